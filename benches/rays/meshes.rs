@@ -105,7 +105,7 @@ pub fn rays(tree: &WideBvh, mesh: &TriangleMesh) -> Rays {
         let disk = warp::disk(Vec2::new(x, y));
         let up = (1.0 - disk.length_squared()).max(0.0).sqrt();
         rays.diffuse.push(Ray::new(origin, Frame::from_normal(normal).to_world(disk.extend(up))));
-        rays.shadow.push(Ray::segment_ending_before(origin, light));
+        rays.shadow.push(Ray::segment_ending_before_point(origin, light));
     }
     rays
 }

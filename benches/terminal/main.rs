@@ -24,7 +24,7 @@ use std::time::{Duration, Instant};
 use glimt::film::Srgb8Image;
 use glimt::pipeline::protocol::MaxPreviewSize;
 use glimt::tui::ColorDepth;
-use glimt::tui::paint::{Fidelity, PacingAdvice, PacingInputs, Painter, advise_on_preview};
+use glimt::tui::paint::{Fidelity, PacingAdvice, PacingInputs, Painter, pace_preview};
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use ratatui::style::Color;
@@ -173,7 +173,7 @@ impl Window {
                 is_final: shot.is_final,
                 final_in: None,
             };
-            if let PacingAdvice::Aim(fidelity) = advise_on_preview(&moment) {
+            if let PacingAdvice::Aim(fidelity) = pace_preview(&moment) {
                 (aimed, at) = (shot.samples, shot.seconds);
                 bytes += self.aim(&shot.picture, fidelity);
                 pictures += 1;

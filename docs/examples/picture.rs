@@ -14,7 +14,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 pub(crate) fn render_to_png(scene: &str, png: &str) -> Result<(), Box<dyn Error>> {
     let token = CancelToken::new();
     let options = Overrides { samples: Some(4), ..Overrides::default() };
-    let rendered = HeadlessSession::default().render(scene.as_ref(), &options, &token)?;
+    let rendered = HeadlessSession::default().render_in_memory(scene.as_ref(), &options, &token)?;
     let bytes = encode(&rendered.image, &EncodeOptions::default(), Format::Png, &token)?;
     Ok(std::fs::write(png, bytes)?)
 }

@@ -414,7 +414,8 @@ fn mesh_accepts_a_matrix() {
         assert_eq!(errors(&outcome.diagnostics), [""; 0], "{placed}");
         outcome.scene.expect("a scene")
     };
-    let transform = |placed: &str| scene(placed).objects[0].shape.mesh().expect("a mesh").placed.transform();
+    let transform =
+        |placed: &str| scene(placed).objects[0].shape.as_mesh().expect("a mesh").placed.to_transform();
     let by_matrix = transform("matrix = [0, -2, 0, 5, 1, 0, 0, 6, 0, 0, -3, 7, 0, 0, 0, 1]");
     let by_steps = transform("scale = [1, 2, -3]\nrotate = [0, 0, 90]\ntranslate = [5, 6, 7]");
     assert_eq!(by_matrix, by_steps);

@@ -87,7 +87,7 @@ pub struct Args {
 
 impl Args {
     /// Returns the command's `--color` option.
-    pub(super) fn color(&self) -> ColorDepthChoice {
+    pub(super) fn color_depth_choice(&self) -> ColorDepthChoice {
         match &self.command {
             Some(Subcommand::Check { color, .. }) => *color,
             Some(Subcommand::Bench(bench)) => bench.color,
@@ -626,7 +626,7 @@ fn choice_long_help<C: Choice>(about: &str) -> String {
 /// Returns the long help for `--output`, with the extensions of all supported formats.
 fn outputs_help() -> String {
     // Skip jpeg: it is the same format as jpg.
-    let still: Vec<_> = Format::known_extensions().filter(|ending| *ending != "jpeg").collect();
+    let still: Vec<_> = Format::all_extensions().filter(|ending| *ending != "jpeg").collect();
     let moving: Vec<_> = AnimationFormat::known_extensions().collect();
     format!(
         "Output file; can be given several times\n\n\

@@ -50,7 +50,7 @@ pub(super) fn lower_args(args: RenderArgs) -> Result<RenderRequest, String> {
         }
         // Parts can have any file name.
         Some(_) => {}
-        None if args.turntable.is_some() => check_turntable(&args)?,
+        None if args.turntable.is_some() => check_turntable_args(&args)?,
         None => check_outputs(&args.outputs)?,
     }
     if args.turntable.is_some() && args.shard.is_some() {
@@ -95,7 +95,7 @@ pub(super) fn lower_args(args: RenderArgs) -> Result<RenderRequest, String> {
 }
 
 /// Checks that every frame of a turntable has its own file and that no single-image options are used.
-fn check_turntable(args: &RenderArgs) -> Result<(), String> {
+fn check_turntable_args(args: &RenderArgs) -> Result<(), String> {
     if !args.once {
         return Err("--turntable needs --once: the terminal UI shows one image".to_owned());
     }

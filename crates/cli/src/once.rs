@@ -32,7 +32,7 @@ const TICK: Duration = Duration::from_millis(50);
 /// Runs `--once`.
 pub(super) fn run(order: &RenderRequest, console: &Console) -> Exit {
     // Lower the priority before starting threads, because threads inherit it.
-    priority::lower_inherited_priority(order.nice);
+    priority::lower_thread_and_child_priority(order.nice);
     let worker = match start(0) {
         Ok(worker) => worker,
         Err(error) => return console.print_error(Exit::FAILED, &describe_start_failure(1, false, &error)),
@@ -233,7 +233,7 @@ fn handle_events(
                 if !reporter.reports_diagnostics() {
                     console.print_diagnostics(&warnings);
                 }
-                return report_done(
+                return report_written_images(
                     &report,
                     (&written.images[before..], turn),
                     &unwritten,
@@ -363,7 +363,7 @@ fn ineffective_option_warnings(asked: &Overrides, settings: &EffectiveSettings) 
     dof.into_iter().chain(photons).collect()
 }
 
-fn report_done(
+fn report_written_images(
     report: &Report,
     (written, turn): (&[PathBuf], Option<TurntableFrame>),
     unwritten: &[String],

@@ -95,11 +95,11 @@ fn summarize(
     mut warnings: Vec<Diagnostic>,
 ) -> SceneSummary {
     let scene = &parsed.loaded.scene;
-    let triangles = |shape: &Shape| match shape.lowered(DVec3::ZERO) {
+    let triangles = |shape: &Shape| match shape.to_traced_shape_relative_to(DVec3::ZERO) {
         LoweredShape::Shape(shape) => shape.triangle_count(),
         LoweredShape::Mesh(mesh) => meshes[mesh.file].mesh.mesh.triangles.len() as u64,
     };
-    let emits = |object: &&Object| match (object.material, object.shape.mesh()) {
+    let emits = |object: &&Object| match (object.material, object.shape.as_mesh()) {
         (Some(index), _) => scene.materials[index].emits(),
         (None, Some(mesh)) => meshes[mesh.file].mesh.materials.iter().any(FileMaterial::emits),
         (None, None) => false,

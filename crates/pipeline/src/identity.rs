@@ -36,7 +36,7 @@ impl ImageDependencies<'_> {
         let scene_path = &self.parsed.loaded.path;
         let others = self.files.iter().filter(|file| file.path != *scene_path);
         traits.extend(others.map(|file| {
-            RenderInput::file(&path_relative_to_scene(&file.path, scene_path), hash_or_reason(file))
+            RenderInput::from_file(&path_relative_to_scene(&file.path, scene_path), hash_or_reason(file))
         }));
         traits.push(RenderInput::from_combined_hash(self.fingerprint().to_string()));
         traits

@@ -117,7 +117,7 @@ impl ProtectedInputs {
     }
 
     /// Whether a path currently refers to one of the files.
-    pub(super) fn contain(&self, path: &Path) -> bool {
+    pub(super) fn contains_path(&self, path: &Path) -> bool {
         FileIdentity::from_path(path).is_some_and(|_| self.build_identity_index().find(path).is_some())
     }
 }
@@ -159,7 +159,7 @@ mod tests {
         }]);
         for (name, is_input) in [("t.png", true), ("T.PNG", true), ("other.png", false), ("none.png", false)]
         {
-            assert_eq!(inputs.contain(&at(name)), is_input, "{name}");
+            assert_eq!(inputs.contains_path(&at(name)), is_input, "{name}");
         }
     }
 }

@@ -186,7 +186,7 @@ pub(crate) fn surfaces_key(
             Some(index) => key.add_usize(1).add(&scene.materials[index], of),
             None => key.add_usize(0),
         };
-        key.add_bool(object.shape.mesh().is_some_and(|mesh| mesh.vertex_colors));
+        key.add_bool(object.shape.as_mesh().is_some_and(|mesh| mesh.vertex_colors));
     }
     for texture in textures {
         key.add_fingerprint(texture);

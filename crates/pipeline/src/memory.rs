@@ -121,11 +121,11 @@ impl MemoryEstimate {
     /// # Errors
     /// Returns a breakdown and a suggested fix if the render needs more memory than the limit.
     pub(super) fn check(&self, plan: &RenderPlan) -> Result<u64, AbortReason> {
-        self.bytes_left_within_given_limit(plan, memory_limit)
+        self.check_with_system_limit(plan, memory_limit)
     }
 
     /// Like [`Self::check`], but takes the system's limit as a parameter.
-    fn bytes_left_within_given_limit(
+    fn check_with_system_limit(
         &self,
         plan: &RenderPlan,
         limit: impl FnOnce() -> Option<MemoryLimit>,
@@ -268,7 +268,7 @@ mod tests {
         let limit = || Some(MemoryLimit { bytes: 8 << 20, setting: "the control group (x)".to_owned() });
         let check = |overrides: &Overrides| {
             let plan = planned(overrides);
-            MemoryEstimate::for_image(&plan).bytes_left_within_given_limit(&plan, limit)
+            MemoryEstimate::for_image(&plan).check_with_system_limit(&plan, limit)
         };
         let said = match check(&Overrides::default()) {
             Err(AbortReason::Failed(Failure::Work(said))) => said,

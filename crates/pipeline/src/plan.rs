@@ -11,7 +11,7 @@ use super::turntable::{self, TurntableFrame};
 use crate::choice::Choice;
 use crate::film::range_map::{DataKind, RangeMap};
 use crate::film::tone::ToneMapping;
-use crate::film::{Quantity, Rect};
+use crate::film::{FilmQuantity, Rect};
 use crate::integrators::{AovSource, FirstHitQuantity, LightAov, PhotonSettings, RenderSettings};
 use crate::math::Vec3;
 use crate::output::AnimationFormat;
@@ -88,7 +88,7 @@ pub(super) fn resolve_plan(
         render.background = Vec3::ZERO;
     }
     check_crop(overrides.crop, render.width, render.height)?;
-    let aperture = scene.camera.aperture();
+    let aperture = scene.camera.lens_radius();
     let settings = RenderSettings {
         render,
         dof: overrides.dof != Some(false) && aperture > 0.0,
@@ -326,7 +326,7 @@ fn check_shardable(settings: &RenderSettings, overrides: &Overrides) -> Result<(
             "`--shard` does not work with photons and a noise target: each pass needs the whole image";
         return refused(message, "use --error 0 with --samples, or --photons off");
     }
-    if settings.gathers_photons() && settings.view.aov_source() == AovSource::Film(Quantity::Error) {
+    if settings.gathers_photons() && settings.view.aov_source() == AovSource::Film(FilmQuantity::Error) {
         return refused(
             "`--shard` does not work with photons and the `error` view",
             "render it without --shard, or use --photons off",
@@ -347,7 +347,9 @@ fn check_format(path: &Path, size: (u32, u32), bit_depth: u8) -> Result<(), Box<
 /// Returns the tone mapping for a view. Exposure and tone curve apply only to light, not to data.
 fn tone_mapping(exposure: f32, curve: Tonemap, view: ViewMode) -> ToneMapping {
     match view.aov_source() {
-        AovSource::Light(LightAov::Radiance(_)) | AovSource::Bounds | AovSource::Film(Quantity::Radiance) => {
+        AovSource::Light(LightAov::Radiance(_))
+        | AovSource::Bounds
+        | AovSource::Film(FilmQuantity::Radiance) => {
             ToneMapping { exposure_stops: exposure, curve, ..Default::default() }
         }
         AovSource::FirstHit(FirstHitQuantity::Depth) => {
@@ -355,7 +357,7 @@ fn tone_mapping(exposure: f32, curve: Tonemap, view: ViewMode) -> ToneMapping {
         }
         AovSource::Light(LightAov::TraversalCost)
         | AovSource::FirstHit(FirstHitQuantity::Photons)
-        | AovSource::Film(Quantity::Samples | Quantity::Error) => {
+        | AovSource::Film(FilmQuantity::Samples | FilmQuantity::Error) => {
             ToneMapping { range_map: RangeMap::Unresolved(DataKind::Amounts), ..ToneMapping::DATA }
         }
         AovSource::FirstHit(
@@ -462,7 +464,7 @@ mod tests {
             std::fs::write(&path, format!("[render]\noutput = \"a.{ending}\"\n{camera}")).expect("written");
             crate::scene::load(&path, &[])
         };
-        for ending in Format::known_extensions() {
+        for ending in Format::all_extensions() {
             assert!(load(ending).is_ok(), "{ending}");
         }
         let wrong = format!("{:?}", load("xyz").expect_err("an unknown format"));
@@ -470,7 +472,7 @@ mod tests {
         for ending in ["png", "exr", "hdr", "jpg", "jpeg", "ppm", "webp", "tga", "bmp"] {
             assert_eq!(
                 offered.contains(ending),
-                Format::known_extensions().any(|known| known == ending),
+                Format::all_extensions().any(|known| known == ending),
                 "{ending}: {wrong}"
             );
         }
@@ -517,7 +519,7 @@ mod tests {
             let transfer = planned("", &overrides).tone.transfer;
             let is_display_value = match view.aov_source() {
                 AovSource::FirstHit(_) | AovSource::Light(LightAov::TraversalCost) => true,
-                AovSource::Film(quantity) => quantity != Quantity::Radiance,
+                AovSource::Film(quantity) => quantity != FilmQuantity::Radiance,
                 AovSource::Light(LightAov::Radiance(_) | LightAov::LitFraction) | AovSource::Bounds => false,
             };
             assert_eq!(transfer == Transfer::Identity, is_display_value, "{}", view.name());

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::output::{may_replace_image, part, scene_name_in_png, scene_path};
+use crate::output::{check_image_replaceable, part, scene_name_in_png, scene_path};
 
 /// Which existing files an image must not replace.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -17,7 +17,7 @@ pub(crate) enum OverwriteProtection {
 
 /// A file that an image must not replace.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum OverwriteConflict {
+pub(crate) enum OverwriteRefusalReason {
     /// The image of another scene.
     OtherScene,
     /// A file that is not an image written by glimt.
@@ -26,21 +26,21 @@ pub(crate) enum OverwriteConflict {
 
 impl OverwriteProtection {
     /// Returns why an image must not replace the file at a path, or `None` if it may.
-    pub(crate) fn reason_to_keep(&self, at: &Path) -> Option<OverwriteConflict> {
+    pub(crate) fn reason_to_keep(&self, at: &Path) -> Option<OverwriteRefusalReason> {
         match self {
-            Self::OtherImages(_) if may_replace_image(at).reason_to_keep().is_some() => {
-                Some(OverwriteConflict::Foreign)
+            Self::OtherImages(_) if check_image_replaceable(at).reason_to_keep().is_some() => {
+                Some(OverwriteRefusalReason::Foreign)
             }
             Self::OtherImages(scene) => {
-                source_scene_if_different(scene, at).map(|_| OverwriteConflict::OtherScene)
+                recorded_scene_if_different(scene, at).map(|_| OverwriteRefusalReason::OtherScene)
             }
-            Self::Parts => part::is_part(at).then_some(OverwriteConflict::Foreign),
+            Self::Parts => part::is_part(at).then_some(OverwriteRefusalReason::Foreign),
             Self::Nothing => None,
         }
     }
 }
 
 /// Returns the scene recorded in an image written by glimt, unless it is this scene.
-pub(crate) fn source_scene_if_different(scene: &Path, at: &Path) -> Option<String> {
+pub(crate) fn recorded_scene_if_different(scene: &Path, at: &Path) -> Option<String> {
     scene_name_in_png(at).filter(|named| !scene_path::metadata_path_refers_to_scene(named, scene, at))
 }

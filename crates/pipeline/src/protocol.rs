@@ -286,7 +286,7 @@ pub enum Event {
         /// Request number.
         generation: u64,
         /// How the render ended.
-        end: LastValidSceneOutcome,
+        end: LastValidSceneRenderOutcome,
     },
     /// The request was cancelled by a newer one or by [`Command::Cancel`].
     Cancelled {
@@ -376,7 +376,7 @@ pub enum Failure {
 
 /// How the render of the last valid scene ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum LastValidSceneOutcome {
+pub enum LastValidSceneRenderOutcome {
     /// The image is finished.
     Finished {
         /// Whether the image was already finished, so that nothing had to be rendered or written.

@@ -13,7 +13,7 @@ use super::render::film_state::FilmState;
 use super::sink::EventSink;
 use super::stages::parse::ParsedScene;
 use crate::control::CancelToken;
-use crate::film::Quantity;
+use crate::film::FilmQuantity;
 use crate::integrators::RenderSettings;
 use crate::math::DVec2;
 use crate::messages::{
@@ -87,7 +87,7 @@ impl QueryContext {
         let (width, height) = (self.settings.render.width, self.settings.render.height);
         let pixel = |at: f64, side: u32| ((at * f64::from(side)).max(0.0) as u32).min(side - 1);
         let (x, y) = (pixel(spot.x, width), pixel(spot.y, height));
-        let color = state.and_then(|state| state.film.pixel(Quantity::Radiance, x, y));
+        let color = state.and_then(|state| state.film.pixel(FilmQuantity::Radiance, x, y));
         let middle = DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5);
         let thing = self.object_at(self.settings.pixel_to_image_plane(middle));
         PickedPixel { pixel: [x, y], thing, color: color.map(|color| color.to_array()) }
@@ -202,7 +202,7 @@ fn replace_scene_text_if_unchanged(
     let refused = || OutputError::Refused { reason: changed.to_owned() };
     let may_replace = |_: &Path| file_text_equals(path, old).then_some(()).ok_or_else(refused);
     let guard = write::WritePolicy {
-        is_kept: &|path| inputs.contain(path),
+        is_kept: &|path| inputs.contains_path(path),
         may_replace: &may_replace,
         sweep: None,
         losses: AttributeLossPolicy::Refuse,

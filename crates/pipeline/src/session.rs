@@ -29,7 +29,7 @@ impl HeadlessSession {
     ///
     /// # Errors
     /// Returns the reason if no image was rendered.
-    pub fn render(
+    pub fn render_in_memory(
         &mut self,
         scene: &Path,
         overrides: &Overrides,
@@ -80,7 +80,7 @@ impl PendingCommands for NoPendingCommands {
         None
     }
 
-    fn interruption(&self) -> Interruption {
+    fn interruption_reason(&self) -> Interruption {
         Interruption::Replaced
     }
 }
@@ -101,7 +101,7 @@ mod tests {
         let mut session = HeadlessSession::default();
         let mut render = |seed, samples| {
             let overrides = Overrides { seed: Some(seed), samples: Some(samples), ..Overrides::default() };
-            session.render(&scene, &overrides, &CancelToken::new()).expect("an image")
+            session.render_in_memory(&scene, &overrides, &CancelToken::new()).expect("an image")
         };
         let (one, again, other, more) = (render(1, 2), render(1, 2), render(2, 2), render(1, 4));
         assert_eq!((one.image.width, one.image.height), (8, 6));
@@ -116,14 +116,17 @@ mod tests {
     #[test]
     fn failed_or_cancelled_render_returns_no_image() {
         let token = CancelToken::new();
-        let missing =
-            HeadlessSession::default().render(Path::new("none.toml"), &Overrides::default(), &token);
+        let missing = HeadlessSession::default().render_in_memory(
+            Path::new("none.toml"),
+            &Overrides::default(),
+            &token,
+        );
         assert!(matches!(missing, Err(RenderFailure::Failed(Failure::Scene(_)))));
         let folder = tempfile::tempdir().expect("a folder");
         let scene = folder.path().join("a.toml");
         std::fs::write(&scene, SCENE).expect("written");
         token.cancel();
-        let cancelled = HeadlessSession::default().render(&scene, &Overrides::default(), &token);
+        let cancelled = HeadlessSession::default().render_in_memory(&scene, &Overrides::default(), &token);
         assert!(matches!(cancelled, Err(RenderFailure::Cancelled)));
     }
 }

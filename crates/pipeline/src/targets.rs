@@ -6,14 +6,14 @@ use std::path::{Path, PathBuf};
 
 use super::inputs::{InputIndex, ProtectedInput, ProtectedInputs};
 use super::plan::{OutputNameSource, RenderPlan};
-use super::protected::{OverwriteProtection, source_scene_if_different};
+use super::protected::{OverwriteProtection, recorded_scene_if_different};
 use super::render::checkpointer::checkpoint_path;
 use super::report::ReportRecognitionFields;
 use super::sink::EventSink;
 use crate::output::part::{self, PartFile};
 use crate::output::write::{SweptFolders, WritePolicy};
 use crate::output::{
-    AttributeLossPolicy, FileIdentity, OutputError, ReplaceCheck, may_replace_image, may_replace_json,
+    AttributeLossPolicy, FileIdentity, OutputError, ReplaceCheck, check_image_replaceable, may_replace_json,
 };
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::has_mesh_extension;
@@ -65,7 +65,8 @@ pub(super) fn output_conflicts(plan: &RenderPlan, inputs: &ProtectedInputs) -> V
     }
     let twin =
         |target: OutputTarget<'_>, at: &FileIdentity| first.get(at).copied().filter(|first| *first != target);
-    let each = targets(plan).filter_map(|target| find_conflict(plan, target, target.path, &inputs, twin));
+    let each = targets_of_all_frames(plan)
+        .filter_map(|target| find_conflict(plan, target, target.path, &inputs, twin));
     each.chain(linked_frame_conflicts(plan)).collect()
 }
 
@@ -116,7 +117,7 @@ pub(super) fn write_guarded<'a, T>(
         }
     };
     write(&WritePolicy {
-        is_kept: &|path| inputs.contain(path),
+        is_kept: &|path| inputs.contains_path(path),
         may_replace: &may_replace,
         sweep,
         losses: AttributeLossPolicy::Report(&|warning| sink.send_write_warning(warning)),
@@ -130,7 +131,7 @@ fn format_conflict_line(conflict: &Diagnostic) -> String {
 }
 
 /// Returns the files of this request, then the files of later turntable frames.
-fn targets(plan: &RenderPlan) -> impl Iterator<Item = OutputTarget<'_>> {
+fn targets_of_all_frames(plan: &RenderPlan) -> impl Iterator<Item = OutputTarget<'_>> {
     let picture = |path| OutputTarget::for_image(plan, path);
     current_targets(plan).chain(plan.later_outputs.iter().map(PathBuf::as_path).map(picture))
 }
@@ -203,8 +204,9 @@ fn foreign_file_error(plan: &RenderPlan, target: OutputTarget<'_>, at: &Path) ->
                 None => name.to_string(),
             };
             let help = format!("{remedy}; -o {own} or --force replaces it");
-            let replaced = may_replace_image(at);
-            if let (ReplaceCheck::Own, Some(other)) = (&replaced, source_scene_if_different(&plan.path, at)) {
+            let replaced = check_image_replaceable(at);
+            if let (ReplaceCheck::Own, Some(other)) = (&replaced, recorded_scene_if_different(&plan.path, at))
+            {
                 let message = format!("cannot write {name}: it is the image of another scene, {other}");
                 return Some(command_line_error(message, Some(help)));
             }

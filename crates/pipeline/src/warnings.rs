@@ -13,7 +13,7 @@ use crate::scene::{LoadedScene, is_model};
 
 /// The setting that caused a warning.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum WarningSetting {
+enum WarnedSetting {
     Integrator,
     Photons,
     PhotonCount,
@@ -34,7 +34,7 @@ pub(super) fn settings_warnings(
 
 /// Adds the location of the setting that caused a warning.
 fn warning_at_setting(
-    cause: WarningSetting,
+    cause: WarnedSetting,
     message: String,
     loaded: &LoadedScene,
     overrides: &Overrides,
@@ -44,7 +44,7 @@ fn warning_at_setting(
         let help = Some(format!("caused by `{option}`, not by the scene"));
         return Diagnostic { severity, message, path: PathBuf::new(), place: None, help };
     }
-    if cause == WarningSetting::Clamp && is_model(&loaded.path) {
+    if cause == WarnedSetting::Clamp && is_model(&loaded.path) {
         let message = message.replace(CLAMP_EFFECT, CLAMP_EFFECT_ON_MODELS);
         let help = Some("`--clamp 0` turns it off".to_owned());
         return Diagnostic { severity, message, path: loaded.path.clone(), place: None, help };
@@ -55,7 +55,7 @@ fn warning_at_setting(
     }
 }
 
-impl WarningSetting {
+impl WarnedSetting {
     /// Returns the command-line option if it overrides the scene.
     fn command_line_option(self, overrides: &Overrides) -> Option<String> {
         match self {
@@ -81,7 +81,7 @@ impl WarningSetting {
     }
 }
 
-fn find_warnings(scene: &Scene, settings: &RenderSettings) -> Vec<(WarningSetting, String)> {
+fn find_warnings(scene: &Scene, settings: &RenderSettings) -> Vec<(WarnedSetting, String)> {
     let RenderSettings { render, photons, .. } = &settings.without_ineffective_settings();
     let finds_all_light = render.integrator.properties().scatters;
     let is_specular = |kind: &MaterialKind| kind.has_delta_lobe();
@@ -97,27 +97,27 @@ fn find_warnings(scene: &Scene, settings: &RenderSettings) -> Vec<(WarningSettin
     if finds_all_light && is_sharp_any && has(&keeps_direction) {
         let message = "path does not find light from a [[light]] of zero size through mirrors or glass: the caustics \
                        are missing";
-        warnings.push((WarningSetting::Integrator, message.to_owned()));
+        warnings.push((WarnedSetting::Integrator, message.to_owned()));
     }
     if photons.is_some()
         && has(&is_specular)
         && scene.lights.iter().any(|light| light.has_emission() && light.has_constant_falloff())
     {
         let message = "photons ignore lights with `falloff = \"none\"`: mirrors and glass reflect none of their light onto surfaces";
-        warnings.push((WarningSetting::Photons, message.to_owned()));
+        warnings.push((WarnedSetting::Photons, message.to_owned()));
     }
     if photons.is_none() && settings.view == ViewMode::Photons {
         let message = "the `photons` view is empty: photons are off or the integrator is `path`";
-        warnings.push((WarningSetting::View, message.to_owned()));
+        warnings.push((WarnedSetting::View, message.to_owned()));
     }
     if photons.is_some() && scene.photons.count > MAX_PHOTONS {
         let message =
             format!("`count` exceeds the maximum of {MAX_PHOTONS} photons per pass, which limits memory use");
-        warnings.push((WarningSetting::PhotonCount, message));
+        warnings.push((WarnedSetting::PhotonCount, message));
     }
     if render.clamp > 0.0 {
         let message = format!("`clamp = {}` {CLAMP_EFFECT}", render.clamp);
-        warnings.push((WarningSetting::Clamp, message));
+        warnings.push((WarnedSetting::Clamp, message));
     }
     warnings
 }

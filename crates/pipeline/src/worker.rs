@@ -289,7 +289,7 @@ impl PendingCommands for CommandSender {
         self.lock().queries.pop_front()
     }
 
-    fn interruption(&self) -> Interruption {
+    fn interruption_reason(&self) -> Interruption {
         let mailbox = self.lock();
         match (mailbox.suspended, mailbox.quit) {
             (true, _) => Interruption::Ended,
@@ -315,7 +315,7 @@ impl Worker {
         loop {
             let outcome = match self.remote.wait_for_next_task() {
                 Task::Quit => {
-                    engine.checkpoint_saved_scene_image(&sink, self.remote.interruption());
+                    engine.checkpoint_saved_scene_image(&sink, self.remote.interruption_reason());
                     break;
                 }
                 Task::Write if self.remote.postpone_write_to_pending(engine.has_sample_in_every_pixel()) => {

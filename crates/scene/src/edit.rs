@@ -102,21 +102,21 @@ impl CameraEdits<'_> {
     }
 
     /// Returns the text before a key on the same line.
-    fn indent(&self, key: &KeyValue<'_>) -> &str {
+    fn text_before_key_on_line(&self, key: &KeyValue<'_>) -> &str {
         let line = self.text[..key.span.start].rfind('\n').map_or(0, |end| end + 1);
         &self.text[line..key.span.start]
     }
 
     /// Whether a key is the first on its line, possibly in the form `camera.key`.
     fn is_first_key_on_line(&self, key: &KeyValue<'_>) -> bool {
-        let indent = self.indent(key).trim();
+        let indent = self.text_before_key_on_line(key).trim();
         indent.is_empty() || indent.ends_with('.')
     }
 
     /// Returns the separator between this entry and the next one.
     fn separator_after(&self, key: &KeyValue<'_>) -> String {
         if self.is_first_key_on_line(key) {
-            format!("{}{}", self.line_ending_after(key), self.indent(key))
+            format!("{}{}", self.line_ending_after(key), self.text_before_key_on_line(key))
         } else {
             ", ".to_owned()
         }

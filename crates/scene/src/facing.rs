@@ -75,13 +75,13 @@ fn max_shape_projection(shape: &Shape, bounds: &[MeshBoundingBox], direction: DV
         let of = |mesh: &MeshReference| {
             Some(transformed_box_corners(mesh, bounds.get(mesh.file).copied().flatten()?))
         };
-        shape.mesh().and_then(of).map_or(f64::NEG_INFINITY, |corners| max_projection(direction, &corners))
+        shape.as_mesh().and_then(of).map_or(f64::NEG_INFINITY, |corners| max_projection(direction, &corners))
     })
 }
 
 /// Returns the transformed corners of a mesh's bounding box.
 fn transformed_box_corners(mesh: &MeshReference, [least, greatest]: [DVec3; 2]) -> [DVec3; 8] {
-    let place = mesh.placed.transform();
+    let place = mesh.placed.to_transform();
     std::array::from_fn(|number| {
         let far = DVec3::new((number & 1) as f64, (number >> 1 & 1) as f64, (number >> 2) as f64);
         place.point(least + (greatest - least) * far)

@@ -49,7 +49,7 @@ pub struct OutlineKey {
 }
 
 /// Returns the tables in a text, in the order in which glimt defines them.
-pub fn outline(text: &str) -> Vec<OutlineTable> {
+pub fn document_outline(text: &str) -> Vec<OutlineTable> {
     let (document, _) = toml::parse(text);
     let of = |info: &'static TableInfo| {
         let found = document.root().get(info.name);
@@ -142,7 +142,7 @@ fn table_entries(value: Value<'_>) -> Option<Entries<'_>> {
 
 impl OutlineTable {
     /// Returns the keys allowed for the table's type, or for any type if the table's type is unknown.
-    pub fn known_keys(&self) -> Vec<&'static KeyInfo> {
+    pub fn keys_allowed_for_type(&self) -> Vec<&'static KeyInfo> {
         match self.kind {
             None if !self.info.types.is_empty() => {
                 let all = self.info.types.iter().flat_map(|kind| kind.keys);
@@ -179,7 +179,7 @@ mod tests {
 
     #[test]
     fn tables_have_names_types_and_paths() {
-        let found: Vec<(Vec<String>, &str)> = outline(TEXT)
+        let found: Vec<(Vec<String>, &str)> = document_outline(TEXT)
             .iter()
             .map(|table| (table.set_arg_prefixes(), table.kind.map_or("", |kind| kind.name)))
             .collect();
@@ -202,7 +202,7 @@ mod tests {
 
     #[test]
     fn inline_table_keys_have_spans() {
-        let tables = outline(TEXT);
+        let tables = document_outline(TEXT);
         let wall = tables
             .iter()
             .find(|table| table.set_arg_prefixes() == ["materials.\"back wall\""])
@@ -215,13 +215,13 @@ mod tests {
 
     #[test]
     fn unknown_types_allow_all_keys() {
-        let tables = outline(TEXT);
+        let tables = document_outline(TEXT);
         let known = |path: &str| {
             let table = tables
                 .iter()
                 .find(|table| table.set_arg_prefixes().contains(&path.to_owned()))
                 .expect("a table");
-            table.known_keys().iter().map(|key| key.name).collect::<Vec<_>>()
+            table.keys_allowed_for_type().iter().map(|key| key.name).collect::<Vec<_>>()
         };
         assert_eq!(
             known("light.1"),

@@ -12,7 +12,7 @@ use super::other_content::{NEW_SCENE_HELP, NonSceneContent, detect_non_scene, ha
 use super::sanitize::escape_invisible_chars;
 use super::{MAX_FILE_BYTES, MAX_PARTS, MODEL_NOT_FOUND, SCENE_NOT_FOUND};
 use crate::system::file::{self, FileKind};
-use crate::system::{RAISE_FILE_LIMIT, describe_error, folder, is_out_of_files};
+use crate::system::{RAISE_FILE_LIMIT, describe_error, folder, is_too_many_open_files};
 
 /// Error message for binary files.
 const NOT_TEXT: &str = "this is a binary file, not a scene";
@@ -27,7 +27,7 @@ const LFS_HELP: &str = "run `git lfs pull`";
 /// Reads the text of a scene file.
 pub(super) fn read_scene_text(path: &Path) -> Result<Arc<str>, Box<Diagnostic>> {
     if is_model(path) {
-        return Err(mesh_file_error(path));
+        return Err(mesh_instead_of_scene_error(path));
     }
     if is_unsupported_model(path) {
         let ending = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
@@ -66,17 +66,17 @@ pub(super) fn binary_file_error(path: &Path) -> Box<Diagnostic> {
 }
 
 /// Creates the error for a mesh passed instead of a scene.
-fn mesh_file_error(path: &Path) -> Box<Diagnostic> {
+fn mesh_instead_of_scene_error(path: &Path) -> Box<Diagnostic> {
     let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
     let help = format!(
         "to use it in a scene, add [[mesh]] with {}; {NEW_SCENE_HELP}",
-        format_mesh_file_entry(&escape_invisible_chars(&name))
+        format_mesh_file_key(&escape_invisible_chars(&name))
     );
     Diagnostic::error(path, MESH_NOT_SCENE.to_owned(), Some(help), None)
 }
 
 /// Formats the key `file` in `[[mesh]]` for help texts.
-fn format_mesh_file_entry(name: &str) -> String {
+fn format_mesh_file_key(name: &str) -> String {
     format!("`file = \"{name}\"`")
 }
 
@@ -134,7 +134,7 @@ fn read_bytes(path: &Path) -> Result<Vec<u8>, Refusal> {
         return Err(too_large_refusal());
     }
     if count_syntax_elements(&bytes) > MAX_PARTS {
-        return Err(large_refusal(format!(
+        return Err(refusal_suggesting_mesh_files(format!(
             "the scene file has more than {} million syntax elements",
             MAX_PARTS >> 20
         )));
@@ -161,10 +161,10 @@ fn not_regular_refusal(path: &Path, kind: FileKind) -> Refusal {
 }
 
 fn too_large_refusal() -> Refusal {
-    large_refusal(format!("the scene file is larger than {} MiB", MAX_FILE_BYTES >> 20))
+    refusal_suggesting_mesh_files(format!("the scene file is larger than {} MiB", MAX_FILE_BYTES >> 20))
 }
 
-fn large_refusal(message: String) -> Refusal {
+fn refusal_suggesting_mesh_files(message: String) -> Refusal {
     (message, Some("put large geometry in mesh files and reference them with [[mesh]]".to_owned()))
 }
 
@@ -187,7 +187,7 @@ fn unreadable_refusal(path: &Path, error: &io::Error) -> Refusal {
         let message = if is_model { MODEL_NOT_FOUND } else { SCENE_NOT_FOUND };
         return (message.to_owned(), help);
     }
-    let help = is_out_of_files(error).then(|| RAISE_FILE_LIMIT.to_owned());
+    let help = is_too_many_open_files(error).then(|| RAISE_FILE_LIMIT.to_owned());
     (format!("cannot read the scene file: {}", describe_error(error)), help)
 }
 
@@ -322,7 +322,7 @@ mod tests {
             std::fs::write(&path, content).expect("written");
             let Diagnostic { message, help, .. } = message(&path);
             assert_eq!(message, MESH_NOT_SCENE);
-            assert!(help.expect("a help text").contains(&format_mesh_file_entry(name)));
+            assert!(help.expect("a help text").contains(&format_mesh_file_key(name)));
         }
         let scene = folder.path().join("scene.obj");
         std::fs::write(&scene, "[camera]\n").expect("written");

@@ -56,11 +56,11 @@ pub struct LineColumnLocator(Option<(Arc<str>, LineIndex)>);
 impl LineColumnLocator {
     /// Like [`line_and_column`], but fast for repeated calls with the same text.
     pub fn locate(&mut self, source: &Arc<str>, offset: usize) -> (usize, usize) {
-        let (source, lines) = self.line_index_for_source(source);
+        let (source, lines) = self.cached_line_index(source);
         lines.locate(source, offset)
     }
 
-    fn line_index_for_source(&mut self, source: &Arc<str>) -> &(Arc<str>, LineIndex) {
+    fn cached_line_index(&mut self, source: &Arc<str>) -> &(Arc<str>, LineIndex) {
         self.0 = self.0.take().filter(|(known, _)| Arc::ptr_eq(known, source));
         self.0.get_or_insert_with(|| (Arc::clone(source), LineIndex::new(source)))
     }
@@ -107,7 +107,7 @@ fn render_diagnostic(
     let mut snippet = None;
     let mut note = None;
     if let Some(place) = &diagnostic.place {
-        let (source, lines) = index.line_index_for_source(&place.source);
+        let (source, lines) = index.cached_line_index(&place.source);
         let (line, column) = lines.locate(source, place.span.start);
         origin = origin.line(line).char_column(column);
         let whole = lines.line_span(line - 1, source).unwrap_or_default();

@@ -3,13 +3,13 @@
 
 use std::borrow::Cow;
 
-use crate::system::text::is_terminal_safe;
+use crate::system::text::is_terminal_safe_char;
 
 /// Replaces control and invisible characters with visible characters: control pictures such as `␛` for ESC
 /// and `␊` for a line feed, four spaces for a tab, and escapes such as `\u{202e}` for C1 controls,
 /// directional marks and zero-width characters. The result is a single line.
 pub fn escape_invisible_chars(text: &str) -> Cow<'_, str> {
-    if text.chars().all(is_terminal_safe) {
+    if text.chars().all(is_terminal_safe_char) {
         return Cow::Borrowed(text);
     }
     let mut shown = String::with_capacity(text.len() + 16);
@@ -18,7 +18,7 @@ pub fn escape_invisible_chars(text: &str) -> Cow<'_, str> {
             '\t' => shown.push_str("    "),
             '\u{7f}' => shown.push('␡'),
             '\0'..='\u{1f}' => shown.extend(char::from_u32(0x2400 + u32::from(c))),
-            c if is_terminal_safe(c) => shown.push(c),
+            c if is_terminal_safe_char(c) => shown.push(c),
             c => shown.extend(c.escape_unicode()),
         }
     }

@@ -183,11 +183,11 @@ impl Display {
     }
 
     /// Sends everything queued to be sent after the preview.
-    fn flush_after_preview_queue(&mut self, now: Instant) {
+    fn flush_deferred_output(&mut self, now: Instant) {
         let [wanted, sent] = &self.window_titles;
         let mut bytes = Vec::new();
         if wanted.title != sent.title {
-            bytes.extend_from_slice(terminal::take_title_saving_bytes());
+            bytes.extend_from_slice(terminal::take_title_save_sequence());
         }
         if wanted.bar.is_some() {
             terminal::mark_progress_bar_used();
@@ -208,7 +208,7 @@ impl Display {
             return false;
         }
         if self.is_complete {
-            self.flush_after_preview_queue(now);
+            self.flush_deferred_output(now);
             return false;
         }
         let room = room.saturating_sub(BEGIN.len() + END.len());

@@ -4,7 +4,7 @@ use super::color::{ColorDepth, ColorDepthChoice};
 use super::display::TerminalEnvironment;
 use super::graphics::ImageProtocol;
 use super::options::PreviewChoice;
-use super::paint::can_repeat;
+use super::paint::terminal_supports_rep;
 use super::pixel_request::UnconfirmedImageProtocol;
 use super::preview_kind::PreviewKind;
 use super::terminal_replies::TerminalQueries;
@@ -20,7 +20,7 @@ pub(super) fn detect_terminal_environment(variable: impl Fn(&str) -> Option<Stri
             || term.starts_with("screen"),
         is_in_tmux: is_set("TMUX"),
         is_remote: ["SSH_CONNECTION", "SSH_CLIENT", "SSH_TTY"].into_iter().any(is_set),
-        can_repeat: can_repeat(variable),
+        can_repeat: terminal_supports_rep(variable),
         ask: TerminalQueries::default(),
     }
 }

@@ -86,12 +86,12 @@ impl RenderHistory {
     }
 
     /// Records that the scene turned out to be invalid. New entries still show its previous version.
-    pub(super) fn discard_invalid_edits(&mut self) {
+    pub(super) fn discard_edits_of_invalid_scene(&mut self) {
         self.read_edits = self.past.back().map_or(self.read_edits, |newest| newest.edits);
     }
 
     /// Lists file changes between the render being viewed and the newest one.
-    pub(super) fn edits_since_viewed(&self) -> String {
+    pub(super) fn describe_edits_since_viewed(&self) -> String {
         let open = self.open.as_ref().and_then(|(at, _)| self.past.get(*at));
         let edits = open
             .zip(self.past.back())
@@ -134,7 +134,7 @@ impl RenderHistory {
         let known = self.past.iter().position(|past| past.shown.generation == shown.generation);
         let last = self.past.len().checked_sub(1);
         let is_last =
-            |last: &usize| self.past.get(*last).is_some_and(|past| past.is_same_image(&shown, &origin));
+            |last: &usize| self.past.get(*last).is_some_and(|past| past.holds_same_image(&shown, &origin));
         match known.or_else(|| last.filter(is_last)) {
             Some(at) => {
                 let past = &self.past[at];
@@ -144,7 +144,7 @@ impl RenderHistory {
                 }
                 // Keep the origin if the image is the same.
                 let is_same = known.is_none() || past.shown.shows_same_image(&shown);
-                let origin = if is_same { past.origin.or_later_if_camera_saved(origin) } else { origin };
+                let origin = if is_same { past.origin.for_reproduced_image(origin) } else { origin };
                 self.replace_entry_image(at, (shown, time), origin);
                 self.merge_with_previous(at);
             }
@@ -188,11 +188,11 @@ impl RenderHistory {
         let Some(before) = at.checked_sub(1) else { return };
         let is_open = self.open.as_ref().is_some_and(|(open, _)| *open == before);
         let Some((earlier, past)) = self.past.get(before).zip(self.past.get(at)) else { return };
-        if is_open || past.origin.is_unfinished || !earlier.is_same_image(&past.shown, &past.origin) {
+        if is_open || past.origin.is_unfinished || !earlier.holds_same_image(&past.shown, &past.origin) {
             return;
         }
         let (edits, run) = (earlier.edits, past.run.or(earlier.run));
-        let origin = earlier.origin.or_later_if_camera_saved(past.origin.clone());
+        let origin = earlier.origin.for_reproduced_image(past.origin.clone());
         self.remove(before);
         if let Some(past) = self.past.get_mut(before) {
             (past.edits, past.run, past.origin) = (edits, run, origin);
@@ -268,7 +268,7 @@ impl RenderHistory {
     }
 
     /// Scene and settings of the older render being viewed. `None` for the newest one.
-    pub(super) fn viewed_provenance(&self) -> Option<&ImageProvenance> {
+    pub(super) fn viewed_older_provenance(&self) -> Option<&ImageProvenance> {
         let (at, _) = self.open.as_ref()?;
         self.past.get(*at).map(|past| &past.origin)
     }
@@ -338,7 +338,7 @@ impl RenderHistory {
     }
 
     /// Whether an entry belongs to this request.
-    pub(super) fn belongs_to_request(&self, at: usize, generation: u64) -> bool {
+    pub(super) fn entry_belongs_to_request(&self, at: usize, generation: u64) -> bool {
         self.past.get(at).is_some_and(|past| past.shown.generation == generation)
     }
 
@@ -381,7 +381,7 @@ impl RenderHistory {
 impl HistoryEntry {
     /// Whether the entry shows the same image as `shown`. An unfinished image is not considered the same as a
     /// finished one.
-    fn is_same_image(&self, shown: &ShownImage, origin: &ImageProvenance) -> bool {
+    fn holds_same_image(&self, shown: &ShownImage, origin: &ImageProvenance) -> bool {
         let is_of_image =
             self.shown.shows_same_image(shown) && (self.origin.is_unfinished || !origin.is_unfinished);
         // An unfinished image may look the same at first and change later.
@@ -512,7 +512,7 @@ mod tests {
         history.record_shown_image(shown_image(2, 20), Instant::now(), ImageProvenance::default());
         // Break the scene, then fix it.
         edit(&mut history);
-        history.discard_invalid_edits();
+        history.discard_edits_of_invalid_scene();
         edit(&mut history);
         history.record_shown_image(shown_image(4, 20), Instant::now(), ImageProvenance::default());
         let before = history.open_before_edit(shown_image(4, 20)).expect("a picture");
@@ -531,7 +531,7 @@ mod tests {
         edit(&mut history);
         history.record_shown_image(shown_image(2, 20), Instant::now(), ImageProvenance::default());
         history.record_scene_edit();
-        history.discard_invalid_edits();
+        history.discard_edits_of_invalid_scene();
         history.record_shown_image(shown_image(3, 30), Instant::now(), ImageProvenance::default());
         assert_eq!(history.open_before_edit(shown_image(3, 30)).expect("a picture").generation, 1);
     }

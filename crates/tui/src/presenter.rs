@@ -12,7 +12,7 @@ use ratatui::layout::Rect;
 use super::display::Display;
 use super::event::Event;
 use super::file_urls::FileUrlBuilder;
-use super::paint::{Fidelity, Hyperlink, LinksAndDelayedText, PacingAdvice, PacingInputs, advise_on_preview};
+use super::paint::{Fidelity, Hyperlink, LinksAndDelayedText, PacingAdvice, PacingInputs, pace_preview};
 use super::state::State;
 use super::view;
 use super::view::FileLinksAndDelayedText;
@@ -77,7 +77,7 @@ impl Presenter {
         now: Instant,
     ) -> Option<Event> {
         let is_same_request =
-            generation == self.drawn.generation && !self.is_newest_preview_unlike_drawn(state);
+            generation == self.drawn.generation && !self.newest_preview_differs_from_drawn(state);
         if is_same_request && self.pacing_advice(state, now) == PacingAdvice::Wait {
             self.drawn.is_old = true;
             return None;
@@ -86,7 +86,7 @@ impl Presenter {
     }
 
     /// Whether the newest preview differs from the drawn one in size, section or missing photons.
-    fn is_newest_preview_unlike_drawn(&self, state: &State) -> bool {
+    fn newest_preview_differs_from_drawn(&self, state: &State) -> bool {
         let latest = self.previews.lock().unwrap_or_else(PoisonError::into_inner);
         let what = |picture: &Srgb8Image| (picture.width, picture.height);
         latest.as_ref().zip(state.picture.shown.as_ref()).is_some_and(|(new, old)| {
@@ -97,7 +97,7 @@ impl Presenter {
 
     /// Whether to draw a newer preview of the same request.
     fn pacing_advice(&self, state: &State, now: Instant) -> PacingAdvice {
-        advise_on_preview(&self.pacing_inputs(state, now))
+        pace_preview(&self.pacing_inputs(state, now))
     }
 
     fn pacing_inputs(&self, state: &State, now: Instant) -> PacingInputs {
@@ -147,7 +147,7 @@ impl Presenter {
     /// Updates the display's target if a frame is due.
     pub(super) fn draw_if_due(&mut self, state: &mut State, now: Instant) {
         let is_due = state.dirty && (state.urgent || now >= self.next_frame);
-        let is_refined = self.has_room_to_refine(state);
+        let is_refined = self.can_refine_preview(state);
         if !is_due && !is_refined {
             return;
         }
@@ -179,7 +179,7 @@ impl Presenter {
 
     /// Whether the connection is idle while a key moves the camera. The last preview is then on the screen at
     /// reduced precision and the next one has not arrived.
-    fn has_room_to_refine(&self, state: &State) -> bool {
+    fn can_refine_preview(&self, state: &State) -> bool {
         let is_step = state.request.camera_step.generation == Some(self.drawn.generation);
         is_step && self.drawn.is_first && !self.drawn.is_refined && self.display.is_complete()
     }
@@ -238,7 +238,7 @@ impl Presenter {
             .at
             .filter(|_| self.drawn.is_old)
             .and_then(|at| self.pacing_inputs(state, now).next_due_time(at));
-        let refine = self.has_room_to_refine(state).then_some(now);
+        let refine = self.can_refine_preview(state).then_some(now);
         let due = due.into_iter().chain(refine);
         next_wake(state, self.next_frame).into_iter().chain(self.display.next_send_time(now)).chain(due).min()
     }

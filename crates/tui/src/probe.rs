@@ -13,7 +13,7 @@ use super::environment::{detect_terminal_environment, may_print_unknown_escapes}
 use super::input::{DecodedInput, Decoder};
 use super::pixel_request::KITTY_QUERY;
 use super::terminal;
-use super::terminal_replies::{BlockGlyphs, TerminalQueries, TerminalReply};
+use super::terminal_replies::{FinestNativeBlocks, TerminalQueries, TerminalReply};
 use super::terminals::{TerminalBrand, TerminalId};
 
 /// Terminal properties determined from replies and environment variables.
@@ -59,11 +59,11 @@ impl TerminalProbeResult {
     pub fn auto_preview_name(&self) -> &'static str {
         let name = self.answers.as_ref().and_then(|answers| answers.name.as_deref());
         let terminal = name.filter(|_| !self.is_multiplexed).and_then(TerminalId::from_report);
-        match (self.depth, terminal.map_or(BlockGlyphs::Unknown, BlockGlyphs::supported_by)) {
+        match (self.depth, terminal.map_or(FinestNativeBlocks::Unknown, FinestNativeBlocks::supported_by)) {
             (ColorDepth::None, _) => "characters",
-            (_, BlockGlyphs::Octants) => "octants",
-            (_, BlockGlyphs::Sextants) => "sextants",
-            (_, BlockGlyphs::Unknown) => "half blocks",
+            (_, FinestNativeBlocks::Octants) => "octants",
+            (_, FinestNativeBlocks::Sextants) => "sextants",
+            (_, FinestNativeBlocks::Unknown) => "half blocks",
         }
     }
 }
@@ -200,12 +200,14 @@ impl ReceivedReplies {
             | TerminalReply::Images(_)
             | TerminalReply::Other => None,
         };
-        let attributes = self.text_between(b"\x1b[?", b'c').unwrap_or_default();
+        let attributes = self.find_text_between_markers(b"\x1b[?", b'c').unwrap_or_default();
         ProbeReplies {
             round_trip: Duration::ZERO,
-            name: self.text_between(b"\x1bP>|", 0x1b),
+            name: self.find_text_between_markers(b"\x1bP>|", 0x1b),
             has_true_color: self.has_received(TerminalReply::TrueColor),
-            has_kitty: self.text_between(b"\x1b_Gi=4211;", 0x1b).is_some_and(|text| text == "OK"),
+            has_kitty: self
+                .find_text_between_markers(b"\x1b_Gi=4211;", 0x1b)
+                .is_some_and(|text| text == "OK"),
             has_sixel: attributes.split(';').any(|attribute| attribute == "4"),
             is_synchronized: self.has_received(TerminalReply::Synchronized { is_known: true }),
             background: self.answers.iter().find_map(background),
@@ -213,7 +215,7 @@ impl ReceivedReplies {
     }
 
     /// Finds the first text between `begin` and `end` that does not contain an escape character.
-    fn text_between(&self, begin: &[u8], end: u8) -> Option<String> {
+    fn find_text_between_markers(&self, begin: &[u8], end: u8) -> Option<String> {
         let starts = self.bytes.windows(begin.len()).enumerate().filter(|(_, window)| *window == begin);
         starts.into_iter().find_map(|(at, _)| {
             let rest = &self.bytes[at + begin.len()..];

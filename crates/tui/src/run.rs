@@ -259,7 +259,7 @@ impl EventLoop {
             }
             Effect::Suspend if signals::has_shell() => {
                 self.leave_screen();
-                self.screen.suspend();
+                self.screen.restore_until_resumed();
                 // The process stops here. After it continues, SIGCONT requests a redraw.
                 signals::stop_process();
             }
@@ -282,7 +282,7 @@ impl EventLoop {
     fn run_editor(&mut self, place: &FilePosition) -> Option<LoopEnd> {
         self.leave_screen();
         input::set_input_paused(true);
-        self.screen.suspend();
+        self.screen.restore_until_resumed();
         // Outside raw mode, keys send signals.
         let child_signals = signals::leave_signals_to_child();
         terminal::save_modes();

@@ -123,13 +123,13 @@ struct ForegroundChild {
 
 static CHILD: Mutex<ForegroundChild> = Mutex::new(ForegroundChild { id: None, ending: None });
 
-fn lock_child() -> MutexGuard<'static, ForegroundChild> {
+fn lock_foreground_child() -> MutexGuard<'static, ForegroundChild> {
     CHILD.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Sets the child process to which terminating signals are forwarded. `None` if it has exited.
 pub(super) fn set_foreground_child(id: Option<Pid>) {
-    let mut child = lock_child();
+    let mut child = lock_foreground_child();
     child.id = id;
     if let (Some(id), Some(number)) = (id, child.ending) {
         forward_to_child(id, number);
@@ -139,7 +139,7 @@ pub(super) fn set_foreground_child(id: Option<Pid>) {
 /// Forwards the first terminating signal to the child. Ignores later ones, because this process also receives
 /// the signals that it sends to its own job.
 fn forward_termination_to_child(number: Number) {
-    let mut child = lock_child();
+    let mut child = lock_foreground_child();
     if child.ending.replace(number).is_none()
         && let Some(id) = child.id
     {

@@ -105,7 +105,7 @@ impl TerminalSession {
     }
 
     /// Restores the terminal until [`TerminalSession::resume`] is called.
-    pub(super) fn suspend(&mut self) {
+    pub(super) fn restore_until_resumed(&mut self) {
         restore_terminal();
     }
 
@@ -238,7 +238,7 @@ fn prepare_restore_on_abort() {
         let _ = write_image_deletion(&mut delete_images).and_then(|()| write_frame_end_and_leave(&mut leave));
         RestoreData { modes: tcgetattr(io::stdin()).ok().map(Into::into), delete_images, leave }
     });
-    abort::set_terminal_restore(restore_terminal_while_aborting);
+    abort::set_terminal_restore_hook(restore_terminal_while_aborting);
 }
 
 /// Restores the terminal using only async-signal-safe calls, without locks or allocations. If the terminal
@@ -280,7 +280,7 @@ pub(super) fn enable_focus_reports_on_setup() {
 
 /// Bytes to send before setting a window title. The first call returns the sequence that saves the original
 /// title. Later calls return nothing.
-pub(super) fn take_title_saving_bytes() -> &'static [u8] {
+pub(super) fn take_title_save_sequence() -> &'static [u8] {
     if HAS_TITLE.swap(true, Ordering::AcqRel) { b"" } else { KEEP_TITLE }
 }
 
@@ -333,7 +333,7 @@ fn write_restore(out: &mut impl Write) -> io::Result<()> {
 /// Writes the bytes that delete stored images.
 fn write_image_deletion(out: &mut impl Write) -> io::Result<()> {
     out.write_all(STRING_END)?;
-    out.write_all(&graphics::delete_all())
+    out.write_all(&graphics::delete_all_commands())
 }
 
 /// Writes the bytes that end an unfinished frame and switch back to the shell's screen.
@@ -477,12 +477,12 @@ mod tests {
         let _alone = exclusive_access();
         let all = || take_undo_bytes().collect::<Vec<_>>();
         assert!(all().is_empty());
-        assert_eq!((take_title_saving_bytes(), take_title_saving_bytes()), (KEEP_TITLE, &b""[..]));
+        assert_eq!((take_title_save_sequence(), take_title_save_sequence()), (KEEP_TITLE, &b""[..]));
         mark_progress_bar_used();
         mark_links_used();
         assert_eq!(all(), [STRING_END, LINK_OFF, TITLE_BACK, PROGRESS_OFF]);
         assert!(all().is_empty());
-        assert_eq!(take_title_saving_bytes(), KEEP_TITLE, "the new title should be saved again");
+        assert_eq!(take_title_save_sequence(), KEEP_TITLE, "the new title should be saved again");
         assert_eq!(all(), [STRING_END, TITLE_BACK]);
     }
 

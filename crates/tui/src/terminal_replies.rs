@@ -6,7 +6,7 @@ use super::terminals::{TerminalBrand, TerminalId};
 
 /// The finest block characters that a terminal draws without using a font.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum BlockGlyphs {
+pub(super) enum FinestNativeBlocks {
     /// The block characters that the terminal draws are unknown.
     Unknown,
     /// Sextants (Unicode 13).
@@ -15,7 +15,7 @@ pub(super) enum BlockGlyphs {
     Octants,
 }
 
-impl BlockGlyphs {
+impl FinestNativeBlocks {
     /// Returns the block characters that a terminal version supports. All terminals listed here have long
     /// supported sextants.
     pub(super) fn supported_by(terminal: TerminalId) -> Self {
@@ -124,22 +124,22 @@ mod tests {
     #[test]
     fn octant_support_depends_on_version() {
         for (report, blocks) in [
-            ("kitty(0.40.1)", BlockGlyphs::Octants),
-            ("kitty(0.35.2)", BlockGlyphs::Sextants),
-            ("foot(1.20.2)", BlockGlyphs::Octants),
-            ("foot(1.9.0)", BlockGlyphs::Sextants),
-            ("ghostty 1.2.0", BlockGlyphs::Octants),
-            ("ghostty 1.1.3-arch2", BlockGlyphs::Sextants),
-            ("VTE(7802)", BlockGlyphs::Octants),
-            ("WezTerm 20240203-110809-5046fc22", BlockGlyphs::Sextants),
-            ("contour 0.6.0", BlockGlyphs::Sextants),
-            ("kitty", BlockGlyphs::Sextants),
-            ("tmux 3.4", BlockGlyphs::Unknown),
-            ("XTerm(390)", BlockGlyphs::Unknown),
-            ("", BlockGlyphs::Unknown),
+            ("kitty(0.40.1)", FinestNativeBlocks::Octants),
+            ("kitty(0.35.2)", FinestNativeBlocks::Sextants),
+            ("foot(1.20.2)", FinestNativeBlocks::Octants),
+            ("foot(1.9.0)", FinestNativeBlocks::Sextants),
+            ("ghostty 1.2.0", FinestNativeBlocks::Octants),
+            ("ghostty 1.1.3-arch2", FinestNativeBlocks::Sextants),
+            ("VTE(7802)", FinestNativeBlocks::Octants),
+            ("WezTerm 20240203-110809-5046fc22", FinestNativeBlocks::Sextants),
+            ("contour 0.6.0", FinestNativeBlocks::Sextants),
+            ("kitty", FinestNativeBlocks::Sextants),
+            ("tmux 3.4", FinestNativeBlocks::Unknown),
+            ("XTerm(390)", FinestNativeBlocks::Unknown),
+            ("", FinestNativeBlocks::Unknown),
         ] {
-            let found =
-                TerminalId::from_report(report).map_or(BlockGlyphs::Unknown, BlockGlyphs::supported_by);
+            let found = TerminalId::from_report(report)
+                .map_or(FinestNativeBlocks::Unknown, FinestNativeBlocks::supported_by);
             assert_eq!(found, blocks, "{report}");
         }
     }

@@ -25,7 +25,7 @@ pub(crate) fn furniture_meshes() -> Vec<(&'static str, Surface)> {
         ("furniture/tumbler.ply", tumbler()),
         ("furniture/bowl.ply", bowl()),
         ("furniture/pot.ply", flower_pot()),
-        ("furniture/leaf.ply", leaf()),
+        ("furniture/leaf.ply", plant_leaf()),
         ("furniture/curtain.ply", curtain()),
         ("furniture/window.ply", window_frame()),
         ("furniture/frame.ply", picture_frame()),
@@ -234,7 +234,7 @@ fn flower_pot() -> Surface {
 }
 
 /// A two-sided leaf of length 1 along z, bent downward.
-fn leaf() -> Surface {
+fn plant_leaf() -> Surface {
     let steps = 8;
     let place = |step: u32, across: f64| {
         let along = f64::from(step) / f64::from(steps);

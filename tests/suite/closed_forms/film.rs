@@ -33,7 +33,7 @@ fn filters_preserve_a_constant_image() {
             let build = build.with(|scene| scene.render.filter = filter);
             let film = film(&build);
             go_on(&film, &build.world(), &build, 3, 0, samples);
-            for pixel in film.radiance().pixels {
+            for pixel in film.radiance_image().pixels {
                 let off = (pixel - 0.7).abs().max_element();
                 assert!(off <= 0.7e-5, "{filter:?}, {samples} samples: {pixel}");
             }
@@ -83,7 +83,7 @@ fn error_estimate_matches_spread_over_seeds() {
             // The variance of a pixel over seeds requires no reference image.
             let luminance = |film: &Film| -> Vec<f64> {
                 let color = |c: &glimt::math::Vec3| glimt::math::color::luminance(*c).into();
-                film.radiance().pixels.iter().map(color).collect()
+                film.radiance_image().pixels.iter().map(color).collect()
             };
             let pictures: Vec<Vec<f64>> = films.iter().map(luminance).collect();
             let (pixels, count) = (pictures[0].len(), f64::from(SEEDS));

@@ -198,7 +198,7 @@ fn sampled_lights_keep_their_textures() {
             }
         }
     }
-    assert!(build.world().lights.sampler_for_mode(LightSamplingPurpose::Eye).is_some());
+    assert!(build.world().lights.sampler_for_purpose(LightSamplingPurpose::Eye).is_some());
     for (name, build) in [("whitted", build.clone()), ("path", by_paths(&build))] {
         assert_irradiance(name, &build, expected);
     }

@@ -2,7 +2,7 @@
 
 use super::Rect;
 use super::sum_order::SumOrder;
-use super::sums::{Film, FilmError, Tile, can_allocate, film_and_image_bytes};
+use super::sums::{Film, FilmCreationError, Tile, can_allocate, film_and_image_bytes};
 use crate::math::DVec3;
 use crate::system::memory::try_reserve_exact;
 
@@ -27,11 +27,11 @@ impl Film {
     ///
     /// # Errors
     /// [`FilmError::Memory`] if there is not enough memory for the block sums.
-    pub fn with_sum_order(mut self, blocks: SumOrder) -> Result<Self, FilmError> {
-        let (crop, kept) = (self.crop(), blocks.kept_block_count());
+    pub fn with_sum_order(mut self, blocks: SumOrder) -> Result<Self, FilmCreationError> {
+        let (crop, kept) = (self.crop_rect(), blocks.kept_block_count());
         let more = crop.area() as u64 * (kept * size_of::<DVec3>()) as u64;
         let (width, height, bytes) = (self.width(), self.height(), self.memory_bytes() + more);
-        let lacks = || FilmError::Memory { width, height, bytes, crop_helps: true };
+        let lacks = || FilmCreationError::Memory { width, height, bytes, crop_helps: true };
         if !can_allocate(more) {
             return Err(lacks());
         }
@@ -65,7 +65,7 @@ impl Film {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::film::{Quantity, TileSamples};
+    use crate::film::{FilmQuantity, TileSamples};
     use crate::math::Vec3;
     use crate::math::random::unit_generator;
 
@@ -93,7 +93,7 @@ mod tests {
                 rest = others;
             }
             let mean = film.lock_tile(0).mean(0).expect("samples");
-            assert_eq!(film.pixel(Quantity::Samples, 0, 0), Some(Vec3::splat(41.0)));
+            assert_eq!(film.pixel(FilmQuantity::Samples, 0, 0), Some(Vec3::splat(41.0)));
             mean.x
         };
         let sum = |values: &[f32]| values.iter().fold(0.0, |sum, value| sum + f64::from(*value));

@@ -165,7 +165,7 @@ impl SquaredMeanChanges {
     }
 
     /// Squared steps in a half-cell at 2^`level` samples and one doubling earlier.
-    fn last_two_squared_steps(
+    fn squared_step_pair_at_level(
         &self,
         level: usize,
         (cell, half): (usize, usize),
@@ -183,9 +183,9 @@ impl SquaredMeanChanges {
 
     /// Squared steps in a half-cell at 2^`level` samples and one, two and three doublings earlier.
     fn last_four_steps(&self, level: usize, at: (usize, usize), is_relative: bool) -> Option<[f64; 4]> {
-        let StepPair { last, before } = self.last_two_squared_steps(level, at, is_relative)?;
+        let StepPair { last, before } = self.squared_step_pair_at_level(level, at, is_relative)?;
         let earlier =
-            |back: usize| self.last_two_squared_steps(level.checked_sub(back)?, at, is_relative)?.before;
+            |back: usize| self.squared_step_pair_at_level(level.checked_sub(back)?, at, is_relative)?.before;
         Some([last, before?, earlier(1)?, earlier(2)?])
     }
 
@@ -228,7 +228,7 @@ impl SquaredMeanChanges {
     pub(super) fn measured_variance_reduction(&self, level: usize, halves: &[usize]) -> Option<f64> {
         let (mut last, mut before) = (0.0, 0.0);
         for (cell, half) in (0..CELLS).flat_map(|cell| halves.iter().map(move |half| (cell, *half))) {
-            let pair = self.last_two_squared_steps(level, (cell, half), false)?;
+            let pair = self.squared_step_pair_at_level(level, (cell, half), false)?;
             if pair.last > 0.0 {
                 last += pair.last;
                 before += pair.before?;
@@ -329,7 +329,7 @@ impl ConvergenceModel {
         is_relative: bool,
     ) -> Option<(f64, f64)> {
         let level = count.checked_ilog2()? as usize;
-        let StepPair { last, before } = steps.last_two_squared_steps(level, (cell, half), is_relative)?;
+        let StepPair { last, before } = steps.squared_step_pair_at_level(level, (cell, half), is_relative)?;
         let fall = Self::doubling_variance_reduction(steps, level, &[half]);
         let step = before.map_or(last, |before| (last + 2.0 * before / fall) / 3.0);
         let rate = predict_doubling_variance_reduction(fall, steps.reduction_confidence(level, &[half]));

@@ -1,7 +1,9 @@
 //! Layers: further quantities of the image's samples, such as the albedo at the first hit.
 
 use super::layer_sums::LayerSums;
-use super::sums::{Film, FilmError, NegativeLobeSums, Tile, can_allocate, pixel_index_in_rect, tile_rect};
+use super::sums::{
+    Film, FilmCreationError, NegativeLobeSums, Tile, can_allocate, pixel_index_in_rect, tile_rect,
+};
 use super::{RadianceImage, Rect, SelectedPixels};
 use crate::math::{DVec3, Vec3};
 use crate::system::memory::try_reserve_exact;
@@ -39,10 +41,10 @@ impl Film {
     ///
     /// # Errors
     /// [`FilmError::Memory`] if there is not enough memory for the layers.
-    pub fn with_layers(mut self, count: usize) -> Result<Self, FilmError> {
-        let more = Self::layer_memory(self.crop(), count);
+    pub fn with_layers(mut self, count: usize) -> Result<Self, FilmCreationError> {
+        let more = Self::layer_memory(self.crop_rect(), count);
         let (width, height, bytes) = (self.width(), self.height(), self.memory_bytes() + more);
-        let lacks = || FilmError::Memory { width, height, bytes, crop_helps: true };
+        let lacks = || FilmCreationError::Memory { width, height, bytes, crop_helps: true };
         if !can_allocate(more) {
             return Err(lacks());
         }
@@ -66,7 +68,7 @@ impl Film {
     pub fn layer_images(&self) -> Vec<RadianceImage> {
         let mut images = vec![RadianceImage::black(self.width(), self.height()); self.layers];
         for number in 0..self.tile_count() {
-            let (rect, tile) = (tile_rect(self.crop(), number), self.lock_tile(number));
+            let (rect, tile) = (tile_rect(self.crop_rect(), number), self.lock_tile(number));
             for index in 0..rect.area() {
                 let (x, y) = (index % rect.width as usize, index / rect.width as usize);
                 let place = (rect.y as usize + y) * self.width() as usize + rect.x as usize + x;
@@ -113,7 +115,7 @@ mod tests {
             for (seed, tile) in [(1, 0), (2, 1), (3, 0)] {
                 film.add_samples(tile, &samples(&film, tile, seed, is_signed));
             }
-            let image = film.radiance().pixels;
+            let image = film.radiance_image().pixels;
             let layers = film.layer_images();
             assert_eq!((layers.len(), &layers[0].pixels), (2, &image));
             for (double, pixel) in layers[1].pixels.iter().zip(&image) {

@@ -32,11 +32,11 @@ pub use noise::{CellHalfNoise, ImageNoiseAndConvergence, total_samples_to_reduce
 pub use pixel_subset::{PixelSubset, SelectedPixels};
 pub use prepass::{BrightnessPrepassPixels, PREPASS_SAMPLES};
 pub use preview::Previewer;
-pub use quantity::Quantity;
+pub use quantity::FilmQuantity;
 pub use srgb::linear_to_srgb8_by_table;
-pub use stored::{Malformed, StoredTile};
+pub use stored::{MalformedTile, StoredTile};
 pub use sum_order::{BLOCK_SIZE, SumOrder};
-pub use sums::{Film, FilmError, SampleCountStats};
+pub use sums::{Film, FilmCreationError, SampleCountStats};
 
 use crate::math::Vec3;
 

@@ -68,7 +68,7 @@ impl Film {
     /// Returns [`Film::relative_error`] and its convergence exponent.
     pub fn image_noise(&self) -> Option<ImageNoiseAndConvergence> {
         let sums @ NoiseSums { variance, mean, .. } = self.noise_sums()?;
-        let pixels = self.crop().area() as f64;
+        let pixels = self.crop_rect().area() as f64;
         let error = (variance / pixels).sqrt();
         // A black image without error has a relative error of 0.
         let relative_error = if error == 0.0 { 0.0 } else { error / (mean / pixels) };
@@ -80,10 +80,10 @@ impl Film {
     /// crops, for photons (because they correlate the pixels' errors), and if a pixel has fewer than two
     /// samples.
     pub fn mean_luminance_error(&self) -> Option<f64> {
-        let is_whole = (self.crop().width, self.crop().height) == (self.width(), self.height());
+        let is_whole = (self.crop_rect().width, self.crop_rect().height) == (self.width(), self.height());
         let is_apart = self.convergence == ConvergenceModel::Stratified;
         let sums = if is_whole && is_apart { self.noise_sums()? } else { return None };
-        Some(sums.variance.sqrt() / self.crop().area() as f64).filter(|error| error.is_finite())
+        Some(sums.variance.sqrt() / self.crop_rect().area() as f64).filter(|error| error.is_finite())
     }
 
     /// Sums the noise over all pixels.
@@ -97,7 +97,7 @@ impl Film {
             for (cell, half) in halves {
                 let pixels = self.cell_half_pixel_count(cell, half) as f64;
                 if pixels > 0.0 {
-                    sums.add_cell_half(&self.cell_half_noise(cell, half)?, pixels);
+                    sums.add_cell_half(&self.half_cell_noise(cell, half)?, pixels);
                 }
             }
             Some(sums)
@@ -120,12 +120,12 @@ impl Film {
 
     /// Noise in one half of a cell. `None` if the half has no pixels or if a pixel has fewer than two
     /// samples.
-    pub fn cell_half_noise(&self, number: usize, half: usize) -> Option<CellHalfNoise> {
+    pub fn half_cell_noise(&self, number: usize, half: usize) -> Option<CellHalfNoise> {
         let tile = self.lock_tile(number / CELLS);
         let (mut pixels, mut samples, mut sum) = (0_u32, u32::MAX, 0.0);
         for pixel in self.half_cell_pixel_indices(number, half) {
             sum += luminance(tile.mean(pixel)?);
-            samples = samples.min(tile.count(pixel));
+            samples = samples.min(tile.sample_count(pixel));
             pixels += 1;
         }
         let pixels = Some(f64::from(pixels)).filter(|pixels| *pixels > 0.0)?;
@@ -164,7 +164,7 @@ impl Film {
         for cell in CELLS * tile..CELLS * (tile + 1) {
             let count = self.cell_half_pixel_count(cell, half) as f64;
             if count > 0.0 {
-                let noise = self.cell_half_noise(cell, half)?;
+                let noise = self.half_cell_noise(cell, half)?;
                 sums.add_cell_half(&noise, count);
                 samples = samples.min(noise.samples);
                 pixels += count;
@@ -179,7 +179,7 @@ impl Film {
     /// `count` is a power of two. The error is the mean over the pixels of luminance variance / (luminance² +
     /// [`RELMSE_EPSILON`](crate::math::color::RELMSE_EPSILON)). `None` if `count` is less than two or exceeds
     /// the pixels' sample count, or if the half has no pixels.
-    pub fn cell_half_relative_error(&self, number: usize, half: usize, count: u32) -> Option<(f64, f64)> {
+    pub fn half_cell_relative_error(&self, number: usize, half: usize, count: u32) -> Option<(f64, f64)> {
         let tile = self.lock_tile(number / CELLS);
         let pixels = self.cell_half_pixel_count(number, half);
         let (sum, rate) =
@@ -188,7 +188,7 @@ impl Film {
     }
 
     /// Convergence model for this film's noise.
-    pub fn convergence(&self) -> ConvergenceModel {
+    pub fn convergence_model(&self) -> ConvergenceModel {
         self.convergence
     }
 
@@ -218,7 +218,7 @@ impl Film {
             (0..tile.counts.len()).map(|pixel| tile.mean(pixel).map(luminance)).sum::<Option<f64>>()
         };
         let sum: Option<f64> = self.map_tiles(of_tile).into_iter().sum();
-        sum.map(|sum| sum / self.crop().area() as f64)
+        sum.map(|sum| sum / self.crop_rect().area() as f64)
     }
 }
 

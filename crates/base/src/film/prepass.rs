@@ -3,7 +3,7 @@
 //! value.
 
 use super::convergence::luminance;
-use super::{Film, Quantity, Rect, TileSamples};
+use super::{Film, FilmQuantity, Rect, TileSamples};
 use crate::math::random::hash;
 
 /// Number of prepass pixels, unless the image has fewer pixels.
@@ -43,7 +43,7 @@ impl BrightnessPrepassPixels {
     pub fn film_mean_luminance(&self, film: &Film) -> Option<f64> {
         self.mean_luminance(|number| {
             let (x, y) = self.pixel_position(number);
-            film.pixel(Quantity::Radiance, x, y).map(|radiance| luminance(radiance.as_dvec3()))
+            film.pixel(FilmQuantity::Radiance, x, y).map(|radiance| luminance(radiance.as_dvec3()))
         })
     }
 
@@ -60,7 +60,7 @@ impl BrightnessPrepassPixels {
         samples.pixels = rect.into();
         let film = Film::new(1, 1, None).ok()?;
         film.add_samples(0, &samples);
-        film.pixel(Quantity::Radiance, 0, 0).map(|radiance| luminance(radiance.as_dvec3()))
+        film.pixel(FilmQuantity::Radiance, 0, 0).map(|radiance| luminance(radiance.as_dvec3()))
     }
 }
 

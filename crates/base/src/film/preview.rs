@@ -7,7 +7,7 @@ use std::time::Instant;
 use rayon::prelude::*;
 
 use super::resample::AxisResampler;
-use super::{Film, Quantity, RadianceImage, is_in_thread_pool};
+use super::{Film, FilmQuantity, RadianceImage, is_in_thread_pool};
 use crate::math::{DVec3, Vec3};
 
 /// Resizes a film with an exact box filter. Each tile's contribution is cached, so an update processes only
@@ -15,7 +15,7 @@ use crate::math::{DVec3, Vec3};
 /// samples show the base image.
 #[derive(Debug)]
 pub struct Previewer {
-    quantity: Quantity,
+    quantity: FilmQuantity,
     width: u32,
     height: u32,
     film_id: Option<u64>,
@@ -54,17 +54,17 @@ const TILES_AT_ONCE: usize = 32;
 impl Previewer {
     /// Creates a previewer for images of this size, which must be at least one pixel.
     pub fn new(width: u32, height: u32) -> Self {
-        Self::for_quantity(Quantity::Radiance, width, height)
+        Self::for_quantity(FilmQuantity::Radiance, width, height)
     }
 
     /// Creates a previewer that shows this quantity.
-    pub fn for_quantity(quantity: Quantity, width: u32, height: u32) -> Self {
+    pub fn for_quantity(quantity: FilmQuantity, width: u32, height: u32) -> Self {
         let (width, height) = (width.max(1), height.max(1));
         Self { quantity, width, height, film_id: None, shares: Vec::new(), next: 0, is_whole: false }
     }
 
     /// Quantity shown in the previews.
-    pub fn quantity(&self) -> Quantity {
+    pub fn quantity(&self) -> FilmQuantity {
         self.quantity
     }
 
@@ -151,7 +151,7 @@ impl Previewer {
 fn refresh_tile_contributions(
     shares: &mut [TileContribution],
     first: usize,
-    (film, quantity): (&Film, Quantity),
+    (film, quantity): (&Film, FilmQuantity),
     axes: [AxisResampler; 2],
 ) {
     let refresh = |(i, share): (usize, &mut TileContribution)| {
@@ -169,7 +169,7 @@ fn refresh_tile_contributions(
 impl TileContribution {
     fn refresh(
         &mut self,
-        (film, quantity): (&Film, Quantity),
+        (film, quantity): (&Film, FilmQuantity),
         tile: usize,
         [columns, rows]: [AxisResampler; 2],
     ) {
@@ -270,7 +270,7 @@ mod tests {
     #[test]
     fn preview_equals_the_resized_image() {
         let film = film(77, 45, None, |x, y| Some(pattern(x, y)));
-        let whole = film.radiance();
+        let whole = film.radiance_image();
         for (width, height) in [(1, 1), (2, 3), (13, 7), (40, 45), (77, 45), (100, 91)] {
             let picture = preview(&film, width, height, None);
             assert!((mean(&picture) - mean(&whole)).abs() < 1e-5, "{width}×{height}");

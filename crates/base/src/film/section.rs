@@ -1,6 +1,6 @@
 //! Unscaled sections of a film.
 
-use super::{Film, Quantity, RadianceImage, Rect};
+use super::{Film, FilmQuantity, RadianceImage, Rect};
 use crate::math::Vec3;
 
 impl Film {
@@ -8,7 +8,7 @@ impl Film {
     /// size), or black if there is no base.
     pub fn image_in_rect(
         &self,
-        quantity: Quantity,
+        quantity: FilmQuantity,
         rect: Rect,
         base: Option<&RadianceImage>,
     ) -> RadianceImage {
@@ -74,11 +74,11 @@ mod tests {
         }
         let base = RadianceImage { width: 2, height: 1, pixels: vec![Vec3::X, Vec3::Y] };
         let rect = Rect { x: 20, y: 11, width: 60, height: 50 };
-        let section = film.image_in_rect(Quantity::Radiance, rect, Some(&base));
+        let section = film.image_in_rect(FilmQuantity::Radiance, rect, Some(&base));
         for (i, pixel) in (0..).zip(&section.pixels) {
             let (x, y) = (rect.x + i % rect.width, rect.y + i / rect.width);
             let below = if x < 50 { Vec3::X } else { Vec3::Y };
-            assert_eq!(*pixel, film.pixel(Quantity::Radiance, x, y).unwrap_or(below), "{x}, {y}");
+            assert_eq!(*pixel, film.pixel(FilmQuantity::Radiance, x, y).unwrap_or(below), "{x}, {y}");
         }
         assert!(section.pixels.contains(&Vec3::X) && section.pixels.contains(&Vec3::Y));
     }

@@ -11,7 +11,7 @@ use crate::math::DVec3;
 /// Error for bytes that do not encode a valid tile of the film.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("the data is not a valid tile of the image")]
-pub struct Malformed;
+pub struct MalformedTile;
 
 /// A deserialized tile. Its blocks can be merged with blocks from other tiles.
 #[derive(Debug, Default)]
@@ -24,14 +24,14 @@ impl StoredTile {
     ///
     /// # Errors
     /// [`Malformed`] if there are too few or too many bytes, or invalid counts.
-    pub fn read(bytes: &[u8], area: usize) -> Result<Self, Malformed> {
+    pub fn read(bytes: &[u8], area: usize) -> Result<Self, MalformedTile> {
         let mut from = ByteReader(bytes);
         let (blocks, is_signed, levels) = (from.count()?, from.count()? == 1, from.count()?);
         let layers = from.count()?;
         // Check the length before reserving memory.
         let sums = blocks.checked_add(layers).and_then(|sums| sums.checked_mul(area * size_of::<DVec3>()));
         if sums.is_none_or(|all| all > bytes.len()) || levels > 32 {
-            return Err(Malformed);
+            return Err(MalformedTile);
         }
         let mut tile = Tile { sums: from.vectors(area)?, ..Tile::default() };
         tile.earlier = (0..blocks).map(|_| from.vectors(area)).collect::<Result<_, _>>()?;
@@ -46,7 +46,7 @@ impl StoredTile {
         let sums = from.vectors(area * layers)?;
         let negative = if is_signed { from.vectors(area * layers)? } else { Vec::new() };
         tile.layers = LayerSums { count: layers, sums, negative };
-        if from.0.is_empty() { Ok(Self { tile }) } else { Err(Malformed) }
+        if from.0.is_empty() { Ok(Self { tile }) } else { Err(MalformedTile) }
     }
 
     /// Number of block sums, including the sum in progress, which may be empty.
@@ -58,15 +58,15 @@ impl StoredTile {
     ///
     /// # Errors
     /// [`Malformed`] if the tiles differ in size or the block does not exist.
-    pub fn add_block_from(&mut self, of: &Self, block: usize) -> Result<(), Malformed> {
+    pub fn add_block_from(&mut self, of: &Self, block: usize) -> Result<(), MalformedTile> {
         let area = of.tile.sums.len();
         if self.tile.sums.is_empty() {
             self.tile.resize(area);
         }
         if self.tile.sums.len() != area {
-            return Err(Malformed);
+            return Err(MalformedTile);
         }
-        let sums = block_sums(&of.tile.earlier, &of.tile.sums, block).ok_or(Malformed)?;
+        let sums = block_sums(&of.tile.earlier, &of.tile.sums, block).ok_or(MalformedTile)?;
         let is_first = self.tile.earlier.is_empty();
         if is_first {
             self.tile.earlier = vec![sums.to_vec()];
@@ -74,7 +74,7 @@ impl StoredTile {
             add_block_sums(&mut self.tile.earlier[0], sums);
         }
         if let Some(negative) = &of.tile.negative {
-            let sums = block_sums(&negative.earlier, &negative.sums, block).ok_or(Malformed)?;
+            let sums = block_sums(&negative.earlier, &negative.sums, block).ok_or(MalformedTile)?;
             let own =
                 self.tile.negative.get_or_insert_with(|| NegativeLobeSums::new(negative.weight, area, 1));
             add_block_sums(&mut own.earlier[0], sums);
@@ -113,7 +113,7 @@ impl Film {
         }
         let (signed, levels) = (tile.negative.is_some(), tile.steps.level_count());
         for count in [tile.earlier.len(), usize::from(signed), levels, tile.layers.count] {
-            put(bytes, count as u32);
+            put_u32(bytes, count as u32);
         }
         put_sums(bytes, &tile.sums, &tile.earlier);
         append_numbers(bytes, tile.counts.iter().map(|count| count.to_le_bytes()));
@@ -122,7 +122,7 @@ impl Film {
             put_sums(bytes, &negative.sums, &negative.earlier);
             append_numbers(bytes, negative.counts.iter().map(|count| count.to_le_bytes()));
         }
-        tile.steps.write_words(&mut |word| put(bytes, word));
+        tile.steps.write_words(&mut |word| put_u32(bytes, word));
         put_sums(bytes, &tile.layers.sums, &[&tile.layers.negative]);
         true
     }
@@ -131,12 +131,12 @@ impl Film {
     ///
     /// # Errors
     /// [`Malformed`] if the tile does not fit this film.
-    pub fn restore_tile(&self, tile: usize, stored: StoredTile) -> Result<(), Malformed> {
-        let area = self.tile_rect(tile).ok_or(Malformed)?.area();
+    pub fn restore_tile(&self, tile: usize, stored: StoredTile) -> Result<(), MalformedTile> {
+        let area = self.tile_rect(tile).ok_or(MalformedTile)?.area();
         let Tile { sums, earlier, counts, negative, steps, layers, .. } = stored.tile;
         let blocks = self.sum_order().kept_block_count();
         if sums.len() != area || earlier.len() != blocks || layers.count != self.layers {
-            return Err(Malformed);
+            return Err(MalformedTile);
         }
         let mut own = self.lock_tile(tile);
         let revision = own.revision + 1;
@@ -153,7 +153,7 @@ impl Film {
         }
         let index = PixelSubset::Half(half).index_in_rect(0, rect);
         let (x, y) = (rect.x + index % rect.width - tile.x, rect.y + index / rect.width - tile.y);
-        self.lock_tile(cell / CELLS).count((y * tile.width + x) as usize)
+        self.lock_tile(cell / CELLS).sample_count((y * tile.width + x) as usize)
     }
 
     /// Adds the number of non-finite samples in restored tiles to [`Film::non_finite_samples`].
@@ -162,7 +162,7 @@ impl Film {
     }
 }
 
-fn put(bytes: &mut Vec<u8>, word: u32) {
+fn put_u32(bytes: &mut Vec<u8>, word: u32) {
     bytes.extend_from_slice(&word.to_le_bytes());
 }
 
@@ -196,29 +196,29 @@ fn append_numbers<const N: usize>(bytes: &mut Vec<u8>, numbers: impl ExactSizeIt
 struct ByteReader<'a>(&'a [u8]);
 
 impl ByteReader<'_> {
-    fn take<const N: usize>(&mut self) -> Result<[u8; N], Malformed> {
-        let (head, rest) = self.0.split_first_chunk().ok_or(Malformed)?;
+    fn take<const N: usize>(&mut self) -> Result<[u8; N], MalformedTile> {
+        let (head, rest) = self.0.split_first_chunk().ok_or(MalformedTile)?;
         self.0 = rest;
         Ok(*head)
     }
 
-    fn u32(&mut self) -> Result<u32, Malformed> {
+    fn u32(&mut self) -> Result<u32, MalformedTile> {
         self.take().map(u32::from_le_bytes)
     }
 
-    fn u64(&mut self) -> Result<u64, Malformed> {
+    fn u64(&mut self) -> Result<u64, MalformedTile> {
         self.take().map(u64::from_le_bytes)
     }
 
-    fn count(&mut self) -> Result<usize, Malformed> {
+    fn count(&mut self) -> Result<usize, MalformedTile> {
         self.u32().map(|count| count as usize)
     }
 
-    fn counts(&mut self, area: usize) -> Result<Vec<u32>, Malformed> {
+    fn counts(&mut self, area: usize) -> Result<Vec<u32>, MalformedTile> {
         (0..area).map(|_| self.u32()).collect()
     }
 
-    fn vectors(&mut self, area: usize) -> Result<Vec<DVec3>, Malformed> {
+    fn vectors(&mut self, area: usize) -> Result<Vec<DVec3>, MalformedTile> {
         let mut number = || self.u64().map(f64::from_bits);
         (0..area).map(|_| Ok(DVec3::new(number()?, number()?, number()?))).collect()
     }
@@ -287,7 +287,7 @@ mod tests {
                 (21, 21)
             );
             add(&second, 21..37, is_signed);
-            assert_eq!(second.radiance().pixels, whole.radiance().pixels);
+            assert_eq!(second.radiance_image().pixels, whole.radiance_image().pixels);
             assert_eq!(second.image_noise(), whole.image_noise());
             for tile in 0..whole.tile_count() {
                 assert_eq!(stored(&second, tile), stored(&whole, tile), "{blocks:?}");
@@ -317,7 +317,7 @@ mod tests {
                 [&outer, &inner].into_iter().for_each(|of| sum.add_counts_from(of));
                 merged.restore_tile(tile, sum).expect("a tile");
             }
-            assert_eq!(merged.radiance().pixels, whole.radiance().pixels);
+            assert_eq!(merged.radiance_image().pixels, whole.radiance_image().pixels);
             assert_eq!(merged.sample_count_stats(), whole.sample_count_stats());
         }
     }
@@ -328,7 +328,7 @@ mod tests {
         add(&film, 0..9, true);
         let (bytes, area) = (stored(&film, 0), film.tile_rect(0).expect("a tile").area());
         for length in (0..bytes.len()).step_by(997).chain([bytes.len() - 1]) {
-            assert_eq!(StoredTile::read(&bytes[..length], area).err(), Some(Malformed), "{length}");
+            assert_eq!(StoredTile::read(&bytes[..length], area).err(), Some(MalformedTile), "{length}");
         }
         assert!(StoredTile::read(&[&bytes[..], &[0]].concat(), area).is_err());
         assert!(StoredTile::read(&bytes, area + 1).is_err());

@@ -13,7 +13,7 @@ use crate::system::memory::try_reserve_exact;
 
 /// Reason why a film could not be created.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum FilmError {
+pub enum FilmCreationError {
     /// There is not enough memory.
     #[error(
         "a {width}×{height} image needs {} of memory, more than is available; make it smaller{}",
@@ -139,7 +139,7 @@ impl Tile {
         sum: impl Fn() -> DVec3,
         negative_sum: impl Fn(&NegativeLobeSums) -> DVec3,
     ) -> Option<DVec3> {
-        let count = self.count(index);
+        let count = self.sample_count(index);
         let negative = self.negative.as_ref().filter(|negative| negative.counts[index] > 0);
         let Some(negative) = negative else {
             return (count > 0).then(|| sum() / f64::from(count));
@@ -153,7 +153,7 @@ impl Tile {
         Some(above + (above - below) * negative.weight)
     }
 
-    pub(super) fn count(&self, index: usize) -> u32 {
+    pub(super) fn sample_count(&self, index: usize) -> u32 {
         self.counts.get(index).copied().unwrap_or(0)
     }
 
@@ -245,7 +245,7 @@ impl Film {
     /// # Errors
     /// [`FilmError`] if the crop is outside the image, or if there is not enough memory for the sums and the
     /// finished image.
-    pub fn new(width: u32, height: u32, crop: Option<Rect>) -> Result<Self, FilmError> {
+    pub fn new(width: u32, height: u32, crop: Option<Rect>) -> Result<Self, FilmCreationError> {
         Self::with_memory_limit(u64::MAX, width, height, crop)
     }
 
@@ -258,15 +258,16 @@ impl Film {
         width: u32,
         height: u32,
         crop: Option<Rect>,
-    ) -> Result<Self, FilmError> {
+    ) -> Result<Self, FilmCreationError> {
         let whole = Rect { x: 0, y: 0, width, height };
-        let crop = crop.unwrap_or(whole).intersection(&whole).ok_or(FilmError::Empty { width, height })?;
+        let crop =
+            crop.unwrap_or(whole).intersection(&whole).ok_or(FilmCreationError::Empty { width, height })?;
         let bytes = film_and_image_bytes(width, height, crop);
         let tiles = if bytes <= most_bytes { allocate_tiles(width, height, crop) } else { None };
         let tiles = tiles.ok_or_else(|| {
             let least = film_and_image_bytes(width, height, Rect { width: 0, height: 0, ..crop });
             let crop_helps = crop == whole && least <= most_bytes && can_allocate(least);
-            FilmError::Memory { width, height, bytes, crop_helps }
+            FilmCreationError::Memory { width, height, bytes, crop_helps }
         })?;
         static IDS: AtomicU64 = AtomicU64::new(0);
         Ok(Self {
@@ -299,7 +300,7 @@ impl Film {
     }
 
     /// Rectangle of pixels to render.
-    pub fn crop(&self) -> Rect {
+    pub fn crop_rect(&self) -> Rect {
         self.crop
     }
 

@@ -32,7 +32,7 @@ fn image_bits(image: &RadianceImage) -> Vec<[u32; 3]> {
 fn pixel_sample_count(film: &Film, x: u32, y: u32) -> u32 {
     let tile = (x / TILE_SIZE) as usize;
     let rect = film.tile_rect(tile).expect("a tile");
-    pixel_index_in_rect(rect, x, y).map_or(0, |index| film.lock_tile(tile).count(index))
+    pixel_index_in_rect(rect, x, y).map_or(0, |index| film.lock_tile(tile).sample_count(index))
 }
 
 fn film_after_passes(passes: &[u32]) -> Film {
@@ -58,7 +58,7 @@ fn sample_grouping_does_not_change_bits() {
     for passes in [&[1; 24][..], &[1, 2, 4, 8, 9], &[23, 1]] {
         let film = film_after_passes(passes);
         assert_eq!(sum_bits(&film), sum_bits(&at_once), "{passes:?}");
-        assert_eq!(image_bits(&film.radiance()), image_bits(&at_once.radiance()), "{passes:?}");
+        assert_eq!(image_bits(&film.radiance_image()), image_bits(&at_once.radiance_image()), "{passes:?}");
         assert_eq!(film.sample_count_stats(), SampleCountStats { min: 24, mean: 24.0, max: 24 });
     }
 }
@@ -67,7 +67,7 @@ fn sample_grouping_does_not_change_bits() {
 fn tiles_partition_the_crop() {
     let crop = Rect { x: 5, y: 7, width: 70, height: 1000 };
     let film = Film::new(100, 60, Some(crop)).expect("a film");
-    assert_eq!(film.crop(), Rect { height: 53, ..crop });
+    assert_eq!(film.crop_rect(), Rect { height: 53, ..crop });
     let order = film.tile_order();
     assert_eq!(order.iter().copied().collect::<HashSet<_>>(), (0..film.tile_count()).collect());
     assert_eq!(order.len(), film.tile_count());
@@ -78,7 +78,7 @@ fn tiles_partition_the_crop() {
             assert!(seen.insert((rect.x + i % rect.width, rect.y + i / rect.width)), "covered twice");
         }
     }
-    assert_eq!(seen.len(), film.crop().area());
+    assert_eq!(seen.len(), film.crop_rect().area());
     assert!(seen.iter().all(|&(x, y)| (5..75).contains(&x) && (7..60).contains(&y)));
     assert_eq!(film.tile_rect(film.tile_count()), None);
 }
@@ -116,7 +116,7 @@ fn pixel_means_and_counts_are_correct() {
     };
     add(3, &[1.0, 2.0, 6.0]);
     add(39, &[0.5]);
-    let image = film.radiance();
+    let image = film.radiance_image();
     assert_eq!(image.pixels[40 + 3], Vec3::splat(3.0));
     assert_eq!(image.pixels[40 + 39], Vec3::splat(0.5));
     assert_eq!(image.pixels.iter().filter(|p| **p != Vec3::ZERO).count(), 2);
@@ -137,7 +137,7 @@ fn non_finite_samples_are_black_and_counted() {
     film.add_samples(
         0,
         &TileSamples {
-            pixels: film.crop().into(),
+            pixels: film.crop_rect().into(),
             samples: 4,
             radiance,
             negative: None,
@@ -145,7 +145,7 @@ fn non_finite_samples_are_black_and_counted() {
         },
     );
     assert_eq!(film.non_finite_samples(), 3);
-    assert_eq!(film.radiance().pixels, [Vec3::ONE]);
+    assert_eq!(film.radiance_image().pixels, [Vec3::ONE]);
     assert_eq!(pixel_sample_count(&film, 0, 0), 4);
 }
 
@@ -199,7 +199,7 @@ fn samples_outside_the_tile_are_ignored() {
 #[test]
 fn panics_while_holding_a_tile_are_harmless() {
     let film = film_after_passes(&[3]);
-    let before = image_bits(&film.radiance());
+    let before = image_bits(&film.radiance_image());
     std::thread::scope(|scope| {
         let holder = scope.spawn(|| {
             let _guard = film.lock_tile(0);
@@ -208,7 +208,7 @@ fn panics_while_holding_a_tile_are_harmless() {
         assert!(holder.join().is_err());
     });
     assert!(film.tiles[0].is_poisoned());
-    assert_eq!(image_bits(&film.radiance()), before);
+    assert_eq!(image_bits(&film.radiance_image()), before);
     film.add_samples(0, &varied_samples(film.tile_rect(0).expect("a tile"), 3, 1));
     assert_eq!(pixel_sample_count(&film, 0, 0), 4);
 }
@@ -245,7 +245,7 @@ fn snapshots_are_consistent_during_rendering() {
         scope.spawn(|| {
             let mut previewer = crate::film::Previewer::new(20, 10);
             while !done.load(Ordering::Acquire) {
-                let whole = film.radiance();
+                let whole = film.radiance_image();
                 assert!(whole.pixels.iter().all(|p| *p == Vec3::ZERO || *p == Vec3::splat(2.0)));
                 previewer.refresh_changed_tiles(&film, None);
                 let small = previewer.build_image(None);
@@ -276,7 +276,10 @@ fn oversized_film_errors_suggest_a_remedy() {
     assert!(cropped(200_000, None).to_string().ends_with(remedy));
     assert!(!cropped(200_000, Some(part)).to_string().ends_with(remedy));
     assert!(!cropped(100_000, None).to_string().ends_with(remedy));
-    assert_eq!(Film::new(0, 5, None).expect_err("no pixels"), FilmError::Empty { width: 0, height: 5 });
+    assert_eq!(
+        Film::new(0, 5, None).expect_err("no pixels"),
+        FilmCreationError::Empty { width: 0, height: 5 }
+    );
     let outside = Rect { x: 10, y: 0, width: 1, height: 1 };
     assert!(Film::new(10, 5, Some(outside)).is_err());
 }

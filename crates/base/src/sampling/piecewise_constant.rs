@@ -35,10 +35,10 @@ impl PiecewiseConstant2D {
     pub fn new(columns: usize, rows: impl Iterator<Item = Vec<f64>>) -> Option<Self> {
         let (mut in_row, mut totals) = (Vec::new(), Vec::new());
         for weights in rows {
-            totals.push(append_cumulative_sums(&weights, &mut in_row));
+            totals.push(append_normalized_cdf(&weights, &mut in_row));
         }
         let mut rows = Vec::new();
-        let total = append_cumulative_sums(&totals, &mut rows);
+        let total = append_normalized_cdf(&totals, &mut rows);
         if !(total > 0.0 && total.is_finite()) {
             return None;
         }
@@ -64,7 +64,7 @@ impl PiecewiseConstant2D {
 
     /// Probability of sampling `column` within its row.
     #[inline(always)]
-    pub fn column_probability(&self, row: usize, column: usize) -> f32 {
+    pub fn column_probability_in_row(&self, row: usize, column: usize) -> f32 {
         let sums = self.row_cumulative_sums(row);
         sums[column + 1] - sums[column]
     }
@@ -78,7 +78,7 @@ impl PiecewiseConstant2D {
 
 /// Appends the normalized exclusive cumulative sums of the weights, followed by 1, and returns the total
 /// weight.
-fn append_cumulative_sums(weights: &[f64], sums: &mut Vec<f32>) -> f64 {
+fn append_normalized_cdf(weights: &[f64], sums: &mut Vec<f32>) -> f64 {
     let total: f64 = weights.iter().sum();
     let least = total / weights.len().max(1) as f64 * LEAST;
     let weight = |weight: f64| if weight > 0.0 { weight.max(least) } else { 0.0 };
@@ -148,7 +148,7 @@ mod tests {
         for (row, column) in (0..3).flat_map(|row| (0..4).map(move |column| (row, column))) {
             let share = f64::from(counts[row][column]) / all;
             assert!((share - weights[row][column] / 16.0).abs() < 1e-2, "{row} {column}: {share}");
-            let known = grid.row_probability(row) * grid.column_probability(row, column);
+            let known = grid.row_probability(row) * grid.column_probability_in_row(row, column);
             assert!((f64::from(known) - weights[row][column] / 16.0).abs() < 1e-7, "{row} {column}: {known}");
             assert_eq!(counts[row][column] == 0, weights[row][column] == 0.0);
         }
@@ -164,10 +164,10 @@ mod tests {
         row[77] = 1e12;
         let grid = PiecewiseConstant2D::new(4096, [row].into_iter()).expect("some weight");
         for column in [0, 76, 78, 4095] {
-            let probability = grid.column_probability(0, column);
+            let probability = grid.column_probability_in_row(0, column);
             assert!(probability > 1e-6, "{column}: {probability}");
         }
-        assert!(grid.column_probability(0, 77) > 0.98);
+        assert!(grid.column_probability_in_row(0, 77) > 0.98);
     }
 
     #[test]
@@ -179,7 +179,7 @@ mod tests {
                 _ => 1e-3 * (i * i) as f64,
             };
             let mut sums = Vec::new();
-            append_cumulative_sums(&(0..count).map(|i| weight(i + 1)).collect::<Vec<_>>(), &mut sums);
+            append_normalized_cdf(&(0..count).map(|i| weight(i + 1)).collect::<Vec<_>>(), &mut sums);
             let guide: Vec<u32> = guide_table(&sums).collect();
             let borders =
                 sums[..count].iter().flat_map(|&sum| [sum.next_down().max(0.0), sum, sum.next_up()]);

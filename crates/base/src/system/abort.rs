@@ -16,7 +16,7 @@ use nix::unistd::{pause, write};
 use signal_hook::consts::SIGABRT;
 use signal_hook::low_level;
 
-use super::memory::is_allocation_failure_handled;
+use super::memory::caller_handles_allocation_failure;
 
 /// Function that restores the terminal and makes only async-signal-safe calls.
 static RESTORE_TERMINAL: OnceLock<fn()> = OnceLock::new();
@@ -32,14 +32,14 @@ pub struct AbortingAllocator;
 /// Ends the process if the allocation failed and its caller does not handle the failure.
 #[inline(always)]
 fn check_allocation(memory: *mut u8, bytes: usize) -> *mut u8 {
-    if memory.is_null() && !is_allocation_failure_handled() {
-        end_without_memory(bytes);
+    if memory.is_null() && !caller_handles_allocation_failure() {
+        abort_out_of_memory(bytes);
     }
     memory
 }
 
 #[cold]
-fn end_without_memory(bytes: usize) -> ! {
+fn abort_out_of_memory(bytes: usize) -> ! {
     let (number, unit) = match bytes {
         1 => (bytes, "byte"),
         0..1_000 => (bytes, "bytes"),
@@ -92,7 +92,7 @@ pub fn install_abort_handler() -> io::Result<()> {
 
 /// Sets the function that restores the terminal before the message is printed. It may only make
 /// async-signal-safe calls. Later calls have no effect.
-pub fn set_terminal_restore(restore: fn()) {
+pub fn set_terminal_restore_hook(restore: fn()) {
     let _ = RESTORE_TERMINAL.set(restore);
 }
 

@@ -38,7 +38,7 @@ pub fn describe_error(error: &Error) -> String {
 pub const RAISE_FILE_LIMIT: &str = "raise the limit on open files (ulimit -n)";
 
 /// Whether too many files are open in the process or the system. Opening another file would also fail.
-pub fn is_out_of_files(error: &Error) -> bool {
+pub fn is_too_many_open_files(error: &Error) -> bool {
     matches!(error.raw_os_error(), Some(nix::libc::EMFILE | nix::libc::ENFILE))
 }
 

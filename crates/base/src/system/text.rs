@@ -2,7 +2,7 @@
 
 /// Whether a terminal prints this character unchanged: it is not a control character, is visible, and does
 /// not change the writing direction.
-pub fn is_terminal_safe(c: char) -> bool {
+pub fn is_terminal_safe_char(c: char) -> bool {
     !matches!(c,
         '\0'..='\u{1f}'
         | '\u{7f}'..='\u{9f}'           // DEL and C1

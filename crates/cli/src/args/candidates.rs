@@ -8,7 +8,7 @@ use clap_complete::engine::{ArgValueCompleter, CompletionCandidate, PathComplete
 
 use crate::scene::keys::key::{KeyInfo, TableSyntax, ValueKind};
 use crate::scene::keys::{all_paths_with_descriptions, all_tables, color_names};
-use crate::scene::outline::{OutlineTable, outline};
+use crate::scene::outline::{OutlineTable, document_outline};
 use crate::scene::{has_mesh_extension, read_current_text};
 
 /// The command line being completed, split into words, if the shell script does not pass it as arguments.
@@ -26,12 +26,14 @@ fn command_line() -> Vec<OsString> {
 
 /// Completes scenes.
 pub(crate) fn scene_completer() -> ArgValueCompleter {
-    ArgValueCompleter::new(PathCompleter::file().filter(is_scene))
+    ArgValueCompleter::new(PathCompleter::file().filter(has_scene_extension))
 }
 
 /// Completes scenes and models.
 pub(crate) fn scene_or_model_completer() -> ArgValueCompleter {
-    ArgValueCompleter::new(PathCompleter::file().filter(|path| is_scene(path) || has_mesh_extension(path)))
+    ArgValueCompleter::new(
+        PathCompleter::file().filter(|path| has_scene_extension(path) || has_mesh_extension(path)),
+    )
 }
 
 /// Completes glTF files.
@@ -40,7 +42,7 @@ pub(crate) fn gltf_completer() -> ArgValueCompleter {
     ArgValueCompleter::new(PathCompleter::file().filter(move |path| has(path, "glb") || has(path, "gltf")))
 }
 
-fn is_scene(path: &Path) -> bool {
+fn has_scene_extension(path: &Path) -> bool {
     path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("toml"))
 }
 
@@ -49,7 +51,7 @@ fn is_scene(path: &Path) -> bool {
 pub(crate) fn key_assignment_completer() -> ArgValueCompleter {
     ArgValueCompleter::new(|current: &OsStr| {
         let Some(current) = current.to_str() else { return Vec::new() };
-        let scene = command_line().into_iter().map(PathBuf::from).find(|word| is_scene(word));
+        let scene = command_line().into_iter().map(PathBuf::from).find(|word| has_scene_extension(word));
         let text = scene.and_then(|scene| read_current_text(&scene).ok());
         set_arg_candidates(text.as_deref().unwrap_or_default(), current)
     })
@@ -69,13 +71,13 @@ pub(crate) fn explain_path_completer() -> ArgValueCompleter {
 fn set_arg_candidates(text: &str, typed: &str) -> Vec<CompletionCandidate> {
     /// Maximum number of candidates.
     const MAX_CANDIDATES: usize = 2000;
-    let outline = outline(text);
+    let outline = document_outline(text);
     let singles = all_tables().iter().filter(|table| table.form == TableSyntax::Single);
     let absent = singles.filter(|info| !outline.iter().any(|table| table.info.name == info.name));
     let of_absent = absent.flat_map(|info| info.keys.iter().map(|key| (info.name.to_owned(), key)));
     let of = |table: &OutlineTable| {
         let paths = table.set_arg_prefixes();
-        let known = table.known_keys();
+        let known = table.keys_allowed_for_type();
         paths.into_iter().flat_map(move |path| known.clone().into_iter().map(move |key| (path.clone(), key)))
     };
     let keys = outline.iter().flat_map(of).chain(of_absent);

@@ -158,7 +158,7 @@ mod tests {
     use super::super::results::tests::results;
     use super::*;
 
-    fn with(scale: impl Fn(&mut super::super::ImageResult, usize)) -> Results {
+    fn with(scale: impl Fn(&mut super::super::ImageMeasurement, usize)) -> Results {
         let mut changed = results();
         for method in changed.scenes.iter_mut().flat_map(|scene| &mut scene.methods) {
             for step in &mut method.steps {

@@ -123,7 +123,7 @@ pub(super) fn store(
 ) -> Result<(), OutputError> {
     let path = cache_file_path(folder, key);
     create_folder(folder)?;
-    let (a, b) = (stored.pair.a(), stored.pair.reference());
+    let (a, b) = (stored.pair.measured_image(), stored.pair.reference());
     let head = CachedReferenceHeader { width: a.width, height: a.height, cost: stored.cost };
     let mut bytes = serde_json::to_vec(&head)
         .map_err(|error| OutputError::File { path: path.clone(), source: error.into() })?;
@@ -211,7 +211,10 @@ mod tests {
         store(&folder, &key, &stored()).expect("stored");
         let back = load(&folder, &key).expect("stored references");
         assert_eq!(back.cost, stored().cost);
-        assert_eq!((back.pair.a(), back.pair.reference()), (stored().pair.a(), stored().pair.reference()));
+        assert_eq!(
+            (back.pair.measured_image(), back.pair.reference()),
+            (stored().pair.measured_image(), stored().pair.reference())
+        );
         assert!(load(&folder, &FingerprintHasher::new("y").finish()).is_none());
     }
 

@@ -5,7 +5,7 @@ use super::brightness::compare_brightness;
 use super::methods::Method;
 use super::reference::{ReferenceFingerprints, SEEDS};
 use super::request::{BenchError, StepSchedule};
-use super::results::{ImageResult, MethodResult, StepResult};
+use super::results::{ImageMeasurement, MethodResult, StepResult};
 use super::run::SceneRun;
 use super::statistics::median;
 use super::table::{format_error_or_near_zero, format_samples_with_unit};
@@ -105,11 +105,11 @@ impl MethodRun<'_> {
         took: &[f64],
     ) -> Result<StepResult, BenchError> {
         let seeds = self.run.order.seeds;
-        let (mut pictures, mut images): (Vec<ImageResult>, Vec<RadianceImage>) = Default::default();
+        let (mut pictures, mut images): (Vec<ImageMeasurement>, Vec<RadianceImage>) = Default::default();
         let mut are_pixels_independent = true;
         for number in 0..seeds {
             let seed = self.run.order.seed + aim.index * seeds + number;
-            self.report_image(aim, number, budget, took, &pictures);
+            self.report_image_start(aim, number, budget, took, &pictures);
             let RenderedImage { image, report, .. } = self.render_step(session, seed, aim)?;
             let relmse = self.two.unbiased_relmse(&image);
             are_pixels_independent &= report.photons.is_none();
@@ -119,7 +119,7 @@ impl MethodRun<'_> {
                     "{name}: the error of seed {seed} is not finite"
                 ))));
             }
-            pictures.push(ImageResult {
+            pictures.push(ImageMeasurement {
                 seed,
                 samples: report.image.samples.mean,
                 seconds: rendering_seconds(&report),
@@ -139,13 +139,13 @@ impl MethodRun<'_> {
         Ok(step)
     }
 
-    fn report_image(
+    fn report_image_start(
         &self,
         aim: StepTarget,
         number: u32,
         budget: &TimeBudget,
         took: &[f64],
-        pictures: &[ImageResult],
+        pictures: &[ImageMeasurement],
     ) {
         let order = self.run.order;
         let amount = match aim.budget {
@@ -210,17 +210,17 @@ impl MethodRun<'_> {
             time_seconds: aim.budget,
             ..self.common.clone()
         };
-        Ok(session.render(self.run.path, &overrides, self.run.token)?)
+        Ok(session.render_in_memory(self.run.path, &overrides, self.run.token)?)
     }
 }
 
 fn summarize_step(
     aim: StepTarget,
-    pictures: Vec<ImageResult>,
+    pictures: Vec<ImageMeasurement>,
     images: &[RadianceImage],
     two: &ReferencePair,
 ) -> StepResult {
-    let of = |value: fn(&ImageResult) -> f64| pictures.iter().map(value).collect::<Vec<f64>>();
+    let of = |value: fn(&ImageMeasurement) -> f64| pictures.iter().map(value).collect::<Vec<f64>>();
     let errors = of(|picture| picture.relmse);
     let least = errors.iter().copied().fold(f64::INFINITY, f64::min);
     let most = errors.iter().copied().fold(f64::NEG_INFINITY, f64::max);

@@ -30,7 +30,7 @@ pub struct Method {
 
 /// Settings of a method, used to remove duplicates.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct MethodSettings {
+struct MethodDedupKey {
     integrator: Integrator,
     /// Photons and shadows. `None` for path tracing, which ignores both.
     of_whitted: Option<(bool, ShadowMode)>,
@@ -46,7 +46,7 @@ pub fn methods_to_measure(scene: &Scene, toggles: &MethodSweep) -> Vec<Method> {
     } else {
         requested_settings(scene, toggles)
     };
-    let mut distinct: Vec<MethodSettings> = Vec::new();
+    let mut distinct: Vec<MethodDedupKey> = Vec::new();
     for settings in all {
         if !distinct.contains(&settings) {
             distinct.push(settings);
@@ -55,7 +55,7 @@ pub fn methods_to_measure(scene: &Scene, toggles: &MethodSweep) -> Vec<Method> {
     distinct.into_iter().map(|settings| create_method_from_settings(settings, toggles)).collect()
 }
 
-fn default_benchmark_methods(scene: &Scene) -> Vec<MethodSettings> {
+fn default_benchmark_methods(scene: &Scene) -> Vec<MethodDedupKey> {
     let own = (scene.render.integrator, scene.photons.enabled);
     let ways = [(Integrator::Path, false), (Integrator::Whitted, true), own];
     let of = |(integrator, photons)| {
@@ -70,13 +70,13 @@ fn default_benchmark_methods(scene: &Scene) -> Vec<MethodSettings> {
     ways.into_iter().map(of).collect()
 }
 
-fn requested_settings(scene: &Scene, toggles: &MethodSweep) -> Vec<MethodSettings> {
+fn requested_settings(scene: &Scene, toggles: &MethodSweep) -> Vec<MethodDedupKey> {
     let mut ways = Vec::new();
-    for integrator in or_scene_value(&toggles.integrators, scene.render.integrator) {
-        for photons in or_scene_value(&toggles.photons, scene.photons.enabled) {
-            for shadows in or_scene_value(&toggles.shadows, scene.render.shadows) {
-                for clamp in or_scene_value(&toggles.clamps, scene.render.clamp) {
-                    for accel in or_scene_value(&toggles.accels, scene.render.accel) {
+    for integrator in requested_or_scene_values(&toggles.integrators, scene.render.integrator) {
+        for photons in requested_or_scene_values(&toggles.photons, scene.photons.enabled) {
+            for shadows in requested_or_scene_values(&toggles.shadows, scene.render.shadows) {
+                for clamp in requested_or_scene_values(&toggles.clamps, scene.render.clamp) {
+                    for accel in requested_or_scene_values(&toggles.accels, scene.render.accel) {
                         ways.push(normalize_method_settings(integrator, photons, shadows, clamp, accel));
                     }
                 }
@@ -86,7 +86,7 @@ fn requested_settings(scene: &Scene, toggles: &MethodSweep) -> Vec<MethodSetting
     ways
 }
 
-fn or_scene_value<T: Copy>(asked: &[T], own: T) -> Vec<T> {
+fn requested_or_scene_values<T: Copy>(asked: &[T], own: T) -> Vec<T> {
     if asked.is_empty() { vec![own] } else { asked.to_vec() }
 }
 
@@ -96,14 +96,14 @@ fn normalize_method_settings(
     shadows: ShadowMode,
     clamp: f32,
     accel: Accel,
-) -> MethodSettings {
+) -> MethodDedupKey {
     let method = integrator.properties();
     let of_whitted = (method.gathers && method.honors_shadows).then_some((photons, shadows));
-    MethodSettings { integrator, of_whitted, clamp, accel }
+    MethodDedupKey { integrator, of_whitted, clamp, accel }
 }
 
 /// Creates a method, named after the requested settings.
-fn create_method_from_settings(settings: MethodSettings, toggles: &MethodSweep) -> Method {
+fn create_method_from_settings(settings: MethodDedupKey, toggles: &MethodSweep) -> Method {
     let mut words = vec![settings.integrator.name().to_owned()];
     if let Some((photons, shadows)) = settings.of_whitted {
         if photons {

@@ -179,7 +179,7 @@ impl ReferenceRenderer<'_> {
             time_seconds: amount.seconds.map(|seconds| seconds.max(1e-3)),
             ..self.common.clone()
         };
-        Ok(session.render(self.scene, &overrides, self.token)?)
+        Ok(session.render_in_memory(self.scene, &overrides, self.token)?)
     }
 }
 

@@ -94,12 +94,12 @@ pub struct StepResult {
     #[serde(default)]
     pub brightness: Option<BrightnessDifference>,
     /// The individual images.
-    pub pictures: Vec<ImageResult>,
+    pub pictures: Vec<ImageMeasurement>,
 }
 
 /// Measurement of one image.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct ImageResult {
+pub struct ImageMeasurement {
     /// Random seed of the image.
     pub seed: u32,
     /// Average samples per pixel.
@@ -200,7 +200,7 @@ pub(super) mod tests {
 
     /// A synthetic step with three images whose errors are close to `relmse`.
     pub(crate) fn step(samples: f64, seconds: f64, relmse: f64, bias: f64) -> StepResult {
-        let of = |(number, factor): (u32, f64)| ImageResult {
+        let of = |(number, factor): (u32, f64)| ImageMeasurement {
             seed: number,
             samples,
             seconds: seconds * factor,

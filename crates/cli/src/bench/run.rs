@@ -142,7 +142,10 @@ impl SceneRun<'_> {
             ReferenceSource::InTime | ReferenceSource::Samples(_) => None,
         };
         let (width, height) = match &given {
-            Some(reference) => (reference.two.image_pair().a().width, reference.two.image_pair().a().height),
+            Some(reference) => (
+                reference.two.reference_pair().measured_image().width,
+                reference.two.reference_pair().measured_image().height,
+            ),
             None => image_size(&loaded.scene, (order.width, order.height)),
         };
         let common =
@@ -177,7 +180,10 @@ impl SceneRun<'_> {
             None => self.load_or_render_references(&mut session, &common, &keys, budget)?,
         };
         drop(session);
-        let (width, height) = (reference.two.image_pair().a().width, reference.two.image_pair().a().height);
+        let (width, height) = (
+            reference.two.reference_pair().measured_image().width,
+            reference.two.reference_pair().measured_image().height,
+        );
         self.report_references(&reference, (width, height));
         let most_samples = max_measurable_samples(reference.result.samples);
         let mut measured = Vec::new();

@@ -23,7 +23,7 @@ pub(crate) fn run(scene: &Path, sets: &[String], is_json: bool, console: &Consol
     match check_scene(scene, sets) {
         Ok(checked) => {
             console.print_diagnostics(&checked.warnings);
-            console.print_line(&format_summary(scene, &checked));
+            console.print_line(&format_scene_counts(scene, &checked));
             Exit::DONE
         }
         Err(Failure::Scene(diagnostics)) => {
@@ -52,7 +52,7 @@ fn check_as_json(scene: &Path, sets: &[String], console: &Console) -> Exit {
     exit
 }
 
-fn format_summary(scene: &Path, checked: &SceneSummary) -> String {
+fn format_scene_counts(scene: &Path, checked: &SceneSummary) -> String {
     let parts = [
         format_count(checked.objects, "object"),
         format_count(checked.triangles, "triangle"),
@@ -78,7 +78,7 @@ mod tests {
     #[test]
     fn summary_uses_singular_and_plural() {
         let checked = SceneSummary { objects: 1, triangles: 0, textures: 2, lights: 3, warnings: Vec::new() };
-        let text = format_summary(Path::new("a.toml"), &checked);
+        let text = format_scene_counts(Path::new("a.toml"), &checked);
         assert_eq!(text, "ok: a.toml: 1 object, 0 triangles, 2 textures, 3 lights");
     }
 }

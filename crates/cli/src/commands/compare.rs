@@ -197,8 +197,8 @@ impl<'a> Summary<'a> {
         Self {
             a: args.a.display().to_string(),
             b: args.b.display().to_string(),
-            width: pair.a().width,
-            height: pair.a().height,
+            width: pair.measured_image().width,
+            height: pair.measured_image().height,
             rmse,
             relmse,
             relmse_trimmed,

@@ -12,7 +12,7 @@ use clap::CommandFactory;
 use clap_complete::CompleteEnv;
 use clap_complete::env::{Elvish, EnvCompleter, Fish, Shells, Zsh};
 
-use self::bash::BashCompleter;
+use self::bash::BashCompletionAdapter;
 use self::powershell::PowershellCompleter;
 
 use crate::args::{Args, Shell};
@@ -53,7 +53,7 @@ fi
 /// Prints the script for a shell.
 pub(crate) fn run(shell: Shell, console: &Console) -> Exit {
     let completer: &dyn EnvCompleter = match shell {
-        Shell::Bash => &BashCompleter,
+        Shell::Bash => &BashCompletionAdapter,
         Shell::Zsh => {
             console.print_trusted_text(ZSH);
             return Exit::DONE;
@@ -76,7 +76,7 @@ pub(crate) fn run(shell: Shell, console: &Console) -> Exit {
 pub(crate) fn answer_completion_request(arguments: &[OsString]) -> Option<Exit> {
     std::env::var_os(VARIABLE)?;
     let folder = std::env::current_dir().ok();
-    let shells = Shells(&[&BashCompleter, &Elvish, &Fish, &PowershellCompleter, &Zsh]);
+    let shells = Shells(&[&BashCompletionAdapter, &Elvish, &Fish, &PowershellCompleter, &Zsh]);
     let complete = CompleteEnv::with_factory(Args::command).var(VARIABLE).shells(shells);
     let complete = complete.bin("glimt").completer("glimt");
     match complete.try_complete(arguments, folder.as_deref()) {

@@ -10,7 +10,7 @@ use crate::exit::Exit;
 use crate::output::Format;
 use crate::pipeline::estimate_memory;
 use crate::pipeline::protocol::Failure;
-use crate::system::text::is_terminal_safe;
+use crate::system::text::is_terminal_safe_char;
 
 pub(crate) fn run(args: &FarmArgs, console: &Console) -> Exit {
     if let Err(error) = Format::from_path(&args.output) {
@@ -40,7 +40,7 @@ pub(crate) fn run(args: &FarmArgs, console: &Console) -> Exit {
 
 /// Whether a word is safe in scripts and on terminals: it has no control characters or invisible characters.
 fn has_only_visible_chars(word: &str) -> bool {
-    word.chars().all(is_terminal_safe)
+    word.chars().all(is_terminal_safe_char)
 }
 
 /// Parses the render options.

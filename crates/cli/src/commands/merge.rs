@@ -71,7 +71,7 @@ impl MergeCommand<'_> {
         let format = self.check_output()?;
         let parts = if self.args.watch { self.wait_for_parts()? } else { self.open_parts()? };
         let inputs = RenderInputFiles::new(&parts, &self.args.out, self.token);
-        self.check_output_is_not_input(&inputs)?;
+        self.check_output_is_not_render_input(&inputs)?;
         let merged = self.merge_parts(&parts, self.args.partial, "merge")?;
         let Some(finish) = parts.first().and_then(|part| part.head.picture.develop_settings()) else {
             return Err(self.console.print_error(Exit::WRONG, "the parts contain no output settings"));
@@ -101,8 +101,8 @@ impl MergeCommand<'_> {
     }
 
     /// Checks that the output does not replace an input file of the render.
-    fn check_output_is_not_input(&self, inputs: &RenderInputFiles<'_>) -> Result<(), Exit> {
-        match self.input_conflict_message(inputs, &self.args.out) {
+    fn check_output_is_not_render_input(&self, inputs: &RenderInputFiles<'_>) -> Result<(), Exit> {
+        match self.output_is_render_input_message(inputs, &self.args.out) {
             Ok(None) => Ok(()),
             Ok(Some(message)) => Err(self.console.print_error(Exit::WRONG, &message)),
             Err(Cancelled) => Err(Exit::FAILED),
@@ -110,12 +110,12 @@ impl MergeCommand<'_> {
     }
 
     /// Returns an error message if the file at `path` is an input file of the parts or their scene.
-    fn input_conflict_message(
+    fn output_is_render_input_message(
         &self,
         inputs: &RenderInputFiles<'_>,
         path: &Path,
     ) -> Result<Option<String>, Cancelled> {
-        let why = inputs.reason_to_keep(path)?;
+        let why = inputs.reason_not_to_overwrite(path)?;
         Ok(why.map(|why| format!("cannot write {}: {why}; choose another output", self.args.out.display())))
     }
 
@@ -260,7 +260,7 @@ impl MergeCommand<'_> {
             Some(finish) => {
                 let merged = self.merge_parts(parts, true, "show")?;
                 self.pool.install(|| {
-                    let image = finish.extract_radiance_image(&merged.film);
+                    let image = finish.quantity_image(&merged.film);
                     let picture = tone_map_to_8_bits(&image, &finish.tone.with_image_range(&image));
                     images_as_text(&[NamedImage { name: words.to_string(), picture }], self.args.color, true)
                 })
@@ -317,7 +317,8 @@ impl MergeCommand<'_> {
             let is_given = self.args.parts.iter().any(|part| is_same_file(part, real));
             let is_part = is_given || part::is_part(real);
             let why = is_part.then(|| format!("cannot write {}: it is a part", out.display()));
-            let why = why.map_or_else(|| self.input_conflict_message(inputs, real), |why| Ok(Some(why)))?;
+            let why =
+                why.map_or_else(|| self.output_is_render_input_message(inputs, real), |why| Ok(Some(why)))?;
             why.map_or(Ok(()), |reason| Err(OutputError::Refused { reason }))
         };
         let is_kept = |path: &Path| self.args.parts.iter().any(|part| is_same_file(part, path));
@@ -328,9 +329,9 @@ impl MergeCommand<'_> {
             sweep: None,
             losses: AttributeLossPolicy::Report(&tell),
         };
-        let bytes = self.pool.install(|| {
-            finish.encode_film_image(film, (&finish.extract_radiance_image(film), &[]), format, token)
-        });
+        let bytes = self
+            .pool
+            .install(|| finish.encode_film_image(film, (&finish.quantity_image(film), &[]), format, token));
         let written = bytes.and_then(|bytes| atomic_with_policy(out, &bytes, &guard, token));
         written.map_err(|error| match error {
             OutputError::Cancelled(_) => Exit::FAILED,

@@ -46,13 +46,13 @@ impl Reporter for JsonReporter {
 
 /// Prints a JSON line to stderr, ignoring errors.
 pub(crate) fn print_json_line_to_stderr(value: &Value) {
-    if let Ok(text) = with_event_first(value) {
+    if let Ok(text) = event_json_line(value) {
         let _ = writeln!(std::io::stderr().lock(), "{text}");
     }
 }
 
 /// Formats an object on one line, starting with `event`. The other keys are sorted.
-fn with_event_first(value: &Value) -> serde_json::Result<String> {
+fn event_json_line(value: &Value) -> serde_json::Result<String> {
     let mut rest = value.clone();
     let Some(event) = rest.as_object_mut().and_then(|keys| keys.remove("event")) else {
         return to_line(value);
@@ -160,12 +160,12 @@ mod tests {
     #[test]
     fn event_is_the_first_key() {
         let value = json!({ "a": 1, "event": "stage", "z": [2] });
-        assert_eq!(with_event_first(&value).expect("JSON"), r#"{"event":"stage","a":1,"z":[2]}"#);
+        assert_eq!(event_json_line(&value).expect("JSON"), r#"{"event":"stage","a":1,"z":[2]}"#);
         assert_eq!(
-            with_event_first(&json!({ "event": "cancelled" })).expect("JSON"),
+            event_json_line(&json!({ "event": "cancelled" })).expect("JSON"),
             r#"{"event":"cancelled"}"#
         );
-        assert_eq!(with_event_first(&json!({ "a": 1 })).expect("JSON"), r#"{"a":1}"#);
+        assert_eq!(event_json_line(&json!({ "a": 1 })).expect("JSON"), r#"{"a":1}"#);
     }
 
     #[test]

@@ -35,7 +35,7 @@ impl PlainReporter {
     }
 
     /// Whether the asset is loaded for the first time. A file with several meshes is loaded once per mesh.
-    fn record_first_load(&mut self, progress: &AssetProgress) -> bool {
+    fn mark_newly_loaded(&mut self, progress: &AssetProgress) -> bool {
         progress.done == progress.total && self.loaded.insert(progress.name.clone())
     }
 
@@ -68,7 +68,7 @@ impl Reporter for PlainReporter {
         {
             self.console.print_line_to_stderr(&stage_status_line(stage));
         } else if let Event::Asset { progress, .. } = event
-            && self.record_first_load(progress)
+            && self.mark_newly_loaded(progress)
         {
             self.console.print_line_to_stderr(&format!("{:<8} {} 100%", "loaded", progress.name));
         } else if let Event::Progress { progress, .. } = event {
@@ -141,7 +141,7 @@ mod tests {
         let mut plain = PlainReporter::new(Console::new(crate::tui::ColorDepthChoice::None));
         let asset = |name: &str, done| AssetProgress { name: name.to_owned(), done, total: 10 };
         let said = [asset("toy.glb", 5), asset("toy.glb", 10), asset("toy.glb", 10), asset("b.png", 10)];
-        assert_eq!(said.map(|progress| plain.record_first_load(&progress)), [false, true, false, true]);
+        assert_eq!(said.map(|progress| plain.mark_newly_loaded(&progress)), [false, true, false, true]);
     }
 
     #[test]

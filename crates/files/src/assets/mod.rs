@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 
 use crate::geometry::mesh::TriangleMesh;
 use crate::system::file::FileStamp;
-use crate::system::{RAISE_FILE_LIMIT, describe_error, is_out_of_files};
+use crate::system::{RAISE_FILE_LIMIT, describe_error, is_too_many_open_files};
 
 pub use file_material::{FileLine, FileMaterial, FileMaterialKind, FileTexture, PhysicalMaterial};
 
@@ -64,7 +64,7 @@ impl AssetError {
 
     /// Creates the error for a file that the system cannot read.
     pub(crate) fn from_io(path: &Path, error: &io::Error) -> Self {
-        match is_out_of_files(error) {
+        match is_too_many_open_files(error) {
             true => Self::TooManyOpenFiles { path: path.to_owned() },
             false => Self::unreadable(path, describe_error(error)),
         }
@@ -123,7 +123,7 @@ pub struct LoadedMesh {
 impl LoadedMesh {
     /// Whether the mesh has no normals and consists of flat faces, like a box.
     pub fn is_faceted_without_normals(&self) -> bool {
-        mesh::normals::is_faceted_without_normals(&self.mesh)
+        mesh::normals::is_polyhedral_without_normals(&self.mesh)
     }
 
     /// Whether the mesh has triangles but no materials.

@@ -33,7 +33,7 @@ pub(crate) struct Monitor<'a> {
 
 impl Monitor<'_> {
     /// Reports progress, then polls the token.
-    pub(crate) fn report_progress(&self, done: usize, total: usize) -> Result<(), Cancelled> {
+    pub(crate) fn report_and_check_cancel(&self, done: usize, total: usize) -> Result<(), Cancelled> {
         (self.progress)(done as u64, total as u64);
         self.token.check_pause_and_cancel()
     }
@@ -77,7 +77,7 @@ pub(crate) fn read_text(path: &Path, limit: u64, monitor: Monitor<'_>) -> Result
 }
 
 /// Reads a text or binary file whose format starts with three letters.
-pub(crate) fn read_with_text_magic(
+pub(crate) fn read_rejecting_non_ascii_magic(
     path: &Path,
     limit: u64,
     monitor: Monitor<'_>,
@@ -158,7 +158,7 @@ pub(crate) fn read_rest(
     let out_of_memory = |_| AssetError::OutOfMemory { path: path.to_owned(), bytes: length };
     try_reserve_exact(&mut bytes, length + 1).map_err(out_of_memory)?;
     loop {
-        monitor.report_progress(bytes.len().min(length), 2 * length)?;
+        monitor.report_and_check_cancel(bytes.len().min(length), 2 * length)?;
         let got = (&mut file).take(CHUNK as u64).read_to_end(&mut bytes).map_err(unreadable)?;
         if got == 0 {
             return Ok(bytes);
@@ -199,13 +199,13 @@ mod tests {
         let path = folder.path().join("zeros");
         // A sparse 3 TiB file. Reading it completely would take an hour.
         File::create(&path).and_then(|file| file.set_len(3 << 40)).expect("a sparse file");
-        for read in [read_text, read_with_text_magic] {
+        for read in [read_text, read_rejecting_non_ascii_magic] {
             let error = rejection(read(&path, u64::MAX, monitor(&token)));
             assert_eq!(error, (Some(1), BINARY_FILE.to_owned()));
         }
         fs::write(&path, b"ply\n\0").expect("written");
         assert!(read_text(&path, 100, monitor(&token)).is_err());
-        assert_eq!(read_with_text_magic(&path, 100, monitor(&token)).expect("read"), b"ply\n\0");
+        assert_eq!(read_rejecting_non_ascii_magic(&path, 100, monitor(&token)).expect("read"), b"ply\n\0");
         fs::write(&path, b"").expect("written");
         assert_eq!(read_text(&path, 100, monitor(&token)).expect("read"), b"");
     }
@@ -221,7 +221,7 @@ mod tests {
             let big: Vec<u8> = words().encode_utf16().flat_map(u16::to_be_bytes).collect();
             for bytes in [little, big] {
                 fs::write(&path, bytes).expect("written");
-                for read in [read_text, read_with_text_magic] {
+                for read in [read_text, read_rejecting_non_ascii_magic] {
                     let error = rejection(read(&path, u64::MAX, monitor(&token)));
                     assert_eq!(error, (Some(1), UTF16_TEXT.to_owned()));
                 }
@@ -250,7 +250,7 @@ mod tests {
         let path = folder.path().join("pointer");
         let pointer = "version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 12345\n";
         fs::write(&path, pointer).expect("written");
-        for read in [read_text, read_with_text_magic, read_unless_zeros_at_start, read_bytes] {
+        for read in [read_text, read_rejecting_non_ascii_magic, read_unless_zeros_at_start, read_bytes] {
             let error = rejection(read(&path, 1 << 20, monitor(&token)));
             assert_eq!(error, (None, LFS_POINTER.to_owned()));
         }

@@ -32,7 +32,7 @@ struct LinearErrorSums {
 }
 
 pub(super) fn measure(pair: &Pair) -> LinearErrors {
-    let pixels = pair.a().pixels.len();
+    let pixels = pair.measured_image().pixels.len();
     let rows = map_rows(pair, row_error_sums);
     let sums = rows.into_iter().enumerate().fold(LinearErrorSums::default(), |sums, (y, row)| {
         let (max, max_at) =
@@ -60,7 +60,7 @@ pub(super) fn measure(pair: &Pair) -> LinearErrors {
 
 /// Applies `row` to each row and returns the results in order.
 fn map_rows<T: Send>(pair: &Pair, row: impl Fn(&[Vec3], &[Vec3]) -> T + Sync) -> Vec<T> {
-    let a = pair.a().pixels.par_chunks(pair.width());
+    let a = pair.measured_image().pixels.par_chunks(pair.width());
     a.zip(pair.reference().pixels.par_chunks(pair.width())).map(|(a, b)| row(a, b)).collect()
 }
 
@@ -88,7 +88,7 @@ fn relative_squared_error(a: Vec3, b: Vec3) -> f64 {
 
 /// Mean of [`relative_squared_error`], excluding the largest values.
 fn trimmed_relmse(pair: &Pair, dropped: usize) -> f64 {
-    let pixels = pair.a().pixels.par_iter().zip(&pair.reference().pixels);
+    let pixels = pair.measured_image().pixels.par_iter().zip(&pair.reference().pixels);
     let mut errors: Vec<f64> = pixels.map(|(&a, &b)| relative_squared_error(a, b)).collect();
     let kept = errors.len() - dropped;
     let (_, &mut least_dropped, _) = errors.select_nth_unstable_by(kept, f64::total_cmp);

@@ -83,7 +83,7 @@ impl Pair {
     }
 
     /// The image to measure.
-    pub fn a(&self) -> &RadianceImage {
+    pub fn measured_image(&self) -> &RadianceImage {
         &self.a
     }
 

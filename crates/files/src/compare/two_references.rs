@@ -22,17 +22,17 @@ pub struct ReferencePair {
 impl ReferencePair {
     /// Creates references from a pair of images.
     pub fn new(pair: Pair) -> Self {
-        let values = 3.0 * pair.a().pixels.len() as f64;
+        let values = 3.0 * pair.measured_image().pixels.len() as f64;
         let weight = |(a, b): (&Vec3, &Vec3)| {
             let mean = (a.as_dvec3() + b.as_dvec3()) / 2.0;
             1.0 / ((mean * mean + RELMSE_EPSILON) * values)
         };
-        let weights = pair.a().pixels.iter().zip(&pair.reference().pixels).map(weight).collect();
+        let weights = pair.measured_image().pixels.iter().zip(&pair.reference().pixels).map(weight).collect();
         Self { pair, weights }
     }
 
     /// Both references.
-    pub fn image_pair(&self) -> &Pair {
+    pub fn reference_pair(&self) -> &Pair {
         &self.pair
     }
 
@@ -98,7 +98,7 @@ impl ReferencePair {
     }
 
     fn weights_and_pixel_pairs(&self) -> impl Iterator<Item = (DVec3, DVec3, DVec3)> {
-        let pixels = self.pair.a().pixels.iter().zip(&self.pair.reference().pixels);
+        let pixels = self.pair.measured_image().pixels.iter().zip(&self.pair.reference().pixels);
         self.weights.iter().zip(pixels).map(|(weight, (a, b))| (*weight, a.as_dvec3(), b.as_dvec3()))
     }
 }

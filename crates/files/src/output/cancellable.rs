@@ -138,7 +138,7 @@ fn wait_until_writable(to: &File, token: &CancelToken) -> io::Result<()> {
 
 /// Distinguishes cancelled writes from I/O errors. Checks the error instead of the token, because the token
 /// may have been cancelled after the write.
-pub(super) fn map_cancelled_error<T>(
+pub(super) fn write_error_or_cancelled<T>(
     result: io::Result<T>,
     error: impl FnOnce(io::Error) -> OutputError,
 ) -> Result<T, OutputError> {
@@ -183,7 +183,7 @@ mod tests {
         let token = CancelToken::new();
         token.cancel();
         let classify =
-            |result| map_cancelled_error(result, |error| OutputError::file("a.png".as_ref(), error));
+            |result| write_error_or_cancelled(result, |error| OutputError::file("a.png".as_ref(), error));
         let stopped = write_all(Vec::new(), b"abc", &token);
         assert!(matches!(classify(stopped), Err(OutputError::Cancelled(_))));
         let full = io::Error::from(io::ErrorKind::StorageFull);

@@ -3,13 +3,13 @@
 use super::{BitDepth, EncodeOptions, Format, LayerImage, OutputError, encode_with_layers};
 use crate::control::CancelToken;
 use crate::film::tone::ToneMapping;
-use crate::film::{Film, Quantity, RadianceImage, SampleCountStats};
+use crate::film::{Film, FilmQuantity, RadianceImage, SampleCountStats};
 
 /// Settings for encoding a film as an image file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FilmEncodingSettings {
     /// Film quantity that the image shows.
-    pub quantity: Quantity,
+    pub quantity: FilmQuantity,
     /// Tone mapping. Its range has not been adapted to the image yet.
     pub tone: ToneMapping,
     /// Bits per channel in PNG and PPM files.
@@ -22,7 +22,7 @@ pub struct FilmEncodingSettings {
 
 impl FilmEncodingSettings {
     /// Extracts the image from a film.
-    pub fn extract_radiance_image(&self, film: &Film) -> RadianceImage {
+    pub fn quantity_image(&self, film: &Film) -> RadianceImage {
         film.image(self.quantity)
     }
 

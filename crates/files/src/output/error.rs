@@ -4,7 +4,7 @@ use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
 
 use super::{AnimationFormat, Format};
-use crate::system::{RAISE_FILE_LIMIT, describe_error, is_out_of_files};
+use crate::system::{RAISE_FILE_LIMIT, describe_error, is_too_many_open_files};
 
 /// Reason why an image could not be written.
 #[derive(Debug, thiserror::Error)]
@@ -103,7 +103,7 @@ fn write_error_advice(error: &io::Error) -> &'static str {
         }
         ErrorKind::InvalidFilename => "choose a shorter name",
         ErrorKind::BrokenPipe => "the reader has exited; write to a file",
-        _ if is_out_of_files(error) => RAISE_FILE_LIMIT,
+        _ if is_too_many_open_files(error) => RAISE_FILE_LIMIT,
         _ => "choose another location",
     }
 }

@@ -57,7 +57,7 @@ impl Format {
     ];
 
     /// All known extensions, without the dot.
-    pub fn known_extensions() -> impl Iterator<Item = &'static str> {
+    pub fn all_extensions() -> impl Iterator<Item = &'static str> {
         Self::EXTENSIONS.iter().map(|(extension, _)| *extension)
     }
 

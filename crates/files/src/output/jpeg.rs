@@ -22,11 +22,11 @@ pub(super) fn encode(
     JpegEncoder::new_with_quality(&mut bytes, QUALITY)
         .encode(&pixels, image.width, image.height, ExtendedColorType::Rgb8)
         .map_err(|error| OutputError::encoder(Format::Jpeg, &error))?;
-    Ok(insert_comment(&bytes.into_bytes(), &comment(options)))
+    Ok(insert_comment(&bytes.into_bytes(), &metadata_comment(options)))
 }
 
 /// Metadata as a comment, one line per item.
-fn comment(options: &EncodeOptions) -> String {
+fn metadata_comment(options: &EncodeOptions) -> String {
     let mut comment = format!("Software: {SOFTWARE}\n");
     for (name, value) in &options.metadata {
         comment += &format!("{}: {}\n", one_line(name), one_line(value));

@@ -5,7 +5,7 @@ use std::fmt::Write;
 
 use serde::Serialize;
 
-use crate::system::text::is_terminal_safe;
+use crate::system::text::is_terminal_safe_char;
 
 /// Formats a value on a single line, without a line feed.
 ///
@@ -26,7 +26,7 @@ pub fn to_pretty_text(value: &impl Serialize) -> serde_json::Result<String> {
 /// Escapes unsafe characters, which occur only inside strings. Line feeds occur only between tokens and are
 /// kept.
 fn escape_terminal_unsafe(text: String) -> String {
-    let is_safe = |c: char| c == '\n' || is_terminal_safe(c);
+    let is_safe = |c: char| c == '\n' || is_terminal_safe_char(c);
     if text.chars().all(is_safe) {
         return text;
     }

@@ -41,7 +41,7 @@ pub use exr::read_mean_luminance_error;
 pub use format::{AnimationFormat, BitDepth, Format};
 pub use identity::{FallbackFileIdentity, FileIdentity, is_same_file};
 pub use origin::{
-    ReplaceCheck, may_replace_image, may_replace_json, may_replace_plot, may_replace_table,
+    ReplaceCheck, check_image_replaceable, may_replace_json, may_replace_plot, may_replace_table,
     scene_name_in_png, sign_plot,
 };
 
@@ -138,7 +138,7 @@ pub fn check_image_path(path: &Path) -> Result<Format, OutputError> {
 ///
 /// # Errors
 /// Same as [`check_image_target`], but does not detect directories that reject new files despite their permissions.
-pub fn check_image_target_read_only(path: &Path) -> Result<Format, OutputError> {
+pub fn check_image_target_without_writing(path: &Path) -> Result<Format, OutputError> {
     let format = Format::from_path(path)?;
     check_file_target_read_only(path)?;
     Ok(format)

@@ -11,18 +11,18 @@ pub(super) fn rename_no_replace(from: &Path, to: &Path) -> io::Result<()> {
     use rustix::io::Errno;
     match renameat_with(CWD, from, CWD, to, RenameFlags::NOREPLACE) {
         // The file system or kernel does not support the flag.
-        Err(Errno::INVAL | Errno::NOSYS | Errno::NOTSUP) => create_then_rename(from, to),
+        Err(Errno::INVAL | Errno::NOSYS | Errno::NOTSUP) => rename_no_replace_fallback(from, to),
         moved => moved.map_err(io::Error::from),
     }
 }
 
 #[cfg(not(any(target_os = "linux", target_vendor = "apple")))]
 pub(super) fn rename_no_replace(from: &Path, to: &Path) -> io::Result<()> {
-    create_then_rename(from, to)
+    rename_no_replace_fallback(from, to)
 }
 
 /// Implements [`rename_no_replace`] with two system calls. The first call fails if the destination exists.
-fn create_then_rename(from: &Path, to: &Path) -> io::Result<()> {
+fn rename_no_replace_fallback(from: &Path, to: &Path) -> io::Result<()> {
     if from.is_dir() {
         // A rename can replace only an empty folder, such as this new one.
         fs::create_dir(to)?;
@@ -43,13 +43,13 @@ mod tests {
         let at = |name: &str| directory.path().join(name);
         fs::create_dir_all(at("from/in")).expect("a folder");
         fs::create_dir(at("to")).expect("a folder");
-        assert!(create_then_rename(&at("from"), &at("to")).is_err() && at("from/in").exists());
-        create_then_rename(&at("from"), &at("new")).expect("moved");
+        assert!(rename_no_replace_fallback(&at("from"), &at("to")).is_err() && at("from/in").exists());
+        rename_no_replace_fallback(&at("from"), &at("new")).expect("moved");
         fs::write(at("file"), "1").expect("a file");
         fs::write(at("other"), "2").expect("a file");
-        assert!(create_then_rename(&at("file"), &at("other")).is_err());
+        assert!(rename_no_replace_fallback(&at("file"), &at("other")).is_err());
         assert_eq!(fs::read(at("other")).expect("a file"), b"2");
-        create_then_rename(&at("file"), &at("last")).expect("moved");
+        rename_no_replace_fallback(&at("file"), &at("last")).expect("moved");
         assert!(at("new/in").exists() && at("last").exists());
     }
 }

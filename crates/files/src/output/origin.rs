@@ -61,7 +61,7 @@ impl ReplaceCheck {
 }
 
 /// Checks whether an image may be replaced. It must be a PNG with a text chunk that names glimt.
-pub fn may_replace_image(path: &Path) -> ReplaceCheck {
+pub fn check_image_replaceable(path: &Path) -> ReplaceCheck {
     ReplaceCheck::from_file(open_existing(path), "an image", is_glimt_image)
 }
 
@@ -163,9 +163,9 @@ mod tests {
     fn unreadable_files_are_not_foreign() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("a.png");
-        assert!(matches!(may_replace_image(&path), ReplaceCheck::Own), "no file");
+        assert!(matches!(check_image_replaceable(&path), ReplaceCheck::Own), "no file");
         std::fs::write(&path, "an image").expect("written");
-        assert!(matches!(may_replace_image(&path), ReplaceCheck::Foreign("an image")));
+        assert!(matches!(check_image_replaceable(&path), ReplaceCheck::Foreign("an image")));
         let denied = || Some(Err(io::Error::from(io::ErrorKind::PermissionDenied)));
         let replaced = ReplaceCheck::from_file(denied(), "an image", |_| true);
         assert!(

@@ -46,9 +46,9 @@ pub(super) fn resolve_writable(path: &Path) -> Result<WriteTarget, OutputError> 
         return Err(target_is_directory_error(path));
     }
     match follow_links(path).map_err(|error| OutputError::file(path, error))? {
-        (target, None) => resolve_new(path, target),
+        (target, None) => check_new_file_target(path, target),
         (_, Some(metadata)) if metadata.is_symlink() => Ok(WriteTarget::InPlace(path.to_owned())),
-        (target, Some(metadata)) => resolve_existing(path, target, metadata),
+        (target, Some(metadata)) => check_existing_target(path, target, metadata),
     }
 }
 
@@ -89,12 +89,16 @@ pub(super) fn follow_links(path: &Path) -> io::Result<(PathBuf, Option<Metadata>
     Err(Errno::ELOOP.into())
 }
 
-fn resolve_new(path: &Path, target: PathBuf) -> Result<WriteTarget, OutputError> {
+fn check_new_file_target(path: &Path, target: PathBuf) -> Result<WriteTarget, OutputError> {
     check_directory(path, directory_of(&target))?;
     Ok(WriteTarget::File(TargetFile { path: target, existing: None }))
 }
 
-fn resolve_existing(path: &Path, target: PathBuf, metadata: Metadata) -> Result<WriteTarget, OutputError> {
+fn check_existing_target(
+    path: &Path,
+    target: PathBuf,
+    metadata: Metadata,
+) -> Result<WriteTarget, OutputError> {
     let kind = metadata.file_type();
     if kind.is_dir() {
         return Err(target_is_directory_error(path));

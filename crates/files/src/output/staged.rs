@@ -35,7 +35,7 @@ pub fn create_files_atomically(
     remove_stale_folders(here);
     let hidden = StagingFolder::create(here, last.as_os_str()).map_err(at(last))?;
     for (name, bytes) in files {
-        cancellable::map_cancelled_error(hidden.write(name, bytes, token), at(name))?;
+        cancellable::write_error_or_cancelled(hidden.write(name, bytes, token), at(name))?;
     }
     // Move the files to their destinations. If a destination exists, undo all moves.
     let mut placed: Vec<&OsStr> = Vec::new();

@@ -170,7 +170,7 @@ pub(super) fn write_atomically_or_in_place(
                     way_out: "edit a copy instead",
                 });
             }
-            cancellable::map_cancelled_error(fill(&new, content, carried.as_ref(), durability), named)?;
+            cancellable::write_error_or_cancelled(fill(&new, content, carried.as_ref(), durability), named)?;
             (guard.may_replace)(&target.path)?;
             let file = match expected {
                 None => new.rename_to(&target.path).map_err(named)?,
@@ -201,8 +201,8 @@ pub(super) fn write_atomically_or_in_place(
         WriteTarget::InPlace(device) => {
             (guard.may_replace)(&device)?;
             let mut bytes = Vec::new();
-            cancellable::map_cancelled_error(content(&mut bytes), named)?;
-            cancellable::map_cancelled_error(append_in_place(&device, &bytes, token), named)?;
+            cancellable::write_error_or_cancelled(content(&mut bytes), named)?;
+            cancellable::write_error_or_cancelled(append_in_place(&device, &bytes, token), named)?;
             Ok(None)
         }
     }

@@ -114,7 +114,7 @@ impl Cone {
     }
 
     /// Surface point at a hit.
-    pub fn surface_point(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
+    pub fn surface_point_at_hit(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
         let point = self.exact_hit_point(ray, hit);
         if hit.primitive > 0 {
             return self.base().closest_surface_point(point, self.coordinate_bound());
@@ -235,7 +235,7 @@ impl Cone {
     }
 
     /// Distance from a point to the surface.
-    pub fn distance(&self, point: DVec3) -> f64 {
+    pub fn distance_from_point(&self, point: DVec3) -> f64 {
         let local = self.frame.point_to_local(point);
         let point = DVec2::new(local.truncate().length(), local.z);
         let rim = DVec2::new(self.radius, self.height);
@@ -278,7 +278,7 @@ mod tests {
     fn met(cone: &Cone, origin: [f32; 3], direction: Vec3) -> Option<(f32, u32, Vec3)> {
         let ray = Ray::new(Vec3::from_array(origin), direction).to_f64();
         let hit = cone.intersect(&ray)?;
-        Some((hit.t, hit.primitive, cone.surface_point(&ray, &hit).normal))
+        Some((hit.t, hit.primitive, cone.surface_point_at_hit(&ray, &hit).normal))
     }
 
     #[test]
@@ -328,7 +328,7 @@ mod tests {
     fn v_increases_from_base_to_tip() {
         let ray = Ray::new(Vec3::new(9.0, 0.5, 0.0), Vec3::NEG_X).to_f64();
         let hit = hat(true).intersect(&ray).expect("aimed at it");
-        let surface = hat(true).surface_point(&ray, &hit);
+        let surface = hat(true).surface_point_at_hit(&ray, &hit);
         assert_eq!(surface.uv.as_vec2(), Vec2::new(0.5, 0.25));
         assert!((surface.dpdv - Vec3::new(-1.0, 2.0, 0.0)).length() < 1e-6);
         let (point, normal) = hat(true).side_point_and_normal(0.5, 0.25);

@@ -51,7 +51,7 @@ impl OrientedBox {
             return None;
         }
         [near, far].into_iter().find_map(|(t, face)| {
-            ray.round_if_in_range(t).map(|t| ShapeHit { t, primitive: face, u: 0.0, v: 0.0 })
+            ray.round_t_if_in_range(t).map(|t| ShapeHit { t, primitive: face, u: 0.0, v: 0.0 })
         })
     }
 
@@ -90,7 +90,7 @@ impl OrientedBox {
     }
 
     /// Surface point at a hit, projected onto the face.
-    pub fn surface_point(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
+    pub fn surface_point_at_hit(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
         let SurfacePointF64 { point, normal: outwards, reach } = self.surface_point_f64(ray, hit);
         let chart = self.face_mapping(hit.primitive);
         let uv = chart.uv(self.local_hit_point(ray, hit));
@@ -258,11 +258,11 @@ mod tests {
             let inside = Ray::new(Vec3::ZERO, direction).to_f64();
             let hit = cube.intersect(&inside).expect("a ray from inside should hit");
             assert_eq!(hit.t, t);
-            assert_eq!(cube.surface_point(&inside, &hit).normal, direction);
+            assert_eq!(cube.surface_point_at_hit(&inside, &hit).normal, direction);
             let outside = Ray::new(-direction * 10.0, direction).to_f64();
             let hit = cube.intersect(&outside).expect("a ray toward the center should hit");
             assert_eq!(hit.t, 10.0 - t);
-            assert_eq!(cube.surface_point(&outside, &hit).normal, -direction);
+            assert_eq!(cube.surface_point_at_hit(&outside, &hit).normal, -direction);
         }
     }
 
@@ -288,7 +288,7 @@ mod tests {
             let ray = RayF64 { origin: cube.center, direction: middle - cube.center, t_max: f64::INFINITY };
             let hit = cube.intersect(&ray).expect("a ray from inside should hit");
             assert_eq!((hit.primitive, hit.t), (face, 1.0));
-            let surface = cube.surface_point(&ray, &hit);
+            let surface = cube.surface_point_at_hit(&ray, &hit);
             assert!((surface.normal - u.cross(v).normalize().as_vec3()).length() < 1e-6);
             assert!((surface.uv.as_vec2() - Vec2::splat(0.5)).length() < 1e-6);
             assert!(

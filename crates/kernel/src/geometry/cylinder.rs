@@ -98,7 +98,7 @@ impl Cylinder {
     }
 
     /// Surface point at a hit.
-    pub fn surface_point(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
+    pub fn surface_point_at_hit(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
         let point = self.unrounded_hit_point(ray, hit);
         if hit.primitive > 0 {
             return self.cap_disk(hit.primitive).closest_surface_point(point, self.coordinate_bound());
@@ -205,7 +205,7 @@ impl Cylinder {
     }
 
     /// Distance from a point to the surface.
-    pub fn distance(&self, point: DVec3) -> f64 {
+    pub fn distance_from_point(&self, point: DVec3) -> f64 {
         let local = self.frame.point_to_local(point);
         let (across, along) = (local.truncate().length(), local.z.abs());
         let from = |dx: f64, dy: f64| DVec2::new(dx, dy).length();
@@ -246,7 +246,7 @@ mod tests {
     fn met(cylinder: &Cylinder, origin: [f32; 3], direction: Vec3) -> Option<(f32, u32, Vec3)> {
         let ray = Ray::new(Vec3::from_array(origin), direction).to_f64();
         let hit = cylinder.intersect(&ray)?;
-        Some((hit.t, hit.primitive, cylinder.surface_point(&ray, &hit).normal))
+        Some((hit.t, hit.primitive, cylinder.surface_point_at_hit(&ray, &hit).normal))
     }
 
     #[test]
@@ -277,7 +277,7 @@ mod tests {
     fn side_uvs_match_the_angle_and_the_height() {
         let ray = Ray::new(Vec3::new(9.0, 3.0, 0.0), Vec3::NEG_X).to_f64();
         let hit = bar(true).intersect(&ray).expect("aimed at it");
-        let surface = bar(true).surface_point(&ray, &hit);
+        let surface = bar(true).surface_point_at_hit(&ray, &hit);
         assert_eq!(surface.uv.as_vec2(), Vec2::new(0.5, 0.75));
         assert!((surface.dpdv - Vec3::Y * 4.0).length() < 1e-6);
         assert!((surface.dpdu - Vec3::NEG_Z * std::f32::consts::PI).length() < 1e-6);

@@ -58,11 +58,11 @@ impl Disk {
         let along = -line.foot.z / line.direction.z;
         let across = (line.foot + line.direction * along).truncate().length();
         let t = line.start + along;
-        (across <= self.radius * (1.0 + BORDER) && ray.round_if_in_range(t).is_some()).then_some((t, 0))
+        (across <= self.radius * (1.0 + BORDER) && ray.round_t_if_in_range(t).is_some()).then_some((t, 0))
     }
 
     /// Surface point at a hit.
-    pub fn surface_point(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
+    pub fn surface_point_at_hit(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
         let t = unrounded_t(hit, self.intersect_f64(ray));
         self.closest_surface_point(ray.at(t), self.coordinate_bound())
     }
@@ -129,7 +129,7 @@ impl Disk {
     }
 
     /// Distance from a point to the disk.
-    pub fn distance(&self, point: DVec3) -> f64 {
+    pub fn distance_from_point(&self, point: DVec3) -> f64 {
         let local = self.frame.point_to_local(point);
         DVec2::new((local.truncate().length() - self.radius).max(0.0), local.z).length()
     }
@@ -139,7 +139,7 @@ impl Disk {
         let (normal, from) = (self.normal(), point - self.centroid());
         let extent = LocalSurfaceShape::Flat(self.radius - from.length());
         let ground = NearestSurface { normal, height: from.dot(normal).abs(), extent };
-        LocalGeometry::Surface { distance: self.distance(point), ground: Some(ground) }
+        LocalGeometry::Surface { distance: self.distance_from_point(point), ground: Some(ground) }
     }
 
     /// Whether a point is inside. Always false because a disk has no volume.
@@ -184,7 +184,7 @@ mod tests {
         let disk = Disk::new(DVec3::ZERO, DVec3::Z, 2.0);
         let ray = Ray::new(Vec3::new(1.0, -0.5, 5.0), Vec3::NEG_Z).to_f64();
         let hit = disk.intersect(&ray).expect("the ray should hit the disk");
-        let surface = disk.surface_point(&ray, &hit);
+        let surface = disk.surface_point_at_hit(&ray, &hit);
         assert_eq!((surface.uv.as_vec2(), surface.normal), (Vec2::new(0.75, 0.375), Vec3::Z));
         assert_eq!((surface.dpdu, surface.dpdv), (Vec3::X * 4.0, Vec3::Y * 4.0));
     }

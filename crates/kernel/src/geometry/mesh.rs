@@ -17,7 +17,7 @@ pub struct TriangleMesh {
     pub uvs: Vec<Vec2>,
     /// Normal group of each vertex. The groups determine which vertices share a computed normal. If empty,
     /// every vertex has its own normal in the group [`VertexNormalGroup::BY_ANGLE`].
-    pub normal_groups: Vec<VertexNormalGroup>,
+    pub normal_groups: Vec<VertexNormalSharing>,
     /// Second set of vertex texture coordinates, or empty.
     pub second_uvs: Vec<Vec2>,
     /// Vertex colors in sRGB, or empty.
@@ -30,7 +30,7 @@ pub struct TriangleMesh {
 
 /// A vertex's normal group.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct VertexNormalGroup {
+pub struct VertexNormalSharing {
     /// Vertices with the same number share a normal. Must be less than the number of vertices in the file.
     pub normal: u32,
     /// Smoothing group. Normals at the same position are merged if they have the same group and differ by at
@@ -38,7 +38,7 @@ pub struct VertexNormalGroup {
     pub group: u32,
 }
 
-impl VertexNormalGroup {
+impl VertexNormalSharing {
     /// The group of vertices without a smoothing group.
     pub const BY_ANGLE: u32 = 0;
     /// The group of flat faces. Their normals are never merged with others.

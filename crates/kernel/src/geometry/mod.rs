@@ -109,12 +109,14 @@ impl Shape {
             Self::Box(cuboid) => cuboid.intersect_packet(rows, ends, found),
             Self::Triangle(triangle) => triangle.intersect_packet(rows, ends, found),
             Self::Disk(disk) => disk.intersect_packet(rows, ends, found),
-            Self::Cylinder(_) | Self::Cone(_) | Self::Torus(_) => self.intersect_each(rows, met, ends, found),
+            Self::Cylinder(_) | Self::Cone(_) | Self::Torus(_) => {
+                self.intersect_each_lane(rows, met, ends, found)
+            }
         }
     }
 
     #[inline(never)]
-    fn intersect_each(&self, rays: &RayPacket, met: u32, ends: &F32x16, found: &mut HitPacket) {
+    fn intersect_each_lane(&self, rays: &RayPacket, met: u32, ends: &F32x16, found: &mut HitPacket) {
         for lane in packet::set_bit_lanes(met) {
             if let Some(hit) = self.intersect(&Ray { t_max: ends[lane], ..rays.ray(lane) }.to_f64()) {
                 found.set(lane, &hit);
@@ -161,8 +163,8 @@ impl Shape {
 
     /// Surface point at a hit.
     #[inline]
-    pub fn surface_point(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
-        for_shape!(self, it => it.surface_point(ray, hit))
+    pub fn surface_point_at_hit(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
+        for_shape!(self, it => it.surface_point_at_hit(ray, hit))
     }
 
     /// Surface point at a hit, with at least the requested fields.
@@ -174,7 +176,7 @@ impl Shape {
         asked: SurfaceRequest,
     ) -> SurfacePoint {
         if asked.uv {
-            self.surface_point(ray, hit)
+            self.surface_point_at_hit(ray, hit)
         } else {
             for_shape!(self, it => it.surface_point_f64(ray, hit)).to_surface_point_without_uv()
         }
@@ -292,9 +294,11 @@ impl Shape {
             Self::Sphere(sphere) => sphere.geometry_near(point),
             Self::Plane(plane) => plane.geometry_near(point),
             Self::Disk(disk) => disk.geometry_near(point),
-            Self::Cylinder(cylinder) => LocalGeometry::curved_at_distance(cylinder.distance(point)),
-            Self::Cone(cone) => LocalGeometry::curved_at_distance(cone.distance(point)),
-            Self::Torus(torus) => LocalGeometry::curved_at_distance(torus.distance(point)),
+            Self::Cylinder(cylinder) => {
+                LocalGeometry::curved_surface_at_distance(cylinder.distance_from_point(point))
+            }
+            Self::Cone(cone) => LocalGeometry::curved_surface_at_distance(cone.distance_from_point(point)),
+            Self::Torus(torus) => LocalGeometry::curved_surface_at_distance(torus.distance_from_point(point)),
         }
     }
 
@@ -400,7 +404,7 @@ mod tests {
                     let hit = shape.intersect(&ray).unwrap_or_else(|| panic!("{shape:?} {part} {u}"));
                     assert!((hit.t - 0.01).abs() < 1e-5, "{shape:?} {part} {u}: {hit:?}");
                     assert_eq!(hit.primitive, part, "{shape:?} {u}");
-                    let normal = shape.surface_point(&ray, &hit).normal.as_dvec3();
+                    let normal = shape.surface_point_at_hit(&ray, &hit).normal.as_dvec3();
                     assert!((normal - place.normal).length() < 1e-4, "{shape:?} {u}: {normal}");
                 }
             }
@@ -487,7 +491,7 @@ mod tests {
                 Shape::Quad(_) | Shape::Plane(_) | Shape::Triangle(_) | Shape::Disk(_) => false,
             };
             for (ray, hit) in hits(&shape) {
-                let surface = shape.surface_point(&ray, &hit);
+                let surface = shape.surface_point_at_hit(&ray, &hit);
                 let behind = surface.point.as_dvec3() - surface.normal.as_dvec3() * 1e-3;
                 let before = surface.point.as_dvec3() + surface.normal.as_dvec3() * 1e-3;
                 assert!(!shape.encloses(before) || !is_closed, "{shape:?}");
@@ -506,7 +510,7 @@ mod tests {
         for shape in shapes() {
             let mut seen = 0;
             for (ray, hit) in hits(&shape) {
-                let surface = shape.surface_point(&ray, &hit);
+                let surface = shape.surface_point_at_hit(&ray, &hit);
                 let point = surface.point.as_dvec3();
                 let uv = shape.uv_at(point);
                 let (u, v) = (surface.dpdu.as_dvec3(), surface.dpdv.as_dvec3());
@@ -545,7 +549,7 @@ mod tests {
         for shape in shapes() {
             let mut compared = 0;
             for (ray, hit) in hits(&shape).step_by(7) {
-                let surface = shape.surface_point(&ray, &hit);
+                let surface = shape.surface_point_at_hit(&ray, &hit);
                 let (point, normal) = (surface.point.as_dvec3(), surface.normal.as_dvec3());
                 let step = 1e-2;
                 let normal_at = |aside: DVec3| {
@@ -554,7 +558,7 @@ mod tests {
                     let hit = shape
                         .intersect(&ray)
                         .filter(|near| near.primitive == hit.primitive && near.t < 0.1)?;
-                    Some(shape.surface_point(&ray, &hit).normal.as_dvec3())
+                    Some(shape.surface_point_at_hit(&ray, &hit).normal.as_dvec3())
                 };
                 let (a, b) = normal.any_orthonormal_pair();
                 let along = |e: DVec3| Some((normal_at(e)? - normal_at(-e)?).dot(e) / (2.0 * step));

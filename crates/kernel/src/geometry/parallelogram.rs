@@ -45,7 +45,7 @@ impl Parallelogram {
     pub fn intersect(&self, ray: &RayF64) -> Option<ShapeHit> {
         let to_corner = self.corner - ray.origin;
         let t = self.normal.dot(to_corner) / self.normal.dot(ray.direction);
-        let accepted = ray.round_if_in_range(t)?;
+        let accepted = ray.round_t_if_in_range(t)?;
         let from_corner = ray.direction * t - to_corner;
         let (s, t) = (from_corner.dot(self.dual_u), from_corner.dot(self.dual_v));
         (is_in_unit_interval_with_margin(s) && is_in_unit_interval_with_margin(t))
@@ -78,7 +78,7 @@ impl Parallelogram {
     }
 
     /// Surface point at a hit.
-    pub fn surface_point(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
+    pub fn surface_point_at_hit(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
         let SurfacePointF64 { point, normal, reach } = self.surface_point_f64(ray, hit);
         SurfacePoint::from_f64(point, normal, self.uv_at_hit(ray, hit).as_vec2(), self.u, self.v, reach)
     }
@@ -180,7 +180,7 @@ mod tests {
         let ray = Ray::new(origin, target - origin).to_f64();
         let hit = quad.intersect(&ray).expect("the ray should hit the quad");
         assert!((hit.t - 1.0).abs() < 1e-6);
-        let surface = quad.surface_point(&ray, &hit);
+        let surface = quad.surface_point_at_hit(&ray, &hit);
         assert!((surface.uv.as_vec2() - Vec2::new(0.25, 0.75)).length() < 1e-6);
         assert!((surface.point - target).length() < 1e-5);
         let outside = (quad.corner + quad.u * 1.01 + quad.v * 0.5).as_vec3();

@@ -30,7 +30,7 @@ impl Plane {
     /// Intersects the plane. `None` for rays in the plane or parallel to it.
     pub fn intersect(&self, ray: &RayF64) -> Option<ShapeHit> {
         let t = self.normal.dot(self.point - ray.origin) / self.normal.dot(ray.direction);
-        (t < f64::from(f32::MAX)).then(|| ray.round_if_in_range(t)).flatten().map(ShapeHit::from_t)
+        (t < f64::from(f32::MAX)).then(|| ray.round_t_if_in_range(t)).flatten().map(ShapeHit::from_t)
     }
 
     /// [`Plane::intersect`] for a packet.
@@ -55,7 +55,7 @@ impl Plane {
     }
 
     /// Surface point at a hit. Each texture tile has an edge length of 1.
-    pub fn surface_point(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
+    pub fn surface_point_at_hit(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
         let SurfacePointF64 { point, normal, reach } = self.surface_point_f64(ray, hit);
         let uv = self.uv_at_hit(ray, hit);
         SurfacePoint { uv, ..SurfacePoint::from_f64(point, normal, uv.as_vec2(), self.u, self.v, reach) }
@@ -158,7 +158,7 @@ mod tests {
         let down = Ray::new(Vec3::new(2.25, 3.0, -1.5), Vec3::NEG_Y).to_f64();
         let hit = floor.intersect(&down).expect("the ray should hit the floor");
         assert_eq!(hit.t, 2.0);
-        let surface = floor.surface_point(&down, &hit);
+        let surface = floor.surface_point_at_hit(&down, &hit);
         assert_eq!((surface.point, surface.uv.as_vec2()), (Vec3::new(2.25, 1.0, -1.5), Vec2::new(2.25, 1.5)));
         for parallel in [Vec3::new(0.0, 1.0, 0.0), Vec3::new(0.0, 2.0, 0.0)] {
             assert_eq!(floor.intersect(&Ray::new(parallel, Vec3::X).to_f64()), None);

@@ -35,7 +35,7 @@ impl Ray {
     /// Creates a segment that ends just before `to`. It is shortened by the rounding errors of both ends so
     /// that it does not hit a surface that contains `to`. t = 1 is `to` itself.
     #[inline(always)]
-    pub fn segment_ending_before(from: Vec3, to: Vec3) -> Self {
+    pub fn segment_ending_before_point(from: Vec3, to: Vec3) -> Self {
         let direction = to - from;
         let size = from.abs().max_element() + to.abs().max_element();
         let relative = size / direction.abs().max_element().max(f32::MIN_POSITIVE);
@@ -83,7 +83,7 @@ impl RayF64 {
     }
 
     /// `t` rounded to `f32`, or `None` if the result is not finite or is outside the ray's interval.
-    pub fn round_if_in_range(&self, t: f64) -> Option<f32> {
+    pub fn round_t_if_in_range(&self, t: f64) -> Option<f32> {
         let single = t as f32;
         (single > 0.0 && single < f32::INFINITY && f64::from(single) <= self.t_max).then_some(single)
     }
@@ -125,7 +125,7 @@ mod tests {
     fn segments_end_before_their_target() {
         for scale in [1e-8_f32, 1.0, 1e8] {
             let (from, to) = (Vec3::new(3.0, 4.0, 5.0) * scale, Vec3::new(3.0, 4.5, 5.0) * scale);
-            let ray = Ray::segment_ending_before(from, to);
+            let ray = Ray::segment_ending_before_point(from, to);
             assert!(ray.at(ray.t_max).y < to.y && ray.at(ray.t_max).y > 4.4999 * scale);
         }
     }

@@ -36,7 +36,7 @@ impl Sphere {
         let q = b + (a * discriminant).sqrt().copysign(b);
         let (t0, t1) = (c / q, q / a);
         let (near, far) = if t0 < t1 { (t0, t1) } else { (t1, t0) };
-        ray.round_if_in_range(near).or_else(|| ray.round_if_in_range(far)).map(ShapeHit::from_t)
+        ray.round_t_if_in_range(near).or_else(|| ray.round_t_if_in_range(far)).map(ShapeHit::from_t)
     }
 
     /// [`Sphere::intersect`] for a packet.
@@ -73,7 +73,7 @@ impl Sphere {
     }
 
     /// Surface point at a hit.
-    pub fn surface_point(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
+    pub fn surface_point_at_hit(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
         let SurfacePointF64 { point, normal, reach } = self.surface_point_f64(ray, hit);
         let (uv, dpdu, dpdv) = sphere_parametrization(normal);
         SurfacePoint::from_f64(point, normal, uv, dpdu * self.radius, dpdv * self.radius, reach)
@@ -113,13 +113,13 @@ impl Sphere {
     }
 
     /// Distance from a point to the surface.
-    pub fn distance(&self, point: DVec3) -> f64 {
+    pub fn distance_from_point(&self, point: DVec3) -> f64 {
         ((point - self.center).length() - self.radius).abs()
     }
 
     /// Local geometry of the sphere near a point, for density estimation.
     pub fn geometry_near(&self, point: DVec3) -> LocalGeometry {
-        let (distance, out) = (self.distance(point), (point - self.center).normalize_or_zero());
+        let (distance, out) = (self.distance_from_point(point), (point - self.center).normalize_or_zero());
         let ground =
             NearestSurface { normal: out, height: distance, extent: LocalSurfaceShape::Round(self.radius) };
         LocalGeometry::Surface { distance, ground: Some(ground) }

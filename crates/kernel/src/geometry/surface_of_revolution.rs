@@ -149,7 +149,7 @@ pub fn first_hit(
     };
     let accepted = |(along, part): (f64, u32)| {
         let t = line.start + along;
-        ray.round_if_in_range(t).filter(|_| !is_start(along, part)).map(|_| (t, part))
+        ray.round_t_if_in_range(t).filter(|_| !is_start(along, part)).map(|_| (t, part))
     };
     if !closed {
         let bare = [side.enter, side.leave].into_iter().filter(|end| ends.contains_position(end.0));

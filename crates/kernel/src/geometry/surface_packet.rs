@@ -94,7 +94,7 @@ impl SurfacePacket {
         }
         for lane in set_bit_lanes(of) {
             let Some(hit) = hits.get(lane) else { continue };
-            let uv = shape.surface_point(&rays.ray_f64(lane), &hit).uv;
+            let uv = shape.surface_point_at_hit(&rays.ray_f64(lane), &hit).uv;
             (self.uv[0][lane], self.uv[1][lane]) = (uv.x, uv.y);
         }
     }

@@ -34,7 +34,7 @@ impl Triangle {
         }
         let sum = wa + wb + wc;
         let normal = (b - a).cross(c - a);
-        let t = ray.round_if_in_range(normal.dot(a) / normal.dot(d))?;
+        let t = ray.round_t_if_in_range(normal.dot(a) / normal.dot(d))?;
         (sum != 0.0).then(|| ShapeHit { t, primitive: 0, u: (wb / sum) as f32, v: (wc / sum) as f32 })
     }
 
@@ -59,7 +59,7 @@ impl Triangle {
     }
 
     /// Surface point at a hit. The texture coordinates at the corners are (0, 0), (1, 0), and (0, 1).
-    pub fn surface_point(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
+    pub fn surface_point_at_hit(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
         let SurfacePointF64 { point, normal, reach } = self.surface_point_f64(ray, hit);
         SurfacePoint::from_f64(
             point,
@@ -168,7 +168,7 @@ mod tests {
             let [a, b, c] = [corner(-size, size), corner(size, size), corner(0.1, -size)];
             let ray = Ray::new(Vec3::new(0.25, 3.0, -0.5), Vec3::new(0.3, -1.0, 0.1)).to_f64();
             let triangle = Triangle { a, b, c };
-            let surface = triangle.surface_point(&ray, &triangle.intersect(&ray).expect("below"));
+            let surface = triangle.surface_point_at_hit(&ray, &triangle.intersect(&ray).expect("below"));
             let t =
                 (0.3 * 0.25 + 0.2 * 0.5 - 3.0) / (-1.0 - 0.3 * f64::from(0.3_f32) + 0.2 * f64::from(0.1_f32));
             let off = (surface.point.as_dvec3() - ray.at(t)).abs().max_element();

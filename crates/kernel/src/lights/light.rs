@@ -1,6 +1,6 @@
 //! The [`Light`] enum. [`Light::family`] returns a light as its family's trait object.
 
-use super::area::{AreaLight, EmissionTexture};
+use super::area::{AreaLight, EmissionModulation};
 use super::delta::{DeltaLight, PointLight, SpotLight};
 use super::infinite::{DirectionalLight, Environment, InfiniteLight};
 use super::packet::LightSamplePacket;
@@ -115,7 +115,7 @@ impl Light {
     #[inline]
     pub fn sample_untextured(&self, point: Vec3, normal: Vec3, u: [f32; 2]) -> Option<LightSample> {
         match self.as_area() {
-            Some(light) => light.sample_untextured(point, normal, u),
+            Some(light) => light.sample_without_texture_factor(point, normal, u),
             None => self.sample(point, normal, u),
         }
     }
@@ -132,7 +132,7 @@ impl Light {
     pub fn bounds(&self) -> Option<LightBounds> {
         let bounds = match self.family() {
             LightFamily::Delta(light) => light.bounds(),
-            LightFamily::Infinite(light) => light.bounds(),
+            LightFamily::Infinite(light) => light.direction_and_irradiance_bounds(),
             LightFamily::Area(light) => light.bounds,
         };
         Some(bounds).filter(|bounds| bounds.power > 0.0)
@@ -140,7 +140,7 @@ impl Light {
 
     /// The emission texture that modulates the light's radiance. `None` for an untextured light.
     #[inline(always)]
-    pub fn emission_texture(&self) -> Option<&EmissionTexture> {
+    pub fn emission_texture(&self) -> Option<&EmissionModulation> {
         self.as_area().and_then(|light| light.texture.as_deref())
     }
 

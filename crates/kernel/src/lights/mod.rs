@@ -45,7 +45,7 @@ mod set;
 pub mod tree;
 
 pub use area::{
-    AreaLight, EmissionTexture, Emitter, EmittingTriangleSelection, MeshEmitter, Side, TriangleWithUvs,
+    AreaLight, EmissionModulation, Emitter, EmittingTriangleSelection, MeshEmitter, Side, TriangleWithUvs,
     UvMapping, back_area_light, front_area_light, see_through_shape_side_light,
 };
 pub use light::{Light, LightFamily};

@@ -116,7 +116,7 @@ impl Lights {
             }
         }
         let tree_over = |taken: &dyn Fn(&&Light) -> bool, most| -> Result<_, Cancelled> {
-            if count_lights_merging_objects(all.iter().filter(taken)) <= most {
+            if count_lights_once_per_object(all.iter().filter(taken)) <= most {
                 return Ok(None);
             }
             let bounds = all.iter().map(|light| light.bounds().filter(|_| taken(&light)));
@@ -135,7 +135,7 @@ impl Lights {
     const MAX_LOCAL_WITHOUT_TREE: usize = 3;
 
     /// How vertices pick lights. `None` if they sample all lights.
-    pub fn sampler_for_mode(&self, receivers: LightSamplingPurpose) -> Option<LightSampler<'_>> {
+    pub fn sampler_for_purpose(&self, receivers: LightSamplingPurpose) -> Option<LightSampler<'_>> {
         match receivers {
             LightSamplingPurpose::Eye => {
                 let sampler =
@@ -160,7 +160,7 @@ impl Lights {
         normal: Vec3,
     ) -> ExpectedSamplesPerLight<'_> {
         // Return early because a cut is expensive to copy.
-        let Some(sampler) = self.sampler_for_mode(receivers) else { return ExpectedSamplesPerLight(None) };
+        let Some(sampler) = self.sampler_for_purpose(receivers) else { return ExpectedSamplesPerLight(None) };
         let mut cut = sampler.picks.new_tree_cut(sampler.tree);
         cut.adapt_to_receiver(&Receiver::with_unknown_lobe(point, normal));
         ExpectedSamplesPerLight(Some((sampler, cut)))
@@ -294,7 +294,7 @@ impl Lights {
 }
 
 /// Number of lights. All lights on the same object count as one.
-fn count_lights_merging_objects<'a>(lights: impl Iterator<Item = &'a Light> + Clone) -> usize {
+fn count_lights_once_per_object<'a>(lights: impl Iterator<Item = &'a Light> + Clone) -> usize {
     let object = |light: &Light| light.as_area().map(|light| light.object);
     let objects: HashSet<u32> = lights.clone().filter_map(object).collect();
     objects.len() + lights.filter(|light| object(light).is_none()).count()

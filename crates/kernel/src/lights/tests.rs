@@ -50,7 +50,7 @@ const POINT: PointLight =
 pub fn light_hit(shape: &Shape, from: Vec3, direction: Vec3) -> Option<(LightHit, ShapeHit)> {
     let ray = Ray::new(from, direction).to_f64();
     let hit = shape.intersect(&ray)?;
-    let normal = shape.surface_point(&ray, &hit).normal;
+    let normal = shape.surface_point_at_hit(&ray, &hit).normal;
     Some((LightHit { direction, distance: hit.t, normal, primitive: hit.primitive }, hit))
 }
 

@@ -187,9 +187,9 @@ impl<B: Bxdf> BxdfPacket<B> {
         }
         if self.any_has_narrow_lobe() {
             if self.any.contains(B::SPLITS_NARROW) {
-                self.add_narrow_lobes(wi, &mut values, self.any.union(B::SPLITS_NARROW));
+                self.add_narrow_lobe_values(wi, &mut values, self.any.union(B::SPLITS_NARROW));
             } else {
-                self.add_narrow_lobes(wi, &mut values, self.any.without(B::SPLITS_NARROW));
+                self.add_narrow_lobe_values(wi, &mut values, self.any.without(B::SPLITS_NARROW));
             }
         }
         if !self.shows_all {
@@ -206,7 +206,7 @@ impl<B: Bxdf> BxdfPacket<B> {
 
     /// Adds the narrow lobes to `values`.
     #[inline(always)]
-    fn add_narrow_lobes(&self, wi: &Vec3x16, values: &mut BsdfValues, any: BxdfFlags) {
+    fn add_narrow_lobe_values(&self, wi: &Vec3x16, values: &mut BsdfValues, any: BxdfFlags) {
         for i in 0..PACKET_SIZE {
             let bsdf = B::get(&self.bsdf, i);
             let value = bsdf.narrow_lobe_value(&B::View::get(&self.view, i), lane(wi, i), any);
@@ -382,7 +382,7 @@ impl<B: Bxdf> BxdfPacket<B> {
 
     /// [`BxdfPacket::pdf`].
     #[inline(always)]
-    pub(super) fn dispatch_pdf(
+    pub(super) fn pdf_out_of_line(
         &self,
         lobes: SampledLobes,
         normals: &Vec3x16,

@@ -30,7 +30,7 @@ impl Coated {
 
     /// The factor applied to the coat's reflection. Counts texture lookups in `lookups`.
     #[inline]
-    pub fn specular_factor(&self, at: &TexturePoint, lookups: &mut u64) -> Vec3 {
+    pub fn specular_tint(&self, at: &TexturePoint, lookups: &mut u64) -> Vec3 {
         self.specular.evaluate(at, lookups)
     }
 

@@ -38,7 +38,7 @@ impl Dielectric {
     /// Whether the surface is smooth.
     #[inline]
     pub fn is_smooth(&self) -> bool {
-        self.roughness.as_constant() == Some(0.0)
+        self.roughness.as_untextured() == Some(0.0)
     }
 
     /// The surface's α. `None` if it is smooth.

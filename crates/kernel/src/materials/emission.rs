@@ -56,7 +56,7 @@ impl Emission {
 
     /// Whether a side may emit light.
     #[inline]
-    pub fn emits_from(&self, is_front: bool) -> bool {
+    pub fn emits_on_side(&self, is_front: bool) -> bool {
         self.is_emissive() && (is_front || self.is_two_sided())
     }
 

@@ -42,7 +42,7 @@ impl LobeAlbedoPolynomial {
     }
 
     /// Fits a polynomial to an albedo function, and stores the function's exact mean.
-    pub fn fit_with_exact_mean(albedo: impl Fn(f64) -> f64) -> Self {
+    pub fn fit_storing_exact_mean(albedo: impl Fn(f64) -> f64) -> Self {
         Self { mean: cosine_weighted_mean(&albedo) as f32, ..Self::fit(albedo) }
     }
 
@@ -335,7 +335,7 @@ fn integrate_albedo<const ACROSS: usize, const ALONG: usize>(
 }
 
 /// Double-precision version of [`crate::materials::fresnel::dielectric`] for light from outside.
-pub fn dielectric_reflectance(cosine: f64, eta: f64) -> f64 {
+pub fn fresnel_dielectric_f64(cosine: f64, eta: f64) -> f64 {
     let root = (eta * eta - 1.0 + cosine * cosine).sqrt();
     let square = |over: f64, under: f64| if under > 0.0 { (over / under) * (over / under) } else { 0.0 };
     let parallel = square(eta * eta * cosine - root, eta * eta * cosine + root);
@@ -358,7 +358,7 @@ mod tests {
         type Reflectance = fn(f64, f64) -> f64;
         let grazing: Reflectance = |cosine, _| (1.0 - cosine).powi(5);
         let normal: Reflectance = |cosine, _| 1.0 - (1.0 - cosine).powi(5);
-        let exact = [1.0, 1.05, 1.33, 1.5, 2.5, 4.0].map(|eta| (dielectric_reflectance as Reflectance, eta));
+        let exact = [1.0, 1.05, 1.33, 1.5, 2.5, 4.0].map(|eta| (fresnel_dielectric_f64 as Reflectance, eta));
         for (reflectance, eta) in exact.into_iter().chain([(grazing, 0.0), (normal, 0.0)]) {
             let reflectance = |cosine: f64| reflectance(cosine, eta);
             for alpha in [0.001, 0.003, 0.01, 0.03, 0.1, 0.3, 0.6, 1.0] {
@@ -397,7 +397,7 @@ mod tests {
         for alpha in [0.003, 0.1, 0.4, 1.0] {
             for cosine in [0.05, 0.2, 0.6, 1.0] {
                 for (eta, fresnel) in
-                    [(1.5, dielectric_reflectance as fn(f64, f64) -> f64), (0.0, |_, _| 1.0)]
+                    [(1.5, fresnel_dielectric_f64 as fn(f64, f64) -> f64), (0.0, |_, _| 1.0)]
                 {
                     let reflectance = |cosine: f64| fresnel(cosine, eta);
                     let found = integrate_albedo::<12, 16>(cosine, alpha, &reflectance);
@@ -411,16 +411,17 @@ mod tests {
     #[test]
     fn smooth_lobes_match_fresnel() {
         // The expected mean is 2 ∫ F(μ) μ dμ for η = 1.5.
-        let smooth = LobeAlbedoPolynomial::fit_with_exact_mean(|cosine| dielectric_reflectance(cosine, 1.5));
+        let smooth =
+            LobeAlbedoPolynomial::fit_storing_exact_mean(|cosine| fresnel_dielectric_f64(cosine, 1.5));
         assert!((smooth.mean - 0.091_778_0).abs() < 2e-5, "{}", smooth.mean);
         let narrow =
-            LobeAlbedoPolynomial::for_microfacet_lobe(0.001, |cosine| dielectric_reflectance(cosine, 1.5));
+            LobeAlbedoPolynomial::for_microfacet_lobe(0.001, |cosine| fresnel_dielectric_f64(cosine, 1.5));
         assert!((narrow.mean - smooth.mean).abs() < 1e-3, "{}", narrow.mean);
     }
 
     #[test]
     fn interpolated_tables_match_single_entries() {
-        let fresnel = |cosine: f64| dielectric_reflectance(cosine, 1.5);
+        let fresnel = |cosine: f64| fresnel_dielectric_f64(cosine, 1.5);
         let alpha = |roughness: f32| (roughness * roughness).max(0.001);
         let table = AlbedoTable::new(None, alpha, fresnel);
         for roughness in [0.0, 0.1, 0.23, 0.5, 0.77, 1.0] {

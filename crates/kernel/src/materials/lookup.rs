@@ -57,17 +57,17 @@ pub struct WhiteLookup;
 impl ParameterLookup<'_> for WhiteLookup {
     #[inline(always)]
     fn color(&mut self, color: &ColorOrTexture) -> Vec3 {
-        color.as_constant().unwrap_or(Vec3::ONE)
+        color.as_untextured().unwrap_or(Vec3::ONE)
     }
 
     #[inline(always)]
     fn number(&mut self, number: &ScalarParameter) -> f32 {
-        number.as_constant().unwrap_or(1.0)
+        number.as_untextured().unwrap_or(1.0)
     }
 
     #[inline(always)]
     fn number_neutral_at_zero(&mut self, number: &ScalarParameter) -> f32 {
-        number.as_constant().unwrap_or(0.0)
+        number.as_untextured().unwrap_or(0.0)
     }
 }
 

@@ -76,7 +76,7 @@ impl<'a> ImageHalver<'a> {
     }
 
     /// Creates empty storage for the rows of the smaller image.
-    pub fn empty_rows(&self) -> TexelData {
+    pub fn allocate_halved_rows(&self) -> TexelData {
         let count = self.width as usize * self.height as usize;
         if self.of.has_alpha() {
             TexelData::FloatAlpha(Vec::with_capacity(count))
@@ -88,9 +88,9 @@ impl<'a> ImageHalver<'a> {
     /// Appends a row of the smaller image. Each texel is the mean over the area that it covers in the larger
     /// image, which preserves the overall mean even for odd sizes.
     pub fn append_row(&self, y: u32, to: &mut TexelData) {
-        let rows = CoveredTexels::new(y, self.height, self.of.height);
+        let rows = DownsampleTaps::new(y, self.height, self.of.height);
         for x in 0..self.width {
-            let columns = CoveredTexels::new(x, self.width, self.of.width);
+            let columns = DownsampleTaps::new(x, self.width, self.of.width);
             match to {
                 TexelData::FloatAlpha(texels) => {
                     let texel = |x: u32, y: u32| {
@@ -114,12 +114,12 @@ impl<'a> ImageHalver<'a> {
 }
 
 /// The texels of the larger image (up to three) that one texel of the smaller image covers along an axis.
-struct CoveredTexels {
+struct DownsampleTaps {
     first: u32,
     weights: [f32; 3],
 }
 
-impl CoveredTexels {
+impl DownsampleTaps {
     fn new(index: u32, of: u32, from: u32) -> Self {
         // In a common unit of length, a texel of the larger image is `of` wide and a texel of the smaller
         // image is `from` wide.
@@ -145,7 +145,7 @@ mod tests {
 
     fn halved(of: &Texels) -> Result<Texels, ()> {
         let halving = ImageHalver::new(of);
-        let mut rows = halving.empty_rows();
+        let mut rows = halving.allocate_halved_rows();
         (0..halving.halved_height()).for_each(|y| halving.append_row(y, &mut rows));
         Ok(halving.assemble_image(rows))
     }

@@ -34,7 +34,7 @@ impl Mirror {
     /// [`Mirror::reflectance`] with white textures.
     pub fn untextured_reflectance(&self, cosine: f32) -> Vec3 {
         match self {
-            Self::Constant(color) => color.as_constant().unwrap_or(Vec3::ONE),
+            Self::Constant(color) => color.as_untextured().unwrap_or(Vec3::ONE),
             Self::Conductor(fresnel) => fresnel.look_up_parameters(&mut WhiteLookup).reflectance(cosine),
         }
     }

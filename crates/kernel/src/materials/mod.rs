@@ -134,18 +134,18 @@ impl Bsdf {
     /// Whether the surface has non-δ lobes, which light sampling can reach.
     #[inline]
     pub fn has_non_delta_lobes(&self) -> bool {
-        self.non_specular().is_some()
+        self.non_specular_part().is_some()
     }
 
     /// Whether the lobes depend on the directions of the texture axes.
     #[inline]
     pub fn is_anisotropic(&self) -> bool {
-        self.non_specular().is_some_and(NonSpecular::is_anisotropic)
+        self.non_specular_part().is_some_and(NonSpecular::is_anisotropic)
     }
 
     /// The non-δ lobes. `None` if there are none.
     #[inline]
-    pub fn non_specular(&self) -> Option<&NonSpecular> {
+    pub fn non_specular_part(&self) -> Option<&NonSpecular> {
         match self {
             Self::NonSpecular(rough) | Self::Coated(Coated { base: rough, .. }) => Some(rough),
             Self::Mirror(_) | Self::Dielectric(_) | Self::ThinDielectric(_) => None,
@@ -162,7 +162,7 @@ impl Bsdf {
 
     /// Whether the surface also scatters light to the other side.
     pub fn is_transmissive(&self) -> bool {
-        self.non_specular().is_some_and(NonSpecular::is_transmissive)
+        self.non_specular_part().is_some_and(NonSpecular::is_transmissive)
     }
 
     /// The surface's main color. Counts texture lookups in `lookups`.

@@ -28,8 +28,8 @@ impl Opacity {
     }
 
     /// The opacity, if it is constant.
-    pub fn as_constant(&self) -> Option<f32> {
-        self.value.as_constant().map(|value| self.apply_cutoff(value))
+    pub fn as_untextured(&self) -> Option<f32> {
+        self.value.as_untextured().map(|value| self.apply_cutoff(value))
     }
 
     /// The mean opacity. For a texture with a cutoff, this is estimated as the texture's mean.

@@ -48,7 +48,7 @@ pub enum ScalarParameter {
 
 impl ScalarParameter {
     /// The constant value, or `None` for a texture.
-    pub fn as_constant(&self) -> Option<f32> {
+    pub fn as_untextured(&self) -> Option<f32> {
         match self {
             Self::Constant(number) => Some(*number),
             Self::Texture(_) => None,

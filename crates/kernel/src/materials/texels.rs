@@ -107,7 +107,7 @@ impl Texels {
     #[inline(always)]
     pub fn linear_colors_at_indices<const N: usize>(&self, places: &[usize; N]) -> [Vec3; N] {
         let mut values = [Vec3::ZERO; N];
-        self.for_each_color_at(places, |i, value| values[i] = value);
+        self.for_each_color_at_indices(places, |i, value| values[i] = value);
         values
     }
 
@@ -116,13 +116,17 @@ impl Texels {
     #[inline(always)]
     pub fn read_color_packets_into(&self, places: &[[usize; PACKET_SIZE]], values: &mut [Vec3x16]) {
         for (places, values) in places.iter().zip(values) {
-            self.for_each_color_at(places, |i, value| set_lane(values, i, value));
+            self.for_each_color_at_indices(places, |i, value| set_lane(values, i, value));
         }
     }
 
     /// Passes the linear value at each texel index to `put`.
     #[inline(always)]
-    fn for_each_color_at<const N: usize>(&self, places: &[usize; N], mut put: impl FnMut(usize, Vec3)) {
+    fn for_each_color_at_indices<const N: usize>(
+        &self,
+        places: &[usize; N],
+        mut put: impl FnMut(usize, Vec3),
+    ) {
         match &self.data {
             TexelData::Srgb8(bytes) => {
                 let table = &*SRGB8_TO_LINEAR;

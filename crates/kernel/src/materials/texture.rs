@@ -160,7 +160,7 @@ pub enum ColorOrTexture {
 
 impl ColorOrTexture {
     /// The constant color, or `None` for a texture.
-    pub fn as_constant(&self) -> Option<Vec3> {
+    pub fn as_untextured(&self) -> Option<Vec3> {
         match self {
             Self::Constant(color) => Some(*color),
             Self::Texture(_) => None,
@@ -192,13 +192,13 @@ impl Texture {
     /// treated as 0.
     pub fn lookup(&self, at: &TexturePoint) -> Vec3 {
         let tiles = self.transformed_uv(at);
-        let value = self.lookup_in_tiles(tiles, || self.mip_level(at));
+        let value = self.lookup_repeated_uv(tiles, || self.mip_level(at));
         self.factor.map_or(value, |factor| factor.apply(value))
     }
 
     /// The value at the given tile coordinates. `level` is called only if the filter uses mip levels.
     #[inline]
-    fn lookup_in_tiles(&self, tiles: DVec2, level: impl FnOnce() -> f32) -> Vec3 {
+    fn lookup_repeated_uv(&self, tiles: DVec2, level: impl FnOnce() -> f32) -> Vec3 {
         let folded =
             [self.wrap.fold(finite_or_zero(tiles.x)) as f32, self.wrap.fold(finite_or_zero(tiles.y)) as f32];
         match self.filter {
@@ -240,7 +240,7 @@ impl Texture {
         };
         // Look up on both sides, along the axes of the image.
         let steps = float_size(&self.texels).as_dvec2().recip() * f64::from(exp2(level));
-        let beside = |by: DVec2| self.lookup_in_tiles(tiles + by, || level).x;
+        let beside = |by: DVec2| self.lookup_repeated_uv(tiles + by, || level).x;
         let change = |half: DVec2| beside(half) - beside(-half);
         let changes =
             Vec2::new(change(DVec2::new(steps.x * 0.5, 0.0)), change(DVec2::new(0.0, steps.y * 0.5)));
@@ -261,7 +261,7 @@ impl Texture {
     }
 
     /// Tangents along the texture's repeated and transformed coordinates. Only the directions matter.
-    pub fn texture_tangents(&self, [dpdu, dpdv]: [Vec3; 2]) -> [Vec3; 2] {
+    pub fn transformed_tangents(&self, [dpdu, dpdv]: [Vec3; 2]) -> [Vec3; 2] {
         let sides = self.repeat.signum();
         let Some(moved) = &self.moved else { return [dpdu * sides.x, dpdv * sides.y] };
         [DVec2::X, DVec2::Y].map(|axis| {
@@ -305,7 +305,10 @@ impl Texture {
     #[inline(always)]
     fn lookup_packet_at_scaled_uv(&self, uv: &[[f64; PACKET_SIZE]; 2], repeat: DVec2) -> Vec3x16 {
         let (texels, size) = (&*self.texels, float_size(&self.texels));
-        let folded = [self.wrap.fold_packet(&uv[0], repeat.x), self.wrap.fold_packet(&uv[1], repeat.y)];
+        let folded = [
+            self.wrap.scale_and_wrap_packet(&uv[0], repeat.x),
+            self.wrap.scale_and_wrap_packet(&uv[1], repeat.y),
+        ];
         let extent = integer_size(texels);
         let (mut first, mut part) = ([[0; PACKET_SIZE]; 2], [[0.0; PACKET_SIZE]; 2]);
         let (shift, count) = match self.filter {
@@ -521,7 +524,7 @@ fn float_size(texels: &Texels) -> Vec2 {
 impl Wrap {
     /// Multiplies coordinates by `repeat` and folds them into [0, 1].
     #[inline(always)]
-    fn fold_packet(self, x: &[f64; PACKET_SIZE], repeat: f64) -> F32x16 {
+    fn scale_and_wrap_packet(self, x: &[f64; PACKET_SIZE], repeat: f64) -> F32x16 {
         let mut folded = [0.0; PACKET_SIZE];
         macro_rules! by {
             ($wrap:expr) => {
@@ -800,7 +803,7 @@ mod tests {
     fn levels(image: &Texels) -> Option<Arc<Mipmaps>> {
         let halved = |level: &Texels| -> Result<Texels, ()> {
             let halving = ImageHalver::new(level);
-            let mut rows = halving.empty_rows();
+            let mut rows = halving.allocate_halved_rows();
             (0..halving.halved_height()).for_each(|y| halving.append_row(y, &mut rows));
             Ok(halving.assemble_image(rows))
         };

@@ -76,7 +76,7 @@ use crate::scene::diagnostic::Diagnostic;
 use crate::scene::fingerprint::Fingerprint;
 use crate::system::priority;
 use crate::system::threads::{check_thread_stack_memory, describe_start_failure, logical_cpu_count};
-use crate::world::{CoplanarLight, GlassSolids, NeededTextureRoleSet, World};
+use crate::world::{CoplanarLight, GlassSolids, NeededTextureRoles, World};
 
 /// Engine configuration, which tests override.
 #[derive(Clone, Copy)]
@@ -320,7 +320,7 @@ impl Engine {
         let is_written = written.as_ref().is_ok_and(|is_written| *is_written);
         self.report_saved_scene_image_state(request, ready.film, sink);
         let film = own::should_write_saved_scene_image(request).then_some(ready.film);
-        let interruption = || context.orders.interruption();
+        let interruption = || context.orders.interruption_reason();
         self.with_checkpointer(film, sink, &interruption, |checkpointer, engine| {
             if let (Some(checkpointer), Some(state)) = (checkpointer, engine.films.current()) {
                 checkpointer.finish(state, state.traced, is_written || engine.is_saved_scene_image_written());
@@ -575,7 +575,7 @@ impl Engine {
     fn load_assets(
         &mut self,
         parsed: &ParsedScene,
-        lookups: NeededTextureRoleSet,
+        lookups: NeededTextureRoles,
         findings: &mut Findings,
         table: &mut StageRunner<'_>,
         reading: &FileReadContext<'_>,
@@ -627,7 +627,7 @@ impl Engine {
                 context.answer_query(query_context, Some(state), &self.inputs, sink);
             }
         };
-        let interruption = || orders.interruption();
+        let interruption = || orders.interruption_reason();
         let film = own::should_write_saved_scene_image(request).then_some(key);
         let rendered = self.with_checkpointer(film, sink, &interruption, |checkpointer, engine| {
             let rendering = RenderStageInputs {
@@ -714,7 +714,7 @@ impl Engine {
             let loaded = &parsed.loaded;
             let found = load_meshes(loaded, &mut engine.meshes, findings, &reading)?.value;
             let mut wanted =
-                find_textures_needed_for_view(loaded, &found, NeededTextureRoleSet::ALL, &engine.textures);
+                find_textures_needed_for_view(loaded, &found, NeededTextureRoles::ALL, &engine.textures);
             add_check_only_textures(loaded, &mut wanted.textures);
             wanted.are_required = true;
             let texels = load_textures(loaded, &wanted, &mut engine.textures, findings, &reading)?.value;

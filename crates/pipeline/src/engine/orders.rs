@@ -31,7 +31,7 @@ pub(crate) trait PendingCommands {
     /// Takes the next query about the current image.
     fn take_query(&self) -> Option<QueryOrEdit>;
     /// Returns the reason for interrupting the render.
-    fn interruption(&self) -> Interruption;
+    fn interruption_reason(&self) -> Interruption;
 }
 
 /// Tokens and orders for a running request.

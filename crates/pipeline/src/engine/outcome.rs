@@ -8,7 +8,7 @@ use super::super::protocol::{Failure, Report, Request};
 use super::super::sink::EventSink;
 use super::super::stages::AbortReason;
 use super::{Engine, RequestContext};
-use crate::film::{Quantity, RadianceImage};
+use crate::film::{FilmQuantity, RadianceImage};
 use crate::scene::diagnostic::Diagnostic;
 use crate::scene::fingerprint::Fingerprint;
 use crate::scene::report::{ReportStyle, render_report};
@@ -80,7 +80,7 @@ impl Engine {
                 let state = self.films.current();
                 let gone = || RenderFailure::Failed(Failure::Work("the film is missing".to_owned()));
                 let state = state.ok_or_else(gone)?;
-                let image = state.film.image(Quantity::Radiance);
+                let image = state.film.image(FilmQuantity::Radiance);
                 Ok(RenderedImage { image, report: Box::new(report), warnings, key: state.key })
             }
             Err(AbortReason::Failed(failure)) => Err(RenderFailure::Failed(failure)),
@@ -90,6 +90,6 @@ impl Engine {
 
     /// Whether the last request read the file at a path.
     pub(crate) fn has_read_file(&self, path: &Path) -> bool {
-        self.inputs.contain(path)
+        self.inputs.contains_path(path)
     }
 }

@@ -26,7 +26,7 @@ pub(super) fn remove_outdated_report(plan: &RenderPlan, inputs: &ProtectedInputs
 impl Engine {
     /// Whether every pixel of the current image has a sample.
     pub(crate) fn has_sample_in_every_pixel(&self) -> bool {
-        self.films.current().is_some_and(FilmState::covers_all_pixels)
+        self.films.current().is_some_and(FilmState::has_sampled_all_pixels)
     }
 
     /// Writes the current image, outside of a request.
@@ -34,7 +34,7 @@ impl Engine {
         let (Some(state), Some(plan), Some(pool)) = (self.films.current(), &self.plan, &self.pool) else {
             return sink.send_write_failed(None, NO_IMAGE.to_owned());
         };
-        if !state.covers_all_pixels() {
+        if !state.has_sampled_all_pixels() {
             // Earlier requests may have written images.
             let what = if self.written.is_empty() { "no image written" } else { NEWEST_IMAGE_NOT_WRITTEN };
             let message = format!("{what}: {INCOMPLETE_IMAGE}");

@@ -21,10 +21,10 @@ use crate::scene::fingerprint::{Fingerprint, FingerprintHasher};
 use crate::settings::{CheckpointSettings, Overrides, ResumeMode};
 use crate::sink::EventSink;
 use crate::stages::parse::ParsedScene;
-use crate::stages::write::{ImageWriteContext, develop_settings, write_if_wanted};
+use crate::stages::write::{ImageWriteContext, film_encoding_settings, write_if_wanted};
 use crate::stages::{AbortReason, StageResult};
 use crate::watch::content::FileRead;
-use crate::world::NeededTextureRoleSet;
+use crate::world::NeededTextureRoles;
 
 /// The scene's own image for the newest request.
 pub(super) struct SavedSceneImage {
@@ -53,7 +53,7 @@ impl SavedSceneImage {
         let of = keys::fingerprint_context(&plan.scene, meshes, orbiter.as_deref());
         let world = keys::world_key(surfaces, &eye.camera, &of);
         let film = keys::film_sums_key(world, &plan.settings, plan.crop);
-        let image = written_image_key(film, &plan);
+        let image = image_with_outputs_key(film, &plan);
         Self { film, image, parsed: Arc::clone(parsed), plan, camera, files: files.to_vec(), share: None }
     }
 
@@ -66,7 +66,7 @@ impl SavedSceneImage {
 }
 
 /// Returns the key for a finished image and its output files.
-fn written_image_key(film: Fingerprint, plan: &RenderPlan) -> Fingerprint {
+fn image_with_outputs_key(film: Fingerprint, plan: &RenderPlan) -> Fingerprint {
     let mut key = FingerprintHasher::new("own image");
     key.add_fingerprint(&keys::developed_image_key(film, plan, 0)).add_u64(plan.bit_depth.into());
     plan.layers.iter().for_each(|layer| {
@@ -131,7 +131,7 @@ impl Engine {
     /// changes.
     pub(super) fn allow_replacing_after_scene_save(&mut self, saves: u64) {
         if std::mem::replace(&mut self.saves, saves) != saves {
-            self.written.allow_replacing_user_image();
+            self.written.allow_replacing_user_written_image();
         }
     }
 
@@ -216,7 +216,7 @@ impl Engine {
         let Some((own, output)) = own.and_then(|own| Some((own, own.plan.outputs.first()?))) else {
             return work(None, self);
         };
-        let finish = develop_settings(&own.plan);
+        let finish = film_encoding_settings(&own.plan);
         let name = || own.dependencies();
         let around = CheckpointContext {
             finish: &finish,
@@ -280,7 +280,7 @@ pub(super) fn saved_scene_plan(
 pub(super) fn texture_needs_with_saved_scene(
     plan: &RenderPlan,
     own: Option<&RenderPlan>,
-) -> NeededTextureRoleSet {
+) -> NeededTextureRoles {
     let shown = plan.settings.texture_needs();
     own.map_or(shown, |own| shown.union(own.settings.texture_needs()))
 }

@@ -9,7 +9,7 @@ use super::{Engine, RequestContext};
 use crate::control::Cancelled;
 use crate::memory::MemoryEstimate;
 use crate::plan::resolve_plan;
-use crate::protocol::{Event, LastValidSceneOutcome, Request, Status};
+use crate::protocol::{Event, LastValidSceneRenderOutcome, Request, Status};
 use crate::sink::EventSink;
 use crate::stages::containers::GltfContainers;
 use crate::stages::meshes::Meshes;
@@ -18,7 +18,7 @@ use crate::stages::textures::{NeededTextures, Textures, find_textures_needed_for
 use crate::stages::{AbortReason, FileReadContext, Findings};
 use crate::table::StageRunner;
 use crate::watch::content::{FileRead, RequestFileSnapshot};
-use crate::world::{GlassSolids, NeededTextureRoleSet};
+use crate::world::{GlassSolids, NeededTextureRoles};
 
 /// A valid scene and all files needed for its image.
 #[derive(Clone)]
@@ -62,10 +62,10 @@ impl Engine {
         let before = self.current_image_key_and_view();
         // Drop errors from this render, because the failed request has already reported its own.
         let end = match self.render_last_valid_scene(newest, sink, context) {
-            Ok(Some(is_reused)) => LastValidSceneOutcome::Finished {
+            Ok(Some(is_reused)) => LastValidSceneRenderOutcome::Finished {
                 unchanged: is_reused && self.current_image_key_and_view() == before,
             },
-            Ok(None) | Err(_) => LastValidSceneOutcome::Stopped,
+            Ok(None) | Err(_) => LastValidSceneRenderOutcome::Stopped,
         };
         sink.send(Event::LastGoodEnded { generation: newest.generation, end });
     }
@@ -122,7 +122,7 @@ impl Engine {
     fn load_missing_textures(
         &mut self,
         good: LastValidScene,
-        lookups: NeededTextureRoleSet,
+        lookups: NeededTextureRoles,
         reading: &FileReadContext<'_>,
     ) -> Result<Option<LastValidScene>, AbortReason> {
         let loaded = &good.parsed.loaded;

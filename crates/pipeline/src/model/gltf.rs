@@ -8,7 +8,7 @@ use super::frame::{frame_model, round_to_decimal_step};
 use super::materials::{MaterialWriter, TextureFileReference};
 use super::toml::{TomlWriter, format_color, format_list, format_number, format_vector};
 use super::{
-    CameraPose, FOV, GeneratedScene, Lighting, ModelViewOptions, ROUGH, SIZE, UniqueNames, file_name,
+    CameraPose, FOV, GeneratedScene, Lighting, ModelViewOptions, ROUGH, SIZE, UsedNames, file_name,
     write_camera, write_ground, write_render_settings, write_sky_and_key_light,
 };
 use crate::assets::gltf::{
@@ -70,7 +70,7 @@ pub(super) fn scene_text(
         path,
         naming,
         toml: TomlWriter::default(),
-        files: UniqueNames::default(),
+        files: UsedNames::default(),
         assets: Vec::new(),
         names: HashMap::new(),
         images: BTreeSet::new(),
@@ -98,7 +98,7 @@ struct SceneWriter<'a> {
     naming: &'a ExportStorage,
     toml: TomlWriter,
     /// File names already used in the folder.
-    files: UniqueNames,
+    files: UsedNames,
     assets: Vec<ExportedFile>,
     names: HashMap<ExportedFileContent, String>,
     /// Images that materials use.
@@ -147,18 +147,18 @@ impl SceneWriter<'_> {
         if !scene.lights.is_empty() {
             self.toml.section_comment("1 cd in the file is treated as 1 W/sr, and 1 lx as 1 W/m².");
         }
-        scene.lights.iter().for_each(|light| self.write_light(light));
+        scene.lights.iter().for_each(|light| self.write_light_table(light));
         // Write the materials, then the meshes that use them.
-        let mut names = UniqueNames::default();
+        let mut names = UsedNames::default();
         let materials = MaterialWriter::write_all(scene, &mut names, self);
-        let mut shapes = UniqueNames::default();
+        let mut shapes = UsedNames::default();
         for instance in &scene.instances {
-            self.write_mesh(instance, &materials[instance.material], &mut shapes);
+            self.write_mesh_table(instance, &materials[instance.material], &mut shapes);
         }
         write_ground(&mut self.toml, &mut names, bounds, &eye);
     }
 
-    fn write_light(&mut self, light: &ModelLight) {
+    fn write_light_table(&mut self, light: &ModelLight) {
         let toml = &mut self.toml;
         toml.table("[[light]]");
         if !light.name.is_empty() {
@@ -166,49 +166,49 @@ impl SceneWriter<'_> {
         }
         match light.kind {
             ModelLightKind::Point => {}
-            ModelLightKind::Spot { .. } => toml.key("type", "\"spot\""),
-            ModelLightKind::Directional => toml.key("type", "\"directional\""),
+            ModelLightKind::Spot { .. } => toml.key_value("type", "\"spot\""),
+            ModelLightKind::Directional => toml.key_value("type", "\"directional\""),
         }
         match light.kind {
             ModelLightKind::Directional => {
-                toml.key("direction", format_vector(light.direction));
-                toml.key("irradiance", format_color(light.intensity));
+                toml.key_value("direction", format_vector(light.direction));
+                toml.key_value("irradiance", format_color(light.intensity));
             }
             ModelLightKind::Point | ModelLightKind::Spot { .. } => {
-                toml.key("position", format_vector(light.position));
-                toml.key("intensity", format_color(light.intensity));
+                toml.key_value("position", format_vector(light.position));
+                toml.key_value("intensity", format_color(light.intensity));
             }
         }
         if let ModelLightKind::Spot { angle, blend } = light.kind {
-            toml.key("look_at", format_vector(light.position + light.direction));
-            toml.key("angle", format_number(angle.min(359.0)));
-            toml.key("blend", format_number(blend));
+            toml.key_value("look_at", format_vector(light.position + light.direction));
+            toml.key_value("angle", format_number(angle.min(359.0)));
+            toml.key_value("blend", format_number(blend));
         }
     }
 
-    fn write_mesh(&mut self, instance: &ModelInstance, material: &str, shapes: &mut UniqueNames) {
+    fn write_mesh_table(&mut self, instance: &ModelInstance, material: &str, shapes: &mut UsedNames) {
         self.toml.table("[[mesh]]");
         if !instance.name.is_empty() {
-            self.toml.key("name", quote_toml_string(&shapes.make_unique(&instance.name, "mesh")));
+            self.toml.key_value("name", quote_toml_string(&shapes.make_unique(&instance.name, "mesh")));
         }
         let base = if instance.name.is_empty() { "part" } else { &instance.name };
         match self.naming {
             ExportStorage::Inside => {
-                self.toml.key("file", quote_toml_string(&file_name(self.path)));
-                self.toml.key("part", instance.part.to_string());
+                self.toml.key_value("file", quote_toml_string(&file_name(self.path)));
+                self.toml.key_value("part", instance.part.to_string());
             }
             ExportStorage::Folder(_) => {
-                let name = self.add_asset(ExportedFileContent::Part(instance.part), base, "ply");
-                self.toml.key("file", quote_toml_string(&name));
+                let name = self.add_exported_file(ExportedFileContent::Part(instance.part), base, "ply");
+                self.toml.key_value("file", quote_toml_string(&name));
             }
         }
-        self.toml.key("material", quote_toml_string(material));
+        self.toml.key_value("material", quote_toml_string(material));
         self.write_placement(&instance.placed.linear, instance.placed.translate);
         if !instance.has_normals {
-            self.toml.key("smooth", "false");
+            self.toml.key_value("smooth", "false");
         }
         if instance.has_colors {
-            self.toml.key("vertex_colors", "true");
+            self.toml.key_value("vertex_colors", "true");
         }
     }
 
@@ -217,10 +217,10 @@ impl SceneWriter<'_> {
         let scale = DVec3::new(linear.x_axis.x, linear.y_axis.y, linear.z_axis.z);
         if *linear == DMat3::from_diagonal(scale) {
             if scale != DVec3::ONE {
-                self.toml.key("scale", format_color(scale));
+                self.toml.key_value("scale", format_color(scale));
             }
             if translate != DVec3::ZERO {
-                self.toml.key("translate", format_vector(translate));
+                self.toml.key_value("translate", format_vector(translate));
             }
             return;
         }
@@ -231,11 +231,11 @@ impl SceneWriter<'_> {
         };
         let matrix = [(rows.x_axis, translate.x), (rows.y_axis, translate.y), (rows.z_axis, translate.z)];
         let matrix = matrix.map(|(axis, last)| row(axis, last)).join(",  ");
-        self.toml.key("matrix", format!("[{matrix},  0, 0, 0, 1]"));
+        self.toml.key_value("matrix", format!("[{matrix},  0, 0, 0, 1]"));
     }
 
     /// Returns the file name for `content`. Adds a file if the content is new.
-    fn add_asset(&mut self, content: ExportedFileContent, wanted: &str, ending: &str) -> String {
+    fn add_exported_file(&mut self, content: ExportedFileContent, wanted: &str, ending: &str) -> String {
         if let Some(known) = self.names.get(&content) {
             return known.clone();
         }
@@ -253,7 +253,7 @@ impl SceneWriter<'_> {
     }
 }
 
-impl super::materials::SceneExport for SceneWriter<'_> {
+impl super::materials::MaterialExportTarget for SceneWriter<'_> {
     fn toml_writer(&mut self) -> &mut TomlWriter {
         &mut self.toml
     }
@@ -301,7 +301,7 @@ impl super::materials::SceneExport for SceneWriter<'_> {
                     Err(_) => "png".to_owned(),
                 };
                 let wanted = self.image_name(image);
-                let name = self.add_asset(ExportedFileContent::Image(image), &wanted, &ending);
+                let name = self.add_exported_file(ExportedFileContent::Image(image), &wanted, &ending);
                 TextureFileReference { file: name, image: None }
             }
         }

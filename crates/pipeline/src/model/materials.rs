@@ -2,14 +2,14 @@
 
 use std::collections::HashMap;
 
-use super::UniqueNames;
+use super::UsedNames;
 use super::toml::{TomlWriter, format_color, format_key, format_number, format_pair};
 use crate::assets::gltf::{Alpha, ModelMaterial, ModelScene, TextureRef, TextureWrap, TexturedValue};
 use crate::math::{DVec3, Vec2};
 use crate::scene::quote_toml_string;
 
 /// Access to the scene text and image files while materials are being written.
-pub(super) trait SceneExport {
+pub(super) trait MaterialExportTarget {
     /// The scene text.
     fn toml_writer(&mut self) -> &mut TomlWriter;
     /// Name of an image, without an extension.
@@ -45,13 +45,13 @@ type TextureIdentity = (usize, TextureUse, String);
 pub(super) struct MaterialWriter<'a, F> {
     files: &'a mut F,
     textures: HashMap<TextureIdentity, String>,
-    names: UniqueNames,
+    names: UsedNames,
 }
 
-impl<F: SceneExport> MaterialWriter<'_, F> {
+impl<F: MaterialExportTarget> MaterialWriter<'_, F> {
     /// Writes the tables and returns the material names.
-    pub(super) fn write_all(scene: &ModelScene, names: &mut UniqueNames, files: &mut F) -> Vec<String> {
-        let mut all = MaterialWriter { files, textures: HashMap::new(), names: UniqueNames::default() };
+    pub(super) fn write_all(scene: &ModelScene, names: &mut UsedNames, files: &mut F) -> Vec<String> {
+        let mut all = MaterialWriter { files, textures: HashMap::new(), names: UsedNames::default() };
         scene
             .materials
             .iter()
@@ -82,7 +82,7 @@ impl<F: SceneExport> MaterialWriter<'_, F> {
         self.write_common_keys(&mut keys, material);
         let toml = self.files.toml_writer();
         toml.table(&format!("[materials.{}]", format_key(name)));
-        keys.iter().for_each(|(key, value)| toml.key(key, value));
+        keys.iter().for_each(|(key, value)| toml.key_value(key, value));
     }
 
     fn write_principled(&mut self, keys: &mut TomlEntries, material: &ModelMaterial) {
@@ -245,11 +245,11 @@ impl<F: SceneExport> MaterialWriter<'_, F> {
         let TextureFileReference { file, image } = self.files.image_file(texture.image);
         let toml = self.files.toml_writer();
         toml.table(&format!("[textures.{}]", format_key(&name)));
-        toml.key("file", quote_toml_string(&file));
+        toml.key_value("file", quote_toml_string(&file));
         if let Some(image) = image {
-            toml.key("image", image.to_string());
+            toml.key_value("image", image.to_string());
         }
-        keys.iter().for_each(|(key, value)| toml.key(key, value));
+        keys.iter().for_each(|(key, value)| toml.key_value(key, value));
         self.textures.insert(identity, name.clone());
         name
     }

@@ -175,16 +175,18 @@ impl Lighting {
 fn write_render_settings(toml: &mut TomlWriter, size: Option<[u32; 2]>, light: Lighting) {
     toml.table("[render]");
     if let Some([width, height]) = size {
-        toml.key("width", width.to_string());
-        toml.key("height", height.to_string());
+        toml.key_value("width", width.to_string());
+        toml.key_value("height", height.to_string());
     }
-    toml.key("samples", "256");
-    toml.key("error", "0.05");
-    toml.key("integrator", "\"path\"");
+    toml.key_value("samples", "256");
+    toml.key_value("error", "0.05");
+    toml.key_value("integrator", "\"path\"");
     match light {
-        Lighting::Default { is_polished: true } => toml.key("clamp", CLAMP),
+        Lighting::Default { is_polished: true } => toml.key_value("clamp", CLAMP),
         Lighting::Default { is_polished: false } => {}
-        Lighting::FromFile { exposure } if exposure != 0.0 => toml.key("exposure", format_number(exposure)),
+        Lighting::FromFile { exposure } if exposure != 0.0 => {
+            toml.key_value("exposure", format_number(exposure))
+        }
         Lighting::FromFile { .. } => {}
     }
 }
@@ -192,33 +194,33 @@ fn write_render_settings(toml: &mut TomlWriter, size: Option<[u32; 2]>, light: L
 /// Writes the `[camera]` table.
 fn write_camera(toml: &mut TomlWriter, eye: &CameraPose, fov: f64) {
     toml.table("[camera]");
-    toml.key("position", format_exact_vector(eye.position));
-    toml.key("look_at", format_exact_vector(eye.look_at));
+    toml.key_value("position", format_exact_vector(eye.position));
+    toml.key_value("look_at", format_exact_vector(eye.look_at));
     if eye.up != DVec3::Y {
-        toml.key("up", format_vector(eye.up));
+        toml.key_value("up", format_vector(eye.up));
     }
     if fov != 40.0 {
-        toml.key("fov", format_number(fov));
+        toml.key_value("fov", format_number(fov));
     }
 }
 
 /// Writes a sky, plus a key light if the model has no lights.
 fn write_sky_and_key_light(toml: &mut TomlWriter, eye: &CameraPose, light: Lighting) {
     toml.table("[environment]");
-    toml.key("color", format_number(light.sky_radiance()));
+    toml.key_value("color", format_number(light.sky_radiance()));
     if matches!(light, Lighting::Default { .. }) {
         toml.table("[[light]]");
-        toml.key("type", "\"directional\"");
-        toml.key("direction", format_vector(key_light_travel_direction(eye)));
-        toml.key("irradiance", format_number(KEY));
-        toml.key("angle", "6");
+        toml.key_value("type", "\"directional\"");
+        toml.key_value("direction", format_vector(key_light_travel_direction(eye)));
+        toml.key_value("irradiance", format_number(KEY));
+        toml.key_value("angle", "6");
     }
 }
 
 /// Writes a ground plane below the model, unless the camera is below it.
 fn write_ground(
     toml: &mut TomlWriter,
-    names: &mut UniqueNames,
+    names: &mut UsedNames,
     [least, greatest]: [DVec3; 2],
     eye: &CameraPose,
 ) {
@@ -229,20 +231,20 @@ fn write_ground(
     }
     let name = names.make_unique("ground", "ground");
     toml.table(&format!("[materials.{name}]"));
-    toml.key("diffuse", format_number(sky_matching_reflectance()));
+    toml.key_value("diffuse", format_number(sky_matching_reflectance()));
     toml.table("[[plane]]");
-    toml.key(
+    toml.key_value(
         "point",
         format_exact_vector(DVec3::new(0.0, frame::round_to_decimal_step(height, size * 1e-5), 0.0)),
     );
-    toml.key("material", format!("\"{name}\""));
+    toml.key_value("material", format!("\"{name}\""));
 }
 
 /// Names already used in a generated scene.
 #[derive(Debug, Default)]
-struct UniqueNames(HashSet<String>);
+struct UsedNames(HashSet<String>);
 
-impl UniqueNames {
+impl UsedNames {
     /// Returns `wanted`, with a number appended if it is taken. Falls back to `usual` if `wanted` is empty or
     /// a number.
     fn make_unique(&mut self, wanted: &str, usual: &str) -> String {

@@ -7,8 +7,8 @@ use std::path::Path;
 use super::frame::frame_model;
 use super::toml::TomlWriter;
 use super::{
-    FOV, GeneratedScene, Lighting, ModelViewOptions, NARROW, ROUGH, SIZE, UniqueNames, file_name,
-    write_camera, write_ground, write_render_settings, write_sky_and_key_light,
+    FOV, GeneratedScene, Lighting, ModelViewOptions, NARROW, ROUGH, SIZE, UsedNames, file_name, write_camera,
+    write_ground, write_render_settings, write_sky_and_key_light,
 };
 use crate::assets::{AssetError, FileMaterial, LoadedMesh};
 use crate::control::{CancelToken, ignore_progress};
@@ -117,7 +117,7 @@ pub(super) fn scene_text(
         );
         return Err(AssetError::Malformed { path: path.to_owned(), line: None, reason });
     }
-    let (mut toml, mut names) = (TomlWriter::default(), UniqueNames::default());
+    let (mut toml, mut names) = (TomlWriter::default(), UsedNames::default());
     toml.comment(&format!("{}, as glimt shows it.", file_name(path)));
     let lighting = Lighting::Default { is_polished: loaded.materials.iter().any(may_cast_caustics) };
     write_render_settings(&mut toml, None, lighting);
@@ -128,24 +128,24 @@ pub(super) fn scene_text(
     let name = names.make_unique("model", "model");
     if needs_material {
         toml.table(&format!("[materials.{name}]"));
-        toml.key("type", "\"principled\"");
-        toml.key("color", if is_colored { "1" } else { "[0.7, 0.68, 0.64]" });
+        toml.key_value("type", "\"principled\"");
+        toml.key_value("color", if is_colored { "1" } else { "[0.7, 0.68, 0.64]" });
     }
     toml.table("[[mesh]]");
-    toml.key("file", quote_toml_string(&file_name(path)));
+    toml.key_value("file", quote_toml_string(&file_name(path)));
     if let Some([x, y, z]) = up.rotation() {
-        toml.key("rotate", format!("[{x}, {y}, {z}]"));
+        toml.key_value("rotate", format!("[{x}, {y}, {z}]"));
     }
     // STL has no vertex normals, and mechanical parts have sharp edges.
     let is_stl = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("stl"));
     if is_stl || loaded.is_faceted_without_normals() {
-        toml.key("smooth", "false");
+        toml.key_value("smooth", "false");
     }
     if needs_material {
-        toml.key("material", format!("\"{name}\""));
+        toml.key_value("material", format!("\"{name}\""));
     }
     if is_colored {
-        toml.key("vertex_colors", "true");
+        toml.key_value("vertex_colors", "true");
     }
     write_ground(&mut toml, &mut names, bounds, &eye);
     // The generated material hides the fact that the file has no materials, so report it here.

@@ -40,7 +40,7 @@ impl TomlWriter {
     }
 
     /// Adds a key with a value in TOML syntax.
-    pub(super) fn key(&mut self, key: &str, value: impl AsRef<str>) {
+    pub(super) fn key_value(&mut self, key: &str, value: impl AsRef<str>) {
         self.line(&format!("{key} = {}", value.as_ref()));
     }
 

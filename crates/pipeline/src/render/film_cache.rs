@@ -109,7 +109,7 @@ impl FilmCache {
     fn insert(&mut self, state: FilmState) {
         let size = state.memory_bytes();
         // Drop incomplete films from a moving camera, which would fill the cache but are never reused.
-        let is_left_behind = state.is_passing && !state.covers_all_pixels();
+        let is_left_behind = state.is_passing && !state.has_sampled_all_pixels();
         if !state.has_samples() {
             return;
         }

@@ -7,8 +7,8 @@ use std::sync::Arc;
 use super::forecast::cost::{CellCost, MeasuredJobCost, PixelOverhead};
 use super::forecast::samples::ExpectedSamples;
 use crate::film::{
-    CELLS, ConvergenceModel, Film, FilmError, PixelSubset, Previewer, RadianceImage, Rect, SelectedPixels,
-    SumOrder,
+    CELLS, ConvergenceModel, Film, FilmCreationError, PixelSubset, Previewer, RadianceImage, Rect,
+    SelectedPixels, SumOrder,
 };
 use crate::integrators::RayCounters;
 use crate::output::part::RenderInput;
@@ -86,7 +86,7 @@ impl FilmState {
         most_bytes: u64,
         convergence: ConvergenceModel,
         share: Option<Shard>,
-    ) -> Result<Self, FilmError> {
+    ) -> Result<Self, FilmCreationError> {
         let blocks = match (&share, convergence) {
             (Some(share), _) => share.sum_order(),
             (None, ConvergenceModel::Photons) => SumOrder::Blocked,
@@ -149,7 +149,7 @@ impl FilmState {
 
     /// Reads the sample counts from the film.
     pub(super) fn recount_samples(&mut self) {
-        let halves: Vec<_> = self.assigned_cell_halves().collect();
+        let halves: Vec<_> = self.shard_cell_halves().collect();
         for (cell, half) in halves {
             self.done[cell][half] = self.film.cell_half_samples_per_pixel(cell, half);
         }
@@ -157,13 +157,13 @@ impl FilmState {
 
     /// Whether every pixel has at least `samples` samples or has reached its goal.
     pub(crate) fn is_complete(&self, samples: u32) -> bool {
-        self.is_complete_in(None, samples)
+        self.is_complete_in_region(None, samples)
     }
 
     /// Like [`Self::is_complete`], but only for tiles overlapping `part`. `None` means all tiles.
-    pub(crate) fn is_complete_in(&self, part: Option<Rect>, samples: u32) -> bool {
-        self.assigned_cell_halves()
-            .filter(|(cell, _)| self.cell_tile_overlaps(part, *cell))
+    pub(crate) fn is_complete_in_region(&self, part: Option<Rect>, samples: u32) -> bool {
+        self.shard_cell_halves()
+            .filter(|(cell, _)| self.cell_tile_overlaps_rect(part, *cell))
             .all(|(tile, half)| self.done[tile][half] >= self.goals.get(tile, half).min(samples))
     }
 
@@ -175,7 +175,7 @@ impl FilmState {
 
     /// Whether no pixel has more than `samples` samples.
     pub(crate) fn has_at_most_samples(&self, samples: u32) -> bool {
-        self.assigned_cell_halves().all(|(cell, half)| self.done[cell][half] <= samples)
+        self.shard_cell_halves().all(|(cell, half)| self.done[cell][half] <= samples)
     }
 
     /// Returns the lowest sample count among pixels that need more samples, limited to `most`.
@@ -189,15 +189,15 @@ impl FilmState {
             let done = self.done[tile][half];
             (done < self.goals.get(tile, half).min(most)).then_some(done)
         };
-        self.assigned_cell_halves()
-            .filter(|(cell, _)| self.cell_tile_overlaps(part, *cell))
+        self.shard_cell_halves()
+            .filter(|(cell, _)| self.cell_tile_overlaps_rect(part, *cell))
             .filter_map(of)
             .min()
             .unwrap_or(most)
     }
 
     /// Whether a cell's tile overlaps `part`.
-    fn cell_tile_overlaps(&self, part: Option<Rect>, cell: usize) -> bool {
+    fn cell_tile_overlaps_rect(&self, part: Option<Rect>, cell: usize) -> bool {
         part.is_none_or(|part| {
             self.film.tile_rect(cell / CELLS).is_some_and(|rect| rect.intersection(&part).is_some())
         })
@@ -205,15 +205,15 @@ impl FilmState {
 
     /// Whether any pixel has samples.
     pub(crate) fn has_samples(&self) -> bool {
-        self.assigned_cell_halves().any(|(cell, half)| self.done[cell][half] > 0)
+        self.shard_cell_halves().any(|(cell, half)| self.done[cell][half] > 0)
     }
 
     /// Whether every pixel has a sample. Only such an image may replace another one.
-    pub(crate) fn covers_all_pixels(&self) -> bool {
-        self.assigned_cell_halves().all(|(cell, half)| self.done[cell][half] > 0)
+    pub(crate) fn has_sampled_all_pixels(&self) -> bool {
+        self.shard_cell_halves().all(|(cell, half)| self.done[cell][half] > 0)
     }
 
-    fn assigned_cell_halves(&self) -> impl Iterator<Item = (usize, usize)> {
+    fn shard_cell_halves(&self) -> impl Iterator<Item = (usize, usize)> {
         let halves = (0..self.done.len()).flat_map(|cell| [(cell, 0), (cell, 1)]);
         halves.filter(|(cell, half)| {
             self.is_tile_in_shard(cell / CELLS) && self.film.cell_half_pixel_count(*cell, *half) > 0
@@ -242,15 +242,16 @@ impl FilmState {
             self.done[cell][half]..self.goals.get(cell, half).min(target(cell, half))
         };
         let mut jobs = Vec::new();
-        let is_wanted =
-            |tile: &&usize| self.is_tile_in_shard(**tile) && self.cell_tile_overlaps(part, CELLS * **tile);
+        let is_wanted = |tile: &&usize| {
+            self.is_tile_in_shard(**tile) && self.cell_tile_overlaps_rect(part, CELLS * **tile)
+        };
         for &tile in self.film.tile_order().iter().filter(is_wanted) {
             let cells = (CELLS * tile..CELLS * (tile + 1))
                 .filter_map(|cell| Some((cell, self.film.cell_rect(cell)?)));
             let cells = cells.map(|(cell, rect)| (rect, [0, 1].map(|half| missing(cell, half))));
             let cells: Vec<(Rect, [Range<u32>; 2])> = cells.collect();
             let job = |pixels, samples: &Range<u32>| TileJob { tile, pixels, samples: samples.clone() };
-            if let Some((rect, samples)) = self.film.tile_rect(tile).zip(common_sample_range(&cells)) {
+            if let Some((rect, samples)) = self.film.tile_rect(tile).zip(uniform_sample_range(&cells)) {
                 jobs.push(job(rect.into(), samples));
                 continue;
             }
@@ -298,7 +299,7 @@ impl FilmState {
 
     /// Returns the number of tiles that reached their sample limit but not the noise target, and the highest
     /// noise among them.
-    pub(crate) fn count_unconverged_at_sample_limit(&self, error: f64) -> Option<(usize, f64)> {
+    pub(crate) fn count_tiles_above_noise_target(&self, error: f64) -> Option<(usize, f64)> {
         self.goals.count_finished_tiles_above_target(&self.film, error)
     }
 
@@ -309,7 +310,7 @@ impl FilmState {
 
     /// Returns the expected final number of samples, summed over all pixels, with at most `most` samples per
     /// pixel.
-    pub(crate) fn expected_pixel_samples(&self, most: u32) -> u64 {
+    pub(crate) fn expected_total_samples(&self, most: u32) -> u64 {
         self.sum_pixel_samples(|cell, half| self.expected_samples(cell, half, most))
     }
 
@@ -337,7 +338,7 @@ impl FilmState {
                 others += lacking;
                 continue;
             }
-            let of_cell = cost.samples_including_overhead(self.pixel_share);
+            let of_cell = cost.cost_in_samples_with_overhead(self.pixel_share);
             seconds += lacking * cost.recorded_seconds() / of_cell;
             known += cost.recorded_seconds();
             worth += of_cell;
@@ -350,7 +351,7 @@ impl FilmState {
     /// pixel. These are also the current and final numbers of photon passes.
     pub(crate) fn current_and_final_photon_passes(&self, most: u32) -> [u32; 2] {
         let most_of = |samples: &dyn Fn(usize, usize) -> u32| {
-            self.assigned_cell_halves().map(|(cell, half)| samples(cell, half)).max().unwrap_or(0)
+            self.shard_cell_halves().map(|(cell, half)| samples(cell, half)).max().unwrap_or(0)
         };
         [
             most_of(&|cell, half| self.done[cell][half]),
@@ -360,7 +361,7 @@ impl FilmState {
 
     /// Whether the final number of samples can be estimated despite a noise target.
     pub(crate) fn can_predict_samples(&self) -> bool {
-        self.assigned_cell_halves().all(|(cell, half)| self.expected_samples(cell, half, u32::MAX) < u32::MAX)
+        self.shard_cell_halves().all(|(cell, half)| self.expected_samples(cell, half, u32::MAX) < u32::MAX)
     }
 
     fn expected_samples(&self, cell: usize, half: usize, most: u32) -> u32 {
@@ -372,12 +373,12 @@ impl FilmState {
         let units = |(cell, half): (usize, usize)| {
             self.film.cell_half_pixel_count(cell, half) as u64 * u64::from(samples_of(cell, half))
         };
-        self.assigned_cell_halves().map(units).sum()
+        self.shard_cell_halves().map(units).sum()
     }
 }
 
 /// Returns the sample range that all halves of all cells need, if it is the same for all of them.
-fn common_sample_range(cells: &[(Rect, [Range<u32>; 2])]) -> Option<&Range<u32>> {
+fn uniform_sample_range(cells: &[(Rect, [Range<u32>; 2])]) -> Option<&Range<u32>> {
     let (_, [first, _]) = cells.first()?;
     cells.iter().all(|(_, halves)| halves.iter().all(|half| half == first)).then_some(first)
 }

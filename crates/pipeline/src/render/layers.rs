@@ -5,7 +5,7 @@
 
 use super::film_state::FilmState;
 use crate::choice::Choice;
-use crate::film::{Quantity, RadianceImage};
+use crate::film::{FilmQuantity, RadianceImage};
 use crate::integrators::SampleLayer;
 use crate::output::LayerImage;
 use crate::plan::RenderPlan;
@@ -30,7 +30,7 @@ impl OutputLayer {
 
 /// Returns the squared standard error of each pixel's mean luminance.
 fn squared_standard_error_image(state: &FilmState) -> RadianceImage {
-    let mut image = state.film.image(Quantity::Error);
+    let mut image = state.film.image(FilmQuantity::Error);
     image.pixels.iter_mut().for_each(|error| *error *= *error);
     image
 }
@@ -46,7 +46,7 @@ pub(crate) fn layer_images(state: &FilmState, plan: &RenderPlan) -> Vec<LayerIma
         let image = match layer.source() {
             LayerSource::Samples(layer) => take(layer)?,
             LayerSource::Variance => squared_standard_error_image(state),
-            LayerSource::SampleCount => state.film.image(Quantity::Samples),
+            LayerSource::SampleCount => state.film.image(FilmQuantity::Samples),
         };
         Some(LayerImage { name: layer.name(), channels: layer.channel_names(), image })
     };

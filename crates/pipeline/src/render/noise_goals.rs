@@ -72,10 +72,10 @@ impl CellSampleGoals {
     ) -> Option<NoiseMeasurements> {
         let is_time = samples >= LEAST && !self.needs_min_samples(done);
         if is_time && self.brightness.is_none() {
-            self.brightness = BrightnessPrepassPixels::new(film.crop()).film_mean_luminance(film);
+            self.brightness = BrightnessPrepassPixels::new(film.crop_rect()).film_mean_luminance(film);
         }
         let brightness = self.brightness.or_else(|| film.mean_luminance())?;
-        let aim = NoiseTarget { error, brightness, convergence: film.convergence() };
+        let aim = NoiseTarget { error, brightness, convergence: film.convergence_model() };
         let is_open =
             |tile: usize| self.judged[tile] < samples && self.tile_has_undecided_half(tile, done, samples);
         let noise = film.map_tiles(|tile| is_open(tile).then(|| TileNoise::measure(film, tile)));
@@ -91,7 +91,7 @@ impl CellSampleGoals {
     /// their goals, and the highest noise among them. Such tiles exist because a half's own noise does not
     /// affect its goal.
     pub(crate) fn count_finished_tiles_above_target(&self, film: &Film, error: f64) -> Option<(usize, f64)> {
-        let aim = NoiseTarget { error, brightness: self.brightness?, convergence: film.convergence() };
+        let aim = NoiseTarget { error, brightness: self.brightness?, convergence: film.convergence_model() };
         let noise = film.map_tiles(|tile| {
             let is_decided = |cell: &[u32; 2]| cell.iter().all(|goal| *goal < u32::MAX);
             let halves = || [0, 1].map(|half| film.noise_in_tile_half(tile, half)).into_iter().flatten();
@@ -228,7 +228,7 @@ pub(crate) mod tests {
         let film = Film::new(COLUMNS, 2, None).expect("a film");
         let mut next = unit_generator(3);
         for (half, (mean, spread)) in halves.into_iter().enumerate() {
-            let pixels = SelectedPixels { rect: film.crop(), part: PixelSubset::Half(half) };
+            let pixels = SelectedPixels { rect: film.crop_rect(), part: PixelSubset::Half(half) };
             let sample = |_| Vec3::splat(mean + spread * (next() - 0.5));
             let radiance = (0..COLUMNS * samples).map(sample).collect();
             film.add_samples(
@@ -322,7 +322,7 @@ pub(crate) mod tests {
             for half in 0..2 {
                 let goal = goals.get(0, if by_own { 1 - half } else { half }).min(target);
                 let samples = goal.saturating_sub(done[0][half]);
-                let pixels = SelectedPixels { rect: film.crop(), part: PixelSubset::Half(half) };
+                let pixels = SelectedPixels { rect: film.crop_rect(), part: PixelSubset::Half(half) };
                 let sample = |_| if next() < 0.01 { Vec3::splat(100.0) } else { Vec3::ZERO };
                 let radiance = (0..8 * samples).map(sample).collect();
                 film.add_samples(

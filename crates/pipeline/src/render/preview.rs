@@ -8,7 +8,7 @@ use super::film_state::FilmState;
 use crate::control::CancelToken;
 use crate::film::range_map::RangeMap;
 use crate::film::tone::{ToneMapping, tone_map_to_8_bits};
-use crate::film::{Previewer, Quantity, RadianceImage, Rect};
+use crate::film::{FilmQuantity, Previewer, RadianceImage, Rect};
 use crate::keys;
 use crate::plan::RenderPlan;
 use crate::protocol::{ImagePosition, MaxPreviewSize, NormalizedRect, PreviewImageState};
@@ -51,7 +51,7 @@ impl PreviewSender<'_> {
 
     /// Spends a short time between tiles on updating the preview, on the current thread. Returns whether it
     /// was completed and sent.
-    pub(crate) fn update_briefly(&self, state: &mut FilmState) -> bool {
+    pub(crate) fn update_in_time_slice(&self, state: &mut FilmState) -> bool {
         let Some(size) = self.fitted_image_size() else { return false };
         if self.send_section_if_requested(state, false) {
             return true;
@@ -67,9 +67,9 @@ impl PreviewSender<'_> {
     fn send_current(&self, state: &FilmState, has_time: bool) {
         if let Some(previewer) = &state.previewer {
             // The first image contains no sample statistics.
-            let base = state.base.as_ref().filter(|_| previewer.quantity() == Quantity::Radiance);
+            let base = state.base.as_ref().filter(|_| previewer.quantity() == FilmQuantity::Radiance);
             let image = previewer.build_image(base);
-            self.send(state, &image, &self.tone(state, &image, has_time), None);
+            self.send(state, &image, &self.choose_tone_mapping(state, &image, has_time), None);
         }
     }
 
@@ -77,11 +77,11 @@ impl PreviewSender<'_> {
     fn send_section_if_requested(&self, state: &FilmState, has_time: bool) -> bool {
         let Some(rect) = self.requested_section() else { return false };
         let quantity = self.plan.settings.view.film_quantity();
-        let base = state.base.as_ref().filter(|_| quantity == Quantity::Radiance);
+        let base = state.base.as_ref().filter(|_| quantity == FilmQuantity::Radiance);
         let render = &self.plan.settings.render;
         let section = NormalizedRect::from_pixels(rect, (render.width, render.height));
         let image = state.film.image_in_rect(quantity, rect, base);
-        self.send(state, &image, &self.tone(state, &image, has_time), Some(section));
+        self.send(state, &image, &self.choose_tone_mapping(state, &image, has_time), Some(section));
         true
     }
 
@@ -109,11 +109,11 @@ impl PreviewSender<'_> {
     /// Returns the tone mapping for a preview. Because preview pixels are averages, data views use the value
     /// range of the full image. If some pixels have no samples or a large image must be shown quickly, they
     /// use the preview's range instead.
-    fn tone(&self, state: &FilmState, image: &RadianceImage, has_time: bool) -> ToneMapping {
+    fn choose_tone_mapping(&self, state: &FilmState, image: &RadianceImage, has_time: bool) -> ToneMapping {
         /// Number of pixels that can be scanned in a few milliseconds.
         const QUICK: usize = 1 << 18;
         let tone = self.plan.tone;
-        let is_known = state.covers_all_pixels() && (has_time || state.film.crop().area() <= QUICK);
+        let is_known = state.has_sampled_all_pixels() && (has_time || state.film.crop_rect().area() <= QUICK);
         if tone.range_map == RangeMap::None || !is_known {
             return tone.with_image_range(image);
         }
@@ -137,7 +137,11 @@ impl PreviewSender<'_> {
 }
 
 /// Spends a short time on updating the previewer. Returns whether it is now up to date.
-fn update_previewer_briefly(state: &mut FilmState, quantity: Quantity, (width, height): (u32, u32)) -> bool {
+fn update_previewer_briefly(
+    state: &mut FilmState,
+    quantity: FilmQuantity,
+    (width, height): (u32, u32),
+) -> bool {
     state.previewer.take_if(|it| it.size() != (width, height) || it.quantity() != quantity);
     let previewer = state.previewer.get_or_insert_with(|| Previewer::for_quantity(quantity, width, height));
     previewer.refresh_changed_tiles(&state.film, Some(Instant::now() + PATIENCE))

@@ -87,7 +87,7 @@ impl<'a> Scheduler<'a> {
         let forecast = Forecast::new(state, rendering.plan.settings.render.samples);
         let EarlierProcessWork { rays, seconds: seconds_before } = std::mem::take(&mut state.before);
         Self {
-            is_first: !state.covers_all_pixels(),
+            is_first: !state.has_sampled_all_pixels(),
             state,
             rendering,
             screen: PreviewSender { bounds, plan: rendering.plan, sink: rendering.sink },
@@ -179,7 +179,7 @@ impl<'a> Scheduler<'a> {
         if self.state.goals.brightness.is_some() {
             return Ok(());
         }
-        let pilot = BrightnessPrepassPixels::new(self.state.film.crop());
+        let pilot = BrightnessPrepassPixels::new(self.state.film.crop_rect());
         let job = |number: u64| {
             let (x, y) = pilot.pixel_position(number);
             let pixels = Rect { x, y, width: 1, height: 1 }.into();
@@ -216,13 +216,13 @@ impl<'a> Scheduler<'a> {
     fn run_passes(&mut self, part: Option<Rect>, samples: u32) -> Result<(), AbortReason> {
         let RenderOptions { samples: most, error, .. } = self.rendering.plan.settings.render;
         self.decide_goals_from_existing(part);
-        while !self.state.is_complete_in(part, samples) && !self.is_over_time {
+        while !self.state.is_complete_in_region(part, samples) && !self.is_over_time {
             if let Some(goals) = self.next_round_goals().filter(|_| part.is_none()) {
                 self.run_round(&goals)?;
                 self.measure_noise_if_due();
                 continue;
             }
-            let pixels = self.state.film.crop().area();
+            let pixels = self.state.film.crop_rect().area();
             let target =
                 samples_after_next_pass(self.state.min_unfinished_samples_in(part, samples), samples, pixels);
             self.run_pass(part, target)?;
@@ -248,7 +248,7 @@ impl<'a> Scheduler<'a> {
         let Some(photons) = self.rendering.photons else {
             return self.render_to_sample_targets(part, |_, _| target, None, 0);
         };
-        while !self.state.is_complete_in(part, target) && !self.is_over_time {
+        while !self.state.is_complete_in_region(part, target) && !self.is_over_time {
             let samples = self.state.min_unfinished_samples_in(part, target);
             let at_once = samples..target.min(samples.saturating_add(photons.max_passes_at_once()));
             let numbers = self.state.to_global_samples(at_once);
@@ -355,7 +355,7 @@ impl<'a> Scheduler<'a> {
         if let Some(bounds) = (self.rendering.take_preview)() {
             (self.screen.bounds, self.next_preview) = (bounds, now);
         }
-        if now >= self.next_preview && self.screen.update_briefly(self.state) {
+        if now >= self.next_preview && self.screen.update_in_time_slice(self.state) {
             self.next_preview = Instant::now() + PREVIEW_INTERVAL.max(now.elapsed() * PREVIEW_SHARE);
         }
         (self.rendering.pulse)(self.state, !self.is_first);

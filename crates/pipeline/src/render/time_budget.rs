@@ -34,7 +34,7 @@ pub(crate) fn next_round_goals(
     let least = done.as_flattened().iter().copied().min().filter(|least| *least >= LEAST.min(most))?;
     // Every half has at least this many samples, regardless of earlier goals.
     let known = 1 << least.ilog2();
-    let halves = collect_cell_halves(film, done, rays, (known, most))?;
+    let halves = half_cells_with_costs(film, done, rays, (known, most))?;
     let pixels: f64 = halves.iter().map(|half| half.pixels).sum();
     let mean = halves.iter().map(|half| half.pixels * f64::from(half.samples)).sum::<f64>() / pixels;
     let work: f64 = halves.iter().map(|half| half.cost_of_samples(half.samples)).sum();
@@ -84,7 +84,7 @@ impl HalfCell {
     }
 }
 
-fn collect_cell_halves(
+fn half_cells_with_costs(
     film: &Film,
     done: &[[u32; 2]],
     rays: &[u64],
@@ -92,7 +92,7 @@ fn collect_cell_halves(
 ) -> Option<Vec<HalfCell>> {
     let mut halves = Vec::with_capacity(2 * done.len());
     for (cell, done) in done.iter().enumerate().filter(|(cell, _)| film.cell_rect(*cell).is_some()) {
-        let errors = [0, 1].map(|half| film.cell_half_relative_error(cell, half, known));
+        let errors = [0, 1].map(|half| film.half_cell_relative_error(cell, half, known));
         let units: f64 = [0, 1]
             .map(|half| film.cell_half_pixel_count(cell, half) as f64 * f64::from(done[half]))
             .iter()

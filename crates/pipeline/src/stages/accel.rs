@@ -18,7 +18,7 @@ use crate::world::{
 };
 
 /// A mesh with distinct lights, and its key.
-type MeshWithSeparateEmitters = (Fingerprint, Arc<LoadedMesh>);
+type KeyedMeshWithSeparateEmitters = (Fingerprint, Arc<LoadedMesh>);
 
 /// Cache of the accel stage.
 #[derive(Debug, Default)]
@@ -112,7 +112,7 @@ fn separate_coincident_mesh_emitters(
     meshes: &Meshes,
     cache: &mut AccelCache,
     token: &CancelToken,
-) -> Result<Vec<Option<MeshWithSeparateEmitters>>, AbortReason> {
+) -> Result<Vec<Option<KeyedMeshWithSeparateEmitters>>, AbortReason> {
     let distinct = |(mesh, is_emissive): (&Arc<CachedMesh>, bool)| {
         let key = keys::lifted_emitter_mesh_key(&mesh.key, is_emissive);
         let found = match cache.distinct.get(&key, key) {
@@ -133,7 +133,7 @@ fn separate_coincident_mesh_emitters(
 /// Returns the trees for all meshes, and how many of them were cached.
 fn build_mesh_trees(
     scene: &Scene,
-    (meshes, distinct): (&Meshes, &[Option<MeshWithSeparateEmitters>]),
+    (meshes, distinct): (&Meshes, &[Option<KeyedMeshWithSeparateEmitters>]),
     cache: &mut AccelCache,
     reading: &FileReadContext<'_>,
 ) -> Result<(Vec<Arc<MeshTree>>, usize), AbortReason> {

@@ -77,7 +77,7 @@ fn open_glass_warnings(loaded: &LoadedScene, open: &[OpenGlass]) -> Vec<Diagnost
 /// Returns the flaw in an object that is not closed.
 fn flaw(loaded: &LoadedScene, open: &OpenGlass) -> Option<GlassFlaw> {
     let shape = &loaded.scene.objects[open.object as usize].shape;
-    if shape.mesh().is_some() {
+    if shape.as_mesh().is_some() {
         return Some(if open.disagrees { GlassFlaw::Fronts } else { GlassFlaw::Hole });
     }
     let sheet = |one, several, help| GlassFlaw::Sheet { one, several, help };

@@ -29,8 +29,12 @@ pub(crate) fn collect_lights(
     let map = textures.environment.as_ref().map(|(key, _)| key);
     let declared = emissive_material_textures(scene).filter_map(|source| textures.key_of.get(&source));
     let patterns: Vec<&Fingerprint> = declared.chain(&textures.of_files).collect();
-    let key =
-        keys::lights_key(scene, of, (geometry.coordinate_origin(), geometry.light_lifts()), (map, &patterns));
+    let key = keys::lights_key(
+        scene,
+        of,
+        (geometry.coordinate_origin(), geometry.coplanar_light_offsets()),
+        (map, &patterns),
+    );
     if let Some(lights) = memo.get(key).filter(|lights| !lights.is_empty()) {
         return Ok(StageResult::reused(lights.clone(), reasons::UNCHANGED));
     }
@@ -40,7 +44,7 @@ pub(crate) fn collect_lights(
         0 => StageResult::skipped(lights, reasons::NO_LIGHTS),
         1 => StageResult::done(lights, "1 light"),
         count => {
-            let are_picked = |receivers| lights.sampler_for_mode(receivers).is_some();
+            let are_picked = |receivers| lights.sampler_for_purpose(receivers).is_some();
             let picked =
                 match (are_picked(LightSamplingPurpose::Eye), are_picked(LightSamplingPurpose::Paths)) {
                     (true, _) => describe_light_tree("a subset is sampled", &lights),

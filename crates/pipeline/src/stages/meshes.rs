@@ -82,7 +82,7 @@ pub(crate) fn load_meshes(
     let mut meshes = Vec::new();
     let mut counts = FileCounts::default();
     let mut warnings = MeshWarnings::default();
-    let file_materials = mesh_files_with_used_materials(&loaded.scene);
+    let file_materials = mesh_file_material_usage(&loaded.scene);
     for ((file, asset), uses_own) in files.iter().zip(assets).zip(file_materials) {
         let content = asset.files[0].content;
         asset.files.into_iter().for_each(|file| findings.add_file(file));
@@ -110,7 +110,7 @@ pub(crate) fn load_meshes(
     }
     add_warnings(loaded, warnings.messages(), findings);
     for object in loaded.scene.objects.iter().filter(|object| object.material.is_none()) {
-        if let Some(mesh) = object.shape.mesh()
+        if let Some(mesh) = object.shape.as_mesh()
             && meshes[mesh.file].mesh.lacks_materials()
         {
             let name = files[mesh.file].value.display();
@@ -135,7 +135,7 @@ fn warn_about_missing_mesh_data(
     findings: &mut Findings,
 ) {
     for object in &loaded.scene.objects {
-        let Some(mesh) = object.shape.mesh() else { continue };
+        let Some(mesh) = object.shape.as_mesh() else { continue };
         let (file, read) = (files[mesh.file].value.display(), &meshes[mesh.file].mesh.mesh);
         if read.positions.is_empty() {
             continue;
@@ -265,10 +265,10 @@ fn file_key(file: &MeshFile, content: FileContentId) -> Fingerprint {
 }
 
 /// Returns, for each mesh file, whether any object uses the file's own materials.
-fn mesh_files_with_used_materials(scene: &Scene) -> Vec<bool> {
+fn mesh_file_material_usage(scene: &Scene) -> Vec<bool> {
     let mut shown = vec![false; scene.mesh_files.len()];
     let plain = scene.objects.iter().filter(|object| object.material.is_none());
-    plain.filter_map(|object| object.shape.mesh()).for_each(|mesh| shown[mesh.file] = true);
+    plain.filter_map(|object| object.shape.as_mesh()).for_each(|mesh| shown[mesh.file] = true);
     shown
 }
 

@@ -99,7 +99,7 @@ impl PhotonStore {
         mut tick: impl FnMut(),
     ) -> Result<PhotonMaps, Cancelled> {
         let first = samples.start;
-        let pass = |number| self.trace_pass(number, sending, &mut tick);
+        let pass = |number| self.get_or_trace_pass(number, sending, &mut tick);
         let passes = samples.map(pass).collect::<Result<Vec<_>, _>>()?;
         let bytes = passes.iter().map(|pass| pass.memory_bytes()).sum();
         let sent = self.sent.get();
@@ -107,7 +107,7 @@ impl PhotonStore {
         Ok(PhotonMaps { first, passes })
     }
 
-    fn trace_pass(
+    fn get_or_trace_pass(
         &self,
         number: u32,
         sending: PhotonContext<'_>,

@@ -74,7 +74,7 @@ pub(crate) fn render(
         }
         (false, _) if state.goals.has_goal_below(wanted) => {
             let missed = state
-                .count_unconverged_at_sample_limit(error.into())
+                .count_tiles_above_noise_target(error.into())
                 .map_or_else(String::new, |(tiles, worst)| {
                     format!("; {tiles} with a few noisy pixels (noise up to {worst:.2})")
                 });

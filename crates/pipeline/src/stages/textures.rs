@@ -29,7 +29,7 @@ use crate::scene::diagnostic::Severity;
 use crate::scene::fingerprint::{Fingerprint, FingerprintHasher};
 use crate::scene::{LoadedScene, is_model};
 use crate::world::{
-    AlphaCutoffKey, Image, Images, NeededTexture, NeededTextureRoleSet, TextureSource, environment_source,
+    AlphaCutoffKey, Image, Images, NeededTexture, NeededTextureRoles, TextureSource, environment_source,
     textures_needed,
 };
 
@@ -122,11 +122,11 @@ pub(crate) struct NeededTextures {
 pub(crate) fn find_textures_needed_for_view(
     loaded: &LoadedScene,
     meshes: &Meshes,
-    lookups: NeededTextureRoleSet,
+    lookups: NeededTextureRoles,
     cache: &TextureCache,
 ) -> NeededTextures {
     let meshes: Vec<_> = meshes.iter().map(|kept| kept.mesh.clone()).collect();
-    let all = textures_needed(&loaded.scene, &meshes, NeededTextureRoleSet::ALL);
+    let all = textures_needed(&loaded.scene, &meshes, NeededTextureRoles::ALL);
     let for_image = textures_needed(&loaded.scene, &meshes, lookups);
     let left_out = all.len() - for_image.len();
     if left_out == 0 || cache.has_all(&all) {

@@ -71,7 +71,7 @@ impl WrittenImages {
     }
 
     /// Allows the scene's own image to replace any other.
-    pub(crate) fn allow_replacing_user_image(&mut self) {
+    pub(crate) fn allow_replacing_user_written_image(&mut self) {
         self.is_by_hand = false;
     }
 
@@ -118,7 +118,7 @@ pub(crate) fn check_targets(
         WriteRequirement::Try => {
             if let Err(error) = check_each_target(
                 plan,
-                output::check_image_target_read_only,
+                output::check_image_target_without_writing,
                 output::check_file_target_read_only,
             ) {
                 sink.send_write_failed(None, error.to_string());
@@ -284,8 +284,8 @@ pub(crate) fn add_animation_frame(
     token: &CancelToken,
 ) -> Result<StageResult<bool>, AbortReason> {
     let ImageWriteContext { plan, inputs, sink, .. } = to;
-    let finish = develop_settings(plan);
-    let image = finish.extract_radiance_image(&state.film);
+    let finish = film_encoding_settings(plan);
+    let image = finish.quantity_image(&state.film);
     frames.0.truncate(turn.number as usize);
     frames.0.push((
         tone_map_to_8_bits(&image, &finish.tone.with_image_range(&image)),
@@ -350,7 +350,7 @@ fn write_part(
     let identity = state.identity.clone().unwrap_or_default();
     let scene = scene_path::relative_to_image(&plan.path, path);
     let references = inputs.relative_paths(&plan.path);
-    let head = create_header(PartOrCheckpoint::Part, state, identity, &develop_settings(plan));
+    let head = create_header(PartOrCheckpoint::Part, state, identity, &film_encoding_settings(plan));
     let head = PartHeader { scene, references, ..head };
     let save = |guard: &WritePolicy<'_>| {
         part::save(path, &head, &state.film, &Value::Null, guard, (token, Durability::Power)).map(drop)
@@ -360,7 +360,7 @@ fn write_part(
 }
 
 /// Returns the settings for developing and encoding a film.
-pub(crate) fn develop_settings(plan: &RenderPlan) -> FilmEncodingSettings {
+pub(crate) fn film_encoding_settings(plan: &RenderPlan) -> FilmEncodingSettings {
     FilmEncodingSettings {
         quantity: plan.settings.view.film_quantity(),
         tone: plan.tone,
@@ -372,7 +372,7 @@ pub(crate) fn develop_settings(plan: &RenderPlan) -> FilmEncodingSettings {
 
 /// Like [`develop_settings`], but with the scene's path relative to the image.
 fn develop_settings_with_relative_scene(plan: &RenderPlan, path: &Path) -> FilmEncodingSettings {
-    let mut finish = develop_settings(plan);
+    let mut finish = film_encoding_settings(plan);
     let scene = finish.metadata.iter_mut().find(|(name, _)| name == SCENE);
     if let Some((_, value)) = scene {
         *value = scene_path::relative_to_image(&plan.path, path);

@@ -10,7 +10,7 @@ use crate::engine::EngineConfig;
 use crate::film::{Rect, SelectedPixels, TileSamples};
 use crate::integrators::{PhotonMaps, RayCounters, RenderSettings};
 use crate::messages::{INCOMPLETE_IMAGE, NEWEST_IMAGE_NOT_WRITTEN};
-use crate::protocol::LastValidSceneOutcome;
+use crate::protocol::LastValidSceneRenderOutcome;
 use crate::scene::description::{Integrator, ShadowMode};
 use crate::settings::ViewMode;
 use crate::world::World;
@@ -179,7 +179,7 @@ pub(super) fn slow(
 }
 
 /// For a request with an invalid scene, waits until the render of the last valid scene ends.
-fn last_good_end(bench: &Bench, of: u64) -> LastValidSceneOutcome {
+fn last_good_end(bench: &Bench, of: u64) -> LastValidSceneRenderOutcome {
     loop {
         match bench.next() {
             Event::LastGoodEnded { generation, end } if generation == of => return end,
@@ -194,7 +194,7 @@ fn nothing_is_rendered_without_a_valid_scene() {
     let mut bench = Bench::new(&SCENE.replace("width = 40", "width = = 40"));
     bench.writing = WriteRequirement::Try;
     assert!(matches!(bench.failed(), Failure::Scene(_)));
-    assert_eq!(last_good_end(&bench, 1), LastValidSceneOutcome::Stopped);
+    assert_eq!(last_good_end(&bench, 1), LastValidSceneRenderOutcome::Stopped);
 }
 
 #[test]
@@ -222,7 +222,7 @@ fn broken_scene_file_does_not_stop_a_render() {
         }
     }
     assert!(is_seen && samples_on_disk(&bench).starts_with("10000"), "{}", samples_on_disk(&bench));
-    let finished = |unchanged| LastValidSceneOutcome::Finished { unchanged };
+    let finished = |unchanged| LastValidSceneRenderOutcome::Finished { unchanged };
     assert_eq!(last_good_end(&bench, broken), finished(false));
     // A second typo does not keep the image from being finished.
     bench.edit("width = = 40", "width = = = 40");
@@ -317,7 +317,7 @@ fn last_valid_scene_never_mixes_file_versions() {
             }
         };
         if is_changed {
-            assert_eq!(end, LastValidSceneOutcome::Stopped);
+            assert_eq!(end, LastValidSceneRenderOutcome::Stopped);
             assert_eq!(bench.picture(), depth);
         } else {
             let expected = picture_by(SCENE, |bench| bench.write("skin.ppm", "P6\n1 1\n255\nxyz"));

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use super::content::{FileContentId, FileHashCache};
 use crate::control::CancelToken;
-use crate::protected::{OverwriteConflict, OverwriteProtection};
+use crate::protected::{OverwriteProtection, OverwriteRefusalReason};
 
 /// A change that another program made to a file written by glimt.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -139,8 +139,8 @@ impl WrittenOutputs {
                 FileContentId::Hash(_) | FileContentId::Unusable(_) => {
                     Some(match output.protection.reason_to_keep(&path) {
                         None => ExternalChange::Replaced,
-                        Some(OverwriteConflict::OtherScene) => ExternalChange::ReplacedByOtherScene,
-                        Some(OverwriteConflict::Foreign) => ExternalChange::ReplacedByForeign,
+                        Some(OverwriteRefusalReason::OtherScene) => ExternalChange::ReplacedByOtherScene,
+                        Some(OverwriteRefusalReason::Foreign) => ExternalChange::ReplacedByForeign,
                     })
                 }
             };

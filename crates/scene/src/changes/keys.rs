@@ -166,17 +166,17 @@ fn join_key(name: &str, key: &str) -> String {
 /// positions.
 fn element_path_segments(all: &[Value<'_>]) -> Vec<String> {
     let mut counts: HashMap<&str, usize> = HashMap::new();
-    for name in all.iter().filter_map(name_key_value) {
+    for name in all.iter().filter_map(value_of_name_key) {
         *counts.entry(name).or_default() += 1;
     }
     let finds = |name: &&str| name.parse::<usize>().is_err() && counts.get(name) == Some(&1);
     let of = |(number, value): (usize, &Value<'_>)| {
-        name_key_value(value).filter(finds).map_or_else(|| number.to_string(), str::to_owned)
+        value_of_name_key(value).filter(finds).map_or_else(|| number.to_string(), str::to_owned)
     };
     (1..).zip(all).map(of).collect()
 }
 
-fn name_key_value<'t>(value: &Value<'t>) -> Option<&'t str> {
+fn value_of_name_key<'t>(value: &Value<'t>) -> Option<&'t str> {
     let TomlValue::Table(table) = value.decode() else { return None };
     match table.get("name")?.value.decode() {
         TomlValue::String(name) => Some(name),

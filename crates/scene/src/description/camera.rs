@@ -133,7 +133,7 @@ impl Camera {
     }
 
     /// Lens radius, ≥ 0.
-    pub fn aperture(&self) -> f64 {
+    pub fn lens_radius(&self) -> f64 {
         match self {
             Self::LookAt { aperture, .. } | Self::Orbiter { aperture, .. } => *aperture,
         }

@@ -191,7 +191,7 @@ pub enum MeshTransform {
 
 impl MeshTransform {
     /// Returns the transform.
-    pub fn transform(&self) -> Transform {
+    pub fn to_transform(&self) -> Transform {
         match *self {
             Self::Steps { scale, rotate, translate } => {
                 Transform::scale_rotate_translate(scale, rotate, translate)
@@ -214,7 +214,7 @@ pub enum LoweredShape<'a> {
 
 impl Shape {
     /// Lowers the shape, with coordinates relative to `origin`.
-    pub fn lowered(&self, origin: DVec3) -> LoweredShape<'_> {
+    pub fn to_traced_shape_relative_to(&self, origin: DVec3) -> LoweredShape<'_> {
         let at = |place: DVec3| place - origin;
         LoweredShape::Shape(match *self {
             Self::Sphere { center, radius } => geometry::Shape::Sphere(Sphere { center: at(center), radius }),
@@ -259,7 +259,7 @@ impl Shape {
     }
 
     /// Returns the mesh instance. `None` for other shapes.
-    pub fn mesh(&self) -> Option<&MeshReference> {
+    pub fn as_mesh(&self) -> Option<&MeshReference> {
         if let Self::Mesh(mesh) = self { Some(mesh) } else { None }
     }
 

@@ -20,7 +20,7 @@ pub(super) fn read_camera(root: &TableReader<'_>) -> Option<Camera> {
         }
         let issue = Issue::error(0..0, "the scene has no [camera]")
             .with_help("add a table [camera] with `position = [0, 1, 4]` and `look_at = [0, 1, 0]`, or with `orbiter = \"FILE\"`");
-        root.context.report(issue.mark_missing_value());
+        root.context.report(issue.with_missing_value_cause());
         return None;
     }
     let table = root.table("camera")?;

@@ -83,7 +83,7 @@ impl Issue {
     }
 
     /// Marks the issue as caused by a missing value.
-    pub(super) fn mark_missing_value(self) -> Self {
+    pub(super) fn with_missing_value_cause(self) -> Self {
         Self { cause: IssueCause::Absence, ..self }
     }
 

@@ -106,7 +106,7 @@ impl<'a> TableKey<'a> {
     }
 
     /// Reads the name of a shape, if any. Reports names that look like numbers.
-    pub(super) fn optional_object_name(&self) -> Option<Option<Box<str>>> {
+    pub(super) fn optional_shape_name(&self) -> Option<Option<Box<str>>> {
         if !self.is_present() {
             return Some(None);
         }
@@ -223,7 +223,7 @@ impl<'a> TableKey<'a> {
         let index = names.find_and_mark_used(text);
         if index.is_none() {
             let message = format!("there is no {} \"{}\"", names.kind, escape_and_truncate(text, 40));
-            let issue = Issue::error(self.value_span()?, message).mark_missing_value();
+            let issue = Issue::error(self.value_span()?, message).with_missing_value_cause();
             self.context.report(names.add_name_suggestions(self.context, issue, text));
         }
         index

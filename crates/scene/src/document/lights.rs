@@ -22,11 +22,11 @@ choice! {
 }
 
 pub(super) fn read_lights(root: &TableReader<'_>) -> Option<Vec<Light>> {
-    let read: Vec<Option<Light>> = root.tables("light").map(|table| noise_target_label(&table)).collect();
+    let read: Vec<Option<Light>> = root.tables("light").map(|table| read_light(&table)).collect();
     read.into_iter().collect()
 }
 
-fn noise_target_label(table: &TableReader<'_>) -> Option<Light> {
+fn read_light(table: &TableReader<'_>) -> Option<Light> {
     let key = table.optional_key("type");
     // Without a valid type, keys cannot be checked.
     let kind = if key.is_present() { key.choice()? } else { LightKind::Point };

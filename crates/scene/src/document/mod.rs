@@ -64,7 +64,7 @@ pub(super) fn parse_and_lower(source: &SceneText, path: &Path) -> ParseOutcome {
     let document = sets::apply_set_args(&context, source, document);
     let scene = read_scene(&TableReader::root(&context, document.root()));
     let has_errors = context.has_errors();
-    let settings = setting_value_spans(&document);
+    let settings = render_and_photons_value_spans(&document);
     ParseOutcome {
         scene: scene.filter(|_| !has_errors),
         diagnostics: context.into_diagnostics(&broken_lines),
@@ -73,7 +73,7 @@ pub(super) fn parse_and_lower(source: &SceneText, path: &Path) -> ParseOutcome {
 }
 
 /// Returns the spans of all values in `[render]` and `[photons]`.
-fn setting_value_spans(document: &toml::Document<'_>) -> Vec<SettingSpan> {
+fn render_and_photons_value_spans(document: &toml::Document<'_>) -> Vec<SettingSpan> {
     let values = |table: &'static str| {
         let entries = document.root().get(table).and_then(|found| match found.value.decode() {
             toml::TomlValue::Table(entries) => Some(entries),

@@ -58,7 +58,7 @@ pub(super) fn report_first_error_per_line(
         let issue = Issue::error(open..open + 1, "`[` opened here is not closed");
         context.report(issue.with_help(unclosed_list_help(context, open)).mark_syntax_error());
     }
-    lines.into_iter().map(|line| line..end_of_broken_lines(context, line)).collect()
+    lines.into_iter().map(|line| line..first_line_after_error(context, line)).collect()
 }
 
 /// The array brackets in a text with syntax errors.
@@ -193,7 +193,7 @@ fn format_array_if_short(values: &[&str]) -> Option<String> {
 
 /// Returns the first line not affected by an error in `line`: the next header if `line` is a broken header,
 /// otherwise the next line.
-fn end_of_broken_lines(context: &FileContext<'_>, line: usize) -> usize {
+fn first_line_after_error(context: &FileContext<'_>, line: usize) -> usize {
     let is_header =
         |line: usize| context.line_text_by_number(line).map(|text| text.trim_start().starts_with('['));
     if is_header(line) != Some(true) {

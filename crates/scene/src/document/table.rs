@@ -108,7 +108,7 @@ impl<'a> TableReader<'a> {
 
     /// Returns the range defined for the key `name`, which has the form `KEY` or `TYPE.KEY`.
     pub(super) fn key_limits(&self, name: &str) -> Limits {
-        match self.expected_kind(name) {
+        match self.expected_value_kind(name) {
             Some(
                 ValueKind::Number(limits)
                 | ValueKind::Color(limits)
@@ -134,14 +134,14 @@ impl<'a> TableReader<'a> {
 
     /// Returns the range defined for an integer key.
     pub(super) fn integer_key_range(&self, name: &str) -> RangeInclusive<i128> {
-        match self.expected_kind(name) {
+        match self.expected_value_kind(name) {
             Some(ValueKind::Whole(least, most)) => least.into()..=most.into(),
             Some(_) | None => 0..=u32::MAX.into(),
         }
     }
 
     /// Returns the type defined for a key. A test checks that the definitions match the keys that are read.
-    fn expected_kind(&self, name: &str) -> Option<ValueKind> {
+    fn expected_value_kind(&self, name: &str) -> Option<ValueKind> {
         let info = match self.title {
             TableTitle::Table(table) | TableTitle::List(table) | TableTitle::Named(table, _) => {
                 table_info(table)?
@@ -222,7 +222,7 @@ impl<'a> TableReader<'a> {
             let issue = Issue::error(self.span.clone(), format!("{} needs `{name}`", self.title))
                 .with_label(format!("`{name}` is missing"))
                 .with_help(format!("add a line, such as `{name} = {example}`"));
-            self.context.report(issue.mark_missing_value());
+            self.context.report(issue.with_missing_value_cause());
         }
     }
 

@@ -6,7 +6,7 @@ use std::borrow::Cow;
 use toml_parser::{ErrorSink, ParseError};
 
 use super::error::{BoundedErrors, SyntaxError};
-use super::tree::{Document, Name, NodeKind, Span, StringRef, TableId, TableOrigin, ValueNode};
+use super::tree::{DecodedTextIndex, Document, Name, NodeKind, Span, TableId, TableOrigin, ValueNode};
 
 /// A table header, `[path.key]` or `[[path.key]]`.
 #[derive(Clone, Debug)]
@@ -89,7 +89,7 @@ impl<'s> DocumentBuilder<'s> {
     }
 
     /// Stores the decoded string at `span`.
-    pub(super) fn store_string(&mut self, span: Span, text: Cow<'s, str>) -> StringRef {
+    pub(super) fn store_string(&mut self, span: Span, text: Cow<'s, str>) -> DecodedTextIndex {
         self.document.store_decoded_string(span, text)
     }
 

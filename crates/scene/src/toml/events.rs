@@ -103,7 +103,7 @@ impl<'s> ExpressionEventReader<'_, 's> {
         let mut path = Vec::new();
         let mut last = event;
         let mut parts = 1;
-        while self.is_before_key_separator() {
+        while self.is_before_key_dot() {
             while let Some(event) = self.next() {
                 if event.kind() != EventKind::SimpleKey {
                     continue;
@@ -126,7 +126,7 @@ impl<'s> ExpressionEventReader<'_, 's> {
         (path, Some(name))
     }
 
-    fn is_before_key_separator(&self) -> bool {
+    fn is_before_key_dot(&self) -> bool {
         let kind = |at: usize| self.events.get(at).map(|event: &Event| event.kind());
         match kind(0) {
             Some(EventKind::KeySep) => true,

@@ -9,7 +9,7 @@
 use std::borrow::Cow;
 
 use super::assembly::{DocumentBuilder, TableHeader};
-use super::tree::{Name, NodeKind, Radix, Span, StringRef, ValueNode};
+use super::tree::{DecodedTextIndex, Name, NodeKind, Radix, Span, ValueNode};
 
 /// Reads the line that starts at byte `at`. Returns the offset after the line. `None` if the line is not
 /// simple.
@@ -172,7 +172,7 @@ impl<'s> LineCursor<'s> {
         if length == 0 && self.peek() == quote {
             return None;
         }
-        Some(NodeKind::String(StringRef::QUOTED))
+        Some(NodeKind::String(DecodedTextIndex::QUOTED))
     }
 
     fn read_boolean(&mut self, word: &str, value: bool) -> Option<NodeKind> {
@@ -204,9 +204,9 @@ impl<'s> LineCursor<'s> {
             self.skip_digits()?;
         }
         let kind = if is_float {
-            NodeKind::Float(StringRef::WHOLE)
+            NodeKind::Float(DecodedTextIndex::WHOLE)
         } else {
-            NodeKind::Integer(StringRef::WHOLE, Radix::Decimal)
+            NodeKind::Integer(DecodedTextIndex::WHOLE, Radix::Decimal)
         };
         self.is_at_delimiter().then_some(kind)
     }

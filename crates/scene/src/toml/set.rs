@@ -62,7 +62,7 @@ impl<'s> Document<'s> {
         let mut depth = 0;
         while depth + 1 < keys.len() {
             let next = depth + 1;
-            match self.resolve_key_part(keys, depth, table, layout)? {
+            match self.resolve_parent_key_part(keys, depth, table, layout)? {
                 KeyPartTarget::Table(inner) => table = inner,
                 KeyPartTarget::Element(list, index) if next + 1 == keys.len() => {
                     self.set_element(list, index, value);
@@ -84,7 +84,7 @@ impl<'s> Document<'s> {
     }
 
     /// Resolves any part of a key except the last.
-    fn resolve_key_part(
+    fn resolve_parent_key_part(
         &mut self,
         keys: &[Name<'s>],
         depth: usize,

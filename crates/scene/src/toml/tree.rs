@@ -28,9 +28,9 @@ impl Span {
 /// A reference to a decoded string: the whole span, the span without quotes, or an index into the document's
 /// decoded strings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct StringRef(u32);
+pub(super) struct DecodedTextIndex(u32);
 
-impl StringRef {
+impl DecodedTextIndex {
     pub(super) const WHOLE: Self = Self(u32::MAX);
     pub(super) const QUOTED: Self = Self(u32::MAX - 1);
 }
@@ -51,9 +51,9 @@ pub(super) struct TableId(u32);
 /// Kind of a value.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum NodeKind {
-    String(StringRef),
-    Integer(StringRef, Radix),
-    Float(StringRef),
+    String(DecodedTextIndex),
+    Integer(DecodedTextIndex, Radix),
+    Float(DecodedTextIndex),
     Boolean(bool),
     Datetime,
     /// `[…]`: an index into the arrays.
@@ -81,7 +81,7 @@ pub(super) struct ValueNode {
 #[derive(Clone, Copy, Debug)]
 struct TableEntry {
     key: Span,
-    text: StringRef,
+    text: DecodedTextIndex,
     node: ValueNode,
     /// The table's next entry, or [`NONE`].
     next: u32,
@@ -168,7 +168,7 @@ impl<'s> Document<'s> {
 
     pub(super) fn add_table(&mut self, origin: TableOrigin) -> TableId {
         self.tables.push(TableRecord { first: NONE, last: NONE, length: 0, origin });
-        TableId(index_to_u32_or_none(self.tables.len() - 1))
+        TableId(index_to_u32_or_sentinel(self.tables.len() - 1))
     }
 
     pub(super) fn table_origin(&self, table: TableId) -> TableOrigin {
@@ -184,13 +184,13 @@ impl<'s> Document<'s> {
         let start = self.elements.len();
         self.elements.extend_from_slice(elements);
         self.arrays.push(Span::new(start, self.elements.len()));
-        NodeKind::Array(index_to_u32_or_none(self.arrays.len() - 1))
+        NodeKind::Array(index_to_u32_or_sentinel(self.arrays.len() - 1))
     }
 
     /// Adds an empty list of tables.
     pub(super) fn add_table_list(&mut self) -> NodeKind {
         self.lists.push(Vec::new());
-        NodeKind::List(index_to_u32_or_none(self.lists.len() - 1))
+        NodeKind::List(index_to_u32_or_sentinel(self.lists.len() - 1))
     }
 
     pub(super) fn table_list_mut(&mut self, list: u32) -> &mut Vec<ValueNode> {
@@ -198,30 +198,30 @@ impl<'s> Document<'s> {
     }
 
     /// Stores the decoded string at `span`.
-    pub(super) fn store_decoded_string(&mut self, span: Span, text: Cow<'s, str>) -> StringRef {
+    pub(super) fn store_decoded_string(&mut self, span: Span, text: Cow<'s, str>) -> DecodedTextIndex {
         let written = self.source.get(span.range()).unwrap_or_default();
         if text == written {
-            return StringRef::WHOLE;
+            return DecodedTextIndex::WHOLE;
         }
         if written.len() >= 2 && written.get(1..written.len() - 1) == Some(&text) {
-            return StringRef::QUOTED;
+            return DecodedTextIndex::QUOTED;
         }
         self.texts.push(text.into_owned());
-        StringRef(index_to_u32_or_none(self.texts.len() - 1))
+        DecodedTextIndex(index_to_u32_or_sentinel(self.texts.len() - 1))
     }
 
-    fn resolve_string(&self, span: Span, text: StringRef) -> &str {
+    fn resolve_string(&self, span: Span, text: DecodedTextIndex) -> &str {
         let range = span.range();
         match text {
-            StringRef::WHOLE => self.source.get(range).unwrap_or_default(),
-            StringRef::QUOTED => self.source.get(range.start + 1..range.end - 1).unwrap_or_default(),
-            StringRef(own) => &self.texts[own as usize],
+            DecodedTextIndex::WHOLE => self.source.get(range).unwrap_or_default(),
+            DecodedTextIndex::QUOTED => self.source.get(range.start + 1..range.end - 1).unwrap_or_default(),
+            DecodedTextIndex(own) => &self.texts[own as usize],
         }
     }
 
     /// Appends an entry to a table that does not contain its key.
     pub(super) fn add_entry(&mut self, table: TableId, name: Name<'s>, node: ValueNode) {
-        let entry = index_to_u32_or_none(self.entries.len());
+        let entry = index_to_u32_or_sentinel(self.entries.len());
         let text = self.store_decoded_string(name.span, name.text.clone());
         self.entries.push(TableEntry { key: name.span, text, node, next: NONE, is_removed: false });
         let TableRecord { first, last, length, .. } = &mut self.tables[table.0 as usize];
@@ -244,7 +244,9 @@ impl<'s> Document<'s> {
         while let Some(entry) = self.entries.get(next as usize).copied() {
             if !entry.is_removed {
                 let text = match entry.text {
-                    StringRef::WHOLE => Cow::Borrowed(self.source.get(entry.key.range()).unwrap_or_default()),
+                    DecodedTextIndex::WHOLE => {
+                        Cow::Borrowed(self.source.get(entry.key.range()).unwrap_or_default())
+                    }
                     _ => Cow::Owned(self.resolve_string(entry.key, entry.text).to_owned()),
                 };
                 self.index.insert((table, text), next);
@@ -363,7 +365,7 @@ impl<'s> Document<'s> {
     }
 }
 
-fn index_to_u32_or_none(index: usize) -> u32 {
+fn index_to_u32_or_sentinel(index: usize) -> u32 {
     u32::try_from(index).unwrap_or(NONE)
 }
 

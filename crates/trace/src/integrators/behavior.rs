@@ -47,6 +47,6 @@ impl PathBehavior {
 }
 
 /// Determines how lights are sampled, based on the settings and on whether photons are gathered.
-pub fn light_sampling_mode(settings: &RenderSettings, are_gathered: bool) -> LightSamplingPurpose {
+pub fn light_sampling_purpose(settings: &RenderSettings, are_gathered: bool) -> LightSamplingPurpose {
     PathBehavior::from_settings(settings, are_gathered).receivers
 }

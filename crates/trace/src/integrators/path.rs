@@ -83,7 +83,7 @@ pub fn trace_camera_paths(
         }
     }
     paths.scatter()?;
-    paths.direct.flush_consecutive_to_accumulator(slots.start, &mut paths.accumulator);
+    paths.direct.add_arrived_light_consecutive(slots.start, &mut paths.accumulator);
     paths.next_bounce(rays);
     // Trace the remaining bounces.
     while !rays.is_empty() {
@@ -101,7 +101,7 @@ pub fn trace_camera_paths(
             }
         }
         paths.scatter()?;
-        paths.direct.add_arrived_light(rays, &mut paths.accumulator);
+        paths.direct.accumulate_arrived_light(rays, &mut paths.accumulator);
         paths.next_bounce(rays);
     }
     Ok(())

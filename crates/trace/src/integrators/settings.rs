@@ -4,7 +4,7 @@ use super::{AovSource, FirstHitQuantity, LayerSet, LightAov, ViewMode};
 use crate::math::{DVec2, Vec3};
 use crate::scene::description::RenderOptions;
 use crate::scene::fingerprint::{FingerprintContext, FingerprintHasher, Fingerprinted};
-use crate::world::NeededTextureRoleSet;
+use crate::world::NeededTextureRoles;
 
 /// Settings for rendering a world.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -59,46 +59,46 @@ impl RenderSettings {
     }
 
     /// Textures needed for images with these settings.
-    pub fn texture_needs(&self) -> NeededTextureRoleSet {
+    pub fn texture_needs(&self) -> NeededTextureRoles {
         match self.view.aov_source() {
             AovSource::FirstHit(FirstHitQuantity::Normal) => {
-                NeededTextureRoleSet { normals: true, ..NeededTextureRoleSet::NONE }
+                NeededTextureRoles { normals: true, ..NeededTextureRoles::NONE }
             }
             AovSource::FirstHit(FirstHitQuantity::Albedo) => {
-                NeededTextureRoleSet { diffuse: true, ..NeededTextureRoleSet::NONE }
+                NeededTextureRoles { diffuse: true, ..NeededTextureRoles::NONE }
             }
             // Photons may be scattered by any surface.
             AovSource::FirstHit(FirstHitQuantity::Photons) if self.gathers_photons() => {
-                NeededTextureRoleSet::ALL
+                NeededTextureRoles::ALL
             }
             AovSource::FirstHit(
                 FirstHitQuantity::Depth
                 | FirstHitQuantity::Barycentric
                 | FirstHitQuantity::Uv
                 | FirstHitQuantity::Photons,
-            ) => NeededTextureRoleSet::NONE,
+            ) => NeededTextureRoles::NONE,
             // Normals and emission are needed, but not surface colors.
-            AovSource::Light(LightAov::LitFraction) => NeededTextureRoleSet {
+            AovSource::Light(LightAov::LitFraction) => NeededTextureRoles {
                 diffuse: false,
                 specular: false,
                 ambient: false,
-                ..NeededTextureRoleSet::ALL
+                ..NeededTextureRoles::ALL
             },
             AovSource::Light(LightAov::Radiance(parts)) if !parts.has_reflected() => {
                 // These components are also visible in mirrors and through glass.
                 let ambient =
                     parts.ambient && self.without_ineffective_settings().render.ambient != Vec3::ZERO;
-                NeededTextureRoleSet {
+                NeededTextureRoles {
                     ambient,
                     lights: parts.emitted,
                     by_delta: true,
-                    ..NeededTextureRoleSet::NONE
+                    ..NeededTextureRoles::NONE
                 }
             }
             // Boxes are drawn over the beauty image.
             AovSource::Light(LightAov::Radiance(_) | LightAov::TraversalCost)
             | AovSource::Bounds
-            | AovSource::Film(_) => NeededTextureRoleSet::ALL,
+            | AovSource::Film(_) => NeededTextureRoles::ALL,
         }
     }
 

@@ -1,7 +1,7 @@
 //! Views: the AOVs that an image can show.
 
 use crate::choice;
-use crate::film::Quantity;
+use crate::film::FilmQuantity;
 use crate::materials::bsdf::LobeFilter;
 
 choice! {
@@ -67,8 +67,8 @@ impl ViewMode {
             Self::Shadow => AovSource::Light(LightAov::LitFraction),
             Self::Bounds => AovSource::Bounds,
             Self::Cost => AovSource::Light(LightAov::TraversalCost),
-            Self::Samples => AovSource::Film(Quantity::Samples),
-            Self::Error => AovSource::Film(Quantity::Error),
+            Self::Samples => AovSource::Film(FilmQuantity::Samples),
+            Self::Error => AovSource::Film(FilmQuantity::Error),
             Self::Normal => AovSource::FirstHit(FirstHitQuantity::Normal),
             Self::Depth => AovSource::FirstHit(FirstHitQuantity::Depth),
             Self::Barycentric => AovSource::FirstHit(FirstHitQuantity::Barycentric),
@@ -82,16 +82,18 @@ impl ViewMode {
     /// View whose samples are used to compute this view.
     pub fn sampled_view(self) -> Self {
         match self.aov_source() {
-            AovSource::Film(Quantity::Radiance | Quantity::Samples | Quantity::Error) => Self::Beauty,
+            AovSource::Film(FilmQuantity::Radiance | FilmQuantity::Samples | FilmQuantity::Error) => {
+                Self::Beauty
+            }
             AovSource::Light(_) | AovSource::FirstHit(_) | AovSource::Bounds => self,
         }
     }
 
     /// Film quantity shown by this view.
-    pub fn film_quantity(self) -> Quantity {
+    pub fn film_quantity(self) -> FilmQuantity {
         match self.aov_source() {
             AovSource::Film(quantity) => quantity,
-            AovSource::Light(_) | AovSource::FirstHit(_) | AovSource::Bounds => Quantity::Radiance,
+            AovSource::Light(_) | AovSource::FirstHit(_) | AovSource::Bounds => FilmQuantity::Radiance,
         }
     }
 }
@@ -107,7 +109,7 @@ pub enum AovSource {
     /// The beauty image with the acceleration structures' bounding boxes drawn over it.
     Bounds,
     /// A statistic of the beauty image's samples.
-    Film(Quantity),
+    Film(FilmQuantity),
 }
 
 impl AovSource {
@@ -136,7 +138,7 @@ impl LightAov {
     pub const ALL: Self = Self::Radiance(RadianceComponentMask::ALL);
 
     /// Whether surface colors are applied to reflected light.
-    pub fn has_surface_colors_applied(self) -> bool {
+    pub fn applies_surface_colors(self) -> bool {
         match self {
             Self::Radiance(_) | Self::TraversalCost => true,
             Self::LitFraction => false,

@@ -42,7 +42,7 @@ impl World {
             lens_glass: Vec::new(),
             enclosing_glass: Box::default(),
             camera_solids: Vec::new(),
-            has_second_uvs: uses_second_uvs(scene, inputs),
+            has_second_uvs: scene_uses_second_uvs(scene, inputs),
             colored: vertex_color_usage_by_object(scene),
             see_through: None,
         };
@@ -58,7 +58,7 @@ impl World {
 }
 
 /// Whether any texture uses the second UV set and any mesh has a second UV set.
-fn uses_second_uvs(scene: &Scene, inputs: &WorldInputs) -> bool {
+fn scene_uses_second_uvs(scene: &Scene, inputs: &WorldInputs) -> bool {
     let asks = scene.textures.iter().any(|texture| texture.uv == UvSet::Second);
     asks && inputs.meshes.iter().any(|mesh| !mesh.loaded().mesh.second_uvs.is_empty())
 }
@@ -72,7 +72,7 @@ fn find_glass_solids(scene: &Scene, inputs: &WorldInputs) -> GlassSolids {
 /// Whether each object's vertex colors are used. `None` if no object's vertex colors are used.
 fn vertex_color_usage_by_object(scene: &Scene) -> Option<Box<[bool]>> {
     let is_colored =
-        |object: &description::Object| object.shape.mesh().is_some_and(|mesh| mesh.vertex_colors);
+        |object: &description::Object| object.shape.as_mesh().is_some_and(|mesh| mesh.vertex_colors);
     let all: Box<[bool]> = scene.objects.iter().map(is_colored).collect();
     all.contains(&true).then_some(all)
 }
@@ -94,7 +94,7 @@ fn lower_materials(scene: &Scene, inputs: &WorldInputs) -> (Vec<Material>, Vec<O
     }
     let fallback = materials.len() as u32;
     materials.push(lower::fallback_material());
-    let of_object = |object: &description::Object| match (object.material, object.shape.mesh()) {
+    let of_object = |object: &description::Object| match (object.material, object.shape.as_mesh()) {
         (Some(index), _) => ObjectMaterial::One(index as u32),
         (None, Some(mesh)) => ObjectMaterial::OfFile { first: first_of_file[mesh.file], fallback },
         (None, None) => ObjectMaterial::One(fallback),

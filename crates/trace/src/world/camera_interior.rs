@@ -69,7 +69,7 @@ impl World {
         let at = Aabb { min: eye, max: eye };
         let near =
             self.compound_solids().into_iter().filter(|body| body.is_covered || body.bounds.overlaps(&at));
-        near.filter_map(|body| Some((body.body, self.material_around(&body, eye, None)?))).collect()
+        near.filter_map(|body| Some((body.body, self.enclosing_glass_material(&body, eye, None)?))).collect()
     }
 
     /// Closed glass solids that consist of meshes or several objects.
@@ -102,7 +102,12 @@ impl World {
     /// Glass material around a point, determined by the majority of rays cast from the point toward the
     /// solid. `None` if the point is outside or no ray hits the solid. If the point is on object `of`, this
     /// object does not block the rays.
-    pub fn material_around(&self, body: &CompoundSolid, point: Vec3, of: Option<u32>) -> Option<u32> {
+    pub fn enclosing_glass_material(
+        &self,
+        body: &CompoundSolid,
+        point: Vec3,
+        of: Option<u32>,
+    ) -> Option<u32> {
         let (objects, mut votes, mut material) = (&body.objects, 0_i32, None);
         for ray in 0..MIN_RAYS.max(objects.len()) {
             let target =

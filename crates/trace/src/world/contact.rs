@@ -9,7 +9,7 @@ use arrayvec::ArrayVec;
 
 use super::isolated::triangle_overlaps_box;
 use super::{Geometry, Hit, MeshInstance, Object, World};
-use crate::accel::OverlappingItem;
+use crate::accel::PrimitiveOrEnclosingSubtree;
 use crate::geometry::ray::offset_origin;
 use crate::geometry::{Aabb, Ray, Shape, ShapeHit, SurfacePoint, SurfaceRequest};
 use crate::math::{DVec3, Vec3};
@@ -108,7 +108,7 @@ impl World {
         let margin = self.geometry.coincidence_margin(at);
         let error = if self.geometry.is_hit_isolated(at.hit, at.surface, margin) {
             if self.is_glass_thicker_than(at, margin) {
-                return self.classify_isolated_hit(at, visit);
+                return self.visit_isolated_hit_surface(at, visit);
             }
             self.geometry.set_hit_as_only_candidate(at, memory)
         } else {
@@ -129,7 +129,7 @@ impl World {
 
     /// Fast path for [`World::classify_candidates`] if [`World::is_glass_thicker_than`] is true and nothing else
     /// is nearby. In this case, only the incoming ray's side matters.
-    fn classify_isolated_hit(
+    fn visit_isolated_hit_surface(
         &self,
         at: &CoincidenceQuery<'_>,
         mut visit: impl FnMut(CoincidentOrEnclosingSurface),
@@ -274,7 +274,7 @@ impl World {
     }
 
     /// Whether an object is a closed shape that contains a point.
-    pub fn is_closed_shape_around_point(&self, object: u32, point: Vec3) -> bool {
+    pub fn is_closed_shape_containing(&self, object: u32, point: Vec3) -> bool {
         match &self.geometry.objects()[object as usize] {
             Object::Shape(shape) => shape.encloses_point(point.as_dvec3()) == Some(true),
             Object::Mesh(_) => false,
@@ -329,8 +329,8 @@ impl Geometry {
         objects.extend(self.unbounded());
         self.tree().visit_surfaces_overlapping_box(&near, |met| {
             match met {
-                OverlappingItem::Primitive(id) => objects.push(id),
-                OverlappingItem::Enclosing(subtree) => {
+                PrimitiveOrEnclosingSubtree::Primitive(id) => objects.push(id),
+                PrimitiveOrEnclosingSubtree::Enclosing(subtree) => {
                     objects.extend(enclosing.get(subtree).into_iter().flatten());
                 }
             }

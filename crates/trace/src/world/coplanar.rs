@@ -272,7 +272,7 @@ pub(super) fn are_coplanar_and_overlap(light: &FlatFace, face: &FlatFace) -> boo
 /// Whether an object may have emissive faces.
 fn can_object_emit(scene: &Scene, meshes: &[&LoadedMesh], object: usize) -> bool {
     let object = &scene.objects[object];
-    match (object.material, object.shape.mesh()) {
+    match (object.material, object.shape.as_mesh()) {
         (Some(material), _) => scene.materials[material].emits(),
         (None, Some(mesh)) => meshes[mesh.file].materials.iter().any(FileMaterial::emits),
         (None, None) => false,
@@ -335,7 +335,7 @@ fn visit_flat_faces(
         }
         Shape::Mesh(ref mesh) => {
             let loaded = meshes[mesh.file];
-            let transform = mesh.placed.transform();
+            let transform = mesh.placed.to_transform();
             let own = |triangle: usize| {
                 let material = *loaded.mesh.materials.get(triangle)? as usize;
                 loaded.materials.get(material).filter(|own| own.emits()).map(|_| EmissionSides::Front)

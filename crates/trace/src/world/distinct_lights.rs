@@ -20,7 +20,7 @@ use crate::scene::description::Scene;
 pub fn mesh_files_with_emissive_override(scene: &Scene) -> Vec<bool> {
     let mut emissive = vec![false; scene.mesh_files.len()];
     for object in &scene.objects {
-        if let (Some(mesh), Some(own)) = (object.shape.mesh(), object.material) {
+        if let (Some(mesh), Some(own)) = (object.shape.as_mesh(), object.material) {
             emissive[mesh.file] |= scene.materials[own].emits();
         }
     }

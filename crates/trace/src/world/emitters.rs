@@ -13,7 +13,7 @@ use crate::lights::MeshEmitter;
 use crate::lights::delta::{PointLight, SpotLight};
 use crate::lights::infinite::{DirectionalLight, Environment, EnvironmentMap};
 use crate::lights::{
-    AreaLight, BoundingSphere, EmissionTexture, Light, LightBounds, Lights, PhotonEmitter, Side,
+    AreaLight, BoundingSphere, EmissionModulation, Light, LightBounds, Lights, PhotonEmitter, Side,
     TriangleWithUvs, UvMapping, back_area_light, front_area_light, see_through_shape_side_light,
 };
 use crate::lights::{Emitter, EmittingTriangleSelection};
@@ -67,7 +67,7 @@ pub fn build_lights(
 }
 
 /// Creates a scene's photon source. `None` if no light emits photons.
-pub fn scene_photon_source(geometry: &Geometry, lights: &Arc<Lights>) -> Option<PhotonEmitter> {
+pub fn scene_photon_emitter(geometry: &Geometry, lights: &Arc<Lights>) -> Option<PhotonEmitter> {
     let emitter_geometry =
         |object: u32| geometry.objects().get(object as usize).map(Object::emitter_geometry);
     let balls: Vec<BoundingSphere> = geometry.objects().iter().filter_map(Object::bounding_sphere).collect();
@@ -130,7 +130,7 @@ struct EmissionWithOpacity {
 
 impl EmissionWithOpacity {
     fn new(emission: Emission, opacity: Option<Opacity>) -> Self {
-        match opacity.as_ref().and_then(Opacity::as_constant) {
+        match opacity.as_ref().and_then(Opacity::as_untextured) {
             Some(part) => {
                 let emission = Emission { scale: emission.scale * part, ..emission };
                 Self { emission, opacity: None, is_sheer: true }
@@ -156,9 +156,9 @@ impl EmissionWithOpacity {
     }
 
     /// Emission factor that varies with position or direction. `chart` maps points on the emitter to UVs.
-    fn texture(&self, chart: UvMapping) -> Option<EmissionTexture> {
+    fn texture(&self, chart: UvMapping) -> Option<EmissionModulation> {
         let Emission { texture, coat, .. } = &self.emission;
-        EmissionTexture::new_with_coat(texture.as_ref(), self.opacity.as_ref(), coat.as_ref(), chart)
+        EmissionModulation::new_with_coat(texture.as_ref(), self.opacity.as_ref(), coat.as_ref(), chart)
     }
 
     /// Whether emission varies with position or direction.
@@ -294,7 +294,7 @@ mod tests {
             let lights = Arc::new(Lights::new(lights, &CancelToken::new()).expect("never canceled"));
             let geometry = Geometry::build(vec![Object::Mesh(Box::new(mesh))], &token);
             let geometry = geometry.expect("never canceled");
-            let source = scene_photon_source(&geometry, &lights).expect("a photon source");
+            let source = scene_photon_emitter(&geometry, &lights).expect("a photon source");
             let mut next = random::unit_generator(1);
             for _ in 0..20_000 {
                 let mut pair = || [next(), next()];

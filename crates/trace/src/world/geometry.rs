@@ -86,7 +86,7 @@ impl Geometry {
     }
 
     /// One translation per object; see [`super::coplanar_lights`]. Empty if no objects are moved.
-    pub fn light_lifts(&self) -> &[DVec3] {
+    pub fn coplanar_light_offsets(&self) -> &[DVec3] {
         &self.lifts
     }
 
@@ -155,7 +155,7 @@ impl Geometry {
     /// Returns the merged meshes if they are represented by `id`, which is an id from
     /// [`Geometry::traced_tree`]. `None` if `id` refers to a real object.
     #[inline(always)]
-    pub(super) fn merged_meshes_by_tree_id(&self, id: u32) -> Option<&MergedMeshes> {
+    pub(super) fn merged_meshes_if_represented_by(&self, id: u32) -> Option<&MergedMeshes> {
         let merged = self.merged.as_ref()?;
         (id as usize == self.objects.len()).then_some(&merged.meshes)
     }
@@ -221,7 +221,7 @@ impl Geometry {
     /// Returns the nearest hit. At equal distances, the lowest object id wins.
     pub fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
         self.closest_hit_with_unbounded(self.traced_tree(), ray, |id, segment| {
-            match self.merged_meshes_by_tree_id(id) {
+            match self.merged_meshes_if_represented_by(id) {
                 Some(merged) => {
                     let shape = merged.closest_hit(segment)?;
                     let MergedTriangle { object, primitive } = merged.triangle(shape.primitive);
@@ -262,7 +262,7 @@ impl Geometry {
         for &id in &self.unbounded {
             end = test(id, end).unwrap_or(end);
         }
-        tree.closest_hit(&Ray { t_max: end, ..*ray }, test);
+        tree.visit_leaves_front_to_back(&Ray { t_max: end, ..*ray }, test);
         best
     }
 
@@ -282,7 +282,7 @@ impl Geometry {
             LightGeometry::Object(own) | LightGeometry::SeeThrough(own) => own != id && any(id, None),
             LightGeometry::Primitive(own, part) => any(id, (own == id).then_some(part)),
         };
-        let test = |id: u32| match (self.merged_meshes_by_tree_id(id), source) {
+        let test = |id: u32| match (self.merged_meshes_if_represented_by(id), source) {
             (
                 Some(merged),
                 LightGeometry::Nothing | LightGeometry::Object(_) | LightGeometry::SeeThrough(_),
@@ -399,12 +399,12 @@ fn lower_shape(
     origin: DVec3,
     token: &CancelToken,
 ) -> Result<Object, Cancelled> {
-    let mesh = match shape.lowered(origin) {
+    let mesh = match shape.to_traced_shape_relative_to(origin) {
         LoweredShape::Shape(shape) => return Ok(Object::Shape(shape)),
         LoweredShape::Mesh(mesh) => mesh,
     };
     let tree = &meshes[mesh.file];
-    let transform = mesh.placed.transform().relative_to_origins(tree.loaded().mesh.origin, origin);
+    let transform = mesh.placed.to_transform().relative_to_origins(tree.loaded().mesh.origin, origin);
     let instance = MeshInstance::new(Arc::clone(tree), transform, mesh.smooth);
     if instance.smooth {
         instance.tree.prepare_normals(token)?;

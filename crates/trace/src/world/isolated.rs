@@ -9,7 +9,7 @@ use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU8, Ordering};
 
 use super::{Geometry, Hit, MeshInstance, Object};
-use crate::accel::OverlappingItem;
+use crate::accel::PrimitiveOrEnclosingSubtree;
 use crate::geometry::{Aabb, Shape, SurfacePoint};
 use crate::math::{DVec3, Vec3};
 
@@ -42,12 +42,12 @@ const CELLS: usize = 16;
 pub(super) struct IsolationCache {
     /// Diagonal of the bounding box of all finite objects.
     reach: f32,
-    tables: Vec<OnceLock<IsolationTable>>,
+    tables: Vec<OnceLock<ObjectIsolationCache>>,
 }
 
 /// Cached isolation states of one object.
 #[derive(Debug)]
-struct IsolationTable {
+struct ObjectIsolationCache {
     /// Maximum margin for which the states are valid.
     margin: f32,
     /// For shapes, the grid's minimum corner and the number of cells per unit length along each axis.
@@ -64,7 +64,7 @@ impl IsolationCache {
     }
 }
 
-impl IsolationTable {
+impl ObjectIsolationCache {
     fn new(margin: f32, cells: [Vec3; 2], count: usize) -> Self {
         Self { margin, cells, states: (0..count).map(|_| AtomicU8::new(UNKNOWN)).collect() }
     }
@@ -133,7 +133,7 @@ impl Geometry {
                 let find = || {
                     let all = shape.bounds().unwrap_or(Aabb::EMPTY);
                     let around = cell.bounds(&all).expanded(Vec3::splat(table.margin));
-                    if self.has_no_neighbors(&around, &SurfaceRegion::GridCell(around), hit.object) {
+                    if self.is_region_isolated(&around, &SurfaceRegion::GridCell(around), hit.object) {
                         1
                     } else {
                         NEVER
@@ -146,20 +146,20 @@ impl Geometry {
 
     /// Creates an object's table. The margin covers rays from up to four scene sizes away. Longer rays have
     /// larger margins and do not use the table.
-    fn new_isolation_table(&self, object: &Object) -> IsolationTable {
+    fn new_isolation_table(&self, object: &Object) -> ObjectIsolationCache {
         let of_rays = self.max_mesh_rounding_error() + 8.0 * f32::EPSILON * self.isolation_cache().reach;
         match object {
             Object::Mesh(mesh) => {
                 let margin = of_rays.max(4.0 * mesh.max_rounding_error());
-                IsolationTable::new(margin, [Vec3::ZERO; 2], mesh.tree.loaded().mesh.triangles.len())
+                ObjectIsolationCache::new(margin, [Vec3::ZERO; 2], mesh.tree.loaded().mesh.triangles.len())
             }
             Object::Shape(shape) => match shape.bounds() {
                 Some(bounds) => {
                     let size = bounds.min.abs().max(bounds.max.abs()).max_element();
-                    IsolationTable::for_grid_cells(of_rays.max(64.0 * f32::EPSILON * size), &bounds)
+                    ObjectIsolationCache::for_grid_cells(of_rays.max(64.0 * f32::EPSILON * size), &bounds)
                 }
                 // With a negative margin, the table of an unbounded shape is never used.
-                None => IsolationTable::new(-1.0, [Vec3::ZERO; 2], 0),
+                None => ObjectIsolationCache::new(-1.0, [Vec3::ZERO; 2], 0),
             },
         }
     }
@@ -190,7 +190,7 @@ impl Geometry {
             let inner = smaller(corners, parts);
             let region = SurfaceRegion::Triangle { corners: inner, apart };
             let around = Aabb::from_points_f64(inner).expanded(Vec3::splat(2.0 * margin));
-            if self.has_no_neighbors(&around, &region, object) {
+            if self.is_region_isolated(&around, &region, object) {
                 return parts as u8;
             }
         }
@@ -198,7 +198,7 @@ impl Geometry {
     }
 
     /// Whether no other objects are near a region. Every object near the region must overlap `around`.
-    fn has_no_neighbors(&self, around: &Aabb, region: &SurfaceRegion, own: u32) -> bool {
+    fn is_region_isolated(&self, around: &Aabb, region: &SurfaceRegion, own: u32) -> bool {
         let is_near = |id: u32| match &self.objects()[id as usize] {
             Object::Shape(shape) => shape_may_overlap_region(shape, around, region),
             Object::Mesh(mesh) => {
@@ -213,8 +213,8 @@ impl Geometry {
         let mut is_clear = true;
         self.tree().visit_surfaces_overlapping_box(around, |met| {
             is_clear = match met {
-                OverlappingItem::Primitive(id) => !is_near(id),
-                OverlappingItem::Enclosing(_) => false,
+                PrimitiveOrEnclosingSubtree::Primitive(id) => !is_near(id),
+                PrimitiveOrEnclosingSubtree::Enclosing(_) => false,
             };
             is_clear
         });

@@ -331,8 +331,7 @@ fn nested_sphere_search_takes_log_squared_time() {
             assert!(f64::from(found) <= bound, "{found} of {count}");
             // Check that the listed spheres include the spheres that determine the medium.
             let glasses = world.closed_glass_shapes().map(|(object, _)| object);
-            let enclosing =
-                glasses.filter(|object| world.is_closed_shape_around_point(*object, sides.beyond));
+            let enclosing = glasses.filter(|object| world.is_closed_shape_containing(*object, sides.beyond));
             let enclosing: Vec<_> = enclosing.collect();
             around.sort_unstable();
             let last = |all: &[u32]| all[all.len().saturating_sub(MAX_INTERIORS)..].to_vec();

@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use super::textures::{
-    AlphaCutoffKey, FILE_NUMBER, TextureSource, coverage_cutoff, file_color_interpretation, file_opacity_use,
-    image_file_and_encoding, material_texture_source,
+    AlphaCutoffKey, FILE_NUMBER, TextureSource, color_or_cutout_interpretation, coverage_cutoff,
+    image_file_and_encoding, material_texture_source, opacity_pixel_interpretation,
 };
 use super::{Image, Images};
 use crate::assets::{FileMaterial, FileMaterialKind, FileTexture, PhysicalMaterial};
@@ -26,7 +26,7 @@ use crate::scene::description::{
 /// Converts a material from the scene file.
 pub fn lower_material(scene: &Scene, images: &Images, material: &description::Material) -> Material {
     let of = SceneTextureLookup { scene, images, material };
-    let color = |source: &ColorSource| of.color(source);
+    let color = |source: &ColorSource| of.lower_color(source);
     let number = |source: &NumberSource| of.number(source, TextureRole::Roughness);
     let bsdf = match &material.kind {
         MaterialKind::Phong { diffuse, specular, shininess, ambient } => {
@@ -108,10 +108,10 @@ pub fn lower_opacity(scene: &Scene, images: &Images, material: &description::Mat
 
 /// A metal: a mirror if its roughness is 0, and otherwise a microfacet conductor.
 fn metal(fresnel: ConductorFresnel, roughness: ScalarParameter, anisotropy: ScalarParameter) -> Bsdf {
-    if roughness.as_constant() == Some(0.0) {
+    if roughness.as_untextured() == Some(0.0) {
         return Bsdf::Mirror(Mirror::Conductor(fresnel));
     }
-    let is_brushed = anisotropy.as_constant() != Some(0.0);
+    let is_brushed = anisotropy.as_untextured() != Some(0.0);
     let metal = Conductor { fresnel, roughness, anisotropy };
     Bsdf::NonSpecular(if is_brushed {
         NonSpecular::BrushedConductor(metal)
@@ -122,7 +122,7 @@ fn metal(fresnel: ConductorFresnel, roughness: ScalarParameter, anisotropy: Scal
 
 /// Converts plastic. With roughness 0, the coat becomes a δ lobe over the diffuse base.
 fn plastic(diffuse: ColorOrTexture, specular: ColorOrTexture, roughness: ScalarParameter, ior: f32) -> Bsdf {
-    let is_smooth = roughness.as_constant() == Some(0.0);
+    let is_smooth = roughness.as_untextured() == Some(0.0);
     let base = NonSpecular::Plastic(Plastic::new(diffuse, specular.clone(), roughness, ior));
     if is_smooth { Bsdf::Coated(Coated { specular, ior, base }) } else { Bsdf::NonSpecular(base) }
 }
@@ -158,7 +158,7 @@ pub fn file_emission(images: &Images, own: &FileMaterial) -> Emission {
     match &own.emission_texture {
         None => Emission::from_constant(own.emission),
         // If the emission map could not be read, do not emit. Otherwise, the whole surface would emit.
-        Some(texture) => match file_texture(images, texture, file_color_interpretation(own, texture)) {
+        Some(texture) => match file_texture(images, texture, color_or_cutout_interpretation(own, texture)) {
             None => Emission::NONE,
             texture => Emission { texture, ..Emission::from_constant(own.emission) },
         },
@@ -171,12 +171,13 @@ pub fn file_opacity(images: &Images, own: &FileMaterial) -> Option<Opacity> {
         return None;
     }
     let texture = own.opacity_texture.as_ref();
-    let value =
-        match texture.and_then(|texture| file_texture(images, texture, file_opacity_use(own, texture))) {
-            Some(texture) => ScalarParameter::Texture(texture),
-            None if own.opacity < 1.0 => ScalarParameter::Constant(own.opacity),
-            None => return None,
-        };
+    let value = match texture
+        .and_then(|texture| file_texture(images, texture, opacity_pixel_interpretation(own, texture)))
+    {
+        Some(texture) => ScalarParameter::Texture(texture),
+        None if own.opacity < 1.0 => ScalarParameter::Constant(own.opacity),
+        None => return None,
+    };
     Some(Opacity { value, cutoff: 0.0 })
 }
 
@@ -192,17 +193,17 @@ pub fn lower_file_material(images: &Images, own: &FileMaterial) -> Material {
             Bsdf::Dielectric(Dielectric::new(ior, tint).with_roughness(ScalarParameter::Constant(roughness)))
         }
         (FileMaterialKind::Principled(physical), _) => {
-            return file_rough_material(images, own, file_principled(images, own, physical));
+            return non_specular_file_material(images, own, file_principled(images, own, physical));
         }
         (FileMaterialKind::Phong | FileMaterialKind::Glass, _) => {
-            return file_rough_material(images, own, file_phong(images, own));
+            return non_specular_file_material(images, own, file_phong(images, own));
         }
     };
     Material { bsdf, emission: Emission::NONE, normal_perturbation: None, opacity: file_opacity(images, own) }
 }
 
 /// Non-specular material from a mesh file, including its emission and normal map.
-fn file_rough_material(images: &Images, own: &FileMaterial, rough: NonSpecular) -> Material {
+fn non_specular_file_material(images: &Images, own: &FileMaterial, rough: NonSpecular) -> Material {
     let normals = own.normal_texture.as_ref().and_then(|texture| {
         let texture = file_texture(images, texture, PixelInterpretation::Normal)?;
         Some(NormalMap { texture, strength: own.normal_strength })
@@ -223,8 +224,8 @@ fn file_material_color_parameter(
     texture: Option<&FileTexture>,
     constant: Vec3,
 ) -> ColorOrTexture {
-    let texture =
-        texture.and_then(|texture| file_texture(images, texture, file_color_interpretation(own, texture)));
+    let texture = texture
+        .and_then(|texture| file_texture(images, texture, color_or_cutout_interpretation(own, texture)));
     texture.map_or(ColorOrTexture::Constant(constant), ColorOrTexture::Texture)
 }
 
@@ -311,7 +312,7 @@ struct SceneTextureLookup<'a> {
 }
 
 impl SceneTextureLookup<'_> {
-    fn color(self, source: &ColorSource) -> ColorOrTexture {
+    fn lower_color(self, source: &ColorSource) -> ColorOrTexture {
         match source {
             ColorSource::Constant(color) => ColorOrTexture::Constant(*color),
             // Textures are used in the same way for all color roles.

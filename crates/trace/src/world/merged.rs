@@ -183,7 +183,7 @@ impl MergedMeshes {
         let size = self.bounds().extent();
         match by.run(IncoherentClosestFacetKernel { facets, size, rows, met, ends, found }) {
             Some(0) => {}
-            Some(undecided) => self.closest_hit_one_by_one(rows, undecided, ends, found),
+            Some(undecided) => self.closest_hit_per_ray(rows, undecided, ends, found),
             None => self.closest_hit_by_tree(rows, met, ends, found),
         }
     }
@@ -191,7 +191,7 @@ impl MergedMeshes {
     /// Traces the rays in `these` one by one.
     #[cold]
     #[inline(never)]
-    fn closest_hit_one_by_one(&self, rows: &RayPacket, these: u32, ends: &F32x16, found: &mut HitPacket) {
+    fn closest_hit_per_ray(&self, rows: &RayPacket, these: u32, ends: &F32x16, found: &mut HitPacket) {
         for lane in set_bit_lanes(these) {
             if let Some(hit) = self.tree.closest_hit(&Ray { t_max: ends[lane], ..rows.ray(lane) }) {
                 found.set(lane, &hit);
@@ -223,7 +223,7 @@ impl MergedMeshes {
         let Some(facets) = &self.facets else { return self.any_hit_by_tree(rows, met, ends, except) };
         let own = except.unwrap_or(&[Self::NO_TRIANGLE; PACKET_SIZE]);
         let size = self.bounds().extent();
-        match by.run(IncoherentAnyFacetKernel { facets, size, rows, met, ends, except: own }) {
+        match by.run(IncoherentAnyHitKernel { facets, size, rows, met, ends, except: own }) {
             Some([hit, 0]) => hit,
             Some([hit, undecided]) => hit | self.any_hit_one_by_one(rows, undecided, ends, own),
             None => self.any_hit_by_tree(rows, met, ends, except),
@@ -317,7 +317,7 @@ impl SimdKernel for IncoherentClosestFacetKernel<'_> {
 
 /// Calls [`TriangleList::any_hit_packet`] for incoherent rays. Returns the hit lanes and the lanes that need an exact
 /// test, or `None` for coherent rays.
-struct IncoherentAnyFacetKernel<'a> {
+struct IncoherentAnyHitKernel<'a> {
     facets: &'a TriangleList,
     size: Vec3,
     rows: &'a RayPacket,
@@ -326,7 +326,7 @@ struct IncoherentAnyFacetKernel<'a> {
     except: &'a [u32; PACKET_SIZE],
 }
 
-impl SimdKernel for IncoherentAnyFacetKernel<'_> {
+impl SimdKernel for IncoherentAnyHitKernel<'_> {
     type Output = Option<[u32; 2]>;
 
     #[inline(always)]
@@ -422,7 +422,7 @@ pub(super) mod tests {
                 if i % 2 == 0 {
                     Ray::new(vector() * 3.0, vector())
                 } else {
-                    Ray::segment_ending_before(vector(), vector())
+                    Ray::segment_ending_before_point(vector(), vector())
                 }
             })
             .collect()
@@ -531,7 +531,8 @@ pub(super) mod tests {
         let (mut started, mut again) = (0, 0);
         for _ in 0..4000 {
             let mut vector = |scale: f32| Vec3::new(next(), next(), next()) * scale;
-            let ray = Ray { t_max: f32::INFINITY, ..Ray::segment_ending_before(vector(1.0), vector(0.02)) };
+            let ray =
+                Ray { t_max: f32::INFINITY, ..Ray::segment_ending_before_point(vector(1.0), vector(0.02)) };
             let Some(hit) = geometry.closest_hit(&ray) else { continue };
             let surface = geometry.surface(&ray, &hit);
             for side in [1.0, -1.0] {

@@ -40,7 +40,7 @@ pub use contact::{
 };
 pub use coplanar::{CoplanarLight, coplanar_lights, light_lifts};
 pub use distinct_lights::{mesh_files_with_emissive_override, separate_coincident_emitters};
-pub use emitters::{build_environment_map, build_lights, scene_photon_source};
+pub use emitters::{build_environment_map, build_lights, scene_photon_emitter};
 pub use geometry::{Geometry, Hit};
 pub use glass_solids::{GlassSolids, OpenGlass};
 pub use merged::MergedMeshes;
@@ -51,7 +51,7 @@ pub use object::Object;
 pub use origin::choose_origin_near_camera_target;
 pub use packet_material::PacketMaterial;
 pub use textures::{
-    AlphaCutoffKey, NeededTexture, NeededTextureRoleSet, TextureSource, environment_source,
+    AlphaCutoffKey, NeededTexture, NeededTextureRoles, TextureSource, environment_source,
     material_texture_source, textures_needed,
 };
 pub use unlit_glass::LightBoundingBoxPair;
@@ -236,14 +236,14 @@ impl World {
         surface: &SurfacePoint,
         footprint: impl Fn([Vec3; 2]) -> Footprint,
     ) -> TexturePoint {
-        let second = if self.has_second_uvs { self.second_texture_point(hit, &footprint) } else { None };
+        let second = if self.has_second_uvs { self.second_uv_point(hit, &footprint) } else { None };
         TexturePoint { uv: surface.uv, footprint: footprint([surface.dpdu, surface.dpdv]), second }
     }
 
     /// The second UV set's part of [`World::texture_point`]. `None` if the mesh has no second set.
     #[cold]
     #[inline(never)]
-    fn second_texture_point(
+    fn second_uv_point(
         &self,
         hit: &Hit,
         footprint: impl Fn([Vec3; 2]) -> Footprint,

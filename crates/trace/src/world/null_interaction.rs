@@ -5,7 +5,7 @@
 //! unoccluded rays that enter the bounding box of a see-through object are then traced from surface to
 //! surface.
 
-use super::packet::OcclusionTest;
+use super::packet::OcclusionCallback;
 use super::{Geometry, Hit, PACKET_SIZE, SimdKernel, World};
 use crate::accel::{AnyHitCallback, F32x16};
 use crate::geometry::packet::{RayPacket, set_bit_lanes};
@@ -111,7 +111,7 @@ impl World {
         if self.geometry.closest_hit_on_objects_where(ray, stops).is_some() {
             return Vec3::ZERO;
         }
-        self.transmittance_along_ray(see_through, ray, source, lookups)
+        self.see_through_transmittance(see_through, ray, source, lookups)
     }
 
     /// Transmittance of the surface at a hit, and the ray's continuation beyond the surface.
@@ -131,7 +131,7 @@ impl World {
     }
 
     /// Product of the transmittances of all see-through surfaces along a shadow ray.
-    fn transmittance_along_ray(
+    fn see_through_transmittance(
         &self,
         see_through: &SeeThroughObjects,
         ray: &Ray,
@@ -188,7 +188,7 @@ impl SimdKernel for TransmittanceKernel<'_> {
         // Find the rays not blocked by opaque objects.
         let geometry: &Geometry = &world.geometry;
         let each_mesh =
-            see_through.is_any_merged || traced & geometry.rays_to_merged_mesh_lights(sources) != 0;
+            see_through.is_any_merged || traced & geometry.merged_mesh_light_ray_mask(sources) != 0;
         let tree = if each_mesh { geometry.tree() } else { geometry.traced_tree() };
         if tree.has_shells() {
             for lane in set_bit_lanes(traced) {
@@ -198,14 +198,14 @@ impl SimdKernel for TransmittanceKernel<'_> {
             }
             return transmittance;
         }
-        let occluders = OcclusionTest::new(geometry, rows, sources, simd);
+        let occluders = OcclusionCallback::new(geometry, rows, sources, simd);
         let mut solid = OpaqueOcclusionTest { occluders, see_through, near: 0 };
         transmittance.occluded =
             tree.any_hit_packet(rows, ends, traced, geometry.unbounded(), &mut solid, simd);
         // Trace the rays that may cross see-through surfaces.
         for lane in set_bit_lanes(traced & !transmittance.occluded & solid.near) {
             let ray = Ray { t_max: ends[lane], ..rows.ray(lane) };
-            let left = world.transmittance_along_ray(
+            let left = world.see_through_transmittance(
                 see_through,
                 &ray,
                 sources.geometry(lane),
@@ -219,7 +219,7 @@ impl SimdKernel for TransmittanceKernel<'_> {
 
 /// Any-hit test for opaque occluders.
 struct OpaqueOcclusionTest<'a, F> {
-    occluders: OcclusionTest<'a, F>,
+    occluders: OcclusionCallback<'a, F>,
     see_through: &'a SeeThroughObjects,
     /// Mask of rays that enter the bounding box of a see-through object.
     near: u32,

@@ -58,7 +58,7 @@ impl Geometry {
 impl Geometry {
     /// Mask of rays whose light is an entire merged mesh.
     #[inline(always)]
-    pub(super) fn rays_to_merged_mesh_lights(&self, sources: &LightGeometryPacket) -> u32 {
+    pub(super) fn merged_mesh_light_ray_mask(&self, sources: &LightGeometryPacket) -> u32 {
         if !sources.is_any || !self.has_merged_meshes() {
             return 0;
         }
@@ -123,10 +123,10 @@ impl SimdKernel for OcclusionKernel<'_> {
     #[inline(always)]
     fn run(self, simd: impl Simd) -> u32 {
         let Self { geometry, rows, ends, traced, sources } = self;
-        if geometry.traced_tree().has_shells() || traced & geometry.rays_to_merged_mesh_lights(sources) != 0 {
+        if geometry.traced_tree().has_shells() || traced & geometry.merged_mesh_light_ray_mask(sources) != 0 {
             return geometry.occluded_one_by_one(rows, ends, traced, sources);
         }
-        let mut occluders = OcclusionTest::new(geometry, rows, sources, simd);
+        let mut occluders = OcclusionCallback::new(geometry, rows, sources, simd);
         geometry.traced_tree().any_hit_packet(rows, ends, traced, geometry.unbounded(), &mut occluders, simd)
     }
 }
@@ -169,7 +169,7 @@ impl<F: Simd> ClosestHitCallback for ClosestHitTest<'_, F> {
     fn test(&mut self, id: u32, met: u32, ends: &mut F32x16) {
         let mut found = HitPacket::without_hits();
         let (these, mut objects) = (masked_ends(met, ends), [id; PACKET_SIZE]);
-        match self.geometry.merged_meshes_by_tree_id(id) {
+        match self.geometry.merged_meshes_if_represented_by(id) {
             Some(merged) => {
                 let by = self.geometry.instruction_set();
                 merged.closest_hit_packet(by, self.rows, (met, &these), &mut found);
@@ -209,7 +209,7 @@ fn resolve_merged_hits(merged: &MergedMeshes, found: &mut HitPacket) -> [u32; PA
 }
 
 /// Any-hit test for shadow rays.
-pub(super) struct OcclusionTest<'a, F> {
+pub(super) struct OcclusionCallback<'a, F> {
     geometry: &'a Geometry,
     rows: &'a RayPacket,
     sources: &'a LightGeometryPacket,
@@ -218,7 +218,7 @@ pub(super) struct OcclusionTest<'a, F> {
     simd: F,
 }
 
-impl<'a, F: Simd> OcclusionTest<'a, F> {
+impl<'a, F: Simd> OcclusionCallback<'a, F> {
     /// Creates the test for a packet of shadow rays to these lights.
     #[inline(always)]
     pub(super) fn new(
@@ -231,10 +231,10 @@ impl<'a, F: Simd> OcclusionTest<'a, F> {
     }
 }
 
-impl<F: Simd> AnyHitCallback for OcclusionTest<'_, F> {
+impl<F: Simd> AnyHitCallback for OcclusionCallback<'_, F> {
     #[inline(always)]
     fn test(&mut self, id: u32, met: u32, ends: &F32x16) -> u32 {
-        if let Some(merged) = self.geometry.merged_meshes_by_tree_id(id) {
+        if let Some(merged) = self.geometry.merged_meshes_if_represented_by(id) {
             let these = masked_ends(met, ends);
             if self.in_part & met == 0 {
                 return merged.any_hit_packet(
@@ -408,7 +408,7 @@ pub(super) mod tests {
             let spread = [0.001, 0.1, 4.0][i % 3];
             let mut ray = || {
                 let to = target + Vec3::new(next(), next(), next()) * spread;
-                if i % 2 == 0 { Ray::segment_ending_before(eye, to) } else { Ray::new(eye, to - eye) }
+                if i % 2 == 0 { Ray::segment_ending_before_point(eye, to) } else { Ray::new(eye, to - eye) }
             };
             let mut rays: Vec<Ray> = (0..=i % PACKET_SIZE).map(|_| ray()).collect();
             // Let some rays ignore the triangle they would hit.

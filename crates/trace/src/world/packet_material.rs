@@ -30,7 +30,7 @@ impl PacketMaterial {
         (is_even && normal_perturbation.is_none() && opacity.is_none()).then(|| Self {
             kind: rough.kind(),
             row_texture: rough.packet_texture().map(Texture::uv_set),
-            ambient: rough.as_constant().map(|bsdf| bsdf.ambient_reflectance()),
+            ambient: rough.as_untextured().map(|bsdf| bsdf.ambient_reflectance()),
             emission: emission.scale,
             is_two_sided: emission.is_two_sided(),
         })

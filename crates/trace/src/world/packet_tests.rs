@@ -49,7 +49,7 @@ impl HostileRandom {
             0 => Ray::new(self.hostile_vector(), self.hostile_vector()),
             1 => Ray::new(self.hostile_vector() * scale, self.vector()),
             2 => Ray::new(self.vector() * 0.5 * scale, self.vector()),
-            3 => Ray::segment_ending_before(self.vector() * 4.0 * scale, self.vector() * scale),
+            3 => Ray::segment_ending_before_point(self.vector() * 4.0 * scale, self.vector() * scale),
             _ => {
                 let from = self.vector() * 4.0 * scale;
                 Ray::new(from, self.vector() * scale - from)

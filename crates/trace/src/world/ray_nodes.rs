@@ -21,7 +21,7 @@ impl Geometry {
         );
         for (id, above) in below {
             let (local, tree) = match (
-                self.merged_meshes_by_tree_id(id),
+                self.merged_meshes_if_represented_by(id),
                 self.objects().get(id as usize).and_then(Object::mesh),
             ) {
                 (Some(merged), _) => (*ray, merged.tree()),

@@ -70,7 +70,7 @@ impl NeededTexture {
     /// The image used as the environment map.
     pub fn for_environment(file: &Path) -> Self {
         Self {
-            source: environment_source_from_file(file),
+            source: environment_texture_source(file),
             name: "environment".to_owned(),
             declared: None,
             mesh_file: None,
@@ -85,7 +85,7 @@ impl NeededTexture {
 
 /// Which textures an image needs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct NeededTextureRoleSet {
+pub struct NeededTextureRoles {
     /// Diffuse reflectance.
     pub diffuse: bool,
     /// Glossy reflectance.
@@ -101,7 +101,7 @@ pub struct NeededTextureRoleSet {
     pub by_delta: bool,
 }
 
-impl NeededTextureRoleSet {
+impl NeededTextureRoles {
     /// Every texture.
     pub const ALL: Self =
         Self { diffuse: true, specular: true, ambient: true, lights: true, normals: true, by_delta: true };
@@ -148,7 +148,7 @@ impl NeededTextureRoleSet {
 pub fn textures_needed(
     scene: &Scene,
     meshes: &[Arc<LoadedMesh>],
-    lookups: NeededTextureRoleSet,
+    lookups: NeededTextureRoles,
 ) -> Vec<NeededTexture> {
     let mut needed: Vec<NeededTexture> = Vec::new();
     let mut known = HashMap::new();
@@ -214,7 +214,7 @@ fn has_mipmaps(scene: &Scene, texture: usize) -> bool {
 
 /// The environment map's file. `None` if there is no map or if the map's color factor is black.
 pub fn environment_source(scene: &Scene) -> Option<TextureSource> {
-    environment_file(scene).map(environment_source_from_file)
+    environment_file(scene).map(environment_texture_source)
 }
 
 fn environment_file(scene: &Scene) -> Option<&Path> {
@@ -222,7 +222,7 @@ fn environment_file(scene: &Scene) -> Option<&Path> {
     Some(&environment.file.as_ref()?.value)
 }
 
-fn environment_source_from_file(file: &Path) -> TextureSource {
+fn environment_texture_source(file: &Path) -> TextureSource {
     TextureSource { path: file.to_owned(), image: None, encoding: ImageEncoding::Color, coverage: None }
 }
 
@@ -232,7 +232,7 @@ fn used_material_flags(scene: &Scene) -> (Vec<bool>, Vec<bool>) {
     let (mut materials, mut files) =
         (vec![false; scene.materials.len()], vec![false; scene.mesh_files.len()]);
     for object in &scene.objects {
-        match (object.material, object.shape.mesh().map(|mesh| mesh.file)) {
+        match (object.material, object.shape.as_mesh().map(|mesh| mesh.file)) {
             (Some(material), _) => materials[material] = true,
             (None, Some(file)) => files[file] = true,
             (None, None) => {}
@@ -247,7 +247,8 @@ pub fn material_texture_source(
     material: &Material,
     (texture, role): (usize, TextureRole),
 ) -> TextureSource {
-    let source = scene_texture_source(scene, texture, texture_use(scene, material, (texture, role)));
+    let source =
+        scene_texture_source(scene, texture, texture_pixel_interpretation(scene, material, (texture, role)));
     match role {
         TextureRole::Opacity(_) => {
             TextureSource { coverage: coverage_cutoff(scene, texture, material.opacity.cutoff), ..source }
@@ -271,7 +272,7 @@ pub fn coverage_cutoff(scene: &Scene, texture: usize, cutoff: f32) -> Option<Alp
 }
 
 /// How a scene material's texture is used in this role.
-pub fn texture_use(
+pub fn texture_pixel_interpretation(
     scene: &Scene,
     material: &Material,
     (texture, role): (usize, TextureRole),
@@ -356,7 +357,7 @@ pub fn image_file_and_encoding(texture: &FileTexture, used: PixelInterpretation)
 pub const FILE_NUMBER: PixelInterpretation = PixelInterpretation::Number(ChannelSelector::Luminance);
 
 /// How a mesh file material's color texture is used.
-pub fn file_color_interpretation(own: &FileMaterial, texture: &FileTexture) -> PixelInterpretation {
+pub fn color_or_cutout_interpretation(own: &FileMaterial, texture: &FileTexture) -> PixelInterpretation {
     let is_alpha = |opacity: &&FileTexture| match opacity.number {
         None | Some(ChannelSelector::Opacity | ChannelSelector::Channel(Channel::Alpha)) => true,
         Some(ChannelSelector::Luminance | ChannelSelector::Channel(_) | ChannelSelector::Mask { .. }) => {
@@ -369,7 +370,7 @@ pub fn file_color_interpretation(own: &FileMaterial, texture: &FileTexture) -> P
 }
 
 /// Returns how a material from a mesh file uses its opacity texture.
-pub fn file_opacity_use(own: &FileMaterial, opacity: &FileTexture) -> PixelInterpretation {
+pub fn opacity_pixel_interpretation(own: &FileMaterial, opacity: &FileTexture) -> PixelInterpretation {
     let colors = [&own.diffuse_texture, &own.specular_texture, &own.emission_texture];
     let is_color = colors.into_iter().flatten().any(|color| color.path == opacity.path);
     let number =
@@ -379,7 +380,7 @@ pub fn file_opacity_use(own: &FileMaterial, opacity: &FileTexture) -> PixelInter
 
 fn file_textures(
     own: &FileMaterial,
-    lookups: NeededTextureRoleSet,
+    lookups: NeededTextureRoles,
 ) -> impl Iterator<Item = (&FileTexture, PixelInterpretation)> {
     let shared = [
         (&own.diffuse_texture, TextureRole::Ambient),
@@ -404,9 +405,11 @@ fn file_textures(
         let texture = texture.as_ref()?;
         let used = match role.pixel_interpretation() {
             PixelInterpretation::Color | PixelInterpretation::CutOut => {
-                file_color_interpretation(own, texture)
+                color_or_cutout_interpretation(own, texture)
             }
-            PixelInterpretation::Number(ChannelSelector::Opacity) => file_opacity_use(own, texture),
+            PixelInterpretation::Number(ChannelSelector::Opacity) => {
+                opacity_pixel_interpretation(own, texture)
+            }
             used @ (PixelInterpretation::Number(_) | PixelInterpretation::Normal) => used,
         };
         Some((texture, used))
@@ -434,7 +437,7 @@ mod tests {
         let outcome = crate::scene::parse(Arc::from(text.as_str()), &path);
         let scene = outcome.scene.unwrap_or_else(|| panic!("{:?}: {text}", outcome.diagnostics));
         let found = scene.materials.iter().find(|material| material.name == "m").expect("the material");
-        found.textures().into_iter().map(|used| texture_use(&scene, found, used)).collect()
+        found.textures().into_iter().map(|used| texture_pixel_interpretation(&scene, found, used)).collect()
     }
 
     #[test]

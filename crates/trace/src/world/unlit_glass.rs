@@ -21,7 +21,7 @@ pub struct LightBoundingBoxPair {
 
 impl LightBoundingBoxPair {
     /// Whether the light may intersect a box.
-    pub fn may_intersect_box(&self, bounds: &Aabb) -> bool {
+    pub fn may_light_intersect_box(&self, bounds: &Aabb) -> bool {
         self.of_ball.overlaps(bounds) && self.of_object.is_none_or(|own| own.overlaps(bounds))
     }
 
@@ -55,7 +55,7 @@ impl World {
             }
         }
         // Keep the closed solids that cannot be touched by a light.
-        let holds_lamp = |bounds: &Aabb| lamps.iter().any(|lamp| lamp.may_intersect_box(bounds));
+        let holds_lamp = |bounds: &Aabb| lamps.iter().any(|lamp| lamp.may_light_intersect_box(bounds));
         let is_dark = |(body, bounds): (u32, &Option<Aabb>)| {
             let closed =
                 bounds.as_ref().filter(|bounds| bounds.extent().is_finite() && !self.is_open_solid(body));

@@ -29,17 +29,17 @@ pub(super) fn encode(picture: &Srgb8Image, cells: Rect, turn: bool) -> Vec<Vec<u
         commands.push([b"\x1b_G", keys.as_bytes(), b";", chunk, b"\x1b\\"].concat());
     }
     if let Some(last) = commands.last_mut() {
-        last.extend(delete(other));
+        last.extend(delete_command(other));
     }
     commands
 }
 
 /// The command that deletes an image and its data.
-fn delete(id: u32) -> Vec<u8> {
+fn delete_command(id: u32) -> Vec<u8> {
     format!("\x1b_Ga=d,d=I,i={id},q=2\x1b\\").into_bytes()
 }
 
 /// The commands that delete both images.
-pub(crate) fn delete_all() -> Vec<u8> {
-    IDS.map(delete).concat()
+pub(crate) fn delete_all_commands() -> Vec<u8> {
+    IDS.map(delete_command).concat()
 }

@@ -19,7 +19,7 @@ use ratatui::layout::Rect;
 use self::palette::Palette;
 use crate::film::Srgb8Image;
 
-pub(super) use self::kitty::delete_all;
+pub(super) use self::kitty::delete_all_commands;
 pub use self::pixel_screen::TestImageTerminal;
 
 /// Image protocols.
@@ -104,7 +104,7 @@ impl TerminalImages {
         }
         self.shown = None;
         match self.protocol {
-            ImageProtocol::Kitty => self.pieces.push_back(self.wrap_for_tmux(kitty::delete_all())),
+            ImageProtocol::Kitty => self.pieces.push_back(self.wrap_for_tmux(kitty::delete_all_commands())),
             ImageProtocol::Sixel | ImageProtocol::Iterm => {}
         }
         Some(shown)
@@ -125,7 +125,7 @@ impl TerminalImages {
     /// everything has been sent. `rate` is the bandwidth in bytes per second, if known.
     pub(super) fn next_slice(&mut self, most: usize, rate: Option<f64>) -> Option<Vec<u8>> {
         if self.pieces.is_empty() && !self.is_complete() {
-            self.queue_encoded_image(rate);
+            self.encode_and_queue_image(rate);
         }
         let mut slice = self.pieces.pop_front()?;
         while let Some(piece) = self.pieces.pop_front_if(|piece| slice.len() + piece.len() <= most) {
@@ -134,7 +134,7 @@ impl TerminalImages {
         Some(slice)
     }
 
-    fn queue_encoded_image(&mut self, rate: Option<f64>) {
+    fn encode_and_queue_image(&mut self, rate: Option<f64>) {
         let Some(wanted) = self.wanted.clone() else { return };
         let seconds = if self.is_still { STILL_SECONDS } else { MOVING_SECONDS };
         let most = rate.map_or(MAX_BYTES, |rate| (rate * seconds).min(MAX_BYTES));

@@ -51,7 +51,7 @@ impl BlockPattern {
     }
 
     /// Counts the grid squares in which each part of this tile overlaps each part of `other`.
-    pub(crate) fn overlap_counts(self, other: Self) -> [[u32; 2]; 2] {
+    pub(crate) fn part_overlap_counts(self, other: Self) -> [[u32; 2]; 2] {
         let parts = |tile: Self| [tile.first, ALL & !tile.first];
         parts(self).map(|own| parts(other).map(|its| (own & its).count_ones()))
     }
@@ -103,7 +103,7 @@ static TABLE: LazyLock<BlockSymbolTable> = LazyLock::new(|| {
     };
     for (mask, symbol) in (0..).zip(QUADRANTS) {
         if !matches!(symbol, ' ' | '█') {
-            add(symbol, expand_mask(mask, 2));
+            add(symbol, expand_mask_to_full_grid(mask, 2));
         }
     }
     let light = BlockPattern::LIGHT.first;
@@ -116,16 +116,16 @@ static TABLE: LazyLock<BlockSymbolTable> = LazyLock::new(|| {
     let mut next = SEXTANTS;
     for mask in 1..63 {
         if !SEXTANTS_ELSEWHERE.contains(&mask) {
-            add(char::from_u32(next).unwrap_or(' '), expand_mask(mask, 3));
+            add(char::from_u32(next).unwrap_or(' '), expand_mask_to_full_grid(mask, 3));
             next += 1;
         }
     }
     let mut next = OCTANTS;
     for mask in 0..256 {
         if let Some((_, symbol)) = OCTANTS_ELSEWHERE.iter().find(|(other, _)| *other == mask) {
-            add(*symbol, expand_mask(mask, 4));
-        } else if octants_as_quadrants(mask).is_none() {
-            add(char::from_u32(next).unwrap_or(' '), expand_mask(mask, 4));
+            add(*symbol, expand_mask_to_full_grid(mask, 4));
+        } else if equivalent_quadrant_mask(mask).is_none() {
+            add(char::from_u32(next).unwrap_or(' '), expand_mask_to_full_grid(mask, 4));
             next += 1;
         }
     }
@@ -160,7 +160,7 @@ const OCTANTS_ELSEWHERE: [(u32, char); 10] = [
 ];
 
 /// Expands a mask with `rows` rows to the full grid.
-fn expand_mask(mask: u32, rows: u32) -> u32 {
+fn expand_mask_to_full_grid(mask: u32, rows: u32) -> u32 {
     expand_rows(mask, rows, GRID_ROWS)
 }
 
@@ -173,8 +173,8 @@ fn expand_rows(mask: u32, from: u32, to: u32) -> u32 {
 }
 
 /// The quadrants that fill the same area as these octants, if any.
-fn octants_as_quadrants(mask: u32) -> Option<u32> {
-    (0..16).find(|quadrants| expand_mask(*quadrants, 2) == expand_mask(mask, 4))
+fn equivalent_quadrant_mask(mask: u32) -> Option<u32> {
+    (0..16).find(|quadrants| expand_mask_to_full_grid(*quadrants, 2) == expand_mask_to_full_grid(mask, 4))
 }
 
 /// Grids that divide a cell into parts.
@@ -233,7 +233,7 @@ fn all_cell_divisions(pixel_rows: u32, part_rows: &[u32]) -> Vec<CellDivision> {
         let half = 1_u32 << (2 * rows - 1);
         // Iterate in Gray code order. The top left part is always included.
         for mask in (0..half).map(|i| (i ^ i >> 1) << 1 | 1) {
-            let of_tile = block_pattern_for_mask(expand_mask(mask, *rows)).map(|(tile, _)| tile);
+            let of_tile = block_pattern_for_mask(expand_mask_to_full_grid(mask, *rows)).map(|(tile, _)| tile);
             let is_new =
                 |tile: &BlockPattern| divisions.iter().all(|division: &CellDivision| division.tile != *tile);
             if let Some(tile) = of_tile.filter(is_new) {
@@ -273,7 +273,7 @@ mod tests {
 
     #[test]
     fn known_block_characters() {
-        let symbol = |mask, rows| TABLE.symbols[&expand_mask(mask, rows)];
+        let symbol = |mask, rows| TABLE.symbols[&expand_mask_to_full_grid(mask, rows)];
         assert_eq!(symbol(0b1001, 2), '▚');
         assert_eq!(symbol(1, 3), '🬀');
         assert_eq!(symbol(0b01_01_01, 3), '▌');

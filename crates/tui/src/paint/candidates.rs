@@ -54,7 +54,7 @@ fn candidate_colors_for_run(
     };
     for span in model.spans {
         let box_ = shared_color_range(wanted.clone(), *span);
-        add(TerminalColor::Rgb(box_.shortest_encoding()));
+        add(TerminalColor::Rgb(box_.color_with_fewest_digits()));
         let index = nearest_256(box_.mean());
         let fixed = TerminalColor::Palette(index);
         if index >= FIRST_UNTOUCHED && fixed.to_rgb().is_some_and(|rgb| box_.contains(rgb)) {
@@ -98,7 +98,7 @@ impl RunColorRange {
     }
 
     /// Returns the color with the fewest decimal digits, preferring the one closest to the mean.
-    fn shortest_encoding(&self) -> [u8; 3] {
+    fn color_with_fewest_digits(&self) -> [u8; 3] {
         let mean = self.mean();
         std::array::from_fn(|i| {
             let fewest = decimal_digits(self.low[i]);

@@ -62,7 +62,7 @@ impl TwoColorCell {
         self,
         other: Self,
     ) -> impl Iterator<Item = (TerminalColor, TerminalColor, f32)> {
-        let shared = self.tile.overlap_counts(other.tile);
+        let shared = self.tile.part_overlap_counts(other.tile);
         let pairs = [(0, 0), (0, 1), (1, 0), (1, 1)].into_iter();
         pairs.filter(move |(own, its)| shared[*own][*its] > 0).map(move |(own, its)| {
             let part = 2.0 * shared[own][its] as f32 / PLACES as f32;

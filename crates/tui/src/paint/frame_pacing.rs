@@ -60,7 +60,7 @@ const SHARE: f64 = 0.5;
 /// Decides whether a preview is worth its cost. The first and last previews always are. A fast terminal gets
 /// 5 to 10 previews per second. A slow connection gets few intermediate previews, and none that would delay
 /// the last one.
-pub fn advise_on_preview(moment: &PacingInputs) -> PacingAdvice {
+pub fn pace_preview(moment: &PacingInputs) -> PacingAdvice {
     if moment.is_final {
         return PacingAdvice::Aim(Fidelity::Still);
     }
@@ -134,11 +134,11 @@ mod tests {
             let slow =
                 PacingInputs { bytes_per_second, since_aim: Duration::ZERO, is_shown: false, ..MOMENT };
             assert_eq!(
-                advise_on_preview(&PacingInputs { aimed_samples: None, ..slow }),
+                pace_preview(&PacingInputs { aimed_samples: None, ..slow }),
                 PacingAdvice::Aim(Fidelity::First)
             );
             assert_eq!(
-                advise_on_preview(&PacingInputs { is_final: true, ..slow }),
+                pace_preview(&PacingInputs { is_final: true, ..slow }),
                 PacingAdvice::Aim(Fidelity::Still)
             );
         }
@@ -146,12 +146,12 @@ mod tests {
 
     #[test]
     fn intermediate_previews_double_the_samples() {
-        assert_eq!(advise_on_preview(&MOMENT), PacingAdvice::Wait);
-        assert_eq!(advise_on_preview(&PacingInputs { samples: 2.0, ..MOMENT }), MOVING);
+        assert_eq!(pace_preview(&MOMENT), PacingAdvice::Wait);
+        assert_eq!(pace_preview(&PacingInputs { samples: 2.0, ..MOMENT }), MOVING);
         let late = PacingInputs { since_aim: Duration::from_secs(3), ..MOMENT };
-        assert_eq!(advise_on_preview(&late), MOVING, "after a long time, any progress is drawn");
+        assert_eq!(pace_preview(&late), MOVING, "after a long time, any progress is drawn");
         assert_eq!(
-            advise_on_preview(&PacingInputs { samples: 1.0, ..late }),
+            pace_preview(&PacingInputs { samples: 1.0, ..late }),
             PacingAdvice::Wait,
             "an unchanged preview is not redrawn"
         );
@@ -161,25 +161,25 @@ mod tests {
     fn fast_terminals_get_5_to_10_previews_per_second() {
         let following = PacingAdvice::Aim(Fidelity::Following);
         let quick = PacingInputs { is_fast: true, since_aim: Duration::from_millis(100), ..MOMENT };
-        assert_eq!(advise_on_preview(&quick), following, "drawn regardless of the number of new samples");
+        assert_eq!(pace_preview(&quick), following, "drawn regardless of the number of new samples");
         assert_eq!(
-            advise_on_preview(&PacingInputs { samples: 0.5, ..quick }),
+            pace_preview(&PacingInputs { samples: 0.5, ..quick }),
             following,
             "drawn even if the sample count is lower"
         );
         assert_eq!(
-            advise_on_preview(&PacingInputs { since_aim: Duration::from_millis(99), ..quick }),
+            pace_preview(&PacingInputs { since_aim: Duration::from_millis(99), ..quick }),
             PacingAdvice::Wait
         );
         assert_eq!(
-            advise_on_preview(&PacingInputs { is_shown: false, ..quick }),
+            pace_preview(&PacingInputs { is_shown: false, ..quick }),
             PacingAdvice::Wait,
             "not drawn before the previous preview has been shown"
         );
         let in_pixels = PacingInputs { is_in_pixels: true, ..quick };
-        assert_eq!(advise_on_preview(&in_pixels), PacingAdvice::Wait);
+        assert_eq!(pace_preview(&in_pixels), PacingAdvice::Wait);
         assert_eq!(
-            advise_on_preview(&PacingInputs { since_aim: Duration::from_millis(200), ..in_pixels }),
+            pace_preview(&PacingInputs { since_aim: Duration::from_millis(200), ..in_pixels }),
             following
         );
     }
@@ -187,35 +187,32 @@ mod tests {
     #[test]
     fn first_pass_is_drawn_in_steps() {
         let coarse = PacingInputs { samples: 0.1, aimed_samples: Some(0.0), ..MOMENT };
-        assert_eq!(advise_on_preview(&coarse), PacingAdvice::Wait);
-        assert_eq!(advise_on_preview(&PacingInputs { samples: 0.25, ..coarse }), MOVING);
-        assert_eq!(
-            advise_on_preview(&PacingInputs { samples: 1.0, aimed_samples: Some(0.5), ..coarse }),
-            MOVING
-        );
+        assert_eq!(pace_preview(&coarse), PacingAdvice::Wait);
+        assert_eq!(pace_preview(&PacingInputs { samples: 0.25, ..coarse }), MOVING);
+        assert_eq!(pace_preview(&PacingInputs { samples: 1.0, aimed_samples: Some(0.5), ..coarse }), MOVING);
     }
 
     #[test]
     fn slow_connections_get_few_previews() {
         // 15 kB take a quarter of a second at 60 kB/s.
         let thin = PacingInputs { bytes_per_second: Some(60e3), samples: 2.0, ..MOMENT };
-        assert_eq!(advise_on_preview(&thin), MOVING);
+        assert_eq!(pace_preview(&thin), MOVING);
         assert_eq!(
-            advise_on_preview(&PacingInputs { since_aim: Duration::from_millis(400), ..thin }),
+            pace_preview(&PacingInputs { since_aim: Duration::from_millis(400), ..thin }),
             PacingAdvice::Wait
         );
         assert_eq!(
-            advise_on_preview(&PacingInputs { is_shown: false, ..thin }),
+            pace_preview(&PacingInputs { is_shown: false, ..thin }),
             PacingAdvice::Wait,
             "the previous preview is still being sent"
         );
         assert_eq!(
-            advise_on_preview(&PacingInputs { is_shown: false, samples: 4.0, ..thin }),
+            pace_preview(&PacingInputs { is_shown: false, samples: 4.0, ..thin }),
             MOVING,
             "the previous preview is much worse"
         );
         let ending = PacingInputs { final_in: Some(Duration::from_millis(200)), ..thin };
-        assert_eq!(advise_on_preview(&ending), PacingAdvice::Wait, "it would delay the final preview");
+        assert_eq!(pace_preview(&ending), PacingAdvice::Wait, "it would delay the final preview");
     }
 
     #[test]
@@ -232,7 +229,7 @@ mod tests {
                     since_aim: Duration::from_secs_f64(seconds - at),
                     ..MOMENT
                 };
-                if advise_on_preview(&moment) != PacingAdvice::Wait {
+                if pace_preview(&moment) != PacingAdvice::Wait {
                     (aimed, at, count) = (Some(moment.samples), seconds, count + 1);
                 }
             }

@@ -36,14 +36,14 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
 pub use self::fidelity::Fidelity;
-pub use self::frame_pacing::{PacingAdvice, PacingInputs, advise_on_preview};
+pub use self::frame_pacing::{PacingAdvice, PacingInputs, pace_preview};
 use self::hyperlinks::UrlTable;
 pub use self::hyperlinks::{Hyperlink, LINK_OFF};
 pub use self::lines::buffer_to_text_lines;
 use self::picture::FirstPreviewByteBudget;
-pub use self::rep_support::can_repeat;
-use self::screen::{LimitedOutputSlice, ScreenModel, Stroke};
-use self::stable_cells::StableCells;
+pub use self::rep_support::terminal_supports_rep;
+use self::screen::{CellRun, LimitedOutputSlice, ScreenModel};
+use self::stable_cells::FirstPreviewCells;
 use self::target_screen::{ScreenRegion, TargetScreen};
 use super::color::ColorDepth;
 
@@ -55,15 +55,15 @@ pub struct Painter {
     can_repeat: bool,
     /// Model of the screen. `None` if the screen content is unknown.
     screen: Option<ScreenModel>,
-    memory: StableCells,
+    memory: FirstPreviewCells,
     wanted: TargetScreen,
     links: UrlTable,
     budget: FirstPreviewByteBudget,
     /// Remaining drawing steps, in order.
-    parts: vec::IntoIter<RowDrawStep>,
+    parts: vec::IntoIter<RowDrawPhase>,
     /// The drawing step in progress.
-    part: Option<RowDrawStep>,
-    strokes: vec::IntoIter<Stroke>,
+    part: Option<RowDrawPhase>,
+    strokes: vec::IntoIter<CellRun>,
     /// Drawing progress for each row of the preview.
     rows: Vec<RowProgress>,
     aim: u64,
@@ -71,7 +71,7 @@ pub struct Painter {
 
 /// A step in drawing the screen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum RowDrawStep {
+enum RowDrawPhase {
     /// Draw a row's text.
     Words(u16),
     /// Draw a row of the preview.
@@ -105,7 +105,7 @@ impl Painter {
             depth,
             can_repeat: false,
             screen: None,
-            memory: StableCells::default(),
+            memory: FirstPreviewCells::default(),
             wanted: TargetScreen::without_cells(depth),
             links: UrlTable::default(),
             budget: FirstPreviewByteBudget::default(),
@@ -161,16 +161,16 @@ impl Painter {
         self.memory.set_target(&wanted, self.screen.as_ref());
         self.wanted = wanted;
         self.aim += 1;
-        self.requeue_draw_steps();
+        self.queue_all_draw_steps();
     }
 
-    fn requeue_draw_steps(&mut self) {
-        let mut rows: Vec<u16> = self.wanted.rows_from_the_middle().collect();
+    fn queue_all_draw_steps(&mut self) {
+        let mut rows: Vec<u16> = self.wanted.rows_center_outward().collect();
         rows.sort_by_key(|y| self.rows[usize::from(*y)].aim);
-        let words = (0..self.wanted.rows).map(RowDrawStep::Words);
+        let words = (0..self.wanted.rows).map(RowDrawPhase::Words);
         let later = (self.wanted.later.top()..self.wanted.later.bottom().min(self.wanted.rows))
-            .map(RowDrawStep::Later);
-        let picture = rows.into_iter().map(RowDrawStep::Picture);
+            .map(RowDrawPhase::Later);
+        let picture = rows.into_iter().map(RowDrawPhase::Picture);
         self.parts = words.chain(picture).chain(later).collect::<Vec<_>>().into_iter();
         self.part = None;
         self.strokes = Vec::new().into_iter();
@@ -201,13 +201,14 @@ impl Painter {
                 if !screen.draw_stroke_if_output_fits(stroke, &self.links, &mut slice) {
                     return slice.bytes;
                 }
-                if let (Some(RowDrawStep::Picture(_)), Stroke::Mosaic { at, count, .. }) = (self.part, stroke)
+                if let (Some(RowDrawPhase::Picture(_)), CellRun::Mosaic { at, count, .. }) =
+                    (self.part, stroke)
                 {
                     self.memory.record_drawn_cells(*at, *count);
                 }
                 self.strokes.next();
             }
-            if let Some(RowDrawStep::Picture(y)) = self.part {
+            if let Some(RowDrawPhase::Picture(y)) = self.part {
                 self.memory.record_row_done(y);
                 self.rows[usize::from(y)] = RowProgress { aim: self.aim, is_done: true };
             }
@@ -217,21 +218,21 @@ impl Painter {
             }
             self.part = self.parts.next();
             let strokes = match self.part {
-                Some(RowDrawStep::Words(y)) => {
+                Some(RowDrawPhase::Words(y)) => {
                     words::plan_text_row(screen, &self.wanted, y, ScreenRegion::Words)
                 }
-                Some(RowDrawStep::Later(y)) => {
+                Some(RowDrawPhase::Later(y)) => {
                     words::plan_text_row(screen, &self.wanted, y, ScreenRegion::Later)
                 }
-                Some(RowDrawStep::Picture(y))
+                Some(RowDrawPhase::Picture(y))
                     if self.rows[usize::from(y)].is_done && !screen.is_row_damaged(y) =>
                 {
                     Vec::new()
                 }
-                Some(RowDrawStep::Picture(y)) if self.wanted.uses_ascii_ramp() => {
+                Some(RowDrawPhase::Picture(y)) if self.wanted.uses_ascii_ramp() => {
                     words::plan_text_row(screen, &self.wanted, y, ScreenRegion::Picture)
                 }
-                Some(RowDrawStep::Picture(y)) => picture::plan_preview_row(
+                Some(RowDrawPhase::Picture(y)) => picture::plan_preview_row(
                     screen,
                     &self.wanted,
                     &self.memory,
@@ -253,7 +254,7 @@ impl Painter {
     pub fn damage(&mut self, cells: Rect) {
         if let Some(screen) = &mut self.screen {
             screen.damage(cells);
-            self.requeue_draw_steps();
+            self.queue_all_draw_steps();
         }
     }
 
@@ -262,6 +263,6 @@ impl Painter {
         self.screen = None;
         self.memory.invalidate();
         self.rows.fill(RowProgress::default());
-        self.requeue_draw_steps();
+        self.queue_all_draw_steps();
     }
 }

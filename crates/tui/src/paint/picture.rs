@@ -5,8 +5,8 @@ use super::cost_model::RateDistortion;
 use super::cursor_moves::CellPosition;
 use super::fidelity::Fidelity;
 use super::row_optimizer::{DrawOp, PlannedRow, RowStart, TargetCell, plan_row};
-use super::screen::{ScreenModel, Stroke};
-use super::stable_cells::StableCells;
+use super::screen::{CellRun, ScreenModel};
+use super::stable_cells::FirstPreviewCells;
 use super::target_screen::TargetScreen;
 
 /// Average number of bytes per cell available for a first preview.
@@ -57,11 +57,11 @@ impl FirstPreviewByteBudget {
 pub(super) fn plan_preview_row(
     screen: &ScreenModel,
     wanted: &TargetScreen,
-    memory: &StableCells,
+    memory: &FirstPreviewCells,
     y: u16,
     can_repeat: bool,
     budget: &mut FirstPreviewByteBudget,
-) -> Vec<Stroke> {
+) -> Vec<CellRun> {
     let columns = wanted.picture.left()..wanted.picture.right();
     let targets: Vec<TargetCell> =
         columns.clone().map(|x| target_cell(screen, wanted, memory, CellPosition { x, y })).collect();
@@ -76,20 +76,20 @@ pub(super) fn plan_preview_row(
         Fidelity::Moving => plan_row(&targets, start, RateDistortion::MOVING),
         Fidelity::First => budget.plan_row_in_budget(&targets, start),
     };
-    let stroke = |op: DrawOp| Stroke::Mosaic {
+    let stroke = |op: DrawOp| CellRun::Mosaic {
         at: CellPosition { x: columns.start + op.column as u16, y },
         glyph: op.glyph,
         mosaic: op.mosaic,
         count: 1,
     };
-    let strokes: Vec<Stroke> = row.ops.into_iter().map(stroke).collect();
-    if can_repeat { Stroke::merge_repeated_blanks(&strokes) } else { strokes }
+    let strokes: Vec<CellRun> = row.ops.into_iter().map(stroke).collect();
+    if can_repeat { CellRun::merge_repeated_blanks(&strokes) } else { strokes }
 }
 
 fn target_cell(
     screen: &ScreenModel,
     wanted: &TargetScreen,
-    memory: &StableCells,
+    memory: &FirstPreviewCells,
     at: CellPosition,
 ) -> TargetCell {
     let shown = match screen.content(at) {

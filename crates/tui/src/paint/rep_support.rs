@@ -4,7 +4,7 @@ use crate::terminals::TerminalBrand;
 
 /// Whether the terminal supports REP (ECMA-48 8.3.103, repeat the preceding character), judging from
 /// environment variables. Many terminals set `TERM` to `xterm-256color`, but not all of them support REP.
-pub fn can_repeat(variable: impl Fn(&str) -> Option<String>) -> bool {
+pub fn terminal_supports_rep(variable: impl Fn(&str) -> Option<String>) -> bool {
     const TERMS: [&str; 8] =
         ["xterm-kitty", "alacritty", "foot", "xterm-ghostty", "wezterm", "contour", "tmux", "rio"];
     let get = |name: &str| variable(name).unwrap_or_default();
@@ -21,7 +21,7 @@ mod tests {
     #[test]
     fn rep_is_used_only_if_known_to_work() {
         let known = |variables: &[(&str, &str)]| {
-            can_repeat(|name| {
+            terminal_supports_rep(|name| {
                 variables.iter().find(|(n, _)| *n == name).map(|(_, value)| (*value).to_owned())
             })
         };

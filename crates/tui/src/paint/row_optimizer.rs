@@ -148,7 +148,7 @@ fn extend_plans(
     } else {
         color_candidates_for_cell_run(wanted, model)
     };
-    let changes = ColorChanges::new(&changes, mosaic, model);
+    let changes = CandidateColorChanges::new(&changes, mosaic, model);
     for (parent, path) in last.iter().enumerate() {
         changes.try_single_changes(parent, path, &mut beam);
     }
@@ -205,7 +205,7 @@ struct ColorChange {
 }
 
 /// Color changes to try for a cell.
-struct ColorChanges {
+struct CandidateColorChanges {
     mosaic: TwoColorCell,
     model: RateDistortion,
     all: Vec<ColorChange>,
@@ -214,7 +214,7 @@ struct ColorChanges {
     second: usize,
 }
 
-impl ColorChanges {
+impl CandidateColorChanges {
     fn new(candidates: &CandidateColors, mosaic: TwoColorCell, model: RateDistortion) -> Self {
         let CandidateColors { first, second, both } = candidates;
         let mut changes =
@@ -301,7 +301,12 @@ struct PlanExtension<'a> {
 }
 
 impl<'a> PlanExtension<'a> {
-    fn new(changes: &ColorChanges, parent: usize, path: &RowPrefixPlan, beam: &'a mut SearchBeam) -> Self {
+    fn new(
+        changes: &CandidateColorChanges,
+        parent: usize,
+        path: &RowPrefixPlan,
+        beam: &'a mut SearchBeam,
+    ) -> Self {
         let byte = changes.model.byte;
         let error = path.cost - path.bytes as f32 * byte;
         let bound = beam.pruning_cost_threshold();

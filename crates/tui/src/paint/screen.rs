@@ -18,7 +18,7 @@ pub(super) struct LimitedOutputSlice {
 
 /// A group of cells drawn with a single glyph.
 #[derive(Clone, Debug)]
-pub(super) enum Stroke {
+pub(super) enum CellRun {
     /// A character.
     Text { at: CellPosition, text: TextCell },
     /// Two colors drawn with the same glyph in `count` cells, using REP for more than one cell.
@@ -28,7 +28,7 @@ pub(super) enum Stroke {
     Erase { at: CellPosition, count: Option<u16> },
 }
 
-impl Stroke {
+impl CellRun {
     /// Position of the stroke's first cell.
     pub(super) fn position(&self) -> CellPosition {
         match self {
@@ -126,7 +126,7 @@ impl ScreenModel {
     /// Draws a stroke. Returns false and does nothing if it does not fit into the slice.
     pub(super) fn draw_stroke_if_output_fits(
         &mut self,
-        stroke: &Stroke,
+        stroke: &CellRun,
         links: &UrlTable,
         slice: &mut LimitedOutputSlice,
     ) -> bool {
@@ -141,11 +141,11 @@ impl ScreenModel {
         true
     }
 
-    fn encode_stroke(&mut self, stroke: &Stroke, links: &UrlTable, bytes: &mut Vec<u8>) {
+    fn encode_stroke(&mut self, stroke: &CellRun, links: &UrlTable, bytes: &mut Vec<u8>) {
         let (at, requirements) = match stroke {
-            Stroke::Text { at, text } => (at, text.pen.exact_requirements()),
-            Stroke::Mosaic { at, glyph, mosaic, .. } => (at, glyph.pen_requirements(mosaic.pair)),
-            Stroke::Erase { at, .. } => {
+            CellRun::Text { at, text } => (at, text.pen.exact_requirements()),
+            CellRun::Mosaic { at, glyph, mosaic, .. } => (at, glyph.pen_requirements(mosaic.pair)),
+            CellRun::Erase { at, .. } => {
                 (at, ForegroundParts::Blank.pen_requirements([TerminalColor::DefaultBackground; 2]))
             }
         };
@@ -156,37 +156,37 @@ impl ScreenModel {
         }
         self.pen.switch_to(&requirements, bytes);
         match stroke {
-            Stroke::Text { text, .. } => bytes.extend_from_slice(text.symbol.as_bytes()),
-            Stroke::Mosaic { glyph, mosaic, count, .. } => {
+            CellRun::Text { text, .. } => bytes.extend_from_slice(text.symbol.as_bytes()),
+            CellRun::Mosaic { glyph, mosaic, count, .. } => {
                 let symbol = glyph.symbol(mosaic.tile);
                 bytes.extend_from_slice(symbol.encode_utf8(&mut [0; 4]).as_bytes());
                 if *count > 1 {
                     bytes.extend(cursor_moves::csi_with_count(*count - 1, b'b'));
                 }
             }
-            Stroke::Erase { count: Some(count), .. } => {
+            CellRun::Erase { count: Some(count), .. } => {
                 bytes.extend(cursor_moves::csi_with_count(*count, b'X'));
             }
-            Stroke::Erase { count: None, .. } => bytes.extend_from_slice(b"\x1b[K"),
+            CellRun::Erase { count: None, .. } => bytes.extend_from_slice(b"\x1b[K"),
         }
     }
 
     /// Updates the cells and cursor after a stroke.
-    fn record_stroke(&mut self, stroke: &Stroke) {
+    fn record_stroke(&mut self, stroke: &CellRun) {
         match stroke {
-            Stroke::Text { at, text } => {
+            CellRun::Text { at, text } => {
                 self.store_cell(*at, CellContent::Text(text.clone()), text.columns);
                 // Terminals disagree about the width of other characters.
                 self.cursor =
                     if text.is_single_narrow_char() { self.position_after_columns(*at, 1) } else { None };
             }
-            Stroke::Mosaic { at, mosaic, count, .. } => {
+            CellRun::Mosaic { at, mosaic, count, .. } => {
                 for x in at.x..at.x + count {
                     self.store_cell(CellPosition { x, ..*at }, CellContent::Mosaic(*mosaic), 1);
                 }
                 self.cursor = self.position_after_columns(*at, *count);
             }
-            Stroke::Erase { at, count } => {
+            CellRun::Erase { at, count } => {
                 for x in at.x..count.map_or(self.columns, |count| at.x + count) {
                     self.store_cell(CellPosition { x, ..*at }, CellContent::BLANK, 1);
                 }

@@ -20,7 +20,7 @@ const MAX_NOISE: u8 = 12;
 
 /// Stores, for each cell, the first preview of the request whose result is on the screen.
 #[derive(Debug, Default)]
-pub(super) struct StableCells {
+pub(super) struct FirstPreviewCells {
     columns: usize,
     picture: Rect,
     /// For each cell, its content in the first preview of the request on the screen. `None` if unknown.
@@ -34,7 +34,7 @@ pub(super) struct StableCells {
     noise: u8,
 }
 
-impl StableCells {
+impl FirstPreviewCells {
     /// Marks the whole screen as unknown.
     pub(super) fn invalidate(&mut self) {
         self.firsts.fill(None);
@@ -81,7 +81,7 @@ impl StableCells {
         for y in wanted.picture.top()..wanted.picture.bottom() {
             for x in wanted.picture.left()..wanted.picture.right() {
                 if let (true, CellContent::Mosaic(shown), Some(wanted)) = (
-                    self.is_steady(CellPosition { x, y }),
+                    self.is_cell_unchanged_by_edit(CellPosition { x, y }),
                     screen.content(CellPosition { x, y }),
                     wanted.preview_cell(x, y),
                 ) {
@@ -107,13 +107,13 @@ impl StableCells {
     ) -> TwoColorCell {
         shown
             .filter(|shown| {
-                self.is_steady(at)
+                self.is_cell_unchanged_by_edit(at)
                     && (self.noise == u8::MAX || max_channel_difference(*shown, wanted) <= self.noise)
             })
             .unwrap_or(wanted)
     }
 
-    fn is_steady(&self, at: CellPosition) -> bool {
+    fn is_cell_unchanged_by_edit(&self, at: CellPosition) -> bool {
         self.steady.get(self.index(at)).copied().unwrap_or(false)
     }
 

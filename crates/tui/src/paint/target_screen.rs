@@ -122,7 +122,7 @@ impl TargetScreen {
     }
 
     /// The rows of the preview, from the middle outward.
-    pub(super) fn rows_from_the_middle(&self) -> impl Iterator<Item = u16> + use<> {
+    pub(super) fn rows_center_outward(&self) -> impl Iterator<Item = u16> + use<> {
         let (top, bottom) = (self.picture.top(), self.picture.bottom());
         let middle = top + (bottom - top) / 2;
         (0..=bottom - top).flat_map(move |away| {

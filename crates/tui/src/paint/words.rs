@@ -2,7 +2,7 @@
 
 use super::cell::{CellContent, ForegroundParts};
 use super::cursor_moves::{self, CellPosition};
-use super::screen::{ScreenModel, Stroke};
+use super::screen::{CellRun, ScreenModel};
 use super::target_screen::{ScreenRegion, TargetScreen};
 
 /// Minimum length of a run of blanks that is erased with one sequence.
@@ -17,7 +17,7 @@ pub(super) fn plan_text_row(
     wanted: &TargetScreen,
     y: u16,
     region: ScreenRegion,
-) -> Vec<Stroke> {
+) -> Vec<CellRun> {
     let mut strokes = Vec::new();
     for x in 0..wanted.columns {
         let at = CellPosition { x, y };
@@ -33,20 +33,20 @@ pub(super) fn plan_text_row(
     replace_blanks_with_erase(wanted, y, &strokes)
 }
 
-fn stroke_for_cell(at: CellPosition, look: &CellContent) -> Option<Stroke> {
+fn stroke_for_cell(at: CellPosition, look: &CellContent) -> Option<CellRun> {
     match look {
-        CellContent::Text(text) => Some(Stroke::Text { at, text: text.clone() }),
+        CellContent::Text(text) => Some(CellRun::Text { at, text: text.clone() }),
         CellContent::Mosaic(mosaic) => {
             let glyph = ForegroundParts::ALL.into_iter().find(|glyph| glyph.can_show_colors(mosaic.pair))?;
-            Some(Stroke::Mosaic { at, glyph, mosaic: *mosaic, count: 1 })
+            Some(CellRun::Mosaic { at, glyph, mosaic: *mosaic, count: 1 })
         }
         CellContent::Unknown | CellContent::Covered => None,
     }
 }
 
 /// Redraws the cells between the last stroke and `to` if this takes fewer bytes than moving the cursor.
-fn bridge_gap(screen: &ScreenModel, strokes: &mut Vec<Stroke>, to: CellPosition) {
-    let Some(Stroke::Text { at, text }) = strokes.last() else { return };
+fn bridge_gap(screen: &ScreenModel, strokes: &mut Vec<CellRun>, to: CellPosition) {
+    let Some(CellRun::Text { at, text }) = strokes.last() else { return };
     let first = at.x + text.columns;
     let jump = cursor_moves::csi_with_count(to.x - first, b'C').len();
     let (mut between, mut bytes) = (Vec::new(), 0);
@@ -55,13 +55,18 @@ fn bridge_gap(screen: &ScreenModel, strokes: &mut Vec<Stroke>, to: CellPosition)
         match screen.content(at) {
             CellContent::Text(other) if other.pen == text.pen && other.is_single_narrow_char() => {
                 bytes += other.symbol.len();
-                between.push(Stroke::Text { at, text: other.clone() });
+                between.push(CellRun::Text { at, text: other.clone() });
             }
             CellContent::Mosaic(mosaic)
                 if mosaic.pair == [text.pen.bg; 2] && text.pen.modifier.is_empty() =>
             {
                 bytes += 1;
-                between.push(Stroke::Mosaic { at, glyph: ForegroundParts::Blank, mosaic: *mosaic, count: 1 });
+                between.push(CellRun::Mosaic {
+                    at,
+                    glyph: ForegroundParts::Blank,
+                    mosaic: *mosaic,
+                    count: 1,
+                });
             }
             CellContent::Text(_) | CellContent::Mosaic(_) | CellContent::Unknown | CellContent::Covered => {
                 return;
@@ -75,7 +80,7 @@ fn bridge_gap(screen: &ScreenModel, strokes: &mut Vec<Stroke>, to: CellPosition)
 }
 
 /// Replaces long runs of blanks with erase sequences.
-fn replace_blanks_with_erase(wanted: &TargetScreen, y: u16, strokes: &[Stroke]) -> Vec<Stroke> {
+fn replace_blanks_with_erase(wanted: &TargetScreen, y: u16, strokes: &[CellRun]) -> Vec<CellRun> {
     let mut shorter = Vec::with_capacity(strokes.len());
     for run in strokes.chunk_by(|a, b| is_blank(a) && is_blank(b) && a.position().x + 1 == b.position().x) {
         let at = run[0].position();
@@ -86,9 +91,9 @@ fn replace_blanks_with_erase(wanted: &TargetScreen, y: u16, strokes: &[Stroke]) 
                 .iter()
                 .all(|look| *look == CellContent::BLANK);
         if is_blank(&run[0]) && is_last && run.len() >= ERASED_TO_END {
-            shorter.push(Stroke::Erase { at, count: None });
+            shorter.push(CellRun::Erase { at, count: None });
         } else if is_blank(&run[0]) && run.len() >= ERASED {
-            shorter.push(Stroke::Erase { at, count: Some(run.len() as u16) });
+            shorter.push(CellRun::Erase { at, count: Some(run.len() as u16) });
         } else {
             shorter.extend_from_slice(run);
         }
@@ -96,6 +101,6 @@ fn replace_blanks_with_erase(wanted: &TargetScreen, y: u16, strokes: &[Stroke]) 
     shorter
 }
 
-fn is_blank(stroke: &Stroke) -> bool {
-    matches!(stroke, Stroke::Mosaic { mosaic, count: 1, .. } if CellContent::Mosaic(*mosaic) == CellContent::BLANK)
+fn is_blank(stroke: &CellRun) -> bool {
+    matches!(stroke, CellRun::Mosaic { mosaic, count: 1, .. } if CellContent::Mosaic(*mosaic) == CellContent::BLANK)
 }

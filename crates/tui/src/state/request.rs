@@ -111,7 +111,7 @@ impl ImageProvenance {
     /// Determines the origin of an image that a later request reproduced. Usually keeps `self`, because the
     /// later changes had no effect, but returns `later` if a camera moved with keys has since been written to
     /// the scene.
-    pub(crate) fn or_later_if_camera_saved(&self, later: Self) -> Self {
+    pub(crate) fn for_reproduced_image(&self, later: Self) -> Self {
         if self.toggles.camera.has_changes() && !later.toggles.camera.has_changes() {
             return later;
         }
@@ -248,14 +248,14 @@ impl RequestState {
     }
 
     /// Overrides for the scene's own image. `None` unless keys have changed the displayed image.
-    pub(crate) fn overrides_for_scene_image(&self) -> Option<Box<Overrides>> {
+    pub(crate) fn overrides_without_keyboard_changes(&self) -> Option<Box<Overrides>> {
         (!self.has_no_keyboard_overrides()).then(|| Box::new(self.command_line.clone()))
     }
 
     /// Drops key changes that have been saved to the scene.
-    pub(crate) fn drop_saved_changes(&mut self) {
+    pub(crate) fn drop_overrides_saved_to_scene(&mut self) {
         let (shadows, integrator, photons) =
-            (self.base_shadows(), self.base_integrator(), self.base_photons_enabled());
+            (self.shadows_without_toggles(), self.integrator_without_toggles(), self.base_photons_enabled());
         let (exposure, own) = (self.command_line.exposure.or(self.exposure), self.camera);
         let KeyOverrides { camera, .. } = &mut self.toggles;
         camera.pose.take_if(|pose| own.is_some_and(|own| own.pose == *pose));
@@ -291,7 +291,7 @@ impl RequestState {
 
     /// Lists camera settings that changed in the scene file after the camera was moved with keys, with their
     /// current values.
-    pub(crate) fn describe_camera_conflicts(&self) -> Vec<String> {
+    pub(crate) fn describe_scene_camera_changes(&self) -> Vec<String> {
         let Some((own, moved)) = self.camera.zip(self.viewpoint()) else { return Vec::new() };
         let from = &self.moved_from;
         let of_pose = |key: &str, of: fn(&Pose) -> DVec3| {
@@ -341,13 +341,13 @@ impl RequestState {
     }
 
     /// Shadows set by the scene or the command line. `None` until a valid scene has been read.
-    pub(crate) fn base_shadows(&self) -> Option<ShadowMode> {
+    pub(crate) fn shadows_without_toggles(&self) -> Option<ShadowMode> {
         self.command_line.shadows.or(self.own.map(|own| own.shadows))
     }
 
     /// The current shadow type.
     pub(crate) fn shadow_mode(&self) -> ShadowMode {
-        self.toggles.shadows.or(self.base_shadows()).unwrap_or(ShadowMode::Soft)
+        self.toggles.shadows.or(self.shadows_without_toggles()).unwrap_or(ShadowMode::Soft)
     }
 
     /// Whether photons are enabled by the scene or the command line. `None` until a valid scene has been
@@ -362,13 +362,13 @@ impl RequestState {
     }
 
     /// Integrator set by the scene or the command line. `None` until a valid scene has been read.
-    pub(crate) fn base_integrator(&self) -> Option<Integrator> {
+    pub(crate) fn integrator_without_toggles(&self) -> Option<Integrator> {
         self.command_line.integrator.or(self.own.map(|own| own.integrator))
     }
 
     /// The current integrator.
     pub(crate) fn integrator(&self) -> Integrator {
-        self.toggles.integrator.or(self.base_integrator()).unwrap_or(Integrator::Whitted)
+        self.toggles.integrator.or(self.integrator_without_toggles()).unwrap_or(Integrator::Whitted)
     }
 
     /// The image's aspect ratio, or a typical value until it is known.

@@ -63,7 +63,7 @@ impl WrittenFile {
     }
 
     /// Describes the changes made with keys that the file includes.
-    pub(crate) fn describe_keyboard_changes(&self) -> Vec<String> {
+    pub(crate) fn describe_included_keyboard_changes(&self) -> Vec<String> {
         self.shows.unwrap_or_default().describe_changes_since(&KeyOverrides::default(), false)
     }
 }

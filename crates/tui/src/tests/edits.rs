@@ -6,7 +6,7 @@ use crate::event::{Event, PreviewSendReport};
 use crate::fixtures::*;
 use crate::messages;
 use crate::pipeline::protocol::{
-    self, CameraSaveResult, LastValidSceneOutcome, PreviewImageState, Stage, Status,
+    self, CameraSaveResult, LastValidSceneRenderOutcome, PreviewImageState, Stage, Status,
 };
 use crate::pipeline::settings::EffectiveSettings;
 use crate::scene::diagnostic::{Diagnostic, Severity};
@@ -160,12 +160,12 @@ fn show_preview(ui: &mut TestUi, name: &str, color: [u8; 3], is_finished: bool) 
 }
 
 /// Reports that the render of the last valid scene has ended.
-fn last_good(ui: &mut TestUi, end: LastValidSceneOutcome) {
+fn last_good(ui: &mut TestUi, end: LastValidSceneRenderOutcome) {
     let generation = ui.state.request.generation;
     ui.worker_event(protocol::Event::LastGoodEnded { generation, end });
 }
 
-const FINISHED: LastValidSceneOutcome = LastValidSceneOutcome::Finished { unchanged: false };
+const FINISHED: LastValidSceneRenderOutcome = LastValidSceneRenderOutcome::Finished { unchanged: false };
 
 /// Finishes a render, makes an edit, and saves a typo while the edit is being rendered.
 fn typo_during_a_render() -> TestUi {
@@ -222,7 +222,7 @@ fn render_of_last_valid_scene_is_counted_once() {
 #[test]
 fn stopped_render_of_last_valid_scene_is_marked() {
     let mut ui = typo_during_a_render();
-    last_good(&mut ui, LastValidSceneOutcome::Stopped);
+    last_good(&mut ui, LastValidSceneRenderOutcome::Stopped);
     assert!(ui.screen_text().contains(&format!("▸– {}:", messages::STOPPED)), "{}", ui.screen_text());
     assert_eq!(ui.state.work.renders, 1);
 }
@@ -236,7 +236,7 @@ fn render_of_last_valid_scene_is_numbered() {
     end(&mut ui, false, 1.0, 1.0);
     save_broken_scene(&mut ui);
     show_preview(&mut ui, "bright", RED, true);
-    last_good(&mut ui, LastValidSceneOutcome::Finished { unchanged: true });
+    last_good(&mut ui, LastValidSceneRenderOutcome::Finished { unchanged: true });
     assert_eq!((ui.state.picture.history.len(), ui.state.work.renders), (1, 1));
     for (run, name, words) in [(2, "hard", "shadows"), (3, "off", "shadows off")] {
         ui.press_character('s');

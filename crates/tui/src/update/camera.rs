@@ -124,7 +124,7 @@ pub(super) fn save_camera(state: &mut State) -> Vec<Effect> {
     if !state.request.toggles.camera.has_changes() && !is_set && !has_mesh_extension(&state.request.scene) {
         return show_notice_without_effects(state, messages::NOTHING_TO_KEEP);
     }
-    let saved = state.request.describe_camera_conflicts();
+    let saved = state.request.describe_scene_camera_changes();
     // Models do not contain a camera that could be overwritten.
     if !saved.is_empty() && !has_mesh_extension(&state.request.scene) {
         // The message below lists the saved values, so they cause no further conflict.

@@ -70,7 +70,7 @@ pub(super) fn toggle_render_before_edit(state: &mut State) -> Vec<Effect> {
     match state.picture.history.open_before_edit(newest) {
         Some(shown) => {
             let effects = show_older_render(state, shown);
-            let edits = state.picture.history.edits_since_viewed();
+            let edits = state.picture.history.describe_edits_since_viewed();
             let edits = if edits.is_empty() { edits } else { format!(", {edits}") };
             show_until_key(state, format!("{}{edits}", messages::BEFORE_EDIT));
             effects

@@ -99,13 +99,14 @@ fn setting_differs_from_base<T: PartialEq>(next: &T, base: Option<T>) -> bool {
 fn cycle_integrator(state: &mut State) -> Vec<Effect> {
     let (all, own) = (Integrator::ALL, state.request.integrator());
     let next = all.iter().skip_while(|one| **one != own).nth(1).or(all.first());
-    state.request.toggles.integrator =
-        next.copied().filter(|next| setting_differs_from_base(next, state.request.base_integrator()));
+    state.request.toggles.integrator = next
+        .copied()
+        .filter(|next| setting_differs_from_base(next, state.request.integrator_without_toggles()));
     request_render(state, false)
 }
 
 /// Returns the name of an integrator that supports a setting, or `None` if the current integrator does.
-fn suggest_supporting_integrator(
+fn supporting_integrator_if_needed(
     state: &State,
     supports: impl Fn(IntegratorProperties) -> bool,
 ) -> Option<&'static str> {
@@ -116,7 +117,7 @@ fn suggest_supporting_integrator(
 }
 
 fn cycle_shadows(state: &mut State) -> Vec<Effect> {
-    if let Some(other) = suggest_supporting_integrator(state, |method| method.honors_shadows) {
+    if let Some(other) = supporting_integrator_if_needed(state, |method| method.honors_shadows) {
         return show_notice_without_effects(
             state,
             &messages::hard_shadows_unsupported(state.request.integrator().name(), other),
@@ -128,7 +129,7 @@ fn cycle_shadows(state: &mut State) -> Vec<Effect> {
         ShadowMode::Off => ShadowMode::Soft,
     };
     state.request.toggles.shadows =
-        Some(next).filter(|next| setting_differs_from_base(next, state.request.base_shadows()));
+        Some(next).filter(|next| setting_differs_from_base(next, state.request.shadows_without_toggles()));
     request_render(state, false)
 }
 
@@ -149,7 +150,7 @@ fn toggle_depth_of_field(state: &mut State) -> Vec<Effect> {
 }
 
 fn toggle_photon_mapping(state: &mut State) -> Vec<Effect> {
-    if let Some(other) = suggest_supporting_integrator(state, |method| method.gathers) {
+    if let Some(other) = supporting_integrator_if_needed(state, |method| method.gathers) {
         return show_notice_without_effects(state, &messages::photons_unsupported(other));
     }
     let next = !state.request.are_photons_enabled();

@@ -98,7 +98,7 @@ fn handle_event(state: &mut State, event: Event) -> Vec<Effect> {
             worker::show_delayed_errors(state);
             Vec::new()
         }
-        Event::Output(change) => worker::handle_output_change(state, &change),
+        Event::Output(change) => worker::handle_external_output_change(state, &change),
         Event::Signal(signal) => vec![signal_effect(signal)],
         Event::Shown { generation } => {
             // The preview has been sent, so the history can be updated now.

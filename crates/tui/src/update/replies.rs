@@ -8,14 +8,14 @@ use crate::graphics::ImageProtocol;
 use crate::pixel_request::UnconfirmedImageProtocol;
 use crate::preview_kind::PreviewKind;
 use crate::state::State;
-use crate::terminal_replies::BlockGlyphs;
+use crate::terminal_replies::FinestNativeBlocks;
 use crate::terminal_replies::TerminalReply;
 use crate::terminals::TerminalId;
 use crate::view::ramp;
 
 /// Enables the capability that a reply confirms, if it was queried.
 pub(super) fn handle_reply(state: &mut State, answer: TerminalReply) -> Vec<Effect> {
-    let mut effects = check_pixel_support(state, answer);
+    let mut effects = enable_pixels_if_supported(state, answer);
     match answer {
         TerminalReply::Name(terminal) => effects.extend(handle_terminal_name(state, terminal)),
         TerminalReply::Focus { is_here } => state.display.has_focus = is_here,
@@ -74,7 +74,7 @@ fn requested_protocol_support(request: UnconfirmedImageProtocol, answer: Termina
 }
 
 /// Switches to pixels if a reply confirms that the terminal supports them.
-fn check_pixel_support(state: &mut State, answer: TerminalReply) -> Vec<Effect> {
+fn enable_pixels_if_supported(state: &mut State, answer: TerminalReply) -> Vec<Effect> {
     let Some(request) = state.display.pixels else { return Vec::new() };
     match requested_protocol_support(request, answer) {
         PixelSupport::Nothing => Vec::new(),
@@ -117,16 +117,16 @@ fn handle_terminal_name(state: &mut State, terminal: TerminalId) -> Vec<Effect> 
         state.dirty = true;
     }
     if ask.blocks {
-        effects.extend(use_block_glyphs(state, BlockGlyphs::supported_by(terminal)));
+        effects.extend(use_block_glyphs(state, FinestNativeBlocks::supported_by(terminal)));
     }
     effects
 }
 
-fn use_block_glyphs(state: &mut State, blocks: BlockGlyphs) -> Vec<Effect> {
+fn use_block_glyphs(state: &mut State, blocks: FinestNativeBlocks) -> Vec<Effect> {
     let kind = match blocks {
-        BlockGlyphs::Unknown => return Vec::new(),
-        BlockGlyphs::Sextants => PreviewKind::Sextant,
-        BlockGlyphs::Octants => PreviewKind::Octant,
+        FinestNativeBlocks::Unknown => return Vec::new(),
+        FinestNativeBlocks::Sextants => PreviewKind::Sextant,
+        FinestNativeBlocks::Octants => PreviewKind::Octant,
     };
     if state.display.kind == PreviewKind::HalfBlock {
         state.display.kind = kind;

@@ -47,7 +47,7 @@ pub(super) fn request_render(state: &mut State, force: bool) -> Vec<Effect> {
         } else {
             WriteRequirement::No
         },
-        own: state.request.overrides_for_scene_image(),
+        own: state.request.overrides_without_keyboard_changes(),
         saves: state.saving.edits,
         force,
         first: state.request.first_section,

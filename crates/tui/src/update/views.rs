@@ -54,7 +54,7 @@ pub(super) fn handle_search_key(state: &mut State, key: KeyPress) -> Option<Vec<
         }
         _ => return None,
     }
-    let found = find_view(&name);
+    let found = find_view_by_partial_name(&name);
     open_list_with_search_text(state, name);
     Some(found.map_or_else(Vec::new, |view| select_if_changed(state, view)))
 }
@@ -77,7 +77,7 @@ pub(super) fn select_view_and_open_list(state: &mut State, view: ViewMode) -> Ve
 }
 
 /// Finds the first view whose name starts with `name` or, failing that, contains it.
-fn find_view(name: &str) -> Option<ViewMode> {
+fn find_view_by_partial_name(name: &str) -> Option<ViewMode> {
     let begins = |view: &&ViewMode| view.name().starts_with(name);
     let has = |view: &&ViewMode| view.name().contains(name);
     let all = || ViewMode::ALL.iter().filter(|_| !name.is_empty());

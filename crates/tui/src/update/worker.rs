@@ -13,7 +13,7 @@ use crate::messages;
 use crate::noise_curve::NoiseCurve;
 use crate::options::OutputChange;
 use crate::pipeline::protocol::{
-    AssetProgress, CheckpointUpdate, Event, Failure, LastValidSceneOutcome, Report, SampleCounts,
+    AssetProgress, CheckpointUpdate, Event, Failure, LastValidSceneRenderOutcome, Report, SampleCounts,
     SavedSceneImageState, Stage, StageReport, Status,
 };
 use crate::scene::MOST_COMPARED_BYTES;
@@ -62,7 +62,7 @@ pub(super) fn handle_worker_event(state: &mut State, event: Event) -> Vec<Effect
         Event::Settings { settings, camera, exposure, own, .. } => {
             state.request.own = Some(own);
             (state.request.camera, state.request.exposure) = (Some(camera), Some(exposure));
-            state.request.drop_saved_changes();
+            state.request.drop_overrides_saved_to_scene();
             let pinhole = state.request.combined_overrides().dof == Some(true) && !settings.dof;
             state.request.effective = Some(*settings);
             clear_problems(state);
@@ -143,7 +143,7 @@ pub(super) fn handle_worker_event(state: &mut State, event: Event) -> Vec<Effect
             | CheckpointUpdate::Absent { .. }
             | CheckpointUpdate::Ignored { .. } => {}
         },
-        Event::Refused { conflicts, .. } => report_output_conflicts(state, conflicts),
+        Event::Refused { conflicts, .. } => show_write_conflicts(state, conflicts),
         Event::Text { text, .. } => state.request.text = (text.len() <= MOST_COMPARED_BYTES).then_some(text),
         Event::WritePostponed { .. } => {
             show_notice(state, messages::WRITE_POSTPONED);
@@ -337,7 +337,7 @@ fn set_written_file_descriptions(state: &mut State, generation: u64, report: &Re
 }
 
 /// Handles another program's change to an output file.
-pub(super) fn handle_output_change(
+pub(super) fn handle_external_output_change(
     state: &mut State,
     OutputChange { path, lost }: &OutputChange,
 ) -> Vec<Effect> {
@@ -352,7 +352,7 @@ pub(super) fn handle_output_change(
 }
 
 /// Shows new conflicts immediately. If the user has closed the pane, only new conflicts reopen it.
-fn report_output_conflicts(state: &mut State, conflicts: Vec<Diagnostic>) {
+fn show_write_conflicts(state: &mut State, conflicts: Vec<Diagnostic>) {
     state.saving.is_write_requested = false;
     state.saving.unwritten = Some(messages::NOT_WRITTEN.to_owned());
     show_notice(state, messages::NOT_WRITTEN);
@@ -470,7 +470,7 @@ fn handle_failure(state: &mut State, failure: Failure) {
     state.saving.change = None;
     match failure {
         // The last valid scene is being rendered.
-        Failure::Scene(_) => state.picture.history.discard_invalid_edits(),
+        Failure::Scene(_) => state.picture.history.discard_edits_of_invalid_scene(),
         Failure::Work(_) => state.work.rendering = RenderState::Stopped,
     }
     match failure {
@@ -487,14 +487,14 @@ fn handle_failure(state: &mut State, failure: Failure) {
 
 /// Handles the end of a render of the last valid scene. Such a render continues while the scene file is
 /// broken.
-fn handle_last_valid_render_end(state: &mut State, end: LastValidSceneOutcome) {
+fn handle_last_valid_render_end(state: &mut State, end: LastValidSceneRenderOutcome) {
     match end {
-        LastValidSceneOutcome::Finished { unchanged } => {
+        LastValidSceneRenderOutcome::Finished { unchanged } => {
             state.work.rendering = RenderState::Finished;
             history::record_image(state);
             count_finished_render(state, unchanged);
         }
-        LastValidSceneOutcome::Stopped => state.work.rendering = RenderState::Stopped,
+        LastValidSceneRenderOutcome::Stopped => state.work.rendering = RenderState::Stopped,
     }
 }
 

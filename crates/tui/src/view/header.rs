@@ -129,7 +129,7 @@ fn draw_scene_info(state: &State, area: Rect, buffer: &mut Buffer) {
 
 /// The view and its range of values. Empty for the beauty view.
 fn view_label(state: &State) -> String {
-    let open = state.picture.history.viewed_provenance();
+    let open = state.picture.history.viewed_older_provenance();
     let of_open = open.map(|origin| origin.toggles.view.unwrap_or_else(|| state.request.base_view_mode()));
     let view = of_open.unwrap_or_else(|| state.request.view_mode());
     if view == ViewMode::Beauty {
@@ -163,7 +163,7 @@ fn actual_pixels_label(state: &State) -> String {
 fn progress_or_result_variants(state: &State) -> Vec<String> {
     if let Some((run, time)) = state.picture.history.viewed_render_number_and_time() {
         let is_unfinished =
-            state.picture.history.viewed_provenance().is_some_and(|origin| origin.is_unfinished);
+            state.picture.history.viewed_older_provenance().is_some_and(|origin| origin.is_unfinished);
         let (place, words) = match run {
             Some(run) => {
                 let place = format!("{run} of {}", newest_render_number(state));

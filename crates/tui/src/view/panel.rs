@@ -99,7 +99,7 @@ fn panel_lines(state: &State, (width, column): (u16, u16), is_in_full: bool) -> 
     }
     lines.extend(wrapped_save_scene_hint(state, column));
     // Progress bars are last because they appear and disappear.
-    lines.extend(state.work.assets.iter().map(|asset| asset_line(state, asset, width)));
+    lines.extend(state.work.assets.iter().map(|asset| asset_progress_line(state, asset, width)));
     lines
 }
 
@@ -128,7 +128,7 @@ fn is_scene_broken(state: &State) -> bool {
     is_at_rest && state.overlays.problems.as_ref().is_none_or(|problems| problems.work.is_none())
 }
 
-fn asset_line(state: &State, asset: &AssetProgressBar, width: u16) -> StyledLine {
+fn asset_progress_line(state: &State, asset: &AssetProgressBar, width: u16) -> StyledLine {
     let fraction = stages::loaded_fraction(asset);
     let (filled_squares, empty) = progress_bar_parts(fraction, BAR, state.display.kind == PreviewKind::Ascii);
     let percent = format!(" {:3} %", floor_percent(fraction));

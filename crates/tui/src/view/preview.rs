@@ -44,7 +44,7 @@ pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) {
 }
 
 /// Draws the thumbnail of a history entry.
-pub(super) fn draw_thumbnail(state: &State, picture: &Srgb8Image, area: Rect, buffer: &mut Buffer) {
+pub(super) fn draw_history_thumbnail(state: &State, picture: &Srgb8Image, area: Rect, buffer: &mut Buffer) {
     let area = area.intersection(buffer.area);
     if !area.is_empty() {
         let kind = cell_based_kind(state.display.kind, state.display.depth);
@@ -216,7 +216,7 @@ impl PreviewPlacement {
             None if kind == PreviewKind::None => {}
             None => {
                 let ramp = AsciiRamp::for_picture(picture, inks.is_light);
-                each(&|x, y, cell| draw_character_cell(&scaled, ramp, inks, (x, y), cell));
+                each(&|x, y, cell| draw_ascii_cell(&scaled, ramp, inks, (x, y), cell));
             }
         }
     }
@@ -260,7 +260,7 @@ fn draw_two_color_cell(
 }
 
 /// Draws a cell as a character.
-fn draw_character_cell(
+fn draw_ascii_cell(
     scaled: &ScaledImage<'_>,
     ramp: AsciiRamp,
     inks: PreviewColors<'_>,

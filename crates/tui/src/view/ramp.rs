@@ -55,13 +55,15 @@ impl AsciiRamp {
     }
 
     /// Maps an sRGB brightness from the ramp's range to [0, 1].
-    fn stretch(self, brightness: f32) -> f32 {
+    fn normalized_brightness(self, brightness: f32) -> f32 {
         ((brightness - self.low) / (self.high - self.low).max(1e-3)).clamp(0.0, 1.0)
     }
 
     /// The character for a color on a monochrome terminal.
     pub(super) fn glyph(self, rgb: [u8; 3]) -> char {
-        self.nearest_glyph(self.stretch(linear_to_srgb(luminance(srgb8_to_linear(rgb)).clamp(0.0, 1.0))))
+        self.nearest_glyph(
+            self.normalized_brightness(linear_to_srgb(luminance(srgb8_to_linear(rgb)).clamp(0.0, 1.0))),
+        )
     }
 
     /// Returns the character that shows a color, and its ink color. The ink is as saturated as possible,
@@ -70,12 +72,12 @@ impl AsciiRamp {
         let linear = srgb8_to_linear(rgb);
         if self.is_light {
             let ink = (1.0 - linear.min_element()).max(1e-3);
-            let brightness = self.stretch(linear_to_srgb(1.0 - ink));
+            let brightness = self.normalized_brightness(linear_to_srgb(1.0 - ink));
             (self.nearest_glyph(brightness), quantize_to_5_bits(Vec3::ONE - (Vec3::ONE - linear) / ink))
         } else {
             let brightest = linear.max_element().max(1e-3);
             (
-                self.nearest_glyph(self.stretch(linear_to_srgb(brightest))),
+                self.nearest_glyph(self.normalized_brightness(linear_to_srgb(brightest))),
                 quantize_to_5_bits(linear / brightest),
             )
         }

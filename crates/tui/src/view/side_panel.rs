@@ -48,7 +48,7 @@ fn curve_and_history_area(state: &State, panel: Rect, lines: u16) -> Rect {
 
 /// Draws the curve and the history strip if they fit. Returns the cells used.
 pub(super) fn draw(state: &State, panel: Rect, lines: u16, buffer: &mut Buffer) -> Rect {
-    let (curve, strip) = divide_curve_and_strip(state, panel, lines);
+    let (curve, strip) = divide_chart_and_history_strip(state, panel, lines);
     curve::draw_noise_chart(state, curve, buffer);
     strip::draw_history_strip(state, strip, buffer);
     // Skip empty areas, since their origin would extend the union.
@@ -57,13 +57,13 @@ pub(super) fn draw(state: &State, panel: Rect, lines: u16, buffer: &mut Buffer) 
 
 /// Returns the index of the history entry shown at a cell in the history strip.
 pub(super) fn history_entry_at(state: &State, panel: Rect, lines: u16, place: (u16, u16)) -> Option<usize> {
-    let (_, strip) = divide_curve_and_strip(state, panel, lines);
+    let (_, strip) = divide_chart_and_history_strip(state, panel, lines);
     strip::entry_at(state, strip, place)
 }
 
 /// Divides the area between the curve and the strip. The strip is placed at the bottom so that it does not
 /// move when the results change.
-fn divide_curve_and_strip(state: &State, panel: Rect, lines: u16) -> (Rect, Rect) {
+fn divide_chart_and_history_strip(state: &State, panel: Rect, lines: u16) -> (Rect, Rect) {
     let area = curve_and_history_area(state, panel, lines);
     let is_over = state.work.activity == WorkerActivity::Done && !state.picture.history.is_viewing_older();
     let wants_curve = |area| is_over && curve::chart_height(state, area).is_some();

@@ -242,7 +242,7 @@ pub(crate) fn unsaved_image_messages(state: &State) -> Vec<String> {
         let words = |file: &WrittenFile| {
             messages::written_image_differs(
                 &file.escaped_path(),
-                &file.describe_keyboard_changes().join(", "),
+                &file.describe_included_keyboard_changes().join(", "),
             )
         };
         return by_hand.map(words).into_iter().collect();
@@ -257,7 +257,7 @@ pub(crate) fn unsaved_image_messages(state: &State) -> Vec<String> {
     let other = match (saving.own, by_hand, image_name) {
         (_, Some(file), _) => Some(messages::image_written_with_changes(
             &file.escaped_path(),
-            &file.describe_keyboard_changes().join(", "),
+            &file.describe_included_keyboard_changes().join(", "),
         )),
         (SceneImageProgress { state: SavedSceneImageState::Written, .. }, None, _) | (_, None, None) => None,
         (SceneImageProgress { state: SavedSceneImageState::Begun { .. }, fraction }, None, Some(name)) => {

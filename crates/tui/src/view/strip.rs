@@ -73,7 +73,7 @@ fn draw_entry(
     let Some(picture) = history.thumbnail(*index) else { return };
     let place = Rect { height: rows.picture, ..*cells };
     let place = Rect { width: thumbnail_width(state, picture, place), ..place };
-    preview::draw_thumbnail(state, picture, place, buffer);
+    preview::draw_history_thumbnail(state, picture, place, buffer);
     let is_looked_at = history.shown_index() == Some(*index);
     let (mark, tone) = if is_looked_at { ("▸", TextRole::Strong) } else { (" ", TextRole::Plain) };
     // The text next to the thumbnail starts at the same column with or without a mark.
@@ -102,7 +102,8 @@ fn render_number_label(state: &State, index: usize) -> String {
 
 /// Whether an entry's render is still running.
 fn is_entry_rendering(state: &State, index: usize) -> bool {
-    state.work.is_rendering() && state.picture.history.belongs_to_request(index, state.request.generation)
+    state.work.is_rendering()
+        && state.picture.history.entry_belongs_to_request(index, state.request.generation)
 }
 
 /// Computes a thumbnail's width from its height, leaving space for text.

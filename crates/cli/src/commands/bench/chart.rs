@@ -70,10 +70,10 @@ impl ConvergenceChart {
         if self.methods.is_empty() || size.0 < MIN_SIZE.0 || size.1 < MIN_SIZE.1 {
             return String::new();
         }
-        buffer_to_text_lines(&self.draw(size), is_colored)
+        buffer_to_text_lines(&self.draw_to_buffer(size), is_colored)
     }
 
-    fn draw(&self, (columns, rows): (u16, u16)) -> Buffer {
+    fn draw_to_buffer(&self, (columns, rows): (u16, u16)) -> Buffer {
         let points: Vec<Vec<(f64, f64)>> = self.methods.iter().map(MethodCurve::log_points).collect();
         let styles = MARKERS.iter().cycle().zip(COLORS.iter().cycle());
         let lines = self.methods.iter().zip(&points).zip(styles);
@@ -123,7 +123,7 @@ pub(super) fn print_charts(results: &Results, console: &Console) {
     for scene in &results.scenes {
         console.print_line(&format!("{}: relMSE over seconds (log–log)", scene.scene));
         console.print_trusted_text(&buffer_to_text_lines(
-            &ConvergenceChart::from_scene(scene).draw((columns, ROWS)),
+            &ConvergenceChart::from_scene(scene).draw_to_buffer((columns, ROWS)),
             console.is_colored(),
         ));
     }
@@ -174,7 +174,7 @@ mod tests {
 
     #[test]
     fn charts_have_lines_names_and_labels() {
-        let buffer = ConvergenceChart::from_scene(&scene()).draw((60, ROWS));
+        let buffer = ConvergenceChart::from_scene(&scene()).draw_to_buffer((60, ROWS));
         let plain = buffer_to_text_lines(&buffer, false);
         assert!(plain.chars().any(|c| ('\u{2801}'..='\u{28ff}').contains(&c)), "{plain}");
         assert!(plain.contains("o path") && plain.contains("201 ms") && plain.contains("1e-1"), "{plain}");
@@ -190,7 +190,8 @@ mod tests {
         let mut empty = scene();
         empty.methods.clear();
         assert!(
-            !buffer_to_text_lines(&ConvergenceChart::from_scene(&empty).draw((30, ROWS)), true).is_empty()
+            !buffer_to_text_lines(&ConvergenceChart::from_scene(&empty).draw_to_buffer((30, ROWS)), true)
+                .is_empty()
         );
     }
 

@@ -26,9 +26,9 @@ pub(super) fn render_images(args: &CompareArgs, pair: &Pair, measured: &PairMeas
     if !is_wanted {
         return String::new();
     }
-    let (difference, description) = flip_or_difference_with_label(pair, measured);
+    let (difference, description) = flip_or_difference_image_and_label(pair, measured);
     let pictures = [
-        tone_mapped(&file_name_or_path(&args.a), pair.a()),
+        tone_mapped(&file_name_or_path(&args.a), pair.measured_image()),
         tone_mapped(&format!("{}, the reference", file_name_or_path(&args.b)), pair.reference()),
         tone_mapped(&description, &difference),
     ];
@@ -54,7 +54,7 @@ fn tone_mapped(name: &str, image: &RadianceImage) -> NamedImage {
 }
 
 /// Returns FLIP in false color, or |a - b| scaled to its maximum if FLIP is too small to see.
-fn flip_or_difference_with_label(pair: &Pair, measured: &PairMeasurements) -> (RadianceImage, String) {
+fn flip_or_difference_image_and_label(pair: &Pair, measured: &PairMeasurements) -> (RadianceImage, String) {
     let errors = &measured.errors;
     if errors.max == 0.0 || measured.flip.iter().any(|error| *error >= MIN_VISIBLE_FLIP) {
         return (compare::flip_heat_map(pair, &measured.flip), "FLIP".to_owned());
@@ -74,7 +74,7 @@ mod tests {
         let image =
             |value| RadianceImage { width: 2, height: 1, pixels: vec![Vec3::splat(0.5), Vec3::splat(value)] };
         let pair = Pair::new([Path::new("a"), Path::new("b")], image(0.5), image(b)).expect("a pair");
-        flip_or_difference_with_label(&pair, &compare::measure(&pair))
+        flip_or_difference_image_and_label(&pair, &compare::measure(&pair))
     }
 
     #[test]

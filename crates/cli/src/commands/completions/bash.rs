@@ -37,9 +37,9 @@ fi
 
 /// The bash adapter. The script passes the line up to the cursor, and separately its trailing part, which
 /// candidates replace.
-pub(super) struct BashCompleter;
+pub(super) struct BashCompletionAdapter;
 
-impl EnvCompleter for BashCompleter {
+impl EnvCompleter for BashCompletionAdapter {
     fn name(&self) -> &'static str {
         "bash"
     }

@@ -13,7 +13,7 @@ use crate::scene::outline::OutlineKey;
 pub(super) fn document_colors(document: &OpenDocument) -> Value {
     let mut found = Vec::new();
     for table in &document.tables {
-        let known = table.known_keys();
+        let known = table.keys_allowed_for_type();
         for key in &table.keys {
             let kind = known.iter().find(|info| info.name == key.name.text).map(|info| info.kind);
             let is_color = matches!(

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use lsp_types::{Position, Range as Span};
 
-use crate::scene::outline::{OutlineTable, outline};
+use crate::scene::outline::{OutlineTable, document_outline};
 
 /// A document opened by the client.
 #[derive(Clone, Debug)]
@@ -23,7 +23,7 @@ impl OpenDocument {
     pub(super) fn new(path: PathBuf, version: i32, text: String) -> Self {
         let starts = text.match_indices('\n').map(|(at, _)| at + 1);
         let lines = std::iter::once(0).chain(starts).collect();
-        Self { path, version, tables: outline(&text), lines, text }
+        Self { path, version, tables: document_outline(&text), lines, text }
     }
 
     /// Returns the byte offset of a position, clamped to the end of its line.

@@ -35,7 +35,7 @@ pub(super) fn hover(document: &OpenDocument, offset: usize) -> Option<Value> {
     let KeyAtCursor { table, outer, key } = key_at(document, offset)?;
     let name = key.name.text.as_str();
     let text = if std::ptr::eq(key, outer) {
-        match table.known_keys().into_iter().find(|one| one.name == name) {
+        match table.keys_allowed_for_type().into_iter().find(|one| one.name == name) {
             Some(info) => format!("**{name}**: {}\n\n{}", info.kind_text(), describe_key(info)),
             None if name == "type" => {
                 let types =
@@ -87,7 +87,12 @@ pub(super) fn texture_reference_keys() -> [(&'static str, &'static str); 3] {
 pub(super) fn definition(document: &OpenDocument, offset: usize) -> Option<Value> {
     let KeyAtCursor { table, outer, key } = key_at(document, offset)?;
     let group = if std::ptr::eq(key, outer) {
-        table.known_keys().into_iter().find(|one| one.name == key.name.text)?.kind.defining_table()?
+        table
+            .keys_allowed_for_type()
+            .into_iter()
+            .find(|one| one.name == key.name.text)?
+            .kind
+            .defining_table()?
     } else if key.name.text == "texture" {
         "textures"
     } else {

@@ -37,7 +37,7 @@ impl<'a> RenderInputFiles<'a> {
     ///
     /// # Errors
     /// Returns [`Cancelled`] if the token is cancelled.
-    pub(super) fn reason_to_keep(&self, path: &Path) -> Result<Option<String>, Cancelled> {
+    pub(super) fn reason_not_to_overwrite(&self, path: &Path) -> Result<Option<String>, Cancelled> {
         let find = |files: &BTreeSet<PathBuf>| {
             let input = files.iter().find(|input| is_same_file(input, path))?;
             // Relative to the working directory.

@@ -101,7 +101,7 @@ fn has_alternative_key(key: &KeyInfo) -> bool {
 /// Returns the schema for a key's value, with the key's description and default.
 fn key_schema(key: &KeyInfo, draft: SchemaDraft) -> Value {
     let mut schema = value_schema(key.kind, draft);
-    schema["description"] = description(key).into();
+    schema["description"] = key_description_markdown(key).into();
     if let DefaultValue::Is(default) = key.default
         && let Ok(default) = serde_json::from_str(default)
     {
@@ -111,7 +111,7 @@ fn key_schema(key: &KeyInfo, draft: SchemaDraft) -> Value {
 }
 
 /// Returns a key's description, unit, range and default as Markdown.
-fn description(key: &KeyInfo) -> String {
+fn key_description_markdown(key: &KeyInfo) -> String {
     let named =
         |name: &str, text: String| if text.is_empty() { text } else { format!("\n\n{name}: {text}.") };
     let default = match key.default {
@@ -187,8 +187,10 @@ fn shared_key_schema(keys: &[(&'static TableTypeInfo, &'static KeyInfo)]) -> Val
         [one] => one.clone(),
         _ => json!({ "anyOf": values }),
     };
-    let docs: Vec<String> =
-        keys.iter().map(|(kind, key)| format!("`{}`: {}", kind.name, description(key))).collect();
+    let docs: Vec<String> = keys
+        .iter()
+        .map(|(kind, key)| format!("`{}`: {}", kind.name, key_description_markdown(key)))
+        .collect();
     schema["description"] = docs.join("\n\n").into();
     schema
 }

@@ -293,13 +293,13 @@ pub(super) struct JsonTexture {
 #[serde(default)]
 pub(super) struct TextureExtensions {
     #[serde(rename = "EXT_texture_webp")]
-    pub(super) webp: Option<TextureSource>,
+    pub(super) webp: Option<TextureSourceExtension>,
     #[serde(rename = "KHR_texture_basisu")]
     pub(super) basis: Option<IgnoredAny>,
 }
 
 #[derive(Debug, Deserialize)]
-pub(super) struct TextureSource {
+pub(super) struct TextureSourceExtension {
     pub(super) source: usize,
 }
 

@@ -158,7 +158,7 @@ impl GltfFile {
             first_part_with_same_mesh: Vec::new(),
         };
         container.first_part_with_same_mesh = container.map_duplicate_parts().map_err(wrong)?;
-        monitor.report_progress(2 * length, 2 * length)?;
+        monitor.report_and_check_cancel(2 * length, 2 * length)?;
         Ok(container)
     }
 
@@ -371,10 +371,10 @@ const DRACO: &str = "KHR_draco_mesh_compression";
 /// objects where glTF 2.0 uses arrays.
 fn pre_2_0_version(text: &[u8]) -> Option<String> {
     #[derive(serde::Deserialize)]
-    struct OldGltfVersion {
+    struct AssetOnlyRoot {
         asset: json::JsonAsset,
     }
-    let OldGltfVersion { asset } = serde_json::from_slice(text).ok()?;
+    let AssetOnlyRoot { asset } = serde_json::from_slice(text).ok()?;
     let is_old = asset.version.starts_with("1.") || asset.version.starts_with("0.");
     is_old.then_some(asset.version)
 }

@@ -315,7 +315,7 @@ impl SceneWalk<'_> {
                         GltfError::new("expected a matrix").add_location(format!("accessors[{accessor}]"))
                     );
                 }
-                from_columns(numbers.element_floats::<16>(0, 0.0).map(f64::from))
+                affine_from_column_major(numbers.element_floats::<16>(0, 0.0).map(f64::from))
             }
             None => AffineMap::IDENTITY,
         };
@@ -469,7 +469,7 @@ fn is_invertible(linear: &DMat3) -> bool {
 /// Transform of a node relative to its parent.
 fn local_transform(node: &JsonNode) -> AffineMap {
     if let Some(matrix) = node.matrix {
-        return from_columns(matrix);
+        return affine_from_column_major(matrix);
     }
     let [x, y, z, w] = node.rotation.unwrap_or([0.0, 0.0, 0.0, 1.0]);
     let length = (x * x + y * y + z * z + w * w).sqrt();
@@ -489,7 +489,7 @@ fn local_transform(node: &JsonNode) -> AffineMap {
 }
 
 /// Affine transform from a column-major 4 × 4 matrix.
-fn from_columns(matrix: [f64; 16]) -> AffineMap {
+fn affine_from_column_major(matrix: [f64; 16]) -> AffineMap {
     let column = |first: usize| DVec3::new(matrix[first], matrix[first + 1], matrix[first + 2]);
     AffineMap { linear: DMat3::from_cols(column(0), column(4), column(8)), translate: column(12) }
 }

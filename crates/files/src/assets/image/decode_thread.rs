@@ -75,7 +75,7 @@ fn wait_for_result<T>(
 ) -> Result<Option<T>, Cancelled> {
     loop {
         match reports.recv_timeout(POLL) {
-            Ok(done) => monitor.report_progress(done as usize, total as usize)?,
+            Ok(done) => monitor.report_and_check_cancel(done as usize, total as usize)?,
             Err(RecvTimeoutError::Timeout) => monitor.token.check_pause_and_cancel()?,
             // The decoder has dropped its reporter, so it has read everything.
             Err(RecvTimeoutError::Disconnected) => break,

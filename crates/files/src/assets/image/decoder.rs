@@ -18,7 +18,7 @@ use super::{ImageEncoding, ImageLimits, tga};
 use super::{empty_image_message, implausible_size_message, memory_limit_message, side_too_long_message};
 
 /// A decoder, with metadata that the decoder itself does not apply.
-pub(super) struct OpenedImage {
+pub(super) struct ImageDecoderWithMetadata {
     pub(super) decoder: Box<dyn ImageDecoder>,
     pub(super) metadata: ImageMetadata,
     /// Size of the texels in bytes.
@@ -141,7 +141,7 @@ pub(super) fn max_decompression_ratio(format: Option<ImageFormat>) -> u64 {
 /// Checks an image's size before memory is allocated, and returns the size of its texels. `held_bytes` is the
 /// size of the file data kept by the decoder. `in_memory` is the size of the in-memory copy of the file,
 /// which is freed before the texels are complete.
-pub(super) fn check_limits_and_texel_bytes(
+pub(super) fn texel_bytes_within_limits(
     decoder: &dyn ImageDecoder,
     texel_bytes: u64,
     [length, held_bytes, in_memory]: [u64; 3],

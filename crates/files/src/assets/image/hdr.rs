@@ -83,7 +83,7 @@ struct HdrHeader {
 
 impl HdrHeader {
     fn read(file: &mut impl BufRead) -> ImageResult<Self> {
-        let mut lines = HeaderLines { file, number: 0, line: Vec::new() };
+        let mut lines = HeaderLineReader { file, number: 0, line: Vec::new() };
         let first = lines.next()?;
         if !first.as_bytes().starts_with(MAGIC) {
             return Err(decoding_error("expected #? at the start".to_owned()));
@@ -105,13 +105,13 @@ impl HdrHeader {
 }
 
 /// Reads header lines with any line endings.
-struct HeaderLines<'a, R> {
+struct HeaderLineReader<'a, R> {
     file: &'a mut R,
     number: usize,
     line: Vec<u8>,
 }
 
-impl<R: BufRead> HeaderLines<'_, R> {
+impl<R: BufRead> HeaderLineReader<'_, R> {
     fn next(&mut self) -> ImageResult<String> {
         self.line.clear();
         let got = self.file.read_until(b'\n', &mut self.line).map_err(ImageError::IoError)?;
@@ -290,9 +290,9 @@ fn read_scanline(file: &mut impl Read, count: usize, pixels: &mut Vec<[u8; 4]>) 
     const RUNS: std::ops::RangeInclusive<usize> = 8..=0x7fff;
     pixels.clear();
     let first = read_pixel(file)?;
-    let [2, 2, high, low] = first else { return read_flat_scanline(file, first, count, pixels) };
+    let [2, 2, high, low] = first else { return read_old_rle_scanline(file, first, count, pixels) };
     if !RUNS.contains(&count) || high > 0x7f {
-        return read_flat_scanline(file, first, count, pixels);
+        return read_old_rle_scanline(file, first, count, pixels);
     }
     if usize::from(u16::from_be_bytes([high, low])) != count {
         return Err(decoding_error(WRONG_LENGTH.to_owned()));
@@ -323,7 +323,7 @@ fn read_run_length_channel(file: &mut impl Read, channel: usize, pixels: &mut [[
 }
 
 /// Reads a scanline stored pixel by pixel. The value (1, 1, 1, n) repeats the previous pixel.
-fn read_flat_scanline(
+fn read_old_rle_scanline(
     file: &mut impl Read,
     first: [u8; 4],
     count: usize,

@@ -34,8 +34,8 @@ use crate::system::describe_error;
 use counting_reader::ProgressReader;
 use decode_thread::ProgressReporter;
 use decoder::{
-    OpenedImage, bytes_per_texel, check_limits_and_texel_bytes, create_decoder, max_decompression_ratio,
-    orientation,
+    ImageDecoderWithMetadata, bytes_per_texel, create_decoder, max_decompression_ratio, orientation,
+    texel_bytes_within_limits,
 };
 use metadata::{ImageMetadata, ImageWarning};
 use pfm::PfmDecoder;
@@ -182,7 +182,7 @@ pub fn load_hashed(
     progress: Progress<'_>,
     token: &CancelToken,
 ) -> Result<(LoadedImage, FileHash), AssetError> {
-    let (source, hash) = OpenImage::read_hashed(path, encoding, limits, token)?;
+    let (source, hash) = OpenImage::open_in_memory_and_hash(path, encoding, limits, token)?;
     Ok((decode_source(source, encoding, Monitor { progress, token })?, hash))
 }
 
@@ -192,7 +192,7 @@ fn decode_source(
     monitor: Monitor<'_>,
 ) -> Result<LoadedImage, AssetError> {
     let (path, length) = (file.path.clone(), file.length as usize);
-    monitor.report_progress(0, length)?;
+    monitor.report_and_check_cancel(0, length)?;
     let (texels, warnings) = file.decode_on_thread(monitor, move |file, report| {
         let (image, mut metadata) = file.decode(encoding, report)?;
         if let Some(words) = convert::constant_alpha_warning(&image, encoding, &metadata) {
@@ -200,7 +200,7 @@ fn decode_source(
         }
         Ok((convert::texels(image, encoding, &metadata), metadata.warnings))
     })?;
-    monitor.report_progress(length, length)?;
+    monitor.report_and_check_cancel(length, length)?;
     let warning = |ImageWarning { line, words }| {
         let line = line.map_or(String::new(), |line| format!(":{line}"));
         format!("{}{line}: {words}", path.display())
@@ -231,7 +231,7 @@ fn source_size_and_decoded_bytes(
     monitor: Monitor<'_>,
 ) -> Result<(u32, u32, u64), AssetError> {
     file.decode_on_thread(monitor, move |file, report| {
-        let OpenedImage { decoder, texel_bytes, .. } = file.open_decoder(encoding, report)?;
+        let ImageDecoderWithMetadata { decoder, texel_bytes, .. } = file.open_decoder(encoding, report)?;
         let (width, height) = decoder.dimensions();
         Ok((width, height, texel_bytes))
     })
@@ -284,7 +284,7 @@ pub fn read_embedded_dimensions(
 pub fn mipmaps(texels: &Texels, token: &CancelToken) -> Result<Mipmaps, Cancelled> {
     Mipmaps::build(texels, |level| {
         let halving = ImageHalver::new(level);
-        let mut rows = halving.empty_rows();
+        let mut rows = halving.allocate_halved_rows();
         for y in 0..halving.halved_height() {
             token.check_pause_and_cancel()?;
             halving.append_row(y, &mut rows);
@@ -358,7 +358,7 @@ impl OpenImage {
 
     /// Reads a file into memory and hashes it. The hash matches the decoded bytes even if the file is
     /// replaced in the meantime.
-    fn read_hashed(
+    fn open_in_memory_and_hash(
         path: &Path,
         encoding: ImageEncoding,
         limits: ImageLimits,
@@ -425,7 +425,7 @@ impl OpenImage {
         encoding: ImageEncoding,
         report: ProgressReporter,
     ) -> Result<(DynamicImage, ImageMetadata), String> {
-        let OpenedImage { mut decoder, metadata, .. } = self.open_decoder(encoding, report)?;
+        let ImageDecoderWithMetadata { mut decoder, metadata, .. } = self.open_decoder(encoding, report)?;
         let (width, height) = decoder.dimensions();
         let orientation = orientation(&mut *decoder).map_err(|error| shorten_decoder_error(&error))?;
         let image = DynamicImage::from_decoder(decoder);
@@ -440,7 +440,7 @@ impl OpenImage {
         mut self,
         encoding: ImageEncoding,
         report: ProgressReporter,
-    ) -> Result<OpenedImage, String> {
+    ) -> Result<ImageDecoderWithMetadata, String> {
         let start = |bytes: &[u8]| ::image::guess_format(bytes).ok();
         let (mut in_memory, mut is_checked) = (0, true);
         match &mut self.file {
@@ -492,7 +492,7 @@ impl OpenImage {
         let (decoder, metadata) = chosen.map_err(|error| shorten_decoder_error(&error))?;
         let held_bytes = if is_jpeg { self.length } else { 0 };
         let texel = bytes_per_texel(decoder.color_type(), encoding, &metadata);
-        let texel_bytes = check_limits_and_texel_bytes(
+        let texel_bytes = texel_bytes_within_limits(
             &*decoder,
             texel,
             [self.length, held_bytes, in_memory],
@@ -503,7 +503,7 @@ impl OpenImage {
             let (width, height) = decoder.dimensions();
             jpeg::check_plausible_size(width, height, self.length)?;
         }
-        Ok(OpenedImage { decoder, metadata, texel_bytes })
+        Ok(ImageDecoderWithMetadata { decoder, metadata, texel_bytes })
     }
 }
 

@@ -61,13 +61,13 @@ impl Primaries {
 
     /// Matrix to linear Rec. 709 with Bradford chromatic adaptation. `None` for degenerate primaries.
     pub(super) fn to_rec_709(self) -> Option<DMat3> {
-        Some(rec_709_from_xyz(self.white_xyz())? * self.to_xyz()?)
+        Some(xyz_to_rec_709_matrix(self.white_xyz())? * self.to_xyz()?)
     }
 }
 
 /// Matrix to linear Rec. 709 from an ICC profile's colorants, which are in XYZ relative to D50.
 pub(super) fn colorants_to_rec_709(colorants: DMat3) -> Option<DMat3> {
-    Some(rec_709_from_xyz(D50)? * colorants)
+    Some(xyz_to_rec_709_matrix(D50)? * colorants)
 }
 
 /// Whether a matrix is the identity, up to rounding.
@@ -76,7 +76,7 @@ pub(super) fn is_identity(matrix: &DMat3) -> bool {
 }
 
 /// Matrix from XYZ with this white point to linear Rec. 709.
-fn rec_709_from_xyz(white: DVec3) -> Option<DMat3> {
+fn xyz_to_rec_709_matrix(white: DVec3) -> Option<DMat3> {
     let to_cones = bradford_cone_response_matrix();
     let [from, to] = [white, Primaries::REC_709.white_xyz()].map(|white| to_cones * white);
     let adapted = inverse(to_cones)? * DMat3::from_diagonal(to / from) * to_cones;

@@ -25,7 +25,7 @@ pub(super) fn find_coincident_vertex_sets(
     let mut hashes = vec![0; positions.len()];
     for (hashes, positions) in hashes.chunks_mut(BATCH).zip(positions.chunks(BATCH)) {
         token.check_pause_and_cancel()?;
-        hashes.par_iter_mut().zip(positions).for_each(|(hash, position)| *hash = hash_of(*position));
+        hashes.par_iter_mut().zip(positions).for_each(|(hash, position)| *hash = hash_position(*position));
     }
     let (entries, ends) = sort_into_buckets(&hashes, bits, token)?;
     let starts = std::iter::once(0).chain(ends.iter().copied());
@@ -42,7 +42,7 @@ fn position_bits(position: Vec3) -> [u32; 3] {
 
 /// Multiplicative hash (Knuth, *The Art of Computer Programming*, vol. 3, section 6.4). The upper bits are
 /// mixed best.
-fn hash_of(position: Vec3) -> u32 {
+fn hash_position(position: Vec3) -> u32 {
     let [x, y, z] = position_bits(position).map(u64::from);
     let mixed = (x | y << 32).wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ z.wrapping_mul(0xc2b2_ae3d_27d4_eb4f);
     ((mixed ^ mixed >> 29).wrapping_mul(0xbf58_476d_1ce4_e5b9) >> 32) as u32
@@ -121,7 +121,7 @@ mod tests {
         let mut counts = [0; 64];
         for i in 0..64_000_u32 {
             let position = Vec3::new((i % 40) as f32, (i / 40 % 40) as f32, (i / 1600) as f32) * 0.5;
-            counts[hash_of(position) as usize >> 26] += 1;
+            counts[hash_position(position) as usize >> 26] += 1;
         }
         assert!(counts.iter().all(|count| (500..2000).contains(count)), "{counts:?}");
     }

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use super::parsed::ParsedMesh;
 use crate::control::{CancelToken, Cancelled};
-use crate::geometry::mesh::VertexNormalGroup;
+use crate::geometry::mesh::VertexNormalSharing;
 use crate::math::Vec2;
 
 /// Number of corners between polls of the cancel token.
@@ -54,7 +54,7 @@ pub(super) fn split_vertices_at_seams(parsed: &mut ParsedMesh, token: &CancelTok
         parsed.colors = new_colors;
     }
     let group =
-        |vertex: &usize| VertexNormalGroup { normal: *vertex as u32, group: VertexNormalGroup::BY_ANGLE };
+        |vertex: &usize| VertexNormalSharing { normal: *vertex as u32, group: VertexNormalSharing::BY_ANGLE };
     parsed.normal_groups = sources.iter().map(group).collect();
     Ok(())
 }

@@ -47,8 +47,8 @@ pub fn load(path: &Path, progress: Progress<'_>, token: &CancelToken) -> Result<
         path.extension().map(|extension| extension.to_string_lossy().to_lowercase()).unwrap_or_default();
     let (parse, read): (ParseFn, ReadFileFn) = match extension.as_str() {
         "obj" => (obj::parse, read::read_text),
-        "off" => (off::parse, read::read_with_text_magic),
-        "ply" => (ply::parse, read::read_with_text_magic),
+        "off" => (off::parse, read::read_rejecting_non_ascii_magic),
+        "ply" => (ply::parse, read::read_rejecting_non_ascii_magic),
         "stl" => (stl::parse, read::read_unless_zeros_at_start),
         _ => return Err(AssetError::unreadable(path, UNKNOWN_FORMAT)),
     };
@@ -59,7 +59,7 @@ pub fn load(path: &Path, progress: Progress<'_>, token: &CancelToken) -> Result<
         return Err(source.malformed_error_without_line(EMPTY_FILE));
     }
     let loaded = LoadedMesh { hash: read::hash(&bytes), ..parse(&source)? };
-    monitor.report_progress(2 * bytes.len(), 2 * bytes.len())?;
+    monitor.report_and_check_cancel(2 * bytes.len(), 2 * bytes.len())?;
     Ok(loaded)
 }
 
@@ -98,7 +98,7 @@ pub(crate) struct MeshFileBytes<'a> {
 impl MeshFileBytes<'_> {
     /// Reports that the parser has reached byte `at`.
     fn report_progress(&self, at: usize) -> Result<(), AssetError> {
-        Ok(self.monitor.report_progress(self.bytes.len() + at, 2 * self.bytes.len())?)
+        Ok(self.monitor.report_and_check_cancel(self.bytes.len() + at, 2 * self.bytes.len())?)
     }
 
     /// Creates an error without a line number.

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use super::coincident;
 use crate::control::{CancelToken, Cancelled};
-use crate::geometry::mesh::{TriangleMesh, VertexNormalGroup};
+use crate::geometry::mesh::{TriangleMesh, VertexNormalSharing};
 use crate::math::{DVec3, Vec3};
 
 /// Minimum cosine at which the normals of coincident vertices are merged. Normals that differ by at most 45
@@ -47,7 +47,7 @@ pub fn vertex_normals(mesh: &TriangleMesh, token: &CancelToken) -> Result<Vec<Ve
         } else {
             let group = |vertex: &u32| groups[*vertex as usize].group;
             let is_joined = |vertex: &&u32| {
-                firsts[**vertex as usize] == **vertex as usize && group(vertex) != VertexNormalGroup::FLAT
+                firsts[**vertex as usize] == **vertex as usize && group(vertex) != VertexNormalSharing::FLAT
             };
             let mut place: Vec<u32> = place.iter().filter(is_joined).copied().collect();
             place.sort_by_key(group);
@@ -72,10 +72,10 @@ pub fn vertex_normals(mesh: &TriangleMesh, token: &CancelToken) -> Result<Vec<Ve
 }
 
 /// Maps each vertex to the first vertex with the same normal. Empty if there are no groups.
-fn map_to_first_with_same_normal(groups: &[VertexNormalGroup]) -> Vec<usize> {
+fn map_to_first_with_same_normal(groups: &[VertexNormalSharing]) -> Vec<usize> {
     let numbers = groups.iter().map(|group| group.normal as usize + 1).max().unwrap_or(0);
     let mut firsts = vec![usize::MAX; numbers];
-    let first_of = |(vertex, group): (usize, &VertexNormalGroup)| {
+    let first_of = |(vertex, group): (usize, &VertexNormalSharing)| {
         let first = &mut firsts[group.normal as usize];
         *first = vertex.min(*first);
         *first
@@ -85,12 +85,12 @@ fn map_to_first_with_same_normal(groups: &[VertexNormalGroup]) -> Vec<usize> {
 
 /// Whether a mesh without normals consists of flat faces, like a box. In a faceted mesh, the face normals
 /// around most vertices partly cancel out.
-pub(crate) fn is_faceted_without_normals(mesh: &TriangleMesh) -> bool {
+pub(crate) fn is_polyhedral_without_normals(mesh: &TriangleMesh) -> bool {
     /// Minimum length of the mean unit normal around a vertex on a smooth surface. It corresponds to normals
     /// that form a cone with a half-angle of 32 degrees.
     const LEAST: f32 = 0.85;
     let groups = &mesh.normal_groups;
-    if !mesh.normals.is_empty() || groups.iter().any(|group| group.group != VertexNormalGroup::BY_ANGLE) {
+    if !mesh.normals.is_empty() || groups.iter().any(|group| group.group != VertexNormalSharing::BY_ANGLE) {
         return false;
     }
     let firsts = map_to_first_with_same_normal(groups);
@@ -352,9 +352,9 @@ mod tests {
         let triangles = sides.iter().flat_map(|[a, b, c, d]| [[*a, *b, *c], [*a, *c, *d]]).collect();
         let mut cube =
             TriangleMesh { positions: (0..8).map(corner).collect(), triangles, ..TriangleMesh::default() };
-        assert!(is_faceted_without_normals(&cube));
+        assert!(is_polyhedral_without_normals(&cube));
         cube.normals = vec![Vec3::Y; 8];
-        assert!(!is_faceted_without_normals(&cube), "the mesh has normals");
-        assert!(!is_faceted_without_normals(&sphere(8)) && !is_faceted_without_normals(&sphere(60)));
+        assert!(!is_polyhedral_without_normals(&cube), "the mesh has normals");
+        assert!(!is_polyhedral_without_normals(&sphere(8)) && !is_polyhedral_without_normals(&sphere(60)));
     }
 }

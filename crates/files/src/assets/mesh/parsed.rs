@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::coincident;
 use crate::assets::{Companion, FileMaterial};
 use crate::control::{CancelToken, Cancelled};
-use crate::geometry::mesh::VertexNormalGroup;
+use crate::geometry::mesh::VertexNormalSharing;
 use crate::math::{DVec3, Vec2, Vec3};
 
 /// Returns the index of the face that contains a corner, given each face's number of corners.
@@ -88,7 +88,7 @@ impl Faces {
 pub(crate) struct ParsedMesh {
     pub(crate) positions: Vec<DVec3>,
     pub(crate) normals: Vec<Vec3>,
-    pub(crate) normal_groups: Vec<VertexNormalGroup>,
+    pub(crate) normal_groups: Vec<VertexNormalSharing>,
     pub(crate) uvs: Vec<Vec2>,
     pub(crate) second_uvs: Vec<Vec2>,
     /// sRGB.

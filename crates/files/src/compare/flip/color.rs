@@ -39,7 +39,7 @@ impl OpponentColor {
     }
 
     /// Clamps to the display's gamut and converts to [`PerceivedColor`].
-    pub(super) fn perceived(self) -> PerceivedColor {
+    pub(super) fn to_perceived_color(self) -> PerceivedColor {
         let y = (self.y + 16.0) / 116.0;
         let xyz = DVec3::new(y + self.cx / 500.0, y, y - self.cz / 200.0) * WHITE;
         PerceivedColor::from_linear((*RGB_OF_XYZ * xyz).clamp(DVec3::ZERO, DVec3::ONE))
@@ -96,8 +96,9 @@ mod tests {
     #[test]
     fn display_colors_round_trip() {
         for rgb in [DVec3::X, DVec3::Y, DVec3::Z, DVec3::new(0.2, 0.5, 0.9), DVec3::splat(1e-4)] {
-            let distance =
-                OpponentColor::from_linear(rgb).perceived().distance(&PerceivedColor::from_linear(rgb));
+            let distance = OpponentColor::from_linear(rgb)
+                .to_perceived_color()
+                .distance(&PerceivedColor::from_linear(rgb));
             assert!(distance < 1e-9, "{rgb}: {distance}");
         }
     }

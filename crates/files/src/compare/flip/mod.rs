@@ -32,7 +32,7 @@ pub(super) fn error_map(pair: &Pair) -> Vec<f32> {
     let mut map = vec![0.0; width * height];
     map.par_chunks_mut(width * tiles::SIDE).enumerate().for_each(|(band, out)| {
         for tile in tiles::tiles_in_band(band, width, height) {
-            let errors = tile_errors(pair, tile, &filters, max);
+            let errors = tile_pixel_errors(pair, tile, &filters, max);
             let rows = errors.chunks_exact(tile.width as usize);
             for (row, out) in rows.zip(out.chunks_exact_mut(width)) {
                 out[tile.x as usize..][..row.len()].copy_from_slice(row);
@@ -42,7 +42,7 @@ pub(super) fn error_map(pair: &Pair) -> Vec<f32> {
     map
 }
 
-fn tile_errors(pair: &Pair, tile: Rect, filters: &Filters, max: f64) -> Vec<f32> {
+fn tile_pixel_errors(pair: &Pair, tile: Rect, filters: &Filters, max: f64) -> Vec<f32> {
     let [a, b] = [0, 1].map(|which| perceived_colors_and_features(pair, which, tile, filters));
     let colors = a.0.iter().zip(&b.0).map(|(a, b)| error_from_color_distance(a.distance(b), max));
     let features = a.1.differences(&b.1);
@@ -60,7 +60,8 @@ fn perceived_colors_and_features(
     let features = filters.detect_features(&planes[0]);
     let [y, cx, cz] = filters.blurred(&planes);
     let blurred = y.values.iter().zip(&cx.values).zip(&cz.values);
-    let perceived = blurred.map(|((&y, &cx), &cz)| OpponentColor { y, cx, cz }.perceived()).collect();
+    let perceived =
+        blurred.map(|((&y, &cx), &cz)| OpponentColor { y, cx, cz }.to_perceived_color()).collect();
     (perceived, features)
 }
 

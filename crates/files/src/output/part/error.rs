@@ -4,11 +4,11 @@ use std::io;
 use std::path::PathBuf;
 
 use crate::system::file::FileKind;
-use crate::system::{describe_error, is_out_of_files};
+use crate::system::{describe_error, is_too_many_open_files};
 
 /// Part index and part count.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct PartIndex {
+pub struct PartIndexAndCount {
     /// Index of the part, starting at 1.
     pub index: u32,
     /// Number of parts.
@@ -108,7 +108,7 @@ pub enum PartError {
     },
     /// There is not enough memory for the image.
     #[error("{0}")]
-    Film(#[from] crate::film::FilmError),
+    Film(#[from] crate::film::FilmCreationError),
     /// The operation was cancelled.
     #[error("cancelled")]
     Cancelled(#[from] crate::control::Cancelled),
@@ -118,7 +118,7 @@ impl PartError {
     /// Whether too many files are open in the process or the system. Opening more files would also fail.
     pub fn is_too_many_open_files(&self) -> bool {
         let Self::Unreadable { source, .. } = self else { return false };
-        is_out_of_files(source)
+        is_too_many_open_files(source)
     }
 }
 

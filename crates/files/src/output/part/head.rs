@@ -9,7 +9,7 @@ use super::super::{BitDepth, FilmEncodingSettings};
 use crate::choice::Choice;
 use crate::film::range_map::{DataKind, RangeMap};
 use crate::film::tone::{ToneMapping, Tonemap, Transfer};
-use crate::film::{ConvergenceModel, Film, FilmError, Quantity, Rect, SumOrder};
+use crate::film::{ConvergenceModel, Film, FilmCreationError, FilmQuantity, Rect, SumOrder};
 
 /// Header of a part or checkpoint.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -160,8 +160,11 @@ pub struct ToneHeader {
 }
 
 /// Names of the quantities in part files.
-const QUANTITIES: [(Quantity, &str); 3] =
-    [(Quantity::Radiance, "radiance"), (Quantity::Samples, "samples"), (Quantity::Error, "error")];
+const QUANTITIES: [(FilmQuantity, &str); 3] = [
+    (FilmQuantity::Radiance, "radiance"),
+    (FilmQuantity::Samples, "samples"),
+    (FilmQuantity::Error, "error"),
+];
 
 /// Names of the range mappings in part files.
 const STRETCHES: [(DataKind, &str); 2] = [(DataKind::Distances, "distances"), (DataKind::Amounts, "amounts")];
@@ -169,7 +172,7 @@ const STRETCHES: [(DataKind, &str); 2] = [(DataKind::Distances, "distances"), (D
 impl ImageHeader {
     /// Describes the image that these settings produce from a film.
     pub fn new(film: &Film, finish: &FilmEncodingSettings) -> Self {
-        let Rect { x, y, width, height } = film.crop();
+        let Rect { x, y, width, height } = film.crop_rect();
         let tone = &finish.tone;
         let kind = match tone.range_map {
             RangeMap::None => None,
@@ -182,7 +185,7 @@ impl ImageHeader {
             width: film.width(),
             height: film.height(),
             crop: [x, y, width, height],
-            is_by_photons: film.convergence() == ConvergenceModel::Photons,
+            is_by_photons: film.convergence_model() == ConvergenceModel::Photons,
             quantity: quantity.map_or("radiance", |(_, word)| *word).to_owned(),
             tone: ToneHeader {
                 exposure: tone.exposure_stops,
@@ -223,7 +226,7 @@ impl ImageHeader {
     ///
     /// # Errors
     /// There is not enough memory.
-    pub fn create_film(&self) -> Result<Film, FilmError> {
+    pub fn create_film(&self) -> Result<Film, FilmCreationError> {
         let [x, y, width, height] = self.crop;
         let film = Film::new(self.width, self.height, Some(Rect { x, y, width, height }))?;
         Ok(match self.is_by_photons {
@@ -236,7 +239,7 @@ impl ImageHeader {
 }
 
 /// Describes the differences between two lists of inputs. `here` and `there` are the names of the lists.
-pub fn dependency_differences(
+pub fn render_input_differences(
     a: &[RenderInput],
     b: &[RenderInput],
     (here, there): (&str, &str),
@@ -249,7 +252,7 @@ pub fn dependency_differences(
     names.extend(b.iter().map(|input| input.name.as_str()).filter(|name| value_of(a, name).is_none()));
     let differing = names.into_iter().filter(|name| value_of(a, name) != value_of(b, name));
     let differing: Vec<&str> = differing.collect();
-    let is_named = differing.iter().any(|name| !is_content_hash_name(name));
+    let is_named = differing.iter().any(|name| !is_content_hash_dependency(name));
     differing
         .iter()
         // The total hash is only useful if nothing else differs.
@@ -257,10 +260,10 @@ pub fn dependency_differences(
         .filter(|name| !is_named || **name != EVERYTHING)
         .map(|name| match (value_of(a, name), value_of(b, name)) {
             _ if *name == EVERYTHING => "the scene's shapes, materials, lights or camera differ".to_owned(),
-            (Some(_), Some(_)) if is_content_hash_name(name) => {
+            (Some(_), Some(_)) if is_content_hash_dependency(name) => {
                 format!("{} has different content", strip_file_dependency_prefix(name))
             }
-            (a, b) if is_content_hash_name(name) => {
+            (a, b) if is_content_hash_dependency(name) => {
                 let place = if a.is_some() { here } else { there };
                 debug_assert!(a.is_some() != b.is_some());
                 format!("{} is only used {place}", strip_file_dependency_prefix(name))
@@ -279,7 +282,7 @@ const PROGRAM: &str = "glimt";
 /// Name of the input that contains the hash of all inputs.
 pub(super) const EVERYTHING: &str = "everything";
 
-fn is_content_hash_name(name: &str) -> bool {
+fn is_content_hash_dependency(name: &str) -> bool {
     name.starts_with(FILE) || name == EVERYTHING
 }
 
@@ -297,7 +300,7 @@ impl RenderInput {
     }
 
     /// Creates an input for a file from its name and content hash.
-    pub fn file(name: &str, content: impl Into<String>) -> Self {
+    pub fn from_file(name: &str, content: impl Into<String>) -> Self {
         Self { name: format!("{FILE}{name}"), value: content.into() }
     }
 

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::head::{PartHeader, PartOrCheckpoint, dependency_differences};
+use super::head::{PartHeader, PartOrCheckpoint, render_input_differences};
 use super::{PartError, PartFile};
 use crate::control::CancelToken;
 use crate::film::{Film, StoredTile};
@@ -45,7 +45,7 @@ pub fn check_and_list_missing(parts: &[PartFile]) -> Result<Vec<u32>, PartError>
 
 /// Describes how two headers differ in the image or in its division into parts.
 fn head_differences(a: &PartHeader, b: &PartHeader) -> Vec<String> {
-    let mut found = dependency_differences(&a.identity, &b.identity, ("here", "there"));
+    let mut found = render_input_differences(&a.identity, &b.identity, ("here", "there"));
     let counts = (a.share.count, b.share.count);
     if counts.0 != counts.1 {
         found.push(format!("the image has {} parts here and {} there", counts.0, counts.1));

@@ -19,9 +19,9 @@ mod merge;
 mod read;
 mod save;
 
-pub use error::{PartError, PartIndex, missing_parts_message};
+pub use error::{PartError, PartIndexAndCount, missing_parts_message};
 pub use head::{
-    ImageHeader, PartHeader, PartOrCheckpoint, PartShare, RenderInput, ToneHeader, dependency_differences,
+    ImageHeader, PartHeader, PartOrCheckpoint, PartShare, RenderInput, ToneHeader, render_input_differences,
 };
 pub use merge::{MergedParts, check_and_list_missing, merge_into_film};
 pub use read::{PartFile, find_input_by_path_suffix, input_name_by_content, is_part};

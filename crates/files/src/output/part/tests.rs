@@ -9,7 +9,7 @@ use super::super::{AttributeLossPolicy, BitDepth, FilmEncodingSettings};
 use super::*;
 use crate::control::CancelToken;
 use crate::film::tone::ToneMapping;
-use crate::film::{Film, Quantity, TileSamples};
+use crate::film::{Film, FilmQuantity, TileSamples};
 use crate::math::Vec3;
 
 /// A film with 70 × 40 pixels and six tiles, with samples only in the tiles of one part.
@@ -34,7 +34,7 @@ fn film(index: u32, count: u32) -> Film {
 
 fn finish() -> FilmEncodingSettings {
     FilmEncodingSettings {
-        quantity: Quantity::Radiance,
+        quantity: FilmQuantity::Radiance,
         tone: ToneMapping { exposure_stops: 0.3, ..ToneMapping::default() },
         bit_depth: BitDepth::Sixteen,
         metadata: vec![("glimt:scene".to_owned(), "a.toml".to_owned())],
@@ -47,7 +47,7 @@ fn head(index: u32, count: u32, film: &Film) -> PartHeader {
         kind: PartOrCheckpoint::Part,
         identity: vec![
             RenderInput::from_name_and_value("seed", "7"),
-            RenderInput::file("knot.obj", "12ab"),
+            RenderInput::from_file("knot.obj", "12ab"),
             RenderInput::from_combined_hash("ff"),
         ],
         share: PartShare { index, count, block_count: 0, blocks: Vec::new() },
@@ -97,7 +97,7 @@ fn parts_merge_in_any_order() {
         let mut paths = parts(folder.path(), count);
         paths.reverse();
         let film = merged(&paths).expect("they fit").film;
-        assert_eq!(film.radiance().pixels, whole.radiance().pixels, "{count} parts");
+        assert_eq!(film.radiance_image().pixels, whole.radiance_image().pixels, "{count} parts");
         assert_eq!(film.mean_luminance_error(), whole.mean_luminance_error());
         let part = opened(&paths[0]).expect("a part");
         assert_eq!(part.head.picture.develop_settings(), Some(finish()));
@@ -244,8 +244,8 @@ fn parts_from_different_builds_do_not_match() {
         vec![RenderInput::from_name_and_value("glimt", build), RenderInput::from_name_and_value("width", "4")]
     };
     let [a, b] = ["0.1.0 (build 1)", "0.1.0 (build 2)"].map(inputs);
-    assert_eq!(dependency_differences(&a, &a, ("here", "there")), [""; 0]);
-    let found = dependency_differences(&a, &b, ("here", "there"));
+    assert_eq!(render_input_differences(&a, &a, ("here", "there")), [""; 0]);
+    let found = render_input_differences(&a, &b, ("here", "there"));
     assert!(found.len() == 1 && found[0].contains("build 1") && found[0].contains("build 2"), "{found:?}");
 }
 

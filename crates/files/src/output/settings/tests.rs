@@ -18,7 +18,7 @@ fn expected() -> Vec<(String, String)> {
 fn settings_round_trip_in_all_image_formats() {
     let image = RadianceImage::black(12, 7);
     let options = EncodeOptions { metadata: settings(), ..EncodeOptions::default() };
-    for extension in Format::known_extensions() {
+    for extension in Format::all_extensions() {
         let format = Format::from_path(Path::new(&format!("a.{extension}"))).expect("a format");
         let bytes = encode(&image, &options, format, &CancelToken::new()).expect("encoded");
         let mut info = read_info_from_start(&bytes).expect(extension);
@@ -65,7 +65,7 @@ fn foreign_images_have_no_settings() {
 fn corrupt_headers_do_not_panic() {
     let options = EncodeOptions { metadata: settings(), ..EncodeOptions::default() };
     let image = RadianceImage::black(12, 7);
-    let mut files: Vec<Vec<u8>> = Format::known_extensions()
+    let mut files: Vec<Vec<u8>> = Format::all_extensions()
         .map(|extension| Format::from_path(Path::new(&format!("a.{extension}"))).expect("a format"))
         .map(|format| encode(&image, &options, format, &CancelToken::new()).expect("encoded"))
         .collect();

@@ -28,7 +28,7 @@ pub(super) fn read_webp_info(mut file: impl Read + Seek) -> Option<ImageInfo> {
                 info.size = Some((read_canvas_dimension(&content, 4)?, read_canvas_dimension(&content, 7)?))
             }
             b"VP8L" if info.size.is_none() => info.size = Some(lossless_size(&content)?),
-            b"XMP " => add_xmp_packet(&mut info, &String::from_utf8_lossy(&content)),
+            b"XMP " => read_xmp_packet(&mut info, &String::from_utf8_lossy(&content)),
             _ => {}
         }
         file.seek(SeekFrom::Start(next)).ok()?;
@@ -49,7 +49,7 @@ fn lossless_size(content: &[u8]) -> Option<(u32, u32)> {
 }
 
 /// Adds the program and the description lines from an XMP packet.
-fn add_xmp_packet(info: &mut ImageInfo, packet: &str) {
+fn read_xmp_packet(info: &mut ImageInfo, packet: &str) {
     let between = |start: &str, end: &str| {
         let (_, rest) = packet.split_once(start)?;
         Some(unescape_xml(rest.split_once(end)?.0))

@@ -104,7 +104,7 @@ impl SphericalShell {
 
 /// A primitive or subtree reported by [`Bvh::visit_overlapping_surfaces`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum OverlappingItem {
+pub enum PrimitiveOrEnclosingSubtree {
     /// A primitive whose surface may intersect the box.
     Primitive(u32),
     /// A subtree in which every primitive encloses the box, identified by its index in
@@ -178,19 +178,20 @@ impl Bvh {
     pub fn visit_surfaces_overlapping_box(
         &self,
         other: &Aabb,
-        mut visit: impl FnMut(OverlappingItem) -> bool,
+        mut visit: impl FnMut(PrimitiveOrEnclosingSubtree) -> bool,
     ) {
         let Some(shells) = &self.shells else {
             let mut goes_on = true;
-            return self
-                .visit_overlapping(other, |id| goes_on = goes_on && visit(OverlappingItem::Primitive(id)));
+            return self.visit_overlapping(other, |id| {
+                goes_on = goes_on && visit(PrimitiveOrEnclosingSubtree::Primitive(id))
+            });
         };
         let mut stack = ArrayVec::<ChildRef, { DEEP_STACK + 1 }>::new();
         stack.push(ChildRef { first: 0, count: 0 });
         while let Some(ChildRef { first, count }) = stack.pop() {
             if count > 0 {
                 let ids = &self.order[first as usize..(first + count) as usize];
-                if !ids.iter().all(|&id| visit(OverlappingItem::Primitive(id))) {
+                if !ids.iter().all(|&id| visit(PrimitiveOrEnclosingSubtree::Primitive(id))) {
                     return;
                 }
                 continue;
@@ -201,7 +202,7 @@ impl Bvh {
                     BoxShellRelation::Outside => {}
                     BoxShellRelation::Near => stack.push(node.child[side]),
                     BoxShellRelation::Enclosed
-                        if visit(OverlappingItem::Enclosing(2 * first as usize + side)) => {}
+                        if visit(PrimitiveOrEnclosingSubtree::Enclosing(2 * first as usize + side)) => {}
                     BoxShellRelation::Enclosed => return,
                 }
             }

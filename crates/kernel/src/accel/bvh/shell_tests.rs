@@ -42,7 +42,7 @@ fn rays(count: usize) -> Vec<Ray> {
 /// The nearest hit and the number of spheres tested.
 fn closest_hit_and_test_count(tree: &Bvh, spheres: &[Sphere], ray: &Ray) -> (Option<(f32, u32)>, usize) {
     let (mut best, mut tests) = (None, 0);
-    tree.closest_hit(ray, |id, t_max| {
+    tree.visit_leaves_front_to_back(ray, |id, t_max| {
         tests += 1;
         let t = spheres[id as usize].intersect(&Ray { t_max, ..*ray }.to_f64())?.t;
         best = best.filter(|best| *best < (t, id)).or(Some((t, id)));
@@ -84,8 +84,8 @@ fn nested_box_queries_match_brute_force() {
             let (mut visited, mut enclosing) = (Vec::new(), Vec::new());
             tree.visit_surfaces_overlapping_box(&near, |met| {
                 match met {
-                    OverlappingItem::Primitive(id) => visited.push(id),
-                    OverlappingItem::Enclosing(subtree) => enclosing.extend(&last[subtree]),
+                    PrimitiveOrEnclosingSubtree::Primitive(id) => visited.push(id),
+                    PrimitiveOrEnclosingSubtree::Enclosing(subtree) => enclosing.extend(&last[subtree]),
                 }
                 true
             });

@@ -214,7 +214,7 @@ mod tests {
                     match round % 7 {
                         0 => Ray::new(from + jitter, Vec3::NEG_Y),
                         1 | 2 => Ray::new(from + jitter, to - from),
-                        _ => Ray::segment_ending_before(from, to * 3.0 + jitter),
+                        _ => Ray::segment_ending_before_point(from, to * 3.0 + jitter),
                     }
                 };
                 let rays: Vec<Ray> = (0..=round % PACKET_SIZE).map(|_| ray()).collect();

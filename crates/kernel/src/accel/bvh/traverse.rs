@@ -13,7 +13,7 @@ impl Bvh {
     /// returns the ray's new end on a hit. Primitives exactly at the ray's end are still tested because the
     /// caller may break ties by id.
     #[inline]
-    pub fn closest_hit(&self, ray: &Ray, mut test: impl FnMut(u32, f32) -> Option<f32>) {
+    pub fn visit_leaves_front_to_back(&self, ray: &Ray, mut test: impl FnMut(u32, f32) -> Option<f32>) {
         if let Some(shells) = &self.shells {
             self.closest_hit_with_shells(shells, ray, &mut test);
         } else if self.depth < SHALLOW_STACK {
@@ -206,7 +206,7 @@ mod tests {
             let ray = Ray::new(origin, Vec3::new(next(), next(), next()) * 8.0 - origin);
             let slabs = SlabRay::new(ray.origin, ray.direction);
             let mut best: Option<(f32, u32)> = None;
-            tree.closest_hit(&ray, |id, t_max| {
+            tree.visit_leaves_front_to_back(&ray, |id, t_max| {
                 let t = slabs.entry_distance(boxes[id as usize].min, boxes[id as usize].max, t_max)?;
                 let better = best.is_none_or(|(least, least_id)| (t, id) < (least, least_id));
                 better.then(|| best = Some((t, id)))?;
@@ -241,7 +241,7 @@ mod tests {
             let nan = Ray { t_max: f32::NAN, ..Ray::new(Vec3::NAN, Vec3::NAN) };
             for ray in [nan, Ray { t_max: f32::INFINITY, ..nan }, Ray::new(Vec3::ZERO, Vec3::NAN)] {
                 let mut tests = 0;
-                tree.closest_hit(&ray, |_, _| {
+                tree.visit_leaves_front_to_back(&ray, |_, _| {
                     tests += 1;
                     None
                 });

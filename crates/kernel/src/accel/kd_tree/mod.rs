@@ -15,7 +15,7 @@ use crate::control::{CancelToken, Cancelled};
 use crate::geometry::{Aabb, Ray};
 use crate::math::Vec3;
 
-use node::{KdNode, LeafTriangle, NodeKind};
+use node::{DecodedNode, KdNode, LeafTriangle};
 
 /// A kd-tree over triangles.
 #[derive(Clone, Debug)]
@@ -62,10 +62,10 @@ impl KdTree {
     pub fn expected_visits(&self) -> (f64, f64) {
         let whole = f64::from(self.bounds.half_area());
         let mut visits = (0.0, 0.0);
-        self.visit_cells_and_node_kinds(|cell, kind| {
+        self.visit_nodes_with_cells(|cell, kind| {
             let share = f64::from(cell.half_area()) / whole;
             visits.0 += share;
-            if let NodeKind::Leaf { count, .. } = kind {
+            if let DecodedNode::Leaf { count, .. } = kind {
                 visits.1 += share * f64::from(count);
             }
         });
@@ -90,17 +90,17 @@ impl KdTree {
             size -= 1;
             let mut place = pending[size];
             loop {
-                match self.nodes[place as usize].kind() {
-                    NodeKind::Leaf { first, count } => {
+                match self.nodes[place as usize].decode() {
+                    DecodedNode::Leaf { first, count } => {
                         let own = &self.references[first as usize..][..count as usize];
                         if !own.iter().all(|&own| visit(self.triangles[own as usize].id)) {
                             return false;
                         }
                         break;
                     }
-                    NodeKind::Inner { axis, at, right } if other.min[axis] > at => place = right,
-                    NodeKind::Inner { axis, at, .. } if other.max[axis] < at => place += 1,
-                    NodeKind::Inner { right, .. } => {
+                    DecodedNode::Inner { axis, at, right } if other.min[axis] > at => place = right,
+                    DecodedNode::Inner { axis, at, .. } if other.max[axis] < at => place += 1,
+                    DecodedNode::Inner { right, .. } => {
                         pending[size] = right;
                         size += 1;
                         place += 1;
@@ -121,15 +121,15 @@ impl KdTree {
         let mut pending = if self.nodes.is_empty() { Vec::new() } else { vec![(self.bounds, 0_u32, 0)] };
         while let Some((bounds, place, depth)) = pending.pop() {
             let Some(stretch) = RayBoxInterval::new(&bounds, ray) else { continue };
-            let kind = self.nodes[place as usize].kind();
+            let kind = self.nodes[place as usize].decode();
             let shapes = match kind {
-                NodeKind::Inner { .. } => 0,
-                NodeKind::Leaf { count, .. } => count,
+                DecodedNode::Inner { .. } => 0,
+                DecodedNode::Leaf { count, .. } => count,
             };
             if !visit(&TreeNodeInfo { bounds, depth, shapes }, &stretch) {
                 continue;
             }
-            if let NodeKind::Inner { axis, at, right } = kind {
+            if let DecodedNode::Inner { axis, at, right } = kind {
                 let [below, above] = split_box(bounds, axis, at);
                 pending.extend([(above, right, depth + 1), (below, place + 1, depth + 1)]);
             }
@@ -137,12 +137,12 @@ impl KdTree {
     }
 
     /// Visits every node with its cell, parents first.
-    fn visit_cells_and_node_kinds(&self, mut visit: impl FnMut(Aabb, NodeKind)) {
+    fn visit_nodes_with_cells(&self, mut visit: impl FnMut(Aabb, DecodedNode)) {
         let mut pending = if self.nodes.is_empty() { Vec::new() } else { vec![(0_u32, self.bounds)] };
         while let Some((place, cell)) = pending.pop() {
-            let kind = self.nodes[place as usize].kind();
+            let kind = self.nodes[place as usize].decode();
             visit(cell, kind);
-            if let NodeKind::Inner { axis, at, right } = kind {
+            if let DecodedNode::Inner { axis, at, right } = kind {
                 let [below, above] = split_box(cell, axis, at);
                 pending.extend([(right, above), (place + 1, below)]);
             }

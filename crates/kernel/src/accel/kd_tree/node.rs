@@ -20,7 +20,7 @@ pub struct KdNode {
 
 /// A decoded node.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum NodeKind {
+pub enum DecodedNode {
     /// An inner node, split by a plane.
     Inner {
         /// Axis of the plane's normal.
@@ -41,13 +41,13 @@ pub enum NodeKind {
 
 impl KdNode {
     /// Encodes a node.
-    pub fn new(kind: NodeKind) -> Self {
+    pub fn new(kind: DecodedNode) -> Self {
         match kind {
-            NodeKind::Inner { axis, at, right } => {
+            DecodedNode::Inner { axis, at, right } => {
                 debug_assert!(axis < 3 && right <= MOST);
                 Self { payload: at.to_bits(), tag: right << 2 | axis as u32 }
             }
-            NodeKind::Leaf { first, count } => {
+            DecodedNode::Leaf { first, count } => {
                 debug_assert!(count <= MOST);
                 Self { payload: first, tag: count << 2 | LEAF }
             }
@@ -56,21 +56,21 @@ impl KdNode {
 
     /// Decodes a node.
     #[inline(always)]
-    pub fn kind(self) -> NodeKind {
+    pub fn decode(self) -> DecodedNode {
         let (low, high) = (self.tag & 3, self.tag >> 2);
         if low == LEAF {
-            NodeKind::Leaf { first: self.payload, count: high }
+            DecodedNode::Leaf { first: self.payload, count: high }
         } else {
-            NodeKind::Inner { axis: low as usize, at: f32::from_bits(self.payload), right: high }
+            DecodedNode::Inner { axis: low as usize, at: f32::from_bits(self.payload), right: high }
         }
     }
 
     /// Offsets the node's indices by the number of nodes and the number of references that precede its
     /// subtree.
     pub fn offset_indices(self, nodes: u32, references: u32) -> Self {
-        Self::new(match self.kind() {
-            NodeKind::Inner { axis, at, right } => NodeKind::Inner { axis, at, right: right + nodes },
-            NodeKind::Leaf { first, count } => NodeKind::Leaf { first: first + references, count },
+        Self::new(match self.decode() {
+            DecodedNode::Inner { axis, at, right } => DecodedNode::Inner { axis, at, right: right + nodes },
+            DecodedNode::Leaf { first, count } => DecodedNode::Leaf { first: first + references, count },
         })
     }
 }

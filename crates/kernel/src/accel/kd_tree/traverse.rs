@@ -5,7 +5,7 @@
 //! distance from the ray's origin to the far end of the mesh.
 
 use super::KdTree;
-use super::node::NodeKind;
+use super::node::DecodedNode;
 use crate::geometry::watertight::ShearedRay;
 use crate::geometry::{Aabb, Ray, ShapeHit};
 
@@ -131,8 +131,8 @@ impl KdTree {
         let mut size = 0;
         let mut place = 0;
         loop {
-            match self.nodes[place as usize].kind() {
-                NodeKind::Inner { axis, at, right } => {
+            match self.nodes[place as usize].decode() {
+                DecodedNode::Inner { axis, at, right } => {
                     let (low, high) = planes.plane_distance_bounds(axis, at);
                     let (first, second) =
                         if planes.backward[axis] { (right, place + 1) } else { (place + 1, right) };
@@ -148,7 +148,7 @@ impl KdTree {
                     }
                     continue;
                 }
-                NodeKind::Leaf { first, count } => {
+                DecodedNode::Leaf { first, count } => {
                     let references = &self.references[first as usize..][..count as usize];
                     let Some(t_max) = test(references) else { return };
                     let end = planes.ray_end_in_scaled_parameter(t_max);

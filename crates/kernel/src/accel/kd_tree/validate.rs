@@ -1,7 +1,7 @@
 //! Validation of a kd-tree, independent of the code that builds it.
 
 use super::build::depth_limit;
-use super::node::NodeKind;
+use super::node::DecodedNode;
 use super::{KdTree, split_box};
 use crate::accel::reference::ClippedTriangle;
 use crate::geometry::Aabb;
@@ -52,8 +52,8 @@ impl KdTree {
                 return Err(format!("node {place} is out of order"));
             }
             reached += 1;
-            match self.nodes[place as usize].kind() {
-                NodeKind::Inner { axis, at, right } => {
+            match self.nodes[place as usize].decode() {
+                DecodedNode::Inner { axis, at, right } => {
                     if !(at > cell.min[axis] && at < cell.max[axis]) {
                         return Err(format!("the plane of node {place} is outside its cell"));
                     }
@@ -66,7 +66,7 @@ impl KdTree {
                         pending.push(NodeVisit { place, cell, depth: depth + 1, inside });
                     }
                 }
-                NodeKind::Leaf { first, count } => {
+                DecodedNode::Leaf { first, count } => {
                     let ids = self.references[first as usize..][..count as usize].iter();
                     let ids: Vec<u32> = ids.map(|&at| self.triangles[at as usize].id).collect();
                     check_leaf(place, &cell, &inside, &ids, &corners)?;

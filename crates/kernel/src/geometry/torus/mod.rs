@@ -56,7 +56,7 @@ impl Torus {
             return None;
         }
         let t = line.start + unit_line.first_crossing(from, leave)? * unit;
-        ray.round_if_in_range(t).map(|_| (t, 0))
+        ray.round_t_if_in_range(t).map(|_| (t, 0))
     }
 
     /// The line through a ray, the same line in units of the circle's radius, and the length of that unit in
@@ -81,7 +81,7 @@ impl Torus {
     }
 
     /// Surface point at a hit.
-    pub fn surface_point(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
+    pub fn surface_point_at_hit(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
         let (out, from_circle) =
             self.directions_from_axis_and_circle(ray.at(unrounded_t(hit, self.intersect_f64(ray))));
         self.surface_from_directions(out, from_circle)
@@ -184,7 +184,7 @@ impl Torus {
     }
 
     /// Distance from a point to the surface.
-    pub fn distance(&self, point: DVec3) -> f64 {
+    pub fn distance_from_point(&self, point: DVec3) -> f64 {
         let local = self.frame.point_to_local(point);
         let from_circle = DVec2::new(local.truncate().length() - self.radius, local.z).length();
         (from_circle - self.tube).abs()
@@ -226,7 +226,7 @@ mod tests {
     fn met(origin: [f32; 3], direction: Vec3) -> Option<(f32, Vec3)> {
         let ray = Ray::new(Vec3::from_array(origin), direction).to_f64();
         let hit = ring().intersect(&ray)?;
-        Some((hit.t, ring().surface_point(&ray, &hit).normal))
+        Some((hit.t, ring().surface_point_at_hit(&ray, &hit).normal))
     }
 
     #[test]
@@ -282,7 +282,7 @@ mod tests {
     fn v_is_one_half_on_the_outermost_circle() {
         let ray = Ray::new(Vec3::new(9.0, 0.0, 0.0), Vec3::NEG_X).to_f64();
         let hit = ring().intersect(&ray).expect("aimed at it");
-        let surface = ring().surface_point(&ray, &hit);
+        let surface = ring().surface_point_at_hit(&ray, &hit);
         let pi = std::f32::consts::PI;
         assert_eq!(surface.uv.as_vec2(), Vec2::splat(0.5));
         assert!((surface.dpdu - Vec3::NEG_Z * (5.0 * pi)).length() < 1e-5);

@@ -14,7 +14,7 @@ use crate::math::{DVec2, DVec3, Vec2, Vec3};
 
 /// A factor on a light's radiance that varies with position and direction.
 #[derive(Clone, Debug, PartialEq)]
-pub struct EmissionTexture {
+pub struct EmissionModulation {
     texture: Option<Arc<Texture>>,
     opacity: Option<Opacity>,
     coat: Option<Arc<EmissionCoat>>,
@@ -43,7 +43,7 @@ pub struct TriangleWithUvs {
     pub second_uvs: Option<[Vec2; 3]>,
 }
 
-impl EmissionTexture {
+impl EmissionModulation {
     /// Creates the factor from a texture and an opacity. Returns `None` if there is neither.
     pub fn new(texture: Option<&Arc<Texture>>, opacity: Option<&Opacity>, chart: UvMapping) -> Option<Self> {
         Self::new_with_coat(texture, opacity, None, chart)
@@ -130,7 +130,7 @@ impl UvMapping {
                 let ray =
                     RayF64 { origin: point - direction * (PROBE * size), direction, t_max: f64::INFINITY };
                 let hit = shape.intersect(&ray)?;
-                Some(shape.surface_point(&ray, &hit).normal.as_dvec3())
+                Some(shape.surface_point_at_hit(&ray, &hit).normal.as_dvec3())
             }
             Self::Triangles(patches) => {
                 let index = patches.binary_search_by_key(&primitive, |patch| patch.primitive).ok()?;

@@ -30,7 +30,7 @@ impl ShapeEmitter for InwardEmitter {
         match self.shape.encloses_point(from.as_dvec3()) {
             Some(true) => 1.0 / ALL_AROUND,
             Some(false) => 0.0,
-            None if self.is_first_hit(from, met.direction, met.distance) => {
+            None if self.is_nearest_hit_at(from, met.direction, met.distance) => {
                 met.uniform_area_pdf(self.by_area.total())
             }
             None => 0.0,
@@ -72,7 +72,7 @@ impl InwardEmitter {
         let direction = offset / distance;
         let cosine = direction.dot(normal);
         let direction = direction.as_vec3();
-        if !(cosine > 0.0 && self.is_first_hit(point, direction, distance as f32)) {
+        if !(cosine > 0.0 && self.is_nearest_hit_at(point, direction, distance as f32)) {
             return LightSamplePoint::NOTHING;
         }
         let factor = cosine * self.by_area.total() / (distance * distance);
@@ -80,7 +80,7 @@ impl InwardEmitter {
     }
 
     /// Whether no part of the shape occludes the point at `distance`.
-    fn is_first_hit(&self, point: Vec3, direction: Vec3, distance: f32) -> bool {
+    fn is_nearest_hit_at(&self, point: Vec3, direction: Vec3, distance: f32) -> bool {
         self.first_hit_distance(point, direction)
             .is_some_and(|first| first > distance * (1.0 - SAME_DISTANCE))
     }

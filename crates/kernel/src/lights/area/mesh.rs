@@ -221,7 +221,7 @@ impl TrianglePairQuad {
             return None;
         }
         let quad = QuadEmitter::new(p, u, v);
-        let [along_u, along_v] = quad.dual_edges();
+        let [along_u, along_v] = quad.dual_basis();
         Some(Self { quad, across: along_u + along_v, primitives: [*one, *two] })
     }
 

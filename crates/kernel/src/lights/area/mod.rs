@@ -21,7 +21,7 @@ pub mod textured_quad;
 pub mod torus;
 pub mod triangle;
 
-pub use emission_texture::{EmissionTexture, TriangleWithUvs, UvMapping};
+pub use emission_texture::{EmissionModulation, TriangleWithUvs, UvMapping};
 pub use mesh::MeshEmitter;
 pub use sample_point::LightSamplePoint;
 
@@ -67,7 +67,7 @@ pub struct AreaLight {
     /// Radiance, or a factor applied to the texture if there is one.
     pub radiance: Vec3,
     /// Texture that modulates the radiance.
-    pub texture: Option<Box<EmissionTexture>>,
+    pub texture: Option<Box<EmissionModulation>>,
     /// Index of the object.
     pub object: u32,
     /// The part of the object that emits.
@@ -257,7 +257,7 @@ fn emission_bounds(shape: &Shape, radiance: Vec3) -> Option<LightBounds> {
 
 impl AreaLight {
     /// Adds an emission texture. Quads are then importance sampled according to the texture.
-    pub fn with_texture(mut self, texture: EmissionTexture) -> Self {
+    pub fn with_texture(mut self, texture: EmissionModulation) -> Self {
         if let (Emitter::Quad(quad), true) = (&self.shape, texture.varies_with_position()) {
             // The two edges are swapped on the back.
             let ordered = |[u, v]: [f64; 2]| match self.side {
@@ -276,7 +276,7 @@ impl AreaLight {
 
     /// [`Light::sample`](super::Light::sample).
     pub fn sample(&self, point: Vec3, normal: Vec3, u: [f32; 2]) -> Option<LightSample> {
-        let sample = self.sample_untextured(point, normal, u)?;
+        let sample = self.sample_without_texture_factor(point, normal, u)?;
         let (Some(texture), ShadowRayEnd::At(target)) = (&self.texture, sample.end) else {
             return Some(sample);
         };
@@ -292,7 +292,12 @@ impl AreaLight {
 
     /// [`AreaLight::sample`] without the emission texture.
     #[inline]
-    pub fn sample_untextured(&self, point: Vec3, normal: Vec3, u: [f32; 2]) -> Option<LightSample> {
+    pub fn sample_without_texture_factor(
+        &self,
+        point: Vec3,
+        normal: Vec3,
+        u: [f32; 2],
+    ) -> Option<LightSample> {
         let own = |sample: LightSamplePoint| {
             let LightSamplePoint { direction, target, factor } = sample;
             let (end, source) = (ShadowRayEnd::At(target), self.light_geometry());

@@ -78,7 +78,7 @@ impl AreaLight {
         }
         // Other shapes do not have a vectorized loop.
         LightSamplePacket::sample_one_by_one(points, used, |i, point| {
-            self.sample_untextured(point, lane(normals, i), [u[0][i], u[1][i]])
+            self.sample_without_texture_factor(point, lane(normals, i), [u[0][i], u[1][i]])
         })
     }
 }

@@ -135,7 +135,7 @@ impl QuadEmitter {
     }
 
     /// Vectors whose dot products with an offset from the corner are the coordinates along the edges.
-    pub(super) fn dual_edges(&self) -> [Vec3; 2] {
+    pub(super) fn dual_basis(&self) -> [Vec3; 2] {
         let (u, v, n) = (self.u.as_dvec3(), self.v.as_dvec3(), self.normal.as_dvec3());
         let (across_v, across_u) = (v.cross(n), n.cross(u));
         [(across_v / across_v.dot(u)).as_vec3(), (across_u / across_u.dot(v)).as_vec3()]

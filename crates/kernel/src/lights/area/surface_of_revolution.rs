@@ -31,10 +31,10 @@ pub trait RevolutionSideView {
     fn polar_frame(&self) -> &PolarFrame;
 
     /// Largest angle around the pole at which the side is visible.
-    fn max_angle(&self) -> SinCos;
+    fn max_visible_angle(&self) -> SinCos;
 
     /// Difference between the cosines at the two ends of the visible interval, for an angle around the pole.
-    fn cosine_extent(&self, around: SinCos) -> f64;
+    fn cosine_extent_at_azimuth(&self, around: SinCos) -> f64;
 
     /// The point at a fraction `share` of the cosine interval. Returns the point's angle from the pole and
     /// its distance.
@@ -60,7 +60,7 @@ impl<S: RevolutionSide> ShapeEmitter for RevolutionEmitter<S> {
                 let (angle, density) = meridians.sample(u[1]);
                 let around = SinCos::from_radians(angle);
                 let (from_pole, distance) = side.polar_angle_and_distance_at(around, f64::from(u[0] / share));
-                let factor = side.cosine_extent(around) / (density * f64::from(share));
+                let factor = side.cosine_extent_at_azimuth(around) / (density * f64::from(share));
                 (side.polar_frame().direction(from_pole, around), distance, factor)
             }
             (_, Some((cap, normal))) => {
@@ -82,7 +82,8 @@ impl<S: RevolutionSide> ShapeEmitter for RevolutionEmitter<S> {
             (_, Some((cap, normal))) if is_cap(normal) => (1.0 - share) * cap.pdf(met.direction),
             (Some((side, meridians)), _) => {
                 let angle = side.polar_frame().azimuth(met.direction);
-                share * meridians.pdf(angle) / side.cosine_extent(SinCos::from_radians(angle.abs()))
+                share * meridians.pdf(angle)
+                    / side.cosine_extent_at_azimuth(SinCos::from_radians(angle.abs()))
             }
             (None, _) => 0.0,
         };
@@ -97,7 +98,9 @@ impl<S: RevolutionSide> ShapeEmitter for RevolutionEmitter<S> {
 impl<S: RevolutionSide> RevolutionEmitter<S> {
     fn view_from(&self, point: Vec3) -> RevolutionView<S::View> {
         let side = self.side.view_from(point).map(|view| {
-            let meridians = AzimuthDistribution::new(view.max_angle(), |turn| view.cosine_extent(turn));
+            let meridians = AzimuthDistribution::new(view.max_visible_angle(), |turn| {
+                view.cosine_extent_at_azimuth(turn)
+            });
             (view, meridians)
         });
         let side = side.filter(|(_, meridians)| meridians.total() > 0.0);
@@ -172,7 +175,7 @@ impl RevolutionSide for CylinderSide {
 
 impl CylinderView {
     /// Distance to the cross-section circle, computed without cancellation.
-    fn distance_to_circle(&self, around: SinCos) -> f64 {
+    fn distance_to_cross_section(&self, around: SinCos) -> f64 {
         let off = self.distance * around.sin;
         let half_chord = ((self.radius - off) * (self.radius + off)).max(0.0).sqrt();
         self.power / (self.distance * around.cos + half_chord)
@@ -188,18 +191,18 @@ impl RevolutionSideView for CylinderView {
         &self.pole
     }
 
-    fn max_angle(&self) -> SinCos {
+    fn max_visible_angle(&self) -> SinCos {
         self.reach
     }
 
-    fn cosine_extent(&self, around: SinCos) -> f64 {
+    fn cosine_extent_at_azimuth(&self, around: SinCos) -> f64 {
         let [low, high] =
-            self.end_cosines(self.distance_to_circle(SinCos { sin: around.sin.abs(), ..around }));
+            self.end_cosines(self.distance_to_cross_section(SinCos { sin: around.sin.abs(), ..around }));
         high - low
     }
 
     fn polar_angle_and_distance_at(&self, around: SinCos, share: f64) -> (SinCos, f64) {
-        let to_circle = self.distance_to_circle(SinCos { sin: around.sin.abs(), ..around });
+        let to_circle = self.distance_to_cross_section(SinCos { sin: around.sin.abs(), ..around });
         let [low, high] = self.end_cosines(to_circle);
         let cos = low + (high - low) * share;
         let height = to_circle * cos / ((1.0 - cos) * (1.0 + cos)).max(f64::MIN_POSITIVE).sqrt();
@@ -296,11 +299,11 @@ impl RevolutionSideView for ConeView {
         &self.pole
     }
 
-    fn max_angle(&self) -> SinCos {
+    fn max_visible_angle(&self) -> SinCos {
         self.reach
     }
 
-    fn cosine_extent(&self, around: SinCos) -> f64 {
+    fn cosine_extent_at_azimuth(&self, around: SinCos) -> f64 {
         let at_tip = self.generatrix_angle_at_tip(around);
         let (along, across) = (self.distance - self.slant * at_tip.cos, self.slant * at_tip.sin);
         let length = (along * along + across * across).sqrt();
@@ -309,7 +312,7 @@ impl RevolutionSideView for ConeView {
 
     fn polar_angle_and_distance_at(&self, around: SinCos, share: f64) -> (SinCos, f64) {
         let at_tip = self.generatrix_angle_at_tip(around);
-        let versine = share * self.cosine_extent(around);
+        let versine = share * self.cosine_extent_at_azimuth(around);
         let from_pole = SinCos { sin: (versine * (2.0 - versine)).max(0.0).sqrt(), cos: 1.0 - versine };
         let sin = at_tip.sin * from_pole.cos + at_tip.cos * from_pole.sin;
         let farthest = self.distance + self.slant;

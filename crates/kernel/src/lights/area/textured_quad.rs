@@ -104,7 +104,7 @@ impl TexturedQuadEmitter {
         let share = (MAX_TEXTURE_SHARE * contrast) as f32;
         let cells =
             PiecewiseConstant2D::new(size[0], rows.into_iter()).filter(|_| share > MIN_TEXTURE_SHARE)?;
-        Some(Self { along: quad.dual_edges(), quad, size, cells, share })
+        Some(Self { along: quad.dual_basis(), quad, size, cells, share })
     }
 
     /// Pdf in sr⁻¹ at an offset from the point, given the untextured quad's pdf.
@@ -122,7 +122,7 @@ impl TexturedQuadEmitter {
     /// Area density of a cell, relative to a constant texture.
     #[inline(always)]
     fn cell_pdf_ratio(&self, column: usize, row: usize) -> f32 {
-        let probability = self.cells.row_probability(row) * self.cells.column_probability(row, column);
+        let probability = self.cells.row_probability(row) * self.cells.column_probability_in_row(row, column);
         probability * (self.size[0] * self.size[1]) as f32
     }
 }

@@ -96,7 +96,7 @@ impl InfiniteLight for DirectionalLight {
         (self.sample_direction_and_irradiance([0.5; 2]).1.as_dvec3() * area).as_vec3()
     }
 
-    fn bounds(&self) -> LightBounds {
+    fn direction_and_irradiance_bounds(&self) -> LightBounds {
         LightBounds {
             space: DistanceFalloff::Beyond,
             center: self.to_light.as_dvec3(),

@@ -163,7 +163,7 @@ impl InfiniteLight for Environment {
 
     /// Bounds that include all directions. The power is the irradiance that the mean radiance causes on a
     /// surface.
-    fn bounds(&self) -> LightBounds {
+    fn direction_and_irradiance_bounds(&self) -> LightBounds {
         let mean = match self {
             Self::Constant(radiance) => mean_channel(*radiance),
             Self::Map { sky, factor, .. } => sky.mean_luminance() * mean_channel(*factor),

@@ -24,7 +24,7 @@ pub trait InfiniteLight {
     fn power_through(&self, area: f64) -> Vec3;
 
     /// Bounds on the light's directions and irradiance.
-    fn bounds(&self) -> LightBounds;
+    fn direction_and_irradiance_bounds(&self) -> LightBounds;
 
     /// Unit direction to the light's center. `None` if the light surrounds the scene.
     fn direction_to_center(&self) -> Option<Vec3>;

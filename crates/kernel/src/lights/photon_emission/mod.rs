@@ -17,7 +17,7 @@ mod surface;
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-use super::area::EmissionTexture;
+use super::area::EmissionModulation;
 use super::delta::{Falloff, PointLight};
 use super::light::{Light, LightFamily};
 use super::set::Lights;
@@ -183,7 +183,7 @@ impl PhotonEmitter {
     pub fn with_targets(self, targets: &[BoundingSphere], share: f32) -> Self {
         let targets = PhotonTargets::new(targets).filter(|_| share > 0.0);
         let aim = targets.and_then(|targets| {
-            let power_toward = |(number, light)| self.power_toward(number, light, &targets);
+            let power_toward = |(number, light)| self.power_toward_targets(number, light, &targets);
             let power_toward: Vec<f64> = self.lights.iter().map(power_toward).collect();
             let (sum, total) = (power_toward.iter().sum::<f64>(), self.by_power.total());
             let weight = |(number, power_toward): (usize, &f64)| {
@@ -272,7 +272,7 @@ impl PhotonEmitter {
                 );
                 let start = PhotonOrigin::Surface { point: place.point, error: place.error, normal };
                 // Apply the clear coat's transmittance in the photon's direction.
-                let left = |texture: &EmissionTexture| {
+                let left = |texture: &EmissionModulation| {
                     texture.coat_transmittance(place.point, place.primitive, -direction)
                 };
                 let flux = place.flux * light.texture.as_deref().map_or(1.0, left);
@@ -351,7 +351,7 @@ impl PhotonEmitter {
     }
 
     /// Estimated power that a light emits toward the targets, used for choosing a light.
-    fn power_toward(&self, number: u32, light: &Light, targets: &PhotonTargets) -> f64 {
+    fn power_toward_targets(&self, number: u32, light: &Light, targets: &PhotonTargets) -> f64 {
         let source = &self.sources[number as usize];
         let power = mean_channel(source.power);
         if !(power > 0.0) {

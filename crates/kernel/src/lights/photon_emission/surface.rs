@@ -100,7 +100,7 @@ impl DividedEmissiveSurface {
             let mut area = 0.0;
             for i in 0..per_side * per_side {
                 let u = Vec2::new((i % per_side) as f32 + 0.5, (i / per_side) as f32 + 0.5) / per_side as f32;
-                let place = on.sample_piece(light, index, u);
+                let place = on.sample_point_on_piece(light, index, u);
                 area = place.area;
                 sum += radiance_without_coat(light, &place).as_dvec3();
             }
@@ -125,7 +125,7 @@ impl DividedEmissiveSurface {
     /// Samples a point from random numbers in [0, 1).
     pub fn sample_point(&self, light: &AreaLight, piece: f32, u: Vec2) -> EmissionPoint {
         let (index, _) = self.pieces.sample(piece);
-        let place = self.on.sample_piece(light, index, u);
+        let place = self.on.sample_point_on_piece(light, index, u);
         let PiecePoint { point, normal, area, .. } = place;
         let factor = PI * area / self.pieces.probability(index);
         let flux = (radiance_without_coat(light, &place).as_dvec3() * factor).as_vec3();
@@ -142,7 +142,7 @@ impl DividedEmissiveSurface {
 
 impl DividedSurfaceGeometry {
     /// A uniformly distributed point on a piece.
-    fn sample_piece(&self, light: &AreaLight, index: usize, u: Vec2) -> PiecePoint {
+    fn sample_point_on_piece(&self, light: &AreaLight, index: usize, u: Vec2) -> PiecePoint {
         match (self, light.shape.as_mesh()) {
             (Self::Shape { shape, side, areas, .. }, _) => {
                 let all = *side as usize;

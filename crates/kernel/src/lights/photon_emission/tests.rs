@@ -15,8 +15,8 @@ use crate::lights::delta::DeltaLight;
 use crate::lights::delta::SpotLight;
 use crate::lights::infinite::{DirectionalLight, Environment, EnvironmentMap};
 use crate::lights::{
-    AreaLight, EmissionTexture, Emitter, EmittingTriangleSelection, MeshEmitter, TriangleWithUvs, UvMapping,
-    front_area_light,
+    AreaLight, EmissionModulation, Emitter, EmittingTriangleSelection, MeshEmitter, TriangleWithUvs,
+    UvMapping, front_area_light,
 };
 use crate::materials::texels::{TexelData, Texels};
 use crate::materials::texture::{Texture, TextureFilter, Wrap};

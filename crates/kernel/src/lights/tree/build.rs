@@ -75,7 +75,7 @@ impl LightTreeBuilder<'_> {
             let Some(bounds) = LightBounds::union_of_all(own.iter().map(|leaf| &leaf.bounds)) else {
                 continue;
             };
-            node.set_child(i, &bounds, self.unit);
+            node.set_child_bounds(i, &bounds, self.unit);
             node.first[i] = first;
             node.children[i] = match own {
                 [leaf] if is_over_lights => NodeChild::Light(leaf.light),
@@ -153,11 +153,11 @@ impl NodeCostSums {
 
     fn from_leaves(leaves: &[LightLeaf]) -> Self {
         let mut sum = Self::NOTHING;
-        leaves.iter().for_each(|leaf| sum.add(leaf));
+        leaves.iter().for_each(|leaf| sum.add_leaf(leaf));
         sum
     }
 
-    fn add(&mut self, leaf: &LightLeaf) {
+    fn add_leaf(&mut self, leaf: &LightLeaf) {
         let LightBounds { center, radius, power, cone, .. } = &leaf.bounds;
         let EmissionCone { axis, cos, .. } = cone;
         self.count += 1;
@@ -209,7 +209,7 @@ fn split_leaves_along_longest_axis(leaves: &mut [LightLeaf], unit: usize) -> usi
         };
         let mut bins = [NodeCostSums::NOTHING; BINS];
         for leaf in &*leaves {
-            bins[bin_of(leaf)].add(leaf);
+            bins[bin_of(leaf)].add_leaf(leaf);
         }
         let last = cheapest_split_index(&bins);
         let count = bins[..last].iter().map(|bin| bin.count).sum();

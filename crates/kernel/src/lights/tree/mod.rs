@@ -170,10 +170,10 @@ impl CumulativeImportance {
         for i in 0..PACKET_SIZE {
             sums[i] = f64::from(importance[i]);
         }
-        sums = add_shifted::<1>(&sums);
-        sums = add_shifted::<2>(&sums);
-        sums = add_shifted::<4>(&sums);
-        Self(add_shifted::<8>(&sums))
+        sums = add_shifted_lanes::<1>(&sums);
+        sums = add_shifted_lanes::<2>(&sums);
+        sums = add_shifted_lanes::<4>(&sums);
+        Self(add_shifted_lanes::<8>(&sums))
     }
 
     /// Probability of a child.
@@ -209,7 +209,7 @@ impl CumulativeImportance {
 
 /// Adds the value `STEP` lanes earlier to each lane.
 #[inline(always)]
-fn add_shifted<const STEP: usize>(sums: &[f64; PACKET_SIZE]) -> [f64; PACKET_SIZE] {
+fn add_shifted_lanes<const STEP: usize>(sums: &[f64; PACKET_SIZE]) -> [f64; PACKET_SIZE] {
     let mut before = [0.0; PACKET_SIZE];
     before[STEP..].copy_from_slice(&sums[..PACKET_SIZE - STEP]);
     for i in 0..PACKET_SIZE {

@@ -229,7 +229,7 @@ impl LightTreeNode {
     }
 
     /// Sets a child. `unit` is the unit of power, approximately the power of the entire tree.
-    pub fn set_child(&mut self, i: usize, bounds: &LightBounds, unit: f64) {
+    pub fn set_child_bounds(&mut self, i: usize, bounds: &LightBounds, unit: f64) {
         let LightBounds { space, center, radius, power, cone } = bounds;
         let own = &mut self.bounds;
         set_lane(&mut own.center, i, center.as_vec3());

@@ -404,7 +404,7 @@ impl NonSpecular {
     }
 
     /// The BSDF, if the material has no textures.
-    pub fn as_constant(&self) -> Option<BxdfPoint> {
+    pub fn as_untextured(&self) -> Option<BxdfPoint> {
         self.textures().next().is_none().then(|| self.with_white_textures())
     }
 

@@ -26,7 +26,7 @@ impl CheckpointLock {
 
     /// Locks a file left behind by a process that has ended. Does nothing if another process has locked the
     /// file.
-    pub(super) fn lock_abandoned(&mut self, path: &Path) {
+    pub(super) fn lock_abandoned_checkpoint(&mut self, path: &Path) {
         let Some(file) = open_if_regular(path) else { return };
         match file.try_lock() {
             Err(TryLockError::WouldBlock) => {}
@@ -83,16 +83,16 @@ mod tests {
         std::fs::write(&path, "first").expect("written");
         let (mut one, mut other) = (CheckpointLock::default(), CheckpointLock::default());
         assert!(!one.is_held_by_this_process(&path) && !one.is_held_by_another_process(&path));
-        one.lock_abandoned(&path);
+        one.lock_abandoned_checkpoint(&path);
         assert!(one.is_held_by_this_process(&path) && !one.is_held_by_another_process(&path));
         // Locks belong to open file handles, so a second instance acts like another process.
-        other.lock_abandoned(&path);
+        other.lock_abandoned_checkpoint(&path);
         assert!(!other.is_held_by_this_process(&path) && other.is_held_by_another_process(&path));
         // Replace the file with a new one of the same name.
         std::fs::write(folder.path().join("b"), "second").expect("written");
         std::fs::rename(folder.path().join("b"), &path).expect("renamed");
         assert!(!one.is_held_by_this_process(&path) && !other.is_held_by_another_process(&path));
-        other.lock_abandoned(&path);
+        other.lock_abandoned_checkpoint(&path);
         assert!(one.is_held_by_another_process(&path));
         other.release();
         assert!(!one.is_held_by_another_process(&path));

@@ -19,7 +19,7 @@ use crate::integrators::RayCounters;
 use crate::messages;
 use crate::output::part::{
     self, ImageHeader, PartError, PartFile, PartHeader, PartOrCheckpoint, PartShare, RenderInput,
-    dependency_differences,
+    render_input_differences,
 };
 use crate::output::write::{Durability, WritePolicy};
 use crate::output::{AttributeLossPolicy, FilmEncodingSettings, OutputError};
@@ -43,12 +43,12 @@ pub(crate) fn create_header(
     identity: Vec<RenderInput>,
     finish: &FilmEncodingSettings,
 ) -> PartHeader {
-    let share = shard_header(state.share.as_ref());
+    let share = part_share_of_shard(state.share.as_ref());
     let (picture, scene) = (ImageHeader::new(&state.film, finish), String::new());
     PartHeader { kind, identity, share, picture, scene, references: Vec::new() }
 }
 
-fn shard_header(share: Option<&Shard>) -> PartShare {
+fn part_share_of_shard(share: Option<&Shard>) -> PartShare {
     match share {
         Some(share) => PartShare {
             index: share.index,
@@ -110,7 +110,7 @@ impl<'a> Checkpointer<'a> {
         }
     }
 
-    fn image_dependencies(&self) -> &[RenderInput] {
+    fn image_inputs(&self) -> &[RenderInput] {
         self.identity.get_or_init(self.around.name)
     }
 
@@ -148,7 +148,7 @@ impl<'a> Checkpointer<'a> {
             return Ok(true);
         }
         let Err(error) = self.restore(state, samples) else {
-            self.around.lock.borrow_mut().lock_abandoned(&self.path);
+            self.around.lock.borrow_mut().lock_abandoned_checkpoint(&self.path);
             self.is_own.set(true);
             let (path, samples) = (self.path.clone(), state.min_unfinished_samples(samples));
             self.send_update(CheckpointUpdate::Resumed { path, samples });
@@ -318,13 +318,13 @@ impl<'a> Checkpointer<'a> {
     }
 
     fn create_header(&self, kind: PartOrCheckpoint, state: &FilmState) -> PartHeader {
-        create_header(kind, state, self.image_dependencies().to_vec(), self.around.finish)
+        create_header(kind, state, self.image_inputs().to_vec(), self.around.finish)
     }
 
     /// Returns the differences between a file header and this render.
     fn differences_from(&self, head: &PartHeader, state: &FilmState) -> Vec<String> {
-        let mut unlike = dependency_differences(&head.identity, self.image_dependencies(), ("there", "here"));
-        let share = shard_header(state.share.as_ref());
+        let mut unlike = render_input_differences(&head.identity, self.image_inputs(), ("there", "here"));
+        let share = part_share_of_shard(state.share.as_ref());
         let name = |share: &PartShare| match share.count {
             1 => "the whole image".to_owned(),
             count => format!("part {}/{count}", share.index),
@@ -443,7 +443,7 @@ impl<'a> Checkpointer<'a> {
         let may_replace = |at: &Path| {
             let refused = |reason| Err(OutputError::Refused { reason });
             match at.symlink_metadata() {
-                Ok(_) if !part::is_part(at) || inputs.contain(at) => refused(format!(
+                Ok(_) if !part::is_part(at) || inputs.contains_path(at) => refused(format!(
                     "cannot write {}: the existing file {}",
                     path.display(),
                     foreign_file_problem(at)
@@ -459,7 +459,7 @@ impl<'a> Checkpointer<'a> {
             }
         };
         let guard = WritePolicy {
-            is_kept: &|path| inputs.contain(path),
+            is_kept: &|path| inputs.contains_path(path),
             may_replace: &may_replace,
             sweep: None,
             losses: AttributeLossPolicy::Report(&|_| ()),

@@ -43,7 +43,7 @@ impl CellCost {
     }
 
     /// The cell's cost as an equivalent number of samples, including the pixel overhead.
-    pub(crate) fn samples_including_overhead(&self, share: PixelOverhead) -> f64 {
+    pub(crate) fn cost_in_samples_with_overhead(&self, share: PixelOverhead) -> f64 {
         share.samples_including_overhead(self.units, self.pixels)
     }
 }
@@ -96,7 +96,9 @@ mod tests {
         }
         for (cell, rate) in cells.iter().zip([1.0, 3.0]) {
             assert!((share.samples_including_overhead(800.0, 100.0) - 850.0).abs() < 1e-9);
-            assert!((cell.recorded_seconds() / cell.samples_including_overhead(share) - rate).abs() < 1e-9);
+            assert!(
+                (cell.recorded_seconds() / cell.cost_in_samples_with_overhead(share) - rate).abs() < 1e-9
+            );
         }
     }
 

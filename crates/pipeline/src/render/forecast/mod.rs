@@ -19,7 +19,7 @@ use std::time::Instant;
 
 use rayon::ThreadPool;
 
-use self::noise::NoiseForecast;
+use self::noise::NoiseTracker;
 use self::work_rate::{WorkAmount, WorkRate};
 use super::film_state::FilmState;
 use crate::film::ConvergenceModel;
@@ -46,7 +46,7 @@ struct WorkEstimate {
 /// Progress and forecast of a render.
 pub(crate) struct Forecast {
     rate: WorkRate,
-    noise: NoiseForecast,
+    noise: NoiseTracker,
     expectation: WorkEstimate,
     /// Last reported fraction.
     fraction: f64,
@@ -78,10 +78,10 @@ impl Forecast {
     pub(crate) fn new(state: &FilmState, most: u32) -> Self {
         Self {
             rate: WorkRate::new(state.cpu_seconds()),
-            noise: NoiseForecast::new(),
+            noise: NoiseTracker::new(),
             expectation: WorkEstimate { due: Instant::now(), total: None, passes: [0; 2] },
             fraction: 0.0,
-            total_units: state.expected_pixel_samples(most),
+            total_units: state.expected_total_samples(most),
             photon_seconds: 0.0,
             photons_since: None,
         }
@@ -89,7 +89,7 @@ impl Forecast {
 
     /// Updates the total work after goals have changed.
     pub(crate) fn update_total_work(&mut self, state: &FilmState, most: u32) {
-        self.total_units = state.expected_pixel_samples(most);
+        self.total_units = state.expected_total_samples(most);
         self.expectation.due = Instant::now();
     }
 
@@ -127,7 +127,7 @@ impl Forecast {
             fraction = fraction.max(elapsed_seconds / (elapsed_seconds + left)).min(1.0);
         }
         self.fraction = if moment.is_last { 1.0 } else { self.fraction.max(fraction) };
-        let pixels = moment.state.film.crop().area() as u64;
+        let pixels = moment.state.film.crop_rect().area() as u64;
         let left = eta_seconds.filter(|_| has_predictable_convergence(moment));
         RenderProgress {
             fraction: self.fraction,
@@ -165,7 +165,7 @@ impl Forecast {
         if !moment.is_first {
             return 0.0;
         }
-        let pixels = moment.state.film.crop().area() as u64;
+        let pixels = moment.state.film.crop_rect().area() as u64;
         pixels.saturating_sub(moment.units) as f64
             / self.total_units.saturating_sub(moment.units).max(1) as f64
     }
@@ -174,7 +174,7 @@ impl Forecast {
 /// Whether future noise can be predicted from past noise. This is impossible with `error`, because fewer and
 /// fewer tiles receive samples, and with photons, because the radius shrinks from pass to pass.
 fn has_predictable_convergence(moment: &RenderSnapshot<'_>) -> bool {
-    match moment.state.film.convergence() {
+    match moment.state.film.convergence_model() {
         ConvergenceModel::Stratified => !(moment.plan.settings.render.error > 0.0),
         ConvergenceModel::Photons => false,
     }
@@ -186,7 +186,7 @@ fn estimate_work(moment: &RenderSnapshot<'_>) -> WorkEstimate {
     let RenderOptions { samples: most, error, .. } = plan.settings.render;
     let begin = Instant::now();
     let is_known = !(error > 0.0) || state.can_predict_samples();
-    let pixels = state.film.crop().area();
+    let pixels = state.film.crop_rect().area();
     let at_once = photons.map_or(u32::MAX, PhotonStore::max_passes_at_once);
     let jobs = |done, end| estimate_remaining_job_count(done, end, pixels, at_once);
     let total = is_known.then(|| state.cpu_seconds() + state.remaining_cpu_seconds(most, jobs));

@@ -15,7 +15,7 @@ const STEP: f64 = 1.5;
 
 /// The last noise measurement and the time of the next one.
 #[derive(Debug)]
-pub(crate) struct NoiseForecast {
+pub(crate) struct NoiseTracker {
     due: Instant,
     told: Option<NoiseMeasurement>,
 }
@@ -30,7 +30,7 @@ struct NoiseMeasurement {
     seconds: f64,
 }
 
-impl NoiseForecast {
+impl NoiseTracker {
     pub(crate) fn new() -> Self {
         Self { due: Instant::now() + INTERVAL, told: None }
     }
@@ -107,9 +107,9 @@ mod tests {
     }
 
     /// Noise of independent samples: 2.1 % after 100 units of work and 9 seconds.
-    fn measured() -> NoiseForecast {
+    fn measured() -> NoiseTracker {
         let noise = ImageNoiseAndConvergence { relative_error: 0.021, power: 1.0 };
-        NoiseForecast {
+        NoiseTracker {
             due: Instant::now(),
             told: Some(NoiseMeasurement { noise, done: 100.0, seconds: 9.0 }),
         }

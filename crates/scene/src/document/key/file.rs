@@ -39,7 +39,7 @@ impl TableKey<'_> {
                     Some(near) => {
                         format!(
                             "did you mean {}?",
-                            escape_invisible_chars(&suggested_scene_path(text, &near))
+                            escape_invisible_chars(&suggestion_relative_to_scene(text, &near))
                         )
                     }
                     None => "paths are relative to the scene file".to_owned(),
@@ -74,7 +74,7 @@ impl TableKey<'_> {
 }
 
 /// Returns a suggested file's path as written in scenes: relative to the scene's folder.
-fn suggested_scene_path(text: &str, near: &Path) -> String {
+fn suggestion_relative_to_scene(text: &str, near: &Path) -> String {
     let name = near.file_name().unwrap_or(near.as_os_str());
     Path::new(text).with_file_name(name).to_string_lossy().into_owned()
 }
@@ -109,9 +109,9 @@ mod tests {
     fn suggestions_are_relative_to_the_scene() {
         let near = Path::new("scenes/../assets/textures/bricks.png");
         assert_eq!(
-            suggested_scene_path("../assets/textures/brick.png", near),
+            suggestion_relative_to_scene("../assets/textures/brick.png", near),
             "../assets/textures/bricks.png"
         );
-        assert_eq!(suggested_scene_path("brick.png", Path::new("scenes/bricks.png")), "bricks.png");
+        assert_eq!(suggestion_relative_to_scene("brick.png", Path::new("scenes/bricks.png")), "bricks.png");
     }
 }

@@ -77,7 +77,7 @@ fn read_object(
         _ => table.required_key("material", "\"name\""),
     };
     let material = key.index_by_name(&materials.names);
-    let name = table.optional_key("name").optional_object_name();
+    let name = table.optional_key("name").optional_shape_name();
     table.report_unknown_and_missing_keys();
     if kind == "plane" && material.is_some_and(|index| materials.is_emissive(index)) {
         let issue = Issue::error(key.value_span()?, "an infinite plane cannot emit light")

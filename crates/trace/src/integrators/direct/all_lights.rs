@@ -8,7 +8,7 @@ use crate::integrators::transport::interiors::{InteriorLists, medium_transmittan
 use crate::integrators::transport::tile::TileContext;
 use crate::integrators::view::LightAov;
 use crate::lights::{
-    EmissionTexture, Light, LightCenter, LightGeometry, LightGeometryPacket, LightSamplePacket,
+    EmissionModulation, Light, LightCenter, LightGeometry, LightGeometryPacket, LightSamplePacket,
 };
 use crate::materials::bsdf::ratio;
 use crate::math::Vec3;
@@ -170,7 +170,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
                 // Apply the MIS weight, unless the light has no extent and is found only by light samples.
                 if MIS && !is_single {
                     let leaves_gloss = self.tile.lobes_find_sky && light.is_environment();
-                    let of_light = if leaves_gloss && self.competing.is_lobe_rays() {
+                    let of_light = if leaves_gloss && self.competing.uses_lobe_rays() {
                         // Use a light-sampling pdf close to 0 so that lobe rays account for all of the light.
                         [f32::MAX; PACKET_SIZE]
                     } else {
@@ -231,7 +231,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
     #[inline(never)]
     fn apply_emission_texture(
         &self,
-        pattern: &EmissionTexture,
+        pattern: &EmissionModulation,
         samples: &LightSamplePacket,
         active: u32,
         mut values: Vec3x16,
@@ -307,7 +307,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         for i in 0..PACKET_SIZE {
             let from = lane(&self.row.from, i);
             let ray = match middle {
-                LightCenter::At(middle) => Ray::segment_ending_before(from, middle),
+                LightCenter::At(middle) => Ray::segment_ending_before_point(from, middle),
                 LightCenter::Towards(direction) => Ray::new(from, direction),
             };
             set_lane(&mut direction, i, ray.direction);
@@ -318,7 +318,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
             ends[i] = if traced & 1 << i != 0 { ends[i] } else { -1.0 };
         }
         let rays = RayPacket::from_soa(self.row.from, direction)
-            .with_start_triangle(self.row.start_triangles(&direction));
+            .with_start_triangle(self.row.ray_start_triangles(&direction));
         self.add_light_along_shadow_rays(
             (&rays, &ends, traced),
             &LightGeometryPacket::splat(source),
@@ -415,7 +415,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
     pub fn shadow_rays(&self, samples: &LightSamplePacket, active: u32) -> (RayPacket, F32x16) {
         let (mut direction, mut ends) = (samples.directions, [-1.0; PACKET_SIZE]);
         for i in 0..PACKET_SIZE {
-            let ray = Ray::segment_ending_before(lane(&self.row.from, i), lane(&samples.targets, i));
+            let ray = Ray::segment_ending_before_point(lane(&self.row.from, i), lane(&samples.targets, i));
             set_lane(&mut direction, i, ray.direction);
             ends[i] = if active & 1 << i != 0 { ray.t_max } else { -1.0 };
         }
@@ -425,7 +425,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         }
         (
             RayPacket::from_soa(self.row.from, direction)
-                .with_start_triangle(self.row.start_triangles(&direction)),
+                .with_start_triangle(self.row.ray_start_triangles(&direction)),
             ends,
         )
     }

@@ -32,7 +32,7 @@ impl CompetingTechnique {
     }
 
     /// Whether the technique consists of rays in glossy lobes.
-    pub fn is_lobe_rays(self) -> bool {
+    pub fn uses_lobe_rays(self) -> bool {
         match self {
             Self::Nothing | Self::Paths | Self::NarrowPaths => false,
             Self::Lobes(_) => true,
@@ -148,7 +148,7 @@ impl TileContext<'_> {
     /// MIS-weighted radiance of infinite lights along a path. Light samples contribute the rest.
     pub fn mis_weighted_infinite_light(&self, path: &PathRay) -> Vec3 {
         let environment = self.world.lights.environment();
-        self.infinite_light_with_sky(
+        self.infinite_light_with_precomputed_sky(
             environment.map(|environment| environment.radiance_and_pdf(path.ray.direction)),
             path,
         )
@@ -156,7 +156,7 @@ impl TileContext<'_> {
 
     /// Like [`TileContext::mis_weighted_infinite_light`], with the environment's radiance and light-sampling pdf already
     /// evaluated.
-    pub fn infinite_light_with_sky(&self, sky: Option<(Vec3, f32)>, path: &PathRay) -> Vec3 {
+    pub fn infinite_light_with_precomputed_sky(&self, sky: Option<(Vec3, f32)>, path: &PathRay) -> Vec3 {
         let (lights, pdf) = (&self.world.lights, path.state.pdf);
         let samples = self.settings.render.shadow_samples as f32;
         if pdf.is_nan() || pdf <= 0.0 {
@@ -170,11 +170,11 @@ impl TileContext<'_> {
 
     /// Like [`TileContext::lobe_ray_emitter_radiance`], for a lobe ray that leaves the scene.
     pub fn lobe_ray_radiance_from_infinity(&self, ray: &Ray, normal: Vec3, pdf: f32) -> Vec3 {
-        self.lobe_ray_radiance_from_light(None, ray, normal, pdf)
+        self.lobe_ray_radiance_from_infinite_light(None, ray, normal, pdf)
     }
 
     /// Like [`TileContext::lobe_ray_radiance_from_infinity`], but restricted to light `number`, unless it is `None`.
-    pub fn lobe_ray_radiance_from_light(
+    pub fn lobe_ray_radiance_from_infinite_light(
         &self,
         number: Option<u32>,
         ray: &Ray,
@@ -241,7 +241,7 @@ impl TileContext<'_> {
         }
         let surface = world.geometry.surface(ray, hit);
         let normal = surface.normal;
-        if !emission.emits_from(normal.dot(ray.direction) < 0.0) {
+        if !emission.emits_on_side(normal.dot(ray.direction) < 0.0) {
             return Vec3::ZERO;
         }
         let at = world.texture_point(hit, &surface, |_| Footprint::POINT);
@@ -294,7 +294,7 @@ impl TileContext<'_> {
     /// rays cannot reach the hit point.
     pub fn emitter_weight_at_glass(&self, path: &PathRay, hit: &Hit) -> f32 {
         let Ray { origin, direction, .. } = path.ray;
-        let shadow = Ray::segment_ending_before(origin, origin + direction * hit.shape.t);
+        let shadow = Ray::segment_ending_before_point(origin, origin + direction * hit.shape.t);
         if path.state.pdf > 0.0
             && !self.world.has_zero_transmittance_along(&shadow, LightGeometry::Object(hit.object))
         {

@@ -97,14 +97,14 @@ impl DirectLightVertexQueue {
     }
 
     /// Stores the ray cone at a path's vertex.
-    pub fn store_cone(&mut self, place: u32, cone: RayCone) {
+    pub fn store_ray_cone(&mut self, place: u32, cone: RayCone) {
         if let Some(own) = self.cones.get_mut(place as usize) {
             *own = cone;
         }
     }
 
     /// Ends the bounce of these paths and adds their direct light to the accumulator, in path order.
-    pub fn add_arrived_light(&mut self, paths: &[PathRay], accumulator: &mut Accumulator<'_>) {
+    pub fn accumulate_arrived_light(&mut self, paths: &[PathRay], accumulator: &mut Accumulator<'_>) {
         for (place, light) in self.arrived.iter().enumerate().filter(|(_, light)| **light != Vec3::ZERO) {
             let path = &paths[place];
             let (slot, only_specular_before) = (path.slot, path.state.only_specular_before);
@@ -115,8 +115,8 @@ impl DirectLightVertexQueue {
     }
 
     /// Like [`DirectLightQueue::flush_to_accumulator`], for paths with consecutive slots.
-    pub fn flush_consecutive_to_accumulator(&mut self, first: u32, accumulator: &mut Accumulator<'_>) {
-        accumulator.add_direct_consecutive(first, &self.arrived, &self.arrived_diffuse);
+    pub fn add_arrived_light_consecutive(&mut self, first: u32, accumulator: &mut Accumulator<'_>) {
+        accumulator.add_direct_to_consecutive_slots(first, &self.arrived, &self.arrived_diffuse);
     }
 
     /// Returns an unused packet. The caller fills it, and then keeps it with
@@ -162,7 +162,7 @@ impl DirectLightVertexQueue {
         aov: LightAov,
         sides: ShadingSides<'_>,
     ) {
-        self.store_cone(lit.place, lit.vertex.cone);
+        self.store_ray_cone(lit.place, lit.vertex.cone);
         let interiors = self.interior_lists.push_list(lit.interiors);
         let far_side = match sides {
             ShadingSides::OneSide { .. } => None,
@@ -215,7 +215,7 @@ impl DirectLightVertexQueue {
     /// Groups of consecutive packets whose lights are sampled together.
     pub fn groups(&self, tile: &TileContext<'_>) -> impl Iterator<Item = Range<usize>> + use<> {
         let (count, picks_lights) =
-            (self.count, tile.world.lights.sampler_for_mode(tile.behavior.receivers).is_some());
+            (self.count, tile.world.lights.sampler_for_purpose(tile.behavior.receivers).is_some());
         let size = if picks_lights { MAX_GROUP_SIZE } else { 1 };
         (0..count).step_by(size).map(move |first| first..(first + size).min(count))
     }
@@ -292,7 +292,7 @@ impl DirectLightVertexQueue {
             // Paths in microfacet lobes do not account for lights.
             CompetingTechnique::from_sharp_vertex_mask(row.bsdf.narrow_lobe_mask() & request.used)
         } else {
-            CompetingTechnique::from_sharp_vertex_mask(row.sharp_lobes(tile, aov) & request.used)
+            CompetingTechnique::from_sharp_vertex_mask(row.sharp_lobe_mask(tile, aov) & request.used)
         }
     }
 
@@ -339,7 +339,7 @@ impl DirectLightVertexQueue {
             splits_lobes,
         };
         use CompetingTechnique::{Lobes, NarrowPaths, Nothing, Paths};
-        let sums = match (competing, tile.world.lights.sampler_for_mode(tile.behavior.receivers)) {
+        let sums = match (competing, tile.world.lights.sampler_for_purpose(tile.behavior.receivers)) {
             (Nothing, None) => instructions.run(plain),
             (Nothing, Some(selection)) => {
                 instructions.run(SampleLightTree { lighting: plain, selection, number, pool: &mut pool })

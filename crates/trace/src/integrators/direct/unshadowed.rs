@@ -53,7 +53,7 @@ impl LobeRayIgnoringOcclusion<'_> {
         }
         // Add the infinite lights.
         for (number, light) in world.lights.iter().filter(|(_, light)| light.is_infinite()) {
-            let radiance = tile.lobe_ray_radiance_from_light(Some(number), ray, normal, *pdf);
+            let radiance = tile.lobe_ray_radiance_from_infinite_light(Some(number), ray, normal, *pdf);
             if radiance != Vec3::ZERO {
                 sum += radiance * transmittance(f32::MAX) * self.visibility_of_light(light, rays);
             }
@@ -70,7 +70,7 @@ impl LobeRayIgnoringOcclusion<'_> {
         // An environment has no center, so test the ray itself.
         let (segment, source) = match light.center_and_geometry() {
             Some((LightCenter::At(middle), source)) => {
-                (Ray::segment_ending_before(self.ray.origin, middle), source)
+                (Ray::segment_ending_before_point(self.ray.origin, middle), source)
             }
             Some((LightCenter::Towards(direction), source)) => (Ray::new(self.ray.origin, direction), source),
             None => (self.ray, LightGeometry::Nothing),
@@ -79,7 +79,7 @@ impl LobeRayIgnoringOcclusion<'_> {
             return Vec3::ZERO;
         }
         rays.shadow += 1;
-        let segment = segment.with_start_triangle(self.row.start_triangle(self.lane, segment.direction));
+        let segment = segment.with_start_triangle(self.row.ray_start_triangle(self.lane, segment.direction));
         self.tile.world.transmittance(&segment, source, &mut rays.lookups)
     }
 }

@@ -126,7 +126,7 @@ impl CameraWavefront<'_, '_> {
                 self.add_emission_and_ambient(&path, &hit, packet.shining & bit != 0);
             }
             Some(hit) => {
-                let surface = packet.surface_unless_plain(self.surfaces, lane);
+                let surface = packet.scalar_shaded_surface(self.surfaces, lane);
                 let camera_path = (self.depth == 0 && self.accumulator.first_hit_layers().is_some())
                     .then_some(path)
                     .filter(|_| !tile.world.has_null_interaction_surfaces());
@@ -141,7 +141,7 @@ impl CameraWavefront<'_, '_> {
             }
             None => {
                 let sky = tile.world.lights.environment().map(|_| packet.sky_radiance_and_pdf(lane));
-                self.add_infinite_light(&path, tile.infinite_light_with_sky(sky, &path));
+                self.add_infinite_light(&path, tile.infinite_light_with_precomputed_sky(sky, &path));
             }
         }
     }
@@ -174,7 +174,7 @@ impl CameraWavefront<'_, '_> {
 
     pub(super) fn shade_mirror(&mut self, path: &PathRay, vertex: &SurfaceVertex<'_>, mirror: &Mirror) {
         let shading = vertex.perturbed_and_smooth_normals(self.counters);
-        let is_colored = self.accumulator.aov.has_surface_colors_applied();
+        let is_colored = self.accumulator.aov.applies_surface_colors();
         let reflectance = vertex.mirror_reflectance(mirror, &shading, is_colored, self.counters);
         self.roulette_and_push_reflected(reflected_path(path, vertex, &shading, reflectance));
     }
@@ -197,7 +197,7 @@ impl CameraWavefront<'_, '_> {
         if both || is_coat {
             let lookups = &mut self.counters.texture_lookups;
             let specular =
-                coated.specular_factor(&vertex.texture_point, lookups) * if both { fresnel } else { 1.0 };
+                coated.specular_tint(&vertex.texture_point, lookups) * if both { fresnel } else { 1.0 };
             if specular != Vec3::ZERO {
                 self.roulette_and_push_reflected(reflected_path(path, vertex, &shading, specular));
             }

@@ -25,7 +25,7 @@ impl CameraWavefront<'_, '_> {
             for lane in set_bit_lanes(packet.plain) {
                 let Some(hit) = packet.hit(lane) else { continue };
                 let cone = packet.path(self.tile, rays, lane).cone.propagated_by(hit.shape.t);
-                self.direct.store_cone(rays.queue_index(lane), cone);
+                self.direct.store_ray_cone(rays.queue_index(lane), cone);
             }
         }
     }
@@ -49,7 +49,7 @@ impl CameraWavefront<'_, '_> {
             }
             return;
         }
-        let is_colored = self.accumulator.aov.has_surface_colors_applied();
+        let is_colored = self.accumulator.aov.applies_surface_colors();
         let mut bsdf =
             if is_colored { rough.evaluate_textures(at, lookups) } else { rough.with_white_textures() };
         if is_colored {

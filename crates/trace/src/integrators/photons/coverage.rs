@@ -81,9 +81,9 @@ pub fn primitive_material(world: &World, object: u32, primitive: u32) -> &Materi
 
 /// Whether photons are stored on a material.
 pub fn can_store_photons(material: &Material) -> bool {
-    let is_lit = |rough: &NonSpecular| rough.as_constant().is_none_or(|bsdf| !bsdf.is_black());
+    let is_lit = |rough: &NonSpecular| rough.as_untextured().is_none_or(|bsdf| !bsdf.is_black());
     let is_rough_glass = || material.bsdf.as_dielectric().is_some_and(|glass| !glass.is_smooth());
-    material.bsdf.non_specular().is_some_and(is_lit) || is_rough_glass()
+    material.bsdf.non_specular_part().is_some_and(is_lit) || is_rough_glass()
 }
 
 /// A wall perpendicular to the kernel's plane, represented as a half-plane containing the center. The dot

@@ -132,9 +132,9 @@ impl PhotonTracer<'_> {
     fn interiors_at(&self, point: Vec3, emitted: &EmittedPhoton) -> InteriorList {
         let world = self.tile.world;
         let emitter = || Some(world.lights.get(emitted.light).as_area()?.object);
-        let around = |glass: &&Interior| world.is_closed_shape_around_point(glass.body, point);
+        let around = |glass: &&Interior| world.is_closed_shape_containing(glass.body, point);
         let in_parts = self.bodies.iter().filter(|_| !is_from_infinite_light(emitted)).filter_map(|body| {
-            let material = world.material_around(body, point, emitter())?;
+            let material = world.enclosing_glass_material(body, point, emitter())?;
             Some(Interior { body: body.body, material })
         });
         self.glasses
@@ -234,7 +234,7 @@ impl PhotonWavefront<'_> {
         let has_planes = tile.world.geometry.has_unbounded();
         for begin in (0..count).step_by(PACKET_SIZE) {
             let numbers =
-                tile.world.geometry.instruction_set().run(EmissionRandomKernel { tile, first: begin });
+                tile.world.geometry.instruction_set().run(PhotonRandomNumbersKernel { tile, first: begin });
             for (i, numbers) in numbers.iter().enumerate().take((count - begin) as usize) {
                 // Emit a photon, and start it in front of all infinite planes it may pass through.
                 let Some(emitted) = tracing.emission.emit(numbers) else { continue };
@@ -292,7 +292,7 @@ impl PhotonWavefront<'_> {
         // Shade other surfaces one by one.
         for i in set_bit_lanes(packet.any & !packet.plain) {
             if let Some(hit) = packet.hit(i) {
-                walk_to_interaction(self, &mut { rays[i] }, (hit, packet.surface_unless_plain(surfaces, i)));
+                walk_to_interaction(self, &mut { rays[i] }, (hit, packet.scalar_shaded_surface(surfaces, i)));
             }
         }
     }
@@ -350,7 +350,7 @@ impl PhotonWavefront<'_> {
             self.store_and_scatter_at_rough(path, vertex, &coated.base, (far, by_chance));
         }
         if is_reflected && self.may_scatter() {
-            let specular = coated.specular_factor(&vertex.texture_point, &mut self.counters.texture_lookups);
+            let specular = coated.specular_tint(&vertex.texture_point, &mut self.counters.texture_lookups);
             let ray = reflected_path(path, vertex, &shading, specular * if chooses { 1.0 } else { fresnel });
             self.queue_specular_photon(path, vertex, (shading.normal, 1.0), ray);
         }
@@ -552,18 +552,18 @@ fn is_from_infinite_light(emitted: &EmittedPhoton) -> bool {
 }
 
 /// Draws the random numbers for photon emission.
-struct EmissionRandomKernel<'a> {
+struct PhotonRandomNumbersKernel<'a> {
     tile: &'a TileContext<'a>,
     first: u32,
 }
 
-impl SimdKernel for EmissionRandomKernel<'_> {
+impl SimdKernel for PhotonRandomNumbersKernel<'_> {
     type Output = [PhotonRandomNumbers; PACKET_SIZE];
 
     #[inline(always)]
     fn run(self, _: impl Simd) -> Self::Output {
         let slots = std::array::from_fn(|i| self.first + i as u32);
-        let (xs, ys, samples) = self.tile.block.samples_of_slots(&slots);
+        let (xs, ys, samples) = self.tile.block.pixels_and_samples_of_slots(&slots);
         let sampler = SamplerPacket::new(self.tile.settings.render.seed, &xs, &ys, &samples);
         let pairs = |decision| sampler.pairs(&[CAMERA_PATH; PACKET_SIZE], decision, 0, 1);
         let (light, aim) = (pairs(Dimension::PhotonLight), pairs(Dimension::PhotonTarget));
@@ -592,7 +592,7 @@ impl SimdKernel for RouletteRandomKernel<'_> {
         for (i, ray) in self.rays.iter().enumerate().take(PACKET_SIZE) {
             (slots[i], paths[i]) = (ray.slot, ray.path);
         }
-        let (xs, ys, samples) = self.tile.block.samples_of_slots(&slots);
+        let (xs, ys, samples) = self.tile.block.pixels_and_samples_of_slots(&slots);
         let sampler = SamplerPacket::new(self.tile.settings.render.seed, &xs, &ys, &samples);
         let [risks, _] = sampler.pairs(&paths, Dimension::Roulette, 0, 1);
         risks

@@ -173,7 +173,7 @@ impl PhotonMap {
             for order in order.chunks(PACKET_SIZE) {
                 let (mut block, mut depth) = (EMPTY, [0; PACKET_SIZE]);
                 for (i, &number) in order.iter().enumerate() {
-                    depth[i] = block.put_photon_returning_depth(i, &photons[number as usize]);
+                    depth[i] = block.set_photon_lane(i, &photons[number as usize]);
                 }
                 blocks.push(block);
                 depths.push(depth);
@@ -235,7 +235,7 @@ impl PhotonMap {
         let ranges = self.candidate_ranges(look);
         for range in &ranges.of[..ranges.count] {
             for block in blocks_in_range(*range) {
-                let Some(weights) = self.block_weights(look, *range, block, simd) else { continue };
+                let Some(weights) = self.kernel_weights_in_block(look, *range, block, simd) else { continue };
                 let flux = &self.blocks[block].flux;
                 let mut brought = [0.0; PACKET_SIZE];
                 for axis in 0..3 {
@@ -268,7 +268,7 @@ impl PhotonMap {
         let ranges = self.candidate_ranges(look);
         for range in &ranges.of[..ranges.count] {
             for block in blocks_in_range(*range) {
-                let Some(weights) = self.block_weights(look, *range, block, simd) else { continue };
+                let Some(weights) = self.kernel_weights_in_block(look, *range, block, simd) else { continue };
                 count += positive_lanes(&weights, simd).count_ones();
             }
         }
@@ -289,7 +289,7 @@ impl PhotonMap {
         let ranges = self.candidate_ranges(look);
         for range in &ranges.of[..ranges.count] {
             for block in blocks_in_range(*range) {
-                let Some(weights) = self.block_weights(look, *range, block, simd) else { continue };
+                let Some(weights) = self.kernel_weights_in_block(look, *range, block, simd) else { continue };
                 for i in set_bit_lanes(positive_lanes(&weights, simd)) {
                     visit(&self.photon(block, i), peak * weights[i]);
                 }
@@ -334,7 +334,7 @@ impl PhotonMap {
     /// Weights of a block's photons that are in a range and within the kernel, relative to the kernel's value
     /// at the center. `None` if there are no such photons.
     #[inline(always)]
-    fn block_weights(
+    fn kernel_weights_in_block(
         &self,
         look: &GatherPoint,
         range: [u32; 2],
@@ -394,7 +394,7 @@ impl PhotonMap {
 
 impl PhotonBlock {
     /// Stores a photon in a lane and returns its depth.
-    fn put_photon_returning_depth(&mut self, i: usize, photon: &Photon) -> u32 {
+    fn set_photon_lane(&mut self, i: usize, photon: &Photon) -> u32 {
         set_lane(&mut self.point, i, photon.point);
         set_lane(&mut self.flux, i, photon.flux);
         self.normal[i] = packed::pack_direction(photon.normal);

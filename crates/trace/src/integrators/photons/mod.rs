@@ -58,7 +58,7 @@ use crate::integrators::transport::tile::{SampleBlock, TileContext};
 use crate::lights::{BoundingSphere, PhotonEmitter};
 use crate::materials::{Dielectric, Material};
 use crate::scene::description::{RenderOptions, ShadowMode};
-use crate::world::{CompoundSolid, Hit, LightBoundingBoxPair, World, scene_photon_source};
+use crate::world::{CompoundSolid, Hit, LightBoundingBoxPair, World, scene_photon_emitter};
 use emit::{PhotonChunk, PhotonTracer};
 pub(super) use map::GatherPoint;
 pub use map::{Photon, PhotonMap};
@@ -148,7 +148,7 @@ impl PhotonMapper {
     ) -> Result<(Self, PhotonPass), Cancelled> {
         // Aim photons at the mirrors and glass.
         let specular = SpecularObjects::from_world(world);
-        let emission = scene_photon_source(&world.geometry, &world.lights).filter(|_| specular.has_any());
+        let emission = scene_photon_emitter(&world.geometry, &world.lights).filter(|_| specular.has_any());
         let aimed = AIMED[usize::from(specular.is_unbounded)];
         let emission = emission.map(|emission| emission.with_targets(&specular.balls, aimed));
         let (glasses, bodies) = light_enclosing_glass_candidates(world);
@@ -361,19 +361,20 @@ fn light_enclosing_glass_candidates(world: &World) -> (Vec<u32>, Vec<CompoundSol
     let lamps = world.finite_light_boxes();
     let may_hold_light = |object: &u32| {
         let bounds = world.geometry.objects()[*object as usize].bounds();
-        bounds.is_none_or(|bounds| lamps.iter().any(|lamp| lamp.may_intersect_box(&bounds)))
+        bounds.is_none_or(|bounds| lamps.iter().any(|lamp| lamp.may_light_intersect_box(&bounds)))
     };
     let closed = world.closed_glass_shapes().map(|(object, _)| object).filter(may_hold_light).collect();
     // A solid closed by opaque surfaces may extend beyond its bounding box, so test the center and corners of
     // each light.
     let is_around = |body: &CompoundSolid, lamp: &LightBoundingBoxPair| {
-        lamp.smaller_box_points().any(|point| world.material_around(body, point, lamp.object).is_some())
+        lamp.smaller_box_points()
+            .any(|point| world.enclosing_glass_material(body, point, lamp.object).is_some())
     };
     let mut bodies = world.compound_solids();
     bodies.retain(|body| {
-        lamps
-            .iter()
-            .any(|lamp| lamp.may_intersect_box(&body.bounds) || body.is_covered && is_around(body, lamp))
+        lamps.iter().any(|lamp| {
+            lamp.may_light_intersect_box(&body.bounds) || body.is_covered && is_around(body, lamp)
+        })
     });
     (closed, bodies)
 }

@@ -32,7 +32,8 @@ pub fn is_occluded(
         [look.point + above * look.normal, photon.point + above * photon.normal]
     };
     let is_blocked = |from, to| {
-        geometry.is_occluded_except_by_light(&Ray::segment_ending_before(from, to), LightGeometry::Nothing)
+        geometry
+            .is_occluded_except_by_light(&Ray::segment_ending_before_point(from, to), LightGeometry::Nothing)
     };
     let [from, to] = lifted(ABOVE);
     if !is_blocked(from, to) {

@@ -75,7 +75,7 @@ fn receives_photons(world: &World, look: &GatherPoint, place: Vec3, radius: f32)
     let mut start = place + above;
     let may_receive = |id: u32| world.materials_of(id).any(can_store_photons);
     for _ in 0..LAYERS {
-        let ray = Ray::segment_ending_before(start, end);
+        let ray = Ray::segment_ending_before_point(start, end);
         // Find the next surface below that may receive photons.
         let Some(hit) = world.geometry.closest_hit_on_objects_where(&ray, may_receive) else { return false };
         let bare = SurfaceRequest { uv: false, shadow_point: false };

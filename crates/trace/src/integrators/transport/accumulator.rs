@@ -159,7 +159,7 @@ impl Accumulator<'_> {
 
     /// Adds direct light at vertices with consecutive slots. The camera must see all of these vertices.
     /// `diffuse` contains the diffuse parts, or nothing if they are not needed.
-    pub fn add_direct_consecutive(&mut self, first: u32, contributions: &[Vec3], diffuse: &[Vec3]) {
+    pub fn add_direct_to_consecutive_slots(&mut self, first: u32, contributions: &[Vec3], diffuse: &[Vec3]) {
         for (sum, contribution) in self.radiance[first as usize..].iter_mut().zip(contributions) {
             *sum += *contribution;
         }

@@ -88,7 +88,7 @@ impl VertexBatch {
     const MIN_WIDTH_RATIO: f32 = 1.5;
 
     /// Mask of vertices whose highlights are too narrow for reliable light sampling.
-    pub fn sharp_lobes(&self, tile: &TileContext<'_>, aov: LightAov) -> u32 {
+    pub fn sharp_lobe_mask(&self, tile: &TileContext<'_>, aov: LightAov) -> u32 {
         let shows = match aov {
             LightAov::Radiance(RadianceComponentMask { specular, .. }) => specular,
             LightAov::LitFraction => false,
@@ -114,8 +114,11 @@ impl VertexBatch {
         for i in 0..PACKET_SIZE {
             is_run &= slots[i] == slots[0] + i as u32;
         }
-        let (xs, ys, samples) =
-            if is_run { block.samples_of_consecutive_slots(slots[0]) } else { block.samples_of_slots(slots) };
+        let (xs, ys, samples) = if is_run {
+            block.samples_of_consecutive_slots(slots[0])
+        } else {
+            block.pixels_and_samples_of_slots(slots)
+        };
         SamplerPacket::new(tile.settings.render.seed, &xs, &ys, &samples)
     }
 
@@ -242,7 +245,7 @@ impl VertexBatch {
     /// [`Ray::start`] values for rays from the vertices in the directions `wi`. [`Ray::NO_TRIANGLE`] for rays
     /// directed behind their facet.
     #[inline(always)]
-    pub fn start_triangles(&self, wi: &Vec3x16) -> [u32; PACKET_SIZE] {
+    pub fn ray_start_triangles(&self, wi: &Vec3x16) -> [u32; PACKET_SIZE] {
         // Vertices on analytic shapes are not on triangles.
         if self.start.iter().fold(!0, |all, start| all & start) == Ray::NO_TRIANGLE {
             return self.start;
@@ -261,7 +264,7 @@ impl VertexBatch {
     }
 
     /// Like [`VertexBatch::start_triangles`], for a single vertex.
-    pub fn start_triangle(&self, i: usize, direction: Vec3) -> u32 {
+    pub fn ray_start_triangle(&self, i: usize, direction: Vec3) -> u32 {
         let normal = if self.has_facet & 1 << i != 0 { &self.facet } else { &self.normal };
         if lane(normal, i).dot(direction) > 0.0 { self.start[i] } else { Ray::NO_TRIANGLE }
     }

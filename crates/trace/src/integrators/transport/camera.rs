@@ -42,7 +42,9 @@ impl TileContext<'_> {
             for (first, row) in (first..).step_by(PACKET_SIZE).zip(&rows) {
                 negative(first, row.negative);
                 let slots = first..slots.end.min(first + PACKET_SIZE as u32);
-                queue.extend(slots.zip(0..).map(|(slot, lane)| self.camera_path(row.rays.ray(lane), slot)));
+                queue.extend(
+                    slots.zip(0..).map(|(slot, lane)| self.start_camera_path(row.rays.ray(lane), slot)),
+                );
             }
         }
     }
@@ -61,7 +63,7 @@ impl TileContext<'_> {
 
     /// Path that starts with a camera ray.
     #[inline(always)]
-    pub fn camera_path(&self, ray: Ray, slot: u32) -> PathRay {
+    pub fn start_camera_path(&self, ray: Ray, slot: u32) -> PathRay {
         let interiors = if self.world.is_camera_in_air() {
             InteriorList::default()
         } else {
@@ -171,7 +173,7 @@ mod tests {
                     assert_eq!((xs[lane], ys[lane], samples[lane]), place, "{first} + {lane}");
                 }
                 let slots = std::array::from_fn(|lane| first + 7 * lane as u32);
-                let (xs, ys, samples) = block.samples_of_slots(&slots);
+                let (xs, ys, samples) = block.pixels_and_samples_of_slots(&slots);
                 for lane in 0..PACKET_SIZE {
                     let place = block.pixel_and_sample(slots[lane]);
                     assert_eq!((xs[lane], ys[lane], samples[lane]), place, "{first} + 7 * {lane}");

@@ -102,7 +102,11 @@ impl PacketHits {
     }
 
     /// Surface at a hit, or `None` if it is plain or not in the surface packet.
-    pub fn surface_unless_plain(&self, surfaces: &SurfacePacket, lane_of_ray: usize) -> Option<SurfacePoint> {
+    pub fn scalar_shaded_surface(
+        &self,
+        surfaces: &SurfacePacket,
+        lane_of_ray: usize,
+    ) -> Option<SurfacePoint> {
         let (i, bit) = (lane_of_ray, 1 << lane_of_ray);
         if self.found & bit == 0 {
             return None;
@@ -128,7 +132,9 @@ impl PacketHits {
     #[inline(always)]
     pub fn path(&self, tile: &TileContext<'_>, rays: &PacketSource<'_>, lane: usize) -> PathRay {
         match rays {
-            PacketSource::Camera(row, first, ..) => tile.camera_path(row.rays.ray(lane), first + lane as u32),
+            PacketSource::Camera(row, first, ..) => {
+                tile.start_camera_path(row.rays.ray(lane), first + lane as u32)
+            }
             PacketSource::Paths(paths, _) => paths[lane],
             PacketSource::Traced(paths, _, places) => paths[places[lane] as usize],
         }
@@ -312,7 +318,7 @@ impl PacketIntersector<'_> {
                 } else if row.bsdf.kind() != material.kind {
                     continue;
                 }
-                let own_uvs = material.row_texture.filter(|_| *are_lit && aov.has_surface_colors_applied());
+                let own_uvs = material.row_texture.filter(|_| *are_lit && aov.applies_surface_colors());
                 // Packets have room for one set of texture coordinates.
                 if own_uvs.is_some() && asked_uvs.is_some() && own_uvs != asked_uvs {
                     continue;

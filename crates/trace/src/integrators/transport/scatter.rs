@@ -171,8 +171,8 @@ impl SimdKernel for BsdfSampler<'_> {
         };
         let sides = if row.has_two_sides { row.bsdf.sample_either_side(&lobe, &u, simd) } else { None };
         let mut scattered = match sides {
-            Some(sides) => self.sample_both_sides(&sides, simd),
-            None => self.sample_viewer_side(&lobe, &u, simd),
+            Some(sides) => self.scatter_both_sides(&sides, simd),
+            None => self.sample_on_viewer_side(&lobe, &u, simd),
         };
         scattered.alive &= used;
         // Apply Russian roulette.
@@ -194,7 +194,7 @@ impl SimdKernel for BsdfSampler<'_> {
 impl BsdfSampler<'_> {
     /// Samples directions on the viewer's side of the vertices.
     #[inline(always)]
-    fn sample_viewer_side(&self, lobe: &F32x16, u: &[F32x16; 2], simd: impl Simd) -> ScatteredDirections {
+    fn sample_on_viewer_side(&self, lobe: &F32x16, u: &[F32x16; 2], simd: impl Simd) -> ScatteredDirections {
         let Self { row, continuation, .. } = *self;
         let wi = row.bsdf.sample(continuation.lobes, &row.normal, lobe, u, simd);
         // Evaluate the BSDF and the pdf.
@@ -222,7 +222,7 @@ impl BsdfSampler<'_> {
         };
         // Drop directions below the horizon.
         alive &= !row.below_horizon_mask(&wi, simd);
-        let starts = row.start_triangles(&wi);
+        let starts = row.ray_start_triangles(&wi);
         let narrow = row.bsdf.narrow_lobe_mask();
         ScatteredDirections {
             alive,
@@ -239,7 +239,7 @@ impl BsdfSampler<'_> {
 
     /// Scatters paths in directions sampled on both sides of the surfaces.
     #[inline(always)]
-    fn sample_both_sides(&self, samples: &DielectricSamplePacket, simd: impl Simd) -> ScatteredDirections {
+    fn scatter_both_sides(&self, samples: &DielectricSamplePacket, simd: impl Simd) -> ScatteredDirections {
         let row = self.row;
         let DielectricSamplePacket { directions: wi, densities: pdfs, shares, shown, beyond } = samples;
         // Apply the terminator factors for perturbed normals, each on its direction's side.

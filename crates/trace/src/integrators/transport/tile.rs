@@ -57,7 +57,7 @@ impl<'a> TileContext<'a> {
             && render.shadow_samples == 1
             && render.clamp == 0.0;
         let lobes_find_sky =
-            is_constant && world.lights.sampler_for_mode(LightSamplingPurpose::Eye).is_none();
+            is_constant && world.lights.sampler_for_purpose(LightSamplingPurpose::Eye).is_none();
         Self { world, settings, block, token, pixel_spread, behavior, paths_find_sky, lobes_find_sky }
     }
 
@@ -92,7 +92,7 @@ impl SampleBlock {
 
     /// Columns, rows and sample indices of slots. Arbitrary for slots without a sample.
     #[inline(always)]
-    pub fn samples_of_slots(
+    pub fn pixels_and_samples_of_slots(
         &self,
         slots: &[u32; PACKET_SIZE],
     ) -> ([u32; PACKET_SIZE], [u32; PACKET_SIZE], [u32; PACKET_SIZE]) {
@@ -136,7 +136,7 @@ impl SampleBlock {
             return ([x; PACKET_SIZE], [y; PACKET_SIZE], samples);
         }
         if self.pixels.part != PixelSubset::All {
-            return self.samples_of_slots(&array::from_fn(|lane| first + lane as u32));
+            return self.pixels_and_samples_of_slots(&array::from_fn(|lane| first + lane as u32));
         }
         let rect = self.pixels.rect;
         for lane in 0..PACKET_SIZE {

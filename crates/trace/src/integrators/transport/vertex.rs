@@ -133,7 +133,7 @@ impl<'a> SurfaceVertex<'a> {
 
     /// Whether the vertex emits toward the path.
     pub fn emits(&self) -> bool {
-        self.material.emission.emits_from(self.is_front)
+        self.material.emission.emits_on_side(self.is_front)
     }
 
     /// Radiance emitted toward the path. If light samples compete with the path, texture lookups are

@@ -97,7 +97,7 @@ impl Segment {
     const DIRECT: Self = Self { origin: Vec3::ZERO, distance: 0.0, count: 0 };
 
     /// Extends the segment across another surface, which the path hits at this distance.
-    fn extended(self, path: &PathRay, distance: f32) -> Self {
+    fn extended_past_surface(self, path: &PathRay, distance: f32) -> Self {
         let origin = if self.count == 0 { path.ray.origin } else { self.origin };
         Self { origin, distance: self.distance + distance, count: self.count + 1 }
     }
@@ -146,7 +146,7 @@ pub fn walk_to_interaction<'a, W: PathStepper<'a>>(
                 match null_interaction(stepper, path, &vertex, (way, hit)) {
                     NullInteraction::Passed(_) if way.count == MAX_NULL_INTERACTIONS => return,
                     NullInteraction::Passed(part) => {
-                        way = way.extended(path, hit.shape.t);
+                        way = way.extended_past_surface(path, hit.shape.t);
                         *path = path_past_surface(*path, &vertex, part);
                         match tile.world.geometry.closest_hit(&path.ray) {
                             Some(next) => {

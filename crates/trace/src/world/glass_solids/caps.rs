@@ -1,6 +1,6 @@
 //! Open rims that end at opaque surfaces, where light can reach the other side only through the glass.
 
-use super::parts::{GlassParts, MeshGlass, RimEdge, classify_object_glass};
+use super::parts::{GlassParts, GlassTriangles, RimEdge, find_glass_triangles};
 use crate::accel::Bvh;
 use crate::assets::LoadedMesh;
 use crate::control::{CancelToken, Cancelled};
@@ -130,11 +130,11 @@ fn evaluate_queries(
     let tree = Bvh::build(&bounds, token)?;
     let mut answers = vec![false; queries.len()];
     for object in &scene.objects {
-        if classify_object_glass(scene, meshes, object) == Some(MeshGlass::All) {
+        if find_glass_triangles(scene, meshes, object) == Some(GlassTriangles::All) {
             continue;
         }
         token.check_pause_and_cancel()?;
-        match object.shape.lowered(origin) {
+        match object.shape.to_traced_shape_relative_to(origin) {
             LoweredShape::Shape(shape) => {
                 let around = shape.bounds().unwrap_or(all);
                 tree.visit_overlapping(&around, |id| {
@@ -165,7 +165,7 @@ pub(super) fn triangles_relative_to<'a>(
     origin: DVec3,
 ) -> impl Iterator<Item = [DVec3; 3]> + 'a {
     let own = &loaded.mesh;
-    let place = placed.placed.transform().relative_to_origins(own.origin, origin);
+    let place = placed.placed.to_transform().relative_to_origins(own.origin, origin);
     let corners = move |number: u32| own.corners(number).map(|corner| place.point(corner.as_dvec3()));
     (0..own.triangles.len() as u32).map(corners)
 }

@@ -37,7 +37,7 @@ pub(super) fn cavities(
     token: &CancelToken,
 ) -> Result<Vec<(usize, usize)>, Cancelled> {
     let corners_of = |object: u32| {
-        let mesh = scene.objects[object as usize].shape.mesh();
+        let mesh = scene.objects[object as usize].shape.as_mesh();
         mesh.into_iter().flat_map(|mesh| triangles_relative_to(mesh, meshes[mesh.file], origin))
     };
     let order = |holds: fn(f64) -> bool| {

@@ -84,7 +84,7 @@ impl GlassSolids {
     /// # Errors
     /// [`Cancelled`] if the token is canceled.
     pub fn find(scene: &Scene, meshes: &[&LoadedMesh], token: &CancelToken) -> Result<Self, Cancelled> {
-        let parts = GlassParts::find(scene, meshes, token)?;
+        let parts = GlassParts::find_in_scene(scene, meshes, token)?;
         if parts.list.is_empty() {
             return Ok(Self::default());
         }
@@ -113,7 +113,7 @@ impl GlassSolids {
                 let is_inside_out = is_first_part_flipped != groups.flips[part as usize];
                 solids.parts[object as usize] =
                     ObjectRole { place: place.unwrap_or(object), is_inside_out, is_open };
-                solids.open.extend(hole.open_glass_at_part(part, object, is_covered));
+                solids.open.extend(hole.describe_at_part(part, object, is_covered));
             }
             if hole.part <= NO_HOLE && groups.have_zero_volume(&parts, members) {
                 solids.flat.extend(members.first().map(|&part| parts.list[part as usize].object));
@@ -275,7 +275,8 @@ impl PartGroups {
         members: &[u32],
     ) -> Option<ClosedSolid> {
         let objects: Vec<u32> = members.iter().map(|&part| parts.list[part as usize].object).collect();
-        let are_meshes = objects.iter().all(|&object| scene.objects[object as usize].shape.mesh().is_some());
+        let are_meshes =
+            objects.iter().all(|&object| scene.objects[object as usize].shape.as_mesh().is_some());
         let do_agree = members.iter().all(|&part| !self.flips[part as usize]);
         let substance = parts.list[members[0] as usize].substance;
         let (volume, _) = self.volume_and_area(parts, members);
@@ -377,7 +378,7 @@ impl Hole {
 
     /// Describes the hole where it borders one part. `None` if the part does not border the hole, or if the
     /// hole is attributed to rounding.
-    fn open_glass_at_part(&self, part: u32, object: u32, is_covered: bool) -> Option<OpenGlass> {
+    fn describe_at_part(&self, part: u32, object: u32, is_covered: bool) -> Option<OpenGlass> {
         let own = || self.rims.iter().zip(&self.disagree).filter(|(rim, _)| rim.part == part);
         let edges = own().count();
         let disagrees = own().all(|(_, disagrees)| *disagrees);

@@ -60,17 +60,21 @@ pub(super) struct GlassParts {
 
 impl GlassParts {
     /// Finds all parts in a scene.
-    pub fn find(scene: &Scene, meshes: &[&LoadedMesh], token: &CancelToken) -> Result<Self, Cancelled> {
+    pub fn find_in_scene(
+        scene: &Scene,
+        meshes: &[&LoadedMesh],
+        token: &CancelToken,
+    ) -> Result<Self, Cancelled> {
         let mut parts = Self::default();
         let mut open_of_file: HashMap<usize, Vec<[u32; 2]>> = HashMap::new();
         for (number, object) in (0_u32..).zip(&scene.objects) {
-            let Some(glass) = classify_object_glass(scene, meshes, object) else { continue };
+            let Some(glass) = find_glass_triangles(scene, meshes, object) else { continue };
             token.check_pause_and_cancel()?;
             if parts.list.is_empty() {
                 parts.origin = point_on_or_inside_shape(&object.shape, meshes);
             }
             let first = parts.list.len();
-            if let Some(mesh) = object.shape.mesh() {
+            if let Some(mesh) = object.shape.as_mesh() {
                 let loaded = meshes[mesh.file];
                 let open = open_of_file.entry(mesh.file).or_insert_with(|| open_edges(&loaded.mesh));
                 parts.add_mesh(number, mesh, loaded, glass, open);
@@ -159,15 +163,15 @@ impl GlassParts {
         object: u32,
         placed: &MeshReference,
         loaded: &LoadedMesh,
-        glass: MeshGlass,
+        glass: GlassTriangles,
         open: &[[u32; 2]],
     ) {
         let mesh = &loaded.mesh;
-        let place = placed.placed.transform().relative_to_origins(mesh.origin, self.origin);
+        let place = placed.placed.to_transform().relative_to_origins(mesh.origin, self.origin);
         let mirrors = place.flips_handedness();
         let is_glass = |triangle: usize| match glass {
-            MeshGlass::All => true,
-            MeshGlass::Some => mesh
+            GlassTriangles::All => true,
+            GlassTriangles::Some => mesh
                 .materials
                 .get(triangle)
                 .is_some_and(|&own| loaded.materials.get(own as usize).is_some_and(FileMaterial::is_glass)),
@@ -206,14 +210,14 @@ fn point_on_or_inside_shape(shape: &Shape, meshes: &[&LoadedMesh]) -> DVec3 {
     let of_mesh = |placed: &MeshReference| {
         let mesh = &meshes[placed.file].mesh;
         let first = mesh.positions.first().map_or(DVec3::ZERO, |first| first.as_dvec3());
-        placed.placed.transform().point(mesh.origin + first)
+        placed.placed.to_transform().point(mesh.origin + first)
     };
-    shape.representative_point().or_else(|| shape.mesh().map(of_mesh)).unwrap_or(DVec3::ZERO)
+    shape.representative_point().or_else(|| shape.as_mesh().map(of_mesh)).unwrap_or(DVec3::ZERO)
 }
 
 /// Which of an object's triangles are glass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum MeshGlass {
+pub(super) enum GlassTriangles {
     /// All triangles, or the whole object if it is not a mesh.
     All,
     /// Triangles whose material in the mesh file is glass.
@@ -221,15 +225,15 @@ pub(super) enum MeshGlass {
 }
 
 /// Returns which triangles of an object are glass, or `None` if the object contains no glass.
-pub(super) fn classify_object_glass(
+pub(super) fn find_glass_triangles(
     scene: &Scene,
     meshes: &[&LoadedMesh],
     object: &Object,
-) -> Option<MeshGlass> {
-    match (object.material, object.shape.mesh()) {
-        (Some(index), _) => scene.materials[index].kind.is_glass().then_some(MeshGlass::All),
+) -> Option<GlassTriangles> {
+    match (object.material, object.shape.as_mesh()) {
+        (Some(index), _) => scene.materials[index].kind.is_glass().then_some(GlassTriangles::All),
         (None, Some(mesh)) => {
-            meshes[mesh.file].materials.iter().any(FileMaterial::is_glass).then_some(MeshGlass::Some)
+            meshes[mesh.file].materials.iter().any(FileMaterial::is_glass).then_some(GlassTriangles::Some)
         }
         (None, None) => None,
     }
@@ -237,7 +241,7 @@ pub(super) fn classify_object_glass(
 
 /// The type of glass that an object is made of.
 fn glass_medium_key_of_object(scene: &Scene, meshes: &[&LoadedMesh], object: &Object) -> GlassMediumKey {
-    match (object.material, object.shape.mesh()) {
+    match (object.material, object.shape.as_mesh()) {
         (Some(index), _) => scene.materials[index].kind.glass_medium_identity(),
         (None, Some(mesh)) => {
             let roughness = NumberSource::Constant(0.0);

@@ -64,7 +64,7 @@ impl MatchedAndOpenEdges {
         token: &CancelToken,
     ) -> Result<Self, Cancelled> {
         let mut edges = Self::default();
-        let sites = EdgeEndpoints::from_rims(parts, rims, token)?;
+        let sites = MergedEdgeEndpoints::from_rims(parts, rims, token)?;
         // Match edges that have both endpoints in common.
         let halves = rims.iter().enumerate().map(|(i, rim)| (*rim, sites.endpoint_ids_of_rim(i)));
         let open = edges.match_equal_edges(parts, halves.collect());
@@ -152,14 +152,14 @@ fn pairs_with_glass_between(same: &[NormalizedRimEdge]) -> impl Iterator<Item = 
 }
 
 /// Endpoints of rim edges, merged if they coincide up to rounding.
-struct EdgeEndpoints {
+struct MergedEdgeEndpoints {
     points: Vec<DVec3>,
     tolerances: Vec<f64>,
     /// Endpoint ids of each edge.
     ends: Vec<[u32; 2]>,
 }
 
-impl EdgeEndpoints {
+impl MergedEdgeEndpoints {
     fn from_rims(parts: &[GlassSolidPart], rims: &[RimEdge], token: &CancelToken) -> Result<Self, Cancelled> {
         // Merge identical points first.
         let point = |end: usize| rims[end / 2].ends[end % 2];

@@ -3,7 +3,7 @@
 use ::image::DynamicImage;
 
 use super::{
-    Sample, alpha_sample_index, is_channel_filled_with, linearize_pixel, rgb, sanitize, with_samples,
+    Sample, alpha_sample_index, is_channel_filled_with, linearize_pixel, pixel_rgb, sanitize, with_samples,
 };
 use crate::assets::image::metadata::{AlphaInterpretation, ImageMetadata};
 use crate::assets::image::space::ColorSpace;
@@ -41,7 +41,7 @@ pub(super) fn cutout_texels(image: DynamicImage, curve: ColorCurve, metadata: &I
 
 fn pack_straight_alpha_texels(samples: &[u8], alpha: usize, curve: ColorCurve) -> TexelData {
     let texel = |pixel: &[u8]| {
-        let [red, green, blue] = rgb(pixel);
+        let [red, green, blue] = pixel_rgb(pixel);
         [red, green, blue, pixel[alpha]]
     };
     let texels = samples.chunks_exact(alpha + 1).map(texel).collect();
@@ -89,7 +89,7 @@ fn premultiplied_floats<T: Sample>(
     let decoding = options.linearization::<T>();
     let texel = |pixel: &[T]| {
         let alpha = sanitize(pixel[options.alpha].to_unit_float()).min(1.0);
-        let encoded = rgb(pixel).map(T::to_unit_float);
+        let encoded = pixel_rgb(pixel).map(T::to_unit_float);
         *unusable += u64::from(encoded.map(sanitize) != encoded);
         let divisor = if options.is_premultiplied && alpha > 0.0 { alpha } else { 1.0 };
         let linear = match &decoding {

@@ -199,7 +199,7 @@ pub(super) fn texels(image: DynamicImage, encoding: ImageEncoding, metadata: &Im
 }
 
 /// Returns a pixel's red, green and blue. A pixel has 1 (gray), 2 (gray and alpha), 3 or 4 samples.
-fn rgb<T: Copy>(pixel: &[T]) -> [T; 3] {
+fn pixel_rgb<T: Copy>(pixel: &[T]) -> [T; 3] {
     match *pixel {
         [red, green, blue, ..] => [red, green, blue],
         _ => [pixel[0]; 3],
@@ -207,7 +207,7 @@ fn rgb<T: Copy>(pixel: &[T]) -> [T; 3] {
 }
 
 fn texels_from_bytes(samples: &[u8], channels: usize, encoding: ImageEncoding) -> TexelData {
-    let texels = samples.chunks_exact(channels).map(rgb).collect();
+    let texels = samples.chunks_exact(channels).map(pixel_rgb).collect();
     if encoding == ImageEncoding::Linear { TexelData::Linear8(texels) } else { TexelData::Srgb8(texels) }
 }
 
@@ -221,7 +221,7 @@ fn texels_from_u16(samples: &[u16], channels: usize, encoding: ImageEncoding) ->
             (0..=u16::MAX).map(|word| srgb_to_linear(value(word))).collect()
         }
     };
-    let texel = |pixel| Vec3::from_array(rgb(pixel).map(|word| linear[usize::from(word)]));
+    let texel = |pixel| Vec3::from_array(pixel_rgb(pixel).map(|word| linear[usize::from(word)]));
     TexelData::Float(samples.chunks_exact(channels).map(texel).collect())
 }
 
@@ -241,7 +241,7 @@ fn texels_from_floats(
         ImageEncoding::Raw => value,
     };
     let mut texel = |pixel| {
-        let rgb = rgb(pixel);
+        let rgb = pixel_rgb(pixel);
         if encoding != ImageEncoding::Raw {
             *unusable += u64::from(!rgb.iter().all(|value| (0.0..=LARGEST as f32).contains(value)));
         }
@@ -283,7 +283,7 @@ fn convert_color_space(
 
 /// Linearizes a pixel, using tables for integers.
 fn linearize_pixel<T: Sample>(pixel: &[T], tables: Option<&[Vec<f32>; 3]>) -> [f32; 3] {
-    let rgb = rgb(pixel);
+    let rgb = pixel_rgb(pixel);
     match tables {
         Some(tables) => std::array::from_fn(|i| tables[i][rgb[i].table_index()]),
         None => rgb.map(T::to_unit_float),

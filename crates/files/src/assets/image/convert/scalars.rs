@@ -2,7 +2,9 @@
 
 use ::image::DynamicImage;
 
-use super::{Sample, alpha_sample_index, channel_count, is_channel_filled_with, rgb, sanitize, with_samples};
+use super::{
+    Sample, alpha_sample_index, channel_count, is_channel_filled_with, pixel_rgb, sanitize, with_samples,
+};
 use crate::assets::image::metadata::ImageMetadata;
 use crate::materials::texels::{TexelData, Texels};
 use crate::materials::{Channel, ChannelSelector};
@@ -55,7 +57,7 @@ pub(super) fn uses_luminance_as_opacity(image: &DynamicImage, of_any_color: bool
 /// Whether red, green and blue are equal in all pixels.
 fn is_grayscale(image: &DynamicImage) -> bool {
     fn all_pixels_gray<T: Sample>(samples: &[T], channels: usize) -> bool {
-        samples.chunks_exact(channels).map(rgb).all(|[r, g, b]| r == g && g == b)
+        samples.chunks_exact(channels).map(pixel_rgb).all(|[r, g, b]| r == g && g == b)
     }
     with_samples!(image, samples => all_pixels_gray(samples, channel_count(image)))
 }
@@ -128,7 +130,7 @@ fn scalar_texels_from_samples<T: Sample>(
     let number = |pixel: &[T]| match samples {
         ScalarSource::Sample(place, is_srgb) => decoded(pixel[place], is_srgb),
         ScalarSource::Luminance => {
-            luminance(Vec3::from_array(rgb(pixel).map(|sample| decoded(sample, is_srgb))))
+            luminance(Vec3::from_array(pixel_rgb(pixel).map(|sample| decoded(sample, is_srgb))))
         }
         ScalarSource::One => 1.0,
     };

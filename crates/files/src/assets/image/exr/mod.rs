@@ -156,7 +156,7 @@ impl<R: BufRead + Seek> ImageDecoder for ExrDecoder<R> {
             .filter_chunks(false, |_, tile, block| is_read(block.layer) && tile.level_index == Vec2(0, 0));
         for chunk in chunks.map_err(image_error)? {
             let block = chunk.and_then(|chunk| decompressor.decompress(chunk)).map_err(image_error)?;
-            image.add(&block, samples);
+            image.add_block(&block, samples);
         }
         image.convert_luminance_chroma(samples);
         Ok(())
@@ -176,7 +176,7 @@ struct PartialImage<'a> {
 
 impl PartialImage<'_> {
     /// Adds the samples from a decompressed block.
-    fn add(&mut self, block: &UncompressedBlock, samples: &mut [u8]) {
+    fn add_block(&mut self, block: &UncompressedBlock, samples: &mut [u8]) {
         let part = block.index.layer;
         let header = &self.headers[part];
         let (Vec2(left, top), size) = (block.index.pixel_position, block.index.pixel_size);

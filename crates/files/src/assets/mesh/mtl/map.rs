@@ -145,7 +145,7 @@ impl Map {
         let name = rest.0;
         map.name = name.strip_prefix('"').and_then(|name| name.strip_suffix('"')).unwrap_or(name).to_owned();
         let first = map.name.split_whitespace().next().filter(|first| first.len() < map.name.len());
-        map.warnings.extend(first.filter(|first| is_like_option(first)).map(not_an_option_warning));
+        map.warnings.extend(first.filter(|first| looks_like_option(first)).map(not_an_option_warning));
         (!map.name.is_empty()).then_some(map)
     }
 
@@ -245,7 +245,7 @@ fn is_near_zero(scale: f64) -> bool {
 }
 
 /// Whether a word looks like an option: a dash followed by letters.
-fn is_like_option(word: &str) -> bool {
+fn looks_like_option(word: &str) -> bool {
     word.strip_prefix('-')
         .is_some_and(|name| !name.is_empty() && name.chars().all(|c| c.is_ascii_alphabetic()))
 }
@@ -285,7 +285,7 @@ impl<'a> MapArguments<'a> {
         let (word, rest) = self.0.split_once(char::is_whitespace)?;
         let (option, rest) = (word.to_ascii_lowercase(), Self(rest.trim_start()));
         let is_option =
-            OPTIONS.contains(&option.as_str()) || is_like_option(word) && rest.is_next_number_or_switch();
+            OPTIONS.contains(&option.as_str()) || looks_like_option(word) && rest.is_next_number_or_switch();
         is_option.then(|| {
             *self = rest;
             option

@@ -80,7 +80,7 @@ impl ParsedObj {
                 .map_err(|reason| source.malformed_error_with_line(start, reason))?;
             words.take_raw_line_rest();
         }
-        found.drop_missing_attributes(source);
+        found.drop_indices_of_absent_attributes(source);
         found.check_index_ranges(source)?;
         found.add_warnings(source);
         Ok(found)
@@ -159,7 +159,7 @@ impl ParsedObj {
 
     /// If the file lacks texture coordinates or normals, drops their indices from all corners and adds a
     /// warning.
-    fn drop_missing_attributes(&mut self, source: &MeshFileBytes<'_>) {
+    fn drop_indices_of_absent_attributes(&mut self, source: &MeshFileBytes<'_>) {
         for (part, count, name) in
             [(1, self.uvs.len(), "texture coordinates"), (2, self.normals.len(), "normals")]
         {

@@ -181,7 +181,7 @@ fn negative_length_message(length: i64) -> String {
 
 const NO_POSITIONS: &str = "the vertices need properties x, y and z";
 
-fn no_vertex_list_message(element: &str) -> String {
+fn missing_vertex_indices_message(element: &str) -> String {
     format!("the element `{element}` needs an integer list `vertex_indices`")
 }
 
@@ -330,7 +330,9 @@ fn read_faces(
     parsed: &mut ParsedMesh,
 ) -> Result<(), AssetError> {
     let Some(corners) = vertex_list_index(element) else {
-        return Err(context.source.malformed_error_without_line(no_vertex_list_message(&element.name)));
+        return Err(context
+            .source
+            .malformed_error_without_line(missing_vertex_indices_message(&element.name)));
     };
     if faces::has_attributes(element, corners) {
         return faces::read_with_attributes(context, element, corners, numbers, vertices, parsed);
@@ -356,7 +358,9 @@ fn read_strips(
     parsed: &mut ParsedMesh,
 ) -> Result<(), AssetError> {
     let Some(corners) = vertex_list_index(element) else {
-        return Err(context.source.malformed_error_without_line(no_vertex_list_message(&element.name)));
+        return Err(context
+            .source
+            .malformed_error_without_line(missing_vertex_indices_message(&element.name)));
     };
     let faces = &mut parsed.faces;
     read_items_with_list_property(context, element, corners, numbers, |numbers, item, length| {

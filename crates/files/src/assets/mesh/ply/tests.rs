@@ -230,7 +230,7 @@ fn strip_triangles_alternate_in_orientation() {
         assert_eq!(error(&file(list, strips)).1, strip_error(&reason));
     }
     let not_a_list = file("", "element tristrips 0\nproperty float vertex_indices\n");
-    assert_eq!(error(&not_a_list).1, no_vertex_list_message("tristrips"));
+    assert_eq!(error(&not_a_list).1, missing_vertex_indices_message("tristrips"));
     // Strips are ignored if there are faces.
     let both = format!("{strips}element face 1\nproperty list uchar int vertex_indices\n");
     assert_eq!(read_bytes(&file("4 0 1 3 2\n3 0 1 2\n", &both)).expect("whole").mesh.triangles, [[0, 1, 2]]);

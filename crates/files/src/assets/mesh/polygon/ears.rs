@@ -189,10 +189,10 @@ impl<'a, F: FnMut([usize; 3])> EarClipper<'a, F> {
         let around = self.corner_and_neighbors(corner);
         let triangle = around.map(|corner| self.point(corner));
         let mut visits = self.visits;
-        let found = self.tree.find_near_triangle(triangle, &mut visits, |other| {
+        let found = self.tree.find_corner_near_triangle(triangle, &mut visits, |other| {
             self.next[other as usize] != NONE
                 && !around.contains(&other)
-                && self.outline_enters(triangle, other, may_touch)
+                && self.outline_enters_triangle(triangle, other, may_touch)
         });
         self.visits = visits;
         found
@@ -200,7 +200,7 @@ impl<'a, F: FnMut([usize; 3])> EarClipper<'a, F> {
 
     /// Whether the outline enters a triangle's interior at this corner. Unless `may_touch` is true, corners
     /// on the diagonal also count.
-    fn outline_enters(&self, triangle: [DVec2; 3], corner: u32, may_touch: bool) -> bool {
+    fn outline_enters_triangle(&self, triangle: [DVec2; 3], corner: u32, may_touch: bool) -> bool {
         let [a, _, c] = triangle;
         let point = self.point(corner);
         let turns = edge_functions(triangle, point);

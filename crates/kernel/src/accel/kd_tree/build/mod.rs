@@ -177,7 +177,7 @@ fn build_part(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::accel::kd_tree::node::NodeKind;
+    use crate::accel::kd_tree::node::DecodedNode;
 
     /// A fan of triangles around one vertex.
     fn fan(count: u32) -> impl Fn(u32) -> [Vec3; 3] + Sync {
@@ -208,7 +208,7 @@ mod tests {
         };
         let size = |room| {
             let built = build_with_budget(room, 6000, fan, &CancelToken::new()).expect("never canceled");
-            let leaf = |node: &&KdNode| matches!(node.kind(), NodeKind::Leaf { .. });
+            let leaf = |node: &&KdNode| matches!(node.decode(), DecodedNode::Leaf { .. });
             assert_eq!(built.triangles.len(), 6000);
             (built.nodes.iter().filter(leaf).count() + built.references.len()) as u64
         };

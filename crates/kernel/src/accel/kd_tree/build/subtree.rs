@@ -2,7 +2,7 @@
 
 use super::Cell;
 use super::partition::PartitionBuffers;
-use crate::accel::kd_tree::node::{KdNode, NodeKind};
+use crate::accel::kd_tree::node::{DecodedNode, KdNode};
 use crate::accel::reference::TriangleReference;
 use crate::control::{CancelToken, Cancelled};
 use crate::math::Vec3;
@@ -53,7 +53,7 @@ impl<C: Fn(u32) -> [Vec3; 3]> KdSubtreeBuilder<'_, C> {
     fn build_cell(&mut self, first: usize, cell: &Cell) -> Result<(), Cancelled> {
         let place = self.built.nodes.len();
         let own = &self.references[first..];
-        let leaf = NodeKind::Leaf { first: self.built.ids.len() as u32, count: own.len() as u32 };
+        let leaf = DecodedNode::Leaf { first: self.built.ids.len() as u32, count: own.len() as u32 };
         self.built.nodes.push(KdNode::new(leaf));
         let Some(plane) = cell.choose_split(own) else {
             self.built.ids.extend(own.iter().map(TriangleReference::id));
@@ -69,7 +69,7 @@ impl<C: Fn(u32) -> [Vec3; 3]> KdSubtreeBuilder<'_, C> {
         self.references.extend_from_slice(left);
         self.build_cell(middle, &left_cell)?;
         let right = self.built.nodes.len() as u32;
-        self.built.nodes[place] = KdNode::new(NodeKind::Inner { axis: plane.axis, at: plane.at, right });
+        self.built.nodes[place] = KdNode::new(DecodedNode::Inner { axis: plane.axis, at: plane.at, right });
         self.build_cell(first, &right_cell)
     }
 }

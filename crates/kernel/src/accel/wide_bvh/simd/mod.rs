@@ -146,7 +146,7 @@ pub fn try_any_hit_packet(
     match tree.instructions {
         #[cfg(target_arch = "x86_64")]
         // SAFETY: as above.
-        InstructionSet::Avx2 => unsafe { packet::try_any_hit_avx2(tree, rays, ends, except) },
+        InstructionSet::Avx2 => unsafe { packet::any_hit_if_coherent_avx2(tree, rays, ends, except) },
         #[cfg(target_arch = "x86_64")]
         // SAFETY: as above.
         InstructionSet::Avx512 => unsafe { packet::try_any_hit_avx512(tree, rays, ends, except) },

@@ -86,14 +86,14 @@ fn update_nearest_of_pack(
     while lanes != 0 {
         let lane = lanes.trailing_zeros() as usize % PACK;
         lanes &= lanes - 1;
-        update_nearest_uninlined(pack, lane, ray, t_max, best);
+        update_nearest_out_of_line(pack, lane, ray, t_max, best);
     }
 }
 
 /// Non-inlined version of [`intersect_and_update_nearest`] for rare cases.
 #[cold]
 #[inline(never)]
-fn update_nearest_uninlined(
+fn update_nearest_out_of_line(
     pack: &TrianglePack,
     lane: usize,
     ray: &Ray,

@@ -25,7 +25,7 @@ fn texture(width: u32, height: u32, filter: TextureFilter) -> Arc<Texture> {
 /// A light with a texture.
 fn textured(light: AreaLight, texture: &Arc<Texture>, chart: UvMapping) -> Light {
     Light::Area(AreaLight {
-        texture: EmissionTexture::new(Some(texture), None, chart).map(Box::new),
+        texture: EmissionModulation::new(Some(texture), None, chart).map(Box::new),
         ..light
     })
 }

@@ -120,7 +120,7 @@ impl BxdfMaterial for Conductor {
 
     #[inline]
     fn is_anisotropic(&self) -> bool {
-        self.anisotropy.as_constant() != Some(0.0)
+        self.anisotropy.as_untextured() != Some(0.0)
     }
 }
 

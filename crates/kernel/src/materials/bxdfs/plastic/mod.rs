@@ -10,7 +10,7 @@ use std::f32::consts::FRAC_1_PI;
 
 use crate::materials::bsdf::{BxdfMaterial, BxdfParameters};
 use crate::materials::lobe_albedo::{
-    AlbedoTable, LobeAlbedoPolynomial, dielectric_reflectance, reflectance_under_coat,
+    AlbedoTable, LobeAlbedoPolynomial, fresnel_dielectric_f64, reflectance_under_coat,
 };
 use crate::materials::lookup::ParameterLookup;
 use crate::materials::microfacet;
@@ -57,13 +57,13 @@ impl Plastic {
         roughness: ScalarParameter,
         ior: f32,
     ) -> Self {
-        let fresnel = |cosine: f64| dielectric_reflectance(cosine, ior.into());
-        let is_smooth = roughness.as_constant() == Some(0.0);
+        let fresnel = |cosine: f64| fresnel_dielectric_f64(cosine, ior.into());
+        let is_smooth = roughness.as_untextured() == Some(0.0);
         let albedos = if is_smooth {
-            AlbedoTable::from_single_albedo(LobeAlbedoPolynomial::fit_with_exact_mean(fresnel))
+            AlbedoTable::from_single_albedo(LobeAlbedoPolynomial::fit_storing_exact_mean(fresnel))
         } else {
             AlbedoTable::new(
-                roughness.as_constant(),
+                roughness.as_untextured(),
                 |one| microfacet::alphas_from_roughness(one, 0.0)[0],
                 fresnel,
             )
@@ -73,7 +73,7 @@ impl Plastic {
 
     /// Whether the coat is smooth.
     fn is_smooth(&self) -> bool {
-        self.roughness.as_constant() == Some(0.0)
+        self.roughness.as_untextured() == Some(0.0)
     }
 }
 

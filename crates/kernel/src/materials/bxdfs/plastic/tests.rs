@@ -29,7 +29,7 @@ fn values_match_the_formulas_and_are_reciprocal() {
         let returned = 1.0 - (1.0 - mean) / (eta * eta);
         let left = |cosine: f64| 1.0 - f64::from(point.albedo.at_cosine(cosine as f32));
         check_values::<PlasticBxdf>(&format!("α {alpha}, η {ior}"), &point, [alpha; 2], |o, i| {
-            let fresnel = dielectric_reflectance((o + i).length() * 0.5, eta);
+            let fresnel = fresnel_dielectric_f64((o + i).length() * 0.5, eta);
             let kd = RED.as_dvec3();
             let base = kd / (DVec3::ONE - kd * returned) / (std::f64::consts::PI * eta * eta);
             base * (left(o.z) * left(i.z))
@@ -89,7 +89,7 @@ fn base_under_smooth_coat_gets_transmitted_light() {
             let base = point(&plastic(Vec3::ONE, 1.0, ior, 0.0));
             let subject = TestSurface::<PlasticBxdf>::new(&base, [1.0; 2], spherical_direction(cosine, 0.3));
             let (albedo, fresnel) =
-                (subject.sampled_albedo(192).x, dielectric_reflectance(cosine, ior.into()));
+                (subject.sampled_albedo(192).x, fresnel_dielectric_f64(cosine, ior.into()));
             assert!((albedo + fresnel - 1.0).abs() < 1e-3, "η {ior}: {albedo} and {fresnel}");
         }
     }

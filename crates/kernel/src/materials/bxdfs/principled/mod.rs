@@ -145,11 +145,11 @@ pub struct EmissionCoat {
 impl EmissionCoat {
     /// A coat with the given weight and roughness. `None` if the weight is 0.
     pub fn new(weight: ScalarParameter, roughness: ScalarParameter) -> Option<Self> {
-        if weight.as_constant() == Some(0.0) {
+        if weight.as_untextured() == Some(0.0) {
             return None;
         }
         let albedo = roughness
-            .as_constant()
+            .as_untextured()
             .map(|one| SchlickAlbedoPair::from_roughness(one).coat_albedo(COAT_REFLECTANCE));
         Some(Self { weight, roughness, albedo })
     }
@@ -186,9 +186,9 @@ fn build_schlick_albedo_tables(roughness: Option<f32>) -> [AlbedoTable; 2] {
 impl Principled {
     /// Creates a material from its parameters.
     pub fn new(inputs: PrincipledInputs) -> Self {
-        let has_coat = inputs.clearcoat.as_constant() != Some(0.0);
-        let coat = inputs.clearcoat_roughness.as_constant().filter(|_| has_coat);
-        let albedos = [inputs.roughness.as_constant(), coat]
+        let has_coat = inputs.clearcoat.as_untextured() != Some(0.0);
+        let coat = inputs.clearcoat_roughness.as_untextured().filter(|_| has_coat);
+        let albedos = [inputs.roughness.as_untextured(), coat]
             .map(|roughness| roughness.map(SchlickAlbedoPair::from_roughness));
         // The albedo is irrelevant if the coat has no weight.
         let [specular, coat] = albedos;
@@ -245,7 +245,7 @@ impl BxdfMaterial for Principled {
     }
 
     fn is_transmissive(&self) -> bool {
-        self.inputs.transmission.as_constant() != Some(0.0)
+        self.inputs.transmission.as_untextured() != Some(0.0)
     }
 }
 

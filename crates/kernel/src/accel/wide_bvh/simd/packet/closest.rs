@@ -49,7 +49,7 @@ pub fn closest_hit_if_coherent<V: SimdVector>(
                         if pack.ids[lane] == u32::MAX {
                             break;
                         }
-                        any |= best.test_triangle(&packet, pack, lane, rays);
+                        any |= best.update_with_triangle(&packet, pack, lane, rays);
                     }
                 }
                 if any != 0 {

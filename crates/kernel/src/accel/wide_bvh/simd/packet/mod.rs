@@ -32,7 +32,12 @@ pub fn try_closest_hit_avx2(
 
 /// [`try_any_hit()`] with AVX2.
 #[target_feature(enable = "avx2")]
-pub fn try_any_hit_avx2(tree: &WideBvh, rays: &[Ray], ends: &F32x16, except: &[Option<u32>]) -> Option<u32> {
+pub fn any_hit_if_coherent_avx2(
+    tree: &WideBvh,
+    rays: &[Ray],
+    ends: &F32x16,
+    except: &[Option<u32>],
+) -> Option<u32> {
     // SAFETY: this function is compiled with the required instructions.
     let (like, like8) = unsafe { (VectorPair::<SimdF32x8>::splat(0.0), SimdF32x8::splat(0.0)) };
     any_hit_if_coherent(tree, rays, ends, except, like, like8)

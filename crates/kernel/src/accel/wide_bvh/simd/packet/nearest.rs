@@ -28,7 +28,7 @@ impl<V: SimdVector> NearestHits<V> {
     /// Updates the rays whose hit on a triangle is nearer than their best hit, or equally near with a lower
     /// index. Returns the mask of the updated rays.
     #[inline(always)]
-    pub fn test_triangle(
+    pub fn update_with_triangle(
         &mut self,
         packet: &SimdRayPacket<V>,
         pack: &TrianglePack,
