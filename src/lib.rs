@@ -82,14 +82,15 @@
 //!
 //! 1. `mod.rs` receives a tile's samples and the effective settings. `behavior.rs` determines how paths
 //!    behave with these settings. `transport/tile.rs` contains the tile's state.
-//! 2. `transport/camera.rs` generates packets of sixteen rays. `camera_paths.rs` traces them bounce by
-//!    bounce.
+//! 2. `path.rs` contains the main loop: it traces packets of sixteen rays from `transport/camera.rs`, bounce
+//!    by bounce. `path/emission.rs` adds the light that the rays find.
 //! 3. `transport/packet.rs` intersects a packet with the scene: `world/geometry.rs`, then the trees in
 //!    `accel/wide_bvh/`, or `geometry/triangle_list.rs` if there are few triangles.
 //! 4. `transport/packet.rs` collects hits on simple materials in packets of sixteen vertices
 //!    (`transport/batch.rs`). All BSDFs in a packet are of the same kind (`materials/bxdfs/mod.rs`).
 //! 5. Other hits are handled one at a time: `transport/walk.rs` skips boundaries within a single glass body
-//!    (`transport/crossing.rs`), and `transport/vertex.rs` evaluates the surface.
+//!    (`transport/crossing.rs`), `transport/vertex.rs` evaluates the surface, and `path/interactions.rs`
+//!    shades it or passes it to `path/vertices.rs`, which queues diffuse and glossy surfaces.
 //! 6. At mirrors and glass, `transport/interface.rs` generates the rays for the next round.
 //! 7. `direct/queue.rs` computes direct light for packets: `direct/all_lights.rs` or `direct/light_tree.rs`
 //!    samples lights, `direct/mis.rs` computes MIS weights, and `direct/shadow_rays.rs` traces shadow rays.

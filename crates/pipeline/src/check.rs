@@ -67,7 +67,7 @@ pub fn estimate_memory(path: &Path, overrides: &Overrides) -> Result<u64, Failur
 
 fn silent_sink() -> EventSink {
     let (events, _) = mpsc::channel();
-    EventSink { generation: 0, events, previews: PreviewSlot::default(), within: None }
+    EventSink { generation: 0, events, previews: PreviewSlot::default() }
 }
 
 impl IncrementalSceneChecker {

@@ -43,7 +43,8 @@ impl ImageDependencies<'_> {
     }
 
     fn add_settings(&self, traits: &mut Vec<RenderInput>) {
-        let RenderSettings { render, dof, view, photons } = self.plan.settings.without_ineffective_settings();
+        let RenderSettings { render, dof, view, photons, layers } =
+            self.plan.settings.without_ineffective_settings();
         let mut add = |name: &str, value: String| traits.push(RenderInput::from_name_and_value(name, value));
         add("width", render.width.to_string());
         add("height", render.height.to_string());
@@ -77,6 +78,10 @@ impl ImageDependencies<'_> {
                 None => "none".to_owned(),
             },
         );
+        if !layers.is_empty() {
+            let names: Vec<_> = self.plan.layers.iter().map(|layer| layer.name()).collect();
+            add("layers", names.join(","));
+        }
         if let Some(samples) = self.divided {
             add("samples", samples.to_string());
             add("exposure", self.plan.tone.exposure_stops.to_string());

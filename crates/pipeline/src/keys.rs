@@ -227,7 +227,7 @@ pub(crate) fn developed_image_key(film: Fingerprint, plan: &RenderPlan, film_num
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::integrators::ViewMode;
+    use crate::integrators::{LayerSet, SampleLayer, ViewMode};
     use crate::math::Vec3;
     use crate::scene::description::{Integrator, PixelFilter, ShadowMode, Tonemap};
     use crate::tests::loaded_of;
@@ -317,7 +317,7 @@ mod tests {
             |settings: &RenderSettings| film_sums_key(FingerprintHasher::new("w").finish(), settings, None);
         let render_settings = settings.render;
         // No `..` here: adding a field must cause a compile error until it is tested below.
-        let RenderSettings { render: _, dof, view, photons } = settings;
+        let RenderSettings { render: _, dof, view, photons, layers } = settings;
         let RenderOptions {
             width,
             height,
@@ -343,7 +343,8 @@ mod tests {
             (PixelFilter::Box, ViewMode::Beauty, Tonemap::None, Accel::Bvh)
         );
         let with = |render: RenderOptions| RenderSettings { render, ..settings };
-        assert_eq!(photons, None);
+        assert_eq!((photons, layers), (None, LayerSet::NONE));
+        let with_layer = |layer| RenderSettings { layers: [layer].into_iter().collect(), ..settings };
         let some = PhotonSettings { count: 7, radius: 0.0, bounces: 2 };
         let with_photons = |photons| RenderSettings { photons: Some(photons), ..settings };
         let gathering = with_photons(some);
@@ -363,6 +364,8 @@ mod tests {
             with(RenderOptions { seed: seed + 1, ..render_settings }),
             RenderSettings { dof: !dof, ..settings },
             RenderSettings { view: ViewMode::Uv, ..settings },
+            with_layer(SampleLayer::Albedo),
+            with_layer(SampleLayer::Depth),
             gathering,
             with_photons(PhotonSettings { count: 8, ..some }),
             with_photons(PhotonSettings { radius: 0.5, ..some }),

@@ -63,8 +63,9 @@ impl MemoryEstimate {
             ("the threads", threads),
         ];
         if !plan.layers.is_empty() {
-            // Layers are rendered one film at a time, but all of their images are kept.
-            items.push(("the layers", film + picture * plan.layers.len() as u64));
+            let recorded = plan.settings.layers.len();
+            let sums = Film::layer_memory(plan.crop.unwrap_or(whole), recorded);
+            items.push(("the layers", sums + picture * plan.layers.len() as u64));
         }
         if let Some(turn) = plan.turn.filter(|_| !plan.moving.is_empty()) {
             let frame = u64::from(render.width) * u64::from(render.height) * 3;

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::settings::{
-    CheckpointSettings, EffectiveSettings, OutputLayer, Overrides, UpAxis, ViewMode, ViewSide,
+    CheckpointSettings, EffectiveSettings, OutputLayer, Overrides, UpAxis, ViewMode, ViewSide, sample_layers,
 };
 use super::turntable::{self, TurntableFrame};
 use crate::choice::Choice;
@@ -97,6 +97,7 @@ pub(super) fn resolve_plan(
             .photons
             .unwrap_or(scene.photons.enabled)
             .then(|| photon_settings(&scene.photons, (render.width, render.height))),
+        layers: sample_layers(&overrides.layers),
     };
     let threads = thread_count(overrides);
     let (outputs, named_by) = output_paths(scene.output.as_ref(), path, overrides);

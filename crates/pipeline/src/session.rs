@@ -49,8 +49,7 @@ impl HeadlessSession {
         };
         // Events are not needed, because the result is returned.
         let (events, _) = mpsc::channel();
-        let sink =
-            EventSink { generation: self.generation, events, previews: PreviewSlot::default(), within: None };
+        let sink = EventSink { generation: self.generation, events, previews: PreviewSlot::default() };
         let context = RequestContext::new(token, token, &NoPendingCommands);
         self.engine.render_image(&request, &sink, &context)
     }

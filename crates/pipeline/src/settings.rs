@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use super::turntable::TurntableFrame;
 use crate::choice;
 use crate::film::Rect;
-use crate::integrators::RenderSettings;
 pub use crate::integrators::ViewMode;
+use crate::integrators::{LayerSet, RenderSettings, SampleLayer};
 pub use crate::scene::description::CameraOverrides;
 use crate::scene::description::{Accel, Integrator, RenderOptions, ShadowMode, render_keys};
 
@@ -113,6 +113,43 @@ choice! {
     }
 }
 
+/// Source of a layer's values.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum LayerSource {
+    /// Values recorded with the image's samples.
+    Samples(SampleLayer),
+    /// The variance of each pixel's luminance.
+    Variance,
+    /// The number of samples in each pixel.
+    SampleCount,
+}
+
+impl OutputLayer {
+    /// Returns the source of the layer's values.
+    pub(super) fn source(self) -> LayerSource {
+        match self {
+            Self::Albedo => LayerSource::Samples(SampleLayer::Albedo),
+            Self::Normal => LayerSource::Samples(SampleLayer::Normal),
+            Self::Depth => LayerSource::Samples(SampleLayer::Depth),
+            Self::Variance => LayerSource::Variance,
+            Self::Samples => LayerSource::SampleCount,
+            Self::Ambient => LayerSource::Samples(SampleLayer::Ambient),
+            Self::Diffuse => LayerSource::Samples(SampleLayer::Diffuse),
+            Self::Specular => LayerSource::Samples(SampleLayer::Specular),
+            Self::Emission => LayerSource::Samples(SampleLayer::Emission),
+        }
+    }
+}
+
+/// Returns the layers to record with the image's samples.
+pub(super) fn sample_layers(layers: &[OutputLayer]) -> LayerSet {
+    let recorded = |layer: &OutputLayer| match layer.source() {
+        LayerSource::Samples(layer) => Some(layer),
+        LayerSource::Variance | LayerSource::SampleCount => None,
+    };
+    layers.iter().filter_map(recorded).collect()
+}
+
 choice! {
     /// Up axis of a mesh file.
     pub enum UpAxis {
@@ -201,7 +238,8 @@ pub struct EffectiveSettings {
 
 impl EffectiveSettings {
     pub(super) fn new(settings: &RenderSettings, threads: usize, outputs: &[PathBuf]) -> Self {
-        let RenderSettings { render, dof, view, photons } = settings.without_ineffective_settings();
+        let RenderSettings { render, dof, view, photons, layers: _ } =
+            settings.without_ineffective_settings();
         Self {
             width: render.width,
             height: render.height,

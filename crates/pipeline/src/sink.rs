@@ -21,8 +21,6 @@ pub(super) struct EventSink {
     pub(super) generation: u64,
     pub(super) events: Sender<Event>,
     pub(super) previews: PreviewSlot,
-    /// Overall progress fractions at the start and end of the render, if it is only part of the work.
-    pub(super) within: Option<[f64; 2]>,
 }
 
 impl EventSink {
@@ -34,18 +32,7 @@ impl EventSink {
         self.send(Event::Stage { generation: self.generation, stage });
     }
 
-    /// Returns a sink for one part of the work. `ends` contains the overall progress fractions at its start
-    /// and end.
-    pub(super) fn for_progress_range(&self, ends: [f64; 2]) -> Self {
-        Self { within: Some(ends), ..self.clone() }
-    }
-
-    pub(super) fn send_progress(&self, mut progress: RenderProgress) {
-        if let Some([begin, end]) = self.within {
-            progress.fraction = begin + progress.fraction * (end - begin);
-            // The duration of any later parts is unknown.
-            progress.eta_seconds = progress.eta_seconds.filter(|_| end == 1.0);
-        }
+    pub(super) fn send_progress(&self, progress: RenderProgress) {
         self.send(Event::Progress { generation: self.generation, progress });
     }
 
@@ -164,7 +151,7 @@ mod tests {
     #[test]
     fn asset_progress_is_throttled_and_completes() {
         let (events, received) = mpsc::channel();
-        let sink = EventSink { generation: 3, events, previews: PreviewSlot::default(), within: None };
+        let sink = EventSink { generation: 3, events, previews: PreviewSlot::default() };
         let load = |progress: &(dyn Fn(u64, u64) + Sync)| -> Result<(), ()> {
             for done in 0..10_000 {
                 progress(done, 10_000);
@@ -190,7 +177,7 @@ mod tests {
     #[test]
     fn failed_asset_does_not_report_completion() {
         let (events, received) = mpsc::channel();
-        let sink = EventSink { generation: 3, events, previews: PreviewSlot::default(), within: None };
+        let sink = EventSink { generation: 3, events, previews: PreviewSlot::default() };
         sink.load_with_progress("bricks", |_| -> Result<(), ()> { Err(()) }).expect_err("failed");
         drop(sink);
         let ends = received.into_iter().filter(

@@ -9,8 +9,8 @@ use std::time::{Duration, Instant};
 use rayon::ThreadPool;
 
 use crate::control::{CancelToken, Cancelled};
-use crate::film::{SelectedPixels, TILE_SIZE, TileSamples};
-use crate::integrators::{PhotonMaps, RayCounters, RenderSettings};
+use crate::film::{Film, SelectedPixels, TILE_SIZE, TileSamples};
+use crate::integrators::{PhotonMaps, RayCounters, RenderSettings, render_tile_with_layers};
 use crate::system::cpu_time::thread_cpu_seconds;
 use crate::world::World;
 
@@ -43,6 +43,8 @@ pub(super) struct Tracer<'a> {
     pub(super) photons: Option<&'a PhotonMaps>,
     /// Index of the jobs' first sample in the entire image.
     pub(super) first: u32,
+    /// Film whose layer sums the samples are added to, if there are layers.
+    pub(super) layers: Option<&'a Film>,
 }
 
 /// Samples to render in one tile.
@@ -70,10 +72,16 @@ impl TileJob {
 
 impl Tracer<'_> {
     fn trace_tile(&self, job: &TileJob) -> Result<(TileSamples, TraceCost), Cancelled> {
-        let Self { kernel, world, settings, token, photons, first, .. } = *self;
+        let Self { kernel, world, settings, token, photons, first, layers, .. } = *self;
         let samples = first + job.samples.start..first + job.samples.end;
         let begin = thread_cpu_seconds();
-        let (samples, rays) = kernel(photons, world, settings, job.pixels, samples, token)?;
+        let (samples, rays) = match layers {
+            Some(film) => {
+                let sums = film.layer_sums(job.tile, job.pixels);
+                render_tile_with_layers(photons, world, settings, (job.pixels, samples), sums, token)?
+            }
+            None => kernel(photons, world, settings, job.pixels, samples, token)?,
+        };
         Ok((samples, TraceCost { rays, seconds: thread_cpu_seconds() - begin }))
     }
 

@@ -310,12 +310,8 @@ impl Worker {
     fn run_loop(self) {
         let _last_words = PanicReporter(&self.remote);
         let mut engine = Engine::new(self.config, self.contents.clone());
-        let mut sink = EventSink {
-            generation: 0,
-            events: self.remote.events.clone(),
-            previews: self.previews.clone(),
-            within: None,
-        };
+        let mut sink =
+            EventSink { generation: 0, events: self.remote.events.clone(), previews: self.previews.clone() };
         loop {
             let outcome = match self.remote.wait_for_next_task() {
                 Task::Quit => {

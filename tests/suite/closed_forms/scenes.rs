@@ -9,7 +9,7 @@ use glimt::control::{CancelToken, ignore_progress};
 use glimt::film::Rect;
 use glimt::geometry::mesh::TriangleMesh;
 use glimt::integrators::{
-    self, PhotonMaps, PhotonSettings, RenderSettings, ViewMode, render_tile_with_photons,
+    self, LayerSet, PhotonMaps, PhotonSettings, RenderSettings, ViewMode, render_tile_with_photons,
 };
 use glimt::materials::texels::{TexelData, Texels};
 use glimt::math::{DVec3, Vec2, Vec3};
@@ -254,7 +254,13 @@ impl Build {
         let render = RenderOptions { seed, ..self.scene.render };
         let PhotonOptions { enabled, count, radius, bounces } = self.scene.photons;
         let photons = PhotonSettings { count: count as u32, radius: radius as f32, bounces };
-        RenderSettings { render, dof: true, view: self.view, photons: enabled.then_some(photons) }
+        RenderSettings {
+            render,
+            dof: true,
+            view: self.view,
+            photons: enabled.then_some(photons),
+            layers: LayerSet::NONE,
+        }
     }
 
     /// The whole image. Each pixel is the mean of its samples.

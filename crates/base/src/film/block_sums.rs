@@ -82,7 +82,13 @@ mod tests {
                 let radiance = some.iter().map(|value| Vec3::splat(*value)).collect();
                 film.add_samples(
                     0,
-                    &TileSamples { pixels: rect.into(), samples: count as u32, radiance, negative: None },
+                    &TileSamples {
+                        pixels: rect.into(),
+                        samples: count as u32,
+                        radiance,
+                        negative: None,
+                        layers: Default::default(),
+                    },
                 );
                 rest = others;
             }

@@ -10,6 +10,8 @@
 mod block_sums;
 mod convergence;
 mod curves;
+mod layer_sums;
+mod layers;
 mod noise;
 mod pixel_subset;
 mod prepass;
@@ -25,6 +27,7 @@ mod sums;
 pub mod tone;
 
 pub use convergence::ConvergenceModel;
+pub use layer_sums::LayerSums;
 pub use noise::{CellHalfNoise, ImageNoiseAndConvergence, total_samples_to_reduce_error};
 pub use pixel_subset::{PixelSubset, SelectedPixels};
 pub use prepass::{BrightnessPrepassPixels, PREPASS_SAMPLES};
@@ -101,6 +104,8 @@ pub struct TileSamples {
     pub radiance: Vec<Vec3>,
     /// Samples in the pixel filter's negative lobes, or `None` if the filter has no negative lobes.
     pub negative: Option<NegativeLobeMask>,
+    /// Sums of the layers in these pixels, including the film's earlier samples; see [`Film::layer_sums`].
+    pub layers: LayerSums,
 }
 
 /// Samples in the negative lobes of the pixel filter. A pixel's value is (1 + `weight`) · mean of the other

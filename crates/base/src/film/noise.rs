@@ -237,7 +237,13 @@ mod tests {
             let radiance = values.iter().map(|&value| Vec3::splat(value)).collect();
             film.add_samples(
                 x / TILE_SIZE as usize,
-                &TileSamples { pixels: rect.into(), samples: values.len() as u32, radiance, negative: None },
+                &TileSamples {
+                    pixels: rect.into(),
+                    samples: values.len() as u32,
+                    radiance,
+                    negative: None,
+                    layers: Default::default(),
+                },
             );
         }
         film
@@ -333,7 +339,13 @@ mod tests {
             }
             film.add_samples(
                 tile,
-                &TileSamples { pixels: rect.into(), samples: count, radiance, negative: None },
+                &TileSamples {
+                    pixels: rect.into(),
+                    samples: count,
+                    radiance,
+                    negative: None,
+                    layers: Default::default(),
+                },
             );
         }
         (film, (square / f64::from(SIDE * SIDE)).sqrt() / truth)

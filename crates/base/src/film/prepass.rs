@@ -94,7 +94,13 @@ mod tests {
         let samples = |rect: Rect| {
             let pixels = (0..rect.area() as u32).map(|i| (rect.x + i % rect.width, rect.y + i / rect.width));
             let radiance = pixels.flat_map(|(x, y)| (0..16).map(move |sample| value(x, y, sample))).collect();
-            TileSamples { pixels: rect.into(), samples: 16, radiance, negative: None }
+            TileSamples {
+                pixels: rect.into(),
+                samples: 16,
+                radiance,
+                negative: None,
+                layers: Default::default(),
+            }
         };
         for tile in 0..film.tile_count() {
             film.add_samples(tile, &samples(film.tile_rect(tile).expect("a tile")));

@@ -244,6 +244,7 @@ mod tests {
                             samples: 1,
                             radiance: vec![Vec3::splat(value)],
                             negative: None,
+                            layers: Default::default(),
                         },
                     );
                 }
@@ -316,6 +317,7 @@ mod tests {
             samples: 2,
             radiance: vec![Vec3::Y; rect.area() * 2],
             negative: None,
+            layers: Default::default(),
         };
         first.add_samples(1, &samples);
         let changed = picture(&first);
@@ -338,6 +340,7 @@ mod tests {
                     samples: 1,
                     radiance: vec![value; rect.area()],
                     negative: None,
+                    layers: Default::default(),
                 },
             );
         }
@@ -380,6 +383,7 @@ mod tests {
                 samples: 1,
                 radiance: vec![Vec3::splat(1e6); rect.area()],
                 negative: None,
+                layers: Default::default(),
             },
         );
         for _ in 0..slices {

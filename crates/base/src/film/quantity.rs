@@ -114,7 +114,16 @@ mod tests {
         let film = Film::new(20, 20, None).expect("a film");
         let rect = Rect { x: 0, y: 0, width: 20, height: 20 };
         let radiance = (0..400 * count).map(|i| Vec3::splat(next(i / count))).collect();
-        film.add_samples(0, &TileSamples { pixels: rect.into(), samples: count, radiance, negative: None });
+        film.add_samples(
+            0,
+            &TileSamples {
+                pixels: rect.into(),
+                samples: count,
+                radiance,
+                negative: None,
+                layers: Default::default(),
+            },
+        );
         film
     }
 

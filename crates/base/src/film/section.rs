@@ -63,7 +63,13 @@ mod tests {
             let radiance = (0..rect.area()).map(|i| Vec3::splat((tile * 10_000 + i) as f32)).collect();
             film.add_samples(
                 tile,
-                &TileSamples { pixels: rect.into(), samples: 1, radiance, negative: None },
+                &TileSamples {
+                    pixels: rect.into(),
+                    samples: 1,
+                    radiance,
+                    negative: None,
+                    layers: Default::default(),
+                },
             );
         }
         let base = RadianceImage { width: 2, height: 1, pixels: vec![Vec3::X, Vec3::Y] };

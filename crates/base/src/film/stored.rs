@@ -3,6 +3,7 @@
 use std::sync::atomic::Ordering;
 
 use super::convergence::SquaredMeanChanges;
+use super::layer_sums::LayerSums;
 use super::sums::{NegativeLobeSums, Tile};
 use super::{CELLS, Film, PixelSubset};
 use crate::math::DVec3;
@@ -26,8 +27,10 @@ impl StoredTile {
     pub fn read(bytes: &[u8], area: usize) -> Result<Self, MalformedTile> {
         let mut from = ByteReader(bytes);
         let (blocks, is_signed, levels) = (from.count()?, from.count()? == 1, from.count()?);
+        let layers = from.count()?;
         // Check the length before reserving memory.
-        if blocks.checked_mul(area * size_of::<DVec3>()).is_none_or(|all| all > bytes.len()) || levels > 32 {
+        let sums = blocks.checked_add(layers).and_then(|sums| sums.checked_mul(area * size_of::<DVec3>()));
+        if sums.is_none_or(|all| all > bytes.len()) || levels > 32 {
             return Err(MalformedTile);
         }
         let mut tile = Tile { sums: from.vectors(area)?, ..Tile::default() };
@@ -40,6 +43,9 @@ impl StoredTile {
             tile.negative = Some(NegativeLobeSums { weight, sums, counts: from.counts(area)?, earlier });
         }
         tile.steps = SquaredMeanChanges::read(area, levels, &mut || from.u32())?;
+        let sums = from.vectors(area * layers)?;
+        let negative = if is_signed { from.vectors(area * layers)? } else { Vec::new() };
+        tile.layers = LayerSums { count: layers, sums, negative };
         if from.0.is_empty() { Ok(Self { tile }) } else { Err(MalformedTile) }
     }
 
@@ -106,7 +112,7 @@ impl Film {
             return false;
         }
         let (signed, levels) = (tile.negative.is_some(), tile.steps.level_count());
-        for count in [tile.earlier.len(), usize::from(signed), levels] {
+        for count in [tile.earlier.len(), usize::from(signed), levels, tile.layers.count] {
             put_u32(bytes, count as u32);
         }
         put_sums(bytes, &tile.sums, &tile.earlier);
@@ -117,6 +123,7 @@ impl Film {
             append_numbers(bytes, negative.counts.iter().map(|count| count.to_le_bytes()));
         }
         tile.steps.write_words(&mut |word| put_u32(bytes, word));
+        put_sums(bytes, &tile.layers.sums, &[&tile.layers.negative]);
         true
     }
 
@@ -126,13 +133,14 @@ impl Film {
     /// [`MalformedTile`] if the tile does not fit this film.
     pub fn restore_tile(&self, tile: usize, stored: StoredTile) -> Result<(), MalformedTile> {
         let area = self.tile_rect(tile).ok_or(MalformedTile)?.area();
-        let Tile { sums, earlier, counts, negative, steps, .. } = stored.tile;
-        if sums.len() != area || earlier.len() != self.sum_order().kept_block_count() {
+        let Tile { sums, earlier, counts, negative, steps, layers, .. } = stored.tile;
+        let blocks = self.sum_order().kept_block_count();
+        if sums.len() != area || earlier.len() != blocks || layers.count != self.layers {
             return Err(MalformedTile);
         }
         let mut own = self.lock_tile(tile);
         let revision = own.revision + 1;
-        *own = Tile { sums, earlier, counts, negative, steps, revision };
+        *own = Tile { sums, earlier, counts, negative, steps, layers, revision };
         own.resize(area);
         Ok(())
     }
@@ -158,8 +166,8 @@ fn put_u32(bytes: &mut Vec<u8>, word: u32) {
     bytes.extend_from_slice(&word.to_le_bytes());
 }
 
-fn put_sums(bytes: &mut Vec<u8>, sums: &[DVec3], earlier: &[Vec<DVec3>]) {
-    for sums in [sums].into_iter().chain(earlier.iter().map(Vec::as_slice)) {
+fn put_sums(bytes: &mut Vec<u8>, sums: &[DVec3], earlier: &[impl AsRef<[DVec3]>]) {
+    for sums in [sums].into_iter().chain(earlier.iter().map(AsRef::as_ref)) {
         append_numbers(
             bytes,
             sums.iter().map(|sum| {
@@ -240,7 +248,10 @@ mod tests {
             }
             let negative = is_signed.then_some(NegativeLobeMask { weight: 0.1, is_negative });
             let samples = range.end - range.start;
-            film.add_samples(tile, &TileSamples { pixels: rect.into(), samples, radiance, negative });
+            film.add_samples(
+                tile,
+                &TileSamples { pixels: rect.into(), samples, radiance, negative, layers: Default::default() },
+            );
         }
     }
 

@@ -1,7 +1,7 @@
 //! Sample blocks: a pixel's sum is the sum of its blocks, so the result has the same bits even if different
 //! machines render different blocks.
 
-use crate::math::DVec3;
+use crate::math::{DVec3, Vec3};
 
 /// Samples per block.
 pub const BLOCK_SIZE: u32 = 16;
@@ -56,4 +56,22 @@ pub(super) fn sum_pixel_blocks(earlier: &[Vec<DVec3>], sums: &[DVec3], index: us
             others.iter().fold(first[index], |sum, block| sum + block[index]) + sums[index]
         }
     }
+}
+
+/// Adds the finite radiances and returns the number of non-finite radiances.
+pub(super) fn add_finite(sum: &mut DVec3, radiances: &[Vec3]) -> u64 {
+    let all = radiances.iter().fold(*sum, |sum, radiance| sum + radiance.as_dvec3());
+    if all.is_finite() {
+        *sum = all;
+        return 0;
+    }
+    let mut non_finite = 0;
+    for radiance in radiances {
+        if radiance.is_finite() {
+            *sum += radiance.as_dvec3();
+        } else {
+            non_finite += 1;
+        }
+    }
+    non_finite
 }

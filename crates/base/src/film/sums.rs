@@ -4,8 +4,9 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 
 use super::convergence::{ConvergenceModel, SquaredMeanChanges, luminance};
+use super::layer_sums::LayerSums;
 use super::pixel_subset::PixelSubset;
-use super::sum_order::{SumOrder, sum_pixel_blocks};
+use super::sum_order::{SumOrder, add_finite, sum_pixel_blocks};
 use super::{CELL_SIZE, CELLS, CELLS_ACROSS, Rect, TILE_SIZE, TileSamples};
 use crate::math::{DVec3, Vec3};
 use crate::system::memory::try_reserve_exact;
@@ -80,6 +81,8 @@ pub struct Film {
     id: u64,
     pub(super) convergence: ConvergenceModel,
     pub(super) blocks: SumOrder,
+    /// Number of layers.
+    pub(super) layers: usize,
 }
 
 /// Sums of one tile in row-major order. Empty until the first samples are added, so that the thread rendering
@@ -93,6 +96,7 @@ pub(super) struct Tile {
     /// Sums of the samples in the filter's negative lobes. `None` until there is such a sample.
     pub(super) negative: Option<NegativeLobeSums>,
     pub(super) steps: SquaredMeanChanges,
+    pub(super) layers: LayerSums,
     /// Incremented whenever the tile changes.
     pub(super) revision: u64,
 }
@@ -116,22 +120,36 @@ impl NegativeLobeSums {
 }
 
 impl Tile {
-    /// Mean of a pixel's samples, weighted by sign if the filter has negative lobes. `None` if the pixel has
-    /// no samples.
+    /// Mean of a pixel's samples. `None` if the pixel has no samples.
     #[inline]
     pub(super) fn mean(&self, index: usize) -> Option<DVec3> {
+        self.signed_mean(
+            index,
+            || self.positive_lobe_sum(index),
+            |negative| sum_pixel_blocks(&negative.earlier, &negative.sums, index),
+        )
+    }
+
+    /// Mean of a pixel's samples, weighted by sign if the filter has negative lobes, from the sums of the
+    /// samples outside and inside these lobes. `None` if the pixel has no samples.
+    #[inline]
+    pub(super) fn signed_mean(
+        &self,
+        index: usize,
+        sum: impl Fn() -> DVec3,
+        negative_sum: impl Fn(&NegativeLobeSums) -> DVec3,
+    ) -> Option<DVec3> {
         let count = self.sample_count(index);
         let negative = self.negative.as_ref().filter(|negative| negative.counts[index] > 0);
         let Some(negative) = negative else {
-            return (count > 0).then(|| self.positive_lobe_sum(index) / f64::from(count));
+            return (count > 0).then(|| sum() / f64::from(count));
         };
-        let below =
-            sum_pixel_blocks(&negative.earlier, &negative.sums, index) / f64::from(negative.counts[index]);
+        let below = negative_sum(negative) / f64::from(negative.counts[index]);
         let positive_count = count - negative.counts[index];
         if positive_count == 0 {
             return Some(below);
         }
-        let above = self.positive_lobe_sum(index) / f64::from(positive_count);
+        let above = sum() / f64::from(positive_count);
         Some(above + (above - below) * negative.weight)
     }
 
@@ -155,6 +173,7 @@ impl Tile {
         self.earlier.iter_mut().for_each(|sums| sums.resize(area, DVec3::ZERO));
         self.counts.resize(area, 0);
         self.steps.resize(area);
+        self.layers.resize(area);
     }
 
     /// Adds consecutive samples to a pixel in the specified cell and half. Returns the number of non-finite
@@ -220,24 +239,6 @@ impl Tile {
     }
 }
 
-/// Adds the finite radiances and returns the number of non-finite radiances.
-fn add_finite(sum: &mut DVec3, radiances: &[Vec3]) -> u64 {
-    let all = radiances.iter().fold(*sum, |sum, radiance| sum + radiance.as_dvec3());
-    if all.is_finite() {
-        *sum = all;
-        return 0;
-    }
-    let mut non_finite = 0;
-    for radiance in radiances {
-        if radiance.is_finite() {
-            *sum += radiance.as_dvec3();
-        } else {
-            non_finite += 1;
-        }
-    }
-    non_finite
-}
-
 impl Film {
     /// Creates an empty film for an image of this size, or for the part covered by `crop`.
     ///
@@ -279,6 +280,7 @@ impl Film {
             id: IDS.fetch_add(1, Ordering::Relaxed),
             convergence: ConvergenceModel::default(),
             blocks: SumOrder::default(),
+            layers: 0,
         })
     }
 
@@ -330,7 +332,7 @@ impl Film {
     /// Bytes used by the sums.
     pub fn memory_bytes(&self) -> u64 {
         let tile = size_of::<Mutex<Tile>>() + size_of::<usize>();
-        let pixel = SUM_BYTES + self.blocks.kept_block_count() * size_of::<DVec3>();
+        let pixel = SUM_BYTES + (self.blocks.kept_block_count() + self.layers) * size_of::<DVec3>();
         (self.crop.area() * pixel + self.tiles.len() * tile) as u64
     }
 
@@ -346,6 +348,7 @@ impl Film {
         let tile = &mut *guard;
         tile.resize(rect.area());
         let count = samples.samples as usize;
+        let is_whole = samples.pixels == rect.into();
         for (i, pixel) in samples.radiance.chunks_exact(count).enumerate() {
             let (x, y) = samples.pixels.image_position(i as u32);
             let Some(index) = pixel_index_in_rect(rect, x, y) else { continue };
@@ -355,6 +358,12 @@ impl Film {
             let half = pixel_index_in_rect(inside, x, y)
                 .map_or(0, |index| PixelSubset::half_containing(index as u32, inside));
             non_finite += tile.add_pixel_samples((index, cell, half), pixel, lobes, self.blocks);
+            if !is_whole {
+                tile.layers.replace_pixel(index, &samples.layers, i);
+            }
+        }
+        if is_whole {
+            tile.layers.replace_all(&samples.layers);
         }
         tile.revision += 1;
         drop(guard);
@@ -398,7 +407,7 @@ fn lock(tile: &Mutex<Tile>) -> MutexGuard<'_, Tile> {
     tile.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-fn pixel_index_in_rect(rect: Rect, x: u32, y: u32) -> Option<usize> {
+pub(super) fn pixel_index_in_rect(rect: Rect, x: u32, y: u32) -> Option<usize> {
     let (x, y) = (x.checked_sub(rect.x)?, y.checked_sub(rect.y)?);
     (x < rect.width && y < rect.height).then(|| y as usize * rect.width as usize + x as usize)
 }

@@ -20,6 +20,7 @@ fn varied_samples(rect: Rect, first: u32, count: u32) -> TileSamples {
         samples: count,
         radiance: (0..rect.area() as u32).flat_map(pixel).collect(),
         negative: None,
+        layers: Default::default(),
     }
 }
 
@@ -104,7 +105,13 @@ fn pixel_means_and_counts_are_correct() {
         let rect = Rect { x, y: 1, width: 1, height: 1 };
         film.add_samples(
             (x / 32) as usize,
-            &TileSamples { pixels: rect.into(), samples: values.len() as u32, radiance, negative: None },
+            &TileSamples {
+                pixels: rect.into(),
+                samples: values.len() as u32,
+                radiance,
+                negative: None,
+                layers: Default::default(),
+            },
         );
     };
     add(3, &[1.0, 2.0, 6.0]);
@@ -129,7 +136,13 @@ fn non_finite_samples_are_black_and_counted() {
     ];
     film.add_samples(
         0,
-        &TileSamples { pixels: film.crop_rect().into(), samples: 4, radiance, negative: None },
+        &TileSamples {
+            pixels: film.crop_rect().into(),
+            samples: 4,
+            radiance,
+            negative: None,
+            layers: Default::default(),
+        },
     );
     assert_eq!(film.non_finite_samples(), 3);
     assert_eq!(film.radiance_image().pixels, [Vec3::ONE]);
@@ -142,19 +155,43 @@ fn samples_outside_the_tile_are_ignored() {
     let wide = Rect { x: 30, y: 0, width: 9, height: 3 };
     film.add_samples(
         1,
-        &TileSamples { pixels: wide.into(), samples: 1, radiance: vec![Vec3::ONE; 20], negative: None },
+        &TileSamples {
+            pixels: wide.into(),
+            samples: 1,
+            radiance: vec![Vec3::ONE; 20],
+            negative: None,
+            layers: Default::default(),
+        },
     );
     film.add_samples(
         0,
-        &TileSamples { pixels: wide.into(), samples: 2, radiance: vec![Vec3::ONE; 3], negative: None },
+        &TileSamples {
+            pixels: wide.into(),
+            samples: 2,
+            radiance: vec![Vec3::ONE; 3],
+            negative: None,
+            layers: Default::default(),
+        },
     );
     film.add_samples(
         7,
-        &TileSamples { pixels: wide.into(), samples: 1, radiance: vec![Vec3::ONE; 27], negative: None },
+        &TileSamples {
+            pixels: wide.into(),
+            samples: 1,
+            radiance: vec![Vec3::ONE; 27],
+            negative: None,
+            layers: Default::default(),
+        },
     );
     film.add_samples(
         0,
-        &TileSamples { pixels: wide.into(), samples: 0, radiance: Vec::new(), negative: None },
+        &TileSamples {
+            pixels: wide.into(),
+            samples: 0,
+            radiance: Vec::new(),
+            negative: None,
+            layers: Default::default(),
+        },
     );
     assert_eq!([29, 30, 31, 32].map(|x| pixel_sample_count(&film, x, 0)), [0, 2, 0, 1]);
 }
@@ -191,7 +228,13 @@ fn snapshots_are_consistent_during_rendering() {
                             let radiance = vec![Vec3::splat(2.0); rect.area()];
                             film.add_samples(
                                 tile,
-                                &TileSamples { pixels: rect.into(), samples: 1, radiance, negative: None },
+                                &TileSamples {
+                                    pixels: rect.into(),
+                                    samples: 1,
+                                    radiance,
+                                    negative: None,
+                                    layers: Default::default(),
+                                },
                             );
                             assert!(film.sample_count_stats().max <= pass + 9);
                         }

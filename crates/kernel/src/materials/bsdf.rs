@@ -78,6 +78,25 @@ impl BsdfValues {
         }
         f
     }
+
+    /// Fractions of [`BsdfValues::f`] from wide lobes, or 0 where f is 0.
+    #[inline(never)]
+    pub fn wide_fraction(&self) -> Vec3x16 {
+        ratio(&self.wide, &self.f())
+    }
+}
+
+/// Returns a/b in each lane, or 0 where b is 0.
+#[inline(always)]
+pub fn ratio(a: &Vec3x16, b: &Vec3x16) -> Vec3x16 {
+    let mut ratio = *a;
+    for axis in 0..3 {
+        for i in 0..PACKET_SIZE {
+            let quotient = a[axis][i] / b[axis][i];
+            ratio[axis][i] = if b[axis][i] != 0.0 { quotient } else { 0.0 };
+        }
+    }
+    ratio
 }
 
 /// Sampled directions in which paths continue, on either side of the surfaces.

@@ -167,8 +167,9 @@ impl<B: Bxdf> BxdfPacket<B> {
         B::ALWAYS.contains(BxdfFlags::NARROW) || self.any.contains(BxdfFlags::NARROW)
     }
 
+    /// Whether any surface may have wide lobes.
     #[inline(always)]
-    fn any_has_wide_lobe(&self) -> bool {
+    pub fn any_has_wide_lobe(&self) -> bool {
         B::ALWAYS.contains(BxdfFlags::WIDE) || self.any.contains(BxdfFlags::WIDE)
     }
 
@@ -324,10 +325,10 @@ impl<B: Bxdf> BxdfPacket<B> {
         is_constant.then(|| self.lane_f(i, Vec3::Z)[0])
     }
 
-    /// f in sr⁻¹ for light that reaches a surface from a direction. Returns f of the shown lobes and f of all
-    /// lobes.
+    /// f in sr⁻¹ for light that reaches a surface from a direction. Returns f of the shown lobes, f of the shown
+    /// wide lobes, and f of all lobes.
     #[inline]
-    pub fn lane_f(&self, i: usize, wi: Vec3) -> [Vec3; 2] {
+    pub fn lane_f(&self, i: usize, wi: Vec3) -> [Vec3; 3] {
         let (bsdf, view) = (B::get(&self.bsdf, i), B::View::get(&self.view, i));
         let (shown, flags) = (ShownLobeFactors::get(&self.shown, i), self.lane_flags(i));
         let (mut f, mut all) = (Vec3::splat(shown.unit), Vec3::ZERO);
@@ -336,12 +337,13 @@ impl<B: Bxdf> BxdfPacket<B> {
             f += wide * shown.wide;
             all += wide;
         }
+        let shown_wide = f;
         if flags.contains(BxdfFlags::NARROW) {
             let narrow = bsdf.narrow_lobe_value(&view, wi, self.any).f;
             f += narrow * shown.narrow;
             all += narrow;
         }
-        [f, all]
+        [f, shown_wide, all]
     }
 }
 

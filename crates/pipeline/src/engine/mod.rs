@@ -31,13 +31,12 @@ use super::keys;
 use super::memory::MemoryEstimate;
 use super::model::ModelViewOptions;
 use super::plan::{OutputNameSource, RenderPlan, resolve_plan, thread_count};
-use super::protocol::{Event, Failure, MaxPreviewSize, Report, Request, Stage, Status, WriteRequirement};
+use super::protocol::{Event, Failure, MaxPreviewSize, Report, Request, Stage, Status};
 use super::queries::{QueryContext, QueryOrEdit};
 use super::render::checkpointer::CheckpointLock;
 use super::render::film_cache::FilmCache;
 use super::render::film_state::FilmState;
 use super::render::first_picture::CoarseImageRenderer;
-use super::render::layers;
 use super::render::preview::PreviewSender;
 use super::render::scheduler::RenderStageInputs;
 use super::render::share::Shard;
@@ -72,7 +71,6 @@ use crate::integrators::RayCounters;
 use crate::lights::Lights;
 use crate::math::DVec3;
 use crate::messages::NO_IMAGE;
-use crate::output::LayerImage;
 use crate::scene::description::CameraOverrides;
 use crate::scene::diagnostic::Diagnostic;
 use crate::scene::fingerprint::Fingerprint;
@@ -125,8 +123,6 @@ pub(super) struct Engine {
     report: Option<Report>,
     /// Finished frames of a turntable.
     frames: RenderedTurntableFrames,
-    /// Layers of the current film.
-    layers: Vec<LayerImage>,
     /// Plan of the current film.
     plan: Option<RenderPlan>,
     query_context: Option<QueryContext>,
@@ -189,7 +185,6 @@ impl Engine {
             is_own: true,
             report: None,
             frames: RenderedTurntableFrames::default(),
-            layers: Vec::new(),
             plan: None,
             query_context: None,
             good: None,
@@ -621,14 +616,7 @@ impl Engine {
         let (mut films, written) = (std::mem::take(&mut self.films), std::mem::take(&mut self.written));
         let written = std::cell::RefCell::new(written);
         let is_own = request.own.is_none();
-        let to = ImageWriteContext {
-            plan,
-            layers: &[],
-            inputs: &self.inputs,
-            contents: &self.contents,
-            is_own,
-            sink,
-        };
+        let to = ImageWriteContext { plan, inputs: &self.inputs, contents: &self.contents, is_own, sink };
         let pulse = |state: &FilmState, is_covered: bool| {
             if !is_covered {
                 context.report_write_awaiting_samples(sink);
@@ -639,9 +627,6 @@ impl Engine {
                 context.answer_query(query_context, Some(state), &self.inputs, sink);
             }
         };
-        let mut images = Vec::new();
-        let wanted = plan.layers.as_slice();
-        let image_sink = sink.for_progress_range(layers::progress_range(wanted, None));
         let interruption = || orders.interruption_reason();
         let film = own::should_write_saved_scene_image(request).then_some(key);
         let rendered = self.with_checkpointer(film, sink, &interruption, |checkpointer, engine| {
@@ -653,7 +638,7 @@ impl Engine {
                 most_film_bytes: engine.config.most_film_bytes,
                 force: request.force,
                 first: request.first,
-                sink: if wanted.is_empty() { sink } else { &image_sink },
+                sink,
                 pulse: &pulse,
                 take_preview: &|| orders.take_preview_resize(),
                 is_moved: request.overrides.camera.has_changes(),
@@ -661,17 +646,8 @@ impl Engine {
                 share: ready.share.clone(),
                 checkpointer,
             };
-            let rendered = render(key, &mut films, &rendering)?;
-            if let Some(state) = films.current().filter(|_| request.write != WriteRequirement::No) {
-                let made = layers::render_layers(state, &rendering, wanted);
-                if let (Err(_), Some(checkpointer)) = (&made, checkpointer) {
-                    checkpointer.finish(state, state.traced, false);
-                }
-                images = made?;
-            }
-            Ok(rendered)
+            render(key, &mut films, &rendering)
         });
-        self.layers = images;
         if ready.share.is_some()
             && let Some(state) = films.current_mut()
         {
@@ -793,6 +769,7 @@ fn make_tracer<'a>(
         token,
         photons: None,
         first: 0,
+        layers: None,
     }
 }
 

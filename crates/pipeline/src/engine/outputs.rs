@@ -52,7 +52,6 @@ impl Engine {
         }
         let to = ImageWriteContext {
             plan,
-            layers: &self.layers,
             inputs: &self.inputs,
             contents: &self.contents,
             is_own: self.is_own,
@@ -143,14 +142,8 @@ impl Engine {
         let Some(state) = self.films.current() else {
             return Err(AbortReason::work_failure("the film is missing"));
         };
-        let to = ImageWriteContext {
-            plan,
-            layers: &self.layers,
-            inputs: &self.inputs,
-            contents: &self.contents,
-            is_own: true,
-            sink,
-        };
+        let to =
+            ImageWriteContext { plan, inputs: &self.inputs, contents: &self.contents, is_own: true, sink };
         let written = &mut self.written;
         let wrote = match plan.outputs.is_empty() {
             true => StageResult::done(true, ""),

@@ -192,7 +192,6 @@ impl Engine {
         }
         let to = ImageWriteContext {
             plan: &own.plan,
-            layers: &[],
             inputs: &self.inputs,
             contents: &self.contents,
             is_own: true,

@@ -41,7 +41,7 @@ impl EngineFixture {
     fn send_unsaved(&mut self) -> Vec<Event> {
         let scene = self.folder.path().join("scene.toml");
         let (events, received) = mpsc::channel();
-        let sink = EventSink { generation: 1, events, previews: PreviewSlot::default(), within: None };
+        let sink = EventSink { generation: 1, events, previews: PreviewSlot::default() };
         let request = Request {
             generation: 1,
             scene,
@@ -197,7 +197,7 @@ fn check_never_mixes_file_versions() {
         let replacement = (scene.clone(), renamed.clone().into_bytes());
         fixture.engine.contents.replacements.lock().expect("not poisoned").insert(at("one.obj"), replacement);
         let events = mpsc::channel().0;
-        let sink = EventSink { generation: 1, events, previews: PreviewSlot::default(), within: None };
+        let sink = EventSink { generation: 1, events, previews: PreviewSlot::default() };
         let read = fixture.engine.load_scene_and_all_assets(&scene, &[], &sink, &CancelToken::new());
         let (parsed, ..) = read.expect("a valid scene");
         assert_eq!(parsed.loaded.source.file_text(), renamed);

@@ -99,7 +99,8 @@ impl FilmState {
             plan.crop,
         )?
         .with_convergence_model(convergence)
-        .with_sum_order(blocks)?;
+        .with_sum_order(blocks)?
+        .with_layers(plan.settings.layers.len())?;
         let film_cells = film.noise_cell_count();
         let goals = CellSampleGoals::new_undecided(film_cells);
         let own = share.as_ref().map(|share| share.tile_mask(film.tile_count()));
@@ -144,11 +145,6 @@ impl FilmState {
             Some(share) => share.to_global_sample_range(samples),
             None => samples,
         }
-    }
-
-    /// Returns goals that are equal to the film's current sample counts.
-    pub(super) fn goals_from_current_samples(&self) -> CellSampleGoals {
-        CellSampleGoals { decided: self.done.clone(), ..CellSampleGoals::new_undecided(self.done.len()) }
     }
 
     /// Reads the sample counts from the film.
@@ -433,7 +429,10 @@ mod tests {
         let pixels = SelectedPixels::from(state.film.tile_rect(tile).expect("a tile"));
         let count = samples.end - samples.start;
         let radiance = (0..pixels.count() as u32 * count).map(|i| Vec3::splat((i % 7) as f32)).collect();
-        state.film.add_samples(tile, &TileSamples { pixels, samples: count, radiance, negative: None });
+        state.film.add_samples(
+            tile,
+            &TileSamples { pixels, samples: count, radiance, negative: None, layers: Default::default() },
+        );
         let job = TileJob { tile, pixels, samples };
         state.record_job(&job, &TraceCost { rays: RayCounters::default(), seconds });
     }

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use super::preview::PreviewSender;
 use crate::film::range_map::RangeMap;
 use crate::film::{RadianceImage, Rect};
-use crate::integrators::{PhotonMaps, RenderSettings};
+use crate::integrators::{LayerSet, PhotonMaps, RenderSettings};
 use crate::plan::RenderPlan;
 use crate::scene::description::RenderOptions;
 use crate::stages::AbortReason;
@@ -62,7 +62,7 @@ impl<'a> CoarseImageRenderer<'a> {
         let plan = self.plan;
         let full = (plan.settings.render.width, plan.settings.render.height);
         let render = RenderOptions { width, height, ..plan.settings.render };
-        let settings = RenderSettings { render, ..plan.settings };
+        let settings = RenderSettings { render, layers: LayerSet::NONE, ..plan.settings };
         let whole = Rect { x: 0, y: 0, width, height };
         let rect = plan.crop.map_or(whole, |rect| scale_rect(rect, full, (width, height)));
         let tracer = Tracer { settings: &settings, photons, ..self.tracer };

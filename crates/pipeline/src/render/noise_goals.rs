@@ -231,7 +231,10 @@ pub(crate) mod tests {
             let pixels = SelectedPixels { rect: film.crop_rect(), part: PixelSubset::Half(half) };
             let sample = |_| Vec3::splat(mean + spread * (next() - 0.5));
             let radiance = (0..COLUMNS * samples).map(sample).collect();
-            film.add_samples(0, &TileSamples { pixels, samples, radiance, negative: None });
+            film.add_samples(
+                0,
+                &TileSamples { pixels, samples, radiance, negative: None, layers: Default::default() },
+            );
         }
         film
     }
@@ -295,7 +298,13 @@ pub(crate) mod tests {
             let radiance = (0..64 * 16).map(|_| Vec3::splat(mean * 2.0 * next())).collect();
             film.add_samples(
                 tile as usize,
-                &TileSamples { pixels: rect.into(), samples: 16, radiance, negative: None },
+                &TileSamples {
+                    pixels: rect.into(),
+                    samples: 16,
+                    radiance,
+                    negative: None,
+                    layers: Default::default(),
+                },
             );
         }
         let mut goals = CellSampleGoals::new_undecided(2 * CELLS);
@@ -316,7 +325,10 @@ pub(crate) mod tests {
                 let pixels = SelectedPixels { rect: film.crop_rect(), part: PixelSubset::Half(half) };
                 let sample = |_| if next() < 0.01 { Vec3::splat(100.0) } else { Vec3::ZERO };
                 let radiance = (0..8 * samples).map(sample).collect();
-                film.add_samples(0, &TileSamples { pixels, samples, radiance, negative: None });
+                film.add_samples(
+                    0,
+                    &TileSamples { pixels, samples, radiance, negative: None, layers: Default::default() },
+                );
                 done[0][half] += samples;
             }
             goals.decide_goals(&film, &done, target, 0.6);

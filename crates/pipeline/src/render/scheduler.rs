@@ -15,7 +15,6 @@ use super::share::Shard;
 use super::time_budget::next_round_goals;
 use crate::film::{BrightnessPrepassPixels, PREPASS_SAMPLES, Rect, TILE_SIZE, TileSamples};
 use crate::integrators::{PhotonMaps, RayCounters};
-use crate::math::Vec3;
 use crate::plan::RenderPlan;
 use crate::protocol::{MaxPreviewSize, NormalizedRect};
 use crate::scene::description::RenderOptions;
@@ -79,8 +78,6 @@ pub(crate) struct Scheduler<'a> {
     is_over_time: bool,
     next_progress: Instant,
     next_preview: Instant,
-    /// Transformation applied to each sample before it is added to the film.
-    pub(crate) changed: Option<&'a (dyn Fn(Vec3) -> Vec3 + Sync)>,
 }
 
 impl<'a> Scheduler<'a> {
@@ -103,7 +100,6 @@ impl<'a> Scheduler<'a> {
             is_over_time: false,
             next_progress: Instant::now(),
             next_preview: Instant::now(),
-            changed: None,
         }
     }
 
@@ -333,15 +329,10 @@ impl<'a> Scheduler<'a> {
         first: u32,
     ) -> Result<(), AbortReason> {
         let jobs = self.state.jobs(part, target);
-        let tracer = Tracer { photons, first, ..self.rendering.tracer };
         let film = Arc::clone(&self.state.film);
-        let changed = self.changed;
-        let keep = |job: &TileJob, mut samples: TileSamples| {
-            if let Some(changed) = changed {
-                samples.radiance.iter_mut().for_each(|sample| *sample = changed(*sample));
-            }
-            film.add_samples(job.tile, &samples);
-        };
+        let layers = Some(&*film).filter(|_| !self.rendering.plan.settings.layers.is_empty());
+        let tracer = Tracer { photons, first, layers, ..self.rendering.tracer };
+        let keep = |job: &TileJob, samples: TileSamples| film.add_samples(job.tile, &samples);
         tracer.run_all_jobs_in_parallel(&jobs, keep, |result| {
             if let Some((job, (), cost)) = result {
                 self.units += self.state.record_job(job, &cost);

@@ -135,7 +135,10 @@ mod tests {
         let rect = film.cell_rect(cell).expect("a cell");
         let pixels = SelectedPixels { rect, part: PixelSubset::Half(half) };
         let radiance = (0..pixels.count() as u32 * samples).map(|_| Vec3::splat(sample())).collect();
-        film.add_samples(cell / CELLS, &TileSamples { pixels, samples, radiance, negative: None });
+        film.add_samples(
+            cell / CELLS,
+            &TileSamples { pixels, samples, radiance, negative: None, layers: Default::default() },
+        );
     }
 
     /// Creates a row of cells. Each half's samples have a mean of about 1 and a spread from `spreads`.

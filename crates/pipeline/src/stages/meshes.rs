@@ -378,7 +378,7 @@ mod tests {
         fn new() -> Self {
             let folder = tempfile::tempdir().expect("a scratch folder");
             let events = std::sync::mpsc::channel().0;
-            let sink = EventSink { generation: 0, events, previews: Default::default(), within: None };
+            let sink = EventSink { generation: 0, events, previews: Default::default() };
             let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().expect("a pool");
             let fixture = Self { folder, sink, pool, cache: NamedCache::default(), contents: Arc::default() };
             fixture.write("a.obj", OBJ);

@@ -10,6 +10,7 @@ use super::super::plan::RenderPlan;
 use super::super::protocol::{WriteRequirement, reasons};
 use super::super::render::checkpointer::create_header;
 use super::super::render::film_state::FilmState;
+use super::super::render::layers::layer_images;
 use super::super::sink::EventSink;
 use super::super::targets::{OutputTarget, output_conflicts, overwrite_protection, write_guarded};
 use super::super::turntable::TurntableFrame;
@@ -22,7 +23,7 @@ use crate::film::{RadianceImage, Rect, SampleCountStats, Srgb8Image};
 use crate::integrators::{AovSource, LightAov};
 use crate::output::part::{self, PartHeader, PartOrCheckpoint};
 use crate::output::write::{Durability, SweptFolders, WritePolicy};
-use crate::output::{self, BitDepth, FilmEncodingSettings, Format, LayerImage, OutputError, scene_path};
+use crate::output::{self, BitDepth, FilmEncodingSettings, Format, OutputError, scene_path};
 use crate::output::{AnimationFormat, animation};
 use crate::scene::fingerprint::{Fingerprint, FingerprintHasher};
 
@@ -91,8 +92,6 @@ fn has_content_id(path: &Path, known: FileContentId, contents: &FileHashCache) -
 #[derive(Clone, Copy)]
 pub(crate) struct ImageWriteContext<'a> {
     pub(crate) plan: &'a RenderPlan,
-    /// Image layers for EXR files.
-    pub(crate) layers: &'a [LayerImage],
     pub(crate) inputs: &'a ProtectedInputs,
     pub(crate) contents: &'a FileHashCache,
     /// Whether this is the scene's own image, without keyboard changes.
@@ -323,7 +322,7 @@ pub(crate) fn add_animation_frame(
 fn write_one(
     image: &RadianceImage,
     state: &FilmState,
-    ImageWriteContext { plan, layers, inputs, sink, .. }: ImageWriteContext<'_>,
+    ImageWriteContext { plan, inputs, sink, .. }: ImageWriteContext<'_>,
     (path, sweep): (&Path, &SweptFolders),
     token: &CancelToken,
 ) -> Result<u64, OutputError> {
@@ -332,7 +331,8 @@ fn write_one(
     if let Some(seconds) = state.ended_by {
         finish.metadata.push(("glimt:time".to_owned(), format!("{seconds} s")));
     }
-    let bytes = finish.encode_film_image(&state.film, (image, layers), Format::from_path(path)?, token)?;
+    let layers = layer_images(state, plan);
+    let bytes = finish.encode_film_image(&state.film, (image, &layers), Format::from_path(path)?, token)?;
     let target = (OutputTarget::for_image(plan, path), Some(sweep));
     write_guarded(plan, inputs, target, sink, |guard| {
         output::write::atomic_with_policy(path, &bytes, guard, token)

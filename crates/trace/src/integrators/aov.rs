@@ -1,14 +1,20 @@
 //! First-hit AOVs. All except depth are display values in [0, 1], not radiance.
 
+use super::layers::{LayerValues, SampleLayer};
 use super::photons::{GatherPoint, PhotonMaps};
+use super::transport::packet::PacketHits;
+use super::transport::ray::PathRay;
 use super::transport::scratch::TraceBuffers;
 use super::transport::tile::TileContext;
 use super::transport::vertex::SurfaceVertex;
 use super::{FirstHitQuantity, RayCounters};
 use crate::control::Cancelled;
-use crate::geometry::SurfacePoint;
+use crate::geometry::packet::set_bit_lanes;
+use crate::geometry::surface_packet::SurfacePacket;
+use crate::materials::TexturePoint;
 use crate::math::lanes::PortableSimd;
 use crate::math::{DVec2, Vec3};
+use crate::world::Hit;
 
 /// Evaluates `quantity` at the first hit of each camera ray in the queue and writes the result, or black if
 /// there is no hit.
@@ -22,32 +28,111 @@ pub fn shade_aov(
     tile.closest_hits(&scratch.rays, &mut scratch.hits)?;
     for (path, hit) in scratch.rays.iter().zip(&scratch.hits) {
         let Some(hit) = hit else { continue };
-        let passed = if tile.world.has_null_interaction_surfaces() {
-            Some(tile.first_opaque_path_and_hit(path, hit, counters))
-        } else {
-            None
-        };
-        let Some((path, hit)) = passed.unwrap_or(Some((*path, *hit))) else { continue };
-        let (path, hit) = (&path, &hit);
-        let vertex = SurfaceVertex::new(tile, path, hit);
+        let Some((path, hit)) = first_opaque_hit(tile, path, hit, counters) else { continue };
+        let vertex = SurfaceVertex::new(tile, &path, &hit);
         let surface = &vertex.surface;
-        let value = match quantity {
+        radiance[path.slot as usize] = match quantity {
             FirstHitQuantity::Normal => (vertex.perturbed_front_normal(counters) + Vec3::ONE) * 0.5,
-            FirstHitQuantity::Depth => Vec3::splat(view_depth(tile, surface)),
+            FirstHitQuantity::Depth => Vec3::splat(view_depth(tile, surface.point)),
             FirstHitQuantity::Barycentric => surface.barycentric,
             FirstHitQuantity::Photons => {
                 Vec3::splat(maps.map_or(0.0, |maps| count_nearby_photons(maps, tile, path.slot, &vertex)))
             }
             FirstHitQuantity::Uv => fractional_uv(surface.uv).as_vec2().extend(0.0),
-            FirstHitQuantity::Albedo => {
-                let albedo =
-                    vertex.material.bsdf.albedo(&vertex.texture_point, &mut counters.texture_lookups);
-                vertex.times_vertex_color(albedo)
-            }
+            FirstHitQuantity::Albedo => albedo(&vertex, counters),
         };
-        radiance[path.slot as usize] = value * path.throughput;
     }
     Ok(())
+}
+
+/// Records the first-hit layers of the plain surfaces in a packet of camera rays that starts at slot `first`.
+/// Returns the mask of lanes whose surfaces are left to [`record_first_hit`].
+pub fn record_plain_first_hits(
+    tile: &TileContext<'_>,
+    (packet, surfaces): (&PacketHits, &SurfacePacket),
+    first: u32,
+    values: &mut LayerValues,
+) -> u32 {
+    let mut left = 0;
+    let mut known = None;
+    for lane in set_bit_lanes(packet.plain) {
+        let Some(hit) = packet.hit(lane) else { continue };
+        let index = tile.world.material_index(&hit);
+        if known.is_none_or(|(own, _)| own != index) {
+            known = Some((index, values.constant_albedo(index, || constant_albedo(tile, index))));
+        }
+        let Some(albedo) = known.and_then(|(_, albedo)| albedo) else {
+            left |= 1 << lane;
+            continue;
+        };
+        let (point, normal) = packet.point_and_shading_normal(surfaces, lane);
+        record(values, first + lane as u32, [albedo, normal, Vec3::splat(view_depth(tile, point))]);
+    }
+    left
+}
+
+/// Albedo of a material, if neither the albedo nor the shading normals vary over a surface and no surface of
+/// this material is a null interaction.
+fn constant_albedo(tile: &TileContext<'_>, index: usize) -> Option<Vec3> {
+    let material = &tile.world.materials[index];
+    let is_constant = !tile.world.material_needs_uvs_or_tangents(index) && !material.has_null_interaction();
+    is_constant.then(|| material.bsdf.albedo(&TexturePoint::from_uv(DVec2::ZERO), &mut 0))
+}
+
+/// Records the first-hit layers of a camera ray with this hit.
+pub fn record_first_hit(
+    tile: &TileContext<'_>,
+    (path, hit): (&PathRay, &Hit),
+    values: &mut LayerValues,
+    counters: &mut RayCounters,
+) {
+    if let Some((path, hit)) = first_opaque_hit(tile, path, hit, counters) {
+        let vertex = SurfaceVertex::from_hit_with_needed_attributes(tile, &path, &hit);
+        record_vertex(tile, path.slot, &vertex, values, counters);
+    }
+}
+
+/// Records the first-hit layers at a vertex.
+pub fn record_vertex(
+    tile: &TileContext<'_>,
+    slot: u32,
+    vertex: &SurfaceVertex<'_>,
+    values: &mut LayerValues,
+    counters: &mut RayCounters,
+) {
+    let set = values.set();
+    // Look up only the textures needed for the layers.
+    let albedo = if set.contains(SampleLayer::Albedo) { albedo(vertex, counters) } else { Vec3::ZERO };
+    let normal =
+        if set.contains(SampleLayer::Normal) { vertex.perturbed_front_normal(counters) } else { Vec3::ZERO };
+    record(values, slot, [albedo, normal, Vec3::splat(view_depth(tile, vertex.surface.point))]);
+}
+
+fn record(values: &mut LayerValues, slot: u32, [albedo, normal, depth]: [Vec3; 3]) {
+    values.add(SampleLayer::Albedo, slot, albedo);
+    values.add(SampleLayer::Normal, slot, normal);
+    values.add(SampleLayer::Depth, slot, depth);
+}
+
+/// The first opaque hit along a camera ray, starting at `hit`, and the path that reaches it. `None` if there is
+/// no opaque surface.
+fn first_opaque_hit(
+    tile: &TileContext<'_>,
+    path: &PathRay,
+    hit: &Hit,
+    counters: &mut RayCounters,
+) -> Option<(PathRay, Hit)> {
+    if tile.world.has_null_interaction_surfaces() {
+        tile.first_opaque_path_and_hit(path, hit, counters)
+    } else {
+        Some((*path, *hit))
+    }
+}
+
+/// Diffuse reflectance at a vertex.
+fn albedo(vertex: &SurfaceVertex<'_>, counters: &mut RayCounters) -> Vec3 {
+    let albedo = vertex.material.bsdf.albedo(&vertex.texture_point, &mut counters.texture_lookups);
+    vertex.times_vertex_color(albedo)
 }
 
 /// Counts the photons within the kernels around a vertex, using the sample's photon pass.
@@ -64,8 +149,8 @@ fn count_nearby_photons(
 }
 
 /// Depth of a surface point along the view axis.
-fn view_depth(tile: &TileContext<'_>, surface: &SurfacePoint) -> f32 {
-    tile.world.camera.depth_of(surface.point.as_dvec3()).max(0.0) as f32
+fn view_depth(tile: &TileContext<'_>, point: Vec3) -> f32 {
+    tile.world.camera.depth_of(point.as_dvec3()).max(0.0) as f32
 }
 
 fn fractional_uv(uv: DVec2) -> DVec2 {

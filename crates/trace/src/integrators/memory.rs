@@ -3,6 +3,8 @@
 use std::cell::RefCell;
 
 use super::direct::queue::DirectLightVertexQueue;
+use super::layers::LayerValues;
+use super::transport::accumulator::DiffuseFractions;
 use super::transport::scratch::TraceBuffers;
 
 /// Buffers that a thread reuses for all of its batches.
@@ -12,6 +14,10 @@ pub struct ThreadMemory {
     pub scratch: TraceBuffers,
     /// Vertices of the current bounce that await direct lighting.
     pub direct: DirectLightVertexQueue,
+    /// Diffuse fractions of the paths, if layers are recorded.
+    pub fractions: DiffuseFractions,
+    /// Values of the layers, if there are any.
+    pub layers: LayerValues,
 }
 
 impl ThreadMemory {

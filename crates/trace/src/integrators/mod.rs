@@ -7,41 +7,46 @@
 //!
 //! ```text
 //! view, counters      AOVs; ray counters
+//! layers              quantities recorded along with the beauty image
 //! settings            render settings
 //! behavior            how paths continue at surfaces, from the integrator, the view and photon mapping
 //! transport           rays, hits, vertex packets; depends on the world, not on integrators or photons
 //! direct              next-event estimation: light samples, shadow rays, MIS weights
 //! photons             photon emission, photon maps, density estimation
 //! memory              reused per-thread buffers
-//! camera_paths        paths from the camera, bounce by bounce, for whitted and path
-//! aov, bounds         first-hit AOVs; bounding-box overlay
+//! aov                 first-hit AOVs
+//! path                paths from the camera, bounce by bounce, for whitted and path
+//! bounds              bounding-box overlay
 //! ```
 
 mod aov;
 mod behavior;
 mod bounds;
-mod camera_paths;
 mod counters;
 mod direct;
+mod layers;
 mod memory;
+mod path;
 mod photons;
 mod settings;
 mod transport;
 mod view;
 
+use std::mem::take;
 use std::ops::Range;
 
 use crate::control::{CancelToken, Cancelled};
-use crate::film::{NegativeLobeMask, SelectedPixels, TileSamples};
+use crate::film::{LayerSums, NegativeLobeMask, SelectedPixels, TileSamples};
 use crate::math::Vec3;
 use crate::world::{PACKET_SIZE, World};
 use behavior::PathBehavior;
 pub use behavior::light_sampling_purpose;
 pub use counters::RayCounters;
+pub use layers::{LayerSet, SampleLayer};
 use memory::ThreadMemory;
 pub use photons::{Photon, PhotonMap, PhotonMapper, PhotonMaps, PhotonPass};
 pub use settings::{PhotonSettings, RenderSettings};
-use transport::accumulator::Accumulator;
+use transport::accumulator::{Accumulator, LayerAccumulator};
 use transport::tile::{SampleBlock, TileContext};
 pub use view::{AovSource, FirstHitQuantity, LightAov, RadianceComponentMask, ViewMode};
 
@@ -75,8 +80,25 @@ pub fn render_tile_with_photons(
     samples: Range<u32>,
     token: &CancelToken,
 ) -> Result<(TileSamples, RayCounters), Cancelled> {
+    let pixels = pixels.into();
+    let layers = LayerSums::zero(settings.layers.len(), pixels.count());
+    render_tile_with_layers(photons, world, settings, (pixels, samples), layers, token)
+}
+
+/// Like [`render_tile_with_photons`], but adds the values of the layers to the sums `layers` of the pixels.
+///
+/// # Errors
+/// [`Cancelled`] if the token is canceled.
+pub fn render_tile_with_layers(
+    photons: Option<&PhotonMaps>,
+    world: &World,
+    settings: &RenderSettings,
+    (pixels, samples): (SelectedPixels, Range<u32>),
+    mut layers: LayerSums,
+    token: &CancelToken,
+) -> Result<(TileSamples, RayCounters), Cancelled> {
     // Allocate the samples.
-    let block = SampleBlock { pixels: pixels.into(), samples };
+    let block = SampleBlock { pixels, samples };
     let weight = settings.render.filter.negative_weight();
     let mut is_negative = vec![false; if weight.is_some() { block.len() } else { 0 }];
     let mut radiance = vec![Vec3::ZERO; block.len()];
@@ -93,6 +115,8 @@ pub fn render_tile_with_photons(
     };
     // Render one batch after another.
     let mut memory = ThreadMemory::take_from_thread();
+    let (mut fractions, mut values) = (take(&mut memory.fractions), take(&mut memory.layers));
+    values.begin_tile();
     for start in (0..block.len()).step_by(BATCH_SIZE) {
         let slots = start as u32..(start + BATCH_SIZE).min(block.len()) as u32;
         counters.camera_rays += slots.len() as u64;
@@ -103,8 +127,14 @@ pub fn render_tile_with_photons(
                 aov::shade_aov((&tile, photons), number, &mut memory.scratch, &mut radiance, &mut counters)?;
             }
             shown @ (AovSource::Light(_) | AovSource::Film(_) | AovSource::Bounds) => {
-                let accumulator = Accumulator { aov: shown.light_aov(), radiance: &mut radiance, clamp };
-                camera_paths::trace_camera_paths(
+                values.begin(settings.layers, &slots);
+                let recorded = (!settings.layers.is_empty()).then(|| LayerAccumulator {
+                    values: &mut values,
+                    fractions: settings.layers.has_light().then_some(&mut fractions),
+                });
+                let accumulator =
+                    Accumulator { aov: shown.light_aov(), radiance: &mut radiance, clamp, layers: recorded };
+                path::trace_camera_paths(
                     (&tile, photons),
                     slots.clone(),
                     &mut memory,
@@ -116,14 +146,17 @@ pub fn render_tile_with_photons(
                     tile.generate_camera_rays(slots, &mut memory.scratch.rays, |_, _| {});
                     bounds::draw_box_edges(&tile, &mut memory.scratch, &mut radiance)?;
                 }
+                let is_negative = weight.map(|_| is_negative.as_slice());
+                values.add_to_sums(&mut layers, block.samples.len(), &radiance, is_negative);
             }
         }
     }
     // Return the samples.
+    (memory.fractions, memory.layers) = (fractions, values);
     memory.return_to_thread();
     let negative = weight.map(|weight| NegativeLobeMask { weight, is_negative });
     let samples = block.samples.len() as u32;
-    Ok((TileSamples { pixels: block.pixels, samples, radiance, negative }, counters))
+    Ok((TileSamples { pixels: block.pixels, samples, radiance, negative, layers }, counters))
 }
 
 /// Copies the bits of a mask to `marked`, starting at slot `first`.

@@ -1,6 +1,6 @@
 //! Render settings.
 
-use super::{AovSource, FirstHitQuantity, LightAov, ViewMode};
+use super::{AovSource, FirstHitQuantity, LayerSet, LightAov, ViewMode};
 use crate::math::{DVec2, Vec3};
 use crate::scene::description::RenderOptions;
 use crate::scene::fingerprint::{FingerprintContext, FingerprintHasher, Fingerprinted};
@@ -17,6 +17,8 @@ pub struct RenderSettings {
     pub view: ViewMode,
     /// Photon mapping settings. `None` if no photons are gathered.
     pub photons: Option<PhotonSettings>,
+    /// Layers to record along with the beauty image.
+    pub layers: LayerSet,
 }
 
 /// Settings for photon emission and density estimation.
@@ -112,7 +114,7 @@ impl RenderSettings {
 
 impl Fingerprinted for RenderSettings {
     fn add_to(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
-        let Self { render, dof, view, photons } = self.without_ineffective_settings();
+        let Self { render, dof, view, photons, layers } = self.without_ineffective_settings();
         key.add(&render, of).add_bool(dof).add_choice(view.sampled_view());
         // All acceleration structures return the same hits, but these two views show the structures
         // themselves.
@@ -125,6 +127,9 @@ impl Fingerprinted for RenderSettings {
         key.add_bool(photons.is_some());
         if let Some(PhotonSettings { count, radius, bounces }) = photons {
             key.add_u64(count.into()).add_f32(radius).add_u64(bounces.into());
+        }
+        for layer in layers.iter() {
+            key.add_usize(layer as usize);
         }
     }
 }

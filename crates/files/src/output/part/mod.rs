@@ -32,7 +32,7 @@ pub use save::save;
 const MARK: [u8; 12] = crate::system::file::PART_MAGIC;
 
 /// Version of the part file format.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 
 /// Index of the footer record.
 const FOOTER: u32 = u32::MAX;

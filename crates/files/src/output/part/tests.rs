@@ -18,7 +18,16 @@ fn film(index: u32, count: u32) -> Film {
     for tile in (0..film.tile_count()).filter(|tile| *tile as u32 % count == index - 1) {
         let rect = film.tile_rect(tile).expect("a tile");
         let radiance = (0..rect.area() * 3).map(|i| Vec3::new(i as f32 / 3.0, tile as f32, 0.1)).collect();
-        film.add_samples(tile, &TileSamples { pixels: rect.into(), samples: 3, radiance, negative: None });
+        film.add_samples(
+            tile,
+            &TileSamples {
+                pixels: rect.into(),
+                samples: 3,
+                radiance,
+                negative: None,
+                layers: Default::default(),
+            },
+        );
     }
     film
 }

@@ -148,8 +148,10 @@ impl<B: Bxdf> TestSurface<B> {
                     (wide + narrow - f).abs().max_element() <= 2e-6 * f.max_element(),
                     "the parts should add up to {f}"
                 );
-                let [alone, of_all_lobes] = self.row.lane_f(i, some[i].as_vec3());
+                let [alone, of_wide_lobes, of_all_lobes] = self.row.lane_f(i, some[i].as_vec3());
                 assert_eq!(alone, of_all_lobes);
+                let off = (of_wide_lobes.as_dvec3() - wide).abs().max_element();
+                assert!(off <= 1e-5 * f.max_element(), "{of_wide_lobes} instead of {wide}");
                 let alone = alone.as_dvec3();
                 assert!((alone - f).abs().max_element() <= 1e-5 * f.max_element(), "{alone} instead of {f}");
                 all.push((f, wide, f64::from(pdf[i])));

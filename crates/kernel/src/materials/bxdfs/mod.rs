@@ -316,6 +316,15 @@ macro_rules! kinds {
                 }
             }
 
+            /// [`BxdfPacket::has_wide_lobes`].
+            #[inline(always)]
+            pub fn has_wide_lobes(&self) -> bool {
+                match self {
+                    $(Self::$kind(row) => row.has_wide_lobes(),)+
+                    $(Self::$part(row) => row.has_wide_lobes()),+
+                }
+            }
+
             /// [`BxdfPacket::narrow_lobe_mask`].
             #[inline(always)]
             pub fn narrow_lobe_mask(&self) -> u32 {
@@ -354,7 +363,7 @@ macro_rules! kinds {
 
             /// [`BxdfPacket::lane_f`].
             #[inline(always)]
-            pub fn lane_f(&self, i: usize, wi: Vec3) -> [Vec3; 2] {
+            pub fn lane_f(&self, i: usize, wi: Vec3) -> [Vec3; 3] {
                 match self {
                     $(Self::$kind(row) => row.lane_f(i, wi),)+
                     $(Self::$part(row) => row.lane_f(i, wi)),+

@@ -10,6 +10,7 @@ use crate::integrators::view::LightAov;
 use crate::lights::{
     EmissionModulation, Light, LightCenter, LightGeometry, LightGeometryPacket, LightSamplePacket,
 };
+use crate::materials::bsdf::ratio;
 use crate::math::Vec3;
 use crate::math::color::luminance;
 use crate::math::lanes::{PACKET_SIZE, Simd, TRUE, Vec3x16, lane, mask_from_bits, set_lane};
@@ -30,6 +31,8 @@ pub struct SampleAllLights<'a, const MIS: bool> {
     pub interior_lists: Option<&'a InteriorLists>,
     /// Whether to sample only infinite lights.
     pub only_infinite: bool,
+    /// Whether to sum the light from wide lobes separately.
+    pub splits_lobes: bool,
 }
 
 /// Ray and texture lookup counts for direct lighting.
@@ -56,7 +59,17 @@ impl std::ops::AddAssign for DirectLightCounters {
 pub struct ReflectedDirectLightPacket {
     /// Reflected radiance, before multiplication by the path throughput.
     pub light: Vec3x16,
+    /// The part of `light` from wide lobes, if it was requested.
+    pub diffuse: Vec3x16,
     pub rays: DirectLightCounters,
+}
+
+impl ReflectedDirectLightPacket {
+    /// Adds reflected light and its part from wide lobes in the lanes set in `bits`.
+    pub fn add_lanes(&mut self, bits: u32, [light, diffuse]: &[Vec3x16; 2]) {
+        add_masked_lanes(bits, light, &mut self.light);
+        add_masked_lanes(bits, diffuse, &mut self.diffuse);
+    }
 }
 
 /// Sums over all light samples.
@@ -64,6 +77,8 @@ pub struct ReflectedDirectLightPacket {
 pub struct LightSums {
     /// Unoccluded reflected light.
     pub light: Vec3x16,
+    /// The part of `light` from wide lobes, if it was requested.
+    pub diffuse: Vec3x16,
     /// Reflected light, ignoring occlusion.
     pub total: F32x16,
     pub rays: DirectLightCounters,
@@ -72,6 +87,7 @@ pub struct LightSums {
 impl LightSums {
     pub const ZERO: Self = Self {
         light: [[0.0; PACKET_SIZE]; 3],
+        diffuse: [[0.0; PACKET_SIZE]; 3],
         total: [0.0; PACKET_SIZE],
         rays: DirectLightCounters { shadow: 0, scattered: 0, lookups: 0 },
     };
@@ -85,7 +101,7 @@ impl LightSums {
                 set_lane(&mut self.light, i, Vec3::splat(share));
             }
         }
-        ReflectedDirectLightPacket { light: self.light, rays: self.rays }
+        ReflectedDirectLightPacket { light: self.light, diffuse: self.diffuse, rays: self.rays }
     }
 }
 
@@ -93,6 +109,8 @@ impl LightSums {
 #[repr(align(64))]
 struct PendingLight {
     light: Vec3x16,
+    /// The part of `light` from wide lobes, if it was requested.
+    diffuse: Vec3x16,
     active: u32,
 }
 
@@ -120,7 +138,8 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
             }
             // If a single shadow ray determines the visibility of the whole light, defer the sum until the
             // ray is traced.
-            let mut pending = PendingLight { light: [[0.0; PACKET_SIZE]; 3], active: 0 };
+            let mut pending =
+                PendingLight { light: [[0.0; PACKET_SIZE]; 3], diffuse: [[0.0; PACKET_SIZE]; 3], active: 0 };
             let is_deferred = match render.shadows {
                 ShadowMode::Soft => false,
                 ShadowMode::Hard => light.center_and_geometry().is_some(),
@@ -147,6 +166,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
                     values = self.apply_emission_texture(pattern, &samples, active, values);
                     sums.rays.lookups += u64::from(active.count_ones());
                 }
+                let mut fraction = self.splits_lobes.then(|| response.bsdf.wide_fraction());
                 // Apply the MIS weight, unless the light has no extent and is found only by light samples.
                 if MIS && !is_single {
                     let leaves_gloss = self.tile.lobes_find_sky && light.is_environment();
@@ -157,6 +177,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
                         light.inverse_pdfs(&samples)
                     };
                     let competing = self.competing.bsdf_rays_per_light_sample(count);
+                    let unweighted = values;
                     values = self.competing.apply_mis_weights(
                         self.row,
                         (&samples, &response),
@@ -164,10 +185,13 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
                         (&of_light, competing),
                         simd,
                     );
+                    if let Some(fraction) = &mut fraction {
+                        self.competing.adjust_wide_fraction(fraction, &unweighted, &values);
+                    }
                 }
                 self.trace_or_defer_light_samples(
                     &samples,
-                    &values,
+                    (&values, fraction.as_ref()),
                     active,
                     sums,
                     is_deferred.then_some(&mut pending),
@@ -232,7 +256,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
     fn trace_or_defer_light_samples(
         &self,
         samples: &LightSamplePacket,
-        values: &Vec3x16,
+        (values, fraction): (&Vec3x16, Option<&Vec3x16>),
         active: u32,
         sums: &mut LightSums,
         pending: Option<&mut PendingLight>,
@@ -248,10 +272,14 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         if let Some(pending) = pending {
             pending.active |= active;
             add_masked_lanes(active, values, &mut pending.light);
+            if let Some(fraction) = fraction {
+                add_fraction(active, values, fraction, &mut pending.diffuse);
+            }
         } else {
             let traced = active & !self.row.below_horizon_mask(&samples.directions, simd);
             let (rays, ends) = self.shadow_rays(samples, traced);
-            self.add_light_along_shadow_rays((&rays, &ends, traced), &samples.sources, values, sums, simd);
+            let light = (values, fraction);
+            self.add_light_along_shadow_rays((&rays, &ends, traced), &samples.sources, light, sums, simd);
         }
     }
 
@@ -270,8 +298,10 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         }
         // Without shadows, all light is unoccluded.
         let Some((middle, source)) = middle.filter(|_| !is_untraced) else {
+            add_masked_lanes(pending.active, &pending.diffuse, &mut sums.diffuse);
             return add_masked_lanes(pending.active, &pending.light, &mut sums.light);
         };
+        let fraction = self.splits_lobes.then(|| ratio(&pending.diffuse, &pending.light));
         // Aim a ray at the light's center.
         let (mut direction, mut ends) = ([[0.0; PACKET_SIZE]; 3], [-1.0; PACKET_SIZE]);
         for i in 0..PACKET_SIZE {
@@ -292,7 +322,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         self.add_light_along_shadow_rays(
             (&rays, &ends, traced),
             &LightGeometryPacket::splat(source),
-            &pending.light,
+            (&pending.light, fraction.as_ref()),
             sums,
             simd,
         );
@@ -305,7 +335,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         &self,
         (rays, ends, traced): (&RayPacket, &F32x16, u32),
         sources: &LightGeometryPacket,
-        values: &Vec3x16,
+        (values, fraction): (&Vec3x16, Option<&Vec3x16>),
         sums: &mut LightSums,
         simd: impl Simd,
     ) {
@@ -314,10 +344,13 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
             return add_traversal_cost(self.tile, rays, ends, traced, &mut sums.light);
         }
         if self.tile.world.has_null_interaction_surfaces() {
-            return self.add_attenuated_light((rays, ends, traced), sources, values, sums);
+            return self.add_attenuated_light((rays, ends, traced), sources, (values, fraction), sums);
         }
         let occluded = self.tile.world.geometry.occluded_ray_packet(rays, ends, traced, sources, simd);
         add_masked_lanes(traced & !occluded, values, &mut sums.light);
+        if let Some(fraction) = fraction {
+            add_fraction(traced & !occluded, values, fraction, &mut sums.diffuse);
+        }
     }
 
     /// Like [`SampleAllLights::add_light_along_shadow_rays`], for scenes with null interactions, where shadow rays have a
@@ -328,7 +361,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         &self,
         (rays, ends, traced): (&RayPacket, &F32x16, u32),
         sources: &LightGeometryPacket,
-        values: &Vec3x16,
+        (values, fraction): (&Vec3x16, Option<&Vec3x16>),
         sums: &mut LightSums,
     ) {
         let weakened = self.tile.world.transmittance_packet(rays, ends, traced, sources);
@@ -340,6 +373,9 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
             set_lane(&mut values, i, value);
         }
         add_masked_lanes(arriving, &values, &mut sums.light);
+        if let Some(fraction) = fraction {
+            add_fraction(arriving, &values, fraction, &mut sums.diffuse);
+        }
     }
 
     /// Returns the unoccluded contribution of each sample, the mask of nonzero contributions, and the
@@ -420,6 +456,18 @@ pub fn add_masked_lanes(bits: u32, values: &Vec3x16, sums: &mut Vec3x16) {
     for axis in 0..3 {
         for i in 0..PACKET_SIZE {
             sums[axis][i] += f32::from_bits(values[axis][i].to_bits() & of[i]);
+        }
+    }
+}
+
+/// Adds these fractions of the values in the lanes set in `bits`.
+#[inline(never)]
+pub fn add_fraction(bits: u32, values: &Vec3x16, fraction: &Vec3x16, sums: &mut Vec3x16) {
+    let of = mask_from_bits(bits);
+    for axis in 0..3 {
+        for i in 0..PACKET_SIZE {
+            let part = values[axis][i] * fraction[axis][i];
+            sums[axis][i] += f32::from_bits(part.to_bits() & of[i]);
         }
     }
 }

@@ -3,7 +3,7 @@
 
 use std::ops::Range;
 
-use super::all_lights::{LightSums, SampleAllLights, add_masked_lanes};
+use super::all_lights::{LightSums, SampleAllLights, add_fraction, add_masked_lanes};
 use super::shadow_rays::ShadowRayQueue;
 use crate::geometry::packet::set_bit_lanes;
 use crate::integrators::view::LightAov;
@@ -277,7 +277,9 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         // Compute the unoccluded contributions.
         let (mut values, active, response) = self.unoccluded_contributions(&samples, 1.0, simd);
         let active = active & used;
+        let mut fraction = self.splits_lobes.then(|| response.bsdf.wide_fraction());
         if MIS {
+            let unweighted = values;
             // Each group of picks has its own pdf and competes with all requested BSDF samples.
             let competing = self.competing.bsdf_rays_per_light_sample(render.shadow_samples)
                 * render.shadow_samples as f32;
@@ -288,6 +290,9 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
                 (&inverse, competing),
                 simd,
             );
+            if let Some(fraction) = &mut fraction {
+                self.competing.adjust_wide_fraction(fraction, &unweighted, &values);
+            }
         }
         if active == 0 {
             return;
@@ -299,7 +304,12 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         match render.shadows {
             // Nothing is traced, so there is no traversal cost.
             ShadowMode::Off if self.aov == LightAov::TraversalCost => return,
-            ShadowMode::Off => return add_masked_lanes(active, &values, &mut sums.light),
+            ShadowMode::Off => {
+                if let Some(fraction) = &fraction {
+                    add_fraction(active, &values, fraction, &mut sums.diffuse);
+                }
+                return add_masked_lanes(active, &values, &mut sums.light);
+            }
             ShadowMode::Hard => self.aim_samples_at_light_centers(&mut samples, &lights, active),
             ShadowMode::Soft => {}
         }
@@ -313,13 +323,14 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
                 for i in 0..PACKET_SIZE {
                     places[i] = tree.tree_order_position(lights[i]);
                 }
-                pool.push(*row_number, (rays, ends, traced), &samples.sources, &values, &places);
+                let light = (&values, fraction.as_ref());
+                pool.push(*row_number, (rays, ends, traced), &samples.sources, light, &places);
             }
             Some(_) | None => {
                 self.add_light_along_shadow_rays(
                     (&rays, &ends, traced),
                     &samples.sources,
-                    &values,
+                    (&values, fraction.as_ref()),
                     sums,
                     simd,
                 );

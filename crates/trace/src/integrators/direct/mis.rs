@@ -7,7 +7,7 @@ use crate::integrators::transport::ray::PathRay;
 use crate::integrators::transport::tile::TileContext;
 use crate::lights::{LightGeometry, LightHit, LightSamplePacket, Side};
 use crate::materials::Footprint;
-use crate::materials::bsdf::{BsdfValues, SampledLobes};
+use crate::materials::bsdf::{BsdfValues, SampledLobes, ratio};
 use crate::math::Vec3;
 use crate::math::lanes::{F32x16, PACKET_SIZE, Simd, Vec3x16, lane, set_lane};
 use crate::world::{Hit, MAX_NULL_INTERACTIONS};
@@ -92,6 +92,25 @@ impl CompetingTechnique {
             }
         }
         values
+    }
+}
+
+impl CompetingTechnique {
+    /// Adjusts the fractions of values that wide lobes reflect, after the MIS weights have changed
+    /// `unweighted` to `weighted`. Weights of narrow lobes leave the light from wide lobes unchanged.
+    #[inline(never)]
+    pub fn adjust_wide_fraction(self, fraction: &mut Vec3x16, unweighted: &Vec3x16, weighted: &Vec3x16) {
+        match self {
+            Self::Nothing | Self::Paths => {}
+            Self::NarrowPaths | Self::Lobes(_) => {
+                let change = ratio(unweighted, weighted);
+                for axis in 0..3 {
+                    for i in 0..PACKET_SIZE {
+                        fraction[axis][i] *= change[axis][i];
+                    }
+                }
+            }
+        }
     }
 }
 

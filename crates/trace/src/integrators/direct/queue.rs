@@ -1,10 +1,10 @@
 //! Queue of vertex packets that await direct lighting, and the light that the vertices reflect.
 
+use std::ops::Range;
+
 use arrayvec::ArrayVec;
 
-use super::all_lights::{
-    DirectLightCounters, LightSums, ReflectedDirectLightPacket, SampleAllLights, add_masked_lanes,
-};
+use super::all_lights::{LightSums, ReflectedDirectLightPacket, SampleAllLights};
 use super::light_tree::SampleLightTree;
 use super::lobe_rays::LobeRayTracingKernel;
 use super::mis::CompetingTechnique;
@@ -17,15 +17,13 @@ use crate::integrators::transport::batch::{ALL, VertexBatch};
 use crate::integrators::transport::cone::RayCone;
 use crate::integrators::transport::interiors::{InteriorList, InteriorLists};
 use crate::integrators::transport::ray::PathRay;
-use crate::integrators::transport::scatter::{BsdfSampler, ContinuationPolicy};
 use crate::integrators::transport::tile::TileContext;
 use crate::integrators::transport::vertex::ShadingVertex;
 use crate::integrators::view::{LightAov, PathClasses};
 use crate::lights::{LightGeometry, LightGeometryPacket};
 use crate::materials::BxdfKind;
-use crate::materials::bsdf::SampledLobes;
 use crate::math::Vec3;
-use crate::math::lanes::{PACKET_SIZE, Simd, Vec3x16, lane};
+use crate::math::lanes::{PACKET_SIZE, Simd, lane};
 use crate::scene::description::ShadowMode;
 use crate::world::{Geometry, SimdKernel};
 
@@ -41,6 +39,8 @@ pub struct DirectLightVertexQueue {
     open: [[usize; BxdfKind::ALL.len()]; 4],
     /// Direct light reflected at the vertices of each path in this bounce.
     arrived: Vec<Vec3>,
+    /// The parts of `arrived` from wide lobes at vertices that the camera sees. Empty if they are not needed.
+    arrived_diffuse: Vec<Vec3>,
     /// Media at the vertices.
     interior_lists: InteriorLists,
     /// Shadow rays of several packets.
@@ -68,8 +68,8 @@ pub enum ShadingSides<'m> {
     },
 }
 
-/// Number of packets processed together if lights are picked from a tree.
-const ROWS: usize = 64;
+/// Number of packets in a group if lights are picked from a tree.
+pub const MAX_GROUP_SIZE: usize = 64;
 
 impl DirectLightVertexQueue {
     /// The queue is processed when it contains this many packets, while their data is still in the cache.
@@ -83,13 +83,16 @@ impl DirectLightVertexQueue {
         self.count >= Self::FULL
     }
 
-    /// Begins a bounce with `paths` paths. If `has_cones`, also allocates ray cones for them.
-    pub fn begin_bounce(&mut self, paths: usize, has_cones: bool) {
+    /// Begins a bounce with `paths` paths. If `has_cones`, also allocates ray cones for them. If
+    /// `splits_lobes`, separates the light from wide lobes at vertices that the camera sees.
+    pub fn begin_bounce(&mut self, paths: usize, has_cones: bool, splits_lobes: bool) {
         self.clear();
         self.cones.clear();
         self.cones.resize(if has_cones { paths } else { 0 }, RayCone::default());
         self.arrived.clear();
         self.arrived.resize(paths, Vec3::ZERO);
+        self.arrived_diffuse.clear();
+        self.arrived_diffuse.resize(if splits_lobes { paths } else { 0 }, Vec3::ZERO);
         self.interior_lists.clear();
     }
 
@@ -100,22 +103,20 @@ impl DirectLightVertexQueue {
         }
     }
 
-    /// Ends the bounce and adds the direct light to the accumulator in path order. `path` returns the slot
-    /// for a queue index and whether the camera sees the vertex.
-    pub fn accumulate_arrived_light(
-        &mut self,
-        path: impl Fn(usize) -> (u32, bool),
-        accumulator: &mut Accumulator<'_>,
-    ) {
+    /// Ends the bounce of these paths and adds their direct light to the accumulator, in path order.
+    pub fn accumulate_arrived_light(&mut self, paths: &[PathRay], accumulator: &mut Accumulator<'_>) {
         for (place, light) in self.arrived.iter().enumerate().filter(|(_, light)| **light != Vec3::ZERO) {
-            let (slot, only_specular_before) = path(place);
-            accumulator.add_clamped_direct(slot, *light, only_specular_before);
+            let path = &paths[place];
+            let (slot, only_specular_before) = (path.slot, path.state.only_specular_before);
+            let visible = self.arrived_diffuse.get(place).copied().filter(|_| only_specular_before);
+            let diffuse = accumulator.diffuse_part(place as u32, *light, visible);
+            accumulator.add_clamped_direct(slot, (*light, diffuse), only_specular_before);
         }
     }
 
     /// Like [`DirectLightVertexQueue::accumulate_arrived_light`], for paths with consecutive slots.
     pub fn add_arrived_light_consecutive(&mut self, first: u32, accumulator: &mut Accumulator<'_>) {
-        accumulator.add_direct_to_consecutive_slots(first, &self.arrived);
+        accumulator.add_direct_to_consecutive_slots(first, &self.arrived, &self.arrived_diffuse);
     }
 
     /// Returns an unused packet. The caller fills it, and then keeps it with
@@ -205,94 +206,73 @@ impl DirectLightVertexQueue {
     }
 
     /// Removes all vertices.
-    fn clear(&mut self) {
+    pub fn clear(&mut self) {
         (self.count, self.open) = (0, Default::default());
         // A canceled bounce may have left rays in the pool.
         self.pool.clear();
     }
 
-    /// Computes direct lighting at all queued vertices, removes the vertices, and returns the number of rays
-    /// traced. `gather` returns the light that another technique adds at a packet. Rays of continuing paths
-    /// are added to `next`. `continuation` determines how paths continue. Without `continuation`, they
-    /// continue only in microfacet lobes. `depth` is the number of bounces so far.
-    pub fn compute_direct_light(
+    /// Groups of consecutive packets whose lights are sampled together.
+    pub fn groups(&self, tile: &TileContext<'_>) -> impl Iterator<Item = Range<usize>> + use<> {
+        let (count, picks_lights) =
+            (self.count, tile.world.lights.sampler_for_purpose(tile.behavior.receivers).is_some());
+        let size = if picks_lights { MAX_GROUP_SIZE } else { 1 };
+        (0..count).step_by(size).map(move |first| first..(first + size).min(count))
+    }
+
+    /// A packet of vertices.
+    pub fn batch(&self, number: usize) -> &VertexBatch {
+        &self.rows[number]
+    }
+
+    /// Media at the vertices.
+    pub fn interior_lists(&self) -> &InteriorLists {
+        &self.interior_lists
+    }
+
+    /// Ray cones at the vertices, indexed by queue index. Empty if ray cones are not used.
+    pub fn cones(&self) -> &[RayCone] {
+        &self.cones
+    }
+
+    /// Samples lights at the packets of a group, and returns the light that each packet reflects.
+    /// `shares_with_paths` is true if continuing paths compete with the light samples.
+    pub fn sample_lights(
         &mut self,
+        group: Range<usize>,
         tile: &TileContext<'_>,
         aov: LightAov,
-        (continuation, depth): (Option<ContinuationPolicy>, u32),
-        gather: impl Fn(&VertexBatch) -> Option<Vec3x16>,
-        next: &mut Vec<PathRay>,
-    ) -> Result<DirectLightCounters, Cancelled> {
-        let mut rays = DirectLightCounters::default();
-        let mut group: ArrayVec<LightSums, ROWS> = ArrayVec::new();
-        let together =
-            if tile.world.lights.sampler_for_purpose(tile.behavior.receivers).is_some() { ROWS } else { 1 };
-        // Hard shadows are computed only with light samples.
-        let shares_with_paths = continuation.is_some()
-            && (!tile.behavior.gathers || tile.settings.render.shadows == ShadowMode::Soft);
-        let mirrors =
-            || tile.behavior.mirrors.then(|| ContinuationPolicy::new(tile, depth, SampledLobes::Narrow));
-        let of_row = |row: &VertexBatch| {
-            let own = if row.bsdf.extends_narrow_lobe_paths() {
-                continuation.or_else(mirrors)
-            } else {
-                continuation
-            };
-            own.filter(|continuation| continuation.continues)
+        shares_with_paths: bool,
+    ) -> Result<ArrayVec<ReflectedDirectLightPacket, MAX_GROUP_SIZE>, Cancelled> {
+        let mut sums: ArrayVec<LightSums, MAX_GROUP_SIZE> = ArrayVec::new();
+        let request = |number: usize, row: &VertexBatch| DirectLightPacketRequest {
+            number,
+            used: row.used & contributing_vertex_mask(row, aov),
+            shares_with_paths,
         };
-        for first in (0..self.count).step_by(together) {
-            let end = (first + together).min(self.count);
-            // Sample lights at each packet, and pool the shadow rays to picked lights.
-            for number in first..end {
-                tile.token.check_pause_and_cancel()?;
-                let row = &mut self.rows[number];
-                if row.may_lift != 0 {
-                    tile.world
-                        .geometry
-                        .instruction_set()
-                        .run(ShadowOriginLiftKernel { geometry: &tile.world.geometry, row });
-                }
-                let request = DirectLightPacketRequest {
-                    number,
-                    used: row.used & contributing_vertex_mask(row, aov),
-                    shares_with_paths,
-                };
-                let sums = self.sample_lights(request, tile, aov, group.len() as u32);
-                group.push(sums);
-                if self.pool.is_full() {
-                    self.pool.trace(tile, aov, &mut group);
-                }
+        // Sample lights at each packet, and pool the shadow rays to picked lights.
+        for number in group.clone() {
+            tile.token.check_pause_and_cancel()?;
+            let row = &mut self.rows[number];
+            if row.may_lift != 0 {
+                tile.world
+                    .geometry
+                    .instruction_set()
+                    .run(ShadowOriginLiftKernel { geometry: &tile.world.geometry, row });
             }
-            // Trace the remaining pooled rays.
-            self.pool.trace(tile, aov, &mut group);
-            // Add light from lobe rays and photons, and store the result.
-            for (number, sums) in (first..end).zip(group.drain(..)) {
-                let row = &self.rows[number];
-                let request = DirectLightPacketRequest {
-                    number,
-                    used: row.used & contributing_vertex_mask(row, aov),
-                    shares_with_paths,
-                };
-                let mut arrived = self.reflected_light_with_lobe_rays(request, tile, aov, sums);
-                if let Some(gathered) = gather(row) {
-                    add_masked_lanes(row.used, &gathered, &mut arrived.light);
-                }
-                rays += arrived.rays;
-                self.accumulate_reflected_light(number, aov, &arrived.light);
-            }
-            // Continue the paths.
-            for row in &self.rows[first..end] {
-                if let Some(continuation) = of_row(row) {
-                    BsdfSampler { tile, row, used: row.used, continuation }.scatter(
-                        &self.interior_lists,
-                        &self.cones,
-                        next,
-                    );
-                }
+            let request = request(number, row);
+            sums.push(self.sample_lights_at_packet(request, tile, aov, sums.len() as u32));
+            if self.pool.is_full() {
+                self.pool.trace(tile, aov, &mut sums);
             }
         }
-        self.clear();
-        Ok(rays)
+        // Trace the remaining pooled rays.
+        self.pool.trace(tile, aov, &mut sums);
+        // Add the light found by lobe rays.
+        let light = group.zip(sums).map(|(number, sums)| {
+            self.reflected_light_with_lobe_rays(request(number, &self.rows[number]), tile, aov, sums)
+        });
+        Ok(light.collect())
     }
 
     /// The technique that competes with light samples at a packet.
@@ -322,7 +302,7 @@ impl DirectLightVertexQueue {
     }
 
     /// Samples lights at a packet. Shadow rays to picked lights are pooled under index `number`.
-    fn sample_lights(
+    fn sample_lights_at_packet(
         &mut self,
         request: DirectLightPacketRequest,
         tile: &TileContext<'_>,
@@ -337,6 +317,7 @@ impl DirectLightVertexQueue {
         let (competing, interior_lists) =
             (self.competing_technique(request, tile, aov), self.interiors_of_batch(row));
         let (instructions, used) = (tile.world.geometry.instruction_set(), request.used);
+        let (only_infinite, splits_lobes) = (false, self.lobe_split(row) == LobeSplit::Mixed);
         let plain = SampleAllLights::<false> {
             tile,
             row,
@@ -344,10 +325,19 @@ impl DirectLightVertexQueue {
             aov,
             competing,
             interior_lists,
-            only_infinite: false,
+            only_infinite,
+            splits_lobes,
         };
-        let weighed =
-            SampleAllLights::<true> { tile, row, used, aov, competing, interior_lists, only_infinite: false };
+        let weighed = SampleAllLights::<true> {
+            tile,
+            row,
+            used,
+            aov,
+            competing,
+            interior_lists,
+            only_infinite,
+            splits_lobes,
+        };
         use CompetingTechnique::{Lobes, NarrowPaths, Nothing, Paths};
         let sums = match (competing, tile.world.lights.sampler_for_purpose(tile.behavior.receivers)) {
             (Nothing, None) => instructions.run(plain),
@@ -385,13 +375,40 @@ impl DirectLightVertexQueue {
         }
     }
 
+    /// How to divide a packet's reflected light.
+    fn lobe_split(&self, row: &VertexBatch) -> LobeSplit {
+        if self.arrived_diffuse.is_empty() || row.only_specular_before == 0 {
+            return LobeSplit::Unused;
+        }
+        match (row.bsdf.has_wide_lobes(), row.bsdf.has_narrow_lobes()) {
+            (_, false) => LobeSplit::OnlyWide,
+            (false, true) => LobeSplit::OnlyNarrow,
+            (true, true) => LobeSplit::Mixed,
+        }
+    }
+
     /// Adds a packet's reflected light to its paths. A path has two vertices at a transmissive surface.
-    fn accumulate_reflected_light(&mut self, number: usize, aov: LightAov, arrived: &Vec3x16) {
+    pub fn accumulate_reflected_light(
+        &mut self,
+        number: usize,
+        aov: LightAov,
+        arrived: &ReflectedDirectLightPacket,
+    ) {
         let row = &self.rows[number];
         let light = match aov {
-            LightAov::Radiance(_) | LightAov::LitFraction => row.times_throughput(arrived),
-            LightAov::TraversalCost => *arrived,
+            LightAov::Radiance(_) | LightAov::LitFraction => row.times_throughput(&arrived.light),
+            LightAov::TraversalCost => arrived.light,
         };
+        let diffuse = match self.lobe_split(row) {
+            LobeSplit::Unused | LobeSplit::OnlyNarrow => None,
+            LobeSplit::OnlyWide => Some(light),
+            LobeSplit::Mixed => Some(row.times_throughput(&arrived.diffuse)),
+        };
+        if let Some(diffuse) = diffuse {
+            for i in set_bit_lanes(row.used) {
+                self.arrived_diffuse[row.place[i] as usize] += lane(&diffuse, i);
+            }
+        }
         match row.first_consecutive_index() {
             Some(first) => {
                 let own = &mut self.arrived[first as usize..][..PACKET_SIZE];
@@ -406,6 +423,19 @@ impl DirectLightVertexQueue {
             }
         }
     }
+}
+
+/// How a packet's reflected light is divided into light from wide lobes and light from narrow lobes.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum LobeSplit {
+    /// The parts are not needed.
+    Unused,
+    /// All lobes are wide.
+    OnlyWide,
+    /// All lobes are narrow.
+    OnlyNarrow,
+    /// The surfaces may have wide and narrow lobes.
+    Mixed,
 }
 
 /// Mask of vertices whose direct light is visible in the view and may be nonzero.

@@ -1,7 +1,7 @@
 //! Shadow rays from many vertex packets, regrouped by light. Rays to nearby lights visit the same bounding
 //! boxes, whereas the rays of one packet diverge.
 
-use super::all_lights::{LightSums, add_masked_lanes, convert_transmittance_for_aov};
+use super::all_lights::{LightSums, add_fraction, add_masked_lanes, convert_transmittance_for_aov};
 use crate::geometry::packet::{F32x16, RayPacket, set_bit_lanes};
 use crate::integrators::transport::tile::TileContext;
 use crate::integrators::view::LightAov;
@@ -20,12 +20,16 @@ struct QueuedShadowRays {
     traced: u32,
     sources: LightGeometryPacket,
     values: Vec3x16,
+    /// Whether [`ShadowRayQueue::fractions`] contains the fractions of `values` from wide lobes.
+    has_fraction: bool,
 }
 
 /// Queue of shadow rays from many vertex packets.
 #[derive(Default)]
 pub struct ShadowRayQueue {
     rows: Vec<QueuedShadowRays>,
+    /// Fractions of the contributions from wide lobes, for the rows that have them.
+    fractions: Vec<Vec3x16>,
     /// For each ray, the tree position of its light, and the ray's row and lane.
     order: Vec<(u32, u32)>,
     /// Rows and lanes of the rays, grouped by light.
@@ -52,7 +56,7 @@ impl ShadowRayQueue {
         row: u32,
         (rays, ends, traced): (RayPacket, F32x16, u32),
         sources: &LightGeometryPacket,
-        values: &Vec3x16,
+        (values, fraction): (&Vec3x16, Option<&Vec3x16>),
         places: &[u32; PACKET_SIZE],
     ) {
         let number = self.rows.len() as u32 * PACKET_SIZE as u32;
@@ -64,7 +68,9 @@ impl ShadowRayQueue {
             traced,
             sources: sources.clone(),
             values: *values,
+            has_fraction: fraction.is_some(),
         });
+        self.fractions.extend(fraction);
     }
 
     /// Traces and removes all rays, and adds the unoccluded light to the packets' sums in queue order.
@@ -73,11 +79,16 @@ impl ShadowRayQueue {
             return;
         }
         self.group_by_light_tree_position();
-        let Self { rows, sorted, .. } = self;
+        let Self { rows, fractions, sorted, .. } = self;
         let world = tile.world;
         world.geometry.instruction_set().run(ShadowRayKernel { world, aov, rows, rays: sorted });
-        for QueuedShadowRays { row, traced, values, .. } in &*rows {
-            add_masked_lanes(*traced, values, &mut sums[*row as usize].light);
+        let mut fractions = fractions.iter();
+        for QueuedShadowRays { row, traced, values, has_fraction, .. } in &*rows {
+            let sums = &mut sums[*row as usize];
+            add_masked_lanes(*traced, values, &mut sums.light);
+            if *has_fraction && let Some(fraction) = fractions.next() {
+                add_fraction(*traced, values, fraction, &mut sums.diffuse);
+            }
         }
         self.clear();
     }
@@ -105,6 +116,7 @@ impl ShadowRayQueue {
     /// Removes all rays.
     pub fn clear(&mut self) {
         self.rows.clear();
+        self.fractions.clear();
         self.order.clear();
     }
 }

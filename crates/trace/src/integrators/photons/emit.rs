@@ -501,10 +501,11 @@ impl PhotonWavefront<'_> {
         let continuation =
             ContinuationPolicy { continues: true, uses_roulette: false, lobes: SampledLobes::All };
         let used = row.used;
-        BsdfSampler { tile: self.tracing.tile, row, used, continuation }.scatter(
+        BsdfSampler { tile: self.tracing.tile, row, used, continuation, has_fractions: false }.scatter(
             &self.interior_lists,
             &[],
             &mut self.next,
+            None,
         );
     }
 

@@ -39,13 +39,14 @@ pub struct GatherPhotonsKernel<'a> {
 }
 
 impl SimdKernel for GatherPhotonsKernel<'_> {
-    type Output = Vec3x16;
+    type Output = [Vec3x16; 2];
 
-    /// Returns the gathered light reflected toward the viewer, before multiplication by the path throughput.
+    /// Returns the gathered light reflected toward the viewer, before multiplication by the path throughput, and
+    /// the part from wide lobes.
     #[inline(always)]
-    fn run(self, simd: impl Simd) -> Vec3x16 {
+    fn run(self, simd: impl Simd) -> [Vec3x16; 2] {
         let Self { tile, row, maps, depth, aov } = self;
-        let mut sums = [[0.0; PACKET_SIZE]; 3];
+        let mut sums = [[[0.0; PACKET_SIZE]; 3]; 2];
         let [looks, choices] = row.sampler_packet(tile).pairs(&row.path, Dimension::Gather, 0, 1);
         let Some(most_depth) = tile.settings.render.max_depth.checked_sub(depth + 1) else { return sums };
         let PathClasses { caustic, indirect, .. } = aov.path_classes();
@@ -72,16 +73,19 @@ impl SimdKernel for GatherPhotonsKernel<'_> {
             };
             // Add the photons' light, unless it is occluded.
             let maps = [(gathers_caustic, &pass.caustic), (gathers_bounced, &pass.bounced)];
-            let mut sum = Vec3::ZERO;
+            let mut sum = [Vec3::ZERO; 2];
             for ((gathers, map), chance) in maps.into_iter().zip(chances) {
                 if gathers && looks[i] < chance {
                     // Rescale the random number for reuse.
                     let random = [choices[i], looks[i] / chance];
                     let (light, photon) = gather_reflected_light((row, i), (map, &look), aov, random, simd);
-                    sum += light * (coverage_factor(tile, (row, i), &look, photon, map.radius()) / chance);
+                    let factor = coverage_factor(tile, (row, i), &look, photon, map.radius()) / chance;
+                    sum[0] += light[0] * factor;
+                    sum[1] += light[1] * factor;
                 }
             }
-            set_lane(&mut sums, i, sum);
+            set_lane(&mut sums[0], i, sum[0]);
+            set_lane(&mut sums[1], i, sum[1]);
         }
         sums
     }
@@ -114,7 +118,8 @@ fn coverage_factor(
     }
 }
 
-/// Light from a map's photons that a vertex reflects toward the viewer, and one of these photons.
+/// Light from a map's photons that a vertex reflects toward the viewer with its part from wide lobes, and one
+/// of these photons.
 #[inline(always)]
 fn gather_reflected_light(
     (row, i): (&VertexBatch, usize),
@@ -122,15 +127,15 @@ fn gather_reflected_light(
     aov: LightAov,
     random: [f32; 2],
     simd: impl Simd,
-) -> (Vec3, Option<PhotonPositionAndNormal>) {
+) -> ([Vec3; 2], Option<PhotonPositionAndNormal>) {
     if aov == LightAov::TraversalCost {
-        return (Vec3::splat(map.count_near(look, simd) as f32), None);
+        return ([Vec3::splat(map.count_near(look, simd) as f32); 2], None);
     }
     let is_flat = row.has_facet & 1 << i == 0;
     match row.bsdf.constant_f(i).filter(|_| is_flat) {
         Some(f) => {
             let (irradiance, photon) = map.irradiance_and_chosen_photon(look, random, simd);
-            (f * irradiance, photon)
+            ([f * irradiance; 2], photon)
         }
         None => gather_with_bsdf_per_photon((row, i), (map, look), random, simd),
     }
@@ -143,12 +148,13 @@ fn gather_with_bsdf_per_photon(
     (map, look): (&PhotonMap, &GatherPoint),
     random: [f32; 2],
     simd: impl Simd,
-) -> (Vec3, Option<PhotonPositionAndNormal>) {
-    let (mut sum, mut total, mut left, mut chosen) = (Vec3::ZERO, 0.0, random[0], None);
+) -> ([Vec3; 2], Option<PhotonPositionAndNormal>) {
+    let (mut sum, mut total, mut left, mut chosen) = ([Vec3::ZERO; 2], 0.0, random[0], None);
     map.visit_weighted_photons(look, simd, |photon, density| {
-        let [shown, all] = row.bsdf.lane_f(i, photon.direction);
+        let [shown, wide, all] = row.bsdf.lane_f(i, photon.direction);
         let scale = density * row.adjoint_photon_weight(i, photon.direction);
-        sum += shown * photon.flux * scale;
+        sum[0] += shown * photon.flux * scale;
+        sum[1] += wide * photon.flux * scale;
         // Choose the same photon whichever lobes are shown, so that the AOVs sum to the beauty image.
         let weight = (all * photon.flux * scale).element_sum();
         total += weight;

@@ -1,6 +1,7 @@
-//! Accumulates the light components visible in the view.
+//! Accumulates the light components visible in the view, and the layers.
 
 use super::ray::PathRay;
+use crate::integrators::layers::{LayerValues, SampleLayer};
 use crate::integrators::view::{LightAov, RadianceComponentMask};
 use crate::math::Vec3;
 
@@ -13,6 +14,44 @@ pub enum NonReflectedTerm {
     Ambient,
 }
 
+/// For each path in a bounce's queue, the fraction of its throughput that wide lobes of the path's first
+/// diffuse or glossy vertex reflect. Arbitrary before that vertex.
+#[derive(Default)]
+pub struct DiffuseFractions {
+    /// Fractions of this bounce's paths.
+    pub current: Vec<Vec3>,
+    /// Fractions of the next bounce's paths.
+    pub next: Vec<Vec3>,
+}
+
+impl DiffuseFractions {
+    /// Begins with `count` camera paths.
+    pub fn begin(&mut self, count: usize) {
+        self.current.clear();
+        self.current.resize(count, Vec3::ZERO);
+        self.next.clear();
+    }
+
+    /// Appends a path that continues path `place` specularly.
+    pub fn inherit(&mut self, place: u32) {
+        self.next.push(self.current[place as usize]);
+    }
+
+    /// Starts the next bounce.
+    pub fn next_bounce(&mut self) {
+        std::mem::swap(&mut self.current, &mut self.next);
+        self.next.clear();
+    }
+}
+
+/// Layers recorded along with the radiance.
+pub struct LayerAccumulator<'a> {
+    /// The layers' values.
+    pub values: &'a mut LayerValues,
+    /// The paths' diffuse fractions. `None` if no component of the light is recorded.
+    pub fractions: Option<&'a mut DiffuseFractions>,
+}
+
 /// Accumulates each slot's radiance, limited to the components visible in the view. In each bounce, emission
 /// and ambient light are added first, followed by reflected light, in path order.
 pub struct Accumulator<'a> {
@@ -22,26 +61,54 @@ pub struct Accumulator<'a> {
     pub radiance: &'a mut [Vec3],
     /// Upper bound on contributions from vertices that the camera does not see, or 0 for no bound.
     pub clamp: f32,
+    /// The layers, if any.
+    pub layers: Option<LayerAccumulator<'a>>,
 }
 
 impl Accumulator<'_> {
+    /// The paths' diffuse fractions, if they are needed for the layers.
+    #[inline]
+    pub fn fractions(&mut self) -> Option<&mut DiffuseFractions> {
+        self.layers.as_mut()?.fractions.as_deref_mut()
+    }
+
+    /// The layers, if any of them shows the first hit.
+    #[inline]
+    pub fn first_hit_layers(&mut self) -> Option<&mut LayerValues> {
+        self.layers.as_mut().map(|layers| &mut *layers.values).filter(|values| values.set().has_first_hit())
+    }
+
+    /// Part of the light at a path's vertex that counts as diffuse. `visible` is this part if the camera sees
+    /// the vertex.
+    #[inline]
+    pub fn diffuse_part(&self, place: u32, light: Vec3, visible: Option<Vec3>) -> Vec3 {
+        let fractions = self.layers.as_ref().and_then(|layers| layers.fractions.as_deref());
+        fractions.map_or(Vec3::ZERO, |fractions| {
+            visible.unwrap_or_else(|| light * fractions.current[place as usize])
+        })
+    }
+
     /// Adds emission or ambient light.
     pub fn add_non_reflected(&mut self, slot: u32, part: NonReflectedTerm, radiance: Vec3) {
         let parts = self.components_to_accumulate();
-        let is_taken = match part {
-            NonReflectedTerm::Emitted => parts.emitted,
-            NonReflectedTerm::Ambient => parts.ambient,
+        let (is_taken, layer) = match part {
+            NonReflectedTerm::Emitted => (parts.emitted, SampleLayer::Emission),
+            NonReflectedTerm::Ambient => (parts.ambient, SampleLayer::Ambient),
         };
         if is_taken {
             self.radiance[slot as usize] += radiance;
+            if let Some(layers) = &mut self.layers {
+                layers.values.add(layer, slot, radiance);
+            }
         }
     }
 
-    /// Adds light from a source that a path hits after its first diffuse or glossy surface.
-    pub fn add_emitter_hit(&mut self, path: &PathRay, radiance: Vec3) {
+    /// Adds light from a source that path `place` hits after its first diffuse or glossy surface.
+    pub fn add_emitter_hit(&mut self, path: &PathRay, place: u32, radiance: Vec3) {
         match self.aov {
             LightAov::Radiance(parts) if path.state.contributes_to_view(parts.paths) => {
-                self.add_clamped_direct(path.slot, radiance, false);
+                let diffuse = self.diffuse_part(place, radiance, None);
+                self.add_clamped_direct(path.slot, (radiance, diffuse), false);
             }
             LightAov::Radiance(_) | LightAov::LitFraction | LightAov::TraversalCost => {}
         }
@@ -79,28 +146,60 @@ impl Accumulator<'_> {
         }
     }
 
-    /// Adds the ambient term of a surface hit by a path.
+    /// Adds the ambient term of a surface hit by path `place`.
     #[inline]
-    pub fn add_ambient(&mut self, path: &PathRay, radiance: Vec3) {
+    pub fn add_ambient(&mut self, path: &PathRay, place: u32, radiance: Vec3) {
         if path.state.only_specular_before {
             self.add_non_reflected(path.slot, NonReflectedTerm::Ambient, radiance);
         } else if self.accepts_ambient(path) {
-            self.add_clamped_direct(path.slot, radiance, false);
+            let diffuse = self.diffuse_part(place, radiance, None);
+            self.add_clamped_direct(path.slot, (radiance, diffuse), false);
         }
     }
 
     /// Adds direct light at vertices with consecutive slots. The camera must see all of these vertices.
-    pub fn add_direct_to_consecutive_slots(&mut self, first: u32, contributions: &[Vec3]) {
+    /// `diffuse` contains the diffuse parts, or nothing if they are not needed.
+    pub fn add_direct_to_consecutive_slots(&mut self, first: u32, contributions: &[Vec3], diffuse: &[Vec3]) {
         for (sum, contribution) in self.radiance[first as usize..].iter_mut().zip(contributions) {
             *sum += *contribution;
         }
+        let Some(layers) = self.layers.as_mut().filter(|_| !diffuse.is_empty()) else { return };
+        for (sum, diffuse) in layers.values.values_from(SampleLayer::Diffuse, first).iter_mut().zip(diffuse) {
+            *sum += *diffuse;
+        }
+        if contributions != diffuse {
+            let specular = contributions.iter().zip(diffuse).map(|(light, diffuse)| light - diffuse);
+            for (sum, specular) in
+                layers.values.values_from(SampleLayer::Specular, first).iter_mut().zip(specular)
+            {
+                *sum += specular;
+            }
+        }
     }
 
-    /// Adds direct light at a vertex, clamped unless the camera sees the vertex.
-    pub fn add_clamped_direct(&mut self, slot: u32, contribution: Vec3, only_specular_before: bool) {
+    /// Adds direct light at a vertex and its diffuse part, clamped unless the camera sees the vertex.
+    pub fn add_clamped_direct(
+        &mut self,
+        slot: u32,
+        (contribution, diffuse): (Vec3, Vec3),
+        only_specular_before: bool,
+    ) {
         let largest = contribution.max_element();
         let is_clamped = !only_specular_before && self.clamp > 0.0 && largest > self.clamp;
         let kept = if is_clamped { self.clamp / largest } else { 1.0 };
         self.radiance[slot as usize] += contribution * kept;
+        if self.layers.is_some() {
+            self.add_reflected_layers(slot, contribution * kept, diffuse * kept);
+        }
+    }
+
+    /// Adds reflected light to the diffuse and specular layers.
+    fn add_reflected_layers(&mut self, slot: u32, light: Vec3, diffuse: Vec3) {
+        if let Some(layers) = &mut self.layers {
+            layers.values.add(SampleLayer::Diffuse, slot, diffuse);
+            if light != diffuse {
+                layers.values.add(SampleLayer::Specular, slot, light - diffuse);
+            }
+        }
     }
 }

@@ -42,6 +42,11 @@ impl PacketSource<'_> {
         }
     }
 
+    /// Mask of the lanes with a ray.
+    pub fn mask(&self) -> u32 {
+        ((1_u64 << self.count()) - 1) as u32
+    }
+
     /// Queue index of a lane's path. Arbitrary if the lane has no path.
     #[inline(always)]
     pub fn queue_index(&self, lane: usize) -> u32 {
@@ -86,6 +91,14 @@ impl PacketHits {
     /// The hit of a lane's ray.
     pub fn hit(&self, lane: usize) -> Option<Hit> {
         self.hits.get(lane).map(|shape| Hit { shape, object: self.object[lane] })
+    }
+
+    /// Point and interpolated front normal of a plain surface.
+    #[inline]
+    pub fn point_and_shading_normal(&self, surfaces: &SurfacePacket, lane_of_ray: usize) -> (Vec3, Vec3) {
+        let is_smooth = surfaces.smooth & 1 << lane_of_ray != 0;
+        let normal = if is_smooth { &surfaces.shading_normal } else { &surfaces.normal };
+        (lane(&surfaces.point, lane_of_ray), lane(normal, lane_of_ray))
     }
 
     /// Surface at a hit, or `None` if it is plain or not in the surface packet.
@@ -262,7 +275,7 @@ impl SimdKernel for PacketIntersector<'_> {
         // Compute the other surfaces, and the environment for rays that leave the scene.
         let found =
             tile.fill_non_plain_surfaces(self.surface, rows, (&hits, &object), any & !plain.all, simd);
-        let all = ((1_u64 << rays.count()) - 1) as u32;
+        let all = rays.mask();
         let sky = match world.lights.environment() {
             Some(environment) if any & all != all => environment.radiance_and_pdf_packet(&rows.direction),
             Some(_) | None => ([[0.0; PACKET_SIZE]; 3], [0.0; PACKET_SIZE]),

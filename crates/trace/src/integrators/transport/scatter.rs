@@ -1,5 +1,6 @@
 //! BSDF sampling at diffuse and glossy surfaces, sixteen at a time, and Russian roulette.
 
+use super::accumulator::DiffuseFractions;
 use super::batch::{BsdfValuesAndCosines, VertexBatch};
 use super::cone::RayCone;
 use super::interface::SCATTERED;
@@ -73,6 +74,8 @@ pub struct BsdfSampler<'a> {
     pub used: u32,
     /// How the paths continue.
     pub continuation: ContinuationPolicy,
+    /// Whether the diffuse fractions of the paths are needed.
+    pub has_fractions: bool,
 }
 
 /// Sampled directions at a packet of vertices.
@@ -94,12 +97,21 @@ pub struct ScatteredDirections {
     factors: Vec3x16,
     /// New values of [`PathHistory::roulette_throughput`].
     roulette_throughput: F32x16,
+    /// Fractions of `factors` from wide lobes, if they are needed.
+    diffuse: Vec3x16,
 }
 
 impl BsdfSampler<'_> {
     /// Adds the rays of the next bounce to `next`. `interior_lists` contains the media at the vertices.
-    /// `cones` is empty or contains the ray cones at the vertices, indexed by queue index.
-    pub fn scatter(self, interior_lists: &InteriorLists, cones: &[RayCone], next: &mut Vec<PathRay>) {
+    /// `cones` is empty or contains the ray cones at the vertices, indexed by queue index. `fractions` is
+    /// required if `has_fractions`.
+    pub fn scatter(
+        self,
+        interior_lists: &InteriorLists,
+        cones: &[RayCone],
+        next: &mut Vec<PathRay>,
+        fractions: Option<&mut DiffuseFractions>,
+    ) {
         // Sample the BSDFs of all vertices in the packet.
         let row = self.row;
         let scattered = self.tile.world.geometry.instruction_set().run(self);
@@ -130,6 +142,15 @@ impl BsdfSampler<'_> {
             path.path = path.continuation_path_number(SCATTERED);
             path
         }));
+        if let Some(DiffuseFractions { current, next }) = fractions {
+            next.extend(set_bit_lanes(scattered.alive).map(|i| {
+                if row.only_specular_before & 1 << i != 0 {
+                    lane(&scattered.diffuse, i)
+                } else {
+                    current[row.place[i] as usize]
+                }
+            }));
+        }
     }
 }
 
@@ -138,7 +159,7 @@ impl SimdKernel for BsdfSampler<'_> {
 
     #[inline(always)]
     fn run(self, simd: impl Simd) -> ScatteredDirections {
-        let Self { tile, row, used, continuation } = self;
+        let Self { tile, row, used, continuation, .. } = self;
         let sampler = row.sampler_packet(tile);
         // Sample a direction at each vertex.
         let u = sampler.pairs(&row.path, Dimension::Direction, 0, 1);
@@ -195,11 +216,25 @@ impl BsdfSampler<'_> {
             let bit = 1 << i;
             alive |= if (cosines[i] > 0.0) & (pdfs[i] > 0.0) & brings { bit } else { 0 };
         }
+        let diffuse = match continuation.lobes {
+            SampledLobes::All if self.has_fractions => bsdf.wide_fraction(),
+            SampledLobes::All | SampledLobes::Narrow => [[0.0; PACKET_SIZE]; 3],
+        };
         // Drop directions below the horizon.
         alive &= !row.below_horizon_mask(&wi, simd);
         let starts = row.ray_start_triangles(&wi);
         let narrow = row.bsdf.narrow_lobe_mask();
-        ScatteredDirections { alive, wi, starts, beyond: 0, narrow, pdfs, factors, roulette_throughput }
+        ScatteredDirections {
+            alive,
+            wi,
+            starts,
+            beyond: 0,
+            narrow,
+            pdfs,
+            factors,
+            roulette_throughput,
+            diffuse,
+        }
     }
 
     /// Scatters paths in directions sampled on both sides of the surfaces.
@@ -239,6 +274,8 @@ impl BsdfSampler<'_> {
             pdfs: *pdfs,
             factors,
             roulette_throughput,
+            // Rough glass has only narrow lobes.
+            diffuse: [[0.0; PACKET_SIZE]; 3],
         }
     }
 }

@@ -1,0 +1,247 @@
+//! Camera paths, traced bounce by bounce with queues instead of recursion. This is the main loop of
+//! `whitted` and `path`: intersect the rays, add the emission they find, sample lights and BSDFs at the
+//! surfaces, and apply Russian roulette.
+//!
+//! In `whitted`, paths split at glass and end at diffuse and glossy surfaces, where direct and ambient light
+//! is added (Whitted, *An Improved Illumination Model for Shaded Display*, 1980). At microfacet surfaces,
+//! they continue in the narrow lobe. In `path`, paths do not split and continue at all surfaces (Kajiya, *The
+//! Rendering Equation*, 1986). With photons, paths in `whitted` also continue at diffuse and glossy surfaces.
+//!
+//! - `emission`: emission and ambient light at the hits.
+//! - `interactions`: surfaces that are shaded one by one, such as mirrors and smooth glass.
+//! - `vertices`: diffuse and glossy surfaces.
+
+mod emission;
+mod interactions;
+mod vertices;
+
+use std::ops::Range;
+
+use super::RayCounters;
+use super::direct::queue::DirectLightVertexQueue;
+use super::memory::ThreadMemory;
+use super::photons::PhotonMaps;
+use super::photons::gather::GatherPhotonsKernel;
+use super::transport::accumulator::Accumulator;
+use super::transport::batch::VertexBatch;
+use super::transport::camera::CAMERA_ROWS;
+use super::transport::crossing::CoincidentSurfaceBuffers;
+use super::transport::packet::PacketSource;
+use super::transport::ray::PathRay;
+use super::transport::scatter::{BsdfSampler, ContinuationPolicy};
+use super::transport::scratch::TraceBuffers;
+use super::transport::tile::TileContext;
+use super::view::LightAov;
+use crate::control::Cancelled;
+use crate::geometry::packet::set_bit_lanes;
+use crate::geometry::surface_packet::SurfacePacket;
+use crate::materials::bsdf::SampledLobes;
+use crate::scene::description::ShadowMode;
+use crate::world::PACKET_SIZE;
+
+/// Number of rays traced between checks of the cancel token.
+const POLL_INTERVAL: usize = 256;
+
+/// Traces the camera paths for a range of slots and adds their radiance to the accumulator. `negative`
+/// receives the first slot of each packet and the mask of samples with a negative filter weight.
+pub fn trace_camera_paths(
+    (tile, maps): (&TileContext<'_>, Option<&PhotonMaps>),
+    slots: Range<u32>,
+    memory: &mut ThreadMemory,
+    accumulator: Accumulator<'_>,
+    counters: &mut RayCounters,
+    mut negative: impl FnMut(u32, u32),
+) -> Result<(), Cancelled> {
+    let ThreadMemory { scratch, direct, .. } = memory;
+    let TraceBuffers { rays, next, surfaces, crossing, camera, hits, object_order } = scratch;
+    let mut paths = CameraWavefront {
+        depth: 0,
+        continuation: None,
+        tile,
+        maps,
+        direct,
+        surfaces,
+        accumulator,
+        next,
+        crossing,
+        place: 0,
+        is_first_hit_pending: false,
+        counters,
+    };
+    // Trace the camera rays.
+    paths.next.clear();
+    if let Some(fractions) = paths.accumulator.fractions() {
+        fractions.begin(slots.len());
+    }
+    paths.begin_bounce(slots.len());
+    for start in slots.clone().step_by(CAMERA_ROWS * PACKET_SIZE) {
+        tile.generate_camera_packets(start..slots.end, camera);
+        for (first, row) in (start..).step_by(PACKET_SIZE).zip(&*camera) {
+            negative(first, row.negative);
+            let count = (slots.end - first).min(PACKET_SIZE as u32) as usize;
+            paths.trace_packet(PacketSource::Camera(row, first, count, first - slots.start))?;
+        }
+    }
+    paths.scatter()?;
+    paths.direct.add_arrived_light_consecutive(slots.start, &mut paths.accumulator);
+    paths.next_bounce(rays);
+    // Trace the remaining bounces.
+    while !rays.is_empty() {
+        paths.begin_bounce(rays.len());
+        if tile.behavior.scatters {
+            // Find all hits first, so that each packet hits one object.
+            tile.closest_hits(rays, hits)?;
+            object_order.sort(hits);
+            for places in object_order.grouped_queue_indices().chunks(PACKET_SIZE) {
+                paths.trace_packet(PacketSource::Traced(rays, hits, places))?;
+            }
+        } else {
+            for (packet, first) in rays.chunks(PACKET_SIZE).zip((0..).step_by(PACKET_SIZE)) {
+                paths.trace_packet(PacketSource::Paths(packet, first))?;
+            }
+        }
+        paths.scatter()?;
+        paths.direct.accumulate_arrived_light(rays, &mut paths.accumulator);
+        paths.next_bounce(rays);
+    }
+    Ok(())
+}
+
+/// One bounce of all paths in a batch.
+struct CameraWavefront<'a, 's> {
+    /// Number of bounces before the current hits.
+    depth: u32,
+    /// How paths continue at diffuse and glossy surfaces. `None` if they end at these surfaces.
+    continuation: Option<ContinuationPolicy>,
+    tile: &'a TileContext<'a>,
+    /// Photon maps for the samples. `None` if no photons are gathered.
+    maps: Option<&'a PhotonMaps>,
+    /// This bounce's diffuse and glossy vertices.
+    direct: &'a mut DirectLightVertexQueue,
+    /// Surfaces at the hits of the current packet.
+    surfaces: &'a mut SurfacePacket,
+    accumulator: Accumulator<'s>,
+    /// Rays of the next bounce.
+    next: &'a mut Vec<PathRay>,
+    /// Index of the current path in this bounce's queue.
+    place: u32,
+    /// Whether the layers that show the first hit of the current camera ray are not recorded yet.
+    is_first_hit_pending: bool,
+    crossing: &'a mut CoincidentSurfaceBuffers,
+    counters: &'a mut RayCounters,
+}
+
+impl CameraWavefront<'_, '_> {
+    /// Intersects a packet of rays, adds the emission they find, and queues the vertices at which the paths
+    /// may scatter.
+    fn trace_packet(&mut self, rays: PacketSource<'_>) -> Result<(), Cancelled> {
+        let tile = self.tile;
+        if (rays.queue_index(0) as usize).is_multiple_of(POLL_INTERVAL) {
+            tile.token.check_pause_and_cancel()?;
+        }
+        // Intersect the rays. The vertices of plain surfaces are ready for the queue.
+        let are_lit = self.may_scatter() && self.accumulator.accepts_reflected();
+        let packet =
+            tile.intersect(rays, self.accumulator.aov, are_lit, (self.direct.spare_batch(), self.surfaces));
+        self.counters.texture_lookups += packet.lookups;
+        if self.accumulator.aov == LightAov::TraversalCost {
+            self.add_traversal_costs(&rays, &packet);
+        }
+        if are_lit {
+            self.direct.commit_spare_vertices();
+            self.store_cones(&rays, &packet);
+        }
+        // Add the emission of camera rays, which needs no MIS weights, and record their layers.
+        let (plain, escaped) = self.emission_masks(&rays, &packet);
+        let mut unfinished = packet.any & !packet.plain;
+        match rays {
+            PacketSource::Camera(row, first, ..) => {
+                self.add_visible_emission(&row.rays, first, &packet, (plain, escaped));
+                self.record_first_hits(&rays, &packet, first);
+            }
+            PacketSource::Paths(..) | PacketSource::Traced(..) => unfinished |= plain | escaped,
+        }
+        // Add the emission of the other rays and shade the surfaces that are not plain. The contributions to
+        // a sample are added in path order.
+        for lane in set_bit_lanes(unfinished) {
+            self.place = rays.queue_index(lane);
+            self.shade_ray(packet.path(tile, &rays, lane), (&packet, lane));
+        }
+        // Scatter at the queued vertices while their data is in the cache.
+        if self.direct.is_full() {
+            self.scatter()?;
+        }
+        Ok(())
+    }
+
+    /// Adds the light reflected at the queued vertices, continues their paths, and empties the queue.
+    fn scatter(&mut self) -> Result<(), Cancelled> {
+        let (tile, aov, depth) = (self.tile, self.accumulator.aov, self.depth);
+        let instruction_set = tile.world.geometry.instruction_set();
+        for vertices in self.direct.groups(tile) {
+            // Sample lights.
+            let light = self.direct.sample_lights(vertices.clone(), tile, aov, self.paths_find_lights())?;
+            for (number, mut light) in vertices.clone().zip(light) {
+                let row = self.direct.batch(number);
+                // Gather photons.
+                if let Some(maps) = self.maps {
+                    let gathered = instruction_set.run(GatherPhotonsKernel { tile, row, maps, depth, aov });
+                    light.add_lanes(row.used, &gathered);
+                }
+                self.counters.shadow_rays += light.rays.shadow;
+                self.counters.scattered_rays += light.rays.scattered;
+                self.counters.texture_lookups += light.rays.lookups;
+                self.direct.accumulate_reflected_light(number, aov, &light);
+            }
+            // Sample BSDFs, with Russian roulette.
+            for number in vertices {
+                let row = self.direct.batch(number);
+                let Some(continuation) = self.continuation_at(row) else { continue };
+                let fractions = self.accumulator.fractions();
+                let has_fractions = fractions.is_some() && row.only_specular_before != 0;
+                let before = self.next.len();
+                BsdfSampler { tile, row, used: row.used, continuation, has_fractions }.scatter(
+                    self.direct.interior_lists(),
+                    self.direct.cones(),
+                    self.next,
+                    fractions,
+                );
+                self.counters.scattered_rays += (self.next.len() - before) as u64;
+            }
+        }
+        self.direct.clear();
+        Ok(())
+    }
+
+    /// How the paths continue at a packet of vertices. `None` if they end there.
+    fn continuation_at(&self, row: &VertexBatch) -> Option<ContinuationPolicy> {
+        let extends_narrow = row.bsdf.extends_narrow_lobe_paths() && self.tile.behavior.mirrors;
+        let narrow = || ContinuationPolicy::new(self.tile, self.depth, SampledLobes::Narrow);
+        let policy = self.continuation.or_else(|| extends_narrow.then(narrow));
+        policy.filter(|policy| policy.continues)
+    }
+
+    /// Whether continuing paths compete with light samples. Hard shadows are computed only with light samples.
+    fn paths_find_lights(&self) -> bool {
+        let is_soft = self.tile.settings.render.shadows == ShadowMode::Soft;
+        self.continuation.is_some() && (!self.tile.behavior.gathers || is_soft)
+    }
+
+    /// Begins a bounce of `paths` paths.
+    fn begin_bounce(&mut self, paths: usize) {
+        let policy = || ContinuationPolicy::new(self.tile, self.depth, SampledLobes::All);
+        self.continuation = self.tile.behavior.scatters.then(policy);
+        let has_fractions = self.accumulator.fractions().is_some();
+        self.direct.begin_bounce(paths, self.tile.pixel_spread > 0.0, has_fractions);
+    }
+
+    /// Starts the next bounce with the rays generated in this bounce, reusing the old queue for output.
+    fn next_bounce(&mut self, rays: &mut Vec<PathRay>) {
+        std::mem::swap(rays, self.next);
+        self.next.clear();
+        if let Some(fractions) = self.accumulator.fractions() {
+            fractions.next_bounce();
+        }
+        self.depth += 1;
+    }
+}

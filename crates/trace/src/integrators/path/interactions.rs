@@ -1,0 +1,268 @@
+//! Interactions of camera paths with surfaces that are shaded one by one. At specular surfaces (mirrors,
+//! smooth glass, panes and coats) paths split, or one branch is chosen at random.
+
+use super::CameraWavefront;
+use crate::geometry::Ray;
+use crate::geometry::packet::set_bit_lanes;
+use crate::integrators::aov::{record_first_hit, record_plain_first_hits, record_vertex};
+use crate::integrators::transport::crossing::CoincidentSurfaceBuffers;
+use crate::integrators::transport::interface::{FresnelSplit, fresnel_split, reflected_path};
+use crate::integrators::transport::interiors::InteriorList;
+use crate::integrators::transport::packet::{PacketHits, PacketSource};
+use crate::integrators::transport::ray::PathRay;
+use crate::integrators::transport::tile::TileContext;
+use crate::integrators::transport::vertex::SurfaceVertex;
+use crate::integrators::transport::walk::{
+    DirectOrCoincidentHit, Interaction, Interface, NullInteraction, PathStepper, walk_to_interaction,
+};
+use crate::integrators::view::LightAov;
+use crate::materials::{Bsdf, Coated, Mirror, ThinDielectric};
+use crate::math::Vec3;
+use crate::world::Hit;
+
+/// A path splits only if its weaker branch contributes at least this much. Otherwise, one branch is chosen at
+/// random.
+const MIN_SPLIT: f32 = 0.01;
+
+impl<'a> PathStepper<'a> for CameraWavefront<'a, '_> {
+    fn tile(&self) -> &'a TileContext<'a> {
+        self.tile
+    }
+
+    fn coincident_surface_buffers(&mut self) -> &mut CoincidentSurfaceBuffers {
+        self.crossing
+    }
+
+    fn record_surface_crossing(&mut self, path: &PathRay, next: Option<Hit>) {
+        if self.accumulator.aov == LightAov::TraversalCost {
+            self.accumulator
+                .add_traversal_cost(path.slot, count_traversal_cost_to_hit(self.tile, path, next));
+        }
+    }
+
+    #[inline(always)]
+    fn interact(&mut self, path: &PathRay, reached: Interaction<'_, 'a>, has_passed: bool) {
+        match reached {
+            Interaction::Opaque(vertex, hit, far) => {
+                if !has_passed && matches!(hit, DirectOrCoincidentHit::Direct(_)) {
+                    self.record_camera_vertex(path, vertex);
+                }
+                if self.add_emission(path, vertex, hit) {
+                    match &vertex.material.bsdf {
+                        Bsdf::NonSpecular(rough) => self.shade_rough(path, vertex, rough, far),
+                        Bsdf::Mirror(mirror) => self.shade_mirror(path, vertex, mirror),
+                        Bsdf::Coated(coated) => self.shade_coated(path, vertex, coated, far),
+                        Bsdf::Dielectric(_) | Bsdf::ThinDielectric(_) => {}
+                    }
+                }
+            }
+            Interaction::Glass(vertex, hit, Interface { far, rough }) => {
+                if !has_passed {
+                    self.record_camera_vertex(path, vertex);
+                }
+                if self.add_emission(path, vertex, DirectOrCoincidentHit::Direct(hit)) {
+                    match rough {
+                        Some(rough) => self.queue_rough_glass_vertices(path, vertex, rough, far),
+                        None => self.shade_glass(path, vertex, far),
+                    }
+                }
+            }
+            Interaction::Hidden if self.may_scatter() => self.push_specular(*path),
+            Interaction::Hidden => {}
+            Interaction::Nothing => self.add_escaped_light(path),
+        }
+    }
+
+    fn texture_lookup_counter(&mut self) -> &mut u64 {
+        &mut self.counters.texture_lookups
+    }
+
+    fn handle_pane(
+        &mut self,
+        path: &PathRay,
+        vertex: &SurfaceVertex<'a>,
+        hit: DirectOrCoincidentHit,
+        pane: &ThinDielectric,
+    ) -> NullInteraction {
+        let reflectance = pane.reflectance(vertex.surface.shading_normal.dot(vertex.wo));
+        let tint = vertex.pane_transmittance(path, pane, &mut self.counters.texture_lookups);
+        let left = tint * (1.0 - reflectance);
+        // After the last bounce, only light that passes straight through the pane is added.
+        if !self.add_emission(path, vertex, hit) {
+            return NullInteraction::Passed(left);
+        }
+        let shading = vertex.perturbed_and_smooth_normals(self.counters);
+        let mirrored = |weight: f32| reflected_path(path, vertex, &shading, Vec3::splat(weight));
+        let weaker = reflectance.min(1.0 - reflectance) * path.throughput.abs().max_element();
+        let splits = self.tile.behavior.splits && path.state.only_specular_before;
+        if weaker >= MIN_SPLIT && splits {
+            self.roulette_and_push_reflected(mirrored(reflectance));
+            NullInteraction::Passed(left)
+        } else if self.tile.chooses_reflection(path, reflectance) {
+            self.roulette_and_push_reflected(mirrored(1.0));
+            NullInteraction::Ended
+        } else {
+            NullInteraction::Passed(tint)
+        }
+    }
+}
+
+impl CameraWavefront<'_, '_> {
+    /// Adds the traversal costs of a packet's rays.
+    pub(super) fn add_traversal_costs(&mut self, rays: &PacketSource<'_>, packet: &PacketHits) {
+        for lane in 0..rays.count() {
+            let path = packet.path(self.tile, rays, lane);
+            let cost = count_traversal_cost_to_hit(self.tile, &path, packet.hit(lane));
+            self.accumulator.add_traversal_cost(path.slot, cost);
+        }
+    }
+
+    /// Shades the hit of one ray in a packet. The path is large, so it is moved only here.
+    #[inline(never)]
+    pub(super) fn shade_ray(&mut self, mut path: PathRay, (packet, lane): (&PacketHits, usize)) {
+        let (tile, bit) = (self.tile, 1 << lane);
+        match packet.hit(lane) {
+            Some(hit) if packet.plain & bit != 0 => {
+                self.add_emission_and_ambient(&path, &hit, packet.shining & bit != 0);
+            }
+            Some(hit) => {
+                let surface = packet.scalar_shaded_surface(self.surfaces, lane);
+                let camera_path = (self.depth == 0 && self.accumulator.first_hit_layers().is_some())
+                    .then_some(path)
+                    .filter(|_| !tile.world.has_null_interaction_surfaces());
+                self.is_first_hit_pending = camera_path.is_some();
+                walk_to_interaction(self, &mut path, (hit, surface));
+                if let Some(path) = camera_path.filter(|_| self.is_first_hit_pending)
+                    && let Some(values) = self.accumulator.first_hit_layers()
+                {
+                    // The walk passed through the surface.
+                    record_first_hit(tile, (&path, &hit), values, self.counters);
+                }
+            }
+            None => {
+                let sky = tile.world.lights.environment().map(|_| packet.sky_radiance_and_pdf(lane));
+                self.add_infinite_light(&path, tile.infinite_light_with_precomputed_sky(sky, &path));
+            }
+        }
+    }
+
+    /// Records the layers that show the first hits of camera rays, except for the hits that [`Self::interact`]
+    /// records.
+    pub(super) fn record_first_hits(&mut self, rays: &PacketSource<'_>, packet: &PacketHits, first: u32) {
+        let tile = self.tile;
+        let Some(values) = self.accumulator.first_hit_layers() else { return };
+        let mut left = record_plain_first_hits(tile, (packet, self.surfaces), first, values);
+        // Paths may pass through surfaces that the layers show.
+        if tile.world.has_null_interaction_surfaces() {
+            left |= packet.any & !packet.plain & rays.mask();
+        }
+        for lane in set_bit_lanes(left) {
+            let Some(hit) = packet.hit(lane) else { continue };
+            record_first_hit(tile, (&packet.path(tile, rays, lane), &hit), values, self.counters);
+        }
+    }
+
+    /// Records the layers that show first hits at the vertex where a camera ray's walk ended.
+    pub(super) fn record_camera_vertex(&mut self, path: &PathRay, vertex: &SurfaceVertex<'_>) {
+        if self.is_first_hit_pending
+            && let Some(values) = self.accumulator.first_hit_layers()
+        {
+            record_vertex(self.tile, path.slot, vertex, values, self.counters);
+            self.is_first_hit_pending = false;
+        }
+    }
+
+    pub(super) fn shade_mirror(&mut self, path: &PathRay, vertex: &SurfaceVertex<'_>, mirror: &Mirror) {
+        let shading = vertex.perturbed_and_smooth_normals(self.counters);
+        let is_colored = self.accumulator.aov.applies_surface_colors();
+        let reflectance = vertex.mirror_reflectance(mirror, &shading, is_colored, self.counters);
+        self.roulette_and_push_reflected(reflected_path(path, vertex, &shading, reflectance));
+    }
+
+    /// Splits a path at a smooth coat, or randomly chooses the coat or the base. The probability of choosing
+    /// the coat is its Fresnel reflectance.
+    pub(super) fn shade_coated(
+        &mut self,
+        path: &PathRay,
+        vertex: &SurfaceVertex<'_>,
+        coated: &Coated,
+        far: &InteriorList,
+    ) {
+        let shading = vertex.perturbed_and_smooth_normals(self.counters);
+        let fresnel = vertex.coat_reflectance(coated, &shading);
+        let weaker = fresnel.min(1.0 - fresnel) * path.throughput.abs().max_element();
+        let splits = self.tile.behavior.splits && path.state.only_specular_before;
+        let both = weaker >= MIN_SPLIT && splits;
+        let is_coat = !both && self.tile.chooses_reflection(path, fresnel);
+        if both || is_coat {
+            let lookups = &mut self.counters.texture_lookups;
+            let specular =
+                coated.specular_tint(&vertex.texture_point, lookups) * if both { fresnel } else { 1.0 };
+            if specular != Vec3::ZERO {
+                self.roulette_and_push_reflected(reflected_path(path, vertex, &shading, specular));
+            }
+        }
+        if !is_coat {
+            // Divide by the probability of choosing the base.
+            let by_chance = if both { 1.0 } else { 1.0 / (1.0 - fresnel) };
+            let mut state = path.state;
+            state.roulette_throughput *= by_chance;
+            let path = PathRay { throughput: path.throughput * by_chance, state, ..*path };
+            self.shade_rough(&path, vertex, &coated.base, far);
+        }
+    }
+
+    pub(super) fn shade_glass(&mut self, path: &PathRay, vertex: &SurfaceVertex<'_>, far: &InteriorList) {
+        let shading = vertex.perturbed_and_smooth_normals(self.counters);
+        let FresnelSplit { reflectance, refracted } =
+            fresnel_split(self.tile.world, path, vertex, &shading, far);
+        let mirrored = |weight: f32| reflected_path(path, vertex, &shading, Vec3::splat(weight));
+        let Some(refracted) = refracted else { return self.roulette_and_push_reflected(mirrored(1.0)) };
+        let weaker = reflectance.min(1.0 - reflectance) * path.throughput.abs().max_element();
+        let splits = self.tile.behavior.splits && path.state.only_specular_before;
+        if weaker >= MIN_SPLIT && splits {
+            self.roulette_and_push_reflected(mirrored(reflectance));
+            self.roulette_and_push_refracted(refracted, 1.0 - reflectance);
+        } else if self.tile.chooses_reflection(path, reflectance) {
+            self.roulette_and_push_reflected(mirrored(1.0));
+        } else {
+            self.roulette_and_push_refracted(refracted, 1.0);
+        }
+    }
+
+    pub(super) fn roulette_and_push_reflected(&mut self, ray: PathRay) {
+        let Some(ray) = self.russian_roulette(ray) else { return };
+        self.counters.reflected_rays += 1;
+        self.push_specular(ray);
+    }
+
+    pub(super) fn roulette_and_push_refracted(&mut self, mut ray: PathRay, weight: f32) {
+        ray.throughput *= weight;
+        let Some(ray) = self.russian_roulette(ray) else { return };
+        self.counters.refracted_rays += 1;
+        self.push_specular(ray);
+    }
+
+    /// Queues a ray with which the current path continues without a diffuse or glossy vertex.
+    pub(super) fn push_specular(&mut self, ray: PathRay) {
+        self.next.push(ray);
+        if let Some(fractions) = self.accumulator.fractions() {
+            fractions.inherit(self.place);
+        }
+    }
+
+    pub(super) fn russian_roulette(&self, ray: PathRay) -> Option<PathRay> {
+        match self.continuation {
+            Some(continuation) if !self.tile.behavior.splits || !ray.state.only_specular_before => {
+                continuation.russian_roulette(self.tile, ray)
+            }
+            Some(_) | None => Some(ray),
+        }
+    }
+}
+
+/// Traversal cost of a path's ray up to the hit.
+fn count_traversal_cost_to_hit(tile: &TileContext<'_>, path: &PathRay, hit: Option<Hit>) -> u32 {
+    let t_max = hit.map_or(path.ray.t_max, |hit| hit.shape.t);
+    tile.world.geometry.traversal_cost(&Ray { t_max, ..path.ray })
+}
