@@ -320,8 +320,8 @@ macro_rules! kinds {
             #[inline(always)]
             pub fn has_wide_lobes(&self) -> bool {
                 match self {
-                    $(Self::$kind(row) => row.has_wide_lobes(),)+
-                    $(Self::$part(row) => row.has_wide_lobes()),+
+                    $(Self::$kind(row) => row.any_has_wide_lobe(),)+
+                    $(Self::$part(row) => row.any_has_wide_lobe()),+
                 }
             }
 
