@@ -185,7 +185,7 @@ fn write_render_settings(toml: &mut TomlWriter, size: Option<[u32; 2]>, light: L
         Lighting::Default { is_polished: true } => toml.key_value("clamp", CLAMP),
         Lighting::Default { is_polished: false } => {}
         Lighting::FromFile { exposure } if exposure != 0.0 => {
-            toml.key_value("exposure", format_number(exposure))
+            toml.key_value("exposure", format_number(exposure));
         }
         Lighting::FromFile { .. } => {}
     }

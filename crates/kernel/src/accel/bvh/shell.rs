@@ -183,7 +183,7 @@ impl Bvh {
         let Some(shells) = &self.shells else {
             let mut goes_on = true;
             return self.visit_overlapping(other, |id| {
-                goes_on = goes_on && visit(PrimitiveOrEnclosingSubtree::Primitive(id))
+                goes_on = goes_on && visit(PrimitiveOrEnclosingSubtree::Primitive(id));
             });
         };
         let mut stack = ArrayVec::<ChildRef, { DEEP_STACK + 1 }>::new();

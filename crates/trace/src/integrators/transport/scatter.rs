@@ -142,7 +142,8 @@ impl BsdfSampler<'_> {
             path.path = path.continuation_path_number(SCATTERED);
             path
         }));
-        if let Some(DiffuseFractions { current, next }) = fractions {
+        if let Some(fractions) = fractions {
+            let DiffuseFractions { current, next } = fractions;
             next.extend(set_bit_lanes(scattered.alive).map(|i| {
                 if row.only_specular_before & 1 << i != 0 {
                     lane(&scattered.diffuse, i)
