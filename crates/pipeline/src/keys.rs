@@ -19,7 +19,7 @@ pub(crate) fn fingerprint_context<'a>(
 
 /// Returns the key for a mesh with distinct lights. `is_emissive` states whether an object's material makes
 /// the entire mesh emissive.
-pub(crate) fn lifted_emitter_mesh_key(mesh: &Fingerprint, is_emissive: bool) -> Fingerprint {
+pub(crate) fn mesh_with_separate_emitters_key(mesh: &Fingerprint, is_emissive: bool) -> Fingerprint {
     FingerprintHasher::new("distinct lights").add_fingerprint(mesh).add_bool(is_emissive).finish()
 }
 
@@ -407,7 +407,8 @@ mod tests {
     #[test]
     fn trees_of_meshes_with_distinct_lights_differ() {
         let mesh = FingerprintHasher::new("mesh").finish();
-        let distinct = [false, true].map(|is_emissive| Some(lifted_emitter_mesh_key(&mesh, is_emissive)));
+        let distinct =
+            [false, true].map(|is_emissive| Some(mesh_with_separate_emitters_key(&mesh, is_emissive)));
         let trees =
             [None, distinct[0], distinct[1]].map(|distinct| mesh_accel_key(&mesh, Accel::Bvh, distinct));
         assert!(trees[0] != trees[1] && trees[1] != trees[2] && trees[0] != trees[2]);

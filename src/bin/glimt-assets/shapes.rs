@@ -29,7 +29,7 @@ pub(crate) fn trefoil_knot_rope() -> Surface {
     for strand in 0..3 {
         let phase = f64::from(strand) / 3.0;
         let middle = |s: f64| {
-            let (center, normal, binormal) = point_and_normals_on_curve(s, trefoil_point);
+            let (center, normal, binormal) = knot_tube_frame(s, trefoil_point);
             let (sin, cos) = sin_cos_turns(phase + 22.0 * s);
             add(center, add(scale(normal, 0.085 * cos), scale(binormal, 0.085 * sin)))
         };
@@ -168,7 +168,7 @@ fn trefoil_point(s: f64) -> Vector {
 
 /// A point on a closed curve, and two directions perpendicular to the curve that are periodic along it. The
 /// first points away from the circle that the knot winds around.
-fn point_and_normals_on_curve(s: f64, curve: impl Fn(f64) -> Vector) -> (Vector, Vector, Vector) {
+fn knot_tube_frame(s: f64, curve: impl Fn(f64) -> Vector) -> (Vector, Vector, Vector) {
     let center = curve(s);
     let tangent = unit(subtract(curve(s + 1e-4), curve(s - 1e-4)));
     let (sin, cos) = sin_cos_turns(2.0 * s);
@@ -179,7 +179,7 @@ fn point_and_normals_on_curve(s: f64, curve: impl Fn(f64) -> Vector) -> (Vector,
 
 /// A point on a tube of radius `radius` around a closed curve.
 fn tube_point(s: f64, t: f64, radius: f64, curve: impl Fn(f64) -> Vector) -> Vector {
-    let (center, normal, binormal) = point_and_normals_on_curve(s, curve);
+    let (center, normal, binormal) = knot_tube_frame(s, curve);
     let (sin, cos) = sin_cos_turns(t);
     add(center, add(scale(normal, radius * cos), scale(binormal, radius * sin)))
 }

@@ -40,7 +40,7 @@ impl Film {
     /// Adds layers to an empty film.
     ///
     /// # Errors
-    /// [`FilmError::Memory`] if there is not enough memory for the layers.
+    /// [`FilmCreationError::Memory`] if there is not enough memory for the layers.
     pub fn with_layers(mut self, count: usize) -> Result<Self, FilmCreationError> {
         let more = Self::layer_memory(self.crop_rect(), count);
         let (width, height, bytes) = (self.width(), self.height(), self.memory_bytes() + more);

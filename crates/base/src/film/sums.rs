@@ -125,7 +125,7 @@ impl Tile {
     pub(super) fn mean(&self, index: usize) -> Option<DVec3> {
         self.signed_mean(
             index,
-            || self.positive_lobe_sum(index),
+            || self.positive_lobe_radiance_sum(index),
             |negative| sum_pixel_blocks(&negative.earlier, &negative.sums, index),
         )
     }
@@ -159,7 +159,7 @@ impl Tile {
 
     /// Sum of a pixel's samples outside negative lobes.
     #[inline(always)]
-    fn positive_lobe_sum(&self, index: usize) -> DVec3 {
+    fn positive_lobe_radiance_sum(&self, index: usize) -> DVec3 {
         if self.earlier.is_empty() {
             self.sums[index]
         } else {

@@ -50,7 +50,7 @@ pub(super) fn parallelogram_polygon((c, u, v): (DVec3, DVec3, DVec3)) -> FlatPol
 
 impl LocalGeometry {
     /// A curved surface. Only its distance is known.
-    pub(super) fn curved_surface_at_distance(distance: f64) -> Self {
+    pub(super) fn from_distance_to_curved_surface(distance: f64) -> Self {
         Self::Surface { distance, ground: None }
     }
 }

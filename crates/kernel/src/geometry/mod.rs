@@ -310,7 +310,7 @@ impl Shape {
             Self::Cylinder(cylinder) => cylinder.mean_curvature(part),
             Self::Cone(cone) => cone.mean_curvature(part, point),
             Self::Torus(torus) => torus.mean_curvature(point),
-            Self::Transformed(transformed) => transformed.curvature(part, point),
+            Self::Transformed(transformed) => transformed.mean_curvature(part, point),
         }
     }
 
@@ -344,10 +344,14 @@ impl Shape {
             Self::Plane(plane) => plane.geometry_near(point),
             Self::Disk(disk) => disk.geometry_near(point),
             Self::Cylinder(cylinder) => {
-                LocalGeometry::curved_surface_at_distance(cylinder.distance_from_point(point))
+                LocalGeometry::from_distance_to_curved_surface(cylinder.distance_from_point(point))
             }
-            Self::Cone(cone) => LocalGeometry::curved_surface_at_distance(cone.distance_from_point(point)),
-            Self::Torus(torus) => LocalGeometry::curved_surface_at_distance(torus.distance_from_point(point)),
+            Self::Cone(cone) => {
+                LocalGeometry::from_distance_to_curved_surface(cone.distance_from_point(point))
+            }
+            Self::Torus(torus) => {
+                LocalGeometry::from_distance_to_curved_surface(torus.distance_from_point(point))
+            }
             Self::Transformed(transformed) => transformed.geometry_near(point),
         }
     }
@@ -368,7 +372,7 @@ impl Shape {
             | Self::Cylinder(_)
             | Self::Cone(_)
             | Self::Torus(_) => None,
-            Self::Transformed(transformed) => transformed.flat_polygon(number),
+            Self::Transformed(transformed) => transformed.polygon_face(number),
         }
     }
 
@@ -379,7 +383,7 @@ impl Shape {
         match self {
             Self::Sphere(sphere) => sphere.radius > distance,
             Self::Box(cuboid) => cuboid.is_near_only_one_face(point, distance),
-            Self::Transformed(transformed) => transformed.is_thicker_than(point, distance),
+            Self::Transformed(transformed) => transformed.is_locally_thicker_than(point, distance),
             Self::Quad(_)
             | Self::Plane(_)
             | Self::Triangle(_)

@@ -130,7 +130,7 @@ impl TransformedShape {
     /// unit tangents t₁ and t₂ in their directions, it is
     /// ½·|det M|·(k₁·|M·t₂|² + k₂·|M·t₁|²) / |M·t₁ × M·t₂|³: the transform multiplies the second fundamental
     /// form by |det M| / |M·t₁ × M·t₂|, and tangents have the lengths |M·tᵢ|.
-    pub fn curvature(&self, part: u32, point: DVec3) -> f64 {
+    pub fn mean_curvature(&self, part: u32, point: DVec3) -> f64 {
         let local = self.to_world.inverse_point(point);
         let mean = self.shape.mean_curvature(part, local);
         let Some((bend, tangents)) = self.shape.meridian(local).filter(|_| mean != 0.0) else {
@@ -165,8 +165,8 @@ impl TransformedShape {
         }
     }
 
-    /// [`Shape::flat_polygon`].
-    pub fn flat_polygon(&self, number: u32) -> Option<FlatPolygon> {
+    /// [`Shape::polygon_face`].
+    pub fn polygon_face(&self, number: u32) -> Option<FlatPolygon> {
         let mut corners: FlatPolygon =
             self.shape.polygon_face(number)?.iter().map(|corner| self.to_world.point(*corner)).collect();
         if self.to_world.flips_handedness() {
@@ -175,8 +175,8 @@ impl TransformedShape {
         Some(corners)
     }
 
-    /// [`Shape::is_thicker_than`].
-    pub fn is_thicker_than(&self, point: DVec3, distance: f64) -> bool {
+    /// [`Shape::is_locally_thicker_than`].
+    pub fn is_locally_thicker_than(&self, point: DVec3, distance: f64) -> bool {
         self.shape
             .is_locally_thicker_than(self.to_world.inverse_point(point), distance * self.inverse_stretch)
     }

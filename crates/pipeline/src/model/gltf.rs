@@ -267,7 +267,7 @@ impl super::materials::MaterialExportTarget for SceneWriter<'_> {
         name.or_else(of_file).unwrap_or_else(|| format!("image_{image}"))
     }
 
-    fn image_file(&mut self, image: usize) -> TextureFileReference {
+    fn image_file_reference(&mut self, image: usize) -> TextureFileReference {
         self.images.insert(image);
         let bytes = self.container.locate_image(image);
         match (self.naming, bytes) {

@@ -15,7 +15,7 @@ pub(super) trait MaterialExportTarget {
     /// Name of an image, without an extension.
     fn image_name(&self, image: usize) -> String;
     /// The file that contains an image.
-    fn image_file(&mut self, image: usize) -> TextureFileReference;
+    fn image_file_reference(&mut self, image: usize) -> TextureFileReference;
 }
 
 /// A texture's file.
@@ -242,7 +242,7 @@ impl<F: MaterialExportTarget> MaterialWriter<'_, F> {
         }
         let wanted = self.files.image_name(texture.image);
         let name = self.names.make_unique(&wanted, "image");
-        let TextureFileReference { file, image } = self.files.image_file(texture.image);
+        let TextureFileReference { file, image } = self.files.image_file_reference(texture.image);
         let toml = self.files.toml_writer();
         toml.table(&format!("[textures.{}]", format_key(&name)));
         toml.key_value("file", quote_toml_string(&file));

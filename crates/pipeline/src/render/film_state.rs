@@ -140,7 +140,7 @@ impl FilmState {
 
     /// Maps this share's samples to sample indices in the whole image. If the indices are not all
     /// consecutive, returns only the first consecutive range.
-    pub(crate) fn to_global_samples(&self, samples: Range<u32>) -> Range<u32> {
+    pub(crate) fn first_global_sample_range(&self, samples: Range<u32>) -> Range<u32> {
         match &self.share {
             Some(share) => share.to_global_sample_range(samples),
             None => samples,

@@ -251,7 +251,7 @@ impl<'a> Scheduler<'a> {
         while !self.state.is_complete_in_region(part, target) && !self.is_over_time {
             let samples = self.state.min_unfinished_samples_in(part, target);
             let at_once = samples..target.min(samples.saturating_add(photons.max_passes_at_once()));
-            let numbers = self.state.to_global_samples(at_once);
+            let numbers = self.state.first_global_sample_range(at_once);
             let end = samples + numbers.len() as u32;
             // Do not trace or gather photons if there is no time left.
             self.run_due_tasks();

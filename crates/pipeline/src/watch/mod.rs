@@ -255,7 +255,7 @@ impl<F: FnMut(WatchEvent)> WatchThread<F> {
             let noticed = self.change_tracker.mark_reported(now);
             (self.say)(WatchEvent::Changed(ContentChangeTime { noticed }));
         }
-        if self.change_tracker.poll_settled(now) {
+        if self.change_tracker.take_reported_change_settled(now) {
             (self.say)(WatchEvent::Settled);
         }
     }

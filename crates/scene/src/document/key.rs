@@ -215,11 +215,14 @@ impl<'a> TableKey<'a> {
 
     /// Reads a name and returns the name's index in `names`.
     pub(super) fn index_by_name(&self, names: &DefinedNames) -> Option<usize> {
-        self.find_defined_name(names, self.string_described_by(|| format!("the name of a {}", names.kind))?)
+        self.resolve_name_or_report(
+            names,
+            self.string_described_by(|| format!("the name of a {}", names.kind))?,
+        )
     }
 
     /// Looks up `text`, the name that is the key's value.
-    fn find_defined_name(&self, names: &DefinedNames, text: &str) -> Option<usize> {
+    fn resolve_name_or_report(&self, names: &DefinedNames, text: &str) -> Option<usize> {
         let index = names.find_and_mark_used(text);
         if index.is_none() {
             let message = format!("there is no {} \"{}\"", names.kind, escape_and_truncate(text, 40));

@@ -34,7 +34,7 @@ impl StatementParser {
         let first = at == if source.starts_with(MARK) { MARK.len() } else { 0 };
         let base = if first { 0 } else { at - 1 };
         let part = Source::new(source.get(base..).unwrap_or_default());
-        let mut end = ExpressionEndFinder::default();
+        let mut end = StatementEndFinder::default();
         for token in part.lex().skip(usize::from(!first)) {
             self.tokens.push(token);
             if end.process_token(token.kind()) {
@@ -68,7 +68,7 @@ fn parse_into_events(
 /// closes a bracket. With mismatched brackets, the parser may finish earlier, but it is never inside a value
 /// while `open` is empty.
 #[derive(Default)]
-struct ExpressionEndFinder {
+struct StatementEndFinder {
     phase: StatementPhase,
     open: Vec<TokenKind>,
 }
@@ -88,7 +88,7 @@ enum StatementPhase {
     Rest,
 }
 
-impl ExpressionEndFinder {
+impl StatementEndFinder {
     /// Processes the next token. Returns whether it ends the expression.
     fn process_token(&mut self, token: TokenKind) -> bool {
         use TokenKind as T;

@@ -7,10 +7,10 @@ impl Geometry {
     /// Calls `visit` for every object that may intersect the box until `visit` returns false. Returns whether
     /// all objects were visited.
     pub fn visit_objects_in_box(&self, bounds: &Aabb, mut visit: impl FnMut(u32, &Object) -> bool) -> bool {
-        let mut goes_on = self.unbounded().iter().all(|&id| visit(id, &self.objects()[id as usize]));
+        let mut continues = self.unbounded().iter().all(|&id| visit(id, &self.objects()[id as usize]));
         self.tree()
-            .visit_overlapping(bounds, |id| goes_on = goes_on && visit(id, &self.objects()[id as usize]));
-        goes_on
+            .visit_overlapping(bounds, |id| continues = continues && visit(id, &self.objects()[id as usize]));
+        continues
     }
 }
 

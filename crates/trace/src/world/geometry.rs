@@ -11,7 +11,7 @@ use crate::math::{DVec3, Vec2, Vec3};
 use crate::scene::description::{self, LoweredShape, Scene};
 
 use super::coplanar::light_lifts;
-use super::isolated::IsolationCache;
+use super::isolated::IsolatedRegionCache;
 use super::merged::MergedTriangle;
 use super::{MergedMeshes, MeshInstance, MeshTree, Object};
 
@@ -38,7 +38,7 @@ pub struct Geometry {
     /// Upper bound on the position error of mesh triangles, including the error of ray tests.
     mesh_rounding: f32,
     /// Cache of isolated surface regions.
-    isolated: IsolationCache,
+    isolated: IsolatedRegionCache,
     /// One translation per object. Empty if no objects are moved.
     lifts: Vec<DVec3>,
     instructions: InstructionSet,
@@ -117,7 +117,7 @@ impl Geometry {
         let rounding = objects.iter().filter_map(Object::mesh).map(MeshInstance::max_rounding_error);
         let mesh_rounding = rounding.fold(0.0, f32::max);
         let origin = DVec3::ZERO;
-        let isolated = IsolationCache::new(&boxes);
+        let isolated = IsolatedRegionCache::new(&boxes);
         Ok(Self {
             objects,
             origin,
@@ -202,7 +202,7 @@ impl Geometry {
     }
 
     /// Cache of isolated surface regions.
-    pub(super) fn isolation_cache(&self) -> &IsolationCache {
+    pub(super) fn isolation_cache(&self) -> &IsolatedRegionCache {
         &self.isolated
     }
 

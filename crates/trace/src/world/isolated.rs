@@ -39,7 +39,7 @@ const CELLS: usize = 16;
 
 /// Isolation tables of all objects.
 #[derive(Debug, Default)]
-pub(super) struct IsolationCache {
+pub(super) struct IsolatedRegionCache {
     /// Diagonal of the bounding box of all finite objects.
     reach: f32,
     tables: Vec<OnceLock<ObjectIsolationCache>>,
@@ -55,7 +55,7 @@ struct ObjectIsolationCache {
     states: Box<[AtomicU8]>,
 }
 
-impl IsolationCache {
+impl IsolatedRegionCache {
     /// Creates empty tables for objects with these bounding boxes.
     pub fn new(boxes: &[Aabb]) -> Self {
         let all = boxes.iter().fold(Aabb::EMPTY, |all, own| all.union(*own));

@@ -162,7 +162,7 @@ impl Decoder {
         let escaped = self.escaped.take().filter(|escaped| now < *escaped + LATE_SEQUENCE);
         match byte {
             ESCAPE => {
-                self.meaning.reset();
+                self.meaning.drop_current_sequence();
                 self.parser.advance(&mut self.meaning, &[byte]);
                 self.held = PendingSequence::Escape;
             }
@@ -230,7 +230,7 @@ impl Decoder {
 
     /// Drops the current sequence and returns it.
     fn take_pending_sequence(&mut self) -> PendingSequence {
-        self.meaning.reset();
+        self.meaning.drop_current_sequence();
         self.command.clear();
         self.parser = vte::Parser::default();
         std::mem::take(&mut self.held)

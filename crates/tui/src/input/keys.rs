@@ -37,7 +37,7 @@ enum NextCharacterMode {
 
 impl InputPerformer {
     /// Drops the current sequence.
-    pub(super) fn reset(&mut self) {
+    pub(super) fn drop_current_sequence(&mut self) {
         self.next = NextCharacterMode::Character;
         self.is_paste = false;
     }

@@ -65,7 +65,7 @@ pub struct Painter {
     part: Option<RowDrawPhase>,
     strokes: vec::IntoIter<CellRun>,
     /// Drawing progress for each row of the preview.
-    rows: Vec<RowProgress>,
+    rows: Vec<RowDrawState>,
     aim: u64,
 }
 
@@ -91,7 +91,7 @@ pub struct LinksAndDelayedText {
 
 /// Drawing progress for one row of the preview.
 #[derive(Clone, Copy, Debug, Default)]
-struct RowProgress {
+struct RowDrawState {
     /// Number of the last target for which the row was drawn.
     aim: u64,
     /// Whether the row on the screen matches its target.
@@ -150,7 +150,7 @@ impl Painter {
             self.screen = None;
         }
         if self.screen.is_none() || self.rows.len() != usize::from(wanted.rows) {
-            self.rows = vec![RowProgress::default(); usize::from(wanted.rows)];
+            self.rows = vec![RowDrawState::default(); usize::from(wanted.rows)];
         }
         for (y, row) in (0..wanted.rows).zip(&mut self.rows) {
             row.is_done = row.is_done && self.wanted.row_also_satisfies_other(&wanted, y);
@@ -210,7 +210,7 @@ impl Painter {
             }
             if let Some(RowDrawPhase::Picture(y)) = self.part {
                 self.memory.record_row_done(y);
-                self.rows[usize::from(y)] = RowProgress { aim: self.aim, is_done: true };
+                self.rows[usize::from(y)] = RowDrawState { aim: self.aim, is_done: true };
             }
             if !slice.bytes.is_empty() && is_late() {
                 self.part = None;
@@ -253,7 +253,7 @@ impl Painter {
     /// Marks the content of these cells as unknown.
     pub fn damage(&mut self, cells: Rect) {
         if let Some(screen) = &mut self.screen {
-            screen.damage(cells);
+            screen.mark_cells_unknown(cells);
             self.queue_all_draw_steps();
         }
     }
@@ -262,7 +262,7 @@ impl Painter {
     pub fn invalidate(&mut self) {
         self.screen = None;
         self.memory.invalidate();
-        self.rows.fill(RowProgress::default());
+        self.rows.fill(RowDrawState::default());
         self.queue_all_draw_steps();
     }
 }

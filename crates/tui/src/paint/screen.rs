@@ -109,7 +109,7 @@ impl ScreenModel {
     }
 
     /// Marks the content of these cells as unknown.
-    pub(super) fn damage(&mut self, cells: Rect) {
+    pub(super) fn mark_cells_unknown(&mut self, cells: Rect) {
         let cells = cells.intersection(Rect::new(0, 0, self.columns, self.rows));
         for y in cells.top()..cells.bottom() {
             for x in cells.left()..cells.right() {

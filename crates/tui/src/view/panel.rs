@@ -156,7 +156,7 @@ fn result_lines(state: &State, width: u16) -> Vec<StyledLine> {
     };
     status_line::unsaved_image_messages(state).iter().for_each(|words| add(words, TextRole::Faint));
     status_line::changed_file_messages(state).for_each(|words| add(&words, TextRole::Warning));
-    for written in status_line::current_image_files(state) {
+    for written in status_line::files_containing_current_image(state) {
         lines.push(vec![("→ ".to_owned(), TextRole::Good), (written.escaped_path(), TextRole::File)]);
         let size = state.request.effective.as_ref().map(|it| format!(", {}×{}", it.width, it.height));
         lines.push(vec![(

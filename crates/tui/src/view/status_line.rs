@@ -213,11 +213,11 @@ fn written_file_pieces(state: &State, layout: &Layout) -> Vec<Vec<(String, TextR
         let size = format!(" {}", format_bytes(written.bytes));
         vec![(" → ".to_owned(), TextRole::Faint), (name, TextRole::File), (size, TextRole::Faint)]
     };
-    current_image_files(state).filter(|_| layout.panel.is_empty()).map(pieces).collect()
+    files_containing_current_image(state).filter(|_| layout.panel.is_empty()).map(pieces).collect()
 }
 
 /// The files that contain the current image.
-pub(super) fn current_image_files(state: &State) -> impl Iterator<Item = &WrittenFile> {
+pub(super) fn files_containing_current_image(state: &State) -> impl Iterator<Item = &WrittenFile> {
     // If the scene's own image has not changed, it may have been written by an earlier request.
     let is_own = state.request.has_no_keyboard_overrides();
     let of_any_request = is_own && state.saving.unwritten.is_none();
@@ -233,7 +233,7 @@ pub(super) fn current_image_files(state: &State) -> impl Iterator<Item = &Writte
 /// Returns messages about a displayed image that has not been written, and about the images that have.
 pub(crate) fn unsaved_image_messages(state: &State) -> Vec<String> {
     let saving = &state.saving;
-    if current_image_files(state).next().is_some() {
+    if files_containing_current_image(state).next().is_some() {
         return Vec::new();
     }
     let by_hand = saving.manually_written_image();

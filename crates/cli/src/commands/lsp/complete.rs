@@ -19,7 +19,7 @@ pub(super) fn complete(document: &OpenDocument, offset: usize) -> Option<Value> 
         CursorContext::Key { of, given, is_assigned } => missing_key_items(of, &given, is_assigned),
         CursorContext::Value { of, key, is_quoted } if key == "type" => type_items(of, is_quoted),
         CursorContext::Value { of, key, is_quoted } => {
-            of.find_key(&key).map(|key| value_items(document, key.kind, is_quoted))?
+            of.find_allowed_key(&key).map(|key| value_items(document, key.kind, is_quoted))?
         }
         CursorContext::InnerKey { given } => {
             let keys =

@@ -32,7 +32,7 @@ impl CursorTable {
         self.info.keys_for_type(self.kind).collect()
     }
 
-    pub(super) fn find_key(&self, name: &str) -> Option<&'static KeyInfo> {
+    pub(super) fn find_allowed_key(&self, name: &str) -> Option<&'static KeyInfo> {
         self.info.keys_for_type(self.kind).find(|key| key.name == name)
     }
 }

@@ -106,7 +106,7 @@ impl MaterialReader<'_> {
             material.roughness = TexturedValue::from_scalar(1.0 - clamp_to_unit(old.glossiness_factor));
         }
         let (color, alpha, texture) = base;
-        material.color = self.convert_color(color, texture)?;
+        material.color = self.convert_textured_color(color, texture)?;
         material.alpha = self.convert_alpha_mode(json, alpha, &material.color)?;
         material.is_two_sided = json.double_sided;
         if let Some(map) = &json.normal_texture {
@@ -117,7 +117,7 @@ impl MaterialReader<'_> {
             extensions.emissive_strength.as_ref().map_or(1.0, |extension| extension.emissive_strength);
         let emission = DVec3::from(json.emissive_factor) * strength;
         if emission.max_element() > 0.0 {
-            material.emission = self.convert_color(emission, &json.emissive_texture)?;
+            material.emission = self.convert_textured_color(emission, &json.emissive_texture)?;
         }
         // Convert the extensions.
         if let Some(ior) = &extensions.ior {
@@ -131,7 +131,8 @@ impl MaterialReader<'_> {
         if let Some(specular) = &extensions.specular {
             material.specular = self.convert_scalar(specular.specular_factor, &specular.specular_texture)?;
             let factor = DVec3::from(specular.specular_color_factor);
-            material.specular_color = self.convert_color(factor, &specular.specular_color_texture)?;
+            material.specular_color =
+                self.convert_textured_color(factor, &specular.specular_color_texture)?;
         }
         if let Some(coat) = &extensions.clearcoat {
             material.clearcoat = self.convert_scalar(coat.clearcoat_factor, &coat.clearcoat_texture)?;
@@ -239,10 +240,10 @@ impl MaterialReader<'_> {
         factor: f64,
         texture: &Option<TextureInfo>,
     ) -> Result<TexturedValue, GltfError> {
-        self.convert_color(DVec3::splat(clamp_to_unit(factor)), texture)
+        self.convert_textured_color(DVec3::splat(clamp_to_unit(factor)), texture)
     }
 
-    fn convert_color(
+    fn convert_textured_color(
         &mut self,
         factor: DVec3,
         texture: &Option<TextureInfo>,

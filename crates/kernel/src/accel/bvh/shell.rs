@@ -181,9 +181,9 @@ impl Bvh {
         mut visit: impl FnMut(PrimitiveOrEnclosingSubtree) -> bool,
     ) {
         let Some(shells) = &self.shells else {
-            let mut goes_on = true;
+            let mut continues = true;
             return self.visit_overlapping(other, |id| {
-                goes_on = goes_on && visit(PrimitiveOrEnclosingSubtree::Primitive(id));
+                continues = continues && visit(PrimitiveOrEnclosingSubtree::Primitive(id));
             });
         };
         let mut stack = ArrayVec::<ChildRef, { DEEP_STACK + 1 }>::new();

@@ -115,7 +115,7 @@ fn partition_into_groups(leaves: &mut [LightLeaf], token: &CancelToken) -> Resul
         let LeafRange { start, count, .. } = groups[most_expensive];
         let own = &mut leaves[start..start + count];
         token.check_pause_and_cancel()?;
-        let middle = split_leaves_along_longest_axis(own, unit);
+        let middle = partition_leaves_along_longest_axis(own, unit);
         let (left, right) = own.split_at(middle);
         groups[most_expensive] = LeafRange::new(start, left);
         groups.insert(most_expensive + 1, LeafRange::new(start + middle, right));
@@ -195,7 +195,7 @@ const BINS: usize = 64;
 
 /// Splits leaves into two nonempty parts along the longest axis. Returns the size of the first part. It is a
 /// multiple of `unit`, unless there are too many leaves to sort.
-fn split_leaves_along_longest_axis(leaves: &mut [LightLeaf], unit: usize) -> usize {
+fn partition_leaves_along_longest_axis(leaves: &mut [LightLeaf], unit: usize) -> usize {
     let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
     for leaf in &*leaves {
         (min, max) = (min.min(leaf.bounds.center), max.max(leaf.bounds.center));

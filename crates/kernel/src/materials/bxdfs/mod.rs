@@ -316,7 +316,7 @@ macro_rules! kinds {
                 }
             }
 
-            /// [`BxdfPacket::has_wide_lobes`].
+            /// [`BxdfPacket::any_has_wide_lobe`].
             #[inline(always)]
             pub fn has_wide_lobes(&self) -> bool {
                 match self {

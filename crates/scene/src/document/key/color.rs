@@ -42,7 +42,7 @@ impl TableKey<'_> {
         if self.is_table() {
             return self.inline_table_texture_index(textures).map(ColorSource::Texture);
         }
-        self.reject_texture_name(textures, COLOR_OR_TEXTURE)?;
+        self.reject_bare_texture_name(textures, COLOR_OR_TEXTURE)?;
         self.color_in_limits(limits, COLOR_OR_TEXTURE).map(|color| ColorSource::Constant(color.as_vec3()))
     }
 
@@ -64,13 +64,13 @@ impl TableKey<'_> {
             table.report_unknown_and_missing_keys();
             return Some(EmissionSource { texture: Some(texture?), ..EmissionSource::from_constant(scale?) });
         }
-        self.reject_texture_name(textures, EMISSION)?;
+        self.reject_bare_texture_name(textures, EMISSION)?;
         self.color_in_limits(Limits::AtLeast(0.0), EMISSION)
             .map(|color| EmissionSource::from_constant(color.as_vec3()))
     }
 
     /// Returns `None` and reports an error if the value is a bare texture name.
-    fn reject_texture_name(&self, textures: &DefinedNames, expected: &str) -> Option<()> {
+    fn reject_bare_texture_name(&self, textures: &DefinedNames, expected: &str) -> Option<()> {
         if let TomlValue::String(text) = self.value?.decode()
             && parse_hex_or_named_srgb8(text).is_none()
             && textures.find_and_mark_used(text).is_some()

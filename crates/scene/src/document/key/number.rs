@@ -44,7 +44,7 @@ impl TableKey<'_> {
             return self.texture_channel_table(textures);
         }
         let name = self.string_described_by(|| NAME_OR_TEXTURE.to_owned())?;
-        Some((self.find_defined_name(textures, name)?, None))
+        Some((self.resolve_name_or_report(textures, name)?, None))
     }
 
     /// Reads the texture and the channel in `{ texture = "name", channel = "r" }`.

@@ -65,13 +65,13 @@ impl CameraWavefront<'_, '_> {
         if bsdf.is_black() {
             return;
         }
-        self.queue_rough(path, vertex, &bsdf, far);
+        self.queue_vertices(path, vertex, &bsdf, far);
     }
 
     /// Queues the vertices of a non-specular surface for direct lighting. `far` is the medium behind the
     /// surface.
     #[inline(always)]
-    pub(super) fn queue_rough(
+    pub(super) fn queue_vertices(
         &mut self,
         path: &PathRay,
         vertex: &SurfaceVertex<'_>,

@@ -164,7 +164,7 @@ impl KernelNeighborhood {
         match shape.geometry_near(self.point) {
             LocalGeometry::Polygons(count) => (0..count)
                 .filter_map(|number| shape.polygon_face(number))
-                .all(|piece| self.add_polygon(&piece, &receives)),
+                .all(|piece| self.try_add_polygon(&piece, &receives)),
             LocalGeometry::Surface { distance, ground } => {
                 distance > FAR * self.radius
                     || ground.is_some_and(|ground| self.try_add_covering_surface(&ground, receives))
@@ -208,12 +208,12 @@ impl KernelNeighborhood {
         near.sort_unstable();
         near.iter().all(|&triangle| {
             let piece = mesh.world_corners(triangle).into_iter().collect();
-            self.add_polygon(&piece, || can_store_photons(primitive_material(world, id, triangle)))
+            self.try_add_polygon(&piece, || can_store_photons(primitive_material(world, id, triangle)))
         })
     }
 
     /// Adds a flat piece and returns whether the coverage still has a closed form.
-    fn add_polygon(&mut self, piece: &FlatPolygon, receives: impl Fn() -> bool) -> bool {
+    fn try_add_polygon(&mut self, piece: &FlatPolygon, receives: impl Fn() -> bool) -> bool {
         let normal = (piece[1] - piece[0]).cross(piece[2] - piece[0]);
         let from = piece[0] - self.point;
         let (size, distance, cosine) = (normal.length_squared(), normal.dot(from), normal.dot(self.normal));

@@ -110,7 +110,7 @@ impl PhotonTracer<'_> {
 
     /// Ray for a photon from an infinite light. Its origin is moved back past any transmissive infinite
     /// planes. `None` if an opaque surface blocks the ray.
-    fn move_past_infinite_planes(&self, ray: Ray) -> Option<Ray> {
+    fn move_origin_back_past_infinite_planes(&self, ray: Ray) -> Option<Ray> {
         let world = self.tile.world;
         let mut start = ray.origin;
         for _ in 0..MAX_PASSED_SURFACES {
@@ -240,9 +240,11 @@ impl PhotonWavefront<'_> {
                 let Some(emitted) = tracing.emission.emit(numbers) else { continue };
                 let past_planes = is_from_infinite_light(&emitted) && has_planes;
                 let ray = emitted.ray();
-                let Some(ray) =
-                    (if past_planes { tracing.move_past_infinite_planes(ray) } else { Some(ray) })
-                else {
+                let Some(ray) = (if past_planes {
+                    tracing.move_origin_back_past_infinite_planes(ray)
+                } else {
+                    Some(ray)
+                }) else {
                     continue;
                 };
                 let offset = begin as usize + i;

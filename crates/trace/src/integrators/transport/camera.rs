@@ -43,7 +43,7 @@ impl TileContext<'_> {
                 negative(first, row.negative);
                 let slots = first..slots.end.min(first + PACKET_SIZE as u32);
                 queue.extend(
-                    slots.zip(0..).map(|(slot, lane)| self.start_camera_path(row.rays.ray(lane), slot)),
+                    slots.zip(0..).map(|(slot, lane)| self.path_from_camera_ray(row.rays.ray(lane), slot)),
                 );
             }
         }
@@ -63,7 +63,7 @@ impl TileContext<'_> {
 
     /// Path that starts with a camera ray.
     #[inline(always)]
-    pub fn start_camera_path(&self, ray: Ray, slot: u32) -> PathRay {
+    pub fn path_from_camera_ray(&self, ray: Ray, slot: u32) -> PathRay {
         let interiors = if self.world.is_camera_in_air() {
             InteriorList::default()
         } else {

@@ -133,7 +133,7 @@ impl PacketHits {
     pub fn path(&self, tile: &TileContext<'_>, rays: &PacketSource<'_>, lane: usize) -> PathRay {
         match rays {
             PacketSource::Camera(row, first, ..) => {
-                tile.start_camera_path(row.rays.ray(lane), first + lane as u32)
+                tile.path_from_camera_ray(row.rays.ray(lane), first + lane as u32)
             }
             PacketSource::Paths(paths, _) => paths[lane],
             PacketSource::Traced(paths, _, places) => paths[places[lane] as usize],

@@ -230,9 +230,9 @@ fn paths_continue_on_exactly_one_side() {
         let mut reflected = 0;
         for (up, down) in up.into_iter().zip(down) {
             // Both sides use the same random numbers. The unused side returns a direction into the surface.
-            let goes_on = [up != DVec3::NEG_Z, down != DVec3::Z];
-            assert!(goes_on[0] != goes_on[1], "{up} {down}");
-            reflected += u32::from(goes_on[0]);
+            let continues = [up != DVec3::NEG_Z, down != DVec3::Z];
+            assert!(continues[0] != continues[1], "{up} {down}");
+            reflected += u32::from(continues[0]);
         }
         assert!(reflected > 0 && reflected < 1024, "{indices:?}: {reflected}");
     }
