@@ -159,7 +159,7 @@ mod tests {
         assert_eq!(offered(text, "sphere.1.r"), ["sphere.1.radius="]);
         assert_eq!(
             offered(text, "sphere.b"),
-            ["center", "radius", "material", "name"].map(|key| format!("sphere.ball.{key}="))
+            ["center", "radius", "material", "name", "matrix"].map(|key| format!("sphere.ball.{key}="))
         );
         assert_eq!(offered("", "render.sam"), ["render.samples="]);
         assert_eq!(offered("", "sphere"), [""; 0]);
