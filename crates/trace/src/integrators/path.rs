@@ -178,10 +178,12 @@ impl CameraWavefront<'_, '_> {
     fn scatter(&mut self) -> Result<(), Cancelled> {
         let (tile, aov, depth) = (self.tile, self.accumulator.aov, self.depth);
         let instruction_set = tile.world.geometry.instruction_set();
+        let shares_with_paths = self.paths_find_lights();
         for vertices in self.direct.groups(tile) {
             // Sample lights.
-            let light = self.direct.sample_lights(vertices.clone(), tile, aov, self.paths_find_lights())?;
-            for (number, mut light) in vertices.clone().zip(light) {
+            self.direct.sample_lights(vertices.clone(), tile, aov, shares_with_paths)?;
+            for (index, number) in vertices.clone().enumerate() {
+                let mut light = self.direct.reflected_light((index, number), tile, aov, shares_with_paths);
                 let row = self.direct.batch(number);
                 // Gather photons.
                 if let Some(maps) = self.maps {

@@ -2,8 +2,6 @@
 
 use std::ops::Range;
 
-use arrayvec::ArrayVec;
-
 use super::all_lights::{LightSums, ReflectedDirectLightPacket, SampleAllLights};
 use super::light_tree::SampleLightTree;
 use super::lobe_rays::LobeRayTracingKernel;
@@ -43,6 +41,8 @@ pub struct DirectLightVertexQueue {
     arrived_diffuse: Vec<Vec3>,
     /// Media at the vertices.
     interior_lists: InteriorLists,
+    /// Sums over the light samples at the packets of a group.
+    sums: Vec<LightSums>,
     /// Shadow rays of several packets.
     pool: ShadowRayQueue,
     /// Ray cones at the vertices of this bounce's paths. Empty if ray cones are not used.
@@ -69,7 +69,7 @@ pub enum ShadingSides<'m> {
 }
 
 /// Number of packets in a group if lights are picked from a tree.
-pub const MAX_GROUP_SIZE: usize = 64;
+const MAX_GROUP_SIZE: usize = 64;
 
 impl DirectLightVertexQueue {
     /// The queue is processed when it contains this many packets, while their data is still in the cache.
@@ -235,23 +235,20 @@ impl DirectLightVertexQueue {
         &self.cones
     }
 
-    /// Samples lights at the packets of a group, and returns the light that each packet reflects.
-    /// `shares_with_paths` is true if continuing paths compete with the light samples.
+    /// Samples lights at the packets of a group, for [`Self::reflected_light`]. `shares_with_paths` is true if
+    /// continuing paths compete with the light samples.
     pub fn sample_lights(
         &mut self,
         group: Range<usize>,
         tile: &TileContext<'_>,
         aov: LightAov,
         shares_with_paths: bool,
-    ) -> Result<ArrayVec<ReflectedDirectLightPacket, MAX_GROUP_SIZE>, Cancelled> {
-        let mut sums: ArrayVec<LightSums, MAX_GROUP_SIZE> = ArrayVec::new();
-        let request = |number: usize, row: &VertexBatch| DirectLightPacketRequest {
-            number,
-            used: row.used & contributing_vertex_mask(row, aov),
-            shares_with_paths,
-        };
+    ) -> Result<(), Cancelled> {
+        // The sums of a group are large, so their buffer is reused.
+        let mut sums = std::mem::take(&mut self.sums);
+        sums.clear();
         // Sample lights at each packet, and pool the shadow rays to picked lights.
-        for number in group.clone() {
+        for number in group {
             tile.token.check_pause_and_cancel()?;
             let row = &mut self.rows[number];
             if row.may_lift != 0 {
@@ -260,7 +257,7 @@ impl DirectLightVertexQueue {
                     .instruction_set()
                     .run(ShadowOriginLiftKernel { geometry: &tile.world.geometry, row });
             }
-            let request = request(number, row);
+            let request = DirectLightPacketRequest::new(number, row, aov, shares_with_paths);
             sums.push(self.sample_lights_at_packet(request, tile, aov, sums.len() as u32));
             if self.pool.is_full() {
                 self.pool.trace(tile, aov, &mut sums);
@@ -268,11 +265,22 @@ impl DirectLightVertexQueue {
         }
         // Trace the remaining pooled rays.
         self.pool.trace(tile, aov, &mut sums);
-        // Add the light found by lobe rays.
-        let light = group.zip(sums).map(|(number, sums)| {
-            self.reflected_light_with_lobe_rays(request(number, &self.rows[number]), tile, aov, sums)
-        });
-        Ok(light.collect())
+        self.sums = sums;
+        Ok(())
+    }
+
+    /// Light reflected at packet `index` of the group whose lights were sampled, including the light found by
+    /// lobe rays. `number` is the index of the packet in the queue.
+    pub fn reflected_light(
+        &mut self,
+        (index, number): (usize, usize),
+        tile: &TileContext<'_>,
+        aov: LightAov,
+        shares_with_paths: bool,
+    ) -> ReflectedDirectLightPacket {
+        let sums = std::mem::replace(&mut self.sums[index], LightSums::ZERO);
+        let request = DirectLightPacketRequest::new(number, &self.rows[number], aov, shares_with_paths);
+        self.reflected_light_with_lobe_rays(request, tile, aov, sums)
     }
 
     /// The technique that competes with light samples at a packet.
@@ -457,6 +465,12 @@ struct DirectLightPacketRequest {
     used: u32,
     /// Whether continuing paths compete with the light samples.
     shares_with_paths: bool,
+}
+
+impl DirectLightPacketRequest {
+    fn new(number: usize, row: &VertexBatch, aov: LightAov, shares_with_paths: bool) -> Self {
+        Self { number, used: row.used & contributing_vertex_mask(row, aov), shares_with_paths }
+    }
 }
 
 /// Moves a packet's shadow-ray origins above their facets wherever the segment from the facet is unoccluded.
