@@ -21,7 +21,7 @@ use super::RayCounters;
 use super::direct::queue::DirectLightVertexQueue;
 use super::memory::ThreadMemory;
 use super::photons::PhotonMaps;
-use super::photons::gather::GatherPhotonsKernel;
+use super::photons::gather::gather_photons;
 use super::transport::accumulator::Accumulator;
 use super::transport::batch::VertexBatch;
 use super::transport::camera::CAMERA_ROWS;
@@ -166,6 +166,7 @@ impl CameraWavefront<'_, '_> {
         for lane in set_bit_lanes(unfinished) {
             self.place = rays.queue_index(lane);
             self.shade_ray(packet.path(tile, &rays, lane), (&packet, lane));
+            self.record_passed_first_hit(&rays, &packet, lane);
         }
         // Scatter at the queued vertices while their data is in the cache.
         if self.direct.is_full() {
@@ -177,8 +178,8 @@ impl CameraWavefront<'_, '_> {
     /// Adds the light reflected at the queued vertices, continues their paths, and empties the queue.
     fn scatter(&mut self) -> Result<(), Cancelled> {
         let (tile, aov, depth) = (self.tile, self.accumulator.aov, self.depth);
-        let instruction_set = tile.world.geometry.instruction_set();
         let shares_with_paths = self.paths_find_lights();
+        let splits_lobes = self.accumulator.fractions().is_some();
         for vertices in self.direct.groups(tile) {
             // Sample lights.
             self.direct.sample_lights(vertices.clone(), tile, aov, shares_with_paths)?;
@@ -187,7 +188,7 @@ impl CameraWavefront<'_, '_> {
                 let row = self.direct.batch(number);
                 // Gather photons.
                 if let Some(maps) = self.maps {
-                    let gathered = instruction_set.run(GatherPhotonsKernel { tile, row, maps, depth, aov });
+                    let gathered = gather_photons(tile, row, maps, depth, (aov, splits_lobes));
                     light.add_lanes(row.used, &gathered);
                 }
                 self.counters.shadow_rays += light.rays.shadow;

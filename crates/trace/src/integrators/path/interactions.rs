@@ -127,17 +127,10 @@ impl CameraWavefront<'_, '_> {
             }
             Some(hit) => {
                 let surface = packet.scalar_shaded_surface(self.surfaces, lane);
-                let camera_path = (self.depth == 0 && self.accumulator.first_hit_layers().is_some())
-                    .then_some(path)
-                    .filter(|_| !tile.world.has_null_interaction_surfaces());
-                self.is_first_hit_pending = camera_path.is_some();
+                self.is_first_hit_pending = self.depth == 0
+                    && self.accumulator.first_hit_layers().is_some()
+                    && !tile.world.has_null_interaction_surfaces();
                 walk_to_interaction(self, &mut path, (hit, surface));
-                if let Some(path) = camera_path.filter(|_| self.is_first_hit_pending)
-                    && let Some(values) = self.accumulator.first_hit_layers()
-                {
-                    // The walk passed through the surface.
-                    record_first_hit(tile, (&path, &hit), values, self.counters);
-                }
             }
             None => {
                 let sky = tile.world.lights.environment().map(|_| packet.sky_radiance_and_pdf(lane));
@@ -159,6 +152,22 @@ impl CameraWavefront<'_, '_> {
         for lane in set_bit_lanes(left) {
             let Some(hit) = packet.hit(lane) else { continue };
             record_first_hit(tile, (&packet.path(tile, rays, lane), &hit), values, self.counters);
+        }
+    }
+
+    /// Records the layers that show the first hit of a camera ray if its walk passed through the surface.
+    #[inline]
+    pub(super) fn record_passed_first_hit(
+        &mut self,
+        rays: &PacketSource<'_>,
+        packet: &PacketHits,
+        lane: usize,
+    ) {
+        if !std::mem::take(&mut self.is_first_hit_pending) {
+            return;
+        }
+        if let (Some(hit), Some(values)) = (packet.hit(lane), self.accumulator.first_hit_layers()) {
+            record_first_hit(self.tile, (&packet.path(self.tile, rays, lane), &hit), values, self.counters);
         }
     }
 

@@ -24,28 +24,36 @@ const INDIRECT_LOOKUP_PROBABILITY: f32 = 0.25;
 /// smooth.
 const BOUNCED_LOOKUP_PROBABILITY: f32 = 0.5;
 
-/// Gathers photons at a packet of vertices.
-pub struct GatherPhotonsKernel<'a> {
-    /// Tile context.
-    pub tile: &'a TileContext<'a>,
-    /// The vertices.
-    pub row: &'a VertexBatch,
-    /// Photon maps for the samples.
-    pub maps: &'a PhotonMaps,
-    /// Number of path bounces before the vertices.
-    pub depth: u32,
-    /// The light AOV to accumulate.
-    pub aov: LightAov,
+/// Gathers photons at a packet of vertices that their paths reach after `depth` bounces. Returns the light
+/// reflected toward the viewer, before multiplication by the path throughput, and the part from wide lobes if
+/// `splits_lobes`.
+pub fn gather_photons(
+    tile: &TileContext<'_>,
+    row: &VertexBatch,
+    maps: &PhotonMaps,
+    depth: u32,
+    (aov, splits_lobes): (LightAov, bool),
+) -> [Vec3x16; 2] {
+    let kernel = GatherPhotonsKernel { tile, row, maps, depth, aov, splits_lobes };
+    tile.world.geometry.instruction_set().run(kernel)
+}
+
+/// The work of [`gather_photons`] for one instruction set.
+struct GatherPhotonsKernel<'a> {
+    tile: &'a TileContext<'a>,
+    row: &'a VertexBatch,
+    maps: &'a PhotonMaps,
+    depth: u32,
+    aov: LightAov,
+    splits_lobes: bool,
 }
 
 impl SimdKernel for GatherPhotonsKernel<'_> {
     type Output = [Vec3x16; 2];
 
-    /// Returns the gathered light reflected toward the viewer, before multiplication by the path throughput, and
-    /// the part from wide lobes.
     #[inline(always)]
     fn run(self, simd: impl Simd) -> [Vec3x16; 2] {
-        let Self { tile, row, maps, depth, aov } = self;
+        let Self { tile, row, maps, depth, aov, splits_lobes } = self;
         let mut sums = [[[0.0; PACKET_SIZE]; 3]; 2];
         let [looks, choices] = row.sampler_packet(tile).pairs(&row.path, Dimension::Gather, 0, 1);
         let Some(most_depth) = tile.settings.render.max_depth.checked_sub(depth + 1) else { return sums };
@@ -78,14 +86,19 @@ impl SimdKernel for GatherPhotonsKernel<'_> {
                 if gathers && looks[i] < chance {
                     // Rescale the random number for reuse.
                     let random = [choices[i], looks[i] / chance];
-                    let (light, photon) = gather_reflected_light((row, i), (map, &look), aov, random, simd);
+                    let (light, photon) =
+                        gather_reflected_light((row, i), (map, &look), (aov, splits_lobes), random, simd);
                     let factor = coverage_factor(tile, (row, i), &look, photon, map.radius()) / chance;
                     sum[0] += light[0] * factor;
-                    sum[1] += light[1] * factor;
+                    if splits_lobes {
+                        sum[1] += light[1] * factor;
+                    }
                 }
             }
             set_lane(&mut sums[0], i, sum[0]);
-            set_lane(&mut sums[1], i, sum[1]);
+            if splits_lobes {
+                set_lane(&mut sums[1], i, sum[1]);
+            }
         }
         sums
     }
@@ -124,7 +137,7 @@ fn coverage_factor(
 fn gather_reflected_light(
     (row, i): (&VertexBatch, usize),
     (map, look): (&PhotonMap, &GatherPoint),
-    aov: LightAov,
+    (aov, splits_lobes): (LightAov, bool),
     random: [f32; 2],
     simd: impl Simd,
 ) -> ([Vec3; 2], Option<PhotonPositionAndNormal>) {
@@ -137,7 +150,7 @@ fn gather_reflected_light(
             let (irradiance, photon) = map.irradiance_and_chosen_photon(look, random, simd);
             ([f * irradiance; 2], photon)
         }
-        None => gather_with_bsdf_per_photon((row, i), (map, look), random, simd),
+        None => gather_with_bsdf_per_photon((row, i), (map, look), splits_lobes, random, simd),
     }
 }
 
@@ -146,6 +159,7 @@ fn gather_reflected_light(
 fn gather_with_bsdf_per_photon(
     (row, i): (&VertexBatch, usize),
     (map, look): (&PhotonMap, &GatherPoint),
+    splits_lobes: bool,
     random: [f32; 2],
     simd: impl Simd,
 ) -> ([Vec3; 2], Option<PhotonPositionAndNormal>) {
@@ -154,7 +168,9 @@ fn gather_with_bsdf_per_photon(
         let [shown, wide, all] = row.bsdf.lane_f(i, photon.direction);
         let scale = density * row.adjoint_photon_weight(i, photon.direction);
         sum[0] += shown * photon.flux * scale;
-        sum[1] += wide * photon.flux * scale;
+        if splits_lobes {
+            sum[1] += wide * photon.flux * scale;
+        }
         // Choose the same photon whichever lobes are shown, so that the AOVs sum to the beauty image.
         let weight = (all * photon.flux * scale).element_sum();
         total += weight;
