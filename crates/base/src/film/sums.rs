@@ -132,7 +132,7 @@ impl Tile {
 
     /// Mean of a pixel's samples, weighted by sign if the filter has negative lobes, from the sums of the
     /// samples outside and inside these lobes. `None` if the pixel has no samples.
-    #[inline]
+    #[inline(always)]
     pub(super) fn signed_mean(
         &self,
         index: usize,

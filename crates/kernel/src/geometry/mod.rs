@@ -280,9 +280,7 @@ impl Shape {
     pub fn encloses_each_point<const COUNT: usize>(&self, points: [DVec3; COUNT]) -> Option<[bool; COUNT]> {
         match self {
             Self::Plane(plane) => Some(points.map(|point| plane.is_behind(point))),
-            Self::Transformed(transformed) => transformed
-                .shape
-                .encloses_each_point(points.map(|point| transformed.to_world.inverse_point(point))),
+            Self::Transformed(transformed) => transformed.encloses_each_point(points),
             Self::Sphere(_)
             | Self::Box(_)
             | Self::Torus(_)

@@ -121,6 +121,11 @@ impl TransformedShape {
         self.shape.encloses(self.to_world.inverse_point(point))
     }
 
+    /// [`Shape::encloses_each_point`] for the transformed shape.
+    pub fn encloses_each_point<const COUNT: usize>(&self, points: [DVec3; COUNT]) -> Option<[bool; COUNT]> {
+        self.shape.encloses_each_point(points.map(|point| self.to_world.inverse_point(point)))
+    }
+
     /// Texture coordinates of a point on the surface.
     pub fn uv_at(&self, point: DVec3) -> DVec2 {
         self.shape.uv_at(self.to_world.inverse_point(point))

@@ -135,6 +135,7 @@ impl Lights {
     const MAX_LOCAL_WITHOUT_TREE: usize = 3;
 
     /// How vertices pick lights. `None` if they sample all lights.
+    #[inline]
     pub fn sampler_for_purpose(&self, receivers: LightSamplingPurpose) -> Option<LightSampler<'_>> {
         match receivers {
             LightSamplingPurpose::Eye => {

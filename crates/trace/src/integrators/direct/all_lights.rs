@@ -92,16 +92,17 @@ impl LightSums {
         rays: DirectLightCounters { shadow: 0, scattered: 0, lookups: 0 },
     };
 
-    /// Converts the sums to the reflected light.
+    /// Returns the reflected light, or the lit fraction of it.
     #[inline(always)]
-    pub fn into_reflected_or_lit_fraction(mut self, aov: LightAov) -> ReflectedDirectLightPacket {
+    pub fn reflected_or_lit_fraction(&self, aov: LightAov) -> ReflectedDirectLightPacket {
+        let mut light = self.light;
         if aov == LightAov::LitFraction {
             for i in 0..PACKET_SIZE {
                 let share = if self.total[i] > 0.0 { self.light[0][i] / self.total[i] } else { 0.0 };
-                set_lane(&mut self.light, i, Vec3::splat(share));
+                set_lane(&mut light, i, Vec3::splat(share));
             }
         }
-        ReflectedDirectLightPacket { light: self.light, diffuse: self.diffuse, rays: self.rays }
+        ReflectedDirectLightPacket { light, diffuse: self.diffuse, rays: self.rays }
     }
 }
 

@@ -272,15 +272,25 @@ impl DirectLightVertexQueue {
     /// Light reflected at packet `index` of the group whose lights were sampled, including the light found by
     /// lobe rays. `number` is the index of the packet in the queue.
     pub fn reflected_light(
-        &mut self,
+        &self,
         (index, number): (usize, usize),
         tile: &TileContext<'_>,
         aov: LightAov,
         shares_with_paths: bool,
     ) -> ReflectedDirectLightPacket {
-        let sums = std::mem::replace(&mut self.sums[index], LightSums::ZERO);
-        let request = DirectLightPacketRequest::new(number, &self.rows[number], aov, shares_with_paths);
-        self.reflected_light_with_lobe_rays(request, tile, aov, sums)
+        let row = &self.rows[number];
+        let request = DirectLightPacketRequest::new(number, row, aov, shares_with_paths);
+        let arrived = self.sums[index].reflected_or_lit_fraction(aov);
+        match self.competing_technique(request, tile, aov) {
+            CompetingTechnique::Lobes(sharp) => {
+                let interior_lists = self.interiors_of_batch(row);
+                let lobes = LobeRayTracingKernel { tile, row, sharp, aov, interior_lists, arrived };
+                tile.world.geometry.instruction_set().run(lobes)
+            }
+            CompetingTechnique::Nothing | CompetingTechnique::Paths | CompetingTechnique::NarrowPaths => {
+                arrived
+            }
+        }
     }
 
     /// The technique that competes with light samples at a packet.
@@ -359,28 +369,6 @@ impl DirectLightVertexQueue {
         };
         self.pool = pool;
         sums
-    }
-
-    /// Reflected light, including the light found by lobe rays.
-    fn reflected_light_with_lobe_rays(
-        &self,
-        request: DirectLightPacketRequest,
-        tile: &TileContext<'_>,
-        aov: LightAov,
-        sums: LightSums,
-    ) -> ReflectedDirectLightPacket {
-        let row = &self.rows[request.number];
-        let arrived = sums.into_reflected_or_lit_fraction(aov);
-        match self.competing_technique(request, tile, aov) {
-            CompetingTechnique::Lobes(sharp) => {
-                let interior_lists = self.interiors_of_batch(row);
-                let lobes = LobeRayTracingKernel { tile, row, sharp, aov, interior_lists, arrived };
-                tile.world.geometry.instruction_set().run(lobes)
-            }
-            CompetingTechnique::Nothing | CompetingTechnique::Paths | CompetingTechnique::NarrowPaths => {
-                arrived
-            }
-        }
     }
 
     /// How to divide a packet's reflected light.

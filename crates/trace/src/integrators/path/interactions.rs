@@ -141,6 +141,7 @@ impl CameraWavefront<'_, '_> {
 
     /// Records the layers that show the first hits of camera rays, except for the hits that [`Self::interact`]
     /// records.
+    #[inline(never)]
     pub(super) fn record_first_hits(&mut self, rays: &PacketSource<'_>, packet: &PacketHits, first: u32) {
         let tile = self.tile;
         let Some(values) = self.accumulator.first_hit_layers() else { return };
@@ -239,17 +240,21 @@ impl CameraWavefront<'_, '_> {
         }
     }
 
-    pub(super) fn roulette_and_push_reflected(&mut self, ray: PathRay) {
-        let Some(ray) = self.russian_roulette(ray) else { return };
-        self.counters.reflected_rays += 1;
-        self.push_specular(ray);
+    #[inline]
+    fn roulette_and_push_reflected(&mut self, mut ray: PathRay) {
+        if self.survives_roulette(&mut ray) {
+            self.counters.reflected_rays += 1;
+            self.push_specular(ray);
+        }
     }
 
-    pub(super) fn roulette_and_push_refracted(&mut self, mut ray: PathRay, weight: f32) {
+    #[inline]
+    fn roulette_and_push_refracted(&mut self, mut ray: PathRay, weight: f32) {
         ray.throughput *= weight;
-        let Some(ray) = self.russian_roulette(ray) else { return };
-        self.counters.refracted_rays += 1;
-        self.push_specular(ray);
+        if self.survives_roulette(&mut ray) {
+            self.counters.refracted_rays += 1;
+            self.push_specular(ray);
+        }
     }
 
     /// Queues a ray with which the current path continues without a diffuse or glossy vertex.
@@ -260,12 +265,13 @@ impl CameraWavefront<'_, '_> {
         }
     }
 
-    pub(super) fn russian_roulette(&self, ray: PathRay) -> Option<PathRay> {
+    #[inline]
+    fn survives_roulette(&self, ray: &mut PathRay) -> bool {
         match self.continuation {
             Some(continuation) if !self.tile.behavior.splits || !ray.state.only_specular_before => {
-                continuation.russian_roulette(self.tile, ray)
+                continuation.survives_roulette(self.tile, ray)
             }
-            Some(_) | None => Some(ray),
+            Some(_) | None => true,
         }
     }
 }

@@ -138,6 +138,7 @@ impl KernelNeighborhood {
     }
 
     /// A piece's corners, projected onto the plane relative to the center, in units of the radius.
+    #[inline]
     fn project_polygon(&self, piece: &FlatPolygon) -> ArrayVec<DVec2, 4> {
         piece.iter().map(|&corner| self.project(corner - self.point)).collect()
     }

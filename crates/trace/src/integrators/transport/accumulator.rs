@@ -97,8 +97,8 @@ impl Accumulator<'_> {
         };
         if is_taken {
             self.radiance[slot as usize] += radiance;
-            if let Some(layers) = &mut self.layers {
-                layers.values.add(layer, slot, radiance);
+            if self.layers.is_some() {
+                self.add_to_layer(layer, slot, radiance);
             }
         }
     }
@@ -189,17 +189,19 @@ impl Accumulator<'_> {
         let kept = if is_clamped { self.clamp / largest } else { 1.0 };
         self.radiance[slot as usize] += contribution * kept;
         if self.layers.is_some() {
-            self.add_reflected_layers(slot, contribution * kept, diffuse * kept);
+            let (light, diffuse) = (contribution * kept, diffuse * kept);
+            self.add_to_layer(SampleLayer::Diffuse, slot, diffuse);
+            if light != diffuse {
+                self.add_to_layer(SampleLayer::Specular, slot, light - diffuse);
+            }
         }
     }
 
-    /// Adds reflected light to the diffuse and specular layers.
-    fn add_reflected_layers(&mut self, slot: u32, light: Vec3, diffuse: Vec3) {
+    /// Adds light to a layer. Out of line because most images have no layers.
+    #[inline(never)]
+    fn add_to_layer(&mut self, layer: SampleLayer, slot: u32, light: Vec3) {
         if let Some(layers) = &mut self.layers {
-            layers.values.add(SampleLayer::Diffuse, slot, diffuse);
-            if light != diffuse {
-                layers.values.add(SampleLayer::Specular, slot, light - diffuse);
-            }
+            layers.values.add(layer, slot, light);
         }
     }
 }

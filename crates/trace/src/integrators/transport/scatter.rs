@@ -49,18 +49,19 @@ impl ContinuationPolicy {
         if self.uses_roulette { (roulette_throughput * Self::GAIN).min(1.0) } else { 1.0 }
     }
 
-    /// Applies Russian roulette to a path after a specular bounce. Returns the reweighted path, or `None` if
-    /// the path ends.
-    pub fn russian_roulette(self, tile: &TileContext<'_>, mut path: PathRay) -> Option<PathRay> {
+    /// Applies Russian roulette to a path after a specular bounce. Returns whether the path continues, and
+    /// divides its throughput by the probability of continuing.
+    #[inline]
+    pub fn survives_roulette(self, tile: &TileContext<'_>, path: &mut PathRay) -> bool {
         let chance = self.survival_probability(path.state.roulette_throughput);
         if chance < 1.0 {
             if !(tile.sampler(path.slot).pair(path.path, Dimension::SpecularRoulette).x < chance) {
-                return None;
+                return false;
             }
             path.throughput /= chance;
             path.state.roulette_throughput /= chance;
         }
-        Some(path)
+        true
     }
 }
 
