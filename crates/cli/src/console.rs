@@ -1,6 +1,6 @@
-//! Output to stderr and stdout outside of the terminal UI. Ignores errors when writing to stderr. Errors when
-//! writing to stdout, for example because the disk is full, determine the exit code. Sanitizes all untrusted
-//! text.
+//! Output to stderr and stdout outside of the terminal UI. Errors when writing to stderr are ignored. Errors
+//! when writing to stdout, for example because the disk is full, determine the exit code. All untrusted text
+//! is sanitized.
 
 use std::cell::RefCell;
 use std::io::{self, IsTerminal, Write};
@@ -18,7 +18,7 @@ use crate::tui::ColorDepthChoice;
 pub(super) struct Console {
     style: ReportStyle,
     pub(super) is_terminal: bool,
-    /// The first error from writing to stdout, other than a closed pipe.
+    /// The latest error from writing to stdout, other than a closed pipe.
     stdout_error: Rc<RefCell<Option<io::Error>>>,
 }
 

@@ -14,7 +14,7 @@ impl Exit {
     /// The arguments or the scene are invalid.
     pub const WRONG: Self = Self(2);
 
-    /// Terminated by a signal.
+    /// Exit code of a process terminated by signal `number`.
     pub fn from_signal(number: i32) -> Self {
         Self(u8::try_from(128 + number).unwrap_or(1))
     }

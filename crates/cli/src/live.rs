@@ -22,7 +22,7 @@ use crate::system::threads::{describe_start_failure, spawn};
 use crate::tui::messages::{OLDER_THAN_EDIT, WAITING_FOR_FILE};
 use crate::tui::{self, ExitStatus, Options, TuiError, TuiOutcome};
 
-/// How long to wait at exit until an image is written. After that, glimt exits if it received a signal. If
+/// How long to wait at exit for an image to be written. After that, glimt exits if it received a signal; if
 /// the user quit with a key, it prints a message and keeps waiting.
 const EXIT_TIMEOUT: Duration = Duration::from_secs(2);
 
@@ -97,7 +97,7 @@ fn run_terminal_ui(order: RenderRequest, console: &Console) -> Result<Exit, (Exi
         worker.stop_or_abandon(Duration::MAX)
     };
     if has_ended {
-        // The thread ends with the worker. Ignore a panic.
+        // The forwarder ends with the worker. Ignore a panic in it.
         let _ = forwarder.join();
     }
     if let Ok(ended) = &outcome {
@@ -118,9 +118,10 @@ fn run_terminal_ui(order: RenderRequest, console: &Console) -> Result<Exit, (Exi
 }
 
 /// Returns the lines to print after the terminal UI exits: unreported writes, the summary, the checkpoint and
-/// lost changes. The summary is printed only after `q`, and only if all writes were reported or if a write
-/// failed but earlier files exist. `is_older` is true if the images are older than the scene. `lost` contains
-/// the outputs changed by other programs. `call` is this command line.
+/// the changes that were not kept. The summary is printed only after `q`, and only if all writes were
+/// reported or if a write failed but earlier files exist. `is_older` is true if the images are older than the
+/// scene. `lost` contains the outputs changed by other programs. `call` is the command line glimt was started
+/// with.
 fn exit_summary_lines(
     writes: &SharedWriteLog,
     ended: &TuiOutcome,
@@ -151,7 +152,7 @@ fn exit_summary_lines(
     lines
 }
 
-/// Returns this command line, quoted for a shell.
+/// Returns the command line glimt was started with, quoted for a shell.
 fn shell_quoted_command_line() -> String {
     let words = std::env::args().skip(1).map(|word| match shlex::try_quote(&word) {
         Ok(quoted) => quoted.into_owned(),
@@ -187,9 +188,9 @@ struct WriteLog {
     checkpoint: Option<Result<PathBuf, String>>,
     /// Whether a request is in its last stage.
     is_last_stage: bool,
-    /// The last request that read files before the UI exited, and these files.
+    /// The last request that read files before the UI exited, and the files it read.
     read: (u64, Vec<FileRead>),
-    /// The files from which the scene's own image was rendered. `None` if it is not written.
+    /// The files from which the scene's own image was rendered, or `None` if that image is not written.
     image_files: Option<Vec<FileRead>>,
 }
 
@@ -272,7 +273,7 @@ impl SharedWriteLog {
             | Event::CameraKept { .. }
             | Event::CameraUndone { .. }
             | Event::Picked { .. } => {}
-            // Later requests are not finished.
+            // Ignore requests after the UI has exited, which are not finished.
             Event::Files { .. } | Event::OwnImage { .. } if has_left => {}
             Event::Files { generation, files, .. } => log.read = (*generation, files.clone()),
             Event::OwnImage { state, .. } => {
@@ -295,7 +296,7 @@ impl SharedWriteLog {
         self.lock_log().checkpoint.clone()
     }
 
-    /// Returns lines about the images that the UI did not report: those of events that it did not handle, or
+    /// Returns the lines about images that the UI did not report: images from events it did not handle, or
     /// all images since an unanswered write command.
     fn unreported_lines(&self, ended: &TuiOutcome, has_ended: bool) -> Vec<String> {
         let log = self.lock_log();

@@ -126,7 +126,7 @@ fn check_turntable_args(args: &RenderArgs) -> Result<(), String> {
     }
 }
 
-/// Adds a path to `known`. Rejects duplicates.
+/// Adds a path to `known`, or returns an error if it is already there.
 fn reject_duplicate_path<'a>(path: &'a Path, known: &mut HashSet<&'a Path>) -> Result<(), String> {
     if !known.insert(path) {
         return Err(format!("-o {} is specified twice", path.display()));

@@ -104,7 +104,7 @@ pub(super) fn run(order: &RenderRequest, console: &Console) -> Exit {
     ended.signal_number().map_or(exit, Exit::from_signal)
 }
 
-/// Returns the render requests: a single request, or one per turntable frame.
+/// Returns the overrides for each render request: a single request, or one per turntable frame.
 fn overrides_per_turntable_frame(overrides: &Overrides) -> impl Iterator<Item = Overrides> {
     let count = overrides.turn.map_or(1, |turn| turn.of);
     (0..count).map(|number| {
@@ -142,7 +142,7 @@ struct CompletedWrites {
 #[derive(Debug, Default)]
 struct ExitDeadline {
     end: Option<Instant>,
-    /// Whether the write stage was cancelled because it took too long.
+    /// Whether the write stage was canceled because it took too long.
     is_write_stopped: bool,
 }
 
@@ -387,8 +387,7 @@ fn report_written_images(
     if unwritten.is_empty() { Exit::DONE } else { Exit::FAILED }
 }
 
-/// Returns a warning about files left over from an earlier, longer turntable. `None` if there are no such
-/// files.
+/// Returns a warning about files left over from an earlier, longer turntable, if any.
 fn leftover_frames_warning(last: &Path, turn: TurntableFrame) -> Option<String> {
     let left = leftover_frames(last, turn);
     let (first, more) = (left.first()?.display(), left.len() - 1);

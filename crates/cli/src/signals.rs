@@ -19,7 +19,7 @@ impl ReceivedSignal {
     }
 }
 
-/// Returns a signal's name for use in messages. `None` for SIGHUP, because the terminal is gone.
+/// Returns a signal's name for use in messages, or `None` for SIGHUP, because the terminal is gone.
 pub(super) fn signal_name(number: i32) -> Option<&'static str> {
     match number {
         SIGINT => Some("SIGINT"),

@@ -22,20 +22,20 @@ pub struct NormalizedRect {
     pub left: f64,
     /// Top edge.
     pub top: f64,
-    /// Width of the section.
+    /// Width of the rectangle.
     pub width: f64,
-    /// Height of the section.
+    /// Height of the rectangle.
     pub height: f64,
 }
 
 impl NormalizedRect {
-    /// Returns the smallest section containing both positions.
+    /// Returns the smallest rectangle that contains both positions.
     pub fn between(a: ImagePosition, b: ImagePosition) -> Self {
         let (left, top) = (a.x.min(b.x), a.y.min(b.y));
         Self { left, top, width: (a.x - b.x).abs(), height: (a.y - b.y).abs() }
     }
 
-    /// Converts a pixel rectangle to a section. `columns` and `rows` are the image's size.
+    /// Normalizes a pixel rectangle of an image with `columns` × `rows` pixels.
     pub(super) fn from_pixels(rect: Rect, (columns, rows): (u32, u32)) -> Self {
         let share = |pixels: u32, side: u32| f64::from(pixels) / f64::from(side);
         Self {
@@ -46,7 +46,7 @@ impl NormalizedRect {
         }
     }
 
-    /// Returns the pixels that overlap the section. `columns` and `rows` are the image's size.
+    /// Returns the pixels that overlap the rectangle in an image with `columns` × `rows` pixels.
     pub(super) fn pixels(self, (columns, rows): (u32, u32)) -> Rect {
         let along = |start: f64, length: f64, side: u32| {
             let at = |share: f64| share.clamp(0.0, 1.0) * f64::from(side);
@@ -58,7 +58,7 @@ impl NormalizedRect {
         Rect { x, y, width, height }
     }
 
-    /// Maps a position in the section to a position in the image.
+    /// Maps a position relative to this rectangle to a position in the image.
     pub fn section_to_image(self, position: ImagePosition) -> ImagePosition {
         ImagePosition { x: self.left + position.x * self.width, y: self.top + position.y * self.height }
     }
@@ -69,9 +69,9 @@ impl NormalizedRect {
 pub struct PickedPixel {
     /// Column and row of the pixel.
     pub pixel: [u32; 2],
-    /// The visible object. `None` if the ray hits nothing.
+    /// The visible object, or `None` if the ray hits nothing.
     pub thing: Option<PickedObject>,
-    /// Current linear pixel color. `None` before the first sample.
+    /// Current linear pixel color, or `None` before the first sample.
     pub color: Option<[f32; 3]>,
 }
 
@@ -118,9 +118,9 @@ pub struct CameraSaveResult {
     pub is_new: bool,
     /// Whether loading the file with the command-line overrides would yield exactly this camera.
     pub is_own: bool,
-    /// Whether a new scene file was created next to the model, which remains open.
+    /// Whether a new scene file was created next to the model. The model remains open.
     pub of_model: bool,
-    /// The edit that the `u` key undoes. `None` if nothing was written or the file is new.
+    /// The edit that the `u` key undoes, or `None` if nothing was written or the file is new.
     pub edit: Option<SavedCameraEdit>,
 }
 

@@ -55,7 +55,7 @@ struct CacheEntry<T> {
     request: u64,
 }
 
-/// Number of the last request that used an unused value, and the value's size in bytes.
+/// Number of the request that last used a now unused value, and the value's size in bytes.
 pub(super) type EvictionCandidate = (u64, usize);
 
 impl<N, T> Default for NamedCache<N, T> {
@@ -97,15 +97,15 @@ impl<N: Hash + Eq, T> NamedCache<N, T> {
         self.entries.values().filter(|entry| !entry.proven).map(|entry| (entry.request, entry.bytes))
     }
 
-    /// Drops unused values that were last used before this request.
+    /// Drops unused values that were last used before request number `request`.
     pub(super) fn evict_unused_before(&mut self, request: u64) {
         self.entries.retain(|_, entry| entry.proven || entry.request >= request);
     }
 }
 
-/// Returns the earliest request that can keep its unused values: they fit into `most_bytes` together with the
-/// unused values of all later requests. A request's values are all evicted together, because half a scene is
-/// of little use and trees keep their meshes alive.
+/// Returns the earliest request whose unused values fit into `most_bytes` together with the unused values of
+/// all later requests. A request's values are all evicted together, because half a scene is of little use and
+/// trees keep their meshes alive.
 pub(super) fn oldest_request_to_keep(
     eviction_candidates: impl Iterator<Item = EvictionCandidate>,
     most_bytes: usize,
@@ -142,7 +142,7 @@ mod tests {
 
     const NOTHING: usize = 0;
 
-    /// Ends a request and evicts unused values until the remaining ones fit into `most_bytes`.
+    /// Ends a request and evicts unused values until the remaining unused values fit into `most_bytes`.
     fn end_request(pool: &mut NamedCache<&str, i32>, success: bool, request: u64, most_bytes: usize) {
         pool.record_request_usage(success, request);
         pool.evict_unused_before(oldest_request_to_keep(pool.eviction_candidates(), most_bytes));

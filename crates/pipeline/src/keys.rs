@@ -8,7 +8,8 @@ use crate::plan::RenderPlan;
 use crate::scene::description::{Accel, Camera, Object, RenderOptions, Scene, Shape};
 use crate::scene::fingerprint::{Fingerprint, FingerprintContext, FingerprintHasher};
 
-/// Returns the textures, meshes and orbiter that scene descriptions refer to by index.
+/// Returns the context for fingerprinting scene descriptions: the textures, meshes and orbiter that they
+/// refer to.
 pub(crate) fn fingerprint_context<'a>(
     scene: &'a Scene,
     meshes: &'a [Fingerprint],
@@ -17,20 +18,20 @@ pub(crate) fn fingerprint_context<'a>(
     FingerprintContext { textures: &scene.textures, meshes, orbiter }
 }
 
-/// Returns the key for a mesh with distinct lights. `is_emissive` states whether an object's material makes
-/// the entire mesh emissive.
+/// Returns the key for a mesh whose coincident emitters have been separated. `is_emissive` states whether an
+/// object's material makes the entire mesh emissive.
 pub(crate) fn mesh_with_separate_emitters_key(mesh: &Fingerprint, is_emissive: bool) -> Fingerprint {
     FingerprintHasher::new("distinct lights").add_fingerprint(mesh).add_bool(is_emissive).finish()
 }
 
-/// Returns the key for a mesh's tree. `distinct` is the key of the mesh with distinct lights if it differs from
-/// the mesh in the file.
+/// Returns the key for a mesh's tree. `distinct` is the key of the mesh with separated emitters if that mesh
+/// differs from the mesh in the file.
 pub(crate) fn mesh_accel_key(mesh: &Fingerprint, accel: Accel, distinct: Option<Fingerprint>) -> Fingerprint {
     FingerprintHasher::new("tree").add_fingerprint(&distinct.unwrap_or(*mesh)).add_choice(accel).finish()
 }
 
-/// Returns the key for all trees and the offset of each object. `lifts` is empty if no object is
-/// offset. `distinct` contains the keys of the meshes with distinct lights, see [`mesh_accel_key`].
+/// Returns the key for all trees and the offset of each object. `lifts` is empty if no object is offset.
+/// `distinct` contains the keys of the meshes with separated emitters (see [`mesh_accel_key`]).
 pub(crate) fn geometry_key(
     scene: &Scene,
     of: &FingerprintContext<'_>,

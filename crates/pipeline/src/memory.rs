@@ -179,8 +179,8 @@ impl MemoryEstimate {
     }
 }
 
-/// Returns the order in which samples are summed. If photons are enabled, assumes that some are emitted,
-/// because this is not known yet.
+/// Returns the order in which samples are summed. If photons are enabled, assumes that photons are emitted,
+/// because it is not known yet whether they are.
 fn sample_sum_order(plan: &RenderPlan) -> SumOrder {
     let gathers = plan.settings.gathers_photons();
     match plan.shard {

@@ -39,18 +39,18 @@ pub(super) struct RenderPlan {
     pub(super) outputs: Vec<PathBuf>,
     /// Animation files that contain this image as a frame.
     pub(super) moving: Vec<PathBuf>,
-    /// The turntable frame. `None` for a still image.
+    /// The turntable frame, or `None` for a still image.
     pub(super) turn: Option<TurntableFrame>,
     /// Additional layers for EXR files.
     pub(super) layers: Vec<OutputLayer>,
-    /// The side of a model that faces the camera, and the model's up axis. `None` if not set on the command
-    /// line.
+    /// The side of a model that faces the camera, or `None` if not set on the command line.
     pub(super) from: Option<ViewSide>,
+    /// The model's up axis, or `None` if not set on the command line.
     pub(super) up: Option<UpAxis>,
     /// Output files for later turntable frames.
     pub(super) later_outputs: Vec<PathBuf>,
     pub(super) named_by: OutputNameSource,
-    /// Default file name pattern for turntable frames, with `#` for the number. `None` if this is not a
+    /// Default file name pattern for turntable frames, with `#` for the number, or `None` if this is not a
     /// turntable or the user named the files.
     pub(super) default_names: Option<PathBuf>,
     pub(super) report: Option<PathBuf>,
@@ -154,7 +154,7 @@ pub(super) const MAX_PHOTONS: u64 = 4_000_000;
 /// and delay the first image.
 const PHOTONS_BY_PIXELS: RangeInclusive<u64> = 8192..=200_000;
 
-/// Returns the photon settings for this image size.
+/// Returns the photon settings for an image of the given size.
 fn photon_settings(requested: &PhotonOptions, (width, height): (u32, u32)) -> PhotonSettings {
     let PhotonOptions { enabled: _, count, radius, bounces } = *requested;
     let by_pixels = || {

@@ -15,12 +15,12 @@ pub(crate) enum OverwriteProtection {
     Nothing,
 }
 
-/// A file that an image must not replace.
+/// Why an image must not replace an existing file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum OverwriteRefusalReason {
-    /// The image of another scene.
+    /// The file is the image of another scene.
     OtherScene,
-    /// A file that is not an image written by glimt.
+    /// The file is not an image written by glimt.
     Foreign,
 }
 
@@ -40,7 +40,7 @@ impl OverwriteProtection {
     }
 }
 
-/// Returns the scene recorded in an image written by glimt, unless it is this scene.
+/// Returns the scene recorded in an image written by glimt, unless that is the given scene.
 pub(crate) fn recorded_scene_if_different(scene: &Path, at: &Path) -> Option<String> {
     scene_name_in_png(at).filter(|named| !scene_path::metadata_path_refers_to_scene(named, scene, at))
 }

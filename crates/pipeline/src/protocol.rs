@@ -38,8 +38,8 @@ pub enum Command {
     Preview(Option<MaxPreviewSize>),
     /// Write this camera to the scene file. [`Event::CameraKept`] reports the result. Rendering continues.
     KeepCamera(MovedCamera),
-    /// Undo this edit of the scene file unless the file has changed since. [`Event::CameraUndone`] reports the result.
-    /// Rendering continues.
+    /// Undo this edit of the scene file unless the file has changed since then. [`Event::CameraUndone`]
+    /// reports the result. Rendering continues.
     UndoCamera(SavedCameraEdit),
     /// Identify the object at an image position. [`Event::Picked`] reports the result. Rendering continues.
     Pick(ImagePosition),
@@ -67,13 +67,13 @@ pub struct Request {
     pub preview: Option<MaxPreviewSize>,
     /// Whether to write the finished image.
     pub write: WriteRequirement,
-    /// Overrides for the scene's own image if this request shows another one. The film and checkpoint of the
-    /// scene's own image are kept. `None` if this request is for the scene's own image.
+    /// Overrides for the scene's own image if this request shows another image, or `None` if this request is
+    /// for the scene's own image. The film and checkpoint of the scene's own image are kept.
     pub own: Option<Box<Overrides>>,
     /// Number of times the scene's files have been saved. An image with keyboard changes that was written by
     /// [`Command::Write`] is kept until a request with a different number reads a valid scene.
     pub saves: u64,
-    /// Render again even if nothing has changed.
+    /// Whether to render again even if nothing has changed.
     pub force: bool,
     /// Region to render first. Does not affect the finished image.
     pub first: Option<NormalizedRect>,
@@ -187,11 +187,11 @@ pub enum Event {
         bytes: u64,
         /// Whether the image is the scene's own image, without keyboard changes.
         is_own: bool,
-        /// Sample counts of an image that was written before its render finished. `None` for a finished
+        /// Sample counts of an image that was written before its render finished, or `None` for a finished
         /// image.
         unfinished: Option<SampleCounts>,
     },
-    /// State of the scene's own image, sent for a request that shows another one.
+    /// State of the scene's own image, sent for a request that shows another image.
     OwnImage {
         /// Request number.
         generation: u64,
@@ -288,7 +288,7 @@ pub enum Event {
         /// How the render ended.
         end: LastValidSceneRenderOutcome,
     },
-    /// The request was cancelled by a newer one or by [`Command::Cancel`].
+    /// The request was cancelled by a newer request or by [`Command::Cancel`].
     Cancelled {
         /// Request number.
         generation: u64,
@@ -309,7 +309,7 @@ pub enum SavedSceneImageState {
     Written,
     /// Some of the image's samples have been rendered.
     Begun {
-        /// Whether the current request adds samples to this image, because both images share a film.
+        /// Whether the current request adds samples to this image because its own image shares the film.
         is_rendering: bool,
     },
     /// None of the image's samples have been rendered.
@@ -406,7 +406,7 @@ pub struct RenderProgress {
     pub elapsed_seconds: f64,
     /// Seconds that earlier requests spent on samples reused by this render.
     pub earlier_seconds: f64,
-    /// Estimated remaining seconds. `None` until the rate is known.
+    /// Estimated remaining seconds, or `None` until the rate is known.
     pub eta_seconds: Option<f64>,
     /// Average samples per pixel so far, rounded down.
     pub samples: u32,
@@ -416,7 +416,7 @@ pub struct RenderProgress {
     pub total_samples: u32,
     /// Whether every pixel will have `total_samples` samples, because there is no noise target or time limit.
     pub is_total_fixed: bool,
-    /// Current noise. `None` during the first half second and the first 16 samples.
+    /// Current noise, or `None` during the first half second and the first 16 samples.
     pub noise: Option<NoisePrediction>,
 }
 
@@ -427,8 +427,8 @@ pub struct NoisePrediction {
     pub now: f64,
     /// Seconds from the start of the render stage to the measurement.
     pub seconds: f64,
-    /// The next lower round noise level, and the number of seconds until it is reached. `None` if the render
-    /// ends before that, or if photons or a noise target (`error`) make the noise unpredictable.
+    /// The next lower round noise level, and the number of seconds until it is reached, or `None` if the
+    /// render ends before that, or if photons or a noise target (`error`) make the noise unpredictable.
     pub next: Option<(f64, f64)>,
 }
 
@@ -445,11 +445,11 @@ pub struct PreviewUpdate {
     /// Range of values displayed as black to white: from the smallest to the largest distance, or from 0 to
     /// the maximum.
     pub range: Option<[f32; 2]>,
-    /// Section of the image shown at 1:1. `None` for the whole image.
+    /// Section of the image shown at 1:1, or `None` for the whole image.
     pub section: Option<NormalizedRect>,
     /// Whether the preview lacks light from photons because they are still being traced.
     pub lacks_photons: bool,
-    /// The image that the preview shows. `None` if the preview lacks light from photons.
+    /// The image that the preview shows, or `None` if the preview lacks light from photons.
     pub source: Option<PreviewImageState>,
 }
 

@@ -1,4 +1,4 @@
-//! Queries about the current image, and edits to the scene file's camera. Both can run during and between
+//! Queries about the current image and edits to the scene file's camera, which can run during and between
 //! requests.
 
 use std::path::{Path, PathBuf};
@@ -212,7 +212,7 @@ fn replace_scene_text_if_unchanged(
 }
 
 /// Writes the scene generated for a model, but with this camera, to a file next to the model. Never replaces
-/// a file.
+/// an existing file.
 fn save_model_scene_with_camera(
     loaded: &LoadedScene,
     camera: &ResolvedCamera,

@@ -21,7 +21,7 @@ pub struct Report {
     pub settings: EffectiveSettings,
     /// The lights and how they are sampled.
     pub lights: LightSamplingReport,
-    /// Photon statistics. `None` if the image does not use photons.
+    /// Photon statistics, or `None` if the image does not use photons.
     pub photons: Option<PhotonsReport>,
     /// All eight stages, in order.
     pub stages: Vec<StageReport>,
@@ -36,7 +36,7 @@ pub struct Report {
 /// The image in a report.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct ImageReport {
-    /// First output file. `None` if no file was written.
+    /// First output file, or `None` if no file was written.
     pub path: Option<String>,
     /// All output files.
     pub paths: Vec<String>,
@@ -50,7 +50,7 @@ pub struct ImageReport {
     /// [`Film::relative_error`](crate::film::Film::relative_error). `None` with fewer than two samples per
     /// pixel.
     pub error: Option<f64>,
-    /// Render time in seconds, including earlier requests that this one continued.
+    /// Render time in seconds, including earlier requests that this request continued.
     pub render_seconds: f64,
     /// Whether every pixel has the requested number of samples.
     pub complete: bool,
@@ -84,7 +84,7 @@ pub struct LightSamplingReport {
     /// Which lights are sampled at each vertex.
     pub sampled: SampledLightSet,
     /// Number of lights sampled from the light tree at each vertex: 32 × `shadow_samples` for `whitted`, or 4
-    /// × `shadow_samples` for `path`. 0 without a tree.
+    /// × `shadow_samples` for `path`. This is 0 without a tree.
     pub picks: u64,
     /// Number of nodes in the light tree.
     pub tree_nodes: u64,

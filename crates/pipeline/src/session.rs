@@ -60,7 +60,7 @@ impl HeadlessSession {
     }
 }
 
-/// Orders for a request without a front end.
+/// Commands for a request without a front end: none ever arrive.
 pub(super) struct NoPendingCommands;
 
 impl PendingCommands for NoPendingCommands {

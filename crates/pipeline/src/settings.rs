@@ -41,7 +41,7 @@ macro_rules! overrides {
             pub camera: CameraOverrides,
             /// Additional layers for EXR files.
             pub layers: Vec<OutputLayer>,
-            /// Turntable frame. `None` for a still image.
+            /// Turntable frame, or `None` for a still image.
             pub turn: Option<TurntableFrame>,
             /// Pixels to render. The rest of the image stays black.
             pub crop: Option<Rect>,
@@ -94,9 +94,9 @@ choice! {
     pub enum OutputLayer {
         /// Diffuse reflectance.
         Albedo = "albedo",
-        /// World-space shading normal, from -1 to 1. 0 if nothing is hit.
+        /// World-space shading normal, from -1 to 1, or 0 if nothing is hit.
         Normal = "normal",
-        /// Distance along the view axis. 0 if nothing is hit.
+        /// Distance along the view axis, or 0 if nothing is hit.
         Depth = "depth",
         /// Variance of the pixel's luminance.
         Variance = "variance",
@@ -165,7 +165,7 @@ choice! {
 /// How often a render saves checkpoints next to its output file, and whether it resumes from them.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct CheckpointSettings {
-    /// Seconds between checkpoints. 0 disables them.
+    /// Seconds between checkpoints. 0 disables checkpoints.
     pub seconds: f64,
     /// Whether a render resumes from a checkpoint.
     pub resume: ResumeMode,
@@ -196,7 +196,7 @@ pub struct KeyboardSettings {
     pub photons: bool,
 }
 
-/// Effective settings of a request, for status lines.
+/// Effective settings of a request, for status lines and reports.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct EffectiveSettings {
     /// Width in pixels.

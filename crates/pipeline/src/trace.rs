@@ -85,10 +85,10 @@ impl Tracer<'_> {
         Ok((samples, TraceCost { rays, seconds: thread_cpu_seconds() - begin }))
     }
 
-    /// Renders the jobs. `keep` stores the samples of each finished job. It runs on the thread that rendered the
-    /// samples, because they are in that thread's CPU cache. `each` is called on the current thread for each
-    /// finished job, in order of completion, and with `None` at least once per [`TICK`]. It returns whether to
-    /// continue. Jobs that have already started are always finished.
+    /// Renders the jobs. `keep` stores the samples of each finished job. It runs on the thread that rendered
+    /// the samples, because they are in that thread's CPU cache. `each` is called on the current thread for
+    /// each finished job, in order of completion, and with `None` whenever no results arrive within [`TICK`].
+    /// It returns whether to continue. Jobs that have already started are always finished.
     ///
     /// # Errors
     /// Returns [`Cancelled`] if the token is cancelled.
@@ -140,7 +140,7 @@ impl Tracer<'_> {
                 stopped.fetch_or(!go_on, Ordering::Relaxed);
             }
         });
-        // Do not call `check`. It blocks while work is paused, which would delay orders.
+        // Do not call `check_pause_and_cancel`. It blocks while work is paused, which would delay commands.
         if self.token.is_cancelled() { Err(Cancelled) } else { Ok(()) }
     }
 }

@@ -40,7 +40,7 @@ impl TurntableFrame {
         }
         let angle = 360.0 * f64::from(self.number) / f64::from(self.of);
         let (axis, arm) = (first.up.normalize_or(DVec3::Y), first.position - first.look_at);
-        // Rodrigues' formula.
+        // Apply Rodrigues' rotation formula.
         let (sin, cos) = sin_cos_degrees(angle);
         let turned = arm * cos + axis.cross(arm) * sin + axis * (axis.dot(arm) * (1.0 - cos));
         Pose { position: first.look_at + turned, ..*first }
@@ -100,7 +100,7 @@ fn insert_frame_number(before: &[u8], (number, digits): (u32, usize), after: &[u
     OsString::from_vec([before, &zeros, number.as_bytes(), after].concat())
 }
 
-/// Returns the first file that two frames would share. `None` if each frame has its own file.
+/// Returns the first file that two frames would share, or `None` if each frame has its own file.
 pub fn first_repeated_file(outputs: &[PathBuf], of: u32) -> Option<PathBuf> {
     let mut seen = HashSet::new();
     let all = |number| outputs.iter().filter_map(move |path| frame_path(path, TurntableFrame { number, of }));

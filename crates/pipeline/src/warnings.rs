@@ -32,7 +32,7 @@ pub(super) fn settings_warnings(
     find_warnings(scene, settings).into_iter().map(place).collect()
 }
 
-/// Adds the location of the setting that caused a warning.
+/// Creates a warning, located at the setting that caused it.
 fn warning_at_setting(
     cause: WarnedSetting,
     message: String,

@@ -12,8 +12,8 @@ pub enum Eta {
 }
 
 impl Eta {
-    /// Returns the remaining time. Returns `None` during the first 1 % or the first half second of the
-    /// render, while the estimate is unreliable.
+    /// Returns the remaining time, or `None` if there is no reliable estimate. An estimate is unreliable
+    /// during the first 1 % and the first half second of the render.
     pub fn from_progress(progress: &RenderProgress) -> Option<Self> {
         const DAY: f64 = 24.0 * 3600.0;
         let is_early = progress.fraction < 0.01 || progress.elapsed_seconds < 0.5;

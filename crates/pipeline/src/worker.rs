@@ -41,7 +41,7 @@ pub(super) fn start_with_config(config: EngineConfig) -> std::io::Result<Handle>
     Ok(Handle { events, previews, remote, contents, thread: Some(thread) })
 }
 
-/// A running worker. Dropping it stops the worker, which may take as long as it takes to write a file.
+/// A handle to a running worker. Dropping it stops the worker and blocks while a file is being written.
 #[derive(Debug)]
 pub struct Handle {
     /// Events from the worker.
@@ -64,7 +64,7 @@ impl Handle {
         self.remote.clone()
     }
 
-    /// Returns the worker's file contents, which can be shared with a watcher of the same files.
+    /// Returns the worker's cache of file hashes, which a watcher of the same files can share.
     pub fn file_hashes(&self) -> Arc<FileHashCache> {
         Arc::clone(&self.contents)
     }
@@ -119,7 +119,7 @@ struct Mailbox {
     is_write_postponed: bool,
     /// Whether a write order arrived after the pending request and therefore applies to it.
     is_write_of_waiting: bool,
-    /// The current request's settings that the user can change with keys.
+    /// The current request's overrides that the user can change with keys.
     shown: Overrides,
     /// Pending preview size change.
     preview: Option<Option<MaxPreviewSize>>,
@@ -138,7 +138,7 @@ struct Mailbox {
     newest: u64,
 }
 
-/// Returns a request's settings that the user can change with keys.
+/// Returns only those of a request's overrides that the user can change with keys.
 fn keyboard_overrides(request: &Request) -> Overrides {
     let Overrides { shadows, integrator, dof, photons, view, camera, exposure, .. } = request.overrides;
     Overrides { shadows, integrator, dof, photons, view, camera, exposure, ..Overrides::default() }
@@ -223,9 +223,9 @@ impl CommandSender {
         self.mailbox.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Postpones a write order until the pending request runs. Does so if the order was meant for that
-    /// request, or if the current image is incomplete and the pending request has the same settings. Returns
-    /// whether the order was postponed.
+    /// Postpones a write order until the pending request runs if the order was meant for that request, or if
+    /// the current image is incomplete and the pending request has the same settings. Returns whether the
+    /// order was postponed.
     fn postpone_write_to_pending(&self, can_write: bool) -> bool {
         let mut mailbox = self.lock();
         let is_meant = mailbox.is_write_of_waiting;
@@ -240,7 +240,7 @@ impl CommandSender {
     fn wait_for_next_task(&self) -> Task {
         let mut mailbox = self.lock();
         loop {
-            // Carry out a write order that came before quitting.
+            // Carry out a write order that arrived before the quit command.
             if mailbox.write && !(mailbox.is_write_postponed && mailbox.request.is_some()) {
                 mailbox.write = false;
                 return Task::Write;

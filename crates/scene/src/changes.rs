@@ -24,7 +24,7 @@ pub fn list_changes(before: &str, after: &str) -> Vec<String> {
     }
 }
 
-/// Summarizes the changed lines. Returns `None` if all lines are equal.
+/// Returns a summary of the changed lines, or `None` if all lines are equal.
 fn summarize_line_changes(before: &str, after: &str) -> Option<String> {
     let (before, after): (Vec<&str>, Vec<&str>) = (before.lines().collect(), after.lines().collect());
     // Strip the common prefix and suffix.
@@ -47,7 +47,7 @@ fn summarize_line_changes(before: &str, after: &str) -> Option<String> {
     }
 }
 
-/// Describes a change to one line. If both lines assign to the same key, shows the key only once.
+/// Describes a change to one line. Shows the key only once if the old and the new line assign to the same key.
 fn describe_line_change(old: &str, new: &str) -> String {
     let parts = |line: &'_ str| {
         line.split_once('=').map(|(key, value)| (key.trim().to_owned(), value.trim().to_owned()))

@@ -232,7 +232,7 @@ mod tests {
     #[test]
     fn added_keys_use_the_same_line_ending() {
         let wanted = ResolvedCamera { fov: 35.5, ..view([0.0, 1.0, 4.0]) };
-        // The first line ends differently from the lines of the camera table.
+        // The first line and the lines of the camera table have different line endings.
         for (first, end) in [("\r\n", "\n"), ("\n", "\r\n")] {
             let text = format!("# a{first}[camera]{end}position = [0, 1, 4]{end}look_at = [0, 1, 0]");
             assert_eq!(written(&text, &wanted), format!("{text}{end}fov = 35.5"), "at the end of the file");

@@ -10,7 +10,7 @@ pub(super) const MESSAGE: &str = "this light shines away from everything";
 pub(super) const LABEL: &str = "all shapes are behind it";
 pub(super) const HELP: &str = "swap `u` and `v`: the front faces along u × v";
 
-/// Minimum and maximum corners of a mesh file's bounding box. `None` for a mesh without vertices.
+/// Minimum and maximum corners of a mesh file's bounding box, or `None` for a mesh without vertices.
 pub type MeshBoundingBox = Option<[DVec3; 2]>;
 
 /// Minimum ratio of the scene's extent in front of a light to the extent behind the light. Below this ratio,
@@ -18,8 +18,8 @@ pub type MeshBoundingBox = Option<[DVec3; 2]>;
 /// ceiling just above it.
 const MIN_FRONT_RATIO: f64 = 0.02;
 
-/// Returns the spans of one-sided quad lights that have shapes behind them and nothing in front of them. Only
-/// calls `bounds` if the scene has one-sided quad lights.
+/// Returns the spans of one-sided quad lights that have shapes behind them and nothing in front of them. Calls
+/// `bounds` only if the scene has one-sided quad lights.
 pub(super) fn lights_facing_away(
     scene: &Scene,
     bounds: impl FnOnce() -> Vec<MeshBoundingBox>,

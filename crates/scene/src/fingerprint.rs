@@ -7,11 +7,11 @@ use crate::math::{DVec3, Vec3};
 /// Values that affect the image. Implementations destructure all fields without `..`, so a new field causes a
 /// compile error until it is added to the fingerprint or explicitly ignored.
 pub trait Fingerprinted {
-    /// Feeds into the fingerprint all values that later stages read.
+    /// Adds all values that later stages read to the fingerprint.
     fn add_to(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>);
 }
 
-/// The data to which scene items refer: textures and meshes (by index), and the orbiter file.
+/// The data that scene items refer to: textures and meshes (by index), and the orbiter file.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct FingerprintContext<'a> {
     /// The scene's textures.
@@ -42,7 +42,7 @@ impl std::fmt::Display for Fingerprint {
     }
 }
 
-/// Fingerprint builder. Hashes its inputs in order. Hashes numbers by their bits.
+/// Builds a fingerprint by hashing its inputs in order. Numbers are hashed by their bits.
 #[derive(Debug)]
 pub struct FingerprintHasher(blake3::Hasher);
 

@@ -5,7 +5,7 @@ use unicode_width::UnicodeWidthStr;
 use super::sanitize::{escape_and_truncate, escape_invisible_chars};
 use super::source::quote_toml_string;
 
-/// Formats one part of a dotted key. Quotes the part if it is not a bare key.
+/// Formats one part of a dotted key, in quotes if it is not a bare key.
 pub(super) fn quote_key_part(name: &str) -> String {
     let is_bare = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
     if !name.is_empty() && name.chars().all(is_bare) { name.to_owned() } else { quote_toml_string(name) }
@@ -28,8 +28,8 @@ pub fn split_at_unquoted_space(text: &str) -> Option<(&str, &str)> {
     find_unquoted(text, ' ').map(|end| (&text[..end], &text[end + 1..]))
 }
 
-/// Shortens a dotted key to `columns`. Drops leading tables first. Cuts the last part only if it does not
-/// fit.
+/// Shortens a dotted key to at most `columns` columns. Drops leading tables first, and truncates the last part
+/// only if it does not fit.
 pub fn shortened_key(key: &str, columns: usize) -> String {
     let key = escape_invisible_chars(key);
     if key.width() <= columns {

@@ -71,8 +71,8 @@ pub struct LoadedScene {
     pub path: PathBuf,
     /// Likely mistakes, in file order.
     pub warnings: Vec<Diagnostic>,
-    /// Files that the scene file itself references. Empty unless there are `--set` values, because only these
-    /// can replace the references.
+    /// Files that the scene file itself references. Empty unless there are `--set` values, because only
+    /// `--set` can replace references.
     pub named: Vec<PathBuf>,
     /// Spans of the values in `[render]` and `[photons]`.
     pub settings: Vec<SettingSpan>,
@@ -107,14 +107,14 @@ impl LoadedScene {
         edit::replace_camera(self.source.file_text(), camera)
     }
 
-    /// Reads the camera from a scene's text, with `--set` values applied. `None` if the text or a value has
-    /// errors.
+    /// Reads the camera from a scene's text, with `--set` values applied. Returns `None` if the text or a
+    /// value has errors.
     pub fn parse_camera_from_text(text: &str, sets: &[String]) -> Option<Camera> {
         document::parse_camera(&SceneText::with_set_args(text.into(), sets).ok()?)
     }
 
-    /// In scenes with mesh files, returns warnings about lights that shine away from everything. Only calls
-    /// `bounds` if there are candidates. `bounds` returns one item per entry of [`Scene::mesh_files`].
+    /// In scenes with mesh files, returns warnings about lights that shine away from everything. Calls
+    /// `bounds` only if there are candidates. It must return one item per entry of [`Scene::mesh_files`].
     pub fn lights_facing_away_warnings(
         &self,
         bounds: impl FnOnce() -> Vec<MeshBoundingBox>,
@@ -139,7 +139,8 @@ impl LoadedScene {
         before.bytes().filter(|byte| *byte == b'\n').count() + 1
     }
 
-    /// Returns the span of a setting's value in the file or in a `--set` argument. `None` if neither sets it.
+    /// Returns the span of a setting's value in the file or in a `--set` argument, or `None` if neither sets
+    /// it.
     pub fn setting_span(&self, table: &str, key: &str) -> Option<Range<usize>> {
         let is_it = |setting: &&SettingSpan| setting.table == table && setting.key == key;
         self.settings.iter().find(is_it).map(|setting| setting.span.clone())
@@ -162,7 +163,7 @@ impl LoadedScene {
 /// Result of parsing a scene's text.
 #[derive(Clone, Debug)]
 pub struct ParseOutcome {
-    /// The scene. `None` if there is an error.
+    /// The scene, or `None` if there is an error.
     pub scene: Option<Scene>,
     /// Errors and warnings, in text order.
     pub diagnostics: Vec<Diagnostic>,
@@ -209,8 +210,8 @@ fn load_from_scene_text(
     }
 }
 
-/// Returns the files that a scene file references, even if the scene has errors. Empty for models and
-/// unreadable files.
+/// Returns the files that a scene file references, even if the scene has errors. The list is empty for models
+/// and unreadable files.
 pub fn referenced_files(path: &Path) -> Vec<PathBuf> {
     if is_model(path) {
         return Vec::new();
@@ -219,7 +220,7 @@ pub fn referenced_files(path: &Path) -> Vec<PathBuf> {
 }
 
 /// Validates the text of a scene file. `path` is used in diagnostics and to resolve relative paths, but the
-/// file is not read. Of referenced files, only the metadata is read.
+/// file itself is not read. Only the metadata of referenced files is read.
 pub fn parse(text: Arc<str>, path: &Path) -> ParseOutcome {
     if text.contains('\0') {
         return ParseOutcome {

@@ -2,7 +2,7 @@
 
 use strsim::osa_distance;
 
-/// Returns the candidate with the smallest edit distance (optimal string alignment) to `written`. `None` if
+/// Returns the candidate with the smallest edit distance (optimal string alignment) to `written`, or `None` if
 /// more than one third of the characters differ. Ignores case and treats `-` as `_`.
 pub fn nearest_name<'a>(written: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     const LONGEST: usize = 64;
@@ -47,7 +47,7 @@ const FOREIGN_NAMES: [(&[&str], &[&str]); 17] = [
     (&["sun", "distant", "infinite", "parallel"], &["directional"]),
 ];
 
-/// Returns the candidate that corresponds to `written` if that is another renderer's name, otherwise the
+/// If `written` is another renderer's name for a candidate, returns this candidate. Otherwise, returns the
 /// nearest candidate.
 pub fn foreign_or_nearest_name<'a>(written: &str, candidates: &[&'a str]) -> Option<&'a str> {
     let plain = written.to_lowercase().replace('-', "_");

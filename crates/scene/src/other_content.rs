@@ -1,5 +1,5 @@
-//! Recognizes models, images, image parts and checkpoints by their first bytes if they are passed instead of
-//! a scene.
+//! Recognizes models, images, image parts and checkpoints that are passed instead of a scene by their first
+//! bytes.
 
 use std::io::Read;
 use std::path::Path;
@@ -42,7 +42,7 @@ pub fn detect_non_scene(path: &Path) -> Option<(&'static str, Box<Diagnostic>)> 
 }
 
 impl NonSceneContent {
-    /// Detects the content type from the first bytes. `None` if the file may be a scene.
+    /// Detects the content type from the first bytes. Returns `None` if the file may be a scene.
     pub(super) fn detect(bytes: &[u8]) -> Option<Self> {
         if bytes.starts_with(&PART_MAGIC) {
             return Some(Self::Part);
@@ -76,7 +76,7 @@ impl NonSceneContent {
     }
 }
 
-/// Returns an image's format.
+/// Returns an image's format, or `None` if the file is not an image.
 fn image_format(bytes: &[u8]) -> Option<&'static str> {
     const STARTS: [(&[u8], &str); 9] = [
         (b"\x89PNG\r\n", "PNG"),

@@ -18,7 +18,7 @@ pub struct OutlineTable {
     pub kind: Option<&'static TableTypeInfo>,
     /// `NAME` in `[materials.NAME]`, or a shape's `name`.
     pub name: Option<SpannedName>,
-    /// 1-based position in a list of tables. 1 for other tables.
+    /// 1-based position in a list of tables, or 1 for other tables.
     pub number: usize,
     /// Byte range of the header or the braces.
     pub span: Range<usize>,
@@ -48,7 +48,7 @@ pub struct OutlineKey {
     pub inner: Vec<OutlineKey>,
 }
 
-/// Returns the tables in a text, in the order in which glimt defines them.
+/// Returns the tables in a text, in the order of [`all_tables`].
 pub fn document_outline(text: &str) -> Vec<OutlineTable> {
     let (document, _) = toml::parse(text);
     let of = |info: &'static TableInfo| {
@@ -58,7 +58,7 @@ pub fn document_outline(text: &str) -> Vec<OutlineTable> {
     all_tables().iter().flat_map(of).collect()
 }
 
-/// Returns the tables that `info` defines.
+/// Returns the tables whose definition is `info`.
 fn outline_tables_of_definition(info: &'static TableInfo, found: &KeyValue<'_>) -> Vec<OutlineTable> {
     match info.form {
         TableSyntax::Single => table_entries(found.value)
@@ -115,7 +115,7 @@ fn outline_keys(all: &Entries<'_>) -> Vec<OutlineKey> {
     all.iter().map(key).collect()
 }
 
-/// The value, if it is a string.
+/// Returns a string value with its span, or `None` for other values.
 fn spanned_string_value(value: Value<'_>) -> Option<SpannedName> {
     match value.decode() {
         TomlValue::String(text) => Some(SpannedName { text: text.to_owned(), span: value.span() }),
@@ -158,7 +158,7 @@ impl OutlineTable {
         }
     }
 
-    /// Returns the key prefixes by which `--set` refers to this table.
+    /// Returns the key prefixes with which `--set` can refer to this table.
     pub fn set_arg_prefixes(&self) -> Vec<String> {
         let table = self.info.name;
         let name = self.name.as_ref().map(|name| format!("{table}.{}", key_path::quote_key_part(&name.text)));

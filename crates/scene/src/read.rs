@@ -97,7 +97,7 @@ fn is_unsupported_model(path: &Path) -> bool {
     UNSUPPORTED_MODELS.contains(&ending.as_str()) && is_file_without_camera_header(path)
 }
 
-/// Whether a file has no `[camera]` header near its start. False for unreadable files.
+/// Whether a readable file has no `[camera]` header near its start.
 fn is_file_without_camera_header(path: &Path) -> bool {
     const START: u64 = 1 << 16;
     let start = || {
@@ -210,8 +210,8 @@ pub(super) fn similar_file(path: &Path, may_be_meant: impl Fn(&Path) -> bool) ->
     Some(parent.join(near))
 }
 
-/// Finds the new file of a scene that is missing because it was probably renamed: a file with the same text
-/// in the same folder.
+/// Finds the new path of a missing scene file that was probably renamed: a file with the same text in the same
+/// folder.
 pub fn find_renamed_scene(path: &Path, text: &str) -> Option<PathBuf> {
     let parent = path.parent()?;
     let listed = if parent.as_os_str().is_empty() { Path::new(".") } else { parent };

@@ -1,8 +1,8 @@
 //! Formats diagnostics as text: `file:line:column`, the source line with the span underlined, and the help
 //! text.
 //!
-//! Text from files is sanitized with [`escape_invisible_chars`]. The only control characters in the output are line breaks
-//! and, with [`ReportStyle::Ansi`], color escape sequences.
+//! Text from files is sanitized with [`escape_invisible_chars`]. The only control characters in the output are
+//! line breaks and, with [`ReportStyle::Ansi`], color escape sequences.
 
 mod lines;
 
@@ -28,7 +28,7 @@ pub enum ReportStyle {
 }
 
 /// Formats diagnostics sorted by file and position, followed by a summary line. Wraps messages at `width`
-/// columns and cuts source lines. Returns an empty string if there are no diagnostics.
+/// columns and truncates source lines. Returns an empty string if there are no diagnostics.
 pub fn render_report(diagnostics: &[Diagnostic], width: usize, style: ReportStyle) -> String {
     let renderer = match style {
         ReportStyle::Plain => Renderer::plain(),
@@ -209,7 +209,7 @@ fn floor_char_boundary(source: &str, offset: usize) -> usize {
     offset
 }
 
-/// Byte offsets of the start of each line, and character counts for finding columns in long lines.
+/// The byte offset of the start of each line, and character counts for finding columns in long lines.
 pub(crate) struct LineIndex {
     starts: Vec<usize>,
     /// Number of characters before each multiple of [`STEP`] bytes.
@@ -237,7 +237,7 @@ impl LineIndex {
         Self { starts: std::iter::once(0).chain(after).collect(), characters: counts }
     }
 
-    /// The number of characters before a byte offset.
+    /// The number of characters between the start of the text and a byte offset.
     fn source_characters_before(&self, source: &str, offset: usize) -> usize {
         let step = offset / STEP;
         self.characters[step] + count_characters(&source.as_bytes()[step * STEP..offset])

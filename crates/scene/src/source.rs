@@ -72,7 +72,7 @@ impl SceneText {
         self.all.get(..self.file).unwrap_or_default()
     }
 
-    /// Returns [`Self::file_text`] as an `Arc`. Only copies the text if there are `--set` values.
+    /// Returns [`Self::file_text`] as an `Arc`. Copies the text only if there are `--set` values.
     pub fn shared_file_text(&self) -> Arc<str> {
         if self.sets.is_empty() { Arc::clone(&self.all) } else { self.file_text().into() }
     }
@@ -113,8 +113,8 @@ impl SceneText {
     }
 }
 
-/// Converts `TABLE.KEY=VALUE` to TOML, quoting the value if necessary. `None` if the `=`, the table or the
-/// key is missing.
+/// Converts `TABLE.KEY=VALUE` to TOML, quoting the value if necessary. Returns `None` if the `=`, the table or
+/// the key is missing.
 fn set_arg_to_toml(set: &str) -> Option<String> {
     // Quoted keys may contain `=`, so try each `=`.
     const MAX_EQUALS_SIGNS: usize = 8;

@@ -139,7 +139,7 @@ impl Display {
         self.images.is_some()
     }
 
-    /// Places a preview drawn as pixels. `None` if the preview is drawn as cells.
+    /// Sets the preview to draw as pixels, or `None` if it is drawn as cells.
     pub(super) fn place_pixels(&mut self, wanted: Option<PlacedImage>, is_still: bool) {
         if let Some(uncovered) = self.images.as_mut().and_then(|images| images.set_target(wanted, is_still)) {
             self.painter.damage(uncovered);
@@ -200,7 +200,8 @@ impl Display {
         }
     }
 
-    /// Sends one slice, ending it early if `is_late` returns true. Returns true if anything was sent.
+    /// Sends one slice, ending it early if `is_late` returns true. Returns whether part of the target was
+    /// sent.
     pub(super) fn send_next_slice(&mut self, now: Instant, is_late: impl Fn() -> bool) -> bool {
         let is_idle = self.is_complete && !self.has_bytes_queued_after_preview();
         let room = if is_idle { 0 } else { self.connection.max_sendable_bytes(now) };
@@ -298,7 +299,7 @@ impl Display {
         self.is_complete && !self.connection.awaits_reply()
     }
 
-    /// Estimated bandwidth in bytes per second. `None` if unknown or too high to matter.
+    /// Estimated bandwidth in bytes per second, or `None` if it is unknown or too high to matter.
     pub(super) fn bytes_per_second(&self) -> Option<f64> {
         self.connection.bytes_per_second()
     }
@@ -322,8 +323,8 @@ impl Display {
         (!std::mem::replace(&mut self.is_reported, true)).then_some(*report)
     }
 
-    /// How long to wait for pending replies before exiting, so that the shell does not receive them as input.
-    /// `None` if no replies are pending.
+    /// How long to wait before exiting for pending replies, so that the shell does not receive them as input,
+    /// or `None` if no replies are pending.
     pub(super) fn reply_wait_before_exit(&self) -> Option<Duration> {
         const MIN: Duration = Duration::from_millis(200);
         const MAX: Duration = Duration::from_secs(1);

@@ -21,8 +21,8 @@ pub(super) fn editor_from_environment(variable: impl Fn(&str) -> Option<String>)
     editor_and_variable(variable).0
 }
 
-/// The editor from the environment as a shell command, with the variable that specifies it. `None` for the
-/// default editor.
+/// The editor from the environment as a shell command, with the variable that specifies it, or with `None`
+/// for the default editor.
 pub fn editor_and_variable(variable: impl Fn(&str) -> Option<String>) -> (String, Option<&'static str>) {
     let set = |name: &'static str| {
         let editor = variable(name).filter(|value| !value.trim().is_empty())?;

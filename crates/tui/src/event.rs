@@ -59,7 +59,7 @@ pub(super) enum Event {
     NoShell,
     /// The editor has exited.
     Back,
-    /// The reason why the editor could not be run.
+    /// The editor could not be run, for this reason.
     NoEditor(String),
     /// A source of events has ended.
     Lost(RequiredEventSource),
@@ -201,7 +201,7 @@ pub(super) struct FilePosition {
 pub(super) struct PreviewSendReport {
     /// Bytes sent since the render began.
     pub bytes: usize,
-    /// Round-trip time of the terminal. `None` if it does not reply.
+    /// Round-trip time of the terminal, or `None` if it does not reply.
     pub round_trip: Option<Duration>,
 }
 

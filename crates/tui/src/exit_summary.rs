@@ -39,7 +39,7 @@ pub(super) fn unsaved_changes_as_options(state: &State) -> Option<String> {
     (!options.is_empty() && !is_in_file).then(|| format!("not kept: {}", options.join(" ")))
 }
 
-/// Names of the image's output files. `None` until the scene has been read.
+/// Names of the image's output files, or `None` until the scene has been read.
 pub(super) fn output_file_names(state: &State) -> Option<String> {
     let outputs = &state.request.effective.as_ref()?.outputs;
     let names: Vec<_> =
@@ -153,7 +153,7 @@ pub(super) fn describe_unfinished_image(samples: SampleCounts, shown: ViewMode) 
     format!("{}unfinished ({})", view_prefix(shown), format_sample_count_or_range(samples))
 }
 
-/// `64 samples`, or `16 to 32 samples`.
+/// Formats a sample count as in `64 samples`, or a range as in `16 to 32 samples`.
 fn format_sample_count_or_range(SampleCounts { min, max, .. }: SampleCounts) -> String {
     let most = format_count_with_noun(max as usize, "sample");
     if min == max { most } else { format!("{min} to {most}") }
@@ -164,7 +164,7 @@ fn view_prefix(view: ViewMode) -> String {
     if view.is_empty() { view } else { format!("{view}, ") }
 }
 
-/// The view's name. Empty for the beauty view.
+/// The view's name, or an empty string for the beauty view.
 pub(super) fn view_name_unless_beauty(view: ViewMode) -> String {
     if view == ViewMode::Beauty { String::new() } else { format!("view {}", view.name()) }
 }

@@ -1,4 +1,4 @@
-//! History of recent renders. Its memory use is bounded.
+//! History of recent renders, with bounded memory use.
 
 use std::cell::OnceCell;
 use std::collections::{HashMap, VecDeque};
@@ -23,16 +23,16 @@ pub(crate) struct ShownImage {
     pub picture: Arc<Srgb8Image>,
     /// Range of displayed values, for views that map values to colors.
     pub range: Option<[f32; 2]>,
-    /// The section of the image shown at 1:1 scale. `None` if the whole image is shown.
+    /// The section of the image shown at 1:1 scale, or `None` if the whole image is shown.
     pub section: Option<NormalizedRect>,
     /// Whether the image lacks the light from photons that are still being traced.
     pub lacks_photons: bool,
-    /// The image that the preview belongs to. `None` if unknown.
+    /// The image that the preview belongs to, if known.
     pub source: Option<PreviewImageState>,
 }
 
 impl ShownImage {
-    /// Whether both previews show the same image, regardless of size and sample count.
+    /// Whether two previews show the same image, regardless of size and sample count.
     pub(crate) fn shows_same_image(&self, other: &Self) -> bool {
         let images = self.source.zip(other.source);
         images.is_some_and(|(own, other)| own.image == other.image)
@@ -65,10 +65,10 @@ struct HistoryEntry {
     /// Number of the last edit included in the image.
     edits: u64,
     origin: ImageProvenance,
-    /// Number of the render that finished the image. `None` if the image is unfinished.
+    /// Number of the render that finished the image, or `None` if the image is unfinished.
     run: Option<u64>,
-    /// Changes since the previous entry, first those in files, then those made with keys. `None` for the
-    /// first entry.
+    /// Changes since the previous entry: first the changes in files, then the changes made with keys. `None`
+    /// for the first entry.
     changes: Option<[Vec<String>; 2]>,
     /// Thumbnail for the history strip, created on first use.
     small: OnceCell<Srgb8Image>,
@@ -111,8 +111,8 @@ impl RenderHistory {
         past.with_stopped_prefix(words)
     }
 
-    /// Records that a camera that has been moved with keys since request `since` was written to the scene.
-    /// This counts as an edit, which all entries since that request include.
+    /// Records that the camera, which has been moved with keys since request `since`, was written to the
+    /// scene. This counts as an edit that all entries since that request include.
     pub(super) fn record_saved_camera(&mut self, since: u64) {
         self.edits += 1;
         self.read_edits = self.edits;
@@ -128,8 +128,8 @@ impl RenderHistory {
         }
     }
 
-    /// Adds an image. It replaces any earlier image from the same request, or the last entry's image if it
-    /// looks the same.
+    /// Adds an image, which replaces any earlier image from the same request, or the last entry's image if
+    /// the two look the same.
     pub(super) fn record_shown_image(&mut self, shown: ShownImage, time: Instant, origin: ImageProvenance) {
         let known = self.past.iter().position(|past| past.shown.generation == shown.generation);
         let last = self.past.len().checked_sub(1);
@@ -241,7 +241,7 @@ impl RenderHistory {
         self.past.back().is_some_and(|newest| newest.run.is_none())
     }
 
-    /// Number of the render that finished an entry. `None` if the entry is unfinished.
+    /// Number of the render that finished an entry, or `None` if the entry is unfinished.
     pub(super) fn render_number_at(&self, at: usize) -> Option<u64> {
         self.past.get(at)?.run
     }
@@ -267,7 +267,7 @@ impl RenderHistory {
         }
     }
 
-    /// Scene and settings of the older render being viewed. `None` for the newest one.
+    /// Scene and settings of the older render being viewed, or `None` if the newest one is being viewed.
     pub(super) fn viewed_older_provenance(&self) -> Option<&ImageProvenance> {
         let (at, _) = self.open.as_ref()?;
         self.past.get(*at).map(|past| &past.origin)
@@ -727,7 +727,7 @@ mod tests {
         let mut generation = 0;
         let mut record = |history: &mut RenderHistory, name: &str, toggles: KeyOverrides, text: &str| {
             generation += 1;
-            // Record the image in progress, when it is finished, and once more.
+            // Record the image while it is in progress, when it is finished, and once more.
             for _ in 0..3 {
                 let (shown, origin) = of_image(generation, name, true);
                 history.record_shown_image(

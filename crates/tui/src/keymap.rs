@@ -10,12 +10,12 @@ use super::messages;
 pub(super) struct KeyBinding<A = Action> {
     /// Keys that trigger the action.
     pub keys: &'static [KeyPress],
-    /// Label in the help. Empty if the label in the previous row covers this key.
+    /// Label in the help, or empty if the label in the previous row covers this key.
     pub label: &'static str,
     pub action: A,
-    /// Description in the help. Empty if the previous row describes this key.
+    /// Description in the help, or empty if the previous row describes this key.
     pub help: &'static str,
-    /// The word shown in the key line. Empty if the key is not listed there.
+    /// The word shown in the key line, or empty if the key is not listed there.
     pub hint: &'static str,
 }
 
@@ -134,7 +134,7 @@ pub(super) const KEYMAP: &[KeyBinding] = &[
         &[KeyPress::plain('b')],
         "b",
         Action::CompareLastEdit,
-        "switch between before and after the last edit",
+        "compare before and after the last edit",
         "",
     ),
     define_binding(
@@ -194,7 +194,7 @@ pub(super) const OVERLAY: &[KeyBinding<OverlayAction>] = &[
         &[KeyPress::plain('j'), KeyPress::special(KeyCode::Down)],
         "j k",
         OverlayAction::LineDown,
-        "or down, up: scroll help, errors; choose a view",
+        "or down, up: scroll the text or choose a view",
         "scroll",
     ),
     define_binding(
@@ -247,7 +247,7 @@ pub(super) fn action_for(key: KeyPress) -> Option<Action> {
     KEYMAP.iter().find(|binding| binding.keys.contains(&key)).map(|binding| binding.action)
 }
 
-/// The table row for an action. Every action has one.
+/// Returns the key binding for an action. Every action has one.
 pub(super) fn binding_for_action(action: Action) -> Option<&'static KeyBinding> {
     KEYMAP.iter().find(|binding| binding.action == action)
 }

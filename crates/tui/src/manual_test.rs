@@ -1,6 +1,6 @@
 //! Runs the front end in a real terminal with a simulated worker. `GLIMT_MANUAL_SCENE` is the scene file's
-//! path. Reading a file that contains `broken` fails, and a file that contains `panic` makes the worker
-//! panic. Pressing `w` makes the front end panic.
+//! path. A scene that contains `broken` fails to load, and one that contains `panic` makes the worker panic.
+//! Pressing `w` makes the front end panic.
 
 use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, Sender, channel};

@@ -171,7 +171,7 @@ pub const RESUMED: &str = "resumed";
 pub const WRITING: &str = "writing the current image";
 /// Shown when `w` was pressed while an older render was displayed.
 pub const WRITING_NEWEST: &str = "writing the newest image, not the one shown";
-/// Shown when `w` has written these files.
+/// Shown when `w` has written `files`.
 pub fn files_written(files: &str) -> String {
     format!("wrote {files}")
 }
@@ -242,12 +242,12 @@ pub fn written_image_unfinished(file: &str) -> String {
     format!("{file} is unfinished · w: write it again")
 }
 
-/// Shown when `w` wrote an image with these changes but another image is displayed.
+/// Shown when `w` wrote an image with `changes` but another image is displayed.
 pub fn image_written_with_changes(file: &str, changes: &str) -> String {
     format!("{file} was written with {changes}")
 }
 
-/// Shown when `w` wrote an image with these changes but the scene's own image is displayed.
+/// Shown when `w` wrote an image with `changes` but the scene's own image is displayed.
 pub fn written_image_differs(file: &str, changes: &str) -> String {
     format!("{} · w: write this image", image_written_with_changes(file, changes))
 }
@@ -286,7 +286,7 @@ pub fn renders_on_changes(file: &str) -> String {
     format!("re-renders when {file} changes")
 }
 
-/// Describes the bytes and round-trip time for sending the last preview.
+/// Amount of data sent for the last preview and, if known, the terminal's round-trip time.
 pub fn preview_bytes_and_round_trip(kilobytes: usize, round_trip_ms: Option<u128>) -> String {
     let round_trip = round_trip_ms.map_or(String::new(), |time| format!(" · {time} ms round trip"));
     format!("{kilobytes} kB sent{round_trip}")

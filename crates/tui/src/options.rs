@@ -47,10 +47,10 @@ pub struct Options {
     pub color: ColorDepthChoice,
     /// How to draw the preview.
     pub preview: PreviewChoice,
-    /// Height of a cell divided by its width. `None` to query the terminal, with 2 as the default.
+    /// Height of a cell divided by its width, or `None` to query the terminal, with 2 as the default.
     pub cell_aspect: Option<f32>,
-    /// How long a render must run before its end triggers a notification. None is sent while the terminal is
-    /// focused. `None` disables notifications.
+    /// How long a render must run for its end to trigger a notification. Notifications are sent only while
+    /// the terminal is not focused. `None` disables them.
     pub notify_after: Option<Duration>,
     /// Sends commands to the worker. Must not block.
     pub commands: Box<dyn FnMut(Command)>,
@@ -78,7 +78,7 @@ impl ExitStatus {
     /// SIGTERM.
     pub const TERMINATED: Self = Self(143);
 
-    /// Terminated by a signal, specified by number.
+    /// The exit code after termination by signal `number`.
     pub fn from_signal(number: i32) -> Self {
         Self(u8::try_from(128 + number).unwrap_or(1))
     }

@@ -53,7 +53,7 @@ impl UnconfirmedImageProtocol {
         Self { protocol, route, is_known: protocol == ImageProtocol::Iterm && has_iterm }
     }
 
-    /// Returns the query for the protocol. Empty if other queries cover it or it cannot be sent.
+    /// Returns the query for the protocol, or no bytes if other queries cover it or it cannot be sent.
     pub(super) fn query(self) -> Vec<u8> {
         match (self.protocol, self.route) {
             (ImageProtocol::Kitty, MultiplexerPassthrough::Direct) => KITTY_QUERY.to_vec(),

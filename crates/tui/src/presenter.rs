@@ -177,8 +177,8 @@ impl Presenter {
         LinksAndDelayedText { later: drawn.later, links: files.map(link).collect() }
     }
 
-    /// Whether the connection is idle while a key moves the camera. The last preview is then on the screen at
-    /// reduced precision and the next one has not arrived.
+    /// Whether to redraw the preview with exact colors because the connection is idle while a key moves the
+    /// camera: the last preview is on the screen at reduced precision, and the next one has not arrived.
     fn can_refine_preview(&self, state: &State) -> bool {
         let is_step = state.request.camera_step.generation == Some(self.drawn.generation);
         is_step && self.drawn.is_first && !self.drawn.is_refined && self.display.is_complete()
@@ -231,7 +231,7 @@ impl Presenter {
         events
     }
 
-    /// When to act next if no event arrives. `None` if there is nothing to do.
+    /// When to act next if no event arrives, or `None` if there is nothing to do.
     pub(super) fn next_action_time(&mut self, state: &State, now: Instant) -> Option<Instant> {
         let due = self
             .drawn

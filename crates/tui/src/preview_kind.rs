@@ -51,7 +51,7 @@ impl PreviewKind {
         }
     }
 
-    /// The grid that divides a cell into parts. `None` if cells are not divided.
+    /// The grid that divides a cell into parts, or `None` if cells are not divided.
     pub(super) fn grid(self) -> Option<CellGrid> {
         match self {
             Self::HalfBlock => Some(CellGrid::Halves),

@@ -31,7 +31,7 @@ pub struct TerminalProbeResult {
     pub is_remote: bool,
     /// Whether environment variables identify a terminal that supports iTerm2's inline images.
     pub has_iterm: bool,
-    /// The terminal's replies. `None` if it does not reply.
+    /// The terminal's replies, or `None` if it does not reply.
     pub answers: Option<ProbeReplies>,
 }
 
@@ -71,10 +71,10 @@ impl TerminalProbeResult {
 /// Timeout for the terminal's replies.
 const PATIENCE: Duration = Duration::from_secs(1);
 
-/// Queries the terminal. `None` if stdin or stdout is not a terminal.
+/// Queries the terminal. Returns `None` if stdin or stdout is not a terminal.
 ///
-/// Multiplexers and consoles are queried only for device attributes because they may print other queries as
-/// text.
+/// Multiplexers and consoles are queried only for their status and device attributes because they may print
+/// other queries as text.
 pub fn probe_terminal() -> Option<TerminalProbeResult> {
     if !(io::stdin().is_terminal() && io::stdout().is_terminal()) {
         return None;

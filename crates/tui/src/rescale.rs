@@ -28,7 +28,7 @@ pub(super) fn resized_pixels(picture: &Srgb8Image, width: u32, height: u32) -> C
     Cow::Owned(pixels)
 }
 
-/// Returns the source pixels that a target pixel covers along one axis, with the length covered in each.
+/// Returns the source pixels that a target pixel covers along one axis, each with its covered length.
 fn covered_pixels(target: u32, targets: u32, sources: u32) -> Vec<(u32, f32)> {
     if targets >= sources {
         let middle = (u64::from(target) * 2 + 1) * u64::from(sources) / (2 * u64::from(targets.max(1)));

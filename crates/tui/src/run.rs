@@ -1,4 +1,4 @@
-//! The event loop. It owns the terminal, and all side effects happen here.
+//! The event loop, which owns the terminal and performs all side effects.
 
 use std::collections::VecDeque;
 use std::io;

@@ -127,7 +127,7 @@ fn lock_foreground_child() -> MutexGuard<'static, ForegroundChild> {
     CHILD.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Sets the child process to which terminating signals are forwarded. `None` if it has exited.
+/// Sets the child process to which terminating signals are forwarded, or `None` once it has exited.
 pub(super) fn set_foreground_child(id: Option<Pid>) {
     let mut child = lock_foreground_child();
     child.id = id;

@@ -34,8 +34,8 @@ pub struct NamedImage {
 }
 
 /// Draws images as lines of text, side by side, or stacked if the terminal is narrow. Uses the terminal's
-/// colors, or ASCII characters without color support. Returns an empty string if the terminal has fewer than
-/// 30 columns. If the output is not a terminal, its size is assumed to be 80×24.
+/// colors, or ASCII characters if it has none. Returns an empty string if the terminal has fewer than 30
+/// columns. If the output is not a terminal, its size is assumed to be 80×24.
 pub fn images_as_text(pictures: &[NamedImage], color: ColorDepthChoice, is_terminal: bool) -> String {
     let variable = |name: &str| std::env::var(name).ok();
     let depth = color::resolve_depth(color, variable);
@@ -54,7 +54,7 @@ fn window_size_and_aspect(window: &WindowSize) -> ((u16, u16), f32) {
     (if size.0 == 0 || size.1 == 0 { (80, 24) } else { size }, aspect.unwrap_or(2.0))
 }
 
-/// Arranges the images in one or more rows.
+/// Draws the images in one or more rows.
 fn lay_out_images(
     pictures: &[NamedImage],
     inks: PreviewColors<'_>,

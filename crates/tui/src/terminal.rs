@@ -51,10 +51,10 @@ static HAS_IMAGES: AtomicBool = AtomicBool::new(false);
 /// The thread that owns the terminal. Its panics restore the terminal. Panic messages from other threads are
 /// stored in [`PANIC`].
 static OWNER: Mutex<Option<ThreadId>> = Mutex::new(None);
-/// Message from the last panic in another thread.
+/// Message from the last panic in a thread that does not own the terminal.
 static PANIC: Mutex<Option<String>> = Mutex::new(None);
 
-/// Enables reports of button events and drags, in SGR format. (crossterm's command would enable all mouse
+/// Enables reports of button events and drags, in SGR format. (crossterm's command would report all mouse
 /// movements.)
 const MOUSE_ON: &str = "\x1b[?1000h\x1b[?1002h\x1b[?1006h";
 const MOUSE_OFF: &str = "\x1b[?1006l\x1b[?1002l\x1b[?1000l";
@@ -143,7 +143,7 @@ impl Drop for TerminalSession {
     }
 }
 
-/// Terminal modes saved while another program uses the terminal. `None` at other times.
+/// Terminal modes saved while another program uses the terminal, or `None` at other times.
 static LENT: Mutex<Option<Termios>> = Mutex::new(None);
 
 /// Saves the terminal modes for [`restore_modes`] before another program uses the terminal.
@@ -368,7 +368,7 @@ fn install_panic_hook() {
     });
 }
 
-/// Message from the last panic in another thread.
+/// Message from the last panic in a thread that does not own the terminal.
 pub(super) fn last_panic() -> Option<String> {
     PANIC.lock().unwrap_or_else(PoisonError::into_inner).clone()
 }
@@ -436,7 +436,7 @@ fn cell_aspect_ratio(cells: (u16, u16), pixels: (u16, u16)) -> f32 {
     if sane && (aspect - DEFAULT_CELL_ASPECT).abs() > 0.06 { aspect } else { DEFAULT_CELL_ASPECT }
 }
 
-/// Cell size in pixels, if plausible.
+/// Cell size in pixels, or a typical size if the reported one is implausible.
 fn cell_size_from_window(cells: (u16, u16), pixels: (u16, u16)) -> (u16, u16) {
     let side = |pixels: u16, cells: u16| pixels.checked_div(cells).filter(|side| (2..=100).contains(side));
     side(pixels.0, cells.0).zip(side(pixels.1, cells.1)).unwrap_or(DEFAULT_CELL_PIXELS)

@@ -59,7 +59,7 @@ pub(super) struct DesktopCapabilities {
 }
 
 impl TerminalBrand {
-    /// The terminal that sets `TERM_PROGRAM` to this value. `None` if unknown.
+    /// The terminal that sets `TERM_PROGRAM` to `name`, or `None` if it is unknown.
     pub(super) fn from_program(name: &str) -> Option<Self> {
         const PROGRAMS: [(&str, TerminalBrand); 6] = [
             ("ghostty", TerminalBrand::Ghostty),

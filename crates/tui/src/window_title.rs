@@ -57,7 +57,7 @@ pub(super) struct TitleAndProgress {
 
 impl TitleAndProgress {
     /// Determines the title and progress bar for the state. If `is_slow`, the percentage changes in larger
-    /// steps. `None` leaves both unchanged.
+    /// steps. Returns `None` if they should stay unchanged for now.
     pub(super) fn for_state(state: &State, is_slow: bool) -> Option<Self> {
         let capabilities = state.display.capabilities;
         if state.work.running_time(state.now).is_some_and(|time| time < SHORT) && !state.work.paused {

@@ -1,4 +1,5 @@
-//! Value noise: smoothly interpolated random numbers on a lattice. Uses only integer arithmetic and products.
+//! Value noise: smoothly interpolated random numbers on a lattice. Uses only arithmetic that gives the same
+//! results on every machine.
 
 use super::vector::{Vector, scale};
 
@@ -13,7 +14,7 @@ pub(crate) fn lattice_random(point: [i64; 3], seed: u64) -> f64 {
     (mixed >> 11) as f64 / (1_u64 << 53) as f64
 }
 
-/// Smooth noise in [0, 1]. If `period` is above 0, the noise repeats after `period` lattice points in x and
+/// Smooth noise in [0, 1]. If `period` is positive, the noise repeats after `period` lattice points in x and
 /// y.
 pub(crate) fn value_noise(at: Vector, period: i64, seed: u64) -> f64 {
     let base = at.map(f64::floor);

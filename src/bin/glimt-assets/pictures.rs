@@ -82,7 +82,7 @@ pub(crate) fn brick_normal_map() -> Vec<u8> {
     encode_png(SIDE, &pixels)
 }
 
-/// An eight by eight checkerboard with a dark lower left square.
+/// An eight by eight checkerboard whose lower left square is dark.
 pub(crate) fn checker() -> Vec<u8> {
     let pixels = render_srgb(64, |u, v| {
         let dark = ((u * 8.0).floor() + (v * 8.0).floor()) % 2.0 == 0.0;

@@ -1,4 +1,4 @@
-//! The meshes.
+//! Meshes of single objects: a coral, a globe, a rope, a knot, a vase and a dodecahedron.
 
 use std::collections::HashMap;
 
@@ -94,7 +94,7 @@ fn vase_profile_point(t: f64) -> [f64; 2] {
     [radius, blend(1)]
 }
 
-/// The dual of the icosahedron, with a pentagon around each vertex.
+/// A dodecahedron: the dual of the icosahedron, with a pentagon around each of its vertices.
 pub(crate) fn dodecahedron() -> Surface {
     let (corners, triangles) = icosahedron();
     let center = |face: &[u32; 3]| {

@@ -6,7 +6,7 @@ use super::vector::{Vector, add, dot, mix, scale, sin_cos_turns, smoothstep, uni
 const WIDTH: u32 = 256;
 const HEIGHT: u32 = 128;
 
-/// Uncompressed Radiance HDR, because noise does not compress.
+/// The sky as a Radiance HDR file, uncompressed because noise does not compress well.
 pub(crate) fn evening_sky_hdr() -> Vec<u8> {
     let mut file =
         format!("#?RADIANCE\nSOFTWARE=glimt-assets\nFORMAT=32-bit_rle_rgbe\n\n-Y {HEIGHT} +X {WIDTH}\n")
@@ -17,7 +17,7 @@ pub(crate) fn evening_sky_hdr() -> Vec<u8> {
     file
 }
 
-/// Direction of a pixel. The center of the map is −z. A quarter of the width to the right of the center is +x.
+/// Direction of a pixel. The center of the map is −z, and +x is a quarter of the width to the right of it.
 fn pixel_direction(column: u32, row: u32) -> Vector {
     let (sin, cos) = sin_cos_turns((f64::from(column) + 0.5) / f64::from(WIDTH) - 0.5);
     let (across, y) = sin_cos_turns((f64::from(row) + 0.5) / f64::from(HEIGHT) * 0.5);

@@ -17,8 +17,8 @@ pub(crate) struct Surface {
 const STEP: f64 = 1e-4;
 
 impl Surface {
-    /// Creates `columns` × `rows` quads over s and t in [0, 1], with normals and the texture coordinates (1 − s, t)
-    /// times `repeat`. The outside is along ∂t × ∂s.
+    /// Creates `columns` × `rows` quads over s and t in [0, 1], with normals and the texture coordinates
+    /// (1 − s, t) times `repeat`. The outside is along ∂t × ∂s.
     pub(crate) fn grid(
         columns: u32,
         rows: u32,

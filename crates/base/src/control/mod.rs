@@ -15,8 +15,8 @@ pub type Progress<'a> = &'a (dyn Fn(u64, u64) + Sync);
 /// Progress callback that ignores all reports.
 pub fn ignore_progress(_done: u64, _total: u64) {}
 
-/// Shared flag that cancels or pauses work. Workers poll [`CancelToken::check_pause_and_cancel`] often enough to stop within
-/// 10 ms.
+/// Shared flag that cancels or pauses work. Workers poll [`CancelToken::check_pause_and_cancel`] often enough
+/// to stop within 10 ms.
 #[derive(Clone, Debug, Default)]
 pub struct CancelToken(Arc<TokenState>);
 

@@ -1,4 +1,4 @@
-//! Allocates a film's block sums, and fills them as blocks are completed.
+//! Allocates a film's block sums and fills them as blocks complete.
 
 use super::Rect;
 use super::sum_order::SumOrder;
@@ -49,7 +49,8 @@ impl Film {
         Ok(self)
     }
 
-    /// Memory in bytes for a crop's sums in this summation order, and for the full-size finished image.
+    /// Bytes of memory for the sums of a crop in this summation order, and bytes for the full-size finished
+    /// image.
     pub fn memory_for((width, height): (u32, u32), crop: Rect, blocks: SumOrder) -> (u64, u64) {
         let more = crop.area() as u64 * (blocks.kept_block_count() * size_of::<DVec3>()) as u64;
         let picture = film_and_image_bytes(width, height, Rect { width: 0, height: 0, ..crop });

@@ -19,10 +19,10 @@ pub(super) fn luminance(radiance: DVec3) -> f64 {
 /// mean of the first n and B the mean of the others. (A − M)² = (A − B)²/4 has the expected value V(n) −
 /// V(2n) for any correlation of A and B, because V(2n) = (V(A) + V(B))/4 + Cov/2 and V(A) = V(B) = V(n).
 ///
-/// The rate at which V falls is measured from the same pixels. The first n samples and the other n each
-/// contain another such step, with the expected value V(n/2) − V(n). The rate is the mean of these two
-/// divided by the first step. A rare bright sample affects all three steps and results in a rate of two, as
-/// for independent samples, even if only a few pixels contain one.
+/// The rate at which V falls is measured from the same pixels. The first n samples and the last n each
+/// contain another such step, with the expected value V(n/2) − V(n). The rate is the mean of these two inner
+/// steps divided by the outer step. A rare bright sample affects all three steps and results in a rate of
+/// two, as for independent samples, even if only a few pixels have such a sample.
 #[derive(Debug, Default)]
 pub(super) struct SquaredMeanChanges {
     /// Luminance of each pixel at its last power-of-two sample count.
@@ -54,7 +54,7 @@ struct LevelSums {
 #[derive(Clone, Copy, Debug, Default)]
 struct StepPair {
     last: f64,
-    /// Mean squared step within the two halves of the samples. `None` for two samples.
+    /// Mean squared step within the two halves of the samples, or `None` if there are only two samples.
     before: Option<f64>,
 }
 
@@ -190,7 +190,7 @@ impl SquaredMeanChanges {
     }
 
     /// Factor by which quadrupling the samples to 2^`level` reduced the variance, measured in one half of
-    /// every cell. `None` if unknown, including for fewer than 16 samples.
+    /// every cell, or `None` if it is unknown, as it always is for fewer than 16 samples.
     fn measured_quadrupling_reduction(&self, level: usize, half: usize) -> Option<f64> {
         let mut sums = [0.0; 4];
         for cell in 0..CELLS {
@@ -208,7 +208,7 @@ impl SquaredMeanChanges {
 
     /// Expected relative standard deviation of the squared steps at 2^`level` samples, summed over the
     /// specified halves of all cells: 1 if a single pixel dominates, lower if many contribute. Ignores cells
-    /// with fewer samples.
+    /// that have not reached this sample count.
     pub(super) fn variance_uncertainty(&self, level: usize, halves: &[usize]) -> f64 {
         let Some(cells) = level.checked_sub(1).and_then(|index| self.levels.get(index)) else { return 1.0 };
         let sums = cells.iter().flat_map(|cell| halves.iter().map(|half| cell[*half]));
@@ -224,7 +224,7 @@ impl SquaredMeanChanges {
     }
 
     /// Factor by which doubling the samples to 2^`level` reduced the variance in the specified halves of all
-    /// cells, or `None` if unknown. Ignores cells with fewer samples.
+    /// cells, or `None` if unknown. Ignores cells that have not reached this sample count.
     pub(super) fn measured_variance_reduction(&self, level: usize, halves: &[usize]) -> Option<f64> {
         let (mut last, mut before) = (0.0, 0.0);
         for (cell, half) in (0..CELLS).flat_map(|cell| halves.iter().map(move |half| (cell, *half))) {
@@ -257,8 +257,8 @@ const INDEPENDENT_RATE: f64 = 2.0;
 /// Maximum plausible variance reduction per doubling.
 const MOST_FALL: f64 = 12.0;
 
-/// Largest variance reduction that is attributed to independent samples, because a few bright pixels can
-/// cause it by chance.
+/// Variance reductions up to this value are attributed to independent samples, because a few bright pixels
+/// can cause them by chance.
 const CHANCE_FALL: f64 = 2.3;
 
 /// Fraction of the variance reduction above [`CHANCE_FALL`] that is expected to continue. The smooth parts of
@@ -343,7 +343,7 @@ impl ConvergenceModel {
     }
 
     /// Variance of the pixel means after 2^`level` samples, summed over the pixels of a half-cell and
-    /// predicted from the reduction per quadrupling of the sample count. `None` for fewer than 16 samples.
+    /// predicted from the reduction per quadrupling of the sample count, or `None` for fewer than 16 samples.
     fn estimate_variance_from_quadrupling(
         steps: &SquaredMeanChanges,
         level: usize,

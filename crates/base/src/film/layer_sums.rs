@@ -1,27 +1,28 @@
-//! Sums of the values of layers.
+//! Per-pixel sums of layer values.
 
 use super::sum_order::add_finite;
 use crate::math::{DVec3, Vec3};
 
-/// Sums of the layers' values in some pixels, pixel by pixel. The image's sample counts apply.
+/// Sums of the layers' values for a set of pixels, stored pixel by pixel. The sample counts are the image's.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LayerSums {
     /// Number of layers.
     pub(super) count: usize,
     pub(super) sums: Vec<DVec3>,
-    /// Sums of the samples in the filter's negative lobes, which `sums` excludes. Empty if there is no such
-    /// sample.
+    /// Sums of the samples in the filter's negative lobes, which `sums` excludes. Empty if there are no
+    /// such samples.
     pub(super) negative: Vec<DVec3>,
 }
 
 impl LayerSums {
-    /// Creates zero sums of `count` layers in `area` pixels.
+    /// Creates sums of zero for `count` layers and `area` pixels.
     pub fn zero(count: usize, area: usize) -> Self {
         Self { count, sums: vec![DVec3::ZERO; count * area], negative: Vec::new() }
     }
 
-    /// Adds consecutive samples to a pixel: the values of some layers, each with its number. `is_negative`
-    /// contains one flag per sample if the filter has negative lobes. Non-finite values are treated as black.
+    /// Adds consecutive samples to a pixel. `layers` contains the index of each layer with its sample values.
+    /// `is_negative` contains one flag per sample if the filter has negative lobes. Non-finite values are
+    /// treated as black.
     pub fn add(&mut self, pixel: usize, layers: &[(usize, &[Vec3])], is_negative: Option<&[bool]>) {
         let first = pixel * self.count;
         let Some(is_negative) = is_negative else {
@@ -50,7 +51,7 @@ impl LayerSums {
         self.sums.resize(area * self.count, DVec3::ZERO);
     }
 
-    /// Replaces the sums of all pixels, without allocating memory for the sums outside negative lobes.
+    /// Replaces the sums of all pixels. Allocates memory only for the sums of negative lobes.
     pub(super) fn replace_all(&mut self, other: &Self) {
         if self.sums.len() == other.sums.len() {
             self.sums.copy_from_slice(&other.sums);
@@ -70,7 +71,7 @@ impl LayerSums {
     }
 }
 
-/// Adds samples of four layers, with the same result as adding them separately.
+/// Adds the samples of four layers at once, with the same result as adding each layer separately.
 fn add_together(sums: &mut [DVec3], layers: &[(usize, &[Vec3]); 4]) {
     let mut all = layers.map(|(layer, _)| sums[layer]);
     let [a, b, c, d] = layers.map(|(_, values)| values);

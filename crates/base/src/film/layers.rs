@@ -1,4 +1,4 @@
-//! Layers: further quantities of the image's samples, such as the albedo at the first hit.
+//! Layers: additional quantities recorded with the image's samples, such as the albedo at the first hit.
 
 use super::layer_sums::LayerSums;
 use super::sums::{
@@ -9,7 +9,7 @@ use crate::math::{DVec3, Vec3};
 use crate::system::memory::try_reserve_exact;
 
 impl Tile {
-    /// Mean of a pixel's values in a layer. `None` if the pixel has no samples or the layer does not exist.
+    /// Mean of a pixel's values in a layer, or `None` if the pixel has no samples or the layer does not exist.
     fn layer_mean(&self, layer: usize, index: usize) -> Option<DVec3> {
         let LayerSums { count, sums, negative } = &self.layers;
         let place = index * count + layer;
@@ -19,7 +19,7 @@ impl Tile {
 }
 
 impl Film {
-    /// Sums of the layers in some of a tile's pixels, to which further samples can be added.
+    /// Layer sums of the selected pixels of a tile, to which more samples can be added.
     pub fn layer_sums(&self, tile: usize, pixels: SelectedPixels) -> LayerSums {
         let zero = || LayerSums::zero(self.layers, pixels.count());
         let Some(rect) = self.tile_rect(tile) else { return zero() };
@@ -63,8 +63,8 @@ impl Film {
         crop.area() as u64 * (count * size_of::<DVec3>()) as u64
     }
 
-    /// For each layer, the mean of its values in every pixel, black outside the crop and in pixels without
-    /// samples.
+    /// One image per layer, with the mean of the layer's values in each pixel. Pixels outside the crop or
+    /// without samples are black.
     pub fn layer_images(&self) -> Vec<RadianceImage> {
         let mut images = vec![RadianceImage::black(self.width(), self.height()); self.layers];
         for number in 0..self.tile_count() {
@@ -135,7 +135,7 @@ mod tests {
                 let area = whole.tile_rect(tile).expect("a tile").area();
                 let read = || StoredTile::read(&bytes, area).expect("a tile");
                 restored.restore_tile(tile, read()).expect("the tile should fit the film");
-                // A film with other layers refuses the tile.
+                // A film with different layers rejects the tile.
                 assert!(Film::new(40, 3, None).expect("a film").restore_tile(tile, read()).is_err());
                 for film in [&whole, &restored] {
                     film.add_samples(tile, &samples(film, tile, 6, is_signed));

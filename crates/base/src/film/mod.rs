@@ -1,8 +1,8 @@
 //! Films (sums of samples), tone mapping and finished images.
 //!
-//! Integrators produce [`TileSamples`], which a [`Film`] sums in f64. Image files contain [`Film::radiance_image`].
-//! [`Previewer`] scales the film to screen size during rendering. [`tone::tone_map_to_8_bits`] converts the radiance or
-//! a preview to a [`Srgb8Image`].
+//! Integrators produce [`TileSamples`], which a [`Film`] sums in f64. Image files contain
+//! [`Film::radiance_image`]. [`Previewer`] scales the film to screen size during rendering.
+//! [`tone::tone_map_to_8_bits`] converts the radiance or a preview to an [`Srgb8Image`].
 //!
 //! Large images are processed on all threads of the caller's rayon pool, or on the calling thread outside a
 //! pool. The caller chooses the number of threads.
@@ -43,8 +43,8 @@ use crate::math::Vec3;
 /// Tile width and height in pixels: 1024 pixels at 40 bytes each fit in a core's L2 cache.
 pub const TILE_SIZE: u32 = 32;
 
-/// Cell width and height in pixels. Each cell of a tile is sampled according to its own noise. Smaller cells
-/// mean that fewer pixels are oversampled only because they are near an edge.
+/// Cell width and height in pixels. Each cell of a tile is sampled according to its own noise. With smaller
+/// cells, fewer pixels are oversampled merely because they are near an edge.
 pub const CELL_SIZE: u32 = 16;
 
 const CELLS_ACROSS: usize = (TILE_SIZE / CELL_SIZE) as usize;

@@ -6,7 +6,7 @@ use super::convergence::{ConvergenceModel, luminance};
 use super::{CELLS, Film, PixelSubset, SelectedPixels, is_in_thread_pool};
 
 /// Sample count at which the standard error drops to `part` times its value at `count` samples, if the
-/// variance falls with this power of the sample count.
+/// variance is proportional to the sample count raised to −`power`.
 pub fn total_samples_to_reduce_error(power: f64, part: f64, count: u32) -> u32 {
     (f64::from(count) * libm::pow(part, -2.0 / power)).ceil() as u32
 }
@@ -60,7 +60,8 @@ impl Film {
     /// pixels' luminance standard errors, divided by the image's mean luminance. The estimate is based on the
     /// changes caused by the latest samples.
     ///
-    /// About 0 if all samples of each pixel are equal. `None` if a pixel has fewer than two samples.
+    /// The result is about 0 if all samples of each pixel are equal, and `None` if a pixel has fewer than two
+    /// samples.
     pub fn relative_error(&self) -> Option<f64> {
         self.image_noise().map(|noise| noise.relative_error)
     }
@@ -76,9 +77,9 @@ impl Film {
             .filter(|noise| noise.relative_error.is_finite())
     }
 
-    /// Standard error of a complete image's mean luminance, assuming independent pixel errors. `None` for
-    /// crops, for photons (because they correlate the pixels' errors), and if a pixel has fewer than two
-    /// samples.
+    /// Standard error of a complete image's mean luminance, assuming independent pixel errors.
+    /// Returns `None` for crops, for photons (because they correlate the pixels' errors), and if a pixel has
+    /// fewer than two samples.
     pub fn mean_luminance_error(&self) -> Option<f64> {
         let is_whole = (self.crop_rect().width, self.crop_rect().height) == (self.width(), self.height());
         let is_apart = self.convergence == ConvergenceModel::Stratified;
@@ -118,7 +119,7 @@ impl Film {
         if is_in_thread_pool() { tiles.into_par_iter().map(f).collect() } else { tiles.map(f).collect() }
     }
 
-    /// Noise in one half of a cell. `None` if the half has no pixels or if a pixel has fewer than two
+    /// Noise in one half of a cell, or `None` if the half has no pixels or if a pixel has fewer than two
     /// samples.
     pub fn half_cell_noise(&self, number: usize, half: usize) -> Option<CellHalfNoise> {
         let tile = self.lock_tile(number / CELLS);
@@ -144,20 +145,21 @@ impl Film {
     }
 
     /// Factor by which the last doubling reduced a tile's variance, measured in the half-cells that have
-    /// completed that doubling. `None` if there are not enough steps.
+    /// completed that doubling, or `None` if there are not enough steps.
     pub fn last_doubling_variance_reduction(&self, tile: usize) -> Option<f64> {
         let tile = self.lock_tile(tile);
         tile.steps.measured_variance_reduction(tile.steps.level_count(), &[0, 1])
     }
 
     /// Expected relative standard deviation of a tile's variance, measured in one half of each cell: 1 if a
-    /// single pixel dominates, lower if many pixels contribute. Ignores cells with fewer samples than others.
+    /// single pixel dominates, lower if many pixels contribute. Ignores cells that have not completed the last
+    /// doubling.
     pub fn tile_variance_uncertainty(&self, tile: usize, half: usize) -> f64 {
         let tile = self.lock_tile(tile);
         tile.steps.variance_uncertainty(tile.steps.level_count(), &[half])
     }
 
-    /// Noise in one half of every cell in a tile. `None` under the same conditions as
+    /// Combined noise in one half of every cell in a tile. Returns `None` under the same conditions as
     /// [`Film::half_cell_noise`].
     pub fn noise_in_tile_half(&self, tile: usize, half: usize) -> Option<CellHalfNoise> {
         let (mut pixels, mut samples, mut sums) = (0.0, u32::MAX, NoiseSums::default());
@@ -175,10 +177,10 @@ impl Film {
         (pixels > 0.0).then_some(CellHalfNoise { variance, mean, samples, power })
     }
 
-    /// Relative error of a half-cell after the first `count` samples per pixel, and its convergence exponent.
-    /// `count` is a power of two. The error is the mean over the pixels of luminance variance / (luminance² +
-    /// [`RELMSE_EPSILON`](crate::math::color::RELMSE_EPSILON)). `None` if `count` is less than two or exceeds
-    /// the pixels' sample count, or if the half has no pixels.
+    /// Relative mean squared error of a half-cell after the first `count` samples per pixel, and its
+    /// convergence exponent. `count` must be a power of two. The error is luminance variance / (luminance² +
+    /// [`RELMSE_EPSILON`](crate::math::color::RELMSE_EPSILON)), averaged over the pixels. Returns `None` if
+    /// `count` is less than two or exceeds the pixels' sample count, or if the half has no pixels.
     pub fn half_cell_relative_error(&self, number: usize, half: usize, count: u32) -> Option<(f64, f64)> {
         let tile = self.lock_tile(number / CELLS);
         let pixels = self.cell_half_pixel_count(number, half);
@@ -320,8 +322,8 @@ mod tests {
         }
     }
 
-    /// A 64 × 64 pixel film and the true root-mean-square error of its pixel means. `sample` returns the
-    /// sample with this index for a pixel with these random bits. `truth` is the expected value.
+    /// A 64 × 64 pixel film and the true relative root-mean-square error of its pixel means. `sample` maps a
+    /// sample index and the pixel's random bits to a sample value. `truth` is the expected value.
     fn square(count: u32, truth: f64, mut sample: impl FnMut(u32, u32) -> f32) -> (Film, f64) {
         const SIDE: u32 = 64;
         let film = Film::new(SIDE, SIDE, None).expect("a film");

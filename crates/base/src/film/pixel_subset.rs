@@ -70,7 +70,7 @@ impl PixelSubset {
     }
 }
 
-/// Whether the right pixel of a pair is in the first half. This alternates every two rows.
+/// 0 if the left pixel of a pair is in the first half, 1 if the right pixel is. Alternates every two rows.
 #[inline(always)]
 fn first_half_offset_in_pair(pair: u32, width: u32) -> u32 {
     (pair / width) & 1

@@ -12,7 +12,7 @@ const PIXELS: u64 = 4096;
 /// Samples per prepass pixel.
 pub const PREPASS_SAMPLES: u32 = 16;
 
-/// Brightness prepass for an image or crop.
+/// Pixels of the brightness prepass for an image or crop.
 #[derive(Clone, Copy, Debug)]
 pub struct BrightnessPrepassPixels {
     crop: Rect,
@@ -29,8 +29,8 @@ impl BrightnessPrepassPixels {
         PIXELS.min(self.crop.area() as u64)
     }
 
-    /// Column and row of a prepass pixel. The row-major pixels are divided into `count` equal runs, and one
-    /// pixel is chosen pseudo-randomly from each.
+    /// Column and row of a prepass pixel. The crop's pixels, in row-major order, are divided into as many
+    /// equal runs as there are prepass pixels, and one pixel is chosen pseudo-randomly from each run.
     pub fn pixel_position(&self, number: u64) -> (u32, u32) {
         let (area, count) = (self.crop.area() as u64, self.pixel_count().max(1));
         let (start, end) = (number * area / count, (number + 1) * area / count);
@@ -53,8 +53,8 @@ impl BrightnessPrepassPixels {
         sum.map(|sum| sum / self.pixel_count() as f64)
     }
 
-    /// Luminance of a prepass pixel computed from its samples, with the same rounding as in a film. `None` if
-    /// there are no samples.
+    /// Luminance of a prepass pixel computed from its samples, with the same rounding as in a film, or `None`
+    /// if there are no samples.
     pub fn luminance_from_samples(mut samples: TileSamples) -> Option<f64> {
         let rect = Rect { x: 0, y: 0, width: 1, height: 1 };
         samples.pixels = rect.into();

@@ -52,12 +52,12 @@ const BAND_ROWS: u32 = 32;
 const TILES_AT_ONCE: usize = 32;
 
 impl Previewer {
-    /// Creates a previewer for images of this size, which must be at least one pixel.
+    /// Creates a radiance previewer of this size. A width or height of 0 is treated as 1.
     pub fn new(width: u32, height: u32) -> Self {
         Self::for_quantity(FilmQuantity::Radiance, width, height)
     }
 
-    /// Creates a previewer that shows this quantity.
+    /// Creates a previewer of this size that shows `quantity`.
     pub fn for_quantity(quantity: FilmQuantity, width: u32, height: u32) -> Self {
         let (width, height) = (width.max(1), height.max(1));
         Self { quantity, width, height, film_id: None, shares: Vec::new(), next: 0, is_whole: false }
@@ -79,8 +79,8 @@ impl Previewer {
         (cells * size_of::<WeightedColor>() + self.shares.capacity() * size_of::<TileContribution>()) as u64
     }
 
-    /// Whether every tile of the film has been processed at least once. If so, [`Previewer::build_image`] has no
-    /// gaps but may be slightly outdated.
+    /// Whether every tile of the film has been processed at least once. If so, the result of
+    /// [`Previewer::build_image`] has no gaps but may be slightly outdated.
     pub fn has_processed_all_tiles(&self) -> bool {
         self.is_whole
     }

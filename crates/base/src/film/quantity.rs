@@ -47,7 +47,7 @@ impl Film {
         image
     }
 
-    /// One pixel of [`Film::image`]. `None` if it has no samples or is outside the crop.
+    /// One pixel of [`Film::image`], or `None` if it has no samples or is outside the crop.
     pub fn pixel(&self, quantity: FilmQuantity, x: u32, y: u32) -> Option<Vec3> {
         let Rect { x: left, y: top, width, height } = self.crop_rect();
         let (right, down) = (x.checked_sub(left)?, y.checked_sub(top)?);
@@ -65,7 +65,7 @@ impl Film {
 }
 
 impl Tile {
-    /// Value of a quantity at pixel `index` of a tile with `columns` columns. `None` if the pixel has no
+    /// Value of a quantity at pixel `index` of a tile with `columns` columns, or `None` if the pixel has no
     /// samples.
     pub(super) fn value(&self, quantity: FilmQuantity, (index, columns): (usize, usize)) -> Option<DVec3> {
         match quantity {
@@ -77,7 +77,8 @@ impl Tile {
         }
     }
 
-    /// Standard error of a pixel's luminance. 0 for a single sample, from which no error can be estimated.
+    /// Standard error of a pixel's luminance: 0 for a single sample, which is not enough for an estimate, and
+    /// `None` without samples.
     fn standard_error(&self, index: usize, columns: usize) -> Option<f64> {
         let count = self.sample_count(index);
         let rows = self.counts.len() / columns.max(1);

@@ -1,5 +1,5 @@
-//! Range mapping, which maps data without an inherent brightness (distances, counts) to brightness, based on
-//! the range of values in view.
+//! Range mapping, which converts data without an inherent brightness (distances, counts) to brightness, based
+//! on the range of values in view.
 
 use super::RadianceImage;
 use crate::math::Vec3;
@@ -10,7 +10,8 @@ pub enum RangeMap {
     /// Leaves the values unchanged.
     #[default]
     None,
-    /// A mapping whose range is unknown until [`RangeMap::with_image_range`] sets it. Maps everything to black.
+    /// A mapping whose range is unknown until [`RangeMap::with_image_range`] sets it. Maps everything to
+    /// black.
     Unresolved(DataKind),
     /// A mapping for values in this range.
     Resolved(DataKind, DataRange),
@@ -101,10 +102,10 @@ impl DataRange {
         [self.least, self.greatest]
     }
 
-    /// Position of a value in the range, from 0 to 1. Linear if the median value in view is above the first
-    /// quarter of the range. Otherwise uses the curve x/(x + b(1 − x)), which maps the median to the end of
-    /// the first quarter (Schlick, *Fast Alternatives to Perlin's Bias and Gain Functions*, Graphics Gems IV,
-    /// 1994). Objects therefore keep distinct shades in front of a plane that extends to the horizon.
+    /// Position of a value in the range, from 0 to 1. The mapping is linear if the median value in view is
+    /// above the first quarter of the range. Otherwise it is the curve x/(x + b(1 − x)), which maps the median
+    /// to ¼ (Schlick, *Fast Alternatives to Perlin's Bias and Gain Functions*, Graphics Gems IV, 1994).
+    /// Objects therefore keep distinct shades in front of a plane that extends to the horizon.
     fn position_in_range(&self, number: f32) -> f32 {
         let range = self.greatest - self.least;
         let x = if range > 0.0 { ((number - self.least) / range).clamp(0.0, 1.0) } else { 0.0 };

@@ -18,8 +18,8 @@ impl AxisResampler {
         Self { from: u64::from(from.max(1)), to: u64::from(to.max(1)) }
     }
 
-    /// New pixels that overlap the old pixel `index`, each with the amount of overlap. Lengths are in units
-    /// of 1/(from·to) of the axis, so every overlap is an exact integer.
+    /// Target pixels that overlap source pixel `index`, each with the length of the overlap. Lengths are in
+    /// units of 1/(from·to) of the axis, so every overlap is an exact integer.
     pub(super) fn overlapping_target_pixels(self, index: u32) -> impl Iterator<Item = (u32, f64)> + Clone {
         let (start, end) = (u64::from(index) * self.to, (u64::from(index) + 1) * self.to);
         (start / self.from..end.div_ceil(self.from)).map(move |new| {

@@ -1,4 +1,4 @@
-//! Binary serialization of film tiles: little-endian numbers, pixel by pixel.
+//! Binary serialization of film tiles as arrays of little-endian numbers.
 
 use std::sync::atomic::Ordering;
 

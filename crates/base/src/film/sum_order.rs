@@ -36,7 +36,8 @@ impl SumOrder {
         }
     }
 
-    /// Index of the block sum that receives the block ending at `count` samples, or `None` within a block.
+    /// Index of the block sum that receives the block ending at `count` samples, or `None` if no block ends
+    /// there.
     pub(super) fn block_ending_at(self, count: u32) -> Option<usize> {
         let is_end = count > 0 && count.is_multiple_of(BLOCK_SIZE);
         match self {

@@ -93,7 +93,7 @@ pub(super) struct Tile {
     pub(super) counts: Vec<u32>,
     /// Sums of finished sample blocks: none, one for all blocks, or one per block; see [`SumOrder`].
     pub(super) earlier: Vec<Vec<DVec3>>,
-    /// Sums of the samples in the filter's negative lobes. `None` until there is such a sample.
+    /// Sums of the samples in the filter's negative lobes. `None` until the first such sample.
     pub(super) negative: Option<NegativeLobeSums>,
     pub(super) steps: SquaredMeanChanges,
     pub(super) layers: LayerSums,
@@ -120,7 +120,7 @@ impl NegativeLobeSums {
 }
 
 impl Tile {
-    /// Mean of a pixel's samples. `None` if the pixel has no samples.
+    /// Mean of a pixel's samples, or `None` if the pixel has no samples.
     #[inline]
     pub(super) fn mean(&self, index: usize) -> Option<DVec3> {
         self.signed_mean(
@@ -130,8 +130,8 @@ impl Tile {
         )
     }
 
-    /// Mean of a pixel's samples, weighted by sign if the filter has negative lobes, from the sums of the
-    /// samples outside and inside these lobes. `None` if the pixel has no samples.
+    /// Combines a pixel's sums into its mean: `sum` over the samples outside the filter's negative lobes, and
+    /// `negative_sum` over the samples inside them. Returns `None` if the pixel has no samples.
     #[inline(always)]
     pub(super) fn signed_mean(
         &self,
@@ -243,8 +243,8 @@ impl Film {
     /// Creates an empty film for an image of this size, or for the part covered by `crop`.
     ///
     /// # Errors
-    /// [`FilmCreationError`] if the crop is outside the image, or if there is not enough memory for the sums and the
-    /// finished image.
+    /// [`FilmCreationError`] if the crop is outside the image, or if there is not enough memory for the sums
+    /// and the finished image.
     pub fn new(width: u32, height: u32, crop: Option<Rect>) -> Result<Self, FilmCreationError> {
         Self::with_memory_limit(u64::MAX, width, height, crop)
     }

@@ -43,7 +43,7 @@ pub enum Transfer {
 /// Maps radiance to display values.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ToneMapping {
-    /// Exposure in stops: radiance is multiplied by 2 to this power.
+    /// Exposure in stops: radiance is multiplied by 2 raised to this power.
     pub exposure_stops: f32,
     /// Tone curve, which is applied after exposure and returns values in [0, 1].
     pub curve: Tonemap,
@@ -59,7 +59,7 @@ const BRIGHTEST: f32 = 1e10;
 const PARALLEL_PIXELS: usize = 1 << 18;
 
 impl ToneMapping {
-    /// Tone mapping for data images, which already contain display values. Only clamps.
+    /// Tone mapping for data images, which already contain display values: it only clamps them.
     pub const DATA: Self = Self {
         exposure_stops: 0.0,
         curve: Tonemap::None,
@@ -165,7 +165,7 @@ mod tests {
         let red = tone(Tonemap::Reinhard).apply(Vec3::X);
         assert!((red - Vec3::X / 1.2126).abs().max_element() < 1e-6);
         assert!((gray(Tonemap::Aces, 1.0) - 2.54 / 3.16).abs() < 1e-6);
-        // Middle gray is the sigmoid's pivot, ½ on a display with gamma 2.2.
+        // Middle gray is at the sigmoid's pivot, whose value of ½ is linearized with a gamma of 2.2.
         assert!((gray(Tonemap::Agx, 0.18) - 0.5_f32.powf(2.2)).abs() < 1e-3);
     }
 

@@ -102,8 +102,8 @@ fn guide_table(sums: &[f32]) -> impl Iterator<Item = u32> {
     })
 }
 
-/// Finds the last interval that starts at or before `u`, searching forward from `place`. It is usually
-/// `place` or the next interval, so the first two steps avoid unpredictable branches.
+/// Finds the last interval that starts at or before `u`, searching forward from `place`. The result is
+/// usually `place` or the next interval, so the first two steps avoid unpredictable branches.
 #[inline(always)]
 fn find_interval_forward(sums: &[f32], mut place: usize, u: f32) -> usize {
     for _ in 0..2 {

@@ -18,7 +18,7 @@ pub enum Dimension {
     LightChoice,
     /// Position on the chosen light.
     ChosenLight,
-    /// Choice of which picked lights are tested with shadow rays.
+    /// Choice of the sampled lights that are tested with shadow rays.
     ShadowRayChoice,
     /// Choice between reflection and refraction.
     Fresnel,
@@ -167,8 +167,8 @@ fn reversed_bits_to_unit(bits: u32) -> f32 {
     (bits.reverse_bits() >> 8) as i32 as f32 * (1.0 / (1 << 24) as f32)
 }
 
-/// Bit-reversed second Sobol coordinate. Bit j is the sum (mod 2) of the index bits k with odd C(k, j), which
-/// means that k has every bit of j set. The bit-reversed first coordinate is the index itself.
+/// Bit-reversed second Sobol coordinate. Bit j is the sum (mod 2) of the index bits k for which C(k, j) is
+/// odd, that is, for which k has every bit of j set. The bit-reversed first coordinate is the index itself.
 #[inline(always)]
 fn reversed_second_sobol(mut bits: u32) -> u32 {
     for (shift, lacking) in
@@ -295,7 +295,7 @@ mod tests {
             }
         }
         let count = f64::from(n);
-        // Five standard errors, which are 1/√(12n) and 1/√n.
+        // Allow five standard errors: 1/√(12n) for the means and 1/√n for the mean product.
         assert!(sums.iter().all(|sum| (sum / count - 0.5).abs() < 5.0 / (12.0 * count).sqrt()), "{sums:?}");
         assert!((product / count).abs() < 5.0 / count.sqrt(), "{product}");
     }

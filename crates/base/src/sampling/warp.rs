@@ -12,7 +12,7 @@ pub fn disk(u: Vec2) -> Vec2 {
     let offset = u * 2.0 - Vec2::ONE;
     let is_wide = offset.x.abs() > offset.y.abs();
     let (radius, across) = if is_wide { (offset.x, offset.y) } else { (offset.y, offset.x) };
-    // Both are 0 at the center.
+    // `radius` and `across` are 0 at the center.
     let part = FRAC_PI_4 * (across / if radius == 0.0 { 1.0 } else { radius });
     let (sin, cos) = sin_cos(if is_wide { part } else { FRAC_PI_2 - part });
     Vec2::new(cos, sin) * radius

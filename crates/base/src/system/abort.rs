@@ -115,7 +115,8 @@ fn end_with_message(words: Arguments<'_>) -> ! {
     let mut message = MessageBuffer::default();
     // Truncate messages that do not fit.
     let _ = writeln!(message, "{words}");
-    // SAFETY: standard error stays open for the lifetime of the process; otherwise, the write fails.
+    // SAFETY: standard error stays open for the lifetime of the process. If it were closed, the write would
+    // fail.
     let _ = write(unsafe { BorrowedFd::borrow_raw(nix::libc::STDERR_FILENO) }, message.bytes());
     low_level::exit(FAILED)
 }

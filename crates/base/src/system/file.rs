@@ -53,8 +53,8 @@ pub fn file_kind(path: &Path) -> io::Result<(FileKind, Metadata)> {
     Ok((FileKind::from_metadata(path, &metadata), metadata))
 }
 
-/// File metadata for detecting changes. It changes when the file is replaced and with every write, except if
-/// two writes have the same timestamp.
+/// File metadata for detecting changes. It changes whenever the file is replaced or written, unless two writes
+/// have the same timestamp.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FileStamp {
     device: u64,
@@ -68,7 +68,7 @@ pub struct FileStamp {
 }
 
 impl FileStamp {
-    /// Time of the last change to the content or metadata. `None` for times before 1970.
+    /// Time of the last change to the content or metadata, or `None` if it is before 1970.
     pub fn last_content_or_metadata_change(&self) -> Option<SystemTime> {
         let (seconds, nanoseconds) = self.modified.max(self.changed);
         let since_1970 = Duration::new(seconds.try_into().ok()?, nanoseconds.try_into().ok()?);
@@ -86,8 +86,8 @@ impl FileStamp {
         }
     }
 
-    /// Returns the stamp for the file at `path`, following symbolic links. `None` if it does not exist or its
-    /// metadata cannot be read.
+    /// Returns the stamp of the file at `path`, following symbolic links, or `None` if the file does not exist
+    /// or its metadata cannot be read.
     pub fn from_path(path: &Path) -> Option<Self> {
         fs::metadata(path).ok().map(|metadata| Self::new(&metadata))
     }

@@ -32,21 +32,21 @@ pub fn try_reserve_exact<T>(vec: &mut Vec<T>, additional: usize) -> Result<(), T
 /// The control group's limit, once [`set_rlimit_from_cgroup`] has applied it.
 static APPLIED_LIMIT: OnceLock<MemoryLimit> = OnceLock::new();
 
-/// Makes allocations fail that exceed the memory limit of the control group. Otherwise, the kernel would kill
-/// the process without a message. `stacks` is the size of the thread stacks, which count in full but are hardly
-/// used. They are added to the limit, up to an eighth.
+/// Makes allocations that exceed the control group's memory limit fail. Otherwise, the kernel would kill the
+/// process without a message. `stacks` is the total size of the thread stacks, which count in full although
+/// they are hardly used. They are therefore added to the limit, up to an eighth of it.
 pub fn set_rlimit_from_cgroup(stacks: u64) {
     let Some(limit) = current_cgroup_limit() else { return };
     let Ok((soft, hard)) = getrlimit(Resource::RLIMIT_DATA) else { return };
     let bytes = limit.bytes.saturating_add(stacks.min(limit.bytes / 8));
     if bytes < soft && setrlimit(Resource::RLIMIT_DATA, bytes, hard).is_ok() {
-        // Another value means that this was called twice.
+        // Setting the limit fails only if an earlier call has set it.
         let _ = APPLIED_LIMIT.set(limit);
     }
 }
 
-/// Returns the setting that prevents this process from mapping `bytes` more bytes of memory. `None` if there
-/// is enough room.
+/// Returns the setting that prevents this process from mapping `bytes` more bytes of memory, or `None` if
+/// there is enough room.
 pub fn limit_preventing_mapping(bytes: u64) -> Option<&'static str> {
     let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
     let limits = [
@@ -78,7 +78,7 @@ pub struct MemoryLimit {
     pub setting: String,
 }
 
-/// Lowest memory limit set by `ulimit -v` or a control group. `None` if memory is unlimited.
+/// Lowest memory limit set by `ulimit -v` or a control group, or `None` if memory is unlimited.
 pub fn memory_limit() -> Option<MemoryLimit> {
     let of_space =
         getrlimit(Resource::RLIMIT_AS).ok().map(|(bytes, _)| bytes).filter(|bytes| *bytes < RLIM_INFINITY);
@@ -86,7 +86,7 @@ pub fn memory_limit() -> Option<MemoryLimit> {
     of_space.into_iter().chain(current_cgroup_limit()).min_by_key(|limit| limit.bytes)
 }
 
-/// Lowest limit among this process's control groups. `None` if memory is unlimited.
+/// Lowest limit among this process's control groups, or `None` if memory is unlimited.
 #[cold]
 fn current_cgroup_limit() -> Option<MemoryLimit> {
     let groups = fs::read_to_string("/proc/self/cgroup").unwrap_or_default();

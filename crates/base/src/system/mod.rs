@@ -1,5 +1,5 @@
-//! Operating system access: error messages, printable characters, regular files, thread priorities, CPU time
-//! and abort handling.
+//! Operating system access: files, folders, memory limits, threads and their priorities, CPU time, machine
+//! identity, error messages, printable characters and abort handling.
 
 #[allow(unsafe_code)]
 pub mod abort;
@@ -34,7 +34,7 @@ pub fn describe_error(error: &Error) -> String {
     }
 }
 
-/// Advice for errors from [`is_too_many_open_files`].
+/// Advice for errors recognized by [`is_too_many_open_files`].
 pub const RAISE_FILE_LIMIT: &str = "raise the limit on open files (ulimit -n)";
 
 /// Whether too many files are open in the process or the system. Opening another file would also fail.

@@ -1,4 +1,4 @@
-//! Starts threads, and explains why the system cannot start them.
+//! Starts threads and explains why the system cannot start them.
 
 use std::fmt::Display;
 use std::io::{Error, Result};
@@ -24,12 +24,12 @@ pub fn spawn<T: Send + 'static>(
     Builder::new().name(name.to_owned()).spawn(work)
 }
 
-/// Number of cores.
+/// Number of logical CPUs available to this process.
 pub fn logical_cpu_count() -> usize {
     available_parallelism().map_or(1, NonZero::get)
 }
 
-/// Starts a pool with one thread per core.
+/// Starts a pool with one thread per logical CPU.
 ///
 /// # Errors
 /// Returns the message from [`describe_start_failure`].
@@ -52,7 +52,7 @@ pub fn check_thread_stack_memory(threads: usize) -> Result<()> {
     }
 }
 
-/// Setting whose limit leaves no room for the stacks of `threads` more threads.
+/// Setting whose limit leaves no room for the stacks of `threads` more threads, or `None` if they fit.
 fn limit_exhausted_by_thread_stacks(threads: usize) -> Option<&'static str> {
     memory::limit_preventing_mapping((threads as u64).saturating_mul(STACK_BYTES))
 }

@@ -35,7 +35,7 @@ pub enum Quantity {
 }
 
 /// Compares the scenes, methods and steps that occur in both runs. Matches scenes by name and size, methods
-/// by name, and steps by sample count.
+/// by name, and steps by sample count or time budget.
 pub fn compare_runs(then: &Results, now: &Results) -> Vec<MethodChange> {
     let mut changes = Vec::new();
     for scene in &now.scenes {
@@ -88,7 +88,7 @@ fn method_change(
     })
 }
 
-/// The baseline's step with the same samples or time.
+/// The baseline's step with the same sample count or time budget.
 fn matching_step<'a>(step: &StepResult, then: &'a [StepResult]) -> Option<&'a StepResult> {
     then.iter().find(|old| match (step.budget, old.budget) {
         (None, None) => old.samples == step.samples,
@@ -97,7 +97,7 @@ fn matching_step<'a>(step: &StepResult, then: &'a [StepResult]) -> Option<&'a St
 }
 
 /// Difference between two steps' mean log times or mean log errors, with its standard error and degrees of
-/// freedom. `None` if a step has fewer than two positive values.
+/// freedom, or `None` if a step has fewer than two positive values.
 fn estimate_log_difference(
     then: &StepResult,
     now: &StepResult,
@@ -114,7 +114,7 @@ fn estimate_log_difference(
     if old.len() < 2 || new.len() < 2 {
         return None;
     }
-    // Identical images have identical errors, and the difference is exactly 0.
+    // Identical images have identical errors, so the difference is exactly 0.
     if old == new { Some((0.0, 0.0, 1.0)) } else { Some(welch_difference(&old, &new)) }
 }
 

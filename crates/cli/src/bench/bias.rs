@@ -1,8 +1,8 @@
-//! Bias of a method: the error that images with different seeds share, but the references do not.
+//! Bias of a method: the error shared by images with different seeds, but not by the references.
 //!
 //! The mean of (xᵢ − r₁)(xⱼ − r₂) over all pairs of different seeds estimates the squared bias because the
-//! noise in all four images is independent. Its standard error is estimated from the variance of the pairs,
-//! from the jackknife over seeds, and from the noise of the references.
+//! noise in all four images is independent. The standard error of this estimate combines the noise of the
+//! references with the variance over pairs or the jackknife variance over seeds, whichever is larger.
 
 use serde::{Deserialize, Serialize};
 
@@ -35,7 +35,8 @@ impl SquaredBias {
     }
 }
 
-/// Estimates the bias from images with different seeds. `None` for fewer than [`MIN_SEEDS`].
+/// Estimates the squared bias from images with different seeds, or returns `None` if there are fewer than
+/// [`MIN_SEEDS`].
 pub fn estimate_bias(references: &ReferencePair, pictures: &[RadianceImage]) -> Option<SquaredBias> {
     if pictures.len() < MIN_SEEDS {
         return None;
@@ -55,7 +56,7 @@ pub fn estimate_bias(references: &ReferencePair, pictures: &[RadianceImage]) -> 
     })
 }
 
-/// Products of errors, for all pairs of images.
+/// Error products of all pairs of images.
 struct PairwiseErrorProducts {
     count: usize,
     /// The indices of two images and the product of their errors.

@@ -17,7 +17,7 @@ use crate::output::write::WritePolicy;
 use crate::output::{AttributeLossPolicy, OutputError, staged, write};
 use crate::scene::fingerprint::{Fingerprint, FingerprintHasher};
 
-/// Returns the cache folder for references, inside `XDG_CACHE_HOME` or `~/.cache`. `None` if neither
+/// Returns the cache folder for references, inside `XDG_CACHE_HOME` or `~/.cache`, or `None` if neither
 /// `XDG_CACHE_HOME` nor `HOME` is set.
 pub fn cache_folder() -> Option<PathBuf> {
     let absolute = |name: &str| std::env::var_os(name).map(PathBuf::from).filter(|path| path.is_absolute());
@@ -28,7 +28,7 @@ pub fn cache_folder() -> Option<PathBuf> {
 /// Writes the starter scene to a file in a subfolder and returns the file's path. Never overwrites files.
 ///
 /// # Errors
-/// The folder or the file cannot be created, or a different file with this name exists.
+/// Returns an error if the folder or the file cannot be created, or if a different file with this name exists.
 pub fn write_starter_scene(folder: &Path) -> Result<PathBuf, OutputError> {
     let text = crate::scene::starter_scene().as_bytes();
     // Use one subfolder per version of the starter scene, because a scene file directly in the cache folder
@@ -90,7 +90,7 @@ struct CachedReferenceHeader {
 
 const KEY_BYTES: usize = 64;
 
-/// Loads the references stored under a key. `None` if the file is missing or damaged.
+/// Loads the references stored under a key, or returns `None` if the file is missing or damaged.
 pub(super) fn load(folder: &Path, key: &Fingerprint) -> Option<ReferencesWithCost> {
     let bytes = fs::read(cache_file_path(folder, key)).ok()?;
     let (content, seal) = bytes.split_at_checked(bytes.len().checked_sub(KEY_BYTES)?)?;
@@ -115,7 +115,7 @@ pub(super) fn load(folder: &Path, key: &Fingerprint) -> Option<ReferencesWithCos
 /// Stores references under a key.
 ///
 /// # Errors
-/// The folder cannot be created or the file cannot be written.
+/// Returns an error if the folder cannot be created or the file cannot be written.
 pub(super) fn store(
     folder: &Path,
     key: &Fingerprint,

@@ -32,7 +32,7 @@ pub struct Method {
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct MethodDedupKey {
     integrator: Integrator,
-    /// Photons and shadows. `None` for path tracing, which ignores both.
+    /// Photons and shadows, or `None` for path tracing, which ignores these settings.
     of_whitted: Option<(bool, ShadowMode)>,
     clamp: f32,
     accel: Accel,

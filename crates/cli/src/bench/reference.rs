@@ -51,15 +51,15 @@ impl ReferenceBudget {
         Self { samples, seconds: Some(seconds) }
     }
 
-    /// Whether cached references are good enough, because they have enough samples or took at least half of
-    /// the requested time.
+    /// Whether cached references are good enough: they have enough samples, or rendering them took at least
+    /// half of the requested time.
     fn is_met(self, cost: ReferenceCost) -> bool {
         cost.samples >= f64::from(self.samples)
             || self.seconds.is_some_and(|seconds| cost.seconds >= 0.5 * seconds)
     }
 }
 
-/// A scene's references, and a warning if they could not be cached.
+/// A scene's references, with the warnings and errors from rendering and caching them.
 pub(super) struct SceneReferences {
     pub(super) two: ReferencePair,
     pub(super) result: ReferenceResult,
@@ -184,7 +184,7 @@ impl ReferenceRenderer<'_> {
 }
 
 /// The cache key of the references. It depends on the build, because builds may render differently, and on
-/// whether samples or time limit the references.
+/// the requested sample count, which is 0 if time limits the references.
 fn cache_key(
     build: &str,
     asked: Option<u32>,

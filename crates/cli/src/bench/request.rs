@@ -29,7 +29,7 @@ pub struct BenchRequest {
     pub seeds: u32,
     /// Seed of the first image.
     pub seed: u32,
-    /// Where the references come from.
+    /// Source of the references.
     pub reference: ReferenceSource,
     /// Time limit in seconds if neither samples nor times are specified.
     pub within: f64,
@@ -51,7 +51,7 @@ pub enum StepSchedule {
     Seconds(Vec<f64>),
 }
 
-/// Where the references come from.
+/// Source of the references.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub enum ReferenceSource {
     /// Path traced in the available time, with up to 100 times the largest requested sample count.
@@ -106,7 +106,7 @@ pub enum BenchError {
     Failed(Failure),
     /// The arguments are invalid. Contains a message with a hint.
     Call(String),
-    /// The benchmark was cancelled.
+    /// The benchmark was canceled.
     Cancelled,
 }
 

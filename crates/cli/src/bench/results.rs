@@ -41,10 +41,10 @@ pub struct SceneResult {
 /// A scene's references.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ReferenceResult {
-    /// Samples per pixel of each reference. `None` for files.
+    /// Samples per pixel of each reference, or `None` if the references are files.
     pub samples: Option<f64>,
-    /// relMSE of each reference, estimated from the difference between the two references. 0 if both are the
-    /// same file.
+    /// relMSE of each reference, estimated from the difference between the two references, or 0 if both are
+    /// the same file.
     pub noise: f64,
     /// Seconds spent rendering both references, possibly in an earlier run.
     pub seconds: Option<f64>,
@@ -88,9 +88,9 @@ pub struct StepResult {
     pub spread: [f64; 2],
     /// Standard error that reference noise adds to each relMSE.
     pub uncertainty: f64,
-    /// The estimated bias. `None` if there are too few images.
+    /// The estimated bias, or `None` if there are too few images.
     pub bias: Option<SquaredBias>,
-    /// Difference in brightness between the images and the references. `None` if there are too few images.
+    /// Difference in brightness between the images and the references, or `None` if there are too few images.
     #[serde(default)]
     pub brightness: Option<BrightnessDifference>,
     /// The individual images.

@@ -28,8 +28,8 @@ const LONG_SIDE: u32 = 96;
 /// Runs a benchmark. Checks all scenes before measuring the first one.
 ///
 /// # Errors
-/// A scene or the arguments are invalid, or the benchmark failed or was cancelled. The error contains the
-/// results of completed scenes.
+/// Returns an error if a scene or an argument is invalid, or if the benchmark fails or is canceled. The error
+/// contains the results of the completed scenes.
 pub fn run(
     order: &BenchRequest,
     token: &CancelToken,

@@ -13,8 +13,8 @@ pub struct Slope {
     pub error: f64,
 }
 
-/// Returns the mean slope of independent series of (time, error) points. Skips errors that are zero or
-/// negative. `None` if no series has two points at different times.
+/// Returns the mean slope of independent series of (time, error) points, or `None` if no series has two
+/// points at different times. Skips errors that are zero or negative.
 pub fn mean_loglog_slope(series: &[Vec<(f64, f64)>]) -> Option<Slope> {
     let slopes: Vec<f64> = series.iter().filter_map(|points| fit_loglog_slope(points)).collect();
     let (value, error) = mean_and_standard_error(&slopes);
@@ -36,8 +36,8 @@ fn fit_loglog_slope(points: &[(f64, f64)]) -> Option<f64> {
 }
 
 /// Returns the time at which the error reaches `target`, interpolated linearly on log–log axes or
-/// extrapolated from the last two points. `None` if the first error is below the target, the error does not
-/// decrease, or the time is more than 1000 times the last measured time.
+/// extrapolated from the last two points. Returns `None` if the first error is below the target, if the error
+/// does not decrease, or if the time is more than 1000 times the last measured time.
 pub fn interpolate_time_to_error(target: f64, points: &[(f64, f64)]) -> Option<TimeToError> {
     let after = points.iter().position(|(_, error)| *error <= target);
     let (index, is_measured) = match after {

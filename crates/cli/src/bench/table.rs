@@ -76,7 +76,8 @@ fn format_sample_count(samples: f64) -> String {
     if samples.fract() == 0.0 { format!("{samples:.0}") } else { format!("{samples:.1}") }
 }
 
-/// Formats an error with three digits. Negative errors and 0 are below the noise of the references.
+/// Formats an error with three digits. Errors of 0 or less, which are below the noise of the references, are
+/// shown as ≈ 0.
 pub(super) fn format_error_or_near_zero(value: f64) -> String {
     if value > 0.0 { format!("{value:.2e}") } else { "≈ 0".to_owned() }
 }

@@ -12,7 +12,7 @@ pub(super) struct TimeBudget {
     /// Number of unfinished scenes.
     scenes: usize,
     methods: usize,
-    /// Planned end of the current scene, in seconds since the start.
+    /// Planned end of the current scene, in seconds since the start of the benchmark.
     scene_end: f64,
     /// Duration of the previous scene in seconds.
     last_scene: Option<f64>,

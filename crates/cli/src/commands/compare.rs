@@ -90,7 +90,7 @@ struct ErrorImageOutput<'a> {
 }
 
 impl<'a> ErrorImageOutput<'a> {
-    /// Reports errors that can be detected before the measurement.
+    /// Creates the output, and reports errors that can be detected before the measurement.
     fn try_from_args(path: &'a Path, args: &CompareArgs, console: &Console) -> Result<Self, Exit> {
         let format =
             Format::from_path(path).map_err(|error| console.print_error(Exit::WRONG, &error.to_string()))?;

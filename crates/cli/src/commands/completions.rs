@@ -72,7 +72,7 @@ pub(crate) fn run(shell: Shell, console: &Console) -> Exit {
     }
 }
 
-/// Responds to a call from a completion script. `None` for any other call.
+/// Responds to a call from a completion script, or returns `None` for any other call.
 pub(crate) fn answer_completion_request(arguments: &[OsString]) -> Option<Exit> {
     std::env::var_os(VARIABLE)?;
     let folder = std::env::current_dir().ok();

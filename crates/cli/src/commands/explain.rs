@@ -53,7 +53,7 @@ fn overview() -> String {
     all_tables().iter().map(line).collect()
 }
 
-/// Describes the key, type or table at this path. `None` if the path is unknown.
+/// Describes the key, type or table at this path, or returns `None` if the path is unknown.
 fn explain_path(path: &str) -> Option<String> {
     let parts: Vec<&str> = path.split('.').collect();
     let found = |all: Vec<(String, &KeyInfo)>| match all.as_slice() {

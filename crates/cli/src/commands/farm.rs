@@ -46,7 +46,7 @@ fn has_only_visible_chars(word: &str) -> bool {
 /// Parses the render options.
 ///
 /// # Errors
-/// An option is invalid or cannot be shared by all parts.
+/// Returns an error if an option is invalid or cannot be shared by all parts.
 fn parse_render_options(args: &FarmArgs) -> Result<RenderArgs, String> {
     let (program, scene) = ("glimt".to_owned(), disambiguate_path_argument(&args.scene));
     let words = [program, scene].into_iter().chain(args.options.iter().cloned());

@@ -28,7 +28,7 @@ pub(crate) fn run(args: &ImportArgs, console: &Console) -> Exit {
     Exit::from_signal(number)
 }
 
-/// Converts the file. Does not report an error if the token is cancelled.
+/// Converts the file. Does not report an error if the token is canceled.
 fn convert(args: &ImportArgs, console: &Console, token: &CancelToken) -> Exit {
     let scene = match &args.output {
         Some(output) => output.clone(),
@@ -79,7 +79,7 @@ fn has_scene_extension(scene: &Path) -> bool {
     scene.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("toml"))
 }
 
-/// Prints and counts all approximations.
+/// Prints all approximations and their number.
 fn report_approximations(file: &Path, notes: &[String], console: &Console) {
     let warning = |note: &String| Diagnostic {
         severity: Severity::Warning,

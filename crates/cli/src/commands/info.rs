@@ -30,7 +30,7 @@ pub(crate) fn run(args: &InfoArgs, console: &Console) -> Exit {
     if info.is_written_by_glimt() { Exit::DONE } else { Exit::FAILED }
 }
 
-/// Describes how a file was rendered. Returns only the format for image formats that cannot store settings.
+/// Reads how a file was rendered, or only the file's format if this format cannot store settings.
 ///
 /// # Errors
 /// Returns the same errors as [`read_image_info`].

@@ -54,7 +54,7 @@ fn report_signal(number: i32, console: &Console) -> Exit {
     Exit::from_signal(number)
 }
 
-/// A `merge` command.
+/// The context of a running `merge` command.
 struct MergeCommand<'a> {
     args: &'a MergeArgs,
     console: &'a Console,
@@ -218,7 +218,7 @@ impl MergeCommand<'_> {
         format!("{count} of {} parts{incomplete}", self.args.parts.len())
     }
 
-    /// Reports the parts on stderr, unless the same terminal shows the same text above the image.
+    /// Reports the parts on stderr, unless the terminal already shows the same text above the image.
     fn report_parts(&self, count: usize, unfinished: &[&Path], words: &str) {
         match self.args.progress {
             ProgressMode::None => {}
@@ -363,7 +363,7 @@ fn set_relative_scene_path(finish: &mut FilmEncodingSettings, parts: &[PartFile]
 /// A part that is not yet complete.
 struct AwaitedPart {
     path: PathBuf,
-    /// Length and modification time of the incomplete file. `None` if the file does not exist.
+    /// Length and modification time of the incomplete file, or `None` if the file does not exist.
     unfinished: Option<(u64, Option<SystemTime>)>,
 }
 
@@ -372,10 +372,10 @@ impl AwaitedPart {
         Self { path, unfinished: None }
     }
 
-    /// Opens the part. `None` if it is missing or incomplete.
+    /// Opens the part, or returns `None` if it is missing or incomplete.
     ///
     /// # Errors
-    /// The part is invalid.
+    /// Returns an error if the part is invalid.
     fn try_open(&mut self, token: &CancelToken) -> Result<Option<PartFile>, PartError> {
         let now = std::fs::metadata(&self.path).ok().map(|found| (found.len(), found.modified().ok()));
         // Do not read an unchanged file again.

@@ -67,7 +67,7 @@ pub(crate) fn run(file: &Path, with_schema: bool, console: &Console) -> Exit {
 /// Writes the schema next to a scene. Returns `false` if an identical file exists.
 ///
 /// # Errors
-/// A different file with this name exists, or the file cannot be written.
+/// Returns an error if a different file with this name exists, or if the file cannot be written.
 fn write_schema(path: &Path) -> Result<bool, (Exit, String)> {
     let text = schema::schema_text(SchemaDraft::Four);
     match write::create_new(path, text.as_bytes()) {
@@ -104,7 +104,7 @@ fn image_or_mesh_extension_error(file: &Path) -> Option<String> {
 }
 
 /// Quotes a file name for a shell and ensures that glimt does not mistake it for an option or a command.
-/// `None` if the name is not safe to print.
+/// Returns `None` if the name is not safe to print.
 fn quote_file_name(file: &Path) -> Option<String> {
     let name = file.to_str().filter(|name| escape_invisible_chars(name) == *name)?;
     let is_bare = !name.contains(['/', '.']) || name.starts_with('-');

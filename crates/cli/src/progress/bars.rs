@@ -114,7 +114,7 @@ fn format_bar_text(progress: &RenderProgress, time: Option<f64>, columns: usize)
     shorter.into_iter().find(|words| words.chars().count() <= room).unwrap_or_default()
 }
 
-/// Creates a style from a template. Falls back to the library's default.
+/// Creates a style from a template, or returns the library's default style if the template is invalid.
 pub(crate) fn bar_style_from_template(template: &str) -> ProgressStyle {
     ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar())
 }

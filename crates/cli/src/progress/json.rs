@@ -1,12 +1,12 @@
-//! One JSON object per line. Its first key, `event`, determines the other keys:
+//! Reports progress as one JSON object per line. The first key, `event`, determines the other keys:
 //!
 //! | event | keys |
 //! | --- | --- |
 //! | `stage` | `stage`, `status` (`running`, `done`, `reused`, `skipped`), `seconds`, `why` |
 //! | `asset` | `name`, `fraction` |
-//! | `progress` | `stage` (`render`), `fraction`, `elapsed_seconds`, `eta_seconds` (or null), `samples`, `total_samples`, `noise` (or null: `now`, and `next` with `level`, `seconds`, or null) |
+//! | `progress` | `stage` (`render`), `fraction`, `elapsed_seconds`, `eta_seconds` (or null), `samples`, `total_samples`, `noise` (null, or an object with `now` and `next`, which is null or has `level` and `seconds`) |
 //! | `written` | `path`, `bytes` |
-//! | `checkpoint` | `status` (`written`, `failed`, `resumed`, `absent`, `ignored`, `unused`, `finished`, `set_aside`), `path`, `message`, `samples`, or null |
+//! | `checkpoint` | `status` (`written`, `failed`, `resumed`, `absent`, `ignored`, `unused`, `finished`, `set_aside`), `path`, `message`, `samples` (each may be null) |
 //! | `write_failed` | `message`: the report or one of several images could not be written |
 //! | `done` | `unchanged`, `seconds`, `complete`, `diagnostics` |
 //! | `failed` | `kind` (`scene`, `work`), `message`, `diagnostics` |
@@ -137,8 +137,8 @@ pub(crate) fn failure_to_json(failure: &Failure) -> Value {
     }
 }
 
-/// Converts diagnostics as in `check --json`, and adds the key `path`: the same as `file`, or null if `file`
-/// is empty.
+/// Converts diagnostics as in `check --json`, and adds the key `path`, which equals `file` but is null if
+/// `file` is empty.
 fn diagnostics_to_json(all: &[Diagnostic]) -> Vec<Value> {
     let mut places = LineColumnLocator::default();
     let with_path = |one: &Diagnostic| {

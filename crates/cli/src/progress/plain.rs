@@ -1,4 +1,4 @@
-//! Prints occasional lines, for logs.
+//! Prints progress as occasional lines, for logs.
 
 use std::collections::HashSet;
 use std::time::{Duration, Instant};
@@ -34,7 +34,8 @@ impl PlainReporter {
         }
     }
 
-    /// Whether the asset is loaded for the first time. A file with several meshes is loaded once per mesh.
+    /// Returns true the first time an asset is fully loaded. A file with several meshes is loaded once per
+    /// mesh.
     fn mark_newly_loaded(&mut self, progress: &AssetProgress) -> bool {
         progress.done == progress.total && self.loaded.insert(progress.name.clone())
     }

@@ -36,7 +36,7 @@ pub struct FileMaterial {
     pub normal_texture: Option<FileTexture>,
     /// Scale factor for the normal map's slopes, ≥ 0. Set by the option `-bm`, 1 by default.
     pub normal_strength: f32,
-    /// Parameters of the PBR extension. `None` if the material has no PBR statements.
+    /// Parameters of the PBR extension, or `None` if the material has no PBR statements.
     pub physical: Option<PhysicalMaterial>,
 }
 
@@ -56,7 +56,8 @@ impl FileMaterial {
 
     /// Determines the kind of material. MTL illumination models 4, 6, 7 and 9 are glass, unless there is an
     /// opacity texture. Materials with PBR statements are principled. Of the rest, models 3, 5 and 8 with a
-    /// specular color are coated if [`Self::has_specular_coat`], and mirrors if not. All others are Phong materials.
+    /// specular color are either coated ([`Self::has_specular_coat`]) or mirrors. All others are Phong
+    /// materials.
     pub fn kind(&self) -> FileMaterialKind<'_> {
         match (self.illumination_model, &self.physical) {
             (Some(4 | 6 | 7 | 9), _) if self.opacity_texture.is_none() => FileMaterialKind::Glass,
@@ -115,8 +116,8 @@ impl FileMaterial {
         }
     }
 
-    /// Whether the specular reflection is a coat. It is one if there is a diffuse texture, or if the diffuse
-    /// color is stronger than the specular color.
+    /// Whether the specular reflection is a coat: there is a diffuse texture, or the diffuse color is
+    /// stronger than the specular color.
     pub fn has_specular_coat(&self) -> bool {
         self.diffuse_texture.is_some() || self.diffuse.max_element() > self.specular.max_element()
     }

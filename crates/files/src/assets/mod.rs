@@ -33,7 +33,7 @@ pub enum AssetError {
     Malformed {
         /// The file.
         path: PathBuf,
-        /// Line number, starting at 1. `None` for files without lines.
+        /// Line number, starting at 1, or `None` for files without lines.
         line: Option<usize>,
         /// The reason, as shown to the user.
         reason: String,
@@ -52,7 +52,7 @@ pub enum AssetError {
         /// The file.
         path: PathBuf,
     },
-    /// The work was cancelled.
+    /// The work was canceled.
     #[error("cancelled")]
     Cancelled(#[from] crate::control::Cancelled),
 }
@@ -93,7 +93,7 @@ pub type FileHash = [u8; 32];
 pub struct Companion {
     /// The file.
     pub path: PathBuf,
-    /// Hash of the bytes that were decoded. `None` if the file could not be read.
+    /// Hash of the bytes that were decoded, or `None` if the file could not be read.
     pub hash: Option<FileHash>,
     /// Stamp of the file, taken before it was read.
     pub stamp: Option<FileStamp>,

@@ -1,4 +1,4 @@
-//! Reads gKit orbiter files. They have five lines of text, each with a letter and numbers.
+//! Reads gKit orbiter files: five lines of text, each with a letter followed by numbers.
 //!
 //! ```text
 //! c 0 1 0          point that the camera looks at
@@ -28,8 +28,8 @@ const LIMIT: u64 = 1 << 20;
 /// gKit's default field of view and image size, for old files without an `f` line.
 const DEFAULT_FIELD: [f64; 3] = [45.0, 1024.0, 640.0];
 
-/// Reads an orbiter file. Returns the camera and the file's hash. The lines `c` and `s` are required. `p` and
-/// `r` default to 0, and `f` to 45 degrees at 1024 × 640 pixels.
+/// Reads an orbiter file and returns its camera and hash. The lines `c` and `s` are required; `p` and `r`
+/// default to 0, and `f` to 45 degrees at 1024 × 640 pixels.
 ///
 /// # Errors
 /// [`AssetError::Unreadable`], or [`AssetError::Malformed`] with the line if a letter is unknown, the number

@@ -1,4 +1,4 @@
-//! Reads regular files. Enforces a size limit, reports progress and can be cancelled.
+//! Reads regular files with a size limit, progress reports and cancellation.
 
 use std::fs::File;
 use std::io::{Read, Seek};
@@ -44,8 +44,8 @@ pub(crate) fn hash(bytes: &[u8]) -> FileHash {
     *blake3::hash(bytes).as_bytes()
 }
 
-/// Opens a regular file with at most `limit` bytes. Returns the file and its length. Rejects pipes, devices
-/// and folders without opening them, because opening a pipe may block.
+/// Opens a regular file of at most `limit` bytes and returns it with its length. Rejects pipes, devices and
+/// folders without opening them, because opening a pipe may block.
 pub(crate) fn open_regular_with_limit(path: &Path, limit: u64) -> Result<(File, u64), AssetError> {
     let unreadable = |error: std::io::Error| AssetError::from_io(path, &error);
     let refused = |kind: FileKind| AssetError::unreadable(path, not_regular_file_message(kind));
@@ -76,7 +76,8 @@ pub(crate) fn read_text(path: &Path, limit: u64, monitor: Monitor<'_>) -> Result
     })
 }
 
-/// Reads a text or binary file whose format starts with three letters.
+/// Reads a text or binary file in a format whose magic number starts with three letters. Rejects UTF-16 text
+/// and files with a zero among the first three bytes.
 pub(crate) fn read_rejecting_non_ascii_magic(
     path: &Path,
     limit: u64,
@@ -88,7 +89,7 @@ pub(crate) fn read_rejecting_non_ascii_magic(
     })
 }
 
-/// Reads a text or binary file. Rejects files that start with [`START`] zeros.
+/// Reads a text or binary file. Rejects files whose first [`START`] bytes are all zero.
 pub(crate) fn read_unless_zeros_at_start(
     path: &Path,
     limit: u64,
@@ -127,8 +128,8 @@ fn is_utf16(start: &[u8]) -> bool {
     }
 }
 
-/// Reads a regular file unless `accept` rejects its first [`START`] bytes. Reports progress in bytes, with a
-/// total of `2·length`. The second half is reserved for parsing.
+/// Reads a regular file unless `accept` rejects its first [`START`] bytes. Reports progress in bytes out of
+/// `2·length`; the second half is reserved for parsing.
 fn read_if_start_accepted(
     path: &Path,
     limit: u64,
@@ -144,7 +145,7 @@ fn read_if_start_accepted(
     read_rest(path, file, (length, limit), monitor)
 }
 
-/// Reads the rest of an open file that has about `length` bytes. Reports progress like [`read_bytes`].
+/// Reads the rest of an open file of about `length` bytes. Reports progress in the way [`read_bytes`] does.
 pub(crate) fn read_rest(
     path: &Path,
     file: File,
@@ -197,7 +198,7 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let token = CancelToken::new();
         let path = folder.path().join("zeros");
-        // A sparse 3 TiB file. Reading it completely would take an hour.
+        // A sparse file of 3 TiB, which would take an hour to read completely.
         File::create(&path).and_then(|file| file.set_len(3 << 40)).expect("a sparse file");
         for read in [read_text, read_rejecting_non_ascii_magic] {
             let error = rejection(read(&path, u64::MAX, monitor(&token)));

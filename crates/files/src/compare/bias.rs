@@ -1,4 +1,4 @@
-//! Bias: the brightness difference between an image and its reference, compared with the noise in both.
+//! Bias: the brightness difference between an image and its reference, compared with their noise.
 
 use super::ErrorMetrics;
 
@@ -15,7 +15,7 @@ pub struct Bias {
 }
 
 impl Bias {
-    /// Computes the bias. `standard_errors` contains the standard errors of both mean luminances, if known.
+    /// Computes the bias from the errors and the standard error of each image's mean luminance, if known.
     /// The noise of the two images must be independent.
     pub fn new(errors: &ErrorMetrics, standard_errors: [Option<f64>; 2]) -> Self {
         let [a, b] = errors.luminances;

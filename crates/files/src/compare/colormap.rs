@@ -4,8 +4,8 @@ use std::f64::consts::TAU;
 
 use crate::math::Vec3;
 
-/// Returns the linear Rec. 709 color for a value in [0, 1]. CIE lightness is proportional to the value. The
-/// Oklab hue (B. Ottosson, 2020) makes half a turn. Chroma peaks in the middle.
+/// Returns the linear Rec. 709 color for a value in [0, 1]. CIE lightness is proportional to the value, the
+/// Oklab hue (B. Ottosson, 2020) makes half a turn, and chroma peaks in the middle.
 pub(super) fn error_color(value: f64) -> Vec3 {
     const LIGHTEST: f64 = 95.0;
     const CHROMA: f64 = 0.19;

@@ -16,7 +16,7 @@ pub fn absolute_difference(pair: &Pair) -> RadianceImage {
     }
 }
 
-/// Shows each pixel's FLIP as a color, from black (0) through purple, red and orange to pale yellow (1).
+/// Shows each pixel's FLIP error as a color, from black (0) via purple, red and orange to pale yellow (1).
 pub fn flip_heat_map(pair: &Pair, flip: &[f32]) -> RadianceImage {
     let pixels = flip.par_iter().map(|&error| colormap::error_color(f64::from(error))).collect();
     RadianceImage { width: pair.measured_image().width, height: pair.measured_image().height, pixels }

@@ -81,8 +81,8 @@ fn ssim_from_moments([a, b]: [f64; 2], [aa, bb]: [f64; 2], ab: f64) -> f64 {
     (2.0 * a * b + C1) * (2.0 * covariance + C2) / ((a * a + b * b + C1) * (variances + C2))
 }
 
-/// Returns the sum of squared differences over the tile's channels, and the luma of both images in the tile,
-/// including a margin of [`RADIUS`] pixels. The luma outside the image is 0.
+/// Returns the tile's sum of squared differences over all channels, and the luma of each image in the tile
+/// and a margin of [`RADIUS`] pixels around it. The luma outside the image is 0.
 fn tile_lumas_and_squared_error(pair: &Pair, tile: Rect) -> (f64, [Plane; 2]) {
     let side = |length: u32| length as usize + 2 * RADIUS;
     let mut lumas =
@@ -104,8 +104,8 @@ fn tile_lumas_and_squared_error(pair: &Pair, tile: Rect) -> (f64, [Plane; 2]) {
     (square, lumas)
 }
 
-/// Converts a position in the tile, including its margin, to a position in the image. `None` outside the
-/// image.
+/// Converts a coordinate in the tile with its margin to an image coordinate, or returns `None` if it is
+/// outside the image.
 fn tile_to_image_coordinate(start: u32, offset: usize, length: usize) -> Option<usize> {
     (start as usize + offset).checked_sub(RADIUS).filter(|&position| position < length)
 }
@@ -114,8 +114,8 @@ fn is_inside_tile(offset: usize, length: u32) -> bool {
     (RADIUS..RADIUS + length as usize).contains(&offset)
 }
 
-/// For each position along one side of the tile, the sum of the window's weights inside the image. `None` if
-/// the window is excluded.
+/// Returns, for each position along one side of the tile, the sum of the window's weights inside the image,
+/// or `None` if the window is excluded.
 fn window_weight_sums(start: u32, count: u32, length: usize, window: &[f64]) -> Vec<Option<f64>> {
     let weight = |position: usize| {
         let is_complete = position >= RADIUS && position + RADIUS < length;

@@ -6,7 +6,7 @@ use super::Pair;
 use crate::math::color::{LUMINANCE_WEIGHTS, RELMSE_EPSILON};
 use crate::math::{DVec2, Vec3};
 
-/// The trimmed mean excludes one pixel in this many.
+/// The trimmed mean excludes one in `DROPPED_ONE_IN` pixels.
 const DROPPED_ONE_IN: usize = 1000;
 
 pub(super) struct LinearErrors {
@@ -101,6 +101,6 @@ fn trimmed_relmse(pair: &Pair, dropped: usize) -> f64 {
     });
     let (sum, count) =
         rows.into_iter().fold((0.0, 0_usize), |all, row: (f64, usize)| (all.0 + row.0, all.1 + row.1));
-    // Several values may be equal to the smallest dropped value. Keep as many of them as necessary.
+    // Several values may equal the smallest dropped value. Count as many of them as are kept.
     (sum + (kept - count) as f64 * least_dropped) / kept as f64
 }

@@ -21,8 +21,7 @@ pub use flip::PIXELS_PER_DEGREE;
 pub use pair::{CompareError, Pair};
 pub use two_references::ReferencePair;
 
-/// Errors in the first image of a pair. The second image is the reference. Means are over pixels and
-/// channels.
+/// Errors of the first image in a pair, measured against the second. Means are over pixels and channels.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ErrorMetrics {
     /// √mean (a − b)², linear.
@@ -56,7 +55,7 @@ pub struct PairMeasurements {
     pub flip: Vec<f32>,
 }
 
-/// Measures all errors.
+/// Computes all error metrics of a pair.
 pub fn measure(pair: &Pair) -> PairMeasurements {
     let linear = linear::measure(pair);
     let display = display::measure(pair);

@@ -15,7 +15,7 @@ fn luminance(color: DVec3) -> f64 {
 #[derive(Clone, Debug)]
 pub struct ReferencePair {
     pair: Pair,
-    /// 1/(r² + 0.01), divided by the number of channels and pixels. r is the mean of both references.
+    /// 1/(r² + 0.01), divided by the number of channels and pixels, where r is the mean of the references.
     weights: Vec<DVec3>,
 }
 
@@ -31,7 +31,7 @@ impl ReferencePair {
         Self { pair, weights }
     }
 
-    /// Both references.
+    /// The two references.
     pub fn reference_pair(&self) -> &Pair {
         &self.pair
     }
@@ -61,8 +61,8 @@ impl ReferencePair {
         sum.element_sum() / 2.0
     }
 
-    /// Standard error of [`Self::unbiased_relmse`] due to the references' noise, assuming independent pixels and fully
-    /// correlated channels.
+    /// Standard error of [`Self::unbiased_relmse`] due to the references' noise, assuming independent pixels
+    /// and fully correlated channels.
     pub fn relmse_standard_error(&self, x: &RadianceImage) -> f64 {
         let variances = self.weights_and_pixel_pairs().zip(&x.pixels).map(|((weight, a, b), x)| {
             let (between, from) = ((a - b) * (a - b), x.as_dvec3() - (a + b) / 2.0);

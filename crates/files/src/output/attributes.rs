@@ -126,14 +126,14 @@ impl FileAttributes {
         // Users may change a file's group to any group they belong to.
         let _ = fchown(new, None, Some(self.gid));
         let (uid, gid) = ids().unwrap_or((u32::MAX, u32::MAX));
-        // Drop the set-user-ID and set-group-ID bits. They would apply to a different user or group.
+        // Drop the set-user-ID and set-group-ID bits, which would apply to a different user or group.
         carried.mode &= 0o777;
         if uid != self.uid {
             carried.lost.push("its owner".to_owned());
         }
         if gid != self.gid {
             carried.lost.push("its group".to_owned());
-            // Members of the new group previously had the permissions for others. Do not grant them more.
+            // So far, members of the new group had only the permissions for others. Do not grant them more.
             let others_bits = (carried.mode & 0o007) << 3;
             carried.mode &= NON_GROUP_BITS | others_bits;
         }
@@ -173,7 +173,7 @@ impl UncopiedAttributes {
     }
 }
 
-/// Reads a file's extended attributes. Returns none on file systems that do not support them.
+/// Reads a file's extended attributes. Returns an empty list if the file system does not support them.
 fn extended_attributes(path: &Path) -> Vec<(OsString, io::Result<Vec<u8>>)> {
     let is_carried = |name: &OsString| !EXCLUDED.iter().any(|known| name == known);
     let value = |name: OsString| match xattr::get_deref(path, &name) {
@@ -188,7 +188,7 @@ fn extended_attributes(path: &Path) -> Vec<(OsString, io::Result<Vec<u8>>)> {
     }
 }
 
-/// Sets an attribute unless it already has this value. Setting an attribute may need special permissions.
+/// Sets an attribute unless it already has this value, because setting it may require special permissions.
 fn set_attribute(new: &File, name: &OsStr, value: &[u8]) -> io::Result<()> {
     if new.get_xattr(name).is_ok_and(|now| now.as_deref() == Some(value)) {
         return Ok(());

@@ -19,8 +19,8 @@ const PIXELS: usize = 1 << 18;
 /// Number of bytes to compress or write between polls of the cancel token.
 pub(super) const BYTES: usize = 1 << 15;
 
-/// Tone maps an image from top to bottom. Each component is one byte, or two bytes in big-endian order as in
-/// PNG and PPM. Passes the bytes to `take` in order, at most [`BYTES`] at a time.
+/// Tone maps an image from top to bottom and passes the bytes to `take` in order, at most [`BYTES`] at a
+/// time. Each component is one byte, or two bytes in big-endian order as in PNG and PPM.
 pub(super) fn tone_map_in_parts(
     image: &RadianceImage,
     options: &EncodeOptions,
@@ -114,7 +114,7 @@ pub(super) fn write_to_pipe(mut to: &File, bytes: &[u8], token: &CancelToken) ->
         match to.write(&rest[..rest.len().min(PIPE_BYTES)]) {
             Ok(0) => return Err(ErrorKind::WriteZero.into()),
             Ok(taken) => rest = &rest[taken..],
-            // Another process has written to the pipe first.
+            // Another process wrote to the pipe first.
             Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted) => {}
             Err(error) => return Err(error),
         }

@@ -10,7 +10,7 @@ use crate::film::{Film, FilmQuantity, RadianceImage, SampleCountStats};
 pub struct FilmEncodingSettings {
     /// Film quantity that the image shows.
     pub quantity: FilmQuantity,
-    /// Tone mapping. Its range has not been adapted to the image yet.
+    /// Tone mapping, with a range that has not been adapted to the image yet.
     pub tone: ToneMapping,
     /// Bits per channel in PNG and PPM files.
     pub bit_depth: BitDepth,
@@ -38,7 +38,7 @@ impl FilmEncodingSettings {
         metadata
     }
 
-    /// Encodes an image file. `image` is the film's image. Layers are only written to EXR files.
+    /// Encodes `image`, the film's image, as an image file. Layers are written only to EXR files.
     ///
     /// # Errors
     /// Same as [`encode`](super::encode).

@@ -58,9 +58,9 @@ pub enum OutputError {
     Target {
         /// The path as specified by the user.
         path: PathBuf,
-        /// The fault.
+        /// The reason.
         why: String,
-        /// Advice.
+        /// Advice for the user.
         way_out: &'static str,
     },
     /// Replacing the existing file is not allowed.

@@ -1,5 +1,5 @@
 //! OpenEXR: 32-bit float, linear, Rec. 709 primaries, lossless ZIP. Negative values, caused by filters with
-//! negative lobes, are preserved. Clamping them would make dark noise too bright on average.
+//! negative lobes, are preserved, because clamping them would brighten dark, noisy areas on average.
 
 use std::fs::File;
 use std::io::BufReader;
@@ -111,8 +111,8 @@ const REC_709: Chromaticities = Chromaticities {
 };
 
 /// Returns the file's attributes. Metadata is written to the standard attribute `comments`, one item per
-/// line. [`MEAN_LUMINANCE_ERROR`] is the only custom attribute. Several would make files nondeterministic,
-/// because the encoder writes them in the random order of its hash map.
+/// line. [`MEAN_LUMINANCE_ERROR`] is the only custom attribute. More than one would make files
+/// nondeterministic, because the encoder writes them in the random order of its hash map.
 fn attributes(options: &EncodeOptions) -> LayerAttributes {
     let line = |(name, value): &(String, String)| format!("{}: {}", one_line(name), one_line(value));
     let lines: Vec<_> = options.metadata.iter().map(line).collect();

@@ -5,8 +5,8 @@ use std::path::Path;
 
 use rustix::fs::{IFlags, ioctl_getflags, ioctl_setflags};
 
-/// Flags that users can set, except for append-only and immutable. Files with these two flags are not
-/// replaced. The remaining flags are managed by the system.
+/// Flags that users can set, except append-only and immutable, because files with these two are never
+/// replaced. All other flags are managed by the system.
 const USER_FLAGS: IFlags = IFlags::NODUMP
     .union(IFlags::NOATIME)
     .union(IFlags::SYNC)
@@ -26,13 +26,13 @@ impl Flags {
         Self(File::open(path).ok().and_then(|file| ioctl_getflags(file).ok()))
     }
 
-    /// Applies the flags to a new, empty file. Returns whether this succeeded.
+    /// Applies the flags to a new, empty file and returns whether this succeeded.
     pub(super) fn carry_over(&self, new: &File) -> bool {
         let Some(wanted) = self.0 else { return true };
         let set = || {
             let now = ioctl_getflags(new)?;
             let then = (now - USER_FLAGS) | (wanted & USER_FLAGS);
-            // Skip the call if nothing changes, because the call may need permission.
+            // Skip the call if nothing changes, because it may require special permissions.
             if now == then { Ok(()) } else { ioctl_setflags(new, then) }
         };
         set().is_ok()

@@ -1,6 +1,6 @@
 //! Replaces a user's text file only if it still has the expected content. Every saved version always exists
 //! under either the file's name or the backup name. Backups that differ from the file are never removed
-//! automatically. They are reported at the next start.
+//! automatically; they are reported at the next start.
 
 use std::fs::{self, File};
 use std::io::{self, ErrorKind};
@@ -47,7 +47,8 @@ fn backup_path(target: &Path) -> PathBuf {
     name.into()
 }
 
-/// A replacement in progress. The steps are [`Self::stage_at_backup_path`], [`Self::swap`] and [`Self::finish_if_old_text_matches`].
+/// A replacement in progress. The steps are [`Self::stage_at_backup_path`], [`Self::swap`] and
+/// [`Self::finish_if_old_text_matches`].
 pub(super) struct Replacement<'a> {
     target: &'a Path,
     held: PathBuf,
@@ -70,7 +71,7 @@ impl<'a> Replacement<'a> {
         Ok(Self { target, held, expected, new })
     }
 
-    /// Swaps both files. The old text is now the backup.
+    /// Swaps the new text with the old text, which becomes the backup.
     ///
     /// # Errors
     /// A system error. Also returns the new text if it has been renamed back to its temporary name.
@@ -394,7 +395,7 @@ mod tests {
         );
         assert_eq!(recover_backup(&link), BackupRecovery::Restored);
         assert_eq!(recover_backup(&link), BackupRecovery::None);
-        // An editor saves while the old text is the backup.
+        // An editor saves while the old text is at the backup path.
         let steps = StepwiseReplacement::move_old_to_backup_path(&scene, OLD.as_bytes()).expect("taken");
         folder.save(NEWER);
         assert!(

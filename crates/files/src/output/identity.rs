@@ -31,8 +31,8 @@ pub enum FileIdentity {
 }
 
 impl FileIdentity {
-    /// Returns the identity of the file at a path. `None` for paths that cannot be a regular file: folders,
-    /// devices, pipes, and unresolvable paths.
+    /// Returns the identity of the file at a path, or `None` for paths that cannot be a regular file:
+    /// folders, devices, pipes, and unresolvable paths.
     pub fn from_path(path: &Path) -> Option<Self> {
         match fs::metadata(path) {
             Ok(found) if found.is_file() => Some(Self::Existing { device: found.dev(), inode: found.ino() }),
@@ -69,7 +69,7 @@ pub struct FallbackFileIdentity {
 }
 
 impl FallbackFileIdentity {
-    /// Returns the fingerprint of the file at a path. `None` if there is no regular file at the path.
+    /// Returns the fallback identity of the file at a path, or `None` if there is no regular file.
     pub fn from_path(path: &Path) -> Option<Self> {
         let found = fs::metadata(path).ok().filter(fs::Metadata::is_file)?;
         let real = path.canonicalize().ok()?;
@@ -83,8 +83,8 @@ impl FallbackFileIdentity {
         })
     }
 
-    /// Whether both may belong to the same file. The files must be in the same folder. Either their names
-    /// must match, ignoring case, or their lengths, modification times and contents must be equal.
+    /// Whether the two may identify the same file: they are in the same folder, and either their names match,
+    /// ignoring case, or their lengths, modification times and contents are equal.
     pub fn may_equal(&self, other: &Self) -> bool {
         let is_stamp_same = || (self.length, self.modified) == (other.length, other.modified);
         self.folder == other.folder

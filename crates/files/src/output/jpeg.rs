@@ -8,8 +8,8 @@ use super::{EncodeOptions, Format, OutputError, SOFTWARE, one_line};
 use crate::control::CancelToken;
 use crate::film::RadianceImage;
 
-/// JPEG quality (maximum 100). Visually lossless at arm's length. Files are a quarter of the size they have
-/// at quality 100.
+/// JPEG quality (maximum 100). Visually lossless at arm's length, with a quarter of the file size of quality
+/// 100.
 const QUALITY: u8 = 92;
 
 pub(super) fn encode(
@@ -25,7 +25,7 @@ pub(super) fn encode(
     Ok(insert_comment(&bytes.into_bytes(), &metadata_comment(options)))
 }
 
-/// Metadata as a comment, one line per item.
+/// Formats the metadata as a comment with one line per item.
 fn metadata_comment(options: &EncodeOptions) -> String {
     let mut comment = format!("Software: {SOFTWARE}\n");
     for (name, value) in &options.metadata {

@@ -122,8 +122,8 @@ pub(crate) fn encode_with_layers(
     bytes
 }
 
-/// Checks before rendering whether an image can be written to this path. Leaves no files behind. Returns the
-/// format for the extension.
+/// Checks before rendering whether an image can be written to this path, and returns the format for its
+/// extension. Leaves no files behind.
 ///
 /// # Errors
 /// The extension is unknown, the directory does not exist, files cannot be created there, or the target is a
@@ -137,7 +137,8 @@ pub fn check_image_path(path: &Path) -> Result<Format, OutputError> {
 /// Like [`check_image_path`], but does not create a file, so it can be called frequently.
 ///
 /// # Errors
-/// Same as [`check_image_path`], but does not detect directories that reject new files despite their permissions.
+/// Same as [`check_image_path`], but does not detect directories that reject new files despite their
+/// permissions.
 pub fn check_image_target_without_writing(path: &Path) -> Result<Format, OutputError> {
     let format = Format::from_path(path)?;
     check_file_target_read_only(path)?;

@@ -1,5 +1,5 @@
-//! Detects from a file's content whether glimt wrote it. glimt replaces only its own files, and only with the
-//! same type of file.
+//! Detects from a file's content whether glimt wrote it. glimt replaces only its own files, and only with
+//! files of the same type.
 
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read};
@@ -48,7 +48,7 @@ impl ReplaceCheck {
         Self::from_file(open_existing(path), kind, |file| is_empty(&file) || is_own(file))
     }
 
-    /// Reason not to replace the file. `None` if it may be replaced.
+    /// Returns the reason not to replace the file, or `None` if it may be replaced.
     pub fn reason_to_keep(&self) -> Option<String> {
         match self {
             Self::Own => None,
@@ -65,7 +65,7 @@ pub fn check_image_replaceable(path: &Path) -> ReplaceCheck {
     ReplaceCheck::from_file(open_existing(path), "an image", is_glimt_image)
 }
 
-/// Returns the scene named in a PNG file that glimt wrote. `None` if there is no such file or scene name.
+/// Returns the scene named in a PNG file's metadata, or `None` if there is no such file or scene name.
 pub fn scene_name_in_png(path: &Path) -> Option<String> {
     const KEY: &str = "glimt:scene";
     let reader = png_header(open_existing(path)?.ok()?)?;

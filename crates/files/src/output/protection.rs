@@ -20,7 +20,7 @@ pub(super) enum ProtectionFlag {
 }
 
 impl ProtectionFlag {
-    /// Returns the flag that protects a file or directory. `None` if there is none or flags are not
+    /// Returns the flag that protects a file or directory, or `None` if there is none or flags are not
     /// supported.
     #[cfg(target_os = "linux")]
     pub(super) fn from_path(path: &Path) -> Option<Self> {
@@ -91,8 +91,8 @@ mod tests {
     struct Flagged(PathBuf);
 
     impl Flagged {
-        /// Sets a flag. `None` if this is not possible, because the user is not root or the file system does
-        /// not support flags.
+        /// Sets a flag. Returns `None` if this fails because the user is not root or the file system does not
+        /// support flags.
         fn new(path: PathBuf, flag: IFlags) -> Option<Self> {
             let set = change(&path, |flags| flags | flag);
             if let Err(error) = &set {

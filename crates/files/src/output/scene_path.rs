@@ -1,4 +1,5 @@
-//! The scene path in an image's metadata. It is relative to the image, so both can be moved together.
+//! The scene path in an image's metadata. It is relative to the image, so that the two can be moved
+//! together.
 
 use std::fs;
 use std::path::{Component, Path, PathBuf};
@@ -130,7 +131,7 @@ mod tests {
             &scene,
             &image
         ));
-        // Move both together, then only the scene.
+        // Move the scene with the image, then only the scene.
         let named = relative_to_image(&scene, &at("a/scene.png"));
         fs::rename(at("a"), at("moved")).expect("moved");
         assert!(metadata_path_refers_to_scene(&named, &at("moved/scene.toml"), &at("moved/scene.png")));

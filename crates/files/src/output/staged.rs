@@ -1,4 +1,4 @@
-//! Creates several files atomically. Writes them to a hidden folder, then moves them to their destinations.
+//! Creates several files atomically by writing them to a hidden folder and moving them to their destinations.
 
 use std::ffi::OsStr;
 use std::fs::{self, DirBuilder, File};
@@ -50,8 +50,8 @@ pub fn create_files_atomically(
     Ok(())
 }
 
-/// Removes files that were already moved. Also removes their folders, unless these contain other files.
-/// Ignores errors because the caller reports the original error.
+/// Removes files that were already moved, and their folders unless they contain other files. Ignores errors
+/// because the caller reports the original error.
 fn remove_placed_files(folder: &Path, placed: &[&OsStr], files: &[(PathBuf, &[u8])]) {
     for (name, _) in
         files.iter().filter(|(name, _)| name.iter().next().is_some_and(|first| placed.contains(&first)))
@@ -63,7 +63,7 @@ fn remove_placed_files(folder: &Path, placed: &[&OsStr], files: &[(PathBuf, &[u8
     }
 }
 
-/// A hidden folder, locked by its writer. It is removed with its contents on drop.
+/// A hidden folder that its writer locks, and that is removed with its contents on drop.
 struct StagingFolder {
     path: PathBuf,
     _lock: File,
@@ -100,7 +100,7 @@ impl StagingFolder {
 
 impl Drop for StagingFolder {
     fn drop(&mut self) {
-        // Ignore errors. The next writer tries again. Removing an empty folder needs no file descriptors.
+        // Ignore errors, because the next writer tries again. Removing an empty folder needs no descriptors.
         let _ = fs::remove_dir(&self.path).or_else(|_| remove_folder_and_contents(&self.path));
     }
 }

@@ -1,5 +1,5 @@
-//! Temporary files next to a target. Their names contain the writer's machine and process. They are locked
-//! while the writer is running, and removed by other processes if the writer has died. Locks alone are not
+//! Temporary files next to a target. Their names identify the writer's machine and process. They are locked
+//! while the writer is running, and removed by other processes after it has died. Locks alone are not
 //! sufficient, because many network file systems do not share them between machines.
 
 use std::ffi::{OsStr, OsString};
@@ -87,7 +87,7 @@ impl TemporaryFile {
 impl Drop for TemporaryFile {
     fn drop(&mut self) {
         if !self.kept {
-            // Ignore errors. The next write tries again.
+            // Ignore errors, because the next write tries again.
             let _ = fs::remove_file(&self.path);
         }
     }
@@ -178,8 +178,8 @@ fn temporary_name(name: &OsStr, writer: &ProcessIdentity) -> OsString {
     result
 }
 
-/// Parses the writer from a temporary name. `None` for other names, including names from older versions
-/// (`.NAME.glimt-PID-N.tmp`), which do not contain the machine.
+/// Parses the writer from a temporary name. Returns `None` for other names, including names from older
+/// versions (`.NAME.glimt-PID-N.tmp`), which do not contain the machine.
 fn parse_writer(name: &OsStr) -> Option<ProcessIdentity> {
     let name = name.to_string_lossy();
     let (_, writer) = name.strip_prefix('.')?.strip_suffix(".tmp")?.rsplit_once(".glimt-")?;

@@ -81,10 +81,10 @@ impl SweptFolders {
     }
 }
 
-/// Like [`atomic`], but with a guard. Can be cancelled until the new file is complete.
+/// Like [`atomic`], but with a policy. Can be cancelled until the new file is complete.
 ///
 /// # Errors
-/// Any error from [`atomic`] or the guard, or [`OutputError::Cancelled`].
+/// Any error from [`atomic`] or `guard`, or [`OutputError::Cancelled`].
 pub fn atomic_with_policy(
     path: &Path,
     bytes: &[u8],
@@ -101,7 +101,7 @@ pub fn atomic_with_policy(
 }
 
 /// Like [`atomic_with_policy`], but replaces the file only if it has the expected content. If the content has
-/// changed, the file is kept and the guard determines the error.
+/// changed, the file is kept and `guard` determines the error.
 ///
 /// # Errors
 /// Same as [`atomic_with_policy`].
@@ -132,9 +132,9 @@ pub enum Durability {
     Power,
 }
 
-/// Like [`atomic_with_policy`], but for generated content. `content` must write all bytes each time it is called.
-/// Returns the new file, which stays locked until it is closed. Returns `None` if the target was written in
-/// place.
+/// Like [`atomic_with_policy`], but for generated content. `content` must write all bytes each time it is
+/// called. Returns the new file, which stays locked until it is closed, or `None` if the target was written
+/// in place.
 ///
 /// # Errors
 /// Any error from [`atomic_with_policy`] or `content`.
@@ -147,8 +147,8 @@ pub fn atomic_generated(
     write_atomically_or_in_place(path, content, guard, (token, durability, None), &sync_directory)
 }
 
-/// Like [`atomic_generated`], but if `expected` is set, replaces only a file with this content. `sync` synchronizes
-/// a directory.
+/// Like [`atomic_generated`], but if `expected` is set, replaces only a file with this content. `sync`
+/// synchronizes a directory.
 pub(super) fn write_atomically_or_in_place(
     path: &Path,
     content: &dyn Fn(&mut dyn Write) -> io::Result<()>,
@@ -264,7 +264,7 @@ fn sync_directory(directory: &Path) -> io::Result<()> {
     }
 }
 
-/// Writes in place. Appends to the target, so existing content in an open file is kept.
+/// Writes in place by appending to the target, so that existing content in an open file is kept.
 fn append_in_place(path: &Path, bytes: &[u8], token: &CancelToken) -> io::Result<()> {
     if path == Path::new(STDOUT) {
         // Flush earlier output first. Do not hold the lock, because the reader may block.

@@ -46,7 +46,7 @@ pub fn difficult_meshes() -> Vec<Vec<[Vec3; 3]>> {
     ]
 }
 
-/// Nearest hit found by testing every triangle except the ray's start triangle.
+/// Finds the nearest hit by testing every triangle except the ray's start triangle.
 pub fn closest_by_brute_force(mesh: &[[Vec3; 3]], ray: &Ray) -> Option<ShapeHit> {
     let sheared = ShearedRay::new(ray.origin, ray.direction);
     let others = (0..).zip(mesh).filter(|&(id, _)| id != ray.start);
@@ -75,7 +75,7 @@ pub fn difficult_rays(mesh: &[[Vec3; 3]]) -> Vec<Ray> {
         rays.push(Ray { t_max: 0.9, ..Ray::new(origin, target - origin) });
         rays.push(Ray::new(Vec3::new(target.x, 20.0, target.z), Vec3::new(zero, -1.0, zero)));
         rays.push(Ray::new(triangle[2], Vec3::new(next(), next(), next())));
-        // Exclude the start triangle. One ray passes through it, and one starts on it.
+        // Exclude the start triangle from a ray that passes through it and from one that starts on it.
         let start = (i % mesh.len().max(1)) as u32;
         rays.push(Ray::new(origin, target - origin).with_start_triangle(start));
         rays.push(Ray::new(target, Vec3::new(next(), next(), next())).with_start_triangle(start));

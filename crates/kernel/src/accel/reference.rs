@@ -88,7 +88,8 @@ pub struct TriangleReference {
 }
 
 impl TriangleReference {
-    /// References to all triangles in order. Skips triangles that cannot be hit or have non-finite boxes.
+    /// Creates references to all triangles in order, skipping triangles that cannot be hit or have non-finite
+    /// boxes.
     ///
     /// # Errors
     /// [`Cancelled`] if the build was canceled.
@@ -160,8 +161,8 @@ impl TriangleReference {
         [self.with_intersection_or_half(left, &parts[0]), self.with_intersection_or_half(right, &parts[1])]
     }
 
-    /// Replaces the reference's box with the intersection of both boxes, or with `half` if they do not
-    /// overlap.
+    /// Replaces the reference's box with the intersection of `half` and `part`, or with `half` if the two do
+    /// not overlap.
     #[inline(always)]
     fn with_intersection_or_half(&self, half: SimdBounds, part: &SimdBounds) -> Self {
         let mut both =
@@ -199,7 +200,7 @@ pub struct ClippedTriangle {
 impl ClippedTriangle {
     const NOTHING: Self = Self { points: [DVec3::ZERO; 9], count: 0 };
 
-    /// Clips a triangle to a box, including its faces.
+    /// Clips a triangle to a box, keeping the parts in the box's faces.
     pub fn clip_to_box(corners: [Vec3; 3], bounds: &Aabb) -> Self {
         let (least, greatest) =
             (corners[0].min(corners[1]).min(corners[2]), corners[0].max(corners[1]).max(corners[2]));
@@ -241,7 +242,7 @@ impl ClippedTriangle {
     }
 
     /// Adds a vertex. Clipping a triangle by six planes produces at most nine vertices. Additional vertices
-    /// are due to rounding. They would not extend the polygon and are dropped.
+    /// are due to rounding and are dropped, because they would not extend the polygon.
     fn push(&mut self, point: DVec3) {
         if let Some(place) = self.points.get_mut(self.count) {
             *place = point;

@@ -74,9 +74,9 @@ impl Cone {
     }
 
     /// Interval in which the line is inside the double cone |p| ≤ k|z|, which extends past the base and the
-    /// tip. The quadratic A·s² − 2B·s + C is relative to the line's closest point to the tip, so B is a
-    /// single product. B² − AC is computed as a difference of squares of the line's moment about the tip.
-    /// This is precise even for lines that graze the side near the tip.
+    /// tip. The quadratic A·s² − 2B·s + C is relative to the point on the line that is closest to the tip, so
+    /// B is a single product. B² − AC is computed as a difference of squares of the line's moment about the
+    /// tip, which is precise even for lines that graze the side near the tip.
     fn side_interval(&self, line: &LocalLine) -> Option<LineInterval> {
         let k = self.radius / self.height;
         let (p, d) = (line.foot, line.direction);
@@ -173,7 +173,7 @@ impl Cone {
         if part == 0 && across > 0.0 { 0.5 * self.height / (self.slant * across) } else { 0.0 }
     }
 
-    /// Unit tangents of the side away from the tip and around the axis.
+    /// Unit tangents of the side, pointing away from the tip and around the axis.
     pub(super) fn tangents(&self, point: DVec3) -> [DVec3; 2] {
         let along = (point - self.frame.origin).normalize_or(self.frame.axis());
         [along, self.frame.tangent_around(point)]
@@ -263,8 +263,8 @@ impl Cone {
     }
 }
 
-/// Mirrors a point. Angles are measured about the axis from base to tip, but the frame's axis points from tip
-/// to base.
+/// Mirrors a point, because angles are measured about the axis from base to tip, but the frame's axis points
+/// from tip to base.
 fn mirror_y(p: DVec2) -> DVec2 {
     DVec2::new(p.x, -p.y)
 }

@@ -237,7 +237,7 @@ impl SurfaceF64 for OrientedBox {
     }
 }
 
-/// Branch-free [`face_axis_and_normal`].
+/// Branchless version of [`face_axis_and_normal`] that returns only the normal.
 #[inline(always)]
 fn branchless_face_normal(face: u32) -> DVec3 {
     let size = if face & 1 == 1 { 1.0 } else { -1.0 };

@@ -11,7 +11,7 @@ pub type FlatPolygon = ArrayVec<DVec3, 4>;
 /// Shape geometry near a point, for integrating a density-estimation kernel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum LocalGeometry {
-    /// Number of flat polygons that form the shape. See [`Shape::polygon`](super::Shape::polygon_face).
+    /// Number of flat polygons that form the shape. See [`Shape::polygon_face`](super::Shape::polygon_face).
     Polygons(u32),
     /// A non-polygonal surface.
     Surface {
@@ -25,7 +25,7 @@ pub enum LocalGeometry {
 /// Surface geometry below a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NearestSurface {
-    /// Unit normal at the surface point closest to the point.
+    /// Unit normal at the closest point on the surface.
     pub normal: DVec3,
     /// Height of the point above or below the surface.
     pub height: f64,
@@ -42,14 +42,14 @@ pub enum LocalSurfaceShape {
     Round(f64),
 }
 
-/// A parallelogram with a corner c and edges u and v.
+/// Returns the parallelogram with corner c and edges u and v.
 #[inline]
 pub(super) fn parallelogram_polygon((c, u, v): (DVec3, DVec3, DVec3)) -> FlatPolygon {
     FlatPolygon::from([c, c + u, c + u + v, c + v])
 }
 
 impl LocalGeometry {
-    /// A curved surface. Only its distance is known.
+    /// Describes a curved surface of which only the distance is known.
     pub(super) fn from_distance_to_curved_surface(distance: f64) -> Self {
         Self::Surface { distance, ground: None }
     }

@@ -235,13 +235,14 @@ impl Shape {
         for_shape!(self, it => it.part_areas().to_vec())
     }
 
-    /// Samples a point uniformly over [`Shape::part_areas`] of a part. `u` is uniform in [0, 1)².
+    /// Samples a point on a part, uniformly over its area in [`Shape::part_areas`]. `u` is uniform in
+    /// [0, 1)².
     pub fn sample(&self, part: u32, u: Vec2) -> SurfaceSample {
         for_shape!(self, it => it.sample(part, u))
     }
 
-    /// Factor from [`Shape::part_areas`] to the area in the world, at a point with this unit normal. 1 unless
-    /// the shape is transformed.
+    /// Factor that converts [`Shape::part_areas`] to world-space area at a point with this unit normal. 1
+    /// unless the shape is transformed.
     #[inline]
     pub fn area_scale(&self, normal: DVec3) -> f64 {
         if let Self::Transformed(transformed) = self { transformed.area_scale(normal) } else { 1.0 }
@@ -269,7 +270,8 @@ impl Shape {
         }
     }
 
-    /// Whether a point is inside, or behind a plane. `None` if the shape encloses no volume.
+    /// Whether a point is inside, or behind the shape if it is a plane. Returns `None` if the shape encloses
+    /// no volume.
     #[inline]
     pub fn encloses_point(&self, point: DVec3) -> Option<bool> {
         self.encloses_each_point([point]).map(|[is_inside]| is_inside)
@@ -313,7 +315,8 @@ impl Shape {
     }
 
     /// Curvature of the meridian through a point on a curved part, and unit tangents along the meridian and
-    /// around the axis, which are the principal directions. `None` if the shape is not a surface of revolution.
+    /// around the axis, which are the principal directions. Returns `None` for all shapes except spheres,
+    /// cylinders, cones and tori.
     fn meridian(&self, point: DVec3) -> Option<(f64, [DVec3; 2])> {
         match self {
             Self::Sphere(sphere) => {
@@ -354,8 +357,8 @@ impl Shape {
         }
     }
 
-    /// Flat polygon with the given index. `None` if the index is out of range or the shape is not made of
-    /// flat polygons.
+    /// Returns the flat polygon with the given index, or `None` if the index is out of range or the shape is
+    /// not made of flat polygons.
     #[inline]
     pub fn polygon_face(&self, number: u32) -> Option<FlatPolygon> {
         match self {
@@ -548,7 +551,8 @@ mod tests {
                 let point = shape.centroid() + DVec3::new(u(0.618_034), u(0.754_878), u(0.569_84));
                 let Some(told) = distance(&shape, point).filter(|_| !places.is_empty()) else { continue };
                 let nearest = places.iter().map(|place| (*place - point).length()).fold(f64::MAX, f64::min);
-                // If the shape is transformed, a lower bound within the transform's condition number.
+                // For a transformed shape, the distance is a lower bound, within the transform's condition
+                // number.
                 let range = if untransformed(&shape).1 { 0.3 } else { 1.0 };
                 let is_near = nearest >= told - 1e-9 && told + 0.03 > range * nearest;
                 assert!(is_near, "{shape:?}: {told}, {nearest}");

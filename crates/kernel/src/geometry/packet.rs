@@ -52,7 +52,7 @@ impl RayPacket {
         Self { start, ..self }
     }
 
-    /// Returns the ray in a lane. Its end is infinite.
+    /// Returns the ray in a lane, with an infinite end.
     #[inline(always)]
     pub fn ray(&self, lane: usize) -> Ray {
         let of = |rows: &[F32x16; 3]| Vec3::new(rows[0][lane], rows[1][lane], rows[2][lane]);
@@ -84,7 +84,7 @@ impl RayPacket {
         }
     }
 
-    /// Returns the ray in a lane in double precision. Its end is infinite.
+    /// Returns the ray in a lane in double precision, with an infinite end.
     #[inline(always)]
     pub(super) fn ray_f64(&self, lane: usize) -> RayF64 {
         let [ox, oy, oz] = &self.origin;
@@ -149,7 +149,7 @@ impl HitPacket {
     }
 }
 
-/// Branchless version of [`RayF64::round_if_in_range`] that returns NaN for `None`.
+/// Branchless version of [`RayF64::round_t_if_in_range`] that returns NaN for `None`.
 #[inline(always)]
 pub(super) fn round_if_in_range(t: f64, end: f32) -> f32 {
     let single = t as f32;
@@ -157,9 +157,9 @@ pub(super) fn round_if_in_range(t: f64, end: f32) -> f32 {
     if is_on_it { single } else { f32::NAN }
 }
 
-/// Whether [`round_if_in_range`] may accept the quotient `above / along`. If not, the division can be skipped. The
-/// factor is larger than the relative error of rounding the quotient to `f32`. The added constants handle
-/// numbers that are too small for the factor.
+/// Whether [`round_if_in_range`] may accept the quotient `above / along`. If not, the division can be
+/// skipped. The factor is larger than the relative error of rounding the quotient to `f32`. The added
+/// constants handle numbers that are too small for the factor.
 #[inline(always)]
 pub(super) fn can_quotient_be_in_range(above: f64, along: f64, end: f32) -> bool {
     let is_ahead = ((above > 0.0) & (along > 0.0)) | ((above < 0.0) & (along < 0.0));

@@ -27,7 +27,7 @@ impl Plane {
         Self { point, normal, u, v }
     }
 
-    /// Intersects the plane. `None` for rays in the plane or parallel to it.
+    /// Intersects the plane. Returns `None` for rays that are in the plane or parallel to it.
     pub fn intersect(&self, ray: &RayF64) -> Option<ShapeHit> {
         let t = self.normal.dot(self.point - ray.origin) / self.normal.dot(ray.direction);
         (t < f64::from(f32::MAX)).then(|| ray.round_t_if_in_range(t)).flatten().map(ShapeHit::from_t)
@@ -78,7 +78,7 @@ impl Plane {
         DVec2::from_array(self.coordinates_of(point))
     }
 
-    /// Areas of the parts. Empty because the area is infinite.
+    /// Areas of the parts. The array is empty because a plane's area is infinite.
     pub fn part_areas(&self) -> [f64; 0] {
         []
     }
@@ -114,7 +114,7 @@ impl Plane {
         LocalGeometry::Surface { distance, ground: Some(ground) }
     }
 
-    /// Whether a point is inside. Always false, unlike [`Plane::is_behind`].
+    /// Whether a point is inside. Unlike [`Plane::is_behind`], this is always false.
     pub fn encloses(&self, _: DVec3) -> bool {
         false
     }
@@ -124,7 +124,7 @@ impl Plane {
         self.normal.dot(point - self.point) < 0.0
     }
 
-    /// Projected area of the front. Infinite if the front faces the direction.
+    /// Projected area of the front, which is infinite if the front faces `direction` and 0 otherwise.
     pub fn projected_area(&self, direction: DVec3) -> f64 {
         if self.normal.dot(direction) > 0.0 { f64::INFINITY } else { 0.0 }
     }

@@ -8,7 +8,7 @@ use crate::math::{DVec3, Vec3};
 pub struct Ray {
     /// Origin of the ray.
     pub origin: Vec3,
-    /// Direction of any nonzero length. t is measured in units of this length.
+    /// Direction, of any nonzero length. t is measured in units of this length.
     pub direction: Vec3,
     /// Upper end of the t interval; ∞ for a half-line.
     pub t_max: f32,
@@ -32,8 +32,8 @@ impl Ray {
         Self { start, ..self }
     }
 
-    /// Creates a segment that ends just before `to`. It is shortened by the rounding errors of both ends so
-    /// that it does not hit a surface that contains `to`. t = 1 is `to` itself.
+    /// Creates a segment that ends just before `to`. It is shortened by the rounding errors of its endpoints
+    /// so that it does not hit a surface that contains `to`. The point `to` itself is at t = 1.
     #[inline(always)]
     pub fn segment_ending_before_point(from: Vec3, to: Vec3) -> Self {
         let direction = to - from;

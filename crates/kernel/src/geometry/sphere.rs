@@ -135,7 +135,7 @@ impl Sphere {
         (point - self.center).length() < self.radius
     }
 
-    /// Projected area. For every direction, this is the area enclosed by a great circle.
+    /// Projected area, which is the area enclosed by a great circle, whatever the direction.
     pub fn projected_area(&self, _: DVec3) -> f64 {
         PI * self.radius * self.radius
     }
@@ -153,8 +153,8 @@ impl SurfaceF64 for Sphere {
     }
 }
 
-/// Texture coordinates u = ½ + atan2(z, x)/2π and v = ½ + asin(y)/π of a unit normal, and the derivatives of
-/// the normal. At the poles, the tangents are an arbitrary perpendicular pair.
+/// Texture coordinates u = ½ + atan2(z, x)/2π and v = ½ + asin(y)/π of a unit normal, and the normal's
+/// derivatives with respect to u and v. At the poles, the derivatives are replaced by perpendicular tangents.
 fn sphere_parametrization(n: DVec3) -> (Vec2, DVec3, DVec3) {
     let u = 0.5 + libm::atan2(n.z, n.x) / (2.0 * PI);
     let v = 0.5 + libm::asin(n.y.clamp(-1.0, 1.0)) / PI;

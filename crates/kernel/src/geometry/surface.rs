@@ -7,7 +7,7 @@ use crate::math::{DVec2, DVec3, Vec2, Vec3};
 pub struct ShapeHit {
     /// Ray parameter: distance in units of the direction's length.
     pub t: f32,
-    /// Index of the part, for example a mesh triangle or a box face. 0 for shapes with a single part.
+    /// Index of the part, for example a mesh triangle or a box face, or 0 for shapes with a single part.
     pub primitive: u32,
     /// Barycentric weight of a triangle's second corner; 0 for other shapes.
     pub u: f32,
@@ -32,7 +32,8 @@ pub struct SurfacePoint {
     /// Unit geometric normal on the front side.
     pub normal: Vec3,
     /// Origin of shadow rays on the camera's side. It is `point` itself, or a point above `point` if flat
-    /// triangles approximate a convex surface. Only valid if the segment from `point` is unobstructed.
+    /// triangles approximate a convex surface. Only valid if nothing obstructs the segment from `point` to
+    /// it.
     pub shadow_point: Vec3,
     /// Unit interpolated normal on the same side as `normal`.
     pub shading_normal: Vec3,
@@ -61,7 +62,7 @@ impl SurfaceRequest {
     pub const ALL: Self = Self { uv: true, shadow_point: true };
 }
 
-/// A point on an emitting surface.
+/// A point sampled on a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfaceSample {
     /// The point.

@@ -70,7 +70,7 @@ impl AxialFrame {
         self.sphere_swept_circle_bounds(height, radius, 0.0)
     }
 
-    /// Bounding box of all balls with radius `ball` with centers on a circle around the axis. Expanded to
+    /// Bounding box of all balls of radius `ball` whose centers are on a circle around the axis, expanded to
     /// account for rounding.
     pub fn sphere_swept_circle_bounds(&self, height: f64, radius: f64, ball: f64) -> Aabb {
         let center = self.point_to_world(DVec3::new(0.0, 0.0, height));
@@ -129,8 +129,8 @@ impl LineInterval {
     }
 }
 
-/// First t at which the ray hits a closed solid, or the side of an open shape. `starts_on` returns whether
-/// the ray starts on a part, within rounding error. The start is not a hit.
+/// First hit of a ray on a closed solid, or on the side of an open shape: t and the part's index. `starts_on`
+/// returns whether the ray starts on a part, within rounding error. The ray's start does not count as a hit.
 pub fn first_hit(
     ray: &RayF64,
     line: &LocalLine,
@@ -139,7 +139,7 @@ pub fn first_hit(
     closed: bool,
     starts_on: impl Fn(u32) -> bool,
 ) -> Option<(f64, u32)> {
-    // The intersection with the side that is closer to the start is the start itself.
+    // If the ray starts on the side, the closer of its two intersections with the side is the start itself.
     let other_on_side = |along: f64| {
         let other = if along == side.enter.0 { side.leave.0 } else { side.enter.0 };
         (line.start + other).abs()
@@ -201,8 +201,8 @@ pub fn to_shape_hit((t, primitive): (f64, u32)) -> ShapeHit {
     ShapeHit { primitive, ..ShapeHit::from_t(t as f32) }
 }
 
-/// The unrounded t of a hit, computed by intersecting the ray again. Returns the rounded t if the second
-/// intersection finds a different hit.
+/// The unrounded t of a hit, taken from `again`, the result of intersecting the ray a second time. Returns
+/// the rounded t if the second intersection found a different hit.
 pub fn unrounded_t(hit: &ShapeHit, again: Option<(f64, u32)>) -> f64 {
     match again {
         Some((t, part)) if t as f32 == hit.t && part == hit.primitive => t,
@@ -230,7 +230,7 @@ pub fn unrounded_hit_point(
     ray.at(fitting.unwrap_or_else(|| unrounded_t(hit, again())))
 }
 
-/// Unit vector from the origin of the plane toward a point. The x axis if the point is the origin.
+/// Unit vector in the plane from the origin toward a point, or the x axis if the point is the origin.
 pub fn radial_direction_toward(p: DVec2) -> DVec2 {
     p.try_normalize().unwrap_or(DVec2::X)
 }

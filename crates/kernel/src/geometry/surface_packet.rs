@@ -116,7 +116,7 @@ impl SurfacePacket {
         }
     }
 
-    /// [`SurfacePacket::fill`] for a shape with a SIMD loop.
+    /// [`SurfacePacket::compute_surface_points`] for a shape with a SIMD loop.
     #[inline(always)]
     pub(super) fn fill_from_shape(
         &mut self,

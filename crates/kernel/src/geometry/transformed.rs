@@ -21,7 +21,7 @@ pub struct TransformedShape {
     pub volume_scale: f64,
     /// Bound on the condition number of the transform in the maximum norm.
     condition: f64,
-    /// Bound on the factor by which the transform enlarges the greatest coordinate.
+    /// Bound on the factor by which the transform enlarges a vector's largest coordinate.
     stretch: f64,
     /// Bound on the factor by which the inverse lengthens vectors.
     inverse_stretch: f64,
@@ -31,7 +31,7 @@ impl TransformedShape {
     /// Transforms a shape.
     pub fn new(shape: Shape, to_world: Transform) -> Self {
         let linear = Transform { translation: DVec3::ZERO, ..to_world };
-        // The sums of the magnitudes in the rows of the inverse, and then of their product with the map.
+        // The absolute row sums of the inverse. Multiplied by |M|, they bound the condition number.
         let inverse = Transform { linear: to_world.inverse_linear, ..linear };
         let sums = inverse.transform_abs_bound(DVec3::ONE);
         Self {
@@ -52,9 +52,9 @@ impl TransformedShape {
         }
     }
 
-    /// Upper bound on the magnitudes of lengths in the world, for lengths in the shape's coordinates. Includes
-    /// the rounding errors of the transform and of its inverse: relative to the lengths, they are larger by
-    /// up to the condition number.
+    /// Converts an upper bound on lengths in the shape's coordinates to a bound on lengths in the world. The
+    /// result also covers the rounding errors of the transform and its inverse, which enlarge relative errors
+    /// by up to the condition number.
     pub fn reach_to_world(&self, reach: f64) -> f64 {
         (1.0 + self.condition) * self.stretch * reach + self.to_world.translation.abs().max_element()
     }
@@ -74,7 +74,7 @@ impl TransformedShape {
         SurfacePoint { uv, barycentric, ..surface }
     }
 
-    /// Bounding box. `None` if the shape is infinite.
+    /// Bounding box, or `None` if the shape is infinite.
     pub fn bounds(&self) -> Option<Aabb> {
         if let Shape::Sphere(sphere) = &self.shape {
             let rows = self.to_world.linear.transpose();
@@ -87,31 +87,33 @@ impl TransformedShape {
         Some(self.rounded_bounds(self.to_world.point(center), self.to_world.transform_abs_bound(half)))
     }
 
-    /// The box around a center, enlarged by the rounding errors.
+    /// The box with this center and half extent, enlarged to account for rounding errors.
     fn rounded_bounds(&self, center: DVec3, extent: DVec3) -> Aabb {
         let size = self.condition * (center - self.to_world.translation).abs() + extent + center.abs();
         let extent = extent + size * (16.0 * f64::EPSILON);
         Aabb::from_points_f64([center - extent, center + extent])
     }
 
-    /// Areas of the parts in the shape's coordinates. Multiply areas by [`TransformedShape::area_scale`].
+    /// Areas of the parts in the shape's coordinates. [`TransformedShape::area_scale`] converts areas to the
+    /// world.
     pub fn part_areas(&self) -> Vec<f64> {
         self.shape.part_areas()
     }
 
-    /// Samples a point uniformly over the area of a part in the shape's coordinates.
+    /// Samples a point in the world. It is distributed uniformly over a part's area in the shape's
+    /// coordinates.
     pub fn sample(&self, part: u32, u: Vec2) -> SurfaceSample {
         let SurfaceSample { point, normal } = self.shape.sample(part, u);
         SurfaceSample { point: self.to_world.point(point), normal: self.to_world.normal(normal).normalize() }
     }
 
-    /// Factor from areas in the shape's coordinates to areas in the world, at a point with this unit normal in
-    /// the world: |det M|·|M⁻ᵀn|, where n is the normal in the shape's coordinates.
+    /// Factor from areas in the shape's coordinates to areas in the world, at a point whose unit normal in
+    /// the world is `normal`: |det M|·|M⁻ᵀn|, where n is the normal in the shape's coordinates.
     pub fn area_scale(&self, normal: DVec3) -> f64 {
         self.volume_scale / (self.to_world.linear.transpose() * normal).length()
     }
 
-    /// Image of the centroid in the shape's coordinates.
+    /// The centroid of the untransformed shape, transformed to the world.
     pub fn centroid(&self) -> DVec3 {
         self.to_world.point(self.shape.centroid())
     }
@@ -170,7 +172,7 @@ impl TransformedShape {
         }
     }
 
-    /// [`Shape::polygon_face`].
+    /// [`Shape::polygon_face`] in world coordinates.
     pub fn polygon_face(&self, number: u32) -> Option<FlatPolygon> {
         let mut corners: FlatPolygon =
             self.shape.polygon_face(number)?.iter().map(|corner| self.to_world.point(*corner)).collect();
@@ -180,7 +182,7 @@ impl TransformedShape {
         Some(corners)
     }
 
-    /// [`Shape::is_locally_thicker_than`].
+    /// [`Shape::is_locally_thicker_than`] in world coordinates.
     pub fn is_locally_thicker_than(&self, point: DVec3, distance: f64) -> bool {
         self.shape
             .is_locally_thicker_than(self.to_world.inverse_point(point), distance * self.inverse_stretch)
@@ -215,8 +217,8 @@ pub(crate) mod tests {
     use crate::math::DMat3;
     use crate::math::random::unit_generator;
 
-    /// The shape under a scale, a shear and a rotation. The transform mirrors the shape if `mirror` is −1, and
-    /// not if it is 1.
+    /// Scales, shears, and rotates a shape. The transform also mirrors the shape if `mirror` is −1, but not
+    /// if it is 1.
     pub(crate) fn sheared(shape: Shape, mirror: f64) -> Shape {
         let [x, y] = [DVec3::new(1.2, 0.1, -0.2), DVec3::new(0.3, 0.8, 0.1)];
         let linear = DMat3::from_cols(x, y, DVec3::new(-0.1, 0.2, 0.9) * mirror);
@@ -224,7 +226,7 @@ pub(crate) mod tests {
         Shape::Transformed(Box::new(TransformedShape::new(shape, to_world)))
     }
 
-    /// Area of a part, by the midpoint rule.
+    /// Area of a part, computed with the midpoint rule.
     pub(crate) fn area(shape: &Shape, part: u32) -> f64 {
         let side = 256_u32;
         let at = |i: u32| (Vec2::new((i % side) as f32, (i / side) as f32) + 0.5) / side as f32;
@@ -240,7 +242,7 @@ pub(crate) mod tests {
 
     #[test]
     fn hits_are_within_their_error_bounds() {
-        // Ellipsoids, in directions that also graze them, from far away and from inside. The distance from an
+        // Test ellipsoids with grazing rays, rays from far away, and rays from inside. The distance from an
         // ellipsoid is |f|/|∇f| up to second order, for f = |x|² − 1 in the coordinates of the unit sphere.
         let mut next = unit_generator(11);
         let mut number = || f64::from(next()) * 2.0 - 1.0;
@@ -275,7 +277,7 @@ pub(crate) mod tests {
             let bound = surface.error.as_dvec3().dot((gradient / gradient.length()).abs());
             assert!(distance <= bound, "{shape:?}, {ray:?}: {distance} > {bound}");
             counts[i % 3] += 1;
-            // No ray that leaves the surface hits it again where it starts.
+            // A ray that leaves the surface must not hit it again at its origin.
             let out = surface.normal;
             let origin = crate::geometry::ray::offset_origin(surface.point, surface.error, out, out);
             let leaving = RayF64 { origin: origin.as_dvec3(), direction: out.as_dvec3(), ..ray };
@@ -292,7 +294,8 @@ pub(crate) mod tests {
         let e = (1.0 - 1.0 / 9.0_f64).sqrt();
         let expected = std::f64::consts::TAU * (1.0 + 3.0 * e.asin() / e);
         assert!((area(&spheroid, 0) / expected - 1.0).abs() < 1e-4, "{} {expected}", area(&spheroid, 0));
-        // A cylinder stretched across its axis: the circumference of an ellipse, by the midpoint rule.
+        // A cylinder stretched across its axis. The midpoint rule gives the circumference of the elliptical
+        // cross section.
         let tube = Shape::Cylinder(Cylinder::new(DVec3::ZERO, DVec3::Z * 2.0, 1.0, true));
         let tube = scaled(tube, DVec3::new(4.0, 1.0, 1.0), DVec3::ZERO, DVec3::ZERO);
         let step = |i: u32| {

@@ -6,8 +6,8 @@ use super::{Aabb, RayF64, ShapeHit, SurfacePoint, SurfaceSample};
 use crate::math::{DVec2, DVec3, Vec2};
 use crate::sampling::warp;
 
-/// A triangle is considered huge if its coordinates are larger by this factor than the coordinates of the ray's
-/// origin and of the hit.
+/// A triangle is considered huge if its largest coordinate is more than this many times as large as the
+/// coordinates of the ray's origin and of the hit.
 const HUGE: f64 = 1024.0;
 
 /// A triangle. The front faces along (b − a) × (c − a).
@@ -23,7 +23,7 @@ pub struct Triangle {
 
 impl Triangle {
     /// Intersects the triangle from either side. Tests the edges with triple products of the corners relative
-    /// to the ray's origin. Triangles with a shared edge compute the same value for it, up to sign, so there
+    /// to the ray's origin. Triangles that share an edge compute the same value for it, up to sign, so there
     /// is no gap between them.
     pub fn intersect(&self, ray: &RayF64) -> Option<ShapeHit> {
         let (a, b, c) = (self.a - ray.origin, self.b - ray.origin, self.c - ray.origin);
@@ -105,7 +105,7 @@ impl Triangle {
         (self.a + self.b + self.c) / 3.0
     }
 
-    /// Whether a point is inside. Always false because a triangle has no volume.
+    /// Whether a point is inside, which is never the case because a triangle has no volume.
     pub fn encloses(&self, _: DVec3) -> bool {
         false
     }

@@ -47,7 +47,7 @@ const ACROSS: f32 = 1024.0 * UNIT_ROUNDOFF;
 /// Maximum coordinate error at which a miss is still certain.
 const BLUNT: f32 = 0.125;
 
-/// Maximum of D/(2A), multiplied by the extent of all triangles.
+/// Maximum product of a triangle's D/(2A) and the extent of all triangles.
 const MOST_SLENDER: f64 = 1e3;
 
 /// Placeholder index that excludes no triangle.
@@ -75,7 +75,7 @@ struct Facet {
     /// hit. Negative if there is only one triangle.
     split: f32,
     /// Index of the triangle where the sum of the coordinates is below `diagonal`, and index of the other
-    /// triangle. Equal if there is only one.
+    /// triangle. The two indices are equal if there is only one triangle.
     numbers: [u32; 2],
     /// D/(2A), which is at least the length of both vectors in `across`.
     slender: f32,
@@ -121,7 +121,8 @@ struct ErrorTerms {
 }
 
 impl TriangleList {
-    /// Creates facets from triangles. `None` if there are too many, or if one is too slender for the bounds.
+    /// Creates a list of triangles. Returns `None` if there are too many, if one is too slender for the error
+    /// bounds, or if their coordinates or extent are out of range.
     pub fn new(corners: Vec<[Vec3; 3]>) -> Option<Self> {
         let points = || corners.iter().flatten().copied();
         let (low, high) = (points().reduce(Vec3::min)?, points().reduce(Vec3::max)?);
@@ -399,7 +400,7 @@ impl Facet {
 
 /// Reorders the corners of two triangles that form a flat quadrilateral close to a parallelogram. The first
 /// triangle's outer corner becomes its first corner, and the second triangle's outer corner becomes its last.
-/// `None` for other triangles.
+/// Returns `None` for other triangles.
 fn pair_into_quad(one: &[Vec3; 3], other: &[Vec3; 3], reach: f32) -> Option<[[Vec3; 3]; 2]> {
     let apart = |of: &[Vec3; 3], from: &[Vec3; 3]| {
         let mut own = (0..3).filter(|&i| !from.contains(&of[i]));
@@ -433,7 +434,7 @@ fn slenderness([a, b, c]: &[Vec3; 3]) -> [f64; 2] {
     [slender, slender * longest]
 }
 
-/// The larger number, or `a` if `b` is NaN.
+/// The larger number, or `a` if either is NaN.
 #[inline(always)]
 fn max_or_first_if_nan(a: f32, b: f32) -> f32 {
     if b > a { b } else { a }

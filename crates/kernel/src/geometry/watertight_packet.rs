@@ -105,7 +105,7 @@ impl<'a> ShearedPacket<'a> {
         let hits = self.intersect_triangles_per_ray(&[number; PACKET_SIZE], *corners, ends);
         let mut is_nearer = [0; PACKET_SIZE];
         for i in 0..PACKET_SIZE {
-            // A hit at the end of a ray counts, unless an earlier triangle was hit at the same t.
+            // A hit at the end of a ray counts, unless the ray hit an earlier triangle at the same t.
             let is_tie = !found.t[i].is_nan() & (hits.t[i] == found.t[i]);
             is_nearer[i] = if is_tie { 0 } else { hits.hit[i] };
         }

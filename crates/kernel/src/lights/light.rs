@@ -79,8 +79,8 @@ impl Light {
         }
     }
 
-    /// Inverse light-sampling pdfs in sr. 0 for black samples and for delta lights, which no other technique
-    /// can sample.
+    /// Inverse light-sampling pdfs in sr. They are 0 for black samples and for delta lights, which no other
+    /// technique can sample.
     #[inline(always)]
     pub fn inverse_pdfs(&self, samples: &LightSamplePacket) -> F32x16 {
         let mut inverse = [0.0; PACKET_SIZE];
@@ -120,14 +120,14 @@ impl Light {
         }
     }
 
-    /// Light-sampling pdf of a hit's direction in sr⁻¹, for the surface point `from` with the given normal. 0
-    /// if light sampling never generates the direction, or if rays cannot hit the light.
+    /// Light-sampling pdf of a hit's direction in sr⁻¹, for the surface point `from` with the given normal.
+    /// It is 0 if light sampling never generates the direction, or if rays cannot hit the light.
     #[inline]
     pub fn pdf(&self, from: Vec3, normal: Vec3, met: &LightHit) -> f32 {
         self.as_area().map_or(0.0, |light| light.pdf(from, normal, met))
     }
 
-    /// Bounds on the light's position and emission, for a [`LightTree`](super::LightTree). `None` if the
+    /// Bounds on the light's position and emission for a [`LightTree`](super::LightTree), or `None` if the
     /// light emits nothing.
     pub fn bounds(&self) -> Option<LightBounds> {
         let bounds = match self.family() {
@@ -138,7 +138,7 @@ impl Light {
         Some(bounds).filter(|bounds| bounds.power > 0.0)
     }
 
-    /// The emission texture that modulates the light's radiance. `None` for an untextured light.
+    /// The emission texture that modulates the light's radiance, or `None` for an untextured light.
     #[inline(always)]
     pub fn emission_texture(&self) -> Option<&EmissionModulation> {
         self.as_area().and_then(|light| light.texture.as_deref())
@@ -163,7 +163,7 @@ impl Light {
         }
     }
 
-    /// The light's center, and the light's own geometry. Rays toward the center must ignore this geometry.
+    /// The light's center and the light's own geometry, which rays toward the center must ignore. Returns
     /// `None` for an environment.
     pub fn center_and_geometry(&self) -> Option<(LightCenter, LightGeometry)> {
         Some(match self.family() {

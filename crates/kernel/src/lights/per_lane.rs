@@ -124,7 +124,7 @@ fn as_area_sampled_mesh_light(light: &Light) -> Option<(&AreaSampledTriangles, &
     light.shape.as_mesh().and_then(MeshEmitter::as_area_sampled).map(|facets| (facets, light))
 }
 
-/// Returns each lane's light of one kind. Adds the lanes that have such a light to `of`. The other lanes get
+/// Returns the lights of one kind, and adds the lanes that have such a light to `of`. All other lanes get
 /// `filler`.
 #[inline(always)]
 fn gather_lights_of_kind<'a, T: Copy>(

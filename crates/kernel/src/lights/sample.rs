@@ -9,7 +9,7 @@ pub struct LightSample {
     pub end: ShadowRayEnd,
     /// Unit direction to the light.
     pub direction: Vec3,
-    /// Radiance divided by the pdf of the direction in sr⁻¹. For delta lights, the irradiance at normal
+    /// Radiance divided by the pdf of the direction in sr⁻¹, or for delta lights, the irradiance at normal
     /// incidence. The contribution is the weight times the BSDF and the cosine.
     pub weight: Vec3,
     /// The light's own geometry, which the shadow ray ignores.
@@ -61,7 +61,8 @@ pub struct LightHit {
 }
 
 impl LightHit {
-    /// Solid-angle pdf in sr⁻¹ of points sampled uniformly over an area. 0 if the light is seen from behind.
+    /// Solid-angle pdf in sr⁻¹ of points sampled uniformly over an area, or 0 if the light is seen from
+    /// behind.
     pub(super) fn uniform_area_pdf(&self, area: f64) -> f32 {
         let cosine = -self.normal.dot(self.direction);
         if cosine > 0.0 { self.distance * self.distance / (area as f32 * cosine) } else { 0.0 }

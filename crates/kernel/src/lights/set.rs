@@ -18,22 +18,22 @@ pub struct Lights {
     by_object: HashMap<u32, ObjectLights>,
     /// Lights on the backs of objects.
     by_back: HashMap<u32, ObjectLights>,
-    /// Directional lights with an extent and their indices. They are visible to rays that leave the scene.
+    /// Directional lights with an extent, which are visible to rays that leave the scene, and their indices.
     suns: Vec<(u32, DirectionalLight)>,
     /// The environment light and its index.
     environment: Option<(u32, Environment)>,
-    /// Tree over all lights. `None` if there are few lights.
+    /// Tree over all lights, or `None` if there are few lights.
     tree: Option<Arc<LightTree>>,
-    /// Tree over all lights except lights at infinity. `None` if path vertices sample every light.
+    /// Tree over all lights except lights at infinity, or `None` if path vertices sample every light.
     local_tree: Option<Arc<LightTree>>,
 }
 
 /// Purpose of the light samples at a vertex.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LightSamplingPurpose {
-    /// Only direct lighting. Light sampling is the only source of noise.
+    /// Direct lighting only, where light sampling is the only source of noise.
     Eye,
-    /// Path tracing. The image also has noise from other sources.
+    /// Path tracing, where the image also has noise from other sources.
     Paths,
 }
 
@@ -44,8 +44,8 @@ pub struct LightSampler<'a> {
     pub tree: &'a LightTree,
     /// Effort to spend on picking lights.
     pub picks: LightSamplingEffort,
-    /// Whether lights at infinity are sampled at every vertex instead of being in the tree. Their bounds
-    /// ignore occlusion.
+    /// Whether lights at infinity are sampled at every vertex instead of being in the tree, because their
+    /// bounds ignore occlusion.
     pub leaves_beyond: bool,
 }
 
@@ -59,7 +59,7 @@ pub struct LightSamplingEffort {
 }
 
 impl LightSamplingEffort {
-    /// Effort for direct lighting. Gives results as good as examining each of a thousand lights.
+    /// Effort for direct lighting. The results are as good as if each of a thousand lights were examined.
     pub const DIRECT: Self = Self { count: MAX_WITHOUT_TREE as u32, nodes: LightTreeCut::MOST };
 
     /// Effort for path vertices. Additional shadow rays are not worthwhile because the image also has other
@@ -95,7 +95,7 @@ impl ExpectedSamplesPerLight<'_> {
 enum ObjectLights {
     /// A single light.
     Whole(u32),
-    /// The light on each primitive. `None` for primitives without a light.
+    /// The light on each primitive, or `None` for primitives without a light.
     Primitives(Vec<Option<u32>>),
 }
 
@@ -130,11 +130,11 @@ impl Lights {
         Ok(Self { all, ..lights })
     }
 
-    /// Path vertices sample all local lights if there are at most this many. Otherwise, they pick one.
-    /// Measured in rooms with 3 to 12 lights.
+    /// Path vertices sample all local lights if there are at most this many, and otherwise pick one. The
+    /// threshold is based on measurements in rooms with 3 to 12 lights.
     const MAX_LOCAL_WITHOUT_TREE: usize = 3;
 
-    /// How vertices pick lights. `None` if they sample all lights.
+    /// How vertices pick lights, or `None` if they sample all lights.
     #[inline]
     pub fn sampler_for_purpose(&self, receivers: LightSamplingPurpose) -> Option<LightSampler<'_>> {
         match receivers {
@@ -244,7 +244,7 @@ impl Lights {
         self.environment.as_ref().map(|(_, environment)| environment)
     }
 
-    /// Solid angle of the largest light at infinity, in sr. 0 if no light has an extent.
+    /// Solid angle of the largest light at infinity in sr, or 0 if no light has an extent.
     pub fn max_infinite_light_solid_angle(&self) -> f32 {
         match self.environment {
             Some(_) => 4.0 * std::f32::consts::PI,
@@ -294,7 +294,7 @@ impl Lights {
     }
 }
 
-/// Number of lights. All lights on the same object count as one.
+/// Number of lights, where all lights on the same object count as one.
 fn count_lights_once_per_object<'a>(lights: impl Iterator<Item = &'a Light> + Clone) -> usize {
     let object = |light: &Light| light.as_area().map(|light| light.object);
     let objects: HashSet<u32> = lights.clone().filter_map(object).collect();

@@ -105,7 +105,7 @@ pub fn ratio(a: &Vec3x16, b: &Vec3x16) -> Vec3x16 {
 pub struct DielectricSamplePacket {
     /// Unit directions.
     pub directions: Vec3x16,
-    /// Pdfs of the directions in sr⁻¹. 0 for directions from which no light arrives.
+    /// Pdfs of the directions in sr⁻¹, or 0 for directions from which no light arrives.
     pub densities: F32x16,
     /// f·cosθ of the lobe divided by the pdf.
     pub shares: F32x16,
@@ -115,7 +115,7 @@ pub struct DielectricSamplePacket {
     pub beyond: Mask,
 }
 
-/// Shape of a narrow lobe, approximated as a power of a cosine around an axis. Used for light selection.
+/// Shape of a narrow lobe for light selection, approximated as a power of a cosine around an axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NarrowLobe {
     /// Unit direction of the axis.
@@ -166,7 +166,7 @@ pub trait BxdfMaterial {
     }
 
     /// The color that can be looked up for packets and set with
-    /// [`Bxdf::set_color`](super::bxdf::Bxdf::set_color). `None` if there is no such color.
+    /// [`Bxdf::set_color`](super::bxdf::Bxdf::set_color), or `None` if there is no such color.
     fn color_for_packet_lookup(&self) -> Option<&ColorOrTexture> {
         None
     }

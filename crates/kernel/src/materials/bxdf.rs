@@ -1,6 +1,7 @@
 //! The interface of non-specular BSDFs. Each one is written once, for a single point and direction; packets
-//! ([`BxdfPacket`](super::bxdf_packet::BxdfPacket)) evaluate it lane by lane, in loops that compile to vector instructions.
-//! All functions must therefore be branch-free and `#[inline(always)]`, and must not call closures.
+//! ([`BxdfPacket`](super::bxdf_packet::BxdfPacket)) evaluate it lane by lane, in loops that compile to vector
+//! instructions. All functions must therefore be branch-free and `#[inline(always)]`, and must not call
+//! closures.
 //!
 //! A BSDF is the sum of wide lobes, which are sampled like a diffuse surface, and narrow lobes, for which
 //! light samples are inefficient. It receives light from one side. A surface that also transmits light is
@@ -34,7 +35,7 @@ impl BxdfFlags {
         self.0 & other.0 == other.0
     }
 
-    /// These flags if the condition holds. Otherwise, no flags.
+    /// These flags if the condition holds, and no flags otherwise.
     #[inline(always)]
     pub const fn when(self, condition: bool) -> Self {
         Self(if condition { self.0 } else { 0 })
@@ -72,8 +73,8 @@ impl LobeValue {
 /// Directions at a surface.
 #[derive(Clone, Copy, Debug)]
 pub struct ShadingGeometry {
-    /// Unit shading normal on the lit side, rotated by [`lobe_shading_normal`]. Except for transmitted light, this
-    /// is the side of the viewer.
+    /// Unit shading normal on the lit side, rotated by [`lobe_shading_normal`]. Except for transmitted light,
+    /// this is the viewer's side.
     pub normal: Vec3,
     /// Unit direction to the viewer.
     pub wo: Vec3,
@@ -90,7 +91,7 @@ pub trait Bxdf: Soa + Default {
     type View: Soa + Default;
 
     /// Whether shading normals are rotated to face the viewer. See
-    /// [`rotate_toward_viewer`](super::microfacet::rotate_normal_to_viewer).
+    /// [`rotate_normal_to_viewer`](super::microfacet::rotate_normal_to_viewer).
     const TURNS_NORMALS: bool = true;
 
     /// Whether the BSDF is for light from behind the surface.
@@ -110,15 +111,16 @@ pub trait Bxdf: Soa + Default {
     /// Flags of all BSDFs of this kind.
     const ALWAYS: BxdfFlags;
 
-    /// A flag for which [`Bxdf::narrow_lobe_value`] is compiled into two loops, one for surfaces with the flag and one
-    /// for surfaces without it.
+    /// A flag for which [`Bxdf::narrow_lobe_value`] is compiled into two loops, one for surfaces with the
+    /// flag and one for surfaces without it.
     const SPLITS_NARROW: BxdfFlags = BxdfFlags(0);
 
     /// Creates the BSDF. `tangent` is ∂p/∂u, or zero without texture coordinates.
     fn new(point: &Self::Point, tangent: Vec3) -> Self;
 
-    /// Replaces the color that [`BxdfMaterial::color_for_packet_lookup`](super::bsdf::BxdfMaterial::color_for_packet_lookup)
-    /// returns. Not called for materials without such a color.
+    /// Replaces the color that
+    /// [`BxdfMaterial::color_for_packet_lookup`](super::bsdf::BxdfMaterial::color_for_packet_lookup) returns.
+    /// Not called for materials without such a color.
     #[inline(always)]
     fn set_color(&mut self, _point: &Self::Point, _color: Vec3) {}
 
@@ -169,8 +171,8 @@ pub trait Bxdf: Soa + Default {
     /// Shape of the narrow lobe, for light selection. Only called if the flags indicate a narrow lobe.
     fn narrow_lobe(&self, view: &Self::View) -> Option<NarrowLobe>;
 
-    /// Exponent of the narrow lobe if it is approximated as a power of a cosine. Light samples are
-    /// inefficient for large exponents. 0 for kinds whose narrow lobes send rays.
+    /// Exponent of the narrow lobe if it is approximated as a power of a cosine, or 0 for kinds whose narrow
+    /// lobes send rays. Light samples are inefficient for large exponents.
     #[inline(always)]
     fn narrow_lobe_exponent(&self) -> f32 {
         0.0

@@ -75,7 +75,7 @@ impl<B: Bxdf> BxdfPacket<B> {
         (self.any, self.shows_all) = (B::ALWAYS, true);
     }
 
-    /// Sets a surface.
+    /// Sets the surface in a lane.
     #[inline(always)]
     pub fn set_bsdf(&mut self, i: usize, point: &B::Point, shown: LobeFilter, directions: &ShadingGeometry) {
         let bsdf = B::new(point, directions.tangent);
@@ -86,7 +86,7 @@ impl<B: Bxdf> BxdfPacket<B> {
         ShownLobeFactors::from(shown).set(&mut self.shown, i);
     }
 
-    /// Copies a surface from another packet.
+    /// Copies a surface from a lane of another packet.
     #[inline(always)]
     pub fn copy_lane(&mut self, i: usize, other: &Self, from: usize) {
         B::get(&other.bsdf, from).set(&mut self.bsdf, i);

@@ -14,7 +14,7 @@ use crate::math::Vec3;
 pub struct Coated {
     /// Factor applied to the coat's reflection.
     pub specular: ColorOrTexture,
-    /// Index of refraction of the coat. At least 1.
+    /// Index of refraction of the coat, at least 1.
     pub ior: f32,
     /// The surface under the coat.
     pub base: NonSpecular,

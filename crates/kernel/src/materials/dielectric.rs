@@ -41,7 +41,7 @@ impl Dielectric {
         self.roughness.as_untextured() == Some(0.0)
     }
 
-    /// The surface's α. `None` if it is smooth.
+    /// The surface's α, or `None` if the surface is smooth.
     #[inline]
     pub fn alpha(&self, at: &TexturePoint, lookups: &mut u64) -> Option<f32> {
         (!self.is_smooth())

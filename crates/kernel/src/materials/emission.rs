@@ -27,7 +27,7 @@ pub struct Emission {
     pub texture: Option<Arc<Texture>>,
     /// Which sides emit.
     pub sides: EmissionSides,
-    /// Clear coat that attenuates the radiance by a direction-dependent factor. `None` without a coat.
+    /// Clear coat that attenuates the radiance by a direction-dependent factor, if there is one.
     pub coat: Option<Arc<EmissionCoat>>,
 }
 

@@ -19,8 +19,8 @@ pub struct TexturePoint {
     pub uv: DVec2,
     /// Footprint around `uv`. Ignored by filters without mip levels.
     pub footprint: Footprint,
-    /// The point in the second UV set. `None` if the object has no second set or no texture uses it. Boxed to
-    /// keep this struct small.
+    /// The point in the second UV set, or `None` if the object has no second set or no texture uses it. Boxed
+    /// to keep this struct small.
     pub second: Option<Box<SecondUvPoint>>,
 }
 

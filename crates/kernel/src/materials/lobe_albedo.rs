@@ -1,4 +1,5 @@
-//! Directional albedos of microfacet lobes: E(μ) = ∫ f(μ, ω) cosθ dω, as functions of the cosine μ of the view direction.
+//! Directional albedos of microfacet lobes: E(μ) = ∫ f(μ, ω) cosθ dω, as functions of the cosine μ of the
+//! view direction.
 //!
 //! They are computed by quadrature over visible normals (Heitz, *Sampling the GGX Distribution of Visible
 //! Normals*, JCGT 7(4), 2018) and stored as polynomials in t = (1 + c)μ/(μ + c), which gives more weight to
@@ -123,7 +124,7 @@ impl AlbedoTable {
     }
 }
 
-/// Evaluates the albedo at μ ≥ 0. A function returns the coefficients.
+/// Evaluates the albedo at μ ≥ 0. `term` returns the coefficients.
 #[inline(always)]
 pub fn evaluate_albedo_fit(cosine: f32, term: impl Fn(usize) -> f32) -> f32 {
     let t = (1.0 + KNEE as f32) * cosine / (cosine + KNEE as f32);
@@ -156,8 +157,8 @@ fn chebyshev_sum(terms: &[f64; TERMS], cosine: f64) -> f64 {
     chebyshev_polynomials(cosine).iter().zip(terms).map(|(value, term)| value * term).sum()
 }
 
-/// Least-squares coefficients. Solves the normal equations with Gaussian elimination. The matrix is positive
-/// definite.
+/// Least-squares coefficients. Solves the normal equations with Gaussian elimination, which needs no pivoting
+/// because the matrix is positive definite.
 fn least_squares(nodes: &[(f64, f64)], weights: &[f64]) -> [f64; TERMS] {
     let mut rows = [[0.0; TERMS + 1]; TERMS];
     for (&(cosine, value), weight) in nodes.iter().zip(weights) {
@@ -264,7 +265,7 @@ impl VisibleNormalDistribution {
         self.facet_and_reflected_cosines(x, (1.0 - x * x).sqrt() * part)[1]
     }
 
-    /// A point on the chord at x whose facet reflects light above the surface. `None` if there is no such
+    /// A point on the chord at x whose facet reflects light above the surface, or `None` if there is no such
     /// point.
     fn find_upward_reflecting_point(&self, x: f64) -> Option<f64> {
         const STEPS: u32 = 12;
@@ -273,8 +274,8 @@ impl VisibleNormalDistribution {
         heights.max_by(|one, other| one.1.total_cmp(&other.1)).filter(|best| best.1 > 0.0).map(|best| best.0)
     }
 
-    /// The ends of the interval around `lit` on the chord in which facets reflect light above the surface.
-    /// Both are relative to the chord's center, in units of half the chord's length.
+    /// The interval around `lit` on the chord in which facets reflect light above the surface. Its ends are
+    /// relative to the chord's center, in units of half the chord's length.
     fn lit_interval(&self, x: f64, lit: f64) -> [f64; 2] {
         [-1.0, 1.0].map(|end| last_true(lit, end, |part| self.reflected_direction_height(x, part) > 0.0))
     }

@@ -1,5 +1,6 @@
-//! Sources of parameter values. A material lists its parameters once, in [`BxdfMaterial::look_up_parameters`], for
-//! texture lookups, for renders with white textures, and for finding the textures that it uses.
+//! Sources of parameter values. A material lists its parameters once, in
+//! [`BxdfMaterial::look_up_parameters`], for texture lookups, for renders with white textures, and for
+//! finding the textures that it uses.
 //!
 //! [`BxdfMaterial::look_up_parameters`]: super::bsdf::BxdfMaterial::look_up_parameters
 
@@ -51,7 +52,7 @@ impl ParameterLookup<'_> for PointLookup<'_> {
     }
 }
 
-/// Replaces textures with white ones. Anisotropy is an exception: its textures are replaced with 0.
+/// Replaces all textures with white, except textures of the anisotropy, which are replaced with 0.
 pub struct WhiteLookup;
 
 impl ParameterLookup<'_> for WhiteLookup {
@@ -71,7 +72,7 @@ impl ParameterLookup<'_> for WhiteLookup {
     }
 }
 
-/// Collects a material's textures. The values are those of [`WhiteLookup`].
+/// Collects a material's textures. Returns the same values as [`WhiteLookup`].
 #[derive(Default)]
 pub struct MaterialTextureCollector<'m> {
     /// Textures of parameters that affect how the surface scatters light.

@@ -1,6 +1,6 @@
-//! Microfacets: the GGX distribution (Walter et al., *Microfacet Models for Refraction through Rough Surfaces*, 2007) with
-//! height-correlated Smith masking and shadowing (Heitz, *Understanding the Masking-Shadowing Function in Microfacet-Based
-//! BRDFs*, JCGT 3(2), 2014), single scattering.
+//! Microfacets with single scattering: the GGX distribution (Walter et al., *Microfacet Models for Refraction
+//! through Rough Surfaces*, 2007) with height-correlated Smith masking and shadowing (Heitz, *Understanding
+//! the Masking-Shadowing Function in Microfacet-Based BRDFs*, JCGT 3(2), 2014).
 //!
 //! A lobe is f = F·D·G/(4 cosθᵢ cosθₒ) with G = 1/(1 + Λᵢ + Λₒ). Let s(θ) = √(cos²θ + α² sin²θ), which
 //! implies 1 + 2Λ = s/cosθ. Then G/(4 cosθᵢ cosθₒ) = 1/(2(cosθᵢ sₒ + cosθₒ sᵢ)), and the pdf of a direction
@@ -43,7 +43,7 @@ pub fn rotate_normal_to_viewer(normal: Vec3, to_eye: Vec3) -> Vec3 {
     Vec3::new(choose(turned.x, normal.x), choose(turned.y, normal.y), choose(turned.z, normal.z))
 }
 
-/// [`rotate_normal_to_viewer`] for a single normal. Optimized for normals that do not need rotation.
+/// [`rotate_normal_to_viewer`] with a branch that is fast for normals that do not need rotation.
 #[inline(always)]
 pub fn rotate_single_normal_to_viewer(normal: Vec3, to_eye: Vec3) -> Vec3 {
     if normal.dot(to_eye) < MIN_FACING_COSINE { rotate_normal_to_viewer(normal, to_eye) } else { normal }
@@ -103,8 +103,8 @@ impl UnnormalizedHalfVector {
         self.ggx_ndf_from_stretched(x * x + y * y, u * v)
     }
 
-    /// Computes D from two values: the squared perpendicular component divided by α², and the product of both
-    /// α values.
+    /// Computes D from the squared perpendicular component divided by α², and the product of the two α
+    /// values.
     #[inline(always)]
     fn ggx_ndf_from_stretched(&self, stretched: f32, product: f32) -> f32 {
         let slope = self.along * self.along + stretched;
@@ -145,15 +145,15 @@ impl SmithTerms {
         self.cosine > MIN_COSINE
     }
 
-    /// Computes D·G/(4 cosθᵢ cosθₒ) in sr⁻¹ from D. 0 if either direction is below the surface.
+    /// Computes D·G/(4 cosθᵢ cosθₒ) in sr⁻¹ from D. Returns 0 if either direction is below the surface.
     #[inline(always)]
     pub fn torrance_sparrow_without_fresnel(&self, other: &Self, distribution: f32) -> f32 {
         let value = distribution / (2.0 * (self.cosine * other.slope + other.cosine * self.slope));
         if self.is_above_surface() & other.is_above_surface() { value } else { 0.0 }
     }
 
-    /// Computes the pdf in sr⁻¹ of a direction from D. The direction is sampled by [`sample_reflection`] for
-    /// this view direction.
+    /// Computes, from D, the pdf in sr⁻¹ of a direction that [`sample_reflection`] samples for this view
+    /// direction.
     #[inline(always)]
     pub fn reflection_pdf(&self, distribution: f32) -> f32 {
         let pdf = distribution / (2.0 * (self.cosine + self.slope));
@@ -162,8 +162,9 @@ impl SmithTerms {
 }
 
 impl SmithTerms {
-    /// [`SmithTerms::reflection_pdf`], computed from the result of [`SmithTerms::torrance_sparrow_without_fresnel`] instead of D. 0 for
-    /// directions below the surface.
+    /// [`SmithTerms::reflection_pdf`], computed from the result of
+    /// [`SmithTerms::torrance_sparrow_without_fresnel`] instead of D. Returns 0 for directions below the
+    /// surface.
     #[inline(always)]
     pub fn pdf_from_reflection_term(&self, other: &Self, reflected: f32) -> f32 {
         let both = self.cosine * other.slope + other.cosine * self.slope;
@@ -172,7 +173,8 @@ impl SmithTerms {
     }
 }
 
-/// A frame around a normal whose first tangent is along a vector.
+/// A frame around a normal. Its first axis is `tangent`, projected onto the surface and normalized, or
+/// arbitrary if that is impossible.
 #[inline(always)]
 pub fn frame_with_tangent(normal: Vec3, tangent: Vec3) -> Frame {
     let plain = Frame::from_normal(normal);

@@ -163,7 +163,7 @@ mod tests {
             let mipmaps = Mipmaps::build(&image, halved).expect("halving succeeds");
             assert_eq!(mipmaps.memory_bytes() as u64, Mipmaps::estimate_memory_bytes(width, height, false));
             for number in 1..=mipmaps.count() {
-                let level = mipmaps.level(number).expect("a level");
+                let level = mipmaps.level(number).expect("the level exists");
                 assert_eq!(
                     (level.width, level.height),
                     ((width >> number).max(1), (height >> number).max(1))
@@ -184,14 +184,14 @@ mod tests {
             unusable: 0,
         };
         // The mean is computed in linear light, not from the bytes.
-        assert_eq!(halved(&four).expect("made").get(0, 0), Vec3::splat(0.5));
+        assert_eq!(halved(&four).expect("halving succeeds").get(0, 0), Vec3::splat(0.5));
         let line = |values: &[f32]| Texels {
             width: values.len() as u32,
             height: 1,
             data: TexelData::Float(values.iter().map(|value| Vec3::splat(*value)).collect()),
             unusable: 0,
         };
-        let five = halved(&line(&[10.0, 20.0, 30.0, 40.0, 50.0])).expect("made");
+        let five = halved(&line(&[10.0, 20.0, 30.0, 40.0, 50.0])).expect("halving succeeds");
         assert_eq!([five.get(0, 0).x, five.get(1, 0).x], [18.0, 42.0]);
     }
 }

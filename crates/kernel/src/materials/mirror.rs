@@ -54,7 +54,7 @@ impl Mirror {
     }
 }
 
-/// The reflected direction of `incident`: R = I − 2(I·N)N.
+/// The reflection of the direction `incident`: R = I − 2(I·N)N.
 pub fn reflect(incident: Vec3, normal: Vec3) -> Vec3 {
     incident - normal * (2.0 * incident.dot(normal))
 }

@@ -49,7 +49,7 @@ pub struct Material {
     pub emission: Emission,
     /// Perturbation of the shading normals by a normal map, a bump map, or both.
     pub normal_perturbation: Option<NormalPerturbation>,
-    /// Probability that the surface exists at a point. `None` if the surface is opaque everywhere.
+    /// Probability that the surface exists at a point, or `None` if the surface is opaque everywhere.
     pub opacity: Option<Opacity>,
 }
 
@@ -89,7 +89,7 @@ impl Material {
         self.textures().iter().any(|texture| texture.mipmaps.is_some())
     }
 
-    /// All textures. A coat over an emitting surface has the same textures as the BSDF's coat.
+    /// All textures. The emission's coat is omitted because it has the same textures as the BSDF's coat.
     fn textures(&self) -> Vec<&Arc<Texture>> {
         let mut textures: Vec<_> = match &self.bsdf {
             Bsdf::NonSpecular(rough) => rough.textures().collect(),
@@ -143,7 +143,7 @@ impl Bsdf {
         self.non_specular_part().is_some_and(NonSpecular::is_anisotropic)
     }
 
-    /// The non-δ lobes. `None` if there are none.
+    /// The non-δ lobes, or `None` if the surface has no such lobes.
     #[inline]
     pub fn non_specular_part(&self) -> Option<&NonSpecular> {
         match self {
@@ -152,7 +152,7 @@ impl Bsdf {
         }
     }
 
-    /// The dielectric that fills the shape. `None` for other materials.
+    /// The dielectric that fills the shape, or `None` for other materials.
     pub fn as_dielectric(&self) -> Option<&Dielectric> {
         match self {
             Self::Dielectric(glass) => Some(glass),

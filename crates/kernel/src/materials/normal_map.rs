@@ -7,7 +7,8 @@ use super::texture::Texture;
 use crate::math::Vec3;
 use crate::math::frame::Frame;
 
-/// A tangent-space normal map. Its linear values are (n + 1)/2, where z points away from the surface.
+/// A tangent-space normal map. Its linear values encode a normal n as (n + 1)/2, with z pointing away from
+/// the surface.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NormalMap {
     /// The normals.

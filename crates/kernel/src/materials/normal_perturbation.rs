@@ -44,14 +44,14 @@ impl NormalPerturbation {
         bent
     }
 
-    /// All textures of both maps.
+    /// The texture of each map that is present.
     pub fn textures(&self) -> impl Iterator<Item = &Arc<Texture>> {
         let of_normals = self.normal_map.as_ref().map(|map| &map.texture);
         of_normals.into_iter().chain(self.bump.as_ref().map(|bump| &bump.texture))
     }
 }
 
-/// A bump map. The heights are in the red channel of a texture (Blinn, *Simulation of Wrinkled Surfaces*,
+/// A bump map, with heights in the red channel of a texture (Blinn, *Simulation of Wrinkled Surfaces*,
 /// SIGGRAPH 1978).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Bump {
@@ -124,7 +124,7 @@ mod tests {
             ([Vec3::X, Vec3::NEG_Y], Vec3::Z, 0.5, Vec3::new(-0.5, 0.0, 1.0)),
             ([Vec3::X, Vec3::Y], Vec3::NEG_Z, 0.5, Vec3::new(-0.5, 0.0, -1.0)),
             ([Vec3::X, Vec3::Y], Vec3::Z, -0.5, Vec3::new(0.5, 0.0, 1.0)),
-            // u does not change along u + v. The height is x − y.
+            // Here, x = u + v and y = v, so the height u equals x − y.
             ([Vec3::X, Vec3::new(1.0, 1.0, 0.0)], Vec3::Z, 1.0, Vec3::new(-1.0, 1.0, 1.0)),
             // The shading normal may be tilted. Only the components of the tangents perpendicular to it
             // matter.

@@ -3,7 +3,7 @@
 use super::footprint::TexturePoint;
 use super::scalar::ScalarParameter;
 
-/// The probability that a surface exists at a point. If it does not exist, rays pass undeflected.
+/// The probability that a surface exists at a point. Where it does not, rays pass through undeflected.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Opacity {
     /// The opacity, clamped to [0, 1].

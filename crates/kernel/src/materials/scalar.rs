@@ -15,12 +15,12 @@ choice! {
         Green = "g",
         /// Blue.
         Blue = "b",
-        /// Alpha. 1 for images without an alpha channel.
+        /// Alpha, or 1 for images without an alpha channel.
         Alpha = "a",
     }
 }
 
-/// Value that a scalar texture reads from a pixel.
+/// Selects the value that a scalar texture reads from each pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum ChannelSelector {
     /// The luminance of the pixel.
@@ -29,8 +29,8 @@ pub enum ChannelSelector {
     Channel(Channel),
     /// The alpha, or the luminance for images without an alpha channel.
     Opacity,
-    /// [`ChannelSelector::Opacity`] for an image that the material does not also use as a color. If alpha is 1
-    /// everywhere and all pixels are gray, the luminance is used as the opacity.
+    /// Like [`ChannelSelector::Opacity`], but for an image that the material does not also use as a color. If
+    /// alpha is 1 everywhere and all pixels are gray, the luminance is used as the opacity.
     Mask {
         /// Whether the luminance is also used if some pixels are not gray.
         of_any_color: bool,
@@ -42,7 +42,7 @@ pub enum ChannelSelector {
 pub enum ScalarParameter {
     /// A constant value.
     Constant(f32),
-    /// A texture. Each of its channels contains the value.
+    /// A texture that contains the value in each of its channels.
     Texture(Arc<Texture>),
 }
 

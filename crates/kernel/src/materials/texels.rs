@@ -35,7 +35,7 @@ pub enum TexelData {
 }
 
 impl Texels {
-    /// Linear value at column `x` and row `y` from the top. Both must be in range.
+    /// Linear value at column `x` and row `y` from the top, which must be in range.
     #[inline]
     pub fn get(&self, x: u32, y: u32) -> Vec3 {
         self.linear_color_at_index(y as usize * self.width as usize + x as usize)
@@ -111,8 +111,8 @@ impl Texels {
         values
     }
 
-    /// Linear values at packets of texel indices. Writes them in place because compilers handle large return
-    /// values poorly.
+    /// Writes the linear values at packets of texel indices to `values`. They are not returned, because
+    /// compilers handle large return values poorly.
     #[inline(always)]
     pub fn read_color_packets_into(&self, places: &[[usize; PACKET_SIZE]], values: &mut [Vec3x16]) {
         for (places, values) in places.iter().zip(values) {

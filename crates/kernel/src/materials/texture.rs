@@ -48,10 +48,10 @@ pub struct Texture {
     pub wrap: Wrap,
     /// Number of repetitions along u and v.
     pub repeat: Vec2,
-    /// Transform that is applied after repetition. `None` if it is the identity on the first UV set.
+    /// Transform that is applied after repetition, or `None` if it is the identity on the first UV set.
     pub moved: Option<Box<UvTransform>>,
-    /// Scale and offset applied to looked-up values. `None` for the identity. Does not affect heights and
-    /// their slopes.
+    /// Scale and offset applied to looked-up values, or `None` for the identity. Heights and their slopes are
+    /// not affected.
     pub factor: Option<ValueScaleAndOffset>,
 }
 
@@ -68,17 +68,17 @@ impl ValueScaleAndOffset {
     /// Leaves values as they are.
     pub const IDENTITY: Self = Self { gain: Vec3::ONE, base: Vec3::ZERO };
 
-    /// A scale without an offset. `None` if the scale is 1.
+    /// A scale without an offset, or `None` if the scale is 1.
     pub fn from_scale(gain: Vec3) -> Option<Self> {
         Self::from_scale_and_offset(gain, Vec3::ZERO)
     }
 
-    /// A scale and an offset. `None` for the identity.
+    /// A scale and an offset, or `None` for the identity.
     pub fn from_scale_and_offset(gain: Vec3, base: Vec3) -> Option<Self> {
         (gain != Vec3::ONE || base != Vec3::ZERO).then_some(Self { gain, base })
     }
 
-    /// The scaled value plus the offset, at least 0.
+    /// The scaled value plus the offset, clamped to be nonnegative.
     #[inline]
     fn apply(&self, value: Vec3) -> Vec3 {
         (value * self.gain + self.base).max(Vec3::ZERO)
@@ -138,7 +138,7 @@ impl UvTransform {
         DVec2::new(moved.x * cos + moved.y * sin, moved.y * cos - moved.x * sin)
     }
 
-    /// Repeats and transforms a packet of coordinates.
+    /// Multiplies a packet of coordinates by `repeat` and transforms them.
     fn transform_packet(&self, uv: &[[f64; PACKET_SIZE]; 2], repeat: DVec2) -> [[f64; PACKET_SIZE]; 2] {
         let mut row = *uv;
         for i in 0..PACKET_SIZE {
@@ -405,8 +405,8 @@ impl Texture {
         self.bilinear(near, folded).lerp(self.bilinear(far, folded), part)
     }
 
-    /// The two images closest to a fractional mip level, and the weight of the second image. `None` if only
-    /// the original image is used.
+    /// The two images closest to a fractional mip level, and the weight of the second image, or `None` if
+    /// only the original image is used.
     #[inline(always)]
     fn adjacent_levels(&self, level: f32) -> Option<(&Texels, &Texels, f32)> {
         let mipmaps = self.mipmaps.as_ref().filter(|_| level > 0.0)?;
@@ -482,8 +482,8 @@ impl Texture {
     }
 }
 
-/// Rounds down. Unlike [`f32::floor`], this never requires a library call. On processors without a rounding
-/// instruction, such a call is slow.
+/// Rounds down without the slow library call that [`f32::floor`] makes on processors without a rounding
+/// instruction.
 #[inline(always)]
 fn floor(x: f32) -> i32 {
     let towards_zero = x as i32;
@@ -573,7 +573,7 @@ impl Wrap {
         }
     }
 
-    /// An index and its successor, both wrapped.
+    /// The wrapped index and its wrapped successor.
     #[inline(always)]
     fn neighbor_indices(self, first: i32, size: i32) -> [i32; 2] {
         [self.wrap_index(first, size), self.wrap_index(first + 1, size)]
@@ -844,7 +844,7 @@ mod tests {
                 assert_eq!(lane(&lanes, i), alone, "{i}");
             }
         }
-        // Partial alpha also weights the colors.
+        // Partially transparent texels weight the colors by their alpha.
         let half = TexelData::LinearAlpha8(vec![[255, 0, 0, 51], [0, 255, 0, 204]]);
         let color =
             row(2, half, TextureFilter::Bilinear).lookup(&TexturePoint::from_uv(DVec2::new(0.5, 0.5)));
@@ -853,7 +853,7 @@ mod tests {
 
     #[test]
     fn mip_levels_preserve_cutoff_coverage() {
-        // Four of the ten texels are visible. Their alpha is just above the cutoff.
+        // Four of the ten texels are visible, with an alpha just above the cutoff.
         let alphas = [140, 140, 120, 0, 0, 140, 120, 0, 140, 0].map(|alpha| [alpha; 3]);
         let mut texture = row(10, TexelData::Linear8(alphas.to_vec()), TextureFilter::Mipmap);
         texture.mipmaps = levels(&texture.texels.threshold_red_channel(0.5));

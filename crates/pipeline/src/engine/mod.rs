@@ -157,7 +157,7 @@ struct ReadyScene {
     film: Fingerprint,
     texels_loaded: u64,
     texture_memory_bytes: u64,
-    /// Share of the image that this process renders. `None` for the whole image.
+    /// Share of the image that this process renders, or `None` for the whole image.
     share: Option<Shard>,
 }
 
@@ -267,7 +267,7 @@ impl Engine {
         (self.films.current().map(|state| state.key), view)
     }
 
-    /// Sends a preview of the current image in another size, outside of a request.
+    /// Sends a preview of the current image at another size, outside of a request.
     pub(super) fn send_resized_preview(
         &mut self,
         bounds: Option<MaxPreviewSize>,
@@ -421,8 +421,8 @@ impl Engine {
         })
     }
 
-    /// Calls `read`, and calls it again whenever a file changes in the meantime. This way, images and errors
-    /// never result from a mix of file versions. `read` must verify the files that it loads.
+    /// Calls `read` repeatedly until no file changes in the meantime, so that images and errors never result
+    /// from a mix of file versions. `read` must verify the files that it loads.
     fn read_consistently<T>(
         &mut self,
         token: &CancelToken,
@@ -499,7 +499,7 @@ impl Engine {
         let lookups = texture_needs_with_saved_scene(&plan, own_image_plan.as_ref());
         let (meshes, bodies, textures, needed) =
             self.load_assets(&parsed, lookups, findings, table, &reading)?;
-        // Parts that were rendered from a half-written file could be merged.
+        // Otherwise, parts rendered from a half-written file could be merged.
         if plan.shard.is_some() {
             contents.wait_for_writers(token)?;
         }
@@ -564,7 +564,7 @@ impl Engine {
         })
     }
 
-    /// Returns the share of the image that this process renders. `None` for the whole image.
+    /// Returns the share of the image that this process renders, or `None` for the whole image.
     fn assigned_shard(&self, plan: &RenderPlan, photons: Option<Fingerprint>) -> Option<Shard> {
         let emits_photons =
             photons.and_then(|key| self.photons.get(key)).is_some_and(PhotonStore::has_lit_caustic_casters);

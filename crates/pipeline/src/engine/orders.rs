@@ -1,4 +1,4 @@
-//! Orders that the front end sends during a request.
+//! Commands that the front end sends during a request.
 
 use std::cell::Cell;
 
@@ -20,11 +20,11 @@ pub(crate) enum Interruption {
     Ended,
 }
 
-/// Orders that arrive during a request.
+/// Commands that arrive during a request.
 pub(crate) trait PendingCommands {
     /// Whether the current image should be written.
     fn wants_write(&self) -> bool;
-    /// Like [`Self::wants_write`], but clears the order.
+    /// Like [`Self::wants_write`], but clears the command.
     fn take_write(&self) -> bool;
     /// Takes the pending preview size change.
     fn take_preview_resize(&self) -> Option<Option<MaxPreviewSize>>;
@@ -34,13 +34,13 @@ pub(crate) trait PendingCommands {
     fn interruption_reason(&self) -> Interruption;
 }
 
-/// Tokens and orders for a running request.
+/// Cancel tokens and commands for a running request.
 pub(crate) struct RequestContext<'a> {
     pub(crate) token: &'a CancelToken,
     /// Cancels the write stage, which runs last.
     pub(crate) writing: &'a CancelToken,
     pub(crate) orders: &'a dyn PendingCommands,
-    /// Whether the front end has already been told that its write order is postponed.
+    /// Whether the postponement of a write command has already been reported to the front end.
     is_postponed: Cell<bool>,
 }
 
@@ -53,7 +53,7 @@ impl<'a> RequestContext<'a> {
         Self { token, writing, orders, is_postponed: Cell::new(false) }
     }
 
-    /// Reports, once, that a write order is postponed until every pixel has a sample.
+    /// Reports, once per request, that a write command is postponed until every pixel has a sample.
     pub(super) fn report_write_awaiting_samples(&self, sink: &EventSink) {
         if self.orders.wants_write() && !self.is_postponed.replace(true) {
             sink.send(Event::WritePostponed { generation: sink.generation });

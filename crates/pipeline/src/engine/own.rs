@@ -1,5 +1,5 @@
 //! The scene's own image, which is the saved scene rendered with the command-line overrides. While the user
-//! views other images by changing settings with keys, its film, checkpoint and files are kept.
+//! changes settings with keys to view other images, its film, checkpoint and files are kept.
 
 use std::sync::Arc;
 
@@ -37,7 +37,7 @@ pub(super) struct SavedSceneImage {
     camera: CameraOverrides,
     /// Files that the image depends on.
     files: Vec<FileRead>,
-    /// Share of the image that this process renders. `None` for the whole image.
+    /// Share of the image that this process renders, or `None` for the whole image.
     pub(super) share: Option<Shard>,
 }
 
@@ -91,7 +91,7 @@ impl Engine {
     }
 
     /// Checks whether a request fits in memory. If the request shows another image, the film of the scene's
-    /// own image also counts. If both films do not fit together, the film of the scene's own image may be
+    /// own image also counts. If the two films do not fit together, the film of the scene's own image may be
     /// dropped, but only if that image has been written.
     ///
     /// # Errors
@@ -127,8 +127,8 @@ impl Engine {
         state.map_or(0, FilmState::memory_bytes)
     }
 
-    /// If the scene has been saved since the last request, lets its own image replace an image with keyboard
-    /// changes.
+    /// If the scene has been saved since the last request, allows its own image to replace an image that was
+    /// written with keyboard changes.
     pub(super) fn allow_replacing_after_scene_save(&mut self, saves: u64) {
         if std::mem::replace(&mut self.saves, saves) != saves {
             self.written.allow_replacing_user_written_image();
@@ -142,7 +142,7 @@ impl Engine {
         }
     }
 
-    /// Reports the state of the scene's own image while another one is shown.
+    /// Reports the state of the scene's own image while another image is shown.
     pub(super) fn report_saved_scene_image_state(
         &self,
         request: &Request,
@@ -203,8 +203,8 @@ impl Engine {
         Ok(StageResult { value: false, status: Status::Skipped, why: reasons::PREVIEW_ONLY.to_owned() })
     }
 
-    /// Calls `work`. If `film` belongs to the scene's own image and checkpoints are enabled for that image,
-    /// passes it a checkpointer.
+    /// Calls `work`, with a checkpointer if `film` belongs to the scene's own image and that image uses
+    /// checkpoints.
     pub(super) fn with_checkpointer<T>(
         &self,
         film: Option<Fingerprint>,
@@ -229,7 +229,7 @@ impl Engine {
         work(Some(&Checkpointer::new(output, own.plan.checkpoints, around)), self)
     }
 
-    /// Removes the checkpoint of the scene's own image, which has been written.
+    /// Removes the checkpoint of the scene's own image after that image has been written.
     pub(super) fn remove_saved_scene_checkpoint(&self, sink: &EventSink) {
         let Some(state) = self.own.as_ref().and_then(|own| self.films.get(own.film)) else { return };
         self.with_checkpointer(Some(state.key), sink, &|| Interruption::Replaced, |checkpointer, _| {
@@ -240,7 +240,7 @@ impl Engine {
         });
     }
 
-    /// Saves a checkpoint of the scene's own image if the worker stops while showing another one.
+    /// Saves a checkpoint of the scene's own image if the worker stops while showing another image.
     pub(crate) fn checkpoint_saved_scene_image(&self, sink: &EventSink, interruption: Interruption) {
         let Some(own) = self.own.as_ref().filter(|_| !self.is_saved_scene_image_written()) else { return };
         let Some(state) = self.films.get(own.film).filter(|state| !state.is_kept) else { return };
@@ -253,8 +253,8 @@ impl Engine {
     }
 }
 
-/// Whether a plan's render uses checkpoints. The output must be a regular file. In addition, checkpoints must
-/// be enabled, or the render must resume from one.
+/// Whether a plan's render uses checkpoints. The output must be a regular file or not exist yet, and
+/// checkpoints must be enabled unless the render was explicitly resumed.
 fn uses_checkpoints(plan: &RenderPlan) -> bool {
     let is_file =
         plan.outputs.first().is_some_and(|path| path.metadata().map_or(true, |found| found.is_file()));
@@ -262,7 +262,7 @@ fn uses_checkpoints(plan: &RenderPlan) -> bool {
     (seconds > 0.0 || resume == ResumeMode::Asked) && is_file
 }
 
-/// Returns the plan for the scene's own image if the request shows another one.
+/// Returns the plan for the scene's own image if the request shows another image.
 ///
 /// # Errors
 /// Returns the errors from [`resolve_plan`].
@@ -275,8 +275,8 @@ pub(super) fn saved_scene_plan(
     own.map_err(|error| AbortReason::Failed(Failure::Scene(vec![*error])))
 }
 
-/// Returns the textures that a request needs. These include the textures for the scene's own image, because
-/// its film key depends on them.
+/// Returns the textures that a request needs, including those for the scene's own image, because its film key
+/// depends on them.
 pub(super) fn texture_needs_with_saved_scene(
     plan: &RenderPlan,
     own: Option<&RenderPlan>,

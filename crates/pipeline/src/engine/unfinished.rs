@@ -117,8 +117,8 @@ impl Engine {
         Ok(Some(rendered.status == Status::Reused && !is_written_now))
     }
 
-    /// Loads any additional textures that this view needs. Returns `None` if the scene's files have changed,
-    /// because they may no longer match the files in memory.
+    /// Loads any additional textures that this view needs. Returns `None` if the scene's files have changed
+    /// on disk, because they may no longer match the data in memory.
     fn load_missing_textures(
         &mut self,
         good: LastValidScene,

@@ -25,7 +25,7 @@ use crate::scene::quote_toml_string;
 use crate::settings::ViewSide;
 use crate::stages::containers::GltfContainers;
 
-/// Storage for the generated scene's meshes and images.
+/// Where the generated scene's meshes and images are stored.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum ExportStorage {
     /// In the glTF file and the files it references.
@@ -234,7 +234,7 @@ impl SceneWriter<'_> {
         self.toml.key_value("matrix", format!("[{matrix},  0, 0, 0, 1]"));
     }
 
-    /// Returns the file name for `content`. Adds a file if the content is new.
+    /// Returns the file name for `content`, adding a file if the content is new.
     fn add_exported_file(&mut self, content: ExportedFileContent, wanted: &str, ending: &str) -> String {
         if let Some(known) = self.names.get(&content) {
             return known.clone();
@@ -349,7 +349,7 @@ fn max_irradiance(lights: &[ModelLight], [least, greatest]: [DVec3; 2]) -> f64 {
     lights.iter().map(of_light).sum()
 }
 
-/// Reads the first bytes of a file. Returns `None` if this fails.
+/// Reads the first four bytes of a file, or returns `None` if this fails.
 fn first_bytes(path: &Path) -> Option<[u8; 4]> {
     let (mut file, _) = crate::system::file::open_regular_file(path).ok()?.ok()?;
     let mut start = [0; 4];

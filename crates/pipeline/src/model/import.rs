@@ -87,7 +87,7 @@ fn check_scene(path: &Path, containers: &GltfContainers, token: &CancelToken) ->
         token,
     )?;
     let Err(errors) = load_generated(shown.text.into(), path, &[]) else { return Ok(()) };
-    // Ignore errors about file names, because the imported scene uses different ones.
+    // Ignore errors about file names, because the imported scene uses different file names.
     let counts = |one: &&Diagnostic| one.severity == Severity::Error && !one.message.contains("`file`");
     let Some(first) = errors.into_iter().find(|one| counts(&one)) else { return Ok(()) };
     Err(AssetError::Malformed {

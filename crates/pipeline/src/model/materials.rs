@@ -148,7 +148,7 @@ impl<F: MaterialExportTarget> MaterialWriter<'_, F> {
         }
     }
 
-    /// Writes the opacity, which uses the alpha channel of a texture if there is one.
+    /// Writes the opacity, reading it from the texture's alpha channel if there is a texture.
     fn write_opacity(&mut self, keys: &mut TomlEntries, value: &TexturedValue, color: &TexturedValue) {
         match &value.texture {
             Some(texture) => {
@@ -209,7 +209,7 @@ impl<F: MaterialExportTarget> MaterialWriter<'_, F> {
         }
     }
 
-    /// Returns a texture's name. Writes its table if it is new.
+    /// Returns a texture's name, writing its table if the texture is new.
     fn ensure_texture_table(&mut self, texture: &TextureRef, use_: TextureUse, factor: DVec3) -> String {
         let mut keys = TomlEntries::new();
         if texture.is_nearest {

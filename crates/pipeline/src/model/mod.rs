@@ -1,5 +1,5 @@
 //! Generates scene text for a mesh or glTF file. `glimt MODEL` and `glimt import` use the same generator, so
-//! both produce the same image.
+//! they produce the same image.
 
 mod frame;
 mod gltf;
@@ -29,7 +29,7 @@ pub(crate) struct ModelViewOptions {
     /// Side facing the camera. `None` uses the camera from the file, or [`ViewSide::Iso`] if the file has no
     /// camera.
     pub(crate) from: Option<ViewSide>,
-    /// Aspect ratio of the image. `None` if the command line sets neither width nor height.
+    /// Aspect ratio of the image, or `None` if the command line sets neither width nor height.
     pub(crate) aspect: Option<f64>,
     /// Up axis of a mesh file. `None` uses the format's default.
     pub(crate) up: Option<UpAxis>,
@@ -126,7 +126,7 @@ fn file_name(path: &Path) -> String {
     path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
-/// Limit on indirect radiance per bounce: four times the sky's radiance. Used for scenes with polished
+/// Limit on indirect radiance per bounce: four times the sky's radiance. It is used for scenes with polished
 /// surfaces, in which caustics from the key light would appear as fireflies at low sample counts.
 const CLAMP: &str = "2";
 /// Roughness above which surfaces do not cause fireflies. At 64 samples, clamping changes the error by a
@@ -146,7 +146,7 @@ enum Lighting {
     },
     /// The lights from the file, plus a sky scaled to match their brightness.
     FromFile {
-        /// Exposure in stops to compensate for bright lights. Never positive.
+        /// Exposure in stops, never positive, to compensate for bright lights.
         exposure: f64,
     },
 }

@@ -39,7 +39,7 @@ fn is_from_blender(path: &Path) -> bool {
 }
 
 impl UpAxis {
-    /// Euler angles in degrees that rotate this axis to y. `None` for y itself.
+    /// Euler angles in degrees that rotate this axis to y, or `None` for y itself.
     fn rotation(self) -> Option<[i32; 3]> {
         match self {
             Self::X => Some([0, 0, 90]),

@@ -56,8 +56,8 @@ impl FilmCache {
         self.make_room(0);
     }
 
-    /// Makes the film with this key the current one if it is cached and usable. Otherwise, there is no
-    /// current film. Caches the previous film if there is room.
+    /// Makes the film with this key current if it is cached and usable. Otherwise, leaves no film current.
+    /// Caches the previous film if there is room.
     pub(crate) fn make_current_if_cached(
         &mut self,
         key: Fingerprint,
@@ -219,7 +219,7 @@ mod tests {
             if tries.get() == 1 { Err("no memory") } else { Ok(state("d")) }
         });
         assert!(made.is_ok() && finds(&mut films, "own"));
-        // Once another film is pinned, this one is treated like any other.
+        // Once another film is pinned, the first film is treated like any other.
         films.pin(key("other"));
         assert!(!finds(&mut films, "d"));
         assert!(!finds(&mut films, "own"));

@@ -25,7 +25,7 @@ pub(crate) struct FilmState {
     /// Serial number, assigned by the film cache.
     pub(crate) number: u64,
     pub(crate) film: Arc<Film>,
-    /// Number of samples taken so far in each half of each cell. [`u32::MAX`] for cells that are not
+    /// Number of samples taken so far in each half of each cell, or [`u32::MAX`] for cells that are not
     /// rendered.
     pub(crate) done: Vec<[u32; 2]>,
     /// Number of rays traced in each cell.
@@ -50,9 +50,9 @@ pub(crate) struct FilmState {
     pub(crate) ended_by: Option<f64>,
     /// Total render time over all requests, in seconds.
     pub(crate) render_seconds: f64,
-    /// Share of the image to render. `None` for the whole image.
+    /// Share of the image to render, or `None` for the whole image.
     pub(crate) share: Option<Shard>,
-    /// Whether each tile belongs to the share. `None` if all tiles do.
+    /// Whether each tile belongs to the share, or `None` if all tiles do.
     own: Option<Vec<bool>>,
     /// Work done by the process whose checkpoint this render resumed from.
     pub(crate) before: EarlierProcessWork,
@@ -60,7 +60,7 @@ pub(crate) struct FilmState {
     pub(crate) traced: RayCounters,
     /// Whether a checkpoint contains all of the film's samples.
     pub(crate) is_kept: bool,
-    /// Names and values of everything that affects the image. `None` until first needed.
+    /// Names and values of everything that affects the image, or `None` until first needed.
     pub(crate) identity: Option<Vec<RenderInput>>,
     /// Whether the film was loaded from a finished part.
     pub(crate) is_finished_part: bool,
@@ -160,7 +160,7 @@ impl FilmState {
         self.is_complete_in_region(None, samples)
     }
 
-    /// Like [`Self::is_complete`], but only for tiles overlapping `part`. `None` means all tiles.
+    /// Like [`Self::is_complete`], but only for tiles overlapping `part` (`None` for all tiles).
     pub(crate) fn is_complete_in_region(&self, part: Option<Rect>, samples: u32) -> bool {
         self.shard_cell_halves()
             .filter(|(cell, _)| self.cell_tile_overlaps_rect(part, *cell))
@@ -183,7 +183,7 @@ impl FilmState {
         self.min_unfinished_samples_in(None, most)
     }
 
-    /// Like [`Self::min_unfinished_samples`], but only for tiles overlapping `part`. `None` means all tiles.
+    /// Like [`Self::min_unfinished_samples`], but only for tiles overlapping `part` (`None` for all tiles).
     pub(crate) fn min_unfinished_samples_in(&self, part: Option<Rect>, most: u32) -> u32 {
         let of = |(tile, half): (usize, usize)| {
             let done = self.done[tile][half];
@@ -208,7 +208,7 @@ impl FilmState {
         self.shard_cell_halves().any(|(cell, half)| self.done[cell][half] > 0)
     }
 
-    /// Whether every pixel has a sample. Only such an image may replace another one.
+    /// Whether every pixel has a sample. Only then may the image replace another image.
     pub(crate) fn has_sampled_all_pixels(&self) -> bool {
         self.shard_cell_halves().all(|(cell, half)| self.done[cell][half] > 0)
     }
@@ -290,7 +290,7 @@ impl FilmState {
         job.pixel_count() * job.samples.len() as u64
     }
 
-    /// Decides which of the tiles with `samples` samples (a power of two) need no more.
+    /// Decides which of the tiles with `samples` samples (a power of two) need no more samples.
     pub(crate) fn decide_goals(&mut self, samples: u32, error: f64) {
         if let Some(judgement) = self.goals.decide_goals(&self.film, &self.done, samples, error) {
             self.expected.predict(&judgement, &self.goals, &self.done);

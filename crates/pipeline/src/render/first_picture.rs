@@ -1,4 +1,4 @@
-//! First images, with one sample per preview pixel. They are shown until the first pass is done.
+//! First images, with one sample per preview pixel, which are shown until the first pass is done.
 
 use std::cell::Cell;
 use std::time::{Duration, Instant};
@@ -15,7 +15,7 @@ use crate::trace::{TileJob, Tracer};
 /// Time budget for the first image while the camera is moving.
 const MOVING_TIME_BUDGET: Duration = Duration::from_millis(6);
 
-/// Inputs needed to render first images.
+/// Renderer for coarse first images.
 #[derive(Clone, Copy)]
 pub(crate) struct CoarseImageRenderer<'a> {
     pub(crate) tracer: Tracer<'a>,
@@ -108,8 +108,8 @@ impl<'a> CoarseImageRenderer<'a> {
     }
 }
 
-/// Returns an image size that takes [`MOVING_TIME_BUDGET`] to render at `rate` pixels per second. `None` if
-/// rendering at the usual size is about as fast.
+/// Returns an image size that takes [`MOVING_TIME_BUDGET`] to render at `rate` pixels per second, or `None`
+/// if rendering at the usual size is about as fast.
 fn size_within_budget((width, height): (u32, u32), rate: f64) -> Option<(u32, u32)> {
     /// Minimum width in pixels.
     const LEAST: f64 = 16.0;
@@ -130,7 +130,7 @@ fn split_into_jobs(rect: Rect) -> Vec<TileJob> {
     places.filter_map(piece).enumerate().map(job).collect()
 }
 
-/// Maps a rectangle in a larger image to the corresponding pixels of a smaller one.
+/// Maps a rectangle in a larger image to the corresponding pixels of a smaller image.
 fn scale_rect(rect: Rect, from: (u32, u32), to: (u32, u32)) -> Rect {
     let along = |start: u32, len: u32, from: u32, to: u32| {
         let at = |pixel: u32| u64::from(pixel) * u64::from(to) / u64::from(from);

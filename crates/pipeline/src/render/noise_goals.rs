@@ -14,8 +14,8 @@ use crate::film::{
 /// Minimum number of samples for noise estimates.
 pub(crate) const LEAST: u32 = PREPASS_SAMPLES;
 
-/// Fraction of the noise target to aim for. Less than 1 because parts whose noise is underestimated stop
-/// early.
+/// Fraction of the noise target to aim for. It is less than 1 because parts whose noise is underestimated
+/// stop early.
 pub(crate) const AIM: f64 = 0.85;
 
 /// A tile is reported if its noise exceeds the target by more than this factor, which allows for measurement
@@ -31,11 +31,11 @@ const LEAST_BRIGHTNESS: f64 = 0.01;
 /// Maximum number of samples for each half of each cell.
 #[derive(Debug)]
 pub(crate) struct CellSampleGoals {
-    /// Goal of each half of each cell. [`u32::MAX`] while undecided.
+    /// Goal of each half of each cell, or [`u32::MAX`] while undecided.
     pub(super) decided: Vec<[u32; 2]>,
     /// Sample count at which each tile was last evaluated. Tiles are evaluated only once per sample count.
     pub(super) judged: Vec<u32>,
-    /// Mean luminance of the [`BrightnessPrepassPixels`]. `None` until noise has been evaluated.
+    /// Mean luminance of the [`BrightnessPrepassPixels`], or `None` until noise has been evaluated.
     pub(super) brightness: Option<f64>,
 }
 
@@ -139,7 +139,7 @@ impl CellSampleGoals {
             for half in 0..2 {
                 let Some(noise) = of_others[half].filter(|_| !was_decided[half]) else { continue };
                 let wanted = aim.samples_to_reach(&noise);
-                // A finished half provides no further information about the other one.
+                // A finished half provides no further information about the other half.
                 if was_decided[1 - half] || wanted <= done[half].saturating_mul(2) {
                     self.decided[cell][half] = wanted.max(done[half]);
                 }
@@ -151,7 +151,7 @@ impl CellSampleGoals {
 /// Noise measurements on which goals are based.
 #[derive(Debug)]
 pub(crate) struct NoiseMeasurements {
-    /// Noise of each tile. `None` for tiles that already have goals or have a different sample count.
+    /// Noise of each tile, or `None` for tiles that already have goals or have a different sample count.
     pub(crate) noise: Vec<Option<TileNoise>>,
     /// Sample count of the evaluated tiles.
     pub(crate) samples: u32,

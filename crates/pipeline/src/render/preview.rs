@@ -14,13 +14,13 @@ use crate::plan::RenderPlan;
 use crate::protocol::{ImagePosition, MaxPreviewSize, NormalizedRect, PreviewImageState};
 use crate::sink::EventSink;
 
-/// Maximum time spent on updating a preview before checking for orders.
+/// Maximum time spent on updating a preview before checking for commands.
 const PATIENCE: Duration = Duration::from_millis(4);
 
-/// Destination and contents of previews.
+/// Sender of previews to the front end.
 #[derive(Clone, Copy)]
 pub(crate) struct PreviewSender<'a> {
-    /// Maximum size of previews. `None` disables them.
+    /// Maximum size of previews. `None` disables previews.
     pub(crate) bounds: Option<MaxPreviewSize>,
     pub(crate) plan: &'a RenderPlan,
     pub(crate) sink: &'a EventSink,
@@ -73,7 +73,8 @@ impl PreviewSender<'_> {
         }
     }
 
-    /// Sends a 1:1 section of the image if the front end requested one. Returns whether it did.
+    /// Sends a 1:1 section of the image if the front end requested one. Returns whether a section was
+    /// requested.
     fn send_section_if_requested(&self, state: &FilmState, has_time: bool) -> bool {
         let Some(rect) = self.requested_section() else { return false };
         let quantity = self.plan.settings.view.film_quantity();

@@ -44,16 +44,16 @@ pub(crate) struct RenderStageInputs<'a> {
     /// Section to render first.
     pub(crate) first: Option<NormalizedRect>,
     pub(crate) sink: &'a EventSink,
-    /// Handles orders during the render. Called often. The arguments are the current film and whether every
-    /// pixel has a sample.
+    /// Handles commands during the render. It is called often. Its arguments are the current film and whether
+    /// every pixel has a sample.
     pub(crate) pulse: &'a dyn Fn(&FilmState, bool),
-    /// Takes a pending order to change the preview size.
+    /// Takes a pending command to change the preview size.
     pub(crate) take_preview: &'a dyn Fn() -> Option<Option<MaxPreviewSize>>,
     /// Whether the camera is being moved. If so, the first image must appear quickly, even if it is small.
     pub(crate) is_moved: bool,
     /// Speed at which the most recent first image was rendered, in pixels per second.
     pub(crate) coarse_rate: &'a Cell<Option<f64>>,
-    /// Share of the image to render. `None` for the whole image.
+    /// Share of the image to render, or `None` for the whole image.
     pub(crate) share: Option<Shard>,
     /// Checkpointer, if the render uses checkpoints.
     pub(crate) checkpointer: Option<&'a Checkpointer<'a>>,
@@ -267,7 +267,7 @@ impl<'a> Scheduler<'a> {
         Ok(())
     }
 
-    /// Traces photons for these samples while handling orders.
+    /// Traces photons for the given samples while handling commands.
     fn trace_photons(
         &mut self,
         photons: &PhotonStore,
@@ -344,7 +344,7 @@ impl<'a> Scheduler<'a> {
         Ok(())
     }
 
-    /// Handles everything that is due between tiles: progress, previews, orders, checkpoints and the time
+    /// Handles everything that is due between tiles: progress, previews, commands, checkpoints and the time
     /// limit.
     fn run_due_tasks(&mut self) {
         let now = Instant::now();

@@ -19,7 +19,7 @@ pub(crate) struct Shard {
     pub(crate) count: u32,
     /// Samples per pixel in the whole image.
     pub(crate) samples: u32,
-    /// Sample blocks in this share. `None` if the share has all samples of its tiles.
+    /// Sample blocks in this share, or `None` if the share has all samples of its tiles.
     blocks: Option<Vec<u32>>,
     /// Index and count that divide the tiles among the shares with the same sample blocks.
     of_tiles: (u32, u32),
@@ -73,12 +73,13 @@ impl Shard {
         }
     }
 
-    /// Returns this share's blocks in sorted order. Empty if the share has all samples of its tiles.
+    /// Returns this share's sample blocks in sorted order, or no blocks if the share has all samples of its
+    /// tiles.
     pub(crate) fn blocks(&self) -> &[u32] {
         self.blocks.as_deref().unwrap_or_default()
     }
 
-    /// Returns the number of blocks in the image. 0 if shares consist of tiles.
+    /// Returns the number of sample blocks in the image, or 0 if shares consist of tiles.
     pub(crate) fn image_block_count(&self) -> u32 {
         if self.blocks.is_some() { self.samples.div_ceil(BLOCK_SIZE) } else { 0 }
     }
@@ -93,7 +94,7 @@ impl Shard {
         own
     }
 
-    /// Returns the number of samples in a block.
+    /// Returns the number of samples per pixel in a block.
     fn block_length(&self, block: u32) -> u32 {
         (self.samples - block * BLOCK_SIZE).min(BLOCK_SIZE)
     }

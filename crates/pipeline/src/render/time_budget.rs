@@ -5,9 +5,9 @@
 //! sample points have gaps, and even a third more samples may not reduce the error.
 //!
 //! Rare bright samples must not attract more samples to their own half, which would make the image too dark.
-//! As in [`super::noise_goals`], the noise of one half determines the samples of the other. It is estimated
-//! only from as many samples as every half has, because any further samples depend on the noise of the other
-//! half.
+//! As in [`super::noise_goals`], the noise of one half determines the samples of the other half. The noise is
+//! estimated only from as many samples as every half has, because any further samples depend on the noise of
+//! the other half.
 
 use crate::film::Film;
 
@@ -217,7 +217,7 @@ mod tests {
 
     /// Returns the mean over many cells with rare bright samples and an expected value of 1. Runs a few
     /// rounds with priorities based on the noise of the other half, or of the same half if `by_own`. With
-    /// only a few cells, giving samples to one of them would noticeably reduce the samples in the others.
+    /// only a few cells, giving samples to one cell would noticeably reduce the samples in the other cells.
     fn rendered(next: &mut impl FnMut() -> f32, by_own: bool) -> f64 {
         const CHANCE: f64 = 0.002;
         let film = Film::new(64 * SIDE, 1, None).expect("a film");

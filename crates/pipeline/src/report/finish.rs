@@ -155,7 +155,7 @@ fn count_work(finished: &RequestResults<'_>) -> WorkCounters {
     }
 }
 
-/// Peak resident memory of the process in bytes. 0 if unknown.
+/// Peak resident memory of the process in bytes, or 0 if unknown.
 fn peak_memory_bytes() -> u64 {
     peak_memory_from_proc_status().unwrap_or_else(peak_memory_from_rusage)
 }

@@ -1,5 +1,5 @@
-//! The accel stage: builds a tree for each mesh file whose content has changed, and one over all objects.
-//! Trees from previous scenes are kept while there is room.
+//! The accel stage: builds a tree for each mesh file whose content has changed, and one tree over all
+//! objects. Trees from previous scenes are kept while there is room.
 
 use std::sync::Arc;
 
@@ -17,14 +17,14 @@ use crate::world::{
     Geometry, MeshTree, light_lifts, mesh_files_with_emissive_override, separate_coincident_emitters,
 };
 
-/// A mesh with distinct lights, and its key.
+/// The key of a mesh whose coincident emitters have been separated, and the mesh.
 type KeyedMeshWithSeparateEmitters = (Fingerprint, Arc<LoadedMesh>);
 
 /// Cache of the accel stage.
 #[derive(Debug, Default)]
 pub(crate) struct AccelCache {
     trees: NamedCache<Fingerprint, MeshTree>,
-    /// Meshes with distinct lights. `None` if the mesh in the file can be used.
+    /// Meshes with separated emitters, or `None` if the mesh in the file can be used as it is.
     distinct: NamedCache<Fingerprint, Option<Arc<LoadedMesh>>>,
     geometry: NamedCache<Fingerprint, Geometry>,
     /// Offsets applied to lights that are coplanar with other surfaces.
@@ -106,7 +106,7 @@ pub(crate) fn build_accel_structures(
     })
 }
 
-/// Returns the meshes with distinct lights. `None` for meshes that can be used as they are.
+/// Returns the meshes with separated emitters, or `None` for meshes that can be used as they are.
 fn separate_coincident_mesh_emitters(
     scene: &Scene,
     meshes: &Meshes,

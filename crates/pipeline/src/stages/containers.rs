@@ -10,7 +10,7 @@ use crate::assets::mesh::load;
 use crate::assets::{AssetError, FileHash, LoadedMesh};
 use crate::control::{CancelToken, Progress, ignore_progress};
 
-/// Slot for a file. Its first user fills it.
+/// Slot for a glTF file, which is filled by its first user.
 type GltfFileSlot = Arc<Mutex<Option<Arc<GltfFile>>>>;
 
 /// Open glTF files and preloaded meshes.
@@ -25,7 +25,7 @@ impl GltfContainers {
     /// Returns a glTF file, opening it if necessary.
     ///
     /// # Errors
-    /// See [`GltfFile::open`]. The next call tries again.
+    /// See [`GltfFile::open`]. After an error, the next call tries again.
     pub(crate) fn open(
         &self,
         path: &Path,

@@ -1,4 +1,4 @@
-//! Detects glass solids and warns about open ones.
+//! Detects glass solids and warns about solids that are not closed.
 
 use std::sync::Arc;
 

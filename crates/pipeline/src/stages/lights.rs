@@ -56,7 +56,7 @@ pub(crate) fn collect_lights(
     })
 }
 
-/// Describes the light tree for a scene that has too many lights to sample each of them.
+/// Describes the light tree for a scene that has too many lights to sample all of them.
 fn describe_light_tree(which: &str, lights: &Lights) -> String {
     format!(", {which}; light tree {} kB", lights.tree_memory_bytes().div_ceil(1000))
 }

@@ -244,7 +244,7 @@ fn has_companion_appeared(
     Ok(false)
 }
 
-/// Returns the files with their current contents.
+/// Returns the files with their contents as first seen by this request.
 fn read_current_content_ids(
     files: &[FileRead],
     reading: &FileReadContext<'_>,
@@ -289,7 +289,8 @@ enum MeshWarning {
 }
 
 impl<'a> MeshWarnings<'a> {
-    /// Adds a file's warnings. Adds warnings about its materials only if an object uses them.
+    /// Adds a file's warnings. Warnings about its materials are included only if an object uses these
+    /// materials.
     fn add(&mut self, file: &'a MeshFile, mesh: &LoadedMesh, uses_own: bool) {
         if mesh.dropped != DroppedFaces::default() {
             let place = *self.dropped.entry(&file.value).or_insert(self.all.len());
@@ -343,7 +344,7 @@ fn add_warnings(loaded: &LoadedScene, warnings: Vec<(&MeshFile, String)>, findin
     }
 }
 
-/// Describes the dropped faces. Returns `None` if none were dropped.
+/// Describes the dropped faces, or returns `None` if no faces were dropped.
 fn describe_dropped_faces(faces: &DroppedFaces) -> Option<String> {
     let count = |number: u64, what: &str| {
         (number > 0).then(|| format!("{number} face{} {what}", if number == 1 { "" } else { "s" }))

@@ -125,7 +125,7 @@ pub(crate) fn parse(
         )])));
     }
     let key = |content| scene_key(origin, content, is_model);
-    // A model's scene depends on several files. All must be unchanged.
+    // A model's scene depends on several files, all of which must be unchanged.
     let is_same = |parsed: &&Arc<ParsedScene>| {
         let now = |file: &FileRead| {
             contents.first_seen_content_id(&file.path, token).is_ok_and(|content| content == file.content)
@@ -186,7 +186,7 @@ fn read_scene(
     Ok((Arc::new(loaded), content, companions, notes))
 }
 
-/// Returns the key for a scene whose file has this content.
+/// Returns the key for a scene whose file has the given content.
 fn scene_key(
     SceneParseRequest { path, sets, show }: SceneParseRequest<'_>,
     content: FileContentId,

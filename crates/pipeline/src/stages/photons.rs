@@ -82,13 +82,13 @@ impl PhotonStore {
         ((MAX_ALIVE_BYTES / size) as u32).clamp(1, MAX_ALIVE)
     }
 
-    /// Average number of seconds needed to trace a pass. 0 if no pass was traced.
+    /// Average number of seconds needed to trace a pass, or 0 if no pass was traced.
     pub(crate) fn mean_seconds_per_pass(&self) -> f64 {
         let PhotonCounts { passes, seconds, .. } = self.sent.get();
         if self.has_lit_caustic_casters() && passes > 0 { seconds / passes as f64 } else { 0.0 }
     }
 
-    /// Returns the maps for these samples. Calls `tick` regularly.
+    /// Returns the maps for the given samples. Calls `tick` regularly.
     ///
     /// # Errors
     /// Returns [`Cancelled`] if the token is cancelled.

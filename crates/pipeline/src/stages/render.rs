@@ -1,8 +1,8 @@
 //! The render stage: traces passes into a film, with progress and previews.
 //!
-//! The film is kept. An interrupted render resumes where it stopped, and more samples can be added to a
-//! finished one. In both cases, the result is bit-identical to an uninterrupted render, because every sample
-//! is a function of its pixel and index, and each pixel sums its samples in order.
+//! The film is kept, so that an interrupted render can resume where it stopped and more samples can be added
+//! to a finished render. In both cases, the result is bit-identical to an uninterrupted render, because every
+//! sample is a function of its pixel and index, and each pixel sums its samples in order.
 
 use super::photons::PhotonStore;
 use super::{AbortReason, StageResult};

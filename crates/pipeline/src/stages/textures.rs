@@ -60,7 +60,7 @@ pub(crate) struct TextureCache {
 }
 
 impl TextureCache {
-    /// Whether all of these textures are cached, even if their files have changed since.
+    /// Whether all of the given textures are cached, even if their files have changed in the meantime.
     fn has_all(&self, needed: &[NeededTexture]) -> bool {
         needed.iter().all(|one| self.texels.get_by_name(&texture_key(&one.source)).is_some())
     }
@@ -113,7 +113,7 @@ pub(crate) struct NeededTextures {
     pub(crate) textures: Vec<NeededTexture>,
     /// Number of textures that the scene uses but this view does not need.
     pub(crate) left_out: usize,
-    /// Whether a missing texture is an error even in a model. If not, the model is shown without it.
+    /// Whether a missing texture is an error even in a model. If not, the model is shown without the texture.
     pub(crate) are_required: bool,
 }
 
@@ -378,7 +378,7 @@ fn environment_span(scene: &Scene) -> Option<Range<usize>> {
 }
 
 impl ImageWithTextures<'_> {
-    /// Whether any use needs mipmaps.
+    /// Whether any texture that uses the image needs mipmaps.
     fn needs_mipmaps(&self) -> bool {
         self.asked_by.iter().any(|one| one.has_mipmaps)
     }
@@ -492,10 +492,10 @@ fn memory_limit_errors(sizes: &[u64], most_bytes: u64) -> Vec<Option<String>> {
     sizes.iter().map(check).collect()
 }
 
-/// Content of a texture's file and, if this is a glTF file, of the image file that it references.
+/// Content of a texture's file and, if that file is a glTF file, of the image file that it references.
 type TextureAndLinkedImageContent = (FileContentId, Option<FileRead>);
 
-/// An image and its mipmaps, and whether both came from the cache.
+/// An image, its mipmaps if needed, and whether all of this came from the cache.
 type DecodedTextureWithMipmaps = (Arc<DecodedTexture>, Option<Arc<Mipmaps>>, bool);
 
 /// Loads an image and its mipmaps. Sets `contents` to the contents that were decoded.
@@ -650,8 +650,8 @@ mod tests {
     fn memory_limit_applies_to_all_images_together() {
         let over = memory_limit_errors(&[600, 400, 0, 25, 1], 1001);
         assert_eq!(over.iter().map(Option::is_some).collect::<Vec<_>>(), [false, false, false, true, false]);
-        // Three run-length encoded images. Their headers specify 15999 × 15999 pixels (732.3 MiB each), but
-        // they contain only a few.
+        // Three run-length encoded images whose headers specify 15999 × 15999 pixels (732.3 MiB each),
+        // although they contain far fewer.
         let table = |name: &str| format!("[textures.{name}]\nfile = \"{name}.tga\"\n");
         let ball = |name: &str| {
             format!(

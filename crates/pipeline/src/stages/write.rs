@@ -64,13 +64,13 @@ impl WrittenImages {
         self.files.is_empty()
     }
 
-    /// Whether a file on disk contains an image with keyboard changes that the user wrote. It is replaced
-    /// only after the scene is saved, or when the user writes another image.
+    /// Whether a file on disk contains an image with keyboard changes that the user wrote. Such a file is
+    /// replaced only after the scene is saved, or when the user writes another image.
     pub(crate) fn has_user_written_image(&self, contents: &FileHashCache) -> bool {
         self.is_by_hand && self.files.iter().any(|(path, (_, known))| has_content_id(path, *known, contents))
     }
 
-    /// Allows the scene's own image to replace any other.
+    /// Allows the scene's own image to replace any other image.
     pub(crate) fn allow_replacing_user_written_image(&mut self) {
         self.is_by_hand = false;
     }
@@ -370,7 +370,7 @@ pub(crate) fn film_encoding_settings(plan: &RenderPlan) -> FilmEncodingSettings 
     }
 }
 
-/// Like [`develop_settings`], but with the scene's path relative to the image.
+/// Like [`film_encoding_settings`], but with the scene's path relative to the image.
 fn develop_settings_with_relative_scene(plan: &RenderPlan, path: &Path) -> FilmEncodingSettings {
     let mut finish = film_encoding_settings(plan);
     let scene = finish.metadata.iter_mut().find(|(name, _)| name == SCENE);

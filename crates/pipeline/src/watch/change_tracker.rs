@@ -70,7 +70,7 @@ impl ChangeTracker {
         }
     }
 
-    /// Returns the time of the next check. `None` if no hint requires one.
+    /// Returns the time of the next check, or `None` if no check is due.
     pub(super) fn next_check_time(&self) -> Option<Instant> {
         let look = self.pending.map(|pending| pending.due);
         [look, self.unsettled.map(|unsettled| self.settled_at(unsettled))].into_iter().flatten().min()

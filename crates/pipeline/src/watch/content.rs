@@ -58,8 +58,8 @@ impl FileContentId {
 
 /// Changes within this time may result in the same timestamp on some file systems.
 const STAMP_RESOLUTION: Duration = Duration::from_secs(2);
-/// Maximum length of a hashed file, in bytes. Longer files are never decoded. They are compared by metadata,
-/// to avoid reading sparse files of several terabytes.
+/// Maximum length of a hashed file, in bytes. Longer files are never decoded, and they are compared by
+/// metadata to avoid reading sparse files of several terabytes.
 const MAX_HASHED: u64 = 4 << 30;
 /// Number of bytes to read between checks of the token.
 const CHUNK: usize = 1 << 20;
@@ -73,8 +73,8 @@ pub struct FileHashCache {
     /// Files that have been hashed.
     #[cfg(test)]
     pub(crate) hashed: Mutex<Vec<PathBuf>>,
-    /// Maps a path to another file and the bytes to be written to it right after the file at the path has
-    /// been hashed.
+    /// Maps a path to a second file and to the bytes that are written to that file right after the file at
+    /// the path has been hashed.
     #[cfg(test)]
     pub(crate) replacements: Mutex<HashMap<PathBuf, (PathBuf, Vec<u8>)>>,
 }
@@ -121,7 +121,7 @@ impl RequestFileSnapshot {
     }
 
     /// Returns the content of a file whose decoded bytes have this hash. Records a change if the content
-    /// differs from what this request saw earlier.
+    /// differs from the content that this request saw earlier.
     pub(crate) fn record_decoded(&self, path: &Path, hash: FileHash) -> FileContentId {
         self.record_decoded_with_stamp(path, hash, None)
     }
@@ -179,7 +179,7 @@ impl RequestFileSnapshot {
         Ok(())
     }
 
-    /// Waits until the last change to any file is at least [`SETTLE_TIME`] old, so that
+    /// Waits for at most about [`SETTLE_TIME`] until no file has changed for that long, so that
     /// [`Self::recheck_seen_files`] also detects a program that is still writing.
     ///
     /// # Errors

@@ -43,7 +43,7 @@ fn identity(folder: &Path) -> Option<Identity> {
 }
 
 /// Returns the watcher if its thread has started. Otherwise, the watcher's handler, which shares `names`, has
-/// been dropped, and any use of the watcher would panic, even dropping it.
+/// been dropped, and any use of the watcher would panic, even dropping it. The watcher is then leaked.
 fn forget_dead_watcher<W>(watcher: W, names: &Arc<Mutex<HashSet<OsString>>>) -> Option<W> {
     if Arc::strong_count(names) > 1 {
         return Some(watcher);
@@ -113,7 +113,7 @@ impl WatchedFolders {
         self.watch_wanted();
     }
 
-    /// Renews all watches. If a notification was missed, any watch may be broken.
+    /// Renews all watches, because any of them may be broken if a notification was missed.
     pub(super) fn renew_all(&mut self) {
         self.unwatch_matching(|_| true);
         self.watch_wanted();

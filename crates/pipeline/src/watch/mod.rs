@@ -37,7 +37,7 @@ use crate::system::threads::spawn;
 const HEARTBEAT: Duration = Duration::from_secs(2);
 /// Interval between checks without notifications.
 const POLL: Duration = Duration::from_millis(200);
-/// Minimum time between reported changes. Long enough to show a first image during continuous saves.
+/// Minimum time between reported changes, which is long enough to show a first image during continuous saves.
 const BETWEEN_CHANGES: Duration = Duration::from_millis(100);
 
 /// Delays for reacting to hints.
@@ -52,7 +52,8 @@ pub(super) struct WatchDelays {
     /// Time without hints after which files count as settled. A program that writes a file in two steps takes
     /// only a fraction of this time.
     settle: Duration,
-    /// Like `settle`, but while a file is open for writing. Longer than network stalls in `scp` or `sftp`.
+    /// Like `settle`, but while a file is open for writing. This is longer than network stalls in `scp` or
+    /// `sftp`.
     settle_open: Duration,
     /// Maximum time before files count as settled, regardless of hints.
     settle_longest: Duration,
@@ -78,7 +79,7 @@ pub enum WatchEvent {
     Changed(ContentChangeTime),
     /// The changed files appear to be complete.
     Settled,
-    /// A file written by glimt was changed, or was restored to what glimt wrote.
+    /// A file written by glimt was changed, or was restored to the content that glimt wrote.
     Output(OutputChange),
 }
 

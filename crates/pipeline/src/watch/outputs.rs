@@ -46,7 +46,7 @@ impl ExternalChange {
 pub struct OutputChange {
     /// Path of the file.
     pub path: PathBuf,
-    /// The change. `None` if the file again has the content that glimt wrote.
+    /// The change, or `None` if the file's content is back to what glimt wrote.
     pub lost: Option<ExternalChange>,
 }
 
@@ -67,8 +67,8 @@ struct WrittenOutput {
 }
 
 impl WrittenOutputs {
-    /// Records that a file is about to be written. Its content is ignored until [`Self::end_write`]. `protection`
-    /// decides whether glimt would replace what another program writes to the file.
+    /// Records that a file is about to be written. Its content is ignored until [`Self::end_write`].
+    /// `protection` decides whether glimt may replace content that another program writes to the file.
     pub(crate) fn begin_write(&self, path: &Path, protection: OverwriteProtection) {
         let mut known = self.lock();
         let output = known.entry(path.to_owned()).or_insert(WrittenOutput {
@@ -144,7 +144,7 @@ impl WrittenOutputs {
                     })
                 }
             };
-            // Ignore the content if another write has started since.
+            // Ignore the content if another write has started in the meantime.
             let is_current = self.lock().get(&path).is_some_and(|now| now.writes == output.writes);
             is_current.then_some((path, output.reported, lost))
         };
@@ -169,7 +169,7 @@ impl WrittenOutputs {
 pub(super) struct PossiblyTransientChanges(Vec<(OutputChange, Instant)>);
 
 impl PossiblyTransientChanges {
-    /// Returns changes that have lasted for `quiet`. Returns each change only once.
+    /// Returns the changes that have lasted for `quiet`, each of them only once.
     pub(super) fn take_confirmed(
         &mut self,
         contents: &FileHashCache,
@@ -191,7 +191,7 @@ impl PossiblyTransientChanges {
         lasting
     }
 
-    /// Returns the time of the next check. `None` if there are no unconfirmed changes.
+    /// Returns the time of the next check, or `None` if there are no unconfirmed changes.
     pub(super) fn next_check_time(&self, quiet: Duration) -> Option<Instant> {
         self.0.iter().map(|(_, since)| *since + quiet).min()
     }

@@ -1,5 +1,5 @@
-//! Handles the removal and re-creation of the working directory, for example by a checkout or when a backup
-//! is restored. The process is then still in the removed directory, so it must change to the new directory of
+//! Handles the removal and re-creation of the working directory, for example by a checkout or by restoring a
+//! backup. Afterwards the process is still in the removed directory and must change to the new directory with
 //! the same name.
 
 use std::env;
@@ -17,8 +17,8 @@ pub(super) fn remember_working_folder() {
     }
 }
 
-/// Whether the working directory exists. If it was removed, tries to change to a new directory of the same
-/// name.
+/// Changes to the new directory with the same name if the working directory was removed. Returns whether the
+/// process is now in an existing directory.
 pub(super) fn reenter_working_folder_if_removed() -> bool {
     !is_working_folder_removed() || HOME.get().is_some_and(|home| env::set_current_dir(home).is_ok())
 }
@@ -27,7 +27,7 @@ fn is_working_folder_removed() -> bool {
     env::current_dir().is_err_and(|error| error.kind() == ErrorKind::NotFound)
 }
 
-/// Returns a missing folder that the file needs: the working directory or the file's own folder.
+/// Returns the missing folder that makes the file inaccessible: the working directory or the file's parent.
 pub fn find_missing_folder(file: &Path) -> Option<PathBuf> {
     if is_working_folder_removed() && file.is_relative() {
         return HOME.get().cloned();

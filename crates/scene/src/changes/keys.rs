@@ -108,7 +108,8 @@ impl KeyDifferences<'_> {
         }
     }
 
-    /// Adds a key that exists in only one document. Adds each `[[name]]` table separately.
+    /// Adds a key that exists in only one document. If its value is an array of tables, adds each table
+    /// separately.
     fn add_unmatched(&mut self, sign: char, name: &str, value: &Value<'_>, text: usize) {
         match value.decode() {
             TomlValue::Array(array) if array.starts_with_table() => {
@@ -142,7 +143,7 @@ impl KeyDifferences<'_> {
         self.add(|| format!("{sign} {}{shown}", shortened_key(name, MAX_KEY_COLUMNS)));
     }
 
-    /// Returns a value's source text, on one line.
+    /// Returns a value's source text, joined into one line and truncated, or `{…}` for a table.
     fn value_text(&self, text: usize, value: &Value<'_>) -> String {
         if let TomlValue::Table(_) = value.decode() {
             return "{…}".to_owned();
@@ -162,8 +163,8 @@ fn join_key(name: &str, key: &str) -> String {
     if name.is_empty() { quote_key_part(key) } else { format!("{name}.{}", quote_key_part(key)) }
 }
 
-/// Returns the key parts by which `--set` refers to a list's elements: unique names or, failing that, 1-based
-/// positions.
+/// Returns the key part with which `--set` addresses each element of a list: the element's name if it is
+/// unique, and otherwise its 1-based position.
 fn element_path_segments(all: &[Value<'_>]) -> Vec<String> {
     let mut counts: HashMap<&str, usize> = HashMap::new();
     for name in all.iter().filter_map(value_of_name_key) {

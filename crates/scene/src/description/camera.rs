@@ -88,8 +88,8 @@ impl CameraOverrides {
 }
 
 impl ResolvedCamera {
-    /// Applies a change. If the focal plane passes through `look_at` (the default), the focus follows
-    /// `look_at`.
+    /// Returns this camera with a change applied. If the focal plane passes through `look_at` (the default),
+    /// the focus follows `look_at`.
     pub fn with_change(&self, change: &CameraOverrides) -> Self {
         let pose = change.pose.unwrap_or(self.pose);
         let focus = if self.is_focused_on_look_at() { pose.distance() } else { self.focus };

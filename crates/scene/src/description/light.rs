@@ -122,7 +122,7 @@ impl Fingerprinted for PointLight {
     }
 }
 
-/// Fingerprint of the lookup parameters. Texels have a separate fingerprint.
+/// Covers only the lookup parameters. The texels have a separate fingerprint.
 impl Fingerprinted for Environment {
     fn add_to(&self, key: &mut FingerprintHasher, _: &FingerprintContext<'_>) {
         let Self { color, file, rotate } = self;

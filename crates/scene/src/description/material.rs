@@ -81,8 +81,8 @@ impl NumberSource {
         }
     }
 
-    /// Returns the texture's index, and how to compute the number from a pixel: from the specified channel if
-    /// there is one, and otherwise as in `usual`. `None` if the number is constant.
+    /// Returns the texture's index and how to compute the number from a pixel: from the specified channel, or
+    /// with `usual` if no channel is specified. Returns `None` if the number is constant.
     pub fn texture_index_and_channel(&self, usual: ChannelSelector) -> Option<(usize, ChannelSelector)> {
         match *self {
             Self::Constant(_) => None,
@@ -114,7 +114,7 @@ impl OpacitySource {
         }
     }
 
-    /// Returns the texture's index, and how to compute the opacity from a pixel. `None` if the opacity is
+    /// Returns the texture's index and how to compute the opacity from a pixel, or `None` if the opacity is
     /// constant.
     pub fn texture_index_and_channel(&self) -> Option<(usize, ChannelSelector)> {
         self.value.texture_index_and_channel(ChannelSelector::Opacity)
@@ -243,7 +243,7 @@ impl MaterialKind {
     }
 
     /// Returns a key for the interior of solid glass: the bits of its index of refraction and transmittance,
-    /// but not its roughness. `None` for other materials.
+    /// but not its roughness. Returns `None` for other materials.
     pub fn glass_medium_identity(&self) -> Option<[u64; 4]> {
         match *self {
             Self::Glass { ior, tint, roughness: _ } => {
@@ -420,7 +420,7 @@ pub enum MaterialKind {
 }
 
 impl ColorSource {
-    /// Returns the texture's index. `None` if the color is constant.
+    /// Returns the texture's index, or `None` if the color is constant.
     fn texture_index(&self) -> Option<usize> {
         match self {
             Self::Constant(_) => None,
@@ -484,7 +484,7 @@ impl Material {
         self.emission.scale != Vec3::ZERO
     }
 
-    /// Returns the weight and roughness of an emitter's clear coat. `None` if there is no emission or no
+    /// Returns the weight and roughness of an emitter's clear coat, or `None` if there is no emission or no
     /// clear coat.
     pub fn emitter_coat_parameters(&self) -> Option<[NumberSource; 2]> {
         match self.kind {
@@ -527,7 +527,7 @@ impl Material {
     }
 }
 
-/// Fingerprint of the lookup parameters. Texels have separate fingerprints.
+/// Covers only the lookup parameters. The texels have separate fingerprints.
 impl Fingerprinted for Texture {
     fn add_to(&self, key: &mut FingerprintHasher, _: &FingerprintContext<'_>) {
         let Self { name: _, file, image, filter, wrap, repeat, rotate, offset, uv, encoding, factor } = self;

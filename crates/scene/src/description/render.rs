@@ -88,10 +88,10 @@ macro_rules! __render_keys {
 }
 
 /// Passes the definitions of all `[render]` keys to a macro, each as `doc name: type = default, range, unit,
-/// change;`. The parser, [`Render`], overrides and command-line options are generated from them.
+/// change;`. The parser, [`RenderOptions`], overrides and command-line options are generated from them.
 ///
 /// The ranges are `whole(MIN, MAX)`, `at_least(MIN)`, `between(MIN, MAX)`, `choice` and `color`. `change`
-/// says what can override the key:
+/// specifies what can override the key:
 ///
 /// | | |
 /// | --- | --- |
@@ -102,8 +102,8 @@ macro_rules! __render_keys {
 /// `render_keys!(callback)` passes all keys, `render_keys!(callback, changed)` passes keys with `option` or
 /// `live`, and `render_keys!(callback, option)` passes keys with `option`.
 ///
-/// To add a key, add it here, to [`Render::add_to`](Fingerprinted::add_to) if images depend on it, to the
-/// starter scene, and to the command-line arguments if it has an option. Tests check that these agree.
+/// To add a key, add it here, to [`RenderOptions::add_to`](Fingerprinted::add_to) if images depend on it, to
+/// the starter scene, and to the command-line arguments if it has an option. Tests check that these agree.
 #[doc(inline)]
 pub use __render_keys as render_keys;
 
@@ -131,7 +131,7 @@ pub struct RenderKeySpec {
     pub unit: &'static str,
     /// Accepted values.
     pub range: KeyRange,
-    /// Returns the accepted names and their meanings. Empty for other types.
+    /// Returns the accepted names and their meanings, or an empty list if the value is not a choice.
     pub choice_values: ChoiceValuesFn,
     /// The default, in scene file syntax.
     pub default: String,

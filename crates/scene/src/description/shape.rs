@@ -208,7 +208,7 @@ impl AffineMap {
         Transform::from_mat3_translation(DMat3::from_cols(x, y, z), self.translate)
     }
 
-    /// Returns the scale of a map that consists of a uniform scale > 0 and a translation. `None` for other
+    /// Returns the scale of a map that consists of a uniform scale > 0 and a translation, or `None` for other
     /// maps.
     fn uniform_scale(&self) -> Option<f64> {
         let scale = self.linear[0].x;
@@ -245,8 +245,9 @@ pub enum LoweredShape<'a> {
 }
 
 impl Shape {
-    /// Applies an affine map. The front remains the front. If the result is a shape of the same kind with the
-    /// same texture coordinates, returns this shape, which is faster to trace.
+    /// Applies an affine map. The front side remains the front side. If the result is a shape of the same
+    /// kind with the same texture coordinates, returns it as such rather than as [`Self::Transformed`],
+    /// because it is faster to trace.
     #[must_use]
     pub fn transformed(self, matrix: AffineMap) -> Self {
         let map = matrix.to_transform();
@@ -281,7 +282,7 @@ impl Shape {
         }
     }
 
-    /// Lowers the shape, with coordinates relative to `origin`.
+    /// Lowers the shape for tracing, with coordinates relative to `origin`.
     pub fn to_traced_shape_relative_to(&self, origin: DVec3) -> LoweredShape<'_> {
         let at = |place: DVec3| place - origin;
         LoweredShape::Shape(match *self {
@@ -337,17 +338,18 @@ impl Shape {
         }
     }
 
-    /// Returns the mesh instance. `None` for other shapes.
+    /// Returns the mesh instance, or `None` for other shapes.
     pub fn as_mesh(&self) -> Option<&MeshReference> {
         if let Self::Mesh(mesh) = self { Some(mesh) } else { None }
     }
 
-    /// Returns the shape before its matrix, and the matrix if the shape is transformed.
+    /// Returns the shape without its matrix, and the matrix if it has one.
     pub fn untransformed(&self) -> (&Self, Option<&AffineMap>) {
         if let Self::Transformed { shape, matrix } = self { (shape, Some(matrix)) } else { (self, None) }
     }
 
-    /// Returns the shape before its matrix as an open surface. `None` for closed shapes, planes and meshes.
+    /// Returns the shape without its matrix as an open surface, or `None` for closed shapes, planes and
+    /// meshes.
     pub fn as_open_surface(&self) -> Option<OpenSurface> {
         match *self.untransformed().0 {
             Self::Quad { corner, u, v } => {
@@ -368,7 +370,7 @@ impl Shape {
         }
     }
 
-    /// Returns a point on or inside the shape. `None` for a mesh.
+    /// Returns a point on or inside the shape, or `None` for a mesh.
     pub fn representative_point(&self) -> Option<DVec3> {
         match *self {
             Self::Sphere { center, .. }
@@ -386,8 +388,8 @@ impl Shape {
         }
     }
 
-    /// Returns an upper bound on the projection of the shape's points onto a unit direction. Infinite for
-    /// planes that are not perpendicular to the direction. `None` for a mesh.
+    /// Returns an upper bound on the projection of the shape's points onto a unit direction, or `None` for a
+    /// mesh. The bound is infinite for planes that are not perpendicular to the direction.
     pub fn upper_bound_along(&self, direction: DVec3) -> Option<f64> {
         let along = |place: DVec3| direction.dot(place);
         // The projected extent of a circle around an axis.
@@ -428,7 +430,7 @@ impl Shape {
     }
 }
 
-/// Returns the largest projection of any of the points onto a unit direction.
+/// Returns the largest projection of the points onto a unit direction.
 pub fn max_projection(direction: DVec3, points: &[DVec3]) -> f64 {
     points.iter().map(|point| direction.dot(*point)).fold(f64::NEG_INFINITY, f64::max)
 }

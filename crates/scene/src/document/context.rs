@@ -20,7 +20,7 @@ pub(super) struct FileContext<'a> {
     searches: Cell<NameSearchCounts>,
 }
 
-/// How many searches for similar names were made, and how many names were compared.
+/// Number of searches for similar names, and number of names compared in them.
 #[derive(Clone, Copy, Default)]
 struct NameSearchCounts {
     count: usize,
@@ -174,7 +174,7 @@ impl<'a> FileContext<'a> {
 
     /// Resolves a path relative to the scene's folder.
     pub(super) fn resolve_path(&self, file: &str) -> PathBuf {
-        // The scene generated for a model refers to the model. Text cannot contain all names.
+        // The scene generated for a model refers to the model file, whose name may not be valid UTF-8.
         let is_own_name = |name: &OsStr| name.to_str().is_none() && name.to_string_lossy() == file;
         if self.path.file_name().is_some_and(is_own_name) {
             return self.path.to_owned();
@@ -232,7 +232,7 @@ const MAX_SEARCHES: usize = 48;
 /// Maximum number of name comparisons per file, checked before each search.
 const MAX_COMPARISONS: usize = 200_000;
 
-/// Maximum number of errors to collect, and maximum number of warnings. Large enough to contain the first
+/// Maximum number of errors to collect, and separately of warnings. It is large enough to include the first
 /// issues in file order, except in absurdly broken files.
 const MAX_COLLECTED: usize = 10_000;
 

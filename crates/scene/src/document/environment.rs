@@ -6,7 +6,7 @@ use super::context::Issue;
 use super::table::TableReader;
 use crate::math::Vec3;
 
-/// Reads the environment. `None` if it is invalid, `Some(None)` if it is absent.
+/// Reads the environment. Returns `None` if it is invalid, and `Some(None)` if it is absent.
 pub(super) fn read_environment(root: &TableReader<'_>) -> Option<Option<Environment>> {
     let key = root.optional_key("environment");
     let Some(table) = root.table("environment") else {

@@ -95,7 +95,7 @@ impl<'a> TableKey<'a> {
         self.string_described_by(|| expected.to_owned())
     }
 
-    /// Reads a string. `expected` returns its description for errors.
+    /// Reads a string. `expected` returns the description of the string for error messages.
     fn string_described_by(&self, expected: impl FnOnce() -> String) -> Option<&'a str> {
         let value = self.value?;
         if let TomlValue::String(text) = value.decode() {
@@ -221,7 +221,7 @@ impl<'a> TableKey<'a> {
         )
     }
 
-    /// Looks up `text`, the name that is the key's value.
+    /// Looks up the name `text`, which is the key's value. Reports an error if it is undefined.
     fn resolve_name_or_report(&self, names: &DefinedNames, text: &str) -> Option<usize> {
         let index = names.find_and_mark_used(text);
         if index.is_none() {

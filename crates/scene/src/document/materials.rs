@@ -17,7 +17,7 @@ use crate::math::{DVec3, Vec3};
 pub(super) struct MaterialList {
     /// Material names.
     pub(super) names: DefinedNames,
-    /// The materials, in the same order as the names. `None` if any is invalid.
+    /// The materials, in the same order as the names, or `None` if any is invalid.
     pub(super) list: Option<Vec<Material>>,
     /// Whether each material emits light.
     emissive: Vec<bool>,
@@ -208,7 +208,7 @@ fn read_ior(table: &TableReader<'_>, path: &'static str) -> f32 {
     read_or_default(table, path, 1.5, TableKey::number_f32)
 }
 
-/// Reads a metal's reflectance, which exactly one of three groups of keys must specify.
+/// Reads a metal's reflectance. Exactly one of three groups of keys must specify it.
 fn read_metal_reflectance(table: &TableReader<'_>, textures: &DefinedNames) -> Option<FresnelSource> {
     let [color, eta, k, element] = ["color", "eta", "k", "element"].map(|name| table.optional_key(name));
     let is_index = eta.is_present() || k.is_present();

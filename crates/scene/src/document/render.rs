@@ -32,7 +32,7 @@ macro_rules! reader {
     ($(
         $(#[doc = $doc:literal])* $name:ident: $type:ty = $default:expr, $range:ident $(($($limit:expr),*))?, $unit:literal, $change:ident;
     )*) => {
-        /// Reads all keys. Uses the default values of absent or invalid keys.
+        /// Reads all keys. Absent and invalid keys have their default values.
         fn read_settings(table: &TableReader<'_>) -> RenderOptions {
             let key = |name| table.optional_key(name);
             RenderOptions {

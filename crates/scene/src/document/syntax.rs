@@ -61,7 +61,7 @@ pub(super) fn report_first_error_per_line(
     lines.into_iter().map(|line| line..first_line_after_error(context, line)).collect()
 }
 
-/// The array brackets in a text with syntax errors.
+/// The array brackets in a text with syntax errors, found on first use.
 struct LazyBracketIndex<'a> {
     text: &'a str,
     brackets: OnceCell<Vec<Bracket>>,
@@ -104,8 +104,8 @@ fn starts_with_key(line: &str) -> bool {
     line.split_once('=').is_some_and(|(key, _)| !key.contains(['[', '{', ',', '\"', '#']))
 }
 
-/// Returns the opening bracket of a list that is still open at the end of the file. Starts at the last key,
-/// because files may be long.
+/// Returns the opening bracket of a list that is still open at the end of the file. Examines only the text from
+/// the last key on, because files may be long.
 fn last_unclosed_bracket(text: &str) -> Option<usize> {
     let mut start = text.len();
     loop {
@@ -118,7 +118,8 @@ fn last_unclosed_bracket(text: &str) -> Option<usize> {
     }
 }
 
-/// Returns the help text for an unclosed list. Contains the whole list if it consists of numbers on one line.
+/// Returns the help text for an unclosed list. The text shows the corrected list if the list consists of numbers
+/// on one line.
 fn unclosed_list_help(context: &FileContext<'_>, open: usize) -> String {
     let end = context
         .span_text(&(open..context.file_text().len()))
@@ -150,8 +151,8 @@ fn missing_commas_message(
     Some(format!("{words}: write {list}"))
 }
 
-/// Returns an issue about a list of numbers in the wrong brackets, such as `(0, 1, 0)`, `{0, 1, 0}`, `vec3(0,
-/// 1, 0)`.
+/// Returns an issue about a list of numbers in the wrong brackets, such as `(0, 1, 0)`, `{0, 1, 0}` or
+/// `vec3(0, 1, 0)`.
 fn wrong_brackets_issue(context: &FileContext<'_>, at: usize) -> Option<Issue> {
     let line = context.line_text_by_number(context.line_number_at_offset(at))?;
     let line_start = context.span_text(&(0..at)).rfind('\n').map_or(0, |end| end + 1);
@@ -184,7 +185,7 @@ fn split_values(text: &str) -> Vec<&str> {
     text.split([',', ';', ' ', '\t']).map(str::trim).filter(|value| !value.is_empty()).collect()
 }
 
-/// Formats several values as a list. `None` for long lists.
+/// Formats at least two values as a list. Returns `None` for fewer values or if the list would be long.
 fn format_array_if_short(values: &[&str]) -> Option<String> {
     const LONGEST: usize = 60;
     let list = format!("[{}]", values.join(", "));
@@ -215,7 +216,8 @@ fn number_text_at<'c>(context: &'c FileContext<'_>, span: &Range<usize>) -> &'c 
     context.span_text(&(start..end))
 }
 
-/// Adds missing digits before or after the decimal point. `None` if the result is not a number.
+/// Adds missing digits before or after the decimal point. Returns `None` if no digit is missing or the result is
+/// not a number.
 fn add_missing_digits(number: &str) -> Option<String> {
     let unsigned = number.trim_start_matches(['+', '-']);
     let sign = &number[..number.len() - unsigned.len()];

@@ -164,7 +164,7 @@ impl<'a> TableReader<'a> {
         key
     }
 
-    /// Reports an error if the key `name` is present, which is not allowed here.
+    /// Reports an error if the table contains the key `name`, which is not allowed here.
     pub(super) fn reject_key(&self, name: &'static str, message: &str, help: Option<&str>) {
         let key = self.optional_key(name);
         self.unavailable.borrow_mut().push(name);
@@ -235,7 +235,7 @@ impl<'a> TableReader<'a> {
         foreign_or_nearest_name(key, &others).or_else(|| nearest_name(key, known.iter().copied()))
     }
 
-    /// Whether there is a table with a similar name that is probably a misspelling of `name`.
+    /// Whether the file contains a table whose name is probably a misspelling of `name`.
     pub(super) fn has_misspelled_table(&self, name: &'static str) -> bool {
         let is_table = |value: Value<'_>| matches!(value.decode(), TomlValue::Table(_));
         let mut others = self.entries.iter().filter(|one| one.key != name && is_table(one.value));

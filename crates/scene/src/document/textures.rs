@@ -18,7 +18,7 @@ use crate::math::{Vec2, Vec3};
 pub(super) struct DefinedTextures {
     /// Texture names.
     pub(super) names: DefinedNames,
-    /// The textures, in the same order as the names. `None` if any is invalid.
+    /// The textures, in the same order as the names, or `None` if any is invalid.
     pub(super) list: Option<Vec<Texture>>,
 }
 

@@ -22,7 +22,8 @@ pub(super) fn describe_value(context: &FileContext<'_>, value: Value<'_>) -> Str
     }
 }
 
-/// Converts an integer or a float, clamped to the range of doubles. `None` for other values.
+/// Converts an integer or a float to a double, clamping it to the range of doubles. Returns `None` for other
+/// values.
 pub(super) fn to_number(value: Value<'_>) -> Option<f64> {
     match value.decode() {
         // Round to the nearest double, as if the number were written as a float.
@@ -42,7 +43,7 @@ pub(super) fn to_number(value: Value<'_>) -> Option<f64> {
     }
 }
 
-/// Parses an integer. `None` if it overflows.
+/// Parses an integer, or returns `None` if it overflows.
 pub(super) fn parse_integer_in_radix(digits: &str, radix: u32) -> Option<i128> {
     i128::from_str_radix(digits, radix).ok()
 }

@@ -91,7 +91,7 @@ pub enum ValueKind {
 }
 
 impl ValueKind {
-    /// Returns the table in which the name is defined. `None` if the value is not a name.
+    /// Returns the table in which the name is defined, or `None` if the value is not a name.
     pub fn defining_table(self) -> Option<&'static str> {
         match self {
             Self::Material => Some("materials"),
@@ -157,7 +157,7 @@ pub(super) const fn define_key(
 }
 
 impl TableInfo {
-    /// Returns the type called `name`, or the default type if `name` is `None`. `None` if the type is
+    /// Returns the type called `name`, or the default type if `name` is `None`. Returns `None` if the type is
     /// unknown.
     pub fn find_type_or_default(&self, name: Option<&str>) -> Option<&'static TableTypeInfo> {
         match name {
@@ -193,7 +193,7 @@ impl KeyInfo {
         }
     }
 
-    /// Returns the range, such as `0 … 1`. Empty if the type implies the range.
+    /// Returns the range, such as `0 … 1`, or an empty string if the type implies the range.
     pub fn range_text(&self) -> String {
         self.kind.range_text()
     }

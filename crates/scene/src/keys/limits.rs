@@ -11,7 +11,7 @@ pub enum Limits {
     NotZero,
     /// At least this number.
     AtLeast(f64),
-    /// A length or size, which must be positive and so large that its square does not underflow.
+    /// A length or size, which must be positive and large enough that its square does not underflow.
     Length,
     /// A [`Length`](Self::Length) or 0.
     LengthOrZero,
@@ -22,7 +22,8 @@ pub enum Limits {
 }
 
 impl Limits {
-    /// Describes why a number is out of range, such as `must be greater than 0`.
+    /// Describes why a number is out of range, such as `must be greater than 0`. Returns `None` if the number
+    /// is accepted.
     pub fn violation(self, number: f64) -> Option<String> {
         if number.is_nan() || number.is_infinite() {
             return Some("must be a finite number".to_owned());

@@ -25,7 +25,7 @@ pub(super) struct DocumentBuilder<'s> {
     pub(super) document: Document<'s>,
     /// The current table.
     table: TableId,
-    /// The header that starts `table`. `None` if `table` is the root. The table is inserted when the next
+    /// The header that starts `table`, or `None` if `table` is the root. The table is inserted when the next
     /// header begins.
     header: Option<TableHeader<'s>>,
     /// An unclosed header, which a later expression may close.
@@ -55,7 +55,8 @@ impl<'s> DocumentBuilder<'s> {
         Self::from_document(Document::new(source))
     }
 
-    /// Adds a new, detached table to a document.
+    /// Adds a new, detached table to a document. Returns a builder that adds keys to this table, and the
+    /// table's ID.
     pub(super) fn from_document_with_new_table(mut document: Document<'s>) -> (Self, TableId) {
         let table = document.add_table(TableOrigin::default());
         (Self { table, ..Self::from_document(document) }, table)
@@ -137,8 +138,8 @@ impl<'s> DocumentBuilder<'s> {
         }
     }
 
-    /// Starts the table that a header names. If longer headers have created the table implicitly, defines it.
-    /// If it is already defined, reports an error and adds keys to it anyway.
+    /// Starts the table that a header names. The header defines the table even if longer headers have already
+    /// created it implicitly. If the table is already defined, reports an error but still adds keys to it.
     pub(super) fn start_table(&mut self, header: TableHeader<'s>) {
         self.table = self
             .take_existing_table(&header)
@@ -148,7 +149,7 @@ impl<'s> DocumentBuilder<'s> {
         self.header = Some(header);
     }
 
-    /// Removes and returns the existing table that a header names. `None` if there is none.
+    /// Removes and returns the table that a header names, or returns `None` if the table does not exist yet.
     fn take_existing_table(&mut self, header: &TableHeader<'s>) -> Option<TableId> {
         if header.is_list {
             return None;
@@ -187,7 +188,7 @@ impl<'s> DocumentBuilder<'s> {
         }
     }
 
-    /// Returns the table at `path`. Creates missing tables.
+    /// Returns the table at `path`, after creating any missing tables.
     fn find_or_create_table(&mut self, from: TableId, path: &[Name<'s>], is_dotted: bool) -> Option<TableId> {
         path.iter().try_fold(from, |table, name| {
             let Some(found) = self.document.find_in_table(table, &name.text) else {
@@ -205,7 +206,7 @@ impl<'s> DocumentBuilder<'s> {
         })
     }
 
-    /// Returns the table if a header or dotted key may add keys to it.
+    /// Returns the table if a header or dotted key may add keys to it, and reports an error otherwise.
     fn check_table_extendable(
         &mut self,
         table: TableId,

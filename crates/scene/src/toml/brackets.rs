@@ -12,7 +12,7 @@ pub(crate) struct Bracket {
     pub(crate) opens: bool,
 }
 
-/// Returns the array brackets in `text`, which must start at the start of an expression.
+/// Returns the array brackets in `text`, which must begin with the start of an expression.
 pub(crate) fn find_all_array_brackets(text: &str) -> Vec<Bracket> {
     let mut brackets = Vec::new();
     let (mut depth, mut is_line_start, mut is_header) = (0_usize, true, false);

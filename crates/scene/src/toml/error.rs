@@ -58,7 +58,7 @@ fn format_expected(expected: &Expected) -> String {
 pub(super) struct BoundedErrors(Vec<SyntaxError>);
 
 impl BoundedErrors {
-    /// Large enough to contain the first errors in text order, except in absurdly broken files.
+    /// Maximum length, large enough to include the first errors in text order, except in absurdly broken files.
     const CAPACITY: usize = 2_000;
 
     pub(super) fn push_with(&mut self, make: impl FnOnce() -> SyntaxError) {
@@ -67,7 +67,7 @@ impl BoundedErrors {
         }
     }
 
-    /// Concatenates both lists.
+    /// Concatenates two lists, up to the maximum length.
     pub(super) fn concatenate(mut self, others: Self) -> Vec<SyntaxError> {
         self.0.extend(others.0);
         self.0.truncate(Self::CAPACITY);

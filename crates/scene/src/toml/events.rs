@@ -60,7 +60,8 @@ impl<'s> ExpressionEventReader<'_, 's> {
         Span::new(self.base + event.span().start(), self.base + event.span().end())
     }
 
-    /// Reads the rest of the open header. An unclosed header ends at the next header and takes over its key.
+    /// Reads the rest of the open header. An unclosed header is closed by the next header, and takes that
+    /// header's key.
     fn read_header(&mut self) {
         let Some(mut header) = self.assembly.open.take() else { return };
         while let Some(event) = self.next() {
@@ -97,8 +98,7 @@ impl<'s> ExpressionEventReader<'_, 's> {
         ValueNode { span, kind: NodeKind::Integer(text, Radix::Decimal) }
     }
 
-    /// Reads a dotted key. Returns the path and the last part of the key. The last part is `None` if there
-    /// are too many parts.
+    /// Reads a dotted key. Returns its path and its last part, which is `None` if the key has too many parts.
     fn read_key(&mut self, event: Event) -> (Vec<Name<'s>>, Option<Name<'s>>) {
         let mut path = Vec::new();
         let mut last = event;

@@ -11,7 +11,7 @@ use std::borrow::Cow;
 use super::assembly::{DocumentBuilder, TableHeader};
 use super::tree::{DecodedTextIndex, Name, NodeKind, Radix, Span, ValueNode};
 
-/// Reads the line that starts at byte `at`. Returns the offset after the line. `None` if the line is not
+/// Reads the line that starts at byte `at`. Returns the offset after the line, or `None` if the line is not
 /// simple.
 pub(super) fn read_plain_line<'s>(
     source: &'s str,

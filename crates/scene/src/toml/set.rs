@@ -166,7 +166,7 @@ impl<'s> Document<'s> {
     }
 }
 
-/// What one part of a key refers to.
+/// Target of one part of a key.
 enum KeyPartTarget {
     /// A table.
     Table(TableId),

@@ -285,7 +285,7 @@ impl<'s> Document<'s> {
         (entry.key, entry.text, entry.node) = (name.span, text, node);
     }
 
-    /// Returns the only value in a table and its dotted key. `None` if there are several values or if the
+    /// Returns the only value in a table and its dotted key, or `None` if there are several values or if the
     /// value has a header.
     pub(super) fn sole_assignment_in_table(&self, table: TableId) -> Option<(Vec<Name<'s>>, ValueNode)> {
         let mut keys = Vec::new();
@@ -309,13 +309,13 @@ impl<'s> Document<'s> {
         Entries { document: self, table }.iter().map(|entry| entry.key.to_owned()).collect()
     }
 
-    /// Finds the value of a key. `None` if it is absent or not a string.
+    /// Finds the string value of a key. Returns `None` if the key is absent or its value is not a string.
     pub(super) fn find_string(&self, table: TableId, name: &str) -> Option<&str> {
         let node = self.find_in_table(table, name)?;
         if let NodeKind::String(text) = node.kind { Some(self.resolve_string(node.span, text)) } else { None }
     }
 
-    /// Returns the elements of an array or list. Empty for other values.
+    /// Returns the elements of an array or list, or no elements for other values.
     pub(super) fn elements_of(&self, kind: NodeKind) -> Vec<ValueNode> {
         let value = Value { document: self, node: ValueNode { span: Span::default(), kind } };
         value.as_array().map_or_else(Vec::new, |elements| elements.nodes.to_vec())
@@ -401,7 +401,7 @@ impl<'d> Value<'d> {
         self.node.span.range()
     }
 
-    /// The elements of an array. `None` if the value is not an array.
+    /// Returns the elements of an array, or `None` if the value is not an array.
     pub(crate) fn as_array(&self) -> Option<Elements<'d>> {
         if let TomlValue::Array(array) = self.decode() { Some(array) } else { None }
     }

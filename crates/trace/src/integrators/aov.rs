@@ -71,15 +71,15 @@ pub fn record_plain_first_hits(
     left
 }
 
-/// Albedo of a material, if neither the albedo nor the shading normals vary over a surface and no surface of
-/// this material is a null interaction.
+/// Returns the albedo of a material if its albedo and shading normals are constant over each surface, and none
+/// of its surfaces is a null interaction.
 fn constant_albedo(tile: &TileContext<'_>, index: usize) -> Option<Vec3> {
     let material = &tile.world.materials[index];
     let is_constant = !tile.world.material_needs_uvs_or_tangents(index) && !material.has_null_interaction();
     is_constant.then(|| material.bsdf.albedo(&TexturePoint::from_uv(DVec2::ZERO), &mut 0))
 }
 
-/// Records the first-hit layers of a camera ray with this hit.
+/// Records the first-hit layers of a camera ray, given its first hit.
 pub fn record_first_hit(
     tile: &TileContext<'_>,
     (path, hit): (&PathRay, &Hit),
@@ -114,8 +114,8 @@ fn record(values: &mut LayerValues, slot: u32, [albedo, normal, depth]: [Vec3; 3
     values.add(SampleLayer::Depth, slot, depth);
 }
 
-/// The first opaque hit along a camera ray, starting at `hit`, and the path that reaches it. `None` if there is
-/// no opaque surface.
+/// Returns the first opaque hit along a camera ray, starting at `hit`, and the path that reaches it. Returns
+/// `None` if there is no opaque surface.
 fn first_opaque_hit(
     tile: &TileContext<'_>,
     path: &PathRay,

@@ -97,8 +97,8 @@ pub struct LayerValues {
     lists: [Vec<Vec3>; SampleLayer::ALL.len()],
     /// Layers with values other than zero.
     used: LayerSet,
-    /// The tile's most recent results of [`LayerValues::constant_albedo`], by material index modulo their
-    /// number.
+    /// The tile's most recent results of [`LayerValues::constant_albedo`], by material index modulo the array
+    /// length.
     albedos: [Option<(usize, Option<Vec3>)>; 16],
 }
 
@@ -108,7 +108,7 @@ impl LayerValues {
         self.albedos = Default::default();
     }
 
-    /// Returns a material's albedo if it is constant, which `evaluate` determines once.
+    /// Returns a material's albedo if it is constant. Calls `evaluate` if the result is not cached.
     pub fn constant_albedo(
         &mut self,
         material: usize,
@@ -140,7 +140,7 @@ impl LayerValues {
         self.set
     }
 
-    /// Values of a layer from a slot onward. Empty if the set does not contain the layer.
+    /// Values of a layer from a slot onward, or an empty slice if the set does not contain the layer.
     #[inline]
     pub fn values_from(&mut self, layer: SampleLayer, slot: u32) -> &mut [Vec3] {
         self.used.0 |= 1 << layer as u8;
@@ -157,7 +157,7 @@ impl LayerValues {
 
     /// Ends the batch and adds its values to the sums of the pixels. There are `samples` samples per pixel.
     /// `radiance` and `is_negative` describe the samples of all pixels. Where the radiance is not finite, all
-    /// values are zero, as the film treats the radiance.
+    /// values are replaced with zero, just as the film replaces the radiance.
     pub fn add_to_sums(
         &mut self,
         sums: &mut LayerSums,

@@ -89,7 +89,7 @@ pub fn trace_camera_paths(
     while !rays.is_empty() {
         paths.begin_bounce(rays.len());
         if tile.behavior.scatters {
-            // Find all hits first, so that each packet hits one object.
+            // Find all hits first, to group the rays by the object that they hit.
             tile.closest_hits(rays, hits)?;
             object_order.sort(hits);
             for places in object_order.grouped_queue_indices().chunks(PACKET_SIZE) {
@@ -111,10 +111,10 @@ pub fn trace_camera_paths(
 struct CameraWavefront<'a, 's> {
     /// Number of bounces before the current hits.
     depth: u32,
-    /// How paths continue at diffuse and glossy surfaces. `None` if they end at these surfaces.
+    /// How paths continue at diffuse and glossy surfaces, or `None` if they end there.
     continuation: Option<ContinuationPolicy>,
     tile: &'a TileContext<'a>,
-    /// Photon maps for the samples. `None` if no photons are gathered.
+    /// Photon maps for the samples, or `None` if no photons are gathered.
     maps: Option<&'a PhotonMaps>,
     /// This bounce's diffuse and glossy vertices.
     direct: &'a mut DirectLightVertexQueue,
@@ -125,7 +125,7 @@ struct CameraWavefront<'a, 's> {
     next: &'a mut Vec<PathRay>,
     /// Index of the current path in this bounce's queue.
     place: u32,
-    /// Whether the layers that show the first hit of the current camera ray are not recorded yet.
+    /// Whether the first-hit layers of the current camera ray have yet to be recorded.
     is_first_hit_pending: bool,
     crossing: &'a mut CoincidentSurfaceBuffers,
     counters: &'a mut RayCounters,
@@ -151,7 +151,7 @@ impl CameraWavefront<'_, '_> {
             self.direct.commit_spare_vertices();
             self.store_cones(&rays, &packet);
         }
-        // Add the emission of camera rays, which needs no MIS weights, and record their layers.
+        // Add the emission found by camera rays, which needs no MIS weights, and record their layers.
         let (plain, escaped) = self.emission_masks(&rays, &packet);
         let mut unfinished = packet.any & !packet.plain;
         match rays {
@@ -161,8 +161,8 @@ impl CameraWavefront<'_, '_> {
             }
             PacketSource::Paths(..) | PacketSource::Traced(..) => unfinished |= plain | escaped,
         }
-        // Add the emission of the other rays and shade the surfaces that are not plain. The contributions to
-        // a sample are added in path order.
+        // Add the emission found by the other rays and shade the surfaces that are not plain. The
+        // contributions to a sample are added in path order.
         for lane in set_bit_lanes(unfinished) {
             self.place = rays.queue_index(lane);
             self.shade_ray(packet.path(tile, &rays, lane), (&packet, lane));
@@ -216,7 +216,7 @@ impl CameraWavefront<'_, '_> {
         Ok(())
     }
 
-    /// How the paths continue at a packet of vertices. `None` if they end there.
+    /// How the paths continue at a packet of vertices, or `None` if they end there.
     fn continuation_at(&self, row: &VertexBatch) -> Option<ContinuationPolicy> {
         let extends_narrow = row.bsdf.extends_narrow_lobe_paths() && self.tile.behavior.mirrors;
         let narrow = || ContinuationPolicy::new(self.tile, self.depth, SampledLobes::Narrow);

@@ -15,7 +15,7 @@ pub struct RenderSettings {
     pub dof: bool,
     /// The view to render.
     pub view: ViewMode,
-    /// Photon mapping settings. `None` if no photons are gathered.
+    /// Photon mapping settings, or `None` if no photons are gathered.
     pub photons: Option<PhotonSettings>,
     /// Layers to record along with the beauty image.
     pub layers: LayerSet,

@@ -103,8 +103,8 @@ impl ViewMode {
 pub enum AovSource {
     /// Light gathered by paths.
     Light(LightAov),
-    /// A quantity at the first hit, without exposure or tone mapping. All quantities except depth are displayed
-    /// unchanged.
+    /// A quantity at the first hit, without exposure or tone mapping. All quantities except depth are
+    /// displayed unchanged.
     FirstHit(FirstHitQuantity),
     /// The beauty image with the acceleration structures' bounding boxes drawn over it.
     Bounds,
@@ -113,7 +113,8 @@ pub enum AovSource {
 }
 
 impl AovSource {
-    /// Light AOV accumulated by paths. Not used by first-hit views.
+    /// The light AOV accumulated by paths, or [`LightAov::ALL`] if the source is not a light AOV. First-hit
+    /// views do not use it.
     pub fn light_aov(self) -> LightAov {
         match self {
             Self::Light(aov) => aov,

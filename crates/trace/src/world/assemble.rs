@@ -69,7 +69,7 @@ fn find_glass_solids(scene: &Scene, inputs: &WorldInputs) -> GlassSolids {
     GlassSolids::find(scene, &meshes, &CancelToken::new()).unwrap_or_default()
 }
 
-/// Whether each object's vertex colors are used. `None` if no object's vertex colors are used.
+/// Whether each object's vertex colors are used, or `None` if no object uses them.
 fn vertex_color_usage_by_object(scene: &Scene) -> Option<Box<[bool]>> {
     let is_colored =
         |object: &description::Object| object.shape.as_mesh().is_some_and(|mesh| mesh.vertex_colors);

@@ -100,8 +100,8 @@ impl World {
     }
 
     /// Glass material around a point, determined by the majority of rays cast from the point toward the
-    /// solid. `None` if the point is outside or no ray hits the solid. If the point is on object `of`, this
-    /// object does not block the rays.
+    /// solid, or `None` if the point is outside or no ray hits the solid. If the point is on object `of`,
+    /// this object does not block the rays.
     pub fn enclosing_glass_material(
         &self,
         body: &CompoundSolid,
@@ -127,7 +127,7 @@ impl World {
     }
 
     /// Casts a ray toward `target`. Returns whether the ray hits the solid from behind, and the material at
-    /// the hit. `None` if the ray misses the solid or leaves through an opaque surface that closes it.
+    /// the hit, or `None` if the ray misses the solid or leaves through an opaque surface that closes it.
     fn ray_hit_side_and_material(
         &self,
         body: &CompoundSolid,
@@ -155,7 +155,7 @@ impl World {
 }
 
 impl Object {
-    /// Returns a point on the surface, selected by `number`. `None` if the object has no area.
+    /// Returns a point on the surface, selected by `number`, or `None` if the object has no area.
     fn surface_point_by_number(&self, number: usize) -> Option<DVec3> {
         match self {
             Self::Shape(shape) => {

@@ -127,8 +127,8 @@ impl World {
         is_away && self.is_glass_material(self.material_index(at.hit) as u32)
     }
 
-    /// Fast path for [`World::visit_coincident_candidates`] if [`World::is_glass_thicker_than`] is true and nothing else
-    /// is nearby. In this case, only the incoming ray's side matters.
+    /// Fast path for [`World::visit_coincident_candidates`] if [`World::is_glass_thicker_than`] is true and
+    /// nothing else is nearby. In this case, only the incoming ray's side matters.
     fn visit_isolated_hit_surface(
         &self,
         at: &CoincidenceQuery<'_>,
@@ -232,7 +232,7 @@ impl World {
         self.glass_solids.solid_id(object)
     }
 
-    /// Whether any glass solid is open. It may then be unknown whether a ray is inside.
+    /// Whether any glass solid is open, in which case it may be unknown whether a ray is inside glass.
     pub fn has_open_glass(&self) -> bool {
         self.has_open_glass
     }
@@ -264,7 +264,7 @@ impl World {
         })
     }
 
-    /// The [`SubtreeClosedGlassIds`] of each subtree. Empty if few objects are nested.
+    /// The [`SubtreeClosedGlassIds`] of each subtree, or an empty list if few objects are nested.
     pub(super) fn closed_glass_shapes_by_subtree(&self) -> Box<[SubtreeClosedGlassIds]> {
         let is_glass = |id: u32| {
             let material = self.material_index(&Hit { shape: ShapeHit::from_t(0.0), object: id }) as u32;

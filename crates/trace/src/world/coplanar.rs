@@ -22,8 +22,8 @@ const COINCIDENT: f64 = 1.0 / (1 << 20) as f64;
 /// Lift relative to the size of the light and its surroundings: well above `f32` rounding errors, but too
 /// small to be visible.
 pub(super) const LIFT: f64 = 1.0 / (1 << 16) as f64;
-/// Error in the plane of a mesh face, relative to its coordinates: several times the `f32` rounding error of
-/// the corners.
+/// Error of a mesh face's plane, relative to the face's coordinates: several times the `f32` rounding error
+/// of the corners.
 pub(super) const ROUNDING: f64 = 1.0 / (1 << 22) as f64;
 /// Two lifts have the same direction if the cosine between them differs from 1 by at most this value.
 const SAME_DIRECTION: f64 = 1e-5;
@@ -39,8 +39,8 @@ pub struct CoplanarLight {
     pub light: usize,
     /// The overlapped object, equal to `light` if both faces belong to one mesh.
     pub surface: usize,
-    /// Translation that moves the light off the surface. `None` if the surface emits toward the same side.
-    /// The overlap then remains, and both surfaces emit.
+    /// Translation that moves the light off the surface, or `None` if the surface emits toward the same side,
+    /// in which case the overlap remains and both surfaces emit.
     pub lift: Option<DVec3>,
 }
 
@@ -48,7 +48,7 @@ pub struct CoplanarLight {
 #[derive(Clone, Debug)]
 pub(super) struct FlatFace {
     pub(super) object: usize,
-    /// Corners in counterclockwise order as seen from the front. Empty for an infinite plane.
+    /// Corners in counterclockwise order as seen from the front, or none for an infinite plane.
     pub(super) corners: Vec<DVec3>,
     point: DVec3,
     /// Unit normal on the front side.
@@ -65,7 +65,7 @@ impl FlatFace {
         Some(Self { object: 0, corners, point: a, normal, emits: None, rounding: 0.0 })
     }
 
-    /// Applies an affine map. The front remains the front.
+    /// Applies an affine map, preserving which side is the front.
     fn transformed(self, map: &Transform) -> Self {
         let mut corners: Vec<DVec3> = self.corners.iter().map(|corner| map.point(*corner)).collect();
         if map.flips_handedness() {
@@ -75,7 +75,7 @@ impl FlatFace {
         Self { corners, point, normal, ..self }
     }
 
-    /// Bounding box of the corners. `None` for an infinite plane.
+    /// Bounding box of the corners, or `None` for an infinite plane.
     fn bounds(&self) -> Option<[DVec3; 2]> {
         let first = *self.corners.first()?;
         let grow = |[least, greatest]: [DVec3; 2], at: &DVec3| [least.min(*at), greatest.max(*at)];
@@ -86,8 +86,8 @@ impl FlatFace {
         self.bounds().map_or(f64::INFINITY, |[least, greatest]| (greatest - least).max_element())
     }
 
-    /// Whether two faces are identical, or are duplicates within one mesh. Duplicate faces emit only once;
-    /// see [`separate_coincident_emitters`](super::separate_coincident_emitters).
+    /// Whether two faces are the same face or duplicates within one mesh. Duplicate faces emit only once; see
+    /// [`separate_coincident_emitters`](super::separate_coincident_emitters).
     fn is_duplicate_of(&self, other: &Self) -> bool {
         self.object == other.object
             && self.corners.iter().all(|corner| other.corners.contains(corner))
@@ -122,7 +122,7 @@ pub(super) struct EmissiveFaces {
 }
 
 impl EmissiveFaces {
-    /// Sorts the faces. `None` if there are no faces.
+    /// Sorts the faces. Returns `None` if there are no faces.
     pub(super) fn new(mut faces: Vec<FlatFace>) -> Option<Self> {
         let least_x = |face: &FlatFace| face.bounds().map_or(f64::NEG_INFINITY, |[least, _]| least.x);
         faces.sort_by(|a, b| least_x(a).total_cmp(&least_x(b)));
@@ -205,7 +205,8 @@ fn are_boxes_apart(a: [DVec3; 2], b: [DVec3; 2]) -> bool {
     a[0].cmpgt(b[1]).any() || a[1].cmplt(b[0]).any()
 }
 
-/// Translations that move lights off coplanar surfaces, one per object. Empty if no lights need to be moved.
+/// Translations that move lights off coplanar surfaces, one per object, or an empty list if no lights need to
+/// be moved.
 pub fn light_lifts(scene: &Scene, meshes: &[Arc<MeshTree>], origin: DVec3) -> Vec<DVec3> {
     let loaded: Vec<_> = meshes.iter().map(|mesh| mesh.loaded()).collect();
     let found = coplanar_lights(scene, &loaded, origin).into_iter();
@@ -252,9 +253,9 @@ fn record_coplanar_light(
     }
 }
 
-/// Whether to lift the light off the face along the light's normal. This hides the back of a two-sided light.
-/// The light is not lifted if the face also emits on that side, unless it is the reverse of the light in the
-/// same mesh: there, each face emits on its own side.
+/// Whether to lift the light off the face along the light's normal, which hides the back of a two-sided
+/// light. The light is not lifted if the face also emits on that side, unless the face is in the same mesh
+/// and has the opposite normal. In that case, each face emits on its own side.
 fn must_lift_light(light: &FlatFace, face: &FlatFace) -> bool {
     !face.emits_along(light.normal) || light.object == face.object && light.has_opposite_normal(face)
 }

@@ -16,7 +16,7 @@ use crate::geometry::mesh::TriangleMesh;
 use crate::math::{DVec3, Vec3};
 use crate::scene::description::Scene;
 
-/// Whether an object gives an emissive material to each mesh file.
+/// For each mesh file, whether any object overrides its materials with an emissive material.
 pub fn mesh_files_with_emissive_override(scene: &Scene) -> Vec<bool> {
     let mut emissive = vec![false; scene.mesh_files.len()];
     for object in &scene.objects {
@@ -28,7 +28,7 @@ pub fn mesh_files_with_emissive_override(scene: &Scene) -> Vec<bool> {
 }
 
 /// Returns a copy of the mesh in which camera rays, shadow rays and light samples agree on which coincident
-/// emissive triangle they reach. `None` if there are no such triangles. If `all_emit` is false, the file's
+/// emissive triangle they reach, or `None` if there are no such triangles. If `all_emit` is false, the file's
 /// materials determine the emissive triangles.
 ///
 /// # Errors
@@ -119,7 +119,8 @@ fn find_triangle_lifts(
     Ok((found, LIFT * greatest))
 }
 
-/// Moves triangles along these directions. The moved triangles get separate vertices.
+/// Moves triangles by `height` along their normals in `lifts`. The moved triangles no longer share vertices
+/// with the others.
 fn lift_triangles(mesh: &mut TriangleMesh, lifts: &BTreeMap<usize, DVec3>, height: f64) {
     let mut known = HashMap::new();
     for (triangle, normal) in lifts {

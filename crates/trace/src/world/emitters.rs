@@ -22,14 +22,14 @@ use crate::materials::{Emission, EmissionSides, Opacity};
 use crate::math::{DVec3, Vec3};
 use crate::scene::description::{self, Scene};
 
-/// Sampling tables for the environment map. `None` if the image is black.
+/// Sampling tables for the environment map, or `None` if the image is black.
 pub fn build_environment_map(texels: &Arc<Texels>) -> Option<Arc<EnvironmentMap>> {
     EnvironmentMap::new(Arc::clone(texels)).map(Arc::new)
 }
 
 /// Builds all lights: delta and directional lights first, then the environment, then emitting objects. A mesh
 /// becomes one light per emitting material. Two-sided emission becomes two lights. `sky` is the environment
-/// map. `None` if there is no map.
+/// map, if there is one.
 ///
 /// # Errors
 /// [`Cancelled`] if the token is canceled.
@@ -66,7 +66,7 @@ pub fn build_lights(
     Ok(Arc::new(Lights::new(all, token)?))
 }
 
-/// Creates a scene's photon source. `None` if no light emits photons.
+/// Creates a scene's photon source, or returns `None` if no light emits photons.
 pub fn scene_photon_emitter(geometry: &Geometry, lights: &Arc<Lights>) -> Option<PhotonEmitter> {
     let emitter_geometry =
         |object: u32| geometry.objects().get(object as usize).map(Object::emitter_geometry);
@@ -74,7 +74,7 @@ pub fn scene_photon_emitter(geometry: &Geometry, lights: &Arc<Lights>) -> Option
     PhotonEmitter::new(lights, emitter_geometry, BoundingSphere::enclosing_spheres(&balls))
 }
 
-/// Environment light. `None` if it is black.
+/// The environment light, or `None` if it is black.
 fn environment_light(
     environment: &description::Environment,
     sky: Option<Arc<EnvironmentMap>>,
@@ -117,7 +117,7 @@ fn emission_unless_texture_black(emission: Emission) -> Emission {
     }
 }
 
-/// Emission of a material, combined with the opacity.
+/// Emission of a material, combined with its opacity.
 #[derive(Clone)]
 struct EmissionWithOpacity {
     /// Emission, scaled by the opacity if it is constant.

@@ -31,7 +31,7 @@ pub struct Geometry {
     /// Origin of the traced coordinates, in scene coordinates.
     origin: DVec3,
     tree: Bvh,
-    /// Small meshes merged into one tree. `None` if merging is not worthwhile.
+    /// Small meshes merged into one tree, or `None` if merging is not worthwhile.
     merged: Option<MergedTree>,
     /// Infinite objects, which are not in the tree.
     unbounded: Vec<u32>,
@@ -39,7 +39,7 @@ pub struct Geometry {
     mesh_rounding: f32,
     /// Cache of isolated surface regions.
     isolated: IsolatedRegionCache,
-    /// One translation per object. Empty if no objects are moved.
+    /// One translation per object, or empty if no objects are moved.
     lifts: Vec<DVec3>,
     instructions: InstructionSet,
 }
@@ -85,7 +85,7 @@ impl Geometry {
         Ok(Self { origin, lifts, ..Self::build(built, token)? })
     }
 
-    /// One translation per object; see [`super::coplanar_lights`]. Empty if no objects are moved.
+    /// One translation per object, or empty if no objects are moved; see [`super::coplanar_lights`].
     pub fn coplanar_light_offsets(&self) -> &[DVec3] {
         &self.lifts
     }
@@ -152,8 +152,8 @@ impl Geometry {
         self.merged.as_ref().map_or(&self.tree, |merged| &merged.over)
     }
 
-    /// Returns the merged meshes if they are represented by `id`, which is an id from
-    /// [`Geometry::traced_tree`]. `None` if `id` refers to a real object.
+    /// Returns the merged meshes if they are represented by `id`, an id from [`Geometry::traced_tree`], or
+    /// `None` if `id` refers to a real object.
     #[inline(always)]
     pub(super) fn merged_meshes_if_represented_by(&self, id: u32) -> Option<&MergedMeshes> {
         let merged = self.merged.as_ref()?;
@@ -298,7 +298,7 @@ impl Geometry {
         self.unbounded.iter().any(|&id| test(id)) || self.traced_tree().any_hit(ray, test)
     }
 
-    /// Scene-wide number of the hit triangle, for [`Ray::start`]. [`Ray::NO_TRIANGLE`] for other shapes.
+    /// Scene-wide number of the hit triangle, for [`Ray::start`], or [`Ray::NO_TRIANGLE`] for other shapes.
     #[inline(always)]
     pub fn scene_triangle_number(&self, hit: &Hit) -> u32 {
         match &self.objects[hit.object as usize] {
@@ -317,7 +317,7 @@ impl Geometry {
         self.objects[hit.object as usize].surface(ray, &hit.shape, asked)
     }
 
-    /// Mean curvature at a hit. Positive if the surface is convex on its front side.
+    /// Mean curvature at a hit, positive if the surface is convex on its front side.
     pub fn mean_curvature(&self, hit: &Hit, surface: &SurfacePoint) -> f32 {
         match &self.objects[hit.object as usize] {
             Object::Shape(shape) => {
@@ -327,14 +327,14 @@ impl Geometry {
         }
     }
 
-    /// Index of a triangle's material in its mesh file. `None` if the file does not assign a material.
+    /// Index of a triangle's material in its mesh file, or `None` if the file does not assign a material.
     pub fn file_material_index(&self, object: u32, triangle: u32) -> Option<u32> {
         let mesh = self.objects[object as usize].mesh()?;
         let materials = &mesh.tree.loaded().mesh.materials;
         materials.get(triangle as usize).copied().filter(|&own| own != u32::MAX)
     }
 
-    /// Vertex color at a hit, interpolated in linear space. `None` if the mesh has no vertex colors.
+    /// Vertex color at a hit, interpolated in linear space, or `None` if the mesh has no vertex colors.
     pub fn vertex_color(&self, hit: &Hit) -> Option<Vec3> {
         let mesh = &self.objects[hit.object as usize].mesh()?.tree.loaded().mesh;
         let corners = mesh.triangles.get(hit.shape.primitive as usize)?;
@@ -344,12 +344,12 @@ impl Geometry {
         Some(a? * (1.0 - u - v) + b? * u + c? * v)
     }
 
-    /// UV and tangents (∂p/∂u, ∂p/∂v) at a hit in the second UV set. `None` without a second UV set.
+    /// UV and tangents (∂p/∂u, ∂p/∂v) at a hit in the second UV set, if there is one.
     pub fn second_uv_and_tangents(&self, hit: &Hit) -> Option<(Vec2, [Vec3; 2])> {
         self.objects[hit.object as usize].mesh()?.second_uv_and_tangents(&hit.shape)
     }
 
-    /// Memory used by the objects and the trees over them, in bytes. Excludes per-mesh trees.
+    /// Memory used by the objects and the trees over them, in bytes, excluding per-mesh trees.
     pub fn top_level_memory_bytes(&self) -> usize {
         let of_merged = |merged: &MergedTree| merged.meshes.memory_bytes() + merged.over.memory_bytes();
         let merged = self.merged.as_ref().map_or(0, of_merged);

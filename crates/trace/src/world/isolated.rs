@@ -30,8 +30,8 @@ const MAX_STATE: f64 = 64.0;
 /// of 30° or more are not considered near.
 const FROM_EDGES: f64 = 4.0;
 
-/// Minimum distance, in margins, at which surfaces are not considered near. Covers a box of one margin around
-/// the point, with room for rounding.
+/// Minimum distance, in margins, at which surfaces are not considered near. This distance covers a box of one
+/// margin around the point, with room for rounding.
 const MIN_SEPARATION: f64 = 1.9;
 
 /// Grid cells along each side of a shape's bounding box.

@@ -85,7 +85,7 @@ pub fn lower_material(scene: &Scene, images: &Images, material: &description::Ma
     Material { bsdf, emission, normal_perturbation, opacity: lower_opacity(scene, images, material) }
 }
 
-/// Opacity of a material from the scene file. `None` if it is fully opaque.
+/// Opacity of a material from the scene file, or `None` if it is fully opaque.
 pub fn lower_opacity(scene: &Scene, images: &Images, material: &description::Material) -> Option<Opacity> {
     let source = &material.opacity;
     if source.is_opaque() {
@@ -106,7 +106,7 @@ pub fn lower_opacity(scene: &Scene, images: &Images, material: &description::Mat
     Some(Opacity { value, cutoff })
 }
 
-/// A metal: a mirror if its roughness is 0, and otherwise a microfacet conductor.
+/// BSDF of a metal: a mirror if its roughness is 0, and otherwise a microfacet conductor.
 fn metal(fresnel: ConductorFresnel, roughness: ScalarParameter, anisotropy: ScalarParameter) -> Bsdf {
     if roughness.as_untextured() == Some(0.0) {
         return Bsdf::Mirror(Mirror::Conductor(fresnel));
@@ -145,7 +145,8 @@ pub fn lower_emission(scene: &Scene, images: &Images, material: &description::Ma
     Emission { scale: emission.scale, texture, sides: emission.sides, coat }
 }
 
-/// Index of refraction and transmittance per unit length of a mesh file's glass. `None` for other materials.
+/// Index of refraction and transmittance per unit length of a mesh file's glass, or `None` for other
+/// materials.
 pub fn file_glass_properties(own: &FileMaterial) -> Option<(f32, DVec3)> {
     own.is_glass().then(|| (own.ior.clamp(1.0, FileMaterial::MAX_IOR), DVec3::ONE))
 }
@@ -157,7 +158,7 @@ pub fn file_emission(images: &Images, own: &FileMaterial) -> Emission {
     }
     match &own.emission_texture {
         None => Emission::from_constant(own.emission),
-        // If the emission map could not be read, do not emit. Otherwise, the whole surface would emit.
+        // If the emission map could not be read, emit nothing rather than from the whole surface.
         Some(texture) => match file_texture(images, texture, color_or_cutout_interpretation(own, texture)) {
             None => Emission::NONE,
             texture => Emission { texture, ..Emission::from_constant(own.emission) },
@@ -165,7 +166,7 @@ pub fn file_emission(images: &Images, own: &FileMaterial) -> Emission {
     }
 }
 
-/// Opacity of a mesh file's material. `None` if it is fully opaque or glass.
+/// Opacity of a mesh file's material, or `None` if it is fully opaque or glass.
 pub fn file_opacity(images: &Images, own: &FileMaterial) -> Option<Opacity> {
     if own.is_glass() {
         return None;
@@ -303,7 +304,7 @@ pub fn fallback_material() -> Material {
     }
 }
 
-/// Looks up the textures of a material from the scene file.
+/// Converts the colors, numbers and textures of a material from the scene file.
 #[derive(Clone, Copy)]
 struct SceneTextureLookup<'a> {
     scene: &'a Scene,
@@ -315,12 +316,13 @@ impl SceneTextureLookup<'_> {
     fn lower_color(self, source: &ColorSource) -> ColorOrTexture {
         match source {
             ColorSource::Constant(color) => ColorOrTexture::Constant(*color),
-            // Textures are used in the same way for all color roles.
+            // The choice of color role does not matter because all of them use textures in the same way.
             ColorSource::Texture(index) => ColorOrTexture::Texture(self.texture(*index, TextureRole::Facets)),
         }
     }
 
-    /// Scalar parameter. Uses the texture's luminance if the scene does not specify a channel.
+    /// Converts a number to a scalar parameter, which uses the texture's luminance if the scene does not
+    /// specify a channel.
     fn number(self, source: &NumberSource, role: fn(ChannelSelector) -> TextureRole) -> ScalarParameter {
         match (source.as_constant(), source.texture_index_and_channel(ChannelSelector::Luminance)) {
             (Some(number), _) => ScalarParameter::Constant(number),
@@ -350,8 +352,8 @@ impl SceneTextureLookup<'_> {
     }
 }
 
-/// Texture from a mesh file. `None` if the image was not loaded, either because it is not needed or because
-/// it could not be read.
+/// Texture from a mesh file, or `None` if the image was not loaded, either because it is not needed or
+/// because it could not be read.
 fn file_texture(images: &Images, texture: &FileTexture, used: PixelInterpretation) -> Option<Arc<Texture>> {
     let texels = images.get(&image_file_and_encoding(texture, used))?.texels.clone();
     let (base, gain) = texture.range;
@@ -372,8 +374,8 @@ fn file_texture(images: &Images, texture: &FileTexture, used: PixelInterpretatio
     }))
 }
 
-/// Returns a loaded image, or a placeholder if the image was not loaded. Such images are used only by
-/// materials without objects, which are never looked up.
+/// Returns a loaded image, or a placeholder if the image was not loaded. Images that are not loaded are used
+/// only by materials without objects, whose textures are never looked up.
 fn loaded_image_or_placeholder(images: &Images, source: &TextureSource) -> Image {
     images.get(source).cloned().unwrap_or_else(|| {
         let data = TexelData::Linear8(vec![[128, 128, 255]]);

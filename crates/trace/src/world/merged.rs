@@ -2,8 +2,8 @@
 //! there are few triangles in total, packets test them using a [`TriangleList`] without a tree.
 //!
 //! Triangles are transformed to world coordinates and rounded. [`contact`](super::contact) and
-//! [`Geometry::visit_nodes_along_ray`](super::Geometry::visit_nodes_along_ray) use the per-mesh trees. Hits on untransformed
-//! instances are bit-identical to those on unmerged meshes.
+//! [`Geometry::visit_nodes_along_ray`](super::Geometry::visit_nodes_along_ray) use the per-mesh trees. Hits
+//! on untransformed instances are bit-identical to hits on unmerged meshes.
 
 use super::triangle_tree::TriangleTree;
 use super::{MeshInstance, Object};
@@ -31,8 +31,8 @@ const MIN_FACETS: usize = 8;
 /// Maximum coordinate of a merged mesh, relative to its size. Beyond this, rounding would distort the mesh.
 const MAX_RELATIVE_COORDINATE: f32 = 1024.0;
 
-/// Maximum size of a transformed mesh, relative to the scene's smallest object. Rounding
-/// would move the corners of a larger mesh by more than 1/256 of the smallest object's size.
+/// Maximum size of a transformed mesh, relative to the scene's smallest object. Rounding would move the
+/// corners of a larger mesh by more than 1/256 of the smallest object's size.
 const MAX_RELATIVE_SIZE: f32 = (1 << 17) as f32;
 
 /// Identifies the object and primitive of a triangle in the merged tree.
@@ -48,7 +48,7 @@ pub struct MergedTriangle {
 #[derive(Debug)]
 pub struct MergedMeshes {
     tree: TriangleTree,
-    /// The triangles, if packets test them without the tree. `None` if there are too many.
+    /// The triangles that packets test without the tree, or `None` if there are too many.
     facets: Option<TriangleList>,
     /// Triangles sorted by object, so that at equal distances the lowest object id wins.
     triangles: Vec<MergedTriangle>,
@@ -291,8 +291,8 @@ fn are_coherent(rows: &RayPacket, met: u32, size: Vec3, simd: impl Simd) -> bool
 /// between directions relative to their length.
 const COHERENCE: f32 = 0.125;
 
-/// Calls [`TriangleList::closest_hit_packet`] for incoherent rays. Returns the lanes that need an exact test, or `None`
-/// for coherent rays.
+/// Kernel that calls [`TriangleList::closest_hit_packet`] for incoherent rays and returns the lanes that need
+/// an exact test, or returns `None` for coherent rays.
 struct IncoherentClosestFacetKernel<'a> {
     facets: &'a TriangleList,
     size: Vec3,
@@ -315,8 +315,8 @@ impl SimdKernel for IncoherentClosestFacetKernel<'_> {
     }
 }
 
-/// Calls [`TriangleList::any_hit_packet`] for incoherent rays. Returns the hit lanes and the lanes that need an exact
-/// test, or `None` for coherent rays.
+/// Kernel that calls [`TriangleList::any_hit_packet`] for incoherent rays and returns the hit lanes and the
+/// lanes that need an exact test, or returns `None` for coherent rays.
 struct IncoherentAnyHitKernel<'a> {
     facets: &'a TriangleList,
     size: Vec3,

@@ -25,7 +25,8 @@ pub struct MeshInstance {
     /// Whether the mesh is included in the tree of [`MergedMeshes`](super::MergedMeshes), in world
     /// coordinates.
     pub(super) is_merged: bool,
-    /// Scene-wide number of the mesh's first triangle. `None` if the scene has too many triangles for `u32`.
+    /// Scene-wide number of the mesh's first triangle, or `None` if the scene has too many triangles for
+    /// `u32`.
     pub(super) first: Option<u32>,
     /// Whether the transform is not the identity.
     pub(super) is_transformed: bool,
@@ -60,7 +61,8 @@ impl MeshInstance {
         }
     }
 
-    /// Scene-wide number of a triangle; see [`Geometry::scene_triangle_number`](super::Geometry::scene_triangle_number).
+    /// Scene-wide number of a triangle; see
+    /// [`Geometry::scene_triangle_number`](super::Geometry::scene_triangle_number).
     #[inline(always)]
     pub(super) fn scene_triangle_number(&self, triangle: u32) -> u32 {
         self.first.map_or(Ray::NO_TRIANGLE, |first| first + triangle)
@@ -143,12 +145,12 @@ impl MeshInstance {
         ])
     }
 
-    /// UVs of a triangle's corners in the second UV set. `None` without a second set.
+    /// UVs of a triangle's corners in the second UV set, if there is one.
     pub fn second_set_corner_uvs(&self, triangle: u32) -> Option<[Vec2; 3]> {
         self.values_in_corner_order(triangle, &self.tree.loaded().mesh.second_uvs)
     }
 
-    /// Vertex values at a triangle's corners, in the order of [`MeshInstance::world_corners`]. `None` if
+    /// Vertex values at a triangle's corners, in the order of [`MeshInstance::world_corners`], or `None` if
     /// `values` is empty.
     fn values_in_corner_order(&self, triangle: u32, values: &[Vec2]) -> Option<[Vec2; 3]> {
         let corners = self.tree.loaded().mesh.triangles[triangle as usize];
@@ -157,7 +159,7 @@ impl MeshInstance {
         Some(if self.transform.flips_handedness() { [a, c, b] } else { [a, b, c] })
     }
 
-    /// UV and tangents at a hit in the second UV set. `None` without a second set.
+    /// UV and tangents at a hit in the second UV set, if there is one.
     pub(super) fn second_uv_and_tangents(&self, hit: &ShapeHit) -> Option<(Vec2, [Vec3; 2])> {
         let mesh = &self.tree.loaded().mesh;
         if mesh.second_uvs.is_empty() {
@@ -171,7 +173,7 @@ impl MeshInstance {
     }
 
     /// Mean curvature of the surface approximated by a triangle, estimated from the vertex normals
-    /// (Akenine-Möller et al. 2021, section 4). Positive if the surface is convex on its front side.
+    /// (Akenine-Möller et al. 2021, section 4). It is positive if the surface is convex on its front side.
     pub(super) fn mean_curvature(&self, triangle: u32, normal: Vec3) -> f32 {
         if !self.smooth {
             return 0.0;

@@ -73,7 +73,7 @@ pub type Images = HashMap<TextureSource, Image>;
 pub struct Image {
     /// The full-resolution pixels.
     pub texels: Arc<Texels>,
-    /// Mip levels. `None` if no texture needs them.
+    /// Mip levels, if any texture needs them.
     pub mipmaps: Option<Arc<Mipmaps>>,
 }
 
@@ -84,9 +84,9 @@ pub struct WorldInputs {
     pub meshes: Vec<Arc<MeshTree>>,
     /// The images listed by [`textures_needed`].
     pub images: Images,
-    /// Contents of the orbiter file. `None` if the scene file defines the camera itself.
+    /// Contents of the orbiter file, or `None` if the scene file defines the camera itself.
     pub orbiter: Option<GkitOrbiterCamera>,
-    /// Camera that overrides the scene's camera. `None` to use the scene's camera.
+    /// Camera that overrides the scene's camera, if any.
     pub camera: Option<description::Camera>,
     /// Glass solids, if they have already been found.
     pub glass_solids: Option<Arc<GlassSolids>>,
@@ -101,11 +101,11 @@ pub struct World {
     pub geometry: Arc<Geometry>,
     /// Materials, referenced by index from the objects.
     pub materials: Vec<Material>,
-    /// Packet-shading data of each material. `None` for materials that are not plain.
+    /// Packet-shading data of each material, or `None` for materials that are not plain.
     packet_material: Box<[Option<PacketMaterial>]>,
     /// Whether any material's lobes depend on the texture axes.
     has_directions: bool,
-    /// Whether each material is textured; see [`Material::is_textured`].
+    /// Whether each material needs UVs or tangents; see [`Material::needs_uvs_or_tangents`].
     textured: Box<[bool]>,
     /// For each object, its material or the materials of its mesh file.
     object_materials: Vec<ObjectMaterial>,
@@ -119,11 +119,12 @@ pub struct World {
     has_glass: bool,
     /// Whether any glass surface is rough.
     has_rough_glass: bool,
-    /// Whether each object represents a closed glass solid that contains no light. Empty without rough glass.
+    /// Whether each object represents a closed glass solid that contains no light. This table is empty if
+    /// there is no rough glass.
     unlit_glass: Box<[bool]>,
     /// Closed glass shapes that may contain points on the lens, with their materials.
     lens_glass: Vec<(u32, u32)>,
-    /// Relevant enclosing glass shapes in each subtree of nested objects. Empty if few objects are nested.
+    /// Relevant enclosing glass shapes in each subtree of nested objects, or empty if few objects are nested.
     enclosing_glass: Box<[contact::SubtreeClosedGlassIds]>,
     /// Other glass solids that contain the camera, with their materials.
     camera_solids: Vec<(u32, u32)>,
@@ -131,9 +132,9 @@ pub struct World {
     mipmapped: Box<[bool]>,
     /// Whether any texture uses a mesh's second UV set.
     has_second_uvs: bool,
-    /// Whether each object's vertex colors are used. `None` if no object's vertex colors are used.
+    /// Whether each object's vertex colors are used, or `None` if no object uses them.
     colored: Option<Box<[bool]>>,
-    /// Objects that light may pass through without changing direction. `None` if there are none.
+    /// Objects that light may pass through without changing direction, if there are any.
     see_through: Option<Box<null_interaction::SeeThroughObjects>>,
 }
 
@@ -163,7 +164,8 @@ impl World {
         }
     }
 
-    /// Name of the hit triangle's material in the mesh file. `None` if the file does not assign a material.
+    /// Name of the hit triangle's material in the mesh file, or `None` if the file does not assign a
+    /// material.
     pub fn file_material_name(&self, hit: &Hit) -> Option<&str> {
         let own = self.geometry.file_material_index(hit.object, hit.shape.primitive)?;
         let mesh = self.geometry.objects()[hit.object as usize].mesh()?;
@@ -204,7 +206,7 @@ impl World {
         }
     }
 
-    /// Whether a material is textured; see [`Material::needs_uvs_or_tangents`].
+    /// Whether a material needs UVs or tangents; see [`Material::needs_uvs_or_tangents`].
     #[inline(always)]
     pub fn material_needs_uvs_or_tangents(&self, material: usize) -> bool {
         self.textured[material]
@@ -222,7 +224,7 @@ impl World {
         self.colored.as_ref().is_some_and(|colored| colored[object as usize])
     }
 
-    /// The vertex color that tints the material at a hit. `None` if vertex colors are not used.
+    /// The vertex color that tints the material at a hit, or `None` if vertex colors are not used.
     #[inline]
     pub fn vertex_color(&self, hit: &Hit) -> Option<Vec3> {
         self.object_uses_vertex_colors(hit.object).then(|| self.geometry.vertex_color(hit)).flatten()
@@ -240,7 +242,7 @@ impl World {
         TexturePoint { uv: surface.uv, footprint: footprint([surface.dpdu, surface.dpdv]), second }
     }
 
-    /// The second UV set's part of [`World::texture_point`]. `None` if the mesh has no second set.
+    /// The second UV set's part of [`World::texture_point`], or `None` if the mesh has no second set.
     #[cold]
     #[inline(never)]
     fn second_uv_point(

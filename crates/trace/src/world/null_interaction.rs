@@ -32,7 +32,7 @@ pub(super) struct SeeThroughObjects {
 }
 
 impl SeeThroughObjects {
-    /// Collects the world's see-through objects. `None` if there are none.
+    /// Collects the world's see-through objects, or returns `None` if there are none.
     pub(super) fn from_world(world: &World) -> Option<Self> {
         let geometry = &world.geometry;
         let has_null_interaction =
@@ -44,8 +44,8 @@ impl SeeThroughObjects {
         objects.contains(&true).then_some(Self { objects, is_any_merged })
     }
 
-    /// Whether light may pass through an object without changing direction. False for the id of the merged
-    /// meshes, which is out of range.
+    /// Whether light may pass through an object without changing direction. Returns false for the id of the
+    /// merged meshes, which is out of range.
     #[inline(always)]
     fn has(&self, object: u32) -> bool {
         self.objects.get(object as usize).copied().unwrap_or(false)

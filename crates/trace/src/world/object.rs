@@ -93,7 +93,7 @@ impl Object {
         }
     }
 
-    /// Bounding box. `None` if the object is infinite.
+    /// Bounding box, or `None` if the object is infinite.
     pub fn bounds(&self) -> Option<Aabb> {
         match self {
             Self::Shape(shape) => shape.bounds(),
@@ -101,7 +101,7 @@ impl Object {
         }
     }
 
-    /// A bounding sphere. `None` if the object is infinite or empty.
+    /// A bounding sphere, or `None` if the object is infinite or empty.
     pub fn bounding_sphere(&self) -> Option<BoundingSphere> {
         if let Self::Shape(Shape::Sphere(Sphere { center, radius })) = self {
             return Some(BoundingSphere { center: *center, radius: *radius });
@@ -119,7 +119,7 @@ impl Object {
         }
     }
 
-    /// The mesh instance. `None` for shapes.
+    /// The mesh instance, or `None` for shapes.
     pub fn mesh(&self) -> Option<&MeshInstance> {
         match self {
             Self::Shape(_) => None,

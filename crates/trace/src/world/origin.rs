@@ -8,8 +8,8 @@ use crate::scene::description;
 
 /// Chooses an origin near the camera's target, so that `f32` coordinates are as precise there as near 0. The
 /// origin is 0 if the target is within about 20 camera distances of 0. It depends only on the point that the
-/// camera orbits and the distance to this point, and changes in discrete steps. Orbiting does not change the
-/// origin. Trees are rebuilt only when the origin changes.
+/// camera orbits and on the distance to this point, so orbiting does not change it. It changes in discrete
+/// steps because every change requires the trees to be rebuilt.
 pub fn choose_origin_near_camera_target(
     camera: &description::Camera,
     orbiter: Option<&GkitOrbiterCamera>,

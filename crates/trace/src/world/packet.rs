@@ -40,8 +40,8 @@ impl Geometry {
         (nearest.hits, nearest.object)
     }
 
-    /// Like [`Geometry::is_occluded_except_by_light`], for a packet of shadow rays. Returns the mask of occluded rays. `traced`
-    /// is the mask of rays to trace. Must be called inside a SIMD kernel.
+    /// Like [`Geometry::is_occluded_except_by_light`], for a packet of shadow rays. Returns the mask of
+    /// occluded rays. `traced` is the mask of rays to trace. Must be called inside a SIMD kernel.
     #[inline(always)]
     pub fn occluded_ray_packet(
         &self,

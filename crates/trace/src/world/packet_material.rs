@@ -10,7 +10,7 @@ use crate::math::Vec3;
 pub struct PacketMaterial {
     /// Kind of BSDF.
     pub kind: BxdfKind,
-    /// UV set for the BSDF texture used in packet shading. `None` without a texture.
+    /// UV set for the BSDF texture used in packet shading, or `None` without a texture.
     pub row_texture: Option<UvSet>,
     /// Ambient reflectance, if the BSDF is constant over the surface.
     pub ambient: Option<Vec3>,
@@ -54,7 +54,7 @@ impl PacketMaterial {
 }
 
 impl World {
-    /// A plain material and its BSDF. `None` if the material is not plain.
+    /// Packet-shading data and BSDF of a material, or `None` if the material is not plain.
     #[inline(always)]
     pub fn material_for_packet_shading(&self, material: usize) -> Option<(&PacketMaterial, &NonSpecular)> {
         let packet_material = self.packet_material[material].as_ref()?;

@@ -18,11 +18,11 @@ use crate::scene::description::{
 pub struct TextureSource {
     /// File path.
     pub path: PathBuf,
-    /// Index of the image in a glTF file. `None` for image files.
+    /// Index of the image in a glTF file, or `None` for a separate image file.
     pub image: Option<u32>,
     /// Encoding of the pixel values.
     pub encoding: ImageEncoding,
-    /// Alpha cutoff at which mip levels preserve coverage. `None` for ordinary mip levels.
+    /// Alpha cutoff at which mip levels preserve coverage, or `None` for ordinary mip levels.
     pub coverage: Option<AlphaCutoffKey>,
 }
 
@@ -50,15 +50,15 @@ pub struct NeededTexture {
     pub source: TextureSource,
     /// Name shown in progress bars.
     pub name: String,
-    /// Index into [`Scene::textures`]. `None` if only a mesh file refers to the image.
+    /// Index into [`Scene::textures`], or `None` if only a mesh file refers to the image.
     pub declared: Option<usize>,
     /// Index into [`Scene::mesh_files`] of the mesh file that refers to the image.
     pub mesh_file: Option<usize>,
-    /// Name of the mesh file's material that refers to the image. `None` for other textures.
+    /// Name of the mesh file's material that refers to the image, or `None` for other textures.
     pub material: Option<String>,
-    /// Line in the MTL file that refers to the image. `None` for other textures.
+    /// Line in the MTL file that refers to the image, or `None` for other textures.
     pub statement: Option<FileLine>,
-    /// Name of a material that uses the image as a normal map. `None` if there is no such material.
+    /// Name of a material that uses the image as a normal map, if there is one.
     pub normals_of: Option<String>,
     /// Whether the image is the environment map.
     pub is_environment: bool,
@@ -83,7 +83,7 @@ impl NeededTexture {
     }
 }
 
-/// Which textures an image needs.
+/// The texture roles that a rendered image needs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct NeededTextureRoles {
     /// Diffuse reflectance.
@@ -212,7 +212,7 @@ fn has_mipmaps(scene: &Scene, texture: usize) -> bool {
     }
 }
 
-/// The environment map's file. `None` if there is no map or if the map's color factor is black.
+/// The environment map's file, or `None` if there is no map or the map's color factor is black.
 pub fn environment_source(scene: &Scene) -> Option<TextureSource> {
     environment_file(scene).map(environment_texture_source)
 }
@@ -265,7 +265,8 @@ pub fn material_texture_source(
     }
 }
 
-/// Cutoff at which an opacity texture's mip levels preserve coverage. `None` without a cutoff or mip levels.
+/// Cutoff at which an opacity texture's mip levels preserve coverage, or `None` without a cutoff or mip
+/// levels.
 pub fn coverage_cutoff(scene: &Scene, texture: usize, cutoff: f32) -> Option<AlphaCutoffKey> {
     let is_covered = cutoff > 0.0 && has_mipmaps(scene, texture);
     is_covered.then(|| AlphaCutoffKey::from_opacity_cutoff(cutoff, scene.textures[texture].factor.x))
@@ -317,7 +318,7 @@ fn have_same_image_and_mapping(scene: &Scene, a: usize, b: usize) -> bool {
     a.file.value == b.file.value && at(a) == at(b)
 }
 
-/// Image file and encoding for a scene texture with this use.
+/// Image file and encoding for a scene texture with this pixel interpretation.
 pub fn scene_texture_source(scene: &Scene, texture: usize, used: PixelInterpretation) -> TextureSource {
     let texture = &scene.textures[texture];
     let encoding = match (texture.encoding, used) {
@@ -340,7 +341,7 @@ pub fn scene_texture_source(scene: &Scene, texture: usize, used: PixelInterpreta
     TextureSource { path: texture.file.value.clone(), image: texture.image, encoding, coverage: None }
 }
 
-/// Image file and encoding for a mesh file's texture with this use.
+/// Image file and encoding for a mesh file's texture with this pixel interpretation.
 pub fn image_file_and_encoding(texture: &FileTexture, used: PixelInterpretation) -> TextureSource {
     let encoding = match used {
         PixelInterpretation::Color => ImageEncoding::Color,

@@ -34,8 +34,8 @@ impl TrianglePoint {
     }
 }
 
-/// The point is computed from the ray if the triangle's corners are this many times farther away than the
-/// point and the ray origin, because `f32` barycentric coordinates are then too imprecise.
+/// The point is computed from the ray if the triangle's corners are this many times farther from the scene's
+/// origin than the point and the ray origin, because `f32` barycentric coordinates are then too imprecise.
 const COARSE: f64 = 1024.0;
 
 /// Minimum distance from the triangle's edges, in point errors. Rounding the point and offsetting it from the
@@ -144,8 +144,8 @@ impl<P: MeshPlacement> PlacedMesh<P> {
         facet.is_coarse && self.point_from_ray(facet, ray).is_some()
     }
 
-    /// Intersection of the ray with the triangle's plane, and its error. `None` unless the triangle is much
-    /// larger than the distances from the scene's origin to the point and the ray origin.
+    /// Intersection of the ray with the triangle's plane, and its error, if the triangle is much larger than
+    /// the distances from the scene's origin to the point and the ray origin.
     fn point_from_ray(&self, facet: &TrianglePoint, ray: &RayF64) -> Option<[Vec3; 2]> {
         if !facet.is_coarse {
             return None;

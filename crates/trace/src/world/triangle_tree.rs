@@ -84,8 +84,8 @@ impl TriangleTree {
         }
     }
 
-    /// Like [`TriangleTree::visit_triangles_in_box`], until `visit` returns false. Returns whether all triangles
-    /// were visited.
+    /// Like [`TriangleTree::visit_triangles_in_box`], but stops when `visit` returns false. Returns whether
+    /// all triangles were visited.
     pub fn visit_triangles_in_box_while(&self, bounds: &Aabb, visit: impl FnMut(u32) -> bool) -> bool {
         match self {
             Self::Boxes(tree) => tree.visit_overlapping_while(bounds, visit),

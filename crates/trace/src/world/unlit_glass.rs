@@ -8,7 +8,7 @@ use crate::math::Vec3;
 /// Margin for rounding around lights, relative to their distance from the origin.
 const ROUNDING: f32 = 1e-5;
 
-/// Two bounding boxes for a light. The light is inside both boxes.
+/// Two bounding boxes of the same light, which is inside both of them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LightBoundingBoxPair {
     /// Bounding box of the light's bounding sphere.

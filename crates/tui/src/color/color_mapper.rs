@@ -32,7 +32,7 @@ pub(crate) struct MappedCell {
 /// Two of the 16 ANSI colors, mixed in one cell.
 #[derive(Clone, Copy, Debug)]
 struct AnsiColorMix {
-    /// Index of the shade character. `None` if only the first color is used.
+    /// Index of the shade character, or `None` if only the first color is used.
     level: Option<usize>,
     colors: [usize; 2],
 }

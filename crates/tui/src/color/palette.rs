@@ -58,7 +58,7 @@ pub(crate) fn assumed_ansi_colors(term: &str) -> &'static AnsiColors {
     if term.starts_with("linux") { &VGA } else { &XTERM }
 }
 
-/// The sRGB value of a palette color. `None` for the first 16, which the user can change.
+/// The sRGB value of a palette color, or `None` for the first 16, which the user can change.
 pub(crate) fn fixed_palette_color(index: u8) -> Option<[u8; 3]> {
     match index {
         0..FIRST_FIXED => None,
@@ -70,7 +70,7 @@ pub(crate) fn fixed_palette_color(index: u8) -> Option<[u8; 3]> {
     }
 }
 
-/// The sRGB value of a terminal color in xterm's default palette. `None` for the default foreground and
+/// The sRGB value of a terminal color in xterm's default palette, or `None` for the default foreground and
 /// background.
 pub fn xterm_rgb(color: Color) -> Option<[u8; 3]> {
     let ansi = match color {

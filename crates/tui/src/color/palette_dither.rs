@@ -3,8 +3,8 @@
 use super::bayer::bayer_threshold;
 use super::recipes::{DitherColor, DitherRecipeCache};
 
-/// How strongly dithering favors palette colors close to the target color. Applies to palettes computed from
-/// an image.
+/// How strongly dithering favors palette colors close to the target color, for palettes computed from an
+/// image.
 const CALM: f32 = 1.0;
 
 /// A ditherer for one palette.

@@ -39,8 +39,8 @@ const SILENCE_ROUND_TRIPS: u32 = 4;
 /// A terminal is fast if it replied to most of the last `RECENT_SLICES` slices within this time.
 const FAST_REPLY: Duration = Duration::from_millis(20);
 const RECENT_SLICES: usize = 8;
-/// Length of the periods over which the minimum round-trip time is tracked. The last one or two periods
-/// count.
+/// Length of the periods over which the minimum round-trip time is tracked. The minimum covers the current
+/// period and the previous one.
 const ROUND_TRIP_AGE: Duration = Duration::from_secs(15);
 /// Maximum and minimum slice size in bytes.
 const MAX_SLICE: usize = 8_000;
@@ -88,7 +88,7 @@ pub(super) struct TerminalConnection {
     /// Time at which the window last shrank. Slices sent before that do not shrink it again.
     shrunk: Option<Instant>,
     round_trips: MinRoundTripTracker,
-    /// Round-trip times of the last slices. Small slices count too: after a slowdown, only small slices are
+    /// Round-trip times of the last slices, including small ones: after a slowdown, only small slices are
     /// sent, so only their replies can show that the connection has recovered.
     recent: VecDeque<Duration>,
     /// Time when the last reply arrived or the oldest pending query was sent, whichever is later.
@@ -199,12 +199,12 @@ impl TerminalConnection {
         !self.flight.is_empty()
     }
 
-    /// Round-trip time excluding queueing. `None` if the terminal does not reply.
+    /// Round-trip time excluding queueing, or `None` if the terminal does not reply.
     pub(super) fn min_round_trip_time(&self) -> Option<Duration> {
         self.round_trips.minimum().filter(|_| self.replies == ReplySupport::Answering)
     }
 
-    /// Estimated bandwidth in bytes per second. `None` if unknown or too high to matter.
+    /// Estimated bandwidth in bytes per second, or `None` if it is unknown or too high to matter.
     pub(super) fn bytes_per_second(&self) -> Option<f64> {
         /// At this rate, sending a preview takes no noticeable time.
         const FAST: f64 = 2e6;

@@ -29,7 +29,8 @@ pub(super) enum ImageProtocol {
     Kitty,
     /// DEC's Sixel format, supported by foot, xterm with `-ti vt340`, mlterm and tmux.
     Sixel,
-    /// iTerm2's protocol. See [`TerminalBrand`](super::terminals::TerminalBrand) for terminals that support it.
+    /// iTerm2's protocol. See [`TerminalBrand`](super::terminals::TerminalBrand) for terminals that support
+    /// it.
     Iterm,
 }
 
@@ -94,8 +95,8 @@ impl TerminalImages {
         }
     }
 
-    /// Sets the image to show. `is_still` marks a final image. Returns cells that no image covers any more,
-    /// which must be redrawn.
+    /// Sets the image to show. `is_still` marks a final image. Returns the cells that no image covers
+    /// anymore, which must be redrawn.
     pub(super) fn set_target(&mut self, wanted: Option<PlacedImage>, is_still: bool) -> Option<Rect> {
         (self.wanted, self.is_still) = (wanted, is_still);
         let shown = self.shown.as_ref()?.cells;
@@ -121,8 +122,8 @@ impl TerminalImages {
             && (self.wanted.is_none() || (self.shown == self.wanted && !(self.is_coarse && self.is_still)))
     }
 
-    /// Returns the next bytes to send, at most `most` of them unless a single piece is longer. `None` if
-    /// everything has been sent. `rate` is the bandwidth in bytes per second, if known.
+    /// Returns the next bytes to send, or `None` if everything has been sent. There are at most `most` bytes
+    /// unless a single piece is longer. `rate` is the bandwidth in bytes per second, if known.
     pub(super) fn next_slice(&mut self, most: usize, rate: Option<f64>) -> Option<Vec<u8>> {
         if self.pieces.is_empty() && !self.is_complete() {
             self.encode_and_queue_image(rate);

@@ -16,7 +16,7 @@ const ESCAPE: u8 = 0x1b;
 /// Bytes that can follow the escape character in a terminal sequence: CSI, OSC, SS3, DCS, SOS, PM, APC, and
 /// the string terminator.
 const INTRODUCERS: &[u8] = b"[]OPX^_\\";
-/// How long after an escape character silence makes it a key press.
+/// An escape character followed by silence for this long is a key press.
 const LONE_ESCAPE: Duration = Duration::from_millis(50);
 /// Timeout between bytes of a sequence, for connections that lose packets.
 const SEQUENCE: Duration = Duration::from_secs(1);
@@ -24,8 +24,7 @@ const SEQUENCE: Duration = Duration::from_secs(1);
 /// like the start of a sequence, would block all further input.
 const LONGEST: Duration = Duration::from_secs(2);
 const MAX_BYTES: usize = 4096;
-/// Maximum delay of a `[` after its escape character. The escape character has already been treated as a key
-/// press.
+/// Maximum delay of a `[` after its escape character, which has already been treated as a key press.
 const LATE_SEQUENCE: Duration = Duration::from_secs(2);
 /// Maximum time to wait for the next byte after a late `[`, and maximum number of bytes to hold back.
 const DOUBT_TIMEOUT: Duration = Duration::from_millis(300);

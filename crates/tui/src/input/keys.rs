@@ -46,7 +46,7 @@ impl InputPerformer {
         self.found.push(DecodedInput::Key(KeyPress { code, modifiers }));
     }
 
-    /// Handles a complete application program command.
+    /// Handles a complete application program command (APC).
     pub(super) fn handle_apc(&mut self, text: &[u8]) {
         self.push_decoded_reply(control_strings::parse_apc(text));
     }
@@ -146,7 +146,7 @@ impl Perform for InputPerformer {
                 self.push_decoded_reply(TerminalReply::Attributes);
             }
             (b"?$", 'y') if first == 2026 => {
-                // 1 means set and 2 means reset. Other values mean unknown or permanent.
+                // 1 means set and 2 means reset. Other values mean that the mode is unknown or permanent.
                 self.push_decoded_reply(TerminalReply::Synchronized { is_known: matches!(second, 1 | 2) });
             }
             ([], '~') if first == 200 => self.is_paste = true,
@@ -201,7 +201,7 @@ impl Perform for InputPerformer {
     }
 }
 
-/// The key for a CSI or SS3 sequence with this final letter.
+/// Returns the key for a CSI or SS3 sequence that ends in `letter`.
 fn key_for_final_byte(letter: char) -> Option<KeyCode> {
     Some(match letter {
         'A' => KeyCode::Up,

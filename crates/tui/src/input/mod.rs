@@ -24,8 +24,8 @@ pub(super) use self::decoder::Decoder;
 use super::event::{Event, RequiredEventSource};
 use crate::system::threads::spawn;
 
-/// Starts a thread that reads standard input. At the end of input, it reports the loss of
-/// [`RequiredEventSource::Keys`].
+/// Starts a thread that reads standard input. At end-of-file, the thread reports that
+/// [`RequiredEventSource::Keys`] was lost.
 ///
 /// # Errors
 /// The thread could not be created.

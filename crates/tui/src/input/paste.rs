@@ -38,7 +38,7 @@ enum ControlSequenceState {
 }
 
 impl ControlSequenceState {
-    /// The state after another byte. `None` if the byte is text.
+    /// The state after another byte, or `None` if the byte is text.
     fn next_state(self, byte: u8) -> Option<Self> {
         match (self, byte) {
             (Self::Outside | Self::Escape | Self::Parameters, 0x1b) => Some(Self::Escape),

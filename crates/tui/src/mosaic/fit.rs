@@ -17,8 +17,8 @@ pub(crate) struct FittedCell {
 /// much. Smaller improvements are invisible, flicker with the noise and take more bytes.
 const WORTH: f32 = 1e-4;
 
-/// Fits a cell to its pixels, minimizing the squared Oklab distance. `pixels` are sRGB colors in row order.
-/// The chosen division minimizes the variance within the two parts.
+/// Finds the tile and the two colors that best match a cell's `pixels` (sRGB colors in row order). The tile
+/// minimizes the Oklab variance within its two parts.
 pub(crate) fn fit_cell(grid: CellGrid, pixels: &[[u8; 3]]) -> FittedCell {
     if let ([first, second], CellGrid::Halves) = (pixels, grid) {
         return FittedCell { tile: BlockPattern::HALVES, pair: [*first, *second] };

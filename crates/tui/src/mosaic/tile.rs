@@ -57,8 +57,8 @@ impl BlockPattern {
     }
 }
 
-/// Returns the tile that a character draws, and true if the foreground is its second part. `None` if it is
-/// not a block character.
+/// Returns the tile that a character draws and whether the foreground is the tile's second part, or `None`
+/// if it is not a block character.
 pub(crate) fn block_pattern_for_symbol(symbol: char) -> Option<(BlockPattern, bool)> {
     // Letters, digits and punctuation have smaller code points than block characters.
     if symbol < '▀' {
@@ -68,8 +68,8 @@ pub(crate) fn block_pattern_for_symbol(symbol: char) -> Option<(BlockPattern, bo
     block_pattern_for_mask(*mask)
 }
 
-/// The grid squares a character fills with the foreground color, as 12 rows of 2 columns. `None` if it is not
-/// a block character.
+/// The grid squares that a character fills with the foreground color, as 12 rows of 2 columns, or `None` if
+/// it is not a block character.
 pub fn filled_squares(symbol: char) -> Option<[bool; 24]> {
     let mask = match symbol {
         ' ' => 0,
@@ -79,8 +79,8 @@ pub fn filled_squares(symbol: char) -> Option<[bool; 24]> {
     Some(std::array::from_fn(|place| mask >> place & 1 == 1))
 }
 
-/// Returns the tile with this mask as its first part, or as its second part if the mask excludes the top left
-/// corner.
+/// Returns the tile whose first part is `mask` and false, or the tile whose second part is `mask` and true if
+/// the mask excludes the top left corner.
 fn block_pattern_for_mask(mask: u32) -> Option<(BlockPattern, bool)> {
     let is_second = mask & 1 == 0;
     let first = if is_second { ALL & !mask } else { mask };
@@ -172,7 +172,7 @@ fn expand_rows(mask: u32, from: u32, to: u32) -> u32 {
         .fold(0, |all, place| all | 1 << place)
 }
 
-/// The quadrants that fill the same area as these octants, if any.
+/// The quadrants that fill the same area as a mask of octants, if any.
 fn equivalent_quadrant_mask(mask: u32) -> Option<u32> {
     (0..16).find(|quadrants| expand_mask_to_full_grid(*quadrants, 2) == expand_mask_to_full_grid(mask, 4))
 }
@@ -225,13 +225,13 @@ impl CellGrid {
     }
 }
 
-/// Lists all divisions along two-column grids for a cell with `pixel_rows` rows of pixels. `part_rows` lists
-/// the number of rows in each grid.
+/// Lists all divisions of a cell with `pixel_rows` rows of pixels along two-column grids. `part_rows`
+/// contains each grid's number of rows.
 fn all_cell_divisions(pixel_rows: u32, part_rows: &[u32]) -> Vec<CellDivision> {
     let mut divisions = vec![CellDivision { first: (1 << pixel_rows) - 1, tile: BlockPattern::HALVES }];
     for rows in part_rows {
         let half = 1_u32 << (2 * rows - 1);
-        // Iterate in Gray code order. The top left part is always included.
+        // Iterate in Gray code order. The mask always includes the top left square.
         for mask in (0..half).map(|i| (i ^ i >> 1) << 1 | 1) {
             let of_tile = block_pattern_for_mask(expand_mask_to_full_grid(mask, *rows)).map(|(tile, _)| tile);
             let is_new =

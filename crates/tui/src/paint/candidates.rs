@@ -5,7 +5,7 @@ use super::cost_model::RateDistortion;
 use super::terminal_color::{TerminalColor, decimal_digits};
 use crate::color::nearest_256;
 
-/// Maximum number of candidates for each part. Also applies to filling both parts with one color.
+/// Maximum number of candidates for each part, and for filling both parts with one color.
 const MAX: usize = 6;
 /// Maximum number of cells that a candidate may cover.
 const LONGEST: usize = 8;
@@ -22,7 +22,7 @@ pub(super) struct CandidateColors {
     pub(super) both: Vec<TerminalColor>,
 }
 
-/// Returns candidates for the first of `cells`, each of which also fits as many of the following cells as
+/// Returns candidate colors for the first of `cells`. Each color also fits as many of the following cells as
 /// possible.
 pub(super) fn color_candidates_for_cell_run(
     cells: &[Option<TwoColorCell>],

@@ -45,7 +45,7 @@ impl TwoColorCell {
         Self::from_halves([shade; 2])
     }
 
-    /// The mosaic for a block character. `None` for other characters.
+    /// The mosaic for a block character, or `None` for any other character.
     fn from_symbol(symbol: &str, fg: TerminalColor, bg: TerminalColor) -> Option<Self> {
         match symbol {
             " " => return Some(Self::uniform(bg)),
@@ -106,7 +106,7 @@ const ON_BLANKS: Modifier = Modifier::REVERSED
 impl ForegroundParts {
     pub(super) const ALL: [Self; 4] = [Self::Blank, Self::First, Self::Second, Self::Full];
 
-    /// The character that draws this tile.
+    /// The character that draws `tile`.
     pub(super) fn symbol(self, tile: BlockPattern) -> char {
         match self {
             Self::Blank => ' ',
@@ -140,7 +140,7 @@ impl ForegroundParts {
         }
     }
 
-    /// Whether this glyph can show these colors.
+    /// Whether this glyph can show the two colors of a cell.
     pub(super) fn can_show_colors(self, pair: [TerminalColor; 2]) -> bool {
         let [first, second] = self.part_layers();
         pair[0].is_allowed_in_layer(first)
@@ -156,7 +156,7 @@ impl CellContent {
         pair: [TerminalColor::DefaultBackground; 2],
     });
 
-    /// Converts a ratatui cell for a terminal with this color depth.
+    /// Converts a ratatui cell for a terminal with the given color depth.
     pub(super) fn from_cell(cell: &Cell, depth: ColorDepth) -> Self {
         let shade = |color, layer| {
             let color = if depth == ColorDepth::None { ratatui::style::Color::Reset } else { color };

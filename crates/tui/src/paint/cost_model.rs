@@ -26,7 +26,7 @@ impl RateDistortion {
     /// as much as a color change.
     pub(super) const MOVING: Self = Self { byte: 32.0, most: 255, spans: &[1, 4, 9] };
 
-    /// Returns the model with a different cost per byte, but at least the cost in [`RateDistortion::MOVING`].
+    /// Returns the model with its cost per byte changed to `byte`, but never below [`RateDistortion::MOVING`].
     pub(super) fn with_cost_per_byte(self, byte: f32) -> Self {
         let byte = byte.max(Self::MOVING.byte);
         let spans: &[u8] = match byte {
@@ -38,7 +38,7 @@ impl RateDistortion {
         Self { byte, spans, ..self }
     }
 
-    /// Returns the error from showing one color instead of another. Infinite if this is not allowed.
+    /// Returns the error from showing one color instead of another, or infinity if that is not allowed.
     pub(super) fn color_error(self, shown: TerminalColor, wanted: TerminalColor) -> f32 {
         if shown == wanted {
             return 0.0;

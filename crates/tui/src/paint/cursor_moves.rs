@@ -70,7 +70,7 @@ fn move_with_return(down: &[u8], column: u16) -> Vec<u8> {
     bytes
 }
 
-/// A control sequence with a count. The count is omitted if it is 1.
+/// A control sequence with a count, which is omitted if it is 1.
 pub(super) fn csi_with_count(count: u16, end: u8) -> Vec<u8> {
     let mut bytes = b"\x1b[".to_vec();
     if count != 1 {

@@ -7,13 +7,13 @@ use super::fidelity::Fidelity;
 /// Inputs for deciding whether to draw a new preview.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PacingInputs {
-    /// Connection bandwidth. `None` if it is too fast to measure.
+    /// Connection bandwidth, or `None` if it is too fast to measure.
     pub bytes_per_second: Option<f64>,
     /// Number of cells in the preview.
     pub cells: u32,
     /// Mean samples per pixel in the new preview. 0 for a coarse preview.
     pub samples: f64,
-    /// Mean samples per pixel in this request's last drawn preview. `None` if no preview has been drawn.
+    /// Mean samples per pixel in this request's last drawn preview, or `None` if no preview has been drawn.
     pub aimed_samples: Option<f64>,
     /// Time since the last drawn preview became the target.
     pub since_aim: Duration,
@@ -112,7 +112,7 @@ impl PacingInputs {
 mod tests {
     use super::*;
 
-    /// Timing one second after a preview with one sample per pixel was drawn.
+    /// Inputs one second after a preview with one sample per pixel was drawn.
     const MOMENT: PacingInputs = PacingInputs {
         bytes_per_second: None,
         cells: 2500,

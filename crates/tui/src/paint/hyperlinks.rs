@@ -23,7 +23,8 @@ pub(super) struct UrlTable {
 }
 
 impl UrlTable {
-    /// Returns a URL's number, or 0 if the URL is invalid or there are too many URLs.
+    /// Returns a URL's number, assigning one if the URL is new. Returns 0 if the URL is invalid or there are
+    /// too many URLs.
     pub(super) fn assign_url_number(&mut self, address: &str) -> u16 {
         if !address.bytes().all(|byte| byte.is_ascii_graphic()) {
             return 0;
@@ -39,7 +40,7 @@ impl UrlTable {
         if is_known { u16::try_from(index + 1).unwrap_or(0) } else { 0 }
     }
 
-    /// Appends the bytes that open a hyperlink, closing the previous one.
+    /// Appends the bytes that open a hyperlink, closing the previous one. Number 0 only closes it.
     pub(super) fn push_link_start(&self, number: u16, out: &mut Vec<u8>) {
         let address = usize::from(number).checked_sub(1).and_then(|index| self.addresses.get(index));
         match address {

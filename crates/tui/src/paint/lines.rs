@@ -7,7 +7,7 @@ use super::pen::Pen;
 use super::terminal_color::{ColorLayer, TerminalColor};
 
 /// Converts a buffer's rows to lines without trailing blanks. Each line starts and ends with the terminal's
-/// default colors. Without colors, the output contains no escape sequences.
+/// default colors. If `is_colored` is false, the output contains no escape sequences.
 pub fn buffer_to_text_lines(buffer: &Buffer, is_colored: bool) -> String {
     let mut bytes = Vec::new();
     for row in buffer.content.chunks(usize::from(buffer.area.width.max(1))) {

@@ -53,7 +53,7 @@ pub struct Painter {
     depth: ColorDepth,
     /// Whether the terminal supports REP.
     can_repeat: bool,
-    /// Model of the screen. `None` if the screen content is unknown.
+    /// Model of the screen, or `None` if the screen content is unknown.
     screen: Option<ScreenModel>,
     memory: FirstPreviewCells,
     wanted: TargetScreen,
@@ -76,7 +76,7 @@ enum RowDrawPhase {
     Words(u16),
     /// Draw a row of the preview.
     Picture(u16),
-    /// Draw text in a row that was delayed until after the preview.
+    /// Draw the part of a row's text that was delayed until after the preview.
     Later(u16),
 }
 
@@ -177,15 +177,15 @@ impl Painter {
         self.budget = FirstPreviewByteBudget::default();
     }
 
-    /// Returns the next bytes to output, at most `most_bytes` unless a single cell needs more. Empty once the
-    /// screen matches the target. The caller must write the bytes because later slices build on them. No
-    /// other output may move the cursor or change colors between slices.
+    /// Returns the next bytes to output, at most `most_bytes` unless a single cell needs more, or no bytes
+    /// once the screen matches the target. The caller must write the bytes because later slices build on
+    /// them. No other output may move the cursor or change colors between slices.
     pub fn next_slice(&mut self, most_bytes: usize) -> Vec<u8> {
         self.next_slice_until(most_bytes, || false)
     }
 
-    /// Like [`Painter::next_slice`], but stops early once `is_late` returns true. `is_late` is called before each
-    /// row because planning a whole preview would delay the response to a key press too much.
+    /// Like [`Painter::next_slice`], but stops early once `is_late` returns true. `is_late` is called before
+    /// each row because planning a whole preview would delay the response to a key press too much.
     pub fn next_slice_until(&mut self, most_bytes: usize, is_late: impl Fn() -> bool) -> Vec<u8> {
         let mut slice = LimitedOutputSlice { bytes: Vec::new(), most: most_bytes };
         if self.wanted.is_empty() {
@@ -250,7 +250,7 @@ impl Painter {
         slice.bytes
     }
 
-    /// Marks the content of these cells as unknown.
+    /// Marks the content of `cells` as unknown.
     pub fn damage(&mut self, cells: Rect) {
         if let Some(screen) = &mut self.screen {
             screen.mark_cells_unknown(cells);

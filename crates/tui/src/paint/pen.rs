@@ -10,22 +10,22 @@ pub(super) struct Pen {
     pub(super) fg: TerminalColor,
     pub(super) bg: TerminalColor,
     pub(super) modifier: Modifier,
-    /// Number of the character's hyperlink. 0 if there is none.
+    /// Number of the character's hyperlink, or 0 if there is none.
     pub(super) link: u16,
 }
 
 /// Requirements that a pen must meet.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PenRequirements {
-    /// Required foreground color. `None` if any color is acceptable.
+    /// Required foreground color, or `None` if any color is acceptable.
     pub(super) fg: Option<TerminalColor>,
-    /// Required background color. `None` if any color is acceptable.
+    /// Required background color, or `None` if any color is acceptable.
     pub(super) bg: Option<TerminalColor>,
     /// Required state of the modifiers in `matters`.
     pub(super) modifier: Modifier,
     /// The modifiers that matter. Others may be on or off.
     pub(super) matters: Modifier,
-    /// Number of the hyperlink. 0 if there is none.
+    /// Number of the hyperlink, or 0 if there is none.
     pub(super) link: u16,
 }
 

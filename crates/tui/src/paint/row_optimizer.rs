@@ -19,9 +19,9 @@ const MAX_BYTES: f32 = 46.0;
 /// A cell in the row, with its target and its current content.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct TargetCell {
-    /// Target content. `None` if the cell is not part of the preview.
+    /// Target content, or `None` if the cell is not part of the preview.
     pub(super) wanted: Option<TwoColorCell>,
-    /// Content on the screen. `None` if unknown, in which case the cell must be drawn.
+    /// Content on the screen, or `None` if unknown, in which case the cell must be drawn.
     pub(super) shown: Option<TwoColorCell>,
 }
 
@@ -56,7 +56,7 @@ struct RowPrefixPlan {
     cost: f32,
     /// Index of the path to the previous cell.
     parent: usize,
-    /// The glyph drawn in the cell. `None` if the cell was kept.
+    /// The glyph drawn in the cell, or `None` if the cell was kept.
     glyph: Option<ForegroundParts>,
 }
 
@@ -164,7 +164,7 @@ fn extend_plans(
 /// The best paths found so far for a cell.
 struct SearchBeam {
     paths: Vec<RowPrefixPlan>,
-    /// Paths whose cost exceeds the best one by more than this are dropped.
+    /// Paths that cost more than the best path by at least this amount are dropped.
     limit: f32,
 }
 

@@ -74,7 +74,7 @@ pub(super) struct ScreenModel {
     pub(super) rows: u16,
     contents: Vec<CellContent>,
     pub(super) pen: Pen,
-    /// Cursor position. `None` if unknown.
+    /// Cursor position, or `None` if unknown.
     pub(super) cursor: Option<CellPosition>,
 }
 
@@ -108,7 +108,7 @@ impl ScreenModel {
         self.contents[start..start + usize::from(self.columns)].contains(&CellContent::Unknown)
     }
 
-    /// Marks the content of these cells as unknown.
+    /// Marks the content of `cells` as unknown.
     pub(super) fn mark_cells_unknown(&mut self, cells: Rect) {
         let cells = cells.intersection(Rect::new(0, 0, self.columns, self.rows));
         for y in cells.top()..cells.bottom() {
@@ -123,7 +123,7 @@ impl ScreenModel {
         usize::from(at.y) * usize::from(self.columns) + usize::from(at.x)
     }
 
-    /// Draws a stroke. Returns false and does nothing if it does not fit into the slice.
+    /// Draws a stroke and returns true, or returns false and does nothing if it does not fit into the slice.
     pub(super) fn draw_stroke_if_output_fits(
         &mut self,
         stroke: &CellRun,
@@ -195,7 +195,7 @@ impl ScreenModel {
         }
     }
 
-    /// Returns the cursor position `columns` to the right. `None` past the last column, where terminals
+    /// Returns the cursor position `columns` to the right, or `None` past the last column, where terminals
     /// differ.
     fn position_after_columns(&self, at: CellPosition, columns: u16) -> Option<CellPosition> {
         Some(CellPosition { x: at.x + columns, ..at }).filter(|next| next.x < self.columns)

@@ -1,8 +1,8 @@
 //! Keeps converged cells on the screen if an edit did not change them.
 //!
 //! The first previews of two requests use the same random numbers, so they differ only where the scene has
-//! changed. If a cell is equal in both, the screen keeps showing its converged state until the new render has
-//! also converged.
+//! changed. If a cell is the same in both previews, the screen keeps showing its converged state until the
+//! new render has also converged.
 
 use ratatui::layout::Rect;
 
@@ -15,7 +15,7 @@ use super::terminal_color::TerminalColor;
 
 /// Maximum channel difference between first previews that are considered equal.
 const ALIKE: u8 = 2;
-/// Upper limit for the noise threshold. Cells are not redrawn for smaller differences.
+/// Upper limit for the noise threshold. Differences up to the threshold do not cause a redraw.
 const MAX_NOISE: u8 = 12;
 
 /// Stores, for each cell, the first preview of the request whose result is on the screen.
@@ -23,9 +23,9 @@ const MAX_NOISE: u8 = 12;
 pub(super) struct FirstPreviewCells {
     columns: usize,
     picture: Rect,
-    /// For each cell, its content in the first preview of the request on the screen. `None` if unknown.
+    /// For each cell, its content in the first preview of the request on the screen, or `None` if unknown.
     firsts: Vec<Option<TwoColorCell>>,
-    /// The first preview of the current request. Empty if there was none.
+    /// The first preview of the current request, or empty if there was none.
     newest: Vec<Option<TwoColorCell>>,
     /// For each cell, whether it looks the same in the first previews of the current request and of the
     /// request on the screen.
@@ -98,7 +98,8 @@ impl FirstPreviewCells {
         median.count()
     }
 
-    /// The mosaic to draw. Returns the displayed one if it differs from the target only by noise.
+    /// Returns the mosaic to draw: the displayed one if it differs from the target only by noise, otherwise
+    /// the target.
     pub(super) fn stabilized_cell(
         &self,
         at: CellPosition,
@@ -155,7 +156,7 @@ fn noise_threshold(median: usize) -> u8 {
     u8::try_from(4 * median + 2).unwrap_or(u8::MAX).min(MAX_NOISE)
 }
 
-/// The largest channel difference between two mosaics. 255 if their colors cannot be compared.
+/// The largest channel difference between two mosaics, or 255 if their colors cannot be compared.
 fn max_channel_difference(a: TwoColorCell, b: TwoColorCell) -> u8 {
     let one = |a: TerminalColor, b: TerminalColor| match (a.to_rgb(), b.to_rgb()) {
         _ if a == b => 0,

@@ -110,7 +110,7 @@ impl TerminalColor {
     }
 }
 
-/// Number of decimal digits.
+/// Number of decimal digits in `number`.
 pub(super) fn decimal_digits(number: u8) -> u32 {
     1 + u32::from(number > 9) + u32::from(number > 99)
 }

@@ -24,7 +24,7 @@ pub(crate) struct TerminalDisplayState {
     pub ask: TerminalQueries,
     /// Terminal capabilities beyond text.
     pub capabilities: DesktopCapabilities,
-    /// How long a render must run before its end triggers a notification. `None` disables notifications.
+    /// How long a render must run for its end to trigger a notification. `None` disables notifications.
     pub notify_after: Option<Duration>,
     /// Whether the window is focused, according to the terminal.
     pub has_focus: bool,

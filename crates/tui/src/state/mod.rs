@@ -42,7 +42,7 @@ pub(super) struct InitialState {
     pub ask: TerminalQueries,
     /// Terminal capabilities beyond text, according to environment variables.
     pub capabilities: DesktopCapabilities,
-    /// How long a render must run before its end triggers a notification. `None` disables notifications.
+    /// How long a render must run for its end to trigger a notification. `None` disables notifications.
     pub notify_after: Option<Duration>,
 }
 
@@ -97,7 +97,7 @@ impl State {
         is_newest && is_at_work && request.preview_size.is_some() && !is_shown
     }
 
-    /// Whether nothing is known that would keep `w` from replacing the output files.
+    /// Whether `w` may replace the output files: no known error or external change prevents it.
     pub(super) fn can_overwrite_outputs(&self) -> bool {
         let is_conflict = |found: &Diagnostic| found.severity == Severity::Error;
         let is_kept = |written: &WrittenFile| written.lost.is_some_and(ExternalChange::is_kept);
@@ -119,7 +119,7 @@ impl State {
         unwritten.into_iter().chain(warnings.iter().cloned()).collect()
     }
 
-    /// Whether the failure is in the scene, not in the render.
+    /// Whether the failure, if there is one, is in the scene rather than in the render.
     fn is_scene_broken(&self) -> bool {
         self.overlays.problems.as_ref().is_none_or(|problems| problems.work.is_none())
     }

@@ -19,7 +19,7 @@ pub(crate) struct BlockingErrors {
 pub(crate) struct ViewList {
     /// Time when the list closes automatically.
     pub until: Instant,
-    /// Search text typed after `/`. `None` if not searching.
+    /// Search text typed after `/`, or `None` if not searching.
     pub name: Option<String>,
 }
 
@@ -35,7 +35,7 @@ pub(crate) struct PaneState {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Message {
     pub words: String,
-    /// Time when the message disappears. `None` for errors and prompts, which stay until a key is pressed.
+    /// Time when the message disappears, or `None` for errors and prompts, which stay until a key is pressed.
     pub until: Option<Instant>,
 }
 
@@ -44,7 +44,7 @@ pub(crate) struct Message {
 pub(crate) struct OverlayState {
     /// The last message, until a key is pressed.
     pub message: Option<Message>,
-    /// Errors in the scene. `None` if it is valid.
+    /// Errors in the scene, or `None` if it is valid.
     pub problems: Option<BlockingErrors>,
     /// Errors in a file that may still be incomplete.
     pub unconfirmed: Option<Vec<Diagnostic>>,

@@ -8,7 +8,7 @@ use crate::pipeline::protocol::ImagePosition;
 pub(crate) struct PictureState {
     pub shown: Option<ShownImage>,
     pub history: RenderHistory,
-    /// Center of the section shown at 1:1 scale. `None` if the whole image is shown.
+    /// Center of the section shown at 1:1 scale, or `None` if the whole image is shown.
     pub close_up: Option<ImagePosition>,
     /// Whether everything but the image is hidden.
     pub is_alone: bool,

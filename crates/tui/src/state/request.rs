@@ -94,7 +94,7 @@ fn join_names(names: &[&str]) -> String {
 pub(crate) struct ImageProvenance {
     /// Settings changed with keys.
     pub toggles: KeyOverrides,
-    /// Text of the scene file. `None` for a model.
+    /// Text of the scene file, or `None` for a model.
     pub text: Option<Arc<str>>,
     /// Other files used by the scene.
     pub files: Arc<[FileRead]>,
@@ -247,7 +247,7 @@ impl RequestState {
         overrides
     }
 
-    /// Overrides for the scene's own image. `None` unless keys have changed the displayed image.
+    /// Overrides for the scene's own image, or `None` unless keys have changed the displayed image.
     pub(crate) fn overrides_without_keyboard_changes(&self) -> Option<Box<Overrides>> {
         (!self.has_no_keyboard_overrides()).then(|| Box::new(self.command_line.clone()))
     }
@@ -266,7 +266,7 @@ impl RequestState {
         self.toggles.exposure.take_if(|now| Some(*now) == exposure);
     }
 
-    /// The camera, including changes made with keys. `None` until a valid scene has been read.
+    /// The camera, including changes made with keys, or `None` until a valid scene has been read.
     pub(crate) fn viewpoint(&self) -> Option<ResolvedCamera> {
         self.camera.map(|camera| camera.with_change(&self.toggles.camera))
     }
@@ -325,8 +325,8 @@ impl RequestState {
         moved.into_iter().chain(focused).chain(exposed).collect()
     }
 
-    /// Whether this is the scene's own image, without changes made with keys. Only this image is written
-    /// automatically.
+    /// Whether no setting has been changed with keys, so the render is the scene's own image. Only that image
+    /// is written automatically.
     pub(crate) fn has_no_keyboard_overrides(&self) -> bool {
         self.toggles == KeyOverrides::default()
     }
@@ -340,7 +340,7 @@ impl RequestState {
         self.toggles.view.unwrap_or_else(|| self.base_view_mode())
     }
 
-    /// Shadows set by the scene or the command line. `None` until a valid scene has been read.
+    /// Shadows set by the scene or the command line, or `None` until a valid scene has been read.
     pub(crate) fn shadows_without_toggles(&self) -> Option<ShadowMode> {
         self.command_line.shadows.or(self.own.map(|own| own.shadows))
     }
@@ -350,7 +350,7 @@ impl RequestState {
         self.toggles.shadows.or(self.shadows_without_toggles()).unwrap_or(ShadowMode::Soft)
     }
 
-    /// Whether photons are enabled by the scene or the command line. `None` until a valid scene has been
+    /// Whether photons are enabled by the scene or the command line, or `None` until a valid scene has been
     /// read.
     pub(crate) fn base_photons_enabled(&self) -> Option<bool> {
         self.command_line.photons.or(self.own.map(|own| own.photons))
@@ -361,7 +361,7 @@ impl RequestState {
         self.toggles.photons.or(self.base_photons_enabled()).unwrap_or(false)
     }
 
-    /// Integrator set by the scene or the command line. `None` until a valid scene has been read.
+    /// Integrator set by the scene or the command line, or `None` until a valid scene has been read.
     pub(crate) fn integrator_without_toggles(&self) -> Option<Integrator> {
         self.command_line.integrator.or(self.own.map(|own| own.integrator))
     }

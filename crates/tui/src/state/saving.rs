@@ -17,7 +17,7 @@ pub(crate) struct UndisplayedChange {
     pub noticed: Instant,
 }
 
-/// The scene's own image, rendered from the saved scene with command-line overrides.
+/// Progress of the scene's own image, which is rendered from the saved scene with command-line overrides.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct SceneImageProgress {
     pub state: SavedSceneImageState,
@@ -32,9 +32,9 @@ pub(crate) struct WrittenFile {
     pub bytes: u64,
     /// Generation of the request that wrote the file.
     pub generation: u64,
-    /// Description of the written image. Empty if not known yet.
+    /// Description of the written image, or empty if not known yet.
     pub made: String,
-    /// Changes made with keys that the file includes. `None` for the scene's own image.
+    /// Changes made with keys that the file includes, or `None` for the scene's own image.
     pub shows: Option<KeyOverrides>,
     /// Whether the image was written before its render finished.
     pub is_unfinished: bool,
@@ -79,7 +79,7 @@ pub(crate) struct SavedFilesState {
     pub own: SceneImageProgress,
     /// Whether the scene's files are complete, meaning that no program is writing them.
     pub is_settled: bool,
-    /// The last save. `None` once its first changed cell is on the screen.
+    /// The last save, or `None` once its first changed cell is on the screen.
     pub change: Option<UndisplayedChange>,
     /// Time when the editor last exited.
     pub editor_closed: Option<Instant>,

@@ -54,7 +54,7 @@ pub(crate) struct WorkState {
     /// Time when the request was paused.
     pub paused_at: Option<Instant>,
     pub stages: [Option<StageReport>; Stage::ALL.len()],
-    /// How long each stage's last run before this request took.
+    /// Duration of each stage's last run before this request.
     pub last_seconds: [Option<f64>; Stage::ALL.len()],
     pub assets: Vec<AssetProgressBar>,
     pub progress: Option<RenderProgress>,

@@ -21,7 +21,7 @@ const TURN: f64 = 3.0;
 const NEARER: f64 = 0.95;
 /// Factor by which a zoom step changes the field of view.
 const WIDER: f64 = 1.05;
-/// Maximum difference between two fields of view that are considered equal. Each step is rounded, but is
+/// Maximum difference between two fields of view that are considered equal. Steps are rounded but always
 /// larger than this.
 const ROUNDING: f64 = 0.015;
 /// Exposure step in stops.

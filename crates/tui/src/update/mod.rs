@@ -70,8 +70,8 @@ fn handle_event(state: &mut State, event: Event) -> Vec<Effect> {
             show_image(state, ShownImage { generation, picture, range, section, lacks_photons, source })
         }
         Event::Changed(ContentChangeTime { noticed }) => {
-            // Keep the message if glimt made the change by writing the camera, or refused to write the camera
-            // because of it.
+            // Keep the message if glimt made the change by writing the camera, or if glimt refused to write
+            // the camera because of the change.
             const OWN: Duration = Duration::from_secs(1);
             let is_of = |said: Option<Instant>| said.is_some_and(|said| state.now <= said + OWN);
             let (is_own, is_known) = (is_of(state.saving.camera_kept), is_of(state.saving.camera_refused));

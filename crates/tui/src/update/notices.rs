@@ -15,7 +15,7 @@ pub(crate) fn show_notice(state: &mut State, words: impl Into<String>) {
     set_message(state, Message { words: words.into(), until });
 }
 
-/// Shows a notice about a change made with keys. Does not offer to write the image if that would fail.
+/// Shows a notice about a change made with keys, without offering to write the image if that would fail.
 pub(super) fn show_key_change(state: &mut State, words: impl Into<String>) {
     let words = words.into();
     let words = if state.can_overwrite_outputs() { words } else { words.replace(messages::WRITE_HINT, "") };
@@ -32,13 +32,13 @@ fn set_message(state: &mut State, message: Message) {
     state.dirty = true;
 }
 
-/// Shows a notice. Returns no effects.
+/// Shows a notice and returns no effects.
 pub(super) fn show_notice_without_effects(state: &mut State, words: &str) -> Vec<Effect> {
     show_notice(state, words);
     Vec::new()
 }
 
-/// Shows a message until a key is pressed. Returns no effects.
+/// Shows a message until a key is pressed and returns no effects.
 pub(super) fn show_message_until_key(state: &mut State, words: &str) -> Vec<Effect> {
     show_until_key(state, words);
     Vec::new()

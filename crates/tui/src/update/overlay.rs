@@ -12,7 +12,7 @@ use crate::pipeline::settings::ViewMode;
 use crate::state::State;
 use crate::view::{diagnostics, help};
 
-/// Handles a key. `None` if no open overlay uses it.
+/// Handles a key, or returns `None` if no open overlay uses it.
 pub(super) fn handle_key(state: &mut State, key: KeyPress) -> Option<Vec<Effect>> {
     if let Some(effects) = views::handle_search_key(state, key) {
         return Some(effects);

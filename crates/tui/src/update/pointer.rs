@@ -100,7 +100,7 @@ pub(super) fn inspect(state: &mut State) -> Vec<Effect> {
     send_pick_query(state, PickPurpose::Inspect)
 }
 
-/// Waits for a click that sets the focus. If already waiting, sets the focus at the crosshair.
+/// Waits for a click that sets the focus. If already waiting, focuses on the object at the crosshair.
 pub(super) fn start_or_confirm_focus_pick(state: &mut State) -> Vec<Effect> {
     if state.picture.history.is_viewing_older() {
         return show_notice_without_effects(state, messages::OLDER_RENDER);
@@ -138,7 +138,7 @@ pub(super) fn toggle_mouse(state: &mut State) -> Vec<Effect> {
 
 /// Handles the reply to a pick query.
 pub(super) fn handle_pick(state: &mut State, picked: &PickedPixel) -> Vec<Effect> {
-    // An older render was opened after the click.
+    // Ignore the reply if an older render was opened after the click.
     if state.picture.history.is_viewing_older() {
         return Vec::new();
     }

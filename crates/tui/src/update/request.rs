@@ -32,7 +32,7 @@ pub(super) fn request_render(state: &mut State, force: bool) -> Vec<Effect> {
     state.request.preview_size = Layout::max_preview_size(state);
     state.request.resize_due = None;
     state.request.camera_step = CameraStepStatus::default();
-    // Clear these for now. If this request renders a saved change, they are set again later.
+    // Forget the last saved change. If this request renders a new one, the caller records it afterwards.
     (state.saving.change, state.saving.first_change) = (None, None);
     state.overlays.unconfirmed = None;
     state.overlays.are_warnings_known = false;

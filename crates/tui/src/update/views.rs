@@ -12,7 +12,8 @@ use crate::pipeline::settings::ViewMode;
 use crate::state::State;
 use crate::view::views::views_per_column;
 
-/// Handles an overlay action. `None` if the list is closed or covered by the help.
+/// Handles an overlay action, or returns `None` if the list is closed, covered by the help or does not use
+/// the action.
 pub(super) fn handle_action(state: &mut State, action: OverlayAction) -> Option<Vec<Effect>> {
     if state.overlays.views.is_none() || state.overlays.help.open {
         return None;
@@ -41,7 +42,8 @@ pub(super) fn handle_action(state: &mut State, action: OverlayAction) -> Option<
     Some(select_if_changed(state, ViewMode::ALL[chosen]))
 }
 
-/// Handles a key while the user is typing a search. `None` if no search is active.
+/// Handles a key while the user is typing a search, or returns `None` if no search is active or it does not
+/// use the key.
 pub(super) fn handle_search_key(state: &mut State, key: KeyPress) -> Option<Vec<Effect>> {
     let mut name = state.overlays.views.as_ref().filter(|_| !state.overlays.help.open)?.name.clone()?;
     let is_held = key.modifiers.contains(KeyModifiers::CONTROL);

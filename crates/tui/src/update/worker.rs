@@ -168,8 +168,8 @@ pub(super) fn handle_worker_event(state: &mut State, event: Event) -> Vec<Effect
     Vec::new()
 }
 
-/// Notifies the user that a long render has ended. Requires that the window is not focused and that the
-/// terminal supports notifications.
+/// Notifies the user that a long render has ended, provided that the window is not focused and the terminal
+/// supports notifications.
 fn notify_long_render_ended(state: &State, time: Option<Duration>) -> Vec<Effect> {
     let is_over = matches!(state.work.activity, WorkerActivity::Done | WorkerActivity::Broken);
     let is_long = |time: &Duration| state.display.notify_after.is_some_and(|least| *time > least);
@@ -260,7 +260,7 @@ fn report_written_files(state: &mut State, paths: &[PathBuf]) {
     show_notice(state, messages::files_written(&names.join(", ")) + which);
 }
 
-/// Records a written file. It is listed next to the image because a message would cover the keys.
+/// Records a written file. The file is listed next to the image because a message would cover the keys.
 fn handle_written_file(
     state: &mut State,
     path: PathBuf,
@@ -277,8 +277,8 @@ fn handle_written_file(
     record_written_file(state, path, bytes, (generation, is_own), unfinished);
 }
 
-/// Records that an image has been written. Its render may still be running. Any existing report belongs to
-/// the same image.
+/// Records that an image has been written, possibly while its render is still running. If a report exists,
+/// it describes the same image.
 fn record_written_file(
     state: &mut State,
     path: PathBuf,
@@ -406,7 +406,7 @@ fn handle_done(state: &mut State, mut report: Box<Report>, warnings: Vec<Diagnos
     }
 }
 
-/// Adds the time spent on this image's samples by earlier requests.
+/// Adds the time that earlier requests spent on this image's samples.
 fn add_earlier_seconds(report: &mut Report) {
     let all = report.image.render_seconds;
     let render = &mut report.stages[Stage::Render as usize];

@@ -40,7 +40,7 @@ pub(super) fn draw_noise_chart(state: &State, area: Rect, buffer: &mut Buffer) -
     rows
 }
 
-/// Number of rows that the chart and its caption use. `None` if they do not fit.
+/// Number of rows that the chart and its caption use, or `None` if they do not fit.
 pub(super) fn chart_height(state: &State, area: Rect) -> Option<u16> {
     let words = 1 + caption(state, curve_points_if_enough(state)?, area.width.min(MAX_COLUMNS)).len() as u16;
     let chart = area.height.checked_sub(words)?.min(MAX_ROWS);

@@ -14,7 +14,7 @@ use crate::scene::report::{self, ReportTextRole};
 use crate::scene::sanitize::escape_invisible_chars;
 use crate::state::State;
 
-/// Maximum number of distinct diagnostics shown. The others appear once these are fixed.
+/// Maximum number of distinct diagnostics shown. The rest appear once the first ones are fixed.
 const MAX: usize = 100;
 
 /// Maximum number of positions shown per diagnostic.
@@ -35,7 +35,7 @@ pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) {
     }
 }
 
-/// The cells covered by the pane. Empty if it is closed.
+/// The cells covered by the pane, or an empty area if it is closed.
 pub(super) fn covered_cells(state: &State) -> Rect {
     let Layout { pane, panel, .. } = Layout::for_state(state);
     if state.overlays.diagnostics.open {
@@ -138,7 +138,8 @@ fn format_diagnostics(diagnostics: &[Diagnostic], width: usize) -> Vec<StyledLin
     lines
 }
 
-/// Formats the first position in full and the others only as line and column. An empty line follows.
+/// Formats a diagnostic with its first position in full and the others only as line and column, followed by
+/// an empty line.
 fn format_diagnostic_with_positions(fault: &[&Diagnostic], width: usize) -> Vec<StyledLine> {
     let tone = |role| match role {
         ReportTextRole::Text => TextRole::Plain,

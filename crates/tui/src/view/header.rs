@@ -1,4 +1,4 @@
-//! The header: state, scene and progress. After `tab` is pressed, it is the only line besides the image.
+//! The header: state, scene and progress. After `tab` is pressed, it is the only text besides the image.
 
 use std::time::Duration;
 
@@ -127,7 +127,7 @@ fn draw_scene_info(state: &State, area: Rect, buffer: &mut Buffer) {
     put_text(buffer, area, &pieces, state.display.depth);
 }
 
-/// The view and its range of values. Empty for the beauty view.
+/// The view and its range of values, or an empty string for the beauty view.
 fn view_label(state: &State) -> String {
     let open = state.picture.history.viewed_older_provenance();
     let of_open = open.map(|origin| origin.toggles.view.unwrap_or_else(|| state.request.base_view_mode()));
@@ -229,7 +229,7 @@ fn newest_render_number(state: &State) -> u64 {
     state.work.renders + u64::from(is_under_way)
 }
 
-/// Formats the remaining time. Empty if the render is paused.
+/// Formats the remaining time, or returns an empty string if the render is paused.
 fn format_eta(state: &State, progress: &RenderProgress) -> String {
     /// Minimum time shown, in seconds. Shorter times would round to zero.
     const MIN: f64 = 0.05;

@@ -33,7 +33,7 @@ pub(super) fn draw(state: &State, buffer: &mut Buffer) {
         title = format!(" keys · lines {}–{} of {} · j k ", first + 1, first + page, lines.len());
     }
     Clear.render(area, buffer);
-    // Clear partly covered lines, which would look truncated.
+    // Clear lines that the help covers in part, because they would look truncated.
     let Layout { header, under, .. } = Layout::for_state(state);
     for line in [header, under].into_iter().filter(|line| line.intersects(area)) {
         Clear.render(line.intersection(buffer.area), buffer);

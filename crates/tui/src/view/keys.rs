@@ -248,7 +248,7 @@ fn relabel_pause_hint(hint: KeyHint, state: &State) -> KeyHint {
     if is_pause && state.work.paused { KeyHint::new(hint.key, "resume") } else { hint }
 }
 
-/// Hint with the number of errors and warnings. `None` if the pane is open.
+/// Hint with the number of errors and warnings, or `None` if there are none or the pane is open.
 fn hidden_diagnostics_hint(state: &State) -> Option<KeyHint> {
     let key = keymap::binding_for_action(Action::ToggleDiagnostics)?.label;
     let (words, tone) = match &state.overlays.problems {

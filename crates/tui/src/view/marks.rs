@@ -8,7 +8,7 @@ use crate::pipeline::protocol::{ImagePosition, NormalizedRect};
 use crate::preview_kind::PreviewKind;
 use crate::state::State;
 
-/// Draws the marks over an image that covers these cells.
+/// Draws the marks over an image that covers `cells`.
 pub(super) fn draw_marks(state: &State, cells: Rect, buffer: &mut Buffer) {
     let mut mark = |spot: ImagePosition, symbols: [&str; 2]| {
         let symbol = symbols[usize::from(state.display.kind == PreviewKind::Ascii)];

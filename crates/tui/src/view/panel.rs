@@ -80,8 +80,8 @@ fn rows_used(lines: &[StyledLine], columns: u16, room: Rect) -> u16 {
     if columns > 1 { room.height } else { u16::try_from(lines.len()).unwrap_or(u16::MAX).min(room.height) }
 }
 
-/// Creates the panel's lines for this width. Hints are wrapped to the column width. Stage reasons are shown
-/// in full, or shortened to fit next to the stages.
+/// Creates the panel's lines for `width`, with hints wrapped to `column`. Stage reasons are shown in full if
+/// `is_in_full`, and otherwise shortened to fit next to the stages.
 fn panel_lines(state: &State, (width, column): (u16, u16), is_in_full: bool) -> Vec<StyledLine> {
     let is_done = matches!(state.work.activity, WorkerActivity::Done);
     let mut lines = inspected_lines(state, width);
@@ -199,7 +199,7 @@ enum RenderLimit {
     Error,
 }
 
-/// Determines which limit ended the render. `None` if only one was set.
+/// Determines which limit ended the render, or returns `None` if only one was set.
 fn reached_limit(state: &State) -> Option<RenderLimit> {
     let (image, effective) = (&state.work.report.as_ref()?.image, state.request.effective.as_ref()?);
     let is_by_error = effective.error > 0.0;

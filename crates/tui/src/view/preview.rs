@@ -82,7 +82,7 @@ fn cell_based_kind(kind: PreviewKind, depth: ColorDepth) -> PreviewKind {
     }
 }
 
-/// Whether the preview is drawn as pixels. This requires that nothing covers it.
+/// Whether the preview is drawn as pixels, which requires that nothing covers it.
 fn is_drawn_as_pixels(state: &State) -> bool {
     matches!(state.display.kind, PreviewKind::Pixels(_))
         && !state.overlays.help.open
@@ -91,7 +91,7 @@ fn is_drawn_as_pixels(state: &State) -> bool {
         && !message::covers_preview(state)
 }
 
-/// Placement of a preview drawn as pixels. `None` if the preview is drawn as cells.
+/// Placement of a preview drawn as pixels, or `None` if the preview is drawn as cells.
 pub(crate) fn terminal_image(state: &State, area: Rect) -> Option<PlacedImage> {
     let shown = state.picture.shown.as_ref().filter(|_| is_drawn_as_pixels(state))?;
     let placed = PreviewPlacement::for_preview(state, shown, area, state.display.kind);
@@ -114,7 +114,7 @@ impl<'a> PreviewColors<'a> {
     }
 }
 
-/// Draws an image into these cells for a terminal with a dark background, xterm's colors, and cells that are
+/// Draws an image into `area` for a terminal with a dark background, xterm's colors, and cells that are
 /// twice as tall as wide.
 pub fn draw_for_dark_xterm(
     picture: &Srgb8Image,
@@ -127,7 +127,7 @@ pub fn draw_for_dark_xterm(
     draw_image(picture, choice, inks, (area, 2.0))
 }
 
-/// Draws an image using these color settings and this cell aspect ratio.
+/// Draws an image with the given color settings and cell aspect ratio.
 pub(crate) fn draw_image(
     picture: &Srgb8Image,
     choice: PreviewChoice,
@@ -236,7 +236,7 @@ impl ScaledImage<'_> {
     }
 }
 
-/// Draws a cell with two colors.
+/// Draws a cell as a block character in two colors.
 fn draw_two_color_cell(
     scaled: &ScaledImage<'_>,
     grid: CellGrid,

@@ -83,8 +83,8 @@ impl AsciiRamp {
         }
     }
 
-    /// The character closest to an sRGB brightness. The range extends from the bare background to the densest
-    /// character.
+    /// The character that comes closest to an sRGB brightness. The range extends from the bare background to
+    /// the densest character.
     fn nearest_glyph(self, brightness: f32) -> char {
         let off = |ink: f32| {
             let covered = ink / MAX_INK;

@@ -9,7 +9,7 @@ use crate::pipeline::protocol::{Stage, StageReport, Status};
 use crate::scene::sanitize::escape_invisible_chars;
 use crate::state::{AssetProgressBar, State};
 
-/// A line of text pieces and their tones.
+/// A line of text pieces and their roles.
 pub(super) type StyledLine = Vec<(String, TextRole)>;
 
 /// Stages that took less than this fraction of the total time are omitted from the summary line.
@@ -91,7 +91,7 @@ fn stage_line(state: &State, stage: Stage, room: u16) -> StyledLine {
     line
 }
 
-/// Tone of a stage's text. Bold if an edit caused the stage to run again.
+/// Role of a stage's text: strong if an edit caused the stage to run again, otherwise plain.
 fn stage_text_role(state: &State, report: Option<&StageReport>) -> TextRole {
     let is_again = report.is_some_and(|it| it.status == Status::Done && state.work.renders > 0);
     if is_again && state.saving.edits > 0 { TextRole::Strong } else { TextRole::Plain }

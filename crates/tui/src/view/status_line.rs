@@ -206,7 +206,7 @@ fn draw_summary(
     put_text_right(buffer, free, &seen, TextRole::Faint, state.display.depth);
 }
 
-/// Name and size of each written file. Empty if the panel lists the files.
+/// Name and size of each written file, or nothing if the panel lists the files.
 fn written_file_pieces(state: &State, layout: &Layout) -> Vec<Vec<(String, TextRole)>> {
     let pieces = |written: &WrittenFile| {
         let name = written.escaped_path();
@@ -281,7 +281,7 @@ pub(super) fn save_to_screen_time(state: &State) -> Option<String> {
     state.saving.first_change.map(|time| messages::save_to_screen_time(&format_duration(time)))
 }
 
-/// A hint for users who have not saved yet. Empty if there is nothing to save.
+/// A hint for users who have not saved yet, or an empty string if there is nothing to save.
 pub(super) fn save_scene_hint(state: &State) -> String {
     if state.saving.edits > 0 || is_scene_unreadable(state) {
         return String::new();

@@ -76,7 +76,7 @@ fn draw_entry(
     preview::draw_history_thumbnail(state, picture, place, buffer);
     let is_looked_at = history.shown_index() == Some(*index);
     let (mark, tone) = if is_looked_at { ("▸", TextRole::Strong) } else { (" ", TextRole::Plain) };
-    // The text next to the thumbnail starts at the same column with or without a mark.
+    // The text next to the thumbnail starts in the same column with or without a mark.
     let words = EntryNumberAndChanges {
         head: format!("{mark}{} ", render_number_label(state, *index)),
         changes: history.describe_changes(*index, is_entry_rendering(state, *index)),

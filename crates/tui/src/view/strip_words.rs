@@ -29,7 +29,7 @@ enum ChangeDetail {
 }
 
 /// Formats the text as lines of `width` columns. Tries to fit it into `rows[0]` rows, then into `rows[1]`. If
-/// it fits neither, the excess is appended to the last line.
+/// it fits into neither, the excess is appended to the last line.
 pub(super) fn wrap_entry_text(words: &EntryNumberAndChanges, width: usize, rows: [usize; 2]) -> Vec<String> {
     let [few, most] = rows;
     let all = [ChangeDetail::Full, ChangeDetail::New, ChangeDetail::Short];

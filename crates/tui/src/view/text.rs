@@ -30,7 +30,7 @@ pub(super) enum TextRole {
 }
 
 impl TextRole {
-    /// Returns the style for text with this tone. Without color support, only modifiers are used.
+    /// Returns the style for text with this role. Without color support, only modifiers are used.
     pub(super) fn style(self, depth: ColorDepth) -> Style {
         let (color, modifier) = match self {
             Self::Plain | Self::File => (Color::Reset, Modifier::empty()),
@@ -94,7 +94,7 @@ pub(super) fn put_text(
     if is_cut { area.width } else { x - area.x }
 }
 
-/// Writes text at the right edge of the first row, if it fits.
+/// Writes text at the right edge of the first row, if it fits. Returns the number of columns used.
 pub(super) fn put_text_right(
     buffer: &mut Buffer,
     area: Rect,
@@ -114,7 +114,7 @@ pub(crate) fn text_columns(text: &str) -> u16 {
     u16::try_from(text.width()).unwrap_or(u16::MAX)
 }
 
-/// Returns a row of an area, counting from the top. Empty if `index` is out of range.
+/// Returns a row of an area, counting from the top, or an empty area if `index` is out of range.
 pub(super) fn nth_row(area: Rect, index: u16) -> Rect {
     if index < area.height { Rect { y: area.y + index, height: 1, ..area } } else { Rect::ZERO }
 }
@@ -199,7 +199,7 @@ pub(super) fn format_approximate_time(seconds: f64) -> String {
 }
 
 /// Formats the difference between a stage's time and its previous time. Uses the same unit as the time unless
-/// the difference is far larger. Empty if insignificant.
+/// the difference is far larger. Returns an empty string if the difference is insignificant.
 pub(super) fn format_time_difference(seconds: f64, before: Option<f64>) -> String {
     /// Relative variation in time between runs of identical work.
     const NOISE: f64 = 0.05;

@@ -68,8 +68,8 @@ fn draw_view_line(
     put_text(buffer, place, &pieces, state.display.depth);
 }
 
-/// Returns the area for the list. If the panel is not tall enough for one column, the list has as many as
-/// necessary.
+/// Returns the area for the list, in the panel if it is large enough. The list has two columns if one would
+/// not fit.
 fn list_area(layout: &Layout) -> Rect {
     let all = ViewMode::ALL.len() as u16;
     let panel = layout.panel;

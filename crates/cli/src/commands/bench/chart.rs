@@ -62,8 +62,8 @@ impl ConvergenceChart {
         }
     }
 
-    /// Renders the chart as text for a terminal of this size. Empty if there are no points or if the chart
-    /// does not fit.
+    /// Renders the chart as text for a terminal of this size. The text is empty if there are no points or if
+    /// the chart does not fit.
     pub(super) fn render_text(&self, (columns, rows): (u16, u16), is_colored: bool) -> String {
         // Some terminals wrap lines that fill the whole width.
         let size = (columns.saturating_sub(1).min(MAX_COLUMNS), rows.saturating_sub(RESERVED_ROWS).min(ROWS));

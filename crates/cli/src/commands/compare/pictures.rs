@@ -15,7 +15,7 @@ use crate::tui::{NamedImage, images_as_text};
 /// FLIP below this value is hard to see in false color.
 const MIN_VISIBLE_FLIP: f32 = 0.1;
 
-/// Renders the images as text. Returns an empty string if the terminal is too small.
+/// Renders the images as text. Returns an empty string if no images are wanted or the terminal is too small.
 pub(super) fn render_images(args: &CompareArgs, pair: &Pair, measured: &PairMeasurements) -> String {
     let is_terminal = std::io::stdout().is_terminal();
     let is_wanted = match args.pictures {

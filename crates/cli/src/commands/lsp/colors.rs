@@ -28,7 +28,7 @@ pub(super) fn document_colors(document: &OpenDocument) -> Value {
     json!(found)
 }
 
-/// Parses a value as a color. Numbers are clamped to 1.
+/// Parses a value as a color. Numbers are clamped to [0, 1].
 fn parse_color(text: &str, key: &OutlineKey) -> Option<Color> {
     let bytes = match &key.text {
         Some(text) => parse_hex_or_named_srgb8(text)?,

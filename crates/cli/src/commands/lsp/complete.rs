@@ -12,7 +12,7 @@ use super::place::{CursorContext, CursorTable, cursor_context};
 use crate::scene::keys::key::{ChoiceValue, KeyInfo, TableSyntax, ValueKind};
 use crate::scene::keys::{all_tables, color_names};
 
-/// Returns the candidates at a byte offset. `None` if nothing can be completed there.
+/// Returns the candidates at a byte offset, or `None` if nothing can be completed there.
 pub(super) fn complete(document: &OpenDocument, offset: usize) -> Option<Value> {
     let items = match cursor_context(&document.text, offset)? {
         CursorContext::Header => header_items(document, offset),

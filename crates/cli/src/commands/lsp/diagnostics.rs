@@ -17,8 +17,8 @@ pub(super) fn text_diagnostics(document: &OpenDocument) -> Vec<Diagnostic> {
     found.iter().map(|one| to_lsp_diagnostic(document, one)).collect()
 }
 
-/// Returns the diagnostics for the file and the files it references, as in `glimt check`. `None` if the file
-/// differs from the open document, if it cannot be read, or if the token is cancelled.
+/// Returns the diagnostics for the file and the files it references, as in `glimt check`. Returns `None`
+/// if the file differs from the open document, if it cannot be read, or if the token is canceled.
 pub(super) fn file_diagnostics(
     document: &OpenDocument,
     checker: &mut IncrementalSceneChecker,

@@ -1,7 +1,7 @@
 //! A thread that checks the files referenced by open documents.
 //!
 //! All documents share one thread and one checker, which does not read unchanged files again. Only the newest
-//! request for each document is kept. It cancels an older request that is still running.
+//! request for each document is kept. It cancels the document's previous request if that is still running.
 
 use std::collections::VecDeque;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
@@ -38,7 +38,7 @@ struct CheckRequests {
 }
 
 impl FileCheckThread {
-    /// Starts a thread that passes diagnostics to `publish`. `None` if no thread can be created.
+    /// Starts a thread that passes diagnostics to `publish`, or returns `None` if no thread can be created.
     pub(super) fn start(
         publish: impl Fn(Uri, &OpenDocument, Vec<Diagnostic>) + Send + 'static,
     ) -> Option<Self> {
@@ -79,7 +79,7 @@ impl CheckQueue {
         self.requests.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Waits for the next request. `None` after [`CheckRequests::shut_down`].
+    /// Waits for the next request. Returns `None` after [`CheckRequests::shut_down`].
     fn wait_for_request(&self) -> Option<(Uri, OpenDocument, CancelToken)> {
         let mut requests = self.lock();
         requests.running = None;

@@ -169,7 +169,8 @@ impl Server<'_> {
         }
     }
 
-    /// Calls a function with a document and a byte offset. `None` if the document is not open.
+    /// Calls a function with the document and byte offset in `params`. Returns `None` if the document is not
+    /// open.
     fn with_document_at(
         &self,
         params: Value,
@@ -181,7 +182,7 @@ impl Server<'_> {
         look(document, document.offset(position))
     }
 
-    /// Calls a function with a document. `None` if the document is not open.
+    /// Calls a function with the document in `params`. Returns `None` if the document is not open.
     fn with_document(&self, params: &Value, look: impl FnOnce(&OpenDocument) -> Value) -> Option<Value> {
         let uri = params["textDocument"]["uri"].as_str()?;
         self.documents().get(uri).map(look)

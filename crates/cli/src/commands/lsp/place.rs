@@ -37,7 +37,7 @@ impl CursorTable {
     }
 }
 
-/// Returns the context at a byte offset. `None` in comments, arrays and unknown tables.
+/// Returns the context at a byte offset, or `None` in comments, arrays and unknown tables.
 pub(super) fn cursor_context(text: &str, offset: usize) -> Option<CursorContext> {
     let before = text.get(..offset)?;
     let line = &before[before.rfind('\n').map_or(0, |at| at + 1)..];
@@ -65,8 +65,8 @@ pub(super) fn cursor_context(text: &str, offset: usize) -> Option<CursorContext>
 }
 
 /// Returns the context in a table. `body` contains the lines of a table or the items of an inline table. The
-/// tuple contains the text before the cursor and the text after it. `None` in arrays and after complete
-/// values.
+/// tuple contains the text before the cursor and the text after it. Returns `None` in arrays and after
+/// complete values.
 fn context_in_table(
     info: &'static TableInfo,
     body: &str,
@@ -157,8 +157,8 @@ impl LineEndState {
 /// The table that contains a byte offset, and a flag that is set if the offset is in an array.
 #[derive(Debug, Default)]
 struct EnclosingTable<'t> {
-    /// The last header before the offset, without its brackets, and the lines of its table. `None` before the
-    /// first header.
+    /// The last header before the offset, without its brackets, and the lines of its table, or `None` before
+    /// the first header.
     table: Option<(&'t str, &'t str)>,
     /// Whether the line continues an array.
     is_in_array: bool,
@@ -198,7 +198,7 @@ fn starts_with_assignment(line: &str) -> bool {
     rest.trim_start().starts_with('=')
 }
 
-/// Returns the name in a table header. `None` for other lines, such as `[1, 0],` in an array.
+/// Returns the name in a table header, or `None` for other lines, such as `[1, 0],` in an array.
 fn header_name(line: &str) -> Option<&str> {
     let (name, rest) = line.trim_start().strip_prefix('[')?.trim_start_matches('[').split_once(']')?;
     let is_part = |c: char| c.is_ascii_alphanumeric() || matches!(c, '_' | '-' | '.' | '"' | '\'' | ' ');

@@ -1,7 +1,7 @@
 //! The LSP base protocol on stdin and stdout: a header with a length, followed by JSON.
 //!
 //! `lsp_server`'s reader stops at invalid messages and allocates as many bytes as the header claims. This
-//! reader responds with an error and limits the length.
+//! reader responds to invalid messages with an error and limits the length.
 
 use std::io::{self, BufRead, Read, Write};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -23,10 +23,10 @@ pub(super) enum ReceivedFrame {
     Invalid(Value),
 }
 
-/// Reads the next frame. `None` at the end of the stream.
+/// Reads the next frame, or returns `None` at the end of the stream.
 ///
 /// # Errors
-/// The stream cannot be read, or a frame is malformed or too long.
+/// Returns an error if the stream cannot be read, or if the frame is malformed or too long.
 pub(super) fn read_frame(from: &mut impl BufRead) -> Result<Option<ReceivedFrame>, String> {
     let Some(length) = read_content_length(from)? else { return Ok(None) };
     if length > MAX_MESSAGE_BYTES {
@@ -41,7 +41,7 @@ pub(super) fn read_frame(from: &mut impl BufRead) -> Result<Option<ReceivedFrame
     Ok(Some(parse_message(bytes)))
 }
 
-/// Reads a header. `None` if the stream ends before it.
+/// Reads a header and returns the content length, or `None` if the stream ends before the header.
 fn read_content_length(from: &mut impl BufRead) -> Result<Option<u64>, String> {
     let mut header = from.by_ref().take(MAX_HEADER_BYTES);
     let mut length = None;

@@ -32,15 +32,15 @@ impl<'a> RenderInputFiles<'a> {
         Self { parts, token, named: scenes.into_iter().chain(named).collect(), companions: OnceCell::new() }
     }
 
-    /// Returns the reason if the file at `path` must be kept because it is an input. Checks the files that
-    /// meshes reference last, because listing them requires reading the meshes.
+    /// Returns the reason why the file at `path` must be kept, if it is an input. Checks the files that meshes
+    /// reference last, because listing them requires reading the meshes.
     ///
     /// # Errors
-    /// Returns [`Cancelled`] if the token is cancelled.
+    /// Returns [`Cancelled`] if the token is canceled.
     pub(super) fn reason_not_to_overwrite(&self, path: &Path) -> Result<Option<String>, Cancelled> {
         let find = |files: &BTreeSet<PathBuf>| {
             let input = files.iter().find(|input| is_same_file(input, path))?;
-            // Relative to the working directory.
+            // Show the path relative to the working directory.
             let name = scene_path::relative_to_image(input, Path::new(""));
             let name = escape_invisible_chars(name.strip_prefix("./").unwrap_or(&name)).into_owned();
             Some(format!("the parts' scene references it ({name})"))

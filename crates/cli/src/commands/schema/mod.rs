@@ -122,7 +122,7 @@ fn key_description_markdown(key: &KeyInfo) -> String {
     format!("{}.{}{}{default}", key.doc, named("Unit", key.unit.to_owned()), named("Range", key.range_text()))
 }
 
-/// Returns the schema for a table that has types. Contains one condition per type.
+/// Returns the schema for a table that has types, with one condition per type.
 fn schema_by_type(info: &'static TableInfo) -> Value {
     let draft = SchemaDraft::Latest;
     let conditions: Vec<Value> = info
@@ -178,7 +178,7 @@ fn all_types_table_schema(info: &'static TableInfo) -> Value {
     table
 }
 
-/// Returns the schema for a key shared by several types. Accepts the values that any of these types accepts.
+/// Returns the schema for a key shared by several types. It accepts every value that any of the types accepts.
 fn shared_key_schema(keys: &[(&'static TableTypeInfo, &'static KeyInfo)]) -> Value {
     let draft = SchemaDraft::Four;
     let mut values: Vec<Value> = keys.iter().map(|(_, key)| value_schema(key.kind, draft)).collect();

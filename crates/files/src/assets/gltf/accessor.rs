@@ -3,7 +3,7 @@
 use super::json::{Accessor, BufferView};
 use super::{GltfError, GltfFile};
 
-/// Maximum number of elements in an accessor without a buffer view. All of its elements are zero.
+/// Maximum number of elements in an accessor without a buffer view, whose elements are all zero.
 const MAX_ZEROS: u64 = 1 << 22;
 
 /// Type of an accessor's components.
@@ -53,7 +53,7 @@ impl ComponentType {
         if normalized { (value / max).max(-1.0) } else { value }
     }
 
-    /// Decodes a component as an index. `None` for types that cannot be indices.
+    /// Decodes a component as an index, or returns `None` for types that cannot be indices.
     fn decode_as_index(self, bytes: &[u8]) -> Option<u32> {
         match self {
             Self::U8 => Some(u32::from(bytes[0])),
@@ -92,7 +92,7 @@ pub(super) struct AccessorReader<'a> {
     pub(super) width: usize,
     /// Number of elements.
     pub(super) count: usize,
-    /// Elements in the buffer view. `None` if all elements are zero.
+    /// Elements in the buffer view. Without a view (`None`), all elements are zero.
     elements: Option<StridedElements<'a>>,
     /// Sparse values and their sorted indices.
     sparse: Option<(Vec<u32>, StridedElements<'a>)>,
@@ -173,7 +173,7 @@ impl<'a> AccessorReader<'a> {
         })
     }
 
-    /// Returns the bytes from the start of an element. `None` if the element is zero.
+    /// Returns the bytes from the start of an element, or `None` if the element is zero.
     fn element_bytes(&self, index: usize) -> Option<&'a [u8]> {
         if let Some((indices, values)) = &self.sparse
             && let Ok(element) = indices.binary_search(&(index as u32))
@@ -183,7 +183,8 @@ impl<'a> AccessorReader<'a> {
         self.elements.map(|elements| &elements.bytes[index * elements.stride..])
     }
 
-    /// Returns an element's first `N` components. Missing ones are set to `missing`. The element must exist.
+    /// Returns an element's first `N` components, with `missing` for components that its type does not have.
+    /// The element must exist.
     pub(super) fn element_floats<const N: usize>(&self, index: usize, missing: f32) -> [f32; N] {
         let (size, element) = (self.component.size(), self.element_bytes(index));
         std::array::from_fn(|component| match element {

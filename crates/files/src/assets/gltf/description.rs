@@ -17,7 +17,7 @@ pub struct ModelScene {
     pub cameras: Vec<ModelCamera>,
     /// Notes about approximations and omissions, each with its location in the file.
     pub notes: Vec<String>,
-    /// Minimum and maximum coordinates of all instances. `None` if there are no instances.
+    /// Minimum and maximum coordinates of all instances, or `None` if there are no instances.
     pub bounds: Option<[DVec3; 2]>,
     /// Sample points on the instances, including the extremes in every direction.
     pub outline: Vec<DVec3>,
@@ -86,13 +86,13 @@ impl TexturedValue {
 pub enum TextureWrap {
     /// Repeats the texture.
     Repeat,
-    /// Repeats the edge texels.
+    /// Extends the edge texels outward.
     Clamp,
     /// Repeats the texture, mirroring every other copy.
     Mirror,
 }
 
-/// A texture lookup. v is 0 at the bottom. Coordinates are scaled, then rotated, then translated.
+/// A texture lookup, with v = 0 at the bottom. Coordinates are scaled, then rotated, then translated.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TextureRef {
     /// Index of the image.
@@ -239,7 +239,7 @@ pub struct ModelCamera {
     pub up: DVec3,
     /// Vertical field of view in degrees.
     pub fov: f64,
-    /// Aspect ratio (width / height). `None` if the file does not specify it.
+    /// Aspect ratio (width / height), or `None` if the file does not specify it.
     pub aspect: Option<f64>,
 }
 

@@ -18,8 +18,8 @@ impl GltfFile {
     /// Merges the file's scene into one mesh.
     ///
     /// # Errors
-    /// Same as [`GltfFile::convert_scene`] and [`GltfFile::build_part`]. Also fails if the scene has no faces or too
-    /// many triangles.
+    /// Same as [`GltfFile::convert_scene`] and [`GltfFile::build_part`]. Also fails if the scene has no faces
+    /// or too many triangles.
     pub fn merged_scene(&self, token: &CancelToken) -> Result<LoadedMesh, AssetError> {
         let scene = self.convert_scene(token)?;
         let Some([min, max]) = scene.bounds else {

@@ -231,7 +231,7 @@ impl GltfFile {
         AssetError::malformed(&self.path, None, wrong.0)
     }
 
-    /// Returns the first part with the same mesh as `part`. That first part is built instead of `part`.
+    /// Returns the first part with the same mesh as `part`. Only this first part is built.
     pub(super) fn first_part_with_same_mesh(&self, part: usize) -> usize {
         self.first_part_with_same_mesh.get(part).copied().unwrap_or(part)
     }
@@ -239,7 +239,7 @@ impl GltfFile {
     /// Maps each part to the first part with the same mesh. Rejects files whose meshes reuse the same buffer
     /// bytes so often that they would need many times the file size in memory.
     fn map_duplicate_parts(&self) -> Result<Vec<usize>, GltfError> {
-        /// Number of corners allowed regardless of the buffer size.
+        /// Number of corners allowed in addition to one per buffer byte.
         const FREE: u64 = 1 << 20;
         let mut first = HashMap::new();
         let mut first_part_with_same_mesh = Vec::new();
@@ -367,8 +367,8 @@ fn not_relative_uri_message(uri: &str) -> String {
 /// An unsupported mesh compression extension.
 const DRACO: &str = "KHR_draco_mesh_compression";
 
-/// Returns the version of a file that predates glTF 2.0. `None` for other files. Older versions use JSON
-/// objects where glTF 2.0 uses arrays.
+/// Returns the version of a file that predates glTF 2.0, or `None` for other files. Such a file does not
+/// parse as [`Root`], because older versions use JSON objects where glTF 2.0 uses arrays.
 fn pre_2_0_version(text: &[u8]) -> Option<String> {
     #[derive(serde::Deserialize)]
     struct AssetOnlyRoot {
@@ -516,7 +516,7 @@ fn check_required_extensions(root: &Root) -> Result<(), GltfError> {
     Ok(())
 }
 
-/// Reads all buffers. Returns them and the list of buffer files.
+/// Reads all buffers and returns them with the list of buffer files.
 fn read_buffers(
     path: &Path,
     root: &mut Root,

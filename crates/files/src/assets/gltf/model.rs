@@ -25,7 +25,8 @@ const LIMIT: f64 = 1e15;
 const MAX_INSTANCES: usize = 1 << 20;
 
 impl GltfFile {
-    /// Converts the file's default scene. Falls back to the first scene, then to all nodes.
+    /// Converts the file's default scene, or the first scene if there is no default, or all nodes if there
+    /// are no scenes.
     ///
     /// # Errors
     /// [`AssetError::Malformed`] with the location in the JSON.
@@ -44,8 +45,8 @@ impl GltfFile {
         Ok(scene)
     }
 
-    /// Computes the bounds and outline of the instances. Skips invalid parts unless all parts are invalid.
-    /// Their errors are reported when the parts are loaded.
+    /// Computes the bounds and outline of the instances. Unless all parts are invalid, skips the invalid
+    /// parts, whose errors are reported when they are loaded.
     fn measure_bounds_and_outline(
         &self,
         scene: &mut ModelScene,
@@ -455,7 +456,7 @@ fn check_intensity(json: &JsonLight, number: usize) -> Result<(), GltfError> {
 struct WorldTransforms {
     /// Nodes in traversal order, each with its transform and visibility (`KHR_node_visibility`).
     order: Vec<(usize, AffineMap, bool)>,
-    /// Transform of each node. `None` for nodes outside the scene.
+    /// Transform of each node, or `None` for nodes outside the scene.
     of_node: Vec<Option<AffineMap>>,
 }
 

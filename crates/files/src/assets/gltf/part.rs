@@ -182,7 +182,7 @@ pub(super) fn wrong_component_count_message(width: usize) -> String {
     format!("expected VEC3, found {width} components")
 }
 
-/// Triangulates corners according to the primitive mode. Drops incomplete triangles.
+/// Triangulates corners according to the primitive mode, dropping incomplete triangles.
 fn triangulate(mode: u32, corners: &[u32]) -> Faces {
     let mut faces = Faces::default();
     let mut add = |triangle: [u32; 3]| {

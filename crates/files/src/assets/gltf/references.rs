@@ -1,4 +1,4 @@
-//! Lists the files that a glTF file references. Does not load the buffers or images.
+//! Lists the files that a glTF file references, without loading its buffers or images.
 
 use std::fmt;
 use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom};
@@ -25,7 +25,7 @@ struct Reference {
     uri: Option<FileUri>,
 }
 
-/// A file URI. `None` for data URIs, which are not copied.
+/// A file URI, or `None` for a data URI, whose contents are not copied.
 #[derive(Debug)]
 struct FileUri(Option<String>);
 
@@ -47,7 +47,7 @@ impl<'de> Deserialize<'de> for FileUri {
     }
 }
 
-/// A reader that fails once the token is cancelled.
+/// A reader that fails once the token is canceled.
 struct CancellableReader<'a, R> {
     reader: R,
     token: &'a CancelToken,
@@ -64,7 +64,7 @@ impl<R: Read> Read for CancellableReader<'_, R> {
 /// without keeping it in memory. Returns an empty list if the file is unreadable or its JSON is invalid.
 ///
 /// # Errors
-/// Returns [`Cancelled`] if the token is cancelled.
+/// Returns [`Cancelled`] if the token is canceled.
 pub fn referenced_files(path: &Path, token: &CancelToken) -> Result<Vec<PathBuf>, Cancelled> {
     let references = json_reader(path, token).ok().and_then(|json| serde_json::from_reader(json).ok());
     token.check_pause_and_cancel()?;

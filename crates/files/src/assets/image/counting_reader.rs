@@ -1,4 +1,4 @@
-//! A reader that reports its progress and can be cancelled.
+//! A reader that reports its progress and can be canceled.
 
 use std::io::{self, Read, Seek, SeekFrom};
 

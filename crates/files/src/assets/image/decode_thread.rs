@@ -1,5 +1,5 @@
 //! Runs image decoders on a separate thread, because they do not poll the cancel token. If a call is
-//! cancelled, its thread is abandoned.
+//! canceled, its thread is abandoned.
 
 use std::io;
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError, SyncSender};
@@ -25,8 +25,8 @@ static ABANDONED: Mutex<Vec<JoinHandle<()>>> = Mutex::new(Vec::new());
 pub(super) struct ProgressReporter(Option<SyncSender<u64>>);
 
 impl ProgressReporter {
-    /// Reports that `done` bytes were read. Returns an error if the call was cancelled, so the decoder can
-    /// stop early.
+    /// Reports that `done` bytes were read. Returns an error if the call was canceled, so that the decoder
+    /// can stop early.
     pub(super) fn report_bytes_read(&self, done: u64) -> io::Result<()> {
         match &self.0 {
             Some(receiver) => receiver.send(done).map_err(|_| io::Error::other(Cancelled)),

@@ -25,8 +25,8 @@ pub(super) struct ImageDecoderWithMetadata {
     pub(super) texel_bytes: u64,
 }
 
-/// Creates the decoder for the detected format. [`ImageReader::into_decoder`] would add decoders that are never
-/// used to the program.
+/// Creates the decoder for the detected format. [`ImageReader::into_decoder`] would link decoders that are
+/// never used.
 pub(super) fn create_decoder<R: BufRead + Seek + 'static>(
     reader: ImageReader<R>,
     encoding: ImageEncoding,
@@ -100,8 +100,8 @@ fn limit_memory_and_read_profile(
     Ok((Box::new(decoder), metadata))
 }
 
-/// Returns an image's orientation from its Exif data. Accepts JPEG's Exif prefix in all formats. Some
-/// programs write it there, but `image` does not support it.
+/// Returns an image's orientation from its Exif data. Accepts JPEG's Exif prefix in all formats, because some
+/// programs write it there, although `image` does not accept it.
 pub(super) fn orientation(decoder: &mut dyn ImageDecoder) -> Result<Orientation, ImageError> {
     let orientation = decoder.orientation()?;
     let exif = if orientation == Orientation::NoTransforms { decoder.exif_metadata()? } else { None };

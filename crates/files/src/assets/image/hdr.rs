@@ -223,7 +223,7 @@ fn are_positive<const N: usize>(numbers: &[f64; N]) -> bool {
 #[derive(Clone, Copy)]
 struct ScanAxis {
     is_vertical: bool,
-    /// Whether pixels are stored from left to right or from top to bottom.
+    /// Whether pixels are stored from left to right or, on a vertical axis, from top to bottom.
     is_forward: bool,
     count: u32,
 }

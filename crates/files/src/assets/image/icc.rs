@@ -34,7 +34,7 @@ pub(super) const LOOKUP_TABLES: &str = "lookup tables are not supported";
 pub(super) const UNSUPPORTED_CURVES: &str = "missing or unsupported curves";
 pub(super) const DEGENERATE_PRIMARIES: &str = "degenerate primaries";
 
-/// Warning about a profile that is ignored because of its color space.
+/// Reason for ignoring a profile with the wrong color space.
 pub(super) fn wrong_color_space_message(found: &str, is_gray: bool) -> String {
     format!("its color space is {found:?}, not {}", if is_gray { "gray" } else { "RGB" })
 }

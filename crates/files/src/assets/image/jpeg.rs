@@ -1,4 +1,4 @@
-//! Rejects malformed JPEG files. The decoder would accept them and fill missing data with gray.
+//! Rejects malformed JPEG files, because the decoder would accept them and fill missing data with gray.
 
 use std::path::Path;
 
@@ -138,7 +138,7 @@ mod tests {
             (b"\xe0JFIF\0\x01\x02", b"\xeeAdobe\0d\0\0\0\0\0", b"\xeeAdobe\0d\0\0\0\0\x01");
         for segments in [&[jfif.as_slice(), rgb][..], &[rgb, jfif]] {
             let file = file(segments);
-            let at = wrong_adobe_transform_offset(&file).expect("both");
+            let at = wrong_adobe_transform_offset(&file).expect("both segments are present");
             assert_eq!(file[at - 11..=at], rgb[1..]);
         }
         for segments in [&[jfif.as_slice(), ycc][..], &[rgb], &[jfif], &[]] {

@@ -22,7 +22,7 @@ pub(super) enum AlphaInterpretation {
 /// A warning about an ignored part of a file.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct ImageWarning {
-    /// Line number, starting at 1. `None` for files without lines.
+    /// Line number, starting at 1, or `None` for files without lines.
     pub(super) line: Option<usize>,
     pub(super) words: String,
 }

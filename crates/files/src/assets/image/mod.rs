@@ -72,16 +72,16 @@ pub enum ImageEncoding {
 /// Transfer function for colors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum ColorCurve {
-    /// [`ImageEncoding::Color`].
+    /// As in [`ImageEncoding::Color`].
     Auto,
-    /// [`ImageEncoding::Srgb`].
+    /// As in [`ImageEncoding::Srgb`].
     Srgb,
-    /// [`ImageEncoding::Linear`].
+    /// As in [`ImageEncoding::Linear`].
     Linear,
 }
 
 impl ColorCurve {
-    /// Encoding of an image without alpha.
+    /// Encoding of an image that has this transfer function and no alpha.
     pub fn encoding(self) -> ImageEncoding {
         match self {
             Self::Auto => ImageEncoding::Color,

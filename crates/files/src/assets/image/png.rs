@@ -181,8 +181,8 @@ fn gamma_curve(gamma: u32) -> TransferFunction {
     }
 }
 
-/// Returns the color space for video signal code points (ITU-T H.273, tables 2 and 3). `None` for undefined
-/// codes, logarithmic curves, and anything other than full-range RGB.
+/// Returns the color space for video signal code points (ITU-T H.273, tables 2 and 3), or `None` for
+/// undefined codes, logarithmic curves, and anything other than full-range RGB.
 fn color_space_from_cicp(points: png::CodingIndependentCodePoints) -> Option<ColorSpace> {
     let primaries = match points.color_primaries {
         1 => Primaries::REC_709,

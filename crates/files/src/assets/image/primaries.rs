@@ -42,7 +42,7 @@ impl Primaries {
         chromaticity_to_unit_sum_xyz(self.white) / self.white[1]
     }
 
-    /// Matrix to XYZ, scaled to map (1, 1, 1) to white. `None` for degenerate primaries.
+    /// Matrix to XYZ, scaled to map (1, 1, 1) to white, or `None` for degenerate primaries.
     fn to_xyz(self) -> Option<DMat3> {
         let primaries = DMat3::from_cols(
             chromaticity_to_unit_sum_xyz(self.red),
@@ -54,12 +54,12 @@ impl Primaries {
         inverse(matrix).is_some().then_some(matrix)
     }
 
-    /// Luminance weights of red, green and blue. `None` for degenerate primaries.
+    /// Luminance weights of red, green and blue, or `None` for degenerate primaries.
     pub(super) fn luminance_weights(self) -> Option<DVec3> {
         Some(self.to_xyz()?.row(1))
     }
 
-    /// Matrix to linear Rec. 709 with Bradford chromatic adaptation. `None` for degenerate primaries.
+    /// Matrix to linear Rec. 709 with Bradford chromatic adaptation, or `None` for degenerate primaries.
     pub(super) fn to_rec_709(self) -> Option<DMat3> {
         Some(xyz_to_rec_709_matrix(self.white_xyz())? * self.to_xyz()?)
     }
@@ -93,7 +93,7 @@ fn chromaticity_to_unit_sum_xyz([x, y]: [f64; 2]) -> DVec3 {
     DVec3::new(x, y, 1.0 - x - y)
 }
 
-/// Inverse of a matrix. `None` if the matrix is nearly singular.
+/// Inverse of a matrix, or `None` if the matrix is nearly singular.
 fn inverse(matrix: DMat3) -> Option<DMat3> {
     (matrix.determinant().abs() > 1e-9).then(|| matrix.inverse()).filter(|inverse| inverse.is_finite())
 }

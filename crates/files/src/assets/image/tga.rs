@@ -48,7 +48,7 @@ pub(super) fn open_with_alpha_usage<R: Read + Seek>(
     Ok((TgaDecoder::new(Cursor::new(header).chain(file))?, alpha))
 }
 
-/// Returns the number of bits per color. `None` for gray images and unknown types.
+/// Returns the number of bits per color, or `None` for gray images and unknown types.
 fn color_bits(header: &[u8; HEADER]) -> Option<u8> {
     match header[2] {
         1 | 9 => Some(header[7]),

@@ -259,7 +259,7 @@ impl<'a> FaceTriangulator<'a> {
         }
     }
 
-    /// Triangulates a polygon. Drops repeated corners, as in quads at a pole.
+    /// Triangulates a polygon after dropping repeated corners, as in quads at a pole.
     fn triangulate_polygon(&mut self, corners: &[u32], face: usize) {
         let place = |corner: u32| self.positions[corner as usize];
         let mut distinct = corners.to_vec();
@@ -287,14 +287,14 @@ impl<'a> FaceTriangulator<'a> {
     }
 }
 
-/// Whether three finite points form a triangle with nonzero area. In `f64`, `f32` coordinates neither
-/// overflow nor underflow, and products for nearby points are exact.
+/// Whether three finite points form a triangle with nonzero area. Computes in `f64`, where products of `f32`
+/// coordinates neither overflow nor underflow, and are exact for nearby points.
 fn has_area([a, b, c]: [Vec3; 3]) -> bool {
     let [a, b, c] = [a, b, c].map(|point| point.as_dvec3());
     (b - a).cross(c - a) != DVec3::ZERO
 }
 
-/// Removes unused vertices. Their coordinates may be arbitrary and would enlarge the bounds.
+/// Removes unused vertices, whose coordinates may be arbitrary and would enlarge the bounds.
 fn drop_unused_vertices(mesh: &mut TriangleMesh) {
     let mut new_index = vec![u32::MAX; mesh.positions.len()];
     for &corner in mesh.triangles.as_flattened() {

@@ -5,8 +5,8 @@ use rayon::prelude::*;
 use crate::control::{CancelToken, Cancelled};
 use crate::math::Vec3;
 
-/// Average number of vertices per bucket. Buckets are sorted in parallel, and each bucket polls the cancel
-/// token once.
+/// Average number of vertices per bucket. Buckets are sorted in parallel, and the cancel token is polled once
+/// per bucket.
 const BUCKET: usize = 1 << 12;
 
 /// Number of vertices between polls of the cancel token.
@@ -77,7 +77,7 @@ fn sort_into_buckets(
     Ok((entries, ends))
 }
 
-/// Finds the coincident vertices in a bucket. Groups the vertices by hash, then by position.
+/// Finds the coincident vertices in a bucket by grouping them by hash, then by position.
 fn group_coincident_in_bucket(
     bucket: &[HashedVertex],
     positions: &[Vec3],

@@ -19,7 +19,7 @@ pub(super) fn split_vertices_at_seams(parsed: &mut ParsedMesh, token: &CancelTok
     let (uvs, colors) = (std::mem::take(&mut parsed.corner_uvs), std::mem::take(&mut parsed.corner_colors));
     let vertices = parsed.positions.len();
     let is_in_range = |corner: &u32| (*corner as usize) < vertices;
-    // Do not report out-of-range indices here. `assemble` reports them together with the face.
+    // Leave out-of-range indices to `assemble`, which reports them together with the face.
     if (uvs.is_empty() && colors.is_empty()) || !parsed.faces.corners.iter().all(is_in_range) {
         return Ok(());
     }

@@ -1,4 +1,4 @@
-//! Mesh files: OBJ with MTL, OFF, PLY and STL. Each parser collects vertices and faces. `assemble` then
+//! Mesh files: OBJ with MTL, OFF, PLY and STL. Each parser collects vertices and faces, from which `assemble`
 //! builds a valid [`TriangleMesh`](crate::geometry::mesh::TriangleMesh).
 
 pub(crate) mod assemble;
@@ -38,7 +38,7 @@ pub const EXTENSIONS: [&str; 4] = ["obj", "off", "ply", "stl"];
 /// bytes. Every byte is counted twice: when it is read and when it is parsed.
 ///
 /// # Errors
-/// - [`AssetError::Unreadable`] if the file is not a regular file with a known extension and at most 4 GiB.
+/// - [`AssetError::Unreadable`] if the file is not a regular file of at most 4 GiB with a known extension.
 /// - [`AssetError::Malformed`] with the line (text) or the face (binary) if the file is invalid or has no
 ///   usable face.
 /// - [`AssetError::Cancelled`].
@@ -68,7 +68,7 @@ pub fn load(path: &Path, progress: Progress<'_>, token: &CancelToken) -> Result<
 /// matter. Memory use is bounded. Returns an empty list for other formats and unreadable files.
 ///
 /// # Errors
-/// Returns [`Cancelled`] if the token is cancelled.
+/// Returns [`Cancelled`] if the token is canceled.
 pub fn referenced_files(path: &Path, token: &CancelToken) -> Result<Vec<PathBuf>, Cancelled> {
     let is_obj = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("obj"));
     if is_obj { obj::referenced_files(path, token) } else { Ok(Vec::new()) }

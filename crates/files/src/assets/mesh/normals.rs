@@ -24,9 +24,9 @@ const COMPARED: usize = 64;
 const BATCH: usize = 1 << 16;
 
 /// Computes a unit normal for each vertex, pointing to the front side of its faces. Each face is weighted by
-/// its angle at the vertex. Coincident vertices share a normal if they are in the same [`VertexNormalSharing`] and
-/// their normals differ by at most 45 degrees. If the face normals cancel out, the normal of one face is
-/// used. The result does not depend on the number of threads.
+/// its angle at the vertex. Coincident vertices share a normal if they have the same
+/// [`VertexNormalSharing::group`] and their normals differ by at most 45 degrees. If the face normals cancel
+/// out, the normal of one face is used. The result does not depend on the number of threads.
 ///
 /// # Errors
 /// [`Cancelled`].
@@ -71,7 +71,7 @@ pub fn vertex_normals(mesh: &TriangleMesh, token: &CancelToken) -> Result<Vec<Ve
     Ok(normals)
 }
 
-/// Maps each vertex to the first vertex with the same normal. Empty if there are no groups.
+/// Maps each vertex to the first vertex with the same normal. Returns an empty list if there are no groups.
 fn map_to_first_with_same_normal(groups: &[VertexNormalSharing]) -> Vec<usize> {
     let numbers = groups.iter().map(|group| group.normal as usize + 1).max().unwrap_or(0);
     let mut firsts = vec![usize::MAX; numbers];
@@ -195,8 +195,8 @@ fn merge_seam_normals(group: &[u32], sums: &[DVec3], joined: &mut [DVec3]) {
     }
 }
 
-/// Assigns normals to vertices whose face normals cancel out. Uses the normal of one of the faces, or +y if
-/// the vertex has no faces.
+/// Assigns normals to vertices whose face normals cancel out: the normal of one of the faces, or +y if the
+/// vertex has no faces.
 fn replace_canceled_normals(
     mesh: &TriangleMesh,
     normals: &mut [Vec3],

@@ -1,5 +1,5 @@
 //! OFF: a header keyword and counts, followed by one vertex per line, then one polygon per line (Geomview
-//! manual, section *OFF*). Many files deviate from this. The counts may follow the keyword directly, the edge
+//! manual, section *OFF*). Many files deviate from this: the counts may follow the keyword directly, the edge
 //! count may be missing, coordinates and faces may be followed by undeclared columns, and comments and blank
 //! lines may be anywhere.
 
@@ -138,7 +138,8 @@ impl ParsedOffColors {
         }
     }
 
-    /// Colors as bytes. Missing colors are white. Empty if there are no colors at all.
+    /// Returns the colors as bytes, with white for missing colors, or an empty list if all are missing. Adds
+    /// warnings about alpha and out-of-range colors.
     fn finish(self, source: &MeshFileBytes<'_>, warnings: &mut Vec<String>) -> Vec<[u8; 3]> {
         if self.all.iter().all(Option::is_none) {
             return Vec::new();

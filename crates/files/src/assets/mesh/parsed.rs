@@ -91,7 +91,7 @@ pub(crate) struct ParsedMesh {
     pub(crate) normal_groups: Vec<VertexNormalSharing>,
     pub(crate) uvs: Vec<Vec2>,
     pub(crate) second_uvs: Vec<Vec2>,
-    /// sRGB.
+    /// Colors in sRGB.
     pub(crate) colors: Vec<[u8; 3]>,
     pub(crate) faces: Faces,
     /// Texture coordinates of each face corner, or empty. For NaN, the vertex's coordinates are used.
@@ -135,7 +135,7 @@ impl ColorComponentExtremes {
         }
     }
 
-    /// Largest value. 0 if all are negative.
+    /// Largest value, or 0 if all values are negative.
     pub(super) fn max(&self) -> f64 {
         self.greatest.map_or(0.0, |(greatest, _)| greatest.max(0.0))
     }

@@ -1,9 +1,9 @@
 //! STL: facets defined by their corners, as text or binary (3D Systems, *StereoLithography Interface
 //! Specification*, 1989). Many files deviate from the specification: binary headers may begin with "solid",
 //! counts may be too small, facets may be polygons, there may be several solids, normals may be zero or
-//! wrong, and keywords may be in any case. Normals in the file are ignored. They are computed from the order
-//! of the corners instead. Coincident corners are merged into one vertex. The format has no units and no
-//! standard colors.
+//! wrong, and keywords may be in any case. Normals in the file are ignored and computed from the order of the
+//! corners instead. Coincident corners are merged into one vertex. The format has no units and no standard
+//! colors.
 
 use super::assemble::{assemble, assemble_text_mesh};
 use super::parsed::{Faces, ParsedMesh};
@@ -62,7 +62,7 @@ fn has_binary_size(bytes: &[u8]) -> bool {
     declared_facet_count(bytes).is_some_and(|count| bytes.len() as u64 == START as u64 + FACET as u64 * count)
 }
 
-/// Number of facets according to a binary header. `None` if the file is too short.
+/// Number of facets according to a binary header, or `None` if the file is too short.
 fn declared_facet_count(bytes: &[u8]) -> Option<u64> {
     let count = bytes.get(HEADER..START)?.first_chunk()?;
     Some(u64::from(u32::from_le_bytes(*count)))
@@ -84,7 +84,7 @@ fn read_binary(source: &MeshFileBytes<'_>) -> Result<ParsedMesh, AssetError> {
             "the header claims 0 facets, and the {excess} bytes that follow are too few for a facet ({FACET} bytes)"
         )));
     }
-    // Accept a count of 0. Some programs write the header before they know the number of facets.
+    // Accept a count of 0, because some programs write the header before they know the number of facets.
     let (count, mut warnings) = (if claimed == 0 { found } else { claimed }, Vec::new());
     if claimed != 0 && (found > claimed || excess > 0) {
         let bytes = (found - claimed) * FACET as u64 + excess as u64;
@@ -148,7 +148,7 @@ struct TextReader<'a> {
 }
 
 impl TextReader<'_> {
-    /// Returns the byte offset of a face's loop. `None` for faces with 3 corners.
+    /// Returns the byte offset of a face's loop, or `None` for faces with 3 corners.
     fn polygon_offset(&self, face: usize) -> Option<usize> {
         self.polygons.iter().find(|(polygon, _)| *polygon == face).map(|(_, start)| *start)
     }

@@ -1,5 +1,5 @@
-//! Tokenizer for text files that consist mostly of numbers. Works on bytes: it does not require UTF-8 or copy
-//! the text.
+//! Tokenizer for text files that consist mostly of numbers. Works on bytes, so it neither requires UTF-8 nor
+//! copies the text.
 
 use std::borrow::Cow;
 use std::fs::File;
@@ -76,7 +76,7 @@ impl Lines {
         self.reader.consume(skipped);
     }
 
-    /// Appends the next line as long as the current one ends with a backslash. Returns the joined lines.
+    /// Appends further lines for as long as the last one ends with a backslash. Returns the joined lines.
     pub(super) fn append_continuation_lines(&mut self, token: &CancelToken) -> Result<&[u8], Cancelled> {
         let is_continued = |line: &[u8]| line.trim_ascii_end().ends_with(b"\\");
         while is_continued(&self.line)

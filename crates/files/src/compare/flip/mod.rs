@@ -13,8 +13,8 @@ use super::{Pair, tiles};
 use crate::film::Rect;
 use crate::math::Vec3;
 
-/// Pixels per degree of the visual field. The display is 0.7 m wide, has 3840 columns, and is viewed from 0.7
-/// m.
+/// Pixels per degree of the visual field, for a display that is 0.7 m wide, has 3840 columns, and is viewed
+/// from 0.7 m.
 pub const PIXELS_PER_DEGREE: f64 = 67.0;
 
 /// Exponent applied to color differences.

@@ -14,7 +14,7 @@ const MIXED: usize = SIDE * SIDE;
 /// Thresholds of the pattern (B. Bayer, 1973).
 const RANKS: [usize; MIXED] = [0, 8, 2, 10, 12, 4, 14, 6, 3, 11, 1, 9, 15, 7, 13, 5];
 
-/// Dithers to a palette.
+/// Ordered ditherer for a palette.
 pub(super) struct Dither {
     palette: Vec<[i32; 3]>,
 }
@@ -43,7 +43,7 @@ impl Dither {
         Ok(indices)
     }
 
-    /// Palette colors whose mean approximates a color, in order of brightness.
+    /// Returns the palette indices of colors whose mean approximates a color, sorted by brightness.
     fn mixed_colors(&self, color: [u8; 3]) -> [u8; MIXED] {
         let color = color.map(i32::from);
         let (mut mixed, mut error) = ([0; MIXED], [0; 3]);

@@ -22,8 +22,7 @@ pub struct PartHeader {
     pub share: PartShare,
     /// Properties of the image.
     pub picture: ImageHeader,
-    /// Scene path, relative to the part. It may differ between parts of the same image. Empty if
-    /// unknown.
+    /// Scene path relative to the part, which may differ between parts of the same image. Empty if unknown.
     #[serde(default)]
     pub scene: String,
     /// Files that the scene references, including unused ones. Paths are relative to the scene's folder.
@@ -79,7 +78,7 @@ impl PartHeader {
             && picture.tone.exposure.is_finite()
     }
 
-    /// Returns the name of the input file with this hexadecimal hash. `None` if no input file has this hash.
+    /// Returns the name of the input file with this hexadecimal hash, or `None` if there is no such file.
     pub(super) fn input_name_by_hash(&self, hash: &str) -> Option<&str> {
         let matches = |input: &&RenderInput| input.name.starts_with(FILE) && input.value == hash;
         self.identity.iter().find(matches).map(|input| strip_file_dependency_prefix(&input.name))
@@ -202,7 +201,7 @@ impl ImageHeader {
         }
     }
 
-    /// Returns the settings for encoding the image file. `None` if a name is unknown.
+    /// Returns the settings for encoding the image file, or `None` if a name is unknown.
     pub fn develop_settings(&self) -> Option<FilmEncodingSettings> {
         let range_map = match self.tone.stretch.as_deref() {
             None => RangeMap::None,
@@ -238,7 +237,7 @@ impl ImageHeader {
     }
 }
 
-/// Describes the differences between two lists of inputs. `here` and `there` are the names of the lists.
+/// Describes the differences between two lists of inputs, which the messages call `here` and `there`.
 pub fn render_input_differences(
     a: &[RenderInput],
     b: &[RenderInput],

@@ -73,11 +73,12 @@ fn metadata_differences(a: &[(String, String)], b: &[(String, String)]) -> Vec<S
     names.filter_map(words).collect()
 }
 
-/// Merges parts in any order. Parts may be missing only if `is_partial` is true. In this case, missing tiles
-/// are black or have fewer samples. `tell` is called with the number of finished tiles and the film.
+/// Merges parts in any order. Parts may be missing only if `is_partial` is true; their tiles are then black
+/// or have fewer samples. `tell` is called with the number of finished tiles and the film.
 ///
 /// # Errors
-/// Same as [`check_and_list_missing`]. Also fails if parts are missing, a part is inconsistent, or the work is cancelled.
+/// Same as [`check_and_list_missing`]. Also fails if parts are missing, a part is inconsistent, or the work
+/// is cancelled.
 pub fn merge_into_film(
     parts: &[PartFile],
     is_partial: bool,
@@ -114,7 +115,7 @@ pub fn merge_into_film(
     Ok(MergedParts { film, missing, count })
 }
 
-/// Returns a tile that only one part contains, and whether the tile has all of its samples.
+/// Returns a tile, which only one part may contain, and whether it has all of its samples.
 fn tile_in_single_part(
     parts: &[PartFile],
     tile: usize,

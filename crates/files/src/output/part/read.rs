@@ -39,9 +39,9 @@ pub fn is_part(path: &Path) -> bool {
     open_raising_file_limit(path).is_ok_and(|mut file| file.read_exact(&mut mark).is_ok()) && mark == MARK
 }
 
-/// Finds an input file that has the same content as the file at `path`, and returns its name. Input files
-/// must not be overwritten, even if the parts were rendered on another machine. `None` if there is no such
-/// input or the file cannot be read.
+/// Returns the name of the input file that has the same content as the file at `path`, or `None` if there is
+/// no such input or the file cannot be read. Input files must not be overwritten, even if the parts were
+/// rendered on another machine.
 pub fn input_name_by_content<'a>(parts: &'a [PartFile], path: &Path) -> Option<&'a str> {
     let mut hasher = blake3::Hasher::new();
     hasher.update_reader(open_raising_file_limit(path).ok()?).ok()?;
@@ -49,8 +49,8 @@ pub fn input_name_by_content<'a>(parts: &'a [PartFile], path: &Path) -> Option<&
     parts.iter().find_map(|part| part.head.input_name_by_hash(&hash))
 }
 
-/// Finds an input file whose name matches the end of `path`, and returns the name. Unlike a comparison of
-/// contents, this also finds files that were missing or have changed since.
+/// Returns the name of an input file that matches the end of `path`. Unlike a comparison of contents, this
+/// also finds files that were missing or have since changed.
 pub fn find_input_by_path_suffix<'a>(parts: &'a [PartFile], path: &Path) -> Option<&'a str> {
     let absolute = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
     let real = path.canonicalize().unwrap_or_else(|_| absolute.clone());

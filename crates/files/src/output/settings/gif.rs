@@ -1,4 +1,4 @@
-//! Reads a GIF's comments and counts its frames. Existing decoders skip comments.
+//! Reads a GIF's comments, which existing decoders skip, and counts its frames.
 
 use std::io::Read;
 
@@ -13,7 +13,7 @@ const COMMENT: u8 = 0xfe;
 /// Flag for a global or local palette.
 const HAS_PALETTE: u8 = 0x80;
 
-/// Reads a GIF from the start. The frame count is missing if the file is truncated. Returns `None` if the
+/// Reads a GIF from the start. The frame count is unknown if the file is truncated. Returns `None` if the
 /// file has no frames.
 pub(super) fn read_gif_info(mut file: impl Read) -> Option<ImageInfo> {
     let [_, _, _, _, _, _, a, b, c, d, flags, _, _] = read_array(&mut file)?;

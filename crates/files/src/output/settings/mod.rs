@@ -1,4 +1,4 @@
-//! Reads settings that glimt has written to an image.
+//! Reads the settings that glimt wrote to an image.
 
 mod gif;
 mod text;
@@ -141,7 +141,7 @@ fn read_start(file: &File) -> std::io::Result<Vec<u8>> {
 /// Reads the properties of an image from its first bytes.
 ///
 /// # Errors
-/// Description of the damage to the header. `None` if the file has another format.
+/// A description of the damage to the header, or `None` if the file has another format.
 fn read_info_from_start(bytes: &[u8]) -> Result<ImageInfo, Option<String>> {
     let wrong = |format: &str| Some(format!("the {format} header is damaged or truncated"));
     match bytes {

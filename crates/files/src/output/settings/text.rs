@@ -2,7 +2,7 @@
 
 use super::ImageInfo;
 
-/// Reads a Radiance HDR header. The settings end at an empty line. The next line contains the resolution.
+/// Reads a Radiance HDR header. The settings end at an empty line, which is followed by the resolution.
 pub(super) fn read_hdr(bytes: &[u8]) -> Option<ImageInfo> {
     let mut info = ImageInfo { format: "HDR".to_owned(), ..ImageInfo::default() };
     let mut lines = bytes.split(|byte| *byte == b'\n').map(String::from_utf8_lossy);

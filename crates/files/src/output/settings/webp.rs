@@ -36,7 +36,7 @@ pub(super) fn read_webp_info(mut file: impl Read + Seek) -> Option<ImageInfo> {
     info.size.map(|_| info)
 }
 
-/// Reads the canvas width or height in an extended file, stored as 24 bits, minus one.
+/// Reads the canvas width or height of an extended file, which is stored in 24 bits, minus one.
 fn read_canvas_dimension(content: &[u8], at: usize) -> Option<u32> {
     let [a, b, c] = *content.get(at..)?.first_chunk()?;
     Some(u32::from_le_bytes([a, b, c, 0]) + 1)

@@ -226,7 +226,7 @@ fn bin_index(centroid: f32, start: f32, bins_per_length: f32) -> usize {
     (((centroid - start) * bins_per_length) as usize).min(BINS - 1)
 }
 
-/// Finds the cheapest plane between bins. `None` if all centroids coincide.
+/// Finds the cheapest plane between bins, or returns `None` if all centroids coincide.
 fn best_split(references: &[PrimitiveReference], centroids: Aabb) -> Option<Split> {
     let extent = centroids.extent();
     let bins_per_length = extent.map(|length| BINS as f32 / length);

@@ -23,7 +23,7 @@ const SURFACE_AREA_LEVELS: usize = 56;
 /// primitives.
 const DEEP_STACK: usize = SURFACE_AREA_LEVELS + 34;
 
-/// Stack size for small trees. For these, initializing a deep stack would take longer than the traversal
+/// Stack size for small trees, for which initializing a deep stack would take longer than the traversal
 /// itself.
 const SHALLOW_STACK: usize = 12;
 

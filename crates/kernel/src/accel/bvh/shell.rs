@@ -1,6 +1,6 @@
-//! Spherical shells around nested surfaces. The boxes of concentric spheres are nested, so they do not narrow
-//! down which spheres a ray hits if it starts among them. The shell between a subtree's smallest and largest
-//! spheres does.
+//! Spherical shells around nested surfaces. The boxes of concentric spheres are nested, so for a ray that
+//! starts among the spheres, they do not narrow down which ones it hits. The shell between the smallest and
+//! largest sphere in a subtree does.
 
 use arrayvec::ArrayVec;
 
@@ -65,8 +65,8 @@ impl SphericalShell {
         Self { inner: self.inner - room, outer: self.outer + room, ..self }
     }
 
-    /// Lower bound on the distance at which a ray hits a surface in the shell. `None` if the ray misses the
-    /// shell.
+    /// Returns a lower bound on the distance at which a ray hits a surface in the shell, or `None` if the ray
+    /// misses the shell.
     fn entry_distance(&self, ray: &RayF64) -> Option<f32> {
         let to_origin = ray.origin - self.center;
         let distance = to_origin.length_squared();
@@ -113,8 +113,8 @@ pub enum PrimitiveOrEnclosingSubtree {
 }
 
 impl Bvh {
-    /// Whether the tree has shells. If it does, single rays use them. Packets use only the boxes and are slow
-    /// in such trees.
+    /// Whether the tree has shells. Single rays use them, but packets use only the boxes and are slow in such
+    /// trees.
     #[inline(always)]
     pub fn has_shells(&self) -> bool {
         self.shells.is_some()
@@ -130,8 +130,8 @@ impl Bvh {
         Self { shells: Some(shells), ..self }
     }
 
-    /// For each subtree, the `N` highest primitive ids that satisfy `counts`, in descending order. Empty
-    /// without shells.
+    /// Returns, for each subtree, the `N` highest primitive ids that satisfy `counts`, in descending order.
+    /// Empty if the tree has no shells.
     pub fn highest_ids_by_subtree<const N: usize>(
         &self,
         counts: impl Fn(u32) -> bool,
@@ -282,7 +282,8 @@ impl ShellRay {
         Self { slabs: SlabRay::new(ray.origin, ray.direction), line: ray.to_f64() }
     }
 
-    /// Lower bound on the distance at which the ray hits a surface. `None` if it misses the box or the shell.
+    /// Returns a lower bound on the distance at which the ray hits a surface, or `None` if it misses the box
+    /// or the shell.
     fn entry_distance(&self, bounds: &Aabb, shell: &SphericalShell, t_max: f32) -> Option<f32> {
         let of_box = self.slabs.entry_distance(bounds.min, bounds.max, t_max)?;
         let of_shell = shell.entry_distance(&self.line)?;

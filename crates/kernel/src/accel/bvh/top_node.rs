@@ -1,7 +1,7 @@
 //! The upper levels of a tree, flattened into one packet of boxes. Intervals that bound the coordinates of
-//! all rays in a packet are tested against all boxes in one step. This skips the boxes that all rays miss.
-//! Rounding is monotonic, so bounds on the inputs of [`SlabRay::entry_distance`] also bound its results: a box that
-//! any single ray would hit is never skipped.
+//! all rays in a packet are tested against all boxes in one step, which skips the boxes that all rays miss.
+//! Rounding is monotonic, so bounds on the inputs of [`SlabRay::entry_distance`] also bound its results: a
+//! box that any single ray would hit is never skipped.
 //!
 //! [`SlabRay::entry_distance`]: crate::geometry::aabb::SlabRay::entry_distance
 

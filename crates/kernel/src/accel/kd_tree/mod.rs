@@ -1,5 +1,5 @@
 //! A kd-tree over triangles (J. L. Bentley, *Multidimensional binary search trees used for associative
-//! searching*, 1975). Unlike a BVH, it partitions space. Both trees return bit-identical hits.
+//! searching*, 1975). Unlike a BVH, it partitions space, but it returns bit-identical hits.
 //!
 //! Planes are chosen with the surface area heuristic. A triangle that straddles a plane is in both children,
 //! each time with the bounding box of its clipped part. Traversal never misses a leaf due to rounding. Among

@@ -33,7 +33,7 @@ pub struct WideNode {
     /// Minimum x, maximum x, minimum y, maximum y, minimum z, and maximum z of each box. Empty boxes range
     /// from ∞ to −∞, and are never hit unless the arithmetic overflows.
     pub rows: [[f32; WIDTH]; 6],
-    /// Encoded children, see [`Child`].
+    /// Encoded children; see [`Child`].
     pub children: [u32; WIDTH],
 }
 
@@ -74,8 +74,8 @@ impl Child {
 }
 
 impl WideNode {
-    /// A node with eight empty boxes. If the arithmetic overflows, a ray hits all boxes. Empty boxes refer to
-    /// the first pack, so traversal still terminates.
+    /// A node with eight empty boxes. They refer to the first pack, so that traversal terminates even if the
+    /// arithmetic overflows and a ray hits all boxes.
     pub const EMPTY: Self = {
         let (least, greatest) = ([f32::INFINITY; WIDTH], [f32::NEG_INFINITY; WIDTH]);
         Self { rows: [least, greatest, least, greatest, least, greatest], children: [LEAF; WIDTH] }
@@ -126,7 +126,7 @@ impl WideNode {
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(16))]
 pub struct TrianglePack {
-    /// x, y, and z of the first corners, then of the second, then of the third.
+    /// x, y, and z of the first corners, followed by those of the second and third corners.
     pub rows: [[f32; PACK]; 9],
     /// Triangle indices, or `u32::MAX` in unused lanes.
     pub ids: [u32; PACK],

@@ -8,7 +8,7 @@
 //! g(s) = (q − 1)² + z² − tube² = |p|² + 1 − tube² − 2q
 //! ```
 //!
-//! has the same sign as the signed distance from the surface, from which it is computed. Its second
+//! is computed from the signed distance to the surface and has the same sign. Its second
 //! derivative is 2(1 − w/q³), where w is constant along the line. Therefore, g has at most two inflection
 //! points, which have a closed form, and is convex or concave between them. On each of these intervals,
 //! Newton's method from the correct end converges to the nearest root without overshooting, or shows that
@@ -16,8 +16,8 @@
 
 use crate::math::DVec3;
 
-/// Maximum number of Newton and bisection steps. Bisecting the entire line down to the last digit takes
-/// fewer.
+/// Maximum number of Newton and bisection steps. Even bisecting the entire line down to the last digit takes
+/// fewer steps.
 const MOST_STEPS: u32 = 200;
 
 /// Half-width of the neighborhood around the axis in which the slope of g changes sign.
@@ -46,8 +46,8 @@ struct LineSample {
 }
 
 impl UnitTorusLine {
-    /// Interval of the line inside the torus's bounding ball and bounding planes. Both are expanded by `room`
-    /// times the tube radius.
+    /// Interval of the line inside the torus's bounding ball and between its bounding planes, all of which
+    /// are moved outward by `room` times the tube radius.
     pub(super) fn nearby_interval(&self, room: f64) -> Option<(f64, f64)> {
         let height = self.tube * (1.0 + room);
         let ball = 1.0 + height;
@@ -104,8 +104,8 @@ impl UnitTorusLine {
     /// Points between `from` and `to` where the line enters the torus. `from` must be outside. There are at
     /// most two such points.
     pub(super) fn surface_entry_parameters(&self, from: f64, to: f64) -> [Option<f64>; 2] {
-        /// Step past a crossing. Long enough to reach the other side despite rounding, unless the line grazes
-        /// the surface.
+        /// Step past a crossing, long enough to reach the other side of the surface despite rounding unless
+        /// the line grazes the surface.
         const BEYOND: f64 = 1e-10;
         let mut found = [None; 2];
         let mut start = from;
@@ -222,7 +222,7 @@ mod tests {
         ((*state >> 11) as f64) / (1_u64 << 53) as f64 * 2.0 - 1.0
     }
 
-    /// Lines close to the circle. Some run along the axis or through it.
+    /// Lines close to the circle. Some are parallel to the axis, and some pass through it.
     fn lines(tube: f64) -> impl Iterator<Item = UnitTorusLine> {
         let mut state = 3;
         (0..30_000).map(move |i| {

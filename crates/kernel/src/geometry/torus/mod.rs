@@ -174,7 +174,7 @@ impl Torus {
         SurfaceSample { point, normal }
     }
 
-    /// Signed distance to the surface. Negative inside.
+    /// Signed distance to the surface, negative inside.
     pub fn signed_distance(&self, point: DVec3) -> f64 {
         let p = self.frame.point_to_local(point);
         DVec2::new(p.truncate().length() - self.radius, p.z).length() - self.tube
@@ -293,7 +293,7 @@ mod tests {
     #[test]
     fn v_is_one_half_on_the_outermost_circle() {
         let ray = Ray::new(Vec3::new(9.0, 0.0, 0.0), Vec3::NEG_X).to_f64();
-        let hit = ring().intersect(&ray).expect("aimed at it");
+        let hit = ring().intersect(&ray).expect("the ray should hit the torus");
         let surface = ring().surface_point_at_hit(&ray, &hit);
         let pi = std::f32::consts::PI;
         assert_eq!(surface.uv.as_vec2(), Vec2::splat(0.5));

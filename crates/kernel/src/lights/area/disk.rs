@@ -66,8 +66,8 @@ impl DiskEmitter {
     /// The disk seen from a point in front of it. If the point is behind the disk, the height is not positive
     /// and the other fields are meaningless.
     ///
-    /// In the plane through the disk's normal, its center, and the point, the rays to the nearest and the
-    /// farthest point of the disk enclose an angle of 2α. The cone's half angles are α in this plane and β
+    /// In the plane through the disk's normal, its center, and the point, the rays to the nearest and
+    /// farthest points of the disk enclose an angle of 2α. The cone's half angles are α in this plane and β
     /// perpendicular to it (Guillén et al., *Area-Preserving Parameterizations for Spherical Ellipses*,
     /// 2017).
     #[inline(always)]

@@ -39,7 +39,7 @@ pub struct TriangleWithUvs {
     pub corners: [DVec3; 3],
     /// UVs of the corners.
     pub uvs: [Vec2; 3],
-    /// UVs of the corners in the second set. `None` if there is no second set.
+    /// The corners' UVs in the second set, or `None` if there is no second set.
     pub second_uvs: Option<[Vec2; 3]>,
 }
 
@@ -120,8 +120,8 @@ impl EmissionModulation {
 const PROBE: f64 = 1e-3;
 
 impl UvMapping {
-    /// The unit normal at a point that is viewed from either side. `None` if the probe ray misses the
-    /// surface.
+    /// The unit normal on the front side at a point, which may be viewed from either side. Returns `None` if
+    /// the probe ray misses the surface.
     fn normal_at_point(&self, point: DVec3, primitive: u32, direction: DVec3) -> Option<DVec3> {
         match self {
             Self::Shape(shape) => {

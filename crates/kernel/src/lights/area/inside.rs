@@ -9,8 +9,8 @@ use crate::math::elementary::sin_cos;
 use crate::math::{DVec3, Vec2, Vec3};
 use crate::sampling::distribution::DiscreteDistribution;
 
-/// The inside of a shape. If the shape is closed, its inside is sampled uniformly over all directions from
-/// points inside, and is invisible from outside. If it is open, its inside is sampled by area.
+/// The inside of a shape. The inside of a closed shape is only visible from points inside, where directions
+/// are sampled uniformly over the sphere. The inside of an open shape is sampled by area.
 #[derive(Clone, Debug, PartialEq)]
 pub struct InwardEmitter {
     shape: Shape,
@@ -46,7 +46,7 @@ impl ShapeEmitter for InwardEmitter {
 const ALL_AROUND: f32 = 4.0 * PI;
 
 impl InwardEmitter {
-    /// Creates an emitter for a shape's inside. `None` if the shape has no area.
+    /// Creates an emitter for a shape's inside, or returns `None` if the shape has no area.
     pub fn new(shape: &Shape) -> Option<Self> {
         Some(Self { shape: shape.clone(), by_area: DiscreteDistribution::new(shape.part_areas())? })
     }

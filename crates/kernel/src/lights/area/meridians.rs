@@ -86,7 +86,7 @@ pub struct PolarFrame {
     pub pole: DVec3,
     /// Direction perpendicular to the pole, at angle 0.
     pub front: DVec3,
-    /// Direction perpendicular to the other two, at angle 90°.
+    /// Direction perpendicular to `pole` and `front`, at angle 90°.
     pub side: DVec3,
 }
 

@@ -173,7 +173,7 @@ impl MeshEmitter {
         })
     }
 
-    /// [`Light::pdf`](crate::lights::Light::pdf).
+    /// Implements [`Light::pdf`](crate::lights::Light::pdf).
     pub fn pdf(&self, from: Vec3, normal: Vec3, met: &LightHit) -> f32 {
         let tree = match &self.sampling {
             MeshSampling::Quad(quad) => return quad.quad.pdf(from, met),

@@ -53,7 +53,7 @@ pub trait ShapeEmitter {
     /// Samples a point on the front that is visible from `point`. `u` is in [0, 1)².
     fn sample(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint;
 
-    /// Pdf of [`ShapeEmitter::sample`] in sr⁻¹. `met` is a point on the front that a ray hits from `from`.
+    /// Pdf of [`ShapeEmitter::sample`] in sr⁻¹. `met` is the point on the front that a ray from `from` hits.
     fn pdf(&self, from: Vec3, met: &LightHit) -> f32;
 
     /// Centroid of the area.
@@ -178,8 +178,8 @@ impl Emitter {
         if let Self::Mesh(mesh) = self { Some(mesh) } else { None }
     }
 
-    /// The quad to sample, along with the triangle pair if the quad is made of two triangles. `None` for
-    /// other shapes.
+    /// The quad to sample, along with the triangle pair if the quad is made of two triangles. Returns `None`
+    /// for other shapes.
     #[inline(always)]
     pub fn as_quad(&self) -> Option<(&QuadEmitter, Option<&TrianglePairQuad>)> {
         if let Self::Quad(quad) = self {
@@ -228,7 +228,7 @@ pub fn see_through_shape_side_light(
     let untransformed = if let Shape::Transformed(own) = shape { &own.shape } else { shape };
     let hides_itself = match (untransformed, side) {
         (Shape::Quad(_) | Shape::Triangle(_) | Shape::Disk(_) | Shape::Plane(_), _) => false,
-        // Seen from outside, the front is hit at most once in each direction.
+        // A ray from outside hits the front of a convex shape at most once.
         (Shape::Sphere(_) | Shape::Box(_) | Shape::Cylinder(_) | Shape::Cone(_), Side::Front) => false,
         (Shape::Sphere(_) | Shape::Box(_) | Shape::Cylinder(_) | Shape::Cone(_), Side::Back) => true,
         (Shape::Torus(_) | Shape::Transformed(_), _) => true,
@@ -255,7 +255,7 @@ pub fn back_area_light(shape: &Shape, radiance: Vec3, object: u32) -> Option<Are
     Some(AreaLight { shape: emitter, side: Side::Back, ..light })
 }
 
-/// A flat shape with its front on the other side. `None` for other shapes.
+/// Turns a flat shape over so that its front faces the other way. Returns `None` for other shapes.
 fn turned_over(shape: &Shape) -> Option<Shape> {
     match shape {
         Shape::Quad(quad) => Some(Shape::Quad(Parallelogram::new(quad.corner, quad.v, quad.u))),
@@ -272,7 +272,7 @@ fn turned_over(shape: &Shape) -> Option<Shape> {
     }
 }
 
-/// Normal of a flat shape's front, of any length. `None` for other shapes.
+/// Normal of a flat shape's front, of any length, or `None` for other shapes.
 fn flat_normal(shape: &Shape) -> Option<DVec3> {
     match shape {
         Shape::Quad(quad) => Some(quad.u.cross(quad.v)),
@@ -288,7 +288,7 @@ fn flat_normal(shape: &Shape) -> Option<DVec3> {
     }
 }
 
-/// Area of a shape. Estimated on a grid of points if the shape is transformed.
+/// Area of a shape, estimated on a grid of points if the shape is transformed.
 fn area(shape: &Shape) -> f64 {
     let areas = shape.part_areas();
     let Shape::Transformed(_) = shape else { return areas.iter().sum() };
@@ -299,7 +299,7 @@ fn area(shape: &Shape) -> f64 {
     (0..).zip(areas).map(|(part, area)| if area > 0.0 { area * mean(part) } else { 0.0 }).sum()
 }
 
-/// Bounds on a shape's emission. `None` if the shape is infinite. Flat shapes emit with a cosine falloff.
+/// Bounds on a shape's emission, or `None` if the shape is infinite. Flat shapes emit with a cosine falloff.
 /// Other shapes are assumed to emit a quarter of their area times the radiance in every direction, which is
 /// the mean over all directions for convex shapes (Cauchy).
 fn emission_bounds(shape: &Shape, radiance: Vec3) -> Option<LightBounds> {
@@ -330,7 +330,7 @@ impl AreaLight {
         Self { texture: Some(Box::new(texture)), ..self }
     }
 
-    /// [`Light::sample`](super::Light::sample).
+    /// Implements [`Light::sample`](super::Light::sample).
     pub fn sample(&self, point: Vec3, normal: Vec3, u: [f32; 2]) -> Option<LightSample> {
         let sample = self.sample_without_texture_factor(point, normal, u)?;
         let (Some(texture), ShadowRayEnd::At(target)) = (&self.texture, sample.end) else {
@@ -370,7 +370,7 @@ impl AreaLight {
         if is_sheer { LightGeometry::SeeThrough(self.object) } else { LightGeometry::Object(self.object) }
     }
 
-    /// [`Light::pdf`](super::Light::pdf).
+    /// Implements [`Light::pdf`](super::Light::pdf).
     pub fn pdf(&self, from: Vec3, normal: Vec3, met: &LightHit) -> f32 {
         let met = &match self.side {
             Side::Front => *met,

@@ -123,8 +123,8 @@ impl QuadEmitter {
         height * nearness * nearness * nearness
     }
 
-    /// Pdf of solid-angle sampling in sr⁻¹, for points in front of the quad. `None` if the quad is sampled by
-    /// area.
+    /// Pdf of solid-angle sampling in sr⁻¹, for points in front of the quad. Returns `None` if the quad is
+    /// sampled by area.
     #[inline(always)]
     pub(super) fn pdf_by_solid_angle(&self, to_corner: Vec3) -> Option<f32> {
         let spherical =
@@ -149,8 +149,7 @@ pub struct SphericalRectangle {
     x: [f32; 2],
     y: [f32; 2],
     z: f32,
-    /// z components of the unit normals of two planes: through the view point and the lower side, and through
-    /// the view point and the upper side.
+    /// z components of the unit normals of the planes through the view point and the lower or upper side.
     lower: f32,
     upper: f32,
     /// Angle at which the slices start.
@@ -166,7 +165,7 @@ impl RectangleEdges {
     }
 }
 
-/// Sine of the angle at which a side appears. `side` is the side's coordinate, and `d2` is the squared
+/// Sine of the angle at which a side is seen. `side` is the side's coordinate, and `d2` is the squared
 /// distance perpendicular to the coordinate axis.
 #[inline(always)]
 fn side_plane_sine(side: f32, d2: f32) -> f32 {

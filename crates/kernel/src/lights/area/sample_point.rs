@@ -9,7 +9,7 @@ pub struct LightSamplePoint {
     pub direction: Vec3,
     /// Sampled point.
     pub target: Vec3,
-    /// Inverse pdf of the direction, in sr. 0 if the point is behind or inside the light.
+    /// Inverse pdf of the direction, in sr, or 0 if the shading point is behind or inside the light.
     pub factor: f32,
 }
 

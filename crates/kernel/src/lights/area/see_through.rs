@@ -16,7 +16,7 @@ pub struct SeeThroughShapeEmitter {
 }
 
 impl SeeThroughShapeEmitter {
-    /// Creates an emitter for one side of a shape. `None` if the shape has no area.
+    /// Creates an emitter for one side of a shape, or returns `None` if the shape has no area.
     pub fn new(shape: &Shape, side: Side) -> Option<Self> {
         let outwards = match side {
             Side::Front => 1.0,

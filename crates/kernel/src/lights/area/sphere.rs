@@ -50,8 +50,8 @@ impl ShapeEmitter for SphereEmitter {
 }
 
 impl SphereEmitter {
-    /// Unit direction to the center, distance to the center, and sin² of the cone's half angle. `None` if the
-    /// point is inside the sphere.
+    /// Unit direction to the center, distance to the center, and sin² of the cone's half angle, or `None` if
+    /// the point is inside the sphere.
     fn cone(&self, point: Vec3) -> Option<(Vec3, f32, f32)> {
         Some(self.cone_unchecked(point)).filter(|(_, _, sin2)| *sin2 < 1.0)
     }

@@ -21,7 +21,7 @@ pub trait RevolutionSide {
     /// The side seen from a point.
     type View: RevolutionSideView;
 
-    /// The side seen from a point. `None` if the point is behind the side.
+    /// The side seen from a point, or `None` if the point is behind the side.
     fn view_from(&self, point: Vec3) -> Option<Self::View>;
 }
 
@@ -36,8 +36,8 @@ pub trait RevolutionSideView {
     /// Difference between the cosines at the two ends of the visible interval, for an angle around the pole.
     fn cosine_extent_at_azimuth(&self, around: SinCos) -> f64;
 
-    /// The point at a fraction `share` of the cosine interval. Returns the point's angle from the pole and
-    /// its distance.
+    /// Angle from the pole and distance of the point at a fraction `share` of the cosine interval, in the
+    /// half plane at the angle `around` the pole.
     fn polar_angle_and_distance_at(&self, around: SinCos, share: f64) -> (SinCos, f64);
 }
 

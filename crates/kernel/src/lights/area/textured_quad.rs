@@ -8,9 +8,9 @@ use crate::lights::tree::bounds::mean_channel;
 use crate::math::{DVec3, Vec3};
 use crate::sampling::piecewise_constant::{GridSample, PiecewiseConstant2D};
 
-/// A parallelogram with an emission texture. Some samples are distributed according to the texture, the
-/// others by solid angle. The pdf is a mixture of both pdfs (one-sample balance heuristic: Veach, *Robust
-/// Monte Carlo Methods for Light Transport Simulation*, 1997, section 9.2.4).
+/// A parallelogram with an emission texture. Some samples are distributed according to the texture, the rest
+/// by solid angle. The pdf is a mixture of the two pdfs (one-sample balance heuristic: Veach, *Robust Monte
+/// Carlo Methods for Light Transport Simulation*, 1997, section 9.2.4).
 #[derive(Clone, Debug, PartialEq)]
 pub struct TexturedQuadEmitter {
     quad: QuadEmitter,

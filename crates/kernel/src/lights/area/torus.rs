@@ -197,7 +197,7 @@ impl TorusView {
         0.5 * density * self.closeness / (libm::cosh(tau) * self.reach)
     }
 
-    /// The slice at an angle φ. `None` if the slice is not visible.
+    /// The slice at an angle φ, or `None` if the slice is not visible.
     fn slice(&self, turn: SinCos) -> Option<TorusSlice> {
         let foot = self.distance * turn.cos;
         let off = self.distance * turn.sin;

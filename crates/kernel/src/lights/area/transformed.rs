@@ -55,13 +55,14 @@ impl ShapeEmitter for TransformedEmitter {
 }
 
 impl TransformedEmitter {
-    /// Transforms the emitter of the shape before the transform.
+    /// Creates an emitter for a transformed shape from an emitter for the untransformed shape.
     pub fn new(emitter: Emitter, transformed: &TransformedShape) -> Self {
         Self { emitter, transformed: transformed.clone() }
     }
 
-    /// The point in the shape's coordinates. `None` if the front is not visible from there: rounding to `f32`
-    /// could move a point behind the surface to its front.
+    /// Converts a point to the shape's coordinates, or returns `None` if the front is not visible from there.
+    /// This is tested before rounding to `f32`, which could move a point from behind the surface to its
+    /// front.
     fn point_to_local(&self, point: Vec3) -> Option<Vec3> {
         let shape = &self.transformed.shape;
         let point = self.transformed.to_world.inverse_point(point.as_dvec3());

@@ -11,8 +11,8 @@ use crate::sampling::warp;
 /// Minimum solid angle in sr for solid-angle sampling. For smaller triangles, area sampling is equally good.
 const MIN_SOLID_ANGLE: f64 = 1e-3;
 
-/// The corners are considered to be on a great circle if the solid angle differs from a hemisphere by less
-/// than this, in sr.
+/// The corners are considered to be on a great circle if the solid angle is within this many sr of a
+/// hemisphere's.
 const ALMOST_HALF: f64 = 1e-4;
 
 /// A triangle that emits toward (b − a) × (c − a).
@@ -71,7 +71,7 @@ impl ShapeEmitter for TriangleEmitter {
 }
 
 impl TriangleEmitter {
-    /// Creates an emitter for an entire triangle. `None` if the triangle has no area.
+    /// Creates an emitter for an entire triangle, or returns `None` if the triangle has no area.
     pub fn new(triangle: &Triangle) -> Option<Self> {
         let Triangle { a, b, c } = *triangle;
         let normal = (b - a).cross(c - a);
@@ -83,7 +83,8 @@ impl TriangleEmitter {
         })
     }
 
-    /// The triangle seen from a point. `None` if the point is behind the triangle.
+    /// The triangle seen from a point: the offsets to its corners and the spherical triangle, or `None` if
+    /// the point is behind the triangle.
     fn spherical_triangle(&self, point: DVec3) -> Option<([DVec3; 3], SphericalTriangle)> {
         let offsets = self.corners.map(|corner| corner - point);
         let corners = offsets.map(DVec3::normalize);

@@ -93,7 +93,7 @@ struct SpotCone {
 }
 
 /// ∫ t·sin(H − t) dt from the edge of a cone (t = 0) inward to t = δ. For small angles, uses the first terms
-/// of the sine series. Their relative error is below 1e-9.
+/// of the sine series, with a relative error below 1e-9.
 fn edge_integral(half: f64, delta: f64) -> f64 {
     if half < 0.02 {
         let (h2, d2) = (half * half, delta * delta);

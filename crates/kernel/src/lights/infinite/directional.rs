@@ -18,14 +18,15 @@ pub struct DirectionalLight {
     pub to_light: Vec3,
     /// Irradiance on a surface that directly faces the light.
     pub irradiance: Vec3,
-    /// 1 − cos of half the angular diameter. 0 for a light without extent.
+    /// 1 − cos of half the angular diameter, or 0 for a light without extent.
     one_minus_cos: f32,
-    /// Radiance of the disk. 0 for a light without extent.
+    /// Radiance of the disk, or 0 for a light without extent.
     radiance: Vec3,
 }
 
 impl DirectionalLight {
-    /// A light with an angular diameter of `angle` radians, up to π. The light has no extent if `angle` is 0.
+    /// Creates a light with an angular diameter of `angle` radians, up to π, or without extent if `angle` is
+    /// 0.
     pub fn new(to_light: Vec3, irradiance: Vec3, angle: f64) -> Self {
         let (quarter, half) = (libm::sin(angle / 4.0), libm::sin(angle / 2.0));
         let radiance = if angle > 0.0 {
@@ -64,17 +65,17 @@ impl DirectionalLight {
         (direction, self.radiance * self.inverse_pdf())
     }
 
-    /// Radiance from a direction. 0 for a light without extent.
+    /// Radiance from a direction, or 0 for a light without extent.
     pub fn radiance(&self, direction: Vec3) -> Vec3 {
         if self.contains(direction) { self.radiance } else { Vec3::ZERO }
     }
 
-    /// Pdf of [`DirectionalLight::sample`] in sr⁻¹. 0 for a light without extent.
+    /// Pdf of [`DirectionalLight::sample`] in sr⁻¹, or 0 for a light without extent.
     pub fn pdf(&self, direction: Vec3) -> f32 {
         if self.contains(direction) { 1.0 / self.inverse_pdf() } else { 0.0 }
     }
 
-    /// Inverse of [`DirectionalLight::pdf`] inside the disk. 0 for a light without extent.
+    /// Inverse of [`DirectionalLight::pdf`] inside the disk, or 0 for a light without extent.
     #[inline(always)]
     pub fn inverse_pdf(&self) -> f32 {
         2.0 * PI * self.one_minus_cos
@@ -129,9 +130,9 @@ mod tests {
             let (mut irradiance, count) = (0.0, 4096);
             for sample in 0..count {
                 let u = PixelSampler::new(1, 2, 3, sample).pair(1, Dimension::Light(0)).to_array();
-                let sample = sun.sample(u).expect("light");
+                let sample = sun.sample(u).expect("the sun should be sampled");
                 assert_eq!(sample.end, ShadowRayEnd::Beyond);
-                // At the edge, the result depends on rounding.
+                // At the edge of the disk, rounding decides whether the pdf is 0.
                 if sun.pdf(sample.direction) > 0.0 {
                     let product =
                         sun.radiance(sample.direction).x / sun.pdf(sample.direction) / sample.weight.x;

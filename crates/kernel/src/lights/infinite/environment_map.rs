@@ -109,8 +109,8 @@ impl EnvironmentMap {
         )
     }
 
-    /// Samples a unit direction. Returns the direction, and the color and pdf that [`EnvironmentMap::lookup_color_and_pdf`]
-    /// would return for it.
+    /// Samples a unit direction. Returns the direction along with the color and pdf that
+    /// [`EnvironmentMap::lookup_color_and_pdf`] would return for it.
     #[inline(always)]
     pub fn sample(&self, u: [f32; 2], turn: f32) -> (Vec3, Vec3, f32) {
         let GridSample { column, row, rest } = self.cells.sample(u);
@@ -231,7 +231,7 @@ impl EnvironmentMap {
     /// Column and row of a cell from cell coordinates.
     #[inline(always)]
     fn cell_at_coordinates(&self, x: f32, y: f32) -> (u32, u32) {
-        // Rounding may have moved a coordinate just below 0 to the full width.
+        // Rounding may have moved a coordinate from just below 0 to the full width.
         ((x as u32).min(self.texels.width - 1), (y as u32).min(self.texels.height))
     }
 

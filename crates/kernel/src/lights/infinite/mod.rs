@@ -19,14 +19,15 @@ pub trait InfiniteLight {
     /// radiance divided by the pdf, or the irradiance if the light has no extent. `u` is in [0, 1)².
     fn sample_direction_and_weight(&self, u: [f32; 2]) -> (Vec3, Vec3);
 
-    /// Power in W that passes through a disk of the given area. For each direction, the disk is perpendicular
-    /// to the direction. Equals the mean weight of [`InfiniteLight::sample_direction_and_weight`] times the area.
+    /// Power in W through a disk of the given area, summed over all directions, where the disk is always
+    /// perpendicular to the direction. Equals the mean weight of
+    /// [`InfiniteLight::sample_direction_and_weight`] times the area.
     fn power_through(&self, area: f64) -> Vec3;
 
     /// Bounds on the light's directions and irradiance.
     fn direction_and_irradiance_bounds(&self) -> LightBounds;
 
-    /// Unit direction to the light's center. `None` if the light surrounds the scene.
+    /// Unit direction to the light's center, or `None` if the light surrounds the scene.
     fn direction_to_center(&self) -> Option<Vec3>;
 
     /// Whether the light has no angular extent.

@@ -76,7 +76,7 @@ impl EmissionProfile<'_> {
 }
 
 impl PhotonTargets {
-    /// Creates targets from spheres. `None` if no sphere has a positive radius.
+    /// Creates targets from spheres, or returns `None` if no sphere has a positive radius.
     pub fn new(balls: &[BoundingSphere]) -> Option<Self> {
         let balls: Vec<BoundingSphere> = balls.iter().copied().filter(|ball| ball.radius > 0.0).collect();
         let balls = cluster_spheres(balls);
@@ -137,7 +137,7 @@ pub struct VisibleTargets<'a> {
 
 /// A single target seen from an emission point.
 struct VisibleTarget {
-    /// The cone of directions to the target. `None` if the point is inside the target.
+    /// The cone of directions to the target, or `None` if the point is inside the target.
     cone: Option<TargetCone>,
     /// Upper bound on the power that the target receives, relative to the peak intensity, in sr.
     weight: f64,
@@ -166,7 +166,7 @@ impl VisibleTargets<'_> {
         Some((Frame::from_normal(cone.axis.as_vec3()).to_world(local), target))
     }
 
-    /// Pdf of aimed directions divided by the pdf of unaimed directions. ∞ if emission never generates
+    /// Pdf of aimed directions divided by the pdf of unaimed directions, or ∞ if emission never generates
     /// `direction`. `made_for` is the target at which the direction was aimed, or `None` for an unaimed
     /// direction.
     pub fn aimed_pdf_ratio(&self, direction: Vec3, made_for: Option<usize>) -> f64 {
@@ -202,7 +202,7 @@ struct TargetCone {
 }
 
 impl TargetCone {
-    /// The cone of directions from a point to a sphere. `None` if the point is inside.
+    /// The cone of directions from a point to a sphere, or `None` if the point is inside the sphere.
     fn from_sphere(ball: &BoundingSphere, from: DVec3) -> Option<Self> {
         let to_center = ball.center - from;
         let distance = to_center.length();

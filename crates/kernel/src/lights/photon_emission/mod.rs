@@ -158,8 +158,8 @@ struct PhotonAim {
     by_light: DiscreteDistribution,
 }
 
-/// Fraction of aimed photons whose light is chosen by power, as for unaimed photons. Needed because an
-/// estimated power of 0 may be wrong.
+/// Fraction of aimed photons whose light is chosen by power, as for unaimed photons. It is not 0 because an
+/// estimated power of 0 toward the targets may be wrong.
 const BY_POWER: f64 = 0.1;
 
 impl PhotonEmitter {

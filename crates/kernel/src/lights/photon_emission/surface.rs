@@ -22,7 +22,7 @@ pub struct DividedEmissiveSurface {
 /// Geometry of the pieces.
 #[derive(Clone, Debug)]
 enum DividedSurfaceGeometry {
-    /// An analytic shape. Each part is divided into side × side pieces of equal
+    /// An analytic shape. Each part is divided into side × side pieces of equal area, measured as in
     /// [`Shape::part_areas`].
     Shape {
         shape: Shape,
@@ -49,7 +49,7 @@ pub struct EmissionPoint {
     /// Cosine-weighted integral of the radiance, divided by the pdf of the point. The mean is the light's
     /// power in W.
     pub flux: Vec3,
-    /// Primitive index. Only for meshes.
+    /// Primitive index in a mesh, or index of the part of a shape.
     pub primitive: u32,
 }
 
@@ -57,7 +57,7 @@ pub struct EmissionPoint {
 struct PiecePoint {
     point: DVec3,
     normal: DVec3,
-    /// Area of the entire piece, if the whole piece has the same area scale as this point.
+    /// Area of the entire piece, assuming that all of it has the same area scale as this point.
     area: f64,
     primitive: u32,
 }
@@ -179,8 +179,8 @@ fn radiance_without_coat(light: &AreaLight, place: &PiecePoint) -> Vec3 {
         })
 }
 
-/// Upper bound on the magnitudes of the lengths used to compute points on the shape. `None` if the shape is
-/// infinite.
+/// Upper bound on the magnitudes of the lengths used to compute points on the shape, or `None` if the shape
+/// is infinite.
 fn coordinate_bound(shape: &Shape) -> Option<f64> {
     if let Shape::Transformed(own) = shape {
         return Some(own.reach_to_world(coordinate_bound(&own.shape)?));

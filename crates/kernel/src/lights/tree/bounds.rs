@@ -3,7 +3,7 @@
 use crate::geometry::Aabb;
 use crate::math::{DVec3, Vec3};
 
-/// Bounds on one or more lights. Used to estimate the lights' contribution without examining each light
+/// Bounds on one or more lights, used to estimate the lights' contribution without examining each light
 /// (Conty Estevez and Kulla, *Importance Sampling of Many Lights with Adaptive Tree Splitting*, 2018, section
 /// 4).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -14,8 +14,8 @@ pub struct LightBounds {
     pub center: DVec3,
     /// Radius of the bounding sphere.
     pub radius: f64,
-    /// Expected emission along the axes, averaged over the color channels. Always positive. In W·sr⁻¹, or an
-    /// irradiance for lights without falloff.
+    /// Expected emission along the axes, averaged over the color channels: an intensity in W·sr⁻¹, or an
+    /// irradiance for lights without falloff. Always positive.
     pub power: f64,
     /// Directions of emission.
     pub cone: EmissionCone,
@@ -32,7 +32,7 @@ pub enum DistanceFalloff {
     Beyond,
 }
 
-/// Bounds the directions of emission.
+/// Bounds on the directions of emission.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EmissionCone {
     /// Axis of a cone that contains the lights' emission axes.
@@ -48,7 +48,7 @@ pub struct EmissionCone {
 pub enum ConeFalloff {
     /// No emission outside the cone.
     Sharp,
-    /// Cosine of the angle to the cone, or 0 from 90° on.
+    /// Cosine of the angle to the cone, or 0 for angles of at least 90°.
     Cosine,
 }
 
@@ -78,7 +78,7 @@ impl EmissionCone {
     fn cos_max_angle_to_axis(&self, axis: DVec3) -> f64 {
         let cos = self.axis.dot(axis).clamp(-1.0, 1.0);
         let (sin, own_sin) = (sine_from_cosine(cos), sine_from_cosine(self.cos));
-        // The sum of the angles exceeds 180°.
+        // If the sum of the angles is at least 180°, the largest angle is 180°.
         if cos <= -self.cos { -1.0 } else { cos * self.cos - sin * own_sin }
     }
 }
@@ -100,8 +100,8 @@ impl LightBounds {
         Self { space: DistanceFalloff::InverseSquare, center: (min + max) * 0.5, radius, power, cone }
     }
 
-    /// Bounds on the emission of a triangle that faces along (b − a) × (c − a), for a radiance of 1. `None`
-    /// if it has no area.
+    /// Bounds on the emission of a triangle that faces along (b − a) × (c − a), for a radiance of 1, or
+    /// `None` if the triangle has no area.
     pub fn from_triangle(corners: &[DVec3; 3]) -> Option<Self> {
         let [a, b, c] = *corners;
         let vector_area = (b - a).cross(c - a) * 0.5;
@@ -113,7 +113,7 @@ impl LightBounds {
         ))
     }
 
-    /// The union of all bounds in `all`, which must have the same falloff. `None` if `all` is empty.
+    /// The union of all bounds in `all`, which must have the same falloff, or `None` if `all` is empty.
     pub fn union_of_all<'a>(all: impl Iterator<Item = &'a Self> + Clone) -> Option<Self> {
         let space = all.clone().next()?.space;
         let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);

@@ -163,7 +163,7 @@ impl NodeCostSums {
         self.count += 1;
         self.power += power;
         (self.min, self.max) = (self.min.min(center - radius), self.max.max(center + radius));
-        // Weight the axis with the length of the cone's mean direction.
+        // Weight the axis by the length of the cone's mean direction.
         self.axes += axis * (power * 0.5 * (1.0 + cos));
     }
 
@@ -193,8 +193,8 @@ const MAX_SORTED: usize = 1 << 15;
 /// Number of bins along the longest axis.
 const BINS: usize = 64;
 
-/// Splits leaves into two nonempty parts along the longest axis. Returns the size of the first part. It is a
-/// multiple of `unit`, unless there are too many leaves to sort.
+/// Splits leaves into two nonempty parts along the longest axis. Returns the size of the first part, which is
+/// a multiple of `unit` unless there are too many leaves to sort.
 fn partition_leaves_along_longest_axis(leaves: &mut [LightLeaf], unit: usize) -> usize {
     let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
     for leaf in &*leaves {

@@ -1,7 +1,7 @@
-//! Cuts through a light tree. A cut is a set of nodes. A point picks lights from the children of these nodes.
-//! If there are few lights, the cut consists of all nodes whose children are lights. Otherwise, nodes too
-//! close to the point for tight bounds are replaced by their children, up to a maximum number of nodes. All
-//! picks for a point use the same cut.
+//! Cuts through a light tree. A cut is a set of nodes, and a point picks lights from the children of these
+//! nodes. If there are few lights, the cut consists of all nodes whose children are lights. Otherwise, nodes
+//! that are too close to the point for tight bounds are replaced by their children, up to a maximum number of
+//! nodes. All picks for a point use the same cut.
 
 use arrayvec::ArrayVec;
 
@@ -21,7 +21,7 @@ pub struct LightTreeCut<'a> {
     receiver: Receiver,
     /// Indices of the cut's nodes.
     nodes: ArrayVec<u32, { LightTreeCut::MOST }>,
-    /// Importance of each node's children. 0 for children that are also in the cut.
+    /// Importance of each node's children, which is 0 for children that are also in the cut.
     importance: ArrayVec<F32x16, { LightTreeCut::MOST }>,
     /// Sum of the importance up to and including each node.
     sums: ArrayVec<f64, { LightTreeCut::MOST }>,
@@ -35,7 +35,8 @@ impl<'a> LightTreeCut<'a> {
     /// Maximum number of nodes in any cut.
     pub const MOST: usize = 64;
 
-    /// Creates a cut with at most `room` nodes. [`LightTreeCut::adapt_to_receiver`] must be called before picking.
+    /// Creates a cut with at most `room` nodes. [`LightTreeCut::adapt_to_receiver`] must be called before
+    /// picking.
     #[inline(always)]
     pub fn new(tree: &'a LightTree, room: usize) -> Self {
         let receiver = Receiver::with_unknown_lobe(Vec3::ZERO, Vec3::ZERO);

@@ -1,6 +1,6 @@
-//! A tree over many lights. Each point picks lights at random, proportionally to bounds on their contributions (Conty Estevez and
-//! Kulla, *Importance Sampling of Many Lights with Adaptive Tree Splitting*, 2018). Nodes have 16 children, whose importance is
-//! computed with SIMD.
+//! A tree over many lights. Each point picks lights at random, with probabilities proportional to bounds on
+//! their contributions (Conty Estevez and Kulla, *Importance Sampling of Many Lights with Adaptive Tree
+//! Splitting*, 2018). Nodes have 16 children, whose importance is computed with SIMD.
 
 pub mod bounds;
 mod build;
@@ -48,7 +48,7 @@ pub struct LightPick {
 }
 
 impl LightTree {
-    /// Picks a light for a surface point. `u` is in [0, 1). `None` if no light reaches the point.
+    /// Picks a light for a surface point. `u` is in [0, 1). Returns `None` if no light reaches the point.
     #[inline(always)]
     pub fn pick(&self, receiver: &Receiver, u: f64) -> Option<LightPick> {
         let mut way = PreviousPickPath::NEW;

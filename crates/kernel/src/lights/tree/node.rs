@@ -32,7 +32,7 @@ struct LightBoundsPacket {
     is_place: F32x16,
     /// 1 for inverse-square falloff, otherwise 0.
     weakens: F32x16,
-    /// Power as a fraction of approximately the entire tree's power. 0 in unused lanes.
+    /// Power in a unit close to the entire tree's power, or 0 in unused lanes.
     power: F32x16,
     /// 1 / (4 · radius).
     spread: F32x16,
@@ -91,7 +91,7 @@ pub enum NodeChild {
     LightTreeNode(u32),
 }
 
-/// Tolerance for rounding errors in bounds on cosines. Also the minimum cosine used in an importance.
+/// Tolerance for rounding errors in bounds on cosines, and minimum cosine used in an importance.
 const MIN_COSINE: f32 = 1e-3;
 
 /// Minimum and maximum importance for a child that may contribute.
@@ -108,7 +108,7 @@ pub struct Receiver {
     pub point: Vec3,
     /// Unit normal of the surface.
     pub normal: Vec3,
-    /// The glossy lobe. `None` if the surface has none or if it is unknown.
+    /// The glossy lobe, or `None` if the surface has no glossy lobe or if it is unknown.
     pub lobe: Option<ReceiverLobe>,
 }
 
@@ -194,8 +194,8 @@ impl LobePacket {
         diffuse: [1.0; PACKET_SIZE],
     };
 
-    /// A lobe's response to light within an angle δ of a direction. Serves as an upper bound and as an
-    /// estimate: cosⁿ δ is at most (1 + n(1 − cos δ)/8)⁻⁸, which is never 0.
+    /// A lobe's response to light within an angle δ of a direction. The result is an upper bound that also
+    /// serves as an estimate: cosⁿ δ is at most (1 + n(1 − cos δ)/8)⁻⁸, which is never 0.
     #[inline(always)]
     fn response_bound_in_lane(&self, i: usize, cos: f32, sin: f32) -> f32 {
         let short = 1.0 - cos - sin;
@@ -210,9 +210,9 @@ impl LobePacket {
 /// Expected contributions of a node's children at a point.
 #[repr(align(64))]
 pub struct ExpectedChildContributions {
-    /// Importance in the tree's unit of power. 0 only if the child certainly contributes nothing.
+    /// Importance in the tree's unit of power. It is 0 only if the child certainly contributes nothing.
     pub importance: F32x16,
-    /// Squared sines of half the angles that the bounding spheres subtend. 1 for points inside a sphere.
+    /// Squared sines of half the angles that the bounding spheres subtend, or 1 for points inside a sphere.
     pub nearness: F32x16,
 }
 
@@ -254,7 +254,8 @@ impl LightTreeNode {
 
     /// Importance of the children for a surface point: power × distance falloff × mean cosine at the surface
     /// × cosine of the smallest angle between the emission cone and a direction from the child (section 4.2,
-    /// with bounds on cosines) × the lobe's response. Never 0 if light from the child may reach the point.
+    /// with bounds on cosines) × the lobe's response. It is never 0 if light from the child may reach the
+    /// point.
     #[inline(always)]
     pub fn child_importances(&self, receiver: &Receiver) -> ExpectedChildContributions {
         let receivers = ReceiverPacket::splat(receiver);

@@ -20,12 +20,12 @@ pub struct LightPickPacket {
     children: [u32; PACKET_SIZE],
     /// Index of the picked light for each point.
     pub lights: [u32; PACKET_SIZE],
-    /// Probabilities of the picks. 0 if no light reaches the point.
+    /// Probabilities of the picks, or 0 if no light reaches the point.
     pub probabilities: F32x16,
 }
 
 impl LightTree {
-    /// Importance of the tree's lights for a packet of points. `None` if the tree has more than one node.
+    /// Importance of the tree's lights for a packet of points, or `None` if the tree has more than one node.
     #[inline(always)]
     pub fn single_node_importance(
         &self,

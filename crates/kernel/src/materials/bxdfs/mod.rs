@@ -109,7 +109,7 @@ macro_rules! kinds {
                 textures
             }
 
-            /// [`BxdfMaterial::packet_color_parameter`].
+            /// [`BxdfMaterial::color_for_packet_lookup`].
             #[inline]
             fn packet_color_parameter(&self) -> Option<&ColorOrTexture> {
                 match self { $(Self::$kind(material) => material.color_for_packet_lookup()),+ }
@@ -419,7 +419,7 @@ impl NonSpecular {
             && self.collect_textures().scattering.len() == usize::from(color.is_some())
     }
 
-    /// The texture that packets look up. `None` if there is no such texture.
+    /// The texture that packets look up, or `None` if there is no such texture.
     #[inline]
     pub fn packet_texture(&self) -> Option<&Texture> {
         self.packet_color_parameter()?.texture().map(|texture| &**texture)
@@ -427,7 +427,7 @@ impl NonSpecular {
 }
 
 impl BxdfPoint {
-    /// The BSDF for transmitted light. It has a different kind. `None` if no light is transmitted.
+    /// The BSDF for transmitted light, which is of a different kind, or `None` if no light is transmitted.
     #[inline(always)]
     pub fn transmission_bsdf(&self) -> Option<Self> {
         match self {
@@ -451,7 +451,7 @@ impl Default for BsdfPacket {
 
 impl BsdfPacket {
     /// Samples a direction on either side of each surface, using the same random numbers as
-    /// [`BxdfPacket::sample`]. `None` for kinds that do not support this.
+    /// [`BxdfPacket::sample`]. Returns `None` for kinds that do not support this.
     #[inline(always)]
     pub fn sample_either_side(
         &self,

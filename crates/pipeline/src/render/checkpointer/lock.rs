@@ -53,12 +53,12 @@ impl CheckpointLock {
         !self.is_held_by_this_process(path) && open_if_regular(path).is_some_and(is_locked)
     }
 
-    /// Records a failure. Returns whether it is the first one in the request.
+    /// Records a failure and returns whether it is the first failure in the request.
     pub(super) fn mark_failure_reported(&mut self, request: u64) -> bool {
         self.failed.replace(request) != Some(request)
     }
 
-    /// Records a file as reported. Returns whether it had not been reported before.
+    /// Records a file as reported and returns whether it had not been reported before.
     pub(super) fn record_first_report_of_file(&mut self, path: &Path) -> bool {
         let identity = FileIdentity::from_path(path);
         let is_news = self.told != identity;

@@ -76,7 +76,7 @@ pub(crate) struct CheckpointContext<'a> {
     pub(crate) finish: &'a FilmEncodingSettings,
     pub(crate) inputs: &'a ProtectedInputs,
     pub(crate) sink: &'a EventSink,
-    /// Computes the names and values of everything that affects the image. Slow.
+    /// Computes the names and values of everything that affects the image. This is slow.
     pub(crate) name: &'a dyn Fn() -> Vec<RenderInput>,
     /// Returns why the render is interrupted.
     pub(crate) interruption: &'a dyn Fn() -> Interruption,
@@ -211,10 +211,10 @@ impl<'a> Checkpointer<'a> {
     }
 
     /// Moves another render's checkpoint aside, unless this render includes all of its samples. If another
-    /// checkpoint was moved aside earlier, keeps the one with the longer render time.
+    /// checkpoint was moved aside earlier, keeps the checkpoint with the longer render time.
     ///
     /// # Errors
-    /// Returns why it cannot be moved, for example because another process holds it.
+    /// Returns why the checkpoint cannot be moved, for example because another process has locked it.
     fn move_other_checkpoint_aside(&self, state: &FilmState, rays: RayCounters) -> Result<(), String> {
         let is_held = self.around.lock.borrow().is_held_by_this_process(&self.path);
         if is_held && self.is_own.get() {
@@ -369,8 +369,8 @@ impl<'a> Checkpointer<'a> {
     }
 
     /// Removes the checkpoint once the image has been written, or saves a final one if checkpoints are kept.
-    /// If the image was not written, saves a checkpoint if the render was long or the process is being
-    /// terminated.
+    /// If the image was not written, saves a checkpoint if checkpoints are kept, the render was long, or the
+    /// process is being terminated.
     pub(crate) fn finish(&self, state: &FilmState, rays: RayCounters, is_written: bool) {
         let was_long = state.render_seconds >= self.settings.seconds;
         let is_ended = match (self.around.interruption)() {

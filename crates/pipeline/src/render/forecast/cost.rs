@@ -21,8 +21,8 @@ pub(crate) struct MeasuredJobCost {
 }
 
 impl CellCost {
-    /// Weight of earlier jobs relative to a new one. Less than 1 because the first samples cost more than
-    /// later ones.
+    /// Weight of earlier jobs relative to a new job. It is less than 1 because the first samples cost more
+    /// than later ones.
     const KEPT: f64 = 0.25;
 
     pub(crate) fn record(&mut self, job: MeasuredJobCost, share: &mut PixelOverhead) {
@@ -86,7 +86,7 @@ mod tests {
 
     #[test]
     fn pixel_and_sample_costs_are_separated() {
-        // Cells of 100 pixels. A sample takes 1 or 3 seconds, and the pixel overhead is half a sample.
+        // Each cell has 100 pixels. A sample takes 1 or 3 seconds, and the pixel overhead is half a sample.
         let (mut share, mut cells) = (PixelOverhead::default(), [CellCost::default(); 2]);
         for samples in [1.0, 1.0, 2.0, 4.0] {
             for (cell, rate) in cells.iter_mut().zip([1.0, 3.0]) {

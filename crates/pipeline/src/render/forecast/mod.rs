@@ -37,7 +37,7 @@ const EXPECTATION_SHARE: u32 = 100;
 struct WorkEstimate {
     /// Time of the next estimate.
     due: Instant,
-    /// CPU seconds for the whole render. `None` while the end is unknown.
+    /// CPU seconds for the whole render, or `None` while the end is unknown.
     total: Option<f64>,
     /// Current and total number of photon passes.
     passes: [u32; 2],
@@ -54,7 +54,7 @@ pub(crate) struct Forecast {
     total_units: u64,
     /// Seconds spent on photons.
     photon_seconds: f64,
-    /// Start time of the current photon pass. `None` outside of passes.
+    /// Start time of the current photon pass, or `None` outside of passes.
     photons_since: Option<f64>,
 }
 

@@ -13,7 +13,7 @@ const INTERVAL: Duration = Duration::from_millis(500);
 /// Minimum ratio of the current noise to the next reported level.
 const STEP: f64 = 1.5;
 
-/// The last noise measurement and the time of the next one.
+/// The last noise measurement and the time when the next one is due.
 #[derive(Debug)]
 pub(crate) struct NoiseTracker {
     due: Instant,

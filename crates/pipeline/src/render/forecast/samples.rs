@@ -70,14 +70,15 @@ impl ExpectedSamples {
 }
 
 /// Model of how noise decreases with the number of samples. Smooth parts converge fast, so their noise soon
-/// becomes negligible. Afterwards, noise decreases as fast as at edges and in penumbras, or more slowly.
+/// becomes negligible. After that, the noise decreases at the rate typical of edges and penumbras, or more
+/// slowly.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct NoiseDecay {
     samples: u32,
-    /// Number of sample doublings that each reduce the variance by a factor of `fall`. After them, `power`
-    /// applies.
+    /// Number of sample doublings that each reduce the variance by a factor of `fall`. After these doublings,
+    /// `power` applies.
     doublings: u32,
-    /// Ratio of the variances before and after the last doubling of samples, for all tiles. `None` below
+    /// Ratio of the variances before and after the last doubling of samples, for all tiles, or `None` below
     /// [`LEAST`] samples, where each tile uses its own ratio.
     fall: Option<f64>,
     /// Exponent p. After the doublings, the variance is proportional to the number of samples to the power

@@ -17,7 +17,7 @@ pub(crate) struct WorkRate {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct WorkAmount {
     pub(crate) done: f64,
-    /// Total work. `None` if unknown.
+    /// Total work, or `None` if unknown.
     pub(crate) total: Option<f64>,
     /// Seconds spent on other activities so far, and seconds expected to be spent on them in the future.
     pub(crate) aside: [f64; 2],
@@ -29,7 +29,7 @@ impl WorkRate {
         Self { fraction: 0.0, rate: None, measured: (0.0, done) }
     }
 
-    /// Work per second. `None` until it has been measured.
+    /// Work per second, or `None` until it has been measured.
     pub(crate) fn rate(&self) -> Option<f64> {
         self.rate
     }

@@ -46,7 +46,8 @@ pub(super) fn is_shape_table_name(name: &str) -> bool {
     KINDS.iter().any(|(kind, _)| *kind == name)
 }
 
-/// Reads all shapes and the mesh files they reference. Returns no shapes if any is invalid.
+/// Reads all shapes and collects the mesh files they reference. The list of shapes is `None` if any shape is
+/// invalid.
 pub(super) fn read_objects(
     root: &TableReader<'_>,
     materials: &MaterialList,
@@ -75,7 +76,7 @@ fn read_object(
 ) -> Option<Object> {
     let shape = reader(table, files);
     let matrix = table.optional_key("matrix");
-    // A mesh's reader reads the matrix.
+    // The reader for meshes has already read the matrix.
     let matrix =
         if kind == "mesh" || !matrix.is_present() { None } else { Some(read_affine_matrix(&matrix)) };
     let key = match kind {
@@ -145,7 +146,7 @@ fn read_axis_ends(table: &TableReader<'_>, names: [&'static str; 2], what: &str)
     Some([first, second])
 }
 
-/// Reads a length, or returns the default.
+/// Reads a length, or returns the default if the key is absent.
 fn read_length(table: &TableReader<'_>, name: &'static str, default: f64) -> Option<f64> {
     let key = table.optional_key(name);
     if key.is_present() { key.number(table.key_limits(name)) } else { Some(default) }

@@ -27,7 +27,7 @@ pub struct SampleAllLights<'a, const MIS: bool> {
     pub aov: LightAov,
     /// Technique that competes with light samples. Unused if `MIS` is false.
     pub competing: CompetingTechnique,
-    /// Media at the vertices. `None` if all vertices are in air.
+    /// Media at the vertices, or `None` if all vertices are in air.
     pub interior_lists: Option<&'a InteriorLists>,
     /// Whether to sample only infinite lights.
     pub only_infinite: bool,
@@ -354,8 +354,8 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         }
     }
 
-    /// Like [`SampleAllLights::add_light_along_shadow_rays`], for scenes with null interactions, where shadow rays have a
-    /// transmittance.
+    /// Like [`SampleAllLights::add_light_along_shadow_rays`], for scenes with null interactions, where shadow
+    /// rays have a transmittance.
     #[cold]
     #[inline(never)]
     fn add_attenuated_light(
@@ -461,7 +461,7 @@ pub fn add_masked_lanes(bits: u32, values: &Vec3x16, sums: &mut Vec3x16) {
     }
 }
 
-/// Adds these fractions of the values in the lanes set in `bits`.
+/// Adds the products of `values` and `fraction` in the lanes set in `bits`.
 #[inline(never)]
 pub fn add_fraction(bits: u32, values: &Vec3x16, fraction: &Vec3x16, sums: &mut Vec3x16) {
     let of = mask_from_bits(bits);
@@ -473,7 +473,7 @@ pub fn add_fraction(bits: u32, values: &Vec3x16, fraction: &Vec3x16, sums: &mut 
     }
 }
 
-/// Transmittance of null interactions for a light AOV.
+/// Converts the transmittance of null interactions to its luminance if the light AOV needs only luminance.
 pub fn convert_transmittance_for_aov(left: Vec3, aov: LightAov) -> Vec3 {
     match aov {
         LightAov::Radiance(_) | LightAov::TraversalCost => left,

@@ -78,7 +78,7 @@ impl<const MIS: bool> SimdKernel for SampleLightTree<'_, MIS> {
 struct SampledLightSink<'a> {
     tree: &'a LightTree,
     row: u32,
-    /// Pool for the shadow rays. `None` to trace them immediately.
+    /// Pool for the shadow rays, or `None` to trace them immediately.
     pool: Option<&'a mut ShadowRayQueue>,
     sums: &'a mut LightSums,
 }
@@ -115,8 +115,7 @@ impl LightPicks {
     }
 }
 
-/// Scale factor for the second random number in a pair. With this factor, the second number's digits are
-/// appended to the first number's digits.
+/// Scale factor that appends the digits of a pair's second random number to the digits of the first.
 const LOW_DIGITS: f64 = 1.0 / (1 << 24) as f64;
 
 impl<const MIS: bool> SampleAllLights<'_, MIS> {

@@ -14,14 +14,14 @@ use crate::sampling::Dimension;
 use crate::scene::description::ShadowMode;
 use crate::world::{Hit, SimdKernel};
 
-/// Traces rays in the glossy lobes of the vertices in `sharp`, one per light sample. Light samples on a large
+/// Traces rays in the glossy lobes of the vertices in `sharp`, one per light sample, because samples on a large
 /// light rarely fall into a narrow lobe.
 pub struct LobeRayTracingKernel<'a> {
     pub tile: &'a TileContext<'a>,
     pub row: &'a VertexBatch,
     pub sharp: u32,
     pub aov: LightAov,
-    /// Media at the vertices. `None` if all vertices are in air.
+    /// Media at the vertices, or `None` if all vertices are in air.
     pub interior_lists: Option<&'a InteriorLists>,
     /// The reflected light to which the results are added.
     pub arrived: ReflectedDirectLightPacket,

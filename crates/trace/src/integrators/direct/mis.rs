@@ -26,7 +26,7 @@ pub enum CompetingTechnique {
 }
 
 impl CompetingTechnique {
-    /// Lobe rays at the vertices in `sharp`. No technique if the mask is 0.
+    /// Returns lobe rays at the vertices in `sharp`, or no technique if the mask is 0.
     pub fn from_sharp_vertex_mask(sharp: u32) -> Self {
         if sharp == 0 { Self::Nothing } else { Self::Lobes(sharp) }
     }
@@ -96,8 +96,8 @@ impl CompetingTechnique {
 }
 
 impl CompetingTechnique {
-    /// Adjusts the fractions of values that wide lobes reflect, after the MIS weights have changed
-    /// `unweighted` to `weighted`. Weights of narrow lobes leave the light from wide lobes unchanged.
+    /// Adjusts the fractions of reflected light that are from wide lobes, after MIS weights have changed the
+    /// light from `unweighted` to `weighted`. Weights of narrow lobes leave the light from wide lobes unchanged.
     #[inline(never)]
     pub fn adjust_wide_fraction(self, fraction: &mut Vec3x16, unweighted: &Vec3x16, weighted: &Vec3x16) {
         match self {
@@ -154,8 +154,8 @@ impl TileContext<'_> {
         )
     }
 
-    /// Like [`TileContext::mis_weighted_infinite_light`], with the environment's radiance and light-sampling pdf already
-    /// evaluated.
+    /// Like [`TileContext::mis_weighted_infinite_light`], with the environment's radiance and light-sampling
+    /// pdf already evaluated.
     pub fn infinite_light_with_precomputed_sky(&self, sky: Option<(Vec3, f32)>, path: &PathRay) -> Vec3 {
         let (lights, pdf) = (&self.world.lights, path.state.pdf);
         let samples = self.settings.render.shadow_samples as f32;
@@ -173,7 +173,8 @@ impl TileContext<'_> {
         self.lobe_ray_radiance_from_infinite_light(None, ray, normal, pdf)
     }
 
-    /// Like [`TileContext::lobe_ray_radiance_from_infinity`], but restricted to light `number`, unless it is `None`.
+    /// Like [`TileContext::lobe_ray_radiance_from_infinity`], but restricted to light `number`, unless it is
+    /// `None`.
     pub fn lobe_ray_radiance_from_infinite_light(
         &self,
         number: Option<u32>,
@@ -190,8 +191,8 @@ impl TileContext<'_> {
         })
     }
 
-    /// Weighted radiance of infinite lights along a ray from a surface with this normal that leaves the
-    /// scene. `only` restricts the result to one light. `sky` contains the environment's radiance and
+    /// Weighted radiance of infinite lights along a ray that leaves the scene from a surface with this
+    /// normal. `only` restricts the result to one light. `sky` contains the environment's radiance and
     /// light-sampling pdf. `share` maps each light's sampling pdf to its weight.
     fn weighted_infinite_light(
         &self,

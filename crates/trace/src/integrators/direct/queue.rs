@@ -269,8 +269,8 @@ impl DirectLightVertexQueue {
         Ok(())
     }
 
-    /// Light reflected at packet `index` of the group whose lights were sampled, including the light found by
-    /// lobe rays. `number` is the index of the packet in the queue.
+    /// Light reflected at packet `index` of the group passed to [`Self::sample_lights`], including the light
+    /// found by lobe rays. `number` is the index of the packet in the queue.
     pub fn reflected_light(
         &self,
         (index, number): (usize, usize),
@@ -314,7 +314,7 @@ impl DirectLightVertexQueue {
         }
     }
 
-    /// Media at a packet's vertices. `None` if all vertices are in air.
+    /// Media at a packet's vertices, or `None` if all vertices are in air.
     fn interiors_of_batch(&self, row: &VertexBatch) -> Option<&InteriorLists> {
         (!self.interior_lists.are_all_air() && row.has_vertex_in_glass()).then_some(&self.interior_lists)
     }

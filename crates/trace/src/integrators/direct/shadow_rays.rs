@@ -121,7 +121,7 @@ impl ShadowRayQueue {
     }
 }
 
-/// Traces the queued rays and clears the bits of occluded rays.
+/// Traces the queued rays and clears the bits of occluded rays in [`QueuedShadowRays::traced`].
 struct ShadowRayKernel<'a> {
     world: &'a World,
     aov: LightAov,

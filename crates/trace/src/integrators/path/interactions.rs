@@ -1,5 +1,5 @@
 //! Interactions of camera paths with surfaces that are shaded one by one. At specular surfaces (mirrors,
-//! smooth glass, panes and coats) paths split, or one branch is chosen at random.
+//! smooth glass, panes and coats), paths either split or continue in a randomly chosen branch.
 
 use super::CameraWavefront;
 use crate::geometry::Ray;
@@ -139,8 +139,7 @@ impl CameraWavefront<'_, '_> {
         }
     }
 
-    /// Records the layers that show the first hits of camera rays, except for the hits that [`Self::interact`]
-    /// records.
+    /// Records the first-hit layers of camera rays, except for hits that [`Self::interact`] records.
     #[inline(never)]
     pub(super) fn record_first_hits(&mut self, rays: &PacketSource<'_>, packet: &PacketHits, first: u32) {
         let tile = self.tile;
@@ -156,7 +155,7 @@ impl CameraWavefront<'_, '_> {
         }
     }
 
-    /// Records the layers that show the first hit of a camera ray if its walk passed through the surface.
+    /// Records the first-hit layers of a camera ray whose walk passed through the first surface it hit.
     #[inline]
     pub(super) fn record_passed_first_hit(
         &mut self,
@@ -172,7 +171,7 @@ impl CameraWavefront<'_, '_> {
         }
     }
 
-    /// Records the layers that show first hits at the vertex where a camera ray's walk ended.
+    /// Records the first-hit layers at the vertex where a camera ray's walk ended.
     pub(super) fn record_camera_vertex(&mut self, path: &PathRay, vertex: &SurfaceVertex<'_>) {
         if self.is_first_hit_pending
             && let Some(values) = self.accumulator.first_hit_layers()
@@ -257,7 +256,7 @@ impl CameraWavefront<'_, '_> {
         }
     }
 
-    /// Queues a ray with which the current path continues without a diffuse or glossy vertex.
+    /// Queues a ray that continues the current path without a diffuse or glossy vertex.
     pub(super) fn push_specular(&mut self, ray: PathRay) {
         self.next.push(ray);
         if let Some(fractions) = self.accumulator.fractions() {

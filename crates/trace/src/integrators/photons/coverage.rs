@@ -194,8 +194,8 @@ impl KernelNeighborhood {
         is_crowded: &mut bool,
     ) -> bool {
         let mut near: ArrayVec<u32, TRIANGLES> = ArrayVec::new();
-        // Trees may visit a triangle twice, and may also visit nearby triangles outside the box. Skip both so
-        // that the result does not depend on the tree.
+        // Trees may visit a triangle twice, and may also visit nearby triangles outside the box. Skip
+        // repeated and distant triangles so that the result does not depend on the tree.
         let is_exact = mesh.visit_triangles_in_box(bounds, |triangle| {
             let is_known = near.contains(&triangle);
             is_known

@@ -108,8 +108,8 @@ impl PhotonTracer<'_> {
         Ok(wavefront.stored)
     }
 
-    /// Ray for a photon from an infinite light. Its origin is moved back past any transmissive infinite
-    /// planes. `None` if an opaque surface blocks the ray.
+    /// Moves the origin of a photon's ray from an infinite light back past any transmissive infinite planes.
+    /// Returns `None` if an opaque surface blocks the ray.
     fn move_origin_back_past_infinite_planes(&self, ray: Ray) -> Option<Ray> {
         let world = self.tile.world;
         let mut start = ray.origin;

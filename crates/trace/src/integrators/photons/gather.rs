@@ -16,8 +16,8 @@ use crate::math::lanes::{Simd, Vec3x16, set_lane};
 use crate::sampling::Dimension;
 use crate::world::SimdKernel;
 
-/// Probability of a lookup at a vertex that the camera does not see. A path has many of these vertices, and
-/// photon lookups at them contribute little noise.
+/// Probability of a lookup at a vertex that the camera does not see. A path has many such vertices, and photon
+/// lookups at them contribute little noise.
 const INDIRECT_LOOKUP_PROBABILITY: f32 = 0.25;
 
 /// Probability of looking up bounced photons at a vertex that the camera sees. Bounced light is weak and
@@ -131,8 +131,8 @@ fn coverage_factor(
     }
 }
 
-/// Light from a map's photons that a vertex reflects toward the viewer with its part from wide lobes, and one
-/// of these photons.
+/// Returns the light from a map's photons that a vertex reflects toward the viewer, the part of this light that
+/// is from wide lobes, and one of the photons.
 #[inline(always)]
 fn gather_reflected_light(
     (row, i): (&VertexBatch, usize),
@@ -174,7 +174,7 @@ fn gather_with_bsdf_per_photon(
         // Choose the same photon whichever lobes are shown, so that the AOVs sum to the beauty image.
         let weight = (all * photon.flux * scale).element_sum();
         total += weight;
-        // Choose a photon by reservoir sampling, as in `LaneReservoirs`.
+        // Choose a photon by reservoir sampling, as in `ReservoirPacket`.
         let part = if weight > 0.0 { weight / total } else { 0.0 };
         if left < part {
             left /= part;

@@ -332,7 +332,7 @@ impl PhotonMap {
     }
 
     /// Weights of a block's photons that are in a range and within the kernel, relative to the kernel's value
-    /// at the center. `None` if there are no such photons.
+    /// at the center, or `None` if there are no such photons.
     #[inline(always)]
     fn kernel_weights_in_block(
         &self,

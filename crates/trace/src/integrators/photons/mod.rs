@@ -82,7 +82,7 @@ pub struct PhotonMapper {
     settings: PhotonSettings,
     /// Maximum number of bounces per photon before it is gathered.
     most_depth: u32,
-    /// Source of the photons. `None` if the scene has no mirrors or glass.
+    /// Source of the photons, or `None` if the scene has no mirrors or glass.
     emission: Option<PhotonEmitter>,
     /// Closed glass shapes that may contain lights.
     glasses: Vec<u32>,
@@ -391,8 +391,8 @@ impl GlassObjectBoundsList {
         Self(each.collect())
     }
 
-    /// Whether light may pass through an object's surface unchanged. True if its index of refraction is 1, or
-    /// if it may touch or overlap glass with the same index.
+    /// Whether light may pass through a glass object's surface unchanged, because the object's index of
+    /// refraction is 1 or the object may touch or overlap glass with the same index.
     fn may_be_index_matched(&self, id: u32, ior: f32) -> bool {
         let own = self.0.iter().find(|(other, ..)| *other == id).and_then(|(_, bounds, _)| *bounds);
         let meets = |other: &Aabb| own.is_none_or(|own| own.expanded(own.extent() * NEAR).overlaps(other));

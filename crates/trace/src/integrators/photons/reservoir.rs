@@ -55,8 +55,8 @@ impl ReservoirPacket {
         }
     }
 
-    /// Chooses a lane in proportion to its total weight and returns the lane's item and index. `None` if all
-    /// weights are 0.
+    /// Chooses a lane in proportion to its total weight and returns the lane's item and index, or `None` if
+    /// all weights are 0.
     #[inline(always)]
     pub fn choose_lane_by_total_weight(&self, random: f32) -> Option<(u32, usize)> {
         let mut left = random * self.totals.iter().sum::<f32>();

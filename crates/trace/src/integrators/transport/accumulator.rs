@@ -48,7 +48,7 @@ impl DiffuseFractions {
 pub struct LayerAccumulator<'a> {
     /// The layers' values.
     pub values: &'a mut LayerValues,
-    /// The paths' diffuse fractions. `None` if no component of the light is recorded.
+    /// The paths' diffuse fractions, or `None` if no component of the light is recorded.
     pub fractions: Option<&'a mut DiffuseFractions>,
 }
 
@@ -72,7 +72,7 @@ impl Accumulator<'_> {
         self.layers.as_mut()?.fractions.as_deref_mut()
     }
 
-    /// The layers, if any of them shows the first hit.
+    /// The layers, if any of them records a quantity at the first hit.
     #[inline]
     pub fn first_hit_layers(&mut self) -> Option<&mut LayerValues> {
         self.layers.as_mut().map(|layers| &mut *layers.values).filter(|values| values.set().has_first_hit())

@@ -31,8 +31,8 @@ soa! {
         /// `t_max` of the ray from the facet to `lifted`.
         pub lift_end: f32 = 0.0,
         pub may_lift: bool = false,
-        /// The surface point and the geometric normal on the viewer's side, if `has_facet`. Otherwise, `from`
-        /// and `normal` are used instead.
+        /// The surface point and the geometric normal on the viewer's side, if `has_facet`. Without them,
+        /// `from` and `normal` are used.
         pub point: Vec3 = Vec3::ZERO,
         pub facet: Vec3 = Vec3::ZERO,
         pub has_facet: bool = false,
@@ -43,7 +43,7 @@ soa! {
         /// Shading normal.
         pub normal: Vec3 = Vec3::ZERO,
         /// Interpolated normal before perturbation, and its cosine with the perturbed normal, or
-        /// [`UNPERTURBED`] if both normals are equal.
+        /// [`UNPERTURBED`] if the two normals are equal.
         pub smooth_normal: Vec3 = Vec3::ZERO,
         pub shading_normal_cosine: f32 = UNPERTURBED,
         /// Path throughput.
@@ -203,7 +203,7 @@ impl VertexBatch {
         self.used |= 1 << i;
     }
 
-    /// Stores the ray origin on the other side of a vertex and the index of the glass around it.
+    /// Stores the ray origin on the far side of a vertex's surface, and the index of the interior list there.
     pub fn set_far_side_origin(&mut self, i: usize, beyond: Vec3, interiors: u32) {
         set_lane(&mut self.beyond, i, beyond);
         self.interiors_beyond[i] = interiors;
@@ -242,8 +242,8 @@ impl VertexBatch {
         left
     }
 
-    /// [`Ray::start`] values for rays from the vertices in the directions `wi`. [`Ray::NO_TRIANGLE`] for rays
-    /// directed behind their facet.
+    /// [`Ray::start`] values for rays from the vertices in the directions `wi`, or [`Ray::NO_TRIANGLE`] for
+    /// rays that point behind their facet.
     #[inline(always)]
     pub fn ray_start_triangles(&self, wi: &Vec3x16) -> [u32; PACKET_SIZE] {
         // Vertices on analytic shapes are not on triangles.
@@ -310,8 +310,8 @@ impl VertexBatch {
         radiance
     }
 
-    /// Returns the first queue index if every lane has a vertex and the indices are consecutive, and
-    /// otherwise `None`.
+    /// Returns the first vertex's queue index if every lane has a vertex and the indices are consecutive, or
+    /// `None` otherwise.
     #[inline(always)]
     pub fn first_consecutive_index(&self) -> Option<u32> {
         let mut is_run = self.used == ALL;

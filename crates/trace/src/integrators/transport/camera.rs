@@ -49,7 +49,8 @@ impl TileContext<'_> {
         }
     }
 
-    /// Replaces the content of `rows` with camera rays for the first slots, at most [`CAMERA_ROWS`] packets.
+    /// Replaces the content of `rows` with packets of camera rays for the first slots in the range, at most
+    /// [`CAMERA_ROWS`] packets.
     pub fn generate_camera_packets(&self, slots: Range<u32>, rows: &mut Vec<CameraRayPacket>) {
         rows.clear();
         let count = slots.len().div_ceil(PACKET_SIZE).min(CAMERA_ROWS);
@@ -104,7 +105,7 @@ impl TileContext<'_> {
             let place = settings.pixel_to_image_plane(place);
             (places[0][lane], places[1][lane]) = (place.x, place.y);
         }
-        // Generate rays through these positions, from points on the lens if it has an aperture.
+        // Generate rays through these positions, from points on the lens if the camera has an aperture.
         let (mut origin, mut direction) = ([[0.0; PACKET_SIZE]; 3], [[0.0; PACKET_SIZE]; 3]);
         if settings.dof && camera.aperture > 0.0 {
             let lens = sample_lens(sampler.pairs(&paths, Dimension::Lens, 0, 1));

@@ -1,6 +1,6 @@
 //! Ray cones, which track the width of the beam around a ray to choose the mip level of texture lookups
 //! (Akenine-Möller, Crassin, Boksansky, Belcour, Panteleev, Wright, *Improved Shader and Texture Level of
-//! Detail Using Ray Cones*, JCGT 2021). Without mip levels, all cones are 0.
+//! Detail Using Ray Cones*, JCGT 2021). Without mip levels, all cones have zero width and spread.
 
 /// A beam around a ray. A negative width means that the beam is past its focus.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -60,8 +60,8 @@ mod tests {
 
     #[test]
     fn curved_surfaces_focus_beams() {
-        // A concave mirror of radius 3 focuses at distance 3/2; a convex mirror of radius 2 has a virtual focus at
-        // distance 1.
+        // A concave mirror of radius 3 focuses at distance 3/2; a convex mirror of radius 2 has a virtual
+        // focus at distance 1.
         let concave = PARALLEL.after_specular(SpecularEvent::Reflected, -1.0 / 3.0, 1.0);
         assert!(concave.propagated_by(1.5).width.abs() < 1e-8);
         let convex = PARALLEL.after_specular(SpecularEvent::Reflected, 0.5, 1.0);

@@ -10,7 +10,7 @@ use crate::world::{CoincidenceQuery, CoincidenceScratch, CoincidentOrEnclosingSu
 pub struct InterfaceCrossing {
     /// Origins for rays leaving on either side.
     pub sides: OffsetPoints,
-    /// The medium traversed by the ray, and the medium on the near side. `None` if both are the ray's
+    /// The medium traversed by the ray, and the medium on the near side, or `None` if each is the ray's
     /// recorded medium.
     pub before: Option<[InteriorList; 2]>,
     /// The medium on the far side.
@@ -19,14 +19,14 @@ pub struct InterfaceCrossing {
     pub opaque: Option<Hit>,
 }
 
-/// The glass whose surface separates two media: the glass with the higher priority, which is later in the
-/// scene file.
+/// The glass whose surface separates two media. It is the glass with the higher priority, which is later in
+/// the scene file.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GlassBoundary {
     /// Material of the glass at this point.
     pub material: u32,
-    /// Hit on the glass surface, along the ray between the two origins. `None` if the path itself hits this
-    /// surface, or if the glass was found only because it encloses the far origin.
+    /// Hit on the glass surface, along the ray between the two origins, or `None` if the path itself hits
+    /// this surface or if the glass was found only because it encloses the far origin.
     pub hit: Option<Hit>,
 }
 
@@ -62,7 +62,7 @@ impl TileContext<'_> {
     /// been inside it, even if it was not recorded as inside. Open solids are considered only if the ray
     /// enters or leaves them here, because it is unknown whether the ray is inside other open solids. A ray
     /// and its reverse therefore see the same media. The returned pair contains the medium that the ray
-    /// traversed and the medium on the near side. It is `None` if both match the record.
+    /// traversed and the medium on the near side, or is `None` if each is the recorded medium.
     fn media_on_both_sides(
         &self,
         known: &InteriorList,
@@ -116,8 +116,8 @@ impl TileContext<'_> {
         (Some([arrived, near]), far)
     }
 
-    /// The surface that separates two media at a hit. Requires the result of [`TileContext::find_interface_crossing`].
-    /// `None` if both media are air.
+    /// The glass surface that separates two media at a hit, or `None` if both media are air. Must be called
+    /// after [`TileContext::find_interface_crossing`], with the same buffers.
     pub fn boundary(
         &self,
         hit: &Hit,

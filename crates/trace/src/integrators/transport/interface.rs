@@ -9,7 +9,7 @@ use crate::materials::mirror::reflect;
 use crate::math::Vec3;
 use crate::world::World;
 
-/// Branch numbers for specular reflection and refraction. They distinguish a path's continuations.
+/// Branch numbers for specular reflection and refraction, which distinguish a path's continuations.
 const REFLECTED: u32 = 1;
 const REFRACTED: u32 = 2;
 /// Branch number for scattering by a non-specular lobe.
@@ -54,7 +54,7 @@ pub fn sheet_transmission_between_media(world: &World, near: &InteriorList, far:
 pub struct FresnelSplit {
     /// Fresnel reflectance.
     pub reflectance: f32,
-    /// The refracted path, not weighted by the transmittance. `None` for total internal reflection.
+    /// The refracted path, not weighted by the transmittance, or `None` for total internal reflection.
     pub refracted: Option<PathRay>,
 }
 
@@ -81,8 +81,8 @@ pub fn fresnel_split(
 }
 
 /// Computes the reflectance and refracted direction with the shading normal. If this normal faces away from
-/// the ray or would refract the ray to the incident side, the geometric normal is used, because the ray must
-/// be inside its medium.
+/// the ray or would refract the ray to the incident side, the geometric normal is used, because the refracted
+/// ray must be in the medium on the far side.
 fn reflectance_and_refraction(
     vertex: &SurfaceVertex<'_>,
     shading: &PerturbedAndSmoothNormals,

@@ -47,7 +47,7 @@ impl PacketSource<'_> {
         ((1_u64 << self.count()) - 1) as u32
     }
 
-    /// Queue index of a lane's path. Arbitrary if the lane has no path.
+    /// Queue index of a lane's path, or an arbitrary number if the lane has no path.
     #[inline(always)]
     pub fn queue_index(&self, lane: usize) -> u32 {
         match self {
@@ -56,7 +56,7 @@ impl PacketSource<'_> {
         }
     }
 
-    /// A lane's queued path. `None` for camera rays.
+    /// A lane's queued path, or `None` for camera rays and for lanes without a path.
     #[inline(always)]
     pub fn queued_path(&self, lane: usize) -> Option<&PathRay> {
         match self {
@@ -175,7 +175,7 @@ impl TileContext<'_> {
         self.pixel_spread == 0.0 && !self.world.material_needs_uvs_or_tangents(material)
     }
 
-    /// Packet-shading data and non-specular BSDF of a plain material. `None` if the material is not plain.
+    /// Packet-shading data and non-specular BSDF of a material, or `None` if the material is not plain.
     #[inline(always)]
     pub fn plain_packet_material(&self, material: usize) -> Option<(&PacketMaterial, &NonSpecular)> {
         let (plain, rough) = self.world.material_for_packet_shading(material)?;
@@ -457,7 +457,7 @@ impl VertexBatch {
         lifts: ShadowLiftSelection,
         simd: impl Simd,
     ) {
-        // Turn both normals toward the viewer.
+        // Turn the shading and geometric normals toward the viewer.
         let (mut normals, mut facets) = ([[0.0; PACKET_SIZE]; 3], [[0.0; PACKET_SIZE]; 3]);
         let (mut ends, mut above, mut bent) = ([0.0; PACKET_SIZE], [0; PACKET_SIZE], [0; PACKET_SIZE]);
         for i in 0..PACKET_SIZE {

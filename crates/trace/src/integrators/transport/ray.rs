@@ -28,7 +28,7 @@ pub struct PathRay {
 /// Summary of a path's earlier vertices, which determines how light found by the path is weighted.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PathHistory {
-    /// BSDF-sampling pdf of the direction at the last vertex, in sr⁻¹. 0 if light samples cannot find the
+    /// BSDF-sampling pdf of the direction at the last vertex, in sr⁻¹, or 0 if light samples cannot find the
     /// light: after the camera, a mirror or glass, or if the path has since passed through glass.
     pub pdf: f32,
     /// Normal used by light samples at the last vertex. Valid if `pdf` > 0.

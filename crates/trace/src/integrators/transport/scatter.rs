@@ -41,8 +41,8 @@ impl ContinuationPolicy {
         Self { continues, uses_roulette: depth >= Self::MIN_DEPTH, lobes }
     }
 
-    /// Survival probability of a path. Proportional to throughput, so that all surviving paths continue with
-    /// the same throughput (Arvo and Kirk, *Particle Transport and Image Synthesis*, 1990). The gain was
+    /// Survival probability of a path, proportional to its throughput so that all surviving paths continue
+    /// with the same throughput (Arvo and Kirk, *Particle Transport and Image Synthesis*, 1990). The gain was
     /// chosen empirically (see `benches/README.md`).
     #[inline(always)]
     fn survival_probability(self, roulette_throughput: f32) -> f32 {

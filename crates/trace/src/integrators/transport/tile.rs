@@ -68,7 +68,7 @@ impl<'a> TileContext<'a> {
     }
 }
 
-/// The samples in a tile. A slot is a sample's index. Samples are ordered by pixel.
+/// The samples in a tile, ordered by pixel. A slot is a sample's index in this order.
 pub struct SampleBlock {
     /// The pixels of the tile.
     pub pixels: SelectedPixels,
@@ -90,7 +90,7 @@ impl SampleBlock {
         (x, y, self.samples.start + sample)
     }
 
-    /// Columns, rows and sample indices of slots. Arbitrary for slots without a sample.
+    /// Columns, rows and sample indices of slots, with arbitrary values for slots without a sample.
     #[inline(always)]
     pub fn pixels_and_samples_of_slots(
         &self,
@@ -121,7 +121,8 @@ impl SampleBlock {
         (xs, ys, samples)
     }
 
-    /// Columns, rows and sample indices of the slots starting at `first`, even past the last slot.
+    /// Columns, rows and sample indices of the sixteen slots starting at `first`, even if some are past the
+    /// last slot.
     #[inline(always)]
     pub fn samples_of_consecutive_slots(
         &self,

@@ -22,8 +22,8 @@ pub struct SurfaceVertex<'a> {
     pub material: &'a Material,
     /// [`Ray::start`] for rays that leave the vertex.
     start: u32,
-    /// Origins for rays on either side. `None` unless they are known more precisely than the surface's error
-    /// bound allows.
+    /// Origins for rays on either side, if they are known more precisely than the surface's error bound
+    /// allows.
     sides: Option<OffsetPoints>,
     /// Whether the path hits the front face.
     pub is_front: bool,
@@ -39,7 +39,7 @@ pub struct SurfaceVertex<'a> {
     pub texture_point: TexturePoint,
     /// The path's ray cone at the surface.
     pub cone: RayCone,
-    /// Vertex color, by which the material's color is multiplied. `None` if there is no vertex color.
+    /// Vertex color, if any, which multiplies the material's color.
     pub color: Option<Vec3>,
     /// Mean curvature, positive if the surface bulges toward the viewer. Computed only for specular surfaces.
     pub curvature: f32,
@@ -66,8 +66,8 @@ impl<'a> SurfaceVertex<'a> {
         Self::at_surface(tile, path, tile.world.material_index(hit), surface, hit, hit.shape.t)
     }
 
-    /// Creates the vertex on a surface that coincides with the surface hit at this distance. `hit` is a hit
-    /// along the segment between the two origins.
+    /// Creates the vertex on a surface that coincides with the surface that the path hits at `distance`.
+    /// `hit` is a hit along the segment between the origins on either side.
     pub fn at_coincident_surface(
         tile: &TileContext<'a>,
         path: &PathRay,
@@ -104,7 +104,7 @@ impl<'a> SurfaceVertex<'a> {
         let wo = -path.ray.direction;
         let side = if surface.normal.dot(wo) < 0.0 { -1.0 } else { 1.0 };
         let cone = path.cone.propagated_by(distance);
-        // Compute the footprint and curvature for ray cones, if used.
+        // If ray cones are used, compute the footprint and the curvature.
         let has_beam = tile.pixel_spread > 0.0;
         let footprint = |tangents| match has_beam && tile.world.is_material_mipmapped(index) {
             true => Footprint::from_ray_cone(cone.width.abs(), path.ray.direction, surface.normal, tangents),
@@ -242,7 +242,7 @@ impl<'a> SurfaceVertex<'a> {
         if self.has_uv { self.surface.dpdu } else { Vec3::ZERO }
     }
 
-    /// Origin for rays on the far side. `None` unless the origins on both sides are known.
+    /// Origin for rays on the far side, if the origins on both sides are known.
     pub fn far_origin(&self) -> Option<Vec3> {
         self.sides.map(|sides| sides.beyond)
     }
@@ -304,8 +304,8 @@ pub struct ShadowOrigin {
     pub point: Vec3,
     /// [`Ray::start`] for rays in front of the facet.
     pub start: u32,
-    /// Horizon normal. Directions behind it are occluded. `None` if the cosines or the shadow rays account
-    /// for this.
+    /// Horizon normal, behind which all directions are occluded, or `None` if the cosines or the shadow rays
+    /// account for this.
     pub horizon: Option<Vec3>,
     /// A point above the facet. If the segment to this point is unoccluded, it is used as the origin for
     /// lights in all directions.
@@ -338,7 +338,7 @@ pub struct PerturbedAndSmoothNormals {
     pub normal: Vec3,
     /// The interpolated normal.
     pub smooth_normal: Vec3,
-    /// The cosine between the two normals. `None` if they are equal.
+    /// The cosine between the two normals, or `None` if they are equal.
     pub shading_normal_cosine: Option<f32>,
 }
 

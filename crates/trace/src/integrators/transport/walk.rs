@@ -37,7 +37,7 @@ pub enum Interaction<'v, 'a> {
 pub struct Interface<'v> {
     /// The medium on the far side.
     pub far: &'v InteriorList,
-    /// Parameters of a rough boundary. `None` if the boundary is smooth.
+    /// Parameters of a rough boundary, or `None` if the boundary is smooth.
     pub rough: Option<RoughDielectricPoint>,
 }
 
@@ -237,7 +237,7 @@ pub fn walk_to_interaction<'a, W: PathStepper<'a>>(
     stepper.interact(path, Interaction::Hidden, true);
 }
 
-/// Rough surface between two media with different indices of refraction. `None` if the surface is smooth.
+/// Rough surface between two media with different indices of refraction, or `None` if the surface is smooth.
 #[cold]
 #[inline(never)]
 fn rough_dielectric_point<'a, W: PathStepper<'a>>(
@@ -284,8 +284,8 @@ fn null_interaction<'a, W: PathStepper<'a>>(
     }
 }
 
-/// Whether a partially transparent surface coincident with glass stops a path. Thin panes have no effect on
-/// glass.
+/// Whether a partially transparent surface coincident with glass stops a path. Thin panes on glass have no
+/// effect.
 #[cold]
 #[inline(never)]
 fn is_stopped_by_coincident_surface<'a, W: PathStepper<'a>>(
@@ -334,7 +334,7 @@ fn path_past_surface(path: PathRay, vertex: &SurfaceVertex<'_>, part: Vec3) -> P
 }
 
 impl TileContext<'_> {
-    /// Returns the first opaque hit along a camera ray, starting with `hit`, and the path that reaches it.
+    /// Returns the first opaque hit along a camera ray, starting with `hit`, and the path that reaches it, or
     /// `None` if there is no opaque hit.
     pub fn first_opaque_path_and_hit(
         &self,

@@ -30,7 +30,7 @@ enum OpaqueQuery {
 ///
 /// An edge is covered if a ray toward its midpoint, from its triangle or from the center of the hole, hits an
 /// opaque surface at the midpoint or slightly beyond. It is also covered if both endpoints are on opaque
-/// surfaces. If these surfaces are curved, the chord between the endpoints may not touch them.
+/// surfaces, because the chord between them may miss a curved surface.
 pub(super) fn covered_rim_fractions(
     scene: &Scene,
     meshes: &[&LoadedMesh],

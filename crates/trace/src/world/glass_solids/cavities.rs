@@ -12,7 +12,7 @@ use crate::scene::description::Scene;
 pub(super) struct ClosedSolid {
     /// Indices of the solid's objects.
     pub objects: Vec<u32>,
-    /// Enclosed volume. Negative if the front faces inward.
+    /// Enclosed volume, negative if the front faces inward.
     pub volume: f64,
     /// Type of glass.
     pub substance: GlassMediumKey,

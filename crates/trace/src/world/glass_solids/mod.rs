@@ -9,7 +9,7 @@
 //! whose front faces inward. A solid is identified by its last object in file order.
 //!
 //! A closed mesh whose front faces inward is a cavity if it is entirely inside another solid of the same
-//! glass. A hollow sphere consisting of two meshes is therefore one solid, just as if both were in one file.
+//! glass. A hollow sphere made of two meshes is therefore one solid, just as if it were a single mesh.
 //!
 //! A solid with a hole is open, unless the hole is surrounded by opaque surfaces. It is unknown whether a ray
 //! is inside open glass. The surface of open glass therefore only affects the medium of rays that hit or
@@ -47,7 +47,7 @@ const COVERED: f64 = 0.95;
 /// Glass solids of a scene.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct GlassSolids {
-    /// Role of each object. Empty if every object is a separate solid and no solids are open.
+    /// Role of each object, or empty if every object is a separate solid and no solids are open.
     parts: Vec<ObjectRole>,
     /// Glass objects with open rims.
     open: Vec<OpenGlass>,
@@ -70,7 +70,7 @@ pub struct OpenGlass {
     pub object: u32,
     /// Number of the object's edges that no other surface shares.
     pub edges: usize,
-    /// Missing fraction of the solid's surface. Exceeds 1 if the hole is larger than the surface.
+    /// Missing fraction of the solid's surface, which exceeds 1 if the hole is larger than the surface.
     pub missing: f64,
     /// Whether the object's open edges coincide with edges of surfaces with the opposite orientation.
     pub disagrees: bool,
@@ -249,7 +249,7 @@ impl PartGroups {
         self.flips[one as usize] != self.flips[other as usize]
     }
 
-    /// Volume and area of a solid whose parts are all oriented like the first part.
+    /// Volume and area of a solid, with all parts oriented like the first part.
     fn volume_and_area(&self, parts: &GlassParts, members: &[u32]) -> (f64, f64) {
         let (mut volume, mut area) = (0.0, 0.0);
         for &part in members {
@@ -266,7 +266,7 @@ impl PartGroups {
         volume.abs() <= NO_VOLUME * area * area.sqrt()
     }
 
-    /// Returns the solid if it may be a cavity or contain one. `None` unless it consists only of consistently
+    /// Returns the solid if it may be a cavity or contain one, that is, if it consists only of consistently
     /// oriented meshes.
     fn closed_solid_if_cavity_candidate(
         &self,
@@ -293,8 +293,8 @@ impl PartGroups {
         members
     }
 
-    /// Whether the front of a solid's first part faces inward. Determined from the volume of a closed solid,
-    /// or from the majority of an open solid's surface.
+    /// Whether the front of a solid's first part faces inward, as determined from the volume of a closed
+    /// solid or from the majority of an open solid's surface.
     fn is_first_part_flipped(&self, parts: &GlassParts, members: &[u32], is_closed: bool) -> bool {
         if is_closed {
             // Smaller volumes are attributed to rounding.
@@ -376,8 +376,8 @@ impl Hole {
         Self { rims: own.into_iter().map(|(rim, _)| rim).collect(), disagree, part: missing / area }
     }
 
-    /// Describes the hole where it borders one part. `None` if the part does not border the hole, or if the
-    /// hole is attributed to rounding.
+    /// Describes the hole where it borders one part. Returns `None` if the part does not border the hole or
+    /// the hole is attributed to rounding.
     fn describe_at_part(&self, part: u32, object: u32, is_covered: bool) -> Option<OpenGlass> {
         let own = || self.rims.iter().zip(&self.disagree).filter(|(rim, _)| rim.part == part);
         let edges = own().count();

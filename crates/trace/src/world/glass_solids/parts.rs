@@ -35,8 +35,8 @@ pub(super) struct GlassSolidPart {
     pub substance: GlassMediumKey,
 }
 
-/// Type of glass, identified by the bit patterns of the index of refraction and transmittance. `None` for a
-/// mesh with several types of glass.
+/// Type of glass, identified by the bit patterns of the index of refraction and transmittance, or `None` for
+/// a mesh with several types of glass.
 pub(super) type GlassMediumKey = Option<[u64; 4]>;
 
 /// A straight edge of a part's boundary, directed so that the surface is on its left as seen from the front.
@@ -124,7 +124,7 @@ impl GlassParts {
         }
     }
 
-    /// Transforms the last part, whose rims start at index `first`. The front remains the front.
+    /// Transforms the last part, whose rims start at index `first`, preserving which side is the front.
     fn transform_last_part(&mut self, first: usize, to_scene: &Transform) {
         let map = to_scene.relative_to_origins(self.origin, self.origin);
         // The area vector, the integral of the normal, depends only on the boundary.
@@ -140,7 +140,8 @@ impl GlassParts {
         let volume_scale = map.linear.determinant().abs();
         let Some(part) = self.list.last_mut() else { return };
         part.volume = volume_scale * (part.volume + map.normal(area_vector).dot(map.translation) / 3.0);
-        // The mean scale of the areas is exact for flat parts.
+        // Scale the area like the area vector, which is exact for flat parts. If that vector is zero, use the
+        // mean scale.
         let flat = map.normal(area_vector.normalize_or_zero()).length() * volume_scale;
         part.area *= if flat > 0.0 { flat } else { libm::pow(volume_scale, 2.0 / 3.0) };
         part.tolerance *= map.transform_abs_bound(DVec3::ONE).max_element();

@@ -12,7 +12,7 @@ use crate::materials::texels::{TexelData, Texels};
 use crate::math::Vec3;
 use crate::math::color::srgb_to_linear;
 
-/// Alpha-weighted texels, or plain texels if the image is opaque.
+/// Converts an image to alpha-weighted texels, or to plain texels if it is opaque.
 pub(super) fn cutout_texels(image: DynamicImage, curve: ColorCurve, metadata: &ImageMetadata) -> Texels {
     let Some(alpha) =
         alpha_sample_index(&image, metadata).filter(|alpha| !is_channel_filled_with(&image, *alpha, 1.0))

@@ -43,7 +43,7 @@ trait Sample: Copy + PartialEq {
     /// Converts the sample to a float. The largest integer becomes 1.
     fn to_unit_float(self) -> f32;
 
-    /// Tables that map every integer to its linear value. `None` for floats, which are already linear.
+    /// Tables that map every integer to its linear value, or `None` for floats, which are already linear.
     fn linearization_tables(_: &ColorSpace) -> Option<[Vec<f32>; 3]> {
         None
     }
@@ -119,7 +119,7 @@ fn is_channel_filled_with(image: &DynamicImage, index: usize, value: f32) -> boo
     with_samples!(image, samples => are_channel_samples_equal_to(samples, (channel_count(image), index), value))
 }
 
-/// Warning about a constant alpha channel that is used as opacity.
+/// Returns the warning, if any, about an opacity read from an alpha channel that is constant or not decoded.
 pub(super) fn constant_alpha_warning(
     image: &DynamicImage,
     encoding: ImageEncoding,
@@ -290,7 +290,7 @@ fn linearize_pixel<T: Sample>(pixel: &[T], tables: Option<&[Vec<f32>; 3]>) -> [f
     }
 }
 
-/// Clamps negative values, and replaces NaN, infinity and excessively large values with 0.
+/// Replaces negative, excessively large and non-finite values with 0.
 fn sanitize(value: f32) -> f32 {
     if (0.0..=LARGEST as f32).contains(&value) { value } else { 0.0 }
 }

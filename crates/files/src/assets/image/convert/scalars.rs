@@ -166,7 +166,7 @@ mod tests {
         ] {
             assert!((number(color(), which, false) - exact).abs() < 1e-4, "{which:?}");
         }
-        // Alpha is linear. The other channels are decoded.
+        // Alpha is always linear; the other channels are decoded from sRGB.
         assert!((number(color(), ChannelSelector::Opacity, true) - 25.0 / 255.0).abs() < 1e-6);
         assert!((number(color(), of(Channel::Blue), true) - srgb_to_linear(0.8)).abs() < 1e-6);
         // Without an alpha channel, alpha is 1, and the opacity is the luminance.

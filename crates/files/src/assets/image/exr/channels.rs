@@ -38,7 +38,7 @@ impl ChosenChannels {
         }
     }
 
-    /// Y, RY and BY.
+    /// Returns the Y, RY and BY channels if the image is stored as luminance and chroma.
     pub(super) fn as_luminance_chroma(self) -> Option<[ChannelIndex; 3]> {
         match self.color {
             ColorChannels::Rgb(_) | ColorChannels::Gray(_) => None,
@@ -156,14 +156,14 @@ fn layers_across_parts(headers: &[Header]) -> LayerMap {
     layers
 }
 
-/// Flat parts with a single channel.
+/// Returns the flat parts with a single channel, each with its index.
 fn single_channel_parts(headers: &[Header]) -> impl Iterator<Item = (usize, &Header)> {
     let headers = headers.iter().enumerate();
     headers.filter(|(_, header)| !header.deep && header.channels.list.len() == 1)
 }
 
-/// Returns the channel of the first single-channel part. `None` if the single-channel parts are components of
-/// a color or vector.
+/// Returns the channel of the first single-channel part, or `None` if the single-channel parts are components
+/// of a color or vector.
 fn first_single_channel(headers: &[Header]) -> Option<ChosenChannels> {
     const COMPONENTS: [&str; 7] = ["R", "G", "B", "RY", "BY", "X", "Y"];
     let is_component = |header: &Header| {

@@ -1,5 +1,5 @@
-//! EXR decoder based on the `exr` crate. The `image` crate supports only R, G and B channels that are not in
-//! a named layer.
+//! EXR decoder based on the `exr` crate. The `image` crate's own decoder supports only R, G and B channels
+//! that are not in a named layer.
 
 pub(super) mod channels;
 mod chroma;
@@ -109,7 +109,7 @@ fn channel_header(headers: &[Header], channel: ChannelIndex) -> &ChannelDescript
     &headers[channel.part].channels.list[channel.channel]
 }
 
-/// Checks that only the chroma channels are subsampled, both by the same factors.
+/// Checks that only the chroma channels are subsampled, and both by the same factors.
 fn check_samplings(headers: &[Header], channels: ChosenChannels) -> Result<(), String> {
     let sampling = |channel: ChannelIndex| channel_header(headers, channel).sampling;
     let is_divided = |channel: &ChannelIndex| {

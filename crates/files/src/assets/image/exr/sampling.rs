@@ -24,7 +24,7 @@ pub(super) struct ChannelSampling {
 }
 
 /// Reads the subsampling factors of all channels in each part. Returns an empty list if no channel is
-/// subsampled or the headers are malformed. `exr` reports malformed headers.
+/// subsampled, or if the headers are malformed, which `exr` then reports.
 pub(super) fn read_samplings(file: &mut (impl Read + Seek)) -> io::Result<Vec<Vec<ChannelSampling>>> {
     let mut bytes = Vec::new();
     file.by_ref().take(HEADER_BYTES).read_to_end(&mut bytes)?;

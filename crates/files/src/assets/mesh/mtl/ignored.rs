@@ -17,7 +17,7 @@ pub(in crate::assets::mesh) struct IgnoredStatement {
     pub(super) words: String,
 }
 
-/// Collects warnings about a file and its used materials. Warnings shared by several materials are merged.
+/// Collects warnings about a file and the materials in use, merging warnings that several materials share.
 pub(in crate::assets::mesh) fn collect_warnings<'a>(
     path: &Path,
     of_file: Vec<IgnoredStatement>,
@@ -283,7 +283,7 @@ fn warn_about_map(
     };
     if texture.is_none() {
         match converted.kind() {
-            // Only specular maps may lack an effect here. The warning about a missing highlight covers them.
+            // Only specular maps can be unused here, and the warning about a missing highlight covers them.
             FileMaterialKind::Phong => {}
             FileMaterialKind::Principled(_)
             | FileMaterialKind::Coated

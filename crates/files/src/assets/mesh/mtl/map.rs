@@ -59,7 +59,7 @@ impl MapKind {
         })
     }
 
-    /// Keyword of the statement. If there are several, returns one of them.
+    /// Returns the statement's keyword, or one of them if there are several.
     pub(super) fn keyword(self) -> &'static str {
         match self {
             Self::Diffuse => "map_Kd",
@@ -100,7 +100,7 @@ impl MapKind {
     }
 }
 
-/// A map and its options, unmodified from the file.
+/// A map and its options, as given in the file.
 #[derive(Clone, Debug)]
 pub(super) struct Map {
     pub(super) line: usize,
@@ -119,7 +119,7 @@ pub(super) struct Map {
 }
 
 impl Map {
-    /// Parses the text after the keyword. `None` if there is no file name.
+    /// Parses the text after the keyword, or returns `None` if it has no file name.
     pub(super) fn parse(text: &str) -> Option<Self> {
         let mut map = Self {
             line: 0,
@@ -195,7 +195,7 @@ impl Map {
     }
 
     /// Candidate paths for the image file, relative to the MTL file's folder: first the whole name, then the
-    /// name without what may be a comment.
+    /// name without possible comments.
     pub(super) fn candidate_paths(&self) -> impl Iterator<Item = PathBuf> {
         with_and_without_comments(&self.name).flat_map(|name| utf8_and_latin1_paths(&name.replace('\\', "/")))
     }
@@ -258,7 +258,7 @@ pub(super) fn not_an_option_warning(word: &str) -> String {
     format!("`{word}` is not a map option; it is read as part of the file name")
 }
 
-/// Arguments to a map statement. The last one is the file name.
+/// Arguments of a map statement, of which the last one is the file name.
 #[derive(Clone, Copy)]
 struct MapArguments<'a>(&'a str);
 
@@ -292,7 +292,7 @@ impl<'a> MapArguments<'a> {
         })
     }
 
-    /// Returns the next word and the text after it. `None` if the next word is the last one.
+    /// Returns the next word and the text after it, or `None` if the next word is the last one.
     fn peek_unless_last(&self) -> Option<(&'a str, &'a str)> {
         let (word, rest) = self.0.split_once(char::is_whitespace)?;
         Some((word, rest.trim_start()))

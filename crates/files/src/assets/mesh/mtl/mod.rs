@@ -93,8 +93,8 @@ pub(super) fn load(path: &Path, monitor: Monitor<'_>) -> Result<MtlLibrary, Asse
     Ok(library)
 }
 
-/// Returns the candidate image paths for a map statement in the MTL file at `path`. Empty for all other
-/// statements, and if the map statement is invalid.
+/// Returns the candidate image paths for a map statement in the MTL file at `path`, or an empty list for
+/// other statements and invalid map statements.
 pub(super) fn map_statement_image_candidates(path: &Path, line: &[u8]) -> Vec<PathBuf> {
     let folder = path.parent().unwrap_or(Path::new(""));
     match statements::parse_line(&decode_line(line), &mut Vec::new()) {
@@ -143,7 +143,7 @@ impl MtlLibrary {
         }
     }
 
-    /// Warns about materials with the same name. The last one is used.
+    /// Warns about materials with the same name, of which only the last one is used.
     fn warn_about_duplicates(&mut self) {
         let mut seen = std::collections::HashMap::new();
         for material in &self.materials {

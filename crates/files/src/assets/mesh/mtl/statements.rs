@@ -62,7 +62,7 @@ impl MtlNumber {
         Self::ALL[self as usize].1
     }
 
-    /// Smallest and largest valid value. `None` if the number has no effect, or if its effect depends on the
+    /// Smallest and largest valid value, or `None` if the number has no effect or its effect depends on the
     /// material.
     fn range(self) -> Option<[f64; 2]> {
         match self {
@@ -91,7 +91,7 @@ pub(super) enum Statement {
     Map(MapKind, Map),
 }
 
-/// Parses a line. Adds a warning for each unusable part.
+/// Parses a line, adding a warning for each unusable part.
 pub(super) fn parse_line(line: &str, warnings: &mut Vec<String>) -> Result<Statement, String> {
     let line = line.trim();
     let (keyword, rest) = line.split_once(char::is_whitespace).unwrap_or((line, ""));
@@ -149,7 +149,7 @@ fn truncate_word(word: &str) -> String {
     word.chars().take(20).collect()
 }
 
-/// Words before a comment.
+/// Returns the words before a comment.
 fn words_before_comment(rest: &str) -> Vec<&str> {
     rest.split('#').next().unwrap_or_default().split_whitespace().collect()
 }

@@ -13,8 +13,7 @@ pub(super) struct FaceRun {
     pub(super) faces: usize,
     pub(super) material: u32,
     pub(super) smoothing: Smoothing,
-    /// Whether an object, group or material starts at this run. If so, it shares no vertices with earlier
-    /// runs.
+    /// Whether the run starts an object, group or material. Such a run shares no vertices with earlier runs.
     pub(super) is_object: bool,
 }
 

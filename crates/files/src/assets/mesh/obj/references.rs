@@ -1,4 +1,4 @@
-//! Lists the files that an OBJ file references. Does not parse its faces or vertices.
+//! Lists the files that an OBJ file references, without parsing its faces or vertices.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};

@@ -100,18 +100,18 @@ impl Vertices {
         !self.colors.is_empty() || !self.painted.is_empty()
     }
 
-    /// Byte offset of the vertex with the minimum alpha. `None` if every alpha is at its maximum. Alpha has
-    /// the same range as the colors.
+    /// Byte offset of the vertex with the minimum alpha, or `None` if every alpha is at its maximum. Alpha
+    /// has the same range as the colors.
     pub(super) fn find_lowest_alpha_offset(&self) -> Option<usize> {
         self.least_alpha.filter(|(least, _)| *least < self.range.full_intensity()).map(|(_, start)| start)
     }
 
-    /// Returns the byte offset of a vertex whose color is out of range, and a warning.
+    /// Returns the byte offset of a vertex with an out-of-range color, and a warning about it.
     pub(super) fn out_of_range_color_warning(&self) -> Option<(usize, String)> {
         self.range.out_of_range_warning()
     }
 
-    /// Color of a position. White if the file does not specify it.
+    /// Color of a position, or white if the file does not specify it.
     pub(super) fn color_of(&self, index: usize) -> [u8; 3] {
         if self.colors.is_empty() {
             return self.painted.get(index).copied().unwrap_or([u8::MAX; 3]);

@@ -160,7 +160,7 @@ pub(super) fn parse(source: &MeshFileBytes<'_>) -> Result<PlyHeader, AssetError>
             }
             textures.0 += 1;
         }
-        // Do not skip unknown keywords after the first element. They may be misspelled properties.
+        // Do not skip unknown keywords after the first element, because they may be misspelled properties.
         if elements.is_empty() && words.first().is_some_and(|first| !KEYWORDS.contains(first)) {
             if skipped.0 == 0 {
                 skipped.1 =

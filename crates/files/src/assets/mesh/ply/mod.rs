@@ -48,7 +48,8 @@ fn read_text(source: &MeshFileBytes<'_>, header: &PlyHeader) -> Result<LoadedMes
             loaded.warnings.push(undeclared_values_warning(line, count));
             Ok(loaded)
         }
-        // Return the error from the second pass. The first pass misreads files with undeclared values.
+        // Return the error from the second pass, because the first pass misreads files with undeclared
+        // values.
         (Err(error), LineEndMode::EndItems(_, Some(_))) => Err(error),
         (Ok(_) | Err(_), LineEndMode::EndItems(_, None) | LineEndMode::Blank) => by_words,
     }
@@ -61,7 +62,7 @@ struct ErrorContext<'a> {
 }
 
 impl ErrorContext<'_> {
-    /// Creates an error about an item. Includes the line number in text files.
+    /// Creates an error about an item, with the line number for text files.
     fn malformed_item_error(&self, at: usize, element: &Element, index: u64, reason: &str) -> AssetError {
         let reason = item_error_message(&element.name, index + 1, reason);
         match self.encoding {
@@ -70,7 +71,7 @@ impl ErrorContext<'_> {
         }
     }
 
-    /// Line number prefix for a message. Empty for binary files.
+    /// Line number prefix for a message, empty for binary files.
     fn line_prefix(&self, at: usize) -> String {
         match self.encoding {
             Encoding::Ascii => format!("line {}: ", self.source.line_number(at)),
@@ -229,8 +230,8 @@ fn read_list_length(
 /// Slot of a vertex's alpha property.
 const ALPHA: usize = 13;
 
-/// Maps a vertex property's name to its slot: position, normal, texture coordinates, color, second
-/// texture coordinates or alpha. `None` for unknown properties.
+/// Maps a vertex property's name to its slot (position, normal, texture coordinates, color, second texture
+/// coordinates or alpha), or to `None` if the property is unknown.
 fn vertex_property_slot(name: &str) -> Option<usize> {
     Some(match name {
         "x" => 0,
@@ -400,8 +401,8 @@ fn checked_vertex_index(vertex: i64, vertices: u64) -> Result<u32, String> {
     }
 }
 
-/// Reads all items of an element. `corners` is a property index. `read` receives the type and length of that
-/// property's list.
+/// Reads all items of an element. Calls `read` for the property with index `corners`, with the item type and
+/// length of its list, and skips the other properties.
 fn read_items_with_list_property<N: NumberReader>(
     context: &ErrorContext<'_>,
     element: &Element,

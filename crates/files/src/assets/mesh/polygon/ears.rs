@@ -9,7 +9,7 @@ use crate::math::DVec2;
 
 /// Maximum number of visits to corners and tree nodes: this many per corner, plus [`EXTRA_VISITS`]. Simple
 /// polygons need about 50 visits per corner. Polygons that wind around the same corners many times may exceed
-/// the limit. Corners are then clipped without being tested.
+/// the limit, after which corners are clipped without being tested.
 const VISITS_PER_CORNER: u64 = 200;
 const EXTRA_VISITS: u64 = 1_000_000;
 
@@ -22,7 +22,7 @@ pub(super) fn clip_ears(points: &[DVec2], emit: impl FnMut([usize; 3])) -> bool 
     EarClipper::new(points, emit).run()
 }
 
-/// Like [`clip`], but also returns the number of visits.
+/// Like [`clip_ears`], but also returns the number of visits.
 #[cfg(test)]
 pub(super) fn count_visits(points: &[DVec2]) -> (bool, u64) {
     let mut clipper = EarClipper::new(points, |_| {});

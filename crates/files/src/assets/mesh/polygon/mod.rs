@@ -35,7 +35,8 @@ fn project_points(points: &[DVec3], normal: DVec3) -> Vec<DVec2> {
     points.iter().map(|point| DVec2::new(point[x], point[y])).collect()
 }
 
-/// Returns the sum of the triangle normals in a fan (Newell's method). Does not depend on the fan's origin.
+/// Returns the sum of the triangle normals in a fan, which does not depend on the fan's origin (Newell's
+/// method).
 fn newell_normal(points: &[DVec3]) -> DVec3 {
     let origin = points[0];
     points.windows(2).map(|pair| (pair[0] - origin).cross(pair[1] - origin)).sum()

@@ -1,4 +1,4 @@
-//! A k-d tree over a polygon's corners. Corners can be removed.
+//! A k-d tree over a polygon's corners, from which corners can be removed.
 
 use crate::math::DVec2;
 

@@ -92,6 +92,6 @@ pub fn cheapest_plane(references: &[TriangleReference], cell: &SimdBounds) -> Op
             &PlanesWithTriangleCounts { at: four(at), left: counts(left), right: counts(right) },
         );
     }
-    // At a face of the bounding box, put references in the plane on the nonempty side.
+    // At a face of the bounding box, put references that lie in the plane on the nonempty side.
     search.cheapest().map(|plane| SplitPlane { planar_right: plane.at <= around.min[plane.axis], ..plane })
 }

@@ -138,8 +138,8 @@ impl Cell {
     /// The two halves of the cell, given the number of references in each.
     fn halves(&self, plane: &SplitPlane, counts: [usize; 2]) -> [Self; 2] {
         let [left, right] = counts.map(room_needed_by_leaf);
-        // Divide the room proportionally. If there is enough room for both halves together, each half gets
-        // enough.
+        // Divide the room proportionally. If it is enough for the two halves together, it is enough for each
+        // of them.
         let room = self.room * left / (left + right);
         let levels = self.levels - 1;
         let [below, above] = self.bounds.split_at_plane(plane.axis, plane.at);

@@ -7,7 +7,7 @@ use crate::accel::reference::TriangleReference;
 use crate::control::{CancelToken, Cancelled};
 use crate::math::Vec3;
 
-/// Nodes and references. Their indices are relative to the subtree.
+/// Nodes and references, with indices relative to the subtree.
 #[derive(Default)]
 pub struct KdSubtree {
     pub nodes: Vec<KdNode>,

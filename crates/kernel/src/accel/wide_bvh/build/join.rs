@@ -51,7 +51,7 @@ struct UpperNodes {
 }
 
 impl UpperNodes {
-    /// Creates the node for a part, and all nodes below it. Returns its index.
+    /// Creates the node for a part and all nodes below it, and returns the node's index.
     fn add_part(&mut self, bounds: SimdBounds, part: TreePart) -> usize {
         let place = self.nodes.len();
         self.nodes.push(Vec::new());

@@ -33,8 +33,7 @@ pub struct ReferenceRangeWithSplit {
     pub bounds: SimdBounds,
     /// Number of ancestors of this segment.
     level: u32,
-    /// The best split. `None` if it costs at least as much as a leaf, even without counting the traversal
-    /// step.
+    /// The best split, or `None` if it costs at least as much as a leaf even without the traversal step.
     pub split: Option<Split>,
     /// Whether the segment is worth its own node.
     pub is_node: bool,
@@ -43,8 +42,8 @@ pub struct ReferenceRangeWithSplit {
 /// How to split a segment.
 #[derive(Clone, Copy, Debug)]
 pub enum Split {
-    /// At a plane. References below `bin` on `axis` go to the left. `sides` are the bounding boxes of both
-    /// sides.
+    /// At a plane. References below `bin` on `axis` go to the left. `sides` contains the bounding box of each
+    /// side.
     Plane { axis: usize, bin: usize, bins: BinMapping, sides: [SimdBounds; 2] },
     /// In the middle of the references in their current order.
     Middle,
@@ -301,8 +300,8 @@ fn partition_along_axis<const AXIS: usize>(
     }
 }
 
-/// Moves the references below a bin to the front. Returns how many there are, and the bounding boxes of the
-/// centroids on both sides. Branchless, since data-dependent branches would often be mispredicted: every
+/// Moves the references below a bin to the front. Returns their number, and the bounding box of the centroids
+/// on each side. Branchless, since data-dependent branches would often be mispredicted: every
 /// reference is swapped with the first one on the right, and then the length of the left side is incremented
 /// by 0 or 1.
 #[allow(clippy::manual_swap)] // `swap` goes through memory, so the next iteration stalls, which halves the build speed

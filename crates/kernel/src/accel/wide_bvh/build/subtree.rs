@@ -13,7 +13,7 @@ pub struct TrianglePackRange {
     pub count: u32,
 }
 
-/// Nodes and packs. Their indices are relative to the subtree.
+/// Nodes and packs, with indices relative to the subtree.
 #[derive(Debug)]
 pub struct WideSubtree {
     pub nodes: Vec<WideNode>,
@@ -61,8 +61,8 @@ impl WideSubtree {
         Child::Leaf { first, count: self.packs.len() as u32 - first }
     }
 
-    /// Builds a node. Repeatedly splits the child with the largest box until there are eight (Wald, Benthin,
-    /// Boulos, *Getting Rid of Packets*, 2008).
+    /// Builds a node by repeatedly splitting the child with the largest box until there are eight (Wald,
+    /// Benthin, Boulos, *Getting Rid of Packets*, 2008).
     fn build_node(
         &mut self,
         references: &mut [TriangleReference],

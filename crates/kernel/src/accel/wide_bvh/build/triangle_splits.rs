@@ -48,7 +48,7 @@ pub fn split_large_triangles(
     Ok(chunks.map(of_chunk).collect::<Result<Vec<_>, _>>()?.concat())
 }
 
-/// How often to cut a triangle with this priority.
+/// Number of times to cut a triangle with this priority.
 fn cut_count(priority: f32, factor: f32) -> u32 {
     (priority * factor) as u32
 }
@@ -62,7 +62,7 @@ fn find_priority_scale(priorities: &[f32], most: u64) -> f32 {
     if !(sum > 0.0 && sum.is_finite()) {
         return 0.0;
     }
-    // Rounding down loses less than one cut for each triangle.
+    // Rounding down loses less than one cut per triangle.
     let (mut low, mut high) =
         ((most as f64 / sum) as f32, ((most as f64 + priorities.len() as f64) / sum) as f32);
     for _ in 0..12 {
@@ -82,7 +82,8 @@ struct BisectionGrid {
 struct GridPlane {
     axis: usize,
     at: f32,
-    /// Level of the plane. Level 0 halves a cell of the finest grid; higher levels halve larger cells.
+    /// Level of the plane. Level 0 separates two cells of the finest grid; higher levels separate larger
+    /// cells.
     level: u32,
 }
 

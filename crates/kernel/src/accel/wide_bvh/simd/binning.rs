@@ -21,8 +21,8 @@ pub fn try_add_to_histogram<const N: usize>(
     false
 }
 
-/// Moves the references below a bin to the front. Returns how many there are, and the bounding boxes of the
-/// centroids on both sides. Returns `None` and does nothing if the processor lacks AVX2.
+/// Moves the references below a bin to the front. Returns their number, and the bounding box of the centroids
+/// on each side. Returns `None` and does nothing if the processor lacks AVX2.
 pub fn try_partition<const AXIS: usize>(
     references: &mut [TriangleReference],
     bin: usize,

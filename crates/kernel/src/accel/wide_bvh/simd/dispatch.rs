@@ -18,7 +18,7 @@ impl InstructionSet {
         match self.or_best_supported() {
             Self::Portable => work.run(PortableSimd),
             #[cfg(target_arch = "x86_64")]
-            // SAFETY: `available` returns an instruction set that the processor supports.
+            // SAFETY: `or_best_supported` returns an instruction set that the processor supports.
             Self::Avx2 => unsafe { run_avx2(work) },
             #[cfg(target_arch = "x86_64")]
             // SAFETY: as above.

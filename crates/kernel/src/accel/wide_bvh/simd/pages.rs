@@ -3,7 +3,7 @@
 /// Minimum allocation size in bytes for using huge pages.
 const LARGE: usize = 1 << 21;
 
-/// An empty vector with capacity for `count` items, in huge pages if the vector is large.
+/// Allocates an empty vector with capacity for `count` items, using huge pages if it is large.
 pub fn allocate_vec_in_huge_pages<T>(count: usize) -> Vec<T> {
     let items = Vec::with_capacity(count);
     let bytes = count * size_of::<T>();

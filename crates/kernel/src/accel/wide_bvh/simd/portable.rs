@@ -81,7 +81,7 @@ pub fn any_hit(tree: &WideBvh, ray: &Ray, except: Option<u32>) -> bool {
     false
 }
 
-/// Children that the ray hits, and their entry distances.
+/// Returns the children that the ray hits, with their entry distances.
 fn hit_children(node: &WideNode, slabs: &SlabRay, t_max: f32) -> impl Iterator<Item = (f32, Child)> {
     (0..WIDTH).filter_map(move |slot| {
         let corner = |side: usize| {

@@ -103,7 +103,7 @@ fn update_nearest_out_of_line(
     intersect_and_update_nearest(pack, lane, &ShearedRay::new(ray.origin, ray.direction), t_max, best);
 }
 
-/// Pushes the children that the ray hits, farthest first, except for the nearest. Returns the nearest.
+/// Returns the nearest child that the ray hits, and pushes the other children that it hits, farthest first.
 #[target_feature(enable = "avx2,fma")]
 #[inline]
 fn push_farther_children(

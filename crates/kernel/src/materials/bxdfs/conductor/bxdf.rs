@@ -30,7 +30,7 @@ soa! {
         normal: Vec3 = Vec3::Z,
         /// Unit direction to the viewer.
         wo: Vec3 = Vec3::Z,
-        /// Direction of u. Arbitrary for isotropic surfaces.
+        /// Direction of u, which is arbitrary for isotropic surfaces.
         tangent: Vec3 = Vec3::X,
     }
 }
@@ -72,7 +72,7 @@ impl<const BRUSHED: bool> Bxdf for ConductorBxdf<BRUSHED> {
 
     #[inline(always)]
     fn new(point: &ConductorPoint, tangent: Vec3) -> Self {
-        // Without texture coordinates, the surface is isotropic. Its α is the geometric mean of both α
+        // Without texture coordinates, the surface is isotropic, and its α is the geometric mean of the two α
         // values.
         let [u, v] = point.alphas;
         let mean = (u * v).sqrt();

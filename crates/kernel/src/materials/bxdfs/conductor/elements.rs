@@ -3,7 +3,7 @@
 //! The values are measured spectra weighted by the color matching functions of the sRGB primaries.
 //! `assets/metals.py` contains the spectra and generates this table. Gold, silver, copper: Johnson and
 //! Christy, *Optical constants of the noble metals*, Phys. Rev. B 6, 1972. Iron, chromium, titanium: Johnson
-//! and Christy, *Optical constants of transition metals*, Phys. Rev. B 9, 1974. Aluminium: Rakić, *Algorithm
+//! and Christy, *Optical constants of transition metals*, Phys. Rev. B 9, 1974. Aluminum: Rakić, *Algorithm
 //! for the determination of intrinsic optical constants of metal films*, Appl. Opt. 34, 1995.
 
 use crate::choice;

@@ -42,7 +42,7 @@ pub enum ConductorFresnel {
 pub struct FresnelPoint {
     /// The reflectance at normal incidence, or the real part η.
     pub first: Vec3,
-    /// The imaginary part k. Negative for Schlick's approximation.
+    /// The imaginary part k, or a negative number for Schlick's approximation.
     pub second: Vec3,
 }
 
@@ -67,7 +67,7 @@ impl ConductorFresnel {
 }
 
 impl FresnelPoint {
-    /// Schlick's approximation. Limits the reflectance at normal incidence to at most 1.
+    /// Uses Schlick's approximation. Limits the reflectance at normal incidence to at most 1.
     pub fn from_schlick(reflectance: Vec3) -> Self {
         Self { first: reflectance.min(Vec3::ONE), second: Vec3::NEG_ONE }
     }

@@ -1,7 +1,7 @@
-//! Samples the lobes of a Phong surface. The diffuse lobe is cosine-weighted. The density of the glossy lobe
-//! is proportional to the cosine to the power α around the reflected view direction (Lafortune and Willems,
-//! *Using the Modified Phong Reflectance Model for Physically Based Rendering*, 1994). Lobes are chosen by
-//! albedo, and the pdf includes both.
+//! Samples the lobes of a Phong surface. The diffuse lobe is cosine-weighted. The pdf of the glossy lobe is
+//! proportional to the cosine of the angle to the reflected view direction, raised to the power α (Lafortune
+//! and Willems, *Using the Modified Phong Reflectance Model for Physically Based Rendering*, 1994). Lobes are
+//! chosen by albedo, and the overall pdf includes both lobes.
 
 use std::f32::consts::{FRAC_1_PI, PI};
 
@@ -83,8 +83,8 @@ pub fn direction_about_axis(axis: Vec3, sine: f32, cosine: f32, turn: f32) -> Ve
 }
 
 /// The glossy lobe's value in a direction, relative to its peak. It is the cosine between the direction and
-/// the reflected view direction, to the power α, or 0 if the cosine is negative. The cosine is computed from
-/// the chord because cos θ loses precision in `f32` for small θ.
+/// the reflected view direction, raised to the power α, or 0 if the cosine is negative. The cosine is
+/// computed from the chord because cos θ loses precision in `f32` for small θ.
 #[inline(always)]
 pub fn phong_cosine_power(mirrored_eye: Vec3, direction: Vec3, shininess: f32) -> f32 {
     let cosine = 1.0 - 0.5 * f64::from((mirrored_eye - direction).length_squared());

@@ -96,7 +96,7 @@ impl PhongBsdf {
         self.diffuse_value() + self.specular_peak() * gloss
     }
 
-    /// The lobes for a view direction. `normal` is the unit normal on that side.
+    /// The lobes for a view direction. `normal` is the unit normal on the viewer's side.
     pub fn lobes(&self, normal: Vec3, to_eye: Vec3) -> PhongLobes {
         PhongLobes {
             normal,
@@ -149,7 +149,7 @@ mod tests {
         assert!((f64::from(value) - expected).abs() < 1e-4 * expected, "{value} {expected}");
     }
 
-    /// Albedo by quadrature over the hemisphere of light directions.
+    /// Albedo, computed by quadrature over the hemisphere of light directions.
     fn albedo(shininess: f32, degrees: f32) -> f64 {
         let (rings, steps) = (400, 800);
         let mut sum = 0.0;

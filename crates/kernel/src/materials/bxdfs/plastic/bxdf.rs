@@ -61,7 +61,7 @@ impl PlasticBxdf {
         }
     }
 
-    /// The coat's transmittance in both directions. 0 for light from behind.
+    /// The coat's transmittance in both directions, or 0 for light from behind.
     #[inline(always)]
     fn two_way_coat_transmittance(&self, view: &PlasticViewTerms, wi: Vec3, any: BxdfFlags) -> f32 {
         let cosine = view.normal.dot(wi);

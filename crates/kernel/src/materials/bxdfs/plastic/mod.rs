@@ -38,11 +38,11 @@ pub struct PlasticPoint {
     pub diffuse: Vec3,
     /// f of the base in sr⁻¹, for light that passes through the coat in both directions.
     pub base: Vec3,
-    /// Factor for the coat's reflectance. 0 if the coat is smooth.
+    /// Factor for the coat's reflectance, or 0 if the coat is smooth.
     pub specular: Vec3,
     /// Index of refraction.
     pub ior: f32,
-    /// α. 0 if the coat is smooth.
+    /// α of the coat, or 0 if it is smooth.
     pub alpha: f32,
     /// Albedo of the coat.
     pub albedo: LobeAlbedoPolynomial,

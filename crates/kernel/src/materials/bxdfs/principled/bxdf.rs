@@ -48,9 +48,9 @@ soa! {
 soa! {
     /// View-dependent values of a principled material.
     pub struct PrincipledViewTerms in PrincipledViewPacket {
-        /// Unit normal that faces the viewer. For transmitted light, it is on the other side.
+        /// Unit normal on the viewer's side, or on the opposite side for transmitted light.
         normal: Vec3 = Vec3::Z,
-        /// Unit direction to the viewer. For transmitted light, it is mirrored to the other side.
+        /// Unit direction to the viewer, mirrored to the opposite side for transmitted light.
         wo: Vec3 = Vec3::Z,
         /// Fraction of the light that passes through the specular lobe between the diffuse lobe and the
         /// viewer.
@@ -69,7 +69,7 @@ soa! {
 /// Set if there is a clear coat.
 const COATED: BxdfFlags = BxdfFlags(1 << BxdfFlags::FIRST_OWN);
 
-/// Transmits light.
+/// Set if the material transmits light.
 const TRANSMITS: BxdfFlags = BxdfFlags(2 << BxdfFlags::FIRST_OWN);
 
 /// Limits a cosine to at least 0.
@@ -121,7 +121,7 @@ impl<const THROUGH: bool> PrincipledBxdf<THROUGH> {
         }
     }
 
-    /// f of the specular lobe and of the coat. 0 for light from behind.
+    /// f of the specular lobe and of the coat, or 0 for light from behind.
     #[inline(always)]
     fn reflection_f(&self, view: &PrincipledViewTerms, wi: Vec3, any: BxdfFlags) -> Vec3 {
         let half = UnnormalizedHalfVector::from_reflection(view.normal, view.wo, wi);

@@ -3,8 +3,8 @@
 //! - Specular lobe: F is a mix of a metal and a dielectric, weighted by `metallic`. Both use Schlick's
 //!   approximation. For the metal, F0 is `color`. For the dielectric, F0 = min(((ior − 1)/(ior + 1))² ·
 //!   specular_color, 1) · specular and F90 = specular.
-//! - Diffuse lobe: (1 − metallic)(1 − transmission) · color/π · (1 − E(μᵢ))(1 − E(μₒ))/(1 − Ē), where E is the albedo of the
-//!   dielectric lobe.
+//! - Diffuse lobe: (1 − metallic)(1 − transmission) · color/π · (1 − E(μᵢ))(1 − E(μₒ))/(1 − Ē), where E is
+//!   the albedo of the dielectric lobe.
 //! - Transmission through a thin sheet: the specular lobe, mirrored to the other side, times (1 − metallic) ·
 //!   transmission · color · (1 − F), where F is the reflectance of the dielectric. Transmissive surfaces are
 //!   represented by two vertices, see [`bsdf`](crate::materials::bsdf).
@@ -33,7 +33,7 @@ const COAT_REFLECTANCE: f32 = 0.04;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Principled {
     inputs: PrincipledInputs,
-    /// Albedos of the specular lobe and of the coat. `None` for lobes with varying roughness.
+    /// Albedos of the specular lobe and of the coat, or `None` for lobes with varying roughness.
     albedos: [Option<SchlickAlbedoPair>; 2],
 }
 
@@ -46,7 +46,7 @@ pub struct PrincipledInputs {
     pub metallic: ScalarParameter,
     /// The square root of α.
     pub roughness: ScalarParameter,
-    /// Index of refraction. At least 1.
+    /// Index of refraction, at least 1.
     pub ior: f32,
     /// Factor for the dielectric's reflectance.
     pub specular: ScalarParameter,
@@ -97,8 +97,9 @@ impl PrincipledPoint {
     }
 }
 
-/// Albedos of two lobes that use Schlick's approximation. The facets of one lobe have a reflectance of 1 at
-/// normal incidence and 0 at grazing angles. For the other lobe, it is the other way around.
+/// Albedos of two lobes that use Schlick's approximation. One lobe's facets have a reflectance of 1 at normal
+/// incidence and 0 at grazing angles, and the other lobe's facets 0 at normal incidence and 1 at grazing
+/// angles.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SchlickAlbedoPair {
     /// Albedo per unit of reflectance at normal incidence.
@@ -138,12 +139,12 @@ pub struct EmissionCoat {
     weight: ScalarParameter,
     /// The square root of the coat's α.
     roughness: ScalarParameter,
-    /// The coat's albedo. `None` if the roughness varies.
+    /// The coat's albedo, or `None` if the roughness varies.
     albedo: Option<LobeAlbedoPolynomial>,
 }
 
 impl EmissionCoat {
-    /// A coat with the given weight and roughness. `None` if the weight is 0.
+    /// Creates a coat with the given weight and roughness, or returns `None` if the weight is 0.
     pub fn new(weight: ScalarParameter, roughness: ScalarParameter) -> Option<Self> {
         if weight.as_untextured() == Some(0.0) {
             return None;

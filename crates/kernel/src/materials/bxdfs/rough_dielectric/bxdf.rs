@@ -41,7 +41,7 @@ const MIN_COSINE: f32 = 1e-6;
 pub struct DielectricSample {
     /// Unit direction.
     pub wi: Vec3,
-    /// Pdf of the direction in sr⁻¹. 0 for directions from which no light arrives.
+    /// Pdf of the direction in sr⁻¹, or 0 for directions from which no light arrives.
     pub pdf: f32,
     /// f·cosθ of the lobe divided by the pdf.
     pub weight: f32,
@@ -77,7 +77,7 @@ impl<const THROUGH: bool> DielectricBxdf<THROUGH> {
         }
         let indices = [self.near, self.far];
         let (half, sum) = UnnormalizedHalfVector::from_refraction(view.normal, [view.wo, wi], indices);
-        // The facet must face the viewer if the surface does, and light must come from behind both.
+        // The facet must face the viewer, as the surface does, and light must arrive from behind the facet.
         let scale = if half.along > 0.0 { 1.0 } else { -1.0 } / half.squared.sqrt();
         let cosines = [scale * view.wo.dot(sum), -scale * wi.dot(sum)];
         let is_through = (cosines[0] > MIN_COSINE) & (cosines[1] > MIN_COSINE);

@@ -9,9 +9,9 @@
 //!   nₒ o + nᵢ i. Light is measured in basic radiance, L/n². Therefore, nᵢ² replaces the nₒ² used for radiance,
 //!   and f/nᵢ² is the same in both directions.
 //!
-//! A surface is represented by two vertices, see [`bsdf`](crate::materials::bsdf). Both sample the same
-//! facet, and choose reflection with probability F, refraction otherwise. Therefore, f·cosθᵢ divided by the
-//! pdf is G/G₁ for both.
+//! A surface is represented by two vertices, see [`bsdf`](crate::materials::bsdf). Both vertices sample the
+//! same facet, and choose reflection with probability F and refraction otherwise. Therefore, f·cosθᵢ divided
+//! by the pdf is G/G₁ at both vertices.
 
 mod bxdf;
 

@@ -6,7 +6,7 @@ use crate::accel::wide_bvh::simd::vector::{SimdF32x8, SimdVector};
 use crate::geometry::aabb::SLAB_PAD;
 
 /// Bounds on all rays in a packet, tested against eight boxes at a time. Subtraction and multiplication round
-/// monotonically, so no ray enters a box before the frustum does, or leaves it after the frustum.
+/// monotonically, so no ray enters a box before the frustum does, or leaves it after the frustum does.
 pub struct Frustum {
     /// The origin coordinate closest to the near plane: the maximum for positive directions, the minimum for
     /// negative ones.

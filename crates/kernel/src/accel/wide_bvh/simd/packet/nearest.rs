@@ -19,7 +19,7 @@ pub struct NearestHits<V: SimdVector> {
 }
 
 impl<V: SimdVector> NearestHits<V> {
-    /// Creates a packet without hits from the ends of the rays.
+    /// Starts without any hits. `ends` contains the ends of the rays.
     #[inline(always)]
     pub fn new(ends: V) -> Self {
         Self { t: ends, u: ends, v: ends, id: ends.splat_like(f32::from_bits(u32::MAX)), found: 0 }

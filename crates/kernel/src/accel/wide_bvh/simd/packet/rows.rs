@@ -30,8 +30,8 @@ impl RaySoa {
         self.start[lane] = f32::from_bits(ray.start);
     }
 
-    /// Loads rays. Lanes without a ray or with a negative end get a copy of the first traced ray. `None` if
-    /// no ray is traced.
+    /// Loads rays. Lanes without a ray or with a negative end get a copy of the first traced ray. Returns
+    /// `None` if no ray is traced.
     #[inline(always)]
     pub fn new(rays: &[Ray], ends: &F32x16) -> Option<Self> {
         let count = rays.len().min(SIZE);
