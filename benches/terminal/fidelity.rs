@@ -10,7 +10,7 @@ use std::process::{Command, Stdio};
 
 use glimt::film::Srgb8Image;
 use glimt::math::Vec3;
-use glimt::math::color::srgb8_to_linear;
+use glimt::math::color::srgb8_color_to_linear;
 use glimt::tui::{ColorDepth, PreviewChoice, draw_for_dark_xterm, filled_squares, xterm_rgb};
 use ratatui::buffer::{Buffer, Cell};
 use ratatui::layout::Rect;
@@ -201,7 +201,7 @@ impl LinearImage {
             let place = y % CELL.1 / (CELL.1 / 12) * 2 + x % CELL.0 / (CELL.0 / 2);
             let symbol = cell.symbol().chars().next().unwrap_or(' ');
             let [ink, ground] = [xterm_rgb(cell.fg).unwrap_or(INK), xterm_rgb(cell.bg).unwrap_or(GROUND)];
-            let [ink, ground] = [ink, ground].map(srgb8_to_linear);
+            let [ink, ground] = [ink, ground].map(srgb8_color_to_linear);
             let part = match (filled_squares(symbol), (symbol as usize).checked_sub(0x20)) {
                 (Some(filled_squares), _) => f32::from(u8::from(filled_squares[place])),
                 (None, Some(number)) => INK_OF_ASCII.get(number).map_or(0.0, |ink| f32::from(*ink) / 255.0),
@@ -213,7 +213,7 @@ impl LinearImage {
     }
 
     fn of_picture(picture: &Srgb8Image, width: usize, height: usize) -> Self {
-        let linear = picture.pixels.iter().map(|pixel| srgb8_to_linear(*pixel)).collect();
+        let linear = picture.pixels.iter().map(|pixel| srgb8_color_to_linear(*pixel)).collect();
         let image =
             glimt::film::RadianceImage { width: picture.width, height: picture.height, pixels: linear };
         let pixels = image.resized(width as u32, height as u32).pixels;

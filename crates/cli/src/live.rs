@@ -14,7 +14,9 @@ use crate::pipeline::protocol::{
     CheckpointUpdate, Command, Event, Failure, SavedSceneImageState, Stage, Status,
 };
 use crate::pipeline::start;
-use crate::pipeline::watch::{ExternalChange, FileHashCache, FileRead, Watcher, find_missing_folder};
+use crate::pipeline::watch::{
+    ExternalChange, FileHashCache, FileRead, Watcher, find_missing_parent_or_working_folder,
+};
 use crate::scene::diagnostic::Diagnostic;
 use crate::scene::sanitize::escape_invisible_chars;
 use crate::scene::{SAME_TEXT, is_file_not_found, read_current_text};
@@ -345,7 +347,7 @@ fn add_waiting_help(problem: &mut Diagnostic) {
         let is_file = |help: &String| help.starts_with("did you mean") || help.contains(SAME_TEXT);
         let file = problem.help.take().filter(is_file);
         let file = file.map_or(String::new(), |help| format!("; {help}"));
-        problem.help = Some(match find_missing_folder(&problem.path) {
+        problem.help = Some(match find_missing_parent_or_working_folder(&problem.path) {
             Some(folder) => format!(
                 "waiting for the folder {} and the scene to appear{file}",
                 escape_invisible_chars(&folder.to_string_lossy())
@@ -423,7 +425,7 @@ mod tests {
     }
 
     #[test]
-    fn unread_save_makes_the_image_older() {
+    fn image_is_outdated_after_an_unread_save() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("a.toml");
         std::fs::write(&path, "1").expect("written");

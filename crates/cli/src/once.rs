@@ -32,7 +32,7 @@ const TICK: Duration = Duration::from_millis(50);
 /// Runs `--once`.
 pub(super) fn run(order: &RenderRequest, console: &Console) -> Exit {
     // Lower the priority before starting threads, because threads inherit it.
-    priority::lower_thread_and_child_priority(order.nice);
+    priority::lower_priority_including_spawned_threads(order.nice);
     let worker = match start(0) {
         Ok(worker) => worker,
         Err(error) => return console.print_error(Exit::FAILED, &describe_start_failure(1, false, &error)),

@@ -29,7 +29,7 @@ impl RequestCamera {
     pub(super) fn new(scene: &Scene, orbiter: Option<GkitOrbiterCamera>, change: &CameraOverrides) -> Self {
         let own = Self { camera: scene.camera.clone(), orbiter };
         if change.has_changes() {
-            Self { camera: own.viewpoint().with_change(change).into(), orbiter: None }
+            Self { camera: own.resolved_camera().with_change(change).into(), orbiter: None }
         } else {
             own
         }
@@ -41,7 +41,7 @@ impl RequestCamera {
             // The first frame uses the scene's camera unchanged.
             None | Some(TurntableFrame { number: 0, .. }) => self,
             Some(turn) => {
-                let view = self.viewpoint();
+                let view = self.resolved_camera();
                 let change =
                     CameraOverrides { pose: Some(turn.pose(&view.pose)), ..CameraOverrides::default() };
                 Self { camera: view.with_change(&change).into(), orbiter: None }
@@ -49,7 +49,7 @@ impl RequestCamera {
         }
     }
 
-    pub(super) fn viewpoint(&self) -> ResolvedCamera {
+    pub(super) fn resolved_camera(&self) -> ResolvedCamera {
         world::Camera::look_at_from_description(&self.camera, self.orbiter.as_ref())
     }
 

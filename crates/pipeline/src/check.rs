@@ -10,7 +10,7 @@ use super::plan::resolve_plan;
 use super::protocol::{Failure, PreviewSlot};
 use super::settings::Overrides;
 use super::sink::EventSink;
-use super::stages::meshes::Meshes;
+use super::stages::meshes::MeshesByFileIndex;
 use super::stages::parse::ParsedScene;
 use super::stages::textures::Textures;
 use crate::assets::FileMaterial;
@@ -90,7 +90,7 @@ impl IncrementalSceneChecker {
 
 fn summarize(
     parsed: &ParsedScene,
-    meshes: &Meshes,
+    meshes: &MeshesByFileIndex,
     textures: &Textures,
     mut warnings: Vec<Diagnostic>,
 ) -> SceneSummary {

@@ -31,7 +31,7 @@ pub(super) struct ImageDependencies<'a> {
 impl ImageDependencies<'_> {
     /// Returns the names and values of everything that affects the image.
     pub(super) fn names_and_values(&self) -> Vec<RenderInput> {
-        let mut traits = vec![RenderInput::from_name_and_value("glimt", BUILD)];
+        let mut traits = vec![RenderInput::from_setting("glimt", BUILD)];
         self.add_settings(&mut traits);
         let scene_path = &self.parsed.loaded.path;
         let others = self.files.iter().filter(|file| file.path != *scene_path);
@@ -45,7 +45,7 @@ impl ImageDependencies<'_> {
     fn add_settings(&self, traits: &mut Vec<RenderInput>) {
         let RenderSettings { render, dof, view, photons, layers } =
             self.plan.settings.without_ineffective_settings();
-        let mut add = |name: &str, value: String| traits.push(RenderInput::from_name_and_value(name, value));
+        let mut add = |name: &str, value: String| traits.push(RenderInput::from_setting(name, value));
         add("width", render.width.to_string());
         add("height", render.height.to_string());
         add("error", render.error.to_string());
@@ -92,7 +92,7 @@ impl ImageDependencies<'_> {
 
     /// Returns a fingerprint of shapes, materials, lights, camera and settings.
     fn fingerprint(&self) -> Fingerprint {
-        let scene = self.scene_with_content_hashes();
+        let scene = self.copy_scene_with_content_hashes();
         let eye = RequestCamera::new(&scene, self.parsed.orbiter, self.camera);
         let orbiter = eye.orbiter.map(|camera| format!("{camera:?}"));
         let meshes: Vec<Fingerprint> = scene
@@ -100,13 +100,13 @@ impl ImageDependencies<'_> {
             .iter()
             .map(|file| file_content_and_part_key(&self.describe_file_content(&file.value), file.part))
             .collect();
-        let of = keys::fingerprint_context(&scene, &meshes, orbiter.as_deref());
-        let world = keys::world_key(&keys::surfaces_key(&scene, &of, &[]), &eye.camera, &of);
+        let of = keys::scene_fingerprint_context(&scene, &meshes, orbiter.as_deref());
+        let world = keys::world_key(&keys::surfaces_and_lights_key(&scene, &of, &[]), &eye.camera, &of);
         keys::film_sums_key(world, &self.plan.settings, self.plan.crop)
     }
 
     /// Returns the scene with each path replaced by a description of the file's content.
-    fn scene_with_content_hashes(&self) -> Scene {
+    fn copy_scene_with_content_hashes(&self) -> Scene {
         let mut scene = Scene::clone(&self.plan.scene);
         for texture in &mut scene.textures {
             texture.file.value = self.describe_file_content(&texture.file.value).into();

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::identity::path_relative_to_scene;
-use super::stages::meshes::Meshes;
+use super::stages::meshes::MeshesByFileIndex;
 use super::stages::parse::ParsedScene;
 use super::watch::content::FileRead;
 use crate::assets::gltf::is_gltf;
@@ -63,7 +63,7 @@ impl ProtectedInputs {
     }
 
     /// Adds the material libraries and images used by mesh files, and the files referenced by glTF files.
-    pub(super) fn add_mesh_dependencies(&mut self, loaded: &Arc<LoadedScene>, meshes: &Meshes) {
+    pub(super) fn add_mesh_dependencies(&mut self, loaded: &Arc<LoadedScene>, meshes: &MeshesByFileIndex) {
         for (file, kept) in loaded.scene.mesh_files.iter().zip(meshes) {
             let name = file.value.file_name().unwrap_or_default().to_string_lossy();
             let mut add = |path: &PathBuf, role: String| {

@@ -10,7 +10,7 @@ use crate::scene::fingerprint::{Fingerprint, FingerprintContext, FingerprintHash
 
 /// Returns the context for fingerprinting scene descriptions: the textures, meshes and orbiter that they
 /// refer to.
-pub(crate) fn fingerprint_context<'a>(
+pub(crate) fn scene_fingerprint_context<'a>(
     scene: &'a Scene,
     meshes: &'a [Fingerprint],
     orbiter: Option<&'a str>,
@@ -39,7 +39,7 @@ pub(crate) fn geometry_key(
     distinct: impl Iterator<Item = Option<Fingerprint>>,
 ) -> Fingerprint {
     let mut key = FingerprintHasher::new("lifted");
-    key.add_fingerprint(&key_with_coordinate_origin(&shapes_key(scene, of), origin));
+    key.add_fingerprint(&key_with_coordinate_origin(&all_object_shapes_key(scene, of), origin));
     for lift in lifts {
         key.add_dvec3(*lift);
     }
@@ -56,12 +56,12 @@ pub(crate) fn geometry_key(
 /// coplanar surfaces.
 pub(crate) fn coplanar_lights_key(scene: &Scene, of: &FingerprintContext<'_>) -> Fingerprint {
     let mut key = FingerprintHasher::new("coplanar");
-    key.add_fingerprint(&shapes_key(scene, of));
+    key.add_fingerprint(&all_object_shapes_key(scene, of));
     let is_round = |object: &&Object| matches!(object.shape, Shape::Sphere { .. } | Shape::Torus { .. });
     for object in scene.objects.iter().filter(|object| !is_round(object)) {
         let material = object.material.map(|index| &scene.materials[index]);
         let emission = material.filter(|material| material.emits()).map(|material| material.emission.sides);
-        let is_glass = material.is_some_and(|material| material.kind.is_glass());
+        let is_glass = material.is_some_and(|material| material.kind.is_solid_glass());
         key.add_bool(object.material.is_some()).add_bool(is_glass).add_bool(emission.is_some());
         if let Some(sides) = emission {
             key.add_choice(sides);
@@ -80,7 +80,7 @@ pub(crate) fn with_tree_kind(of: &Fingerprint, accel: Accel) -> Fingerprint {
     FingerprintHasher::new("in trees").add_fingerprint(of).add_choice(accel).finish()
 }
 
-fn shapes_key(scene: &Scene, of: &FingerprintContext<'_>) -> Fingerprint {
+fn all_object_shapes_key(scene: &Scene, of: &FingerprintContext<'_>) -> Fingerprint {
     let mut key = FingerprintHasher::new("shapes");
     for object in &scene.objects {
         key.add(&object.shape, of);
@@ -91,7 +91,7 @@ fn shapes_key(scene: &Scene, of: &FingerprintContext<'_>) -> Fingerprint {
 /// Returns the key for the shapes and their glass materials.
 pub(crate) fn glass_key(scene: &Scene, of: &FingerprintContext<'_>) -> Fingerprint {
     let mut key = FingerprintHasher::new("glass");
-    key.add_fingerprint(&shapes_key(scene, of));
+    key.add_fingerprint(&all_object_shapes_key(scene, of));
     for object in &scene.objects {
         let substance = object.material.and_then(|index| scene.materials[index].kind.glass_medium_identity());
         key.add_bool(object.material.is_some()).add_bool(substance.is_some());
@@ -139,7 +139,7 @@ fn light_descriptions_key(scene: &Scene, of: &FingerprintContext<'_>) -> Fingerp
                     .add(&object.shape, of)
                     .add(&material.emission, of)
                     .add(&material.opacity, of);
-                for number in material.emitter_coat_parameters().iter().flatten() {
+                for number in material.emitter_coat_weight_and_roughness().iter().flatten() {
                     key.add(number, of);
                 }
             }
@@ -175,13 +175,14 @@ pub(crate) fn photons_key(
 }
 
 /// Returns the key for all surfaces, lights and textures.
-pub(crate) fn surfaces_key(
+pub(crate) fn surfaces_and_lights_key(
     scene: &Scene,
     of: &FingerprintContext<'_>,
     textures: &[Fingerprint],
 ) -> Fingerprint {
     let mut key = FingerprintHasher::new("surfaces");
-    key.add_fingerprint(&shapes_key(scene, of)).add_fingerprint(&light_descriptions_key(scene, of));
+    key.add_fingerprint(&all_object_shapes_key(scene, of))
+        .add_fingerprint(&light_descriptions_key(scene, of));
     for object in &scene.objects {
         match object.material {
             Some(index) => key.add_usize(1).add(&scene.materials[index], of),
@@ -237,11 +238,11 @@ mod tests {
 
     fn keys(text: &str) -> (Fingerprint, Fingerprint, Fingerprint) {
         let scene = loaded_of(text).scene;
-        let of = fingerprint_context(&scene, &[], None);
+        let of = scene_fingerprint_context(&scene, &[], None);
         (
             geometry_key(&scene, &of, (DVec3::ZERO, &[]), std::iter::empty()),
             lights_key(&scene, &of, (DVec3::ZERO, &[]), (None, &[])),
-            world_key(&surfaces_key(&scene, &of, &[]), &scene.camera, &of),
+            world_key(&surfaces_and_lights_key(&scene, &of, &[]), &scene.camera, &of),
         )
     }
 
@@ -274,7 +275,7 @@ mod tests {
             let scene = loaded_of(BALL).scene;
             geometry_key(
                 &scene,
-                &fingerprint_context(&scene, &[], None),
+                &scene_fingerprint_context(&scene, &[], None),
                 (DVec3::ZERO, &[lift]),
                 std::iter::empty(),
             )
@@ -420,7 +421,7 @@ mod tests {
         let quad = "[[quad]]\ncorner = [0, 0, 0]\nu = [1, 0, 0]\nv = [0, 1, 0]\nmaterial = \"m\"\n";
         let key = |kind: &str| {
             let scene = loaded_of(&format!("{quad}[materials.m]\ntype = \"{kind}\"\n")).scene;
-            coplanar_lights_key(&scene, &fingerprint_context(&scene, &[], None))
+            coplanar_lights_key(&scene, &scene_fingerprint_context(&scene, &[], None))
         };
         assert_ne!(key("phong"), key("glass"));
     }

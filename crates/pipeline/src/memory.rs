@@ -7,7 +7,7 @@
 use super::plan::RenderPlan;
 use super::render::share::Shard;
 use super::stages::AbortReason;
-use super::stages::meshes::Meshes;
+use super::stages::meshes::MeshesByFileIndex;
 use crate::film::{Film, Rect, SumOrder};
 use crate::integrators::PhotonSettings;
 use crate::scene::description::{Accel, Scene};
@@ -50,10 +50,10 @@ impl MemoryEstimate {
     pub(super) fn for_image(plan: &RenderPlan) -> Self {
         let render = &plan.settings.render;
         let whole = Rect { x: 0, y: 0, width: render.width, height: render.height };
-        let (film, picture) = Film::memory_for(
+        let (film, picture) = Film::crop_sum_and_image_bytes(
             (render.width, render.height),
             plan.crop.unwrap_or(whole),
-            sample_sum_order(plan),
+            sample_summation_order(plan),
         );
         let threads = plan.threads as u64 * THREAD;
         let mut items = vec![
@@ -78,7 +78,7 @@ impl MemoryEstimate {
     pub(super) fn for_image_and_scene(
         plan: &RenderPlan,
         scene: &Scene,
-        meshes: &Meshes,
+        meshes: &MeshesByFileIndex,
         texture_bytes: u64,
     ) -> Self {
         let Self(mut items) = Self::for_image(plan);
@@ -181,10 +181,10 @@ impl MemoryEstimate {
 
 /// Returns the order in which samples are summed. If photons are enabled, assumes that photons are emitted,
 /// because it is not known yet whether they are.
-fn sample_sum_order(plan: &RenderPlan) -> SumOrder {
+fn sample_summation_order(plan: &RenderPlan) -> SumOrder {
     let gathers = plan.settings.gathers_photons();
     match plan.shard {
-        Some(shard) => Shard::new(shard, gathers, plan.settings.render.samples).sum_order(),
+        Some(shard) => Shard::new(shard, gathers, plan.settings.render.samples).summation_order(),
         None if gathers => SumOrder::Blocked,
         None => SumOrder::Sequential,
     }

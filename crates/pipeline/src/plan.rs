@@ -103,14 +103,15 @@ pub(super) fn resolve_plan(
     let (outputs, named_by) = output_paths(scene.output.as_ref(), path, overrides);
     let is_usual = named_by == OutputNameSource::Default && overrides.turn.is_some();
     let default_names = outputs.first().filter(|_| is_usual).cloned();
-    let OutputFiles { outputs, moving, later_outputs } =
-        OutputFiles::group_turntable_outputs(outputs, overrides.turn);
+    let OutputPathsByKind { outputs, moving, later_outputs } =
+        OutputPathsByKind::classify_output_paths(outputs, overrides.turn);
     let bit_depth = overrides.bit_depth.unwrap_or(8);
     match overrides.shard {
         // Part files do not use an image format.
         Some(_) => check_shardable(&settings, overrides)?,
         None => {
-            let check = |path: &PathBuf| check_format(path, (render.width, render.height), bit_depth);
+            let check =
+                |path: &PathBuf| check_format_supports_image(path, (render.width, render.height), bit_depth);
             outputs.iter().try_for_each(check)?;
             check_layers(&outputs, &moving, settings.view, overrides)?;
             moving.iter().try_for_each(|path| {
@@ -125,7 +126,7 @@ pub(super) fn resolve_plan(
         threads,
         crop: overrides.crop,
         time_seconds: overrides.time_seconds,
-        tone: tone_mapping(render.exposure, render.tonemap, settings.view),
+        tone: tone_mapping_for_view(render.exposure, render.tonemap, settings.view),
         bit_depth,
         effective: EffectiveSettings::new(&settings, threads, &[outputs.as_slice(), &moving].concat()),
         outputs,
@@ -209,14 +210,14 @@ fn requested_report_path(overrides: &Overrides) -> Option<PathBuf> {
 }
 
 /// A request's output files, grouped by kind.
-struct OutputFiles {
+struct OutputPathsByKind {
     outputs: Vec<PathBuf>,
     moving: Vec<PathBuf>,
     later_outputs: Vec<PathBuf>,
 }
 
-impl OutputFiles {
-    fn group_turntable_outputs(paths: Vec<PathBuf>, turn: Option<TurntableFrame>) -> Self {
+impl OutputPathsByKind {
+    fn classify_output_paths(paths: Vec<PathBuf>, turn: Option<TurntableFrame>) -> Self {
         let (mut moving, mut later_outputs) = (Vec::new(), Vec::new());
         let Some(turn) = turn else { return Self { outputs: paths, moving, later_outputs } };
         let mut outputs = Vec::new();
@@ -336,7 +337,7 @@ fn check_shardable(settings: &RenderSettings, overrides: &Overrides) -> Result<(
 }
 
 /// Checks that the file format supports the image size and bit depth.
-fn check_format(path: &Path, size: (u32, u32), bit_depth: u8) -> Result<(), Box<Diagnostic>> {
+fn check_format_supports_image(path: &Path, size: (u32, u32), bit_depth: u8) -> Result<(), Box<Diagnostic>> {
     let check = || Format::from_path(path)?.check_image(size.0, size.1, BitDepth::try_from(bit_depth)?);
     check().map_err(|error: OutputError| {
         let (severity, message) = (Severity::Error, error.to_string());
@@ -345,7 +346,7 @@ fn check_format(path: &Path, size: (u32, u32), bit_depth: u8) -> Result<(), Box<
 }
 
 /// Returns the tone mapping for a view. Exposure and tone curve apply only to light, not to data.
-fn tone_mapping(exposure: f32, curve: Tonemap, view: ViewMode) -> ToneMapping {
+fn tone_mapping_for_view(exposure: f32, curve: Tonemap, view: ViewMode) -> ToneMapping {
     match view.aov_source() {
         AovSource::Light(LightAov::Radiance(_))
         | AovSource::Bounds

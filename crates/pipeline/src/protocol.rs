@@ -19,7 +19,7 @@ pub use super::answers::{
 pub use super::report::{
     ImageReport, LightSamplingReport, PhotonsReport, Report, SampleCounts, SampledLightSet, WorkCounters,
 };
-use super::settings::{EffectiveSettings, KeyboardSettings, Overrides};
+use super::settings::{EffectiveSettings, KeyboardOverridableSettings, Overrides};
 use super::watch::content::FileRead;
 use crate::film::Srgb8Image;
 pub use crate::output::WriteWarning;
@@ -156,7 +156,7 @@ pub enum Event {
         /// The scene's exposure in stops.
         exposure: f32,
         /// The scene's values for the other settings that keys can change.
-        own: KeyboardSettings,
+        own: KeyboardOverridableSettings,
     },
     /// The scene file was read.
     Text {
@@ -450,12 +450,12 @@ pub struct PreviewUpdate {
     /// Whether the preview lacks light from photons because they are still being traced.
     pub lacks_photons: bool,
     /// The image that the preview shows, or `None` if the preview lacks light from photons.
-    pub source: Option<PreviewImageState>,
+    pub source: Option<PreviewSourceImage>,
 }
 
 /// The image that a preview shows, and whether it is finished.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct PreviewImageState {
+pub struct PreviewSourceImage {
     /// Previews with the same key show the same image, although their sizes and sample counts may differ.
     pub image: Fingerprint,
     /// Whether the image has all of its samples.

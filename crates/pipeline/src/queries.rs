@@ -157,7 +157,7 @@ impl QueryContext {
             Some(SavedCameraEdit { path: path.clone(), before: read.into(), after: text.as_str().into() })
         };
         let is_own = LoadedScene::parse_camera_from_text(&text, &self.sets)
-            .is_some_and(|own| own.matches_viewpoint(camera));
+            .is_some_and(|own| own.matches_resolved_camera(camera));
         Ok(CameraSaveResult { path, is_new: edit.is_some(), is_own, of_model: false, edit })
     }
 }

@@ -51,7 +51,7 @@ impl HeadlessSession {
         let (events, _) = mpsc::channel();
         let sink = EventSink { generation: self.generation, events, previews: PreviewSlot::default() };
         let context = RequestContext::new(token, token, &NoPendingCommands);
-        self.engine.render_image(&request, &sink, &context)
+        self.engine.render_radiance_image(&request, &sink, &context)
     }
 
     /// Whether the last image depends on the file at a path.
@@ -80,7 +80,7 @@ impl PendingCommands for NoPendingCommands {
         None
     }
 
-    fn interruption_reason(&self) -> Interruption {
+    fn cancellation_cause(&self) -> Interruption {
         Interruption::Replaced
     }
 }

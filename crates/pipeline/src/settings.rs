@@ -187,7 +187,7 @@ pub enum ResumeMode {
 
 /// Scene settings that can be overridden with keys.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct KeyboardSettings {
+pub struct KeyboardOverridableSettings {
     /// Integrator.
     pub integrator: Integrator,
     /// Shadow type.

@@ -7,7 +7,7 @@ use std::sync::{Arc, PoisonError};
 use std::time::Instant;
 
 use super::protocol::{
-    AssetProgress, CheckpointUpdate, Event, NormalizedRect, PreviewImageState, PreviewSlot, PreviewUpdate,
+    AssetProgress, CheckpointUpdate, Event, NormalizedRect, PreviewSlot, PreviewSourceImage, PreviewUpdate,
     RenderProgress, SampleCounts, SavedSceneImageState, StageReport,
 };
 use super::watch::content::FileRead;
@@ -81,7 +81,7 @@ impl EventSink {
         picture: Srgb8Image,
         range: Option<[f32; 2]>,
         section: Option<NormalizedRect>,
-        source: PreviewImageState,
+        source: PreviewSourceImage,
     ) {
         let (generation, picture, source) = (self.generation, Arc::new(picture), Some(source));
         self.replace_preview_and_notify(PreviewUpdate {
@@ -115,7 +115,7 @@ impl EventSink {
 
     /// Loads an asset and reports the progress that `load` passes to its callback. If loading succeeds,
     /// always reports completion.
-    pub(super) fn load_with_progress<T, E>(
+    pub(super) fn load_asset_with_progress<T, E>(
         &self,
         name: &str,
         load: impl FnOnce(&(dyn Fn(u64, u64) + Sync)) -> Result<T, E>,
@@ -158,7 +158,7 @@ mod tests {
             }
             Ok(())
         };
-        sink.load_with_progress("bricks", load).expect("loaded");
+        sink.load_asset_with_progress("bricks", load).expect("loaded");
         drop(sink);
         let seen: Vec<(u64, u64)> = received
             .into_iter()
@@ -178,7 +178,7 @@ mod tests {
     fn failed_asset_does_not_report_completion() {
         let (events, received) = mpsc::channel();
         let sink = EventSink { generation: 3, events, previews: PreviewSlot::default() };
-        sink.load_with_progress("bricks", |_| -> Result<(), ()> { Err(()) }).expect_err("failed");
+        sink.load_asset_with_progress("bricks", |_| -> Result<(), ()> { Err(()) }).expect_err("failed");
         drop(sink);
         let ends = received.into_iter().filter(
             |event| matches!(event, Event::Asset { progress, .. } if progress.done == progress.total),

@@ -13,7 +13,8 @@ use super::sink::EventSink;
 use crate::output::part::{self, PartFile};
 use crate::output::write::{SweptFolders, WritePolicy};
 use crate::output::{
-    AttributeLossPolicy, FileIdentity, OutputError, ReplaceCheck, check_image_replaceable, may_replace_json,
+    AttributeLossPolicy, FileIdentity, OutputError, ReplaceCheck, check_image_replaceable,
+    check_json_replaceable,
 };
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::has_mesh_extension;
@@ -213,7 +214,7 @@ fn foreign_file_error(plan: &RenderPlan, target: OutputTarget<'_>, at: &Path) ->
             (replaced, help)
         }
         TargetKind::Report => {
-            let replaced = may_replace_json(at, "a report", ReportRecognitionFields::have_all_stages);
+            let replaced = check_json_replaceable(at, "a report", ReportRecognitionFields::have_all_stages);
             (replaced, format!("{remedy}; --force replaces it"))
         }
         TargetKind::Picture(OutputNameSource::CommandLine | OutputNameSource::Scene) => {

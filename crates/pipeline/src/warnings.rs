@@ -101,7 +101,7 @@ fn find_warnings(scene: &Scene, settings: &RenderSettings) -> Vec<(WarnedSetting
     }
     if photons.is_some()
         && has(&is_specular)
-        && scene.lights.iter().any(|light| light.has_emission() && light.has_constant_falloff())
+        && scene.lights.iter().any(|light| light.has_emission() && light.has_disabled_falloff())
     {
         let message = "photons ignore lights with `falloff = \"none\"`: mirrors and glass reflect none of their light onto surfaces";
         warnings.push((WarnedSetting::Photons, message.to_owned()));

@@ -50,11 +50,11 @@ pub fn format_seconds(seconds: f64) -> String {
         s if s < 0.999_5 => format!("{:.0} ms", s * 1e3),
         s if s < 9.995 => format!("{s:.2} s"),
         s if s < 59.95 => format!("{s:.1} s"),
-        s => format_hours_and_minutes(s.round() as u64),
+        s => format_long_duration(s.round() as u64),
     }
 }
 
-fn format_hours_and_minutes(seconds: u64) -> String {
+fn format_long_duration(seconds: u64) -> String {
     match (seconds / 3600, seconds / 60 % 60, seconds % 60) {
         (0, minutes, seconds) => format!("{minutes} min {seconds:02} s"),
         (hours, minutes, _) => format!("{hours} h {minutes:02} min"),
@@ -80,7 +80,7 @@ mod tests {
     }
 
     #[test]
-    fn unreliable_or_huge_eta_is_not_shown() {
+    fn unreliable_or_huge_eta_has_no_duration() {
         let eta = |fraction, elapsed, eta| {
             Eta::from_progress(&progress(fraction, elapsed, Some(eta))).map(Eta::format)
         };

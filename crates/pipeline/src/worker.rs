@@ -139,7 +139,7 @@ struct Mailbox {
 }
 
 /// Returns only those of a request's overrides that the user can change with keys.
-fn keyboard_overrides(request: &Request) -> Overrides {
+fn keyboard_adjustable_overrides(request: &Request) -> Overrides {
     let Overrides { shadows, integrator, dof, photons, view, camera, exposure, .. } = request.overrides;
     Overrides { shadows, integrator, dof, photons, view, camera, exposure, ..Overrides::default() }
 }
@@ -229,10 +229,9 @@ impl CommandSender {
     fn postpone_write_to_pending(&self, can_write: bool) -> bool {
         let mut mailbox = self.lock();
         let is_meant = mailbox.is_write_of_waiting;
-        let postponed = mailbox
-            .request
-            .as_ref()
-            .is_some_and(|request| is_meant || !can_write && keyboard_overrides(request) == mailbox.shown);
+        let postponed = mailbox.request.as_ref().is_some_and(|request| {
+            is_meant || !can_write && keyboard_adjustable_overrides(request) == mailbox.shown
+        });
         (mailbox.write, mailbox.is_write_postponed) = (postponed, postponed);
         postponed
     }
@@ -255,7 +254,7 @@ impl CommandSender {
             if let Some(request) = mailbox.request.take() {
                 (mailbox.token, mailbox.writing) = (CancelToken::new(), CancelToken::new());
                 mailbox.is_write_of_waiting = false;
-                mailbox.shown = keyboard_overrides(&request);
+                mailbox.shown = keyboard_adjustable_overrides(&request);
                 mailbox.token.set_paused(mailbox.paused);
                 return Task::Render(request, mailbox.token.clone(), mailbox.writing.clone());
             }
@@ -289,7 +288,7 @@ impl PendingCommands for CommandSender {
         self.lock().queries.pop_front()
     }
 
-    fn interruption_reason(&self) -> Interruption {
+    fn cancellation_cause(&self) -> Interruption {
         let mailbox = self.lock();
         match (mailbox.suspended, mailbox.quit) {
             (true, _) => Interruption::Ended,
@@ -315,7 +314,7 @@ impl Worker {
         loop {
             let outcome = match self.remote.wait_for_next_task() {
                 Task::Quit => {
-                    engine.checkpoint_saved_scene_image(&sink, self.remote.interruption_reason());
+                    engine.checkpoint_saved_scene_image(&sink, self.remote.cancellation_cause());
                     break;
                 }
                 Task::Write if self.remote.postpone_write_to_pending(engine.has_sample_in_every_pixel()) => {

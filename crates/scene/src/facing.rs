@@ -47,7 +47,7 @@ pub(super) fn lights_facing_away(
         let others = scene.objects.iter().enumerate().filter(|(other, _)| *other != number);
         let reach = |direction: DVec3| {
             let of = |object: &Object| {
-                max_shape_projection(&object.shape, &bounds, direction) - direction.dot(corner)
+                shape_projection_upper_bound(&object.shape, &bounds, direction) - direction.dot(corner)
             };
             others.clone().map(|(_, object)| of(object)).fold(0.0, f64::max)
         };
@@ -70,7 +70,7 @@ fn is_camera_in_front_of_light(camera: &Camera, corner: DVec3, front: DVec3) -> 
 }
 
 /// Returns an upper bound on the projection of a shape's points onto a unit direction.
-fn max_shape_projection(shape: &Shape, bounds: &[MeshBoundingBox], direction: DVec3) -> f64 {
+fn shape_projection_upper_bound(shape: &Shape, bounds: &[MeshBoundingBox], direction: DVec3) -> f64 {
     shape.upper_bound_along(direction).unwrap_or_else(|| {
         let of = |mesh: &MeshReference| {
             Some(transformed_box_corners(mesh, bounds.get(mesh.file).copied().flatten()?))

@@ -115,7 +115,7 @@ impl LoadedScene {
 
     /// In scenes with mesh files, returns warnings about lights that shine away from everything. Calls
     /// `bounds` only if there are candidates. It must return one item per entry of [`Scene::mesh_files`].
-    pub fn lights_facing_away_warnings(
+    pub fn lights_facing_nothing_warnings(
         &self,
         bounds: impl FnOnce() -> Vec<MeshBoundingBox>,
     ) -> Vec<Diagnostic> {

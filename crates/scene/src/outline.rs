@@ -61,16 +61,17 @@ pub fn document_outline(text: &str) -> Vec<OutlineTable> {
 /// Returns the tables whose definition is `info`.
 fn outline_tables_of_definition(info: &'static TableInfo, found: &KeyValue<'_>) -> Vec<OutlineTable> {
     match info.form {
-        TableSyntax::Single => table_entries(found.value)
+        TableSyntax::Single => entries_if_table(found.value)
             .map(|all| outline_table(info, None, 1, found.value, &all))
             .into_iter()
             .collect(),
         TableSyntax::Named => {
-            let named = table_entries(found.value).into_iter().flat_map(|all| all.iter().collect::<Vec<_>>());
+            let named =
+                entries_if_table(found.value).into_iter().flat_map(|all| all.iter().collect::<Vec<_>>());
             named
                 .filter_map(|one| {
                     let name = SpannedName { text: one.key.to_owned(), span: one.span };
-                    Some(outline_table(info, Some(name), 1, one.value, &table_entries(one.value)?))
+                    Some(outline_table(info, Some(name), 1, one.value, &entries_if_table(one.value)?))
                 })
                 .collect()
         }
@@ -80,7 +81,7 @@ fn outline_tables_of_definition(info: &'static TableInfo, found: &KeyValue<'_>) 
             elements
                 .enumerate()
                 .filter_map(|(index, value)| {
-                    let all = table_entries(value)?;
+                    let all = entries_if_table(value)?;
                     let name = all.get("name").and_then(|name| spanned_string_value(name.value));
                     Some(outline_table(info, name, index + 1, value, &all))
                 })
@@ -110,7 +111,7 @@ fn outline_keys(all: &Entries<'_>) -> Vec<OutlineKey> {
         name: SpannedName { text: one.key.to_owned(), span: one.span },
         value: one.value.span(),
         text: spanned_string_value(one.value).map(|text| text.text),
-        inner: table_entries(one.value).map_or_else(Vec::new, |inner| outline_keys(&inner)),
+        inner: entries_if_table(one.value).map_or_else(Vec::new, |inner| outline_keys(&inner)),
     };
     all.iter().map(key).collect()
 }
@@ -128,7 +129,7 @@ fn spanned_string_value(value: Value<'_>) -> Option<SpannedName> {
     }
 }
 
-fn table_entries(value: Value<'_>) -> Option<Entries<'_>> {
+fn entries_if_table(value: Value<'_>) -> Option<Entries<'_>> {
     match value.decode() {
         TomlValue::Table(entries) => Some(entries),
         TomlValue::String(_)

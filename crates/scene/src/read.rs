@@ -119,9 +119,9 @@ fn not_utf8_error(path: &Path, bytes: &[u8], offset: usize) -> Box<Diagnostic> {
     Diagnostic::error(path, message, help, Some(SourceSpan { source, span, label }))
 }
 
-type Refusal = (String, Option<String>);
+type RefusalMessageAndHelp = (String, Option<String>);
 
-fn read_bytes(path: &Path) -> Result<Vec<u8>, Refusal> {
+fn read_bytes(path: &Path) -> Result<Vec<u8>, RefusalMessageAndHelp> {
     let unreadable = |error: io::Error| unreadable_refusal(path, &error);
     let (file, metadata) =
         file::open_regular_file(path).map_err(unreadable)?.map_err(|kind| not_regular_refusal(path, kind))?;
@@ -134,7 +134,7 @@ fn read_bytes(path: &Path) -> Result<Vec<u8>, Refusal> {
         return Err(too_large_refusal());
     }
     if count_syntax_elements(&bytes) > MAX_PARTS {
-        return Err(refusal_suggesting_mesh_files(format!(
+        return Err(refusal_with_mesh_file_advice(format!(
             "the scene file has more than {} million syntax elements",
             MAX_PARTS >> 20
         )));
@@ -147,7 +147,7 @@ fn count_syntax_elements(text: &[u8]) -> usize {
     text.iter().filter(|byte| b"[]{}=,\n".contains(byte)).count()
 }
 
-fn not_regular_refusal(path: &Path, kind: FileKind) -> Refusal {
+fn not_regular_refusal(path: &Path, kind: FileKind) -> RefusalMessageAndHelp {
     if has_mesh_extension(path) {
         return (format!("this is {}, not a model", kind.description()), None);
     }
@@ -160,15 +160,15 @@ fn not_regular_refusal(path: &Path, kind: FileKind) -> Refusal {
     (format!("this is {}, not a scene file", kind.description()), Some(help.to_owned()))
 }
 
-fn too_large_refusal() -> Refusal {
-    refusal_suggesting_mesh_files(format!("the scene file is larger than {} MiB", MAX_FILE_BYTES >> 20))
+fn too_large_refusal() -> RefusalMessageAndHelp {
+    refusal_with_mesh_file_advice(format!("the scene file is larger than {} MiB", MAX_FILE_BYTES >> 20))
 }
 
-fn refusal_suggesting_mesh_files(message: String) -> Refusal {
+fn refusal_with_mesh_file_advice(message: String) -> RefusalMessageAndHelp {
     (message, Some("put large geometry in mesh files and reference them with [[mesh]]".to_owned()))
 }
 
-fn unreadable_refusal(path: &Path, error: &io::Error) -> Refusal {
+fn unreadable_refusal(path: &Path, error: &io::Error) -> RefusalMessageAndHelp {
     if error.kind() == io::ErrorKind::NotFound && is_symlink(path) {
         return (DANGLING_LINK.to_owned(), None);
     }

@@ -113,7 +113,7 @@ fn render_diagnostic(
         let whole = lines.line_span(line - 1, source).unwrap_or_default();
         let excerpt = Excerpt::new(source, whole, &place.span);
         let label = escape_invisible_chars(&place.label);
-        let fits = excerpt.label_column(line) + display_width(&label) <= width;
+        let fits = excerpt.label_text_column(line) + display_width(&label) <= width;
         // The renderer does not wrap labels, so show a long label as a note.
         note = (!fits && !label.is_empty()).then_some(place.label.as_str());
         let label = (fits && !label.is_empty()).then(|| label.into_owned());
@@ -187,7 +187,7 @@ impl Excerpt {
 
     /// Returns the column where the label starts, after the line number, ` | `, the text before the span, the
     /// carets and a space.
-    fn label_column(&self, line: usize) -> usize {
+    fn label_text_column(&self, line: usize) -> usize {
         let frame = line.to_string().len() + " | ".len();
         frame
             + display_width(&self.text[..self.span.start])
@@ -238,7 +238,7 @@ impl LineIndex {
     }
 
     /// The number of characters between the start of the text and a byte offset.
-    fn source_characters_before(&self, source: &str, offset: usize) -> usize {
+    fn character_index_in_source(&self, source: &str, offset: usize) -> usize {
         let step = offset / STEP;
         self.characters[step] + count_characters(&source.as_bytes()[step * STEP..offset])
     }
@@ -254,7 +254,7 @@ impl LineIndex {
         let line = self.line_number(offset);
         let start = self.starts[line - 1];
         let before =
-            self.source_characters_before(source, offset) - self.source_characters_before(source, start);
+            self.character_index_in_source(source, offset) - self.character_index_in_source(source, start);
         let has_mark = source[start..offset].starts_with('\u{feff}');
         (line, before + 1 - usize::from(has_mark))
     }

@@ -1,7 +1,7 @@
 use super::description::*;
 use super::document::{ENERGY_GAIN, MISSING_VALUE, MORE_LIKE_THESE, NO_AREA, UNLIT_SCENE};
 use super::*;
-use crate::math::color::srgb8_to_linear;
+use crate::math::color::srgb8_color_to_linear;
 use crate::math::{DVec3, Vec2, Vec3};
 
 pub const CAMERA: &str = "[camera]\nposition = [0, 1, 4]\nlook_at = [0, 1, 0]\n";
@@ -73,7 +73,7 @@ fn numbers_and_colors_accept_every_syntax() {
          ambient = '#ff8000', background = [1, 2.5, 1e1] }",
     );
     assert_eq!((scene.render.width, scene.render.height, scene.render.seed), (1280, 480, u32::MAX));
-    assert_eq!(scene.render.ambient, srgb8_to_linear([255, 128, 0]));
+    assert_eq!(scene.render.ambient, srgb8_color_to_linear([255, 128, 0]));
     assert_eq!(scene.render.background, Vec3::new(1.0, 2.5, 10.0));
 }
 
@@ -400,7 +400,7 @@ fn colors_are_arrays_numbers_or_strings() {
     };
     assert_eq!(diffuse("[0.5, 0.5, 0.5]"), diffuse("0.5"));
     assert_eq!((diffuse("1"), diffuse("\"white\"")), (Vec3::ONE, Vec3::ONE));
-    assert_eq!(diffuse("\"Tomato\""), srgb8_to_linear([255, 99, 71]));
+    assert_eq!(diffuse("\"Tomato\""), srgb8_color_to_linear([255, 99, 71]));
     assert_eq!(diffuse("\"#ff6347\""), diffuse("\"tomato\""));
     let wrong = outcome(&format!("[materials.a]\ndiffuse = \"tomatoe\"\n{CAMERA}"));
     assert_eq!(

@@ -113,7 +113,7 @@ impl Display {
         self.invalidate();
         self.window_titles[1] = TitleAndProgress::default();
         self.connection = self.link.new_connection(now);
-        let questions = [SYNCHRONIZED, &self.link.ask.query_bytes(), ATTRIBUTES].concat();
+        let questions = [SYNCHRONIZED, &self.link.ask.optional_query_bytes(), ATTRIBUTES].concat();
         self.send(questions, Some(QueryKind::Attributes), now);
     }
 
@@ -213,7 +213,7 @@ impl Display {
             return false;
         }
         let room = room.saturating_sub(BEGIN.len() + END.len());
-        let cells = self.painter.next_slice_until(room, is_late);
+        let cells = self.painter.next_slice_before_deadline(room, is_late);
         if !cells.is_empty() {
             self.send_slice(self.wrap_synchronized(cells), now);
             return true;

@@ -50,7 +50,7 @@ fn protocol_for_choice(preview: PreviewChoice) -> Option<ImageProtocol> {
 
 /// Selects the queries to send to the terminal. Few are sent to multiplexers, which reply on their own behalf
 /// or not at all, and to plain terminals, which may print queries as text.
-pub(super) fn terminal_queries(
+pub(super) fn select_terminal_queries(
     preview: PreviewChoice,
     color: ColorDepthChoice,
     depth: ColorDepth,
@@ -96,7 +96,7 @@ mod tests {
     #[test]
     fn only_unknown_properties_are_queried() {
         let ask = |preview, color, depth, pairs: &[(&str, &str)]| {
-            terminal_queries(preview, color, depth, |name| {
+            select_terminal_queries(preview, color, depth, |name| {
                 pairs.iter().find(|(key, _)| *key == name).map(|(_, value)| (*value).to_owned())
             })
         };

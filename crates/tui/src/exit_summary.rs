@@ -2,7 +2,7 @@
 
 use super::event::WriteFailure;
 use super::messages;
-use super::state::{KeyOverrides, SceneImageProgress, State, WorkerActivity, WrittenFile};
+use super::state::{KeyOverrides, RequestStatus, SceneImageProgress, State, WrittenFile};
 use super::view::text::format_count_with_noun;
 use crate::choice::Choice;
 use crate::pipeline::protocol::{Report, SampleCounts, SavedSceneImageState};
@@ -89,16 +89,16 @@ fn describe_events_since_writing(state: &State) -> String {
     let is_after = written.iter().any(|written| written.generation != state.request.generation);
     let next = if is_after { NEXT_RENDER } else { "the render" };
     match (state.work.activity, &state.work.progress) {
-        (WorkerActivity::Running { .. } | WorkerActivity::Cancelled, Some(progress)) => {
+        (RequestStatus::Running { .. } | RequestStatus::Cancelled, Some(progress)) => {
             format!("; {next} was stopped at {:.0} %", (progress.fraction * 100.0).floor())
         }
-        (WorkerActivity::Running { .. } | WorkerActivity::Cancelled, None) => format!("; {next} was stopped"),
-        (WorkerActivity::Done | WorkerActivity::Waiting | WorkerActivity::Broken, _) => String::new(),
+        (RequestStatus::Running { .. } | RequestStatus::Cancelled, None) => format!("; {next} was stopped"),
+        (RequestStatus::Done | RequestStatus::Waiting | RequestStatus::Broken, _) => String::new(),
     }
 }
 
 fn is_scene_broken(state: &State) -> bool {
-    matches!(state.work.activity, WorkerActivity::Waiting | WorkerActivity::Broken)
+    matches!(state.work.activity, RequestStatus::Waiting | RequestStatus::Broken)
 }
 
 fn scene_name(state: &State) -> String {
@@ -363,7 +363,7 @@ mod tests {
         ui.worker_event(done_event(4, Vec::new(), false));
         let made = "wrote cornell.png, a.png: 640×480, 64 samples, 1.93 s";
         assert_eq!(summary_text(&ui.state), made);
-        ui.fail_render(vec![diagnostic(Severity::Error, "wrong")]);
+        ui.report_scene_errors(vec![diagnostic(Severity::Error, "wrong")]);
         assert_eq!(summary_text(&ui.state), format!("{made}; cornell.toml has errors since"));
     }
 
@@ -451,7 +451,7 @@ mod tests {
         let said = crate::view::status_line::unsaved_image_messages(&ui.state);
         assert_eq!(
             said,
-            [messages::NOT_SAVED.to_owned(), messages::scene_image_unfinished("cornell.png", 10)]
+            [messages::NOT_SAVED.to_owned(), messages::scene_image_interrupted("cornell.png", 10)]
         );
         assert!(ui.screen_text().contains(messages::NOT_SAVED), "{}", ui.screen_text());
         // `w` writes the displayed image.

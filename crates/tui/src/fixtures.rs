@@ -22,7 +22,7 @@ use crate::pipeline::protocol::{
     self, AssetProgress, Command, Failure, ImageReport, RenderProgress, Report, Request, ResolvedCamera,
     SampleCounts, Stage, StageReport, Status, WorkCounters,
 };
-use crate::pipeline::settings::{EffectiveSettings, KeyboardSettings, Overrides, ViewMode};
+use crate::pipeline::settings::{EffectiveSettings, KeyboardOverridableSettings, Overrides, ViewMode};
 use crate::scene::description::{Accel, Integrator, Pose, ShadowMode};
 use crate::scene::diagnostic::{Diagnostic, Severity, SourceSpan};
 
@@ -137,7 +137,7 @@ impl TestUi {
         self.worker_event(done_event(self.state.request.generation, Vec::new(), false));
     }
 
-    pub(super) fn fail_render(&mut self, diagnostics: Vec<Diagnostic>) {
+    pub(super) fn report_scene_errors(&mut self, diagnostics: Vec<Diagnostic>) {
         let generation = self.state.request.generation;
         self.worker_event(protocol::Event::Started { generation });
         self.worker_event(protocol::Event::Failed { generation, failure: Failure::Scene(diagnostics) });
@@ -202,8 +202,8 @@ pub(super) fn effective_settings() -> EffectiveSettings {
 }
 
 /// Settings from the scene file, before any overrides.
-pub(super) fn scene_settings() -> KeyboardSettings {
-    KeyboardSettings { integrator: Integrator::Whitted, shadows: ShadowMode::Soft, photons: false }
+pub(super) fn scene_settings() -> KeyboardOverridableSettings {
+    KeyboardOverridableSettings { integrator: Integrator::Whitted, shadows: ShadowMode::Soft, photons: false }
 }
 
 /// A camera at (0, 1, 4) that looks along −z at a point 4 units away.

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use crate::film::Srgb8Image;
 use crate::messages;
-use crate::pipeline::protocol::{NormalizedRect, PreviewImageState};
+use crate::pipeline::protocol::{NormalizedRect, PreviewSourceImage};
 use crate::rescale::resized;
 use crate::state::ImageProvenance;
 
@@ -28,7 +28,7 @@ pub(crate) struct ShownImage {
     /// Whether the image lacks the light from photons that are still being traced.
     pub lacks_photons: bool,
     /// The image that the preview belongs to, if known.
-    pub source: Option<PreviewImageState>,
+    pub source: Option<PreviewSourceImage>,
 }
 
 impl ShownImage {
@@ -113,7 +113,7 @@ impl RenderHistory {
 
     /// Records that the camera, which has been moved with keys since request `since`, was written to the
     /// scene. This counts as an edit that all entries since that request include.
-    pub(super) fn record_saved_camera(&mut self, since: u64) {
+    pub(super) fn record_camera_save_as_edit(&mut self, since: u64) {
         self.edits += 1;
         self.read_edits = self.edits;
         for past in self.past.iter_mut().filter(|past| past.shown.generation >= since) {
@@ -144,7 +144,7 @@ impl RenderHistory {
                 }
                 // Keep the origin if the image is the same.
                 let is_same = known.is_none() || past.shown.shows_same_image(&shown);
-                let origin = if is_same { past.origin.for_reproduced_image(origin) } else { origin };
+                let origin = if is_same { past.origin.after_reproduction_by(origin) } else { origin };
                 self.replace_entry_image(at, (shown, time), origin);
                 self.merge_with_previous(at);
             }
@@ -192,7 +192,7 @@ impl RenderHistory {
             return;
         }
         let (edits, run) = (earlier.edits, past.run.or(earlier.run));
-        let origin = earlier.origin.for_reproduced_image(past.origin.clone());
+        let origin = earlier.origin.after_reproduction_by(past.origin.clone());
         self.remove(before);
         if let Some(past) = self.past.get_mut(before) {
             (past.edits, past.run, past.origin) = (edits, run, origin);
@@ -344,7 +344,7 @@ impl RenderHistory {
 
     /// Describes the changes since the previous entry: edits first, then keys. An entry still being rendered
     /// is not marked as stopped.
-    pub(super) fn describe_changes(&self, at: usize, is_under_way: bool) -> Vec<String> {
+    pub(super) fn describe_changes_since_previous(&self, at: usize, is_under_way: bool) -> Vec<String> {
         let Some(past) = self.past.get(at) else { return Vec::new() };
         let words = match past.changes.as_ref().map(|changes| changes.concat()) {
             None => vec![messages::OPENED.to_owned()],
@@ -538,7 +538,7 @@ mod tests {
 
     /// A preview of a finished or unfinished image, and the image's origin.
     fn of_image(generation: u64, name: &str, is_finished: bool) -> (ShownImage, ImageProvenance) {
-        let source = Some(PreviewImageState { image: FingerprintHasher::new(name).finish(), is_finished });
+        let source = Some(PreviewSourceImage { image: FingerprintHasher::new(name).finish(), is_finished });
         // Make every preview different.
         let picture = uniform_picture(10, 10, [generation as u8, u8::from(is_finished), 0]);
         let origin = ImageProvenance { is_unfinished: !is_finished, ..ImageProvenance::default() };
@@ -601,7 +601,7 @@ mod tests {
         history.record_shown_image(shown_image(1, 10), Instant::now(), ImageProvenance::default());
         history.record_shown_image(shown_image(2, 20), Instant::now(), ImageProvenance::default());
         history.record_shown_image(shown_image(3, 30), Instant::now(), ImageProvenance::default());
-        history.record_saved_camera(2);
+        history.record_camera_save_as_edit(2);
         let before = history.open_before_edit(shown_image(3, 30)).expect("a picture");
         assert_eq!(before.generation, 1, "expected the image before the camera moved");
     }
@@ -621,7 +621,7 @@ mod tests {
     }
 
     fn changes(history: &RenderHistory) -> Vec<String> {
-        (0..history.len()).map(|at| history.describe_changes(at, false).join("; ")).collect()
+        (0..history.len()).map(|at| history.describe_changes_since_previous(at, false).join("; ")).collect()
     }
 
     #[test]

@@ -58,7 +58,7 @@ pub use editor::editor_and_variable;
 pub use graphics::TestImageTerminal;
 pub use mosaic::filled_squares;
 pub use options::{ContentChangeTime, ExitStatus, Options, PreviewChoice, TuiError, TuiOutcome, WatchEvent};
-pub use probe::{ProbeReplies, TerminalProbeResult, probe_terminal};
+pub use probe::{ReportedTerminalFeatures, TerminalProbeResult, probe_terminal};
 pub use run::run;
 pub use static_image::{NamedImage, images_as_text};
 pub use view::preview::draw_for_dark_xterm;

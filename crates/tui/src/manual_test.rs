@@ -30,7 +30,7 @@ fn interactive_session() {
     let slot = Arc::clone(&previews);
     thread::spawn(move || run_simulated_worker(&orders, &sender, &slot));
     let watched = scene.clone();
-    thread::spawn(move || forward_scene_changes(&watched, &watcher));
+    thread::spawn(move || poll_scene_file_changes(&watched, &watcher));
     let outcome = run(Options {
         scene,
         overrides: Overrides::default(),
@@ -55,7 +55,7 @@ fn interactive_session() {
     }
 }
 
-fn forward_scene_changes(scene: &PathBuf, news: &Sender<WatchEvent>) {
+fn poll_scene_file_changes(scene: &PathBuf, news: &Sender<WatchEvent>) {
     let mut last = std::fs::read(scene).ok();
     loop {
         thread::sleep(Duration::from_millis(30));
@@ -116,7 +116,7 @@ fn simulate_render(
         say(Event::Asset { generation, progress: asset_progress("bricks", u64::from(step.min(10)), 10) });
         if let Some(size) = request.preview {
             let height = (size.width * 3 / 4).min(size.height).max(1);
-            let picture = Arc::new(draw_test_picture(height * 4 / 3, height, step + text.len() as u32 * 20));
+            let picture = Arc::new(test_preview_image(height * 4 / 3, height, step + text.len() as u32 * 20));
             *slot.lock().expect("a slot") = Some(PreviewUpdate {
                 generation,
                 picture,
@@ -154,7 +154,7 @@ fn simulate_render(
     None
 }
 
-fn draw_test_picture(width: u32, height: u32, phase: u32) -> Srgb8Image {
+fn test_preview_image(width: u32, height: u32, phase: u32) -> Srgb8Image {
     let pixel = |x: u32, y: u32| [(x * 255 / width) as u8, (y * 255 / height) as u8, (phase * 6 % 256) as u8];
     let pixels =
         (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).map(|(x, y)| pixel(x, y)).collect();

@@ -212,7 +212,7 @@ pub fn view_chosen(name: &str) -> String {
 pub const VIEW_WITHOUT_PHOTONS: &str = "view photons: photons are off (p: on)";
 
 /// Shown when a checkpoint from another render was renamed.
-pub fn other_render_checkpoint_kept(file: &str) -> String {
+pub fn other_render_checkpoint_renamed(file: &str) -> String {
     format!("kept another render's checkpoint as {file}")
 }
 
@@ -264,7 +264,7 @@ pub const OLDER_THAN_EDIT: &str = " (older than your last edit)";
 pub const WAITING_FOR_FILE: &str = "waiting for it to appear";
 
 /// Shown when the render of the scene's own image was interrupted.
-pub fn scene_image_unfinished(file: &str, percent: u32) -> String {
+pub fn scene_image_interrupted(file: &str, percent: u32) -> String {
     format!("{file} at {percent} %: press 0 to continue")
 }
 

@@ -70,23 +70,23 @@ impl Presenter {
 
     /// Handles a new preview in the slot. If it should be drawn, takes it out of the slot. Otherwise it stays
     /// there until a newer one replaces it, so previews never queue up.
-    pub(super) fn take_preview_if_due(
+    pub(super) fn take_preview_event_if_due(
         &mut self,
         generation: u64,
         state: &State,
         now: Instant,
     ) -> Option<Event> {
         let is_same_request =
-            generation == self.drawn.generation && !self.newest_preview_differs_from_drawn(state);
+            generation == self.drawn.generation && !self.newest_preview_has_different_format(state);
         if is_same_request && self.pacing_advice(state, now) == PacingAdvice::Wait {
             self.drawn.is_old = true;
             return None;
         }
-        self.take_preview()
+        self.take_preview_event()
     }
 
     /// Whether the newest preview differs from the drawn one in size, section or missing photons.
-    fn newest_preview_differs_from_drawn(&self, state: &State) -> bool {
+    fn newest_preview_has_different_format(&self, state: &State) -> bool {
         let latest = self.previews.lock().unwrap_or_else(PoisonError::into_inner);
         let what = |picture: &Srgb8Image| (picture.width, picture.height);
         latest.as_ref().zip(state.picture.shown.as_ref()).is_some_and(|(new, old)| {
@@ -131,7 +131,7 @@ impl Presenter {
         (f64::from(picture.width) * f64::from(picture.height) / f64::from(pixels)) as u32
     }
 
-    fn take_preview(&mut self) -> Option<Event> {
+    fn take_preview_event(&mut self) -> Option<Event> {
         self.drawn.is_old = false;
         let latest = self.previews.lock().unwrap_or_else(PoisonError::into_inner).take()?;
         let PreviewUpdate { generation, picture, range, section, lacks_photons, source } = latest;
@@ -222,7 +222,7 @@ impl Presenter {
         let has_sent = self.display.send_next_slice(now, is_late);
         let mut events: Vec<Event> = self.display.take_send_report().map(Event::Frame).into_iter().collect();
         if self.drawn.is_old && self.pacing_advice(state, now) != PacingAdvice::Wait {
-            events.extend(self.take_preview());
+            events.extend(self.take_preview_event());
         }
         let is_new = |drawn: &mut DrawnPreview| !std::mem::replace(&mut drawn.is_shown, true);
         if self.drawn.picture.is_some() && has_sent && is_new(&mut self.drawn) {
@@ -274,7 +274,7 @@ mod tests {
         assert_eq!(next_wake(&state, now), Some(now));
         state.dirty = false;
         assert!(next_wake(&state, now).is_some(), "expected a wakeup to update the elapsed time");
-        state.work.activity = crate::state::WorkerActivity::Done;
+        state.work.activity = crate::state::RequestStatus::Done;
         assert_eq!(next_wake(&state, now), None);
     }
 }

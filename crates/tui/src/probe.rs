@@ -32,12 +32,12 @@ pub struct TerminalProbeResult {
     /// Whether environment variables identify a terminal that supports iTerm2's inline images.
     pub has_iterm: bool,
     /// The terminal's replies, or `None` if it does not reply.
-    pub answers: Option<ProbeReplies>,
+    pub answers: Option<ReportedTerminalFeatures>,
 }
 
 /// Data from the terminal's replies.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct ProbeReplies {
+pub struct ReportedTerminalFeatures {
     /// Round-trip time for a status report.
     pub round_trip: Duration,
     /// Terminal name and version (XTVERSION).
@@ -92,7 +92,7 @@ pub fn probe_terminal() -> Option<TerminalProbeResult> {
             palette: false,
             pixels: None,
         };
-        [&ask.query_bytes(), SYNCHRONIZED, KITTY_QUERY].concat()
+        [&ask.optional_query_bytes(), SYNCHRONIZED, KITTY_QUERY].concat()
     };
     let is_dumb = variable("TERM").is_some_and(|term| term == "dumb");
     let answers = if is_dumb { None } else { query_in_raw_mode(&questions).ok().flatten() };
@@ -109,7 +109,7 @@ pub fn probe_terminal() -> Option<TerminalProbeResult> {
 }
 
 /// Sends the queries in raw mode, then restores the terminal modes.
-fn query_in_raw_mode(questions: &[u8]) -> io::Result<Option<ProbeReplies>> {
+fn query_in_raw_mode(questions: &[u8]) -> io::Result<Option<ReportedTerminalFeatures>> {
     let stdin = io::stdin();
     let before = tcgetattr(&stdin)?;
     let mut raw = before.clone();
@@ -122,7 +122,7 @@ fn query_in_raw_mode(questions: &[u8]) -> io::Result<Option<ProbeReplies>> {
     answers
 }
 
-fn query_and_read_replies(questions: &[u8]) -> io::Result<Option<ProbeReplies>> {
+fn query_and_read_replies(questions: &[u8]) -> io::Result<Option<ReportedTerminalFeatures>> {
     let (begin, mut heard) = (Instant::now(), ReceivedReplies::default());
     send(STATUS)?;
     if !read_replies_until(&mut heard, begin, |heard| heard.has_received(TerminalReply::Ready))? {
@@ -131,7 +131,7 @@ fn query_and_read_replies(questions: &[u8]) -> io::Result<Option<ProbeReplies>> 
     let round_trip = begin.elapsed();
     send(&[questions, ATTRIBUTES].concat())?;
     read_replies_until(&mut heard, Instant::now(), |heard| heard.has_received(TerminalReply::Attributes))?;
-    Ok(Some(ProbeReplies { round_trip, ..heard.summarize() }))
+    Ok(Some(ReportedTerminalFeatures { round_trip, ..heard.summarize() }))
 }
 
 fn send(bytes: &[u8]) -> io::Result<()> {
@@ -187,7 +187,7 @@ impl ReceivedReplies {
     }
 
     /// Summarizes the received replies.
-    fn summarize(&self) -> ProbeReplies {
+    fn summarize(&self) -> ReportedTerminalFeatures {
         let background = |answer: &TerminalReply| match answer {
             TerminalReply::Background(rgb) => Some(*rgb),
             TerminalReply::Ready
@@ -201,7 +201,7 @@ impl ReceivedReplies {
             | TerminalReply::Other => None,
         };
         let attributes = self.find_text_between_markers(b"\x1b[?", b'c').unwrap_or_default();
-        ProbeReplies {
+        ReportedTerminalFeatures {
             round_trip: Duration::ZERO,
             name: self.find_text_between_markers(b"\x1bP>|", 0x1b),
             has_true_color: self.has_received(TerminalReply::TrueColor),
@@ -251,7 +251,7 @@ mod tests {
     fn negative_replies_are_not_capabilities() {
         let refused =
             replies_in(b"\x1bP0+r524742\x1b\\\x1b[?2026;0$y\x1b_Gi=4211;ENOTSUPPORTED\x1b\\\x1b[?1;42c");
-        assert_eq!(refused.summarize(), ProbeReplies::default());
+        assert_eq!(refused.summarize(), ReportedTerminalFeatures::default());
         assert!(!replies_in(b"\x1b[?62;").has_received(TerminalReply::Attributes));
     }
 }

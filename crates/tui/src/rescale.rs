@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use crate::film::Srgb8Image;
 use crate::math::Vec3;
-use crate::math::color::{linear_to_srgb8, srgb8_to_linear};
+use crate::math::color::{linear_to_srgb8, srgb8_color_to_linear};
 
 /// Resizes an image to `width` × `height`.
 pub(super) fn resized(picture: &Srgb8Image, width: u32, height: u32) -> Srgb8Image {
@@ -17,8 +17,8 @@ pub(super) fn resized_pixels(picture: &Srgb8Image, width: u32, height: u32) -> C
     if (picture.width, picture.height) == (width, height) {
         return Cow::Borrowed(&picture.pixels);
     }
-    let columns: Vec<_> = (0..width).map(|i| covered_pixels(i, width, picture.width)).collect();
-    let rows: Vec<_> = (0..height).map(|i| covered_pixels(i, height, picture.height)).collect();
+    let columns: Vec<_> = (0..width).map(|i| covered_pixel_weights(i, width, picture.width)).collect();
+    let rows: Vec<_> = (0..height).map(|i| covered_pixel_weights(i, height, picture.height)).collect();
     let mut pixels = Vec::with_capacity(width as usize * height as usize);
     for row in &rows {
         for column in &columns {
@@ -29,7 +29,7 @@ pub(super) fn resized_pixels(picture: &Srgb8Image, width: u32, height: u32) -> C
 }
 
 /// Returns the source pixels that a target pixel covers along one axis, each with its covered length.
-fn covered_pixels(target: u32, targets: u32, sources: u32) -> Vec<(u32, f32)> {
+fn covered_pixel_weights(target: u32, targets: u32, sources: u32) -> Vec<(u32, f32)> {
     if targets >= sources {
         let middle = (u64::from(target) * 2 + 1) * u64::from(sources) / (2 * u64::from(targets.max(1)));
         return vec![(u32::try_from(middle).unwrap_or(0), 1.0)];
@@ -56,7 +56,7 @@ fn mean_color(picture: &Srgb8Image, columns: &[(u32, f32)], rows: &[(u32, f32)])
     let (mut sum, mut weights) = (Vec3::ZERO, 0.0);
     for (y, height) in rows {
         for (x, width) in columns {
-            sum += srgb8_to_linear(at(*x, *y)) * (width * height);
+            sum += srgb8_color_to_linear(at(*x, *y)) * (width * height);
             weights += width * height;
         }
     }

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use super::color::{self, ColorDepth};
 use super::display::{Display, TerminalEnvironment};
 use super::editor;
-use super::environment::{detect_terminal_environment, terminal_queries};
+use super::environment::{detect_terminal_environment, select_terminal_queries};
 use super::event::FilePosition;
 use super::event::{Effect, Event, RequiredEventSource};
 use super::exit_summary;
@@ -49,7 +49,7 @@ pub fn run(options: Options) -> Result<TuiOutcome, TuiError> {
     }
     let screen = TerminalSession::open()?;
     let link = TerminalEnvironment {
-        ask: terminal_queries(options.preview, options.color, depth, variable),
+        ask: select_terminal_queries(options.preview, options.color, depth, variable),
         ..detect_terminal_environment(variable)
     };
     let setup = InitialState {
@@ -213,7 +213,7 @@ impl EventLoop {
     fn handle_event(&mut self, event: Event) -> Option<LoopEnd> {
         match event {
             Event::Worker(protocol::Event::Preview { generation }) => {
-                let taken = self.presenter.take_preview_if_due(generation, &self.state, Instant::now());
+                let taken = self.presenter.take_preview_event_if_due(generation, &self.state, Instant::now());
                 return taken.and_then(|picture| self.apply_event(picture));
             }
             Event::TerminalReply(answer) => {
@@ -259,7 +259,7 @@ impl EventLoop {
             }
             Effect::Suspend if signals::has_shell() => {
                 self.leave_screen();
-                self.screen.restore_until_resumed();
+                self.screen.restore_terminal_temporarily();
                 // The process stops here. After it continues, SIGCONT requests a redraw.
                 signals::stop_process();
             }
@@ -282,7 +282,7 @@ impl EventLoop {
     fn run_editor(&mut self, place: &FilePosition) -> Option<LoopEnd> {
         self.leave_screen();
         input::set_input_paused(true);
-        self.screen.restore_until_resumed();
+        self.screen.restore_terminal_temporarily();
         // Outside raw mode, keys send signals.
         let child_signals = signals::leave_signals_to_child();
         terminal::save_modes();

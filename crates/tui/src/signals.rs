@@ -132,7 +132,7 @@ pub(super) fn set_foreground_child(id: Option<Pid>) {
     let mut child = lock_foreground_child();
     child.id = id;
     if let (Some(id), Some(number)) = (id, child.ending) {
-        forward_to_child(id, number);
+        forward_to_job_or_child(id, number);
     }
 }
 
@@ -143,13 +143,13 @@ fn forward_termination_to_child(number: Number) {
     if child.ending.replace(number).is_none()
         && let Some(id) = child.id
     {
-        forward_to_child(id, number);
+        forward_to_job_or_child(id, number);
     }
 }
 
 /// Forwards the signal to the whole job if this process leads it, since a shell does not forward signals to
 /// its children. Otherwise forwards it to the child only.
-fn forward_to_child(id: Pid, number: Number) {
+fn forward_to_job_or_child(id: Pid, number: Number) {
     let whole_job = Pid::from_raw(0);
     // Ignore errors because the process may have exited.
     let _ = kill(if getpgrp() == getpid() { whole_job } else { id }, number);

@@ -43,7 +43,7 @@ pub fn images_as_text(pictures: &[NamedImage], color: ColorDepthChoice, is_termi
     let inks = PreviewColors { depth, shades: &shades, is_light: color::has_light_background(variable) };
     let (size, aspect) =
         if is_terminal { window_size_and_aspect(&terminal::query_window(None)) } else { ((80, 24), 2.0) };
-    let buffers = lay_out_images(pictures, inks, size, aspect);
+    let buffers = draw_image_rows(pictures, inks, size, aspect);
     buffers.iter().map(|buffer| buffer_to_text_lines(buffer, depth != ColorDepth::None)).collect()
 }
 
@@ -55,7 +55,7 @@ fn window_size_and_aspect(window: &WindowSize) -> ((u16, u16), f32) {
 }
 
 /// Draws the images in one or more rows.
-fn lay_out_images(
+fn draw_image_rows(
     pictures: &[NamedImage],
     inks: PreviewColors<'_>,
     (across, down): (u16, u16),
@@ -103,7 +103,7 @@ mod tests {
         let named = |name: &str| NamedImage { name: name.to_owned(), picture: picture.clone() };
         let shades = ColorMapper::new(depth, &XTERM);
         let inks = PreviewColors { depth, shades: &shades, is_light: false };
-        let buffers = lay_out_images(
+        let buffers = draw_image_rows(
             &["a.png", "b.png", "a very long name of a difference"].map(named),
             inks,
             size,

@@ -105,7 +105,7 @@ impl TerminalSession {
     }
 
     /// Restores the terminal until [`TerminalSession::resume`] is called.
-    pub(super) fn restore_until_resumed(&mut self) {
+    pub(super) fn restore_terminal_temporarily(&mut self) {
         restore_terminal();
     }
 

@@ -5,7 +5,7 @@
 use std::time::Duration;
 
 use super::graphics::base64;
-use super::state::{State, WorkerActivity};
+use super::state::{RequestStatus, State};
 use super::terminals::NotificationProtocol;
 use super::view;
 use crate::scene::sanitize::escape_invisible_chars;
@@ -100,10 +100,10 @@ fn scene_file_name(state: &State) -> String {
 
 fn progress_bar_state(state: &State, percent: Option<u32>) -> ProgressBar {
     match state.work.activity {
-        WorkerActivity::Running { .. } if state.work.paused => ProgressBar::Paused(percent.unwrap_or(0)),
-        WorkerActivity::Running { .. } => percent.map_or(ProgressBar::Busy, ProgressBar::Percent),
-        WorkerActivity::Broken => ProgressBar::Broken,
-        WorkerActivity::Done | WorkerActivity::Waiting | WorkerActivity::Cancelled => ProgressBar::None,
+        RequestStatus::Running { .. } if state.work.paused => ProgressBar::Paused(percent.unwrap_or(0)),
+        RequestStatus::Running { .. } => percent.map_or(ProgressBar::Busy, ProgressBar::Percent),
+        RequestStatus::Broken => ProgressBar::Broken,
+        RequestStatus::Done | RequestStatus::Waiting | RequestStatus::Cancelled => ProgressBar::None,
     }
 }
 
@@ -169,7 +169,7 @@ mod tests {
         let done = "\x1b]2;cornell.toml: done · glimt\x1b\\\x1b]9;4;0;0\x1b\\";
         assert_eq!(sent(&mut shown_title, &ui, false), done);
         assert_eq!(sent(&mut shown_title, &ui, false), "", "unchanged state should send no bytes");
-        ui.fail_render(Vec::new());
+        ui.report_scene_errors(Vec::new());
         ui.handle_event(crate::event::Event::Settled);
         assert!(sent(&mut shown_title, &ui, false).contains("\x1b]9;4;2;100\x1b\\"));
     }

@@ -37,7 +37,7 @@ pub(crate) fn bear() -> Surface {
     // Add a vertex in each cell that has corners on both sides of the surface.
     let mut vertices = vec![u32::MAX; nx * ny * nz];
     let cell = |[x, y, z]: [usize; 3]| (x * ny + y) * nz + z;
-    for at in lattice_points(CELLS) {
+    for at in all_lattice_indices(CELLS) {
         let corners =
             (0..8).filter(|&c| corner([at[0] + (c & 1), at[1] + (c >> 1 & 1), at[2] + (c >> 2)])).count();
         if corners % 8 != 0 {
@@ -46,7 +46,7 @@ pub(crate) fn bear() -> Surface {
         }
     }
     // Add a quad around each edge that crosses the surface, facing outward.
-    for (at, axis) in lattice_points(CELLS).flat_map(|at| (0..3).map(move |axis| (at, axis))) {
+    for (at, axis) in all_lattice_indices(CELLS).flat_map(|at| (0..3).map(move |axis| (at, axis))) {
         let (next, last) = ((axis + 1) % 3, (axis + 2) % 3);
         if at[next] == 0 || at[last] == 0 {
             continue;
@@ -72,13 +72,13 @@ pub(crate) fn bear() -> Surface {
 
 /// Returns for each lattice point whether it is inside the bear.
 fn inside_flags() -> Vec<bool> {
-    lattice_points(CELLS.map(|cells| cells + 1))
+    all_lattice_indices(CELLS.map(|cells| cells + 1))
         .map(|at| bear_distance(lattice_position(at, 0.0)) < 0.0)
         .collect()
 }
 
 /// All points of a lattice, with the last axis varying fastest.
-fn lattice_points([nx, ny, nz]: [usize; 3]) -> impl Iterator<Item = [usize; 3]> {
+fn all_lattice_indices([nx, ny, nz]: [usize; 3]) -> impl Iterator<Item = [usize; 3]> {
     (0..nx).flat_map(move |x| (0..ny).flat_map(move |y| (0..nz).map(move |z| [x, y, z])))
 }
 

@@ -168,7 +168,7 @@ fn black_emission_texture_emits_nothing() {
 fn light_power_follows_mean_of_texture() {
     let strength = |build: &Build| {
         let world = build.world();
-        let bounds = world.lights.iter().filter_map(|(_, light)| light.bounds());
+        let bounds = world.lights.iter().filter_map(|(_, light)| light.bounds_if_emissive());
         bounds.map(|bounds| bounds.power).sum::<f64>()
     };
     let mut patterned = at_origin();

@@ -51,7 +51,7 @@ impl Film {
 
     /// Bytes of memory for the sums of a crop in this summation order, and bytes for the full-size finished
     /// image.
-    pub fn memory_for((width, height): (u32, u32), crop: Rect, blocks: SumOrder) -> (u64, u64) {
+    pub fn crop_sum_and_image_bytes((width, height): (u32, u32), crop: Rect, blocks: SumOrder) -> (u64, u64) {
         let more = crop.area() as u64 * (blocks.kept_block_count() * size_of::<DVec3>()) as u64;
         let picture = film_and_image_bytes(width, height, Rect { width: 0, height: 0, ..crop });
         (film_and_image_bytes(width, height, crop) - picture + more, picture)

@@ -137,7 +137,12 @@ impl SquaredMeanChanges {
 
     /// Records the luminance of a pixel in the specified cell and half, at a sample count determined by
     /// [`SquaredMeanChanges::samples_to_next_record`].
-    pub(super) fn record(&mut self, (pixel, cell, half): (usize, usize, usize), count: u32, luminance: f64) {
+    pub(super) fn record_pixel_luminance(
+        &mut self,
+        (pixel, cell, half): (usize, usize, usize),
+        count: u32,
+        luminance: f64,
+    ) {
         let rounded = luminance as f32;
         if !count.is_power_of_two() {
             self.half_way[pixel] = rounded;
@@ -296,7 +301,7 @@ impl ConvergenceModel {
 
     /// Factor by which doubling the samples to 2^`level` reduced the variance in the specified halves of a
     /// tile.
-    fn doubling_variance_reduction(steps: &SquaredMeanChanges, level: usize, halves: &[usize]) -> f64 {
+    fn clamped_measured_reduction(steps: &SquaredMeanChanges, level: usize, halves: &[usize]) -> f64 {
         steps
             .measured_variance_reduction(level, halves)
             .map_or(INDEPENDENT_RATE, |fall| fall.clamp(INDEPENDENT_RATE, MOST_FALL))
@@ -310,7 +315,7 @@ impl ConvergenceModel {
         halves: &[usize],
     ) -> f64 {
         predict_doubling_variance_reduction(
-            Self::doubling_variance_reduction(steps, level, halves),
+            Self::clamped_measured_reduction(steps, level, halves),
             steps.reduction_confidence(level, halves),
         )
     }
@@ -330,7 +335,7 @@ impl ConvergenceModel {
     ) -> Option<(f64, f64)> {
         let level = count.checked_ilog2()? as usize;
         let StepPair { last, before } = steps.squared_step_pair_at_level(level, (cell, half), is_relative)?;
-        let fall = Self::doubling_variance_reduction(steps, level, &[half]);
+        let fall = Self::clamped_measured_reduction(steps, level, &[half]);
         let step = before.map_or(last, |before| (last + 2.0 * before / fall) / 3.0);
         let rate = predict_doubling_variance_reduction(fall, steps.reduction_confidence(level, &[half]));
         let by_two = variance_from_squared_step(step, count, rate);

@@ -1,6 +1,6 @@
 //! Per-pixel sums of layer values.
 
-use super::sum_order::add_finite;
+use super::sum_order::add_finite_and_count_non_finite;
 use crate::math::{DVec3, Vec3};
 
 /// Sums of the layers' values for a set of pixels, stored pixel by pixel. The sample counts are the image's.
@@ -30,10 +30,10 @@ impl LayerSums {
             // Add four layers at a time, because the additions to one sum depend on each other.
             let (groups, rest) = layers.as_chunks::<4>();
             for group in groups {
-                add_together(sums, group);
+                add_four_layers(sums, group);
             }
             for (layer, values) in rest {
-                add_finite(&mut sums[*layer], values);
+                add_finite_and_count_non_finite(&mut sums[*layer], values);
             }
             return;
         };
@@ -41,7 +41,7 @@ impl LayerSums {
         for (layer, values) in layers {
             for (value, &is_negative) in values.iter().zip(is_negative) {
                 let sums = if is_negative { &mut self.negative } else { &mut self.sums };
-                add_finite(&mut sums[first + layer], std::slice::from_ref(value));
+                add_finite_and_count_non_finite(&mut sums[first + layer], std::slice::from_ref(value));
             }
         }
     }
@@ -72,7 +72,7 @@ impl LayerSums {
 }
 
 /// Adds the samples of four layers at once, with the same result as adding each layer separately.
-fn add_together(sums: &mut [DVec3], layers: &[(usize, &[Vec3]); 4]) {
+fn add_four_layers(sums: &mut [DVec3], layers: &[(usize, &[Vec3]); 4]) {
     let mut all = layers.map(|(layer, _)| sums[layer]);
     let [a, b, c, d] = layers.map(|(_, values)| values);
     for (((a, b), c), d) in a.iter().zip(b).zip(c).zip(d) {
@@ -84,7 +84,7 @@ fn add_together(sums: &mut [DVec3], layers: &[(usize, &[Vec3]); 4]) {
         if sum.is_finite() {
             sums[*layer] = sum;
         } else {
-            add_finite(&mut sums[*layer], values);
+            add_finite_and_count_non_finite(&mut sums[*layer], values);
         }
     }
 }
@@ -103,7 +103,7 @@ mod tests {
     }
 
     #[test]
-    fn layers_added_together_keep_their_bits() {
+    fn adding_four_layers_is_bit_identical() {
         let mut next = unit_generator(4);
         let mut list = || (0..7).map(|_| Vec3::new(next(), next() * 1e9, next())).collect::<Vec<_>>();
         let mut lists = [list(), list(), list(), list(), list()];

@@ -14,7 +14,7 @@ impl Tile {
         let LayerSums { count, sums, negative } = &self.layers;
         let place = index * count + layer;
         let below = |_: &NegativeLobeSums| negative.get(place).copied().unwrap_or_default();
-        if layer < *count { self.signed_mean(index, || sums[place], below) } else { None }
+        if layer < *count { self.mean_from_lobe_sums(index, || sums[place], below) } else { None }
     }
 }
 

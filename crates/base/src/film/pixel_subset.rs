@@ -57,7 +57,7 @@ impl PixelSubset {
         match self {
             Self::All => number,
             // If the area is odd, the last pixel belongs to the first half.
-            Self::Half(half) => (2 * number + (first_half_offset_in_pair(number, rect.width) ^ half as u32))
+            Self::Half(half) => (2 * number + (first_half_column_in_pair(number, rect.width) ^ half as u32))
                 .min(rect.area() as u32 - 1),
         }
     }
@@ -66,13 +66,13 @@ impl PixelSubset {
     pub fn half_containing(index: u32, rect: Rect) -> usize {
         let area = rect.area() as u32;
         let is_alone = index + 1 == area && area % 2 == 1;
-        if is_alone { 0 } else { ((index & 1) ^ first_half_offset_in_pair(index / 2, rect.width)) as usize }
+        if is_alone { 0 } else { ((index & 1) ^ first_half_column_in_pair(index / 2, rect.width)) as usize }
     }
 }
 
 /// 0 if the left pixel of a pair is in the first half, 1 if the right pixel is. Alternates every two rows.
 #[inline(always)]
-fn first_half_offset_in_pair(pair: u32, width: u32) -> u32 {
+fn first_half_column_in_pair(pair: u32, width: u32) -> u32 {
     (pair / width) & 1
 }
 

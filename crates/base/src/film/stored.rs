@@ -26,8 +26,9 @@ impl StoredTile {
     /// [`MalformedTile`] if there are too few or too many bytes, or invalid counts.
     pub fn read(bytes: &[u8], area: usize) -> Result<Self, MalformedTile> {
         let mut from = ByteReader(bytes);
-        let (blocks, is_signed, levels) = (from.count()?, from.count()? == 1, from.count()?);
-        let layers = from.count()?;
+        let (blocks, is_signed, levels) =
+            (from.u32_as_usize()?, from.u32_as_usize()? == 1, from.u32_as_usize()?);
+        let layers = from.u32_as_usize()?;
         // Check the length before reserving memory.
         let sums = blocks.checked_add(layers).and_then(|sums| sums.checked_mul(area * size_of::<DVec3>()));
         if sums.is_none_or(|all| all > bytes.len()) || levels > 32 {
@@ -210,7 +211,7 @@ impl ByteReader<'_> {
         self.take().map(u64::from_le_bytes)
     }
 
-    fn count(&mut self) -> Result<usize, MalformedTile> {
+    fn u32_as_usize(&mut self) -> Result<usize, MalformedTile> {
         self.u32().map(|count| count as usize)
     }
 

@@ -60,7 +60,7 @@ pub(super) fn sum_pixel_blocks(earlier: &[Vec<DVec3>], sums: &[DVec3], index: us
 }
 
 /// Adds the finite radiances and returns the number of non-finite radiances.
-pub(super) fn add_finite(sum: &mut DVec3, radiances: &[Vec3]) -> u64 {
+pub(super) fn add_finite_and_count_non_finite(sum: &mut DVec3, radiances: &[Vec3]) -> u64 {
     let all = radiances.iter().fold(*sum, |sum, radiance| sum + radiance.as_dvec3());
     if all.is_finite() {
         *sum = all;

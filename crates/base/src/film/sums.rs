@@ -6,7 +6,7 @@ use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 use super::convergence::{ConvergenceModel, SquaredMeanChanges, luminance};
 use super::layer_sums::LayerSums;
 use super::pixel_subset::PixelSubset;
-use super::sum_order::{SumOrder, add_finite, sum_pixel_blocks};
+use super::sum_order::{SumOrder, add_finite_and_count_non_finite, sum_pixel_blocks};
 use super::{CELL_SIZE, CELLS, CELLS_ACROSS, Rect, TILE_SIZE, TileSamples};
 use crate::math::{DVec3, Vec3};
 use crate::system::memory::try_reserve_exact;
@@ -123,7 +123,7 @@ impl Tile {
     /// Mean of a pixel's samples, or `None` if the pixel has no samples.
     #[inline]
     pub(super) fn mean(&self, index: usize) -> Option<DVec3> {
-        self.signed_mean(
+        self.mean_from_lobe_sums(
             index,
             || self.positive_lobe_radiance_sum(index),
             |negative| sum_pixel_blocks(&negative.earlier, &negative.sums, index),
@@ -133,7 +133,7 @@ impl Tile {
     /// Combines a pixel's sums into its mean: `sum` over the samples outside the filter's negative lobes, and
     /// `negative_sum` over the samples inside them. Returns `None` if the pixel has no samples.
     #[inline(always)]
-    pub(super) fn signed_mean(
+    pub(super) fn mean_from_lobe_sums(
         &self,
         index: usize,
         sum: impl Fn() -> DVec3,
@@ -198,7 +198,7 @@ impl Tile {
             };
             let part = rest.start..rest.end.min(rest.start + left);
             non_finite += match lobes {
-                None => add_finite(&mut self.sums[index], &radiances[part.clone()]),
+                None => add_finite_and_count_non_finite(&mut self.sums[index], &radiances[part.clone()]),
                 Some((weight, signs)) => self.add_with_negative_lobes(
                     index,
                     weight,
@@ -211,7 +211,7 @@ impl Tile {
             if part.len() == to_note
                 && let Some(mean) = self.mean(index)
             {
-                self.steps.record((index, cell, half), self.counts[index], luminance(mean));
+                self.steps.record_pixel_luminance((index, cell, half), self.counts[index], luminance(mean));
             }
             if blocks != SumOrder::Sequential {
                 self.close_block_if_complete(index, blocks);
@@ -232,7 +232,7 @@ impl Tile {
         let mut non_finite = 0;
         for (radiance, &is_negative) in radiances.iter().zip(is_negative) {
             let sum = if is_negative { &mut negative.sums[index] } else { &mut self.sums[index] };
-            non_finite += add_finite(sum, std::slice::from_ref(radiance));
+            non_finite += add_finite_and_count_non_finite(sum, std::slice::from_ref(radiance));
             negative.counts[index] += u32::from(is_negative);
         }
         non_finite

@@ -73,11 +73,11 @@ impl ToneMapping {
     }
 
     /// Linear display light in [0, 1] for any input color. NaN and negative components are treated as 0.
-    pub fn apply(&self, radiance: Vec3) -> Vec3 {
-        self.apply_with_exposure(radiance, exp2(self.exposure_stops))
+    pub fn linear_display_light(&self, radiance: Vec3) -> Vec3 {
+        self.linear_display_light_with_exposure(radiance, exp2(self.exposure_stops))
     }
 
-    fn apply_with_exposure(&self, radiance: Vec3, factor: f32) -> Vec3 {
+    fn linear_display_light_with_exposure(&self, radiance: Vec3, factor: f32) -> Vec3 {
         let radiance = self.range_map.map_to_brightness(radiance);
         let bounded = |x: f32| if x.is_nan() { 0.0 } else { x.clamp(0.0, BRIGHTEST) };
         let color = Vec3::from_array((radiance * factor).to_array().map(bounded));
@@ -121,7 +121,7 @@ fn tone_map_pixels<T: Send>(
     encode: impl Fn(Vec3) -> T + Sync,
 ) -> Vec<T> {
     let factor = exp2(tone.exposure_stops);
-    let pixel = |&radiance: &Vec3| encode(tone.apply_with_exposure(radiance, factor));
+    let pixel = |&radiance: &Vec3| encode(tone.linear_display_light_with_exposure(radiance, factor));
     if image.pixels.len() < PARALLEL_PIXELS || !is_in_thread_pool() {
         image.pixels.iter().map(pixel).collect()
     } else {
@@ -139,7 +139,7 @@ mod tests {
     }
 
     fn gray(curve: Tonemap, value: f32) -> f32 {
-        tone(curve).apply(Vec3::splat(value)).y
+        tone(curve).linear_display_light(Vec3::splat(value)).y
     }
 
     #[test]
@@ -162,7 +162,7 @@ mod tests {
         assert!((gray(Tonemap::Reinhard, 1.0) - 0.5).abs() < 1e-6);
         assert!((gray(Tonemap::Reinhard, 3.0) - 0.75).abs() < 1e-6);
         // Reinhard works on luminance: pure red with radiance 1 has a luminance of 0.2126.
-        let red = tone(Tonemap::Reinhard).apply(Vec3::X);
+        let red = tone(Tonemap::Reinhard).linear_display_light(Vec3::X);
         assert!((red - Vec3::X / 1.2126).abs().max_element() < 1e-6);
         assert!((gray(Tonemap::Aces, 1.0) - 2.54 / 3.16).abs() < 1e-6);
         // Middle gray is at the sigmoid's pivot, whose value of ½ is linearized with a gamma of 2.2.
@@ -171,7 +171,7 @@ mod tests {
 
     #[test]
     fn agx_desaturates_bright_colors() {
-        let blue = tone(Tonemap::Agx).apply(Vec3::new(0.0, 0.0, 1000.0));
+        let blue = tone(Tonemap::Agx).linear_display_light(Vec3::new(0.0, 0.0, 1000.0));
         assert!(blue.min_element() > 0.3 && blue.z > 0.9, "{blue}");
     }
 
@@ -197,7 +197,7 @@ mod tests {
             for exposure_stops in [0.0, 10.0, -10.0, 500.0, -500.0, f32::NAN] {
                 let mapping = ToneMapping { exposure_stops, ..tone(curve) };
                 for [r, g, b] in hostile.iter().flat_map(|&a| hostile.map(|b| [a, b, 0.5])) {
-                    let color = mapping.apply(Vec3::new(r, g, b));
+                    let color = mapping.linear_display_light(Vec3::new(r, g, b));
                     assert!(color.is_finite(), "{mapping:?} of {r}, {g}, {b}: {color}");
                     assert!(color.min_element() >= 0.0 && color.max_element() <= 1.0, "{mapping:?}: {color}");
                 }
@@ -263,7 +263,10 @@ mod tests {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().expect("a pool");
         let developed = pool.install(|| tone_map_to_8_bits(&image, &mapping)).pixels;
         for (pixel, &radiance) in developed.iter().zip(&image.pixels) {
-            assert_eq!(*pixel, mapping.apply(radiance).to_array().map(linear_to_srgb8_by_table));
+            assert_eq!(
+                *pixel,
+                mapping.linear_display_light(radiance).to_array().map(linear_to_srgb8_by_table)
+            );
         }
     }
 }

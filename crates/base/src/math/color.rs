@@ -42,7 +42,7 @@ pub fn linear_to_srgb8(linear: f32) -> u8 {
 
 /// Decodes an sRGB byte triple to a linear color.
 #[inline]
-pub fn srgb8_to_linear(bytes: [u8; 3]) -> Vec3 {
+pub fn srgb8_color_to_linear(bytes: [u8; 3]) -> Vec3 {
     Vec3::from_array(bytes.map(|byte| SRGB8_TO_LINEAR[usize::from(byte)]))
 }
 
@@ -59,7 +59,7 @@ mod tests {
         for byte in 0..=255_u8 {
             let linear = srgb_to_linear(f32::from(byte) / 255.0);
             assert_eq!(linear_to_srgb8(linear), byte);
-            assert_eq!(srgb8_to_linear([byte, 0, 255]), Vec3::new(linear, 0.0, 1.0));
+            assert_eq!(srgb8_color_to_linear([byte, 0, 255]), Vec3::new(linear, 0.0, 1.0));
         }
     }
 

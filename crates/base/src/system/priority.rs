@@ -5,7 +5,7 @@
 
 /// Raises the nice value of this thread and the threads it starts later, or of the whole process on systems
 /// other than Linux (nice(2), sched(7)). Does nothing if the increment is 0 or if the system refuses.
-pub fn lower_thread_and_child_priority(steps: u8) {
+pub fn lower_priority_including_spawned_threads(steps: u8) {
     #[cfg(unix)]
     if steps > 0 {
         let _ = rustix::process::nice(i32::from(steps));
@@ -17,6 +17,6 @@ pub fn lower_thread_and_child_priority(steps: u8) {
 /// Raises the nice value of this thread on systems with per-thread nice values. Does nothing elsewhere.
 pub fn lower_thread_priority(steps: u8) {
     if cfg!(target_os = "linux") {
-        lower_thread_and_child_priority(steps);
+        lower_priority_including_spawned_threads(steps);
     }
 }

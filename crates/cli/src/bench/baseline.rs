@@ -1,7 +1,7 @@
 //! Compares results with a baseline and tests the differences for significance.
 
 use super::results::{MethodResult, Results, StepResult};
-use super::statistics::{student_t_quantile, student_t_tail, welch_difference};
+use super::statistics::{student_t_tail, student_t_upper_quantile, welch_difference};
 
 /// Family-wise false positive rate for the whole table.
 const FALSE_POSITIVE_RATE: f64 = 0.01;
@@ -76,7 +76,7 @@ fn method_change(
         (false, true) => 1.0,
         (false, false) => 0.0,
     };
-    let reach = student_t_quantile(0.025, freedom) * error;
+    let reach = student_t_upper_quantile(0.025, freedom) * error;
     (count > 0.0).then(|| MethodChange {
         scene: scene.to_owned(),
         method: now.name.clone(),

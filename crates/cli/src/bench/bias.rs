@@ -6,7 +6,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::statistics::{student_t_quantile, student_t_tail};
+use super::statistics::{student_t_tail, student_t_upper_quantile};
 use crate::compare::ReferencePair;
 use crate::film::RadianceImage;
 
@@ -52,7 +52,7 @@ pub fn estimate_bias(references: &ReferencePair, pictures: &[RadianceImage]) -> 
         size,
         error,
         by_chance,
-        bound: size.max(0.0) + student_t_quantile(FALSE_POSITIVE_RATE, freedom) * error,
+        bound: size.max(0.0) + student_t_upper_quantile(FALSE_POSITIVE_RATE, freedom) * error,
     })
 }
 

@@ -51,7 +51,7 @@ impl MethodRun<'_> {
         let mut session = HeadlessSession::default();
         // Warm the caches before measuring.
         let begin = StepTarget { index: 0, samples: 1, budget: None };
-        let first = self.render_step(&mut session, SEEDS[0], begin)?;
+        let first = self.render_step_image(&mut session, SEEDS[0], begin)?;
         *threads = first.report.settings.threads;
         let mut steps: Vec<StepResult> = Vec::new();
         let mut took = Vec::new();
@@ -60,12 +60,12 @@ impl MethodRun<'_> {
             steps.push(self.measure_step(&mut session, aim, budget, &took)?);
             took.push(budget.method_elapsed_seconds() - before);
         }
-        let last = self.render_step(&mut session, SEEDS[0], begin)?;
+        let last = self.render_step_image(&mut session, SEEDS[0], begin)?;
         if last.key != first.key
             || self.run.reference_renderer(self.common).compute_reference_fingerprints(&mut session)?
                 != *self.keys
         {
-            return Err(self.run.scene_changed_error());
+            return Err(self.run.create_scene_changed_error());
         }
         Ok(MethodResult::new(self.method.name.clone(), setup_seconds(&first.report), steps))
     }
@@ -110,7 +110,7 @@ impl MethodRun<'_> {
         for number in 0..seeds {
             let seed = self.run.order.seed + aim.index * seeds + number;
             self.report_image_start(aim, number, budget, took, &pictures);
-            let RenderedImage { image, report, .. } = self.render_step(session, seed, aim)?;
+            let RenderedImage { image, report, .. } = self.render_step_image(session, seed, aim)?;
             let relmse = self.two.unbiased_relmse(&image);
             are_pixels_independent &= report.photons.is_none();
             if !relmse.is_finite() {
@@ -192,7 +192,7 @@ impl MethodRun<'_> {
         }
     }
 
-    fn render_step(
+    fn render_step_image(
         &self,
         session: &mut HeadlessSession,
         seed: u32,

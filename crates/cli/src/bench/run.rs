@@ -61,7 +61,7 @@ pub fn run(
 fn check_scenes(runs: &[SceneRun<'_>]) -> Result<(), BenchError> {
     let mut wrong = Vec::new();
     for run in runs {
-        match run.prepare(&mut HeadlessSession::default()) {
+        match run.load_and_validate(&mut HeadlessSession::default()) {
             Ok(_) => {}
             Err(BenchError::Failed(Failure::Scene(diagnostics))) => wrong.extend(diagnostics),
             Err(
@@ -132,7 +132,7 @@ struct ValidatedScene {
 
 impl SceneRun<'_> {
     /// Reads and validates the scene and its files.
-    fn prepare(&self, session: &mut HeadlessSession) -> Result<ValidatedScene, BenchError> {
+    fn load_and_validate(&self, session: &mut HeadlessSession) -> Result<ValidatedScene, BenchError> {
         let order = self.order;
         self.report_task_begin("reading", None);
         let loaded = scene::load(self.path, &order.common.sets)
@@ -172,7 +172,7 @@ impl SceneRun<'_> {
     /// Measures the scene. Prepares it again first, because it may have been saved since the first check.
     fn measure(&self, budget: &mut TimeBudget, threads: &mut usize) -> Result<SceneResult, BenchError> {
         let mut session = HeadlessSession::default();
-        let ValidatedScene { scene, given, common, keys } = self.prepare(&mut session)?;
+        let ValidatedScene { scene, given, common, keys } = self.load_and_validate(&mut session)?;
         let methods = methods_to_measure(&scene, &self.order.toggles);
         budget.begin_scene(methods.len());
         let reference = match given {
@@ -229,11 +229,15 @@ impl SceneRun<'_> {
             self.report_task_begin(&format!("reference {} of 2", 3 - left), seconds);
         };
         let made = maker.render_reference_pair(session, amount, begin)?;
-        if made.keys == *keys { Ok(maker.store_in_cache(made)) } else { Err(self.scene_changed_error()) }
+        if made.keys == *keys {
+            Ok(maker.store_in_cache(made))
+        } else {
+            Err(self.create_scene_changed_error())
+        }
     }
 
     /// Returns the error for a scene that was saved while it was being measured.
-    pub(super) fn scene_changed_error(&self) -> BenchError {
+    pub(super) fn create_scene_changed_error(&self) -> BenchError {
         BenchError::Failed(Failure::Work(scene_changed_message(self.path)))
     }
 

@@ -29,7 +29,7 @@ pub fn student_t_tail(t: f64, freedom: f64) -> f64 {
 }
 
 /// The inverse of [`student_t_tail`], for probabilities below 0.5.
-pub fn student_t_quantile(probability: f64, freedom: f64) -> f64 {
+pub fn student_t_upper_quantile(probability: f64, freedom: f64) -> f64 {
     let (mut low, mut high) = (0.0, 1.0);
     while student_t_tail(high, freedom) > probability && high < 1e12 {
         high *= 2.0;
@@ -109,9 +109,9 @@ mod tests {
                 student_t_tail(t, freedom)
             );
             assert!(
-                (student_t_quantile(probability, freedom) - t).abs() < 1e-4,
+                (student_t_upper_quantile(probability, freedom) - t).abs() < 1e-4,
                 "{}",
-                student_t_quantile(probability, freedom)
+                student_t_upper_quantile(probability, freedom)
             );
         }
         assert!((student_t_tail(-1.0, 3.0) + student_t_tail(1.0, 3.0) - 1.0).abs() < 1e-14);

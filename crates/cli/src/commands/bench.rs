@@ -37,7 +37,7 @@ pub(crate) fn run(args: &BenchArgs, console: &Console) -> Exit {
 
 /// Runs the benchmark and reports errors. `Err` contains the exit code.
 fn try_run(args: &BenchArgs, console: &Console) -> Result<Exit, Exit> {
-    priority::lower_thread_and_child_priority(args.nice);
+    priority::lower_priority_including_spawned_threads(args.nice);
     let order = bench_request(args, console)?;
     let scenes = order.scenes.len();
     let outputs = BenchOutputs::try_from_args(args, &order.scenes, console)?;

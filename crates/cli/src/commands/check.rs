@@ -8,7 +8,7 @@ use crate::commands::info::report_image_instead_of_scene;
 use crate::console::Console;
 use crate::diagnostic_json::diagnostic_to_json;
 use crate::exit::Exit;
-use crate::output::json::to_line;
+use crate::output::json::to_line_without_newline;
 use crate::pipeline::protocol::Failure;
 use crate::pipeline::{SceneSummary, check_scene};
 use crate::scene::report::LineColumnLocator;
@@ -45,7 +45,7 @@ fn check_as_json(scene: &Path, sets: &[String], console: &Console) -> Exit {
     let all: Vec<Value> = diagnostics.iter().map(|one| diagnostic_to_json(one, &mut places)).collect();
     let scene = scene.to_string_lossy();
     let report = json!({ "scene": scene, "ok": exit == Exit::DONE, "diagnostics": all });
-    match to_line(&report) {
+    match to_line_without_newline(&report) {
         Ok(line) => console.print_trusted_text(&format!("{line}\n")),
         Err(error) => return console.print_error(Exit::FAILED, &format!("cannot write JSON: {error}")),
     }

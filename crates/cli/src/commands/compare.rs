@@ -219,7 +219,7 @@ impl<'a> Summary<'a> {
 
 /// Prints the JSON object. Values that are not finite become null.
 fn print_json(summary: &Summary<'_>, console: &Console) {
-    match output::json::to_line(summary) {
+    match output::json::to_line_without_newline(summary) {
         Ok(text) => console.print_line(&text),
         Err(error) => console.print_line_to_stderr(&format!("error: {error}")),
     }
@@ -300,7 +300,7 @@ fn table_rows(summary: &Summary<'_>) -> Vec<(&'static str, String, &'static str,
         );
         rows.push((
             "bias",
-            format_signed_six_digits(bias),
+            format_six_digits_any_sign(bias),
             "",
             format!("linear: mean(a - b)/mean(b); {noise}"),
         ));
@@ -312,7 +312,7 @@ fn table_rows(summary: &Summary<'_>) -> Vec<(&'static str, String, &'static str,
     rows
 }
 
-fn format_signed_six_digits(value: f64) -> String {
+fn format_six_digits_any_sign(value: f64) -> String {
     let sign = if value < 0.0 { "-" } else { "" };
     format!("{sign}{}", format_six_significant_digits(value.abs()))
 }

@@ -9,14 +9,14 @@ use crate::commands::check::format_count;
 use crate::console::Console;
 use crate::exit::Exit;
 use crate::system::folder::entry_names;
-use crate::tui::{self, ColorDepth, ProbeReplies, TerminalProbeResult, probe_terminal};
+use crate::tui::{self, ColorDepth, ReportedTerminalFeatures, TerminalProbeResult, probe_terminal};
 
 /// Prints one line per finding.
 pub(crate) fn run(console: &Console) -> Exit {
     let mut lines = vec![("glimt", format!("{}, {}-{}", crate::pipeline::BUILD, ARCH, OS))];
     lines.extend([("processor", describe_simd_instructions()), ("threads", describe_threads())]);
     match probe_terminal() {
-        Some(probe) => lines.extend(describe_terminal(&probe)),
+        Some(probe) => lines.extend(describe_terminal_as_rows(&probe)),
         None => lines.push(("terminal", "none (not a tty); use --once".to_owned())),
     }
     lines.extend([("editor", describe_editor()), ("cache", describe_cache_folder())]);
@@ -51,7 +51,7 @@ fn describe_threads() -> String {
 }
 
 /// Describes the terminal as a list of property names and values.
-fn describe_terminal(probe: &TerminalProbeResult) -> Vec<(&'static str, String)> {
+fn describe_terminal_as_rows(probe: &TerminalProbeResult) -> Vec<(&'static str, String)> {
     let term = nonempty_environment_variable("TERM").unwrap_or_else(|| "TERM is not set".to_owned());
     let name = probe.answers.as_ref().and_then(|answers| answers.name.clone());
     let ((columns, rows), (width, height)) = (probe.cells, probe.cell_pixels);
@@ -107,7 +107,7 @@ fn describe_preview(probe: &TerminalProbeResult) -> String {
     format!("{}; {more}", probe.auto_preview_name())
 }
 
-fn describe_round_trip(answers: Option<&ProbeReplies>) -> String {
+fn describe_round_trip(answers: Option<&ReportedTerminalFeatures>) -> String {
     let Some(answers) = answers else { return "the terminal does not respond".to_owned() };
     let whole = if answers.is_synchronized { "; synchronized output" } else { "" };
     format!("{:.1} ms{whole}", answers.round_trip.as_secs_f64() * 1e3)

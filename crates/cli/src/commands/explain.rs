@@ -16,7 +16,7 @@ pub(crate) fn run(path: Option<&str>, console: &Console) -> Exit {
     };
     match text {
         Some(text) => {
-            console.print_trusted_text(&wrap_indented(&text, stdout_columns_or_default()));
+            console.print_trusted_text(&wrap_with_hanging_indents(&text, stdout_columns_or_default()));
             Exit::DONE
         }
         None => console.print_error(Exit::WRONG, &unknown_path_message(path.unwrap_or_default())),
@@ -24,7 +24,7 @@ pub(crate) fn run(path: Option<&str>, console: &Console) -> Exit {
 }
 
 /// Wraps text to `columns` with hanging indents.
-fn wrap_indented(text: &str, columns: usize) -> String {
+fn wrap_with_hanging_indents(text: &str, columns: usize) -> String {
     let mut fitted = String::new();
     for line in text.lines() {
         // A name and its description are separated by at least two spaces.
@@ -256,10 +256,10 @@ mod tests {
         let text = "[mesh]\n    A mesh from a file.\n\n    matrix    One two three four five six.\n";
         let expected =
             "[mesh]\n    A mesh from a file.\n\n    matrix    One two three four\n              five six.\n";
-        assert_eq!(wrap_indented(text, 34), expected);
-        assert_eq!(wrap_indented(text, 10), text, "too narrow to wrap");
+        assert_eq!(wrap_with_hanging_indents(text, 34), expected);
+        assert_eq!(wrap_with_hanging_indents(text, 10), text, "too narrow to wrap");
         for (path, _) in all_paths_with_descriptions() {
-            let text = wrap_indented(&explain_path(&path).unwrap_or_default(), 80);
+            let text = wrap_with_hanging_indents(&explain_path(&path).unwrap_or_default(), 80);
             let broken: Vec<&str> = text.lines().filter(|line| line.chars().count() > 80).collect();
             assert!(broken.is_empty(), "{broken:?}");
         }

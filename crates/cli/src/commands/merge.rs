@@ -179,7 +179,7 @@ impl MergeCommand<'_> {
             let state = (parts.len(), unfinished.iter().map(|path| path.to_path_buf()).collect::<Vec<_>>());
             if said.as_ref() != Some(&state) {
                 let is_new = said.is_none_or(|(count, _)| count != parts.len());
-                let words = self.describe_part_completeness(parts.len(), &unfinished);
+                let words = self.describe_completed_parts(parts.len(), &unfinished);
                 if self.redraws_in_place() {
                     self.redraw_image(&parts, &words, &mut block)?;
                 } else if is_new {
@@ -208,7 +208,7 @@ impl MergeCommand<'_> {
     }
 
     /// Describes how many parts are complete, and names the incomplete parts.
-    fn describe_part_completeness(&self, count: usize, unfinished: &[&Path]) -> String {
+    fn describe_completed_parts(&self, count: usize, unfinished: &[&Path]) -> String {
         let names: Vec<_> = unfinished.iter().map(|path| path.to_string_lossy()).collect();
         let incomplete = match names.as_slice() {
             [] => String::new(),

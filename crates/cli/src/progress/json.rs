@@ -21,7 +21,7 @@ use serde_json::{Value, json};
 
 use super::Reporter;
 use crate::diagnostic_json::diagnostic_to_json;
-use crate::output::json::to_line;
+use crate::output::json::to_line_without_newline;
 use crate::pipeline::protocol::{CheckpointUpdate, Event, Failure};
 use crate::scene::diagnostic::Diagnostic;
 use crate::scene::report::LineColumnLocator;
@@ -46,18 +46,19 @@ impl Reporter for JsonReporter {
 
 /// Prints a JSON line to stderr, ignoring errors.
 pub(crate) fn print_json_line_to_stderr(value: &Value) {
-    if let Ok(text) = event_json_line(value) {
+    if let Ok(text) = format_json_line_event_first(value) {
         let _ = writeln!(std::io::stderr().lock(), "{text}");
     }
 }
 
 /// Formats an object on one line, starting with `event`. The other keys are sorted.
-fn event_json_line(value: &Value) -> serde_json::Result<String> {
+fn format_json_line_event_first(value: &Value) -> serde_json::Result<String> {
     let mut rest = value.clone();
     let Some(event) = rest.as_object_mut().and_then(|keys| keys.remove("event")) else {
-        return to_line(value);
+        return to_line_without_newline(value);
     };
-    let (first, rest) = (to_line(&json!({ "event": event }))?, to_line(&rest)?);
+    let (first, rest) =
+        (to_line_without_newline(&json!({ "event": event }))?, to_line_without_newline(&rest)?);
     let comma = if rest == "{}" { "" } else { "," };
     Ok(format!("{}{comma}{}", &first[..first.len() - 1], &rest[1..]))
 }
@@ -160,12 +161,12 @@ mod tests {
     #[test]
     fn event_is_the_first_key() {
         let value = json!({ "a": 1, "event": "stage", "z": [2] });
-        assert_eq!(event_json_line(&value).expect("JSON"), r#"{"event":"stage","a":1,"z":[2]}"#);
+        assert_eq!(format_json_line_event_first(&value).expect("JSON"), r#"{"event":"stage","a":1,"z":[2]}"#);
         assert_eq!(
-            event_json_line(&json!({ "event": "cancelled" })).expect("JSON"),
+            format_json_line_event_first(&json!({ "event": "cancelled" })).expect("JSON"),
             r#"{"event":"cancelled"}"#
         );
-        assert_eq!(event_json_line(&json!({ "a": 1 })).expect("JSON"), r#"{"a":1}"#);
+        assert_eq!(format_json_line_event_first(&json!({ "a": 1 })).expect("JSON"), r#"{"a":1}"#);
     }
 
     #[test]

@@ -37,7 +37,7 @@ const DEFAULT_FIELD: [f64; 3] = [45.0, 1024.0, 640.0];
 pub fn load(path: &Path) -> Result<(GkitOrbiterCamera, FileHash), AssetError> {
     let token = CancelToken::new();
     let bytes = read::read_text(path, LIMIT, read::Monitor { progress: &ignore_progress, token: &token })?;
-    Ok((parse_orbiter_camera(path, &String::from_utf8_lossy(&bytes))?, read::hash(&bytes)))
+    Ok((parse_orbiter_camera(path, &String::from_utf8_lossy(&bytes))?, read::hash_bytes(&bytes)))
 }
 
 fn parse_orbiter_camera(path: &Path, text: &str) -> Result<GkitOrbiterCamera, AssetError> {

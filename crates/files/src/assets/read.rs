@@ -40,7 +40,7 @@ impl Monitor<'_> {
 }
 
 /// BLAKE3 hash of a file's content.
-pub(crate) fn hash(bytes: &[u8]) -> FileHash {
+pub(crate) fn hash_bytes(bytes: &[u8]) -> FileHash {
     *blake3::hash(bytes).as_bytes()
 }
 
@@ -72,20 +72,20 @@ const START: usize = 1 << 12;
 pub(crate) fn read_text(path: &Path, limit: u64, monitor: Monitor<'_>) -> Result<Vec<u8>, AssetError> {
     read_if_start_accepted(path, limit, monitor, |start| {
         reject_utf16(path, start)?;
-        reject_if_binary(path, start.contains(&0))
+        reject_as_binary_if(path, start.contains(&0))
     })
 }
 
 /// Reads a text or binary file in a format whose magic number starts with three letters. Rejects UTF-16 text
 /// and files with a zero among the first three bytes.
-pub(crate) fn read_rejecting_non_ascii_magic(
+pub(crate) fn read_rejecting_zeros_in_magic(
     path: &Path,
     limit: u64,
     monitor: Monitor<'_>,
 ) -> Result<Vec<u8>, AssetError> {
     read_if_start_accepted(path, limit, monitor, |start| {
         reject_utf16(path, start)?;
-        reject_if_binary(path, start[..start.len().min(3)].contains(&0))
+        reject_as_binary_if(path, start[..start.len().min(3)].contains(&0))
     })
 }
 
@@ -96,7 +96,7 @@ pub(crate) fn read_unless_zeros_at_start(
     monitor: Monitor<'_>,
 ) -> Result<Vec<u8>, AssetError> {
     read_if_start_accepted(path, limit, monitor, |start| {
-        reject_if_binary(path, !start.is_empty() && start.iter().all(|byte| *byte == 0))
+        reject_as_binary_if(path, !start.is_empty() && start.iter().all(|byte| *byte == 0))
     })
 }
 
@@ -105,7 +105,7 @@ pub(crate) fn read_bytes(path: &Path, limit: u64, monitor: Monitor<'_>) -> Resul
     read_if_start_accepted(path, limit, monitor, |_| Ok(()))
 }
 
-fn reject_if_binary(path: &Path, is_binary: bool) -> Result<(), AssetError> {
+fn reject_as_binary_if(path: &Path, is_binary: bool) -> Result<(), AssetError> {
     let refused = || AssetError::malformed(path, Some(1), BINARY_FILE);
     if is_binary { Err(refused()) } else { Ok(()) }
 }
@@ -194,19 +194,19 @@ mod tests {
     }
 
     #[test]
-    fn binary_files_are_rejected_by_their_start() {
+    fn binary_files_are_rejected_early() {
         let folder = tempfile::tempdir().expect("a folder");
         let token = CancelToken::new();
         let path = folder.path().join("zeros");
         // A sparse file of 3 TiB, which would take an hour to read completely.
         File::create(&path).and_then(|file| file.set_len(3 << 40)).expect("a sparse file");
-        for read in [read_text, read_rejecting_non_ascii_magic] {
+        for read in [read_text, read_rejecting_zeros_in_magic] {
             let error = rejection(read(&path, u64::MAX, monitor(&token)));
             assert_eq!(error, (Some(1), BINARY_FILE.to_owned()));
         }
         fs::write(&path, b"ply\n\0").expect("written");
         assert!(read_text(&path, 100, monitor(&token)).is_err());
-        assert_eq!(read_rejecting_non_ascii_magic(&path, 100, monitor(&token)).expect("read"), b"ply\n\0");
+        assert_eq!(read_rejecting_zeros_in_magic(&path, 100, monitor(&token)).expect("read"), b"ply\n\0");
         fs::write(&path, b"").expect("written");
         assert_eq!(read_text(&path, 100, monitor(&token)).expect("read"), b"");
     }
@@ -222,7 +222,7 @@ mod tests {
             let big: Vec<u8> = words().encode_utf16().flat_map(u16::to_be_bytes).collect();
             for bytes in [little, big] {
                 fs::write(&path, bytes).expect("written");
-                for read in [read_text, read_rejecting_non_ascii_magic] {
+                for read in [read_text, read_rejecting_zeros_in_magic] {
                     let error = rejection(read(&path, u64::MAX, monitor(&token)));
                     assert_eq!(error, (Some(1), UTF16_TEXT.to_owned()));
                 }
@@ -251,7 +251,7 @@ mod tests {
         let path = folder.path().join("pointer");
         let pointer = "version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 12345\n";
         fs::write(&path, pointer).expect("written");
-        for read in [read_text, read_rejecting_non_ascii_magic, read_unless_zeros_at_start, read_bytes] {
+        for read in [read_text, read_rejecting_zeros_in_magic, read_unless_zeros_at_start, read_bytes] {
             let error = rejection(read(&path, 1 << 20, monitor(&token)));
             assert_eq!(error, (None, LFS_POINTER.to_owned()));
         }

@@ -14,11 +14,11 @@ pub(super) fn error_color(value: f64) -> Vec3 {
     let turn = 0.79 + 0.5 * value;
     let chroma = CHROMA * 4.0 * value * (1.0 - value) + PALEST * value * value;
     let (a, b) = (chroma * libm::cos(TAU * turn), chroma * libm::sin(TAU * turn));
-    from_oklab(libm::cbrt(luminance_from_lightness(LIGHTEST * value)), a, b)
+    from_oklab(libm::cbrt(luminance_from_cie_lightness(LIGHTEST * value)), a, b)
 }
 
 /// Converts a CIE lightness in [0, 100] to relative luminance.
-fn luminance_from_lightness(lightness: f64) -> f64 {
+fn luminance_from_cie_lightness(lightness: f64) -> f64 {
     const KAPPA: f64 = 24_389.0 / 27.0;
     let root = (lightness + 16.0) / 116.0;
     if lightness > 8.0 { root * root * root } else { lightness / KAPPA }

@@ -7,7 +7,7 @@
 
 use rayon::prelude::*;
 
-use super::plane::{Plane, gaussian_kernel, normalized_taps};
+use super::plane::{Plane, normalized_taps, unnormalized_gaussian};
 use super::{Pair, tiles};
 use crate::film::Rect;
 use crate::math::Vec3;
@@ -44,7 +44,7 @@ impl DisplayErrorSums {
 
 pub(super) fn measure(pair: &Pair) -> DisplayErrors {
     let (width, height) = (pair.width(), pair.height());
-    let window = normalized_taps(&gaussian_kernel(SIGMA, RADIUS));
+    let window = normalized_taps(&unnormalized_gaussian(SIGMA, RADIUS));
     let band_sums = |band| {
         let sums = tiles::tiles_in_band(band, width, height).map(|tile| tile_sums(pair, tile, &window));
         sums.fold(DisplayErrorSums::default(), DisplayErrorSums::plus)
@@ -90,9 +90,9 @@ fn tile_lumas_and_squared_error(pair: &Pair, tile: Rect) -> (f64, [Plane; 2]) {
     let mut square = 0.0;
     let width = side(tile.width);
     for row in 0..side(tile.height) {
-        let Some(y) = tile_to_image_coordinate(tile.y, row, pair.height()) else { continue };
+        let Some(y) = image_coordinate_if_inside(tile.y, row, pair.height()) else { continue };
         for column in 0..width {
-            let Some(x) = tile_to_image_coordinate(tile.x, column, pair.width()) else { continue };
+            let Some(x) = image_coordinate_if_inside(tile.x, column, pair.width()) else { continue };
             let [a, b] = pair.pixel_pair(x, y).map(encode_srgb);
             lumas[0].values[row * width + column] = luma(a);
             lumas[1].values[row * width + column] = luma(b);
@@ -106,7 +106,7 @@ fn tile_lumas_and_squared_error(pair: &Pair, tile: Rect) -> (f64, [Plane; 2]) {
 
 /// Converts a coordinate in the tile with its margin to an image coordinate, or returns `None` if it is
 /// outside the image.
-fn tile_to_image_coordinate(start: u32, offset: usize, length: usize) -> Option<usize> {
+fn image_coordinate_if_inside(start: u32, offset: usize, length: usize) -> Option<usize> {
     (start as usize + offset).checked_sub(RADIUS).filter(|&position| position < length)
 }
 

@@ -120,7 +120,7 @@ fn read_radiance_image(path: &Path) -> Result<(RadianceImage, Vec<String>), Asse
         load(path, ImageEncoding::Raw, ImageLimits::default(), &ignore_progress, &CancelToken::new())?;
     let texels = image.texels;
     let (width, height) = (texels.width, texels.height);
-    Ok((RadianceImage { width, height, pixels: texels.into_linear() }, image.warnings))
+    Ok((RadianceImage { width, height, pixels: texels.into_linear_colors() }, image.warnings))
 }
 
 fn check_finite(path: &Path, image: &RadianceImage) -> Option<CompareError> {

@@ -109,7 +109,7 @@ impl FileAttributes {
         let mut carried = UncopiedAttributes { lost: Vec::new(), mode: self.mode };
         // Set the flags before changing the owner, because only the owner may set them.
         #[cfg(target_os = "linux")]
-        if !self.flags.carry_over(new) {
+        if !self.flags.try_apply_to_file(new) {
             carried.lost.push("its flags (chattr)".to_owned());
         }
         self.carry_owner(new, &mut carried);

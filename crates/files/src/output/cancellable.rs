@@ -21,7 +21,7 @@ pub(super) const BYTES: usize = 1 << 15;
 
 /// Tone maps an image from top to bottom and passes the bytes to `take` in order, at most [`BYTES`] at a
 /// time. Each component is one byte, or two bytes in big-endian order as in PNG and PPM.
-pub(super) fn tone_map_in_parts(
+pub(super) fn for_each_tone_mapped_part(
     image: &RadianceImage,
     options: &EncodeOptions,
     token: &CancelToken,
@@ -56,7 +56,8 @@ pub(super) fn tone_map_all(
         picture.extend_from_slice(part);
         Ok(())
     };
-    tone_map_in_parts(image, options, token, take).map_err(|error| OutputError::encoder(format, &error))?;
+    for_each_tone_mapped_part(image, options, token, take)
+        .map_err(|error| OutputError::encoder(format, &error))?;
     Ok(picture)
 }
 
@@ -165,7 +166,7 @@ mod tests {
             all.extend_from_slice(bytes);
             Ok(())
         };
-        tone_map_in_parts(&image, &options, &token, take).expect("not cancelled");
+        for_each_tone_mapped_part(&image, &options, &token, take).expect("not cancelled");
         let expected = tone_map_to_16_bits(&image, &options.tone).pixels.into_flattened();
         assert!(all.as_chunks().0.iter().map(|two| u16::from_be_bytes(*two)).eq(expected));
         let mut parts = 0;
@@ -174,7 +175,7 @@ mod tests {
             token.cancel();
             Ok(())
         };
-        assert!(tone_map_in_parts(&image, &options, &token, stop).is_err());
+        assert!(for_each_tone_mapped_part(&image, &options, &token, stop).is_err());
         assert_eq!(parts, 1);
     }
 

@@ -17,7 +17,7 @@ use ::exr::prelude::{
 use rayon::prelude::*;
 
 use super::cancellable::CancellableBuffer;
-use super::{EncodeOptions, Format, LayerImage, OutputError, SOFTWARE, as_finite, one_line};
+use super::{EncodeOptions, Format, LayerImage, OutputError, SOFTWARE, one_line, replace_non_finite};
 use crate::control::CancelToken;
 use crate::film::RadianceImage;
 
@@ -51,7 +51,7 @@ pub(super) fn encode(
     let mut bytes = CancellableBuffer::new(token);
     ::exr::block::write(&mut bytes, headers, true, |meta, file| {
         let block = |index| layers.extract_uncompressed_block(&meta.headers, index);
-        compress_blocks(&meta, meta.collect_ordered_block_data(block), file)
+        compress_and_write_blocks(&meta, meta.collect_ordered_block_data(block), file)
     })
     .map_err(|error| OutputError::encoder(Format::Exr, &error))?;
     Ok(bytes.into_bytes())
@@ -60,7 +60,7 @@ pub(super) fn encode(
 /// Channels of an image and its layers (`albedo.R` and so on).
 fn channels(image: &RadianceImage, layers: &[LayerImage]) -> AnyChannels<FlatSamples> {
     let channel = |name: &str, image: &RadianceImage, component: usize| {
-        let samples = image.pixels.iter().map(|pixel| as_finite(pixel[component])).collect();
+        let samples = image.pixels.iter().map(|pixel| replace_non_finite(pixel[component])).collect();
         AnyChannel::new(name, FlatSamples::F32(samples))
     };
     let names = ["R", "G", "B"];
@@ -77,7 +77,7 @@ fn channels(image: &RadianceImage, layers: &[LayerImage]) -> AnyChannels<FlatSam
 
 /// Compresses blocks in the caller's thread pool, or on the caller's thread if there is no pool. By default,
 /// the encoder would create its own pool with one thread per core.
-fn compress_blocks(
+fn compress_and_write_blocks(
     meta: &MetaData,
     mut blocks: impl Iterator<Item = (usize, UncompressedBlock)>,
     file: &mut impl ChunksWriter,

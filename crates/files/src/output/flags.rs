@@ -27,7 +27,7 @@ impl Flags {
     }
 
     /// Applies the flags to a new, empty file and returns whether this succeeded.
-    pub(super) fn carry_over(&self, new: &File) -> bool {
+    pub(super) fn try_apply_to_file(&self, new: &File) -> bool {
         let Some(wanted) = self.0 else { return true };
         let set = || {
             let now = ioctl_getflags(new)?;

@@ -270,7 +270,7 @@ mod tests {
 
         /// Returns all texts that exist after the process is killed, stale files are removed and glimt
         /// restarts.
-        fn after_a_kill(&self) -> Vec<String> {
+        fn texts_after_kill(&self) -> Vec<String> {
             remove_stale_files(self.folder.path(), &|_| false);
             recover_backup(&self.scene());
             let entries = fs::read_dir(self.folder.path()).expect("a folder");
@@ -345,7 +345,7 @@ mod tests {
                     }
                     std::mem::forget(replacement);
                 }
-                let found = folder.after_a_kill();
+                let found = folder.texts_after_kill();
                 let is_lost = newest != OLD && !found.contains(&newest);
                 assert!(!is_lost, "{steps} {saves:?}: {newest:?} is not in {found:?}");
                 assert!(scene.exists() && found.len() <= 2, "{steps} {saves:?}: {found:?}");

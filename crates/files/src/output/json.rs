@@ -11,7 +11,7 @@ use crate::system::text::is_terminal_safe_char;
 ///
 /// # Errors
 /// The value cannot be serialized.
-pub fn to_line(value: &impl Serialize) -> serde_json::Result<String> {
+pub fn to_line_without_newline(value: &impl Serialize) -> serde_json::Result<String> {
     serde_json::to_string(value).map(escape_terminal_unsafe)
 }
 
@@ -51,7 +51,7 @@ mod tests {
     #[test]
     fn unsafe_characters_are_escaped_reversibly() {
         let odd = "a\u{9b}\u{7f}\u{202e}\u{200d}\u{e0041}\u{1b}\n\t\"\\ä木🌳";
-        let text = to_line(&[odd]).expect("JSON");
+        let text = to_line_without_newline(&[odd]).expect("JSON");
         assert_eq!(text, "[\"a\\u009b\\u007f\\u202e\\u200d\\udb40\\udc41\\u001b\\n\\t\\\"\\\\ä木🌳\"]");
         assert_eq!(serde_json::from_str::<[String; 1]>(&text).expect("JSON"), [odd]);
         let laid_out = to_pretty_text(&[odd]).expect("JSON");

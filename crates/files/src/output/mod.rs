@@ -41,8 +41,8 @@ pub use exr::read_mean_luminance_error;
 pub use format::{AnimationFormat, BitDepth, Format};
 pub use identity::{FallbackFileIdentity, FileIdentity, is_same_file};
 pub use origin::{
-    ReplaceCheck, check_image_replaceable, may_replace_json, may_replace_plot, may_replace_table,
-    scene_name_in_png, sign_plot,
+    ReplaceCheck, check_image_replaceable, check_json_replaceable, check_plot_replaceable,
+    check_table_replaceable, scene_name_in_png, sign_plot,
 };
 
 use crate::control::CancelToken;
@@ -162,7 +162,7 @@ pub fn check_file_target(path: &Path) -> Result<(), OutputError> {
 }
 
 /// Replaces NaN with 0 and infinities with the largest finite value.
-fn as_finite(component: f32) -> f32 {
+fn replace_non_finite(component: f32) -> f32 {
     if component.is_nan() { 0.0 } else { component.clamp(-f32::MAX, f32::MAX) }
 }
 

@@ -40,7 +40,7 @@ fn try_encode(
     }
     let mut writer = encoder.write_header()?;
     let mut data = writer.stream_writer_with_size(CHUNK_BYTES)?;
-    cancellable::tone_map_in_parts(image, options, token, |part| data.write_all(part))?;
+    cancellable::for_each_tone_mapped_part(image, options, token, |part| data.write_all(part))?;
     data.finish()?;
     writer.finish()?;
     Ok(bytes)

@@ -23,7 +23,7 @@ pub(super) fn encode(
         bytes.extend_from_slice(part);
         Ok(())
     };
-    let written = cancellable::tone_map_in_parts(image, options, token, take);
+    let written = cancellable::for_each_tone_mapped_part(image, options, token, take);
     written.map_err(|error| OutputError::encoder(Format::Ppm, &error))?;
     Ok(bytes)
 }

@@ -46,9 +46,9 @@ pub(super) fn resolve_writable(path: &Path) -> Result<WriteTarget, OutputError> 
         return Err(target_is_directory_error(path));
     }
     match follow_links(path).map_err(|error| OutputError::file(path, error))? {
-        (target, None) => check_new_file_target(path, target),
+        (target, None) => resolve_new_file_target(path, target),
         (_, Some(metadata)) if metadata.is_symlink() => Ok(WriteTarget::InPlace(path.to_owned())),
-        (target, Some(metadata)) => check_existing_target(path, target, metadata),
+        (target, Some(metadata)) => resolve_existing_target(path, target, metadata),
     }
 }
 
@@ -89,12 +89,12 @@ pub(super) fn follow_links(path: &Path) -> io::Result<(PathBuf, Option<Metadata>
     Err(Errno::ELOOP.into())
 }
 
-fn check_new_file_target(path: &Path, target: PathBuf) -> Result<WriteTarget, OutputError> {
+fn resolve_new_file_target(path: &Path, target: PathBuf) -> Result<WriteTarget, OutputError> {
     check_directory(path, directory_of(&target))?;
     Ok(WriteTarget::File(TargetFile { path: target, existing: None }))
 }
 
-fn check_existing_target(
+fn resolve_existing_target(
     path: &Path,
     target: PathBuf,
     metadata: Metadata,

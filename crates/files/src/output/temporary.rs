@@ -109,7 +109,7 @@ fn probe_unnamed_creation(directory: &Path) -> io::Result<()> {
 }
 
 #[cfg(not(target_os = "linux"))]
-fn create_unnamed(_: &Path) -> io::Result<()> {
+fn probe_unnamed_creation(_: &Path) -> io::Result<()> {
     Err(ErrorKind::Unsupported.into())
 }
 

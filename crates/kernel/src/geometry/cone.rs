@@ -152,12 +152,12 @@ impl Cone {
     }
 
     /// Texture coordinates of a point on the surface.
-    pub fn uv_at(&self, point: DVec3) -> DVec2 {
+    pub fn uv_at_point(&self, point: DVec3) -> DVec2 {
         let local = self.frame.point_to_local(point);
         let (across, below) = (local.truncate().length(), self.height - local.z);
         let off_side = (across * self.height - local.z * self.radius) / self.slant;
         if self.capped && below.abs() < off_side.abs() {
-            return self.base().uv_at(point);
+            return self.base().uv_at_point(point);
         }
         let (_, along) = self.slant_direction_and_distance(local);
         DVec2::new(
@@ -174,7 +174,7 @@ impl Cone {
     }
 
     /// Unit tangents of the side, pointing away from the tip and around the axis.
-    pub(super) fn tangents(&self, point: DVec3) -> [DVec3; 2] {
+    pub(super) fn principal_directions(&self, point: DVec3) -> [DVec3; 2] {
         let along = (point - self.frame.origin).normalize_or(self.frame.axis());
         [along, self.frame.tangent_around(point)]
     }
@@ -354,15 +354,15 @@ mod tests {
             Self::new(DVec3::NEG_Z, DVec3::Z, radius, capped)
         }
 
-        fn met(&self, ray: &RayF64) -> Option<(f64, u32)> {
+        fn intersect_nearest(&self, ray: &RayF64) -> Option<(f64, u32)> {
             self.intersect_f64(ray)
         }
 
-        fn within(&self, ray: &RayF64) -> Option<LineInterval> {
+        fn interval_inside_side(&self, ray: &RayF64) -> Option<LineInterval> {
             self.side_interval(&self.frame.line_to_local(ray))
         }
 
-        fn exact(&self, ray: &RayF64, hit: &ShapeHit) -> DVec3 {
+        fn unrounded_point(&self, ray: &RayF64, hit: &ShapeHit) -> DVec3 {
             self.exact_hit_point(ray, hit)
         }
     }

@@ -100,7 +100,7 @@ impl OrientedBox {
     }
 
     /// Texture coordinates of a point on the surface.
-    pub fn uv_at(&self, point: DVec3) -> DVec2 {
+    pub fn uv_at_point(&self, point: DVec3) -> DVec2 {
         let local = self.axes.transpose() * (point - self.center);
         // The point is on the face with the largest relative coordinate.
         let axis = (local / self.half).abs().max_position();

@@ -31,7 +31,7 @@ impl SurfaceF64 for Cylinder {
         if hit.primitive > 0 {
             return self.cap_disk(hit.primitive).closest_point_f64(point, self.coordinate_bound());
         }
-        let (out, z) = self.closest_on_side(point);
+        let (out, z) = self.closest_side_direction_and_height(point);
         self.side_point_at_height_f64(out, z)
     }
 }
@@ -103,7 +103,7 @@ impl Cylinder {
         if hit.primitive > 0 {
             return self.cap_disk(hit.primitive).closest_surface_point(point, self.coordinate_bound());
         }
-        let (out, z) = self.closest_on_side(point);
+        let (out, z) = self.closest_side_direction_and_height(point);
         let SurfacePointF64 { point, normal, reach } = self.side_point_at_height_f64(out, z);
         SurfacePoint::from_f64(
             point,
@@ -116,7 +116,7 @@ impl Cylinder {
     }
 
     /// The point on the side that is closest to `point`, as a direction from the axis and a height.
-    fn closest_on_side(&self, point: DVec3) -> (DVec2, f64) {
+    fn closest_side_direction_and_height(&self, point: DVec3) -> (DVec2, f64) {
         let local = self.frame.point_to_local(point);
         (radial_direction_toward(local.truncate()), local.z.clamp(-self.half_length, self.half_length))
     }
@@ -136,11 +136,11 @@ impl Cylinder {
     }
 
     /// Texture coordinates of a point on the surface.
-    pub fn uv_at(&self, point: DVec3) -> DVec2 {
+    pub fn uv_at_point(&self, point: DVec3) -> DVec2 {
         let local = self.frame.point_to_local(point);
         let (inwards, below) = (self.radius - local.truncate().length(), self.half_length - local.z.abs());
         if self.capped && below.abs() < inwards.abs() {
-            return self.cap_disk(if local.z < 0.0 { 1 } else { 2 }).uv_at(point);
+            return self.cap_disk(if local.z < 0.0 { 1 } else { 2 }).uv_at_point(point);
         }
         DVec2::new(u_from_direction(radial_direction_toward(local.truncate())), self.height_to_v(local.z))
     }
@@ -151,7 +151,7 @@ impl Cylinder {
     }
 
     /// Unit tangents along the axis and around it.
-    pub(super) fn tangents(&self, point: DVec3) -> [DVec3; 2] {
+    pub(super) fn principal_directions(&self, point: DVec3) -> [DVec3; 2] {
         [self.frame.axis(), self.frame.tangent_around(point)]
     }
 
@@ -303,15 +303,15 @@ mod tests {
             Self::new(DVec3::NEG_Z, DVec3::Z, radius, capped)
         }
 
-        fn met(&self, ray: &RayF64) -> Option<(f64, u32)> {
+        fn intersect_nearest(&self, ray: &RayF64) -> Option<(f64, u32)> {
             self.intersect_f64(ray)
         }
 
-        fn within(&self, ray: &RayF64) -> Option<LineInterval> {
+        fn interval_inside_side(&self, ray: &RayF64) -> Option<LineInterval> {
             self.side_interval(&self.frame.line_to_local(ray))
         }
 
-        fn exact(&self, ray: &RayF64, hit: &ShapeHit) -> DVec3 {
+        fn unrounded_point(&self, ray: &RayF64, hit: &ShapeHit) -> DVec3 {
             self.unrounded_hit_point(ray, hit)
         }
     }

@@ -73,7 +73,7 @@ impl Disk {
         let SurfacePointF64 { point: near, normal, .. } = self.closest_point_f64(point, reach);
         let edge = 2.0 * self.radius;
         let [across, up] = [DVec3::X, DVec3::Y].map(|axis| self.frame.vector_to_world(axis * edge));
-        SurfacePoint::from_f64(near, normal, self.uv_at(point).as_vec2(), across, up, reach)
+        SurfacePoint::from_f64(near, normal, self.uv_at_point(point).as_vec2(), across, up, reach)
     }
 
     /// Point on the disk nearest to `point`, before rounding. `reach` is an upper bound on the magnitudes of
@@ -94,7 +94,7 @@ impl Disk {
     }
 
     /// Texture coordinates of a point on the disk.
-    pub fn uv_at(&self, point: DVec3) -> DVec2 {
+    pub fn uv_at_point(&self, point: DVec3) -> DVec2 {
         self.nearest_point_and_uv(point).1
     }
 

@@ -230,7 +230,7 @@ impl Shape {
     }
 
     /// Areas of the parts, indexed like `ShapeHit::primitive`. Empty if the shape is infinite. If the shape is
-    /// transformed, these are the areas before the transform; see [`Shape::area_scale`].
+    /// transformed, these are the areas before the transform; see [`Shape::area_scale_for_world_normal`].
     pub fn part_areas(&self) -> Vec<f64> {
         for_shape!(self, it => it.part_areas().to_vec())
     }
@@ -244,8 +244,12 @@ impl Shape {
     /// Factor that converts [`Shape::part_areas`] to world-space area at a point with this unit normal. 1
     /// unless the shape is transformed.
     #[inline]
-    pub fn area_scale(&self, normal: DVec3) -> f64 {
-        if let Self::Transformed(transformed) = self { transformed.area_scale(normal) } else { 1.0 }
+    pub fn area_scale_for_world_normal(&self, normal: DVec3) -> f64 {
+        if let Self::Transformed(transformed) = self {
+            transformed.area_scale_for_world_normal(normal)
+        } else {
+            1.0
+        }
     }
 
     /// Centroid of the surface. For a transformed shape, the image of the centroid.
@@ -254,7 +258,7 @@ impl Shape {
     }
 
     /// Whether a point is inside.
-    pub fn encloses(&self, point: DVec3) -> bool {
+    pub fn contains_point(&self, point: DVec3) -> bool {
         for_shape!(self, it => it.encloses(point))
     }
 
@@ -297,8 +301,8 @@ impl Shape {
     }
 
     /// Texture coordinates of a point on the surface.
-    pub fn uv_at(&self, point: DVec3) -> DVec2 {
-        for_shape!(self, it => it.uv_at(point))
+    pub fn uv_at_point(&self, point: DVec3) -> DVec2 {
+        for_shape!(self, it => it.uv_at_point(point))
     }
 
     /// Mean curvature at a point on a part. Positive if the front is convex.
@@ -317,15 +321,15 @@ impl Shape {
     /// Curvature of the meridian through a point on a curved part, and unit tangents along the meridian and
     /// around the axis, which are the principal directions. Returns `None` for all shapes except spheres,
     /// cylinders, cones and tori.
-    fn meridian(&self, point: DVec3) -> Option<(f64, [DVec3; 2])> {
+    fn meridian_curvature_and_directions(&self, point: DVec3) -> Option<(f64, [DVec3; 2])> {
         match self {
             Self::Sphere(sphere) => {
                 let (a, b) = (point - sphere.center).normalize_or(DVec3::Y).any_orthonormal_pair();
                 Some((1.0 / sphere.radius, [a, b]))
             }
-            Self::Cylinder(cylinder) => Some((0.0, cylinder.tangents(point))),
-            Self::Cone(cone) => Some((0.0, cone.tangents(point))),
-            Self::Torus(torus) => Some((1.0 / torus.tube(), torus.tangents(point))),
+            Self::Cylinder(cylinder) => Some((0.0, cylinder.principal_directions(point))),
+            Self::Cone(cone) => Some((0.0, cone.principal_directions(point))),
+            Self::Torus(torus) => Some((1.0 / torus.tube(), torus.principal_directions(point))),
             Self::Quad(_)
             | Self::Plane(_)
             | Self::Box(_)
@@ -441,7 +445,8 @@ mod tests {
     fn integral(shape: &Shape, asked: impl Fn(&SurfaceSample) -> f64) -> f64 {
         let grid = |i: u32| Vec2::new((i % SIDE) as f32 + 0.5, (i / SIDE) as f32 + 0.5) / SIDE as f32;
         let over_part = |(part, area): (u32, f64)| {
-            let value = |place: SurfaceSample| asked(&place) * shape.area_scale(place.normal);
+            let value =
+                |place: SurfaceSample| asked(&place) * shape.area_scale_for_world_normal(place.normal);
             let sum: f64 = (0..SIDE * SIDE).map(|i| value(shape.sample(part, grid(i)))).sum();
             sum * area / f64::from(SIDE * SIDE)
         };
@@ -578,8 +583,8 @@ mod tests {
                 let surface = shape.surface_point_at_hit(&ray, &hit);
                 let behind = surface.point.as_dvec3() - surface.normal.as_dvec3() * 1e-3;
                 let before = surface.point.as_dvec3() + surface.normal.as_dvec3() * 1e-3;
-                assert!(!shape.encloses(before) || !is_closed, "{shape:?}");
-                seen += u32::from(shape.encloses(behind));
+                assert!(!shape.contains_point(before) || !is_closed, "{shape:?}");
+                seen += u32::from(shape.contains_point(behind));
             }
             assert_eq!(
                 seen > 100,
@@ -596,7 +601,7 @@ mod tests {
             for (ray, hit) in hits(&shape) {
                 let surface = shape.surface_point_at_hit(&ray, &hit);
                 let point = surface.point.as_dvec3();
-                let uv = shape.uv_at(point);
+                let uv = shape.uv_at_point(point);
                 let (u, v) = (surface.dpdu.as_dvec3(), surface.dpdv.as_dvec3());
                 // Skip steps that cross a seam, a border, or a pole.
                 let step = 1e-4;
@@ -616,7 +621,8 @@ mod tests {
                     "{shape:?}: {uv} {}",
                     surface.uv
                 );
-                let moved = [shape.uv_at(point + u * step) - uv, shape.uv_at(point + v * step) - uv];
+                let moved =
+                    [shape.uv_at_point(point + u * step) - uv, shape.uv_at_point(point + v * step) - uv];
                 let off = (moved[0] - DVec2::X * step).length().max((moved[1] - DVec2::Y * step).length());
                 assert!(off < 0.02 * step, "{shape:?} at {uv}: {moved:?}");
                 // On spheres, u increases from x to z as documented, so images are mirrored. They are not

@@ -96,7 +96,7 @@ impl Parallelogram {
     }
 
     /// Texture coordinates of a point on the quad.
-    pub fn uv_at(&self, point: DVec3) -> DVec2 {
+    pub fn uv_at_point(&self, point: DVec3) -> DVec2 {
         DVec2::from_array(self.coordinates_of(point))
     }
 

@@ -74,7 +74,7 @@ impl Plane {
     }
 
     /// Texture coordinates of a point on the plane.
-    pub fn uv_at(&self, point: DVec3) -> DVec2 {
+    pub fn uv_at_point(&self, point: DVec3) -> DVec2 {
         DVec2::from_array(self.coordinates_of(point))
     }
 

@@ -80,7 +80,7 @@ impl Sphere {
     }
 
     /// Texture coordinates of a point on the surface.
-    pub fn uv_at(&self, point: DVec3) -> DVec2 {
+    pub fn uv_at_point(&self, point: DVec3) -> DVec2 {
         sphere_parametrization((point - self.center).normalize_or(DVec3::Y)).0.as_dvec2()
     }
 
@@ -146,8 +146,8 @@ impl SurfaceF64 for Sphere {
     fn surface_point_f64(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePointF64 {
         let outwards = ray.at(f64::from(hit.t)) - self.center;
         // At the center, any normal is correct.
-        let is_told = outwards.length_squared() > 0.0;
-        let n = (if is_told { outwards } else { -ray.direction }).normalize();
+        let is_nonzero = outwards.length_squared() > 0.0;
+        let n = (if is_nonzero { outwards } else { -ray.direction }).normalize();
         let reach = self.center.abs().max_element() + self.radius;
         SurfacePointF64 { point: self.center + n * self.radius, normal: n, reach }
     }

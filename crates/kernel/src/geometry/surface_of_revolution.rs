@@ -291,13 +291,13 @@ pub(super) mod tests {
         fn thin(radius: f64, capped: bool) -> Self;
 
         /// Nearest hit.
-        fn met(&self, ray: &RayF64) -> Option<(f64, u32)>;
+        fn intersect_nearest(&self, ray: &RayF64) -> Option<(f64, u32)>;
 
         /// Interval of the ray inside the unbounded side surface.
-        fn within(&self, ray: &RayF64) -> Option<LineInterval>;
+        fn interval_inside_side(&self, ray: &RayF64) -> Option<LineInterval>;
 
         /// Hit point before rounding.
-        fn exact(&self, ray: &RayF64, hit: &ShapeHit) -> DVec3;
+        fn unrounded_point(&self, ray: &RayF64, hit: &ShapeHit) -> DVec3;
     }
 
     /// Checks hit points of rays so distant that both crossings of the side round to the same distance.
@@ -310,9 +310,10 @@ pub(super) mod tests {
             let at = DVec3::new(0.0, across * 0.02, along);
             let from = at + DVec3::new(2e5, 0.0, f64::from(i % 7) * 2e5 - 6e5);
             let ray = Ray::new(from.as_vec3(), (at - from).normalize().as_vec3()).to_f64();
-            let Some((t, part)) = thin.met(&ray) else { continue };
-            assert_eq!(thin.exact(&ray, &to_shape_hit((t, part))), ray.at(t), "{thin:?} {ray:?}");
-            let size = thin.within(&ray).map_or(f64::INFINITY, |side| side.leave.0 - side.enter.0);
+            let Some((t, part)) = thin.intersect_nearest(&ray) else { continue };
+            assert_eq!(thin.unrounded_point(&ray, &to_shape_hit((t, part))), ray.at(t), "{thin:?} {ray:?}");
+            let size =
+                thin.interval_inside_side(&ray).map_or(f64::INFINITY, |side| side.leave.0 - side.enter.0);
             ambiguous += u32::from((t + size) as f32 == t as f32);
         }
         assert!(ambiguous > 100, "{ambiguous}");

@@ -76,7 +76,7 @@ impl SurfacePacket {
     /// Computes the surface points of the hits selected by `of`, which must be on the same shape. Returns
     /// false if the shape has no SIMD loop.
     #[inline(always)]
-    pub fn compute_surface_points(
+    pub fn try_compute_surface_points(
         &mut self,
         shape: &Shape,
         rays: &RayPacket,
@@ -116,7 +116,7 @@ impl SurfacePacket {
         }
     }
 
-    /// [`SurfacePacket::compute_surface_points`] for a shape with a SIMD loop.
+    /// [`SurfacePacket::try_compute_surface_points`] for a shape with a SIMD loop.
     #[inline(always)]
     pub(super) fn fill_from_shape(
         &mut self,

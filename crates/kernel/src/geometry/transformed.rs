@@ -55,7 +55,7 @@ impl TransformedShape {
     /// Converts an upper bound on lengths in the shape's coordinates to a bound on lengths in the world. The
     /// result also covers the rounding errors of the transform and its inverse, which enlarge relative errors
     /// by up to the condition number.
-    pub fn reach_to_world(&self, reach: f64) -> f64 {
+    pub fn length_bound_to_world(&self, reach: f64) -> f64 {
         (1.0 + self.condition) * self.stretch * reach + self.to_world.translation.abs().max_element()
     }
 
@@ -94,7 +94,7 @@ impl TransformedShape {
         Aabb::from_points_f64([center - extent, center + extent])
     }
 
-    /// Areas of the parts in the shape's coordinates. [`TransformedShape::area_scale`] converts areas to the
+    /// Areas of the parts in the shape's coordinates. [`TransformedShape::area_scale_for_world_normal`] converts areas to the
     /// world.
     pub fn part_areas(&self) -> Vec<f64> {
         self.shape.part_areas()
@@ -109,7 +109,7 @@ impl TransformedShape {
 
     /// Factor from areas in the shape's coordinates to areas in the world, at a point whose unit normal in
     /// the world is `normal`: |det M|·|M⁻ᵀn|, where n is the normal in the shape's coordinates.
-    pub fn area_scale(&self, normal: DVec3) -> f64 {
+    pub fn area_scale_for_world_normal(&self, normal: DVec3) -> f64 {
         self.volume_scale / (self.to_world.linear.transpose() * normal).length()
     }
 
@@ -120,7 +120,7 @@ impl TransformedShape {
 
     /// Whether a point is inside.
     pub fn encloses(&self, point: DVec3) -> bool {
-        self.shape.encloses(self.to_world.inverse_point(point))
+        self.shape.contains_point(self.to_world.inverse_point(point))
     }
 
     /// [`Shape::encloses_each_point`] for the transformed shape.
@@ -129,8 +129,8 @@ impl TransformedShape {
     }
 
     /// Texture coordinates of a point on the surface.
-    pub fn uv_at(&self, point: DVec3) -> DVec2 {
-        self.shape.uv_at(self.to_world.inverse_point(point))
+    pub fn uv_at_point(&self, point: DVec3) -> DVec2 {
+        self.shape.uv_at_point(self.to_world.inverse_point(point))
     }
 
     /// Mean curvature at a point on a part. With principal curvatures k₁ and k₂ in the shape's coordinates and
@@ -140,7 +140,9 @@ impl TransformedShape {
     pub fn mean_curvature(&self, part: u32, point: DVec3) -> f64 {
         let local = self.to_world.inverse_point(point);
         let mean = self.shape.mean_curvature(part, local);
-        let Some((bend, tangents)) = self.shape.meridian(local).filter(|_| mean != 0.0) else {
+        let Some((bend, tangents)) =
+            self.shape.meridian_curvature_and_directions(local).filter(|_| mean != 0.0)
+        else {
             return 0.0;
         };
         let [along, around] = tangents.map(|tangent| self.to_world.vector(tangent));
@@ -203,7 +205,7 @@ impl SurfaceF64 for TransformedShape {
         SurfacePointF64 {
             point: self.to_world.point(point),
             normal: self.to_world.normal(normal.normalize()),
-            reach: self.reach_to_world(reach),
+            reach: self.length_bound_to_world(reach),
         }
     }
 }
@@ -230,7 +232,7 @@ pub(crate) mod tests {
     pub(crate) fn area(shape: &Shape, part: u32) -> f64 {
         let side = 256_u32;
         let at = |i: u32| (Vec2::new((i % side) as f32, (i / side) as f32) + 0.5) / side as f32;
-        let scale = |i: u32| shape.area_scale(shape.sample(part, at(i)).normal);
+        let scale = |i: u32| shape.area_scale_for_world_normal(shape.sample(part, at(i)).normal);
         let mean = (0..side * side).map(scale).sum::<f64>() / f64::from(side * side);
         mean * shape.part_areas()[part as usize]
     }

@@ -72,8 +72,8 @@ impl Triangle {
     }
 
     /// Texture coordinates of a point on the triangle.
-    pub fn uv_at(&self, point: DVec3) -> DVec2 {
-        barycentric_weights([self.a, self.b, self.c], point)
+    pub fn uv_at_point(&self, point: DVec3) -> DVec2 {
+        barycentric_weights_at_point([self.a, self.b, self.c], point)
     }
 
     /// Bounding box.
@@ -118,7 +118,7 @@ impl Triangle {
 }
 
 /// Barycentric weights of the second and third corners at a point on the triangle.
-pub fn barycentric_weights([a, b, c]: [DVec3; 3], point: DVec3) -> DVec2 {
+pub fn barycentric_weights_at_point([a, b, c]: [DVec3; 3], point: DVec3) -> DVec2 {
     let (ab, ac, ap) = (b - a, c - a, point - a);
     let normal = ab.cross(ac);
     let of = |area: DVec3| area.dot(normal) / normal.length_squared();

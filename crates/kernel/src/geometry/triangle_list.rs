@@ -55,7 +55,7 @@ const NONE: u32 = u32::MAX;
 
 /// A triangle, or two triangles that form a flat quadrilateral.
 #[derive(Clone, Copy, Debug)]
-struct Facet {
+struct TriangleOrQuad {
     /// Unit normal.
     normal: Vec3,
     /// Dot product of the normal and a point on the plane.
@@ -86,7 +86,7 @@ struct Facet {
 /// The triangles of a small scene.
 #[derive(Debug)]
 pub struct TriangleList {
-    facets: Vec<Facet>,
+    facets: Vec<TriangleOrQuad>,
     corners: Vec<[Vec3; 3]>,
     /// Bounding box.
     low: Vec3,
@@ -148,11 +148,11 @@ impl TriangleList {
                     is_left[other] = false;
                     let [one, two] = [slenderness(&corners[number]), slenderness(&corners[other])];
                     let most = [one[0].max(two[0]), one[1].max(two[1])];
-                    Facet::new(&first, Some(apex), [number as u32, other as u32], most)
+                    TriangleOrQuad::new(&first, Some(apex), [number as u32, other as u32], most)
                 }
                 None => {
                     let own = &corners[number];
-                    Facet::new(own, None, [number as u32; 2], slenderness(own))
+                    TriangleOrQuad::new(own, None, [number as u32; 2], slenderness(own))
                 }
             });
         }
@@ -221,7 +221,9 @@ impl TriangleList {
         let [ox, oy, oz] = &rays.origin;
         let [dx, dy, dz] = &rays.direction;
         for facet in &self.facets {
-            let Facet { normal, offset, across: [first, second], start, half, diagonal, beyond, .. } = *facet;
+            let TriangleOrQuad {
+                normal, offset, across: [first, second], start, half, diagonal, beyond, ..
+            } = *facet;
             let (slender, along, split) = (facet.slender, facet.along, facet.split);
             // Select with bit operations. Otherwise, compilers would select between two addresses lane by
             // lane.
@@ -360,10 +362,10 @@ struct CandidateTestResults {
     hit: Mask,
     /// Mask of the undecided rays.
     undecided: u32,
-    hits: super::watertight_packet::Hits,
+    hits: super::watertight_packet::TriangleTestResults,
 }
 
-impl Facet {
+impl TriangleOrQuad {
     fn new([a, b, c]: &[Vec3; 3], apex: Option<Vec3>, numbers: [u32; 2], [slender, wide]: [f64; 2]) -> Self {
         let [a, b, c] = [a, b, c].map(|corner| corner.as_dvec3());
         let (u, v) = (b - a, c - a);

@@ -93,7 +93,7 @@ impl ShearedRay {
             return self.intersect_needle(corners, t_max);
         }
         if t.abs() <= error {
-            return self.intersect_at_start(corners, t_max);
+            return self.intersect_near_origin(corners, t_max);
         }
         (t > 0.0 && t <= t_max).then_some(ShapeHit { t, primitive: 0, u: wb * inverse, v: wc * inverse })
     }
@@ -126,7 +126,7 @@ impl ShearedRay {
     /// Finds the hit on a triangle whose plane is so close to the origin that the sign of t is uncertain in
     /// single precision. The ray's line is already known to pass through the triangle.
     #[cold]
-    fn intersect_at_start(&self, corners: &[Vec3; 3], t_max: f32) -> Option<ShapeHit> {
+    fn intersect_near_origin(&self, corners: &[Vec3; 3], t_max: f32) -> Option<ShapeHit> {
         let ([a, b, c], [wa, wb, wc]) = self.edge_functions_f64(corners);
         let sum = wa + wb + wc;
         let t = ((wa * a.z + wb * b.z + wc * c.z) / sum) as f32;
@@ -232,7 +232,7 @@ mod tests {
     }
 
     #[test]
-    fn hits_are_never_at_nan() {
+    fn hit_distances_are_finite() {
         let bad = [f32::NAN, f32::INFINITY, 0.0, -0.0, 1e38, 1e-40];
         for a in bad {
             for b in bad {

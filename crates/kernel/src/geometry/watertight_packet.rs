@@ -20,7 +20,7 @@ pub struct ShearedPacket<'a> {
 }
 
 /// Results of testing each ray in a packet against one triangle.
-pub(super) struct Hits {
+pub(super) struct TriangleTestResults {
     pub(super) hit: Mask,
     /// Lanes that need the scalar test.
     pub(super) doubtful: Mask,
@@ -212,10 +212,10 @@ impl<'a> ShearedPacket<'a> {
         numbers: &[u32; PACKET_SIZE],
         corners: [impl Corner; 3],
         ends: &F32x16,
-    ) -> Hits {
+    ) -> TriangleTestResults {
         let [a, b, c] =
             [self.shear_corner(corners[0]), self.shear_corner(corners[1]), self.shear_corner(corners[2])];
-        let mut hits = Hits {
+        let mut hits = TriangleTestResults {
             hit: [0; PACKET_SIZE],
             doubtful: [0; PACKET_SIZE],
             t: [0.0; PACKET_SIZE],

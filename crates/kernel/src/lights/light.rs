@@ -82,7 +82,7 @@ impl Light {
     /// Inverse light-sampling pdfs in sr. They are 0 for black samples and for delta lights, which no other
     /// technique can sample.
     #[inline(always)]
-    pub fn inverse_pdfs(&self, samples: &LightSamplePacket) -> F32x16 {
+    pub fn inverse_pdfs_of_samples(&self, samples: &LightSamplePacket) -> F32x16 {
         let mut inverse = [0.0; PACKET_SIZE];
         match self {
             Self::Point(_) | Self::Spot(_) => {}
@@ -98,9 +98,9 @@ impl Light {
         inverse
     }
 
-    /// [`Light::inverse_pdfs`] for a single sample, computed from its direction and weight.
+    /// [`Light::inverse_pdfs_of_samples`] for a single sample, computed from its direction and weight.
     #[inline(always)]
-    pub(super) fn inverse_pdf(&self, direction: Vec3, weight: Vec3) -> f32 {
+    pub(super) fn inverse_pdf_of_sample(&self, direction: Vec3, weight: Vec3) -> f32 {
         match self {
             Self::Point(_) | Self::Spot(_) => 0.0,
             Self::Directional(light) => light.inverse_pdf(),
@@ -129,7 +129,7 @@ impl Light {
 
     /// Bounds on the light's position and emission for a [`LightTree`](super::LightTree), or `None` if the
     /// light emits nothing.
-    pub fn bounds(&self) -> Option<LightBounds> {
+    pub fn bounds_if_emissive(&self) -> Option<LightBounds> {
         let bounds = match self.family() {
             LightFamily::Delta(light) => light.bounds(),
             LightFamily::Infinite(light) => light.direction_and_irradiance_bounds(),

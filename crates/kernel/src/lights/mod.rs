@@ -29,7 +29,7 @@
 //!
 //! - The weight of a sample is the radiance divided by the pdf of its direction. For a delta light, it is the
 //!   irradiance.
-//! - The pdf of a sampled direction ([`Light::inverse_pdfs`]) equals its pdf when a ray hits the light
+//! - The pdf of a sampled direction ([`Light::inverse_pdfs_of_samples`]) equals its pdf when a ray hits the light
 //!   ([`Light::pdf`], or [`Lights::radiance_from_infinity`] for infinite lights).
 //! - The mean photon flux equals the power implied by the bounds and the samples.
 

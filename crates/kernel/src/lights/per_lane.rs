@@ -31,7 +31,7 @@ macro_rules! convex_packet_of {
 
 impl Lights {
     /// [`Light::sample`] for the points in the mask `used`, where each lane has its own light. Returns the
-    /// samples, the inverse pdfs in sr (as in [`Light::inverse_pdfs`]), and the number of texture lookups.
+    /// samples, the inverse pdfs in sr (as in [`Light::inverse_pdfs_of_samples`]), and the number of texture lookups.
     #[inline(always)]
     pub fn sample_per_lane(
         &self,
@@ -52,16 +52,16 @@ impl Lights {
             let first = left.trailing_zeros() as usize % PACKET_SIZE;
             let mut of = 0;
             let found = if let Some(filler) = lights[first].as_point() {
-                let lights = gather_lights_of_kind((&lights, left), &mut of, Light::as_point, filler);
+                let lights = lights_of_kind_or_filler((&lights, left), &mut of, Light::as_point, filler);
                 packet_of!(LightGeometry::Nothing, i => {
                     let (direction, weight) = lights[i].direction_and_irradiance(lane(points, i));
                     (direction, lights[i].position.as_vec3(), weight)
                 })
             } else if let Some(filler) = as_sphere_light(lights[first]) {
-                let balls = gather_lights_of_kind((&lights, left), &mut of, as_sphere_light, filler);
+                let balls = lights_of_kind_or_filler((&lights, left), &mut of, as_sphere_light, filler);
                 convex_packet_of!(i => balls, points, u)
             } else if let Some(filler) = as_quad_light(lights[first]) {
-                let quads = gather_lights_of_kind((&lights, left), &mut of, as_quad_light, filler);
+                let quads = lights_of_kind_or_filler((&lights, left), &mut of, as_quad_light, filler);
                 let mut row = convex_packet_of!(i => quads, points, u);
                 for i in 0..PACKET_SIZE {
                     if let Some((_, Some(two))) = quads[i].1.shape.as_quad() {
@@ -70,7 +70,8 @@ impl Lights {
                 }
                 row
             } else if let Some(filler) = as_area_sampled_mesh_light(lights[first]) {
-                let all = gather_lights_of_kind((&lights, left), &mut of, as_area_sampled_mesh_light, filler);
+                let all =
+                    lights_of_kind_or_filler((&lights, left), &mut of, as_area_sampled_mesh_light, filler);
                 triangle_packet_of!(i => (all[i].0, all[i].1), points, u)
             } else {
                 of = 1 << first;
@@ -89,7 +90,7 @@ impl Lights {
         }
         let mut inverse = [0.0; PACKET_SIZE];
         for i in 0..PACKET_SIZE {
-            inverse[i] = lights[i].inverse_pdf(lane(&row.directions, i), lane(&row.weights, i));
+            inverse[i] = lights[i].inverse_pdf_of_sample(lane(&row.directions, i), lane(&row.weights, i));
         }
         // Apply the emission textures. They do not affect the pdfs.
         let mut lookups = 0;
@@ -127,7 +128,7 @@ fn as_area_sampled_mesh_light(light: &Light) -> Option<(&AreaSampledTriangles, &
 /// Returns the lights of one kind, and adds the lanes that have such a light to `of`. All other lanes get
 /// `filler`.
 #[inline(always)]
-fn gather_lights_of_kind<'a, T: Copy>(
+fn lights_of_kind_or_filler<'a, T: Copy>(
     (lights, left): (&[&'a Light; PACKET_SIZE], u32),
     of: &mut u32,
     kind: impl Fn(&'a Light) -> Option<T>,

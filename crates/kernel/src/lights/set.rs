@@ -119,7 +119,7 @@ impl Lights {
             if count_lights_once_per_object(all.iter().filter(taken)) <= most {
                 return Ok(None);
             }
-            let bounds = all.iter().map(|light| light.bounds().filter(|_| taken(&light)));
+            let bounds = all.iter().map(|light| light.bounds_if_emissive().filter(|_| taken(&light)));
             Ok(LightTree::new(&bounds.collect::<Vec<_>>(), token)?.map(Arc::new))
         };
         lights.tree = tree_over(&|_| true, MAX_WITHOUT_TREE)?;

@@ -91,7 +91,7 @@ pub trait Bxdf: Soa + Default {
     type View: Soa + Default;
 
     /// Whether shading normals are rotated to face the viewer. See
-    /// [`rotate_normal_to_viewer`](super::microfacet::rotate_normal_to_viewer).
+    /// [`rotate_normal_to_viewer_branchless`](super::microfacet::rotate_normal_to_viewer_branchless).
     const TURNS_NORMALS: bool = true;
 
     /// Whether the BSDF is for light from behind the surface.
@@ -189,7 +189,7 @@ pub(super) fn branchless_select_vec3(condition: bool, yes: Vec3, no: Vec3) -> Ve
 /// Computes the lobes' shading normal from a normal on the lit side and the direction to the viewer.
 #[inline(always)]
 pub fn lobe_shading_normal<B: Bxdf>(normal: Vec3, wo: Vec3) -> Vec3 {
-    use super::microfacet::rotate_single_normal_to_viewer as turn;
+    use super::microfacet::rotate_normal_to_viewer_if_needed as turn;
     match (B::TURNS_NORMALS, B::IS_TRANSMISSION) {
         (false, _) => normal,
         (true, false) => turn(normal, wo),

@@ -2,7 +2,7 @@
 
 use super::bsdf::{BsdfValues, DielectricSamplePacket, LobeFilter, NarrowLobe, SampledLobes, UvPacket};
 use super::bxdf::{Bxdf, BxdfFlags, ShadingGeometry};
-use super::microfacet::rotate_normal_to_viewer;
+use super::microfacet::rotate_normal_to_viewer_branchless;
 use super::rough_dielectric::DielectricBxdf;
 use super::texture::Texture;
 use crate::math::Vec3;
@@ -64,14 +64,14 @@ impl<B: Bxdf> Default for BxdfPacket<B> {
 
 /// Flags in which the compiler knows the value of [`BxdfFlags::NARROW`], so it can remove code from loops.
 #[inline(always)]
-fn with_known_narrow_flag<const NARROW: bool>(any: BxdfFlags) -> BxdfFlags {
+fn flags_with_const_narrow<const NARROW: bool>(any: BxdfFlags) -> BxdfFlags {
     if NARROW { any.union(BxdfFlags::NARROW) } else { any.without(BxdfFlags::NARROW) }
 }
 
 impl<B: Bxdf> BxdfPacket<B> {
     /// Prepares the packet for reuse with other surfaces.
     #[inline(always)]
-    pub fn reset_flags(&mut self) {
+    pub fn prepare_for_reuse(&mut self) {
         (self.any, self.shows_all) = (B::ALWAYS, true);
     }
 
@@ -143,7 +143,7 @@ impl<B: Bxdf> BxdfPacket<B> {
     ) {
         if B::TURNS_NORMALS {
             for i in 0..PACKET_SIZE {
-                let turned = rotate_normal_to_viewer(lane(normals, i), -lane(directions, i));
+                let turned = rotate_normal_to_viewer_branchless(lane(normals, i), -lane(directions, i));
                 set_lane(normals, i, turned);
             }
         }
@@ -235,7 +235,7 @@ impl<B: Bxdf> BxdfPacket<B> {
         wi: &Vec3x16,
         values: &BsdfValues,
     ) -> F32x16 {
-        let any = with_known_narrow_flag::<NARROW>(self.any);
+        let any = flags_with_const_narrow::<NARROW>(self.any);
         let mut pdfs = [0.0; PACKET_SIZE];
         for i in 0..PACKET_SIZE {
             let bsdf = B::get(&self.bsdf, i);
@@ -256,21 +256,21 @@ impl<B: Bxdf> BxdfPacket<B> {
         u: &[F32x16; 2],
     ) -> Vec3x16 {
         if self.any_has_narrow_lobe() {
-            self.sample_lanes::<true>(lobes, normals, choices, u)
+            self.sample_specialized_by_narrow_flag::<true>(lobes, normals, choices, u)
         } else {
-            self.sample_lanes::<false>(lobes, normals, choices, u)
+            self.sample_specialized_by_narrow_flag::<false>(lobes, normals, choices, u)
         }
     }
 
     #[inline(always)]
-    fn sample_lanes<const NARROW: bool>(
+    fn sample_specialized_by_narrow_flag<const NARROW: bool>(
         &self,
         lobes: SampledLobes,
         normals: &Vec3x16,
         choices: &F32x16,
         u: &[F32x16; 2],
     ) -> Vec3x16 {
-        let any = with_known_narrow_flag::<NARROW>(self.any);
+        let any = flags_with_const_narrow::<NARROW>(self.any);
         let mut wi = [[0.0; PACKET_SIZE]; 3];
         for i in 0..PACKET_SIZE {
             let bsdf = B::get(&self.bsdf, i);
@@ -399,7 +399,7 @@ impl<B: Bxdf> BxdfPacket<B> {
 
     /// [`BxdfPacket::sample`].
     #[inline(always)]
-    pub(super) fn sample_outlined(
+    pub(super) fn sample_out_of_line(
         &self,
         lobes: SampledLobes,
         normals: &Vec3x16,
@@ -418,7 +418,7 @@ impl<B: Bxdf> BxdfPacket<B> {
 impl<const THROUGH: bool> BxdfPacket<DielectricBxdf<THROUGH>> {
     /// [`BxdfPacket::sample_either_side`].
     #[inline(always)]
-    pub(super) fn sample_either_side_outlined(
+    pub(super) fn sample_either_side_out_of_line(
         &self,
         choices: &F32x16,
         u: &[F32x16; 2],

@@ -32,7 +32,7 @@ pub fn dielectric_from_outside(cos_incident: f32, eta: f32) -> f32 {
 
 /// [`dielectric`] for light from either side, in `f32` for packets. Returns 1 for total internal reflection.
 #[inline(always)]
-pub fn dielectric_from_either_side(cos_incident: f32, eta: f32) -> f32 {
+pub fn dielectric_for_any_eta(cos_incident: f32, eta: f32) -> f32 {
     let squared = (eta - 1.0) * (eta + 1.0) + cos_incident * cos_incident;
     dielectric_from_transmitted_cos2(cos_incident, eta, if squared > 0.0 { squared } else { 0.0 })
 }
@@ -94,7 +94,7 @@ pub fn schlick_weight(cos_incident: f32) -> f32 {
 
 /// Direction in which Snell's law refracts the unit vector `incident`, given the unit normal on its side and
 /// the cosine from [`dielectric`].
-pub fn refract(incident: Vec3, normal: Vec3, eta: f32, cos_transmitted: f32) -> Vec3 {
+pub fn refract_given_cosine(incident: Vec3, normal: Vec3, eta: f32, cos_transmitted: f32) -> Vec3 {
     let cos_incident = -incident.dot(normal);
     (incident / eta + normal * (cos_incident / eta - cos_transmitted)).normalize()
 }
@@ -123,7 +123,7 @@ mod tests {
             for step in 1..=1000_u16 {
                 let cosine = f32::from(step) / 1000.0;
                 let (exact, through) = dielectric(cosine, eta);
-                assert!((exact - dielectric_from_either_side(cosine, eta)).abs() < 2e-5, "{eta} {cosine}");
+                assert!((exact - dielectric_for_any_eta(cosine, eta)).abs() < 2e-5, "{eta} {cosine}");
                 let Some(beyond) = through else { continue };
                 let there = fresnel_transmittance([cosine, beyond], [1.0, eta]);
                 assert!((1.0 - exact - there).abs() < 2e-5, "{eta} {cosine}: {there}");
@@ -213,7 +213,8 @@ mod tests {
                 let (sin, cos) = degrees.to_radians().sin_cos();
                 let incident = Vec3::new(sin, -cos, 0.0);
                 let (_, cos_t) = dielectric(cos, eta);
-                let refracted = refract(incident, Vec3::Y, eta, cos_t.expect("below the critical angle"));
+                let refracted =
+                    refract_given_cosine(incident, Vec3::Y, eta, cos_t.expect("below the critical angle"));
                 assert!((refracted.x - sin / eta).abs() < 1e-6 && refracted.y < 0.0);
             }
         }

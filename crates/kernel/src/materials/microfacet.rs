@@ -20,7 +20,7 @@ pub const MIN_ALPHA: f32 = 1e-3;
 /// Minimum cosine of directions above the surface.
 const MIN_COSINE: f32 = 1e-6;
 
-/// Minimum cosine between a normal and the direction to the viewer. See [`rotate_normal_to_viewer`].
+/// Minimum cosine between a normal and the direction to the viewer. See [`rotate_normal_to_viewer_branchless`].
 const MIN_FACING_COSINE: f32 = 1e-3;
 
 /// Computes a lobe's α along u and along v. An anisotropy in [−1, 1] stretches the base value, roughness².
@@ -35,7 +35,7 @@ pub fn alphas_from_roughness(roughness: f32, anisotropy: f32) -> [f32; 2] {
 /// Rotates the unit normal just enough to face the viewer. Shading normals may face away from the viewer near
 /// silhouettes of smooth meshes.
 #[inline(always)]
-pub fn rotate_normal_to_viewer(normal: Vec3, to_eye: Vec3) -> Vec3 {
+pub fn rotate_normal_to_viewer_branchless(normal: Vec3, to_eye: Vec3) -> Vec3 {
     let missing = MIN_FACING_COSINE - normal.dot(to_eye);
     let turned = normal + to_eye * missing;
     let turned = turned * (1.0 / turned.length_squared().sqrt());
@@ -43,10 +43,14 @@ pub fn rotate_normal_to_viewer(normal: Vec3, to_eye: Vec3) -> Vec3 {
     Vec3::new(choose(turned.x, normal.x), choose(turned.y, normal.y), choose(turned.z, normal.z))
 }
 
-/// [`rotate_normal_to_viewer`] with a branch that is fast for normals that do not need rotation.
+/// [`rotate_normal_to_viewer_branchless`] with a branch that is fast for normals that do not need rotation.
 #[inline(always)]
-pub fn rotate_single_normal_to_viewer(normal: Vec3, to_eye: Vec3) -> Vec3 {
-    if normal.dot(to_eye) < MIN_FACING_COSINE { rotate_normal_to_viewer(normal, to_eye) } else { normal }
+pub fn rotate_normal_to_viewer_if_needed(normal: Vec3, to_eye: Vec3) -> Vec3 {
+    if normal.dot(to_eye) < MIN_FACING_COSINE {
+        rotate_normal_to_viewer_branchless(normal, to_eye)
+    } else {
+        normal
+    }
 }
 
 /// The unnormalized half vector of two unit directions.
@@ -141,7 +145,7 @@ impl SmithTerms {
 
     /// Whether the direction is above the surface.
     #[inline(always)]
-    pub fn is_above_surface(&self) -> bool {
+    pub fn is_direction_above_surface(&self) -> bool {
         self.cosine > MIN_COSINE
     }
 
@@ -149,7 +153,7 @@ impl SmithTerms {
     #[inline(always)]
     pub fn torrance_sparrow_without_fresnel(&self, other: &Self, distribution: f32) -> f32 {
         let value = distribution / (2.0 * (self.cosine * other.slope + other.cosine * self.slope));
-        if self.is_above_surface() & other.is_above_surface() { value } else { 0.0 }
+        if self.is_direction_above_surface() & other.is_direction_above_surface() { value } else { 0.0 }
     }
 
     /// Computes, from D, the pdf in sr⁻¹ of a direction that [`sample_reflection`] samples for this view
@@ -157,7 +161,7 @@ impl SmithTerms {
     #[inline(always)]
     pub fn reflection_pdf(&self, distribution: f32) -> f32 {
         let pdf = distribution / (2.0 * (self.cosine + self.slope));
-        if self.is_above_surface() { pdf } else { 0.0 }
+        if self.is_direction_above_surface() { pdf } else { 0.0 }
     }
 }
 
@@ -169,7 +173,7 @@ impl SmithTerms {
     pub fn pdf_from_reflection_term(&self, other: &Self, reflected: f32) -> f32 {
         let both = self.cosine * other.slope + other.cosine * self.slope;
         let pdf = reflected * both / (self.cosine + self.slope);
-        if self.is_above_surface() & other.is_above_surface() { pdf } else { 0.0 }
+        if self.is_direction_above_surface() & other.is_direction_above_surface() { pdf } else { 0.0 }
     }
 }
 

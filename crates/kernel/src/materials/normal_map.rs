@@ -24,7 +24,7 @@ impl NormalMap {
     pub fn perturb(&self, at: &TexturePoint, normal: Vec3, dpdu: Vec3, dpdv: Vec3) -> Vec3 {
         let mapped = self.texture.lookup(at) * 2.0 - Vec3::ONE;
         let slope = self.texture.flip_slopes_in_mirrored_tiles(at, mapped.truncate() * self.strength);
-        let [dpdu, dpdv] = self.texture.transformed_tangents(self.texture.tangents(at, [dpdu, dpdv]));
+        let [dpdu, dpdv] = self.texture.transformed_tangents(self.texture.uv_set_tangents(at, [dpdu, dpdv]));
         let (tangent, bitangent) = orthogonalize_tangents(normal, dpdu, dpdv);
         let bent = tangent * slope.x + bitangent * slope.y + normal * mapped.z.abs();
         bent.try_normalize().unwrap_or(normal)

@@ -73,7 +73,7 @@ impl Bump {
     /// add up: if m is the normal from the normal map, the perturbed normal has the direction m / (m · n) −
     /// ∇h.
     fn perturb(&self, at: &TexturePoint, normal: Vec3, bent: Vec3, tangents: [Vec3; 2]) -> Vec3 {
-        let [dpdu, dpdv] = self.texture.tangents(at, tangents);
+        let [dpdu, dpdv] = self.texture.uv_set_tangents(at, tangents);
         let slopes = self.texture.slopes(at) * self.scale;
         let volume = normal.dot(dpdu.cross(dpdv));
         let gradient = (dpdv.cross(normal) * slopes.x + normal.cross(dpdu) * slopes.y) / volume;

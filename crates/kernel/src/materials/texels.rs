@@ -1,6 +1,6 @@
 //! Image texels, stored as compactly as they were in the file.
 
-use crate::math::color::{SRGB8_TO_LINEAR, srgb8_to_linear};
+use crate::math::color::{SRGB8_TO_LINEAR, srgb8_color_to_linear};
 use crate::math::lanes::{PACKET_SIZE, Vec3x16, set_lane};
 use crate::math::{DVec3, DVec4, Vec3, Vec4};
 
@@ -45,7 +45,7 @@ impl Texels {
     #[inline]
     pub fn linear_color_at_index(&self, place: usize) -> Vec3 {
         match &self.data {
-            TexelData::Srgb8(bytes) => srgb8_to_linear(bytes[place]),
+            TexelData::Srgb8(bytes) => srgb8_color_to_linear(bytes[place]),
             TexelData::Linear8(bytes) => unit_color_from_bytes(bytes[place]),
             TexelData::Float(floats) => floats[place],
             TexelData::SrgbAlpha8(_) | TexelData::LinearAlpha8(_) | TexelData::FloatAlpha(_) => {
@@ -69,7 +69,7 @@ impl Texels {
         match &self.data {
             TexelData::SrgbAlpha8(bytes) => {
                 let [red, green, blue, _] = bytes[place];
-                srgb8_to_linear([red, green, blue])
+                srgb8_color_to_linear([red, green, blue])
             }
             TexelData::LinearAlpha8(bytes) => {
                 let [red, green, blue, _] = bytes[place];
@@ -155,12 +155,12 @@ impl Texels {
     }
 
     /// Linear values of all texels.
-    pub fn into_linear(self) -> Vec<Vec3> {
+    pub fn into_linear_colors(self) -> Vec<Vec3> {
         if self.has_alpha() {
             return (0..self.len()).map(|place| self.linear_color_at_index(place)).collect();
         }
         match self.data {
-            TexelData::Srgb8(bytes) => bytes.into_iter().map(srgb8_to_linear).collect(),
+            TexelData::Srgb8(bytes) => bytes.into_iter().map(srgb8_color_to_linear).collect(),
             TexelData::Linear8(bytes) => bytes.into_iter().map(unit_color_from_bytes).collect(),
             TexelData::Float(floats) => floats,
             TexelData::SrgbAlpha8(_) | TexelData::LinearAlpha8(_) | TexelData::FloatAlpha(_) => Vec::new(),

@@ -192,13 +192,13 @@ impl Texture {
     /// treated as 0.
     pub fn lookup(&self, at: &TexturePoint) -> Vec3 {
         let tiles = self.transformed_uv(at);
-        let value = self.lookup_repeated_uv(tiles, || self.mip_level(at));
+        let value = self.lookup_transformed_uv(tiles, || self.mip_level(at));
         self.factor.map_or(value, |factor| factor.apply(value))
     }
 
     /// The value at the given tile coordinates. `level` is called only if the filter uses mip levels.
     #[inline]
-    fn lookup_repeated_uv(&self, tiles: DVec2, level: impl FnOnce() -> f32) -> Vec3 {
+    fn lookup_transformed_uv(&self, tiles: DVec2, level: impl FnOnce() -> f32) -> Vec3 {
         let folded =
             [self.wrap.fold(finite_or_zero(tiles.x)) as f32, self.wrap.fold(finite_or_zero(tiles.y)) as f32];
         match self.filter {
@@ -225,7 +225,7 @@ impl Texture {
     /// Tangents ∂p/∂u and ∂p/∂v of the UV set used for lookups. `first` contains the tangents of the first
     /// set.
     #[inline]
-    pub fn tangents(&self, at: &TexturePoint, first: [Vec3; 2]) -> [Vec3; 2] {
+    pub fn uv_set_tangents(&self, at: &TexturePoint, first: [Vec3; 2]) -> [Vec3; 2] {
         let second = self.moved.as_ref().and_then(|moved| moved.second_uv_set_point(at));
         second.map_or(first, |second| second.tangents)
     }
@@ -240,7 +240,7 @@ impl Texture {
         };
         // Look up on both sides, along the axes of the image.
         let steps = float_size(&self.texels).as_dvec2().recip() * f64::from(exp2(level));
-        let beside = |by: DVec2| self.lookup_repeated_uv(tiles + by, || level).x;
+        let beside = |by: DVec2| self.lookup_transformed_uv(tiles + by, || level).x;
         let change = |half: DVec2| beside(half) - beside(-half);
         let changes =
             Vec2::new(change(DVec2::new(steps.x * 0.5, 0.0)), change(DVec2::new(0.0, steps.y * 0.5)));
@@ -282,7 +282,7 @@ impl Texture {
     #[inline(always)]
     pub fn lookup_packet(&self, uv: &[[f64; PACKET_SIZE]; 2]) -> Vec3x16 {
         let mut row = match &self.moved {
-            None => self.lookup_packet_at_scaled_uv(uv, self.repeat.as_dvec2()),
+            None => self.lookup_packet_with_repeat(uv, self.repeat.as_dvec2()),
             Some(moved) => self.transform_and_lookup_packet(moved, uv),
         };
         if let Some(factor) = self.factor {
@@ -298,16 +298,16 @@ impl Texture {
     #[cold]
     #[inline(never)]
     fn transform_and_lookup_packet(&self, moved: &UvTransform, uv: &[[f64; PACKET_SIZE]; 2]) -> Vec3x16 {
-        self.lookup_packet_at_scaled_uv(&moved.transform_packet(uv, self.repeat.as_dvec2()), DVec2::ONE)
+        self.lookup_packet_with_repeat(&moved.transform_packet(uv, self.repeat.as_dvec2()), DVec2::ONE)
     }
 
     /// [`Texture::lookup_packet`] at coordinates scaled by `repeat`.
     #[inline(always)]
-    fn lookup_packet_at_scaled_uv(&self, uv: &[[f64; PACKET_SIZE]; 2], repeat: DVec2) -> Vec3x16 {
+    fn lookup_packet_with_repeat(&self, uv: &[[f64; PACKET_SIZE]; 2], repeat: DVec2) -> Vec3x16 {
         let (texels, size) = (&*self.texels, float_size(&self.texels));
         let folded = [
-            self.wrap.scale_and_wrap_packet(&uv[0], repeat.x),
-            self.wrap.scale_and_wrap_packet(&uv[1], repeat.y),
+            self.wrap.repeat_and_fold_packet(&uv[0], repeat.x),
+            self.wrap.repeat_and_fold_packet(&uv[1], repeat.y),
         ];
         let extent = integer_size(texels);
         let (mut first, mut part) = ([[0; PACKET_SIZE]; 2], [[0.0; PACKET_SIZE]; 2]);
@@ -388,8 +388,8 @@ impl Texture {
 
     fn nearest(&self, [u, v]: [f32; 2]) -> Vec3 {
         let (size, extent) = (float_size(&self.texels), integer_size(&self.texels));
-        let column = self.wrap.wrap_index(floor(u * size.x), extent[0]);
-        let row = self.wrap.wrap_index(floor(v * size.y), extent[1]);
+        let column = self.wrap.wrap_index(floor_to_i32(u * size.x), extent[0]);
+        let row = self.wrap.wrap_index(floor_to_i32(v * size.y), extent[1]);
         self.texels.linear_color_at_index(texel_index(column, row, extent))
     }
 
@@ -473,7 +473,7 @@ impl Texture {
     fn bilinear_corners(&self, texels: &Texels, [u, v]: [f32; 2]) -> ([usize; 4], [f32; 2]) {
         let (size, extent) = (float_size(texels), integer_size(texels));
         let (x, y) = (u * size.x - 0.5, v * size.y - 0.5);
-        let first = [floor(x), floor(y)];
+        let first = [floor_to_i32(x), floor_to_i32(y)];
         let (fx, fy) = (x - first[0] as f32, y - first[1] as f32);
         let [left, right] = self.wrap.neighbor_indices(first[0], extent[0]);
         let [bottom, top] = self.wrap.neighbor_indices(first[1], extent[1]);
@@ -485,7 +485,7 @@ impl Texture {
 /// Rounds down without the slow library call that [`f32::floor`] makes on processors without a rounding
 /// instruction.
 #[inline(always)]
-fn floor(x: f32) -> i32 {
+fn floor_to_i32(x: f32) -> i32 {
     let towards_zero = x as i32;
     towards_zero - i32::from(towards_zero as f32 > x)
 }
@@ -524,7 +524,7 @@ fn float_size(texels: &Texels) -> Vec2 {
 impl Wrap {
     /// Multiplies coordinates by `repeat` and folds them into [0, 1].
     #[inline(always)]
-    fn scale_and_wrap_packet(self, x: &[f64; PACKET_SIZE], repeat: f64) -> F32x16 {
+    fn repeat_and_fold_packet(self, x: &[f64; PACKET_SIZE], repeat: f64) -> F32x16 {
         let mut folded = [0.0; PACKET_SIZE];
         macro_rules! by {
             ($wrap:expr) => {
@@ -673,12 +673,12 @@ mod tests {
             TexturePoint { second: Some(Box::new(second)), ..TexturePoint::from_uv(DVec2::new(0.1, 0.1)) };
         let mut texture = numbered(TextureFilter::Nearest, Wrap::Repeat);
         let first = [Vec3::X, Vec3::Y];
-        assert_eq!((texture.lookup(&at).x, texture.tangents(&at, first)), (0.0, first));
+        assert_eq!((texture.lookup(&at).x, texture.uv_set_tangents(&at, first)), (0.0, first));
         texture.moved = UvTransform::new(UvSet::Second, 0.0, DVec2::ZERO).map(Box::new);
-        assert_eq!((texture.lookup(&at).x, texture.tangents(&at, first)), (3.0, second.tangents));
+        assert_eq!((texture.lookup(&at).x, texture.uv_set_tangents(&at, first)), (3.0, second.tangents));
         assert_eq!(texture.lookup(&at.without_footprint()).x, 3.0);
         let alone = TexturePoint { second: None, ..at };
-        assert_eq!((texture.lookup(&alone).x, texture.tangents(&alone, first)), (0.0, first));
+        assert_eq!((texture.lookup(&alone).x, texture.uv_set_tangents(&alone, first)), (0.0, first));
         // The second set is repeated, rotated, and translated like the first set.
         texture.repeat = Vec2::new(1.0, 0.5);
         texture.moved = UvTransform::new(UvSet::Second, 90.0, DVec2::new(0.5, 0.0)).map(Box::new);

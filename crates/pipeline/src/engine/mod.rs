@@ -41,14 +41,14 @@ use super::render::preview::PreviewSender;
 use super::render::scheduler::RenderStageInputs;
 use super::render::share::Shard;
 use super::report::finish::{RequestResults, make_report};
-use super::settings::{KeyboardSettings, Overrides, ViewMode};
+use super::settings::{KeyboardOverridableSettings, Overrides, ViewMode};
 use super::sink::EventSink;
 use super::stages::accel::{AccelCache, build_accel_structures};
 use super::stages::containers::GltfContainers;
 use super::stages::coplanar::warn_about_coplanar_lights;
 use super::stages::glass::find_glass_solids;
 use super::stages::lights::{EnvironmentMapMemo, collect_lights};
-use super::stages::meshes::{CachedMesh, MeshPathAndPart, Meshes, load_meshes};
+use super::stages::meshes::{CachedMesh, MeshPathAndPart, MeshesByFileIndex, load_meshes};
 use super::stages::parse::{ParsedScene, SceneParseRequest, parse};
 use super::stages::photons::{PhotonCache, PhotonContext, PhotonStore, trace_first_photons};
 use super::stages::render::render;
@@ -320,7 +320,7 @@ impl Engine {
         let is_written = written.as_ref().is_ok_and(|is_written| *is_written);
         self.report_saved_scene_image_state(request, ready.film, sink);
         let film = own::should_write_saved_scene_image(request).then_some(ready.film);
-        let interruption = || context.orders.interruption_reason();
+        let interruption = || context.orders.cancellation_cause();
         self.with_checkpointer(film, sink, &interruption, |checkpointer, engine| {
             if let (Some(checkpointer), Some(state)) = (checkpointer, engine.films.current()) {
                 checkpointer.finish(state, state.traced, is_written || engine.is_saved_scene_image_written());
@@ -370,8 +370,8 @@ impl Engine {
         let asked = (plan.scene.photons.enabled, request.overrides.photons);
         let key =
             |of_photons| keys::photons_key(&ready.surfaces, ready.origin, &plan.settings.render, of_photons);
-        let own =
-            RequestCamera::new(&plan.scene, ready.parsed.orbiter, &CameraOverrides::default()).viewpoint();
+        let own = RequestCamera::new(&plan.scene, ready.parsed.orbiter, &CameraOverrides::default())
+            .resolved_camera();
         let query_context = QueryContext {
             own,
             parsed: ready.parsed.clone(),
@@ -476,9 +476,9 @@ impl Engine {
         table.sink.send(Event::Settings {
             generation: request.generation,
             settings: Box::new(plan.effective.clone()),
-            camera: own.viewpoint(),
+            camera: own.resolved_camera(),
             exposure: scene.render.exposure,
-            own: KeyboardSettings {
+            own: KeyboardOverridableSettings {
                 integrator: scene.render.integrator,
                 shadows: scene.render.shadows,
                 photons: scene.photons.enabled,
@@ -533,14 +533,14 @@ impl Engine {
         let mesh_keys: Vec<Fingerprint> = meshes.iter().map(|mesh| mesh.key).collect();
         // The orbiter camera is small, so include it in the key as text.
         let orbiter = eye.orbiter.map(|camera| format!("{camera:?}"));
-        let of = keys::fingerprint_context(scene, &mesh_keys, orbiter.as_deref());
+        let of = keys::scene_fingerprint_context(scene, &mesh_keys, orbiter.as_deref());
         let origin = eye.origin_near_camera();
         let build = || build_accel_structures(scene, (&of, origin), meshes, &mut self.accel, reading);
         let built = table.run(Stage::Accel, build)?;
         let memos = (&mut self.lights, &mut self.sky);
         let gather = || Ok(collect_lights(scene, &of, &built.geometry, textures, memos, reading.token)?);
         let lights = table.run(Stage::Lights, gather)?;
-        let surfaces = keys::surfaces_key(scene, &of, &textures.keys);
+        let surfaces = keys::surfaces_and_lights_key(scene, &of, &textures.keys);
         let parts = (built, lights, Arc::clone(bodies));
         let world = build_or_reuse_world(scene, (&surfaces, &of), parts, textures, &eye, &mut self.world);
         let Textures { texels_loaded, memory_bytes: texture_memory_bytes, .. } = **textures;
@@ -579,7 +579,7 @@ impl Engine {
         findings: &mut Findings,
         table: &mut StageRunner<'_>,
         reading: &FileReadContext<'_>,
-    ) -> Result<(Meshes, Arc<GlassSolids>, Textures, NeededTextures), AbortReason> {
+    ) -> Result<(MeshesByFileIndex, Arc<GlassSolids>, Textures, NeededTextures), AbortReason> {
         let loaded = &parsed.loaded;
         let (cache, mesh_cache) = (&mut self.textures, &mut self.meshes);
         let found = table.run(Stage::Meshes, || load_meshes(loaded, mesh_cache, findings, reading))?;
@@ -627,7 +627,7 @@ impl Engine {
                 context.answer_query(query_context, Some(state), &self.inputs, sink);
             }
         };
-        let interruption = || orders.interruption_reason();
+        let interruption = || orders.cancellation_cause();
         let film = own::should_write_saved_scene_image(request).then_some(key);
         let rendered = self.with_checkpointer(film, sink, &interruption, |checkpointer, engine| {
             let rendering = RenderStageInputs {
@@ -702,7 +702,7 @@ impl Engine {
         sets: &[String],
         sink: &EventSink,
         token: &CancelToken,
-    ) -> Result<(Arc<ParsedScene>, Meshes, Textures, Vec<Diagnostic>), Failure> {
+    ) -> Result<(Arc<ParsedScene>, MeshesByFileIndex, Textures, Vec<Diagnostic>), Failure> {
         let mut findings = Findings::default();
         let all = self.read_consistently(token, &mut findings, |engine, contents, findings| {
             let containers = GltfContainers::default();
@@ -774,7 +774,11 @@ fn make_tracer<'a>(
 }
 
 /// Collects the files referenced by the scene and all other files that were read.
-fn collect_protected_inputs(parsed: &ParsedScene, meshes: &Meshes, findings: &Findings) -> ProtectedInputs {
+fn collect_protected_inputs(
+    parsed: &ParsedScene,
+    meshes: &MeshesByFileIndex,
+    findings: &Findings,
+) -> ProtectedInputs {
     let mut inputs = ProtectedInputs::from_scene(parsed);
     inputs.add_mesh_dependencies(&parsed.loaded, meshes);
     inputs.add_read(&findings.files);

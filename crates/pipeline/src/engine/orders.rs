@@ -31,7 +31,7 @@ pub(crate) trait PendingCommands {
     /// Takes the next query about the current image.
     fn take_query(&self) -> Option<QueryOrEdit>;
     /// Returns the reason for interrupting the render.
-    fn interruption_reason(&self) -> Interruption;
+    fn cancellation_cause(&self) -> Interruption;
 }
 
 /// Cancel tokens and commands for a running request.

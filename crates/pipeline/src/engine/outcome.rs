@@ -68,7 +68,7 @@ impl Engine {
     ///
     /// # Errors
     /// Returns the reason if no image was rendered.
-    pub(crate) fn render_image(
+    pub(crate) fn render_radiance_image(
         &mut self,
         request: &Request,
         sink: &EventSink,

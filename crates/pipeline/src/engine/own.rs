@@ -50,7 +50,7 @@ impl SavedSceneImage {
         (camera, files): (CameraOverrides, &[FileRead]),
     ) -> Self {
         let orbiter = eye.orbiter.map(|camera| format!("{camera:?}"));
-        let of = keys::fingerprint_context(&plan.scene, meshes, orbiter.as_deref());
+        let of = keys::scene_fingerprint_context(&plan.scene, meshes, orbiter.as_deref());
         let world = keys::world_key(surfaces, &eye.camera, &of);
         let film = keys::film_sums_key(world, &plan.settings, plan.crop);
         let image = image_with_outputs_key(film, &plan);

@@ -12,7 +12,7 @@ use crate::plan::resolve_plan;
 use crate::protocol::{Event, LastValidSceneRenderOutcome, Request, Status};
 use crate::sink::EventSink;
 use crate::stages::containers::GltfContainers;
-use crate::stages::meshes::Meshes;
+use crate::stages::meshes::MeshesByFileIndex;
 use crate::stages::parse::ParsedScene;
 use crate::stages::textures::{NeededTextures, Textures, find_textures_needed_for_view, load_textures};
 use crate::stages::{AbortReason, FileReadContext, Findings};
@@ -26,7 +26,7 @@ pub(super) struct LastValidScene {
     /// Generation of the request that read the scene.
     pub(super) generation: u64,
     pub(super) parsed: Arc<ParsedScene>,
-    pub(super) meshes: Meshes,
+    pub(super) meshes: MeshesByFileIndex,
     pub(super) bodies: Arc<GlassSolids>,
     pub(super) textures: Arc<Textures>,
     /// Textures that were needed when `textures` was loaded.

@@ -67,12 +67,12 @@ pub(super) fn frame_model(
     // Drop digits that make no visible difference.
     let size = half.length().max(LEAST);
     let step = size * 1e-4;
-    let tidy = |at: DVec3| DVec3::from(at.to_array().map(|part| round_to_decimal_step(part, step)));
+    let tidy = |at: DVec3| DVec3::from(at.to_array().map(|part| round_to_power_of_ten_of_step(part, step)));
     CameraPose { position: tidy(middle + back * distance), look_at: tidy(middle), up }
 }
 
 /// Rounds to a multiple of the largest power of ten that does not exceed `step`.
-pub(super) fn round_to_decimal_step(value: f64, step: f64) -> f64 {
+pub(super) fn round_to_power_of_ten_of_step(value: f64, step: f64) -> f64 {
     let unit = libm::pow(10.0, libm::floor(libm::log10(step)));
     let whole = (value / unit).round();
     // Dividing by a power of ten produces fewer digits than multiplying by its reciprocal.
@@ -104,7 +104,7 @@ pub(super) const KEY: f64 = 1.5;
 
 /// Ground reflectance that makes level ground as bright as the sky, which hides the horizon. The ground's
 /// irradiance is π·`SKY` plus the key light's contribution.
-pub(super) fn sky_matching_reflectance() -> f64 {
+pub(super) fn ground_reflectance_matching_sky() -> f64 {
     let key = KEY * libm::sin(ELEVATION.to_radians()) / std::f64::consts::PI;
     round_significant(SKY / (SKY + key), 3)
 }
@@ -164,8 +164,8 @@ mod tests {
 
     #[test]
     fn insignificant_digits_are_dropped() {
-        assert_eq!(round_to_decimal_step(1.234_567_8, 3e-4), 1.2346);
-        assert_eq!(round_to_decimal_step(-12_345.678, 30.0), -12_350.0);
+        assert_eq!(round_to_power_of_ten_of_step(1.234_567_8, 3e-4), 1.2346);
+        assert_eq!(round_to_power_of_ten_of_step(-12_345.678, 30.0), -12_350.0);
     }
 
     /// A plane lit only by the sky and the key light has the sky's radiance.
@@ -174,7 +174,7 @@ mod tests {
         let eye = frame_model([DVec3::ZERO, DVec3::ONE], &[DVec3::ZERO, DVec3::ONE], (ViewSide::Iso, 1), 1.0);
         let direction = key_light_travel_direction(&eye).normalize();
         let irradiance = std::f64::consts::PI * SKY - direction.y * KEY;
-        let radiance = sky_matching_reflectance() * irradiance / std::f64::consts::PI;
+        let radiance = ground_reflectance_matching_sky() * irradiance / std::f64::consts::PI;
         assert!((radiance / SKY - 1.0).abs() < 0.02, "{radiance}");
         let to_eye = (eye.position - eye.look_at).normalize();
         assert!((-direction).dot(to_eye) > 0.3, "the key light and the camera should be on the same side");

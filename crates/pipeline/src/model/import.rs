@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::gltf::{ExportStorage, ExportedFileContent};
+use super::gltf::{ExportedAssetLocation, ExportedFileSource};
 use super::{GeneratedScene, ModelViewOptions, mark_diagnostic_as_generated};
 use crate::assets::AssetError;
 use crate::assets::gltf::is_gltf;
@@ -44,7 +44,7 @@ pub fn import_gltf(path: &Path, folder: &str, token: &CancelToken) -> Result<Imp
     }
     let pool = core_pool().map_err(ImportError::Work)?;
     let containers = GltfContainers::default();
-    let naming = ExportStorage::Folder(folder.to_owned());
+    let naming = ExportedAssetLocation::Folder(folder.to_owned());
     let read = || {
         let GeneratedScene { text, notes, assets, .. } =
             super::gltf::scene_text(path, (ModelViewOptions::default(), &naming), &containers, token)?;
@@ -53,10 +53,10 @@ pub fn import_gltf(path: &Path, folder: &str, token: &CancelToken) -> Result<Imp
         let mut files = Vec::new();
         for asset in assets {
             let bytes = match asset.content {
-                ExportedFileContent::Part(part) => {
+                ExportedFileSource::Part(part) => {
                     write::encode_ply(&container.build_part(part, &ignore_progress, token)?.mesh)
                 }
-                ExportedFileContent::Image(image) => {
+                ExportedFileSource::Image(image) => {
                     // Check the content. Otherwise, a malicious glTF file could make the import copy
                     // arbitrary files as images.
                     container.check_image_decodes(image, token)?;
@@ -82,7 +82,7 @@ pub fn import_gltf(path: &Path, folder: &str, token: &CancelToken) -> Result<Imp
 fn check_scene(path: &Path, containers: &GltfContainers, token: &CancelToken) -> Result<(), AssetError> {
     let shown = super::gltf::scene_text(
         path,
-        (ModelViewOptions::default(), &ExportStorage::Inside),
+        (ModelViewOptions::default(), &ExportedAssetLocation::Inside),
         containers,
         token,
     )?;

@@ -49,7 +49,7 @@ impl UpAxis {
     }
 
     /// Applies [`rotation`](Self::rotation) to a point.
-    fn rotate_upright(self, at: DVec3) -> DVec3 {
+    fn rotate_point_upright(self, at: DVec3) -> DVec3 {
         match self {
             Self::X => DVec3::new(-at.y, at.x, at.z),
             Self::Y => at,
@@ -59,7 +59,7 @@ impl UpAxis {
 }
 
 /// Whether a material from a mesh file may cast caustics.
-fn may_cast_caustics(material: &FileMaterial) -> bool {
+fn material_may_cast_caustics(material: &FileMaterial) -> bool {
     let is_mirror_or_glass = matches!(material.illumination_model, Some(3..=9));
     match &material.physical {
         Some(own) => {
@@ -98,7 +98,7 @@ pub(super) fn scene_text(
         });
     };
     let up = show.up.unwrap_or_else(|| default_up_axis(path));
-    let upright = |at: DVec3| up.rotate_upright(at);
+    let upright = |at: DVec3| up.rotate_point_upright(at);
     let (a, b) = (upright(least), upright(greatest));
     let bounds = [a.min(b), a.max(b)];
     let points: Vec<DVec3> = loaded.mesh.extreme_vertices().into_iter().map(upright).collect();
@@ -119,7 +119,7 @@ pub(super) fn scene_text(
     }
     let (mut toml, mut names) = (TomlWriter::default(), UsedNames::default());
     toml.comment(&format!("{}, as glimt shows it.", file_name(path)));
-    let lighting = Lighting::Default { is_polished: loaded.materials.iter().any(may_cast_caustics) };
+    let lighting = Lighting::Default { is_polished: loaded.materials.iter().any(material_may_cast_caustics) };
     write_render_settings(&mut toml, None, lighting);
     write_camera(&mut toml, &eye, FOV);
     write_sky_and_key_light(&mut toml, &eye, lighting);
@@ -181,9 +181,9 @@ mod tests {
     fn up_axis_matches_scene_rotation() {
         for (up, axis) in [(UpAxis::X, DVec3::X), (UpAxis::Y, DVec3::Y), (UpAxis::Z, DVec3::Z)] {
             let rotation = rotation_xyz(DVec3::from(up.rotation().unwrap_or_default().map(f64::from)));
-            assert_eq!(up.rotate_upright(axis), DVec3::Y, "{up:?}");
+            assert_eq!(up.rotate_point_upright(axis), DVec3::Y, "{up:?}");
             for at in [axis, DVec3::new(1.0, 2.0, 3.0)] {
-                assert_eq!(rotation * at, up.rotate_upright(at), "{up:?}");
+                assert_eq!(rotation * at, up.rotate_point_upright(at), "{up:?}");
             }
         }
     }

@@ -88,7 +88,7 @@ impl FilmState {
         share: Option<Shard>,
     ) -> Result<Self, FilmCreationError> {
         let blocks = match (&share, convergence) {
-            (Some(share), _) => share.sum_order(),
+            (Some(share), _) => share.summation_order(),
             (None, ConvergenceModel::Photons) => SumOrder::Blocked,
             (None, ConvergenceModel::Stratified) => SumOrder::Sequential,
         };

@@ -53,7 +53,7 @@ impl<'a> CoarseImageRenderer<'a> {
     }
 
     /// Traces a first image and records how many pixels per second were rendered. Calls `tick` regularly.
-    pub(crate) fn trace_picture(
+    pub(crate) fn trace_coarse_image(
         &self,
         photons: Option<&PhotonMaps>,
         (width, height): (u32, u32),
@@ -102,7 +102,7 @@ impl<'a> CoarseImageRenderer<'a> {
             return Ok(());
         };
         let Some(size) = self.sizes(shown).into_iter().next() else { return Ok(()) };
-        let picture = self.trace_picture(None, size, tick)?;
+        let picture = self.trace_coarse_image(None, size, tick)?;
         screen.show_without_photons(&picture.resized(shown.0, shown.1));
         Ok(())
     }

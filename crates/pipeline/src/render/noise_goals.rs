@@ -80,7 +80,7 @@ impl CellSampleGoals {
             |tile: usize| self.judged[tile] < samples && self.tile_has_undecided_half(tile, done, samples);
         let noise = film.map_tiles(|tile| is_open(tile).then(|| TileNoise::measure(film, tile)));
         if is_time {
-            self.decide_all_goals_from_noise(&noise, done, samples, &aim);
+            self.decide_goals_within_next_doubling(&noise, done, samples, &aim);
             let judged = self.judged.iter_mut().zip(&noise).filter(|(_, noise)| noise.is_some());
             judged.for_each(|(judged, _)| *judged = samples);
         }
@@ -121,7 +121,7 @@ impl CellSampleGoals {
         halves.any(|(goal, done)| goal > done && *done < LEAST)
     }
 
-    fn decide_all_goals_from_noise(
+    fn decide_goals_within_next_doubling(
         &mut self,
         noise: &[Option<TileNoise>],
         done: &[[u32; 2]],
@@ -177,7 +177,7 @@ impl TileNoise {
                 ..noise
             })
         };
-        Self { halves: [0, 1].map(noise), fall: film.last_doubling_variance_reduction(tile) }
+        Self { halves: [0, 1].map(noise), fall: film.last_variance_reduction_in_tile(tile) }
     }
 }
 
@@ -254,7 +254,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn noise_in_only_one_half_is_reported() {
+    fn tiles_noisy_after_merging_halves_are_counted() {
         let rough = film([(1.0, 0.0), (1.0, 1.0)], 16);
         let goals = judged([(1.0, 0.0), (1.0, 1.0)], 16, 0.01);
         assert_eq!(

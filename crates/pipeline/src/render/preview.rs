@@ -11,7 +11,7 @@ use crate::film::tone::{ToneMapping, tone_map_to_8_bits};
 use crate::film::{FilmQuantity, Previewer, RadianceImage, Rect};
 use crate::keys;
 use crate::plan::RenderPlan;
-use crate::protocol::{ImagePosition, MaxPreviewSize, NormalizedRect, PreviewImageState};
+use crate::protocol::{ImagePosition, MaxPreviewSize, NormalizedRect, PreviewSourceImage};
 use crate::sink::EventSink;
 
 /// Maximum time spent on updating a preview before checking for commands.
@@ -100,7 +100,7 @@ impl PreviewSender<'_> {
         section: Option<NormalizedRect>,
     ) {
         let range = tone.range_map.range().map(|range| range.limits());
-        let source = PreviewImageState {
+        let source = PreviewSourceImage {
             image: keys::developed_image_key(state.key, self.plan, state.number),
             is_finished: state.is_finished(self.plan),
         };

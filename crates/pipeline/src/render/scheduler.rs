@@ -397,7 +397,7 @@ impl<'a> Scheduler<'a> {
                 Some(photons) => Some(self.trace_photons(photons, 0..1)?),
                 None => None,
             };
-            let picture = coarse.trace_picture(maps.as_ref(), size, || {})?;
+            let picture = coarse.trace_coarse_image(maps.as_ref(), size, || {})?;
             self.state.base = Some(picture.resized(shown.0, shown.1));
             self.show();
         }

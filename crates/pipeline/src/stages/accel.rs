@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::super::cache::{EvictionCandidate, Memo, NamedCache};
 use super::super::keys;
 use super::super::protocol::reasons;
-use super::meshes::{CachedMesh, Meshes};
+use super::meshes::{CachedMesh, MeshesByFileIndex};
 use super::{AbortReason, FileReadContext, StageResult};
 use crate::assets::LoadedMesh;
 use crate::control::CancelToken;
@@ -14,7 +14,7 @@ use crate::math::DVec3;
 use crate::scene::description::Scene;
 use crate::scene::fingerprint::{Fingerprint, FingerprintContext};
 use crate::world::{
-    Geometry, MeshTree, light_lifts, mesh_files_with_emissive_override, separate_coincident_emitters,
+    Geometry, MeshTree, emissive_override_by_mesh_file, light_lifts, separate_coincident_emitters,
 };
 
 /// The key of a mesh whose coincident emitters have been separated, and the mesh.
@@ -74,7 +74,7 @@ pub(crate) struct AccelResult {
 pub(crate) fn build_accel_structures(
     scene: &Scene,
     (of, origin): (&FingerprintContext<'_>, DVec3),
-    meshes: &Meshes,
+    meshes: &MeshesByFileIndex,
     cache: &mut AccelCache,
     reading: &FileReadContext<'_>,
 ) -> Result<StageResult<AccelResult>, AbortReason> {
@@ -109,7 +109,7 @@ pub(crate) fn build_accel_structures(
 /// Returns the meshes with separated emitters, or `None` for meshes that can be used as they are.
 fn separate_coincident_mesh_emitters(
     scene: &Scene,
-    meshes: &Meshes,
+    meshes: &MeshesByFileIndex,
     cache: &mut AccelCache,
     token: &CancelToken,
 ) -> Result<Vec<Option<KeyedMeshWithSeparateEmitters>>, AbortReason> {
@@ -127,13 +127,13 @@ fn separate_coincident_mesh_emitters(
         };
         Ok((*found).clone().map(|distinct| (key, distinct)))
     };
-    meshes.iter().zip(mesh_files_with_emissive_override(scene)).map(distinct).collect()
+    meshes.iter().zip(emissive_override_by_mesh_file(scene)).map(distinct).collect()
 }
 
 /// Returns the trees for all meshes, and how many of them were cached.
 fn build_mesh_trees(
     scene: &Scene,
-    (meshes, distinct): (&Meshes, &[Option<KeyedMeshWithSeparateEmitters>]),
+    (meshes, distinct): (&MeshesByFileIndex, &[Option<KeyedMeshWithSeparateEmitters>]),
     cache: &mut AccelCache,
     reading: &FileReadContext<'_>,
 ) -> Result<(Vec<Arc<MeshTree>>, usize), AbortReason> {

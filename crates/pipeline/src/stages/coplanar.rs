@@ -3,7 +3,7 @@
 use super::super::cache::Memo;
 use super::super::keys;
 use super::Findings;
-use super::meshes::Meshes;
+use super::meshes::MeshesByFileIndex;
 use super::parse::ParsedScene;
 use crate::assets::LoadedMesh;
 use crate::scene::description::Object;
@@ -18,7 +18,7 @@ const MAX_WARNINGS: usize = 10;
 /// overlap. Reuses the previous search result if shapes and lights are unchanged.
 pub(crate) fn warn_about_coplanar_lights(
     parsed: &ParsedScene,
-    meshes: &Meshes,
+    meshes: &MeshesByFileIndex,
     memo: &mut Memo<Vec<CoplanarLight>>,
     findings: &mut Findings,
 ) {
@@ -27,7 +27,7 @@ pub(crate) fn warn_about_coplanar_lights(
     let origin = world::choose_origin_near_camera_target(&scene.camera, parsed.orbiter.as_ref());
     let mesh_keys: Vec<Fingerprint> = meshes.iter().map(|mesh| mesh.key).collect();
     let key = keys::key_with_coordinate_origin(
-        &keys::coplanar_lights_key(scene, &keys::fingerprint_context(scene, &mesh_keys, None)),
+        &keys::coplanar_lights_key(scene, &keys::scene_fingerprint_context(scene, &mesh_keys, None)),
         origin,
     );
     let found = memo.get(key).cloned().unwrap_or_else(|| {

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::super::cache::Memo;
 use super::super::keys;
-use super::meshes::Meshes;
+use super::meshes::MeshesByFileIndex;
 use super::{AbortReason, Findings};
 use crate::assets::LoadedMesh;
 use crate::control::CancelToken;
@@ -24,14 +24,14 @@ const LACKS: &str = "glass refracts where a ray enters and leaves it; rays throu
 /// Returns [`AbortReason::Cancelled`] if the token is cancelled.
 pub(crate) fn find_glass_solids(
     loaded: &LoadedScene,
-    meshes: &Meshes,
+    meshes: &MeshesByFileIndex,
     memo: &mut Memo<Arc<GlassSolids>>,
     findings: &mut Findings,
     token: &CancelToken,
 ) -> Result<Arc<GlassSolids>, AbortReason> {
     let scene = &loaded.scene;
     let mesh_keys: Vec<Fingerprint> = meshes.iter().map(|mesh| mesh.key).collect();
-    let key = keys::glass_key(scene, &keys::fingerprint_context(scene, &mesh_keys, None));
+    let key = keys::glass_key(scene, &keys::scene_fingerprint_context(scene, &mesh_keys, None));
     let bodies = if let Some(bodies) = memo.get(key) {
         Arc::clone(bodies)
     } else {
@@ -198,7 +198,7 @@ mod tests {
         std::fs::write(folder.path().join("a.ply"), "").expect("written");
         let loaded = crate::scene::load(&path, &[]).expect("a valid scene");
         let mut findings = Findings::default();
-        let meshes: Meshes = mesh
+        let meshes: MeshesByFileIndex = mesh
             .into_iter()
             .map(|mesh| {
                 let key = FingerprintHasher::new("test").finish();

@@ -75,7 +75,7 @@ fn emissive_material_textures(scene: &Scene) -> impl Iterator<Item = TextureSour
             | TextureRole::NormalMap
             | TextureRole::Bump(_) => false,
         });
-        textures.map(|texture| world::material_texture_source(scene, material, texture))
+        textures.map(|texture| world::scene_material_texture_source(scene, material, texture))
     })
 }
 

@@ -39,7 +39,7 @@ impl CachedMesh {
 }
 
 /// One mesh for each of the scene's mesh files. Meshes that failed to load are empty.
-pub(crate) type Meshes = Vec<Arc<CachedMesh>>;
+pub(crate) type MeshesByFileIndex = Vec<Arc<CachedMesh>>;
 
 /// Loads the scene's meshes. Tries all files and adds errors to the findings.
 ///
@@ -50,7 +50,7 @@ pub(crate) fn load_meshes(
     cache: &mut NamedCache<MeshPathAndPart, CachedMesh>,
     findings: &mut Findings,
     reading: &FileReadContext<'_>,
-) -> Result<StageResult<Meshes>, AbortReason> {
+) -> Result<StageResult<MeshesByFileIndex>, AbortReason> {
     let files = &loaded.scene.mesh_files;
     if files.is_empty() {
         return Ok(StageResult::skipped(Vec::new(), reasons::NO_MESHES));
@@ -62,9 +62,9 @@ pub(crate) fn load_meshes(
             let content = reading.contents.first_seen_content_id(&file.value, reading.token)?;
             if let Some(last) = cache.get_by_name(&name) {
                 // The mesh probably still references the same files, so hash them before they are read.
-                read_current_content_ids(&last.companions, reading)?;
+                files_with_first_seen_content(&last.companions, reading)?;
             }
-            Ok((content, cache.get(&name, file_key(file, content))))
+            Ok((content, cache.get(&name, mesh_key_without_companions(file, content))))
         })
         .collect::<Result<_, Cancelled>>()?;
     let assets: Vec<LoadedAsset<CachedMesh>> = reading.pool.install(|| {
@@ -82,7 +82,7 @@ pub(crate) fn load_meshes(
     let mut meshes = Vec::new();
     let mut counts = FileCounts::default();
     let mut warnings = MeshWarnings::default();
-    let file_materials = mesh_file_material_usage(&loaded.scene);
+    let file_materials = files_using_own_materials_mask(&loaded.scene);
     for ((file, asset), uses_own) in files.iter().zip(assets).zip(file_materials) {
         let content = asset.files[0].content;
         asset.files.into_iter().for_each(|file| findings.add_file(file));
@@ -90,9 +90,13 @@ pub(crate) fn load_meshes(
             Ok((mesh, was_kept)) => {
                 counts.kept += usize::from(was_kept);
                 counts.loaded += usize::from(!was_kept);
-                warnings.add(file, &mesh.mesh, uses_own);
+                warnings.add_file_warnings(file, &mesh.mesh, uses_own);
                 let bytes = mesh.mesh.mesh.memory_bytes();
-                cache.insert(mesh_identity(file), file_key(file, content), (mesh.clone(), bytes));
+                cache.insert(
+                    mesh_identity(file),
+                    mesh_key_without_companions(file, content),
+                    (mesh.clone(), bytes),
+                );
                 mesh
             }
             Err(AssetError::Cancelled(_)) => return Err(AbortReason::Cancelled),
@@ -102,7 +106,7 @@ pub(crate) fn load_meshes(
             Err(error) => {
                 counts.failed += 1;
                 findings.add_asset_error(loaded, file.span.clone(), &error);
-                let key = file_key(file, content);
+                let key = mesh_key_without_companions(file, content);
                 Arc::new(CachedMesh::new(Arc::default(), key, Vec::new()))
             }
         };
@@ -122,7 +126,7 @@ pub(crate) fn load_meshes(
     warn_about_missing_mesh_data(loaded, files, &meshes, findings);
     if counts.failed == 0 {
         let bounds = || meshes.iter().map(|mesh| mesh.bounds()).collect();
-        findings.warnings.extend(loaded.lights_facing_away_warnings(bounds));
+        findings.warnings.extend(loaded.lights_facing_nothing_warnings(bounds));
     }
     Ok(loading_result(meshes, counts))
 }
@@ -196,13 +200,14 @@ fn load_or_reuse_mesh(
     let path = &file.value;
     let mut files = vec![FileRead { path: path.to_owned(), content }];
     if let Some(mesh) = kept
-        && mesh.companions == read_current_content_ids(&mesh.companions, reading)?
+        && mesh.companions == files_with_first_seen_content(&mesh.companions, reading)?
     {
         files.extend(mesh.companions.iter().cloned());
         return Ok(LoadedAsset { files, result: Ok((mesh, true)) });
     }
     let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
-    let read = || reading.sink.load_with_progress(&name, |progress| load(path, progress, reading.token));
+    let read =
+        || reading.sink.load_asset_with_progress(&name, |progress| load(path, progress, reading.token));
     let mut loaded = read();
     if let Ok(mesh) = &loaded
         && has_companion_appeared(&mesh.companions, reading)?
@@ -217,7 +222,7 @@ fn load_or_reuse_mesh(
             let companions = mesh.companions.iter().map(read).collect::<Result<Vec<_>, _>>()?;
             files.extend(companions.iter().cloned());
             let mut key = FingerprintHasher::new("mesh");
-            key.add_fingerprint(&file_key(file, content));
+            key.add_fingerprint(&mesh_key_without_companions(file, content));
             for file in &companions {
                 file.content.add_to_fingerprint(key.add_path_bytes(&file.path));
             }
@@ -235,7 +240,7 @@ fn has_companion_appeared(
     reading: &FileReadContext<'_>,
 ) -> Result<bool, Cancelled> {
     for companion in companions.iter().filter(|companion| companion.hash.is_none()) {
-        let is_new = reading.contents.seen_content(&companion.path).is_none();
+        let is_new = reading.contents.content_id_if_seen(&companion.path).is_none();
         let content = reading.contents.first_seen_content_id(&companion.path, reading.token)?;
         if is_new && matches!(content, FileContentId::Hash(_)) {
             return Ok(true);
@@ -245,7 +250,7 @@ fn has_companion_appeared(
 }
 
 /// Returns the files with their contents as first seen by this request.
-fn read_current_content_ids(
+fn files_with_first_seen_content(
     files: &[FileRead],
     reading: &FileReadContext<'_>,
 ) -> Result<Vec<FileRead>, Cancelled> {
@@ -256,7 +261,7 @@ fn read_current_content_ids(
     files.iter().map(now).collect()
 }
 
-fn file_key(file: &MeshFile, content: FileContentId) -> Fingerprint {
+fn mesh_key_without_companions(file: &MeshFile, content: FileContentId) -> Fingerprint {
     let mut key = FingerprintHasher::new("file");
     content.add_to_fingerprint(
         key.add_path_bytes(&file.value).add_usize(file.part.map_or(0, |part| part as usize + 1)),
@@ -265,7 +270,7 @@ fn file_key(file: &MeshFile, content: FileContentId) -> Fingerprint {
 }
 
 /// Returns, for each mesh file, whether any object uses the file's own materials.
-fn mesh_file_material_usage(scene: &Scene) -> Vec<bool> {
+fn files_using_own_materials_mask(scene: &Scene) -> Vec<bool> {
     let mut shown = vec![false; scene.mesh_files.len()];
     let plain = scene.objects.iter().filter(|object| object.material.is_none());
     plain.filter_map(|object| object.shape.as_mesh()).for_each(|mesh| shown[mesh.file] = true);
@@ -291,7 +296,7 @@ enum MeshWarning {
 impl<'a> MeshWarnings<'a> {
     /// Adds a file's warnings. Warnings about its materials are included only if an object uses these
     /// materials.
-    fn add(&mut self, file: &'a MeshFile, mesh: &LoadedMesh, uses_own: bool) {
+    fn add_file_warnings(&mut self, file: &'a MeshFile, mesh: &LoadedMesh, uses_own: bool) {
         if mesh.dropped != DroppedFaces::default() {
             let place = *self.dropped.entry(&file.value).or_insert(self.all.len());
             match self.all.get_mut(place) {
@@ -408,7 +413,7 @@ mod tests {
         }
 
         /// Loads the meshes of a scene that contains `tables`.
-        fn find(&mut self, tables: &str, contents: &RequestFileSnapshot) -> (Meshes, Findings) {
+        fn find(&mut self, tables: &str, contents: &RequestFileSnapshot) -> (MeshesByFileIndex, Findings) {
             let camera = "[camera]\nposition = [0, 0, 4]\nlook_at = [0, 0, 0]\n";
             self.write("scene.toml", &format!("{tables}{camera}"));
             let loaded = crate::scene::load(&self.folder.path().join("scene.toml"), &[]).expect("a scene");
@@ -579,8 +584,8 @@ mod tests {
             ..LoadedMesh::default()
         };
         let mut warnings = MeshWarnings::default();
-        files.iter().for_each(|file| warnings.add(file, &mesh(149, "odd"), true));
-        warnings.add(&other, &mesh(1, "odd"), true);
+        files.iter().for_each(|file| warnings.add_file_warnings(file, &mesh(149, "odd"), true));
+        warnings.add_file_warnings(&other, &mesh(1, "odd"), true);
         let messages: Vec<String> = warnings.messages().into_iter().map(|(_, message)| message).collect();
         let expected = [
             "a.glb: skipped 447 faces without area in 3 parts",

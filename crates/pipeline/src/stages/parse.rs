@@ -250,7 +250,7 @@ pub fn files_referenced_by_assets<'a>(
     Ok(companions)
 }
 
-type OrbiterReadResult = (Option<GkitOrbiterCamera>, Option<FileContentId>);
+type OrbiterCameraAndContent = (Option<GkitOrbiterCamera>, Option<FileContentId>);
 
 /// Reads the camera's orbiter file, if it has one. Adds errors to the findings.
 fn read_orbiter_camera_file(
@@ -259,7 +259,7 @@ fn read_orbiter_camera_file(
     contents: &RequestFileSnapshot,
     findings: &mut Findings,
     token: &CancelToken,
-) -> Result<OrbiterReadResult, AbortReason> {
+) -> Result<OrbiterCameraAndContent, AbortReason> {
     let Camera::Orbiter { file, .. } = &loaded.scene.camera else { return Ok((None, None)) };
     let content = contents.first_seen_content_id(&file.value, token)?;
     if let Some(parsed) = known.filter(|parsed| parsed.orbiter_content == Some(content)) {

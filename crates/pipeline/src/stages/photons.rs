@@ -229,7 +229,7 @@ pub(crate) fn trace_first_photons(
             PhotonMapper::new_with_first_pass(world, &settings, of_photons, progress, token)
         })
     };
-    let (photons, first) = sending.sink.load_with_progress("photons", send)?;
+    let (photons, first) = sending.sink.load_asset_with_progress("photons", send)?;
     let seconds = watch.seconds();
     let (passes, emitted, stored, lookups) = (1, first.emitted, first.stored_photon_count(), first.lookups);
     let sent = PhotonCounts { passes, emitted, stored, lookups, seconds, most_alive_bytes: 0 };

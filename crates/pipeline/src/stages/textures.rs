@@ -13,12 +13,12 @@ use super::super::cache::{EvictionCandidate, NamedCache};
 use super::super::protocol::reasons;
 use super::super::watch::content::{FileContentId, FileRead};
 use super::containers::{ImageInput, canonical};
-use super::meshes::Meshes;
+use super::meshes::MeshesByFileIndex;
 use super::{AbortReason, FileCounts, FileReadContext, Findings, StageResult, loading_result};
 use crate::assets::AssetError;
 use crate::assets::image::{
-    ColorCurve, EmbeddedImage, ImageEncoding, ImageLimits, LoadedImage, build_coverage_mipmaps,
-    load_embedded, load_hashed, mipmaps, read_dimensions_and_decoded_bytes, read_embedded_dimensions,
+    ColorCurve, EmbeddedImage, ImageEncoding, ImageLimits, LoadedImage, load_embedded, load_hashed, mipmaps,
+    mipmaps_of_thresholded_texels, read_dimensions_and_decoded_bytes, read_embedded_dimensions,
 };
 use crate::control::{Cancelled, Progress};
 use crate::materials::Mipmaps;
@@ -121,7 +121,7 @@ pub(crate) struct NeededTextures {
 /// returns all of them, so that the lights and trees that depend on them can be reused.
 pub(crate) fn find_textures_needed_for_view(
     loaded: &LoadedScene,
-    meshes: &Meshes,
+    meshes: &MeshesByFileIndex,
     lookups: NeededTextureRoles,
     cache: &TextureCache,
 ) -> NeededTextures {
@@ -178,7 +178,7 @@ pub(crate) fn load_textures(
     let mut counts = FileCounts::default();
     for (mut image, (contents, asset)) in images.into_iter().zip(assets) {
         (image.content, image.linked) = contents;
-        let key = image.key();
+        let key = image.content_fingerprint();
         for one in &image.asked_by {
             findings.add_file(FileRead { path: one.source.path.clone(), content: image.content });
         }
@@ -387,7 +387,7 @@ impl ImageWithTextures<'_> {
         &self.asked_by[0].source.path
     }
 
-    fn key(&self) -> Fingerprint {
+    fn content_fingerprint(&self) -> Fingerprint {
         let (path, image, encoding, coverage) = &self.name;
         let mut key = FingerprintHasher::new("texture");
         key.add_path_bytes(path)
@@ -428,7 +428,7 @@ fn group_by_image<'a>(
         images.push(ImageWithTextures { name, content, linked, kept, asked_by: vec![one] });
     }
     for image in &mut images {
-        let key = image.key();
+        let key = image.content_fingerprint();
         image.kept.texels = cache.texels.get(&image.name, key);
         if image.needs_mipmaps() {
             image.kept.mipmaps = cache.mipmaps.get(&image.name, key);
@@ -442,7 +442,7 @@ fn load_images_within_limit(
     images: &[ImageWithTextures<'_>],
     most_bytes: u64,
     reading: &FileReadContext<'_>,
-) -> Vec<(TextureAndLinkedImageContent, Result<DecodedTextureWithMipmaps, AssetError>)> {
+) -> Vec<(TextureFileContents, Result<DecodedTextureWithMipmaps, AssetError>)> {
     let size = |image: &ImageWithTextures<'_>| {
         let (width, height, bytes) = match image.kept.texels.as_deref() {
             Some(DecodedTexture { texels, .. }) => {
@@ -493,7 +493,7 @@ fn memory_limit_errors(sizes: &[u64], most_bytes: u64) -> Vec<Option<String>> {
 }
 
 /// Content of a texture's file and, if that file is a glTF file, of the image file that it references.
-type TextureAndLinkedImageContent = (FileContentId, Option<FileRead>);
+type TextureFileContents = (FileContentId, Option<FileRead>);
 
 /// An image, its mipmaps if needed, and whether all of this came from the cache.
 type DecodedTextureWithMipmaps = (Arc<DecodedTexture>, Option<Arc<Mipmaps>>, bool);
@@ -501,7 +501,7 @@ type DecodedTextureWithMipmaps = (Arc<DecodedTexture>, Option<Arc<Mipmaps>>, boo
 /// Loads an image and its mipmaps. Sets `contents` to the contents that were decoded.
 fn load_one(
     image: &ImageWithTextures<'_>,
-    contents: &mut TextureAndLinkedImageContent,
+    contents: &mut TextureFileContents,
     reading: &FileReadContext<'_>,
 ) -> Result<DecodedTextureWithMipmaps, AssetError> {
     let mut was_kept = true;
@@ -518,7 +518,9 @@ fn load_one(
             was_kept = false;
             let made = match image.asked_by[0].source.coverage {
                 None => mipmaps(&decoded.texels, reading.token)?,
-                Some(cutoff) => build_coverage_mipmaps(&decoded.texels, cutoff.value(), reading.token)?,
+                Some(cutoff) => {
+                    mipmaps_of_thresholded_texels(&decoded.texels, cutoff.value(), reading.token)?
+                }
             };
             Some(Arc::new(made))
         }
@@ -530,7 +532,7 @@ fn load_one(
 /// Decodes an image. Sets `contents` to the contents that were decoded.
 fn decode(
     image: &ImageWithTextures<'_>,
-    contents: &mut TextureAndLinkedImageContent,
+    contents: &mut TextureFileContents,
     reading: &FileReadContext<'_>,
 ) -> Result<LoadedImage, AssetError> {
     let (one, limits) = (image.asked_by[0], ImageLimits::default());
@@ -546,7 +548,7 @@ fn decode(
                     let within = EmbeddedImage { path: image.path(), bytes };
                     let load =
                         |progress: Progress<'_>| load_embedded(within, encoding, limits, progress, token);
-                    return reading.sink.load_with_progress(&one.name, load);
+                    return reading.sink.load_asset_with_progress(&one.name, load);
                 }
                 ImageInput::File(path) => {
                     let content = reading.contents.first_seen_content_id(&path, token)?;
@@ -557,7 +559,7 @@ fn decode(
         }
     };
     let load = |progress: Progress<'_>| load_hashed(&file, encoding, limits, progress, token);
-    let (texels, hash) = reading.sink.load_with_progress(&one.name, load)?;
+    let (texels, hash) = reading.sink.load_asset_with_progress(&one.name, load)?;
     let content = reading.contents.record_decoded(&file, hash);
     match &mut contents.1 {
         Some(linked) => linked.content = content,

@@ -112,11 +112,11 @@ pub(crate) fn check_targets(
     match writing {
         WriteRequirement::No => Ok(()),
         WriteRequirement::Must => {
-            check_each_target(plan, output::check_image_path, output::check_file_target)
+            check_each_target_is_writable(plan, output::check_image_path, output::check_file_target)
                 .map_err(AbortReason::work_failure)
         }
         WriteRequirement::Try => {
-            if let Err(error) = check_each_target(
+            if let Err(error) = check_each_target_is_writable(
                 plan,
                 output::check_image_target_without_writing,
                 output::check_file_target_read_only,
@@ -128,7 +128,7 @@ pub(crate) fn check_targets(
     }
 }
 
-fn check_each_target(
+fn check_each_target_is_writable(
     plan: &RenderPlan,
     target: impl Fn(&Path) -> Result<Format, OutputError>,
     place: impl Fn(&Path) -> Result<(), OutputError>,
@@ -303,7 +303,7 @@ pub(crate) fn add_animation_frame(
     for path in &plan.moving {
         let Some(format) = AnimationFormat::from_path(path) else { continue };
         let write = || {
-            let metadata = develop_settings_with_relative_scene(plan, path).metadata_with_samples(samples);
+            let metadata = encoding_settings_with_relative_scene(plan, path).metadata_with_samples(samples);
             let bytes = animation::encode(&frames, &metadata, format, token)?;
             let write =
                 |guard: &WritePolicy<'_>| output::write::atomic_with_policy(path, &bytes, guard, token);
@@ -326,7 +326,7 @@ fn write_one(
     (path, sweep): (&Path, &SweptFolders),
     token: &CancelToken,
 ) -> Result<u64, OutputError> {
-    let mut finish = develop_settings_with_relative_scene(plan, path);
+    let mut finish = encoding_settings_with_relative_scene(plan, path);
     // Record the time limit only if it ended the render.
     if let Some(seconds) = state.ended_by {
         finish.metadata.push(("glimt:time".to_owned(), format!("{seconds} s")));
@@ -371,7 +371,7 @@ pub(crate) fn film_encoding_settings(plan: &RenderPlan) -> FilmEncodingSettings 
 }
 
 /// Like [`film_encoding_settings`], but with the scene's path relative to the image.
-fn develop_settings_with_relative_scene(plan: &RenderPlan, path: &Path) -> FilmEncodingSettings {
+fn encoding_settings_with_relative_scene(plan: &RenderPlan, path: &Path) -> FilmEncodingSettings {
     let mut finish = film_encoding_settings(plan);
     let scene = finish.metadata.iter_mut().find(|(name, _)| name == SCENE);
     if let Some((_, value)) = scene {

@@ -112,7 +112,7 @@ impl RequestFileSnapshot {
         path: &Path,
         token: &CancelToken,
     ) -> Result<FileContentId, Cancelled> {
-        if let Some(content) = self.seen_content(path) {
+        if let Some(content) = self.content_id_if_seen(path) {
             return Ok(content);
         }
         let stamp = FileStamp::from_path(path);
@@ -212,7 +212,7 @@ impl RequestFileSnapshot {
     }
 
     /// Returns a file's content if this request has seen it.
-    pub(crate) fn seen_content(&self, path: &Path) -> Option<FileContentId> {
+    pub(crate) fn content_id_if_seen(&self, path: &Path) -> Option<FileContentId> {
         self.lock_seen_files().get(path).map(|seen| seen.content)
     }
 

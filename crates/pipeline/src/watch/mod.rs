@@ -29,7 +29,7 @@ pub use self::content::{FileHashCache, FileRead};
 use self::folders::{ChangeHint, WatchedFolders};
 use self::outputs::PossiblyTransientChanges;
 pub use self::outputs::{ExternalChange, OutputChange};
-pub use self::working_folder::find_missing_folder;
+pub use self::working_folder::find_missing_parent_or_working_folder;
 use crate::control::CancelToken;
 use crate::system::threads::spawn;
 

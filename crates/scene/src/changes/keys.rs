@@ -62,11 +62,11 @@ impl KeyDifferences<'_> {
             let name = join_key(name, entry.key);
             match old.get(entry.key) {
                 Some(before) => self.compare_values(&name, &before.value, &entry.value),
-                None => self.add_unmatched('+', &name, &entry.value, 1),
+                None => self.add_unmatched_value_or_tables('+', &name, &entry.value, 1),
             }
         }
         for entry in old.iter().filter(|entry| new.get(entry.key).is_none()) {
-            self.add_unmatched('−', &join_key(name, entry.key), &entry.value, 0);
+            self.add_unmatched_value_or_tables('−', &join_key(name, entry.key), &entry.value, 0);
         }
     }
 
@@ -110,7 +110,7 @@ impl KeyDifferences<'_> {
 
     /// Adds a key that exists in only one document. If its value is an array of tables, adds each table
     /// separately.
-    fn add_unmatched(&mut self, sign: char, name: &str, value: &Value<'_>, text: usize) {
+    fn add_unmatched_value_or_tables(&mut self, sign: char, name: &str, value: &Value<'_>, text: usize) {
         match value.decode() {
             TomlValue::Array(array) if array.starts_with_table() => {
                 let all: Vec<Value<'_>> = array.iter().collect();
@@ -238,34 +238,34 @@ mod tests {
     }
 
     #[track_caller]
-    fn changed_to_two(before: &str, expected: &str) {
+    fn assert_change_to_two(before: &str, expected: &str) {
         assert_eq!(key_changes(before, &before.replacen("= 1", "= 2", 1)).join("; "), expected, "{before}");
     }
 
     #[test]
     fn keys_with_unusual_names_are_quoted() {
-        changed_to_two(
+        assert_change_to_two(
             "[materials.\"copper ball\"]\nroughness = 1",
             "materials.\"copper ball\".roughness 1 → 2",
         );
-        changed_to_two("[materials.\"a.b\"]\nroughness = 1", "materials.\"a.b\".roughness 1 → 2");
-        changed_to_two("[materials.'say \"x\"']\ntint = 1", "materials.\"say \\\"x\\\"\".tint 1 → 2");
-        changed_to_two("[[quad]]\nname = \"back wall\"\nu = 1", "quad.\"back wall\".u 1 → 2");
-        changed_to_two("[[quad]]\nname = \"\"\nu = 1", "quad.\"\".u 1 → 2");
+        assert_change_to_two("[materials.\"a.b\"]\nroughness = 1", "materials.\"a.b\".roughness 1 → 2");
+        assert_change_to_two("[materials.'say \"x\"']\ntint = 1", "materials.\"say \\\"x\\\"\".tint 1 → 2");
+        assert_change_to_two("[[quad]]\nname = \"back wall\"\nu = 1", "quad.\"back wall\".u 1 → 2");
+        assert_change_to_two("[[quad]]\nname = \"\"\nu = 1", "quad.\"\".u 1 → 2");
     }
 
     /// `--set` interprets numbers as positions in the list, and rejects ambiguous names.
     #[test]
     fn ambiguous_names_become_positions() {
-        changed_to_two("[[quad]]\nname = \"7\"\nu = 1", "quad.1.u 1 → 2");
+        assert_change_to_two("[[quad]]\nname = \"7\"\nu = 1", "quad.1.u 1 → 2");
         let twins = "[[quad]]\nname = \"wall\"\nu = 1\n[[quad]]\nname = \"wall\"";
-        changed_to_two(twins, "quad.1.u 1 → 2");
+        assert_change_to_two(twins, "quad.1.u 1 → 2");
     }
 
     #[test]
     fn long_keys_keep_their_last_part() {
         let name = "a material with a very long name indeed, longer than any line";
-        changed_to_two(&format!("[materials.\"{name}\"]\nroughness = 1"), "…roughness 1 → 2");
+        assert_change_to_two(&format!("[materials.\"{name}\"]\nroughness = 1"), "…roughness 1 → 2");
     }
 
     #[test]

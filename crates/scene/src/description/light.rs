@@ -84,7 +84,7 @@ impl Light {
     }
 
     /// Whether the light is a point light or spotlight with `falloff = "none"`.
-    pub fn has_constant_falloff(&self) -> bool {
+    pub fn has_disabled_falloff(&self) -> bool {
         match self {
             Self::Point(light) => light.falloff == Falloff::None,
             Self::Spot(light) => light.point.falloff == Falloff::None,

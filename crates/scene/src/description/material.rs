@@ -238,7 +238,7 @@ impl MaterialKind {
     }
 
     /// Whether the material is solid glass.
-    pub fn is_glass(&self) -> bool {
+    pub fn is_solid_glass(&self) -> bool {
         self.glass_medium_identity().is_some()
     }
 
@@ -281,7 +281,7 @@ pub struct Bump {
 
 impl Bump {
     /// Returns how to compute the height from a pixel.
-    pub fn height_channel(&self) -> ChannelSelector {
+    pub fn height_channel_selector(&self) -> ChannelSelector {
         self.channel.map_or(ChannelSelector::Luminance, ChannelSelector::Channel)
     }
 }
@@ -486,7 +486,7 @@ impl Material {
 
     /// Returns the weight and roughness of an emitter's clear coat, or `None` if there is no emission or no
     /// clear coat.
-    pub fn emitter_coat_parameters(&self) -> Option<[NumberSource; 2]> {
+    pub fn emitter_coat_weight_and_roughness(&self) -> Option<[NumberSource; 2]> {
         match self.kind {
             MaterialKind::Principled { clearcoat, clearcoat_roughness, .. } => {
                 let has_coat = self.emits() && clearcoat != NumberSource::Constant(0.0);
@@ -516,11 +516,11 @@ impl Material {
         let numbers = numbers.map(|(texture, number)| (texture, TextureRole::Roughness(number)));
         let shown = emission.texture.filter(|_| self.emits()).map(|index| (index, TextureRole::Emission));
         let normals = normal_map.map(|map| (map.texture, TextureRole::NormalMap));
-        let heights = bump.map(|bump| (bump.texture, TextureRole::Bump(bump.height_channel())));
+        let heights = bump.map(|bump| (bump.texture, TextureRole::Bump(bump.height_channel_selector())));
         let opacity = opacity
             .texture_index_and_channel()
             .map(|(texture, number)| (texture, TextureRole::Opacity(number)));
-        let coat = self.emitter_coat_parameters().into_iter().flatten();
+        let coat = self.emitter_coat_weight_and_roughness().into_iter().flatten();
         let coat = coat.filter_map(|number| number.texture_index_and_channel(ChannelSelector::Luminance));
         let coat = coat.map(|(texture, number)| (texture, TextureRole::EmissionCoat(number)));
         colors.chain(numbers).chain(shown).chain(normals).chain(heights).chain(opacity).chain(coat).collect()

@@ -42,7 +42,7 @@ fn is_orbiter_file_effective(table: &TableReader<'_>) -> bool {
     table.optional_key("orbiter").is_present() && !is_replaced
 }
 
-fn read_aperture(table: &TableReader<'_>) -> f64 {
+fn read_lens_radius(table: &TableReader<'_>) -> f64 {
     table.optional_key("aperture").number(table.key_limits("aperture")).unwrap_or(0.0)
 }
 
@@ -56,7 +56,7 @@ fn read_look_at_camera(table: &TableReader<'_>) -> Option<Camera> {
     let (eye, target) = (position.vector(Limits::Any), look_at.vector(Limits::Any));
     let up_vector = table.optional_key("up").vector_or(Limits::Any, DVec3::Y);
     let fov = read_fov(table).unwrap_or(FOV_DEGREES);
-    let aperture = read_aperture(table);
+    let aperture = read_lens_radius(table);
     let focus = table.optional_key("focus").number(table.key_limits("focus"));
 
     let (position_key, look_at_key) = (position, look_at);
@@ -80,7 +80,7 @@ fn read_look_at_camera(table: &TableReader<'_>) -> Option<Camera> {
 /// Returns `up` if it is long enough and not parallel to `view`.
 fn check_up_vector(table: &TableReader<'_>, view: DVec3, up: DVec3) -> Option<DVec3> {
     let span = table.optional_key("up").value_span().or(table.optional_key("look_at").value_span())?;
-    if !table.optional_key("up").check_vector_magnitude(up) {
+    if !table.optional_key("up").check_vector_long_enough(up) {
         return None;
     }
     let Some(direction) = up.try_normalize() else {
@@ -103,7 +103,7 @@ fn check_up_vector(table: &TableReader<'_>, view: DVec3, up: DVec3) -> Option<DV
 
 fn read_orbiter_camera(table: &TableReader<'_>) -> Option<Camera> {
     let file = table.optional_key("orbiter").existing_file(&[]);
-    let (fov, aperture) = (read_fov(table), read_aperture(table));
+    let (fov, aperture) = (read_fov(table), read_lens_radius(table));
     let focus = table.optional_key("focus").number(table.key_limits("focus"));
     for name in ["position", "look_at", "up"] {
         let message = format!("`{name}` conflicts with `orbiter`");

@@ -106,11 +106,11 @@ impl<'a> FileContext<'a> {
 
     /// Adds an issue to the list.
     pub(super) fn report(&self, issue: Issue) {
-        self.report_with(|| issue);
+        self.build_and_report_issue(|| issue);
     }
 
     /// Adds an issue to the list, or only counts the issue if the list is full.
-    pub(super) fn report_with(&self, make: impl FnOnce() -> Issue) {
+    pub(super) fn build_and_report_issue(&self, make: impl FnOnce() -> Issue) {
         let issue = make();
         let mut counts = self.counts.get();
         let count = &mut counts[usize::from(issue.severity == Severity::Warning)];

@@ -165,7 +165,7 @@ impl<'a> TableKey<'a> {
 
     /// Checks that a vector is long enough to compute with, and reports an error if not. For vectors of
     /// length 0, the caller reports a more specific error.
-    pub(super) fn check_vector_magnitude(&self, vector: DVec3) -> bool {
+    pub(super) fn check_vector_long_enough(&self, vector: DVec3) -> bool {
         let length = robust_length(vector);
         let Some(span) = self.value_span().filter(|_| is_nonzero_but_too_short(length)) else { return true };
         let issue = Issue::error(span, format!("`{}` must be more than {SHORTEST:e} long", self.name));

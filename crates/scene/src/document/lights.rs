@@ -4,7 +4,7 @@ use super::super::description::Light;
 use super::super::description::light::{DirectionalLight, Falloff, PointLight, SpotLight};
 use super::context::Issue;
 use super::limits::Limits;
-use super::shapes::read_direction;
+use super::shapes::read_unnormalized_direction;
 use super::table::TableReader;
 use crate::choice;
 use crate::math::{DVec3, Vec3};
@@ -74,7 +74,7 @@ fn read_spot_light(table: &TableReader<'_>) -> Option<SpotLight> {
 const MIN_ANGLE_DEGREES: f64 = 1e-3;
 
 fn read_directional_light(table: &TableReader<'_>) -> Option<DirectionalLight> {
-    let direction = read_direction(table, "direction", "light", DVec3::NEG_Y);
+    let direction = read_unnormalized_direction(table, "direction", "light", DVec3::NEG_Y);
     let irradiance = table.optional_key("irradiance").color().unwrap_or(Vec3::ONE);
     let key = table.optional_key("angle");
     let angle = if key.is_present() { key.number(table.key_limits("directional.angle")) } else { Some(0.0) };

@@ -74,7 +74,7 @@ fn read_material(name: String, table: &TableReader<'_>, textures: &DefinedNames)
     let (emission, normal_map) =
         (common::read_emission(table, textures), common::read_normal_map(table, textures));
     let bump = common::read_bump(table, textures);
-    let opacity = if kind.as_ref().is_some_and(MaterialKind::is_glass) {
+    let opacity = if kind.as_ref().is_some_and(MaterialKind::is_solid_glass) {
         common::reject_opacity_keys(table);
         OpacitySource::FULL
     } else {
@@ -166,7 +166,7 @@ fn read_principled(table: &TableReader<'_>, textures: &DefinedNames) -> Material
 }
 
 /// Returns the key at the path `TYPE.KEY`.
-fn key_without_type_prefix<'a>(table: &TableReader<'a>, path: &'static str) -> TableKey<'a> {
+fn table_key_from_typed_path<'a>(table: &TableReader<'a>, path: &'static str) -> TableKey<'a> {
     table.optional_key(path.split_once('.').map_or(path, |(_, name)| name))
 }
 
@@ -178,7 +178,7 @@ fn read_or_default<'a, T>(
     default: T,
     read: impl FnOnce(&TableKey<'a>, Limits) -> Option<T>,
 ) -> T {
-    read(&key_without_type_prefix(table, path), table.key_limits(path)).unwrap_or(default)
+    read(&table_key_from_typed_path(table, path), table.key_limits(path)).unwrap_or(default)
 }
 
 /// Reads a color or a texture.

@@ -60,7 +60,7 @@ pub(super) fn parse_and_lower(source: &SceneText, path: &Path) -> ParseOutcome {
         };
     }
     let (document, errors) = toml::parse(text);
-    let broken_lines = syntax::report_first_error_per_line(&context, errors);
+    let broken_lines = syntax::report_errors_and_collect_broken_lines(&context, errors);
     let document = sets::apply_set_args(&context, source, document);
     let scene = read_scene(&TableReader::root(&context, document.root()));
     let has_errors = context.has_errors();

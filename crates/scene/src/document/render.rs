@@ -33,7 +33,7 @@ macro_rules! reader {
         $(#[doc = $doc:literal])* $name:ident: $type:ty = $default:expr, $range:ident $(($($limit:expr),*))?, $unit:literal, $change:ident;
     )*) => {
         /// Reads all keys. Absent and invalid keys have their default values.
-        fn read_settings(table: &TableReader<'_>) -> RenderOptions {
+        fn read_render_options(table: &TableReader<'_>) -> RenderOptions {
             let key = |name| table.optional_key(name);
             RenderOptions {
                 $($name: read!(key(stringify!($name)), $range $(($($limit),*))?).unwrap_or(RenderOptions::DEFAULT.$name),)*
@@ -47,7 +47,7 @@ render_keys!(reader);
 /// Reads the settings and the optional output path.
 pub(super) fn read_render_table(root: &TableReader<'_>) -> (Option<RenderOptions>, Option<PathBuf>) {
     let Some(table) = root.table("render") else { return (Some(RenderOptions::DEFAULT), None) };
-    let render = read_settings(&table);
+    let render = read_render_options(&table);
     let output = read_output_path(&table);
     check_image_size(&table, &render);
     table.report_unknown_and_missing_keys();

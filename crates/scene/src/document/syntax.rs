@@ -5,13 +5,13 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
 use super::super::sanitize::escape_and_truncate;
-use super::super::toml::{Bracket, SyntaxError, find_all_array_brackets, innermost_bracket_open_at_end};
+use super::super::toml::{BracketToken, SyntaxError, find_all_array_brackets, innermost_bracket_open_at_end};
 use super::context::{FileContext, Issue};
 
 /// Reports only the first error on each line, because it usually causes the other errors on the line. Returns
 /// the unreliable lines in order: lines with errors, and the lines after a broken header, because their keys
 /// appear to belong to another table.
-pub(super) fn report_first_error_per_line(
+pub(super) fn report_errors_and_collect_broken_lines(
     context: &FileContext<'_>,
     mut errors: Vec<SyntaxError>,
 ) -> Vec<Range<usize>> {
@@ -58,13 +58,13 @@ pub(super) fn report_first_error_per_line(
         let issue = Issue::error(open..open + 1, "`[` opened here is not closed");
         context.report(issue.with_help(unclosed_list_help(context, open)).mark_syntax_error());
     }
-    lines.into_iter().map(|line| line..first_line_after_error(context, line)).collect()
+    lines.into_iter().map(|line| line..first_line_unaffected_by_error(context, line)).collect()
 }
 
 /// The array brackets in a text with syntax errors, found on first use.
 struct LazyBracketIndex<'a> {
     text: &'a str,
-    brackets: OnceCell<Vec<Bracket>>,
+    brackets: OnceCell<Vec<BracketToken>>,
 }
 
 impl LazyBracketIndex<'_> {
@@ -194,7 +194,7 @@ fn format_array_if_short(values: &[&str]) -> Option<String> {
 
 /// Returns the first line not affected by an error in `line`: the next header if `line` is a broken header,
 /// otherwise the next line.
-fn first_line_after_error(context: &FileContext<'_>, line: usize) -> usize {
+fn first_line_unaffected_by_error(context: &FileContext<'_>, line: usize) -> usize {
     let is_header =
         |line: usize| context.line_text_by_number(line).map(|text| text.trim_start().starts_with('['));
     if is_header(line) != Some(true) {

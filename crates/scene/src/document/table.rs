@@ -212,7 +212,7 @@ impl<'a> TableReader<'a> {
         let known = self.known.borrow();
         let mut meant = Vec::new();
         for KeyValue { key, span, value } in self.entries.iter().filter(|one| !known.contains(&one.key)) {
-            self.context.report_with(|| {
+            self.context.build_and_report_issue(|| {
                 let near = self.guess_intended_key(key, &known);
                 meant.extend(near);
                 self.unknown_key_issue(key, span, &value.decode(), near)

@@ -76,7 +76,7 @@ impl<'s> DocumentBuilder<'s> {
     }
 
     /// Whether a header is unclosed.
-    pub(super) fn is_in_header(&self) -> bool {
+    pub(super) fn has_unclosed_header(&self) -> bool {
         self.open.is_some()
     }
 

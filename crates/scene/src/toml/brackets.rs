@@ -5,7 +5,7 @@ use toml_parser::lexer::TokenKind;
 
 /// An array bracket. Brackets in headers, strings and comments are skipped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Bracket {
+pub(crate) struct BracketToken {
     /// Byte offset in the text.
     pub(crate) at: usize,
     /// Whether the bracket is `[`.
@@ -13,7 +13,7 @@ pub(crate) struct Bracket {
 }
 
 /// Returns the array brackets in `text`, which must begin with the start of an expression.
-pub(crate) fn find_all_array_brackets(text: &str) -> Vec<Bracket> {
+pub(crate) fn find_all_array_brackets(text: &str) -> Vec<BracketToken> {
     let mut brackets = Vec::new();
     let (mut depth, mut is_line_start, mut is_header) = (0_usize, true, false);
     for token in Source::new(text).lex() {
@@ -25,7 +25,7 @@ pub(crate) fn find_all_array_brackets(text: &str) -> Vec<Bracket> {
                 is_header |= opens && is_line_start && depth == 0;
                 if !is_header {
                     depth = if opens { depth + 1 } else { depth.saturating_sub(1) };
-                    brackets.push(Bracket { at: token.span().start(), opens });
+                    brackets.push(BracketToken { at: token.span().start(), opens });
                 }
                 is_line_start = false;
             }
@@ -47,7 +47,7 @@ pub(crate) fn find_all_array_brackets(text: &str) -> Vec<Bracket> {
 }
 
 /// Returns the offset of the innermost bracket that is still open at the end of the text.
-pub(crate) fn innermost_bracket_open_at_end(brackets: &[Bracket]) -> Option<usize> {
+pub(crate) fn innermost_bracket_open_at_end(brackets: &[BracketToken]) -> Option<usize> {
     let mut closed = 0_usize;
     for bracket in brackets.iter().rev() {
         match (bracket.opens, closed) {

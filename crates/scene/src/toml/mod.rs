@@ -33,7 +33,7 @@ mod tree;
 use assembly::DocumentBuilder;
 use expression::StatementParser;
 
-pub(super) use brackets::{Bracket, find_all_array_brackets, innermost_bracket_open_at_end};
+pub(super) use brackets::{BracketToken, find_all_array_brackets, innermost_bracket_open_at_end};
 pub(super) use error::SyntaxError;
 pub(super) use set::{KeyError, KeyErrorKind, TopLevelTableKinds};
 pub(super) use tree::{Document, Elements, Entries, KeyValue, TomlValue, Value};
@@ -80,8 +80,11 @@ pub(super) fn parse(source: &str) -> (Document<'_>, Vec<SyntaxError>) {
     let mut expressions = StatementParser::default();
     let mut at = if source.starts_with(MARK) { MARK.len() } else { 0 };
     while at < source.len() {
-        let plain =
-            if assembly.is_in_header() { None } else { plain::read_plain_line(source, at, &mut assembly) };
+        let plain = if assembly.has_unclosed_header() {
+            None
+        } else {
+            plain::read_plain_line(source, at, &mut assembly)
+        };
         at = plain.unwrap_or_else(|| expressions.read(source, at, &mut assembly));
     }
     assembly.finish()

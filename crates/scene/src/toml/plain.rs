@@ -30,7 +30,7 @@ pub(super) fn read_plain_line<'s>(
             }
         }
         first if is_bare_key_byte(first) => {
-            let key = line.read_name()?;
+            let key = line.read_bare_key_name()?;
             line.skip_whitespace();
             line.expect_byte(b'=')?;
             line.skip_whitespace();
@@ -105,7 +105,7 @@ impl<'s> LineCursor<'s> {
         self.expect_byte(b'\n')
     }
 
-    fn read_name(&mut self) -> Option<Name<'s>> {
+    fn read_bare_key_name(&mut self) -> Option<Name<'s>> {
         let start = self.at;
         if self.skip_while(is_bare_key_byte) == 0 {
             return None;
@@ -118,10 +118,10 @@ impl<'s> LineCursor<'s> {
         let start = self.at;
         self.expect_byte(b'[')?;
         let is_list = self.expect_byte(b'[').is_some();
-        let mut key = self.read_name()?;
+        let mut key = self.read_bare_key_name()?;
         let mut path = Vec::new();
         if self.expect_byte(b'.').is_some() {
-            path.push(std::mem::replace(&mut key, self.read_name()?));
+            path.push(std::mem::replace(&mut key, self.read_bare_key_name()?));
         }
         self.expect_byte(b']')?;
         if is_list {

@@ -39,7 +39,7 @@ pub fn shade_aov(
                 Vec3::splat(maps.map_or(0.0, |maps| count_nearby_photons(maps, tile, path.slot, &vertex)))
             }
             FirstHitQuantity::Uv => fractional_uv(surface.uv).as_vec2().extend(0.0),
-            FirstHitQuantity::Albedo => albedo(&vertex, counters),
+            FirstHitQuantity::Albedo => vertex_albedo(&vertex, counters),
         };
     }
     Ok(())
@@ -47,7 +47,7 @@ pub fn shade_aov(
 
 /// Records the first-hit layers of the plain surfaces in a packet of camera rays that starts at slot `first`.
 /// Returns the mask of lanes whose surfaces are left to [`record_first_hit`].
-pub fn record_plain_first_hits(
+pub fn record_first_hits_on_plain_surfaces(
     tile: &TileContext<'_>,
     (packet, surfaces): (&PacketHits, &SurfacePacket),
     first: u32,
@@ -66,7 +66,11 @@ pub fn record_plain_first_hits(
             continue;
         };
         let (point, normal) = packet.point_and_shading_normal(surfaces, lane);
-        record(values, first + lane as u32, [albedo, normal, Vec3::splat(view_depth(tile, point))]);
+        add_first_hit_layer_values(
+            values,
+            first + lane as u32,
+            [albedo, normal, Vec3::splat(view_depth(tile, point))],
+        );
     }
     left
 }
@@ -100,15 +104,19 @@ pub fn record_vertex(
     values: &mut LayerValues,
     counters: &mut RayCounters,
 ) {
-    let set = values.set();
+    let set = values.layer_set();
     // Look up only the textures needed for the layers.
-    let albedo = if set.contains(SampleLayer::Albedo) { albedo(vertex, counters) } else { Vec3::ZERO };
+    let albedo = if set.contains(SampleLayer::Albedo) { vertex_albedo(vertex, counters) } else { Vec3::ZERO };
     let normal =
         if set.contains(SampleLayer::Normal) { vertex.perturbed_front_normal(counters) } else { Vec3::ZERO };
-    record(values, slot, [albedo, normal, Vec3::splat(view_depth(tile, vertex.surface.point))]);
+    add_first_hit_layer_values(
+        values,
+        slot,
+        [albedo, normal, Vec3::splat(view_depth(tile, vertex.surface.point))],
+    );
 }
 
-fn record(values: &mut LayerValues, slot: u32, [albedo, normal, depth]: [Vec3; 3]) {
+fn add_first_hit_layer_values(values: &mut LayerValues, slot: u32, [albedo, normal, depth]: [Vec3; 3]) {
     values.add(SampleLayer::Albedo, slot, albedo);
     values.add(SampleLayer::Normal, slot, normal);
     values.add(SampleLayer::Depth, slot, depth);
@@ -130,7 +138,7 @@ fn first_opaque_hit(
 }
 
 /// Diffuse reflectance at a vertex.
-fn albedo(vertex: &SurfaceVertex<'_>, counters: &mut RayCounters) -> Vec3 {
+fn vertex_albedo(vertex: &SurfaceVertex<'_>, counters: &mut RayCounters) -> Vec3 {
     let albedo = vertex.material.bsdf.albedo(&vertex.texture_point, &mut counters.texture_lookups);
     vertex.times_vertex_color(albedo)
 }

@@ -27,7 +27,7 @@ impl PathBehavior {
     pub fn from_settings(settings: &RenderSettings, has_photons: bool) -> Self {
         let IntegratorProperties { splits, scatters, gathers, .. } = settings.render.integrator.properties();
         let gathers = gathers && has_photons;
-        match settings.view.aov_source().light_aov() {
+        match settings.view.aov_source().light_aov_or_all() {
             // The lit fraction is measured at the first visible surface, where all lights are sampled.
             LightAov::LitFraction => Self {
                 splits: true,

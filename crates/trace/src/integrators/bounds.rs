@@ -72,7 +72,7 @@ fn find_edge_to_draw(tile: &TileContext<'_>, ray: &Ray, end: f32, spread: f32) -
             let is_first =
                 best.is_none_or(|best| (line.is_behind, line.depth) < (best.is_behind, best.depth));
             if is_first
-                && ray_distance_to_nearest_face_edge(bounds, local, (t, side)) < 0.5 * LINE_WIDTH * pixel(t)
+                && distance_from_ray_to_face_edge(bounds, local, (t, side)) < 0.5 * LINE_WIDTH * pixel(t)
             {
                 best = Some(line);
             }
@@ -83,7 +83,7 @@ fn find_edge_to_draw(tile: &TileContext<'_>, ray: &Ray, end: f32, spread: f32) -
 }
 
 /// Distance from a ray to the nearest edge of the box face that the ray crosses at t.
-fn ray_distance_to_nearest_face_edge(bounds: &Aabb, ray: &Ray, (t, side): (f32, usize)) -> f32 {
+fn distance_from_ray_to_face_edge(bounds: &Aabb, ray: &Ray, (t, side): (f32, usize)) -> f32 {
     let (point, d) = (ray.at(t), ray.direction);
     let to_edge = |axis: usize| {
         let from_edge = (point[axis] - bounds.min[axis]).min(bounds.max[axis] - point[axis]).max(0.0);
@@ -103,7 +103,7 @@ mod tests {
         let distance = |origin: Vec3, direction: Vec3| {
             let ray = Ray::new(origin, direction);
             let stretch = RayBoxInterval::new(&cube, &ray).expect("the ray should hit the cube");
-            ray_distance_to_nearest_face_edge(&cube, &ray, stretch.enter)
+            distance_from_ray_to_face_edge(&cube, &ray, stretch.enter)
         };
         assert!((distance(Vec3::new(0.2, 0.7, -3.0), Vec3::Z) - 0.2).abs() < 1e-6);
         // A ray along (0, 1, 1) through (½, 0.9, 0) is 0.1·cos 45° from the upper edge.

@@ -122,7 +122,7 @@ impl LayerValues {
     }
 
     /// Begins a batch with zero values.
-    pub fn begin(&mut self, set: LayerSet, slots: &Range<u32>) {
+    pub fn begin_batch(&mut self, set: LayerSet, slots: &Range<u32>) {
         (self.set, self.first) = (set, slots.start);
         for layer in SampleLayer::ALL {
             let list = &mut self.lists[layer as usize];
@@ -136,7 +136,7 @@ impl LayerValues {
     }
 
     /// The layers.
-    pub fn set(&self) -> LayerSet {
+    pub fn layer_set(&self) -> LayerSet {
         self.set
     }
 
@@ -211,7 +211,7 @@ mod tests {
         let set: LayerSet = [SampleLayer::Depth, SampleLayer::Diffuse].into_iter().collect();
         let (mut values, mut sums) = (LayerValues::default(), LayerSums::zero(set.len(), 2));
         for slots in [0..2, 2..4] {
-            values.begin(set, &slots);
+            values.begin_batch(set, &slots);
             for slot in slots {
                 SampleLayer::ALL.iter().for_each(|layer| values.add(*layer, slot, Vec3::ONE));
             }

@@ -108,7 +108,7 @@ pub fn render_tile_with_layers(
     let photons = photons.filter(|_| settings.gathers_photons());
     let behavior = PathBehavior::from_settings(settings, photons.is_some());
     let tile = TileContext::new(world, settings, &block, token, behavior);
-    let clamp = if settings.view.aov_source().light_aov() == LightAov::TraversalCost {
+    let clamp = if settings.view.aov_source().light_aov_or_all() == LightAov::TraversalCost {
         0.0
     } else {
         settings.render.clamp
@@ -123,17 +123,21 @@ pub fn render_tile_with_layers(
         let negative = |first: u32, bits: u32| write_mask_bits(&mut is_negative, first, bits);
         match settings.view.aov_source() {
             AovSource::FirstHit(number) => {
-                tile.generate_camera_rays(slots, &mut memory.scratch.rays, negative);
+                tile.replace_queue_with_camera_rays(slots, &mut memory.scratch.rays, negative);
                 aov::shade_aov((&tile, photons), number, &mut memory.scratch, &mut radiance, &mut counters)?;
             }
             shown @ (AovSource::Light(_) | AovSource::Film(_) | AovSource::Bounds) => {
-                values.begin(settings.layers, &slots);
+                values.begin_batch(settings.layers, &slots);
                 let recorded = (!settings.layers.is_empty()).then(|| LayerAccumulator {
                     values: &mut values,
                     fractions: settings.layers.has_light().then_some(&mut fractions),
                 });
-                let accumulator =
-                    Accumulator { aov: shown.light_aov(), radiance: &mut radiance, clamp, layers: recorded };
+                let accumulator = Accumulator {
+                    aov: shown.light_aov_or_all(),
+                    radiance: &mut radiance,
+                    clamp,
+                    layers: recorded,
+                };
                 path::trace_camera_paths(
                     (&tile, photons),
                     slots.clone(),
@@ -143,7 +147,7 @@ pub fn render_tile_with_layers(
                     negative,
                 )?;
                 if shown == AovSource::Bounds {
-                    tile.generate_camera_rays(slots, &mut memory.scratch.rays, |_, _| {});
+                    tile.replace_queue_with_camera_rays(slots, &mut memory.scratch.rays, |_, _| {});
                     bounds::draw_box_edges(&tile, &mut memory.scratch, &mut radiance)?;
                 }
                 let is_negative = weight.map(|_| is_negative.as_slice());

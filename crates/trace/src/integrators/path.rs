@@ -75,14 +75,14 @@ pub fn trace_camera_paths(
     }
     paths.begin_bounce(slots.len());
     for start in slots.clone().step_by(CAMERA_ROWS * PACKET_SIZE) {
-        tile.generate_camera_packets(start..slots.end, camera);
+        tile.fill_camera_packets(start..slots.end, camera);
         for (first, row) in (start..).step_by(PACKET_SIZE).zip(&*camera) {
             negative(first, row.negative);
             let count = (slots.end - first).min(PACKET_SIZE as u32) as usize;
             paths.trace_packet(PacketSource::Camera(row, first, count, first - slots.start))?;
         }
     }
-    paths.scatter()?;
+    paths.shade_queued_vertices()?;
     paths.direct.add_arrived_light_consecutive(slots.start, &mut paths.accumulator);
     paths.next_bounce(rays);
     // Trace the remaining bounces.
@@ -100,7 +100,7 @@ pub fn trace_camera_paths(
                 paths.trace_packet(PacketSource::Paths(packet, first))?;
             }
         }
-        paths.scatter()?;
+        paths.shade_queued_vertices()?;
         paths.direct.accumulate_arrived_light(rays, &mut paths.accumulator);
         paths.next_bounce(rays);
     }
@@ -141,8 +141,12 @@ impl CameraWavefront<'_, '_> {
         }
         // Intersect the rays. The vertices of plain surfaces are ready for the queue.
         let are_lit = self.may_scatter() && self.accumulator.accepts_reflected();
-        let packet =
-            tile.intersect(rays, self.accumulator.aov, are_lit, (self.direct.spare_batch(), self.surfaces));
+        let packet = tile.intersect_packet(
+            rays,
+            self.accumulator.aov,
+            are_lit,
+            (self.direct.spare_batch(), self.surfaces),
+        );
         self.counters.texture_lookups += packet.lookups;
         if self.accumulator.aov == LightAov::TraversalCost {
             self.add_traversal_costs(&rays, &packet);
@@ -152,11 +156,11 @@ impl CameraWavefront<'_, '_> {
             self.store_cones(&rays, &packet);
         }
         // Add the emission found by camera rays, which needs no MIS weights, and record their layers.
-        let (plain, escaped) = self.emission_masks(&rays, &packet);
+        let (plain, escaped) = self.emitting_and_escaped_masks(&rays, &packet);
         let mut unfinished = packet.any & !packet.plain;
         match rays {
             PacketSource::Camera(row, first, ..) => {
-                self.add_visible_emission(&row.rays, first, &packet, (plain, escaped));
+                self.add_camera_ray_emission(&row.rays, first, &packet, (plain, escaped));
                 self.record_first_hits(&rays, &packet, first);
             }
             PacketSource::Paths(..) | PacketSource::Traced(..) => unfinished |= plain | escaped,
@@ -165,24 +169,24 @@ impl CameraWavefront<'_, '_> {
         // contributions to a sample are added in path order.
         for lane in set_bit_lanes(unfinished) {
             self.place = rays.queue_index(lane);
-            self.shade_ray(packet.path(tile, &rays, lane), (&packet, lane));
-            self.record_passed_first_hit(&rays, &packet, lane);
+            self.shade_ray(packet.incoming_path(tile, &rays, lane), (&packet, lane));
+            self.record_first_hit_if_passed(&rays, &packet, lane);
         }
         // Scatter at the queued vertices while their data is in the cache.
         if self.direct.is_full() {
-            self.scatter()?;
+            self.shade_queued_vertices()?;
         }
         Ok(())
     }
 
     /// Adds the light reflected at the queued vertices, continues their paths, and empties the queue.
-    fn scatter(&mut self) -> Result<(), Cancelled> {
+    fn shade_queued_vertices(&mut self) -> Result<(), Cancelled> {
         let (tile, aov, depth) = (self.tile, self.accumulator.aov, self.depth);
         let shares_with_paths = self.paths_find_lights();
         let splits_lobes = self.accumulator.fractions().is_some();
-        for vertices in self.direct.groups(tile) {
+        for vertices in self.direct.light_sampling_groups(tile) {
             // Sample lights.
-            self.direct.sample_lights(vertices.clone(), tile, aov, shares_with_paths)?;
+            self.direct.sample_lights_for_group(vertices.clone(), tile, aov, shares_with_paths)?;
             for (index, number) in vertices.clone().enumerate() {
                 let mut light = self.direct.reflected_light((index, number), tile, aov, shares_with_paths);
                 let row = self.direct.batch(number);
@@ -203,7 +207,7 @@ impl CameraWavefront<'_, '_> {
                 let fractions = self.accumulator.fractions();
                 let has_fractions = fractions.is_some() && row.only_specular_before != 0;
                 let before = self.next.len();
-                BsdfSampler { tile, row, used: row.used, continuation, has_fractions }.scatter(
+                BsdfSampler { tile, row, used: row.used, continuation, has_fractions }.queue_scattered_paths(
                     self.direct.interior_lists(),
                     self.direct.cones(),
                     self.next,

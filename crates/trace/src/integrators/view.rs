@@ -115,7 +115,7 @@ pub enum AovSource {
 impl AovSource {
     /// The light AOV accumulated by paths, or [`LightAov::ALL`] if the source is not a light AOV. First-hit
     /// views do not use it.
-    pub fn light_aov(self) -> LightAov {
+    pub fn light_aov_or_all(self) -> LightAov {
         match self {
             Self::Light(aov) => aov,
             Self::FirstHit(_) | Self::Bounds | Self::Film(_) => LightAov::ALL,

@@ -48,7 +48,7 @@ impl World {
         };
         Self {
             unlit_glass: world.find_shadowed_glass_interiors(),
-            lens_glass: world.find_lens_glass(),
+            lens_glass: world.find_closed_glass_near_lens(),
             enclosing_glass: world.closed_glass_shapes_by_subtree(),
             camera_solids: world.find_solids_around_camera(),
             see_through: SeeThroughObjects::from_world(&world).map(Box::new),

@@ -19,6 +19,6 @@ impl MeshInstance {
     /// triangles may also be visited, and triangles may be visited more than once. Returns whether all
     /// triangles were visited.
     pub fn visit_triangles_in_box(&self, bounds: &Aabb, visit: impl FnMut(u32) -> bool) -> bool {
-        self.tree.triangle_tree().visit_triangles_in_box_while(&self.box_to_local(bounds), visit)
+        self.tree.triangle_tree().all_triangles_in_box_satisfy(&self.box_to_local(bounds), visit)
     }
 }

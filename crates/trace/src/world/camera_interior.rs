@@ -50,7 +50,7 @@ impl World {
     }
 
     /// Closed glass shapes whose bounding boxes overlap the lens, with their materials.
-    pub(super) fn find_lens_glass(&self) -> Vec<(u32, u32)> {
+    pub(super) fn find_closed_glass_near_lens(&self) -> Vec<(u32, u32)> {
         let (eye, lens) = (self.camera.position.as_vec3(), Vec3::splat(self.camera.aperture as f32));
         let lens = Aabb { min: eye, max: eye }.expanded(lens + eye.abs() * f32::EPSILON);
         let objects = (0_u32..).zip(self.geometry.objects());

@@ -19,7 +19,7 @@ pub const MAX_INTERIORS: usize = 4;
 
 /// The last closed glass shapes in a subtree, in descending order. Other shapes in the subtree that enclose
 /// the same point have no effect there.
-pub(super) type SubtreeClosedGlassIds = ArrayVec<u32, MAX_INTERIORS>;
+pub(super) type LastClosedGlassIdsInSubtree = ArrayVec<u32, MAX_INTERIORS>;
 
 /// Two points, one on each side of coincident surfaces.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -191,7 +191,11 @@ impl World {
                 mesh.and_then(|mesh| mesh.intersect_segment_with_triangle(triangle, ends))
             {
                 let hit = Hit { shape, object };
-                found(self.coincident_surface_from_hit(hit, self.material_index(&hit) as u32, is_front));
+                found(self.convert_hit_to_coincident_surface(
+                    hit,
+                    self.material_index(&hit) as u32,
+                    is_front,
+                ));
             }
         }
         if is_led || closed_lead { sides } else { OffsetPoints { before: probe.close, ..sides } }
@@ -214,10 +218,10 @@ impl World {
         let own = shape.intersect(&ray)?;
         let is_front =
             shape.requested_surface_point(&ray, &own, bare).normal.as_dvec3().dot(ray.direction) < 0.0;
-        Some(self.coincident_surface_from_hit(Hit { shape: own, object }, material, is_front))
+        Some(self.convert_hit_to_coincident_surface(Hit { shape: own, object }, material, is_front))
     }
 
-    fn coincident_surface_from_hit(
+    fn convert_hit_to_coincident_surface(
         &self,
         hit: Hit,
         material: u32,
@@ -264,8 +268,8 @@ impl World {
         })
     }
 
-    /// The [`SubtreeClosedGlassIds`] of each subtree, or an empty list if few objects are nested.
-    pub(super) fn closed_glass_shapes_by_subtree(&self) -> Box<[SubtreeClosedGlassIds]> {
+    /// The [`LastClosedGlassIdsInSubtree`] of each subtree, or an empty list if few objects are nested.
+    pub(super) fn closed_glass_shapes_by_subtree(&self) -> Box<[LastClosedGlassIdsInSubtree]> {
         let is_glass = |id: u32| {
             let material = self.material_index(&Hit { shape: ShapeHit::from_t(0.0), object: id }) as u32;
             self.is_closed_shape(id) && self.is_glass_material(material)
@@ -319,7 +323,7 @@ impl Geometry {
         &self,
         at: &CoincidenceQuery<'_>,
         memory: &mut CoincidenceScratch,
-        enclosing: &[SubtreeClosedGlassIds],
+        enclosing: &[LastClosedGlassIdsInSubtree],
     ) -> Vec3 {
         let CoincidenceScratch { objects, triangles } = memory;
         objects.clear();

@@ -142,7 +142,7 @@ impl EmissiveFaces {
 
     /// Returns the lights whose bounding boxes touch a face's bounding box. Increases `pairs` by the number
     /// of compared lights.
-    pub(super) fn near<'a>(
+    pub(super) fn lights_near_face<'a>(
         &'a self,
         face: &FlatFace,
         pairs: &mut usize,
@@ -177,14 +177,14 @@ pub fn coplanar_lights(scene: &Scene, meshes: &[&LoadedMesh], origin: DVec3) -> 
     // Lights that touch glass are not moved because the handling of coincident glass surfaces resolves this
     // case.
     let is_glass = |object: &usize| {
-        scene.objects[*object].material.is_some_and(|own| scene.materials[own].kind.is_glass())
+        scene.objects[*object].material.is_some_and(|own| scene.materials[own].kind.is_solid_glass())
     };
     for object in (0..scene.objects.len()).filter(|object| !is_glass(object)) {
         visit_flat_faces(scene, meshes, (object, origin), Some(&lights), |face| {
             if pairs > MAX_PAIRS {
                 return;
             }
-            for light in lights.near(face, &mut pairs) {
+            for light in lights.lights_near_face(face, &mut pairs) {
                 let is_lifted = must_lift_light(light, face);
                 // Report each overlap of two lights only once.
                 let is_reported = is_lifted
@@ -192,7 +192,7 @@ pub fn coplanar_lights(scene: &Scene, meshes: &[&LoadedMesh], origin: DVec3) -> 
                         && !must_lift_light(face, light)
                         && !light.is_duplicate_of(face);
                 if is_reported && are_coplanar_and_overlap(light, face) {
-                    record_coplanar_light(&mut found, (light, face), is_lifted);
+                    record_coplanar_light_with_max_lift(&mut found, (light, face), is_lifted);
                 }
             }
         });
@@ -231,7 +231,7 @@ pub fn light_lifts(scene: &Scene, meshes: &[Arc<MeshTree>], origin: DVec3) -> Ve
 
 /// Adds a light and the surface that it overlaps. If the pair already exists, updates its lift in this
 /// direction to the maximum over all faces. The lift is above the rounding error of both faces.
-fn record_coplanar_light(
+fn record_coplanar_light_with_max_lift(
     found: &mut BTreeMap<(usize, usize), Vec<CoplanarLight>>,
     (light, face): (&FlatFace, &FlatFace),
     is_lifted: bool,

@@ -130,7 +130,7 @@ fn lights_are_compared_only_with_nearby_faces() {
     let lights = EmissiveFaces::new(all.clone()).expect("lights");
     let mut pairs = 0;
     for face in &all {
-        let near: Vec<f64> = lights.near(face, &mut pairs).map(|light| light.point.x).collect();
+        let near: Vec<f64> = lights.lights_near_face(face, &mut pairs).map(|light| light.point.x).collect();
         assert_eq!(near, [face.point.x]);
     }
     assert!(pairs < 3 * all.len(), "{pairs} pairs");

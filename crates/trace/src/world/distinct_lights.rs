@@ -17,7 +17,7 @@ use crate::math::{DVec3, Vec3};
 use crate::scene::description::Scene;
 
 /// For each mesh file, whether any object overrides its materials with an emissive material.
-pub fn mesh_files_with_emissive_override(scene: &Scene) -> Vec<bool> {
+pub fn emissive_override_by_mesh_file(scene: &Scene) -> Vec<bool> {
     let mut emissive = vec![false; scene.mesh_files.len()];
     for object in &scene.objects {
         if let (Some(mesh), Some(own)) = (object.shape.as_mesh(), object.material) {
@@ -103,7 +103,7 @@ fn find_triangle_lifts(
         if pairs > MAX_PAIRS {
             break;
         }
-        for light in lights.near(&other, &mut pairs) {
+        for light in lights.lights_near_face(&other, &mut pairs) {
             // Other instances of the mesh may use the file's materials, in which only some faces emit.
             let is_dark =
                 !is_light || emits_in_file(light.object as u32) && !emits_in_file(other.object as u32);
@@ -128,7 +128,7 @@ fn lift_triangles(mesh: &mut TriangleMesh, lifts: &BTreeMap<usize, DVec3>, heigh
         let corners = mesh.triangles[*triangle].map(|corner| {
             *known.entry((corner, direction)).or_insert_with(|| {
                 let at = mesh.positions[corner as usize].as_dvec3() + *normal * height;
-                append_vertex_copy(mesh, corner as usize, at.as_vec3())
+                append_vertex_copy_at(mesh, corner as usize, at.as_vec3())
             })
         });
         mesh.triangles[*triangle] = corners;
@@ -136,15 +136,15 @@ fn lift_triangles(mesh: &mut TriangleMesh, lifts: &BTreeMap<usize, DVec3>, heigh
 }
 
 /// Adds a copy of a vertex at position `at`.
-fn append_vertex_copy(mesh: &mut TriangleMesh, vertex: usize, at: Vec3) -> u32 {
-    fn push_vertex_copy<T: Copy>(values: &mut Vec<T>, vertex: usize) {
+fn append_vertex_copy_at(mesh: &mut TriangleMesh, vertex: usize, at: Vec3) -> u32 {
+    fn push_attribute_copy<T: Copy>(values: &mut Vec<T>, vertex: usize) {
         values.extend(values.get(vertex).copied());
     }
     mesh.positions.push(at);
-    push_vertex_copy(&mut mesh.normals, vertex);
-    push_vertex_copy(&mut mesh.normal_groups, vertex);
-    push_vertex_copy(&mut mesh.uvs, vertex);
-    push_vertex_copy(&mut mesh.second_uvs, vertex);
-    push_vertex_copy(&mut mesh.colors, vertex);
+    push_attribute_copy(&mut mesh.normals, vertex);
+    push_attribute_copy(&mut mesh.normal_groups, vertex);
+    push_attribute_copy(&mut mesh.uvs, vertex);
+    push_attribute_copy(&mut mesh.second_uvs, vertex);
+    push_attribute_copy(&mut mesh.colors, vertex);
     (mesh.positions.len() - 1) as u32
 }

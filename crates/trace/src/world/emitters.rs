@@ -59,7 +59,11 @@ pub fn build_lights(
                 all.extend(lights.map(Light::Area));
             }
             Object::Mesh(mesh) => {
-                all.extend(mesh_lights(id, mesh, emissive, images, token)?.into_iter().map(Light::Area));
+                all.extend(
+                    mesh_lights_by_material_and_side(id, mesh, emissive, images, token)?
+                        .into_iter()
+                        .map(Light::Area),
+                );
             }
         }
     }
@@ -156,7 +160,7 @@ impl EmissionWithOpacity {
     }
 
     /// Emission factor that varies with position or direction. `chart` maps points on the emitter to UVs.
-    fn texture(&self, chart: UvMapping) -> Option<EmissionModulation> {
+    fn emission_modulation(&self, chart: UvMapping) -> Option<EmissionModulation> {
         let Emission { texture, coat, .. } = &self.emission;
         EmissionModulation::new_with_coat(texture.as_ref(), self.opacity.as_ref(), coat.as_ref(), chart)
     }
@@ -181,7 +185,7 @@ fn area_lights_of_shape(
             (false, Side::Back) => back_area_light(shape, radiance, object)?,
         };
         let light = AreaLight { bounds: emissive.scale_light_bounds_by_texture_means(light.bounds), ..light };
-        Some(match emissive.texture(UvMapping::Shape(shape.clone())) {
+        Some(match emissive.emission_modulation(UvMapping::Shape(shape.clone())) {
             Some(texture) => light.with_texture(texture),
             None => light,
         })
@@ -190,7 +194,7 @@ fn area_lights_of_shape(
 }
 
 /// Creates the lights for a mesh. If `emissive` is `None`, the triangles use the mesh file's materials.
-fn mesh_lights(
+fn mesh_lights_by_material_and_side(
     object: u32,
     mesh: &MeshInstance,
     emissive: Option<&EmissionWithOpacity>,
@@ -241,7 +245,7 @@ fn mesh_lights(
                 };
                 UvMapping::Triangles(triangles_with_material(mesh, own).map(patch).collect())
             };
-            let texture = if emissive.has_varying_emission() { emissive.texture(patches()).map(Box::new) } else { None };
+            let texture = if emissive.has_varying_emission() { emissive.emission_modulation(patches()).map(Box::new) } else { None };
             let (shape, part) = (Emitter::Mesh(emitter), EmittingTriangleSelection::Listed);
             Ok(Some(AreaLight { shape, side, radiance, texture, object, part, bounds }))
         };
@@ -288,8 +292,14 @@ mod tests {
             let transform = Transform::scale_rotate_translate(scale, turned, at);
             let mesh = MeshInstance::new(Arc::clone(&tree), transform, false);
             let emissive = EmissionWithOpacity::new(Emission::from_constant(Vec3::ONE), None);
-            let lights = mesh_lights(0, &mesh, Some(&emissive), &Images::default(), &CancelToken::new())
-                .expect("never canceled");
+            let lights = mesh_lights_by_material_and_side(
+                0,
+                &mesh,
+                Some(&emissive),
+                &Images::default(),
+                &CancelToken::new(),
+            )
+            .expect("never canceled");
             let lights = lights.into_iter().map(Light::Area).collect();
             let lights = Arc::new(Lights::new(lights, &CancelToken::new()).expect("never canceled"));
             let geometry = Geometry::build(vec![Object::Mesh(Box::new(mesh))], &token);

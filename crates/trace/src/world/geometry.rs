@@ -6,7 +6,7 @@ use crate::accel::{Bvh, InstructionSet, SphericalShell};
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::{Aabb, Ray, Shape, ShapeHit, SurfacePoint, SurfaceRequest};
 use crate::lights::LightGeometry;
-use crate::math::color::srgb8_to_linear;
+use crate::math::color::srgb8_color_to_linear;
 use crate::math::{DVec3, Vec2, Vec3};
 use crate::scene::description::{self, LoweredShape, Scene};
 
@@ -223,7 +223,7 @@ impl Geometry {
         self.closest_hit_with_unbounded(self.traced_tree(), ray, |id, segment| {
             match self.merged_meshes_if_represented_by(id) {
                 Some(merged) => {
-                    let shape = merged.closest_hit(segment)?;
+                    let shape = merged.closest_merged_triangle_hit(segment)?;
                     let MergedTriangle { object, primitive } = merged.triangle(shape.primitive);
                     Some(Hit { shape: ShapeHit { primitive, ..shape }, object })
                 }
@@ -338,7 +338,7 @@ impl Geometry {
     pub fn vertex_color(&self, hit: &Hit) -> Option<Vec3> {
         let mesh = &self.objects[hit.object as usize].mesh()?.tree.loaded().mesh;
         let corners = mesh.triangles.get(hit.shape.primitive as usize)?;
-        let color = |vertex: u32| mesh.colors.get(vertex as usize).map(|color| srgb8_to_linear(*color));
+        let color = |vertex: u32| mesh.colors.get(vertex as usize).map(|color| srgb8_color_to_linear(*color));
         let [a, b, c] = corners.map(color);
         let (u, v) = (hit.shape.u, hit.shape.v);
         Some(a? * (1.0 - u - v) + b? * u + c? * v)

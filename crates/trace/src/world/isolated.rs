@@ -117,7 +117,7 @@ impl Geometry {
     pub(super) fn is_hit_isolated(&self, hit: &Hit, surface: &SurfacePoint, margin: Vec3) -> bool {
         let object = &self.objects()[hit.object as usize];
         let table = self.isolation_cache().tables[hit.object as usize]
-            .get_or_init(|| self.new_isolation_table(object));
+            .get_or_init(|| self.new_object_isolation_cache(object));
         if !(margin.max_element() <= table.margin) {
             return false;
         }
@@ -146,7 +146,7 @@ impl Geometry {
 
     /// Creates an object's table. The margin covers rays from up to four scene sizes away. Longer rays have
     /// larger margins and do not use the table.
-    fn new_isolation_table(&self, object: &Object) -> ObjectIsolationCache {
+    fn new_object_isolation_cache(&self, object: &Object) -> ObjectIsolationCache {
         let of_rays = self.max_mesh_rounding_error() + 8.0 * f32::EPSILON * self.isolation_cache().reach;
         match object {
             Object::Mesh(mesh) => {
@@ -203,7 +203,7 @@ impl Geometry {
             Object::Shape(shape) => shape_may_overlap_region(shape, around, region),
             Object::Mesh(mesh) => {
                 let is_far = |other: u32| !region.is_triangle_near(mesh.world_corners(other), around);
-                !mesh.tree.triangle_tree().visit_triangles_in_box_while(&mesh.box_to_local(around), is_far)
+                !mesh.tree.triangle_tree().all_triangles_in_box_satisfy(&mesh.box_to_local(around), is_far)
             }
         };
         let is_near = |id: u32| id != own && is_near(id);
@@ -226,7 +226,7 @@ impl Geometry {
 /// coordinates. This is checked first because most nearby triangles are neighbors in the same mesh.
 fn is_apart_from_own_mesh(mesh: &MeshInstance, triangle: u32, part: [DVec3; 3], apart: f64) -> bool {
     let around = Aabb::from_points_f64(part).expanded(Vec3::splat((1.1 * apart) as f32));
-    mesh.tree.triangle_tree().visit_triangles_in_box_while(&around, |other| {
+    mesh.tree.triangle_tree().all_triangles_in_box_satisfy(&around, |other| {
         other == triangle || are_triangles_apart(part, mesh.local_corners(other), apart)
     })
 }

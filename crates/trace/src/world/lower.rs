@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::textures::{
     AlphaCutoffKey, FILE_NUMBER, TextureSource, color_or_cutout_interpretation, coverage_cutoff,
-    image_file_and_encoding, material_texture_source, opacity_pixel_interpretation,
+    image_file_and_encoding, opacity_pixel_interpretation, scene_material_texture_source,
 };
 use super::{Image, Images};
 use crate::assets::{FileMaterial, FileMaterialKind, FileTexture, PhysicalMaterial};
@@ -25,9 +25,9 @@ use crate::scene::description::{
 
 /// Converts a material from the scene file.
 pub fn lower_material(scene: &Scene, images: &Images, material: &description::Material) -> Material {
-    let of = SceneTextureLookup { scene, images, material };
+    let of = MaterialParameterConverter { scene, images, material };
     let color = |source: &ColorSource| of.lower_color(source);
-    let number = |source: &NumberSource| of.number(source, TextureRole::Roughness);
+    let number = |source: &NumberSource| of.lower_number(source, TextureRole::Roughness);
     let bsdf = match &material.kind {
         MaterialKind::Phong { diffuse, specular, shininess, ambient } => {
             Bsdf::NonSpecular(NonSpecular::Phong(Phong {
@@ -78,7 +78,7 @@ pub fn lower_material(scene: &Scene, images: &Images, material: &description::Ma
         strength: map.strength,
     });
     let bump = material.bump.map(|bump| Bump {
-        texture: of.texture(bump.texture, TextureRole::Bump(bump.height_channel())),
+        texture: of.texture(bump.texture, TextureRole::Bump(bump.height_channel_selector())),
         scale: bump.scale,
     });
     let normal_perturbation = NormalPerturbation::new(normal_map, bump);
@@ -94,7 +94,7 @@ pub fn lower_opacity(scene: &Scene, images: &Images, material: &description::Mat
     let (value, cutoff) = match source.texture_index_and_channel() {
         None => (ScalarParameter::Constant(source.value.as_constant()?), source.cutoff),
         Some((index, number)) => {
-            let of = SceneTextureLookup { scene, images, material };
+            let of = MaterialParameterConverter { scene, images, material };
             let texture = of.texture(index, TextureRole::Opacity(number));
             // If mip levels preserve coverage, the cutoff already includes the factor.
             let coverage = coverage_cutoff(scene, index, source.cutoff);
@@ -136,9 +136,9 @@ fn lower_fresnel(source: &FresnelSource, color: impl Fn(&ColorSource) -> ColorOr
 
 /// Emission of a material from the scene file.
 pub fn lower_emission(scene: &Scene, images: &Images, material: &description::Material) -> Emission {
-    let (emission, of) = (&material.emission, SceneTextureLookup { scene, images, material });
-    let coat = material.emitter_coat_parameters().and_then(|numbers| {
-        let [weight, roughness] = numbers.map(|number| of.number(&number, TextureRole::EmissionCoat));
+    let (emission, of) = (&material.emission, MaterialParameterConverter { scene, images, material });
+    let coat = material.emitter_coat_weight_and_roughness().and_then(|numbers| {
+        let [weight, roughness] = numbers.map(|number| of.lower_number(&number, TextureRole::EmissionCoat));
         EmissionCoat::new(weight, roughness).map(Arc::new)
     });
     let texture = emission.texture.map(|index| of.texture(index, TextureRole::Emission));
@@ -194,17 +194,17 @@ pub fn lower_file_material(images: &Images, own: &FileMaterial) -> Material {
             Bsdf::Dielectric(Dielectric::new(ior, tint).with_roughness(ScalarParameter::Constant(roughness)))
         }
         (FileMaterialKind::Principled(physical), _) => {
-            return non_specular_file_material(images, own, file_principled(images, own, physical));
+            return file_material_from_non_specular(images, own, file_principled(images, own, physical));
         }
         (FileMaterialKind::Phong | FileMaterialKind::Glass, _) => {
-            return non_specular_file_material(images, own, file_phong(images, own));
+            return file_material_from_non_specular(images, own, file_phong(images, own));
         }
     };
     Material { bsdf, emission: Emission::NONE, normal_perturbation: None, opacity: file_opacity(images, own) }
 }
 
 /// Non-specular material from a mesh file, including its emission and normal map.
-fn non_specular_file_material(images: &Images, own: &FileMaterial, rough: NonSpecular) -> Material {
+fn file_material_from_non_specular(images: &Images, own: &FileMaterial, rough: NonSpecular) -> Material {
     let normals = own.normal_texture.as_ref().and_then(|texture| {
         let texture = file_texture(images, texture, PixelInterpretation::Normal)?;
         Some(NormalMap { texture, strength: own.normal_strength })
@@ -306,13 +306,13 @@ pub fn fallback_material() -> Material {
 
 /// Converts the colors, numbers and textures of a material from the scene file.
 #[derive(Clone, Copy)]
-struct SceneTextureLookup<'a> {
+struct MaterialParameterConverter<'a> {
     scene: &'a Scene,
     images: &'a Images,
     material: &'a description::Material,
 }
 
-impl SceneTextureLookup<'_> {
+impl MaterialParameterConverter<'_> {
     fn lower_color(self, source: &ColorSource) -> ColorOrTexture {
         match source {
             ColorSource::Constant(color) => ColorOrTexture::Constant(*color),
@@ -323,7 +323,11 @@ impl SceneTextureLookup<'_> {
 
     /// Converts a number to a scalar parameter, which uses the texture's luminance if the scene does not
     /// specify a channel.
-    fn number(self, source: &NumberSource, role: fn(ChannelSelector) -> TextureRole) -> ScalarParameter {
+    fn lower_number(
+        self,
+        source: &NumberSource,
+        role: fn(ChannelSelector) -> TextureRole,
+    ) -> ScalarParameter {
         match (source.as_constant(), source.texture_index_and_channel(ChannelSelector::Luminance)) {
             (Some(number), _) => ScalarParameter::Constant(number),
             (None, Some((texture, number))) => ScalarParameter::Texture(self.texture(texture, role(number))),
@@ -335,8 +339,10 @@ impl SceneTextureLookup<'_> {
         let Self { scene, images, material } = self;
         let declared = &scene.textures[index];
         let &description::Texture { filter, wrap, repeat, rotate, offset, uv, factor, .. } = declared;
-        let Image { texels, mipmaps } =
-            loaded_image_or_placeholder(images, &material_texture_source(scene, material, (index, role)));
+        let Image { texels, mipmaps } = loaded_image_or_placeholder(
+            images,
+            &scene_material_texture_source(scene, material, (index, role)),
+        );
         let mipmaps = match filter {
             TextureFilter::Nearest | TextureFilter::Bilinear => None,
             TextureFilter::Mipmap => mipmaps,

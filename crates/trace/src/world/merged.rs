@@ -157,7 +157,7 @@ impl MergedMeshes {
     }
 
     /// Returns the nearest hit. The hit's primitive is a triangle index into the tree.
-    pub fn closest_hit(&self, ray: &Ray) -> Option<ShapeHit> {
+    pub fn closest_merged_triangle_hit(&self, ray: &Ray) -> Option<ShapeHit> {
         self.tree.closest_hit(ray)
     }
 
@@ -502,7 +502,7 @@ pub(super) mod tests {
     }
 
     /// Large triangles, each with a small part near the origin.
-    fn fans() -> Arc<MeshTree> {
+    fn mesh_of_large_triangles() -> Arc<MeshTree> {
         let mut next = random(7);
         let mut vector = |scale: f32| Vec3::new(next(), next(), next()) * scale;
         let mut mesh = TriangleMesh::default();
@@ -517,7 +517,7 @@ pub(super) mod tests {
 
     #[test]
     fn rays_do_not_hit_their_starting_triangle() {
-        let tree = fans();
+        let tree = mesh_of_large_triangles();
         let turned = |degrees: DVec3, at: DVec3| {
             Transform::scale_rotate_translate(DVec3::new(1.0, 3.0, 0.7), degrees, at)
         };

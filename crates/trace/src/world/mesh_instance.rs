@@ -128,7 +128,7 @@ impl MeshInstance {
 
     /// Vertex UVs in one of the UV sets. Falls back to the first set if there is no second set.
     #[inline(always)]
-    pub(super) fn uvs_in_set(&self, set: UvSet) -> &[Vec2] {
+    pub(super) fn vertex_uvs_of_set(&self, set: UvSet) -> &[Vec2] {
         let mesh = &self.tree.loaded().mesh;
         match set {
             UvSet::Second if !mesh.second_uvs.is_empty() => &mesh.second_uvs,
@@ -138,7 +138,7 @@ impl MeshInstance {
 
     /// UVs of a triangle's corners, in the order of [`MeshInstance::world_corners`].
     pub fn corner_uvs(&self, triangle: u32) -> [Vec2; 3] {
-        self.values_in_corner_order(triangle, self.uvs_in_set(UvSet::First)).unwrap_or([
+        self.values_in_corner_order(triangle, self.vertex_uvs_of_set(UvSet::First)).unwrap_or([
             Vec2::ZERO,
             Vec2::X,
             Vec2::Y,

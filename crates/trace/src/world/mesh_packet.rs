@@ -80,7 +80,7 @@ impl MeshInstance {
             surface.copy_shading_normals_from(of, &found);
         }
         if let Some(set) = asked_uvs {
-            let all = self.uvs_in_set(set);
+            let all = self.vertex_uvs_of_set(set);
             for i in 0..PACKET_SIZE {
                 let uvs = match all {
                     [] => [Vec2::ZERO, Vec2::X, Vec2::Y],

@@ -39,7 +39,7 @@ pub use contact::{
     CoincidenceQuery, CoincidenceScratch, CoincidentOrEnclosingSurface, MAX_INTERIORS, OffsetPoints,
 };
 pub use coplanar::{CoplanarLight, coplanar_lights, light_lifts};
-pub use distinct_lights::{mesh_files_with_emissive_override, separate_coincident_emitters};
+pub use distinct_lights::{emissive_override_by_mesh_file, separate_coincident_emitters};
 pub use emitters::{build_environment_map, build_lights, scene_photon_emitter};
 pub use geometry::{Geometry, Hit};
 pub use glass_solids::{GlassSolids, OpenGlass};
@@ -52,9 +52,9 @@ pub use origin::choose_origin_near_camera_target;
 pub use packet_material::PacketMaterial;
 pub use textures::{
     AlphaCutoffKey, NeededTexture, NeededTextureRoles, TextureSource, environment_source,
-    material_texture_source, textures_needed,
+    scene_material_texture_source, textures_needed,
 };
-pub use unlit_glass::LightBoundingBoxPair;
+pub use unlit_glass::LightSphereAndObjectBounds;
 
 use crate::assets::GkitOrbiterCamera;
 use crate::geometry::SurfacePoint;
@@ -125,7 +125,7 @@ pub struct World {
     /// Closed glass shapes that may contain points on the lens, with their materials.
     lens_glass: Vec<(u32, u32)>,
     /// Relevant enclosing glass shapes in each subtree of nested objects, or empty if few objects are nested.
-    enclosing_glass: Box<[contact::SubtreeClosedGlassIds]>,
+    enclosing_glass: Box<[contact::LastClosedGlassIdsInSubtree]>,
     /// Other glass solids that contain the camera, with their materials.
     camera_solids: Vec<(u32, u32)>,
     /// Whether each material is mipmapped; see [`Material::is_mipmapped`].
@@ -257,7 +257,7 @@ impl World {
     /// Whether an object's texture axes are well defined or irrelevant: the object has UVs, or no lobes
     /// depend on the axes.
     #[inline]
-    pub fn has_usable_texture_axes(&self, object: u32) -> bool {
+    pub fn has_texture_axes_if_needed(&self, object: u32) -> bool {
         if !self.has_directions {
             return true;
         }

@@ -48,7 +48,7 @@ impl Object {
         match self {
             Self::Shape(shape) => shape.intersect_packet(rows, met, ends, found, simd),
             Self::Mesh(mesh) if mesh.is_small() => {
-                mesh.closest_hit_without_tree(rows, met, ends, found, simd);
+                mesh.closest_hit_packet_without_tree(rows, met, ends, found, simd);
             }
             Self::Mesh(mesh) => mesh.closest_hit_packet(rows, met, ends, found),
         }
@@ -68,7 +68,7 @@ impl Object {
         let shape = match self {
             Self::Shape(shape) => shape,
             Self::Mesh(mesh) if mesh.is_small() => {
-                return mesh.any_hit_without_tree(rows, met, ends, except, simd);
+                return mesh.any_hit_packet_without_tree(rows, met, ends, except, simd);
             }
             Self::Mesh(mesh) => return mesh.any_hit_packet(rows, met, ends, except),
         };

@@ -58,7 +58,7 @@ impl Geometry {
 impl Geometry {
     /// Mask of rays whose light is an entire merged mesh.
     #[inline(always)]
-    pub(super) fn merged_mesh_light_ray_mask(&self, sources: &LightGeometryPacket) -> u32 {
+    pub(super) fn entire_merged_mesh_light_mask(&self, sources: &LightGeometryPacket) -> u32 {
         if !sources.is_any || !self.has_merged_meshes() {
             return 0;
         }
@@ -123,7 +123,9 @@ impl SimdKernel for OcclusionKernel<'_> {
     #[inline(always)]
     fn run(self, simd: impl Simd) -> u32 {
         let Self { geometry, rows, ends, traced, sources } = self;
-        if geometry.traced_tree().has_shells() || traced & geometry.merged_mesh_light_ray_mask(sources) != 0 {
+        if geometry.traced_tree().has_shells()
+            || traced & geometry.entire_merged_mesh_light_mask(sources) != 0
+        {
             return geometry.occluded_one_by_one(rows, ends, traced, sources);
         }
         let mut occluders = OcclusionCallback::new(geometry, rows, sources, simd);
@@ -376,13 +378,13 @@ pub(super) mod tests {
         assert_packets(&geometry);
     }
 
-    struct Occluded<'a> {
+    struct OccludedRayPacketKernel<'a> {
         geometry: &'a Geometry,
         rays: &'a [Ray],
         sources: &'a LightGeometryPacket,
     }
 
-    impl SimdKernel for Occluded<'_> {
+    impl SimdKernel for OccludedRayPacketKernel<'_> {
         type Output = u32;
 
         #[inline(always)]
@@ -428,7 +430,11 @@ pub(super) mod tests {
             let sources: Vec<_> = (0..rays.len()).map(source).collect();
             let mut row = LightGeometryPacket::splat(LightGeometry::Nothing);
             sources.iter().enumerate().for_each(|(lane, source)| row.set_geometry(lane, *source));
-            let occluded = geometry.instruction_set().run(Occluded { geometry, rays: &rays, sources: &row });
+            let occluded = geometry.instruction_set().run(OccludedRayPacketKernel {
+                geometry,
+                rays: &rays,
+                sources: &row,
+            });
             for (lane, (ray, source)) in rays.iter().zip(&sources).enumerate() {
                 assert_eq!(
                     occluded & 1 << lane != 0,

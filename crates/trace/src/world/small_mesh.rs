@@ -19,7 +19,7 @@ impl MeshInstance {
 
     /// Finds the nearest hits of the rays in `met`. Other lanes have negative `ends`.
     #[inline(always)]
-    pub(super) fn closest_hit_without_tree(
+    pub(super) fn closest_hit_packet_without_tree(
         &self,
         rows: &RayPacket,
         met: u32,
@@ -37,7 +37,7 @@ impl MeshInstance {
     /// Returns the mask of rays in `met` that hit any triangle other than the ignored triangle. Other lanes
     /// have negative `ends`.
     #[inline(always)]
-    pub(super) fn any_hit_without_tree(
+    pub(super) fn any_hit_packet_without_tree(
         &self,
         rows: &RayPacket,
         met: u32,

@@ -163,12 +163,12 @@ pub fn textures_needed(
             known.normals_of = known.normals_of.take().or(texture.normals_of);
         }
     };
-    let (used_materials, own_materials) = used_material_flags(scene);
+    let (used_materials, own_materials) = used_material_and_mesh_file_flags(scene);
     for (material, _) in scene.materials.iter().zip(used_materials).filter(|(_, used)| *used) {
         let (textures, is_delta) = (material.textures().into_iter(), material.kind.has_delta_lobe());
         for (texture, role) in textures.filter(|(_, role)| lookups.includes_role(*role, is_delta)) {
             add(NeededTexture {
-                source: material_texture_source(scene, material, (texture, role)),
+                source: scene_material_texture_source(scene, material, (texture, role)),
                 name: scene.textures[texture].name.clone(),
                 declared: Some(texture),
                 mesh_file: None,
@@ -181,7 +181,8 @@ pub fn textures_needed(
         }
     }
     for (file, mesh) in meshes.iter().enumerate().filter(|(file, _)| own_materials[*file]) {
-        let of_material = |own| file_textures(own, lookups).map(move |texture| (own, texture));
+        let of_material =
+            |own| needed_textures_of_file_material(own, lookups).map(move |texture| (own, texture));
         for (own, (texture, used)) in mesh.materials.iter().flat_map(of_material) {
             let path = &texture.path;
             let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
@@ -228,7 +229,7 @@ fn environment_texture_source(file: &Path) -> TextureSource {
 
 /// Which of the scene's materials are used by objects, and which mesh files' materials are used by mesh
 /// instances.
-fn used_material_flags(scene: &Scene) -> (Vec<bool>, Vec<bool>) {
+fn used_material_and_mesh_file_flags(scene: &Scene) -> (Vec<bool>, Vec<bool>) {
     let (mut materials, mut files) =
         (vec![false; scene.materials.len()], vec![false; scene.mesh_files.len()]);
     for object in &scene.objects {
@@ -242,7 +243,7 @@ fn used_material_flags(scene: &Scene) -> (Vec<bool>, Vec<bool>) {
 }
 
 /// Image file and encoding for a scene material's texture in this role.
-pub fn material_texture_source(
+pub fn scene_material_texture_source(
     scene: &Scene,
     material: &Material,
     (texture, role): (usize, TextureRole),
@@ -379,7 +380,7 @@ pub fn opacity_pixel_interpretation(own: &FileMaterial, opacity: &FileTexture) -
     PixelInterpretation::Number(number)
 }
 
-fn file_textures(
+fn needed_textures_of_file_material(
     own: &FileMaterial,
     lookups: NeededTextureRoles,
 ) -> impl Iterator<Item = (&FileTexture, PixelInterpretation)> {

@@ -86,7 +86,7 @@ impl TriangleTree {
 
     /// Like [`TriangleTree::visit_triangles_in_box`], but stops when `visit` returns false. Returns whether
     /// all triangles were visited.
-    pub fn visit_triangles_in_box_while(&self, bounds: &Aabb, visit: impl FnMut(u32) -> bool) -> bool {
+    pub fn all_triangles_in_box_satisfy(&self, bounds: &Aabb, visit: impl FnMut(u32) -> bool) -> bool {
         match self {
             Self::Boxes(tree) => tree.visit_overlapping_while(bounds, visit),
             Self::Planes(tree) => tree.visit_overlapping_while(bounds, visit),

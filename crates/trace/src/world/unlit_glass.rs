@@ -10,7 +10,7 @@ const ROUNDING: f32 = 1e-5;
 
 /// Two bounding boxes of the same light, which is inside both of them.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LightBoundingBoxPair {
+pub struct LightSphereAndObjectBounds {
     /// Bounding box of the light's bounding sphere.
     of_ball: Aabb,
     /// Bounding box of the emitting object.
@@ -19,14 +19,14 @@ pub struct LightBoundingBoxPair {
     pub object: Option<u32>,
 }
 
-impl LightBoundingBoxPair {
+impl LightSphereAndObjectBounds {
     /// Whether the light may intersect a box.
     pub fn may_light_intersect_box(&self, bounds: &Aabb) -> bool {
         self.of_ball.overlaps(bounds) && self.of_object.is_none_or(|own| own.overlaps(bounds))
     }
 
     /// Center and corners of the smaller box.
-    pub fn smaller_box_points(&self) -> impl Iterator<Item = Vec3> {
+    pub fn smaller_box_center_and_corners(&self) -> impl Iterator<Item = Vec3> {
         let own = self.of_object.unwrap_or(self.of_ball);
         let corner = move |i: usize| {
             let pick = |axis: usize| if i & (1 << axis) == 0 { own.min[axis] } else { own.max[axis] };
@@ -65,16 +65,16 @@ impl World {
     }
 
     /// Bounding boxes of all finite lights, with a margin for rounding.
-    pub fn finite_light_boxes(&self) -> Vec<LightBoundingBoxPair> {
+    pub fn finite_light_boxes(&self) -> Vec<LightSphereAndObjectBounds> {
         let boxes = self.lights.iter().filter_map(|(_, light)| {
-            let bounds = light.bounds().filter(|_| !light.is_infinite())?;
+            let bounds = light.bounds_if_emissive().filter(|_| !light.is_infinite())?;
             let (center, radius) = (bounds.center.as_vec3(), bounds.radius as f32);
             let room = ROUNDING * (radius + center.abs().max_element());
             let around = Vec3::splat(radius + room);
             let of_ball = Aabb::from_points([center - around, center + around]);
             let object = light.as_area().map(|area| area.object);
             let bounds = object.and_then(|object| self.geometry.objects()[object as usize].bounds());
-            Some(LightBoundingBoxPair {
+            Some(LightSphereAndObjectBounds {
                 of_ball,
                 of_object: bounds.map(|own| own.expanded(Vec3::splat(room))),
                 object,

@@ -5,9 +5,9 @@ use std::cell::RefCell;
 use super::bayer::bayer_threshold;
 use super::oklab::linear_to_oklab;
 use super::palette::{self, AnsiColors};
-use super::recipes::{DitherColor, DitherRecipeCache};
+use super::recipes::{DitherRecipeCache, SolidOrPatternColor};
 use super::{ColorDepth, NAMES};
-use crate::math::color::srgb8_to_linear;
+use crate::math::color::srgb8_color_to_linear;
 use crate::mosaic::{BlockPattern, FittedCell};
 use ratatui::style::Color;
 
@@ -57,15 +57,18 @@ impl ColorMapper {
             ColorDepth::Indexed256 => {
                 let inks = (palette::FIRST_FIXED..=u8::MAX)
                     .filter_map(palette::fixed_palette_color)
-                    .map(DitherColor::solid);
+                    .map(SolidOrPatternColor::solid);
                 shades.plain = RefCell::new(DitherRecipeCache::new(inks.collect(), CALM_256));
             }
             ColorDepth::Ansi16 => {
-                let inks: Vec<DitherColor> = ansi.iter().copied().map(DitherColor::solid).collect();
+                let inks: Vec<SolidOrPatternColor> =
+                    ansi.iter().copied().map(SolidOrPatternColor::solid).collect();
                 shades.pairs = ansi_color_mixes(&inks);
                 let mixed = shades.pairs.iter().map(|pair| {
                     let [front, back] = pair.colors.map(|color| &inks[color]);
-                    pair.level.map_or(*front, |level| DitherColor::from_pattern(front, back, LEVELS[level]))
+                    pair.level.map_or(*front, |level| {
+                        SolidOrPatternColor::from_two_color_pattern(front, back, LEVELS[level])
+                    })
                 });
                 shades.mixed = RefCell::new(DitherRecipeCache::new(mixed.collect(), CALM_16));
                 shades.plain = RefCell::new(DitherRecipeCache::new(inks, CALM_EDGES));
@@ -75,7 +78,7 @@ impl ColorMapper {
     }
 
     /// Returns the terminal color to draw for an sRGB color at this pixel position.
-    pub(crate) fn map_color(&self, rgb: [u8; 3], x: usize, y: usize) -> Color {
+    pub(crate) fn dithered_terminal_color(&self, rgb: [u8; 3], x: usize, y: usize) -> Color {
         let index = || self.plain.borrow_mut().select_color_index(rgb, bayer_threshold(x, y));
         match self.depth {
             ColorDepth::TrueColor => Color::Rgb(rgb[0], rgb[1], rgb[2]),
@@ -89,12 +92,15 @@ impl ColorMapper {
     pub(crate) fn map_cell(&self, fitted: FittedCell, x: usize, y: usize) -> MappedCell {
         let [first, second] = fitted.pair;
         if self.depth == ColorDepth::Ansi16 {
-            let labs = fitted.pair.map(|rgb| linear_to_oklab(srgb8_to_linear(rgb)));
+            let labs = fitted.pair.map(|rgb| linear_to_oklab(srgb8_color_to_linear(rgb)));
             if labs[0].distance_squared(labs[1]) < EDGE {
                 return self.dithered_cell(pattern_weighted_mean_color(first, second, fitted.tile), x, y);
             }
         }
-        let pair = [self.map_color(first, x, 2 * y), self.map_color(second, x, 2 * y + 1)];
+        let pair = [
+            self.dithered_terminal_color(first, x, 2 * y),
+            self.dithered_terminal_color(second, x, 2 * y + 1),
+        ];
         MappedCell { tile: fitted.tile, pair }
     }
 
@@ -113,7 +119,7 @@ impl ColorMapper {
 }
 
 /// Returns all single colors, followed by every pair of colors mixed with each shade character.
-fn ansi_color_mixes(inks: &[DitherColor]) -> Vec<AnsiColorMix> {
+fn ansi_color_mixes(inks: &[SolidOrPatternColor]) -> Vec<AnsiColorMix> {
     let alone = (0..inks.len()).map(|color| AnsiColorMix { level: None, colors: [color; 2] });
     let both = (0..inks.len()).flat_map(|a| (0..a).map(move |b| [a, b]));
     let shaded = both
@@ -123,7 +129,7 @@ fn ansi_color_mixes(inks: &[DitherColor]) -> Vec<AnsiColorMix> {
 
 fn pattern_weighted_mean_color(first: [u8; 3], second: [u8; 3], tile: BlockPattern) -> [u8; 3] {
     let [a, b] = tile.part_sizes().map(|size| size as f32);
-    let mixed = (srgb8_to_linear(first) * a + srgb8_to_linear(second) * b) / (a + b);
+    let mixed = (srgb8_color_to_linear(first) * a + srgb8_color_to_linear(second) * b) / (a + b);
     mixed.to_array().map(crate::math::color::linear_to_srgb8)
 }
 

@@ -1,7 +1,7 @@
 //! Dithering with an arbitrary palette.
 
 use super::bayer::bayer_threshold;
-use super::recipes::{DitherColor, DitherRecipeCache};
+use super::recipes::{DitherRecipeCache, SolidOrPatternColor};
 
 /// How strongly dithering favors palette colors close to the target color, for palettes computed from an
 /// image.
@@ -14,7 +14,7 @@ pub(crate) struct PaletteDither(DitherRecipeCache);
 impl PaletteDither {
     /// Creates a ditherer for these colors.
     pub(crate) fn new(colors: &[[u8; 3]]) -> Self {
-        Self(DitherRecipeCache::new(colors.iter().copied().map(DitherColor::solid).collect(), CALM))
+        Self(DitherRecipeCache::new(colors.iter().copied().map(SolidOrPatternColor::solid).collect(), CALM))
     }
 
     /// Returns the index of the palette color to use for `rgb` at this pixel.

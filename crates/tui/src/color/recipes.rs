@@ -9,7 +9,7 @@ use std::collections::HashMap;
 
 use super::oklab::{OklabDerivative, linear_to_oklab};
 use crate::math::Vec3;
-use crate::math::color::srgb8_to_linear;
+use crate::math::color::srgb8_color_to_linear;
 
 /// Number of inks in a dithering recipe.
 pub(super) const PARTS: usize = 16;
@@ -20,23 +20,23 @@ const MAX_RECIPES: usize = 1 << 16;
 
 /// A solid color or a fine pattern of two colors.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct DitherColor {
+pub(super) struct SolidOrPatternColor {
     linear: Vec3,
     lab: Vec3,
     /// Mean squared distance from a pattern's two colors to their mean. Zero for solid colors.
     texture: f32,
 }
 
-impl DitherColor {
+impl SolidOrPatternColor {
     /// Creates an ink with a solid color.
     pub(super) fn solid(rgb: [u8; 3]) -> Self {
-        let linear = srgb8_to_linear(rgb);
+        let linear = srgb8_color_to_linear(rgb);
         Self { linear, lab: linear_to_oklab(linear), texture: 0.0 }
     }
 
     /// Creates an ink from a fine pattern of `front` over `back`. `share` is the fraction of the area covered
     /// by `front`.
-    pub(super) fn from_pattern(front: &Self, back: &Self, share: f32) -> Self {
+    pub(super) fn from_two_color_pattern(front: &Self, back: &Self, share: f32) -> Self {
         /// Texture weight for patterns inside a cell, which are less visible than patterns made of whole
         /// cells.
         const FINENESS: f32 = 0.25;
@@ -51,7 +51,7 @@ impl DitherColor {
 /// Cached dithering recipes for a set of inks.
 #[derive(Debug, Default)]
 pub(super) struct DitherRecipeCache {
-    inks: Vec<DitherColor>,
+    inks: Vec<SolidOrPatternColor>,
     /// Weight given to an ink's distance from the color, relative to the error in the recipe's mean.
     calm: f32,
     recipes: HashMap<[u8; 3], [u16; PARTS]>,
@@ -60,7 +60,7 @@ pub(super) struct DitherRecipeCache {
 impl DitherRecipeCache {
     /// Creates a ditherer for these inks. With `calm` = 0, only the mean matters. Larger values favor inks
     /// near the color.
-    pub(super) fn new(inks: Vec<DitherColor>, calm: f32) -> Self {
+    pub(super) fn new(inks: Vec<SolidOrPatternColor>, calm: f32) -> Self {
         Self { inks, calm, recipes: HashMap::new() }
     }
 
@@ -84,7 +84,7 @@ impl DitherRecipeCache {
     }
 
     fn compute_pattern(&self, rgb: [u8; 3]) -> [u16; PARTS] {
-        let linear = srgb8_to_linear(rgb);
+        let linear = srgb8_color_to_linear(rgb);
         let lab = linear_to_oklab(linear);
         let slope = OklabDerivative::at(linear);
         let mut near: Vec<(f32, usize)> = self
@@ -123,7 +123,7 @@ mod tests {
 
     fn cube() -> DitherRecipeCache {
         DitherRecipeCache::new(
-            (16..=255).filter_map(palette::fixed_palette_color).map(DitherColor::solid).collect(),
+            (16..=255).filter_map(palette::fixed_palette_color).map(SolidOrPatternColor::solid).collect(),
             0.1,
         )
     }
@@ -148,7 +148,7 @@ mod tests {
                 .map(|part| mixer.select_color_index(rgb, (part as f32 + 0.5) / PARTS as f32))
                 .collect();
             let mean = parts.iter().map(|ink| mixer.inks[*ink].linear).sum::<Vec3>() / PARTS as f32;
-            let off = linear_to_oklab(mean).distance(linear_to_oklab(srgb8_to_linear(rgb)));
+            let off = linear_to_oklab(mean).distance(linear_to_oklab(srgb8_color_to_linear(rgb)));
             assert!(off < 0.02, "{rgb:?}: {off}");
         }
     }
@@ -156,7 +156,7 @@ mod tests {
     #[test]
     fn recipe_inks_are_similar() {
         let mut mixer = cube();
-        let lab = linear_to_oklab(srgb8_to_linear([150, 75, 50]));
+        let lab = linear_to_oklab(srgb8_color_to_linear([150, 75, 50]));
         for part in 0..PARTS {
             let ink = mixer.select_color_index([150, 75, 50], (part as f32 + 0.5) / PARTS as f32);
             assert!(mixer.inks[ink].lab.distance(lab) < 0.15);

@@ -40,7 +40,7 @@ impl TestImageTerminal {
     }
 
     /// Number of images shown so far.
-    pub fn shown_image_count(&self) -> usize {
+    pub fn total_shown_image_count(&self) -> usize {
         self.count
     }
 

@@ -46,14 +46,16 @@ impl DeviceControlString {
         match self.kind {
             DcsReplyKind::Name => TerminalId::from_report(&String::from_utf8_lossy(&self.text))
                 .map_or(TerminalReply::Other, TerminalReply::Name),
-            DcsReplyKind::Capability if has_true_color(&self.text) => TerminalReply::TrueColor,
+            DcsReplyKind::Capability if capabilities_include_true_color(&self.text) => {
+                TerminalReply::TrueColor
+            }
             DcsReplyKind::Capability | DcsReplyKind::Other => TerminalReply::Other,
         }
     }
 }
 
 /// Whether the reported capabilities include `RGB` or `Tc`. Their names are hex-encoded.
-fn has_true_color(text: &[u8]) -> bool {
+fn capabilities_include_true_color(text: &[u8]) -> bool {
     let names = text.split(|byte| *byte == b';').filter_map(|item| item.split(|byte| *byte == b'=').next());
     names.into_iter().any(|name| name == b"524742" || name == b"5463")
 }
@@ -120,9 +122,9 @@ mod tests {
 
     #[test]
     fn capabilities_are_found_by_name() {
-        assert!(has_true_color(b"524742=38"));
-        assert!(has_true_color(b"5463"));
-        assert!(!has_true_color(b"544e=787465726d"));
+        assert!(capabilities_include_true_color(b"524742=38"));
+        assert!(capabilities_include_true_color(b"5463"));
+        assert!(!capabilities_include_true_color(b"544e=787465726d"));
         assert_eq!(DeviceControlString::begin(b"+", 0, 'r').parse_reply(), TerminalReply::Other);
     }
 }

@@ -9,7 +9,7 @@ use crossterm::event::KeyCode;
 
 use super::decoded::DecodedInput;
 use super::keys::InputPerformer;
-use super::paste::PasteScanner;
+use super::paste::ActivePaste;
 use crate::event::KeyPress;
 
 const ESCAPE: u8 = 0x1b;
@@ -62,7 +62,7 @@ enum PendingSequence {
     /// Either the rest of a sequence whose escape character was treated as a key press, or separate key
     /// presses.
     Doubtful(Vec<u8>),
-    Paste(PasteScanner),
+    Paste(ActivePaste),
 }
 
 impl Decoder {
@@ -148,7 +148,7 @@ impl Decoder {
             }
             PendingSequence::Doubtful(bytes) => self.continue_ambiguous_sequence(bytes, byte, now),
             PendingSequence::Paste(mut paste) => {
-                if paste.scan_byte(byte, now) {
+                if paste.scan_for_end_marker(byte, now) {
                     self.meaning.found.push(DecodedInput::Paste);
                 } else {
                     self.held = PendingSequence::Paste(paste);
@@ -199,7 +199,7 @@ impl Decoder {
         self.meaning.has_ended = false;
         self.parser.advance(&mut self.meaning, &[byte]);
         if std::mem::take(&mut self.meaning.is_paste) {
-            self.held = PendingSequence::Paste(PasteScanner::new(now));
+            self.held = PendingSequence::Paste(ActivePaste::new(now));
         } else if bytes >= MAX_BYTES {
             self.take_pending_sequence();
         } else if !self.meaning.has_ended {

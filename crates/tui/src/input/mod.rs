@@ -33,7 +33,7 @@ pub(super) fn start_reader(events: &Sender<Event>) -> io::Result<()> {
     let events = events.clone();
     let read = move || {
         let mut decoder = Decoder::default();
-        while let Some(inputs) = read_decoded_input(&mut decoder) {
+        while let Some(inputs) = read_next_input_batch(&mut decoder) {
             for input in inputs {
                 if events.send(input.into()).is_err() {
                     return;
@@ -64,7 +64,7 @@ fn wait_while_input_released() -> bool {
 }
 
 /// Reads and decodes input. Returns an empty list after a timeout, or `None` if the terminal was closed.
-fn read_decoded_input(decoder: &mut Decoder) -> Option<Vec<DecodedInput>> {
+fn read_next_input_batch(decoder: &mut Decoder) -> Option<Vec<DecodedInput>> {
     let mut bytes = [0; 4096];
     let waited = wait_for_input(decoder.deadline());
     if wait_while_input_released() {

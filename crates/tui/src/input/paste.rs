@@ -17,7 +17,7 @@ const END: &[u8] = b"\x1b[201~";
 
 /// A paste in progress.
 #[derive(Debug)]
-pub(super) struct PasteScanner {
+pub(super) struct ActivePaste {
     begin: Instant,
     last: Instant,
     bytes: usize,
@@ -50,7 +50,7 @@ impl ControlSequenceState {
     }
 }
 
-impl PasteScanner {
+impl ActivePaste {
     pub(super) fn new(now: Instant) -> Self {
         Self { begin: now, last: now, bytes: 0, matched: 0, sequence: ControlSequenceState::Outside }
     }
@@ -62,7 +62,7 @@ impl PasteScanner {
     }
 
     /// Processes one byte. Returns true if it completes the end marker.
-    pub(super) fn scan_byte(&mut self, byte: u8, now: Instant) -> bool {
+    pub(super) fn scan_for_end_marker(&mut self, byte: u8, now: Instant) -> bool {
         let sequence = self.sequence.next_state(byte);
         if sequence.is_none() {
             self.last = now;

@@ -3,7 +3,7 @@
 use super::tile::{BlockPattern, CellDivision, CellGrid};
 use crate::color::linear_to_oklab;
 use crate::math::Vec3;
-use crate::math::color::{linear_to_srgb8, srgb8_to_linear};
+use crate::math::color::{linear_to_srgb8, srgb8_color_to_linear};
 
 /// A cell's tile and its two sRGB colors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -23,7 +23,7 @@ pub(crate) fn fit_cell(grid: CellGrid, pixels: &[[u8; 3]]) -> FittedCell {
     if let ([first, second], CellGrid::Halves) = (pixels, grid) {
         return FittedCell { tile: BlockPattern::HALVES, pair: [*first, *second] };
     }
-    let pixels: Vec<Vec3> = pixels.iter().map(|pixel| srgb8_to_linear(*pixel)).collect();
+    let pixels: Vec<Vec3> = pixels.iter().map(|pixel| srgb8_color_to_linear(*pixel)).collect();
     let CellDivision { first, tile } = best_division(grid, &pixels);
     let mean = |is_first: bool| {
         let of_part = (0..pixels.len()).filter(|i| (first >> i & 1 == 1) == is_first);

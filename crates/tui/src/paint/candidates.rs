@@ -2,7 +2,7 @@
 
 use super::cell::TwoColorCell;
 use super::cost_model::RateDistortion;
-use super::terminal_color::{TerminalColor, decimal_digits};
+use super::terminal_color::{TerminalColor, decimal_digit_count};
 use crate::color::nearest_256;
 
 /// Maximum number of candidates for each part, and for filling both parts with one color.
@@ -24,7 +24,7 @@ pub(super) struct CandidateColors {
 
 /// Returns candidate colors for the first of `cells`. Each color also fits as many of the following cells as
 /// possible.
-pub(super) fn color_candidates_for_cell_run(
+pub(super) fn candidate_colors_for_run_start(
     cells: &[Option<TwoColorCell>],
     model: RateDistortion,
 ) -> CandidateColors {
@@ -101,7 +101,7 @@ impl RunColorRange {
     fn color_with_fewest_digits(&self) -> [u8; 3] {
         let mean = self.mean();
         std::array::from_fn(|i| {
-            let fewest = decimal_digits(self.low[i]);
+            let fewest = decimal_digit_count(self.low[i]);
             let most = [9, 99, u8::MAX][fewest as usize - 1];
             mean[i].min(most)
         })
@@ -126,13 +126,13 @@ mod tests {
     #[test]
     fn candidates_cover_many_following_cells() {
         // 21 is within the tolerance of 20, 21 and 22, but not of 24.
-        let found = color_candidates_for_cell_run(&row(&[20, 21, 22, 24]), RateDistortion::EXACT);
+        let found = candidate_colors_for_run_start(&row(&[20, 21, 22, 24]), RateDistortion::EXACT);
         assert_eq!(found.first, [TerminalColor::Rgb([21, 50, 99])]);
         assert_eq!(found.second, [TerminalColor::Rgb([0, 0, 0])], "themes may replace color 16");
         assert_eq!(found.both.len(), 1, "no color fits both halves");
         let grays = [Some(TwoColorCell::uniform(TerminalColor::Rgb([8, 8, 8])))];
         assert_eq!(
-            color_candidates_for_cell_run(&grays, RateDistortion::EXACT).first,
+            candidate_colors_for_run_start(&grays, RateDistortion::EXACT).first,
             [TerminalColor::Rgb([8, 8, 8]), TerminalColor::Palette(232)]
         );
     }
@@ -143,12 +143,12 @@ mod tests {
             Some(TwoColorCell::from_halves([TerminalColor::DefaultBackground, TerminalColor::Palette(3)])),
             None,
         ];
-        let found = color_candidates_for_cell_run(&cells, RateDistortion::MOVING);
+        let found = candidate_colors_for_run_start(&cells, RateDistortion::MOVING);
         assert_eq!(
             (found.first, found.second),
             (vec![TerminalColor::DefaultBackground], vec![TerminalColor::Palette(3)])
         );
-        let found = color_candidates_for_cell_run(&[None], RateDistortion::MOVING);
+        let found = candidate_colors_for_run_start(&[None], RateDistortion::MOVING);
         assert!(found.first.is_empty() && found.both.is_empty());
     }
 }

@@ -163,7 +163,7 @@ impl CellContent {
             TerminalColor::from_ratatui(color, layer)
         };
         let (fg, bg) = (shade(cell.fg, ColorLayer::Foreground), shade(cell.bg, ColorLayer::Background));
-        let (symbol, columns) = printable_symbol(cell.symbol());
+        let (symbol, columns) = printable_symbol_and_width(cell.symbol());
         let harmless = if symbol == " " { Modifier::all() - ON_BLANKS } else { Modifier::empty() };
         let mosaic =
             harmless.contains(cell.modifier).then(|| TwoColorCell::from_symbol(symbol, fg, bg)).flatten();
@@ -189,7 +189,7 @@ impl CellContent {
 }
 
 /// Returns a cell's symbol and its width, or a blank if the symbol would move the cursor or print nothing.
-fn printable_symbol(symbol: &str) -> (&str, u16) {
+fn printable_symbol_and_width(symbol: &str) -> (&str, u16) {
     let columns = symbol.width();
     if columns == 0 || columns > 2 || symbol.chars().any(char::is_control) {
         (" ", 1)

@@ -39,7 +39,7 @@ impl RateDistortion {
     }
 
     /// Returns the error from showing one color instead of another, or infinity if that is not allowed.
-    pub(super) fn color_error(self, shown: TerminalColor, wanted: TerminalColor) -> f32 {
+    pub(super) fn squared_color_error(self, shown: TerminalColor, wanted: TerminalColor) -> f32 {
         if shown == wanted {
             return 0.0;
         }
@@ -59,20 +59,22 @@ mod tests {
     #[test]
     fn error_is_a_bounded_sum_of_squares() {
         let (a, b) = (TerminalColor::Rgb([10, 20, 30]), TerminalColor::Rgb([11, 20, 32]));
-        assert_eq!(RateDistortion::MOVING.color_error(a, b), 5.0);
-        assert_eq!(RateDistortion::EXACT.color_error(a, b), f32::INFINITY);
-        assert_eq!(RateDistortion::EXACT.color_error(a, TerminalColor::Rgb([9, 21, 30])), 2.0);
+        assert_eq!(RateDistortion::MOVING.squared_color_error(a, b), 5.0);
+        assert_eq!(RateDistortion::EXACT.squared_color_error(a, b), f32::INFINITY);
+        assert_eq!(RateDistortion::EXACT.squared_color_error(a, TerminalColor::Rgb([9, 21, 30])), 2.0);
         assert_eq!(
-            RateDistortion::MOVING.color_error(TerminalColor::Palette(16), TerminalColor::Rgb([1, 1, 0])),
+            RateDistortion::MOVING
+                .squared_color_error(TerminalColor::Palette(16), TerminalColor::Rgb([1, 1, 0])),
             2.0
         );
         assert_eq!(
-            RateDistortion::MOVING.color_error(TerminalColor::DefaultBackground, TerminalColor::Palette(0)),
+            RateDistortion::MOVING
+                .squared_color_error(TerminalColor::DefaultBackground, TerminalColor::Palette(0)),
             f32::INFINITY
         );
         assert_eq!(
             RateDistortion::MOVING
-                .color_error(TerminalColor::DefaultBackground, TerminalColor::DefaultBackground),
+                .squared_color_error(TerminalColor::DefaultBackground, TerminalColor::DefaultBackground),
             0.0
         );
     }

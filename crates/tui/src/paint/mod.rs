@@ -65,7 +65,7 @@ pub struct Painter {
     part: Option<RowDrawPhase>,
     strokes: vec::IntoIter<CellRun>,
     /// Drawing progress for each row of the preview.
-    rows: Vec<RowDrawState>,
+    rows: Vec<RowRefreshStatus>,
     aim: u64,
 }
 
@@ -91,7 +91,7 @@ pub struct LinksAndDelayedText {
 
 /// Drawing progress for one row of the preview.
 #[derive(Clone, Copy, Debug, Default)]
-struct RowDrawState {
+struct RowRefreshStatus {
     /// Number of the last target for which the row was drawn.
     aim: u64,
     /// Whether the row on the screen matches its target.
@@ -150,7 +150,7 @@ impl Painter {
             self.screen = None;
         }
         if self.screen.is_none() || self.rows.len() != usize::from(wanted.rows) {
-            self.rows = vec![RowDrawState::default(); usize::from(wanted.rows)];
+            self.rows = vec![RowRefreshStatus::default(); usize::from(wanted.rows)];
         }
         for (y, row) in (0..wanted.rows).zip(&mut self.rows) {
             row.is_done = row.is_done && self.wanted.row_also_satisfies_other(&wanted, y);
@@ -181,12 +181,12 @@ impl Painter {
     /// once the screen matches the target. The caller must write the bytes because later slices build on
     /// them. No other output may move the cursor or change colors between slices.
     pub fn next_slice(&mut self, most_bytes: usize) -> Vec<u8> {
-        self.next_slice_until(most_bytes, || false)
+        self.next_slice_before_deadline(most_bytes, || false)
     }
 
     /// Like [`Painter::next_slice`], but stops early once `is_late` returns true. `is_late` is called before
     /// each row because planning a whole preview would delay the response to a key press too much.
-    pub fn next_slice_until(&mut self, most_bytes: usize, is_late: impl Fn() -> bool) -> Vec<u8> {
+    pub fn next_slice_before_deadline(&mut self, most_bytes: usize, is_late: impl Fn() -> bool) -> Vec<u8> {
         let mut slice = LimitedOutputSlice { bytes: Vec::new(), most: most_bytes };
         if self.wanted.is_empty() {
             return slice.bytes;
@@ -209,8 +209,8 @@ impl Painter {
                 self.strokes.next();
             }
             if let Some(RowDrawPhase::Picture(y)) = self.part {
-                self.memory.record_row_done(y);
-                self.rows[usize::from(y)] = RowDrawState { aim: self.aim, is_done: true };
+                self.memory.mark_row_as_drawn(y);
+                self.rows[usize::from(y)] = RowRefreshStatus { aim: self.aim, is_done: true };
             }
             if !slice.bytes.is_empty() && is_late() {
                 self.part = None;
@@ -262,7 +262,7 @@ impl Painter {
     pub fn invalidate(&mut self) {
         self.screen = None;
         self.memory.invalidate();
-        self.rows.fill(RowDrawState::default());
+        self.rows.fill(RowRefreshStatus::default());
         self.queue_all_draw_steps();
     }
 }

@@ -4,10 +4,10 @@
 //! colors. The cost depends on the pen and the cursor position, so the search keeps the best path for each of
 //! a few pens (Viterbi algorithm with beam search) and traces the path back from the cheapest end.
 
-use super::candidates::{CandidateColors, color_candidates_for_cell_run};
+use super::candidates::{CandidateColors, candidate_colors_for_run_start};
 use super::cell::{ForegroundParts, TwoColorCell};
 use super::cost_model::RateDistortion;
-use super::terminal_color::{ColorLayer, TerminalColor, decimal_digits};
+use super::terminal_color::{ColorLayer, TerminalColor, decimal_digit_count};
 use crate::mosaic::{BlockPattern, PLACES};
 
 /// Number of paths kept per cell.
@@ -79,7 +79,7 @@ impl CursorGap {
             Self::Far => 8,
             Self::Cells(0) => 0,
             Self::Cells(1) => 3,
-            Self::Cells(count) => 3 + decimal_digits(count),
+            Self::Cells(count) => 3 + decimal_digit_count(count),
         }
     }
 
@@ -125,7 +125,7 @@ fn extend_plans(
         (None, _) => 0.0,
         (Some(wanted), Some(shown)) => shown
             .overlapping_colors(wanted)
-            .map(|(shown, wanted, part)| part * model.color_error(shown, wanted))
+            .map(|(shown, wanted, part)| part * model.squared_color_error(shown, wanted))
             .sum(),
         (Some(_), None) => f32::INFINITY,
     };
@@ -146,7 +146,7 @@ fn extend_plans(
     let changes = if leave <= model.byte {
         CandidateColors::default()
     } else {
-        color_candidates_for_cell_run(wanted, model)
+        candidate_colors_for_run_start(wanted, model)
     };
     let changes = CandidateColorChanges::new(&changes, mosaic, model);
     for (parent, path) in last.iter().enumerate() {
@@ -233,7 +233,7 @@ impl CandidateColorChanges {
         let sizes = self.mosaic.tile.part_sizes();
         std::array::from_fn(|part| {
             let share = 2.0 * sizes[part] as f32 / PLACES as f32;
-            share * self.model.color_error(shade, self.mosaic.pair[part])
+            share * self.model.squared_color_error(shade, self.mosaic.pair[part])
         })
     }
 
@@ -500,7 +500,7 @@ mod tests {
                 for (shown, wanted, part) in shown.overlapping_colors(wanted) {
                     // Larger errors in a single channel should be avoided at any cost.
                     let most = if is_exact { 3.0 } else { RateDistortion::MOVING.byte * 120.0 };
-                    prop_assert!(part * model.color_error(shown, wanted) <= most);
+                    prop_assert!(part * model.squared_color_error(shown, wanted) <= most);
                 }
             }
         }

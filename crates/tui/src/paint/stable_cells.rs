@@ -54,8 +54,10 @@ impl FirstPreviewCells {
         }
         match wanted.fidelity {
             Fidelity::First => self.compare_first_previews(wanted),
-            Fidelity::Moving => self.noise = noise_threshold(self.median_difference(wanted, screen)),
-            Fidelity::Following => match self.median_difference(wanted, screen) {
+            Fidelity::Moving => {
+                self.noise = noise_threshold(self.median_difference_from_screen(wanted, screen));
+            }
+            Fidelity::Following => match self.median_difference_from_screen(wanted, screen) {
                 // There is hardly any noise left to hide, so redraw everything.
                 ..=1 => self.steady.fill(false),
                 median => self.noise = noise_threshold(median),
@@ -70,12 +72,13 @@ impl FirstPreviewCells {
         self.newest = places.map(|(x, y)| wanted.preview_cell(x, y)).collect();
         self.noise = u8::MAX;
         for (steady, (first, newest)) in self.steady.iter_mut().zip(self.firsts.iter().zip(&self.newest)) {
-            *steady = first.zip(*newest).is_some_and(|(a, b)| max_channel_difference(a, b) <= ALIKE);
+            *steady =
+                first.zip(*newest).is_some_and(|(a, b)| max_channel_difference_between_cells(a, b) <= ALIKE);
         }
     }
 
     /// Median difference between the target and the stable cells on the screen.
-    fn median_difference(&self, wanted: &TargetScreen, screen: Option<&ScreenModel>) -> usize {
+    fn median_difference_from_screen(&self, wanted: &TargetScreen, screen: Option<&ScreenModel>) -> usize {
         let mut counts = [0_u32; 256];
         let Some(screen) = screen else { return 0 };
         for y in wanted.picture.top()..wanted.picture.bottom() {
@@ -85,7 +88,7 @@ impl FirstPreviewCells {
                     screen.content(CellPosition { x, y }),
                     wanted.preview_cell(x, y),
                 ) {
-                    counts[usize::from(max_channel_difference(*shown, wanted))] += 1;
+                    counts[usize::from(max_channel_difference_between_cells(*shown, wanted))] += 1;
                 }
             }
         }
@@ -109,7 +112,8 @@ impl FirstPreviewCells {
         shown
             .filter(|shown| {
                 self.is_cell_unchanged_by_edit(at)
-                    && (self.noise == u8::MAX || max_channel_difference(*shown, wanted) <= self.noise)
+                    && (self.noise == u8::MAX
+                        || max_channel_difference_between_cells(*shown, wanted) <= self.noise)
             })
             .unwrap_or(wanted)
     }
@@ -134,7 +138,7 @@ impl FirstPreviewCells {
     }
 
     /// Records that a row is complete. Cells that were not redrawn also show the current request.
-    pub(super) fn record_row_done(&mut self, y: u16) {
+    pub(super) fn mark_row_as_drawn(&mut self, y: u16) {
         for x in self.picture.left()..self.picture.right() {
             let index = self.index(CellPosition { x, y });
             if let Some(Some(newest)) = self.newest.get(index)
@@ -157,7 +161,7 @@ fn noise_threshold(median: usize) -> u8 {
 }
 
 /// The largest channel difference between two mosaics, or 255 if their colors cannot be compared.
-fn max_channel_difference(a: TwoColorCell, b: TwoColorCell) -> u8 {
+fn max_channel_difference_between_cells(a: TwoColorCell, b: TwoColorCell) -> u8 {
     let one = |a: TerminalColor, b: TerminalColor| match (a.to_rgb(), b.to_rgb()) {
         _ if a == b => 0,
         (Some(a), Some(b)) => a.iter().zip(b).map(|(a, b)| a.abs_diff(b)).max().unwrap_or(0),

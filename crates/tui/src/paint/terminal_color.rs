@@ -104,14 +104,14 @@ impl TerminalColor {
             Self::DefaultBackground | Self::DefaultForeground | Self::Palette(0..8) => 2,
             // Upper bound for 90 to 97 or 100 to 107, since the layer is not known here.
             Self::Palette(8..16) => 3,
-            Self::Palette(index) => 5 + decimal_digits(index),
-            Self::Rgb(rgb) => 7 + rgb.map(decimal_digits).iter().sum::<u32>(),
+            Self::Palette(index) => 5 + decimal_digit_count(index),
+            Self::Rgb(rgb) => 7 + rgb.map(decimal_digit_count).iter().sum::<u32>(),
         }
     }
 }
 
 /// Number of decimal digits in `number`.
-pub(super) fn decimal_digits(number: u8) -> u32 {
+pub(super) fn decimal_digit_count(number: u8) -> u32 {
     1 + u32::from(number > 9) + u32::from(number > 99)
 }
 

@@ -17,7 +17,7 @@ pub(super) use self::picture::PictureState;
 pub(super) use self::request::{CameraStepStatus, ImageProvenance, KeyOverrides, RequestState, format_stops};
 pub(super) use self::saving::{SavedFilesState, SceneImageProgress, UndisplayedChange, WrittenFile};
 pub(super) use self::selection::{MousePress, PickPurpose, PointerState};
-pub(super) use self::work::{AssetProgressBar, RenderState, WorkState, WorkerActivity};
+pub(super) use self::work::{AssetProgressBar, RenderState, RequestStatus, WorkState};
 use super::color::{AnsiColors, ColorDepth};
 use super::event::WindowSize;
 use super::options::ExternalChange;
@@ -87,11 +87,11 @@ impl State {
         let is_shown = picture.shown.as_ref().is_some_and(|shown| shown.generation == request.generation);
         // While the scene is broken, the last valid one is being rendered.
         let is_at_work = match work.activity {
-            WorkerActivity::Running { .. } => true,
-            WorkerActivity::Waiting | WorkerActivity::Broken => {
-                request.camera.is_some() && self.is_scene_broken()
+            RequestStatus::Running { .. } => true,
+            RequestStatus::Waiting | RequestStatus::Broken => {
+                request.camera.is_some() && self.is_failure_in_scene()
             }
-            WorkerActivity::Done | WorkerActivity::Cancelled => false,
+            RequestStatus::Done | RequestStatus::Cancelled => false,
         };
         let is_newest = request.camera_step.generation == Some(request.generation);
         is_newest && is_at_work && request.preview_size.is_some() && !is_shown
@@ -120,13 +120,13 @@ impl State {
     }
 
     /// Whether the failure, if there is one, is in the scene rather than in the render.
-    fn is_scene_broken(&self) -> bool {
+    fn is_failure_in_scene(&self) -> bool {
         self.overlays.problems.as_ref().is_none_or(|problems| problems.work.is_none())
     }
 
     /// Opens the view list, or restarts its timeout if it is already open.
     pub(super) fn open_view_list(&mut self) {
-        self.overlays.open_view_list(self.now);
+        self.overlays.open_or_extend_view_list(self.now);
         self.dirty = true;
     }
 

@@ -8,7 +8,9 @@ use crate::choice::Choice;
 use crate::math::DVec3;
 use crate::pipeline::FileRead;
 use crate::pipeline::protocol::{MaxPreviewSize, NormalizedRect, ResolvedCamera};
-use crate::pipeline::settings::{CameraOverrides, EffectiveSettings, KeyboardSettings, Overrides, ViewMode};
+use crate::pipeline::settings::{
+    CameraOverrides, EffectiveSettings, KeyboardOverridableSettings, Overrides, ViewMode,
+};
 use crate::scene::description::{Integrator, Pose, ShadowMode};
 use crate::scene::sanitize::escape_invisible_chars;
 use crate::scene::{has_mesh_extension, list_changes};
@@ -111,7 +113,7 @@ impl ImageProvenance {
     /// Determines the origin of an image that a later request reproduced. Usually keeps `self`, because the
     /// later changes had no effect, but returns `later` if a camera moved with keys has since been written to
     /// the scene.
-    pub(crate) fn for_reproduced_image(&self, later: Self) -> Self {
+    pub(crate) fn after_reproduction_by(&self, later: Self) -> Self {
         if self.toggles.camera.has_changes() && !later.toggles.camera.has_changes() {
             return later;
         }
@@ -190,7 +192,7 @@ pub(crate) struct RequestState {
     /// The scene's own exposure in stops.
     pub exposure: Option<f32>,
     /// Other scene settings that keys can change.
-    pub own: Option<KeyboardSettings>,
+    pub own: Option<KeyboardOverridableSettings>,
 }
 
 impl RequestState {
@@ -248,7 +250,7 @@ impl RequestState {
     }
 
     /// Overrides for the scene's own image, or `None` unless keys have changed the displayed image.
-    pub(crate) fn overrides_without_keyboard_changes(&self) -> Option<Box<Overrides>> {
+    pub(crate) fn scene_image_overrides_if_changed(&self) -> Option<Box<Overrides>> {
         (!self.has_no_keyboard_overrides()).then(|| Box::new(self.command_line.clone()))
     }
 
@@ -291,7 +293,7 @@ impl RequestState {
 
     /// Lists camera settings that changed in the scene file after the camera was moved with keys, with their
     /// current values.
-    pub(crate) fn describe_scene_camera_changes(&self) -> Vec<String> {
+    pub(crate) fn scene_camera_edits_since_move(&self) -> Vec<String> {
         let Some((own, moved)) = self.camera.zip(self.viewpoint()) else { return Vec::new() };
         let from = &self.moved_from;
         let of_pose = |key: &str, of: fn(&Pose) -> DVec3| {
@@ -316,7 +318,7 @@ impl RequestState {
     }
 
     /// Describes camera, focus and exposure changes made with keys, which may not be obvious from the image.
-    pub(crate) fn describe_keyboard_changes(&self) -> Vec<String> {
+    pub(crate) fn describe_camera_and_exposure_changes(&self) -> Vec<String> {
         let CameraOverrides { pose, fov, focus } = self.toggles.camera;
         let is_moved = pose.is_some() || fov.is_some();
         let moved = is_moved.then(|| "camera".to_owned());

@@ -8,7 +8,7 @@ use crate::pipeline::protocol::{AssetProgress, RenderProgress, Report, Stage, St
 
 /// The worker's state for the current generation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum WorkerActivity {
+pub(crate) enum RequestStatus {
     /// The worker is processing the request.
     Running { since: Instant },
     /// The request has finished.
@@ -48,7 +48,7 @@ impl AssetProgressBar {
 
 /// Progress and result of the newest request.
 pub(crate) struct WorkState {
-    pub activity: WorkerActivity,
+    pub activity: RequestStatus,
     pub rendering: RenderState,
     pub paused: bool,
     /// Time when the request was paused.
@@ -77,7 +77,7 @@ pub(crate) struct WorkState {
 impl WorkState {
     pub(super) fn new(now: Instant) -> Self {
         Self {
-            activity: WorkerActivity::Running { since: now },
+            activity: RequestStatus::Running { since: now },
             rendering: RenderState::UnderWay,
             paused: false,
             paused_at: None,
@@ -117,19 +117,19 @@ impl WorkState {
     }
 
     pub(crate) fn is_request_running(&self) -> bool {
-        matches!(self.activity, WorkerActivity::Running { .. })
+        matches!(self.activity, RequestStatus::Running { .. })
     }
 
     /// How long the current request has been running, not counting pauses.
     pub(crate) fn running_time(&self, now: Instant) -> Option<Duration> {
         match self.activity {
-            WorkerActivity::Running { since } => {
+            RequestStatus::Running { since } => {
                 Some(self.paused_at.unwrap_or(now).saturating_duration_since(since))
             }
-            WorkerActivity::Done
-            | WorkerActivity::Waiting
-            | WorkerActivity::Broken
-            | WorkerActivity::Cancelled => None,
+            RequestStatus::Done
+            | RequestStatus::Waiting
+            | RequestStatus::Broken
+            | RequestStatus::Cancelled => None,
         }
     }
 
@@ -147,7 +147,7 @@ impl WorkState {
         if paused {
             self.paused_at = Some(now);
         } else if let Some(held) = self.paused_at.take()
-            && let WorkerActivity::Running { since } = &mut self.activity
+            && let RequestStatus::Running { since } = &mut self.activity
         {
             *since += now.saturating_duration_since(held);
         }

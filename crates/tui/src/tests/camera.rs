@@ -103,7 +103,7 @@ fn missing_previews_do_not_block_steps() {
 fn arrows_scroll_open_diagnostics() {
     let mut ui = TestUi::new();
     ui.finish_render(RED);
-    ui.fail_render((0..9).map(|i| diagnostic(Severity::Error, &format!("wrong {i}"))).collect());
+    ui.report_scene_errors((0..9).map(|i| diagnostic(Severity::Error, &format!("wrong {i}"))).collect());
     let down = KeyPress::special(KeyCode::Down);
     assert!(ui.press_key(down).is_empty());
     assert!(ui.state.overlays.diagnostics.scroll > 0);

@@ -6,7 +6,7 @@ use crate::event::{Event, PreviewSendReport};
 use crate::fixtures::*;
 use crate::messages;
 use crate::pipeline::protocol::{
-    self, CameraSaveResult, LastValidSceneRenderOutcome, PreviewImageState, Stage, Status,
+    self, CameraSaveResult, LastValidSceneRenderOutcome, PreviewSourceImage, Stage, Status,
 };
 use crate::pipeline::settings::EffectiveSettings;
 use crate::scene::diagnostic::{Diagnostic, Severity};
@@ -17,14 +17,14 @@ const GREEN: [u8; 3] = [10, 200, 20];
 /// Saves a scene that contains an error.
 fn save_broken_scene(ui: &mut TestUi) {
     ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
-    ui.fail_render(vec![diagnostic(Severity::Error, "unknown key `radus`")]);
+    ui.report_scene_errors(vec![diagnostic(Severity::Error, "unknown key `radus`")]);
     ui.handle_event(Event::Settled);
 }
 
 /// Sends a preview of a finished or unfinished image.
 fn preview(ui: &mut TestUi, name: &str, color: [u8; 3], is_finished: bool) {
     let generation = ui.state.request.generation;
-    let source = Some(PreviewImageState { image: FingerprintHasher::new(name).finish(), is_finished });
+    let source = Some(PreviewSourceImage { image: FingerprintHasher::new(name).finish(), is_finished });
     let picture = uniform_picture(50, 38, color);
     let (range, section, lacks_photons) = (None, None, false);
     ui.handle_event(Event::Picture { generation, picture, range, section, lacks_photons, source });
@@ -240,7 +240,7 @@ fn render_of_last_valid_scene_is_numbered() {
     assert_eq!((ui.state.picture.history.len(), ui.state.work.renders), (1, 1));
     for (run, name, words) in [(2, "hard", "shadows"), (3, "off", "shadows off")] {
         ui.press_character('s');
-        ui.fail_render(vec![diagnostic(Severity::Error, "unknown key `radus`")]);
+        ui.report_scene_errors(vec![diagnostic(Severity::Error, "unknown key `radus`")]);
         for is_finished in [false, true] {
             show_preview(&mut ui, name, [7, run, u8::from(is_finished)], is_finished);
             assert!(ui.screen_text().contains(&format!("▸{run} {words}")), "{}", ui.screen_text());
@@ -400,7 +400,7 @@ fn creating_a_model_scene_cannot_be_undone() {
 fn unreadable_scene_has_no_save_hint() {
     let mut ui = TestUi::new();
     let folder = Diagnostic { place: None, ..diagnostic(Severity::Error, "a folder") };
-    ui.fail_render(vec![folder]);
+    ui.report_scene_errors(vec![folder]);
     assert!(!ui.screen_text().contains("save "), "{}", ui.screen_text());
     ui.handle_event(Event::Settled);
     assert!(
@@ -409,7 +409,7 @@ fn unreadable_scene_has_no_save_hint() {
         ui.screen_text()
     );
     let mut ui = TestUi::new();
-    ui.fail_render(vec![diagnostic(Severity::Error, "unknown key `radus`")]);
+    ui.report_scene_errors(vec![diagnostic(Severity::Error, "unknown key `radus`")]);
     ui.handle_event(Event::Settled);
     assert!(
         ui.screen_text().contains(&messages::save_to_render_hint("cornell.toml", false)),

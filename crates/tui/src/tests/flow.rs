@@ -8,7 +8,7 @@ use crate::fixtures::*;
 use crate::messages;
 use crate::pipeline::protocol::{self, Command, Failure, MaxPreviewSize, WriteRequirement};
 use crate::scene::diagnostic::{Diagnostic, Severity};
-use crate::state::WorkerActivity;
+use crate::state::RequestStatus;
 use crate::{ContentChangeTime, ExitStatus};
 
 #[test]
@@ -206,7 +206,7 @@ fn lost_event_sources_are_handled() {
 fn cancelled_render_is_reported() {
     let mut ui = TestUi::new();
     ui.worker_event(protocol::Event::Cancelled { generation: 1 });
-    assert_eq!(ui.state.work.activity, WorkerActivity::Cancelled);
+    assert_eq!(ui.state.work.activity, RequestStatus::Cancelled);
     assert!(ui.screen_text().contains("stopped"));
 }
 
@@ -245,12 +245,12 @@ fn errors_in_incomplete_files_are_deferred() {
     let mut ui = TestUi::new();
     ui.finish_render(RED);
     ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
-    ui.fail_render(error_with("half"));
+    ui.report_scene_errors(error_with("half"));
     let text = ui.screen_text();
     assert!(!text.contains("half") && !text.contains("broken"), "{text}");
     assert!(text.contains("… waiting") && text.contains(messages::INCOMPLETE_FILE), "{text}");
     ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
-    ui.fail_render(error_with("more"));
+    ui.report_scene_errors(error_with("more"));
     assert!(!ui.screen_text().contains("more") && !ui.screen_text().contains("broken"));
     assert!(ui.handle_event(Event::Settled).is_empty());
     let text = ui.screen_text();
@@ -263,7 +263,7 @@ fn file_saved_in_steps_shows_no_error() {
     let mut ui = TestUi::new();
     ui.finish_render(RED);
     ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
-    ui.fail_render(error_with("half"));
+    ui.report_scene_errors(error_with("half"));
     ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
     ui.finish_render(BLUE);
     ui.handle_event(Event::Settled);
@@ -276,14 +276,14 @@ fn file_saved_in_steps_shows_no_error() {
 #[test]
 fn errors_in_stable_files_are_shown_immediately() {
     let mut ui = TestUi::new();
-    ui.fail_render(error_with("first"));
+    ui.report_scene_errors(error_with("first"));
     assert!(ui.screen_text().contains("error: first"), "without a save, errors should not be deferred");
     ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
     ui.handle_event(Event::Settled);
-    ui.fail_render(error_with("late"));
+    ui.report_scene_errors(error_with("late"));
     assert!(ui.screen_text().contains("error: late"));
     ui.press_character('r');
-    ui.fail_render(error_with("again"));
+    ui.report_scene_errors(error_with("again"));
     assert!(ui.screen_text().contains("error: again"));
 }
 
@@ -291,11 +291,11 @@ fn errors_in_stable_files_are_shown_immediately() {
 fn errors_are_shown_if_the_watcher_is_lost() {
     let mut ui = TestUi::new();
     ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
-    ui.fail_render(error_with("half"));
+    ui.report_scene_errors(error_with("half"));
     ui.handle_event(Event::Lost(RequiredEventSource::Watcher));
     assert!(ui.screen_text().contains("error: half"), "{}", ui.screen_text());
     ui.press_character('r');
-    ui.fail_render(error_with("again"));
+    ui.report_scene_errors(error_with("again"));
     assert!(ui.screen_text().contains("error: again"));
 }
 

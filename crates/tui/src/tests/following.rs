@@ -292,7 +292,8 @@ impl WatchedRender {
             lacks_photons: false,
             source: None,
         });
-        if let Some(event) = self.presenter.take_preview_if_due(generation, &self.ui.state, self.ui.now) {
+        if let Some(event) = self.presenter.take_preview_event_if_due(generation, &self.ui.state, self.ui.now)
+        {
             self.send_event(event);
         }
     }

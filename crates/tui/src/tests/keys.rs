@@ -10,7 +10,7 @@ use crate::keymap::{self, KEYMAP};
 use crate::math::DVec3;
 use crate::messages;
 use crate::pipeline::protocol::{self, Command, ImagePosition, SavedCameraEdit, WriteRequirement};
-use crate::pipeline::settings::{EffectiveSettings, KeyboardSettings, Overrides, ViewMode};
+use crate::pipeline::settings::{EffectiveSettings, KeyboardOverridableSettings, Overrides, ViewMode};
 use crate::preview_kind::PreviewKind;
 use crate::scene::description::{Integrator, Pose, ShadowMode};
 use crate::scene::diagnostic::Severity;
@@ -216,7 +216,7 @@ fn check(action: Action, key: KeyPress, ui: &mut TestUi) {
             assert!(ui.press_key(key).is_empty(), "nothing left to reset");
         }
         Action::ToggleDiagnostics => {
-            ui.fail_render(vec![diagnostic(Severity::Error, "wrong")]);
+            ui.report_scene_errors(vec![diagnostic(Severity::Error, "wrong")]);
             assert!(ui.press_key(key).is_empty());
             assert!(!ui.screen_text().contains("error: wrong"));
         }
@@ -296,7 +296,7 @@ fn key_line_shows_currently_useful_keys() {
     let generation = ui.state.request.generation;
     ui.worker_event(done_event(generation, vec![diagnostic(Severity::Warning, "unused")], false));
     assert!(bottom(&mut ui).contains("e 1 warning"));
-    ui.fail_render(vec![diagnostic(Severity::Error, "wrong")]);
+    ui.report_scene_errors(vec![diagnostic(Severity::Error, "wrong")]);
     assert!(bottom(&mut ui).contains("esc close"), "{}", bottom(&mut ui));
     ui.press_key(KeyPress::special(crossterm::event::KeyCode::Esc));
     assert!(bottom(&mut ui).contains("e 1 error"), "{}", bottom(&mut ui));
@@ -491,8 +491,10 @@ fn saved_settings_are_the_base_for_toggles() {
     ui.finish_render(BLUE);
     // The saved scene has hard shadows, as set with the key.
     ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
-    let (generation, own) =
-        (ui.state.request.generation, KeyboardSettings { shadows: ShadowMode::Hard, ..scene_settings() });
+    let (generation, own) = (
+        ui.state.request.generation,
+        KeyboardOverridableSettings { shadows: ShadowMode::Hard, ..scene_settings() },
+    );
     let settings = Box::new(EffectiveSettings { shadows: ShadowMode::Hard, ..effective_settings() });
     ui.worker_event(protocol::Event::Settings { generation, settings, camera: camera(), exposure: 0.0, own });
     let shadows: Vec<Option<ShadowMode>> = "sss"

@@ -113,7 +113,7 @@ fn layout_is_stable_during_a_render() {
                 )),
                 7 => ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now })),
                 8 => {
-                    ui.fail_render(vec![diagnostic(Severity::Error, "wrong")]);
+                    ui.report_scene_errors(vec![diagnostic(Severity::Error, "wrong")]);
                     Vec::new()
                 }
                 _ => ui.handle_event(Event::Settled),
@@ -172,7 +172,7 @@ fn small_windows_are_usable() {
         rendered(&mut ui, (640, 480));
         let share = cells_of(&mut ui, RED) as f64 / max_cells((columns, rows), (640, 480));
         assert!(share >= 0.7, "{share:.3}\n{}", ui.screen_text());
-        ui.fail_render(vec![diagnostic(Severity::Error, "misspelled")]);
+        ui.report_scene_errors(vec![diagnostic(Severity::Error, "misspelled")]);
         let text = ui.screen_text();
         assert!(text.contains("✗ broken") && text.contains("error: misspelled"), "{text}");
         assert!(text.contains("cornell.toml:3:1"), "{text}");

@@ -100,7 +100,7 @@ fn scroll_keys_are_shown_only_when_needed() {
     }
     for (faults, is_long) in [(9, true), (1, false)] {
         let mut ui = TestUi::new();
-        ui.fail_render(
+        ui.report_scene_errors(
             (0..faults).map(|i| diagnostic(Severity::Error, &format!("wrong number {i}"))).collect(),
         );
         assert!(ui.screen_text().contains("esc close"), "{}", ui.screen_text());
@@ -284,7 +284,7 @@ fn view_list_marks_hidden_views() {
 #[test]
 fn only_ten_positions_of_an_error_are_shown() {
     let mut ui = TestUi::from_state(state(120, 40));
-    ui.fail_render((1..=20).map(|line| at(Severity::Error, "unknown `wal`", line)).collect());
+    ui.report_scene_errors((1..=20).map(|line| at(Severity::Error, "unknown `wal`", line)).collect());
     let text = ui.screen_text();
     let words = ": 2:1, 3:1, 4:1, 5:1, 6:1, 7:1, 8:1, 9:1, 10:1 and 10 more";
     assert!(text.split_whitespace().collect::<Vec<_>>().join(" ").contains(words), "{text}");
@@ -300,7 +300,7 @@ fn at(severity: Severity, message: &str, line: usize) -> Diagnostic {
 fn errors_come_first_and_duplicates_are_merged() {
     let mut ui = TestUi::from_state(state(120, 40));
     let material = |line| at(Severity::Error, "unknown `wal`", line);
-    ui.fail_render(vec![
+    ui.report_scene_errors(vec![
         at(Severity::Warning, "texture `b` is not used", 1),
         material(12),
         material(5),
@@ -331,7 +331,7 @@ fn diagnostics_are_next_to_the_image_if_possible() {
             own: scene_settings(),
         });
         let before = cells_of(&mut ui, RED);
-        ui.fail_render(vec![diagnostic(Severity::Error, "misspelled")]);
+        ui.report_scene_errors(vec![diagnostic(Severity::Error, "misspelled")]);
         assert!(ui.screen_text().contains("error: misspelled"), "{}", ui.screen_text());
         let after = cells_of(&mut ui, RED);
         assert_eq!(
@@ -348,12 +348,12 @@ fn closed_diagnostics_stay_closed_until_new_ones() {
     let mut ui = TestUi::new();
     ui.finish_render(RED);
     let fault = || vec![diagnostic(Severity::Error, "misspelled")];
-    ui.fail_render(fault());
+    ui.report_scene_errors(fault());
     ui.press_key(ESCAPE);
     ui.press_character('v');
-    ui.fail_render(fault());
+    ui.report_scene_errors(fault());
     assert!(!ui.state.overlays.diagnostics.open, "{}", ui.screen_text());
-    ui.fail_render(vec![diagnostic(Severity::Error, "another one")]);
+    ui.report_scene_errors(vec![diagnostic(Severity::Error, "another one")]);
     assert!(ui.state.overlays.diagnostics.open, "new errors should open the pane");
 }
 
@@ -361,10 +361,10 @@ fn closed_diagnostics_stay_closed_until_new_ones() {
 fn camera_steps_wait_while_the_scene_is_broken() {
     let mut ui = TestUi::new();
     ui.finish_render(RED);
-    ui.fail_render(vec![diagnostic(Severity::Error, "misspelled")]);
+    ui.report_scene_errors(vec![diagnostic(Severity::Error, "misspelled")]);
     let first = ui.press_character('h');
     assert!(find_render_request(&first).is_some());
-    ui.fail_render(vec![diagnostic(Severity::Error, "misspelled")]);
+    ui.report_scene_errors(vec![diagnostic(Severity::Error, "misspelled")]);
     assert!(
         find_render_request(&ui.press_character('h')).is_none(),
         "the step should wait for the first step's preview"
@@ -385,7 +385,9 @@ fn camera_steps_wait_while_the_scene_is_broken() {
 #[test]
 fn number_of_displayed_errors_is_limited() {
     let mut ui = TestUi::from_state(state(120, 40));
-    ui.fail_render((0..20_000).map(|i| diagnostic(Severity::Error, &format!("wrong number {i}"))).collect());
+    ui.report_scene_errors(
+        (0..20_000).map(|i| diagnostic(Severity::Error, &format!("wrong number {i}"))).collect(),
+    );
     for _ in 0..100 {
         ui.press_key(KeyPress::special(KeyCode::PageDown));
     }
@@ -395,7 +397,9 @@ fn number_of_displayed_errors_is_limited() {
 #[test]
 fn diagnostics_scroll_with_every_key() {
     let mut ui = TestUi::new();
-    ui.fail_render((0..9).map(|i| diagnostic(Severity::Error, &format!("wrong number {i}"))).collect());
+    ui.report_scene_errors(
+        (0..9).map(|i| diagnostic(Severity::Error, &format!("wrong number {i}"))).collect(),
+    );
     let top = ui.screen_text();
     ui.press_character('j');
     assert_ne!(ui.screen_text(), top);

@@ -90,7 +90,7 @@ fn wheel_zooms_and_scrolls_diagnostics() {
         find_render_request(&effects).expect("a request").overrides.camera.pose.expect("a pose").distance()
             < 4.0
     );
-    ui.fail_render((0..9).map(|i| diagnostic(Severity::Error, &format!("wrong {i}"))).collect());
+    ui.report_scene_errors((0..9).map(|i| diagnostic(Severity::Error, &format!("wrong {i}"))).collect());
     assert!(mouse(&mut ui, MouseEventKind::WheelDown, 20, 15).is_empty());
     assert!(ui.state.overlays.diagnostics.scroll > 0);
     mouse(&mut ui, MouseEventKind::WheelUp, 20, 15);
@@ -115,7 +115,7 @@ fn clicked_object_is_shown_and_can_be_edited() {
         other => panic!("{other:?}"),
     };
     assert_eq!(place(&ui.press_character('o')), ("scenes/cornell.toml".to_owned(), 47, 1));
-    ui.fail_render(vec![diagnostic(Severity::Error, "wrong")]);
+    ui.report_scene_errors(vec![diagnostic(Severity::Error, "wrong")]);
     assert_eq!(
         place(&ui.press_character('o')),
         ("scenes/cornell.toml".to_owned(), 3, 1),

@@ -60,7 +60,7 @@ fn preview_without_colors_uses_characters() {
     let state = state_with(80, 24, PreviewKind::Ascii, ColorDepth::None, Overrides::default());
     let mut ui = TestUi::from_state(state);
     ui.finish_render([255; 3]);
-    ui.fail_render(vec![diagnostic(Severity::Error, "unknown key `heigth`")]);
+    ui.report_scene_errors(vec![diagnostic(Severity::Error, "unknown key `heigth`")]);
     let screen = ui.draw_screen();
     assert_eq!(screen[(25, 5)].symbol(), "@");
     assert!(screen.content.iter().all(|cell| cell.fg == Color::Reset && cell.bg == Color::Reset));
@@ -308,12 +308,12 @@ fn deleted_file_is_reported_as_missing() {
     let absent =
         *crate::scene::read_current_text("no-such-folder/cornell.toml".as_ref()).expect_err("an error");
     ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
-    ui.fail_render(vec![absent]);
+    ui.report_scene_errors(vec![absent]);
     ui.handle_event(Event::Settled);
     let text = ui.screen_text();
     assert!(text.starts_with(" ✗ missing "), "{text}");
     assert!(!text.contains("broken") && text.contains(messages::LAST_GOOD_RENDER), "{text}");
-    ui.fail_render(vec![diagnostic(Severity::Error, "unknown key")]);
+    ui.report_scene_errors(vec![diagnostic(Severity::Error, "unknown key")]);
     assert!(ui.screen_text().starts_with(" ✗ broken "), "{}", ui.screen_text());
 }
 
@@ -323,7 +323,7 @@ fn broken_file_keeps_the_image() {
     ui.finish_render(RED);
     let before = cells_of(&mut ui, RED);
     ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
-    ui.fail_render(vec![diagnostic(Severity::Error, "unknown `heigth`")]);
+    ui.report_scene_errors(vec![diagnostic(Severity::Error, "unknown `heigth`")]);
     ui.handle_event(Event::Settled);
     let text = ui.screen_text();
     for words in [
@@ -350,7 +350,9 @@ fn broken_file_keeps_the_image() {
 #[test]
 fn long_diagnostics_scroll_to_their_ends() {
     let mut ui = TestUi::new();
-    ui.fail_render((0..9).map(|i| diagnostic(Severity::Error, &format!("wrong number {i}"))).collect());
+    ui.report_scene_errors(
+        (0..9).map(|i| diagnostic(Severity::Error, &format!("wrong number {i}"))).collect(),
+    );
     assert!(ui.screen_text().contains("wrong number 0") && !ui.screen_text().contains("wrong number 8"));
     assert!(ui.screen_text().contains("9 errors"));
     let down = KeyPress::special(crossterm::event::KeyCode::PageDown);
@@ -422,7 +424,7 @@ fn escape_sequences_in_names_are_harmless() {
     let mut broken = diagnostic(Severity::Error, evil);
     broken.path = evil.into();
     broken.help = Some(evil.to_owned());
-    ui.fail_render(vec![broken]);
+    ui.report_scene_errors(vec![broken]);
     harmless(&ui.screen_text());
     ui.worker_event(protocol::Event::Failed { generation: 1, failure: Failure::Work(evil.to_owned()) });
     harmless(&ui.screen_text());
@@ -457,7 +459,7 @@ proptest! {
         for step in script {
             let generation = ui.state.request.generation;
             match step {
-                0 => ui.fail_render(vec![diagnostic(Severity::Error, "a rather long message that has to be wrapped"); 3]),
+                0 => ui.report_scene_errors(vec![diagnostic(Severity::Error, "a rather long message that has to be wrapped"); 3]),
                 1 => ui.finish_render(RED),
                 2 => { ui.worker_event(protocol::Event::Asset { generation, progress: asset_progress("long name of a texture", 1, 2) }); }
                 3 => { ui.worker_event(protocol::Event::Progress { generation, progress: render_progress(0.3, Some(9.0)) }); }

@@ -294,7 +294,7 @@ fn unchanged_image_keeps_its_curve() {
     rendered(&mut ui, 0.01);
     // Make and fix a typo, which leaves the image unchanged.
     ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
-    ui.fail_render(vec![diagnostic(crate::scene::diagnostic::Severity::Error, "wrong")]);
+    ui.report_scene_errors(vec![diagnostic(crate::scene::diagnostic::Severity::Error, "wrong")]);
     ui.handle_event(Event::Settled);
     ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
     let generation = ui.state.request.generation;
@@ -357,7 +357,7 @@ fn history_heading_is_not_shown_without_entries() {
         for count in 1..8 {
             let errors = (0..count)
                 .map(|number| diagnostic(crate::scene::diagnostic::Severity::Error, &format!("{number}")));
-            ui.fail_render(errors.collect());
+            ui.report_scene_errors(errors.collect());
             ui.handle_event(Event::Settled);
             let text = ui.screen_text();
             assert!(text.contains("error: 0"), "{text}");

@@ -51,7 +51,7 @@ fn warnings_are_shown_during_the_render() {
 #[test]
 fn warnings_are_counted_with_errors() {
     let mut ui = TestUi::new();
-    ui.fail_render(vec![diagnostic(Severity::Error, "wrong"), diagnostic(Severity::Warning, "odd")]);
+    ui.report_scene_errors(vec![diagnostic(Severity::Error, "wrong"), diagnostic(Severity::Warning, "odd")]);
     ui.handle_event(Event::Settled);
     assert!(ui.screen_text().contains("─ 1 error, 1 warning ─"), "{}", ui.screen_text());
 }

@@ -36,7 +36,7 @@ fn reset_lists_all_changes_once() {
     ui.press_character(']');
     ui.finish_render(BLUE);
     ui.press_key(KeyPress::special(KeyCode::Esc));
-    assert_eq!(ui.state.request.describe_keyboard_changes(), ["focus", "exposure (+0.25)"]);
+    assert_eq!(ui.state.request.describe_camera_and_exposure_changes(), ["focus", "exposure (+0.25)"]);
     assert!(last_line(&mut ui).contains("reset focus, "), "{}", ui.screen_text());
     ui.press_character('l');
     ui.finish_render(RED);
@@ -80,7 +80,7 @@ fn resume_message_disappears_after_the_render() {
 #[test]
 fn first_render_hint_omits_the_word_again() {
     let mut ui = TestUi::from_state(state(120, 40));
-    ui.fail_render(vec![diagnostic(Severity::Error, "unknown key `heigth`")]);
+    ui.report_scene_errors(vec![diagnostic(Severity::Error, "unknown key `heigth`")]);
     assert!(!ui.screen_text().contains("render again"), "{}", ui.screen_text());
     assert_eq!(exit_summary::summary_text(&ui.state), "no image written; cornell.toml has errors");
     ui.finish_render(RED);
@@ -114,7 +114,7 @@ fn stage_reason_in_a_wide_panel_is_not_wrapped() {
 fn save_hint_has_its_own_line() {
     for (columns, rows) in [(80, 24), (100, 30), (120, 40), (200, 60)] {
         let mut ui = TestUi::from_state(state(columns, rows));
-        ui.fail_render(vec![diagnostic(Severity::Error, "unknown key `heigth`")]);
+        ui.report_scene_errors(vec![diagnostic(Severity::Error, "unknown key `heigth`")]);
         ui.handle_event(Event::Settled);
         let text = ui.screen_text();
         let hint = messages::save_to_render_hint("cornell.toml", false);

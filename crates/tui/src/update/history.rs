@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::notices::{show_notice, show_notice_without_effects, show_until_key};
+use super::notices::{show_notice, show_notice_returning_no_effects, show_until_key};
 use crate::event::Effect;
 use crate::messages;
 use crate::state::{RenderState, State};
@@ -39,8 +39,8 @@ pub(super) fn browse(state: &mut State, steps: isize) -> Vec<Effect> {
         return return_to_newest(state, messages::NEWEST_RENDER);
     }
     match state.picture.history.step_back_by(steps, newest) {
-        Some(shown) => show_older_render(state, shown),
-        None => show_notice_without_effects(
+        Some(shown) => show_history_render(state, shown),
+        None => show_notice_returning_no_effects(
             state,
             if steps > 0 { messages::OLDEST_RENDER } else { messages::NEWEST_RENDER },
         ),
@@ -55,7 +55,7 @@ pub(super) fn open_at(state: &mut State, at: usize) -> Vec<Effect> {
         return return_to_newest(state, messages::NEWEST_RENDER);
     }
     match state.picture.history.open_at(at, newest) {
-        Some(shown) => show_older_render(state, shown),
+        Some(shown) => show_history_render(state, shown),
         None => Vec::new(),
     }
 }
@@ -69,13 +69,13 @@ pub(super) fn toggle_render_before_edit(state: &mut State) -> Vec<Effect> {
     let Some(newest) = newest_image(state) else { return report_no_image(state) };
     match state.picture.history.open_before_edit(newest) {
         Some(shown) => {
-            let effects = show_older_render(state, shown);
+            let effects = show_history_render(state, shown);
             let edits = state.picture.history.describe_edits_since_viewed();
             let edits = if edits.is_empty() { edits } else { format!(", {edits}") };
             show_until_key(state, format!("{}{edits}", messages::BEFORE_EDIT));
             effects
         }
-        None => show_notice_without_effects(state, messages::NO_EARLIER_RENDER),
+        None => show_notice_returning_no_effects(state, messages::NO_EARLIER_RENDER),
     }
 }
 
@@ -91,7 +91,7 @@ pub(super) fn return_to_newest(state: &mut State, words: &str) -> Vec<Effect> {
 /// Explains why the history, which consists of previews, has no image.
 fn report_no_image(state: &mut State) -> Vec<Effect> {
     let is_shown = state.request.preview_size.is_some();
-    show_notice_without_effects(state, if is_shown { messages::NO_IMAGE } else { messages::NO_PREVIEW })
+    show_notice_returning_no_effects(state, if is_shown { messages::NO_IMAGE } else { messages::NO_PREVIEW })
 }
 
 fn newest_image(state: &State) -> Option<crate::history::ShownImage> {
@@ -102,7 +102,7 @@ fn newest_image(state: &State) -> Option<crate::history::ShownImage> {
     }
 }
 
-fn show_older_render(state: &mut State, shown: crate::history::ShownImage) -> Vec<Effect> {
+fn show_history_render(state: &mut State, shown: crate::history::ShownImage) -> Vec<Effect> {
     state.picture.shown = Some(shown);
     // The header already shows the render's number and age.
     let keys = &messages::HISTORY_KEYS[usize::from(state.picture.history.is_viewing_oldest())..];

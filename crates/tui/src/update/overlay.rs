@@ -22,7 +22,7 @@ pub(super) fn handle_key(state: &mut State, key: KeyPress) -> Option<Vec<Effect>
         return Some(select_view_and_open_list(state, view));
     }
     let action = keymap::overlay_action_for(key)?;
-    if let Some(effects) = views::handle_action(state, action) {
+    if let Some(effects) = views::handle_view_list_action(state, action) {
         return Some(effects);
     }
     perform_action(state, action).then(Vec::new)
@@ -82,8 +82,8 @@ fn close_or_cancel_topmost(state: &mut State) -> bool {
 /// to scroll, in which case the key keeps its usual function.
 fn scroll(state: &mut State, step: impl FnOnce(usize, usize) -> usize) -> bool {
     let (is_help, (page, last)) = match () {
-        () if state.overlays.help.open => (true, help::state_page_and_max_scroll(state)),
-        () if state.overlays.diagnostics.open => (false, diagnostics::state_page_and_max_scroll(state)),
+        () if state.overlays.help.open => (true, help::page_height_and_max_scroll(state)),
+        () if state.overlays.diagnostics.open => (false, diagnostics::page_height_and_max_scroll(state)),
         () => return false,
     };
     let pane = if is_help { &mut state.overlays.help } else { &mut state.overlays.diagnostics };

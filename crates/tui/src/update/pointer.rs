@@ -1,6 +1,8 @@
 //! Handles the mouse and queries about image positions.
 
-use super::notices::{show_key_change, show_message_until_key, show_notice, show_notice_without_effects};
+use super::notices::{
+    show_key_change, show_notice, show_notice_returning_no_effects, show_until_key_returning_no_effects,
+};
 use super::{camera, history, overlay, region};
 use crate::event::FilePosition;
 use crate::event::{Effect, MouseEvent, MouseEventKind};
@@ -83,7 +85,7 @@ fn drag_to_orbit(state: &mut State, mouse: MouseEvent) -> Vec<Effect> {
 
 fn pick_object_at_click(state: &mut State, mouse: MouseEvent) -> Vec<Effect> {
     if state.picture.history.is_viewing_older() {
-        return show_notice_without_effects(state, messages::OLDER_RENDER);
+        return show_notice_returning_no_effects(state, messages::OLDER_RENDER);
     }
     let Some(spot) = image_position_at(state, mouse.column, mouse.row) else { return Vec::new() };
     state.selection.crosshair = spot;
@@ -103,15 +105,15 @@ pub(super) fn inspect(state: &mut State) -> Vec<Effect> {
 /// Waits for a click that sets the focus. If already waiting, focuses on the object at the crosshair.
 pub(super) fn start_or_confirm_focus_pick(state: &mut State) -> Vec<Effect> {
     if state.picture.history.is_viewing_older() {
-        return show_notice_without_effects(state, messages::OLDER_RENDER);
+        return show_notice_returning_no_effects(state, messages::OLDER_RENDER);
     }
     if state.request.viewpoint().is_some_and(|view| view.aperture == 0.0) {
         state.selection.is_focusing = false;
-        return show_notice_without_effects(state, messages::PINHOLE);
+        return show_notice_returning_no_effects(state, messages::PINHOLE);
     }
     if state.selection.is_mouse_on && !state.selection.is_focusing {
         state.selection.is_focusing = true;
-        return show_message_until_key(state, messages::CLICK_TO_FOCUS);
+        return show_until_key_returning_no_effects(state, messages::CLICK_TO_FOCUS);
     }
     state.selection.is_focusing = false;
     send_pick_query(state, PickPurpose::Focus)
@@ -119,10 +121,10 @@ pub(super) fn start_or_confirm_focus_pick(state: &mut State) -> Vec<Effect> {
 
 fn send_pick_query(state: &mut State, purpose: PickPurpose) -> Vec<Effect> {
     if state.picture.history.is_viewing_older() {
-        return show_notice_without_effects(state, messages::OLDER_RENDER);
+        return show_notice_returning_no_effects(state, messages::OLDER_RENDER);
     }
     if state.request.camera.is_none() {
-        return show_notice_without_effects(state, messages::NO_SCENE);
+        return show_notice_returning_no_effects(state, messages::NO_SCENE);
     }
     state.selection.purpose = purpose;
     vec![Effect::Send(Command::Pick(state.selection.crosshair))]
@@ -149,12 +151,12 @@ pub(super) fn handle_pick(state: &mut State, picked: &PickedPixel) -> Vec<Effect
         (PickPurpose::Inspect, _) => {
             state.overlays.message = None;
             let facts = inspected_values(picked);
-            state.selection.clicked = Some(format_picked_values(picked, &facts));
+            state.selection.clicked = Some(join_values_with_pixel_position(picked, &facts));
             state.selection.facts = Some(facts);
             state.dirty = true;
             Vec::new()
         }
-        (PickPurpose::Focus, None) => show_notice_without_effects(state, messages::NOTHING_TO_FOCUS),
+        (PickPurpose::Focus, None) => show_notice_returning_no_effects(state, messages::NOTHING_TO_FOCUS),
         (PickPurpose::Focus, Some(thing)) => focus_at_depth(state, thing.depth),
     }
 }
@@ -162,11 +164,11 @@ pub(super) fn handle_pick(state: &mut State, picked: &PickedPixel) -> Vec<Effect
 fn focus_at_depth(state: &mut State, depth: f64) -> Vec<Effect> {
     let distance = round_to_step(depth, decimal_step_at_distance(depth));
     if !(distance > 0.0) {
-        return show_notice_without_effects(state, messages::NOTHING_TO_FOCUS);
+        return show_notice_returning_no_effects(state, messages::NOTHING_TO_FOCUS);
     }
     // The scene may have been edited after the click.
     if state.request.viewpoint().is_none_or(|view| view.aperture == 0.0) {
-        return show_notice_without_effects(state, messages::PINHOLE);
+        return show_notice_returning_no_effects(state, messages::PINHOLE);
     }
     state.request.toggles.camera.focus = Some(distance);
     let effects = camera::render_camera_step(state);
@@ -177,7 +179,10 @@ fn focus_at_depth(state: &mut State, depth: f64) -> Vec<Effect> {
 }
 
 /// Formats the inspected values and the pixel position on one line.
-fn format_picked_values(PickedPixel { thing, pixel: [x, y], .. }: &PickedPixel, facts: &[String]) -> String {
+fn join_values_with_pixel_position(
+    PickedPixel { thing, pixel: [x, y], .. }: &PickedPixel,
+    facts: &[String],
+) -> String {
     let pixel = thing.as_ref().map_or(String::new(), |_| format!(" · pixel {x}, {y}"));
     facts.join(" · ") + &pixel
 }
@@ -185,14 +190,14 @@ fn format_picked_values(PickedPixel { thing, pixel: [x, y], .. }: &PickedPixel, 
 /// Copies the inspected values if the terminal supports it.
 pub(super) fn copy_values(state: &mut State) -> Vec<Effect> {
     if state.picture.history.is_viewing_older() {
-        return show_notice_without_effects(state, messages::OLDER_RENDER);
+        return show_notice_returning_no_effects(state, messages::OLDER_RENDER);
     }
     let Some(clicked) = state.selection.clicked.clone() else {
-        return show_notice_without_effects(state, messages::NOTHING_TO_COPY);
+        return show_notice_returning_no_effects(state, messages::NOTHING_TO_COPY);
     };
     if !state.display.capabilities.clipboard {
         // The message contains the text so that the user can select it.
-        return show_notice_without_effects(state, &format!("{} {clicked}", messages::SELECT_TO_COPY));
+        return show_notice_returning_no_effects(state, &format!("{} {clicked}", messages::SELECT_TO_COPY));
     }
     show_notice(state, format!("{} {clicked}", messages::COPIED));
     vec![Effect::Aside(window_title::clipboard_bytes(&clicked))]
@@ -213,7 +218,7 @@ fn inspected_values(PickedPixel { thing, color, pixel: [x, y] }: &PickedPixel) -
     facts.extend((!has_mesh_extension(path)).then(|| format!("{}:{line}", escape_invisible_chars(&file))));
     facts.extend([
         escape_invisible_chars(material).into_owned(),
-        format!("distance {}", format_significant_digits(*distance)),
+        format!("distance {}", format_three_significant_digits(*distance)),
         format!("position {}", format_vector(*position)),
     ]);
     facts.extend(light);
@@ -222,11 +227,11 @@ fn inspected_values(PickedPixel { thing, color, pixel: [x, y] }: &PickedPixel) -
 }
 
 fn format_vector(all: [f64; 3]) -> String {
-    format!("({})", all.map(format_significant_digits).join(", "))
+    format!("({})", all.map(format_three_significant_digits).join(", "))
 }
 
 /// Formats a number with three significant digits, or more if it has more digits before the decimal point.
-fn format_significant_digits(number: f64) -> String {
+fn format_three_significant_digits(number: f64) -> String {
     let digits = if number == 0.0 { 0.0 } else { 2.0 - libm::floor(libm::log10(number.abs())) };
     round_to_step(number, libm::pow(10.0, -digits.clamp(0.0, 3.0))).to_string()
 }

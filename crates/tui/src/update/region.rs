@@ -1,6 +1,6 @@
 //! The image region to render first.
 
-use super::notices::{show_message_until_key, show_notice};
+use super::notices::{show_notice, show_until_key_returning_no_effects};
 use super::request::request_render;
 use crate::event::Effect;
 use crate::messages;
@@ -12,7 +12,7 @@ const SIDE: f64 = 1.0 / 3.0;
 
 /// Handles the key that selects a region. The first press waits for a drag, the second selects the region
 /// around the crosshair, and the third clears the region.
-pub(super) fn handle_region_select_key(state: &mut State) -> Vec<Effect> {
+pub(super) fn start_confirm_or_clear_region(state: &mut State) -> Vec<Effect> {
     if state.request.first_section.take().is_some() {
         (state.selection.is_marking, state.selection.press) = (false, None);
         let effects = reorder_running_render(state);
@@ -21,7 +21,7 @@ pub(super) fn handle_region_select_key(state: &mut State) -> Vec<Effect> {
     }
     if state.selection.is_mouse_on && !state.selection.is_marking {
         state.selection.is_marking = true;
-        return show_message_until_key(state, messages::DRAG_REGION);
+        return show_until_key_returning_no_effects(state, messages::DRAG_REGION);
     }
     render_section_first(state, section_around_point(state.selection.crosshair))
 }

@@ -3,7 +3,7 @@
 use super::history;
 use crate::event::Effect;
 use crate::pipeline::protocol::{Command, Request, WriteRequirement};
-use crate::state::{CameraStepStatus, KeyOverrides, RenderState, State, WorkerActivity};
+use crate::state::{CameraStepStatus, KeyOverrides, RenderState, RequestStatus, State};
 use crate::view::layout::Layout;
 
 /// Creates a request with the current settings. The stage table is unchanged until the worker starts on the
@@ -47,7 +47,7 @@ pub(super) fn request_render(state: &mut State, force: bool) -> Vec<Effect> {
         } else {
             WriteRequirement::No
         },
-        own: state.request.overrides_without_keyboard_changes(),
+        own: state.request.scene_image_overrides_if_changed(),
         saves: state.saving.edits,
         force,
         first: state.request.first_section,
@@ -57,7 +57,7 @@ pub(super) fn request_render(state: &mut State, force: bool) -> Vec<Effect> {
         state.set_clock_paused(false);
         effects.push(Effect::Send(Command::Pause(false)));
     }
-    state.work.activity = WorkerActivity::Running { since: state.now };
+    state.work.activity = RequestStatus::Running { since: state.now };
     state.work.rendering = RenderState::UnderWay;
     effects.push(Effect::Send(Command::Render(Box::new(request))));
     effects

@@ -20,7 +20,7 @@ use crate::scene::MOST_COMPARED_BYTES;
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::sanitize::escape_invisible_chars;
 use crate::state::{
-    AssetProgressBar, BlockingErrors, PaneState, RenderState, SceneImageProgress, State, WorkerActivity,
+    AssetProgressBar, BlockingErrors, PaneState, RenderState, RequestStatus, SceneImageProgress, State,
     WrittenFile,
 };
 use crate::window_title;
@@ -44,7 +44,7 @@ pub(super) fn handle_worker_event(state: &mut State, event: Event) -> Vec<Effect
             return Vec::new();
         }
         Event::Done { generation, report, .. } if generation != state.request.generation => {
-            set_written_file_descriptions(state, generation, &report);
+            set_written_image_descriptions(state, generation, &report);
             return Vec::new();
         }
         event => event,
@@ -65,7 +65,7 @@ pub(super) fn handle_worker_event(state: &mut State, event: Event) -> Vec<Effect
             state.request.drop_overrides_saved_to_scene();
             let pinhole = state.request.combined_overrides().dof == Some(true) && !settings.dof;
             state.request.effective = Some(*settings);
-            clear_problems(state);
+            clear_blocking_errors(state);
             state.picture.history.record_scene_read();
             if pinhole {
                 show_notice(state, messages::PINHOLE);
@@ -100,7 +100,7 @@ pub(super) fn handle_worker_event(state: &mut State, event: Event) -> Vec<Effect
         Event::WriteFailed { path, message, .. } => {
             let is_by_hand = std::mem::take(&mut state.saving.is_write_requested);
             // A failed write requested during the render does not affect the final image.
-            if !is_by_hand || state.work.activity == WorkerActivity::Done {
+            if !is_by_hand || state.work.activity == RequestStatus::Done {
                 state.saving.unwritten = Some(messages::NOT_WRITTEN.to_owned());
             }
             let is_it = |written: &&mut WrittenFile| Some(&written.path) == path.as_ref();
@@ -125,7 +125,9 @@ pub(super) fn handle_worker_event(state: &mut State, event: Event) -> Vec<Effect
             CheckpointUpdate::SetAside { path } => {
                 show_until_key(
                     state,
-                    messages::other_render_checkpoint_kept(&escape_invisible_chars(&path.to_string_lossy())),
+                    messages::other_render_checkpoint_renamed(&escape_invisible_chars(
+                        &path.to_string_lossy(),
+                    )),
                 );
             }
             CheckpointUpdate::Unused { path, why } => {
@@ -160,7 +162,7 @@ pub(super) fn handle_worker_event(state: &mut State, event: Event) -> Vec<Effect
         }
         Event::LastGoodEnded { end, .. } => handle_last_valid_render_end(state, end),
         Event::Cancelled { .. } => {
-            (state.work.activity, state.work.rendering) = (WorkerActivity::Cancelled, RenderState::Stopped);
+            (state.work.activity, state.work.rendering) = (RequestStatus::Cancelled, RenderState::Stopped);
             state.set_clock_paused(false);
             state.work.assets.clear();
         }
@@ -171,7 +173,7 @@ pub(super) fn handle_worker_event(state: &mut State, event: Event) -> Vec<Effect
 /// Notifies the user that a long render has ended, provided that the window is not focused and the terminal
 /// supports notifications.
 fn notify_long_render_ended(state: &State, time: Option<Duration>) -> Vec<Effect> {
-    let is_over = matches!(state.work.activity, WorkerActivity::Done | WorkerActivity::Broken);
+    let is_over = matches!(state.work.activity, RequestStatus::Done | RequestStatus::Broken);
     let is_long = |time: &Duration| state.display.notify_after.is_some_and(|least| *time > least);
     let time = time.filter(is_long).filter(|_| is_over && !state.display.has_focus);
     let notice = time.zip(state.display.capabilities.notice);
@@ -269,7 +271,7 @@ fn handle_written_file(
     unfinished: Option<SampleCounts>,
 ) {
     // If the render is still running, writing another output may have failed.
-    let is_by_hand = state.work.activity == WorkerActivity::Done;
+    let is_by_hand = state.work.activity == RequestStatus::Done;
     if is_by_hand {
         (state.saving.unwritten, state.saving.write_failed) = (None, None);
         close_empty_pane(state);
@@ -327,7 +329,7 @@ fn is_scene_image_written(state: &State, generation: u64) -> bool {
 }
 
 /// Adds a description to the files that contain a finished request's image.
-fn set_written_file_descriptions(state: &mut State, generation: u64, report: &Report) {
+fn set_written_image_descriptions(state: &mut State, generation: u64, report: &Report) {
     let base = state.request.base_view_mode();
     let has_image = |written: &&mut WrittenFile| written.generation == generation && !written.is_unfinished;
     for written in state.saving.written.iter_mut().filter(has_image) {
@@ -367,7 +369,7 @@ fn show_write_conflicts(state: &mut State, conflicts: Vec<Diagnostic>) {
 }
 
 /// Clears the errors once the file is valid again.
-fn clear_problems(state: &mut State) {
+fn clear_blocking_errors(state: &mut State) {
     if state.overlays.problems.take().is_some() {
         state.overlays.diagnostics = PaneState::default();
     }
@@ -376,12 +378,12 @@ fn clear_problems(state: &mut State) {
 fn handle_done(state: &mut State, mut report: Box<Report>, warnings: Vec<Diagnostic>, unchanged: bool) {
     add_earlier_seconds(&mut report);
     state.overlays.message.take_if(|message| message.words.starts_with(messages::RESUMING));
-    clear_problems(state);
+    clear_blocking_errors(state);
     for stage in &report.stages {
         record_stage(state, stage.clone());
     }
     state.request.effective = Some(report.settings.clone());
-    (state.work.activity, state.work.rendering) = (WorkerActivity::Done, RenderState::Finished);
+    (state.work.activity, state.work.rendering) = (RequestStatus::Done, RenderState::Finished);
     state.set_clock_paused(false);
     state.work.assets.clear();
     // This request's image has been written, so earlier write failures no longer matter.
@@ -391,7 +393,7 @@ fn handle_done(state: &mut State, mut report: Box<Report>, warnings: Vec<Diagnos
         state.saving.own = SceneImageProgress { state: SavedSceneImageState::Written, fraction: 1.0 };
     }
     complete_noise_curve(state, &report, unchanged);
-    set_written_file_descriptions(state, state.request.generation, &report);
+    set_written_image_descriptions(state, state.request.generation, &report);
     state.work.report = Some(report);
     state.work.unchanged = unchanged;
     set_warnings(state, warnings);
@@ -475,7 +477,7 @@ fn handle_failure(state: &mut State, failure: Failure) {
     }
     match failure {
         Failure::Scene(diagnostics) if !state.saving.is_settled => {
-            state.work.activity = WorkerActivity::Waiting;
+            state.work.activity = RequestStatus::Waiting;
             state.overlays.unconfirmed = Some(diagnostics);
         }
         Failure::Scene(diagnostics) => show_errors(state, BlockingErrors { diagnostics, work: None }),
@@ -500,7 +502,7 @@ fn handle_last_valid_render_end(state: &mut State, end: LastValidSceneRenderOutc
 
 /// Shows new errors. If the user has closed the pane, only new errors reopen it.
 fn show_errors(state: &mut State, problems: BlockingErrors) {
-    state.work.activity = WorkerActivity::Broken;
+    state.work.activity = RequestStatus::Broken;
     if state.overlays.problems.as_ref() != Some(&problems) {
         state.overlays.problems = Some(problems);
         state.overlays.diagnostics = PaneState { open: true, scroll: 0 };

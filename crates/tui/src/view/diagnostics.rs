@@ -77,7 +77,7 @@ fn draw_title(state: &State, area: Rect, shown: Option<(usize, usize, usize)>, b
 }
 
 /// Returns the number of lines per page and the maximum scroll position.
-pub(crate) fn state_page_and_max_scroll(state: &State) -> (usize, usize) {
+pub(crate) fn page_height_and_max_scroll(state: &State) -> (usize, usize) {
     let area = Layout::for_state(state).pane;
     let text = pane_lines(state, area);
     page_and_max_scroll(&text, area)

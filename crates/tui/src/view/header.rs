@@ -9,8 +9,9 @@ use super::layout::{BLOCK, Layout};
 use super::message;
 use super::stages::running_stage_name;
 use super::text::{
-    TextRole, floor_percent, format_count_with_noun, format_running_time, format_seconds,
-    format_three_digit_number, put_text, put_text_right, remaining_row_area, text_columns,
+    TextRole, floor_percent, format_count_with_noun, format_number_to_three_digits,
+    format_running_time_with_tenths, format_seconds, put_text, put_text_right, remaining_row_area,
+    text_columns,
 };
 use crate::action::Action;
 use crate::choice::Choice;
@@ -22,7 +23,7 @@ use crate::pipeline::settings::ViewMode;
 use crate::pipeline::words::Eta;
 use crate::scene::diagnostic::Severity;
 use crate::scene::sanitize::escape_invisible_chars;
-use crate::state::{State, WorkerActivity};
+use crate::state::{RequestStatus, State};
 
 /// Minimum header width at which the state block has a fixed width.
 const WIDE: u16 = 60;
@@ -88,13 +89,13 @@ pub(super) fn state_symbol_word_and_role(state: &State) -> (&'static str, &'stat
 fn worker_symbol_word_and_role(state: &State) -> (&'static str, &'static str, TextRole) {
     match state.work.activity {
         _ if state.work.paused => ("‖", "paused", TextRole::Warning),
-        WorkerActivity::Running { .. } => ("●", "rendering", TextRole::Working),
-        WorkerActivity::Done if state.saving.unwritten.is_some() => ("!", "unwritten", TextRole::Error),
-        WorkerActivity::Done => ("✓", "done", TextRole::Good),
-        WorkerActivity::Waiting => ("…", "waiting", TextRole::Warning),
-        WorkerActivity::Broken if state.overlays.is_scene_missing() => ("✗", "missing", TextRole::Error),
-        WorkerActivity::Broken => ("✗", "broken", TextRole::Error),
-        WorkerActivity::Cancelled => ("■", "stopped", TextRole::Warning),
+        RequestStatus::Running { .. } => ("●", "rendering", TextRole::Working),
+        RequestStatus::Done if state.saving.unwritten.is_some() => ("!", "unwritten", TextRole::Error),
+        RequestStatus::Done => ("✓", "done", TextRole::Good),
+        RequestStatus::Waiting => ("…", "waiting", TextRole::Warning),
+        RequestStatus::Broken if state.overlays.is_scene_missing() => ("✗", "missing", TextRole::Error),
+        RequestStatus::Broken => ("✗", "broken", TextRole::Error),
+        RequestStatus::Cancelled => ("■", "stopped", TextRole::Warning),
     }
 }
 
@@ -139,7 +140,7 @@ fn view_label(state: &State) -> String {
     let shown = state.picture.shown.as_ref().filter(|shown| is_at_hand(shown.generation));
     let range = shown.and_then(|shown| shown.range);
     let range = range.map_or(String::new(), |[least, most]| {
-        format!(" {} to {}", format_three_digit_number(least), format_three_digit_number(most))
+        format!(" {} to {}", format_number_to_three_digits(least), format_number_to_three_digits(most))
     });
     format!("  view {}{range}", view.name())
 }
@@ -194,29 +195,29 @@ fn progress_or_result_variants(state: &State) -> Vec<String> {
         return [messages::WITHOUT_PHOTONS, "no photons yet"].map(str::to_owned).to_vec();
     }
     match (state.work.activity, &state.work.report, &state.work.progress) {
-        (WorkerActivity::Running { .. }, _, Some(progress)) => {
+        (RequestStatus::Running { .. }, _, Some(progress)) => {
             let done = format!("{} %", floor_percent(progress.fraction));
             vec![format!("{done}{}", format_eta(state, progress)), done]
         }
-        (WorkerActivity::Running { .. }, _, None) => {
+        (RequestStatus::Running { .. }, _, None) => {
             running_stage_name(state).map(|name| format!("{name}…")).into_iter().collect()
         }
-        (WorkerActivity::Done, _, _) if state.work.unchanged => {
+        (RequestStatus::Done, _, _) if state.work.unchanged => {
             vec![
                 format!("unchanged · {}", messages::render_number(state.work.renders)),
                 "unchanged".to_owned(),
             ]
         }
-        (WorkerActivity::Done, Some(report), _) => {
+        (RequestStatus::Done, Some(report), _) => {
             let time = format_seconds(report.seconds);
             vec![format!("{time} · {}", messages::render_number(state.work.renders)), time]
         }
-        (WorkerActivity::Waiting, _, _) => vec![messages::INCOMPLETE_FILE.to_owned()],
-        (WorkerActivity::Broken, _, _) if state.overlays.is_scene_missing() => {
+        (RequestStatus::Waiting, _, _) => vec![messages::INCOMPLETE_FILE.to_owned()],
+        (RequestStatus::Broken, _, _) if state.overlays.is_scene_missing() => {
             vec![messages::WAITING_FOR_FILE.to_owned()]
         }
-        (WorkerActivity::Broken, _, _) => vec![format_problem_count(state)],
-        (WorkerActivity::Done | WorkerActivity::Cancelled, _, _) => Vec::new(),
+        (RequestStatus::Broken, _, _) => vec![format_problem_count(state)],
+        (RequestStatus::Done | RequestStatus::Cancelled, _, _) => Vec::new(),
     }
 }
 
@@ -237,7 +238,9 @@ fn format_eta(state: &State, progress: &RenderProgress) -> String {
         None => "…".to_owned(),
         Some(Eta::OverADay) => Eta::OverADay.format(),
         Some(Eta::Seconds(eta)) if eta < MIN => "under 1 s".to_owned(),
-        Some(Eta::Seconds(eta)) => format_running_time(Duration::try_from_secs_f64(eta).unwrap_or_default()),
+        Some(Eta::Seconds(eta)) => {
+            format_running_time_with_tenths(Duration::try_from_secs_f64(eta).unwrap_or_default())
+        }
     };
     if state.work.paused { String::new() } else { format!("  ETA {eta}") }
 }

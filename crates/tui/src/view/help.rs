@@ -25,7 +25,7 @@ const NOTES: &[(&str, &str)] = &[
 pub(super) fn draw(state: &State, buffer: &mut Buffer) {
     let area = help_area(state);
     let inner = inside_border(area);
-    let (page, last) = state_page_and_max_scroll(state);
+    let (page, last) = page_height_and_max_scroll(state);
     let first = state.overlays.help.scroll.min(last);
     let lines = help_lines(inner.width);
     let mut title = " keys ".to_owned();
@@ -44,7 +44,7 @@ pub(super) fn draw(state: &State, buffer: &mut Buffer) {
         let block = Block::bordered().border_type(BorderType::Rounded).border_style(border);
         block.title_style(title_style).title(title).render(area, buffer);
     }
-    let labels = label_width(inner.width);
+    let labels = label_column_width(inner.width);
     for (index, (label, help)) in (0..inner.height).zip(lines.iter().skip(first)) {
         let line = nth_row(inner, index);
         let place = Rect { x: line.x + 1, width: labels.min(line.width), ..line };
@@ -62,14 +62,14 @@ pub(super) fn draw(state: &State, buffer: &mut Buffer) {
 const BESIDE: u16 = 3;
 
 /// Width of the label column if the help is `width` columns wide.
-fn label_width(width: u16) -> u16 {
+fn label_column_width(width: u16) -> u16 {
     const MIN: u16 = 9;
     max_entry_width(|(label, _)| label).min(MIN.max(width / 3))
 }
 
 /// The help entries, wrapped into lines.
 fn help_lines(width: u16) -> Vec<(String, String)> {
-    let labels = label_width(width);
+    let labels = label_column_width(width);
     let both = |(label, help)| {
         let label = wrap_text(label, usize::from(labels));
         let help = wrap_text(help, usize::from(width.saturating_sub(labels + BESIDE)));
@@ -81,7 +81,7 @@ fn help_lines(width: u16) -> Vec<(String, String)> {
 }
 
 /// Returns the number of lines per page and the maximum scroll position.
-pub(crate) fn state_page_and_max_scroll(state: &State) -> (usize, usize) {
+pub(crate) fn page_height_and_max_scroll(state: &State) -> (usize, usize) {
     let inner = inside_border(help_area(state));
     let page = usize::from(inner.height).max(1);
     (page, help_lines(inner.width).len().saturating_sub(page))

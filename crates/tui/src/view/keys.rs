@@ -13,7 +13,7 @@ use crate::keymap::{self, KEYMAP, KeyBinding, OVERLAY, OverlayAction};
 use crate::preview_kind::PreviewKind;
 use crate::scene::has_mesh_extension;
 use crate::scene::report::summarize_counts;
-use crate::state::{KeyOverrides, State, ViewList, WorkerActivity};
+use crate::state::{KeyOverrides, RequestStatus, State, ViewList};
 
 /// A hint in the key line: a key with long and short descriptions.
 struct KeyHint {
@@ -113,7 +113,12 @@ fn hints_for_toggles(state: &State) -> Vec<KeyHint> {
     let all = [
         (Action::CycleShadows, "shadows", shadows.to_owned(), keys.shadows.is_some()),
         (Action::TogglePhotons, "photons", photons.to_owned(), keys.photons.is_some()),
-        (Action::ToggleDepthOfField, "dof", on_off(has_depth_of_field(state)).to_owned(), keys.dof.is_some()),
+        (
+            Action::ToggleDepthOfField,
+            "dof",
+            on_off(is_depth_of_field_on(state)).to_owned(),
+            keys.dof.is_some(),
+        ),
         (Action::NextView, "view", state.request.view_mode().name().to_owned(), keys.view.is_some()),
         (
             Action::CycleIntegrator,
@@ -145,7 +150,7 @@ fn current_hints(state: &State) -> (Vec<KeyHint>, Vec<KeyHint>) {
     // Show scroll keys if some lines are not visible.
     let scrolling = |last: usize, keys: &[OverlayAction]| if last > 0 { overlay(keys) } else { Vec::new() };
     if state.overlays.help.open {
-        let (_, last) = super::help::state_page_and_max_scroll(state);
+        let (_, last) = super::help::page_height_and_max_scroll(state);
         let lines = scrolling(last, &[OverlayAction::LineDown]).into_iter().chain(closing());
         return (lines.chain(scrolling(last, &[OverlayAction::PageDown])).collect(), Vec::new());
     }
@@ -153,7 +158,7 @@ fn current_hints(state: &State) -> (Vec<KeyHint>, Vec<KeyHint>) {
     if let Some(views) = &state.overlays.views {
         urgent.extend(view_list_hints(views).into_iter().chain(closing()));
     } else if state.overlays.diagnostics.open {
-        let (_, last) = super::diagnostics::state_page_and_max_scroll(state);
+        let (_, last) = super::diagnostics::page_height_and_max_scroll(state);
         urgent.extend(scrolling(last, &[OverlayAction::LineDown]).into_iter().chain(closing()));
     }
     urgent.extend(hidden_diagnostics_hint(state));
@@ -185,15 +190,14 @@ fn current_hints(state: &State) -> (Vec<KeyHint>, Vec<KeyHint>) {
     }
     let reset = keymap::binding_for_action(Action::ResetSettings).map_or("", |it| it.label);
     let changed = |words| KeyHint { tone: TextRole::Strong, ..KeyHint::new(reset, words) };
-    let changes = state.request.describe_keyboard_changes().join(", ");
+    let changes = state.request.describe_camera_and_exposure_changes().join(", ");
     urgent.extend((!changes.is_empty()).then(|| changed(format!("reset {changes}"))));
     let now: &[Action] = match state.work.activity {
         _ if state.work.paused => &[Action::TogglePause, Action::WriteImage],
-        WorkerActivity::Running { .. } => &[Action::TogglePause],
-        WorkerActivity::Done
-        | WorkerActivity::Waiting
-        | WorkerActivity::Broken
-        | WorkerActivity::Cancelled => &[],
+        RequestStatus::Running { .. } => &[Action::TogglePause],
+        RequestStatus::Done | RequestStatus::Waiting | RequestStatus::Broken | RequestStatus::Cancelled => {
+            &[]
+        }
     };
     let first = now
         .iter()
@@ -209,7 +213,7 @@ fn current_hints(state: &State) -> (Vec<KeyHint>, Vec<KeyHint>) {
     let is_idle = |it: &&KeyBinding| it.action != Action::TogglePause || state.work.is_request_running();
     // If there are changes to list, a hint added above already shows them next to this key.
     let is_of_use = state.request.toggles != KeyOverrides::default()
-        && state.request.describe_keyboard_changes().is_empty();
+        && state.request.describe_camera_and_exposure_changes().is_empty();
     let is_back = |it: &&KeyBinding| it.action != Action::ResetSettings || is_of_use;
     let others = KEYMAP
         .iter()
@@ -262,7 +266,7 @@ fn hidden_diagnostics_hint(state: &State) -> Option<KeyHint> {
     Some(KeyHint { tone, ..KeyHint::new(key, words) })
 }
 
-fn has_depth_of_field(state: &State) -> bool {
+fn is_depth_of_field_on(state: &State) -> bool {
     state.request.effective.as_ref().is_some_and(|it| it.dof)
         && state.request.combined_overrides().dof != Some(false)
 }

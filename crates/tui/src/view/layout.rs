@@ -87,7 +87,7 @@ impl Layout {
         };
         let holds = |(width, height)| layout.panel.width >= width && layout.panel.height >= height;
         let has_room = TEXT_SIZES.into_iter().any(holds);
-        layout.pane = if has_room { layout.panel } else { lower_half(rest) };
+        layout.pane = if has_room { layout.panel } else { bottom_pane_area(rest) };
         layout
     }
 }
@@ -145,7 +145,7 @@ fn take_top(rest: &mut Rect, height: u16) -> Rect {
     taken
 }
 
-fn lower_half(rest: Rect) -> Rect {
+fn bottom_pane_area(rest: Rect) -> Rect {
     let height = (rest.height / 2).max(PANE_HEIGHT).min(rest.height);
     Rect { y: rest.bottom() - height, height, ..rest }
 }

@@ -19,7 +19,7 @@ pub(super) fn draw_marks(state: &State, cells: Rect, buffer: &mut Buffer) {
         }
     };
     if let Some(NormalizedRect { left, top, width, height }) =
-        state.request.first_section.filter(|_| is_region_marked(state))
+        state.request.first_section.filter(|_| are_region_marks_visible(state))
     {
         // Keep the marks inside the region.
         let (right, bottom) = (left + width * 0.999, top + height * 0.999);
@@ -37,7 +37,7 @@ pub(super) fn draw_marks(state: &State, cells: Rect, buffer: &mut Buffer) {
 }
 
 /// Whether to mark the region. It is marked while it is being selected or rendered.
-fn is_region_marked(state: &State) -> bool {
+fn are_region_marks_visible(state: &State) -> bool {
     state.selection.is_marking || state.work.is_request_running()
 }
 

@@ -53,7 +53,7 @@ pub(super) fn replaces_header_or_key_line(state: &State, layout: &Layout) -> boo
 }
 
 /// Returns the part of the status line that no message uses.
-pub(super) fn free_status_line_area(state: &State, layout: &Layout) -> Rect {
+pub(super) fn status_line_area_beside_message(state: &State, layout: &Layout) -> Rect {
     let spot = message_text(state, layout).map(|(words, _)| message_position(state, layout, &words));
     let used = match spot {
         Some(MessagePosition::Line(line)) if line.y == layout.under.y => line.width + GAP,

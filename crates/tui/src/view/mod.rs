@@ -44,7 +44,13 @@ pub(super) fn draw(state: &State, buffer: &mut Buffer) -> FileLinksAndDelayedTex
     header::draw(state, &layout, buffer);
     preview::draw(state, layout.preview, buffer);
     let mut drawn = panel::draw(state, layout.panel, buffer);
-    status_line::draw(state, &layout, message::free_status_line_area(state, &layout), buffer, &mut drawn);
+    status_line::draw(
+        state,
+        &layout,
+        message::status_line_area_beside_message(state, &layout),
+        buffer,
+        &mut drawn,
+    );
     keys::draw(state, &layout, buffer);
     if state.overlays.diagnostics.open {
         diagnostics::draw(state, layout.pane, buffer);

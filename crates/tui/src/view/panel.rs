@@ -17,7 +17,7 @@ use super::text::{
 use crate::pipeline::protocol::Stage;
 use crate::preview_kind::PreviewKind;
 use crate::scene::sanitize::escape_invisible_chars;
-use crate::state::{AssetProgressBar, State, WorkerActivity};
+use crate::state::{AssetProgressBar, RequestStatus, State};
 
 /// Width of an asset's progress bar.
 const BAR: u16 = 8;
@@ -83,7 +83,7 @@ fn rows_used(lines: &[StyledLine], columns: u16, room: Rect) -> u16 {
 /// Creates the panel's lines for `width`, with hints wrapped to `column`. Stage reasons are shown in full if
 /// `is_in_full`, and otherwise shortened to fit next to the stages.
 fn panel_lines(state: &State, (width, column): (u16, u16), is_in_full: bool) -> Vec<StyledLine> {
-    let is_done = matches!(state.work.activity, WorkerActivity::Done);
+    let is_done = matches!(state.work.activity, RequestStatus::Done);
     let mut lines = inspected_lines(state, width);
     // Stages and results describe the newest render.
     if state.picture.history.is_viewing_older() {
@@ -91,7 +91,7 @@ fn panel_lines(state: &State, (width, column): (u16, u16), is_in_full: bool) -> 
     }
     // If the scene is broken, its stages have no visible result.
     if !is_done && !is_scene_broken(state) {
-        let of = |stage| if is_in_full { stages::stage_lines_with_full_reason } else { stages::stage_line_with_reason }(state, stage, width);
+        let of = |stage| if is_in_full { stages::lines_of_stage_with_full_reason } else { stages::stage_line_with_reason }(state, stage, width);
         lines.extend(Stage::ALL.into_iter().flat_map(of));
     }
     if is_done {
@@ -122,8 +122,8 @@ fn inspected_lines(state: &State, width: u16) -> Vec<StyledLine> {
 /// Whether the current scene is invalid.
 fn is_scene_broken(state: &State) -> bool {
     let is_at_rest = match state.work.activity {
-        WorkerActivity::Waiting | WorkerActivity::Broken => true,
-        WorkerActivity::Running { .. } | WorkerActivity::Done | WorkerActivity::Cancelled => false,
+        RequestStatus::Waiting | RequestStatus::Broken => true,
+        RequestStatus::Running { .. } | RequestStatus::Done | RequestStatus::Cancelled => false,
     };
     is_at_rest && state.overlays.problems.as_ref().is_none_or(|problems| problems.work.is_none())
 }
@@ -155,7 +155,7 @@ fn result_lines(state: &State, width: u16) -> Vec<StyledLine> {
         lines.extend(wrap_text(words, usize::from(width)).into_iter().map(|line| vec![(line, tone)]));
     };
     status_line::unsaved_image_messages(state).iter().for_each(|words| add(words, TextRole::Faint));
-    status_line::changed_file_messages(state).for_each(|words| add(&words, TextRole::Warning));
+    status_line::externally_changed_output_messages(state).for_each(|words| add(&words, TextRole::Warning));
     for written in status_line::files_containing_current_image(state) {
         lines.push(vec![("→ ".to_owned(), TextRole::Good), (written.escaped_path(), TextRole::File)]);
         let size = state.request.effective.as_ref().map(|it| format!(", {}×{}", it.width, it.height));

@@ -2,7 +2,7 @@
 
 use crate::film::Srgb8Image;
 use crate::math::Vec3;
-use crate::math::color::{linear_to_srgb, linear_to_srgb8, luminance, srgb_to_linear, srgb8_to_linear};
+use crate::math::color::{linear_to_srgb, linear_to_srgb8, luminance, srgb_to_linear, srgb8_color_to_linear};
 
 /// Characters and the fraction of a cell covered by their ink, measured with DejaVu Sans Mono. Other fonts
 /// differ by a few percent. All are punctuation, so that they are not mistaken for text.
@@ -44,7 +44,7 @@ impl AsciiRamp {
         const MIN: f32 = 0.25;
         let mut counts = [0_usize; 256];
         for pixel in &picture.pixels {
-            let level = linear_to_srgb8(luminance(srgb8_to_linear(*pixel)));
+            let level = linear_to_srgb8(luminance(srgb8_color_to_linear(*pixel)));
             counts[usize::from(level)] += 1;
         }
         let beyond = picture.pixels.len() / 30;
@@ -55,29 +55,29 @@ impl AsciiRamp {
     }
 
     /// Maps an sRGB brightness from the ramp's range to [0, 1].
-    fn normalized_brightness(self, brightness: f32) -> f32 {
+    fn normalize_brightness_to_ramp_range(self, brightness: f32) -> f32 {
         ((brightness - self.low) / (self.high - self.low).max(1e-3)).clamp(0.0, 1.0)
     }
 
     /// The character for a color on a monochrome terminal.
     pub(super) fn glyph(self, rgb: [u8; 3]) -> char {
-        self.nearest_glyph(
-            self.normalized_brightness(linear_to_srgb(luminance(srgb8_to_linear(rgb)).clamp(0.0, 1.0))),
-        )
+        self.nearest_glyph(self.normalize_brightness_to_ramp_range(linear_to_srgb(
+            luminance(srgb8_color_to_linear(rgb)).clamp(0.0, 1.0),
+        )))
     }
 
     /// Returns the character that shows a color, and its ink color. The ink is as saturated as possible,
     /// which maximizes the area covered by the character.
     pub(super) fn tinted_glyph(self, rgb: [u8; 3]) -> (char, [u8; 3]) {
-        let linear = srgb8_to_linear(rgb);
+        let linear = srgb8_color_to_linear(rgb);
         if self.is_light {
             let ink = (1.0 - linear.min_element()).max(1e-3);
-            let brightness = self.normalized_brightness(linear_to_srgb(1.0 - ink));
+            let brightness = self.normalize_brightness_to_ramp_range(linear_to_srgb(1.0 - ink));
             (self.nearest_glyph(brightness), quantize_to_5_bits(Vec3::ONE - (Vec3::ONE - linear) / ink))
         } else {
             let brightest = linear.max_element().max(1e-3);
             (
-                self.nearest_glyph(self.normalized_brightness(linear_to_srgb(brightest))),
+                self.nearest_glyph(self.normalize_brightness_to_ramp_range(linear_to_srgb(brightest))),
                 quantize_to_5_bits(linear / brightest),
             )
         }
@@ -116,7 +116,7 @@ fn quantize_to_5_bits(linear: Vec3) -> [u8; 3] {
 
 /// Whether a background is perceptually closer to white than to black.
 pub(crate) fn is_light(rgb: [u8; 3]) -> bool {
-    luminance(srgb8_to_linear(rgb)) > srgb_to_linear(0.5)
+    luminance(srgb8_color_to_linear(rgb)) > srgb_to_linear(0.5)
 }
 
 #[cfg(test)]

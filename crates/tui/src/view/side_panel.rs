@@ -5,7 +5,7 @@ use ratatui::layout::Rect;
 
 use super::layout::ENTRY_WIDTH;
 use super::{curve, diagnostics, strip};
-use crate::state::{State, WorkerActivity};
+use crate::state::{RequestStatus, State};
 
 /// Minimum window width for the curve and the history.
 const WIDE: u16 = 120;
@@ -65,7 +65,7 @@ pub(super) fn history_entry_at(state: &State, panel: Rect, lines: u16, place: (u
 /// move when the results change.
 fn divide_chart_and_history_strip(state: &State, panel: Rect, lines: u16) -> (Rect, Rect) {
     let area = curve_and_history_area(state, panel, lines);
-    let is_over = state.work.activity == WorkerActivity::Done && !state.picture.history.is_viewing_older();
+    let is_over = state.work.activity == RequestStatus::Done && !state.picture.history.is_viewing_older();
     let wants_curve = |area| is_over && curve::chart_height(state, area).is_some();
     if area.width >= DIVIDED {
         // Place them side by side.

@@ -21,7 +21,7 @@ const MIN_WHY: u16 = 12;
 
 /// Formats a stage's symbol, name, time, time difference and reason. A reason that does not fit follows on
 /// separate lines.
-pub(super) fn stage_lines_with_full_reason(state: &State, stage: Stage, room: u16) -> Vec<StyledLine> {
+pub(super) fn lines_of_stage_with_full_reason(state: &State, stage: Stage, room: u16) -> Vec<StyledLine> {
     let mut line = stage_line(state, stage, room);
     let why = stage_reason(state, stage);
     if why.is_empty() {
@@ -117,14 +117,18 @@ pub(super) fn stage_summary_line(state: &State, room: u16) -> StyledLine {
     let first = done().find(|it| it.seconds >= longest).map(|it| it.name);
     let counts = |it: &StageReport| it.seconds >= SMALL * total;
     let forms = [
-        format_stage_summary(state, true, counts),
-        format_stage_summary(state, false, counts),
-        format_stage_summary(state, false, |it| Some(it.name) == first),
+        list_stage_times_and_cached_count(state, true, counts),
+        list_stage_times_and_cached_count(state, false, counts),
+        list_stage_times_and_cached_count(state, false, |it| Some(it.name) == first),
     ];
     forms.into_iter().find(|line| line_width(line) <= room).unwrap_or_default()
 }
 
-fn format_stage_summary(state: &State, is_long: bool, counts: impl Fn(&StageReport) -> bool) -> StyledLine {
+fn list_stage_times_and_cached_count(
+    state: &State,
+    is_long: bool,
+    counts: impl Fn(&StageReport) -> bool,
+) -> StyledLine {
     let mut line = StyledLine::new();
     let mut reused = 0;
     for report in state.work.stages.iter().flatten() {

@@ -8,8 +8,9 @@ use super::extras::FileLinksAndDelayedText;
 use super::layout::Layout;
 use super::stages::{self, running_stage_name};
 use super::text::{
-    TextRole, floor_percent, format_approximate_time, format_bytes, format_duration, format_running_time,
-    format_two_digit_percent, progress_bar_parts, put_text, put_text_right, remaining_row_area, text_columns,
+    TextRole, floor_percent, format_approximate_time, format_bytes, format_duration,
+    format_running_time_with_tenths, format_two_digit_percent, progress_bar_parts, put_text, put_text_right,
+    remaining_row_area, text_columns,
 };
 use crate::exit_summary;
 use crate::messages;
@@ -18,7 +19,7 @@ use crate::pipeline::words::format_mean_samples;
 use crate::preview_kind::PreviewKind;
 use crate::scene::has_mesh_extension;
 use crate::scene::sanitize::escape_invisible_chars;
-use crate::state::{SceneImageProgress, State, WorkerActivity, WrittenFile};
+use crate::state::{RequestStatus, SceneImageProgress, State, WrittenFile};
 
 /// Short save hints, for narrow windows.
 const SHORT_HINT: &str = "save it to re-render";
@@ -58,20 +59,20 @@ fn status_content(state: &State) -> StatusContent {
         return StatusContent::Nothing;
     }
     match state.work.activity {
-        WorkerActivity::Running { .. } => StatusContent::ProgressBar,
-        WorkerActivity::Done => StatusContent::Summary,
-        WorkerActivity::Waiting | WorkerActivity::Cancelled => StatusContent::Nothing,
-        WorkerActivity::Broken if let Some(progress) = last_valid_scene_progress(state) => {
+        RequestStatus::Running { .. } => StatusContent::ProgressBar,
+        RequestStatus::Done => StatusContent::Summary,
+        RequestStatus::Waiting | RequestStatus::Cancelled => StatusContent::Nothing,
+        RequestStatus::Broken if let Some(progress) = last_valid_scene_progress(state) => {
             StatusContent::Words(format!(
                 "{}: {} %",
                 messages::LAST_GOOD_SCENE,
                 floor_percent(progress.fraction)
             ))
         }
-        WorkerActivity::Broken if state.picture.shown.is_some() => {
+        RequestStatus::Broken if state.picture.shown.is_some() => {
             StatusContent::Words(messages::LAST_GOOD_RENDER.to_owned())
         }
-        WorkerActivity::Broken => StatusContent::Words(save_scene_hint(state)),
+        RequestStatus::Broken => StatusContent::Words(save_scene_hint(state)),
     }
 }
 
@@ -89,13 +90,14 @@ pub(super) fn reserved_columns(state: &State, layout: &Layout) -> u16 {
 
 /// Progress of the last valid scene's render, which continues while the file is broken.
 pub(crate) fn last_valid_scene_progress(state: &State) -> Option<&RenderProgress> {
-    let is_broken = matches!(state.work.activity, WorkerActivity::Broken | WorkerActivity::Waiting);
+    let is_broken = matches!(state.work.activity, RequestStatus::Broken | RequestStatus::Waiting);
     state.work.progress.as_ref().filter(|progress| is_broken && progress.fraction < 1.0)
 }
 
 /// Progress bar fraction and text for the asset being loaded or for the render.
 fn progress_fraction_and_text(state: &State, layout: &Layout) -> (f64, String) {
-    let time = state.work.total_rendering_time(state.now).map_or(String::new(), format_running_time);
+    let time =
+        state.work.total_rendering_time(state.now).map_or(String::new(), format_running_time_with_tenths);
     match (&state.work.progress, state.work.assets.last()) {
         (Some(progress), _) => {
             let samples = if progress.is_total_fixed {
@@ -182,7 +184,7 @@ fn draw_summary(
         }
     }
     if layout.panel.is_empty() {
-        for words in changed_file_messages(state) {
+        for words in externally_changed_output_messages(state) {
             is_room(vec![(format!(" {words}"), TextRole::Warning)]);
         }
     }
@@ -236,7 +238,7 @@ pub(crate) fn unsaved_image_messages(state: &State) -> Vec<String> {
     if files_containing_current_image(state).next().is_some() {
         return Vec::new();
     }
-    let by_hand = saving.manually_written_image();
+    let by_hand = saving.written_image_with_key_changes();
     if state.request.has_no_keyboard_overrides() {
         let by_hand = by_hand.filter(|_| saving.unwritten.is_none());
         let words = |file: &WrittenFile| {
@@ -261,7 +263,7 @@ pub(crate) fn unsaved_image_messages(state: &State) -> Vec<String> {
         )),
         (SceneImageProgress { state: SavedSceneImageState::Written, .. }, None, _) | (_, None, None) => None,
         (SceneImageProgress { state: SavedSceneImageState::Begun { .. }, fraction }, None, Some(name)) => {
-            Some(messages::scene_image_unfinished(&name, floor_percent(fraction)))
+            Some(messages::scene_image_interrupted(&name, floor_percent(fraction)))
         }
         (SceneImageProgress { state: SavedSceneImageState::NotBegun, .. }, None, Some(name)) => {
             let is_older = !saving.written.is_empty() && saving.are_images_outdated();
@@ -272,7 +274,7 @@ pub(crate) fn unsaved_image_messages(state: &State) -> Vec<String> {
 }
 
 /// Returns a message for each written file that another program has changed.
-pub(super) fn changed_file_messages(state: &State) -> impl Iterator<Item = String> {
+pub(super) fn externally_changed_output_messages(state: &State) -> impl Iterator<Item = String> {
     state.saving.written.iter().filter_map(WrittenFile::describe_external_change)
 }
 

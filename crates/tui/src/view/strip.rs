@@ -79,7 +79,7 @@ fn draw_entry(
     // The text next to the thumbnail starts in the same column with or without a mark.
     let words = EntryNumberAndChanges {
         head: format!("{mark}{} ", render_number_label(state, *index)),
-        changes: history.describe_changes(*index, is_entry_rendering(state, *index)),
+        changes: history.describe_changes_since_previous(*index, is_entry_rendering(state, *index)),
     };
     let beside = remaining_row_area(*cells, place.width + 1);
     let lines =

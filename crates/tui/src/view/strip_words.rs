@@ -37,7 +37,7 @@ pub(super) fn wrap_entry_text(words: &EntryNumberAndChanges, width: usize, rows:
     let fewer = (1..count).rev().map(ChangeDetail::First).chain([ChangeDetail::Cut]);
     let in_few = all.map(|form| (form, few));
     let in_most = all.into_iter().chain(fewer).map(|form| (form, most));
-    let lines = |form| fill_lines(&words.head, &split_shown_changes(words, form, width), width);
+    let lines = |form| fill_lines(&words.head, &split_changes_into_pieces(words, form, width), width);
     let is_lone =
         |lines: &[String]| lines.first().is_some_and(|line| line.trim_end() == words.head.trim_end());
     let fits = |(form, rows): (ChangeDetail, usize)| {
@@ -55,7 +55,7 @@ pub(super) fn wrap_entry_text(words: &EntryNumberAndChanges, width: usize, rows:
 }
 
 /// Splits all displayed changes into pieces.
-fn split_shown_changes(
+fn split_changes_into_pieces(
     words: &EntryNumberAndChanges,
     form: ChangeDetail,
     width: usize,

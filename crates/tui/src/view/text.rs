@@ -173,7 +173,7 @@ pub(crate) fn format_duration(time: Duration) -> String {
 
 /// Formats a running time. Always shows tenths of a second up to a minute, so that the format does not keep
 /// changing.
-pub(super) fn format_running_time(time: Duration) -> String {
+pub(super) fn format_running_time_with_tenths(time: Duration) -> String {
     if time.as_secs() < 60 { format!("{:.1} s", time.as_secs_f64()) } else { format_duration(time) }
 }
 
@@ -246,7 +246,7 @@ pub(super) fn format_two_digit_percent(part: f64) -> String {
 }
 
 /// Formats a number with about three significant digits.
-pub(super) fn format_three_digit_number(x: f32) -> String {
+pub(super) fn format_number_to_three_digits(x: f32) -> String {
     let digits = match x.abs() {
         x if x >= 100.0 => 0,
         x if x >= 10.0 => 1,

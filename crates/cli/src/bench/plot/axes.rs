@@ -63,7 +63,7 @@ pub(super) fn format_log_axis_mark(mark: f64) -> String {
 }
 
 /// Formats a mark as `0.02`, `5` or `200`.
-pub(super) fn format_decimal(mark: f64) -> String {
+pub(super) fn format_log_mark_as_decimal(mark: f64) -> String {
     let (factor, whole) = digit_and_exponent(mark);
     if (-3..=5).contains(&whole) {
         let decimals = (-whole).max(0) as usize;
@@ -104,7 +104,7 @@ mod tests {
         let far = LogAxis::spanning([1e-5, 0.3].into_iter(), 0.0);
         assert_eq!(far.marks, [-5.0, -4.0, -3.0, -2.0, -1.0]);
         let near = LogAxis::spanning([0.02, 0.3, -1.0, f64::NAN].into_iter(), 0.0);
-        let names: Vec<String> = near.marks.iter().map(|mark| format_decimal(*mark)).collect();
+        let names: Vec<String> = near.marks.iter().map(|mark| format_log_mark_as_decimal(*mark)).collect();
         assert_eq!(names, ["0.02", "0.05", "0.1", "0.2"]);
         let names: Vec<String> = near.marks.iter().map(|mark| format_log_axis_mark(*mark)).collect();
         assert_eq!(names, ["2·10⁻²", "5·10⁻²", "10⁻¹", "2·10⁻¹"]);
@@ -112,6 +112,9 @@ mod tests {
         let half = LogAxis::spanning([1e-2, 1.0].into_iter(), 0.5).range;
         assert!((half.start + 4.36).abs() < 1e-9 && (half.end - 0.12).abs() < 1e-9, "{half:?}");
         assert_eq!(format_log_axis_mark(libm::log10(5.0)), "5");
-        assert_eq!((format_decimal(2.0).as_str(), format_decimal(-12.0).as_str()), ("100", "10⁻¹²"));
+        assert_eq!(
+            (format_log_mark_as_decimal(2.0).as_str(), format_log_mark_as_decimal(-12.0).as_str()),
+            ("100", "10⁻¹²")
+        );
     }
 }

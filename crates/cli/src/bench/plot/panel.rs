@@ -4,7 +4,7 @@ use plotters::coord::Shift;
 use plotters::prelude::*;
 
 use super::AXES;
-use super::axes::{LogAxis, format_decimal, format_log_axis_mark};
+use super::axes::{LogAxis, format_log_axis_mark, format_log_mark_as_decimal};
 use crate::bench::results::{BiasVerdict, MethodResult, SceneResult, StepResult};
 use crate::bench::slope::Slope;
 use crate::scene::sanitize::escape_invisible_chars;
@@ -52,7 +52,7 @@ pub(super) fn draw_panel<'a>(scene: &SceneResult, place: &PanelArea<'a>) -> Resu
         .axis_desc_style(("sans-serif", 16))
         .x_desc(AXES[0])
         .y_desc(AXES[1])
-        .x_label_formatter(&|mark| format_decimal(*mark))
+        .x_label_formatter(&|mark| format_log_mark_as_decimal(*mark))
         .y_label_formatter(&|mark| format_log_axis_mark(*mark))
         .draw()?;
     if noise > 0.0 {

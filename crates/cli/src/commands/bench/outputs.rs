@@ -12,8 +12,8 @@ use crate::exit::Exit;
 use crate::lower::STDOUT_NAME;
 use crate::output::write::{self, WritePolicy};
 use crate::output::{
-    self, AttributeLossPolicy, FileIdentity, OutputError, is_same_file, may_replace_json, may_replace_plot,
-    may_replace_table,
+    self, AttributeLossPolicy, FileIdentity, OutputError, check_json_replaceable, check_plot_replaceable,
+    check_table_replaceable, is_same_file,
 };
 use crate::system::{describe_error, file};
 
@@ -110,12 +110,12 @@ impl BenchOutputs {
     fn check_written_by_glimt(&self, index: usize, real: &Path) -> Result<(), OutputError> {
         let (option, path, kind) = &self.files[index];
         let replaced = match kind {
-            OutputKind::Csv => may_replace_table(real, csv::HEAD),
+            OutputKind::Csv => check_table_replaceable(real, csv::HEAD),
             // Replace only valid baselines, which contain at least one scene.
             OutputKind::Json => {
-                may_replace_json(real, "a results file", |found: &Results| !found.scenes.is_empty())
+                check_json_replaceable(real, "a results file", |found: &Results| !found.scenes.is_empty())
             }
-            OutputKind::Plot => may_replace_plot(real, &plot::AXES),
+            OutputKind::Plot => check_plot_replaceable(real, &plot::AXES),
         };
         let Some(why) = replaced.reason_to_keep() else { return Ok(()) };
         let way_out = format!("choose another file with {option} FILE, or use --force");

@@ -4,7 +4,7 @@ use lsp_types::{Color, ColorInformation, ColorPresentation};
 use serde_json::{Value, json};
 
 use super::document::OpenDocument;
-use crate::math::color::{linear_to_srgb, srgb8_to_linear};
+use crate::math::color::{linear_to_srgb, srgb8_color_to_linear};
 use crate::scene::keys::key::ValueKind;
 use crate::scene::keys::parse_hex_or_named_srgb8;
 use crate::scene::outline::OutlineKey;
@@ -53,7 +53,7 @@ pub(super) fn color_presentations(params: &Value) -> Option<Value> {
     let color: Color = serde_json::from_value(params["color"].clone()).ok()?;
     let bytes = [color.red, color.green, color.blue].map(|part| (part.clamp(0.0, 1.0) * 255.0).round() as u8);
     let [red, green, blue] = bytes;
-    let linear = srgb8_to_linear(bytes).to_array().map(|part| format!("{part:.3}"));
+    let linear = srgb8_color_to_linear(bytes).to_array().map(|part| format!("{part:.3}"));
     let labels = [format!("\"#{red:02x}{green:02x}{blue:02x}\""), format!("[{}]", linear.join(", "))];
     let presentation = |label: String| ColorPresentation { label, ..ColorPresentation::default() };
     Some(json!(labels.map(presentation)))

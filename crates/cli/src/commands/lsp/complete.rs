@@ -7,7 +7,7 @@ use lsp_types::{
 use serde_json::{Value, json};
 
 use super::document::OpenDocument;
-use super::look::{describe_key, texture_reference_keys};
+use super::look::{describe_key, texture_inline_table_keys};
 use super::place::{CursorContext, CursorTable, cursor_context};
 use crate::scene::keys::key::{ChoiceValue, KeyInfo, TableSyntax, ValueKind};
 use crate::scene::keys::{all_tables, color_names};
@@ -22,8 +22,9 @@ pub(super) fn complete(document: &OpenDocument, offset: usize) -> Option<Value> 
             of.find_allowed_key(&key).map(|key| value_items(document, key.kind, is_quoted))?
         }
         CursorContext::InnerKey { given } => {
-            let keys =
-                texture_reference_keys().into_iter().filter(|(name, _)| !given.iter().any(|one| one == name));
+            let keys = texture_inline_table_keys()
+                .into_iter()
+                .filter(|(name, _)| !given.iter().any(|one| one == name));
             keys.map(|(name, doc)| {
                 completion_item(name, CompletionItemKind::PROPERTY, doc, format!("{name} = "))
             })

@@ -45,7 +45,7 @@ pub(super) fn hover(document: &OpenDocument, offset: usize) -> Option<Value> {
             None => return None,
         }
     } else {
-        texture_reference_keys().into_iter().find(|(known, _)| *known == name)?.1.to_owned()
+        texture_inline_table_keys().into_iter().find(|(known, _)| *known == name)?.1.to_owned()
     };
     let contents = HoverContents::Markup(MarkupContent { kind: MarkupKind::Markdown, value: text });
     Some(json!(Hover { contents, range: Some(document.to_lsp_range(&key.name.span)) }))
@@ -75,7 +75,7 @@ pub(super) fn describe_key(key: &KeyInfo) -> String {
 }
 
 /// Returns the keys allowed in a texture's inline table.
-pub(super) fn texture_reference_keys() -> [(&'static str, &'static str); 3] {
+pub(super) fn texture_inline_table_keys() -> [(&'static str, &'static str); 3] {
     [
         ("texture", "The name of a texture."),
         ("channel", "The channel to read: `\"r\"`, `\"g\"`, `\"b\"` or `\"a\"`."),

@@ -43,7 +43,7 @@ pub(super) fn cursor_context(text: &str, offset: usize) -> Option<CursorContext>
     let line = &before[before.rfind('\n').map_or(0, |at| at + 1)..];
     let trimmed = line.trim_start();
     let around = EnclosingTable::from_offset(text, offset);
-    if LineEndState::scan_line(line).is_comment || around.is_in_array {
+    if LineEndState::from_line(line).is_comment || around.is_in_array {
         return None;
     }
     if trimmed.starts_with('[') && !trimmed.contains(']') {
@@ -117,7 +117,7 @@ fn last_list_item(typed: &str) -> &str {
 }
 
 fn is_in_quotes(value: &str) -> bool {
-    LineEndState::scan_line(value).quote.is_some()
+    LineEndState::from_line(value).quote.is_some()
 }
 
 /// State at the end of a line: whether a string, a comment or brackets are open.
@@ -131,7 +131,7 @@ struct LineEndState {
 }
 
 impl LineEndState {
-    fn scan_line(line: &str) -> Self {
+    fn from_line(line: &str) -> Self {
         let mut scan = Self::default();
         let mut is_escaped = false;
         for character in line.chars() {
@@ -180,7 +180,7 @@ impl<'t> EnclosingTable<'t> {
                 // Stop at the next table.
                 Some(_) if offset < start => break,
                 Some(name) => header = Some((name, end)),
-                None => open = (open + LineEndState::scan_line(line).brackets).max(0),
+                None => open = (open + LineEndState::from_line(line).brackets).max(0),
             }
             at = end;
         }

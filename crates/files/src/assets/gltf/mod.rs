@@ -104,7 +104,7 @@ impl GltfFile {
         let monitor = Monitor { progress, token };
         let bytes = read::read_unless_zeros_at_start(path, FILE_LIMIT, monitor)?;
         read::reject_utf16(path, &bytes)?;
-        let (length, hash) = (bytes.len(), read::hash(&bytes));
+        let (length, hash) = (bytes.len(), read::hash_bytes(&bytes));
         let wrong = |wrong: GltfError| AssetError::malformed(path, None, wrong.0);
         let (json, binary) =
             if bytes.starts_with(b"glTF") { glb_chunks(&bytes).map_err(wrong)? } else { (0..length, None) };
@@ -356,7 +356,7 @@ fn short_buffer_message(claimed: u64, has: usize) -> String {
     format!("it claims {claimed} bytes but has {has}")
 }
 
-fn missing_buffer_message(reason: &str, number: usize, name: &str) -> String {
+fn unreadable_buffer_file_message(reason: &str, number: usize, name: &str) -> String {
     format!("{reason}; {name} stores buffers[{number}] there")
 }
 
@@ -538,11 +538,14 @@ fn read_buffers(
                     read::read_bytes(&file, FILE_LIMIT - total, silent).map_err(|error| match error {
                         AssetError::Unreadable { path: missing, reason } => {
                             let name = path.file_name().unwrap_or_default().to_string_lossy();
-                            AssetError::unreadable(&missing, missing_buffer_message(&reason, number, &name))
+                            AssetError::unreadable(
+                                &missing,
+                                unreadable_buffer_file_message(&reason, number, &name),
+                            )
                         }
                         other => other,
                     })?;
-                files.push(Companion { path: file, hash: Some(read::hash(&bytes)), stamp });
+                files.push(Companion { path: file, hash: Some(read::hash_bytes(&bytes)), stamp });
                 bytes
             }
             None if number == 0 => binary

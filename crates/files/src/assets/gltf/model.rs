@@ -37,7 +37,7 @@ impl GltfFile {
             notes: ImportNotes::default(),
             materials: HashMap::new(),
         };
-        walk.run().map_err(|wrong| self.malformed_error(wrong))?;
+        walk.add_all_nodes().map_err(|wrong| self.malformed_error(wrong))?;
         let SceneWalk { mut scene, notes, .. } = walk;
         scene.notes = notes.0;
         scene.images = self.root.images.iter().map(|image| image.name.clone()).collect();
@@ -110,7 +110,7 @@ struct SceneWalk<'a> {
 }
 
 impl SceneWalk<'_> {
-    fn run(&mut self) -> Result<(), GltfError> {
+    fn add_all_nodes(&mut self) -> Result<(), GltfError> {
         let root = &self.container.root;
         // Find the root nodes.
         let number = root.scene.unwrap_or_default();
@@ -196,7 +196,7 @@ impl SceneWalk<'_> {
             let json = lights
                 .get(light.light)
                 .ok_or_else(|| GltfError::index_out_of_range("lights", light.light, lights.len()))?;
-            check_intensity(json, light.light)?;
+            check_intensity_limit(json, light.light)?;
             self.add_light(json, &node.name, placed, &place);
         }
         if node.extensions.instancing.is_some() {
@@ -232,7 +232,7 @@ impl SceneWalk<'_> {
             }
             let material =
                 self.material_index(primitive.material, container.select_two_uv_sets(primitive))?;
-            let colors = container.attribute(primitive, "COLOR_0")?;
+            let colors = container.open_attribute(primitive, "COLOR_0")?;
             self.note_ignored_attributes(
                 &format!("meshes[{mesh}].primitives[{index}]"),
                 primitive,
@@ -436,7 +436,7 @@ fn check_transform_magnitude(node: &JsonNode, placed: &AffineMap) -> Result<(), 
 }
 
 /// Rejects lights with an intensity above the limit.
-fn check_intensity(json: &JsonLight, number: usize) -> Result<(), GltfError> {
+fn check_intensity_limit(json: &JsonLight, number: usize) -> Result<(), GltfError> {
     let brightest = json.color.iter().fold(0.0_f64, |max, part| max.max(*part)) * json.intensity;
     if brightest < LIMIT || !(json.intensity > 0.0) {
         return Ok(());

@@ -86,7 +86,7 @@ impl GltfFile {
             return Err(GltfError::new("points and lines have no faces"));
         }
         // Find the vertex of each corner.
-        let positions = self.attribute(primitive, "POSITION")?;
+        let positions = self.open_attribute(primitive, "POSITION")?;
         let positions = positions.ok_or_else(|| GltfError::new("it has no positions"))?;
         if positions.width != 3 {
             let width = positions.width;
@@ -96,12 +96,12 @@ impl GltfFile {
         let (corners, vertices) = self.read_corner_indices(primitive, positions.count)?;
         // Read the vertex attributes.
         let is_complete = |numbers: &AccessorReader<'_>| numbers.count >= positions.count;
-        let normals = self.attribute(primitive, "NORMAL")?.filter(is_complete);
+        let normals = self.open_attribute(primitive, "NORMAL")?.filter(is_complete);
         let mut sets = Vec::with_capacity(2);
         for set in self.select_two_uv_sets(primitive) {
-            sets.push(self.attribute(primitive, &format!("TEXCOORD_{set}"))?.filter(is_complete));
+            sets.push(self.open_attribute(primitive, &format!("TEXCOORD_{set}"))?.filter(is_complete));
         }
-        let colors = self.attribute(primitive, "COLOR_0")?.filter(is_complete);
+        let colors = self.open_attribute(primitive, "COLOR_0")?.filter(is_complete);
         let each = || vertices.iter().map(|vertex| *vertex as usize);
         let mut parsed = ParsedMesh { faces: triangulate(primitive.mode, &corners), ..ParsedMesh::default() };
         parsed.positions = each()
@@ -127,7 +127,7 @@ impl GltfFile {
     }
 
     /// Opens an attribute of a primitive, if present.
-    pub(super) fn attribute(
+    pub(super) fn open_attribute(
         &self,
         primitive: &Primitive,
         name: &str,

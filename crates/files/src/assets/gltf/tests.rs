@@ -406,7 +406,7 @@ fn errors_include_their_location() {
     let mut external = square();
     external["buffers"][0]["uri"] = json!("none.bin");
     let missing = crate::system::describe_error(&std::io::Error::from_raw_os_error(nix::libc::ENOENT));
-    assert_eq!(rejection(open_json(&external)).1, missing_buffer_message(&missing, 0, "a.gltf"));
+    assert_eq!(rejection(open_json(&external)).1, unreadable_buffer_file_message(&missing, 0, "a.gltf"));
     let zeros = json!({"componentType": 5126, "count": 4_000_000_000_u32, "type": "VEC3"});
     let found = with(&|json| json["accessors"][0] = zeros.clone());
     assert!(found.ends_with(&too_many_zeros_message(4_000_000_000)), "{found}");

@@ -136,7 +136,7 @@ mod tests {
     }
 
     #[test]
-    fn reports_are_in_order_and_panics_return_none() {
+    fn reports_are_in_order_and_panics_become_errors() {
         let token = CancelToken::new();
         let seen = Mutex::new(Vec::new());
         let note = |done, total| seen.lock().expect("no panic").push((done, total));

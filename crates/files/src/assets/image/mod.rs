@@ -297,7 +297,7 @@ pub fn mipmaps(texels: &Texels, token: &CancelToken) -> Result<Mipmaps, Cancelle
 ///
 /// # Errors
 /// [`Cancelled`].
-pub fn build_coverage_mipmaps(
+pub fn mipmaps_of_thresholded_texels(
     texels: &Texels,
     cutoff: f32,
     token: &CancelToken,
@@ -380,7 +380,7 @@ impl OpenImage {
             None => {
                 let monitor = Monitor { progress: &ignore_progress, token };
                 let bytes = read::read_rest(path, file, (length, FILE_LIMIT), monitor)?;
-                let hash = read::hash(&bytes);
+                let hash = read::hash_bytes(&bytes);
                 (bytes, hash)
             }
         };

@@ -229,7 +229,7 @@ fn unsupported_cicp_warning(points: png::CodingIndependentCodePoints) -> String 
 
 /// Reads a file's color profile, then rewinds the file.
 fn read_profile(file: &mut (impl Read + Seek)) -> io::Result<Option<DecompressedProfile>> {
-    let profile = find_profile(file);
+    let profile = find_and_decompress_profile(file);
     file.seek(SeekFrom::Start(0))?;
     match profile {
         // The decoder reports truncated files.
@@ -238,7 +238,7 @@ fn read_profile(file: &mut (impl Read + Seek)) -> io::Result<Option<Decompressed
     }
 }
 
-fn find_profile(file: &mut (impl Read + Seek)) -> io::Result<Option<DecompressedProfile>> {
+fn find_and_decompress_profile(file: &mut (impl Read + Seek)) -> io::Result<Option<DecompressedProfile>> {
     const SIGNATURE: u64 = 8;
     const CHECKSUM: i64 = 4;
     file.seek(SeekFrom::Start(SIGNATURE))?;

@@ -61,10 +61,10 @@ pub(super) fn assemble_text_mesh(
     if triangles.is_empty() {
         return Err(source.malformed_error_without_line(no_usable_face_message(faces.len(), dropped)));
     }
-    let bad_uvs = [&uvs, &second_uvs].map(|uvs| find_non_finite_vertices(uvs, |uv| uv.is_finite()));
-    let bad_normals = find_non_finite_vertices(&normals, |normal| normal.is_finite());
-    warnings.extend(first_non_finite_face_warning(&faces, line_of, &bad_uvs.concat(), NON_FINITE_UVS));
-    warnings.extend(first_non_finite_face_warning(&faces, line_of, &bad_normals, NON_FINITE_NORMALS));
+    let bad_uvs = [&uvs, &second_uvs].map(|uvs| vertices_with_non_finite_attribute(uvs, |uv| uv.is_finite()));
+    let bad_normals = vertices_with_non_finite_attribute(&normals, |normal| normal.is_finite());
+    warnings.extend(first_face_using_vertices_warning(&faces, line_of, &bad_uvs.concat(), NON_FINITE_UVS));
+    warnings.extend(first_face_using_vertices_warning(&faces, line_of, &bad_normals, NON_FINITE_NORMALS));
     let materials_of = triangle_materials;
     let mut mesh = TriangleMesh {
         origin,
@@ -123,12 +123,12 @@ const NON_FINITE_UVS: &str = "has non-finite texture coordinates; such coordinat
 const NON_FINITE_NORMALS: &str = "has non-finite normals; they are recomputed";
 
 /// Returns the vertices whose attribute is not finite.
-fn find_non_finite_vertices<T>(values: &[T], is_finite: impl Fn(&T) -> bool) -> Vec<u32> {
+fn vertices_with_non_finite_attribute<T>(values: &[T], is_finite: impl Fn(&T) -> bool) -> Vec<u32> {
     (0_u32..).zip(values).filter(|(_, value)| !is_finite(value)).map(|(vertex, _)| vertex).collect()
 }
 
 /// Warns about the first face that uses any of the vertices.
-fn first_non_finite_face_warning(
+fn first_face_using_vertices_warning(
     faces: &Faces,
     line_of: impl Fn(usize) -> Option<usize>,
     vertices: &[u32],

@@ -45,10 +45,10 @@ pub const EXTENSIONS: [&str; 4] = ["obj", "off", "ply", "stl"];
 pub fn load(path: &Path, progress: Progress<'_>, token: &CancelToken) -> Result<LoadedMesh, AssetError> {
     let extension =
         path.extension().map(|extension| extension.to_string_lossy().to_lowercase()).unwrap_or_default();
-    let (parse, read): (ParseFn, ReadFileFn) = match extension.as_str() {
+    let (parse, read): (ParseFn, ReadMeshFileFn) = match extension.as_str() {
         "obj" => (obj::parse, read::read_text),
-        "off" => (off::parse, read::read_rejecting_non_ascii_magic),
-        "ply" => (ply::parse, read::read_rejecting_non_ascii_magic),
+        "off" => (off::parse, read::read_rejecting_zeros_in_magic),
+        "ply" => (ply::parse, read::read_rejecting_zeros_in_magic),
         "stl" => (stl::parse, read::read_unless_zeros_at_start),
         _ => return Err(AssetError::unreadable(path, UNKNOWN_FORMAT)),
     };
@@ -58,7 +58,7 @@ pub fn load(path: &Path, progress: Progress<'_>, token: &CancelToken) -> Result<
     if source.bytes.is_empty() {
         return Err(source.malformed_error_without_line(EMPTY_FILE));
     }
-    let loaded = LoadedMesh { hash: read::hash(&bytes), ..parse(&source)? };
+    let loaded = LoadedMesh { hash: read::hash_bytes(&bytes), ..parse(&source)? };
     monitor.report_and_check_cancel(2 * bytes.len(), 2 * bytes.len())?;
     Ok(loaded)
 }
@@ -85,7 +85,7 @@ pub(crate) fn vertex_out_of_range_message(vertex: i64, count: u64) -> String {
 }
 
 type ParseFn = fn(&MeshFileBytes<'_>) -> Result<LoadedMesh, AssetError>;
-type ReadFileFn = fn(&Path, u64, Monitor<'_>) -> Result<Vec<u8>, AssetError>;
+type ReadMeshFileFn = fn(&Path, u64, Monitor<'_>) -> Result<Vec<u8>, AssetError>;
 
 /// A mesh file in memory, with the monitor for its parser.
 #[derive(Clone, Copy)]

@@ -32,16 +32,16 @@ struct OffReader<'a> {
     source: MeshFileBytes<'a>,
     cursor: Cursor<'a>,
     /// Lines with numbers that the header does not declare.
-    excess: IgnoredLines,
+    excess: LinesWithIgnoredValues,
     /// Lines whose color is an index into a colormap.
-    indices: IgnoredLines,
+    indices: LinesWithIgnoredValues,
 }
 
 /// Lines to warn about: their number and the byte offset of the first one.
 #[derive(Clone, Copy, Default)]
-struct IgnoredLines(u64, usize);
+struct LinesWithIgnoredValues(u64, usize);
 
-impl IgnoredLines {
+impl LinesWithIgnoredValues {
     fn add(&mut self, at: usize) {
         self.1 = if self.0 == 0 { at } else { self.1 };
         self.0 += 1;
@@ -49,12 +49,12 @@ impl IgnoredLines {
 
     fn warning(self, source: &MeshFileBytes<'_>, ignored: &str) -> Option<String> {
         let Self(count, first) = self;
-        (count > 0).then(|| ignored_lines_warning(source.line_number(first), count, ignored))
+        (count > 0).then(|| ignored_values_warning(source.line_number(first), count, ignored))
     }
 }
 
 /// Warning about ignored values on `count` lines.
-fn ignored_lines_warning(first: usize, count: u64, ignored: &str) -> String {
+fn ignored_values_warning(first: usize, count: u64, ignored: &str) -> String {
     match count {
         1 => format!("line {first}: ignored {ignored}"),
         _ => format!("line {first} and {} more: ignored {ignored}", count - 1),
@@ -263,7 +263,7 @@ impl OffReader<'_> {
     /// Checks the counts against the file size. A vertex takes at least 6 bytes, a face at least 2.
     fn check_plausible_counts(&self, vertices: u64, faces: u64) -> Result<(), AssetError> {
         let needed = vertices.saturating_mul(6).saturating_add(faces.saturating_mul(2));
-        let remaining = self.cursor.remaining() as u64;
+        let remaining = self.cursor.remaining_byte_count() as u64;
         if needed > remaining + 1 || vertices > u64::from(u32::MAX) {
             let reason = implausible_counts_message(vertices, faces, remaining);
             return Err(self
@@ -387,7 +387,7 @@ impl OffReader<'_> {
         colors: &mut ParsedOffColors,
     ) -> Result<(), AssetError> {
         let arity = usize::try_from(self.read_nonnegative_integer("corners")?).unwrap_or(usize::MAX);
-        if arity.saturating_mul(2) > self.cursor.remaining() {
+        if arity.saturating_mul(2) > self.cursor.remaining_byte_count() {
             return self.fail(too_many_corners_message(arity));
         }
         for corner in 0..arity {
@@ -516,13 +516,13 @@ mod tests {
         }
         assert_eq!(off(["255 0 0", ""]), ([[red; 3], [white; 3]].concat(), vec![]));
         assert_eq!(off(["", ""]), (vec![], vec![]));
-        let index = ignored_lines_warning(7, 1, COLOR_INDEX);
+        let index = ignored_values_warning(7, 1, COLOR_INDEX);
         assert_eq!(off(["3", "255 0 0"]), ([[white; 3], [red; 3]].concat(), vec![index]));
         let clamped = vec![format!("line 8: {}", clamped_color_warning(-1.0, 255.0))];
         assert_eq!(off(["255 0 0", "-1 255 0"]), (both.0, clamped));
         let transparent = vec![alpha_ignored_warning(8)];
         assert_eq!(off(["1 0 0", "0 1 0 0.5"]), ([[red; 3], [green; 3]].concat(), transparent));
-        let more = ignored_lines_warning(7, 2, UNDECLARED);
+        let more = ignored_values_warning(7, 2, UNDECLARED);
         assert_eq!(off(["1 2", "1 0 0 1 7"]), ([[white; 3], [red; 3]].concat(), vec![more]));
         assert_eq!(
             corner_colors("COFF", " 0 255 0", ["255 0 0", "255 0 0"]),
@@ -540,7 +540,7 @@ mod tests {
 
     #[test]
     fn undeclared_numbers_are_reported_with_line() {
-        let more = ignored_lines_warning(3, 4, UNDECLARED);
+        let more = ignored_values_warning(3, 4, UNDECLARED);
         assert_eq!(corner_colors("OFF", " 0 0 1", ["", ""]), (vec![], vec![more.clone()]));
         assert_eq!(corner_colors("NOFF", " 0 0 1 7", ["", ""]).1, [more]);
         assert!(corner_colors("NOFF", " 0 0 1", ["", ""]).1.is_empty());

@@ -76,7 +76,7 @@ fn lightness(t: f64) -> f64 {
 }
 
 /// Distance between green and blue, the two display colors that are farthest apart.
-pub(super) fn max_display_color_distance() -> f64 {
+pub(super) fn max_display_hyab_distance() -> f64 {
     PerceivedColor::from_linear(DVec3::Y).distance(&PerceivedColor::from_linear(DVec3::Z))
 }
 

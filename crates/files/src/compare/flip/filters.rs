@@ -3,7 +3,7 @@
 
 use std::f64::consts::{FRAC_1_SQRT_2, PI};
 
-use super::super::plane::{Plane, gaussian_kernel, normalized_taps, offsets};
+use super::super::plane::{Plane, normalized_taps, offsets, unnormalized_gaussian};
 
 /// A Gaussian term of a contrast sensitivity function: amplitude, and width in square degrees.
 #[derive(Clone, Copy)]
@@ -52,11 +52,11 @@ impl Filters {
             [&zeros, taps, &zeros].concat()
         };
         let blurs = SENSITIVITY.map(|terms| {
-            let mut blurs = contrast_sensitivity_blurs(terms, blur_radius, pixels_per_degree);
+            let mut blurs = sensitivity_blurs_of_channel(terms, blur_radius, pixels_per_degree);
             blurs.iter_mut().for_each(|blur| blur.taps = padded(&blur.taps, blur_radius));
             blurs
         });
-        let bell = gaussian_kernel(sigma, feature_radius);
+        let bell = unnormalized_gaussian(sigma, feature_radius);
         let slope: Vec<_> = offsets(feature_radius).zip(&bell).map(|(x, g)| -x * g).collect();
         let curvature: Vec<_> =
             offsets(feature_radius).zip(&bell).map(|(x, g)| (x * x / (sigma * sigma) - 1.0) * g).collect();
@@ -104,7 +104,7 @@ impl Filters {
 }
 
 /// Creates the Gaussian blurs for a channel. Their weights are chosen so that all 2D taps sum to 1.
-fn contrast_sensitivity_blurs(
+fn sensitivity_blurs_of_channel(
     terms: &[SensitivityTerm],
     radius: usize,
     pixels_per_degree: f64,
@@ -112,7 +112,7 @@ fn contrast_sensitivity_blurs(
     let volumes = terms.iter().map(|term| {
         // exp(−π²d²/b) with d in degrees.
         let sigma = (term.b / 2.0).sqrt() / PI * pixels_per_degree;
-        let taps = gaussian_kernel(sigma, radius);
+        let taps = unnormalized_gaussian(sigma, radius);
         let sum: f64 = taps.iter().sum();
         WeightedGaussian { weight: term.a * (PI / term.b).sqrt() * sum * sum, taps: normalized_taps(&taps) }
     });

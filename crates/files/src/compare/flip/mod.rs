@@ -28,7 +28,7 @@ const PT: f64 = 0.95;
 pub(super) fn error_map(pair: &Pair) -> Vec<f32> {
     let (width, height) = (pair.width(), pair.height());
     let filters = Filters::new(PIXELS_PER_DEGREE);
-    let max = libm::pow(color::max_display_color_distance(), QC);
+    let max = libm::pow(color::max_display_hyab_distance(), QC);
     let mut map = vec![0.0; width * height];
     map.par_chunks_mut(width * tiles::SIDE).enumerate().for_each(|(band, out)| {
         for tile in tiles::tiles_in_band(band, width, height) {

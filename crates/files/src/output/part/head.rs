@@ -294,7 +294,7 @@ const FILE: &str = "file ";
 
 impl RenderInput {
     /// Creates an input for a setting.
-    pub fn from_name_and_value(name: &str, value: impl Into<String>) -> Self {
+    pub fn from_setting(name: &str, value: impl Into<String>) -> Self {
         Self { name: name.to_owned(), value: value.into() }
     }
 

@@ -27,7 +27,7 @@ pub(super) fn read_gif_info(mut file: impl Read) -> Option<ImageInfo> {
                 let Some([kind]) = read_array(&mut file) else { break false };
                 let mut comment = Vec::new();
                 let keep = |part: &[u8]| comment.extend_from_slice(if kind == COMMENT { part } else { &[] });
-                if read_sub_blocks(&mut file, keep).is_none() {
+                if for_each_sub_block(&mut file, keep).is_none() {
                     break false;
                 }
                 String::from_utf8_lossy(&comment).lines().for_each(|line| info.add_line(line));
@@ -62,11 +62,11 @@ fn skip_frame(file: &mut impl Read) -> Option<()> {
     let [_, _, _, _, _, _, _, _, flags] = read_array(file)?;
     skip_palette(file, flags)?;
     let [_] = read_array(file)?;
-    read_sub_blocks(file, |_| {})
+    for_each_sub_block(file, |_| {})
 }
 
 /// Reads sub-blocks of at most 255 bytes, up to the first empty one.
-fn read_sub_blocks(file: &mut impl Read, mut take: impl FnMut(&[u8])) -> Option<()> {
+fn for_each_sub_block(file: &mut impl Read, mut take: impl FnMut(&[u8])) -> Option<()> {
     let mut content = [0; 255];
     loop {
         let [length] = read_array(file)?;

@@ -134,7 +134,7 @@ impl PendingSubtrees {
     }
 
     #[inline(always)]
-    fn next(&mut self) -> Option<(f32, usize)> {
+    fn pop_nearest(&mut self) -> Option<(f32, usize)> {
         self.count = self.count.checked_sub(1)?;
         let i = usize::from(self.order[self.count]);
         Some((self.entry[i], i))
@@ -144,7 +144,7 @@ impl PendingSubtrees {
 impl Bvh {
     /// Mask of the top node's subtrees that the packet may hit, and lower bounds on their entry distances.
     #[inline(always)]
-    fn top_subtree_hit_mask(
+    fn top_subtree_hits_and_entries(
         &self,
         slabs: &SlabRayPacket<'_>,
         ends: &F32x16,
@@ -154,7 +154,7 @@ impl Bvh {
         if traced == 0 {
             return (0, [0.0; PACKET_SIZE]);
         }
-        self.top.subtrees_hit_by_beam(
+        self.top.beam_hits_and_entries(
             &RayCoordinateBounds::from_ray_packet(slabs.origin, &slabs.inverse, (ends, traced), simd),
             simd,
         )
@@ -175,7 +175,7 @@ impl Bvh {
         let slabs = SlabRayPacket::new(rays, simd);
         let (mut leaf, mut in_leaf) = (outside, traced);
         let mut near =
-            PendingSubtrees::sorted_by_entry(self.top_subtree_hit_mask(&slabs, ends, traced, simd));
+            PendingSubtrees::sorted_by_entry(self.top_subtree_hits_and_entries(&slabs, ends, traced, simd));
         let mut stack = PacketStack::new();
         loop {
             for &id in leaf {
@@ -189,11 +189,11 @@ impl Bvh {
                 let (entry, in_it, child) = match stack.pop() {
                     Some(waiting) => waiting,
                     None => {
-                        let Some((entry, i)) = near.next() else { return };
+                        let Some((entry, i)) = near.pop_nearest() else { return };
                         if entry > end {
                             return;
                         }
-                        let (bounds, child) = self.top.subtree(i);
+                        let (bounds, child) = self.top.subtree_bounds_and_child(i);
                         (entry, hit_mask(&slabs.entry_intervals(&bounds, ends), simd), child)
                     }
                 };
@@ -241,7 +241,7 @@ impl Bvh {
         let slabs = SlabRayPacket::new(rays, simd);
         let mut free = traced;
         let (mut leaf, mut in_leaf) = (outside, traced);
-        let (mut subtrees, _) = self.top_subtree_hit_mask(&slabs, ends, traced, simd);
+        let (mut subtrees, _) = self.top_subtree_hits_and_entries(&slabs, ends, traced, simd);
         let mut stack = PacketStack::new();
         loop {
             for &id in leaf {
@@ -258,8 +258,9 @@ impl Bvh {
                     Some((_, in_it, child)) => (in_it, child),
                     None if subtrees == 0 => return traced & !free,
                     None => {
-                        let (bounds, child) =
-                            self.top.subtree(subtrees.trailing_zeros() as usize % PACKET_SIZE);
+                        let (bounds, child) = self
+                            .top
+                            .subtree_bounds_and_child(subtrees.trailing_zeros() as usize % PACKET_SIZE);
                         subtrees &= subtrees - 1;
                         (hit_mask(&slabs.entry_intervals(&bounds, ends), simd), child)
                     }

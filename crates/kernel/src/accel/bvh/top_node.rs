@@ -66,7 +66,7 @@ impl WideTopNode {
 
     /// A subtree and its bounding box.
     #[inline(always)]
-    pub(super) fn subtree(&self, i: usize) -> (Aabb, ChildRef) {
+    pub(super) fn subtree_bounds_and_child(&self, i: usize) -> (Aabb, ChildRef) {
         let corner = |rows: &[F32x16; 3]| Vec3::new(rows[0][i], rows[1][i], rows[2][i]);
         (Aabb { min: corner(&self.min), max: corner(&self.max) }, self.child[i])
     }
@@ -87,7 +87,7 @@ impl WideTopNode {
 
     /// Mask of the subtrees that the rays in a beam may hit, and lower bounds on the entry distances.
     #[inline(always)]
-    pub(super) fn subtrees_hit_by_beam(&self, beam: &RayCoordinateBounds, simd: impl Simd) -> (u32, F32x16) {
+    pub(super) fn beam_hits_and_entries(&self, beam: &RayCoordinateBounds, simd: impl Simd) -> (u32, F32x16) {
         let (mut near, mut far) = ([0.0_f32; PACKET_SIZE], [beam.end * SLAB_PAD; PACKET_SIZE]);
         for axis in 0..3 {
             let [low, high] = beam.inverse[axis];

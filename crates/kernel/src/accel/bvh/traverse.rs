@@ -124,7 +124,7 @@ impl Bvh {
     pub fn visit_overlapping(&self, other: &Aabb, mut visit: impl FnMut(u32)) {
         let mut stack = ArrayVec::<ChildRef, DEEP_STACK>::new();
         for subtree in set_bit_lanes(self.top.overlap_mask(other)) {
-            stack.push(self.top.subtree(subtree).1);
+            stack.push(self.top.subtree_bounds_and_child(subtree).1);
             while let Some(current) = stack.pop() {
                 if current.count > 0 {
                     let places = current.first as usize..(current.first + current.count) as usize;
@@ -181,7 +181,7 @@ mod tests {
     use crate::math::random::signed_generator;
 
     /// Finds the nearest hit by brute force, treating each box as a solid.
-    fn brute(boxes: &[Aabb], ray: &Ray) -> Option<(f32, u32)> {
+    fn closest_box_by_brute_force(boxes: &[Aabb], ray: &Ray) -> Option<(f32, u32)> {
         let slabs = SlabRay::new(ray.origin, ray.direction);
         let hits = boxes
             .iter()
@@ -212,7 +212,7 @@ mod tests {
                 better.then(|| best = Some((t, id)))?;
                 Some(t)
             });
-            assert_eq!(best, brute(&boxes, &ray));
+            assert_eq!(best, closest_box_by_brute_force(&boxes, &ray));
             let any = tree.any_hit(&ray, |id| {
                 slabs.entry_distance(boxes[id as usize].min, boxes[id as usize].max, ray.t_max).is_some()
             });

@@ -95,7 +95,7 @@ impl Torus {
     }
 
     /// Texture coordinates of a point on the surface.
-    pub fn uv_at(&self, point: DVec3) -> DVec2 {
+    pub fn uv_at_point(&self, point: DVec3) -> DVec2 {
         let (out, from_circle) = self.directions_from_axis_and_circle(point);
         DVec2::new(u_from_direction(out), u_from_direction(from_circle))
     }
@@ -107,7 +107,7 @@ impl Torus {
     }
 
     /// Unit tangents around the tube and around the axis.
-    pub(super) fn tangents(&self, point: DVec3) -> [DVec3; 2] {
+    pub(super) fn principal_directions(&self, point: DVec3) -> [DVec3; 2] {
         let (out, from_circle) = self.directions_from_axis_and_circle(point);
         let around_tube = self.frame.vector_to_world((out * -from_circle.y).extend(from_circle.x));
         [around_tube, self.frame.tangent_around(point)]

@@ -6,7 +6,7 @@
 
 use std::sync::Arc;
 
-use crate::geometry::triangle::barycentric_weights;
+use crate::geometry::triangle::barycentric_weights_at_point;
 use crate::geometry::{RayF64, Shape};
 use crate::materials::texture::Texture;
 use crate::materials::{EmissionCoat, Footprint, Opacity, SecondUvPoint, TexturePoint};
@@ -142,14 +142,14 @@ impl UvMapping {
 
     fn texture_point(&self, point: DVec3, primitive: u32) -> TexturePoint {
         let patches = match self {
-            Self::Shape(shape) => return TexturePoint::from_uv(shape.uv_at(point)),
+            Self::Shape(shape) => return TexturePoint::from_uv(shape.uv_at_point(point)),
             Self::Triangles(patches) => patches,
         };
         let found = patches.binary_search_by_key(&primitive, |patch| patch.primitive);
         let Ok(TriangleWithUvs { corners, uvs, second_uvs, .. }) = found.map(|index| patches[index]) else {
             return TexturePoint::from_uv(DVec2::ZERO);
         };
-        let weights = barycentric_weights(corners, point);
+        let weights = barycentric_weights_at_point(corners, point);
         let between = |uvs: [Vec2; 3]| {
             let [a, b, c] = uvs.map(|uv| uv.as_dvec2());
             a + (b - a) * weights.x + (c - a) * weights.y

@@ -30,9 +30,9 @@ impl ShapeEmitter for InwardEmitter {
         match self.shape.encloses_point(from.as_dvec3()) {
             Some(true) => 1.0 / ALL_AROUND,
             Some(false) => 0.0,
-            None if self.is_nearest_hit_at(from, met.direction, met.distance) => {
-                met.uniform_area_pdf(self.by_area.total() * self.shape.area_scale(met.normal.as_dvec3()))
-            }
+            None if self.is_nearest_hit_at(from, met.direction, met.distance) => met.uniform_area_pdf(
+                self.by_area.total() * self.shape.area_scale_for_world_normal(met.normal.as_dvec3()),
+            ),
             None => 0.0,
         }
     }
@@ -75,7 +75,7 @@ impl InwardEmitter {
         if !(cosine > 0.0 && self.is_nearest_hit_at(point, direction, distance as f32)) {
             return LightSamplePoint::NOTHING;
         }
-        let area = self.by_area.total() * self.shape.area_scale(normal);
+        let area = self.by_area.total() * self.shape.area_scale_for_world_normal(normal);
         let factor = cosine * area / (distance * distance);
         LightSamplePoint { direction, target: point + direction * distance as f32, factor: factor as f32 }
     }

@@ -294,7 +294,7 @@ fn area(shape: &Shape) -> f64 {
     let Shape::Transformed(_) = shape else { return areas.iter().sum() };
     const SIDE: u32 = 16;
     let grid = |i: u32| (Vec2::new((i % SIDE) as f32, (i / SIDE) as f32) + 0.5) / SIDE as f32;
-    let scale = |part: u32, i: u32| shape.area_scale(shape.sample(part, grid(i)).normal);
+    let scale = |part: u32, i: u32| shape.area_scale_for_world_normal(shape.sample(part, grid(i)).normal);
     let mean = |part: u32| (0..SIDE * SIDE).map(|i| scale(part, i)).sum::<f64>() / f64::from(SIDE * SIDE);
     (0..).zip(areas).map(|(part, area)| if area > 0.0 { area * mean(part) } else { 0.0 }).sum()
 }
@@ -308,7 +308,7 @@ fn emission_bounds(shape: &Shape, radiance: Vec3) -> Option<LightBounds> {
         Some(normal) => (area, EmissionCone::lambertian(normal)),
         None => (0.25 * area, EmissionCone::ALL),
     };
-    Some(LightBounds::from_box(shape.bounds()?, mean_channel(radiance) * shown, cone))
+    Some(LightBounds::from_bounding_box(shape.bounds()?, mean_channel(radiance) * shown, cone))
 }
 
 impl AreaLight {

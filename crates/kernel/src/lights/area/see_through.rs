@@ -37,13 +37,15 @@ impl ShapeEmitter for SeeThroughShapeEmitter {
             return LightSamplePoint::NOTHING;
         }
         let direction = (offset / distance).as_vec3();
-        let area = self.by_area.total() * self.shape.area_scale(normal);
+        let area = self.by_area.total() * self.shape.area_scale_for_world_normal(normal);
         let factor = cosine * area / (distance * distance);
         LightSamplePoint { direction, target: point + direction * distance as f32, factor: factor as f32 }
     }
 
     fn pdf(&self, _: Vec3, met: &LightHit) -> f32 {
-        met.uniform_area_pdf(self.by_area.total() * self.shape.area_scale(met.normal.as_dvec3()))
+        met.uniform_area_pdf(
+            self.by_area.total() * self.shape.area_scale_for_world_normal(met.normal.as_dvec3()),
+        )
     }
 
     fn area_centroid(&self) -> DVec3 {

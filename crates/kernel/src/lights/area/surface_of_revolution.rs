@@ -34,11 +34,11 @@ pub trait RevolutionSideView {
     fn max_visible_angle(&self) -> SinCos;
 
     /// Difference between the cosines at the two ends of the visible interval, for an angle around the pole.
-    fn cosine_extent_at_azimuth(&self, around: SinCos) -> f64;
+    fn cosine_difference_across_azimuth(&self, around: SinCos) -> f64;
 
     /// Angle from the pole and distance of the point at a fraction `share` of the cosine interval, in the
     /// half plane at the angle `around` the pole.
-    fn polar_angle_and_distance_at(&self, around: SinCos, share: f64) -> (SinCos, f64);
+    fn polar_angle_and_distance_at_fraction(&self, around: SinCos, share: f64) -> (SinCos, f64);
 }
 
 /// The visible part of a light.
@@ -59,8 +59,9 @@ impl<S: RevolutionSide> ShapeEmitter for RevolutionEmitter<S> {
             (Some((side, meridians)), _) if u[0] < share => {
                 let (angle, density) = meridians.sample(u[1]);
                 let around = SinCos::from_radians(angle);
-                let (from_pole, distance) = side.polar_angle_and_distance_at(around, f64::from(u[0] / share));
-                let factor = side.cosine_extent_at_azimuth(around) / (density * f64::from(share));
+                let (from_pole, distance) =
+                    side.polar_angle_and_distance_at_fraction(around, f64::from(u[0] / share));
+                let factor = side.cosine_difference_across_azimuth(around) / (density * f64::from(share));
                 (side.polar_frame().direction(from_pole, around), distance, factor)
             }
             (_, Some((cap, normal))) => {
@@ -83,7 +84,7 @@ impl<S: RevolutionSide> ShapeEmitter for RevolutionEmitter<S> {
             (Some((side, meridians)), _) => {
                 let angle = side.polar_frame().azimuth(met.direction);
                 share * meridians.pdf(angle)
-                    / side.cosine_extent_at_azimuth(SinCos::from_radians(angle.abs()))
+                    / side.cosine_difference_across_azimuth(SinCos::from_radians(angle.abs()))
             }
             (None, _) => 0.0,
         };
@@ -99,7 +100,7 @@ impl<S: RevolutionSide> RevolutionEmitter<S> {
     fn view_from(&self, point: Vec3) -> RevolutionView<S::View> {
         let side = self.side.view_from(point).map(|view| {
             let meridians = AzimuthDistribution::new(view.max_visible_angle(), |turn| {
-                view.cosine_extent_at_azimuth(turn)
+                view.cosine_difference_across_azimuth(turn)
             });
             (view, meridians)
         });
@@ -195,13 +196,13 @@ impl RevolutionSideView for CylinderView {
         self.reach
     }
 
-    fn cosine_extent_at_azimuth(&self, around: SinCos) -> f64 {
+    fn cosine_difference_across_azimuth(&self, around: SinCos) -> f64 {
         let [low, high] =
             self.end_cosines(self.distance_to_cross_section(SinCos { sin: around.sin.abs(), ..around }));
         high - low
     }
 
-    fn polar_angle_and_distance_at(&self, around: SinCos, share: f64) -> (SinCos, f64) {
+    fn polar_angle_and_distance_at_fraction(&self, around: SinCos, share: f64) -> (SinCos, f64) {
         let to_circle = self.distance_to_cross_section(SinCos { sin: around.sin.abs(), ..around });
         let [low, high] = self.end_cosines(to_circle);
         let cos = low + (high - low) * share;
@@ -303,16 +304,16 @@ impl RevolutionSideView for ConeView {
         self.reach
     }
 
-    fn cosine_extent_at_azimuth(&self, around: SinCos) -> f64 {
+    fn cosine_difference_across_azimuth(&self, around: SinCos) -> f64 {
         let at_tip = self.generatrix_angle_at_tip(around);
         let (along, across) = (self.distance - self.slant * at_tip.cos, self.slant * at_tip.sin);
         let length = (along * along + across * across).sqrt();
         if along > 0.0 { across * across / (length * (length + along)) } else { 1.0 - along / length }
     }
 
-    fn polar_angle_and_distance_at(&self, around: SinCos, share: f64) -> (SinCos, f64) {
+    fn polar_angle_and_distance_at_fraction(&self, around: SinCos, share: f64) -> (SinCos, f64) {
         let at_tip = self.generatrix_angle_at_tip(around);
-        let versine = share * self.cosine_extent_at_azimuth(around);
+        let versine = share * self.cosine_difference_across_azimuth(around);
         let from_pole = SinCos { sin: (versine * (2.0 - versine)).max(0.0).sqrt(), cos: 1.0 - versine };
         let sin = at_tip.sin * from_pole.cos + at_tip.cos * from_pole.sin;
         let farthest = self.distance + self.slant;

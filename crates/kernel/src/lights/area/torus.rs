@@ -87,7 +87,7 @@ impl ShapeEmitter for TorusEmitter {
     /// the pdf includes both hits. The sample is the nearer hit, so the torus never occludes it.
     fn sample(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
         let Some(view) = TorusView::new(&self.torus, point) else { return LightSamplePoint::NOTHING };
-        let slices = view.slice_density();
+        let slices = view.slice_distribution();
         let side = 2.0 * f64::from(u[0]) - 1.0;
         let (share, density) = slices.sample(side.abs());
         let tau = share * view.reach;
@@ -95,8 +95,8 @@ impl ShapeEmitter for TorusEmitter {
         let Some(slice) = view.slice(SinCos::from_radians(turn.copysign(side))) else {
             return LightSamplePoint::NOTHING;
         };
-        let (sine, in_slice) = slice.elevation_density(&view).sample(f64::from(u[1]));
-        let place = slice.near_intersection(&view, slice.tangent_from_sine(2.0 * sine - 1.0));
+        let (sine, in_slice) = slice.elevation_distribution(&view).sample(f64::from(u[1]));
+        let place = slice.near_intersection(&view, slice.slice_tangent_from_elevation_sine(2.0 * sine - 1.0));
         let own = view.to_density_over_angle(density, tau) * 0.5 * in_slice / place.factor;
         if !(own > 0.0) {
             return LightSamplePoint::NOTHING;
@@ -117,7 +117,7 @@ impl ShapeEmitter for TorusEmitter {
 
     fn pdf(&self, from: Vec3, met: &LightHit) -> f32 {
         TorusView::new(&self.torus, from).map_or(0.0, |view| {
-            let slices = view.slice_density();
+            let slices = view.slice_distribution();
             let (density, first) = view.sum_entry_pdfs(&self.torus, &slices, met.direction.as_dvec3());
             // A ray may continue through the first surface and hit another one, which is never sampled.
             let is_later = first.is_some_and(|first| f64::from(met.distance) > first * (1.0 + SAME_DISTANCE));
@@ -178,7 +178,7 @@ impl TorusView {
     }
 
     /// Density over τ of the slices on one side, relative to its maximum.
-    fn slice_density(&self) -> PiecewiseLinear<SLICES> {
+    fn slice_distribution(&self) -> PiecewiseLinear<SLICES> {
         // Compute sinh and cosh from powers of e^step.
         let step = libm::exp(self.reach / (SLICES - 1) as f64);
         let mut power = 1.0;
@@ -187,8 +187,9 @@ impl TorusView {
             power *= step;
             let (sin, cos) = sin_cos((sinh / self.closeness) as f32);
             let slice = self.slice(SinCos { sin: f64::from(sin), cos: f64::from(cos) });
-            slice.map_or(0.0, |slice| slice.near_intersection(self, slice.tangent_from_sine(0.0)).factor)
-                * cosh
+            slice.map_or(0.0, |slice| {
+                slice.near_intersection(self, slice.slice_tangent_from_elevation_sine(0.0)).factor
+            }) * cosh
         }))
     }
 
@@ -254,31 +255,32 @@ impl TorusView {
         if !(ahead > 0.0 && factor > 0.0) {
             return 0.0;
         }
-        let in_slice =
-            slice.elevation_density(self).pdf((0.5 + 0.5 * slice.sine_from_tangent(tangent)).clamp(0.0, 1.0));
+        let in_slice = slice
+            .elevation_distribution(self)
+            .pdf((0.5 + 0.5 * slice.elevation_sine_from_slice_tangent(tangent)).clamp(0.0, 1.0));
         self.to_density_over_angle(slices.pdf(share), share * self.reach) * 0.5 * in_slice / factor
     }
 }
 
 impl TorusSlice {
     /// Converts the relative sine of the elevation to the tangent of the angle to the circle's center.
-    fn tangent_from_sine(&self, sine: f64) -> f64 {
+    fn slice_tangent_from_elevation_sine(&self, sine: f64) -> f64 {
         let sine = sine * self.sine;
         let distance = (self.gap * self.gap + self.off * self.off).sqrt();
         distance * sine / ((1.0 - sine) * (1.0 + sine)).sqrt() / self.gap
     }
 
     /// Converts the tangent of the angle to the circle's center to the relative sine of the elevation.
-    fn sine_from_tangent(&self, tangent: f64) -> f64 {
+    fn elevation_sine_from_slice_tangent(&self, tangent: f64) -> f64 {
         let y = self.gap * tangent;
         y / (self.gap * self.gap + self.off * self.off + y * y).sqrt() / self.sine
     }
 
     /// Density of the relative sine of the elevation, from its minimum to its maximum.
-    fn elevation_density(&self, view: &TorusView) -> PiecewiseLinear<PLACES> {
+    fn elevation_distribution(&self, view: &TorusView) -> PiecewiseLinear<PLACES> {
         let sine = |i: usize| 2.0 * i as f64 / (PLACES - 1) as f64 - 1.0;
         PiecewiseLinear(std::array::from_fn(|i| {
-            self.near_intersection(view, self.tangent_from_sine(sine(i))).factor
+            self.near_intersection(view, self.slice_tangent_from_elevation_sine(sine(i))).factor
         }))
     }
 

@@ -18,7 +18,7 @@ pub struct TransformedEmitter {
 
 impl ShapeEmitter for TransformedEmitter {
     fn sample(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
-        let Some(point) = self.point_to_local(point) else { return LightSamplePoint::NOTHING };
+        let Some(point) = self.local_point_if_in_front(point) else { return LightSamplePoint::NOTHING };
         let local = self.emitter.sample(point, u);
         let to_world = &self.transformed.to_world;
         let offset = to_world.vector(local.direction.as_dvec3());
@@ -34,7 +34,7 @@ impl ShapeEmitter for TransformedEmitter {
     }
 
     fn pdf(&self, from: Vec3, met: &LightHit) -> f32 {
-        let Some(from) = self.point_to_local(from) else { return 0.0 };
+        let Some(from) = self.local_point_if_in_front(from) else { return 0.0 };
         let to_world = &self.transformed.to_world;
         let direction = to_world.inverse_vector(met.direction.as_dvec3());
         let length = direction.length();
@@ -63,12 +63,12 @@ impl TransformedEmitter {
     /// Converts a point to the shape's coordinates, or returns `None` if the front is not visible from there.
     /// This is tested before rounding to `f32`, which could move a point from behind the surface to its
     /// front.
-    fn point_to_local(&self, point: Vec3) -> Option<Vec3> {
+    fn local_point_if_in_front(&self, point: Vec3) -> Option<Vec3> {
         let shape = &self.transformed.shape;
         let point = self.transformed.to_world.inverse_point(point.as_dvec3());
         let is_behind = match flat_normal(shape) {
             Some(normal) => !(normal.dot(point - shape.centroid()) > 0.0),
-            None => shape.encloses(point),
+            None => shape.contains_point(point),
         };
         (!is_behind).then(|| point.as_vec3())
     }

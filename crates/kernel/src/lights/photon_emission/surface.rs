@@ -152,7 +152,7 @@ impl DividedSurfaceGeometry {
                 let corner = Vec2::new((cell % all) as f32, (cell / all) as f32);
                 let u = ((corner + u) / *side as f32).min(Vec2::splat(1.0_f32.next_down()));
                 let SurfaceSample { point, normal } = shape.sample(part as u32, u);
-                let area = areas[part] * shape.area_scale(normal) / (all * all) as f64;
+                let area = areas[part] * shape.area_scale_for_world_normal(normal) / (all * all) as f64;
                 let normal = match light.side {
                     Side::Front => normal,
                     Side::Back => -normal,
@@ -160,7 +160,7 @@ impl DividedSurfaceGeometry {
                 PiecePoint { point, normal, area, primitive: part as u32 }
             }
             (Self::Mesh { .. }, Some(mesh)) => {
-                let (place, area, primitive) = mesh.sample_point_on_triangle(index, u);
+                let (place, area, primitive) = mesh.sample_triangle_by_area(index, u);
                 PiecePoint { point: place.point, normal: place.normal, area, primitive }
             }
             (Self::Mesh { .. }, None) => {
@@ -183,7 +183,7 @@ fn radiance_without_coat(light: &AreaLight, place: &PiecePoint) -> Vec3 {
 /// is infinite.
 fn coordinate_bound(shape: &Shape) -> Option<f64> {
     if let Shape::Transformed(own) = shape {
-        return Some(own.reach_to_world(coordinate_bound(&own.shape)?));
+        return Some(own.length_bound_to_world(coordinate_bound(&own.shape)?));
     }
     let bounds = shape.bounds()?;
     let greatest = bounds.min.abs().max(bounds.max.abs()).as_dvec3().max_element();

@@ -94,7 +94,7 @@ impl LightBounds {
     }
 
     /// Bounds on a light with inverse-square falloff inside a box.
-    pub fn from_box(bounds: Aabb, power: f64, cone: EmissionCone) -> Self {
+    pub fn from_bounding_box(bounds: Aabb, power: f64, cone: EmissionCone) -> Self {
         let (min, max) = (bounds.min.as_dvec3(), bounds.max.as_dvec3());
         let radius = (max - min).length() * 0.5;
         Self { space: DistanceFalloff::InverseSquare, center: (min + max) * 0.5, radius, power, cone }
@@ -106,7 +106,7 @@ impl LightBounds {
         let [a, b, c] = *corners;
         let vector_area = (b - a).cross(c - a) * 0.5;
         let normal = vector_area.try_normalize()?;
-        Some(Self::from_box(
+        Some(Self::from_bounding_box(
             Aabb::from_points_f64(*corners),
             vector_area.length(),
             EmissionCone::lambertian(normal),

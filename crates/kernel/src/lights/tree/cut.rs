@@ -5,7 +5,7 @@
 
 use arrayvec::ArrayVec;
 
-use super::node::{ExpectedChildContributions, NodeChild, Receiver};
+use super::node::{ImportanceAndNearness, NodeChild, Receiver};
 use super::{
     CumulativeImportance, LightPick, LightTree, NOT_IN_TREE, PreviousPickPath, ROOT, clamp_below,
     scale_u_to_total,
@@ -69,7 +69,7 @@ impl<'a> LightTreeCut<'a> {
         }
         while self.importance.len() < self.nodes.len() {
             let node = &tree.nodes[self.nodes[self.importance.len()] as usize];
-            let ExpectedChildContributions { mut importance, nearness } = node.child_importances(receiver);
+            let ImportanceAndNearness { mut importance, nearness } = node.child_importances(receiver);
             for i in 0..node.count as usize {
                 if let NodeChild::LightTreeNode(below) = node.children[i]
                     && importance[i] > 0.0

@@ -63,13 +63,13 @@ impl LightBoundsPacket {
     #[inline(always)]
     fn splat_lane(&self, i: usize) -> Self {
         Self {
-            center: splat3(lane(&self.center, i)),
+            center: splat_vec3(lane(&self.center, i)),
             radius: [self.radius[i]; PACKET_SIZE],
             is_place: [self.is_place[i]; PACKET_SIZE],
             weakens: [self.weakens[i]; PACKET_SIZE],
             power: [self.power[i]; PACKET_SIZE],
             spread: [self.spread[i]; PACKET_SIZE],
-            axis: splat3(lane(&self.axis, i)),
+            axis: splat_vec3(lane(&self.axis, i)),
             cos: [self.cos[i]; PACKET_SIZE],
             sin: [self.sin[i]; PACKET_SIZE],
             end: [self.end[i]; PACKET_SIZE],
@@ -78,7 +78,7 @@ impl LightBoundsPacket {
 }
 
 #[inline(always)]
-fn splat3(v: Vec3) -> Vec3x16 {
+fn splat_vec3(v: Vec3) -> Vec3x16 {
     [[v.x; PACKET_SIZE], [v.y; PACKET_SIZE], [v.z; PACKET_SIZE]]
 }
 
@@ -172,10 +172,10 @@ impl ReceiverPacket {
     /// A packet with the same receiver in all lanes.
     #[inline(always)]
     fn splat(receiver: &Receiver) -> Self {
-        let mut row = Self::with_unknown_lobe(&splat3(receiver.point), &splat3(receiver.normal));
+        let mut row = Self::with_unknown_lobe(&splat_vec3(receiver.point), &splat_vec3(receiver.normal));
         if let Some(ReceiverLobe { axis, shininess, peak, diffuse }) = receiver.lobe {
             row.lobes = LobePacket {
-                axis: splat3(axis),
+                axis: splat_vec3(axis),
                 shininess: [shininess; PACKET_SIZE],
                 peak: [peak; PACKET_SIZE],
                 diffuse: [diffuse; PACKET_SIZE],
@@ -209,7 +209,7 @@ impl LobePacket {
 
 /// Expected contributions of a node's children at a point.
 #[repr(align(64))]
-pub struct ExpectedChildContributions {
+pub struct ImportanceAndNearness {
     /// Importance in the tree's unit of power. It is 0 only if the child certainly contributes nothing.
     pub importance: F32x16,
     /// Squared sines of half the angles that the bounding spheres subtend, or 1 for points inside a sphere.
@@ -257,7 +257,7 @@ impl LightTreeNode {
     /// with bounds on cosines) × the lobe's response. It is never 0 if light from the child may reach the
     /// point.
     #[inline(always)]
-    pub fn child_importances(&self, receiver: &Receiver) -> ExpectedChildContributions {
+    pub fn child_importances(&self, receiver: &Receiver) -> ImportanceAndNearness {
         let receivers = ReceiverPacket::splat(receiver);
         expected_contributions(&self.bounds, &receivers, self.is_plain, receiver.lobe.is_some())
     }
@@ -287,7 +287,7 @@ fn expected_contributions(
     receivers: &ReceiverPacket,
     is_plain: bool,
     has_lobes: bool,
-) -> ExpectedChildContributions {
+) -> ImportanceAndNearness {
     match (is_plain, has_lobes) {
         (true, false) => specialized_contributions::<true, false>(bounds, receivers),
         (false, false) => specialized_contributions::<false, false>(bounds, receivers),
@@ -300,7 +300,7 @@ fn expected_contributions(
 fn specialized_contributions<const IS_PLAIN: bool, const HAS_LOBE: bool>(
     bounds: &LightBoundsPacket,
     receivers: &ReceiverPacket,
-) -> ExpectedChildContributions {
+) -> ImportanceAndNearness {
     let ReceiverPacket { point, normal, lobes } = receivers;
     let mut offset = bounds.center;
     for axis in 0..3 {
@@ -375,7 +375,7 @@ fn specialized_contributions<const IS_PLAIN: bool, const HAS_LOBE: bool>(
         importance[i] = if arrives { value } else { 0.0 };
         nearness[i] = sin[i] * sin[i];
     }
-    ExpectedChildContributions { importance, nearness }
+    ImportanceAndNearness { importance, nearness }
 }
 /// 1/√x for x ≥ [`MIN_IMPORTANCE`], accurate to a few ulps. Uses Newton's method because 16 square roots and
 /// divisions would take longer than the rest of the node test.

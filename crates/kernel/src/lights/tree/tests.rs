@@ -52,7 +52,7 @@ fn lights_of(count: u32, next: &mut impl FnMut() -> f32) -> Vec<Light> {
 }
 
 fn tree_of(lights: &[Light]) -> LightTree {
-    LightTree::new(&lights.iter().map(Light::bounds).collect::<Vec<_>>(), &CancelToken::new())
+    LightTree::new(&lights.iter().map(Light::bounds_if_emissive).collect::<Vec<_>>(), &CancelToken::new())
         .expect("never canceled")
         .expect("some light")
 }
@@ -323,7 +323,8 @@ fn picks_are_invariant_to_power_of_two_scaling() {
 fn joint_bounds_contain_all_lights() {
     let mut next = random::unit_generator(11);
     for _ in 0..200 {
-        let bounds: Vec<LightBounds> = lights_of(20, &mut next).iter().filter_map(Light::bounds).collect();
+        let bounds: Vec<LightBounds> =
+            lights_of(20, &mut next).iter().filter_map(Light::bounds_if_emissive).collect();
         for space in [DistanceFalloff::InverseSquare, DistanceFalloff::Constant, DistanceFalloff::Beyond] {
             let own: Vec<_> = bounds.iter().filter(|one| one.space == space).copied().collect();
             let Some(all) = LightBounds::union_of_all(own.iter()) else { continue };
@@ -361,7 +362,7 @@ fn coincident_and_distant_lights_build_valid_trees() {
 #[test]
 fn canceled_builds_return_an_error() {
     let mut next = random::unit_generator(2);
-    let bounds: Vec<_> = lights_of(100, &mut next).iter().map(Light::bounds).collect();
+    let bounds: Vec<_> = lights_of(100, &mut next).iter().map(Light::bounds_if_emissive).collect();
     let token = CancelToken::new();
     assert!(LightTree::new(&bounds, &token).is_ok_and(|tree| tree.is_some()));
     token.cancel();

@@ -112,7 +112,7 @@ impl<B: Bxdf> TestSurface<B> {
         light: NarrowLightPath,
     ) -> Self {
         let mut row = BxdfPacket::<B>::default();
-        row.reset_flags();
+        row.prepare_for_reuse();
         for i in 0..PACKET_SIZE {
             let normal = Vec3::Z * light.light_side_sign() as f32;
             let place = ShadingGeometry { normal, wo: to_eye.as_vec3(), tangent: TANGENT };
@@ -435,7 +435,7 @@ pub fn check_lane_independence_with<B: Bxdf>(points: &[B::Point], lit: NarrowLig
             (std::array::from_fn(|_| next()), [(); 2].map(|()| std::array::from_fn(|_| next())));
         let row = |of: &dyn Fn(usize) -> bool| {
             let mut row = BxdfPacket::<B>::default();
-            row.reset_flags();
+            row.prepare_for_reuse();
             for i in (0..PACKET_SIZE).filter(|i| of(*i)) {
                 let place = ShadingGeometry {
                     normal: Vec3::Z * lit.light_side_sign() as f32,
@@ -493,7 +493,7 @@ pub fn check_shown_lobes<B: Bxdf>(points: &[B::Point], lit: NarrowLightPath) {
             };
             let shown = |diffuse: bool, specular: bool| {
                 let mut row = BxdfPacket::<B>::default();
-                row.reset_flags();
+                row.prepare_for_reuse();
                 row.set_bsdf(0, point, LobeFilter::Of { diffuse, specular }, &place);
                 let mut light = [[0.0; PACKET_SIZE], [0.0; PACKET_SIZE], [1.0; PACKET_SIZE]];
                 set_lane(&mut light, 0, way);

@@ -203,12 +203,12 @@ macro_rules! kinds {
                 }
             }
 
-            /// [`BxdfPacket::reset_flags`].
+            /// [`BxdfPacket::prepare_for_reuse`].
             #[inline(always)]
-            pub fn reset_flags(&mut self) {
+            pub fn prepare_for_reuse(&mut self) {
                 match self {
-                    $(Self::$kind(row) => row.reset_flags(),)+
-                    $(Self::$part(row) => row.reset_flags()),+
+                    $(Self::$kind(row) => row.prepare_for_reuse(),)+
+                    $(Self::$part(row) => row.prepare_for_reuse()),+
                 }
             }
 
@@ -302,8 +302,8 @@ macro_rules! kinds {
                 simd: impl Simd,
             ) -> Vec3x16 {
                 match self {
-                    $(Self::$kind(row) => row.sample_outlined(lobes, normals, choices, u, simd),)+
-                    $(Self::$part(row) => row.sample_outlined(lobes, normals, choices, u, simd)),+
+                    $(Self::$kind(row) => row.sample_out_of_line(lobes, normals, choices, u, simd),)+
+                    $(Self::$part(row) => row.sample_out_of_line(lobes, normals, choices, u, simd)),+
                 }
             }
 
@@ -460,8 +460,8 @@ impl BsdfPacket {
         simd: impl Simd,
     ) -> Option<DielectricSamplePacket> {
         match self {
-            Self::DielectricReflection(row) => Some(row.sample_either_side_outlined(choices, u, simd)),
-            Self::DielectricTransmission(row) => Some(row.sample_either_side_outlined(choices, u, simd)),
+            Self::DielectricReflection(row) => Some(row.sample_either_side_out_of_line(choices, u, simd)),
+            Self::DielectricTransmission(row) => Some(row.sample_either_side_out_of_line(choices, u, simd)),
             Self::Phong(_)
             | Self::Conductor(_)
             | Self::BrushedConductor(_)

@@ -43,18 +43,18 @@ pub(crate) fn create_header(
     identity: Vec<RenderInput>,
     finish: &FilmEncodingSettings,
 ) -> PartHeader {
-    let share = part_share_of_shard(state.share.as_ref());
+    let share = part_share_from_shard(state.share.as_ref());
     let (picture, scene) = (ImageHeader::new(&state.film, finish), String::new());
     PartHeader { kind, identity, share, picture, scene, references: Vec::new() }
 }
 
-fn part_share_of_shard(share: Option<&Shard>) -> PartShare {
+fn part_share_from_shard(share: Option<&Shard>) -> PartShare {
     match share {
         Some(share) => PartShare {
             index: share.index,
             count: share.count,
             block_count: share.image_block_count(),
-            blocks: share.blocks().to_vec(),
+            blocks: share.sample_blocks().to_vec(),
         },
         None => PartShare { index: 1, count: 1, block_count: 0, blocks: Vec::new() },
     }
@@ -136,7 +136,7 @@ impl<'a> Checkpointer<'a> {
             ResumeMode::No | ResumeMode::Asked | ResumeMode::IfSame => {}
         }
         if resume != ResumeMode::Asked && !part::is_part(&self.path) {
-            self.report_failure(&format!("{} {}", self.path.display(), foreign_file_problem(&self.path)));
+            self.report_failure(&format!("{} {}", self.path.display(), not_a_checkpoint_message(&self.path)));
             return Ok(true);
         }
         if resume == ResumeMode::No {
@@ -163,7 +163,7 @@ impl<'a> Checkpointer<'a> {
         if self.around.lock.borrow_mut().record_first_report_of_file(&self.path) {
             self.send_update(CheckpointUpdate::Unused {
                 path: self.path.clone(),
-                why: rejection_reason(&error),
+                why: rejection_message(&error),
             });
         }
         Ok(!state.has_samples())
@@ -184,7 +184,7 @@ impl<'a> Checkpointer<'a> {
             // Earlier checks ensure that a part never replaces a checkpoint.
             Ok(_) => return Ok(false),
             Err(error) => {
-                self.send_update(CheckpointUpdate::Unused { path, why: rejection_reason(&error) });
+                self.send_update(CheckpointUpdate::Unused { path, why: rejection_message(&error) });
                 return Ok(false);
             }
         };
@@ -225,7 +225,7 @@ impl<'a> Checkpointer<'a> {
         }
         let Some((head, there)) = read_valid_checkpoint(&self.path) else {
             return match PartFile::read_header(&self.path) {
-                Err(PartError::Version { .. }) => self.back_up_unless_shorter(|_| false),
+                Err(PartError::Version { .. }) => self.move_aside_unless_shorter(|_| false),
                 Ok(head) if head.kind == PartOrCheckpoint::Part => {
                     Err(finished_part_conflict_message(&self.path))
                 }
@@ -251,14 +251,14 @@ impl<'a> Checkpointer<'a> {
         let is_longer = |aside: &Path| {
             read_valid_checkpoint(aside).is_some_and(|(_, before)| before.seconds >= there.seconds)
         };
-        self.back_up_unless_shorter(is_longer)
+        self.move_aside_unless_shorter(is_longer)
     }
 
     /// Moves the checkpoint aside, unless `is_longer` returns true for one that was moved aside earlier.
     ///
     /// # Errors
     /// Returns why it cannot be moved.
-    fn back_up_unless_shorter(&self, is_longer: impl Fn(&Path) -> bool) -> Result<(), String> {
+    fn move_aside_unless_shorter(&self, is_longer: impl Fn(&Path) -> bool) -> Result<(), String> {
         let mut aside = self.path.as_os_str().to_owned();
         aside.push(ASIDE);
         let aside = PathBuf::from(aside);
@@ -324,7 +324,7 @@ impl<'a> Checkpointer<'a> {
     /// Returns the differences between a file header and this render.
     fn differences_from(&self, head: &PartHeader, state: &FilmState) -> Vec<String> {
         let mut unlike = render_input_differences(&head.identity, self.image_inputs(), ("there", "here"));
-        let share = part_share_of_shard(state.share.as_ref());
+        let share = part_share_from_shard(state.share.as_ref());
         let name = |share: &PartShare| match share.count {
             1 => "the whole image".to_owned(),
             count => format!("part {}/{count}", share.index),
@@ -446,7 +446,7 @@ impl<'a> Checkpointer<'a> {
                 Ok(_) if !part::is_part(at) || inputs.contains_path(at) => refused(format!(
                     "cannot write {}: the existing file {}",
                     path.display(),
-                    foreign_file_problem(at)
+                    not_a_checkpoint_message(at)
                 )),
                 Ok(_) if PartFile::read_header(at).is_ok_and(|head| head.kind == PartOrCheckpoint::Part) => {
                     Err(OutputError::Refused { reason: finished_part_conflict_message(path) })
@@ -491,7 +491,7 @@ fn held_by_another_message(path: &Path) -> String {
 }
 
 /// Returns the reason for not using a file, without the file name.
-fn rejection_reason(error: &PartError) -> String {
+fn rejection_message(error: &PartError) -> String {
     match error {
         PartError::Other { differences, .. } => differences.join("; "),
         PartError::Damaged { why, .. } => format!("{}: {why}", messages::DAMAGED),
@@ -518,7 +518,7 @@ fn read_valid_checkpoint(path: &Path) -> Option<(PartHeader, NonFilmRenderState)
     state.is_plausible().then_some((file.head, state))
 }
 /// Describes why a file does not count as a checkpoint: its content, or an error when opening it.
-fn foreign_file_problem(path: &Path) -> String {
+fn not_a_checkpoint_message(path: &Path) -> String {
     // Opening a pipe would block.
     open_regular_file(path).map_or_else(
         |error| format!("cannot be read: {}", describe_error(&error)),

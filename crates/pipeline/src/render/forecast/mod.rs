@@ -120,7 +120,7 @@ impl Forecast {
         // Apply the time limit if it ends the render earlier.
         if let Some(budget) = moment.plan.time_seconds {
             // The first pass always completes, even after the time limit.
-            let of_first = eta_seconds.map_or(0.0, |eta| eta * self.first_pass_share(moment));
+            let of_first = eta_seconds.map_or(0.0, |eta| eta * self.remaining_first_pass_share(moment));
             let left = (budget - elapsed_seconds).max(of_first);
             eta_seconds = Some(eta_seconds.unwrap_or(left).min(left));
             // Elapsed time counts as progress even if no work was done.
@@ -146,7 +146,7 @@ impl Forecast {
     /// noise has been evaluated.
     fn done_and_total_work(&mut self, moment: &RenderSnapshot<'_>) -> WorkAmount {
         if Instant::now() >= self.expectation.due {
-            self.expectation = estimate_work(moment);
+            self.expectation = estimate_total_work(moment);
         }
         let WorkEstimate { total, passes: [passes, all_passes], .. } = self.expectation;
         let done = moment.state.cpu_seconds();
@@ -161,7 +161,7 @@ impl Forecast {
     }
 
     /// Returns the first pass's share of the remaining work.
-    fn first_pass_share(&self, moment: &RenderSnapshot<'_>) -> f64 {
+    fn remaining_first_pass_share(&self, moment: &RenderSnapshot<'_>) -> f64 {
         if !moment.is_first {
             return 0.0;
         }
@@ -181,7 +181,7 @@ fn has_predictable_convergence(moment: &RenderSnapshot<'_>) -> bool {
 }
 
 /// Estimates the total work as a sum over all cells.
-fn estimate_work(moment: &RenderSnapshot<'_>) -> WorkEstimate {
+fn estimate_total_work(moment: &RenderSnapshot<'_>) -> WorkEstimate {
     let RenderSnapshot { state, plan, photons, .. } = moment;
     let RenderOptions { samples: most, error, .. } = plan.settings.render;
     let begin = Instant::now();

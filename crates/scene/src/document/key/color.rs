@@ -10,7 +10,7 @@ use super::super::limits::Limits;
 use super::super::names::DefinedNames;
 use super::super::value::{TomlValue, Value, number_within, parse_integer_in_radix, report_wrong_type};
 use super::TableKey;
-use crate::math::color::srgb8_to_linear;
+use crate::math::color::srgb8_color_to_linear;
 use crate::math::{DVec3, Vec3};
 
 const COLOR: &str = "a color: [r, g, b], a number, \"#rrggbb\" or a name";
@@ -139,7 +139,7 @@ impl TableKey<'_> {
     /// Converts `#rrggbb` or a case-insensitive color name from sRGB to linear.
     fn parse_hex_or_named_color(&self, text: &str) -> Option<Vec3> {
         if let Some(bytes) = parse_hex_or_named_srgb8(text) {
-            return Some(srgb8_to_linear(bytes));
+            return Some(srgb8_color_to_linear(bytes));
         }
         let issue = Issue::error(self.value_span()?, format!("`{}` must be {COLOR}", self.name));
         let small = text.to_ascii_lowercase();

@@ -104,7 +104,7 @@ fn read_object(
 }
 
 /// Reads a direction of any nonzero length. Error messages call the shape or light `what`.
-pub(super) fn read_direction(
+pub(super) fn read_unnormalized_direction(
     table: &TableReader<'_>,
     name: &'static str,
     what: &str,
@@ -112,7 +112,7 @@ pub(super) fn read_direction(
 ) -> Option<DVec3> {
     let key = table.optional_key(name);
     let direction = key.vector_or(Limits::Any, default)?;
-    if !key.check_vector_magnitude(direction) {
+    if !key.check_vector_long_enough(direction) {
         return None;
     }
     if direction == DVec3::ZERO {

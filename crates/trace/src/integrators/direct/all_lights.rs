@@ -175,7 +175,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
                         // Use a light-sampling pdf close to 0 so that lobe rays account for all of the light.
                         [f32::MAX; PACKET_SIZE]
                     } else {
-                        light.inverse_pdfs(&samples)
+                        light.inverse_pdfs_of_samples(&samples)
                     };
                     let competing = self.competing.bsdf_rays_per_light_sample(count);
                     let unweighted = values;
@@ -201,7 +201,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
             }
             // Trace the single ray to the light's center.
             if pending.active != 0 {
-                self.add_unoccluded_pending_light(light.center_and_geometry(), &pending, sums, simd);
+                self.trace_and_add_pending_light(light.center_and_geometry(), &pending, sums, simd);
             }
         }
     }
@@ -274,7 +274,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
             pending.active |= active;
             add_masked_lanes(active, values, &mut pending.light);
             if let Some(fraction) = fraction {
-                add_fraction(active, values, fraction, &mut pending.diffuse);
+                add_masked_lane_products(active, values, fraction, &mut pending.diffuse);
             }
         } else {
             let traced = active & !self.row.below_horizon_mask(&samples.directions, simd);
@@ -286,7 +286,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
 
     /// Adds deferred light after tracing one shadow ray to the light's center.
     #[inline(always)]
-    fn add_unoccluded_pending_light(
+    fn trace_and_add_pending_light(
         &self,
         middle: Option<(LightCenter, LightGeometry)>,
         pending: &PendingLight,
@@ -350,7 +350,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         let occluded = self.tile.world.geometry.occluded_ray_packet(rays, ends, traced, sources, simd);
         add_masked_lanes(traced & !occluded, values, &mut sums.light);
         if let Some(fraction) = fraction {
-            add_fraction(traced & !occluded, values, fraction, &mut sums.diffuse);
+            add_masked_lane_products(traced & !occluded, values, fraction, &mut sums.diffuse);
         }
     }
 
@@ -375,7 +375,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         }
         add_masked_lanes(arriving, &values, &mut sums.light);
         if let Some(fraction) = fraction {
-            add_fraction(arriving, &values, fraction, &mut sums.diffuse);
+            add_masked_lane_products(arriving, &values, fraction, &mut sums.diffuse);
         }
     }
 
@@ -463,7 +463,7 @@ pub fn add_masked_lanes(bits: u32, values: &Vec3x16, sums: &mut Vec3x16) {
 
 /// Adds the products of `values` and `fraction` in the lanes set in `bits`.
 #[inline(never)]
-pub fn add_fraction(bits: u32, values: &Vec3x16, fraction: &Vec3x16, sums: &mut Vec3x16) {
+pub fn add_masked_lane_products(bits: u32, values: &Vec3x16, fraction: &Vec3x16, sums: &mut Vec3x16) {
     let of = mask_from_bits(bits);
     for axis in 0..3 {
         for i in 0..PACKET_SIZE {

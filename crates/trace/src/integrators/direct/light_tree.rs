@@ -3,7 +3,7 @@
 
 use std::ops::Range;
 
-use super::all_lights::{LightSums, SampleAllLights, add_fraction, add_masked_lanes};
+use super::all_lights::{LightSums, SampleAllLights, add_masked_lane_products, add_masked_lanes};
 use super::shadow_rays::ShadowRayQueue;
 use crate::geometry::packet::set_bit_lanes;
 use crate::integrators::view::LightAov;
@@ -102,7 +102,7 @@ impl LightPicks {
     /// Returns the lights and the mask of vertices that picked a light. Lights in the other lanes are
     /// arbitrary and have no effect.
     #[inline(always)]
-    fn lights_and_pick_mask(&self) -> ([u32; PACKET_SIZE], u32) {
+    fn lane_lights_and_picked_mask(&self) -> ([u32; PACKET_SIZE], u32) {
         let (mut lights, shares, mut used) = (self.lights, &self.shares, 0);
         for i in 0..PACKET_SIZE {
             used |= u32::from(shares[i] > 0.0) << i;
@@ -261,7 +261,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
     ) {
         let SampledLightSink { tree, row: row_number, pool, sums } = sink;
         let (row, render) = (self.row, &self.tile.settings.render);
-        let (lights, used) = pick.lights_and_pick_mask();
+        let (lights, used) = pick.lane_lights_and_picked_mask();
         // Sample a point on each picked light.
         let u = sampler.pairs(&row.path, Dimension::ChosenLight, number, count);
         let at = (&row.from, &row.normal);
@@ -305,7 +305,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
             ShadowMode::Off if self.aov == LightAov::TraversalCost => return,
             ShadowMode::Off => {
                 if let Some(fraction) = &fraction {
-                    add_fraction(active, &values, fraction, &mut sums.diffuse);
+                    add_masked_lane_products(active, &values, fraction, &mut sums.diffuse);
                 }
                 return add_masked_lanes(active, &values, &mut sums.light);
             }

@@ -293,7 +293,7 @@ impl TileContext<'_> {
 
     /// Like [`TileContext::emitter_weight`], for an emitter that coincides with glass. Returns 1 if shadow
     /// rays cannot reach the hit point.
-    pub fn emitter_weight_at_glass(&self, path: &PathRay, hit: &Hit) -> f32 {
+    pub fn coincident_glass_emitter_weight(&self, path: &PathRay, hit: &Hit) -> f32 {
         let Ray { origin, direction, .. } = path.ray;
         let shadow = Ray::segment_ending_before_point(origin, origin + direction * hit.shape.t);
         if path.state.pdf > 0.0

@@ -140,7 +140,9 @@ impl DirectLightVertexQueue {
         // Merge a small packet with other packets of the same kind.
         let mut left = row.used;
         let open = &mut self.open[0][row.bsdf.kind() as usize];
-        if let Some(open) = kept.get_mut(*open).filter(|open| open.accepts(row.bsdf.kind(), (false, false))) {
+        if let Some(open) =
+            kept.get_mut(*open).filter(|open| open.has_kind_and_flags(row.bsdf.kind(), (false, false)))
+        {
             for lane in set_bit_lanes(row.used).take((ALL & !open.used).count_ones() as usize) {
                 open.copy_vertex_from(open.used.trailing_ones() as usize, row, lane);
                 left &= !(1 << lane);
@@ -190,7 +192,7 @@ impl DirectLightVertexQueue {
         let (is_dark, has_two_sides) = which;
         let table = usize::from(is_dark) + 2 * usize::from(has_two_sides);
         let mut number = self.open[table][kind as usize];
-        let is_open = |row: &VertexBatch| row.used != ALL && row.accepts(kind, which);
+        let is_open = |row: &VertexBatch| row.used != ALL && row.has_kind_and_flags(kind, which);
         if number >= self.count || !is_open(&self.rows[number]) {
             let row = self.spare_batch();
             row.reset();
@@ -213,7 +215,10 @@ impl DirectLightVertexQueue {
     }
 
     /// Groups of consecutive packets whose lights are sampled together.
-    pub fn groups(&self, tile: &TileContext<'_>) -> impl Iterator<Item = Range<usize>> + use<> {
+    pub fn light_sampling_groups(
+        &self,
+        tile: &TileContext<'_>,
+    ) -> impl Iterator<Item = Range<usize>> + use<> {
         let (count, picks_lights) =
             (self.count, tile.world.lights.sampler_for_purpose(tile.behavior.receivers).is_some());
         let size = if picks_lights { MAX_GROUP_SIZE } else { 1 };
@@ -237,7 +242,7 @@ impl DirectLightVertexQueue {
 
     /// Samples lights at the packets of a group, for [`Self::reflected_light`]. `shares_with_paths` is true if
     /// continuing paths compete with the light samples.
-    pub fn sample_lights(
+    pub fn sample_lights_for_group(
         &mut self,
         group: Range<usize>,
         tile: &TileContext<'_>,
@@ -258,7 +263,7 @@ impl DirectLightVertexQueue {
                     .run(ShadowOriginLiftKernel { geometry: &tile.world.geometry, row });
             }
             let request = DirectLightPacketRequest::new(number, row, aov, shares_with_paths);
-            sums.push(self.sample_lights_at_packet(request, tile, aov, sums.len() as u32));
+            sums.push(self.light_sample_sums_at_packet(request, tile, aov, sums.len() as u32));
             if self.pool.is_full() {
                 self.pool.trace(tile, aov, &mut sums);
             }
@@ -269,7 +274,7 @@ impl DirectLightVertexQueue {
         Ok(())
     }
 
-    /// Light reflected at packet `index` of the group passed to [`Self::sample_lights`], including the light
+    /// Light reflected at packet `index` of the group passed to [`Self::sample_lights_for_group`], including the light
     /// found by lobe rays. `number` is the index of the packet in the queue.
     pub fn reflected_light(
         &self,
@@ -320,7 +325,7 @@ impl DirectLightVertexQueue {
     }
 
     /// Samples lights at a packet. Shadow rays to picked lights are pooled under index `number`.
-    fn sample_lights_at_packet(
+    fn light_sample_sums_at_packet(
         &mut self,
         request: DirectLightPacketRequest,
         tile: &TileContext<'_>,
@@ -335,7 +340,8 @@ impl DirectLightVertexQueue {
         let (competing, interior_lists) =
             (self.competing_technique(request, tile, aov), self.interiors_of_batch(row));
         let (instructions, used) = (tile.world.geometry.instruction_set(), request.used);
-        let (only_infinite, splits_lobes) = (false, self.lobe_split(row) == LobeSplit::Mixed);
+        let (only_infinite, splits_lobes) =
+            (false, self.wide_narrow_light_split(row) == WideNarrowLightSplit::Mixed);
         let plain = SampleAllLights::<false> {
             tile,
             row,
@@ -372,14 +378,14 @@ impl DirectLightVertexQueue {
     }
 
     /// How to divide a packet's reflected light.
-    fn lobe_split(&self, row: &VertexBatch) -> LobeSplit {
+    fn wide_narrow_light_split(&self, row: &VertexBatch) -> WideNarrowLightSplit {
         if self.arrived_diffuse.is_empty() || row.only_specular_before == 0 {
-            return LobeSplit::Unused;
+            return WideNarrowLightSplit::Unused;
         }
         match (row.bsdf.has_wide_lobes(), row.bsdf.has_narrow_lobes()) {
-            (_, false) => LobeSplit::OnlyWide,
-            (false, true) => LobeSplit::OnlyNarrow,
-            (true, true) => LobeSplit::Mixed,
+            (_, false) => WideNarrowLightSplit::OnlyWide,
+            (false, true) => WideNarrowLightSplit::OnlyNarrow,
+            (true, true) => WideNarrowLightSplit::Mixed,
         }
     }
 
@@ -395,17 +401,17 @@ impl DirectLightVertexQueue {
             LightAov::Radiance(_) | LightAov::LitFraction => row.times_throughput(&arrived.light),
             LightAov::TraversalCost => arrived.light,
         };
-        let diffuse = match self.lobe_split(row) {
-            LobeSplit::Unused | LobeSplit::OnlyNarrow => None,
-            LobeSplit::OnlyWide => Some(light),
-            LobeSplit::Mixed => Some(row.times_throughput(&arrived.diffuse)),
+        let diffuse = match self.wide_narrow_light_split(row) {
+            WideNarrowLightSplit::Unused | WideNarrowLightSplit::OnlyNarrow => None,
+            WideNarrowLightSplit::OnlyWide => Some(light),
+            WideNarrowLightSplit::Mixed => Some(row.times_throughput(&arrived.diffuse)),
         };
         if let Some(diffuse) = diffuse {
             for i in set_bit_lanes(row.used) {
                 self.arrived_diffuse[row.place[i] as usize] += lane(&diffuse, i);
             }
         }
-        match row.first_consecutive_index() {
+        match row.first_consecutive_queue_index() {
             Some(first) => {
                 let own = &mut self.arrived[first as usize..][..PACKET_SIZE];
                 for (i, own) in own.iter_mut().enumerate() {
@@ -423,7 +429,7 @@ impl DirectLightVertexQueue {
 
 /// How a packet's reflected light is divided into light from wide lobes and light from narrow lobes.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum LobeSplit {
+enum WideNarrowLightSplit {
     /// The parts are not needed.
     Unused,
     /// All lobes are wide.

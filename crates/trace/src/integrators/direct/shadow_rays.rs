@@ -1,7 +1,9 @@
 //! Shadow rays from many vertex packets, regrouped by light. Rays to nearby lights visit the same bounding
 //! boxes, whereas the rays of one packet diverge.
 
-use super::all_lights::{LightSums, add_fraction, add_masked_lanes, convert_transmittance_for_aov};
+use super::all_lights::{
+    LightSums, add_masked_lane_products, add_masked_lanes, convert_transmittance_for_aov,
+};
 use crate::geometry::packet::{F32x16, RayPacket, set_bit_lanes};
 use crate::integrators::transport::tile::TileContext;
 use crate::integrators::view::LightAov;
@@ -87,7 +89,7 @@ impl ShadowRayQueue {
             let sums = &mut sums[*row as usize];
             add_masked_lanes(*traced, values, &mut sums.light);
             if *has_fraction && let Some(fraction) = fractions.next() {
-                add_fraction(*traced, values, fraction, &mut sums.diffuse);
+                add_masked_lane_products(*traced, values, fraction, &mut sums.diffuse);
             }
         }
         self.clear();
@@ -152,7 +154,7 @@ impl SimdKernel for ShadowRayKernel<'_> {
             }
             let traced = ((1_u64 << rays.len()) - 1) as u32;
             let occluded = if world.has_null_interaction_surfaces() {
-                attenuate(world, aov, (&packet, &ends, traced), &sources, (rows, rays))
+                attenuate_queued_contributions(world, aov, (&packet, &ends, traced), &sources, (rows, rays))
             } else {
                 world.geometry.occluded_ray_packet(&packet, &ends, traced, &sources, simd)
             };
@@ -168,7 +170,7 @@ impl SimdKernel for ShadowRayKernel<'_> {
 /// with zero transmittance.
 #[cold]
 #[inline(never)]
-fn attenuate(
+fn attenuate_queued_contributions(
     world: &World,
     aov: LightAov,
     (packet, ends, traced): (&RayPacket, &F32x16, u32),

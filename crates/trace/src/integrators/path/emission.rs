@@ -16,7 +16,11 @@ use crate::world::Hit;
 impl CameraWavefront<'_, '_> {
     /// Masks of a packet's plain surfaces that emit or reflect ambient light, and of the rays that escape to
     /// a background or an infinite light.
-    pub(super) fn emission_masks(&self, rays: &PacketSource<'_>, packet: &PacketHits) -> (u32, u32) {
+    pub(super) fn emitting_and_escaped_masks(
+        &self,
+        rays: &PacketSource<'_>,
+        packet: &PacketHits,
+    ) -> (u32, u32) {
         let (render, lights) = (&self.tile.settings.render, &self.tile.world.lights);
         let plain = if render.ambient == Vec3::ZERO { packet.shining } else { packet.plain };
         let is_dark_beyond = render.background == Vec3::ZERO && !lights.has_infinite_lights();
@@ -25,7 +29,7 @@ impl CameraWavefront<'_, '_> {
 
     /// Adds the emission visible to camera rays: from plain surfaces, the background and infinite lights. It
     /// can be added directly because each sample's emission precedes its direct light.
-    pub(super) fn add_visible_emission(
+    pub(super) fn add_camera_ray_emission(
         &mut self,
         rays: &RayPacket,
         first: u32,
@@ -55,7 +59,7 @@ impl CameraWavefront<'_, '_> {
         // Add the background and the infinite lights.
         let lights = &tile.world.lights;
         for lane in set_bit_lanes(beyond) {
-            let sky = lights.environment().map(|_| packet.sky_radiance_and_pdf(lane));
+            let sky = lights.environment().map(|_| packet.sky_radiance_and_pdf_of_lane(lane));
             let beyond = lights.radiance_from_infinity_with_precomputed_sky(
                 sky,
                 lane_of(&rays.direction, lane),
@@ -84,7 +88,7 @@ impl CameraWavefront<'_, '_> {
     }
 
     /// Adds the emission of a surface and returns whether the path may scatter at the surface.
-    pub(super) fn add_emission(
+    pub(super) fn add_emission_and_check_scattering(
         &mut self,
         path: &PathRay,
         vertex: &SurfaceVertex<'_>,
@@ -93,7 +97,7 @@ impl CameraWavefront<'_, '_> {
         if vertex.emits() {
             let weight = match hit {
                 DirectOrCoincidentHit::Direct(hit) => self.tile.emitter_weight(path, &hit),
-                DirectOrCoincidentHit::Touching(hit) => self.tile.emitter_weight_at_glass(path, &hit),
+                DirectOrCoincidentHit::Touching(hit) => self.tile.coincident_glass_emitter_weight(path, &hit),
             };
             let radiance = vertex.emitted_radiance(path, self.counters);
             self.add_weighted_emission(path, radiance, weight);

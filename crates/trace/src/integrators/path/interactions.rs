@@ -4,7 +4,7 @@
 use super::CameraWavefront;
 use crate::geometry::Ray;
 use crate::geometry::packet::set_bit_lanes;
-use crate::integrators::aov::{record_first_hit, record_plain_first_hits, record_vertex};
+use crate::integrators::aov::{record_first_hit, record_first_hits_on_plain_surfaces, record_vertex};
 use crate::integrators::transport::crossing::CoincidentSurfaceBuffers;
 use crate::integrators::transport::interface::{FresnelSplit, fresnel_split, reflected_path};
 use crate::integrators::transport::interiors::InteriorList;
@@ -41,13 +41,13 @@ impl<'a> PathStepper<'a> for CameraWavefront<'a, '_> {
     }
 
     #[inline(always)]
-    fn interact(&mut self, path: &PathRay, reached: Interaction<'_, 'a>, has_passed: bool) {
+    fn handle_interaction(&mut self, path: &PathRay, reached: Interaction<'_, 'a>, has_passed: bool) {
         match reached {
             Interaction::Opaque(vertex, hit, far) => {
                 if !has_passed && matches!(hit, DirectOrCoincidentHit::Direct(_)) {
                     self.record_camera_vertex(path, vertex);
                 }
-                if self.add_emission(path, vertex, hit) {
+                if self.add_emission_and_check_scattering(path, vertex, hit) {
                     match &vertex.material.bsdf {
                         Bsdf::NonSpecular(rough) => self.shade_rough(path, vertex, rough, far),
                         Bsdf::Mirror(mirror) => self.shade_mirror(path, vertex, mirror),
@@ -60,7 +60,7 @@ impl<'a> PathStepper<'a> for CameraWavefront<'a, '_> {
                 if !has_passed {
                     self.record_camera_vertex(path, vertex);
                 }
-                if self.add_emission(path, vertex, DirectOrCoincidentHit::Direct(hit)) {
+                if self.add_emission_and_check_scattering(path, vertex, DirectOrCoincidentHit::Direct(hit)) {
                     match rough {
                         Some(rough) => self.queue_rough_glass_vertices(path, vertex, rough, far),
                         None => self.shade_glass(path, vertex, far),
@@ -88,7 +88,7 @@ impl<'a> PathStepper<'a> for CameraWavefront<'a, '_> {
         let tint = vertex.pane_transmittance(path, pane, &mut self.counters.texture_lookups);
         let left = tint * (1.0 - reflectance);
         // After the last bounce, only light that passes straight through the pane is added.
-        if !self.add_emission(path, vertex, hit) {
+        if !self.add_emission_and_check_scattering(path, vertex, hit) {
             return NullInteraction::Passed(left);
         }
         let shading = vertex.perturbed_and_smooth_normals(self.counters);
@@ -111,7 +111,7 @@ impl CameraWavefront<'_, '_> {
     /// Adds the traversal costs of a packet's rays.
     pub(super) fn add_traversal_costs(&mut self, rays: &PacketSource<'_>, packet: &PacketHits) {
         for lane in 0..rays.count() {
-            let path = packet.path(self.tile, rays, lane);
+            let path = packet.incoming_path(self.tile, rays, lane);
             let cost = count_traversal_cost_to_hit(self.tile, &path, packet.hit(lane));
             self.accumulator.add_traversal_cost(path.slot, cost);
         }
@@ -133,31 +133,31 @@ impl CameraWavefront<'_, '_> {
                 walk_to_interaction(self, &mut path, (hit, surface));
             }
             None => {
-                let sky = tile.world.lights.environment().map(|_| packet.sky_radiance_and_pdf(lane));
+                let sky = tile.world.lights.environment().map(|_| packet.sky_radiance_and_pdf_of_lane(lane));
                 self.add_infinite_light(&path, tile.infinite_light_with_precomputed_sky(sky, &path));
             }
         }
     }
 
-    /// Records the first-hit layers of camera rays, except for hits that [`Self::interact`] records.
+    /// Records the first-hit layers of camera rays, except for hits that [`Self::handle_interaction`] records.
     #[inline(never)]
     pub(super) fn record_first_hits(&mut self, rays: &PacketSource<'_>, packet: &PacketHits, first: u32) {
         let tile = self.tile;
         let Some(values) = self.accumulator.first_hit_layers() else { return };
-        let mut left = record_plain_first_hits(tile, (packet, self.surfaces), first, values);
+        let mut left = record_first_hits_on_plain_surfaces(tile, (packet, self.surfaces), first, values);
         // Paths may pass through surfaces that the layers show.
         if tile.world.has_null_interaction_surfaces() {
             left |= packet.any & !packet.plain & rays.mask();
         }
         for lane in set_bit_lanes(left) {
             let Some(hit) = packet.hit(lane) else { continue };
-            record_first_hit(tile, (&packet.path(tile, rays, lane), &hit), values, self.counters);
+            record_first_hit(tile, (&packet.incoming_path(tile, rays, lane), &hit), values, self.counters);
         }
     }
 
     /// Records the first-hit layers of a camera ray whose walk passed through the first surface it hit.
     #[inline]
-    pub(super) fn record_passed_first_hit(
+    pub(super) fn record_first_hit_if_passed(
         &mut self,
         rays: &PacketSource<'_>,
         packet: &PacketHits,
@@ -167,7 +167,12 @@ impl CameraWavefront<'_, '_> {
             return;
         }
         if let (Some(hit), Some(values)) = (packet.hit(lane), self.accumulator.first_hit_layers()) {
-            record_first_hit(self.tile, (&packet.path(self.tile, rays, lane), &hit), values, self.counters);
+            record_first_hit(
+                self.tile,
+                (&packet.incoming_path(self.tile, rays, lane), &hit),
+                values,
+                self.counters,
+            );
         }
     }
 

@@ -3,7 +3,7 @@
 use super::CameraWavefront;
 use crate::geometry::packet::set_bit_lanes;
 use crate::integrators::direct::queue::ShadingSides;
-use crate::integrators::transport::interface::sheet_transmission_between_media;
+use crate::integrators::transport::interface::diffuser_basic_radiance_transmittance;
 use crate::integrators::transport::interiors::InteriorList;
 use crate::integrators::transport::packet::{PacketHits, PacketSource};
 use crate::integrators::transport::ray::PathRay;
@@ -24,7 +24,7 @@ impl CameraWavefront<'_, '_> {
         if self.tile.pixel_spread > 0.0 {
             for lane in set_bit_lanes(packet.plain) {
                 let Some(hit) = packet.hit(lane) else { continue };
-                let cone = packet.path(self.tile, rays, lane).cone.propagated_by(hit.shape.t);
+                let cone = packet.incoming_path(self.tile, rays, lane).cone.propagated_by(hit.shape.t);
                 self.direct.store_ray_cone(rays.queue_index(lane), cone);
             }
         }
@@ -88,7 +88,7 @@ impl CameraWavefront<'_, '_> {
         // viewer's side.
         if let Some((bsdf, shading)) = behind.filter(|_| aov != LightAov::LitFraction) {
             let throughput =
-                path.throughput * sheet_transmission_between_media(tile.world, &path.interiors, far);
+                path.throughput * diffuser_basic_radiance_transmittance(tile.world, &path.interiors, far);
             let (path, vertex) = (&PathRay { throughput, ..*path }, &vertex.far_side());
             let lit = ShadingVertex { path, interiors: far, place, vertex, shading, bsdf: &bsdf };
             self.direct.push(tile, &lit, aov, ShadingSides::OneSide { is_dark: false });

@@ -16,7 +16,7 @@ use crate::integrators::transport::batch::{ALL, UNPERTURBED, VertexBatch};
 use crate::integrators::transport::cone::RayCone;
 use crate::integrators::transport::crossing::CoincidentSurfaceBuffers;
 use crate::integrators::transport::interface::{
-    FresnelSplit, fresnel_split, reflected_path, sheet_transmission_between_media,
+    FresnelSplit, diffuser_basic_radiance_transmittance, fresnel_split, reflected_path,
 };
 use crate::integrators::transport::interiors::{Interior, InteriorList, InteriorLists, medium_ior};
 use crate::integrators::transport::packet::PacketSource;
@@ -177,7 +177,7 @@ impl<'a> PathStepper<'a> for PhotonWavefront<'a> {
     fn record_surface_crossing(&mut self, _: &PathRay, _: Option<Hit>) {}
 
     #[inline(always)]
-    fn interact(&mut self, path: &PathRay, reached: Interaction<'_, 'a>, has_passed: bool) {
+    fn handle_interaction(&mut self, path: &PathRay, reached: Interaction<'_, 'a>, has_passed: bool) {
         match reached {
             Interaction::Opaque(vertex, _, far) => {
                 let lacks_photons = self.depth == 0 && !has_passed;
@@ -276,7 +276,8 @@ impl PhotonWavefront<'_> {
         surfaces: &mut SurfacePacket,
     ) {
         let tile = self.tracing.tile;
-        let packet = tile.intersect(PacketSource::Paths(rays, 0), LightAov::ALL, true, (row, surfaces));
+        let packet =
+            tile.intersect_packet(PacketSource::Paths(rays, 0), LightAov::ALL, true, (row, surfaces));
         self.counters.texture_lookups += packet.lookups;
         // Direct light is found by light samples.
         if self.depth > 0 {
@@ -411,7 +412,7 @@ impl PhotonWavefront<'_> {
             1.0 / (eta * eta)
         } else {
             // For a camera path, this is transmission from the other side.
-            sheet_transmission_between_media(tile.world, far, &path.interiors)
+            diffuser_basic_radiance_transmittance(tile.world, far, &path.interiors)
         };
         let interiors = self.interior_lists.push_list(far);
         if self.open_behind.used == ALL || self.open_behind.bsdf.kind() != bsdf.kind() {
@@ -503,12 +504,8 @@ impl PhotonWavefront<'_> {
         let continuation =
             ContinuationPolicy { continues: true, uses_roulette: false, lobes: SampledLobes::All };
         let used = row.used;
-        BsdfSampler { tile: self.tracing.tile, row, used, continuation, has_fractions: false }.scatter(
-            &self.interior_lists,
-            &[],
-            &mut self.next,
-            None,
-        );
+        BsdfSampler { tile: self.tracing.tile, row, used, continuation, has_fractions: false }
+            .queue_scattered_paths(&self.interior_lists, &[], &mut self.next, None);
     }
 
     /// Applies Russian roulette based on flux. Surviving photons keep about their initial flux.

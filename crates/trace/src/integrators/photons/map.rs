@@ -234,7 +234,7 @@ impl PhotonMap {
         let mut choices = ReservoirPacket::new(random[0]);
         let ranges = self.candidate_ranges(look);
         for range in &ranges.of[..ranges.count] {
-            for block in blocks_in_range(*range) {
+            for block in block_index_range(*range) {
                 let Some(weights) = self.kernel_weights_in_block(look, *range, block, simd) else { continue };
                 let flux = &self.blocks[block].flux;
                 let mut brought = [0.0; PACKET_SIZE];
@@ -267,9 +267,9 @@ impl PhotonMap {
         let mut count = 0;
         let ranges = self.candidate_ranges(look);
         for range in &ranges.of[..ranges.count] {
-            for block in blocks_in_range(*range) {
+            for block in block_index_range(*range) {
                 let Some(weights) = self.kernel_weights_in_block(look, *range, block, simd) else { continue };
-                count += positive_lanes(&weights, simd).count_ones();
+                count += positive_lane_mask(&weights, simd).count_ones();
             }
         }
         count
@@ -288,9 +288,9 @@ impl PhotonMap {
         let peak = self.peak_weight();
         let ranges = self.candidate_ranges(look);
         for range in &ranges.of[..ranges.count] {
-            for block in blocks_in_range(*range) {
+            for block in block_index_range(*range) {
                 let Some(weights) = self.kernel_weights_in_block(look, *range, block, simd) else { continue };
-                for i in set_bit_lanes(positive_lanes(&weights, simd)) {
+                for i in set_bit_lanes(positive_lane_mask(&weights, simd)) {
                     visit(&self.photon(block, i), peak * weights[i]);
                 }
             }
@@ -405,13 +405,13 @@ impl PhotonBlock {
 
 /// Blocks that contain a nonempty range of photons.
 #[inline(always)]
-fn blocks_in_range([start, end]: [u32; 2]) -> std::ops::Range<usize> {
+fn block_index_range([start, end]: [u32; 2]) -> std::ops::Range<usize> {
     start as usize / PACKET_SIZE..(end as usize).div_ceil(PACKET_SIZE)
 }
 
 /// Mask of lanes with values above 0.
 #[inline(always)]
-fn positive_lanes(weights: &F32x16, simd: impl Simd) -> u32 {
+fn positive_lane_mask(weights: &F32x16, simd: impl Simd) -> u32 {
     let mut above: Mask = [0; PACKET_SIZE];
     for i in 0..PACKET_SIZE {
         above[i] = if weights[i] > 0.0 { TRUE } else { 0 };

@@ -75,7 +75,10 @@ impl Accumulator<'_> {
     /// The layers, if any of them records a quantity at the first hit.
     #[inline]
     pub fn first_hit_layers(&mut self) -> Option<&mut LayerValues> {
-        self.layers.as_mut().map(|layers| &mut *layers.values).filter(|values| values.set().has_first_hit())
+        self.layers
+            .as_mut()
+            .map(|layers| &mut *layers.values)
+            .filter(|values| values.layer_set().has_first_hit())
     }
 
     /// Part of the light at a path's vertex that counts as diffuse. `visible` is this part if the camera sees

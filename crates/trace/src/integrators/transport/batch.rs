@@ -115,7 +115,7 @@ impl VertexBatch {
             is_run &= slots[i] == slots[0] + i as u32;
         }
         let (xs, ys, samples) = if is_run {
-            block.samples_of_consecutive_slots(slots[0])
+            block.pixels_and_samples_from_slot(slots[0])
         } else {
             block.pixels_and_samples_of_slots(slots)
         };
@@ -133,14 +133,14 @@ impl VertexBatch {
         (self.used, self.has_horizon, self.may_lift) = (0, 0, 0);
         (self.has_facet, self.only_specular_before, self.after_gloss) = (0, 0, 0);
         (self.is_perturbed, self.is_dark, self.has_two_sides) = (false, false, false);
-        self.bsdf.reset_flags();
+        self.bsdf.prepare_for_reuse();
         self.shading_normal_cosine = [UNPERTURBED; PACKET_SIZE];
     }
 
     /// Whether the packet accepts vertices with this kind of BSDF and these values of `is_dark` and
     /// `has_two_sides`.
     #[inline(always)]
-    pub fn accepts(&self, kind: BxdfKind, (is_dark, has_two_sides): (bool, bool)) -> bool {
+    pub fn has_kind_and_flags(&self, kind: BxdfKind, (is_dark, has_two_sides): (bool, bool)) -> bool {
         self.bsdf.kind() == kind && self.is_dark == is_dark && self.has_two_sides == has_two_sides
     }
 
@@ -197,7 +197,7 @@ impl VertexBatch {
             ..BatchVertex::default()
         }
         .set(self, i);
-        let directions = ShadingGeometry { normal, wo: vertex.wo, tangent: vertex.tangent() };
+        let directions = ShadingGeometry { normal, wo: vertex.wo, tangent: vertex.dpdu_or_zero() };
         self.bsdf.set_bsdf(i, bsdf, aov.lobes(), &directions);
         self.is_perturbed |= shading.shading_normal_cosine.is_some();
         self.used |= 1 << i;
@@ -313,7 +313,7 @@ impl VertexBatch {
     /// Returns the first vertex's queue index if every lane has a vertex and the indices are consecutive, or
     /// `None` otherwise.
     #[inline(always)]
-    pub fn first_consecutive_index(&self) -> Option<u32> {
+    pub fn first_consecutive_queue_index(&self) -> Option<u32> {
         let mut is_run = self.used == ALL;
         for i in 0..PACKET_SIZE {
             is_run &= self.place[i] == self.place[0].wrapping_add(i as u32);

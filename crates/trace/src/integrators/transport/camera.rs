@@ -29,7 +29,7 @@ pub struct CameraRayPacket {
 impl TileContext<'_> {
     /// Replaces the queue's content with camera rays for a range of slots, and reports the rays with a
     /// negative filter weight.
-    pub fn generate_camera_rays(
+    pub fn replace_queue_with_camera_rays(
         &self,
         slots: Range<u32>,
         queue: &mut Vec<PathRay>,
@@ -38,7 +38,7 @@ impl TileContext<'_> {
         queue.clear();
         let mut rows = Vec::new();
         for first in slots.clone().step_by(CAMERA_ROWS * PACKET_SIZE) {
-            self.generate_camera_packets(first..slots.end, &mut rows);
+            self.fill_camera_packets(first..slots.end, &mut rows);
             for (first, row) in (first..).step_by(PACKET_SIZE).zip(&rows) {
                 negative(first, row.negative);
                 let slots = first..slots.end.min(first + PACKET_SIZE as u32);
@@ -51,7 +51,7 @@ impl TileContext<'_> {
 
     /// Replaces the content of `rows` with packets of camera rays for the first slots in the range, at most
     /// [`CAMERA_ROWS`] packets.
-    pub fn generate_camera_packets(&self, slots: Range<u32>, rows: &mut Vec<CameraRayPacket>) {
+    pub fn fill_camera_packets(&self, slots: Range<u32>, rows: &mut Vec<CameraRayPacket>) {
         rows.clear();
         let count = slots.len().div_ceil(PACKET_SIZE).min(CAMERA_ROWS);
         self.world.geometry.instruction_set().run(GenerateCameraRays {
@@ -90,7 +90,7 @@ impl TileContext<'_> {
     fn camera_packet(&self, first: u32) -> CameraRayPacket {
         let paths = [CAMERA_PATH; PACKET_SIZE];
         let (settings, camera) = (self.settings, &self.world.camera);
-        let (xs, ys, samples) = self.block.samples_of_consecutive_slots(first);
+        let (xs, ys, samples) = self.block.pixels_and_samples_from_slot(first);
         let sampler = SamplerPacket::new(settings.render.seed, &xs, &ys, &samples);
         // Sample positions in the pixels.
         let mut in_pixel = sampler.pairs(&paths, Dimension::Pixel, 0, 1);
@@ -168,7 +168,7 @@ mod tests {
         for samples in [3..4, 0..5, 100..116, 7..40] {
             let block = SampleBlock { pixels: tile.into(), samples };
             for first in [0, 1, 2, 15, 33] {
-                let (xs, ys, samples) = block.samples_of_consecutive_slots(first);
+                let (xs, ys, samples) = block.pixels_and_samples_from_slot(first);
                 for lane in 0..PACKET_SIZE {
                     let place = block.pixel_and_sample(first + lane as u32);
                     assert_eq!((xs[lane], ys[lane], samples[lane]), place, "{first} + {lane}");

@@ -22,7 +22,7 @@ pub struct InterfaceCrossing {
 /// The glass whose surface separates two media. It is the glass with the higher priority, which is later in
 /// the scene file.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct GlassBoundary {
+pub struct SeparatingGlassSurface {
     /// Material of the glass at this point.
     pub material: u32,
     /// Hit on the glass surface, along the ray between the two origins, or `None` if the path itself hits
@@ -118,27 +118,27 @@ impl TileContext<'_> {
 
     /// The glass surface that separates two media at a hit, or `None` if both media are air. Must be called
     /// after [`TileContext::find_interface_crossing`], with the same buffers.
-    pub fn boundary(
+    pub fn separating_glass_surface(
         &self,
         hit: &Hit,
         [near, far]: [&InteriorList; 2],
         memory: &CoincidentSurfaceBuffers,
-    ) -> Option<GlassBoundary> {
+    ) -> Option<SeparatingGlassSurface> {
         let later = near.glass().max(far.glass())?;
         let own = self.world.material_index(hit) as u32;
         if self.world.solid_id(hit.object) == later.body && self.world.is_glass_material(own) {
-            return Some(GlassBoundary { material: own, hit: None });
+            return Some(SeparatingGlassSurface { material: own, hit: None });
         }
         // The path hits a different coincident surface.
         let of_body = memory.near.iter().find_map(|thing| match *thing {
             CoincidentOrEnclosingSurface::Surface { hit, material, .. } => {
                 let is_later =
                     self.world.solid_id(hit.object) == later.body && self.world.is_glass_material(material);
-                is_later.then_some(GlassBoundary { material, hit: Some(hit) })
+                is_later.then_some(SeparatingGlassSurface { material, hit: Some(hit) })
             }
             CoincidentOrEnclosingSurface::Around { .. } => None,
         });
-        Some(of_body.unwrap_or(GlassBoundary { material: later.material, hit: None }))
+        Some(of_body.unwrap_or(SeparatingGlassSurface { material: later.material, hit: None }))
     }
 
     /// Removes the open solids from a medium.

@@ -4,7 +4,7 @@ use super::cone::SpecularEvent;
 use super::interiors::{InteriorList, medium_ior};
 use super::ray::PathRay;
 use super::vertex::{PerturbedAndSmoothNormals, SurfaceVertex};
-use crate::materials::fresnel::{dielectric, refract};
+use crate::materials::fresnel::{dielectric, refract_given_cosine};
 use crate::materials::mirror::reflect;
 use crate::math::Vec3;
 use crate::world::World;
@@ -45,7 +45,7 @@ pub fn reflected_path(
 /// In the denser medium, light spreads over fewer directions and would gain energy without this factor. In
 /// the opposite direction, radiance is unchanged (Veach, *Robust Monte Carlo Methods for Light Transport
 /// Simulation*, 1997, section 5.2).
-pub fn sheet_transmission_between_media(world: &World, near: &InteriorList, far: &InteriorList) -> f32 {
+pub fn diffuser_basic_radiance_transmittance(world: &World, near: &InteriorList, far: &InteriorList) -> f32 {
     let eta = medium_ior(world, far) / medium_ior(world, near);
     (eta * eta).min(1.0)
 }
@@ -93,7 +93,7 @@ fn reflectance_and_refraction(
     let crosses = |direction: &Vec3| direction.dot(geometric) < 0.0;
     let by = |normal: Vec3| {
         let (reflectance, cosine) = dielectric(-normal.dot(incident), eta);
-        (reflectance, cosine.map(|cosine| refract(incident, normal, eta, cosine)))
+        (reflectance, cosine.map(|cosine| refract_given_cosine(incident, normal, eta, cosine)))
     };
     let shaded = if shading.dot(incident) < 0.0 { by(shading) } else { by(geometric) };
     match shaded {

@@ -130,7 +130,7 @@ impl PacketHits {
 
     /// Returns a lane's path.
     #[inline(always)]
-    pub fn path(&self, tile: &TileContext<'_>, rays: &PacketSource<'_>, lane: usize) -> PathRay {
+    pub fn incoming_path(&self, tile: &TileContext<'_>, rays: &PacketSource<'_>, lane: usize) -> PathRay {
         match rays {
             PacketSource::Camera(row, first, ..) => {
                 tile.path_from_camera_ray(row.rays.ray(lane), first + lane as u32)
@@ -141,7 +141,7 @@ impl PacketHits {
     }
 
     /// Radiance of the environment along a ray that leaves the scene, and its light-sampling pdf in sr⁻¹.
-    pub fn sky_radiance_and_pdf(&self, lane_of_ray: usize) -> (Vec3, f32) {
+    pub fn sky_radiance_and_pdf_of_lane(&self, lane_of_ray: usize) -> (Vec3, f32) {
         (lane(&self.sky.0, lane_of_ray), self.sky.1[lane_of_ray])
     }
 }
@@ -150,7 +150,7 @@ impl TileContext<'_> {
     /// Intersects at most [`PACKET_SIZE`] rays. Plain surfaces are stored in the vertex packet, ready for
     /// direct lighting if `are_lit` is true. The packet's `used` mask contains the surfaces that reflect
     /// light. Other surfaces are stored in the surface packet if supported.
-    pub fn intersect(
+    pub fn intersect_packet(
         &self,
         rays: PacketSource<'_>,
         aov: LightAov,
@@ -195,7 +195,7 @@ struct PacketIntersector<'a> {
 }
 
 /// Masks of a packet's plain surfaces.
-struct PlainSurfaceMasks {
+struct PlainAndEmissiveSurfaceMasks {
     /// All plain surfaces.
     all: u32,
     /// Surfaces that emit on either side.
@@ -295,9 +295,9 @@ impl PacketIntersector<'_> {
         (hits, object): (&HitPacket, &[u32; PACKET_SIZE]),
         mut left: u32,
         simd: impl Simd,
-    ) -> PlainSurfaceMasks {
+    ) -> PlainAndEmissiveSurfaceMasks {
         let Self { tile, aov, are_lit, row, surface, .. } = self;
-        let mut plain = PlainSurfaceMasks { all: 0, shining: 0, two_sided: 0, lookups: 0 };
+        let mut plain = PlainAndEmissiveSurfaceMasks { all: 0, shining: 0, two_sided: 0, lookups: 0 };
         while left != 0 {
             let (id, of_object) = lanes_matching_first(object, left, simd);
             left &= !of_object;
@@ -336,7 +336,7 @@ impl PacketIntersector<'_> {
             match &tile.world.geometry.objects()[id as usize] {
                 Object::Shape(shape) => {
                     row.set_start_triangles(of, &[Ray::NO_TRIANGLE; PACKET_SIZE]);
-                    if !surface.compute_surface_points(shape, rows, hits, of) {
+                    if !surface.try_compute_surface_points(shape, rows, hits, of) {
                         (plain.shining, plain.two_sided) = (plain.shining & !of, plain.two_sided & !of);
                         continue;
                     }
@@ -419,7 +419,7 @@ impl TileContext<'_> {
                 continue;
             }
             let is_filled = match thing {
-                Object::Shape(shape) => surface.compute_surface_points(shape, rows, hits, of),
+                Object::Shape(shape) => surface.try_compute_surface_points(shape, rows, hits, of),
                 Object::Mesh(mesh) => {
                     mesh.fill_surfaces(surface, rows, hits, of, None, simd);
                     true

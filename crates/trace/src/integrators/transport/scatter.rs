@@ -106,7 +106,7 @@ impl BsdfSampler<'_> {
     /// Adds the rays of the next bounce to `next`. `interior_lists` contains the media at the vertices.
     /// `cones` is empty or contains the ray cones at the vertices, indexed by queue index. `fractions` is
     /// required if `has_fractions`.
-    pub fn scatter(
+    pub fn queue_scattered_paths(
         self,
         interior_lists: &InteriorLists,
         cones: &[RayCone],
@@ -173,7 +173,7 @@ impl SimdKernel for BsdfSampler<'_> {
         };
         let sides = if row.has_two_sides { row.bsdf.sample_either_side(&lobe, &u, simd) } else { None };
         let mut scattered = match sides {
-            Some(sides) => self.scatter_both_sides(&sides, simd),
+            Some(sides) => self.scattered_from_two_sided_samples(&sides, simd),
             None => self.sample_on_viewer_side(&lobe, &u, simd),
         };
         scattered.alive &= used;
@@ -241,7 +241,11 @@ impl BsdfSampler<'_> {
 
     /// Scatters paths in directions sampled on both sides of the surfaces.
     #[inline(always)]
-    fn scatter_both_sides(&self, samples: &DielectricSamplePacket, simd: impl Simd) -> ScatteredDirections {
+    fn scattered_from_two_sided_samples(
+        &self,
+        samples: &DielectricSamplePacket,
+        simd: impl Simd,
+    ) -> ScatteredDirections {
         let row = self.row;
         let DielectricSamplePacket { directions: wi, densities: pdfs, shares, shown, beyond } = samples;
         // Apply the terminator factors for perturbed normals, each on its direction's side.

@@ -124,7 +124,7 @@ impl SampleBlock {
     /// Columns, rows and sample indices of the sixteen slots starting at `first`, even if some are past the
     /// last slot.
     #[inline(always)]
-    pub fn samples_of_consecutive_slots(
+    pub fn pixels_and_samples_from_slot(
         &self,
         first: u32,
     ) -> ([u32; PACKET_SIZE], [u32; PACKET_SIZE], [u32; PACKET_SIZE]) {

@@ -120,7 +120,7 @@ impl<'a> SurfaceVertex<'a> {
             color: tile.world.vertex_color(hit),
             curvature,
             material,
-            has_uv: tile.world.has_usable_texture_axes(hit.object),
+            has_uv: tile.world.has_texture_axes_if_needed(hit.object),
             is_front: surface.normal.dot(path.ray.direction) < 0.0,
             wo,
             normal: surface.normal * side,
@@ -238,7 +238,7 @@ impl<'a> SurfaceVertex<'a> {
     }
 
     /// ∂p/∂u, or zero on a mesh without texture coordinates, where u is not defined.
-    pub fn tangent(&self) -> Vec3 {
+    pub fn dpdu_or_zero(&self) -> Vec3 {
         if self.has_uv { self.surface.dpdu } else { Vec3::ZERO }
     }
 

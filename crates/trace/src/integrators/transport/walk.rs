@@ -55,12 +55,12 @@ pub trait PathStepper<'a> {
     /// Handles the interaction that ends a walk. The path contains the incoming ray, in the medium before the
     /// surface, and its throughput includes absorption. `has_passed` is true if the walk crossed any surface
     /// inside glass.
-    fn interact(&mut self, path: &PathRay, reached: Interaction<'_, 'a>, has_passed: bool);
+    fn handle_interaction(&mut self, path: &PathRay, reached: Interaction<'_, 'a>, has_passed: bool);
 
     /// Texture lookup counter.
     fn texture_lookup_counter(&mut self) -> &mut u64;
 
-    /// Handles a thin pane. The path has the same state as in [`PathStepper::interact`].
+    /// Handles a thin pane. The path has the same state as in [`PathStepper::handle_interaction`].
     fn handle_pane(
         &mut self,
         path: &PathRay,
@@ -105,7 +105,7 @@ impl Segment {
     /// Moves the ray origin back to the path's last vertex, and returns the hit with the distance from that
     /// vertex.
     #[inline(always)]
-    fn rebase_to_last_vertex(&self, path: &mut PathRay, mut hit: Hit) -> Hit {
+    fn rebase_ray_to_last_vertex(&self, path: &mut PathRay, mut hit: Hit) -> Hit {
         if self.count > 0 {
             path.ray.origin = self.origin;
             hit.shape.t += self.distance;
@@ -157,7 +157,7 @@ pub fn walk_to_interaction<'a, W: PathStepper<'a>>(
                             None => {
                                 stepper.record_surface_crossing(path, None);
                                 path.ray.origin = way.origin;
-                                return stepper.interact(path, Interaction::Nothing, has_passed);
+                                return stepper.handle_interaction(path, Interaction::Nothing, has_passed);
                             }
                         }
                     }
@@ -179,8 +179,8 @@ pub fn walk_to_interaction<'a, W: PathStepper<'a>>(
                 far = crossing.far;
                 vertex.set_offset_points(crossing.sides);
             }
-            let hit = way.rebase_to_last_vertex(path, hit);
-            return stepper.interact(
+            let hit = way.rebase_ray_to_last_vertex(path, hit);
+            return stepper.handle_interaction(
                 path,
                 Interaction::Opaque(&vertex, DirectOrCoincidentHit::Direct(hit), &far),
                 has_passed,
@@ -200,9 +200,9 @@ pub fn walk_to_interaction<'a, W: PathStepper<'a>>(
                 || is_stopped_by_coincident_surface(stepper, path, &vertex)
             {
                 let touched = Hit { shape: ShapeHit { t: hit.shape.t, ..touching.shape }, ..touching };
-                let touched = way.rebase_to_last_vertex(path, touched);
+                let touched = way.rebase_ray_to_last_vertex(path, touched);
                 let reached = Interaction::Opaque(&vertex, DirectOrCoincidentHit::Touching(touched), &far);
-                return stepper.interact(path, reached, has_passed);
+                return stepper.handle_interaction(path, reached, has_passed);
             }
             path.path = path.continuation_path_number(PASSED);
         }
@@ -215,8 +215,8 @@ pub fn walk_to_interaction<'a, W: PathStepper<'a>>(
             } else {
                 None
             };
-            let hit = way.rebase_to_last_vertex(path, hit);
-            return stepper.interact(
+            let hit = way.rebase_ray_to_last_vertex(path, hit);
+            return stepper.handle_interaction(
                 path,
                 Interaction::Glass(&vertex, hit, Interface { far: &far, rough }),
                 has_passed,
@@ -231,10 +231,10 @@ pub fn walk_to_interaction<'a, W: PathStepper<'a>>(
         stepper.record_surface_crossing(path, next);
         match next {
             Some(next) => hit = next,
-            None => return stepper.interact(path, Interaction::Nothing, true),
+            None => return stepper.handle_interaction(path, Interaction::Nothing, true),
         }
     }
-    stepper.interact(path, Interaction::Hidden, true);
+    stepper.handle_interaction(path, Interaction::Hidden, true);
 }
 
 /// Rough surface between two media with different indices of refraction, or `None` if the surface is smooth.
@@ -249,7 +249,8 @@ fn rough_dielectric_point<'a, W: PathStepper<'a>>(
     let tile = stepper.tile();
     let interior_lists = [&path.interiors, far];
     let indices = interior_lists.map(|interiors| medium_ior(tile.world, interiors));
-    let boundary = tile.boundary(hit, interior_lists, stepper.coincident_surface_buffers())?;
+    let boundary =
+        tile.separating_glass_surface(hit, interior_lists, stepper.coincident_surface_buffers())?;
     let glass = tile.world.materials[boundary.material as usize].bsdf.as_dielectric()?;
     let touching = boundary.hit.filter(|_| glass.roughness.texture().is_some());
     let touching =
@@ -274,7 +275,7 @@ fn null_interaction<'a, W: PathStepper<'a>>(
     match &vertex.material.bsdf {
         Bsdf::ThinDielectric(pane) => {
             let mut whole = *path;
-            let hit = way.rebase_to_last_vertex(&mut whole, hit);
+            let hit = way.rebase_ray_to_last_vertex(&mut whole, hit);
             whole.interiors = stepper.tile().interiors_without_open_solids(whole.interiors);
             stepper.handle_pane(&whole, vertex, DirectOrCoincidentHit::Direct(hit), pane)
         }

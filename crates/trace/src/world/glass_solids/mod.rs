@@ -113,7 +113,7 @@ impl GlassSolids {
                 let is_inside_out = is_first_part_flipped != groups.flips[part as usize];
                 solids.parts[object as usize] =
                     ObjectRole { place: place.unwrap_or(object), is_inside_out, is_open };
-                solids.open.extend(hole.describe_at_part(part, object, is_covered));
+                solids.open.extend(hole.open_glass_at_part(part, object, is_covered));
             }
             if hole.part <= NO_HOLE && groups.have_zero_volume(&parts, members) {
                 solids.flat.extend(members.first().map(|&part| parts.list[part as usize].object));
@@ -378,7 +378,7 @@ impl Hole {
 
     /// Describes the hole where it borders one part. Returns `None` if the part does not border the hole or
     /// the hole is attributed to rounding.
-    fn describe_at_part(&self, part: u32, object: u32, is_covered: bool) -> Option<OpenGlass> {
+    fn open_glass_at_part(&self, part: u32, object: u32, is_covered: bool) -> Option<OpenGlass> {
         let own = || self.rims.iter().zip(&self.disagree).filter(|(rim, _)| rim.part == part);
         let edges = own().count();
         let disagrees = own().all(|(_, disagrees)| *disagrees);

@@ -96,8 +96,8 @@ impl GlassParts {
     /// Adds an open shape.
     fn add_open_surface(&mut self, number: u32, sheet: &OpenSurface) {
         match *sheet {
-            OpenSurface::Quad(corners) => self.add_polygon(number, &corners),
-            OpenSurface::Triangle(corners) => self.add_polygon(number, &corners),
+            OpenSurface::Quad(corners) => self.add_polygon_part(number, &corners),
+            OpenSurface::Triangle(corners) => self.add_polygon_part(number, &corners),
             OpenSurface::Disk { center, normal, radius } => {
                 let normal = normal.normalize();
                 let area = std::f64::consts::PI * radius * radius;
@@ -153,7 +153,7 @@ impl GlassParts {
     }
 
     /// Adds a planar polygon with corners in counterclockwise order as seen from the front.
-    fn add_polygon(&mut self, object: u32, corners: &[DVec3]) {
+    fn add_polygon_part(&mut self, object: u32, corners: &[DVec3]) {
         let own: Vec<DVec3> = corners.iter().map(|&corner| corner - self.origin).collect();
         let halves = (1..own.len() - 1).map(|i| (own[i] - own[0]).cross(own[i + 1] - own[0]) * 0.5);
         let normal: DVec3 = halves.sum();
@@ -259,7 +259,7 @@ pub(super) fn find_glass_triangles(
     object: &Object,
 ) -> Option<GlassTriangles> {
     match (object.material, object.shape.as_mesh()) {
-        (Some(index), _) => scene.materials[index].kind.is_glass().then_some(GlassTriangles::All),
+        (Some(index), _) => scene.materials[index].kind.is_solid_glass().then_some(GlassTriangles::All),
         (None, Some(mesh)) => {
             meshes[mesh.file].materials.iter().any(FileMaterial::is_glass).then_some(GlassTriangles::Some)
         }

@@ -66,7 +66,7 @@ impl MatchedAndOpenEdges {
         let mut edges = Self::default();
         let sites = MergedEdgeEndpoints::from_rims(parts, rims, token)?;
         // Match edges that have both endpoints in common.
-        let halves = rims.iter().enumerate().map(|(i, rim)| (*rim, sites.endpoint_ids_of_rim(i)));
+        let halves = rims.iter().enumerate().map(|(i, rim)| (*rim, sites.endpoint_ids_of_rim_edge(i)));
         let open = edges.match_equal_edges(parts, halves.collect());
         token.check_pause_and_cancel()?;
         // Split the remaining edges at the endpoints of other edges, and match again.
@@ -199,7 +199,7 @@ impl MergedEdgeEndpoints {
         Ok(Self { points, tolerances, ends })
     }
 
-    fn endpoint_ids_of_rim(&self, rim: usize) -> [u32; 2] {
+    fn endpoint_ids_of_rim_edge(&self, rim: usize) -> [u32; 2] {
         self.ends[rim]
     }
 

@@ -3,7 +3,8 @@
 use ::image::DynamicImage;
 
 use super::{
-    Sample, alpha_sample_index, is_channel_filled_with, linearize_pixel, pixel_rgb, sanitize, with_samples,
+    Sample, alpha_sample_index, apply_transfer_curves_to_pixel, is_channel_filled_with, pixel_rgb, sanitize,
+    with_samples,
 };
 use crate::assets::image::metadata::{AlphaInterpretation, ImageMetadata};
 use crate::assets::image::space::ColorSpace;
@@ -95,7 +96,7 @@ fn premultiplied_floats<T: Sample>(
         let linear = match &decoding {
             Linearization::Linear => encoded.map(|value| value / divisor),
             Linearization::Srgb => encoded.map(|value| srgb_to_linear(sanitize(value / divisor))),
-            Linearization::Tables(tables) => linearize_pixel(pixel, Some(tables)),
+            Linearization::Tables(tables) => apply_transfer_curves_to_pixel(pixel, Some(tables)),
         };
         let color = Vec3::from_array(options.space.convert_to_linear_rec_709(linear).map(sanitize));
         (color * alpha).extend(alpha)

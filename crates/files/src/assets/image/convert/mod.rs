@@ -266,7 +266,7 @@ fn convert_color_space(
     ) -> TexelData {
         let tables = T::linearization_tables(space);
         let mut texel = |pixel| {
-            let linear = linearize_pixel(pixel, tables.as_ref());
+            let linear = apply_transfer_curves_to_pixel(pixel, tables.as_ref());
             let color = space.convert_to_linear_rec_709(linear);
             if is_raw {
                 return Vec3::from_array(color);
@@ -282,7 +282,7 @@ fn convert_color_space(
 }
 
 /// Linearizes a pixel, using tables for integers.
-fn linearize_pixel<T: Sample>(pixel: &[T], tables: Option<&[Vec<f32>; 3]>) -> [f32; 3] {
+fn apply_transfer_curves_to_pixel<T: Sample>(pixel: &[T], tables: Option<&[Vec<f32>; 3]>) -> [f32; 3] {
     let rgb = pixel_rgb(pixel);
     match tables {
         Some(tables) => std::array::from_fn(|i| tables[i][rgb[i].table_index()]),

@@ -152,7 +152,7 @@ mod tests {
     }
 
     #[test]
-    fn pixel_values_are_scalars() {
+    fn selected_channel_determines_the_scalar() {
         let color =
             || DynamicImage::ImageRgba8(ImageBuffer::from_pixel(1, 1, ::image::Rgba([51, 102, 204, 25])));
         let of = |channel| ChannelSelector::Channel(channel);

@@ -82,7 +82,7 @@ impl LuminanceChroma {
         let interpolated = |plane: &Vec<f32>| -> Vec<f32> {
             let rows = plane.chunks_exact(width / step);
             rows.flat_map(|row| {
-                (0..width).map(|x| interpolate_chroma_at_column(x, self.step, row.len(), |at| row[at]))
+                (0..width).map(|x| interpolate_chroma_within_row(x, self.step, row.len(), |at| row[at]))
             })
             .collect()
         };
@@ -121,7 +121,7 @@ impl LuminanceChroma {
 
 /// Interpolates chroma at a column, using the filter for 2 × 2 subsampling and linear interpolation for other
 /// factors.
-fn interpolate_chroma_at_column(
+fn interpolate_chroma_within_row(
     x: usize,
     step: Vec2<usize>,
     count: usize,

@@ -106,7 +106,7 @@ fn line_of_value<T>(at: Option<WithLine<T>>) -> Option<usize> {
 }
 
 /// Whether a number is above 1 by more than rounding errors.
-fn is_number_above_one(number: f32) -> bool {
+fn is_above_one_with_tolerance(number: f32) -> bool {
     number > 1.0 + 1e-5
 }
 
@@ -190,12 +190,14 @@ fn warn_about_unrenderable_reflectance(
     };
     let ks = converted.specular.max_element();
     match converted.kind() {
-        FileMaterialKind::Phong => warn_about_missing_or_excess_reflectance(found, converted, add),
-        FileMaterialKind::Principled(_) | FileMaterialKind::Coated if is_number_above_one(kd) => {
+        FileMaterialKind::Phong => warn_about_highlight_and_energy_gain(found, converted, add),
+        FileMaterialKind::Principled(_) | FileMaterialKind::Coated if is_above_one_with_tolerance(kd) => {
             add(line_of_value(diffuse), BRIGHT_DIFFUSE);
         }
         FileMaterialKind::Coated if ks > FileMaterial::MAX_COAT => add(line_of_value(specular), BRIGHT_COAT),
-        FileMaterialKind::Mirror if is_number_above_one(ks) => add(line_of_value(specular), BRIGHT_MIRROR),
+        FileMaterialKind::Mirror if is_above_one_with_tolerance(ks) => {
+            add(line_of_value(specular), BRIGHT_MIRROR);
+        }
         FileMaterialKind::Mirror if kd > 0.0 => add(line_of_value(diffuse), DIFFUSE_UNDER_MIRROR),
         FileMaterialKind::Principled(_)
         | FileMaterialKind::Coated
@@ -205,7 +207,7 @@ fn warn_about_unrenderable_reflectance(
 }
 
 /// Warns about missing highlights and about surfaces that reflect more light than they receive.
-fn warn_about_missing_or_excess_reflectance(
+fn warn_about_highlight_and_energy_gain(
     found: &MtlMaterial,
     converted: &FileMaterial,
     add: &mut impl FnMut(Option<usize>, &str),
@@ -223,7 +225,7 @@ fn warn_about_missing_or_excess_reflectance(
         true => converted.specular * (2.0 / (converted.shininess + 2.0)),
         false => Vec3::ZERO,
     };
-    if is_number_above_one((kd + ks).max_element()) {
+    if is_above_one_with_tolerance((kd + ks).max_element()) {
         add(line_of_value(diffuse).or(line_of_value(specular)), GAINS_ENERGY);
     }
 }

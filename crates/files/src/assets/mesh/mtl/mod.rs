@@ -79,7 +79,7 @@ impl MtlMaterial {
 pub(super) fn load(path: &Path, monitor: Monitor<'_>) -> Result<MtlLibrary, AssetError> {
     let quiet = Monitor { progress: &crate::control::ignore_progress, ..monitor };
     let bytes = read::read_text(path, FILE_LIMIT, quiet)?;
-    let hash = read::hash(&bytes);
+    let hash = read::hash_bytes(&bytes);
     let bytes = convert_mac_line_ends(strip_byte_order_mark(&bytes));
     let mut library = MtlLibrary { materials: Vec::new(), ignored: Vec::new(), hash };
     for (index, line) in bytes.split(|byte| *byte == b'\n').enumerate() {

@@ -88,7 +88,7 @@ impl NumberReader for AsciiReader<'_> {
     }
 
     fn has_bytes_for(&self, _: ScalarType, count: u64) -> bool {
-        count.saturating_mul(2) <= self.0.remaining() as u64 + 1
+        count.saturating_mul(2) <= self.0.remaining_byte_count() as u64 + 1
     }
 }
 

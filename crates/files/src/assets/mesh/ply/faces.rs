@@ -184,7 +184,7 @@ impl FaceReader {
     fn add(&mut self, parsed: &mut ParsedMesh, start: usize, end: usize) {
         let arity = self.corners.len();
         let is_wrong = |list: &[f64], sizes| {
-            !list.is_empty() && arity > 0 && corner_components(list, arity, 0, sizes).is_none()
+            !list.is_empty() && arity > 0 && components_of_corner(list, arity, 0, sizes).is_none()
         };
         if is_wrong(&self.uvs, UV_SIZES) || is_wrong(&self.parts, COLOR_SIZES) {
             if self.wrong == 0 {
@@ -197,11 +197,11 @@ impl FaceReader {
             if self.has_uvs {
                 let of_face = if self.has_uv { UV.map(|index| self.values[index]) } else { [f64::NAN; 2] };
                 let of_corner =
-                    corner_components(&self.uvs, arity, index, UV_SIZES).and_then(|uv| uv.first_chunk());
+                    components_of_corner(&self.uvs, arity, index, UV_SIZES).and_then(|uv| uv.first_chunk());
                 parsed.corner_uvs.push(DVec2::from(*of_corner.unwrap_or(&of_face)).as_vec2());
             }
             let Some(colors) = &mut self.colors else { continue };
-            let of_corner = corner_components(&self.parts, arity, index, COLOR_SIZES);
+            let of_corner = components_of_corner(&self.parts, arity, index, COLOR_SIZES);
             match of_corner.and_then(|color| color.first_chunk()) {
                 Some(color) => colors.push(*color, end),
                 None if self.has_color => colors.push(COLOR.map(|index| self.values[index]), end),
@@ -254,7 +254,7 @@ const COLOR_SIZES: [usize; 2] = [3, 4];
 
 /// Returns a corner's components. The list contains either one value per corner or a single value for the
 /// face.
-fn corner_components(list: &[f64], arity: usize, index: usize, sizes: [usize; 2]) -> Option<&[f64]> {
+fn components_of_corner(list: &[f64], arity: usize, index: usize, sizes: [usize; 2]) -> Option<&[f64]> {
     match sizes.into_iter().find(|size| list.len() == size * arity) {
         Some(size) => list.get(index * size..(index + 1) * size),
         None => sizes.contains(&list.len()).then_some(list),

@@ -149,13 +149,13 @@ impl<'a, F: FnMut([usize; 3])> EarClipper<'a, F> {
             self.requeue_blocked_by(changed);
         }
         for neighbor in [a, c] {
-            self.enqueue(neighbor);
+            self.enqueue_corner(neighbor);
         }
     }
 
     /// Appends a corner to the queue. Clipping corners in queue order spreads the cuts along the outline,
     /// which avoids slivers.
-    fn enqueue(&mut self, corner: u32) {
+    fn enqueue_corner(&mut self, corner: u32) {
         let stamp = &mut self.stamps[corner as usize];
         *stamp += 1;
         self.queue.push_back((corner, *stamp));
@@ -173,7 +173,7 @@ impl<'a, F: FnMut([usize; 3])> EarClipper<'a, F> {
         while entry != NONE {
             let (corner, stamp, next) = self.waiting[entry as usize];
             if self.stamps[corner as usize] == stamp {
-                self.enqueue(corner);
+                self.enqueue_corner(corner);
             }
             entry = next;
         }

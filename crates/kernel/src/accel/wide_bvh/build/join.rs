@@ -3,13 +3,13 @@
 use rayon::prelude::*;
 
 use super::TreePart;
-use super::subtree::{TrianglePackRange, WideSubtree};
+use super::subtree::{PackReferenceRange, WideSubtree};
 use crate::accel::reference::SimdBounds;
 use crate::accel::wide_bvh::node::{Child, WIDTH, WideNode};
 use crate::accel::wide_bvh::simd::pages;
 
 /// Joins all parts into one list of nodes, starting with the root, and one list of packs.
-pub fn flatten(root: TreePart) -> (Vec<WideNode>, Vec<TrianglePackRange>) {
+pub fn flatten(root: TreePart) -> (Vec<WideNode>, Vec<PackReferenceRange>) {
     let mut top = UpperNodes::default();
     match root {
         TreePart::Built(subtree) if matches!(subtree.root, Child::Inner(0)) => {
@@ -78,7 +78,7 @@ impl UpperNodes {
         place
     }
 
-    fn finish(self) -> (Vec<WideNode>, Vec<TrianglePackRange>) {
+    fn finish(self) -> (Vec<WideNode>, Vec<PackReferenceRange>) {
         let starts = self.subtree_starts();
         let nodes_of_top: Vec<WideNode> =
             self.nodes.iter().map(|children| self.build_wide_node(children, &starts)).collect();

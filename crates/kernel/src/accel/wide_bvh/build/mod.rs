@@ -54,7 +54,7 @@ pub fn build(
     token.check_pause_and_cancel()?;
     let (nodes, leaves) = join::flatten(part);
     token.check_pause_and_cancel()?;
-    let pack = |leaf: &subtree::TrianglePackRange| {
+    let pack = |leaf: &subtree::PackReferenceRange| {
         let members = &references[leaf.first as usize..][..leaf.count as usize];
         TrianglePack::new(members.iter().map(|member| (member.id(), corners(member.id()))))
     };

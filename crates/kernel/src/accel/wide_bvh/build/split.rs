@@ -159,13 +159,13 @@ impl BinMapping {
 
     /// Bin numbers plus [`ROUND`].
     #[inline(always)]
-    fn bin_coordinates(&self, centroid: Vec4) -> Vec4 {
+    fn bin_numbers_plus_round(&self, centroid: Vec4) -> Vec4 {
         (centroid - self.start) * self.per_length - Vec4::splat(0.5) + Vec4::splat(ROUND)
     }
 
     #[inline(always)]
     fn bin_indices(&self, reference: &TriangleReference) -> [usize; 3] {
-        let [x, y, z, _] = self.bin_coordinates(reference.centroid()).to_array();
+        let [x, y, z, _] = self.bin_numbers_plus_round(reference.centroid()).to_array();
         [x, y, z].map(|place| place.to_bits() as usize & (BINS - 1))
     }
 }

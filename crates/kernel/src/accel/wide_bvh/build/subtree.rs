@@ -6,7 +6,7 @@ use crate::accel::wide_bvh::node::{Child, PACK, WIDTH, WideNode};
 
 /// A range of references that forms a triangle pack.
 #[derive(Clone, Copy, Debug)]
-pub struct TrianglePackRange {
+pub struct PackReferenceRange {
     /// Index of the first reference among all references.
     pub first: u32,
     /// Number of references, from one to four.
@@ -17,7 +17,7 @@ pub struct TrianglePackRange {
 #[derive(Debug)]
 pub struct WideSubtree {
     pub nodes: Vec<WideNode>,
-    pub packs: Vec<TrianglePackRange>,
+    pub packs: Vec<PackReferenceRange>,
     pub root: Child,
     pub bounds: SimdBounds,
 }
@@ -56,7 +56,7 @@ impl WideSubtree {
         let first = self.packs.len() as u32;
         for at in (0..count).step_by(PACK) {
             self.packs
-                .push(TrianglePackRange { first: (start + at) as u32, count: PACK.min(count - at) as u32 });
+                .push(PackReferenceRange { first: (start + at) as u32, count: PACK.min(count - at) as u32 });
         }
         Child::Leaf { first, count: self.packs.len() as u32 - first }
     }

@@ -2,7 +2,7 @@
 
 use std::arch::x86_64::*;
 
-use super::portable::intersect_and_update_nearest;
+use super::portable::intersect_lane_and_update_nearest;
 use super::ray::{SimdRay, is_traceable};
 use super::stack::{Stack, entry_distance, sort_key};
 use super::triangle::Hits;
@@ -41,7 +41,7 @@ pub fn closest_hit(tree: &WideBvh, ray: &Ray) -> Option<ShapeHit> {
                 for pack in &tree.packs[first as usize..(first + count) as usize] {
                     let hits = lines.intersect_pack(pack, t_max);
                     if hits.hit | hits.doubtful != 0 {
-                        update_nearest_of_pack(pack, &hits, ray, &mut best, t_max);
+                        update_nearest_with_pack_hits(pack, &hits, ray, &mut best, t_max);
                         t_max = best.map_or(t_max, |best| best.t);
                     }
                 }
@@ -61,7 +61,7 @@ pub fn closest_hit(tree: &WideBvh, ray: &Ray) -> Option<ShapeHit> {
 /// Updates the best hit with the nearest hit in a pack.
 #[target_feature(enable = "avx2,fma")]
 #[inline]
-fn update_nearest_of_pack(
+fn update_nearest_with_pack_hits(
     pack: &TrianglePack,
     hits: &Hits<SimdF32x4>,
     ray: &Ray,
@@ -90,7 +90,7 @@ fn update_nearest_of_pack(
     }
 }
 
-/// Non-inlined version of [`intersect_and_update_nearest`] for rare cases.
+/// Non-inlined version of [`intersect_lane_and_update_nearest`] for rare cases.
 #[cold]
 #[inline(never)]
 fn update_nearest_out_of_line(
@@ -100,7 +100,7 @@ fn update_nearest_out_of_line(
     t_max: f32,
     best: &mut Option<ShapeHit>,
 ) {
-    intersect_and_update_nearest(pack, lane, &ShearedRay::new(ray.origin, ray.direction), t_max, best);
+    intersect_lane_and_update_nearest(pack, lane, &ShearedRay::new(ray.origin, ray.direction), t_max, best);
 }
 
 /// Returns the nearest child that the ray hits, and pushes the other children that it hits, farthest first.

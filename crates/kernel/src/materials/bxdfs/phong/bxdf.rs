@@ -133,8 +133,8 @@ impl Bxdf for PhongBxdf {
         Some(NarrowLobe {
             axis,
             exponent,
-            peak: lobes.gray_f_from_cosine_power(1.0) - lobes.gray_f_from_cosine_power(0.0),
-            wide: lobes.gray_f_from_cosine_power(0.0),
+            peak: lobes.gray_f_of_all_lobes(1.0) - lobes.gray_f_of_all_lobes(0.0),
+            wide: lobes.gray_f_of_all_lobes(0.0),
         })
     }
 

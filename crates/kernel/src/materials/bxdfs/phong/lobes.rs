@@ -61,7 +61,7 @@ impl PhongLobes {
 
     /// f in sr⁻¹ of a gray surface with these albedos, given its [`phong_cosine_power`].
     #[inline(always)]
-    pub fn gray_f_from_cosine_power(&self, gloss: f32) -> f32 {
+    pub fn gray_f_of_all_lobes(&self, gloss: f32) -> f32 {
         self.diffuse * FRAC_1_PI + self.specular * ((self.shininess + 2.0) * (0.5 * FRAC_1_PI)) * gloss
     }
 

@@ -155,7 +155,7 @@ impl Bxdf for PlasticBxdf {
             let [distribution, _] = self.distribution_and_fresnel(view, wi);
             let [eye, light] = self.smith_terms(view, wi);
             let pdf = eye.reflection_pdf(distribution);
-            coat = if light.is_above_surface() { pdf } else { 0.0 };
+            coat = if light.is_direction_above_surface() { pdf } else { 0.0 };
         }
         let cosine = normal.dot(wi);
         let diffuse = if cosine > 0.0 { cosine * FRAC_1_PI } else { 0.0 };

@@ -159,7 +159,7 @@ impl<const THROUGH: bool> PrincipledBxdf<THROUGH> {
         let half = UnnormalizedHalfVector::from_reflection(view.normal, view.wo, wi);
         let [eye, light] = Self::smith_terms(view, wi, alpha);
         let pdf = eye.reflection_pdf(half.evaluate_isotropic_ggx(alpha));
-        if light.is_above_surface() { pdf } else { 0.0 }
+        if light.is_direction_above_surface() { pdf } else { 0.0 }
     }
 }
 

@@ -110,20 +110,20 @@ pub struct SchlickAlbedoPair {
 
 impl SchlickAlbedoPair {
     /// The albedos for a constant roughness.
-    fn from_roughness(roughness: f32) -> Self {
+    fn computed_for_roughness(roughness: f32) -> Self {
         let [normal, grazing] = build_schlick_albedo_tables(Some(roughness));
         Self { normal: normal.lobe_at_roughness(roughness), grazing: grazing.lobe_at_roughness(roughness) }
     }
 
     /// The albedos for any roughness, interpolated from tables.
-    fn from_tables(roughness: f32) -> Self {
+    fn from_static_tables(roughness: f32) -> Self {
         static TABLES: LazyLock<[AlbedoTable; 2]> = LazyLock::new(|| build_schlick_albedo_tables(None));
         let [normal, grazing] = &*TABLES;
         Self { normal: normal.lobe_at_roughness(roughness), grazing: grazing.lobe_at_roughness(roughness) }
     }
 
     /// Albedo of a coat with this reflectance at normal incidence and a reflectance of 1 at grazing angles.
-    fn coat_albedo(&self, reflectance: f32) -> LobeAlbedoPolynomial {
+    fn coat_albedo_polynomial(&self, reflectance: f32) -> LobeAlbedoPolynomial {
         let sum = |normal: f32, grazing: f32| reflectance * normal + grazing;
         LobeAlbedoPolynomial {
             terms: std::array::from_fn(|i| sum(self.normal.terms[i], self.grazing.terms[i])),
@@ -149,9 +149,9 @@ impl EmissionCoat {
         if weight.as_untextured() == Some(0.0) {
             return None;
         }
-        let albedo = roughness
-            .as_untextured()
-            .map(|one| SchlickAlbedoPair::from_roughness(one).coat_albedo(COAT_REFLECTANCE));
+        let albedo = roughness.as_untextured().map(|one| {
+            SchlickAlbedoPair::computed_for_roughness(one).coat_albedo_polynomial(COAT_REFLECTANCE)
+        });
         Some(Self { weight, roughness, albedo })
     }
 
@@ -159,10 +159,10 @@ impl EmissionCoat {
     /// `lookups`.
     pub fn transmittance(&self, at: &TexturePoint, cosine: f32, lookups: &mut u64) -> f32 {
         let weight = self.weight.evaluate(at, lookups).clamp(0.0, 1.0);
-        let between = |roughness: f32| SchlickAlbedoPair::from_tables(roughness.clamp(0.0, 1.0));
+        let between = |roughness: f32| SchlickAlbedoPair::from_static_tables(roughness.clamp(0.0, 1.0));
         let albedo = match self.albedo {
             Some(albedo) => albedo,
-            None => between(self.roughness.evaluate(at, lookups)).coat_albedo(COAT_REFLECTANCE),
+            None => between(self.roughness.evaluate(at, lookups)).coat_albedo_polynomial(COAT_REFLECTANCE),
         };
         1.0 - weight * albedo.at_cosine(cosine.abs())
     }
@@ -190,7 +190,7 @@ impl Principled {
         let has_coat = inputs.clearcoat.as_untextured() != Some(0.0);
         let coat = inputs.clearcoat_roughness.as_untextured().filter(|_| has_coat);
         let albedos = [inputs.roughness.as_untextured(), coat]
-            .map(|roughness| roughness.map(SchlickAlbedoPair::from_roughness));
+            .map(|roughness| roughness.map(SchlickAlbedoPair::computed_for_roughness));
         // The albedo is irrelevant if the coat has no weight.
         let [specular, coat] = albedos;
         Self { inputs, albedos: [specular, if has_coat { coat } else { specular }] }
@@ -212,8 +212,9 @@ impl BxdfMaterial for Principled {
         let specular_color = lookup.color(&inputs.specular_color);
         let reflectance = (specular_color * (ratio * ratio)).min(Vec3::ONE) * specular;
         let [specular_albedo, coat_albedo] = self.albedos;
-        let albedo = specular_albedo.unwrap_or_else(|| SchlickAlbedoPair::from_tables(roughness));
-        let coat_albedo = coat_albedo.unwrap_or_else(|| SchlickAlbedoPair::from_tables(coat_roughness));
+        let albedo = specular_albedo.unwrap_or_else(|| SchlickAlbedoPair::from_static_tables(roughness));
+        let coat_albedo =
+            coat_albedo.unwrap_or_else(|| SchlickAlbedoPair::from_static_tables(coat_roughness));
         let mean = reflectance * albedo.normal.mean + Vec3::splat(specular * albedo.grazing.mean);
         let below = color * (1.0 - metallic);
         let diffuse = below * (1.0 - through);
@@ -228,7 +229,7 @@ impl BxdfMaterial for Principled {
             albedo,
             coat,
             coat_alpha: microfacet::alphas_from_roughness(coat_roughness, 0.0)[0],
-            coat_albedo: coat_albedo.coat_albedo(COAT_REFLECTANCE),
+            coat_albedo: coat_albedo.coat_albedo_polynomial(COAT_REFLECTANCE),
             ambient: diffuse,
         }
     }

@@ -3,7 +3,7 @@
 use super::RoughDielectricPoint;
 use crate::materials::bsdf::{NarrowLobe, SampledLobes};
 use crate::materials::bxdf::{Bxdf, BxdfFlags, LobeValue, ShadingGeometry, branchless_select_vec3};
-use crate::materials::fresnel::{dielectric_from_either_side, fresnel_transmittance};
+use crate::materials::fresnel::{dielectric_for_any_eta, fresnel_transmittance};
 use crate::materials::microfacet::{
     SmithTerms, UnnormalizedHalfVector, reflect_at, refract_at, sample_visible_normal,
 };
@@ -70,8 +70,7 @@ impl<const THROUGH: bool> DielectricBxdf<THROUGH> {
         let [eye, light] = self.smith_terms(view, wi);
         if !THROUGH {
             let half = UnnormalizedHalfVector::from_reflection(view.normal, view.wo, wi);
-            let reflectance =
-                dielectric_from_either_side(half.cosine_to_either_direction(), self.far / self.near);
+            let reflectance = dielectric_for_any_eta(half.cosine_to_either_direction(), self.far / self.near);
             return reflectance
                 * eye.torrance_sparrow_without_fresnel(&light, half.evaluate_isotropic_ggx(self.alpha));
         }
@@ -104,7 +103,7 @@ impl<const THROUGH: bool> DielectricBxdf<THROUGH> {
         let indices = [self.near, self.far];
         let eta = indices[1] / indices[0];
         let cosine = half.dot(wo);
-        let reflectance = dielectric_from_either_side(cosine, eta);
+        let reflectance = dielectric_for_any_eta(cosine, eta);
         let is_reflected = choice < reflectance;
         let refracted = refract_at(half, wo, eta);
         let wi = branchless_select_vec3(is_reflected, reflect_at(half, wo), refracted);
@@ -122,8 +121,8 @@ impl<const THROUGH: bool> DielectricBxdf<THROUGH> {
         let along = normal.dot(half);
         let half = UnnormalizedHalfVector { squared: 1.0, along, across: half - normal * along };
         let pdf = by_facet * eye.reflection_pdf(half.evaluate_isotropic_ggx(self.alpha));
-        let is_seen = light.is_above_surface()
-            & eye.is_above_surface()
+        let is_seen = light.is_direction_above_surface()
+            & eye.is_direction_above_surface()
             & (is_reflected | is_through)
             & (pdf < f32::MAX);
         let weight =
@@ -193,7 +192,7 @@ impl<const THROUGH: bool> Bxdf for DielectricBxdf<THROUGH> {
     ) -> Vec3 {
         let half = self.sample_facet(view, u);
         let eta = self.far / self.near;
-        let is_reflected = choice < dielectric_from_either_side(half.dot(view.wo), eta);
+        let is_reflected = choice < dielectric_for_any_eta(half.dot(view.wo), eta);
         let wi = if THROUGH { refract_at(half, view.wo, eta) } else { reflect_at(half, view.wo) };
         // If the other side is chosen, the path continues at that side's vertex, and this direction is not
         // used.
@@ -205,7 +204,7 @@ impl<const THROUGH: bool> Bxdf for DielectricBxdf<THROUGH> {
     fn narrow_lobe(&self, view: &DielectricViewTerms) -> Option<NarrowLobe> {
         let &DielectricViewTerms { normal, wo } = view;
         let eta = self.far / self.near;
-        let reflectance = dielectric_from_either_side(normal.dot(wo), eta);
+        let reflectance = dielectric_for_any_eta(normal.dot(wo), eta);
         if !THROUGH {
             return Some(NarrowLobe::from_microfacets(normal, wo, self.alpha, reflectance, 0.0));
         }

@@ -146,10 +146,10 @@ fn albedo(bsdf: &PhongBsdf, degrees: f32) -> f64 {
         let gloss = phong_cosine_power(lobes.mirrored_eye, direction, lobes.shininess);
         let cosine = normal.dot(direction).max(0.0);
         assert!(
-            (lobes.gray_f_from_cosine_power(gloss) - bsdf.value(&lobes, direction).x).abs()
-                <= 1e-6 * lobes.gray_f_from_cosine_power(gloss)
+            (lobes.gray_f_of_all_lobes(gloss) - bsdf.value(&lobes, direction).x).abs()
+                <= 1e-6 * lobes.gray_f_of_all_lobes(gloss)
         );
-        f64::from(lobes.gray_f_from_cosine_power(gloss) * cosine / lobes.pdf(direction, gloss))
+        f64::from(lobes.gray_f_of_all_lobes(gloss) * cosine / lobes.pdf(direction, gloss))
     };
     (0..SAMPLES).map(one).sum::<f64>() / f64::from(SAMPLES)
 }
