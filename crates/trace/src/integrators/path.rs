@@ -141,14 +141,10 @@ impl CameraWavefront<'_, '_> {
         }
         // Intersect the rays. The vertices of plain surfaces are ready for the queue.
         let are_lit = self.may_scatter() && self.accumulator.accepts_reflected();
-        let packet = tile.intersect_packet(
-            rays,
-            self.accumulator.aov,
-            are_lit,
-            (self.direct.spare_batch(), self.surfaces),
-        );
+        let (aov, buffers) = (self.accumulator.aov, (self.direct.spare_batch(), &mut *self.surfaces));
+        let packet = tile.intersect_packet(rays, aov, are_lit, buffers);
         self.counters.texture_lookups += packet.lookups;
-        if self.accumulator.aov == LightAov::TraversalCost {
+        if aov == LightAov::TraversalCost {
             self.add_traversal_costs(&rays, &packet);
         }
         if are_lit {
