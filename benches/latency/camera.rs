@@ -44,7 +44,7 @@ fn held(terminal: &mut TimedTerminal) -> BenchResult<f64> {
     Ok(terminal.bursts() as f64 / begin.elapsed().as_secs_f64())
 }
 
-/// Returns whether a different image is shown, ignoring changes in noise.
+/// Returns whether a different image is shown, ignoring differences due to noise.
 fn is_other(before: &Cells, now: &Cells) -> bool {
     let pairs = before.iter().zip(now).filter_map(|(a, b)| Some(((*a)?, (*b)?)));
     let far = |(a, b): &([[u8; 3]; 2], [[u8; 3]; 2])| {

@@ -87,7 +87,8 @@ impl Mode {
         }
     }
 
-    /// Returns whether the image has changed. While it is rendering, changes in noise are ignored.
+    /// Returns whether a different image is shown. If rendering is in progress, differences due to noise are
+    /// ignored.
     fn is_other(self, before: &Cells, now: &Cells) -> bool {
         let differ = |most: u8| {
             let pairs = before.iter().zip(now).filter_map(|(a, b)| Some(((*a)?, (*b)?)));

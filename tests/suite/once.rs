@@ -376,7 +376,7 @@ fn check_names_lights_counted_twice() {
     };
     let once = "f 1 2 3 4\n";
     assert!(!mentions(&said(once, &[mesh]), "twice"));
-    // Repeated faces that start at another corner emit once.
+    // Duplicate faces emit only once, even if they start at different corners.
     assert!(!mentions(&said("f 1 2 3\nf 1 3 4\nf 2 3 1\nf 3 4 1\n", &[mesh]), "twice"));
     // The other diagonal.
     assert_mentions(

@@ -13,7 +13,7 @@ use serde_json::{Value, json};
 use crate::parts::room_dir;
 use crate::test_dir::{TestDir, assert_mentions};
 
-/// Writes a part or checkpoint again with a changed header or render state.
+/// Rewrites a part or checkpoint with a changed header or render state.
 fn rewrite(path: &Path, change: impl FnOnce(&mut PartHeader, &mut Value)) {
     let token = CancelToken::new();
     let file = PartFile::open(path, &token).expect("a part or checkpoint");

@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 use super::super::frame::Frame;
 use super::{CaseSet, SceneFiles, StressRow};
 
-/// Upper bound on the difference between the images of a scene and of its moved copy.
+/// Upper bound on the difference between the images of a scene and of a moved copy.
 const MOVED: f64 = 1e-3;
 
 /// Samples per pixel.

@@ -44,7 +44,7 @@ v = [0, 0, -40]
 material = "blue"
 "#;
 
-/// A path-traced scene of the emissive objects, with additional `[render]` keys and elements.
+/// A path-traced scene that contains [`SIGNS`], with additional `[render]` keys and elements.
 fn signs(more: &str, camera: &str, rest: &str) -> SceneFiles {
     let render = head(16, &format!("integrator = \"path\"\nbackground = [0.3, 0.4, 0.5]\n{more}"));
     SceneFiles::new(format!("{render}{camera}{SIGNS}{rest}"))

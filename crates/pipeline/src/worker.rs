@@ -493,7 +493,7 @@ mod tests {
         );
         assert!(
             remote.postpone_write_to_pending(false),
-            "the order should be postponed for an incomplete image"
+            "the order should be postponed while the image is incomplete"
         );
         assert!(matches!(remote.wait_for_next_task(), Task::Render(..)));
         assert!(remote.take_write(), "the request should take the order");

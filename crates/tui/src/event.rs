@@ -174,7 +174,7 @@ pub(super) enum Effect {
     Suspend,
     /// SIGCONT was received. Set up the terminal again and redraw everything.
     Redraw,
-    /// Enable or disable mouse reports.
+    /// Enable or disable mouse reporting.
     Mouse(bool),
     /// Open the editor at this position.
     Edit(FilePosition),
@@ -182,7 +182,7 @@ pub(super) enum Effect {
     Measure,
     /// Send bytes after the preview: a notification or clipboard text.
     Aside(Vec<u8>),
-    /// Enable focus reports.
+    /// Enable focus reporting.
     ReportFocus,
 }
 

@@ -13,7 +13,7 @@ use crate::state::ImageProvenance;
 
 /// Memory limit for all images and scene texts, in bytes.
 const MAX_BYTES: usize = 16 << 20;
-/// Maximum width and height of a thumbnail in pixels. Octants can just resolve this size.
+/// Maximum width and height of a thumbnail in pixels, which is about what octants can show in the strip.
 const SMALL: f32 = 32.0;
 
 /// A displayed image and its request.

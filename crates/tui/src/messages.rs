@@ -46,12 +46,12 @@ pub fn focus_moved(distance: f64) -> String {
     format!("focus at {distance} (preview only). w: save image · c: keep in scene · 0: reset")
 }
 
-/// Shown when `c` wrote the camera into the scene file.
+/// Shown when `c` has written the camera into the scene file.
 pub fn camera_saved(file: &str) -> String {
     format!("camera saved to {file} · u: undo")
 }
 
-/// Shown when `c` wrote the camera into the scene file but the command line overrides it.
+/// Shown when `c` has written the camera into the scene file but the command line overrides it.
 pub fn saved_camera_overridden(file: &str) -> String {
     format!("camera saved to {file}, but --set overrides it in this run")
 }
@@ -61,12 +61,12 @@ pub fn camera_already_in_scene(file: &str) -> String {
     format!("{file} already has this camera")
 }
 
-/// Shown when `c` wrote a scene file for a model.
+/// Shown when `c` has written a scene file for a model.
 pub fn model_scene_written(file: &str) -> String {
     format!("wrote {file}, a scene with this model and camera")
 }
 
-/// Shown when `u` undid the last `c`.
+/// Shown when `u` has undone the last `c`.
 pub fn camera_save_undone(file: &str) -> String {
     format!("undone: {file} restored")
 }
@@ -80,9 +80,9 @@ pub const NO_IMAGE: &str = "no image yet";
 pub const NEWEST_RENDER: &str = "this is the newest render";
 /// Shown when `n` was pressed at the oldest render.
 pub const OLDEST_RENDER: &str = "this is the oldest render";
-/// Shown when `b` returned to the newest render.
+/// Shown when `b` has returned to the newest render.
 pub const AFTER_EDIT: &str = "after the last edit (newest render)";
-/// Shown when `b` returned to the render before the last edit. Followed by the edits.
+/// Shown when `b` has returned to the render before the last edit. Followed by the edits.
 pub const BEFORE_EDIT: &str = "before the last edit";
 /// Shown when `b` was pressed before any edit.
 pub const NO_EARLIER_RENDER: &str = "no earlier render to compare with";
@@ -137,9 +137,9 @@ pub const CLICK_TO_FOCUS: &str = "click to focus there · f: at the crosshair";
 pub const NOTHING_TO_FOCUS: &str = "nothing to focus on there";
 /// Shown when `y` was pressed before any click.
 pub const NOTHING_TO_COPY: &str = "nothing to copy: click or press Enter first";
-/// Shown when mouse reports were turned on.
+/// Shown when mouse reporting has been turned on.
 pub const MOUSE_ON: &str = "mouse on: drag to orbit, wheel to zoom, click to inspect";
-/// Shown when mouse reports were turned off.
+/// Shown when mouse reporting has been turned off.
 pub const MOUSE_OFF: &str = "mouse off: drag to select text · m: on";
 /// Precedes inspected values that were copied.
 pub const COPIED: &str = "copied:";
@@ -152,7 +152,7 @@ pub const DRAG_REGION: &str = "drag a region to render first (z: around the cros
 pub const REGION_FIRST: &str = "region renders first · z: clear";
 /// Shown when a region was selected while nothing was rendering.
 pub const REGION_NEXT: &str = "region renders first from the next render · z: clear";
-/// Shown when `z` cleared the region.
+/// Shown when `z` has cleared the region.
 pub const REGION_CLEARED: &str = "region cleared";
 
 /// Shown when a digit was pressed while the view list was closed.
@@ -165,7 +165,7 @@ pub const NO_PREVIEW: &str = "no preview is shown (see --preview)";
 pub const ACTUAL_PIXELS: &str = "actual pixels (1:1) · x: fit";
 /// Shown when space was pressed while nothing was rendering.
 pub const NOT_RENDERING: &str = "nothing is rendering";
-/// Shown when a new request ended a pause.
+/// Shown when a new request has ended a pause.
 pub const RESUMED: &str = "resumed";
 /// Shown when `w` was pressed.
 pub const WRITING: &str = "writing the current image";
@@ -221,12 +221,12 @@ pub fn checkpoint_ignored(file: &str, why: &str) -> String {
     format!("ignoring {file}: {why}")
 }
 
-/// Shown when another program modified an output file.
+/// Shown when another program has modified an output file.
 pub fn output_modified_externally(file: &str, how: &str) -> String {
     format!("{file} {how} · w: write it again")
 }
 
-/// Shown when another program modified an output file, which `w` will therefore not replace.
+/// Shown when another program has modified an output file, which `w` will therefore not replace.
 pub fn output_not_overwritten(file: &str, how: &str) -> String {
     format!("{file} {how} · name another file with -o")
 }
@@ -237,17 +237,17 @@ pub const NOT_SAVED: &str = "not saved · w: save it";
 pub const NOT_SAVED_WITH_CONFLICT: &str = "not saved";
 /// Part of messages about changes made with keys. Omitted when `w` cannot write the image.
 pub const WRITE_HINT: &str = "w: save image · ";
-/// Shown when `w` wrote the displayed image before its render finished.
+/// Shown when `w` has written the displayed image before its render finished.
 pub fn written_image_unfinished(file: &str) -> String {
     format!("{file} is unfinished · w: write it again")
 }
 
-/// Shown when `w` wrote an image with `changes` but another image is displayed.
+/// Shown when `w` has written an image with `changes` but another image is displayed.
 pub fn image_written_with_changes(file: &str, changes: &str) -> String {
     format!("{file} was written with {changes}")
 }
 
-/// Shown when `w` wrote an image with `changes` but the scene's own image is displayed.
+/// Shown when `w` has written an image with `changes` but the scene's own image is displayed.
 pub fn written_image_differs(file: &str, changes: &str) -> String {
     format!("{} · w: write this image", image_written_with_changes(file, changes))
 }

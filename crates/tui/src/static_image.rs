@@ -104,7 +104,7 @@ mod tests {
         let shades = ColorMapper::new(depth, &XTERM);
         let inks = PreviewColors { depth, shades: &shades, is_light: false };
         let buffers = draw_image_rows(
-            &["a.png", "b.png", "a very long name of a difference"].map(named),
+            &["a.png", "b.png", "a difference image with a long name"].map(named),
             inks,
             size,
             2.0,

@@ -34,11 +34,11 @@ use crate::system::abort;
 
 /// Whether the alternate screen is active.
 static TAKEN: AtomicBool = AtomicBool::new(false);
-/// Whether mouse reports are enabled.
+/// Whether mouse reporting is enabled.
 static MOUSE: AtomicBool = AtomicBool::new(true);
 /// Whether the terminal is in raw mode.
 static RAW: AtomicBool = AtomicBool::new(false);
-/// Whether focus reports are enabled.
+/// Whether focus reporting is enabled.
 static FOCUS: AtomicBool = AtomicBool::new(false);
 /// Whether the window title has been changed.
 static HAS_TITLE: AtomicBool = AtomicBool::new(false);
@@ -59,7 +59,7 @@ static PANIC: Mutex<Option<String>> = Mutex::new(None);
 const MOUSE_ON: &str = "\x1b[?1000h\x1b[?1002h\x1b[?1006h";
 const MOUSE_OFF: &str = "\x1b[?1006l\x1b[?1002l\x1b[?1000l";
 
-/// Enables focus reports (mode 1004).
+/// Enables focus reporting (mode 1004).
 const FOCUS_ON: &str = "\x1b[?1004h";
 const FOCUS_OFF: &str = "\x1b[?1004l";
 
@@ -118,13 +118,13 @@ impl TerminalSession {
         set_up_terminal()
     }
 
-    /// Enables or disables mouse reports.
+    /// Enables or disables mouse reporting.
     pub(super) fn set_mouse(&mut self, is_on: bool) {
         MOUSE.store(is_on, Ordering::Release);
         writer::queue_slice(if is_on { MOUSE_ON } else { MOUSE_OFF }.as_bytes().to_vec());
     }
 
-    /// Enables focus reports.
+    /// Enables focus reporting.
     pub(super) fn request_focus_reports(&mut self) {
         enable_focus_reports_on_setup();
         writer::queue_slice(FOCUS_ON.as_bytes().to_vec());
@@ -273,7 +273,7 @@ pub(super) fn mark_images_used() {
     HAS_IMAGES.store(true, Ordering::Release);
 }
 
-/// Enables focus reports each time the terminal is set up.
+/// Enables focus reporting each time the terminal is set up.
 pub(super) fn enable_focus_reports_on_setup() {
     FOCUS.store(true, Ordering::Release);
 }

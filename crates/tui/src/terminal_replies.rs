@@ -72,13 +72,13 @@ pub(super) struct TerminalQueries {
     pub(super) blocks: bool,
     /// Query the terminal's name to determine its other capabilities.
     pub(super) name: bool,
-    /// Query support for 24-bit color.
+    /// Query whether the terminal supports 24-bit color.
     pub(super) true_color: bool,
     /// Query the background color.
     pub(super) background: bool,
     /// Query the 16 ANSI colors.
     pub(super) palette: bool,
-    /// Query support for images.
+    /// Query whether the terminal supports this image protocol.
     pub(super) pixels: Option<UnconfirmedImageProtocol>,
 }
 

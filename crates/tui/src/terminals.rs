@@ -50,7 +50,7 @@ pub(super) struct DesktopCapabilities {
     /// A progress bar in the window frame or taskbar (OSC 9;4).
     pub(super) progress: bool,
     pub(super) notice: Option<NotificationProtocol>,
-    /// Focus reports (mode 1004).
+    /// Focus reporting (mode 1004).
     pub(super) focus: bool,
     /// Hyperlinks (OSC 8).
     pub(super) links: bool,

@@ -17,7 +17,8 @@ pub(crate) fn evening_sky_hdr() -> Vec<u8> {
     file
 }
 
-/// Direction of a pixel. The center of the map is −z, and +x is a quarter of the width to the right of it.
+/// Direction of a pixel. The center of the map faces −z, and the point a quarter of the width to its right
+/// faces +x.
 fn pixel_direction(column: u32, row: u32) -> Vector {
     let (sin, cos) = sin_cos_turns((f64::from(column) + 0.5) / f64::from(WIDTH) - 0.5);
     let (across, y) = sin_cos_turns((f64::from(row) + 0.5) / f64::from(HEIGHT) * 0.5);

@@ -158,7 +158,7 @@ fn is_of_type(name: &str, value: &Value) -> bool {
 }
 
 /// Whether a string matches one of the supported patterns: `[^0-9]`, `\.(one|other)$` and `^(one|other)$`.
-/// `[Pp]` matches a letter in both cases.
+/// `[Pp]` matches a letter in either case.
 fn matches(pattern: &str, text: &str) -> bool {
     if pattern == "[^0-9]" {
         return text.chars().any(|c| !c.is_ascii_digit());

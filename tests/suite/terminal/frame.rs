@@ -133,7 +133,7 @@ fn known_terminals_get_and_reset_features() {
         );
         assert!(
             is_last(&bytes, b"\x1b[?1004h", b"\x1b[?1004l"),
-            "{variables:?}: focus reports must be disabled"
+            "{variables:?}: focus reporting must be disabled"
         );
         if has_what.progress {
             assert!(
@@ -237,7 +237,7 @@ fn late_terminal_reply_enables_features() {
     assert!(!has(&terminal.bytes(), b"\x1b]2;"));
     terminal.press("\x1bP>|ghostty 1.2.0\x1b\\");
     terminal.wait("a title", |_| has(&terminal.bytes(), b"\x1b]2;scene.toml: done"));
-    terminal.wait("focus reports", |_| has(&terminal.bytes(), b"\x1b[?1004h"));
+    terminal.wait("focus reporting", |_| has(&terminal.bytes(), b"\x1b[?1004h"));
     terminal.press("q");
     terminal.code();
     terminal.wait("the restored terminal", |screen| !screen.alternate_screen() && !screen.hide_cursor());

@@ -8,7 +8,8 @@ const WIDE: u16 = 2000;
 /// Key descriptions: the list of tables, a table, a type and a key.
 const EXPLAINED: [&str; 4] = ["", "camera", "materials.metal", "render.integrator"];
 
-/// Arguments of all calls to check: short help for the program and each command, and key descriptions.
+/// Arguments for each invocation under test: the short help of the program and of each command, and the key
+/// descriptions.
 fn calls(folder: &Folder) -> Vec<String> {
     let program = lines(folder, "-h", WIDE);
     let list =

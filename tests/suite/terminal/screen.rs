@@ -140,7 +140,7 @@ fn last_of_many_resizes_wins() {
     terminal.resize(80, 24);
     terminal.wait("the last line", |screen| last_line(screen).ends_with("? help"));
     terminal.wait("the image", |screen| Colors::of(screen).red == red);
-    // Wait, because immediately after an escape character the key would be Alt-q.
+    // Wait, because a `q` sent right after an escape character would be read as Alt-q.
     terminal.settled(vt100::Screen::contents);
     terminal.press("q");
     assert_eq!(terminal.end(), 0);

@@ -86,7 +86,7 @@ impl MergeCommand<'_> {
         let out = &self.args.out;
         let name = out.display();
         if part::is_part(out) {
-            let message = format!("cannot write {name}: it is a part; put the output before the parts");
+            let message = format!("cannot write {name}: it is a part; name the output before the parts");
             return Err(self.console.print_error(Exit::WRONG, &message));
         }
         if self.args.parts.iter().any(|part| is_same_file(part, out)) {

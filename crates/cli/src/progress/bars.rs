@@ -90,7 +90,7 @@ impl Reporter for ProgressBars {
             bar.finish_and_clear();
         }
         self.stage.finish_and_clear();
-        // Ignore errors, which only leave the output on the screen.
+        // Ignore errors: at worst, the output stays on the screen.
         let _ = self.all.clear();
     }
 }

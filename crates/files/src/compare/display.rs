@@ -81,8 +81,8 @@ fn ssim_from_moments([a, b]: [f64; 2], [aa, bb]: [f64; 2], ab: f64) -> f64 {
     (2.0 * a * b + C1) * (2.0 * covariance + C2) / ((a * a + b * b + C1) * (variances + C2))
 }
 
-/// Returns the tile's sum of squared differences over all channels, and the luma of each image in the tile
-/// and a margin of [`RADIUS`] pixels around it. The luma outside the image is 0.
+/// Returns the tile's sum of squared differences over all channels, and the luma plane of each image. The
+/// planes cover the tile and a margin of [`RADIUS`] pixels on each side. Outside the image, luma is 0.
 fn tile_lumas_and_squared_error(pair: &Pair, tile: Rect) -> (f64, [Plane; 2]) {
     let side = |length: u32| length as usize + 2 * RADIUS;
     let mut lumas =

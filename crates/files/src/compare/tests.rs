@@ -41,8 +41,8 @@ fn warnings_about_the_files_are_returned() {
     }
 }
 
-/// An image of hashed values in [0, 1], with and without added noise of ±1/8. Some sums are outside the
-/// display range.
+/// Two images of the same hashed values in [0, 1]. The first has added noise of up to ±1/8, which moves some
+/// values out of the display range.
 fn noisy(width: u32, height: u32) -> [RadianceImage; 2] {
     let clean = |x, y, c| ((x * 7 + y * 13 + c * 29) * (x + 2 * y + 3) % 257) as f32 / 256.0;
     let noise = |x, y, c| (((x * 5 + y * 11 + c * 17) % 33) as f32 - 16.0) / 128.0;

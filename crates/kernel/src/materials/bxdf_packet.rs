@@ -216,8 +216,8 @@ impl<B: Bxdf> BxdfPacket<B> {
         }
     }
 
-    /// Pdfs in sr⁻¹ of directions sampled from these lobes. Cosine lobes are around `normals`. `values` is
-    /// the result of [`BxdfPacket::f`].
+    /// Pdfs in sr⁻¹ of directions sampled from these lobes. Cosine lobes are centered on `normals`. `values`
+    /// is the result of [`BxdfPacket::f`].
     #[inline(always)]
     pub fn pdf(&self, lobes: SampledLobes, normals: &Vec3x16, wi: &Vec3x16, values: &BsdfValues) -> F32x16 {
         if self.any_has_narrow_lobe() {
@@ -245,8 +245,8 @@ impl<B: Bxdf> BxdfPacket<B> {
         pdfs
     }
 
-    /// Samples a unit direction for each surface. Cosine lobes are around `normals`. `choices` selects the
-    /// lobes, and `u` the directions within them. All random numbers are in [0, 1).
+    /// Samples a unit direction for each surface. Cosine lobes are centered on `normals`. `choices` selects
+    /// the lobes, and `u` the directions within them. All random numbers are in [0, 1).
     #[inline(always)]
     pub fn sample(
         &self,

@@ -278,7 +278,7 @@ impl Texture {
         [along(DVec2::X), along(DVec2::Y)]
     }
 
-    /// [`Texture::lookup`] for a packet, for textures without mip levels.
+    /// Packet version of [`Texture::lookup`], for textures without mip levels.
     #[inline(always)]
     pub fn lookup_packet(&self, uv: &[[f64; PACKET_SIZE]; 2]) -> Vec3x16 {
         let mut row = match &self.moved {

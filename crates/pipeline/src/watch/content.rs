@@ -179,8 +179,8 @@ impl RequestFileSnapshot {
         Ok(())
     }
 
-    /// Waits for at most about [`SETTLE_TIME`] until no file has changed for that long, so that
-    /// [`Self::recheck_seen_files`] also detects a program that is still writing.
+    /// Waits until no file has changed for [`SETTLE_TIME`], or until about that much time has passed. As a
+    /// result, [`Self::recheck_seen_files`] also detects a program that is still writing.
     ///
     /// # Errors
     /// Returns [`Cancelled`] if the token is cancelled.

@@ -54,7 +54,7 @@ impl Scratch {
 
     #[track_caller]
     fn next(&self) -> WatchEvent {
-        self.news.recv_timeout(Duration::from_secs(60)).expect("news within a minute")
+        self.news.recv_timeout(Duration::from_secs(60)).expect("an event within a minute")
     }
 
     /// Expects exactly one change, after which the files settle.
@@ -67,7 +67,7 @@ impl Scratch {
 
     #[track_caller]
     fn expect_none(&self) {
-        assert!(self.news.recv_timeout(SETTLE).is_err(), "unexpected news");
+        assert!(self.news.recv_timeout(SETTLE).is_err(), "unexpected event");
     }
 
     /// Saves three different contents and expects one change for each.

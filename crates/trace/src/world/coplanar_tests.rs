@@ -180,7 +180,7 @@ fn overlapping_faces_of_one_light_are_reported() {
     // Add both triangles of a split along the other diagonal, and then only one of them.
     assert_eq!(reported(&[[0, 1, 2], [0, 2, 3], [1, 2, 3], [1, 3, 0]]), [(0, 0)]);
     assert_eq!(reported(&[[0, 1, 2], [0, 2, 3], [1, 2, 3]]), [(0, 0)]);
-    // Repeated faces emit once, and reversed faces are moved apart.
+    // Duplicate faces emit only once, and reversed faces are moved apart.
     assert_eq!(reported(&[[0, 1, 2], [0, 2, 3], [1, 2, 0], [3, 0, 2]]), []);
     assert_eq!(reported(&[[0, 1, 2], [0, 2, 3], [2, 1, 0], [3, 2, 0]]), []);
 }

@@ -1,8 +1,8 @@
 //! Faces of a mesh light that coincide with each other or with other faces of the mesh.
 //!
-//! Repeated faces emit once: they are given the same corners in the same order, so that rays always hit the
-//! first. Emissive faces in the plane of a face that does not emit or that faces the other way are moved off
-//! the plane.
+//! Duplicate faces emit only once: they are given the same corners in the same order, so that rays always hit
+//! the first. Emissive faces in the plane of a face that does not emit or that faces the other way are moved
+//! off the plane.
 
 use std::borrow::Cow;
 use std::collections::{BTreeMap, HashMap};

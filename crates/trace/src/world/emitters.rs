@@ -214,7 +214,7 @@ fn mesh_lights_by_material_and_side(
             (0..).zip(&loaded.materials).map(|(own, material)| (Some(own), of_file(material))).collect()
         }
     };
-    // Rays always hit the first of several repeated faces, so only the first face emits.
+    // Rays always hit the first of several duplicate faces, so only that face emits.
     let emits = |id: u32| {
         let own = |index: &u32| loaded.materials.get(*index as usize).is_some_and(FileMaterial::emits);
         emissive.is_some() || loaded.mesh.materials.get(id as usize).is_some_and(own)

@@ -16,7 +16,7 @@ use crate::math::{DVec3, Vec3};
 /// State of a triangle or grid cell that has not been computed yet.
 const UNKNOWN: u8 = 0;
 
-/// State of a region in which other surfaces may be near any point.
+/// State of a region in which no point counts as isolated, because other surfaces may be nearby.
 const NEVER: u8 = u8::MAX;
 
 /// Resolution of a triangle's state. Points whose barycentric coordinates are all at least `state /

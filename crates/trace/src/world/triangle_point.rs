@@ -180,7 +180,7 @@ impl<P: MeshPlacement> PlacedMesh<P> {
         let [of_u, of_v, of_w] = [ac, ab, ac - ab].map(|edge| (least * edge.length()).min(MAX_EDGE_MARGIN));
         let (u, v) = (f64::from(u).max(of_u), f64::from(v).max(of_v));
         let excess = (u + v - (1.0 - of_w)).max(0.0);
-        // Reduce the coordinate with more slack.
+        // Reduce the coordinate that is farther above its minimum.
         let (u, v) = if u - of_u > v - of_v { (u - excess, v) } else { (u, v - excess) };
         let local = a + ab * u + ac * v;
         let point = self.placement.point_to_world(local).as_vec3();

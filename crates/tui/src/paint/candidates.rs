@@ -10,7 +10,8 @@ const MAX: usize = 6;
 /// Maximum number of cells that a candidate may cover.
 const LONGEST: usize = 8;
 
-/// Base16 themes with 22 colors replace the first entries of the color cube, so only later ones are used.
+/// First palette entry used as a candidate. Base16 themes with 22 colors overwrite the first six entries of
+/// the color cube, so only the remaining entries are used.
 const FIRST_UNTOUCHED: u8 = 22;
 
 /// Candidate colors for the parts of a cell.

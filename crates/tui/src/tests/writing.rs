@@ -49,7 +49,7 @@ fn write(ui: &mut TestUi, is_own: bool, unfinished: Option<SampleCounts>) {
 
 #[track_caller]
 fn assert_shows(ui: &mut TestUi, words: &str) {
-    // A side panel wraps its lines, so the preview is between them.
+    // A side panel wraps its text next to the preview, so remove the preview's cells between the lines.
     let text: String = ui.screen_text().chars().filter(|it| *it != '▀' && !it.is_whitespace()).collect();
     let words: String = words.chars().filter(|it| !it.is_whitespace()).collect();
     assert!(text.contains(&words), "{words}: {}", ui.screen_text());

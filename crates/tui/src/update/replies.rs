@@ -226,7 +226,7 @@ mod tests {
         assert_eq!(state.display.capabilities, ghostty.capabilities());
         assert!(
             handle_reply(&mut state, TerminalReply::Name(ghostty)).is_empty(),
-            "focus reports are already enabled"
+            "focus reporting is already enabled"
         );
     }
 

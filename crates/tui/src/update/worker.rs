@@ -338,7 +338,7 @@ fn set_written_image_descriptions(state: &mut State, generation: u64, report: &R
     }
 }
 
-/// Handles another program's change to an output file.
+/// Handles an output file that another program has modified.
 pub(super) fn handle_external_output_change(
     state: &mut State,
     OutputChange { path, lost }: &OutputChange,

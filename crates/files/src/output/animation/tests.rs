@@ -62,7 +62,7 @@ fn decoded(bytes: &[u8]) -> Vec<Vec<u8>> {
 /// where gradients show banding.
 #[test]
 fn gif_dithering_preserves_gradients_on_average() {
-    // Use slow gradients in many colors, so that the palette colors are far apart.
+    // Use shallow gradients in many colors, so that the palette colors are far apart.
     let smooth = |number: u32| {
         let pixel = |i: u32| {
             let (x, y, k) = (i % 96, i / 96, number % 8);

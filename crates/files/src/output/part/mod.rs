@@ -27,8 +27,8 @@ pub use merge::{MergedParts, check_and_list_missing, merge_into_film};
 pub use read::{PartFile, find_input_by_path_suffix, input_name_by_content, is_part};
 pub use save::save;
 
-/// Magic number. As in PNG, a program that converts the file as if it were text corrupts the number, so the
-/// conversion is detected.
+/// Magic number. Like PNG's signature, it is corrupted if a program converts the file as if it were text, so
+/// such damage is detected.
 const MARK: [u8; 12] = crate::system::file::PART_MAGIC;
 
 /// Version of the part file format.

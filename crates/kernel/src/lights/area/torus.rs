@@ -263,7 +263,8 @@ impl TorusView {
 }
 
 impl TorusSlice {
-    /// Converts the relative sine of the elevation to the tangent of the angle to the circle's center.
+    /// Converts the relative sine of the elevation (the sine divided by its maximum) to the tangent of the
+    /// angle to the circle's center.
     fn slice_tangent_from_elevation_sine(&self, sine: f64) -> f64 {
         let sine = sine * self.sine;
         let distance = (self.gap * self.gap + self.off * self.off).sqrt();
@@ -276,7 +277,7 @@ impl TorusSlice {
         y / (self.gap * self.gap + self.off * self.off + y * y).sqrt() / self.sine
     }
 
-    /// Density of the relative sine of the elevation, from its minimum to its maximum.
+    /// Distribution of the relative sine of the elevation, mapped from [−1, 1] to [0, 1].
     fn elevation_distribution(&self, view: &TorusView) -> PiecewiseLinear<PLACES> {
         let sine = |i: usize| 2.0 * i as f64 / (PLACES - 1) as f64 - 1.0;
         PiecewiseLinear(std::array::from_fn(|i| {

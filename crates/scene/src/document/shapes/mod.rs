@@ -76,7 +76,7 @@ fn read_object(
 ) -> Option<Object> {
     let shape = reader(table, files);
     let matrix = table.optional_key("matrix");
-    // The reader for meshes has already read the matrix.
+    // The mesh reader has already read the matrix.
     let matrix =
         if kind == "mesh" || !matrix.is_present() { None } else { Some(read_affine_matrix(&matrix)) };
     let key = match kind {

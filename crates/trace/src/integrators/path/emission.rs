@@ -105,8 +105,8 @@ impl CameraWavefront<'_, '_> {
         self.may_scatter()
     }
 
-    /// Adds the emission that a path hits, multiplied by the path's MIS weight. Light samples contribute the
-    /// rest.
+    /// Adds the emission of a surface that a path hits, multiplied by the path's MIS weight. Light samples
+    /// contribute the rest.
     pub(super) fn add_weighted_emission(&mut self, path: &PathRay, radiance: Vec3, weight: f32) {
         if self.is_light_counted_elsewhere(path) {
             return;
@@ -122,7 +122,7 @@ impl CameraWavefront<'_, '_> {
         }
     }
 
-    /// Whether another technique accounts for the emission that a path hits: photons for light via mirrors and
+    /// Whether another technique accounts for the light that a path finds: photons for light via mirrors and
     /// glass, or light samples for hard shadows.
     pub(super) fn is_light_counted_elsewhere(&self, path: &PathRay) -> bool {
         let PathBehavior { gathers, mirrors, .. } = self.tile.behavior;

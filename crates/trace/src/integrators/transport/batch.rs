@@ -31,7 +31,7 @@ soa! {
         /// `t_max` of the ray from the facet to `lifted`.
         pub lift_end: f32 = 0.0,
         pub may_lift: bool = false,
-        /// The surface point and the geometric normal on the viewer's side, if `has_facet`. Without them,
+        /// The surface point, and the geometric normal oriented toward the viewer, if `has_facet`. Otherwise,
         /// `from` and `normal` are used.
         pub point: Vec3 = Vec3::ZERO,
         pub facet: Vec3 = Vec3::ZERO,
@@ -274,7 +274,7 @@ impl VertexBatch {
         self.has_horizon & 1 << i != 0 && !(lane(&self.horizon, i).dot(direction) > 0.0)
     }
 
-    /// Surface point of a vertex, and its geometric normal on the viewer's side.
+    /// Surface point of a vertex, and its geometric normal oriented toward the viewer.
     #[inline(always)]
     pub fn surface_point_and_normal(&self, i: usize) -> (Vec3, Vec3) {
         if self.has_facet & 1 << i != 0 {

@@ -18,8 +18,8 @@ pub struct Interior {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct InteriorList {
     inside: [Interior; MAX_INTERIORS],
-    /// Number of recorded solids, stored as a whole word because copying a word after writing one of its
-    /// bytes stalls.
+    /// Number of recorded solids. This is a whole word because the processor stalls if a word is copied soon
+    /// after one of its bytes was written.
     count: u32,
 }
 

@@ -88,7 +88,7 @@ pub struct PacketHits {
 }
 
 impl PacketHits {
-    /// The hit of a lane's ray.
+    /// Returns the hit found by the ray in a lane, if any.
     pub fn hit(&self, lane: usize) -> Option<Hit> {
         self.hits.get(lane).map(|shape| Hit { shape, object: self.object[lane] })
     }

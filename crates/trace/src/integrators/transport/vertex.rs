@@ -31,7 +31,7 @@ pub struct SurfaceVertex<'a> {
     has_uv: bool,
     /// Unit direction toward the viewer, opposite to the path's ray.
     pub wo: Vec3,
-    /// Geometric normal on the viewer's side.
+    /// Geometric normal, oriented toward the viewer.
     pub normal: Vec3,
     /// −1 if the viewer is on the back side, 1 otherwise.
     side: f32,
