@@ -6,7 +6,7 @@ use std::path::Path;
 use glimt::control::CancelToken;
 use glimt::output::AttributeLossPolicy;
 use glimt::output::part::{self, PartFile, PartHeader};
-use glimt::output::write::{Durability, WritePolicy};
+use glimt::output::write::{Durability, ExistingFilePolicy};
 use glimt::pipeline::BUILD;
 use serde_json::{Value, json};
 
@@ -21,7 +21,7 @@ fn rewrite(path: &Path, change: impl FnOnce(&mut PartHeader, &mut Value)) {
     file.restore(&film).expect("valid tiles");
     let (mut head, mut state) = (file.head, file.state);
     change(&mut head, &mut state);
-    let guard = WritePolicy {
+    let guard = ExistingFilePolicy {
         is_kept: &|_| false,
         may_replace: &|_| Ok(()),
         sweep: None,

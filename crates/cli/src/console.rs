@@ -65,7 +65,7 @@ impl Console {
 
     /// Width of stdout in columns, if it is a terminal.
     pub(super) fn stdout_columns(&self) -> Option<usize> {
-        terminal_columns(io::stdout().is_terminal())
+        columns_if_terminal(io::stdout().is_terminal())
     }
 
     /// Prints trusted text to stdout unchanged.
@@ -111,15 +111,15 @@ impl Console {
 }
 
 fn stderr_columns() -> usize {
-    terminal_columns(io::stderr().is_terminal()).unwrap_or(DEFAULT_COLUMNS)
+    columns_if_terminal(io::stderr().is_terminal()).unwrap_or(DEFAULT_COLUMNS)
 }
 
 /// Text width on stdout in columns: the terminal's width, or 80.
 pub(super) fn stdout_columns_or_default() -> usize {
-    terminal_columns(io::stdout().is_terminal()).unwrap_or(80)
+    columns_if_terminal(io::stdout().is_terminal()).unwrap_or(80)
 }
 
-fn terminal_columns(is_terminal: bool) -> Option<usize> {
+fn columns_if_terminal(is_terminal: bool) -> Option<usize> {
     let size = if is_terminal { crossterm::terminal::size().ok() } else { None };
     size.map(|(columns, _)| usize::from(columns)).filter(|columns| *columns > 0)
 }

@@ -81,7 +81,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> Exit {
         Some(Subcommand::Lsp { .. }) => commands::lsp::run(&console),
         Some(Subcommand::Doctor) => commands::doctor::run(&console),
         None => match lower::lower_args(args.render) {
-            Ok(order) => match mistyped_command_message(&order.scene) {
+            Ok(order) => match message_if_mistyped_command(&order.scene) {
                 Some(message) => console.print_error(Exit::WRONG, &message),
                 None => render(order, &console),
             },
@@ -122,7 +122,9 @@ fn report_parse_error(error: &clap::Error, arguments: &[OsString]) -> Exit {
         console.record_stdout_error(error.print().and_then(|()| io::stdout().flush()));
         return console.final_exit_code(Exit::DONE);
     }
-    if let Some(message) = find_extra_argument(error).and_then(|_| unknown_command_message(arguments)) {
+    if let Some(message) =
+        find_extra_argument(error).and_then(|_| message_if_first_argument_mistyped(arguments))
+    {
         return console.print_error(Exit::WRONG, &message);
     }
     if let Some(second) = find_extra_argument(error) {
@@ -143,13 +145,13 @@ fn report_parse_error(error: &clap::Error, arguments: &[OsString]) -> Exit {
 }
 
 /// Returns an error message if the first argument looks like a mistyped command.
-fn unknown_command_message(arguments: &[OsString]) -> Option<String> {
+fn message_if_first_argument_mistyped(arguments: &[OsString]) -> Option<String> {
     // A later argument may be the value of an option.
-    mistyped_command_message(Path::new(arguments.get(1)?))
+    message_if_mistyped_command(Path::new(arguments.get(1)?))
 }
 
 /// Returns an error message if the scene argument looks like a mistyped command.
-fn mistyped_command_message(word: &Path) -> Option<String> {
+fn message_if_mistyped_command(word: &Path) -> Option<String> {
     let first = word.to_string_lossy();
     if first.contains(['.', '/']) || first.starts_with('-') || word.symlink_metadata().is_ok() {
         return None;

@@ -15,7 +15,7 @@ use crate::pipeline::protocol::{
 };
 use crate::pipeline::start;
 use crate::pipeline::watch::{
-    ExternalChange, FileHashCache, FileRead, Watcher, find_missing_parent_or_working_folder,
+    ExternalChange, FileHashCache, FilePathAndContentId, Watcher, find_missing_parent_or_working_folder,
 };
 use crate::scene::diagnostic::Diagnostic;
 use crate::scene::sanitize::escape_invisible_chars;
@@ -191,9 +191,9 @@ struct WriteLog {
     /// Whether a request is in its last stage.
     is_last_stage: bool,
     /// The last request that read files before the UI exited, and the files it read.
-    read: (u64, Vec<FileRead>),
+    read: (u64, Vec<FilePathAndContentId>),
     /// The files from which the scene's own image was rendered, or `None` if that image is not written.
-    image_files: Option<Vec<FileRead>>,
+    image_files: Option<Vec<FilePathAndContentId>>,
 }
 
 impl SharedWriteLog {
@@ -433,7 +433,7 @@ mod tests {
         let content = contents.read_content_id(&path, &CancelToken::new()).expect("never canceled");
         let read = || Event::Files {
             generation: 1,
-            files: vec![FileRead { path: path.clone(), content }],
+            files: vec![FilePathAndContentId { path: path.clone(), content }],
             read: 1,
             since: std::time::Instant::now(),
         };

@@ -51,7 +51,7 @@ pub(super) fn lower_args(args: RenderArgs) -> Result<RenderRequest, String> {
         // Parts can have any file name.
         Some(_) => {}
         None if args.turntable.is_some() => check_turntable_args(&args)?,
-        None => check_outputs(&args.outputs)?,
+        None => check_output_formats_and_duplicates(&args.outputs)?,
     }
     if args.turntable.is_some() && args.shard.is_some() {
         return Err(
@@ -113,7 +113,7 @@ fn check_turntable_args(args: &RenderArgs) -> Result<(), String> {
         turntable::check_turntable_output(path)?;
         reject_duplicate_path(path, &mut known)?;
     }
-    if let Some(twin) = turntable::first_repeated_file(&args.outputs, args.turntable.unwrap_or(1)) {
+    if let Some(twin) = turntable::first_file_shared_by_frames(&args.outputs, args.turntable.unwrap_or(1)) {
         let name = twin.display();
         return Err(format!("{name} would be written twice: choose distinct file names"));
     }
@@ -135,7 +135,7 @@ fn reject_duplicate_path<'a>(path: &'a Path, known: &mut HashSet<&'a Path>) -> R
 }
 
 /// Checks that all extensions are known and that no output is specified twice.
-fn check_outputs(outputs: &[PathBuf]) -> Result<(), String> {
+fn check_output_formats_and_duplicates(outputs: &[PathBuf]) -> Result<(), String> {
     let mut known = HashSet::new();
     for path in outputs {
         if AnimationFormat::from_path(path).is_some() {

@@ -13,7 +13,7 @@ use crate::pipeline::protocol::{
     CheckpointUpdate, Command, Event, Failure, Report, Request, Stage, StageReport, Status, WriteRequirement,
     WriteWarning,
 };
-use crate::pipeline::settings::{EffectiveSettings, Overrides};
+use crate::pipeline::settings::{EffectiveSettingsSummary, Overrides};
 use crate::pipeline::turntable::{TurntableFrame, leftover_frames};
 use crate::pipeline::{Handle, start};
 use crate::progress::{self, Reporter};
@@ -60,7 +60,7 @@ pub(super) fn run(order: &RenderRequest, console: &Console) -> Exit {
         if ended.signal_number().is_some() && !is_lost && deadline.check_write_timeout_once(now, is_writing) {
             worker.send(Command::Cancel);
         }
-        ended.signal_number().is_some() && deadline.is_over(now)
+        ended.signal_number().is_some() && deadline.has_expired_since_first_call(now)
     };
     let (mut exit, mut is_whole) = (Exit::DONE, false);
     // Use one reporter per image to clear the progress of the previous frame.
@@ -147,7 +147,7 @@ struct ExitDeadline {
 }
 
 impl ExitDeadline {
-    fn is_over(&mut self, now: Instant) -> bool {
+    fn has_expired_since_first_call(&mut self, now: Instant) -> bool {
         now >= *self.end.get_or_insert(now + EXIT_TIMEOUT)
     }
 
@@ -233,7 +233,7 @@ fn handle_events(
                 if !reporter.reports_diagnostics() {
                     console.print_diagnostics(&warnings);
                 }
-                return report_written_images(
+                return report_written_and_failed_images(
                     &report,
                     (&written.images[before..], turn),
                     &unwritten,
@@ -351,7 +351,7 @@ fn argument_warning(message: &str, help: &str) -> Diagnostic {
 
 /// Returns warnings about options that have no effect. The terminal UI has its own messages for these
 /// options.
-fn ineffective_option_warnings(asked: &Overrides, settings: &EffectiveSettings) -> Vec<Diagnostic> {
+fn ineffective_option_warnings(asked: &Overrides, settings: &EffectiveSettingsSummary) -> Vec<Diagnostic> {
     let dof = (asked.dof == Some(true) && !settings.dof).then(|| {
         let help = "set `aperture` in [camera], for example to 0.1";
         argument_warning("--dof on has no effect: the camera's aperture is 0", help)
@@ -363,7 +363,7 @@ fn ineffective_option_warnings(asked: &Overrides, settings: &EffectiveSettings) 
     dof.into_iter().chain(photons).collect()
 }
 
-fn report_written_images(
+fn report_written_and_failed_images(
     report: &Report,
     (written, turn): (&[PathBuf], Option<TurntableFrame>),
     unwritten: &[String],
@@ -447,9 +447,11 @@ mod tests {
         let half = signal + EXIT_TIMEOUT / 2;
         let mut deadline = ExitDeadline::default();
         assert_eq!(deadline.time_left(half), EXIT_TIMEOUT, "without a signal");
-        assert!(!deadline.is_over(signal) && !deadline.is_over(half));
+        assert!(
+            !deadline.has_expired_since_first_call(signal) && !deadline.has_expired_since_first_call(half)
+        );
         assert_eq!(deadline.time_left(half), EXIT_TIMEOUT / 2);
-        assert!(deadline.is_over(signal + EXIT_TIMEOUT));
+        assert!(deadline.has_expired_since_first_call(signal + EXIT_TIMEOUT));
         assert_eq!(deadline.time_left(signal + EXIT_TIMEOUT), Duration::ZERO);
     }
 
@@ -461,7 +463,10 @@ mod tests {
             let mut stops = |after| deadline.check_write_timeout_once(signal + after, is_image);
             assert!(!stops(Duration::ZERO) && !stops(WRITE_TIMEOUT / 2));
             assert!(stops(WRITE_TIMEOUT) && !stops(EXIT_TIMEOUT), "once");
-            assert!(!deadline.is_over(signal + end - TICK) && deadline.is_over(signal + end));
+            assert!(
+                !deadline.has_expired_since_first_call(signal + end - TICK)
+                    && deadline.has_expired_since_first_call(signal + end)
+            );
         }
     }
 }

@@ -9,7 +9,7 @@ use super::build::BUILD;
 use super::keys;
 use super::plan::RenderPlan;
 use super::stages::parse::ParsedScene;
-use super::watch::content::{FileContentId, FileRead};
+use super::watch::content::{FileContentId, FilePathAndContentId};
 use crate::choice::Choice;
 use crate::integrators::{PhotonSettings, RenderSettings};
 use crate::output::part::RenderInput;
@@ -22,7 +22,7 @@ pub(super) struct ImageDependencies<'a> {
     pub(super) plan: &'a RenderPlan,
     pub(super) camera: &'a CameraOverrides,
     /// Files that were read, including the scene file.
-    pub(super) files: &'a [FileRead],
+    pub(super) files: &'a [FilePathAndContentId],
     /// The whole image's sample count if the image is rendered in parts. All parts must use the same sample
     /// count and output settings.
     pub(super) divided: Option<u32>,
@@ -100,7 +100,7 @@ impl ImageDependencies<'_> {
             .iter()
             .map(|file| file_content_and_part_key(&self.describe_file_content(&file.value), file.part))
             .collect();
-        let of = keys::scene_fingerprint_context(&scene, &meshes, orbiter.as_deref());
+        let of = keys::scene_references_for_fingerprint(&scene, &meshes, orbiter.as_deref());
         let world = keys::world_key(&keys::surfaces_and_lights_key(&scene, &of, &[]), &eye.camera, &of);
         keys::film_sums_key(world, &self.plan.settings, self.plan.crop)
     }
@@ -145,7 +145,7 @@ pub(super) fn path_relative_to_scene(path: &Path, scene: &Path) -> String {
 }
 
 /// Returns the file's hash in hexadecimal, or the reason why there is none.
-fn hash_or_reason(file: &FileRead) -> String {
+fn hash_or_reason(file: &FilePathAndContentId) -> String {
     match file.content {
         FileContentId::Missing => "missing".to_owned(),
         FileContentId::Unusable(_) => "not readable".to_owned(),

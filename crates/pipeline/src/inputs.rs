@@ -8,7 +8,7 @@ use std::sync::Arc;
 use super::identity::path_relative_to_scene;
 use super::stages::meshes::MeshesByFileIndex;
 use super::stages::parse::ParsedScene;
-use super::watch::content::FileRead;
+use super::watch::content::FilePathAndContentId;
 use crate::assets::gltf::is_gltf;
 use crate::output::{FallbackFileIdentity, FileIdentity};
 use crate::scene::description::Camera;
@@ -81,7 +81,7 @@ impl ProtectedInputs {
     }
 
     /// Adds all other files that were read.
-    pub(super) fn add_read(&mut self, files: &[FileRead]) {
+    pub(super) fn add_read(&mut self, files: &[FilePathAndContentId]) {
         let known: HashSet<PathBuf> = self.0.iter().map(|input| input.path.clone()).collect();
         for file in files.iter().filter(|file| !known.contains(&file.path)) {
             let role = "a file read by the scene".to_owned();
@@ -106,7 +106,7 @@ impl ProtectedInputs {
     pub(super) fn build_identity_index(&self) -> InputIndex<'_> {
         let mut on_disk = InputIndex { by_identity: HashMap::new(), alike: Vec::new() };
         for input in &self.0 {
-            if let Some(identity) = FileIdentity::from_path(&input.path) {
+            if let Some(identity) = FileIdentity::from_existing_or_new_path(&input.path) {
                 on_disk.by_identity.entry(identity).or_insert(input);
             }
             on_disk
@@ -118,7 +118,8 @@ impl ProtectedInputs {
 
     /// Whether a path currently refers to one of the files.
     pub(super) fn contains_path(&self, path: &Path) -> bool {
-        FileIdentity::from_path(path).is_some_and(|_| self.build_identity_index().find(path).is_some())
+        FileIdentity::from_existing_or_new_path(path)
+            .is_some_and(|_| self.build_identity_index().find(path).is_some())
     }
 }
 
@@ -131,7 +132,7 @@ pub(super) struct InputIndex<'a> {
 impl<'a> InputIndex<'a> {
     /// Returns the input that a path refers to, or probably refers to.
     pub(super) fn find(&self, path: &Path) -> Option<&'a ProtectedInput> {
-        if let Some(input) = self.by_identity.get(&FileIdentity::from_path(path)?) {
+        if let Some(input) = self.by_identity.get(&FileIdentity::from_existing_or_new_path(path)?) {
             return Some(input);
         }
         let own = FallbackFileIdentity::from_path(path)?;

@@ -10,7 +10,7 @@ use crate::scene::fingerprint::{Fingerprint, FingerprintContext, FingerprintHash
 
 /// Returns the context for fingerprinting scene descriptions: the textures, meshes and orbiter that they
 /// refer to.
-pub(crate) fn scene_fingerprint_context<'a>(
+pub(crate) fn scene_references_for_fingerprint<'a>(
     scene: &'a Scene,
     meshes: &'a [Fingerprint],
     orbiter: Option<&'a str>,
@@ -238,7 +238,7 @@ mod tests {
 
     fn keys(text: &str) -> (Fingerprint, Fingerprint, Fingerprint) {
         let scene = loaded_of(text).scene;
-        let of = scene_fingerprint_context(&scene, &[], None);
+        let of = scene_references_for_fingerprint(&scene, &[], None);
         (
             geometry_key(&scene, &of, (DVec3::ZERO, &[]), std::iter::empty()),
             lights_key(&scene, &of, (DVec3::ZERO, &[]), (None, &[])),
@@ -275,7 +275,7 @@ mod tests {
             let scene = loaded_of(BALL).scene;
             geometry_key(
                 &scene,
-                &scene_fingerprint_context(&scene, &[], None),
+                &scene_references_for_fingerprint(&scene, &[], None),
                 (DVec3::ZERO, &[lift]),
                 std::iter::empty(),
             )
@@ -421,7 +421,7 @@ mod tests {
         let quad = "[[quad]]\ncorner = [0, 0, 0]\nu = [1, 0, 0]\nv = [0, 1, 0]\nmaterial = \"m\"\n";
         let key = |kind: &str| {
             let scene = loaded_of(&format!("{quad}[materials.m]\ntype = \"{kind}\"\n")).scene;
-            coplanar_lights_key(&scene, &scene_fingerprint_context(&scene, &[], None))
+            coplanar_lights_key(&scene, &scene_references_for_fingerprint(&scene, &[], None))
         };
         assert_ne!(key("phong"), key("glass"));
     }

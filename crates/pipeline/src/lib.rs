@@ -52,5 +52,5 @@ pub use build::BUILD;
 pub use check::{IncrementalSceneChecker, SceneSummary, check_scene, estimate_memory};
 pub use model::import::{ImportError, ImportedScene, import_gltf};
 pub use stages::parse::files_referenced_by_assets;
-pub use watch::content::{FileContentId, FileRead};
+pub use watch::content::{FileContentId, FilePathAndContentId};
 pub use worker::{CommandSender, Handle, start};

@@ -11,7 +11,7 @@ use super::stages::meshes::MeshesByFileIndex;
 use crate::film::{Film, Rect, SumOrder};
 use crate::integrators::PhotonSettings;
 use crate::scene::description::{Accel, Scene};
-use crate::system::memory::{MemoryLimit, memory_limit};
+use crate::system::memory::{MemoryLimit, ulimit_or_cgroup_limit};
 
 /// Bytes used by the program itself.
 const PROGRAM: u64 = 24 << 20;
@@ -121,11 +121,11 @@ impl MemoryEstimate {
     /// # Errors
     /// Returns a breakdown and a suggested fix if the render needs more memory than the limit.
     pub(super) fn check(&self, plan: &RenderPlan) -> Result<u64, AbortReason> {
-        self.check_with_system_limit(plan, memory_limit)
+        self.check_with_limit_provider(plan, ulimit_or_cgroup_limit)
     }
 
     /// Like [`Self::check`], but takes the system's limit as a parameter.
-    fn check_with_system_limit(
+    fn check_with_limit_provider(
         &self,
         plan: &RenderPlan,
         limit: impl FnOnce() -> Option<MemoryLimit>,
@@ -268,7 +268,7 @@ mod tests {
         let limit = || Some(MemoryLimit { bytes: 8 << 20, setting: "the control group (x)".to_owned() });
         let check = |overrides: &Overrides| {
             let plan = planned(overrides);
-            MemoryEstimate::for_image(&plan).check_with_system_limit(&plan, limit)
+            MemoryEstimate::for_image(&plan).check_with_limit_provider(&plan, limit)
         };
         let said = match check(&Overrides::default()) {
             Err(AbortReason::Failed(Failure::Work(said))) => said,

@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::settings::{
-    CheckpointSettings, EffectiveSettings, OutputLayer, Overrides, UpAxis, ViewMode, ViewSide, sample_layers,
+    CheckpointSettings, EffectiveSettingsSummary, OutputLayer, Overrides, UpAxis, ViewMode, ViewSide,
+    sample_layers,
 };
 use super::turntable::{self, TurntableFrame};
 use crate::choice::Choice;
@@ -60,7 +61,7 @@ pub(super) struct RenderPlan {
     pub(super) checkpoints: CheckpointSettings,
     /// Maximum memory use of the render, in bytes.
     pub(super) memory: Option<u64>,
-    pub(super) effective: EffectiveSettings,
+    pub(super) effective: EffectiveSettingsSummary,
 }
 
 /// Source of the output file names.
@@ -128,7 +129,7 @@ pub(super) fn resolve_plan(
         time_seconds: overrides.time_seconds,
         tone: tone_mapping_for_view(render.exposure, render.tonemap, settings.view),
         bit_depth,
-        effective: EffectiveSettings::new(&settings, threads, &[outputs.as_slice(), &moving].concat()),
+        effective: EffectiveSettingsSummary::new(&settings, threads, &[outputs.as_slice(), &moving].concat()),
         outputs,
         moving,
         later_outputs,

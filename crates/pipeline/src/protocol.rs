@@ -19,8 +19,8 @@ pub use super::answers::{
 pub use super::report::{
     ImageReport, LightSamplingReport, PhotonsReport, Report, SampleCounts, SampledLightSet, WorkCounters,
 };
-use super::settings::{EffectiveSettings, KeyboardOverridableSettings, Overrides};
-use super::watch::content::FileRead;
+use super::settings::{EffectiveSettingsSummary, KeyboardOverridableSettings, Overrides};
+use super::watch::content::FilePathAndContentId;
 use crate::film::Srgb8Image;
 pub use crate::output::WriteWarning;
 pub use crate::scene::description::ResolvedCamera;
@@ -124,7 +124,7 @@ pub enum Event {
         /// Request number.
         generation: u64,
         /// The scene and all files it references.
-        files: Vec<FileRead>,
+        files: Vec<FilePathAndContentId>,
         /// Number of files at the start of the list that this request read. The others were read by earlier
         /// requests.
         read: usize,
@@ -150,7 +150,7 @@ pub enum Event {
         /// Request number.
         generation: u64,
         /// Effective settings of the request.
-        settings: Box<EffectiveSettings>,
+        settings: Box<EffectiveSettingsSummary>,
         /// The scene's camera.
         camera: ResolvedCamera,
         /// The scene's exposure in stops.
@@ -450,12 +450,12 @@ pub struct PreviewUpdate {
     /// Whether the preview lacks light from photons because they are still being traced.
     pub lacks_photons: bool,
     /// The image that the preview shows, or `None` if the preview lacks light from photons.
-    pub source: Option<PreviewSourceImage>,
+    pub source: Option<PreviewedImageState>,
 }
 
 /// The image that a preview shows, and whether it is finished.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct PreviewSourceImage {
+pub struct PreviewedImageState {
     /// Previews with the same key show the same image, although their sizes and sample counts may differ.
     pub image: Fingerprint,
     /// Whether the image has all of its samples.

@@ -157,7 +157,7 @@ impl QueryContext {
             Some(SavedCameraEdit { path: path.clone(), before: read.into(), after: text.as_str().into() })
         };
         let is_own = LoadedScene::parse_camera_from_text(&text, &self.sets)
-            .is_some_and(|own| own.matches_resolved_camera(camera));
+            .is_some_and(|own| own.is_look_at_matching_view(camera));
         Ok(CameraSaveResult { path, is_new: edit.is_some(), is_own, of_model: false, edit })
     }
 }
@@ -196,12 +196,12 @@ fn replace_scene_text_if_unchanged(
 ) -> Result<(), String> {
     let metadata =
         file::file_kind(path).map(|(_, metadata)| metadata).map_err(|error| describe_error(&error))?;
-    if let Some(why) = file::reason_not_to_replace(&metadata) {
+    if let Some(why) = file::hard_linked_or_readonly_reason(&metadata) {
         return Err(format!("{} {why}: {outcome}", path.display()));
     }
     let refused = || OutputError::Refused { reason: changed.to_owned() };
     let may_replace = |_: &Path| file_text_equals(path, old).then_some(()).ok_or_else(refused);
-    let guard = write::WritePolicy {
+    let guard = write::ExistingFilePolicy {
         is_kept: &|path| inputs.contains_path(path),
         may_replace: &may_replace,
         sweep: None,

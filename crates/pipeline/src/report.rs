@@ -5,7 +5,7 @@ mod marks;
 
 pub(super) use self::marks::ReportRecognitionFields;
 use super::protocol::StageReport;
-use super::settings::EffectiveSettings;
+use super::settings::EffectiveSettingsSummary;
 use crate::film::SampleCountStats;
 
 /// Report of a finished request. `--report` writes it as JSON.
@@ -18,7 +18,7 @@ pub struct Report {
     /// Size, samples and files of the image.
     pub image: ImageReport,
     /// Effective settings.
-    pub settings: EffectiveSettings,
+    pub settings: EffectiveSettingsSummary,
     /// The lights and how they are sampled.
     pub lights: LightSamplingReport,
     /// Photon statistics, or `None` if the image does not use photons.

@@ -198,7 +198,7 @@ pub struct KeyboardOverridableSettings {
 
 /// Effective settings of a request, for status lines and reports.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
-pub struct EffectiveSettings {
+pub struct EffectiveSettingsSummary {
     /// Width in pixels.
     pub width: u32,
     /// Height in pixels.
@@ -236,7 +236,7 @@ pub struct EffectiveSettings {
     pub outputs: Vec<PathBuf>,
 }
 
-impl EffectiveSettings {
+impl EffectiveSettingsSummary {
     pub(super) fn new(settings: &RenderSettings, threads: usize, outputs: &[PathBuf]) -> Self {
         let RenderSettings { render, dof, view, photons, layers: _ } =
             settings.without_ineffective_settings();

@@ -7,10 +7,10 @@ use std::sync::{Arc, PoisonError};
 use std::time::Instant;
 
 use super::protocol::{
-    AssetProgress, CheckpointUpdate, Event, NormalizedRect, PreviewSlot, PreviewSourceImage, PreviewUpdate,
+    AssetProgress, CheckpointUpdate, Event, NormalizedRect, PreviewSlot, PreviewUpdate, PreviewedImageState,
     RenderProgress, SampleCounts, SavedSceneImageState, StageReport,
 };
-use super::watch::content::FileRead;
+use super::watch::content::FilePathAndContentId;
 use crate::film::Srgb8Image;
 use crate::output::WriteWarning;
 use crate::scene::diagnostic::Diagnostic;
@@ -36,7 +36,7 @@ impl EventSink {
         self.send(Event::Progress { generation: self.generation, progress });
     }
 
-    pub(super) fn send_files_read(&self, files: Vec<FileRead>, read: usize, since: Instant) {
+    pub(super) fn send_files_read(&self, files: Vec<FilePathAndContentId>, read: usize, since: Instant) {
         self.send(Event::Files { generation: self.generation, files, read, since });
     }
 
@@ -81,7 +81,7 @@ impl EventSink {
         picture: Srgb8Image,
         range: Option<[f32; 2]>,
         section: Option<NormalizedRect>,
-        source: PreviewSourceImage,
+        source: PreviewedImageState,
     ) {
         let (generation, picture, source) = (self.generation, Arc::new(picture), Some(source));
         self.replace_preview_and_notify(PreviewUpdate {

@@ -18,7 +18,7 @@ impl PausableClock {
 
     /// Returns the seconds of active work. Includes the time since the last call unless work was paused
     /// (`held`).
-    pub(super) fn active_seconds(&mut self, held: bool) -> f64 {
+    pub(super) fn update_active_seconds(&mut self, held: bool) -> f64 {
         let now = Instant::now();
         if !held {
             self.active += now - self.last;

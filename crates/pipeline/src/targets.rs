@@ -11,10 +11,9 @@ use super::render::checkpointer::checkpoint_path;
 use super::report::ReportRecognitionFields;
 use super::sink::EventSink;
 use crate::output::part::{self, PartFile};
-use crate::output::write::{SweptFolders, WritePolicy};
+use crate::output::write::{ExistingFilePolicy, SweptFolders};
 use crate::output::{
-    AttributeLossPolicy, FileIdentity, OutputError, ReplaceCheck, check_image_replaceable,
-    check_json_replaceable,
+    AttributeLossPolicy, FileIdentity, OutputError, ReplaceCheck, check_image_replaceable, json_replace_check,
 };
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::has_mesh_extension;
@@ -60,7 +59,7 @@ pub(super) fn output_conflicts(plan: &RenderPlan, inputs: &ProtectedInputs) -> V
     // Later frames have distinct files, because each name contains the frame number.
     let mut first = HashMap::new();
     for target in current_targets(plan) {
-        if let Some(identity) = FileIdentity::from_path(target.path) {
+        if let Some(identity) = FileIdentity::from_existing_or_new_path(target.path) {
             first.entry(identity).or_insert(target);
         }
     }
@@ -76,7 +75,7 @@ pub(super) fn output_conflicts(plan: &RenderPlan, inputs: &ProtectedInputs) -> V
 fn linked_frame_conflicts(plan: &RenderPlan) -> Vec<Diagnostic> {
     let (mut seen, mut found) = (HashMap::new(), Vec::new());
     for path in plan.outputs.iter().chain(&plan.later_outputs).filter(|_| !plan.later_outputs.is_empty()) {
-        let Some(identity) = FileIdentity::from_path(path) else { continue };
+        let Some(identity) = FileIdentity::from_existing_or_new_path(path) else { continue };
         match seen.entry(identity) {
             Entry::Vacant(new) => drop(new.insert(path)),
             Entry::Occupied(twin) if *twin.get() != path => {
@@ -99,7 +98,7 @@ pub(super) fn write_guarded<'a, T>(
     inputs: &ProtectedInputs,
     (target, sweep): (OutputTarget<'a>, Option<&SweptFolders>),
     sink: &EventSink,
-    write: impl FnOnce(&WritePolicy<'_>) -> Result<T, OutputError>,
+    write: impl FnOnce(&ExistingFilePolicy<'_>) -> Result<T, OutputError>,
 ) -> Result<T, OutputError> {
     let may_replace = |real: &Path| {
         let inputs = inputs.build_identity_index();
@@ -110,14 +109,14 @@ pub(super) fn write_guarded<'a, T>(
                 return None;
             }
             let mut others = current_targets(plan).filter(|other| *other != target);
-            others.find(|other| FileIdentity::from_path(other.path).as_ref() == Some(at))
+            others.find(|other| FileIdentity::from_existing_or_new_path(other.path).as_ref() == Some(at))
         };
         match find_conflict(plan, target, real, &inputs, twin) {
             Some(conflict) => Err(OutputError::Refused { reason: format_conflict_line(&conflict) }),
             None => Ok(()),
         }
     };
-    write(&WritePolicy {
+    write(&ExistingFilePolicy {
         is_kept: &|path| inputs.contains_path(path),
         may_replace: &may_replace,
         sweep,
@@ -154,7 +153,7 @@ fn find_conflict<'a>(
     inputs: &InputIndex<'_>,
     twin: impl Fn(OutputTarget<'a>, &FileIdentity) -> Option<OutputTarget<'a>>,
 ) -> Option<Diagnostic> {
-    if let Some(identity) = FileIdentity::from_path(at) {
+    if let Some(identity) = FileIdentity::from_existing_or_new_path(at) {
         if let Some(input) = inputs.find(at) {
             return Some(input_error(plan, target, input));
         }
@@ -172,7 +171,7 @@ fn find_conflict<'a>(
 
 /// Whether a file is the checkpoint for an output.
 fn is_checkpoint_for(output: &Path, identity: &FileIdentity) -> bool {
-    FileIdentity::from_path(&checkpoint_path(output)).as_ref() == Some(identity)
+    FileIdentity::from_existing_or_new_path(&checkpoint_path(output)).as_ref() == Some(identity)
 }
 
 fn input_error(plan: &RenderPlan, target: OutputTarget<'_>, input: &ProtectedInput) -> Diagnostic {
@@ -214,7 +213,7 @@ fn foreign_file_error(plan: &RenderPlan, target: OutputTarget<'_>, at: &Path) ->
             (replaced, help)
         }
         TargetKind::Report => {
-            let replaced = check_json_replaceable(at, "a report", ReportRecognitionFields::have_all_stages);
+            let replaced = json_replace_check(at, "a report", ReportRecognitionFields::have_all_stages);
             (replaced, format!("{remedy}; --force replaces it"))
         }
         TargetKind::Picture(OutputNameSource::CommandLine | OutputNameSource::Scene) => {

@@ -174,7 +174,7 @@ fn max_pass_samples(pixels: usize) -> u32 {
 
 /// Estimates the number of jobs needed to take a pixel from `done` to `total` samples using [`samples_after_next_pass`].
 /// Each job has at most `at_once` samples.
-pub(super) fn estimate_remaining_job_count(done: u32, total: u32, pixels: usize, at_once: u32) -> u32 {
+pub(super) fn estimate_jobs_per_pixel(done: u32, total: u32, pixels: usize, at_once: u32) -> u32 {
     let longest = max_pass_samples(pixels);
     let (mut reached, mut jobs) = (done, 0);
     while reached < longest.min(total) {
@@ -206,15 +206,12 @@ mod tests {
                 reached = end;
             }
             assert_eq!(
-                estimate_remaining_job_count(done, total, pixels, at_once),
+                estimate_jobs_per_pixel(done, total, pixels, at_once),
                 jobs,
                 "{done} {total} {pixels} {at_once}"
             );
         }
-        assert_eq!(
-            estimate_remaining_job_count(0, u32::MAX, 5000, u32::MAX),
-            6 + (u32::MAX - 32).div_ceil(32)
-        );
+        assert_eq!(estimate_jobs_per_pixel(0, u32::MAX, 5000, u32::MAX), 6 + (u32::MAX - 32).div_ceil(32));
     }
 
     #[test]

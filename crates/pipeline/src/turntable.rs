@@ -101,7 +101,7 @@ fn insert_frame_number(before: &[u8], (number, digits): (u32, usize), after: &[u
 }
 
 /// Returns the first file that two frames would share, or `None` if each frame has its own file.
-pub fn first_repeated_file(outputs: &[PathBuf], of: u32) -> Option<PathBuf> {
+pub fn first_file_shared_by_frames(outputs: &[PathBuf], of: u32) -> Option<PathBuf> {
     let mut seen = HashSet::new();
     let all = |number| outputs.iter().filter_map(move |path| frame_path(path, TurntableFrame { number, of }));
     (0..of).flat_map(all).find(|path| !seen.insert(path.clone()))
@@ -195,7 +195,7 @@ mod tests {
 
     #[test]
     fn colliding_names_are_found() {
-        let twin = |names: [&str; 2], of| first_repeated_file(&names.map(PathBuf::from), of);
+        let twin = |names: [&str; 2], of| first_file_shared_by_frames(&names.map(PathBuf::from), of);
         assert_eq!(twin(["a_#.png", "a_1#.png"], 10), None);
         assert_eq!(twin(["a_#.png", "a_1#.png"], 11), Some("a_11.png".into()));
         assert_eq!(twin(["a_#.png", "a_##.png"], 9), None);

@@ -40,7 +40,7 @@ fn warning_at_setting(
     overrides: &Overrides,
 ) -> Diagnostic {
     let severity = Severity::Warning;
-    if let Some(option) = cause.command_line_option(overrides) {
+    if let Some(option) = cause.overriding_command_line_option(overrides) {
         let help = Some(format!("caused by `{option}`, not by the scene"));
         return Diagnostic { severity, message, path: PathBuf::new(), place: None, help };
     }
@@ -57,7 +57,7 @@ fn warning_at_setting(
 
 impl WarnedSetting {
     /// Returns the command-line option if it overrides the scene.
-    fn command_line_option(self, overrides: &Overrides) -> Option<String> {
+    fn overriding_command_line_option(self, overrides: &Overrides) -> Option<String> {
         match self {
             Self::Integrator => overrides.integrator.map(|one| format!("--integrator {}", one.name())),
             Self::Photons => {

@@ -226,7 +226,7 @@ impl CommandSender {
     /// Postpones a write order until the pending request runs if the order was meant for that request, or if
     /// the current image is incomplete and the pending request has the same settings. Returns whether the
     /// order was postponed.
-    fn postpone_write_to_pending(&self, can_write: bool) -> bool {
+    fn try_postpone_write_to_pending(&self, can_write: bool) -> bool {
         let mut mailbox = self.lock();
         let is_meant = mailbox.is_write_of_waiting;
         let postponed = mailbox.request.as_ref().is_some_and(|request| {
@@ -317,7 +317,9 @@ impl Worker {
                     engine.checkpoint_saved_scene_image(&sink, self.remote.cancellation_cause());
                     break;
                 }
-                Task::Write if self.remote.postpone_write_to_pending(engine.has_sample_in_every_pixel()) => {
+                Task::Write
+                    if self.remote.try_postpone_write_to_pending(engine.has_sample_in_every_pixel()) =>
+                {
                     continue;
                 }
                 Task::Write => catch_unwind(AssertUnwindSafe(|| engine.write_now(&sink))),
@@ -429,7 +431,7 @@ mod tests {
         remote.send(Command::Quit);
         assert!(token.is_cancelled());
         assert!(matches!(remote.wait_for_next_task(), Task::Write));
-        assert!(!remote.postpone_write_to_pending(false), "no request should be pending");
+        assert!(!remote.try_postpone_write_to_pending(false), "no request should be pending");
         assert!(matches!(remote.wait_for_next_task(), Task::Quit));
     }
 
@@ -470,7 +472,7 @@ mod tests {
         remote.send(Command::Render(Box::new(Request { overrides, ..*view })));
         assert!(matches!(remote.wait_for_next_task(), Task::Write));
         assert!(
-            !remote.postpone_write_to_pending(false),
+            !remote.try_postpone_write_to_pending(false),
             "the order should not be postponed, so that an error is reported"
         );
         // An order sent after the view was requested applies to the view, even if the first image is
@@ -478,7 +480,7 @@ mod tests {
         remote.send(Command::Write);
         assert!(!remote.wants_write() && !remote.take_write(), "the ending request should ignore the order");
         assert!(matches!(remote.wait_for_next_task(), Task::Write));
-        assert!(remote.postpone_write_to_pending(true));
+        assert!(remote.try_postpone_write_to_pending(true));
     }
 
     #[test]
@@ -492,13 +494,13 @@ mod tests {
             "the order should apply to the shown image first"
         );
         assert!(
-            remote.postpone_write_to_pending(false),
+            remote.try_postpone_write_to_pending(false),
             "the order should be postponed while the image is incomplete"
         );
         assert!(matches!(remote.wait_for_next_task(), Task::Render(..)));
         assert!(remote.take_write(), "the request should take the order");
         assert!(!remote.take_write());
         assert!(matches!(remote.wait_for_next_task(), Task::Preview(None, _)));
-        assert!(!remote.postpone_write_to_pending(false), "no request should be pending");
+        assert!(!remote.try_postpone_write_to_pending(false), "no request should be pending");
     }
 }

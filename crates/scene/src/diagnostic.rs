@@ -30,7 +30,7 @@ pub struct Diagnostic {
 
 impl Diagnostic {
     /// Creates an error in the file at `path`.
-    pub(crate) fn error(
+    pub(crate) fn error_in_file(
         path: &Path,
         message: String,
         help: Option<String>,

@@ -22,7 +22,7 @@ pub(super) fn replace_camera(text: &str, wanted: &ResolvedCamera) -> Result<Stri
     edits.set_camera(wanted);
     let new = edits.apply();
     let is_right = parse_camera(&SceneText::from_file_text(new.as_str().into()))
-        .is_some_and(|new| new.matches_resolved_camera(wanted));
+        .is_some_and(|new| new.is_look_at_matching_view(wanted));
     is_right.then_some(new).ok_or_else(|| "glimt cannot edit the [camera] table in this form".to_owned())
 }
 

@@ -36,7 +36,7 @@ use diagnostic::{Diagnostic, Severity};
 pub use document::MORE_LIKE_THESE;
 pub use facing::MeshBoundingBox;
 pub use key_path::{key_parts, shortened_key, split_at_unquoted_space};
-pub use other_content::detect_non_scene;
+pub use other_content::detect_image_or_part;
 pub use read::find_renamed_scene;
 pub use source::{SceneText, quote_toml_string};
 

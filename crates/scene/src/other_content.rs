@@ -29,7 +29,7 @@ pub(super) enum NonSceneContent {
 
 /// Checks whether a file is an image, an image part or a checkpoint, regardless of its name. Returns its
 /// format and an error, or `None` for other or unreadable files.
-pub fn detect_non_scene(path: &Path) -> Option<(&'static str, Box<Diagnostic>)> {
+pub fn detect_image_or_part(path: &Path) -> Option<(&'static str, Box<Diagnostic>)> {
     const START: u64 = 1 << 10;
     let (opened, _) = file::open_regular_file(path).ok()?.ok()?;
     let mut bytes = Vec::new();
@@ -72,7 +72,7 @@ impl NonSceneContent {
                 "`glimt info` shows which scene it belongs to; `glimt merge` merges parts".to_owned(),
             ),
         };
-        Diagnostic::error(path, message, Some(help), None)
+        Diagnostic::error_in_file(path, message, Some(help), None)
     }
 }
 
@@ -185,14 +185,14 @@ mod tests {
         std::fs::write(&path, PART_MAGIC).expect("written");
         let part = super::super::read_current_text(&path).expect_err("an error");
         assert_eq!(part, NonSceneContent::Part.to_diagnostic(&path));
-        assert_eq!(detect_non_scene(&path), Some(("part", part)));
+        assert_eq!(detect_image_or_part(&path), Some(("part", part)));
         std::fs::write(&path, b"\x76\x2f\x31\x01").expect("written");
         let file = std::fs::File::options().write(true).open(&path).expect("opened");
         file.set_len(super::super::MAX_FILE_BYTES + 1).expect("made longer");
         let large = super::super::read_current_text(&path).expect_err("an error");
         assert_eq!(large, NonSceneContent::Image("EXR").to_diagnostic(&path));
         std::fs::write(&path, b"v 0 0 0\n").expect("written");
-        assert_eq!(detect_non_scene(&path), None, "models are rendered");
+        assert_eq!(detect_image_or_part(&path), None, "models are rendered");
     }
 
     #[test]

@@ -8,7 +8,7 @@ use super::diagnostic::{Diagnostic, SourceSpan};
 use super::document::has_mesh_extension;
 use super::keys::endings::MESHES;
 use super::nearest::nearest_name;
-use super::other_content::{NEW_SCENE_HELP, NonSceneContent, detect_non_scene, has_scene_extension};
+use super::other_content::{NEW_SCENE_HELP, NonSceneContent, detect_image_or_part, has_scene_extension};
 use super::sanitize::escape_invisible_chars;
 use super::{MAX_FILE_BYTES, MAX_PARTS, MODEL_NOT_FOUND, SCENE_NOT_FOUND};
 use crate::system::file::{self, FileKind};
@@ -33,15 +33,15 @@ pub(super) fn read_scene_text(path: &Path) -> Result<Arc<str>, Box<Diagnostic>> 
         let ending = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
         let message = format!("glimt cannot read .{ending} models");
         let help = format!("export it in one of these formats: .{}", MESHES.join(", ."));
-        return Err(Diagnostic::error(path, message, Some(help), None));
+        return Err(Diagnostic::error_in_file(path, message, Some(help), None));
     }
     let bytes = read_bytes(path).map_err(|(message, help)| {
         // Report a large image as an image rather than as a large scene.
-        detect_non_scene(path)
-            .map_or_else(|| Diagnostic::error(path, message, help, None), |(_, problem)| problem)
+        detect_image_or_part(path)
+            .map_or_else(|| Diagnostic::error_in_file(path, message, help, None), |(_, problem)| problem)
     })?;
     if file::is_lfs_pointer(&bytes) {
-        return Err(Diagnostic::error(path, LFS_POINTER.to_owned(), Some(LFS_HELP.to_owned()), None));
+        return Err(Diagnostic::error_in_file(path, LFS_POINTER.to_owned(), Some(LFS_HELP.to_owned()), None));
     }
     if let Some(content) = NonSceneContent::detect(&bytes) {
         return Err(content.to_diagnostic(path));
@@ -57,7 +57,7 @@ pub(super) fn read_scene_text(path: &Path) -> Result<Arc<str>, Box<Diagnostic>> 
 
 /// Creates the error for a binary file.
 pub(super) fn binary_file_error(path: &Path) -> Box<Diagnostic> {
-    Diagnostic::error(
+    Diagnostic::error_in_file(
         path,
         NOT_TEXT.to_owned(),
         Some(format!("a scene is a TOML file in UTF-8; {NEW_SCENE_HELP}")),
@@ -72,7 +72,7 @@ fn mesh_instead_of_scene_error(path: &Path) -> Box<Diagnostic> {
         "to use it in a scene, add [[mesh]] with {}; {NEW_SCENE_HELP}",
         format_mesh_file_key(&escape_invisible_chars(&name))
     );
-    Diagnostic::error(path, MESH_NOT_SCENE.to_owned(), Some(help), None)
+    Diagnostic::error_in_file(path, MESH_NOT_SCENE.to_owned(), Some(help), None)
 }
 
 /// Formats the key `file` in `[[mesh]]` for help texts.
@@ -116,7 +116,7 @@ fn not_utf8_error(path: &Path, bytes: &[u8], offset: usize) -> Box<Diagnostic> {
     let span = offset..offset + char::REPLACEMENT_CHARACTER.len_utf8();
     let label = "not a UTF-8 character".to_owned();
     let help = Some("save the file as UTF-8".to_owned());
-    Diagnostic::error(path, message, help, Some(SourceSpan { source, span, label }))
+    Diagnostic::error_in_file(path, message, help, Some(SourceSpan { source, span, label }))
 }
 
 type RefusalMessageAndHelp = (String, Option<String>);
@@ -134,7 +134,7 @@ fn read_bytes(path: &Path) -> Result<Vec<u8>, RefusalMessageAndHelp> {
         return Err(too_large_refusal());
     }
     if count_syntax_elements(&bytes) > MAX_PARTS {
-        return Err(refusal_with_mesh_file_advice(format!(
+        return Err(refusal_advising_separate_mesh_files(format!(
             "the scene file has more than {} million syntax elements",
             MAX_PARTS >> 20
         )));
@@ -161,10 +161,13 @@ fn not_regular_refusal(path: &Path, kind: FileKind) -> RefusalMessageAndHelp {
 }
 
 fn too_large_refusal() -> RefusalMessageAndHelp {
-    refusal_with_mesh_file_advice(format!("the scene file is larger than {} MiB", MAX_FILE_BYTES >> 20))
+    refusal_advising_separate_mesh_files(format!(
+        "the scene file is larger than {} MiB",
+        MAX_FILE_BYTES >> 20
+    ))
 }
 
-fn refusal_with_mesh_file_advice(message: String) -> RefusalMessageAndHelp {
+fn refusal_advising_separate_mesh_files(message: String) -> RefusalMessageAndHelp {
     (message, Some("put large geometry in mesh files and reference them with [[mesh]]".to_owned()))
 }
 

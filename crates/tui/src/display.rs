@@ -6,7 +6,7 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
 use super::color::ColorDepth;
-use super::connection::{QueryKind, TerminalConnection};
+use super::connection::{QueryKind, TerminalFlowControl};
 use super::event::PreviewSendReport;
 use super::graphics::{PlacedImage, TerminalImages};
 use super::paint::{Fidelity, LinksAndDelayedText, Painter};
@@ -45,23 +45,23 @@ pub(super) struct TerminalEnvironment {
 impl TerminalEnvironment {
     /// Creates a connection whose speed is unknown. A local multiplexer's replies do not reflect the network
     /// behind it.
-    fn new_connection(self, now: Instant) -> TerminalConnection {
-        TerminalConnection::new(self.is_multiplexed && self.is_remote, now)
+    fn new_connection(self, now: Instant) -> TerminalFlowControl {
+        TerminalFlowControl::new(self.is_multiplexed && self.is_remote, now)
     }
 }
 
 /// A nonblocking writer for terminal output.
-pub(super) type TerminalWriter = Box<dyn FnMut(Vec<u8>)>;
+pub(super) type TerminalOutputCallback = Box<dyn FnMut(Vec<u8>)>;
 
 /// The event loop's interface to the terminal's screen.
 pub(super) struct Display {
     painter: Painter,
     /// The preview, if it is drawn as pixels.
     images: Option<TerminalImages>,
-    connection: TerminalConnection,
+    connection: TerminalFlowControl,
     link: TerminalEnvironment,
     /// Writer that sends bytes to the terminal.
-    out: TerminalWriter,
+    out: TerminalOutputCallback,
     /// Whether the terminal supports synchronized output (mode 2026).
     is_synchronized: bool,
     /// Whether the target has been sent completely.
@@ -86,7 +86,7 @@ impl Display {
         depth: ColorDepth,
         link: TerminalEnvironment,
         images: Option<TerminalImages>,
-        out: TerminalWriter,
+        out: TerminalOutputCallback,
         now: Instant,
     ) -> Self {
         let mut display = Self {
@@ -348,7 +348,8 @@ mod tests {
         let now = Instant::now();
         let all = Rc::new(Cell::new(0));
         let count = all.clone();
-        let out: TerminalWriter = Box::new(move |bytes: Vec<u8>| count.set(count.get() + bytes.len()));
+        let out: TerminalOutputCallback =
+            Box::new(move |bytes: Vec<u8>| count.set(count.get() + bytes.len()));
         let mut display = Display::new(ColorDepth::TrueColor, TerminalEnvironment::default(), None, out, now);
         let area = Rect::new(0, 0, 40, 20);
         let mut buffer = Buffer::empty(area);

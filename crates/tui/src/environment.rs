@@ -10,7 +10,9 @@ use super::preview_kind::PreviewKind;
 use super::terminal_replies::TerminalQueries;
 
 /// The terminal and its connection, as detected from environment variables.
-pub(super) fn detect_terminal_environment(variable: impl Fn(&str) -> Option<String>) -> TerminalEnvironment {
+pub(super) fn terminal_environment_from_variables(
+    variable: impl Fn(&str) -> Option<String>,
+) -> TerminalEnvironment {
     let is_set = |name: &str| variable(name).is_some_and(|value| !value.is_empty());
     let term = variable("TERM").unwrap_or_default();
     TerminalEnvironment {
@@ -33,7 +35,7 @@ pub(super) fn may_print_unknown_escapes(variable: impl Fn(&str) -> Option<String
 }
 
 /// Returns the image protocol for the user's preview choice.
-fn protocol_for_choice(preview: PreviewChoice) -> Option<ImageProtocol> {
+fn explicitly_chosen_image_protocol(preview: PreviewChoice) -> Option<ImageProtocol> {
     match preview {
         PreviewChoice::Kitty => Some(ImageProtocol::Kitty),
         PreviewChoice::Sixel => Some(ImageProtocol::Sixel),
@@ -58,7 +60,7 @@ pub(super) fn select_terminal_queries(
 ) -> TerminalQueries {
     let get = |name: &str| variable(name).unwrap_or_default();
     let term = get("TERM");
-    let is_outermost = !detect_terminal_environment(&variable).is_multiplexed;
+    let is_outermost = !terminal_environment_from_variables(&variable).is_multiplexed;
     let is_plain = may_print_unknown_escapes(&variable);
     let has_palette = matches!(depth, ColorDepth::Indexed256 | ColorDepth::Ansi16);
     let is_ramp = PreviewKind::from_choice(preview, depth) == PreviewKind::Ascii;
@@ -68,7 +70,7 @@ pub(super) fn select_terminal_queries(
         true_color: color == ColorDepthChoice::Auto && has_palette && is_outermost && !is_plain,
         background: is_ramp && get("STY").is_empty() && !term.starts_with("linux") && term != "dumb",
         palette: depth == ColorDepth::Ansi16 && is_outermost && !is_plain,
-        pixels: protocol_for_choice(preview)
+        pixels: explicitly_chosen_image_protocol(preview)
             .map(|protocol| UnconfirmedImageProtocol::new(protocol, &variable, is_plain)),
     }
 }
@@ -80,7 +82,7 @@ mod tests {
     #[test]
     fn multiplexers_and_networks_are_detected() {
         let link = |pairs: &[(&str, &str)]| {
-            detect_terminal_environment(|name| {
+            terminal_environment_from_variables(|name| {
                 pairs.iter().find(|(key, _)| *key == name).map(|(_, value)| (*value).to_owned())
             })
         };

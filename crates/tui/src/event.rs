@@ -10,7 +10,7 @@ use crossterm::event::{KeyCode, KeyModifiers};
 use super::options::{ContentChangeTime, OutputChange, WatchEvent};
 use super::terminal_replies::TerminalReply;
 use crate::film::Srgb8Image;
-use crate::pipeline::protocol::{self, NormalizedRect, PreviewSourceImage};
+use crate::pipeline::protocol::{self, NormalizedRect, PreviewedImageState};
 
 /// An input to the front end.
 #[derive(Clone, Debug)]
@@ -41,7 +41,7 @@ pub(super) enum Event {
         range: Option<[f32; 2]>,
         section: Option<NormalizedRect>,
         lacks_photons: bool,
-        source: Option<PreviewSourceImage>,
+        source: Option<PreviewedImageState>,
     },
     /// A file that the scene depends on was written.
     Changed(ContentChangeTime),

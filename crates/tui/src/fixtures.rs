@@ -22,7 +22,7 @@ use crate::pipeline::protocol::{
     self, AssetProgress, Command, Failure, ImageReport, RenderProgress, Report, Request, ResolvedCamera,
     SampleCounts, Stage, StageReport, Status, WorkCounters,
 };
-use crate::pipeline::settings::{EffectiveSettings, KeyboardOverridableSettings, Overrides, ViewMode};
+use crate::pipeline::settings::{EffectiveSettingsSummary, KeyboardOverridableSettings, Overrides, ViewMode};
 use crate::scene::description::{Accel, Integrator, Pose, ShadowMode};
 use crate::scene::diagnostic::{Diagnostic, Severity, SourceSpan};
 
@@ -181,8 +181,8 @@ pub(super) fn uniform_picture(width: u32, height: u32, color: [u8; 3]) -> Arc<Sr
     Arc::new(Srgb8Image { width, height, pixels: vec![color; width as usize * height as usize] })
 }
 
-pub(super) fn effective_settings() -> EffectiveSettings {
-    EffectiveSettings {
+pub(super) fn effective_settings() -> EffectiveSettingsSummary {
+    EffectiveSettingsSummary {
         width: 640,
         height: 480,
         error: 0.0,

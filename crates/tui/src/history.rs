@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use crate::film::Srgb8Image;
 use crate::messages;
-use crate::pipeline::protocol::{NormalizedRect, PreviewSourceImage};
+use crate::pipeline::protocol::{NormalizedRect, PreviewedImageState};
 use crate::rescale::resized;
 use crate::state::ImageProvenance;
 
@@ -28,7 +28,7 @@ pub(crate) struct ShownImage {
     /// Whether the image lacks the light from photons that are still being traced.
     pub lacks_photons: bool,
     /// The image that the preview belongs to, if known.
-    pub source: Option<PreviewSourceImage>,
+    pub source: Option<PreviewedImageState>,
 }
 
 impl ShownImage {
@@ -144,7 +144,7 @@ impl RenderHistory {
                 }
                 // Keep the origin if the image is the same.
                 let is_same = known.is_none() || past.shown.shows_same_image(&shown);
-                let origin = if is_same { past.origin.after_reproduction_by(origin) } else { origin };
+                let origin = if is_same { past.origin.after_rerender_of_same_image(origin) } else { origin };
                 self.replace_entry_image(at, (shown, time), origin);
                 self.merge_with_previous(at);
             }
@@ -192,7 +192,7 @@ impl RenderHistory {
             return;
         }
         let (edits, run) = (earlier.edits, past.run.or(earlier.run));
-        let origin = earlier.origin.after_reproduction_by(past.origin.clone());
+        let origin = earlier.origin.after_rerender_of_same_image(past.origin.clone());
         self.remove(before);
         if let Some(past) = self.past.get_mut(before) {
             (past.edits, past.run, past.origin) = (edits, run, origin);
@@ -268,7 +268,7 @@ impl RenderHistory {
     }
 
     /// Scene and settings of the older render being viewed, or `None` if the newest one is being viewed.
-    pub(super) fn viewed_older_provenance(&self) -> Option<&ImageProvenance> {
+    pub(super) fn viewed_older_scene_and_settings(&self) -> Option<&ImageProvenance> {
         let (at, _) = self.open.as_ref()?;
         self.past.get(*at).map(|past| &past.origin)
     }
@@ -289,7 +289,7 @@ impl RenderHistory {
     }
 
     /// Stores a new image. Returns whether it stays hidden because an older one is being viewed.
-    pub(super) fn update_newest_while_viewing_older(&mut self, shown: &ShownImage) -> bool {
+    pub(super) fn store_newest_if_viewing_older(&mut self, shown: &ShownImage) -> bool {
         if let Some((_, newest)) = &mut self.open {
             *newest = shown.clone();
         }
@@ -300,7 +300,7 @@ impl RenderHistory {
     pub(super) fn step_back_by(&mut self, back: isize, newest: ShownImage) -> Option<ShownImage> {
         let at = self.open.as_ref().map_or(self.past.len().checked_sub(1)?, |(at, _)| *at);
         let next = at.checked_add_signed(-back).filter(|next| *next < self.past.len())?;
-        self.show_entry(next, newest)
+        self.open_entry(next, newest)
     }
 
     /// Whether moving `back` entries back (forward if negative) reaches the newest one.
@@ -313,7 +313,7 @@ impl RenderHistory {
     pub(super) fn open_before_edit(&mut self, newest: ShownImage) -> Option<ShownImage> {
         let last = self.past.back()?.edits;
         let at = self.past.iter().rposition(|past| past.edits < last)?;
-        self.show_entry(at, newest)
+        self.open_entry(at, newest)
     }
 
     /// Number of history entries.
@@ -357,10 +357,10 @@ impl RenderHistory {
 
     /// Opens a history entry for viewing.
     pub(super) fn open_at(&mut self, at: usize, newest: ShownImage) -> Option<ShownImage> {
-        self.show_entry(at, newest)
+        self.open_entry(at, newest)
     }
 
-    fn show_entry(&mut self, at: usize, newest: ShownImage) -> Option<ShownImage> {
+    fn open_entry(&mut self, at: usize, newest: ShownImage) -> Option<ShownImage> {
         let shown = self.past.get(at)?.shown.clone();
         self.open = Some((at, newest));
         Some(shown)
@@ -420,7 +420,7 @@ mod tests {
     use super::*;
     use crate::fixtures::uniform_picture;
     use crate::pipeline::settings::{CameraOverrides, ViewMode};
-    use crate::pipeline::{FileContentId, FileRead};
+    use crate::pipeline::{FileContentId, FilePathAndContentId};
     use crate::scene::fingerprint::FingerprintHasher;
     use crate::state::KeyOverrides;
 
@@ -538,7 +538,7 @@ mod tests {
 
     /// A preview of a finished or unfinished image, and the image's origin.
     fn of_image(generation: u64, name: &str, is_finished: bool) -> (ShownImage, ImageProvenance) {
-        let source = Some(PreviewSourceImage { image: FingerprintHasher::new(name).finish(), is_finished });
+        let source = Some(PreviewedImageState { image: FingerprintHasher::new(name).finish(), is_finished });
         // Make every preview different.
         let picture = uniform_picture(10, 10, [generation as u8, u8::from(is_finished), 0]);
         let origin = ImageProvenance { is_unfinished: !is_finished, ..ImageProvenance::default() };
@@ -763,9 +763,11 @@ mod tests {
 
     #[test]
     fn changed_files_are_listed_by_name() {
-        let file =
-            |name: &str, hash: u8| FileRead { path: name.into(), content: FileContentId::Hash([hash; 32]) };
-        let files = |bricks, knot| -> Arc<[FileRead]> {
+        let file = |name: &str, hash: u8| FilePathAndContentId {
+            path: name.into(),
+            content: FileContentId::Hash([hash; 32]),
+        };
+        let files = |bricks, knot| -> Arc<[FilePathAndContentId]> {
             [file("textures/bricks.png", bricks), file("knot.obj", knot)].into()
         };
         let mut history = RenderHistory::default();

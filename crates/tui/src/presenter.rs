@@ -25,7 +25,7 @@ use crate::pipeline::protocol::{PreviewSlot, PreviewUpdate};
 const FRAME: Duration = Duration::from_millis(50);
 
 /// Draws the state to the terminal.
-pub(super) struct Presenter {
+pub(super) struct FramePresenter {
     pub(super) display: Display,
     drawn: DrawnPreview,
     previews: PreviewSlot,
@@ -56,7 +56,7 @@ struct DrawnPreview {
     is_refined: bool,
 }
 
-impl Presenter {
+impl FramePresenter {
     pub(super) fn new(display: Display, previews: PreviewSlot, now: Instant) -> Self {
         Self {
             display,
@@ -77,7 +77,7 @@ impl Presenter {
         now: Instant,
     ) -> Option<Event> {
         let is_same_request =
-            generation == self.drawn.generation && !self.newest_preview_has_different_format(state);
+            generation == self.drawn.generation && !self.size_section_or_photons_differ(state);
         if is_same_request && self.pacing_advice(state, now) == PacingAdvice::Wait {
             self.drawn.is_old = true;
             return None;
@@ -86,7 +86,7 @@ impl Presenter {
     }
 
     /// Whether the newest preview differs from the drawn one in size, section or missing photons.
-    fn newest_preview_has_different_format(&self, state: &State) -> bool {
+    fn size_section_or_photons_differ(&self, state: &State) -> bool {
         let latest = self.previews.lock().unwrap_or_else(PoisonError::into_inner);
         let what = |picture: &Srgb8Image| (picture.width, picture.height);
         latest.as_ref().zip(state.picture.shown.as_ref()).is_some_and(|(new, old)| {
@@ -240,7 +240,11 @@ impl Presenter {
             .and_then(|at| self.pacing_inputs(state, now).next_due_time(at));
         let refine = self.can_refine_preview(state).then_some(now);
         let due = due.into_iter().chain(refine);
-        next_wake(state, self.next_frame).into_iter().chain(self.display.next_send_time(now)).chain(due).min()
+        next_frame_or_tick_time(state, self.next_frame)
+            .into_iter()
+            .chain(self.display.next_send_time(now))
+            .chain(due)
+            .min()
     }
 }
 
@@ -256,7 +260,7 @@ fn is_final_preview(state: &State) -> bool {
 }
 
 /// Time at which the state next needs a frame or a tick.
-fn next_wake(state: &State, next_frame: Instant) -> Option<Instant> {
+fn next_frame_or_tick_time(state: &State, next_frame: Instant) -> Option<Instant> {
     let frame = state.dirty.then_some(if state.urgent { state.now } else { next_frame });
     [frame, state.next_tick()].into_iter().flatten().min()
 }
@@ -271,10 +275,13 @@ mod tests {
         let now = Instant::now();
         let mut state = state(80, 24);
         state.dirty = true;
-        assert_eq!(next_wake(&state, now), Some(now));
+        assert_eq!(next_frame_or_tick_time(&state, now), Some(now));
         state.dirty = false;
-        assert!(next_wake(&state, now).is_some(), "expected a wakeup to update the elapsed time");
+        assert!(
+            next_frame_or_tick_time(&state, now).is_some(),
+            "expected a wakeup to update the elapsed time"
+        );
         state.work.activity = crate::state::RequestStatus::Done;
-        assert_eq!(next_wake(&state, now), None);
+        assert_eq!(next_frame_or_tick_time(&state, now), None);
     }
 }

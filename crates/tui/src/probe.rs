@@ -9,7 +9,7 @@ use nix::sys::termios::{FlushArg, SetArg, cfmakeraw, tcgetattr, tcsetattr};
 
 use super::color::{self, ColorDepth, ColorDepthChoice};
 use super::display::{ATTRIBUTES, STATUS, SYNCHRONIZED};
-use super::environment::{detect_terminal_environment, may_print_unknown_escapes};
+use super::environment::{may_print_unknown_escapes, terminal_environment_from_variables};
 use super::input::{DecodedInput, Decoder};
 use super::pixel_request::KITTY_QUERY;
 use super::terminal;
@@ -80,7 +80,7 @@ pub fn probe_terminal() -> Option<TerminalProbeResult> {
         return None;
     }
     let variable = |name: &str| std::env::var(name).ok();
-    let (window, link) = (terminal::query_window(None), detect_terminal_environment(variable));
+    let (window, link) = (terminal::query_window(None), terminal_environment_from_variables(variable));
     let questions = if may_print_unknown_escapes(variable) || link.is_multiplexed {
         Vec::new()
     } else {
@@ -131,7 +131,7 @@ fn query_and_read_replies(questions: &[u8]) -> io::Result<Option<ReportedTermina
     let round_trip = begin.elapsed();
     send(&[questions, ATTRIBUTES].concat())?;
     read_replies_until(&mut heard, Instant::now(), |heard| heard.has_received(TerminalReply::Attributes))?;
-    Ok(Some(ReportedTerminalFeatures { round_trip, ..heard.summarize() }))
+    Ok(Some(ReportedTerminalFeatures { round_trip, ..heard.to_reported_features() }))
 }
 
 fn send(bytes: &[u8]) -> io::Result<()> {
@@ -187,7 +187,7 @@ impl ReceivedReplies {
     }
 
     /// Summarizes the received replies.
-    fn summarize(&self) -> ReportedTerminalFeatures {
+    fn to_reported_features(&self) -> ReportedTerminalFeatures {
         let background = |answer: &TerminalReply| match answer {
             TerminalReply::Background(rgb) => Some(*rgb),
             TerminalReply::Ready
@@ -240,7 +240,7 @@ mod tests {
         let heard = replies_in(
             b"\x1b[0n\x1bP>|foot(1.20.2)\x1b\\\x1bP1+r524742=38\x1b\\\x1b[?2026;2$y\x1b]11;rgb:1c1c/1c1c/1c1c\x1b\\\x1b_Gi=4211;OK\x1b\\\x1b[?62;4;22c",
         );
-        let answers = heard.summarize();
+        let answers = heard.to_reported_features();
         assert_eq!(answers.name.as_deref(), Some("foot(1.20.2)"));
         assert_eq!(answers.background, Some([0x1c; 3]));
         assert!(answers.has_true_color && answers.has_kitty && answers.has_sixel && answers.is_synchronized);
@@ -251,7 +251,7 @@ mod tests {
     fn negative_replies_are_not_capabilities() {
         let refused =
             replies_in(b"\x1bP0+r524742\x1b\\\x1b[?2026;0$y\x1b_Gi=4211;ENOTSUPPORTED\x1b\\\x1b[?1;42c");
-        assert_eq!(refused.summarize(), ReportedTerminalFeatures::default());
+        assert_eq!(refused.to_reported_features(), ReportedTerminalFeatures::default());
         assert!(!replies_in(b"\x1b[?62;").has_received(TerminalReply::Attributes));
     }
 }

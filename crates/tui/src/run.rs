@@ -8,13 +8,13 @@ use std::time::{Duration, Instant};
 use super::color::{self, ColorDepth};
 use super::display::{Display, TerminalEnvironment};
 use super::editor;
-use super::environment::{detect_terminal_environment, select_terminal_queries};
+use super::environment::{select_terminal_queries, terminal_environment_from_variables};
 use super::event::FilePosition;
 use super::event::{Effect, Event, RequiredEventSource};
 use super::exit_summary;
 use super::input;
 use super::options::{ExitStatus, Options, TuiError, TuiOutcome};
-use super::presenter::Presenter;
+use super::presenter::FramePresenter;
 use super::preview_kind::PreviewKind;
 use super::signals::{self, SignalListener};
 use super::state::{InitialState, State};
@@ -40,7 +40,7 @@ pub fn run(options: Options) -> Result<TuiOutcome, TuiError> {
     crossterm::style::force_color_output(depth != ColorDepth::None);
 
     let (sender, events) = mpsc::channel();
-    let listener = SignalListener::start(&sender).map_err(terminal_error_for("handle signals for"))?;
+    let listener = SignalListener::start(&sender).map_err(terminal_error_mapper("handle signals for"))?;
     let variable = |name: &str| std::env::var(name).ok();
     let capabilities =
         TerminalId::from_environment(variable).map(TerminalId::capabilities).unwrap_or_default();
@@ -50,7 +50,7 @@ pub fn run(options: Options) -> Result<TuiOutcome, TuiError> {
     let screen = TerminalSession::open()?;
     let link = TerminalEnvironment {
         ask: select_terminal_queries(options.preview, options.color, depth, variable),
-        ..detect_terminal_environment(variable)
+        ..terminal_environment_from_variables(variable)
     };
     let setup = InitialState {
         scene: options.scene,
@@ -58,7 +58,7 @@ pub fn run(options: Options) -> Result<TuiOutcome, TuiError> {
         window: terminal::query_window(options.cell_aspect),
         preview: PreviewKind::initial(options.preview, depth, link.ask.pixels),
         depth,
-        is_light: color::has_light_background(variable),
+        is_light: color::colorfgbg_indicates_light_background(variable),
         ansi: *color::assumed_ansi_colors(&variable("TERM").unwrap_or_default()),
         ask: link.ask,
         capabilities,
@@ -66,26 +66,26 @@ pub fn run(options: Options) -> Result<TuiOutcome, TuiError> {
     };
     forward_channel("worker-events", options.events, &sender, Event::Worker, RequiredEventSource::Worker)?;
     forward_channel("news", options.news, &sender, Event::from_watcher, RequiredEventSource::Watcher)?;
-    input::start_reader(&sender).map_err(terminal_error_for("read keys from"))?;
-    writer::start_writer(&sender).map_err(terminal_error_for("write to"))?;
+    input::start_reader(&sender).map_err(terminal_error_mapper("read keys from"))?;
+    writer::start_writer(&sender).map_err(terminal_error_mapper("write to"))?;
 
     let now = Instant::now();
     let display = Display::new(depth, link, None, Box::new(writer::queue_slice), now);
     let ui = EventLoop {
         screen,
-        presenter: Presenter::new(display, options.previews, now),
+        presenter: FramePresenter::new(display, options.previews, now),
         events,
         postponed: VecDeque::new(),
         state: State::new(setup, now),
         commands: options.commands,
         cell_aspect: options.cell_aspect,
     };
-    let outcome = ui.run();
+    let outcome = ui.run_and_shut_down();
     drop(listener);
     outcome
 }
 
-fn terminal_error_for(action: &'static str) -> impl Fn(io::Error) -> TuiError {
+fn terminal_error_mapper(action: &'static str) -> impl Fn(io::Error) -> TuiError {
     move |source| TuiError::Terminal { action, source }
 }
 
@@ -106,13 +106,13 @@ fn forward_channel<T: Send + 'static>(
         }
         let _ = events.send(Event::Lost(source));
     };
-    spawn(name, pass).map_err(terminal_error_for("start a thread for"))?;
+    spawn(name, pass).map_err(terminal_error_mapper("start a thread for"))?;
     Ok(())
 }
 
 struct EventLoop {
     screen: TerminalSession,
-    presenter: Presenter,
+    presenter: FramePresenter,
     events: Receiver<Event>,
     /// Events that arrived while waiting for replies.
     postponed: VecDeque<Event>,
@@ -128,7 +128,7 @@ enum LoopEnd {
 }
 
 impl EventLoop {
-    fn run(mut self) -> Result<TuiOutcome, TuiError> {
+    fn run_and_shut_down(mut self) -> Result<TuiOutcome, TuiError> {
         let effects = request_first_render(&mut self.state);
         let mut end = self.perform_effects(effects);
         while end.is_none() {
@@ -149,7 +149,7 @@ impl EventLoop {
             }
             Some(LoopEnd::Error(error)) => return Err(error),
             Some(LoopEnd::Quit(status)) => {
-                self.leave_screen();
+                self.leave_screen_and_await_replies();
                 status
             }
             None => ExitStatus::QUIT,
@@ -169,7 +169,7 @@ impl EventLoop {
 
     /// Leaves the screen and waits briefly for pending replies, which the shell would otherwise read as typed
     /// text.
-    fn leave_screen(&mut self) {
+    fn leave_screen_and_await_replies(&mut self) {
         self.screen.leave_screen_in_raw_mode();
         let deadline =
             self.presenter.display.reply_wait_before_exit().map(|patience| Instant::now() + patience);
@@ -254,11 +254,11 @@ impl EventLoop {
             Effect::StopJob => {
                 return signals::stop_job()
                     .err()
-                    .map(terminal_error_for("stop the job of"))
+                    .map(terminal_error_mapper("stop the job of"))
                     .map(LoopEnd::Error);
             }
             Effect::Suspend if signals::has_shell() => {
-                self.leave_screen();
+                self.leave_screen_and_await_replies();
                 self.screen.restore_terminal_temporarily();
                 // The process stops here. After it continues, SIGCONT requests a redraw.
                 signals::stop_process();
@@ -280,7 +280,7 @@ impl EventLoop {
 
     /// Lets the editor use the terminal until it exits.
     fn run_editor(&mut self, place: &FilePosition) -> Option<LoopEnd> {
-        self.leave_screen();
+        self.leave_screen_and_await_replies();
         input::set_input_paused(true);
         self.screen.restore_terminal_temporarily();
         // Outside raw mode, keys send signals.

@@ -40,10 +40,14 @@ pub fn images_as_text(pictures: &[NamedImage], color: ColorDepthChoice, is_termi
     let variable = |name: &str| std::env::var(name).ok();
     let depth = color::resolve_depth(color, variable);
     let shades = ColorMapper::new(depth, color::assumed_ansi_colors(&variable("TERM").unwrap_or_default()));
-    let inks = PreviewColors { depth, shades: &shades, is_light: color::has_light_background(variable) };
+    let inks = PreviewColors {
+        depth,
+        shades: &shades,
+        is_light: color::colorfgbg_indicates_light_background(variable),
+    };
     let (size, aspect) =
         if is_terminal { window_size_and_aspect(&terminal::query_window(None)) } else { ((80, 24), 2.0) };
-    let buffers = draw_image_rows(pictures, inks, size, aspect);
+    let buffers = draw_images_beside_or_stacked(pictures, inks, size, aspect);
     buffers.iter().map(|buffer| buffer_to_text_lines(buffer, depth != ColorDepth::None)).collect()
 }
 
@@ -55,7 +59,7 @@ fn window_size_and_aspect(window: &WindowSize) -> ((u16, u16), f32) {
 }
 
 /// Draws the images in one or more rows.
-fn draw_image_rows(
+fn draw_images_beside_or_stacked(
     pictures: &[NamedImage],
     inks: PreviewColors<'_>,
     (across, down): (u16, u16),
@@ -103,7 +107,7 @@ mod tests {
         let named = |name: &str| NamedImage { name: name.to_owned(), picture: picture.clone() };
         let shades = ColorMapper::new(depth, &XTERM);
         let inks = PreviewColors { depth, shades: &shades, is_light: false };
-        let buffers = draw_image_rows(
+        let buffers = draw_images_beside_or_stacked(
             &["a.png", "b.png", "a difference image with a long name"].map(named),
             inks,
             size,

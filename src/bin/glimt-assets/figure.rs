@@ -1,7 +1,7 @@
 //! A bear made of balls and round cones with smooth joints, for `scenes/figure.toml`. It is 0.33 high and
 //! sits at the origin.
 
-use super::surface::Surface;
+use super::surface::PolygonMesh;
 use super::vector::{Vector, add, dot, mix, scale, subtract, unit};
 
 /// The lattice's corner, cell size, and number of cells along each axis.
@@ -29,11 +29,11 @@ const PARTS: [[(Vector, f64); 2]; 8] = [
 /// Extracts the zero level set of the distance field with surface nets (Gibson, *Constrained Elastic Surface
 /// Nets*, MICCAI 1998). Each cell that the surface crosses has one vertex, which is moved onto the surface.
 /// Each lattice edge that the surface crosses has one quad.
-pub(crate) fn bear() -> Surface {
+pub(crate) fn bear() -> PolygonMesh {
     let inside = inside_flags();
     let [nx, ny, nz] = CELLS;
     let corner = |[x, y, z]: [usize; 3]| inside[(x * (ny + 1) + y) * (nz + 1) + z];
-    let mut surface = Surface::default();
+    let mut surface = PolygonMesh::default();
     // Add a vertex in each cell that has corners on both sides of the surface.
     let mut vertices = vec![u32::MAX; nx * ny * nz];
     let cell = |[x, y, z]: [usize; 3]| (x * ny + y) * nz + z;

@@ -3,7 +3,7 @@
 use std::f64::consts::SQRT_2;
 
 use super::noise::{lattice_random, value_noise};
-use super::surface::Surface;
+use super::surface::PolygonMesh;
 use super::vector::{Vector, add, cross, dot, mix, scale, sin_cos_turns, smoothstep, subtract, unit};
 
 /// Width and height of the leaf texture.
@@ -59,8 +59,8 @@ fn leaf_texture_color(u: f64, v: f64) -> Vector {
 }
 
 /// Leaves around a ball. Each leaf is a square whose stalk starts at the ball.
-pub(crate) fn shrub() -> Surface {
-    let mut surface = Surface::default();
+pub(crate) fn shrub() -> PolygonMesh {
+    let mut surface = PolygonMesh::default();
     for number in 0..LEAVES {
         let chance = |place: i64| lattice_random([number, place, 0], 83);
         // Choose where on the ball the stalk starts, and the direction of the leaf.

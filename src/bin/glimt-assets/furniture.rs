@@ -2,11 +2,11 @@
 //! origin and faces +z.
 
 use super::parts::{ball, beveled_box, join, round_bar_along_path, solid_of_revolution, translate};
-use super::surface::Surface;
+use super::surface::PolygonMesh;
 use super::vector::{Vector, sin_cos_turns};
 
 /// All pieces and their file names.
-pub(crate) fn furniture_meshes() -> Vec<(&'static str, Surface)> {
+pub(crate) fn furniture_meshes() -> Vec<(&'static str, PolygonMesh)> {
     vec![
         ("furniture/cushion.ply", cushion()),
         ("furniture/armrest.ply", beveled_box([-0.1, 0.1, -0.42], [0.1, 0.62, 0.42], 0.045)),
@@ -36,13 +36,13 @@ pub(crate) fn furniture_meshes() -> Vec<(&'static str, Surface)> {
 }
 
 /// A 1 × 0.2 × 1 cushion, thinner toward its edges.
-fn cushion() -> Surface {
+fn cushion() -> PolygonMesh {
     let (rings, sides) = (9, 32);
     let outline = |ring: u32| {
         let (sin, cos) = sin_cos_turns(0.5 * f64::from(ring) / f64::from(rings - 1) - 0.25);
         (0.1 + 0.1 * sin.signum() * sin.abs().sqrt(), cos.max(0.0).sqrt())
     };
-    let mut surface = Surface::default();
+    let mut surface = PolygonMesh::default();
     for ring in 0..rings {
         let (height, reach) = outline(ring);
         let count = if ring == 0 || ring == rings - 1 { 1 } else { sides };
@@ -74,24 +74,24 @@ fn cushion() -> Surface {
     surface
 }
 
-fn foot() -> Surface {
+fn foot() -> PolygonMesh {
     solid_of_revolution(&[[0.0, 0.0], [0.018, 0.0], [0.018, 0.0], [0.03, 0.1], [0.0, 0.1]], 10)
 }
 
 /// A table leg of height 1, scaled by the scene.
-fn table_leg() -> Surface {
+fn table_leg() -> PolygonMesh {
     solid_of_revolution(&[[0.0, 0.0], [0.016, 0.0], [0.016, 0.0], [0.026, 1.0], [0.026, 1.0], [0.0, 1.0]], 12)
 }
 
 /// A round glass plate of radius 0.5 with a rounded edge.
-fn glass_plate() -> Surface {
+fn glass_plate() -> PolygonMesh {
     let outline =
         [[0.0, 0.0], [0.494, 0.0], [0.498, 0.002], [0.5, 0.006], [0.498, 0.01], [0.494, 0.012], [0.0, 0.012]];
     solid_of_revolution(&outline, 64)
 }
 
 /// A 1.2 by 2.0 shelf, 0.3 deep, with four boards between its sides.
-fn shelf() -> Surface {
+fn shelf() -> PolygonMesh {
     let side = |x: f64| beveled_box([x, 0.0, -0.15], [x + 0.03, 2.0, 0.15], 0.003);
     let boards = (0..5).map(|index| {
         let y = 0.06 + 0.47 * f64::from(index);
@@ -105,7 +105,7 @@ fn shelf() -> Surface {
 }
 
 /// The cover of a 1 by 1 by 1 book, scaled by the scene. The spine is at +z.
-fn book_cover() -> Surface {
+fn book_cover() -> PolygonMesh {
     join([
         beveled_box([-0.5, 0.0, -0.5], [-0.42, 1.0, 0.5], 0.01),
         beveled_box([0.42, 0.0, -0.5], [0.5, 1.0, 0.5], 0.01),
@@ -114,12 +114,12 @@ fn book_cover() -> Surface {
 }
 
 /// The pages inside a book's cover.
-fn book_pages() -> Surface {
+fn book_pages() -> PolygonMesh {
     beveled_box([-0.425, 0.01, -0.48], [0.425, 0.985, 0.445], 0.005)
 }
 
 /// A 0.44 by 0.92 by 0.46 wooden chair.
-fn chair() -> Surface {
+fn chair() -> PolygonMesh {
     let post = |x: f64| round_bar_along_path(&[[x, 0.0, -0.26], [x, 0.45, -0.2], [x, 0.92, -0.26]], 0.018, 8);
     let rung = |from: Vector, to: Vector| round_bar_along_path(&[from, to], 0.01, 6);
     let slat = |y: f64, z: f64| beveled_box([-0.2, y, z - 0.01], [0.2, y + 0.07, z + 0.01], 0.004);
@@ -139,7 +139,7 @@ fn chair() -> Surface {
 }
 
 /// The stand of a floor lamp, 1.5 high.
-fn floor_lamp_stand() -> Surface {
+fn floor_lamp_stand() -> PolygonMesh {
     let outline = [
         [0.0, 0.0],
         [0.14, 0.0],
@@ -154,7 +154,7 @@ fn floor_lamp_stand() -> Surface {
 }
 
 /// A conical lampshade, open at both ends, 0.26 high.
-fn lampshade() -> Surface {
+fn lampshade() -> PolygonMesh {
     let outline = [
         [0.22, 0.0],
         [0.22, 0.0],
@@ -170,7 +170,7 @@ fn lampshade() -> Surface {
 }
 
 /// A hollow glass decanter with a round belly, 0.27 high.
-fn decanter() -> Surface {
+fn decanter() -> PolygonMesh {
     let outside = [
         [0.0, 0.0],
         [0.07, 0.0],
@@ -202,14 +202,14 @@ fn decanter() -> Surface {
 }
 
 /// A drinking glass, 0.095 high.
-fn tumbler() -> Surface {
+fn tumbler() -> PolygonMesh {
     let outside = [[0.0, 0.0], [0.03, 0.0], [0.034, 0.004], [0.036, 0.02], [0.04, 0.092], [0.039, 0.095]];
     let inside = [[0.0375, 0.092], [0.0335, 0.024], [0.03, 0.016], [0.0, 0.014]];
     solid_of_revolution(&[&outside[..], &inside[..]].concat(), 32)
 }
 
 /// A wide bowl, 0.09 high.
-fn bowl() -> Surface {
+fn bowl() -> PolygonMesh {
     let outside =
         [[0.0, 0.0], [0.05, 0.0], [0.05, 0.0], [0.055, 0.01], [0.11, 0.04], [0.145, 0.085], [0.142, 0.09]];
     let inside = [[0.137, 0.085], [0.104, 0.044], [0.05, 0.018], [0.0, 0.014]];
@@ -217,7 +217,7 @@ fn bowl() -> Surface {
 }
 
 /// A flower pot with soil.
-fn flower_pot() -> Surface {
+fn flower_pot() -> PolygonMesh {
     let outline = [
         [0.0, 0.0],
         [0.12, 0.0],
@@ -234,14 +234,14 @@ fn flower_pot() -> Surface {
 }
 
 /// A two-sided leaf of length 1 along z, bent downward.
-fn plant_leaf() -> Surface {
+fn plant_leaf() -> PolygonMesh {
     let steps = 8;
     let place = |step: u32, across: f64| {
         let along = f64::from(step) / f64::from(steps);
         let half = 0.16 * (4.0 * along * (1.0 - along)).max(0.0).sqrt() * (1.0 - 0.35 * along);
         [half * across, 0.75 * along - 0.62 * along * along + 0.05 * across.abs(), along]
     };
-    let mut surface = Surface::default();
+    let mut surface = PolygonMesh::default();
     for step in 0..=steps {
         surface.positions.extend([-1.0, 0.0, 1.0].map(|across| place(step, across)));
     }
@@ -255,9 +255,9 @@ fn plant_leaf() -> Surface {
 }
 
 /// A pleated curtain, 0.5 wide and 1 high, in the plane z = 0.
-fn curtain() -> Surface {
+fn curtain() -> PolygonMesh {
     let columns = 48;
-    let mut surface = Surface::default();
+    let mut surface = PolygonMesh::default();
     for column in 0..=columns {
         let along = f64::from(column) / f64::from(columns);
         let (fold, _) = sin_cos_turns(6.0 * along);
@@ -276,7 +276,7 @@ fn curtain() -> Surface {
 }
 
 /// A 1.8 by 1.6 window frame with two bars, centered on its sill.
-fn window_frame() -> Surface {
+fn window_frame() -> PolygonMesh {
     let upright = |x: f64, half: f64| beveled_box([x - half, 0.0, -0.04], [x + half, 1.6, 0.04], 0.006);
     join([
         upright(-0.87, 0.03),
@@ -290,7 +290,7 @@ fn window_frame() -> Surface {
 }
 
 /// A 1 by 1 picture frame on a wall that faces +z.
-fn picture_frame() -> Surface {
+fn picture_frame() -> PolygonMesh {
     let (inside, outside) = (0.5, 0.55);
     join([
         beveled_box([-outside, -outside, 0.0], [outside, -inside, 0.03], 0.008),
@@ -301,7 +301,7 @@ fn picture_frame() -> Surface {
 }
 
 /// A 0.9 by 2.05 door with panels on both sides. The hinges are at the origin.
-fn door() -> Surface {
+fn door() -> PolygonMesh {
     let panel =
         |x: f64, y: f64, height: f64| beveled_box([x, y, -0.005], [x + 0.3, y + height, 0.045], 0.012);
     let knob = |z: f64| ball(2, [0.83, 1.02, z], 0.028);
@@ -318,7 +318,7 @@ fn door() -> Surface {
 }
 
 /// The door frame, for a wall 0.12 thick behind the origin.
-fn jamb() -> Surface {
+fn jamb() -> PolygonMesh {
     join([
         beveled_box([-0.09, 0.0, -0.14], [0.0, 2.06, 0.02], 0.006),
         beveled_box([0.9, 0.0, -0.14], [0.99, 2.06, 0.02], 0.006),
@@ -327,7 +327,7 @@ fn jamb() -> Surface {
 }
 
 /// A 1.0 by 2.0 bed without cushions. The head is at −z.
-fn bed() -> Surface {
+fn bed() -> PolygonMesh {
     let post = |x: f64, z: f64, height: f64| {
         beveled_box([x - 0.03, 0.0, z - 0.03], [x + 0.03, height, z + 0.03], 0.008)
     };

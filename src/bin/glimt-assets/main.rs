@@ -174,7 +174,7 @@ mod tests {
     }
 
     /// A vertex position as bits.
-    fn place(surface: &surface::Surface, vertex: u32) -> [u64; 3] {
+    fn place(surface: &surface::PolygonMesh, vertex: u32) -> [u64; 3] {
         surface.positions[vertex as usize].map(|coordinate| (coordinate + 0.0).to_bits())
     }
 

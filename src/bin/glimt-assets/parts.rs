@@ -2,12 +2,12 @@
 //! outward.
 
 use super::shapes::displaced_icosphere;
-use super::surface::Surface;
+use super::surface::PolygonMesh;
 use super::vector::{Vector, add, cross, dot, scale, sin_cos_turns, subtract, unit};
 
 /// Joins several solids into one surface.
-pub(crate) fn join(parts: impl IntoIterator<Item = Surface>) -> Surface {
-    let mut whole = Surface::default();
+pub(crate) fn join(parts: impl IntoIterator<Item = PolygonMesh>) -> PolygonMesh {
+    let mut whole = PolygonMesh::default();
     for part in parts {
         let base = whole.positions.len() as u32;
         whole.positions.extend(part.positions);
@@ -17,16 +17,16 @@ pub(crate) fn join(parts: impl IntoIterator<Item = Surface>) -> Surface {
 }
 
 /// Translates a surface.
-pub(crate) fn translate(surface: Surface, by: Vector) -> Surface {
+pub(crate) fn translate(surface: PolygonMesh, by: Vector) -> PolygonMesh {
     map_positions(surface, |position| add(position, by))
 }
 
-fn map_positions(surface: Surface, map: impl Fn(Vector) -> Vector) -> Surface {
-    Surface { positions: surface.positions.into_iter().map(map).collect(), ..surface }
+fn map_positions(surface: PolygonMesh, map: impl Fn(Vector) -> Vector) -> PolygonMesh {
+    PolygonMesh { positions: surface.positions.into_iter().map(map).collect(), ..surface }
 }
 
 /// A box between two corners with edges beveled by `edge`.
-pub(crate) fn beveled_box(from: Vector, to: Vector, edge: f64) -> Surface {
+pub(crate) fn beveled_box(from: Vector, to: Vector, edge: f64) -> PolygonMesh {
     let (middle, half) = (scale(add(from, to), 0.5), scale(subtract(to, from), 0.5));
     let sign = |corner: u32, axis: usize| if corner >> axis & 1 == 1 { 1.0 } else { -1.0 };
     // Use three vertices per corner, one for each adjacent side.
@@ -61,7 +61,7 @@ pub(crate) fn beveled_box(from: Vector, to: Vector, edge: f64) -> Surface {
 
 /// A hexahedron. `corners` contains the corners of its bottom face in order, then the corresponding corners
 /// of its top face.
-pub(crate) fn hexahedron(corners: [Vector; 8]) -> Surface {
+pub(crate) fn hexahedron(corners: [Vector; 8]) -> PolygonMesh {
     let middle = scale(corners.iter().fold([0.0; 3], |sum, &corner| add(sum, corner)), 0.125);
     let sides = [[0, 1, 2, 3], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]];
     // Each side has its own vertices because the edges are sharp.
@@ -71,20 +71,20 @@ pub(crate) fn hexahedron(corners: [Vector; 8]) -> Surface {
 }
 
 /// Creates a convex solid, flipping faces where necessary so that all of them face outward.
-fn orient_outward(positions: Vec<Vector>, mut faces: Vec<Vec<u32>>, middle: Vector) -> Surface {
+fn orient_outward(positions: Vec<Vector>, mut faces: Vec<Vec<u32>>, middle: Vector) -> PolygonMesh {
     for face in &mut faces {
         let [a, b, c] = [0, 1, 2].map(|corner| positions[face[corner] as usize]);
         if dot(cross(subtract(b, a), subtract(c, a)), subtract(a, middle)) < 0.0 {
             face.reverse();
         }
     }
-    Surface { positions, faces, ..Surface::default() }
+    PolygonMesh { positions, faces, ..PolygonMesh::default() }
 }
 
 /// A solid of revolution about y. `outline` contains radii and heights, from the foot along the outside to
 /// the top. Radius 0 is on the axis. Two equal points form a sharp edge.
-pub(crate) fn solid_of_revolution(outline: &[[f64; 2]], sides: u32) -> Surface {
-    let mut surface = Surface::default();
+pub(crate) fn solid_of_revolution(outline: &[[f64; 2]], sides: u32) -> PolygonMesh {
+    let mut surface = PolygonMesh::default();
     let mut below: Option<(u32, [f64; 2])> = None;
     for &[radius, height] in outline {
         let base = surface.positions.len() as u32;
@@ -109,8 +109,8 @@ pub(crate) fn solid_of_revolution(outline: &[[f64; 2]], sides: u32) -> Surface {
 }
 
 /// A round bar that follows a path, closed at both ends.
-pub(crate) fn round_bar_along_path(path: &[Vector], radius: f64, sides: u32) -> Surface {
-    let mut surface = Surface::default();
+pub(crate) fn round_bar_along_path(path: &[Vector], radius: f64, sides: u32) -> PolygonMesh {
+    let mut surface = PolygonMesh::default();
     let last = path.len() - 1;
     let tangent = |at: usize| unit(subtract(path[(at + 1).min(last)], path[at.saturating_sub(1)]));
     let first = tangent(0);
@@ -142,6 +142,6 @@ pub(crate) fn round_bar_along_path(path: &[Vector], radius: f64, sides: u32) -> 
 }
 
 /// A ball of 20 · 4^`times` triangles.
-pub(crate) fn ball(times: u32, center: Vector, radius: f64) -> Surface {
+pub(crate) fn ball(times: u32, center: Vector, radius: f64) -> PolygonMesh {
     translate(displaced_icosphere(times, |_| radius), center)
 }

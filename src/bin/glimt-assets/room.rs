@@ -39,7 +39,7 @@ impl ObjWriter {
     }
 
     /// Adds a box on the floor, rotated about y.
-    fn block(&mut self, center: [f64; 2], half: Vector, turns: f64) {
+    fn block_on_floor(&mut self, center: [f64; 2], half: Vector, turns: f64) {
         let (sin, cos) = sin_cos_turns(turns);
         let right = [cos, 0.0, -sin];
         let front = [sin, 0.0, cos];
@@ -72,11 +72,11 @@ pub(crate) fn obj() -> Vec<u8> {
     room.start_object("right_wall", "ochre");
     room.quad([x, 0.0, -z], [0.0, 0.0, depth], [0.0, height, 0.0], [1.0, 1.0]);
     room.start_object("plinth", "plaster");
-    room.block([-0.55, -0.45], [0.28, 0.62, 0.28], 0.06);
+    room.block_on_floor([-0.55, -0.45], [0.28, 0.62, 0.28], 0.06);
     room.start_object("chest", "lacquer");
-    room.block([0.5, -0.1], [0.36, 0.24, 0.28], -0.07);
+    room.block_on_floor([0.5, -0.1], [0.36, 0.24, 0.28], -0.07);
     room.start_object("step", "tiles");
-    room.block([0.5, -0.1], [0.5, 0.06, 0.42], -0.07);
+    room.block_on_floor([0.5, -0.1], [0.5, 0.06, 0.42], -0.07);
     room.start_object("lamp", "lamp");
     room.quad([-0.35, height - 0.02, -0.3], [0.7, 0.0, 0.0], [0.0, 0.0, 0.6], [1.0, 1.0]);
     room.text.into_bytes()

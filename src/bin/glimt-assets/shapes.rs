@@ -3,11 +3,11 @@
 use std::collections::HashMap;
 
 use super::noise::{fractal_noise, value_noise};
-use super::surface::{Surface, icosahedron, sphere_midpoint};
+use super::surface::{PolygonMesh, icosahedron, sphere_midpoint};
 use super::vector::{Vector, add, cross, dot, scale, sin_cos_turns, smoothstep, subtract, unit};
 
 /// A coral: a round lump with branching ridges and 81,920 triangles.
-pub(crate) fn coral() -> Surface {
+pub(crate) fn coral() -> PolygonMesh {
     displaced_icosphere(6, |direction| {
         let ridge = 1.0 - (2.0 * fractal_noise(scale(direction, 2.6), 3, 0, 7) - 1.0).abs();
         0.72 + 0.34 * smoothstep(0.62, 1.0, ridge) + 0.05 * fractal_noise(scale(direction, 14.0), 2, 0, 21)
@@ -15,7 +15,7 @@ pub(crate) fn coral() -> Surface {
 }
 
 /// A mountainous globe with 1,310,720 triangles.
-pub(crate) fn mountainous_globe() -> Surface {
+pub(crate) fn mountainous_globe() -> PolygonMesh {
     displaced_icosphere(8, |direction| {
         let height = fractal_noise(scale(direction, 2.0), 8, 0, 3);
         let crater = value_noise(scale(direction, 9.0), 0, 11);
@@ -24,17 +24,17 @@ pub(crate) fn mountainous_globe() -> Surface {
 }
 
 /// Three strands twisted along a knot: 36,864 triangles.
-pub(crate) fn trefoil_knot_rope() -> Surface {
-    let mut whole = Surface::default();
+pub(crate) fn trefoil_knot_rope() -> PolygonMesh {
+    let mut whole = PolygonMesh::default();
     for strand in 0..3 {
         let phase = f64::from(strand) / 3.0;
         let middle = |s: f64| {
-            let (center, normal, binormal) = knot_tube_frame(s, trefoil_point);
+            let (center, normal, binormal) = tube_center_normal_binormal(s, trefoil_point);
             let (sin, cos) = sin_cos_turns(phase + 22.0 * s);
             add(center, add(scale(normal, 0.085 * cos), scale(binormal, 0.085 * sin)))
         };
         let tube = weld_grid_seams(
-            Surface::grid(512, 12, [1.0, 1.0], |s, t| tube_point(s, t, 0.082, middle)),
+            PolygonMesh::grid(512, 12, [1.0, 1.0], |s, t| tube_point(s, t, 0.082, middle)),
             512,
             12,
         );
@@ -46,13 +46,13 @@ pub(crate) fn trefoil_knot_rope() -> Surface {
 }
 
 /// A tube along a trefoil knot. The texture repeats 24 times along the tube and twice around it.
-pub(crate) fn knot() -> Surface {
-    Surface::grid(224, 24, [24.0, 2.0], |s, t| tube_point(s, t, 0.24, trefoil_point))
+pub(crate) fn knot() -> PolygonMesh {
+    PolygonMesh::grid(224, 24, [24.0, 2.0], |s, t| tube_point(s, t, 0.24, trefoil_point))
 }
 
 /// A hollow vase, a surface of revolution about y, 1.6 high.
-pub(crate) fn vase() -> Surface {
-    Surface::grid(64, 64, [4.0, 4.0], |s, t| {
+pub(crate) fn vase() -> PolygonMesh {
+    PolygonMesh::grid(64, 64, [4.0, 4.0], |s, t| {
         let [radius, height] = vase_profile_point(t);
         let (sin, cos) = sin_cos_turns(s);
         [radius * cos, height, radius * sin]
@@ -95,7 +95,7 @@ fn vase_profile_point(t: f64) -> [f64; 2] {
 }
 
 /// A dodecahedron: the dual of the icosahedron, with a pentagon around each of its vertices.
-pub(crate) fn dodecahedron() -> Surface {
+pub(crate) fn dodecahedron() -> PolygonMesh {
     let (corners, triangles) = icosahedron();
     let center = |face: &[u32; 3]| {
         let [a, b, c] = face.map(|corner| corners[corner as usize]);
@@ -104,7 +104,7 @@ pub(crate) fn dodecahedron() -> Surface {
     let positions = triangles.iter().map(center).collect();
     let faces =
         (0..corners.len() as u32).map(|corner| incident_triangles_in_order(corner, &triangles)).collect();
-    Surface { positions, faces, ..Surface::default() }
+    PolygonMesh { positions, faces, ..PolygonMesh::default() }
 }
 
 /// The triangles around a corner, in order. The last edge of each triangle is the first edge of the next.
@@ -130,7 +130,7 @@ fn incident_triangles_in_order(corner: u32, triangles: &[[u32; 3]]) -> Vec<u32> 
 
 /// An icosahedron subdivided `times` times. `radius` returns a vertex's distance from the center, given its
 /// direction.
-pub(crate) fn displaced_icosphere(times: u32, radius: impl Fn(Vector) -> f64) -> Surface {
+pub(crate) fn displaced_icosphere(times: u32, radius: impl Fn(Vector) -> f64) -> PolygonMesh {
     let (mut corners, mut triangles) = icosahedron();
     for _ in 0..times {
         let mut middles = HashMap::new();
@@ -150,10 +150,10 @@ pub(crate) fn displaced_icosphere(times: u32, radius: impl Fn(Vector) -> f64) ->
         }
         triangles = finer;
     }
-    Surface {
+    PolygonMesh {
         positions: corners.into_iter().map(|direction| scale(direction, radius(direction))).collect(),
         faces: triangles.into_iter().map(|triangle| triangle.to_vec()).collect(),
-        ..Surface::default()
+        ..PolygonMesh::default()
     }
 }
 
@@ -168,7 +168,7 @@ fn trefoil_point(s: f64) -> Vector {
 
 /// A point on a closed curve, and two directions perpendicular to the curve that are periodic along it. The
 /// first points away from the circle that the knot winds around.
-fn knot_tube_frame(s: f64, curve: impl Fn(f64) -> Vector) -> (Vector, Vector, Vector) {
+fn tube_center_normal_binormal(s: f64, curve: impl Fn(f64) -> Vector) -> (Vector, Vector, Vector) {
     let center = curve(s);
     let tangent = unit(subtract(curve(s + 1e-4), curve(s - 1e-4)));
     let (sin, cos) = sin_cos_turns(2.0 * s);
@@ -179,21 +179,21 @@ fn knot_tube_frame(s: f64, curve: impl Fn(f64) -> Vector) -> (Vector, Vector, Ve
 
 /// A point on a tube of radius `radius` around a closed curve.
 fn tube_point(s: f64, t: f64, radius: f64, curve: impl Fn(f64) -> Vector) -> Vector {
-    let (center, normal, binormal) = knot_tube_frame(s, curve);
+    let (center, normal, binormal) = tube_center_normal_binormal(s, curve);
     let (sin, cos) = sin_cos_turns(t);
     add(center, add(scale(normal, radius * cos), scale(binormal, radius * sin)))
 }
 
 /// Closes a grid in both directions by merging its seam vertices.
-fn weld_grid_seams(grid: Surface, columns: u32, rows: u32) -> Surface {
+fn weld_grid_seams(grid: PolygonMesh, columns: u32, rows: u32) -> PolygonMesh {
     let welded = |vertex: u32| {
         let (column, row) = (vertex / (rows + 1), vertex % (rows + 1));
         (column % columns) * rows + row % rows
     };
     let kept = (0..columns).flat_map(|column| (0..rows).map(move |row| column * (rows + 1) + row));
-    Surface {
+    PolygonMesh {
         positions: kept.map(|vertex| grid.positions[vertex as usize]).collect(),
         faces: grid.faces.into_iter().map(|face| face.into_iter().map(welded).collect()).collect(),
-        ..Surface::default()
+        ..PolygonMesh::default()
     }
 }

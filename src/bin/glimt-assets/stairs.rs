@@ -4,7 +4,7 @@
 use super::parts::{
     ball, beveled_box, hexahedron, join, round_bar_along_path, solid_of_revolution, translate,
 };
-use super::surface::Surface;
+use super::surface::PolygonMesh;
 use super::vector::{Vector, add, sin_cos_turns};
 
 /// Height and depth of a step, and width of a flight.
@@ -23,7 +23,7 @@ const BACK_WALL: f64 = -2.2;
 const TREAD: f64 = 0.035;
 
 /// All parts and their file names.
-pub(crate) fn stair_meshes() -> Vec<(&'static str, Surface)> {
+pub(crate) fn stair_meshes() -> Vec<(&'static str, PolygonMesh)> {
     vec![
         ("stairs/tread.ply", tread()),
         ("stairs/flight1.ply", first_flight()),
@@ -46,12 +46,12 @@ pub(crate) fn stair_meshes() -> Vec<(&'static str, Surface)> {
 }
 
 /// A board whose nosing faces +z. One end extends past the open side of the flight.
-fn tread() -> Surface {
+fn tread() -> PolygonMesh {
     beveled_box([0.0, -TREAD, -GO], [WIDTH + 0.03, 0.0, 0.03], 0.008)
 }
 
 /// The steps up to the landing, and the landing itself, solid down to the floor.
-fn first_flight() -> Surface {
+fn first_flight() -> PolygonMesh {
     let step = |index: u32| {
         let (front, top) = (FOOT[2] - f64::from(index) * GO, f64::from(index + 1) * RISE - TREAD);
         sharp_block([LEFT_WALL, 0.0, front - GO], [FOOT[0], top, front])
@@ -61,7 +61,7 @@ fn first_flight() -> Surface {
 }
 
 /// The steps from the landing to the gallery, with a sloping soffit.
-fn second_flight() -> Surface {
+fn second_flight() -> PolygonMesh {
     let soffit = |x: f64| LANDING[1] - 0.14 + (x - LANDING[0]) * RISE / GO;
     join((0..9).map(|index| {
         let (from, to) = (LANDING[0] + f64::from(index) * GO, LANDING[0] + f64::from(index + 1) * GO);
@@ -83,7 +83,7 @@ fn second_flight() -> Surface {
 }
 
 /// The floor at the top, with a molding along its edge.
-fn gallery_floor() -> Surface {
+fn gallery_floor() -> PolygonMesh {
     let [x, y, z] = GALLERY;
     join([
         beveled_box([x, y - 0.25, BACK_WALL], [RIGHT_WALL, y, z], 0.004),
@@ -93,7 +93,7 @@ fn gallery_floor() -> Surface {
 }
 
 /// A block with sharp edges.
-fn sharp_block(from: Vector, to: Vector) -> Surface {
+fn sharp_block(from: Vector, to: Vector) -> PolygonMesh {
     let corner = |x: Vector, y: Vector, z: Vector| [x[0], y[1], z[2]];
     let floor = |y| [corner(from, y, from), corner(to, y, from), corner(to, y, to), corner(from, y, to)];
     let [a, b, c, d] = floor(from);
@@ -102,7 +102,7 @@ fn sharp_block(from: Vector, to: Vector) -> Surface {
 }
 
 /// A turned post of height 1.05, with its foot sunk into the tread.
-fn baluster() -> Surface {
+fn baluster() -> PolygonMesh {
     let outline = [
         [0.0, 0.0],
         [0.02, 0.0],
@@ -123,7 +123,7 @@ fn baluster() -> Surface {
 }
 
 /// A square newel post topped with a ball.
-fn newel() -> Surface {
+fn newel() -> PolygonMesh {
     join([
         beveled_box([-0.05, 0.0, -0.05], [0.05, 1.12, 0.05], 0.008),
         beveled_box([-0.065, 1.12, -0.065], [0.065, 1.16, 0.065], 0.012),
@@ -132,20 +132,20 @@ fn newel() -> Surface {
 }
 
 /// The handrail along the open side of a flight, above the nosings and slightly inside.
-fn rail(from: Vector, to: Vector) -> Surface {
+fn rail(from: Vector, to: Vector) -> PolygonMesh {
     let above = if from[0] == to[0] { [-0.05, 1.0, 0.0] } else { [0.0, 1.0, -0.05] };
     round_bar_along_path(&[add(from, above), add(to, above)], 0.032, 12)
 }
 
 /// A flame-shaped bulb, 0.1 high.
-fn candle_bulb() -> Surface {
+fn candle_bulb() -> PolygonMesh {
     let outline =
         [[0.0, 0.0], [0.012, 0.004], [0.02, 0.02], [0.022, 0.036], [0.016, 0.058], [0.007, 0.08], [0.0, 0.1]];
     solid_of_revolution(&outline, 8)
 }
 
 /// A thick-walled wall lamp, open at the top.
-fn wall_lamp() -> Surface {
+fn wall_lamp() -> PolygonMesh {
     let outer = [[0.0, -0.09], [0.05, -0.085], [0.09, -0.06], [0.12, -0.02], [0.135, 0.03], [0.135, 0.03]];
     let inner =
         [[0.128, 0.03], [0.128, 0.03], [0.113, -0.018], [0.085, -0.055], [0.047, -0.078], [0.0, -0.082]];
@@ -153,7 +153,7 @@ fn wall_lamp() -> Surface {
 }
 
 /// A conical lampshade, open at both ends.
-fn lampshade() -> Surface {
+fn lampshade() -> PolygonMesh {
     let outline = [
         [0.14, 0.0],
         [0.14, 0.0],
@@ -169,7 +169,7 @@ fn lampshade() -> Surface {
 }
 
 /// The foot of a table lamp.
-fn table_lamp_foot() -> Surface {
+fn table_lamp_foot() -> PolygonMesh {
     let outline = [
         [0.0, 0.0],
         [0.07, 0.0],
@@ -187,7 +187,7 @@ fn table_lamp_foot() -> Surface {
 }
 
 /// A chandelier: a ring of five arms under a rod, without bulbs.
-fn chandelier() -> Surface {
+fn chandelier() -> PolygonMesh {
     let rod = round_bar_along_path(&[[0.0, 0.0, 0.0], [0.0, 2.0, 0.0]], 0.012, 8);
     let hub = solid_of_revolution(
         &[[0.0, -0.08], [0.03, -0.06], [0.05, 0.0], [0.03, 0.06], [0.012, 0.1], [0.0, 0.1]],
@@ -213,7 +213,7 @@ fn chandelier() -> Surface {
 }
 
 /// A 0.9 by 2.05 door with four panels and a frame, on a wall that faces +z.
-fn door() -> Surface {
+fn door() -> PolygonMesh {
     let panel = |x: f64, y: f64, height: f64| beveled_box([x, y, 0.0], [x + 0.3, y + height, 0.035], 0.015);
     join([
         beveled_box([-0.45, 0.0, 0.0], [0.45, 2.05, 0.02], 0.004),
@@ -228,7 +228,7 @@ fn door() -> Surface {
 }
 
 /// A 1 by 1 picture frame on a wall that faces +z.
-fn picture_frame() -> Surface {
+fn picture_frame() -> PolygonMesh {
     let (inside, outside) = (0.5, 0.57);
     join([
         beveled_box([-outside, -outside, 0.0], [outside, -inside, 0.03], 0.01),
@@ -239,7 +239,7 @@ fn picture_frame() -> Surface {
 }
 
 /// A narrow 1.1 by 0.36 table, 0.78 high.
-fn console_table() -> Surface {
+fn console_table() -> PolygonMesh {
     let leg = |x: f64, z: f64| {
         let outline = [[0.0, 0.0], [0.015, 0.0], [0.02, 0.3], [0.024, 0.6], [0.024, 0.7], [0.0, 0.7]];
         translate(solid_of_revolution(&outline, 10), [x, 0.0, z])

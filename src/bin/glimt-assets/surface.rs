@@ -6,7 +6,7 @@ use super::vector::{Vector, cross, scale, subtract, unit};
 
 /// A polygon mesh. `normals` and `uvs` are empty or have one entry per position.
 #[derive(Default)]
-pub(crate) struct Surface {
+pub(crate) struct PolygonMesh {
     pub(crate) positions: Vec<Vector>,
     pub(crate) normals: Vec<Vector>,
     pub(crate) uvs: Vec<[f64; 2]>,
@@ -16,7 +16,7 @@ pub(crate) struct Surface {
 /// Finite-difference step for normals.
 const STEP: f64 = 1e-4;
 
-impl Surface {
+impl PolygonMesh {
     /// Creates `columns` × `rows` quads over s and t in [0, 1], with normals and the texture coordinates
     /// (1 − s, t) times `repeat`. The outside is along ∂t × ∂s.
     pub(crate) fn grid(
@@ -83,13 +83,13 @@ impl Surface {
     pub(crate) fn to_obj(&self, title: &str) -> Vec<u8> {
         let mut file = format!("# {title}. Made by glimt-assets.\n");
         for position in &self.positions {
-            write_line(&mut file, "v", position, 5);
+            write_keyword_and_numbers(&mut file, "v", position, 5);
         }
         for uv in &self.uvs {
-            write_line(&mut file, "vt", uv, 4);
+            write_keyword_and_numbers(&mut file, "vt", uv, 4);
         }
         for normal in &self.normals {
-            write_line(&mut file, "vn", normal, 4);
+            write_keyword_and_numbers(&mut file, "vn", normal, 4);
         }
         for face in &self.faces {
             file.push('f');
@@ -107,7 +107,7 @@ impl Surface {
         let mut file = format!("OFF\n# {title}. Made by glimt-assets.\n");
         let _ = writeln!(file, "{} {} 0", self.positions.len(), self.faces.len());
         for position in &self.positions {
-            write_line(&mut file, "", position, 7);
+            write_keyword_and_numbers(&mut file, "", position, 7);
         }
         for face in &self.faces {
             let corners: Vec<String> = face.iter().map(u32::to_string).collect();
@@ -117,7 +117,7 @@ impl Surface {
     }
 }
 
-fn write_line(file: &mut String, keyword: &str, numbers: &[f64], digits: usize) {
+fn write_keyword_and_numbers(file: &mut String, keyword: &str, numbers: &[f64], digits: usize) {
     // Add 0 after rounding to avoid `-0.00000`.
     let unit = 10_f64.powi(digits as i32);
     let words: Vec<String> =

@@ -4,7 +4,7 @@ use std::f64::consts::{PI, TAU};
 
 use glimt::geometry::Ray;
 use glimt::geometry::mesh::TriangleMesh;
-use glimt::lights::LightSamplingPurpose;
+use glimt::lights::LightSamplingIntegrator;
 use glimt::materials::TexturePoint;
 use glimt::math::{DVec3, Vec2, Vec3};
 use glimt::scene::description::{EmissionSource, Integrator, Material, Shape, TextureFilter, Wrap};
@@ -103,7 +103,9 @@ fn by_directions(build: &Build) -> f64 {
             let surface = world.geometry.surface(&ray, &hit);
             if surface.normal.dot(ray.direction) < 0.0 {
                 let emission = &world.materials[world.material_index(&hit)].emission;
-                sum += f64::from(emission.radiance(&TexturePoint::from_uv(surface.uv), 1.0, &mut 0).x);
+                sum += f64::from(
+                    emission.radiance_of_emitting_side(&TexturePoint::from_uv(surface.uv), 1.0, &mut 0).x,
+                );
             }
         }
     }
@@ -198,7 +200,7 @@ fn sampled_lights_keep_their_textures() {
             }
         }
     }
-    assert!(build.world().lights.sampler_for_purpose(LightSamplingPurpose::Eye).is_some());
+    assert!(build.world().lights.sampler_for_integrator(LightSamplingIntegrator::Eye).is_some());
     for (name, build) in [("whitted", build.clone()), ("path", by_paths(&build))] {
         assert_irradiance(name, &build, expected);
     }

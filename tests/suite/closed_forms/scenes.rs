@@ -21,8 +21,8 @@ use glimt::scene::description::{
     Tonemap, UvSet, Wrap,
 };
 use glimt::world::{
-    Geometry, Image, MeshTree, NeededTextureRoles, World, WorldInputs, build_environment_map, build_lights,
-    choose_origin_near_camera_target, separate_coincident_emitters, textures_needed,
+    Geometry, Image, MeshTree, TextureRolesNeededByRender, World, WorldInputs, build_environment_map,
+    build_lights, choose_origin_near_camera_target, separate_coincident_emitters, textures_needed,
 };
 
 use super::v;
@@ -232,7 +232,7 @@ impl Build {
 
     pub fn world(&self) -> World {
         let mut parts = self.parts.clone();
-        for needed in textures_needed(&self.scene, &[], NeededTextureRoles::ALL) {
+        for needed in textures_needed(&self.scene, &[], TextureRolesNeededByRender::ALL) {
             let texels = match needed.declared {
                 Some(number) => &self.texels[number],
                 None => self.sky.as_ref().expect("an environment map"),

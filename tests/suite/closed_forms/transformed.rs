@@ -43,7 +43,7 @@ fn shapes() -> Vec<Shape> {
 
 fn is_closed(shape: &Shape) -> bool {
     let is_flat = matches!(shape, Shape::Quad { .. } | Shape::Triangle { .. });
-    !is_flat && shape.as_open_surface().is_none()
+    !is_flat && shape.untransformed_open_surface().is_none()
 }
 
 /// The scene with a mesh under a map.

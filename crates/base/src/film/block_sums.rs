@@ -8,7 +8,7 @@ use crate::system::memory::try_reserve_exact;
 
 impl Tile {
     /// Moves a pixel's running sum to its block sum if the block is complete.
-    pub(super) fn close_block_if_complete(&mut self, pixel: usize, blocks: SumOrder) {
+    pub(super) fn close_pixel_block_if_complete(&mut self, pixel: usize, blocks: SumOrder) {
         let Some(block) = blocks.block_ending_at(self.counts[pixel]) else { return };
         let put = |earlier: &mut [Vec<DVec3>], sums: &mut [DVec3]| {
             if let Some(block) = earlier.get_mut(block) {
@@ -28,7 +28,7 @@ impl Film {
     /// # Errors
     /// [`FilmCreationError::Memory`] if there is not enough memory for the block sums.
     pub fn with_sum_order(mut self, blocks: SumOrder) -> Result<Self, FilmCreationError> {
-        let (crop, kept) = (self.crop_rect(), blocks.kept_block_count());
+        let (crop, kept) = (self.crop_rect(), blocks.block_sums_per_pixel());
         let more = crop.area() as u64 * (kept * size_of::<DVec3>()) as u64;
         let (width, height, bytes) = (self.width(), self.height(), self.memory_bytes() + more);
         let lacks = || FilmCreationError::Memory { width, height, bytes, crop_helps: true };
@@ -52,7 +52,7 @@ impl Film {
     /// Bytes of memory for the sums of a crop in this summation order, and bytes for the full-size finished
     /// image.
     pub fn crop_sum_and_image_bytes((width, height): (u32, u32), crop: Rect, blocks: SumOrder) -> (u64, u64) {
-        let more = crop.area() as u64 * (blocks.kept_block_count() * size_of::<DVec3>()) as u64;
+        let more = crop.area() as u64 * (blocks.block_sums_per_pixel() * size_of::<DVec3>()) as u64;
         let picture = film_and_image_bytes(width, height, Rect { width: 0, height: 0, ..crop });
         (film_and_image_bytes(width, height, crop) - picture + more, picture)
     }

@@ -137,7 +137,7 @@ impl SquaredMeanChanges {
 
     /// Records the luminance of a pixel in the specified cell and half, at a sample count determined by
     /// [`SquaredMeanChanges::samples_to_next_record`].
-    pub(super) fn record_pixel_luminance(
+    pub(super) fn record_luminance_at_count(
         &mut self,
         (pixel, cell, half): (usize, usize, usize),
         count: u32,
@@ -301,7 +301,11 @@ impl ConvergenceModel {
 
     /// Factor by which doubling the samples to 2^`level` reduced the variance in the specified halves of a
     /// tile.
-    fn clamped_measured_reduction(steps: &SquaredMeanChanges, level: usize, halves: &[usize]) -> f64 {
+    fn clamped_doubling_variance_reduction(
+        steps: &SquaredMeanChanges,
+        level: usize,
+        halves: &[usize],
+    ) -> f64 {
         steps
             .measured_variance_reduction(level, halves)
             .map_or(INDEPENDENT_RATE, |fall| fall.clamp(INDEPENDENT_RATE, MOST_FALL))
@@ -315,7 +319,7 @@ impl ConvergenceModel {
         halves: &[usize],
     ) -> f64 {
         predict_doubling_variance_reduction(
-            Self::clamped_measured_reduction(steps, level, halves),
+            Self::clamped_doubling_variance_reduction(steps, level, halves),
             steps.reduction_confidence(level, halves),
         )
     }
@@ -327,7 +331,7 @@ impl ConvergenceModel {
     /// the last step with a prediction from the two previous steps, because each step is noisy. However,
     /// base-2 sequences are best stratified at powers of 4, so every other doubling gains more. The second
     /// prediction is therefore based on quadrupled sample counts.
-    pub(super) fn predict_half_cell_variance(
+    pub(super) fn pixel_variance_sum_and_rate(
         steps: &SquaredMeanChanges,
         (cell, half): (usize, usize),
         count: u32,
@@ -335,7 +339,7 @@ impl ConvergenceModel {
     ) -> Option<(f64, f64)> {
         let level = count.checked_ilog2()? as usize;
         let StepPair { last, before } = steps.squared_step_pair_at_level(level, (cell, half), is_relative)?;
-        let fall = Self::clamped_measured_reduction(steps, level, &[half]);
+        let fall = Self::clamped_doubling_variance_reduction(steps, level, &[half]);
         let step = before.map_or(last, |before| (last + 2.0 * before / fall) / 3.0);
         let rate = predict_doubling_variance_reduction(fall, steps.reduction_confidence(level, &[half]));
         let by_two = variance_from_squared_step(step, count, rate);

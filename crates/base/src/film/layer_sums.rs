@@ -23,14 +23,19 @@ impl LayerSums {
     /// Adds consecutive samples to a pixel. `layers` contains the index of each layer with its sample values.
     /// `is_negative` contains one flag per sample if the filter has negative lobes. Non-finite values are
     /// treated as black.
-    pub fn add(&mut self, pixel: usize, layers: &[(usize, &[Vec3])], is_negative: Option<&[bool]>) {
+    pub fn add_pixel_samples(
+        &mut self,
+        pixel: usize,
+        layers: &[(usize, &[Vec3])],
+        is_negative: Option<&[bool]>,
+    ) {
         let first = pixel * self.count;
         let Some(is_negative) = is_negative else {
             let sums = &mut self.sums[first..first + self.count];
             // Add four layers at a time, because the additions to one sum depend on each other.
             let (groups, rest) = layers.as_chunks::<4>();
             for group in groups {
-                add_four_layers(sums, group);
+                add_samples_to_four_layers(sums, group);
             }
             for (layer, values) in rest {
                 add_finite_and_count_non_finite(&mut sums[*layer], values);
@@ -72,7 +77,7 @@ impl LayerSums {
 }
 
 /// Adds the samples of four layers at once, with the same result as adding each layer separately.
-fn add_four_layers(sums: &mut [DVec3], layers: &[(usize, &[Vec3]); 4]) {
+fn add_samples_to_four_layers(sums: &mut [DVec3], layers: &[(usize, &[Vec3]); 4]) {
     let mut all = layers.map(|(layer, _)| sums[layer]);
     let [a, b, c, d] = layers.map(|(_, values)| values);
     for (((a, b), c), d) in a.iter().zip(b).zip(c).zip(d) {
@@ -98,7 +103,7 @@ mod tests {
     fn non_finite_layer_values_are_black() {
         let values = [Vec3::new(f32::NAN, 1.0, 1.0), Vec3::ONE, Vec3::ONE];
         let mut sums = LayerSums::zero(2, 2);
-        sums.add(1, &[(0, &values)], None);
+        sums.add_pixel_samples(1, &[(0, &values)], None);
         assert_eq!(sums.sums, [DVec3::ZERO, DVec3::ZERO, DVec3::splat(2.0), DVec3::ZERO]);
     }
 
@@ -111,8 +116,8 @@ mod tests {
         let (mut together, mut separate) = (LayerSums::zero(5, 1), LayerSums::zero(5, 1));
         let layers: Vec<(usize, &[Vec3])> = lists.iter().map(Vec::as_slice).enumerate().collect();
         for _ in 0..2 {
-            together.add(0, &layers, None);
-            layers.iter().for_each(|layer| separate.add(0, &[*layer], None));
+            together.add_pixel_samples(0, &layers, None);
+            layers.iter().for_each(|layer| separate.add_pixel_samples(0, &[*layer], None));
         }
         assert_eq!(together, separate);
     }

@@ -98,7 +98,7 @@ mod tests {
         let mut layers = film.layer_sums(tile, pixels);
         for (pixel, (values, signs)) in radiance.chunks(5).zip(is_negative.chunks(5)).enumerate() {
             let double: Vec<Vec3> = values.iter().map(|value| value * 2.0).collect();
-            layers.add(pixel, &[(0, values), (1, &double)], is_signed.then_some(signs));
+            layers.add_pixel_samples(pixel, &[(0, values), (1, &double)], is_signed.then_some(signs));
         }
         let negative = is_signed.then_some(NegativeLobeMask { weight: 0.1, is_negative });
         TileSamples { pixels, samples: 5, radiance, negative, layers }

@@ -130,7 +130,7 @@ impl Film {
             pixels += 1;
         }
         let pixels = Some(f64::from(pixels)).filter(|pixels| *pixels > 0.0)?;
-        let (variance, rate) = ConvergenceModel::predict_half_cell_variance(
+        let (variance, rate) = ConvergenceModel::pixel_variance_sum_and_rate(
             &tile.steps,
             (number % CELLS, half),
             samples,
@@ -146,7 +146,7 @@ impl Film {
 
     /// Factor by which the last doubling reduced a tile's variance, measured in the half-cells that have
     /// completed that doubling, or `None` if there are not enough steps.
-    pub fn last_variance_reduction_in_tile(&self, tile: usize) -> Option<f64> {
+    pub fn last_doubling_variance_reduction(&self, tile: usize) -> Option<f64> {
         let tile = self.lock_tile(tile);
         tile.steps.measured_variance_reduction(tile.steps.level_count(), &[0, 1])
     }
@@ -181,11 +181,16 @@ impl Film {
     /// convergence exponent. `count` must be a power of two. The error is luminance variance / (luminance² +
     /// [`RELMSE_EPSILON`](crate::math::color::RELMSE_EPSILON)), averaged over the pixels. Returns `None` if
     /// `count` is less than two or exceeds the pixels' sample count, or if the half has no pixels.
-    pub fn half_cell_relative_mse(&self, number: usize, half: usize, count: u32) -> Option<(f64, f64)> {
+    pub fn cell_half_relmse_and_exponent(
+        &self,
+        number: usize,
+        half: usize,
+        count: u32,
+    ) -> Option<(f64, f64)> {
         let tile = self.lock_tile(number / CELLS);
         let pixels = self.cell_half_pixel_count(number, half);
         let (sum, rate) =
-            ConvergenceModel::predict_half_cell_variance(&tile.steps, (number % CELLS, half), count, true)?;
+            ConvergenceModel::pixel_variance_sum_and_rate(&tile.steps, (number % CELLS, half), count, true)?;
         (pixels > 0).then(|| (sum / pixels as f64, libm::log2(rate)))
     }
 
@@ -268,9 +273,9 @@ mod tests {
     fn halves_with_fewer_samples_are_ignored() {
         // Two pixels in different halves: one with steps of 1 and 0.5, the other with a single step of 3.
         let film = film(&[&[1.0, 3.0, 2.0, 4.0], &[1.0, 7.0]]);
-        assert_eq!(film.last_variance_reduction_in_tile(0), Some(4.0));
+        assert_eq!(film.last_doubling_variance_reduction(0), Some(4.0));
         assert_eq!(
-            self::film(&[&[1.0, 3.0], &[1.0, 7.0]]).last_variance_reduction_in_tile(0),
+            self::film(&[&[1.0, 3.0], &[1.0, 7.0]]).last_doubling_variance_reduction(0),
             None,
             "one step"
         );

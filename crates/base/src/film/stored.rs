@@ -135,7 +135,7 @@ impl Film {
     pub fn restore_tile(&self, tile: usize, stored: StoredTile) -> Result<(), MalformedTile> {
         let area = self.tile_rect(tile).ok_or(MalformedTile)?.area();
         let Tile { sums, earlier, counts, negative, steps, layers, .. } = stored.tile;
-        let blocks = self.sum_order().kept_block_count();
+        let blocks = self.sum_order().block_sums_per_pixel();
         if sums.len() != area || earlier.len() != blocks || layers.count != self.layers {
             return Err(MalformedTile);
         }

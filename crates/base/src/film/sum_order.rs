@@ -20,7 +20,7 @@ pub enum SumOrder {
 
 impl SumOrder {
     /// Number of finished block sums kept per pixel.
-    pub fn kept_block_count(self) -> usize {
+    pub fn block_sums_per_pixel(self) -> usize {
         match self {
             Self::Sequential => 0,
             Self::Blocked => 1,

@@ -211,10 +211,14 @@ impl Tile {
             if part.len() == to_note
                 && let Some(mean) = self.mean(index)
             {
-                self.steps.record_pixel_luminance((index, cell, half), self.counts[index], luminance(mean));
+                self.steps.record_luminance_at_count(
+                    (index, cell, half),
+                    self.counts[index],
+                    luminance(mean),
+                );
             }
             if blocks != SumOrder::Sequential {
-                self.close_block_if_complete(index, blocks);
+                self.close_pixel_block_if_complete(index, blocks);
             }
         }
         non_finite
@@ -332,7 +336,7 @@ impl Film {
     /// Bytes used by the sums.
     pub fn memory_bytes(&self) -> u64 {
         let tile = size_of::<Mutex<Tile>>() + size_of::<usize>();
-        let pixel = SUM_BYTES + (self.blocks.kept_block_count() + self.layers) * size_of::<DVec3>();
+        let pixel = SUM_BYTES + (self.blocks.block_sums_per_pixel() + self.layers) * size_of::<DVec3>();
         (self.crop.area() * pixel + self.tiles.len() * tile) as u64
     }
 

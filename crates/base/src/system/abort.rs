@@ -16,7 +16,7 @@ use nix::unistd::{pause, write};
 use signal_hook::consts::SIGABRT;
 use signal_hook::low_level;
 
-use super::memory::is_allocation_failure_handled;
+use super::memory::caller_handles_allocation_failure;
 
 /// Function that restores the terminal and makes only async-signal-safe calls.
 static RESTORE_TERMINAL: OnceLock<fn()> = OnceLock::new();
@@ -32,7 +32,7 @@ pub struct AbortingAllocator;
 /// Ends the process if the allocation failed and its caller does not handle the failure.
 #[inline(always)]
 fn check_allocation(memory: *mut u8, bytes: usize) -> *mut u8 {
-    if memory.is_null() && !is_allocation_failure_handled() {
+    if memory.is_null() && !caller_handles_allocation_failure() {
         abort_out_of_memory(bytes);
     }
     memory

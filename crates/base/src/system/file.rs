@@ -105,7 +105,7 @@ pub fn is_lfs_pointer(bytes: &[u8]) -> bool {
 
 /// Returns the reason not to replace this file, or `None` if it may be replaced. Read-only files are not
 /// replaced, even by root.
-pub fn reason_not_to_replace(metadata: &Metadata) -> Option<&'static str> {
+pub fn hard_linked_or_readonly_reason(metadata: &Metadata) -> Option<&'static str> {
     match () {
         () if metadata.nlink() > 1 => Some("has other hard links, which would keep the old text"),
         () if metadata.permissions().readonly() => Some("is read-only"),

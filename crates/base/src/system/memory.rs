@@ -13,7 +13,7 @@ thread_local! {
 }
 
 /// Whether the caller of the current allocation handles its failure.
-pub(super) fn is_allocation_failure_handled() -> bool {
+pub(super) fn caller_handles_allocation_failure() -> bool {
     MAY_FAIL.get()
 }
 
@@ -79,7 +79,7 @@ pub struct MemoryLimit {
 }
 
 /// Lowest memory limit set by `ulimit -v` or a control group, or `None` if memory is unlimited.
-pub fn memory_limit() -> Option<MemoryLimit> {
+pub fn ulimit_or_cgroup_limit() -> Option<MemoryLimit> {
     let of_space =
         getrlimit(Resource::RLIMIT_AS).ok().map(|(bytes, _)| bytes).filter(|bytes| *bytes < RLIM_INFINITY);
     let of_space = of_space.map(|bytes| MemoryLimit { bytes, setting: "`ulimit -v`".to_owned() });
@@ -146,7 +146,7 @@ mod tests {
     fn only_fallible_reservations_may_fail() {
         let mut bytes = Vec::<u8>::new();
         assert!(try_reserve_exact(&mut bytes, isize::MAX as usize).is_err());
-        assert!(!is_allocation_failure_handled());
+        assert!(!caller_handles_allocation_failure());
         assert!(try_reserve_exact(&mut bytes, 100).is_ok() && bytes.capacity() >= 100);
     }
 

@@ -33,7 +33,7 @@ pub fn logical_cpu_count() -> usize {
 ///
 /// # Errors
 /// Returns the message from [`describe_start_failure`].
-pub fn core_pool() -> std::result::Result<ThreadPool, String> {
+pub fn logical_cpu_pool() -> std::result::Result<ThreadPool, String> {
     let threads = logical_cpu_count();
     let failed = |error: &dyn Display| describe_start_failure(threads, false, &error);
     check_thread_stack_memory(threads).map_err(|error| failed(&error))?;

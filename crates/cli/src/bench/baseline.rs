@@ -1,6 +1,6 @@
 //! Compares results with a baseline and tests the differences for significance.
 
-use super::results::{MethodResult, Results, StepResult};
+use super::results::{MethodAnalysis, Results, StepResult};
 use super::statistics::{student_t_tail, student_t_upper_quantile, welch_difference};
 
 /// Family-wise false positive rate for the whole table.
@@ -8,7 +8,7 @@ const FALSE_POSITIVE_RATE: f64 = 0.01;
 
 /// Change in a method's time or error on a scene.
 #[derive(Clone, Debug, PartialEq)]
-pub struct MethodChange {
+pub struct MethodQuantityChange {
     /// Name of the scene.
     pub scene: String,
     /// Name of the method.
@@ -36,7 +36,7 @@ pub enum Quantity {
 
 /// Compares the scenes, methods and steps that occur in both runs. Matches scenes by name and size, methods
 /// by name, and steps by sample count or time budget.
-pub fn compare_runs(then: &Results, now: &Results) -> Vec<MethodChange> {
+pub fn compare_runs(then: &Results, now: &Results) -> Vec<MethodQuantityChange> {
     let mut changes = Vec::new();
     for scene in &now.scenes {
         let is_same = |other: &&super::SceneResult| {
@@ -57,13 +57,13 @@ pub fn compare_runs(then: &Results, now: &Results) -> Vec<MethodChange> {
 
 fn method_change(
     scene: &str,
-    then: &MethodResult,
-    now: &MethodResult,
+    then: &MethodAnalysis,
+    now: &MethodAnalysis,
     quantity: Quantity,
-) -> Option<MethodChange> {
+) -> Option<MethodQuantityChange> {
     let pairs = now.steps.iter().filter_map(|step| Some((matching_step(step, &then.steps)?, step)));
     let differences: Vec<(f64, f64, f64)> =
-        pairs.filter_map(|(old, new)| estimate_log_difference(old, new, quantity)).collect();
+        pairs.filter_map(|(old, new)| log_difference_and_standard_error(old, new, quantity)).collect();
     let count = differences.len() as f64;
     let mean = differences.iter().map(|(difference, ..)| difference).sum::<f64>() / count;
     let variances = || differences.iter().map(|(_, error, freedom)| (error * error, freedom));
@@ -77,7 +77,7 @@ fn method_change(
         (false, false) => 0.0,
     };
     let reach = student_t_upper_quantile(0.025, freedom) * error;
-    (count > 0.0).then(|| MethodChange {
+    (count > 0.0).then(|| MethodQuantityChange {
         scene: scene.to_owned(),
         method: now.name.clone(),
         quantity,
@@ -98,7 +98,7 @@ fn matching_step<'a>(step: &StepResult, then: &'a [StepResult]) -> Option<&'a St
 
 /// Difference between two steps' mean log times or mean log errors, with its standard error and degrees of
 /// freedom, or `None` if a step has fewer than two positive values.
-fn estimate_log_difference(
+fn log_difference_and_standard_error(
     then: &StepResult,
     now: &StepResult,
     quantity: Quantity,
@@ -119,7 +119,7 @@ fn estimate_log_difference(
 }
 
 /// Formats the comparison as lines.
-pub fn format_changes(changes: &[MethodChange], name: &str) -> Vec<String> {
+pub fn format_changes(changes: &[MethodQuantityChange], name: &str) -> Vec<String> {
     if changes.is_empty() {
         return vec![format!("{name} shares no combination of scene, size, method and step with this run")];
     }
@@ -132,8 +132,8 @@ pub fn format_changes(changes: &[MethodChange], name: &str) -> Vec<String> {
     lines
 }
 
-fn format_change(change: &MethodChange) -> String {
-    let MethodChange { scene, method, factor, interval: [low, high], .. } = change;
+fn format_change(change: &MethodQuantityChange) -> String {
+    let MethodQuantityChange { scene, method, factor, interval: [low, high], .. } = change;
     let quantity = match change.quantity {
         Quantity::Seconds => "time",
         Quantity::Error => "error",

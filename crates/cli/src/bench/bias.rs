@@ -7,7 +7,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::statistics::{student_t_tail, student_t_upper_quantile};
-use crate::compare::ReferencePair;
+use crate::compare::IndependentReferences;
 use crate::film::RadianceImage;
 
 /// Significance level of the test for bias.
@@ -37,7 +37,7 @@ impl SquaredBias {
 
 /// Estimates the squared bias from images with different seeds, or returns `None` if there are fewer than
 /// [`MIN_SEEDS`].
-pub fn estimate_bias(references: &ReferencePair, pictures: &[RadianceImage]) -> Option<SquaredBias> {
+pub fn estimate_bias(references: &IndependentReferences, pictures: &[RadianceImage]) -> Option<SquaredBias> {
     if pictures.len() < MIN_SEEDS {
         return None;
     }
@@ -64,7 +64,7 @@ struct PairwiseErrorProducts {
 }
 
 impl PairwiseErrorProducts {
-    fn from_images(references: &ReferencePair, pictures: &[RadianceImage]) -> Self {
+    fn from_images(references: &IndependentReferences, pictures: &[RadianceImage]) -> Self {
         let count = pictures.len();
         let pairs = (0..count).flat_map(|i| (i + 1..count).map(move |j| (i, j)));
         let products = pairs
@@ -149,7 +149,7 @@ mod tests {
         fn found(&mut self, seeds: usize, offset: f32, block: u32) -> SquaredBias {
             let names = [Path::new("r1"), Path::new("r2")];
             let pair = Pair::new(names, self.picture(0.02, 0.0, 1), self.picture(0.02, 0.0, 1));
-            let references = ReferencePair::new(pair.expect("a pair"));
+            let references = IndependentReferences::new(pair.expect("a pair"));
             let pictures: Vec<_> = (0..seeds).map(|_| self.picture(0.2, offset, block)).collect();
             estimate_bias(&references, &pictures).expect("enough seeds")
         }
@@ -206,7 +206,7 @@ mod tests {
             noise.picture(0.0, 0.0, 1),
             noise.picture(0.0, 0.0, 1),
         );
-        let references = ReferencePair::new(pair.expect("a pair"));
+        let references = IndependentReferences::new(pair.expect("a pair"));
         let of =
             |picture: RadianceImage| estimate_bias(&references, &vec![picture; 3]).expect("enough seeds");
         assert!(!of(noise.picture(0.0, 0.0, 1)).is_significant());

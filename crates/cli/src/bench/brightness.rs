@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::bias::{FALSE_POSITIVE_RATE, MIN_SEEDS};
 use super::statistics::{mean_and_standard_error, student_t_tail};
-use crate::compare::ReferencePair;
+use crate::compare::IndependentReferences;
 use crate::film::RadianceImage;
 use crate::math::DVec3;
 use crate::math::color::LUMINANCE_WEIGHTS;
@@ -32,7 +32,7 @@ impl BrightnessDifference {
 /// references. `are_pixels_independent` must be false with photons, because they correlate pixel errors.
 /// Returns `None` for fewer than [`MIN_SEEDS`] images or for black references.
 pub fn compare_brightness(
-    references: &ReferencePair,
+    references: &IndependentReferences,
     pictures: &[RadianceImage],
     are_pixels_independent: bool,
 ) -> Option<BrightnessDifference> {
@@ -94,10 +94,10 @@ mod tests {
         RadianceImage { width: SIDE, height: SIDE, pixels: pixels.collect() }
     }
 
-    fn references(next: &mut impl FnMut() -> f32) -> ReferencePair {
+    fn references(next: &mut impl FnMut() -> f32) -> IndependentReferences {
         let pair = [Path::new("r1"), Path::new("r2")];
         let [a, b] = [picture(next, 0.0, 0.02, 0.0), picture(next, 0.0, 0.02, 0.0)];
-        ReferencePair::new(Pair::new(pair, a, b).expect("a pair"))
+        IndependentReferences::new(Pair::new(pair, a, b).expect("a pair"))
     }
 
     #[test]
@@ -148,6 +148,9 @@ mod tests {
         assert_eq!(compare_brightness(&references, &pictures, true), None);
         let black = || RadianceImage::black(2, 2);
         let dark = Pair::new([Path::new("a"), Path::new("b")], black(), black()).expect("a pair");
-        assert_eq!(compare_brightness(&ReferencePair::new(dark), &[black(), black(), black()], true), None);
+        assert_eq!(
+            compare_brightness(&IndependentReferences::new(dark), &[black(), black(), black()], true),
+            None
+        );
     }
 }

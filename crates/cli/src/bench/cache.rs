@@ -13,7 +13,7 @@ use crate::compare::Pair;
 use crate::control::CancelToken;
 use crate::film::RadianceImage;
 use crate::math::Vec3;
-use crate::output::write::WritePolicy;
+use crate::output::write::ExistingFilePolicy;
 use crate::output::{AttributeLossPolicy, OutputError, staged, write};
 use crate::scene::fingerprint::{Fingerprint, FingerprintHasher};
 
@@ -136,7 +136,7 @@ pub(super) fn store(
     let may_replace = |real: &Path| {
         if is_replaceable(real) { Ok(()) } else { Err(foreign_file_error(&path, "a reference")) }
     };
-    let guard = WritePolicy {
+    let guard = ExistingFilePolicy {
         is_kept: &|_| false,
         may_replace: &may_replace,
         sweep: None,

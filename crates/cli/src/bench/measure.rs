@@ -5,12 +5,12 @@ use super::brightness::compare_brightness;
 use super::methods::Method;
 use super::reference::{ReferenceFingerprints, SEEDS};
 use super::request::{BenchError, StepSchedule};
-use super::results::{ImageMeasurement, MethodResult, StepResult};
+use super::results::{ImageMeasurement, MethodAnalysis, StepResult};
 use super::run::SceneRun;
 use super::statistics::median;
 use super::table::{format_error_or_near_zero, format_samples_with_unit};
 use super::time_budget::TimeBudget;
-use crate::compare::ReferencePair;
+use crate::compare::IndependentReferences;
 use crate::film::RadianceImage;
 use crate::pipeline::protocol::{Failure, Report, Stage};
 use crate::pipeline::session::{HeadlessSession, RenderedImage};
@@ -36,7 +36,7 @@ pub(super) struct MethodRun<'a> {
     pub(super) method: &'a Method,
     /// Fingerprints of the references.
     pub(super) keys: &'a ReferenceFingerprints,
-    pub(super) two: &'a ReferencePair,
+    pub(super) two: &'a IndependentReferences,
     /// Default maximum number of samples per step.
     pub(super) most_samples: f64,
 }
@@ -47,7 +47,7 @@ impl MethodRun<'_> {
         &self,
         budget: &TimeBudget,
         threads: &mut usize,
-    ) -> Result<MethodResult, BenchError> {
+    ) -> Result<MethodAnalysis, BenchError> {
         let mut session = HeadlessSession::default();
         // Warm the caches before measuring.
         let begin = StepTarget { index: 0, samples: 1, budget: None };
@@ -62,12 +62,12 @@ impl MethodRun<'_> {
         }
         let last = self.render_step_image(&mut session, SEEDS[0], begin)?;
         if last.key != first.key
-            || self.run.reference_renderer(self.common).compute_reference_fingerprints(&mut session)?
+            || self.run.reference_renderer(self.common).fingerprints_from_test_renders(&mut session)?
                 != *self.keys
         {
             return Err(self.run.create_scene_changed_error());
         }
-        Ok(MethodResult::new(self.method.name.clone(), setup_seconds(&first.report), steps))
+        Ok(MethodAnalysis::new(self.method.name.clone(), setup_seconds(&first.report), steps))
     }
 
     /// Chooses the next step from the previous steps and their durations in seconds.
@@ -218,7 +218,7 @@ fn summarize_step(
     aim: StepTarget,
     pictures: Vec<ImageMeasurement>,
     images: &[RadianceImage],
-    two: &ReferencePair,
+    two: &IndependentReferences,
 ) -> StepResult {
     let of = |value: fn(&ImageMeasurement) -> f64| pictures.iter().map(value).collect::<Vec<f64>>();
     let errors = of(|picture| picture.relmse);

@@ -26,7 +26,7 @@ pub use brightness::BrightnessDifference;
 pub use methods::{Method, MethodSweep, methods_to_measure};
 pub use request::{BenchError, BenchEvent, BenchRequest, PartialResultsError, ReferenceSource, StepSchedule};
 pub use results::{
-    BiasVerdict, ImageMeasurement, MethodResult, ReferenceResult, Results, SceneResult, StepResult,
+    BiasVerdict, ImageMeasurement, MethodAnalysis, ReferenceResult, Results, SceneResult, StepResult,
 };
 pub use run::{image_size, run};
-pub use slope::{Slope, TimeToError};
+pub use slope::{ErrorOverTimeSlope, TimeToError};

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use super::cache::{self, ReferenceCost, ReferencesWithCost};
 use super::request::BenchError;
 use super::results::ReferenceResult;
-use crate::compare::{Pair, ReferencePair};
+use crate::compare::{IndependentReferences, Pair};
 use crate::control::CancelToken;
 use crate::pipeline::BUILD;
 use crate::pipeline::session::{HeadlessSession, RenderedImage};
@@ -53,7 +53,7 @@ impl ReferenceBudget {
 
     /// Whether cached references are good enough: they have enough samples, or rendering them took at least
     /// half of the requested time.
-    fn is_met(self, cost: ReferenceCost) -> bool {
+    fn is_met_by_cached_references(self, cost: ReferenceCost) -> bool {
         cost.samples >= f64::from(self.samples)
             || self.seconds.is_some_and(|seconds| cost.seconds >= 0.5 * seconds)
     }
@@ -61,7 +61,7 @@ impl ReferenceBudget {
 
 /// A scene's references, with the warnings and errors from rendering and caching them.
 pub(super) struct SceneReferences {
-    pub(super) two: ReferencePair,
+    pub(super) two: IndependentReferences,
     pub(super) result: ReferenceResult,
     pub(super) warnings: Vec<Diagnostic>,
     /// Error message if the references could not be cached.
@@ -86,7 +86,7 @@ pub(super) fn load_reference_files(files: &[PathBuf; 2]) -> Result<SceneReferenc
     })?;
     let mut names: Vec<String> = files.iter().map(|file| file.to_string_lossy().into_owned()).collect();
     names.dedup();
-    let two = ReferencePair::new(pair);
+    let two = IndependentReferences::new(pair);
     let noise = two.reference_noise();
     let result = ReferenceResult { samples: None, noise, seconds: None, is_cached: false, files: names };
     Ok(SceneReferences { two, result, warnings: Vec::new(), cache_error: None })
@@ -110,7 +110,7 @@ impl ReferenceRenderer<'_> {
 
     /// Renders one sample per pixel to get the fingerprints of the references and to check that all files can
     /// be read.
-    pub(super) fn compute_reference_fingerprints(
+    pub(super) fn fingerprints_from_test_renders(
         &self,
         session: &mut HeadlessSession,
     ) -> Result<ReferenceFingerprints, BenchError> {
@@ -127,7 +127,7 @@ impl ReferenceRenderer<'_> {
         amount: ReferenceBudget,
     ) -> Option<SceneReferences> {
         let stored = cache::load(self.cache?, &self.reference_cache_key(keys))
-            .filter(|stored| amount.is_met(stored.cost))?;
+            .filter(|stored| amount.is_met_by_cached_references(stored.cost))?;
         Some(assemble_scene_references(stored, true, Vec::new(), None))
     }
 
@@ -205,7 +205,7 @@ fn assemble_scene_references(
     cache_error: Option<String>,
 ) -> SceneReferences {
     let ReferencesWithCost { pair, cost } = stored;
-    let two = ReferencePair::new(pair);
+    let two = IndependentReferences::new(pair);
     let result = ReferenceResult {
         samples: Some(cost.samples),
         noise: two.reference_noise(),

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::bias::SquaredBias;
 use super::brightness::BrightnessDifference;
-use super::slope::{Slope, TimeToError, interpolate_time_to_error, mean_loglog_slope};
+use super::slope::{ErrorOverTimeSlope, TimeToError, interpolate_time_to_error, mean_loglog_slope};
 use super::statistics::mean_and_standard_error;
 
 /// Target errors. The results include the time needed to reach each of them.
@@ -35,7 +35,7 @@ pub struct SceneResult {
     /// The references.
     pub reference: ReferenceResult,
     /// The methods in table order.
-    pub methods: Vec<MethodResult>,
+    pub methods: Vec<MethodAnalysis>,
 }
 
 /// A scene's references.
@@ -56,7 +56,7 @@ pub struct ReferenceResult {
 
 /// Results for one method on one scene.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct MethodResult {
+pub struct MethodAnalysis {
     /// Name shown in tables.
     pub name: String,
     /// Seconds for reading files, building acceleration structures and preparing lights.
@@ -64,9 +64,9 @@ pub struct MethodResult {
     /// The steps in order of time.
     pub steps: Vec<StepResult>,
     /// Slope of error over time on log–log axes, fitted to all steps.
-    pub slope: Option<Slope>,
+    pub slope: Option<ErrorOverTimeSlope>,
     /// Slope of error over time on log–log axes between the last two steps.
-    pub last_slope: Option<Slope>,
+    pub last_slope: Option<ErrorOverTimeSlope>,
     /// Times to reach `TARGETS`.
     pub time_to: [Option<TimeToError>; TARGETS.len()],
     /// Whether the method is biased.
@@ -165,7 +165,7 @@ fn is_bias_decreasing(before: SquaredBias, after: SquaredBias) -> bool {
     after.size < MAX_RATIO * before.size && before.size - after.size > 2.0 * error
 }
 
-impl MethodResult {
+impl MethodAnalysis {
     pub(super) fn new(name: String, setup_seconds: f64, steps: Vec<StepResult>) -> Self {
         let middle: Vec<(f64, f64)> = steps.iter().map(|step| (step.seconds, step.relmse)).collect();
         let verdict = BiasVerdict::from_steps(&steps);
@@ -225,10 +225,10 @@ pub(super) mod tests {
     }
 
     /// A synthetic method with noise inversely proportional to time, plus a bias.
-    pub(crate) fn method(name: &str, noise: f64, bias: f64) -> MethodResult {
+    pub(crate) fn method(name: &str, noise: f64, bias: f64) -> MethodAnalysis {
         let steps =
             [1.0, 4.0, 16.0, 64.0].map(|samples| step(samples, samples * 0.01, noise / samples + bias, bias));
-        MethodResult::new(name.to_owned(), 0.003, steps.to_vec())
+        MethodAnalysis::new(name.to_owned(), 0.003, steps.to_vec())
     }
 
     /// Two scenes with two methods each.

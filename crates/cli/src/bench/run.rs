@@ -150,7 +150,7 @@ impl SceneRun<'_> {
         };
         let common =
             Overrides { width: Some(width), height: Some(height), error: Some(0.0), ..order.common.clone() };
-        let keys = self.reference_renderer(&common).compute_reference_fingerprints(session)?;
+        let keys = self.reference_renderer(&common).fingerprints_from_test_renders(session)?;
         self.check_output_input_overlap(session)?;
         Ok(ValidatedScene { scene: Arc::clone(&loaded.scene), given, common, keys })
     }

@@ -6,7 +6,7 @@ use super::statistics::mean_and_standard_error;
 
 /// A slope on log–log axes: −1 for independent samples, 0 if the error does not decrease.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Slope {
+pub struct ErrorOverTimeSlope {
     /// Mean slope over all series.
     pub value: f64,
     /// Standard error across the series.
@@ -15,14 +15,15 @@ pub struct Slope {
 
 /// Returns the mean slope of independent series of (time, error) points, or `None` if no series has two
 /// points at different times. Skips errors that are zero or negative.
-pub fn mean_loglog_slope(series: &[Vec<(f64, f64)>]) -> Option<Slope> {
-    let slopes: Vec<f64> = series.iter().filter_map(|points| fit_loglog_slope(points)).collect();
+pub fn mean_loglog_slope(series: &[Vec<(f64, f64)>]) -> Option<ErrorOverTimeSlope> {
+    let slopes: Vec<f64> = series.iter().filter_map(|points| fit_error_over_time_slope(points)).collect();
     let (value, error) = mean_and_standard_error(&slopes);
-    (!slopes.is_empty()).then_some(Slope { value, error: if error.is_finite() { error } else { 0.0 } })
+    (!slopes.is_empty())
+        .then_some(ErrorOverTimeSlope { value, error: if error.is_finite() { error } else { 0.0 } })
 }
 
 /// Least-squares slope of one series.
-fn fit_loglog_slope(points: &[(f64, f64)]) -> Option<f64> {
+fn fit_error_over_time_slope(points: &[(f64, f64)]) -> Option<f64> {
     let usable = points.iter().filter(|(time, error)| *time > 0.0 && *error > 0.0);
     let logs: Vec<(f64, f64)> = usable.map(|&(time, error)| (libm::log(time), libm::log(error))).collect();
     let count = logs.len() as f64;

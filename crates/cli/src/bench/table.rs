@@ -1,7 +1,9 @@
 //! Formats results as a table that fits 80 columns.
 
-use super::results::{BiasVerdict, MethodResult, ReferenceResult, Results, SceneResult, StepResult, TARGETS};
-use super::slope::{Slope, TimeToError};
+use super::results::{
+    BiasVerdict, MethodAnalysis, ReferenceResult, Results, SceneResult, StepResult, TARGETS,
+};
+use super::slope::{ErrorOverTimeSlope, TimeToError};
 use crate::pipeline::words;
 
 /// Formats the results as lines.
@@ -32,7 +34,7 @@ fn format_scene(scene: &SceneResult) -> Vec<String> {
     for method in &scene.methods {
         lines.push(format!("{}: {}", method.name, format_setup_and_slope(method)));
         lines.extend(
-            format_target_times(method)
+            format_method_target_times(method)
                 .into_iter()
                 .chain([describe_bias(method)])
                 .chain(describe_brightness(method))
@@ -82,13 +84,13 @@ pub(super) fn format_error_or_near_zero(value: f64) -> String {
     if value > 0.0 { format!("{value:.2e}") } else { "≈ 0".to_owned() }
 }
 
-fn format_setup_and_slope(method: &MethodResult) -> String {
+fn format_setup_and_slope(method: &MethodAnalysis) -> String {
     let slope = method.slope.map_or(String::new(), |slope| format!(", slope {}", format_slope(slope)));
     format!("setup {}{slope}", words::format_seconds(method.setup_seconds))
 }
 
 /// Describes how long it takes to reach each target error.
-fn format_target_times(method: &MethodResult) -> Option<String> {
+fn format_method_target_times(method: &MethodAnalysis) -> Option<String> {
     let times = TARGETS.iter().zip(method.time_to).filter_map(|(target, time)| Some((target, time?)));
     let parts = times.map(|(target, TimeToError { seconds, is_measured })| {
         let about = if is_measured { "" } else { "about " };
@@ -104,13 +106,13 @@ pub(super) fn format_samples_with_unit(samples: f64) -> String {
 }
 
 /// Formats a slope, as in `−0.98 ± 0.02`.
-pub(super) fn format_slope(Slope { value, error }: Slope) -> String {
+pub(super) fn format_slope(ErrorOverTimeSlope { value, error }: ErrorOverTimeSlope) -> String {
     let sign = if value < 0.0 { "−" } else { "" };
     format!("{sign}{:.2} ± {error:.2}", value.abs())
 }
 
 /// Describes a method's bias.
-fn describe_bias(method: &MethodResult) -> String {
+fn describe_bias(method: &MethodAnalysis) -> String {
     let at = method
         .steps
         .last()
@@ -138,7 +140,7 @@ fn describe_bias(method: &MethodResult) -> String {
 }
 
 /// Describes how the mean luminance at the last step differs from the references.
-fn describe_brightness(method: &MethodResult) -> Option<String> {
+fn describe_brightness(method: &MethodAnalysis) -> Option<String> {
     let brightness = method.steps.last()?.brightness?;
     let percent = |part: f64| format!("{:.2} %", 100.0 * part.abs());
     let side = if brightness.value < 0.0 { "below" } else { "above" };

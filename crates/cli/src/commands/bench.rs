@@ -32,11 +32,11 @@ use crate::system::threads::{describe_start_failure, spawn};
 const TICK: Duration = Duration::from_millis(50);
 
 pub(crate) fn run(args: &BenchArgs, console: &Console) -> Exit {
-    try_run(args, console).unwrap_or_else(|exit| exit)
+    run_and_print_errors(args, console).unwrap_or_else(|exit| exit)
 }
 
 /// Runs the benchmark and reports errors. `Err` contains the exit code.
-fn try_run(args: &BenchArgs, console: &Console) -> Result<Exit, Exit> {
+fn run_and_print_errors(args: &BenchArgs, console: &Console) -> Result<Exit, Exit> {
     priority::lower_priority_including_spawned_threads(args.nice);
     let order = bench_request(args, console)?;
     let scenes = order.scenes.len();

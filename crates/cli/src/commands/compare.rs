@@ -15,15 +15,15 @@ use crate::control::CancelToken;
 use crate::exit::Exit;
 use crate::film::RadianceImage;
 use crate::output::part::is_part;
-use crate::output::write::{self, WritePolicy};
+use crate::output::write::{self, ExistingFilePolicy};
 use crate::output::{
     self, AttributeLossPolicy, EncodeOptions, FileIdentity, Format, OutputError, WriteWarning, is_same_file,
 };
-use crate::system::threads::core_pool;
+use crate::system::threads::logical_cpu_pool;
 use crate::tui::wrap_text;
 
 pub(crate) fn run(args: &CompareArgs, console: &Console) -> Exit {
-    match core_pool() {
+    match logical_cpu_pool() {
         Ok(pool) => run_in_pool(&pool, args, console).unwrap_or_else(|exit| exit),
         Err(message) => console.print_error(Exit::FAILED, &message),
     }
@@ -69,8 +69,8 @@ fn compare_to_thresholds(summary: &Summary<'_>, console: &Console) -> Exit {
 }
 
 fn warn_about_same_file(args: &CompareArgs, console: &Console) {
-    let identity = FileIdentity::from_path(&args.a);
-    if identity.is_some() && identity == FileIdentity::from_path(&args.b) {
+    let identity = FileIdentity::from_existing_or_new_path(&args.a);
+    if identity.is_some() && identity == FileIdentity::from_existing_or_new_path(&args.b) {
         let (a, b) = (args.a.display(), args.b.display());
         let which = if args.a == args.b {
             format!("{a} is specified twice")
@@ -137,7 +137,7 @@ impl<'a> ErrorImageOutput<'a> {
         let is_kept = |path: &Path| check_not_input(path, path, args).is_err();
         let warnings = RefCell::new(Vec::new());
         let losses = AttributeLossPolicy::Report(&|warning| warnings.borrow_mut().push(warning));
-        let guard = WritePolicy { is_kept: &is_kept, may_replace: &may_replace, sweep: None, losses };
+        let guard = ExistingFilePolicy { is_kept: &is_kept, may_replace: &may_replace, sweep: None, losses };
         write::atomic_with_policy(self.path, &bytes, &guard, &token)?;
         Ok(warnings.into_inner())
     }

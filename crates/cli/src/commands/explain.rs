@@ -73,7 +73,7 @@ fn explain_path(path: &str) -> Option<String> {
                     .filter_map(|table| Some(type_details(table, table.find_type_or_default(Some(name))?)));
                 Some(texts.collect::<Vec<_>>().join("\n"))
             }
-            None => found(all_keys().filter(|(_, key)| key.name == *name).collect()),
+            None => found(all_keys_with_paths().filter(|(_, key)| key.name == *name).collect()),
         },
         [name, second] => {
             let table = find_table(name)?;
@@ -83,7 +83,7 @@ fn explain_path(path: &str) -> Option<String> {
             if *second == "type" && !table.types.is_empty() {
                 return Some(format_type_list(table));
             }
-            found(keys_of_table(table).filter(|(_, key)| key.name == *second).collect())
+            found(table_keys_with_paths(table).filter(|(_, key)| key.name == *second).collect())
         }
         [name, second, third] => {
             let table = find_table(name)?;
@@ -105,11 +105,11 @@ fn explain_path(path: &str) -> Option<String> {
 }
 
 /// Returns all keys with their full paths, such as `TABLE.TYPE.KEY`.
-fn all_keys() -> impl Iterator<Item = (String, &'static KeyInfo)> {
-    all_tables().iter().flat_map(keys_of_table)
+fn all_keys_with_paths() -> impl Iterator<Item = (String, &'static KeyInfo)> {
+    all_tables().iter().flat_map(table_keys_with_paths)
 }
 
-fn keys_of_table(table: &'static TableInfo) -> impl Iterator<Item = (String, &'static KeyInfo)> {
+fn table_keys_with_paths(table: &'static TableInfo) -> impl Iterator<Item = (String, &'static KeyInfo)> {
     let own = table.types.iter().flat_map(move |kind| {
         kind.keys.iter().map(move |key| (format!("{}.{}.{}", table.name, kind.name, key.name), key))
     });
@@ -118,7 +118,7 @@ fn keys_of_table(table: &'static TableInfo) -> impl Iterator<Item = (String, &'s
 
 /// Describes a key: description, type, unit, range, default and an example.
 fn key_details(path: &str, key: &KeyInfo) -> String {
-    let mut text = format!("{path}\n    {}\n\n", format_sentence(key.doc));
+    let mut text = format!("{path}\n    {}\n\n", sentence_without_backticks(key.doc));
     let mut row = |name: &str, value: String| {
         if !value.is_empty() {
             text.push_str(&format!("    {name:<9}{value}\n"));
@@ -157,12 +157,12 @@ fn key_summary(path: &str, key: &KeyInfo) -> String {
     };
     let facts = [without_backticks(&key.kind_text()), key.unit.to_owned(), key.range_text(), default];
     let facts: Vec<String> = facts.into_iter().filter(|fact| !fact.is_empty()).collect();
-    format!("{path}: {}\n    {}\n", facts.join("; "), format_sentence(key.doc))
+    format!("{path}: {}\n    {}\n", facts.join("; "), sentence_without_backticks(key.doc))
 }
 
 /// Describes a table, with one line per type and key.
 fn table_details(table: &'static TableInfo) -> String {
-    let head = format!("{}\n    {}\n\n", table.header(), format_sentence(table.doc));
+    let head = format!("{}\n    {}\n\n", table.header(), sentence_without_backticks(table.doc));
     let types = if table.types.is_empty() { String::new() } else { format!("{}\n", format_type_list(table)) };
     format!("{head}{types}{}", format_key_list(table.keys.iter()))
 }
@@ -178,7 +178,12 @@ fn format_type_list(table: &TableInfo) -> String {
 
 /// Describes a type, with one line for each of its keys and each common key.
 fn type_details(table: &'static TableInfo, kind: &'static TableTypeInfo) -> String {
-    let head = format!("{}, type = \"{}\"\n    {}\n\n", table.header(), kind.name, format_sentence(kind.doc));
+    let head = format!(
+        "{}, type = \"{}\"\n    {}\n\n",
+        table.header(),
+        kind.name,
+        sentence_without_backticks(kind.doc)
+    );
     format!("{head}{}", format_key_list(table.keys_for_type(Some(kind))))
 }
 
@@ -191,7 +196,7 @@ fn without_backticks(text: &str) -> String {
     text.replace('`', "")
 }
 
-fn format_sentence(text: &str) -> String {
+fn sentence_without_backticks(text: &str) -> String {
     format!("{}.", without_backticks(text))
 }
 

@@ -20,7 +20,7 @@ pub(crate) fn run(args: &ImportArgs, console: &Console) -> Exit {
         Ok(ended) => ended,
         Err(message) => return console.print_error(Exit::FAILED, &message),
     };
-    let exit = convert(args, console, &token);
+    let exit = convert_and_write(args, console, &token);
     let Some(number) = ended.signal_number() else { return exit };
     if let Some(signal) = signals::signal_name(number).filter(|_| exit != Exit::DONE) {
         console.print_line_to_stderr(&format!("terminated by {signal}: nothing was written"));
@@ -29,7 +29,7 @@ pub(crate) fn run(args: &ImportArgs, console: &Console) -> Exit {
 }
 
 /// Converts the file. Does not report an error if the token is canceled.
-fn convert(args: &ImportArgs, console: &Console, token: &CancelToken) -> Exit {
+fn convert_and_write(args: &ImportArgs, console: &Console, token: &CancelToken) -> Exit {
     let scene = match &args.output {
         Some(output) => output.clone(),
         None => PathBuf::from(args.file.with_extension("toml").file_name().unwrap_or_default()),

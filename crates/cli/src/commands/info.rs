@@ -11,7 +11,7 @@ use crate::output::json::to_pretty_text;
 use crate::output::settings::{ImageInfo, ImageInfoReadError, read_image_info};
 use crate::pipeline::protocol::Failure;
 use crate::progress::{failure_to_json, json_line};
-use crate::scene::detect_non_scene;
+use crate::scene::detect_image_or_part;
 use crate::scene::sanitize::escape_invisible_chars;
 
 pub(crate) fn run(args: &InfoArgs, console: &Console) -> Exit {
@@ -35,7 +35,7 @@ pub(crate) fn run(args: &InfoArgs, console: &Console) -> Exit {
 /// # Errors
 /// Returns the same errors as [`read_image_info`].
 fn read_info_or_format(path: &Path) -> Result<ImageInfo, ImageInfoReadError> {
-    read_image_info(path).or_else(|error| match (&error, detect_non_scene(path)) {
+    read_image_info(path).or_else(|error| match (&error, detect_image_or_part(path)) {
         (ImageInfoReadError::NotAnImage { .. }, Some((format, _))) => {
             Ok(ImageInfo { format: format.to_owned(), ..ImageInfo::default() })
         }
@@ -46,7 +46,7 @@ fn read_info_or_format(path: &Path) -> Result<ImageInfo, ImageInfoReadError> {
 /// If the file is an image, part or checkpoint instead of a scene, reports this along with how the file was
 /// rendered, as one JSON line or as text. Returns `None` for other files.
 pub(crate) fn report_image_instead_of_scene(path: &Path, is_json: bool, console: &Console) -> Option<Exit> {
-    let (_, problem) = detect_non_scene(path)?;
+    let (_, problem) = detect_image_or_part(path)?;
     let info = read_info_or_format(path);
     if is_json {
         let mut value = failure_to_json(&Failure::Scene(vec![*problem]));

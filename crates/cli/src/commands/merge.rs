@@ -19,21 +19,21 @@ use crate::film::Film;
 use crate::film::tone::tone_map_to_8_bits;
 use crate::merge_block::InPlaceTerminalBlock;
 use crate::output::part::{self, MergedParts, PartError, PartFile};
-use crate::output::write::{WritePolicy, atomic_with_policy};
+use crate::output::write::{ExistingFilePolicy, atomic_with_policy};
 use crate::output::{
     self, AttributeLossPolicy, FilmEncodingSettings, Format, OutputError, is_same_file, scene_path,
 };
 use crate::progress::{bar_style_from_template, json_line};
 use crate::scene::sanitize::{escape_and_truncate, escape_invisible_chars};
 use crate::signals;
-use crate::system::threads::core_pool;
+use crate::system::threads::logical_cpu_pool;
 use crate::tui::{NamedImage, images_as_text};
 
 /// Polling interval for new parts.
 const POLL_INTERVAL: Duration = Duration::from_millis(500);
 
 pub(crate) fn run(args: &MergeArgs, console: &Console) -> Exit {
-    let pool = match core_pool() {
+    let pool = match logical_cpu_pool() {
         Ok(pool) => pool,
         Err(message) => return console.print_error(Exit::FAILED, &message),
     };
@@ -64,10 +64,10 @@ struct MergeCommand<'a> {
 
 impl MergeCommand<'_> {
     fn run(&self) -> Exit {
-        self.try_run().unwrap_or_else(|exit| exit)
+        self.run_and_print_errors().unwrap_or_else(|exit| exit)
     }
 
-    fn try_run(&self) -> Result<Exit, Exit> {
+    fn run_and_print_errors(&self) -> Result<Exit, Exit> {
         let format = self.check_output()?;
         let parts = if self.args.watch { self.wait_for_parts()? } else { self.open_parts()? };
         let inputs = RenderInputFiles::new(&parts, &self.args.out, self.token);
@@ -102,7 +102,7 @@ impl MergeCommand<'_> {
 
     /// Checks that the output does not replace an input file of the render.
     fn check_output_is_not_render_input(&self, inputs: &RenderInputFiles<'_>) -> Result<(), Exit> {
-        match self.output_is_render_input_message(inputs, &self.args.out) {
+        match self.message_if_render_input(inputs, &self.args.out) {
             Ok(None) => Ok(()),
             Ok(Some(message)) => Err(self.console.print_error(Exit::WRONG, &message)),
             Err(Cancelled) => Err(Exit::FAILED),
@@ -110,7 +110,7 @@ impl MergeCommand<'_> {
     }
 
     /// Returns an error message if the file at `path` is an input file of the parts or their scene.
-    fn output_is_render_input_message(
+    fn message_if_render_input(
         &self,
         inputs: &RenderInputFiles<'_>,
         path: &Path,
@@ -121,7 +121,7 @@ impl MergeCommand<'_> {
 
     /// Opens all parts and reports every invalid one.
     fn open_parts(&self) -> Result<Vec<PartFile>, Exit> {
-        let mut bar = StepProgress::new(self.args.progress, self.console, "read");
+        let mut bar = StepProgressBar::new(self.args.progress, self.console, "read");
         let (mut parts, mut wrong) = (Vec::new(), Vec::new());
         for (index, path) in self.args.parts.iter().enumerate() {
             match PartFile::open(path, self.token) {
@@ -164,11 +164,12 @@ impl MergeCommand<'_> {
         loop {
             let mut rest = Vec::new();
             for mut awaited in waiting {
-                let looked =
-                    awaited.try_open(self.token).map_err(|error| match error.is_too_many_open_files() {
+                let looked = awaited.open_if_complete(self.token).map_err(|error| {
+                    match error.is_too_many_open_files() {
                         true => self.report_open_file_limit(parts.len()),
                         false => self.report_part_error(&error),
-                    });
+                    }
+                });
                 match looked? {
                     Some(part) => parts.push(part),
                     None => rest.push(awaited),
@@ -279,7 +280,7 @@ impl MergeCommand<'_> {
         is_partial: bool,
         what: &'static str,
     ) -> Result<MergedParts, Exit> {
-        let mut bar = StepProgress::new(self.args.progress, self.console, what);
+        let mut bar = StepProgressBar::new(self.args.progress, self.console, what);
         let tell = |tile: usize, film: &Film| bar.update(tile, film.tile_count());
         let merged = part::merge_into_film(parts, is_partial, self.token, tell);
         bar.end();
@@ -317,21 +318,20 @@ impl MergeCommand<'_> {
             let is_given = self.args.parts.iter().any(|part| is_same_file(part, real));
             let is_part = is_given || part::is_part(real);
             let why = is_part.then(|| format!("cannot write {}: it is a part", out.display()));
-            let why =
-                why.map_or_else(|| self.output_is_render_input_message(inputs, real), |why| Ok(Some(why)))?;
+            let why = why.map_or_else(|| self.message_if_render_input(inputs, real), |why| Ok(Some(why)))?;
             why.map_or(Ok(()), |reason| Err(OutputError::Refused { reason }))
         };
         let is_kept = |path: &Path| self.args.parts.iter().any(|part| is_same_file(part, path));
         let tell = |warning| self.console.print_line_to_stderr(&format!("warning: {warning}"));
-        let guard = WritePolicy {
+        let guard = ExistingFilePolicy {
             is_kept: &is_kept,
             may_replace: &may_replace,
             sweep: None,
             losses: AttributeLossPolicy::Report(&tell),
         };
-        let bytes = self
-            .pool
-            .install(|| finish.encode_film_image(film, (&finish.quantity_image(film), &[]), format, token));
+        let bytes = self.pool.install(|| {
+            finish.encode_with_film_metadata(film, (&finish.quantity_image(film), &[]), format, token)
+        });
         let written = bytes.and_then(|bytes| atomic_with_policy(out, &bytes, &guard, token));
         written.map_err(|error| match error {
             OutputError::Cancelled(_) => Exit::FAILED,
@@ -376,7 +376,7 @@ impl AwaitedPart {
     ///
     /// # Errors
     /// Returns an error if the part is invalid.
-    fn try_open(&mut self, token: &CancelToken) -> Result<Option<PartFile>, PartError> {
+    fn open_if_complete(&mut self, token: &CancelToken) -> Result<Option<PartFile>, PartError> {
         let now = std::fs::metadata(&self.path).ok().map(|found| (found.len(), found.modified().ok()));
         // Do not read an unchanged file again.
         if now.is_none() || now == self.unfinished {
@@ -404,14 +404,14 @@ impl AwaitedPart {
 }
 
 /// Progress bar and JSON events for one step of a merge.
-struct StepProgress {
+struct StepProgressBar {
     what: &'static str,
     bar: Option<ProgressBar>,
     is_json: bool,
     said: usize,
 }
 
-impl StepProgress {
+impl StepProgressBar {
     fn new(progress: ProgressMode, console: &Console, what: &'static str) -> Self {
         let template = "  {wide_bar} {percent:>3}% {msg}";
         let has_bar = progress == ProgressMode::Auto && console.is_terminal;

@@ -25,7 +25,7 @@ pub(crate) fn run(file: &Path, with_schema: bool, console: &Console) -> Exit {
         console.print_trusted_text(&text);
         return Exit::DONE;
     }
-    if let Some(message) = image_or_mesh_extension_message(file) {
+    if let Some(message) = message_if_image_or_mesh_extension(file) {
         return console.print_error(Exit::WRONG, &message);
     }
     // Do not write the schema if the scene cannot be written.
@@ -87,7 +87,7 @@ fn write_schema(path: &Path) -> Result<bool, (Exit, String)> {
 }
 
 /// Returns the error message for a scene file with an image or mesh extension.
-fn image_or_mesh_extension_message(file: &Path) -> Option<String> {
+fn message_if_image_or_mesh_extension(file: &Path) -> Option<String> {
     let what = if has_mesh_extension(file) {
         "a mesh"
     } else if has_image_extension(file) {

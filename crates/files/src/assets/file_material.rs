@@ -50,7 +50,7 @@ impl FileMaterial {
 
     /// Whether the material has a specular highlight. Illumination models 0 and 1 have none. Materials with
     /// an exponent of 0 are also excluded: their highlight would cover the hemisphere at full strength.
-    pub fn has_highlight(&self) -> bool {
+    pub fn allows_specular_highlight(&self) -> bool {
         self.shininess > 0.0 && !matches!(self.illumination_model, Some(0 | 1))
     }
 
@@ -99,7 +99,7 @@ impl FileMaterial {
     /// Removes the textures that do not affect this kind of material.
     pub(super) fn drop_unused_textures(&mut self) {
         let (keeps_diffuse, keeps_specular, keeps_surface) = match self.kind() {
-            FileMaterialKind::Phong => (true, self.has_highlight(), true),
+            FileMaterialKind::Phong => (true, self.allows_specular_highlight(), true),
             FileMaterialKind::Principled(_) => (true, false, true),
             FileMaterialKind::Coated => (true, false, false),
             FileMaterialKind::Mirror | FileMaterialKind::Glass => (false, false, false),

@@ -90,7 +90,7 @@ fn number_too_large_message(letter: &str, number: f64) -> String {
     format!("numbers after `{letter}` must be below {LARGEST:e} in magnitude, not {number:e}")
 }
 
-fn distance_too_short_message(size: f64) -> String {
+fn distance_below_minimum_message(size: f64) -> String {
     format!("the distance in `s` must be above {SHORTEST:e}, not {size:e}")
 }
 
@@ -125,7 +125,7 @@ fn check_distance(numbers: Result<[f64; 2], String>) -> Result<[f64; 2], String>
     let [size, radius] = numbers?;
     match () {
         () if !(size > 0.0) => Err(distance_not_positive_message(size)),
-        () if is_nonzero_but_too_short(size) => Err(distance_too_short_message(size)),
+        () if is_nonzero_but_too_short(size) => Err(distance_below_minimum_message(size)),
         () => Ok([size, radius]),
     }
 }
@@ -184,7 +184,7 @@ mod tests {
             ("p 1e308 0", 1, number_too_large_message("p", 1e308)),
             ("r 0 -1e19", 1, number_too_large_message("r", -1e19)),
             ("s 1e20 1", 1, number_too_large_message("s", 1e20)),
-            ("s 1e-30 1", 1, distance_too_short_message(1e-30)),
+            ("s 1e-30 1", 1, distance_below_minimum_message(1e-30)),
             ("f 40 1e19 3", 1, number_too_large_message("f", 1e19)),
         ] {
             assert_eq!(error(text), (Some(line), reason), "{text}");

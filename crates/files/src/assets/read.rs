@@ -78,7 +78,7 @@ pub(crate) fn read_text(path: &Path, limit: u64, monitor: Monitor<'_>) -> Result
 
 /// Reads a text or binary file in a format whose magic number starts with three letters. Rejects UTF-16 text
 /// and files with a zero among the first three bytes.
-pub(crate) fn read_rejecting_zeros_in_magic(
+pub(crate) fn read_unless_zeros_in_magic(
     path: &Path,
     limit: u64,
     monitor: Monitor<'_>,
@@ -200,13 +200,13 @@ mod tests {
         let path = folder.path().join("zeros");
         // A sparse file of 3 TiB, which would take an hour to read completely.
         File::create(&path).and_then(|file| file.set_len(3 << 40)).expect("a sparse file");
-        for read in [read_text, read_rejecting_zeros_in_magic] {
+        for read in [read_text, read_unless_zeros_in_magic] {
             let error = rejection(read(&path, u64::MAX, monitor(&token)));
             assert_eq!(error, (Some(1), BINARY_FILE.to_owned()));
         }
         fs::write(&path, b"ply\n\0").expect("written");
         assert!(read_text(&path, 100, monitor(&token)).is_err());
-        assert_eq!(read_rejecting_zeros_in_magic(&path, 100, monitor(&token)).expect("read"), b"ply\n\0");
+        assert_eq!(read_unless_zeros_in_magic(&path, 100, monitor(&token)).expect("read"), b"ply\n\0");
         fs::write(&path, b"").expect("written");
         assert_eq!(read_text(&path, 100, monitor(&token)).expect("read"), b"");
     }
@@ -222,7 +222,7 @@ mod tests {
             let big: Vec<u8> = words().encode_utf16().flat_map(u16::to_be_bytes).collect();
             for bytes in [little, big] {
                 fs::write(&path, bytes).expect("written");
-                for read in [read_text, read_rejecting_zeros_in_magic] {
+                for read in [read_text, read_unless_zeros_in_magic] {
                     let error = rejection(read(&path, u64::MAX, monitor(&token)));
                     assert_eq!(error, (Some(1), UTF16_TEXT.to_owned()));
                 }
@@ -251,7 +251,7 @@ mod tests {
         let path = folder.path().join("pointer");
         let pointer = "version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 12345\n";
         fs::write(&path, pointer).expect("written");
-        for read in [read_text, read_rejecting_zeros_in_magic, read_unless_zeros_at_start, read_bytes] {
+        for read in [read_text, read_unless_zeros_in_magic, read_unless_zeros_at_start, read_bytes] {
             let error = rejection(read(&path, 1 << 20, monitor(&token)));
             assert_eq!(error, (None, LFS_POINTER.to_owned()));
         }

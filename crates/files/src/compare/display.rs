@@ -7,7 +7,7 @@
 
 use rayon::prelude::*;
 
-use super::plane::{Plane, normalized_taps, unnormalized_gaussian};
+use super::plane::{Plane, normalized_taps, unnormalized_gaussian_taps};
 use super::{Pair, tiles};
 use crate::film::Rect;
 use crate::math::Vec3;
@@ -44,7 +44,7 @@ impl DisplayErrorSums {
 
 pub(super) fn measure(pair: &Pair) -> DisplayErrors {
     let (width, height) = (pair.width(), pair.height());
-    let window = normalized_taps(&unnormalized_gaussian(SIGMA, RADIUS));
+    let window = normalized_taps(&unnormalized_gaussian_taps(SIGMA, RADIUS));
     let band_sums = |band| {
         let sums = tiles::tiles_in_band(band, width, height).map(|tile| tile_sums(pair, tile, &window));
         sums.fold(DisplayErrorSums::default(), DisplayErrorSums::plus)

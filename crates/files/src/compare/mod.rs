@@ -19,7 +19,7 @@ pub use bias::Bias;
 pub use diff::{absolute_difference, flip_heat_map};
 pub use flip::PIXELS_PER_DEGREE;
 pub use pair::{CompareError, Pair};
-pub use two_references::ReferencePair;
+pub use two_references::IndependentReferences;
 
 /// Errors of the first image in a pair, measured against the second. Means are over pixels and channels.
 #[derive(Clone, Debug, PartialEq)]

@@ -64,7 +64,7 @@ fn add_weighted_rows(sums: &mut [f64], rows: &[&[f64]], taps: &[f64]) {
 }
 
 /// exp(−x²/2σ²) at integer pixel offsets from −radius to radius.
-pub(super) fn unnormalized_gaussian(sigma: f64, radius: usize) -> Vec<f64> {
+pub(super) fn unnormalized_gaussian_taps(sigma: f64, radius: usize) -> Vec<f64> {
     offsets(radius).map(|x| libm::exp(-x * x / (2.0 * sigma * sigma))).collect()
 }
 
@@ -102,7 +102,7 @@ mod tests {
 
     #[test]
     fn gaussian_taps_match_known_values() {
-        let taps = normalized_taps(&unnormalized_gaussian(1.5, 5));
+        let taps = normalized_taps(&unnormalized_gaussian_taps(1.5, 5));
         assert_eq!(taps.len(), 11);
         assert!((taps[5] - 0.266_011_7).abs() < 1e-7 && (taps[0] - 0.001_028_4).abs() < 1e-7, "{taps:?}");
     }

@@ -42,7 +42,7 @@ impl FilmEncodingSettings {
     ///
     /// # Errors
     /// Same as [`encode`](super::encode).
-    pub fn encode_film_image(
+    pub fn encode_with_film_metadata(
         &self,
         film: &Film,
         (image, layers): (&RadianceImage, &[LayerImage]),

@@ -122,7 +122,8 @@ impl<'a> Replacement<'a> {
 
     /// Whether the backup name refers to the new file.
     fn is_new_at_backup_path(&self) -> bool {
-        super::FileIdentity::from_path(&self.held).is_some_and(|held| held.matches_open_file(&self.new.file))
+        super::FileIdentity::from_existing_or_new_path(&self.held)
+            .is_some_and(|held| held.matches_open_file(&self.new.file))
     }
 }
 

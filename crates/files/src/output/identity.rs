@@ -33,7 +33,7 @@ pub enum FileIdentity {
 impl FileIdentity {
     /// Returns the identity of the file at a path, or `None` for paths that cannot be a regular file:
     /// folders, devices, pipes, and unresolvable paths.
-    pub fn from_path(path: &Path) -> Option<Self> {
+    pub fn from_existing_or_new_path(path: &Path) -> Option<Self> {
         match fs::metadata(path) {
             Ok(found) if found.is_file() => Some(Self::Existing { device: found.dev(), inode: found.ino() }),
             Err(error) if error.kind() == ErrorKind::NotFound => Self::from_new_path(path),
@@ -104,10 +104,10 @@ fn have_same_content(a: &Path, b: &Path) -> bool {
 /// Whether two paths refer to the same file, existing or not. Also true if they may refer to the same file
 /// according to their [`FallbackFileIdentity`].
 pub fn is_same_file(a: &Path, b: &Path) -> bool {
-    let Some(identity) = FileIdentity::from_path(a) else { return false };
+    let Some(identity) = FileIdentity::from_existing_or_new_path(a) else { return false };
     let are_alike =
         || Some(FallbackFileIdentity::from_path(a)?.may_equal(&FallbackFileIdentity::from_path(b)?));
-    FileIdentity::from_path(b) == Some(identity) || are_alike().unwrap_or(false)
+    FileIdentity::from_existing_or_new_path(b) == Some(identity) || are_alike().unwrap_or(false)
 }
 
 #[cfg(test)]
@@ -126,7 +126,7 @@ mod tests {
         symlink("a", at("link")).expect("a link");
         fs::hard_link(at("a"), at("hard")).expect("a link");
         symlink("far/away", at("near")).expect("a link");
-        let of = |name: &str| FileIdentity::from_path(&at(name)).expect(name);
+        let of = |name: &str| FileIdentity::from_existing_or_new_path(&at(name)).expect(name);
         for name in ["./a", "far/../a", "link", "hard", "far/away/../../a"] {
             assert_eq!(of(name), of("a"), "{name}");
         }
@@ -142,7 +142,7 @@ mod tests {
         symlink("far/away", at("near")).expect("a link");
         symlink("second", at("first")).expect("a link");
         symlink("near/new", at("second")).expect("a link");
-        let of = |name: &str| FileIdentity::from_path(&at(name));
+        let of = |name: &str| FileIdentity::from_existing_or_new_path(&at(name));
         for name in ["near/new", "./far/away/new", "first", "second"] {
             assert_eq!(of(name), of("far/away/new"), "{name}");
             assert!(matches!(of(name), Some(FileIdentity::New { .. })), "{name}");
@@ -192,7 +192,7 @@ mod tests {
         for path in
             [folder.path(), Path::new("/dev/null"), Path::new("/dev/null/x"), &circle, Path::new("..")]
         {
-            assert_eq!(FileIdentity::from_path(path), None, "{}", path.display());
+            assert_eq!(FileIdentity::from_existing_or_new_path(path), None, "{}", path.display());
         }
     }
 }

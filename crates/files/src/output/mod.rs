@@ -41,8 +41,8 @@ pub use exr::read_mean_luminance_error;
 pub use format::{AnimationFormat, BitDepth, Format};
 pub use identity::{FallbackFileIdentity, FileIdentity, is_same_file};
 pub use origin::{
-    ReplaceCheck, check_image_replaceable, check_json_replaceable, check_plot_replaceable,
-    check_table_replaceable, scene_name_in_png, sign_plot,
+    ReplaceCheck, check_image_replaceable, json_replace_check, plot_replace_check, scene_name_in_png,
+    sign_plot, table_replace_check,
 };
 
 use crate::control::CancelToken;

@@ -76,7 +76,7 @@ pub fn scene_name_in_png(path: &Path) -> Option<String> {
 }
 
 /// Checks whether a JSON file may be replaced. It must be empty, or parse as a `T` that `is_own` accepts.
-pub fn check_json_replaceable<T: DeserializeOwned>(
+pub fn json_replace_check<T: DeserializeOwned>(
     path: &Path,
     kind: &'static str,
     is_own: impl Fn(&T) -> bool,
@@ -91,7 +91,7 @@ pub fn check_json_replaceable<T: DeserializeOwned>(
 
 /// Checks whether a table may be replaced. It must be empty, or start with `first_line`, including the line
 /// end.
-pub fn check_table_replaceable(path: &Path, first_line: &str) -> ReplaceCheck {
+pub fn table_replace_check(path: &Path, first_line: &str) -> ReplaceCheck {
     ReplaceCheck::from_text_file(path, "a table", |file| {
         let mut start = Vec::new();
         let is_read = file.take(first_line.len() as u64).read_to_end(&mut start).is_ok();
@@ -101,7 +101,7 @@ pub fn check_table_replaceable(path: &Path, first_line: &str) -> ReplaceCheck {
 
 /// Checks whether a plot may be replaced. It must be empty, or contain `texts` and the signature that
 /// [`sign_plot`] adds. Plots from older versions, which have no signature, are also accepted.
-pub fn check_plot_replaceable(path: &Path, texts: &[&str]) -> ReplaceCheck {
+pub fn plot_replace_check(path: &Path, texts: &[&str]) -> ReplaceCheck {
     ReplaceCheck::from_text_file(path, "a plot", |file| is_glimt_plot(file, texts))
 }
 

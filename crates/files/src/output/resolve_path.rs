@@ -46,9 +46,9 @@ pub(super) fn resolve_writable(path: &Path) -> Result<WriteTarget, OutputError> 
         return Err(target_is_directory_error(path));
     }
     match follow_links(path).map_err(|error| OutputError::file(path, error))? {
-        (target, None) => resolve_new_file_target(path, target),
+        (target, None) => checked_target_for_new_file(path, target),
         (_, Some(metadata)) if metadata.is_symlink() => Ok(WriteTarget::InPlace(path.to_owned())),
-        (target, Some(metadata)) => resolve_existing_target(path, target, metadata),
+        (target, Some(metadata)) => checked_target_for_existing(path, target, metadata),
     }
 }
 
@@ -89,12 +89,12 @@ pub(super) fn follow_links(path: &Path) -> io::Result<(PathBuf, Option<Metadata>
     Err(Errno::ELOOP.into())
 }
 
-fn resolve_new_file_target(path: &Path, target: PathBuf) -> Result<WriteTarget, OutputError> {
-    check_directory(path, directory_of(&target))?;
+fn checked_target_for_new_file(path: &Path, target: PathBuf) -> Result<WriteTarget, OutputError> {
+    check_directory_is_writable(path, directory_of(&target))?;
     Ok(WriteTarget::File(TargetFile { path: target, existing: None }))
 }
 
-fn resolve_existing_target(
+fn checked_target_for_existing(
     path: &Path,
     target: PathBuf,
     metadata: Metadata,
@@ -116,7 +116,7 @@ fn resolve_existing_target(
     // Replacing the file requires only write permission for the directory. Check the file itself anyway,
     // because it may be read-only on purpose.
     check_access(path, &target, AccessFlags::W_OK)?;
-    let directory = check_directory(path, directory_of(&target))?;
+    let directory = check_directory_is_writable(path, directory_of(&target))?;
     if protection::is_protected_by_sticky_bit(&directory, &metadata) {
         let directory = directory_of(&target).display();
         return Err(OutputError::Target {
@@ -130,7 +130,7 @@ fn resolve_existing_target(
     Ok(WriteTarget::File(TargetFile { path: target, existing: Some(metadata) }))
 }
 
-fn check_directory(path: &Path, directory: &Path) -> Result<Metadata, OutputError> {
+fn check_directory_is_writable(path: &Path, directory: &Path) -> Result<Metadata, OutputError> {
     match fs::metadata(directory) {
         Ok(metadata) if metadata.is_dir() => {
             check_flags(path, &format!("the directory {}", directory.display()), directory)?;

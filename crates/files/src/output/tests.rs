@@ -304,7 +304,7 @@ fn unsuitable_images_are_rejected() {
     assert_eq!(BitDepth::try_from(16).expect("known"), BitDepth::Sixteen);
 }
 
-const NOTHING_KEPT: write::WritePolicy<'_> = write::WritePolicy {
+const NOTHING_KEPT: write::ExistingFilePolicy<'_> = write::ExistingFilePolicy {
     is_kept: &|_| false,
     may_replace: &|_| Ok(()),
     sweep: None,
@@ -333,7 +333,7 @@ fn each_folder_is_searched_once() {
     let folder = tempfile::tempdir().expect("a folder");
     let other = folder.path().join("other");
     std::fs::create_dir(&other).expect("a folder");
-    let write_two = |guard: &write::WritePolicy<'_>| {
+    let write_two = |guard: &write::ExistingFilePolicy<'_>| {
         let mut kept = Vec::new();
         for at in [folder.path(), &other].repeat(2) {
             let stale = at.join(dead_name("stale.png"));
@@ -345,7 +345,7 @@ fn each_folder_is_searched_once() {
         kept
     };
     let sweep = write::SweptFolders::default();
-    let guard = write::WritePolicy { sweep: Some(&sweep), ..NOTHING_KEPT };
+    let guard = write::ExistingFilePolicy { sweep: Some(&sweep), ..NOTHING_KEPT };
     assert_eq!(write_two(&guard), [false, false, true, true]);
     assert_eq!(write_two(&NOTHING_KEPT), [false; 4]);
 }
@@ -356,7 +356,7 @@ fn unsynchronized_files_are_reported_as_written() {
     let path = folder.path().join("a.png");
     let (warnings, synced) = (std::cell::RefCell::new(Vec::new()), std::cell::Cell::new(0));
     let report = |warning| warnings.borrow_mut().push(warning);
-    let guard = write::WritePolicy { losses: AttributeLossPolicy::Report(&report), ..NOTHING_KEPT };
+    let guard = write::ExistingFilePolicy { losses: AttributeLossPolicy::Report(&report), ..NOTHING_KEPT };
     let content = |file: &mut dyn std::io::Write| file.write_all(b"new");
     let failing_sync = |directory: &Path| {
         synced.set(synced.get() + 1);
@@ -398,7 +398,7 @@ fn guards_check_the_link_target_after_writing() {
         assert_eq!((path, entries()), (real.as_path(), 3), "the temporary file should exist");
         Err(OutputError::Refused { reason: "no".to_owned() })
     };
-    let guard = write::WritePolicy { may_replace: &may_replace, ..NOTHING_KEPT };
+    let guard = write::ExistingFilePolicy { may_replace: &may_replace, ..NOTHING_KEPT };
     let refused = write::atomic_with_policy(&link, b"new", &guard, &CancelToken::new()).expect_err("refused");
     assert_eq!((refused.to_string().as_str(), asked.get(), entries()), ("no", 1, 2));
     assert_eq!(std::fs::read(&real).expect("read"), b"old");
@@ -428,7 +428,7 @@ fn replacing_a_file_grants_no_permissions() {
             let report = |what| reports.lock().expect("no panic").push(what);
             let losses =
                 if is_refused { AttributeLossPolicy::Refuse } else { AttributeLossPolicy::Report(&report) };
-            let guard = write::WritePolicy { losses, ..NOTHING_KEPT };
+            let guard = write::ExistingFilePolicy { losses, ..NOTHING_KEPT };
             setfsgid(Gid::from_raw(65534));
             setfsuid(Uid::from_raw(65534));
             write::atomic_with_policy(&path, b"new", &guard, &CancelToken::new())
@@ -461,7 +461,7 @@ fn concurrent_saves_are_not_overwritten() {
     let refused = || OutputError::Refused { reason: "it has changed".to_owned() };
     let swap = |may_replace: &dyn Fn(&Path) -> Result<(), OutputError>| {
         std::fs::write(&path, "read").expect("written");
-        let guard = write::WritePolicy { may_replace, ..NOTHING_KEPT };
+        let guard = write::ExistingFilePolicy { may_replace, ..NOTHING_KEPT };
         write::atomic_if_unchanged(&path, (b"read", b"new"), &guard, &CancelToken::new())
     };
     let has = |text: &str| std::fs::read(&path).expect("read") == text.as_bytes();

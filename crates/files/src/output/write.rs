@@ -37,7 +37,7 @@ pub const STDOUT: &str = "/dev/stdout";
 /// unchanged, and the temporary file is removed.
 pub fn atomic(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
     let losses = AttributeLossPolicy::Report(&|_| ());
-    let guard = WritePolicy { is_kept: &|_| false, may_replace: &|_| Ok(()), sweep: None, losses };
+    let guard = ExistingFilePolicy { is_kept: &|_| false, may_replace: &|_| Ok(()), sweep: None, losses };
     atomic_with_policy(path, bytes, &guard, &CancelToken::new())
 }
 
@@ -48,7 +48,9 @@ pub fn atomic(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
 pub fn create_new(path: &Path, bytes: &[u8]) -> io::Result<()> {
     let mut file = OpenOptions::new().write(true).create_new(true).open(path)?;
     let written = file.write_all(bytes).and_then(|()| file.sync_all());
-    if written.is_err() && FileIdentity::from_path(path).is_some_and(|found| found.matches_open_file(&file)) {
+    if written.is_err()
+        && FileIdentity::from_existing_or_new_path(path).is_some_and(|found| found.matches_open_file(&file))
+    {
         // The file is still ours. Ignore errors because the caller reports the original error.
         let _ = fs::remove_file(path);
     }
@@ -56,7 +58,7 @@ pub fn create_new(path: &Path, bytes: &[u8]) -> io::Result<()> {
 }
 
 /// Policy for existing files. `may_replace` is called just before the replacement, with the resolved path.
-pub struct WritePolicy<'a> {
+pub struct ExistingFilePolicy<'a> {
     /// Whether to keep a file whose name looks like a temporary file left by a killed process.
     pub is_kept: &'a dyn Fn(&Path) -> bool,
     /// Decides whether a file, existing or not, may be replaced or written in place.
@@ -88,7 +90,7 @@ impl SweptFolders {
 pub fn atomic_with_policy(
     path: &Path,
     bytes: &[u8],
-    guard: &WritePolicy<'_>,
+    guard: &ExistingFilePolicy<'_>,
     token: &CancelToken,
 ) -> Result<(), OutputError> {
     atomic_generated(
@@ -108,7 +110,7 @@ pub fn atomic_with_policy(
 pub fn atomic_if_unchanged(
     path: &Path,
     (expected, bytes): (&[u8], &[u8]),
-    guard: &WritePolicy<'_>,
+    guard: &ExistingFilePolicy<'_>,
     token: &CancelToken,
 ) -> Result<(), OutputError> {
     let content: &dyn Fn(&mut dyn Write) -> io::Result<()> =
@@ -141,7 +143,7 @@ pub enum Durability {
 pub fn atomic_generated(
     path: &Path,
     content: &dyn Fn(&mut dyn Write) -> io::Result<()>,
-    guard: &WritePolicy<'_>,
+    guard: &ExistingFilePolicy<'_>,
     (token, durability): (&CancelToken, Durability),
 ) -> Result<Option<File>, OutputError> {
     write_atomically_or_in_place(path, content, guard, (token, durability, None), &sync_directory)
@@ -152,7 +154,7 @@ pub fn atomic_generated(
 pub(super) fn write_atomically_or_in_place(
     path: &Path,
     content: &dyn Fn(&mut dyn Write) -> io::Result<()>,
-    guard: &WritePolicy<'_>,
+    guard: &ExistingFilePolicy<'_>,
     (token, durability, expected): (&CancelToken, Durability, Option<&[u8]>),
     sync: &dyn Fn(&Path) -> io::Result<()>,
 ) -> Result<Option<File>, OutputError> {
@@ -224,7 +226,7 @@ pub fn ignore_file_size_signal() {
 /// only the owner and users on its access list can read the temporary file until it is complete.
 fn create_temporary(
     target: &TargetFile,
-    guard: &WritePolicy<'_>,
+    guard: &ExistingFilePolicy<'_>,
 ) -> io::Result<(TemporaryFile, Option<UncopiedAttributes>)> {
     let directory = target.directory();
     if guard.sweep.is_none_or(|sweep| sweep.mark_searched(directory)) {

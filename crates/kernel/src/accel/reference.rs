@@ -101,8 +101,8 @@ impl TriangleReference {
         let mut references: Vec<Self> =
             (0..count).into_par_iter().map(|id| Self::new(id, corners(id))).collect();
         token.check_pause_and_cancel()?;
-        if !references.par_iter().all(Self::is_hittable_and_finite) {
-            references.retain(Self::is_hittable_and_finite);
+        if !references.par_iter().all(Self::has_finite_extent) {
+            references.retain(Self::has_finite_extent);
         }
         Ok(references)
     }
@@ -128,7 +128,7 @@ impl TriangleReference {
     }
 
     /// Whether the triangle can be hit and its box is finite.
-    fn is_hittable_and_finite(&self) -> bool {
+    fn has_finite_extent(&self) -> bool {
         self.bounds.extent().truncate().is_finite()
     }
 

@@ -25,8 +25,8 @@ impl SimdKernel for TriangleListQueryKernel<'_> {
     fn run(self, simd: impl Simd) -> Self::Output {
         let (rows, ends) = RayPacket::new(self.rays);
         let (met, mut found) = (((1_u64 << self.rays.len()) - 1) as u32, HitPacket::without_hits());
-        let open = self.facets.closest_hit_packet(&rows, (met, &ends), &mut found, simd);
-        let [any, open_any] = self.facets.any_hit_packet(&rows, (met, &ends), self.except, simd);
+        let open = self.facets.update_decided_closest_hits(&rows, (met, &ends), &mut found, simd);
+        let [any, open_any] = self.facets.any_hit_and_undecided_masks(&rows, (met, &ends), self.except, simd);
         (found, [open, any, open_any])
     }
 }

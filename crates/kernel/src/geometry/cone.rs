@@ -60,7 +60,14 @@ impl Cone {
         let base = if self.capped { self.height } else { self.height * (1.0 + BORDER) };
         let ends = LineInterval::between_heights(&line, (0.0, 0), (base, 1))?;
         let starts_on = |part| self.starts_on(ray, part);
-        surface_of_revolution::first_hit(ray, &line, self.side_interval(&line)?, ends, self.capped, starts_on)
+        surface_of_revolution::first_hit(
+            ray,
+            &line,
+            self.double_cone_interval(&line)?,
+            ends,
+            self.capped,
+            starts_on,
+        )
     }
 
     /// Whether a ray starts on a part, within rounding error.
@@ -77,7 +84,7 @@ impl Cone {
     /// tip. The quadratic A·s² − 2B·s + C is relative to the point on the line that is closest to the tip, so
     /// B is a single product. B² − AC is computed as a difference of squares of the line's moment about the
     /// tip, which is precise even for lines that graze the side near the tip.
-    fn side_interval(&self, line: &LocalLine) -> Option<LineInterval> {
+    fn double_cone_interval(&self, line: &LocalLine) -> Option<LineInterval> {
         let k = self.radius / self.height;
         let (p, d) = (line.foot, line.direction);
         let factors = |x: DVec3| {
@@ -107,7 +114,7 @@ impl Cone {
     fn exact_hit_point(&self, ray: &RayF64, hit: &ShapeHit) -> DVec3 {
         let line = self.frame.line_to_local(ray);
         let crossings = match hit.primitive {
-            0 => self.side_interval(&line),
+            0 => self.double_cone_interval(&line),
             cap => LineInterval::between_heights(&line, (self.height, cap), (self.height, cap)),
         };
         surface_of_revolution::unrounded_hit_point((ray, &line), hit, crossings, || self.intersect_f64(ray))
@@ -174,7 +181,7 @@ impl Cone {
     }
 
     /// Unit tangents of the side, pointing away from the tip and around the axis.
-    pub(super) fn principal_directions(&self, point: DVec3) -> [DVec3; 2] {
+    pub(super) fn meridian_and_azimuth_tangents(&self, point: DVec3) -> [DVec3; 2] {
         let along = (point - self.frame.origin).normalize_or(self.frame.axis());
         [along, self.frame.tangent_around(point)]
     }
@@ -184,7 +191,7 @@ impl Cone {
     }
 
     /// Point and unit normal on the side at the given texture coordinates.
-    pub fn side_point_and_normal(&self, u: f64, v: f64) -> (DVec3, DVec3) {
+    pub fn side_point_and_normal_from_uv(&self, u: f64, v: f64) -> (DVec3, DVec3) {
         let out = mirror_y(direction_at_u(u));
         let point = (out * self.radius).extend(self.height) * (1.0 - v);
         let normal = (out * self.height).extend(-self.radius) / self.slant;
@@ -197,33 +204,33 @@ impl Cone {
     }
 
     /// Areas of the parts.
-    pub fn part_areas(&self) -> [f64; 2] {
+    pub fn local_part_areas(&self) -> [f64; 2] {
         let cap = if self.capped { PI * self.radius * self.radius } else { 0.0 };
         [PI * self.radius * self.slant, cap]
     }
 
     /// Samples a point uniformly over the area of a part.
-    pub fn sample(&self, part: u32, u: Vec2) -> SurfaceSample {
+    pub fn sample_point_on_part(&self, part: u32, u: Vec2) -> SurfaceSample {
         match part {
             0 => {
                 let (point, normal) =
-                    self.side_point_and_normal(f64::from(u.x), 1.0 - (1.0 - f64::from(u.y)).sqrt());
+                    self.side_point_and_normal_from_uv(f64::from(u.x), 1.0 - (1.0 - f64::from(u.y)).sqrt());
                 SurfaceSample { point, normal }
             }
-            _ => self.base().sample(0, u),
+            _ => self.base().sample_point_on_part(0, u),
         }
     }
 
     /// Centroid of the surface.
     pub fn centroid(&self) -> DVec3 {
-        let [side, cap] = self.part_areas();
+        let [side, cap] = self.local_part_areas();
         self.frame.point_to_world(DVec3::Z * (self.height * (side * 2.0 / 3.0 + cap) / (side + cap)))
     }
 
     /// Projected area: the surface area facing a unit direction, weighted by the cosine.
-    pub fn projected_area(&self, direction: DVec3) -> f64 {
+    pub fn projected_area_estimate(&self, direction: DVec3) -> f64 {
         let along = self.frame.axis().dot(direction);
-        let [side, cap] = self.part_areas();
+        let [side, cap] = self.local_part_areas();
         // Components of the side's normals perpendicular to the axis and toward the tip.
         let (cosine, sine) = (self.height / self.slant, self.radius / self.slant);
         projected_area_of_normal_ring(side, cosine * sine_from_cosine(along), -sine * along)
@@ -337,7 +344,7 @@ mod tests {
         let surface = hat(true).surface_point_at_hit(&ray, &hit);
         assert_eq!(surface.uv.as_vec2(), Vec2::new(0.5, 0.25));
         assert!((surface.dpdv - Vec3::new(-1.0, 2.0, 0.0)).length() < 1e-6);
-        let (point, normal) = hat(true).side_point_and_normal(0.5, 0.25);
+        let (point, normal) = hat(true).side_point_and_normal_from_uv(0.5, 0.25);
         assert!((point - DVec3::new(0.75, 0.5, 0.0)).length() < 1e-14);
         assert!((normal.as_vec3() - surface.normal).length() < 1e-6);
     }
@@ -359,7 +366,7 @@ mod tests {
         }
 
         fn interval_inside_side(&self, ray: &RayF64) -> Option<LineInterval> {
-            self.side_interval(&self.frame.line_to_local(ray))
+            self.double_cone_interval(&self.frame.line_to_local(ray))
         }
 
         fn unrounded_point(&self, ray: &RayF64, hit: &ShapeHit) -> DVec3 {

@@ -1,6 +1,6 @@
 //! Oriented boxes in double precision.
 
-use super::packet::{F32x16, HitPacket, RayPacket, round_if_in_range};
+use super::packet::{F32x16, HitPacket, RayPacket, round_in_range_or_nan};
 use super::surface::tangents_from_normal;
 use super::surface_packet::{SurfaceF64, SurfacePointF64};
 use super::{Aabb, RayF64, ShapeHit, SurfacePoint, SurfaceSample};
@@ -81,7 +81,7 @@ impl OrientedBox {
                 far_face = if is_sooner { face + positive } else { far_face };
             }
             let is_met = !is_beside & (near <= far);
-            let (enter, leave) = (round_if_in_range(near, end), round_if_in_range(far, end));
+            let (enter, leave) = (round_in_range_or_nan(near, end), round_in_range_or_nan(far, end));
             let is_inside = enter.is_nan();
             let t = if is_inside { leave } else { enter };
             hits.t[lane] = if is_met { t } else { f32::NAN };
@@ -175,13 +175,13 @@ impl OrientedBox {
     }
 
     /// Areas of the faces.
-    pub fn part_areas(&self) -> [f64; 6] {
+    pub fn local_part_areas(&self) -> [f64; 6] {
         let [x, y, z] = (self.half * 2.0).to_array();
         [y * z, y * z, x * z, x * z, x * y, x * y]
     }
 
     /// Samples a point uniformly over the area of a face.
-    pub fn sample(&self, face: u32, u: Vec2) -> SurfaceSample {
+    pub fn sample_point_on_part(&self, face: u32, u: Vec2) -> SurfaceSample {
         let (corner, a, b) = self.face(face);
         let point = corner + a * f64::from(u.x) + b * f64::from(u.y);
         SurfaceSample { point, normal: self.axes * face_axis_and_normal(face).1 }
@@ -198,9 +198,9 @@ impl OrientedBox {
     }
 
     /// Projected area: the surface area facing a unit direction, weighted by the cosine.
-    pub fn projected_area(&self, direction: DVec3) -> f64 {
+    pub fn projected_area_estimate(&self, direction: DVec3) -> f64 {
         let along = (self.axes.transpose() * direction).abs();
-        let [x, _, y, _, z, _] = self.part_areas();
+        let [x, _, y, _, z, _] = self.local_part_areas();
         DVec3::new(x, y, z).dot(along)
     }
 }

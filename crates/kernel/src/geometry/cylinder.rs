@@ -151,7 +151,7 @@ impl Cylinder {
     }
 
     /// Unit tangents along the axis and around it.
-    pub(super) fn principal_directions(&self, point: DVec3) -> [DVec3; 2] {
+    pub(super) fn meridian_and_azimuth_tangents(&self, point: DVec3) -> [DVec3; 2] {
         [self.frame.axis(), self.frame.tangent_around(point)]
     }
 
@@ -160,7 +160,7 @@ impl Cylinder {
     }
 
     /// Point and unit normal on the side at the given texture coordinates.
-    pub fn side_point_and_normal(&self, u: f64, v: f64) -> (DVec3, DVec3) {
+    pub fn side_point_and_normal_from_uv(&self, u: f64, v: f64) -> (DVec3, DVec3) {
         let (out, z) = (direction_at_u(u), (2.0 * v - 1.0) * self.half_length);
         (
             self.frame.point_to_world((out * self.radius).extend(z)),
@@ -176,19 +176,19 @@ impl Cylinder {
     }
 
     /// Areas of the parts.
-    pub fn part_areas(&self) -> [f64; 3] {
+    pub fn local_part_areas(&self) -> [f64; 3] {
         let cap = if self.capped { PI * self.radius * self.radius } else { 0.0 };
         [TAU * self.radius * 2.0 * self.half_length, cap, cap]
     }
 
     /// Samples a point uniformly over the area of a part.
-    pub fn sample(&self, part: u32, u: Vec2) -> SurfaceSample {
+    pub fn sample_point_on_part(&self, part: u32, u: Vec2) -> SurfaceSample {
         match part {
             0 => {
-                let (point, normal) = self.side_point_and_normal(f64::from(u.x), f64::from(u.y));
+                let (point, normal) = self.side_point_and_normal_from_uv(f64::from(u.x), f64::from(u.y));
                 SurfaceSample { point, normal }
             }
-            cap => self.cap_disk(cap).sample(0, u),
+            cap => self.cap_disk(cap).sample_point_on_part(0, u),
         }
     }
 
@@ -198,9 +198,9 @@ impl Cylinder {
     }
 
     /// Projected area: the surface area facing a unit direction, weighted by the cosine.
-    pub fn projected_area(&self, direction: DVec3) -> f64 {
+    pub fn projected_area_estimate(&self, direction: DVec3) -> f64 {
         let along = self.frame.axis().dot(direction);
-        let [side, cap, _] = self.part_areas();
+        let [side, cap, _] = self.local_part_areas();
         projected_area_of_normal_ring(side, sine_from_cosine(along), 0.0) + cap * along.abs()
     }
 
@@ -286,7 +286,7 @@ mod tests {
         assert_eq!(surface.uv.as_vec2(), Vec2::new(0.5, 0.75));
         assert!((surface.dpdv - Vec3::Y * 4.0).length() < 1e-6);
         assert!((surface.dpdu - Vec3::NEG_Z * std::f32::consts::PI).length() < 1e-6);
-        let (point, normal) = bar(true).side_point_and_normal(0.5, 0.75);
+        let (point, normal) = bar(true).side_point_and_normal_from_uv(0.5, 0.75);
         assert!((point - DVec3::new(1.5, 3.0, 0.0)).length() < 1e-14 && (normal - DVec3::X).length() < 1e-14);
     }
 

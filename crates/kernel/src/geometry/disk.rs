@@ -2,8 +2,8 @@
 
 use std::f64::consts::PI;
 
-use super::local_geometry::{LocalGeometry, LocalSurfaceShape, NearestSurface};
-use super::packet::{F32x16, HitPacket, RayPacket, round_if_in_range};
+use super::local_geometry::{FlatOrRoundExtent, LocalGeometry, NearestSurface};
+use super::packet::{F32x16, HitPacket, RayPacket, round_in_range_or_nan};
 use super::surface_of_revolution::{AxialFrame, to_shape_hit, unrounded_t};
 use super::surface_packet::{SurfaceF64, SurfacePointF64};
 use super::{Aabb, RayF64, ShapeHit, SurfacePoint, SurfaceSample};
@@ -48,7 +48,7 @@ impl Disk {
             let line = self.frame.line_to_local(&rays.ray_f64(lane));
             let along = -line.foot.z / line.direction.z;
             let across = (line.foot + line.direction * along).truncate().length();
-            let t = round_if_in_range(line.start + along, end);
+            let t = round_in_range_or_nan(line.start + along, end);
             hits.t[lane] = if across <= radius { t } else { f32::NAN };
         }
     }
@@ -79,7 +79,7 @@ impl Disk {
     /// Point on the disk nearest to `point`, before rounding. `reach` is an upper bound on the magnitudes of
     /// the lengths used to compute `point`.
     pub fn closest_point_f64(&self, point: DVec3, reach: f64) -> SurfacePointF64 {
-        let (p, _) = self.nearest_point_and_uv(point);
+        let (p, _) = self.nearest_local_point_and_uv(point);
         SurfacePointF64 { point: self.frame.point_to_world(p.extend(0.0)), normal: self.normal(), reach }
     }
 
@@ -88,14 +88,14 @@ impl Disk {
     }
 
     /// Plane coordinates of the nearest point on the disk, and its texture coordinates.
-    fn nearest_point_and_uv(&self, point: DVec3) -> (DVec2, DVec2) {
+    fn nearest_local_point_and_uv(&self, point: DVec3) -> (DVec2, DVec2) {
         let p = self.frame.point_to_local(point).truncate().clamp_length_max(self.radius);
         (p, DVec2::splat(0.5) + p / (2.0 * self.radius))
     }
 
     /// Texture coordinates of a point on the disk.
     pub fn uv_at_point(&self, point: DVec3) -> DVec2 {
-        self.nearest_point_and_uv(point).1
+        self.nearest_local_point_and_uv(point).1
     }
 
     /// Maps a point from the unit disk to this disk.
@@ -119,12 +119,12 @@ impl Disk {
     }
 
     /// Area of each part.
-    pub fn part_areas(&self) -> [f64; 1] {
+    pub fn local_part_areas(&self) -> [f64; 1] {
         [PI * self.radius * self.radius]
     }
 
     /// Samples a point uniformly over the area.
-    pub fn sample(&self, _: u32, u: Vec2) -> SurfaceSample {
+    pub fn sample_point_on_part(&self, _: u32, u: Vec2) -> SurfaceSample {
         SurfaceSample { point: self.point_from_unit_disk(warp::disk(u).as_dvec2()), normal: self.normal() }
     }
 
@@ -137,7 +137,7 @@ impl Disk {
     /// Local geometry of the disk near a point, for density estimation.
     pub fn geometry_near(&self, point: DVec3) -> LocalGeometry {
         let (normal, from) = (self.normal(), point - self.centroid());
-        let extent = LocalSurfaceShape::Flat(self.radius - from.length());
+        let extent = FlatOrRoundExtent::Flat(self.radius - from.length());
         let ground = NearestSurface { normal, height: from.dot(normal).abs(), extent };
         LocalGeometry::Surface { distance: self.distance_from_point(point), ground: Some(ground) }
     }
@@ -149,8 +149,8 @@ impl Disk {
 
     /// Projected area of the front: the area times the cosine of the angle between the normal and a unit
     /// direction.
-    pub fn projected_area(&self, direction: DVec3) -> f64 {
-        let [area] = self.part_areas();
+    pub fn projected_area_estimate(&self, direction: DVec3) -> f64 {
+        let [area] = self.local_part_areas();
         area * self.normal().dot(direction).max(0.0)
     }
 

@@ -30,12 +30,12 @@ pub struct NearestSurface {
     /// Height of the point above or below the surface.
     pub height: f64,
     /// Extent of the surface around the closest point.
-    pub extent: LocalSurfaceShape,
+    pub extent: FlatOrRoundExtent,
 }
 
 /// Extent of a surface around a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum LocalSurfaceShape {
+pub enum FlatOrRoundExtent {
     /// A plane that extends at least up to this distance.
     Flat(f64),
     /// A sphere of this radius.

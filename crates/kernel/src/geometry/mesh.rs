@@ -16,8 +16,8 @@ pub struct TriangleMesh {
     /// Vertex texture coordinates, or empty. v = 0 is the bottom row of an image.
     pub uvs: Vec<Vec2>,
     /// Normal group of each vertex. The groups determine which vertices share a computed normal. If empty,
-    /// every vertex has its own normal in the group [`VertexNormalSharing::BY_ANGLE`].
-    pub normal_groups: Vec<VertexNormalSharing>,
+    /// every vertex has its own normal in the group [`VertexNormalGroup::BY_ANGLE`].
+    pub normal_groups: Vec<VertexNormalGroup>,
     /// Second set of vertex texture coordinates, or empty.
     pub second_uvs: Vec<Vec2>,
     /// Vertex colors in sRGB, or empty.
@@ -30,7 +30,7 @@ pub struct TriangleMesh {
 
 /// A vertex's normal group.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct VertexNormalSharing {
+pub struct VertexNormalGroup {
     /// Vertices with the same number share a normal. Must be less than the number of vertices in the file.
     pub normal: u32,
     /// Smoothing group. Normals at the same position are merged if they have the same group and differ by at
@@ -38,7 +38,7 @@ pub struct VertexNormalSharing {
     pub group: u32,
 }
 
-impl VertexNormalSharing {
+impl VertexNormalGroup {
     /// The group of vertices without a smoothing group.
     pub const BY_ANGLE: u32 = 0;
     /// The group of flat faces. Their normals are never merged with others.
@@ -57,7 +57,7 @@ impl TriangleMesh {
     }
 
     /// Bounding box in file coordinates, or `None` if there are no vertices.
-    pub fn bounds(&self) -> Option<[DVec3; 2]> {
+    pub fn bounds_in_file_coordinates(&self) -> Option<[DVec3; 2]> {
         let first = *self.positions.first()?;
         let grow = |[least, greatest]: [Vec3; 2], at: &Vec3| [least.min(*at), greatest.max(*at)];
         Some(self.positions.iter().fold([first; 2], grow).map(|at| at.as_dvec3() + self.origin))

@@ -151,7 +151,7 @@ impl Shape {
         true
     }
 
-    /// Implements [`SurfacePacket::fill_uv`]. Returns whether the shape supports SIMD.
+    /// Implements [`SurfacePacket::fill_uv_of_shape_lanes`]. Returns whether the shape supports SIMD.
     #[inline(always)]
     fn try_fill_uvs(&self, row: &mut SurfacePacket, rays: &RayPacket, hits: &HitPacket, of: u32) -> bool {
         match self {
@@ -231,17 +231,17 @@ impl Shape {
 
     /// Areas of the parts, indexed like `ShapeHit::primitive`. Empty if the shape is infinite. If the shape is
     /// transformed, these are the areas before the transform; see [`Shape::area_scale_for_world_normal`].
-    pub fn part_areas(&self) -> Vec<f64> {
-        for_shape!(self, it => it.part_areas().to_vec())
+    pub fn local_part_areas(&self) -> Vec<f64> {
+        for_shape!(self, it => it.local_part_areas().to_vec())
     }
 
-    /// Samples a point on a part, uniformly over its area in [`Shape::part_areas`]. `u` is uniform in
+    /// Samples a point on a part, uniformly over its area in [`Shape::local_part_areas`]. `u` is uniform in
     /// [0, 1)².
-    pub fn sample(&self, part: u32, u: Vec2) -> SurfaceSample {
-        for_shape!(self, it => it.sample(part, u))
+    pub fn sample_point_on_part(&self, part: u32, u: Vec2) -> SurfaceSample {
+        for_shape!(self, it => it.sample_point_on_part(part, u))
     }
 
-    /// Factor that converts [`Shape::part_areas`] to world-space area at a point with this unit normal. 1
+    /// Factor that converts [`Shape::local_part_areas`] to world-space area at a point with this unit normal. 1
     /// unless the shape is transformed.
     #[inline]
     pub fn area_scale_for_world_normal(&self, normal: DVec3) -> f64 {
@@ -277,16 +277,19 @@ impl Shape {
     /// Whether a point is inside, or behind the shape if it is a plane. Returns `None` if the shape encloses
     /// no volume.
     #[inline]
-    pub fn encloses_point(&self, point: DVec3) -> Option<bool> {
-        self.encloses_each_point([point]).map(|[is_inside]| is_inside)
+    pub fn encloses_point_if_closed(&self, point: DVec3) -> Option<bool> {
+        self.encloses_points_if_closed([point]).map(|[is_inside]| is_inside)
     }
 
-    /// [`Shape::encloses_point`] for several points.
+    /// [`Shape::encloses_point_if_closed`] for several points.
     #[inline]
-    pub fn encloses_each_point<const COUNT: usize>(&self, points: [DVec3; COUNT]) -> Option<[bool; COUNT]> {
+    pub fn encloses_points_if_closed<const COUNT: usize>(
+        &self,
+        points: [DVec3; COUNT],
+    ) -> Option<[bool; COUNT]> {
         match self {
             Self::Plane(plane) => Some(points.map(|point| plane.is_behind(point))),
-            Self::Transformed(transformed) => transformed.encloses_each_point(points),
+            Self::Transformed(transformed) => transformed.encloses_points_if_closed(points),
             Self::Sphere(_)
             | Self::Box(_)
             | Self::Torus(_)
@@ -327,9 +330,9 @@ impl Shape {
                 let (a, b) = (point - sphere.center).normalize_or(DVec3::Y).any_orthonormal_pair();
                 Some((1.0 / sphere.radius, [a, b]))
             }
-            Self::Cylinder(cylinder) => Some((0.0, cylinder.principal_directions(point))),
-            Self::Cone(cone) => Some((0.0, cone.principal_directions(point))),
-            Self::Torus(torus) => Some((1.0 / torus.tube(), torus.principal_directions(point))),
+            Self::Cylinder(cylinder) => Some((0.0, cylinder.meridian_and_azimuth_tangents(point))),
+            Self::Cone(cone) => Some((0.0, cone.meridian_and_azimuth_tangents(point))),
+            Self::Torus(torus) => Some((1.0 / torus.tube(), torus.meridian_and_azimuth_tangents(point))),
             Self::Quad(_)
             | Self::Plane(_)
             | Self::Box(_)
@@ -401,8 +404,8 @@ impl Shape {
 
     /// Projected area: the surface area facing a unit direction, weighted by the cosine. For a torus, this is
     /// the mean over all directions.
-    pub fn projected_area(&self, direction: DVec3) -> f64 {
-        for_shape!(self, it => it.projected_area(direction))
+    pub fn projected_area_estimate(&self, direction: DVec3) -> f64 {
+        for_shape!(self, it => it.projected_area_estimate(direction))
     }
 }
 
@@ -447,10 +450,10 @@ mod tests {
         let over_part = |(part, area): (u32, f64)| {
             let value =
                 |place: SurfaceSample| asked(&place) * shape.area_scale_for_world_normal(place.normal);
-            let sum: f64 = (0..SIDE * SIDE).map(|i| value(shape.sample(part, grid(i)))).sum();
+            let sum: f64 = (0..SIDE * SIDE).map(|i| value(shape.sample_point_on_part(part, grid(i)))).sum();
             sum * area / f64::from(SIDE * SIDE)
         };
-        (0..).zip(shape.part_areas()).map(over_part).sum()
+        (0..).zip(shape.local_part_areas()).map(over_part).sum()
     }
 
     /// Hits of rays aimed at the shape from a surrounding sphere.
@@ -458,9 +461,9 @@ mod tests {
         (0..4000).filter_map(move |i| {
             let around = Shape::Sphere(Sphere { center: shape.centroid(), radius: 5.0 });
             let u = |i: u32| Vec2::new(i as f32 * 0.618_034 % 1.0, i as f32 * 0.754_877_7 % 1.0);
-            let from = around.sample(0, u(i)).point;
+            let from = around.sample_point_on_part(0, u(i)).point;
             let near = Shape::Sphere(Sphere { center: shape.centroid(), radius: 0.8 });
-            let to = near.sample(0, u(3 * i + 7)).point;
+            let to = near.sample_point_on_part(0, u(3 * i + 7)).point;
             let ray = Ray::new(from.as_vec3(), (to - from).as_vec3()).to_f64();
             shape.intersect(&ray).map(|hit| (ray, hit))
         })
@@ -469,10 +472,10 @@ mod tests {
     #[test]
     fn sampled_points_are_on_the_shape() {
         for shape in shapes() {
-            for (part, _) in (0_u32..).zip(shape.part_areas()).filter(|(_, area)| *area > 0.0) {
+            for (part, _) in (0_u32..).zip(shape.local_part_areas()).filter(|(_, area)| *area > 0.0) {
                 for i in 0..200_u32 {
                     let u = Vec2::new((i as f32 + 0.5) * 0.618_034 % 1.0, (i as f32 + 0.5) / 200.0);
-                    let place = shape.sample(part, u);
+                    let place = shape.sample_point_on_part(part, u);
                     assert!((place.normal.length() - 1.0).abs() < 1e-9, "{shape:?}");
                     let from = place.point + place.normal * 0.01;
                     let ray = Ray::new(from.as_vec3(), -place.normal.as_vec3()).to_f64();
@@ -505,7 +508,7 @@ mod tests {
 
     #[test]
     fn projected_area_integrates_the_cosines() {
-        for shape in shapes().into_iter().filter(|shape| !shape.part_areas().is_empty()) {
+        for shape in shapes().into_iter().filter(|shape| !shape.local_part_areas().is_empty()) {
             let directions = [DVec3::X, DVec3::NEG_Y, DVec3::new(-0.3, 0.5, 0.8).normalize()];
             let shown = |direction: DVec3| integral(&shape, |place| place.normal.dot(direction).max(0.0));
             let area = integral(&shape, |_| 1.0);
@@ -515,9 +518,9 @@ mod tests {
             for direction in directions {
                 if matches!(shape, Shape::Torus(_)) {
                     // For a torus, only the mean over all directions is computed (Cauchy's formula).
-                    assert_eq!(shape.projected_area(direction), shape.part_areas()[0] / 4.0);
+                    assert_eq!(shape.projected_area_estimate(direction), shape.local_part_areas()[0] / 4.0);
                 } else {
-                    let off = shape.projected_area(direction) - shown(direction);
+                    let off = shape.projected_area_estimate(direction) - shown(direction);
                     assert!(off.abs() < 2e-3 * area, "{shape:?}: {off}");
                 }
             }
@@ -528,7 +531,7 @@ mod tests {
     fn centroid_is_the_mean_of_the_points() {
         // The centroid of a transformed cone is not the image of the cone's centroid.
         let is_cone = |shape: &Shape| matches!(untransformed(shape), (Shape::Cone(_), true));
-        let bounded = |shape: &Shape| !shape.part_areas().is_empty();
+        let bounded = |shape: &Shape| !shape.local_part_areas().is_empty();
         for shape in shapes().into_iter().filter(|shape| bounded(shape) && !is_cone(shape)) {
             let area = integral(&shape, |_| 1.0);
             for axis in 0..3 {
@@ -545,11 +548,11 @@ mod tests {
             LocalGeometry::Polygons(_) => None,
         };
         for shape in shapes() {
-            let parts = (0_u32..).zip(shape.part_areas()).filter(|(_, area)| *area > 0.0);
+            let parts = (0_u32..).zip(shape.local_part_areas()).filter(|(_, area)| *area > 0.0);
             let grid = |i: u32| Vec2::new((i % SIDE) as f32 + 0.5, (i / SIDE) as f32 + 0.5) / SIDE as f32;
             let places: Vec<DVec3> = parts
                 .flat_map(|(part, _)| (0..SIDE * SIDE).map(move |i| (part, grid(i))))
-                .map(|(part, u)| shape.sample(part, u).point)
+                .map(|(part, u)| shape.sample_point_on_part(part, u).point)
                 .collect();
             for i in 0..12_u32 {
                 let u = |factor: f64| (f64::from(i) + 0.5) * factor % 1.0 * 3.0 - 1.5;
@@ -572,7 +575,9 @@ mod tests {
             // A tube or an open cone also contains points, although its surface is open.
             let is_closed = match untransformed(&shape).0 {
                 Shape::Sphere(_) | Shape::Box(_) | Shape::Torus(_) => true,
-                Shape::Cylinder(_) | Shape::Cone(_) => shape.part_areas().iter().all(|&area| area > 0.0),
+                Shape::Cylinder(_) | Shape::Cone(_) => {
+                    shape.local_part_areas().iter().all(|&area| area > 0.0)
+                }
                 Shape::Quad(_)
                 | Shape::Plane(_)
                 | Shape::Triangle(_)

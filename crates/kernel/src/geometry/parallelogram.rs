@@ -1,6 +1,8 @@
 //! Quads (squares and other parallelograms) in double precision.
 
-use super::packet::{F32x16, HitPacket, PACKET_SIZE, RayPacket, can_quotient_be_in_range, round_if_in_range};
+use super::packet::{
+    F32x16, HitPacket, PACKET_SIZE, RayPacket, can_quotient_be_in_range, round_in_range_or_nan,
+};
 use super::surface_packet::{SurfaceF64, SurfacePointF64, UvMapped};
 use super::{Aabb, RayF64, ShapeHit, SurfacePoint, SurfaceSample};
 use crate::math::lanes::{Simd, TRUE};
@@ -72,7 +74,7 @@ impl Parallelogram {
             let from_corner = ray.direction * t - (self.corner - ray.origin);
             let (s, r) = (from_corner.dot(self.dual_u), from_corner.dot(self.dual_v));
             let is_inside = is_in_unit_interval_with_margin(s) & is_in_unit_interval_with_margin(r);
-            let accepted = round_if_in_range(t, ends[lane]);
+            let accepted = round_in_range_or_nan(t, ends[lane]);
             hits.t[lane] = if is_inside { accepted } else { f32::NAN };
         }
     }
@@ -112,12 +114,12 @@ impl Parallelogram {
     }
 
     /// Area of each part.
-    pub fn part_areas(&self) -> [f64; 1] {
+    pub fn local_part_areas(&self) -> [f64; 1] {
         [self.normal.length()]
     }
 
     /// Samples a point uniformly over the area.
-    pub fn sample(&self, _: u32, u: Vec2) -> SurfaceSample {
+    pub fn sample_point_on_part(&self, _: u32, u: Vec2) -> SurfaceSample {
         let point = self.corner + self.u * f64::from(u.x) + self.v * f64::from(u.y);
         SurfaceSample { point, normal: self.normal.normalize() }
     }
@@ -134,7 +136,7 @@ impl Parallelogram {
 
     /// Projected area of the front: the area times the cosine of the angle between the normal and a unit
     /// direction.
-    pub fn projected_area(&self, direction: DVec3) -> f64 {
+    pub fn projected_area_estimate(&self, direction: DVec3) -> f64 {
         self.normal.dot(direction).max(0.0)
     }
 }

@@ -1,7 +1,9 @@
 //! Infinite planes in double precision.
 
-use super::local_geometry::{LocalGeometry, LocalSurfaceShape, NearestSurface};
-use super::packet::{F32x16, HitPacket, PACKET_SIZE, RayPacket, can_quotient_be_in_range, round_if_in_range};
+use super::local_geometry::{FlatOrRoundExtent, LocalGeometry, NearestSurface};
+use super::packet::{
+    F32x16, HitPacket, PACKET_SIZE, RayPacket, can_quotient_be_in_range, round_in_range_or_nan,
+};
 use super::surface::tangents_from_normal;
 use super::surface_packet::{SurfaceF64, SurfacePointF64, UvMapped};
 use super::{RayF64, ShapeHit, SurfacePoint, SurfaceSample};
@@ -49,7 +51,7 @@ impl Plane {
         }
         for lane in 0..PACKET_SIZE {
             let t = above[lane] / along[lane];
-            let accepted = round_if_in_range(t, ends[lane]);
+            let accepted = round_in_range_or_nan(t, ends[lane]);
             hits.t[lane] = if t < f64::from(f32::MAX) { accepted } else { f32::NAN };
         }
     }
@@ -79,12 +81,12 @@ impl Plane {
     }
 
     /// Areas of the parts. The array is empty because a plane's area is infinite.
-    pub fn part_areas(&self) -> [f64; 0] {
+    pub fn local_part_areas(&self) -> [f64; 0] {
         []
     }
 
     /// Returns the plane's reference point because an infinite area cannot be sampled uniformly.
-    pub fn sample(&self, _: u32, _: Vec2) -> SurfaceSample {
+    pub fn sample_point_on_part(&self, _: u32, _: Vec2) -> SurfaceSample {
         SurfaceSample { point: self.point, normal: self.normal }
     }
 
@@ -109,7 +111,7 @@ impl Plane {
         let ground = NearestSurface {
             normal: self.normal,
             height: distance,
-            extent: LocalSurfaceShape::Flat(f64::INFINITY),
+            extent: FlatOrRoundExtent::Flat(f64::INFINITY),
         };
         LocalGeometry::Surface { distance, ground: Some(ground) }
     }
@@ -125,7 +127,7 @@ impl Plane {
     }
 
     /// Projected area of the front, which is infinite if the front faces `direction` and 0 otherwise.
-    pub fn projected_area(&self, direction: DVec3) -> f64 {
+    pub fn projected_area_estimate(&self, direction: DVec3) -> f64 {
         if self.normal.dot(direction) > 0.0 { f64::INFINITY } else { 0.0 }
     }
 }

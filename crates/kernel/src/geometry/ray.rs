@@ -45,7 +45,7 @@ impl Ray {
 
     /// Extends the segment by the error bound of its endpoint.
     #[inline(always)]
-    pub fn extended_by_error(self, error: Vec3) -> Self {
+    pub fn extended_by_endpoint_error(self, error: Vec3) -> Self {
         let relative = 4.0 * error.max_element() / self.direction.abs().max_element();
         Self { t_max: self.t_max + relative, ..self }
     }

@@ -2,8 +2,8 @@
 
 use std::f64::consts::PI;
 
-use super::local_geometry::{LocalGeometry, LocalSurfaceShape, NearestSurface};
-use super::packet::{F32x16, HitPacket, PACKET_SIZE, RayPacket, round_if_in_range};
+use super::local_geometry::{FlatOrRoundExtent, LocalGeometry, NearestSurface};
+use super::packet::{F32x16, HitPacket, PACKET_SIZE, RayPacket, round_in_range_or_nan};
 use super::surface_packet::{SurfaceF64, SurfacePointF64};
 use super::{Aabb, RayF64, ShapeHit, SurfacePoint, SurfaceSample};
 use crate::math::lanes::{Simd, TRUE};
@@ -65,8 +65,8 @@ impl Sphere {
             let q = b + (a * discriminants[lane]).sqrt().copysign(b);
             let (t0, t1) = (c / q, q / a);
             let is_in_order = t0 < t1;
-            let near = round_if_in_range(if is_in_order { t0 } else { t1 }, ends[lane]);
-            let far = round_if_in_range(if is_in_order { t1 } else { t0 }, ends[lane]);
+            let near = round_in_range_or_nan(if is_in_order { t0 } else { t1 }, ends[lane]);
+            let far = round_in_range_or_nan(if is_in_order { t1 } else { t0 }, ends[lane]);
             let t = if near.is_nan() { far } else { near };
             hits.t[lane] = if discriminants[lane] >= 0.0 { t } else { f32::NAN };
         }
@@ -93,12 +93,12 @@ impl Sphere {
     }
 
     /// Area of each part.
-    pub fn part_areas(&self) -> [f64; 1] {
+    pub fn local_part_areas(&self) -> [f64; 1] {
         [4.0 * PI * self.radius * self.radius]
     }
 
     /// Samples a point uniformly over the area.
-    pub fn sample(&self, _: u32, u: Vec2) -> SurfaceSample {
+    pub fn sample_point_on_part(&self, _: u32, u: Vec2) -> SurfaceSample {
         let (x, y) = (f64::from(u.x), f64::from(u.y));
         let height = 1.0 - 2.0 * x;
         let across = (1.0 - height * height).max(0.0).sqrt();
@@ -121,7 +121,7 @@ impl Sphere {
     pub fn geometry_near(&self, point: DVec3) -> LocalGeometry {
         let (distance, out) = (self.distance_from_point(point), (point - self.center).normalize_or_zero());
         let ground =
-            NearestSurface { normal: out, height: distance, extent: LocalSurfaceShape::Round(self.radius) };
+            NearestSurface { normal: out, height: distance, extent: FlatOrRoundExtent::Round(self.radius) };
         LocalGeometry::Surface { distance, ground: Some(ground) }
     }
 
@@ -136,7 +136,7 @@ impl Sphere {
     }
 
     /// Projected area, which is the area enclosed by a great circle, whatever the direction.
-    pub fn projected_area(&self, _: DVec3) -> f64 {
+    pub fn projected_area_estimate(&self, _: DVec3) -> f64 {
         PI * self.radius * self.radius
     }
 }

@@ -76,7 +76,7 @@ impl SurfacePacket {
     /// Computes the surface points of the hits selected by `of`, which must be on the same shape. Returns
     /// false if the shape has no SIMD loop.
     #[inline(always)]
-    pub fn try_compute_surface_points(
+    pub fn try_fill_points_of_shape_lanes(
         &mut self,
         shape: &Shape,
         rays: &RayPacket,
@@ -88,7 +88,7 @@ impl SurfacePacket {
 
     /// Computes the texture coordinates of the hits selected by `of`, which must be on the same shape.
     #[inline(always)]
-    pub fn fill_uv(&mut self, shape: &Shape, rays: &RayPacket, hits: &HitPacket, of: u32) {
+    pub fn fill_uv_of_shape_lanes(&mut self, shape: &Shape, rays: &RayPacket, hits: &HitPacket, of: u32) {
         if shape.try_fill_uvs(self, rays, hits, of) {
             return;
         }
@@ -99,7 +99,7 @@ impl SurfacePacket {
         }
     }
 
-    /// [`SurfacePacket::fill_uv`] for a shape with a SIMD loop.
+    /// [`SurfacePacket::fill_uv_of_shape_lanes`] for a shape with a SIMD loop.
     #[inline(always)]
     pub(super) fn fill_uv_from_shape(
         &mut self,
@@ -116,7 +116,7 @@ impl SurfacePacket {
         }
     }
 
-    /// [`SurfacePacket::try_compute_surface_points`] for a shape with a SIMD loop.
+    /// [`SurfacePacket::try_fill_points_of_shape_lanes`] for a shape with a SIMD loop.
     #[inline(always)]
     pub(super) fn fill_from_shape(
         &mut self,

@@ -3,7 +3,7 @@
 //! Rays are transformed to the shape's own coordinates in double precision. An affine transform preserves the
 //! ray parameter t, so hits are the same in both coordinate systems.
 
-use super::local_geometry::{FlatPolygon, LocalGeometry, LocalSurfaceShape, NearestSurface};
+use super::local_geometry::{FlatOrRoundExtent, FlatPolygon, LocalGeometry, NearestSurface};
 use super::surface_packet::{SurfaceF64, SurfacePointF64};
 use super::{Aabb, RayF64, Shape, ShapeHit, SurfacePoint, SurfaceSample};
 use crate::math::transform::Transform;
@@ -96,14 +96,14 @@ impl TransformedShape {
 
     /// Areas of the parts in the shape's coordinates. [`TransformedShape::area_scale_for_world_normal`] converts areas to the
     /// world.
-    pub fn part_areas(&self) -> Vec<f64> {
-        self.shape.part_areas()
+    pub fn local_part_areas(&self) -> Vec<f64> {
+        self.shape.local_part_areas()
     }
 
     /// Samples a point in the world. It is distributed uniformly over a part's area in the shape's
     /// coordinates.
-    pub fn sample(&self, part: u32, u: Vec2) -> SurfaceSample {
-        let SurfaceSample { point, normal } = self.shape.sample(part, u);
+    pub fn sample_point_on_part(&self, part: u32, u: Vec2) -> SurfaceSample {
+        let SurfaceSample { point, normal } = self.shape.sample_point_on_part(part, u);
         SurfaceSample { point: self.to_world.point(point), normal: self.to_world.normal(normal).normalize() }
     }
 
@@ -123,9 +123,12 @@ impl TransformedShape {
         self.shape.contains_point(self.to_world.inverse_point(point))
     }
 
-    /// [`Shape::encloses_each_point`] for the transformed shape.
-    pub fn encloses_each_point<const COUNT: usize>(&self, points: [DVec3; COUNT]) -> Option<[bool; COUNT]> {
-        self.shape.encloses_each_point(points.map(|point| self.to_world.inverse_point(point)))
+    /// [`Shape::encloses_points_if_closed`] for the transformed shape.
+    pub fn encloses_points_if_closed<const COUNT: usize>(
+        &self,
+        points: [DVec3; COUNT],
+    ) -> Option<[bool; COUNT]> {
+        self.shape.encloses_points_if_closed(points.map(|point| self.to_world.inverse_point(point)))
     }
 
     /// Texture coordinates of a point on the surface.
@@ -154,16 +157,16 @@ impl TransformedShape {
     /// Local geometry of the shape near a point, for density estimation. The distance is a lower bound.
     pub fn geometry_near(&self, point: DVec3) -> LocalGeometry {
         let ground_to_world = |ground: NearestSurface| match ground.extent {
-            LocalSurfaceShape::Flat(extent) => {
+            FlatOrRoundExtent::Flat(extent) => {
                 let normal = self.to_world.normal(ground.normal);
                 let length = normal.length();
                 Some(NearestSurface {
                     normal: normal / length,
                     height: ground.height / length,
-                    extent: LocalSurfaceShape::Flat(extent / self.inverse_stretch),
+                    extent: FlatOrRoundExtent::Flat(extent / self.inverse_stretch),
                 })
             }
-            LocalSurfaceShape::Round(_) => None,
+            FlatOrRoundExtent::Round(_) => None,
         };
         match self.shape.geometry_near(self.to_world.inverse_point(point)) {
             LocalGeometry::Polygons(count) => LocalGeometry::Polygons(count),
@@ -191,10 +194,10 @@ impl TransformedShape {
     }
 
     /// Projected area. The transform maps the area vectors A to |det M|·M⁻ᵀ·A.
-    pub fn projected_area(&self, direction: DVec3) -> f64 {
+    pub fn projected_area_estimate(&self, direction: DVec3) -> f64 {
         let direction = self.to_world.inverse_vector(direction);
         let length = direction.length();
-        self.volume_scale * length * self.shape.projected_area(direction / length)
+        self.volume_scale * length * self.shape.projected_area_estimate(direction / length)
     }
 }
 
@@ -229,15 +232,16 @@ pub(crate) mod tests {
     }
 
     /// Area of a part, computed with the midpoint rule.
-    pub(crate) fn area(shape: &Shape, part: u32) -> f64 {
+    pub(crate) fn part_area_by_midpoint_rule(shape: &Shape, part: u32) -> f64 {
         let side = 256_u32;
         let at = |i: u32| (Vec2::new((i % side) as f32, (i / side) as f32) + 0.5) / side as f32;
-        let scale = |i: u32| shape.area_scale_for_world_normal(shape.sample(part, at(i)).normal);
+        let scale =
+            |i: u32| shape.area_scale_for_world_normal(shape.sample_point_on_part(part, at(i)).normal);
         let mean = (0..side * side).map(scale).sum::<f64>() / f64::from(side * side);
-        mean * shape.part_areas()[part as usize]
+        mean * shape.local_part_areas()[part as usize]
     }
 
-    fn scaled(shape: Shape, scale: DVec3, degrees: DVec3, translation: DVec3) -> Shape {
+    fn transformed_shape(shape: Shape, scale: DVec3, degrees: DVec3, translation: DVec3) -> Shape {
         let to_world = Transform::scale_rotate_translate(scale, degrees, translation);
         Shape::Transformed(Box::new(TransformedShape::new(shape, to_world)))
     }
@@ -254,7 +258,7 @@ pub(crate) mod tests {
             let degrees = DVec3::new(number(), number(), number()) * 180.0;
             let center = DVec3::new(number(), number(), number()) * 100.0;
             let unit = Shape::Sphere(Sphere { center: DVec3::ZERO, radius: 1.0 });
-            let shape = scaled(unit, scale, degrees, center);
+            let shape = transformed_shape(unit, scale, degrees, center);
             let Shape::Transformed(own) = &shape else { unreachable!() };
             let on_unit = || DVec3::new(number(), number(), number()).normalize();
             let [a, b] = {
@@ -292,21 +296,26 @@ pub(crate) mod tests {
     fn area_scales_integrate_to_known_areas() {
         // A prolate spheroid with semi-axes a and c: 2π·a²·(1 + c·arcsin(e)/(a·e)), where e² = 1 − a²/c².
         let unit = Shape::Sphere(Sphere { center: DVec3::ZERO, radius: 1.0 });
-        let spheroid = scaled(unit, DVec3::new(1.0, 3.0, -1.0), DVec3::new(20.0, 50.0, 70.0), DVec3::ONE);
+        let spheroid =
+            transformed_shape(unit, DVec3::new(1.0, 3.0, -1.0), DVec3::new(20.0, 50.0, 70.0), DVec3::ONE);
         let e = (1.0 - 1.0 / 9.0_f64).sqrt();
         let expected = std::f64::consts::TAU * (1.0 + 3.0 * e.asin() / e);
-        assert!((area(&spheroid, 0) / expected - 1.0).abs() < 1e-4, "{} {expected}", area(&spheroid, 0));
+        assert!(
+            (part_area_by_midpoint_rule(&spheroid, 0) / expected - 1.0).abs() < 1e-4,
+            "{} {expected}",
+            part_area_by_midpoint_rule(&spheroid, 0)
+        );
         // A cylinder stretched across its axis. The midpoint rule gives the circumference of the elliptical
         // cross section.
         let tube = Shape::Cylinder(Cylinder::new(DVec3::ZERO, DVec3::Z * 2.0, 1.0, true));
-        let tube = scaled(tube, DVec3::new(4.0, 1.0, 1.0), DVec3::ZERO, DVec3::ZERO);
+        let tube = transformed_shape(tube, DVec3::new(4.0, 1.0, 1.0), DVec3::ZERO, DVec3::ZERO);
         let step = |i: u32| {
             let (sin, cos) = (std::f64::consts::TAU * (f64::from(i) + 0.5) / 10_000.0).sin_cos();
             DVec2::new(4.0 * sin, cos).length() * std::f64::consts::TAU / 10_000.0
         };
         let ellipse: f64 = (0..10_000).map(step).sum();
-        assert!((area(&tube, 0) / (2.0 * ellipse) - 1.0).abs() < 1e-4);
-        assert!((area(&tube, 1) / (4.0 * std::f64::consts::PI) - 1.0).abs() < 1e-9);
+        assert!((part_area_by_midpoint_rule(&tube, 0) / (2.0 * ellipse) - 1.0).abs() < 1e-4);
+        assert!((part_area_by_midpoint_rule(&tube, 1) / (4.0 * std::f64::consts::PI) - 1.0).abs() < 1e-9);
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! Single triangles in double precision.
 
-use super::packet::{F32x16, HitPacket, RayPacket, round_if_in_range};
+use super::packet::{F32x16, HitPacket, RayPacket, round_in_range_or_nan};
 use super::surface_packet::{SurfaceF64, SurfacePointF64};
 use super::{Aabb, RayF64, ShapeHit, SurfacePoint, SurfaceSample};
 use crate::math::{DVec2, DVec3, Vec2};
@@ -50,7 +50,7 @@ impl Triangle {
             let is_right = (wa > 0.0) | (wb > 0.0) | (wc > 0.0);
             let sum = wa + wb + wc;
             let normal = (b - a).cross(c - a);
-            let t = round_if_in_range(normal.dot(a) / normal.dot(d), end);
+            let t = round_in_range_or_nan(normal.dot(a) / normal.dot(d), end);
             let is_met = !(is_left & is_right) & (sum != 0.0);
             hits.t[lane] = if is_met { t } else { f32::NAN };
             hits.u[lane] = (wb / sum) as f32;
@@ -87,12 +87,12 @@ impl Triangle {
     }
 
     /// Area of each part.
-    pub fn part_areas(&self) -> [f64; 1] {
+    pub fn local_part_areas(&self) -> [f64; 1] {
         [0.5 * self.unnormalized_normal().length()]
     }
 
     /// Samples a point uniformly over the area.
-    pub fn sample(&self, _: u32, u: Vec2) -> SurfaceSample {
+    pub fn sample_point_on_part(&self, _: u32, u: Vec2) -> SurfaceSample {
         let w = warp::triangle(u).as_dvec3();
         SurfaceSample {
             point: self.a * w.x + self.b * w.y + self.c * w.z,
@@ -112,7 +112,7 @@ impl Triangle {
 
     /// Projected area of the front: the area times the cosine of the angle between the normal and a unit
     /// direction.
-    pub fn projected_area(&self, direction: DVec3) -> f64 {
+    pub fn projected_area_estimate(&self, direction: DVec3) -> f64 {
         (0.5 * self.unnormalized_normal().dot(direction)).max(0.0)
     }
 }

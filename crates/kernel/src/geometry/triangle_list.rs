@@ -139,8 +139,8 @@ impl TriangleList {
                 continue;
             }
             let other = (number + 1..corners.len()).find_map(|other| {
-                let pair =
-                    is_left[other].then(|| pair_into_quad(&corners[number], &corners[other], reach))??;
+                let pair = is_left[other]
+                    .then(|| reorder_corners_into_quad(&corners[number], &corners[other], reach))??;
                 Some((other, pair))
             });
             facets.push(match other {
@@ -162,7 +162,7 @@ impl TriangleList {
     /// Updates `found` with the nearest hits of the rays in `met`. All other rays must have negative ends.
     /// Returns the mask of undecided rays, whose hits are left unchanged.
     #[inline(always)]
-    pub fn closest_hit_packet(
+    pub fn update_decided_closest_hits(
         &self,
         rays: &RayPacket,
         (met, ends): (u32, &F32x16),
@@ -182,7 +182,7 @@ impl TriangleList {
     /// Returns the mask of the rays in `met` that hit any triangle other than the ray's entry in `except`,
     /// and the mask of undecided rays. All other rays must have negative ends.
     #[inline(always)]
-    pub fn any_hit_packet(
+    pub fn any_hit_and_undecided_masks(
         &self,
         rays: &RayPacket,
         (met, ends): (u32, &F32x16),
@@ -403,7 +403,7 @@ impl TriangleOrQuad {
 /// Reorders the corners of two triangles that form a flat quadrilateral close to a parallelogram. The first
 /// triangle's outer corner becomes its first corner, and the second triangle's outer corner becomes its last.
 /// Returns `None` for other triangles.
-fn pair_into_quad(one: &[Vec3; 3], other: &[Vec3; 3], reach: f32) -> Option<[[Vec3; 3]; 2]> {
+fn reorder_corners_into_quad(one: &[Vec3; 3], other: &[Vec3; 3], reach: f32) -> Option<[[Vec3; 3]; 2]> {
     let apart = |of: &[Vec3; 3], from: &[Vec3; 3]| {
         let mut own = (0..3).filter(|&i| !from.contains(&of[i]));
         own.next().filter(|_| own.next().is_none())

@@ -54,8 +54,10 @@ pub use photon_emission::{
     BoundingSphere, EmissiveObjectGeometry, EmittedPhoton, PhotonEmitter, PhotonOrigin, PhotonRandomNumbers,
 };
 pub use sample::{LightCenter, LightGeometry, LightHit, LightSample, ShadowRayEnd};
-pub use set::{ExpectedSamplesPerLight, LightSampler, LightSamplingEffort, LightSamplingPurpose, Lights};
-pub use tree::{LightBounds, LightPick, LightTree, LightTreeCut, Receiver, ReceiverLobe, ReceiverPacket};
+pub use set::{ExpectedSamplesPerLight, LightSampler, LightSamplingEffort, LightSamplingIntegrator, Lights};
+pub use tree::{
+    AdaptiveLightTreeCut, LightBounds, LightPick, LightTree, Receiver, ReceiverLobe, ReceiverPacket,
+};
 
 #[cfg(test)]
 mod tests;

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::area::{AreaLight, EmittingTriangleSelection, MeshEmitter, Side};
 use super::infinite::{DirectionalLight, Environment, InfiniteLight};
 use super::light::Light;
-use super::tree::{LightTree, LightTreeCut, MAX_WITHOUT_TREE, Receiver};
+use super::tree::{AdaptiveLightTreeCut, LightTree, MAX_WITHOUT_TREE, Receiver};
 use crate::control::{CancelToken, Cancelled};
 use crate::math::Vec3;
 
@@ -30,7 +30,7 @@ pub struct Lights {
 
 /// Purpose of the light samples at a vertex.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum LightSamplingPurpose {
+pub enum LightSamplingIntegrator {
     /// Direct lighting only, where light sampling is the only source of noise.
     Eye,
     /// Path tracing, where the image also has noise from other sources.
@@ -60,7 +60,7 @@ pub struct LightSamplingEffort {
 
 impl LightSamplingEffort {
     /// Effort for direct lighting. The results are as good as if each of a thousand lights were examined.
-    pub const DIRECT: Self = Self { count: MAX_WITHOUT_TREE as u32, nodes: LightTreeCut::MOST };
+    pub const DIRECT: Self = Self { count: MAX_WITHOUT_TREE as u32, nodes: AdaptiveLightTreeCut::MOST };
 
     /// Effort for path vertices. Additional shadow rays are not worthwhile because the image also has other
     /// noise.
@@ -68,13 +68,13 @@ impl LightSamplingEffort {
 
     /// Creates a cut through a tree for this effort.
     #[inline(always)]
-    pub fn new_tree_cut(self, tree: &LightTree) -> LightTreeCut<'_> {
-        LightTreeCut::new(tree, self.nodes)
+    pub fn new_tree_cut(self, tree: &LightTree) -> AdaptiveLightTreeCut<'_> {
+        AdaptiveLightTreeCut::new(tree, self.nodes)
     }
 }
 
 /// Expected number of samples that each light gets at a vertex, per requested sample.
-pub struct ExpectedSamplesPerLight<'a>(Option<(LightSampler<'a>, LightTreeCut<'a>)>);
+pub struct ExpectedSamplesPerLight<'a>(Option<(LightSampler<'a>, AdaptiveLightTreeCut<'a>)>);
 
 impl ExpectedSamplesPerLight<'_> {
     /// Expected number of samples for a light.
@@ -108,7 +108,7 @@ impl Lights {
         let mut lights = Self::default();
         for (number, light) in (0_u32..).zip(&all) {
             if let Some(light) = light.as_area() {
-                lights.index_light_by_object(number, light);
+                lights.add_light_to_object_index(number, light);
             } else if let Some(sun) = light.as_directional().filter(|sun| !sun.is_single_direction()) {
                 lights.suns.push((number, *sun));
             } else if let Some(light) = light.as_environment() {
@@ -136,14 +136,14 @@ impl Lights {
 
     /// How vertices pick lights, or `None` if they sample all lights.
     #[inline]
-    pub fn sampler_for_purpose(&self, receivers: LightSamplingPurpose) -> Option<LightSampler<'_>> {
+    pub fn sampler_for_integrator(&self, receivers: LightSamplingIntegrator) -> Option<LightSampler<'_>> {
         match receivers {
-            LightSamplingPurpose::Eye => {
+            LightSamplingIntegrator::Eye => {
                 let sampler =
                     |tree| LightSampler { tree, picks: LightSamplingEffort::DIRECT, leaves_beyond: false };
                 self.tree.as_deref().map(sampler)
             }
-            LightSamplingPurpose::Paths => {
+            LightSamplingIntegrator::Paths => {
                 let sampler =
                     |tree| LightSampler { tree, picks: LightSamplingEffort::PATHS, leaves_beyond: true };
                 self.local_tree.as_deref().map(sampler)
@@ -156,12 +156,14 @@ impl Lights {
     #[inline]
     pub fn expected_sample_counts(
         &self,
-        receivers: LightSamplingPurpose,
+        receivers: LightSamplingIntegrator,
         point: Vec3,
         normal: Vec3,
     ) -> ExpectedSamplesPerLight<'_> {
         // Return early because a cut is expensive to copy.
-        let Some(sampler) = self.sampler_for_purpose(receivers) else { return ExpectedSamplesPerLight(None) };
+        let Some(sampler) = self.sampler_for_integrator(receivers) else {
+            return ExpectedSamplesPerLight(None);
+        };
         let mut cut = sampler.picks.new_tree_cut(sampler.tree);
         cut.adapt_to_receiver(&Receiver::with_unknown_lobe(point, normal));
         ExpectedSamplesPerLight(Some((sampler, cut)))
@@ -178,7 +180,7 @@ impl Lights {
         trees.iter().map(|tree| tree.memory_bytes()).chain(self.all.iter().map(of_mesh)).sum()
     }
 
-    fn index_light_by_object(&mut self, number: u32, light: &AreaLight) {
+    fn add_light_to_object_index(&mut self, number: u32, light: &AreaLight) {
         let by_object = match light.side {
             Side::Front => &mut self.by_object,
             Side::Back => &mut self.by_back,
@@ -220,7 +222,7 @@ impl Lights {
 
     /// Whether rays can hit a light.
     pub fn can_be_hit(&self) -> bool {
-        !self.by_object.is_empty() || self.has_infinite_lights()
+        !self.by_object.is_empty() || self.has_visible_infinite_lights()
     }
 
     /// Whether any part of an object emits.
@@ -235,7 +237,7 @@ impl Lights {
     }
 
     /// Whether rays that leave the scene may reach a light.
-    pub fn has_infinite_lights(&self) -> bool {
+    pub fn has_visible_infinite_lights(&self) -> bool {
         !self.suns.is_empty() || self.environment.is_some()
     }
 

@@ -203,7 +203,7 @@ fn two_sided_samples_cover_the_visible_shape() {
         // Use points around the shape and one point inside.
         let is_flat =
             front_area_light(&shape, Vec3::ONE, 0).is_some_and(|light| light.bounds.cone.cos == 1.0);
-        let inner = shape.sample(0, Vec2::splat(0.5));
+        let inner = shape.sample_point_on_part(0, Vec2::splat(0.5));
         let inner = (inner.point - inner.normal * 0.1).as_vec3();
         for from in points().into_iter().chain((!is_flat).then_some(inner)) {
             let (n, mut seen, mut sum) = (100_000_u32, 0.0, 0.0);
@@ -245,7 +245,7 @@ fn back_sample_pdf_equals_pdf_of_hit() {
     for shape in shapes().into_iter().chain([tube]) {
         let light = Light::Area(back_area_light(&shape, Vec3::ONE, OBJECT).expect("a light"));
         let mut compared = 0;
-        let inner = shape.sample(0, Vec2::splat(0.5));
+        let inner = shape.sample_point_on_part(0, Vec2::splat(0.5));
         let inner = (inner.point - inner.normal * 0.1).as_vec3();
         for from in points().into_iter().chain([inner]) {
             for (direction, target, factor) in samples(&light, 0, from, 256) {

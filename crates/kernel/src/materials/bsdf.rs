@@ -18,7 +18,7 @@ pub type UvPacket = [[f64; PACKET_SIZE]; 2];
 
 /// The lobes that an image shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum LobeFilter {
+pub enum ShownLobes {
     /// Lobes selected by role.
     Of {
         /// The wide lobes.
@@ -30,14 +30,14 @@ pub enum LobeFilter {
     Unit,
 }
 
-impl LobeFilter {
+impl ShownLobes {
     /// All lobes.
     pub const ALL: Self = Self::Of { diffuse: true, specular: true };
 }
 
 /// The lobes from which directions are sampled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum SampledLobes {
+pub enum LobesToSample {
     /// All lobes, whether or not they are shown.
     All,
     /// Only the narrow lobe.

@@ -10,7 +10,7 @@
 //! [`Bxdf::sample`] continues the path at exactly one of them. The pdfs include the directions on both
 //! sides.
 
-use super::bsdf::{BxdfParameters, NarrowLobe, SampledLobes};
+use super::bsdf::{BxdfParameters, LobesToSample, NarrowLobe};
 use crate::math::Vec3;
 use crate::math::soa::Soa;
 
@@ -91,7 +91,7 @@ pub trait Bxdf: Soa + Default {
     type View: Soa + Default;
 
     /// Whether shading normals are rotated to face the viewer. See
-    /// [`rotate_normal_to_viewer_branchless`](super::microfacet::rotate_normal_to_viewer_branchless).
+    /// [`ensure_normal_faces_viewer_branchless`](super::microfacet::ensure_normal_faces_viewer_branchless).
     const TURNS_NORMALS: bool = true;
 
     /// Whether the BSDF is for light from behind the surface.
@@ -149,7 +149,7 @@ pub trait Bxdf: Soa + Default {
     fn pdf(
         &self,
         view: &Self::View,
-        lobes: SampledLobes,
+        lobes: LobesToSample,
         normal: Vec3,
         wi: Vec3,
         shape: f32,
@@ -161,7 +161,7 @@ pub trait Bxdf: Soa + Default {
     fn sample(
         &self,
         view: &Self::View,
-        lobes: SampledLobes,
+        lobes: LobesToSample,
         normal: Vec3,
         choice: f32,
         u: [f32; 2],
@@ -181,7 +181,7 @@ pub trait Bxdf: Soa + Default {
 
 /// Chooses one of two vectors without a branch.
 #[inline(always)]
-pub(super) fn branchless_select_vec3(condition: bool, yes: Vec3, no: Vec3) -> Vec3 {
+pub(super) fn choose_vec3_by_bool(condition: bool, yes: Vec3, no: Vec3) -> Vec3 {
     let pick = |yes: f32, no: f32| if condition { yes } else { no };
     Vec3::new(pick(yes.x, no.x), pick(yes.y, no.y), pick(yes.z, no.z))
 }
@@ -189,7 +189,7 @@ pub(super) fn branchless_select_vec3(condition: bool, yes: Vec3, no: Vec3) -> Ve
 /// Computes the lobes' shading normal from a normal on the lit side and the direction to the viewer.
 #[inline(always)]
 pub fn lobe_shading_normal<B: Bxdf>(normal: Vec3, wo: Vec3) -> Vec3 {
-    use super::microfacet::rotate_normal_to_viewer_if_needed as turn;
+    use super::microfacet::ensure_normal_faces_viewer as turn;
     match (B::TURNS_NORMALS, B::IS_TRANSMISSION) {
         (false, _) => normal,
         (true, false) => turn(normal, wo),

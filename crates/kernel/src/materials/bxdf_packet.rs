@@ -1,8 +1,8 @@
 //! Packets of 16 non-specular BSDFs of the same kind. All functions must be called inside a SIMD kernel.
 
-use super::bsdf::{BsdfValues, DielectricSamplePacket, LobeFilter, NarrowLobe, SampledLobes, UvPacket};
+use super::bsdf::{BsdfValues, DielectricSamplePacket, LobesToSample, NarrowLobe, ShownLobes, UvPacket};
 use super::bxdf::{Bxdf, BxdfFlags, ShadingGeometry};
-use super::microfacet::rotate_normal_to_viewer_branchless;
+use super::microfacet::ensure_normal_faces_viewer_branchless;
 use super::rough_dielectric::DielectricBxdf;
 use super::texture::Texture;
 use crate::math::Vec3;
@@ -24,15 +24,15 @@ soa! {
     }
 }
 
-impl From<LobeFilter> for ShownLobeFactors {
+impl From<ShownLobes> for ShownLobeFactors {
     #[inline(always)]
-    fn from(shown: LobeFilter) -> Self {
+    fn from(shown: ShownLobes) -> Self {
         let factor = |is_shown: bool| if is_shown { 1.0 } else { 0.0 };
         match shown {
-            LobeFilter::Of { diffuse, specular } => {
+            ShownLobes::Of { diffuse, specular } => {
                 Self { wide: factor(diffuse), narrow: factor(specular), unit: 0.0 }
             }
-            LobeFilter::Unit => Self { wide: 0.0, narrow: 0.0, unit: 1.0 },
+            ShownLobes::Unit => Self { wide: 0.0, narrow: 0.0, unit: 1.0 },
         }
     }
 }
@@ -77,10 +77,10 @@ impl<B: Bxdf> BxdfPacket<B> {
 
     /// Sets the surface in a lane.
     #[inline(always)]
-    pub fn set_bsdf(&mut self, i: usize, point: &B::Point, shown: LobeFilter, directions: &ShadingGeometry) {
+    pub fn set_bsdf(&mut self, i: usize, point: &B::Point, shown: ShownLobes, directions: &ShadingGeometry) {
         let bsdf = B::new(point, directions.tangent);
         self.any = self.any.union(bsdf.flags());
-        self.shows_all &= shown == LobeFilter::ALL;
+        self.shows_all &= shown == ShownLobes::ALL;
         bsdf.compute_view_terms(directions, self.any).set(&mut self.view, i);
         bsdf.set(&mut self.bsdf, i);
         ShownLobeFactors::from(shown).set(&mut self.shown, i);
@@ -100,11 +100,11 @@ impl<B: Bxdf> BxdfPacket<B> {
     /// the given coordinates replace the color. Later entries of `shown` override earlier ones. Returns a
     /// mask of surfaces that reflect nothing.
     #[inline(always)]
-    pub fn set_lanes_to_material(
+    pub fn evaluate_material_into_lanes(
         &mut self,
         point: &B::Point,
         color: Option<(&Texture, &UvPacket)>,
-        shown: &[(u32, LobeFilter)],
+        shown: &[(u32, ShownLobes)],
         simd: impl Simd,
     ) -> u32 {
         let bsdf = B::new(point, Vec3::X);
@@ -121,7 +121,7 @@ impl<B: Bxdf> BxdfPacket<B> {
             let of = mask_from_bits(of);
             B::select(&of, &filled, &mut self.bsdf);
             ShownLobeFactors::select(&of, &ShownLobeFactors::from(shown).splat(), &mut self.shown);
-            self.shows_all &= shown == LobeFilter::ALL;
+            self.shows_all &= shown == ShownLobes::ALL;
         }
         self.any = self.any.union(bsdf.flags());
         let mut black = [0; PACKET_SIZE];
@@ -143,7 +143,7 @@ impl<B: Bxdf> BxdfPacket<B> {
     ) {
         if B::TURNS_NORMALS {
             for i in 0..PACKET_SIZE {
-                let turned = rotate_normal_to_viewer_branchless(lane(normals, i), -lane(directions, i));
+                let turned = ensure_normal_faces_viewer_branchless(lane(normals, i), -lane(directions, i));
                 set_lane(normals, i, turned);
             }
         }
@@ -219,18 +219,18 @@ impl<B: Bxdf> BxdfPacket<B> {
     /// Pdfs in sr⁻¹ of directions sampled from these lobes. Cosine lobes are centered on `normals`. `values`
     /// is the result of [`BxdfPacket::f`].
     #[inline(always)]
-    pub fn pdf(&self, lobes: SampledLobes, normals: &Vec3x16, wi: &Vec3x16, values: &BsdfValues) -> F32x16 {
+    pub fn pdf(&self, lobes: LobesToSample, normals: &Vec3x16, wi: &Vec3x16, values: &BsdfValues) -> F32x16 {
         if self.any_has_narrow_lobe() {
-            self.pdf_specialized_by_narrow_flag::<true>(lobes, normals, wi, values)
+            self.pdf_with_const_narrow::<true>(lobes, normals, wi, values)
         } else {
-            self.pdf_specialized_by_narrow_flag::<false>(lobes, normals, wi, values)
+            self.pdf_with_const_narrow::<false>(lobes, normals, wi, values)
         }
     }
 
     #[inline(always)]
-    fn pdf_specialized_by_narrow_flag<const NARROW: bool>(
+    fn pdf_with_const_narrow<const NARROW: bool>(
         &self,
-        lobes: SampledLobes,
+        lobes: LobesToSample,
         normals: &Vec3x16,
         wi: &Vec3x16,
         values: &BsdfValues,
@@ -250,22 +250,22 @@ impl<B: Bxdf> BxdfPacket<B> {
     #[inline(always)]
     pub fn sample(
         &self,
-        lobes: SampledLobes,
+        lobes: LobesToSample,
         normals: &Vec3x16,
         choices: &F32x16,
         u: &[F32x16; 2],
     ) -> Vec3x16 {
         if self.any_has_narrow_lobe() {
-            self.sample_specialized_by_narrow_flag::<true>(lobes, normals, choices, u)
+            self.sample_with_const_narrow::<true>(lobes, normals, choices, u)
         } else {
-            self.sample_specialized_by_narrow_flag::<false>(lobes, normals, choices, u)
+            self.sample_with_const_narrow::<false>(lobes, normals, choices, u)
         }
     }
 
     #[inline(always)]
-    fn sample_specialized_by_narrow_flag<const NARROW: bool>(
+    fn sample_with_const_narrow<const NARROW: bool>(
         &self,
-        lobes: SampledLobes,
+        lobes: LobesToSample,
         normals: &Vec3x16,
         choices: &F32x16,
         u: &[F32x16; 2],
@@ -322,13 +322,13 @@ impl<B: Bxdf> BxdfPacket<B> {
     #[inline(always)]
     pub fn constant_f(&self, i: usize) -> Option<Vec3> {
         let is_constant = B::HAS_CONSTANT_WIDE && !self.lane_flags(i).contains(BxdfFlags::NARROW);
-        is_constant.then(|| self.lane_f(i, Vec3::Z)[0])
+        is_constant.then(|| self.lane_f_by_lobe_set(i, Vec3::Z)[0])
     }
 
     /// f in sr⁻¹ for light that reaches a surface from a direction. Returns f of the shown lobes, f of the shown
     /// wide lobes, and f of all lobes.
     #[inline]
-    pub fn lane_f(&self, i: usize, wi: Vec3) -> [Vec3; 3] {
+    pub fn lane_f_by_lobe_set(&self, i: usize, wi: Vec3) -> [Vec3; 3] {
         let (bsdf, view) = (B::get(&self.bsdf, i), B::View::get(&self.view, i));
         let (shown, flags) = (ShownLobeFactors::get(&self.shown, i), self.lane_flags(i));
         let (mut f, mut all) = (Vec3::splat(shown.unit), Vec3::ZERO);
@@ -350,13 +350,17 @@ impl<B: Bxdf> BxdfPacket<B> {
 impl<const THROUGH: bool> BxdfPacket<DielectricBxdf<THROUGH>> {
     /// Samples a direction on either side of each surface.
     #[inline(always)]
-    pub fn sample_either_side(&self, choices: &F32x16, u: &[F32x16; 2]) -> DielectricSamplePacket {
+    pub fn sample_reflection_or_transmission(
+        &self,
+        choices: &F32x16,
+        u: &[F32x16; 2],
+    ) -> DielectricSamplePacket {
         let (mut wi, mut beyond) = ([[0.0; PACKET_SIZE]; 3], [0; PACKET_SIZE]);
         let (mut pdfs, mut weights) = ([0.0; PACKET_SIZE], [0.0; PACKET_SIZE]);
         for i in 0..PACKET_SIZE {
             let bsdf = DielectricBxdf::<THROUGH>::get(&self.bsdf, i);
             let view = Soa::get(&self.view, i);
-            let sample = bsdf.sample_either_side(&view, choices[i], [u[0][i], u[1][i]]);
+            let sample = bsdf.sample_reflection_or_transmission(&view, choices[i], [u[0][i], u[1][i]]);
             set_lane(&mut wi, i, sample.wi);
             (pdfs[i], weights[i]) = (sample.pdf, sample.weight);
             beyond[i] = if sample.is_beyond { TRUE } else { 0 };
@@ -384,7 +388,7 @@ impl<B: Bxdf> BxdfPacket<B> {
     #[inline(always)]
     pub(super) fn pdf_out_of_line(
         &self,
-        lobes: SampledLobes,
+        lobes: LobesToSample,
         normals: &Vec3x16,
         wi: &Vec3x16,
         values: &BsdfValues,
@@ -401,7 +405,7 @@ impl<B: Bxdf> BxdfPacket<B> {
     #[inline(always)]
     pub(super) fn sample_out_of_line(
         &self,
-        lobes: SampledLobes,
+        lobes: LobesToSample,
         normals: &Vec3x16,
         choices: &F32x16,
         u: &[F32x16; 2],
@@ -416,9 +420,9 @@ impl<B: Bxdf> BxdfPacket<B> {
 }
 
 impl<const THROUGH: bool> BxdfPacket<DielectricBxdf<THROUGH>> {
-    /// [`BxdfPacket::sample_either_side`].
+    /// [`BxdfPacket::sample_reflection_or_transmission`].
     #[inline(always)]
-    pub(super) fn sample_either_side_out_of_line(
+    pub(super) fn sample_reflection_or_transmission_out_of_line(
         &self,
         choices: &F32x16,
         u: &[F32x16; 2],
@@ -446,7 +450,7 @@ impl<B: Bxdf> SimdKernel for EvaluationKernel<'_, B> {
 /// Kernel of [`BxdfPacket::pdf`].
 struct PdfKernel<'a, B: Bxdf> {
     packet: &'a BxdfPacket<B>,
-    lobes: SampledLobes,
+    lobes: LobesToSample,
     normals: &'a Vec3x16,
     wi: &'a Vec3x16,
     values: &'a BsdfValues,
@@ -464,7 +468,7 @@ impl<B: Bxdf> SimdKernel for PdfKernel<'_, B> {
 /// Kernel of [`BxdfPacket::sample`].
 struct SamplingKernel<'a, B: Bxdf> {
     packet: &'a BxdfPacket<B>,
-    lobes: SampledLobes,
+    lobes: LobesToSample,
     normals: &'a Vec3x16,
     choices: &'a F32x16,
     u: &'a [F32x16; 2],
@@ -479,7 +483,7 @@ impl<B: Bxdf> SimdKernel for SamplingKernel<'_, B> {
     }
 }
 
-/// Kernel of [`BxdfPacket::sample_either_side`].
+/// Kernel of [`BxdfPacket::sample_reflection_or_transmission`].
 struct EitherSideSamplingKernel<'a, const THROUGH: bool> {
     packet: &'a BxdfPacket<DielectricBxdf<THROUGH>>,
     choices: &'a F32x16,
@@ -491,6 +495,6 @@ impl<const THROUGH: bool> SimdKernel for EitherSideSamplingKernel<'_, THROUGH> {
 
     #[inline(always)]
     fn run(self, _: impl Simd) -> DielectricSamplePacket {
-        self.packet.sample_either_side(self.choices, self.u)
+        self.packet.sample_reflection_or_transmission(self.choices, self.u)
     }
 }

@@ -23,7 +23,7 @@ pub fn dielectric(cos_incident: f32, eta: f32) -> (f32, Option<f32>) {
 /// [`dielectric`] for light from outside (`eta` ≥ 1), in `f32` for packets.
 #[inline(always)]
 pub fn dielectric_from_outside(cos_incident: f32, eta: f32) -> f32 {
-    dielectric_from_transmitted_cos2(
+    dielectric_from_eta2_transmitted_cos2(
         cos_incident,
         eta,
         (eta - 1.0) * (eta + 1.0) + cos_incident * cos_incident,
@@ -34,13 +34,13 @@ pub fn dielectric_from_outside(cos_incident: f32, eta: f32) -> f32 {
 #[inline(always)]
 pub fn dielectric_for_any_eta(cos_incident: f32, eta: f32) -> f32 {
     let squared = (eta - 1.0) * (eta + 1.0) + cos_incident * cos_incident;
-    dielectric_from_transmitted_cos2(cos_incident, eta, if squared > 0.0 { squared } else { 0.0 })
+    dielectric_from_eta2_transmitted_cos2(cos_incident, eta, if squared > 0.0 { squared } else { 0.0 })
 }
 
 /// Computes the reflectance of a dielectric boundary from η² times the squared cosine of the transmitted
 /// direction.
 #[inline(always)]
-fn dielectric_from_transmitted_cos2(cos_incident: f32, eta: f32, cos2_t: f32) -> f32 {
+fn dielectric_from_eta2_transmitted_cos2(cos_incident: f32, eta: f32, cos2_t: f32) -> f32 {
     let cos_t = cos2_t.sqrt();
     let squared = eta * eta;
     // Both cosines are multiplied by η. The `max` avoids 0/0 at grazing angles for η = 1.
@@ -94,7 +94,12 @@ pub fn schlick_weight(cos_incident: f32) -> f32 {
 
 /// Direction in which Snell's law refracts the unit vector `incident`, given the unit normal on its side and
 /// the cosine from [`dielectric`].
-pub fn refract_given_cosine(incident: Vec3, normal: Vec3, eta: f32, cos_transmitted: f32) -> Vec3 {
+pub fn refract_given_transmitted_cosine(
+    incident: Vec3,
+    normal: Vec3,
+    eta: f32,
+    cos_transmitted: f32,
+) -> Vec3 {
     let cos_incident = -incident.dot(normal);
     (incident / eta + normal * (cos_incident / eta - cos_transmitted)).normalize()
 }
@@ -213,8 +218,12 @@ mod tests {
                 let (sin, cos) = degrees.to_radians().sin_cos();
                 let incident = Vec3::new(sin, -cos, 0.0);
                 let (_, cos_t) = dielectric(cos, eta);
-                let refracted =
-                    refract_given_cosine(incident, Vec3::Y, eta, cos_t.expect("below the critical angle"));
+                let refracted = refract_given_transmitted_cosine(
+                    incident,
+                    Vec3::Y,
+                    eta,
+                    cos_t.expect("below the critical angle"),
+                );
                 assert!((refracted.x - sin / eta).abs() < 1e-6 && refracted.y < 0.0);
             }
         }

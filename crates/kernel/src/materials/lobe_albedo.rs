@@ -63,7 +63,7 @@ impl LobeAlbedoPolynomial {
         let mut weights = nodes.map(|(cosine, _)| least(cosine));
         let mut terms = [0.0; TERMS];
         for _ in 0..24 {
-            terms = least_squares(&nodes, &weights);
+            terms = fit_chebyshev_least_squares(&nodes, &weights);
             let errors =
                 nodes.map(|(cosine, value)| (chebyshev_sum(&terms, cosine) - value).abs() * least(cosine));
             let largest = errors.iter().fold(1e-12, |most: f64, error| most.max(*error));
@@ -143,7 +143,7 @@ fn cosine_weighted_mean(albedo: impl Fn(f64) -> f64) -> f64 {
 }
 
 /// Chebyshev polynomials at μ.
-fn chebyshev_polynomials(cosine: f64) -> [f64; TERMS] {
+fn chebyshev_values_at_cosine(cosine: f64) -> [f64; TERMS] {
     let x = 2.0 * (1.0 + KNEE) * cosine / (cosine + KNEE) - 1.0;
     let mut values = [1.0; TERMS];
     values[1] = x;
@@ -154,15 +154,15 @@ fn chebyshev_polynomials(cosine: f64) -> [f64; TERMS] {
 }
 
 fn chebyshev_sum(terms: &[f64; TERMS], cosine: f64) -> f64 {
-    chebyshev_polynomials(cosine).iter().zip(terms).map(|(value, term)| value * term).sum()
+    chebyshev_values_at_cosine(cosine).iter().zip(terms).map(|(value, term)| value * term).sum()
 }
 
 /// Least-squares coefficients. Solves the normal equations with Gaussian elimination, which needs no pivoting
 /// because the matrix is positive definite.
-fn least_squares(nodes: &[(f64, f64)], weights: &[f64]) -> [f64; TERMS] {
+fn fit_chebyshev_least_squares(nodes: &[(f64, f64)], weights: &[f64]) -> [f64; TERMS] {
     let mut rows = [[0.0; TERMS + 1]; TERMS];
     for (&(cosine, value), weight) in nodes.iter().zip(weights) {
-        let basis = chebyshev_polynomials(cosine);
+        let basis = chebyshev_values_at_cosine(cosine);
         for i in 0..TERMS {
             for j in 0..TERMS {
                 rows[i][j] += weight * weight * basis[i] * basis[j];

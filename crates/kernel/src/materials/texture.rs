@@ -139,7 +139,11 @@ impl UvTransform {
     }
 
     /// Multiplies a packet of coordinates by `repeat` and transforms them.
-    fn transform_packet(&self, uv: &[[f64; PACKET_SIZE]; 2], repeat: DVec2) -> [[f64; PACKET_SIZE]; 2] {
+    fn scale_and_transform_packet(
+        &self,
+        uv: &[[f64; PACKET_SIZE]; 2],
+        repeat: DVec2,
+    ) -> [[f64; PACKET_SIZE]; 2] {
         let mut row = *uv;
         for i in 0..PACKET_SIZE {
             let moved = self.transform_point(DVec2::new(uv[0][i], uv[1][i]) * repeat);
@@ -282,7 +286,7 @@ impl Texture {
     #[inline(always)]
     pub fn lookup_packet(&self, uv: &[[f64; PACKET_SIZE]; 2]) -> Vec3x16 {
         let mut row = match &self.moved {
-            None => self.lookup_packet_with_repeat(uv, self.repeat.as_dvec2()),
+            None => self.lookup_packet_at_scaled_uv(uv, self.repeat.as_dvec2()),
             Some(moved) => self.transform_and_lookup_packet(moved, uv),
         };
         if let Some(factor) = self.factor {
@@ -298,16 +302,19 @@ impl Texture {
     #[cold]
     #[inline(never)]
     fn transform_and_lookup_packet(&self, moved: &UvTransform, uv: &[[f64; PACKET_SIZE]; 2]) -> Vec3x16 {
-        self.lookup_packet_with_repeat(&moved.transform_packet(uv, self.repeat.as_dvec2()), DVec2::ONE)
+        self.lookup_packet_at_scaled_uv(
+            &moved.scale_and_transform_packet(uv, self.repeat.as_dvec2()),
+            DVec2::ONE,
+        )
     }
 
     /// [`Texture::lookup_packet`] at coordinates scaled by `repeat`.
     #[inline(always)]
-    fn lookup_packet_with_repeat(&self, uv: &[[f64; PACKET_SIZE]; 2], repeat: DVec2) -> Vec3x16 {
+    fn lookup_packet_at_scaled_uv(&self, uv: &[[f64; PACKET_SIZE]; 2], repeat: DVec2) -> Vec3x16 {
         let (texels, size) = (&*self.texels, float_size(&self.texels));
         let folded = [
-            self.wrap.repeat_and_fold_packet(&uv[0], repeat.x),
-            self.wrap.repeat_and_fold_packet(&uv[1], repeat.y),
+            self.wrap.scale_and_fold_packet(&uv[0], repeat.x),
+            self.wrap.scale_and_fold_packet(&uv[1], repeat.y),
         ];
         let extent = integer_size(texels);
         let (mut first, mut part) = ([[0; PACKET_SIZE]; 2], [[0.0; PACKET_SIZE]; 2]);
@@ -524,7 +531,7 @@ fn float_size(texels: &Texels) -> Vec2 {
 impl Wrap {
     /// Multiplies coordinates by `repeat` and folds them into [0, 1].
     #[inline(always)]
-    fn repeat_and_fold_packet(self, x: &[f64; PACKET_SIZE], repeat: f64) -> F32x16 {
+    fn scale_and_fold_packet(self, x: &[f64; PACKET_SIZE], repeat: f64) -> F32x16 {
         let mut folded = [0.0; PACKET_SIZE];
         macro_rules! by {
             ($wrap:expr) => {

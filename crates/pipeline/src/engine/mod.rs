@@ -22,7 +22,7 @@ pub(super) use self::orders::{Interruption, PendingCommands, RequestContext};
 use self::outcome::CompletedRequest;
 pub use self::outcome::{RenderFailure, RenderedImage};
 use self::outputs::remove_outdated_report;
-use self::own::{SavedSceneImage, saved_scene_plan, texture_needs_with_saved_scene};
+use self::own::{ImageWithoutKeyboardChanges, saved_scene_plan, texture_needs_with_saved_scene};
 use self::unfinished::LastValidScene;
 use super::assembly::{KeyedWorld, RequestCamera, build_or_reuse_world};
 use super::cache::{Memo, NamedCache};
@@ -65,7 +65,7 @@ use super::table::StageRunner;
 use super::targets::output_conflicts;
 use super::trace::{TileKernel, Tracer};
 use super::warnings::settings_warnings;
-use super::watch::content::{FileHashCache, FileRead, RequestFileSnapshot};
+use super::watch::content::{FileHashCache, FilePathAndContentId, FilesSeenByRequest};
 use crate::control::CancelToken;
 use crate::integrators::RayCounters;
 use crate::lights::Lights;
@@ -76,7 +76,7 @@ use crate::scene::diagnostic::Diagnostic;
 use crate::scene::fingerprint::Fingerprint;
 use crate::system::priority;
 use crate::system::threads::{check_thread_stack_memory, describe_start_failure, logical_cpu_count};
-use crate::world::{CoplanarLight, GlassSolids, NeededTextureRoles, World};
+use crate::world::{CoplanarLight, GlassSolids, TextureRolesNeededByRender, World};
 
 /// Engine configuration, which tests override.
 #[derive(Clone, Copy)]
@@ -112,7 +112,7 @@ pub(super) struct Engine {
     photons: PhotonCache,
     films: FilmCache,
     written: WrittenImages,
-    own: Option<SavedSceneImage>,
+    own: Option<ImageWithoutKeyboardChanges>,
     /// Save count from the newest request with a valid scene.
     saves: u64,
     /// Whether the film of the scene's own image is kept while other images are rendered.
@@ -132,7 +132,7 @@ pub(super) struct Engine {
     coarse_rate: Cell<Option<f64>>,
     pool: Option<Arc<ThreadPool>>,
     /// Assets of the last valid scene, which are watched while the scene file is broken.
-    assets: Vec<FileRead>,
+    assets: Vec<FilePathAndContentId>,
     /// All files that must not be written: the files of the last valid scene and all files referenced since.
     inputs: ProtectedInputs,
     /// Whether the current scene file is invalid, which means that its referenced files are unknown.
@@ -244,7 +244,7 @@ impl Engine {
         }
         if let Ok(report) = &outcome {
             self.report = Some(report.clone());
-            let is_by_hand = self.written.has_user_written_image(&self.contents);
+            let is_by_hand = self.written.has_user_written_image_on_disk(&self.contents);
             if request.own.is_none() && findings.conflicts.is_empty() && !is_by_hand {
                 self.write_report(report, sink, context.writing);
             }
@@ -319,7 +319,7 @@ impl Engine {
         });
         let is_written = written.as_ref().is_ok_and(|is_written| *is_written);
         self.report_saved_scene_image_state(request, ready.film, sink);
-        let film = own::should_write_saved_scene_image(request).then_some(ready.film);
+        let film = own::request_writes_saved_scene_image(request).then_some(ready.film);
         let interruption = || context.orders.cancellation_cause();
         self.with_checkpointer(film, sink, &interruption, |checkpointer, engine| {
             if let (Some(checkpointer), Some(state)) = (checkpointer, engine.films.current()) {
@@ -327,7 +327,7 @@ impl Engine {
             }
         });
         let is_written = written?;
-        let pool = self.thread_pool(ready.plan.threads)?;
+        let pool = self.render_thread_pool(ready.plan.threads)?;
         let Some(state) = self.films.current() else {
             return Err(AbortReason::work_failure("the film is missing"));
         };
@@ -364,7 +364,7 @@ impl Engine {
         sink: &EventSink,
         context: &RequestContext<'_>,
     ) -> Result<Option<Fingerprint>, AbortReason> {
-        let pool = self.thread_pool(ready.plan.threads)?;
+        let pool = self.render_thread_pool(ready.plan.threads)?;
         let (plan, world) = (&ready.plan, &ready.world.1);
         let sending = PhotonContext { world, plan, pool: &pool, token: context.token, sink };
         let asked = (plan.scene.photons.enabled, request.overrides.photons);
@@ -417,7 +417,7 @@ impl Engine {
     ) -> Result<ReadyScene, AbortReason> {
         self.read_consistently(token, findings, |engine, contents, findings| {
             table.stages.clear();
-            engine.prepare(request, table, (contents, token), findings)
+            engine.run_stages_before_photons(request, table, (contents, token), findings)
         })
     }
 
@@ -427,10 +427,10 @@ impl Engine {
         &mut self,
         token: &CancelToken,
         findings: &mut Findings,
-        mut read: impl FnMut(&mut Self, &RequestFileSnapshot, &mut Findings) -> Result<T, AbortReason>,
+        mut read: impl FnMut(&mut Self, &FilesSeenByRequest, &mut Findings) -> Result<T, AbortReason>,
     ) -> Result<T, AbortReason> {
         for _ in 0..MAX_READS {
-            let contents = RequestFileSnapshot::new(Arc::clone(&self.contents));
+            let contents = FilesSeenByRequest::new(Arc::clone(&self.contents));
             let result = read(self, &contents, findings);
             if result.is_err() && !token.is_cancelled() {
                 contents.recheck_seen_files(token)?;
@@ -446,18 +446,18 @@ impl Engine {
     }
 
     /// Runs all stages up to photon tracing and rendering.
-    fn prepare(
+    fn run_stages_before_photons(
         &mut self,
         request: &Request,
         table: &mut StageRunner<'_>,
-        (contents, token): (&RequestFileSnapshot, &CancelToken),
+        (contents, token): (&FilesSeenByRequest, &CancelToken),
         findings: &mut Findings,
     ) -> Result<ReadyScene, AbortReason> {
         let containers = GltfContainers::default();
         let show = ModelViewOptions::from_overrides(&request.overrides);
         // Create the thread pool before parsing, because reading a model uses all threads. The thread count
         // does not depend on the scene.
-        let pool = self.thread_pool(thread_count(&request.overrides))?;
+        let pool = self.render_thread_pool(thread_count(&request.overrides))?;
         let parsed = table.run(Stage::Parse, || {
             let origin = SceneParseRequest { path: &request.scene, sets: &request.overrides.sets, show };
             pool.install(|| parse(origin, (contents, &containers), &mut self.parsed, findings, token))
@@ -492,7 +492,7 @@ impl Engine {
         if findings.conflicts.is_empty() {
             check_targets(request.write, &plan, table.sink)?;
         }
-        let pool = self.thread_pool(plan.threads)?;
+        let pool = self.render_thread_pool(plan.threads)?;
         let reading =
             FileReadContext { sink: table.sink, token, contents, pool: &pool, containers: &containers };
         // Include textures needed only for the scene's own image, because its film key depends on them.
@@ -533,7 +533,7 @@ impl Engine {
         let mesh_keys: Vec<Fingerprint> = meshes.iter().map(|mesh| mesh.key).collect();
         // The orbiter camera is small, so include it in the key as text.
         let orbiter = eye.orbiter.map(|camera| format!("{camera:?}"));
-        let of = keys::scene_fingerprint_context(scene, &mesh_keys, orbiter.as_deref());
+        let of = keys::scene_references_for_fingerprint(scene, &mesh_keys, orbiter.as_deref());
         let origin = eye.origin_near_camera();
         let build = || build_accel_structures(scene, (&of, origin), meshes, &mut self.accel, reading);
         let built = table.run(Stage::Accel, build)?;
@@ -548,8 +548,11 @@ impl Engine {
         let camera = own::saved_scene_overrides(request).camera;
         let own = own.unwrap_or_else(|| plan.clone());
         let own_eye = RequestCamera::new(&own.scene, parsed.orbiter, &camera).rotated_for_turntable(own.turn);
-        let own =
-            SavedSceneImage::new((parsed, own, &own_eye), (&surfaces, &mesh_keys), (camera, &self.assets));
+        let own = ImageWithoutKeyboardChanges::new(
+            (parsed, own, &own_eye),
+            (&surfaces, &mesh_keys),
+            (camera, &self.assets),
+        );
         self.pin_saved_scene_image(own);
         Ok(ReadyScene {
             parsed: parsed.clone(),
@@ -575,7 +578,7 @@ impl Engine {
     fn load_assets(
         &mut self,
         parsed: &ParsedScene,
-        lookups: NeededTextureRoles,
+        lookups: TextureRolesNeededByRender,
         findings: &mut Findings,
         table: &mut StageRunner<'_>,
         reading: &FileReadContext<'_>,
@@ -596,7 +599,7 @@ impl Engine {
             table.sink.send(Event::Warnings { generation, warnings });
             Ok((found, bodies, texels, needed))
         } else {
-            Err(AbortReason::Failed(findings.take_as_failure()))
+            Err(AbortReason::Failed(findings.take_diagnostics_as_failure()))
         }
     }
 
@@ -608,7 +611,7 @@ impl Engine {
         sink: &EventSink,
         context: &RequestContext<'_>,
     ) -> Result<StageResult<RayCounters>, AbortReason> {
-        let pool = self.thread_pool(ready.plan.threads)?;
+        let pool = self.render_thread_pool(ready.plan.threads)?;
         let (plan, orders) = (&ready.plan, context.orders);
         let key = ready.film;
         let watch = PausableStopwatch::start(context.token);
@@ -628,7 +631,7 @@ impl Engine {
             }
         };
         let interruption = || orders.cancellation_cause();
-        let film = own::should_write_saved_scene_image(request).then_some(key);
+        let film = own::request_writes_saved_scene_image(request).then_some(key);
         let rendered = self.with_checkpointer(film, sink, &interruption, |checkpointer, engine| {
             let rendering = RenderStageInputs {
                 tracer: make_tracer(engine.config.kernel, &pool, ready, context.token),
@@ -651,7 +654,7 @@ impl Engine {
         if ready.share.is_some()
             && let Some(state) = films.current_mut()
         {
-            state.identity = self.own.as_ref().map(SavedSceneImage::dependencies);
+            state.identity = self.own.as_ref().map(ImageWithoutKeyboardChanges::dependencies);
         }
         (self.films, self.written) = (films, written.into_inner());
         let is_reused = rendered.as_ref().is_ok_and(|staged| staged.status == Status::Reused);
@@ -662,7 +665,7 @@ impl Engine {
     }
 
     /// Returns the thread pool for a render with `--threads` or the default thread count.
-    fn thread_pool(&mut self, threads: usize) -> Result<Arc<ThreadPool>, AbortReason> {
+    fn render_thread_pool(&mut self, threads: usize) -> Result<Arc<ThreadPool>, AbortReason> {
         self.thread_pool_for(threads, true)
     }
 
@@ -713,8 +716,12 @@ impl Engine {
             let reading = FileReadContext { sink, token, contents, pool: &pool, containers: &containers };
             let loaded = &parsed.loaded;
             let found = load_meshes(loaded, &mut engine.meshes, findings, &reading)?.value;
-            let mut wanted =
-                find_textures_needed_for_view(loaded, &found, NeededTextureRoles::ALL, &engine.textures);
+            let mut wanted = find_textures_needed_for_view(
+                loaded,
+                &found,
+                TextureRolesNeededByRender::ALL,
+                &engine.textures,
+            );
             add_check_only_textures(loaded, &mut wanted.textures);
             wanted.are_required = true;
             let texels = load_textures(loaded, &wanted, &mut engine.textures, findings, &reading)?.value;
@@ -736,7 +743,7 @@ impl Engine {
             Ok((parsed, found, texels)) if findings.errors.is_empty() => {
                 Ok((parsed, found, texels, findings.warnings))
             }
-            Ok(_) => Err(findings.take_as_failure()),
+            Ok(_) => Err(findings.take_diagnostics_as_failure()),
             Err(AbortReason::Failed(failure)) => Err(failure),
             Err(AbortReason::Cancelled) => Err(Failure::Work("cancelled".to_owned())),
         }
@@ -747,7 +754,7 @@ impl Engine {
 ///
 /// # Errors
 /// A file has changed, or the token is cancelled.
-fn verify_files_unchanged(contents: &RequestFileSnapshot, token: &CancelToken) -> Result<(), AbortReason> {
+fn verify_files_unchanged(contents: &FilesSeenByRequest, token: &CancelToken) -> Result<(), AbortReason> {
     contents.recheck_seen_files(token)?;
     let changed =
         contents.changed_file().map(|path| format!("{} changed while it was being read", path.display()));

@@ -7,7 +7,7 @@ use super::super::render::film_state::FilmState;
 use super::super::report::finish::{remove_stale_report, write_report};
 use super::super::sink::EventSink;
 use super::super::stages::write::{
-    ImageWriteContext, add_animation_frame, write_if_wanted, write_on_request,
+    ImageWriteContext, add_frame_and_write_if_last, write_if_wanted, write_on_request,
 };
 use super::super::stages::{AbortReason, Findings, StageResult};
 use super::super::targets::output_conflicts;
@@ -88,7 +88,7 @@ impl Engine {
         }
         if request.write == WriteRequirement::Must {
             findings.errors.extend(found);
-            return Err(AbortReason::Failed(findings.take_as_failure()));
+            return Err(AbortReason::Failed(findings.take_diagnostics_as_failure()));
         }
         if found != findings.conflicts {
             sink.send_write_conflicts(found.clone());
@@ -135,10 +135,10 @@ impl Engine {
         if request.own.is_some() {
             return self.write_image_without_overrides(sink, token);
         }
-        if self.written.has_user_written_image(&self.contents) {
+        if self.written.has_user_written_image_on_disk(&self.contents) {
             return Ok(StageResult::skipped(false, reasons::OTHER_IMAGE_WRITTEN));
         }
-        let pool = self.thread_pool(plan.threads)?;
+        let pool = self.render_thread_pool(plan.threads)?;
         let Some(state) = self.films.current() else {
             return Err(AbortReason::work_failure("the film is missing"));
         };
@@ -153,6 +153,6 @@ impl Engine {
         written.own = own.map(|own| own.image);
         let Some(turn) = plan.turn.filter(|_| !plan.moving.is_empty()) else { return Ok(wrote) };
         let frames = &mut self.frames;
-        pool.install(|| add_animation_frame(state, to, (turn, frames), token))
+        pool.install(|| add_frame_and_write_if_last(state, to, (turn, frames), token))
     }
 }

@@ -21,13 +21,13 @@ use crate::scene::fingerprint::{Fingerprint, FingerprintHasher};
 use crate::settings::{CheckpointSettings, Overrides, ResumeMode};
 use crate::sink::EventSink;
 use crate::stages::parse::ParsedScene;
-use crate::stages::write::{ImageWriteContext, film_encoding_settings, write_if_wanted};
+use crate::stages::write::{ImageWriteContext, image_encoding_settings, write_if_wanted};
 use crate::stages::{AbortReason, StageResult};
-use crate::watch::content::FileRead;
-use crate::world::NeededTextureRoles;
+use crate::watch::content::FilePathAndContentId;
+use crate::world::TextureRolesNeededByRender;
 
 /// The scene's own image for the newest request.
-pub(super) struct SavedSceneImage {
+pub(super) struct ImageWithoutKeyboardChanges {
     /// Key of the film.
     pub(super) film: Fingerprint,
     /// Key for the finished image and its output files.
@@ -36,21 +36,21 @@ pub(super) struct SavedSceneImage {
     pub(super) plan: RenderPlan,
     camera: CameraOverrides,
     /// Files that the image depends on.
-    files: Vec<FileRead>,
+    files: Vec<FilePathAndContentId>,
     /// Share of the image that this process renders, or `None` for the whole image.
     pub(super) share: Option<Shard>,
 }
 
-impl SavedSceneImage {
+impl ImageWithoutKeyboardChanges {
     /// Computes the keys for the scene's own image. `eye` is the scene's camera. `surfaces` and `meshes` are
     /// the keys for the surfaces and meshes.
     pub(super) fn new(
         (parsed, plan, eye): (&Arc<ParsedScene>, RenderPlan, &RequestCamera),
         (surfaces, meshes): (&Fingerprint, &[Fingerprint]),
-        (camera, files): (CameraOverrides, &[FileRead]),
+        (camera, files): (CameraOverrides, &[FilePathAndContentId]),
     ) -> Self {
         let orbiter = eye.orbiter.map(|camera| format!("{camera:?}"));
-        let of = keys::scene_fingerprint_context(&plan.scene, meshes, orbiter.as_deref());
+        let of = keys::scene_references_for_fingerprint(&plan.scene, meshes, orbiter.as_deref());
         let world = keys::world_key(surfaces, &eye.camera, &of);
         let film = keys::film_sums_key(world, &plan.settings, plan.crop);
         let image = image_with_outputs_key(film, &plan);
@@ -80,7 +80,7 @@ fn image_with_outputs_key(film: Fingerprint, plan: &RenderPlan) -> Fingerprint {
 
 impl Engine {
     /// Sets the scene's own image for a request and keeps its film while other images are rendered.
-    pub(super) fn pin_saved_scene_image(&mut self, mut own: SavedSceneImage) {
+    pub(super) fn pin_saved_scene_image(&mut self, mut own: ImageWithoutKeyboardChanges) {
         if self.pins_own {
             self.films.pin(own.film);
         }
@@ -180,7 +180,8 @@ impl Engine {
         token: &CancelToken,
     ) -> Result<StageResult<bool>, AbortReason> {
         let only_shown = || Ok(StageResult::skipped(false, reasons::PREVIEW_ONLY));
-        if self.is_saved_scene_image_written() || self.written.has_user_written_image(&self.contents) {
+        if self.is_saved_scene_image_written() || self.written.has_user_written_image_on_disk(&self.contents)
+        {
             return only_shown();
         }
         let (Some(own), Some(state), Some(pool)) = (&self.own, self.films.current(), &self.pool) else {
@@ -216,7 +217,7 @@ impl Engine {
         let Some((own, output)) = own.and_then(|own| Some((own, own.plan.outputs.first()?))) else {
             return work(None, self);
         };
-        let finish = film_encoding_settings(&own.plan);
+        let finish = image_encoding_settings(&own.plan);
         let name = || own.dependencies();
         let around = CheckpointContext {
             finish: &finish,
@@ -280,7 +281,7 @@ pub(super) fn saved_scene_plan(
 pub(super) fn texture_needs_with_saved_scene(
     plan: &RenderPlan,
     own: Option<&RenderPlan>,
-) -> NeededTextureRoles {
+) -> TextureRolesNeededByRender {
     let shown = plan.settings.texture_needs();
     own.map_or(shown, |own| shown.union(own.settings.texture_needs()))
 }
@@ -291,6 +292,6 @@ pub(super) fn saved_scene_overrides(request: &Request) -> &Overrides {
 }
 
 /// Whether the scene's own image should be written.
-pub(super) fn should_write_saved_scene_image(request: &Request) -> bool {
+pub(super) fn request_writes_saved_scene_image(request: &Request) -> bool {
     request.own.is_some() || request.write != WriteRequirement::No
 }

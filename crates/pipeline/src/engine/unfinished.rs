@@ -17,8 +17,8 @@ use crate::stages::parse::ParsedScene;
 use crate::stages::textures::{NeededTextures, Textures, find_textures_needed_for_view, load_textures};
 use crate::stages::{AbortReason, FileReadContext, Findings};
 use crate::table::StageRunner;
-use crate::watch::content::{FileRead, RequestFileSnapshot};
-use crate::world::{GlassSolids, NeededTextureRoles};
+use crate::watch::content::{FilePathAndContentId, FilesSeenByRequest};
+use crate::world::{GlassSolids, TextureRolesNeededByRender};
 
 /// A valid scene and all files needed for its image.
 #[derive(Clone)]
@@ -32,7 +32,7 @@ pub(super) struct LastValidScene {
     /// Textures that were needed when `textures` was loaded.
     pub(super) needed: NeededTextures,
     /// All files that were read for the scene, with their contents.
-    pub(super) files: Vec<FileRead>,
+    pub(super) files: Vec<FilePathAndContentId>,
 }
 
 impl LastValidScene {
@@ -40,7 +40,7 @@ impl LastValidScene {
     fn have_asset_files_changed(&self, reading: &FileReadContext<'_>) -> Result<bool, Cancelled> {
         let loaded = &self.parsed.loaded;
         let is_mesh = |path: &PathBuf| loaded.scene.mesh_files.iter().any(|file| file.value == *path);
-        for FileRead { path, content } in &self.files {
+        for FilePathAndContentId { path, content } in &self.files {
             let is_scene_file = *path == loaded.path && !is_mesh(path);
             if !is_scene_file && reading.contents.first_seen_content_id(path, reading.token)? != *content {
                 return Ok(true);
@@ -61,7 +61,7 @@ impl Engine {
     ) {
         let before = self.current_image_key_and_view();
         // Drop errors from this render, because the failed request has already reported its own.
-        let end = match self.render_last_valid_scene(newest, sink, context) {
+        let end = match self.run_last_valid_scene_stages(newest, sink, context) {
             Ok(Some(is_reused)) => LastValidSceneRenderOutcome::Finished {
                 unchanged: is_reused && self.current_image_key_and_view() == before,
             },
@@ -72,7 +72,7 @@ impl Engine {
 
     /// Renders and writes the last valid scene. Returns whether the existing image and files were reused, or
     /// `None` if there is no valid scene or its files have changed.
-    fn render_last_valid_scene(
+    fn run_last_valid_scene_stages(
         &mut self,
         newest: &Request,
         sink: &EventSink,
@@ -86,8 +86,8 @@ impl Engine {
         let Ok(plan) = resolve_plan(&loaded.scene, path, &request.overrides) else { return Ok(None) };
         let own = saved_scene_plan(&request, &good.parsed)?;
         // Load the textures needed for another view if their files are still valid.
-        let pool = self.thread_pool(plan.threads)?;
-        let snapshot = RequestFileSnapshot::new(Arc::clone(&self.contents));
+        let pool = self.render_thread_pool(plan.threads)?;
+        let snapshot = FilesSeenByRequest::new(Arc::clone(&self.contents));
         let containers = GltfContainers::default();
         let token = context.token;
         let reading =
@@ -122,7 +122,7 @@ impl Engine {
     fn load_missing_textures(
         &mut self,
         good: LastValidScene,
-        lookups: NeededTextureRoles,
+        lookups: TextureRolesNeededByRender,
         reading: &FileReadContext<'_>,
     ) -> Result<Option<LastValidScene>, AbortReason> {
         let loaded = &good.parsed.loaded;

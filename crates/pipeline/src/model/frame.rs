@@ -27,7 +27,7 @@ pub(super) struct CameraPose {
 
 impl ViewSide {
     /// Direction from the model to the camera, and the image's up vector. The model's front faces +z.
-    fn view_and_up_axes(self) -> (DVec3, DVec3) {
+    fn to_camera_and_up_axes(self) -> (DVec3, DVec3) {
         match self {
             Self::Front => (DVec3::Z, DVec3::Y),
             Self::Back => (DVec3::NEG_Z, DVec3::Y),
@@ -48,7 +48,7 @@ pub(super) fn frame_model(
     (from, turns): (ViewSide, u32),
     aspect: f64,
 ) -> CameraPose {
-    let (back, up) = from.view_and_up_axes();
+    let (back, up) = from.to_camera_and_up_axes();
     let middle = (least + greatest) * 0.5;
     let tangent = libm::tan((FOV * 0.5).to_radians()) * FILLED;
     // Move the camera back until every point is inside the frame.
@@ -67,12 +67,12 @@ pub(super) fn frame_model(
     // Drop digits that make no visible difference.
     let size = half.length().max(LEAST);
     let step = size * 1e-4;
-    let tidy = |at: DVec3| DVec3::from(at.to_array().map(|part| round_to_power_of_ten_of_step(part, step)));
+    let tidy = |at: DVec3| DVec3::from(at.to_array().map(|part| round_to_decimals_of_step(part, step)));
     CameraPose { position: tidy(middle + back * distance), look_at: tidy(middle), up }
 }
 
 /// Rounds to a multiple of the largest power of ten that does not exceed `step`.
-pub(super) fn round_to_power_of_ten_of_step(value: f64, step: f64) -> f64 {
+pub(super) fn round_to_decimals_of_step(value: f64, step: f64) -> f64 {
     let unit = libm::pow(10.0, libm::floor(libm::log10(step)));
     let whole = (value / unit).round();
     // Dividing by a power of ten produces fewer digits than multiplying by its reciprocal.
@@ -164,8 +164,8 @@ mod tests {
 
     #[test]
     fn insignificant_digits_are_dropped() {
-        assert_eq!(round_to_power_of_ten_of_step(1.234_567_8, 3e-4), 1.2346);
-        assert_eq!(round_to_power_of_ten_of_step(-12_345.678, 30.0), -12_350.0);
+        assert_eq!(round_to_decimals_of_step(1.234_567_8, 3e-4), 1.2346);
+        assert_eq!(round_to_decimals_of_step(-12_345.678, 30.0), -12_350.0);
     }
 
     /// A plane lit only by the sky and the key light has the sky's radiance.

@@ -4,7 +4,7 @@ use std::collections::{BTreeSet, HashMap};
 use std::io::Read;
 use std::path::Path;
 
-use super::frame::{frame_model, round_to_power_of_ten_of_step};
+use super::frame::{frame_model, round_to_decimals_of_step};
 use super::materials::{MaterialWriter, TextureFileReference};
 use super::toml::{TomlWriter, format_color, format_list, format_number, format_vector};
 use super::{
@@ -27,7 +27,7 @@ use crate::stages::containers::GltfContainers;
 
 /// Where the generated scene's meshes and images are stored.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) enum ExportedAssetLocation {
+pub(crate) enum SceneAssetLocation {
     /// In the glTF file and the files it references.
     Inside,
     /// In separate files in this folder, next to the scene.
@@ -40,12 +40,12 @@ pub(crate) struct ExportedFile {
     /// Path relative to the scene.
     pub(crate) name: String,
     /// Source of the file's content.
-    pub(crate) content: ExportedFileSource,
+    pub(crate) content: GltfPartOrImage,
 }
 
 /// Source of an exported file's content.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub(crate) enum ExportedFileSource {
+pub(crate) enum GltfPartOrImage {
     /// A mesh part, written as PLY.
     Part(usize),
     /// An image, copied unchanged.
@@ -55,7 +55,7 @@ pub(crate) enum ExportedFileSource {
 /// Converts a glTF file to scene text.
 pub(super) fn scene_text(
     path: &Path,
-    (show, naming): (ModelViewOptions, &ExportedAssetLocation),
+    (show, naming): (ModelViewOptions, &SceneAssetLocation),
     containers: &GltfContainers,
     token: &CancelToken,
 ) -> Result<GeneratedScene, AssetError> {
@@ -84,10 +84,10 @@ pub(super) fn scene_text(
     let ModelScene { mut notes, .. } = scene;
     match naming {
         // Previews tolerate unreadable images, but imports do not.
-        ExportedAssetLocation::Inside => {
+        SceneAssetLocation::Inside => {
             notes.extend(is_fully_transparent.then(|| INVISIBLE_MODEL.to_owned()));
         }
-        ExportedAssetLocation::Folder(_) => {
+        SceneAssetLocation::Folder(_) => {
             images.into_iter().try_for_each(|image| container.check_image_header(image, token))?;
         }
     }
@@ -97,12 +97,12 @@ pub(super) fn scene_text(
 struct SceneWriter<'a> {
     container: &'a GltfFile,
     path: &'a Path,
-    naming: &'a ExportedAssetLocation,
+    naming: &'a SceneAssetLocation,
     toml: TomlWriter,
     /// File names already used in the folder.
     files: UsedNames,
     assets: Vec<ExportedFile>,
-    names: HashMap<ExportedFileSource, String>,
+    names: HashMap<GltfPartOrImage, String>,
     /// Images that materials use.
     images: BTreeSet<usize>,
     image_names: Vec<String>,
@@ -195,12 +195,12 @@ impl SceneWriter<'_> {
         }
         let base = if instance.name.is_empty() { "part" } else { &instance.name };
         match self.naming {
-            ExportedAssetLocation::Inside => {
+            SceneAssetLocation::Inside => {
                 self.toml.key_value("file", quote_toml_string(&file_name(self.path)));
                 self.toml.key_value("part", instance.part.to_string());
             }
-            ExportedAssetLocation::Folder(_) => {
-                let name = self.add_exported_file(ExportedFileSource::Part(instance.part), base, "ply");
+            SceneAssetLocation::Folder(_) => {
+                let name = self.add_exported_file(GltfPartOrImage::Part(instance.part), base, "ply");
                 self.toml.key_value("file", quote_toml_string(&name));
             }
         }
@@ -237,13 +237,13 @@ impl SceneWriter<'_> {
     }
 
     /// Returns the file name for `content`, adding a file if the content is new.
-    fn add_exported_file(&mut self, content: ExportedFileSource, wanted: &str, ending: &str) -> String {
+    fn add_exported_file(&mut self, content: GltfPartOrImage, wanted: &str, ending: &str) -> String {
         if let Some(known) = self.names.get(&content) {
             return known.clone();
         }
         let folder = match self.naming {
-            ExportedAssetLocation::Inside => String::new(),
-            ExportedAssetLocation::Folder(folder) => format!("{folder}/"),
+            SceneAssetLocation::Inside => String::new(),
+            SceneAssetLocation::Folder(folder) => format!("{folder}/"),
         };
         let plain: String =
             wanted.chars().map(|c| if c.is_alphanumeric() || "-_.".contains(c) { c } else { '_' }).collect();
@@ -273,7 +273,7 @@ impl super::materials::MaterialExportTarget for SceneWriter<'_> {
         self.images.insert(image);
         let bytes = self.container.locate_image(image);
         match (self.naming, bytes) {
-            (ExportedAssetLocation::Inside, Ok(ImageLocation::File(file)))
+            (SceneAssetLocation::Inside, Ok(ImageLocation::File(file)))
                 if has_image_extension(&file) && file.is_file() =>
             {
                 let folder = self.path.parent().unwrap_or(Path::new(""));
@@ -282,13 +282,13 @@ impl super::materials::MaterialExportTarget for SceneWriter<'_> {
             }
             // A file without an image extension is read through the glTF file, so that its format is detected
             // from its content. A missing file is watched until it appears.
-            (ExportedAssetLocation::Inside, bytes) => {
+            (SceneAssetLocation::Inside, bytes) => {
                 if let Ok(ImageLocation::File(file)) = bytes {
                     self.companions.push(Companion { path: file, hash: None, stamp: None });
                 }
                 TextureFileReference { file: file_name(self.path), image: Some(image) }
             }
-            (ExportedAssetLocation::Folder(_), bytes) => {
+            (SceneAssetLocation::Folder(_), bytes) => {
                 let ending = match &bytes {
                     Ok(ImageLocation::Inside(bytes)) => sniff_image_extension(bytes).to_owned(),
                     Ok(ImageLocation::File(path)) => {
@@ -303,7 +303,7 @@ impl super::materials::MaterialExportTarget for SceneWriter<'_> {
                     Err(_) => "png".to_owned(),
                 };
                 let wanted = self.image_name(image);
-                let name = self.add_exported_file(ExportedFileSource::Image(image), &wanted, &ending);
+                let name = self.add_exported_file(GltfPartOrImage::Image(image), &wanted, &ending);
                 TextureFileReference { file: name, image: None }
             }
         }
@@ -380,7 +380,7 @@ fn camera_pose(camera: &ModelCamera, [least, greatest]: [DVec3; 2]) -> CameraPos
     let depth = ((least + greatest) * 0.5 - camera.position).dot(camera.direction).max(size * 0.05);
     let look_at = camera.position + camera.direction * depth;
     let step = size.min(depth) * 1e-6;
-    let tidy = |at: DVec3| DVec3::from(at.to_array().map(|part| round_to_power_of_ten_of_step(part, step)));
+    let tidy = |at: DVec3| DVec3::from(at.to_array().map(|part| round_to_decimals_of_step(part, step)));
     let up = if (camera.up - DVec3::Y).length() < 1e-6 || has_no_roll(camera) { DVec3::Y } else { camera.up };
     CameraPose { position: tidy(camera.position), look_at: tidy(look_at), up }
 }

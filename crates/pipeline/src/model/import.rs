@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::gltf::{ExportedAssetLocation, ExportedFileSource};
+use super::gltf::{GltfPartOrImage, SceneAssetLocation};
 use super::{GeneratedScene, ModelViewOptions, mark_diagnostic_as_generated};
 use crate::assets::AssetError;
 use crate::assets::gltf::is_gltf;
@@ -11,7 +11,7 @@ use crate::control::{CancelToken, ignore_progress};
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::load_generated;
 use crate::stages::containers::GltfContainers;
-use crate::system::threads::core_pool;
+use crate::system::threads::logical_cpu_pool;
 
 /// An imported scene, ready to be written.
 #[derive(Debug)]
@@ -42,25 +42,25 @@ pub fn import_gltf(path: &Path, folder: &str, token: &CancelToken) -> Result<Imp
         let message = format!("cannot import {}: only .gltf and .glb files are supported", path.display());
         return Err(ImportError::File(message));
     }
-    let pool = core_pool().map_err(ImportError::Work)?;
+    let pool = logical_cpu_pool().map_err(ImportError::Work)?;
     let containers = GltfContainers::default();
-    let naming = ExportedAssetLocation::Folder(folder.to_owned());
+    let naming = SceneAssetLocation::Folder(folder.to_owned());
     let read = || {
         let GeneratedScene { text, notes, assets, .. } =
             super::gltf::scene_text(path, (ModelViewOptions::default(), &naming), &containers, token)?;
-        check_scene(path, &containers, token)?;
+        check_generated_scene(path, &containers, token)?;
         let container = containers.open(path, &ignore_progress, token)?;
         let mut files = Vec::new();
         for asset in assets {
             let bytes = match asset.content {
-                ExportedFileSource::Part(part) => {
+                GltfPartOrImage::Part(part) => {
                     write::encode_ply(&container.build_part(part, &ignore_progress, token)?.mesh)
                 }
-                ExportedFileSource::Image(image) => {
+                GltfPartOrImage::Image(image) => {
                     // Check the content. Otherwise, a malicious glTF file could make the import copy
                     // arbitrary files as images.
                     container.check_image_decodes(image, token)?;
-                    container.read_image_bytes(image, token)?
+                    container.read_embedded_or_external_image(image, token)?
                 }
             };
             files.push((PathBuf::from(asset.name), bytes));
@@ -79,10 +79,14 @@ pub fn import_gltf(path: &Path, folder: &str, token: &CancelToken) -> Result<Imp
 
 /// Rejects a scene that `glimt check` would reject. Checks the text that `glimt MODEL` would render, because
 /// the files referenced by that text already exist.
-fn check_scene(path: &Path, containers: &GltfContainers, token: &CancelToken) -> Result<(), AssetError> {
+fn check_generated_scene(
+    path: &Path,
+    containers: &GltfContainers,
+    token: &CancelToken,
+) -> Result<(), AssetError> {
     let shown = super::gltf::scene_text(
         path,
-        (ModelViewOptions::default(), &ExportedAssetLocation::Inside),
+        (ModelViewOptions::default(), &SceneAssetLocation::Inside),
         containers,
         token,
     )?;

@@ -12,7 +12,7 @@ use std::collections::HashSet;
 use std::path::Path;
 
 use self::frame::{CameraPose, FOV, KEY, SKY, ground_reflectance_matching_sky, key_light_travel_direction};
-use self::gltf::{ExportedAssetLocation, ExportedFile};
+use self::gltf::{ExportedFile, SceneAssetLocation};
 use self::toml::{TomlWriter, format_exact_vector, format_number, format_vector, round_significant};
 use super::settings::{Overrides, UpAxis, ViewSide};
 use super::stages::containers::GltfContainers;
@@ -108,7 +108,7 @@ pub(crate) fn scene_text(
             let reason = "glTF files are always y-up; `--up` applies to obj, off, ply and stl".to_owned();
             return Err(AssetError::Malformed { path: path.to_owned(), line: None, reason });
         }
-        return gltf::scene_text(path, (show, &ExportedAssetLocation::Inside), containers, token);
+        return gltf::scene_text(path, (show, &SceneAssetLocation::Inside), containers, token);
     }
     plain::scene_text(path, show, containers, token)
 }
@@ -235,7 +235,7 @@ fn write_ground(
     toml.table("[[plane]]");
     toml.key_value(
         "point",
-        format_exact_vector(DVec3::new(0.0, frame::round_to_power_of_ten_of_step(height, size * 1e-5), 0.0)),
+        format_exact_vector(DVec3::new(0.0, frame::round_to_decimals_of_step(height, size * 1e-5), 0.0)),
     );
     toml.key_value("material", format!("\"{name}\""));
 }

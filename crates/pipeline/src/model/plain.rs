@@ -90,7 +90,7 @@ pub(super) fn scene_text(
     token: &CancelToken,
 ) -> Result<GeneratedScene, AssetError> {
     let loaded = containers.load_any_mesh((path, None), &ignore_progress, token)?;
-    let Some([least, greatest]) = loaded.mesh.bounds() else {
+    let Some([least, greatest]) = loaded.mesh.bounds_in_file_coordinates() else {
         return Err(AssetError::Malformed {
             path: path.to_owned(),
             line: None,

@@ -58,7 +58,7 @@ impl FilmCache {
 
     /// Makes the film with this key current if it is cached and usable. Otherwise, leaves no film current.
     /// Caches the previous film if there is room.
-    pub(crate) fn make_current_if_cached(
+    pub(crate) fn set_current_to_cached_or_none(
         &mut self,
         key: Fingerprint,
         is_usable: impl FnOnce(&FilmState) -> bool,
@@ -67,7 +67,7 @@ impl FilmCache {
             let kept = self.kept.iter().position(|state| state.key == key);
             let found = kept.map(|index| self.kept.remove(index));
             if let Some(before) = std::mem::replace(&mut self.current, found) {
-                self.insert(before);
+                self.insert_if_worth_keeping(before);
             }
         }
         self.current.take_if(|current| !is_usable(current));
@@ -106,7 +106,7 @@ impl FilmCache {
     }
 
     /// Caches a film, evicting others to make room. A film larger than the limit is dropped instead.
-    fn insert(&mut self, state: FilmState) {
+    fn insert_if_worth_keeping(&mut self, state: FilmState) {
         let size = state.memory_bytes();
         // Drop incomplete films from a moving camera, which would fill the cache but are never reused.
         let is_left_behind = state.is_passing && !state.has_sampled_all_pixels();
@@ -166,14 +166,14 @@ mod tests {
     fn films(names: &[&str], most_kept_bytes: u64) -> FilmCache {
         let mut films = FilmCache { most_kept_bytes, ..FilmCache::default() };
         for name in names {
-            films.make_current_if_cached(key(name), |_| true);
+            films.set_current_to_cached_or_none(key(name), |_| true);
             films.replace_current_with_retry(|| Ok::<_, ()>(state(name))).expect("a film");
         }
         films
     }
 
     fn finds(films: &mut FilmCache, name: &str) -> bool {
-        films.make_current_if_cached(key(name), |_| true);
+        films.set_current_to_cached_or_none(key(name), |_| true);
         films.current().is_some_and(|current| current.key == key(name))
     }
 
@@ -209,7 +209,7 @@ mod tests {
         films.pin(key("own"));
         films.most_kept_bytes -= 1;
         for name in ["a", "b", "c"] {
-            films.make_current_if_cached(key(name), |_| true);
+            films.set_current_to_cached_or_none(key(name), |_| true);
             films.replace_current_with_retry(|| Ok::<_, ()>(state(name))).expect("a film");
         }
         assert_eq!(films.count(), 2, "only the pinned and the current film should remain");
@@ -229,7 +229,7 @@ mod tests {
     fn moving_camera_keeps_only_complete_films() {
         for is_whole in [false, true] {
             let mut films = films(&["a"], u64::MAX);
-            films.make_current_if_cached(key("b"), |_| true);
+            films.set_current_to_cached_or_none(key("b"), |_| true);
             let passing = || {
                 let mut passing = state("b");
                 passing.is_passing = true;
@@ -237,7 +237,7 @@ mod tests {
                 Ok::<_, ()>(passing)
             };
             films.replace_current_with_retry(passing).expect("a film");
-            films.make_current_if_cached(key("c"), |_| true);
+            films.set_current_to_cached_or_none(key("c"), |_| true);
             assert_eq!(finds(&mut films, "b"), is_whole);
             assert!(finds(&mut films, "a"));
         }
@@ -246,9 +246,9 @@ mod tests {
     #[test]
     fn cached_films_are_dropped_when_out_of_memory() {
         let mut films = films(&["a", "b"], u64::MAX);
-        films.make_current_if_cached(key("a"), |_| false);
+        films.set_current_to_cached_or_none(key("a"), |_| false);
         assert!(films.current().is_none() && !finds(&mut films, "a") && finds(&mut films, "b"));
-        films.make_current_if_cached(key("c"), |_| true);
+        films.set_current_to_cached_or_none(key("c"), |_| true);
         let tries = std::cell::Cell::new(0);
         let made = films.replace_current_with_retry(|| {
             tries.set(tries.get() + 1);

@@ -140,7 +140,7 @@ impl FilmState {
 
     /// Maps this share's samples to sample indices in the whole image. If the indices are not all
     /// consecutive, returns only the first consecutive range.
-    pub(crate) fn first_global_sample_range(&self, samples: Range<u32>) -> Range<u32> {
+    pub(crate) fn to_first_global_sample_range(&self, samples: Range<u32>) -> Range<u32> {
         match &self.share {
             Some(share) => share.to_global_sample_range(samples),
             None => samples,
@@ -251,7 +251,8 @@ impl FilmState {
             let cells = cells.map(|(cell, rect)| (rect, [0, 1].map(|half| missing(cell, half))));
             let cells: Vec<(Rect, [Range<u32>; 2])> = cells.collect();
             let job = |pixels, samples: &Range<u32>| TileJob { tile, pixels, samples: samples.clone() };
-            if let Some((rect, samples)) = self.film.tile_rect(tile).zip(uniform_sample_range(&cells)) {
+            if let Some((rect, samples)) = self.film.tile_rect(tile).zip(shared_sample_range_of_cells(&cells))
+            {
                 jobs.push(job(rect.into(), samples));
                 continue;
             }
@@ -339,8 +340,8 @@ impl FilmState {
                 continue;
             }
             let of_cell = cost.cost_in_samples_with_overhead(self.pixel_share);
-            seconds += lacking * cost.recorded_seconds() / of_cell;
-            known += cost.recorded_seconds();
+            seconds += lacking * cost.decayed_seconds_sum() / of_cell;
+            known += cost.decayed_seconds_sum();
             worth += of_cell;
         }
         // Without measurements, assume that all samples cost the same.
@@ -378,7 +379,7 @@ impl FilmState {
 }
 
 /// Returns the sample range that all halves of all cells need, if it is the same for all of them.
-fn uniform_sample_range(cells: &[(Rect, [Range<u32>; 2])]) -> Option<&Range<u32>> {
+fn shared_sample_range_of_cells(cells: &[(Rect, [Range<u32>; 2])]) -> Option<&Range<u32>> {
     let (_, [first, _]) = cells.first()?;
     cells.iter().all(|(_, halves)| halves.iter().all(|half| half == first)).then_some(first)
 }

@@ -32,7 +32,7 @@ impl<'a> CoarseImageRenderer<'a> {
     pub(crate) fn sizes(&self, shown: (u32, u32)) -> Vec<(u32, u32)> {
         let usual = self.reduce_size_for_large_scenes(shown);
         let rate = self.rate.get().filter(|_| self.is_moved);
-        let hasty = rate.and_then(|rate| size_within_budget(usual, rate));
+        let hasty = rate.and_then(|rate| size_for_time_budget(usual, rate));
         hasty.into_iter().chain([usual]).filter(|size| self.is_less_work(*size)).collect()
     }
 
@@ -110,7 +110,7 @@ impl<'a> CoarseImageRenderer<'a> {
 
 /// Returns an image size that takes [`MOVING_TIME_BUDGET`] to render at `rate` pixels per second, or `None`
 /// if rendering at the usual size is about as fast.
-fn size_within_budget((width, height): (u32, u32), rate: f64) -> Option<(u32, u32)> {
+fn size_for_time_budget((width, height): (u32, u32), rate: f64) -> Option<(u32, u32)> {
     /// Minimum width in pixels.
     const LEAST: f64 = 16.0;
     let share = (rate * MOVING_TIME_BUDGET.as_secs_f64() / (f64::from(width) * f64::from(height))).sqrt();
@@ -167,11 +167,11 @@ mod tests {
 
     #[test]
     fn first_image_fits_its_time_budget() {
-        let pixels_of = |rate: f64| size_within_budget((120, 80), rate / MOVING_TIME_BUDGET.as_secs_f64());
+        let pixels_of = |rate: f64| size_for_time_budget((120, 80), rate / MOVING_TIME_BUDGET.as_secs_f64());
         assert_eq!(pixels_of(9600.0), None, "the usual size should be fast enough");
         assert_eq!(pixels_of(2400.0), Some((60, 40)));
         assert_eq!(pixels_of(1.0), Some((16, 11)), "the size should not fall below the minimum");
-        assert_eq!(size_within_budget((10, 5), 0.0), Some((10, 5)));
+        assert_eq!(size_for_time_budget((10, 5), 0.0), Some((10, 5)));
     }
 
     #[test]

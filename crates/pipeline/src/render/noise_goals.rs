@@ -77,7 +77,7 @@ impl CellSampleGoals {
         let brightness = self.brightness.or_else(|| film.mean_luminance())?;
         let aim = NoiseTarget { error, brightness, convergence: film.convergence_model() };
         let is_open =
-            |tile: usize| self.judged[tile] < samples && self.tile_has_undecided_half(tile, done, samples);
+            |tile: usize| self.judged[tile] < samples && self.tile_has_undecided_half_at(tile, done, samples);
         let noise = film.map_tiles(|tile| is_open(tile).then(|| TileNoise::measure(film, tile)));
         if is_time {
             self.decide_goals_within_next_doubling(&noise, done, samples, &aim);
@@ -108,7 +108,7 @@ impl CellSampleGoals {
     }
 
     /// Whether a tile contains an undecided half with `samples` samples.
-    pub(crate) fn tile_has_undecided_half(&self, tile: usize, done: &[[u32; 2]], samples: u32) -> bool {
+    pub(crate) fn tile_has_undecided_half_at(&self, tile: usize, done: &[[u32; 2]], samples: u32) -> bool {
         let cells = self.decided.iter().zip(done).skip(CELLS * tile).take(CELLS);
         cells
             .flat_map(|(goals, done)| goals.iter().zip(done))
@@ -177,7 +177,7 @@ impl TileNoise {
                 ..noise
             })
         };
-        Self { halves: [0, 1].map(noise), fall: film.last_variance_reduction_in_tile(tile) }
+        Self { halves: [0, 1].map(noise), fall: film.last_doubling_variance_reduction(tile) }
     }
 }
 

@@ -11,7 +11,7 @@ use crate::film::tone::{ToneMapping, tone_map_to_8_bits};
 use crate::film::{FilmQuantity, Previewer, RadianceImage, Rect};
 use crate::keys;
 use crate::plan::RenderPlan;
-use crate::protocol::{ImagePosition, MaxPreviewSize, NormalizedRect, PreviewSourceImage};
+use crate::protocol::{ImagePosition, MaxPreviewSize, NormalizedRect, PreviewedImageState};
 use crate::sink::EventSink;
 
 /// Maximum time spent on updating a preview before checking for commands.
@@ -40,8 +40,9 @@ impl PreviewSender<'_> {
         if self.send_section_if_requested(state, true) {
             return;
         }
-        while !pool.install(|| update_previewer_briefly(state, self.plan.settings.view.film_quantity(), size))
-        {
+        while !pool.install(|| {
+            update_previewer_briefly(state, self.plan.settings.view.displayed_film_quantity(), size)
+        }) {
             if token.is_cancelled() {
                 return;
             }
@@ -51,12 +52,12 @@ impl PreviewSender<'_> {
 
     /// Spends a short time between tiles on updating the preview, on the current thread. Returns whether it
     /// was completed and sent.
-    pub(crate) fn update_in_time_slice(&self, state: &mut FilmState) -> bool {
+    pub(crate) fn update_briefly_and_send(&self, state: &mut FilmState) -> bool {
         let Some(size) = self.fitted_image_size() else { return false };
         if self.send_section_if_requested(state, false) {
             return true;
         }
-        update_previewer_briefly(state, self.plan.settings.view.film_quantity(), size);
+        update_previewer_briefly(state, self.plan.settings.view.displayed_film_quantity(), size);
         let is_whole = state.previewer.as_ref().is_some_and(Previewer::has_processed_all_tiles);
         if is_whole {
             self.send_current(state, false);
@@ -77,7 +78,7 @@ impl PreviewSender<'_> {
     /// requested.
     fn send_section_if_requested(&self, state: &FilmState, has_time: bool) -> bool {
         let Some(rect) = self.requested_section() else { return false };
-        let quantity = self.plan.settings.view.film_quantity();
+        let quantity = self.plan.settings.view.displayed_film_quantity();
         let base = state.base.as_ref().filter(|_| quantity == FilmQuantity::Radiance);
         let render = &self.plan.settings.render;
         let section = NormalizedRect::from_pixels(rect, (render.width, render.height));
@@ -100,7 +101,7 @@ impl PreviewSender<'_> {
         section: Option<NormalizedRect>,
     ) {
         let range = tone.range_map.range().map(|range| range.limits());
-        let source = PreviewSourceImage {
+        let source = PreviewedImageState {
             image: keys::developed_image_key(state.key, self.plan, state.number),
             is_finished: state.is_finished(self.plan),
         };
@@ -118,7 +119,7 @@ impl PreviewSender<'_> {
         if tone.range_map == RangeMap::None || !is_known {
             return tone.with_image_range(image);
         }
-        tone.with_image_range(&state.film.image(self.plan.settings.view.film_quantity()))
+        tone.with_image_range(&state.film.image(self.plan.settings.view.displayed_film_quantity()))
     }
 
     /// Returns the pixels of the 1:1 section, if one was requested.

@@ -127,13 +127,13 @@ impl<'a> Scheduler<'a> {
 
     /// Returns the number of seconds that all requests have spent on this film.
     fn seconds_across_requests(&mut self) -> f64 {
-        self.state.render_seconds + self.clock.active_seconds(self.rendering.tracer.token.is_paused())
+        self.state.render_seconds + self.clock.update_active_seconds(self.rendering.tracer.token.is_paused())
     }
 
     /// Returns the render time in seconds, including time spent by the process whose checkpoint this render
     /// resumed from.
     pub(crate) fn total_render_seconds(&mut self) -> f64 {
-        self.seconds_before + self.clock.active_seconds(self.rendering.tracer.token.is_paused())
+        self.seconds_before + self.clock.update_active_seconds(self.rendering.tracer.token.is_paused())
     }
 
     fn run_passes_to_end(&mut self) -> Result<(), AbortReason> {
@@ -239,7 +239,7 @@ impl<'a> Scheduler<'a> {
 
     fn measure_noise_if_due(&mut self) {
         let Tracer { pool, token, .. } = self.rendering.tracer;
-        let seconds = self.clock.active_seconds(token.is_paused());
+        let seconds = self.clock.update_active_seconds(token.is_paused());
         self.forecast.measure_noise_if_due(self.state, pool, seconds);
     }
 
@@ -251,7 +251,7 @@ impl<'a> Scheduler<'a> {
         while !self.state.is_complete_in_region(part, target) && !self.is_over_time {
             let samples = self.state.min_unfinished_samples_in(part, target);
             let at_once = samples..target.min(samples.saturating_add(photons.max_passes_at_once()));
-            let numbers = self.state.first_global_sample_range(at_once);
+            let numbers = self.state.to_first_global_sample_range(at_once);
             let end = samples + numbers.len() as u32;
             // Do not trace or gather photons if there is no time left.
             self.run_due_tasks();
@@ -275,13 +275,13 @@ impl<'a> Scheduler<'a> {
     ) -> Result<PhotonMaps, AbortReason> {
         let RenderStageInputs { plan, sink, tracer, .. } = *self.rendering;
         let Tracer { pool, world, token, .. } = tracer;
-        let begin = self.clock.active_seconds(token.is_paused());
-        self.forecast.begin_photons(begin);
+        let begin = self.clock.update_active_seconds(token.is_paused());
+        self.forecast.begin_photons_at(begin);
         let maps =
             photons.get_or_trace_maps(samples, PhotonContext { world, plan, pool, token, sink }, || {
                 self.run_due_tasks();
             })?;
-        self.forecast.end_photons(self.clock.active_seconds(token.is_paused()));
+        self.forecast.end_photons_at(self.clock.update_active_seconds(token.is_paused()));
         Ok(maps)
     }
 
@@ -302,7 +302,7 @@ impl<'a> Scheduler<'a> {
         const STEP: Duration = Duration::from_millis(30);
         /// Number of pixels in half a tile.
         const PIXELS: f64 = (TILE_SIZE * TILE_SIZE / 2) as f64;
-        let seconds = self.clock.active_seconds(self.rendering.tracer.token.is_paused());
+        let seconds = self.clock.update_active_seconds(self.rendering.tracer.token.is_paused());
         let threads = self.rendering.tracer.pool.current_num_threads() as f64;
         let rate = (self.units - self.units_before) as f64 / seconds / threads;
         let most = ((rate * STEP.as_secs_f64() / PIXELS) as u32).max(16);
@@ -355,7 +355,7 @@ impl<'a> Scheduler<'a> {
         if let Some(bounds) = (self.rendering.take_preview)() {
             (self.screen.bounds, self.next_preview) = (bounds, now);
         }
-        if now >= self.next_preview && self.screen.update_in_time_slice(self.state) {
+        if now >= self.next_preview && self.screen.update_briefly_and_send(self.state) {
             self.next_preview = Instant::now() + PREVIEW_INTERVAL.max(now.elapsed() * PREVIEW_SHARE);
         }
         (self.rendering.pulse)(self.state, !self.is_first);
@@ -376,7 +376,7 @@ impl<'a> Scheduler<'a> {
 
     /// Reports the render's progress and expected end.
     fn report_progress(&mut self, is_last: bool) {
-        let elapsed_seconds = self.clock.active_seconds(self.rendering.tracer.token.is_paused());
+        let elapsed_seconds = self.clock.update_active_seconds(self.rendering.tracer.token.is_paused());
         let RenderStageInputs { plan, photons, sink, .. } = *self.rendering;
         let (state, units, is_first) = (&*self.state, self.units, self.is_first);
         let moment = RenderSnapshot { state, plan, photons, elapsed_seconds, units, is_first, is_last };

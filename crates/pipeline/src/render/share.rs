@@ -75,7 +75,7 @@ impl Shard {
 
     /// Returns this share's sample blocks in sorted order, or no blocks if the share has all samples of its
     /// tiles.
-    pub(crate) fn sample_blocks(&self) -> &[u32] {
+    pub(crate) fn sample_block_indices(&self) -> &[u32] {
         self.blocks.as_deref().unwrap_or_default()
     }
 
@@ -145,7 +145,7 @@ mod tests {
     #[test]
     fn share_blocks_are_spread_out() {
         let share = Shard::new((1, 2), true, 4096);
-        let first = share.sample_blocks().iter().filter(|block| **block < 128).count();
+        let first = share.sample_block_indices().iter().filter(|block| **block < 128).count();
         assert!((44..=84).contains(&first), "{first} of 128 in the first half");
         assert_eq!(share.summation_order(), SumOrder::SeparateBlocks(128));
         assert_eq!(Shard::new((1, 1), true, 40).summation_order(), SumOrder::SeparateBlocks(2));

@@ -92,7 +92,7 @@ fn half_cells_with_costs(
 ) -> Option<Vec<HalfCell>> {
     let mut halves = Vec::with_capacity(2 * done.len());
     for (cell, done) in done.iter().enumerate().filter(|(cell, _)| film.cell_rect(*cell).is_some()) {
-        let errors = [0, 1].map(|half| film.half_cell_relative_mse(cell, half, known));
+        let errors = [0, 1].map(|half| film.cell_half_relmse_and_exponent(cell, half, known));
         let units: f64 = [0, 1]
             .map(|half| film.cell_half_pixel_count(cell, half) as f64 * f64::from(done[half]))
             .iter()

@@ -6,8 +6,8 @@ use super::{ImageReport, LightSamplingReport, PhotonsReport, Report, SampledLigh
 use crate::control::CancelToken;
 use crate::film::range_map::RangeMap;
 use crate::inputs::ProtectedInputs;
-use crate::integrators::{RayCounters, light_sampling_purpose};
-use crate::output::write::{WritePolicy, atomic_with_policy};
+use crate::integrators::{RayCounters, light_sampling_integrator};
+use crate::output::write::{ExistingFilePolicy, atomic_with_policy};
 use crate::output::{OutputError, json};
 use crate::plan::RenderPlan;
 use crate::protocol::StageReport;
@@ -78,7 +78,7 @@ pub(crate) fn remove_stale_report(
 ) -> Result<(), OutputError> {
     let Some(path) = plan.report.as_ref().filter(|path| path.is_file()) else { return Ok(()) };
     let failed = |source| OutputError::File { path: path.clone(), source };
-    let remove = |guard: &WritePolicy<'_>| {
+    let remove = |guard: &ExistingFilePolicy<'_>| {
         let real = std::fs::canonicalize(path).map_err(failed)?;
         (guard.may_replace)(&real)?;
         std::fs::remove_file(&real).map_err(failed)
@@ -100,7 +100,7 @@ fn image_report(finished: &RequestResults<'_>) -> ImageReport {
         error: finished.state.film.relative_error(),
         render_seconds: finished.state.render_seconds,
         complete: finished.state.is_complete(plan.settings.render.samples),
-        range: data_range(finished),
+        range: data_view_value_range(finished),
     }
 }
 
@@ -110,7 +110,7 @@ fn light_sampling_report(finished: &RequestResults<'_>) -> LightSamplingReport {
     let samples = u64::from(settings.render.shadow_samples);
     let are_gathered =
         settings.gathers_photons() && finished.photons.is_some_and(|photons| photons.emitted > 0);
-    let selection = lights.sampler_for_purpose(light_sampling_purpose(settings, are_gathered));
+    let selection = lights.sampler_for_integrator(light_sampling_integrator(settings, are_gathered));
     let (sampled, picks) = match selection {
         Some(selection) => (SampledLightSet::Picked, samples * u64::from(selection.picks.count)),
         None => (SampledLightSet::All, 0),
@@ -124,12 +124,12 @@ fn light_sampling_report(finished: &RequestResults<'_>) -> LightSamplingReport {
     }
 }
 
-fn data_range(finished: &RequestResults<'_>) -> Option<[f32; 2]> {
+fn data_view_value_range(finished: &RequestResults<'_>) -> Option<[f32; 2]> {
     let RequestResults { plan, state, .. } = finished;
     if plan.tone.range_map == RangeMap::None {
         return None;
     }
-    let image = state.film.image(plan.settings.view.film_quantity());
+    let image = state.film.image(plan.settings.view.displayed_film_quantity());
     plan.tone.with_image_range(&image).range_map.range().map(|range| range.limits())
 }
 

@@ -14,7 +14,7 @@ use crate::math::DVec3;
 use crate::scene::description::Scene;
 use crate::scene::fingerprint::{Fingerprint, FingerprintContext};
 use crate::world::{
-    Geometry, MeshTree, emissive_override_by_mesh_file, light_lifts, separate_coincident_emitters,
+    Geometry, MeshTree, emissive_override_flags_by_mesh_file, light_lifts, separate_coincident_emitters,
 };
 
 /// The key of a mesh whose coincident emitters have been separated, and the mesh.
@@ -127,7 +127,7 @@ fn separate_coincident_mesh_emitters(
         };
         Ok((*found).clone().map(|distinct| (key, distinct)))
     };
-    meshes.iter().zip(emissive_override_by_mesh_file(scene)).map(distinct).collect()
+    meshes.iter().zip(emissive_override_flags_by_mesh_file(scene)).map(distinct).collect()
 }
 
 /// Returns the trees for all meshes, and how many of them were cached.

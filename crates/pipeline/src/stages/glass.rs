@@ -31,7 +31,7 @@ pub(crate) fn find_glass_solids(
 ) -> Result<Arc<GlassSolids>, AbortReason> {
     let scene = &loaded.scene;
     let mesh_keys: Vec<Fingerprint> = meshes.iter().map(|mesh| mesh.key).collect();
-    let key = keys::glass_key(scene, &keys::scene_fingerprint_context(scene, &mesh_keys, None));
+    let key = keys::glass_key(scene, &keys::scene_references_for_fingerprint(scene, &mesh_keys, None));
     let bodies = if let Some(bodies) = memo.get(key) {
         Arc::clone(bodies)
     } else {
@@ -81,7 +81,7 @@ fn flaw(loaded: &LoadedScene, open: &OpenGlass) -> Option<GlassFlaw> {
         return Some(if open.disagrees { GlassFlaw::Fronts } else { GlassFlaw::Hole });
     }
     let sheet = |one, several, help| GlassFlaw::Sheet { one, several, help };
-    Some(match shape.as_open_surface()? {
+    Some(match shape.untransformed_open_surface()? {
         OpenSurface::Quad(_) => sheet(
             "a glass quad",
             "glass quads",

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use super::super::cache::NamedCache;
 use super::super::protocol::reasons;
-use super::super::watch::content::{FileContentId, FileRead};
+use super::super::watch::content::{FileContentId, FilePathAndContentId};
 use super::containers::canonical;
 use super::{AbortReason, FileCounts, FileReadContext, Findings, LoadedAsset, StageResult, loading_result};
 use crate::assets::{AssetError, Companion, DroppedFaces, LoadedMesh};
@@ -23,18 +23,22 @@ pub(crate) struct CachedMesh {
     pub(crate) mesh: Arc<LoadedMesh>,
     /// Key that covers the contents of all files that the mesh depends on.
     pub(crate) key: Fingerprint,
-    companions: Vec<FileRead>,
+    companions: Vec<FilePathAndContentId>,
     /// Bounds of the mesh, computed on demand.
     bounds: OnceLock<MeshBoundingBox>,
 }
 
 impl CachedMesh {
-    pub(super) fn new(mesh: Arc<LoadedMesh>, key: Fingerprint, companions: Vec<FileRead>) -> Self {
+    pub(super) fn new(
+        mesh: Arc<LoadedMesh>,
+        key: Fingerprint,
+        companions: Vec<FilePathAndContentId>,
+    ) -> Self {
         Self { mesh, key, companions, bounds: OnceLock::new() }
     }
 
     fn bounds(&self) -> MeshBoundingBox {
-        *self.bounds.get_or_init(|| self.mesh.mesh.bounds())
+        *self.bounds.get_or_init(|| self.mesh.mesh.bounds_in_file_coordinates())
     }
 }
 
@@ -62,7 +66,7 @@ pub(crate) fn load_meshes(
             let content = reading.contents.first_seen_content_id(&file.value, reading.token)?;
             if let Some(last) = cache.get_by_name(&name) {
                 // The mesh probably still references the same files, so hash them before they are read.
-                files_with_first_seen_content(&last.companions, reading)?;
+                contents_as_seen_by_request(&last.companions, reading)?;
             }
             Ok((content, cache.get(&name, mesh_key_without_companions(file, content))))
         })
@@ -112,7 +116,7 @@ pub(crate) fn load_meshes(
         };
         meshes.push(mesh);
     }
-    add_warnings(loaded, warnings.messages(), findings);
+    add_limited_mesh_warnings(loaded, warnings.messages(), findings);
     for object in loaded.scene.objects.iter().filter(|object| object.material.is_none()) {
         if let Some(mesh) = object.shape.as_mesh()
             && meshes[mesh.file].mesh.lacks_materials()
@@ -198,9 +202,9 @@ fn load_or_reuse_mesh(
     load: impl Fn(&Path, Progress<'_>, &CancelToken) -> Result<LoadedMesh, AssetError>,
 ) -> Result<LoadedAsset<CachedMesh>, Cancelled> {
     let path = &file.value;
-    let mut files = vec![FileRead { path: path.to_owned(), content }];
+    let mut files = vec![FilePathAndContentId { path: path.to_owned(), content }];
     if let Some(mesh) = kept
-        && mesh.companions == files_with_first_seen_content(&mesh.companions, reading)?
+        && mesh.companions == contents_as_seen_by_request(&mesh.companions, reading)?
     {
         files.extend(mesh.companions.iter().cloned());
         return Ok(LoadedAsset { files, result: Ok((mesh, true)) });
@@ -218,7 +222,7 @@ fn load_or_reuse_mesh(
         Ok(mesh) => {
             let content = reading.contents.record_decoded(path, mesh.hash);
             files[0].content = content;
-            let read = |companion| reading.contents.read_companion(companion, reading.token);
+            let read = |companion| reading.contents.record_companion(companion, reading.token);
             let companions = mesh.companions.iter().map(read).collect::<Result<Vec<_>, _>>()?;
             files.extend(companions.iter().cloned());
             let mut key = FingerprintHasher::new("mesh");
@@ -250,13 +254,13 @@ fn has_companion_appeared(
 }
 
 /// Returns the files with their contents as first seen by this request.
-fn files_with_first_seen_content(
-    files: &[FileRead],
+fn contents_as_seen_by_request(
+    files: &[FilePathAndContentId],
     reading: &FileReadContext<'_>,
-) -> Result<Vec<FileRead>, Cancelled> {
-    let now = |file: &FileRead| {
+) -> Result<Vec<FilePathAndContentId>, Cancelled> {
+    let now = |file: &FilePathAndContentId| {
         let content = reading.contents.first_seen_content_id(&file.path, reading.token)?;
-        Ok(FileRead { path: file.path.clone(), content })
+        Ok(FilePathAndContentId { path: file.path.clone(), content })
     };
     files.iter().map(now).collect()
 }
@@ -337,7 +341,11 @@ impl<'a> MeshWarnings<'a> {
 /// Maximum number of warnings about all mesh files.
 pub(crate) const MAX_WARNINGS: usize = 100;
 
-fn add_warnings(loaded: &LoadedScene, warnings: Vec<(&MeshFile, String)>, findings: &mut Findings) {
+fn add_limited_mesh_warnings(
+    loaded: &LoadedScene,
+    warnings: Vec<(&MeshFile, String)>,
+    findings: &mut Findings,
+) {
     let unsaid = warnings.len().saturating_sub(MAX_WARNINGS);
     let last = warnings.last().map(|(file, _)| file.span.clone());
     for (file, message) in warnings.into_iter().take(MAX_WARNINGS) {
@@ -367,7 +375,7 @@ mod tests {
     use super::super::containers::GltfContainers;
     use super::*;
     use crate::sink::EventSink;
-    use crate::watch::content::{FileHashCache, RequestFileSnapshot};
+    use crate::watch::content::{FileHashCache, FilesSeenByRequest};
 
     const OBJ: &str = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl m\nf 1 2 3\n";
 
@@ -396,8 +404,8 @@ mod tests {
             std::fs::write(self.folder.path().join(name), text).expect("written");
         }
 
-        fn snapshot(&self) -> RequestFileSnapshot {
-            RequestFileSnapshot::new(self.contents.clone())
+        fn snapshot(&self) -> FilesSeenByRequest {
+            FilesSeenByRequest::new(self.contents.clone())
         }
 
         fn hash(&self, name: &str) -> FileContentId {
@@ -406,14 +414,14 @@ mod tests {
         }
 
         /// Loads `a.obj` from a snapshot. Returns the mesh and the contents of its files.
-        fn read(&mut self, contents: &RequestFileSnapshot) -> (Arc<CachedMesh>, Vec<FileRead>) {
+        fn read(&mut self, contents: &FilesSeenByRequest) -> (Arc<CachedMesh>, Vec<FilePathAndContentId>) {
             let (meshes, findings) = self.find("[[mesh]]\nfile = \"a.obj\"\n", contents);
             assert!(findings.errors.is_empty(), "{:?}", findings.errors);
             (meshes[0].clone(), findings.files)
         }
 
         /// Loads the meshes of a scene that contains `tables`.
-        fn find(&mut self, tables: &str, contents: &RequestFileSnapshot) -> (MeshesByFileIndex, Findings) {
+        fn find(&mut self, tables: &str, contents: &FilesSeenByRequest) -> (MeshesByFileIndex, Findings) {
             let camera = "[camera]\nposition = [0, 0, 4]\nlook_at = [0, 0, 0]\n";
             self.write("scene.toml", &format!("{tables}{camera}"));
             let loaded = crate::scene::load(&self.folder.path().join("scene.toml"), &[]).expect("a scene");

@@ -23,7 +23,7 @@ use rayon::ThreadPool;
 use self::containers::GltfContainers;
 use super::protocol::{Failure, Status, reasons};
 use super::sink::EventSink;
-use super::watch::content::{FileHashCache, FileRead, RequestFileSnapshot};
+use super::watch::content::{FileHashCache, FilePathAndContentId, FilesSeenByRequest};
 use crate::assets::AssetError;
 use crate::control::{CancelToken, Cancelled};
 use crate::scene::LoadedScene;
@@ -82,7 +82,7 @@ impl<T> StageResult<T> {
 pub(super) struct FileReadContext<'a> {
     pub(super) sink: &'a EventSink,
     pub(super) token: &'a CancelToken,
-    pub(super) contents: &'a RequestFileSnapshot,
+    pub(super) contents: &'a FilesSeenByRequest,
     pub(super) pool: &'a ThreadPool,
     pub(super) containers: &'a GltfContainers,
 }
@@ -93,8 +93,8 @@ pub(super) struct Findings {
     /// A point in time before the first read.
     pub(super) begun: Instant,
     /// All files that the request tried to read, without duplicates.
-    pub(super) files: Vec<FileRead>,
-    known: HashSet<FileRead>,
+    pub(super) files: Vec<FilePathAndContentId>,
+    known: HashSet<FilePathAndContentId>,
     pub(super) errors: Vec<Diagnostic>,
     /// Current reasons for not writing an image.
     pub(super) conflicts: Vec<Diagnostic>,
@@ -120,14 +120,14 @@ impl Findings {
         *self = Self { begun: self.begun, ..Self::default() };
     }
 
-    pub(super) fn add_file(&mut self, file: FileRead) {
+    pub(super) fn add_file(&mut self, file: FilePathAndContentId) {
         if self.known.insert(file.clone()) {
             self.files.push(file);
         }
     }
 
     /// Replaces a file's recorded content with the decoded content.
-    pub(super) fn replace_read_file(&mut self, file: FileRead) {
+    pub(super) fn replace_read_file(&mut self, file: FilePathAndContentId) {
         self.known.retain(|known| known.path != file.path);
         self.files.retain(|known| known.path != file.path);
         self.add_file(file);
@@ -150,7 +150,7 @@ impl Findings {
             }
             let path = folder.join(text);
             if let Ok(content) = contents.read_content_id(&path, token) {
-                self.add_file(FileRead { path, content });
+                self.add_file(FilePathAndContentId { path, content });
             }
         }
     }
@@ -176,7 +176,7 @@ impl Findings {
     }
 
     /// Takes all errors and warnings, errors first.
-    pub(super) fn take_as_failure(&mut self) -> Failure {
+    pub(super) fn take_diagnostics_as_failure(&mut self) -> Failure {
         let mut all = std::mem::take(&mut self.errors);
         all.append(&mut self.warnings);
         Failure::Scene(all)
@@ -196,7 +196,7 @@ fn diagnostic_at_span(
 /// Result of loading an asset.
 pub(super) struct LoadedAsset<T> {
     /// The file, followed by the files it references.
-    pub(super) files: Vec<FileRead>,
+    pub(super) files: Vec<FilePathAndContentId>,
     /// The value, and whether it came from the cache.
     pub(super) result: Result<(Arc<T>, bool), AssetError>,
 }

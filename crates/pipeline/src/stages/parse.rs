@@ -7,7 +7,7 @@ use std::sync::Arc;
 use super::super::cache::Memo;
 use super::super::model::{self, GeneratedScene, ModelViewOptions};
 use super::super::protocol::{Failure, reasons};
-use super::super::watch::content::{FileContentId, FileRead, RequestFileSnapshot};
+use super::super::watch::content::{FileContentId, FilePathAndContentId, FilesSeenByRequest};
 use super::containers::GltfContainers;
 use super::{AbortReason, Findings, StageResult};
 use crate::assets::gltf::{self, is_gltf};
@@ -31,7 +31,7 @@ pub(crate) struct ParsedScene {
     /// Files that the scene references without the overrides, and the files that those files reference.
     pub(crate) named: Vec<PathBuf>,
     /// Files that a generated model scene depends on, except the model itself.
-    companions: Vec<FileRead>,
+    companions: Vec<FilePathAndContentId>,
     /// Approximations made when the scene for a model was generated.
     notes: Vec<Diagnostic>,
     orbiter_content: Option<FileContentId>,
@@ -51,7 +51,7 @@ pub(crate) struct SceneParseRequest<'a> {
 /// Generates a scene for a model. Also returns all other files that the generated scene depends on.
 fn generate_model_scene(
     SceneParseRequest { path, sets, show }: SceneParseRequest<'_>,
-    (contents, containers): (&RequestFileSnapshot, &GltfContainers),
+    (contents, containers): (&FilesSeenByRequest, &GltfContainers),
     findings: &mut Findings,
     token: &CancelToken,
 ) -> Result<(scene::LoadedScene, GeneratedScene), AbortReason> {
@@ -63,7 +63,7 @@ fn generate_model_scene(
         AssetError::Unreadable { path, reason } => {
             // Watch a missing file to detect when it is created.
             if let Ok(content) = contents.first_seen_content_id(&path, token) {
-                findings.add_file(FileRead { path: path.clone(), content });
+                findings.add_file(FilePathAndContentId { path: path.clone(), content });
             }
             scene_failure_from_message(&path, format!("cannot read it: {reason}"))
         }
@@ -96,7 +96,7 @@ fn file_diagnostic(path: &Path, severity: Severity, message: String) -> Diagnost
 /// Returns all errors in the scene file.
 pub(crate) fn parse(
     origin: SceneParseRequest<'_>,
-    (contents, containers): (&RequestFileSnapshot, &GltfContainers),
+    (contents, containers): (&FilesSeenByRequest, &GltfContainers),
     memo: &mut Memo<Arc<ParsedScene>>,
     findings: &mut Findings,
     token: &CancelToken,
@@ -113,7 +113,7 @@ pub(crate) fn parse(
     let content = contents.first_seen_content_id(path, token)?;
     let is_model = is_model(path);
     if !is_model && (show.from.is_some() || show.up.is_some()) {
-        findings.add_file(FileRead { path: path.to_owned(), content });
+        findings.add_file(FilePathAndContentId { path: path.to_owned(), content });
         let message = match show.from {
             Some(_) => "`--from` applies to models; a scene has its own camera",
             None => "`--up` applies to models; scenes are always y-up",
@@ -127,7 +127,7 @@ pub(crate) fn parse(
     let key = |content| scene_key(origin, content, is_model);
     // A model's scene depends on several files, all of which must be unchanged.
     let is_same = |parsed: &&Arc<ParsedScene>| {
-        let now = |file: &FileRead| {
+        let now = |file: &FilePathAndContentId| {
             contents.first_seen_content_id(&file.path, token).is_ok_and(|content| content == file.content)
         };
         parsed.companions.iter().all(now)
@@ -138,11 +138,11 @@ pub(crate) fn parse(
         None => {
             // Record the current content in case parsing fails. After a successful parse, replace it with the
             // parsed content.
-            findings.add_file(FileRead { path: path.to_owned(), content });
+            findings.add_file(FilePathAndContentId { path: path.to_owned(), content });
             read_scene(origin, (contents, containers), memo.latest(), findings, token)?
         }
     };
-    findings.replace_read_file(FileRead { path: path.to_owned(), content });
+    findings.replace_read_file(FilePathAndContentId { path: path.to_owned(), content });
     companions.iter().for_each(|file| findings.add_file(file.clone()));
     let (orbiter, orbiter_content) =
         read_orbiter_camera_file(&loaded, known.as_deref(), contents, findings, token)?;
@@ -160,11 +160,12 @@ pub(crate) fn parse(
 }
 
 /// A scene, its file's content, the other files it depends on, and the approximations made.
-type SceneAndDependencies = (Arc<scene::LoadedScene>, FileContentId, Vec<FileRead>, Vec<Diagnostic>);
+type SceneAndDependencies =
+    (Arc<scene::LoadedScene>, FileContentId, Vec<FilePathAndContentId>, Vec<Diagnostic>);
 
 fn read_scene(
     origin: SceneParseRequest<'_>,
-    (contents, containers): (&RequestFileSnapshot, &GltfContainers),
+    (contents, containers): (&FilesSeenByRequest, &GltfContainers),
     last: Option<&Arc<ParsedScene>>,
     findings: &mut Findings,
     token: &CancelToken,
@@ -180,7 +181,7 @@ fn read_scene(
     }
     let (loaded, made) = generate_model_scene(origin, (contents, containers), findings, token)?;
     let content = contents.record_decoded(path, made.hash);
-    let companions = made.companions.iter().map(|companion| contents.read_companion(companion, token));
+    let companions = made.companions.iter().map(|companion| contents.record_companion(companion, token));
     let companions = companions.collect::<Result<_, Cancelled>>()?;
     let notes = made.notes.into_iter().map(|note| file_diagnostic(path, Severity::Warning, note)).collect();
     Ok((Arc::new(loaded), content, companions, notes))
@@ -250,30 +251,30 @@ pub fn files_referenced_by_assets<'a>(
     Ok(companions)
 }
 
-type OrbiterCameraAndContent = (Option<GkitOrbiterCamera>, Option<FileContentId>);
+type OrbiterCameraAndFileContentId = (Option<GkitOrbiterCamera>, Option<FileContentId>);
 
 /// Reads the camera's orbiter file, if it has one. Adds errors to the findings.
 fn read_orbiter_camera_file(
     loaded: &scene::LoadedScene,
     known: Option<&ParsedScene>,
-    contents: &RequestFileSnapshot,
+    contents: &FilesSeenByRequest,
     findings: &mut Findings,
     token: &CancelToken,
-) -> Result<OrbiterCameraAndContent, AbortReason> {
+) -> Result<OrbiterCameraAndFileContentId, AbortReason> {
     let Camera::Orbiter { file, .. } = &loaded.scene.camera else { return Ok((None, None)) };
     let content = contents.first_seen_content_id(&file.value, token)?;
     if let Some(parsed) = known.filter(|parsed| parsed.orbiter_content == Some(content)) {
-        findings.add_file(FileRead { path: file.value.clone(), content });
+        findings.add_file(FilePathAndContentId { path: file.value.clone(), content });
         return Ok((parsed.orbiter, Some(content)));
     }
     match load_orbiter(&file.value) {
         Ok((camera, hash)) => {
             let content = contents.record_decoded(&file.value, hash);
-            findings.add_file(FileRead { path: file.value.clone(), content });
+            findings.add_file(FilePathAndContentId { path: file.value.clone(), content });
             Ok((Some(camera), Some(content)))
         }
         Err(error) => {
-            findings.add_file(FileRead { path: file.value.clone(), content });
+            findings.add_file(FilePathAndContentId { path: file.value.clone(), content });
             findings.add_asset_error(loaded, file.span.clone(), &error);
             Ok((None, Some(content)))
         }

@@ -26,7 +26,7 @@ pub(crate) fn render(
 ) -> Result<StageResult<RayCounters>, AbortReason> {
     let RenderOptions { samples: wanted, error, .. } = rendering.plan.settings.render;
     let is_other = films.current().is_some_and(|current| current.key != key);
-    films.make_current_if_cached(key, |kept| !rendering.force && kept.has_at_most_samples(wanted));
+    films.set_current_to_cached_or_none(key, |kept| !rendering.force && kept.has_at_most_samples(wanted));
     if films.current().is_none() {
         let convergence = match rendering.photons.is_some_and(PhotonStore::has_lit_caustic_casters) {
             true => ConvergenceModel::Photons,

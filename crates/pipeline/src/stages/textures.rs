@@ -11,14 +11,15 @@ use rayon::prelude::*;
 
 use super::super::cache::{EvictionCandidate, NamedCache};
 use super::super::protocol::reasons;
-use super::super::watch::content::{FileContentId, FileRead};
+use super::super::watch::content::{FileContentId, FilePathAndContentId};
 use super::containers::{ImageInput, canonical};
 use super::meshes::MeshesByFileIndex;
 use super::{AbortReason, FileCounts, FileReadContext, Findings, StageResult, loading_result};
 use crate::assets::AssetError;
 use crate::assets::image::{
-    ColorCurve, EmbeddedImage, ImageEncoding, ImageLimits, LoadedImage, load_embedded, load_hashed, mipmaps,
-    mipmaps_of_thresholded_texels, read_dimensions_and_decoded_bytes, read_embedded_dimensions,
+    ColorCurve, DecodedImage, EmbeddedImage, ImageEncoding, ImageLimits,
+    embedded_dimensions_and_decoded_bytes, load_embedded, load_hashed, mipmaps,
+    mipmaps_of_thresholded_texels, read_dimensions_and_decoded_bytes,
 };
 use crate::control::{Cancelled, Progress};
 use crate::materials::Mipmaps;
@@ -29,8 +30,8 @@ use crate::scene::diagnostic::Severity;
 use crate::scene::fingerprint::{Fingerprint, FingerprintHasher};
 use crate::scene::{LoadedScene, is_model};
 use crate::world::{
-    AlphaCutoffKey, Image, Images, NeededTexture, NeededTextureRoles, TextureSource, environment_source,
-    textures_needed,
+    AlphaCutoffKey, Image, Images, NeededTexture, TextureRolesNeededByRender, TextureSource,
+    environment_source, textures_needed,
 };
 
 /// Maximum total size of a scene's texels, in bytes.
@@ -122,11 +123,11 @@ pub(crate) struct NeededTextures {
 pub(crate) fn find_textures_needed_for_view(
     loaded: &LoadedScene,
     meshes: &MeshesByFileIndex,
-    lookups: NeededTextureRoles,
+    lookups: TextureRolesNeededByRender,
     cache: &TextureCache,
 ) -> NeededTextures {
     let meshes: Vec<_> = meshes.iter().map(|kept| kept.mesh.clone()).collect();
-    let all = textures_needed(&loaded.scene, &meshes, NeededTextureRoles::ALL);
+    let all = textures_needed(&loaded.scene, &meshes, TextureRolesNeededByRender::ALL);
     let for_image = textures_needed(&loaded.scene, &meshes, lookups);
     let left_out = all.len() - for_image.len();
     if left_out == 0 || cache.has_all(&all) {
@@ -140,7 +141,7 @@ struct ImageWithTextures<'a> {
     name: TextureKey,
     content: FileContentId,
     /// The image file that the glTF file references.
-    linked: Option<FileRead>,
+    linked: Option<FilePathAndContentId>,
     kept: CachedTexelsAndMipmaps,
     asked_by: Vec<&'a NeededTexture>,
 }
@@ -178,9 +179,9 @@ pub(crate) fn load_textures(
     let mut counts = FileCounts::default();
     for (mut image, (contents, asset)) in images.into_iter().zip(assets) {
         (image.content, image.linked) = contents;
-        let key = image.content_fingerprint();
+        let key = image.decoded_image_fingerprint();
         for one in &image.asked_by {
-            findings.add_file(FileRead { path: one.source.path.clone(), content: image.content });
+            findings.add_file(FilePathAndContentId { path: one.source.path.clone(), content: image.content });
         }
         if let Some(file) = &image.linked {
             findings.add_file(file.clone());
@@ -387,7 +388,7 @@ impl ImageWithTextures<'_> {
         &self.asked_by[0].source.path
     }
 
-    fn content_fingerprint(&self) -> Fingerprint {
+    fn decoded_image_fingerprint(&self) -> Fingerprint {
         let (path, image, encoding, coverage) = &self.name;
         let mut key = FingerprintHasher::new("texture");
         key.add_path_bytes(path)
@@ -397,7 +398,7 @@ impl ImageWithTextures<'_> {
             key.add_f32(cutoff.value());
         }
         self.content.add_to_fingerprint(&mut key);
-        if let Some(FileRead { path, content }) = &self.linked {
+        if let Some(FilePathAndContentId { path, content }) = &self.linked {
             content.add_to_fingerprint(key.add_path_bytes(path));
         }
         key.finish()
@@ -422,13 +423,13 @@ fn group_by_image<'a>(
         let content = reading.contents.first_seen_content_id(&one.source.path, reading.token)?;
         let linked = cache.linked.get(&name).map(|path| {
             let content = reading.contents.first_seen_content_id(path, reading.token)?;
-            Ok(FileRead { path: path.clone(), content })
+            Ok(FilePathAndContentId { path: path.clone(), content })
         });
         let (linked, kept) = (linked.transpose()?, CachedTexelsAndMipmaps::default());
         images.push(ImageWithTextures { name, content, linked, kept, asked_by: vec![one] });
     }
     for image in &mut images {
-        let key = image.content_fingerprint();
+        let key = image.decoded_image_fingerprint();
         image.kept.texels = cache.texels.get(&image.name, key);
         if image.needs_mipmaps() {
             image.kept.mipmaps = cache.mipmaps.get(&image.name, key);
@@ -442,7 +443,7 @@ fn load_images_within_limit(
     images: &[ImageWithTextures<'_>],
     most_bytes: u64,
     reading: &FileReadContext<'_>,
-) -> Vec<(TextureFileContents, Result<DecodedTextureWithMipmaps, AssetError>)> {
+) -> Vec<(TextureFileContentIds, Result<DecodedTextureWithMipmaps, AssetError>)> {
     let size = |image: &ImageWithTextures<'_>| {
         let (width, height, bytes) = match image.kept.texels.as_deref() {
             Some(DecodedTexture { texels, .. }) => {
@@ -493,7 +494,7 @@ fn memory_limit_errors(sizes: &[u64], most_bytes: u64) -> Vec<Option<String>> {
 }
 
 /// Content of a texture's file and, if that file is a glTF file, of the image file that it references.
-type TextureFileContents = (FileContentId, Option<FileRead>);
+type TextureFileContentIds = (FileContentId, Option<FilePathAndContentId>);
 
 /// An image, its mipmaps if needed, and whether all of this came from the cache.
 type DecodedTextureWithMipmaps = (Arc<DecodedTexture>, Option<Arc<Mipmaps>>, bool);
@@ -501,7 +502,7 @@ type DecodedTextureWithMipmaps = (Arc<DecodedTexture>, Option<Arc<Mipmaps>>, boo
 /// Loads an image and its mipmaps. Sets `contents` to the contents that were decoded.
 fn load_one(
     image: &ImageWithTextures<'_>,
-    contents: &mut TextureFileContents,
+    contents: &mut TextureFileContentIds,
     reading: &FileReadContext<'_>,
 ) -> Result<DecodedTextureWithMipmaps, AssetError> {
     let mut was_kept = true;
@@ -509,7 +510,7 @@ fn load_one(
         Some(decoded) => decoded.clone(),
         None => {
             was_kept = false;
-            let LoadedImage { texels, warnings } = decode(image, contents, reading)?;
+            let DecodedImage { texels, warnings } = decode(image, contents, reading)?;
             Arc::new(DecodedTexture { texels: Arc::new(texels), warnings })
         }
     };
@@ -532,9 +533,9 @@ fn load_one(
 /// Decodes an image. Sets `contents` to the contents that were decoded.
 fn decode(
     image: &ImageWithTextures<'_>,
-    contents: &mut TextureFileContents,
+    contents: &mut TextureFileContentIds,
     reading: &FileReadContext<'_>,
-) -> Result<LoadedImage, AssetError> {
+) -> Result<DecodedImage, AssetError> {
     let (one, limits) = (image.asked_by[0], ImageLimits::default());
     let (encoding, token) = (one.source.encoding, reading.token);
     contents.1 = None;
@@ -552,7 +553,7 @@ fn decode(
                 }
                 ImageInput::File(path) => {
                     let content = reading.contents.first_seen_content_id(&path, token)?;
-                    contents.1 = Some(FileRead { path: path.clone(), content });
+                    contents.1 = Some(FilePathAndContentId { path: path.clone(), content });
                     path
                 }
             }
@@ -589,7 +590,7 @@ fn image_dimensions_and_memory(
     let (limits, encoding) = (ImageLimits::default(), source.encoding);
     match locate_image_bytes(source, reading)? {
         ImageInput::File(path) => read_dimensions_and_decoded_bytes(&path, encoding, limits, reading.token),
-        ImageInput::Bytes(bytes) => read_embedded_dimensions(
+        ImageInput::Bytes(bytes) => embedded_dimensions_and_decoded_bytes(
             EmbeddedImage { path: &source.path, bytes },
             encoding,
             limits,

@@ -22,7 +22,7 @@ use crate::film::tone::tone_map_to_8_bits;
 use crate::film::{RadianceImage, Rect, SampleCountStats, Srgb8Image};
 use crate::integrators::{AovSource, LightAov};
 use crate::output::part::{self, PartHeader, PartOrCheckpoint};
-use crate::output::write::{Durability, SweptFolders, WritePolicy};
+use crate::output::write::{Durability, ExistingFilePolicy, SweptFolders};
 use crate::output::{self, BitDepth, FilmEncodingSettings, Format, OutputError, scene_path};
 use crate::output::{AnimationFormat, animation};
 use crate::scene::fingerprint::{Fingerprint, FingerprintHasher};
@@ -66,7 +66,7 @@ impl WrittenImages {
 
     /// Whether a file on disk contains an image with keyboard changes that the user wrote. Such a file is
     /// replaced only after the scene is saved, or when the user writes another image.
-    pub(crate) fn has_user_written_image(&self, contents: &FileHashCache) -> bool {
+    pub(crate) fn has_user_written_image_on_disk(&self, contents: &FileHashCache) -> bool {
         self.is_by_hand && self.files.iter().any(|(path, (_, known))| has_content_id(path, *known, contents))
     }
 
@@ -201,8 +201,8 @@ fn write_outdated_outputs(
         let wrote = match state.share {
             Some(_) => write_part(state, to, (path, &written.sweep), token),
             None => {
-                let image =
-                    radiance.get_or_insert_with(|| state.film.image(plan.settings.view.film_quantity()));
+                let image = radiance
+                    .get_or_insert_with(|| state.film.image(plan.settings.view.displayed_film_quantity()));
                 token
                     .check_pause_and_cancel()
                     .map_err(OutputError::from)
@@ -277,14 +277,14 @@ pub(crate) struct RenderedTurntableFrames(Vec<(Srgb8Image, SampleCountStats)>);
 ///
 /// # Errors
 /// The token is cancelled, or a file could not be written.
-pub(crate) fn add_animation_frame(
+pub(crate) fn add_frame_and_write_if_last(
     state: &FilmState,
     to: ImageWriteContext<'_>,
     (turn, frames): (TurntableFrame, &mut RenderedTurntableFrames),
     token: &CancelToken,
 ) -> Result<StageResult<bool>, AbortReason> {
     let ImageWriteContext { plan, inputs, sink, .. } = to;
-    let finish = film_encoding_settings(plan);
+    let finish = image_encoding_settings(plan);
     let image = finish.quantity_image(&state.film);
     frames.0.truncate(turn.number as usize);
     frames.0.push((
@@ -305,8 +305,9 @@ pub(crate) fn add_animation_frame(
         let write = || {
             let metadata = encoding_settings_with_relative_scene(plan, path).metadata_with_samples(samples);
             let bytes = animation::encode(&frames, &metadata, format, token)?;
-            let write =
-                |guard: &WritePolicy<'_>| output::write::atomic_with_policy(path, &bytes, guard, token);
+            let write = |guard: &ExistingFilePolicy<'_>| {
+                output::write::atomic_with_policy(path, &bytes, guard, token)
+            };
             write_guarded(plan, inputs, (OutputTarget::for_image(plan, path), None), sink, write)?;
             Ok(bytes.len() as u64)
         };
@@ -332,7 +333,8 @@ fn write_one(
         finish.metadata.push(("glimt:time".to_owned(), format!("{seconds} s")));
     }
     let layers = layer_images(state, plan);
-    let bytes = finish.encode_film_image(&state.film, (image, &layers), Format::from_path(path)?, token)?;
+    let bytes =
+        finish.encode_with_film_metadata(&state.film, (image, &layers), Format::from_path(path)?, token)?;
     let target = (OutputTarget::for_image(plan, path), Some(sweep));
     write_guarded(plan, inputs, target, sink, |guard| {
         output::write::atomic_with_policy(path, &bytes, guard, token)
@@ -350,9 +352,9 @@ fn write_part(
     let identity = state.identity.clone().unwrap_or_default();
     let scene = scene_path::relative_to_image(&plan.path, path);
     let references = inputs.relative_paths(&plan.path);
-    let head = create_header(PartOrCheckpoint::Part, state, identity, &film_encoding_settings(plan));
+    let head = create_header(PartOrCheckpoint::Part, state, identity, &image_encoding_settings(plan));
     let head = PartHeader { scene, references, ..head };
-    let save = |guard: &WritePolicy<'_>| {
+    let save = |guard: &ExistingFilePolicy<'_>| {
         part::save(path, &head, &state.film, &Value::Null, guard, (token, Durability::Power)).map(drop)
     };
     write_guarded(plan, inputs, (OutputTarget::for_image(plan, path), Some(sweep)), sink, save)?;
@@ -360,9 +362,9 @@ fn write_part(
 }
 
 /// Returns the settings for developing and encoding a film.
-pub(crate) fn film_encoding_settings(plan: &RenderPlan) -> FilmEncodingSettings {
+pub(crate) fn image_encoding_settings(plan: &RenderPlan) -> FilmEncodingSettings {
     FilmEncodingSettings {
-        quantity: plan.settings.view.film_quantity(),
+        quantity: plan.settings.view.displayed_film_quantity(),
         tone: plan.tone,
         bit_depth: BitDepth::try_from(plan.bit_depth).unwrap_or_default(),
         metadata: metadata(plan),
@@ -370,9 +372,9 @@ pub(crate) fn film_encoding_settings(plan: &RenderPlan) -> FilmEncodingSettings 
     }
 }
 
-/// Like [`film_encoding_settings`], but with the scene's path relative to the image.
+/// Like [`image_encoding_settings`], but with the scene's path relative to the image.
 fn encoding_settings_with_relative_scene(plan: &RenderPlan, path: &Path) -> FilmEncodingSettings {
-    let mut finish = film_encoding_settings(plan);
+    let mut finish = image_encoding_settings(plan);
     let scene = finish.metadata.iter_mut().find(|(name, _)| name == SCENE);
     if let Some((_, value)) = scene {
         *value = scene_path::relative_to_image(&plan.path, path);

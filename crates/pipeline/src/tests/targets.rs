@@ -98,7 +98,7 @@ fn watched_files_cannot_be_written() {
     let files = files.expect("files");
     assert_eq!(files.len(), 5, "{files:?}");
     for file in files {
-        assert!(FileIdentity::from_path(&file.path).is_some(), "{file:?}");
+        assert!(FileIdentity::from_existing_or_new_path(&file.path).is_some(), "{file:?}");
         bench.overrides.report = Some(file.path.clone());
         assert!(matches!(bench.failed(), Failure::Scene(_)), "{file:?}");
     }

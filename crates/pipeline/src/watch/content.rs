@@ -14,7 +14,7 @@ use crate::system::file::{self, FileKind, FileStamp};
 
 /// A file that a request read or tried to read.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
-pub struct FileRead {
+pub struct FilePathAndContentId {
     /// Path of the file.
     pub path: PathBuf,
     /// The decoded content or, if the file was not decoded, its content during the request.
@@ -90,7 +90,7 @@ struct SeenFile {
 /// File contents as seen by a single request. A file's content must not change during a request. If it does,
 /// the request starts again. The watcher detects later changes.
 #[derive(Debug)]
-pub(crate) struct RequestFileSnapshot {
+pub(crate) struct FilesSeenByRequest {
     contents: Arc<FileHashCache>,
     /// Time before the first read.
     begun: SystemTime,
@@ -98,7 +98,7 @@ pub(crate) struct RequestFileSnapshot {
     changed: Mutex<Option<PathBuf>>,
 }
 
-impl RequestFileSnapshot {
+impl FilesSeenByRequest {
     pub(crate) fn new(contents: Arc<FileHashCache>) -> Self {
         Self { contents, begun: SystemTime::now(), seen: Mutex::default(), changed: Mutex::default() }
     }
@@ -126,7 +126,7 @@ impl RequestFileSnapshot {
         self.record_decoded_with_stamp(path, hash, None)
     }
 
-    /// Like [`RequestFileSnapshot::record_decoded`], but takes a stamp obtained before the file was read.
+    /// Like [`FilesSeenByRequest::record_decoded`], but takes a stamp obtained before the file was read.
     fn record_decoded_with_stamp(
         &self,
         path: &Path,
@@ -146,16 +146,16 @@ impl RequestFileSnapshot {
     ///
     /// # Errors
     /// Returns [`Cancelled`] if the token is cancelled.
-    pub(crate) fn read_companion(
+    pub(crate) fn record_companion(
         &self,
         Companion { path, hash, stamp }: &Companion,
         token: &CancelToken,
-    ) -> Result<FileRead, Cancelled> {
+    ) -> Result<FilePathAndContentId, Cancelled> {
         let content = match hash {
             Some(hash) => self.record_decoded_with_stamp(path, *hash, *stamp),
             None => self.first_seen_content_id(path, token)?,
         };
-        Ok(FileRead { path: path.clone(), content })
+        Ok(FilePathAndContentId { path: path.clone(), content })
     }
 
     /// Records a change if a file's content differs from the content that this request first saw. Must be
@@ -374,13 +374,13 @@ mod tests {
         let path = folder.path().join("file");
         let token = CancelToken::new();
         let contents = Arc::new(FileHashCache::default());
-        let snapshot = RequestFileSnapshot::new(contents.clone());
+        let snapshot = FilesSeenByRequest::new(contents.clone());
         fs::write(&path, "a").expect("written");
         let first = snapshot.first_seen_content_id(&path, &token).expect("not cancelled");
         fs::write(&path, "b").expect("written");
         assert_eq!(snapshot.first_seen_content_id(&path, &token), Ok(first));
         assert_ne!(
-            RequestFileSnapshot::new(contents).first_seen_content_id(&path, &token),
+            FilesSeenByRequest::new(contents).first_seen_content_id(&path, &token),
             Ok(first),
             "the next request should see the change"
         );
@@ -406,19 +406,19 @@ mod tests {
         let [mesh, texture, library, same] =
             ["mesh", "texture", "library", "same"].map(|name| current.join(name));
         let hash_of = |path: &Path| *blake3::hash(&fs::read(path).expect("read")).as_bytes();
-        let verified = |snapshot: &RequestFileSnapshot| {
+        let verified = |snapshot: &FilesSeenByRequest| {
             snapshot.recheck_seen_files(&token).expect("not cancelled");
             snapshot.changed_file()
         };
         for is_decoded in [false, true] {
             show("old");
-            let snapshot = RequestFileSnapshot::new(Arc::default());
+            let snapshot = FilesSeenByRequest::new(Arc::default());
             snapshot.first_seen_content_id(&same, &token).expect("not cancelled");
             if is_decoded {
                 let (hash, stamp) = (Some(hash_of(&library)), FileStamp::from_path(&library));
                 let companion = Companion { path: library.clone(), hash, stamp };
                 show("new");
-                snapshot.read_companion(&companion, &token).expect("not cancelled");
+                snapshot.record_companion(&companion, &token).expect("not cancelled");
             } else {
                 snapshot.first_seen_content_id(&mesh, &token).expect("not cancelled");
                 assert_eq!(verified(&snapshot), None);
@@ -429,7 +429,7 @@ mod tests {
         }
         // Neither replacement with the same content nor removal is a change.
         show("old");
-        let snapshot = RequestFileSnapshot::new(Arc::default());
+        let snapshot = FilesSeenByRequest::new(Arc::default());
         snapshot.first_seen_content_id(&same, &token).expect("not cancelled");
         show("new");
         assert_eq!(verified(&snapshot), None);
@@ -445,7 +445,7 @@ mod tests {
         let (old, stamp) = (*blake3::hash(b"old").as_bytes(), FileStamp::from_path(&path));
         let token = CancelToken::new();
         for is_settled in [false, true] {
-            let mut snapshot = RequestFileSnapshot::new(Arc::default());
+            let mut snapshot = FilesSeenByRequest::new(Arc::default());
             if is_settled {
                 snapshot.begun += Duration::from_secs(4);
             }
@@ -461,7 +461,7 @@ mod tests {
         let folder = tempfile::tempdir().expect("a scratch folder");
         let path = folder.path().join("file");
         fs::write(&path, "half").expect("written");
-        let (snapshot, token) = (RequestFileSnapshot::new(Arc::default()), CancelToken::new());
+        let (snapshot, token) = (FilesSeenByRequest::new(Arc::default()), CancelToken::new());
         snapshot.first_seen_content_id(&path, &token).expect("not cancelled");
         snapshot.wait_for_writers(&token).expect("not cancelled");
         let modified = fs::metadata(&path).and_then(|found| found.modified()).expect("metadata");

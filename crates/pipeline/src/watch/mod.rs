@@ -25,7 +25,7 @@ use std::time::{Duration, Instant};
 
 use self::change_tracker::ChangeTracker;
 use self::content::FileContentId;
-pub use self::content::{FileHashCache, FileRead};
+pub use self::content::{FileHashCache, FilePathAndContentId};
 use self::folders::{ChangeHint, WatchedFolders};
 use self::outputs::PossiblyTransientChanges;
 pub use self::outputs::{ExternalChange, OutputChange};
@@ -100,7 +100,7 @@ enum Message {
     /// A hint about a watched file.
     Hint(ChangeHint),
     /// Files to watch: those read after the specified time, and those read earlier.
-    Files(Vec<FileRead>, Vec<FileRead>, Instant),
+    Files(Vec<FilePathAndContentId>, Vec<FilePathAndContentId>, Instant),
     /// The worker has written a file.
     Outputs,
     Quit,
@@ -154,7 +154,12 @@ impl Watcher {
     /// Sets the files to watch: those in `read`, which were read after `since`, and those in `before`, which
     /// were read earlier. A file counts as changed if its content differs from the specified content, unless
     /// a change has been reported since the file was read.
-    pub fn set_files(&self, read: Vec<FileRead>, before: Vec<FileRead>, since: Instant) {
+    pub fn set_files(
+        &self,
+        read: Vec<FilePathAndContentId>,
+        before: Vec<FilePathAndContentId>,
+        since: Instant,
+    ) {
         let _ = self.orders.send(Message::Files(read, before, since));
     }
 
@@ -180,7 +185,7 @@ struct WatchThread<F> {
     files: HashMap<PathBuf, (FileContentId, Instant)>,
     change_tracker: ChangeTracker,
     /// Changes that the last check found but did not report.
-    pending: Vec<FileRead>,
+    pending: Vec<FilePathAndContentId>,
     /// Output changes that may be temporary.
     suspects: PossiblyTransientChanges,
     /// Time after which to report a missing file or a changed output.
@@ -213,13 +218,18 @@ impl<F: FnMut(WatchEvent)> WatchThread<F> {
         due.map_or(unhinted, |due| due.min(unhinted))
     }
 
-    fn set_files(&mut self, read: Vec<FileRead>, known: Vec<FileRead>, since: Instant) {
+    fn set_files(
+        &mut self,
+        read: Vec<FilePathAndContentId>,
+        known: Vec<FilePathAndContentId>,
+        since: Instant,
+    ) {
         let before = std::mem::take(&mut self.files);
-        for FileRead { path, content } in known {
+        for FilePathAndContentId { path, content } in known {
             let said = before.get(&path).copied();
             self.files.insert(path, said.unwrap_or((content, since)));
         }
-        for FileRead { path, content } in read {
+        for FilePathAndContentId { path, content } in read {
             // A change reported after `since` is newer than the content that was read. Ignore earlier
             // reports, because the file may have been restored.
             let said = before.get(&path).copied().filter(|(_, when)| *when > since);
@@ -248,9 +258,9 @@ impl<F: FnMut(WatchEvent)> WatchThread<F> {
             (self.say)(WatchEvent::Output(change));
         }
         let found = self.differences();
-        let is_said = !self.should_delay_report(&found, now);
+        let is_said = !self.has_nothing_to_report_yet(&found, now);
         if is_said {
-            for FileRead { path, content } in found {
+            for FilePathAndContentId { path, content } in found {
                 self.files.insert(path, (content, now));
             }
             let noticed = self.change_tracker.mark_reported(now);
@@ -262,7 +272,7 @@ impl<F: FnMut(WatchEvent)> WatchThread<F> {
     }
 
     /// Whether a check found no changes, or found changes that should not be reported yet.
-    fn should_delay_report(&mut self, found: &[FileRead], now: Instant) -> bool {
+    fn has_nothing_to_report_yet(&mut self, found: &[FilePathAndContentId], now: Instant) -> bool {
         let before = std::mem::take(&mut self.pending);
         if found.is_empty() {
             self.change_tracker.discard_hints();
@@ -285,16 +295,16 @@ impl<F: FnMut(WatchEvent)> WatchThread<F> {
     }
 
     /// Returns the files whose content differs from the last reported content.
-    fn differences(&self) -> Vec<FileRead> {
+    fn differences(&self) -> Vec<FilePathAndContentId> {
         let token = CancelToken::new();
         // Use a token that is never cancelled.
         let now =
             |path: &PathBuf| self.contents.read_content_id(path, &token).unwrap_or(FileContentId::Missing);
         let files = self.files.iter();
-        let mut found: Vec<FileRead> = files
+        let mut found: Vec<FilePathAndContentId> = files
             .map(|(path, (content, _))| (path, *content, now(path)))
             .filter(|(_, before, now)| before != now)
-            .map(|(path, _, content)| FileRead { path: path.clone(), content })
+            .map(|(path, _, content)| FilePathAndContentId { path: path.clone(), content })
             .collect();
         found.sort_by(|a, b| a.path.cmp(&b.path));
         found
@@ -302,7 +312,7 @@ impl<F: FnMut(WatchEvent)> WatchThread<F> {
 }
 
 /// Whether a file is missing or empty, in which case it is probably being replaced.
-fn has_missing_or_empty_file(files: &[FileRead]) -> bool {
+fn has_missing_or_empty_file(files: &[FilePathAndContentId]) -> bool {
     let empty = FileContentId::Hash(*blake3::hash(b"").as_bytes());
     files.iter().any(|file| file.content == FileContentId::Missing || file.content == empty)
 }

@@ -42,7 +42,7 @@ impl Scratch {
 
     fn watch(&self, paths: &[&Path]) {
         let contents = FileHashCache::default();
-        let read = |path: &&Path| FileRead {
+        let read = |path: &&Path| FilePathAndContentId {
             path: path.to_path_buf(),
             content: contents.read_content_id(path, &CancelToken::new()).expect("not cancelled"),
         };
@@ -272,7 +272,7 @@ fn change_before_watching_is_detected() {
     let path = scratch.path("b.toml");
     fs::write(&path, "new").expect("written");
     let content = FileContentId::Hash(*blake3::hash(b"old").as_bytes());
-    scratch.watcher.set_files(vec![FileRead { path, content }], Vec::new(), Instant::now());
+    scratch.watcher.set_files(vec![FilePathAndContentId { path, content }], Vec::new(), Instant::now());
     scratch.expect_one();
 }
 
@@ -283,7 +283,7 @@ fn restored_file_is_reported_if_change_was_read() {
     scratch.expect_one();
     // The file temporarily had different content, which a request read but the watcher did not see.
     let content = FileContentId::Hash(*blake3::hash(b"between").as_bytes());
-    let between = vec![FileRead { path: path.clone(), content }];
+    let between = vec![FilePathAndContentId { path: path.clone(), content }];
     scratch.watcher.set_files(between.clone(), Vec::new(), Instant::now());
     scratch.expect_one();
     // Contents read before a save are ignored.
@@ -293,7 +293,7 @@ fn restored_file_is_reported_if_change_was_read() {
     let begun = Instant::now();
     fs::write(&path, "said later").expect("written");
     scratch.expect_one();
-    scratch.watcher.set_files(vec![FileRead { path, content }], Vec::new(), begun);
+    scratch.watcher.set_files(vec![FilePathAndContentId { path, content }], Vec::new(), begun);
     scratch.expect_none();
 }
 

@@ -62,11 +62,11 @@ impl KeyDifferences<'_> {
             let name = join_key(name, entry.key);
             match old.get(entry.key) {
                 Some(before) => self.compare_values(&name, &before.value, &entry.value),
-                None => self.add_unmatched_value_or_tables('+', &name, &entry.value, 1),
+                None => self.add_unmatched_value_or_elements('+', &name, &entry.value, 1),
             }
         }
         for entry in old.iter().filter(|entry| new.get(entry.key).is_none()) {
-            self.add_unmatched_value_or_tables('−', &join_key(name, entry.key), &entry.value, 0);
+            self.add_unmatched_value_or_elements('−', &join_key(name, entry.key), &entry.value, 0);
         }
     }
 
@@ -110,7 +110,7 @@ impl KeyDifferences<'_> {
 
     /// Adds a key that exists in only one document. If its value is an array of tables, adds each table
     /// separately.
-    fn add_unmatched_value_or_tables(&mut self, sign: char, name: &str, value: &Value<'_>, text: usize) {
+    fn add_unmatched_value_or_elements(&mut self, sign: char, name: &str, value: &Value<'_>, text: usize) {
         match value.decode() {
             TomlValue::Array(array) if array.starts_with_table() => {
                 let all: Vec<Value<'_>> = array.iter().collect();

@@ -123,7 +123,7 @@ pub fn is_same_distance(a: f64, b: f64) -> bool {
 
 impl Camera {
     /// Whether the camera has this viewpoint, up to rounding of the focus distance.
-    pub fn matches_resolved_camera(&self, view: &ResolvedCamera) -> bool {
+    pub fn is_look_at_matching_view(&self, view: &ResolvedCamera) -> bool {
         match self {
             Self::LookAt { focus, .. } if is_same_distance(*focus, view.focus) => {
                 *self == ResolvedCamera { focus: *focus, ..*view }.into()

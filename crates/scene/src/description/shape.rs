@@ -210,7 +210,7 @@ impl AffineMap {
 
     /// Returns the scale of a map that consists of a uniform scale > 0 and a translation, or `None` for other
     /// maps.
-    fn uniform_scale(&self) -> Option<f64> {
+    fn unrotated_uniform_scale(&self) -> Option<f64> {
         let scale = self.linear[0].x;
         (scale > 0.0 && self.linear == DVec3::AXES.map(|axis| axis * scale)).then_some(scale)
     }
@@ -253,7 +253,7 @@ impl Shape {
         let map = matrix.to_transform();
         let (at, along) = (|point: DVec3| map.point(point), |vector: DVec3| map.vector(vector));
         let flips = map.flips_handedness();
-        match (self, matrix.uniform_scale()) {
+        match (self, matrix.unrotated_uniform_scale()) {
             (Self::Quad { corner, u, v }, _) if !flips => {
                 Self::Quad { corner: at(corner), u: along(u), v: along(v) }
             }
@@ -344,14 +344,14 @@ impl Shape {
     }
 
     /// Returns the shape without its matrix, and the matrix if it has one.
-    pub fn untransformed(&self) -> (&Self, Option<&AffineMap>) {
+    pub fn shape_and_matrix(&self) -> (&Self, Option<&AffineMap>) {
         if let Self::Transformed { shape, matrix } = self { (shape, Some(matrix)) } else { (self, None) }
     }
 
     /// Returns the shape without its matrix as an open surface, or `None` for closed shapes, planes and
     /// meshes.
-    pub fn as_open_surface(&self) -> Option<OpenSurface> {
-        match *self.untransformed().0 {
+    pub fn untransformed_open_surface(&self) -> Option<OpenSurface> {
+        match *self.shape_and_matrix().0 {
             Self::Quad { corner, u, v } => {
                 Some(OpenSurface::Quad([corner, corner + u, corner + u + v, corner + v]))
             }

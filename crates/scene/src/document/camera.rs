@@ -61,7 +61,7 @@ fn read_look_at_camera(table: &TableReader<'_>) -> Option<Camera> {
 
     let (position_key, look_at_key) = (position, look_at);
     let (position, look_at) = (eye?, target?);
-    if !position_key.check_points_far_apart(position, &look_at_key, look_at) {
+    if !position_key.check_points_equal_or_far_apart(position, &look_at_key, look_at) {
         return None;
     }
     let view = look_at - position;
@@ -80,7 +80,7 @@ fn read_look_at_camera(table: &TableReader<'_>) -> Option<Camera> {
 /// Returns `up` if it is long enough and not parallel to `view`.
 fn check_up_vector(table: &TableReader<'_>, view: DVec3, up: DVec3) -> Option<DVec3> {
     let span = table.optional_key("up").value_span().or(table.optional_key("look_at").value_span())?;
-    if !table.optional_key("up").check_vector_long_enough(up) {
+    if !table.optional_key("up").check_vector_zero_or_long_enough(up) {
         return None;
     }
     let Some(direction) = up.try_normalize() else {

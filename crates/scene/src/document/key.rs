@@ -165,7 +165,7 @@ impl<'a> TableKey<'a> {
 
     /// Checks that a vector is long enough to compute with, and reports an error if not. For vectors of
     /// length 0, the caller reports a more specific error.
-    pub(super) fn check_vector_long_enough(&self, vector: DVec3) -> bool {
+    pub(super) fn check_vector_zero_or_long_enough(&self, vector: DVec3) -> bool {
         let length = robust_length(vector);
         let Some(span) = self.value_span().filter(|_| is_nonzero_but_too_short(length)) else { return true };
         let issue = Issue::error(span, format!("`{}` must be more than {SHORTEST:e} long", self.name));
@@ -175,7 +175,7 @@ impl<'a> TableKey<'a> {
 
     /// Checks that the points at the keys `self` and `other` are far enough apart to compute with, and
     /// reports an error if not. For equal points, the caller reports a more specific error.
-    pub(super) fn check_points_far_apart(&self, from: DVec3, other: &Self, to: DVec3) -> bool {
+    pub(super) fn check_points_equal_or_far_apart(&self, from: DVec3, other: &Self, to: DVec3) -> bool {
         let distance = robust_length(to - from);
         let span = other.value_span().or(self.value_span());
         let Some(span) = span.filter(|_| is_nonzero_but_too_short(distance)) else { return true };

@@ -63,7 +63,7 @@ fn read_spot_light(table: &TableReader<'_>) -> Option<SpotLight> {
         table.context.report(issue);
         return None;
     }
-    if !place.check_points_far_apart(point.position, &aim, look_at) {
+    if !place.check_points_equal_or_far_apart(point.position, &aim, look_at) {
         return None;
     }
     Some(SpotLight { point, look_at, angle: angle?, blend: blend? })

@@ -166,7 +166,7 @@ fn read_principled(table: &TableReader<'_>, textures: &DefinedNames) -> Material
 }
 
 /// Returns the key at the path `TYPE.KEY`.
-fn table_key_from_typed_path<'a>(table: &TableReader<'a>, path: &'static str) -> TableKey<'a> {
+fn optional_key_ignoring_type_prefix<'a>(table: &TableReader<'a>, path: &'static str) -> TableKey<'a> {
     table.optional_key(path.split_once('.').map_or(path, |(_, name)| name))
 }
 
@@ -178,7 +178,7 @@ fn read_or_default<'a, T>(
     default: T,
     read: impl FnOnce(&TableKey<'a>, Limits) -> Option<T>,
 ) -> T {
-    read(&table_key_from_typed_path(table, path), table.key_limits(path)).unwrap_or(default)
+    read(&optional_key_ignoring_type_prefix(table, path), table.key_limits(path)).unwrap_or(default)
 }
 
 /// Reads a color or a texture.

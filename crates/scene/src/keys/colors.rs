@@ -9,11 +9,11 @@ pub fn color_names() -> impl Iterator<Item = &'static str> {
 
 /// Parses a color string (`#rrggbb` or a case-insensitive name) into sRGB bytes.
 pub fn parse_hex_or_named_srgb8(text: &str) -> Option<[u8; 3]> {
-    parse_hex_color(text).or_else(|| named_color(text))
+    parse_six_digit_hex_color(text).or_else(|| named_color(text))
 }
 
 /// Parses `#rrggbb`.
-fn parse_hex_color(text: &str) -> Option<[u8; 3]> {
+fn parse_six_digit_hex_color(text: &str) -> Option<[u8; 3]> {
     let digits = hex_digits(text).filter(|digits| digits.len() == 6)?;
     let number = u32::from_str_radix(digits, 16).ok()?;
     let [_, red, green, blue] = number.to_be_bytes();

@@ -29,7 +29,7 @@ impl<'s> ExpressionEventReader<'_, 's> {
         if self.assembly.open.is_some() {
             self.read_header();
         }
-        while let (false, Some(event)) = (self.assembly.is_lost, self.next()) {
+        while let (false, Some(event)) = (self.assembly.is_lost, self.next_raw_event()) {
             match event.kind() {
                 EventKind::StdTableOpen | EventKind::ArrayTableOpen => {
                     self.assembly.finish_table();
@@ -45,7 +45,7 @@ impl<'s> ExpressionEventReader<'_, 's> {
         }
     }
 
-    fn next(&mut self) -> Option<Event> {
+    fn next_raw_event(&mut self) -> Option<Event> {
         let (first, rest) = self.events.split_first()?;
         self.events = rest;
         Some(*first)
@@ -53,7 +53,7 @@ impl<'s> ExpressionEventReader<'_, 's> {
 
     fn next_if(&mut self, kind: EventKind) -> Option<Event> {
         let is_next = self.events.first().is_some_and(|event| event.kind() == kind);
-        if is_next { self.next() } else { None }
+        if is_next { self.next_raw_event() } else { None }
     }
 
     fn span(&self, event: Event) -> Span {
@@ -64,7 +64,7 @@ impl<'s> ExpressionEventReader<'_, 's> {
     /// header's key.
     fn read_header(&mut self) {
         let Some(mut header) = self.assembly.open.take() else { return };
-        while let Some(event) = self.next() {
+        while let Some(event) = self.next_raw_event() {
             match event.kind() {
                 EventKind::StdTableClose | EventKind::ArrayTableClose => {
                     header.span.end = self.span(event).end;
@@ -86,8 +86,10 @@ impl<'s> ExpressionEventReader<'_, 's> {
             return;
         };
         self.next_if(EventKind::Whitespace);
-        let value =
-            self.next().and_then(|event| self.read_value(event)).unwrap_or_else(|| self.placeholder_value());
+        let value = self
+            .next_raw_event()
+            .and_then(|event| self.read_value(event))
+            .unwrap_or_else(|| self.placeholder_value());
         self.assembly.add_key_value(&path, key, value);
     }
 
@@ -104,7 +106,7 @@ impl<'s> ExpressionEventReader<'_, 's> {
         let mut last = event;
         let mut parts = 1;
         while self.is_before_key_dot() {
-            while let Some(event) = self.next() {
+            while let Some(event) = self.next_raw_event() {
                 if event.kind() != EventKind::SimpleKey {
                     continue;
                 }
@@ -180,7 +182,7 @@ impl<'s> ExpressionEventReader<'_, 's> {
         let first = self.assembly.elements.len();
         let mut span = self.span(open);
         let mut value = None;
-        while let Some(event) = self.next() {
+        while let Some(event) = self.next_raw_event() {
             span.end = self.span(event).end;
             match event.kind() {
                 EventKind::InlineTableOpen | EventKind::ArrayOpen | EventKind::Scalar => {
@@ -211,7 +213,7 @@ impl<'s> ExpressionEventReader<'_, 's> {
         let table = self.assembly.document.add_table(origin);
         let mut span = self.span(open);
         let (mut key, mut value) = (None, None);
-        while let Some(event) = self.next() {
+        while let Some(event) = self.next_raw_event() {
             span.end = self.span(event).end;
             match event.kind() {
                 EventKind::SimpleKey => {

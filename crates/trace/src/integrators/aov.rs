@@ -1,6 +1,6 @@
 //! First-hit AOVs. All except depth are display values in [0, 1], not radiance.
 
-use super::layers::{LayerValues, SampleLayer};
+use super::layers::{SampleLayer, SampleLayerValues};
 use super::photons::{GatherPoint, PhotonMaps};
 use super::transport::packet::PacketHits;
 use super::transport::ray::PathRay;
@@ -46,12 +46,12 @@ pub fn shade_aov(
 }
 
 /// Records the first-hit layers of the plain surfaces in a packet of camera rays that starts at slot `first`.
-/// Returns the mask of lanes whose surfaces are left to [`record_first_hit`].
+/// Returns the mask of lanes whose surfaces are left to [`record_first_hit_of_ray`].
 pub fn record_first_hits_on_plain_surfaces(
     tile: &TileContext<'_>,
     (packet, surfaces): (&PacketHits, &SurfacePacket),
     first: u32,
-    values: &mut LayerValues,
+    values: &mut SampleLayerValues,
 ) -> u32 {
     let mut left = 0;
     let mut known = None;
@@ -66,7 +66,7 @@ pub fn record_first_hits_on_plain_surfaces(
             continue;
         };
         let (point, normal) = packet.point_and_shading_normal(surfaces, lane);
-        add_first_hit_layer_values(
+        add_first_hit_values_to_slot(
             values,
             first + lane as u32,
             [albedo, normal, Vec3::splat(view_depth(tile, point))],
@@ -84,10 +84,10 @@ fn constant_albedo(tile: &TileContext<'_>, index: usize) -> Option<Vec3> {
 }
 
 /// Records the first-hit layers of a camera ray, given its first hit.
-pub fn record_first_hit(
+pub fn record_first_hit_of_ray(
     tile: &TileContext<'_>,
     (path, hit): (&PathRay, &Hit),
-    values: &mut LayerValues,
+    values: &mut SampleLayerValues,
     counters: &mut RayCounters,
 ) {
     if let Some((path, hit)) = first_opaque_hit(tile, path, hit, counters) {
@@ -101,7 +101,7 @@ pub fn record_vertex(
     tile: &TileContext<'_>,
     slot: u32,
     vertex: &SurfaceVertex<'_>,
-    values: &mut LayerValues,
+    values: &mut SampleLayerValues,
     counters: &mut RayCounters,
 ) {
     let set = values.layer_set();
@@ -109,14 +109,18 @@ pub fn record_vertex(
     let albedo = if set.contains(SampleLayer::Albedo) { vertex_albedo(vertex, counters) } else { Vec3::ZERO };
     let normal =
         if set.contains(SampleLayer::Normal) { vertex.perturbed_front_normal(counters) } else { Vec3::ZERO };
-    add_first_hit_layer_values(
+    add_first_hit_values_to_slot(
         values,
         slot,
         [albedo, normal, Vec3::splat(view_depth(tile, vertex.surface.point))],
     );
 }
 
-fn add_first_hit_layer_values(values: &mut LayerValues, slot: u32, [albedo, normal, depth]: [Vec3; 3]) {
+fn add_first_hit_values_to_slot(
+    values: &mut SampleLayerValues,
+    slot: u32,
+    [albedo, normal, depth]: [Vec3; 3],
+) {
     values.add(SampleLayer::Albedo, slot, albedo);
     values.add(SampleLayer::Normal, slot, normal);
     values.add(SampleLayer::Depth, slot, depth);

@@ -2,7 +2,7 @@
 
 use super::settings::RenderSettings;
 use super::view::LightAov;
-use crate::lights::LightSamplingPurpose;
+use crate::lights::LightSamplingIntegrator;
 use crate::scene::description::IntegratorProperties;
 
 /// How camera paths continue at surfaces.
@@ -19,7 +19,7 @@ pub struct PathBehavior {
     /// glass ignores this light.
     pub gathers: bool,
     /// How lights are sampled.
-    pub receivers: LightSamplingPurpose,
+    pub receivers: LightSamplingIntegrator,
 }
 
 impl PathBehavior {
@@ -27,19 +27,19 @@ impl PathBehavior {
     pub fn from_settings(settings: &RenderSettings, has_photons: bool) -> Self {
         let IntegratorProperties { splits, scatters, gathers, .. } = settings.render.integrator.properties();
         let gathers = gathers && has_photons;
-        match settings.view.aov_source().light_aov_or_all() {
+        match settings.view.aov_source().light_transport_aov_or_all() {
             // The lit fraction is measured at the first visible surface, where all lights are sampled.
             LightAov::LitFraction => Self {
                 splits: true,
                 scatters: gathers,
                 mirrors: false,
                 gathers,
-                receivers: LightSamplingPurpose::Eye,
+                receivers: LightSamplingIntegrator::Eye,
             },
             LightAov::Radiance(_) | LightAov::TraversalCost => {
                 let scatters = scatters || gathers;
                 let receivers =
-                    if scatters { LightSamplingPurpose::Paths } else { LightSamplingPurpose::Eye };
+                    if scatters { LightSamplingIntegrator::Paths } else { LightSamplingIntegrator::Eye };
                 Self { splits, scatters, mirrors: !scatters, gathers, receivers }
             }
         }
@@ -47,6 +47,6 @@ impl PathBehavior {
 }
 
 /// Determines how lights are sampled, based on the settings and on whether photons are gathered.
-pub fn light_sampling_purpose(settings: &RenderSettings, are_gathered: bool) -> LightSamplingPurpose {
+pub fn light_sampling_integrator(settings: &RenderSettings, are_gathered: bool) -> LightSamplingIntegrator {
     PathBehavior::from_settings(settings, are_gathered).receivers
 }

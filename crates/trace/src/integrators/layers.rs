@@ -89,7 +89,7 @@ impl FromIterator<SampleLayer> for LayerSet {
 
 /// Layer values of a batch of samples.
 #[derive(Default)]
-pub struct LayerValues {
+pub struct SampleLayerValues {
     set: LayerSet,
     /// First slot of the batch.
     first: u32,
@@ -97,14 +97,14 @@ pub struct LayerValues {
     lists: [Vec<Vec3>; SampleLayer::ALL.len()],
     /// Layers with values other than zero.
     used: LayerSet,
-    /// The tile's most recent results of [`LayerValues::constant_albedo`], by material index modulo the array
+    /// The tile's most recent results of [`SampleLayerValues::constant_albedo`], by material index modulo the array
     /// length.
     albedos: [Option<(usize, Option<Vec3>)>; 16],
 }
 
-impl LayerValues {
+impl SampleLayerValues {
     /// Begins a tile.
-    pub fn begin_tile(&mut self) {
+    pub fn clear_cached_albedos(&mut self) {
         self.albedos = Default::default();
     }
 
@@ -188,7 +188,7 @@ impl LayerValues {
             let here = slots.start - begin..slots.end - begin;
             let values: ArrayVec<_, 7> =
                 used.iter().map(|(position, values)| (*position, &values[here.clone()])).collect();
-            sums.add(pixel, &values, is_negative.map(|signs| &signs[slots]));
+            sums.add_pixel_samples(pixel, &values, is_negative.map(|signs| &signs[slots]));
         }
     }
 }
@@ -209,7 +209,7 @@ mod tests {
     #[test]
     fn non_finite_samples_are_zero_in_all_layers() {
         let set: LayerSet = [SampleLayer::Depth, SampleLayer::Diffuse].into_iter().collect();
-        let (mut values, mut sums) = (LayerValues::default(), LayerSums::zero(set.len(), 2));
+        let (mut values, mut sums) = (SampleLayerValues::default(), LayerSums::zero(set.len(), 2));
         for slots in [0..2, 2..4] {
             values.begin_batch(set, &slots);
             for slot in slots {
@@ -220,8 +220,8 @@ mod tests {
         }
         let mut expected = LayerSums::zero(set.len(), 2);
         for layer in 0..2 {
-            expected.add(0, &[(layer, &[Vec3::ONE; 2])], None);
-            expected.add(1, &[(layer, &[Vec3::ONE])], None);
+            expected.add_pixel_samples(0, &[(layer, &[Vec3::ONE; 2])], None);
+            expected.add_pixel_samples(1, &[(layer, &[Vec3::ONE])], None);
         }
         assert_eq!(sums, expected);
     }

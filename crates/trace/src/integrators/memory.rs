@@ -3,7 +3,7 @@
 use std::cell::RefCell;
 
 use super::direct::queue::DirectLightVertexQueue;
-use super::layers::LayerValues;
+use super::layers::SampleLayerValues;
 use super::transport::accumulator::DiffuseFractions;
 use super::transport::scratch::TraceBuffers;
 
@@ -17,7 +17,7 @@ pub struct ThreadMemory {
     /// Diffuse fractions of the paths, if layers are recorded.
     pub fractions: DiffuseFractions,
     /// Values of the layers, if there are any.
-    pub layers: LayerValues,
+    pub layers: SampleLayerValues,
 }
 
 impl ThreadMemory {

@@ -40,7 +40,7 @@ use crate::film::{LayerSums, NegativeLobeMask, SelectedPixels, TileSamples};
 use crate::math::Vec3;
 use crate::world::{PACKET_SIZE, World};
 use behavior::PathBehavior;
-pub use behavior::light_sampling_purpose;
+pub use behavior::light_sampling_integrator;
 pub use counters::RayCounters;
 pub use layers::{LayerSet, SampleLayer};
 use memory::ThreadMemory;
@@ -108,7 +108,7 @@ pub fn render_tile_with_layers(
     let photons = photons.filter(|_| settings.gathers_photons());
     let behavior = PathBehavior::from_settings(settings, photons.is_some());
     let tile = TileContext::new(world, settings, &block, token, behavior);
-    let clamp = if settings.view.aov_source().light_aov_or_all() == LightAov::TraversalCost {
+    let clamp = if settings.view.aov_source().light_transport_aov_or_all() == LightAov::TraversalCost {
         0.0
     } else {
         settings.render.clamp
@@ -116,7 +116,7 @@ pub fn render_tile_with_layers(
     // Render one batch after another.
     let mut memory = ThreadMemory::take_from_thread();
     let (mut fractions, mut values) = (take(&mut memory.fractions), take(&mut memory.layers));
-    values.begin_tile();
+    values.clear_cached_albedos();
     for start in (0..block.len()).step_by(BATCH_SIZE) {
         let slots = start as u32..(start + BATCH_SIZE).min(block.len()) as u32;
         counters.camera_rays += slots.len() as u64;
@@ -133,7 +133,7 @@ pub fn render_tile_with_layers(
                     fractions: settings.layers.has_light().then_some(&mut fractions),
                 });
                 let accumulator = Accumulator {
-                    aov: shown.light_aov_or_all(),
+                    aov: shown.light_transport_aov_or_all(),
                     radiance: &mut radiance,
                     clamp,
                     layers: recorded,

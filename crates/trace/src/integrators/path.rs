@@ -28,14 +28,14 @@ use super::transport::camera::CAMERA_ROWS;
 use super::transport::crossing::CoincidentSurfaceBuffers;
 use super::transport::packet::PacketSource;
 use super::transport::ray::PathRay;
-use super::transport::scatter::{BsdfSampler, ContinuationPolicy};
+use super::transport::scatter::{BounceContinuation, BsdfSampler};
 use super::transport::scratch::TraceBuffers;
 use super::transport::tile::TileContext;
 use super::view::LightAov;
 use crate::control::Cancelled;
 use crate::geometry::packet::set_bit_lanes;
 use crate::geometry::surface_packet::SurfacePacket;
-use crate::materials::bsdf::SampledLobes;
+use crate::materials::bsdf::LobesToSample;
 use crate::scene::description::ShadowMode;
 use crate::world::PACKET_SIZE;
 
@@ -112,7 +112,7 @@ struct CameraWavefront<'a, 's> {
     /// Number of bounces before the current hits.
     depth: u32,
     /// How paths continue at diffuse and glossy surfaces, or `None` if they end there.
-    continuation: Option<ContinuationPolicy>,
+    continuation: Option<BounceContinuation>,
     tile: &'a TileContext<'a>,
     /// Photon maps for the samples, or `None` if no photons are gathered.
     maps: Option<&'a PhotonMaps>,
@@ -182,7 +182,7 @@ impl CameraWavefront<'_, '_> {
         let splits_lobes = self.accumulator.fractions().is_some();
         for vertices in self.direct.light_sampling_groups(tile) {
             // Sample lights.
-            self.direct.sample_lights_for_group(vertices.clone(), tile, aov, shares_with_paths)?;
+            self.direct.sample_and_trace_group_lights(vertices.clone(), tile, aov, shares_with_paths)?;
             for (index, number) in vertices.clone().enumerate() {
                 let mut light = self.direct.reflected_light((index, number), tile, aov, shares_with_paths);
                 let row = self.direct.batch(number);
@@ -205,7 +205,7 @@ impl CameraWavefront<'_, '_> {
                 let before = self.next.len();
                 BsdfSampler { tile, row, used: row.used, continuation, has_fractions }.queue_scattered_paths(
                     self.direct.interior_lists(),
-                    self.direct.cones(),
+                    self.direct.cones_by_queue_index(),
                     self.next,
                     fractions,
                 );
@@ -217,9 +217,9 @@ impl CameraWavefront<'_, '_> {
     }
 
     /// How the paths continue at a packet of vertices, or `None` if they end there.
-    fn continuation_at(&self, row: &VertexBatch) -> Option<ContinuationPolicy> {
+    fn continuation_at(&self, row: &VertexBatch) -> Option<BounceContinuation> {
         let extends_narrow = row.bsdf.extends_narrow_lobe_paths() && self.tile.behavior.mirrors;
-        let narrow = || ContinuationPolicy::new(self.tile, self.depth, SampledLobes::Narrow);
+        let narrow = || BounceContinuation::new(self.tile, self.depth, LobesToSample::Narrow);
         let policy = self.continuation.or_else(|| extends_narrow.then(narrow));
         policy.filter(|policy| policy.continues)
     }
@@ -232,7 +232,7 @@ impl CameraWavefront<'_, '_> {
 
     /// Begins a bounce of `paths` paths.
     fn begin_bounce(&mut self, paths: usize) {
-        let policy = || ContinuationPolicy::new(self.tile, self.depth, SampledLobes::All);
+        let policy = || BounceContinuation::new(self.tile, self.depth, LobesToSample::All);
         self.continuation = self.tile.behavior.scatters.then(policy);
         let has_fractions = self.accumulator.fractions().is_some();
         self.direct.begin_bounce(paths, self.tile.pixel_spread > 0.0, has_fractions);

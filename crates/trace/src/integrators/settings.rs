@@ -4,7 +4,7 @@ use super::{AovSource, FirstHitQuantity, LayerSet, LightAov, ViewMode};
 use crate::math::{DVec2, Vec3};
 use crate::scene::description::RenderOptions;
 use crate::scene::fingerprint::{FingerprintContext, FingerprintHasher, Fingerprinted};
-use crate::world::NeededTextureRoles;
+use crate::world::TextureRolesNeededByRender;
 
 /// Settings for rendering a world.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -59,46 +59,46 @@ impl RenderSettings {
     }
 
     /// Textures needed for images with these settings.
-    pub fn texture_needs(&self) -> NeededTextureRoles {
+    pub fn texture_needs(&self) -> TextureRolesNeededByRender {
         match self.view.aov_source() {
             AovSource::FirstHit(FirstHitQuantity::Normal) => {
-                NeededTextureRoles { normals: true, ..NeededTextureRoles::NONE }
+                TextureRolesNeededByRender { normals: true, ..TextureRolesNeededByRender::NONE }
             }
             AovSource::FirstHit(FirstHitQuantity::Albedo) => {
-                NeededTextureRoles { diffuse: true, ..NeededTextureRoles::NONE }
+                TextureRolesNeededByRender { diffuse: true, ..TextureRolesNeededByRender::NONE }
             }
             // Photons may be scattered by any surface.
             AovSource::FirstHit(FirstHitQuantity::Photons) if self.gathers_photons() => {
-                NeededTextureRoles::ALL
+                TextureRolesNeededByRender::ALL
             }
             AovSource::FirstHit(
                 FirstHitQuantity::Depth
                 | FirstHitQuantity::Barycentric
                 | FirstHitQuantity::Uv
                 | FirstHitQuantity::Photons,
-            ) => NeededTextureRoles::NONE,
+            ) => TextureRolesNeededByRender::NONE,
             // Normals and emission are needed, but not surface colors.
-            AovSource::Light(LightAov::LitFraction) => NeededTextureRoles {
+            AovSource::Light(LightAov::LitFraction) => TextureRolesNeededByRender {
                 diffuse: false,
                 specular: false,
                 ambient: false,
-                ..NeededTextureRoles::ALL
+                ..TextureRolesNeededByRender::ALL
             },
             AovSource::Light(LightAov::Radiance(parts)) if !parts.has_reflected() => {
                 // These components are also visible in mirrors and through glass.
                 let ambient =
                     parts.ambient && self.without_ineffective_settings().render.ambient != Vec3::ZERO;
-                NeededTextureRoles {
+                TextureRolesNeededByRender {
                     ambient,
                     lights: parts.emitted,
                     by_delta: true,
-                    ..NeededTextureRoles::NONE
+                    ..TextureRolesNeededByRender::NONE
                 }
             }
             // Boxes are drawn over the beauty image.
             AovSource::Light(LightAov::Radiance(_) | LightAov::TraversalCost)
             | AovSource::Bounds
-            | AovSource::Film(_) => NeededTextureRoles::ALL,
+            | AovSource::Film(_) => TextureRolesNeededByRender::ALL,
         }
     }
 

@@ -2,7 +2,7 @@
 
 use crate::choice;
 use crate::film::FilmQuantity;
-use crate::materials::bsdf::LobeFilter;
+use crate::materials::bsdf::ShownLobes;
 
 choice! {
     /// Content of an image.
@@ -90,7 +90,7 @@ impl ViewMode {
     }
 
     /// Film quantity shown by this view.
-    pub fn film_quantity(self) -> FilmQuantity {
+    pub fn displayed_film_quantity(self) -> FilmQuantity {
         match self.aov_source() {
             AovSource::Film(quantity) => quantity,
             AovSource::Light(_) | AovSource::FirstHit(_) | AovSource::Bounds => FilmQuantity::Radiance,
@@ -115,7 +115,7 @@ pub enum AovSource {
 impl AovSource {
     /// The light AOV accumulated by paths, or [`LightAov::ALL`] if the source is not a light AOV. First-hit
     /// views do not use it.
-    pub fn light_aov_or_all(self) -> LightAov {
+    pub fn light_transport_aov_or_all(self) -> LightAov {
         match self {
             Self::Light(aov) => aov,
             Self::FirstHit(_) | Self::Bounds | Self::Film(_) => LightAov::ALL,
@@ -148,13 +148,13 @@ impl LightAov {
 
     /// The non-specular lobes that contribute.
     #[inline(always)]
-    pub fn lobes(self) -> LobeFilter {
+    pub fn lobes(self) -> ShownLobes {
         match self {
             Self::Radiance(RadianceComponentMask { diffuse, specular, .. }) => {
-                LobeFilter::Of { diffuse, specular }
+                ShownLobes::Of { diffuse, specular }
             }
-            Self::TraversalCost => LobeFilter::ALL,
-            Self::LitFraction => LobeFilter::Unit,
+            Self::TraversalCost => ShownLobes::ALL,
+            Self::LitFraction => ShownLobes::Unit,
         }
     }
 

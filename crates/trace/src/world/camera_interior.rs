@@ -37,7 +37,7 @@ impl World {
     /// solids that contain the camera.
     pub fn glass_around_lens_point(&self, point: Vec3) -> impl Iterator<Item = (u32, u32)> {
         let is_inside = move |&(object, _): &(u32, u32)| match &self.geometry.objects()[object as usize] {
-            Object::Shape(shape) => shape.encloses_point(point.as_dvec3()) == Some(true),
+            Object::Shape(shape) => shape.encloses_point_if_closed(point.as_dvec3()) == Some(true),
             Object::Mesh(_) => false,
         };
         self.lens_glass.iter().copied().filter(is_inside).chain(self.camera_solids.iter().copied())
@@ -159,11 +159,11 @@ impl Object {
     fn surface_point_by_number(&self, number: usize) -> Option<DVec3> {
         match self {
             Self::Shape(shape) => {
-                let areas = shape.part_areas();
+                let areas = shape.local_part_areas();
                 let parts: Vec<usize> = (0..areas.len()).filter(|&part| areas[part] > 0.0).collect();
                 let part = *parts.get(number % parts.len().max(1))?;
                 let u = Vec2::new(0.618_034, 0.754_877_7) * (number as f32 + 0.5);
-                Some(shape.sample(part as u32, u.fract()).point)
+                Some(shape.sample_point_on_part(part as u32, u.fract()).point)
             }
             Self::Mesh(mesh) => {
                 let count = mesh.triangle_count();

@@ -176,7 +176,7 @@ impl World {
         for &id in &memory.objects {
             if let Object::Shape(shape) = &geometry.objects()[id as usize] {
                 let points = [sides.before, probe.close, sides.beyond].map(|point| point.as_dvec3());
-                let inside = shape.encloses_each_point(points);
+                let inside = shape.encloses_points_if_closed(points);
                 closed_lead |= inside.is_some_and(|[before, close, _]| before != close);
                 let is_around = inside.map(|[_, _, beyond]| beyond);
                 self.shape_if_coincident_or_enclosing(shape, id, (&sides, is_around))
@@ -191,11 +191,7 @@ impl World {
                 mesh.and_then(|mesh| mesh.intersect_segment_with_triangle(triangle, ends))
             {
                 let hit = Hit { shape, object };
-                found(self.convert_hit_to_coincident_surface(
-                    hit,
-                    self.material_index(&hit) as u32,
-                    is_front,
-                ));
+                found(self.coincident_surface_from_hit(hit, self.material_index(&hit) as u32, is_front));
             }
         }
         if is_led || closed_lead { sides } else { OffsetPoints { before: probe.close, ..sides } }
@@ -218,10 +214,10 @@ impl World {
         let own = shape.intersect(&ray)?;
         let is_front =
             shape.requested_surface_point(&ray, &own, bare).normal.as_dvec3().dot(ray.direction) < 0.0;
-        Some(self.convert_hit_to_coincident_surface(Hit { shape: own, object }, material, is_front))
+        Some(self.coincident_surface_from_hit(Hit { shape: own, object }, material, is_front))
     }
 
-    fn convert_hit_to_coincident_surface(
+    fn coincident_surface_from_hit(
         &self,
         hit: Hit,
         material: u32,
@@ -274,13 +270,13 @@ impl World {
             let material = self.material_index(&Hit { shape: ShapeHit::from_t(0.0), object: id }) as u32;
             self.is_closed_shape(id) && self.is_glass_material(material)
         };
-        self.geometry.tree().highest_ids_by_subtree(is_glass).into()
+        self.geometry.tree().n_highest_ids_by_subtree(is_glass).into()
     }
 
     /// Whether an object is a closed shape that contains a point.
     pub fn is_closed_shape_containing(&self, object: u32, point: Vec3) -> bool {
         match &self.geometry.objects()[object as usize] {
-            Object::Shape(shape) => shape.encloses_point(point.as_dvec3()) == Some(true),
+            Object::Shape(shape) => shape.encloses_point_if_closed(point.as_dvec3()) == Some(true),
             Object::Mesh(_) => false,
         }
     }

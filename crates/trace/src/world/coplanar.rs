@@ -110,7 +110,7 @@ impl FlatFace {
 }
 
 /// Emissive faces, sorted by minimum x.
-pub(super) struct EmissiveFaces {
+pub(super) struct SortedEmissiveFaces {
     pub(super) faces: Vec<FlatFace>,
     bounds: Vec<[DVec3; 2]>,
     /// Maximum extent along x.
@@ -121,7 +121,7 @@ pub(super) struct EmissiveFaces {
     margin: f64,
 }
 
-impl EmissiveFaces {
+impl SortedEmissiveFaces {
     /// Sorts the faces. Returns `None` if there are no faces.
     pub(super) fn new(mut faces: Vec<FlatFace>) -> Option<Self> {
         let least_x = |face: &FlatFace| face.bounds().map_or(f64::NEG_INFINITY, |[least, _]| least.x);
@@ -137,12 +137,12 @@ impl EmissiveFaces {
 
     /// Whether no light can be near a box.
     fn are_apart_from_box(&self, bounds: [DVec3; 2]) -> bool {
-        are_boxes_apart(bounds, self.region)
+        are_boxes_disjoint(bounds, self.region)
     }
 
     /// Returns the lights whose bounding boxes touch a face's bounding box. Increases `pairs` by the number
     /// of compared lights.
-    pub(super) fn lights_near_face<'a>(
+    pub(super) fn lights_with_touching_bounds<'a>(
         &'a self,
         face: &FlatFace,
         pairs: &mut usize,
@@ -155,7 +155,7 @@ impl EmissiveFaces {
         *pairs += end - start;
         let range = start..end;
         range
-            .filter(move |index| !are_boxes_apart(self.bounds[*index], bounds))
+            .filter(move |index| !are_boxes_disjoint(self.bounds[*index], bounds))
             .map(|index| &self.faces[index])
     }
 }
@@ -171,7 +171,7 @@ pub fn coplanar_lights(scene: &Scene, meshes: &[&LoadedMesh], origin: DVec3) -> 
             }
         });
     }
-    let Some(lights) = EmissiveFaces::new(faces) else { return Vec::new() };
+    let Some(lights) = SortedEmissiveFaces::new(faces) else { return Vec::new() };
     let mut found = BTreeMap::new();
     let mut pairs = 0;
     // Lights that touch glass are not moved because the handling of coincident glass surfaces resolves this
@@ -184,7 +184,7 @@ pub fn coplanar_lights(scene: &Scene, meshes: &[&LoadedMesh], origin: DVec3) -> 
             if pairs > MAX_PAIRS {
                 return;
             }
-            for light in lights.lights_near_face(face, &mut pairs) {
+            for light in lights.lights_with_touching_bounds(face, &mut pairs) {
                 let is_lifted = must_lift_light(light, face);
                 // Report each overlap of two lights only once.
                 let is_reported = is_lifted
@@ -201,7 +201,7 @@ pub fn coplanar_lights(scene: &Scene, meshes: &[&LoadedMesh], origin: DVec3) -> 
 }
 
 /// Whether two boxes are disjoint. Boxes are pairs of minimum and maximum corners.
-fn are_boxes_apart(a: [DVec3; 2], b: [DVec3; 2]) -> bool {
+fn are_boxes_disjoint(a: [DVec3; 2], b: [DVec3; 2]) -> bool {
     a[0].cmpgt(b[1]).any() || a[1].cmplt(b[0]).any()
 }
 
@@ -296,13 +296,13 @@ fn visit_flat_faces(
     scene: &Scene,
     meshes: &[&LoadedMesh],
     (number, origin): (usize, DVec3),
-    near: Option<&EmissiveFaces>,
+    near: Option<&SortedEmissiveFaces>,
     mut visit: impl FnMut(&FlatFace),
 ) {
     let object = &scene.objects[number];
     let material = object.material.map(|index| &scene.materials[index]);
     let emits = material.filter(|material| material.emits()).map(|material| material.emission.sides);
-    let (shape, matrix) = object.shape.untransformed();
+    let (shape, matrix) = object.shape.shape_and_matrix();
     let map = matrix.map(|matrix| matrix.to_transform().relative_to_origins(DVec3::ZERO, origin));
     // The map also translates the origin.
     let origin = if map.is_some() { DVec3::ZERO } else { origin };
@@ -322,7 +322,8 @@ fn visit_flat_faces(
         Shape::Box { center, size, rotate } => {
             let cuboid = OrientedBox::new(center, size, rotate);
             for face in 0..6 {
-                let corners = [Vec2::ZERO, Vec2::X, Vec2::ONE, Vec2::Y].map(|u| cuboid.sample(face, u));
+                let corners =
+                    [Vec2::ZERO, Vec2::X, Vec2::ONE, Vec2::Y].map(|u| cuboid.sample_point_on_part(face, u));
                 let mut face = polygon(corners.map(|corner| corner.point).to_vec());
                 if let Some(face) = &mut face {
                     face.normal = corners[0].normal;

@@ -127,10 +127,11 @@ fn lights_are_compared_only_with_nearby_faces() {
         FlatFace { emits: Some(EmissionSides::Front), ..FlatFace::new(corners.to_vec()).expect("a face") }
     };
     let all: Vec<FlatFace> = (0..2000).rev().map(light).collect();
-    let lights = EmissiveFaces::new(all.clone()).expect("lights");
+    let lights = SortedEmissiveFaces::new(all.clone()).expect("lights");
     let mut pairs = 0;
     for face in &all {
-        let near: Vec<f64> = lights.lights_near_face(face, &mut pairs).map(|light| light.point.x).collect();
+        let near: Vec<f64> =
+            lights.lights_with_touching_bounds(face, &mut pairs).map(|light| light.point.x).collect();
         assert_eq!(near, [face.point.x]);
     }
     assert!(pairs < 3 * all.len(), "{pairs} pairs");

@@ -8,7 +8,7 @@ use std::borrow::Cow;
 use std::collections::{BTreeMap, HashMap};
 
 use super::coplanar::{
-    EmissiveFaces, FlatFace, LIFT, MAX_PAIRS, ROUNDING, SURROUNDINGS, are_coplanar_and_overlap,
+    FlatFace, LIFT, MAX_PAIRS, ROUNDING, SURROUNDINGS, SortedEmissiveFaces, are_coplanar_and_overlap,
 };
 use crate::assets::{FileMaterial, LoadedMesh};
 use crate::control::{CancelToken, Cancelled};
@@ -17,7 +17,7 @@ use crate::math::{DVec3, Vec3};
 use crate::scene::description::Scene;
 
 /// For each mesh file, whether any object overrides its materials with an emissive material.
-pub fn emissive_override_by_mesh_file(scene: &Scene) -> Vec<bool> {
+pub fn emissive_override_flags_by_mesh_file(scene: &Scene) -> Vec<bool> {
     let mut emissive = vec![false; scene.mesh_files.len()];
     for object in &scene.objects {
         if let (Some(mesh), Some(own)) = (object.shape.as_mesh(), object.material) {
@@ -97,13 +97,13 @@ fn find_triangle_lifts(
     let all = 0..mesh.triangles.len() as u32;
     let (mut found, mut pairs, mut sizes) = (BTreeMap::new(), 0, 1.0);
     let emissive = all.clone().filter(|id| emits(*id)).filter_map(face).collect();
-    let Some(lights) = EmissiveFaces::new(emissive) else { return Ok((found, 0.0)) };
+    let Some(lights) = SortedEmissiveFaces::new(emissive) else { return Ok((found, 0.0)) };
     for (other, is_light) in all.filter_map(|id| Some((face(id)?, emits(id)))) {
         token.check_pause_and_cancel()?;
         if pairs > MAX_PAIRS {
             break;
         }
-        for light in lights.lights_near_face(&other, &mut pairs) {
+        for light in lights.lights_with_touching_bounds(&other, &mut pairs) {
             // Other instances of the mesh may use the file's materials, in which only some faces emit.
             let is_dark =
                 !is_light || emits_in_file(light.object as u32) && !emits_in_file(other.object as u32);

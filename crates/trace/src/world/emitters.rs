@@ -160,7 +160,7 @@ impl EmissionWithOpacity {
     }
 
     /// Emission factor that varies with position or direction. `chart` maps points on the emitter to UVs.
-    fn emission_modulation(&self, chart: UvMapping) -> Option<EmissionModulation> {
+    fn build_emission_modulation(&self, chart: UvMapping) -> Option<EmissionModulation> {
         let Emission { texture, coat, .. } = &self.emission;
         EmissionModulation::new_with_coat(texture.as_ref(), self.opacity.as_ref(), coat.as_ref(), chart)
     }
@@ -185,7 +185,7 @@ fn area_lights_of_shape(
             (false, Side::Back) => back_area_light(shape, radiance, object)?,
         };
         let light = AreaLight { bounds: emissive.scale_light_bounds_by_texture_means(light.bounds), ..light };
-        Some(match emissive.emission_modulation(UvMapping::Shape(shape.clone())) {
+        Some(match emissive.build_emission_modulation(UvMapping::Shape(shape.clone())) {
             Some(texture) => light.with_texture(texture),
             None => light,
         })
@@ -245,7 +245,7 @@ fn mesh_lights_by_material_and_side(
                 };
                 UvMapping::Triangles(triangles_with_material(mesh, own).map(patch).collect())
             };
-            let texture = if emissive.has_varying_emission() { emissive.emission_modulation(patches()).map(Box::new) } else { None };
+            let texture = if emissive.has_varying_emission() { emissive.build_emission_modulation(patches()).map(Box::new) } else { None };
             let (shape, part) = (Emitter::Mesh(emitter), EmittingTriangleSelection::Listed);
             Ok(Some(AreaLight { shape, side, radiance, texture, object, part, bounds }))
         };

@@ -223,7 +223,7 @@ impl Geometry {
         self.closest_hit_with_unbounded(self.traced_tree(), ray, |id, segment| {
             match self.merged_meshes_if_represented_by(id) {
                 Some(merged) => {
-                    let shape = merged.closest_merged_triangle_hit(segment)?;
+                    let shape = merged.closest_hit_with_merged_index(segment)?;
                     let MergedTriangle { object, primitive } = merged.triangle(shape.primitive);
                     Some(Hit { shape: ShapeHit { primitive, ..shape }, object })
                 }

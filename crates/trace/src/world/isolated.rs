@@ -42,12 +42,12 @@ const CELLS: usize = 16;
 pub(super) struct IsolatedRegionCache {
     /// Diagonal of the bounding box of all finite objects.
     reach: f32,
-    tables: Vec<OnceLock<ObjectIsolationCache>>,
+    tables: Vec<OnceLock<ObjectRegionIsolationStates>>,
 }
 
 /// Cached isolation states of one object.
 #[derive(Debug)]
-struct ObjectIsolationCache {
+struct ObjectRegionIsolationStates {
     /// Maximum margin for which the states are valid.
     margin: f32,
     /// For shapes, the grid's minimum corner and the number of cells per unit length along each axis.
@@ -64,7 +64,7 @@ impl IsolatedRegionCache {
     }
 }
 
-impl ObjectIsolationCache {
+impl ObjectRegionIsolationStates {
     fn new(margin: f32, cells: [Vec3; 2], count: usize) -> Self {
         Self { margin, cells, states: (0..count).map(|_| AtomicU8::new(UNKNOWN)).collect() }
     }
@@ -117,7 +117,7 @@ impl Geometry {
     pub(super) fn is_hit_isolated(&self, hit: &Hit, surface: &SurfacePoint, margin: Vec3) -> bool {
         let object = &self.objects()[hit.object as usize];
         let table = self.isolation_cache().tables[hit.object as usize]
-            .get_or_init(|| self.new_object_isolation_cache(object));
+            .get_or_init(|| self.new_isolation_states_for_object(object));
         if !(margin.max_element() <= table.margin) {
             return false;
         }
@@ -146,20 +146,27 @@ impl Geometry {
 
     /// Creates an object's table. The margin covers rays from up to four scene sizes away. Longer rays have
     /// larger margins and do not use the table.
-    fn new_object_isolation_cache(&self, object: &Object) -> ObjectIsolationCache {
+    fn new_isolation_states_for_object(&self, object: &Object) -> ObjectRegionIsolationStates {
         let of_rays = self.max_mesh_rounding_error() + 8.0 * f32::EPSILON * self.isolation_cache().reach;
         match object {
             Object::Mesh(mesh) => {
                 let margin = of_rays.max(4.0 * mesh.max_rounding_error());
-                ObjectIsolationCache::new(margin, [Vec3::ZERO; 2], mesh.tree.loaded().mesh.triangles.len())
+                ObjectRegionIsolationStates::new(
+                    margin,
+                    [Vec3::ZERO; 2],
+                    mesh.tree.loaded().mesh.triangles.len(),
+                )
             }
             Object::Shape(shape) => match shape.bounds() {
                 Some(bounds) => {
                     let size = bounds.min.abs().max(bounds.max.abs()).max_element();
-                    ObjectIsolationCache::for_grid_cells(of_rays.max(64.0 * f32::EPSILON * size), &bounds)
+                    ObjectRegionIsolationStates::for_grid_cells(
+                        of_rays.max(64.0 * f32::EPSILON * size),
+                        &bounds,
+                    )
                 }
                 // With a negative margin, the table of an unbounded shape is never used.
-                None => ObjectIsolationCache::new(-1.0, [Vec3::ZERO; 2], 0),
+                None => ObjectRegionIsolationStates::new(-1.0, [Vec3::ZERO; 2], 0),
             },
         }
     }

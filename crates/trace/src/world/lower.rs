@@ -243,7 +243,7 @@ fn file_mirror_over_diffuse(images: &Images, own: &FileMaterial) -> Bsdf {
 
 fn file_phong(images: &Images, own: &FileMaterial) -> NonSpecular {
     let scale = 2.0 / (own.shininess + 2.0);
-    let specular = match own.has_highlight() {
+    let specular = match own.allows_specular_highlight() {
         true => match file_material_color_parameter(images, own, own.specular_texture.as_ref(), own.specular)
         {
             ColorOrTexture::Constant(specular) => ColorOrTexture::Constant(specular * scale),

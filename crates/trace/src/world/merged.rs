@@ -157,7 +157,7 @@ impl MergedMeshes {
     }
 
     /// Returns the nearest hit. The hit's primitive is a triangle index into the tree.
-    pub fn closest_merged_triangle_hit(&self, ray: &Ray) -> Option<ShapeHit> {
+    pub fn closest_hit_with_merged_index(&self, ray: &Ray) -> Option<ShapeHit> {
         self.tree.closest_hit(ray)
     }
 
@@ -311,7 +311,7 @@ impl SimdKernel for IncoherentClosestFacetKernel<'_> {
         if are_coherent(rows, met, size, simd) {
             return None;
         }
-        Some(facets.closest_hit_packet(rows, (met, ends), found, simd))
+        Some(facets.update_decided_closest_hits(rows, (met, ends), found, simd))
     }
 }
 
@@ -335,7 +335,7 @@ impl SimdKernel for IncoherentAnyHitKernel<'_> {
         if are_coherent(rows, met, size, simd) {
             return None;
         }
-        Some(facets.any_hit_packet(rows, (met, ends), except, simd))
+        Some(facets.any_hit_and_undecided_masks(rows, (met, ends), except, simd))
     }
 }
 
@@ -502,7 +502,7 @@ pub(super) mod tests {
     }
 
     /// Large triangles, each with a small part near the origin.
-    fn mesh_of_large_triangles() -> Arc<MeshTree> {
+    fn random_mesh_of_large_triangles() -> Arc<MeshTree> {
         let mut next = random(7);
         let mut vector = |scale: f32| Vec3::new(next(), next(), next()) * scale;
         let mut mesh = TriangleMesh::default();
@@ -517,7 +517,7 @@ pub(super) mod tests {
 
     #[test]
     fn rays_do_not_hit_their_starting_triangle() {
-        let tree = mesh_of_large_triangles();
+        let tree = random_mesh_of_large_triangles();
         let turned = |degrees: DVec3, at: DVec3| {
             Transform::scale_rotate_translate(DVec3::new(1.0, 3.0, 0.7), degrees, at)
         };

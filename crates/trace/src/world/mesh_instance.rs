@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::mesh_packet::interpolate_triangle_uv;
+use super::mesh_packet::interpolate_single_triangle_uv;
 use super::mesh_tree::MeshTree;
 use super::placement::{IdentityPlacement, MeshPlacement};
 use super::triangle_point::{EDGE_MARGIN, PlacedMesh, TrianglePoint};
@@ -44,7 +44,7 @@ impl MeshInstance {
 
     /// Transforms a ray to mesh coordinates without changing t.
     pub(super) fn local_ray(&self, ray: &Ray) -> Ray {
-        let start = self.mesh_triangle_number(ray.start);
+        let start = self.mesh_triangle_number_unchecked(ray.start);
         if self.is_transformed {
             self.transform_ray_to_mesh(ray).with_start_triangle(start)
         } else {
@@ -78,7 +78,7 @@ impl MeshInstance {
     /// Converts a scene-wide triangle number to this mesh's numbering. For another mesh's triangle, the
     /// result is out of range.
     #[inline(always)]
-    pub(super) fn mesh_triangle_number(&self, in_scene: u32) -> u32 {
+    pub(super) fn mesh_triangle_number_unchecked(&self, in_scene: u32) -> u32 {
         self.first.map_or(Ray::NO_TRIANGLE, |first| in_scene.wrapping_sub(first))
     }
 
@@ -128,7 +128,7 @@ impl MeshInstance {
 
     /// Vertex UVs in one of the UV sets. Falls back to the first set if there is no second set.
     #[inline(always)]
-    pub(super) fn vertex_uvs_of_set(&self, set: UvSet) -> &[Vec2] {
+    pub(super) fn all_vertex_uvs_in_set(&self, set: UvSet) -> &[Vec2] {
         let mesh = &self.tree.loaded().mesh;
         match set {
             UvSet::Second if !mesh.second_uvs.is_empty() => &mesh.second_uvs,
@@ -138,7 +138,7 @@ impl MeshInstance {
 
     /// UVs of a triangle's corners, in the order of [`MeshInstance::world_corners`].
     pub fn corner_uvs(&self, triangle: u32) -> [Vec2; 3] {
-        self.values_in_corner_order(triangle, self.vertex_uvs_of_set(UvSet::First)).unwrap_or([
+        self.values_in_corner_order(triangle, self.all_vertex_uvs_in_set(UvSet::First)).unwrap_or([
             Vec2::ZERO,
             Vec2::X,
             Vec2::Y,
@@ -265,7 +265,7 @@ impl MeshInstance {
             return (Vec2::new(barycentric.y, barycentric.z), world(ab), world(ac));
         }
         let [a, b, c] = vertices.map(|vertex| uvs[vertex]);
-        let uv = interpolate_triangle_uv([a, b, c], barycentric);
+        let uv = interpolate_single_triangle_uv([a, b, c], barycentric);
         let (duv_b, duv_c) = ((b - a).as_dvec2(), (c - a).as_dvec2());
         let determinant = duv_b.perp_dot(duv_c);
         if determinant == 0.0 || !determinant.is_finite() {
@@ -319,7 +319,7 @@ impl MeshInstance {
     fn local_rays(&self, rows: &RayPacket, met: u32) -> [Ray; PACKET_SIZE] {
         let local = |lane: usize| {
             let ray = rows.ray(lane % PACKET_SIZE);
-            let ray = ray.with_start_triangle(self.mesh_triangle_number(ray.start));
+            let ray = ray.with_start_triangle(self.mesh_triangle_number_unchecked(ray.start));
             if self.is_transformed { self.transform_ray_to_mesh(&ray) } else { ray }
         };
         let mut rays = [local(met.trailing_zeros() as usize); PACKET_SIZE];

@@ -80,13 +80,13 @@ impl MeshInstance {
             surface.copy_shading_normals_from(of, &found);
         }
         if let Some(set) = asked_uvs {
-            let all = self.vertex_uvs_of_set(set);
+            let all = self.all_vertex_uvs_in_set(set);
             for i in 0..PACKET_SIZE {
                 let uvs = match all {
                     [] => [Vec2::ZERO, Vec2::X, Vec2::Y],
                     uvs => vertices[i].map(|vertex| uvs[vertex as usize]),
                 };
-                let uv = interpolate_triangle_uv(
+                let uv = interpolate_single_triangle_uv(
                     uvs,
                     Vec3::new(1.0 - hits.u[i] - hits.v[i], hits.u[i], hits.v[i]),
                 );
@@ -162,7 +162,7 @@ fn correct_doubtful_points(
 
 /// Interpolates the UVs of a triangle's corners.
 #[inline(always)]
-pub(super) fn interpolate_triangle_uv([a, b, c]: [Vec2; 3], barycentric: Vec3) -> Vec2 {
+pub(super) fn interpolate_single_triangle_uv([a, b, c]: [Vec2; 3], barycentric: Vec3) -> Vec2 {
     a * barycentric.x + b * barycentric.y + c * barycentric.z
 }
 

@@ -39,7 +39,7 @@ pub use contact::{
     CoincidenceQuery, CoincidenceScratch, CoincidentOrEnclosingSurface, MAX_INTERIORS, OffsetPoints,
 };
 pub use coplanar::{CoplanarLight, coplanar_lights, light_lifts};
-pub use distinct_lights::{emissive_override_by_mesh_file, separate_coincident_emitters};
+pub use distinct_lights::{emissive_override_flags_by_mesh_file, separate_coincident_emitters};
 pub use emitters::{build_environment_map, build_lights, scene_photon_emitter};
 pub use geometry::{Geometry, Hit};
 pub use glass_solids::{GlassSolids, OpenGlass};
@@ -51,10 +51,10 @@ pub use object::Object;
 pub use origin::choose_origin_near_camera_target;
 pub use packet_material::PacketMaterial;
 pub use textures::{
-    AlphaCutoffKey, NeededTexture, NeededTextureRoles, TextureSource, environment_source,
+    AlphaCutoffKey, NeededTexture, TextureRolesNeededByRender, TextureSource, environment_source,
     scene_material_texture_source, textures_needed,
 };
-pub use unlit_glass::LightSphereAndObjectBounds;
+pub use unlit_glass::LightBoundingBoxes;
 
 use crate::assets::GkitOrbiterCamera;
 use crate::geometry::SurfacePoint;
@@ -257,7 +257,7 @@ impl World {
     /// Whether an object's texture axes are well defined or irrelevant: the object has UVs, or no lobes
     /// depend on the axes.
     #[inline]
-    pub fn has_texture_axes_if_needed(&self, object: u32) -> bool {
+    pub fn object_has_texture_axes_if_needed(&self, object: u32) -> bool {
         if !self.has_directions {
             return true;
         }

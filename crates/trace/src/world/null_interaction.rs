@@ -188,7 +188,7 @@ impl SimdKernel for TransmittanceKernel<'_> {
         // Find the rays not blocked by opaque objects.
         let geometry: &Geometry = &world.geometry;
         let each_mesh =
-            see_through.is_any_merged || traced & geometry.entire_merged_mesh_light_mask(sources) != 0;
+            see_through.is_any_merged || traced & geometry.target_light_is_merged_mesh_mask(sources) != 0;
         let tree = if each_mesh { geometry.tree() } else { geometry.traced_tree() };
         if tree.has_shells() {
             for lane in set_bit_lanes(traced) {

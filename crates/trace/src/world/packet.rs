@@ -58,7 +58,7 @@ impl Geometry {
 impl Geometry {
     /// Mask of rays whose light is an entire merged mesh.
     #[inline(always)]
-    pub(super) fn entire_merged_mesh_light_mask(&self, sources: &LightGeometryPacket) -> u32 {
+    pub(super) fn target_light_is_merged_mesh_mask(&self, sources: &LightGeometryPacket) -> u32 {
         if !sources.is_any || !self.has_merged_meshes() {
             return 0;
         }
@@ -124,7 +124,7 @@ impl SimdKernel for OcclusionKernel<'_> {
     fn run(self, simd: impl Simd) -> u32 {
         let Self { geometry, rows, ends, traced, sources } = self;
         if geometry.traced_tree().has_shells()
-            || traced & geometry.entire_merged_mesh_light_mask(sources) != 0
+            || traced & geometry.target_light_is_merged_mesh_mask(sources) != 0
         {
             return geometry.occluded_one_by_one(rows, ends, traced, sources);
         }
@@ -229,7 +229,7 @@ impl<'a, F: Simd> OcclusionCallback<'a, F> {
         sources: &'a LightGeometryPacket,
         simd: F,
     ) -> Self {
-        Self { geometry, rows, sources, in_part: single_primitive_light_ray_mask(sources, simd), simd }
+        Self { geometry, rows, sources, in_part: target_light_is_primitive_mask(sources, simd), simd }
     }
 }
 
@@ -272,7 +272,7 @@ impl<F: Simd> AnyHitCallback for OcclusionCallback<'_, F> {
 
 /// Mask of rays whose light is a single primitive of an object.
 #[inline(always)]
-fn single_primitive_light_ray_mask(sources: &LightGeometryPacket, simd: impl Simd) -> u32 {
+fn target_light_is_primitive_mask(sources: &LightGeometryPacket, simd: impl Simd) -> u32 {
     if !sources.is_any {
         return 0;
     }

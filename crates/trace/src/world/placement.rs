@@ -7,11 +7,11 @@ use crate::math::transform::Transform;
 /// A transform from mesh coordinates to world coordinates.
 pub trait MeshPlacement: Copy {
     /// Transforms a point to world coordinates.
-    fn point_to_world(self, local: DVec3) -> DVec3;
+    fn mesh_point_to_world(self, local: DVec3) -> DVec3;
 
     /// Bounds the absolute components of a direction in world coordinates. `local` contains bounds on its
     /// components in mesh coordinates.
-    fn abs_bound_to_world(self, local: DVec3) -> DVec3;
+    fn vector_abs_bound_to_world(self, local: DVec3) -> DVec3;
 
     /// Transforms a normal. The result is not normalized.
     fn normal_to_world(self, local: DVec3) -> DVec3;
@@ -22,12 +22,12 @@ pub trait MeshPlacement: Copy {
 
 impl MeshPlacement for &Transform {
     #[inline(always)]
-    fn point_to_world(self, local: DVec3) -> DVec3 {
+    fn mesh_point_to_world(self, local: DVec3) -> DVec3 {
         Transform::point(self, local)
     }
 
     #[inline(always)]
-    fn abs_bound_to_world(self, local: DVec3) -> DVec3 {
+    fn vector_abs_bound_to_world(self, local: DVec3) -> DVec3 {
         Transform::transform_abs_bound(self, local)
     }
 
@@ -48,13 +48,13 @@ pub struct IdentityPlacement;
 
 impl MeshPlacement for IdentityPlacement {
     #[inline(always)]
-    fn point_to_world(self, local: DVec3) -> DVec3 {
+    fn mesh_point_to_world(self, local: DVec3) -> DVec3 {
         // Adding the translation in the matrix version converts −0 to +0. Do the same here.
         local + DVec3::ZERO
     }
 
     #[inline(always)]
-    fn abs_bound_to_world(self, local: DVec3) -> DVec3 {
+    fn vector_abs_bound_to_world(self, local: DVec3) -> DVec3 {
         local
     }
 

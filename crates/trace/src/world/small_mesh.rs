@@ -75,7 +75,7 @@ impl MeshInstance {
             }
         }
         for start in &mut start {
-            *start = self.mesh_triangle_number(*start);
+            *start = self.mesh_triangle_number_unchecked(*start);
         }
         RayPacket::from_soa(origin, direction).with_start_triangle(start)
     }

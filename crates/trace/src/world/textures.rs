@@ -85,7 +85,7 @@ impl NeededTexture {
 
 /// The texture roles that a rendered image needs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct NeededTextureRoles {
+pub struct TextureRolesNeededByRender {
     /// Diffuse reflectance.
     pub diffuse: bool,
     /// Glossy reflectance.
@@ -101,7 +101,7 @@ pub struct NeededTextureRoles {
     pub by_delta: bool,
 }
 
-impl NeededTextureRoles {
+impl TextureRolesNeededByRender {
     /// Every texture.
     pub const ALL: Self =
         Self { diffuse: true, specular: true, ambient: true, lights: true, normals: true, by_delta: true };
@@ -148,7 +148,7 @@ impl NeededTextureRoles {
 pub fn textures_needed(
     scene: &Scene,
     meshes: &[Arc<LoadedMesh>],
-    lookups: NeededTextureRoles,
+    lookups: TextureRolesNeededByRender,
 ) -> Vec<NeededTexture> {
     let mut needed: Vec<NeededTexture> = Vec::new();
     let mut known = HashMap::new();
@@ -382,7 +382,7 @@ pub fn opacity_pixel_interpretation(own: &FileMaterial, opacity: &FileTexture) -
 
 fn needed_textures_of_file_material(
     own: &FileMaterial,
-    lookups: NeededTextureRoles,
+    lookups: TextureRolesNeededByRender,
 ) -> impl Iterator<Item = (&FileTexture, PixelInterpretation)> {
     let shared = [
         (&own.diffuse_texture, TextureRole::Ambient),
@@ -393,7 +393,10 @@ fn needed_textures_of_file_material(
     let of_kind = match &own.physical {
         None => vec![
             (&own.diffuse_texture, TextureRole::Diffuse),
-            (if own.has_highlight() { &own.specular_texture } else { &None }, TextureRole::Specular),
+            (
+                if own.allows_specular_highlight() { &own.specular_texture } else { &None },
+                TextureRole::Specular,
+            ),
         ],
         Some(physical) => vec![
             (&own.diffuse_texture, TextureRole::Facets),

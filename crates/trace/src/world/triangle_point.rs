@@ -70,9 +70,9 @@ impl<P: MeshPlacement> PlacedMesh<P> {
     /// which a point lies. In a merged tree, the rounding of the transformed corners is added.
     #[inline(always)]
     pub(super) fn point_error_bound(&self, point: Vec3, local: DVec3, [a, b, c]: [DVec3; 3]) -> Vec3 {
-        let reach = self.placement.abs_bound_to_world(local.abs());
+        let reach = self.placement.vector_abs_bound_to_world(local.abs());
         let parts = point.abs() + reach.as_vec3() + self.placement.mesh_origin().abs().as_vec3();
-        let greatest = self.placement.abs_bound_to_world(a.abs().max(b.abs()).max(c.abs()));
+        let greatest = self.placement.vector_abs_bound_to_world(a.abs().max(b.abs()).max(c.abs()));
         let of_double = f64_arithmetic_error_bound(greatest.max_element());
         let error = parts * (2.0 * f32::EPSILON) + Vec3::splat(of_double + f32::MIN_POSITIVE);
         if self.has_rounded_corners {
@@ -90,7 +90,7 @@ impl<P: MeshPlacement> PlacedMesh<P> {
         let [a, b, c] = corners;
         let (ab, ac) = (b - a, c - a);
         let local = a + ab * f64::from(u) + ac * f64::from(v);
-        let point = self.placement.point_to_world(local).as_vec3();
+        let point = self.placement.mesh_point_to_world(local).as_vec3();
         let error = self.point_error_bound(point, local, corners);
         let across = ab.cross(ac);
         // Compare squared distances from the edges with the squared minimum.
@@ -110,14 +110,14 @@ impl<P: MeshPlacement> PlacedMesh<P> {
             barycentric: Vec3::new(1.0 - u as f32 - v as f32, u as f32, v as f32),
             is_near_edge,
             is_coarse: f64::from(point.abs().max_element()) * COARSE
-                < self.triangle_coordinate_bound(corners),
+                < self.triangle_world_coordinate_bound(corners),
         }
     }
 
     /// Upper bound on the world coordinates of a triangle's corners.
     #[inline(always)]
-    fn triangle_coordinate_bound(&self, [a, b, c]: [DVec3; 3]) -> f64 {
-        let greatest = self.placement.abs_bound_to_world(a.abs().max(b.abs()).max(c.abs()));
+    fn triangle_world_coordinate_bound(&self, [a, b, c]: [DVec3; 3]) -> f64 {
+        let greatest = self.placement.vector_abs_bound_to_world(a.abs().max(b.abs()).max(c.abs()));
         (greatest + self.placement.mesh_origin().abs()).max_element()
     }
 
@@ -131,7 +131,7 @@ impl<P: MeshPlacement> PlacedMesh<P> {
         ray: &RayF64,
         weights: [f32; 2],
     ) -> [Vec3; 2] {
-        match self.point_from_ray(facet, ray) {
+        match self.plane_intersection_if_more_precise(facet, ray) {
             Some(corrected) => corrected,
             None if facet.is_near_edge => self.pulled_inside(facet, weights),
             None => [facet.point, facet.error],
@@ -141,19 +141,19 @@ impl<P: MeshPlacement> PlacedMesh<P> {
     /// Whether [`PlacedMesh::corrected_point_and_error`] computes the point from the ray.
     #[inline(always)]
     pub(super) fn uses_point_from_ray(&self, facet: &TrianglePoint, ray: &RayF64) -> bool {
-        facet.is_coarse && self.point_from_ray(facet, ray).is_some()
+        facet.is_coarse && self.plane_intersection_if_more_precise(facet, ray).is_some()
     }
 
     /// Intersection of the ray with the triangle's plane, and its error, if the triangle is much larger than
     /// the distances from the scene's origin to the point and the ray origin.
-    fn point_from_ray(&self, facet: &TrianglePoint, ray: &RayF64) -> Option<[Vec3; 2]> {
+    fn plane_intersection_if_more_precise(&self, facet: &TrianglePoint, ray: &RayF64) -> Option<[Vec3; 2]> {
         if !facet.is_coarse {
             return None;
         }
         let [a, b, c] = facet.corners;
-        let greatest = self.triangle_coordinate_bound(facet.corners);
+        let greatest = self.triangle_world_coordinate_bound(facet.corners);
         let normal = self.placement.normal_to_world((b - a).cross(c - a));
-        let t = (self.placement.point_to_world(a) - ray.origin).dot(normal) / ray.direction.dot(normal);
+        let t = (self.placement.mesh_point_to_world(a) - ray.origin).dot(normal) / ray.direction.dot(normal);
         let point = ray.at(t);
         let reach = ray.origin.abs().max(point.abs()).max_element();
         let apart = (point - facet.point.as_dvec3()).abs().max_element();
@@ -183,7 +183,7 @@ impl<P: MeshPlacement> PlacedMesh<P> {
         // Reduce the coordinate that is farther above its minimum.
         let (u, v) = if u - of_u > v - of_v { (u - excess, v) } else { (u, v - excess) };
         let local = a + ab * u + ac * v;
-        let point = self.placement.point_to_world(local).as_vec3();
+        let point = self.placement.mesh_point_to_world(local).as_vec3();
         if !point.is_finite() {
             return [facet.point, facet.error];
         }
@@ -214,7 +214,7 @@ impl<P: MeshPlacement> PlacedMesh<P> {
         normals: &[Vec3; 3],
         direction: DVec3,
     ) -> Vec3 {
-        let point = self.placement.point_to_world(facet.local);
+        let point = self.placement.mesh_point_to_world(facet.local);
         let normal = facet.normal.as_dvec3();
         let side = if normal.dot(direction) > 0.0 { -1.0 } else { 1.0 };
         let weights = facet.barycentric.to_array();
@@ -225,7 +225,7 @@ impl<P: MeshPlacement> PlacedMesh<P> {
             let is_told = reciprocal.is_finite() & (reciprocal > 0.0);
             let own = own * if is_told { reciprocal } else { 0.0 };
             let own = own * side * if own.dot(normal) < 0.0 { -1.0 } else { 1.0 };
-            let height = (self.placement.point_to_world(facet.corners[i]) - point).dot(own);
+            let height = (self.placement.mesh_point_to_world(facet.corners[i]) - point).dot(own);
             lifted += own * (f64::from(weights[i]) * if height > 0.0 { height } else { 0.0 });
         }
         (point + lifted).as_vec3()
@@ -251,8 +251,11 @@ mod tests {
             let at = DVec3::new(number(), number(), number());
             let (map, here) = (&Transform::IDENTITY, IdentityPlacement);
             let bits = |numbers: DVec3| numbers.to_array().map(f64::to_bits);
-            assert_eq!(bits(MeshPlacement::point_to_world(map, at)), bits(here.point_to_world(at)));
-            assert_eq!(MeshPlacement::abs_bound_to_world(map, at.abs()), here.abs_bound_to_world(at.abs()));
+            assert_eq!(bits(MeshPlacement::mesh_point_to_world(map, at)), bits(here.mesh_point_to_world(at)));
+            assert_eq!(
+                MeshPlacement::vector_abs_bound_to_world(map, at.abs()),
+                here.vector_abs_bound_to_world(at.abs())
+            );
             assert_eq!(bits(MeshPlacement::normal_to_world(map, at)), bits(here.normal_to_world(at)));
             assert_eq!(map.mesh_origin(), here.mesh_origin());
         }

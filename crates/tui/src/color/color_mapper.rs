@@ -8,7 +8,7 @@ use super::palette::{self, AnsiColors};
 use super::recipes::{DitherRecipeCache, SolidOrPatternColor};
 use super::{ColorDepth, NAMES};
 use crate::math::color::srgb8_color_to_linear;
-use crate::mosaic::{BlockPattern, FittedCell};
+use crate::mosaic::{FittedCell, TwoPartBlockPattern};
 use ratatui::style::Color;
 
 /// How strongly dithering favors inks close to the target color on 256-color and 16-color terminals.
@@ -25,7 +25,7 @@ const LEVELS: [f32; 3] = [0.25, 0.5, 0.75];
 /// A tile and the colors of its two parts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct MappedCell {
-    pub(crate) tile: BlockPattern,
+    pub(crate) tile: TwoPartBlockPattern,
     pub(crate) pair: [Color; 2],
 }
 
@@ -110,10 +110,10 @@ impl ColorMapper {
             self.pairs.get(index).copied().unwrap_or(AnsiColorMix { level: None, colors: [0; 2] });
         let [front, back] = colors.map(|color| NAMES[color]);
         match level {
-            None => MappedCell { tile: BlockPattern::HALVES, pair: [front; 2] },
-            Some(0) => MappedCell { tile: BlockPattern::LIGHT, pair: [front, back] },
-            Some(1) => MappedCell { tile: BlockPattern::MEDIUM, pair: [front, back] },
-            Some(_) => MappedCell { tile: BlockPattern::LIGHT, pair: [back, front] },
+            None => MappedCell { tile: TwoPartBlockPattern::HALVES, pair: [front; 2] },
+            Some(0) => MappedCell { tile: TwoPartBlockPattern::LIGHT, pair: [front, back] },
+            Some(1) => MappedCell { tile: TwoPartBlockPattern::MEDIUM, pair: [front, back] },
+            Some(_) => MappedCell { tile: TwoPartBlockPattern::LIGHT, pair: [back, front] },
         }
     }
 }
@@ -127,7 +127,7 @@ fn ansi_color_mixes(inks: &[SolidOrPatternColor]) -> Vec<AnsiColorMix> {
     alone.chain(shaded).collect()
 }
 
-fn pattern_weighted_mean_color(first: [u8; 3], second: [u8; 3], tile: BlockPattern) -> [u8; 3] {
+fn pattern_weighted_mean_color(first: [u8; 3], second: [u8; 3], tile: TwoPartBlockPattern) -> [u8; 3] {
     let [a, b] = tile.part_sizes().map(|size| size as f32);
     let mixed = (srgb8_color_to_linear(first) * a + srgb8_color_to_linear(second) * b) / (a + b);
     mixed.to_array().map(crate::math::color::linear_to_srgb8)
@@ -139,7 +139,7 @@ mod tests {
     use crate::color::XTERM;
 
     fn cell(shades: &ColorMapper, rgb: [u8; 3], x: usize, y: usize) -> MappedCell {
-        shades.map_cell(FittedCell { tile: BlockPattern::HALVES, pair: [rgb; 2] }, x, y)
+        shades.map_cell(FittedCell { tile: TwoPartBlockPattern::HALVES, pair: [rgb; 2] }, x, y)
     }
 
     #[test]
@@ -181,10 +181,10 @@ mod tests {
         ansi[1] = [150, 75, 50];
         let shades = ColorMapper::new(ColorDepth::Ansi16, &ansi);
         assert_eq!(cell(&shades, [150, 75, 50], 2, 2).pair, [Color::Red; 2]);
-        let edge = FittedCell { tile: BlockPattern::HALVES, pair: [[255; 3], [0; 3]] };
+        let edge = FittedCell { tile: TwoPartBlockPattern::HALVES, pair: [[255; 3], [0; 3]] };
         assert_eq!(
             shades.map_cell(edge, 1, 1),
-            MappedCell { tile: BlockPattern::HALVES, pair: [Color::White, Color::Black] }
+            MappedCell { tile: TwoPartBlockPattern::HALVES, pair: [Color::White, Color::Black] }
         );
     }
 }

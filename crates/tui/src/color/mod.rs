@@ -9,7 +9,7 @@ mod recipes;
 
 use ratatui::style::Color;
 
-pub(super) use self::bayer::dithered_to_6_bits;
+pub(super) use self::bayer::dither_color_to_6_bits;
 pub(super) use self::color_mapper::ColorMapper;
 pub(super) use self::oklab::linear_to_oklab;
 pub use self::palette::xterm_rgb;
@@ -96,7 +96,7 @@ fn is_known_true_color_terminal(term: &str, program: &str) -> bool {
 }
 
 /// Whether `COLORFGBG` (set by rxvt and some other terminals) indicates a light background.
-pub(super) fn has_light_background(variable: impl Fn(&str) -> Option<String>) -> bool {
+pub(super) fn colorfgbg_indicates_light_background(variable: impl Fn(&str) -> Option<String>) -> bool {
     let last = variable("COLORFGBG").and_then(|colors| colors.rsplit(';').next()?.parse::<u8>().ok());
     last.is_some_and(|index| index == 7 || (9..16).contains(&index))
 }
@@ -148,7 +148,8 @@ mod tests {
 
     #[test]
     fn background_is_dark_by_default() {
-        let light = |colors: Option<&str>| has_light_background(|_| colors.map(str::to_owned));
+        let light =
+            |colors: Option<&str>| colorfgbg_indicates_light_background(|_| colors.map(str::to_owned));
         assert!(light(Some("0;15")) && light(Some("0;default;7")));
         assert!(!light(Some("15;0")) && !light(Some("15;8")) && !light(Some("15;default")) && !light(None));
     }

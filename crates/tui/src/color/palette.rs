@@ -101,7 +101,7 @@ pub fn xterm_rgb(color: Color) -> Option<[u8; 3]> {
 
 /// Index of the nearest palette color in the cube (16 to 231) or the grays (232 to 255).
 pub(crate) fn nearest_256(rgb: [u8; 3]) -> u8 {
-    let steps = rgb.map(nearest_cube_level);
+    let steps = rgb.map(nearest_cube_level_index);
     let cube = steps.map(|step| CUBE_LEVELS[step]);
     let mean = rgb.iter().map(|&channel| u32::from(channel)).sum::<u32>() / 3;
     let gray_step = (mean.saturating_sub(8) + 5).min(235) / 10;
@@ -115,7 +115,7 @@ pub(crate) fn nearest_256(rgb: [u8; 3]) -> u8 {
     }
 }
 
-fn nearest_cube_level(channel: u8) -> usize {
+fn nearest_cube_level_index(channel: u8) -> usize {
     match channel {
         0..48 => 0,
         48..115 => 1,

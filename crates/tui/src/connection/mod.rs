@@ -78,7 +78,7 @@ enum ReplySupport {
 
 /// The connection to the terminal.
 #[derive(Debug)]
-pub(super) struct TerminalConnection {
+pub(super) struct TerminalFlowControl {
     replies: ReplySupport,
     is_multiplexed: bool,
     flight: VecDeque<SentSlice>,
@@ -98,7 +98,7 @@ pub(super) struct TerminalConnection {
     unwritten: usize,
 }
 
-impl TerminalConnection {
+impl TerminalFlowControl {
     /// Creates a connection whose speed is unknown. `is_multiplexed` means that a multiplexer replies instead
     /// of the terminal.
     pub(super) fn new(is_multiplexed: bool, now: Instant) -> Self {

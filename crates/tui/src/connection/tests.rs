@@ -2,7 +2,7 @@ use super::*;
 
 /// A terminal behind a simulated connection. Sends as much as flow control allows.
 struct SimulatedTerminal {
-    connection: TerminalConnection,
+    connection: TerminalFlowControl,
     start: Instant,
     now: Instant,
     bytes_a_second: f64,
@@ -23,7 +23,7 @@ impl SimulatedTerminal {
     fn new(bytes_a_second: f64, milliseconds: u64, answers: bool, is_multiplexed: bool) -> Self {
         let now = Instant::now();
         let mut terminal = Self {
-            connection: TerminalConnection::new(is_multiplexed, now),
+            connection: TerminalFlowControl::new(is_multiplexed, now),
             start: now,
             now,
             bytes_a_second,
@@ -155,7 +155,7 @@ fn stalled_connection_recovers() {
 
 #[test]
 fn lost_reply_delays_output_by_a_second() {
-    let mut connection = TerminalConnection::new(false, Instant::now());
+    let mut connection = TerminalFlowControl::new(false, Instant::now());
     let now = Instant::now();
     connection.record_sent(100, Some(QueryKind::Attributes), now);
     connection.handle_reply(QueryKind::Attributes, now + Duration::from_millis(5));
@@ -165,7 +165,7 @@ fn lost_reply_delays_output_by_a_second() {
     assert_eq!(connection.next_send_time(sent), Some(sent + SILENCE));
     assert!(connection.max_sendable_bytes(sent + SILENCE) > 0);
     // The timeout grows with the round-trip time.
-    let mut slow = TerminalConnection::new(false, now);
+    let mut slow = TerminalFlowControl::new(false, now);
     slow.record_sent(100, Some(QueryKind::Attributes), now);
     slow.handle_reply(QueryKind::Attributes, now + Duration::from_millis(800));
     slow.record_sent(slow.window_bytes(), Some(QueryKind::Status), sent);
@@ -188,7 +188,7 @@ fn idle_connection_needs_no_wakeups() {
 
 #[test]
 fn unsolicited_replies_are_ignored() {
-    let mut connection = TerminalConnection::new(false, Instant::now());
+    let mut connection = TerminalFlowControl::new(false, Instant::now());
     let now = Instant::now();
     connection.handle_reply(QueryKind::Status, now);
     connection.record_sent(100, Some(QueryKind::Attributes), now);
@@ -200,9 +200,9 @@ fn unsolicited_replies_are_ignored() {
 
 #[test]
 fn replies_to_small_slices_reveal_a_fast_terminal() {
-    let mut connection = TerminalConnection::new(false, Instant::now());
+    let mut connection = TerminalFlowControl::new(false, Instant::now());
     let mut now = Instant::now();
-    let mut answer = |connection: &mut TerminalConnection, bytes: usize, milliseconds: u64| {
+    let mut answer = |connection: &mut TerminalFlowControl, bytes: usize, milliseconds: u64| {
         connection.record_sent(bytes, Some(QueryKind::Status), now);
         now += Duration::from_millis(milliseconds);
         connection.handle_reply(QueryKind::Status, now);
@@ -218,7 +218,7 @@ fn replies_to_small_slices_reveal_a_fast_terminal() {
         answer(&mut connection, 60, 20);
     }
     assert!(connection.is_fast());
-    let mut behind = TerminalConnection::new(true, now);
+    let mut behind = TerminalFlowControl::new(true, now);
     behind.record_sent(12, Some(QueryKind::Attributes), now);
     behind.handle_reply(QueryKind::Attributes, now + Duration::from_millis(1));
     assert!(!behind.is_fast(), "the multiplexer replies");

@@ -7,7 +7,7 @@
 
 use std::ops::Range;
 
-use crate::color::{PaletteDither, dithered_to_6_bits};
+use crate::color::{PaletteDither, dither_color_to_6_bits};
 use crate::film::Srgb8Image;
 
 /// Maximum number of colors. Registers below 16 are reserved for the terminal.
@@ -46,7 +46,7 @@ impl Palette {
         let width = picture.width.max(1) as usize;
         let mut index = |(i, rgb): (usize, &[u8; 3])| {
             let (x, y) = (i % width, i / width);
-            self.dither.index_at(dithered_to_6_bits(*rgb, x, y), x, y) as u8
+            self.dither.index_at(dither_color_to_6_bits(*rgb, x, y), x, y) as u8
         };
         picture.pixels.iter().enumerate().map(&mut index).collect()
     }

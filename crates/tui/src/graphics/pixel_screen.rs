@@ -40,7 +40,7 @@ impl TestImageTerminal {
     }
 
     /// Number of images shown so far.
-    pub fn total_shown_image_count(&self) -> usize {
+    pub fn received_image_count(&self) -> usize {
         self.count
     }
 

@@ -121,13 +121,13 @@ impl Decoder {
 
     fn process_byte(&mut self, byte: u8, now: Instant) {
         match std::mem::take(&mut self.held) {
-            PendingSequence::Nothing => self.begin_sequence(byte, now),
+            PendingSequence::Nothing => self.process_byte_outside_sequence(byte, now),
             PendingSequence::Escape | PendingSequence::StringEnd => self.continue_after_escape(byte, now),
             PendingSequence::Sequence { introducer, .. } if byte == ESCAPE => {
                 if introducer == b'_' {
                     self.meaning.handle_apc(&std::mem::take(&mut self.command));
                 }
-                self.begin_sequence(byte, now);
+                self.process_byte_outside_sequence(byte, now);
                 if b"]P_X^".contains(&introducer) {
                     self.held = PendingSequence::StringEnd;
                 }
@@ -138,7 +138,7 @@ impl Decoder {
                 self.take_pending_sequence();
                 self.push_escape_key();
                 self.replay(&[introducer]);
-                self.begin_sequence(byte, now);
+                self.process_byte_outside_sequence(byte, now);
             }
             PendingSequence::Sequence { begin, bytes, introducer } => {
                 if introducer == b'_' {
@@ -148,7 +148,7 @@ impl Decoder {
             }
             PendingSequence::Doubtful(bytes) => self.continue_ambiguous_sequence(bytes, byte, now),
             PendingSequence::Paste(mut paste) => {
-                if paste.scan_for_end_marker(byte, now) {
+                if paste.byte_completes_end_marker(byte, now) {
                     self.meaning.found.push(DecodedInput::Paste);
                 } else {
                     self.held = PendingSequence::Paste(paste);
@@ -157,7 +157,7 @@ impl Decoder {
         }
     }
 
-    fn begin_sequence(&mut self, byte: u8, now: Instant) {
+    fn process_byte_outside_sequence(&mut self, byte: u8, now: Instant) {
         let escaped = self.escaped.take().filter(|escaped| now < *escaped + LATE_SEQUENCE);
         match byte {
             ESCAPE => {
@@ -183,7 +183,7 @@ impl Decoder {
             byte if !INTRODUCERS.contains(&byte) => {
                 self.take_pending_sequence();
                 self.push_escape_key();
-                self.begin_sequence(byte, now);
+                self.process_byte_outside_sequence(byte, now);
             }
             _ => self.continue_sequence(byte, (now, 2, byte), now),
         }
@@ -223,7 +223,7 @@ impl Decoder {
         } else {
             self.take_pending_sequence();
             self.replay(&bytes);
-            self.begin_sequence(byte, now);
+            self.process_byte_outside_sequence(byte, now);
         }
     }
 

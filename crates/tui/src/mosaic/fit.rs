@@ -1,6 +1,6 @@
 //! Approximates a cell's pixels with two colors and a block character.
 
-use super::tile::{BlockPattern, CellDivision, CellGrid};
+use super::tile::{CellDivision, CellGrid, TwoPartBlockPattern};
 use crate::color::linear_to_oklab;
 use crate::math::Vec3;
 use crate::math::color::{linear_to_srgb8, srgb8_color_to_linear};
@@ -8,7 +8,7 @@ use crate::math::color::{linear_to_srgb8, srgb8_color_to_linear};
 /// A cell's tile and its two sRGB colors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct FittedCell {
-    pub(crate) tile: BlockPattern,
+    pub(crate) tile: TwoPartBlockPattern,
     /// Colors of the first and second parts.
     pub(crate) pair: [[u8; 3]; 2],
 }
@@ -22,7 +22,7 @@ const WORTH: f32 = 1e-4;
 /// minimizes the Oklab variance within its two parts.
 pub(crate) fn fit_cell(grid: CellGrid, pixels: &[[u8; 3]]) -> FittedCell {
     if let ([first, second], CellGrid::Halves) = (pixels, grid) {
-        return FittedCell { tile: BlockPattern::HALVES, pair: [*first, *second] };
+        return FittedCell { tile: TwoPartBlockPattern::HALVES, pair: [*first, *second] };
     }
     let pixels: Vec<Vec3> = pixels.iter().map(|pixel| srgb8_color_to_linear(*pixel)).collect();
     let CellDivision { first, tile } = best_division(grid, &pixels);
@@ -39,7 +39,8 @@ fn best_division(grid: CellGrid, pixels: &[Vec3]) -> CellDivision {
     let count = pixels.len() as f32;
     let labs: Vec<Vec3> = pixels.iter().map(|pixel| linear_to_oklab(*pixel)).collect();
     let all: Vec3 = labs.iter().sum();
-    let (mut best, mut most) = (CellDivision { first: 1, tile: BlockPattern::HALVES }, f32::NEG_INFINITY);
+    let (mut best, mut most) =
+        (CellDivision { first: 1, tile: TwoPartBlockPattern::HALVES }, f32::NEG_INFINITY);
     let (mut mask, mut sum, mut size) = (0_u32, Vec3::ZERO, 0.0_f32);
     for division in grid.two_color_patterns() {
         let mut changed = mask ^ division.first;
@@ -53,7 +54,7 @@ fn best_division(grid: CellGrid, pixels: &[Vec3]) -> CellDivision {
         mask = division.first;
         // Reduction in variance, up to a constant.
         let gain = sum.length_squared() / size + (all - sum).length_squared() / (count - size).max(1.0);
-        let worth = if division.tile == BlockPattern::HALVES { WORTH * count } else { 0.0 };
+        let worth = if division.tile == TwoPartBlockPattern::HALVES { WORTH * count } else { 0.0 };
         if gain + worth > most {
             (best, most) = (*division, gain + worth);
         }
@@ -84,6 +85,6 @@ mod tests {
     #[test]
     fn nearly_uniform_cells_use_halves() {
         let pixels: Vec<[u8; 3]> = (0..4).map(|i| [150 + i % 3; 3]).collect();
-        assert_eq!(fit_cell(CellGrid::Quadrants, &pixels).tile, BlockPattern::HALVES);
+        assert_eq!(fit_cell(CellGrid::Quadrants, &pixels).tile, TwoPartBlockPattern::HALVES);
     }
 }

@@ -5,4 +5,4 @@ mod tile;
 
 pub(super) use self::fit::{FittedCell, fit_cell};
 pub use self::tile::filled_squares;
-pub(super) use self::tile::{BlockPattern, CellGrid, PLACES, block_pattern_for_symbol};
+pub(super) use self::tile::{CellGrid, PLACES, TwoPartBlockPattern, pattern_and_inversion_for_symbol};

@@ -14,21 +14,21 @@ const ALL: u32 = (1 << PLACES) - 1;
 /// A division of a cell into two parts, and the characters that draw it. The first part contains the top left
 /// corner.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct BlockPattern {
+pub(crate) struct TwoPartBlockPattern {
     /// Mask of the grid squares in the first part, in row order.
     first: u32,
     symbols: [char; 2],
 }
 
-impl PartialEq for BlockPattern {
+impl PartialEq for TwoPartBlockPattern {
     fn eq(&self, other: &Self) -> bool {
         self.first == other.first
     }
 }
 
-impl Eq for BlockPattern {}
+impl Eq for TwoPartBlockPattern {}
 
-impl BlockPattern {
+impl TwoPartBlockPattern {
     /// Upper and lower halves.
     pub(crate) const HALVES: Self = Self { first: (1 << GRID_ROWS) - 1, symbols: ['▀', '▄'] };
     /// A pattern that fills a quarter of the cell with the foreground color. The pattern varies between
@@ -59,13 +59,13 @@ impl BlockPattern {
 
 /// Returns the tile that a character draws and whether the foreground is the tile's second part, or `None`
 /// if it is not a block character.
-pub(crate) fn block_pattern_for_symbol(symbol: char) -> Option<(BlockPattern, bool)> {
+pub(crate) fn pattern_and_inversion_for_symbol(symbol: char) -> Option<(TwoPartBlockPattern, bool)> {
     // Letters, digits and punctuation have smaller code points than block characters.
     if symbol < '▀' {
         return None;
     }
     let mask = TABLE.masks.get(&symbol)?;
-    block_pattern_for_mask(*mask)
+    pattern_and_inversion_for_mask(*mask)
 }
 
 /// The grid squares that a character fills with the foreground color, as 12 rows of 2 columns, or `None` if
@@ -81,11 +81,11 @@ pub fn filled_squares(symbol: char) -> Option<[bool; 24]> {
 
 /// Returns the tile whose first part is `mask` and false, or the tile whose second part is `mask` and true if
 /// the mask excludes the top left corner.
-fn block_pattern_for_mask(mask: u32) -> Option<(BlockPattern, bool)> {
+fn pattern_and_inversion_for_mask(mask: u32) -> Option<(TwoPartBlockPattern, bool)> {
     let is_second = mask & 1 == 0;
     let first = if is_second { ALL & !mask } else { mask };
     let symbol = |mask| TABLE.symbols.get(&mask).copied();
-    let tile = BlockPattern { first, symbols: [symbol(first)?, symbol(ALL & !first)?] };
+    let tile = TwoPartBlockPattern { first, symbols: [symbol(first)?, symbol(ALL & !first)?] };
     Some((tile, is_second))
 }
 
@@ -106,7 +106,7 @@ static TABLE: LazyLock<BlockSymbolTable> = LazyLock::new(|| {
             add(symbol, expand_mask_to_full_grid(mask, 2));
         }
     }
-    let light = BlockPattern::LIGHT.first;
+    let light = TwoPartBlockPattern::LIGHT.first;
     add('░', light);
     add('▓', ALL & !light);
     // The inverted checkerboard has a different mask but looks the same.
@@ -192,7 +192,7 @@ pub(crate) enum CellGrid {
 pub(super) struct CellDivision {
     /// Mask of the pixels in the first part, in row order.
     pub(super) first: u32,
-    pub(super) tile: BlockPattern,
+    pub(super) tile: TwoPartBlockPattern,
 }
 
 impl CellGrid {
@@ -228,14 +228,17 @@ impl CellGrid {
 /// Lists all divisions of a cell with `pixel_rows` rows of pixels along two-column grids. `part_rows`
 /// contains each grid's number of rows.
 fn all_cell_divisions(pixel_rows: u32, part_rows: &[u32]) -> Vec<CellDivision> {
-    let mut divisions = vec![CellDivision { first: (1 << pixel_rows) - 1, tile: BlockPattern::HALVES }];
+    let mut divisions =
+        vec![CellDivision { first: (1 << pixel_rows) - 1, tile: TwoPartBlockPattern::HALVES }];
     for rows in part_rows {
         let half = 1_u32 << (2 * rows - 1);
         // Iterate in Gray code order. The mask always includes the top left square.
         for mask in (0..half).map(|i| (i ^ i >> 1) << 1 | 1) {
-            let of_tile = block_pattern_for_mask(expand_mask_to_full_grid(mask, *rows)).map(|(tile, _)| tile);
-            let is_new =
-                |tile: &BlockPattern| divisions.iter().all(|division: &CellDivision| division.tile != *tile);
+            let of_tile =
+                pattern_and_inversion_for_mask(expand_mask_to_full_grid(mask, *rows)).map(|(tile, _)| tile);
+            let is_new = |tile: &TwoPartBlockPattern| {
+                divisions.iter().all(|division: &CellDivision| division.tile != *tile)
+            };
             if let Some(tile) = of_tile.filter(is_new) {
                 divisions.push(CellDivision { first: expand_rows(mask, *rows, pixel_rows), tile });
             }
@@ -262,12 +265,12 @@ mod tests {
                     "{grid:?} {first:b}"
                 );
                 let [front, back] = tile.symbols();
-                assert_eq!(block_pattern_for_symbol(front), Some((*tile, false)), "{front}");
-                assert_eq!(block_pattern_for_symbol(back), Some((*tile, true)), "{back}");
+                assert_eq!(pattern_and_inversion_for_symbol(front), Some((*tile, false)), "{front}");
+                assert_eq!(pattern_and_inversion_for_symbol(back), Some((*tile, true)), "{back}");
                 assert!(seen.insert(front) && seen.insert(back));
             }
             assert_eq!(divisions.len(), count, "{grid:?}");
-            assert_eq!(divisions[0].tile, BlockPattern::HALVES);
+            assert_eq!(divisions[0].tile, TwoPartBlockPattern::HALVES);
         }
     }
 
@@ -287,10 +290,10 @@ mod tests {
     #[test]
     fn shades_fill_one_two_or_three_quarters() {
         for (symbol, share) in [('░', 6), ('▒', 12), ('▓', 18)] {
-            let (tile, is_second) = block_pattern_for_symbol(symbol).expect("a tile");
+            let (tile, is_second) = pattern_and_inversion_for_symbol(symbol).expect("a tile");
             assert_eq!(tile.part_sizes()[usize::from(is_second)], share, "{symbol}");
         }
-        assert_eq!(block_pattern_for_symbol('▒').map(|(tile, _)| tile.symbols()), Some(['▒', '▒']));
-        assert_eq!(block_pattern_for_symbol('a'), None);
+        assert_eq!(pattern_and_inversion_for_symbol('▒').map(|(tile, _)| tile.symbols()), Some(['▒', '▒']));
+        assert_eq!(pattern_and_inversion_for_symbol('a'), None);
     }
 }

@@ -1,6 +1,6 @@
 //! Candidate colors for a cell.
 
-use super::cell::TwoColorCell;
+use super::cell::TwoPartColorCell;
 use super::cost_model::RateDistortion;
 use super::terminal_color::{TerminalColor, decimal_digit_count};
 use crate::color::nearest_256;
@@ -16,7 +16,7 @@ const FIRST_UNTOUCHED: u8 = 22;
 
 /// Candidate colors for the parts of a cell.
 #[derive(Clone, Debug, Default)]
-pub(super) struct CandidateColors {
+pub(super) struct PartColorCandidates {
     pub(super) first: Vec<TerminalColor>,
     pub(super) second: Vec<TerminalColor>,
     /// Candidates for filling both parts with the same color.
@@ -26,12 +26,12 @@ pub(super) struct CandidateColors {
 /// Returns candidate colors for the first of `cells`. Each color also fits as many of the following cells as
 /// possible.
 pub(super) fn candidate_colors_for_run_start(
-    cells: &[Option<TwoColorCell>],
+    cells: &[Option<TwoPartColorCell>],
     model: RateDistortion,
-) -> CandidateColors {
+) -> PartColorCandidates {
     let column = |part: usize| cells.iter().map_while(move |cell| cell.map(|mosaic| mosaic.pair[part]));
     let both = cells.iter().map_while(|cell| cell.map(|mosaic| mosaic.pair)).flatten();
-    CandidateColors {
+    PartColorCandidates {
         first: candidate_colors_for_run(&column(0), model),
         second: candidate_colors_for_run(&column(1), model),
         both: candidate_colors_for_run(&both, model),
@@ -117,9 +117,12 @@ impl RunColorRange {
 mod tests {
     use super::*;
 
-    fn row(values: &[u8]) -> Vec<Option<TwoColorCell>> {
+    fn row(values: &[u8]) -> Vec<Option<TwoPartColorCell>> {
         let halves = |value: &u8| {
-            TwoColorCell::from_halves([TerminalColor::Rgb([*value, 50, 100]), TerminalColor::Rgb([0, 0, 0])])
+            TwoPartColorCell::from_halves([
+                TerminalColor::Rgb([*value, 50, 100]),
+                TerminalColor::Rgb([0, 0, 0]),
+            ])
         };
         values.iter().map(|value| Some(halves(value))).collect()
     }
@@ -131,7 +134,7 @@ mod tests {
         assert_eq!(found.first, [TerminalColor::Rgb([21, 50, 99])]);
         assert_eq!(found.second, [TerminalColor::Rgb([0, 0, 0])], "themes may replace color 16");
         assert_eq!(found.both.len(), 1, "no color fits both halves");
-        let grays = [Some(TwoColorCell::uniform(TerminalColor::Rgb([8, 8, 8])))];
+        let grays = [Some(TwoPartColorCell::uniform(TerminalColor::Rgb([8, 8, 8])))];
         assert_eq!(
             candidate_colors_for_run_start(&grays, RateDistortion::EXACT).first,
             [TerminalColor::Rgb([8, 8, 8]), TerminalColor::Palette(232)]
@@ -141,7 +144,10 @@ mod tests {
     #[test]
     fn palette_colors_are_kept_unchanged() {
         let cells = [
-            Some(TwoColorCell::from_halves([TerminalColor::DefaultBackground, TerminalColor::Palette(3)])),
+            Some(TwoPartColorCell::from_halves([
+                TerminalColor::DefaultBackground,
+                TerminalColor::Palette(3),
+            ])),
             None,
         ];
         let found = candidate_colors_for_run_start(&cells, RateDistortion::MOVING);

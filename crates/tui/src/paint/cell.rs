@@ -7,7 +7,7 @@ use unicode_width::UnicodeWidthStr;
 use super::pen::{Pen, PenRequirements};
 use super::terminal_color::{ColorLayer, TerminalColor};
 use crate::color::ColorDepth;
-use crate::mosaic::{BlockPattern, PLACES, block_pattern_for_symbol};
+use crate::mosaic::{PLACES, TwoPartBlockPattern, pattern_and_inversion_for_symbol};
 
 /// Content of a cell.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -15,7 +15,7 @@ pub(super) enum CellContent {
     /// The content of the cell is unknown.
     Unknown,
     /// A tile with two colors. A blank consists of two halves in the same color.
-    Mosaic(TwoColorCell),
+    Mosaic(TwoPartColorCell),
     /// A character.
     Text(TextCell),
     /// The right half of a wide character.
@@ -24,20 +24,20 @@ pub(super) enum CellContent {
 
 /// A cell with two colors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct TwoColorCell {
-    pub(super) tile: BlockPattern,
+pub(super) struct TwoPartColorCell {
+    pub(super) tile: TwoPartBlockPattern,
     /// Colors of the first and second parts.
     pub(super) pair: [TerminalColor; 2],
 }
 
-impl TwoColorCell {
+impl TwoPartColorCell {
     /// Normalizes the tile so that cells with the same appearance are equal.
-    pub(super) fn new(tile: BlockPattern, pair: [TerminalColor; 2]) -> Self {
-        Self { tile: if pair[0] == pair[1] { BlockPattern::HALVES } else { tile }, pair }
+    pub(super) fn new(tile: TwoPartBlockPattern, pair: [TerminalColor; 2]) -> Self {
+        Self { tile: if pair[0] == pair[1] { TwoPartBlockPattern::HALVES } else { tile }, pair }
     }
 
     pub(super) fn from_halves(pair: [TerminalColor; 2]) -> Self {
-        Self { tile: BlockPattern::HALVES, pair }
+        Self { tile: TwoPartBlockPattern::HALVES, pair }
     }
 
     /// A cell with a single color.
@@ -52,7 +52,7 @@ impl TwoColorCell {
             "█" => return Some(Self::uniform(fg)),
             _ => {}
         }
-        let (tile, is_second) = block_pattern_for_symbol(symbol.chars().next()?)?;
+        let (tile, is_second) = pattern_and_inversion_for_symbol(symbol.chars().next()?)?;
         Some(Self::new(tile, if is_second { [bg, fg] } else { [fg, bg] }))
     }
 
@@ -107,7 +107,7 @@ impl ForegroundParts {
     pub(super) const ALL: [Self; 4] = [Self::Blank, Self::First, Self::Second, Self::Full];
 
     /// The character that draws `tile`.
-    pub(super) fn symbol(self, tile: BlockPattern) -> char {
+    pub(super) fn symbol(self, tile: TwoPartBlockPattern) -> char {
         match self {
             Self::Blank => ' ',
             Self::First => tile.symbols()[0],
@@ -151,8 +151,8 @@ impl ForegroundParts {
 
 impl CellContent {
     /// A blank with the terminal's default background.
-    pub(super) const BLANK: Self = Self::Mosaic(TwoColorCell {
-        tile: BlockPattern::HALVES,
+    pub(super) const BLANK: Self = Self::Mosaic(TwoPartColorCell {
+        tile: TwoPartBlockPattern::HALVES,
         pair: [TerminalColor::DefaultBackground; 2],
     });
 
@@ -166,7 +166,7 @@ impl CellContent {
         let (symbol, columns) = printable_symbol_and_width(cell.symbol());
         let harmless = if symbol == " " { Modifier::all() - ON_BLANKS } else { Modifier::empty() };
         let mosaic =
-            harmless.contains(cell.modifier).then(|| TwoColorCell::from_symbol(symbol, fg, bg)).flatten();
+            harmless.contains(cell.modifier).then(|| TwoPartColorCell::from_symbol(symbol, fg, bg)).flatten();
         mosaic.map_or_else(
             || {
                 Self::Text(TextCell {

@@ -60,18 +60,18 @@ pub struct Painter {
     links: UrlTable,
     budget: FirstPreviewByteBudget,
     /// Remaining drawing steps, in order.
-    parts: vec::IntoIter<RowDrawPhase>,
+    parts: vec::IntoIter<RowDrawStep>,
     /// The drawing step in progress.
-    part: Option<RowDrawPhase>,
+    part: Option<RowDrawStep>,
     strokes: vec::IntoIter<CellRun>,
     /// Drawing progress for each row of the preview.
-    rows: Vec<RowRefreshStatus>,
+    rows: Vec<PreviewRowProgress>,
     aim: u64,
 }
 
 /// A step in drawing the screen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum RowDrawPhase {
+enum RowDrawStep {
     /// Draw a row's text.
     Words(u16),
     /// Draw a row of the preview.
@@ -91,7 +91,7 @@ pub struct LinksAndDelayedText {
 
 /// Drawing progress for one row of the preview.
 #[derive(Clone, Copy, Debug, Default)]
-struct RowRefreshStatus {
+struct PreviewRowProgress {
     /// Number of the last target for which the row was drawn.
     aim: u64,
     /// Whether the row on the screen matches its target.
@@ -150,7 +150,7 @@ impl Painter {
             self.screen = None;
         }
         if self.screen.is_none() || self.rows.len() != usize::from(wanted.rows) {
-            self.rows = vec![RowRefreshStatus::default(); usize::from(wanted.rows)];
+            self.rows = vec![PreviewRowProgress::default(); usize::from(wanted.rows)];
         }
         for (y, row) in (0..wanted.rows).zip(&mut self.rows) {
             row.is_done = row.is_done && self.wanted.row_also_satisfies_other(&wanted, y);
@@ -167,10 +167,10 @@ impl Painter {
     fn queue_all_draw_steps(&mut self) {
         let mut rows: Vec<u16> = self.wanted.rows_center_outward().collect();
         rows.sort_by_key(|y| self.rows[usize::from(*y)].aim);
-        let words = (0..self.wanted.rows).map(RowDrawPhase::Words);
+        let words = (0..self.wanted.rows).map(RowDrawStep::Words);
         let later = (self.wanted.later.top()..self.wanted.later.bottom().min(self.wanted.rows))
-            .map(RowDrawPhase::Later);
-        let picture = rows.into_iter().map(RowDrawPhase::Picture);
+            .map(RowDrawStep::Later);
+        let picture = rows.into_iter().map(RowDrawStep::Picture);
         self.parts = words.chain(picture).chain(later).collect::<Vec<_>>().into_iter();
         self.part = None;
         self.strokes = Vec::new().into_iter();
@@ -201,16 +201,16 @@ impl Painter {
                 if !screen.draw_stroke_if_output_fits(stroke, &self.links, &mut slice) {
                     return slice.bytes;
                 }
-                if let (Some(RowDrawPhase::Picture(_)), CellRun::Mosaic { at, count, .. }) =
+                if let (Some(RowDrawStep::Picture(_)), CellRun::Mosaic { at, count, .. }) =
                     (self.part, stroke)
                 {
                     self.memory.record_drawn_cells(*at, *count);
                 }
                 self.strokes.next();
             }
-            if let Some(RowDrawPhase::Picture(y)) = self.part {
+            if let Some(RowDrawStep::Picture(y)) = self.part {
                 self.memory.mark_row_as_drawn(y);
-                self.rows[usize::from(y)] = RowRefreshStatus { aim: self.aim, is_done: true };
+                self.rows[usize::from(y)] = PreviewRowProgress { aim: self.aim, is_done: true };
             }
             if !slice.bytes.is_empty() && is_late() {
                 self.part = None;
@@ -218,21 +218,21 @@ impl Painter {
             }
             self.part = self.parts.next();
             let strokes = match self.part {
-                Some(RowDrawPhase::Words(y)) => {
+                Some(RowDrawStep::Words(y)) => {
                     words::plan_text_row(screen, &self.wanted, y, ScreenRegion::Words)
                 }
-                Some(RowDrawPhase::Later(y)) => {
+                Some(RowDrawStep::Later(y)) => {
                     words::plan_text_row(screen, &self.wanted, y, ScreenRegion::Later)
                 }
-                Some(RowDrawPhase::Picture(y))
+                Some(RowDrawStep::Picture(y))
                     if self.rows[usize::from(y)].is_done && !screen.is_row_damaged(y) =>
                 {
                     Vec::new()
                 }
-                Some(RowDrawPhase::Picture(y)) if self.wanted.uses_ascii_ramp() => {
+                Some(RowDrawStep::Picture(y)) if self.wanted.uses_ascii_ramp() => {
                     words::plan_text_row(screen, &self.wanted, y, ScreenRegion::Picture)
                 }
-                Some(RowDrawPhase::Picture(y)) => picture::plan_preview_row(
+                Some(RowDrawStep::Picture(y)) => picture::plan_preview_row(
                     screen,
                     &self.wanted,
                     &self.memory,
@@ -262,7 +262,7 @@ impl Painter {
     pub fn invalidate(&mut self) {
         self.screen = None;
         self.memory.invalidate();
-        self.rows.fill(RowRefreshStatus::default());
+        self.rows.fill(PreviewRowProgress::default());
         self.queue_all_draw_steps();
     }
 }

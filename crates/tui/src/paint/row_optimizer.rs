@@ -4,11 +4,11 @@
 //! colors. The cost depends on the pen and the cursor position, so the search keeps the best path for each of
 //! a few pens (Viterbi algorithm with beam search) and traces the path back from the cheapest end.
 
-use super::candidates::{CandidateColors, candidate_colors_for_run_start};
-use super::cell::{ForegroundParts, TwoColorCell};
+use super::candidates::{PartColorCandidates, candidate_colors_for_run_start};
+use super::cell::{ForegroundParts, TwoPartColorCell};
 use super::cost_model::RateDistortion;
 use super::terminal_color::{ColorLayer, TerminalColor, decimal_digit_count};
-use crate::mosaic::{BlockPattern, PLACES};
+use crate::mosaic::{PLACES, TwoPartBlockPattern};
 
 /// Number of paths kept per cell.
 const BEAM: usize = 5;
@@ -20,9 +20,9 @@ const MAX_BYTES: f32 = 46.0;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct TargetCell {
     /// Target content, or `None` if the cell is not part of the preview.
-    pub(super) wanted: Option<TwoColorCell>,
+    pub(super) wanted: Option<TwoPartColorCell>,
     /// Content on the screen, or `None` if unknown, in which case the cell must be drawn.
-    pub(super) shown: Option<TwoColorCell>,
+    pub(super) shown: Option<TwoPartColorCell>,
 }
 
 /// State of the pen and cursor at the start of a row.
@@ -40,7 +40,7 @@ pub(super) struct DrawOp {
     /// Column relative to the first target cell.
     pub(super) column: usize,
     pub(super) glyph: ForegroundParts,
-    pub(super) mosaic: TwoColorCell,
+    pub(super) mosaic: TwoPartColorCell,
 }
 
 /// A path through the row up to some cell.
@@ -117,7 +117,7 @@ pub(super) fn plan_row(targets: &[TargetCell], start: RowStart, model: RateDisto
 fn extend_plans(
     last: &[RowPrefixPlan],
     target: TargetCell,
-    wanted: &[Option<TwoColorCell>],
+    wanted: &[Option<TwoPartColorCell>],
     model: RateDistortion,
 ) -> Vec<RowPrefixPlan> {
     let mut beam = SearchBeam { paths: Vec::with_capacity(BEAM), limit: MAX_BYTES * model.byte };
@@ -144,11 +144,11 @@ fn extend_plans(
     // A cell that is close enough to its target is not worth a color change, but redrawing it may be cheaper
     // than skipping it.
     let changes = if leave <= model.byte {
-        CandidateColors::default()
+        PartColorCandidates::default()
     } else {
         candidate_colors_for_run_start(wanted, model)
     };
-    let changes = CandidateColorChanges::new(&changes, mosaic, model);
+    let changes = ColorChangesToTry::new(&changes, mosaic, model);
     for (parent, path) in last.iter().enumerate() {
         changes.try_single_changes(parent, path, &mut beam);
     }
@@ -205,8 +205,8 @@ struct ColorChange {
 }
 
 /// Color changes to try for a cell.
-struct CandidateColorChanges {
-    mosaic: TwoColorCell,
+struct ColorChangesToTry {
+    mosaic: TwoPartColorCell,
     model: RateDistortion,
     all: Vec<ColorChange>,
     /// End index of the colors for the first part. Colors for the second part follow, up to `second`.
@@ -214,9 +214,9 @@ struct CandidateColorChanges {
     second: usize,
 }
 
-impl CandidateColorChanges {
-    fn new(candidates: &CandidateColors, mosaic: TwoColorCell, model: RateDistortion) -> Self {
-        let CandidateColors { first, second, both } = candidates;
+impl ColorChangesToTry {
+    fn new(candidates: &PartColorCandidates, mosaic: TwoPartColorCell, model: RateDistortion) -> Self {
+        let PartColorCandidates { first, second, both } = candidates;
         let mut changes =
             Self { mosaic, model, all: Vec::new(), first: first.len(), second: first.len() + second.len() };
         let change = |shade: &TerminalColor| ColorChange {
@@ -240,7 +240,7 @@ impl CandidateColorChanges {
     /// Extends a path by drawing with the current pen or after changing one of its colors. A color chosen for
     /// one part is used only there.
     fn try_single_changes(&self, parent: usize, path: &RowPrefixPlan, beam: &mut SearchBeam) {
-        let mut ends = PlanExtension::new(self, parent, path, beam);
+        let mut ends = OneCellPlanExtender::new(self, parent, path, beam);
         if !ends.can_enter_beam() {
             return;
         }
@@ -267,7 +267,7 @@ impl CandidateColorChanges {
 
     /// Extends a path by changing both colors of the pen.
     fn try_paired_changes(&self, parent: usize, path: &RowPrefixPlan, beam: &mut SearchBeam) {
-        let mut ends = PlanExtension::new(self, parent, path, beam);
+        let mut ends = OneCellPlanExtender::new(self, parent, path, beam);
         for first in &self.all[..self.first] {
             for second in &self.all[self.first..self.second] {
                 let bytes = first.bytes + second.bytes + 4;
@@ -286,7 +286,7 @@ impl CandidateColorChanges {
 }
 
 /// Extends one path by drawing the next cell.
-struct PlanExtension<'a> {
+struct OneCellPlanExtender<'a> {
     parent: usize,
     /// Number of bytes so far, including those that move the cursor to the cell.
     bytes: u32,
@@ -294,15 +294,15 @@ struct PlanExtension<'a> {
     error: f32,
     /// Cost per byte of output.
     byte: f32,
-    tile: BlockPattern,
+    tile: TwoPartBlockPattern,
     beam: &'a mut SearchBeam,
     /// Current cost bound of the beam.
     bound: f32,
 }
 
-impl<'a> PlanExtension<'a> {
+impl<'a> OneCellPlanExtender<'a> {
     fn new(
-        changes: &CandidateColorChanges,
+        changes: &ColorChangesToTry,
         parent: usize,
         path: &RowPrefixPlan,
         beam: &'a mut SearchBeam,
@@ -321,7 +321,7 @@ impl<'a> PlanExtension<'a> {
 
     fn try_glyph(&mut self, ends: PenWithErrors, sgr: u32, glyph: ForegroundParts) {
         // Inverting the medium shade yields a different pattern but the same character.
-        if glyph == ForegroundParts::Second && self.tile == BlockPattern::MEDIUM {
+        if glyph == ForegroundParts::Second && self.tile == TwoPartBlockPattern::MEDIUM {
             return;
         }
         let bytes = self.bytes + sgr + glyph.symbol(self.tile).len_utf8() as u32;
@@ -368,7 +368,7 @@ impl PenWithErrors {
 }
 
 /// Traces the cheapest path back from the last cell.
-fn trace_back(paths: &[Vec<RowPrefixPlan>], wanted: &[Option<TwoColorCell>]) -> PlannedRow {
+fn trace_back(paths: &[Vec<RowPrefixPlan>], wanted: &[Option<TwoPartColorCell>]) -> PlannedRow {
     let last = paths.last().into_iter().flatten().enumerate();
     let best = last.min_by(|a, b| a.1.cost.total_cmp(&b.1.cost));
     let (mut index, bytes) = best.map_or((0, 0), |(index, path)| (index, path.bytes));
@@ -380,7 +380,7 @@ fn trace_back(paths: &[Vec<RowPrefixPlan>], wanted: &[Option<TwoColorCell>]) -> 
                 ColorLayer::Foreground => path.fg,
                 ColorLayer::Background => path.bg,
             });
-            ops.push(DrawOp { column: column - 1, glyph, mosaic: TwoColorCell::new(mosaic.tile, pair) });
+            ops.push(DrawOp { column: column - 1, glyph, mosaic: TwoPartColorCell::new(mosaic.tile, pair) });
         }
         index = path.parent;
     }
@@ -393,7 +393,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::mosaic::block_pattern_for_symbol;
+    use crate::mosaic::pattern_and_inversion_for_symbol;
 
     const BLACK: TerminalColor = TerminalColor::Rgb([0, 0, 0]);
     const RED: TerminalColor = TerminalColor::Rgb([200, 0, 0]);
@@ -402,8 +402,8 @@ mod tests {
         halves
             .iter()
             .map(|halves| TargetCell {
-                wanted: Some(TwoColorCell::from_halves(*halves)),
-                shown: Some(TwoColorCell::uniform(TerminalColor::DefaultBackground)),
+                wanted: Some(TwoPartColorCell::from_halves(*halves)),
+                shown: Some(TwoPartColorCell::uniform(TerminalColor::DefaultBackground)),
             })
             .collect()
     }
@@ -429,7 +429,7 @@ mod tests {
     fn unchanged_cells_are_skipped() {
         let mut targets = wanted(&[[RED, BLACK]; 9]);
         for target in &mut targets[1..8] {
-            target.shown = Some(TwoColorCell::from_halves([RED, TerminalColor::Rgb([1, 1, 1])]));
+            target.shown = Some(TwoPartColorCell::from_halves([RED, TerminalColor::Rgb([1, 1, 1])]));
         }
         let found = plan_row(&targets, start(RED, BLACK), RateDistortion::EXACT);
         let columns: Vec<usize> = found.ops.iter().map(|op| op.column).collect();
@@ -448,7 +448,7 @@ mod tests {
             [TerminalColor::DefaultForeground, TerminalColor::DefaultBackground],
             [TerminalColor::DefaultForeground; 2],
         ] {
-            let targets = [TargetCell { wanted: Some(TwoColorCell::from_halves(halves)), shown: None }];
+            let targets = [TargetCell { wanted: Some(TwoPartColorCell::from_halves(halves)), shown: None }];
             let found = plan_row(&targets, start(BLACK, BLACK), RateDistortion::MOVING);
             assert_eq!(found.ops.first().map(|op| op.mosaic.pair), Some(halves));
         }
@@ -463,16 +463,16 @@ mod tests {
         ]
     }
 
-    fn mosaic() -> impl Strategy<Value = TwoColorCell> {
+    fn mosaic() -> impl Strategy<Value = TwoPartColorCell> {
         let tile = prop_oneof![
-            3 => Just(BlockPattern::HALVES),
+            3 => Just(TwoPartBlockPattern::HALVES),
             1 => proptest::sample::select(vec!['▌', '▚', '░', '▒', '🬟', '\u{1CD10}'])
-                .prop_map(|symbol| block_pattern_for_symbol(symbol).expect("a tile").0),
+                .prop_map(|symbol| pattern_and_inversion_for_symbol(symbol).expect("a tile").0),
         ];
         (tile, [shade(), shade()]).prop_map(|(tile, pair)| {
             // Normalize like a tile read from a character: the first part is the foreground.
-            let is_cell = tile != BlockPattern::MEDIUM || pair[0] != TerminalColor::DefaultBackground;
-            TwoColorCell::new(if is_cell { tile } else { BlockPattern::HALVES }, pair)
+            let is_cell = tile != TwoPartBlockPattern::MEDIUM || pair[0] != TerminalColor::DefaultBackground;
+            TwoPartColorCell::new(if is_cell { tile } else { TwoPartBlockPattern::HALVES }, pair)
         })
     }
 
@@ -488,7 +488,7 @@ mod tests {
             let targets: Vec<TargetCell> = cells.iter().map(|(wanted, shown)| TargetCell { wanted: *wanted, shown: *shown }).collect();
             let model = if is_exact { RateDistortion::EXACT } else { RateDistortion::MOVING };
             let found = plan_row(&targets, start(TerminalColor::DefaultForeground, TerminalColor::DefaultBackground), model);
-            let mut screen: Vec<Option<TwoColorCell>> = targets.iter().map(|target| target.shown).collect();
+            let mut screen: Vec<Option<TwoPartColorCell>> = targets.iter().map(|target| target.shown).collect();
             for op in &found.ops {
                 prop_assert!(targets[op.column].wanted.is_some(), "not part of the preview");
                 prop_assert!(op.glyph.can_show_colors(op.mosaic.pair));

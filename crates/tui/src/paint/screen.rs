@@ -2,7 +2,7 @@
 
 use ratatui::layout::Rect;
 
-use super::cell::{CellContent, ForegroundParts, TextCell, TwoColorCell};
+use super::cell::{CellContent, ForegroundParts, TextCell, TwoPartColorCell};
 use super::cursor_moves::{self, CellPosition};
 use super::hyperlinks::{LINK_OFF, UrlTable};
 use super::pen::Pen;
@@ -22,7 +22,7 @@ pub(super) enum CellRun {
     /// A character.
     Text { at: CellPosition, text: TextCell },
     /// Two colors drawn with the same glyph in `count` cells, using REP for more than one cell.
-    Mosaic { at: CellPosition, glyph: ForegroundParts, mosaic: TwoColorCell, count: u16 },
+    Mosaic { at: CellPosition, glyph: ForegroundParts, mosaic: TwoPartColorCell, count: u16 },
     /// `count` blanks with the terminal's default background, or a sequence that erases to the end of the row
     /// if `count` is `None`.
     Erase { at: CellPosition, count: Option<u16> },

@@ -6,7 +6,7 @@
 
 use ratatui::layout::Rect;
 
-use super::cell::{CellContent, TwoColorCell};
+use super::cell::{CellContent, TwoPartColorCell};
 use super::cursor_moves::CellPosition;
 use super::fidelity::Fidelity;
 use super::screen::ScreenModel;
@@ -24,9 +24,9 @@ pub(super) struct FirstPreviewCells {
     columns: usize,
     picture: Rect,
     /// For each cell, its content in the first preview of the request on the screen, or `None` if unknown.
-    firsts: Vec<Option<TwoColorCell>>,
+    firsts: Vec<Option<TwoPartColorCell>>,
     /// The first preview of the current request, or empty if there was none.
-    newest: Vec<Option<TwoColorCell>>,
+    newest: Vec<Option<TwoPartColorCell>>,
     /// For each cell, whether it looks the same in the first previews of the current request and of the
     /// request on the screen.
     steady: Vec<bool>,
@@ -55,9 +55,9 @@ impl FirstPreviewCells {
         match wanted.fidelity {
             Fidelity::First => self.compare_first_previews(wanted),
             Fidelity::Moving => {
-                self.noise = noise_threshold(self.median_difference_from_screen(wanted, screen));
+                self.noise = noise_threshold(self.median_stable_cell_difference(wanted, screen));
             }
-            Fidelity::Following => match self.median_difference_from_screen(wanted, screen) {
+            Fidelity::Following => match self.median_stable_cell_difference(wanted, screen) {
                 // There is hardly any noise left to hide, so redraw everything.
                 ..=1 => self.steady.fill(false),
                 median => self.noise = noise_threshold(median),
@@ -78,7 +78,7 @@ impl FirstPreviewCells {
     }
 
     /// Median difference between the target and the stable cells on the screen.
-    fn median_difference_from_screen(&self, wanted: &TargetScreen, screen: Option<&ScreenModel>) -> usize {
+    fn median_stable_cell_difference(&self, wanted: &TargetScreen, screen: Option<&ScreenModel>) -> usize {
         let mut counts = [0_u32; 256];
         let Some(screen) = screen else { return 0 };
         for y in wanted.picture.top()..wanted.picture.bottom() {
@@ -106,9 +106,9 @@ impl FirstPreviewCells {
     pub(super) fn stabilized_cell(
         &self,
         at: CellPosition,
-        wanted: TwoColorCell,
-        shown: Option<TwoColorCell>,
-    ) -> TwoColorCell {
+        wanted: TwoPartColorCell,
+        shown: Option<TwoPartColorCell>,
+    ) -> TwoPartColorCell {
         shown
             .filter(|shown| {
                 self.is_cell_unchanged_by_edit(at)
@@ -161,7 +161,7 @@ fn noise_threshold(median: usize) -> u8 {
 }
 
 /// The largest channel difference between two mosaics, or 255 if their colors cannot be compared.
-fn max_channel_difference_between_cells(a: TwoColorCell, b: TwoColorCell) -> u8 {
+fn max_channel_difference_between_cells(a: TwoPartColorCell, b: TwoPartColorCell) -> u8 {
     let one = |a: TerminalColor, b: TerminalColor| match (a.to_rgb(), b.to_rgb()) {
         _ if a == b => 0,
         (Some(a), Some(b)) => a.iter().zip(b).map(|(a, b)| a.abs_diff(b)).max().unwrap_or(0),

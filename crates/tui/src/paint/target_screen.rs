@@ -3,7 +3,7 @@
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
-use super::cell::{CellContent, TwoColorCell};
+use super::cell::{CellContent, TwoPartColorCell};
 use super::fidelity::Fidelity;
 use crate::color::ColorDepth;
 
@@ -70,7 +70,7 @@ impl TargetScreen {
     }
 
     /// The mosaic of a preview cell. `None` for text cells, which may cover the preview.
-    pub(super) fn preview_cell(&self, x: u16, y: u16) -> Option<TwoColorCell> {
+    pub(super) fn preview_cell(&self, x: u16, y: u16) -> Option<TwoPartColorCell> {
         match self.row(y)[usize::from(x)] {
             CellContent::Mosaic(mosaic) if self.picture.contains((x, y).into()) => Some(mosaic),
             CellContent::Mosaic(_) | CellContent::Text(_) | CellContent::Covered | CellContent::Unknown => {

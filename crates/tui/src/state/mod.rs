@@ -126,7 +126,7 @@ impl State {
 
     /// Opens the view list, or restarts its timeout if it is already open.
     pub(super) fn open_view_list(&mut self) {
-        self.overlays.open_or_extend_view_list(self.now);
+        self.overlays.open_view_list_or_restart_timeout(self.now);
         self.dirty = true;
     }
 

@@ -64,7 +64,7 @@ impl OverlayState {
     }
 
     /// Opens the view list, or restarts its timeout if it is already open.
-    pub(crate) fn open_or_extend_view_list(&mut self, now: Instant) {
+    pub(crate) fn open_view_list_or_restart_timeout(&mut self, now: Instant) {
         const MOMENT: Duration = Duration::from_secs(4);
         let name = self.views.take().and_then(|views| views.name);
         self.views = Some(ViewList { until: now + MOMENT, name });

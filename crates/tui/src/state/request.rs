@@ -6,10 +6,10 @@ use std::time::Instant;
 
 use crate::choice::Choice;
 use crate::math::DVec3;
-use crate::pipeline::FileRead;
+use crate::pipeline::FilePathAndContentId;
 use crate::pipeline::protocol::{MaxPreviewSize, NormalizedRect, ResolvedCamera};
 use crate::pipeline::settings::{
-    CameraOverrides, EffectiveSettings, KeyboardOverridableSettings, Overrides, ViewMode,
+    CameraOverrides, EffectiveSettingsSummary, KeyboardOverridableSettings, Overrides, ViewMode,
 };
 use crate::scene::description::{Integrator, Pose, ShadowMode};
 use crate::scene::sanitize::escape_invisible_chars;
@@ -99,7 +99,7 @@ pub(crate) struct ImageProvenance {
     /// Text of the scene file, or `None` for a model.
     pub text: Option<Arc<str>>,
     /// Other files used by the scene.
-    pub files: Arc<[FileRead]>,
+    pub files: Arc<[FilePathAndContentId]>,
     /// Whether the render is unfinished.
     pub is_unfinished: bool,
 }
@@ -113,7 +113,7 @@ impl ImageProvenance {
     /// Determines the origin of an image that a later request reproduced. Usually keeps `self`, because the
     /// later changes had no effect, but returns `later` if a camera moved with keys has since been written to
     /// the scene.
-    pub(crate) fn after_reproduction_by(&self, later: Self) -> Self {
+    pub(crate) fn after_rerender_of_same_image(&self, later: Self) -> Self {
         if self.toggles.camera.has_changes() && !later.toggles.camera.has_changes() {
             return later;
         }
@@ -124,10 +124,12 @@ impl ImageProvenance {
     pub(crate) fn describe_file_changes(&self, before: &Self) -> Vec<String> {
         let texts = before.text.as_deref().zip(self.text.as_deref());
         let of_text = texts.map(|(old, new)| list_changes(old, new)).unwrap_or_default();
-        let is_changed = |file: &&FileRead| {
+        let is_changed = |file: &&FilePathAndContentId| {
             before.files.iter().any(|old| old.path == file.path && old.content != file.content)
         };
-        let name = |file: &FileRead| file.path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let name = |file: &FilePathAndContentId| {
+            file.path.file_name().unwrap_or_default().to_string_lossy().into_owned()
+        };
         let of_files = self
             .files
             .iter()
@@ -184,9 +186,9 @@ pub(crate) struct RequestState {
     /// Text of the scene file for the newest valid request.
     pub text: Option<Arc<str>>,
     /// Other files used by the scene.
-    pub files: Arc<[FileRead]>,
+    pub files: Arc<[FilePathAndContentId]>,
     /// Effective settings, as reported by the worker.
-    pub effective: Option<EffectiveSettings>,
+    pub effective: Option<EffectiveSettingsSummary>,
     /// The scene's own camera for the newest valid request.
     pub camera: Option<ResolvedCamera>,
     /// The scene's own exposure in stops.
@@ -221,7 +223,7 @@ impl RequestState {
 
     /// Records the newest request's input files. Includes a model but not a scene file, whose text is
     /// compared separately.
-    pub(crate) fn record_input_files(&mut self, files: Vec<FileRead>) {
+    pub(crate) fn record_input_files(&mut self, files: Vec<FilePathAndContentId>) {
         let is_model = has_mesh_extension(&self.scene);
         self.files = files.into_iter().filter(|file| is_model || file.path != self.scene).collect();
     }
@@ -250,7 +252,7 @@ impl RequestState {
     }
 
     /// Overrides for the scene's own image, or `None` unless keys have changed the displayed image.
-    pub(crate) fn scene_image_overrides_if_changed(&self) -> Option<Box<Overrides>> {
+    pub(crate) fn command_line_overrides_if_keys_changed(&self) -> Option<Box<Overrides>> {
         (!self.has_no_keyboard_overrides()).then(|| Box::new(self.command_line.clone()))
     }
 

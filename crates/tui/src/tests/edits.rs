@@ -6,9 +6,9 @@ use crate::event::{Event, PreviewSendReport};
 use crate::fixtures::*;
 use crate::messages;
 use crate::pipeline::protocol::{
-    self, CameraSaveResult, LastValidSceneRenderOutcome, PreviewSourceImage, Stage, Status,
+    self, CameraSaveResult, LastValidSceneRenderOutcome, PreviewedImageState, Stage, Status,
 };
-use crate::pipeline::settings::EffectiveSettings;
+use crate::pipeline::settings::EffectiveSettingsSummary;
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::fingerprint::FingerprintHasher;
 
@@ -24,7 +24,7 @@ fn save_broken_scene(ui: &mut TestUi) {
 /// Sends a preview of a finished or unfinished image.
 fn preview(ui: &mut TestUi, name: &str, color: [u8; 3], is_finished: bool) {
     let generation = ui.state.request.generation;
-    let source = Some(PreviewSourceImage { image: FingerprintHasher::new(name).finish(), is_finished });
+    let source = Some(PreviewedImageState { image: FingerprintHasher::new(name).finish(), is_finished });
     let picture = uniform_picture(50, 38, color);
     let (range, section, lacks_photons) = (None, None, false);
     ui.handle_event(Event::Picture { generation, picture, range, section, lacks_photons, source });
@@ -375,7 +375,7 @@ fn d_and_f_report_a_pinhole_camera() {
         let mut ui = TestUi::new();
         ui.save_scene(text);
         ui.report_scene_read();
-        ui.state.request.effective = Some(EffectiveSettings { dof: false, ..effective_settings() });
+        ui.state.request.effective = Some(EffectiveSettingsSummary { dof: false, ..effective_settings() });
         ui.state.request.camera.as_mut().expect("a camera").aperture = 0.0;
         ui.press_character('d');
         assert!(ui.screen_text().contains(messages::PINHOLE), "{}", ui.screen_text());

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use super::super::display::{Display, TerminalEnvironment};
 use super::super::graphics::{ImageProtocol, TerminalImages, TestImageTerminal};
-use super::super::presenter::Presenter;
+use super::super::presenter::FramePresenter;
 use super::super::terminal_replies::TerminalReply;
 use crate::color::{ColorDepth, xterm_rgb};
 use crate::event::Event;
@@ -137,7 +137,7 @@ fn parts(cell: &vt100::Cell) -> Option<[[u8; 3]; 24]> {
 /// A render displayed on a simulated terminal.
 struct WatchedRender {
     ui: TestUi,
-    presenter: Presenter,
+    presenter: FramePresenter,
     outbox: Rc<RefCell<Vec<Vec<u8>>>>,
     terminal: SimulatedTerminal,
     slot: PreviewSlot,
@@ -175,7 +175,7 @@ impl WatchedRender {
         let out = Box::new(move |bytes| taken.borrow_mut().push(bytes));
         let display = Display::new(depth, TerminalEnvironment::default(), images, out, begin);
         Self {
-            presenter: Presenter::new(display, slot.clone(), begin),
+            presenter: FramePresenter::new(display, slot.clone(), begin),
             ui,
             outbox,
             terminal: SimulatedTerminal::new(line, begin),

@@ -10,7 +10,7 @@ use crate::keymap::{self, KEYMAP};
 use crate::math::DVec3;
 use crate::messages;
 use crate::pipeline::protocol::{self, Command, ImagePosition, SavedCameraEdit, WriteRequirement};
-use crate::pipeline::settings::{EffectiveSettings, KeyboardOverridableSettings, Overrides, ViewMode};
+use crate::pipeline::settings::{EffectiveSettingsSummary, KeyboardOverridableSettings, Overrides, ViewMode};
 use crate::preview_kind::PreviewKind;
 use crate::scene::description::{Integrator, Pose, ShadowMode};
 use crate::scene::diagnostic::Severity;
@@ -342,7 +342,7 @@ fn toggles_start_from_the_command_line() {
 #[test]
 fn pinhole_has_no_depth_of_field() {
     let mut ui = TestUi::new();
-    let pinhole = || Box::new(EffectiveSettings { dof: false, ..effective_settings() });
+    let pinhole = || Box::new(EffectiveSettingsSummary { dof: false, ..effective_settings() });
     ui.worker_event(protocol::Event::Settings {
         generation: 1,
         settings: pinhole(),
@@ -495,7 +495,7 @@ fn saved_settings_are_the_base_for_toggles() {
         ui.state.request.generation,
         KeyboardOverridableSettings { shadows: ShadowMode::Hard, ..scene_settings() },
     );
-    let settings = Box::new(EffectiveSettings { shadows: ShadowMode::Hard, ..effective_settings() });
+    let settings = Box::new(EffectiveSettingsSummary { shadows: ShadowMode::Hard, ..effective_settings() });
     ui.worker_event(protocol::Event::Settings { generation, settings, camera: camera(), exposure: 0.0, own });
     let shadows: Vec<Option<ShadowMode>> = "sss"
         .chars()

@@ -8,7 +8,7 @@ use crate::fixtures::*;
 use crate::graphics::ImageProtocol;
 use crate::messages;
 use crate::pipeline::protocol::{self, Command, MaxPreviewSize, Stage, Status};
-use crate::pipeline::settings::{EffectiveSettings, Overrides};
+use crate::pipeline::settings::{EffectiveSettingsSummary, Overrides};
 use crate::preview_kind::PreviewKind;
 use crate::scene::diagnostic::Severity;
 use crate::view::layout::Layout;
@@ -27,7 +27,7 @@ fn fitted_preview_size(size: (u32, u32), most: MaxPreviewSize) -> (u32, u32) {
 fn rendered(ui: &mut TestUi, (width, height): (u32, u32)) {
     let generation = ui.state.request.generation;
     ui.worker_event(protocol::Event::Started { generation });
-    let settings = Box::new(EffectiveSettings { width, height, ..effective_settings() });
+    let settings = Box::new(EffectiveSettingsSummary { width, height, ..effective_settings() });
     ui.worker_event(protocol::Event::Settings {
         generation,
         settings,
@@ -127,7 +127,7 @@ fn layout_is_stable_during_a_render() {
 #[test]
 fn new_aspect_ratio_requests_another_preview() {
     let mut ui = TestUi::new();
-    let settings = |width| Box::new(EffectiveSettings { width, height: 480, ..effective_settings() });
+    let settings = |width| Box::new(EffectiveSettingsSummary { width, height: 480, ..effective_settings() });
     let same = ui.worker_event(protocol::Event::Settings {
         generation: 1,
         settings: settings(640),
@@ -300,7 +300,7 @@ fn hints_wrap_at_the_panel_width() {
     for (columns, rows, width) in [(80, 24, 480), (120, 40, 480), (160, 40, 480)] {
         let mut ui = TestUi::from_state(state(columns, rows));
         ui.finish_render(RED);
-        let settings = Box::new(EffectiveSettings { width, height: 480, ..effective_settings() });
+        let settings = Box::new(EffectiveSettingsSummary { width, height: 480, ..effective_settings() });
         ui.worker_event(protocol::Event::Settings {
             generation: 1,
             settings,

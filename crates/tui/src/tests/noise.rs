@@ -32,7 +32,7 @@ fn sample_count_is_approximate_with_noise_target() {
     let mut ui = TestUi::new();
     ui.worker_event(protocol::Event::Started { generation: 1 });
     let settings =
-        Box::new(crate::pipeline::settings::EffectiveSettings { error: 0.02, ..effective_settings() });
+        Box::new(crate::pipeline::settings::EffectiveSettingsSummary { error: 0.02, ..effective_settings() });
     ui.worker_event(protocol::Event::Settings {
         generation: 1,
         settings,

@@ -9,7 +9,7 @@ use crate::fixtures::*;
 use crate::keymap::{KEYMAP, OVERLAY};
 use crate::messages;
 use crate::pipeline::protocol::{self, Failure};
-use crate::pipeline::settings::{EffectiveSettings, ViewMode};
+use crate::pipeline::settings::{EffectiveSettingsSummary, ViewMode};
 use crate::scene::diagnostic::{Diagnostic, Severity, SourceSpan};
 
 /// Number of views.
@@ -217,7 +217,7 @@ fn views_are_found_by_name() {
 fn no_partial_lines_remain_below_the_view_list() {
     let mut ui = TestUi::from_state(state(120, 40));
     ui.finish_render(RED);
-    let settings = Box::new(EffectiveSettings { width: 480, height: 480, ..effective_settings() });
+    let settings = Box::new(EffectiveSettingsSummary { width: 480, height: 480, ..effective_settings() });
     ui.worker_event(protocol::Event::Settings {
         generation: 1,
         settings,
@@ -322,7 +322,7 @@ fn diagnostics_are_next_to_the_image_if_possible() {
     {
         let mut ui = TestUi::from_state(state(columns, rows));
         ui.finish_render(RED);
-        let settings = Box::new(EffectiveSettings { width, height: 480, ..effective_settings() });
+        let settings = Box::new(EffectiveSettingsSummary { width, height: 480, ..effective_settings() });
         ui.worker_event(protocol::Event::Settings {
             generation: 1,
             settings,

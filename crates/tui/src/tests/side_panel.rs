@@ -10,7 +10,7 @@ use crate::fixtures::*;
 use crate::graphics::ImageProtocol;
 use crate::messages;
 use crate::pipeline::protocol::{self, NoisePrediction, RenderProgress};
-use crate::pipeline::settings::{EffectiveSettings, Overrides};
+use crate::pipeline::settings::{EffectiveSettingsSummary, Overrides};
 use crate::preview_kind::PreviewKind;
 use crate::terminal_replies::TerminalReply;
 use crate::terminals::{TerminalBrand, TerminalId};
@@ -21,7 +21,7 @@ use crate::view::layout::Layout;
 fn rendered(ui: &mut TestUi, error: f32) {
     let generation = ui.state.request.generation;
     ui.worker_event(protocol::Event::Started { generation });
-    let settings = Box::new(EffectiveSettings { error, ..effective_settings() });
+    let settings = Box::new(EffectiveSettingsSummary { error, ..effective_settings() });
     ui.worker_event(protocol::Event::Settings {
         generation,
         settings: settings.clone(),
@@ -331,7 +331,7 @@ fn history_heading_is_not_shown_without_entries() {
     // The panel is too narrow for diagnostics, then not tall enough, then large enough.
     for (width, height) in [(640, 400), (640, 320), (640, 480)] {
         let mut ui = TestUi::from_state(state(200, 60));
-        ui.state.request.effective = Some(EffectiveSettings { width, height, ..effective_settings() });
+        ui.state.request.effective = Some(EffectiveSettingsSummary { width, height, ..effective_settings() });
         ui.handle_event(Event::Resize(window(200, 60)));
         for (number, color) in [RED, BLUE, [1, 2, 3]].into_iter().enumerate() {
             ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));

@@ -8,7 +8,7 @@ use crate::messages;
 use crate::state::{RenderState, State};
 
 /// Adds the current image to the history.
-pub(super) fn record_image(state: &mut State) {
+pub(super) fn record_current_image(state: &mut State) {
     if let Some(shown) = newest_image(state).filter(|shown| shown.generation == state.request.generation) {
         let is_finished = state.work.rendering == RenderState::Finished || shown.is_finished();
         let origin = state.request.image_provenance(!is_finished);
@@ -18,13 +18,13 @@ pub(super) fn record_image(state: &mut State) {
 
 /// Records a new image for the newest request, even if an older render is being viewed. The last image often
 /// arrives after the end of its render. A section shown at 1:1 scale never replaces a finished image.
-pub(super) fn record_newest(state: &mut State) {
+pub(super) fn record_newly_arrived_image(state: &mut State) {
     let is_over = !state.work.is_rendering();
     if is_over && newest_image(state).is_some_and(|shown| shown.section.is_some()) {
         return;
     }
     let (count, last) = (state.picture.history.len(), state.picture.history.last_picture().cloned());
-    record_image(state);
+    record_current_image(state);
     let history = &state.picture.history;
     let is_new = history.len() != count;
     let is_other = history.last_picture().zip(last).is_some_and(|(now, before)| !Arc::ptr_eq(now, &before));
@@ -33,7 +33,7 @@ pub(super) fn record_newest(state: &mut State) {
 
 /// Moves back by `steps` renders, or forward if `steps` is negative.
 pub(super) fn browse(state: &mut State, steps: isize) -> Vec<Effect> {
-    record_image(state);
+    record_current_image(state);
     let Some(newest) = newest_image(state) else { return report_no_image(state) };
     if state.picture.history.returns_to_newest(steps) {
         return return_to_newest(state, messages::NEWEST_RENDER);
@@ -48,8 +48,8 @@ pub(super) fn browse(state: &mut State, steps: isize) -> Vec<Effect> {
 }
 
 /// Opens a render from the history strip.
-pub(super) fn open_at(state: &mut State, at: usize) -> Vec<Effect> {
-    record_image(state);
+pub(super) fn open_entry_at_index(state: &mut State, at: usize) -> Vec<Effect> {
+    record_current_image(state);
     let Some(newest) = newest_image(state) else { return Vec::new() };
     if at + 1 >= state.picture.history.len() {
         return return_to_newest(state, messages::NEWEST_RENDER);
@@ -65,7 +65,7 @@ pub(super) fn toggle_render_before_edit(state: &mut State) -> Vec<Effect> {
     if state.picture.history.is_viewing_older() {
         return return_to_newest(state, messages::AFTER_EDIT);
     }
-    record_image(state);
+    record_current_image(state);
     let Some(newest) = newest_image(state) else { return report_no_image(state) };
     match state.picture.history.open_before_edit(newest) {
         Some(shown) => {

@@ -63,7 +63,7 @@ pub(super) fn perform_action(state: &mut State, action: Action) -> Vec<Effect> {
         Action::Brighten => camera::change_exposure(state, 1.0),
         Action::KeepCamera => camera::save_camera(state),
         Action::UndoCamera => camera::undo_saved_camera(state),
-        Action::Inspect => pointer::inspect(state),
+        Action::Inspect => pointer::inspect_at_crosshair(state),
         Action::Copy => pointer::copy_values(state),
         Action::Focus => pointer::start_or_confirm_focus_pick(state),
         Action::ActualPixels => toggle_actual_pixels(state),

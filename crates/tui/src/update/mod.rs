@@ -77,7 +77,7 @@ fn handle_event(state: &mut State, event: Event) -> Vec<Effect> {
             let (is_own, is_known) = (is_of(state.saving.camera_kept), is_of(state.saving.camera_refused));
             (state.saving.camera_kept, state.saving.camera_refused) = (None, None);
             state.saving.is_settled = false;
-            history::record_image(state);
+            history::record_current_image(state);
             if !is_own && !is_known {
                 (state.overlays.message, state.selection.facts) = (None, None);
             }
@@ -95,14 +95,14 @@ fn handle_event(state: &mut State, event: Event) -> Vec<Effect> {
             effects
         }
         Event::Settled => {
-            worker::show_delayed_errors(state);
+            worker::show_withheld_errors(state);
             Vec::new()
         }
         Event::Output(change) => worker::handle_external_output_change(state, &change),
         Event::Signal(signal) => vec![signal_effect(signal)],
         Event::Shown { generation } => {
             // The preview has been sent, so the history can be updated now.
-            history::record_newest(state);
+            history::record_newly_arrived_image(state);
             record_save_to_screen_time(state, generation)
         }
         Event::Tick => tick(state),
@@ -127,8 +127,8 @@ fn show_image(state: &mut State, shown: ShownImage) -> Vec<Effect> {
         && has_consistent_pixel_count(&shown.picture)
         && state.display.kind != PreviewKind::None
     {
-        if state.picture.history.update_newest_while_viewing_older(&shown) {
-            history::record_newest(state);
+        if state.picture.history.store_newest_if_viewing_older(&shown) {
+            history::record_newly_arrived_image(state);
             return Vec::new();
         }
         state.urgent |= state.picture.shown.as_ref().is_none_or(|last| last.generation != shown.generation);
@@ -219,7 +219,7 @@ fn handle_lost_source(state: &mut State, source: RequiredEventSource) -> Vec<Eff
     match source {
         RequiredEventSource::Worker => vec![Effect::GiveUp],
         RequiredEventSource::Watcher => {
-            worker::show_delayed_errors(state);
+            worker::show_withheld_errors(state);
             show_until_key(state, messages::NOT_WATCHING);
             Vec::new()
         }

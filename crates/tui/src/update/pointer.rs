@@ -27,15 +27,15 @@ pub(super) fn handle_mouse(state: &mut State, mouse: MouseEvent) -> Vec<Effect> 
         MouseEventKind::Press => {
             let is_on_picture = Layout::for_state(state).preview.contains((mouse.column, mouse.row).into());
             let MouseEvent { column, row, .. } = mouse;
-            if let Some(at) = view::history_entry_at(state, column, row) {
-                return history::open_at(state, at);
+            if let Some(at) = view::history_index_at(state, column, row) {
+                return history::open_entry_at_index(state, at);
             }
             let from = image_position_at(state, column, row);
             state.selection.press =
                 is_on_picture.then_some(MousePress { column, row, has_moved: false, from });
             Vec::new()
         }
-        MouseEventKind::Drag => drag_to_orbit(state, mouse),
+        MouseEventKind::Drag => drag_region_or_orbit(state, mouse),
         MouseEventKind::Release if state.selection.is_marking && state.selection.press.take().is_some() => {
             let spot = image_position_at(state, mouse.column, mouse.row);
             region::end_drag(state, spot)
@@ -44,7 +44,7 @@ pub(super) fn handle_mouse(state: &mut State, mouse: MouseEvent) -> Vec<Effect> 
             Some(press) if !press.has_moved => pick_object_at_click(state, mouse),
             Some(_) | None => Vec::new(),
         },
-        MouseEventKind::WheelUp | MouseEventKind::WheelDown if is_over_help_or_diagnostics(state, mouse) => {
+        MouseEventKind::WheelUp | MouseEventKind::WheelDown if wheel_scrolls_overlay(state, mouse) => {
             let line = if mouse.kind == MouseEventKind::WheelUp {
                 OverlayAction::LineUp
             } else {
@@ -58,13 +58,13 @@ pub(super) fn handle_mouse(state: &mut State, mouse: MouseEvent) -> Vec<Effect> 
     }
 }
 
-fn is_over_help_or_diagnostics(state: &State, mouse: MouseEvent) -> bool {
+fn wheel_scrolls_overlay(state: &State, mouse: MouseEvent) -> bool {
     let is_on_errors = || Layout::for_state(state).pane.contains((mouse.column, mouse.row).into());
     state.overlays.help.open || state.overlays.diagnostics.open && is_on_errors()
 }
 
 /// Orbits the camera so that the scene follows the mouse.
-fn drag_to_orbit(state: &mut State, mouse: MouseEvent) -> Vec<Effect> {
+fn drag_region_or_orbit(state: &mut State, mouse: MouseEvent) -> Vec<Effect> {
     let Some(press) = state.selection.press else { return Vec::new() };
     if state.selection.is_marking {
         if let Some((from, to)) = press.from.zip(image_position_at(state, mouse.column, mouse.row)) {
@@ -98,7 +98,7 @@ fn pick_object_at_click(state: &mut State, mouse: MouseEvent) -> Vec<Effect> {
 }
 
 /// Queries the object at the crosshair.
-pub(super) fn inspect(state: &mut State) -> Vec<Effect> {
+pub(super) fn inspect_at_crosshair(state: &mut State) -> Vec<Effect> {
     send_pick_query(state, PickPurpose::Inspect)
 }
 

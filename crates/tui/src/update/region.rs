@@ -15,7 +15,7 @@ const SIDE: f64 = 1.0 / 3.0;
 pub(super) fn start_confirm_or_clear_region(state: &mut State) -> Vec<Effect> {
     if state.request.first_section.take().is_some() {
         (state.selection.is_marking, state.selection.press) = (false, None);
-        let effects = reorder_running_render(state);
+        let effects = restart_render_with_new_order(state);
         show_notice(state, messages::REGION_CLEARED);
         return effects;
     }
@@ -57,13 +57,13 @@ fn render_section_first(state: &mut State, section: NormalizedRect) -> Vec<Effec
     state.selection.is_marking = false;
     state.request.first_section = Some(section);
     let words = if state.work.is_request_running() { messages::REGION_FIRST } else { messages::REGION_NEXT };
-    let effects = reorder_running_render(state);
+    let effects = restart_render_with_new_order(state);
     show_notice(state, words);
     effects
 }
 
 /// Restarts a running render to change its rendering order. Samples are kept.
-fn reorder_running_render(state: &mut State) -> Vec<Effect> {
+fn restart_render_with_new_order(state: &mut State) -> Vec<Effect> {
     state.dirty = true;
     if state.work.is_request_running() && !state.work.paused {
         request_render(state, false)

@@ -13,7 +13,7 @@ pub(super) fn request_render(state: &mut State, force: bool) -> Vec<Effect> {
     if state.request.camera_step.generation == Some(state.request.generation) {
         state.picture.history.drop_unfinished_of_request(state.request.generation);
     } else {
-        history::record_image(state);
+        history::record_current_image(state);
     }
     state.picture.shown = state.picture.history.return_to_newest().or_else(|| state.picture.shown.take());
     let before = std::mem::replace(&mut state.request.sent_toggles, state.request.toggles);
@@ -47,7 +47,7 @@ pub(super) fn request_render(state: &mut State, force: bool) -> Vec<Effect> {
         } else {
             WriteRequirement::No
         },
-        own: state.request.scene_image_overrides_if_changed(),
+        own: state.request.command_line_overrides_if_keys_changed(),
         saves: state.saving.edits,
         force,
         first: state.request.first_section,

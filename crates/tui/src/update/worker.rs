@@ -376,7 +376,7 @@ fn clear_blocking_errors(state: &mut State) {
 }
 
 fn handle_done(state: &mut State, mut report: Box<Report>, warnings: Vec<Diagnostic>, unchanged: bool) {
-    add_earlier_seconds(&mut report);
+    add_seconds_of_earlier_requests(&mut report);
     state.overlays.message.take_if(|message| message.words.starts_with(messages::RESUMING));
     clear_blocking_errors(state);
     for stage in &report.stages {
@@ -397,7 +397,7 @@ fn handle_done(state: &mut State, mut report: Box<Report>, warnings: Vec<Diagnos
     state.work.report = Some(report);
     state.work.unchanged = unchanged;
     set_warnings(state, warnings);
-    history::record_image(state);
+    history::record_current_image(state);
     count_finished_render(state, unchanged);
     if unchanged {
         state.saving.last_edit.take_if(|edit| *edit == state.request.generation);
@@ -409,7 +409,7 @@ fn handle_done(state: &mut State, mut report: Box<Report>, warnings: Vec<Diagnos
 }
 
 /// Adds the time that earlier requests spent on this image's samples.
-fn add_earlier_seconds(report: &mut Report) {
+fn add_seconds_of_earlier_requests(report: &mut Report) {
     let all = report.image.render_seconds;
     let render = &mut report.stages[Stage::Render as usize];
     if render.status == Status::Done && all > render.seconds {
@@ -493,7 +493,7 @@ fn handle_last_valid_render_end(state: &mut State, end: LastValidSceneRenderOutc
     match end {
         LastValidSceneRenderOutcome::Finished { unchanged } => {
             state.work.rendering = RenderState::Finished;
-            history::record_image(state);
+            history::record_current_image(state);
             count_finished_render(state, unchanged);
         }
         LastValidSceneRenderOutcome::Stopped => state.work.rendering = RenderState::Stopped,
@@ -511,7 +511,7 @@ fn show_errors(state: &mut State, problems: BlockingErrors) {
 }
 
 /// Shows errors that were withheld, now that the files are complete.
-pub(super) fn show_delayed_errors(state: &mut State) {
+pub(super) fn show_withheld_errors(state: &mut State) {
     state.saving.is_settled = true;
     if let Some(diagnostics) = state.overlays.unconfirmed.take() {
         show_errors(state, BlockingErrors { diagnostics, work: None });

@@ -35,7 +35,7 @@ pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
     let used = draw_activity_block(state, area, buffer);
     let mut room = remaining_row_area(area, used + 1);
     // If there is no other line, a message takes the whole header.
-    if layout.keys.is_empty() && message::replaces_header_or_key_line(state, layout) {
+    if layout.keys.is_empty() && message::has_message_to_show(state, layout) {
         return;
     }
     if state.picture.is_alone {
@@ -130,7 +130,7 @@ fn draw_scene_info(state: &State, area: Rect, buffer: &mut Buffer) {
 
 /// The view and its range of values, or an empty string for the beauty view.
 fn view_label(state: &State) -> String {
-    let open = state.picture.history.viewed_older_provenance();
+    let open = state.picture.history.viewed_older_scene_and_settings();
     let of_open = open.map(|origin| origin.toggles.view.unwrap_or_else(|| state.request.base_view_mode()));
     let view = of_open.unwrap_or_else(|| state.request.view_mode());
     if view == ViewMode::Beauty {
@@ -163,8 +163,11 @@ fn actual_pixels_label(state: &State) -> String {
 /// Progress or result in several variants, from longest to shortest.
 fn progress_or_result_variants(state: &State) -> Vec<String> {
     if let Some((run, time)) = state.picture.history.viewed_render_number_and_time() {
-        let is_unfinished =
-            state.picture.history.viewed_older_provenance().is_some_and(|origin| origin.is_unfinished);
+        let is_unfinished = state
+            .picture
+            .history
+            .viewed_older_scene_and_settings()
+            .is_some_and(|origin| origin.is_unfinished);
         let (place, words) = match run {
             Some(run) => {
                 let place = format!("{run} of {}", newest_render_number(state));

@@ -64,7 +64,7 @@ const BESIDE: u16 = 3;
 /// Width of the label column if the help is `width` columns wide.
 fn label_column_width(width: u16) -> u16 {
     const MIN: u16 = 9;
-    max_entry_width(|(label, _)| label).min(MIN.max(width / 3))
+    max_entry_part_width(|(label, _)| label).min(MIN.max(width / 3))
 }
 
 /// The help entries, wrapped into lines.
@@ -93,7 +93,7 @@ fn all_help_entries() -> impl Iterator<Item = (&'static str, &'static str)> {
     keys.chain(overlay).chain(NOTES.iter().copied())
 }
 
-fn max_entry_width(part: impl Fn((&'static str, &'static str)) -> &'static str) -> u16 {
+fn max_entry_part_width(part: impl Fn((&'static str, &'static str)) -> &'static str) -> u16 {
     all_help_entries().map(|entry| text_columns(part(entry))).max().unwrap_or(0)
 }
 
@@ -101,7 +101,8 @@ fn help_area(state: &State) -> Rect {
     let window = Rect::new(0, 0, state.display.window.columns, state.display.window.rows);
     // Leave the key line visible, because it shows how to scroll and close the help.
     let above = Rect { height: window.height.saturating_sub(u16::from(window.height > 3)), ..window };
-    let width = max_entry_width(|(label, _)| label) + max_entry_width(|(_, help)| help) + BESIDE + 3;
+    let width =
+        max_entry_part_width(|(label, _)| label) + max_entry_part_width(|(_, help)| help) + BESIDE + 3;
     let wide = centered_area(above, width, above.height);
     let height =
         u16::try_from(help_lines(inside_border(wide).width).len()).unwrap_or(u16::MAX).saturating_add(2);

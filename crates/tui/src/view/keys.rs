@@ -34,10 +34,10 @@ impl KeyHint {
     }
 
     fn width(&self, is_long: bool) -> u16 {
-        text_columns(self.key) + 1 + text_columns(self.label(is_long)) + GAP
+        text_columns(self.key) + 1 + text_columns(self.description(is_long)) + GAP
     }
 
-    fn label(&self, is_long: bool) -> &str {
+    fn description(&self, is_long: bool) -> &str {
         if is_long { &self.words } else { &self.short }
     }
 }
@@ -49,7 +49,7 @@ const OF_USE: u16 = 26;
 
 pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
     let area = layout.keys;
-    if layout.under.is_empty() && message::replaces_header_or_key_line(state, layout) {
+    if layout.under.is_empty() && message::has_message_to_show(state, layout) {
         return;
     }
     let ways = [KeyHint::for_action(Action::Quit), KeyHint::for_action(Action::ToggleHelp)];
@@ -62,7 +62,7 @@ pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
     let room = area.width.saturating_sub(width(ways, true).saturating_sub(GAP));
     let is_long = width(&toggles, true) + OF_USE <= room;
     let mut left = Rect { width: room, ..area };
-    for hint in fit_hints(current_hints(state), toggles, room, is_long) {
+    for hint in fit_hints(urgent_and_other_hints(state), toggles, room, is_long) {
         left = remaining_row_area(left, draw_hint(&hint, left, is_long, state, buffer));
     }
     let mut right = remaining_row_area(area, room);
@@ -94,7 +94,8 @@ fn fit_hints(
 }
 
 fn draw_hint(hint: &KeyHint, area: Rect, is_long: bool, state: &State, buffer: &mut Buffer) -> u16 {
-    let pieces = [(hint.key, TextRole::Strong), (" ", TextRole::Plain), (hint.label(is_long), hint.tone)];
+    let pieces =
+        [(hint.key, TextRole::Strong), (" ", TextRole::Plain), (hint.description(is_long), hint.tone)];
     put_text(buffer, area, &pieces, state.display.depth);
     hint.width(is_long)
 }
@@ -141,7 +142,7 @@ fn hints_for_toggles(state: &State) -> Vec<KeyHint> {
 }
 
 /// Currently useful hints, divided into urgent hints and other hints.
-fn current_hints(state: &State) -> (Vec<KeyHint>, Vec<KeyHint>) {
+fn urgent_and_other_hints(state: &State) -> (Vec<KeyHint>, Vec<KeyHint>) {
     let overlay = |wanted: &[OverlayAction]| -> Vec<KeyHint> {
         let of = OVERLAY.iter().filter(|it| wanted.contains(&it.action) && !it.hint.is_empty());
         of.map(|it| KeyHint::new(it.label, it.hint)).collect()

@@ -32,10 +32,10 @@ pub(super) fn activity_word(state: &State) -> &'static str {
 }
 
 /// Returns the index of the history entry shown at a cell in the history strip.
-pub(super) fn history_entry_at(state: &State, column: u16, row: u16) -> Option<usize> {
+pub(super) fn history_index_at(state: &State, column: u16, row: u16) -> Option<usize> {
     let layout = Layout::for_state(state);
     let is_open = state.overlays.help.open || layout.panel.is_empty();
-    (!is_open).then(|| panel::history_entry_at(state, layout.panel, (column, row))).flatten()
+    (!is_open).then(|| panel::history_index_at(state, layout.panel, (column, row))).flatten()
 }
 
 /// Draws the whole screen.

@@ -41,14 +41,15 @@ pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) -> FileLinksA
         let place = Rect { x: room.x + column * width, width: width - gap, ..room };
         drawn.put_line_with_links(state, nth_row(place, line_of), line, buffer);
     }
-    drawn.later = side_panel::draw(state, area, rows_used(&lines, columns, room), buffer);
+    drawn.later =
+        side_panel::draw_chart_and_history_strip(state, area, rows_used(&lines, columns, room), buffer);
     drawn
 }
 
 /// Returns the index of the history entry shown at a cell in the history strip.
-pub(super) fn history_entry_at(state: &State, area: Rect, place: (u16, u16)) -> Option<usize> {
+pub(super) fn history_index_at(state: &State, area: Rect, place: (u16, u16)) -> Option<usize> {
     let PanelTextLayout { lines, columns, room } = lay_out_panel_text(state, area);
-    side_panel::history_entry_at(state, area, rows_used(&lines, columns, room), place)
+    side_panel::history_index_at(state, area, rows_used(&lines, columns, room), place)
 }
 
 /// The panel's lines, the number of columns, and the area available for them.
@@ -129,7 +130,7 @@ fn is_scene_broken(state: &State) -> bool {
 }
 
 fn asset_progress_line(state: &State, asset: &AssetProgressBar, width: u16) -> StyledLine {
-    let fraction = stages::loaded_fraction(asset);
+    let fraction = stages::asset_loaded_fraction(asset);
     let (filled_squares, empty) = progress_bar_parts(fraction, BAR, state.display.kind == PreviewKind::Ascii);
     let percent = format!(" {:3} %", floor_percent(fraction));
     let room = width.min(2 * ENTRY_WIDTH).saturating_sub(BAR + text_columns(&percent) + 1);

@@ -73,12 +73,15 @@ impl AsciiRamp {
         if self.is_light {
             let ink = (1.0 - linear.min_element()).max(1e-3);
             let brightness = self.normalize_brightness_to_ramp_range(linear_to_srgb(1.0 - ink));
-            (self.nearest_glyph(brightness), quantize_to_5_bits(Vec3::ONE - (Vec3::ONE - linear) / ink))
+            (
+                self.nearest_glyph(brightness),
+                linear_to_quantized_srgb8(Vec3::ONE - (Vec3::ONE - linear) / ink),
+            )
         } else {
             let brightest = linear.max_element().max(1e-3);
             (
                 self.nearest_glyph(self.normalize_brightness_to_ramp_range(linear_to_srgb(brightest))),
-                quantize_to_5_bits(linear / brightest),
+                linear_to_quantized_srgb8(linear / brightest),
             )
         }
     }
@@ -107,7 +110,7 @@ fn quantile_level(counts: &[usize; 256], mut levels: impl Iterator<Item = usize>
 }
 
 /// Quantizes a color to 5 bits per channel so that noise does not cause redraws.
-fn quantize_to_5_bits(linear: Vec3) -> [u8; 3] {
+fn linear_to_quantized_srgb8(linear: Vec3) -> [u8; 3] {
     linear.to_array().map(|channel| {
         let level = linear_to_srgb8(channel) >> 3;
         level << 3 | level >> 2

@@ -47,7 +47,12 @@ fn curve_and_history_area(state: &State, panel: Rect, lines: u16) -> Rect {
 }
 
 /// Draws the curve and the history strip if they fit. Returns the cells used.
-pub(super) fn draw(state: &State, panel: Rect, lines: u16, buffer: &mut Buffer) -> Rect {
+pub(super) fn draw_chart_and_history_strip(
+    state: &State,
+    panel: Rect,
+    lines: u16,
+    buffer: &mut Buffer,
+) -> Rect {
     let (curve, strip) = divide_chart_and_history_strip(state, panel, lines);
     curve::draw_noise_chart(state, curve, buffer);
     strip::draw_history_strip(state, strip, buffer);
@@ -56,9 +61,9 @@ pub(super) fn draw(state: &State, panel: Rect, lines: u16, buffer: &mut Buffer) 
 }
 
 /// Returns the index of the history entry shown at a cell in the history strip.
-pub(super) fn history_entry_at(state: &State, panel: Rect, lines: u16, place: (u16, u16)) -> Option<usize> {
+pub(super) fn history_index_at(state: &State, panel: Rect, lines: u16, place: (u16, u16)) -> Option<usize> {
     let (_, strip) = divide_chart_and_history_strip(state, panel, lines);
-    strip::entry_at(state, strip, place)
+    strip::entry_index_at(state, strip, place)
 }
 
 /// Divides the area between the curve and the strip. The strip is placed at the bottom so that it does not

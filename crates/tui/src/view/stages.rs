@@ -72,7 +72,8 @@ fn stage_line(state: &State, stage: Stage, room: u16) -> StyledLine {
         Some((Status::Reused, _)) => ("=", TextRole::Faint, "reused".to_owned()),
         Some((Status::Skipped, _)) => ("-", TextRole::Faint, "skipped".to_owned()),
     };
-    let text_tone = if tone == TextRole::Faint { TextRole::Faint } else { stage_text_role(state, report) };
+    let text_tone =
+        if tone == TextRole::Faint { TextRole::Faint } else { stage_role_marking_reruns(state, report) };
     let line = |gap: u16| {
         let (name, gap) = (stage.name(), usize::from(gap));
         vec![(sign.to_owned(), tone), (format!(" {name}{:gap$}{time}", ""), text_tone)]
@@ -80,7 +81,7 @@ fn stage_line(state: &State, stage: Stage, room: u16) -> StyledLine {
     // Align the times unless the gap is needed for the time difference.
     let used = text_columns(stage.name()) + text_columns(&time);
     let usual = TIME_ENDS.saturating_sub(used).max(1);
-    let change = report.map_or(String::new(), |report| time_change(state, report));
+    let change = report.map_or(String::new(), |report| stage_time_change_text(state, report));
     let change = if change.is_empty() { change } else { format!(" {change}") };
     let least = 2 + used + 1 + text_columns(&change);
     if change.is_empty() || least > room {
@@ -92,13 +93,13 @@ fn stage_line(state: &State, stage: Stage, room: u16) -> StyledLine {
 }
 
 /// Role of a stage's text: strong if an edit caused the stage to run again, otherwise plain.
-fn stage_text_role(state: &State, report: Option<&StageReport>) -> TextRole {
+fn stage_role_marking_reruns(state: &State, report: Option<&StageReport>) -> TextRole {
     let is_again = report.is_some_and(|it| it.status == Status::Done && state.work.renders > 0);
     if is_again && state.saving.edits > 0 { TextRole::Strong } else { TextRole::Plain }
 }
 
 /// Difference between the stage's time and its previous time.
-fn time_change(state: &State, report: &StageReport) -> String {
+fn stage_time_change_text(state: &State, report: &StageReport) -> String {
     match report.status {
         Status::Done => format_time_difference(
             report.seconds,
@@ -137,9 +138,9 @@ fn list_stage_times_and_cached_count(
             let comma = if line.is_empty() { "" } else { ", " };
             line.push((
                 format!("{comma}{} {}", report.name.name(), format_seconds(report.seconds)),
-                stage_text_role(state, Some(report)),
+                stage_role_marking_reruns(state, Some(report)),
             ));
-            let change = time_change(state, report);
+            let change = stage_time_change_text(state, report);
             if !change.is_empty() {
                 line.push((format!(" {change}"), TextRole::Strong));
             }
@@ -160,7 +161,7 @@ pub(super) fn running_stage_name(state: &State) -> Option<&'static str> {
 }
 
 /// Loaded fraction of an asset.
-pub(super) fn loaded_fraction(asset: &AssetProgressBar) -> f64 {
+pub(super) fn asset_loaded_fraction(asset: &AssetProgressBar) -> f64 {
     let progress = &asset.progress;
     if progress.total == 0 { 1.0 } else { progress.done as f64 / progress.total as f64 }
 }

@@ -109,9 +109,9 @@ fn progress_fraction_and_text(state: &State, layout: &Layout) -> (f64, String) {
             (progress.fraction, format!("{samples} · {time}"))
         }
         (None, Some(asset)) if layout.panel.is_empty() => {
-            (stages::loaded_fraction(asset), escape_invisible_chars(&asset.progress.name).into_owned())
+            (stages::asset_loaded_fraction(asset), escape_invisible_chars(&asset.progress.name).into_owned())
         }
-        (None, asset) => (asset.map_or(0.0, stages::loaded_fraction), time),
+        (None, asset) => (asset.map_or(0.0, stages::asset_loaded_fraction), time),
     }
 }
 

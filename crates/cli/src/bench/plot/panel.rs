@@ -5,8 +5,8 @@ use plotters::prelude::*;
 
 use super::AXES;
 use super::axes::{LogAxis, format_log_axis_mark, format_log_mark_as_decimal};
-use crate::bench::results::{BiasVerdict, MethodResult, SceneResult, StepResult};
-use crate::bench::slope::Slope;
+use crate::bench::results::{BiasVerdict, MethodAnalysis, SceneResult, StepResult};
+use crate::bench::slope::ErrorOverTimeSlope;
 use crate::scene::sanitize::escape_invisible_chars;
 
 /// Okabe and Ito's color-blind-safe palette.
@@ -106,7 +106,7 @@ fn draw_reference_noise<'c, 'a: 'c>(
 /// Draws each step's error range.
 fn draw_error_bars<'c, 'a: 'c>(
     chart: &mut Chart<'c, 'a>,
-    method: &MethodResult,
+    method: &MethodAnalysis,
     color: RGBColor,
     up: &LogAxis,
 ) -> Result<(), DrawError<'a>> {
@@ -124,7 +124,7 @@ fn draw_error_bars<'c, 'a: 'c>(
 /// Draws the medians and adds the method to the legend.
 fn draw_medians<'c, 'a: 'c>(
     chart: &mut Chart<'c, 'a>,
-    method: &MethodResult,
+    method: &MethodAnalysis,
     number: usize,
 ) -> Result<(), DrawError<'a>> {
     let color = method_color(number);
@@ -156,8 +156,8 @@ fn method_marker(at: (i32, i32), number: usize) -> Polygon<(i32, i32)> {
 }
 
 /// A method's legend entry, such as `path, slope −0.98`.
-fn legend_label(method: &MethodResult) -> String {
-    let slope = method.slope.map_or(String::new(), |Slope { value, .. }| {
+fn legend_label(method: &MethodAnalysis) -> String {
+    let slope = method.slope.map_or(String::new(), |ErrorOverTimeSlope { value, .. }| {
         format!(", slope {}{:.2}", if value < 0.0 { "−" } else { "" }, value.abs())
     });
     let bias = match method.verdict {

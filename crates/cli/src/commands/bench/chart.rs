@@ -144,7 +144,7 @@ fn axis_labels([low, high]: [f64; 2], word: impl Fn(f64) -> String) -> Vec<Strin
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bench::{MethodResult, ReferenceResult, StepResult};
+    use crate::bench::{MethodAnalysis, ReferenceResult, StepResult};
 
     fn scene() -> SceneResult {
         let step = |samples: f64| StepResult {
@@ -158,7 +158,7 @@ mod tests {
             brightness: None,
             pictures: Vec::new(),
         };
-        let method = MethodResult {
+        let method = MethodAnalysis {
             name: "path".to_owned(),
             setup_seconds: 0.0,
             steps: vec![step(1.0), step(16.0)],

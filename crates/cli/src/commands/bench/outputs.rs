@@ -10,10 +10,10 @@ use crate::console::Console;
 use crate::control::CancelToken;
 use crate::exit::Exit;
 use crate::lower::STDOUT_NAME;
-use crate::output::write::{self, WritePolicy};
+use crate::output::write::{self, ExistingFilePolicy};
 use crate::output::{
-    self, AttributeLossPolicy, FileIdentity, OutputError, check_json_replaceable, check_plot_replaceable,
-    check_table_replaceable, is_same_file,
+    self, AttributeLossPolicy, FileIdentity, OutputError, is_same_file, json_replace_check,
+    plot_replace_check, table_replace_check,
 };
 use crate::system::{describe_error, file};
 
@@ -66,7 +66,7 @@ impl BenchOutputs {
     }
 
     fn check_output(&self, index: usize, path: &Path, kind: OutputKind) -> Result<(), OutputError> {
-        self.check_path_conflicts(index, path)?;
+        self.check_conflicts_of_output(index, path)?;
         let is_svg = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("svg"));
         if path == Path::new(STDOUT_NAME) && !matches!(kind, OutputKind::Plot) {
             let (option, ..) = self.files[index];
@@ -83,8 +83,8 @@ impl BenchOutputs {
     }
 
     /// Checks that output `index`, whose resolved path is `real`, is neither an input nor another output.
-    fn check_path_conflicts(&self, index: usize, real: &Path) -> Result<(), OutputError> {
-        if FileIdentity::from_path(real).is_none() {
+    fn check_conflicts_of_output(&self, index: usize, real: &Path) -> Result<(), OutputError> {
+        if FileIdentity::from_existing_or_new_path(real).is_none() {
             return Ok(());
         }
         let is_it = |path: &Path| is_same_file(real, path);
@@ -110,12 +110,12 @@ impl BenchOutputs {
     fn check_written_by_glimt(&self, index: usize, real: &Path) -> Result<(), OutputError> {
         let (option, path, kind) = &self.files[index];
         let replaced = match kind {
-            OutputKind::Csv => check_table_replaceable(real, csv::HEAD),
+            OutputKind::Csv => table_replace_check(real, csv::HEAD),
             // Replace only valid baselines, which contain at least one scene.
             OutputKind::Json => {
-                check_json_replaceable(real, "a results file", |found: &Results| !found.scenes.is_empty())
+                json_replace_check(real, "a results file", |found: &Results| !found.scenes.is_empty())
             }
-            OutputKind::Plot => check_plot_replaceable(real, &plot::AXES),
+            OutputKind::Plot => plot_replace_check(real, &plot::AXES),
         };
         let Some(why) = replaced.reason_to_keep() else { return Ok(()) };
         let way_out = format!("choose another file with {option} FILE, or use --force");
@@ -164,12 +164,12 @@ impl BenchOutputs {
         let (_, path, kind) = &self.files[index];
         let bytes = format_content(*kind, results)
             .map_err(|why| format!("cannot write {}: {why}", path.display()))?;
-        let may_replace = |real: &Path| self.check_path_conflicts(index, real);
+        let may_replace = |real: &Path| self.check_conflicts_of_output(index, real);
         let is_kept = |path: &Path| self.inputs.iter().any(|(_, input)| input == path);
         let losses = AttributeLossPolicy::Report(&|warning| {
             progress.report_written_file_warning(&warning.to_string());
         });
-        let guard = WritePolicy { is_kept: &is_kept, may_replace: &may_replace, sweep: None, losses };
+        let guard = ExistingFilePolicy { is_kept: &is_kept, may_replace: &may_replace, sweep: None, losses };
         let written = write::atomic_with_policy(path, &bytes, &guard, token);
         written.map(|()| bytes.len()).map_err(|error| error.to_string())
     }

@@ -66,7 +66,7 @@ impl BenchProgress {
             BenchEvent::Begins { what, left } => {
                 self.what = what;
                 self.left = left.map(|left| (left, Instant::now()));
-                self.redraw(matches!(self.format, ProgressFormat::Json));
+                self.redraw_bar_or_print_line(matches!(self.format, ProgressFormat::Json));
             }
             BenchEvent::Done(line) => {
                 self.last = Instant::now();
@@ -79,7 +79,7 @@ impl BenchProgress {
             BenchEvent::Point { scene, method, seconds, relmse } => {
                 if let ProgressFormat::Bar(_, lines) = &mut self.format {
                     lines.add_point(&scene, &method, (seconds, relmse));
-                    self.redraw(false);
+                    self.redraw_bar_or_print_line(false);
                 }
             }
             BenchEvent::Warnings(warnings) => match &self.format {
@@ -96,10 +96,10 @@ impl BenchProgress {
     /// Updates the report as time passes.
     pub(super) fn tick(&mut self) {
         let is_due = self.last.elapsed() >= INTERVAL;
-        self.redraw(is_due);
+        self.redraw_bar_or_print_line(is_due);
     }
 
-    fn redraw(&mut self, is_due: bool) {
+    fn redraw_bar_or_print_line(&mut self, is_due: bool) {
         let elapsed = self.begin.elapsed().as_secs_f64();
         let left = self.left.map(|(left, at)| (left - at.elapsed().as_secs_f64()).max(0.0));
         if let Some(left) = left {

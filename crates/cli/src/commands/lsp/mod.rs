@@ -36,14 +36,14 @@ use serde_json::{Value, json};
 
 use self::document::OpenDocument;
 use self::files::FileCheckThread;
-use self::wire::{Client, ReceivedFrame};
+use self::wire::{ClientWriter, ReceivedFrame};
 use crate::console::Console;
 use crate::exit::Exit;
 
 /// Runs the server until the client sends `exit` or closes stdin. `exit` without a preceding `shutdown` is a
 /// failure, as the protocol requires.
 pub(crate) fn run(console: &Console) -> Exit {
-    match serve(&mut std::io::stdin().lock(), &Client::new(std::io::stdout())) {
+    match serve(&mut std::io::stdin().lock(), &ClientWriter::new(std::io::stdout())) {
         Ok(exit) => exit,
         Err(message) => console.print_error(Exit::FAILED, &format!("language server: {message}")),
     }
@@ -73,7 +73,7 @@ enum ServerPhase {
     ShutDown,
 }
 
-fn serve(from: &mut impl BufRead, client: &Client) -> Result<Exit, String> {
+fn serve(from: &mut impl BufRead, client: &ClientWriter) -> Result<Exit, String> {
     let documents = Documents::default();
     let (open, to) = (Arc::clone(&documents), client.clone());
     let publish = move |uri, document: &OpenDocument, found| {
@@ -86,7 +86,7 @@ fn serve(from: &mut impl BufRead, client: &Client) -> Result<Exit, String> {
         match received {
             ReceivedFrame::Invalid(answer) => client.send_error(&answer),
             ReceivedFrame::Message(Message::Request(request)) => {
-                let response = server.handle_request(request, &mut phase);
+                let response = server.response_to_request(request, &mut phase);
                 server.send(&response.into());
             }
             ReceivedFrame::Message(Message::Notification(one)) => match (one.method.as_str(), phase) {
@@ -106,7 +106,7 @@ fn serve(from: &mut impl BufRead, client: &Client) -> Result<Exit, String> {
 type Documents = Arc<Mutex<HashMap<String, OpenDocument>>>;
 
 struct Server<'c> {
-    client: &'c Client,
+    client: &'c ClientWriter,
     documents: Documents,
     /// The thread that checks referenced files. If it could not be started, this is `None`, and only the
     /// documents themselves are checked.
@@ -123,7 +123,7 @@ impl Server<'_> {
     }
 
     /// Responds to a request and updates the phase.
-    fn handle_request(&self, request: Request, phase: &mut ServerPhase) -> Response {
+    fn response_to_request(&self, request: Request, phase: &mut ServerPhase) -> Response {
         let refused = |id, code: ErrorCode, why: &str| Response::new_err(id, code as i32, why.to_owned());
         match (request.method.as_str(), *phase) {
             (Initialize::METHOD, ServerPhase::New) => {
@@ -192,21 +192,21 @@ impl Server<'_> {
         let Notification { method, params } = notification;
         match method.as_str() {
             DidOpenTextDocument::METHOD => {
-                if let Some(DidOpenTextDocumentParams { text_document: one }) = parse_params(params) {
-                    self.store_and_diagnose_document(&one.uri, one.version, one.text);
+                if let Some(DidOpenTextDocumentParams { text_document: one }) = params_if_valid(params) {
+                    self.store_document_and_diagnose_text(&one.uri, one.version, one.text);
                     self.queue_referenced_files_check(&one.uri);
                 }
             }
             DidChangeTextDocument::METHOD => {
                 if let Some(DidChangeTextDocumentParams { text_document, mut content_changes }) =
-                    parse_params(params)
+                    params_if_valid(params)
                 {
                     if content_changes.iter().any(|change| change.range.is_some()) {
                         self.log_error(
                             "ignored an incremental change: this server needs full text synchronization",
                         );
                     } else if let Some(last) = content_changes.pop() {
-                        self.store_and_diagnose_document(
+                        self.store_document_and_diagnose_text(
                             &text_document.uri,
                             text_document.version,
                             last.text,
@@ -215,12 +215,12 @@ impl Server<'_> {
                 }
             }
             DidSaveTextDocument::METHOD => {
-                if let Some(DidSaveTextDocumentParams { text_document, .. }) = parse_params(params) {
+                if let Some(DidSaveTextDocumentParams { text_document, .. }) = params_if_valid(params) {
                     self.queue_referenced_files_check(&text_document.uri);
                 }
             }
             DidCloseTextDocument::METHOD => {
-                if let Some(DidCloseTextDocumentParams { text_document }) = parse_params(params) {
+                if let Some(DidCloseTextDocumentParams { text_document }) = params_if_valid(params) {
                     self.documents().remove(text_document.uri.as_str());
                     self.send(&diagnostics_notification(text_document.uri, None, Vec::new()));
                 }
@@ -236,7 +236,7 @@ impl Server<'_> {
     }
 
     /// Stores a document and publishes its diagnostics.
-    fn store_and_diagnose_document(&self, uri: &Uri, version: i32, text: String) {
+    fn store_document_and_diagnose_text(&self, uri: &Uri, version: i32, text: String) {
         let document = OpenDocument::new(uri_to_path(uri), version, text);
         let found = diagnostics::text_diagnostics(&document);
         self.documents().insert(uri.as_str().to_owned(), document);
@@ -266,7 +266,7 @@ fn publish_if_current(
     }
 }
 
-fn parse_params<P: DeserializeOwned>(params: Value) -> Option<P> {
+fn params_if_valid<P: DeserializeOwned>(params: Value) -> Option<P> {
     serde_json::from_value(params).ok()
 }
 

@@ -129,9 +129,9 @@ fn replace_unpaired_surrogates(text: &str) -> String {
 
 /// The connection to the client, shared between threads.
 #[derive(Clone)]
-pub(super) struct Client(Arc<Mutex<Box<dyn Write + Send>>>);
+pub(super) struct ClientWriter(Arc<Mutex<Box<dyn Write + Send>>>);
 
-impl Client {
+impl ClientWriter {
     pub(super) fn new(to: impl Write + Send + 'static) -> Self {
         Self(Arc::new(Mutex::new(Box::new(to))))
     }

@@ -67,7 +67,7 @@ fn table_schema(info: &'static TableInfo, draft: SchemaDraft) -> Value {
             object_schema(&info.keys.iter().collect::<Vec<_>>(), draft, |key| key_schema(key, draft))
         }
         (false, SchemaDraft::Four) => all_types_table_schema(info),
-        (false, SchemaDraft::Latest) => schema_by_type(info),
+        (false, SchemaDraft::Latest) => table_schema_with_type_conditions(info),
     };
     for (name, condition) in table_key_conditions(info.name, draft) {
         table[name] = condition;
@@ -123,7 +123,7 @@ fn key_description_markdown(key: &KeyInfo) -> String {
 }
 
 /// Returns the schema for a table that has types, with one condition per type.
-fn schema_by_type(info: &'static TableInfo) -> Value {
+fn table_schema_with_type_conditions(info: &'static TableInfo) -> Value {
     let draft = SchemaDraft::Latest;
     let conditions: Vec<Value> = info
         .types

@@ -174,7 +174,7 @@ impl<'a> AccessorReader<'a> {
     }
 
     /// Returns the bytes from the start of an element, or `None` if the element is zero.
-    fn element_bytes(&self, index: usize) -> Option<&'a [u8]> {
+    fn bytes_starting_at_element(&self, index: usize) -> Option<&'a [u8]> {
         if let Some((indices, values)) = &self.sparse
             && let Ok(element) = indices.binary_search(&(index as u32))
         {
@@ -186,7 +186,7 @@ impl<'a> AccessorReader<'a> {
     /// Returns an element's first `N` components, with `missing` for components that its type does not have.
     /// The element must exist.
     pub(super) fn element_floats<const N: usize>(&self, index: usize, missing: f32) -> [f32; N] {
-        let (size, element) = (self.component.size(), self.element_bytes(index));
+        let (size, element) = (self.component.size(), self.bytes_starting_at_element(index));
         std::array::from_fn(|component| match element {
             _ if component >= self.width => missing,
             Some(bytes) => self.component.decode_number(&bytes[component * size..], self.normalized),
@@ -201,7 +201,7 @@ impl<'a> AccessorReader<'a> {
 
     /// Reads element number `element` as an index. The element must exist.
     pub(super) fn read_index(&self, element: usize) -> u32 {
-        self.element_bytes(element)
+        self.bytes_starting_at_element(element)
             .and_then(|bytes| self.component.decode_as_index(bytes))
             .unwrap_or_default()
     }

@@ -37,7 +37,7 @@ impl JsonMaterial {
     }
 
     /// Texture coordinate sets used by all textures, starting with the base color texture.
-    pub(super) fn coordinate_sets(&self) -> Vec<usize> {
+    pub(super) fn coordinate_set_per_texture(&self) -> Vec<usize> {
         self.supported_textures().into_iter().map(TextureInfo::coordinate_set).collect()
     }
 }

@@ -199,7 +199,11 @@ impl GltfFile {
     ///
     /// # Errors
     /// Same as [`GltfFile::locate_image`]. Also fails if the image file cannot be read.
-    pub fn read_image_bytes(&self, number: usize, token: &CancelToken) -> Result<Vec<u8>, AssetError> {
+    pub fn read_embedded_or_external_image(
+        &self,
+        number: usize,
+        token: &CancelToken,
+    ) -> Result<Vec<u8>, AssetError> {
         match self.locate_image(number)? {
             ImageLocation::Inside(bytes) => Ok(bytes.to_vec()),
             ImageLocation::File(file) => {
@@ -260,7 +264,7 @@ impl GltfFile {
         let bytes: u64 = self.buffers.iter().map(|buffer| buffer.len() as u64).sum();
         let limit = bytes + FREE;
         if corners > limit {
-            return Err(GltfError::new(too_many_corners_message(corners, bytes, limit)));
+            return Err(GltfError::new(too_many_corners_for_buffers_message(corners, bytes, limit)));
         }
         Ok(first_part_with_same_mesh)
     }
@@ -293,7 +297,7 @@ impl GltfFile {
             }
             ImageLocation::Inside(bytes) => {
                 let image = EmbeddedImage { path: &self.path, bytes: bytes.into() };
-                image::read_embedded_dimensions(image, encoding, limits, token)
+                image::embedded_dimensions_and_decoded_bytes(image, encoding, limits, token)
             }
         };
         size.map(drop).map_err(|error| self.add_image_context(number, error))
@@ -316,7 +320,7 @@ impl GltfFile {
     }
 }
 
-fn too_many_corners_message(corners: u64, bytes: u64, limit: u64) -> String {
+fn too_many_corners_for_buffers_message(corners: u64, bytes: u64, limit: u64) -> String {
     format!("its primitives have {corners} triangle corners; the limit for {bytes} buffer bytes is {limit}")
 }
 

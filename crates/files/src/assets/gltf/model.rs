@@ -232,7 +232,7 @@ impl SceneWalk<'_> {
             }
             let material =
                 self.material_index(primitive.material, container.select_two_uv_sets(primitive))?;
-            let colors = container.open_attribute(primitive, "COLOR_0")?;
+            let colors = container.open_attribute_accessor(primitive, "COLOR_0")?;
             self.note_ignored_attributes(
                 &format!("meshes[{mesh}].primitives[{index}]"),
                 primitive,

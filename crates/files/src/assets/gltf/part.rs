@@ -86,22 +86,24 @@ impl GltfFile {
             return Err(GltfError::new("points and lines have no faces"));
         }
         // Find the vertex of each corner.
-        let positions = self.open_attribute(primitive, "POSITION")?;
+        let positions = self.open_attribute_accessor(primitive, "POSITION")?;
         let positions = positions.ok_or_else(|| GltfError::new("it has no positions"))?;
         if positions.width != 3 {
             let width = positions.width;
-            let reason = wrong_component_count_message(width);
+            let reason = expected_vec3_message(width);
             return Err(GltfError::new(reason).add_location("POSITION"));
         }
-        let (corners, vertices) = self.read_corner_indices(primitive, positions.count)?;
+        let (corners, vertices) = self.read_corners_and_kept_vertices(primitive, positions.count)?;
         // Read the vertex attributes.
         let is_complete = |numbers: &AccessorReader<'_>| numbers.count >= positions.count;
-        let normals = self.open_attribute(primitive, "NORMAL")?.filter(is_complete);
+        let normals = self.open_attribute_accessor(primitive, "NORMAL")?.filter(is_complete);
         let mut sets = Vec::with_capacity(2);
         for set in self.select_two_uv_sets(primitive) {
-            sets.push(self.open_attribute(primitive, &format!("TEXCOORD_{set}"))?.filter(is_complete));
+            sets.push(
+                self.open_attribute_accessor(primitive, &format!("TEXCOORD_{set}"))?.filter(is_complete),
+            );
         }
-        let colors = self.open_attribute(primitive, "COLOR_0")?.filter(is_complete);
+        let colors = self.open_attribute_accessor(primitive, "COLOR_0")?.filter(is_complete);
         let each = || vertices.iter().map(|vertex| *vertex as usize);
         let mut parsed = ParsedMesh { faces: triangulate(primitive.mode, &corners), ..ParsedMesh::default() };
         parsed.positions = each()
@@ -127,7 +129,7 @@ impl GltfFile {
     }
 
     /// Opens an attribute of a primitive, if present.
-    pub(super) fn open_attribute(
+    pub(super) fn open_attribute_accessor(
         &self,
         primitive: &Primitive,
         name: &str,
@@ -140,7 +142,7 @@ impl GltfFile {
     /// textures use, in ascending order. If the textures use only one set, that set is first.
     pub(super) fn select_two_uv_sets(&self, primitive: &Primitive) -> [usize; 2] {
         let material = primitive.material.and_then(|material| self.root.materials.get(material));
-        let used = material.map(|material| material.coordinate_sets()).unwrap_or_default();
+        let used = material.map(|material| material.coordinate_set_per_texture()).unwrap_or_default();
         let first = used.first().copied().unwrap_or_default();
         match used.iter().find(|set| **set != first) {
             Some(&second) => [first.min(second), first.max(second)],
@@ -150,7 +152,7 @@ impl GltfFile {
 
     /// Returns each corner's index into a list of vertices, and that list. The list contains all vertices, or
     /// only the used ones if there are few corners.
-    fn read_corner_indices(
+    fn read_corners_and_kept_vertices(
         &self,
         primitive: &Primitive,
         vertices: usize,
@@ -178,7 +180,7 @@ impl GltfFile {
     }
 }
 
-pub(super) fn wrong_component_count_message(width: usize) -> String {
+pub(super) fn expected_vec3_message(width: usize) -> String {
     format!("expected VEC3, found {width} components")
 }
 

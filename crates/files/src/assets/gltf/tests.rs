@@ -340,7 +340,10 @@ fn scenes_merge_into_one_mesh() {
     json["nodes"] = json!([{"children": [1, 2]}, {"mesh": 0}, {"mesh": 0, "scale": [-1, 1, 1], "translation": [0, 5, 0]}]);
     let merged = open_json(&json).expect("read").merged_scene(&CancelToken::new()).expect("a mesh");
     assert_eq!((merged.mesh.triangles.len(), merged.mesh.materials.as_slice()), (4, &[0; 4][..]));
-    assert_eq!(merged.mesh.bounds(), Some([DVec3::new(-2.0, 0.0, 0.0), DVec3::new(2.0, 6.0, 0.0)]));
+    assert_eq!(
+        merged.mesh.bounds_in_file_coordinates(),
+        Some([DVec3::new(-2.0, 0.0, 0.0), DVec3::new(2.0, 6.0, 0.0)])
+    );
     // The mirrored instance keeps its orientation.
     let front = |triangle: u32| {
         let [a, b, c] = merged.mesh.corners(triangle);
@@ -422,7 +425,7 @@ fn buffer_byte_reuse_is_limited() {
     json["accessors"] = json!(accessors);
     let primitives: Vec<Value> = (0..400).map(|number| json!({"attributes": {"POSITION": number}})).collect();
     json["meshes"][0]["primitives"] = json!(primitives);
-    assert_eq!(error(&json), too_many_corners_message(400 << 20, 92, 92 + (1 << 20)));
+    assert_eq!(error(&json), too_many_corners_for_buffers_message(400 << 20, 92, 92 + (1 << 20)));
 }
 
 /// Primitives with the same mesh share one part, with the texture coordinates used by their materials.
@@ -460,7 +463,7 @@ fn corner_limit_counts_all_built_primitives() {
     json["meshes"][0]["primitives"] = json!(primitives(4));
     assert!(open_json(&json).is_ok());
     json["meshes"][0]["primitives"] = json!(primitives(5));
-    assert_eq!(error(&json), too_many_corners_message(40 * 3 * 9_998, 92, 92 + (1 << 20)));
+    assert_eq!(error(&json), too_many_corners_for_buffers_message(40 * 3 * 9_998, 92, 92 + (1 << 20)));
 }
 
 #[test]
@@ -503,7 +506,7 @@ fn old_versions_and_wrong_types_are_rejected() {
     }
     let mut flat = square();
     flat["accessors"][0]["type"] = json!("VEC2");
-    assert!(error(&flat).ends_with(&part::wrong_component_count_message(2)), "{}", error(&flat));
+    assert!(error(&flat).ends_with(&part::expected_vec3_message(2)), "{}", error(&flat));
 }
 
 /// Some programs write unpadded chunks, or extra bytes past the length declared in the header.

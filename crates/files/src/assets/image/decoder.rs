@@ -45,7 +45,7 @@ pub(super) fn create_decoder<R: BufRead + Seek + 'static>(
         }
         Some(ImageFormat::Hdr) => {
             let mut decoder = HdrDecoder::new(reader.into_inner())?;
-            let metadata = decoder.metadata();
+            let metadata = decoder.take_metadata();
             Ok((Box::new(decoder), metadata))
         }
         Some(ImageFormat::Tga) => {
@@ -125,7 +125,7 @@ pub(super) fn bytes_per_texel(color: ColorType, encoding: ImageEncoding, metadat
 /// Memory allowed for any image, regardless of its file size.
 const SMALL_BYTES: u64 = 256 << 20;
 /// Maximum ratio of memory size to file size for a format. The memory holds the decoded image and its texels.
-pub(super) fn max_decompression_ratio(format: Option<ImageFormat>) -> u64 {
+pub(super) fn max_memory_to_file_ratio(format: Option<ImageFormat>) -> u64 {
     match format {
         // Worst case: eight pixels per byte in a bitmap.
         Some(ImageFormat::Pnm) => 64,

@@ -34,7 +34,7 @@ impl<R: BufRead> HdrDecoder<R> {
     }
 
     /// Color space and warnings.
-    pub(super) fn metadata(&mut self) -> ImageMetadata {
+    pub(super) fn take_metadata(&mut self) -> ImageMetadata {
         let space = std::mem::take(&mut self.header.space);
         ImageMetadata {
             space,
@@ -186,7 +186,7 @@ impl HeaderVariables {
         HdrHeader {
             scan,
             scales: correction.map(|correction| 1.0 / (exposure * correction)),
-            space: matrix.map_or_else(ColorSpace::default, ColorSpace::from_matrix_to_rec_709),
+            space: matrix.map_or_else(ColorSpace::default, ColorSpace::from_matrix_with_default_curves),
             warnings: self.warnings,
         }
     }

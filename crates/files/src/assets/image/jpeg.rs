@@ -30,7 +30,7 @@ pub(super) const TRUNCATED: &str = "the image data is truncated";
 /// does not name the type.
 fn check_supported_type(bytes: &[u8]) -> Result<(), String> {
     // A frame header starts with the bits per sample.
-    let mut frames = segments(bytes)
+    let mut frames = segments_before_scan(bytes)
         .filter(|(marker, _)| matches!(marker, 0xc0..=0xcf) && !matches!(marker, 0xc4 | 0xc8 | 0xcc));
     let Some((marker, start)) = frames.next() else { return Ok(()) };
     let kind = match (marker, bytes.get(start)) {
@@ -49,8 +49,8 @@ pub(super) fn wrong_adobe_transform_offset(bytes: &[u8]) -> Option<usize> {
     const ADOBE: &[u8] = b"Adobe";
     const TRANSFORM: usize = 11;
     let find = |marker: u8, name: &[u8]| {
-        let mut named =
-            segments(bytes).filter(|(found, start)| *found == marker && bytes[*start..].starts_with(name));
+        let mut named = segments_before_scan(bytes)
+            .filter(|(found, start)| *found == marker && bytes[*start..].starts_with(name));
         named.next().map(|(_, start)| start)
     };
     find(0xe0, b"JFIF\0")?;
@@ -66,7 +66,7 @@ pub(super) fn fix_adobe_color_transform(bytes: &mut [u8]) {
 }
 
 /// Returns the marker and data offset of each segment before the first scan.
-fn segments(bytes: &[u8]) -> impl Iterator<Item = (u8, usize)> {
+fn segments_before_scan(bytes: &[u8]) -> impl Iterator<Item = (u8, usize)> {
     const SCAN: u8 = 0xda;
     let mut at = 2;
     std::iter::from_fn(move || {

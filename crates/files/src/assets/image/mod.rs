@@ -34,7 +34,7 @@ use crate::system::describe_error;
 use counting_reader::ProgressReader;
 use decode_thread::ProgressReporter;
 use decoder::{
-    ImageDecoderWithMetadata, bytes_per_texel, create_decoder, max_decompression_ratio, orientation,
+    ImageDecoderWithMetadata, bytes_per_texel, create_decoder, max_memory_to_file_ratio, orientation,
     texel_bytes_within_limits,
 };
 use metadata::{ImageMetadata, ImageWarning};
@@ -128,7 +128,7 @@ impl ImageEncoding {
 
 /// A decoded image file.
 #[derive(Clone, Debug, PartialEq)]
-pub struct LoadedImage {
+pub struct DecodedImage {
     /// The texels.
     pub texels: Texels,
     /// Warnings about ignored parts of the file. Each starts with the file name.
@@ -167,7 +167,7 @@ pub fn load(
     limits: ImageLimits,
     progress: Progress<'_>,
     token: &CancelToken,
-) -> Result<LoadedImage, AssetError> {
+) -> Result<DecodedImage, AssetError> {
     load_hashed(path, encoding, limits, progress, token).map(|(image, _)| image)
 }
 
@@ -181,7 +181,7 @@ pub fn load_hashed(
     limits: ImageLimits,
     progress: Progress<'_>,
     token: &CancelToken,
-) -> Result<(LoadedImage, FileHash), AssetError> {
+) -> Result<(DecodedImage, FileHash), AssetError> {
     let (source, hash) = OpenImage::open_in_memory_and_hash(path, encoding, limits, token)?;
     Ok((decode_source(source, encoding, Monitor { progress, token })?, hash))
 }
@@ -190,10 +190,10 @@ fn decode_source(
     file: OpenImage,
     encoding: ImageEncoding,
     monitor: Monitor<'_>,
-) -> Result<LoadedImage, AssetError> {
+) -> Result<DecodedImage, AssetError> {
     let (path, length) = (file.path.clone(), file.length as usize);
     monitor.report_and_check_cancel(0, length)?;
-    let (texels, warnings) = file.decode_on_thread(monitor, move |file, report| {
+    let (texels, warnings) = file.run_on_decode_thread(monitor, move |file, report| {
         let (image, mut metadata) = file.decode(encoding, report)?;
         if let Some(words) = convert::constant_alpha_warning(&image, encoding, &metadata) {
             metadata.add_warning(words);
@@ -205,7 +205,7 @@ fn decode_source(
         let line = line.map_or(String::new(), |line| format!(":{line}"));
         format!("{}{line}: {words}", path.display())
     };
-    Ok(LoadedImage { texels, warnings: warnings.into_iter().map(warning).collect() })
+    Ok(DecodedImage { texels, warnings: warnings.into_iter().map(warning).collect() })
 }
 
 /// Reads an image header. Returns the width and height in pixels, and the size of the texels in bytes.
@@ -230,7 +230,7 @@ fn source_size_and_decoded_bytes(
     encoding: ImageEncoding,
     monitor: Monitor<'_>,
 ) -> Result<(u32, u32, u64), AssetError> {
-    file.decode_on_thread(monitor, move |file, report| {
+    file.run_on_decode_thread(monitor, move |file, report| {
         let ImageDecoderWithMetadata { decoder, texel_bytes, .. } = file.open_decoder(encoding, report)?;
         let (width, height) = decoder.dimensions();
         Ok((width, height, texel_bytes))
@@ -256,7 +256,7 @@ pub fn load_embedded(
     limits: ImageLimits,
     progress: Progress<'_>,
     token: &CancelToken,
-) -> Result<LoadedImage, AssetError> {
+) -> Result<DecodedImage, AssetError> {
     decode_source(OpenImage::from_embedded(image, limits, token)?, encoding, Monitor { progress, token })
 }
 
@@ -264,7 +264,7 @@ pub fn load_embedded(
 ///
 /// # Errors
 /// Same as [`read_dimensions_and_decoded_bytes`].
-pub fn read_embedded_dimensions(
+pub fn embedded_dimensions_and_decoded_bytes(
     image: EmbeddedImage<'_>,
     encoding: ImageEncoding,
     limits: ImageLimits,
@@ -406,7 +406,7 @@ impl OpenImage {
     }
 
     /// Runs a decoder on a separate thread, catching panics.
-    fn decode_on_thread<T: Send + 'static>(
+    fn run_on_decode_thread<T: Send + 'static>(
         self,
         monitor: Monitor<'_>,
         work: impl FnOnce(Self, ProgressReporter) -> Result<T, String> + Send + 'static,
@@ -482,7 +482,7 @@ impl OpenImage {
         if is_jpeg && !is_checked {
             jpeg::check_complete(&self.path, self.limits.memory_bytes, &self.token)?;
         }
-        let expansion = max_decompression_ratio(reader.format());
+        let expansion = max_memory_to_file_ratio(reader.format());
         let chosen = if is_pfm {
             PfmDecoder::new(reader.into_inner())
                 .map(|decoder| (Box::new(decoder) as _, ImageMetadata::default()))
@@ -553,7 +553,7 @@ fn shorten_decoder_error(error: &ImageError) -> String {
         ImageError::Limits(error) if error.kind() == LimitErrorKind::InsufficientMemory => {
             "it needs more memory than the limit for images".to_owned()
         }
-        _ => simplify_png_message(&error.to_string()),
+        _ => replace_chunk_debug_with_name(&error.to_string()),
     };
     if words.chars().count() <= MAX_LENGTH {
         words
@@ -564,7 +564,7 @@ fn shorten_decoder_error(error: &ImageError) -> String {
 
 /// Replaces PNG chunk types in a decoder message with the chunk names. The decoder prints them in debug
 /// format.
-fn simplify_png_message(words: &str) -> String {
+fn replace_chunk_debug_with_name(words: &str) -> String {
     const OPENING: &str = "ChunkType { type: ";
     let Some((before, rest)) = words.split_once(OPENING) else { return words.to_owned() };
     let Some((chunk, after)) = rest.split_once(" }") else { return words.to_owned() };

@@ -139,7 +139,7 @@ impl ColorSpace {
     }
 
     /// Creates a color space that differs from the default only in its primaries.
-    pub(super) fn from_matrix_to_rec_709(matrix: DMat3) -> Self {
+    pub(super) fn from_matrix_with_default_curves(matrix: DMat3) -> Self {
         Self::from_curves_and_matrix(None, matrix)
     }
 
@@ -160,7 +160,7 @@ impl ColorSpace {
     }
 
     /// Converts linear light in this space to linear Rec. 709.
-    pub(super) fn convert_to_linear_rec_709(&self, linear: [f32; 3]) -> [f32; 3] {
+    pub(super) fn convert_linear_to_rec_709(&self, linear: [f32; 3]) -> [f32; 3] {
         let Some(matrix) = &self.matrix else { return linear };
         (*matrix * DVec3::from_array(linear.map(f64::from))).as_vec3().to_array()
     }

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use super::parsed::ParsedMesh;
 use crate::control::{CancelToken, Cancelled};
-use crate::geometry::mesh::VertexNormalSharing;
+use crate::geometry::mesh::VertexNormalGroup;
 use crate::math::Vec2;
 
 /// Number of corners between polls of the cancel token.
@@ -42,11 +42,11 @@ pub(super) fn split_vertices_at_seams(parsed: &mut ParsedMesh, token: &CancelTok
             new_colors.push(color);
         }
     }
-    gather_values(&mut parsed.positions, &sources);
-    gather_values(&mut parsed.normals, &sources);
-    gather_values(&mut parsed.uvs, &sources);
-    gather_values(&mut parsed.second_uvs, &sources);
-    gather_values(&mut parsed.colors, &sources);
+    gather_values_in_place(&mut parsed.positions, &sources);
+    gather_values_in_place(&mut parsed.normals, &sources);
+    gather_values_in_place(&mut parsed.uvs, &sources);
+    gather_values_in_place(&mut parsed.second_uvs, &sources);
+    gather_values_in_place(&mut parsed.colors, &sources);
     if !uvs.is_empty() {
         parsed.uvs = new_uvs;
     }
@@ -54,13 +54,13 @@ pub(super) fn split_vertices_at_seams(parsed: &mut ParsedMesh, token: &CancelTok
         parsed.colors = new_colors;
     }
     let group =
-        |vertex: &usize| VertexNormalSharing { normal: *vertex as u32, group: VertexNormalSharing::BY_ANGLE };
+        |vertex: &usize| VertexNormalGroup { normal: *vertex as u32, group: VertexNormalGroup::BY_ANGLE };
     parsed.normal_groups = sources.iter().map(group).collect();
     Ok(())
 }
 
 /// Replaces `values` with the values at the indices in `sources`. An empty list stays empty.
-fn gather_values<T: Copy>(values: &mut Vec<T>, sources: &[usize]) {
+fn gather_values_in_place<T: Copy>(values: &mut Vec<T>, sources: &[usize]) {
     if !values.is_empty() {
         *values = sources.iter().map(|vertex| values[*vertex]).collect();
     }

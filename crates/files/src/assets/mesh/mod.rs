@@ -45,10 +45,10 @@ pub const EXTENSIONS: [&str; 4] = ["obj", "off", "ply", "stl"];
 pub fn load(path: &Path, progress: Progress<'_>, token: &CancelToken) -> Result<LoadedMesh, AssetError> {
     let extension =
         path.extension().map(|extension| extension.to_string_lossy().to_lowercase()).unwrap_or_default();
-    let (parse, read): (ParseFn, ReadMeshFileFn) = match extension.as_str() {
+    let (parse, read): (ParseFn, ReadBytesFn) = match extension.as_str() {
         "obj" => (obj::parse, read::read_text),
-        "off" => (off::parse, read::read_rejecting_zeros_in_magic),
-        "ply" => (ply::parse, read::read_rejecting_zeros_in_magic),
+        "off" => (off::parse, read::read_unless_zeros_in_magic),
+        "ply" => (ply::parse, read::read_unless_zeros_in_magic),
         "stl" => (stl::parse, read::read_unless_zeros_at_start),
         _ => return Err(AssetError::unreadable(path, UNKNOWN_FORMAT)),
     };
@@ -85,7 +85,7 @@ pub(crate) fn vertex_out_of_range_message(vertex: i64, count: u64) -> String {
 }
 
 type ParseFn = fn(&MeshFileBytes<'_>) -> Result<LoadedMesh, AssetError>;
-type ReadMeshFileFn = fn(&Path, u64, Monitor<'_>) -> Result<Vec<u8>, AssetError>;
+type ReadBytesFn = fn(&Path, u64, Monitor<'_>) -> Result<Vec<u8>, AssetError>;
 
 /// A mesh file in memory, with the monitor for its parser.
 #[derive(Clone, Copy)]

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use super::coincident;
 use crate::control::{CancelToken, Cancelled};
-use crate::geometry::mesh::{TriangleMesh, VertexNormalSharing};
+use crate::geometry::mesh::{TriangleMesh, VertexNormalGroup};
 use crate::math::{DVec3, Vec3};
 
 /// Minimum cosine at which the normals of coincident vertices are merged. Normals that differ by at most 45
@@ -25,7 +25,7 @@ const BATCH: usize = 1 << 16;
 
 /// Computes a unit normal for each vertex, pointing to the front side of its faces. Each face is weighted by
 /// its angle at the vertex. Coincident vertices share a normal if they have the same
-/// [`VertexNormalSharing::group`] and their normals differ by at most 45 degrees. If the face normals cancel
+/// [`VertexNormalGroup::group`] and their normals differ by at most 45 degrees. If the face normals cancel
 /// out, the normal of one face is used. The result does not depend on the number of threads.
 ///
 /// # Errors
@@ -33,7 +33,7 @@ const BATCH: usize = 1 << 16;
 pub fn vertex_normals(mesh: &TriangleMesh, token: &CancelToken) -> Result<Vec<Vec3>, Cancelled> {
     let mut sums = sum_weighted_face_normals(mesh, token)?;
     let groups = &mesh.normal_groups;
-    let firsts = map_to_first_with_same_normal(groups);
+    let firsts = first_vertices_by_normal_number(groups);
     for (vertex, first) in firsts.iter().enumerate().filter(|(vertex, first)| vertex != *first) {
         let own = std::mem::take(&mut sums[vertex]);
         sums[*first] += own;
@@ -43,17 +43,17 @@ pub fn vertex_normals(mesh: &TriangleMesh, token: &CancelToken) -> Result<Vec<Ve
     for place in &places {
         token.check_pause_and_cancel()?;
         if groups.is_empty() {
-            merge_seam_normals(place, &sums, &mut joined);
+            merge_normals_within_seam_angle(place, &sums, &mut joined);
         } else {
             let group = |vertex: &u32| groups[*vertex as usize].group;
             let is_joined = |vertex: &&u32| {
-                firsts[**vertex as usize] == **vertex as usize && group(vertex) != VertexNormalSharing::FLAT
+                firsts[**vertex as usize] == **vertex as usize && group(vertex) != VertexNormalGroup::FLAT
             };
             let mut place: Vec<u32> = place.iter().filter(is_joined).copied().collect();
             place.sort_by_key(group);
             place
                 .chunk_by(|a, b| group(a) == group(b))
-                .for_each(|place| merge_seam_normals(place, &sums, &mut joined));
+                .for_each(|place| merge_normals_within_seam_angle(place, &sums, &mut joined));
         }
     }
     for (vertex, first) in firsts.into_iter().enumerate() {
@@ -72,10 +72,10 @@ pub fn vertex_normals(mesh: &TriangleMesh, token: &CancelToken) -> Result<Vec<Ve
 }
 
 /// Maps each vertex to the first vertex with the same normal. Returns an empty list if there are no groups.
-fn map_to_first_with_same_normal(groups: &[VertexNormalSharing]) -> Vec<usize> {
+fn first_vertices_by_normal_number(groups: &[VertexNormalGroup]) -> Vec<usize> {
     let numbers = groups.iter().map(|group| group.normal as usize + 1).max().unwrap_or(0);
     let mut firsts = vec![usize::MAX; numbers];
-    let first_of = |(vertex, group): (usize, &VertexNormalSharing)| {
+    let first_of = |(vertex, group): (usize, &VertexNormalGroup)| {
         let first = &mut firsts[group.normal as usize];
         *first = vertex.min(*first);
         *first
@@ -90,10 +90,10 @@ pub(crate) fn is_polyhedral_without_normals(mesh: &TriangleMesh) -> bool {
     /// that form a cone with a half-angle of 32 degrees.
     const LEAST: f32 = 0.85;
     let groups = &mesh.normal_groups;
-    if !mesh.normals.is_empty() || groups.iter().any(|group| group.group != VertexNormalSharing::BY_ANGLE) {
+    if !mesh.normals.is_empty() || groups.iter().any(|group| group.group != VertexNormalGroup::BY_ANGLE) {
         return false;
     }
-    let firsts = map_to_first_with_same_normal(groups);
+    let firsts = first_vertices_by_normal_number(groups);
     let mut sums = vec![(Vec3::ZERO, 0_u32); mesh.positions.len()];
     for corners in &mesh.triangles {
         let [a, b, c] = corners.map(|corner| mesh.positions[corner as usize]);
@@ -160,14 +160,14 @@ fn normal_and_corner_angles([a, b, c]: [Vec3; 3]) -> (DVec3, [f64; 3]) {
     if doubled_area == 0.0 {
         return (DVec3::ZERO, [0.0; 3]);
     }
-    let angle = |from: DVec3, to: DVec3| fast_atan2(-from.dot(to), doubled_area);
+    let angle = |from: DVec3, to: DVec3| fast_atan2_upper_half(-from.dot(to), doubled_area);
     (cross / doubled_area, [angle(ca, ab), angle(ab, bc), angle(bc, ca)])
 }
 
 /// Computes `atan2(y, x)` for y > 0 with a relative error of at most 2e-8 (Abramowitz and Stegun, *Handbook
 /// of Mathematical Functions*, 4.4.49). This is accurate enough for weights and avoids unpredictable
 /// branches.
-fn fast_atan2(x: f64, y: f64) -> f64 {
+fn fast_atan2_upper_half(x: f64, y: f64) -> f64 {
     const STARTS: [f64; 4] = [0.0, FRAC_PI_2, PI, FRAC_PI_2];
     const SIGNS: [f64; 4] = [1.0, -1.0, -1.0, 1.0];
     let octant = usize::from(y > x.abs()) | usize::from(x < 0.0) << 1;
@@ -180,7 +180,7 @@ fn fast_atan2(x: f64, y: f64) -> f64 {
     STARTS[octant] + SIGNS[octant] * t * (low + t8 * (high + t8 * 0.002_866_225_7))
 }
 
-fn merge_seam_normals(group: &[u32], sums: &[DVec3], joined: &mut [DVec3]) {
+fn merge_normals_within_seam_angle(group: &[u32], sums: &[DVec3], joined: &mut [DVec3]) {
     let own = |vertex: u32| sums[vertex as usize];
     if group.len() > COMPARED {
         let sum: DVec3 = group.iter().map(|&vertex| own(vertex)).sum();
@@ -296,7 +296,7 @@ mod tests {
         for i in 0..1000 {
             let (x, y) = ((f64::from(i) * 0.7).sin() * 3.0, (0.02 * f64::from(i) - 15.0).exp());
             let exact = y.atan2(x);
-            assert!((fast_atan2(x, y) - exact).abs() <= 3e-8 * exact, "({x}, {y})");
+            assert!((fast_atan2_upper_half(x, y) - exact).abs() <= 3e-8 * exact, "({x}, {y})");
         }
     }
 

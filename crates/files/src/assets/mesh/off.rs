@@ -42,7 +42,7 @@ struct OffReader<'a> {
 struct LinesWithIgnoredValues(u64, usize);
 
 impl LinesWithIgnoredValues {
-    fn add(&mut self, at: usize) {
+    fn add_line_at_offset(&mut self, at: usize) {
         self.1 = if self.0 == 0 { at } else { self.1 };
         self.0 += 1;
     }
@@ -160,7 +160,7 @@ impl OffReader<'_> {
         let header = self.read_header_keyword()?;
         let vertices = self.read_count("vertices")?;
         let faces = self.read_count("faces")?;
-        self.skip_edge_count()?;
+        self.skip_edge_count_and_line_end()?;
         self.check_plausible_counts(vertices, faces)?;
         let mut parsed = ParsedMesh::default();
         self.vertices(header, vertices, &mut parsed)?;
@@ -248,7 +248,7 @@ impl OffReader<'_> {
     }
 
     /// Skips the optional number of edges and the end of the line.
-    fn skip_edge_count(&mut self) -> Result<(), AssetError> {
+    fn skip_edge_count_and_line_end(&mut self) -> Result<(), AssetError> {
         if self.cursor.skip_to_word_in_line() {
             self.read_nonnegative_integer("edges")?;
         }
@@ -305,9 +305,9 @@ impl OffReader<'_> {
                 }
                 self.add_color_repeatedly(color, 1, &mut colors);
             } else if header.uvs {
-                parsed.uvs.push(self.read_uv()?);
+                parsed.uvs.push(self.read_uv_at_line_end()?);
             } else if self.cursor.skip_to_word_in_line() {
-                self.excess.add(self.cursor.offset());
+                self.excess.add_line_at_offset(self.cursor.offset());
             }
             self.cursor.move_to_next_line();
         }
@@ -320,9 +320,9 @@ impl OffReader<'_> {
         colors.push_repeated(color, times, self.cursor.offset());
         match color {
             [_, _, _, alpha] => colors.track_lowest_alpha(*alpha, self.cursor.offset()),
-            [_] => self.indices.add(self.cursor.offset()),
+            [_] => self.indices.add_line_at_offset(self.cursor.offset()),
             [] | [_, _, _] => {}
-            [_, _] | [_, _, _, _, _, ..] => self.excess.add(self.cursor.offset()),
+            [_, _] | [_, _, _, _, _, ..] => self.excess.add_line_at_offset(self.cursor.offset()),
         }
     }
 
@@ -352,7 +352,7 @@ impl OffReader<'_> {
 
     /// Reads texture coordinates: the last two numbers on the line. A color with any number of components may
     /// precede them.
-    fn read_uv(&mut self) -> Result<Vec2, AssetError> {
+    fn read_uv_at_line_end(&mut self) -> Result<Vec2, AssetError> {
         let mut last = DVec2::new(self.float("u")?, self.float("v")?);
         while self.cursor.skip_to_word_in_line() {
             last = DVec2::new(last.y, self.float("a number")?);
@@ -408,7 +408,7 @@ impl OffReader<'_> {
         let (mut color, mut count) = ([0.0; 5], 0);
         while count < color.len() && self.cursor.skip_to_word_in_line() {
             let Some(number) = self.cursor.float() else {
-                self.excess.add(self.cursor.offset());
+                self.excess.add_line_at_offset(self.cursor.offset());
                 break;
             };
             color[count] = number;

@@ -7,11 +7,11 @@ use rayon::prelude::*;
 use super::coincident;
 use crate::assets::{Companion, FileMaterial};
 use crate::control::{CancelToken, Cancelled};
-use crate::geometry::mesh::VertexNormalSharing;
+use crate::geometry::mesh::VertexNormalGroup;
 use crate::math::{DVec3, Vec2, Vec3};
 
 /// Returns the index of the face that contains a corner, given each face's number of corners.
-pub(super) fn face_of_corner(arities: &[u32], corner: usize) -> usize {
+pub(super) fn face_of_corner_from_arities(arities: &[u32], corner: usize) -> usize {
     let mut end = 0;
     let is_before = |arity: &&u32| {
         end += **arity as usize;
@@ -72,7 +72,7 @@ impl Faces {
         if self.arities.is_empty() {
             return corner / 3;
         }
-        face_of_corner(&self.arities, corner)
+        face_of_corner_from_arities(&self.arities, corner)
     }
 
     /// Number of faces.
@@ -88,7 +88,7 @@ impl Faces {
 pub(crate) struct ParsedMesh {
     pub(crate) positions: Vec<DVec3>,
     pub(crate) normals: Vec<Vec3>,
-    pub(crate) normal_groups: Vec<VertexNormalSharing>,
+    pub(crate) normal_groups: Vec<VertexNormalGroup>,
     pub(crate) uvs: Vec<Vec2>,
     pub(crate) second_uvs: Vec<Vec2>,
     /// Colors in sRGB.
@@ -119,7 +119,7 @@ pub(crate) struct ColorComponentExtremes {
 }
 
 impl ColorComponentExtremes {
-    pub(super) fn add(&mut self, value: f64, at: usize) {
+    pub(super) fn add_component(&mut self, value: f64, at: usize) {
         if !value.is_finite() {
             self.non_finite.get_or_insert((value, at));
             return;
@@ -171,7 +171,7 @@ pub(crate) struct ColorRange(ColorComponentExtremes);
 impl ColorRange {
     /// Adds a color and its byte offset.
     pub(crate) fn add(&mut self, parts: [f64; 3], at: usize) {
-        parts.into_iter().for_each(|part| self.0.add(part, at));
+        parts.into_iter().for_each(|part| self.0.add_component(part, at));
     }
 
     /// Color value at full intensity. If there are fractions and no value exceeds 2, values above 1 are

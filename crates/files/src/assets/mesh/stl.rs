@@ -32,7 +32,7 @@ pub(super) fn parse(source: &MeshFileBytes<'_>) -> Result<LoadedMesh, AssetError
             let mut reader =
                 TextReader { source, cursor: Cursor::new(source.bytes, 0), polygons: Vec::new() };
             let parsed = ParsedMesh { has_separate_corners: true, ..reader.read()? };
-            assemble_text_mesh(&source, parsed, |face| reader.polygon_offset(face))
+            assemble_text_mesh(&source, parsed, |face| reader.face_offset_unless_triangle(face))
         }
         StlEncoding::Binary => {
             assemble(source, ParsedMesh { has_separate_corners: true, ..read_binary(source)? })
@@ -149,7 +149,7 @@ struct TextReader<'a> {
 
 impl TextReader<'_> {
     /// Returns the byte offset of a face's loop, or `None` for faces with 3 corners.
-    fn polygon_offset(&self, face: usize) -> Option<usize> {
+    fn face_offset_unless_triangle(&self, face: usize) -> Option<usize> {
         self.polygons.iter().find(|(polygon, _)| *polygon == face).map(|(_, start)| *start)
     }
 

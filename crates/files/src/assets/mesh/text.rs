@@ -68,7 +68,7 @@ impl Lines {
 
     /// Skips buffered lines that do not contain `letter` in upper or lower case. This is much faster than
     /// reading them.
-    pub(super) fn skip_buffered_lines_without(&mut self, letter: u8) {
+    pub(super) fn skip_buffered_lines_without_letter(&mut self, letter: u8) {
         let Ok(buffer) = self.reader.fill_buf() else { return };
         let (lower, upper) = (letter.to_ascii_lowercase(), letter.to_ascii_uppercase());
         let found = memchr::memchr2(lower, upper, buffer).unwrap_or(buffer.len());

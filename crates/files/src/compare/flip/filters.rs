@@ -3,7 +3,7 @@
 
 use std::f64::consts::{FRAC_1_SQRT_2, PI};
 
-use super::super::plane::{Plane, normalized_taps, offsets, unnormalized_gaussian};
+use super::super::plane::{Plane, normalized_taps, offsets, unnormalized_gaussian_taps};
 
 /// A Gaussian term of a contrast sensitivity function: amplitude, and width in square degrees.
 #[derive(Clone, Copy)]
@@ -56,7 +56,7 @@ impl Filters {
             blurs.iter_mut().for_each(|blur| blur.taps = padded(&blur.taps, blur_radius));
             blurs
         });
-        let bell = unnormalized_gaussian(sigma, feature_radius);
+        let bell = unnormalized_gaussian_taps(sigma, feature_radius);
         let slope: Vec<_> = offsets(feature_radius).zip(&bell).map(|(x, g)| -x * g).collect();
         let curvature: Vec<_> =
             offsets(feature_radius).zip(&bell).map(|(x, g)| (x * x / (sigma * sigma) - 1.0) * g).collect();
@@ -112,7 +112,7 @@ fn sensitivity_blurs_of_channel(
     let volumes = terms.iter().map(|term| {
         // exp(−π²d²/b) with d in degrees.
         let sigma = (term.b / 2.0).sqrt() / PI * pixels_per_degree;
-        let taps = unnormalized_gaussian(sigma, radius);
+        let taps = unnormalized_gaussian_taps(sigma, radius);
         let sum: f64 = taps.iter().sum();
         WeightedGaussian { weight: term.a * (PI / term.b).sqrt() * sum * sum, taps: normalized_taps(&taps) }
     });

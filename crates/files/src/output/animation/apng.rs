@@ -4,7 +4,7 @@ use ::png::{BlendOp, ColorType, DisposeOp, Encoder, EncodingError, SrgbRendering
 
 use super::super::SOFTWARE;
 use super::super::png::add_text;
-use super::frame_duration_in_ticks;
+use super::turn_frame_duration_in_ticks;
 use crate::control::CancelToken;
 use crate::film::Srgb8Image;
 
@@ -21,7 +21,7 @@ pub(super) fn encode(
     encoder.set_source_srgb(SrgbRenderingIntent::Perceptual);
     // 0 means that the animation repeats forever.
     encoder.set_animated(frames.len() as u32, 0)?;
-    encoder.set_frame_delay(frame_duration_in_ticks(frames.len(), 1000.0).round() as u16, 1000)?;
+    encoder.set_frame_delay(turn_frame_duration_in_ticks(frames.len(), 1000.0).round() as u16, 1000)?;
     encoder.set_blend_op(BlendOp::Source)?;
     encoder.set_dispose_op(DisposeOp::None)?;
     add_text(&mut encoder, "Software", SOFTWARE)?;

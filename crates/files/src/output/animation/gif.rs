@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::super::{SOFTWARE, one_line};
 use super::dither::Dither;
-use super::frame_duration_in_ticks;
+use super::turn_frame_duration_in_ticks;
 use crate::control::CancelToken;
 use crate::film::Srgb8Image;
 
@@ -37,7 +37,7 @@ pub(super) fn encode(
         encoder.write_raw_extension(comment, &[line.as_bytes()])?;
     }
     // Compress several frames in parallel.
-    let delay = frame_duration_in_ticks(frames.len(), 100.0).round() as u16;
+    let delay = turn_frame_duration_in_ticks(frames.len(), 100.0).round() as u16;
     let dither = Dither::new(&palette);
     let compress = |picture: &Srgb8Image| {
         let buffer = dither.palette_indices(picture, token)?;

@@ -44,7 +44,7 @@ pub fn encode(
 }
 
 /// Returns the duration of a frame in units of 1/`per_second` seconds.
-fn frame_duration_in_ticks(frames: usize, per_second: f64) -> f64 {
+fn turn_frame_duration_in_ticks(frames: usize, per_second: f64) -> f64 {
     (TURN_SECONDS / frames as f64).max(SHORTEST_FRAME) * per_second
 }
 

@@ -96,7 +96,7 @@ pub fn merge_into_film(
         token.check_pause_and_cancel()?;
         let area = film.tile_rect(tile).map_or(0, |rect| rect.area());
         let stored = match first.head.share.block_count {
-            0 => read_whole_tile(parts, tile, area)?,
+            0 => find_tile_in_parts(parts, tile, area)?,
             blocks => sum_blocks(parts, blocks, tile, area)?,
         };
         let is_complete = stored.as_ref().is_some_and(|(_, is_complete)| *is_complete);
@@ -116,7 +116,7 @@ pub fn merge_into_film(
 }
 
 /// Returns a tile, which only one part may contain, and whether it has all of its samples.
-fn read_whole_tile(
+fn find_tile_in_parts(
     parts: &[PartFile],
     tile: usize,
     area: usize,

@@ -24,7 +24,7 @@ pub use head::{
     ImageHeader, PartHeader, PartOrCheckpoint, PartShare, RenderInput, ToneHeader, render_input_differences,
 };
 pub use merge::{MergedParts, check_and_list_missing, merge_into_film};
-pub use read::{PartFile, find_input_by_path_suffix, input_name_by_content, is_part};
+pub use read::{PartFile, find_input_that_ends_path, input_name_by_content, is_part};
 pub use save::save;
 
 /// Magic number. Like PNG's signature, it is corrupted if a program converts the file as if it were text, so

@@ -8,7 +8,7 @@ use std::sync::mpsc::{self, SyncSender};
 use serde_json::Value;
 
 use super::super::OutputError;
-use super::super::write::{Durability, WritePolicy, atomic_generated};
+use super::super::write::{Durability, ExistingFilePolicy, atomic_generated};
 use super::{Digest, FOOTER, Footer, MARK, PartHeader, VERSION, digest};
 use crate::control::CancelToken;
 use crate::film::Film;
@@ -24,7 +24,7 @@ pub fn save(
     head: &PartHeader,
     film: &Film,
     state: &Value,
-    guard: &WritePolicy<'_>,
+    guard: &ExistingFilePolicy<'_>,
     (token, durability): (&CancelToken, Durability),
 ) -> Result<Option<File>, OutputError> {
     atomic_generated(path, &|file| write(file, head, film, state, token), guard, (token, durability))

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use proptest::prelude::*;
 use serde_json::json;
 
-use super::super::write::{Durability, WritePolicy};
+use super::super::write::{Durability, ExistingFilePolicy};
 use super::super::{AttributeLossPolicy, BitDepth, FilmEncodingSettings};
 use super::*;
 use crate::control::CancelToken;
@@ -57,7 +57,7 @@ fn head(index: u32, count: u32, film: &Film) -> PartHeader {
     }
 }
 
-const OPEN: WritePolicy<'static> = WritePolicy {
+const OPEN: ExistingFilePolicy<'static> = ExistingFilePolicy {
     is_kept: &|_| false,
     may_replace: &|_| Ok(()),
     sweep: None,
@@ -296,6 +296,6 @@ fn inputs_match_the_end_of_a_path() {
         ("/d.png", None),
         ("/scenes", None),
     ] {
-        assert_eq!(head.find_input_by_path_suffix(Path::new(path)), expected, "{path}");
+        assert_eq!(head.find_input_that_ends_path(Path::new(path)), expected, "{path}");
     }
 }

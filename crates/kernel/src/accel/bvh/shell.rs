@@ -108,7 +108,7 @@ pub enum PrimitiveOrEnclosingSubtree {
     /// A primitive whose surface may intersect the box.
     Primitive(u32),
     /// A subtree in which every primitive encloses the box, identified by its index in
-    /// [`Bvh::highest_ids_by_subtree`].
+    /// [`Bvh::n_highest_ids_by_subtree`].
     Enclosing(usize),
 }
 
@@ -132,7 +132,7 @@ impl Bvh {
 
     /// Returns, for each subtree, the `N` highest primitive ids that satisfy `counts`, in descending order.
     /// Empty if the tree has no shells.
-    pub fn highest_ids_by_subtree<const N: usize>(
+    pub fn n_highest_ids_by_subtree<const N: usize>(
         &self,
         counts: impl Fn(u32) -> bool,
     ) -> Vec<ArrayVec<u32, N>> {

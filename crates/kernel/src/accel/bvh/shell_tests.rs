@@ -76,7 +76,7 @@ fn nested_box_queries_match_brute_force() {
     for spread in [0.0, 1e-4, 0.02] {
         let spheres = spheres(200, spread);
         let tree = tree(&spheres);
-        let last = tree.highest_ids_by_subtree::<3>(|id| id.is_multiple_of(2));
+        let last = tree.n_highest_ids_by_subtree::<3>(|id| id.is_multiple_of(2));
         let mut next = random(3);
         for i in 0..500 {
             let at = Vec3::X + Vec3::new(next(), next(), next()) * 2.0;

@@ -15,14 +15,14 @@ use crate::control::{CancelToken, Cancelled};
 use crate::geometry::{Aabb, Ray};
 use crate::math::Vec3;
 
-use node::{DecodedNode, KdNode, LeafTriangle};
+use node::{DecodedNode, LeafTriangle, PackedKdNode};
 
 /// A kd-tree over triangles.
 #[derive(Clone, Debug)]
 pub struct KdTree {
     /// Nodes in depth-first order: the root is first, and a left child follows its parent. Empty if there are
     /// no triangles.
-    nodes: Vec<KdNode>,
+    nodes: Vec<PackedKdNode>,
     /// Indices into `triangles`, leaf by leaf.
     references: Vec<u32>,
     /// All triangles without duplicates, in the order in which the leaves first refer to them.

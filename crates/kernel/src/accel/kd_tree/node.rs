@@ -5,12 +5,12 @@ use crate::math::Vec3;
 /// Tag of a leaf, stored in place of an inner node's axis.
 const LEAF: u32 = 3;
 
-/// Largest child index or reference count that fits into `KdNode::tag`.
+/// Largest child index or reference count that fits into `PackedKdNode::tag`.
 pub const MOST: u32 = u32::MAX >> 2;
 
 /// An encoded node. The left child of an inner node is the next node.
 #[derive(Clone, Copy, Debug)]
-pub struct KdNode {
+pub struct PackedKdNode {
     /// Inner node: bits of the plane's coordinate. Leaf: index of the first reference.
     payload: u32,
     /// The two low bits contain the axis or [`LEAF`]. The others contain the right child or the number of
@@ -39,7 +39,7 @@ pub enum DecodedNode {
     },
 }
 
-impl KdNode {
+impl PackedKdNode {
     /// Encodes a node.
     pub fn new(kind: DecodedNode) -> Self {
         match kind {

@@ -107,7 +107,7 @@ impl Torus {
     }
 
     /// Unit tangents around the tube and around the axis.
-    pub(super) fn principal_directions(&self, point: DVec3) -> [DVec3; 2] {
+    pub(super) fn meridian_and_azimuth_tangents(&self, point: DVec3) -> [DVec3; 2] {
         let (out, from_circle) = self.directions_from_axis_and_circle(point);
         let around_tube = self.frame.vector_to_world((out * -from_circle.y).extend(from_circle.x));
         [around_tube, self.frame.tangent_around(point)]
@@ -162,7 +162,7 @@ impl Torus {
     /// Samples a point uniformly over the area. The tube angle ψ has a pdf proportional to 1 +
     /// (tube/radius)·cos ψ. The pdf values at ψ and at the mirrored angle π − ψ have a constant sum, so a
     /// uniformly distributed ψ is either kept or mirrored, with probabilities proportional to these values.
-    pub fn sample(&self, _: u32, u: Vec2) -> SurfaceSample {
+    pub fn sample_point_on_part(&self, _: u32, u: Vec2) -> SurfaceSample {
         let (x, y) = (f64::from(u.x), f64::from(u.y));
         // cos ψ at v = y, where ψ = 0 corresponds to v = ½.
         let share = 0.5 - 0.5 * (self.tube / self.radius) * libm::cos(2.0 * PI * y);
@@ -208,13 +208,13 @@ impl Torus {
     }
 
     /// Projected area averaged over all directions, which is a quarter of the area.
-    pub fn projected_area(&self, _: DVec3) -> f64 {
-        let [area] = self.part_areas();
+    pub fn projected_area_estimate(&self, _: DVec3) -> f64 {
+        let [area] = self.local_part_areas();
         area / 4.0
     }
 
     /// Area of each part.
-    pub fn part_areas(&self) -> [f64; 1] {
+    pub fn local_part_areas(&self) -> [f64; 1] {
         [4.0 * PI * PI * self.radius * self.tube]
     }
 

@@ -69,7 +69,7 @@ impl EmissionModulation {
 
     /// The factor at the given texture coordinates.
     #[inline]
-    pub fn lookup(&self, uv: DVec2) -> Vec3 {
+    pub fn factor_at_uv(&self, uv: DVec2) -> Vec3 {
         self.lookup_texture_point(&TexturePoint::from_uv(uv))
     }
 
@@ -111,7 +111,7 @@ impl EmissionModulation {
         let (point, direction) = (point.as_dvec3(), direction.as_dvec3());
         let at = self.chart.texture_point(point, primitive);
         // At a shape's edge, the probe ray may miss the shape because of rounding.
-        let normal = self.chart.normal_at_point(point, primitive, direction);
+        let normal = self.chart.geometric_normal_at_point(point, primitive, direction);
         coat.transmittance(&at, normal.map_or(1.0, |normal| normal.dot(direction)) as f32, &mut 0)
     }
 }
@@ -122,7 +122,7 @@ const PROBE: f64 = 1e-3;
 impl UvMapping {
     /// The unit normal on the front side at a point, which may be viewed from either side. Returns `None` if
     /// the probe ray misses the surface.
-    fn normal_at_point(&self, point: DVec3, primitive: u32, direction: DVec3) -> Option<DVec3> {
+    fn geometric_normal_at_point(&self, point: DVec3, primitive: u32, direction: DVec3) -> Option<DVec3> {
         match self {
             Self::Shape(shape) => {
                 let size = f64::from(shape.bounds()?.extent().max_element());

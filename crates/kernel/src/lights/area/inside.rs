@@ -19,7 +19,7 @@ pub struct InwardEmitter {
 
 impl ShapeEmitter for InwardEmitter {
     fn sample(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
-        match self.shape.encloses_point(point.as_dvec3()) {
+        match self.shape.encloses_point_if_closed(point.as_dvec3()) {
             Some(true) => self.sample_direction(point, u),
             Some(false) => LightSamplePoint::NOTHING,
             None => self.sample_by_area(point, u),
@@ -27,7 +27,7 @@ impl ShapeEmitter for InwardEmitter {
     }
 
     fn pdf(&self, from: Vec3, met: &LightHit) -> f32 {
-        match self.shape.encloses_point(from.as_dvec3()) {
+        match self.shape.encloses_point_if_closed(from.as_dvec3()) {
             Some(true) => 1.0 / ALL_AROUND,
             Some(false) => 0.0,
             None if self.is_nearest_hit_at(from, met.direction, met.distance) => met.uniform_area_pdf(
@@ -48,7 +48,7 @@ const ALL_AROUND: f32 = 4.0 * PI;
 impl InwardEmitter {
     /// Creates an emitter for a shape's inside, or returns `None` if the shape has no area.
     pub fn new(shape: &Shape) -> Option<Self> {
-        Some(Self { shape: shape.clone(), by_area: DiscreteDistribution::new(shape.part_areas())? })
+        Some(Self { shape: shape.clone(), by_area: DiscreteDistribution::new(shape.local_part_areas())? })
     }
 
     /// Samples a direction uniformly from a point inside the shape.
@@ -66,7 +66,8 @@ impl InwardEmitter {
     /// point.
     fn sample_by_area(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
         let (part, rest) = self.by_area.sample(u[0]);
-        let SurfaceSample { point: place, normal } = self.shape.sample(part as u32, Vec2::new(rest, u[1]));
+        let SurfaceSample { point: place, normal } =
+            self.shape.sample_point_on_part(part as u32, Vec2::new(rest, u[1]));
         let offset = place - point.as_dvec3();
         let distance = offset.length();
         let direction = offset / distance;

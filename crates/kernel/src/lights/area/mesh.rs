@@ -101,7 +101,7 @@ impl MeshEmitter {
 
     /// Samples a point uniformly on the triangle at `index`. Returns the point, the triangle's area, and its
     /// primitive index.
-    pub fn sample_triangle_by_area(&self, index: usize, u: Vec2) -> (SurfaceSample, f64, u32) {
+    pub fn sample_point_on_triangle(&self, index: usize, u: Vec2) -> (SurfaceSample, f64, u32) {
         let ([a, b, c], primitive) = &self.triangles[index];
         let weights = warp::triangle(u).as_dvec3();
         let point = *a * weights.x + *b * weights.y + *c * weights.z;

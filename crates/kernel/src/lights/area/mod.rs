@@ -42,7 +42,7 @@ use mesh::TrianglePairQuad;
 use quad::QuadEmitter;
 use see_through::SeeThroughShapeEmitter;
 use sphere::SphereEmitter;
-use surface_of_revolution::{ConeSide, CylinderSide, RevolutionEmitter};
+use surface_of_revolution::{CappedRevolutionEmitter, ConeSide, CylinderSide};
 use textured_quad::TexturedQuadEmitter;
 use torus::TorusEmitter;
 use transformed::TransformedEmitter;
@@ -113,9 +113,9 @@ pub enum Emitter {
     /// A disk.
     Disk(DiskEmitter),
     /// A cylinder.
-    Cylinder(Box<RevolutionEmitter<CylinderSide>>),
+    Cylinder(Box<CappedRevolutionEmitter<CylinderSide>>),
     /// A cone.
-    Cone(Box<RevolutionEmitter<ConeSide>>),
+    Cone(Box<CappedRevolutionEmitter<ConeSide>>),
     /// A torus.
     Torus(TorusEmitter),
     /// The front of a transformed shape.
@@ -207,8 +207,10 @@ fn front_emitter(shape: &Shape) -> Option<Emitter> {
         Shape::Box(cuboid) => Emitter::Box(BoxEmitter::new(cuboid)),
         Shape::Triangle(triangle) => Emitter::Triangle(TriangleEmitter::new(triangle)?),
         Shape::Disk(disk) => Emitter::Disk(DiskEmitter::new(disk)),
-        Shape::Cylinder(cylinder) => Emitter::Cylinder(Box::new(RevolutionEmitter::from_cylinder(cylinder))),
-        Shape::Cone(cone) => Emitter::Cone(Box::new(RevolutionEmitter::from_cone(cone))),
+        Shape::Cylinder(cylinder) => {
+            Emitter::Cylinder(Box::new(CappedRevolutionEmitter::from_entire_cylinder(cylinder)))
+        }
+        Shape::Cone(cone) => Emitter::Cone(Box::new(CappedRevolutionEmitter::from_entire_cone(cone))),
         Shape::Torus(torus) => Emitter::Torus(TorusEmitter::new(*torus)),
         Shape::Transformed(own) => {
             Emitter::Transformed(Box::new(TransformedEmitter::new(front_emitter(&own.shape)?, own)))
@@ -246,7 +248,7 @@ pub fn see_through_shape_side_light(
 
 /// Creates the light on the back of a shape, or returns `None` if the shape is infinite or has no area.
 pub fn back_area_light(shape: &Shape, radiance: Vec3, object: u32) -> Option<AreaLight> {
-    let turned = turned_over(shape);
+    let turned = turned_over_if_flat(shape);
     let light = front_area_light(turned.as_ref().unwrap_or(shape), radiance, object)?;
     let emitter = match turned {
         Some(_) => light.shape,
@@ -256,12 +258,12 @@ pub fn back_area_light(shape: &Shape, radiance: Vec3, object: u32) -> Option<Are
 }
 
 /// Turns a flat shape over so that its front faces the other way. Returns `None` for other shapes.
-fn turned_over(shape: &Shape) -> Option<Shape> {
+fn turned_over_if_flat(shape: &Shape) -> Option<Shape> {
     match shape {
         Shape::Quad(quad) => Some(Shape::Quad(Parallelogram::new(quad.corner, quad.v, quad.u))),
         Shape::Triangle(Triangle { a, b, c }) => Some(Shape::Triangle(Triangle { a: *a, b: *c, c: *b })),
         Shape::Disk(disk) => Some(Shape::Disk(Disk::new(disk.centroid(), -disk.normal(), disk.radius()))),
-        Shape::Transformed(own) => turned_over(&own.shape)
+        Shape::Transformed(own) => turned_over_if_flat(&own.shape)
             .map(|shape| Shape::Transformed(Box::new(TransformedShape::new(shape, own.to_world)))),
         Shape::Plane(_)
         | Shape::Sphere(_)
@@ -290,11 +292,13 @@ fn flat_normal(shape: &Shape) -> Option<DVec3> {
 
 /// Area of a shape, estimated on a grid of points if the shape is transformed.
 fn area(shape: &Shape) -> f64 {
-    let areas = shape.part_areas();
+    let areas = shape.local_part_areas();
     let Shape::Transformed(_) = shape else { return areas.iter().sum() };
     const SIDE: u32 = 16;
     let grid = |i: u32| (Vec2::new((i % SIDE) as f32, (i / SIDE) as f32) + 0.5) / SIDE as f32;
-    let scale = |part: u32, i: u32| shape.area_scale_for_world_normal(shape.sample(part, grid(i)).normal);
+    let scale = |part: u32, i: u32| {
+        shape.area_scale_for_world_normal(shape.sample_point_on_part(part, grid(i)).normal)
+    };
     let mean = |part: u32| (0..SIDE * SIDE).map(|i| scale(part, i)).sum::<f64>() / f64::from(SIDE * SIDE);
     (0..).zip(areas).map(|(part, area)| if area > 0.0 { area * mean(part) } else { 0.0 }).sum()
 }
@@ -320,7 +324,7 @@ impl AreaLight {
                 Side::Front => [u, v],
                 Side::Back => [v, u],
             };
-            let color = |at: [f64; 2]| texture.lookup(DVec2::from_array(ordered(at)));
+            let color = |at: [f64; 2]| texture.factor_at_uv(DVec2::from_array(ordered(at)));
             let across = ordered(texture.texels_per_uv_unit());
             let picture = TexturedQuadEmitter::new(*quad, across, color);
             if let Some(picture) = picture {

@@ -22,14 +22,19 @@ impl SeeThroughShapeEmitter {
             Side::Front => 1.0,
             Side::Back => -1.0,
         };
-        Some(Self { shape: shape.clone(), by_area: DiscreteDistribution::new(shape.part_areas())?, outwards })
+        Some(Self {
+            shape: shape.clone(),
+            by_area: DiscreteDistribution::new(shape.local_part_areas())?,
+            outwards,
+        })
     }
 }
 
 impl ShapeEmitter for SeeThroughShapeEmitter {
     fn sample(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
         let (part, rest) = self.by_area.sample(u[0]);
-        let SurfaceSample { point: place, normal } = self.shape.sample(part as u32, Vec2::new(rest, u[1]));
+        let SurfaceSample { point: place, normal } =
+            self.shape.sample_point_on_part(part as u32, Vec2::new(rest, u[1]));
         let offset = place - point.as_dvec3();
         let distance = offset.length();
         let cosine = -self.outwards * normal.dot(offset) / distance;

@@ -10,7 +10,7 @@ use crate::math::{DVec3, Vec3};
 
 /// A curved side and its caps. At most one cap is visible from any point.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RevolutionEmitter<S> {
+pub struct CappedRevolutionEmitter<S> {
     side: S,
     caps: [Option<DiskEmitter>; 2],
     middle: DVec3,
@@ -34,7 +34,7 @@ pub trait RevolutionSideView {
     fn max_visible_angle(&self) -> SinCos;
 
     /// Difference between the cosines at the two ends of the visible interval, for an angle around the pole.
-    fn cosine_difference_across_azimuth(&self, around: SinCos) -> f64;
+    fn visible_cosine_extent_at_azimuth(&self, around: SinCos) -> f64;
 
     /// Angle from the pole and distance of the point at a fraction `share` of the cosine interval, in the
     /// half plane at the angle `around` the pole.
@@ -49,7 +49,7 @@ struct RevolutionView<V> {
     share: f64,
 }
 
-impl<S: RevolutionSide> ShapeEmitter for RevolutionEmitter<S> {
+impl<S: RevolutionSide> ShapeEmitter for CappedRevolutionEmitter<S> {
     /// Samples nearly uniformly over the solid angle. The density varies between meridians, and it varies by
     /// up to 20 % on a cap.
     fn sample(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
@@ -61,7 +61,7 @@ impl<S: RevolutionSide> ShapeEmitter for RevolutionEmitter<S> {
                 let around = SinCos::from_radians(angle);
                 let (from_pole, distance) =
                     side.polar_angle_and_distance_at_fraction(around, f64::from(u[0] / share));
-                let factor = side.cosine_difference_across_azimuth(around) / (density * f64::from(share));
+                let factor = side.visible_cosine_extent_at_azimuth(around) / (density * f64::from(share));
                 (side.polar_frame().direction(from_pole, around), distance, factor)
             }
             (_, Some((cap, normal))) => {
@@ -84,7 +84,7 @@ impl<S: RevolutionSide> ShapeEmitter for RevolutionEmitter<S> {
             (Some((side, meridians)), _) => {
                 let angle = side.polar_frame().azimuth(met.direction);
                 share * meridians.pdf(angle)
-                    / side.cosine_difference_across_azimuth(SinCos::from_radians(angle.abs()))
+                    / side.visible_cosine_extent_at_azimuth(SinCos::from_radians(angle.abs()))
             }
             (None, _) => 0.0,
         };
@@ -96,11 +96,11 @@ impl<S: RevolutionSide> ShapeEmitter for RevolutionEmitter<S> {
     }
 }
 
-impl<S: RevolutionSide> RevolutionEmitter<S> {
+impl<S: RevolutionSide> CappedRevolutionEmitter<S> {
     fn view_from(&self, point: Vec3) -> RevolutionView<S::View> {
         let side = self.side.view_from(point).map(|view| {
             let meridians = AzimuthDistribution::new(view.max_visible_angle(), |turn| {
-                view.cosine_difference_across_azimuth(turn)
+                view.visible_cosine_extent_at_azimuth(turn)
             });
             (view, meridians)
         });
@@ -138,9 +138,9 @@ pub struct CylinderView {
     ends: [f64; 2],
 }
 
-impl RevolutionEmitter<CylinderSide> {
+impl CappedRevolutionEmitter<CylinderSide> {
     /// Creates an emitter for an entire cylinder.
-    pub fn from_cylinder(cylinder: &Cylinder) -> Self {
+    pub fn from_entire_cylinder(cylinder: &Cylinder) -> Self {
         let caps = [1, 2].map(|number| cylinder.cap_disk(number));
         let across = caps[1].centroid() - caps[0].centroid();
         let side = CylinderSide {
@@ -196,7 +196,7 @@ impl RevolutionSideView for CylinderView {
         self.reach
     }
 
-    fn cosine_difference_across_azimuth(&self, around: SinCos) -> f64 {
+    fn visible_cosine_extent_at_azimuth(&self, around: SinCos) -> f64 {
         let [low, high] =
             self.end_cosines(self.distance_to_cross_section(SinCos { sin: around.sin.abs(), ..around }));
         high - low
@@ -239,9 +239,9 @@ pub struct ConeView {
     slant: f64,
 }
 
-impl RevolutionEmitter<ConeSide> {
+impl CappedRevolutionEmitter<ConeSide> {
     /// Creates an emitter for an entire cone.
-    pub fn from_cone(cone: &Cone) -> Self {
+    pub fn from_entire_cone(cone: &Cone) -> Self {
         let (base, tip) = (cone.base(), cone.tip());
         let (height, radius) = ((base.centroid() - tip).length(), base.radius());
         let slant = (height * height + radius * radius).sqrt();
@@ -304,7 +304,7 @@ impl RevolutionSideView for ConeView {
         self.reach
     }
 
-    fn cosine_difference_across_azimuth(&self, around: SinCos) -> f64 {
+    fn visible_cosine_extent_at_azimuth(&self, around: SinCos) -> f64 {
         let at_tip = self.generatrix_angle_at_tip(around);
         let (along, across) = (self.distance - self.slant * at_tip.cos, self.slant * at_tip.sin);
         let length = (along * along + across * across).sqrt();
@@ -313,7 +313,7 @@ impl RevolutionSideView for ConeView {
 
     fn polar_angle_and_distance_at_fraction(&self, around: SinCos, share: f64) -> (SinCos, f64) {
         let at_tip = self.generatrix_angle_at_tip(around);
-        let versine = share * self.cosine_difference_across_azimuth(around);
+        let versine = share * self.visible_cosine_extent_at_azimuth(around);
         let from_pole = SinCos { sin: (versine * (2.0 - versine)).max(0.0).sqrt(), cos: 1.0 - versine };
         let sin = at_tip.sin * from_pole.cos + at_tip.cos * from_pole.sin;
         let farthest = self.distance + self.slant;

@@ -236,12 +236,12 @@ impl TorusView {
     ) -> (f64, Option<f64>) {
         let ray = RayF64 { origin: self.point, direction, t_max: f64::INFINITY };
         let entries = torus.entry_parameters(&ray);
-        let sum = entries.iter().flatten().map(|t| self.pdf(slices, direction * *t)).sum();
+        let sum = entries.iter().flatten().map(|t| self.pdf_at_point_offset(slices, direction * *t)).sum();
         (sum, entries[0])
     }
 
     /// Pdf at a point, given its offset from the view point.
-    fn pdf(&self, slices: &PiecewiseLinear<SLICES>, offset: DVec3) -> f64 {
+    fn pdf_at_point_offset(&self, slices: &PiecewiseLinear<SLICES>, offset: DVec3) -> f64 {
         let (x, y) = (self.distance + offset.dot(self.out), offset.dot(self.across));
         let ring = (x * x + y * y).sqrt();
         let turn = SinCos { sin: y / ring, cos: x / ring };

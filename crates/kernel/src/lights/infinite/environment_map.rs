@@ -105,7 +105,7 @@ impl EnvironmentMap {
         let density = self.cell_pdf(place.column, place.row);
         (
             interpolate_bilinear(&corners, place.between),
-            density * relative_pdf_in_cell(&luminances_of_corner_colors(&corners), place.along),
+            density * relative_pdf_in_cell(&luminances_of_four_corners(&corners), place.along),
         )
     }
 
@@ -115,7 +115,7 @@ impl EnvironmentMap {
     pub fn sample(&self, u: [f32; 2], turn: f32) -> (Vec3, Vec3, f32) {
         let GridSample { column, row, rest } = self.cells.sample(u);
         let corners = self.corner_texels(column as u32, row as u32);
-        let luminances = luminances_of_corner_colors(&corners);
+        let luminances = luminances_of_four_corners(&corners);
         let along = warp::bilinear(rest, &luminances);
         let (direction, down) = self.direction_in_cell(column as f32, row, along, turn);
         let density = self.cell_pdf(column as u32, row as u32);
@@ -171,7 +171,7 @@ impl EnvironmentMap {
         let [mut directions, mut colors] = [[[0.0; PACKET_SIZE]; 3]; 2];
         for i in 0..PACKET_SIZE {
             let corners = [0, 1, 2, 3].map(|corner| lane(&corners[corner], i));
-            let luminances = luminances_of_corner_colors(&corners);
+            let luminances = luminances_of_four_corners(&corners);
             let along = warp::bilinear([rest[0][i], rest[1][i]], &luminances);
             let y = tops[i] + extents[i] * f64::from(along[1]);
             let (direction, down) =
@@ -204,7 +204,7 @@ impl EnvironmentMap {
         for i in 0..PACKET_SIZE {
             let corners = [0, 1, 2, 3].map(|corner| lane(&corners[corner], i));
             set_lane(&mut colors, i, interpolate_bilinear(&corners, [between[i], angles[i]]));
-            pdfs[i] *= relative_pdf_in_cell(&luminances_of_corner_colors(&corners), [between[i], heights[i]]);
+            pdfs[i] *= relative_pdf_in_cell(&luminances_of_four_corners(&corners), [between[i], heights[i]]);
         }
         (colors, pdfs)
     }
@@ -294,7 +294,7 @@ fn interpolate_bilinear(corners: &[Vec3; 4], between: [f32; 2]) -> Vec3 {
 }
 
 #[inline(always)]
-fn luminances_of_corner_colors(corners: &[Vec3; 4]) -> [f32; 4] {
+fn luminances_of_four_corners(corners: &[Vec3; 4]) -> [f32; 4] {
     corners.map(luminance)
 }
 

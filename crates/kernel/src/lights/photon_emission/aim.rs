@@ -56,7 +56,7 @@ impl EmissionProfile<'_> {
 
     /// Upper bound on [`EmissionProfile::relative_intensity`] over a cone of directions. `sin` is the sine of
     /// the cone's half angle, which is at most 90°.
-    fn max_relative_intensity_in_cone(&self, axis: DVec3, sin: f64) -> f64 {
+    fn relative_intensity_bound_in_cone(&self, axis: DVec3, sin: f64) -> f64 {
         let cos = ((1.0 - sin) * (1.0 + sin)).max(0.0).sqrt();
         // Cosine of the smallest angle between a direction and the cone.
         let nearest = |direction: DVec3| {
@@ -115,7 +115,9 @@ impl PhotonTargets {
         for ball in &self.balls {
             let cone = TargetCone::from_sphere(ball, from);
             let weight = match &cone {
-                Some(cone) => cone.solid_angle() * sends.max_relative_intensity_in_cone(cone.axis, cone.sin),
+                Some(cone) => {
+                    cone.solid_angle() * sends.relative_intensity_bound_in_cone(cone.axis, cone.sin)
+                }
                 None => sends.effective_solid_angle(),
             };
             if weight > 0.0 {

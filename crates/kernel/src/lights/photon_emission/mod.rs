@@ -183,7 +183,7 @@ impl PhotonEmitter {
     pub fn with_targets(self, targets: &[BoundingSphere], share: f32) -> Self {
         let targets = PhotonTargets::new(targets).filter(|_| share > 0.0);
         let aim = targets.and_then(|targets| {
-            let power_toward = |(number, light)| self.power_toward_targets(number, light, &targets);
+            let power_toward = |(number, light)| self.estimate_power_toward_targets(number, light, &targets);
             let power_toward: Vec<f64> = self.lights.iter().map(power_toward).collect();
             let (sum, total) = (power_toward.iter().sum::<f64>(), self.by_power.total());
             let weight = |(number, power_toward): (usize, &f64)| {
@@ -207,7 +207,7 @@ impl PhotonEmitter {
     }
 
     /// Total power of all lights, in W.
-    pub fn power(&self) -> Vec3 {
+    pub fn total_light_power(&self) -> Vec3 {
         self.sources.iter().map(|source| source.power.as_dvec3()).sum::<DVec3>().as_vec3()
     }
 
@@ -351,7 +351,7 @@ impl PhotonEmitter {
     }
 
     /// Estimated power that a light emits toward the targets, used for choosing a light.
-    fn power_toward_targets(&self, number: u32, light: &Light, targets: &PhotonTargets) -> f64 {
+    fn estimate_power_toward_targets(&self, number: u32, light: &Light, targets: &PhotonTargets) -> f64 {
         let source = &self.sources[number as usize];
         let power = mean_channel(source.power);
         if !(power > 0.0) {

@@ -23,11 +23,11 @@ pub struct DividedEmissiveSurface {
 #[derive(Clone, Debug)]
 enum DividedSurfaceGeometry {
     /// An analytic shape. Each part is divided into side × side pieces of equal area, measured as in
-    /// [`Shape::part_areas`].
+    /// [`Shape::local_part_areas`].
     Shape {
         shape: Shape,
         side: u32,
-        /// [`Shape::part_areas`].
+        /// [`Shape::local_part_areas`].
         areas: Vec<f64>,
         /// Upper bound on the magnitudes of the lengths used to compute points.
         reach: f64,
@@ -76,7 +76,7 @@ impl DividedEmissiveSurface {
     pub fn new(light: &AreaLight, emitter_geometry: &EmissiveObjectGeometry) -> Option<Self> {
         let (on, count) = match emitter_geometry {
             EmissiveObjectGeometry::Shape(shape) => {
-                let areas = shape.part_areas();
+                let areas = shape.local_part_areas();
                 let is_uneven = light.texture.is_some() || matches!(shape, Shape::Transformed(_));
                 let most = if is_uneven { PIECES / areas.len().max(1) } else { 1 };
                 let side = most.isqrt().max(1);
@@ -151,7 +151,7 @@ impl DividedSurfaceGeometry {
                 let (part, cell) = (index / (all * all), index % (all * all));
                 let corner = Vec2::new((cell % all) as f32, (cell / all) as f32);
                 let u = ((corner + u) / *side as f32).min(Vec2::splat(1.0_f32.next_down()));
-                let SurfaceSample { point, normal } = shape.sample(part as u32, u);
+                let SurfaceSample { point, normal } = shape.sample_point_on_part(part as u32, u);
                 let area = areas[part] * shape.area_scale_for_world_normal(normal) / (all * all) as f64;
                 let normal = match light.side {
                     Side::Front => normal,
@@ -160,7 +160,7 @@ impl DividedSurfaceGeometry {
                 PiecePoint { point, normal, area, primitive: part as u32 }
             }
             (Self::Mesh { .. }, Some(mesh)) => {
-                let (place, area, primitive) = mesh.sample_triangle_by_area(index, u);
+                let (place, area, primitive) = mesh.sample_point_on_triangle(index, u);
                 PiecePoint { point: place.point, normal: place.normal, area, primitive }
             }
             (Self::Mesh { .. }, None) => {

@@ -9,7 +9,7 @@ use crate::geometry::disk::Disk;
 use crate::geometry::parallelogram::Parallelogram;
 use crate::geometry::sphere::Sphere;
 use crate::geometry::torus::Torus;
-use crate::geometry::transformed::tests::{area, sheared};
+use crate::geometry::transformed::tests::{part_area_by_midpoint_rule, sheared};
 use crate::geometry::triangle::Triangle;
 use crate::lights::area::Side;
 use crate::lights::delta::DeltaLight;
@@ -95,9 +95,15 @@ fn lights() -> Vec<(Light, Option<Shape>, f64)> {
     all.push((Light::Environment(Environment::Constant(COLOR)), None, 4.0 * PI * disk));
     for shape in shapes() {
         let light = front_area_light(&shape, COLOR, OBJECT).expect("an area");
-        let parts = 0..shape.part_areas().len() as u32;
+        let parts = 0..shape.local_part_areas().len() as u32;
         let area: f64 = parts
-            .map(|part| if shape.part_areas()[part as usize] > 0.0 { area(&shape, part) } else { 0.0 })
+            .map(|part| {
+                if shape.local_part_areas()[part as usize] > 0.0 {
+                    part_area_by_midpoint_rule(&shape, part)
+                } else {
+                    0.0
+                }
+            })
             .sum();
         all.push((Light::Area(light), Some(shape), PI * area));
     }
@@ -250,7 +256,7 @@ fn photons_from_one_light_carry_its_power() {
     for (light, shape, power) in lights().into_iter().filter(|(_, shape, _)| !is_transformed(shape)) {
         let source = source_of(light.clone(), shape.as_ref());
         let power = COLOR.as_dvec3() * power;
-        let told = source.power().as_dvec3();
+        let told = source.total_light_power().as_dvec3();
         assert!((told / power - 1.0).abs().max_element() < 1e-5, "{light:?}: {told} instead of {power}");
         let mut next = numbers(random::unit_generator(1));
         for _ in 0..1000 {
@@ -266,7 +272,7 @@ fn photons_from_one_light_carry_its_power() {
 #[test]
 fn photons_leave_convex_lights() {
     for shape in shapes() {
-        let is_open = shape.part_areas().last() == Some(&0.0);
+        let is_open = shape.local_part_areas().last() == Some(&0.0);
         if is_open || matches!(shape, Shape::Torus(_)) {
             continue;
         }
@@ -422,7 +428,7 @@ fn lights_are_chosen_by_power() {
         Arc::new(Lights::new((0..10_000).map(lamp).collect(), &CancelToken::new()).expect("never canceled"));
     let source = PhotonEmitter::new(&lights, |_| None, SCENE).expect("power");
     let (mut next, mut counts) = (numbers(random::unit_generator(8)), [0.0; 7]);
-    let power = source.power();
+    let power = source.total_light_power();
     let (mut flux, count) = (DVec3::ZERO, 700_000);
     for _ in 0..count {
         let photon = source.emit(&next()).expect("a photon");

@@ -5,7 +5,7 @@
 
 use arrayvec::ArrayVec;
 
-use super::node::{ImportanceAndNearness, NodeChild, Receiver};
+use super::node::{ImportanceAndNearnessPacket, NodeChild, Receiver};
 use super::{
     CumulativeImportance, LightPick, LightTree, NOT_IN_TREE, PreviousPickPath, ROOT, clamp_below,
     scale_u_to_total,
@@ -14,28 +14,28 @@ use crate::math::Vec3;
 use crate::math::lanes::F32x16;
 
 /// A cut through a tree, for picking lights at successive points.
-pub struct LightTreeCut<'a> {
+pub struct AdaptiveLightTreeCut<'a> {
     tree: &'a LightTree,
     /// Maximum number of nodes in the cut.
     room: usize,
     receiver: Receiver,
     /// Indices of the cut's nodes.
-    nodes: ArrayVec<u32, { LightTreeCut::MOST }>,
+    nodes: ArrayVec<u32, { AdaptiveLightTreeCut::MOST }>,
     /// Importance of each node's children, which is 0 for children that are also in the cut.
-    importance: ArrayVec<F32x16, { LightTreeCut::MOST }>,
+    importance: ArrayVec<F32x16, { AdaptiveLightTreeCut::MOST }>,
     /// Sum of the importance up to and including each node.
-    sums: ArrayVec<f64, { LightTreeCut::MOST }>,
+    sums: ArrayVec<f64, { AdaptiveLightTreeCut::MOST }>,
 }
 
 /// Minimum nearness at which a node is replaced by its children. Nearness is the squared sine of half the
 /// angle that the bounding sphere subtends.
 const NEAR: f32 = 0.05;
 
-impl<'a> LightTreeCut<'a> {
+impl<'a> AdaptiveLightTreeCut<'a> {
     /// Maximum number of nodes in any cut.
     pub const MOST: usize = 64;
 
-    /// Creates a cut with at most `room` nodes. [`LightTreeCut::adapt_to_receiver`] must be called before
+    /// Creates a cut with at most `room` nodes. [`AdaptiveLightTreeCut::adapt_to_receiver`] must be called before
     /// picking.
     #[inline(always)]
     pub fn new(tree: &'a LightTree, room: usize) -> Self {
@@ -69,7 +69,7 @@ impl<'a> LightTreeCut<'a> {
         }
         while self.importance.len() < self.nodes.len() {
             let node = &tree.nodes[self.nodes[self.importance.len()] as usize];
-            let ImportanceAndNearness { mut importance, nearness } = node.child_importances(receiver);
+            let ImportanceAndNearnessPacket { mut importance, nearness } = node.child_importances(receiver);
             for i in 0..node.count as usize {
                 if let NodeChild::LightTreeNode(below) = node.children[i]
                     && importance[i] > 0.0
@@ -142,7 +142,7 @@ impl<'a> LightTreeCut<'a> {
         (f64::from(self.importance[index][child]) * inverse) as f32
     }
 
-    /// Probability that [`LightTreeCut::pick_sorted_batch`] picks a light.
+    /// Probability that [`AdaptiveLightTreeCut::pick_sorted_batch`] picks a light.
     #[inline]
     pub fn probability(&self, light: u32) -> f32 {
         let place = self.tree.positions[light as usize];

@@ -9,7 +9,7 @@ mod node;
 mod single_node;
 
 pub use bounds::{EmissionCone, LightBounds};
-pub use cut::LightTreeCut;
+pub use cut::AdaptiveLightTreeCut;
 pub use node::{LightTreeNode, NodeChild, Receiver, ReceiverLobe, ReceiverPacket};
 pub use single_node::{LightPickPacket, SingleNodeLightImportances};
 

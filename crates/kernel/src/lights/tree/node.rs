@@ -209,7 +209,7 @@ impl LobePacket {
 
 /// Expected contributions of a node's children at a point.
 #[repr(align(64))]
-pub struct ImportanceAndNearness {
+pub struct ImportanceAndNearnessPacket {
     /// Importance in the tree's unit of power. It is 0 only if the child certainly contributes nothing.
     pub importance: F32x16,
     /// Squared sines of half the angles that the bounding spheres subtend, or 1 for points inside a sphere.
@@ -257,7 +257,7 @@ impl LightTreeNode {
     /// with bounds on cosines) × the lobe's response. It is never 0 if light from the child may reach the
     /// point.
     #[inline(always)]
-    pub fn child_importances(&self, receiver: &Receiver) -> ImportanceAndNearness {
+    pub fn child_importances(&self, receiver: &Receiver) -> ImportanceAndNearnessPacket {
         let receivers = ReceiverPacket::splat(receiver);
         expected_contributions(&self.bounds, &receivers, self.is_plain, receiver.lobe.is_some())
     }
@@ -287,7 +287,7 @@ fn expected_contributions(
     receivers: &ReceiverPacket,
     is_plain: bool,
     has_lobes: bool,
-) -> ImportanceAndNearness {
+) -> ImportanceAndNearnessPacket {
     match (is_plain, has_lobes) {
         (true, false) => specialized_contributions::<true, false>(bounds, receivers),
         (false, false) => specialized_contributions::<false, false>(bounds, receivers),
@@ -300,7 +300,7 @@ fn expected_contributions(
 fn specialized_contributions<const IS_PLAIN: bool, const HAS_LOBE: bool>(
     bounds: &LightBoundsPacket,
     receivers: &ReceiverPacket,
-) -> ImportanceAndNearness {
+) -> ImportanceAndNearnessPacket {
     let ReceiverPacket { point, normal, lobes } = receivers;
     let mut offset = bounds.center;
     for axis in 0..3 {
@@ -338,7 +338,7 @@ fn specialized_contributions<const IS_PLAIN: bool, const HAS_LOBE: bool>(
     let (mut value, mut away) = ([0.0; PACKET_SIZE], [1.0; PACKET_SIZE]);
     if IS_PLAIN {
         for i in 0..PACKET_SIZE {
-            value[i] = bounds.power[i] * clamp_to_min_cosine(mean[i]) * (inverse[i] * inverse[i]);
+            value[i] = bounds.power[i] * clamp_to_positive_cosine_range(mean[i]) * (inverse[i] * inverse[i]);
         }
     } else {
         let [mut cos, mut without] = [[0.0; PACKET_SIZE]; 2];
@@ -353,8 +353,10 @@ fn specialized_contributions<const IS_PLAIN: bool, const HAS_LOBE: bool>(
             let is_within = (cos[i] >= bounds.cos[i]) | (square[i] <= least[i]);
             away[i] = (if is_within { 1.0 } else { beyond }) + sin[i];
             let weakened = if bounds.weakens[i] > 0.0 { inverse[i] * inverse[i] } else { 1.0 };
-            value[i] =
-                bounds.power[i] * clamp_to_min_cosine(mean[i]) * weakened * clamp_to_min_cosine(away[i]);
+            value[i] = bounds.power[i]
+                * clamp_to_positive_cosine_range(mean[i])
+                * weakened
+                * clamp_to_positive_cosine_range(away[i]);
         }
     }
     if HAS_LOBE {
@@ -375,7 +377,7 @@ fn specialized_contributions<const IS_PLAIN: bool, const HAS_LOBE: bool>(
         importance[i] = if arrives { value } else { 0.0 };
         nearness[i] = sin[i] * sin[i];
     }
-    ImportanceAndNearness { importance, nearness }
+    ImportanceAndNearnessPacket { importance, nearness }
 }
 /// 1/√x for x ≥ [`MIN_IMPORTANCE`], accurate to a few ulps. Uses Newton's method because 16 square roots and
 /// divisions would take longer than the rest of the node test.
@@ -394,7 +396,7 @@ fn replace_by_inverse_sqrt(x: &mut F32x16) {
 
 /// Clamps a bound on a cosine.
 #[inline(always)]
-fn clamp_to_min_cosine(bound: f32) -> f32 {
+fn clamp_to_positive_cosine_range(bound: f32) -> f32 {
     min_or_second_if_nan(clamp_min(bound, MIN_COSINE), 1.0)
 }
 

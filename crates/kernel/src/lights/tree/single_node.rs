@@ -100,7 +100,7 @@ impl SingleNodeLightImportances<'_> {
                 NodeChild::LightTreeNode(_) => 0,
             };
         }
-        LightPickPacket { children, lights, probabilities: self.normalize_importance(&values) }
+        LightPickPacket { children, lights, probabilities: self.importances_to_pick_probabilities(&values) }
     }
 
     /// Probabilities of `picks` with these importances.
@@ -110,11 +110,11 @@ impl SingleNodeLightImportances<'_> {
         for i in 0..PACKET_SIZE {
             values[i] = self.importance[picks.children[i] as usize % PACKET_SIZE][i];
         }
-        self.normalize_importance(&values)
+        self.importances_to_pick_probabilities(&values)
     }
 
     #[inline(always)]
-    fn normalize_importance(&self, values: &F32x16) -> F32x16 {
+    fn importances_to_pick_probabilities(&self, values: &F32x16) -> F32x16 {
         let mut shares = [0.0; PACKET_SIZE];
         for i in 0..PACKET_SIZE {
             let share = (f64::from(values[i]) / self.totals[i]) as f32;

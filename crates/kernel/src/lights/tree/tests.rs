@@ -67,16 +67,16 @@ fn place(next: &mut impl FnMut() -> f32) -> (Vec3, Vec3) {
 const NODES: usize = 12;
 
 /// A cut for a point.
-fn cut_for(tree: &LightTree, point: Vec3, normal: Vec3, nodes: usize) -> LightTreeCut<'_> {
-    let mut cut = LightTreeCut::new(tree, nodes);
+fn cut_for(tree: &LightTree, point: Vec3, normal: Vec3, nodes: usize) -> AdaptiveLightTreeCut<'_> {
+    let mut cut = AdaptiveLightTreeCut::new(tree, nodes);
     // Visit another point first, which should not affect the result.
     cut.adapt_to_receiver(&Receiver::with_unknown_lobe(normal, point));
     cut.adapt_to_receiver(&Receiver::with_unknown_lobe(point, normal));
     cut
 }
 
-/// The light that [`LightTreeCut::pick`] picks for each number, and its probability.
-fn picks_of<const N: usize>(cut: &LightTreeCut<'_>, u: &[f64; N]) -> [Option<(u32, f32)>; N] {
+/// The light that [`AdaptiveLightTreeCut::pick`] picks for each number, and its probability.
+fn picks_of<const N: usize>(cut: &AdaptiveLightTreeCut<'_>, u: &[f64; N]) -> [Option<(u32, f32)>; N] {
     let mut picks = [None; N];
     cut.pick_sorted_batch(u.iter().copied(), |place, light, probability| {
         picks[place] = Some((light, probability));

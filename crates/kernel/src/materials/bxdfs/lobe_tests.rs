@@ -1,7 +1,7 @@
 //! Checks for microfacet lobes. The tests of each kind of BSDF use them. Compares values with an `f64`
 //! reference, samples with pdfs, and albedos.
 
-use crate::materials::bsdf::{DielectricSamplePacket, LobeFilter, SampledLobes};
+use crate::materials::bsdf::{DielectricSamplePacket, LobesToSample, ShownLobes};
 use crate::materials::bxdf::{Bxdf, ShadingGeometry};
 use crate::materials::bxdf_packet::BxdfPacket;
 use crate::math::lanes::{F32x16, PACKET_SIZE, Vec3x16, lane, set_lane};
@@ -116,7 +116,7 @@ impl<B: Bxdf> TestSurface<B> {
         for i in 0..PACKET_SIZE {
             let normal = Vec3::Z * light.light_side_sign() as f32;
             let place = ShadingGeometry { normal, wo: to_eye.as_vec3(), tangent: TANGENT };
-            row.set_bsdf(i, point, LobeFilter::ALL, &place);
+            row.set_bsdf(i, point, ShownLobes::ALL, &place);
         }
         Self { row, to_eye, alphas: alphas.map(f64::from), light }
     }
@@ -132,7 +132,7 @@ impl<B: Bxdf> TestSurface<B> {
     }
 
     /// f, the part of f from the wide lobes, and the pdf, for light from each direction.
-    pub fn evaluate_bsdf(&self, lobes: SampledLobes, directions: &[DVec3]) -> Vec<(DVec3, DVec3, f64)> {
+    pub fn evaluate_bsdf(&self, lobes: LobesToSample, directions: &[DVec3]) -> Vec<(DVec3, DVec3, f64)> {
         let mut all = Vec::new();
         for some in directions.chunks(PACKET_SIZE) {
             let mut rows = [[0.0; PACKET_SIZE], [0.0; PACKET_SIZE], [1.0; PACKET_SIZE]];
@@ -148,7 +148,7 @@ impl<B: Bxdf> TestSurface<B> {
                     (wide + narrow - f).abs().max_element() <= 2e-6 * f.max_element(),
                     "the parts should add up to {f}"
                 );
-                let [alone, of_wide_lobes, of_all_lobes] = self.row.lane_f(i, some[i].as_vec3());
+                let [alone, of_wide_lobes, of_all_lobes] = self.row.lane_f_by_lobe_set(i, some[i].as_vec3());
                 assert_eq!(alone, of_all_lobes);
                 let off = (of_wide_lobes.as_dvec3() - wide).abs().max_element();
                 assert!(off <= 1e-5 * f.max_element(), "{of_wide_lobes} instead of {wide}");
@@ -161,7 +161,7 @@ impl<B: Bxdf> TestSurface<B> {
     }
 
     /// Directions sampled with `side` × `side` stratified random numbers.
-    pub fn sample_directions(&self, lobes: SampledLobes, side: u32) -> Vec<DVec3> {
+    pub fn sample_directions(&self, lobes: LobesToSample, side: u32) -> Vec<DVec3> {
         let rows = stratified_packets(side)
             .map(|(choices, u)| self.row.sample(lobes, &self.lit_side_normals(), &choices, &u));
         let mut all: Vec<DVec3> =
@@ -171,7 +171,7 @@ impl<B: Bxdf> TestSurface<B> {
     }
 
     /// Samples on either side with the same random numbers as [`TestSurface::sample_direction`].
-    pub fn sample_either_side(
+    pub fn sample_reflection_or_transmission(
         &self,
         side: u32,
         sample: impl Fn(&BxdfPacket<B>, &F32x16, &[F32x16; 2]) -> DielectricSamplePacket,
@@ -191,7 +191,7 @@ impl<B: Bxdf> TestSurface<B> {
 
     /// Albedo of all lobes, estimated as the mean of f·cos/pdf over samples.
     pub fn sampled_albedo(&self, side: u32) -> DVec3 {
-        self.mean_sample_weight(&self.sample_directions(SampledLobes::All, side))
+        self.mean_sample_weight(&self.sample_directions(LobesToSample::All, side))
     }
 
     /// [`TestSurface::sampled_albedo`] with 16 lobe choices per cell.
@@ -204,7 +204,7 @@ impl<B: Bxdf> TestSurface<B> {
             let choices =
                 std::array::from_fn(|i| ((i as f32 + next()) / PACKET_SIZE as f32).min(0.999_999_9));
             let u = [[x; PACKET_SIZE], [y; PACKET_SIZE]];
-            let directions = self.row.sample(SampledLobes::All, &self.lit_side_normals(), &choices, &u);
+            let directions = self.row.sample(LobesToSample::All, &self.lit_side_normals(), &choices, &u);
             samples.extend((0..PACKET_SIZE).map(|i| lane(&directions, i).as_dvec3()));
         }
         self.mean_sample_weight(&samples)
@@ -212,8 +212,8 @@ impl<B: Bxdf> TestSurface<B> {
 
     /// Maximum of f·cos/pdf over samples of all lobes.
     pub fn largest_weight(&self, side: u32) -> f64 {
-        let samples = self.sample_directions(SampledLobes::All, side);
-        let values = self.evaluate_bsdf(SampledLobes::All, &samples);
+        let samples = self.sample_directions(LobesToSample::All, side);
+        let values = self.evaluate_bsdf(LobesToSample::All, &samples);
         let weights = samples.iter().zip(values).map(|(direction, (f, _, pdf))| {
             if pdf > 0.0 { f.max_element() * self.height(*direction).max(0.0) / pdf } else { 0.0 }
         });
@@ -222,7 +222,7 @@ impl<B: Bxdf> TestSurface<B> {
 
     /// Mean of f·cos/pdf.
     fn mean_sample_weight(&self, samples: &[DVec3]) -> DVec3 {
-        let values = self.evaluate_bsdf(SampledLobes::All, samples);
+        let values = self.evaluate_bsdf(LobesToSample::All, samples);
         let sum: DVec3 = samples
             .iter()
             .zip(values)
@@ -247,7 +247,7 @@ impl<B: Bxdf> TestSurface<B> {
             .chunks(PACKET_SIZE)
             .map(|some| {
                 let directions: Vec<DVec3> = some.iter().map(|one| one.0).collect();
-                let values = self.evaluate_bsdf(SampledLobes::All, &directions);
+                let values = self.evaluate_bsdf(LobesToSample::All, &directions);
                 some.iter().zip(values).map(|((_, weight), (f, wide, _))| (f - wide) * *weight).sum::<DVec3>()
             })
             .sum();
@@ -259,7 +259,7 @@ impl<B: Bxdf> TestSurface<B> {
             })
             .collect();
         let wide: DVec3 =
-            self.evaluate_bsdf(SampledLobes::All, &directions).iter().map(|(_, wide, _)| *wide).sum();
+            self.evaluate_bsdf(LobesToSample::All, &directions).iter().map(|(_, wide, _)| *wide).sum();
         narrow + wide * (PI / f64::from(rings * steps))
     }
 
@@ -319,7 +319,7 @@ impl<B: Bxdf> TestSurface<B> {
 
     /// χ² test that compares samples with the pdf in cells of the half-vector map. The statistic must be at
     /// most six standard deviations above its mean.
-    pub fn check_samples(&self, what: &str, lobes: SampledLobes) {
+    pub fn check_samples(&self, what: &str, lobes: LobesToSample) {
         const CELLS: u32 = 16;
         // Near total reflection, refraction has a square-root singularity.
         let fine = if let NarrowLightPath::Refracted(_) = self.light { 36 } else { 12 };
@@ -395,9 +395,9 @@ pub fn check_values<B: Bxdf>(
             if light.z < 0.02 {
                 continue;
             }
-            let (f, _, _) = there.evaluate_bsdf(SampledLobes::All, &[light])[0];
+            let (f, _, _) = there.evaluate_bsdf(LobesToSample::All, &[light])[0];
             let (back, _, _) =
-                TestSurface::<B>::new(point, alphas, light).evaluate_bsdf(SampledLobes::All, &[to_eye])[0];
+                TestSurface::<B>::new(point, alphas, light).evaluate_bsdf(LobesToSample::All, &[to_eye])[0];
             let size = f.max_element();
             assert!(
                 (f - back).abs().max_element() <= reciprocity * size,
@@ -442,18 +442,18 @@ pub fn check_lane_independence_with<B: Bxdf>(points: &[B::Point], lit: NarrowLig
                     wo: to_eye[i],
                     tangent: TANGENT,
                 };
-                row.set_bsdf(i, &points[(first + i) % points.len()], LobeFilter::ALL, &place);
+                row.set_bsdf(i, &points[(first + i) % points.len()], ShownLobes::ALL, &place);
             }
             row
         };
         let numbers = |row: &BxdfPacket<B>, i: usize| {
             let values = row.f(&light);
             let mut bits: Vec<u32> = lane(&values.f(), i).to_array().map(f32::to_bits).to_vec();
-            for lobes in [SampledLobes::All, SampledLobes::Narrow] {
+            for lobes in [LobesToSample::All, LobesToSample::Narrow] {
                 bits.push(row.pdf(lobes, &normals, &light, &values)[i].to_bits());
                 let sample = lane(&row.sample(lobes, &normals, &choices, &u), i);
                 // If there is no narrow lobe, its sample is never used.
-                if lobes == SampledLobes::All || row.narrow_lobe_mask() & 1 << i != 0 {
+                if lobes == LobesToSample::All || row.narrow_lobe_mask() & 1 << i != 0 {
                     bits.extend(sample.to_array().map(f32::to_bits));
                 }
             }
@@ -494,7 +494,7 @@ pub fn check_shown_lobes<B: Bxdf>(points: &[B::Point], lit: NarrowLightPath) {
             let shown = |diffuse: bool, specular: bool| {
                 let mut row = BxdfPacket::<B>::default();
                 row.prepare_for_reuse();
-                row.set_bsdf(0, point, LobeFilter::Of { diffuse, specular }, &place);
+                row.set_bsdf(0, point, ShownLobes::Of { diffuse, specular }, &place);
                 let mut light = [[0.0; PACKET_SIZE], [0.0; PACKET_SIZE], [1.0; PACKET_SIZE]];
                 set_lane(&mut light, 0, way);
                 let values = row.f(&light);

@@ -17,7 +17,7 @@ pub use rough_dielectric::RoughDielectricPoint;
 use std::sync::Arc;
 
 use crate::materials::bsdf::{
-    BsdfValues, BxdfMaterial, BxdfParameters, DielectricSamplePacket, LobeFilter, NarrowLobe, SampledLobes,
+    BsdfValues, BxdfMaterial, BxdfParameters, DielectricSamplePacket, LobesToSample, NarrowLobe, ShownLobes,
     UvPacket,
 };
 use crate::materials::bxdf::{Bxdf, ShadingGeometry, lobe_shading_normal};
@@ -139,7 +139,7 @@ macro_rules! kinds {
 
             /// [`lobe_shading_normal`].
             #[inline(always)]
-            pub fn facing_normal(&self, normal: Vec3, wo: Vec3) -> Vec3 {
+            pub fn lobe_shading_normal(&self, normal: Vec3, wo: Vec3) -> Vec3 {
                 match self {
                     $(Self::$kind(_) => lobe_shading_normal::<$bxdf>(normal, wo),)+
                     $(Self::$part(_) => lobe_shading_normal::<$part_bxdf>(normal, wo)),+
@@ -218,7 +218,7 @@ macro_rules! kinds {
                 &mut self,
                 i: usize,
                 bsdf: &BxdfPoint,
-                shown: LobeFilter,
+                shown: ShownLobes,
                 directions: &ShadingGeometry,
             ) {
                 $(if let (Self::$kind(row), BxdfPoint::$kind(bsdf)) = (&mut *self, bsdf) {
@@ -229,19 +229,19 @@ macro_rules! kinds {
                 })+
             }
 
-            /// [`BxdfPacket::set_lanes_to_material`] for a material of the same kind as the packet.
+            /// [`BxdfPacket::evaluate_material_into_lanes`] for a material of the same kind as the packet.
             #[inline(always)]
-            pub fn set_lanes_to_material(
+            pub fn evaluate_material_into_lanes(
                 &mut self,
                 material: &NonSpecular,
                 uv: Option<&UvPacket>,
-                shown: &[(u32, LobeFilter)],
+                shown: &[(u32, ShownLobes)],
                 simd: impl Simd,
             ) -> u32 {
                 $(if let (Self::$kind(row), NonSpecular::$kind(material)) = (&mut *self, material) {
                     let point = material.look_up_parameters(&mut WhiteLookup);
                     let texture = material.color_for_packet_lookup().and_then(ColorOrTexture::texture);
-                    return row.set_lanes_to_material(&point, texture.map(|texture| &**texture).zip(uv), shown, simd);
+                    return row.evaluate_material_into_lanes(&point, texture.map(|texture| &**texture).zip(uv), shown, simd);
                 })+
                 0
             }
@@ -279,7 +279,7 @@ macro_rules! kinds {
             #[inline(always)]
             pub fn pdf(
                 &self,
-                lobes: SampledLobes,
+                lobes: LobesToSample,
                 normals: &Vec3x16,
                 wi: &Vec3x16,
                 values: &BsdfValues,
@@ -295,7 +295,7 @@ macro_rules! kinds {
             #[inline(always)]
             pub fn sample(
                 &self,
-                lobes: SampledLobes,
+                lobes: LobesToSample,
                 normals: &Vec3x16,
                 choices: &F32x16,
                 u: &[F32x16; 2],
@@ -361,12 +361,12 @@ macro_rules! kinds {
                 }
             }
 
-            /// [`BxdfPacket::lane_f`].
+            /// [`BxdfPacket::lane_f_by_lobe_set`].
             #[inline(always)]
-            pub fn lane_f(&self, i: usize, wi: Vec3) -> [Vec3; 3] {
+            pub fn lane_f_by_lobe_set(&self, i: usize, wi: Vec3) -> [Vec3; 3] {
                 match self {
-                    $(Self::$kind(row) => row.lane_f(i, wi),)+
-                    $(Self::$part(row) => row.lane_f(i, wi)),+
+                    $(Self::$kind(row) => row.lane_f_by_lobe_set(i, wi),)+
+                    $(Self::$part(row) => row.lane_f_by_lobe_set(i, wi)),+
                 }
             }
         }
@@ -429,7 +429,7 @@ impl NonSpecular {
 impl BxdfPoint {
     /// The BSDF for transmitted light, which is of a different kind, or `None` if no light is transmitted.
     #[inline(always)]
-    pub fn transmission_bsdf(&self) -> Option<Self> {
+    pub fn bsdf_for_transmitted_light(&self) -> Option<Self> {
         match self {
             Self::DielectricReflection(glass) => Some(Self::DielectricTransmission(*glass)),
             Self::Principled(point) => point.transmits().then_some(Self::PrincipledTransmission(*point)),
@@ -453,15 +453,19 @@ impl BsdfPacket {
     /// Samples a direction on either side of each surface, using the same random numbers as
     /// [`BxdfPacket::sample`]. Returns `None` for kinds that do not support this.
     #[inline(always)]
-    pub fn sample_either_side(
+    pub fn sample_reflection_or_transmission(
         &self,
         choices: &F32x16,
         u: &[F32x16; 2],
         simd: impl Simd,
     ) -> Option<DielectricSamplePacket> {
         match self {
-            Self::DielectricReflection(row) => Some(row.sample_either_side_out_of_line(choices, u, simd)),
-            Self::DielectricTransmission(row) => Some(row.sample_either_side_out_of_line(choices, u, simd)),
+            Self::DielectricReflection(row) => {
+                Some(row.sample_reflection_or_transmission_out_of_line(choices, u, simd))
+            }
+            Self::DielectricTransmission(row) => {
+                Some(row.sample_reflection_or_transmission_out_of_line(choices, u, simd))
+            }
             Self::Phong(_)
             | Self::Conductor(_)
             | Self::BrushedConductor(_)

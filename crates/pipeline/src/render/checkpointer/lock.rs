@@ -21,7 +21,7 @@ pub(crate) struct CheckpointLock {
 impl CheckpointLock {
     /// Keeps a file open after this process has written and locked it.
     pub(super) fn keep_open(&mut self, path: &Path, file: Option<File>) {
-        (self.held, self.told) = (file, FileIdentity::from_path(path));
+        (self.held, self.told) = (file, FileIdentity::from_existing_or_new_path(path));
     }
 
     /// Locks a file left behind by a process that has ended. Does nothing if another process has locked the
@@ -44,7 +44,7 @@ impl CheckpointLock {
     pub(super) fn is_held_by_this_process(&self, path: &Path) -> bool {
         let is_held =
             |identity: FileIdentity| self.held.as_ref().is_some_and(|file| identity.matches_open_file(file));
-        FileIdentity::from_path(path).is_some_and(is_held)
+        FileIdentity::from_existing_or_new_path(path).is_some_and(is_held)
     }
 
     /// Whether another running process holds the file at this path.
@@ -54,13 +54,13 @@ impl CheckpointLock {
     }
 
     /// Records a failure and returns whether it is the first failure in the request.
-    pub(super) fn mark_failure_reported(&mut self, request: u64) -> bool {
+    pub(super) fn record_first_failure_of_request(&mut self, request: u64) -> bool {
         self.failed.replace(request) != Some(request)
     }
 
     /// Records a file as reported and returns whether it had not been reported before.
     pub(super) fn record_first_report_of_file(&mut self, path: &Path) -> bool {
-        let identity = FileIdentity::from_path(path);
+        let identity = FileIdentity::from_existing_or_new_path(path);
         let is_news = self.told != identity;
         self.told = identity;
         is_news

@@ -21,7 +21,7 @@ use crate::output::part::{
     self, ImageHeader, PartError, PartFile, PartHeader, PartOrCheckpoint, PartShare, RenderInput,
     render_input_differences,
 };
-use crate::output::write::{Durability, WritePolicy};
+use crate::output::write::{Durability, ExistingFilePolicy};
 use crate::output::{AttributeLossPolicy, FilmEncodingSettings, OutputError};
 use crate::protocol::CheckpointUpdate;
 use crate::settings::{CheckpointSettings, ResumeMode};
@@ -43,18 +43,18 @@ pub(crate) fn create_header(
     identity: Vec<RenderInput>,
     finish: &FilmEncodingSettings,
 ) -> PartHeader {
-    let share = part_share_from_shard(state.share.as_ref());
+    let share = part_index_and_blocks(state.share.as_ref());
     let (picture, scene) = (ImageHeader::new(&state.film, finish), String::new());
     PartHeader { kind, identity, share, picture, scene, references: Vec::new() }
 }
 
-fn part_share_from_shard(share: Option<&Shard>) -> PartShare {
+fn part_index_and_blocks(share: Option<&Shard>) -> PartShare {
     match share {
         Some(share) => PartShare {
             index: share.index,
             count: share.count,
             block_count: share.image_block_count(),
-            blocks: share.sample_blocks().to_vec(),
+            blocks: share.sample_block_indices().to_vec(),
         },
         None => PartShare { index: 1, count: 1, block_count: 0, blocks: Vec::new() },
     }
@@ -110,7 +110,7 @@ impl<'a> Checkpointer<'a> {
         }
     }
 
-    fn image_inputs(&self) -> &[RenderInput] {
+    fn current_render_inputs(&self) -> &[RenderInput] {
         self.identity.get_or_init(self.around.name)
     }
 
@@ -225,7 +225,7 @@ impl<'a> Checkpointer<'a> {
         }
         let Some((head, there)) = read_valid_checkpoint(&self.path) else {
             return match PartFile::read_header(&self.path) {
-                Err(PartError::Version { .. }) => self.move_aside_unless_shorter(|_| false),
+                Err(PartError::Version { .. }) => self.replace_moved_aside_unless_longer(|_| false),
                 Ok(head) if head.kind == PartOrCheckpoint::Part => {
                     Err(finished_part_conflict_message(&self.path))
                 }
@@ -251,14 +251,14 @@ impl<'a> Checkpointer<'a> {
         let is_longer = |aside: &Path| {
             read_valid_checkpoint(aside).is_some_and(|(_, before)| before.seconds >= there.seconds)
         };
-        self.move_aside_unless_shorter(is_longer)
+        self.replace_moved_aside_unless_longer(is_longer)
     }
 
     /// Moves the checkpoint aside, unless `is_longer` returns true for one that was moved aside earlier.
     ///
     /// # Errors
     /// Returns why it cannot be moved.
-    fn move_aside_unless_shorter(&self, is_longer: impl Fn(&Path) -> bool) -> Result<(), String> {
+    fn replace_moved_aside_unless_longer(&self, is_longer: impl Fn(&Path) -> bool) -> Result<(), String> {
         let mut aside = self.path.as_os_str().to_owned();
         aside.push(ASIDE);
         let aside = PathBuf::from(aside);
@@ -318,13 +318,14 @@ impl<'a> Checkpointer<'a> {
     }
 
     fn create_header(&self, kind: PartOrCheckpoint, state: &FilmState) -> PartHeader {
-        create_header(kind, state, self.image_inputs().to_vec(), self.around.finish)
+        create_header(kind, state, self.current_render_inputs().to_vec(), self.around.finish)
     }
 
     /// Returns the differences between a file header and this render.
     fn differences_from(&self, head: &PartHeader, state: &FilmState) -> Vec<String> {
-        let mut unlike = render_input_differences(&head.identity, self.image_inputs(), ("there", "here"));
-        let share = part_share_from_shard(state.share.as_ref());
+        let mut unlike =
+            render_input_differences(&head.identity, self.current_render_inputs(), ("there", "here"));
+        let share = part_index_and_blocks(state.share.as_ref());
         let name = |share: &PartShare| match share.count {
             1 => "the whole image".to_owned(),
             count => format!("part {}/{count}", share.index),
@@ -458,7 +459,7 @@ impl<'a> Checkpointer<'a> {
                 Ok(_) | Err(_) => Ok(()),
             }
         };
-        let guard = WritePolicy {
+        let guard = ExistingFilePolicy {
             is_kept: &|path| inputs.contains_path(path),
             may_replace: &may_replace,
             sweep: None,
@@ -472,7 +473,7 @@ impl<'a> Checkpointer<'a> {
 
     fn report_failure(&self, why: &str) {
         let CheckpointContext { sink, lock, .. } = self.around;
-        if lock.borrow_mut().mark_failure_reported(sink.generation) {
+        if lock.borrow_mut().record_first_failure_of_request(sink.generation) {
             self.send_update(CheckpointUpdate::Failed { message: format!("no checkpoint: {why}") });
         }
     }

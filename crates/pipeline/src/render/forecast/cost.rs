@@ -26,7 +26,7 @@ impl CellCost {
     const KEPT: f64 = 0.25;
 
     pub(crate) fn record(&mut self, job: MeasuredJobCost, share: &mut PixelOverhead) {
-        share.record(self.last, job);
+        share.record_job_pair(self.last, job);
         self.seconds = Self::KEPT * self.seconds + job.seconds;
         self.units = Self::KEPT * self.units + job.pixels * job.samples;
         self.pixels = Self::KEPT * self.pixels + job.pixels;
@@ -38,7 +38,7 @@ impl CellCost {
         !(self.units > 0.0)
     }
 
-    pub(crate) fn recorded_seconds(&self) -> f64 {
+    pub(crate) fn decayed_seconds_sum(&self) -> f64 {
         self.seconds
     }
 
@@ -63,7 +63,7 @@ impl PixelOverhead {
     /// Maximum overhead per pixel, in samples.
     const MOST: f64 = 4.0;
 
-    fn record(&mut self, before: Option<MeasuredJobCost>, now: MeasuredJobCost) {
+    fn record_job_pair(&mut self, before: Option<MeasuredJobCost>, now: MeasuredJobCost) {
         if let Some(before) =
             before.filter(|before| before.pixels == now.pixels && before.samples < now.samples)
         {
@@ -97,7 +97,7 @@ mod tests {
         for (cell, rate) in cells.iter().zip([1.0, 3.0]) {
             assert!((share.samples_including_overhead(800.0, 100.0) - 850.0).abs() < 1e-9);
             assert!(
-                (cell.recorded_seconds() / cell.cost_in_samples_with_overhead(share) - rate).abs() < 1e-9
+                (cell.decayed_seconds_sum() / cell.cost_in_samples_with_overhead(share) - rate).abs() < 1e-9
             );
         }
     }

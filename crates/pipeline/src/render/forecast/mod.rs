@@ -27,7 +27,7 @@ use crate::plan::RenderPlan;
 use crate::protocol::RenderProgress;
 use crate::scene::description::RenderOptions;
 use crate::stages::photons::PhotonStore;
-use crate::trace::estimate_remaining_job_count;
+use crate::trace::estimate_jobs_per_pixel;
 
 /// Estimating the remaining work requires a sum over all cells, which may take at most `1/EXPECTATION_SHARE`
 /// of the time.
@@ -94,12 +94,12 @@ impl Forecast {
     }
 
     /// Begins a photon pass. `seconds` is the time since the stage started.
-    pub(crate) fn begin_photons(&mut self, seconds: f64) {
+    pub(crate) fn begin_photons_at(&mut self, seconds: f64) {
         self.photons_since = Some(seconds);
     }
 
     /// Ends a photon pass.
-    pub(crate) fn end_photons(&mut self, seconds: f64) {
+    pub(crate) fn end_photons_at(&mut self, seconds: f64) {
         if let Some(since) = self.photons_since.take() {
             self.photon_seconds += seconds - since;
         }
@@ -120,7 +120,7 @@ impl Forecast {
         // Apply the time limit if it ends the render earlier.
         if let Some(budget) = moment.plan.time_seconds {
             // The first pass always completes, even after the time limit.
-            let of_first = eta_seconds.map_or(0.0, |eta| eta * self.remaining_first_pass_share(moment));
+            let of_first = eta_seconds.map_or(0.0, |eta| eta * self.first_pass_share_of_remaining(moment));
             let left = (budget - elapsed_seconds).max(of_first);
             eta_seconds = Some(eta_seconds.unwrap_or(left).min(left));
             // Elapsed time counts as progress even if no work was done.
@@ -146,7 +146,7 @@ impl Forecast {
     /// noise has been evaluated.
     fn done_and_total_work(&mut self, moment: &RenderSnapshot<'_>) -> WorkAmount {
         if Instant::now() >= self.expectation.due {
-            self.expectation = estimate_total_work(moment);
+            self.expectation = estimate_total_cpu_work(moment);
         }
         let WorkEstimate { total, passes: [passes, all_passes], .. } = self.expectation;
         let done = moment.state.cpu_seconds();
@@ -161,7 +161,7 @@ impl Forecast {
     }
 
     /// Returns the first pass's share of the remaining work.
-    fn remaining_first_pass_share(&self, moment: &RenderSnapshot<'_>) -> f64 {
+    fn first_pass_share_of_remaining(&self, moment: &RenderSnapshot<'_>) -> f64 {
         if !moment.is_first {
             return 0.0;
         }
@@ -181,14 +181,14 @@ fn has_predictable_convergence(moment: &RenderSnapshot<'_>) -> bool {
 }
 
 /// Estimates the total work as a sum over all cells.
-fn estimate_total_work(moment: &RenderSnapshot<'_>) -> WorkEstimate {
+fn estimate_total_cpu_work(moment: &RenderSnapshot<'_>) -> WorkEstimate {
     let RenderSnapshot { state, plan, photons, .. } = moment;
     let RenderOptions { samples: most, error, .. } = plan.settings.render;
     let begin = Instant::now();
     let is_known = !(error > 0.0) || state.can_predict_samples();
     let pixels = state.film.crop_rect().area();
     let at_once = photons.map_or(u32::MAX, PhotonStore::max_passes_at_once);
-    let jobs = |done, end| estimate_remaining_job_count(done, end, pixels, at_once);
+    let jobs = |done, end| estimate_jobs_per_pixel(done, end, pixels, at_once);
     let total = is_known.then(|| state.cpu_seconds() + state.remaining_cpu_seconds(most, jobs));
     let passes = photons.map_or([0; 2], |_| state.current_and_final_photon_passes(most));
     WorkEstimate { due: Instant::now() + EXPECTATION_SHARE * begin.elapsed(), total, passes }

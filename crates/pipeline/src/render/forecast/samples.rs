@@ -42,7 +42,9 @@ impl ExpectedSamples {
         let NoiseMeasurements { noise, samples, aim } = judgement;
         // Collect the tiles without goals and the overall rate at which their noise decreases.
         let open = |(tile, noise): (usize, &Option<TileNoise>)| {
-            noise.filter(|_| goals.tile_has_undecided_half(tile, done, *samples)).map(|noise| (tile, noise))
+            noise
+                .filter(|_| goals.tile_has_undecided_half_at(tile, done, *samples))
+                .map(|noise| (tile, noise))
         };
         let tiles: Vec<(usize, TileNoise)> = noise.iter().enumerate().filter_map(open).collect();
         let falls = tiles.iter().filter_map(|(_, noise)| noise.fall).collect();

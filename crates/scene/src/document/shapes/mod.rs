@@ -112,7 +112,7 @@ pub(super) fn read_unnormalized_direction(
 ) -> Option<DVec3> {
     let key = table.optional_key(name);
     let direction = key.vector_or(Limits::Any, default)?;
-    if !key.check_vector_long_enough(direction) {
+    if !key.check_vector_zero_or_long_enough(direction) {
         return None;
     }
     if direction == DVec3::ZERO {
@@ -131,7 +131,7 @@ fn read_axis_ends(table: &TableReader<'_>, names: [&'static str; 2], what: &str)
     let (first, second) =
         (keys[0].vector_or(Limits::Any, DVec3::ZERO), keys[1].vector_or(Limits::Any, DVec3::Y));
     let (first, second) = (first?, second?);
-    if !keys[0].check_points_far_apart(first, &keys[1], second) {
+    if !keys[0].check_points_equal_or_far_apart(first, &keys[1], second) {
         return None;
     }
     if first == second {

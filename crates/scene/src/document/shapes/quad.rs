@@ -14,7 +14,7 @@ pub(super) fn read(table: &TableReader<'_>) -> Option<Shape> {
     let u = u_key.vector_or(Limits::Any, DVec3::new(2.0, 0.0, 0.0));
     let v = v_key.vector_or(Limits::Any, DVec3::new(0.0, 0.0, -2.0));
     let (corner, u, v) = (corner?, u?, v?);
-    if !(u_key.check_vector_long_enough(u) & v_key.check_vector_long_enough(v)) {
+    if !(u_key.check_vector_zero_or_long_enough(u) & v_key.check_vector_zero_or_long_enough(v)) {
         return None;
     }
     if !edges_span_area(u, v) {

@@ -17,9 +17,9 @@ pub(super) fn read(table: &TableReader<'_>) -> Option<Shape> {
     let [a, b, c] = [0, 1, 2].map(|i| keys[i].vector_or(Limits::Any, CORNERS[i]));
     let (a, b, c) = (a?, b?, c?);
     let [a_key, b_key, c_key] = &keys;
-    if !(a_key.check_points_far_apart(a, b_key, b)
-        && a_key.check_points_far_apart(a, c_key, c)
-        && b_key.check_points_far_apart(b, c_key, c))
+    if !(a_key.check_points_equal_or_far_apart(a, b_key, b)
+        && a_key.check_points_equal_or_far_apart(a, c_key, c)
+        && b_key.check_points_equal_or_far_apart(b, c_key, c))
     {
         return None;
     }

@@ -4,7 +4,7 @@ use super::mis::CompetingTechnique;
 use crate::geometry::Ray;
 use crate::geometry::packet::{F32x16, RayPacket, set_bit_lanes};
 use crate::integrators::transport::batch::{BsdfValuesAndCosines, VertexBatch};
-use crate::integrators::transport::interiors::{InteriorLists, medium_transmittance};
+use crate::integrators::transport::interiors::{InteriorListPool, medium_transmittance};
 use crate::integrators::transport::tile::TileContext;
 use crate::integrators::view::LightAov;
 use crate::lights::{
@@ -28,7 +28,7 @@ pub struct SampleAllLights<'a, const MIS: bool> {
     /// Technique that competes with light samples. Unused if `MIS` is false.
     pub competing: CompetingTechnique,
     /// Media at the vertices, or `None` if all vertices are in air.
-    pub interior_lists: Option<&'a InteriorLists>,
+    pub interior_lists: Option<&'a InteriorListPool>,
     /// Whether to sample only infinite lights.
     pub only_infinite: bool,
     /// Whether to sum the light from wide lobes separately.
@@ -94,7 +94,7 @@ impl LightSums {
 
     /// Returns the reflected light, or the lit fraction of it.
     #[inline(always)]
-    pub fn reflected_or_lit_fraction(&self, aov: LightAov) -> ReflectedDirectLightPacket {
+    pub fn reflected_light_for_aov(&self, aov: LightAov) -> ReflectedDirectLightPacket {
         let mut light = self.light;
         if aov == LightAov::LitFraction {
             for i in 0..PACKET_SIZE {
@@ -190,7 +190,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
                         self.competing.adjust_wide_fraction(fraction, &unweighted, &values);
                     }
                 }
-                self.trace_or_defer_light_samples(
+                self.trace_samples_or_accumulate_pending(
                     &samples,
                     (&values, fraction.as_ref()),
                     active,
@@ -211,7 +211,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
     #[inline(never)]
     fn attenuate_by_glass(
         &self,
-        interior_lists: &InteriorLists,
+        interior_lists: &InteriorListPool,
         samples: &LightSamplePacket,
         mut values: Vec3x16,
     ) -> Vec3x16 {
@@ -254,7 +254,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
     /// Adds the contributions of one light's samples. With `pending`, defers them until the light's shadow
     /// ray is traced.
     #[inline(always)]
-    fn trace_or_defer_light_samples(
+    fn trace_samples_or_accumulate_pending(
         &self,
         samples: &LightSamplePacket,
         (values, fraction): (&Vec3x16, Option<&Vec3x16>),

@@ -1,13 +1,13 @@
 //! Rays in narrow lobes, which complement light samples.
 
 use super::all_lights::{ReflectedDirectLightPacket, add_traversal_cost};
-use super::unshadowed::LobeRayIgnoringOcclusion;
+use super::unshadowed::LobeRayWithoutSoftShadows;
 use crate::geometry::packet::{RayPacket, set_bit_lanes};
 use crate::integrators::transport::batch::{BsdfValuesAndCosines, VertexBatch};
-use crate::integrators::transport::interiors::{InteriorLists, medium_transmittance};
+use crate::integrators::transport::interiors::{InteriorListPool, medium_transmittance};
 use crate::integrators::transport::tile::TileContext;
 use crate::integrators::view::LightAov;
-use crate::materials::bsdf::SampledLobes;
+use crate::materials::bsdf::LobesToSample;
 use crate::math::Vec3;
 use crate::math::lanes::{PACKET_SIZE, Simd, lane, set_lane};
 use crate::sampling::Dimension;
@@ -22,7 +22,7 @@ pub struct LobeRayTracingKernel<'a> {
     pub sharp: u32,
     pub aov: LightAov,
     /// Media at the vertices, or `None` if all vertices are in air.
-    pub interior_lists: Option<&'a InteriorLists>,
+    pub interior_lists: Option<&'a InteriorListPool>,
     /// The reflected light to which the results are added.
     pub arrived: ReflectedDirectLightPacket,
 }
@@ -47,9 +47,9 @@ impl SimdKernel for LobeRayTracingKernel<'_> {
             if row.bsdf.extends_narrow_lobe_paths() {
                 [choices, _] = sampler.pairs(&row.path, Dimension::Lobe, repetition, count);
             }
-            let wi = row.bsdf.sample(SampledLobes::Narrow, &row.normal, &choices, &u, simd);
+            let wi = row.bsdf.sample(LobesToSample::Narrow, &row.normal, &choices, &u, simd);
             let BsdfValuesAndCosines { bsdf, cosines } = row.evaluate_bsdf_and_cosines(&wi, simd);
-            let pdfs = row.bsdf.pdf(SampledLobes::Narrow, &row.normal, &wi, &bsdf, simd);
+            let pdfs = row.bsdf.pdf(LobesToSample::Narrow, &row.normal, &wi, &bsdf, simd);
             let narrow = &bsdf.narrow;
             // Select the rays above the horizon.
             let mut sent = sharp & !row.below_horizon_mask(&wi, simd);
@@ -68,7 +68,7 @@ impl SimdKernel for LobeRayTracingKernel<'_> {
                 let lit = if aov == LightAov::TraversalCost { 0 } else { sent };
                 for i in set_bit_lanes(lit) {
                     let found =
-                        LobeRayIgnoringOcclusion { tile, row, lane: i, ray: rays.ray(i), pdf: pdfs[i] };
+                        LobeRayWithoutSoftShadows { tile, row, lane: i, ray: rays.ray(i), pdf: pdfs[i] };
                     let radiance = found.radiance(|distance| transmittance(i, distance), &mut arrived.rays);
                     let value = lane(narrow, i) * radiance * (cosines[i] / (pdfs[i] * count as f32));
                     let sum = lane(&arrived.light, i) + value;

@@ -7,7 +7,7 @@ use crate::integrators::transport::ray::PathRay;
 use crate::integrators::transport::tile::TileContext;
 use crate::lights::{LightGeometry, LightHit, LightSamplePacket, Side};
 use crate::materials::Footprint;
-use crate::materials::bsdf::{BsdfValues, SampledLobes, ratio};
+use crate::materials::bsdf::{BsdfValues, LobesToSample, ratio};
 use crate::math::Vec3;
 use crate::math::lanes::{F32x16, PACKET_SIZE, Simd, Vec3x16, lane, set_lane};
 use crate::world::{Hit, MAX_NULL_INTERACTIONS};
@@ -64,9 +64,9 @@ impl CompetingTechnique {
         // Weight each sample against the lobes from which BSDF samples are drawn.
         let (lobes, start) = match self {
             Self::Nothing => return values,
-            Self::Paths => (SampledLobes::All, !0),
-            Self::NarrowPaths => (SampledLobes::Narrow, !0),
-            Self::Lobes(sharp) => (SampledLobes::Narrow, sharp),
+            Self::Paths => (LobesToSample::All, !0),
+            Self::NarrowPaths => (LobesToSample::Narrow, !0),
+            Self::Lobes(sharp) => (LobesToSample::Narrow, sharp),
         };
         let pdfs = row.bsdf.pdf(lobes, &row.normal, &samples.directions, &response.bsdf, simd);
         let mut weights = [1.0; PACKET_SIZE];
@@ -76,16 +76,16 @@ impl CompetingTechnique {
         }
         // Apply the weights to the light reflected by these lobes.
         match lobes {
-            SampledLobes::All => {
+            LobesToSample::All => {
                 for i in 0..PACKET_SIZE {
                     let value = lane(&values, i) * weights[i];
                     set_lane(&mut values, i, value);
                 }
             }
-            SampledLobes::Narrow => {
+            LobesToSample::Narrow => {
                 let BsdfValues { wide, narrow, .. } = &response.bsdf;
                 for i in 0..PACKET_SIZE {
-                    let left = narrow_lobe_mis_factor(lane(wide, i), lane(narrow, i), weights[i]);
+                    let left = combined_lobes_mis_factor(lane(wide, i), lane(narrow, i), weights[i]);
                     let value = lane(&values, i) * left;
                     set_lane(&mut values, i, value);
                 }
@@ -117,7 +117,7 @@ impl CompetingTechnique {
 /// Factor for reflected light if the MIS weight applies only to the narrow lobe, because rays in a narrow
 /// lobe do not account for wide lobes. With this factor, the AOVs still sum to the beauty image.
 #[inline(always)]
-fn narrow_lobe_mis_factor(wide: Vec3, narrow: Vec3, weight: f32) -> Vec3 {
+fn combined_lobes_mis_factor(wide: Vec3, narrow: Vec3, weight: f32) -> Vec3 {
     let part = |wide: f32, narrow: f32| {
         let all = wide + narrow;
         if all > 0.0 { (wide + narrow * weight) / all } else { 0.0 }
@@ -202,7 +202,7 @@ impl TileContext<'_> {
         share: impl Fn(f32) -> f32,
     ) -> Vec3 {
         let lights = &self.world.lights;
-        if !lights.has_infinite_lights() {
+        if !lights.has_visible_infinite_lights() {
             return Vec3::ZERO;
         }
         let samples = lights.expected_sample_counts(self.behavior.receivers, ray.origin, normal);
@@ -246,7 +246,7 @@ impl TileContext<'_> {
             return Vec3::ZERO;
         }
         let at = world.texture_point(hit, &surface, |_| Footprint::POINT);
-        let mut radiance = emission.radiance(&at, normal.dot(ray.direction), lookups);
+        let mut radiance = emission.radiance_of_emitting_side(&at, normal.dot(ray.direction), lookups);
         if let Some(opacity) = &material.opacity {
             radiance *= opacity.evaluate(&at, lookups);
         }

@@ -13,7 +13,7 @@ use crate::geometry::packet::{RayPacket, nonnegative_end_mask, set_bit_lanes};
 use crate::integrators::transport::accumulator::Accumulator;
 use crate::integrators::transport::batch::{ALL, VertexBatch};
 use crate::integrators::transport::cone::RayCone;
-use crate::integrators::transport::interiors::{InteriorList, InteriorLists};
+use crate::integrators::transport::interiors::{InteriorList, InteriorListPool};
 use crate::integrators::transport::ray::PathRay;
 use crate::integrators::transport::tile::TileContext;
 use crate::integrators::transport::vertex::ShadingVertex;
@@ -40,7 +40,7 @@ pub struct DirectLightVertexQueue {
     /// The parts of `arrived` from wide lobes at vertices that the camera sees. Empty if they are not needed.
     arrived_diffuse: Vec<Vec3>,
     /// Media at the vertices.
-    interior_lists: InteriorLists,
+    interior_lists: InteriorListPool,
     /// Sums over the light samples at the packets of a group.
     sums: Vec<LightSums>,
     /// Shadow rays of several packets.
@@ -220,7 +220,7 @@ impl DirectLightVertexQueue {
         tile: &TileContext<'_>,
     ) -> impl Iterator<Item = Range<usize>> + use<> {
         let (count, picks_lights) =
-            (self.count, tile.world.lights.sampler_for_purpose(tile.behavior.receivers).is_some());
+            (self.count, tile.world.lights.sampler_for_integrator(tile.behavior.receivers).is_some());
         let size = if picks_lights { MAX_GROUP_SIZE } else { 1 };
         (0..count).step_by(size).map(move |first| first..(first + size).min(count))
     }
@@ -231,18 +231,18 @@ impl DirectLightVertexQueue {
     }
 
     /// Media at the vertices.
-    pub fn interior_lists(&self) -> &InteriorLists {
+    pub fn interior_lists(&self) -> &InteriorListPool {
         &self.interior_lists
     }
 
     /// Ray cones at the vertices, indexed by queue index. Empty if ray cones are not used.
-    pub fn cones(&self) -> &[RayCone] {
+    pub fn cones_by_queue_index(&self) -> &[RayCone] {
         &self.cones
     }
 
     /// Samples lights at the packets of a group, for [`Self::reflected_light`]. `shares_with_paths` is true if
     /// continuing paths compete with the light samples.
-    pub fn sample_lights_for_group(
+    pub fn sample_and_trace_group_lights(
         &mut self,
         group: Range<usize>,
         tile: &TileContext<'_>,
@@ -274,7 +274,7 @@ impl DirectLightVertexQueue {
         Ok(())
     }
 
-    /// Light reflected at packet `index` of the group passed to [`Self::sample_lights_for_group`], including the light
+    /// Light reflected at packet `index` of the group passed to [`Self::sample_and_trace_group_lights`], including the light
     /// found by lobe rays. `number` is the index of the packet in the queue.
     pub fn reflected_light(
         &self,
@@ -285,7 +285,7 @@ impl DirectLightVertexQueue {
     ) -> ReflectedDirectLightPacket {
         let row = &self.rows[number];
         let request = DirectLightPacketRequest::new(number, row, aov, shares_with_paths);
-        let arrived = self.sums[index].reflected_or_lit_fraction(aov);
+        let arrived = self.sums[index].reflected_light_for_aov(aov);
         match self.competing_technique(request, tile, aov) {
             CompetingTechnique::Lobes(sharp) => {
                 let interior_lists = self.interiors_of_batch(row);
@@ -320,7 +320,7 @@ impl DirectLightVertexQueue {
     }
 
     /// Media at a packet's vertices, or `None` if all vertices are in air.
-    fn interiors_of_batch(&self, row: &VertexBatch) -> Option<&InteriorLists> {
+    fn interiors_of_batch(&self, row: &VertexBatch) -> Option<&InteriorListPool> {
         (!self.interior_lists.are_all_air() && row.has_vertex_in_glass()).then_some(&self.interior_lists)
     }
 
@@ -341,7 +341,7 @@ impl DirectLightVertexQueue {
             (self.competing_technique(request, tile, aov), self.interiors_of_batch(row));
         let (instructions, used) = (tile.world.geometry.instruction_set(), request.used);
         let (only_infinite, splits_lobes) =
-            (false, self.wide_narrow_light_split(row) == WideNarrowLightSplit::Mixed);
+            (false, self.wide_narrow_lobe_split(row) == WideNarrowLobeSplit::Mixed);
         let plain = SampleAllLights::<false> {
             tile,
             row,
@@ -363,7 +363,7 @@ impl DirectLightVertexQueue {
             splits_lobes,
         };
         use CompetingTechnique::{Lobes, NarrowPaths, Nothing, Paths};
-        let sums = match (competing, tile.world.lights.sampler_for_purpose(tile.behavior.receivers)) {
+        let sums = match (competing, tile.world.lights.sampler_for_integrator(tile.behavior.receivers)) {
             (Nothing, None) => instructions.run(plain),
             (Nothing, Some(selection)) => {
                 instructions.run(SampleLightTree { lighting: plain, selection, number, pool: &mut pool })
@@ -378,14 +378,14 @@ impl DirectLightVertexQueue {
     }
 
     /// How to divide a packet's reflected light.
-    fn wide_narrow_light_split(&self, row: &VertexBatch) -> WideNarrowLightSplit {
+    fn wide_narrow_lobe_split(&self, row: &VertexBatch) -> WideNarrowLobeSplit {
         if self.arrived_diffuse.is_empty() || row.only_specular_before == 0 {
-            return WideNarrowLightSplit::Unused;
+            return WideNarrowLobeSplit::Unused;
         }
         match (row.bsdf.has_wide_lobes(), row.bsdf.has_narrow_lobes()) {
-            (_, false) => WideNarrowLightSplit::OnlyWide,
-            (false, true) => WideNarrowLightSplit::OnlyNarrow,
-            (true, true) => WideNarrowLightSplit::Mixed,
+            (_, false) => WideNarrowLobeSplit::OnlyWide,
+            (false, true) => WideNarrowLobeSplit::OnlyNarrow,
+            (true, true) => WideNarrowLobeSplit::Mixed,
         }
     }
 
@@ -401,10 +401,10 @@ impl DirectLightVertexQueue {
             LightAov::Radiance(_) | LightAov::LitFraction => row.times_throughput(&arrived.light),
             LightAov::TraversalCost => arrived.light,
         };
-        let diffuse = match self.wide_narrow_light_split(row) {
-            WideNarrowLightSplit::Unused | WideNarrowLightSplit::OnlyNarrow => None,
-            WideNarrowLightSplit::OnlyWide => Some(light),
-            WideNarrowLightSplit::Mixed => Some(row.times_throughput(&arrived.diffuse)),
+        let diffuse = match self.wide_narrow_lobe_split(row) {
+            WideNarrowLobeSplit::Unused | WideNarrowLobeSplit::OnlyNarrow => None,
+            WideNarrowLobeSplit::OnlyWide => Some(light),
+            WideNarrowLobeSplit::Mixed => Some(row.times_throughput(&arrived.diffuse)),
         };
         if let Some(diffuse) = diffuse {
             for i in set_bit_lanes(row.used) {
@@ -429,7 +429,7 @@ impl DirectLightVertexQueue {
 
 /// How a packet's reflected light is divided into light from wide lobes and light from narrow lobes.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum WideNarrowLightSplit {
+enum WideNarrowLobeSplit {
     /// The parts are not needed.
     Unused,
     /// All lobes are wide.

@@ -14,7 +14,7 @@ use crate::world::{Hit, MAX_NULL_INTERACTIONS};
 use super::all_lights::DirectLightCounters;
 
 /// A ray in a vertex's narrow lobe, and the pdf of its direction.
-pub struct LobeRayIgnoringOcclusion<'a> {
+pub struct LobeRayWithoutSoftShadows<'a> {
     pub tile: &'a TileContext<'a>,
     pub row: &'a VertexBatch,
     /// Lane of the vertex in the packet.
@@ -23,7 +23,7 @@ pub struct LobeRayIgnoringOcclusion<'a> {
     pub pdf: f32,
 }
 
-impl LobeRayIgnoringOcclusion<'_> {
+impl LobeRayWithoutSoftShadows<'_> {
     /// Radiance from the lights along the ray, with MIS weights for equal numbers of light samples and lobe
     /// rays. `transmittance` returns the medium's transmittance up to a distance.
     #[cold]
@@ -47,7 +47,7 @@ impl LobeRayIgnoringOcclusion<'_> {
                 let side = if front.dot(ray.direction) > 0.0 { Side::Back } else { Side::Front };
                 let light = world.lights.light_on_primitive(hit.object, hit.shape.primitive, side);
                 let arriving =
-                    light.map_or(Vec3::ZERO, |(_, light)| self.transmittance_to_light_center(light, rays));
+                    light.map_or(Vec3::ZERO, |(_, light)| self.hard_shadow_transmittance(light, rays));
                 sum += radiance * transmittance(distance) * arriving;
             }
             (along, passed) = (world.transmittance_and_continued_ray(&along, &hit, &mut 0).1, distance);
@@ -56,14 +56,14 @@ impl LobeRayIgnoringOcclusion<'_> {
         for (number, light) in world.lights.iter().filter(|(_, light)| light.is_infinite()) {
             let radiance = tile.lobe_ray_radiance_from_infinite_light(Some(number), ray, normal, *pdf);
             if radiance != Vec3::ZERO {
-                sum += radiance * transmittance(f32::MAX) * self.transmittance_to_light_center(light, rays);
+                sum += radiance * transmittance(f32::MAX) * self.hard_shadow_transmittance(light, rays);
             }
         }
         sum
     }
 
     /// Unoccluded fraction of a light.
-    fn transmittance_to_light_center(&self, light: &Light, rays: &mut DirectLightCounters) -> Vec3 {
+    fn hard_shadow_transmittance(&self, light: &Light, rays: &mut DirectLightCounters) -> Vec3 {
         match self.tile.settings.render.shadows {
             ShadowMode::Off => return Vec3::ONE,
             ShadowMode::Hard | ShadowMode::Soft => {}

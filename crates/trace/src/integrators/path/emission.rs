@@ -23,7 +23,7 @@ impl CameraWavefront<'_, '_> {
     ) -> (u32, u32) {
         let (render, lights) = (&self.tile.settings.render, &self.tile.world.lights);
         let plain = if render.ambient == Vec3::ZERO { packet.shining } else { packet.plain };
-        let is_dark_beyond = render.background == Vec3::ZERO && !lights.has_infinite_lights();
+        let is_dark_beyond = render.background == Vec3::ZERO && !lights.has_visible_infinite_lights();
         (plain, if is_dark_beyond { 0 } else { rays.mask() & !packet.any })
     }
 
@@ -88,7 +88,7 @@ impl CameraWavefront<'_, '_> {
     }
 
     /// Adds the emission of a surface and returns whether the path may scatter at the surface.
-    pub(super) fn add_emission_and_check_scattering(
+    pub(super) fn add_path_emission_and_may_scatter(
         &mut self,
         path: &PathRay,
         vertex: &SurfaceVertex<'_>,

@@ -4,7 +4,7 @@
 use super::CameraWavefront;
 use crate::geometry::Ray;
 use crate::geometry::packet::set_bit_lanes;
-use crate::integrators::aov::{record_first_hit, record_first_hits_on_plain_surfaces, record_vertex};
+use crate::integrators::aov::{record_first_hit_of_ray, record_first_hits_on_plain_surfaces, record_vertex};
 use crate::integrators::transport::crossing::CoincidentSurfaceBuffers;
 use crate::integrators::transport::interface::{FresnelSplit, fresnel_split, reflected_path};
 use crate::integrators::transport::interiors::InteriorList;
@@ -41,13 +41,13 @@ impl<'a> PathStepper<'a> for CameraWavefront<'a, '_> {
     }
 
     #[inline(always)]
-    fn handle_interaction(&mut self, path: &PathRay, reached: Interaction<'_, 'a>, has_passed: bool) {
+    fn handle_walk_end(&mut self, path: &PathRay, reached: Interaction<'_, 'a>, has_passed: bool) {
         match reached {
             Interaction::Opaque(vertex, hit, far) => {
                 if !has_passed && matches!(hit, DirectOrCoincidentHit::Direct(_)) {
                     self.record_camera_vertex(path, vertex);
                 }
-                if self.add_emission_and_check_scattering(path, vertex, hit) {
+                if self.add_path_emission_and_may_scatter(path, vertex, hit) {
                     match &vertex.material.bsdf {
                         Bsdf::NonSpecular(rough) => self.shade_rough(path, vertex, rough, far),
                         Bsdf::Mirror(mirror) => self.shade_mirror(path, vertex, mirror),
@@ -60,7 +60,7 @@ impl<'a> PathStepper<'a> for CameraWavefront<'a, '_> {
                 if !has_passed {
                     self.record_camera_vertex(path, vertex);
                 }
-                if self.add_emission_and_check_scattering(path, vertex, DirectOrCoincidentHit::Direct(hit)) {
+                if self.add_path_emission_and_may_scatter(path, vertex, DirectOrCoincidentHit::Direct(hit)) {
                     match rough {
                         Some(rough) => self.queue_rough_glass_vertices(path, vertex, rough, far),
                         None => self.shade_glass(path, vertex, far),
@@ -88,7 +88,7 @@ impl<'a> PathStepper<'a> for CameraWavefront<'a, '_> {
         let tint = vertex.pane_transmittance(path, pane, &mut self.counters.texture_lookups);
         let left = tint * (1.0 - reflectance);
         // After the last bounce, only light that passes straight through the pane is added.
-        if !self.add_emission_and_check_scattering(path, vertex, hit) {
+        if !self.add_path_emission_and_may_scatter(path, vertex, hit) {
             return NullInteraction::Passed(left);
         }
         let shading = vertex.perturbed_and_smooth_normals(self.counters);
@@ -126,7 +126,7 @@ impl CameraWavefront<'_, '_> {
                 self.add_emission_and_ambient(&path, &hit, packet.shining & bit != 0);
             }
             Some(hit) => {
-                let surface = packet.scalar_shaded_surface(self.surfaces, lane);
+                let surface = packet.non_plain_surface_of_lane(self.surfaces, lane);
                 self.is_first_hit_pending = self.depth == 0
                     && self.accumulator.first_hit_layers().is_some()
                     && !tile.world.has_null_interaction_surfaces();
@@ -139,7 +139,7 @@ impl CameraWavefront<'_, '_> {
         }
     }
 
-    /// Records the first-hit layers of camera rays, except for hits that [`Self::handle_interaction`] records.
+    /// Records the first-hit layers of camera rays, except for hits that [`Self::handle_walk_end`] records.
     #[inline(never)]
     pub(super) fn record_first_hits(&mut self, rays: &PacketSource<'_>, packet: &PacketHits, first: u32) {
         let tile = self.tile;
@@ -151,7 +151,12 @@ impl CameraWavefront<'_, '_> {
         }
         for lane in set_bit_lanes(left) {
             let Some(hit) = packet.hit(lane) else { continue };
-            record_first_hit(tile, (&packet.incoming_path(tile, rays, lane), &hit), values, self.counters);
+            record_first_hit_of_ray(
+                tile,
+                (&packet.incoming_path(tile, rays, lane), &hit),
+                values,
+                self.counters,
+            );
         }
     }
 
@@ -167,7 +172,7 @@ impl CameraWavefront<'_, '_> {
             return;
         }
         if let (Some(hit), Some(values)) = (packet.hit(lane), self.accumulator.first_hit_layers()) {
-            record_first_hit(
+            record_first_hit_of_ray(
                 self.tile,
                 (&packet.incoming_path(self.tile, rays, lane), &hit),
                 values,

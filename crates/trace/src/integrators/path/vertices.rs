@@ -53,7 +53,7 @@ impl CameraWavefront<'_, '_> {
         let mut bsdf =
             if is_colored { rough.evaluate_textures(at, lookups) } else { rough.with_white_textures() };
         if is_colored {
-            vertex.tint_by_vertex_color(&mut bsdf);
+            vertex.tint_bsdf_by_vertex_color(&mut bsdf);
         }
         if accepts_ambient {
             self.accumulator.add_ambient(
@@ -80,7 +80,7 @@ impl CameraWavefront<'_, '_> {
     ) {
         let (tile, place) = (self.tile, self.place);
         let shading = vertex.perturbed_and_smooth_normals(self.counters);
-        let behind = bsdf.transmission_bsdf().map(|bsdf| (bsdf, shading.far_side()));
+        let behind = bsdf.bsdf_for_transmitted_light().map(|bsdf| (bsdf, shading.far_side()));
         let aov = self.light_aov_selection_at_vertex(path);
         let lit = ShadingVertex { path, interiors: &path.interiors, place, vertex, shading, bsdf };
         self.direct.push(tile, &lit, aov, ShadingSides::OneSide { is_dark: false });

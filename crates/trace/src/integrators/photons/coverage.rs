@@ -7,7 +7,7 @@ use arrayvec::ArrayVec;
 
 use super::kernel::kernel_integral_over_polygon;
 use super::map::{GatherPoint, MIN_COSINE, REACH};
-use crate::geometry::local_geometry::{FlatPolygon, LocalSurfaceShape, NearestSurface};
+use crate::geometry::local_geometry::{FlatOrRoundExtent, FlatPolygon, NearestSurface};
 use crate::geometry::{Aabb, LocalGeometry, Shape, ShapeHit};
 use crate::materials::{Material, NonSpecular};
 use crate::math::frame::Frame;
@@ -133,14 +133,14 @@ impl KernelNeighborhood {
 
     /// Projects a vector onto the plane, in units of the radius.
     #[inline]
-    fn project(&self, vector: DVec3) -> DVec2 {
+    fn project_vector(&self, vector: DVec3) -> DVec2 {
         DVec2::new(self.tangents[0].dot(vector), self.tangents[1].dot(vector))
     }
 
     /// A piece's corners, projected onto the plane relative to the center, in units of the radius.
     #[inline]
     fn project_polygon(&self, piece: &FlatPolygon) -> ArrayVec<DVec2, 4> {
-        piece.iter().map(|&corner| self.project(corner - self.point)).collect()
+        piece.iter().map(|&corner| self.project_vector(corner - self.point)).collect()
     }
 
     /// Returns the kernel's weight over the pieces, or `None` if a wall separates the pieces or if they
@@ -165,7 +165,7 @@ impl KernelNeighborhood {
         match shape.geometry_near(self.point) {
             LocalGeometry::Polygons(count) => (0..count)
                 .filter_map(|number| shape.polygon_face(number))
-                .all(|piece| self.try_add_polygon(&piece, &receives)),
+                .all(|piece| self.add_polygon_piece_or_wall(&piece, &receives)),
             LocalGeometry::Surface { distance, ground } => {
                 distance > FAR * self.radius
                     || ground.is_some_and(|ground| self.try_add_covering_surface(&ground, receives))
@@ -177,8 +177,8 @@ impl KernelNeighborhood {
     /// false.
     fn try_add_covering_surface(&mut self, ground: &NearestSurface, receives: impl Fn() -> bool) -> bool {
         let is_wide = match ground.extent {
-            LocalSurfaceShape::Flat(reach) => reach > FAR * self.radius,
-            LocalSurfaceShape::Round(radius) => radius > WIDE * self.radius,
+            FlatOrRoundExtent::Flat(reach) => reach > FAR * self.radius,
+            FlatOrRoundExtent::Round(radius) => radius > WIDE * self.radius,
         };
         let is_same = ground.normal.dot(self.normal).abs() > SAME_PLANE && ground.height < FLAT * self.radius;
         self.whole += u32::from(is_wide && is_same && receives());
@@ -209,12 +209,14 @@ impl KernelNeighborhood {
         near.sort_unstable();
         near.iter().all(|&triangle| {
             let piece = mesh.world_corners(triangle).into_iter().collect();
-            self.try_add_polygon(&piece, || can_store_photons(primitive_material(world, id, triangle)))
+            self.add_polygon_piece_or_wall(&piece, || {
+                can_store_photons(primitive_material(world, id, triangle))
+            })
         })
     }
 
     /// Adds a flat piece and returns whether the coverage still has a closed form.
-    fn try_add_polygon(&mut self, piece: &FlatPolygon, receives: impl Fn() -> bool) -> bool {
+    fn add_polygon_piece_or_wall(&mut self, piece: &FlatPolygon, receives: impl Fn() -> bool) -> bool {
         let normal = (piece[1] - piece[0]).cross(piece[2] - piece[0]);
         let from = piece[0] - self.point;
         let (size, distance, cosine) = (normal.length_squared(), normal.dot(from), normal.dot(self.normal));
@@ -243,7 +245,7 @@ impl KernelNeighborhood {
 
     /// Adds a wall, given its plane's normal and signed distance from the center.
     fn add_wall(&mut self, normal: DVec3, distance: f64) -> bool {
-        let along = self.project(normal) * (self.radius * distance.signum());
+        let along = self.project_vector(normal) * (self.radius * distance.signum());
         let length = along.length();
         let wall = Wall { normal: along / length, distance: distance.abs() / (length * self.radius) };
         normal.dot(self.normal).abs() < UPRIGHT && wall.distance > FLAT && self.walls.try_push(wall).is_ok()

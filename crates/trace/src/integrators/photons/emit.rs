@@ -18,10 +18,10 @@ use crate::integrators::transport::crossing::CoincidentSurfaceBuffers;
 use crate::integrators::transport::interface::{
     FresnelSplit, diffuser_basic_radiance_transmittance, fresnel_split, reflected_path,
 };
-use crate::integrators::transport::interiors::{Interior, InteriorList, InteriorLists, medium_ior};
+use crate::integrators::transport::interiors::{Interior, InteriorList, InteriorListPool, medium_ior};
 use crate::integrators::transport::packet::PacketSource;
 use crate::integrators::transport::ray::{PathHistory, PathRay};
-use crate::integrators::transport::scatter::{BsdfSampler, ContinuationPolicy};
+use crate::integrators::transport::scatter::{BounceContinuation, BsdfSampler};
 use crate::integrators::transport::tile::TileContext;
 use crate::integrators::transport::vertex::{ShadingVertex, SurfaceVertex};
 use crate::integrators::transport::walk::{
@@ -31,7 +31,7 @@ use crate::integrators::transport::walk::{
 use crate::integrators::view::LightAov;
 use crate::integrators::{PACKET_SIZE, RayCounters};
 use crate::lights::{EmittedPhoton, PhotonEmitter, PhotonOrigin, PhotonRandomNumbers};
-use crate::materials::bsdf::SampledLobes;
+use crate::materials::bsdf::LobesToSample;
 use crate::materials::{Bsdf, BxdfPoint, Coated, NonSpecular, ThinDielectric};
 use crate::math::Vec3;
 use crate::math::lanes::{Simd, lane, set_lane};
@@ -82,7 +82,7 @@ impl PhotonTracer<'_> {
             next: Vec::new(),
             open: VertexBatch::empty(),
             open_behind: VertexBatch::empty(),
-            interior_lists: InteriorLists::default(),
+            interior_lists: InteriorListPool::default(),
             crossing: CoincidentSurfaceBuffers::default(),
             stored: PhotonChunk::default(),
             counters: RayCounters::default(),
@@ -99,7 +99,7 @@ impl PhotonTracer<'_> {
             // Scatter the individually queued vertices, and apply Russian roulette.
             wavefront.scatter_queued_vertices();
             wavefront.interior_lists.clear();
-            wavefront.russian_roulette();
+            wavefront.apply_roulette_to_queued_photons();
             std::mem::swap(&mut rays, &mut wavefront.next);
             wavefront.next.clear();
             wavefront.depth += 1;
@@ -159,7 +159,7 @@ struct PhotonWavefront<'a> {
     /// Vertex packet for transmitted photons.
     open_behind: VertexBatch,
     /// Media at the individually queued vertices.
-    interior_lists: InteriorLists,
+    interior_lists: InteriorListPool,
     crossing: CoincidentSurfaceBuffers,
     stored: PhotonChunk,
     counters: RayCounters,
@@ -177,7 +177,7 @@ impl<'a> PathStepper<'a> for PhotonWavefront<'a> {
     fn record_surface_crossing(&mut self, _: &PathRay, _: Option<Hit>) {}
 
     #[inline(always)]
-    fn handle_interaction(&mut self, path: &PathRay, reached: Interaction<'_, 'a>, has_passed: bool) {
+    fn handle_walk_end(&mut self, path: &PathRay, reached: Interaction<'_, 'a>, has_passed: bool) {
         match reached {
             Interaction::Opaque(vertex, _, far) => {
                 let lacks_photons = self.depth == 0 && !has_passed;
@@ -295,7 +295,11 @@ impl PhotonWavefront<'_> {
         // Shade other surfaces one by one.
         for i in set_bit_lanes(packet.any & !packet.plain) {
             if let Some(hit) = packet.hit(i) {
-                walk_to_interaction(self, &mut { rays[i] }, (hit, packet.scalar_shaded_surface(surfaces, i)));
+                walk_to_interaction(
+                    self,
+                    &mut { rays[i] },
+                    (hit, packet.non_plain_surface_of_lane(surfaces, i)),
+                );
             }
         }
     }
@@ -369,7 +373,7 @@ impl PhotonWavefront<'_> {
         (far, scattered): (&InteriorList, Option<f32>),
     ) {
         let mut bsdf = rough.evaluate_textures(&vertex.texture_point, &mut self.counters.texture_lookups);
-        vertex.tint_by_vertex_color(&mut bsdf);
+        vertex.tint_bsdf_by_vertex_color(&mut bsdf);
         if !bsdf.is_black() {
             self.store_and_scatter(path, vertex, bsdf, (far, scattered));
         }
@@ -394,7 +398,7 @@ impl PhotonWavefront<'_> {
         };
         // Queue the photon for scattering.
         let shading = vertex.perturbed_and_smooth_normals(&mut self.counters);
-        let behind = bsdf.transmission_bsdf().map(|bsdf| (bsdf, shading.far_side()));
+        let behind = bsdf.bsdf_for_transmitted_light().map(|bsdf| (bsdf, shading.far_side()));
         let interiors = self.interior_lists.push_list(&path.interiors);
         if self.open.used == ALL || self.open.bsdf.kind() != bsdf.kind() {
             self.scatter_queued_vertices();
@@ -502,14 +506,14 @@ impl PhotonWavefront<'_> {
             row.shading_normal_cosine[i] = UNPERTURBED;
         }
         let continuation =
-            ContinuationPolicy { continues: true, uses_roulette: false, lobes: SampledLobes::All };
+            BounceContinuation { continues: true, uses_roulette: false, lobes: LobesToSample::All };
         let used = row.used;
         BsdfSampler { tile: self.tracing.tile, row, used, continuation, has_fractions: false }
             .queue_scattered_paths(&self.interior_lists, &[], &mut self.next, None);
     }
 
     /// Applies Russian roulette based on flux. Surviving photons keep about their initial flux.
-    fn russian_roulette(&mut self) {
+    fn apply_roulette_to_queued_photons(&mut self) {
         let tile = self.tracing.tile;
         let mut kept = 0;
         for begin in (0..self.next.len()).step_by(PACKET_SIZE) {

@@ -124,7 +124,7 @@ fn coverage_factor(
             0.0
         }
         by_trials @ (KernelCoverage::Clipped | KernelCoverage::Crowded) => {
-            let sampler = tile.sampler(row.slot[i]);
+            let sampler = tile.sampler_for_slot(row.slot[i]);
             let pair = |number| sampler.pair(row.path[i], Dimension::Trial(number));
             inverse_coverage(tile.world, look, radius, by_trials, pair)
         }
@@ -165,7 +165,7 @@ fn gather_with_bsdf_per_photon(
 ) -> ([Vec3; 2], Option<PhotonPositionAndNormal>) {
     let (mut sum, mut total, mut left, mut chosen) = ([Vec3::ZERO; 2], 0.0, random[0], None);
     map.visit_weighted_photons(look, simd, |photon, density| {
-        let [shown, wide, all] = row.bsdf.lane_f(i, photon.direction);
+        let [shown, wide, all] = row.bsdf.lane_f_by_lobe_set(i, photon.direction);
         let scale = density * row.adjoint_photon_weight(i, photon.direction);
         sum[0] += shown * photon.flux * scale;
         if splits_lobes {

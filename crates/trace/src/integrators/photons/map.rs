@@ -234,7 +234,7 @@ impl PhotonMap {
         let mut choices = ReservoirPacket::new(random[0]);
         let ranges = self.candidate_ranges(look);
         for range in &ranges.of[..ranges.count] {
-            for block in block_index_range(*range) {
+            for block in blocks_covering_photon_range(*range) {
                 let Some(weights) = self.kernel_weights_in_block(look, *range, block, simd) else { continue };
                 let [red, green, blue] = &self.blocks[block].flux;
                 let mut brought = [0.0; PACKET_SIZE];
@@ -267,7 +267,7 @@ impl PhotonMap {
         let mut count = 0;
         let ranges = self.candidate_ranges(look);
         for range in &ranges.of[..ranges.count] {
-            for block in block_index_range(*range) {
+            for block in blocks_covering_photon_range(*range) {
                 let Some(weights) = self.kernel_weights_in_block(look, *range, block, simd) else { continue };
                 count += positive_lane_mask(&weights, simd).count_ones();
             }
@@ -288,7 +288,7 @@ impl PhotonMap {
         let peak = self.peak_weight();
         let ranges = self.candidate_ranges(look);
         for range in &ranges.of[..ranges.count] {
-            for block in block_index_range(*range) {
+            for block in blocks_covering_photon_range(*range) {
                 let Some(weights) = self.kernel_weights_in_block(look, *range, block, simd) else { continue };
                 for i in set_bit_lanes(positive_lane_mask(&weights, simd)) {
                     visit(&self.photon(block, i), peak * weights[i]);
@@ -405,7 +405,7 @@ impl PhotonBlock {
 
 /// Blocks that contain a nonempty range of photons.
 #[inline(always)]
-fn block_index_range([start, end]: [u32; 2]) -> std::ops::Range<usize> {
+fn blocks_covering_photon_range([start, end]: [u32; 2]) -> std::ops::Range<usize> {
     start as usize / PACKET_SIZE..(end as usize).div_ceil(PACKET_SIZE)
 }
 

@@ -58,7 +58,7 @@ use crate::integrators::transport::tile::{SampleBlock, TileContext};
 use crate::lights::{BoundingSphere, PhotonEmitter};
 use crate::materials::{Dielectric, Material};
 use crate::scene::description::{RenderOptions, ShadowMode};
-use crate::world::{CompoundSolid, Hit, LightSphereAndObjectBounds, World, scene_photon_emitter};
+use crate::world::{CompoundSolid, Hit, LightBoundingBoxes, World, scene_photon_emitter};
 use emit::{PhotonChunk, PhotonTracer};
 pub(super) use map::GatherPoint;
 pub use map::{Photon, PhotonMap};
@@ -366,7 +366,7 @@ fn light_enclosing_glass_candidates(world: &World) -> (Vec<u32>, Vec<CompoundSol
     let closed = world.closed_glass_shapes().map(|(object, _)| object).filter(may_hold_light).collect();
     // A solid closed by opaque surfaces may extend beyond its bounding box, so test the center and corners of
     // each light.
-    let is_around = |body: &CompoundSolid, lamp: &LightSphereAndObjectBounds| {
+    let is_around = |body: &CompoundSolid, lamp: &LightBoundingBoxes| {
         lamp.smaller_box_center_and_corners()
             .any(|point| world.enclosing_glass_material(body, point, lamp.object).is_some())
     };

@@ -1,7 +1,7 @@
 //! Accumulates the light components visible in the view, and the layers.
 
 use super::ray::PathRay;
-use crate::integrators::layers::{LayerValues, SampleLayer};
+use crate::integrators::layers::{SampleLayer, SampleLayerValues};
 use crate::integrators::view::{LightAov, RadianceComponentMask};
 use crate::math::Vec3;
 
@@ -47,7 +47,7 @@ impl DiffuseFractions {
 /// Layers recorded along with the radiance.
 pub struct LayerAccumulator<'a> {
     /// The layers' values.
-    pub values: &'a mut LayerValues,
+    pub values: &'a mut SampleLayerValues,
     /// The paths' diffuse fractions, or `None` if no component of the light is recorded.
     pub fractions: Option<&'a mut DiffuseFractions>,
 }
@@ -74,7 +74,7 @@ impl Accumulator<'_> {
 
     /// The layers, if any of them records a quantity at the first hit.
     #[inline]
-    pub fn first_hit_layers(&mut self) -> Option<&mut LayerValues> {
+    pub fn first_hit_layers(&mut self) -> Option<&mut SampleLayerValues> {
         self.layers
             .as_mut()
             .map(|layers| &mut *layers.values)
@@ -93,7 +93,7 @@ impl Accumulator<'_> {
 
     /// Adds emission or ambient light.
     pub fn add_non_reflected(&mut self, slot: u32, part: NonReflectedTerm, radiance: Vec3) {
-        let parts = self.components_to_accumulate();
+        let parts = self.accumulated_radiance_components();
         let (is_taken, layer) = match part {
             NonReflectedTerm::Emitted => (parts.emitted, SampleLayer::Emission),
             NonReflectedTerm::Ambient => (parts.ambient, SampleLayer::Ambient),
@@ -123,7 +123,7 @@ impl Accumulator<'_> {
     }
 
     /// Radiance components to accumulate.
-    fn components_to_accumulate(&self) -> RadianceComponentMask {
+    fn accumulated_radiance_components(&self) -> RadianceComponentMask {
         match self.aov {
             LightAov::Radiance(parts) => parts,
             LightAov::LitFraction | LightAov::TraversalCost => RadianceComponentMask::NONE,
@@ -141,7 +141,7 @@ impl Accumulator<'_> {
     /// Whether the ambient term of a surface hit by a path is accumulated. After a diffuse or glossy surface,
     /// it is treated as light reflected by that surface.
     pub fn accepts_ambient(&self, path: &PathRay) -> bool {
-        let parts = self.components_to_accumulate();
+        let parts = self.accumulated_radiance_components();
         if path.state.only_specular_before {
             parts.ambient
         } else {

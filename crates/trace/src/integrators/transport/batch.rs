@@ -115,7 +115,7 @@ impl VertexBatch {
             is_run &= slots[i] == slots[0] + i as u32;
         }
         let (xs, ys, samples) = if is_run {
-            block.pixels_and_samples_from_slot(slots[0])
+            block.pixels_and_samples_of_consecutive_slots(slots[0])
         } else {
             block.pixels_and_samples_of_slots(slots)
         };
@@ -171,7 +171,7 @@ impl VertexBatch {
     ) {
         let ShadingVertex { path, place, vertex, shading, bsdf, .. } = lit;
         let origin = vertex.shadow_origin(tile, path.state.only_specular_before);
-        let normal = bsdf.facing_normal(shading.normal, vertex.wo);
+        let normal = bsdf.lobe_shading_normal(shading.normal, vertex.wo);
         BatchVertex {
             from: origin.point,
             start: origin.start,

@@ -90,7 +90,7 @@ impl TileContext<'_> {
     fn camera_packet(&self, first: u32) -> CameraRayPacket {
         let paths = [CAMERA_PATH; PACKET_SIZE];
         let (settings, camera) = (self.settings, &self.world.camera);
-        let (xs, ys, samples) = self.block.pixels_and_samples_from_slot(first);
+        let (xs, ys, samples) = self.block.pixels_and_samples_of_consecutive_slots(first);
         let sampler = SamplerPacket::new(settings.render.seed, &xs, &ys, &samples);
         // Sample positions in the pixels.
         let mut in_pixel = sampler.pairs(&paths, Dimension::Pixel, 0, 1);
@@ -108,7 +108,7 @@ impl TileContext<'_> {
         // Generate rays through these positions, from points on the lens if the camera has an aperture.
         let (mut origin, mut direction) = ([[0.0; PACKET_SIZE]; 3], [[0.0; PACKET_SIZE]; 3]);
         if settings.dof && camera.aperture > 0.0 {
-            let lens = sample_lens(sampler.pairs(&paths, Dimension::Lens, 0, 1));
+            let lens = sample_unit_disk_packet(sampler.pairs(&paths, Dimension::Lens, 0, 1));
             for lane in 0..PACKET_SIZE {
                 let place = DVec2::new(places[0][lane], places[1][lane]);
                 let ray = camera.ray(place, Vec2::new(lens[0][lane], lens[1][lane]));
@@ -147,7 +147,7 @@ impl SimdKernel for GenerateCameraRays<'_> {
 
 /// Maps pairs of random numbers to the unit disk.
 #[inline(always)]
-fn sample_lens([u, v]: [F32x16; 2]) -> [F32x16; 2] {
+fn sample_unit_disk_packet([u, v]: [F32x16; 2]) -> [F32x16; 2] {
     let mut points = [u, v];
     for lane in 0..PACKET_SIZE {
         let point = warp::disk(Vec2::new(u[lane], v[lane]));
@@ -168,7 +168,7 @@ mod tests {
         for samples in [3..4, 0..5, 100..116, 7..40] {
             let block = SampleBlock { pixels: tile.into(), samples };
             for first in [0, 1, 2, 15, 33] {
-                let (xs, ys, samples) = block.pixels_and_samples_from_slot(first);
+                let (xs, ys, samples) = block.pixels_and_samples_of_consecutive_slots(first);
                 for lane in 0..PACKET_SIZE {
                     let place = block.pixel_and_sample(first + lane as u32);
                     assert_eq!((xs[lane], ys[lane], samples[lane]), place, "{first} + {lane}");

@@ -88,12 +88,12 @@ impl InteriorList {
 
 /// Interior lists of vertices, by index. Index 0 is air.
 #[derive(Debug, Default)]
-pub struct InteriorLists {
+pub struct InteriorListPool {
     /// Lists with glass, starting at index 1.
     inside: Vec<InteriorList>,
 }
 
-impl InteriorLists {
+impl InteriorListPool {
     /// Removes all lists.
     pub fn clear(&mut self) {
         self.inside.clear();

@@ -14,7 +14,7 @@ use crate::geometry::surface_packet::SurfacePacket;
 use crate::geometry::{Ray, SurfacePoint};
 use crate::integrators::view::LightAov;
 use crate::materials::NonSpecular;
-use crate::materials::bsdf::LobeFilter;
+use crate::materials::bsdf::ShownLobes;
 use crate::math::lanes::{F32x16, Simd, TRUE, Vec3x16, lane, mask_from_bits, select, select_u32, set_lane};
 use crate::math::{DVec2, Vec3};
 use crate::sampling::CAMERA_PATH;
@@ -102,7 +102,7 @@ impl PacketHits {
     }
 
     /// Surface at a hit, or `None` if it is plain or not in the surface packet.
-    pub fn scalar_shaded_surface(
+    pub fn non_plain_surface_of_lane(
         &self,
         surfaces: &SurfacePacket,
         lane_of_ray: usize,
@@ -170,7 +170,7 @@ impl TileContext<'_> {
     /// Whether surface packets contain everything needed for shading a non-plain material. Surface packets
     /// have no texture coordinates or tangents.
     #[inline(always)]
-    fn can_shade_material_in_packet(&self, material: usize) -> bool {
+    fn surface_packet_suffices_for_material(&self, material: usize) -> bool {
         // Ray cones need tangents and curvatures.
         self.pixel_spread == 0.0 && !self.world.material_needs_uvs_or_tangents(material)
     }
@@ -195,7 +195,7 @@ struct PacketIntersector<'a> {
 }
 
 /// Masks of a packet's plain surfaces.
-struct PlainAndEmissiveSurfaceMasks {
+struct PlainSurfaceMasks {
     /// All plain surfaces.
     all: u32,
     /// Surfaces that emit on either side.
@@ -295,11 +295,11 @@ impl PacketIntersector<'_> {
         (hits, object): (&HitPacket, &[u32; PACKET_SIZE]),
         mut left: u32,
         simd: impl Simd,
-    ) -> PlainAndEmissiveSurfaceMasks {
+    ) -> PlainSurfaceMasks {
         let Self { tile, aov, are_lit, row, surface, .. } = self;
-        let mut plain = PlainAndEmissiveSurfaceMasks { all: 0, shining: 0, two_sided: 0, lookups: 0 };
+        let mut plain = PlainSurfaceMasks { all: 0, shining: 0, two_sided: 0, lookups: 0 };
         while left != 0 {
-            let (id, of_object) = lanes_matching_first(object, left, simd);
+            let (id, of_object) = first_index_and_matching_lanes(object, left, simd);
             left &= !of_object;
             if tile.world.object_uses_vertex_colors(id) {
                 continue;
@@ -310,7 +310,7 @@ impl PacketIntersector<'_> {
             let mut groups = ArrayVec::<(&NonSpecular, bool, u32), PACKET_SIZE>::new();
             let mut waiting = of_object;
             while waiting != 0 {
-                let (material, alike) = lanes_matching_first(&materials, waiting, simd);
+                let (material, alike) = first_index_and_matching_lanes(&materials, waiting, simd);
                 waiting &= !alike;
                 let Some((material, rough)) = tile.plain_packet_material(material as usize) else { continue };
                 if plain.all | of == 0 {
@@ -336,12 +336,12 @@ impl PacketIntersector<'_> {
             match &tile.world.geometry.objects()[id as usize] {
                 Object::Shape(shape) => {
                     row.set_start_triangles(of, &[Ray::NO_TRIANGLE; PACKET_SIZE]);
-                    if !surface.try_compute_surface_points(shape, rows, hits, of) {
+                    if !surface.try_fill_points_of_shape_lanes(shape, rows, hits, of) {
                         (plain.shining, plain.two_sided) = (plain.shining & !of, plain.two_sided & !of);
                         continue;
                     }
                     if asked_uvs.is_some() {
-                        surface.fill_uv(shape, rows, hits, of);
+                        surface.fill_uv_of_shape_lanes(shape, rows, hits, of);
                     }
                 }
                 Object::Mesh(mesh) => {
@@ -353,9 +353,10 @@ impl PacketIntersector<'_> {
             // Evaluate the materials. At vertices that the camera does not see, all lobes are used.
             for (rough, has_uv, of) in groups {
                 plain.lookups += if has_uv { u64::from(of.count_ones()) } else { 0 };
-                let shown = [(of, aov.lobes()), (of & !row.only_specular_before, LobeFilter::ALL)];
+                let shown = [(of, aov.lobes()), (of & !row.only_specular_before, ShownLobes::ALL)];
                 let shown = if *aov == LightAov::ALL { &shown[..1] } else { &shown };
-                let black = row.bsdf.set_lanes_to_material(rough, has_uv.then_some(&surface.uv), shown, simd);
+                let black =
+                    row.bsdf.evaluate_material_into_lanes(rough, has_uv.then_some(&surface.uv), shown, simd);
                 row.used |= of & !black;
             }
         }
@@ -366,7 +367,7 @@ impl PacketIntersector<'_> {
 /// Returns the index stored in the first lane in `left`, and the mask of lanes in `left` that have the same
 /// index.
 #[inline(always)]
-fn lanes_matching_first(indices: &[u32; PACKET_SIZE], left: u32, simd: impl Simd) -> (u32, u32) {
+fn first_index_and_matching_lanes(indices: &[u32; PACKET_SIZE], left: u32, simd: impl Simd) -> (u32, u32) {
     let index = indices[left.trailing_zeros() as usize % PACKET_SIZE];
     let mut of = [0; PACKET_SIZE];
     for lane in 0..PACKET_SIZE {
@@ -401,7 +402,7 @@ impl TileContext<'_> {
     ) -> u32 {
         let mut found = 0;
         while left != 0 {
-            let (id, of_object) = lanes_matching_first(object, left, simd);
+            let (id, of_object) = first_index_and_matching_lanes(object, left, simd);
             left &= !of_object;
             let thing = &self.world.geometry.objects()[id as usize];
             // A single hit on a shape is cheaper to evaluate separately.
@@ -411,15 +412,15 @@ impl TileContext<'_> {
             let materials = self.world.packet_material_indices(id, of_object, &hits.primitive);
             let (mut of, mut waiting) = (0, of_object);
             while waiting != 0 {
-                let (material, alike) = lanes_matching_first(&materials, waiting, simd);
+                let (material, alike) = first_index_and_matching_lanes(&materials, waiting, simd);
                 waiting &= !alike;
-                of |= if self.can_shade_material_in_packet(material as usize) { alike } else { 0 };
+                of |= if self.surface_packet_suffices_for_material(material as usize) { alike } else { 0 };
             }
             if of == 0 {
                 continue;
             }
             let is_filled = match thing {
-                Object::Shape(shape) => surface.try_compute_surface_points(shape, rows, hits, of),
+                Object::Shape(shape) => surface.try_fill_points_of_shape_lanes(shape, rows, hits, of),
                 Object::Mesh(mesh) => {
                     mesh.fill_surfaces(surface, rows, hits, of, None, simd);
                     true

@@ -4,12 +4,12 @@ use super::accumulator::DiffuseFractions;
 use super::batch::{BsdfValuesAndCosines, VertexBatch};
 use super::cone::RayCone;
 use super::interface::SCATTERED;
-use super::interiors::InteriorLists;
+use super::interiors::InteriorListPool;
 use super::ray::{PathHistory, PathRay};
 use super::tile::TileContext;
 use crate::geometry::Ray;
 use crate::geometry::packet::set_bit_lanes;
-use crate::materials::bsdf::{DielectricSamplePacket, SampledLobes};
+use crate::materials::bsdf::{DielectricSamplePacket, LobesToSample};
 use crate::math::Vec3;
 use crate::math::lanes::{F32x16, PACKET_SIZE, Simd, TRUE, Vec3x16, lane, set_lane};
 use crate::sampling::Dimension;
@@ -17,26 +17,26 @@ use crate::world::SimdKernel;
 
 /// How paths continue after a bounce.
 #[derive(Clone, Copy, Debug)]
-pub struct ContinuationPolicy {
+pub struct BounceContinuation {
     /// Whether paths continue. After the last bounce, they continue only if they may hit a light.
     pub continues: bool,
     /// Whether Russian roulette applies.
     pub uses_roulette: bool,
     /// Lobes from which directions are sampled.
-    pub lobes: SampledLobes,
+    pub lobes: LobesToSample,
 }
 
-impl ContinuationPolicy {
+impl BounceContinuation {
     /// Number of bounces before Russian roulette begins.
     const MIN_DEPTH: u32 = 3;
     /// Reciprocal of the throughput below which Russian roulette may end a path.
     const GAIN: f32 = 2.5;
 
     /// Determines how paths continue in these lobes after `depth` bounces.
-    pub fn new(tile: &TileContext<'_>, depth: u32, lobes: SampledLobes) -> Self {
+    pub fn new(tile: &TileContext<'_>, depth: u32, lobes: LobesToSample) -> Self {
         let emits = || tile.world.materials.iter().any(|material| material.emission.is_emissive());
         let max_depth = tile.settings.render.max_depth;
-        let shines = || tile.world.lights.has_infinite_lights() || emits();
+        let shines = || tile.world.lights.has_visible_infinite_lights() || emits();
         let continues = depth + 1 < max_depth || depth + 1 == max_depth && shines();
         Self { continues, uses_roulette: depth >= Self::MIN_DEPTH, lobes }
     }
@@ -55,7 +55,7 @@ impl ContinuationPolicy {
     pub fn survives_roulette(self, tile: &TileContext<'_>, path: &mut PathRay) -> bool {
         let chance = self.survival_probability(path.state.roulette_throughput);
         if chance < 1.0 {
-            if !(tile.sampler(path.slot).pair(path.path, Dimension::SpecularRoulette).x < chance) {
+            if !(tile.sampler_for_slot(path.slot).pair(path.path, Dimension::SpecularRoulette).x < chance) {
                 return false;
             }
             path.throughput /= chance;
@@ -74,7 +74,7 @@ pub struct BsdfSampler<'a> {
     /// Mask of vertices whose paths continue.
     pub used: u32,
     /// How the paths continue.
-    pub continuation: ContinuationPolicy,
+    pub continuation: BounceContinuation,
     /// Whether the diffuse fractions of the paths are needed.
     pub has_fractions: bool,
 }
@@ -108,7 +108,7 @@ impl BsdfSampler<'_> {
     /// required if `has_fractions`.
     pub fn queue_scattered_paths(
         self,
-        interior_lists: &InteriorLists,
+        interior_lists: &InteriorListPool,
         cones: &[RayCone],
         next: &mut Vec<PathRay>,
         fractions: Option<&mut DiffuseFractions>,
@@ -171,7 +171,11 @@ impl SimdKernel for BsdfSampler<'_> {
         } else {
             [[0.0; PACKET_SIZE]; 2]
         };
-        let sides = if row.has_two_sides { row.bsdf.sample_either_side(&lobe, &u, simd) } else { None };
+        let sides = if row.has_two_sides {
+            row.bsdf.sample_reflection_or_transmission(&lobe, &u, simd)
+        } else {
+            None
+        };
         let mut scattered = match sides {
             Some(sides) => self.scattered_from_two_sided_samples(&sides, simd),
             None => self.sample_on_viewer_side(&lobe, &u, simd),
@@ -204,8 +208,8 @@ impl BsdfSampler<'_> {
         let pdfs = row.bsdf.pdf(continuation.lobes, &row.normal, &wi, &bsdf, simd);
         let mut roulette_throughput = [0.0; PACKET_SIZE];
         let f = match continuation.lobes {
-            SampledLobes::All => bsdf.f(),
-            SampledLobes::Narrow => bsdf.narrow,
+            LobesToSample::All => bsdf.f(),
+            LobesToSample::Narrow => bsdf.narrow,
         };
         let mut factors = f;
         let mut alive = 0_u32;
@@ -219,8 +223,8 @@ impl BsdfSampler<'_> {
             alive |= if (cosines[i] > 0.0) & (pdfs[i] > 0.0) & brings { bit } else { 0 };
         }
         let diffuse = match continuation.lobes {
-            SampledLobes::All if self.has_fractions => bsdf.wide_fraction(),
-            SampledLobes::All | SampledLobes::Narrow => [[0.0; PACKET_SIZE]; 3],
+            LobesToSample::All if self.has_fractions => bsdf.wide_fraction(),
+            LobesToSample::All | LobesToSample::Narrow => [[0.0; PACKET_SIZE]; 3],
         };
         // Drop directions below the horizon.
         alive &= !row.below_horizon_mask(&wi, simd);

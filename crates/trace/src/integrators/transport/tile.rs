@@ -7,7 +7,7 @@ use crate::control::CancelToken;
 use crate::film::{PixelSubset, SelectedPixels};
 use crate::integrators::RenderSettings;
 use crate::integrators::behavior::PathBehavior;
-use crate::lights::LightSamplingPurpose;
+use crate::lights::LightSamplingIntegrator;
 use crate::lights::infinite::Environment;
 use crate::sampling::PixelSampler;
 use crate::scene::description::ShadowMode;
@@ -57,12 +57,12 @@ impl<'a> TileContext<'a> {
             && render.shadow_samples == 1
             && render.clamp == 0.0;
         let lobes_find_sky =
-            is_constant && world.lights.sampler_for_purpose(LightSamplingPurpose::Eye).is_none();
+            is_constant && world.lights.sampler_for_integrator(LightSamplingIntegrator::Eye).is_none();
         Self { world, settings, block, token, pixel_spread, behavior, paths_find_sky, lobes_find_sky }
     }
 
     /// Sampler for a slot.
-    pub fn sampler(&self, slot: u32) -> PixelSampler {
+    pub fn sampler_for_slot(&self, slot: u32) -> PixelSampler {
         let (x, y, sample) = self.block.pixel_and_sample(slot);
         PixelSampler::new(self.settings.render.seed, x, y, sample)
     }
@@ -124,7 +124,7 @@ impl SampleBlock {
     /// Columns, rows and sample indices of the sixteen slots starting at `first`, even if some are past the
     /// last slot.
     #[inline(always)]
-    pub fn pixels_and_samples_from_slot(
+    pub fn pixels_and_samples_of_consecutive_slots(
         &self,
         first: u32,
     ) -> ([u32; PACKET_SIZE], [u32; PACKET_SIZE], [u32; PACKET_SIZE]) {

@@ -120,7 +120,7 @@ impl<'a> SurfaceVertex<'a> {
             color: tile.world.vertex_color(hit),
             curvature,
             material,
-            has_uv: tile.world.has_texture_axes_if_needed(hit.object),
+            has_uv: tile.world.object_has_texture_axes_if_needed(hit.object),
             is_front: surface.normal.dot(path.ray.direction) < 0.0,
             wo,
             normal: surface.normal * side,
@@ -141,7 +141,11 @@ impl<'a> SurfaceVertex<'a> {
     pub fn emitted_radiance(&self, path: &PathRay, counters: &mut RayCounters) -> Vec3 {
         let is_shared = path.state.pdf > 0.0;
         let at = self.lookup_point(is_shared);
-        self.material.emission.radiance(&at, self.normal.dot(self.wo), &mut counters.texture_lookups)
+        self.material.emission.radiance_of_emitting_side(
+            &at,
+            self.normal.dot(self.wo),
+            &mut counters.texture_lookups,
+        )
     }
 
     /// Point for texture lookups, without the footprint if light samples compete with the path.
@@ -168,7 +172,7 @@ impl<'a> SurfaceVertex<'a> {
 
     /// Multiplies a BSDF by the vertex color.
     #[inline(always)]
-    pub fn tint_by_vertex_color(&self, bsdf: &mut BxdfPoint) {
+    pub fn tint_bsdf_by_vertex_color(&self, bsdf: &mut BxdfPoint) {
         if let Some(color) = self.color {
             *bsdf = bsdf.tinted(color);
         }
@@ -291,7 +295,7 @@ impl<'a> SurfaceVertex<'a> {
 pub fn lift_significance_and_t_max(on_facet: Vec3, to: Vec3, normal: Vec3, error: Vec3) -> (bool, f32) {
     let lift = Ray { t_max: 1.0, ..Ray::new(on_facet, to - on_facet) };
     let is_above = lift.direction.dot(normal) > MIN_LIFT * normal.abs().dot(error);
-    (is_above, lift.extended_by_error(error).t_max)
+    (is_above, lift.extended_by_endpoint_error(error).t_max)
 }
 
 /// Minimum lift, in units of the point's error. Below it, the point on the facet is used.

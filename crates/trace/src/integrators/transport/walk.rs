@@ -55,12 +55,12 @@ pub trait PathStepper<'a> {
     /// Handles the interaction that ends a walk. The path contains the incoming ray, in the medium before the
     /// surface, and its throughput includes absorption. `has_passed` is true if the walk crossed any surface
     /// inside glass.
-    fn handle_interaction(&mut self, path: &PathRay, reached: Interaction<'_, 'a>, has_passed: bool);
+    fn handle_walk_end(&mut self, path: &PathRay, reached: Interaction<'_, 'a>, has_passed: bool);
 
     /// Texture lookup counter.
     fn texture_lookup_counter(&mut self) -> &mut u64;
 
-    /// Handles a thin pane. The path has the same state as in [`PathStepper::handle_interaction`].
+    /// Handles a thin pane. The path has the same state as in [`PathStepper::handle_walk_end`].
     fn handle_pane(
         &mut self,
         path: &PathRay,
@@ -143,7 +143,7 @@ pub fn walk_to_interaction<'a, W: PathStepper<'a>>(
         if vertex.material.bsdf.as_dielectric().is_none() {
             path.throughput *= medium_transmittance(tile.world, &path.interiors, hit.shape.t);
             if vertex.material.has_null_interaction() {
-                match null_interaction(stepper, path, &vertex, (way, hit)) {
+                match null_interaction_outcome(stepper, path, &vertex, (way, hit)) {
                     NullInteraction::Passed(_) if way.count == MAX_NULL_INTERACTIONS => return,
                     NullInteraction::Passed(part) => {
                         way = way.extended_past_surface(path, hit.shape.t);
@@ -157,7 +157,7 @@ pub fn walk_to_interaction<'a, W: PathStepper<'a>>(
                             None => {
                                 stepper.record_surface_crossing(path, None);
                                 path.ray.origin = way.origin;
-                                return stepper.handle_interaction(path, Interaction::Nothing, has_passed);
+                                return stepper.handle_walk_end(path, Interaction::Nothing, has_passed);
                             }
                         }
                     }
@@ -180,7 +180,7 @@ pub fn walk_to_interaction<'a, W: PathStepper<'a>>(
                 vertex.set_offset_points(crossing.sides);
             }
             let hit = way.rebase_ray_to_last_vertex(path, hit);
-            return stepper.handle_interaction(
+            return stepper.handle_walk_end(
                 path,
                 Interaction::Opaque(&vertex, DirectOrCoincidentHit::Direct(hit), &far),
                 has_passed,
@@ -197,12 +197,12 @@ pub fn walk_to_interaction<'a, W: PathStepper<'a>>(
         if let Some(touching) = opaque {
             let vertex = SurfaceVertex::at_coincident_surface(tile, path, (sides, &touching), hit.shape.t);
             if !vertex.material.has_null_interaction()
-                || is_stopped_by_coincident_surface(stepper, path, &vertex)
+                || coincident_surface_opacity_test(stepper, path, &vertex)
             {
                 let touched = Hit { shape: ShapeHit { t: hit.shape.t, ..touching.shape }, ..touching };
                 let touched = way.rebase_ray_to_last_vertex(path, touched);
                 let reached = Interaction::Opaque(&vertex, DirectOrCoincidentHit::Touching(touched), &far);
-                return stepper.handle_interaction(path, reached, has_passed);
+                return stepper.handle_walk_end(path, reached, has_passed);
             }
             path.path = path.continuation_path_number(PASSED);
         }
@@ -216,7 +216,7 @@ pub fn walk_to_interaction<'a, W: PathStepper<'a>>(
                 None
             };
             let hit = way.rebase_ray_to_last_vertex(path, hit);
-            return stepper.handle_interaction(
+            return stepper.handle_walk_end(
                 path,
                 Interaction::Glass(&vertex, hit, Interface { far: &far, rough }),
                 has_passed,
@@ -231,10 +231,10 @@ pub fn walk_to_interaction<'a, W: PathStepper<'a>>(
         stepper.record_surface_crossing(path, next);
         match next {
             Some(next) => hit = next,
-            None => return stepper.handle_interaction(path, Interaction::Nothing, true),
+            None => return stepper.handle_walk_end(path, Interaction::Nothing, true),
         }
     }
-    stepper.handle_interaction(path, Interaction::Hidden, true);
+    stepper.handle_walk_end(path, Interaction::Hidden, true);
 }
 
 /// Rough surface between two media with different indices of refraction, or `None` if the surface is smooth.
@@ -263,7 +263,7 @@ fn rough_dielectric_point<'a, W: PathStepper<'a>>(
 /// Determines whether a path passes straight through a surface that may be a null interaction.
 #[cold]
 #[inline(never)]
-fn null_interaction<'a, W: PathStepper<'a>>(
+fn null_interaction_outcome<'a, W: PathStepper<'a>>(
     stepper: &mut W,
     path: &PathRay,
     vertex: &SurfaceVertex<'a>,
@@ -289,7 +289,7 @@ fn null_interaction<'a, W: PathStepper<'a>>(
 /// effect.
 #[cold]
 #[inline(never)]
-fn is_stopped_by_coincident_surface<'a, W: PathStepper<'a>>(
+fn coincident_surface_opacity_test<'a, W: PathStepper<'a>>(
     stepper: &mut W,
     path: &PathRay,
     vertex: &SurfaceVertex<'a>,
@@ -319,7 +319,7 @@ fn stochastic_opacity_test(
     lookups: &mut u64,
 ) -> bool {
     let chance = opacity_at(path, vertex, lookups);
-    chance >= 1.0 || tile.sampler(path.slot).pair(path.path, Dimension::Opacity).x < chance
+    chance >= 1.0 || tile.sampler_for_slot(path.slot).pair(path.path, Dimension::Opacity).x < chance
 }
 
 /// Path after a null interaction.
@@ -358,6 +358,6 @@ impl TileContext<'_> {
     /// Randomly chooses between reflection and refraction. `reflectance` is the probability of reflection.
     #[inline]
     pub fn chooses_reflection(&self, path: &PathRay, reflectance: f32) -> bool {
-        self.sampler(path.slot).pair(path.path, Dimension::Fresnel).x < reflectance
+        self.sampler_for_slot(path.slot).pair(path.path, Dimension::Fresnel).x < reflectance
     }
 }

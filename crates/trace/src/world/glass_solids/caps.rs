@@ -1,6 +1,6 @@
 //! Open rims that end at opaque surfaces, where light can reach the other side only through the glass.
 
-use super::parts::{GlassParts, GlassTriangles, RimEdge, find_glass_triangles};
+use super::parts::{GlassParts, GlassTriangleCoverage, RimEdge, glass_triangle_coverage};
 use crate::accel::Bvh;
 use crate::assets::LoadedMesh;
 use crate::control::{CancelToken, Cancelled};
@@ -130,7 +130,7 @@ fn evaluate_queries(
     let tree = Bvh::build(&bounds, token)?;
     let mut answers = vec![false; queries.len()];
     for object in &scene.objects {
-        if find_glass_triangles(scene, meshes, object) == Some(GlassTriangles::All) {
+        if glass_triangle_coverage(scene, meshes, object) == Some(GlassTriangleCoverage::All) {
             continue;
         }
         token.check_pause_and_cancel()?;

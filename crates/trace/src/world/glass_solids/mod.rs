@@ -100,7 +100,7 @@ impl GlassSolids {
         let alone = |place| ObjectRole { place, is_inside_out: false, is_open: false };
         solids.parts = (0..scene.objects.len() as u32).map(alone).collect();
         let all = groups.parts_by_solid();
-        let holes = Hole::find_all(&parts, &groups, &all, &shared_edges);
+        let holes = SolidOpenBoundary::find_per_solid(&parts, &groups, &all, &shared_edges);
         let covered = hole_covered_flags(scene, meshes, &parts, &holes, token)?;
         let mut closed: Vec<ClosedSolid> = Vec::new();
         for ((members, hole), &is_covered) in all.iter().zip(&holes).zip(&covered) {
@@ -184,13 +184,14 @@ fn hole_covered_flags(
     scene: &Scene,
     meshes: &[&LoadedMesh],
     parts: &GlassParts,
-    holes: &[Hole],
+    holes: &[SolidOpenBoundary],
     token: &CancelToken,
 ) -> Result<Vec<bool>, Cancelled> {
-    let is_large = |hole: &&Hole| hole.part > SMALL_HOLE;
+    let is_large = |hole: &&SolidOpenBoundary| hole.part > SMALL_HOLE;
     let rims: Vec<&[RimEdge]> = holes.iter().filter(is_large).map(|hole| &*hole.rims).collect();
     let mut parts = caps::covered_rim_fractions(scene, meshes, parts, &rims, token)?.into_iter();
-    let is_covered = |hole: &Hole| is_large(&hole) && parts.next().is_some_and(|part| part >= COVERED);
+    let is_covered =
+        |hole: &SolidOpenBoundary| is_large(&hole) && parts.next().is_some_and(|part| part >= COVERED);
     Ok(holes.iter().map(is_covered).collect())
 }
 
@@ -308,7 +309,7 @@ impl PartGroups {
 }
 
 /// Missing part of a solid's surface.
-struct Hole {
+struct SolidOpenBoundary {
     rims: Vec<RimEdge>,
     /// For each edge, whether another edge of the solid coincides with it and has the same direction.
     disagree: Vec<bool>,
@@ -316,9 +317,9 @@ struct Hole {
     part: f64,
 }
 
-impl Hole {
+impl SolidOpenBoundary {
     /// Returns the holes of all solids.
-    fn find_all(
+    fn find_per_solid(
         parts: &GlassParts,
         groups: &PartGroups,
         all: &[Vec<u32>],

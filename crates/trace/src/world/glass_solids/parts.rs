@@ -69,7 +69,7 @@ impl GlassParts {
         let mut parts = Self::default();
         let mut open_of_file: HashMap<usize, Vec<[u32; 2]>> = HashMap::new();
         for (number, object) in (0_u32..).zip(&scene.objects) {
-            let Some(glass) = find_glass_triangles(scene, meshes, object) else { continue };
+            let Some(glass) = glass_triangle_coverage(scene, meshes, object) else { continue };
             token.check_pause_and_cancel()?;
             if parts.list.is_empty() {
                 parts.origin = point_on_or_inside_shape(&object.shape, meshes);
@@ -79,10 +79,10 @@ impl GlassParts {
                 let loaded = meshes[mesh.file];
                 let open = open_of_file.entry(mesh.file).or_insert_with(|| open_edges(&loaded.mesh));
                 parts.add_mesh(number, mesh, loaded, glass, open);
-            } else if let Some(sheet) = object.shape.as_open_surface() {
+            } else if let Some(sheet) = object.shape.untransformed_open_surface() {
                 let first = parts.rims.len();
                 parts.add_open_surface(number, &sheet);
-                if let (_, Some(matrix)) = object.shape.untransformed() {
+                if let (_, Some(matrix)) = object.shape.shape_and_matrix() {
                     parts.transform_last_part(first, &matrix.to_transform());
                 }
             }
@@ -191,15 +191,15 @@ impl GlassParts {
         object: u32,
         placed: &MeshReference,
         loaded: &LoadedMesh,
-        glass: GlassTriangles,
+        glass: GlassTriangleCoverage,
         open: &[[u32; 2]],
     ) {
         let mesh = &loaded.mesh;
         let place = placed.placed.to_transform().relative_to_origins(mesh.origin, self.origin);
         let mirrors = place.flips_handedness();
         let is_glass = |triangle: usize| match glass {
-            GlassTriangles::All => true,
-            GlassTriangles::Some => mesh
+            GlassTriangleCoverage::All => true,
+            GlassTriangleCoverage::Some => mesh
                 .materials
                 .get(triangle)
                 .is_some_and(|&own| loaded.materials.get(own as usize).is_some_and(FileMaterial::is_glass)),
@@ -245,7 +245,7 @@ fn point_on_or_inside_shape(shape: &Shape, meshes: &[&LoadedMesh]) -> DVec3 {
 
 /// Which of an object's triangles are glass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum GlassTriangles {
+pub(super) enum GlassTriangleCoverage {
     /// All triangles, or the whole object if it is not a mesh.
     All,
     /// Triangles whose material in the mesh file is glass.
@@ -253,16 +253,20 @@ pub(super) enum GlassTriangles {
 }
 
 /// Returns which triangles of an object are glass, or `None` if the object contains no glass.
-pub(super) fn find_glass_triangles(
+pub(super) fn glass_triangle_coverage(
     scene: &Scene,
     meshes: &[&LoadedMesh],
     object: &Object,
-) -> Option<GlassTriangles> {
+) -> Option<GlassTriangleCoverage> {
     match (object.material, object.shape.as_mesh()) {
-        (Some(index), _) => scene.materials[index].kind.is_solid_glass().then_some(GlassTriangles::All),
-        (None, Some(mesh)) => {
-            meshes[mesh.file].materials.iter().any(FileMaterial::is_glass).then_some(GlassTriangles::Some)
+        (Some(index), _) => {
+            scene.materials[index].kind.is_solid_glass().then_some(GlassTriangleCoverage::All)
         }
+        (None, Some(mesh)) => meshes[mesh.file]
+            .materials
+            .iter()
+            .any(FileMaterial::is_glass)
+            .then_some(GlassTriangleCoverage::Some),
         (None, None) => None,
     }
 }

@@ -89,8 +89,8 @@ fn premultiplied_floats<T: Sample>(
 ) -> TexelData {
     let decoding = options.linearization::<T>();
     let texel = |pixel: &[T]| {
-        let alpha = sanitize(pixel[options.alpha].to_unit_float()).min(1.0);
-        let encoded = pixel_rgb(pixel).map(T::to_unit_float);
+        let alpha = sanitize(pixel[options.alpha].to_float_scaling_integers()).min(1.0);
+        let encoded = pixel_rgb(pixel).map(T::to_float_scaling_integers);
         *unusable += u64::from(encoded.map(sanitize) != encoded);
         let divisor = if options.is_premultiplied && alpha > 0.0 { alpha } else { 1.0 };
         let linear = match &decoding {
@@ -98,7 +98,7 @@ fn premultiplied_floats<T: Sample>(
             Linearization::Srgb => encoded.map(|value| srgb_to_linear(sanitize(value / divisor))),
             Linearization::Tables(tables) => apply_transfer_curves_to_pixel(pixel, Some(tables)),
         };
-        let color = Vec3::from_array(options.space.convert_to_linear_rec_709(linear).map(sanitize));
+        let color = Vec3::from_array(options.space.convert_linear_to_rec_709(linear).map(sanitize));
         (color * alpha).extend(alpha)
     };
     TexelData::FloatAlpha(samples.chunks_exact(options.alpha + 1).map(texel).collect())

@@ -41,7 +41,7 @@ use with_samples;
 /// Sample type of an image.
 trait Sample: Copy + PartialEq {
     /// Converts the sample to a float. The largest integer becomes 1.
-    fn to_unit_float(self) -> f32;
+    fn to_float_scaling_integers(self) -> f32;
 
     /// Tables that map every integer to its linear value, or `None` for floats, which are already linear.
     fn linearization_tables(_: &ColorSpace) -> Option<[Vec<f32>; 3]> {
@@ -55,7 +55,7 @@ trait Sample: Copy + PartialEq {
 }
 
 impl Sample for u8 {
-    fn to_unit_float(self) -> f32 {
+    fn to_float_scaling_integers(self) -> f32 {
         f32::from(self) / f32::from(Self::MAX)
     }
 
@@ -69,7 +69,7 @@ impl Sample for u8 {
 }
 
 impl Sample for u16 {
-    fn to_unit_float(self) -> f32 {
+    fn to_float_scaling_integers(self) -> f32 {
         f32::from(self) / f32::from(Self::MAX)
     }
 
@@ -83,7 +83,7 @@ impl Sample for u16 {
 }
 
 impl Sample for f32 {
-    fn to_unit_float(self) -> f32 {
+    fn to_float_scaling_integers(self) -> f32 {
         self
     }
 }
@@ -114,7 +114,7 @@ fn is_channel_filled_with(image: &DynamicImage, index: usize, value: f32) -> boo
         (channels, index): (usize, usize),
         value: f32,
     ) -> bool {
-        samples.chunks_exact(channels).all(|pixel| pixel[index].to_unit_float() == value)
+        samples.chunks_exact(channels).all(|pixel| pixel[index].to_float_scaling_integers() == value)
     }
     with_samples!(image, samples => are_channel_samples_equal_to(samples, (channel_count(image), index), value))
 }
@@ -140,7 +140,7 @@ pub(super) fn constant_alpha_warning(
         ImageEncoding::Number { of: ChannelSelector::Mask { of_any_color }, .. }
             if is_channel_filled_with(image, alpha, 1.0) =>
         {
-            Some(if scalars::uses_luminance_as_opacity(image, of_any_color) {
+            Some(if scalars::uses_luminance_opacity_if_opaque(image, of_any_color) {
                 LUMINANCE_USED
             } else {
                 OPAQUE
@@ -267,7 +267,7 @@ fn convert_color_space(
         let tables = T::linearization_tables(space);
         let mut texel = |pixel| {
             let linear = apply_transfer_curves_to_pixel(pixel, tables.as_ref());
-            let color = space.convert_to_linear_rec_709(linear);
+            let color = space.convert_linear_to_rec_709(linear);
             if is_raw {
                 return Vec3::from_array(color);
             }
@@ -286,7 +286,7 @@ fn apply_transfer_curves_to_pixel<T: Sample>(pixel: &[T], tables: Option<&[Vec<f
     let rgb = pixel_rgb(pixel);
     match tables {
         Some(tables) => std::array::from_fn(|i| tables[i][rgb[i].table_index()]),
-        None => rgb.map(T::to_unit_float),
+        None => rgb.map(T::to_float_scaling_integers),
     }
 }
 

@@ -38,7 +38,8 @@ fn choose_scalar_source(
         ChannelSelector::Opacity => alpha.map_or(luminance, of_alpha),
         ChannelSelector::Mask { of_any_color } => {
             let is_alpha = |alpha: &usize| {
-                !is_channel_filled_with(image, *alpha, 1.0) || !uses_luminance_as_opacity(image, of_any_color)
+                !is_channel_filled_with(image, *alpha, 1.0)
+                    || !uses_luminance_opacity_if_opaque(image, of_any_color)
             };
             alpha.filter(is_alpha).map_or(luminance, of_alpha)
         }
@@ -50,7 +51,7 @@ fn choose_scalar_source(
 }
 
 /// Whether to use an opaque image's luminance as its opacity.
-pub(super) fn uses_luminance_as_opacity(image: &DynamicImage, of_any_color: bool) -> bool {
+pub(super) fn uses_luminance_opacity_if_opaque(image: &DynamicImage, of_any_color: bool) -> bool {
     of_any_color || is_grayscale(image)
 }
 
@@ -104,7 +105,9 @@ fn count_unusable_pixels<T: Sample>(pixels: &[T], channels: usize, samples: Scal
         ScalarSource::One => 0..0,
     };
     let is_broken = |pixel: &&[T]| {
-        !pixel[used.clone()].iter().all(|value| sanitize(value.to_unit_float()) == value.to_unit_float())
+        !pixel[used.clone()]
+            .iter()
+            .all(|value| sanitize(value.to_float_scaling_integers()) == value.to_float_scaling_integers())
     };
     pixels.chunks_exact(channels).filter(is_broken).count() as u64
 }
@@ -124,7 +127,7 @@ fn scalar_texels_from_samples<T: Sample>(
     is_srgb: bool,
 ) -> TexelData {
     let decoded = |sample: T, is_srgb: bool| {
-        let value = sanitize(sample.to_unit_float());
+        let value = sanitize(sample.to_float_scaling_integers());
         if is_srgb { srgb_to_linear(value) } else { value }
     };
     let number = |pixel: &[T]| match samples {

@@ -85,7 +85,7 @@ impl LayerChannels {
         slot.get_or_insert(channel);
     }
 
-    fn color(&self) -> Option<ChosenChannels> {
+    fn rgb_channels(&self) -> Option<ChosenChannels> {
         let [red, green, blue] = self.rgb;
         Some(ChosenChannels { color: ColorChannels::Rgb([red?, green?, blue?]), alpha: self.alpha })
     }
@@ -123,11 +123,13 @@ pub(super) fn choose_channels(headers: &[Header]) -> Option<ChosenChannels> {
             layers.find_map(|(_, layer)| channels(layer))
         })
     };
-    let unnamed =
-        find(false, LayerChannels::color).or_else(|| find(false, LayerChannels::gray_or_luminance_chroma));
-    let named =
-        || find(true, LayerChannels::color).or_else(|| find(true, LayerChannels::gray_or_luminance_chroma));
-    unnamed.or_else(named).or_else(|| first_single_channel(headers))
+    let unnamed = find(false, LayerChannels::rgb_channels)
+        .or_else(|| find(false, LayerChannels::gray_or_luminance_chroma));
+    let named = || {
+        find(true, LayerChannels::rgb_channels)
+            .or_else(|| find(true, LayerChannels::gray_or_luminance_chroma))
+    };
+    unnamed.or_else(named).or_else(|| gray_from_single_channel_part(headers))
 }
 
 /// Returns a part's layers, keyed by name. A layer name is the part of a channel name before its last dot.
@@ -164,7 +166,7 @@ fn single_channel_parts(headers: &[Header]) -> impl Iterator<Item = (usize, &Hea
 
 /// Returns the channel of the first single-channel part, or `None` if the single-channel parts are components
 /// of a color or vector.
-fn first_single_channel(headers: &[Header]) -> Option<ChosenChannels> {
+fn gray_from_single_channel_part(headers: &[Header]) -> Option<ChosenChannels> {
     const COMPONENTS: [&str; 7] = ["R", "G", "B", "RY", "BY", "X", "Y"];
     let is_component = |header: &Header| {
         let name = header.channels.list[0].name.to_string().to_ascii_uppercase();

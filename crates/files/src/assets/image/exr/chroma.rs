@@ -13,7 +13,7 @@ use crate::math::DVec3;
 const WEIGHTS: [f32; 7] = [0.627_123, -0.186_077, 0.087_929, -0.043_159, 0.019_597, -0.007_540, 0.002_128];
 
 /// Luminance and chroma planes for the data window.
-pub(super) struct LuminanceChroma {
+pub(super) struct LuminanceChromaPlanes {
     /// Y, RY and BY.
     channels: [ChannelIndex; 3],
     /// Size of the luminance plane.
@@ -24,7 +24,7 @@ pub(super) struct LuminanceChroma {
     chroma: [Vec<f32>; 2],
 }
 
-impl LuminanceChroma {
+impl LuminanceChromaPlanes {
     pub(super) fn new(headers: &[Header], channels: [ChannelIndex; 3]) -> Self {
         let [_, ry, _] = channels;
         let (size, step) = (headers[ry.part].layer_size, channel_header(headers, ry).sampling);
@@ -62,7 +62,7 @@ impl LuminanceChroma {
         if !is_filtered {
             for (index, luminance) in self.luminance.iter().enumerate() {
                 let at = [index % width, index / width];
-                put(at, luminance_chroma_to_rgb(*luminance, self.chroma_between_rows(at), weights));
+                put(at, luminance_chroma_to_rgb(*luminance, self.interpolated_chroma_at_pixel(at), weights));
             }
             return;
         }
@@ -82,7 +82,7 @@ impl LuminanceChroma {
         let interpolated = |plane: &Vec<f32>| -> Vec<f32> {
             let rows = plane.chunks_exact(width / step);
             rows.flat_map(|row| {
-                (0..width).map(|x| interpolate_chroma_within_row(x, self.step, row.len(), |at| row[at]))
+                (0..width).map(|x| interpolated_chroma_at_column(x, self.step, row.len(), |at| row[at]))
             })
             .collect()
         };
@@ -112,23 +112,24 @@ impl LuminanceChroma {
     }
 
     /// Chroma of a pixel, interpolated linearly between rows that have samples.
-    fn chroma_between_rows(&self, [x, y]: [usize; 2]) -> [f32; 2] {
+    fn interpolated_chroma_at_pixel(&self, [x, y]: [usize; 2]) -> [f32; 2] {
         let (width, rows) = (self.size.width(), self.size.height() / self.step.y());
-        [0, 1]
-            .map(|plane| upsample_linearly(y, self.step.y(), rows, |row| self.chroma[plane][row * width + x]))
+        [0, 1].map(|plane| {
+            interpolate_linearly_at_pixel(y, self.step.y(), rows, |row| self.chroma[plane][row * width + x])
+        })
     }
 }
 
 /// Interpolates chroma at a column, using the filter for 2 × 2 subsampling and linear interpolation for other
 /// factors.
-fn interpolate_chroma_within_row(
+fn interpolated_chroma_at_column(
     x: usize,
     step: Vec2<usize>,
     count: usize,
     sample: impl Fn(usize) -> f32,
 ) -> f32 {
     if step != Vec2(2, 2) {
-        return upsample_linearly(x, step.x(), count, sample);
+        return interpolate_linearly_at_pixel(x, step.x(), count, sample);
     }
     let last = count as i64 - 1;
     match x % 2 {
@@ -144,7 +145,12 @@ fn filter_between(left: i64, sample: impl Fn(i64) -> f32) -> f32 {
 }
 
 /// Interpolates linearly between samples that are `step` pixels apart. The last sample is repeated.
-fn upsample_linearly(pixel: usize, step: usize, count: usize, sample: impl Fn(usize) -> f32) -> f32 {
+fn interpolate_linearly_at_pixel(
+    pixel: usize,
+    step: usize,
+    count: usize,
+    sample: impl Fn(usize) -> f32,
+) -> f32 {
     let first = (pixel / step).min(count - 1);
     let (low, fraction) = (sample(first), (pixel % step) as f32 / step as f32);
     if fraction == 0.0 { low } else { low + (sample((first + 1).min(count - 1)) - low) * fraction }

@@ -21,7 +21,7 @@ use super::metadata::{AlphaInterpretation, ImageMetadata};
 use super::primaries::Primaries;
 use super::space::ColorSpace;
 use channels::{ChannelIndex, ChosenChannels, choose_channels, describe_unusable_channels};
-use chroma::LuminanceChroma;
+use chroma::LuminanceChromaPlanes;
 use sampling::{BlockDecompressor, ChannelSampling, SubsamplingHidingReader};
 
 /// Size of a decoded sample in bytes.
@@ -38,7 +38,7 @@ pub(super) struct ExrDecoder<R> {
 impl<R: BufRead + Seek> ExrDecoder<R> {
     /// Creates a decoder that allocates at most `memory_bytes` in addition to the pixels.
     pub(super) fn new(mut file: R, memory_bytes: u64) -> ImageResult<Self> {
-        let samplings = sampling::read_samplings(&mut file).map_err(ImageError::IoError)?;
+        let samplings = sampling::read_samplings_if_subsampled(&mut file).map_err(ImageError::IoError)?;
         let file = SubsamplingHidingReader::new(file, &samplings);
         let reader = ::exr::block::read(file, false).map_err(image_error)?;
         let Some(channels) = choose_channels(reader.headers()) else {
@@ -50,7 +50,7 @@ impl<R: BufRead + Seek> ExrDecoder<R> {
             channels.all().map(|channel| decompressed_block_size(&reader.headers()[channel.part])).max();
         let chroma_bytes = channels
             .as_luminance_chroma()
-            .map_or(0, |planes| LuminanceChroma::memory_bytes(decompressor.headers(), planes));
+            .map_or(0, |planes| LuminanceChromaPlanes::memory_bytes(decompressor.headers(), planes));
         if needed.unwrap_or_default().saturating_add(chroma_bytes) > memory_bytes {
             return Err(ImageError::Limits(LimitError::from_kind(LimitErrorKind::InsufficientMemory)));
         }
@@ -63,7 +63,7 @@ impl<R: BufRead + Seek> ExrDecoder<R> {
             ImageMetadata { alpha: AlphaInterpretation::Premultiplied, ..ImageMetadata::default() };
         if let Some(primaries) = primaries(self.header()) {
             match primaries.to_rec_709() {
-                Some(matrix) => metadata.space = ColorSpace::from_matrix_to_rec_709(matrix),
+                Some(matrix) => metadata.space = ColorSpace::from_matrix_with_default_curves(matrix),
                 None => metadata.add_warning(DEGENERATE_CHROMATICITIES),
             }
         }
@@ -147,7 +147,7 @@ impl<R: BufRead + Seek> ImageDecoder for ExrDecoder<R> {
         let mut image = PartialImage {
             headers: &headers,
             channels,
-            planes: channels.as_luminance_chroma().map(|planes| LuminanceChroma::new(&headers, planes)),
+            planes: channels.as_luminance_chroma().map(|planes| LuminanceChromaPlanes::new(&headers, planes)),
         };
         samples.fill(0);
         let is_read = |part: usize| channels.all().any(|channel| channel.part == part);
@@ -171,7 +171,7 @@ impl<R: BufRead + Seek> ImageDecoder for ExrDecoder<R> {
 struct PartialImage<'a> {
     headers: &'a [Header],
     channels: ChosenChannels,
-    planes: Option<LuminanceChroma>,
+    planes: Option<LuminanceChromaPlanes>,
 }
 
 impl PartialImage<'_> {

@@ -25,7 +25,9 @@ pub(super) struct ChannelSampling {
 
 /// Reads the subsampling factors of all channels in each part. Returns an empty list if no channel is
 /// subsampled, or if the headers are malformed, which `exr` then reports.
-pub(super) fn read_samplings(file: &mut (impl Read + Seek)) -> io::Result<Vec<Vec<ChannelSampling>>> {
+pub(super) fn read_samplings_if_subsampled(
+    file: &mut (impl Read + Seek),
+) -> io::Result<Vec<Vec<ChannelSampling>>> {
     let mut bytes = Vec::new();
     file.by_ref().take(HEADER_BYTES).read_to_end(&mut bytes)?;
     file.seek(SeekFrom::Start(0))?;

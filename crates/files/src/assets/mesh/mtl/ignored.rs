@@ -12,7 +12,7 @@ use crate::math::Vec3;
 
 /// An MTL statement that is ignored or approximated.
 #[derive(Clone, Debug, PartialEq)]
-pub(in crate::assets::mesh) struct IgnoredStatement {
+pub(in crate::assets::mesh) struct MtlWarning {
     pub(super) line: usize,
     pub(super) words: String,
 }
@@ -20,10 +20,10 @@ pub(in crate::assets::mesh) struct IgnoredStatement {
 /// Collects warnings about a file and the materials in use, merging warnings that several materials share.
 pub(in crate::assets::mesh) fn collect_warnings<'a>(
     path: &Path,
-    of_file: Vec<IgnoredStatement>,
+    of_file: Vec<MtlWarning>,
     materials: impl Iterator<Item = &'a MtlMaterial>,
 ) -> Vec<String> {
-    let mut warnings: Vec<(IgnoredStatement, usize)> = Vec::new();
+    let mut warnings: Vec<(MtlWarning, usize)> = Vec::new();
     let mut known: HashMap<String, usize> = HashMap::new();
     for ignored in of_file {
         known.entry(ignored.words.clone()).or_insert(warnings.len());
@@ -38,18 +38,18 @@ pub(in crate::assets::mesh) fn collect_warnings<'a>(
             }
         }
     }
-    let text = |(IgnoredStatement { line, words }, more)| {
+    let text = |(MtlWarning { line, words }, more)| {
         let more = if more > 0 { format!(" ({more} more)") } else { String::new() };
         format!("{}:{line}: {words}{more}", path.display())
     };
     warnings.into_iter().map(text).collect()
 }
 
-fn material_warnings(found: &MtlMaterial) -> Vec<IgnoredStatement> {
+fn material_warnings(found: &MtlMaterial) -> Vec<MtlWarning> {
     let converted = to_file_material(found, Path::new(""));
     let mut ignored = found.ignored.clone();
     let mut add = |line: Option<usize>, words: &str| {
-        ignored.push(IgnoredStatement { line: line.unwrap_or(found.line), words: words.to_owned() });
+        ignored.push(MtlWarning { line: line.unwrap_or(found.line), words: words.to_owned() });
     };
     warn_about_approximations(found, &converted, &mut add);
     warn_about_opacity(found, &converted, &mut add);
@@ -216,11 +216,12 @@ fn warn_about_highlight_and_energy_gain(
     let specular_map = found.map(MapKind::Specular);
     let is_matte = matches!(converted.illumination_model, Some(0 | 1));
     let has_strength = converted.specular != Vec3::ZERO || specular_map.is_some();
-    if !is_matte && has_strength && !converted.has_highlight() {
+    if !is_matte && has_strength && !converted.allows_specular_highlight() {
         add(line_of_value(specular).or(specular_map.map(|map| map.line)), NO_HIGHLIGHT);
     }
     let kd = if converted.diffuse_texture.is_some() { Vec3::ZERO } else { converted.diffuse };
-    let has_constant_highlight = converted.has_highlight() && converted.specular_texture.is_none();
+    let has_constant_highlight =
+        converted.allows_specular_highlight() && converted.specular_texture.is_none();
     let ks = match has_constant_highlight {
         true => converted.specular * (2.0 / (converted.shininess + 2.0)),
         false => Vec3::ZERO,

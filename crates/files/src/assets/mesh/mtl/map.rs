@@ -197,7 +197,8 @@ impl Map {
     /// Candidate paths for the image file, relative to the MTL file's folder: first the whole name, then the
     /// name without possible comments.
     pub(super) fn candidate_paths(&self) -> impl Iterator<Item = PathBuf> {
-        with_and_without_comments(&self.name).flat_map(|name| utf8_and_latin1_paths(&name.replace('\\', "/")))
+        with_and_without_comments(&self.name)
+            .flat_map(|name| encode_utf8_and_latin1_paths(&name.replace('\\', "/")))
     }
 
     /// Returns the texture for this map in the MTL file at `library`. Its path is the first candidate that
@@ -348,7 +349,9 @@ pub(in crate::assets::mesh) fn with_and_without_comments(text: &str) -> impl Ite
 }
 
 /// Yields the name encoded as UTF-8, and also as Latin-1 if it has non-ASCII letters.
-pub(in crate::assets::mesh) fn utf8_and_latin1_paths(name: &str) -> impl Iterator<Item = PathBuf> + use<> {
+pub(in crate::assets::mesh) fn encode_utf8_and_latin1_paths(
+    name: &str,
+) -> impl Iterator<Item = PathBuf> + use<> {
     let latin1: Option<Vec<u8>> = name.chars().map(|letter| u8::try_from(u32::from(letter)).ok()).collect();
     let latin1 = latin1.filter(|_| !name.is_ascii()).map(|bytes| PathBuf::from(OsStr::from_bytes(&bytes)));
     std::iter::once(PathBuf::from(name)).chain(latin1)

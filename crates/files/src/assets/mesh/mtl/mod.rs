@@ -10,8 +10,8 @@ use std::path::{Path, PathBuf};
 use super::text::{convert_mac_line_ends, decode_line, strip_byte_order_mark};
 use crate::assets::read::{self, Monitor};
 use crate::assets::{AssetError, FileHash};
-pub(super) use ignored::{IgnoredStatement, collect_warnings};
-pub(super) use map::{first_existing_or_first, utf8_and_latin1_paths, with_and_without_comments};
+pub(super) use ignored::{MtlWarning, collect_warnings};
+pub(super) use map::{encode_utf8_and_latin1_paths, first_existing_or_first, with_and_without_comments};
 pub(super) use material::to_file_material;
 use statements::{MtlColorKind, MtlNumber, Statement};
 
@@ -22,7 +22,7 @@ pub(super) const FILE_LIMIT: u64 = 64 << 20;
 pub(super) struct MtlLibrary {
     pub(super) materials: Vec<MtlMaterial>,
     /// Ignored statements outside any material.
-    pub(super) ignored: Vec<IgnoredStatement>,
+    pub(super) ignored: Vec<MtlWarning>,
     /// Hash of the file.
     pub(super) hash: FileHash,
 }
@@ -38,7 +38,7 @@ pub(super) struct MtlMaterial {
     illumination: Option<WithLine<u8>>,
     maps: Vec<(map::MapKind, map::Map)>,
     /// Statements that have no effect.
-    ignored: Vec<IgnoredStatement>,
+    ignored: Vec<MtlWarning>,
 }
 
 /// A value and the line that defines it.
@@ -122,11 +122,11 @@ impl MtlLibrary {
             let is_nothing = matches!(statement, Statement::Nothing);
             if !is_nothing && self.ignored.is_empty() {
                 let words = NO_MATERIAL_YET.to_owned();
-                self.ignored.push(IgnoredStatement { line, words });
+                self.ignored.push(MtlWarning { line, words });
             }
             return;
         };
-        material.ignored.extend(warnings.into_iter().map(|words| IgnoredStatement { line, words }));
+        material.ignored.extend(warnings.into_iter().map(|words| MtlWarning { line, words }));
         match statement {
             Statement::New(_) | Statement::Nothing | Statement::Ignored => {}
             Statement::Color(color, value) => {
@@ -149,7 +149,7 @@ impl MtlLibrary {
         for material in &self.materials {
             if let Some(first) = seen.insert(material.name.as_str(), material.line) {
                 let words = duplicate_material_warning(&material.name, first);
-                self.ignored.push(IgnoredStatement { line: material.line, words });
+                self.ignored.push(MtlWarning { line: material.line, words });
             }
         }
     }

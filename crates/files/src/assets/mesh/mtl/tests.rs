@@ -458,7 +458,10 @@ fn ineffective_maps_are_reported_with_line() {
 fn illumination_models_select_the_reflection() {
     let of =
         |model: u8| read(&format!("newmtl a\nKd .8 0 0\nKs .5 .5 .5\nNs 9\nillum {model}\n")).expect("whole");
-    assert_eq!([0, 1, 2, 10].map(|model| of(model)[0].has_highlight()), [false, false, true, true]);
+    assert_eq!(
+        [0, 1, 2, 10].map(|model| of(model)[0].allows_specular_highlight()),
+        [false, false, true, true]
+    );
     assert!(of(3)[0].has_specular_coat());
     let black = read("newmtl a\nKs .5 .5 .5\nillum 3\n").expect("whole");
     assert_eq!((black[0].diffuse, black[0].has_specular_coat()), (Vec3::ZERO, false));

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use super::super::parsed::ParsedMesh;
 use super::statements::{CornerIndices, NONE, ParsedObj, Smoothing};
-use crate::geometry::mesh::VertexNormalSharing;
+use crate::geometry::mesh::VertexNormalGroup;
 use crate::math::{Vec2, Vec3};
 
 /// Consecutive faces with the same material, smoothing group and object.
@@ -79,10 +79,10 @@ impl VertexBuilder<'_> {
     fn find_or_add_vertex(&mut self, corner: CornerIndices, smoothing: Smoothing) -> u32 {
         let has_normal = corner[2] != NONE;
         let tag = match smoothing {
-            Smoothing::Flat if !has_normal => (VertexNormalSharing::FLAT, self.face as u32),
-            Smoothing::Group(group) if !has_normal => (group.min(VertexNormalSharing::FLAT - 1), 0),
+            Smoothing::Flat if !has_normal => (VertexNormalGroup::FLAT, self.face as u32),
+            Smoothing::Group(group) if !has_normal => (group.min(VertexNormalGroup::FLAT - 1), 0),
             Smoothing::Flat | Smoothing::Group(_) | Smoothing::Unspecified => {
-                (VertexNormalSharing::BY_ANGLE, 0)
+                (VertexNormalGroup::BY_ANGLE, 0)
             }
         };
         let next = self.parsed.positions.len() as u32;
@@ -108,10 +108,10 @@ impl VertexBuilder<'_> {
             self.parsed.colors.push(vertices.color_of(position));
         }
         if self.has_smoothing {
-            let is_shared = group != VertexNormalSharing::FLAT && group != VertexNormalSharing::BY_ANGLE;
+            let is_shared = group != VertexNormalGroup::FLAT && group != VertexNormalGroup::BY_ANGLE;
             let key = (corner[0], group);
             let normal = if is_shared { *self.normals.entry(key).or_insert(index) } else { index };
-            self.parsed.normal_groups.push(VertexNormalSharing { normal, group });
+            self.parsed.normal_groups.push(VertexNormalGroup { normal, group });
         }
     }
 }

@@ -3,7 +3,7 @@
 use std::collections::{BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
 
-use super::super::mtl::{self, MtlLibrary, utf8_and_latin1_paths, with_and_without_comments};
+use super::super::mtl::{self, MtlLibrary, encode_utf8_and_latin1_paths, with_and_without_comments};
 use super::super::{AssetError, MeshFileBytes};
 use crate::assets::{Companion, FileMaterial};
 use crate::system::file::FileStamp;
@@ -46,7 +46,10 @@ impl MtlLibraryLoader<'_> {
 
     /// Maps each used material name to its index in `names`. In both OBJ and MTL files, a name may contain
     /// `#` (`Material #25`) or be followed by a comment, so the longest match is used.
-    fn map_used_names_to_indices<'n>(&self, names: impl Iterator<Item = &'n str>) -> HashMap<String, usize> {
+    fn map_used_names_within_library<'n>(
+        &self,
+        names: impl Iterator<Item = &'n str>,
+    ) -> HashMap<String, usize> {
         let all: Vec<_> = names.enumerate().map(|(index, name)| (name, index)).collect();
         let mut known: HashMap<&str, usize> = all.iter().copied().collect();
         for (name, index) in all {
@@ -64,7 +67,7 @@ impl MtlLibraryLoader<'_> {
         let hash = library.as_ref().ok().map(|library| library.hash);
         self.found.files.push(Companion { path: path.to_owned(), hash, stamp });
         match library {
-            Ok(library) => Ok(self.add_and_map_used_materials(path, library)),
+            Ok(library) => Ok(self.add_materials_and_map_used(path, library)),
             Err(error @ AssetError::Unreadable { .. }) => {
                 self.found.missing = true;
                 self.found.warnings.push(unreadable_library_warning(&error));
@@ -74,10 +77,11 @@ impl MtlLibraryLoader<'_> {
         }
     }
 
-    fn add_and_map_used_materials(&mut self, path: &Path, library: MtlLibrary) -> HashMap<String, usize> {
+    fn add_materials_and_map_used(&mut self, path: &Path, library: MtlLibrary) -> HashMap<String, usize> {
         let MtlLibrary { materials, ignored, hash: _ } = library;
         let folder = path.parent().unwrap_or(Path::new(""));
-        let indices = self.map_used_names_to_indices(materials.iter().map(|material| material.name.as_str()));
+        let indices =
+            self.map_used_names_within_library(materials.iter().map(|material| material.name.as_str()));
         let used: BTreeSet<usize> = indices.values().copied().collect();
         let found = &mut self.found;
         found.warnings.extend(mtl::collect_warnings(
@@ -98,7 +102,7 @@ pub(super) fn library_paths(obj: &Path, statement: &str) -> Vec<PathBuf> {
     let folder = obj.parent().unwrap_or(Path::new(""));
     let readings =
         with_and_without_comments(statement).flat_map(|name| [name.to_owned(), name.replace('\\', "/")]);
-    let readings = readings.flat_map(|name| utf8_and_latin1_paths(&name));
+    let readings = readings.flat_map(|name| encode_utf8_and_latin1_paths(&name));
     let single = readings.map(|name| folder.join(name)).find(|path| path.exists());
     if let Some(path) = single {
         return vec![path];
@@ -106,7 +110,7 @@ pub(super) fn library_paths(obj: &Path, statement: &str) -> Vec<PathBuf> {
     let names = with_and_without_comments(statement).last().unwrap_or(statement).replace('\\', "/");
     names
         .split_whitespace()
-        .filter_map(|name| mtl::first_existing_or_first(folder, utf8_and_latin1_paths(name)))
+        .filter_map(|name| mtl::first_existing_or_first(folder, encode_utf8_and_latin1_paths(name)))
         .collect()
 }
 

@@ -31,7 +31,7 @@ fn libraries(path: &Path, token: &CancelToken) -> Result<BTreeSet<PathBuf>, Canc
     let Ok(mut lines) = Lines::open(path, FILE_LIMIT) else { return Ok(libraries) };
     loop {
         // Most lines contain only numbers.
-        lines.skip_buffered_lines_without(b'm');
+        lines.skip_buffered_lines_without_letter(b'm');
         let Some(line) = lines.read_next_line(token)? else { return Ok(libraries) };
         if !is_library_statement(line) {
             continue;

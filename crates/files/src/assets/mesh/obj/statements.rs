@@ -1,6 +1,6 @@
 //! Parses the statements in an OBJ file.
 
-use super::super::parsed::{alpha_ignored_warning, face_of_corner};
+use super::super::parsed::{alpha_ignored_warning, face_of_corner_from_arities};
 use super::super::text::expected_message;
 use super::super::{AssetError, MeshFileBytes};
 use super::vertex::Vertices;
@@ -102,11 +102,13 @@ impl ParsedObj {
         match lower_case(keyword, &mut lower) {
             b"v" => self.vertices.parse_vertex(words)?,
             b"vt" => {
-                let [u, v, _] = parse_numbers(words, 1, 2, "texture coordinates")?;
+                let [u, v, _] = parse_min_to_max_numbers(words, 1, 2, "texture coordinates")?;
                 self.uvs.push(DVec2::new(u, v).as_vec2());
             }
             b"vn" => {
-                self.normals.push(DVec3::from(parse_numbers(words, 3, 3, "normal coordinates")?).as_vec3());
+                self.normals.push(
+                    DVec3::from(parse_min_to_max_numbers(words, 3, 3, "normal coordinates")?).as_vec3(),
+                );
             }
             b"f" => self.parse_face(words)?,
             b"o" | b"g" => self.push_state_change(StateChange::Object),
@@ -165,7 +167,8 @@ impl ParsedObj {
         {
             let Some(first) = self.corners.iter().position(|corner| corner[part] != NONE) else { continue };
             if count == 0 {
-                let line = source.line_number(face_start(source, face_of_corner(&self.arities, first)));
+                let line =
+                    source.line_number(face_start(source, face_of_corner_from_arities(&self.arities, first)));
                 self.warnings.push(missing_attribute_warning(line, name));
                 self.corners.iter_mut().for_each(|corner| corner[part] = NONE);
             }
@@ -186,7 +189,7 @@ impl ParsedObj {
         };
         let index = i64::from(self.corners[place][part]) + 1;
         Err(source.malformed_error_with_line(
-            face_start(source, face_of_corner(&self.arities, place)),
+            face_start(source, face_of_corner_from_arities(&self.arities, place)),
             out_of_range_message(part, index, counts[part]),
         ))
     }
@@ -196,7 +199,7 @@ impl ParsedObj {
             let line = source.line_number(start);
             self.warnings.push(excess_vertex_words_warning(line));
         }
-        if let Some(start) = self.vertices.find_lowest_alpha_offset() {
+        if let Some(start) = self.vertices.most_transparent_vertex_offset() {
             self.warnings.push(alpha_ignored_warning(source.line_number(start)));
         }
         if let Some((start, words)) = self.vertices.out_of_range_color_warning() {
@@ -263,7 +266,7 @@ fn face_byte_offsets<'a>(source: &MeshFileBytes<'a>) -> impl Iterator<Item = usi
 }
 
 /// Parses `min` to `max` numbers in a statement. Missing numbers are 0.
-fn parse_numbers(
+fn parse_min_to_max_numbers(
     words: &mut ObjTextCursor<'_>,
     min: usize,
     max: usize,

@@ -62,7 +62,7 @@ impl Vertices {
             return Err(ZERO_WEIGHT.to_owned());
         }
         if let Some(color) = color {
-            self.add_color(color, start)?;
+            self.add_color_of_next_position(color, start)?;
         }
         if let Some(alpha) = alpha
             && self.least_alpha.is_none_or(|(least, _)| alpha < least)
@@ -74,7 +74,7 @@ impl Vertices {
     }
 
     /// Adds a color for the next position.
-    fn add_color(&mut self, color: [f64; 3], start: usize) -> Result<(), String> {
+    fn add_color_of_next_position(&mut self, color: [f64; 3], start: usize) -> Result<(), String> {
         if !color.iter().all(|part| part.is_finite()) {
             return Err(NONFINITE_COLOR.to_owned());
         }
@@ -102,7 +102,7 @@ impl Vertices {
 
     /// Byte offset of the vertex with the minimum alpha, or `None` if every alpha is at its maximum. Alpha
     /// has the same range as the colors.
-    pub(super) fn find_lowest_alpha_offset(&self) -> Option<usize> {
+    pub(super) fn most_transparent_vertex_offset(&self) -> Option<usize> {
         self.least_alpha.filter(|(least, _)| *least < self.range.full_intensity()).map(|(_, start)| start)
     }
 

@@ -42,25 +42,25 @@ pub(super) enum LineEndMode {
 }
 
 impl AsciiReader<'_> {
-    fn seek_word(&mut self) -> Result<(), String> {
+    fn seek_word_across_lines(&mut self) -> Result<(), String> {
         if self.0.skip_to_word_across_lines() { Ok(()) } else { Err(END_OF_FILE.to_owned()) }
     }
 }
 
 impl NumberReader for AsciiReader<'_> {
     fn float(&mut self, _: ScalarType) -> Result<f64, String> {
-        self.seek_word()?;
+        self.seek_word_across_lines()?;
         self.0.float().ok_or_else(|| expected_message("a number", self.0.word()))
     }
 
     fn integer(&mut self, _: ScalarType) -> Result<i64, String> {
-        self.seek_word()?;
+        self.seek_word_across_lines()?;
         self.0.integer().ok_or_else(|| expected_message("an integer", self.0.word()))
     }
 
     fn skip(&mut self, _: ScalarType, count: usize) -> Result<(), String> {
         for _ in 0..count {
-            self.seek_word()?;
+            self.seek_word_across_lines()?;
             self.0.word();
         }
         Ok(())
@@ -101,7 +101,7 @@ pub(super) struct BinaryReader<'a, const BIG_ENDIAN: bool> {
 
 impl<const BIG_ENDIAN: bool> BinaryReader<'_, BIG_ENDIAN> {
     #[inline]
-    fn take<const N: usize>(&mut self) -> Result<[u8; N], String> {
+    fn take_as_little_endian<const N: usize>(&mut self) -> Result<[u8; N], String> {
         let found = self.bytes.get(self.at..).and_then(|rest| rest.first_chunk::<N>());
         let mut found = *found.ok_or_else(|| END_OF_FILE.to_owned())?;
         self.at += N;
@@ -116,8 +116,8 @@ impl<const BIG_ENDIAN: bool> NumberReader for BinaryReader<'_, BIG_ENDIAN> {
     #[inline]
     fn float(&mut self, scalar: ScalarType) -> Result<f64, String> {
         match scalar {
-            ScalarType::F32 => Ok(f64::from(f32::from_le_bytes(self.take()?))),
-            ScalarType::F64 => Ok(f64::from_le_bytes(self.take()?)),
+            ScalarType::F32 => Ok(f64::from(f32::from_le_bytes(self.take_as_little_endian()?))),
+            ScalarType::F64 => Ok(f64::from_le_bytes(self.take_as_little_endian()?)),
             ScalarType::I8
             | ScalarType::U8
             | ScalarType::I16
@@ -130,12 +130,12 @@ impl<const BIG_ENDIAN: bool> NumberReader for BinaryReader<'_, BIG_ENDIAN> {
     #[inline]
     fn integer(&mut self, scalar: ScalarType) -> Result<i64, String> {
         Ok(match scalar {
-            ScalarType::I8 => i64::from(i8::from_le_bytes(self.take()?)),
-            ScalarType::U8 => i64::from(u8::from_le_bytes(self.take()?)),
-            ScalarType::I16 => i64::from(i16::from_le_bytes(self.take()?)),
-            ScalarType::U16 => i64::from(u16::from_le_bytes(self.take()?)),
-            ScalarType::I32 => i64::from(i32::from_le_bytes(self.take()?)),
-            ScalarType::U32 => i64::from(u32::from_le_bytes(self.take()?)),
+            ScalarType::I8 => i64::from(i8::from_le_bytes(self.take_as_little_endian()?)),
+            ScalarType::U8 => i64::from(u8::from_le_bytes(self.take_as_little_endian()?)),
+            ScalarType::I16 => i64::from(i16::from_le_bytes(self.take_as_little_endian()?)),
+            ScalarType::U16 => i64::from(u16::from_le_bytes(self.take_as_little_endian()?)),
+            ScalarType::I32 => i64::from(i32::from_le_bytes(self.take_as_little_endian()?)),
+            ScalarType::U32 => i64::from(u32::from_le_bytes(self.take_as_little_endian()?)),
             ScalarType::F32 | ScalarType::F64 => self.float(scalar)? as i64,
         })
     }

@@ -4,7 +4,7 @@ use super::super::parsed::{ALPHA_IGNORED, ColorComponentExtremes, ColorRange, un
 use super::header::ScalarType;
 
 /// Colors in file order.
-pub(super) struct PlyColors {
+pub(super) struct PlyColorCollector {
     /// Types of red, green and blue.
     scalars: [ScalarType; 3],
     /// Colors stored as bytes.
@@ -18,7 +18,7 @@ pub(super) struct PlyColors {
     alpha: Option<(f64, ScalarType, usize)>,
 }
 
-impl PlyColors {
+impl PlyColorCollector {
     pub(super) fn new(scalars: [ScalarType; 3]) -> Self {
         let (bytes, numbers) = Default::default();
         let (range, extremes) = Default::default();
@@ -27,7 +27,7 @@ impl PlyColors {
 
     /// Adds a color. `at` is a byte offset in its item.
     pub(super) fn push(&mut self, color: [f64; 3], at: usize) {
-        self.extremes.iter_mut().zip(color).for_each(|(extremes, part)| extremes.add(part, at));
+        self.extremes.iter_mut().zip(color).for_each(|(extremes, part)| extremes.add_component(part, at));
         if !self.are_bytes() {
             self.range.add(color, at);
         }

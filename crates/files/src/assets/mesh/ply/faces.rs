@@ -2,7 +2,7 @@
 
 use super::super::parsed::{FACE_COLORS_IGNORED, ParsedMesh};
 use super::body::NumberReader;
-use super::colors::PlyColors;
+use super::colors::PlyColorCollector;
 use super::header::{Element, PropertyType, ScalarType};
 use super::{
     ErrorContext, checked_vertex_index, read_items, read_list_length, skip_property, vertex_property_slot,
@@ -95,7 +95,7 @@ struct FaceReader {
     alpha: Option<ScalarType>,
     /// Type of the colors in lists.
     list_scalar: Option<ScalarType>,
-    colors: Option<PlyColors>,
+    colors: Option<PlyColorCollector>,
     /// Texture number of the first face.
     texture: Option<f64>,
     has_several_textures: bool,
@@ -118,8 +118,8 @@ impl FaceReader {
         let scalars = COLOR.map(|index| scalar(PropertyRole::Value(index)).unwrap_or(ScalarType::U8));
         let list_scalar = scalar(PropertyRole::Colors);
         let colors = match list_scalar {
-            Some(scalar) => Some(PlyColors::new([scalar; 3])),
-            None => has_color.then(|| PlyColors::new(scalars)),
+            Some(scalar) => Some(PlyColorCollector::new([scalar; 3])),
+            None => has_color.then(|| PlyColorCollector::new(scalars)),
         };
         let has_uv = UV.iter().all(has_value);
         Self {

@@ -13,7 +13,7 @@ use super::text::Cursor;
 use super::{AssetError, LoadedMesh, MeshFileBytes, vertex_out_of_range_message};
 use crate::math::{DVec2, DVec3};
 use body::{AsciiReader, BinaryReader, LineEndMode, NumberReader};
-use colors::PlyColors;
+use colors::PlyColorCollector;
 use header::{Element, Encoding, PlyHeader, PropertyType, ScalarType};
 
 /// Number of items between polls of the cancel token.
@@ -278,8 +278,8 @@ fn read_vertices(
             PropertyType::Scalar(_) | PropertyType::List { .. } => None,
         })
     };
-    let mut colors =
-        has_colors.then(|| PlyColors::new([8, 9, 10].map(|slot| scalar(slot).unwrap_or(ScalarType::U8))));
+    let mut colors = has_colors
+        .then(|| PlyColorCollector::new([8, 9, 10].map(|slot| scalar(slot).unwrap_or(ScalarType::U8))));
     let alpha_scalar = scalar(ALPHA);
     let count = element.count as usize;
     parsed.positions.reserve(count);

@@ -18,11 +18,11 @@ const NONE: u32 = u32::MAX;
 
 /// Triangulates a counterclockwise polygon. Returns whether all cuts are diagonals, which is false for
 /// self-intersecting polygons.
-pub(super) fn clip_ears(points: &[DVec2], emit: impl FnMut([usize; 3])) -> bool {
+pub(super) fn clip_ears_and_check_simple(points: &[DVec2], emit: impl FnMut([usize; 3])) -> bool {
     EarClipper::new(points, emit).run()
 }
 
-/// Like [`clip_ears`], but also returns the number of visits.
+/// Like [`clip_ears_and_check_simple`], but also returns the number of visits.
 #[cfg(test)]
 pub(super) fn count_visits(points: &[DVec2]) -> (bool, u64) {
     let mut clipper = EarClipper::new(points, |_| {});
@@ -118,24 +118,24 @@ impl<'a, F: FnMut([usize; 3])> EarClipper<'a, F> {
         self.points[corner as usize]
     }
 
-    fn corner_and_neighbors(&self, corner: u32) -> [u32; 3] {
+    fn previous_corner_next_indices(&self, corner: u32) -> [u32; 3] {
         [self.previous[corner as usize], corner, self.next[corner as usize]]
     }
 
     fn is_convex(&self, corner: u32) -> bool {
-        let [a, b, c] = self.corner_and_neighbors(corner).map(|corner| self.point(corner));
+        let [a, b, c] = self.previous_corner_next_indices(corner).map(|corner| self.point(corner));
         twice_signed_area(a, b, c) > 0.0
     }
 
     /// Whether the outline reverses direction at a corner.
     fn is_spike(&self, corner: u32) -> bool {
-        let [a, b, c] = self.corner_and_neighbors(corner).map(|corner| self.point(corner));
+        let [a, b, c] = self.previous_corner_next_indices(corner).map(|corner| self.point(corner));
         twice_signed_area(a, b, c) == 0.0 && (a - b).dot(c - b) >= 0.0
     }
 
     /// Removes a corner, and emits its triangle unless the triangle has zero area.
     fn clip_corner(&mut self, corner: u32) {
-        let [a, b, c] = self.corner_and_neighbors(corner);
+        let [a, b, c] = self.previous_corner_next_indices(corner);
         if self.is_convex(b) {
             (self.emit)([a, b, c].map(|corner| corner as usize));
         }
@@ -149,13 +149,13 @@ impl<'a, F: FnMut([usize; 3])> EarClipper<'a, F> {
             self.requeue_blocked_by(changed);
         }
         for neighbor in [a, c] {
-            self.enqueue_corner(neighbor);
+            self.append_corner_to_queue(neighbor);
         }
     }
 
     /// Appends a corner to the queue. Clipping corners in queue order spreads the cuts along the outline,
     /// which avoids slivers.
-    fn enqueue_corner(&mut self, corner: u32) {
+    fn append_corner_to_queue(&mut self, corner: u32) {
         let stamp = &mut self.stamps[corner as usize];
         *stamp += 1;
         self.queue.push_back((corner, *stamp));
@@ -173,7 +173,7 @@ impl<'a, F: FnMut([usize; 3])> EarClipper<'a, F> {
         while entry != NONE {
             let (corner, stamp, next) = self.waiting[entry as usize];
             if self.stamps[corner as usize] == stamp {
-                self.enqueue_corner(corner);
+                self.append_corner_to_queue(corner);
             }
             entry = next;
         }
@@ -186,7 +186,7 @@ impl<'a, F: FnMut([usize; 3])> EarClipper<'a, F> {
         if self.visits > self.max_visits {
             return None;
         }
-        let around = self.corner_and_neighbors(corner);
+        let around = self.previous_corner_next_indices(corner);
         let triangle = around.map(|corner| self.point(corner));
         let mut visits = self.visits;
         let found = self.tree.find_corner_near_triangle(triangle, &mut visits, |other| {

@@ -22,7 +22,7 @@ pub(super) fn triangulate(points: &[Vec3], mut emit: impl FnMut([usize; 3])) -> 
         (1..count - 1).for_each(|i| emit([0, i, i + 1]));
         normal != DVec3::ZERO && (1..count - 1).all(|i| turns(0, i, i + 1) >= 0.0)
     } else {
-        ears::clip_ears(&project_points(&points, normal), emit)
+        ears::clip_ears_and_check_simple(&project_points(&points, normal), emit)
     }
 }
 

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::cost::SplitPlane;
 use super::subtree::KdSubtree;
-use crate::accel::kd_tree::node::{DecodedNode, KdNode};
+use crate::accel::kd_tree::node::{DecodedNode, PackedKdNode};
 use crate::accel::wide_bvh::pages;
 
 /// A part of the kd-tree: an upper node or a subtree.
@@ -45,7 +45,7 @@ impl TreePart {
             nodes: pages::allocate_vec_in_huge_pages(size.nodes),
             ids: pages::allocate_vec_in_huge_pages(size.ids),
         };
-        let nothing = KdNode::new(DecodedNode::Leaf { first: 0, count: 0 });
+        let nothing = PackedKdNode::new(DecodedNode::Leaf { first: 0, count: 0 });
         rayon::join(
             || (0..size.nodes).into_par_iter().map(|_| nothing).collect_into_vec(&mut all.nodes),
             || (0..size.ids).into_par_iter().map(|_| 0).collect_into_vec(&mut all.ids),
@@ -55,7 +55,7 @@ impl TreePart {
     }
 
     /// Writes the part, given the numbers of nodes and references that precede it.
-    fn flatten_into(self, nodes: &mut [KdNode], ids: &mut [u32], before: SubtreeSize) {
+    fn flatten_into(self, nodes: &mut [PackedKdNode], ids: &mut [u32], before: SubtreeSize) {
         match self {
             Self::Built(subtree) => {
                 for (node, own) in nodes.iter_mut().zip(&subtree.nodes) {
@@ -73,8 +73,11 @@ impl TreePart {
                 let before_right =
                     SubtreeSize { nodes: before_left.nodes + size.nodes, ids: before.ids + size.ids };
                 let right_place = before_right.nodes as u32;
-                node[0] =
-                    KdNode::new(DecodedNode::Inner { axis: plane.axis, at: plane.at, right: right_place });
+                node[0] = PackedKdNode::new(DecodedNode::Inner {
+                    axis: plane.axis,
+                    at: plane.at,
+                    right: right_place,
+                });
                 rayon::join(
                     || left.flatten_into(left_nodes, left_ids, before_left),
                     || right.flatten_into(right_nodes, right_ids, before_right),

@@ -13,7 +13,7 @@ mod sweep;
 
 use rayon::prelude::*;
 
-use super::node::{self, KdNode, LeafTriangle};
+use super::node::{self, LeafTriangle, PackedKdNode};
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::Aabb;
 use crate::geometry::mesh::TriangleMesh;
@@ -31,7 +31,7 @@ use subtree::KdSubtree;
 const TASK_SIZE: usize = 4096;
 
 /// Maximum total number of leaves and references. A tree has fewer than two nodes per leaf, and node indices
-/// must fit into a [`KdNode`].
+/// must fit into a [`PackedKdNode`].
 const MOST_ROOM: u64 = node::MOST as u64 / 2;
 
 /// All triangles must fit into a single leaf.
@@ -49,7 +49,7 @@ const NOWHERE: u32 = u32::MAX;
 
 /// A finished kd-tree.
 pub struct BuiltKdTree {
-    pub nodes: Vec<KdNode>,
+    pub nodes: Vec<PackedKdNode>,
     /// Indices into `triangles`, leaf by leaf.
     pub references: Vec<u32>,
     pub triangles: Vec<LeafTriangle>,
@@ -208,7 +208,7 @@ mod tests {
         };
         let size = |room| {
             let built = build_with_budget(room, 6000, fan, &CancelToken::new()).expect("never canceled");
-            let leaf = |node: &&KdNode| matches!(node.decode(), DecodedNode::Leaf { .. });
+            let leaf = |node: &&PackedKdNode| matches!(node.decode(), DecodedNode::Leaf { .. });
             assert_eq!(built.triangles.len(), 6000);
             (built.nodes.iter().filter(leaf).count() + built.references.len()) as u64
         };

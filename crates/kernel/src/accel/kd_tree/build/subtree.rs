@@ -2,7 +2,7 @@
 
 use super::Cell;
 use super::partition::PartitionBuffers;
-use crate::accel::kd_tree::node::{DecodedNode, KdNode};
+use crate::accel::kd_tree::node::{DecodedNode, PackedKdNode};
 use crate::accel::reference::TriangleReference;
 use crate::control::{CancelToken, Cancelled};
 use crate::math::Vec3;
@@ -10,7 +10,7 @@ use crate::math::Vec3;
 /// Nodes and references, with indices relative to the subtree.
 #[derive(Default)]
 pub struct KdSubtree {
-    pub nodes: Vec<KdNode>,
+    pub nodes: Vec<PackedKdNode>,
     pub ids: Vec<u32>,
 }
 
@@ -54,7 +54,7 @@ impl<C: Fn(u32) -> [Vec3; 3]> KdSubtreeBuilder<'_, C> {
         let place = self.built.nodes.len();
         let own = &self.references[first..];
         let leaf = DecodedNode::Leaf { first: self.built.ids.len() as u32, count: own.len() as u32 };
-        self.built.nodes.push(KdNode::new(leaf));
+        self.built.nodes.push(PackedKdNode::new(leaf));
         let Some(plane) = cell.choose_split(own) else {
             self.built.ids.extend(own.iter().map(TriangleReference::id));
             self.references.truncate(first);
@@ -69,7 +69,8 @@ impl<C: Fn(u32) -> [Vec3; 3]> KdSubtreeBuilder<'_, C> {
         self.references.extend_from_slice(left);
         self.build_cell(middle, &left_cell)?;
         let right = self.built.nodes.len() as u32;
-        self.built.nodes[place] = KdNode::new(DecodedNode::Inner { axis: plane.axis, at: plane.at, right });
+        self.built.nodes[place] =
+            PackedKdNode::new(DecodedNode::Inner { axis: plane.axis, at: plane.at, right });
         self.build_cell(first, &right_cell)
     }
 }

@@ -35,7 +35,7 @@ pub fn split_large_triangles(
         token.check_pause_and_cancel()?;
         let mut pieces = Vec::new();
         for (reference, &priority) in references.iter().zip(priorities) {
-            grid.cut_into_pieces(
+            grid.cut_at_grid_planes(
                 *reference,
                 cut_count(priority, factor),
                 corners(reference.id()),
@@ -120,7 +120,7 @@ impl BisectionGrid {
     }
 
     /// Cuts a triangle `cuts` times. Larger parts are cut more often.
-    fn cut_into_pieces(
+    fn cut_at_grid_planes(
         &self,
         reference: TriangleReference,
         cuts: u32,
@@ -132,8 +132,8 @@ impl BisectionGrid {
         let halves = reference.split(axis, at, corners);
         let [left, right] = halves.map(|half| half.bounds.extent().truncate().max_element());
         let of_left = ((cuts - 1) as f32 * (left / (left + right)) + 0.5) as u32;
-        self.cut_into_pieces(halves[0], of_left, corners, pieces);
-        self.cut_into_pieces(halves[1], cuts - 1 - of_left.min(cuts - 1), corners, pieces);
+        self.cut_at_grid_planes(halves[0], of_left, corners, pieces);
+        self.cut_at_grid_planes(halves[1], cuts - 1 - of_left.min(cuts - 1), corners, pieces);
     }
 }
 

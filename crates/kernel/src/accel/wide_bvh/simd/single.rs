@@ -32,7 +32,7 @@ pub fn closest_hit(tree: &WideBvh, ray: &Ray) -> Option<ShapeHit> {
             Child::Inner(index) => {
                 let node = &tree.nodes[index as usize];
                 let (near, met) = lines.box_entries(node, end);
-                if let Some(next) = push_farther_children(tree, node, near, met, &mut stack) {
+                if let Some(next) = push_farther_and_return_nearest(tree, node, near, met, &mut stack) {
                     code = next;
                     continue;
                 }
@@ -86,14 +86,14 @@ fn update_nearest_with_pack_hits(
     while lanes != 0 {
         let lane = lanes.trailing_zeros() as usize % PACK;
         lanes &= lanes - 1;
-        update_nearest_out_of_line(pack, lane, ray, t_max, best);
+        recheck_lane_and_update_nearest(pack, lane, ray, t_max, best);
     }
 }
 
 /// Non-inlined version of [`intersect_lane_and_update_nearest`] for rare cases.
 #[cold]
 #[inline(never)]
-fn update_nearest_out_of_line(
+fn recheck_lane_and_update_nearest(
     pack: &TrianglePack,
     lane: usize,
     ray: &Ray,
@@ -106,7 +106,7 @@ fn update_nearest_out_of_line(
 /// Returns the nearest child that the ray hits, and pushes the other children that it hits, farthest first.
 #[target_feature(enable = "avx2,fma")]
 #[inline]
-fn push_farther_children(
+fn push_farther_and_return_nearest(
     tree: &WideBvh,
     node: &WideNode,
     near: SimdF32x8,

@@ -40,7 +40,7 @@ pub fn intersect<V: SimdVector>(
     let along = (wa * az + wb * bz + wc * cz) * shear_z;
     let none = Hits { hit: 0, doubtful: 0, t: zero, u: zero, v: zero };
     let candidate = if is_single {
-        on_edge | may_be_hit(corners, determinant, shear_z, along, t_max)
+        on_edge | may_be_in_range_mask(corners, determinant, shear_z, along, t_max)
     } else {
         zero.le(zero)
     };
@@ -58,7 +58,7 @@ pub fn intersect<V: SimdVector>(
     Hits { hit, doubtful, t, u: wb * inverse, v: wc * inverse }
 }
 
-/// Unit roundoff divided by the needle ratio, slightly enlarged to account for rounding in [`may_be_hit`]
+/// Unit roundoff divided by the needle ratio, slightly enlarged to account for rounding in [`may_be_in_range_mask`]
 /// itself.
 const UNITS: f32 = 1.05 * 0.5 * f32::EPSILON / ILL_CONDITIONED;
 
@@ -68,7 +68,7 @@ const UNITS: f32 = 1.05 * 0.5 * f32::EPSILON / ILL_CONDITIONED;
 /// at most the reach times 30·s·(s + d) unit roundoffs, divided by the determinant. If the inverse of the
 /// determinant may be infinite, the triangle counts as a needle. `along` is t times the determinant.
 #[inline(always)]
-fn may_be_hit<V: SimdVector>(
+fn may_be_in_range_mask<V: SimdVector>(
     corners: &ShearedCorners<V>,
     determinant: V,
     shear_z: V,
@@ -152,7 +152,8 @@ mod tests {
             t.store(&mut distance);
             let part = [0.5, 1.0, 1.0 + f32::EPSILON, 2.0, f32::INFINITY][round % 5];
             let end = like.splat_like((distance[0] * part).max(0.0));
-            let passes = SimdF32x4::movemask(may_be_hit(&corners, determinant, shear_z, along, end)) != 0;
+            let passes =
+                SimdF32x4::movemask(may_be_in_range_mask(&corners, determinant, shear_z, along, end)) != 0;
             let is_ahead = SimdF32x4::movemask(like.lt(t) & t.le(end)) != 0;
             let is_beyond = SimdF32x4::movemask(end.lt(t)) != 0;
             assert!(passes || !(is_ahead || is_needle || is_at_start), "{scalar:?}");

@@ -39,7 +39,7 @@ fn textured_emission_matches_light_sampling() {
         let source = source_of(light.clone(), Some(&shape));
         assert_same_irradiance(&format!("{shape:?}"), &light, &source, Some(&shape));
         let found = mean(&source, 1 << 14, |photon| f64::from(photon.flux.y));
-        let told = f64::from(source.power().y);
+        let told = f64::from(source.total_light_power().y);
         assert!(
             found.error < 5e-3 * told && (found.mean / told - 1.0).abs() < 0.02,
             "{found:?} instead of {told}"
@@ -52,9 +52,13 @@ fn quad_power_is_the_mean_of_its_texture() {
     let (shape, texels) = (shapes()[1].clone(), patchy(32, 16));
     let light = front_area_light(&shape, COLOR, OBJECT).expect("an area");
     let light = textured(light, &texture(32, 16, TextureFilter::Nearest), UvMapping::Shape(shape.clone()));
-    let exact = texels.mean().as_dvec3() * COLOR.as_dvec3() * PI * shape.part_areas()[0];
+    let exact = texels.mean().as_dvec3() * COLOR.as_dvec3() * PI * shape.local_part_areas()[0];
     let source = source_of(light, Some(&shape));
-    assert!((source.power().as_dvec3() / exact - 1.0).abs().max_element() < 1e-4, "{}", source.power());
+    assert!(
+        (source.total_light_power().as_dvec3() / exact - 1.0).abs().max_element() < 1e-4,
+        "{}",
+        source.total_light_power()
+    );
     let found = mean(&source, 1 << 14, |photon| f64::from(photon.flux.x));
     assert!(found.error < 1e-3 * exact.x && (found.mean - exact.x).abs() < 5.0 * found.error, "{found:?}");
 }
@@ -121,7 +125,7 @@ fn mesh_emission_matches_light_sampling() {
         assert_same_irradiance(&format!("mesh {side} {is_textured}"), &light, &source, None);
         if !is_textured {
             let exact = COLOR.as_dvec3() * area * PI;
-            assert!((source.power().as_dvec3() / exact - 1.0).abs().max_element() < 1e-5);
+            assert!((source.total_light_power().as_dvec3() / exact - 1.0).abs().max_element() < 1e-5);
         }
     }
 }
@@ -132,7 +136,7 @@ fn environment_emission_matches_light_sampling() {
     let light = Light::Environment(Environment::from_map(sky, COLOR, 77.0));
     let source = source_of(light.clone(), None);
     let found = mean(&source, 1 << 14, |photon| f64::from(photon.flux.y));
-    let told = f64::from(source.power().y);
+    let told = f64::from(source.total_light_power().y);
     assert!(found.error < 1e-3 * told && (found.mean - told).abs() < 5.0 * found.error, "{found:?} {told}");
     assert_same_irradiance("map", &light, &source, None);
 }

@@ -1,7 +1,7 @@
 //! The lobe of a conductor.
 
 use super::{ConductorPoint, FresnelPoint, reflectance};
-use crate::materials::bsdf::{NarrowLobe, SampledLobes};
+use crate::materials::bsdf::{LobesToSample, NarrowLobe};
 use crate::materials::bxdf::{Bxdf, BxdfFlags, LobeValue, ShadingGeometry};
 use crate::materials::fresnel::schlick_weight;
 use crate::materials::microfacet::{
@@ -46,7 +46,7 @@ impl<const BRUSHED: bool> ConductorBxdf<BRUSHED> {
 
     /// Smith terms for the directions to the viewer and to the light.
     #[inline(always)]
-    fn smith_terms(&self, view: &ConductorViewTerms, wi: Vec3) -> [SmithTerms; 2] {
+    fn view_and_light_smith_terms(&self, view: &ConductorViewTerms, wi: Vec3) -> [SmithTerms; 2] {
         if BRUSHED {
             let frame = Self::frame(view);
             [
@@ -100,7 +100,7 @@ impl<const BRUSHED: bool> Bxdf for ConductorBxdf<BRUSHED> {
         } else {
             half.evaluate_isotropic_ggx(self.alphas[0])
         };
-        let [eye, light] = self.smith_terms(view, wi);
+        let [eye, light] = self.view_and_light_smith_terms(view, wi);
         let white = eye.torrance_sparrow_without_fresnel(&light, distribution);
         let cosine = half.cosine_to_either_direction();
         let weight = schlick_weight(cosine);
@@ -121,13 +121,13 @@ impl<const BRUSHED: bool> Bxdf for ConductorBxdf<BRUSHED> {
     fn pdf(
         &self,
         view: &ConductorViewTerms,
-        _: SampledLobes,
+        _: LobesToSample,
         _: Vec3,
         wi: Vec3,
         shape: f32,
         _: BxdfFlags,
     ) -> f32 {
-        let [eye, light] = self.smith_terms(view, wi);
+        let [eye, light] = self.view_and_light_smith_terms(view, wi);
         eye.pdf_from_reflection_term(&light, shape)
     }
 
@@ -135,7 +135,7 @@ impl<const BRUSHED: bool> Bxdf for ConductorBxdf<BRUSHED> {
     fn sample(
         &self,
         view: &ConductorViewTerms,
-        _: SampledLobes,
+        _: LobesToSample,
         _: Vec3,
         _: f32,
         u: [f32; 2],

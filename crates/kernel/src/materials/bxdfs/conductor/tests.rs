@@ -4,7 +4,7 @@
 use super::elements::MetalElement;
 use super::*;
 use crate::choice::Choice;
-use crate::materials::bsdf::SampledLobes;
+use crate::materials::bsdf::LobesToSample;
 use crate::materials::bxdfs::lobe_tests::{
     ALPHAS, COSINES, TestSurface, check_lane_independence, check_values, reference_microfacet_brdf,
     spherical_direction,
@@ -66,7 +66,7 @@ fn isotropic_packets_match_brushed_packets() {
         let brushed = TestSurface::<ConductorBxdf<true>>::new(&point, [alpha; 2], at);
         let (one, other) = (round.sampled_albedo(64), brushed.sampled_albedo(64));
         assert!((one - other).abs().max_element() < 1e-3, "α {alpha}: {one} and {other}");
-        round.check_samples(&format!("α {alpha}"), SampledLobes::All);
+        round.check_samples(&format!("α {alpha}"), LobesToSample::All);
         let wide = [f64::from(alpha); 2];
         check_values::<ConductorBxdf<false>>(&format!("α {alpha}"), &point, [alpha; 2], |o, i| {
             let first = DVec3::new(1.0, 0.78, 0.34);
@@ -86,7 +86,7 @@ fn samples_follow_the_pdf() {
                 alphas,
                 spherical_direction(cosine, 0.7),
             );
-            subject.check_samples(&format!("α {alphas:?} at a cosine of {cosine}"), SampledLobes::All);
+            subject.check_samples(&format!("α {alphas:?} at a cosine of {cosine}"), LobesToSample::All);
         }
     }
 }

@@ -4,7 +4,7 @@ use std::f32::consts::FRAC_1_PI;
 
 use super::PhongBsdf;
 use super::lobes::{PhongLobes, phong_cosine_power};
-use crate::materials::bsdf::{NarrowLobe, SampledLobes};
+use crate::materials::bsdf::{LobesToSample, NarrowLobe};
 use crate::materials::bxdf::{Bxdf, BxdfFlags, LobeValue, ShadingGeometry};
 use crate::math::Vec3;
 use glimt_base::soa;
@@ -35,10 +35,10 @@ soa! {
 
 impl PhongBxdf {
     #[inline(always)]
-    fn lobes(&self, view: &PhongViewTerms, lobes: SampledLobes, normal: Vec3) -> PhongLobes {
+    fn lobes(&self, view: &PhongViewTerms, lobes: LobesToSample, normal: Vec3) -> PhongLobes {
         let [diffuse, specular] = match lobes {
-            SampledLobes::All => self.albedos,
-            SampledLobes::Narrow => [0.0, 1.0],
+            LobesToSample::All => self.albedos,
+            LobesToSample::Narrow => [0.0, 1.0],
         };
         PhongLobes { normal, mirrored_eye: view.reflected, diffuse, specular, shininess: self.shininess }
     }
@@ -102,7 +102,7 @@ impl Bxdf for PhongBxdf {
     fn pdf(
         &self,
         view: &PhongViewTerms,
-        lobes: SampledLobes,
+        lobes: LobesToSample,
         normal: Vec3,
         wi: Vec3,
         shape: f32,
@@ -115,7 +115,7 @@ impl Bxdf for PhongBxdf {
     fn sample(
         &self,
         view: &PhongViewTerms,
-        lobes: SampledLobes,
+        lobes: LobesToSample,
         normal: Vec3,
         choice: f32,
         u: [f32; 2],
@@ -128,7 +128,7 @@ impl Bxdf for PhongBxdf {
     #[inline(always)]
     fn narrow_lobe(&self, view: &PhongViewTerms) -> Option<NarrowLobe> {
         // The normal is not used here.
-        let lobes = self.lobes(view, SampledLobes::All, Vec3::Z);
+        let lobes = self.lobes(view, LobesToSample::All, Vec3::Z);
         let (axis, exponent) = (view.reflected, self.shininess);
         Some(NarrowLobe {
             axis,

@@ -3,8 +3,8 @@
 use std::f32::consts::{FRAC_1_PI, PI};
 
 use super::{PlasticPoint, base_layer_f};
-use crate::materials::bsdf::{NarrowLobe, SampledLobes};
-use crate::materials::bxdf::{Bxdf, BxdfFlags, LobeValue, ShadingGeometry, branchless_select_vec3};
+use crate::materials::bsdf::{LobesToSample, NarrowLobe};
+use crate::materials::bxdf::{Bxdf, BxdfFlags, LobeValue, ShadingGeometry, choose_vec3_by_bool};
 use crate::materials::fresnel::dielectric_from_outside;
 use crate::materials::lobe_albedo::{TERMS, evaluate_albedo_fit};
 use crate::materials::microfacet::{SmithTerms, UnnormalizedHalfVector, sample_reflection};
@@ -72,7 +72,7 @@ impl PlasticBxdf {
 
     /// Smith terms for the directions to the viewer and to the light.
     #[inline(always)]
-    fn smith_terms(&self, view: &PlasticViewTerms, wi: Vec3) -> [SmithTerms; 2] {
+    fn view_and_light_smith_terms(&self, view: &PlasticViewTerms, wi: Vec3) -> [SmithTerms; 2] {
         let of = |direction| SmithTerms::isotropic(view.normal, direction, self.alpha);
         [of(view.wo), of(wi)]
     }
@@ -135,7 +135,7 @@ impl Bxdf for PlasticBxdf {
     #[inline(always)]
     fn narrow_lobe_value(&self, view: &PlasticViewTerms, wi: Vec3, _: BxdfFlags) -> LobeValue {
         let [distribution, fresnel] = self.distribution_and_fresnel(view, wi);
-        let [eye, light] = self.smith_terms(view, wi);
+        let [eye, light] = self.view_and_light_smith_terms(view, wi);
         let coat = fresnel * eye.torrance_sparrow_without_fresnel(&light, distribution);
         LobeValue { f: self.specular * coat, max: self.specular.max_element() * coat, shape: 0.0 }
     }
@@ -144,7 +144,7 @@ impl Bxdf for PlasticBxdf {
     fn pdf(
         &self,
         view: &PlasticViewTerms,
-        lobes: SampledLobes,
+        lobes: LobesToSample,
         normal: Vec3,
         wi: Vec3,
         _: f32,
@@ -153,15 +153,15 @@ impl Bxdf for PlasticBxdf {
         let mut coat = 0.0;
         if any.contains(BxdfFlags::NARROW) {
             let [distribution, _] = self.distribution_and_fresnel(view, wi);
-            let [eye, light] = self.smith_terms(view, wi);
+            let [eye, light] = self.view_and_light_smith_terms(view, wi);
             let pdf = eye.reflection_pdf(distribution);
             coat = if light.is_direction_above_surface() { pdf } else { 0.0 };
         }
         let cosine = normal.dot(wi);
         let diffuse = if cosine > 0.0 { cosine * FRAC_1_PI } else { 0.0 };
         match lobes {
-            SampledLobes::All => view.coat_share * coat + (1.0 - view.coat_share) * diffuse,
-            SampledLobes::Narrow => coat,
+            LobesToSample::All => view.coat_share * coat + (1.0 - view.coat_share) * diffuse,
+            LobesToSample::Narrow => coat,
         }
     }
 
@@ -169,7 +169,7 @@ impl Bxdf for PlasticBxdf {
     fn sample(
         &self,
         view: &PlasticViewTerms,
-        lobes: SampledLobes,
+        lobes: LobesToSample,
         normal: Vec3,
         choice: f32,
         u: [f32; 2],
@@ -181,10 +181,10 @@ impl Bxdf for PlasticBxdf {
         }
         let coat = sample_reflection(&Frame::from_normal(view.normal), view.wo, [self.alpha; 2], u);
         let is_coat = match lobes {
-            SampledLobes::All => choice < view.coat_share,
-            SampledLobes::Narrow => self.alpha > 0.0,
+            LobesToSample::All => choice < view.coat_share,
+            LobesToSample::Narrow => self.alpha > 0.0,
         };
-        branchless_select_vec3(is_coat, coat, diffuse)
+        choose_vec3_by_bool(is_coat, coat, diffuse)
     }
 
     #[inline(always)]

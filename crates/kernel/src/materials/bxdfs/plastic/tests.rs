@@ -1,7 +1,7 @@
 //! Tests of plastic. Compares values with formulas and samples with pdfs, and runs the white furnace test.
 
 use super::*;
-use crate::materials::bsdf::SampledLobes;
+use crate::materials::bsdf::LobesToSample;
 use crate::materials::bxdfs::lobe_tests::{
     ALPHAS, COSINES, TestSurface, check_lane_independence, check_values, reference_microfacet_brdf,
     spherical_direction,
@@ -56,10 +56,10 @@ fn samples_follow_the_pdf() {
             [alpha; 2],
             spherical_direction(cosine, 0.7),
         );
-        subject.check_samples(&format!("coat with α {alpha} at a cosine of {cosine}"), SampledLobes::Narrow);
+        subject.check_samples(&format!("coat with α {alpha} at a cosine of {cosine}"), LobesToSample::Narrow);
         // For narrow lobes, the map's cells are too large for the diffuse lobe.
         if alpha >= 0.2 {
-            subject.check_samples(&format!("α {alpha} at a cosine of {cosine}"), SampledLobes::All);
+            subject.check_samples(&format!("α {alpha} at a cosine of {cosine}"), LobesToSample::All);
         }
     }
 }

@@ -3,8 +3,8 @@
 use std::f32::consts::FRAC_1_PI;
 
 use super::{COAT_REFLECTANCE, PrincipledPoint};
-use crate::materials::bsdf::{NarrowLobe, SampledLobes};
-use crate::materials::bxdf::{Bxdf, BxdfFlags, LobeValue, ShadingGeometry, branchless_select_vec3};
+use crate::materials::bsdf::{LobesToSample, NarrowLobe};
+use crate::materials::bxdf::{Bxdf, BxdfFlags, LobeValue, ShadingGeometry, choose_vec3_by_bool};
 use crate::materials::fresnel::schlick_weight;
 use crate::materials::lobe_albedo::{TERMS, evaluate_albedo_fit};
 use crate::materials::microfacet::{SmithTerms, UnnormalizedHalfVector, sample_reflection};
@@ -107,7 +107,7 @@ impl<const THROUGH: bool> PrincipledBxdf<THROUGH> {
 
     /// Smith terms for the directions to the viewer and to the light.
     #[inline(always)]
-    fn smith_terms(view: &PrincipledViewTerms, wi: Vec3, alpha: f32) -> [SmithTerms; 2] {
+    fn view_and_light_smith_terms(view: &PrincipledViewTerms, wi: Vec3, alpha: f32) -> [SmithTerms; 2] {
         [SmithTerms::isotropic(view.normal, view.wo, alpha), SmithTerms::isotropic(view.normal, wi, alpha)]
     }
 
@@ -123,15 +123,15 @@ impl<const THROUGH: bool> PrincipledBxdf<THROUGH> {
 
     /// f of the specular lobe and of the coat, or 0 for light from behind.
     #[inline(always)]
-    fn reflection_f(&self, view: &PrincipledViewTerms, wi: Vec3, any: BxdfFlags) -> Vec3 {
+    fn specular_and_coat_f(&self, view: &PrincipledViewTerms, wi: Vec3, any: BxdfFlags) -> Vec3 {
         let half = UnnormalizedHalfVector::from_reflection(view.normal, view.wo, wi);
         let weight = schlick_weight(half.cosine_to_either_direction());
-        let [eye, light] = Self::smith_terms(view, wi, self.alpha);
+        let [eye, light] = Self::view_and_light_smith_terms(view, wi, self.alpha);
         let reflectance = self.facets + (Vec3::splat(self.grazing) - self.facets) * weight;
         let white = eye.torrance_sparrow_without_fresnel(&light, half.evaluate_isotropic_ggx(self.alpha));
         let specular = reflectance * (white * self.two_way_coat_transmittance(view, light.cosine, any));
         if any.contains(COATED) {
-            let [eye, light] = Self::smith_terms(view, wi, self.coat_alpha);
+            let [eye, light] = Self::view_and_light_smith_terms(view, wi, self.coat_alpha);
             let white =
                 eye.torrance_sparrow_without_fresnel(&light, half.evaluate_isotropic_ggx(self.coat_alpha));
             let reflectance = COAT_REFLECTANCE + (1.0 - COAT_REFLECTANCE) * weight;
@@ -146,7 +146,7 @@ impl<const THROUGH: bool> PrincipledBxdf<THROUGH> {
     fn transmission_f(&self, view: &PrincipledViewTerms, wi: Vec3, any: BxdfFlags) -> Vec3 {
         let half = UnnormalizedHalfVector::from_reflection(view.normal, view.wo, wi);
         let weight = schlick_weight(half.cosine_to_either_direction());
-        let [eye, light] = Self::smith_terms(view, wi, self.alpha);
+        let [eye, light] = Self::view_and_light_smith_terms(view, wi, self.alpha);
         let (facets, grazing) = (self.dielectric, self.dielectric_grazing);
         let rest = Vec3::ONE - (facets + (Vec3::splat(grazing) - facets) * weight);
         let white = eye.torrance_sparrow_without_fresnel(&light, half.evaluate_isotropic_ggx(self.alpha));
@@ -157,7 +157,7 @@ impl<const THROUGH: bool> PrincipledBxdf<THROUGH> {
     #[inline(always)]
     fn microfacet_lobe_pdf(view: &PrincipledViewTerms, wi: Vec3, alpha: f32) -> f32 {
         let half = UnnormalizedHalfVector::from_reflection(view.normal, view.wo, wi);
-        let [eye, light] = Self::smith_terms(view, wi, alpha);
+        let [eye, light] = Self::view_and_light_smith_terms(view, wi, alpha);
         let pdf = eye.reflection_pdf(half.evaluate_isotropic_ggx(alpha));
         if light.is_direction_above_surface() { pdf } else { 0.0 }
     }
@@ -240,7 +240,11 @@ impl<const THROUGH: bool> Bxdf for PrincipledBxdf<THROUGH> {
 
     #[inline(always)]
     fn narrow_lobe_value(&self, view: &PrincipledViewTerms, wi: Vec3, any: BxdfFlags) -> LobeValue {
-        let f = if THROUGH { self.transmission_f(view, wi, any) } else { self.reflection_f(view, wi, any) };
+        let f = if THROUGH {
+            self.transmission_f(view, wi, any)
+        } else {
+            self.specular_and_coat_f(view, wi, any)
+        };
         LobeValue { f, max: f.max_element(), shape: 0.0 }
     }
 
@@ -248,7 +252,7 @@ impl<const THROUGH: bool> Bxdf for PrincipledBxdf<THROUGH> {
     fn pdf(
         &self,
         view: &PrincipledViewTerms,
-        lobes: SampledLobes,
+        lobes: LobesToSample,
         normal: Vec3,
         wi: Vec3,
         _: f32,
@@ -264,12 +268,12 @@ impl<const THROUGH: bool> Bxdf for PrincipledBxdf<THROUGH> {
             specular_share * specular + coat_share * coat
         };
         match lobes {
-            SampledLobes::All if THROUGH => narrow,
-            SampledLobes::All => {
+            LobesToSample::All if THROUGH => narrow,
+            LobesToSample::All => {
                 let diffuse_share = 1.0 - specular_share - coat_share - transmission_share;
                 narrow + diffuse_share * nonnegative_cosine(normal.dot(wi)) * FRAC_1_PI
             }
-            SampledLobes::Narrow => {
+            LobesToSample::Narrow => {
                 narrow / (specular_share + coat_share + transmission_share).max(f32::MIN_POSITIVE)
             }
         }
@@ -279,7 +283,7 @@ impl<const THROUGH: bool> Bxdf for PrincipledBxdf<THROUGH> {
     fn sample(
         &self,
         view: &PrincipledViewTerms,
-        lobes: SampledLobes,
+        lobes: LobesToSample,
         normal: Vec3,
         choice: f32,
         u: [f32; 2],
@@ -287,29 +291,25 @@ impl<const THROUGH: bool> Bxdf for PrincipledBxdf<THROUGH> {
     ) -> Vec3 {
         let PrincipledViewTerms { specular_share, coat_share, transmission_share, .. } = *view;
         let choice = match lobes {
-            SampledLobes::All => choice,
-            SampledLobes::Narrow => choice * (specular_share + coat_share + transmission_share),
+            LobesToSample::All => choice,
+            LobesToSample::Narrow => choice * (specular_share + coat_share + transmission_share),
         };
         // The lobes are in this order: coat, specular, diffuse, transmission.
         let last = match lobes {
-            SampledLobes::All => 1.0 - transmission_share,
-            SampledLobes::Narrow => specular_share + coat_share,
+            LobesToSample::All => 1.0 - transmission_share,
+            LobesToSample::Narrow => specular_share + coat_share,
         };
         let is_through = (transmission_share > 0.0) & (choice >= last);
         let alpha = if (choice < coat_share) & !THROUGH { self.coat_alpha } else { self.alpha };
         let is_wide = match lobes {
-            SampledLobes::All => choice >= coat_share + specular_share,
-            SampledLobes::Narrow => false,
+            LobesToSample::All => choice >= coat_share + specular_share,
+            LobesToSample::Narrow => false,
         };
         let is_wide = is_wide & !THROUGH;
         let narrow = sample_reflection(&Frame::from_normal(view.normal), view.wo, [alpha; 2], u);
         let wide = direction_about_axis(normal, u[0].sqrt(), (1.0 - u[0]).sqrt(), u[1]);
         // If the path continues on the other side, this direction is not used.
-        branchless_select_vec3(
-            is_through == THROUGH,
-            branchless_select_vec3(is_wide, wide, narrow),
-            -view.normal,
-        )
+        choose_vec3_by_bool(is_through == THROUGH, choose_vec3_by_bool(is_wide, wide, narrow), -view.normal)
     }
 
     #[inline(always)]

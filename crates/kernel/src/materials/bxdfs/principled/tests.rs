@@ -2,7 +2,7 @@
 //! are at most 1.
 
 use super::*;
-use crate::materials::bsdf::SampledLobes;
+use crate::materials::bsdf::LobesToSample;
 use crate::materials::bxdfs::lobe_tests::{
     ALPHAS, COSINES, NarrowLightPath, TestSurface, check_lane_independence, check_lane_independence_with,
     check_values, reference_microfacet_brdf, spherical_direction,
@@ -105,9 +105,9 @@ fn samples_follow_the_pdf() {
                 spherical_direction(cosine, 0.7),
             );
             let what = format!("α {alpha}, metallic {metallic} at a cosine of {cosine}");
-            subject.check_samples(&what, SampledLobes::Narrow);
+            subject.check_samples(&what, LobesToSample::Narrow);
             if alpha >= 0.2 {
-                subject.check_samples(&what, SampledLobes::All);
+                subject.check_samples(&what, LobesToSample::All);
             }
         }
     }
@@ -196,7 +196,7 @@ fn transmission_is_the_mirrored_specular_lobe() {
                 let fresnel = f0 + (DVec3::splat(0.8) - f0) * weight;
                 let lobe = reference_microfacet_brdf(o, i, [f64::from(alpha); 2]) * left(o.z) * left(i.z);
                 let exact = RED.as_dvec3() * (DVec3::ONE - fresnel) * (part * (1.0 - m) * lobe);
-                let found = subject.evaluate_bsdf(SampledLobes::All, &[light])[0].0;
+                let found = subject.evaluate_bsdf(LobesToSample::All, &[light])[0].0;
                 let error = if alpha >= 0.05 { 3e-5 } else { 5e-3 };
                 let what = format!("α {alpha}, {transmission}, {cosine}: {found} instead of {exact}");
                 assert!((found - exact).abs().max_element() <= error * exact.max_element(), "{what}");
@@ -219,9 +219,9 @@ fn samples_on_both_sides_follow_the_pdf() {
             );
             let front = TestSurface::<PrincipledBxdf<false>>::new(&point, [alpha; 2], at);
             let what = format!("α {alpha}, metallic {metallic} at a cosine of {cosine}");
-            for lobes in [SampledLobes::Narrow, SampledLobes::All] {
+            for lobes in [LobesToSample::Narrow, LobesToSample::All] {
                 behind.check_samples(&format!("other side, {lobes:?}, {what}"), lobes);
-                if lobes == SampledLobes::Narrow || alpha >= 0.2 {
+                if lobes == LobesToSample::Narrow || alpha >= 0.2 {
                     front.check_samples(&format!("viewer's side, {lobes:?}, {what}"), lobes);
                 }
             }

@@ -1,8 +1,8 @@
 //! The lobes of rough glass.
 
 use super::RoughDielectricPoint;
-use crate::materials::bsdf::{NarrowLobe, SampledLobes};
-use crate::materials::bxdf::{Bxdf, BxdfFlags, LobeValue, ShadingGeometry, branchless_select_vec3};
+use crate::materials::bsdf::{LobesToSample, NarrowLobe};
+use crate::materials::bxdf::{Bxdf, BxdfFlags, LobeValue, ShadingGeometry, choose_vec3_by_bool};
 use crate::materials::fresnel::{dielectric_for_any_eta, fresnel_transmittance};
 use crate::materials::microfacet::{
     SmithTerms, UnnormalizedHalfVector, reflect_at, refract_at, sample_visible_normal,
@@ -53,7 +53,7 @@ impl<const THROUGH: bool> DielectricBxdf<THROUGH> {
     /// Smith terms for the directions to the viewer and to the light. Each direction uses the normal on its
     /// side.
     #[inline(always)]
-    fn smith_terms(&self, view: &DielectricViewTerms, wi: Vec3) -> [SmithTerms; 2] {
+    fn view_and_light_smith_terms(&self, view: &DielectricViewTerms, wi: Vec3) -> [SmithTerms; 2] {
         let lit = if THROUGH { -view.normal } else { view.normal };
         [SmithTerms::isotropic(view.normal, view.wo, self.alpha), SmithTerms::isotropic(lit, wi, self.alpha)]
     }
@@ -67,7 +67,7 @@ impl<const THROUGH: bool> DielectricBxdf<THROUGH> {
     /// f of the lobe.
     #[inline(always)]
     fn f(&self, view: &DielectricViewTerms, wi: Vec3) -> f32 {
-        let [eye, light] = self.smith_terms(view, wi);
+        let [eye, light] = self.view_and_light_smith_terms(view, wi);
         if !THROUGH {
             let half = UnnormalizedHalfVector::from_reflection(view.normal, view.wo, wi);
             let reflectance = dielectric_for_any_eta(half.cosine_to_either_direction(), self.far / self.near);
@@ -92,7 +92,7 @@ impl<const THROUGH: bool> DielectricBxdf<THROUGH> {
     /// Samples a facet, and randomly chooses reflection or refraction. All formulas use the facet's normal,
     /// which is the half vector in both cases.
     #[inline(always)]
-    pub fn sample_either_side(
+    pub fn sample_reflection_or_transmission(
         &self,
         view: &DielectricViewTerms,
         choice: f32,
@@ -106,7 +106,7 @@ impl<const THROUGH: bool> DielectricBxdf<THROUGH> {
         let reflectance = dielectric_for_any_eta(cosine, eta);
         let is_reflected = choice < reflectance;
         let refracted = refract_at(half, wo, eta);
-        let wi = branchless_select_vec3(is_reflected, reflect_at(half, wo), refracted);
+        let wi = choose_vec3_by_bool(is_reflected, reflect_at(half, wo), refracted);
         // Compute the facet's scattering per solid angle.
         let behind = -half.dot(refracted);
         let sum = indices[0] * cosine - indices[1] * behind;
@@ -170,13 +170,13 @@ impl<const THROUGH: bool> Bxdf for DielectricBxdf<THROUGH> {
     fn pdf(
         &self,
         view: &DielectricViewTerms,
-        _: SampledLobes,
+        _: LobesToSample,
         _: Vec3,
         wi: Vec3,
         shape: f32,
         _: BxdfFlags,
     ) -> f32 {
-        let [eye, light] = self.smith_terms(view, wi);
+        let [eye, light] = self.view_and_light_smith_terms(view, wi);
         eye.pdf_from_reflection_term(&light, shape)
     }
 
@@ -184,7 +184,7 @@ impl<const THROUGH: bool> Bxdf for DielectricBxdf<THROUGH> {
     fn sample(
         &self,
         view: &DielectricViewTerms,
-        _: SampledLobes,
+        _: LobesToSample,
         _: Vec3,
         choice: f32,
         u: [f32; 2],
@@ -197,7 +197,7 @@ impl<const THROUGH: bool> Bxdf for DielectricBxdf<THROUGH> {
         // If the other side is chosen, the path continues at that side's vertex, and this direction is not
         // used.
         let unused = if THROUGH { view.normal } else { -view.normal };
-        branchless_select_vec3(is_reflected == THROUGH, unused, wi)
+        choose_vec3_by_bool(is_reflected == THROUGH, unused, wi)
     }
 
     #[inline(always)]

@@ -1,7 +1,7 @@
 //! Tests of rough glass. Compares values with `f64` formulas, samples with pdfs, and albedos with quadrature.
 
 use super::*;
-use crate::materials::bsdf::SampledLobes;
+use crate::materials::bsdf::LobesToSample;
 use crate::materials::bxdf::Bxdf;
 use crate::materials::bxdf_packet::BxdfPacket;
 use crate::materials::bxdfs::lobe_tests::{
@@ -113,7 +113,7 @@ fn transmission_matches_the_formulas() {
                 )
             };
             let value = |point: &RoughDielectricPoint, eye: DVec3, light: DVec3, eta: f64| {
-                subject(point, eye, eta).evaluate_bsdf(SampledLobes::All, &[light])[0].0.x
+                subject(point, eye, eta).evaluate_bsdf(LobesToSample::All, &[light])[0].0.x
             };
             let there = value(&point, to_eye, light, eta);
             // Flip both directions to the other side.
@@ -149,9 +149,9 @@ fn reflection_matches_the_formulas() {
             let (y, turn) = (f64::from(0.98 * next()), f64::from(next()) * TAU);
             let near = subject.map_to_direction(y, turn).map(|(way, _)| way.as_vec3().as_dvec3());
             for light in [Some(place(&mut next)), near].into_iter().flatten().filter(|one| one.z > 0.02) {
-                let there = subject.evaluate_bsdf(SampledLobes::All, &[light])[0].0.x;
+                let there = subject.evaluate_bsdf(LobesToSample::All, &[light])[0].0.x;
                 let back = TestSurface::<DielectricBxdf<false>>::new(&point, [alpha; 2], light);
-                let back = back.evaluate_bsdf(SampledLobes::All, &[to_eye])[0].0.x;
+                let back = back.evaluate_bsdf(LobesToSample::All, &[to_eye])[0].0.x;
                 let what = format!("α {alpha}, {indices:?}, from {light} to {to_eye}");
                 assert!((there - back).abs() <= reciprocity * there, "{what}: {there}, reversed {back}");
                 let (o, i) = (to_eye.normalize(), light.normalize());
@@ -176,8 +176,8 @@ fn samples_on_both_sides_follow_the_pdf() {
         for cosine in COSINES {
             let (reflection, transmission) = parts(&glass(indices, alpha), spherical_direction(cosine, 0.7));
             let what = format!("α {alpha}, {indices:?} at a cosine of {cosine}");
-            reflection.check_samples(&format!("reflection, {what}"), SampledLobes::All);
-            transmission.check_samples(&format!("transmission, {what}"), SampledLobes::All);
+            reflection.check_samples(&format!("reflection, {what}"), LobesToSample::All);
+            transmission.check_samples(&format!("transmission, {what}"), LobesToSample::All);
         }
     }
 }
@@ -224,8 +224,8 @@ fn paths_continue_on_exactly_one_side() {
     for indices in INDICES {
         let (reflection, transmission) = parts(&glass(indices, 0.4), spherical_direction(0.5, 0.3));
         let (up, down) = (
-            reflection.sample_directions(SampledLobes::All, 32),
-            transmission.sample_directions(SampledLobes::All, 32),
+            reflection.sample_directions(LobesToSample::All, 32),
+            transmission.sample_directions(LobesToSample::All, 32),
         );
         let mut reflected = 0;
         for (up, down) in up.into_iter().zip(down) {
@@ -245,17 +245,19 @@ fn two_sided_samples_match_one_sided_samples() {
             let point = glass(indices, alpha);
             let (reflection, transmission) = parts(&point, spherical_direction(cosine, 0.3));
             let alone = [
-                reflection.sample_directions(SampledLobes::All, 16),
-                transmission.sample_directions(SampledLobes::All, 16),
+                reflection.sample_directions(LobesToSample::All, 16),
+                transmission.sample_directions(LobesToSample::All, 16),
             ];
             let rows: [Vec<TwoSidedSample>; 2] = [
-                reflection.sample_either_side(16, BxdfPacket::sample_either_side),
-                transmission.sample_either_side(16, BxdfPacket::sample_either_side),
+                reflection
+                    .sample_reflection_or_transmission(16, BxdfPacket::sample_reflection_or_transmission),
+                transmission
+                    .sample_reflection_or_transmission(16, BxdfPacket::sample_reflection_or_transmission),
             ];
             let directions: Vec<DVec3> = rows[0].iter().map(|sample| sample.direction).collect();
             let by_directions = [
-                reflection.evaluate_bsdf(SampledLobes::All, &directions),
-                transmission.evaluate_bsdf(SampledLobes::All, &directions),
+                reflection.evaluate_bsdf(LobesToSample::All, &directions),
+                transmission.evaluate_bsdf(LobesToSample::All, &directions),
             ];
             for (i, (up, down)) in rows[0].iter().zip(&rows[1]).enumerate() {
                 let what = format!("α {alpha}, {indices:?} at a cosine of {cosine}, sample {i}");

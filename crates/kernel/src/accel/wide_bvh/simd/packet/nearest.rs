@@ -67,7 +67,7 @@ impl<V: SimdVector> NearestHits<V> {
         while singly != 0 {
             let ray = singly.trailing_zeros() as usize;
             singly &= singly - 1;
-            taken |= self.test_triangle_scalar(ray, pack, lane, rays);
+            taken |= self.update_ray_with_scalar_test(ray, pack, lane, rays);
         }
         taken
     }
@@ -75,7 +75,13 @@ impl<V: SimdVector> NearestHits<V> {
     /// [`NearestHits::update_with_triangle`] for one ray, using the scalar test.
     #[cold]
     #[inline(never)]
-    fn test_triangle_scalar(&mut self, ray: usize, pack: &TrianglePack, lane: usize, rays: &[Ray]) -> u32 {
+    fn update_ray_with_scalar_test(
+        &mut self,
+        ray: usize,
+        pack: &TrianglePack,
+        lane: usize,
+        rays: &[Ray],
+    ) -> u32 {
         let Some(own) = rays.get(ray) else { return 0 };
         let [mut t, mut u, mut v, mut id] = [[0.0; SIZE]; 4];
         self.t.store(&mut t);
