@@ -274,7 +274,7 @@ FAULTS = [
      "(eye.cosine + light.slope)", ROUGH_GLASS + "two_sided_samples_match_one_sided_samples"),
     ("box edges treated as faces", "geometry/cuboid.rs", "⟦are_far.into_iter().filter(|&is_far| is_far).count() == 2⟧",
      "true", "world::isolated::tests::isolated_regions_match_the_full_search"),
-    ("paths that continue on both sides of glass", "materials/bxdfs/rough_dielectric/bxdf.rs", "select_vec3(⟦is_reflected == THROUGH⟧, unused, wi)", "false",
+    ("paths that continue on both sides of glass", "materials/bxdfs/rough_dielectric/bxdf.rs", "choose_vec3_by_bool(⟦is_reflected == THROUGH⟧, unused, wi)", "false",
      ROUGH_GLASS + "paths_continue_on_exactly_one_side"),
     ("missing Fresnel reflectance of glass", "materials/bxdfs/rough_dielectric/bxdf.rs",
      "return ⟦reflectance⟧\n                * eye.torrance_sparrow_without_fresnel", "1.0", ROUGH_GLASS + "samples_on_both_sides_follow_the_pdf"),
