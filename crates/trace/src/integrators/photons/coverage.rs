@@ -165,7 +165,7 @@ impl KernelNeighborhood {
         match shape.geometry_near(self.point) {
             LocalGeometry::Polygons(count) => (0..count)
                 .filter_map(|number| shape.polygon_face(number))
-                .all(|piece| self.add_polygon_piece_or_wall(&piece, &receives)),
+                .all(|piece| self.add_polygon_piece_or_wall(piece, &receives)),
             LocalGeometry::Surface { distance, ground } => {
                 distance > FAR * self.radius
                     || ground.is_some_and(|ground| self.try_add_covering_surface(&ground, receives))
@@ -209,14 +209,14 @@ impl KernelNeighborhood {
         near.sort_unstable();
         near.iter().all(|&triangle| {
             let piece = mesh.world_corners(triangle).into_iter().collect();
-            self.add_polygon_piece_or_wall(&piece, || {
+            self.add_polygon_piece_or_wall(piece, || {
                 can_store_photons(primitive_material(world, id, triangle))
             })
         })
     }
 
     /// Adds a flat piece and returns whether the coverage still has a closed form.
-    fn add_polygon_piece_or_wall(&mut self, piece: &FlatPolygon, receives: impl Fn() -> bool) -> bool {
+    fn add_polygon_piece_or_wall(&mut self, piece: FlatPolygon, receives: impl Fn() -> bool) -> bool {
         let normal = (piece[1] - piece[0]).cross(piece[2] - piece[0]);
         let from = piece[0] - self.point;
         let (size, distance, cosine) = (normal.length_squared(), normal.dot(from), normal.dot(self.normal));
@@ -227,7 +227,7 @@ impl KernelNeighborhood {
             return true;
         }
         if cosine * cosine > SAME_PLANE * SAME_PLANE * size && is_within(FLAT) {
-            return !receives() || self.pieces.try_push(piece.clone()).is_ok();
+            return !receives() || self.pieces.try_push(piece).is_ok();
         }
         let heights = piece.iter().map(|&corner| self.normal.dot(corner - self.point));
         let (low, high) = heights.fold((f64::MAX, f64::MIN), |(low, high), z| (low.min(z), high.max(z)));
@@ -236,7 +236,7 @@ impl KernelNeighborhood {
         if high < -reach
             || low > reach
             || !rises && (is_steep || !receives())
-            || !polygon_overlaps_unit_disk(&self.project_polygon(piece))
+            || !polygon_overlaps_unit_disk(&self.project_polygon(&piece))
         {
             return true;
         }

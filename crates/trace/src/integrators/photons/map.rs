@@ -236,13 +236,13 @@ impl PhotonMap {
         for range in &ranges.of[..ranges.count] {
             for block in blocks_covering_photon_range(*range) {
                 let Some(weights) = self.kernel_weights_in_block(look, *range, block, simd) else { continue };
-                let [red, green, blue] = &self.blocks[block].flux;
+                let flux = &self.blocks[block].flux;
                 let mut brought = [0.0; PACKET_SIZE];
-                for i in 0..PACKET_SIZE {
-                    let weighted = [red[i] * weights[i], green[i] * weights[i], blue[i] * weights[i]];
-                    for axis in 0..3 {
-                        sums[axis][i] += weighted[axis];
-                        brought[i] += weighted[axis];
+                for axis in 0..3 {
+                    for i in 0..PACKET_SIZE {
+                        let weighted = flux[axis][i] * weights[i];
+                        sums[axis][i] += weighted;
+                        brought[i] += weighted;
                     }
                 }
                 choices.add_item(block as u32, &brought);
