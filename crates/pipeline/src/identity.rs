@@ -12,7 +12,7 @@ use super::stages::parse::ParsedScene;
 use super::watch::content::{FileContentId, FilePathAndContentId};
 use crate::choice::Choice;
 use crate::integrators::{PhotonSettings, RenderSettings};
-use crate::output::part::RenderInput;
+use crate::output::part::NamedRenderInput;
 use crate::scene::description::{CameraOverrides, Scene};
 use crate::scene::fingerprint::{Fingerprint, FingerprintHasher};
 
@@ -30,22 +30,22 @@ pub(super) struct ImageDependencies<'a> {
 
 impl ImageDependencies<'_> {
     /// Returns the names and values of everything that affects the image.
-    pub(super) fn names_and_values(&self) -> Vec<RenderInput> {
-        let mut traits = vec![RenderInput::from_setting("glimt", BUILD)];
+    pub(super) fn names_and_values(&self) -> Vec<NamedRenderInput> {
+        let mut traits = vec![NamedRenderInput::from_setting("glimt", BUILD)];
         self.add_settings(&mut traits);
         let scene_path = &self.parsed.loaded.path;
         let others = self.files.iter().filter(|file| file.path != *scene_path);
         traits.extend(others.map(|file| {
-            RenderInput::from_file(&path_relative_to_scene(&file.path, scene_path), hash_or_reason(file))
+            NamedRenderInput::from_file(&path_relative_to_scene(&file.path, scene_path), hash_or_reason(file))
         }));
-        traits.push(RenderInput::from_combined_hash(self.fingerprint().to_string()));
+        traits.push(NamedRenderInput::from_combined_hash(self.fingerprint().to_string()));
         traits
     }
 
-    fn add_settings(&self, traits: &mut Vec<RenderInput>) {
+    fn add_settings(&self, traits: &mut Vec<NamedRenderInput>) {
         let RenderSettings { render, dof, view, photons, layers } =
             self.plan.settings.without_ineffective_settings();
-        let mut add = |name: &str, value: String| traits.push(RenderInput::from_setting(name, value));
+        let mut add = |name: &str, value: String| traits.push(NamedRenderInput::from_setting(name, value));
         add("width", render.width.to_string());
         add("height", render.height.to_string());
         add("error", render.error.to_string());

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use super::settings::{
     CheckpointSettings, EffectiveSettingsSummary, OutputLayer, Overrides, UpAxis, ViewMode, ViewSide,
-    sample_layers,
+    layers_to_record,
 };
 use super::turntable::{self, TurntableFrame};
 use crate::choice::Choice;
@@ -98,7 +98,7 @@ pub(super) fn resolve_plan(
             .photons
             .unwrap_or(scene.photons.enabled)
             .then(|| photon_settings(&scene.photons, (render.width, render.height))),
-        layers: sample_layers(&overrides.layers),
+        layers: layers_to_record(&overrides.layers),
     };
     let threads = thread_count(overrides);
     let (outputs, named_by) = output_paths(scene.output.as_ref(), path, overrides);

@@ -142,7 +142,7 @@ impl OutputLayer {
 }
 
 /// Returns the layers to record with the image's samples.
-pub(super) fn sample_layers(layers: &[OutputLayer]) -> LayerSet {
+pub(super) fn layers_to_record(layers: &[OutputLayer]) -> LayerSet {
     let recorded = |layer: &OutputLayer| match layer.source() {
         LayerSource::Samples(layer) => Some(layer),
         LayerSource::Variance | LayerSource::SampleCount => None,

@@ -83,7 +83,7 @@ fn set_arg_candidates(text: &str, typed: &str) -> Vec<CompletionCandidate> {
     let keys = outline.iter().flat_map(of).chain(of_absent);
     let of_key = |(path, key): (String, &'static KeyInfo)| {
         key_or_value_candidates(&format!("{path}.{}=", key.name), key.doc, typed, || {
-            suggest_values(key.kind, &outline)
+            key_value_completions(key.kind, &outline)
         })
     };
     let of_type = |table: &OutlineTable| {
@@ -119,7 +119,7 @@ fn key_or_value_candidates(
 }
 
 /// Returns the named values for a key of type `kind`: keywords, colors, or names of tables in `outline`.
-fn suggest_values(kind: ValueKind, outline: &[OutlineTable]) -> Vec<DescribedValue> {
+fn key_value_completions(kind: ValueKind, outline: &[OutlineTable]) -> Vec<DescribedValue> {
     let plain = |value: &str| (value.to_owned(), "");
     match kind {
         ValueKind::Words(list) => list().iter().map(|word| (word.name.to_owned(), word.meaning)).collect(),

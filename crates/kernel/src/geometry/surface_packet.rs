@@ -139,12 +139,12 @@ impl SurfacePacket {
             set_lane(&mut found.error, lane, point_error_bound(point, reach));
             set_lane(&mut found.normal, lane, normal.normalize().as_vec3());
         }
-        self.copy_points_from(of, &found);
+        self.copy_surface_lanes_from(of, &found);
     }
 
     /// Copies the selected points, errors, and normals from another packet.
     #[inline(always)]
-    pub fn copy_points_from(&mut self, of: u32, found: &Self) {
+    pub fn copy_surface_lanes_from(&mut self, of: u32, found: &Self) {
         let of = mask_from_bits(of);
         for axis in 0..3 {
             select(&of, &found.point[axis], &mut self.point[axis]);

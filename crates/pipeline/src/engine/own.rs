@@ -10,7 +10,7 @@ use crate::control::CancelToken;
 use crate::identity::ImageDependencies;
 use crate::keys;
 use crate::memory::MemoryEstimate;
-use crate::output::part::RenderInput;
+use crate::output::part::NamedRenderInput;
 use crate::plan::{RenderPlan, resolve_plan};
 use crate::protocol::{Failure, Request, SavedSceneImageState, Status, WriteRequirement, reasons};
 use crate::render::checkpointer::{CheckpointContext, Checkpointer};
@@ -58,7 +58,7 @@ impl ImageWithoutKeyboardChanges {
     }
 
     /// Returns the names and values of everything that affects the image.
-    pub(super) fn dependencies(&self) -> Vec<RenderInput> {
+    pub(super) fn dependencies(&self) -> Vec<NamedRenderInput> {
         let divided = self.share.as_ref().map(|share| share.samples);
         let Self { parsed, plan, camera, files, .. } = self;
         ImageDependencies { parsed, plan, camera, files, divided }.names_and_values()

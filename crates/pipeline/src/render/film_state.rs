@@ -11,7 +11,7 @@ use crate::film::{
     SelectedPixels, SumOrder,
 };
 use crate::integrators::RayCounters;
-use crate::output::part::RenderInput;
+use crate::output::part::NamedRenderInput;
 use crate::plan::RenderPlan;
 use crate::render::noise_goals::CellSampleGoals;
 use crate::render::share::Shard;
@@ -61,7 +61,7 @@ pub(crate) struct FilmState {
     /// Whether a checkpoint contains all of the film's samples.
     pub(crate) is_kept: bool,
     /// Names and values of everything that affects the image, or `None` until first needed.
-    pub(crate) identity: Option<Vec<RenderInput>>,
+    pub(crate) identity: Option<Vec<NamedRenderInput>>,
     /// Whether the film was loaded from a finished part.
     pub(crate) is_finished_part: bool,
 }

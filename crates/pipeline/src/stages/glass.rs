@@ -40,9 +40,9 @@ pub(crate) fn find_glass_solids(
     };
     memo.set(key, Arc::clone(&bodies));
     findings.warnings.extend(open_glass_warnings(loaded, bodies.open_objects()));
-    findings
-        .warnings
-        .extend(bodies.zero_volume_objects().iter().map(|&object| zero_volume_glass_warning(loaded, object)));
+    findings.warnings.extend(
+        bodies.zero_volume_objects().iter().map(|&object| duplicate_faces_glass_warning(loaded, object)),
+    );
     Ok(bodies)
 }
 
@@ -158,7 +158,7 @@ fn list_object_names(loaded: &LoadedScene, members: &[&OpenGlass]) -> String {
 }
 
 /// Returns the warning about a closed mesh that encloses no volume.
-fn zero_volume_glass_warning(loaded: &LoadedScene, object: u32) -> Diagnostic {
+fn duplicate_faces_glass_warning(loaded: &LoadedScene, object: u32) -> Diagnostic {
     let object = &loaded.scene.objects[object as usize];
     let name = object.name.as_deref().map(|name| format!(" \"{name}\"")).unwrap_or_default();
     let message =

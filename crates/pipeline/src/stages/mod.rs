@@ -49,7 +49,7 @@ impl AbortReason {
     }
 
     /// An error on the command line, which has no location in the scene.
-    pub(super) fn from_command_line_error(message: String, help: &str) -> Self {
+    pub(super) fn failure_with_remedy(message: String, help: &str) -> Self {
         let (severity, help) = (Severity::Error, Some(help.to_owned()));
         let path = std::path::PathBuf::new();
         Self::Failed(Failure::Scene(vec![Diagnostic { severity, message, path, place: None, help }]))

@@ -111,7 +111,7 @@ impl<'s> ExpressionEventReader<'_, 's> {
                     continue;
                 }
                 if parts < MAX_DEPTH {
-                    let name = self.read_name(last);
+                    let name = self.decode_key_part(last);
                     path.push(name);
                 }
                 parts += 1;
@@ -124,7 +124,7 @@ impl<'s> ExpressionEventReader<'_, 's> {
             self.assembly.meaning.push_with(|| SyntaxError::at(span.range(), "recursion limit"));
             return (Vec::new(), None);
         }
-        let name = self.read_name(last);
+        let name = self.decode_key_part(last);
         (path, Some(name))
     }
 
@@ -137,7 +137,7 @@ impl<'s> ExpressionEventReader<'_, 's> {
         }
     }
 
-    fn read_name(&mut self, event: Event) -> Name<'s> {
+    fn decode_key_part(&mut self, event: Event) -> Name<'s> {
         let mut text = Cow::Borrowed("");
         let mut sink = ErrorCollector { errors: &mut self.assembly.meaning, base: self.base };
         if let Some(raw) = self.source.get(event) {

@@ -60,7 +60,7 @@ impl MeshInstance {
         if doubtful != 0 {
             on_ray = correct_doubtful_points(&placed, &corners, (rays, hits), doubtful, &mut found);
         }
-        surface.copy_points_from(of, &found);
+        surface.copy_surface_lanes_from(of, &found);
         if self.smooth {
             let normals = gather_vertex_attributes(&vertices, self.tree.file_or_computed_normals());
             let normals_of = |i: usize| [lane(&normals[0], i), lane(&normals[1], i), lane(&normals[2], i)];

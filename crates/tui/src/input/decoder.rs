@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use crossterm::event::KeyCode;
 
 use super::decoded::DecodedInput;
-use super::keys::InputPerformer;
+use super::keys::DecodedInputCollector;
 use super::paste::ActivePaste;
 use crate::event::KeyPress;
 
@@ -34,7 +34,7 @@ const MAX_DOUBTFUL_BYTES: usize = 32;
 #[derive(Default)]
 pub(crate) struct Decoder {
     parser: vte::Parser,
-    meaning: InputPerformer,
+    meaning: DecodedInputCollector,
     held: PendingSequence,
     /// Time when the last byte arrived.
     last: Option<Instant>,

@@ -11,7 +11,7 @@ use crate::terminal_replies::TerminalReply;
 
 /// Parser callbacks that collect the decoded input.
 #[derive(Debug, Default)]
-pub(super) struct InputPerformer {
+pub(super) struct DecodedInputCollector {
     /// Decoded input, in order.
     pub found: Vec<DecodedInput>,
     /// Whether a sequence, recognized or not, has ended.
@@ -35,7 +35,7 @@ enum NextCharacterMode {
     Mouse(u8),
 }
 
-impl InputPerformer {
+impl DecodedInputCollector {
     /// Drops the current sequence.
     pub(super) fn drop_current_sequence(&mut self) {
         self.next = NextCharacterMode::Character;
@@ -73,7 +73,7 @@ impl InputPerformer {
     }
 }
 
-impl Perform for InputPerformer {
+impl Perform for DecodedInputCollector {
     fn print(&mut self, character: char) {
         self.has_ended = true;
         match std::mem::take(&mut self.next) {

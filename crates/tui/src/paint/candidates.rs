@@ -56,7 +56,7 @@ fn candidate_colors_for_run(
     for span in model.spans {
         let box_ = shared_color_range(wanted.clone(), *span);
         add(TerminalColor::Rgb(box_.color_with_fewest_digits()));
-        let index = nearest_256(box_.mean());
+        let index = nearest_256(box_.clamped_mean_color());
         let fixed = TerminalColor::Palette(index);
         if index >= FIRST_UNTOUCHED && fixed.to_rgb().is_some_and(|rgb| box_.contains(rgb)) {
             add(fixed);
@@ -92,7 +92,7 @@ fn shared_color_range(wanted: impl Iterator<Item = TerminalColor>, span: u8) -> 
 }
 
 impl RunColorRange {
-    fn mean(&self) -> [u8; 3] {
+    fn clamped_mean_color(&self) -> [u8; 3] {
         let count = self.count.max(1);
         let mean = |i: usize| u8::try_from((self.sum[i] + count / 2) / count).unwrap_or(u8::MAX);
         std::array::from_fn(|i| mean(i).clamp(self.low[i], self.high[i]))
@@ -100,7 +100,7 @@ impl RunColorRange {
 
     /// Returns the color with the fewest decimal digits, preferring the one closest to the mean.
     fn color_with_fewest_digits(&self) -> [u8; 3] {
-        let mean = self.mean();
+        let mean = self.clamped_mean_color();
         std::array::from_fn(|i| {
             let fewest = decimal_digit_count(self.low[i]);
             let most = [9, 99, u8::MAX][fewest as usize - 1];

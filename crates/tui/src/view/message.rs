@@ -105,7 +105,7 @@ fn message_position(state: &State, layout: &Layout, words: &str) -> MessagePosit
         return if fits {
             MessagePosition::Line(line)
         } else {
-            MessagePosition::Over(max_message_area(layout, line))
+            MessagePosition::Over(message_area_covering_rows_above(layout, line))
         };
     }
     let needed = match status_line::reserved_columns(state, layout) {
@@ -115,13 +115,13 @@ fn message_position(state: &State, layout: &Layout, words: &str) -> MessagePosit
     if width.saturating_add(needed) <= under.width {
         return MessagePosition::Line(Rect { width, ..under });
     }
-    let room = max_message_area(layout, under);
+    let room = message_area_covering_rows_above(layout, under);
     let above = Rect { height: room.height.saturating_sub(under.height), ..room };
     MessagePosition::Over(if needed == 0 || above.is_empty() { room } else { above })
 }
 
 /// A line, together with the rows above it that a long message may cover.
-fn max_message_area(layout: &Layout, line: Rect) -> Rect {
+fn message_area_covering_rows_above(layout: &Layout, line: Rect) -> Rect {
     // Skip empty areas, since their origin would extend the union.
     let areas = [layout.preview, layout.panel].into_iter().filter(|area| !area.is_empty());
     let rest = areas.reduce(Rect::union).unwrap_or(line);

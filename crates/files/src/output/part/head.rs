@@ -17,7 +17,7 @@ pub struct PartHeader {
     /// Type of the file.
     pub kind: PartOrCheckpoint,
     /// Everything the image depends on, with user-visible names.
-    pub identity: Vec<RenderInput>,
+    pub identity: Vec<NamedRenderInput>,
     /// Share of the image that the file contains.
     pub share: PartShare,
     /// Properties of the image.
@@ -53,7 +53,7 @@ impl PartOrCheckpoint {
 
 /// An input that an image depends on.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct RenderInput {
+pub struct NamedRenderInput {
     /// A scene key or a file name.
     pub name: String,
     /// Value of the key, or hash of the file's content.
@@ -80,7 +80,7 @@ impl PartHeader {
 
     /// Returns the name of the input file with this hexadecimal hash, or `None` if there is no such file.
     pub(super) fn input_name_by_hash(&self, hash: &str) -> Option<&str> {
-        let matches = |input: &&RenderInput| input.name.starts_with(FILE) && input.value == hash;
+        let matches = |input: &&NamedRenderInput| input.name.starts_with(FILE) && input.value == hash;
         self.identity.iter().find(matches).map(|input| strip_file_dependency_prefix(&input.name))
     }
 
@@ -239,11 +239,11 @@ impl ImageHeader {
 
 /// Describes the differences between two lists of inputs, which the messages call `here` and `there`.
 pub fn render_input_differences(
-    a: &[RenderInput],
-    b: &[RenderInput],
+    a: &[NamedRenderInput],
+    b: &[NamedRenderInput],
     (here, there): (&str, &str),
 ) -> Vec<String> {
-    let value_of = |all: &[RenderInput], name: &str| {
+    let value_of = |all: &[NamedRenderInput], name: &str| {
         all.iter().find(|input| input.name == name).map(|input| input.value.clone())
     };
     let shown = |value: Option<String>| value.unwrap_or_else(|| "missing".to_owned());
@@ -292,7 +292,7 @@ fn strip_file_dependency_prefix(name: &str) -> &str {
 /// Name prefix for file inputs.
 const FILE: &str = "file ";
 
-impl RenderInput {
+impl NamedRenderInput {
     /// Creates an input for a setting.
     pub fn from_setting(name: &str, value: impl Into<String>) -> Self {
         Self { name: name.to_owned(), value: value.into() }

@@ -21,7 +21,8 @@ mod save;
 
 pub use error::{PartError, PartIndexAndCount, missing_parts_message};
 pub use head::{
-    ImageHeader, PartHeader, PartOrCheckpoint, PartShare, RenderInput, ToneHeader, render_input_differences,
+    ImageHeader, NamedRenderInput, PartHeader, PartOrCheckpoint, PartShare, ToneHeader,
+    render_input_differences,
 };
 pub use merge::{MergedParts, check_and_list_missing, merge_into_film};
 pub use read::{PartFile, find_input_that_ends_path, input_name_by_content, is_part};

@@ -46,9 +46,9 @@ fn head(index: u32, count: u32, film: &Film) -> PartHeader {
     PartHeader {
         kind: PartOrCheckpoint::Part,
         identity: vec![
-            RenderInput::from_setting("seed", "7"),
-            RenderInput::from_file("knot.obj", "12ab"),
-            RenderInput::from_combined_hash("ff"),
+            NamedRenderInput::from_setting("seed", "7"),
+            NamedRenderInput::from_file("knot.obj", "12ab"),
+            NamedRenderInput::from_combined_hash("ff"),
         ],
         share: PartShare { index, count, block_count: 0, blocks: Vec::new() },
         picture: ImageHeader::new(film, &finish()),
@@ -241,7 +241,7 @@ fn metadata_differences_are_listed() {
 #[test]
 fn parts_from_different_builds_do_not_match() {
     let inputs = |build: &str| {
-        vec![RenderInput::from_setting("glimt", build), RenderInput::from_setting("width", "4")]
+        vec![NamedRenderInput::from_setting("glimt", build), NamedRenderInput::from_setting("width", "4")]
     };
     let [a, b] = ["0.1.0 (build 1)", "0.1.0 (build 2)"].map(inputs);
     assert_eq!(render_input_differences(&a, &a, ("here", "there")), [""; 0]);

@@ -18,7 +18,7 @@ use crate::inputs::ProtectedInputs;
 use crate::integrators::RayCounters;
 use crate::messages;
 use crate::output::part::{
-    self, ImageHeader, PartError, PartFile, PartHeader, PartOrCheckpoint, PartShare, RenderInput,
+    self, ImageHeader, NamedRenderInput, PartError, PartFile, PartHeader, PartOrCheckpoint, PartShare,
     render_input_differences,
 };
 use crate::output::write::{Durability, ExistingFilePolicy};
@@ -40,7 +40,7 @@ const ENDING: &str = ".checkpoint";
 pub(crate) fn create_header(
     kind: PartOrCheckpoint,
     state: &FilmState,
-    identity: Vec<RenderInput>,
+    identity: Vec<NamedRenderInput>,
     finish: &FilmEncodingSettings,
 ) -> PartHeader {
     let share = part_index_and_blocks(state.share.as_ref());
@@ -77,7 +77,7 @@ pub(crate) struct CheckpointContext<'a> {
     pub(crate) inputs: &'a ProtectedInputs,
     pub(crate) sink: &'a EventSink,
     /// Computes the names and values of everything that affects the image. This is slow.
-    pub(crate) name: &'a dyn Fn() -> Vec<RenderInput>,
+    pub(crate) name: &'a dyn Fn() -> Vec<NamedRenderInput>,
     /// Returns why the render is interrupted.
     pub(crate) interruption: &'a dyn Fn() -> Interruption,
     /// The process's checkpoint state.
@@ -90,7 +90,7 @@ pub(crate) struct Checkpointer<'a> {
     path: PathBuf,
     settings: CheckpointSettings,
     around: CheckpointContext<'a>,
-    identity: OnceCell<Vec<RenderInput>>,
+    identity: OnceCell<Vec<NamedRenderInput>>,
     due: Cell<Instant>,
     /// Whether the checkpoint held by this process belongs to this render.
     is_own: Cell<bool>,
@@ -110,7 +110,7 @@ impl<'a> Checkpointer<'a> {
         }
     }
 
-    fn current_render_inputs(&self) -> &[RenderInput] {
+    fn current_render_inputs(&self) -> &[NamedRenderInput] {
         self.identity.get_or_init(self.around.name)
     }
 
@@ -155,7 +155,7 @@ impl<'a> Checkpointer<'a> {
             return Ok(true);
         };
         if resume == ResumeMode::Asked {
-            return Err(AbortReason::from_command_line_error(
+            return Err(AbortReason::failure_with_remedy(
                 format!("--resume: {error}"),
                 "remove --resume to start over, or name another file with -o",
             ));
@@ -196,7 +196,7 @@ impl<'a> Checkpointer<'a> {
         }
         let refused = |error: PartError| {
             let remedy = "remove --resume to replace it, or name another file with -o";
-            Err(AbortReason::from_command_line_error(format!("--resume: {error}"), remedy))
+            Err(AbortReason::failure_with_remedy(format!("--resume: {error}"), remedy))
         };
         if !differences.is_empty() {
             return refused(PartError::Other { path, other: "this call".to_owned(), differences });
@@ -223,7 +223,7 @@ impl<'a> Checkpointer<'a> {
         if self.around.lock.borrow().is_held_by_another_process(&self.path) {
             return Err(held_by_another_message(&self.path));
         }
-        let Some((head, there)) = read_valid_checkpoint(&self.path) else {
+        let Some((head, there)) = read_checkpoint_header_and_state(&self.path) else {
             return match PartFile::read_header(&self.path) {
                 Err(PartError::Version { .. }) => self.replace_moved_aside_unless_longer(|_| false),
                 Ok(head) if head.kind == PartOrCheckpoint::Part => {
@@ -249,7 +249,7 @@ impl<'a> Checkpointer<'a> {
             return Ok(());
         }
         let is_longer = |aside: &Path| {
-            read_valid_checkpoint(aside).is_some_and(|(_, before)| before.seconds >= there.seconds)
+            read_checkpoint_header_and_state(aside).is_some_and(|(_, before)| before.seconds >= there.seconds)
         };
         self.replace_moved_aside_unless_longer(is_longer)
     }
@@ -265,7 +265,7 @@ impl<'a> Checkpointer<'a> {
         if is_longer(&aside) {
             return Ok(());
         }
-        if aside.symlink_metadata().is_ok() && read_valid_checkpoint(&aside).is_none() {
+        if aside.symlink_metadata().is_ok() && read_checkpoint_header_and_state(&aside).is_none() {
             return Err(format!(
                 "cannot move the existing checkpoint aside: {} exists and is not a checkpoint",
                 aside.display()
@@ -394,7 +394,7 @@ impl<'a> Checkpointer<'a> {
         let is_own = self.is_own.get() && lock.is_held_by_this_process(&self.path);
         if is_own
             || !lock.is_held_by_another_process(&self.path)
-                && read_valid_checkpoint(&self.path).is_some_and(is_done)
+                && read_checkpoint_header_and_state(&self.path).is_some_and(is_done)
         {
             lock.release();
             // A failure to remove the checkpoint is harmless.
@@ -512,7 +512,7 @@ fn rejection_message(error: &PartError) -> String {
 }
 
 /// Reads the header and state of a valid checkpoint.
-fn read_valid_checkpoint(path: &Path) -> Option<(PartHeader, NonFilmRenderState)> {
+fn read_checkpoint_header_and_state(path: &Path) -> Option<(PartHeader, NonFilmRenderState)> {
     let file = PartFile::open(path, &CancelToken::new()).ok()?;
     file.check_kind(PartOrCheckpoint::Checkpoint).ok()?;
     let state: NonFilmRenderState = serde_json::from_value(file.state).ok()?;

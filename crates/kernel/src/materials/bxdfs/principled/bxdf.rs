@@ -97,7 +97,7 @@ impl<const THROUGH: bool> PrincipledBxdf<THROUGH> {
 
     /// Fraction of the light that passes through the dielectric's specular lobe at a cosine ≥ 0.
     #[inline(always)]
-    fn specular_transmittance(&self, cosine: f32) -> Vec3 {
+    fn one_minus_specular_albedo(&self, cosine: f32) -> Vec3 {
         let [normal, grazing] = self.specular_albedos(cosine);
         let rest = Vec3::ONE - self.dielectric * normal - Vec3::splat(self.dielectric_grazing * grazing);
         // If the facets reflect everything, no light passes. Clamp to 0 because rounding could make the
@@ -204,7 +204,7 @@ impl<const THROUGH: bool> Bxdf for PrincipledBxdf<THROUGH> {
         let wo = if THROUGH { mirrored } else { wo };
         let cosine = nonnegative_cosine(normal.dot(wo));
         let coat = self.coat_albedo(cosine);
-        let transmittance = self.specular_transmittance(cosine);
+        let transmittance = self.one_minus_specular_albedo(cosine);
         let [at_normal, at_grazing] = self.specular_albedos(cosine);
         let specular = self.facets.max_element() * at_normal + self.grazing * at_grazing;
         let diffuse = self.diffuse * transmittance.max_element();
@@ -232,7 +232,7 @@ impl<const THROUGH: bool> Bxdf for PrincipledBxdf<THROUGH> {
     #[inline(always)]
     fn wide_lobe_value(&self, view: &PrincipledViewTerms, wi: Vec3, any: BxdfFlags) -> LobeValue {
         let cosine = view.normal.dot(wi);
-        let transmittance = self.specular_transmittance(nonnegative_cosine(cosine)) * view.transmittance;
+        let transmittance = self.one_minus_specular_albedo(nonnegative_cosine(cosine)) * view.transmittance;
         let coat = if cosine > 0.0 { self.two_way_coat_transmittance(view, cosine, any) } else { 0.0 };
         let f = self.base * transmittance * coat;
         LobeValue { f, max: f.max_element(), shape: 0.0 }
