@@ -16,13 +16,13 @@ ROOT = HERE.parent.parent
 
 # Each picture has the name of its scene.
 PICTURES = {
-    "path.jpg": "--width 960 --height 960 --samples 4096",
+    "path.jpg": "--width 960 --height 960 --samples 2048",
     "photons.jpg": "--width 960 --height 960 --samples 384",
     "water.jpg": "--width 960 --height 720 --samples 256",
     "lamps.jpg": "--width 960 --height 600 --samples 256",
     "environment.jpg": "--width 960 --height 600 --samples 512",
     "metals.jpg": "--width 960 --height 533 --samples 4096",
-    "leaves.jpg": "--width 960 --height 720 --samples 1024",
+    "leaves.jpg": "--width 960 --height 720 --samples 512",
     "textures.png": "--width 320 --height 240 --samples 128",
     "ring.png": "--width 480 --height 320 --samples 64",
     "shapes.png": "--width 480 --height 300 --samples 96",

@@ -17,7 +17,10 @@ const HELD: Duration = Duration::from_secs(6);
 
 /// Prints one line per scene.
 pub(crate) fn print() -> Result<(), Box<dyn Error>> {
-    println!("camera keys held for {} s over a connection with 1 Mbit/s and 150 ms", HELD.as_secs());
+    println!(
+        "camera keys held for {} s over a 1 Mbit/s connection with a round-trip time of 150 ms",
+        HELD.as_secs()
+    );
     println!("{:<16} {:>14} {:>22}", "", "used", "max. unacknowledged bytes");
     for scene in ["cornell", "cornell_glass", "textures", "spheres"] {
         let (share, most) = orbit(scene)?;

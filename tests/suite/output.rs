@@ -297,7 +297,7 @@ fn kill_leaves_a_whole_file_and_cleans_up() {
     let mut left_behind = 0;
     for round in 0..50_u64 {
         let mut writer = child(&this_binary(), test, &path).spawn().expect("a child");
-        // When the file changes, the child is writing. Then wait for this round's delay.
+        // Once the file changes, the child has started writing. Wait for this round's delay, then kill it.
         let state = || fs::metadata(&path).map(|file| (file.ino(), file.mtime(), file.mtime_nsec()));
         let before = state().expect("a file");
         while state().expect("a file") == before {

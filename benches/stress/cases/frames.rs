@@ -27,9 +27,9 @@ pub(super) fn rows(extent: CaseSet) -> Vec<StressRow> {
         ("lens", "LENS"),
         ("64 lights", "LAMPS"),
     ];
-    // At another position, rounding occasionally picks a different light from the tree or a different photon
-    // for a kernel, which changes one sample of many. Scenes with many lights therefore run only in the long
-    // variant, with more samples.
+    // In a moved scene, rounding occasionally selects a different light from the tree or a different photon
+    // for a kernel, which changes individual samples. Scenes with many lights therefore run only in the long
+    // variant, where they get more samples.
     let settings = settings.iter().filter(|(_, setting)| extent == CaseSet::Long || *setting != "LAMPS");
     for &(name, setting) in settings {
         let is_picking = setting == PHOTONS || setting == "LAMPS";

@@ -128,7 +128,7 @@ pub enum Subcommand {
         #[arg(long, value_parser = choice_parser::<ColorDepthChoice>(), hide_possible_values = true, long_help = choice_long_help::<ColorDepthChoice>("Colors of messages and images"), default_value = "auto", value_name = "HOW")]
         color: ColorDepthChoice,
     },
-    /// Write a commented starter scene; never overwrites a file
+    /// Write a commented starter scene without overwriting files
     New {
         /// The file to write, or - for stdout
         file: PathBuf,
@@ -136,7 +136,7 @@ pub enum Subcommand {
         #[arg(long)]
         schema: bool,
     },
-    /// Convert a glTF file to a scene; never overwrites a file
+    /// Convert a glTF file to a scene without overwriting files
     ///
     /// Meshes (as PLY files) and images are written to a folder next to the scene.
     #[command(after_long_help = IMPORT_HELP)]

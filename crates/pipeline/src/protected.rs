@@ -40,7 +40,8 @@ impl OverwriteProtection {
     }
 }
 
-/// Returns the scene recorded in an image written by glimt, unless that is the given scene.
+/// Returns the scene recorded in an image written by glimt, or `None` if no scene is recorded or it is the
+/// given scene.
 pub(crate) fn recorded_scene_if_different(scene: &Path, at: &Path) -> Option<String> {
     scene_name_in_png(at).filter(|named| !scene_path::metadata_path_refers_to_scene(named, scene, at))
 }

@@ -5,7 +5,7 @@ use std::fmt::Display;
 /// Shown when a key requires a scene but none has been loaded.
 pub const NO_SCENE: &str = "no scene loaded";
 
-/// Shown when the camera was moved with keys.
+/// Shown when the camera is moved with keys.
 pub const CAMERA_MOVED: &str = "camera moved (preview only). w: save image · c: keep in scene · 0: reset";
 /// Shown when the camera has returned to its position in the scene.
 pub const CAMERA_RESET: &str = "camera reset";
@@ -13,17 +13,17 @@ pub const CAMERA_RESET: &str = "camera reset";
 pub const CLOSEST: &str = "closest zoom reached";
 /// Shown when the camera cannot be moved farther away.
 pub const FARTHEST: &str = "farthest zoom reached";
-/// Shown when `c` was pressed but the camera has not been moved.
+/// Shown when `c` is pressed but the camera has not been moved.
 pub const NOTHING_TO_KEEP: &str = "camera unchanged: nothing to keep";
 /// Explains why `c` has to be pressed again. Follows the list of saved camera settings.
 pub const CAMERA_CONFLICT: &str = "was saved after you moved the camera: press c again to overwrite it";
-/// Shown when `u` was pressed but no camera has been saved.
+/// Shown when `u` is pressed but no camera has been saved.
 pub const NOTHING_TO_UNDO: &str = "nothing to undo";
-/// Shown when `u` was pressed but `c` only created a new scene file.
+/// Shown when `u` is pressed but `c` only created a new scene file.
 pub const NEW_SCENE_STAYS: &str = "nothing to undo: c wrote a new scene for the model";
-/// Shown when `0` was pressed but no keys have changed anything.
+/// Shown when `0` is pressed but no keys have changed anything.
 pub const NOTHING_TO_RESET: &str = "nothing to reset";
-/// Shown when `0` was pressed.
+/// Shown when `0` is pressed.
 pub const RESET: &str = "reset to the scene's settings";
 
 /// Shown when the field of view is at its limit.
@@ -36,12 +36,12 @@ pub fn exposure_limit(stops: &str) -> String {
     format!("exposure limit: {stops}")
 }
 
-/// Shown when the exposure was changed with keys.
+/// Shown when the exposure is changed with keys.
 pub fn exposure_changed(stops: &str) -> String {
     format!("exposure {stops}")
 }
 
-/// Shown when the focus was set with a click.
+/// Shown when the focus is set with a click.
 pub fn focus_moved(distance: f64) -> String {
     format!("focus at {distance} (preview only). w: save image · c: keep in scene · 0: reset")
 }
@@ -56,7 +56,7 @@ pub fn saved_camera_overridden(file: &str) -> String {
     format!("camera saved to {file}, but --set overrides it in this run")
 }
 
-/// Shown when `c` was pressed but the scene file already contains this camera.
+/// Shown when `c` is pressed but the scene file already contains this camera.
 pub fn camera_already_in_scene(file: &str) -> String {
     format!("{file} already has this camera")
 }
@@ -71,20 +71,20 @@ pub fn camera_save_undone(file: &str) -> String {
     format!("undone: {file} restored")
 }
 
-/// Shown when the newest render's camera was saved while an older render was displayed.
+/// Shown when the newest render's camera is saved while an older render is displayed.
 pub const OF_NEWEST_RENDER: &str = " (camera of the newest render, not the one shown)";
 
 /// Shown when the history contains no image.
 pub const NO_IMAGE: &str = "no image yet";
-/// Shown when `N` was pressed at the newest render.
+/// Shown when `N` is pressed at the newest render.
 pub const NEWEST_RENDER: &str = "this is the newest render";
-/// Shown when `n` was pressed at the oldest render.
+/// Shown when `n` is pressed at the oldest render.
 pub const OLDEST_RENDER: &str = "this is the oldest render";
 /// Shown when `b` has returned to the newest render.
 pub const AFTER_EDIT: &str = "after the last edit (newest render)";
 /// Shown when `b` has returned to the render before the last edit. Followed by the edits.
 pub const BEFORE_EDIT: &str = "before the last edit";
-/// Shown when `b` was pressed before any edit.
+/// Shown when `b` is pressed before any edit.
 pub const NO_EARLIER_RENDER: &str = "no earlier render to compare with";
 /// Shown when the user tries to inspect an older render.
 pub const OLDER_RENDER: &str = "can't inspect an older render. b: back to the newest";
@@ -129,13 +129,13 @@ pub const OPENED: &str = "opened";
 /// Listed instead of changes for a render that differs from the previous one only in noise.
 pub const AGAIN: &str = "rendered again";
 
-/// Shown when depth of field was requested for a camera without a lens.
+/// Shown when depth of field is requested for a camera without a lens.
 pub const PINHOLE: &str = "no depth of field: aperture is 0";
-/// Shown when `f` was pressed and a click is expected.
+/// Shown when `f` is pressed and a click is expected.
 pub const CLICK_TO_FOCUS: &str = "click to focus there · f: at the crosshair";
 /// Shown when the user tries to focus on the background.
 pub const NOTHING_TO_FOCUS: &str = "nothing to focus on there";
-/// Shown when `y` was pressed before any click.
+/// Shown when `y` is pressed before any click.
 pub const NOTHING_TO_COPY: &str = "nothing to copy: click or press Enter first";
 /// Shown when mouse reporting has been turned on.
 pub const MOUSE_ON: &str = "mouse on: drag to orbit, wheel to zoom, click to inspect";
@@ -146,30 +146,30 @@ pub const COPIED: &str = "copied:";
 /// Precedes inspected values if the terminal does not support the clipboard.
 pub const SELECT_TO_COPY: &str = "shift-drag to select and copy:";
 
-/// Shown when `z` was pressed and a drag is expected.
+/// Shown when `z` is pressed and a drag is expected.
 pub const DRAG_REGION: &str = "drag a region to render first (z: around the crosshair)";
-/// Shown when a region of the running render was selected.
+/// Shown when a region of the running render is selected.
 pub const REGION_FIRST: &str = "region renders first · z: clear";
-/// Shown when a region was selected while nothing was rendering.
+/// Shown when a region is selected while nothing is rendering.
 pub const REGION_NEXT: &str = "region renders first from the next render · z: clear";
 /// Shown when `z` has cleared the region.
 pub const REGION_CLEARED: &str = "region cleared";
 
-/// Shown when a digit was pressed while the view list was closed.
+/// Shown when a digit is pressed while the view list is closed.
 pub const VIEWS_FIRST: &str = "press v first: digits choose from the list of views";
-/// Shown when `o` was pressed for a model.
+/// Shown when `o` is pressed for a model.
 pub const NO_EDITOR_FOR_MODELS: &str = "models cannot be edited; c writes a scene file for this one";
 /// Shown when a key requires a preview but none is displayed.
 pub const NO_PREVIEW: &str = "no preview is shown (see --preview)";
 /// Shown when `x` shows actual pixels.
 pub const ACTUAL_PIXELS: &str = "actual pixels (1:1) · x: fit";
-/// Shown when space was pressed while nothing was rendering.
+/// Shown when space is pressed while nothing is rendering.
 pub const NOT_RENDERING: &str = "nothing is rendering";
 /// Shown when a new request has ended a pause.
 pub const RESUMED: &str = "resumed";
-/// Shown when `w` was pressed.
+/// Shown when `w` is pressed.
 pub const WRITING: &str = "writing the current image";
-/// Shown when `w` was pressed while an older render was displayed.
+/// Shown when `w` is pressed while an older render is displayed.
 pub const WRITING_NEWEST: &str = "writing the newest image, not the one shown";
 /// Shown when `w` has written `files`.
 pub fn files_written(files: &str) -> String {
@@ -178,17 +178,17 @@ pub fn files_written(files: &str) -> String {
 
 /// Follows the names of the written files if an older render is displayed.
 pub const WROTE_NEWEST: &str = " (the newest image, not the one shown)";
-/// Shown when `e` was pressed but there are no diagnostics.
+/// Shown when `e` is pressed but there are no diagnostics.
 pub const NO_DIAGNOSTICS: &str = "no errors or warnings";
-/// Shown when `e` was pressed before the scene had been read.
+/// Shown when `e` is pressed before the scene had been read.
 pub const STILL_READING: &str = "still reading the files";
-/// Shown when Ctrl-z was pressed but there is no shell.
+/// Shown when Ctrl-z is pressed but there is no shell to return to.
 pub const NO_SHELL: &str = "no shell to return to";
 /// Shown when the file watcher has stopped.
 pub const NOT_WATCHING: &str = "file watching stopped; press r to re-render";
 /// Shown when the image could not be written.
 pub const NOT_WRITTEN: &str = "not written (e: why)";
-/// Shown when writing the image was postponed.
+/// Shown when writing the image is postponed.
 pub const WRITE_POSTPONED: &str = "the image will be written once every pixel has a sample";
 /// Shown when a render continues from a checkpoint.
 pub const RESUMING: &str = "resuming from";
@@ -203,15 +203,15 @@ pub fn photons_unsupported(other: &str) -> String {
     format!("photons work only with {other} (i: switch)")
 }
 
-/// Shown when a view was chosen.
+/// Shown when a view is chosen.
 pub fn view_chosen(name: &str) -> String {
     format!("view {name} (preview only). w: save image · 0: reset")
 }
 
-/// Shown when the photon view was selected while photons were off.
+/// Shown when the photon view is selected while photons are off.
 pub const VIEW_WITHOUT_PHOTONS: &str = "view photons: photons are off (p: on)";
 
-/// Shown when a checkpoint from another render was renamed.
+/// Shown when a checkpoint from another render is renamed.
 pub fn other_render_checkpoint_renamed(file: &str) -> String {
     format!("kept another render's checkpoint as {file}")
 }
@@ -226,7 +226,7 @@ pub fn output_modified_externally(file: &str, how: &str) -> String {
     format!("{file} {how} · w: write it again")
 }
 
-/// Shown when another program has modified an output file, which `w` will therefore not replace.
+/// Shown when another program has modified an output file and `w` will not replace it.
 pub fn output_not_overwritten(file: &str, how: &str) -> String {
     format!("{file} {how} · name another file with -o")
 }
@@ -263,12 +263,12 @@ pub const OLDER_THAN_EDIT: &str = " (older than your last edit)";
 /// Shown when the scene file does not exist.
 pub const WAITING_FOR_FILE: &str = "waiting for it to appear";
 
-/// Shown when the render of the scene's own image was interrupted.
+/// Shown when the render of the scene's own image is interrupted.
 pub fn scene_image_interrupted(file: &str, percent: u32) -> String {
     format!("{file} at {percent} %: press 0 to continue")
 }
 
-/// Shown when the scene was edited after its own image was rendered.
+/// Shown when the scene has been edited since its own image was rendered.
 pub fn scene_image_outdated(file: &str) -> String {
     format!("{file} is older than your last edit: press 0 to render it")
 }

@@ -94,8 +94,8 @@ fn convex_shapes_do_not_self_hit() {
     }
 }
 
-/// A room from −size/2 to size/2. Returns its corners, and its walls as corner indices in the order seen from
-/// inside.
+/// A room from −size/2 to size/2. Returns its corners, and its walls as corner indices, counterclockwise as
+/// seen from inside.
 fn room(size: DVec3) -> ([DVec3; 8], [[usize; 4]; 6]) {
     let corner = |i: usize| {
         size * (DVec3::new((i & 1) as f64, (i >> 1 & 1) as f64, (i >> 2 & 1) as f64) - DVec3::splat(0.5))

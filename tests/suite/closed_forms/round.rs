@@ -189,7 +189,7 @@ fn torus_hits_match_distance_function() {
 
 #[test]
 fn ray_from_torus_finds_next_intersection() {
-    // Some rays start outward, including through the hole, and others start into the tube.
+    // From each hit, one ray goes outward (sometimes through the hole) and one goes into the tube.
     let mut random = Random(29);
     for size in [1e-8, 1e-4, 1.0, 1e4, 1e8] {
         for center in places(&mut random, size) {

@@ -14,7 +14,7 @@ use super::{Random, assert_close, lambert, mean_and_error, v};
 
 const UNIT: Shape = Shape::Sphere { center: DVec3::ZERO, radius: 1.0 };
 
-/// A map with these images of the axes.
+/// The affine map that sends the unit vectors of the axes to `x`, `y` and `z`, and then translates.
 fn map(x: DVec3, y: DVec3, z: DVec3, translate: DVec3) -> AffineMap {
     AffineMap { linear: [x, y, z], translate }
 }

@@ -58,7 +58,7 @@ impl Corpus {
         Self { scenes: scenes(), assets: assets() }
     }
 
-    /// The mutated file for a case, named like the original.
+    /// The mutated file for a case, with the name of the original file.
     fn make(&self, case: Case) -> Seed {
         let seeds = match case.kind {
             FuzzInput::Scene => &self.scenes,

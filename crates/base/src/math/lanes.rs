@@ -31,9 +31,9 @@ pub type Mask = [u32; PACKET_SIZE];
 /// Mask value of a selected lane.
 pub const TRUE: u32 = u32::MAX;
 
-/// A computation in branch-free loops over packets, compiled once per instruction set. Functions called in
-/// the loops must be inlined and must not be closures. Otherwise they are compiled without the instruction
-/// set's features.
+/// A computation written as branch-free loops over packets, compiled once per instruction set. Functions
+/// called in the loops must be inlined and must not be closures. Otherwise they are compiled without the
+/// instruction set's features.
 pub trait SimdKernel {
     /// Result of the computation.
     type Output;

@@ -40,7 +40,7 @@ impl TargetFile {
     }
 }
 
-/// Resolves a path, and checks without writing whether it can be written.
+/// Resolves a path and checks that it is writable, without writing anything.
 pub(super) fn resolve_writable(path: &Path) -> Result<WriteTarget, OutputError> {
     if path.file_name().is_none() || path.as_os_str().as_bytes().ends_with(b"/") {
         return Err(target_is_directory_error(path));

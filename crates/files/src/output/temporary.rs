@@ -114,8 +114,8 @@ fn probe_unnamed_creation(_: &Path) -> io::Result<()> {
 }
 
 /// Removes temporary files left by killed processes on this machine, unless `is_kept` returns true. Keeps
-/// files from other machines, earlier boots and running processes. Ignores files that cannot be removed,
-/// because they must not prevent a write.
+/// files from other machines, earlier boots and running processes. Skips files that cannot be removed, so
+/// that a failed cleanup never prevents a write.
 pub(super) fn remove_stale_files(directory: &Path, is_kept: &dyn Fn(&Path) -> bool) {
     for path in stale_entries(directory) {
         if path.symlink_metadata().is_ok_and(|found| found.is_file()) && !is_kept(&path) {

@@ -266,7 +266,8 @@ fn sync_directory(directory: &Path) -> io::Result<()> {
     }
 }
 
-/// Writes in place by appending to the target, so that existing content in an open file is kept.
+/// Writes directly to the target, such as a pipe or an open descriptor, instead of replacing it. Appends, so
+/// that the existing content of an open file is kept.
 fn append_in_place(path: &Path, bytes: &[u8], token: &CancelToken) -> io::Result<()> {
     if path == Path::new(STDOUT) {
         // Flush earlier output first. Do not hold the lock, because the reader may block.

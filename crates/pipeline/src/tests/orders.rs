@@ -273,7 +273,7 @@ fn last_valid_scene_applies_new_overrides() {
             let of = bench.send();
             let failed = bench.until_end(of);
             assert!(matches!(failed.last(), Some(Event::Failed { failure: Failure::Scene(_), .. })));
-            // The image is shown and written under the generation of the request that the key press sent.
+            // The preview and the written image have the generation number of the request for the change.
             let mut is_seen = false;
             loop {
                 match bench.next() {

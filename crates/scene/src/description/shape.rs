@@ -40,7 +40,8 @@ pub enum Shape {
         /// Radius, > 0.
         radius: f64,
     },
-    /// A parallelogram: corner + s·u + t·v with s and t in [0, 1]. The front faces along u × v ≠ 0.
+    /// A parallelogram: corner + s·u + t·v with s and t in [0, 1]. The front side faces in the direction
+    /// u × v, which must be nonzero.
     Quad {
         /// The corner at s = t = 0.
         corner: DVec3,

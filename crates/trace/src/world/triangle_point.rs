@@ -22,7 +22,8 @@ pub(super) struct TrianglePoint {
     /// Whether the point is so close to an edge that a ray from the point could start beyond a neighboring
     /// surface; see [`PlacedMesh::pulled_inside`].
     pub(super) is_near_edge: bool,
-    /// Whether the barycentric coordinates may be too imprecise; see [`PlacedMesh::point_from_ray`].
+    /// Whether the barycentric coordinates may be too imprecise; see
+    /// [`PlacedMesh::plane_intersection_if_more_precise`].
     is_coarse: bool,
 }
 
@@ -144,8 +145,9 @@ impl<P: MeshPlacement> PlacedMesh<P> {
         facet.is_coarse && self.plane_intersection_if_more_precise(facet, ray).is_some()
     }
 
-    /// Intersection of the ray with the triangle's plane, and its error, if the triangle is much larger than
-    /// the distances from the scene's origin to the point and the ray origin.
+    /// Intersection of the ray with the triangle's plane, and its error. `None` unless the triangle's corners
+    /// are much farther from the scene's origin than the point and the ray origin, and the intersection is
+    /// close to the facet's point.
     fn plane_intersection_if_more_precise(&self, facet: &TrianglePoint, ray: &RayF64) -> Option<[Vec3; 2]> {
         if !facet.is_coarse {
             return None;

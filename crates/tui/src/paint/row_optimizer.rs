@@ -470,7 +470,7 @@ mod tests {
                 .prop_map(|symbol| pattern_and_inversion_for_symbol(symbol).expect("a tile").0),
         ];
         (tile, [shade(), shade()]).prop_map(|(tile, pair)| {
-            // Normalize like a tile read from a character: the first part is the foreground.
+            // A medium shade draws its first part in the foreground color, never in the default background.
             let is_cell = tile != TwoPartBlockPattern::MEDIUM || pair[0] != TerminalColor::DefaultBackground;
             TwoPartColorCell::new(if is_cell { tile } else { TwoPartBlockPattern::HALVES }, pair)
         })

@@ -62,7 +62,7 @@ impl WrittenFile {
         self.lost.map(|lost| describe(lost)(&self.escaped_path(), lost.describe()))
     }
 
-    /// Describes the changes made with keys that the file includes.
+    /// Describes which changes made with keys are included in the written image.
     pub(crate) fn describe_included_keyboard_changes(&self) -> Vec<String> {
         self.shows.unwrap_or_default().describe_changes_since(&KeyOverrides::default(), false)
     }
@@ -74,7 +74,7 @@ pub(crate) struct SavedFilesState {
     pub edits: u64,
     /// Generation of the request that followed the last edit.
     pub last_edit: Option<u64>,
-    /// Generation of the first request that used the last saved files.
+    /// Generation number of the first request that used the most recently saved scene files.
     pub saved_at: u64,
     pub own: SceneImageProgress,
     /// Whether the scene's files are complete, meaning that no program is writing them.

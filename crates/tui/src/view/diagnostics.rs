@@ -45,8 +45,8 @@ pub(super) fn covered_cells(state: &State) -> Rect {
     }
 }
 
-/// Returns the lower part of an area, with enough rows for the title and the lines, or the whole area if it
-/// is the panel.
+/// Returns the bottom part of an area, tall enough for the title and the lines if possible. If the area is
+/// the panel, returns all of it.
 fn pane_area(area: Rect, lines: usize, is_panel: bool) -> Rect {
     if is_panel {
         return area;

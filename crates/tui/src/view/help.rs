@@ -16,7 +16,7 @@ const NOTES: &[(&str, &str)] = &[
     ("31 kB sent", messages::HELP_BYTES),
     ("noise 2 %", "relative to the brightness of the whole image"),
     ("target 1 % per tile", "noise target per tile; ✓ reached everywhere"),
-    ("bold", "changed by the last edit or a key"),
+    ("bold", "changed by the last edit or key press"),
     ("render 1 s −.3 s", messages::HELP_STAGE_TIME),
     ("render 3", "number of finished renders, as in the history"),
 ];
@@ -33,7 +33,7 @@ pub(super) fn draw(state: &State, buffer: &mut Buffer) {
         title = format!(" keys · lines {}–{} of {} · j k ", first + 1, first + page, lines.len());
     }
     Clear.render(area, buffer);
-    // Clear lines that the help covers in part, because they would look truncated.
+    // Clear lines that the help only partly covers, because they would look truncated.
     let Layout { header, under, .. } = Layout::for_state(state);
     for line in [header, under].into_iter().filter(|line| line.intersects(area)) {
         Clear.render(line.intersection(buffer.area), buffer);

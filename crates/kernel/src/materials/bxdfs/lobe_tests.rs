@@ -1,5 +1,5 @@
-//! Checks for microfacet lobes. The tests of each kind of BSDF use them. Compares values with an `f64`
-//! reference, samples with pdfs, and albedos.
+//! Checks for microfacet lobes, shared by the tests of all kinds of BSDFs. They compare values with an `f64`
+//! reference and samples with pdfs, and compute albedos.
 
 use crate::materials::bsdf::{DielectricSamplePacket, LobesToSample, ShownLobes};
 use crate::materials::bxdf::{Bxdf, ShadingGeometry};

@@ -114,7 +114,7 @@ impl Forecast {
     /// Returns the progress, including the predicted time and noise.
     pub(crate) fn progress_and_predictions(&mut self, moment: &RenderSnapshot<'_>) -> RenderProgress {
         let elapsed_seconds = moment.elapsed_seconds;
-        // Predict the end from the remaining work.
+        // Predict the time left from the remaining work.
         let work = self.done_and_total_work(moment);
         let (mut fraction, mut eta_seconds) = self.rate.update_fraction_and_time_left(elapsed_seconds, work);
         // Apply the time limit if it ends the render earlier.

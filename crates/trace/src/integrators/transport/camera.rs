@@ -27,8 +27,8 @@ pub struct CameraRayPacket {
 }
 
 impl TileContext<'_> {
-    /// Replaces the queue's content with camera rays for a range of slots, and reports the rays with a
-    /// negative filter weight.
+    /// Replaces the queue's contents with camera rays for a range of slots. Calls `negative` for each packet
+    /// with its first slot and the mask of rays whose filter weight is negative.
     pub fn replace_queue_with_camera_rays(
         &self,
         slots: Range<u32>,
@@ -49,7 +49,7 @@ impl TileContext<'_> {
         }
     }
 
-    /// Replaces the content of `rows` with packets of camera rays for the first slots in the range, at most
+    /// Replaces the contents of `rows` with packets of camera rays for the first slots in the range, at most
     /// [`CAMERA_ROWS`] packets.
     pub fn fill_camera_packets(&self, slots: Range<u32>, rows: &mut Vec<CameraRayPacket>) {
         rows.clear();
