@@ -38,7 +38,7 @@ impl<T> Memo<T> {
 /// Cache for named values, such as loaded files and data built from them. Each value is valid for one key.
 /// Unused values are kept while there is room, which makes switching back to a scene fast.
 #[derive(Debug)]
-pub(super) struct NamedCache<N, T> {
+pub(super) struct CacheOfNamedValues<N, T> {
     entries: HashMap<N, CacheEntry<T>>,
 }
 
@@ -58,13 +58,13 @@ struct CacheEntry<T> {
 /// Number of the request that last used a now unused value, and the value's size in bytes.
 pub(super) type EvictionCandidate = (u64, usize);
 
-impl<N, T> Default for NamedCache<N, T> {
+impl<N, T> Default for CacheOfNamedValues<N, T> {
     fn default() -> Self {
         Self { entries: HashMap::new() }
     }
 }
 
-impl<N: Hash + Eq, T> NamedCache<N, T> {
+impl<N: Hash + Eq, T> CacheOfNamedValues<N, T> {
     /// Returns the value with this name if its key matches.
     pub(super) fn get(&mut self, name: &N, key: Fingerprint) -> Option<Arc<T>> {
         let entry = self.entries.get_mut(name).filter(|entry| entry.key == key)?;
@@ -143,14 +143,14 @@ mod tests {
     const NOTHING: usize = 0;
 
     /// Ends a request and evicts unused values until the remaining unused values fit into `most_bytes`.
-    fn end_request(pool: &mut NamedCache<&str, i32>, success: bool, request: u64, most_bytes: usize) {
+    fn end_request(pool: &mut CacheOfNamedValues<&str, i32>, success: bool, request: u64, most_bytes: usize) {
         pool.record_request_usage(success, request);
         pool.evict_unused_before(oldest_request_to_keep(pool.eviction_candidates(), most_bytes));
     }
 
     #[test]
     fn unused_values_are_evicted_when_out_of_room() {
-        let mut pool = NamedCache::default();
+        let mut pool = CacheOfNamedValues::default();
         pool.insert("x", key("1"), (Arc::new(1), 10));
         pool.insert("y", key("1"), (Arc::new(2), 10));
         end_request(&mut pool, true, 1, NOTHING);
@@ -163,7 +163,7 @@ mod tests {
 
     #[test]
     fn failed_request_keeps_last_valid_values() {
-        let mut pool = NamedCache::default();
+        let mut pool = CacheOfNamedValues::default();
         pool.insert("good", key("1"), (Arc::new(1), 10));
         end_request(&mut pool, true, 1, NOTHING);
         pool.insert("wrong", key("1"), (Arc::new(2), 10));
@@ -175,7 +175,7 @@ mod tests {
 
     #[test]
     fn oldest_scene_is_evicted_entirely() {
-        let mut pool = NamedCache::default();
+        let mut pool = CacheOfNamedValues::default();
         for (request, names) in [(1, ["a", "b"]), (2, ["c", "d"]), (3, ["e", "f"])] {
             for name in names {
                 pool.insert(name, key("1"), (Arc::new(1), 10));

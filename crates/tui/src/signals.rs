@@ -116,14 +116,14 @@ fn wait_for_pending_signals() {
 }
 
 /// The foreground child process, and the signal that is terminating this process.
-struct ForegroundChild {
+struct ForegroundChildRecord {
     id: Option<Pid>,
     ending: Option<Number>,
 }
 
-static CHILD: Mutex<ForegroundChild> = Mutex::new(ForegroundChild { id: None, ending: None });
+static CHILD: Mutex<ForegroundChildRecord> = Mutex::new(ForegroundChildRecord { id: None, ending: None });
 
-fn lock_foreground_child() -> MutexGuard<'static, ForegroundChild> {
+fn lock_foreground_child() -> MutexGuard<'static, ForegroundChildRecord> {
     CHILD.lock().unwrap_or_else(PoisonError::into_inner)
 }
 

@@ -50,7 +50,7 @@ impl SumOrder {
 
 /// Adds a pixel's finished blocks in order, followed by the unfinished block.
 #[cold]
-pub(super) fn sum_pixel_blocks(earlier: &[Vec<DVec3>], sums: &[DVec3], index: usize) -> DVec3 {
+pub(super) fn pixel_sum_over_sample_blocks(earlier: &[Vec<DVec3>], sums: &[DVec3], index: usize) -> DVec3 {
     match earlier {
         [] => sums[index],
         [first, others @ ..] => {

@@ -6,7 +6,7 @@ use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 use super::convergence::{ConvergenceModel, SquaredMeanChanges, luminance};
 use super::layer_sums::LayerSums;
 use super::pixel_subset::PixelSubset;
-use super::sum_order::{SumOrder, add_finite_and_count_non_finite, sum_pixel_blocks};
+use super::sum_order::{SumOrder, add_finite_and_count_non_finite, pixel_sum_over_sample_blocks};
 use super::{CELL_SIZE, CELLS, CELLS_ACROSS, Rect, TILE_SIZE, TileSamples};
 use crate::math::{DVec3, Vec3};
 use crate::system::memory::try_reserve_exact;
@@ -126,7 +126,7 @@ impl Tile {
         self.mean_from_lobe_sums(
             index,
             || self.positive_lobe_radiance_sum(index),
-            |negative| sum_pixel_blocks(&negative.earlier, &negative.sums, index),
+            |negative| pixel_sum_over_sample_blocks(&negative.earlier, &negative.sums, index),
         )
     }
 
@@ -163,7 +163,7 @@ impl Tile {
         if self.earlier.is_empty() {
             self.sums[index]
         } else {
-            sum_pixel_blocks(&self.earlier, &self.sums, index)
+            pixel_sum_over_sample_blocks(&self.earlier, &self.sums, index)
         }
     }
 

@@ -176,7 +176,8 @@ impl MergeCommand<'_> {
                 }
             }
             waiting = rest;
-            let unfinished: Vec<&Path> = waiting.iter().filter_map(AwaitedPart::path_if_incomplete).collect();
+            let unfinished: Vec<&Path> =
+                waiting.iter().filter_map(AwaitedPart::existing_path_if_incomplete).collect();
             let state = (parts.len(), unfinished.iter().map(|path| path.to_path_buf()).collect::<Vec<_>>());
             if said.as_ref() != Some(&state) {
                 let is_new = said.is_none_or(|(count, _)| count != parts.len());
@@ -398,7 +399,7 @@ impl AwaitedPart {
     }
 
     /// Returns the part's path if the file exists but is incomplete.
-    fn path_if_incomplete(&self) -> Option<&Path> {
+    fn existing_path_if_incomplete(&self) -> Option<&Path> {
         self.unfinished.is_some().then_some(&self.path)
     }
 }

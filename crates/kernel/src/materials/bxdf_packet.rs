@@ -299,7 +299,7 @@ impl<B: Bxdf> BxdfPacket<B> {
 
     /// The narrow lobe of a surface, if it has one.
     #[inline(always)]
-    pub fn narrow_lobe(&self, i: usize) -> Option<NarrowLobe> {
+    pub fn narrow_lobe_at_lane(&self, i: usize) -> Option<NarrowLobe> {
         if !self.lane_flags(i).contains(BxdfFlags::NARROW) {
             return None;
         }

@@ -25,7 +25,7 @@ use self::outputs::remove_outdated_report;
 use self::own::{ImageWithoutKeyboardChanges, saved_scene_plan, texture_needs_with_saved_scene};
 use self::unfinished::LastValidScene;
 use super::assembly::{KeyedWorld, RequestCamera, build_or_reuse_world};
-use super::cache::{Memo, NamedCache};
+use super::cache::{CacheOfNamedValues, Memo};
 use super::inputs::ProtectedInputs;
 use super::keys;
 use super::memory::MemoryEstimate;
@@ -99,7 +99,7 @@ pub(super) struct Engine {
     config: EngineConfig,
     contents: Arc<FileHashCache>,
     parsed: Memo<Arc<ParsedScene>>,
-    meshes: NamedCache<MeshPathAndPart, CachedMesh>,
+    meshes: CacheOfNamedValues<MeshPathAndPart, CachedMesh>,
     bodies: Memo<Arc<GlassSolids>>,
     coplanar: Memo<Vec<CoplanarLight>>,
     textures: TextureCache,
@@ -167,7 +167,7 @@ impl Engine {
             config,
             contents,
             parsed: Memo::default(),
-            meshes: NamedCache::default(),
+            meshes: CacheOfNamedValues::default(),
             bodies: Memo::default(),
             coplanar: Memo::default(),
             textures: TextureCache::default(),
@@ -231,7 +231,7 @@ impl Engine {
         sink.send(Event::Started { generation });
         let mut findings = Findings::default();
         let before = self.current_image_key_and_view();
-        let outcome = self.run_stages(request, sink, context, &mut findings);
+        let outcome = self.run_all_request_stages(request, sink, context, &mut findings);
         if let Err(AbortReason::Failed(Failure::Scene(diagnostics))) = &outcome {
             findings.watch_underlined_files(diagnostics, &request.scene, &self.contents, context.token);
         }
@@ -287,7 +287,7 @@ impl Engine {
         }
     }
 
-    fn run_stages(
+    fn run_all_request_stages(
         &mut self,
         request: &Request,
         sink: &EventSink,

@@ -138,7 +138,7 @@ pub(super) fn scene_text(
     }
     // STL has no vertex normals, and mechanical parts have sharp edges.
     let is_stl = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("stl"));
-    if is_stl || loaded.is_faceted_without_normals() {
+    if is_stl || loaded.has_flat_faces_and_no_normals() {
         toml.key_value("smooth", "false");
     }
     if needs_material {

@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use super::super::cache::{EvictionCandidate, Memo, NamedCache};
+use super::super::cache::{CacheOfNamedValues, EvictionCandidate, Memo};
 use super::super::keys;
 use super::super::protocol::reasons;
 use super::meshes::{CachedMesh, MeshesByFileIndex};
@@ -23,10 +23,10 @@ type KeyedMeshWithSeparateEmitters = (Fingerprint, Arc<LoadedMesh>);
 /// Cache of the accel stage.
 #[derive(Debug, Default)]
 pub(crate) struct AccelCache {
-    trees: NamedCache<Fingerprint, MeshTree>,
+    trees: CacheOfNamedValues<Fingerprint, MeshTree>,
     /// Meshes with separated emitters, or `None` if the mesh in the file can be used as it is.
-    distinct: NamedCache<Fingerprint, Option<Arc<LoadedMesh>>>,
-    geometry: NamedCache<Fingerprint, Geometry>,
+    distinct: CacheOfNamedValues<Fingerprint, Option<Arc<LoadedMesh>>>,
+    geometry: CacheOfNamedValues<Fingerprint, Geometry>,
     /// Offsets applied to lights that are coplanar with other surfaces.
     lifts: Memo<Vec<DVec3>>,
     /// Key of the current tree over all objects.

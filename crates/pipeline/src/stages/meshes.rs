@@ -6,7 +6,7 @@ use std::sync::{Arc, OnceLock};
 
 use rayon::prelude::*;
 
-use super::super::cache::NamedCache;
+use super::super::cache::CacheOfNamedValues;
 use super::super::protocol::reasons;
 use super::super::watch::content::{FileContentId, FilePathAndContentId};
 use super::containers::canonical;
@@ -51,7 +51,7 @@ pub(crate) type MeshesByFileIndex = Vec<Arc<CachedMesh>>;
 /// The token is cancelled, or there is not enough memory.
 pub(crate) fn load_meshes(
     loaded: &LoadedScene,
-    cache: &mut NamedCache<MeshPathAndPart, CachedMesh>,
+    cache: &mut CacheOfNamedValues<MeshPathAndPart, CachedMesh>,
     findings: &mut Findings,
     reading: &FileReadContext<'_>,
 ) -> Result<StageResult<MeshesByFileIndex>, AbortReason> {
@@ -384,7 +384,7 @@ mod tests {
         folder: tempfile::TempDir,
         sink: EventSink,
         pool: rayon::ThreadPool,
-        cache: NamedCache<MeshPathAndPart, CachedMesh>,
+        cache: CacheOfNamedValues<MeshPathAndPart, CachedMesh>,
         contents: Arc<FileHashCache>,
     }
 
@@ -394,7 +394,8 @@ mod tests {
             let events = std::sync::mpsc::channel().0;
             let sink = EventSink { generation: 0, events, previews: Default::default() };
             let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().expect("a pool");
-            let fixture = Self { folder, sink, pool, cache: NamedCache::default(), contents: Arc::default() };
+            let fixture =
+                Self { folder, sink, pool, cache: CacheOfNamedValues::default(), contents: Arc::default() };
             fixture.write("a.obj", OBJ);
             fixture.write("a.mtl", "newmtl m\nKd 1 0 0\n");
             fixture
@@ -515,7 +516,7 @@ mod tests {
         let (mesh, files) = fixture.read(&snapshot);
         assert_eq!((mesh.mesh.mesh.triangles.len(), files[0].content), (1, old), "cached");
         assert_eq!(snapshot.changed_file(), None);
-        fixture.cache = NamedCache::default();
+        fixture.cache = CacheOfNamedValues::default();
         let (mesh, files) = fixture.read(&snapshot);
         assert_eq!((mesh.mesh.mesh.triangles.len(), files[0].content), (2, fixture.hash("a.obj")), "decoded");
         assert_eq!(

@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use super::super::cache::{EvictionCandidate, NamedCache};
+use super::super::cache::{CacheOfNamedValues, EvictionCandidate};
 use super::super::protocol::reasons;
 use super::super::watch::content::{FileContentId, FilePathAndContentId};
 use super::containers::{ImageInput, canonical};
@@ -54,8 +54,8 @@ struct DecodedTexture {
 /// Texture cache. Each file and encoding has one entry, plus one for its mipmaps if a material uses them.
 #[derive(Debug, Default)]
 pub(crate) struct TextureCache {
-    texels: NamedCache<TextureKey, DecodedTexture>,
-    mipmaps: NamedCache<TextureKey, Mipmaps>,
+    texels: CacheOfNamedValues<TextureKey, DecodedTexture>,
+    mipmaps: CacheOfNamedValues<TextureKey, Mipmaps>,
     /// Image files referenced by glTF files, by texture name.
     linked: HashMap<TextureKey, PathBuf>,
 }

@@ -21,14 +21,14 @@ use crate::math::limits::{SHORTEST, is_nonzero_but_too_short, robust_length};
 use crate::math::{DVec3, Vec2};
 
 /// A table's key, which may be absent.
-pub(super) struct TableKey<'a> {
+pub(super) struct KeyInTable<'a> {
     pub(super) context: &'a FileContext<'a>,
     pub(super) name: &'static str,
     pub(super) value: Option<Value<'a>>,
     key_span: Option<Range<usize>>,
 }
 
-impl<'a> TableKey<'a> {
+impl<'a> KeyInTable<'a> {
     pub(super) fn new(
         context: &'a FileContext<'a>,
         name: &'static str,

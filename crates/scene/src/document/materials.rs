@@ -5,7 +5,7 @@ use super::super::description::{
 };
 use super::common;
 use super::context::Issue;
-use super::key::TableKey;
+use super::key::KeyInTable;
 use super::limits::Limits;
 use super::names::DefinedNames;
 use super::table::TableReader;
@@ -87,9 +87,9 @@ fn read_material(name: String, table: &TableReader<'_>, textures: &DefinedNames)
 fn read_phong(table: &TableReader<'_>, textures: &DefinedNames) -> MaterialKind {
     let (diffuse_key, specular_key) = (table.optional_key("diffuse"), table.optional_key("specular"));
     let ambient_key = table.optional_key("ambient");
-    let color = |key: &TableKey<'_>, name| key.color_or_texture(textures, table.key_limits(name));
+    let color = |key: &KeyInTable<'_>, name| key.color_or_texture(textures, table.key_limits(name));
     let (diffuse, specular) = (color(&diffuse_key, "phong.diffuse"), color(&specular_key, "phong.specular"));
-    let is_wrong = |key: &TableKey<'_>, color: &Option<ColorSource>| key.is_present() && color.is_none();
+    let is_wrong = |key: &KeyInTable<'_>, color: &Option<ColorSource>| key.is_present() && color.is_none();
     let is_invalid = is_wrong(&diffuse_key, &diffuse) || is_wrong(&specular_key, &specular);
     let diffuse = diffuse.unwrap_or(ColorSource::Constant(Vec3::splat(0.7)));
     let specular = specular.unwrap_or(ColorSource::Constant(Vec3::ZERO));
@@ -101,7 +101,7 @@ fn read_phong(table: &TableReader<'_>, textures: &DefinedNames) -> MaterialKind 
     MaterialKind::Phong {
         diffuse,
         specular,
-        shininess: read_or_default(table, "phong.shininess", 32.0, TableKey::number_f32),
+        shininess: read_or_default(table, "phong.shininess", 32.0, KeyInTable::number_f32),
         ambient: color(&ambient_key, "phong.ambient"),
     }
 }
@@ -110,7 +110,12 @@ fn read_phong(table: &TableReader<'_>, textures: &DefinedNames) -> MaterialKind 
 pub(crate) const ENERGY_GAIN: &str = "this material reflects more light than it receives";
 
 /// Warns about a material that reflects more light than it receives.
-fn warn_about_energy_gain(kd_key: &TableKey<'_>, ks_key: &TableKey<'_>, kd: &ColorSource, ks: &ColorSource) {
+fn warn_about_energy_gain(
+    kd_key: &KeyInTable<'_>,
+    ks_key: &KeyInTable<'_>,
+    kd: &ColorSource,
+    ks: &ColorSource,
+) {
     let constant = |source: &ColorSource| match source {
         ColorSource::Constant(color) => *color,
         ColorSource::Texture(_) => Vec3::ZERO,
@@ -166,7 +171,7 @@ fn read_principled(table: &TableReader<'_>, textures: &DefinedNames) -> Material
 }
 
 /// Returns the key at the path `TYPE.KEY`.
-fn optional_key_ignoring_type_prefix<'a>(table: &TableReader<'a>, path: &'static str) -> TableKey<'a> {
+fn optional_key_ignoring_type_prefix<'a>(table: &TableReader<'a>, path: &'static str) -> KeyInTable<'a> {
     table.optional_key(path.split_once('.').map_or(path, |(_, name)| name))
 }
 
@@ -176,7 +181,7 @@ fn read_or_default<'a, T>(
     table: &TableReader<'a>,
     path: &'static str,
     default: T,
-    read: impl FnOnce(&TableKey<'a>, Limits) -> Option<T>,
+    read: impl FnOnce(&KeyInTable<'a>, Limits) -> Option<T>,
 ) -> T {
     read(&optional_key_ignoring_type_prefix(table, path), table.key_limits(path)).unwrap_or(default)
 }
@@ -205,7 +210,7 @@ fn read_number_or_texture(
 
 /// Reads an index of refraction.
 fn read_ior(table: &TableReader<'_>, path: &'static str) -> f32 {
-    read_or_default(table, path, 1.5, TableKey::number_f32)
+    read_or_default(table, path, 1.5, KeyInTable::number_f32)
 }
 
 /// Reads a metal's reflectance. Exactly one of three groups of keys must specify it.
@@ -217,7 +222,7 @@ fn read_metal_reflectance(table: &TableReader<'_>, textures: &DefinedNames) -> O
     if count > 1 {
         let given = [&element, &k, &eta, &color].into_iter().find(|key| key.is_present());
         let issue = Issue::error(
-            given.and_then(TableKey::key_span)?,
+            given.and_then(KeyInTable::key_span)?,
             "the reflectance of this metal is specified twice",
         )
         .with_help("use exactly one of `color`, `eta` with `k`, and `element`");

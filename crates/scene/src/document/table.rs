@@ -10,7 +10,7 @@ use super::super::nearest::{foreign_or_nearest_name, nearest_name};
 use super::super::sanitize::escape_and_truncate;
 use super::super::toml::{Entries, KeyValue};
 use super::context::{FileContext, Issue};
-use super::key::TableKey;
+use super::key::KeyInTable;
 use super::limits::Limits;
 use super::value::{TomlValue, Value, describe_value};
 
@@ -92,13 +92,13 @@ impl<'a> TableReader<'a> {
     }
 
     /// Reads an optional key.
-    pub(super) fn optional_key(&self, name: &'static str) -> TableKey<'a> {
+    pub(super) fn optional_key(&self, name: &'static str) -> KeyInTable<'a> {
         let mut known = self.known.borrow_mut();
         if !known.contains(&name) {
             known.push(name);
         }
         let entry = self.entries.get(name);
-        TableKey::new(
+        KeyInTable::new(
             self.context,
             name,
             entry.as_ref().map(|one| one.span.clone()),
@@ -156,7 +156,7 @@ impl<'a> TableReader<'a> {
     }
 
     /// Reads a required key. `example` is a valid value to show in the help text.
-    pub(super) fn required_key(&self, name: &'static str, example: &'static str) -> TableKey<'a> {
+    pub(super) fn required_key(&self, name: &'static str, example: &'static str) -> KeyInTable<'a> {
         let key = self.optional_key(name);
         if !key.is_present() {
             self.missing.borrow_mut().push((name, example));

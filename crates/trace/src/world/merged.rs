@@ -181,7 +181,7 @@ impl MergedMeshes {
     ) {
         let Some(facets) = &self.facets else { return self.closest_hit_by_tree(rows, met, ends, found) };
         let size = self.bounds().extent();
-        match by.run(IncoherentClosestFacetKernel { facets, size, rows, met, ends, found }) {
+        match by.run(TriangleListClosestHitKernel { facets, size, rows, met, ends, found }) {
             Some(0) => {}
             Some(undecided) => self.closest_hit_per_ray(rows, undecided, ends, found),
             None => self.closest_hit_by_tree(rows, met, ends, found),
@@ -293,7 +293,7 @@ const COHERENCE: f32 = 0.125;
 
 /// Kernel that calls [`TriangleList::closest_hit_packet`] for incoherent rays and returns the lanes that need
 /// an exact test, or returns `None` for coherent rays.
-struct IncoherentClosestFacetKernel<'a> {
+struct TriangleListClosestHitKernel<'a> {
     facets: &'a TriangleList,
     size: Vec3,
     rows: &'a RayPacket,
@@ -302,7 +302,7 @@ struct IncoherentClosestFacetKernel<'a> {
     found: &'a mut HitPacket,
 }
 
-impl SimdKernel for IncoherentClosestFacetKernel<'_> {
+impl SimdKernel for TriangleListClosestHitKernel<'_> {
     type Output = Option<u32>;
 
     #[inline(always)]

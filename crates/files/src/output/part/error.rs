@@ -124,11 +124,11 @@ impl PartError {
 
 /// Describes missing parts, for example `2 of 8 parts are missing: 3/8, 4/8`.
 pub fn missing_parts_message(missing: &[u32], count: u32) -> String {
-    format!("{} of {count} parts are missing: {}", missing.len(), truncated_part_list(missing, count))
+    format!("{} of {count} parts are missing: {}", missing.len(), format_missing_parts(missing, count))
 }
 
 /// Lists parts in the form `1/8, 3/8, 4/8`. Long lists are truncated.
-fn truncated_part_list(missing: &[u32], count: u32) -> String {
+fn format_missing_parts(missing: &[u32], count: u32) -> String {
     const MAX_SHOWN: usize = 20;
     let names: Vec<String> = missing.iter().take(MAX_SHOWN).map(|index| format!("{index}/{count}")).collect();
     let rest = missing.len().saturating_sub(MAX_SHOWN);

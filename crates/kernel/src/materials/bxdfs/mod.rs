@@ -334,12 +334,12 @@ macro_rules! kinds {
                 }
             }
 
-            /// [`BxdfPacket::narrow_lobe`].
+            /// [`BxdfPacket::narrow_lobe_at_lane`].
             #[inline(always)]
-            pub fn narrow_lobe(&self, i: usize) -> Option<NarrowLobe> {
+            pub fn narrow_lobe_at_lane(&self, i: usize) -> Option<NarrowLobe> {
                 match self {
-                    $(Self::$kind(row) => row.narrow_lobe(i),)+
-                    $(Self::$part(row) => row.narrow_lobe(i)),+
+                    $(Self::$kind(row) => row.narrow_lobe_at_lane(i),)+
+                    $(Self::$part(row) => row.narrow_lobe_at_lane(i)),+
                 }
             }
 

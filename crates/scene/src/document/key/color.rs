@@ -9,7 +9,7 @@ use super::super::context::Issue;
 use super::super::limits::Limits;
 use super::super::names::DefinedNames;
 use super::super::value::{TomlValue, Value, number_within, parse_integer_in_radix, report_wrong_type};
-use super::TableKey;
+use super::KeyInTable;
 use crate::math::color::srgb8_color_to_linear;
 use crate::math::{DVec3, Vec3};
 
@@ -22,7 +22,7 @@ const COLOR_OR_TEXTURE: &str =
 const EMISSION: &str =
     "a color, [r, g, b], a number, \"#rrggbb\" or a name, or { texture = \"name\", scale = 1.0 }";
 
-impl TableKey<'_> {
+impl KeyInTable<'_> {
     /// Reads a non-negative color and converts it to linear.
     pub(in super::super) fn color(&self) -> Option<Vec3> {
         self.color_f64(Limits::AtLeast(0.0)).map(DVec3::as_vec3)

@@ -8,11 +8,11 @@ use super::super::super::nearest::nearest_name;
 use super::super::super::read::{MAX_FOLDER_FILES, is_symlink, similar_file};
 use super::super::super::sanitize::{escape_and_truncate, escape_invisible_chars};
 use super::super::context::Issue;
-use super::TableKey;
+use super::KeyInTable;
 use crate::system::describe_error;
 use crate::system::file::{self, FileKind};
 
-impl TableKey<'_> {
+impl KeyInTable<'_> {
     /// Reads the path of an existing file and resolves it against the scene's folder. The file must have one
     /// of the extensions `endings`, unless the list is empty.
     pub(in super::super) fn existing_file(&self, endings: &[&str]) -> Option<Spanned<PathBuf>> {

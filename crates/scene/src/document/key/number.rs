@@ -5,12 +5,12 @@ use super::super::context::Issue;
 use super::super::limits::Limits;
 use super::super::names::DefinedNames;
 use super::super::value::{TomlValue, number_within};
-use super::TableKey;
+use super::KeyInTable;
 
 const NUMBER_OR_TEXTURE: &str = "a number, or { texture = \"name\" }";
 const NAME_OR_TEXTURE: &str = "the name of a texture, or { texture = \"name\" }";
 
-impl TableKey<'_> {
+impl KeyInTable<'_> {
     /// Reads a number, or a texture with an optional channel.
     pub(in super::super) fn number_or_texture(
         &self,

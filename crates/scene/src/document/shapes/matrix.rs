@@ -2,7 +2,7 @@
 
 use super::super::super::description::AffineMap;
 use super::super::context::Issue;
-use super::super::key::TableKey;
+use super::super::key::KeyInTable;
 use super::super::limits::Limits;
 use crate::math::DVec3;
 use crate::math::limits::{SHORTEST, is_nonzero_but_too_short, robust_length};
@@ -12,7 +12,7 @@ use crate::math::limits::{SHORTEST, is_nonzero_but_too_short, robust_length};
 const MIN_VOLUME_RATIO: f64 = 1e-12;
 
 /// Reads an invertible affine transform in row-major order.
-pub(super) fn read_affine_matrix(key: &TableKey<'_>) -> Option<AffineMap> {
+pub(super) fn read_affine_matrix(key: &KeyInTable<'_>) -> Option<AffineMap> {
     let numbers: [f64; 16] = key.numbers(Limits::Any, "16 numbers, row by row")?;
     let [x, y, z, translate] =
         std::array::from_fn(|column| DVec3::from_array(std::array::from_fn(|row| numbers[4 * row + column])));

@@ -3,7 +3,7 @@
 use super::super::super::description::Shape;
 use super::super::NO_AREA;
 use super::super::context::Issue;
-use super::super::key::TableKey;
+use super::super::key::KeyInTable;
 use super::super::limits::Limits;
 use super::super::table::TableReader;
 use super::edges_span_area;
@@ -24,7 +24,7 @@ pub(super) fn read(table: &TableReader<'_>) -> Option<Shape> {
         return None;
     }
     if !edges_span_area(b - a, c - a) {
-        let span = keys.iter().rev().find_map(TableKey::value_span)?;
+        let span = keys.iter().rev().find_map(KeyInTable::value_span)?;
         let issue = Issue::error(span, format!("the triangle {NO_AREA}"))
             .with_label("`a`, `b` and `c` are collinear")
             .with_help("use three points that are not collinear");

@@ -239,7 +239,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
     /// Narrow lobe at a vertex, with its strength relative to the wide lobes.
     #[inline(always)]
     fn receiver_lobe(&self, i: usize) -> Option<ReceiverLobe> {
-        let NarrowLobe { axis, exponent, peak, wide } = self.row.bsdf.narrow_lobe(i)?;
+        let NarrowLobe { axis, exponent, peak, wide } = self.row.bsdf.narrow_lobe_at_lane(i)?;
         let is_both = wide > 0.0;
         Some(ReceiverLobe {
             axis,

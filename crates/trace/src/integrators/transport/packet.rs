@@ -273,8 +273,13 @@ impl SimdKernel for PacketIntersector<'_> {
             self.row.set_plain_vertices(&rays, rows, self.surface, lifts, simd)
         };
         // Compute the other surfaces, and the environment for rays that leave the scene.
-        let found =
-            tile.fill_non_plain_surfaces(self.surface, rows, (&hits, &object), any & !plain.all, simd);
+        let found = tile.fill_packable_non_plain_surfaces(
+            self.surface,
+            rows,
+            (&hits, &object),
+            any & !plain.all,
+            simd,
+        );
         let all = rays.mask();
         let sky = match world.lights.environment() {
             Some(environment) if any & all != all => environment.radiance_and_pdf_packet(&rows.direction),
@@ -392,7 +397,7 @@ fn gather_hit_packet(known: &[Option<Hit>], places: &[u32]) -> (HitPacket, [u32;
 impl TileContext<'_> {
     /// Stores the surfaces of non-plain hits in the surface packet and returns the mask of stored surfaces.
     #[inline(always)]
-    fn fill_non_plain_surfaces(
+    fn fill_packable_non_plain_surfaces(
         &self,
         surface: &mut SurfacePacket,
         rows: &RayPacket,
