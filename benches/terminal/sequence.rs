@@ -10,7 +10,7 @@ use glimt::pipeline::Handle;
 use glimt::pipeline::protocol::{Command, Event, MaxPreviewSize, Request, WriteRequirement};
 use glimt::pipeline::settings::Overrides;
 
-/// A preview of an unfinished or finished image.
+/// A preview of an image, which may still be rendering.
 pub(crate) struct RecordedPreview {
     /// Seconds since the request.
     pub(crate) seconds: f64,

@@ -39,7 +39,7 @@ fn dir() -> TestDir {
     dir
 }
 
-/// Runs `glimt compare`. Returns the JSON object from stdout, and stderr.
+/// Runs `glimt compare --json` and returns the JSON object printed to stdout, along with the text of stderr.
 #[track_caller]
 fn json(dir: &TestDir, line: &str, code: i32) -> (Value, String) {
     let output = dir.run(&format!("compare --json {line}"));

@@ -303,7 +303,7 @@ fn report_replaces_only_reports() {
         dir.write(name, content);
         refused(&dir, &format!("ball.toml {ENDLESS} --report {name}"), &[name, ".json"]);
     }
-    // A report on stdout is appended if the stream was opened for appending.
+    // If stdout was opened for appending, the report is appended to the file.
     dir.write("log", "before\n");
     let log = fs::OpenOptions::new().append(true).open(dir.path("log")).expect("a file");
     let status = dir.glimt("ball.toml --once --report /dev/stdout").stdout(log).status().expect("it runs");

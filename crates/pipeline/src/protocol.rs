@@ -191,7 +191,7 @@ pub enum Event {
         /// image.
         unfinished: Option<SampleCounts>,
     },
-    /// State of the scene's own image, sent for a request that shows another image.
+    /// State of the scene's own image, sent when a request shows a different image.
     OwnImage {
         /// Request number.
         generation: u64,

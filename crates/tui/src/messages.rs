@@ -124,9 +124,9 @@ pub fn render_number(number: impl Display) -> String {
 
 /// Label for a render that was stopped.
 pub const STOPPED: &str = "stopped";
-/// Listed instead of changes for the first render in the history.
+/// Shown in place of changes for the first render in the history.
 pub const OPENED: &str = "opened";
-/// Listed instead of changes for a render that differs from the previous one only in noise.
+/// Shown in place of changes when a render differs from the previous one only in noise.
 pub const AGAIN: &str = "rendered again";
 
 /// Shown when depth of field is requested for a camera without a lens.

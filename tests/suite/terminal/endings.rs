@@ -162,7 +162,7 @@ fn render_resumes_after_a_dropped_connection() {
     terminal.press("q");
     assert_eq!(terminal.end(), 0);
     assert!(checkpoint.is_file());
-    // The same scene resumes, produces the same pixels, and removes the checkpoint.
+    // A render of the same scene resumes, produces the same pixels, and removes the checkpoint.
     folder.write("scene.toml", &slow);
     let terminal = folder.terminal();
     terminal.wait_for(messages::RESUMING);

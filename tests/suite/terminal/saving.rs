@@ -170,7 +170,7 @@ fn persistent_error_is_shown() {
 #[test]
 fn broken_save_does_not_stop_the_render() {
     let folder = Folder::new();
-    // A render that takes long enough to save the scene in the meantime.
+    // A render slow enough for the scene to be saved before it ends.
     let slow = SCENE.replace("samples = 4", "samples = 1000").replace("width = 64", "width = 320");
     let slow = slow.replace("height = 48", "height = 240");
     folder.write("scene.toml", &slow);

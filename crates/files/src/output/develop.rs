@@ -10,7 +10,7 @@ use crate::film::{Film, FilmQuantity, RadianceImage, SampleCountStats};
 pub struct FilmEncodingSettings {
     /// Film quantity that the image shows.
     pub quantity: FilmQuantity,
-    /// Tone mapping, with a range that has not been adapted to the image yet.
+    /// Tone mapping, before its range is adapted to the image.
     pub tone: ToneMapping,
     /// Bits per channel in PNG and PPM files.
     pub bit_depth: BitDepth,

@@ -58,7 +58,7 @@ pub(super) fn check_writable(path: &Path) -> Result<(), OutputError> {
         WriteTarget::File(target) => {
             let directory = target.directory();
             temporary::check_can_create(directory).map_err(|error| match error.kind() {
-                // The directory exists, so the error is about the new file, as in /proc.
+                // The directory exists, so the error comes from creating the file. This happens in /proc.
                 ErrorKind::NotFound if directory.is_dir() => OutputError::Target {
                     path: path.to_owned(),
                     why: format!("files cannot be created in the directory {}", directory.display()),

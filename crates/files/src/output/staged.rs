@@ -78,7 +78,7 @@ impl StagingFolder {
                 Err(error) => return Err(error),
                 Ok(()) => {
                     let lock = File::open(&path)?;
-                    // If locking is not supported, no process removes the folder as stale.
+                    // If locking is not supported, no process treats the folder as stale and removes it.
                     let _ = lock.try_lock();
                     return Ok(Self { path, _lock: lock });
                 }

@@ -54,7 +54,7 @@ impl TemporaryFile {
     fn try_lock(&self) -> io::Result<bool> {
         match self.file.try_lock() {
             Err(TryLockError::WouldBlock) => Ok(false),
-            // If locking is not supported, no process removes the file as stale.
+            // If locking is not supported, no process treats the file as stale and removes it.
             Err(TryLockError::Error(_)) => Ok(true),
             Ok(()) => still_refers_to(&self.file, &self.path),
         }
@@ -178,8 +178,8 @@ fn temporary_name(name: &OsStr, writer: &ProcessIdentity) -> OsString {
     result
 }
 
-/// Parses the writer from a temporary name. Returns `None` for other names, including names from older
-/// versions (`.NAME.glimt-PID-N.tmp`), which do not contain the machine.
+/// Parses the identity of the writer from a temporary name. Returns `None` for other names, including those
+/// from older versions (`.NAME.glimt-PID-N.tmp`), which do not identify the machine.
 fn parse_writer(name: &OsStr) -> Option<ProcessIdentity> {
     let name = name.to_string_lossy();
     let (_, writer) = name.strip_prefix('.')?.strip_suffix(".tmp")?.rsplit_once(".glimt-")?;

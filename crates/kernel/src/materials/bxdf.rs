@@ -168,8 +168,11 @@ pub trait Bxdf: Soa + Default {
         any: BxdfFlags,
     ) -> Vec3;
 
-    /// Shape of the narrow lobe, for light selection. Only called if the flags indicate a narrow lobe.
-    fn narrow_lobe(&self, view: &Self::View) -> Option<NarrowLobe>;
+    /// Shape of the narrow lobe, for light selection. Only called if the flags indicate a narrow lobe. With
+    /// `None`, lights are selected as for a wide lobe.
+    fn narrow_lobe(&self, _view: &Self::View) -> Option<NarrowLobe> {
+        None
+    }
 
     /// Exponent of the narrow lobe if it is approximated as a power of a cosine, or 0 for kinds whose narrow
     /// lobes send rays. Light samples are inefficient for large exponents.

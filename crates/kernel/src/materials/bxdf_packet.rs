@@ -15,9 +15,9 @@ use glimt_base::soa;
 soa! {
     /// Factors that select which lobes an image shows.
     pub struct ShownLobeFactors in LobeFactorsPacket {
-        /// Factor for the wide lobes.
+        /// Factor applied to the wide lobes: 1 if they are shown, 0 otherwise.
         wide: f32 = 0.0,
-        /// Factor for the narrow lobes.
+        /// Factor applied to the narrow lobes: 1 if they are shown, 0 otherwise.
         narrow: f32 = 0.0,
         /// Value of f in sr⁻¹ that is shown instead of the lobes.
         unit: f32 = 0.0,
@@ -281,7 +281,7 @@ impl<B: Bxdf> BxdfPacket<B> {
         wi
     }
 
-    /// Flags of one surface.
+    /// Flags of the surface in lane `i`.
     #[inline(always)]
     fn lane_flags(&self, i: usize) -> BxdfFlags {
         B::get(&self.bsdf, i).flags().union(B::ALWAYS)

@@ -305,9 +305,9 @@ fn quadrature_dense_at_ends(count: usize) -> Vec<(f64, f64)> {
     gauss_legendre(count).map(|(t, weight)| (t * t * (3.0 - 2.0 * t), weight * 6.0 * t * (1.0 - t))).collect()
 }
 
-/// E(μ), which is the mean of F·G/G₁ over visible normals. There are `ACROSS` nodes perpendicular to the
-/// plane of incidence and `ALONG` nodes in it. For accuracy, nodes cover only the facets that reflect light
-/// above the surface.
+/// E(μ), the mean of F·G/G₁ over visible normals. Uses `ACROSS` nodes in the direction perpendicular to the
+/// plane of incidence and `ALONG` nodes parallel to it. For accuracy, the nodes cover only facets that
+/// reflect light above the surface.
 fn integrate_albedo<const ACROSS: usize, const ALONG: usize>(
     cosine: f64,
     alpha: f64,

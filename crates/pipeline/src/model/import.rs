@@ -36,7 +36,8 @@ pub enum ImportError {
 /// Imports a glTF file as a scene whose meshes and images are stored in `folder`.
 ///
 /// # Errors
-/// The file is invalid, the machine lacks resources, or the token is cancelled.
+/// Returns an error if the file is invalid, memory runs out, a thread cannot be started, or the token is
+/// cancelled.
 pub fn import_gltf(path: &Path, folder: &str, token: &CancelToken) -> Result<ImportedScene, ImportError> {
     if !is_gltf(path) {
         let message = format!("cannot import {}: only .gltf and .glb files are supported", path.display());

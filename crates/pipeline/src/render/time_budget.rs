@@ -20,7 +20,7 @@ const SHARE: f64 = 1.0 / 8.0;
 /// Work done in a round, relative to all earlier work. Noise is measured again before the next round.
 const ROUND: f64 = 0.4;
 
-/// Overhead per sample, in addition to its rays, measured in rays.
+/// Overhead per sample beyond tracing its rays, expressed as a number of rays.
 const BESIDE: f64 = 1.0;
 
 /// Returns the next sample counts for both halves of each cell, based on their current samples and rays. The

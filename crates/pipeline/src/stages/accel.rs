@@ -24,7 +24,8 @@ type KeyedMeshWithSeparateEmitters = (Fingerprint, Arc<LoadedMesh>);
 #[derive(Debug, Default)]
 pub(crate) struct AccelCache {
     trees: CacheOfNamedValues<Fingerprint, MeshTree>,
-    /// Meshes with separated emitters, or `None` if the mesh in the file can be used as it is.
+    /// Meshes whose coincident emitters have been separated, or `None` if the mesh in the file can be used as
+    /// it is.
     distinct: CacheOfNamedValues<Fingerprint, Option<Arc<LoadedMesh>>>,
     geometry: CacheOfNamedValues<Fingerprint, Geometry>,
     /// Offsets applied to lights that are coplanar with other surfaces.

@@ -159,7 +159,8 @@ pub(crate) fn parse(
     Ok(StageResult::done(parsed, ""))
 }
 
-/// A scene, its file's content, the other files it depends on, and the approximations made.
+/// A loaded scene, the content ID of its file, the other files it depends on, and warnings about
+/// approximations.
 type SceneAndDependencies =
     (Arc<scene::LoadedScene>, FileContentId, Vec<FilePathAndContentId>, Vec<Diagnostic>);
 

@@ -336,8 +336,8 @@ fn warn_about_unusable_pixels(
     warn(loaded, image.asked_by[0], &message, findings);
 }
 
-/// Warns about a gray normal map, which probably contains heights. A gray normal map from a mesh file has no
-/// effect.
+/// Warns that a gray normal map is probably a height map. If it comes from a mesh file, it does not change
+/// the normals.
 fn warn_about_gray_normal_map(
     loaded: &LoadedScene,
     image: &ImageWithTextures<'_>,

@@ -64,8 +64,8 @@ impl WrittenImages {
         self.files.is_empty()
     }
 
-    /// Whether a file on disk contains an image with keyboard changes that the user wrote. Such a file is
-    /// replaced only after the scene is saved, or when the user writes another image.
+    /// Whether a file on disk contains an image that the user wrote and that includes keyboard changes. Such
+    /// a file is replaced only after the scene is saved, or when the user writes another image.
     pub(crate) fn has_user_written_image_on_disk(&self, contents: &FileHashCache) -> bool {
         self.is_by_hand && self.files.iter().any(|(path, (_, known))| has_content_id(path, *known, contents))
     }

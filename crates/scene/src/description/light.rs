@@ -29,7 +29,7 @@ pub struct PointLight {
     pub falloff: Falloff,
 }
 
-/// A point light that shines into a cone.
+/// A point light that shines only within a cone.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SpotLight {
     /// The light's position and on-axis intensity.

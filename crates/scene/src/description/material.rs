@@ -459,7 +459,7 @@ impl MaterialKind {
         }
     }
 
-    /// Returns the number parameters that may be textures.
+    /// Returns the numeric parameters that may be textures.
     fn texturable_number_parameters(&self) -> Vec<NumberSource> {
         match self {
             Self::Metal { fresnel: _, roughness, anisotropy } => vec![*roughness, *anisotropy],

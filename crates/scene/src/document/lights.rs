@@ -14,7 +14,7 @@ choice! {
     enum LightKind {
         /// A point light.
         Point = "point",
-        /// A point light that shines into a cone.
+        /// A point light that shines only within a cone.
         Spot = "spot",
         /// A distant light.
         Directional = "directional",

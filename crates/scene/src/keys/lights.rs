@@ -35,7 +35,7 @@ pub(super) const LIGHT: TableInfo = TableInfo {
         },
         TableTypeInfo {
             name: "spot",
-            doc: "A point light that shines into a cone",
+            doc: "A point light that shines only within a cone",
             keys: &[
                 define_key("position", Numbers(3, "point", Any), "length", Is("[0, 3, 0]"), "Position"),
                 define_key(

@@ -41,10 +41,10 @@ pub(super) use tree::{Document, Elements, Entries, KeyValue, TomlValue, Value};
 /// Maximum nesting depth of arrays and tables, and maximum number of parts in a dotted key.
 const MAX_DEPTH: u32 = 80;
 
-/// The byte order mark that may precede a text.
+/// The byte order mark that may precede the text.
 const MARK: &str = "\u{feff}";
 
-/// Whether a text consists of exactly one dotted key and its value.
+/// Whether `text` is exactly one dotted key and its value.
 pub(super) fn is_dotted_key_value(text: &str) -> bool {
     let (document, errors) = parse(text);
     errors.is_empty()

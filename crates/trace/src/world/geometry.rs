@@ -298,7 +298,8 @@ impl Geometry {
         self.unbounded.iter().any(|&id| test(id)) || self.traced_tree().any_hit(ray, test)
     }
 
-    /// Scene-wide number of the hit triangle, for [`Ray::start`], or [`Ray::NO_TRIANGLE`] for other shapes.
+    /// Scene-wide index of the hit triangle, for use as [`Ray::start`]. Returns [`Ray::NO_TRIANGLE`] if there
+    /// is none, for example because the shape is not a triangle.
     #[inline(always)]
     pub fn scene_triangle_number(&self, hit: &Hit) -> u32 {
         match &self.objects[hit.object as usize] {

@@ -353,22 +353,22 @@ fn assert_followed(preview: PreviewKind, depth: ColorDepth) {
 }
 
 #[test]
-fn fast_terminal_follows_render_in_half_blocks() {
+fn fast_terminal_keeps_up_using_half_blocks() {
     assert_followed(PreviewKind::HalfBlock, ColorDepth::TrueColor);
 }
 
 #[test]
-fn fast_terminal_follows_render_in_sextants() {
+fn fast_terminal_keeps_up_using_sextants() {
     assert_followed(PreviewKind::Sextant, ColorDepth::TrueColor);
 }
 
 #[test]
-fn fast_terminal_follows_render_in_256_colors() {
+fn fast_terminal_keeps_up_using_256_colors() {
     assert_followed(PreviewKind::HalfBlock, ColorDepth::Indexed256);
 }
 
 #[test]
-fn fast_terminal_follows_render_in_pixels() {
+fn fast_terminal_keeps_up_using_pixels() {
     assert_followed(PreviewKind::Pixels(ImageProtocol::Kitty), ColorDepth::TrueColor);
 }
 

@@ -162,7 +162,7 @@ fn save_time_is_cleared_by_the_next_render() {
     assert!(ui.state.saving.first_change.is_none(), "not rendered after a save: {}", ui.screen_text());
 }
 
-/// Preview kinds: one that draws a preview, and one that does not.
+/// A preview kind that draws the image, and one that draws nothing.
 const KINDS: [PreviewKind; 2] = [PreviewKind::HalfBlock, PreviewKind::None];
 
 fn ui_with(kind: PreviewKind) -> TestUi {

@@ -1,5 +1,5 @@
 //! Camera keys and mouse gestures. Steps can arrive faster than previews, so each step waits until the
-//! previous one has a preview. Only the newest waiting step is rendered.
+//! previous one has a preview. Only the newest pending step is rendered.
 
 use std::path::PathBuf;
 
@@ -231,12 +231,12 @@ fn request_camera_step_render(state: &mut State) -> Vec<Effect> {
     effects
 }
 
-/// Renders the waiting step, if any, even if the previous one has no preview.
+/// Renders the pending step, if any, even if the previous one has no preview.
 pub(super) fn render_waiting_step_now(state: &mut State) -> Vec<Effect> {
     if state.request.camera_step.is_waiting { request_camera_step_render(state) } else { Vec::new() }
 }
 
-/// Renders the waiting step if the previous one has a preview.
+/// Renders the pending step if the previous one has a preview.
 pub(super) fn try_render_waiting_step(state: &mut State) -> Vec<Effect> {
     if state.request.camera_step.is_waiting && !state.awaits_camera_step_preview() {
         render_step_or_await_preview(state)

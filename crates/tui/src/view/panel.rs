@@ -1,5 +1,5 @@
-//! The panel next to or below the image. It shows stages and loading assets during a render, and the results
-//! afterwards.
+//! The panel next to or below the image. During a render, it shows the stages and the assets being loaded;
+//! afterwards, it shows the results.
 
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;

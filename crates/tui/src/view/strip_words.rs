@@ -1,4 +1,4 @@
-//! The text of a history entry. It shows as many changes as fit. New values are always complete.
+//! The text of a history entry. It shows as many changes as fit. New values are never shortened.
 
 use unicode_width::UnicodeWidthStr;
 

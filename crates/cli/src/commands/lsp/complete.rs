@@ -161,8 +161,8 @@ fn choice_items(list: &[ChoiceValue], is_quoted: bool) -> Vec<CompletionItem> {
     list.iter().map(word).collect()
 }
 
-/// Returns candidates for the names of the tables in `table`. For example, `[materials.wall]` defines the
-/// name `wall`.
+/// Returns completion items for the names that tables of type `table` define. For example, `[materials.wall]`
+/// defines the name `wall`.
 fn defined_name_items(document: &OpenDocument, table: &str, is_quoted: bool) -> Vec<CompletionItem> {
     let named =
         document.tables.iter().filter(|one| one.info.name == table).filter_map(|one| one.name.as_ref());

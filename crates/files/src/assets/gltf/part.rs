@@ -53,7 +53,8 @@ impl GltfFile {
     /// Builds a part as a mesh without materials.
     ///
     /// # Errors
-    /// [`AssetError::Malformed`] with the location in the JSON, or [`AssetError::Cancelled`].
+    /// Returns [`AssetError::Malformed`] with the location in the JSON if the part is invalid or unsupported,
+    /// or [`AssetError::Cancelled`] if the token is cancelled.
     pub fn build_part(
         &self,
         part: usize,

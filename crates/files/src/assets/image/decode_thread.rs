@@ -127,7 +127,7 @@ mod tests {
         };
         let monitor = Monitor { progress: &ignore_progress, token: &token };
         assert_eq!(run_on_thread(monitor, 1, stuck).err(), Some(Cancelled));
-        release.send(()).expect("the work is still waiting");
+        release.send(()).expect("the work is still running");
         let fresh = CancelToken::new();
         let next = move |_| ended.try_recv();
         let ended = run_on_thread(Monitor { progress: &ignore_progress, token: &fresh }, 1, next)

@@ -64,8 +64,8 @@ impl UnitTorusLine {
         (half > 0.0 && enter < leave).then_some((enter, leave))
     }
 
-    /// First point between `from` and `to` where the line crosses the surface. A start on the surface, within
-    /// rounding error, does not count.
+    /// First point between `from` and `to` where the line crosses the surface. If the line starts on the
+    /// surface, within rounding error, its start is ignored.
     pub(super) fn first_crossing(&self, from: f64, to: f64) -> Option<f64> {
         if !(from < to) {
             return None;

@@ -89,7 +89,8 @@ struct NoiseDecay {
 }
 
 impl NoiseDecay {
-    /// Fits the model to each tile's ratio of variances before and after the last doubling of samples.
+    /// Fits the model to `falls`: for each tile, the variance before the last doubling of samples divided by
+    /// the variance after it.
     fn fit(convergence: ConvergenceModel, mut falls: Vec<f64>, samples: u32) -> Self {
         let doublings = (LEAST.ilog2().saturating_sub(samples.ilog2())).max(1);
         if convergence == ConvergenceModel::Photons {

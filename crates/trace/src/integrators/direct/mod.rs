@@ -1,7 +1,8 @@
 //! Next-event estimation: light samples with their shadow rays, and the techniques that compete with light
 //! samples.
 //!
-//! - `queue`: packets of vertices that await direct lighting, and the light they reflect.
+//! - `queue`: packets of vertices that await direct lighting, and the light they reflect. `shadow_lift`:
+//!   their shadow-ray origins on smooth meshes.
 //! - `all_lights`: sampling of every light. `light_tree`: sampling of lights picked from a tree.
 //!   `shadow_rays`: shadow rays to the picked lights, grouped by light.
 //! - `lobe_rays`: rays in narrow lobes. `unshadowed`: lobe rays without soft shadows.
@@ -12,5 +13,6 @@ pub mod light_tree;
 pub mod lobe_rays;
 pub mod mis;
 pub mod queue;
+mod shadow_lift;
 pub mod shadow_rays;
 pub mod unshadowed;

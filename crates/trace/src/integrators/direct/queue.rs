@@ -6,10 +6,10 @@ use super::all_lights::{LightSums, ReflectedDirectLightPacket, SampleAllLights};
 use super::light_tree::SampleLightTree;
 use super::lobe_rays::LobeRayTracingKernel;
 use super::mis::CompetingTechnique;
+use super::shadow_lift::ShadowOriginLiftKernel;
 use super::shadow_rays::ShadowRayQueue;
 use crate::control::Cancelled;
-use crate::geometry::Ray;
-use crate::geometry::packet::{RayPacket, nonnegative_end_mask, set_bit_lanes};
+use crate::geometry::packet::set_bit_lanes;
 use crate::integrators::transport::accumulator::Accumulator;
 use crate::integrators::transport::batch::{ALL, VertexBatch};
 use crate::integrators::transport::cone::RayCone;
@@ -18,12 +18,10 @@ use crate::integrators::transport::ray::PathRay;
 use crate::integrators::transport::tile::TileContext;
 use crate::integrators::transport::vertex::ShadingVertex;
 use crate::integrators::view::{LightAov, PathClasses};
-use crate::lights::{LightGeometry, LightGeometryPacket};
 use crate::materials::BxdfKind;
 use crate::math::Vec3;
-use crate::math::lanes::{PACKET_SIZE, Simd, lane};
+use crate::math::lanes::{PACKET_SIZE, lane};
 use crate::scene::description::ShadowMode;
-use crate::world::{Geometry, SimdKernel};
 
 /// Vertices that await direct lighting. The result for a vertex does not depend on which vertices share its
 /// packet.
@@ -464,50 +462,5 @@ struct DirectLightPacketRequest {
 impl DirectLightPacketRequest {
     fn new(number: usize, row: &VertexBatch, aov: LightAov, shares_with_paths: bool) -> Self {
         Self { number, used: row.used & contributing_vertex_mask(row, aov), shares_with_paths }
-    }
-}
-
-/// Moves a packet's shadow-ray origins above their facets wherever the segment from the facet is unoccluded.
-struct ShadowOriginLiftKernel<'a> {
-    geometry: &'a Geometry,
-    row: &'a mut VertexBatch,
-}
-
-impl SimdKernel for ShadowOriginLiftKernel<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run(self, simd: impl Simd) {
-        let Self { geometry, row } = self;
-        // Create rays from the facets to the lifted points.
-        let mut direction = row.lifted;
-        for axis in 0..3 {
-            for i in 0..PACKET_SIZE {
-                direction[axis][i] = row.lifted[axis][i] - row.from[axis][i];
-            }
-        }
-        let mut ends = [-1.0; PACKET_SIZE];
-        for i in 0..PACKET_SIZE {
-            ends[i] = if row.may_lift & 1 << i != 0 { row.lift_end[i] } else { -1.0 };
-        }
-        let rays = RayPacket::from_soa(row.from, direction).with_start_triangle(row.start);
-        // Find the occluded rays.
-        let blocked = {
-            let (traced, nothing) =
-                (nonnegative_end_mask(&ends, simd), LightGeometryPacket::splat(LightGeometry::Nothing));
-            geometry.occluded_ray_packet(&rays, &ends, traced, &nothing, simd)
-        };
-        // Move the origins of the unoccluded rays.
-        let lifted = row.may_lift & !blocked;
-        row.has_horizon &= !lifted;
-        for i in 0..PACKET_SIZE {
-            row.start[i] = if lifted & 1 << i != 0 { Ray::NO_TRIANGLE } else { row.start[i] };
-        }
-        for axis in 0..3 {
-            for i in 0..PACKET_SIZE {
-                let (from, to) = (row.from[axis][i], row.lifted[axis][i]);
-                row.from[axis][i] = if lifted & 1 << i != 0 { to } else { from };
-            }
-        }
     }
 }

@@ -3,7 +3,8 @@
 //!
 //! - `tile`: the context shared by all rays of a tile. `ray`, `cone`, `interiors`: a path's ray, its ray
 //!   cone, and the glass around it.
-//! - `camera`: camera rays. `trace`, `packet`: intersection, and packets of plain surfaces.
+//! - `camera`: camera rays. `trace`, `packet`: intersection, and packets of plain surfaces. `plain_vertices`:
+//!   their vertices.
 //! - `walk`, `crossing`: null interactions and glass boundaries up to the next scattering surface. `vertex`:
 //!   that surface, prepared for shading.
 //! - `interface`: specular reflection and refraction. `batch`: packets of non-specular vertices. `scatter`:
@@ -18,6 +19,7 @@ pub mod crossing;
 pub mod interface;
 pub mod interiors;
 pub mod packet;
+mod plain_vertices;
 pub mod ray;
 pub mod scatter;
 pub mod scratch;

@@ -64,7 +64,7 @@ fn material_warnings(found: &MtlMaterial) -> Vec<MtlWarning> {
 pub(super) const UNSHADED: &str = "`illum 0` (unshaded color) is rendered as a matte surface";
 pub(super) const SHADOW_CATCHER: &str = "`illum 10` (shadow catcher) is rendered as an ordinary surface";
 pub(super) const UNKNOWN_MODEL: &str = "unknown illumination model; `illum 2` is used";
-pub(super) const INVISIBLE_GLASS: &str = "glass without an index of refraction `Ni` above 1 is invisible";
+pub(super) const INVISIBLE_GLASS: &str = "glass is invisible unless `Ni` (index of refraction) is above 1";
 pub(super) const IOR_CLAMPED: &str = "`Ni` is clamped to 10";
 const OPAQUE_TR: &str = "`Tr 1` without `d` is rendered as opaque; use `d 0` for an invisible surface";
 const TR_IGNORED: &str = "`Tr` is ignored because `d` takes precedence";

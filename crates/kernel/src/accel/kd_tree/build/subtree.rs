@@ -40,7 +40,7 @@ impl KdSubtree {
 /// Builds a subtree, reusing the same buffers for all cells.
 struct KdSubtreeBuilder<'a, C> {
     built: KdSubtree,
-    /// References of all pending cells. The last ones belong to the next cell.
+    /// References for all pending cells. Those for the next cell are at the end.
     references: Vec<TriangleReference>,
     scratch: PartitionBuffers,
     corners: &'a C,

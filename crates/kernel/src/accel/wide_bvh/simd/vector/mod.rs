@@ -40,7 +40,7 @@ pub trait SimdVector: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Outpu
     /// Broadcasts a number to all lanes.
     #[inline(always)]
     fn splat_like(self, x: f32) -> Self {
-        // SAFETY: a value of this type exists.
+        // SAFETY: a value of this type exists, so the processor has the instructions.
         unsafe { Self::splat(x) }
     }
 
@@ -48,7 +48,7 @@ pub trait SimdVector: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Outpu
     #[inline(always)]
     fn load_slice(self, from: &[f32]) -> Self {
         assert!(from.len() >= Self::COUNT);
-        // SAFETY: a value of this type exists, and the length was checked.
+        // SAFETY: a value of this type exists, so the processor has the instructions. The length was checked.
         unsafe { Self::load(from.as_ptr()) }
     }
 
@@ -91,7 +91,7 @@ macro_rules! operators {
             type Output = Self;
             #[inline(always)]
             fn add(self, other: Self) -> Self {
-                // SAFETY: a value of this type exists.
+                // SAFETY: a value of this type exists, so the processor has the instructions.
                 Self(unsafe { $add(self.0, other.0) })
             }
         }
@@ -99,7 +99,7 @@ macro_rules! operators {
             type Output = Self;
             #[inline(always)]
             fn sub(self, other: Self) -> Self {
-                // SAFETY: a value of this type exists.
+                // SAFETY: a value of this type exists, so the processor has the instructions.
                 Self(unsafe { $sub(self.0, other.0) })
             }
         }
@@ -107,7 +107,7 @@ macro_rules! operators {
             type Output = Self;
             #[inline(always)]
             fn mul(self, other: Self) -> Self {
-                // SAFETY: a value of this type exists.
+                // SAFETY: a value of this type exists, so the processor has the instructions.
                 Self(unsafe { $mul(self.0, other.0) })
             }
         }
@@ -121,7 +121,7 @@ macro_rules! wide_mask {
             type Output = Self;
             #[inline(always)]
             fn bitand(self, other: Self) -> Self {
-                // SAFETY: a value of this type exists.
+                // SAFETY: a value of this type exists, so the processor has the instructions.
                 Self(unsafe { $and(self.0, other.0) })
             }
         }
@@ -129,7 +129,7 @@ macro_rules! wide_mask {
             type Output = Self;
             #[inline(always)]
             fn bitor(self, other: Self) -> Self {
-                // SAFETY: a value of this type exists.
+                // SAFETY: a value of this type exists, so the processor has the instructions.
                 Self(unsafe { $or(self.0, other.0) })
             }
         }

@@ -1,0 +1,55 @@
+//! Lifts the shadow-ray origins of vertices on smooth meshes above their facets.
+
+use crate::geometry::Ray;
+use crate::geometry::packet::{RayPacket, nonnegative_end_mask};
+use crate::integrators::transport::batch::VertexBatch;
+use crate::lights::{LightGeometry, LightGeometryPacket};
+use crate::math::lanes::{PACKET_SIZE, Simd};
+use crate::world::{Geometry, SimdKernel};
+
+/// Moves a packet's shadow-ray origins above their facets wherever the segment from the facet is unoccluded.
+pub struct ShadowOriginLiftKernel<'a> {
+    /// The scene's geometry.
+    pub geometry: &'a Geometry,
+    /// The vertices.
+    pub row: &'a mut VertexBatch,
+}
+
+impl SimdKernel for ShadowOriginLiftKernel<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self, simd: impl Simd) {
+        let Self { geometry, row } = self;
+        // Create rays from the facets to the lifted points.
+        let mut direction = row.lifted;
+        for axis in 0..3 {
+            for i in 0..PACKET_SIZE {
+                direction[axis][i] = row.lifted[axis][i] - row.from[axis][i];
+            }
+        }
+        let mut ends = [-1.0; PACKET_SIZE];
+        for i in 0..PACKET_SIZE {
+            ends[i] = if row.may_lift & 1 << i != 0 { row.lift_end[i] } else { -1.0 };
+        }
+        let rays = RayPacket::from_soa(row.from, direction).with_start_triangle(row.start);
+        // Find the occluded rays.
+        let blocked = {
+            let (traced, nothing) =
+                (nonnegative_end_mask(&ends, simd), LightGeometryPacket::splat(LightGeometry::Nothing));
+            geometry.occluded_ray_packet(&rays, &ends, traced, &nothing, simd)
+        };
+        // Move the origins of the unoccluded rays.
+        let lifted = row.may_lift & !blocked;
+        row.has_horizon &= !lifted;
+        for i in 0..PACKET_SIZE {
+            row.start[i] = if lifted & 1 << i != 0 { Ray::NO_TRIANGLE } else { row.start[i] };
+        }
+        for axis in 0..3 {
+            for i in 0..PACKET_SIZE {
+                let (from, to) = (row.from[axis][i], row.lifted[axis][i]);
+                row.from[axis][i] = if lifted & 1 << i != 0 { to } else { from };
+            }
+        }
+    }
+}
