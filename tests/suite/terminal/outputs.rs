@@ -127,7 +127,7 @@ fn link_changed_while_rendering_is_detected() {
 #[test]
 fn finishing_render_keeps_image_written_with_w() {
     let folder = Folder::new();
-    let text = SCENE.replace("samples = 4", "samples = 3000");
+    let text = SCENE.replace("samples = 4", "samples = 12000");
     folder.write("scene.toml", &text);
     for (keys, changes) in [("]]", "exposure +0.5"), ("s", "shadows hard")] {
         let mut terminal = folder.terminal_with(&[folder.program(), "scene.toml", "-o", "a.png"], &[]);

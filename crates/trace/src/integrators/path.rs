@@ -26,7 +26,7 @@ use super::transport::accumulator::Accumulator;
 use super::transport::batch::VertexBatch;
 use super::transport::camera::CAMERA_ROWS;
 use super::transport::crossing::CoincidentSurfaceBuffers;
-use super::transport::packet::PacketSource;
+use super::transport::packet_source::PacketSource;
 use super::transport::ray::PathRay;
 use super::transport::scatter::{BounceContinuation, BsdfSampler};
 use super::transport::scratch::TraceBuffers;

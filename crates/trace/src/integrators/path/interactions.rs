@@ -8,7 +8,8 @@ use crate::integrators::aov::{record_first_hit_of_ray, record_first_hits_on_plai
 use crate::integrators::transport::crossing::CoincidentSurfaceBuffers;
 use crate::integrators::transport::interface::{FresnelSplit, fresnel_split, reflected_path};
 use crate::integrators::transport::interiors::InteriorList;
-use crate::integrators::transport::packet::{PacketHits, PacketSource};
+use crate::integrators::transport::packet::PacketHits;
+use crate::integrators::transport::packet_source::PacketSource;
 use crate::integrators::transport::ray::PathRay;
 use crate::integrators::transport::tile::TileContext;
 use crate::integrators::transport::vertex::SurfaceVertex;

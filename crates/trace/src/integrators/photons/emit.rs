@@ -19,7 +19,7 @@ use crate::integrators::transport::interface::{
     FresnelSplit, diffuser_basic_radiance_transmittance, fresnel_split, reflected_path,
 };
 use crate::integrators::transport::interiors::{Interior, InteriorList, InteriorListPool, medium_ior};
-use crate::integrators::transport::packet::PacketSource;
+use crate::integrators::transport::packet_source::PacketSource;
 use crate::integrators::transport::ray::{PathHistory, PathRay};
 use crate::integrators::transport::scatter::{BounceContinuation, BsdfSampler};
 use crate::integrators::transport::tile::TileContext;

@@ -4,7 +4,7 @@
 use arrayvec::ArrayVec;
 
 use super::batch::VertexBatch;
-use super::camera::CameraRayPacket;
+use super::packet_source::PacketSource;
 use super::plain_vertices::ShadowLiftSelection;
 use super::ray::PathRay;
 use super::tile::TileContext;
@@ -18,52 +18,6 @@ use crate::math::lanes::{F32x16, Simd, TRUE, Vec3x16, lane, set_lane};
 use crate::math::{DVec2, Vec3};
 use crate::scene::description::ShadowMode;
 use crate::world::{Hit, Object, PACKET_SIZE, PacketMaterial, SimdKernel};
-
-/// Source of a packet's rays.
-#[derive(Clone, Copy)]
-pub enum PacketSource<'a> {
-    /// Camera rays: the packet, its first slot, the number of rays, and the queue index of the first ray.
-    Camera(&'a CameraRayPacket, u32, usize, u32),
-    /// Consecutive rays in a queue, and the queue index of the first ray.
-    Paths(&'a [PathRay], u32),
-    /// Rays whose hits have already been found, at these queue indices.
-    Traced(&'a [PathRay], &'a [Option<Hit>], &'a [u32]),
-}
-
-impl PacketSource<'_> {
-    /// Number of rays.
-    pub fn count(&self) -> usize {
-        match self {
-            Self::Camera(_, _, count, _) => *count,
-            Self::Paths(paths, _) => paths.len(),
-            Self::Traced(_, _, places) => places.len(),
-        }
-    }
-
-    /// Mask of the lanes with a ray.
-    pub fn mask(&self) -> u32 {
-        ((1_u64 << self.count()) - 1) as u32
-    }
-
-    /// Queue index of a lane's path, or an arbitrary number if the lane has no path.
-    #[inline(always)]
-    pub fn queue_index(&self, lane: usize) -> u32 {
-        match self {
-            Self::Camera(_, _, _, first) | Self::Paths(_, first) => first + lane as u32,
-            Self::Traced(_, _, places) => places.get(lane).copied().unwrap_or(0),
-        }
-    }
-
-    /// A lane's queued path, or `None` for camera rays and for lanes without a path.
-    #[inline(always)]
-    pub fn queued_path(&self, lane: usize) -> Option<&PathRay> {
-        match self {
-            Self::Camera(..) => None,
-            Self::Paths(paths, _) => paths.get(lane),
-            Self::Traced(paths, _, places) => paths.get(*places.get(lane)? as usize),
-        }
-    }
-}
 
 /// Hits of a packet. A surface is plain if its ray is in air, its shape and the textures of its non-specular
 /// material can be evaluated in packets, and all plain surfaces of the packet have the same kind of BSDF.

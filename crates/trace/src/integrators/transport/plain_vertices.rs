@@ -1,7 +1,7 @@
 //! Stores the vertices of plain surfaces in a packet: positions, normals, shadow-ray origins and path state.
 
 use super::batch::{UNPERTURBED, VertexBatch};
-use super::packet::PacketSource;
+use super::packet_source::PacketSource;
 use super::vertex::lift_significance_and_t_max;
 use crate::geometry::Ray;
 use crate::geometry::packet::RayPacket;
