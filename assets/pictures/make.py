@@ -16,7 +16,7 @@ ROOT = HERE.parent.parent
 
 # Each picture has the name of its scene.
 PICTURES = {
-    "path.jpg": "--width 960 --height 960 --samples 2048",
+    "path.jpg": "--width 960 --height 960 --samples 2048 --time 560",
     "photons.jpg": "--width 960 --height 960 --samples 384",
     "water.jpg": "--width 960 --height 720 --samples 256",
     "lamps.jpg": "--width 960 --height 600 --samples 256",
