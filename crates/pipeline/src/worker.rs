@@ -138,7 +138,7 @@ struct Mailbox {
     newest: u64,
 }
 
-/// Returns only those of a request's overrides that the user can change with keys.
+/// Returns the request's overrides that the user can change with keys, without the others.
 fn keyboard_adjustable_overrides(request: &Request) -> Overrides {
     let Overrides { shadows, integrator, dof, photons, view, camera, exposure, .. } = request.overrides;
     Overrides { shadows, integrator, dof, photons, view, camera, exposure, ..Overrides::default() }

@@ -1,6 +1,6 @@
 //! Temporary files next to a target. Their names identify the writer's machine and process. They are locked
-//! while the writer is running, and removed by other processes after it has died. Locks alone are not
-//! sufficient, because many network file systems do not share them between machines.
+//! while the writer is running, and removed by other processes after it has died. Locks are not
+//! sufficient on their own, because many network file systems do not share them between machines.
 
 use std::ffi::{OsStr, OsString};
 use std::fs::{self, File, OpenOptions, TryLockError};

@@ -126,7 +126,7 @@ impl WideNode {
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(16))]
 pub struct TrianglePack {
-    /// x, y, and z of the first corners, followed by those of the second and third corners.
+    /// x, y and z of the first corners, then of the second and third corners.
     pub rows: [[f32; PACK]; 9],
     /// Triangle indices, or `u32::MAX` in unused lanes.
     pub ids: [u32; PACK],

@@ -310,8 +310,8 @@ impl VertexBatch {
         radiance
     }
 
-    /// Returns the first vertex's queue index if every lane has a vertex and the indices are consecutive, or
-    /// `None` otherwise.
+    /// Returns the first vertex's queue index, or `None` unless every lane has a vertex and the indices are
+    /// consecutive.
     #[inline(always)]
     pub fn first_consecutive_queue_index(&self) -> Option<u32> {
         let mut is_run = self.used == ALL;
