@@ -11,13 +11,14 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 INTEGRATORS = ROOT / "crates" / "trace" / "src" / "integrators"
+TEST_MODULE = re.compile(r'^#\[cfg\(test\)\]\n(?:#\[path = "[^"]*"\]\n)?(?:pub )?mod ', re.MULTILINE)
 TEST_FILE = re.compile(r"(^|/)(\w*tests|test_\w+)(/|\.rs$)")
 
 
 def code_lines(text):
     """Number of code lines before the first test module."""
     code = 0
-    for line in text.split("#[cfg(test)]\nmod ")[0].splitlines():
+    for line in TEST_MODULE.split(text)[0].splitlines():
         stripped = line.strip()
         code += bool(stripped) and not stripped.startswith("//")
     return code

@@ -31,8 +31,8 @@
 //! ## Crates
 //!
 //! The modules are divided into member crates under `crates/`. Crates compile in parallel, and an edit
-//! recompiles only its own crate and dependent crates. This crate re-exports all of them. Each crate re-exports
-//! the modules it depends on at its root, so `crate::math` has the same meaning everywhere.
+//! recompiles only its own crate and dependent crates. This crate re-exports all of them. Each crate
+//! re-exports the modules it depends on at its root, so `crate::math` has the same meaning everywhere.
 //!
 //! | crate | modules |
 //! | --- | --- |
@@ -53,8 +53,8 @@
 //! From a file notification to the preview and the written image. Paths start with the module: `tui/run.rs`
 //! is `crates/tui/src/run.rs`. The table above lists each module's crate.
 //!
-//! 1. `pipeline/watch/mod.rs`: the operating system reports a change. The watcher compares contents and forwards
-//!    only actual changes, through `cli/live.rs`.
+//! 1. `pipeline/watch/mod.rs`: the operating system reports a change. The watcher compares contents and
+//!    forwards only actual changes, through `cli/live.rs`.
 //! 2. `tui/run.rs` receives the change as an event (`tui/event.rs`), and `tui/update/mod.rs` updates the
 //!    state.
 //! 3. `tui/update/request.rs` creates a request, and `tui/run.rs` sends it. The header (`tui/view/header.rs`)
@@ -104,8 +104,9 @@
 //!
 //! ## Dependencies
 //!
-//! Each module uses only the modules to the right of its arrow. `tests/suite/architecture` compares the sources
-//! with this table. The files within a module have no import cycles, except for the pairs listed in that test.
+//! Each module uses only the modules to the right of its arrow. `tests/suite/architecture` compares the
+//! sources with this table. The files within a module have no import cycles, except for the pairs listed in
+//! that test.
 //!
 //! ```text
 //! system      ->
@@ -134,11 +135,11 @@
 //! - The same scene, settings and seed produce the same bits with any number of threads on every machine.
 //!   Random numbers are a function of pixel, sample and dimension. Every sum has a fixed order. Images do not
 //!   depend on the system's math library.
-//! - Rays are traced in batches. Each hit has an error bound, which offsets the origin of the next ray. There are
-//!   no constant epsilons. Thresholds for degenerate input are relative to the size of the input.
+//! - Rays are traced in batches. Each hit has an error bound, which offsets the origin of the next ray. There
+//!   are no constant epsilons. Thresholds for degenerate input are relative to the size of the input.
 //! - Scene coordinates are `f64`. Tracing uses `f32` relative to an origin near the camera's target
 //!   (`world::origin`). Each mesh has its own origin.
-//! - Rendering cannot fail, but it can be cancelled. Errors are values that contain the file and the
+//! - Rendering cannot fail, but it can be canceled. Errors are values that contain the file and the
 //!   position.
 //! - Only `assets`, `output`, `scene` (the scene file, and whether the files it references exist),
 //!   `pipeline::watch`, `pipeline::identity`, `pipeline::render::checkpointer` (checkpoints),

@@ -273,7 +273,8 @@ impl EmbreeScene<'_> {
                 packet.rows[8][lane] = ray.t_max;
                 packet.rows[9][lane] = f32::from_bits(u32::MAX);
             }
-            // SAFETY: the scene is committed, and packet and mask have the layout and alignment that the API requires.
+            // SAFETY: the scene is committed, and packet and mask have the layout and alignment that the API
+            // requires.
             unsafe {
                 (self.embree.queries.intersect16)(valid.0.as_ptr(), self.scene, &mut packet, &arguments);
             };

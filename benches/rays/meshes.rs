@@ -16,8 +16,8 @@ use glimt::sampling::{CAMERA_PATH, Dimension, PixelSampler, warp};
 /// Image width and height, for a million rays.
 const SIDE: u32 = 1000;
 
-/// A closed bumpy ball of `rings` × `rings` quads, each split into two triangles. At the poles, one of the two
-/// is degenerate.
+/// A closed bumpy ball of `rings` × `rings` quads, each split into two triangles. At the poles, one of the
+/// two is degenerate.
 pub fn rippled_ball(rings: u32) -> TriangleMesh {
     let columns = rings;
     let point = |ring: u32, column: u32| {

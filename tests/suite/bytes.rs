@@ -36,8 +36,8 @@ impl PreviewRenderer {
         Self { handle, preview, generation: 0, folder: tempfile::tempdir().expect("a temporary folder") }
     }
 
-    /// Returns the last preview of a scene. If `samples` is `None`, this is the coarse preview with one sample
-    /// per preview pixel.
+    /// Returns the last preview of a scene. If `samples` is `None`, this is the coarse preview with one
+    /// sample per preview pixel.
     fn preview(&mut self, scene: &str, samples: Option<u32>) -> Srgb8Image {
         let path: PathBuf = self.folder.path().join("scene.toml");
         std::fs::write(&path, scene).expect("written");

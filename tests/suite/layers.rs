@@ -180,8 +180,8 @@ fn every_layer_equals_its_view() {
     }
 }
 
-/// Whether every sample of a pixel hits a surface. With misses, 2v − 1 for the view v is less than the layer in
-/// each component, by the fraction of misses.
+/// Whether every sample of a pixel hits a surface. With misses, 2v − 1 for the view v is less than the layer
+/// in each component, by the fraction of misses.
 fn is_covered(view: &[f32], all: &BTreeMap<String, Vec<f32>>, at: usize) -> bool {
     let misses = ["X", "Y", "Z"]
         .iter()

@@ -88,8 +88,8 @@ fn around_the_camera(ior: &str) -> String {
     )
 }
 
-/// At distance d, the image covers a height of 2 d tan(fov / 2). Compares a wall at this field of view with the
-/// same wall at 40°.
+/// At distance d, the image covers a height of 2 d tan(fov / 2). Compares a wall at this field of view with
+/// the same wall at 40°.
 fn angle_of_view(fov: f64) -> StressRow {
     let distance = |fov: f64| 1.0 / (0.5 * fov.to_radians()).tan();
     let picture = |fov: f64| {

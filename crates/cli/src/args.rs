@@ -350,8 +350,8 @@ pub struct CompareArgs {
     pub max_relmse: Option<f64>,
     /// Write the error as an image
     ///
-    /// png, jpg, ppm and webp show FLIP in false color, from black for 0 through purple, red and orange to pale yellow
-    /// for 1. exr and hdr contain |a - b|, linear.
+    /// png, jpg, ppm and webp show FLIP in false color, from black for 0 through purple, red and orange to
+    /// pale yellow for 1. exr and hdr contain |a - b|, linear.
     #[arg(long, value_name = "FILE")]
     pub diff: Option<PathBuf>,
     /// Print one JSON object on stdout
@@ -380,7 +380,8 @@ pub struct RenderArgs {
     /// Override a scene key
     ///
     /// For example render.samples=3, materials.wall.diffuse=red, sphere.2.radius=.3 (the second sphere) or
-    /// sphere.ball.radius=.3 (the sphere named ball). Can be given several times. Dedicated options have precedence.
+    /// sphere.ball.radius=.3 (the sphere named ball). Can be given several times. Dedicated options have
+    /// precedence.
     #[arg(long = "set", add = candidates::key_assignment_completer(), value_name = "TABLE.KEY=VALUE")]
     pub sets: Vec<String>,
 

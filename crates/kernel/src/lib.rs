@@ -8,7 +8,8 @@
 //! | [`materials`] | one file per BSDF; textures and their footprints, normal maps, height maps | no other module; all directions are in a local frame |
 //! | [`lights`] | one file per light, in `area`, `delta` and `infinite`; light sampling; photon emission | `geometry` and textures; no BSDFs or trees over shapes |
 //!
-//! Start reading at [`geometry::Shape`], [`materials::Material`], and the documentation of [`lights`] and [`accel`].
+//! Start reading at [`geometry::Shape`], [`materials::Material`], and the documentation of [`lights`] and
+//! [`accel`].
 //!
 //! Performance-critical code exists in two versions: one for single rays and one for packets of 16 rays.
 

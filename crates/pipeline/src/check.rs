@@ -75,7 +75,7 @@ impl IncrementalSceneChecker {
     ///
     /// # Errors
     /// Returns all errors and warnings for the scene and its files, or [`Failure::Work`] if the token is
-    /// cancelled.
+    /// canceled.
     pub fn check(
         &mut self,
         path: &Path,

@@ -288,7 +288,7 @@ pub enum Event {
         /// How the render ended.
         end: LastValidSceneRenderOutcome,
     },
-    /// The request was cancelled by a newer request or by [`Command::Cancel`].
+    /// The request was canceled by a newer request or by [`Command::Cancel`].
     Cancelled {
         /// Request number.
         generation: u64,

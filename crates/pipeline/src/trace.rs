@@ -91,7 +91,7 @@ impl Tracer<'_> {
     /// It returns whether to continue. Jobs that have already started are always finished.
     ///
     /// # Errors
-    /// Returns [`Cancelled`] if the token is cancelled.
+    /// Returns [`Cancelled`] if the token is canceled.
     pub(super) fn run_all_jobs_in_parallel<K: Send>(
         &self,
         jobs: &[TileJob],
@@ -172,8 +172,8 @@ fn max_pass_samples(pixels: usize) -> u32 {
     (LONGEST * (TILE / pixels.clamp(1, TILE))) as u32
 }
 
-/// Estimates the number of jobs needed to take a pixel from `done` to `total` samples using [`samples_after_next_pass`].
-/// Each job has at most `at_once` samples.
+/// Estimates the number of jobs needed to take a pixel from `done` to `total` samples using
+/// [`samples_after_next_pass`]. Each job has at most `at_once` samples.
 pub(super) fn estimate_jobs_per_pixel(done: u32, total: u32, pixels: usize, at_once: u32) -> u32 {
     let longest = max_pass_samples(pixels);
     let (mut reached, mut jobs) = (done, 0);

@@ -125,7 +125,8 @@ pub fn leftover_frames(last: &Path, turn: TurntableFrame) -> Vec<PathBuf> {
     (turn.number + 2..=MAX_FRAMES).map(file).take_while(|path| path.symlink_metadata().is_ok()).collect()
 }
 
-/// Splits a file name into the bytes before its last run of `#`, the length of the run, and the bytes after it.
+/// Splits a file name into the bytes before its last run of `#`, the length of the run, and the bytes after
+/// it.
 fn split_placeholder(path: &Path) -> Option<(&[u8], usize, &[u8])> {
     let name = path.file_name()?.as_bytes();
     let end = name.iter().rposition(|byte| *byte == DIGIT)? + 1;

@@ -20,8 +20,8 @@ use super::watch::content::FileHashCache;
 use crate::control::CancelToken;
 use crate::system::threads::spawn;
 
-/// Starts a worker thread. On Linux, its render threads have the current thread's niceness plus `nice`, so that
-/// the front end and other programs have priority.
+/// Starts a worker thread. On Linux, its render threads have the current thread's niceness plus `nice`, so
+/// that the front end and other programs have priority.
 ///
 /// # Errors
 /// The system cannot start a thread.

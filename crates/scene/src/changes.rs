@@ -47,7 +47,8 @@ fn summarize_line_changes(before: &str, after: &str) -> Option<String> {
     }
 }
 
-/// Describes a change to one line. Shows the key only once if the old and the new line assign to the same key.
+/// Describes a change to one line. Shows the key only once if the old and the new line assign to the same
+/// key.
 fn describe_line_change(old: &str, new: &str) -> String {
     let parts = |line: &'_ str| {
         line.split_once('=').map(|(key, value)| (key.trim().to_owned(), value.trim().to_owned()))

@@ -18,8 +18,8 @@ pub type MeshBoundingBox = Option<[DVec3; 2]>;
 /// ceiling just above it.
 const MIN_FRONT_RATIO: f64 = 0.02;
 
-/// Returns the spans of one-sided quad lights that have shapes behind them and nothing in front of them. Calls
-/// `bounds` only if the scene has one-sided quad lights.
+/// Returns the spans of one-sided quad lights that have shapes behind them and nothing in front of them.
+/// Calls `bounds` only if the scene has one-sided quad lights.
 pub(super) fn lights_facing_away(
     scene: &Scene,
     bounds: impl FnOnce() -> Vec<MeshBoundingBox>,

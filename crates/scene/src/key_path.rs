@@ -28,8 +28,8 @@ pub fn split_at_unquoted_space(text: &str) -> Option<(&str, &str)> {
     find_unquoted(text, ' ').map(|end| (&text[..end], &text[end + 1..]))
 }
 
-/// Shortens a dotted key to at most `columns` columns. Drops leading tables first, and truncates the last part
-/// only if it does not fit.
+/// Shortens a dotted key to at most `columns` columns. Drops leading tables first, and truncates the last
+/// part only if it does not fit.
 pub fn shortened_key(key: &str, columns: usize) -> String {
     let key = escape_invisible_chars(key);
     if key.width() <= columns {

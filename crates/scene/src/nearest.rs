@@ -2,8 +2,8 @@
 
 use strsim::osa_distance;
 
-/// Returns the candidate with the smallest edit distance (optimal string alignment) to `written`, or `None` if
-/// more than one third of the characters differ. Ignores case and treats `-` as `_`.
+/// Returns the candidate with the smallest edit distance (optimal string alignment) to `written`, or `None`
+/// if more than one third of the characters differ. Ignores case and treats `-` as `_`.
 pub fn nearest_name<'a>(written: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     const LONGEST: usize = 64;
     if written.len() > LONGEST {

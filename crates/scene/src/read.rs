@@ -213,8 +213,8 @@ pub(super) fn similar_file(path: &Path, may_be_meant: impl Fn(&Path) -> bool) ->
     Some(parent.join(near))
 }
 
-/// Finds the new path of a missing scene file that was probably renamed: a file with the same text in the same
-/// folder.
+/// Finds the new path of a missing scene file that was probably renamed: a file with the same text in the
+/// same folder.
 pub fn find_renamed_scene(path: &Path, text: &str) -> Option<PathBuf> {
     let parent = path.parent()?;
     let listed = if parent.as_os_str().is_empty() { Path::new(".") } else { parent };

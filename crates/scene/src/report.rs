@@ -1,8 +1,8 @@
 //! Formats diagnostics as text: `file:line:column`, the source line with the span underlined, and the help
 //! text.
 //!
-//! Text from files is sanitized with [`escape_invisible_chars`]. The only control characters in the output are
-//! line breaks and, with [`ReportStyle::Ansi`], color escape sequences.
+//! Text from files is sanitized with [`escape_invisible_chars`]. The only control characters in the output
+//! are line breaks and, with [`ReportStyle::Ansi`], color escape sequences.
 
 mod lines;
 

@@ -25,8 +25,8 @@ pub fn escape_invisible_chars(text: &str) -> Cow<'_, str> {
     Cow::Owned(shown)
 }
 
-/// Makes text safe to display with [`escape_invisible_chars`] and truncates it to `limit` characters. Truncated
-/// text ends with `…`.
+/// Makes text safe to display with [`escape_invisible_chars`] and truncates it to `limit` characters.
+/// Truncated text ends with `…`.
 pub fn escape_and_truncate(text: &str, limit: usize) -> String {
     let shown = escape_invisible_chars(text);
     if shown.chars().count() <= limit {

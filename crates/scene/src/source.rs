@@ -113,8 +113,8 @@ impl SceneText {
     }
 }
 
-/// Converts `TABLE.KEY=VALUE` to TOML, quoting the value if necessary. Returns `None` if the `=`, the table or
-/// the key is missing.
+/// Converts `TABLE.KEY=VALUE` to TOML, quoting the value if necessary. Returns `None` if the `=`, the table
+/// or the key is missing.
 fn set_arg_to_toml(set: &str) -> Option<String> {
     // Quoted keys may contain `=`, so try each `=`.
     const MAX_EQUALS_SIGNS: usize = 8;

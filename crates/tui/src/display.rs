@@ -50,7 +50,7 @@ impl TerminalEnvironment {
     }
 }
 
-/// A nonblocking writer for terminal output.
+/// Passes output to the terminal without blocking.
 pub(super) type TerminalOutputCallback = Box<dyn FnMut(Vec<u8>)>;
 
 /// The event loop's interface to the terminal's screen.

@@ -16,8 +16,8 @@ pub(super) enum FinestNativeBlocks {
 }
 
 impl FinestNativeBlocks {
-    /// Returns the finest block characters that a terminal version draws. Terminals that draw octants in newer
-    /// versions have long drawn sextants.
+    /// Returns the finest block characters that a terminal version draws. Terminals that draw octants in
+    /// newer versions have long drawn sextants.
     pub(super) fn supported_by(terminal: TerminalId) -> Self {
         let octants_since = match terminal.brand {
             TerminalBrand::Kitty => [0, 40],

@@ -82,8 +82,8 @@ fn circle_of_confusion_diameter_is_exact() {
 
 #[test]
 fn small_light_has_analytic_blur_variance() {
-    // The light's image is the convolution disk ∗ square ∗ pixel. The variance along an axis is D²/16 + s²/12 + 1/12,
-    // and the sum of all pixels is s².
+    // The light's image is the convolution disk ∗ square ∗ pixel. The variance along an axis is D²/16 + s²/12
+    // + 1/12, and the sum of all pixels is s².
     for (d, diameter) in [(10.0, 13.187_9), (2.5, 26.375_8)] {
         let s = 3.0 / pixels_per_length(d);
         let build = scene().quad(v(-s / 2.0, -s / 2.0, -d), v(s, 0.0, 0.0), v(0.0, s, 0.0), emitter(1.0));

@@ -73,8 +73,8 @@ fn techniques_agree_on_transmitted_light() {
 
 #[test]
 fn every_light_shines_through_rough_glass() {
-    // Compares MIS of light and lobe samples with path tracing. There are many lights, and each vertex samples
-    // only some of them.
+    // Compares MIS of light and lobe samples with path tracing. There are many lights, and each vertex
+    // samples only some of them.
     for (what, build, at) in boundaries().into_iter().skip(3).take(3) {
         let lamps = |build: Build| {
             (0..12_u32).fold(build, |build, number| {

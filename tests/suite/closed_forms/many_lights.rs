@@ -3,7 +3,7 @@
 use glimt::film::Rect;
 use glimt::geometry::mesh::TriangleMesh;
 use glimt::integrators::ViewMode;
-use glimt::lights::LightSamplingIntegrator;
+use glimt::lights::LightSamplingPurpose;
 use glimt::math::{DVec3, Vec3};
 use glimt::scene::description::light::{DirectionalLight, Falloff, PointLight, SpotLight};
 use glimt::scene::description::{Light, ShadowMode, Shape};
@@ -88,8 +88,8 @@ fn every_light_kind_matches_the_full_sum() {
     let build = every_kind(room(phong(0.4, 0.3, 200.0, 0.0)));
     let picked = with_dark_lights(build.clone());
     assert!(
-        build.world().lights.sampler_for_integrator(LightSamplingIntegrator::Eye).is_none()
-            && picked.world().lights.sampler_for_integrator(LightSamplingIntegrator::Eye).is_some()
+        build.world().lights.sampler_for_purpose(LightSamplingPurpose::Eye).is_none()
+            && picked.world().lights.sampler_for_purpose(LightSamplingPurpose::Eye).is_some()
     );
     for (shadows, samples) in
         [(ShadowMode::Soft, 1), (ShadowMode::Soft, 2), (ShadowMode::Hard, 1), (ShadowMode::Off, 1)]
@@ -178,7 +178,7 @@ fn mesh_light_matches_separate_triangles() {
     };
     let mesh = room(matte(0.7)).mesh(mesh, AS_IT_IS, emitter(20.0));
     assert!(
-        mesh.world().lights.sampler_for_integrator(LightSamplingIntegrator::Eye).is_none(),
+        mesh.world().lights.sampler_for_purpose(LightSamplingPurpose::Eye).is_none(),
         "a mesh must be a single light"
     );
     assert_same("whitted", &mesh.clone().shadows(ShadowMode::Soft, 8), &alone, (64, 16), 5e-3);

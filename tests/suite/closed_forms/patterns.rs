@@ -4,7 +4,7 @@ use std::f64::consts::{PI, TAU};
 
 use glimt::geometry::Ray;
 use glimt::geometry::mesh::TriangleMesh;
-use glimt::lights::LightSamplingIntegrator;
+use glimt::lights::LightSamplingPurpose;
 use glimt::materials::TexturePoint;
 use glimt::math::{DVec3, Vec2, Vec3};
 use glimt::scene::description::{EmissionSource, Integrator, Material, Shape, TextureFilter, Wrap};
@@ -200,7 +200,7 @@ fn sampled_lights_keep_their_textures() {
             }
         }
     }
-    assert!(build.world().lights.sampler_for_integrator(LightSamplingIntegrator::Eye).is_some());
+    assert!(build.world().lights.sampler_for_purpose(LightSamplingPurpose::Eye).is_some());
     for (name, build) in [("whitted", build.clone()), ("path", by_paths(&build))] {
         assert_irradiance(name, &build, expected);
     }

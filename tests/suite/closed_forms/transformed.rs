@@ -1,4 +1,5 @@
-//! Shapes with a `matrix`: compared with the shapes and meshes they equal, with closed forms, and in furnaces.
+//! Shapes with a `matrix`: compared with the shapes and meshes they equal, with closed forms, and in
+//! furnaces.
 
 use glimt::assets::LoadedMesh;
 use glimt::geometry::Ray;

@@ -1,4 +1,5 @@
-//! Soak test: random edits, keys, resizes, broken scenes and dropped terminals, from a fixed seed, for any duration.
+//! Soak test: random edits, keys, resizes, broken scenes and dropped terminals, from a fixed seed, for any
+//! duration.
 //!
 //!     GLIMT_SOAK_MINUTES=60 cargo test --profile quick --test suite soak -- --ignored --nocapture
 //!

@@ -9,7 +9,8 @@ use crate::math::{DVec3, Vec3};
 use crate::system::memory::try_reserve_exact;
 
 impl Tile {
-    /// Mean of a pixel's values in a layer, or `None` if the pixel has no samples or the layer does not exist.
+    /// Mean of a pixel's values in a layer, or `None` if the pixel has no samples or the layer does not
+    /// exist.
     fn layer_mean(&self, layer: usize, index: usize) -> Option<DVec3> {
         let LayerSums { count, sums, negative } = &self.layers;
         let place = index * count + layer;
@@ -87,8 +88,8 @@ mod tests {
     use crate::film::{NegativeLobeMask, StoredTile, TileSamples};
     use crate::math::random::unit_generator;
 
-    /// Five samples per pixel of a 40 × 3 film whose two layers are 1 and 2 times the radiance. The filter has
-    /// negative lobes if `is_signed`.
+    /// Five samples per pixel of a 40 × 3 film whose two layers are 1 and 2 times the radiance. The filter
+    /// has negative lobes if `is_signed`.
     fn samples(film: &Film, tile: usize, seed: u64, is_signed: bool) -> TileSamples {
         let pixels = SelectedPixels::from(film.tile_rect(tile).expect("a tile"));
         let mut next = unit_generator(seed);

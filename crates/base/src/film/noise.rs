@@ -152,8 +152,8 @@ impl Film {
     }
 
     /// Expected relative standard deviation of a tile's variance, measured in one half of each cell: 1 if a
-    /// single pixel dominates, lower if many pixels contribute. Ignores cells that have not completed the last
-    /// doubling.
+    /// single pixel dominates, lower if many pixels contribute. Ignores cells that have not completed the
+    /// last doubling.
     pub fn tile_variance_uncertainty(&self, tile: usize, half: usize) -> f64 {
         let tile = self.lock_tile(tile);
         tile.steps.variance_uncertainty(tile.steps.level_count(), &[half])

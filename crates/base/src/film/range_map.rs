@@ -103,9 +103,9 @@ impl DataRange {
     }
 
     /// Position of a value in the range, from 0 to 1. The mapping is linear if the median value in view is
-    /// above the first quarter of the range. Otherwise it is the curve x/(x + b(1 − x)), which maps the median
-    /// to ¼ (Schlick, *Fast Alternatives to Perlin's Bias and Gain Functions*, Graphics Gems IV, 1994).
-    /// Objects therefore keep distinct shades in front of a plane that extends to the horizon.
+    /// above the first quarter of the range. Otherwise it is the curve x/(x + b(1 − x)), which maps the
+    /// median to ¼ (Schlick, *Fast Alternatives to Perlin's Bias and Gain Functions*, Graphics Gems IV,
+    /// 1994). Objects therefore keep distinct shades in front of a plane that extends to the horizon.
     fn position_in_range(&self, number: f32) -> f32 {
         let range = self.greatest - self.least;
         let x = if range > 0.0 { ((number - self.least) / range).clamp(0.0, 1.0) } else { 0.0 };

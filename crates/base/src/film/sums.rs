@@ -132,6 +132,7 @@ impl Tile {
 
     /// Combines a pixel's sums into its mean: `sum` over the samples outside the filter's negative lobes, and
     /// `negative_sum` over the samples inside them. Returns `None` if the pixel has no samples.
+    /// Inlined because noise estimates call it for every pixel.
     #[inline(always)]
     pub(super) fn mean_from_lobe_sums(
         &self,

@@ -87,8 +87,8 @@ macro_rules! reduce {
 pub struct PortableSimd;
 
 impl Simd for PortableSimd {
-    /// Reduces by halves. `black_box` forces compilers to compute the whole vector first. Otherwise they would
-    /// turn a combination of single bits into one test per lane.
+    /// Reduces by halves. `black_box` forces compilers to compute the whole vector first. Otherwise they
+    /// would turn a combination of single bits into one test per lane.
     #[inline(always)]
     fn movemask(self, mask: &Mask) -> u32 {
         let mut row = std::hint::black_box(*mask);

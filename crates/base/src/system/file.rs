@@ -53,8 +53,8 @@ pub fn file_kind(path: &Path) -> io::Result<(FileKind, Metadata)> {
     Ok((FileKind::from_metadata(path, &metadata), metadata))
 }
 
-/// File metadata for detecting changes. It changes whenever the file is replaced or written, unless two writes
-/// have the same timestamp.
+/// File metadata for detecting changes. It changes whenever the file is replaced or written, unless two
+/// writes have the same timestamp.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FileStamp {
     device: u64,
@@ -86,8 +86,8 @@ impl FileStamp {
         }
     }
 
-    /// Returns the stamp of the file at `path`, following symbolic links, or `None` if the file does not exist
-    /// or its metadata cannot be read.
+    /// Returns the stamp of the file at `path`, following symbolic links, or `None` if the file does not
+    /// exist or its metadata cannot be read.
     pub fn from_path(path: &Path) -> Option<Self> {
         fs::metadata(path).ok().map(|metadata| Self::new(&metadata))
     }

@@ -28,7 +28,8 @@ pub fn cache_folder() -> Option<PathBuf> {
 /// Writes the starter scene to a file in a subfolder and returns the file's path. Never overwrites files.
 ///
 /// # Errors
-/// Returns an error if the folder or the file cannot be created, or if a different file with this name exists.
+/// Returns an error if the folder or the file cannot be created, or if a different file with this name
+/// exists.
 pub fn write_starter_scene(folder: &Path) -> Result<PathBuf, OutputError> {
     let text = crate::scene::starter_scene().as_bytes();
     // Use one subfolder per version of the starter scene, because a scene file directly in the cache folder

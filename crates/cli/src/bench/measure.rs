@@ -65,7 +65,7 @@ impl MethodRun<'_> {
             || self.run.reference_renderer(self.common).fingerprints_from_test_renders(&mut session)?
                 != *self.keys
         {
-            return Err(self.run.create_scene_changed_error());
+            return Err(self.run.scene_changed_error());
         }
         Ok(MethodAnalysis::new(self.method.name.clone(), setup_seconds(&first.report), steps))
     }

@@ -229,15 +229,11 @@ impl SceneRun<'_> {
             self.report_task_begin(&format!("reference {} of 2", 3 - left), seconds);
         };
         let made = maker.render_reference_pair(session, amount, begin)?;
-        if made.keys == *keys {
-            Ok(maker.store_in_cache(made))
-        } else {
-            Err(self.create_scene_changed_error())
-        }
+        if made.keys == *keys { Ok(maker.store_in_cache(made)) } else { Err(self.scene_changed_error()) }
     }
 
     /// Returns the error for a scene that was saved while it was being measured.
-    pub(super) fn create_scene_changed_error(&self) -> BenchError {
+    pub(super) fn scene_changed_error(&self) -> BenchError {
         BenchError::Failed(Failure::Work(scene_changed_message(self.path)))
     }
 

@@ -137,8 +137,8 @@ fn wait_until_writable(to: &File, token: &CancelToken) -> io::Result<()> {
     }
 }
 
-/// Distinguishes cancelled writes from I/O errors. Checks the error instead of the token, because the token
-/// may have been cancelled after the write.
+/// Distinguishes canceled writes from I/O errors. Checks the error instead of the token, because the token
+/// may have been canceled after the write.
 pub(super) fn write_error_or_cancelled<T>(
     result: io::Result<T>,
     error: impl FnOnce(io::Error) -> OutputError,

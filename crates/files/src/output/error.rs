@@ -69,7 +69,7 @@ pub enum OutputError {
         /// Message that names the file, states the reason and gives advice.
         reason: String,
     },
-    /// The work was cancelled.
+    /// The work was canceled.
     #[error("cancelled")]
     Cancelled(#[from] crate::control::Cancelled),
     /// The operating system reported an error.

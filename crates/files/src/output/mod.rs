@@ -82,7 +82,7 @@ pub struct EncodeOptions {
 /// Encodes an image. The result is deterministic.
 ///
 /// # Errors
-/// The format does not support this size or bit depth, the encoder fails, or the work is cancelled
+/// The format does not support this size or bit depth, the encoder fails, or the work is canceled
 /// ([`OutputError::Cancelled`]).
 pub fn encode(
     image: &RadianceImage,
@@ -117,7 +117,7 @@ pub(crate) fn encode_with_layers(
         Format::Ppm => ppm::encode(image, options, token),
         Format::WebP => webp::encode(image, options, token),
     };
-    // A cancelled encoder reports an error from its writer.
+    // A canceled encoder reports an error from its writer.
     token.check_pause_and_cancel()?;
     bytes
 }

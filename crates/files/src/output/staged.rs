@@ -18,7 +18,7 @@ use crate::system::folder::remove_folder_and_contents;
 ///
 /// # Errors
 /// A path cannot be written, for example because it exists ([`ErrorKind::AlreadyExists`]), or the operation
-/// is cancelled.
+/// is canceled.
 pub fn create_files_atomically(
     folder: &Path,
     files: &[(PathBuf, &[u8])],
@@ -143,7 +143,7 @@ mod tests {
         fs::create_dir(at.join("a_files")).expect("a folder");
         assert!(create_files_atomically(at, &files, &CancelToken::new()).is_err());
         assert_eq!((names(at), names(&at.join("a_files"))), (vec!["a_files".to_owned()], Vec::new()));
-        // A cancelled operation leaves no files behind.
+        // A canceled operation leaves no files behind.
         fs::remove_dir(at.join("a_files")).expect("removed");
         let token = CancelToken::new();
         token.cancel();

@@ -83,7 +83,7 @@ impl SweptFolders {
     }
 }
 
-/// Like [`atomic`], but with a policy. Can be cancelled until the new file is complete.
+/// Like [`atomic`], but with a policy. Can be canceled until the new file is complete.
 ///
 /// # Errors
 /// Any error from [`atomic`] or `guard`, or [`OutputError::Cancelled`].

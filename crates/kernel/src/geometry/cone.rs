@@ -228,7 +228,7 @@ impl Cone {
     }
 
     /// Projected area: the surface area facing a unit direction, weighted by the cosine.
-    pub fn projected_area_estimate(&self, direction: DVec3) -> f64 {
+    pub fn projected_area(&self, direction: DVec3) -> f64 {
         let along = self.frame.axis().dot(direction);
         let [side, cap] = self.local_part_areas();
         // Components of the side's normals perpendicular to the axis and toward the tip.

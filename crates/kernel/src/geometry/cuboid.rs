@@ -198,7 +198,7 @@ impl OrientedBox {
     }
 
     /// Projected area: the surface area facing a unit direction, weighted by the cosine.
-    pub fn projected_area_estimate(&self, direction: DVec3) -> f64 {
+    pub fn projected_area(&self, direction: DVec3) -> f64 {
         let along = (self.axes.transpose() * direction).abs();
         let [x, _, y, _, z, _] = self.local_part_areas();
         DVec3::new(x, y, z).dot(along)

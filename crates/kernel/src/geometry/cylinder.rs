@@ -198,7 +198,7 @@ impl Cylinder {
     }
 
     /// Projected area: the surface area facing a unit direction, weighted by the cosine.
-    pub fn projected_area_estimate(&self, direction: DVec3) -> f64 {
+    pub fn projected_area(&self, direction: DVec3) -> f64 {
         let along = self.frame.axis().dot(direction);
         let [side, cap, _] = self.local_part_areas();
         projected_area_of_normal_ring(side, sine_from_cosine(along), 0.0) + cap * along.abs()

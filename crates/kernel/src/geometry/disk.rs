@@ -149,7 +149,7 @@ impl Disk {
 
     /// Projected area of the front: the area times the cosine of the angle between the normal and a unit
     /// direction.
-    pub fn projected_area_estimate(&self, direction: DVec3) -> f64 {
+    pub fn projected_area(&self, direction: DVec3) -> f64 {
         let [area] = self.local_part_areas();
         area * self.normal().dot(direction).max(0.0)
     }

@@ -129,7 +129,7 @@ impl Shape {
         }
     }
 
-    /// Implements [`SurfacePacket::fill`]. Returns whether the shape supports SIMD.
+    /// Implements [`SurfacePacket::try_fill_points_of_shape_lanes`]. Returns whether the shape supports SIMD.
     #[inline(always)]
     fn try_fill_surfaces(
         &self,
@@ -229,8 +229,8 @@ impl Shape {
         }
     }
 
-    /// Areas of the parts, indexed like `ShapeHit::primitive`. Empty if the shape is infinite. If the shape is
-    /// transformed, these are the areas before the transform; see [`Shape::area_scale_for_world_normal`].
+    /// Areas of the parts, indexed like `ShapeHit::primitive`. Empty if the shape is infinite. If the shape
+    /// is transformed, these are the areas before the transform; see [`Shape::area_scale_for_world_normal`].
     pub fn local_part_areas(&self) -> Vec<f64> {
         for_shape!(self, it => it.local_part_areas().to_vec())
     }
@@ -241,8 +241,8 @@ impl Shape {
         for_shape!(self, it => it.sample_point_on_part(part, u))
     }
 
-    /// Factor that converts [`Shape::local_part_areas`] to world-space area at a point with this unit normal. 1
-    /// unless the shape is transformed.
+    /// Factor that converts [`Shape::local_part_areas`] to world-space area at a point with this unit normal.
+    /// 1 unless the shape is transformed.
     #[inline]
     pub fn area_scale_for_world_normal(&self, normal: DVec3) -> f64 {
         if let Self::Transformed(transformed) = self {
@@ -258,7 +258,7 @@ impl Shape {
     }
 
     /// Whether a point is inside.
-    pub fn contains_point(&self, point: DVec3) -> bool {
+    pub fn encloses_point(&self, point: DVec3) -> bool {
         for_shape!(self, it => it.encloses(point))
     }
 
@@ -404,8 +404,8 @@ impl Shape {
 
     /// Projected area: the surface area facing a unit direction, weighted by the cosine. For a torus, this is
     /// the mean over all directions.
-    pub fn projected_area_estimate(&self, direction: DVec3) -> f64 {
-        for_shape!(self, it => it.projected_area_estimate(direction))
+    pub fn projected_area(&self, direction: DVec3) -> f64 {
+        for_shape!(self, it => it.projected_area(direction))
     }
 }
 
@@ -518,9 +518,9 @@ mod tests {
             for direction in directions {
                 if matches!(shape, Shape::Torus(_)) {
                     // For a torus, only the mean over all directions is computed (Cauchy's formula).
-                    assert_eq!(shape.projected_area_estimate(direction), shape.local_part_areas()[0] / 4.0);
+                    assert_eq!(shape.projected_area(direction), shape.local_part_areas()[0] / 4.0);
                 } else {
-                    let off = shape.projected_area_estimate(direction) - shown(direction);
+                    let off = shape.projected_area(direction) - shown(direction);
                     assert!(off.abs() < 2e-3 * area, "{shape:?}: {off}");
                 }
             }
@@ -588,8 +588,8 @@ mod tests {
                 let surface = shape.surface_point_at_hit(&ray, &hit);
                 let behind = surface.point.as_dvec3() - surface.normal.as_dvec3() * 1e-3;
                 let before = surface.point.as_dvec3() + surface.normal.as_dvec3() * 1e-3;
-                assert!(!shape.contains_point(before) || !is_closed, "{shape:?}");
-                seen += u32::from(shape.contains_point(behind));
+                assert!(!shape.encloses_point(before) || !is_closed, "{shape:?}");
+                seen += u32::from(shape.encloses_point(behind));
             }
             assert_eq!(
                 seen > 100,

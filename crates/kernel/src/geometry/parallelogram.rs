@@ -136,7 +136,7 @@ impl Parallelogram {
 
     /// Projected area of the front: the area times the cosine of the angle between the normal and a unit
     /// direction.
-    pub fn projected_area_estimate(&self, direction: DVec3) -> f64 {
+    pub fn projected_area(&self, direction: DVec3) -> f64 {
         self.normal.dot(direction).max(0.0)
     }
 }

@@ -127,7 +127,7 @@ impl Plane {
     }
 
     /// Projected area of the front, which is infinite if the front faces `direction` and 0 otherwise.
-    pub fn projected_area_estimate(&self, direction: DVec3) -> f64 {
+    pub fn projected_area(&self, direction: DVec3) -> f64 {
         if self.normal.dot(direction) > 0.0 { f64::INFINITY } else { 0.0 }
     }
 }

@@ -136,7 +136,7 @@ impl Sphere {
     }
 
     /// Projected area, which is the area enclosed by a great circle, whatever the direction.
-    pub fn projected_area_estimate(&self, _: DVec3) -> f64 {
+    pub fn projected_area(&self, _: DVec3) -> f64 {
         PI * self.radius * self.radius
     }
 }

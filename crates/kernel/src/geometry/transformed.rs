@@ -94,8 +94,8 @@ impl TransformedShape {
         Aabb::from_points_f64([center - extent, center + extent])
     }
 
-    /// Areas of the parts in the shape's coordinates. [`TransformedShape::area_scale_for_world_normal`] converts areas to the
-    /// world.
+    /// Areas of the parts in the shape's coordinates. [`TransformedShape::area_scale_for_world_normal`]
+    /// converts areas to the world.
     pub fn local_part_areas(&self) -> Vec<f64> {
         self.shape.local_part_areas()
     }
@@ -120,7 +120,7 @@ impl TransformedShape {
 
     /// Whether a point is inside.
     pub fn encloses(&self, point: DVec3) -> bool {
-        self.shape.contains_point(self.to_world.inverse_point(point))
+        self.shape.encloses_point(self.to_world.inverse_point(point))
     }
 
     /// [`Shape::encloses_points_if_closed`] for the transformed shape.
@@ -136,10 +136,10 @@ impl TransformedShape {
         self.shape.uv_at_point(self.to_world.inverse_point(point))
     }
 
-    /// Mean curvature at a point on a part. With principal curvatures k₁ and k₂ in the shape's coordinates and
-    /// unit tangents t₁ and t₂ in their directions, it is
-    /// ½·|det M|·(k₁·|M·t₂|² + k₂·|M·t₁|²) / |M·t₁ × M·t₂|³: the transform multiplies the second fundamental
-    /// form by |det M| / |M·t₁ × M·t₂|, and tangents have the lengths |M·tᵢ|.
+    /// Mean curvature at a point on a part. With principal curvatures k₁ and k₂ in the shape's coordinates
+    /// and unit tangents t₁ and t₂ in their directions, it is ½·|det M|·(k₁·|M·t₂|² + k₂·|M·t₁|²) / |M·t₁ ×
+    /// M·t₂|³: the transform multiplies the second fundamental form by |det M| / |M·t₁ × M·t₂|, and tangents
+    /// have the lengths |M·tᵢ|.
     pub fn mean_curvature(&self, part: u32, point: DVec3) -> f64 {
         let local = self.to_world.inverse_point(point);
         let mean = self.shape.mean_curvature(part, local);
@@ -194,10 +194,10 @@ impl TransformedShape {
     }
 
     /// Projected area. The transform maps the area vectors A to |det M|·M⁻ᵀ·A.
-    pub fn projected_area_estimate(&self, direction: DVec3) -> f64 {
+    pub fn projected_area(&self, direction: DVec3) -> f64 {
         let direction = self.to_world.inverse_vector(direction);
         let length = direction.length();
-        self.volume_scale * length * self.shape.projected_area_estimate(direction / length)
+        self.volume_scale * length * self.shape.projected_area(direction / length)
     }
 }
 

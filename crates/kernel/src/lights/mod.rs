@@ -29,8 +29,8 @@
 //!
 //! - The weight of a sample is the radiance divided by the pdf of its direction. For a delta light, it is the
 //!   irradiance.
-//! - The pdf of a sampled direction ([`Light::inverse_pdfs_of_samples`]) equals its pdf when a ray hits the light
-//!   ([`Light::pdf`], or [`Lights::radiance_from_infinity`] for infinite lights).
+//! - The pdf of a sampled direction ([`Light::inverse_pdfs_of_samples`]) equals its pdf when a ray hits the
+//!   light ([`Light::pdf`], or [`Lights::radiance_from_infinity`] for infinite lights).
 //! - The mean photon flux equals the power implied by the bounds and the samples.
 
 pub mod area;
@@ -54,7 +54,7 @@ pub use photon_emission::{
     BoundingSphere, EmissiveObjectGeometry, EmittedPhoton, PhotonEmitter, PhotonOrigin, PhotonRandomNumbers,
 };
 pub use sample::{LightCenter, LightGeometry, LightHit, LightSample, ShadowRayEnd};
-pub use set::{ExpectedSamplesPerLight, LightSampler, LightSamplingEffort, LightSamplingIntegrator, Lights};
+pub use set::{ExpectedSamplesPerLight, LightSampler, LightSamplingEffort, LightSamplingPurpose, Lights};
 pub use tree::{
     AdaptiveLightTreeCut, LightBounds, LightPick, LightTree, Receiver, ReceiverLobe, ReceiverPacket,
 };

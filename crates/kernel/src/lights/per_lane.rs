@@ -31,7 +31,8 @@ macro_rules! convex_packet_of {
 
 impl Lights {
     /// [`Light::sample`] for the points in the mask `used`, where each lane has its own light. Returns the
-    /// samples, the inverse pdfs in sr (as in [`Light::inverse_pdfs_of_samples`]), and the number of texture lookups.
+    /// samples, the inverse pdfs in sr (as in [`Light::inverse_pdfs_of_samples`]), and the number of texture
+    /// lookups.
     #[inline(always)]
     pub fn sample_per_lane(
         &self,

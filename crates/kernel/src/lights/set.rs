@@ -30,7 +30,7 @@ pub struct Lights {
 
 /// Purpose of the light samples at a vertex.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum LightSamplingIntegrator {
+pub enum LightSamplingPurpose {
     /// Direct lighting only, where light sampling is the only source of noise.
     Eye,
     /// Path tracing, where the image also has noise from other sources.
@@ -136,14 +136,14 @@ impl Lights {
 
     /// How vertices pick lights, or `None` if they sample all lights.
     #[inline]
-    pub fn sampler_for_integrator(&self, receivers: LightSamplingIntegrator) -> Option<LightSampler<'_>> {
+    pub fn sampler_for_purpose(&self, receivers: LightSamplingPurpose) -> Option<LightSampler<'_>> {
         match receivers {
-            LightSamplingIntegrator::Eye => {
+            LightSamplingPurpose::Eye => {
                 let sampler =
                     |tree| LightSampler { tree, picks: LightSamplingEffort::DIRECT, leaves_beyond: false };
                 self.tree.as_deref().map(sampler)
             }
-            LightSamplingIntegrator::Paths => {
+            LightSamplingPurpose::Paths => {
                 let sampler =
                     |tree| LightSampler { tree, picks: LightSamplingEffort::PATHS, leaves_beyond: true };
                 self.local_tree.as_deref().map(sampler)
@@ -156,12 +156,12 @@ impl Lights {
     #[inline]
     pub fn expected_sample_counts(
         &self,
-        receivers: LightSamplingIntegrator,
+        receivers: LightSamplingPurpose,
         point: Vec3,
         normal: Vec3,
     ) -> ExpectedSamplesPerLight<'_> {
         // Return early because a cut is expensive to copy.
-        let Some(sampler) = self.sampler_for_integrator(receivers) else {
+        let Some(sampler) = self.sampler_for_purpose(receivers) else {
             return ExpectedSamplesPerLight(None);
         };
         let mut cut = sampler.picks.new_tree_cut(sampler.tree);

@@ -3,8 +3,8 @@
 //!
 //! To add a kind of BSDF, add a file that implements [`BxdfMaterial`], [`BxdfParameters`], and
 //! [`Bxdf`](super::bxdf::Bxdf), and a line in the table in [`bxdfs`](super::bxdfs). No other code
-//! distinguishes kinds: integrators call `f`, `pdf`, and `sample` of a [`BsdfPacket`](super::BsdfPacket) for all
-//! lanes at once.
+//! distinguishes kinds: integrators call `f`, `pdf`, and `sample` of a [`BsdfPacket`](super::BsdfPacket) for
+//! all lanes at once.
 
 use std::f32::consts::FRAC_1_PI;
 

@@ -128,6 +128,7 @@ pub trait Bxdf: Soa + Default {
     fn flags(&self) -> BxdfFlags;
 
     /// Whether the surface reflects nothing.
+    #[inline(always)]
     fn is_black(&self) -> bool {
         false
     }
@@ -170,6 +171,7 @@ pub trait Bxdf: Soa + Default {
 
     /// Shape of the narrow lobe, for light selection. Only called if the flags indicate a narrow lobe. With
     /// `None`, lights are selected as for a wide lobe.
+    #[inline(always)]
     fn narrow_lobe(&self, _view: &Self::View) -> Option<NarrowLobe> {
         None
     }

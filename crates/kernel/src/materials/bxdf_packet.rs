@@ -325,8 +325,8 @@ impl<B: Bxdf> BxdfPacket<B> {
         is_constant.then(|| self.lane_f_by_lobe_set(i, Vec3::Z)[0])
     }
 
-    /// f in sr⁻¹ for light that reaches a surface from a direction. Returns f of the shown lobes, f of the shown
-    /// wide lobes, and f of all lobes.
+    /// f in sr⁻¹ for light that reaches a surface from a direction. Returns f of the shown lobes, f of the
+    /// shown wide lobes, and f of all lobes.
     #[inline]
     pub fn lane_f_by_lobe_set(&self, i: usize, wi: Vec3) -> [Vec3; 3] {
         let (bsdf, view) = (B::get(&self.bsdf, i), B::View::get(&self.view, i));

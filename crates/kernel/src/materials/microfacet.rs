@@ -20,7 +20,8 @@ pub const MIN_ALPHA: f32 = 1e-3;
 /// Minimum cosine of directions above the surface.
 const MIN_COSINE: f32 = 1e-6;
 
-/// Minimum cosine between a normal and the direction to the viewer. See [`ensure_normal_faces_viewer_branchless`].
+/// Minimum cosine between a normal and the direction to the viewer. See
+/// [`ensure_normal_faces_viewer_branchless`].
 const MIN_FACING_COSINE: f32 = 1e-3;
 
 /// Computes a lobe's α along u and along v. An anisotropy in [−1, 1] stretches the base value, roughness².
@@ -43,7 +44,8 @@ pub fn ensure_normal_faces_viewer_branchless(normal: Vec3, to_eye: Vec3) -> Vec3
     Vec3::new(choose(turned.x, normal.x), choose(turned.y, normal.y), choose(turned.z, normal.z))
 }
 
-/// [`ensure_normal_faces_viewer_branchless`] with a branch that is fast for normals that do not need rotation.
+/// [`ensure_normal_faces_viewer_branchless`] with a branch that is fast for normals that do not need
+/// rotation.
 #[inline(always)]
 pub fn ensure_normal_faces_viewer(normal: Vec3, to_eye: Vec3) -> Vec3 {
     if normal.dot(to_eye) < MIN_FACING_COSINE {

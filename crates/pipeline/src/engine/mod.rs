@@ -22,7 +22,7 @@ pub(super) use self::orders::{Interruption, PendingCommands, RequestContext};
 use self::outcome::CompletedRequest;
 pub use self::outcome::{RenderFailure, RenderedImage};
 use self::outputs::remove_outdated_report;
-use self::own::{ImageWithoutKeyboardChanges, saved_scene_plan, texture_needs_with_saved_scene};
+use self::own::{SavedSceneImage, saved_scene_plan, texture_needs_with_saved_scene};
 use self::unfinished::LastValidScene;
 use super::assembly::{KeyedWorld, RequestCamera, build_or_reuse_world};
 use super::cache::{CacheOfNamedValues, Memo};
@@ -112,7 +112,7 @@ pub(super) struct Engine {
     photons: PhotonCache,
     films: FilmCache,
     written: WrittenImages,
-    own: Option<ImageWithoutKeyboardChanges>,
+    own: Option<SavedSceneImage>,
     /// Save count from the newest request with a valid scene.
     saves: u64,
     /// Whether the film of the scene's own image is kept while other images are rendered.
@@ -407,7 +407,7 @@ impl Engine {
         Ok(photons_key)
     }
 
-    /// Runs [`Self::prepare`] on one consistent version of all files.
+    /// Runs [`Self::run_stages_before_photons`] on one consistent version of all files.
     fn prepare_consistent_scene(
         &mut self,
         request: &Request,
@@ -548,11 +548,8 @@ impl Engine {
         let camera = own::saved_scene_overrides(request).camera;
         let own = own.unwrap_or_else(|| plan.clone());
         let own_eye = RequestCamera::new(&own.scene, parsed.orbiter, &camera).rotated_for_turntable(own.turn);
-        let own = ImageWithoutKeyboardChanges::new(
-            (parsed, own, &own_eye),
-            (&surfaces, &mesh_keys),
-            (camera, &self.assets),
-        );
+        let own =
+            SavedSceneImage::new((parsed, own, &own_eye), (&surfaces, &mesh_keys), (camera, &self.assets));
         self.pin_saved_scene_image(own);
         Ok(ReadyScene {
             parsed: parsed.clone(),
@@ -654,7 +651,7 @@ impl Engine {
         if ready.share.is_some()
             && let Some(state) = films.current_mut()
         {
-            state.identity = self.own.as_ref().map(ImageWithoutKeyboardChanges::dependencies);
+            state.identity = self.own.as_ref().map(SavedSceneImage::dependencies);
         }
         (self.films, self.written) = (films, written.into_inner());
         let is_reused = rendered.as_ref().is_ok_and(|staged| staged.status == Status::Reused);
@@ -753,7 +750,7 @@ impl Engine {
 /// Checks that no file has changed since the request first saw it.
 ///
 /// # Errors
-/// A file has changed, or the token is cancelled.
+/// A file has changed, or the token is canceled.
 fn verify_files_unchanged(contents: &FilesSeenByRequest, token: &CancelToken) -> Result<(), AbortReason> {
     contents.recheck_seen_files(token)?;
     let changed =

@@ -105,7 +105,7 @@ impl Engine {
         let paths: Vec<String> =
             plan.outputs.iter().map(|path| path.to_string_lossy().into_owned()).collect();
         let image = ImageReport { path: paths.first().cloned(), paths, ..report.image.clone() };
-        // Use a token that is never cancelled, because the user requested the image.
+        // Use a token that is never canceled, because the user requested the image.
         self.write_report(&Report { image, ..report.clone() }, sink, &CancelToken::new());
     }
 

@@ -27,7 +27,7 @@ use crate::watch::content::FilePathAndContentId;
 use crate::world::TextureRolesNeededByRender;
 
 /// The scene's own image for the newest request.
-pub(super) struct ImageWithoutKeyboardChanges {
+pub(super) struct SavedSceneImage {
     /// Key of the film.
     pub(super) film: Fingerprint,
     /// Key for the finished image and its output files.
@@ -41,7 +41,7 @@ pub(super) struct ImageWithoutKeyboardChanges {
     pub(super) share: Option<Shard>,
 }
 
-impl ImageWithoutKeyboardChanges {
+impl SavedSceneImage {
     /// Computes the keys for the scene's own image. `eye` is the scene's camera. `surfaces` and `meshes` are
     /// the keys for the surfaces and meshes.
     pub(super) fn new(
@@ -80,7 +80,7 @@ fn image_with_outputs_key(film: Fingerprint, plan: &RenderPlan) -> Fingerprint {
 
 impl Engine {
     /// Sets the scene's own image for a request and keeps its film while other images are rendered.
-    pub(super) fn pin_saved_scene_image(&mut self, mut own: ImageWithoutKeyboardChanges) {
+    pub(super) fn pin_saved_scene_image(&mut self, mut own: SavedSceneImage) {
         if self.pins_own {
             self.films.pin(own.film);
         }
@@ -173,7 +173,7 @@ impl Engine {
     /// Writes the scene's own image if the current view is based on its finished film.
     ///
     /// # Errors
-    /// Returns [`AbortReason::Cancelled`] if the token is cancelled.
+    /// Returns [`AbortReason::Cancelled`] if the token is canceled.
     pub(super) fn write_image_without_overrides(
         &mut self,
         sink: &EventSink,

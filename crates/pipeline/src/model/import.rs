@@ -37,7 +37,7 @@ pub enum ImportError {
 ///
 /// # Errors
 /// Returns an error if the file is invalid, memory runs out, a thread cannot be started, or the token is
-/// cancelled.
+/// canceled.
 pub fn import_gltf(path: &Path, folder: &str, token: &CancelToken) -> Result<ImportedScene, ImportError> {
     if !is_gltf(path) {
         let message = format!("cannot import {}: only .gltf and .glb files are supported", path.display());

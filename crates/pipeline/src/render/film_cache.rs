@@ -58,11 +58,7 @@ impl FilmCache {
 
     /// Makes the film with this key current if it is cached and usable. Otherwise, leaves no film current.
     /// Caches the previous film if there is room.
-    pub(crate) fn set_current_to_cached_or_none(
-        &mut self,
-        key: Fingerprint,
-        is_usable: impl FnOnce(&FilmState) -> bool,
-    ) {
+    pub(crate) fn switch_to_cached(&mut self, key: Fingerprint, is_usable: impl FnOnce(&FilmState) -> bool) {
         if self.current.as_ref().is_none_or(|current| current.key != key) {
             let kept = self.kept.iter().position(|state| state.key == key);
             let found = kept.map(|index| self.kept.remove(index));
@@ -166,14 +162,14 @@ mod tests {
     fn films(names: &[&str], most_kept_bytes: u64) -> FilmCache {
         let mut films = FilmCache { most_kept_bytes, ..FilmCache::default() };
         for name in names {
-            films.set_current_to_cached_or_none(key(name), |_| true);
+            films.switch_to_cached(key(name), |_| true);
             films.replace_current_with_retry(|| Ok::<_, ()>(state(name))).expect("a film");
         }
         films
     }
 
     fn finds(films: &mut FilmCache, name: &str) -> bool {
-        films.set_current_to_cached_or_none(key(name), |_| true);
+        films.switch_to_cached(key(name), |_| true);
         films.current().is_some_and(|current| current.key == key(name))
     }
 
@@ -209,7 +205,7 @@ mod tests {
         films.pin(key("own"));
         films.most_kept_bytes -= 1;
         for name in ["a", "b", "c"] {
-            films.set_current_to_cached_or_none(key(name), |_| true);
+            films.switch_to_cached(key(name), |_| true);
             films.replace_current_with_retry(|| Ok::<_, ()>(state(name))).expect("a film");
         }
         assert_eq!(films.count(), 2, "only the pinned and the current film should remain");
@@ -229,7 +225,7 @@ mod tests {
     fn moving_camera_keeps_only_complete_films() {
         for is_whole in [false, true] {
             let mut films = films(&["a"], u64::MAX);
-            films.set_current_to_cached_or_none(key("b"), |_| true);
+            films.switch_to_cached(key("b"), |_| true);
             let passing = || {
                 let mut passing = state("b");
                 passing.is_passing = true;
@@ -237,7 +233,7 @@ mod tests {
                 Ok::<_, ()>(passing)
             };
             films.replace_current_with_retry(passing).expect("a film");
-            films.set_current_to_cached_or_none(key("c"), |_| true);
+            films.switch_to_cached(key("c"), |_| true);
             assert_eq!(finds(&mut films, "b"), is_whole);
             assert!(finds(&mut films, "a"));
         }
@@ -246,9 +242,9 @@ mod tests {
     #[test]
     fn cached_films_are_dropped_when_out_of_memory() {
         let mut films = films(&["a", "b"], u64::MAX);
-        films.set_current_to_cached_or_none(key("a"), |_| false);
+        films.switch_to_cached(key("a"), |_| false);
         assert!(films.current().is_none() && !finds(&mut films, "a") && finds(&mut films, "b"));
-        films.set_current_to_cached_or_none(key("c"), |_| true);
+        films.switch_to_cached(key("c"), |_| true);
         let tries = std::cell::Cell::new(0);
         let made = films.replace_current_with_retry(|| {
             tries.set(tries.get() + 1);

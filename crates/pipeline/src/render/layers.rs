@@ -1,7 +1,7 @@
 //! EXR layers: additional channels for the finished image.
 //!
-//! The film sums the light and first-hit layers from the image's own samples, so the light components add up to
-//! the image.
+//! The film sums the light and first-hit layers from the image's own samples, so the light components add up
+//! to the image.
 
 use super::film_state::FilmState;
 use crate::choice::Choice;

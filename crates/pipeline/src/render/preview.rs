@@ -33,7 +33,7 @@ impl PreviewSender<'_> {
         self.bounds.and_then(|bounds| fit_size(render.width, render.height, bounds))
     }
 
-    /// Sends a preview of the whole film unless cancelled. Must not be called while tiles are rendering,
+    /// Sends a preview of the whole film unless canceled. Must not be called while tiles are rendering,
     /// because it uses the thread pool.
     pub(crate) fn send_film_preview(&self, state: &mut FilmState, pool: &ThreadPool, token: &CancelToken) {
         let Some(size) = self.fitted_image_size() else { return };

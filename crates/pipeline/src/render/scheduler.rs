@@ -106,7 +106,7 @@ impl<'a> Scheduler<'a> {
     /// Renders the film until it reaches the requested number of samples or the noise target.
     ///
     /// # Errors
-    /// Returns [`AbortReason::Cancelled`] if the token is cancelled. The film keeps its samples.
+    /// Returns [`AbortReason::Cancelled`] if the token is canceled. The film keeps its samples.
     pub(crate) fn run(&mut self) -> Result<(), AbortReason> {
         self.state.is_kept = false;
         let ran = self.run_passes_to_end();
@@ -201,7 +201,7 @@ impl<'a> Scheduler<'a> {
         Ok(())
     }
 
-    /// Evaluates the noise of existing samples from a checkpoint or a cancelled request.
+    /// Evaluates the noise of existing samples from a checkpoint or a canceled request.
     fn decide_goals_from_existing(&mut self, part: Option<Rect>) {
         let RenderOptions { samples, error, .. } = self.rendering.plan.settings.render;
         let done = self.state.min_unfinished_samples_in(part, samples);

@@ -6,7 +6,7 @@ use super::{ImageReport, LightSamplingReport, PhotonsReport, Report, SampledLigh
 use crate::control::CancelToken;
 use crate::film::range_map::RangeMap;
 use crate::inputs::ProtectedInputs;
-use crate::integrators::{RayCounters, light_sampling_integrator};
+use crate::integrators::{RayCounters, light_sampling_purpose};
 use crate::output::write::{ExistingFilePolicy, atomic_with_policy};
 use crate::output::{OutputError, json};
 use crate::plan::RenderPlan;
@@ -110,7 +110,7 @@ fn light_sampling_report(finished: &RequestResults<'_>) -> LightSamplingReport {
     let samples = u64::from(settings.render.shadow_samples);
     let are_gathered =
         settings.gathers_photons() && finished.photons.is_some_and(|photons| photons.emitted > 0);
-    let selection = lights.sampler_for_integrator(light_sampling_integrator(settings, are_gathered));
+    let selection = lights.sampler_for_purpose(light_sampling_purpose(settings, are_gathered));
     let (sampled, picks) = match selection {
         Some(selection) => (SampledLightSet::Picked, samples * u64::from(selection.picks.count)),
         None => (SampledLightSet::All, 0),

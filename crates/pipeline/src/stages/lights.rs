@@ -9,7 +9,7 @@ use super::StageResult;
 use super::textures::Textures;
 use crate::control::{CancelToken, Cancelled};
 use crate::lights::infinite::EnvironmentMap;
-use crate::lights::{LightSamplingIntegrator, Lights};
+use crate::lights::{LightSamplingPurpose, Lights};
 use crate::scene::description::{Scene, TextureRole};
 use crate::scene::fingerprint::{Fingerprint, FingerprintContext};
 use crate::world::{self, Geometry, TextureSource};
@@ -44,15 +44,13 @@ pub(crate) fn collect_lights(
         0 => StageResult::skipped(lights, reasons::NO_LIGHTS),
         1 => StageResult::done(lights, "1 light"),
         count => {
-            let are_picked = |receivers| lights.sampler_for_integrator(receivers).is_some();
-            let picked = match (
-                are_picked(LightSamplingIntegrator::Eye),
-                are_picked(LightSamplingIntegrator::Paths),
-            ) {
-                (true, _) => describe_light_tree("a subset is sampled", &lights),
-                (false, true) => describe_light_tree("a subset is sampled after bounces", &lights),
-                (false, false) => String::new(),
-            };
+            let are_picked = |receivers| lights.sampler_for_purpose(receivers).is_some();
+            let picked =
+                match (are_picked(LightSamplingPurpose::Eye), are_picked(LightSamplingPurpose::Paths)) {
+                    (true, _) => describe_light_tree("a subset is sampled", &lights),
+                    (false, true) => describe_light_tree("a subset is sampled after bounces", &lights),
+                    (false, false) => String::new(),
+                };
             StageResult::done(lights, format!("{count} lights{picked}"))
         }
     })

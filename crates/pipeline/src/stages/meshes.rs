@@ -48,7 +48,7 @@ pub(crate) type MeshesByFileIndex = Vec<Arc<CachedMesh>>;
 /// Loads the scene's meshes. Tries all files and adds errors to the findings.
 ///
 /// # Errors
-/// The token is cancelled, or there is not enough memory.
+/// The token is canceled, or there is not enough memory.
 pub(crate) fn load_meshes(
     loaded: &LoadedScene,
     cache: &mut CacheOfNamedValues<MeshPathAndPart, CachedMesh>,

@@ -48,7 +48,7 @@ impl AbortReason {
         Self::Failed(Failure::Work(message.to_string()))
     }
 
-    /// An error on the command line, which has no location in the scene.
+    /// A failure without a location in the scene, and how to fix it.
     pub(super) fn failure_with_remedy(message: String, help: &str) -> Self {
         let (severity, help) = (Severity::Error, Some(help.to_owned()));
         let path = std::path::PathBuf::new();

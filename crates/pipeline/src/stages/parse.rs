@@ -239,7 +239,7 @@ fn referenced_files(loaded: &scene::LoadedScene, token: &CancelToken) -> Result<
 /// files and any errors in the files.
 ///
 /// # Errors
-/// Returns [`Cancelled`] if the token is cancelled.
+/// Returns [`Cancelled`] if the token is canceled.
 pub fn files_referenced_by_assets<'a>(
     files: impl Iterator<Item = &'a PathBuf>,
     token: &CancelToken,

@@ -91,7 +91,7 @@ impl PhotonStore {
     /// Returns the maps for the given samples. Calls `tick` regularly.
     ///
     /// # Errors
-    /// Returns [`Cancelled`] if the token is cancelled.
+    /// Returns [`Cancelled`] if the token is canceled.
     pub(crate) fn get_or_trace_maps(
         &self,
         samples: Range<u32>,
@@ -188,7 +188,7 @@ fn run_with_ticks<T: Send>(
 /// the scene. Calls `tick` regularly, and calls `before` once before tracing any photons.
 ///
 /// # Errors
-/// The token is cancelled, or `before` fails.
+/// The token is canceled, or `before` fails.
 pub(crate) fn trace_first_photons(
     (enabled, wanted): (bool, Option<bool>),
     key: impl FnOnce(PhotonSettings) -> Fingerprint,

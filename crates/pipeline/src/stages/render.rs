@@ -18,7 +18,7 @@ use crate::scene::fingerprint::Fingerprint;
 /// Renders the film with this key until it has the requested number of samples or reaches the noise target.
 ///
 /// # Errors
-/// The token is cancelled, or there is not enough memory for the film. The film keeps its samples.
+/// The token is canceled, or there is not enough memory for the film. The film keeps its samples.
 pub(crate) fn render(
     key: Fingerprint,
     films: &mut FilmCache,
@@ -26,7 +26,7 @@ pub(crate) fn render(
 ) -> Result<StageResult<RayCounters>, AbortReason> {
     let RenderOptions { samples: wanted, error, .. } = rendering.plan.settings.render;
     let is_other = films.current().is_some_and(|current| current.key != key);
-    films.set_current_to_cached_or_none(key, |kept| !rendering.force && kept.has_at_most_samples(wanted));
+    films.switch_to_cached(key, |kept| !rendering.force && kept.has_at_most_samples(wanted));
     if films.current().is_none() {
         let convergence = match rendering.photons.is_some_and(PhotonStore::has_lit_caustic_casters) {
             true => ConvergenceModel::Photons,

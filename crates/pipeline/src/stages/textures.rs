@@ -156,7 +156,7 @@ struct CachedTexelsAndMipmaps {
 /// Loads the needed textures. Tries all files and adds errors to the findings.
 ///
 /// # Errors
-/// The token is cancelled, or there is not enough memory.
+/// The token is canceled, or there is not enough memory.
 pub(crate) fn load_textures(
     loaded: &LoadedScene,
     needed: &NeededTextures,

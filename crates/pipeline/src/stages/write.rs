@@ -84,7 +84,7 @@ impl WrittenImages {
 
 /// Whether a file has the given content.
 fn has_content_id(path: &Path, known: FileContentId, contents: &FileHashCache) -> bool {
-    // Use a token that is never cancelled.
+    // Use a token that is never canceled.
     contents.read_content_id(path, &CancelToken::new()).is_ok_and(|content| content == known)
 }
 
@@ -102,8 +102,8 @@ pub(crate) struct ImageWriteContext<'a> {
 /// Checks all output files before rendering starts.
 ///
 /// # Errors
-/// With [`WriteRequirement::Must`], returns an error for the first file that cannot be written. Otherwise, reports
-/// failures as events.
+/// With [`WriteRequirement::Must`], returns an error for the first file that cannot be written. Otherwise,
+/// reports failures as events.
 pub(crate) fn check_targets(
     writing: WriteRequirement,
     plan: &RenderPlan,
@@ -174,7 +174,8 @@ pub(crate) fn write_if_wanted(
 /// events. Returns whether all files are now up to date.
 ///
 /// # Errors
-/// Returns [`AbortReason::Cancelled`] if the token is cancelled. If `is_must`, returns the last failure to write a file.
+/// Returns [`AbortReason::Cancelled`] if the token is canceled. If `is_must`, returns the last failure to
+/// write a file.
 fn write_outdated_outputs(
     state: &FilmState,
     to: ImageWriteContext<'_>,
@@ -259,7 +260,7 @@ pub(crate) fn write_on_request(
         return false;
     }
     written.mark_all_outdated();
-    // Use a token that is never cancelled, because the user requested the image.
+    // Use a token that is never canceled, because the user requested the image.
     let outcome = write_outdated_outputs(state, to, written, &CancelToken::new(), false);
     let is_written = outcome.is_ok_and(|stage| stage.value);
     if is_written {
@@ -276,7 +277,7 @@ pub(crate) struct RenderedTurntableFrames(Vec<(Srgb8Image, SampleCountStats)>);
 /// have been written.
 ///
 /// # Errors
-/// The token is cancelled, or a file could not be written.
+/// The token is canceled, or a file could not be written.
 pub(crate) fn add_frame_and_write_if_last(
     state: &FilmState,
     to: ImageWriteContext<'_>,

@@ -15,7 +15,7 @@ use crate::scene::description::{Integrator, ShadowMode};
 use crate::settings::ViewMode;
 use crate::world::World;
 
-/// Blocks until its token is cancelled.
+/// Blocks until its token is canceled.
 fn endless(
     _: Option<&PhotonMaps>,
     _: &World,

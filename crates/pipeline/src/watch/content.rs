@@ -106,7 +106,7 @@ impl FilesSeenByRequest {
     /// Returns a file's content as first seen by this request.
     ///
     /// # Errors
-    /// Returns [`Cancelled`] if the token is cancelled.
+    /// Returns [`Cancelled`] if the token is canceled.
     pub(crate) fn first_seen_content_id(
         &self,
         path: &Path,
@@ -145,7 +145,7 @@ impl FilesSeenByRequest {
     /// Returns a file referenced by another file, along with its decoded content.
     ///
     /// # Errors
-    /// Returns [`Cancelled`] if the token is cancelled.
+    /// Returns [`Cancelled`] if the token is canceled.
     pub(crate) fn record_companion(
         &self,
         Companion { path, hash, stamp }: &Companion,
@@ -163,7 +163,7 @@ impl FilesSeenByRequest {
     /// A removed file does not count as changed.
     ///
     /// # Errors
-    /// Returns [`Cancelled`] if the token is cancelled.
+    /// Returns [`Cancelled`] if the token is canceled.
     pub(crate) fn recheck_seen_files(&self, token: &CancelToken) -> Result<(), Cancelled> {
         let seen: Vec<_> = self.lock_seen_files().iter().map(|(path, seen)| (path.clone(), *seen)).collect();
         for (path, SeenFile { content, stamp }) in seen {
@@ -183,7 +183,7 @@ impl FilesSeenByRequest {
     /// result, [`Self::recheck_seen_files`] also detects a program that is still writing.
     ///
     /// # Errors
-    /// Returns [`Cancelled`] if the token is cancelled.
+    /// Returns [`Cancelled`] if the token is canceled.
     pub(crate) fn wait_for_writers(&self, token: &CancelToken) -> Result<(), Cancelled> {
         let begun = Instant::now();
         loop {
@@ -240,7 +240,7 @@ impl FileHashCache {
     /// Returns the current content of a file.
     ///
     /// # Errors
-    /// Returns [`Cancelled`] if the token is cancelled. The token is checked once per mebibyte.
+    /// Returns [`Cancelled`] if the token is canceled. The token is checked once per mebibyte.
     pub fn read_content_id(&self, path: &Path, token: &CancelToken) -> Result<FileContentId, Cancelled> {
         token.check_pause_and_cancel()?;
         let now = SystemTime::now();

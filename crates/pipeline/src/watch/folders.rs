@@ -44,7 +44,7 @@ fn identity(folder: &Path) -> Option<Identity> {
 
 /// Returns the watcher if its thread has started. Otherwise, the watcher's handler, which shares `names`, has
 /// been dropped, and any use of the watcher would panic, even dropping it. The watcher is then leaked.
-fn leak_watcher_if_dead<W>(watcher: W, names: &Arc<Mutex<HashSet<OsString>>>) -> Option<W> {
+fn watcher_if_alive<W>(watcher: W, names: &Arc<Mutex<HashSet<OsString>>>) -> Option<W> {
     if Arc::strong_count(names) > 1 {
         return Some(watcher);
     }
@@ -65,7 +65,7 @@ impl WatchedFolders {
             }
         };
         let watcher = if poll { None } else { notify::recommended_watcher(handler).ok() };
-        let watcher = watcher.and_then(|watcher| leak_watcher_if_dead(watcher, &names));
+        let watcher = watcher.and_then(|watcher| watcher_if_alive(watcher, &names));
         Self { watcher, names, wanted: HashMap::new(), watched: HashMap::new() }
     }
 
@@ -210,9 +210,9 @@ mod tests {
     #[test]
     fn watcher_without_thread_is_not_used() {
         let names: Arc<Mutex<HashSet<OsString>>> = Arc::default();
-        assert!(leak_watcher_if_dead(Dead, &names).is_none());
+        assert!(watcher_if_alive(Dead, &names).is_none());
         let _handler = names.clone();
-        assert_eq!(leak_watcher_if_dead(1, &names), Some(1));
+        assert_eq!(watcher_if_alive(1, &names), Some(1));
     }
 
     #[test]

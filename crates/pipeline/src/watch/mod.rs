@@ -1,14 +1,14 @@
 //! Reports when a file that a scene depends on has changed.
 //!
 //! Editors save files in many ways: in place, by renaming, or by removing and rewriting. The watcher
-//! therefore watches folders (for a symbolic link, also the folder of its target) and treats notifications only
-//! as hints. It compares contents and reports only real changes. A file that was closed after writing or renamed
-//! into place is checked immediately. A file that is still being written is checked after a short pause.
-//! Timestamps are also checked every two seconds, or several times per second if there are no notifications
-//! (network file systems, no watches left) or a folder or the working directory is missing.
+//! therefore watches folders (for a symbolic link, also the folder of its target) and treats notifications
+//! only as hints. It compares contents and reports only real changes. A file that was closed after writing or
+//! renamed into place is checked immediately. A file that is still being written is checked after a short
+//! pause. Timestamps are also checked every two seconds, or several times per second if there are no
+//! notifications (network file systems, no watches left) or a folder or the working directory is missing.
 //!
-//! A program may write a file in several steps. [`WatchEvent::Settled`] follows a change when no further changes
-//! are expected. Errors in a file are not reported earlier.
+//! A program may write a file in several steps. [`WatchEvent::Settled`] follows a change when no further
+//! changes are expected. Errors in a file are not reported earlier.
 
 mod change_tracker;
 pub mod content;
@@ -258,7 +258,7 @@ impl<F: FnMut(WatchEvent)> WatchThread<F> {
             (self.say)(WatchEvent::Output(change));
         }
         let found = self.differences();
-        let is_said = !self.has_nothing_to_report_yet(&found, now);
+        let is_said = !self.postpone_report(&found, now);
         if is_said {
             for FilePathAndContentId { path, content } in found {
                 self.files.insert(path, (content, now));
@@ -271,8 +271,8 @@ impl<F: FnMut(WatchEvent)> WatchThread<F> {
         }
     }
 
-    /// Whether a check found no changes, or found changes that should not be reported yet.
-    fn has_nothing_to_report_yet(&mut self, found: &[FilePathAndContentId], now: Instant) -> bool {
+    /// Keeps changes that are too early to report. Returns true if there is nothing to report now.
+    fn postpone_report(&mut self, found: &[FilePathAndContentId], now: Instant) -> bool {
         let before = std::mem::take(&mut self.pending);
         if found.is_empty() {
             self.change_tracker.discard_hints();
@@ -297,7 +297,7 @@ impl<F: FnMut(WatchEvent)> WatchThread<F> {
     /// Returns the files whose content differs from the last reported content.
     fn differences(&self) -> Vec<FilePathAndContentId> {
         let token = CancelToken::new();
-        // Use a token that is never cancelled.
+        // Use a token that is never canceled.
         let now =
             |path: &PathBuf| self.contents.read_content_id(path, &token).unwrap_or(FileContentId::Missing);
         let files = self.files.iter();

@@ -131,7 +131,7 @@ impl WrittenOutputs {
             idle.map(|(path, output)| (path.clone(), output.clone())).collect()
         };
         let state = |(path, output): (PathBuf, WrittenOutput)| {
-            // Use a token that is never cancelled.
+            // Use a token that is never canceled.
             let now = contents.read_content_id(&path, &CancelToken::new()).unwrap_or(FileContentId::Missing);
             let lost = match now {
                 now if now == output.content => None,

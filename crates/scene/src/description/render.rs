@@ -38,7 +38,8 @@ macro_rules! __render_keys {
             integrator: Integrator = Integrator::Whitted, choice, "", option;
             /// Shadows in `whitted`.
             shadows: ShadowMode = ShadowMode::Soft, choice, "", option;
-            /// Limit on indirect radiance per bounce: removes fireflies, but darkens the image (biased); 0 disables the limit.
+            /// Limit on indirect radiance per bounce: removes fireflies, but darkens the image (biased); 0
+            /// disables the limit.
             clamp: f32 = 0.0, at_least(0.0), "radiance", option;
             /// Ambient radiance in `whitted`, an approximation of indirect light.
             ambient: Vec3 = Vec3::ZERO, color, "radiance", scene;

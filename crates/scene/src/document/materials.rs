@@ -171,7 +171,7 @@ fn read_principled(table: &TableReader<'_>, textures: &DefinedNames) -> Material
 }
 
 /// Returns the key at the path `TYPE.KEY`.
-fn optional_key_ignoring_type_prefix<'a>(table: &TableReader<'a>, path: &'static str) -> KeyInTable<'a> {
+fn key_at_typed_path<'a>(table: &TableReader<'a>, path: &'static str) -> KeyInTable<'a> {
     table.optional_key(path.split_once('.').map_or(path, |(_, name)| name))
 }
 
@@ -183,7 +183,7 @@ fn read_or_default<'a, T>(
     default: T,
     read: impl FnOnce(&KeyInTable<'a>, Limits) -> Option<T>,
 ) -> T {
-    read(&optional_key_ignoring_type_prefix(table, path), table.key_limits(path)).unwrap_or(default)
+    read(&key_at_typed_path(table, path), table.key_limits(path)).unwrap_or(default)
 }
 
 /// Reads a color or a texture.

@@ -104,8 +104,8 @@ fn starts_with_key(line: &str) -> bool {
     line.split_once('=').is_some_and(|(key, _)| !key.contains(['[', '{', ',', '\"', '#']))
 }
 
-/// Returns the opening bracket of a list that is still open at the end of the file. Examines only the text from
-/// the last key on, because files may be long.
+/// Returns the opening bracket of a list that is still open at the end of the file. Examines only the text
+/// from the last key on, because files may be long.
 fn last_unclosed_bracket(text: &str) -> Option<usize> {
     let mut start = text.len();
     loop {
@@ -118,8 +118,8 @@ fn last_unclosed_bracket(text: &str) -> Option<usize> {
     }
 }
 
-/// Returns the help text for an unclosed list. The text shows the corrected list if the list consists of numbers
-/// on one line.
+/// Returns the help text for an unclosed list. The text shows the corrected list if the list consists of
+/// numbers on one line.
 fn unclosed_list_help(context: &FileContext<'_>, open: usize) -> String {
     let end = context
         .span_text(&(open..context.file_text().len()))
@@ -216,8 +216,8 @@ fn number_text_at<'c>(context: &'c FileContext<'_>, span: &Range<usize>) -> &'c 
     context.span_text(&(start..end))
 }
 
-/// Adds missing digits before or after the decimal point. Returns `None` if no digit is missing or the result is
-/// not a number.
+/// Adds missing digits before or after the decimal point. Returns `None` if no digit is missing or the result
+/// is not a number.
 fn add_missing_digits(number: &str) -> Option<String> {
     let unsigned = number.trim_start_matches(['+', '-']);
     let sign = &number[..number.len() - unsigned.len()];

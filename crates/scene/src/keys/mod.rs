@@ -35,8 +35,8 @@ pub fn all_tables() -> &'static [TableInfo] {
     &TABLES
 }
 
-/// Returns the paths and descriptions of all tables, types and keys, such as `materials`, `materials.metal` and
-/// `materials.metal.roughness`.
+/// Returns the paths and descriptions of all tables, types and keys, such as `materials`, `materials.metal`
+/// and `materials.metal.roughness`.
 pub fn all_paths_with_descriptions() -> Vec<(String, &'static str)> {
     let mut all = Vec::new();
     for table in all_tables() {

@@ -58,7 +58,8 @@ fn format_expected(expected: &Expected) -> String {
 pub(super) struct BoundedErrors(Vec<SyntaxError>);
 
 impl BoundedErrors {
-    /// Maximum length, large enough to include the first errors in text order, except in absurdly broken files.
+    /// Maximum length, large enough to include the first errors in text order, except in absurdly broken
+    /// files.
     const CAPACITY: usize = 2_000;
 
     pub(super) fn push_with(&mut self, make: impl FnOnce() -> SyntaxError) {

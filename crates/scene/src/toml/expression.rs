@@ -65,8 +65,8 @@ fn parse_into_events(
 /// Finds the end of a TOML expression.
 ///
 /// `open` is a supersequence of the parser's open brackets, because only a bracket of the same kind closes a
-/// bracket here. With mismatched brackets, the parser may finish earlier, but it is never inside a value while
-/// `open` is empty.
+/// bracket here. With mismatched brackets, the parser may finish earlier, but it is never inside a value
+/// while `open` is empty.
 #[derive(Default)]
 struct StatementEndFinder {
     phase: StatementPhase,

@@ -75,8 +75,8 @@ pub fn record_first_hits_on_plain_surfaces(
     left
 }
 
-/// Returns the albedo of a material if its albedo and shading normals are constant over each surface, and none
-/// of its surfaces is a null interaction.
+/// Returns the albedo of a material if its albedo and shading normals are constant over each surface, and
+/// none of its surfaces is a null interaction.
 fn constant_albedo(tile: &TileContext<'_>, index: usize) -> Option<Vec3> {
     let material = &tile.world.materials[index];
     let is_constant = !tile.world.material_needs_uvs_or_tangents(index) && !material.has_null_interaction();

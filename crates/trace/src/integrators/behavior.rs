@@ -2,7 +2,7 @@
 
 use super::settings::RenderSettings;
 use super::view::LightAov;
-use crate::lights::LightSamplingIntegrator;
+use crate::lights::LightSamplingPurpose;
 use crate::scene::description::IntegratorProperties;
 
 /// How camera paths continue at surfaces.
@@ -19,7 +19,7 @@ pub struct PathBehavior {
     /// glass ignores this light.
     pub gathers: bool,
     /// How lights are sampled.
-    pub receivers: LightSamplingIntegrator,
+    pub receivers: LightSamplingPurpose,
 }
 
 impl PathBehavior {
@@ -34,12 +34,12 @@ impl PathBehavior {
                 scatters: gathers,
                 mirrors: false,
                 gathers,
-                receivers: LightSamplingIntegrator::Eye,
+                receivers: LightSamplingPurpose::Eye,
             },
             LightAov::Radiance(_) | LightAov::TraversalCost => {
                 let scatters = scatters || gathers;
                 let receivers =
-                    if scatters { LightSamplingIntegrator::Paths } else { LightSamplingIntegrator::Eye };
+                    if scatters { LightSamplingPurpose::Paths } else { LightSamplingPurpose::Eye };
                 Self { splits, scatters, mirrors: !scatters, gathers, receivers }
             }
         }
@@ -47,6 +47,6 @@ impl PathBehavior {
 }
 
 /// Determines how lights are sampled, based on the settings and on whether photons are gathered.
-pub fn light_sampling_integrator(settings: &RenderSettings, are_gathered: bool) -> LightSamplingIntegrator {
+pub fn light_sampling_purpose(settings: &RenderSettings, are_gathered: bool) -> LightSamplingPurpose {
     PathBehavior::from_settings(settings, are_gathered).receivers
 }

@@ -97,8 +97,8 @@ pub struct SampleLayerValues {
     lists: [Vec<Vec3>; SampleLayer::ALL.len()],
     /// Layers with values other than zero.
     used: LayerSet,
-    /// The tile's most recent results of [`SampleLayerValues::constant_albedo`], by material index modulo the array
-    /// length.
+    /// The tile's most recent results of [`SampleLayerValues::constant_albedo`], by material index modulo the
+    /// array length.
     albedos: [Option<(usize, Option<Vec3>)>; 16],
 }
 

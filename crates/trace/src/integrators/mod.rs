@@ -40,7 +40,7 @@ use crate::film::{LayerSums, NegativeLobeMask, SelectedPixels, TileSamples};
 use crate::math::Vec3;
 use crate::world::{PACKET_SIZE, World};
 use behavior::PathBehavior;
-pub use behavior::light_sampling_integrator;
+pub use behavior::light_sampling_purpose;
 pub use counters::RayCounters;
 pub use layers::{LayerSet, SampleLayer};
 use memory::ThreadMemory;

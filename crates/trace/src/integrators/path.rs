@@ -83,7 +83,7 @@ pub fn trace_camera_paths(
         }
     }
     paths.shade_queued_vertices()?;
-    paths.direct.add_arrived_light_consecutive(slots.start, &mut paths.accumulator);
+    paths.direct.accumulate_consecutive_arrived_light(slots.start, &mut paths.accumulator);
     paths.next_bounce(rays);
     // Trace the remaining bounces.
     while !rays.is_empty() {
@@ -141,7 +141,8 @@ impl CameraWavefront<'_, '_> {
         }
         // Intersect the rays. The vertices of plain surfaces are ready for the queue.
         let are_lit = self.may_scatter() && self.accumulator.accepts_reflected();
-        let (aov, buffers) = (self.accumulator.aov, (self.direct.spare_batch(), &mut *self.surfaces));
+        let aov = self.accumulator.aov;
+        let buffers = (self.direct.spare_batch(), &mut *self.surfaces);
         let packet = tile.intersect_packet(rays, aov, are_lit, buffers);
         self.counters.texture_lookups += packet.lookups;
         if aov == LightAov::TraversalCost {
@@ -151,23 +152,23 @@ impl CameraWavefront<'_, '_> {
             self.direct.commit_spare_vertices();
             self.store_cones(&rays, &packet);
         }
-        // Add the emission found by camera rays, which needs no MIS weights, and record their layers.
+        // Add the emission found by camera rays, which needs no MIS weights.
         let (plain, escaped) = self.emitting_and_escaped_masks(&rays, &packet);
         let mut unfinished = packet.any & !packet.plain;
         match rays {
             PacketSource::Camera(row, first, ..) => {
                 self.add_camera_ray_emission(&row.rays, first, &packet, (plain, escaped));
-                self.record_first_hits(&rays, &packet, first);
             }
             PacketSource::Paths(..) | PacketSource::Traced(..) => unfinished |= plain | escaped,
         }
-        // Add the emission found by the other rays and shade the surfaces that are not plain. The
-        // contributions to a sample are added in path order.
+        // Add the emission found by the other rays and shade the surfaces that are not plain, in path order.
+        let mut pending = 0;
         for lane in set_bit_lanes(unfinished) {
             self.place = rays.queue_index(lane);
-            self.shade_ray(packet.incoming_path(tile, &rays, lane), (&packet, lane));
-            self.record_first_hit_if_passed(&rays, &packet, lane);
+            self.shade_ray(rays.path(tile, lane), (&packet, lane));
+            pending |= u32::from(std::mem::take(&mut self.is_first_hit_pending)) << lane;
         }
+        self.record_first_hits(&rays, &packet, pending);
         // Scatter at the queued vertices while their data is in the cache.
         if self.direct.is_full() {
             self.shade_queued_vertices()?;
@@ -179,21 +180,19 @@ impl CameraWavefront<'_, '_> {
     fn shade_queued_vertices(&mut self) -> Result<(), Cancelled> {
         let (tile, aov, depth) = (self.tile, self.accumulator.aov, self.depth);
         let shares_with_paths = self.paths_find_lights();
-        let splits_lobes = self.accumulator.fractions().is_some();
         for vertices in self.direct.light_sampling_groups(tile) {
             // Sample lights.
-            self.direct.sample_and_trace_group_lights(vertices.clone(), tile, aov, shares_with_paths)?;
+            self.direct.sample_group_lights(vertices.clone(), tile, aov, shares_with_paths)?;
             for (index, number) in vertices.clone().enumerate() {
                 let mut light = self.direct.reflected_light((index, number), tile, aov, shares_with_paths);
                 let row = self.direct.batch(number);
                 // Gather photons.
                 if let Some(maps) = self.maps {
+                    let splits_lobes = self.direct.splits_lobes(row);
                     let gathered = gather_photons(tile, row, maps, depth, (aov, splits_lobes));
-                    light.add_lanes(row.used, &gathered);
+                    light.add_lanes(row.used, &gathered, splits_lobes);
                 }
-                self.counters.shadow_rays += light.rays.shadow;
-                self.counters.scattered_rays += light.rays.scattered;
-                self.counters.texture_lookups += light.rays.lookups;
+                light.rays.add_to(self.counters);
                 self.direct.accumulate_reflected_light(number, aov, &light);
             }
             // Sample BSDFs, with Russian roulette.
@@ -224,7 +223,8 @@ impl CameraWavefront<'_, '_> {
         policy.filter(|policy| policy.continues)
     }
 
-    /// Whether continuing paths compete with light samples. Hard shadows are computed only with light samples.
+    /// Whether continuing paths compete with light samples. Hard shadows are computed only with light
+    /// samples.
     fn paths_find_lights(&self) -> bool {
         let is_soft = self.tile.settings.render.shadows == ShadowMode::Soft;
         self.continuation.is_some() && (!self.tile.behavior.gathers || is_soft)

@@ -223,7 +223,7 @@ impl MergedMeshes {
         let Some(facets) = &self.facets else { return self.any_hit_by_tree(rows, met, ends, except) };
         let own = except.unwrap_or(&[Self::NO_TRIANGLE; PACKET_SIZE]);
         let size = self.bounds().extent();
-        match by.run(IncoherentAnyHitKernel { facets, size, rows, met, ends, except: own }) {
+        match by.run(TriangleListAnyHitKernel { facets, size, rows, met, ends, except: own }) {
             Some([hit, 0]) => hit,
             Some([hit, undecided]) => hit | self.any_hit_one_by_one(rows, undecided, ends, own),
             None => self.any_hit_by_tree(rows, met, ends, except),
@@ -291,8 +291,8 @@ fn are_coherent(rows: &RayPacket, met: u32, size: Vec3, simd: impl Simd) -> bool
 /// between directions relative to their length.
 const COHERENCE: f32 = 0.125;
 
-/// Kernel that calls [`TriangleList::closest_hit_packet`] for incoherent rays and returns the lanes that need
-/// an exact test, or returns `None` for coherent rays.
+/// Kernel that calls [`TriangleList::update_decided_closest_hits`] for incoherent rays and returns the lanes
+/// that need an exact test, or returns `None` for coherent rays.
 struct TriangleListClosestHitKernel<'a> {
     facets: &'a TriangleList,
     size: Vec3,
@@ -315,9 +315,9 @@ impl SimdKernel for TriangleListClosestHitKernel<'_> {
     }
 }
 
-/// Kernel that calls [`TriangleList::any_hit_packet`] for incoherent rays and returns the hit lanes and the
-/// lanes that need an exact test, or returns `None` for coherent rays.
-struct IncoherentAnyHitKernel<'a> {
+/// Kernel that calls [`TriangleList::any_hit_and_undecided_masks`] for incoherent rays and returns the hit
+/// lanes and the lanes that need an exact test, or returns `None` for coherent rays.
+struct TriangleListAnyHitKernel<'a> {
     facets: &'a TriangleList,
     size: Vec3,
     rows: &'a RayPacket,
@@ -326,7 +326,7 @@ struct IncoherentAnyHitKernel<'a> {
     except: &'a [u32; PACKET_SIZE],
 }
 
-impl SimdKernel for IncoherentAnyHitKernel<'_> {
+impl SimdKernel for TriangleListAnyHitKernel<'_> {
     type Output = Option<[u32; 2]>;
 
     #[inline(always)]

@@ -78,7 +78,7 @@ impl ColorMapper {
     }
 
     /// Returns the terminal color to draw for an sRGB color at this pixel position.
-    pub(crate) fn dithered_terminal_color(&self, rgb: [u8; 3], x: usize, y: usize) -> Color {
+    pub(crate) fn terminal_color_at(&self, rgb: [u8; 3], x: usize, y: usize) -> Color {
         let index = || self.plain.borrow_mut().select_color_index(rgb, bayer_threshold(x, y));
         match self.depth {
             ColorDepth::TrueColor => Color::Rgb(rgb[0], rgb[1], rgb[2]),
@@ -97,10 +97,7 @@ impl ColorMapper {
                 return self.dithered_cell(pattern_weighted_mean_color(first, second, fitted.tile), x, y);
             }
         }
-        let pair = [
-            self.dithered_terminal_color(first, x, 2 * y),
-            self.dithered_terminal_color(second, x, 2 * y + 1),
-        ];
+        let pair = [self.terminal_color_at(first, x, 2 * y), self.terminal_color_at(second, x, 2 * y + 1)];
         MappedCell { tile: fitted.tile, pair }
     }
 

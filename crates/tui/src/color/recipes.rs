@@ -34,8 +34,8 @@ impl SolidOrPatternColor {
         Self { linear, lab: linear_to_oklab(linear), texture: 0.0 }
     }
 
-    /// Creates an ink from a fine pattern of `front` over `back`. `share` is the fraction of the area covered
-    /// by `front`.
+    /// Creates a color from a fine pattern of `front` over `back`. `share` is the fraction of the area
+    /// covered by `front`.
     pub(super) fn from_two_color_pattern(front: &Self, back: &Self, share: f32) -> Self {
         /// Texture weight for patterns inside a cell, which are less visible than patterns made of whole
         /// cells.

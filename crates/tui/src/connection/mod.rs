@@ -76,7 +76,7 @@ enum ReplySupport {
     Silent,
 }
 
-/// The connection to the terminal.
+/// Flow control for output to the terminal.
 #[derive(Debug)]
 pub(super) struct TerminalFlowControl {
     replies: ReplySupport,

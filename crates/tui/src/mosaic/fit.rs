@@ -13,9 +13,9 @@ pub(crate) struct FittedCell {
     pub(crate) pair: [[u8; 3]; 2],
 }
 
-/// A tile other than [`BlockPattern::HALVES`] is chosen only if it reduces the mean squared Oklab distance by
-/// at least this much. Smaller improvements are invisible, make the tiles flicker with the noise, and take
-/// more bytes.
+/// A tile other than [`TwoPartBlockPattern::HALVES`] is chosen only if it reduces the mean squared Oklab
+/// distance by at least this much. Smaller improvements are invisible, make the tiles flicker with the noise,
+/// and take more bytes.
 const WORTH: f32 = 1e-4;
 
 /// Finds the tile and the two colors that best match a cell's `pixels` (sRGB colors in row order). The tile

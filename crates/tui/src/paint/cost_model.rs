@@ -26,7 +26,8 @@ impl RateDistortion {
     /// as much as a color change.
     pub(super) const MOVING: Self = Self { byte: 32.0, most: 255, spans: &[1, 4, 9] };
 
-    /// Returns the model with its cost per byte changed to `byte`, but never below [`RateDistortion::MOVING`].
+    /// Returns the model with its cost per byte changed to `byte`, but never below
+    /// [`RateDistortion::MOVING`].
     pub(super) fn with_cost_per_byte(self, byte: f32) -> Self {
         let byte = byte.max(Self::MOVING.byte);
         let spans: &[u8] = match byte {

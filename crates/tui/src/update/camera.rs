@@ -4,7 +4,7 @@
 use std::path::PathBuf;
 
 use super::notices::{
-    show_key_change, show_notice, show_notice_returning_no_effects, show_until_key_returning_no_effects,
+    show_key_change, show_notice, show_notice_without_effects, show_until_key_without_effects,
 };
 use super::request::request_render;
 use crate::camera::{dollied, orbited, zoomed_fov};
@@ -48,7 +48,7 @@ pub(super) fn dolly(state: &mut State, steps: f64) -> Vec<Effect> {
     };
     let pose = dollied(&view.pose, libm::pow(NEARER, steps), own.pose.distance());
     if pose == view.pose {
-        return show_notice_returning_no_effects(
+        return show_notice_without_effects(
             state,
             if steps > 0.0 { messages::CLOSEST } else { messages::FARTHEST },
         );
@@ -61,7 +61,7 @@ pub(super) fn widen_field_of_view(state: &mut State, steps: f64) -> Vec<Effect> 
     let Some(view) = state.request.viewpoint() else { return show_no_scene_notice(state) };
     let fov = zoomed_fov(&view, libm::pow(WIDER, steps));
     if fov == view.fov {
-        return show_notice_returning_no_effects(state, &messages::fov_limit(fov));
+        return show_notice_without_effects(state, &messages::fov_limit(fov));
     }
     state.request.toggles.camera.fov = Some(fov);
     render_camera_step(state)
@@ -74,7 +74,7 @@ pub(super) fn change_exposure(state: &mut State, steps: f32) -> Vec<Effect> {
     let before = state.request.toggles.exposure.unwrap_or(own);
     let stops = (before + steps * STOPS).clamp((-MAX_STOPS).min(before), MAX_STOPS.max(before));
     if stops == before {
-        return show_notice_returning_no_effects(state, &messages::exposure_limit(&format_stops(stops)));
+        return show_notice_without_effects(state, &messages::exposure_limit(&format_stops(stops)));
     }
     state.request.toggles.exposure = (stops != own).then_some(stops);
     let effects = render_step_or_await_preview(state);
@@ -89,7 +89,7 @@ fn move_camera(state: &mut State, how: impl FnOnce(&Pose) -> Pose) -> Vec<Effect
 }
 
 fn show_no_scene_notice(state: &mut State) -> Vec<Effect> {
-    show_notice_returning_no_effects(state, messages::NO_SCENE)
+    show_notice_without_effects(state, messages::NO_SCENE)
 }
 
 pub(super) fn render_camera_step(state: &mut State) -> Vec<Effect> {
@@ -124,7 +124,7 @@ pub(super) fn save_camera(state: &mut State) -> Vec<Effect> {
     let is_set = state.request.command_line.sets.iter().any(|set| set.trim_start().starts_with("camera"));
     // For models, `c` writes a new scene file, even with the default camera.
     if !state.request.toggles.camera.has_changes() && !is_set && !has_mesh_extension(&state.request.scene) {
-        return show_notice_returning_no_effects(state, messages::NOTHING_TO_KEEP);
+        return show_notice_without_effects(state, messages::NOTHING_TO_KEEP);
     }
     let saved = state.request.scene_camera_edits_since_move();
     // Models do not contain a camera that could be overwritten.
@@ -132,7 +132,7 @@ pub(super) fn save_camera(state: &mut State) -> Vec<Effect> {
         // The message below lists the saved values, so they cause no further conflict.
         state.request.reset_move_origin_to_scene_camera();
         let saved = saved.join(", ");
-        return show_until_key_returning_no_effects(
+        return show_until_key_without_effects(
             state,
             &format!("error: {saved} {}", messages::CAMERA_CONFLICT),
         );
@@ -152,7 +152,7 @@ pub(super) fn handle_saved_camera(
         Err(why) => {
             state.saving.camera_refused = Some(state.now);
             state.saving.has_scene_of_model |= has_mesh_extension(&state.request.scene);
-            return show_until_key_returning_no_effects(
+            return show_until_key_without_effects(
                 state,
                 &format!("error: {}", escape_invisible_chars(&why)),
             );
@@ -188,9 +188,9 @@ pub(super) fn undo_saved_camera(state: &mut State) -> Vec<Effect> {
     match state.saving.camera_edits.last() {
         Some(edit) => vec![Effect::Send(Command::UndoCamera(edit.clone()))],
         None if state.saving.camera_of_model.is_some() => {
-            show_notice_returning_no_effects(state, messages::NEW_SCENE_STAYS)
+            show_notice_without_effects(state, messages::NEW_SCENE_STAYS)
         }
-        None => show_notice_returning_no_effects(state, messages::NOTHING_TO_UNDO),
+        None => show_notice_without_effects(state, messages::NOTHING_TO_UNDO),
     }
 }
 
@@ -200,7 +200,7 @@ pub(super) fn handle_undone_camera(state: &mut State, outcome: Result<PathBuf, S
         Ok(path) => path,
         Err(why) => {
             state.saving.camera_refused = Some(state.now);
-            return show_until_key_returning_no_effects(
+            return show_until_key_without_effects(
                 state,
                 &format!("error: {}", escape_invisible_chars(&why)),
             );

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::notices::{show_notice, show_notice_returning_no_effects, show_until_key};
+use super::notices::{show_notice, show_notice_without_effects, show_until_key};
 use crate::event::Effect;
 use crate::messages;
 use crate::state::{RenderState, State};
@@ -40,7 +40,7 @@ pub(super) fn browse(state: &mut State, steps: isize) -> Vec<Effect> {
     }
     match state.picture.history.step_back_by(steps, newest) {
         Some(shown) => show_history_render(state, shown),
-        None => show_notice_returning_no_effects(
+        None => show_notice_without_effects(
             state,
             if steps > 0 { messages::OLDEST_RENDER } else { messages::NEWEST_RENDER },
         ),
@@ -75,7 +75,7 @@ pub(super) fn toggle_render_before_edit(state: &mut State) -> Vec<Effect> {
             show_until_key(state, format!("{}{edits}", messages::BEFORE_EDIT));
             effects
         }
-        None => show_notice_returning_no_effects(state, messages::NO_EARLIER_RENDER),
+        None => show_notice_without_effects(state, messages::NO_EARLIER_RENDER),
     }
 }
 
@@ -91,7 +91,7 @@ pub(super) fn return_to_newest(state: &mut State, words: &str) -> Vec<Effect> {
 /// Explains why the history, which consists of previews, has no image.
 fn report_no_image(state: &mut State) -> Vec<Effect> {
     let is_shown = state.request.preview_size.is_some();
-    show_notice_returning_no_effects(state, if is_shown { messages::NO_IMAGE } else { messages::NO_PREVIEW })
+    show_notice_without_effects(state, if is_shown { messages::NO_IMAGE } else { messages::NO_PREVIEW })
 }
 
 fn newest_image(state: &State) -> Option<crate::history::ShownImage> {

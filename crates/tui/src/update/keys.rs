@@ -2,7 +2,7 @@
 
 use crossterm::event::{KeyCode, KeyModifiers};
 
-use super::notices::{show_notice, show_notice_returning_no_effects};
+use super::notices::{show_notice, show_notice_without_effects};
 use super::request::{request_render, request_resized_preview};
 use super::views::select_view_and_open_list;
 use super::{camera, edit_position, history, overlay, pointer, region};
@@ -26,11 +26,7 @@ pub(super) fn handle_key(state: &mut State, key: KeyPress) -> Vec<Effect> {
     let Some(action) = keymap::action_for(key) else {
         let is_digit = key == KeyPress { code: key.code, modifiers: KeyModifiers::NONE }
             && matches!(key.code, KeyCode::Char('1'..='9'));
-        return if is_digit {
-            show_notice_returning_no_effects(state, messages::VIEWS_FIRST)
-        } else {
-            Vec::new()
-        };
+        return if is_digit { show_notice_without_effects(state, messages::VIEWS_FIRST) } else { Vec::new() };
     };
     state.dirty |= state.overlays.message.take().is_some() | state.selection.facts.take().is_some();
     state.selection.is_focusing &= action == Action::Focus;
@@ -70,7 +66,7 @@ pub(super) fn perform_action(state: &mut State, action: Action) -> Vec<Effect> {
         Action::RenderRegionFirst => region::start_confirm_or_clear_region(state),
         Action::ToggleMouse => pointer::toggle_mouse(state),
         Action::Edit if has_mesh_extension(&state.request.scene) => {
-            show_notice_returning_no_effects(state, messages::NO_EDITOR_FOR_MODELS)
+            show_notice_without_effects(state, messages::NO_EDITOR_FOR_MODELS)
         }
         Action::Edit => vec![Effect::Edit(edit_position::position_to_edit(state))],
         Action::CompareLastEdit => history::toggle_render_before_edit(state),
@@ -121,7 +117,7 @@ fn supporting_integrator_name_if_needed(
 
 fn cycle_shadows(state: &mut State) -> Vec<Effect> {
     if let Some(other) = supporting_integrator_name_if_needed(state, |method| method.honors_shadows) {
-        return show_notice_returning_no_effects(
+        return show_notice_without_effects(
             state,
             &messages::hard_shadows_unsupported(state.request.integrator().name(), other),
         );
@@ -140,9 +136,9 @@ fn cycle_shadows(state: &mut State) -> Vec<Effect> {
 fn toggle_depth_of_field(state: &mut State) -> Vec<Effect> {
     let switched_off = state.request.combined_overrides().dof == Some(false);
     match &state.request.effective {
-        None => return show_notice_returning_no_effects(state, messages::NO_SCENE),
+        None => return show_notice_without_effects(state, messages::NO_SCENE),
         Some(effective) if !effective.dof && !switched_off => {
-            return show_notice_returning_no_effects(state, messages::PINHOLE);
+            return show_notice_without_effects(state, messages::PINHOLE);
         }
         Some(_) => {}
     }
@@ -154,7 +150,7 @@ fn toggle_depth_of_field(state: &mut State) -> Vec<Effect> {
 
 fn toggle_photon_mapping(state: &mut State) -> Vec<Effect> {
     if let Some(other) = supporting_integrator_name_if_needed(state, |method| method.gathers) {
-        return show_notice_returning_no_effects(state, &messages::photons_unsupported(other));
+        return show_notice_without_effects(state, &messages::photons_unsupported(other));
     }
     let next = !state.request.are_photons_enabled();
     state.request.toggles.photons =
@@ -169,7 +165,7 @@ fn step_view(state: &mut State, steps: usize) -> Vec<Effect> {
 
 fn toggle_image_only(state: &mut State) -> Vec<Effect> {
     match state.display.kind {
-        PreviewKind::None => return show_notice_returning_no_effects(state, messages::NO_PREVIEW),
+        PreviewKind::None => return show_notice_without_effects(state, messages::NO_PREVIEW),
         PreviewKind::HalfBlock
         | PreviewKind::Quadrant
         | PreviewKind::Sextant
@@ -185,7 +181,7 @@ fn toggle_image_only(state: &mut State) -> Vec<Effect> {
 /// Toggles between actual pixels around the crosshair and the whole image.
 fn toggle_actual_pixels(state: &mut State) -> Vec<Effect> {
     if state.request.preview_size.is_none() {
-        return show_notice_returning_no_effects(state, messages::NO_PREVIEW);
+        return show_notice_without_effects(state, messages::NO_PREVIEW);
     }
     history::return_to_newest(state, "");
     state.picture.close_up =
@@ -200,7 +196,7 @@ fn toggle_actual_pixels(state: &mut State) -> Vec<Effect> {
 
 fn toggle_pause(state: &mut State) -> Vec<Effect> {
     if !state.work.is_request_running() && !state.work.paused {
-        return show_notice_returning_no_effects(state, messages::NOT_RENDERING);
+        return show_notice_without_effects(state, messages::NOT_RENDERING);
     }
     state.set_clock_paused(!state.work.paused);
     state.dirty = true;
@@ -218,7 +214,7 @@ fn write_image_now(state: &mut State) -> Vec<Effect> {
 
 fn reset_to_scene_settings(state: &mut State) -> Vec<Effect> {
     if state.request.toggles == KeyOverrides::default() {
-        return show_notice_returning_no_effects(state, messages::NOTHING_TO_RESET);
+        return show_notice_without_effects(state, messages::NOTHING_TO_RESET);
     }
     state.request.toggles = KeyOverrides::default();
     let effects = request_render(state, false);
@@ -229,7 +225,7 @@ fn reset_to_scene_settings(state: &mut State) -> Vec<Effect> {
 fn toggle_diagnostics(state: &mut State) -> Vec<Effect> {
     if state.overlays.problems.is_none() && state.warnings_and_write_failure().is_empty() {
         let is_read = state.overlays.are_warnings_known || !state.work.is_request_running();
-        return show_notice_returning_no_effects(
+        return show_notice_without_effects(
             state,
             if is_read { messages::NO_DIAGNOSTICS } else { messages::STILL_READING },
         );

@@ -250,7 +250,7 @@ fn draw_two_color_cell(
     let colors: Vec<[u8; 3]> = parts.iter().copied().flatten().collect();
     if colors.len() < parts.len() {
         // The last row of cells may lack pixels in its lower half.
-        let color = parts[0].map_or(Color::Reset, |rgb| shades.dithered_terminal_color(rgb, x, 2 * y));
+        let color = parts[0].map_or(Color::Reset, |rgb| shades.terminal_color_at(rgb, x, 2 * y));
         cell.set_symbol("▀").set_style(Style::new().fg(color).bg(Color::Reset));
         return;
     }
@@ -272,7 +272,7 @@ fn draw_ascii_cell(
         cell.set_char(ramp.glyph(rgb));
     } else {
         let (symbol, ink) = ramp.tinted_glyph(rgb);
-        cell.set_char(symbol).set_style(Style::new().fg(inks.shades.dithered_terminal_color(ink, x, y)));
+        cell.set_char(symbol).set_style(Style::new().fg(inks.shades.terminal_color_at(ink, x, y)));
     }
 }
 

@@ -138,7 +138,8 @@ fn split_command_line(line: &str) -> CommandLine {
     CommandLine { words, quote }
 }
 
-/// Quotes a candidate that is inserted after the open quote `quote`, or returns `None` if it cannot be quoted.
+/// Quotes a candidate that is inserted after the open quote `quote`, or returns `None` if it cannot be
+/// quoted.
 fn quote_text_for_bash(text: &str, quote: Quote, keeps_home: bool) -> Option<String> {
     let is_plain = |c: char| c.is_alphanumeric() || "_./,:=@%+-".contains(c);
     if text.chars().any(char::is_control) {

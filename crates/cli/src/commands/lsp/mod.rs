@@ -86,7 +86,7 @@ fn serve(from: &mut impl BufRead, client: &ClientWriter) -> Result<Exit, String>
         match received {
             ReceivedFrame::Invalid(answer) => client.send_error(&answer),
             ReceivedFrame::Message(Message::Request(request)) => {
-                let response = server.response_to_request(request, &mut phase);
+                let response = server.respond_to_request(request, &mut phase);
                 server.send(&response.into());
             }
             ReceivedFrame::Message(Message::Notification(one)) => match (one.method.as_str(), phase) {
@@ -123,7 +123,7 @@ impl Server<'_> {
     }
 
     /// Responds to a request and updates the phase.
-    fn response_to_request(&self, request: Request, phase: &mut ServerPhase) -> Response {
+    fn respond_to_request(&self, request: Request, phase: &mut ServerPhase) -> Response {
         let refused = |id, code: ErrorCode, why: &str| Response::new_err(id, code as i32, why.to_owned());
         match (request.method.as_str(), *phase) {
             (Initialize::METHOD, ServerPhase::New) => {
@@ -193,7 +193,7 @@ impl Server<'_> {
         match method.as_str() {
             DidOpenTextDocument::METHOD => {
                 if let Some(DidOpenTextDocumentParams { text_document: one }) = params_if_valid(params) {
-                    self.store_document_and_diagnose_text(&one.uri, one.version, one.text);
+                    self.store_and_diagnose_document(&one.uri, one.version, one.text);
                     self.queue_referenced_files_check(&one.uri);
                 }
             }
@@ -206,7 +206,7 @@ impl Server<'_> {
                             "ignored an incremental change: this server needs full text synchronization",
                         );
                     } else if let Some(last) = content_changes.pop() {
-                        self.store_document_and_diagnose_text(
+                        self.store_and_diagnose_document(
                             &text_document.uri,
                             text_document.version,
                             last.text,
@@ -236,7 +236,7 @@ impl Server<'_> {
     }
 
     /// Stores a document and publishes its diagnostics.
-    fn store_document_and_diagnose_text(&self, uri: &Uri, version: i32, text: String) {
+    fn store_and_diagnose_document(&self, uri: &Uri, version: i32, text: String) {
         let document = OpenDocument::new(uri_to_path(uri), version, text);
         let found = diagnostics::text_diagnostics(&document);
         self.documents().insert(uri.as_str().to_owned(), document);

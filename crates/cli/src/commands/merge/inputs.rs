@@ -32,8 +32,8 @@ impl<'a> RenderInputFiles<'a> {
         Self { parts, token, named: scenes.into_iter().chain(named).collect(), companions: OnceCell::new() }
     }
 
-    /// Returns the reason why the file at `path` must be kept, if it is an input. Checks the files that meshes
-    /// reference last, because listing them requires reading the meshes.
+    /// Returns the reason why the file at `path` must be kept, if it is an input. Checks the files that
+    /// meshes reference last, because listing them requires reading the meshes.
     ///
     /// # Errors
     /// Returns [`Cancelled`] if the token is canceled.

@@ -178,7 +178,8 @@ fn all_types_table_schema(info: &'static TableInfo) -> Value {
     table
 }
 
-/// Returns the schema for a key shared by several types. It accepts every value that any of the types accepts.
+/// Returns the schema for a key shared by several types. It accepts every value that any of the types
+/// accepts.
 fn shared_key_schema(keys: &[(&'static TableTypeInfo, &'static KeyInfo)]) -> Value {
     let draft = SchemaDraft::Four;
     let mut values: Vec<Value> = keys.iter().map(|(_, key)| value_schema(key.kind, draft)).collect();

@@ -16,7 +16,7 @@ const SHORTEST_FRAME: f64 = 0.02;
 /// Encodes frames of the same size as an animation that loops forever. Encoding is deterministic.
 ///
 /// # Errors
-/// The format does not support the frames, the encoder fails, or the work is cancelled
+/// The format does not support the frames, the encoder fails, or the work is canceled
 /// ([`OutputError::Cancelled`]).
 pub fn encode(
     frames: &[Srgb8Image],
@@ -38,7 +38,7 @@ pub fn encode(
         AnimationFormat::Gif => gif::encode(frames, metadata, token).map_err(|error| error.to_string()),
         AnimationFormat::Apng => apng::encode(frames, metadata, token).map_err(|error| error.to_string()),
     };
-    // A cancelled encoder reports its own error.
+    // A canceled encoder reports its own error.
     token.check_pause_and_cancel()?;
     bytes.map_err(|why| failed(format!("could not be encoded: {why}")))
 }

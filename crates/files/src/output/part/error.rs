@@ -109,7 +109,7 @@ pub enum PartError {
     /// There is not enough memory for the image.
     #[error("{0}")]
     Film(#[from] crate::film::FilmCreationError),
-    /// The operation was cancelled.
+    /// The operation was canceled.
     #[error("cancelled")]
     Cancelled(#[from] crate::control::Cancelled),
 }

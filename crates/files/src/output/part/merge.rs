@@ -78,7 +78,7 @@ fn metadata_differences(a: &[(String, String)], b: &[(String, String)]) -> Vec<S
 ///
 /// # Errors
 /// Same as [`check_and_list_missing`]. Also fails if parts are missing, a part is inconsistent, or the work
-/// is cancelled.
+/// is canceled.
 pub fn merge_into_film(
     parts: &[PartFile],
     is_partial: bool,

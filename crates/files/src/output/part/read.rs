@@ -64,7 +64,7 @@ impl PartFile {
     ///
     /// # Errors
     /// The file is unreadable, not a part, from another version, truncated or damaged, or the work is
-    /// cancelled.
+    /// canceled.
     pub fn open(path: &Path, token: &CancelToken) -> Result<Self, PartError> {
         let unreadable = |source| PartError::Unreadable { path: path.to_owned(), source };
         let file = open_raising_file_limit(path)?;

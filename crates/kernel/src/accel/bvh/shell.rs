@@ -209,8 +209,8 @@ impl Bvh {
         }
     }
 
-    /// [`Bvh::closest_hit`] with shells. The callback is `dyn` because compiling this function separately for
-    /// each caller would not make it faster.
+    /// The closest-hit traversal with shells. The callback is `dyn` because compiling this function
+    /// separately for each caller would not make it faster.
     #[cold]
     #[inline(never)]
     pub(super) fn closest_hit_with_shells(

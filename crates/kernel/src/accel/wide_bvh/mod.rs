@@ -145,8 +145,8 @@ impl WideBvh {
         !self.nodes.is_empty() && simd::any_hit(self, ray, except)
     }
 
-    /// [`WideBvh::closest_hit`] for up to [`PACKET_SIZE`] rays. Faster for rays in similar directions, such as
-    /// camera rays through neighboring pixels.
+    /// [`WideBvh::closest_hit`] for up to [`PACKET_SIZE`] rays. Faster for rays in similar directions, such
+    /// as camera rays through neighboring pixels.
     pub fn closest_hit_packet(&self, rays: &[Ray], ends: &F32x16, hits: &mut [Option<ShapeHit>]) {
         debug_assert!(rays.len() <= PACKET_SIZE && rays.len() == hits.len());
         hits.fill(None);
@@ -157,8 +157,8 @@ impl WideBvh {
         }
     }
 
-    /// [`WideBvh::any_hit`] for up to [`PACKET_SIZE`] rays. Returns the mask of the rays that hit. `except` is
-    /// empty or has one entry per ray.
+    /// [`WideBvh::any_hit`] for up to [`PACKET_SIZE`] rays. Returns the mask of the rays that hit. `except`
+    /// is empty or has one entry per ray.
     pub fn any_hit_packet(&self, rays: &[Ray], ends: &F32x16, except: &[Option<u32>]) -> u32 {
         debug_assert!(rays.len() <= PACKET_SIZE && (except.is_empty() || rays.len() == except.len()));
         if self.nodes.is_empty() {

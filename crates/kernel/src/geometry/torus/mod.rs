@@ -208,7 +208,7 @@ impl Torus {
     }
 
     /// Projected area averaged over all directions, which is a quarter of the area.
-    pub fn projected_area_estimate(&self, _: DVec3) -> f64 {
+    pub fn projected_area(&self, _: DVec3) -> f64 {
         let [area] = self.local_part_areas();
         area / 4.0
     }

@@ -68,7 +68,7 @@ impl TransformedEmitter {
         let point = self.transformed.to_world.inverse_point(point.as_dvec3());
         let is_behind = match flat_normal(shape) {
             Some(normal) => !(normal.dot(point - shape.centroid()) > 0.0),
-            None => shape.contains_point(point),
+            None => shape.encloses_point(point),
         };
         (!is_behind).then(|| point.as_vec3())
     }

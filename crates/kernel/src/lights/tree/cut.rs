@@ -35,8 +35,8 @@ impl<'a> AdaptiveLightTreeCut<'a> {
     /// Maximum number of nodes in any cut.
     pub const MOST: usize = 64;
 
-    /// Creates a cut with at most `room` nodes. [`AdaptiveLightTreeCut::adapt_to_receiver`] must be called before
-    /// picking.
+    /// Creates a cut with at most `room` nodes. [`AdaptiveLightTreeCut::adapt_to_receiver`] must be called
+    /// before picking.
     #[inline(always)]
     pub fn new(tree: &'a LightTree, room: usize) -> Self {
         let receiver = Receiver::with_unknown_lobe(Vec3::ZERO, Vec3::ZERO);

@@ -75,7 +75,7 @@ fn cut_for(tree: &LightTree, point: Vec3, normal: Vec3, nodes: usize) -> Adaptiv
     cut
 }
 
-/// The light that [`AdaptiveLightTreeCut::pick`] picks for each number, and its probability.
+/// The light that [`AdaptiveLightTreeCut::pick_sorted_batch`] picks for each number, and its probability.
 fn picks_of<const N: usize>(cut: &AdaptiveLightTreeCut<'_>, u: &[f64; N]) -> [Option<(u32, f32)>; N] {
     let mut picks = [None; N];
     cut.pick_sorted_batch(u.iter().copied(), |place, light, probability| {

@@ -170,7 +170,7 @@ impl<B: Bxdf> TestSurface<B> {
         all
     }
 
-    /// Samples on either side with the same random numbers as [`TestSurface::sample_direction`].
+    /// Samples on either side with the same random numbers as [`TestSurface::sample_directions`].
     pub fn sample_reflection_or_transmission(
         &self,
         side: u32,

@@ -35,8 +35,8 @@ use rough_dielectric::DielectricBxdf;
 
 /// Generates enums over all kinds. Their methods dispatch to the trait methods of the same name. `materials`
 /// lists kinds that are entire materials. `parts` lists kinds that other materials use for part of their
-/// light. `kept` is the type in which a [`BsdfPacket`] stores a packet. The most common kind is stored inline.
-/// Others are boxed to keep packets small in scenes without them.
+/// light. `kept` is the type in which a [`BsdfPacket`] stores a packet. The most common kind is stored
+/// inline. Others are boxed to keep packets small in scenes without them.
 macro_rules! kinds {
     (
         materials { $($(#[$doc:meta])* $kind:ident($material:ty, $bxdf:ty, kept: $kept:ty)),+ $(,)? }

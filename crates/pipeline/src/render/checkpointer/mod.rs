@@ -169,8 +169,8 @@ impl<'a> Checkpointer<'a> {
         Ok(!state.has_samples())
     }
 
-    /// Restores the film from the output file if the file already contains this part. Returns whether the film was
-    /// restored.
+    /// Restores the film from the output file if the file already contains this part. Returns whether the
+    /// film was restored.
     ///
     /// # Errors
     /// The output file is a part of another render.
@@ -225,7 +225,7 @@ impl<'a> Checkpointer<'a> {
         }
         let Some((head, there)) = read_checkpoint_header_and_state(&self.path) else {
             return match PartFile::read_header(&self.path) {
-                Err(PartError::Version { .. }) => self.replace_moved_aside_unless_longer(|_| false),
+                Err(PartError::Version { .. }) => self.move_aside_unless_shorter(|_| false),
                 Ok(head) if head.kind == PartOrCheckpoint::Part => {
                     Err(finished_part_conflict_message(&self.path))
                 }
@@ -251,14 +251,14 @@ impl<'a> Checkpointer<'a> {
         let is_longer = |aside: &Path| {
             read_checkpoint_header_and_state(aside).is_some_and(|(_, before)| before.seconds >= there.seconds)
         };
-        self.replace_moved_aside_unless_longer(is_longer)
+        self.move_aside_unless_shorter(is_longer)
     }
 
     /// Moves the checkpoint aside, unless `is_longer` returns true for one that was moved aside earlier.
     ///
     /// # Errors
     /// Returns why it cannot be moved.
-    fn replace_moved_aside_unless_longer(&self, is_longer: impl Fn(&Path) -> bool) -> Result<(), String> {
+    fn move_aside_unless_shorter(&self, is_longer: impl Fn(&Path) -> bool) -> Result<(), String> {
         let mut aside = self.path.as_os_str().to_owned();
         aside.push(ASIDE);
         let aside = PathBuf::from(aside);
@@ -347,7 +347,7 @@ impl<'a> Checkpointer<'a> {
         self.due.set(Instant::now() + pause);
     }
 
-    /// When a render is cancelled, saves a checkpoint if it will be resumed later. Returns whether one was
+    /// When a render is canceled, saves a checkpoint if it will be resumed later. Returns whether one was
     /// saved.
     pub(crate) fn save_if_cancelled(&self, state: &FilmState, rays: RayCounters, seconds: f64) -> bool {
         let is_kept = match (self.around.interruption)() {
@@ -465,7 +465,7 @@ impl<'a> Checkpointer<'a> {
             sweep: None,
             losses: AttributeLossPolicy::Report(&|_| ()),
         };
-        // This write is short and never cancelled, because it may have been triggered by a signal.
+        // This write is short and never canceled, because it may have been triggered by a signal.
         let file = part::save(path, head, film, state, &guard, (&CancelToken::new(), durability))?;
         lock.borrow_mut().keep_open(path, file);
         Ok(())

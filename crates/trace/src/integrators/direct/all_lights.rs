@@ -3,6 +3,7 @@
 use super::mis::CompetingTechnique;
 use crate::geometry::Ray;
 use crate::geometry::packet::{F32x16, RayPacket, set_bit_lanes};
+use crate::integrators::RayCounters;
 use crate::integrators::transport::batch::{BsdfValuesAndCosines, VertexBatch};
 use crate::integrators::transport::interiors::{InteriorListPool, medium_transmittance};
 use crate::integrators::transport::tile::TileContext;
@@ -46,6 +47,15 @@ pub struct DirectLightCounters {
     pub lookups: u64,
 }
 
+impl DirectLightCounters {
+    /// Adds these counts to a tile's counts.
+    pub fn add_to(&self, counters: &mut RayCounters) {
+        counters.shadow_rays += self.shadow;
+        counters.scattered_rays += self.scattered;
+        counters.texture_lookups += self.lookups;
+    }
+}
+
 impl std::ops::AddAssign for DirectLightCounters {
     fn add_assign(&mut self, other: Self) {
         self.shadow += other.shadow;
@@ -65,10 +75,12 @@ pub struct ReflectedDirectLightPacket {
 }
 
 impl ReflectedDirectLightPacket {
-    /// Adds reflected light and its part from wide lobes in the lanes set in `bits`.
-    pub fn add_lanes(&mut self, bits: u32, [light, diffuse]: &[Vec3x16; 2]) {
+    /// Adds reflected light, and if `splits_lobes` its part from wide lobes, in the lanes set in `bits`.
+    pub fn add_lanes(&mut self, bits: u32, [light, diffuse]: &[Vec3x16; 2], splits_lobes: bool) {
         add_masked_lanes(bits, light, &mut self.light);
-        add_masked_lanes(bits, diffuse, &mut self.diffuse);
+        if splits_lobes {
+            add_masked_lanes(bits, diffuse, &mut self.diffuse);
+        }
     }
 }
 
@@ -92,7 +104,7 @@ impl LightSums {
         rays: DirectLightCounters { shadow: 0, scattered: 0, lookups: 0 },
     };
 
-    /// Returns the reflected light, or the lit fraction of it.
+    /// Returns the reflected light or, for that AOV, the lit fraction.
     #[inline(always)]
     pub fn reflected_light_for_aov(&self, aov: LightAov) -> ReflectedDirectLightPacket {
         let mut light = self.light;

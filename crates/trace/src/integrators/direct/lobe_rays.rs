@@ -14,8 +14,8 @@ use crate::sampling::Dimension;
 use crate::scene::description::ShadowMode;
 use crate::world::{Hit, SimdKernel};
 
-/// Traces rays in the glossy lobes of the vertices in `sharp`, one per light sample, because samples on a large
-/// light rarely fall into a narrow lobe.
+/// Traces rays in the glossy lobes of the vertices in `sharp`, one per light sample, because samples on a
+/// large light rarely fall into a narrow lobe.
 pub struct LobeRayTracingKernel<'a> {
     pub tile: &'a TileContext<'a>,
     pub row: &'a VertexBatch,

@@ -97,7 +97,8 @@ impl CompetingTechnique {
 
 impl CompetingTechnique {
     /// Adjusts the fractions of reflected light that are from wide lobes, after MIS weights have changed the
-    /// light from `unweighted` to `weighted`. Weights of narrow lobes leave the light from wide lobes unchanged.
+    /// light from `unweighted` to `weighted`. Weights of narrow lobes leave the light from wide lobes
+    /// unchanged.
     #[inline(never)]
     pub fn adjust_wide_fraction(self, fraction: &mut Vec3x16, unweighted: &Vec3x16, weighted: &Vec3x16) {
         match self {

@@ -113,7 +113,7 @@ impl DirectLightVertexQueue {
     }
 
     /// Like [`DirectLightVertexQueue::accumulate_arrived_light`], for paths with consecutive slots.
-    pub fn add_arrived_light_consecutive(&mut self, first: u32, accumulator: &mut Accumulator<'_>) {
+    pub fn accumulate_consecutive_arrived_light(&mut self, first: u32, accumulator: &mut Accumulator<'_>) {
         accumulator.add_direct_to_consecutive_slots(first, &self.arrived, &self.arrived_diffuse);
     }
 
@@ -218,7 +218,7 @@ impl DirectLightVertexQueue {
         tile: &TileContext<'_>,
     ) -> impl Iterator<Item = Range<usize>> + use<> {
         let (count, picks_lights) =
-            (self.count, tile.world.lights.sampler_for_integrator(tile.behavior.receivers).is_some());
+            (self.count, tile.world.lights.sampler_for_purpose(tile.behavior.receivers).is_some());
         let size = if picks_lights { MAX_GROUP_SIZE } else { 1 };
         (0..count).step_by(size).map(move |first| first..(first + size).min(count))
     }
@@ -238,9 +238,9 @@ impl DirectLightVertexQueue {
         &self.cones
     }
 
-    /// Samples lights at the packets of a group, for [`Self::reflected_light`]. `shares_with_paths` is true if
-    /// continuing paths compete with the light samples.
-    pub fn sample_and_trace_group_lights(
+    /// Samples lights at the packets of a group and traces the shadow rays, for [`Self::reflected_light`].
+    /// `shares_with_paths` is true if continuing paths compete with the light samples.
+    pub fn sample_group_lights(
         &mut self,
         group: Range<usize>,
         tile: &TileContext<'_>,
@@ -261,7 +261,7 @@ impl DirectLightVertexQueue {
                     .run(ShadowOriginLiftKernel { geometry: &tile.world.geometry, row });
             }
             let request = DirectLightPacketRequest::new(number, row, aov, shares_with_paths);
-            sums.push(self.light_sample_sums_at_packet(request, tile, aov, sums.len() as u32));
+            sums.push(self.sample_packet_lights(request, tile, aov, sums.len() as u32));
             if self.pool.is_full() {
                 self.pool.trace(tile, aov, &mut sums);
             }
@@ -272,8 +272,8 @@ impl DirectLightVertexQueue {
         Ok(())
     }
 
-    /// Light reflected at packet `index` of the group passed to [`Self::sample_and_trace_group_lights`], including the light
-    /// found by lobe rays. `number` is the index of the packet in the queue.
+    /// Light reflected at packet `index` of the group passed to [`Self::sample_group_lights`], including the
+    /// light found by lobe rays. `number` is the index of the packet in the queue.
     pub fn reflected_light(
         &self,
         (index, number): (usize, usize),
@@ -323,7 +323,7 @@ impl DirectLightVertexQueue {
     }
 
     /// Samples lights at a packet. Shadow rays to picked lights are pooled under index `number`.
-    fn light_sample_sums_at_packet(
+    fn sample_packet_lights(
         &mut self,
         request: DirectLightPacketRequest,
         tile: &TileContext<'_>,
@@ -338,8 +338,7 @@ impl DirectLightVertexQueue {
         let (competing, interior_lists) =
             (self.competing_technique(request, tile, aov), self.interiors_of_batch(row));
         let (instructions, used) = (tile.world.geometry.instruction_set(), request.used);
-        let (only_infinite, splits_lobes) =
-            (false, self.wide_narrow_lobe_split(row) == WideNarrowLobeSplit::Mixed);
+        let (only_infinite, splits_lobes) = (false, self.splits_lobes(row));
         let plain = SampleAllLights::<false> {
             tile,
             row,
@@ -361,7 +360,7 @@ impl DirectLightVertexQueue {
             splits_lobes,
         };
         use CompetingTechnique::{Lobes, NarrowPaths, Nothing, Paths};
-        let sums = match (competing, tile.world.lights.sampler_for_integrator(tile.behavior.receivers)) {
+        let sums = match (competing, tile.world.lights.sampler_for_purpose(tile.behavior.receivers)) {
             (Nothing, None) => instructions.run(plain),
             (Nothing, Some(selection)) => {
                 instructions.run(SampleLightTree { lighting: plain, selection, number, pool: &mut pool })
@@ -373,6 +372,11 @@ impl DirectLightVertexQueue {
         };
         self.pool = pool;
         sums
+    }
+
+    /// Whether the light from wide lobes must be summed separately at a packet.
+    pub fn splits_lobes(&self, row: &VertexBatch) -> bool {
+        self.wide_narrow_lobe_split(row) == WideNarrowLobeSplit::Mixed
     }
 
     /// How to divide a packet's reflected light.

@@ -4,7 +4,7 @@ use crate::geometry::Ray;
 use crate::geometry::packet::{RayPacket, nonnegative_end_mask};
 use crate::integrators::transport::batch::VertexBatch;
 use crate::lights::{LightGeometry, LightGeometryPacket};
-use crate::math::lanes::{PACKET_SIZE, Simd};
+use crate::math::lanes::{PACKET_SIZE, Simd, mask_from_bits, select, select_u32};
 use crate::world::{Geometry, SimdKernel};
 
 /// Moves a packet's shadow-ray origins above their facets wherever the segment from the facet is unoccluded.
@@ -42,14 +42,10 @@ impl SimdKernel for ShadowOriginLiftKernel<'_> {
         // Move the origins of the unoccluded rays.
         let lifted = row.may_lift & !blocked;
         row.has_horizon &= !lifted;
-        for i in 0..PACKET_SIZE {
-            row.start[i] = if lifted & 1 << i != 0 { Ray::NO_TRIANGLE } else { row.start[i] };
-        }
+        let of = mask_from_bits(lifted);
+        select_u32(&of, &[Ray::NO_TRIANGLE; PACKET_SIZE], &mut row.start);
         for axis in 0..3 {
-            for i in 0..PACKET_SIZE {
-                let (from, to) = (row.from[axis][i], row.lifted[axis][i]);
-                row.from[axis][i] = if lifted & 1 << i != 0 { to } else { from };
-            }
+            select(&of, &row.lifted[axis], &mut row.from[axis]);
         }
     }
 }

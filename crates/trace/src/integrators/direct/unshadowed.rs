@@ -62,7 +62,7 @@ impl LobeRayWithoutSoftShadows<'_> {
         sum
     }
 
-    /// Unoccluded fraction of a light.
+    /// Transmittance toward a light's center, or 1 without shadows.
     fn hard_shadow_transmittance(&self, light: &Light, rays: &mut DirectLightCounters) -> Vec3 {
         match self.tile.settings.render.shadows {
             ShadowMode::Off => return Vec3::ONE,

@@ -89,7 +89,7 @@ impl CameraWavefront<'_, '_> {
     }
 
     /// Adds the emission of a surface and returns whether the path may scatter at the surface.
-    pub(super) fn add_path_emission_and_may_scatter(
+    pub(super) fn add_path_emission(
         &mut self,
         path: &PathRay,
         vertex: &SurfaceVertex<'_>,

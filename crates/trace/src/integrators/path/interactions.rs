@@ -48,7 +48,7 @@ impl<'a> PathStepper<'a> for CameraWavefront<'a, '_> {
                 if !has_passed && matches!(hit, DirectOrCoincidentHit::Direct(_)) {
                     self.record_camera_vertex(path, vertex);
                 }
-                if self.add_path_emission_and_may_scatter(path, vertex, hit) {
+                if self.add_path_emission(path, vertex, hit) {
                     match &vertex.material.bsdf {
                         Bsdf::NonSpecular(rough) => self.shade_rough(path, vertex, rough, far),
                         Bsdf::Mirror(mirror) => self.shade_mirror(path, vertex, mirror),
@@ -61,7 +61,7 @@ impl<'a> PathStepper<'a> for CameraWavefront<'a, '_> {
                 if !has_passed {
                     self.record_camera_vertex(path, vertex);
                 }
-                if self.add_path_emission_and_may_scatter(path, vertex, DirectOrCoincidentHit::Direct(hit)) {
+                if self.add_path_emission(path, vertex, DirectOrCoincidentHit::Direct(hit)) {
                     match rough {
                         Some(rough) => self.queue_rough_glass_vertices(path, vertex, rough, far),
                         None => self.shade_glass(path, vertex, far),
@@ -89,7 +89,7 @@ impl<'a> PathStepper<'a> for CameraWavefront<'a, '_> {
         let tint = vertex.pane_transmittance(path, pane, &mut self.counters.texture_lookups);
         let left = tint * (1.0 - reflectance);
         // After the last bounce, only light that passes straight through the pane is added.
-        if !self.add_path_emission_and_may_scatter(path, vertex, hit) {
+        if !self.add_path_emission(path, vertex, hit) {
             return NullInteraction::Passed(left);
         }
         let shading = vertex.perturbed_and_smooth_normals(self.counters);
@@ -112,7 +112,7 @@ impl CameraWavefront<'_, '_> {
     /// Adds the traversal costs of a packet's rays.
     pub(super) fn add_traversal_costs(&mut self, rays: &PacketSource<'_>, packet: &PacketHits) {
         for lane in 0..rays.count() {
-            let path = packet.incoming_path(self.tile, rays, lane);
+            let path = rays.path(self.tile, lane);
             let cost = count_traversal_cost_to_hit(self.tile, &path, packet.hit(lane));
             self.accumulator.add_traversal_cost(path.slot, cost);
         }
@@ -140,45 +140,23 @@ impl CameraWavefront<'_, '_> {
         }
     }
 
-    /// Records the first-hit layers of camera rays, except for hits that [`Self::handle_walk_end`] records.
+    /// Records the first-hit layers of a packet of camera rays, except for hits that
+    /// [`Self::record_camera_vertex`] has recorded. `pending` is the mask of shaded rays whose walks did not
+    /// end directly at the surface they hit. Out of line because most images have no layers.
     #[inline(never)]
-    pub(super) fn record_first_hits(&mut self, rays: &PacketSource<'_>, packet: &PacketHits, first: u32) {
+    pub(super) fn record_first_hits(&mut self, rays: &PacketSource<'_>, packet: &PacketHits, pending: u32) {
         let tile = self.tile;
+        let PacketSource::Camera(_, first, ..) = *rays else { return };
         let Some(values) = self.accumulator.first_hit_layers() else { return };
         let mut left = record_first_hits_on_plain_surfaces(tile, (packet, self.surfaces), first, values);
+        left |= pending;
         // Paths may pass through surfaces that the layers show.
         if tile.world.has_null_interaction_surfaces() {
             left |= packet.any & !packet.plain & rays.mask();
         }
         for lane in set_bit_lanes(left) {
             let Some(hit) = packet.hit(lane) else { continue };
-            record_first_hit_of_ray(
-                tile,
-                (&packet.incoming_path(tile, rays, lane), &hit),
-                values,
-                self.counters,
-            );
-        }
-    }
-
-    /// Records the first-hit layers of a camera ray whose walk passed through the first surface it hit.
-    #[inline]
-    pub(super) fn record_first_hit_if_passed(
-        &mut self,
-        rays: &PacketSource<'_>,
-        packet: &PacketHits,
-        lane: usize,
-    ) {
-        if !std::mem::take(&mut self.is_first_hit_pending) {
-            return;
-        }
-        if let (Some(hit), Some(values)) = (packet.hit(lane), self.accumulator.first_hit_layers()) {
-            record_first_hit_of_ray(
-                self.tile,
-                (&packet.incoming_path(self.tile, rays, lane), &hit),
-                values,
-                self.counters,
-            );
+            record_first_hit_of_ray(tile, (&rays.path(tile, lane), &hit), values, self.counters);
         }
     }
 
@@ -252,7 +230,7 @@ impl CameraWavefront<'_, '_> {
 
     #[inline]
     fn roulette_and_push_reflected(&mut self, mut ray: PathRay) {
-        if self.survives_roulette(&mut ray) {
+        if self.apply_roulette(&mut ray) {
             self.counters.reflected_rays += 1;
             self.push_specular(ray);
         }
@@ -261,7 +239,7 @@ impl CameraWavefront<'_, '_> {
     #[inline]
     fn roulette_and_push_refracted(&mut self, mut ray: PathRay, weight: f32) {
         ray.throughput *= weight;
-        if self.survives_roulette(&mut ray) {
+        if self.apply_roulette(&mut ray) {
             self.counters.refracted_rays += 1;
             self.push_specular(ray);
         }
@@ -275,11 +253,12 @@ impl CameraWavefront<'_, '_> {
         }
     }
 
+    /// Applies Russian roulette to a specular ray, unless the path may still split. Returns false if it ends.
     #[inline]
-    fn survives_roulette(&self, ray: &mut PathRay) -> bool {
+    fn apply_roulette(&self, ray: &mut PathRay) -> bool {
         match self.continuation {
             Some(continuation) if !self.tile.behavior.splits || !ray.state.only_specular_before => {
-                continuation.survives_roulette(self.tile, ray)
+                continuation.apply_roulette(self.tile, ray)
             }
             Some(_) | None => true,
         }

@@ -25,7 +25,7 @@ impl CameraWavefront<'_, '_> {
         if self.tile.pixel_spread > 0.0 {
             for lane in set_bit_lanes(packet.plain) {
                 let Some(hit) = packet.hit(lane) else { continue };
-                let cone = packet.incoming_path(self.tile, rays, lane).cone.propagated_by(hit.shape.t);
+                let cone = rays.path(self.tile, lane).cone.propagated_by(hit.shape.t);
                 self.direct.store_ray_cone(rays.queue_index(lane), cone);
             }
         }
@@ -82,7 +82,7 @@ impl CameraWavefront<'_, '_> {
         let (tile, place) = (self.tile, self.place);
         let shading = vertex.perturbed_and_smooth_normals(self.counters);
         let behind = bsdf.bsdf_for_transmitted_light().map(|bsdf| (bsdf, shading.far_side()));
-        let aov = self.light_aov_selection_at_vertex(path);
+        let aov = self.light_aov_at_vertex(path);
         let lit = ShadingVertex { path, interiors: &path.interiors, place, vertex, shading, bsdf };
         self.direct.push(tile, &lit, aov, ShadingSides::OneSide { is_dark: false });
         // Transmitted light has its own vertex, except for the lit fraction, which is measured on the
@@ -110,7 +110,7 @@ impl CameraWavefront<'_, '_> {
         }
         let (tile, place) = (self.tile, self.place);
         let shading = vertex.perturbed_and_smooth_normals(self.counters);
-        let aov = self.light_aov_selection_at_vertex(path);
+        let aov = self.light_aov_at_vertex(path);
         let near = &path.interiors;
         let reflection = BxdfPoint::DielectricReflection(rough);
         let transmission = BxdfPoint::DielectricTransmission(rough);
@@ -148,7 +148,7 @@ impl CameraWavefront<'_, '_> {
     }
 
     /// The light AOV at a path's vertex. After the first non-specular surface, all light is included.
-    pub(super) fn light_aov_selection_at_vertex(&self, path: &PathRay) -> LightAov {
+    pub(super) fn light_aov_at_vertex(&self, path: &PathRay) -> LightAov {
         if path.state.only_specular_before { self.accumulator.aov } else { LightAov::ALL }
     }
 }

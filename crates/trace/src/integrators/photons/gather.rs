@@ -16,8 +16,8 @@ use crate::math::lanes::{Simd, Vec3x16, set_lane};
 use crate::sampling::Dimension;
 use crate::world::SimdKernel;
 
-/// Probability of a lookup at a vertex that the camera does not see. A path has many such vertices, and photon
-/// lookups at them contribute little noise.
+/// Probability of a lookup at a vertex that the camera does not see. A path has many such vertices, and
+/// photon lookups at them contribute little noise.
 const INDIRECT_LOOKUP_PROBABILITY: f32 = 0.25;
 
 /// Probability of looking up bounced photons at a vertex that the camera sees. Bounced light is weak and
@@ -25,8 +25,8 @@ const INDIRECT_LOOKUP_PROBABILITY: f32 = 0.25;
 const BOUNCED_LOOKUP_PROBABILITY: f32 = 0.5;
 
 /// Gathers photons at a packet of vertices that their paths reach after `depth` bounces. Returns the light
-/// reflected toward the viewer, before multiplication by the path throughput, and the part from wide lobes if
-/// `splits_lobes`.
+/// reflected toward the viewer, before multiplication by the path throughput, and the part from wide lobes,
+/// which is 0 unless `splits_lobes`.
 pub fn gather_photons(
     tile: &TileContext<'_>,
     row: &VertexBatch,
@@ -134,8 +134,8 @@ fn coverage_factor(
     }
 }
 
-/// Returns the light from a map's photons that a vertex reflects toward the viewer, the part of this light that
-/// is from wide lobes, and one of the photons.
+/// Returns the light from a map's photons that a vertex reflects toward the viewer, the part of this light
+/// that is from wide lobes (arbitrary unless `SPLIT`), and one of the photons.
 #[inline(always)]
 fn gather_reflected_light<const SPLIT: bool>(
     (row, i): (&VertexBatch, usize),

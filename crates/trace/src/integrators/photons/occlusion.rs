@@ -16,8 +16,8 @@ const BELOW: f32 = 0.02;
 /// Segments shorter than this, in kernel radii, are considered unoccluded.
 const NEAR: f32 = 1e-3;
 
-/// Whether a photon is occluded from the kernel's center. Tests a segment above the surface, or a segment close
-/// to the surface if there is not enough room above the center or the photon.
+/// Whether a photon is occluded from the kernel's center. Tests a segment above the surface, or a segment
+/// close to the surface if there is not enough room above the center or the photon.
 pub fn is_occluded(
     geometry: &Geometry,
     look: &GatherPoint,

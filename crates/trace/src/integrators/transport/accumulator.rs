@@ -52,6 +52,14 @@ pub struct LayerAccumulator<'a> {
     pub fractions: Option<&'a mut DiffuseFractions>,
 }
 
+impl LayerAccumulator<'_> {
+    /// Adds light to a layer. Out of line because most images have no layers.
+    #[inline(never)]
+    fn add(&mut self, layer: SampleLayer, slot: u32, light: Vec3) {
+        self.values.add(layer, slot, light);
+    }
+}
+
 /// Accumulates each slot's radiance, limited to the components visible in the view. In each bounce, emission
 /// and ambient light are added first, followed by reflected light, in path order.
 pub struct Accumulator<'a> {
@@ -93,15 +101,15 @@ impl Accumulator<'_> {
 
     /// Adds emission or ambient light.
     pub fn add_non_reflected(&mut self, slot: u32, part: NonReflectedTerm, radiance: Vec3) {
-        let parts = self.accumulated_radiance_components();
+        let parts = self.components_to_accumulate();
         let (is_taken, layer) = match part {
             NonReflectedTerm::Emitted => (parts.emitted, SampleLayer::Emission),
             NonReflectedTerm::Ambient => (parts.ambient, SampleLayer::Ambient),
         };
         if is_taken {
             self.radiance[slot as usize] += radiance;
-            if self.layers.is_some() {
-                self.add_to_layer(layer, slot, radiance);
+            if let Some(layers) = &mut self.layers {
+                layers.add(layer, slot, radiance);
             }
         }
     }
@@ -123,7 +131,7 @@ impl Accumulator<'_> {
     }
 
     /// Radiance components to accumulate.
-    fn accumulated_radiance_components(&self) -> RadianceComponentMask {
+    fn components_to_accumulate(&self) -> RadianceComponentMask {
         match self.aov {
             LightAov::Radiance(parts) => parts,
             LightAov::LitFraction | LightAov::TraversalCost => RadianceComponentMask::NONE,
@@ -141,7 +149,7 @@ impl Accumulator<'_> {
     /// Whether the ambient term of a surface hit by a path is accumulated. After a diffuse or glossy surface,
     /// it is treated as light reflected by that surface.
     pub fn accepts_ambient(&self, path: &PathRay) -> bool {
-        let parts = self.accumulated_radiance_components();
+        let parts = self.components_to_accumulate();
         if path.state.only_specular_before {
             parts.ambient
         } else {
@@ -191,20 +199,12 @@ impl Accumulator<'_> {
         let is_clamped = !only_specular_before && self.clamp > 0.0 && largest > self.clamp;
         let kept = if is_clamped { self.clamp / largest } else { 1.0 };
         self.radiance[slot as usize] += contribution * kept;
-        if self.layers.is_some() {
-            let (light, diffuse) = (contribution * kept, diffuse * kept);
-            self.add_to_layer(SampleLayer::Diffuse, slot, diffuse);
-            if light != diffuse {
-                self.add_to_layer(SampleLayer::Specular, slot, light - diffuse);
-            }
-        }
-    }
-
-    /// Adds light to a layer. Out of line because most images have no layers.
-    #[inline(never)]
-    fn add_to_layer(&mut self, layer: SampleLayer, slot: u32, light: Vec3) {
         if let Some(layers) = &mut self.layers {
-            layers.values.add(layer, slot, light);
+            let (light, diffuse) = (contribution * kept, diffuse * kept);
+            layers.add(SampleLayer::Diffuse, slot, diffuse);
+            if light != diffuse {
+                layers.add(SampleLayer::Specular, slot, light - diffuse);
+            }
         }
     }
 }

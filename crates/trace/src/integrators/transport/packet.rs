@@ -6,7 +6,6 @@ use arrayvec::ArrayVec;
 use super::batch::VertexBatch;
 use super::packet_source::PacketSource;
 use super::plain_vertices::ShadowLiftSelection;
-use super::ray::PathRay;
 use super::tile::TileContext;
 use crate::geometry::packet::{self, HitPacket, RayPacket};
 use crate::geometry::surface_packet::SurfacePacket;
@@ -78,18 +77,6 @@ impl PacketHits {
             dpdv: Vec3::ZERO,
             barycentric: Vec3::new(1.0 - u - v, u, v),
         })
-    }
-
-    /// Returns a lane's path.
-    #[inline(always)]
-    pub fn incoming_path(&self, tile: &TileContext<'_>, rays: &PacketSource<'_>, lane: usize) -> PathRay {
-        match rays {
-            PacketSource::Camera(row, first, ..) => {
-                tile.path_from_camera_ray(row.rays.ray(lane), first + lane as u32)
-            }
-            PacketSource::Paths(paths, _) => paths[lane],
-            PacketSource::Traced(paths, _, places) => paths[places[lane] as usize],
-        }
     }
 
     /// Radiance of the environment along a ray that leaves the scene, and its light-sampling pdf in sr⁻¹.
@@ -172,7 +159,7 @@ impl SimdKernel for PacketIntersector<'_> {
         let rows = match rays {
             PacketSource::Camera(row, _, count, _) => {
                 ends[..count].fill(f32::INFINITY);
-                traced = ((1_u64 << count) - 1) as u32;
+                traced = rays.mask();
                 &row.rays
             }
             PacketSource::Paths(..) | PacketSource::Traced(..) => {

@@ -2,6 +2,7 @@
 
 use super::camera::CameraRayPacket;
 use super::ray::PathRay;
+use super::tile::TileContext;
 use crate::world::Hit;
 
 /// Source of a packet's rays.
@@ -36,6 +37,18 @@ impl PacketSource<'_> {
         match self {
             Self::Camera(_, _, _, first) | Self::Paths(_, first) => first + lane as u32,
             Self::Traced(_, _, places) => places.get(lane).copied().unwrap_or(0),
+        }
+    }
+
+    /// A lane's path. The lane must have one.
+    #[inline(always)]
+    pub fn path(&self, tile: &TileContext<'_>, lane: usize) -> PathRay {
+        match self {
+            Self::Camera(row, first, ..) => {
+                tile.path_from_camera_ray(row.rays.ray(lane), first + lane as u32)
+            }
+            Self::Paths(paths, _) => paths[lane],
+            Self::Traced(paths, _, places) => paths[places[lane] as usize],
         }
     }
 

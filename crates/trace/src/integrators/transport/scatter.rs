@@ -49,10 +49,10 @@ impl BounceContinuation {
         if self.uses_roulette { (roulette_throughput * Self::GAIN).min(1.0) } else { 1.0 }
     }
 
-    /// Applies Russian roulette to a path after a specular bounce. Returns whether the path continues, and
+    /// Applies Russian roulette to a path after a specular bounce. Returns false if the path ends. Otherwise,
     /// divides its throughput by the probability of continuing.
     #[inline]
-    pub fn survives_roulette(self, tile: &TileContext<'_>, path: &mut PathRay) -> bool {
+    pub fn apply_roulette(self, tile: &TileContext<'_>, path: &mut PathRay) -> bool {
         let chance = self.survival_probability(path.state.roulette_throughput);
         if chance < 1.0 {
             if !(tile.sampler_for_slot(path.slot).pair(path.path, Dimension::SpecularRoulette).x < chance) {

@@ -7,7 +7,7 @@ use crate::control::CancelToken;
 use crate::film::{PixelSubset, SelectedPixels};
 use crate::integrators::RenderSettings;
 use crate::integrators::behavior::PathBehavior;
-use crate::lights::LightSamplingIntegrator;
+use crate::lights::LightSamplingPurpose;
 use crate::lights::infinite::Environment;
 use crate::sampling::PixelSampler;
 use crate::scene::description::ShadowMode;
@@ -57,7 +57,7 @@ impl<'a> TileContext<'a> {
             && render.shadow_samples == 1
             && render.clamp == 0.0;
         let lobes_find_sky =
-            is_constant && world.lights.sampler_for_integrator(LightSamplingIntegrator::Eye).is_none();
+            is_constant && world.lights.sampler_for_purpose(LightSamplingPurpose::Eye).is_none();
         Self { world, settings, block, token, pixel_spread, behavior, paths_find_sky, lobes_find_sky }
     }
 

@@ -197,7 +197,7 @@ pub fn walk_to_interaction<'a, W: PathStepper<'a>>(
         if let Some(touching) = opaque {
             let vertex = SurfaceVertex::at_coincident_surface(tile, path, (sides, &touching), hit.shape.t);
             if !vertex.material.has_null_interaction()
-                || coincident_surface_opacity_test(stepper, path, &vertex)
+                || is_stopped_by_coincident_surface(stepper, path, &vertex)
             {
                 let touched = Hit { shape: ShapeHit { t: hit.shape.t, ..touching.shape }, ..touching };
                 let touched = way.rebase_ray_to_last_vertex(path, touched);
@@ -289,7 +289,7 @@ fn null_interaction_outcome<'a, W: PathStepper<'a>>(
 /// effect.
 #[cold]
 #[inline(never)]
-fn coincident_surface_opacity_test<'a, W: PathStepper<'a>>(
+fn is_stopped_by_coincident_surface<'a, W: PathStepper<'a>>(
     stepper: &mut W,
     path: &PathRay,
     vertex: &SurfaceVertex<'a>,

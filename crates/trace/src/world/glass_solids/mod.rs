@@ -100,7 +100,7 @@ impl GlassSolids {
         let alone = |place| ObjectRole { place, is_inside_out: false, is_open: false };
         solids.parts = (0..scene.objects.len() as u32).map(alone).collect();
         let all = groups.parts_by_solid();
-        let holes = SolidOpenBoundary::find_per_solid(&parts, &groups, &all, &shared_edges);
+        let holes = SolidHole::find_per_solid(&parts, &groups, &all, &shared_edges);
         let covered = hole_covered_flags(scene, meshes, &parts, &holes, token)?;
         let mut closed: Vec<ClosedSolid> = Vec::new();
         for ((members, hole), &is_covered) in all.iter().zip(&holes).zip(&covered) {
@@ -184,14 +184,13 @@ fn hole_covered_flags(
     scene: &Scene,
     meshes: &[&LoadedMesh],
     parts: &GlassParts,
-    holes: &[SolidOpenBoundary],
+    holes: &[SolidHole],
     token: &CancelToken,
 ) -> Result<Vec<bool>, Cancelled> {
-    let is_large = |hole: &&SolidOpenBoundary| hole.part > SMALL_HOLE;
+    let is_large = |hole: &&SolidHole| hole.part > SMALL_HOLE;
     let rims: Vec<&[RimEdge]> = holes.iter().filter(is_large).map(|hole| &*hole.rims).collect();
     let mut parts = caps::covered_rim_fractions(scene, meshes, parts, &rims, token)?.into_iter();
-    let is_covered =
-        |hole: &SolidOpenBoundary| is_large(&hole) && parts.next().is_some_and(|part| part >= COVERED);
+    let is_covered = |hole: &SolidHole| is_large(&hole) && parts.next().is_some_and(|part| part >= COVERED);
     Ok(holes.iter().map(is_covered).collect())
 }
 
@@ -309,7 +308,7 @@ impl PartGroups {
 }
 
 /// Missing part of a solid's surface.
-struct SolidOpenBoundary {
+struct SolidHole {
     rims: Vec<RimEdge>,
     /// For each edge, whether another edge of the solid coincides with it and has the same direction.
     disagree: Vec<bool>,
@@ -317,7 +316,7 @@ struct SolidOpenBoundary {
     part: f64,
 }
 
-impl SolidOpenBoundary {
+impl SolidHole {
     /// Returns the holes of all solids.
     fn find_per_solid(
         parts: &GlassParts,

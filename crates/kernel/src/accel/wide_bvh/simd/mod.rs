@@ -113,7 +113,7 @@ pub fn any_hit(tree: &WideBvh, ray: &Ray, except: Option<u32>) -> bool {
     }
 }
 
-/// [`WideBvh::update_decided_closest_hits`] for a nonempty tree. Returns whether the packet was traced.
+/// [`WideBvh::closest_hit_packet`] for a nonempty tree. Returns whether the packet was traced.
 #[allow(unsafe_code)]
 pub fn try_closest_hit_packet(
     tree: &WideBvh,
@@ -134,7 +134,7 @@ pub fn try_closest_hit_packet(
     }
 }
 
-/// [`WideBvh::any_hit_and_undecided_masks`] for a nonempty tree. Returns the mask of the rays that hit, or `None` if the
+/// [`WideBvh::any_hit_packet`] for a nonempty tree. Returns the mask of the rays that hit, or `None` if the
 /// packet was not traced.
 #[allow(unsafe_code)]
 pub fn try_any_hit_packet(

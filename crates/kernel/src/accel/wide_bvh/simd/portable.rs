@@ -38,7 +38,7 @@ pub fn closest_hit(tree: &WideBvh, ray: &Ray) -> Option<ShapeHit> {
             Child::Leaf { first, count } => {
                 for pack in &tree.packs[first as usize..(first + count) as usize] {
                     for lane in (0..PACK).filter(|&lane| pack.ids[lane] != ray.start) {
-                        intersect_packed_triangle(pack, lane, &sheared, t_max, &mut best);
+                        update_nearest_with_triangle(pack, lane, &sheared, t_max, &mut best);
                         t_max = best.map_or(t_max, |best| best.t);
                     }
                 }
@@ -94,7 +94,7 @@ fn hit_children(node: &WideNode, slabs: &SlabRay, t_max: f32) -> impl Iterator<I
 /// Replaces the best hit with the hit on a lane's triangle if that hit is nearer, or equally near with a
 /// lower index.
 #[inline]
-pub fn intersect_packed_triangle(
+pub fn update_nearest_with_triangle(
     pack: &TrianglePack,
     lane: usize,
     ray: &ShearedRay,

@@ -2,7 +2,7 @@
 
 use std::arch::x86_64::*;
 
-use super::portable::intersect_packed_triangle;
+use super::portable::update_nearest_with_triangle;
 use super::ray::{SimdRay, is_traceable};
 use super::stack::{Stack, entry_distance, sort_key};
 use super::triangle::Hits;
@@ -90,7 +90,7 @@ fn update_nearest_with_pack_hits(
     }
 }
 
-/// Non-inlined version of [`intersect_packed_triangle`] for rare cases.
+/// Non-inlined version of [`update_nearest_with_triangle`] for rare cases.
 #[cold]
 #[inline(never)]
 fn recheck_lane_and_update_nearest(
@@ -100,7 +100,7 @@ fn recheck_lane_and_update_nearest(
     t_max: f32,
     best: &mut Option<ShapeHit>,
 ) {
-    intersect_packed_triangle(pack, lane, &ShearedRay::new(ray.origin, ray.direction), t_max, best);
+    update_nearest_with_triangle(pack, lane, &ShearedRay::new(ray.origin, ray.direction), t_max, best);
 }
 
 /// Returns the nearest child that the ray hits, and pushes the other children that it hits, farthest first.

@@ -58,8 +58,8 @@ pub fn intersect<V: SimdVector>(
     Hits { hit, doubtful, t, u: wb * inverse, v: wc * inverse }
 }
 
-/// Unit roundoff divided by the needle ratio, slightly enlarged to account for rounding in [`may_be_in_range_mask`]
-/// itself.
+/// Unit roundoff divided by the needle ratio, slightly enlarged to account for rounding in
+/// [`may_be_in_range_mask`] itself.
 const UNITS: f32 = 1.05 * 0.5 * f32::EPSILON / ILL_CONDITIONED;
 
 /// Whether a triangle may need the full test. Returns false only if the triangle is not a needle and t is

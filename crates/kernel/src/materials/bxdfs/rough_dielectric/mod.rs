@@ -6,8 +6,8 @@
 //!
 //! - for reflection, f = F·D·G/(4 cosθᵢ cosθₒ), and the facet's normal h has the direction o + i;
 //! - for transmission, f = |o·h| |i·h| (1 − F)·D·G·nᵢ²/(cosθᵢ cosθₒ |nₒ o + nᵢ i|²), and h has the direction
-//!   nₒ o + nᵢ i. Light is measured in basic radiance, L/n². Therefore, nᵢ² replaces the nₒ² used for radiance,
-//!   and f/nᵢ² is the same in both directions.
+//!   nₒ o + nᵢ i. Light is measured in basic radiance, L/n². Therefore, nᵢ² replaces the nₒ² used for
+//!   radiance, and f/nᵢ² is the same in both directions.
 //!
 //! A surface is represented by two vertices, see [`bsdf`](crate::materials::bsdf). Both vertices sample the
 //! same facet, and choose reflection with probability F and refraction otherwise. Therefore, f·cosθᵢ divided

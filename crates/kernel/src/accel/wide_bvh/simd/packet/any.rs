@@ -13,7 +13,7 @@ use crate::geometry::Ray;
 use crate::geometry::aabb::SLAB_PAD;
 use crate::geometry::watertight::ShearedRay;
 
-/// Implements [`WideBvh::any_hit_and_undecided_masks`]. Returns `None` if the rays are not coherent.
+/// Implements [`WideBvh::any_hit_packet`]. Returns `None` if the rays are not coherent.
 #[inline(always)]
 pub fn any_hit_if_coherent<V: SimdVector>(
     tree: &WideBvh,

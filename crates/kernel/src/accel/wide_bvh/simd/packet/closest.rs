@@ -13,7 +13,7 @@ use crate::accel::wide_bvh::simd::vector::{SimdF32x8, SimdVector};
 use crate::geometry::aabb::SLAB_PAD;
 use crate::geometry::{Ray, ShapeHit};
 
-/// Implements [`WideBvh::update_decided_closest_hits`]. Returns false if the rays are not coherent.
+/// Implements [`WideBvh::closest_hit_packet`]. Returns false if the rays are not coherent.
 #[inline(always)]
 pub fn closest_hit_if_coherent<V: SimdVector>(
     tree: &WideBvh,
