@@ -6,8 +6,9 @@ use std::io::BufReader;
 use std::path::Path;
 
 use ::exr::block::UncompressedBlock;
+use ::exr::block::chunk::{Chunk, CompressedBlock, CompressedScanLineBlock};
 use ::exr::block::writer::ChunksWriter;
-use ::exr::error::UnitResult;
+use ::exr::error::{Error, UnitResult};
 use ::exr::image::write::layers::{LayersWriter, WritableLayers};
 use ::exr::meta::MetaData;
 use ::exr::meta::attribute::{AttributeValue, Chromaticities, Text};
@@ -51,7 +52,7 @@ pub(super) fn encode(
     let mut bytes = CancellableBuffer::new(token);
     ::exr::block::write(&mut bytes, headers, true, |meta, file| {
         let block = |index| layers.extract_uncompressed_block(&meta.headers, index);
-        compress_and_write_blocks(&meta, meta.collect_ordered_block_data(block), file)
+        compress_and_write_blocks(meta.collect_ordered_block_data(block), file)
     })
     .map_err(|error| OutputError::encoder(Format::Exr, &error))?;
     Ok(bytes.into_bytes())
@@ -78,14 +79,12 @@ fn channels(image: &RadianceImage, layers: &[LayerImage]) -> AnyChannels<FlatSam
 /// Compresses blocks in the caller's thread pool, or on the caller's thread if there is no pool. By default,
 /// the encoder would create its own pool with one thread per core.
 fn compress_and_write_blocks(
-    meta: &MetaData,
     mut blocks: impl Iterator<Item = (usize, UncompressedBlock)>,
     file: &mut impl ChunksWriter,
 ) -> UnitResult {
     let is_in_pool = rayon::current_thread_index().is_some();
     let batch_size = if is_in_pool { 4 * rayon::current_num_threads() } else { 1 };
-    let compressed =
-        |(index, block): (usize, UncompressedBlock)| (index, block.compress_to_chunk(&meta.headers));
+    let compressed = |(index, block): (usize, UncompressedBlock)| (index, compress_scan_lines(block));
     loop {
         let batch: Vec<_> = blocks.by_ref().take(batch_size).collect();
         if batch.is_empty() {
@@ -100,6 +99,31 @@ fn compress_and_write_blocks(
             file.write_chunk(index, chunk?)?;
         }
     }
+}
+
+/// Compresses a block of scan lines with ZIP: the low bytes of each half of a sample are separated from the
+/// high bytes, replaced by differences and deflated. The encoder's own function deflates at level 4, which
+/// takes three times as long as level 1 for 4 % smaller files.
+fn compress_scan_lines(block: UncompressedBlock) -> ::exr::error::Result<Chunk> {
+    let UncompressedBlock { index, data } = block;
+    let samples = data
+        .chunks_exact(size_of::<f32>())
+        .map(|bytes| f32::from_ne_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]));
+    let samples: Vec<u8> = samples.flat_map(f32::to_le_bytes).collect();
+    let (even, odd) = (samples.iter().step_by(2), samples.iter().skip(1).step_by(2));
+    let mut before = 128_u8;
+    let differences = even.chain(odd).map(|byte| {
+        let difference = byte.wrapping_sub(before).wrapping_add(128);
+        before = *byte;
+        difference
+    });
+    let differences: Vec<u8> = differences.collect();
+    let deflated = miniz_oxide::deflate::compress_to_vec_zlib(&differences, 1);
+    // Readers take blocks of full length as uncompressed.
+    let compressed_pixels_le = if deflated.len() < samples.len() { deflated } else { samples };
+    let top = i32::try_from(index.pixel_position.y()).map_err(|_| Error::Invalid("image height".into()))?;
+    let block = CompressedScanLineBlock { y_coordinate: top, compressed_pixels_le };
+    Ok(Chunk { layer_index: index.layer, compressed_block: CompressedBlock::ScanLine(block) })
 }
 
 /// ITU-R BT.709 primaries with D65 white.
