@@ -63,24 +63,17 @@ impl Material {
     /// partially transparent.
     #[inline]
     pub fn has_null_interaction(&self) -> bool {
-        let is_pane = match &self.bsdf {
-            Bsdf::ThinDielectric(_) => true,
-            Bsdf::NonSpecular(_) | Bsdf::Mirror(_) | Bsdf::Dielectric(_) | Bsdf::Coated(_) => false,
-        };
-        is_pane || self.opacity.is_some()
+        self.bsdf.as_thin_dielectric().is_some() || self.opacity.is_some()
     }
 
     /// Fraction of the light that passes undeflected at a point, for an incident angle with the given cosine.
     /// `color` multiplies a pane's transmittance. Counts texture lookups in `lookups`.
     pub fn null_transmittance(&self, at: &TexturePoint, color: Vec3, cosine: f32, lookups: &mut u64) -> Vec3 {
         let there = self.opacity.as_ref().map_or(1.0, |opacity| opacity.evaluate(at, lookups));
-        let through = match &self.bsdf {
-            Bsdf::ThinDielectric(pane) => {
-                let tint = pane.tint.evaluate(at, lookups).min(Vec3::ONE);
-                tint * color * (1.0 - pane.reflectance(cosine))
-            }
-            Bsdf::NonSpecular(_) | Bsdf::Mirror(_) | Bsdf::Dielectric(_) | Bsdf::Coated(_) => Vec3::ZERO,
-        };
+        let through = self.bsdf.as_thin_dielectric().map_or(Vec3::ZERO, |pane| {
+            let tint = pane.tint.evaluate(at, lookups).min(Vec3::ONE);
+            tint * color * (1.0 - pane.reflectance(cosine))
+        });
         through * there + Vec3::splat(1.0 - there)
     }
 
@@ -149,6 +142,24 @@ impl Bsdf {
         match self {
             Self::NonSpecular(rough) | Self::Coated(Coated { base: rough, .. }) => Some(rough),
             Self::Mirror(_) | Self::Dielectric(_) | Self::ThinDielectric(_) => None,
+        }
+    }
+
+    /// The BSDF of a surface that has only non-δ lobes, or `None` for other materials.
+    #[inline(always)]
+    pub fn as_non_specular(&self) -> Option<&NonSpecular> {
+        match self {
+            Self::NonSpecular(rough) => Some(rough),
+            Self::Mirror(_) | Self::Dielectric(_) | Self::ThinDielectric(_) | Self::Coated(_) => None,
+        }
+    }
+
+    /// The thin pane, or `None` for other materials.
+    #[inline]
+    pub fn as_thin_dielectric(&self) -> Option<&ThinDielectric> {
+        match self {
+            Self::ThinDielectric(pane) => Some(pane),
+            Self::NonSpecular(_) | Self::Mirror(_) | Self::Dielectric(_) | Self::Coated(_) => None,
         }
     }
 

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use super::super::fingerprint::{FingerprintContext, FingerprintHasher, Fingerprinted};
 use super::Spanned;
+use crate::lights;
 pub use crate::lights::delta::Falloff;
 use crate::math::{DVec3, Vec3};
 
@@ -90,6 +91,36 @@ impl Light {
             Self::Spot(light) => light.point.falloff == Falloff::None,
             Self::Directional(_) => false,
         }
+    }
+
+    /// Converts the light to the form that is traced, with coordinates relative to `origin`.
+    pub fn to_traced_light(&self, origin: DVec3) -> lights::Light {
+        match self {
+            Self::Point(light) => lights::Light::Point(light.to_traced_light(origin)),
+            Self::Spot(light) => {
+                let axis = (light.look_at - light.point.position).normalize().as_vec3();
+                let half_angle = (light.angle.to_radians() * 0.5) as f32;
+                let point = light.point.to_traced_light(origin);
+                lights::Light::Spot(lights::delta::SpotLight { point, axis, half_angle, blend: light.blend })
+            }
+            Self::Directional(light) => {
+                let to_light = -light.direction.normalize().as_vec3();
+                let angle = light.angle.to_radians();
+                lights::Light::Directional(lights::infinite::DirectionalLight::new(
+                    to_light,
+                    light.irradiance,
+                    angle,
+                ))
+            }
+        }
+    }
+}
+
+impl PointLight {
+    /// Converts the light to the form that is traced, with coordinates relative to `origin`.
+    fn to_traced_light(&self, origin: DVec3) -> lights::delta::PointLight {
+        let Self { position, intensity, falloff } = *self;
+        lights::delta::PointLight { position: position - origin, intensity, falloff }
     }
 }
 

@@ -26,6 +26,7 @@ use super::transport::accumulator::Accumulator;
 use super::transport::batch::VertexBatch;
 use super::transport::camera::CAMERA_ROWS;
 use super::transport::crossing::CoincidentSurfaceBuffers;
+use super::transport::packet::POLL_INTERVAL;
 use super::transport::packet_source::PacketSource;
 use super::transport::ray::PathRay;
 use super::transport::scatter::{BounceContinuation, BsdfSampler};
@@ -38,9 +39,6 @@ use crate::geometry::surface_packet::SurfacePacket;
 use crate::materials::bsdf::LobesToSample;
 use crate::scene::description::ShadowMode;
 use crate::world::PACKET_SIZE;
-
-/// Number of rays traced between checks of the cancel token.
-const POLL_INTERVAL: usize = 256;
 
 /// Traces the camera paths for a range of slots and adds their radiance to the accumulator. `negative`
 /// receives the first slot of each packet and the mask of samples with a negative filter weight.

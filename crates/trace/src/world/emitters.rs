@@ -10,8 +10,7 @@ use crate::assets::FileMaterial;
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::Shape;
 use crate::lights::MeshEmitter;
-use crate::lights::delta::{PointLight, SpotLight};
-use crate::lights::infinite::{DirectionalLight, Environment, EnvironmentMap};
+use crate::lights::infinite::{Environment, EnvironmentMap};
 use crate::lights::{
     AreaLight, BoundingSphere, EmissionModulation, Light, LightBounds, Lights, PhotonEmitter, Side,
     TriangleWithUvs, UvMapping, back_area_light, front_area_light, see_through_shape_side_light,
@@ -19,7 +18,7 @@ use crate::lights::{
 use crate::lights::{Emitter, EmittingTriangleSelection};
 use crate::materials::texels::Texels;
 use crate::materials::{Emission, EmissionSides, Opacity};
-use crate::math::{DVec3, Vec3};
+use crate::math::Vec3;
 use crate::scene::description::{self, Scene};
 
 /// Sampling tables for the environment map, or `None` if the image is black.
@@ -41,7 +40,7 @@ pub fn build_lights(
     token: &CancelToken,
 ) -> Result<Arc<Lights>, Cancelled> {
     let points = scene.lights.iter().filter(|light| light.has_emission());
-    let points = points.map(|light| delta_or_directional_light(light, geometry.coordinate_origin()));
+    let points = points.map(|light| light.to_traced_light(geometry.coordinate_origin()));
     let objects = (0_u32..).zip(geometry.objects()).zip(&scene.objects);
     let emissive = scene.materials.iter().map(|material| {
         let emission = emission_unless_texture_black(lower_emission(scene, images, material));
@@ -90,26 +89,6 @@ fn environment_light(
     match file {
         Some(_) => Some(Environment::from_map(sky?, *color, *rotate)),
         None => Some(Environment::Constant(*color)),
-    }
-}
-
-/// Converts a light without a shape to coordinates relative to `origin`.
-fn delta_or_directional_light(light: &description::Light, origin: DVec3) -> Light {
-    let point = |light: &description::light::PointLight| {
-        let description::light::PointLight { position, intensity, falloff } = *light;
-        PointLight { position: position - origin, intensity, falloff }
-    };
-    match light {
-        description::Light::Point(light) => Light::Point(point(light)),
-        description::Light::Spot(light) => {
-            let axis = (light.look_at - light.point.position).normalize().as_vec3();
-            let half_angle = (light.angle.to_radians() * 0.5) as f32;
-            Light::Spot(SpotLight { point: point(&light.point), axis, half_angle, blend: light.blend })
-        }
-        description::Light::Directional(light) => {
-            let to_light = -light.direction.normalize().as_vec3();
-            Light::Directional(DirectionalLight::new(to_light, light.irradiance, light.angle.to_radians()))
-        }
     }
 }
 

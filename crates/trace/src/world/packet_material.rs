@@ -2,7 +2,7 @@
 
 use super::World;
 use crate::materials::texture::Texture;
-use crate::materials::{Bsdf, BxdfKind, Material, NonSpecular, UvSet};
+use crate::materials::{BxdfKind, Material, NonSpecular, UvSet};
 use crate::math::Vec3;
 
 /// Data for shading a plain material in packets.
@@ -26,7 +26,7 @@ impl PacketMaterial {
     pub(super) fn from_material(material: &Material) -> Option<Self> {
         let Material { bsdf, emission, normal_perturbation, opacity } = material;
         let is_even = emission.texture.is_none() && emission.coat.is_none();
-        let rough = non_specular_bsdf(bsdf).filter(|rough| rough.supports_packets())?;
+        let rough = bsdf.as_non_specular().filter(|rough| rough.supports_packets())?;
         (is_even && normal_perturbation.is_none() && opacity.is_none()).then(|| Self {
             kind: rough.kind(),
             row_texture: rough.packet_texture().map(Texture::uv_set),
@@ -34,14 +34,6 @@ impl PacketMaterial {
             emission: emission.scale,
             is_two_sided: emission.is_two_sided(),
         })
-    }
-}
-
-#[inline(always)]
-fn non_specular_bsdf(bsdf: &Bsdf) -> Option<&NonSpecular> {
-    match bsdf {
-        Bsdf::NonSpecular(rough) => Some(rough),
-        Bsdf::Mirror(_) | Bsdf::Dielectric(_) | Bsdf::ThinDielectric(_) | Bsdf::Coated(_) => None,
     }
 }
 
@@ -58,6 +50,6 @@ impl World {
     #[inline(always)]
     pub fn material_for_packet_shading(&self, material: usize) -> Option<(&PacketMaterial, &NonSpecular)> {
         let packet_material = self.packet_material[material].as_ref()?;
-        Some((packet_material, non_specular_bsdf(&self.materials[material].bsdf)?))
+        Some((packet_material, self.materials[material].bsdf.as_non_specular()?))
     }
 }

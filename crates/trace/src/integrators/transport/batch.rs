@@ -54,7 +54,7 @@ soa! {
         pub path: u32 = 0,
         /// Path index in the bounce's queue.
         pub place: u32 = 0,
-        /// [`PathState::roulette_throughput`](super::ray::PathState::roulette_throughput) of the path.
+        /// [`PathHistory::roulette_throughput`](super::ray::PathHistory::roulette_throughput) of the path.
         pub roulette_throughput: f32 = 0.0,
         /// Index of the vertex's interior list.
         pub interiors: u32 = 0,

@@ -3,8 +3,8 @@
 //!
 //! - `tile`: the context shared by all rays of a tile. `ray`, `cone`, `interiors`: a path's ray, its ray
 //!   cone, and the glass around it.
-//! - `camera`: camera rays. `packet_source`: the rays of a packet. `trace`, `packet`: intersection, and
-//!   packets of plain surfaces. `plain_vertices`: their vertices.
+//! - `camera`: camera rays. `packet_source`: the rays of a packet. `packet`: intersection, and packets of
+//!   plain surfaces. `plain_vertices`: their vertices.
 //! - `walk`, `crossing`: null interactions and glass boundaries up to the next scattering surface. `vertex`:
 //!   that surface, prepared for shading.
 //! - `interface`: specular reflection and refraction. `batch`: packets of non-specular vertices. `scatter`:
@@ -25,6 +25,5 @@ pub mod ray;
 pub mod scatter;
 pub mod scratch;
 pub mod tile;
-pub mod trace;
 pub mod vertex;
 pub mod walk;

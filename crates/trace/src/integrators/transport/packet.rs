@@ -6,7 +6,9 @@ use arrayvec::ArrayVec;
 use super::batch::VertexBatch;
 use super::packet_source::PacketSource;
 use super::plain_vertices::ShadowLiftSelection;
+use super::ray::PathRay;
 use super::tile::TileContext;
+use crate::control::Cancelled;
 use crate::geometry::packet::{self, HitPacket, RayPacket};
 use crate::geometry::surface_packet::SurfacePacket;
 use crate::geometry::{Ray, SurfacePoint};
@@ -17,6 +19,9 @@ use crate::math::lanes::{F32x16, Simd, TRUE, Vec3x16, lane, set_lane};
 use crate::math::{DVec2, Vec3};
 use crate::scene::description::ShadowMode;
 use crate::world::{Hit, Object, PACKET_SIZE, PacketMaterial, SimdKernel};
+
+/// Number of rays traced between checks of the cancel token.
+pub const POLL_INTERVAL: usize = 256;
 
 /// Hits of a packet. A surface is plain if its ray is in air, its shape and the textures of its non-specular
 /// material can be evaluated in packets, and all plain surfaces of the packet have the same kind of BSDF.
@@ -86,6 +91,24 @@ impl PacketHits {
 }
 
 impl TileContext<'_> {
+    /// Finds the closest hit of every ray in a queue, replacing the content of `hits`.
+    ///
+    /// # Errors
+    /// [`Cancelled`] if the token is canceled.
+    pub fn closest_hits(&self, rays: &[PathRay], hits: &mut Vec<Option<Hit>>) -> Result<(), Cancelled> {
+        hits.clear();
+        hits.resize(rays.len(), None);
+        for (paths, hits) in rays.chunks(POLL_INTERVAL).zip(hits.chunks_mut(POLL_INTERVAL)) {
+            self.token.check_pause_and_cancel()?;
+            for (paths, hits) in paths.chunks(PACKET_SIZE).zip(hits.chunks_mut(PACKET_SIZE)) {
+                let rays: [Ray; PACKET_SIZE] =
+                    std::array::from_fn(|lane| paths[lane.min(paths.len() - 1)].ray);
+                self.world.geometry.closest_hit_packet(&rays[..paths.len()], hits);
+            }
+        }
+        Ok(())
+    }
+
     /// Intersects at most [`PACKET_SIZE`] rays. Plain surfaces are stored in the vertex packet, ready for
     /// direct lighting if `are_lit` is true. The packet's `used` mask contains the surfaces that reflect
     /// light. Other surfaces are stored in the surface packet if supported.

@@ -12,7 +12,7 @@ use super::tile::TileContext;
 use super::vertex::SurfaceVertex;
 use crate::geometry::{Ray, ShapeHit, SurfacePoint};
 use crate::integrators::RayCounters;
-use crate::materials::{Bsdf, RoughDielectricPoint, ThinDielectric};
+use crate::materials::{RoughDielectricPoint, ThinDielectric};
 use crate::math::Vec3;
 use crate::sampling::Dimension;
 use crate::world::{Hit, MAX_NULL_INTERACTIONS, OffsetPoints};
@@ -272,17 +272,11 @@ fn null_interaction_outcome<'a, W: PathStepper<'a>>(
     if !stochastic_opacity_test(stepper.tile(), path, vertex, stepper.texture_lookup_counter()) {
         return NullInteraction::Passed(Vec3::ONE);
     }
-    match &vertex.material.bsdf {
-        Bsdf::ThinDielectric(pane) => {
-            let mut whole = *path;
-            let hit = way.rebase_ray_to_last_vertex(&mut whole, hit);
-            whole.interiors = stepper.tile().interiors_without_open_solids(whole.interiors);
-            stepper.handle_pane(&whole, vertex, DirectOrCoincidentHit::Direct(hit), pane)
-        }
-        Bsdf::NonSpecular(_) | Bsdf::Mirror(_) | Bsdf::Dielectric(_) | Bsdf::Coated(_) => {
-            NullInteraction::Opaque
-        }
-    }
+    let Some(pane) = vertex.material.bsdf.as_thin_dielectric() else { return NullInteraction::Opaque };
+    let mut whole = *path;
+    let hit = way.rebase_ray_to_last_vertex(&mut whole, hit);
+    whole.interiors = stepper.tile().interiors_without_open_solids(whole.interiors);
+    stepper.handle_pane(&whole, vertex, DirectOrCoincidentHit::Direct(hit), pane)
 }
 
 /// Whether a partially transparent surface coincident with glass stops a path. Thin panes on glass have no
@@ -294,12 +288,8 @@ fn is_stopped_by_coincident_surface<'a, W: PathStepper<'a>>(
     path: &PathRay,
     vertex: &SurfaceVertex<'a>,
 ) -> bool {
-    match &vertex.material.bsdf {
-        Bsdf::ThinDielectric(_) => false,
-        Bsdf::NonSpecular(_) | Bsdf::Mirror(_) | Bsdf::Dielectric(_) | Bsdf::Coated(_) => {
-            stochastic_opacity_test(stepper.tile(), path, vertex, stepper.texture_lookup_counter())
-        }
-    }
+    vertex.material.bsdf.as_thin_dielectric().is_none()
+        && stochastic_opacity_test(stepper.tile(), path, vertex, stepper.texture_lookup_counter())
 }
 
 /// Opacity of the surface at a vertex. If light samples compete with the path, the texture is looked up
