@@ -53,12 +53,12 @@ fn empty_scene_has_the_documented_defaults() {
 #[test]
 fn materials_have_the_documented_defaults() {
     let scene = scene("[materials.a]\n[materials.b]\ntype='mirror'\n[materials.c]\ntype='glass'");
-    let phong = MaterialKind::Phong {
+    let phong = MaterialKind::Phong(PhongParameters {
         diffuse: ColorSource::Constant(Vec3::splat(0.7)),
         specular: ColorSource::Constant(Vec3::ZERO),
         shininess: 32.0,
         ambient: None,
-    };
+    });
     assert!(scene.materials.iter().all(|material| !material.emits() && material.normal_map.is_none()));
     let kinds: Vec<_> = scene.materials.into_iter().map(|material| material.kind).collect();
     let mirror = MaterialKind::Mirror { reflectance: ColorSource::Constant(Vec3::splat(0.9)) };
@@ -162,7 +162,9 @@ fn mesh_files_are_listed_once() {
         (texture.repeat, texture.wrap, texture.filter),
         (Vec2::new(2.0, -1.0), Wrap::Mirror, TextureFilter::Nearest)
     );
-    let MaterialKind::Phong { diffuse, .. } = &scene.materials[0].kind else { panic!("not phong") };
+    let MaterialKind::Phong(PhongParameters { diffuse, .. }) = &scene.materials[0].kind else {
+        panic!("not phong")
+    };
     let map = NormalMap { texture: 0, strength: 0.5 };
     assert_eq!((diffuse, scene.materials[0].normal_map), (&ColorSource::Texture(0), Some(map)));
 
@@ -394,7 +396,7 @@ fn colors_are_arrays_numbers_or_strings() {
     let diffuse = |text: &str| {
         let scene = scene(&format!("[materials.a]\ndiffuse = {text}"));
         match &scene.materials[0].kind {
-            MaterialKind::Phong { diffuse: ColorSource::Constant(color), .. } => *color,
+            MaterialKind::Phong(PhongParameters { diffuse: ColorSource::Constant(color), .. }) => *color,
             other => panic!("{other:?}"),
         }
     };

@@ -7,7 +7,9 @@ use glimt::control::{CancelToken, ignore_progress};
 use glimt::geometry::mesh::TriangleMesh;
 use glimt::math::{DVec3, Vec2, Vec3};
 use glimt::scene::description::light::Falloff;
-use glimt::scene::description::{Accel, ColorSource, MaterialKind, ShadowMode, Shape, TextureFilter, Wrap};
+use glimt::scene::description::{
+    Accel, ColorSource, MaterialKind, PhongParameters, ShadowMode, Shape, TextureFilter, Wrap,
+};
 
 use super::scenes::{AS_IT_IS, Build, emitter, glass, lat_long_sphere, matte, mirror, phong, scene};
 use super::v;
@@ -33,7 +35,7 @@ fn everything_at(at: DVec3, accel: Accel) -> Build {
         Vec2::ONE,
     );
     let mut tiles = matte(0.5);
-    if let MaterialKind::Phong { diffuse, .. } = &mut tiles.kind {
+    if let MaterialKind::Phong(PhongParameters { diffuse, .. }) = &mut tiles.kind {
         *diffuse = ColorSource::Texture(bricks);
     }
     build
@@ -124,7 +126,7 @@ fn plane_texture_is_stable_far_from_origin() {
                 repeat,
             );
             let mut tiles = matte(0.5);
-            if let MaterialKind::Phong { diffuse, .. } = &mut tiles.kind {
+            if let MaterialKind::Phong(PhongParameters { diffuse, .. }) = &mut tiles.kind {
                 *diffuse = ColorSource::Texture(picture);
             }
             build

@@ -3,7 +3,7 @@
 use glimt::integrators::ViewMode;
 use glimt::math::{DVec3, Vec2, Vec3};
 use glimt::scene::description::{
-    ColorSource, EmissionSource, Integrator, Material, MaterialKind, TextureFilter, Wrap,
+    ColorSource, EmissionSource, Integrator, Material, MaterialKind, PhongParameters, TextureFilter, Wrap,
 };
 
 use super::scenes::{Build, emitter, lat_long_sphere, matte, mirror, phong, plain, scene};
@@ -23,7 +23,7 @@ fn board(filter: TextureFilter, repeat: f32) -> (Build, Material) {
     let mut build = scene().with(|scene| scene.render.ambient = Vec3::ONE);
     let texture = checkers(&mut build, filter, repeat);
     let mut kind = phong(0.0, 0.0, 1.0, 0.0);
-    if let MaterialKind::Phong { diffuse, .. } = &mut kind.kind {
+    if let MaterialKind::Phong(PhongParameters { diffuse, .. }) = &mut kind.kind {
         *diffuse = ColorSource::Texture(texture);
     }
     (build, kind)
@@ -59,7 +59,7 @@ fn distant_boards_are_gray_for_every_key() {
         ("diffuse", |board| {
             let diffuse = ColorSource::Texture(board);
             let specular = ColorSource::Constant(Vec3::ZERO);
-            plain(MaterialKind::Phong { diffuse, specular, shininess: 1.0, ambient: None })
+            plain(MaterialKind::Phong(PhongParameters { diffuse, specular, shininess: 1.0, ambient: None }))
         }),
         ("emission", |board| {
             let own = emitter(1.0);
@@ -113,7 +113,7 @@ fn constant_texture_is_constant_at_every_level() {
         Vec2::splat(99.0),
     );
     let mut kind = matte(0.0);
-    if let MaterialKind::Phong { diffuse, .. } = &mut kind.kind {
+    if let MaterialKind::Phong(PhongParameters { diffuse, .. }) = &mut kind.kind {
         *diffuse = ColorSource::Texture(texture);
     }
     let build = build.quad(v(-9.0, 0.0, 9.0), v(18.0, 0.0, 0.0), v(0.0, 0.0, -18.0), kind);

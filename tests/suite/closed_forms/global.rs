@@ -5,7 +5,9 @@ use std::f64::consts::PI;
 use glimt::integrators::ViewMode;
 use glimt::math::{DVec3, Vec3};
 use glimt::scene::description::light::Falloff;
-use glimt::scene::description::{ColorSource, Integrator, Material, MaterialKind, ShadowMode, Shape};
+use glimt::scene::description::{
+    ColorSource, Integrator, Material, MaterialKind, PhongParameters, ShadowMode, Shape,
+};
 
 use super::distant::sun;
 use super::scenes::{Build, emitter, glass, lat_long_sphere, matte, mirror, phong, scene, tinted};
@@ -401,7 +403,7 @@ fn reflectances_multiply_per_color_channel() {
     let colors = Vec3::new(0.2, 0.5, 0.75);
     let room = room(1.0, 0.5, 0.0).with(|scene| {
         for material in &mut scene.materials {
-            if let MaterialKind::Phong { diffuse, .. } = &mut material.kind {
+            if let MaterialKind::Phong(PhongParameters { diffuse, .. }) = &mut material.kind {
                 *diffuse = ColorSource::Constant(colors);
             }
         }

@@ -8,7 +8,7 @@ use glimt::integrators::render_tile;
 use glimt::math::{DVec3, Vec2, Vec3};
 use glimt::scene::description::light::Falloff;
 use glimt::scene::description::{
-    ColorSource, Material, MaterialKind, ShadowMode, Shape, TextureFilter, Wrap,
+    ColorSource, Material, MaterialKind, PhongParameters, ShadowMode, Shape, TextureFilter, Wrap,
 };
 
 use super::scenes::{Build, emitter, glass, mirror, plain, scene};
@@ -20,7 +20,7 @@ fn pictured(paint: impl Fn(&mut Build, Vec3) -> ColorSource) -> Build {
     let mut build = scene();
     let phong = |build: &mut Build, r: f32, ks: f32| -> Material {
         let (diffuse, specular) = (paint(build, Vec3::new(r, 0.5, 0.3)), paint(build, Vec3::splat(ks)));
-        plain(MaterialKind::Phong { diffuse, specular, shininess: 12.5, ambient: None })
+        plain(MaterialKind::Phong(PhongParameters { diffuse, specular, shininess: 12.5, ambient: None }))
     };
     let shapes = [
         Shape::Plane { point: v(0.0, -0.3, 0.0), normal: v(0.1, 1.0, 0.0) },

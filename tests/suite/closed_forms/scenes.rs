@@ -16,9 +16,9 @@ use glimt::math::{DVec3, Vec2, Vec3};
 use glimt::scene::description::light::{Falloff, PointLight};
 use glimt::scene::description::{
     Accel, Camera, ColorSource, EmissionSource, Environment, FresnelSource, Integrator, Light, Material,
-    MaterialKind, MeshFile, MeshReference, MeshTransform, NumberSource, Object, OpacitySource, PhotonOptions,
-    PixelFilter, RenderOptions, Scene, ShadowMode, Shape, Spanned, Texture, TextureEncoding, TextureFilter,
-    Tonemap, UvSet, Wrap,
+    MaterialKind, MeshFile, MeshReference, MeshTransform, NumberSource, Object, OpacitySource,
+    PhongParameters, PhotonOptions, PixelFilter, RenderOptions, Scene, ShadowMode, Shape, Spanned, Texture,
+    TextureEncoding, TextureFilter, Tonemap, UvSet, Wrap,
 };
 use glimt::world::{
     Geometry, Image, MeshTree, TextureRolesNeededByRender, World, WorldInputs, build_environment_map,
@@ -337,8 +337,12 @@ pub fn plain(kind: MaterialKind) -> Material {
 
 pub fn phong(diffuse: f32, specular: f32, shininess: f32, emission: f32) -> Material {
     let gray = |x| ColorSource::Constant(Vec3::splat(x));
-    let kind =
-        MaterialKind::Phong { diffuse: gray(diffuse), specular: gray(specular), shininess, ambient: None };
+    let kind = MaterialKind::Phong(PhongParameters {
+        diffuse: gray(diffuse),
+        specular: gray(specular),
+        shininess,
+        ambient: None,
+    });
     Material { emission: EmissionSource::from_constant(Vec3::splat(emission)), ..plain(kind) }
 }
 

@@ -8,7 +8,8 @@ use glimt::materials::TexturePoint;
 use glimt::math::{DVec3, Vec2, Vec3};
 use glimt::scene::description::light::Falloff;
 use glimt::scene::description::{
-    ColorSource, Material, MaterialKind, MeshReference, ShadowMode, Shape, TextureFilter, Wrap,
+    ColorSource, Material, MaterialKind, MeshReference, PhongParameters, ShadowMode, Shape, TextureFilter,
+    Wrap,
 };
 
 use super::scenes::{Build, emitter, glass, lat_long_sphere, matte, mirror, phong, scene};
@@ -49,7 +50,7 @@ fn phong_lobe_is_normalized() {
 fn components_add_up_to_beauty() {
     // Lₐ = ka·Isa. At depth 0, the image consists only of emission.
     let mut kind = phong(0.3, 0.5, 20.0, 0.25);
-    if let MaterialKind::Phong { ambient, .. } = &mut kind.kind {
+    if let MaterialKind::Phong(PhongParameters { ambient, .. }) = &mut kind.kind {
         *ambient = Some(ColorSource::Constant(Vec3::splat(0.6)));
     }
     let lit = lobe(kind, 35.0).with(|scene| scene.render.ambient = Vec3::splat(0.2));
@@ -106,7 +107,7 @@ fn pictured(filter: TextureFilter, wrap: Wrap, repeat: Vec2) -> (Build, Material
     let mut build = scene().with(|scene| scene.render.ambient = Vec3::ONE);
     let texture = build.texture(&[&[RED, GREEN], &[BLUE, GRAY]], filter, wrap, repeat);
     let mut kind = phong(0.0, 0.0, 1.0, 0.0);
-    if let MaterialKind::Phong { diffuse, .. } = &mut kind.kind {
+    if let MaterialKind::Phong(PhongParameters { diffuse, .. }) = &mut kind.kind {
         *diffuse = ColorSource::Texture(texture);
     }
     (build, kind)

@@ -4,7 +4,7 @@ use glimt::geometry::mesh::TriangleMesh;
 use glimt::math::{DVec3, Vec2, Vec3};
 use glimt::scene::description::{
     Bump, ColorSource, EmissionSource, Integrator, Material, MaterialKind, NormalMap, NumberSource,
-    OpacitySource, TextureFilter, UvSet, Wrap,
+    OpacitySource, PhongParameters, TextureFilter, UvSet, Wrap,
 };
 
 use super::scenes::{Build, matte, phong, principled, scene};
@@ -37,12 +37,12 @@ fn texture(build: &mut Build, filter: TextureFilter) -> usize {
 fn materials(texture: usize) -> Vec<(&'static str, Material)> {
     let number = || NumberSource::Texture { texture, channel: None };
     let lit = phong(0.5, 0.3, 20.0, 0.0);
-    let colored = MaterialKind::Phong {
+    let colored = MaterialKind::Phong(PhongParameters {
         diffuse: ColorSource::Texture(texture),
         specular: ColorSource::Constant(Vec3::ZERO),
         shininess: 1.0,
         ambient: None,
-    };
+    });
     let mut rough = principled(0.5, 1.0, 0.5);
     if let MaterialKind::Principled { roughness, .. } = &mut rough.kind {
         *roughness = number();
@@ -125,12 +125,12 @@ fn one_material_can_use_both_uv_sets() {
         let flat =
             build.texture(&[&[Vec3::new(0.5, 0.5, 1.0)]], TextureFilter::Nearest, Wrap::Repeat, Vec2::ONE);
         let material = Material {
-            kind: MaterialKind::Phong {
+            kind: MaterialKind::Phong(PhongParameters {
                 diffuse: ColorSource::Texture(color),
                 specular: ColorSource::Constant(Vec3::ZERO),
                 shininess: 1.0,
                 ambient: None,
-            },
+            }),
             emission: EmissionSource { texture: Some(light), ..EmissionSource::from_constant(Vec3::ONE) },
             normal_map: has_relief.then_some(NormalMap { texture: flat, strength: 1.0 }),
             ..matte(0.5)

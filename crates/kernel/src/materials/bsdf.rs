@@ -1,10 +1,10 @@
 //! Non-specular ("rough") materials, which have no δ lobes, and the values that their BSDFs exchange with
 //! integrators.
 //!
-//! To add a kind of BSDF, add a file that implements [`BxdfMaterial`], [`BxdfParameters`], and
-//! [`Bxdf`](super::bxdf::Bxdf), and a line in the table in [`bxdfs`](super::bxdfs). No other code
-//! distinguishes kinds: integrators call `f`, `pdf`, and `sample` of a [`BsdfPacket`](super::BsdfPacket) for
-//! all lanes at once.
+//! To add a kind of BSDF, add a file that implements [`Bxdf`](super::bxdf::Bxdf), and a line in the table in
+//! [`bxdfs`](super::bxdfs). If its parameters differ from those of all other kinds, also implement
+//! [`BxdfMaterial`] and [`BxdfParameters`]. No other code distinguishes kinds: integrators call `f`, `pdf`,
+//! and `sample` of a [`BsdfPacket`](super::BsdfPacket) for all lanes at once.
 
 use std::f32::consts::FRAC_1_PI;
 

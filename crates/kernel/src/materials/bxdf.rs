@@ -82,6 +82,15 @@ pub struct ShadingGeometry {
     pub tangent: Vec3,
 }
 
+/// Lobes from which a direction is sampled.
+#[derive(Clone, Copy, Debug)]
+pub struct SampledLobes {
+    /// The lobes.
+    pub lobes: LobesToSample,
+    /// The unit normal of cosine lobes.
+    pub normal: Vec3,
+}
+
 /// A non-specular BSDF at a single point. Values that depend on the view direction are stored separately.
 pub trait Bxdf: Soa + Default {
     /// The material's parameters at a single point.
@@ -142,32 +151,17 @@ pub trait Bxdf: Soa + Default {
         LobeValue::ZERO
     }
 
-    /// Value of the narrow lobes.
+    /// Value of the narrow lobes. Also called for surfaces without narrow lobes in packets that contain
+    /// surfaces with narrow lobes. f must then be 0.
     fn narrow_lobe_value(&self, view: &Self::View, wi: Vec3, any: BxdfFlags) -> LobeValue;
 
-    /// Pdf in sr⁻¹ of a direction sampled from these lobes. Cosine lobes are around `normal`. `shape` is the
-    /// narrow lobes' [`LobeValue::shape`].
-    fn pdf(
-        &self,
-        view: &Self::View,
-        lobes: LobesToSample,
-        normal: Vec3,
-        wi: Vec3,
-        shape: f32,
-        any: BxdfFlags,
-    ) -> f32;
+    /// Pdf in sr⁻¹ of a direction sampled from these lobes. `shape` is the narrow lobes'
+    /// [`LobeValue::shape`].
+    fn pdf(&self, view: &Self::View, from: SampledLobes, wi: Vec3, shape: f32, any: BxdfFlags) -> f32;
 
-    /// Samples a unit direction. Cosine lobes are around `normal`. `choice` selects the lobe, and `u` the
-    /// direction within it. All random numbers are in [0, 1).
-    fn sample(
-        &self,
-        view: &Self::View,
-        lobes: LobesToSample,
-        normal: Vec3,
-        choice: f32,
-        u: [f32; 2],
-        any: BxdfFlags,
-    ) -> Vec3;
+    /// Samples a unit direction from these lobes. The first random number selects the lobe, and the others
+    /// select the direction within it. All are in [0, 1).
+    fn sample(&self, view: &Self::View, from: SampledLobes, random: [f32; 3], any: BxdfFlags) -> Vec3;
 
     /// Shape of the narrow lobe, for light selection. Only called if the flags indicate a narrow lobe. With
     /// `None`, lights are selected as for a wide lobe.

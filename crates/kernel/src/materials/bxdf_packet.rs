@@ -1,7 +1,7 @@
 //! Packets of 16 non-specular BSDFs of the same kind. All functions must be called inside a SIMD kernel.
 
 use super::bsdf::{BsdfValues, DielectricSamplePacket, LobesToSample, NarrowLobe, ShownLobes, UvPacket};
-use super::bxdf::{Bxdf, BxdfFlags, ShadingGeometry};
+use super::bxdf::{Bxdf, BxdfFlags, SampledLobes, ShadingGeometry};
 use super::microfacet::ensure_normal_faces_viewer_branchless;
 use super::rough_dielectric::DielectricBxdf;
 use super::texture::Texture;
@@ -240,7 +240,8 @@ impl<B: Bxdf> BxdfPacket<B> {
         for i in 0..PACKET_SIZE {
             let bsdf = B::get(&self.bsdf, i);
             let view = B::View::get(&self.view, i);
-            pdfs[i] = bsdf.pdf(&view, lobes, lane(normals, i), lane(wi, i), values.shape[i], any);
+            let from = SampledLobes { lobes, normal: lane(normals, i) };
+            pdfs[i] = bsdf.pdf(&view, from, lane(wi, i), values.shape[i], any);
         }
         pdfs
     }
@@ -275,8 +276,8 @@ impl<B: Bxdf> BxdfPacket<B> {
         for i in 0..PACKET_SIZE {
             let bsdf = B::get(&self.bsdf, i);
             let view = B::View::get(&self.view, i);
-            let u = [u[0][i], u[1][i]];
-            set_lane(&mut wi, i, bsdf.sample(&view, lobes, lane(normals, i), choices[i], u, any));
+            let from = SampledLobes { lobes, normal: lane(normals, i) };
+            set_lane(&mut wi, i, bsdf.sample(&view, from, [choices[i], u[0][i], u[1][i]], any));
         }
         wi
     }

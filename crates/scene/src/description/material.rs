@@ -177,7 +177,7 @@ impl MaterialKind {
     /// Name of the material type in scene files.
     pub fn name(&self) -> &'static str {
         match self {
-            Self::Phong { .. } => "phong",
+            Self::Phong(_) => "phong",
             Self::Mirror { .. } => "mirror",
             Self::Glass { .. } | Self::Pane { .. } => "glass",
             Self::Metal { .. } => "metal",
@@ -189,7 +189,7 @@ impl MaterialKind {
     /// Whether the material has a δ lobe, like a mirror, smooth glass or a smooth coat.
     pub fn has_delta_lobe(&self) -> bool {
         match self {
-            Self::Phong { .. } | Self::Principled { .. } => false,
+            Self::Phong(_) | Self::Principled { .. } => false,
             Self::Metal { roughness, .. }
             | Self::Plastic { roughness, .. }
             | Self::Glass { roughness, .. } => *roughness == NumberSource::Constant(0.0),
@@ -201,7 +201,7 @@ impl MaterialKind {
     pub fn is_index_matched_glass(&self) -> bool {
         match self {
             Self::Glass { ior, .. } => *ior == 1.0,
-            Self::Phong { .. }
+            Self::Phong(_)
             | Self::Mirror { .. }
             | Self::Pane { .. }
             | Self::Metal { .. }
@@ -215,7 +215,7 @@ impl MaterialKind {
     pub fn is_anisotropic(&self) -> bool {
         match self {
             Self::Metal { anisotropy, .. } => *anisotropy != NumberSource::Constant(0.0),
-            Self::Phong { .. }
+            Self::Phong(_)
             | Self::Mirror { .. }
             | Self::Glass { .. }
             | Self::Pane { .. }
@@ -229,7 +229,7 @@ impl MaterialKind {
         match self {
             Self::Metal { fresnel: FresnelSource::Index { .. }, .. } | Self::Glass { .. } => false,
             Self::Metal { fresnel: FresnelSource::Schlick(_), .. }
-            | Self::Phong { .. }
+            | Self::Phong(_)
             | Self::Mirror { .. }
             | Self::Pane { .. }
             | Self::Plastic { .. }
@@ -249,7 +249,7 @@ impl MaterialKind {
             Self::Glass { ior, tint, roughness: _ } => {
                 Some([f64::from(ior), tint.x, tint.y, tint.z].map(f64::to_bits))
             }
-            Self::Phong { .. }
+            Self::Phong(_)
             | Self::Mirror { .. }
             | Self::Pane { .. }
             | Self::Metal { .. }
@@ -340,20 +340,24 @@ impl TextureRole {
     }
 }
 
+/// Parameters of a Phong surface.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PhongParameters {
+    /// Diffuse reflectance kd.
+    pub diffuse: ColorSource,
+    /// Specular reflectance ks.
+    pub specular: ColorSource,
+    /// Phong exponent α ≥ 0.
+    pub shininess: f32,
+    /// Ambient reflectance ka. `None` uses the diffuse color.
+    pub ambient: Option<ColorSource>,
+}
+
 /// Reflection and transmission of a material.
 #[derive(Clone, Debug, PartialEq)]
 pub enum MaterialKind {
     /// The normalized Phong model.
-    Phong {
-        /// Diffuse reflectance kd.
-        diffuse: ColorSource,
-        /// Specular reflectance ks.
-        specular: ColorSource,
-        /// Phong exponent α ≥ 0.
-        shininess: f32,
-        /// Ambient reflectance ka. `None` uses the diffuse color.
-        ambient: Option<ColorSource>,
-    },
+    Phong(PhongParameters),
     /// A perfect mirror.
     Mirror {
         /// Reflectance, in [0, 1].
@@ -433,7 +437,7 @@ impl MaterialKind {
     /// Returns the color parameters that may be textures, each with its role.
     fn color_parameters_with_roles(&self) -> Vec<(&ColorSource, TextureRole)> {
         match self {
-            Self::Phong { diffuse, specular, shininess: _, ambient } => vec![
+            Self::Phong(PhongParameters { diffuse, specular, shininess: _, ambient }) => vec![
                 (diffuse, TextureRole::Diffuse),
                 (specular, TextureRole::Specular),
                 (ambient.as_ref().unwrap_or(diffuse), TextureRole::Ambient),
@@ -473,7 +477,7 @@ impl MaterialKind {
                 clearcoat_roughness,
                 ..
             } => vec![*metallic, *roughness, *specular, *transmission, *clearcoat, *clearcoat_roughness],
-            Self::Phong { .. } | Self::Mirror { .. } | Self::Pane { .. } => Vec::new(),
+            Self::Phong(_) | Self::Mirror { .. } | Self::Pane { .. } => Vec::new(),
         }
     }
 }
@@ -492,7 +496,7 @@ impl Material {
                 let has_coat = self.emits() && clearcoat != NumberSource::Constant(0.0);
                 has_coat.then_some([clearcoat, clearcoat_roughness])
             }
-            MaterialKind::Phong { .. }
+            MaterialKind::Phong(_)
             | MaterialKind::Mirror { .. }
             | MaterialKind::Glass { .. }
             | MaterialKind::Pane { .. }
@@ -623,7 +627,7 @@ impl Fingerprinted for Bump {
 impl Fingerprinted for MaterialKind {
     fn add_to(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
         match self {
-            Self::Phong { diffuse, specular, shininess, ambient } => {
+            Self::Phong(PhongParameters { diffuse, specular, shininess, ambient }) => {
                 key.add_usize(0).add_f32(*shininess).add(diffuse, of).add(specular, of).add(ambient, of);
             }
             Self::Mirror { reflectance } => {

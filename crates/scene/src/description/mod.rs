@@ -17,8 +17,8 @@ pub use camera::{Camera, CameraOverrides, Pose, ResolvedCamera, is_same_distance
 pub use light::{Environment, Light};
 pub use material::{
     Bump, Channel, ChannelSelector, ColorSource, EmissionSides, EmissionSource, FresnelSource, Material,
-    MaterialKind, NormalMap, NumberSource, OpacitySource, PixelInterpretation, Texture, TextureEncoding,
-    TextureFilter, TextureRole, UvSet, Wrap,
+    MaterialKind, NormalMap, NumberSource, OpacitySource, PhongParameters, PixelInterpretation, Texture,
+    TextureEncoding, TextureFilter, TextureRole, UvSet, Wrap,
 };
 pub use method::{Integrator, IntegratorProperties};
 pub use render::{

@@ -1,7 +1,7 @@
 //! Reads the `[materials.*]` tables.
 
 use super::super::description::{
-    ColorSource, FresnelSource, Material, MaterialKind, NumberSource, OpacitySource,
+    ColorSource, FresnelSource, Material, MaterialKind, NumberSource, OpacitySource, PhongParameters,
 };
 use super::common;
 use super::context::Issue;
@@ -64,7 +64,7 @@ fn read_material(name: String, table: &TableReader<'_>, textures: &DefinedNames)
     // Without a valid type, keys cannot be checked.
     let kind = if key.is_present() { key.choice()? } else { MaterialType::Phong };
     let kind = match kind {
-        MaterialType::Phong => Some(read_phong(table, textures)),
+        MaterialType::Phong => Some(MaterialKind::Phong(read_phong(table, textures))),
         MaterialType::Mirror => Some(read_mirror(table, textures)),
         MaterialType::Glass => read_glass(table, textures),
         MaterialType::Metal => read_metal(table, textures),
@@ -84,7 +84,7 @@ fn read_material(name: String, table: &TableReader<'_>, textures: &DefinedNames)
     Some(Material { name, kind: kind?, emission, normal_map, bump, opacity })
 }
 
-fn read_phong(table: &TableReader<'_>, textures: &DefinedNames) -> MaterialKind {
+fn read_phong(table: &TableReader<'_>, textures: &DefinedNames) -> PhongParameters {
     let (diffuse_key, specular_key) = (table.optional_key("diffuse"), table.optional_key("specular"));
     let ambient_key = table.optional_key("ambient");
     let color = |key: &KeyInTable<'_>, name| key.color_or_texture(textures, table.key_limits(name));
@@ -98,7 +98,7 @@ fn read_phong(table: &TableReader<'_>, textures: &DefinedNames) -> MaterialKind 
     if !is_invalid && are_bytes == [false; 3] {
         warn_about_energy_gain(&diffuse_key, &specular_key, &diffuse, &specular);
     }
-    MaterialKind::Phong {
+    PhongParameters {
         diffuse,
         specular,
         shininess: read_or_default(table, "phong.shininess", 32.0, KeyInTable::number_f32),

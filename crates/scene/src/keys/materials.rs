@@ -4,7 +4,7 @@ use super::key::DefaultValue::{Absent, By, Is};
 use super::key::ValueKind::{
     ColorOrTexture, Emission, Flag, Heights, Number, NumberOrTexture, Texture, Words,
 };
-use super::key::{TableInfo, TableSyntax, TableTypeInfo, choice_values, define_key};
+use super::key::{KeyInfo, TableInfo, TableSyntax, TableTypeInfo, choice_values, define_key};
 use super::limits::Limits::{Any, AtLeast, Between};
 use crate::description::EmissionSides;
 use crate::materials::conductor::elements::MetalElement;
@@ -54,40 +54,7 @@ pub(super) const MATERIALS: TableInfo = TableInfo {
         ),
     ],
     types: &[
-        TableTypeInfo {
-            name: "phong",
-            doc: "A diffuse surface with a glossy highlight",
-            keys: &[
-                define_key(
-                    "diffuse",
-                    ColorOrTexture(AtLeast(0.0)),
-                    "reflectance",
-                    Is("[0.7, 0.7, 0.7]"),
-                    "Diffuse reflectance, kd",
-                ),
-                define_key(
-                    "specular",
-                    ColorOrTexture(AtLeast(0.0)),
-                    "reflectance",
-                    Is("[0, 0, 0]"),
-                    "Glossy reflectance, ks; glimt warns if `diffuse` + `specular` exceeds 1, which is not energy conserving",
-                ),
-                define_key(
-                    "shininess",
-                    Number(Between(0.0, 1000000.0)),
-                    "",
-                    Is("32.0"),
-                    "Phong exponent; larger values make smaller highlights",
-                ),
-                define_key(
-                    "ambient",
-                    ColorOrTexture(AtLeast(0.0)),
-                    "",
-                    By("as `diffuse`"),
-                    "Reflectance for `[render] ambient`",
-                ),
-            ],
-        },
+        TableTypeInfo { name: "phong", doc: "A diffuse surface with a glossy highlight", keys: PHONG_KEYS },
         TableTypeInfo {
             name: "mirror",
             doc: "A perfect mirror",
@@ -280,3 +247,35 @@ pub(super) const MATERIALS: TableInfo = TableInfo {
         },
     ],
 };
+
+/// Keys of a Phong surface.
+const PHONG_KEYS: &[KeyInfo] = &[
+    define_key(
+        "diffuse",
+        ColorOrTexture(AtLeast(0.0)),
+        "reflectance",
+        Is("[0.7, 0.7, 0.7]"),
+        "Diffuse reflectance, kd",
+    ),
+    define_key(
+        "specular",
+        ColorOrTexture(AtLeast(0.0)),
+        "reflectance",
+        Is("[0, 0, 0]"),
+        "Glossy reflectance, ks; glimt warns if `diffuse` + `specular` exceeds 1, which is not energy conserving",
+    ),
+    define_key(
+        "shininess",
+        Number(Between(0.0, 1000000.0)),
+        "",
+        Is("32.0"),
+        "Phong exponent; larger values make smaller highlights",
+    ),
+    define_key(
+        "ambient",
+        ColorOrTexture(AtLeast(0.0)),
+        "",
+        By("as `diffuse`"),
+        "Reflectance for `[render] ambient`",
+    ),
+];

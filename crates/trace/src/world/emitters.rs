@@ -249,7 +249,7 @@ mod tests {
     use crate::geometry::mesh::TriangleMesh;
     use crate::lights::{PhotonOrigin, PhotonRandomNumbers};
     use crate::math::transform::Transform;
-    use crate::math::{Vec3, random};
+    use crate::math::{DVec3, Vec3, random};
     use crate::scene::description::Accel;
     use crate::world::MeshTree;
 

@@ -19,8 +19,8 @@ use crate::materials::{
 };
 use crate::math::{DVec3, Vec3};
 use crate::scene::description::{
-    self, ChannelSelector, ColorSource, FresnelSource, MaterialKind, NumberSource, PixelInterpretation,
-    Scene, TextureRole,
+    self, ChannelSelector, ColorSource, FresnelSource, MaterialKind, NumberSource, PhongParameters,
+    PixelInterpretation, Scene, TextureRole,
 };
 
 /// Converts a material from the scene file.
@@ -29,7 +29,7 @@ pub fn lower_material(scene: &Scene, images: &Images, material: &description::Ma
     let color = |source: &ColorSource| of.lower_color(source);
     let number = |source: &NumberSource| of.lower_number(source, TextureRole::Roughness);
     let bsdf = match &material.kind {
-        MaterialKind::Phong { diffuse, specular, shininess, ambient } => {
+        MaterialKind::Phong(PhongParameters { diffuse, specular, shininess, ambient }) => {
             Bsdf::NonSpecular(NonSpecular::Phong(Phong {
                 diffuse: color(diffuse),
                 specular: color(specular),

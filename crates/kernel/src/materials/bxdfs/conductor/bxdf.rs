@@ -1,8 +1,8 @@
 //! The lobe of a conductor.
 
 use super::{ConductorPoint, FresnelPoint, reflectance};
-use crate::materials::bsdf::{LobesToSample, NarrowLobe};
-use crate::materials::bxdf::{Bxdf, BxdfFlags, LobeValue, ShadingGeometry};
+use crate::materials::bsdf::NarrowLobe;
+use crate::materials::bxdf::{Bxdf, BxdfFlags, LobeValue, SampledLobes, ShadingGeometry};
 use crate::materials::fresnel::schlick_weight;
 use crate::materials::microfacet::{
     SmithTerms, UnnormalizedHalfVector, frame_with_tangent, sample_reflection,
@@ -118,15 +118,7 @@ impl<const BRUSHED: bool> Bxdf for ConductorBxdf<BRUSHED> {
     }
 
     #[inline(always)]
-    fn pdf(
-        &self,
-        view: &ConductorViewTerms,
-        _: LobesToSample,
-        _: Vec3,
-        wi: Vec3,
-        shape: f32,
-        _: BxdfFlags,
-    ) -> f32 {
+    fn pdf(&self, view: &ConductorViewTerms, _: SampledLobes, wi: Vec3, shape: f32, _: BxdfFlags) -> f32 {
         let [eye, light] = self.view_and_light_smith_terms(view, wi);
         eye.pdf_from_reflection_term(&light, shape)
     }
@@ -135,10 +127,8 @@ impl<const BRUSHED: bool> Bxdf for ConductorBxdf<BRUSHED> {
     fn sample(
         &self,
         view: &ConductorViewTerms,
-        _: LobesToSample,
-        _: Vec3,
-        _: f32,
-        u: [f32; 2],
+        _: SampledLobes,
+        [_, u @ ..]: [f32; 3],
         _: BxdfFlags,
     ) -> Vec3 {
         sample_reflection(&Self::frame(view), view.wo, self.alphas, u)

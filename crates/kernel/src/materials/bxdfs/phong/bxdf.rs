@@ -5,7 +5,7 @@ use std::f32::consts::FRAC_1_PI;
 use super::PhongBsdf;
 use super::lobes::{PhongLobes, phong_cosine_power};
 use crate::materials::bsdf::{LobesToSample, NarrowLobe};
-use crate::materials::bxdf::{Bxdf, BxdfFlags, LobeValue, ShadingGeometry};
+use crate::materials::bxdf::{Bxdf, BxdfFlags, LobeValue, SampledLobes, ShadingGeometry};
 use crate::math::Vec3;
 use glimt_base::soa;
 
@@ -35,7 +35,8 @@ soa! {
 
 impl PhongBxdf {
     #[inline(always)]
-    fn lobes(&self, view: &PhongViewTerms, lobes: LobesToSample, normal: Vec3) -> PhongLobes {
+    pub(super) fn lobes(&self, view: &PhongViewTerms, from: SampledLobes) -> PhongLobes {
+        let SampledLobes { lobes, normal } = from;
         let [diffuse, specular] = match lobes {
             LobesToSample::All => self.albedos,
             LobesToSample::Narrow => [0.0, 1.0],
@@ -99,36 +100,30 @@ impl Bxdf for PhongBxdf {
     }
 
     #[inline(always)]
-    fn pdf(
-        &self,
-        view: &PhongViewTerms,
-        lobes: LobesToSample,
-        normal: Vec3,
-        wi: Vec3,
-        shape: f32,
-        _: BxdfFlags,
-    ) -> f32 {
-        self.lobes(view, lobes, normal).pdf(wi, shape)
+    fn pdf(&self, view: &PhongViewTerms, lobes: SampledLobes, wi: Vec3, shape: f32, _: BxdfFlags) -> f32 {
+        self.lobes(view, lobes).pdf(wi, shape)
     }
 
     #[inline(always)]
     fn sample(
         &self,
         view: &PhongViewTerms,
-        lobes: LobesToSample,
-        normal: Vec3,
-        choice: f32,
-        u: [f32; 2],
+        lobes: SampledLobes,
+        [choice, u0, u1]: [f32; 3],
         any: BxdfFlags,
     ) -> Vec3 {
-        let lobes = self.lobes(view, lobes, normal);
-        if any.contains(BxdfFlags::NARROW) { lobes.sample(choice, u) } else { lobes.sample_diffuse(u) }
+        let lobes = self.lobes(view, lobes);
+        if any.contains(BxdfFlags::NARROW) {
+            lobes.sample(choice, [u0, u1])
+        } else {
+            lobes.sample_diffuse([u0, u1])
+        }
     }
 
     #[inline(always)]
     fn narrow_lobe(&self, view: &PhongViewTerms) -> Option<NarrowLobe> {
         // The normal is not used here.
-        let lobes = self.lobes(view, LobesToSample::All, Vec3::Z);
+        let lobes = self.lobes(view, SampledLobes { lobes: LobesToSample::All, normal: Vec3::Z });
         let (axis, exponent) = (view.reflected, self.shininess);
         Some(NarrowLobe {
             axis,

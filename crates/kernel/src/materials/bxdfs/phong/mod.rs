@@ -9,9 +9,13 @@ use std::f32::consts::{FRAC_1_PI, PI};
 use crate::materials::bsdf::{BxdfMaterial, BxdfParameters};
 use crate::materials::lookup::ParameterLookup;
 use crate::materials::texture::ColorOrTexture;
+#[cfg(test)]
+use crate::materials::{
+    bsdf::LobesToSample,
+    bxdf::{Bxdf, SampledLobes, ShadingGeometry},
+};
 use crate::math::Vec3;
 pub use bxdf::PhongBxdf;
-use lobes::{PhongLobes, phong_cosine_power};
 
 /// A material with diffuse and glossy reflection on both sides.
 #[derive(Clone, Debug, PartialEq)]
@@ -90,24 +94,6 @@ impl PhongBsdf {
         self.diffuse * FRAC_1_PI
     }
 
-    /// f in sr⁻¹ for light from a direction.
-    pub fn value(&self, lobes: &PhongLobes, to_light: Vec3) -> Vec3 {
-        let gloss = phong_cosine_power(lobes.mirrored_eye, to_light, self.shininess);
-        self.diffuse_value() + self.specular_peak() * gloss
-    }
-
-    /// The lobes for a view direction. `normal` is the unit normal on the viewer's side.
-    pub fn lobes(&self, normal: Vec3, to_eye: Vec3) -> PhongLobes {
-        PhongLobes {
-            normal,
-            // (2(n·l)n − l)·v = (2(n·v)n − v)·l.
-            mirrored_eye: normal * (2.0 * normal.dot(to_eye)) - to_eye,
-            diffuse: self.diffuse.max_element(),
-            specular: self.specular.max_element(),
-            shininess: self.shininess,
-        }
-    }
-
     /// The glossy part of f at the lobe's peak in sr⁻¹.
     pub fn specular_peak(&self) -> Vec3 {
         self.specular * ((self.shininess + 2.0) / (2.0 * PI))
@@ -115,8 +101,27 @@ impl PhongBsdf {
 }
 
 #[cfg(test)]
+impl PhongBsdf {
+    /// f in sr⁻¹. `normal` is the unit normal on the viewer's side.
+    fn value(&self, normal: Vec3, wo: Vec3, wi: Vec3) -> Vec3 {
+        let bxdf = PhongBxdf::new(self, Vec3::ZERO);
+        let any = PhongBxdf::ALWAYS.union(bxdf.flags());
+        let view = bxdf.compute_view_terms(&ShadingGeometry { normal, wo, tangent: Vec3::ZERO }, any);
+        bxdf.wide_lobe_value(&view, wi, any).f + bxdf.narrow_lobe_value(&view, wi, any).f
+    }
+
+    /// The lobes for a view direction.
+    fn lobes(&self, normal: Vec3, wo: Vec3) -> lobes::PhongLobes {
+        let bxdf = PhongBxdf::new(self, Vec3::ZERO);
+        let directions = ShadingGeometry { normal, wo, tangent: Vec3::ZERO };
+        let view = bxdf.compute_view_terms(&directions, PhongBxdf::ALWAYS);
+        bxdf.lobes(&view, SampledLobes { lobes: LobesToSample::All, normal })
+    }
+}
+
+#[cfg(test)]
 mod tests {
-    use super::super::lobe_tests::{NarrowLightPath, check_shown_lobes};
+    use super::super::lobe_tests::{NarrowLightPath, check_lane_independence, check_shown_lobes};
     use super::*;
 
     fn glossy(shininess: f32) -> PhongBsdf {
@@ -131,9 +136,22 @@ mod tests {
         check_shown_lobes::<PhongBxdf>(&points, NarrowLightPath::Mirrored);
     }
 
+    #[test]
+    fn lanes_are_independent() {
+        let points = [0.0, 0.5].map(|specular| {
+            let (diffuse, specular) = (Vec3::new(0.4, 0.2, 0.1), Vec3::splat(specular));
+            [0.0, 1.0, 40.0, 1e4, 1e6].map(|shininess| PhongBsdf {
+                diffuse,
+                specular,
+                shininess,
+                ambient: Vec3::ZERO,
+            })
+        });
+        check_lane_independence::<PhongBxdf>(points.as_flattened());
+    }
+
     fn reflected(shininess: f32, to_eye: Vec3, to_light: Vec3) -> f32 {
-        let bsdf = glossy(shininess);
-        bsdf.value(&bsdf.lobes(Vec3::Z, to_eye), to_light).x
+        glossy(shininess).value(Vec3::Z, to_eye, to_light).x
     }
 
     fn at_angle(degrees: f32) -> Vec3 {

@@ -4,7 +4,9 @@ use std::f32::consts::{FRAC_1_PI, PI};
 
 use super::{PlasticPoint, base_layer_f};
 use crate::materials::bsdf::{LobesToSample, NarrowLobe};
-use crate::materials::bxdf::{Bxdf, BxdfFlags, LobeValue, ShadingGeometry, choose_vec3_by_bool};
+use crate::materials::bxdf::{
+    Bxdf, BxdfFlags, LobeValue, SampledLobes, ShadingGeometry, choose_vec3_by_bool,
+};
 use crate::materials::fresnel::dielectric_from_outside;
 use crate::materials::lobe_albedo::{TERMS, evaluate_albedo_fit};
 use crate::materials::microfacet::{SmithTerms, UnnormalizedHalfVector, sample_reflection};
@@ -144,8 +146,7 @@ impl Bxdf for PlasticBxdf {
     fn pdf(
         &self,
         view: &PlasticViewTerms,
-        lobes: LobesToSample,
-        normal: Vec3,
+        SampledLobes { lobes, normal }: SampledLobes,
         wi: Vec3,
         _: f32,
         any: BxdfFlags,
@@ -169,10 +170,8 @@ impl Bxdf for PlasticBxdf {
     fn sample(
         &self,
         view: &PlasticViewTerms,
-        lobes: LobesToSample,
-        normal: Vec3,
-        choice: f32,
-        u: [f32; 2],
+        SampledLobes { lobes, normal }: SampledLobes,
+        [choice, u @ ..]: [f32; 3],
         any: BxdfFlags,
     ) -> Vec3 {
         let diffuse = direction_about_axis(normal, u[0].sqrt(), (1.0 - u[0]).sqrt(), u[1]);

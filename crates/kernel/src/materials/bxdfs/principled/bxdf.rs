@@ -4,7 +4,9 @@ use std::f32::consts::FRAC_1_PI;
 
 use super::{COAT_REFLECTANCE, PrincipledPoint};
 use crate::materials::bsdf::{LobesToSample, NarrowLobe};
-use crate::materials::bxdf::{Bxdf, BxdfFlags, LobeValue, ShadingGeometry, choose_vec3_by_bool};
+use crate::materials::bxdf::{
+    Bxdf, BxdfFlags, LobeValue, SampledLobes, ShadingGeometry, choose_vec3_by_bool,
+};
 use crate::materials::fresnel::schlick_weight;
 use crate::materials::lobe_albedo::{TERMS, evaluate_albedo_fit};
 use crate::materials::microfacet::{SmithTerms, UnnormalizedHalfVector, sample_reflection};
@@ -252,8 +254,7 @@ impl<const THROUGH: bool> Bxdf for PrincipledBxdf<THROUGH> {
     fn pdf(
         &self,
         view: &PrincipledViewTerms,
-        lobes: LobesToSample,
-        normal: Vec3,
+        SampledLobes { lobes, normal }: SampledLobes,
         wi: Vec3,
         _: f32,
         any: BxdfFlags,
@@ -283,10 +284,8 @@ impl<const THROUGH: bool> Bxdf for PrincipledBxdf<THROUGH> {
     fn sample(
         &self,
         view: &PrincipledViewTerms,
-        lobes: LobesToSample,
-        normal: Vec3,
-        choice: f32,
-        u: [f32; 2],
+        SampledLobes { lobes, normal }: SampledLobes,
+        [choice, u @ ..]: [f32; 3],
         _: BxdfFlags,
     ) -> Vec3 {
         let PrincipledViewTerms { specular_share, coat_share, transmission_share, .. } = *view;

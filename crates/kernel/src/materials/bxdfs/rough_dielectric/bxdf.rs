@@ -1,8 +1,10 @@
 //! The lobes of rough glass.
 
 use super::RoughDielectricPoint;
-use crate::materials::bsdf::{LobesToSample, NarrowLobe};
-use crate::materials::bxdf::{Bxdf, BxdfFlags, LobeValue, ShadingGeometry, choose_vec3_by_bool};
+use crate::materials::bsdf::NarrowLobe;
+use crate::materials::bxdf::{
+    Bxdf, BxdfFlags, LobeValue, SampledLobes, ShadingGeometry, choose_vec3_by_bool,
+};
 use crate::materials::fresnel::{dielectric_for_any_eta, fresnel_transmittance};
 use crate::materials::microfacet::{
     SmithTerms, UnnormalizedHalfVector, reflect_at, refract_at, sample_visible_normal,
@@ -167,15 +169,7 @@ impl<const THROUGH: bool> Bxdf for DielectricBxdf<THROUGH> {
     }
 
     #[inline(always)]
-    fn pdf(
-        &self,
-        view: &DielectricViewTerms,
-        _: LobesToSample,
-        _: Vec3,
-        wi: Vec3,
-        shape: f32,
-        _: BxdfFlags,
-    ) -> f32 {
+    fn pdf(&self, view: &DielectricViewTerms, _: SampledLobes, wi: Vec3, shape: f32, _: BxdfFlags) -> f32 {
         let [eye, light] = self.view_and_light_smith_terms(view, wi);
         eye.pdf_from_reflection_term(&light, shape)
     }
@@ -184,10 +178,8 @@ impl<const THROUGH: bool> Bxdf for DielectricBxdf<THROUGH> {
     fn sample(
         &self,
         view: &DielectricViewTerms,
-        _: LobesToSample,
-        _: Vec3,
-        choice: f32,
-        u: [f32; 2],
+        _: SampledLobes,
+        [choice, u @ ..]: [f32; 3],
         _: BxdfFlags,
     ) -> Vec3 {
         let half = self.sample_facet(view, u);
