@@ -29,14 +29,7 @@ pub fn lower_material(scene: &Scene, images: &Images, material: &description::Ma
     let color = |source: &ColorSource| of.lower_color(source);
     let number = |source: &NumberSource| of.lower_number(source, TextureRole::Roughness);
     let bsdf = match &material.kind {
-        MaterialKind::Phong(PhongParameters { diffuse, specular, shininess, ambient }) => {
-            Bsdf::NonSpecular(NonSpecular::Phong(Phong {
-                diffuse: color(diffuse),
-                specular: color(specular),
-                shininess: *shininess,
-                ambient: ambient.as_ref().map(color),
-            }))
-        }
+        MaterialKind::Phong(parameters) => Bsdf::NonSpecular(NonSpecular::Phong(phong(parameters, color))),
         MaterialKind::Mirror { reflectance } => Bsdf::Mirror(Mirror::Constant(color(reflectance))),
         MaterialKind::Metal { fresnel, roughness, anisotropy } => {
             metal(lower_fresnel(fresnel, color), number(roughness), number(anisotropy))
@@ -104,6 +97,16 @@ pub fn lower_opacity(scene: &Scene, images: &Images, material: &description::Mat
         }
     };
     Some(Opacity { value, cutoff })
+}
+
+fn phong(parameters: &PhongParameters, color: impl Fn(&ColorSource) -> ColorOrTexture) -> Phong {
+    let PhongParameters { diffuse, specular, shininess, ambient } = parameters;
+    Phong {
+        diffuse: color(diffuse),
+        specular: color(specular),
+        shininess: *shininess,
+        ambient: ambient.as_ref().map(color),
+    }
 }
 
 /// BSDF of a metal: a mirror if its roughness is 0, and otherwise a microfacet conductor.
