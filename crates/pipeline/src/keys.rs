@@ -180,12 +180,27 @@ pub(crate) fn surfaces_and_lights_key(
     of: &FingerprintContext<'_>,
     textures: &[Fingerprint],
 ) -> Fingerprint {
+    // A new field of the scene must be added to one of the keys. Those of the lights and of the objects' shapes
+    // are part of this key. The settings, the camera and the photons have keys of their own. The context and
+    // `textures` contain the files and their parts.
+    let Scene {
+        objects,
+        materials,
+        lights: _,
+        environment: _,
+        textures: _,
+        mesh_files: _,
+        render: _,
+        camera: _,
+        photons: _,
+        output: _,
+    } = scene;
     let mut key = FingerprintHasher::new("surfaces");
     key.add_fingerprint(&all_object_shapes_key(scene, of))
         .add_fingerprint(&light_descriptions_key(scene, of));
-    for object in &scene.objects {
+    for object in objects {
         match object.material {
-            Some(index) => key.add_usize(1).add(&scene.materials[index], of),
+            Some(index) => key.add_usize(1).add(&materials[index], of),
             None => key.add_usize(0),
         };
         key.add_bool(object.shape.as_mesh().is_some_and(|mesh| mesh.vertex_colors));
