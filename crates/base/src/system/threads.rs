@@ -12,6 +12,10 @@ use super::{describe_error, memory};
 /// Address space used by a thread: its stack (with the standard library's default size) and its signal stack.
 pub const STACK_BYTES: u64 = (2 << 20) + (64 << 10);
 
+/// Additional address space for everything else that is allocated while threads start. If there is none left,
+/// the C library terminates the process, for example when a thread registers its first thread-local variable.
+const SPARE_BYTES: u64 = 1 << 20;
+
 /// Starts a thread.
 ///
 /// # Errors
@@ -40,8 +44,8 @@ pub fn logical_cpu_pool() -> std::result::Result<ThreadPool, String> {
     ThreadPoolBuilder::new().num_threads(threads).build().map_err(|error| failed(&error))
 }
 
-/// Checks that the stacks of `threads` more threads fit within the process's memory limits. The standard
-/// library terminates the process if a new thread has no room for its signal stack.
+/// Checks that the stacks of `threads` more threads fit within the process's memory limits, with room to spare.
+/// The standard library terminates the process if a new thread has no room for its signal stack.
 ///
 /// # Errors
 /// Returns the system's out-of-memory error if the stacks do not fit.
@@ -54,7 +58,7 @@ pub fn check_thread_stack_memory(threads: usize) -> Result<()> {
 
 /// Setting whose limit leaves no room for the stacks of `threads` more threads, or `None` if they fit.
 fn limit_exhausted_by_thread_stacks(threads: usize) -> Option<&'static str> {
-    memory::limit_preventing_mapping((threads as u64).saturating_mul(STACK_BYTES))
+    memory::limit_preventing_mapping((threads as u64).saturating_mul(STACK_BYTES).saturating_add(SPARE_BYTES))
 }
 
 /// Explains why `threads` threads could not be started and how to fix it. The system reports the same error
