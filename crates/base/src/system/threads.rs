@@ -44,8 +44,8 @@ pub fn logical_cpu_pool() -> std::result::Result<ThreadPool, String> {
     ThreadPoolBuilder::new().num_threads(threads).build().map_err(|error| failed(&error))
 }
 
-/// Checks that the stacks of `threads` more threads fit within the process's memory limits, with room to spare.
-/// The standard library terminates the process if a new thread has no room for its signal stack.
+/// Checks that the stacks of `threads` more threads fit within the process's memory limits, with room to
+/// spare. The standard library terminates the process if a new thread has no room for its signal stack.
 ///
 /// # Errors
 /// Returns the system's out-of-memory error if the stacks do not fit.

@@ -1,11 +1,11 @@
 //! Watertight intersection of mesh triangles with packets of rays in arbitrary directions. Performs the
-//! operations of [`ShearedRay::intersect`] in the same order, so the results are bit-identical.
+//! operations of [`ShearedRay::intersect`](super::watertight::ShearedRay::intersect) in the same order, so
+//! the results are bit-identical.
 
-use super::packet::{F32x16, HitPacket, PACKET_SIZE, RayPacket, set_bit_lanes};
-use super::watertight::{ILL_CONDITIONED, ShearedRay};
-use crate::math::Vec3;
+use super::packet::{F32x16, PACKET_SIZE, RayPacket};
+use super::watertight::ILL_CONDITIONED;
 use crate::math::float::gamma;
-use crate::math::lanes::{Mask, Simd, TRUE, Vec3x16, select, select_u32};
+use crate::math::lanes::{Mask, TRUE, Vec3x16};
 
 /// A packet of rays, preprocessed for triangle tests.
 pub struct ShearedPacket<'a> {
@@ -20,33 +20,17 @@ pub struct ShearedPacket<'a> {
 }
 
 /// Results of testing each ray in a packet against one triangle.
-pub(super) struct TriangleTestResults {
-    pub(super) hit: Mask,
+pub struct TriangleTestResults {
+    /// Lanes with a hit.
+    pub hit: Mask,
     /// Lanes that need the scalar test.
-    pub(super) doubtful: Mask,
-    pub(super) t: F32x16,
-    pub(super) u: F32x16,
-    pub(super) v: F32x16,
-}
-
-/// A triangle corner, shared by all rays or different for each ray.
-pub(super) trait Corner: Copy {
-    /// Coordinate of the corner for the ray in a lane.
-    fn coordinate_in_lane(self, axis: usize, lane: usize) -> f32;
-}
-
-impl Corner for Vec3 {
-    #[inline(always)]
-    fn coordinate_in_lane(self, axis: usize, _: usize) -> f32 {
-        self[axis]
-    }
-}
-
-impl Corner for &Vec3x16 {
-    #[inline(always)]
-    fn coordinate_in_lane(self, axis: usize, lane: usize) -> f32 {
-        self[axis][lane]
-    }
+    pub doubtful: Mask,
+    /// Distance of each hit.
+    pub t: F32x16,
+    /// Barycentric coordinate of the second corner at each hit.
+    pub u: F32x16,
+    /// Barycentric coordinate of the third corner.
+    pub v: F32x16,
 }
 
 impl<'a> ShearedPacket<'a> {
@@ -92,89 +76,12 @@ impl<'a> ShearedPacket<'a> {
         Self { rays, longest, is_down, shear }
     }
 
-    /// Updates `found` with nearer hits on a triangle. Triangles must be tested in order of increasing
-    /// indices. `met` is the mask of traced rays. All other rays must have negative ends.
-    #[inline(always)]
-    pub fn update_closest_hits(
-        &self,
-        (number, corners): (u32, &[Vec3; 3]),
-        (met, ends): (u32, &mut F32x16),
-        found: &mut HitPacket,
-        simd: impl Simd,
-    ) {
-        let hits = self.intersect_triangles_per_ray(&[number; PACKET_SIZE], *corners, ends);
-        let mut is_nearer = [0; PACKET_SIZE];
-        for i in 0..PACKET_SIZE {
-            // A hit at the end of a ray counts, unless the ray hit an earlier triangle at the same t.
-            let is_tie = !found.t[i].is_nan() & (hits.t[i] == found.t[i]);
-            is_nearer[i] = if is_tie { 0 } else { hits.hit[i] };
-        }
-        select(&is_nearer, &hits.t, ends);
-        select(&is_nearer, &hits.t, &mut found.t);
-        select(&is_nearer, &hits.u, &mut found.u);
-        select(&is_nearer, &hits.v, &mut found.v);
-        select_u32(&is_nearer, &[number; PACKET_SIZE], &mut found.primitive);
-        let doubtful = simd.movemask(&hits.doubtful) & met;
-        if doubtful != 0 {
-            self.update_closest_hits_scalar(doubtful, (number, corners), ends, found);
-        }
-    }
-
-    /// Mask of the rays in `met` that hit a triangle. All other rays must have negative ends.
-    #[inline(always)]
-    pub fn hit_mask(
-        &self,
-        (number, corners): (u32, &[Vec3; 3]),
-        met: u32,
-        ends: &F32x16,
-        simd: impl Simd,
-    ) -> u32 {
-        let hits = self.intersect_triangles_per_ray(&[number; PACKET_SIZE], *corners, ends);
-        let doubtful = simd.movemask(&hits.doubtful) & met;
-        let hit = simd.movemask(&hits.hit) & met;
-        if doubtful == 0 { hit } else { hit | self.hit_mask_scalar(doubtful, corners, ends) }
-    }
-
-    /// [`ShearedPacket::update_closest_hits`] for the given rays, one by one.
-    #[cold]
-    #[inline(never)]
-    fn update_closest_hits_scalar(
-        &self,
-        these: u32,
-        (number, corners): (u32, &[Vec3; 3]),
-        ends: &mut F32x16,
-        found: &mut HitPacket,
-    ) {
-        for i in set_bit_lanes(these) {
-            let Some(hit) = self.intersect_lane(i, corners, ends[i]) else { continue };
-            if found.t[i].is_nan() || hit.t < found.t[i] {
-                found.set(i, &super::ShapeHit { primitive: number, ..hit });
-                ends[i] = hit.t;
-            }
-        }
-    }
-
-    /// [`ShearedPacket::hit_mask`] for the given rays, one by one.
-    #[cold]
-    #[inline(never)]
-    fn hit_mask_scalar(&self, these: u32, corners: &[Vec3; 3], ends: &F32x16) -> u32 {
-        set_bit_lanes(these)
-            .filter(|&i| self.intersect_lane(i, corners, ends[i]).is_some())
-            .fold(0, |hit, i| hit | 1 << i)
-    }
-
-    fn intersect_lane(&self, i: usize, corners: &[Vec3; 3], end: f32) -> Option<super::ShapeHit> {
-        let ray = self.rays.ray(i);
-        ShearedRay::new(ray.origin, ray.direction).intersect(corners, end)
-    }
-
     /// A corner in each ray's sheared coordinates.
     #[inline(always)]
-    fn shear_corner(&self, corner: impl Corner) -> Vec3x16 {
+    fn shear_corner(&self, corner: &Vec3x16) -> Vec3x16 {
         let mut seen = [[0.0; PACKET_SIZE]; 3];
         for i in 0..PACKET_SIZE {
-            let [x, y, z] =
-                [0, 1, 2].map(|axis| corner.coordinate_in_lane(axis, i) - self.rays.origin[axis][i]);
+            let [x, y, z] = [0, 1, 2].map(|axis| corner[axis][i] - self.rays.origin[axis][i]);
             let (is_x, is_y) = (self.longest[0][i] != 0, self.longest[1][i] != 0);
             let along = if is_x {
                 x
@@ -204,13 +111,13 @@ impl<'a> ShearedPacket<'a> {
         seen
     }
 
-    /// [`ShearedRay::intersect`] for a packet in which each ray has its own triangle. Rays that start on
-    /// their triangle do not hit it.
+    /// [`ShearedRay::intersect`](super::watertight::ShearedRay::intersect) for a packet in which each ray has
+    /// its own triangle. Rays that start on their triangle do not hit it.
     #[inline(always)]
-    pub(super) fn intersect_triangles_per_ray(
+    pub fn intersect_triangles_per_ray(
         &self,
         numbers: &[u32; PACKET_SIZE],
-        corners: [impl Corner; 3],
+        corners: [&Vec3x16; 3],
         ends: &F32x16,
     ) -> TriangleTestResults {
         let [a, b, c] =

@@ -25,9 +25,6 @@ const MAX_TOTAL: usize = 1 << 17;
 /// Maximum triangle count at which packets test all triangles without a tree.
 const MAX_FACETS: usize = triangle_list::MOST;
 
-/// Minimum triangle count for merging. Below it, testing each mesh separately is as fast.
-const MIN_FACETS: usize = 8;
-
 /// Maximum coordinate of a merged mesh, relative to its size. Beyond this, rounding would distort the mesh.
 const MAX_RELATIVE_COORDINATE: f32 = 1024.0;
 
@@ -84,7 +81,7 @@ impl MergedMeshes {
         let Some(accel) = chosen.first().and_then(|&id| Some(objects[id].mesh()?.tree.accel_kind())) else {
             return Ok(None);
         };
-        if total < MIN_FACETS || chosen.len() < 2 && total > MAX_FACETS {
+        if chosen.len() < 2 && total > MAX_FACETS {
             return Ok(None);
         }
         // A small number of triangles is worth merging only if packets can test them without a tree.

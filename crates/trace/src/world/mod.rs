@@ -23,7 +23,6 @@ mod packet;
 mod packet_material;
 mod placement;
 mod ray_nodes;
-mod small_mesh;
 pub mod textures;
 mod triangle_point;
 mod triangle_tree;

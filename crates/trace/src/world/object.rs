@@ -47,9 +47,6 @@ impl Object {
     ) {
         match self {
             Self::Shape(shape) => shape.intersect_packet(rows, met, ends, found, simd),
-            Self::Mesh(mesh) if mesh.is_small() => {
-                mesh.closest_hit_packet_without_tree(rows, met, ends, found, simd);
-            }
             Self::Mesh(mesh) => mesh.closest_hit_packet(rows, met, ends, found),
         }
     }
@@ -67,9 +64,6 @@ impl Object {
     ) -> u32 {
         let shape = match self {
             Self::Shape(shape) => shape,
-            Self::Mesh(mesh) if mesh.is_small() => {
-                return mesh.any_hit_packet_without_tree(rows, met, ends, except, simd);
-            }
             Self::Mesh(mesh) => return mesh.any_hit_packet(rows, met, ends, except),
         };
         let mut found = HitPacket::without_hits();

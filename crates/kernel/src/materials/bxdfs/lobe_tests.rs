@@ -1,6 +1,6 @@
-//! Checks for lobes of any shape, shared by the tests of all kinds of BSDFs. They compare values with an `f64`
-//! reference and samples with pdfs, and compute albedos. The `alphas` of a surface are used only to place
-//! directions, so for other lobes the width of the closest microfacet lobe is sufficient.
+//! Checks for lobes of any shape, shared by the tests of all kinds of BSDFs. They compare values with an
+//! `f64` reference and samples with pdfs, and compute albedos. The `alphas` of a surface are used only to
+//! place directions, so for other lobes the width of the closest microfacet lobe is sufficient.
 
 use crate::materials::bsdf::{DielectricSamplePacket, LobesToSample, ShownLobes};
 use crate::materials::bxdf::{Bxdf, ShadingGeometry};
