@@ -561,11 +561,11 @@ pub(super) mod tests {
         assert_eq!(members(&[(&small, here), (&few, here)]), Some(vec![0, 1]));
         assert_eq!(members(&[(&small, here), (&few, far), (&few, here)]), Some(vec![0, 2]));
         assert_eq!(members(&[(&small, here)]), None, "a single mesh");
-        // A few triangles are merged without a tree if there are enough of them and there are no slivers.
+        // A few triangles are merged without a tree if there are no slivers.
         assert_eq!(members(&[(&few, here), (&few, here)]), Some(vec![0, 1]));
         assert_eq!(members(&[(&few, here)]), Some(vec![0]));
         let (least, needles) = (mesh(5, 3), mesh(6, 8));
-        assert_eq!(members(&[(&least, here), (&few, far)]), None, "too few to be worthwhile");
+        assert_eq!(members(&[(&least, here), (&few, far)]), Some(vec![0]));
         let flat = Transform::scale_rotate_translate(DVec3::new(1.0, 1e-6, 1e-6), DVec3::ZERO, DVec3::ZERO);
         assert_eq!(members(&[(&needles, flat), (&few, here)]), None, "slivers");
         let large = mesh(3, 14_000);
