@@ -15,9 +15,9 @@ use glimt_base::soa;
 soa! {
     /// Factors that select which lobes an image shows.
     pub struct ShownLobeFactors in LobeFactorsPacket {
-        /// Factor applied to the wide lobes: 1 if they are shown, 0 otherwise.
+        /// Factor for the wide lobes: 1 if they are shown, and 0 if they are hidden.
         wide: f32 = 0.0,
-        /// Factor applied to the narrow lobes: 1 if they are shown, 0 otherwise.
+        /// Factor for the narrow lobes: 1 if they are shown, and 0 if they are hidden.
         narrow: f32 = 0.0,
         /// Value of f in sr⁻¹ that is shown instead of the lobes.
         unit: f32 = 0.0,

@@ -36,8 +36,8 @@ pub trait RevolutionSideView {
     /// Difference between the cosines at the two ends of the visible interval, for an angle around the pole.
     fn visible_cosine_extent_at_azimuth(&self, around: SinCos) -> f64;
 
-    /// Angle from the pole and distance of a point on the side. The point lies in the half plane at the
-    /// angle `around` about the pole, at a fraction `share` of the visible cosine interval.
+    /// Angle from the pole and distance of the point on the side whose angle around the pole is `around`, and
+    /// whose polar cosine is at the fraction `share` of the visible interval.
     fn polar_angle_and_distance_at_fraction(&self, around: SinCos, share: f64) -> (SinCos, f64);
 }
 
