@@ -180,8 +180,8 @@ pub(crate) fn surfaces_and_lights_key(
     of: &FingerprintContext<'_>,
     textures: &[Fingerprint],
 ) -> Fingerprint {
-    // A new field of the scene must be added to one of the keys. This key includes the keys of the lights and of
-    // the objects' shapes. The settings, the camera and the photons have separate keys. The context and
+    // A new field of the scene must be added to one of the keys. This key includes the keys of the lights and
+    // of the objects' shapes. The settings, the camera and the photons have separate keys. The context and
     // `textures` contain the files and their parts.
     let Scene {
         objects,

@@ -90,14 +90,25 @@ fn exr_is_exact_and_ignores_the_exposure() {
     for (pixel, value) in image.pixels.iter_mut().zip(special) {
         pixel.y = value;
     }
-    let bytes = encode(&image, &options(BitDepth::Eight), Format::Exr).expect("an EXR");
-    let file = read_exr(&bytes);
-    assert_eq!(file.0, (50, 40));
-    let bits = |v: &Vec3| v.to_array().map(f32::to_bits);
-    for (decoded, expected) in file.1.iter().zip(&image.pixels) {
-        assert_eq!(bits(decoded), bits(expected));
+    // Random bits, except that the values are finite, do not compress.
+    let mut next = crate::math::random::unit_generator(5);
+    let mut random = || {
+        let mut half = || (next() * 65536.0) as u32;
+        f32::from_bits((half() << 16 | half()) & !(1 << 30))
+    };
+    let pixels = (0..50 * 40).map(|_| Vec3::new(random(), random(), random())).collect();
+    let noise = RadianceImage { pixels, ..image.clone() };
+    for (image, is_smaller) in [(image, true), (noise, false)] {
+        let bytes = encode(&image, &options(BitDepth::Eight), Format::Exr).expect("an EXR");
+        assert_eq!(bytes.len() < size_of_val(image.pixels.as_slice()), is_smaller, "{} bytes", bytes.len());
+        let file = read_exr(&bytes);
+        assert_eq!(file.0, (50, 40));
+        let bits = |v: &Vec3| v.to_array().map(f32::to_bits);
+        for (decoded, expected) in file.1.iter().zip(&image.pixels) {
+            assert_eq!(bits(decoded), bits(expected));
+        }
+        assert_eq!(file.1.len(), image.pixels.len());
     }
-    assert_eq!(file.1.len(), image.pixels.len());
 }
 
 fn read_exr(bytes: &[u8]) -> ((usize, usize), Vec<Vec3>) {
