@@ -4,7 +4,7 @@
 use glimt::tui::messages;
 use nix::sys::signal::Signal;
 
-use super::pty::{Colors, Folder, SCENE, Terminal};
+use super::pty::{Colors, Folder, SCENE, Terminal, cells, upper};
 use super::relay::Answers;
 
 /// Environment variables that identify terminals, with the terminals' features: title, progress, a
@@ -224,8 +224,18 @@ fn slow_connection_sends_the_preview_first() {
     let side = |length| std::num::NonZero::new(length).expect("not zero");
     let mut before = vt100::Parser::new(side(40), side(120), 0);
     before.process(&bytes[..title]);
+    let mut after = vt100::Parser::new(side(40), side(120), 0);
+    after.process(&bytes);
+    let image_cells = |screen: &vt100::Screen| {
+        let is_colored = |color: &vt100::Color| matches!(color, vt100::Color::Rgb(..));
+        cells(screen).filter_map(upper).filter(is_colored).count()
+    };
+    let (preview, image) = (image_cells(before.screen()), image_cells(after.screen()));
     let red = Colors::of(before.screen()).red;
-    assert!(red > 500, "{red} cells of the preview before the first title");
+    assert!(
+        preview == image && red > 0,
+        "{preview} of {image} cells of the preview, {red} of them red, before the first title"
+    );
     assert!(terminal.line(|seen| seen.most_unanswered) <= 24_000);
 }
 
