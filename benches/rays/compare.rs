@@ -50,7 +50,10 @@ fn closest(tree: &WideBvh, mesh: &TriangleMesh, rays: &[Ray], answers: &[Option<
 fn report<'a>(mesh: &TriangleMesh, differing: impl Iterator<Item = &'a Ray>) {
     let differing: Vec<_> = differing.collect();
     let on_edge = differing.iter().filter(|ray| passes_edge(mesh, ray)).count();
-    println!("    hit or miss differs {}, {on_edge} of them within 4 ulp of an edge", differing.len());
+    println!(
+        "    {} rays hit in only one of the two, {on_edge} of these within 4 ulp of an edge",
+        differing.len()
+    );
 }
 
 /// Returns whether the ray passes within 4 ulp of a triangle edge, measured in the edge test's coordinates.

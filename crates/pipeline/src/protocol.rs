@@ -67,8 +67,8 @@ pub struct Request {
     pub preview: Option<MaxPreviewSize>,
     /// Whether to write the finished image.
     pub write: WriteRequirement,
-    /// Overrides for the scene's own image if this request shows another image, or `None` if this request is
-    /// for the scene's own image. The film and checkpoint of the scene's own image are kept.
+    /// If this request shows another image than the scene's own, the overrides for the scene's own image, whose
+    /// film and checkpoint are kept. `None` if this request is for the scene's own image.
     pub own: Option<Box<Overrides>>,
     /// Number of times the scene's files have been saved. An image with keyboard changes that was written by
     /// [`Command::Write`] is kept until a request with a different number reads a valid scene.

@@ -73,7 +73,7 @@ impl SceneText {
     }
 
     /// Returns [`Self::file_text`] as an `Arc`. Copies the text only if there are `--set` values.
-    pub fn shared_file_text(&self) -> Arc<str> {
+    pub fn file_text_as_arc(&self) -> Arc<str> {
         if self.sets.is_empty() { Arc::clone(&self.all) } else { self.file_text().into() }
     }
 

@@ -10,7 +10,7 @@ use super::connection::{QueryKind, TerminalFlowControl};
 use super::event::PreviewSendReport;
 use super::graphics::{PlacedImage, TerminalImages};
 use super::paint::{Fidelity, LinksAndDelayedText, Painter};
-use super::preview_kind::PreviewKind;
+use super::preview_style::PreviewStyle;
 use super::terminal;
 use super::terminal_replies::TerminalQueries;
 use super::terminal_replies::TerminalReply;
@@ -127,8 +127,8 @@ impl Display {
     }
 
     /// Switches to drawing the preview as pixels if `kind` requires it.
-    pub(super) fn enable_pixel_preview_if_required(&mut self, kind: PreviewKind) {
-        if let (PreviewKind::Pixels(protocol), None) = (kind, &self.images) {
+    pub(super) fn enable_pixel_preview_if_required(&mut self, kind: PreviewStyle) {
+        if let (PreviewStyle::Pixels(protocol), None) = (kind, &self.images) {
             terminal::mark_images_used();
             self.images = Some(TerminalImages::new(protocol, self.link.is_in_tmux));
         }

@@ -6,7 +6,7 @@ use super::graphics::ImageProtocol;
 use super::options::PreviewChoice;
 use super::paint::terminal_supports_rep;
 use super::pixel_request::UnconfirmedImageProtocol;
-use super::preview_kind::PreviewKind;
+use super::preview_style::PreviewStyle;
 use super::terminal_replies::TerminalQueries;
 
 /// The terminal and its connection, as detected from environment variables.
@@ -63,7 +63,7 @@ pub(super) fn select_terminal_queries(
     let is_outermost = !terminal_environment_from_variables(&variable).is_multiplexed;
     let is_plain = may_print_unknown_escapes(&variable);
     let has_palette = matches!(depth, ColorDepth::Indexed256 | ColorDepth::Ansi16);
-    let is_ramp = PreviewKind::from_choice(preview, depth) == PreviewKind::Ascii;
+    let is_ramp = PreviewStyle::from_choice(preview, depth) == PreviewStyle::Ascii;
     TerminalQueries {
         blocks: preview == PreviewChoice::Auto && depth != ColorDepth::None && is_outermost && !is_plain,
         name: is_outermost && !is_plain && !term.is_empty(),

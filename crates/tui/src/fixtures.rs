@@ -10,7 +10,7 @@ use ratatui::layout::Rect;
 use super::color::{ColorDepth, XTERM};
 use super::event::{Effect, Event, KeyPress, WindowSize};
 use super::options::ContentChangeTime;
-use super::preview_kind::PreviewKind;
+use super::preview_style::PreviewStyle;
 use super::state::{InitialState, State};
 use super::terminal_replies::TerminalQueries;
 use super::terminals::DesktopCapabilities;
@@ -32,13 +32,13 @@ pub(super) fn window(columns: u16, rows: u16) -> WindowSize {
 
 /// Creates a state from which no request has been sent yet.
 pub(super) fn state(columns: u16, rows: u16) -> State {
-    state_with(columns, rows, PreviewKind::HalfBlock, ColorDepth::TrueColor, Overrides::default())
+    state_with(columns, rows, PreviewStyle::HalfBlock, ColorDepth::TrueColor, Overrides::default())
 }
 
 pub(super) fn state_with(
     columns: u16,
     rows: u16,
-    preview: PreviewKind,
+    preview: PreviewStyle,
     depth: ColorDepth,
     overrides: Overrides,
 ) -> State {

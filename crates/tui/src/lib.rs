@@ -25,7 +25,7 @@ mod options;
 pub mod paint;
 mod pixel_request;
 mod presenter;
-mod preview_kind;
+mod preview_style;
 mod terminal_replies;
 mod window_title;
 

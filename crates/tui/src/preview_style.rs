@@ -8,7 +8,7 @@ use super::pixel_request::UnconfirmedImageProtocol;
 
 /// How the preview is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum PreviewKind {
+pub(super) enum PreviewStyle {
     HalfBlock,
     Quadrant,
     Sextant,
@@ -19,8 +19,8 @@ pub(super) enum PreviewKind {
     None,
 }
 
-impl PreviewKind {
-    /// Determines the preview kind from the user's choice and the color depth.
+impl PreviewStyle {
+    /// Determines the preview style from the user's choice and the color depth.
     pub(super) fn from_choice(choice: PreviewChoice, depth: ColorDepth) -> Self {
         match choice {
             PreviewChoice::None => Self::None,
@@ -37,7 +37,7 @@ impl PreviewKind {
         }
     }
 
-    /// The initial preview kind. Pixels are used only if the terminal is known to support them.
+    /// The initial preview style. Pixels are used only if the terminal is known to support them.
     pub(super) fn initial(
         choice: PreviewChoice,
         depth: ColorDepth,
@@ -69,9 +69,15 @@ mod tests {
 
     #[test]
     fn preview_without_colors_uses_ascii() {
-        assert_eq!(PreviewKind::from_choice(PreviewChoice::Auto, ColorDepth::None), PreviewKind::Ascii);
-        assert_eq!(PreviewKind::from_choice(PreviewChoice::HalfBlock, ColorDepth::None), PreviewKind::Ascii);
-        assert_eq!(PreviewKind::from_choice(PreviewChoice::Auto, ColorDepth::Ansi16), PreviewKind::HalfBlock);
-        assert_eq!(PreviewKind::from_choice(PreviewChoice::None, ColorDepth::TrueColor), PreviewKind::None);
+        assert_eq!(PreviewStyle::from_choice(PreviewChoice::Auto, ColorDepth::None), PreviewStyle::Ascii);
+        assert_eq!(
+            PreviewStyle::from_choice(PreviewChoice::HalfBlock, ColorDepth::None),
+            PreviewStyle::Ascii
+        );
+        assert_eq!(
+            PreviewStyle::from_choice(PreviewChoice::Auto, ColorDepth::Ansi16),
+            PreviewStyle::HalfBlock
+        );
+        assert_eq!(PreviewStyle::from_choice(PreviewChoice::None, ColorDepth::TrueColor), PreviewStyle::None);
     }
 }

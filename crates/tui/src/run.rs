@@ -15,7 +15,7 @@ use super::exit_summary;
 use super::input;
 use super::options::{ExitStatus, Options, TuiError, TuiOutcome};
 use super::presenter::FramePresenter;
-use super::preview_kind::PreviewKind;
+use super::preview_style::PreviewStyle;
 use super::signals::{self, SignalListener};
 use super::state::{InitialState, State};
 use super::terminal::{self, TerminalSession};
@@ -56,7 +56,7 @@ pub fn run(options: Options) -> Result<TuiOutcome, TuiError> {
         scene: options.scene,
         overrides: options.overrides,
         window: terminal::query_window(options.cell_aspect),
-        preview: PreviewKind::initial(options.preview, depth, link.ask.pixels),
+        preview: PreviewStyle::initial(options.preview, depth, link.ask.pixels),
         depth,
         is_light: color::colorfgbg_indicates_light_background(variable),
         ansi: *color::assumed_ansi_colors(&variable("TERM").unwrap_or_default()),

@@ -1,4 +1,5 @@
-//! The scene schema in both drafts: it accepts the same scenes as the program, and locates errors.
+//! Validation with the scene schema, in both drafts of JSON Schema: it accepts the same scenes as the program
+//! and reports errors in the right place.
 
 mod validator;
 

@@ -337,7 +337,7 @@ impl Terminal {
         self.wait(text, |screen| screen.contents().contains(text));
     }
 
-    /// Waits for a message from the front end, which may be truncated.
+    /// Waits for one of the front end's messages. The screen may show a truncated message.
     #[track_caller]
     pub fn wait_for_message(&self, message: &str) {
         self.wait(message, |screen| shows(screen, message));

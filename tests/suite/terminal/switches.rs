@@ -18,7 +18,7 @@ fn setting(folder: &Folder, name: &str) -> serde_json::Value {
 }
 
 #[test]
-fn photons_and_integrator_switch_for_this_run() {
+fn keys_override_photons_and_integrator() {
     let folder = Folder::new();
     folder.write("scene.toml", &glassy());
     let call = [folder.program(), "scene.toml", "--report", "report.json"];

@@ -148,11 +148,11 @@ impl TriangleList {
                     is_left[other] = false;
                     let [one, two] = [slenderness(&corners[number]), slenderness(&corners[other])];
                     let most = [one[0].max(two[0]), one[1].max(two[1])];
-                    TriangleOrQuad::new(&first, Some(apex), [number as u32, other as u32], most)
+                    TriangleOrQuad::from_triangle(&first, Some(apex), [number as u32, other as u32], most)
                 }
                 None => {
                     let own = &corners[number];
-                    TriangleOrQuad::new(own, None, [number as u32; 2], slenderness(own))
+                    TriangleOrQuad::from_triangle(own, None, [number as u32; 2], slenderness(own))
                 }
             });
         }
@@ -366,7 +366,12 @@ struct CandidateTestResults {
 }
 
 impl TriangleOrQuad {
-    fn new([a, b, c]: &[Vec3; 3], apex: Option<Vec3>, numbers: [u32; 2], [slender, wide]: [f64; 2]) -> Self {
+    fn from_triangle(
+        [a, b, c]: &[Vec3; 3],
+        apex: Option<Vec3>,
+        numbers: [u32; 2],
+        [slender, wide]: [f64; 2],
+    ) -> Self {
         let [a, b, c] = [a, b, c].map(|corner| corner.as_dvec3());
         let (u, v) = (b - a, c - a);
         let normal = u.cross(v);

@@ -462,7 +462,7 @@ impl Engine {
             let origin = SceneParseRequest { path: &request.scene, sets: &request.overrides.sets, show };
             pool.install(|| parse(origin, (contents, &containers), &mut self.parsed, findings, token))
         })?;
-        let text = parsed.loaded.source.shared_file_text();
+        let text = parsed.loaded.source.file_text_as_arc();
         table.sink.send(Event::Text { generation: request.generation, text });
         let plan = resolve_plan(&parsed.loaded.scene, &request.scene, &request.overrides)
             .map_err(|error| AbortReason::Failed(Failure::Scene(vec![*error])))?;

@@ -36,7 +36,7 @@ pub const NOISE_TARGET_REACHED: &str = "noise target reached in some tiles";
 pub const ALREADY_WRITTEN: &str = "already written";
 /// The request's image will not be written.
 pub const PREVIEW_ONLY: &str = "preview only";
-/// The output files contain an image with keyboard changes, which the user wrote with a key.
+/// The output files contain an image with keyboard changes. The user pressed `w` to write it.
 pub const OTHER_IMAGE_WRITTEN: &str = "w wrote another image";
 
 /// Start of the reason for a render that continued from existing samples.

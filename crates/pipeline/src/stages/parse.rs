@@ -216,7 +216,7 @@ fn add_renamed_file_hint(
     if let [error] = &mut errors[..]
         && scene::is_file_not_found(error)
         && let Some(last) = last
-        && let Some(file) = scene::find_renamed_scene(path, &last.loaded.source.shared_file_text())
+        && let Some(file) = scene::find_renamed_scene(path, &last.loaded.source.file_text_as_arc())
     {
         let name = escape_invisible_chars(&file.to_string_lossy()).into_owned();
         error.help = Some(format!("{name} {}; run `glimt {name}` to watch it", scene::SAME_TEXT));

@@ -245,7 +245,8 @@ fn files_replaced_while_others_load_are_read_again() {
 
 #[test]
 fn files_replaced_before_an_error_are_read_again() {
-    // The scene is replaced while its mesh is read. Its old texture is no longer valid.
+    // The scene is replaced while its mesh is still being read, so the texture of the old scene is no longer
+    // valid.
     let new = SCENE.replace("skin.ppm", "new.ppm");
     let mut bench = Bench::new(SCENE);
     std::fs::rename(bench.path("skin.ppm"), bench.path("new.ppm")).expect("renamed");

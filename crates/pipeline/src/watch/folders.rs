@@ -42,8 +42,8 @@ fn identity(folder: &Path) -> Option<Identity> {
     fs::metadata(folder).ok().map(|metadata| (metadata.dev(), metadata.ino()))
 }
 
-/// Returns the watcher if its thread has started. Otherwise, the watcher's handler, which shares `names`, has
-/// been dropped, and any use of the watcher would panic, even dropping it. The watcher is then leaked.
+/// Returns the watcher, or `None` if its thread did not start. A watcher without a thread has already dropped
+/// its handler, which shares `names`. It would panic when used or dropped, so it is leaked.
 fn watcher_if_alive<W>(watcher: W, names: &Arc<Mutex<HashSet<OsString>>>) -> Option<W> {
     if Arc::strong_count(names) > 1 {
         return Some(watcher);

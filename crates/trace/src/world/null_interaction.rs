@@ -89,7 +89,13 @@ impl World {
         traced: u32,
         sources: &LightGeometryPacket,
     ) -> ShadowTransmittancePacket {
-        self.geometry.instruction_set().run(TransmittanceKernel { world: self, rows, ends, traced, sources })
+        self.geometry.instruction_set().run(ShadowTransmittanceKernel {
+            world: self,
+            rows,
+            ends,
+            traced,
+            sources,
+        })
     }
 
     /// Whether a shadow ray's transmittance is zero.
@@ -168,7 +174,7 @@ impl World {
 }
 
 /// Kernel of [`World::transmittance_packet`].
-struct TransmittanceKernel<'a> {
+struct ShadowTransmittanceKernel<'a> {
     world: &'a World,
     rows: &'a RayPacket,
     ends: &'a F32x16,
@@ -176,7 +182,7 @@ struct TransmittanceKernel<'a> {
     sources: &'a LightGeometryPacket,
 }
 
-impl SimdKernel for TransmittanceKernel<'_> {
+impl SimdKernel for ShadowTransmittanceKernel<'_> {
     type Output = ShadowTransmittancePacket;
 
     #[inline(always)]

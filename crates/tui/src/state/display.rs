@@ -8,14 +8,14 @@ use crate::event::{PreviewSendReport, WindowSize};
 use crate::graphics::ImageProtocol;
 use crate::mosaic::CellGrid;
 use crate::pixel_request::UnconfirmedImageProtocol;
-use crate::preview_kind::PreviewKind;
+use crate::preview_style::PreviewStyle;
 use crate::terminal_replies::TerminalQueries;
 use crate::terminals::DesktopCapabilities;
 
 /// Window size, terminal capabilities and preview settings.
 pub(crate) struct TerminalDisplayState {
     pub window: WindowSize,
-    pub kind: PreviewKind,
+    pub kind: PreviewStyle,
     pub depth: ColorDepth,
     pub shades: ColorMapper,
     /// The terminal's 16 ANSI colors, as reported or assumed.
@@ -68,7 +68,7 @@ impl TerminalDisplayState {
         /// Maximum number of pixels in the window for Sixel, which needs twice as much memory.
         const MAX_IN_SIXELS: f32 = 1_600_000.0;
         match self.kind {
-            PreviewKind::Pixels(protocol) => {
+            PreviewStyle::Pixels(protocol) => {
                 let most = match protocol {
                     ImageProtocol::Sixel => MAX_IN_SIXELS,
                     ImageProtocol::Kitty | ImageProtocol::Iterm => MAX_PIXELS,
@@ -85,6 +85,6 @@ impl TerminalDisplayState {
     /// Whether the preview's colors are dithered.
     pub(crate) fn dithers_colors(&self) -> bool {
         matches!(self.depth, ColorDepth::Indexed256 | ColorDepth::Ansi16)
-            || self.kind == PreviewKind::Pixels(ImageProtocol::Sixel)
+            || self.kind == PreviewStyle::Pixels(ImageProtocol::Sixel)
     }
 }

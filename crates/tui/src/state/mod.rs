@@ -21,7 +21,7 @@ pub(super) use self::work::{AssetProgressBar, RenderState, RequestStatus, WorkSt
 use super::color::{AnsiColors, ColorDepth};
 use super::event::WindowSize;
 use super::options::ExternalChange;
-use super::preview_kind::PreviewKind;
+use super::preview_style::PreviewStyle;
 use super::terminal_replies::TerminalQueries;
 use super::terminals::DesktopCapabilities;
 use crate::pipeline::settings::Overrides;
@@ -32,7 +32,7 @@ pub(super) struct InitialState {
     pub scene: PathBuf,
     pub overrides: Overrides,
     pub window: WindowSize,
-    pub preview: PreviewKind,
+    pub preview: PreviewStyle,
     pub depth: ColorDepth,
     /// Whether the environment indicates a light background.
     pub is_light: bool,

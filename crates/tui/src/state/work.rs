@@ -70,7 +70,7 @@ pub(crate) struct WorkState {
     pub unchanged: bool,
     /// Number of finished renders, not counting exposure changes.
     pub renders: u64,
-    /// Whether the newest render has been counted, at this or another exposure.
+    /// Whether `renders` includes the newest render. A change of exposure does not count as a new render.
     pub is_counted: bool,
 }
 

@@ -6,7 +6,7 @@ use crate::fixtures::*;
 use crate::messages;
 use crate::pipeline::protocol::{self, Command, ResolvedCamera, WriteRequirement};
 use crate::pipeline::settings::Overrides;
-use crate::preview_kind::PreviewKind;
+use crate::preview_style::PreviewStyle;
 use crate::scene::description::Pose;
 use crate::scene::diagnostic::Severity;
 use crate::{ColorDepth, ContentChangeTime};
@@ -191,7 +191,7 @@ fn reverted_changes_are_not_sent() {
 #[test]
 fn command_line_exposure_is_not_a_change() {
     let base = Overrides { exposure: Some(1.0), ..Overrides::default() };
-    let mut ui = TestUi::from_state(state_with(80, 24, PreviewKind::HalfBlock, ColorDepth::TrueColor, base));
+    let mut ui = TestUi::from_state(state_with(80, 24, PreviewStyle::HalfBlock, ColorDepth::TrueColor, base));
     ui.finish_render(RED);
     ui.press_character('[');
     show(&mut ui);

@@ -17,7 +17,7 @@ use crate::fixtures::*;
 use crate::mosaic::filled_squares;
 use crate::pipeline::protocol::{self, PreviewSlot, PreviewUpdate};
 use crate::pipeline::settings::Overrides;
-use crate::preview_kind::PreviewKind;
+use crate::preview_style::PreviewStyle;
 
 const COLUMNS: u16 = 120;
 const ROWS: u16 = 40;
@@ -152,7 +152,7 @@ struct WatchedRender {
 }
 
 impl WatchedRender {
-    fn new(line: SimulatedConnection, preview: PreviewKind, depth: ColorDepth) -> Self {
+    fn new(line: SimulatedConnection, preview: PreviewStyle, depth: ColorDepth) -> Self {
         let mut ui = TestUi::from_state(state_with(COLUMNS, ROWS, preview, depth, Overrides::default()));
         let begin = ui.now;
         let generation = ui.state.request.generation;
@@ -168,7 +168,7 @@ impl WatchedRender {
         let size = ui.state.request.preview_size.expect("a preview size");
         let (outbox, slot) = (Rc::<RefCell<Vec<Vec<u8>>>>::default(), PreviewSlot::default());
         let images = match preview {
-            PreviewKind::Pixels(protocol) => Some(TerminalImages::new(protocol, false)),
+            PreviewStyle::Pixels(protocol) => Some(TerminalImages::new(protocol, false)),
             _ => None,
         };
         let taken = Rc::clone(&outbox);
@@ -336,7 +336,7 @@ const MAX: [(f64, f64); 3] = [(0.1, 1.5), (0.25, 0.8), (0.5, 0.5)];
 /// Checks that the screen is close to its final content at each fraction in [`MAX`], and that enough previews
 /// are drawn.
 #[track_caller]
-fn assert_followed(preview: PreviewKind, depth: ColorDepth) {
+fn assert_followed(preview: PreviewStyle, depth: ColorDepth) {
     let mut watch = WatchedRender::new(FAST, preview, depth);
     let screens = MAX.map(|(fraction, _)| {
         watch.until(fraction);
@@ -354,27 +354,27 @@ fn assert_followed(preview: PreviewKind, depth: ColorDepth) {
 
 #[test]
 fn fast_terminal_keeps_up_using_half_blocks() {
-    assert_followed(PreviewKind::HalfBlock, ColorDepth::TrueColor);
+    assert_followed(PreviewStyle::HalfBlock, ColorDepth::TrueColor);
 }
 
 #[test]
 fn fast_terminal_keeps_up_using_sextants() {
-    assert_followed(PreviewKind::Sextant, ColorDepth::TrueColor);
+    assert_followed(PreviewStyle::Sextant, ColorDepth::TrueColor);
 }
 
 #[test]
 fn fast_terminal_keeps_up_using_256_colors() {
-    assert_followed(PreviewKind::HalfBlock, ColorDepth::Indexed256);
+    assert_followed(PreviewStyle::HalfBlock, ColorDepth::Indexed256);
 }
 
 #[test]
 fn fast_terminal_keeps_up_using_pixels() {
-    assert_followed(PreviewKind::Pixels(ImageProtocol::Kitty), ColorDepth::TrueColor);
+    assert_followed(PreviewStyle::Pixels(ImageProtocol::Kitty), ColorDepth::TrueColor);
 }
 
 #[test]
 fn slow_connection_gets_few_previews() {
-    let mut watch = WatchedRender::new(SLOW, PreviewKind::HalfBlock, ColorDepth::TrueColor);
+    let mut watch = WatchedRender::new(SLOW, PreviewStyle::HalfBlock, ColorDepth::TrueColor);
     watch.until(1.0);
     assert!(watch.shown <= 12, "{} previews in 10 s", watch.shown);
     let sent = watch.terminal.sent;
@@ -388,7 +388,7 @@ fn slow_connection_gets_few_previews() {
 
 #[test]
 fn held_key_uses_most_of_the_bandwidth() {
-    let mut watch = WatchedRender::new(SLOW, PreviewKind::HalfBlock, ColorDepth::TrueColor);
+    let mut watch = WatchedRender::new(SLOW, PreviewStyle::HalfBlock, ColorDepth::TrueColor);
     watch.until(0.2);
     watch.orbit(Duration::from_secs(2));
     let before = watch.terminal.sent;
@@ -403,7 +403,7 @@ fn held_key_uses_most_of_the_bandwidth() {
 fn only_cells_use_synchronized_output() {
     let (begin, end) = ("\x1b[?2026h", "\x1b[?2026l");
     for (preview, is_marked) in
-        [(PreviewKind::HalfBlock, true), (PreviewKind::Pixels(ImageProtocol::Kitty), false)]
+        [(PreviewStyle::HalfBlock, true), (PreviewStyle::Pixels(ImageProtocol::Kitty), false)]
     {
         let mut watch = WatchedRender::new(FAST, preview, ColorDepth::TrueColor);
         watch.presenter.display.handle_reply(TerminalReply::Synchronized { is_known: true }, watch.begin);

@@ -10,7 +10,7 @@ use crate::fixtures::*;
 use crate::messages;
 use crate::pipeline::protocol::{CameraSaveResult, Command, Event as WorkerEvent, PickedPixel};
 use crate::pipeline::settings::Overrides;
-use crate::preview_kind::PreviewKind;
+use crate::preview_style::PreviewStyle;
 
 /// A UI with two renders: the beauty view, then the normal view with hard shadows. The older one is being
 /// viewed.
@@ -162,10 +162,10 @@ fn save_time_is_cleared_by_the_next_render() {
     assert!(ui.state.saving.first_change.is_none(), "not rendered after a save: {}", ui.screen_text());
 }
 
-/// A preview kind that draws the image, and one that draws nothing.
-const KINDS: [PreviewKind; 2] = [PreviewKind::HalfBlock, PreviewKind::None];
+/// A preview style that draws the image, and one that draws nothing.
+const KINDS: [PreviewStyle; 2] = [PreviewStyle::HalfBlock, PreviewStyle::None];
 
-fn ui_with(kind: PreviewKind) -> TestUi {
+fn ui_with(kind: PreviewStyle) -> TestUi {
     TestUi::from_state(state_with(80, 24, kind, ColorDepth::TrueColor, Overrides::default()))
 }
 
@@ -190,7 +190,7 @@ fn interrupted_render_is_counted_once() {
 
 #[test]
 fn first_render_is_counted_even_if_unchanged() {
-    let mut ui = ui_with(PreviewKind::None);
+    let mut ui = ui_with(PreviewStyle::None);
     ui.report_scene_read();
     // The key arrives when the image is complete but the request has not ended.
     ui.press_character(']');
@@ -205,7 +205,7 @@ fn history_needs_a_preview() {
         [('n', messages::OLDEST_RENDER), ('N', messages::NEWEST_RENDER), ('b', messages::NO_EARLIER_RENDER)];
     for (kind, (key, words)) in KINDS.into_iter().flat_map(|kind| keys.map(|it| (kind, it))) {
         let mut ui = ui_with(kind);
-        let has_preview = kind != PreviewKind::None;
+        let has_preview = kind != PreviewStyle::None;
         ui.press_character(key);
         let early = if has_preview { messages::NO_IMAGE } else { messages::NO_PREVIEW };
         assert!(ui.screen_text().contains(early), "{kind:?} {key}: {}", ui.screen_text());

@@ -11,7 +11,7 @@ use crate::math::DVec3;
 use crate::messages;
 use crate::pipeline::protocol::{self, Command, ImagePosition, SavedCameraEdit, WriteRequirement};
 use crate::pipeline::settings::{EffectiveSettingsSummary, KeyboardOverridableSettings, Overrides, ViewMode};
-use crate::preview_kind::PreviewKind;
+use crate::preview_style::PreviewStyle;
 use crate::scene::description::{Integrator, Pose, ShadowMode};
 use crate::scene::diagnostic::Severity;
 use crate::{ContentChangeTime, ExitStatus};
@@ -326,7 +326,7 @@ fn message_is_shown_until_a_key_is_pressed() {
 fn toggles_start_from_the_command_line() {
     let base =
         Overrides { shadows: Some(ShadowMode::Off), view: Some(ViewMode::Depth), ..Overrides::default() };
-    let state = state_with(80, 24, PreviewKind::HalfBlock, ColorDepth::TrueColor, base.clone());
+    let state = state_with(80, 24, PreviewStyle::HalfBlock, ColorDepth::TrueColor, base.clone());
     let mut ui = TestUi::from_state(state);
     assert!(bottom(&mut ui).starts_with("s off  p off") && bottom(&mut ui).contains("v depth"));
     let effects = ui.press_character('s');
@@ -354,7 +354,7 @@ fn pinhole_has_no_depth_of_field() {
     assert!(ui.screen_text().contains(messages::PINHOLE));
 
     let base = Overrides { dof: Some(false), ..Overrides::default() };
-    let state = state_with(80, 24, PreviewKind::HalfBlock, ColorDepth::TrueColor, base);
+    let state = state_with(80, 24, PreviewStyle::HalfBlock, ColorDepth::TrueColor, base);
     let mut ui = TestUi::from_state(state);
     ui.worker_event(protocol::Event::Settings {
         generation: 1,
@@ -459,7 +459,7 @@ fn reverted_toggle_is_not_a_change() {
         let mut ui = TestUi::from_state(state_with(
             120,
             40,
-            PreviewKind::HalfBlock,
+            PreviewStyle::HalfBlock,
             ColorDepth::TrueColor,
             base.clone(),
         ));

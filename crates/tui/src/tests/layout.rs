@@ -9,7 +9,7 @@ use crate::graphics::ImageProtocol;
 use crate::messages;
 use crate::pipeline::protocol::{self, Command, MaxPreviewSize, Stage, Status};
 use crate::pipeline::settings::{EffectiveSettingsSummary, Overrides};
-use crate::preview_kind::PreviewKind;
+use crate::preview_style::PreviewStyle;
 use crate::scene::diagnostic::Severity;
 use crate::view::layout::Layout;
 
@@ -322,7 +322,7 @@ fn hints_wrap_at_the_panel_width() {
 #[test]
 fn pixel_preview_memory_is_bounded() {
     let by = |protocol, columns, rows, cell_pixels| {
-        let kind = PreviewKind::Pixels(protocol);
+        let kind = PreviewStyle::Pixels(protocol);
         let mut state = state_with(columns, rows, kind, ColorDepth::TrueColor, Overrides::default());
         state.display.window.cell_pixels = cell_pixels;
         state.display.horizontal_pixels_per_cell()

@@ -50,7 +50,7 @@ fn sample_count_is_approximate_with_noise_target() {
 /// Returns the screen after a render with a target `error` or a time limit.
 fn ended(error: f32, time_seconds: Option<f64>, complete: bool, samples: u32) -> String {
     let overrides = crate::pipeline::settings::Overrides { time_seconds, ..Default::default() };
-    let (kind, depth) = (crate::preview_kind::PreviewKind::HalfBlock, crate::color::ColorDepth::None);
+    let (kind, depth) = (crate::preview_style::PreviewStyle::HalfBlock, crate::color::ColorDepth::None);
     let mut ui = TestUi::from_state(state_with(80, 24, kind, depth, overrides));
     ui.finish_render(RED);
     let report = ui.state.work.report.as_mut().expect("a report");

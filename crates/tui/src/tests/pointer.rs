@@ -13,7 +13,7 @@ use crate::pipeline::protocol::{
     SavedCameraEdit, WriteRequirement,
 };
 use crate::pipeline::settings::Overrides;
-use crate::preview_kind::PreviewKind;
+use crate::preview_style::PreviewStyle;
 use crate::scene::diagnostic::Severity;
 use crate::terminals::{TerminalBrand, TerminalId};
 
@@ -269,7 +269,7 @@ fn y_copies_if_the_terminal_supports_it() {
 fn command_line_camera_overrides_the_file() {
     let sets = vec!["camera.fov=30".to_owned()];
     let base = Overrides { sets, ..Overrides::default() };
-    let mut ui = TestUi::from_state(state_with(80, 24, PreviewKind::HalfBlock, ColorDepth::TrueColor, base));
+    let mut ui = TestUi::from_state(state_with(80, 24, PreviewStyle::HalfBlock, ColorDepth::TrueColor, base));
     ui.finish_render(RED);
     assert!(
         matches!(ui.press_character('c')[..], [Effect::Send(Command::KeepCamera(_))]),

@@ -15,7 +15,7 @@ use crate::keymap::KEYMAP;
 use crate::messages;
 use crate::pipeline::protocol::{self, Failure, RenderProgress, Stage, StageReport, Status};
 use crate::pipeline::settings::{Overrides, ViewMode};
-use crate::preview_kind::PreviewKind;
+use crate::preview_style::PreviewStyle;
 use crate::scene::diagnostic::Severity;
 
 #[test]
@@ -57,7 +57,7 @@ fn half_blocks_show_two_pixels() {
 
 #[test]
 fn preview_without_colors_uses_characters() {
-    let state = state_with(80, 24, PreviewKind::Ascii, ColorDepth::None, Overrides::default());
+    let state = state_with(80, 24, PreviewStyle::Ascii, ColorDepth::None, Overrides::default());
     let mut ui = TestUi::from_state(state);
     ui.finish_render([255; 3]);
     ui.report_scene_errors(vec![diagnostic(Severity::Error, "unknown key `heigth`")]);
@@ -69,7 +69,7 @@ fn preview_without_colors_uses_characters() {
 #[test]
 fn value_range_is_shown_after_the_view_name() {
     let base = Overrides { view: Some(ViewMode::Depth), ..Overrides::default() };
-    let state = state_with(120, 40, PreviewKind::HalfBlock, ColorDepth::TrueColor, base);
+    let state = state_with(120, 40, PreviewStyle::HalfBlock, ColorDepth::TrueColor, base);
     let mut ui = TestUi::from_state(state);
     for (range, words) in [
         (Some([2.704, 659.24]), "view depth 2.7 to 659 "),
@@ -445,12 +445,12 @@ proptest! {
         keys in prop::collection::vec(0..KEYMAP.len(), 0..14),
     ) {
         let kind = [
-            PreviewKind::HalfBlock,
-            PreviewKind::Quadrant,
-            PreviewKind::Sextant,
-            PreviewKind::Octant,
-            PreviewKind::Ascii,
-            PreviewKind::None,
+            PreviewStyle::HalfBlock,
+            PreviewStyle::Quadrant,
+            PreviewStyle::Sextant,
+            PreviewStyle::Octant,
+            PreviewStyle::Ascii,
+            PreviewStyle::None,
         ][kind];
         let depth = [ColorDepth::TrueColor, ColorDepth::Indexed256, ColorDepth::Ansi16, ColorDepth::None][depth];
         let mut ui = TestUi::from_state(state_with(columns, rows, kind, depth, Overrides::default()));

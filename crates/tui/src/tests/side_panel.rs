@@ -11,7 +11,7 @@ use crate::graphics::ImageProtocol;
 use crate::messages;
 use crate::pipeline::protocol::{self, NoisePrediction, RenderProgress};
 use crate::pipeline::settings::{EffectiveSettingsSummary, Overrides};
-use crate::preview_kind::PreviewKind;
+use crate::preview_style::PreviewStyle;
 use crate::terminal_replies::TerminalReply;
 use crate::terminals::{TerminalBrand, TerminalId};
 use crate::view;
@@ -370,11 +370,11 @@ fn history_heading_is_not_shown_without_entries() {
 #[test]
 fn side_panel_fits_every_window_size() {
     let kinds = [
-        (PreviewKind::HalfBlock, ColorDepth::TrueColor),
-        (PreviewKind::Octant, ColorDepth::Indexed256),
-        (PreviewKind::Ascii, ColorDepth::None),
-        (PreviewKind::Pixels(ImageProtocol::Kitty), ColorDepth::TrueColor),
-        (PreviewKind::None, ColorDepth::Ansi16),
+        (PreviewStyle::HalfBlock, ColorDepth::TrueColor),
+        (PreviewStyle::Octant, ColorDepth::Indexed256),
+        (PreviewStyle::Ascii, ColorDepth::None),
+        (PreviewStyle::Pixels(ImageProtocol::Kitty), ColorDepth::TrueColor),
+        (PreviewStyle::None, ColorDepth::Ansi16),
     ];
     let edits = [
         "a = 1",

@@ -10,7 +10,7 @@ use crate::fixtures::*;
 use crate::messages;
 use crate::pipeline::protocol::{self, CheckpointUpdate, PickedPixel, Stage, Status};
 use crate::pipeline::settings::Overrides;
-use crate::preview_kind::PreviewKind;
+use crate::preview_style::PreviewStyle;
 use crate::scene::diagnostic::Severity;
 
 fn last_line(ui: &mut TestUi) -> String {
@@ -61,7 +61,7 @@ fn photon_view_without_photons_shows_a_hint() {
 fn image_keys_are_hidden_without_a_preview() {
     let kind =
         |kind| TestUi::from_state(state_with(200, 24, kind, ColorDepth::TrueColor, Overrides::default()));
-    for (mut ui, is_offered) in [(kind(PreviewKind::None), false), (kind(PreviewKind::HalfBlock), true)] {
+    for (mut ui, is_offered) in [(kind(PreviewStyle::None), false), (kind(PreviewStyle::HalfBlock), true)] {
         ui.finish_render(RED);
         assert_eq!(last_line(&mut ui).contains("tab image"), is_offered, "{}", ui.screen_text());
     }

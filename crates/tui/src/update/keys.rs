@@ -14,7 +14,7 @@ use crate::keymap;
 use crate::messages;
 use crate::pipeline::protocol::Command;
 use crate::pipeline::settings::ViewMode;
-use crate::preview_kind::PreviewKind;
+use crate::preview_style::PreviewStyle;
 use crate::scene::description::{Integrator, IntegratorProperties, ShadowMode};
 use crate::scene::has_mesh_extension;
 use crate::state::{KeyOverrides, PaneState, State};
@@ -165,13 +165,13 @@ fn step_view(state: &mut State, steps: usize) -> Vec<Effect> {
 
 fn toggle_image_only(state: &mut State) -> Vec<Effect> {
     match state.display.kind {
-        PreviewKind::None => return show_notice_without_effects(state, messages::NO_PREVIEW),
-        PreviewKind::HalfBlock
-        | PreviewKind::Quadrant
-        | PreviewKind::Sextant
-        | PreviewKind::Octant
-        | PreviewKind::Ascii
-        | PreviewKind::Pixels(_) => {}
+        PreviewStyle::None => return show_notice_without_effects(state, messages::NO_PREVIEW),
+        PreviewStyle::HalfBlock
+        | PreviewStyle::Quadrant
+        | PreviewStyle::Sextant
+        | PreviewStyle::Octant
+        | PreviewStyle::Ascii
+        | PreviewStyle::Pixels(_) => {}
     }
     state.picture.is_alone = !state.picture.is_alone;
     state.dirty = true;

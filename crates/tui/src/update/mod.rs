@@ -23,7 +23,7 @@ use super::event::{Effect, Event, RequiredEventSource, Signal, WindowSize};
 use super::history::ShownImage;
 use super::messages;
 use super::options::ContentChangeTime;
-use super::preview_kind::PreviewKind;
+use super::preview_style::PreviewStyle;
 use super::state::{Message, SceneImageProgress, State, UndisplayedChange};
 use super::view::layout::Layout;
 use crate::film::Srgb8Image;
@@ -125,7 +125,7 @@ fn handle_event(state: &mut State, event: Event) -> Vec<Effect> {
 fn show_image(state: &mut State, shown: ShownImage) -> Vec<Effect> {
     if shown.generation == state.request.generation
         && has_consistent_pixel_count(&shown.picture)
-        && state.display.kind != PreviewKind::None
+        && state.display.kind != PreviewStyle::None
     {
         if state.picture.history.store_newest_if_viewing_older(&shown) {
             history::record_newly_arrived_image(state);

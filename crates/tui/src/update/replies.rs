@@ -6,7 +6,7 @@ use crate::color::{ColorDepth, ColorMapper};
 use crate::event::Effect;
 use crate::graphics::ImageProtocol;
 use crate::pixel_request::UnconfirmedImageProtocol;
-use crate::preview_kind::PreviewKind;
+use crate::preview_style::PreviewStyle;
 use crate::state::State;
 use crate::terminal_replies::FinestNativeBlocks;
 use crate::terminal_replies::TerminalReply;
@@ -85,7 +85,7 @@ fn enable_pixels_if_supported(state: &mut State, answer: TerminalReply) -> Vec<E
         PixelSupport::Has => {
             (state.display.pixels, state.display.pixels_until) = (None, None);
             state.overlays.message.take_if(|message| message.words == request.unsupported_message());
-            state.display.kind = PreviewKind::Pixels(request.protocol);
+            state.display.kind = PreviewStyle::Pixels(request.protocol);
             state.dirty = true;
             request_resized_preview(state)
         }
@@ -125,10 +125,10 @@ fn handle_terminal_name(state: &mut State, terminal: TerminalId) -> Vec<Effect> 
 fn use_block_glyphs(state: &mut State, blocks: FinestNativeBlocks) -> Vec<Effect> {
     let kind = match blocks {
         FinestNativeBlocks::Unknown => return Vec::new(),
-        FinestNativeBlocks::Sextants => PreviewKind::Sextant,
-        FinestNativeBlocks::Octants => PreviewKind::Octant,
+        FinestNativeBlocks::Sextants => PreviewStyle::Sextant,
+        FinestNativeBlocks::Octants => PreviewStyle::Octant,
     };
-    if state.display.kind == PreviewKind::HalfBlock {
+    if state.display.kind == PreviewStyle::HalfBlock {
         state.display.kind = kind;
         state.dirty = true;
     }
@@ -161,12 +161,12 @@ mod tests {
     #[test]
     fn pixels_are_drawn_once_confirmed() {
         let mut ui = ui_requesting_pixels(MultiplexerPassthrough::Direct);
-        assert_eq!(ui.state.display.kind, PreviewKind::HalfBlock);
+        assert_eq!(ui.state.display.kind, PreviewStyle::HalfBlock);
         let effects = ui.handle_event(Event::TerminalReply(TerminalReply::Images(ImageProtocol::Kitty)));
         assert!(matches!(&effects[..], [Effect::Send(Command::Preview(Some(_)))]), "{effects:?}");
         ui.handle_event(Event::TerminalReply(TerminalReply::Attributes));
         ui.advance_clock(2000);
-        assert_eq!(ui.state.display.kind, PreviewKind::Pixels(ImageProtocol::Kitty));
+        assert_eq!(ui.state.display.kind, PreviewStyle::Pixels(ImageProtocol::Kitty));
         assert_eq!(ui.state.overlays.message, None);
     }
 
@@ -177,7 +177,7 @@ mod tests {
         assert!(ui.screen_text().contains("kitty images"), "{}", ui.screen_text());
         let refusal = ui.state.display.pixels.map(UnconfirmedImageProtocol::unsupported_message);
         assert_eq!(ui.state.overlays.message.as_ref().map(|message| message.words.clone()), refusal);
-        assert_eq!(ui.state.display.kind, PreviewKind::HalfBlock);
+        assert_eq!(ui.state.display.kind, PreviewStyle::HalfBlock);
         ui.press_character('s');
         ui.handle_event(Event::TerminalReply(TerminalReply::Attributes));
         ui.advance_clock(2000);
@@ -198,7 +198,7 @@ mod tests {
         ui.advance_clock(100);
         assert!(ui.screen_text().contains("allow-passthrough on"), "{}", ui.screen_text());
         ui.handle_event(Event::TerminalReply(TerminalReply::Images(ImageProtocol::Kitty)));
-        assert_eq!(ui.state.display.kind, PreviewKind::Pixels(ImageProtocol::Kitty));
+        assert_eq!(ui.state.display.kind, PreviewStyle::Pixels(ImageProtocol::Kitty));
         assert!(!ui.screen_text().contains("allow-passthrough"), "{}", ui.screen_text());
     }
 
@@ -214,7 +214,7 @@ mod tests {
         let effects = handle_reply(&mut state, foot);
         let [Effect::Send(Command::Preview(Some(size)))] = &effects[..] else { panic!("{effects:?}") };
         assert_eq!((size.width, size.height), (2 * before.width, 2 * before.height));
-        assert_eq!(state.display.kind, PreviewKind::Octant);
+        assert_eq!(state.display.kind, PreviewStyle::Octant);
     }
 
     #[test]
@@ -232,7 +232,7 @@ mod tests {
 
     #[test]
     fn only_queried_colors_are_used() {
-        let mut state = state_with(80, 24, PreviewKind::HalfBlock, ColorDepth::Ansi16, Default::default());
+        let mut state = state_with(80, 24, PreviewStyle::HalfBlock, ColorDepth::Ansi16, Default::default());
         let answers = [
             TerminalReply::Ink { index: 1, rgb: [180, 30, 30] },
             TerminalReply::Ink { index: 200, rgb: [180, 30, 30] },

@@ -10,7 +10,7 @@ use ratatui::widgets::{Axis, Chart, Dataset, GraphType, Widget};
 use super::text::{TextRole, format_seconds, format_two_digit_percent, nth_row, put_text, wrap_text};
 use crate::color::ColorDepth;
 use crate::messages;
-use crate::preview_kind::PreviewKind;
+use crate::preview_style::PreviewStyle;
 use crate::state::State;
 
 /// Minimum and maximum height of the chart in rows.
@@ -119,7 +119,7 @@ fn plot(state: &State, points: &[(f64, f64)], area: Rect, buffer: &mut Buffer) {
 
 /// The chart's marker: Braille dots, if the terminal is likely to support them.
 fn select_chart_marker(state: &State) -> Marker {
-    let is_simple = state.display.kind == PreviewKind::Ascii
+    let is_simple = state.display.kind == PreviewStyle::Ascii
         || matches!(state.display.depth, ColorDepth::Ansi16 | ColorDepth::None);
     if is_simple { Marker::Dot } else { Marker::Braille }
 }

@@ -10,7 +10,7 @@ use super::text::{TextRole, put_text, remaining_row_area, text_columns};
 use crate::action::Action;
 use crate::choice::Choice;
 use crate::keymap::{self, KEYMAP, KeyBinding, OVERLAY, OverlayAction};
-use crate::preview_kind::PreviewKind;
+use crate::preview_style::PreviewStyle;
 use crate::scene::has_mesh_extension;
 use crate::scene::report::summarize_counts;
 use crate::state::{KeyOverrides, RequestStatus, State, ViewList};
@@ -209,7 +209,7 @@ fn urgent_and_other_hints(state: &State) -> (Vec<KeyHint>, Vec<KeyHint>) {
     let is_other = |it: &&KeyBinding| {
         !it.hint.is_empty() && !now.contains(&it.action) && !ELSEWHERE.contains(&it.action)
     };
-    let has_picture = state.display.kind != PreviewKind::None;
+    let has_picture = state.display.kind != PreviewStyle::None;
     let is_shown = |it: &&KeyBinding| it.action != Action::ShowImageOnly || has_picture;
     let is_idle = |it: &&KeyBinding| it.action != Action::TogglePause || state.work.is_request_running();
     // If there are changes to list, a hint added above already shows them next to this key.

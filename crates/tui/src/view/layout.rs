@@ -6,7 +6,7 @@
 use ratatui::layout::Rect;
 
 use crate::pipeline::protocol::{MaxPreviewSize, Stage};
-use crate::preview_kind::PreviewKind;
+use crate::preview_style::PreviewStyle;
 use crate::state::State;
 
 /// Areas of the screen. An area is empty if there is no space for it.
@@ -50,7 +50,7 @@ impl Layout {
     /// Computes the layout for the state's window and image.
     pub(crate) fn for_state(state: &State) -> Self {
         let shape = state.request.aspect() * state.display.window.cell_aspect;
-        let shape = (state.display.kind != PreviewKind::None).then_some(shape);
+        let shape = (state.display.kind != PreviewStyle::None).then_some(shape);
         Self::new(state.display.window.columns, state.display.window.rows, shape, state.picture.is_alone)
     }
 

@@ -5,13 +5,13 @@ use ratatui::layout::Rect;
 
 use super::text::TextRole;
 use crate::pipeline::protocol::{ImagePosition, NormalizedRect};
-use crate::preview_kind::PreviewKind;
+use crate::preview_style::PreviewStyle;
 use crate::state::State;
 
 /// Draws the marks over an image that covers `cells`.
 pub(super) fn draw_marks(state: &State, cells: Rect, buffer: &mut Buffer) {
     let mut mark = |spot: ImagePosition, symbols: [&str; 2]| {
-        let symbol = symbols[usize::from(state.display.kind == PreviewKind::Ascii)];
+        let symbol = symbols[usize::from(state.display.kind == PreviewStyle::Ascii)];
         let cell = cell_for_position(state, spot, cells).and_then(|place| buffer.cell_mut(place));
         if let Some(cell) = cell {
             cell.reset();

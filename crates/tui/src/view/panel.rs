@@ -15,7 +15,7 @@ use super::text::{
     text_columns, truncated_text, wrap_text,
 };
 use crate::pipeline::protocol::Stage;
-use crate::preview_kind::PreviewKind;
+use crate::preview_style::PreviewStyle;
 use crate::scene::sanitize::escape_invisible_chars;
 use crate::state::{AssetProgressBar, RequestStatus, State};
 
@@ -131,7 +131,8 @@ fn is_scene_broken(state: &State) -> bool {
 
 fn asset_progress_line(state: &State, asset: &AssetProgressBar, width: u16) -> StyledLine {
     let fraction = stages::asset_loaded_fraction(asset);
-    let (filled_squares, empty) = progress_bar_parts(fraction, BAR, state.display.kind == PreviewKind::Ascii);
+    let (filled_squares, empty) =
+        progress_bar_parts(fraction, BAR, state.display.kind == PreviewStyle::Ascii);
     let percent = format!(" {:3} %", floor_percent(fraction));
     let room = width.min(2 * ENTRY_WIDTH).saturating_sub(BAR + text_columns(&percent) + 1);
     let name = truncated_text(&escape_invisible_chars(&asset.progress.name), room);

@@ -17,7 +17,7 @@ use crate::messages;
 use crate::mosaic::{CellGrid, fit_cell};
 use crate::options::PreviewChoice;
 use crate::pipeline::protocol::ImagePosition;
-use crate::preview_kind::PreviewKind;
+use crate::preview_style::PreviewStyle;
 use crate::rescale::resized_pixels;
 use crate::state::State;
 
@@ -74,17 +74,17 @@ pub(crate) fn image_position_at(state: &State, column: u16, row: u16) -> Option<
     cells.contains((column, row).into()).then(spot)
 }
 
-/// Returns the preview kind to use if the preview must be drawn as cells.
-fn cell_based_kind(kind: PreviewKind, depth: ColorDepth) -> PreviewKind {
+/// Returns the preview style to use if the preview must be drawn as cells.
+fn cell_based_kind(kind: PreviewStyle, depth: ColorDepth) -> PreviewStyle {
     match kind {
-        PreviewKind::Pixels(_) => PreviewKind::from_choice(PreviewChoice::Auto, depth),
+        PreviewStyle::Pixels(_) => PreviewStyle::from_choice(PreviewChoice::Auto, depth),
         kind => kind,
     }
 }
 
 /// Whether the preview is drawn as pixels, which requires that nothing covers it.
 fn is_drawn_as_pixels(state: &State) -> bool {
-    matches!(state.display.kind, PreviewKind::Pixels(_))
+    matches!(state.display.kind, PreviewStyle::Pixels(_))
         && !state.overlays.help.open
         && !state.overlays.diagnostics.open
         && state.overlays.views.is_none()
@@ -135,7 +135,7 @@ pub(crate) fn draw_image(
     (area, cell_aspect): (Rect, f32),
 ) -> Buffer {
     let mut buffer = Buffer::empty(area);
-    let kind = cell_based_kind(PreviewKind::from_choice(choice, inks.depth), inks.depth);
+    let kind = cell_based_kind(PreviewStyle::from_choice(choice, inks.depth), inks.depth);
     PreviewPlacement::fit(picture, area, kind, cell_aspect, f32::INFINITY).draw(
         picture,
         kind,
@@ -153,7 +153,7 @@ pub(crate) fn size_in_cells(
     (columns, rows): (u16, u16),
     cell_aspect: f32,
 ) -> (u16, u16) {
-    let kind = PreviewKind::from_choice(PreviewChoice::HalfBlock, depth);
+    let kind = PreviewStyle::from_choice(PreviewChoice::HalfBlock, depth);
     let area = Rect::new(0, 0, columns, rows);
     let cells = PreviewPlacement::fit(picture, area, kind, cell_aspect, f32::INFINITY).cells;
     (cells.width, cells.height)
@@ -169,7 +169,7 @@ struct PreviewPlacement {
 
 impl PreviewPlacement {
     /// Placement of the current preview, either as large as possible or showing actual pixels.
-    fn for_preview(state: &State, shown: &ShownImage, area: Rect, kind: PreviewKind) -> Self {
+    fn for_preview(state: &State, shown: &ShownImage, area: Rect, kind: PreviewStyle) -> Self {
         let across = kind.grid().map_or(1, CellGrid::columns_per_cell);
         let one_to_one = across as f32 / state.display.horizontal_pixels_per_cell() as f32;
         let most = if shown.section.is_some() { one_to_one } else { f32::INFINITY };
@@ -178,7 +178,7 @@ impl PreviewPlacement {
 
     /// Computes the largest centered placement with the image's aspect ratio. `cell_aspect` is a cell's
     /// height divided by its width. An image pixel covers at most `most` cell parts horizontally.
-    fn fit(picture: &Srgb8Image, area: Rect, kind: PreviewKind, cell_aspect: f32, most: f32) -> Self {
+    fn fit(picture: &Srgb8Image, area: Rect, kind: PreviewStyle, cell_aspect: f32, most: f32) -> Self {
         let (across, down) =
             kind.grid().map_or((1, 1), |grid| (grid.columns_per_cell() as u16, grid.rows_per_cell() as u16));
         let pixel_aspect = cell_aspect * f32::from(across) / f32::from(down);
@@ -199,7 +199,7 @@ impl PreviewPlacement {
         Self { cells, width: u32::from(width), height: u32::from(height) }
     }
 
-    fn draw(self, picture: &Srgb8Image, kind: PreviewKind, inks: PreviewColors<'_>, buffer: &mut Buffer) {
+    fn draw(self, picture: &Srgb8Image, kind: PreviewStyle, inks: PreviewColors<'_>, buffer: &mut Buffer) {
         let pixels = resized_pixels(picture, self.width, self.height);
         let scaled = ScaledImage { width: self.width, height: self.height, pixels: &pixels };
         let mut each = |draw: &dyn Fn(usize, usize, &mut Cell)| {
@@ -213,7 +213,7 @@ impl PreviewPlacement {
         };
         match kind.grid() {
             Some(grid) => each(&|x, y, cell| draw_two_color_cell(&scaled, grid, inks.shades, (x, y), cell)),
-            None if kind == PreviewKind::None => {}
+            None if kind == PreviewStyle::None => {}
             None => {
                 let ramp = AsciiRamp::for_picture(picture, inks.is_light);
                 each(&|x, y, cell| draw_ascii_cell(&scaled, ramp, inks, (x, y), cell));
@@ -287,7 +287,7 @@ mod tests {
         Srgb8Image { width, height, pixels }
     }
 
-    fn fit(width: u32, height: u32, area: (u16, u16), kind: PreviewKind, aspect: f32) -> PreviewPlacement {
+    fn fit(width: u32, height: u32, area: (u16, u16), kind: PreviewStyle, aspect: f32) -> PreviewPlacement {
         PreviewPlacement::fit(
             &picture(width, height, |_, _| [0; 3]),
             Rect::new(3, 1, area.0, area.1),
@@ -299,11 +299,11 @@ mod tests {
 
     #[test]
     fn image_with_the_requested_size_is_not_scaled() {
-        let placed = fit(50, 40, (50, 20), PreviewKind::HalfBlock, 2.0);
+        let placed = fit(50, 40, (50, 20), PreviewStyle::HalfBlock, 2.0);
         assert_eq!(placed, PreviewPlacement { cells: Rect::new(3, 1, 50, 20), width: 50, height: 40 });
-        let narrow = fit(20, 40, (50, 20), PreviewKind::HalfBlock, 2.0);
+        let narrow = fit(20, 40, (50, 20), PreviewStyle::HalfBlock, 2.0);
         assert_eq!(narrow.cells, Rect::new(18, 1, 20, 20));
-        let odd = fit(50, 31, (50, 20), PreviewKind::HalfBlock, 2.0);
+        let odd = fit(50, 31, (50, 20), PreviewStyle::HalfBlock, 2.0);
         assert_eq!(odd, PreviewPlacement { cells: Rect::new(3, 3, 50, 16), width: 50, height: 31 });
     }
 
@@ -312,11 +312,11 @@ mod tests {
         for (columns, rows) in [(80_u16, 24_u16), (51, 20), (150, 55), (200, 20), (30, 60)] {
             for (width, height) in [(640, 480), (100, 300), (1920, 1080), (64, 64)] {
                 for (kind, across, per_cell) in [
-                    (PreviewKind::HalfBlock, 1.0, 2.0),
-                    (PreviewKind::Ascii, 1.0, 1.0),
-                    (PreviewKind::Quadrant, 2.0, 2.0),
-                    (PreviewKind::Sextant, 2.0, 6.0),
-                    (PreviewKind::Octant, 2.0, 4.0),
+                    (PreviewStyle::HalfBlock, 1.0, 2.0),
+                    (PreviewStyle::Ascii, 1.0, 1.0),
+                    (PreviewStyle::Quadrant, 2.0, 2.0),
+                    (PreviewStyle::Sextant, 2.0, 6.0),
+                    (PreviewStyle::Octant, 2.0, 4.0),
                 ] {
                     for aspect in [1.8_f32, 2.0, 2.3] {
                         let placed = fit(width, height, (columns, rows), kind, aspect);
@@ -345,9 +345,9 @@ mod tests {
         let one = picture(2, 1, |_, _| [9, 8, 7]);
         let state = state(2, 3);
         let mut buffer = Buffer::empty(Rect::new(0, 0, 2, 3));
-        PreviewPlacement::fit(&one, buffer.area, PreviewKind::HalfBlock, 2.0, f32::INFINITY).draw(
+        PreviewPlacement::fit(&one, buffer.area, PreviewStyle::HalfBlock, 2.0, f32::INFINITY).draw(
             &one,
-            PreviewKind::HalfBlock,
+            PreviewStyle::HalfBlock,
             PreviewColors::for_state(&state),
             &mut buffer,
         );
@@ -360,7 +360,7 @@ mod tests {
         let sharp = picture(8, 8, |x, _| if x < 3 { [200, 20, 20] } else { [20, 20, 200] });
         let state = state(4, 2);
         for (kind, symbol) in
-            [(PreviewKind::Quadrant, "▌"), (PreviewKind::Sextant, "▌"), (PreviewKind::Octant, "▌")]
+            [(PreviewStyle::Quadrant, "▌"), (PreviewStyle::Sextant, "▌"), (PreviewStyle::Octant, "▌")]
         {
             let mut buffer = Buffer::empty(Rect::new(0, 0, 4, 2));
             PreviewPlacement::fit(&sharp, buffer.area, kind, 2.0, f32::INFINITY).draw(

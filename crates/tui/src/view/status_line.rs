@@ -16,7 +16,7 @@ use crate::exit_summary;
 use crate::messages;
 use crate::pipeline::protocol::{NoisePrediction, RenderProgress, SavedSceneImageState};
 use crate::pipeline::words::format_mean_samples;
-use crate::preview_kind::PreviewKind;
+use crate::preview_style::PreviewStyle;
 use crate::scene::has_mesh_extension;
 use crate::scene::sanitize::escape_invisible_chars;
 use crate::state::{RequestStatus, SceneImageProgress, State, WrittenFile};
@@ -133,7 +133,7 @@ fn draw_progress_bar(state: &State, layout: &Layout, area: Rect, buffer: &mut Bu
         return;
     }
     let (filled_squares, empty) =
-        progress_bar_parts(fraction, room, state.display.kind == PreviewKind::Ascii);
+        progress_bar_parts(fraction, room, state.display.kind == PreviewStyle::Ascii);
     let (tone, gap) =
         (if state.work.paused { TextRole::Warning } else { TextRole::Working }, (" ", TextRole::Plain));
     let pieces = [

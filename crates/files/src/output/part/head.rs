@@ -170,7 +170,7 @@ const STRETCHES: [(DataKind, &str); 2] = [(DataKind::Distances, "distances"), (D
 
 impl ImageHeader {
     /// Describes the image that these settings produce from a film.
-    pub fn new(film: &Film, finish: &FilmEncodingSettings) -> Self {
+    pub fn from_film(film: &Film, finish: &FilmEncodingSettings) -> Self {
         let Rect { x, y, width, height } = film.crop_rect();
         let tone = &finish.tone;
         let kind = match tone.range_map {

@@ -51,7 +51,7 @@ fn head(index: u32, count: u32, film: &Film) -> PartHeader {
             NamedRenderInput::from_combined_hash("ff"),
         ],
         share: PartShare { index, count, block_count: 0, blocks: Vec::new() },
-        picture: ImageHeader::new(film, &finish()),
+        picture: ImageHeader::from_film(film, &finish()),
         scene: String::new(),
         references: Vec::new(),
     }

@@ -265,8 +265,8 @@ impl WideBvh {
 /// one by one is faster.
 const SMALL_GROUP: usize = 8;
 
-/// Groups rays whose directions have the same signs and longest axis, and calls `take` with each group's ends
-/// and size. Rays outside the group have negative ends.
+/// Groups rays whose directions have the same signs and longest axis. Calls `take` for each group with the
+/// maximum distances of all rays, which are negative for rays outside the group, and the group's size.
 fn for_each_coherent_group_ends(rays: &[Ray], ends: &F32x16, mut take: impl FnMut(&F32x16, usize)) {
     let way = |ray: &Ray| {
         let [x, y, z] = ray.direction.to_array().map(f32::abs);

@@ -44,7 +44,7 @@ pub(crate) fn create_header(
     finish: &FilmEncodingSettings,
 ) -> PartHeader {
     let share = part_index_and_blocks(state.share.as_ref());
-    let (picture, scene) = (ImageHeader::new(&state.film, finish), String::new());
+    let (picture, scene) = (ImageHeader::from_film(&state.film, finish), String::new());
     PartHeader { kind, identity, share, picture, scene, references: Vec::new() }
 }
 

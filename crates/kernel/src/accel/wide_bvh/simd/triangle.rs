@@ -1,5 +1,5 @@
 //! SIMD watertight triangle test. Performs the operations of `ShearedRay::intersect` in the same order and
-//! without fused products, so results are bit-identical.
+//! without fused multiply-adds, so both give the same bits.
 
 use super::vector::SimdVector;
 use crate::geometry::watertight::ILL_CONDITIONED;
