@@ -4,7 +4,7 @@
 use glimt::tui::messages;
 use nix::sys::signal::Signal;
 
-use super::pty::{Colors, Folder, SCENE, Terminal, cells, upper};
+use super::pty::{Folder, SCENE, Terminal, cells, upper};
 use super::relay::Answers;
 
 /// Environment variables that identify terminals, with the terminals' features: title, progress, a
