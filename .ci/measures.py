@@ -3,7 +3,7 @@
 
     python3 .ci/measures.py
 
-Code lines exclude blank lines, comments and tests (`#[cfg(test)]` modules and files named `*tests.rs` or in `tests` folders).
+Code lines exclude blank lines, comments and tests (`#[cfg(test)]` modules, and files named `*tests.rs` or in `tests` folders).
 """
 
 import re
@@ -13,6 +13,7 @@ ROOT = Path(__file__).resolve().parent.parent
 INTEGRATORS = ROOT / "crates" / "trace" / "src" / "integrators"
 TEST_MODULE = re.compile(r'^#\[cfg\(test\)\]\n(?:#\[path = "[^"]*"\]\n)?(?:pub )?mod ', re.MULTILINE)
 TEST_FILE = re.compile(r"(^|/)(\w*tests|test_\w+)(/|\.rs$)")
+TEST_MODULE_FILE = re.compile(r"^#\[cfg\(test\)\]\n(?:pub(?:\(\w+\))? )?mod (\w+);", re.MULTILINE)
 
 
 def code_lines(text):
@@ -22,6 +23,16 @@ def code_lines(text):
         stripped = line.strip()
         code += bool(stripped) and not stripped.startswith("//")
     return code
+
+
+def test_module_files(files):
+    """Files and folders of modules that are only compiled for tests."""
+    found = set()
+    for file in files:
+        folder = file.parent if file.stem in ("lib", "main", "mod") else file.with_suffix("")
+        for name in TEST_MODULE_FILE.findall(file.read_text()):
+            found |= {folder / f"{name}.rs", folder / name}
+    return found
 
 
 def required_functions(path, trait):
@@ -40,7 +51,8 @@ def main():
     total = 0
     for crate in sorted((ROOT / "crates").iterdir()):
         files = [file for file in crate.glob("src/**/*.rs") if not TEST_FILE.search(str(file.relative_to(crate)))]
-        lines = sum(code_lines(file.read_text()) for file in files)
+        tests = test_module_files(files)
+        lines = sum(code_lines(file.read_text()) for file in files if not tests & {file, *file.parents})
         total += lines
         print(f"{lines:7} code lines in {crate.name}")
     print(f"{total:7} code lines in all crates")
