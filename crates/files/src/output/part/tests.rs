@@ -20,7 +20,7 @@ fn film(index: u32, count: u32) -> Film {
         let radiance = (0..rect.area() * 3).map(|i| Vec3::new(i as f32 / 3.0, tile as f32, 0.1)).collect();
         film.add_samples(
             tile,
-            &TileSamples {
+            TileSamples {
                 pixels: rect.into(),
                 samples: 3,
                 radiance,
