@@ -86,7 +86,7 @@ FAULTS = [
     ("rays that hit the triangle they start on", "geometry/triangle_list.rs", "let is_left_out = ⟦is_sure & ((rays.start[i] == number) | (except[i] == number))⟧;",
      "is_sure & (rays.start[i] == number)", "accel::triangle_list_tests::decided_packets_match_single_rays"),
     ("cosine with a normal that faces away from the viewer", "integrators/transport/batch.rs",
-     "let normal = ⟦bsdf.lobe_shading_normal(shading.normal, vertex.wo)⟧;", "shading.normal",
+     "let normal = ⟦bsdf.lobe_shading_normal(shading.normal, wo)⟧;", "shading.normal",
      MICROFACETS + "coarse_smooth_meshes_conserve_energy"),
     ("a boundary between equal indices", "integrators/transport/walk.rs",
      "near.glass() != far.glass() && ⟦medium_ior(tile.world, near) != medium_ior(tile.world, &far)⟧ {", "true",

@@ -1,7 +1,7 @@
 //! Packets of sixteen vertices that await direct lighting, stored as a struct of arrays.
 
 use super::tile::TileContext;
-use super::vertex::ShadingVertex;
+use super::vertex::{ScatteringGeometry, ShadingVertex};
 use crate::geometry::Ray;
 use crate::geometry::packet::set_bit_lanes;
 use crate::integrators::view::{LightAov, RadianceComponentMask};
@@ -170,8 +170,10 @@ impl VertexBatch {
         interiors: u32,
     ) {
         let ShadingVertex { path, place, vertex, shading, bsdf, .. } = lit;
-        let origin = vertex.shadow_origin(tile, path.state.only_specular_before);
-        let normal = bsdf.lobe_shading_normal(shading.normal, vertex.wo);
+        let ScatteringGeometry { origin, facet, wo, tangent } =
+            vertex.scattering_geometry(tile, path.state.only_specular_before);
+        let normal = bsdf.lobe_shading_normal(shading.normal, wo);
+        let (point, facet_normal) = facet.unwrap_or((Vec3::ZERO, Vec3::ZERO));
         BatchVertex {
             from: origin.point,
             start: origin.start,
@@ -180,9 +182,9 @@ impl VertexBatch {
             lifted: origin.lift.map_or(Vec3::ZERO, |lift| lift.to),
             lift_end: origin.lift.map_or(0.0, |lift| lift.end),
             may_lift: origin.lift.is_some(),
-            point: vertex.surface.point,
-            facet: vertex.normal,
-            has_facet: true,
+            point,
+            facet: facet_normal,
+            has_facet: facet.is_some(),
             only_specular_before: path.state.only_specular_before,
             after_gloss: path.state.is_after_gloss,
             normal,
@@ -197,7 +199,7 @@ impl VertexBatch {
             ..BatchVertex::default()
         }
         .set(self, i);
-        let directions = ShadingGeometry { normal, wo: vertex.wo, tangent: vertex.dpdu_or_zero() };
+        let directions = ShadingGeometry { normal, wo, tangent };
         self.bsdf.set_bsdf(i, bsdf, aov.lobes(), &directions);
         self.is_perturbed |= shading.shading_normal_cosine.is_some();
         self.used |= 1 << i;

@@ -246,6 +246,21 @@ impl<'a> SurfaceVertex<'a> {
         if self.has_uv { self.surface.dpdu } else { Vec3::ZERO }
     }
 
+    /// What light sampling and BSDF sampling need to know about the vertex.
+    #[inline(always)]
+    pub fn scattering_geometry(
+        &self,
+        tile: &TileContext<'_>,
+        only_specular_before: bool,
+    ) -> ScatteringGeometry {
+        ScatteringGeometry {
+            origin: self.shadow_origin(tile, only_specular_before),
+            facet: Some((self.surface.point, self.normal)),
+            wo: self.wo,
+            tangent: self.dpdu_or_zero(),
+        }
+    }
+
     /// Origin for rays on the far side, if the origins on both sides are known.
     pub fn far_origin(&self) -> Option<Vec3> {
         self.sides.map(|sides| sides.beyond)
@@ -300,6 +315,19 @@ pub fn lift_significance_and_t_max(on_facet: Vec3, to: Vec3, normal: Vec3, error
 
 /// Minimum lift, in units of the point's error. Below it, the point on the facet is used.
 const MIN_LIFT: f32 = 8.0;
+
+/// Geometry of a vertex at which light is sampled and the path may scatter, on a surface or elsewhere.
+pub struct ScatteringGeometry {
+    /// Origin of light samples and shadow rays.
+    pub origin: ShadowOrigin,
+    /// The surface point and the geometric normal on the lit side, or `None` if the origin and the shading
+    /// normal take their place.
+    pub facet: Option<(Vec3, Vec3)>,
+    /// Unit direction toward the viewer.
+    pub wo: Vec3,
+    /// ∂p/∂u, or zero without texture coordinates.
+    pub tangent: Vec3,
+}
 
 /// Origin of shadow rays.
 #[derive(Clone, Copy, Debug)]

@@ -102,12 +102,20 @@ impl Segment {
         Self { origin, distance: self.distance + distance, count: self.count + 1 }
     }
 
+    /// Moves the ray origin back to the path's last vertex.
+    #[inline(always)]
+    fn move_origin_to_last_vertex(&self, path: &mut PathRay) {
+        if self.count > 0 {
+            path.ray.origin = self.origin;
+        }
+    }
+
     /// Moves the ray origin back to the path's last vertex, and returns the hit with the distance from that
     /// vertex.
     #[inline(always)]
     fn rebase_ray_to_last_vertex(&self, path: &mut PathRay, mut hit: Hit) -> Hit {
+        self.move_origin_to_last_vertex(path);
         if self.count > 0 {
-            path.ray.origin = self.origin;
             hit.shape.t += self.distance;
         }
         hit
@@ -129,12 +137,19 @@ pub enum DirectOrCoincidentHit {
 pub fn walk_to_interaction<'a, W: PathStepper<'a>>(
     stepper: &mut W,
     path: &mut PathRay,
-    (mut hit, mut surface): (Hit, Option<SurfacePoint>),
+    (hit, mut surface): (Hit, Option<SurfacePoint>),
 ) {
     let tile = stepper.tile();
-    let (mut way, mut hidden) = (Segment::DIRECT, 0);
-    while hidden < MAX_PASSED_SURFACES {
+    let (mut way, mut hidden, mut next) = (Segment::DIRECT, 0, Some(hit));
+    loop {
         let has_passed = hidden > 0;
+        let Some(hit) = next else {
+            way.move_origin_to_last_vertex(path);
+            return stepper.handle_walk_end(path, Interaction::Nothing, has_passed);
+        };
+        if hidden == MAX_PASSED_SURFACES {
+            return stepper.handle_walk_end(path, Interaction::Hidden, true);
+        }
         let mut vertex = match surface.take() {
             Some(surface) => SurfaceVertex::from_computed_surface(tile, path, &hit, surface),
             None => SurfaceVertex::from_hit_with_needed_attributes(tile, path, &hit),
@@ -148,18 +163,9 @@ pub fn walk_to_interaction<'a, W: PathStepper<'a>>(
                     NullInteraction::Passed(part) => {
                         way = way.extended_past_surface(path, hit.shape.t);
                         *path = path_past_surface(*path, &vertex, part);
-                        match tile.world.geometry.closest_hit(&path.ray) {
-                            Some(next) => {
-                                stepper.record_surface_crossing(path, Some(next));
-                                hit = next;
-                                continue;
-                            }
-                            None => {
-                                stepper.record_surface_crossing(path, None);
-                                path.ray.origin = way.origin;
-                                return stepper.handle_walk_end(path, Interaction::Nothing, has_passed);
-                            }
-                        }
+                        next = tile.world.geometry.closest_hit(&path.ray);
+                        stepper.record_surface_crossing(path, next);
+                        continue;
                     }
                     NullInteraction::Ended => return,
                     NullInteraction::Opaque => {}
@@ -227,14 +233,9 @@ pub fn walk_to_interaction<'a, W: PathStepper<'a>>(
         path.state = path.state.after_crossing_inside_glass();
         path.cone = path.cone.propagated_by(hit.shape.t);
         (way, hidden) = (Segment::DIRECT, hidden + 1);
-        let next = tile.world.geometry.closest_hit(&path.ray);
+        next = tile.world.geometry.closest_hit(&path.ray);
         stepper.record_surface_crossing(path, next);
-        match next {
-            Some(next) => hit = next,
-            None => return stepper.handle_walk_end(path, Interaction::Nothing, true),
-        }
     }
-    stepper.handle_walk_end(path, Interaction::Hidden, true);
 }
 
 /// Rough surface between two media with different indices of refraction, or `None` if the surface is smooth.
