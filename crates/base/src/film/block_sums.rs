@@ -83,7 +83,7 @@ mod tests {
                 let radiance = some.iter().map(|value| Vec3::splat(*value)).collect();
                 film.add_samples(
                     0,
-                    &TileSamples {
+                    TileSamples {
                         pixels: rect.into(),
                         samples: count as u32,
                         radiance,

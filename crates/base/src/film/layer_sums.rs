@@ -3,6 +3,9 @@
 use super::sum_order::add_finite_and_count_non_finite;
 use crate::math::{DVec3, Vec3};
 
+/// Number of values per sample if all layers are recorded.
+const ALL_VALUES: usize = 21;
+
 /// Sums of the layers' values for a set of pixels, stored pixel by pixel. The sample counts are the image's.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LayerSums {
@@ -20,34 +23,27 @@ impl LayerSums {
         Self { count, sums: vec![DVec3::ZERO; count * area], negative: Vec::new() }
     }
 
-    /// Adds consecutive samples to a pixel. `layers` contains the index of each layer with its sample values.
-    /// `is_negative` contains one flag per sample if the filter has negative lobes. Non-finite values are
-    /// treated as black.
-    pub fn add_pixel_samples(
-        &mut self,
-        pixel: usize,
-        layers: &[(usize, &[Vec3])],
-        is_negative: Option<&[bool]>,
-    ) {
-        let first = pixel * self.count;
+    /// Adds consecutive samples to a pixel. Each sample has three values per layer. `is_negative` contains one
+    /// flag per sample if the filter has negative lobes. Non-finite values are treated as black.
+    #[inline(always)]
+    pub fn add_pixel_samples(&mut self, pixel: usize, values: &[f32], is_negative: Option<&[bool]>) {
+        let (pixel, size) = (pixel * self.count..(pixel + 1) * self.count, 3 * self.count);
         let Some(is_negative) = is_negative else {
-            let sums = &mut self.sums[first..first + self.count];
-            // Add four layers at a time, because the additions to one sum depend on each other.
-            let (groups, rest) = layers.as_chunks::<4>();
-            for group in groups {
-                add_samples_to_four_layers(sums, group);
-            }
-            for (layer, values) in rest {
-                add_finite_and_count_non_finite(&mut sums[*layer], values);
+            let sums = &mut self.sums[pixel];
+            // The loops over all layers compile to vector instructions.
+            let is_done = match size {
+                ALL_VALUES => try_add_samples::<ALL_VALUES>(bytemuck::cast_slice_mut(sums), values),
+                _ => false,
+            };
+            if !is_done {
+                values.chunks_exact(size).for_each(|sample| add_finite_layers(sums, sample));
             }
             return;
         };
         self.negative.resize(self.sums.len(), DVec3::ZERO);
-        for (layer, values) in layers {
-            for (value, &is_negative) in values.iter().zip(is_negative) {
-                let sums = if is_negative { &mut self.negative } else { &mut self.sums };
-                add_finite_and_count_non_finite(&mut sums[first + layer], std::slice::from_ref(value));
-            }
+        for (sample, &is_negative) in values.chunks_exact(size).zip(is_negative) {
+            let sums = if is_negative { &mut self.negative } else { &mut self.sums };
+            add_finite_layers(&mut sums[pixel.clone()], sample);
         }
     }
 
@@ -56,12 +52,27 @@ impl LayerSums {
         self.sums.resize(area * self.count, DVec3::ZERO);
     }
 
-    /// Replaces the sums of all pixels. Allocates memory only for the sums of negative lobes.
-    pub(super) fn replace_all(&mut self, other: &Self) {
+    /// Replaces the sums of all pixels and returns the previous sums.
+    pub(super) fn replace_all(&mut self, mut other: Self) -> Self {
         if self.sums.len() == other.sums.len() {
-            self.sums.copy_from_slice(&other.sums);
-            self.negative.clone_from(&other.negative);
+            std::mem::swap(self, &mut other);
         }
+        other
+    }
+
+    /// Sets the sums to zero for `count` layers and `area` pixels, reusing memory.
+    pub(super) fn reset(&mut self, count: usize, area: usize) {
+        self.count = count;
+        self.sums.clear();
+        self.resize(area);
+        self.negative.clear();
+    }
+
+    /// Copies other sums, reusing memory.
+    pub(super) fn copy_from(&mut self, other: &Self) {
+        self.count = other.count;
+        self.sums.clone_from(&other.sums);
+        self.negative.clone_from(&other.negative);
     }
 
     /// Replaces a pixel's sums with those of pixel `from` in `other`.
@@ -76,22 +87,28 @@ impl LayerSums {
     }
 }
 
-/// Adds the samples of four layers at once, with the same result as adding each layer separately.
-fn add_samples_to_four_layers(sums: &mut [DVec3], layers: &[(usize, &[Vec3]); 4]) {
-    let mut all = layers.map(|(layer, _)| sums[layer]);
-    let [a, b, c, d] = layers.map(|(_, values)| values);
-    for (((a, b), c), d) in a.iter().zip(b).zip(c).zip(d) {
-        for (sum, value) in all.iter_mut().zip([a, b, c, d]) {
-            *sum += value.as_dvec3();
+/// Adds the finite layer values of a sample.
+fn add_finite_layers(sums: &mut [DVec3], sample: &[f32]) {
+    for (sum, value) in sums.iter_mut().zip(sample.as_chunks::<3>().0) {
+        add_finite_and_count_non_finite(sum, &[Vec3::from_array(*value)]);
+    }
+}
+
+/// Adds samples with `N` values. Does nothing and returns false if a sum would not be finite.
+#[inline(always)]
+fn try_add_samples<const N: usize>(sums: &mut [f64], values: &[f32]) -> bool {
+    let Some(sums) = sums.as_mut_array::<N>() else { return false };
+    let mut totals = *sums;
+    for sample in values.as_chunks::<N>().0 {
+        for (total, value) in totals.iter_mut().zip(sample) {
+            *total += f64::from(*value);
         }
     }
-    for ((layer, values), sum) in layers.iter().zip(all) {
-        if sum.is_finite() {
-            sums[*layer] = sum;
-        } else {
-            add_finite_and_count_non_finite(&mut sums[*layer], values);
-        }
+    let is_finite = totals.iter().fold(true, |all, total| all & total.is_finite());
+    if is_finite {
+        *sums = totals;
     }
+    is_finite
 }
 
 #[cfg(test)]
@@ -101,24 +118,29 @@ mod tests {
 
     #[test]
     fn non_finite_layer_values_are_black() {
-        let values = [Vec3::new(f32::NAN, 1.0, 1.0), Vec3::ONE, Vec3::ONE];
         let mut sums = LayerSums::zero(2, 2);
-        sums.add_pixel_samples(1, &[(0, &values)], None);
-        assert_eq!(sums.sums, [DVec3::ZERO, DVec3::ZERO, DVec3::splat(2.0), DVec3::ZERO]);
+        let samples = [[f32::NAN, 1.0, 1.0, 1.0, 1.0, 1.0], [1.0; 6]];
+        sums.add_pixel_samples(1, samples.as_flattened(), None);
+        assert_eq!(sums.sums, [DVec3::ZERO, DVec3::ZERO, DVec3::ONE, DVec3::splat(2.0)]);
     }
 
     #[test]
-    fn adding_four_layers_is_bit_identical() {
+    fn samples_are_added_in_sequence() {
         let mut next = unit_generator(4);
-        let mut list = || (0..7).map(|_| Vec3::new(next(), next() * 1e9, next())).collect::<Vec<_>>();
-        let mut lists = [list(), list(), list(), list(), list()];
-        lists[2][5].y = f32::INFINITY;
-        let (mut together, mut separate) = (LayerSums::zero(5, 1), LayerSums::zero(5, 1));
-        let layers: Vec<(usize, &[Vec3])> = lists.iter().map(Vec::as_slice).enumerate().collect();
-        for _ in 0..2 {
-            together.add_pixel_samples(0, &layers, None);
-            layers.iter().for_each(|layer| separate.add_pixel_samples(0, &[*layer], None));
+        for count in 1..=9 {
+            let mut layers =
+                || -> Vec<Vec3> { (0..count).map(|_| Vec3::new(next(), next() * 1e9, next())).collect() };
+            let samples = [layers(), layers(), layers()];
+            let mut sums = LayerSums::zero(count, 1);
+            for _ in 0..2 {
+                let values: Vec<f32> = samples.iter().flatten().flat_map(Vec3::to_array).collect();
+                sums.add_pixel_samples(0, &values, None);
+            }
+            for layer in 0..count {
+                let both = samples.iter().chain(&samples);
+                let expected = both.fold(DVec3::ZERO, |sum, layers| sum + layers[layer].as_dvec3());
+                assert_eq!(sums.sums[layer], expected, "layer {layer} of {count}");
+            }
         }
-        assert_eq!(together, separate);
     }
 }

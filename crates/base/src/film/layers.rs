@@ -2,7 +2,7 @@
 
 use super::layer_sums::LayerSums;
 use super::sums::{
-    Film, FilmCreationError, NegativeLobeSums, Tile, can_allocate, pixel_index_in_rect, tile_rect,
+    Film, FilmCreationError, NegativeLobeSums, Tile, can_allocate, lock, pixel_index_in_rect, tile_rect,
 };
 use super::{RadianceImage, Rect, SelectedPixels};
 use crate::math::{DVec3, Vec3};
@@ -22,13 +22,17 @@ impl Tile {
 impl Film {
     /// Layer sums of the selected pixels of a tile, to which more samples can be added.
     pub fn layer_sums(&self, tile: usize, pixels: SelectedPixels) -> LayerSums {
-        let zero = || LayerSums::zero(self.layers, pixels.count());
-        let Some(rect) = self.tile_rect(tile) else { return zero() };
+        let mut sums = lock(&self.spare_layers).pop().unwrap_or_default();
+        let Some(rect) = self.tile_rect(tile) else {
+            sums.reset(self.layers, pixels.count());
+            return sums;
+        };
         let tile = self.lock_tile(tile);
         if pixels == rect.into() && !tile.counts.is_empty() {
-            return tile.layers.clone();
+            sums.copy_from(&tile.layers);
+            return sums;
         }
-        let mut sums = zero();
+        sums.reset(self.layers, pixels.count());
         for i in 0..pixels.count() {
             let (x, y) = pixels.image_position(i as u32);
             if let Some(index) = pixel_index_in_rect(rect, x, y) {
@@ -98,8 +102,12 @@ mod tests {
         let is_negative: Vec<bool> = radiance.iter().map(|value| value.x > 0.7).collect();
         let mut layers = film.layer_sums(tile, pixels);
         for (pixel, (values, signs)) in radiance.chunks(5).zip(is_negative.chunks(5)).enumerate() {
-            let double: Vec<Vec3> = values.iter().map(|value| value * 2.0).collect();
-            layers.add_pixel_samples(pixel, &[(0, values), (1, &double)], is_signed.then_some(signs));
+            let sample = |value: &Vec3| {
+                let Vec3 { x, y, z } = *value;
+                [x, y, z, 2.0 * x, 2.0 * y, 2.0 * z]
+            };
+            let values: Vec<f32> = values.iter().flat_map(sample).collect();
+            layers.add_pixel_samples(pixel, &values, is_signed.then_some(signs));
         }
         let negative = is_signed.then_some(NegativeLobeMask { weight: 0.1, is_negative });
         TileSamples { pixels, samples: 5, radiance, negative, layers }
@@ -114,7 +122,7 @@ mod tests {
         for is_signed in [false, true] {
             let film = film();
             for (seed, tile) in [(1, 0), (2, 1), (3, 0)] {
-                film.add_samples(tile, &samples(&film, tile, seed, is_signed));
+                film.add_samples(tile, samples(&film, tile, seed, is_signed));
             }
             let image = film.radiance_image().pixels;
             let layers = film.layer_images();
@@ -130,7 +138,7 @@ mod tests {
         for is_signed in [false, true] {
             let (whole, restored) = (film(), film());
             for tile in 0..2 {
-                whole.add_samples(tile, &samples(&whole, tile, 5, is_signed));
+                whole.add_samples(tile, samples(&whole, tile, 5, is_signed));
                 let mut bytes = Vec::new();
                 assert!(whole.serialize_tile(tile, &mut bytes));
                 let area = whole.tile_rect(tile).expect("a tile").area();
@@ -139,7 +147,7 @@ mod tests {
                 // A film with different layers rejects the tile.
                 assert!(Film::new(40, 3, None).expect("a film").restore_tile(tile, read()).is_err());
                 for film in [&whole, &restored] {
-                    film.add_samples(tile, &samples(film, tile, 6, is_signed));
+                    film.add_samples(tile, samples(film, tile, 6, is_signed));
                 }
             }
             assert_eq!(whole.layer_images(), restored.layer_images());

@@ -244,7 +244,7 @@ mod tests {
             let radiance = values.iter().map(|&value| Vec3::splat(value)).collect();
             film.add_samples(
                 x / TILE_SIZE as usize,
-                &TileSamples {
+                TileSamples {
                     pixels: rect.into(),
                     samples: values.len() as u32,
                     radiance,
@@ -346,7 +346,7 @@ mod tests {
             }
             film.add_samples(
                 tile,
-                &TileSamples {
+                TileSamples {
                     pixels: rect.into(),
                     samples: count,
                     radiance,

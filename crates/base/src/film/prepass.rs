@@ -59,7 +59,7 @@ impl BrightnessPrepassPixels {
         let rect = Rect { x: 0, y: 0, width: 1, height: 1 };
         samples.pixels = rect.into();
         let film = Film::new(1, 1, None).ok()?;
-        film.add_samples(0, &samples);
+        film.add_samples(0, samples);
         film.pixel(FilmQuantity::Radiance, 0, 0).map(|radiance| luminance(radiance.as_dvec3()))
     }
 }
@@ -103,7 +103,7 @@ mod tests {
             }
         };
         for tile in 0..film.tile_count() {
-            film.add_samples(tile, &samples(film.tile_rect(tile).expect("a tile")));
+            film.add_samples(tile, samples(film.tile_rect(tile).expect("a tile")));
         }
         let prepass = BrightnessPrepassPixels::new(crop);
         let apart = prepass.mean_luminance(|number| {

@@ -239,7 +239,7 @@ mod tests {
                     let rect = Rect { x, y, width: 1, height: 1 };
                     film.add_samples(
                         tile,
-                        &TileSamples {
+                        TileSamples {
                             pixels: rect.into(),
                             samples: 1,
                             radiance: vec![Vec3::splat(value)],
@@ -319,7 +319,7 @@ mod tests {
             negative: None,
             layers: Default::default(),
         };
-        first.add_samples(1, &samples);
+        first.add_samples(1, samples);
         let changed = picture(&first);
         assert_eq!(changed, preview(&first, 9, 5, None));
         assert!(changed.pixels.iter().any(|p| p.x == 0.0 && p.y == 1.0), "the new tile should be visible");
@@ -335,7 +335,7 @@ mod tests {
             let value = Vec3::splat(tile as f32);
             film.add_samples(
                 tile,
-                &TileSamples {
+                TileSamples {
                     pixels: rect.into(),
                     samples: 1,
                     radiance: vec![value; rect.area()],
@@ -378,7 +378,7 @@ mod tests {
         let rect = film.tile_rect(0).expect("a tile");
         film.add_samples(
             0,
-            &TileSamples {
+            TileSamples {
                 pixels: rect.into(),
                 samples: 1,
                 radiance: vec![Vec3::splat(1e6); rect.area()],

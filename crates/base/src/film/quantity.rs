@@ -117,7 +117,7 @@ mod tests {
         let radiance = (0..400 * count).map(|i| Vec3::splat(next(i / count))).collect();
         film.add_samples(
             0,
-            &TileSamples {
+            TileSamples {
                 pixels: rect.into(),
                 samples: count,
                 radiance,

@@ -63,7 +63,7 @@ mod tests {
             let radiance = (0..rect.area()).map(|i| Vec3::splat((tile * 10_000 + i) as f32)).collect();
             film.add_samples(
                 tile,
-                &TileSamples {
+                TileSamples {
                     pixels: rect.into(),
                     samples: 1,
                     radiance,

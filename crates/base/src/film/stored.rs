@@ -251,7 +251,7 @@ mod tests {
             let samples = range.end - range.start;
             film.add_samples(
                 tile,
-                &TileSamples { pixels: rect.into(), samples, radiance, negative, layers: Default::default() },
+                TileSamples { pixels: rect.into(), samples, radiance, negative, layers: Default::default() },
             );
         }
     }

@@ -83,6 +83,8 @@ pub struct Film {
     pub(super) blocks: SumOrder,
     /// Number of layers.
     pub(super) layers: usize,
+    /// Memory of replaced layer sums, for reuse by [`Film::layer_sums`].
+    pub(super) spare_layers: Mutex<Vec<LayerSums>>,
 }
 
 /// Sums of one tile in row-major order. Empty until the first samples are added, so that the thread rendering
@@ -286,6 +288,7 @@ impl Film {
             convergence: ConvergenceModel::default(),
             blocks: SumOrder::default(),
             layers: 0,
+            spare_layers: Mutex::default(),
         })
     }
 
@@ -343,7 +346,7 @@ impl Film {
 
     /// Adds samples to a tile one by one, in order. A sample with a NaN or an infinity is treated as black
     /// and counted in [`Film::non_finite_samples`]. Pixels outside the tile are ignored.
-    pub fn add_samples(&self, tile: usize, samples: &TileSamples) {
+    pub fn add_samples(&self, tile: usize, samples: TileSamples) {
         let Some(rect) = self.tile_rect(tile) else { return };
         if samples.samples == 0 || samples.pixels.rect.width == 0 {
             return;
@@ -367,11 +370,12 @@ impl Film {
                 tile.layers.replace_pixel(index, &samples.layers, i);
             }
         }
-        if is_whole {
-            tile.layers.replace_all(&samples.layers);
-        }
+        let replaced = is_whole.then(|| tile.layers.replace_all(samples.layers));
         tile.revision += 1;
         drop(guard);
+        if let Some(replaced) = replaced.filter(|_| self.layers > 0) {
+            lock(&self.spare_layers).push(replaced);
+        }
         self.non_finite_samples.fetch_add(non_finite, Ordering::Relaxed);
     }
 
@@ -408,8 +412,8 @@ impl Film {
     }
 }
 
-fn lock(tile: &Mutex<Tile>) -> MutexGuard<'_, Tile> {
-    tile.lock().unwrap_or_else(PoisonError::into_inner)
+pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 pub(super) fn pixel_index_in_rect(rect: Rect, x: u32, y: u32) -> Option<usize> {

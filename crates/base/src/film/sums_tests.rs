@@ -40,7 +40,7 @@ fn film_after_passes(passes: &[u32]) -> Film {
     for &tile in film.tile_order() {
         let mut first = 0;
         for &count in passes {
-            film.add_samples(tile, &varied_samples(film.tile_rect(tile).expect("a tile"), first, count));
+            film.add_samples(tile, varied_samples(film.tile_rect(tile).expect("a tile"), first, count));
             first += count;
         }
     }
@@ -105,7 +105,7 @@ fn pixel_means_and_counts_are_correct() {
         let rect = Rect { x, y: 1, width: 1, height: 1 };
         film.add_samples(
             (x / 32) as usize,
-            &TileSamples {
+            TileSamples {
                 pixels: rect.into(),
                 samples: values.len() as u32,
                 radiance,
@@ -136,7 +136,7 @@ fn non_finite_samples_are_black_and_counted() {
     ];
     film.add_samples(
         0,
-        &TileSamples {
+        TileSamples {
             pixels: film.crop_rect().into(),
             samples: 4,
             radiance,
@@ -155,7 +155,7 @@ fn samples_outside_the_tile_are_ignored() {
     let wide = Rect { x: 30, y: 0, width: 9, height: 3 };
     film.add_samples(
         1,
-        &TileSamples {
+        TileSamples {
             pixels: wide.into(),
             samples: 1,
             radiance: vec![Vec3::ONE; 20],
@@ -165,7 +165,7 @@ fn samples_outside_the_tile_are_ignored() {
     );
     film.add_samples(
         0,
-        &TileSamples {
+        TileSamples {
             pixels: wide.into(),
             samples: 2,
             radiance: vec![Vec3::ONE; 3],
@@ -175,7 +175,7 @@ fn samples_outside_the_tile_are_ignored() {
     );
     film.add_samples(
         7,
-        &TileSamples {
+        TileSamples {
             pixels: wide.into(),
             samples: 1,
             radiance: vec![Vec3::ONE; 27],
@@ -185,7 +185,7 @@ fn samples_outside_the_tile_are_ignored() {
     );
     film.add_samples(
         0,
-        &TileSamples {
+        TileSamples {
             pixels: wide.into(),
             samples: 0,
             radiance: Vec::new(),
@@ -209,7 +209,7 @@ fn panics_while_holding_a_tile_are_harmless() {
     });
     assert!(film.tiles[0].is_poisoned());
     assert_eq!(image_bits(&film.radiance_image()), before);
-    film.add_samples(0, &varied_samples(film.tile_rect(0).expect("a tile"), 3, 1));
+    film.add_samples(0, varied_samples(film.tile_rect(0).expect("a tile"), 3, 1));
     assert_eq!(pixel_sample_count(&film, 0, 0), 4);
 }
 
@@ -228,7 +228,7 @@ fn snapshots_are_consistent_during_rendering() {
                             let radiance = vec![Vec3::splat(2.0); rect.area()];
                             film.add_samples(
                                 tile,
-                                &TileSamples {
+                                TileSamples {
                                     pixels: rect.into(),
                                     samples: 1,
                                     radiance,

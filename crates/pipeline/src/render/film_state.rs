@@ -432,7 +432,7 @@ mod tests {
         let radiance = (0..pixels.count() as u32 * count).map(|i| Vec3::splat((i % 7) as f32)).collect();
         state.film.add_samples(
             tile,
-            &TileSamples { pixels, samples: count, radiance, negative: None, layers: Default::default() },
+            TileSamples { pixels, samples: count, radiance, negative: None, layers: Default::default() },
         );
         let job = TileJob { tile, pixels, samples };
         state.record_job(&job, &TraceCost { rays: RayCounters::default(), seconds });

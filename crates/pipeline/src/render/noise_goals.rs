@@ -233,7 +233,7 @@ pub(crate) mod tests {
             let radiance = (0..COLUMNS * samples).map(sample).collect();
             film.add_samples(
                 0,
-                &TileSamples { pixels, samples, radiance, negative: None, layers: Default::default() },
+                TileSamples { pixels, samples, radiance, negative: None, layers: Default::default() },
             );
         }
         film
@@ -298,7 +298,7 @@ pub(crate) mod tests {
             let radiance = (0..64 * 16).map(|_| Vec3::splat(mean * 2.0 * next())).collect();
             film.add_samples(
                 tile as usize,
-                &TileSamples {
+                TileSamples {
                     pixels: rect.into(),
                     samples: 16,
                     radiance,
@@ -327,7 +327,7 @@ pub(crate) mod tests {
                 let radiance = (0..8 * samples).map(sample).collect();
                 film.add_samples(
                     0,
-                    &TileSamples { pixels, samples, radiance, negative: None, layers: Default::default() },
+                    TileSamples { pixels, samples, radiance, negative: None, layers: Default::default() },
                 );
                 done[0][half] += samples;
             }

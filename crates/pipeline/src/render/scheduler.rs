@@ -332,7 +332,7 @@ impl<'a> Scheduler<'a> {
         let film = Arc::clone(&self.state.film);
         let layers = Some(&*film).filter(|_| !self.rendering.plan.settings.layers.is_empty());
         let tracer = Tracer { photons, first, layers, ..self.rendering.tracer };
-        let keep = |job: &TileJob, samples: TileSamples| film.add_samples(job.tile, &samples);
+        let keep = |job: &TileJob, samples: TileSamples| film.add_samples(job.tile, samples);
         tracer.run_all_jobs_in_parallel(&jobs, keep, |result| {
             if let Some((job, (), cost)) = result {
                 self.units += self.state.record_job(job, &cost);

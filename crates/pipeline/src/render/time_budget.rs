@@ -137,7 +137,7 @@ mod tests {
         let radiance = (0..pixels.count() as u32 * samples).map(|_| Vec3::splat(sample())).collect();
         film.add_samples(
             cell / CELLS,
-            &TileSamples { pixels, samples, radiance, negative: None, layers: Default::default() },
+            TileSamples { pixels, samples, radiance, negative: None, layers: Default::default() },
         );
     }
 

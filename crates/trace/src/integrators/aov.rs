@@ -66,11 +66,8 @@ pub fn record_first_hits_on_plain_surfaces(
             continue;
         };
         let (point, normal) = packet.point_and_shading_normal(surfaces, lane);
-        add_first_hit_values_to_slot(
-            values,
-            first + lane as u32,
-            [albedo, normal, Vec3::splat(view_depth(tile, point))],
-        );
+        let depth = Vec3::splat(view_depth(tile, point));
+        values.add_first_hit(first + lane as u32, [albedo, normal, depth]);
     }
     left
 }
@@ -109,21 +106,8 @@ pub fn record_vertex(
     let albedo = if set.contains(SampleLayer::Albedo) { vertex_albedo(vertex, counters) } else { Vec3::ZERO };
     let normal =
         if set.contains(SampleLayer::Normal) { vertex.perturbed_front_normal(counters) } else { Vec3::ZERO };
-    add_first_hit_values_to_slot(
-        values,
-        slot,
-        [albedo, normal, Vec3::splat(view_depth(tile, vertex.surface.point))],
-    );
-}
-
-fn add_first_hit_values_to_slot(
-    values: &mut SampleLayerValues,
-    slot: u32,
-    [albedo, normal, depth]: [Vec3; 3],
-) {
-    values.add(SampleLayer::Albedo, slot, albedo);
-    values.add(SampleLayer::Normal, slot, normal);
-    values.add(SampleLayer::Depth, slot, depth);
+    let depth = Vec3::splat(view_depth(tile, vertex.surface.point));
+    values.add_first_hit(slot, [albedo, normal, depth]);
 }
 
 /// Returns the first opaque hit along a camera ray, starting at `hit`, and the path that reaches it. Returns

@@ -2,10 +2,11 @@
 
 use std::ops::Range;
 
-use arrayvec::ArrayVec;
-
+use crate::accel::InstructionSet;
 use crate::film::LayerSums;
 use crate::math::Vec3;
+use crate::math::lanes::Simd;
+use crate::world::SimdKernel;
 
 /// A quantity recorded along with the beauty image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -75,6 +76,11 @@ impl LayerSet {
         self.0 & Self::FIRST_HIT.0 != 0
     }
 
+    /// Whether the set contains all quantities at the first hit.
+    fn has_all_first_hit(self) -> bool {
+        self.0 & Self::FIRST_HIT.0 == Self::FIRST_HIT.0
+    }
+
     /// Whether the set contains a component of the light.
     pub fn has_light(self) -> bool {
         self.0 & !Self::FIRST_HIT.0 != 0
@@ -93,10 +99,12 @@ pub struct SampleLayerValues {
     set: LayerSet,
     /// First slot of the batch.
     first: u32,
-    /// Values of each layer.
-    lists: [Vec<Vec3>; SampleLayer::ALL.len()],
-    /// Layers with values other than zero.
-    used: LayerSet,
+    /// Number of values per sample.
+    size: usize,
+    /// Values of one sample after another, with three components per layer.
+    values: Vec<f32>,
+    /// Index of each layer's first component among the values of a sample, for layers in the set.
+    places: [Option<usize>; SampleLayer::ALL.len()],
     /// The tile's most recent results of [`SampleLayerValues::constant_albedo`], by material index modulo the
     /// array length.
     albedos: [Option<(usize, Option<Vec3>)>; 16],
@@ -123,16 +131,13 @@ impl SampleLayerValues {
 
     /// Begins a batch with zero values.
     pub fn begin_batch(&mut self, set: LayerSet, slots: &Range<u32>) {
-        (self.set, self.first) = (set, slots.start);
-        for layer in SampleLayer::ALL {
-            let list = &mut self.lists[layer as usize];
-            let count = if set.contains(layer) { slots.len() } else { 0 };
-            if self.used.contains(layer) {
-                list.fill(Vec3::ZERO);
-            }
-            list.resize(count, Vec3::ZERO);
+        (self.set, self.first, self.size) = (set, slots.start, 3 * set.len());
+        self.places = [None; SampleLayer::ALL.len()];
+        for (position, layer) in set.iter().enumerate() {
+            self.places[layer as usize] = Some(3 * position);
         }
-        self.used = LayerSet::NONE;
+        self.values.clear();
+        self.values.resize(slots.len() * self.size, 0.0);
     }
 
     /// The layers.
@@ -140,18 +145,45 @@ impl SampleLayerValues {
         self.set
     }
 
-    /// Values of a layer from a slot onward, or an empty slice if the set does not contain the layer.
-    #[inline]
-    pub fn values_from(&mut self, layer: SampleLayer, slot: u32) -> &mut [Vec3] {
-        self.used.0 |= 1 << layer as u8;
-        self.lists[layer as usize].get_mut((slot - self.first) as usize..).unwrap_or_default()
-    }
-
     /// Adds a value to a sample. Does nothing if the set does not contain the layer.
     #[inline]
     pub fn add(&mut self, layer: SampleLayer, slot: u32, value: Vec3) {
-        if let Some(sum) = self.values_from(layer, slot).first_mut() {
-            *sum += value;
+        let Some(place) = self.places[layer as usize] else { return };
+        let start = (slot - self.first) as usize * self.size + place;
+        if let Some([x, y, z]) = self.values.get_mut(start..).and_then(<[f32]>::first_chunk_mut) {
+            (*x, *y, *z) = (*x + value.x, *y + value.y, *z + value.z);
+        }
+    }
+
+    /// Adds the albedo, normal and depth at the first hit to a sample. Ignores layers that are not in the set.
+    #[inline]
+    pub fn add_first_hit(&mut self, slot: u32, values: [Vec3; 3]) {
+        // If the set contains all three, they come first.
+        let start = (slot - self.first) as usize * self.size;
+        match self.values.get_mut(start..).and_then(<[f32]>::first_chunk_mut::<9>) {
+            Some(sums) if self.set.has_all_first_hit() => {
+                for (sum, value) in sums.iter_mut().zip(values.map(|value| value.to_array()).as_flattened()) {
+                    *sum += value;
+                }
+            }
+            Some(_) | None => {
+                for (layer, value) in SampleLayer::ALL.into_iter().zip(values) {
+                    self.add(layer, slot, value);
+                }
+            }
+        }
+    }
+
+    /// Adds one value to each sample from a slot onward. Does nothing if the set does not contain the layer.
+    #[inline]
+    pub fn add_consecutive(&mut self, layer: SampleLayer, slot: u32, values: impl Iterator<Item = Vec3>) {
+        let Some(place) = self.places[layer as usize] else { return };
+        let start = (slot - self.first) as usize * self.size + place;
+        let samples = self.values.get_mut(start..).unwrap_or_default().chunks_mut(self.size);
+        for (sample, value) in samples.zip(values) {
+            if let Some([x, y, z]) = sample.first_chunk_mut() {
+                (*x, *y, *z) = (*x + value.x, *y + value.y, *z + value.z);
+            }
         }
     }
 
@@ -162,33 +194,45 @@ impl SampleLayerValues {
         &mut self,
         sums: &mut LayerSums,
         samples: usize,
-        radiance: &[Vec3],
-        is_negative: Option<&[bool]>,
+        (radiance, is_negative): (&[Vec3], Option<&[bool]>),
+        instructions: InstructionSet,
     ) {
-        let Some(count) = self.set.iter().next().map(|layer| self.lists[layer as usize].len()) else {
-            return;
-        };
-        let (begin, end) = (self.first as usize, self.first as usize + count);
-        let radiance = &radiance[begin..end];
+        if !self.set.is_empty() {
+            instructions.run(LayerSumKernel { values: self, sums, samples, radiance, is_negative });
+        }
+    }
+}
+
+/// Kernel of [`SampleLayerValues::add_to_sums`].
+struct LayerSumKernel<'a> {
+    values: &'a mut SampleLayerValues,
+    sums: &'a mut LayerSums,
+    samples: usize,
+    radiance: &'a [Vec3],
+    is_negative: Option<&'a [bool]>,
+}
+
+impl SimdKernel for LayerSumKernel<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self, _: impl Simd) {
+        let Self { values: SampleLayerValues { first, size, values, .. }, sums, samples, .. } = self;
+        let begin = *first as usize;
+        let end = begin + values.len() / *size;
+        let radiance = &self.radiance[begin..end];
         // Test all samples together first, because this is faster.
         if !radiance.iter().fold(true, |all, value| all & value.is_finite()) {
-            for (slot, _) in radiance.iter().enumerate().filter(|(_, value)| !value.is_finite()) {
-                self.lists
-                    .iter_mut()
-                    .filter_map(|list| list.get_mut(slot))
-                    .for_each(|value| *value = Vec3::ZERO);
+            for (sample, radiance) in values.chunks_mut(*size).zip(radiance) {
+                if !radiance.is_finite() {
+                    sample.fill(0.0);
+                }
             }
         }
-        let used: ArrayVec<(usize, &[Vec3]), 7> = (self.set.iter().enumerate())
-            .filter(|(_, layer)| self.used.contains(*layer))
-            .map(|(position, layer)| (position, self.lists[layer as usize].as_slice()))
-            .collect();
         for pixel in begin / samples..end.div_ceil(samples) {
             let slots = begin.max(pixel * samples)..end.min((pixel + 1) * samples);
-            let here = slots.start - begin..slots.end - begin;
-            let values: ArrayVec<_, 7> =
-                used.iter().map(|(position, values)| (*position, &values[here.clone()])).collect();
-            sums.add_pixel_samples(pixel, &values, is_negative.map(|signs| &signs[slots]));
+            let here = (slots.start - begin) * *size..(slots.end - begin) * *size;
+            sums.add_pixel_samples(pixel, &values[here], self.is_negative.map(|signs| &signs[slots]));
         }
     }
 }
@@ -203,6 +247,7 @@ mod tests {
         assert_eq!(set.iter().collect::<Vec<_>>(), [SampleLayer::Depth, SampleLayer::Emission]);
         assert!(set.contains(SampleLayer::Emission) && !set.contains(SampleLayer::Albedo));
         assert!(set.has_first_hit() && set.has_light() && set.len() == 2);
+        assert_eq!(LayerSet::FIRST_HIT.iter().collect::<Vec<_>>(), SampleLayer::ALL[..3]);
         assert!(!LayerSet::NONE.has_first_hit() && !LayerSet::NONE.has_light() && LayerSet::NONE.is_empty());
     }
 
@@ -216,13 +261,11 @@ mod tests {
                 SampleLayer::ALL.iter().for_each(|layer| values.add(*layer, slot, Vec3::ONE));
             }
             let radiance = [Vec3::ONE, Vec3::new(0.0, f32::NAN, 0.0), Vec3::ONE, Vec3::ONE];
-            values.add_to_sums(&mut sums, 3, &radiance, None);
+            values.add_to_sums(&mut sums, 3, (&radiance, None), InstructionSet::Portable);
         }
         let mut expected = LayerSums::zero(set.len(), 2);
-        for layer in 0..2 {
-            expected.add_pixel_samples(0, &[(layer, &[Vec3::ONE; 2])], None);
-            expected.add_pixel_samples(1, &[(layer, &[Vec3::ONE])], None);
-        }
+        expected.add_pixel_samples(0, &[1.0; 12], None);
+        expected.add_pixel_samples(1, &[1.0; 6], None);
         assert_eq!(sums, expected);
     }
 }

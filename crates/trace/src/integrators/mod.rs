@@ -151,7 +151,8 @@ pub fn render_tile_with_layers(
                     bounds::draw_box_edges(&tile, &mut memory.scratch, &mut radiance)?;
                 }
                 let is_negative = weight.map(|_| is_negative.as_slice());
-                values.add_to_sums(&mut layers, block.samples.len(), &radiance, is_negative);
+                let instructions = world.geometry.instruction_set();
+                values.add_to_sums(&mut layers, block.samples.len(), (&radiance, is_negative), instructions);
             }
         }
     }

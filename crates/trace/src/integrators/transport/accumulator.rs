@@ -175,16 +175,10 @@ impl Accumulator<'_> {
             *sum += *contribution;
         }
         let Some(layers) = self.layers.as_mut().filter(|_| !diffuse.is_empty()) else { return };
-        for (sum, diffuse) in layers.values.values_from(SampleLayer::Diffuse, first).iter_mut().zip(diffuse) {
-            *sum += *diffuse;
-        }
+        layers.values.add_consecutive(SampleLayer::Diffuse, first, diffuse.iter().copied());
         if contributions != diffuse {
             let specular = contributions.iter().zip(diffuse).map(|(light, diffuse)| light - diffuse);
-            for (sum, specular) in
-                layers.values.values_from(SampleLayer::Specular, first).iter_mut().zip(specular)
-            {
-                *sum += specular;
-            }
+            layers.values.add_consecutive(SampleLayer::Specular, first, specular);
         }
     }
 
