@@ -28,7 +28,9 @@ pub fn import_scene(path: &Path, folder: &str, token: &CancelToken) -> Result<Im
         let importable = FORMATS.iter().filter(|format| format.convert.is_some());
         let list: Vec<_> =
             importable.flat_map(|format| format.extensions).map(|one| format!(".{one}")).collect();
-        let (path, list) = (path.display(), list.join(" and "));
+        let list = list.join(", ");
+        let list = list.rsplit_once(", ").map_or(list.clone(), |(first, last)| format!("{first} and {last}"));
+        let path = path.display();
         return Err(ImportError::File(format!("cannot import {path}: only {list} files are supported")));
     };
     let pool = logical_cpu_pool().map_err(ImportError::Work)?;
