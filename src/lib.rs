@@ -24,7 +24,7 @@
 //! | [`integrators`] | whitted, path, photons, AOVs |
 //! | [`compare`] | error metrics for an image compared with a reference |
 //! | [`output`] | encoders, atomic writes, metadata |
-//! | [`pipeline`] | stages, caches, the worker, file watching, scenes generated for models |
+//! | [`pipeline`] | stages, caches, the worker, file watching, importers of foreign formats |
 //! | [`tui`] | the terminal front end |
 //! | [`cli`] | arguments, subcommands, the headless front end; `bench`, which plots error against time |
 //!
@@ -99,8 +99,8 @@
 //! 9. `transport/scatter.rs` samples the next direction of each continuing path.
 //! 10. `transport/accumulator.rs` sums the view's values per sample. `film/sums.rs` adds samples to pixels.
 //!
-//! CONTRIBUTING explains how to add a key, a shape, a light, a material or an integrator. `tests/README.md`
-//! explains where to put tests and how to run them.
+//! CONTRIBUTING explains how to add a key, a shape, a light, a material, an integrator or a foreign format.
+//! `tests/README.md` explains where to put tests and how to run them.
 //!
 //! ## Dependencies
 //!

@@ -288,7 +288,7 @@ and something is approximated.";
 #[derive(Clone, Debug, clap::Args)]
 pub struct ImportArgs {
     /// The file to read: gltf, glb
-    #[arg(add = candidates::gltf_completer())]
+    #[arg(add = candidates::import_completer())]
     pub file: PathBuf,
     /// The scene to write [default: FILE with .toml, in the current folder]
     #[arg(short, long, value_name = "SCENE")]
@@ -371,7 +371,7 @@ pub struct CompareArgs {
 #[derive(Clone, Debug, clap::Args)]
 pub struct RenderArgs {
     /// A scene (TOML) or a model: obj, off, ply, stl, glb, gltf
-    #[arg(required = true, add = candidates::scene_or_model_completer(), value_name = "SCENE")]
+    #[arg(required = true, add = candidates::scene_or_foreign_completer(), value_name = "SCENE")]
     pub scene: Option<PathBuf>,
     /// Render once, write the image and exit
     #[arg(long)]

@@ -11,8 +11,8 @@ use super::stages::parse::ParsedScene;
 use super::watch::content::FilePathAndContentId;
 use crate::assets::gltf::is_gltf;
 use crate::output::{FallbackFileIdentity, FileIdentity};
+use crate::scene::LoadedScene;
 use crate::scene::description::Camera;
-use crate::scene::{LoadedScene, is_model};
 
 /// A file that must not be written.
 #[derive(Clone, Debug)]
@@ -34,7 +34,7 @@ impl ProtectedInputs {
         let loaded = &parsed.loaded;
         let scene = &loaded.scene;
         let path = loaded.path.clone();
-        let role = if is_model(&path) { "the model" } else { "the scene file" };
+        let role = if loaded.is_model() { "the model" } else { "the scene file" };
         let mut inputs = Self(vec![ProtectedInput { path, role: role.to_owned(), place: None }]);
         let mut add = |path: &Path, span: &Range<usize>, role: String| {
             let place = Some((Arc::clone(loaded), span.clone()));

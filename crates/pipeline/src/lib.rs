@@ -12,12 +12,12 @@ mod build;
 mod cache;
 mod check;
 mod engine;
+mod formats;
 mod identity;
 mod inputs;
 mod keys;
 mod memory;
 pub mod messages;
-mod model;
 mod plan;
 mod protected;
 pub mod protocol;
@@ -50,7 +50,10 @@ use glimt_trace::{integrators, world};
 
 pub use build::BUILD;
 pub use check::{IncrementalSceneChecker, SceneSummary, check_scene, estimate_memory};
-pub use model::import::{ImportError, ImportedScene, import_gltf};
+pub use formats::{
+    ImportError, ImportedScene, has_foreign_extension, has_importable_extension, has_model_extension,
+    import_scene,
+};
 pub use stages::parse::files_referenced_by_assets;
 pub use watch::content::{FileContentId, FilePathAndContentId};
 pub use worker::{CommandSender, Handle, start};

@@ -341,8 +341,7 @@ fn check_shardable(settings: &RenderSettings, overrides: &Overrides) -> Result<(
 fn check_format_supports_image(path: &Path, size: (u32, u32), bit_depth: u8) -> Result<(), Box<Diagnostic>> {
     let check = || Format::from_path(path)?.check_image(size.0, size.1, BitDepth::try_from(bit_depth)?);
     check().map_err(|error: OutputError| {
-        let (severity, message) = (Severity::Error, error.to_string());
-        Box::new(Diagnostic { severity, message, path: path.to_owned(), place: None, help: None })
+        Box::new(Diagnostic::about_file(path, Severity::Error, error.to_string()))
     })
 }
 

@@ -20,7 +20,7 @@ use crate::messages::{
     ALREADY_EXISTS, CAMERA_CHANGED, MODEL_MISSING, NOT_UNDONE, SCENE_FILE_CHANGED, SCENE_FILE_MISSING,
 };
 use crate::output::{AttributeLossPolicy, OutputError, write};
-use crate::scene::{LoadedScene, has_mesh_extension, is_model, read_current_text};
+use crate::scene::{LoadedScene, read_current_text};
 use crate::system::{describe_error, file};
 use crate::world::World;
 
@@ -130,11 +130,11 @@ impl QueryContext {
     ) -> Result<CameraSaveResult, String> {
         let loaded = &self.parsed.loaded;
         let path = loaded.path.clone();
-        if is_model(&path) {
-            return save_model_scene_with_camera(loaded, camera);
-        }
-        if has_mesh_extension(&path) && path.symlink_metadata().is_err() {
-            return Err(format!("{} {MODEL_MISSING}", path.display()));
+        if loaded.is_model() {
+            return match is_file_missing(&path) {
+                true => Err(format!("{} {MODEL_MISSING}", path.display())),
+                false => save_model_scene_with_camera(loaded, camera),
+            };
         }
         let read = loaded.source.file_text();
         let changed = SCENE_FILE_CHANGED;

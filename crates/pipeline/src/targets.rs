@@ -4,6 +4,7 @@ use std::collections::HashMap;
 use std::collections::hash_map::Entry;
 use std::path::{Path, PathBuf};
 
+use super::formats::has_model_extension;
 use super::inputs::{InputIndex, ProtectedInput, ProtectedInputs};
 use super::plan::{OutputNameSource, RenderPlan};
 use super::protected::{OverwriteProtection, recorded_scene_if_different};
@@ -16,7 +17,6 @@ use crate::output::{
     AttributeLossPolicy, FileIdentity, OutputError, ReplaceCheck, check_image_replaceable, json_replace_check,
 };
 use crate::scene::diagnostic::{Diagnostic, Severity};
-use crate::scene::has_mesh_extension;
 
 /// A file to be written.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -250,7 +250,7 @@ fn conflict_help(plan: &RenderPlan, kind: TargetKind) -> &'static str {
         TargetKind::Picture(OutputNameSource::Default) if plan.turn.is_some() => {
             "choose other names with -o 'NAME_####.png'"
         }
-        TargetKind::Picture(OutputNameSource::Default) if has_mesh_extension(Path::new(&plan.name)) => {
+        TargetKind::Picture(OutputNameSource::Default) if has_model_extension(Path::new(&plan.name)) => {
             "name a file with -o FILE"
         }
         TargetKind::Picture(OutputNameSource::CommandLine) => "name another file with -o FILE",

@@ -7,9 +7,9 @@ use super::settings::{Overrides, ViewMode};
 use crate::choice::Choice;
 use crate::integrators::RenderSettings;
 use crate::messages::{CLAMP_EFFECT, CLAMP_EFFECT_ON_MODELS};
+use crate::scene::LoadedScene;
 use crate::scene::description::{MaterialKind, Scene};
 use crate::scene::diagnostic::{Diagnostic, Severity};
-use crate::scene::{LoadedScene, is_model};
 
 /// The setting that caused a warning.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -44,14 +44,14 @@ fn warning_at_setting(
         let help = Some(format!("caused by `{option}`, not by the scene"));
         return Diagnostic { severity, message, path: PathBuf::new(), place: None, help };
     }
-    if cause == WarnedSetting::Clamp && is_model(&loaded.path) {
+    if cause == WarnedSetting::Clamp && loaded.is_model() {
         let message = message.replace(CLAMP_EFFECT, CLAMP_EFFECT_ON_MODELS);
         let help = Some("`--clamp 0` turns it off".to_owned());
         return Diagnostic { severity, message, path: loaded.path.clone(), place: None, help };
     }
     match cause.scene_table_and_key().and_then(|(table, key)| loaded.setting_span(table, key)) {
         Some(span) => loaded.diagnostic_at(span, severity, message, None),
-        None => Diagnostic { severity, message, path: loaded.path.clone(), place: None, help: None },
+        None => Diagnostic::about_file(&loaded.path, severity, message),
     }
 }
 

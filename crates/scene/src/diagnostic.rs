@@ -29,6 +29,11 @@ pub struct Diagnostic {
 }
 
 impl Diagnostic {
+    /// Creates a diagnostic about an entire file.
+    pub fn about_file(path: &Path, severity: Severity, message: String) -> Self {
+        Self { severity, message, path: path.to_owned(), place: None, help: None }
+    }
+
     /// Creates an error in the file at `path`.
     pub(crate) fn error_in_file(
         path: &Path,

@@ -36,8 +36,8 @@ use diagnostic::{Diagnostic, Severity};
 pub use document::MORE_LIKE_THESE;
 pub use facing::MeshBoundingBox;
 pub use key_path::{key_parts, shortened_key, split_at_unquoted_space};
-pub use other_content::detect_image_or_part;
-pub use read::find_renamed_scene;
+pub use other_content::{detect_image_or_part, has_scene_extension};
+pub use read::{find_renamed_scene, lacks_camera_header};
 pub use source::{SceneText, quote_toml_string};
 
 /// Maximum size of a scene file in bytes.
@@ -98,6 +98,11 @@ pub fn read_current_text(path: &Path) -> Result<Arc<str>, Box<Diagnostic>> {
 }
 
 impl LoadedScene {
+    /// Whether the scene was generated for the model at [`Self::path`].
+    pub fn is_model(&self) -> bool {
+        self.source.is_generated()
+    }
+
     /// Returns the file's text after writing `camera` to `[camera]`. Replaces numbers in place and adds
     /// missing keys. Comments and formatting stay unchanged.
     ///
@@ -210,12 +215,9 @@ fn load_from_scene_text(
     }
 }
 
-/// Returns the files that a scene file references, even if the scene has errors. The list is empty for models
-/// and unreadable files.
+/// Returns the files that a scene file references, even if the scene has errors. The list is empty for
+/// unreadable files and files that are not scene files.
 pub fn referenced_files(path: &Path) -> Vec<PathBuf> {
-    if is_model(path) {
-        return Vec::new();
-    }
     read::read_scene_text(path).map_or(Vec::new(), |text| document::referenced_files(&text, path))
 }
 
@@ -230,16 +232,6 @@ pub fn parse(text: Arc<str>, path: &Path) -> ParseOutcome {
         };
     }
     document::parse_and_lower(&SceneText::from_file_text(text), path)
-}
-
-/// Whether a file is a model, that is, has a mesh extension and does not contain a scene.
-pub fn is_model(path: &Path) -> bool {
-    read::is_model(path)
-}
-
-/// Whether a file has a mesh extension.
-pub fn has_mesh_extension(path: &Path) -> bool {
-    document::has_mesh_extension(path)
 }
 
 /// Returns the commented scene written by `glimt new`.

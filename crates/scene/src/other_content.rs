@@ -11,8 +11,8 @@ use crate::system::file::{self, PART_MAGIC};
 /// Hint for errors about files that are not scenes.
 pub(super) const NEW_SCENE_HELP: &str = "`glimt new FILE` writes a scene to start from";
 
-/// Whether a file has a scene's extension.
-pub(super) fn has_scene_extension(found: &Path) -> bool {
+/// Whether a path has a scene file's extension.
+pub fn has_scene_extension(found: &Path) -> bool {
     found.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("toml"))
 }
 

@@ -26,7 +26,7 @@ const LFS_HELP: &str = "run `git lfs pull`";
 
 /// Reads the text of a scene file.
 pub(super) fn read_scene_text(path: &Path) -> Result<Arc<str>, Box<Diagnostic>> {
-    if is_model(path) {
+    if has_mesh_extension(path) && lacks_camera_header(path) {
         return Err(mesh_instead_of_scene_error(path));
     }
     if is_unsupported_model(path) {
@@ -80,11 +80,6 @@ fn format_mesh_file_key(name: &str) -> String {
     format!("`file = \"{name}\"`")
 }
 
-/// Whether a readable file has a mesh extension and does not contain a scene.
-pub(super) fn is_model(path: &Path) -> bool {
-    has_mesh_extension(path) && is_file_without_camera_header(path)
-}
-
 /// Extensions of unsupported model formats.
 const UNSUPPORTED_MODELS: [&str; 22] = [
     "3dm", "3ds", "3mf", "abc", "blend", "c4d", "dae", "fbx", "iges", "igs", "lwo", "ma", "max", "mb",
@@ -94,11 +89,11 @@ const UNSUPPORTED_MODELS: [&str; 22] = [
 /// Whether a readable file has an unsupported model format's extension and does not contain a scene.
 fn is_unsupported_model(path: &Path) -> bool {
     let ending = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
-    UNSUPPORTED_MODELS.contains(&ending.as_str()) && is_file_without_camera_header(path)
+    UNSUPPORTED_MODELS.contains(&ending.as_str()) && lacks_camera_header(path)
 }
 
-/// Whether a readable file has no `[camera]` header near its start.
-fn is_file_without_camera_header(path: &Path) -> bool {
+/// Whether a file is readable and has no `[camera]` header near its start, and therefore is not a scene file.
+pub fn lacks_camera_header(path: &Path) -> bool {
     const START: u64 = 1 << 16;
     let start = || {
         let (file, _) = file::open_regular_file(path).ok()?.ok()?;

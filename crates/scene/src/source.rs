@@ -87,6 +87,11 @@ impl SceneText {
         span.start >= self.file
     }
 
+    /// Whether the text was generated for a model and therefore is not in a file.
+    pub(super) fn is_generated(&self) -> bool {
+        self.is_generated
+    }
+
     /// Marks the text as generated for a model.
     pub(super) fn mark_generated(self) -> Self {
         Self { is_generated: true, ..self }

@@ -1,15 +1,16 @@
 //! Completion candidates for arguments: files by extension, and keys for `--set`.
 
 use std::ffi::{OsStr, OsString};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::OnceLock;
 
 use clap_complete::engine::{ArgValueCompleter, CompletionCandidate, PathCompleter};
 
+use crate::pipeline::{has_foreign_extension, has_importable_extension};
 use crate::scene::keys::key::{KeyInfo, TableSyntax, ValueKind};
 use crate::scene::keys::{all_paths_with_descriptions, all_tables, color_names};
 use crate::scene::outline::{OutlineTable, document_outline};
-use crate::scene::{has_mesh_extension, read_current_text};
+use crate::scene::{has_scene_extension, read_current_text};
 
 /// The command line being completed, split into words, if the shell script does not pass it as arguments.
 static WORDS: OnceLock<Vec<OsString>> = OnceLock::new();
@@ -29,21 +30,16 @@ pub(crate) fn scene_completer() -> ArgValueCompleter {
     ArgValueCompleter::new(PathCompleter::file().filter(has_scene_extension))
 }
 
-/// Completes scenes and models.
-pub(crate) fn scene_or_model_completer() -> ArgValueCompleter {
+/// Completes scenes and foreign files.
+pub(crate) fn scene_or_foreign_completer() -> ArgValueCompleter {
     ArgValueCompleter::new(
-        PathCompleter::file().filter(|path| has_scene_extension(path) || has_mesh_extension(path)),
+        PathCompleter::file().filter(|path| has_scene_extension(path) || has_foreign_extension(path)),
     )
 }
 
-/// Completes glTF files.
-pub(crate) fn gltf_completer() -> ArgValueCompleter {
-    let has = |path: &Path, ending: &str| path.extension().is_some_and(|is| is.eq_ignore_ascii_case(ending));
-    ArgValueCompleter::new(PathCompleter::file().filter(move |path| has(path, "glb") || has(path, "gltf")))
-}
-
-fn has_scene_extension(path: &Path) -> bool {
-    path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("toml"))
+/// Completes files that `import` accepts.
+pub(crate) fn import_completer() -> ArgValueCompleter {
+    ArgValueCompleter::new(PathCompleter::file().filter(has_importable_extension))
 }
 
 /// Completes `TABLE.KEY=VALUE` with keys from the scene on the command line. Without a scene, completes keys

@@ -1,4 +1,4 @@
-//! `glimt import`: converts a glTF file to a scene.
+//! `glimt import`: converts a foreign file to a scene.
 
 use std::path::{Path, PathBuf};
 
@@ -9,8 +9,9 @@ use crate::control::CancelToken;
 use crate::exit::Exit;
 use crate::output::OutputError;
 use crate::output::staged::create_files_atomically;
-use crate::pipeline::{ImportError, ImportedScene, import_gltf};
-use crate::scene::diagnostic::{Diagnostic, Severity};
+use crate::pipeline::{ImportError, ImportedScene, import_scene};
+use crate::scene::diagnostic::Diagnostic;
+use crate::scene::has_scene_extension;
 use crate::signals;
 
 pub(crate) fn run(args: &ImportArgs, console: &Console) -> Exit {
@@ -48,15 +49,15 @@ fn convert_and_write(args: &ImportArgs, console: &Console, token: &CancelToken) 
             &format!("{} already exists; choose another scene with -o", there.display()),
         );
     }
-    let imported = match import_gltf(&args.file, &folder, token) {
+    let imported = match import_scene(&args.file, &folder, token) {
         Ok(imported) => imported,
         Err(_) if token.is_cancelled() => return Exit::FAILED,
         Err(ImportError::File(message)) => return console.print_error(Exit::WRONG, &message),
         Err(ImportError::Work(message)) => return console.print_error(Exit::FAILED, &message),
     };
-    report_approximations(&args.file, &imported.notes, console);
-    if args.strict && !imported.notes.is_empty() {
-        let what = format_count(imported.notes.len() as u64, "approximation");
+    report_approximations(&imported.substitutions, console);
+    if args.strict && !imported.substitutions.is_empty() {
+        let what = format_count(imported.substitutions.len() as u64, "approximation");
         return console.print_error(Exit::WRONG, &format!("{what} with --strict: nothing was written"));
     }
     match write_all(&scene, &imported, token) {
@@ -74,24 +75,12 @@ fn convert_and_write(args: &ImportArgs, console: &Console, token: &CancelToken) 
     }
 }
 
-/// Whether a path has a scene's extension.
-fn has_scene_extension(scene: &Path) -> bool {
-    scene.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("toml"))
-}
-
 /// Prints all approximations and their number.
-fn report_approximations(file: &Path, notes: &[String], console: &Console) {
-    let warning = |note: &String| Diagnostic {
-        severity: Severity::Warning,
-        message: note.clone(),
-        path: file.to_owned(),
-        place: None,
-        help: None,
-    };
-    console.print_diagnostics(&notes.iter().map(warning).collect::<Vec<_>>());
-    if !notes.is_empty() {
-        console
-            .print_line_to_stderr(&format!("{} in total", format_count(notes.len() as u64, "approximation")));
+fn report_approximations(substitutions: &[Diagnostic], console: &Console) {
+    console.print_diagnostics(substitutions);
+    if !substitutions.is_empty() {
+        let count = format_count(substitutions.len() as u64, "approximation");
+        console.print_line_to_stderr(&format!("{count} in total"));
     }
 }
 

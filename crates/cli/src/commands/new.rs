@@ -9,8 +9,9 @@ use crate::commands::schema;
 use crate::console::Console;
 use crate::exit::Exit;
 use crate::output::{self, Format, OutputError, write};
+use crate::pipeline::has_model_extension;
 use crate::scene::sanitize::escape_invisible_chars;
-use crate::scene::{has_mesh_extension, starter_scene};
+use crate::scene::starter_scene;
 
 pub(crate) fn run(file: &Path, with_schema: bool, console: &Console) -> Exit {
     let text =
@@ -88,7 +89,7 @@ fn write_schema(path: &Path) -> Result<bool, (Exit, String)> {
 
 /// Returns the error message for a scene file with an image or mesh extension.
 fn message_if_image_or_mesh_extension(file: &Path) -> Option<String> {
-    let what = if has_mesh_extension(file) {
+    let what = if has_model_extension(file) {
         "a mesh"
     } else if has_image_extension(file) {
         "an image"

@@ -70,7 +70,8 @@ impl AssetError {
         }
     }
 
-    pub(crate) fn malformed(path: &Path, line: Option<usize>, reason: impl Into<String>) -> Self {
+    /// Creates the error for a file with invalid content.
+    pub fn malformed(path: &Path, line: Option<usize>, reason: impl Into<String>) -> Self {
         Self::Malformed { path: path.to_owned(), line, reason: reason.into() }
     }
 }

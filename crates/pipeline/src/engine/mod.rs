@@ -26,10 +26,10 @@ use self::own::{SavedSceneImage, saved_scene_plan, texture_needs_with_saved_scen
 use self::unfinished::LastValidScene;
 use super::assembly::{KeyedWorld, RequestCamera, build_or_reuse_world};
 use super::cache::{CacheOfNamedValues, Memo};
+use super::formats::model::ModelViewOptions;
 use super::inputs::ProtectedInputs;
 use super::keys;
 use super::memory::MemoryEstimate;
-use super::model::ModelViewOptions;
 use super::plan::{OutputNameSource, RenderPlan, resolve_plan, thread_count};
 use super::protocol::{Event, Failure, MaxPreviewSize, Report, Request, Stage, Status};
 use super::queries::{QueryContext, QueryOrEdit};

@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::super::cache::Memo;
-use super::super::model::{self, GeneratedScene, ModelViewOptions};
+use super::super::formats::model::ModelViewOptions;
+use super::super::formats::{ForeignFormat, ForeignScene, ImportContext, ImportFailure};
 use super::super::protocol::{Failure, reasons};
 use super::super::watch::content::{FileContentId, FilePathAndContentId, FilesSeenByRequest};
 use super::containers::GltfContainers;
@@ -20,7 +21,6 @@ use crate::scene;
 use crate::scene::description::Camera;
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::fingerprint::{Fingerprint, FingerprintHasher};
-use crate::scene::is_model;
 use crate::scene::sanitize::escape_invisible_chars;
 
 /// A valid scene and the files it references.
@@ -30,9 +30,9 @@ pub(crate) struct ParsedScene {
     pub(crate) orbiter: Option<GkitOrbiterCamera>,
     /// Files that the scene references without the overrides, and the files that those files reference.
     pub(crate) named: Vec<PathBuf>,
-    /// Files that a generated model scene depends on, except the model itself.
+    /// Other files that the scene in a foreign file depends on.
     companions: Vec<FilePathAndContentId>,
-    /// Approximations made when the scene for a model was generated.
+    /// Notes and substitutions from the importer of a foreign file.
     notes: Vec<Diagnostic>,
     orbiter_content: Option<FileContentId>,
 }
@@ -48,20 +48,23 @@ pub(crate) struct SceneParseRequest<'a> {
     pub(crate) show: ModelViewOptions,
 }
 
-/// Generates a scene for a model. Also returns all other files that the generated scene depends on.
-fn generate_model_scene(
-    SceneParseRequest { path, sets, show }: SceneParseRequest<'_>,
-    (contents, containers): (&FilesSeenByRequest, &GltfContainers),
+/// Converts an importer's error. Watches missing files to detect when they are created.
+fn abort_reason(
+    failure: ImportFailure,
+    contents: &FilesSeenByRequest,
     findings: &mut Findings,
     token: &CancelToken,
-) -> Result<(scene::LoadedScene, GeneratedScene), AbortReason> {
-    let made = model::scene_text(path, show, containers, token).map_err(|error| match error {
+) -> AbortReason {
+    let error = match failure {
+        ImportFailure::Scene(errors) => return AbortReason::Failed(Failure::Scene(errors)),
+        ImportFailure::File(error) => error,
+    };
+    match error {
         AssetError::Cancelled(_) => AbortReason::Cancelled,
         AssetError::OutOfMemory { .. } | AssetError::TooManyOpenFiles { .. } => {
             AbortReason::work_failure(error)
         }
         AssetError::Unreadable { path, reason } => {
-            // Watch a missing file to detect when it is created.
             if let Ok(content) = contents.first_seen_content_id(&path, token) {
                 findings.add_file(FilePathAndContentId { path: path.clone(), content });
             }
@@ -71,23 +74,11 @@ fn generate_model_scene(
             let line = line.map_or(String::new(), |line| format!("line {line}: "));
             scene_failure_from_message(&path, format!("{line}{reason}"))
         }
-    })?;
-    let loaded = scene::load_generated(made.text.as_str().into(), path, sets);
-    let loaded = loaded.map_err(|errors| {
-        let shown =
-            |one: Diagnostic| if one.path == path { model::mark_diagnostic_as_generated(one) } else { one };
-        AbortReason::Failed(Failure::Scene(errors.into_iter().map(shown).collect()))
-    })?;
-    Ok((loaded, made))
+    }
 }
 
 fn scene_failure_from_message(path: &Path, message: String) -> AbortReason {
-    AbortReason::Failed(Failure::Scene(vec![file_diagnostic(path, Severity::Error, message)]))
-}
-
-/// Creates a diagnostic about an entire file.
-fn file_diagnostic(path: &Path, severity: Severity, message: String) -> Diagnostic {
-    Diagnostic { severity, message, path: path.to_owned(), place: None, help: None }
+    AbortReason::Failed(Failure::Scene(vec![Diagnostic::about_file(path, Severity::Error, message)]))
 }
 
 /// Reads and validates the scene, including the command-line overrides.
@@ -107,25 +98,25 @@ pub(crate) fn parse(
             Some("compare both files, save the one you need as the scene, and remove the other".to_owned());
         findings.warnings.push(Diagnostic {
             help,
-            ..file_diagnostic(path, Severity::Warning, held::backup_differs_warning(&held))
+            ..Diagnostic::about_file(path, Severity::Warning, held::backup_differs_warning(&held))
         });
     }
     let content = contents.first_seen_content_id(path, token)?;
-    let is_model = is_model(path);
-    if !is_model && (show.from.is_some() || show.up.is_some()) {
+    let format = ForeignFormat::of_file(path);
+    if !format.is_some_and(|format| format.is_model) && (show.from.is_some() || show.up.is_some()) {
         findings.add_file(FilePathAndContentId { path: path.to_owned(), content });
         let message = match show.from {
             Some(_) => "`--from` applies to models; a scene has its own camera",
             None => "`--up` applies to models; scenes are always y-up",
         };
-        return Err(AbortReason::Failed(Failure::Scene(vec![file_diagnostic(
+        return Err(AbortReason::Failed(Failure::Scene(vec![Diagnostic::about_file(
             Path::new(""),
             Severity::Error,
             message.to_owned(),
         )])));
     }
-    let key = |content| scene_key(origin, content, is_model);
-    // A model's scene depends on several files, all of which must be unchanged.
+    let key = |content| scene_key(origin, content, format);
+    // A foreign scene may depend on several files, all of which must be unchanged.
     let is_same = |parsed: &&Arc<ParsedScene>| {
         let now = |file: &FilePathAndContentId| {
             contents.first_seen_content_id(&file.path, token).is_ok_and(|content| content == file.content)
@@ -139,7 +130,7 @@ pub(crate) fn parse(
             // Record the current content in case parsing fails. After a successful parse, replace it with the
             // parsed content.
             findings.add_file(FilePathAndContentId { path: path.to_owned(), content });
-            read_scene(origin, (contents, containers), memo.latest(), findings, token)?
+            read_scene(origin, format, (contents, containers), memo.latest(), findings, token)?
         }
     };
     findings.replace_read_file(FilePathAndContentId { path: path.to_owned(), content });
@@ -165,41 +156,42 @@ type SceneAndDependencies =
     (Arc<scene::LoadedScene>, FileContentId, Vec<FilePathAndContentId>, Vec<Diagnostic>);
 
 fn read_scene(
-    origin: SceneParseRequest<'_>,
+    SceneParseRequest { path, sets, show }: SceneParseRequest<'_>,
+    format: Option<&ForeignFormat>,
     (contents, containers): (&FilesSeenByRequest, &GltfContainers),
     last: Option<&Arc<ParsedScene>>,
     findings: &mut Findings,
     token: &CancelToken,
 ) -> Result<SceneAndDependencies, AbortReason> {
-    let SceneParseRequest { path, sets, .. } = origin;
-    if !is_model(path) {
+    let Some(format) = format else {
         let loaded = scene::load(path, sets).map_err(|errors| {
             AbortReason::Failed(Failure::Scene(add_renamed_file_hint(errors, path, last)))
         })?;
         let content =
             contents.record_decoded(path, *blake3::hash(loaded.source.file_text().as_bytes()).as_bytes());
         return Ok((Arc::new(loaded), content, Vec::new(), Vec::new()));
-    }
-    let (loaded, made) = generate_model_scene(origin, (contents, containers), findings, token)?;
-    let content = contents.record_decoded(path, made.hash);
-    let companions = made.companions.iter().map(|companion| contents.record_companion(companion, token));
+    };
+    let context = ImportContext { sets, view: show, containers, token };
+    let ForeignScene { loaded, hash, companions, notes, substitutions } =
+        (format.read)(path, &context).map_err(|failure| abort_reason(failure, contents, findings, token))?;
+    let content = contents.record_decoded(path, hash);
+    let companions = companions.iter().map(|companion| contents.record_companion(companion, token));
     let companions = companions.collect::<Result<_, Cancelled>>()?;
-    let notes = made.notes.into_iter().map(|note| file_diagnostic(path, Severity::Warning, note)).collect();
-    Ok((Arc::new(loaded), content, companions, notes))
+    Ok((Arc::new(loaded), content, companions, [substitutions, notes].concat()))
 }
 
 /// Returns the key for a scene whose file has the given content.
 fn scene_key(
     SceneParseRequest { path, sets, show }: SceneParseRequest<'_>,
     content: FileContentId,
-    is_model: bool,
+    format: Option<&ForeignFormat>,
 ) -> Fingerprint {
     let mut key = FingerprintHasher::new("parse");
     content.add_to_fingerprint(key.add_path_bytes(path));
     sets.iter().for_each(|set| {
         key.add_str(set);
     });
-    if is_model {
+    if format.is_some() {
         show.add_to_fingerprint(&mut key);
     }
     key.finish()

@@ -25,10 +25,10 @@ use crate::control::{Cancelled, Progress};
 use crate::materials::Mipmaps;
 use crate::materials::texels::{TexelData, Texels};
 use crate::math::Vec3;
+use crate::scene::LoadedScene;
 use crate::scene::description::{Channel, ChannelSelector, Scene, TextureEncoding, TextureRole};
 use crate::scene::diagnostic::Severity;
 use crate::scene::fingerprint::{Fingerprint, FingerprintHasher};
-use crate::scene::{LoadedScene, is_model};
 use crate::world::{
     AlphaCutoffKey, Image, Images, NeededTexture, TextureRolesNeededByRender, TextureSource,
     environment_source, textures_needed,
@@ -224,7 +224,7 @@ pub(crate) fn load_textures(
             Err(error @ (AssetError::OutOfMemory { .. } | AssetError::TooManyOpenFiles { .. })) => {
                 return Err(AbortReason::work_failure(error));
             }
-            Err(error) if !are_required && is_model(&loaded.path) => {
+            Err(error) if !are_required && loaded.is_model() => {
                 counts.failed += 1;
                 for one in &image.asked_by {
                     replace_unreadable_image(loaded, one, &error, &mut textures.images, findings);

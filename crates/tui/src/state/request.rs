@@ -7,13 +7,14 @@ use std::time::Instant;
 use crate::choice::Choice;
 use crate::math::DVec3;
 use crate::pipeline::FilePathAndContentId;
+use crate::pipeline::has_model_extension;
 use crate::pipeline::protocol::{MaxPreviewSize, NormalizedRect, ResolvedCamera};
 use crate::pipeline::settings::{
     CameraOverrides, EffectiveSettingsSummary, KeyboardOverridableSettings, Overrides, ViewMode,
 };
 use crate::scene::description::{Integrator, Pose, ShadowMode};
+use crate::scene::list_changes;
 use crate::scene::sanitize::escape_invisible_chars;
-use crate::scene::{has_mesh_extension, list_changes};
 
 /// Settings changed with keys. They override the command line.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -224,7 +225,7 @@ impl RequestState {
     /// Records the newest request's input files. Includes a model but not a scene file, whose text is
     /// compared separately.
     pub(crate) fn record_input_files(&mut self, files: Vec<FilePathAndContentId>) {
-        let is_model = has_mesh_extension(&self.scene);
+        let is_model = has_model_extension(&self.scene);
         self.files = files.into_iter().filter(|file| is_model || file.path != self.scene).collect();
     }
 
@@ -232,7 +233,7 @@ impl RequestState {
     pub(crate) fn image_provenance(&self, is_unfinished: bool) -> ImageProvenance {
         ImageProvenance {
             toggles: self.sent_toggles,
-            text: self.text.clone().filter(|_| !has_mesh_extension(&self.scene)),
+            text: self.text.clone().filter(|_| !has_model_extension(&self.scene)),
             files: self.files.clone(),
             is_unfinished,
         }

@@ -9,8 +9,8 @@ use crate::event::{Effect, MouseEvent, MouseEventKind};
 use crate::keymap::OverlayAction;
 use crate::math::decimal::{decimal_step_at_distance, round_to_step};
 use crate::messages;
+use crate::pipeline::has_model_extension;
 use crate::pipeline::protocol::{Command, PickedObject, PickedPixel};
-use crate::scene::has_mesh_extension;
 use crate::scene::sanitize::escape_invisible_chars;
 use crate::state::{MousePress, PickPurpose, State};
 use crate::view;
@@ -144,7 +144,7 @@ pub(super) fn handle_pick(state: &mut State, picked: &PickedPixel) -> Vec<Effect
     if state.picture.history.is_viewing_older() {
         return Vec::new();
     }
-    let in_text = picked.thing.as_ref().filter(|thing| !has_mesh_extension(&thing.path));
+    let in_text = picked.thing.as_ref().filter(|thing| !has_model_extension(&thing.path));
     state.selection.picked =
         in_text.map(|thing| FilePosition { path: thing.path.clone(), line: thing.line, column: 1 });
     match (state.selection.purpose, &picked.thing) {
@@ -215,7 +215,7 @@ fn inspected_values(PickedPixel { thing, color, pixel: [x, y] }: &PickedPixel) -
     let back = if *is_front { "" } else { " (back)" };
     let mut facts = vec![format!("{shape}{name}")];
     // A model's scene is generated, so its lines do not exist in any file.
-    facts.extend((!has_mesh_extension(path)).then(|| format!("{}:{line}", escape_invisible_chars(&file))));
+    facts.extend((!has_model_extension(path)).then(|| format!("{}:{line}", escape_invisible_chars(&file))));
     facts.extend([
         escape_invisible_chars(material).into_owned(),
         format!("distance {}", format_three_significant_digits(*distance)),

@@ -1,27 +1,20 @@
-//! Generates scene text for a mesh or glTF file. `glimt MODEL` and `glimt import` use the same generator, so
-//! they produce the same image.
-
-mod frame;
-mod gltf;
-pub(super) mod import;
-mod materials;
-mod plain;
-mod toml;
+//! The scenes that glimt generates for models: a view, lights and a ground.
 
 use std::collections::HashSet;
 use std::path::Path;
 
-use self::frame::{CameraPose, FOV, KEY, SKY, ground_reflectance_matching_sky, key_light_travel_direction};
-use self::gltf::{ExportedFile, SceneAssetLocation};
-use self::toml::{TomlWriter, format_exact_vector, format_number, format_vector, round_significant};
-use super::settings::{Overrides, UpAxis, ViewSide};
-use super::stages::containers::GltfContainers;
-use crate::assets::gltf::is_gltf;
-use crate::assets::{AssetError, Companion, FileHash};
-use crate::control::CancelToken;
+use super::frame::{
+    CameraPose, KEY, SKY, ground_reflectance_matching_sky, key_light_travel_direction,
+    round_to_decimals_of_step,
+};
+use super::toml::{TomlWriter, format_exact_vector, format_number, format_vector, round_significant};
+use super::{ForeignScene, ImportFailure};
+use crate::assets::{Companion, FileHash};
 use crate::math::DVec3;
-use crate::scene::diagnostic::Diagnostic;
+use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::fingerprint::FingerprintHasher;
+use crate::scene::load_generated;
+use crate::settings::{Overrides, UpAxis, ViewSide};
 
 /// View of a model, as specified on the command line.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -38,7 +31,7 @@ pub(crate) struct ModelViewOptions {
 }
 
 /// Default width and height of the image.
-const SIZE: [f64; 2] = [640.0, 480.0];
+pub(super) const SIZE: [f64; 2] = [640.0, 480.0];
 
 impl Default for ModelViewOptions {
     fn default() -> Self {
@@ -78,51 +71,37 @@ impl ModelViewOptions {
     }
 }
 
-/// A model's scene text and the files it depends on.
-#[derive(Debug)]
-pub(crate) struct GeneratedScene {
-    /// The scene text.
-    pub(crate) text: String,
-    /// Hash of the model file.
-    pub(crate) hash: FileHash,
-    /// Other files that affect the text.
-    pub(crate) companions: Vec<Companion>,
-    /// Messages about approximations.
-    pub(crate) notes: Vec<String>,
-    /// Files referenced by the text that do not exist yet.
-    pub(crate) assets: Vec<ExportedFile>,
+/// The scene text generated for a model, and the other contents of a [`ForeignScene`].
+pub(super) struct GeneratedText {
+    pub(super) text: String,
+    pub(super) hash: FileHash,
+    pub(super) companions: Vec<Companion>,
+    pub(super) notes: Vec<Diagnostic>,
+    pub(super) substitutions: Vec<Diagnostic>,
 }
 
-/// Generates a scene showing a model. Paths are relative to the model's folder.
-///
-/// # Errors
-/// The file cannot be read or is invalid.
-pub(crate) fn scene_text(
-    path: &Path,
-    show: ModelViewOptions,
-    containers: &GltfContainers,
-    token: &CancelToken,
-) -> Result<GeneratedScene, AssetError> {
-    if is_gltf(path) {
-        if show.up.is_some_and(|up| up != UpAxis::Y) {
-            let reason = "glTF files are always y-up; `--up` applies to obj, off, ply and stl".to_owned();
-            return Err(AssetError::Malformed { path: path.to_owned(), line: None, reason });
-        }
-        return gltf::scene_text(path, (show, &SceneAssetLocation::Inside), containers, token);
+impl GeneratedText {
+    /// Lowers the text to a scene, with the overrides from the command line.
+    pub(super) fn into_scene(self, path: &Path, sets: &[String]) -> Result<ForeignScene, ImportFailure> {
+        let Self { text, hash, companions, notes, substitutions } = self;
+        let loaded = load_generated(text.into(), path, sets).map_err(|mut errors| {
+            // Say that errors outside the overrides are not in a file.
+            for error in errors.iter_mut().filter(|error| error.path == path) {
+                error.message = format!("in the scene generated for this model, {}", error.message);
+            }
+            ImportFailure::Scene(errors)
+        })?;
+        Ok(ForeignScene { loaded, hash, companions, notes, substitutions })
     }
-    plain::scene_text(path, show, containers, token)
 }
 
-/// Marks a diagnostic as coming from the generated scene, which is not stored in a file.
-pub(crate) fn mark_diagnostic_as_generated(diagnostic: Diagnostic) -> Diagnostic {
-    Diagnostic {
-        message: format!("in the scene generated for this model, {}", diagnostic.message),
-        ..diagnostic
-    }
+/// Creates a warning about a model.
+pub(super) fn warning(path: &Path, message: impl Into<String>) -> Diagnostic {
+    Diagnostic::about_file(path, Severity::Warning, message.into())
 }
 
 /// Returns the last component of a path.
-fn file_name(path: &Path) -> String {
+pub(super) fn file_name(path: &Path) -> String {
     path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
@@ -131,14 +110,14 @@ fn file_name(path: &Path) -> String {
 const CLAMP: &str = "2";
 /// Roughness above which surfaces do not cause fireflies. At 64 samples, clamping changes the error by a
 /// quarter at roughness 0.4, but by a factor of ten at roughness 0.2.
-const ROUGH: f64 = 0.3;
+pub(super) const ROUGH: f64 = 0.3;
 /// Phong exponent with a highlight as narrow as a GGX lobe of roughness [`ROUGH`]: 2/α² − 2 with α =
 /// roughness².
-const NARROW: f32 = 245.0;
+pub(super) const NARROW: f32 = 245.0;
 
 /// Lighting for a model.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Lighting {
+pub(super) enum Lighting {
     /// A default sky and key light.
     Default {
         /// Whether any surface is polished.
@@ -153,7 +132,7 @@ enum Lighting {
 
 impl Lighting {
     /// Creates lighting that uses the file's lights. `irradiance` is their irradiance on the model.
-    fn from_file_light_irradiance(irradiance: f64) -> Self {
+    pub(super) fn from_file_light_irradiance(irradiance: f64) -> Self {
         // At this irradiance, a white surface is as bright as under the default lights.
         const USUAL: f64 = 3.0;
         let over = (irradiance / USUAL).max(1.0);
@@ -172,7 +151,7 @@ impl Lighting {
 }
 
 /// Writes the `[render]` table.
-fn write_render_settings(toml: &mut TomlWriter, size: Option<[u32; 2]>, light: Lighting) {
+pub(super) fn write_render_settings(toml: &mut TomlWriter, size: Option<[u32; 2]>, light: Lighting) {
     toml.table("[render]");
     if let Some([width, height]) = size {
         toml.key_value("width", width.to_string());
@@ -192,7 +171,7 @@ fn write_render_settings(toml: &mut TomlWriter, size: Option<[u32; 2]>, light: L
 }
 
 /// Writes the `[camera]` table.
-fn write_camera(toml: &mut TomlWriter, eye: &CameraPose, fov: f64) {
+pub(super) fn write_camera(toml: &mut TomlWriter, eye: &CameraPose, fov: f64) {
     toml.table("[camera]");
     toml.key_value("position", format_exact_vector(eye.position));
     toml.key_value("look_at", format_exact_vector(eye.look_at));
@@ -205,7 +184,7 @@ fn write_camera(toml: &mut TomlWriter, eye: &CameraPose, fov: f64) {
 }
 
 /// Writes a sky, plus a key light if the model has no lights.
-fn write_sky_and_key_light(toml: &mut TomlWriter, eye: &CameraPose, light: Lighting) {
+pub(super) fn write_sky_and_key_light(toml: &mut TomlWriter, eye: &CameraPose, light: Lighting) {
     toml.table("[environment]");
     toml.key_value("color", format_number(light.sky_radiance()));
     if matches!(light, Lighting::Default { .. }) {
@@ -218,7 +197,7 @@ fn write_sky_and_key_light(toml: &mut TomlWriter, eye: &CameraPose, light: Light
 }
 
 /// Writes a ground plane below the model, unless the camera is below it.
-fn write_ground(
+pub(super) fn write_ground(
     toml: &mut TomlWriter,
     names: &mut UsedNames,
     [least, greatest]: [DVec3; 2],
@@ -235,19 +214,19 @@ fn write_ground(
     toml.table("[[plane]]");
     toml.key_value(
         "point",
-        format_exact_vector(DVec3::new(0.0, frame::round_to_decimals_of_step(height, size * 1e-5), 0.0)),
+        format_exact_vector(DVec3::new(0.0, round_to_decimals_of_step(height, size * 1e-5), 0.0)),
     );
     toml.key_value("material", format!("\"{name}\""));
 }
 
 /// Names already used in a generated scene.
 #[derive(Debug, Default)]
-struct UsedNames(HashSet<String>);
+pub(super) struct UsedNames(HashSet<String>);
 
 impl UsedNames {
     /// Returns `wanted`, with a number appended if it is taken. Falls back to `usual` if `wanted` is empty or
     /// a number.
-    fn make_unique(&mut self, wanted: &str, usual: &str) -> String {
+    pub(super) fn make_unique(&mut self, wanted: &str, usual: &str) -> String {
         let plain: String = wanted.chars().filter(|c| !c.is_control()).take(100).collect();
         let plain = plain.trim();
         let is_name = plain.parse::<f64>().is_err() && !plain.is_empty();

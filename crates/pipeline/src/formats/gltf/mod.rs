@@ -1,69 +1,115 @@
-//! Converts glTF files to scene text.
+//! glTF files.
+
+mod materials;
 
 use std::collections::{BTreeSet, HashMap};
 use std::io::Read;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use super::frame::{frame_model, round_to_decimals_of_step};
-use super::materials::{MaterialWriter, TextureFileReference};
-use super::toml::{TomlWriter, format_color, format_list, format_number, format_vector};
-use super::{
-    CameraPose, FOV, GeneratedScene, Lighting, ModelViewOptions, ROUGH, SIZE, UsedNames, file_name,
-    write_camera, write_ground, write_render_settings, write_sky_and_key_light,
+use self::materials::{MaterialWriter, TextureFileReference};
+use super::frame::{CameraPose, FOV, frame_model, round_to_decimals_of_step};
+use super::model::{
+    GeneratedText, Lighting, ModelViewOptions, ROUGH, SIZE, UsedNames, file_name, warning, write_camera,
+    write_ground, write_render_settings, write_sky_and_key_light,
 };
+use super::toml::{TomlWriter, format_color, format_list, format_number, format_vector};
+use super::{ForeignScene, ImportContext, ImportFailure, ImportedScene};
 use crate::assets::gltf::{
     Alpha, GltfFile, ImageLocation, ModelCamera, ModelInstance, ModelLight, ModelLightKind, ModelMaterial,
     ModelScene, TexturedValue,
 };
+use crate::assets::mesh::ply::write;
 use crate::assets::{AssetError, Companion};
-use crate::control::{CancelToken, ignore_progress};
+use crate::control::ignore_progress;
 use crate::math::color::luminance;
 use crate::math::{DMat3, DVec3};
 use crate::messages::INVISIBLE_MODEL;
+use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::keys::endings::MAPS;
 use crate::scene::quote_toml_string;
-use crate::settings::ViewSide;
-use crate::stages::containers::GltfContainers;
+use crate::settings::{UpAxis, ViewSide};
 
 /// Where the generated scene's meshes and images are stored.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) enum SceneAssetLocation {
+enum SceneAssetLocation<'a> {
     /// In the glTF file and the files it references.
     Inside,
     /// In separate files in this folder, next to the scene.
-    Folder(String),
-}
-
-/// A file that the generated scene references.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct ExportedFile {
-    /// Path relative to the scene.
-    pub(crate) name: String,
-    /// Source of the file's content.
-    pub(crate) content: GltfPartOrImage,
+    Folder(&'a str),
 }
 
 /// Source of an exported file's content.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub(crate) enum GltfPartOrImage {
+#[derive(Clone, Copy, PartialEq, Eq, Hash)]
+enum GltfPartOrImage {
     /// A mesh part, written as PLY.
     Part(usize),
     /// An image, copied unchanged.
     Image(usize),
 }
 
-/// Converts a glTF file to scene text.
-pub(super) fn scene_text(
+/// Reads a glTF file.
+pub(super) fn read(path: &Path, context: &ImportContext<'_>) -> Result<ForeignScene, ImportFailure> {
+    if context.view.up.is_some_and(|up| up != UpAxis::Y) {
+        let reason = "glTF files are always y-up; `--up` applies to obj, off, ply and stl";
+        return Err(AssetError::malformed(path, None, reason).into());
+    }
+    let (text, _) = scene_text(path, &SceneAssetLocation::Inside, context)?;
+    text.into_scene(path, context.sets)
+}
+
+/// Converts a glTF file to a scene file, and to files in `folder` that contain its meshes and images.
+pub(super) fn convert(
     path: &Path,
-    (show, naming): (ModelViewOptions, &SceneAssetLocation),
-    containers: &GltfContainers,
-    token: &CancelToken,
-) -> Result<GeneratedScene, AssetError> {
+    folder: &str,
+    context: &ImportContext<'_>,
+) -> Result<ImportedScene, AssetError> {
+    let &ImportContext { containers, token, .. } = context;
+    let (GeneratedText { text, substitutions, .. }, assets) =
+        scene_text(path, &SceneAssetLocation::Folder(folder), context)?;
+    check_shown_scene(path, context)?;
+    let container = containers.open(path, &ignore_progress, token)?;
+    let encode = |(name, content)| {
+        let bytes = match content {
+            GltfPartOrImage::Part(part) => {
+                write::encode_ply(&container.build_part(part, &ignore_progress, token)?.mesh)
+            }
+            GltfPartOrImage::Image(image) => {
+                // Check the content. Otherwise, a malicious glTF file could make the import copy arbitrary
+                // files as images.
+                container.check_image_decodes(image, token)?;
+                container.read_embedded_or_external_image(image, token)?
+            }
+        };
+        Ok((PathBuf::from(name), bytes))
+    };
+    let files = assets.into_iter().map(encode).collect::<Result<_, AssetError>>()?;
+    Ok(ImportedScene { text, files, substitutions })
+}
+
+/// Rejects a file that `glimt check` would reject. Checks the scene that `glimt MODEL` would render, because the
+/// files referenced by that scene already exist.
+fn check_shown_scene(path: &Path, context: &ImportContext<'_>) -> Result<(), AssetError> {
+    let errors = match read(path, context) {
+        Ok(_) => return Ok(()),
+        Err(ImportFailure::File(error)) => return Err(error),
+        Err(ImportFailure::Scene(errors)) => errors,
+    };
+    // Ignore errors about file names, because the imported scene uses different file names.
+    let counts = |one: &Diagnostic| one.severity == Severity::Error && !one.message.contains("`file`");
+    let first = errors.into_iter().find(counts);
+    first.map_or(Ok(()), |error| Err(AssetError::malformed(path, None, error.message)))
+}
+
+/// Generates the scene text for a glTF file. Also returns the names and contents of the files that the text
+/// references but that do not exist yet. The names are relative to the scene.
+fn scene_text(
+    path: &Path,
+    naming: &SceneAssetLocation<'_>,
+    &ImportContext { view, containers, token, .. }: &ImportContext<'_>,
+) -> Result<(GeneratedText, Vec<(String, GltfPartOrImage)>), AssetError> {
     let container = containers.open(path, &ignore_progress, token)?;
     let scene = container.convert_scene(token)?;
     let Some(bounds) = scene.bounds else {
-        let reason = "its scene has no visible faces".to_owned();
-        return Err(AssetError::Malformed { path: path.to_owned(), line: None, reason });
+        return Err(AssetError::malformed(path, None, "its scene has no visible faces"));
     };
     let mut writer = SceneWriter {
         container: &container,
@@ -77,31 +123,29 @@ pub(super) fn scene_text(
         image_names: scene.images.clone(),
         companions: container.external_buffers().to_vec(),
     };
-    writer.write(&scene, bounds, show);
+    writer.write(&scene, bounds, view);
     let SceneWriter { toml, assets, images, companions, .. } = writer;
     let is_fully_transparent =
         scene.instances.iter().all(|one| is_fully_transparent(&scene.materials[one.material]));
-    let ModelScene { mut notes, .. } = scene;
-    match naming {
-        // Previews tolerate unreadable images, but imports do not.
-        SceneAssetLocation::Inside => {
-            notes.extend(is_fully_transparent.then(|| INVISIBLE_MODEL.to_owned()));
-        }
-        SceneAssetLocation::Folder(_) => {
-            images.into_iter().try_for_each(|image| container.check_image_header(image, token))?;
-        }
+    let notes = is_fully_transparent.then(|| warning(path, INVISIBLE_MODEL)).into_iter().collect();
+    let substitutions = scene.notes.into_iter().map(|note| warning(path, note)).collect();
+    // Previews tolerate unreadable images, but imports do not.
+    if let SceneAssetLocation::Folder(_) = naming {
+        images.into_iter().try_for_each(|image| container.check_image_header(image, token))?;
     }
-    Ok(GeneratedScene { text: toml.finish(), hash: container.file_hash(), companions, notes, assets })
+    let (text, hash) = (toml.finish(), container.file_hash());
+    Ok((GeneratedText { text, hash, companions, notes, substitutions }, assets))
 }
 
 struct SceneWriter<'a> {
     container: &'a GltfFile,
     path: &'a Path,
-    naming: &'a SceneAssetLocation,
+    naming: &'a SceneAssetLocation<'a>,
     toml: TomlWriter,
     /// File names already used in the folder.
     files: UsedNames,
-    assets: Vec<ExportedFile>,
+    /// Names and contents of files that the text references but that do not exist yet.
+    assets: Vec<(String, GltfPartOrImage)>,
     names: HashMap<GltfPartOrImage, String>,
     /// Images that materials use.
     images: BTreeSet<usize>,
@@ -111,15 +155,15 @@ struct SceneWriter<'a> {
 }
 
 impl SceneWriter<'_> {
-    fn write(&mut self, scene: &ModelScene, bounds: [DVec3; 2], show: ModelViewOptions) {
+    fn write(&mut self, scene: &ModelScene, bounds: [DVec3; 2], view: ModelViewOptions) {
         // Describe the model and its approximations.
         self.toml.comment(&format!("{}, as glimt shows it.", file_name(self.path)));
         for note in &scene.notes {
             self.toml.comment(note);
         }
         // Write the render settings, the camera and the lights.
-        let own = scene.cameras.first().filter(|_| show.from.is_none());
-        let aspect = show.aspect.or(own.and_then(|camera| camera.aspect));
+        let own = scene.cameras.first().filter(|_| view.from.is_none());
+        let aspect = view.aspect.or(own.and_then(|camera| camera.aspect));
         let size = own
             .and_then(|camera| camera.aspect)
             .map(|aspect| [(SIZE[1] * aspect).round().max(1.0) as u32, SIZE[1] as u32]);
@@ -138,7 +182,7 @@ impl SceneWriter<'_> {
                 let eye = frame_model(
                     bounds,
                     &scene.outline,
-                    (show.from.unwrap_or(ViewSide::Iso), show.turns),
+                    (view.from.unwrap_or(ViewSide::Iso), view.turns),
                     aspect.unwrap_or(SIZE[0] / SIZE[1]),
                 );
                 write_camera(&mut self.toml, &eye, FOV);
@@ -152,7 +196,7 @@ impl SceneWriter<'_> {
         scene.lights.iter().for_each(|light| self.write_light_table(light));
         // Write the materials, then the meshes that use them.
         let mut names = UsedNames::default();
-        let materials = MaterialWriter::write_all(scene, &mut names, self);
+        let materials = MaterialWriter::write_all(&scene.materials, &mut names, self);
         let mut shapes = UsedNames::default();
         for instance in &scene.instances {
             self.write_mesh_table(instance, &materials[instance.material], &mut shapes);
@@ -249,17 +293,12 @@ impl SceneWriter<'_> {
             wanted.chars().map(|c| if c.is_alphanumeric() || "-_.".contains(c) { c } else { '_' }).collect();
         let plain = plain.trim_matches('.').chars().take(60).collect::<String>().to_lowercase();
         let name = format!("{folder}{}.{ending}", self.files.make_unique(&plain, "part"));
-        self.assets.push(ExportedFile { name: name.clone(), content });
+        self.assets.push((name.clone(), content));
         self.names.insert(content, name.clone());
         name
     }
-}
 
-impl super::materials::MaterialExportTarget for SceneWriter<'_> {
-    fn toml_writer(&mut self) -> &mut TomlWriter {
-        &mut self.toml
-    }
-
+    /// Returns the name of an image, without an extension.
     fn image_name(&self, image: usize) -> String {
         let name = self.image_names.get(image).filter(|name| !name.is_empty()).cloned();
         let of_file = || match self.container.locate_image(image) {
@@ -269,12 +308,13 @@ impl super::materials::MaterialExportTarget for SceneWriter<'_> {
         name.or_else(of_file).unwrap_or_else(|| format!("image_{image}"))
     }
 
+    /// Returns the file that contains an image.
     fn image_file_reference(&mut self, image: usize) -> TextureFileReference {
         self.images.insert(image);
         let bytes = self.container.locate_image(image);
         match (self.naming, bytes) {
             (SceneAssetLocation::Inside, Ok(ImageLocation::File(file)))
-                if has_image_extension(&file) && file.is_file() =>
+                if image_extension(&file).is_some() && file.is_file() =>
             {
                 let folder = self.path.parent().unwrap_or(Path::new(""));
                 let name = file.strip_prefix(folder).unwrap_or(&file);
@@ -291,15 +331,9 @@ impl super::materials::MaterialExportTarget for SceneWriter<'_> {
             (SceneAssetLocation::Folder(_), bytes) => {
                 let ending = match &bytes {
                     Ok(ImageLocation::Inside(bytes)) => sniff_image_extension(bytes).to_owned(),
-                    Ok(ImageLocation::File(path)) => {
-                        let own = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
-                        let start = || first_bytes(path).unwrap_or_default();
-                        if MAPS.contains(&own.as_str()) {
-                            own
-                        } else {
-                            sniff_image_extension(&start()).to_owned()
-                        }
-                    }
+                    Ok(ImageLocation::File(path)) => image_extension(path).unwrap_or_else(|| {
+                        sniff_image_extension(&first_bytes(path).unwrap_or_default()).to_owned()
+                    }),
                     Err(_) => "png".to_owned(),
                 };
                 let wanted = self.image_name(image);
@@ -310,10 +344,10 @@ impl super::materials::MaterialExportTarget for SceneWriter<'_> {
     }
 }
 
-/// Whether the file name has an image extension.
-fn has_image_extension(file: &Path) -> bool {
-    let ending = file.extension().unwrap_or_default().to_string_lossy().to_lowercase();
-    MAPS.contains(&ending.as_str())
+/// Returns a file's extension in lowercase if it is an image extension.
+fn image_extension(file: &Path) -> Option<String> {
+    let extension = file.extension()?.to_string_lossy().to_lowercase();
+    MAPS.contains(&extension.as_str()).then_some(extension)
 }
 
 /// Whether a material is fully transparent everywhere.

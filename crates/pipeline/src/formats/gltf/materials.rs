@@ -2,21 +2,12 @@
 
 use std::collections::HashMap;
 
-use super::UsedNames;
-use super::toml::{TomlWriter, format_color, format_key, format_number, format_pair};
-use crate::assets::gltf::{Alpha, ModelMaterial, ModelScene, TextureRef, TextureWrap, TexturedValue};
+use super::super::model::UsedNames;
+use super::super::toml::{format_color, format_key, format_number, format_pair};
+use super::SceneWriter;
+use crate::assets::gltf::{Alpha, ModelMaterial, TextureRef, TextureWrap, TexturedValue};
 use crate::math::{DVec3, Vec2};
 use crate::scene::quote_toml_string;
-
-/// Access to the scene text and image files while materials are being written.
-pub(super) trait MaterialExportTarget {
-    /// The scene text.
-    fn toml_writer(&mut self) -> &mut TomlWriter;
-    /// Name of an image, without an extension.
-    fn image_name(&self, image: usize) -> String;
-    /// The file that contains an image.
-    fn image_file_reference(&mut self, image: usize) -> TextureFileReference;
-}
 
 /// A texture's file.
 #[derive(Clone, Debug, PartialEq)]
@@ -42,18 +33,21 @@ type TomlEntries = Vec<(&'static str, String)>;
 type TextureIdentity = (usize, TextureUse, String);
 
 /// Writer for materials and their textures.
-pub(super) struct MaterialWriter<'a, F> {
-    files: &'a mut F,
+pub(super) struct MaterialWriter<'a, 'b> {
+    scene: &'a mut SceneWriter<'b>,
     textures: HashMap<TextureIdentity, String>,
     names: UsedNames,
 }
 
-impl<F: MaterialExportTarget> MaterialWriter<'_, F> {
+impl MaterialWriter<'_, '_> {
     /// Writes the tables and returns the material names.
-    pub(super) fn write_all(scene: &ModelScene, names: &mut UsedNames, files: &mut F) -> Vec<String> {
-        let mut all = MaterialWriter { files, textures: HashMap::new(), names: UsedNames::default() };
-        scene
-            .materials
+    pub(super) fn write_all(
+        materials: &[ModelMaterial],
+        names: &mut UsedNames,
+        scene: &mut SceneWriter<'_>,
+    ) -> Vec<String> {
+        let mut all = MaterialWriter { scene, textures: HashMap::new(), names: UsedNames::default() };
+        materials
             .iter()
             .map(|material| {
                 let name = names.make_unique(&material.name, "material");
@@ -80,7 +74,7 @@ impl<F: MaterialExportTarget> MaterialWriter<'_, F> {
             keys.push(("ior", format_number(material.ior)));
         }
         self.write_common_keys(&mut keys, material);
-        let toml = self.files.toml_writer();
+        let toml = &mut self.scene.toml;
         toml.table(&format!("[materials.{}]", format_key(name)));
         keys.iter().for_each(|(key, value)| toml.key_value(key, value));
     }
@@ -240,10 +234,10 @@ impl<F: MaterialExportTarget> MaterialWriter<'_, F> {
         if let Some(known) = self.textures.get(&identity) {
             return known.clone();
         }
-        let wanted = self.files.image_name(texture.image);
+        let wanted = self.scene.image_name(texture.image);
         let name = self.names.make_unique(&wanted, "image");
-        let TextureFileReference { file, image } = self.files.image_file_reference(texture.image);
-        let toml = self.files.toml_writer();
+        let TextureFileReference { file, image } = self.scene.image_file_reference(texture.image);
+        let toml = &mut self.scene.toml;
         toml.table(&format!("[textures.{}]", format_key(&name)));
         toml.key_value("file", quote_toml_string(&file));
         if let Some(image) = image {

@@ -1,31 +1,24 @@
-//! Converts mesh files (OBJ, OFF, PLY, STL) to scene text.
+//! Mesh files: OBJ, OFF, PLY and STL.
 
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
-use super::frame::frame_model;
-use super::toml::TomlWriter;
-use super::{
-    FOV, GeneratedScene, Lighting, ModelViewOptions, NARROW, ROUGH, SIZE, UsedNames, file_name, write_camera,
-    write_ground, write_render_settings, write_sky_and_key_light,
+use super::frame::{FOV, frame_model};
+use super::model::{
+    GeneratedText, Lighting, NARROW, ROUGH, SIZE, UsedNames, file_name, warning, write_camera, write_ground,
+    write_render_settings, write_sky_and_key_light,
 };
+use super::toml::TomlWriter;
+use super::{ForeignScene, ImportContext, ImportFailure};
 use crate::assets::{AssetError, FileMaterial, LoadedMesh};
-use crate::control::{CancelToken, ignore_progress};
+use crate::control::ignore_progress;
 use crate::math::DVec3;
 use crate::math::limits::LARGEST;
 use crate::messages::INVISIBLE_MODEL;
 use crate::scene::{MORE_LIKE_THESE, quote_toml_string};
 use crate::settings::{UpAxis, ViewSide};
-use crate::stages::containers::GltfContainers;
 use crate::stages::meshes::MAX_WARNINGS;
-
-/// Default up axis: z for STL (the CAD and 3D printing convention) and for PLY files exported by Blender, y
-/// for all others.
-fn default_up_axis(path: &Path) -> UpAxis {
-    let has = |ending: &str| path.extension().is_some_and(|own| own.eq_ignore_ascii_case(ending));
-    if has("stl") || has("ply") && is_from_blender(path) { UpAxis::Z } else { UpAxis::Y }
-}
 
 /// Whether the header of a PLY file mentions Blender, which exports PLY files with z as the up axis.
 fn is_from_blender(path: &Path) -> bool {
@@ -82,22 +75,35 @@ fn is_mesh_fully_transparent(loaded: &LoadedMesh) -> bool {
     !loaded.mesh.materials.is_empty() && loaded.mesh.materials.iter().all(is_fully_transparent)
 }
 
-/// Generates the scene text for a mesh file.
-pub(super) fn scene_text(
+/// Reads an OBJ or OFF file.
+pub(super) fn read(path: &Path, context: &ImportContext<'_>) -> Result<ForeignScene, ImportFailure> {
+    scene_text(path, UpAxis::Y, false, context)?.into_scene(path, context.sets)
+}
+
+/// Reads a PLY file. Blender exports them with z as the up axis.
+pub(super) fn read_ply(path: &Path, context: &ImportContext<'_>) -> Result<ForeignScene, ImportFailure> {
+    let up = if is_from_blender(path) { UpAxis::Z } else { UpAxis::Y };
+    scene_text(path, up, false, context)?.into_scene(path, context.sets)
+}
+
+/// Reads an STL file. By the convention of CAD and 3D printing, z is the up axis. STL has no vertex normals,
+/// and mechanical parts have sharp edges.
+pub(super) fn read_stl(path: &Path, context: &ImportContext<'_>) -> Result<ForeignScene, ImportFailure> {
+    scene_text(path, UpAxis::Z, true, context)?.into_scene(path, context.sets)
+}
+
+/// Generates the scene text for a mesh file. `up` is the format's default up axis.
+fn scene_text(
     path: &Path,
-    show: ModelViewOptions,
-    containers: &GltfContainers,
-    token: &CancelToken,
-) -> Result<GeneratedScene, AssetError> {
+    up: UpAxis,
+    is_faceted: bool,
+    &ImportContext { view, containers, token, .. }: &ImportContext<'_>,
+) -> Result<GeneratedText, AssetError> {
     let loaded = containers.load_any_mesh((path, None), &ignore_progress, token)?;
     let Some([least, greatest]) = loaded.mesh.bounds_in_file_coordinates() else {
-        return Err(AssetError::Malformed {
-            path: path.to_owned(),
-            line: None,
-            reason: "no usable face".to_owned(),
-        });
+        return Err(AssetError::malformed(path, None, "no usable face"));
     };
-    let up = show.up.unwrap_or_else(|| default_up_axis(path));
+    let up = view.up.unwrap_or(up);
     let upright = |at: DVec3| up.rotate_point_upright(at);
     let (a, b) = (upright(least), upright(greatest));
     let bounds = [a.min(b), a.max(b)];
@@ -105,8 +111,8 @@ pub(super) fn scene_text(
     let eye = frame_model(
         bounds,
         &points,
-        (show.from.unwrap_or(ViewSide::Iso), show.turns),
-        show.aspect.unwrap_or(SIZE[0] / SIZE[1]),
+        (view.from.unwrap_or(ViewSide::Iso), view.turns),
+        view.aspect.unwrap_or(SIZE[0] / SIZE[1]),
     );
     // Report the file's coordinates as the cause, because the user did not choose the camera position.
     let eye_reach = eye.position.abs().max(eye.look_at.abs()).max_element();
@@ -115,7 +121,7 @@ pub(super) fn scene_text(
         let reason = format!(
             "its coordinates extend to {farthest:e}, which places the camera at {eye_reach:.0e}; coordinates must be below {LARGEST:e}"
         );
-        return Err(AssetError::Malformed { path: path.to_owned(), line: None, reason });
+        return Err(AssetError::malformed(path, None, reason));
     }
     let (mut toml, mut names) = (TomlWriter::default(), UsedNames::default());
     toml.comment(&format!("{}, as glimt shows it.", file_name(path)));
@@ -136,9 +142,7 @@ pub(super) fn scene_text(
     if let Some([x, y, z]) = up.rotation() {
         toml.key_value("rotate", format!("[{x}, {y}, {z}]"));
     }
-    // STL has no vertex normals, and mechanical parts have sharp edges.
-    let is_stl = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("stl"));
-    if is_stl || loaded.has_flat_faces_and_no_normals() {
+    if is_faceted || loaded.has_flat_faces_and_no_normals() {
         toml.key_value("smooth", "false");
     }
     if needs_material {
@@ -151,9 +155,10 @@ pub(super) fn scene_text(
     // The generated material hides the fact that the file has no materials, so report it here.
     let mut notes = if needs_material { first_warnings(&loaded.material_warnings) } else { Vec::new() };
     notes.extend(is_mesh_fully_transparent(&loaded).then(|| INVISIBLE_MODEL.to_owned()));
-    let (hash, companions, assets) = (loaded.hash, loaded.companions.clone(), Vec::new());
+    let notes = notes.into_iter().map(|note| warning(path, note)).collect();
+    let (hash, companions) = (loaded.hash, loaded.companions.clone());
     containers.store_mesh_for_next_load(path, loaded);
-    Ok(GeneratedScene { text: toml.finish(), hash, companions, notes, assets })
+    Ok(GeneratedText { text: toml.finish(), hash, companions, notes, substitutions: Vec::new() })
 }
 
 /// Returns the first warnings and, if there are more, a line that counts the rest.

@@ -1,0 +1,170 @@
+//! Foreign formats: files that glimt renders or imports although they are not scene files.
+//!
+//! [`FORMATS`] lists the formats, each with its extensions and its importer. This is the only place that
+//! decides from a file's name which format it has. An importer reads a file into a [`ForeignScene`]; the rest
+//! of the pipeline does not know the format. `model` generates the view and the lights for models, which
+//! `glimt MODEL` and `glimt import` share so that they produce the same image.
+
+mod frame;
+mod gltf;
+mod import;
+mod mesh;
+pub(crate) mod model;
+mod toml;
+
+use std::path::{Path, PathBuf};
+
+use self::model::ModelViewOptions;
+use super::stages::containers::GltfContainers;
+use crate::assets::{AssetError, Companion, FileHash};
+use crate::control::CancelToken;
+use crate::scene::diagnostic::Diagnostic;
+use crate::scene::{LoadedScene, lacks_camera_header};
+
+pub use import::{ImportError, import_scene};
+
+/// All foreign formats.
+const FORMATS: [ForeignFormat; 5] = [
+    ForeignFormat {
+        extensions: &["gltf", "glb"],
+        is_model: true,
+        read: gltf::read,
+        convert: Some(gltf::convert),
+    },
+    ForeignFormat { extensions: &["obj"], is_model: true, read: mesh::read, convert: None },
+    ForeignFormat { extensions: &["off"], is_model: true, read: mesh::read, convert: None },
+    ForeignFormat { extensions: &["ply"], is_model: true, read: mesh::read_ply, convert: None },
+    ForeignFormat { extensions: &["stl"], is_model: true, read: mesh::read_stl, convert: None },
+];
+
+/// A foreign format.
+#[derive(Debug)]
+pub(crate) struct ForeignFormat {
+    /// Extensions in lowercase, without dots.
+    extensions: &'static [&'static str],
+    /// Whether the file is a model rather than a scene. Models have no text that the user could edit, and
+    /// glimt chooses a view and lights for them.
+    pub(crate) is_model: bool,
+    /// Reads a file.
+    pub(crate) read: ReadFn,
+    /// Converts a file for `glimt import` to a scene whose meshes and images are stored in the named folder.
+    /// `None` if the format cannot be imported.
+    convert: Option<ConvertFn>,
+}
+
+type ReadFn = fn(&Path, &ImportContext<'_>) -> Result<ForeignScene, ImportFailure>;
+type ConvertFn = fn(&Path, &str, &ImportContext<'_>) -> Result<ImportedScene, AssetError>;
+
+/// Inputs of an importer other than the file.
+#[derive(Clone, Copy)]
+pub(crate) struct ImportContext<'a> {
+    /// Scene key overrides from the command line.
+    pub(crate) sets: &'a [String],
+    /// View of a model.
+    pub(crate) view: ModelViewOptions,
+    /// Files that are open. Meshes stored here are not read again when the scene's assets are loaded.
+    pub(crate) containers: &'a GltfContainers,
+    pub(crate) token: &'a CancelToken,
+}
+
+/// The scene in a foreign file.
+#[derive(Debug)]
+pub(crate) struct ForeignScene {
+    /// The scene, with overrides applied.
+    pub(crate) loaded: LoadedScene,
+    /// Hash of the file.
+    pub(crate) hash: FileHash,
+    /// Other files that affect the scene, and therefore are watched. The assets that the scene references are
+    /// not included.
+    pub(crate) companions: Vec<Companion>,
+    /// Remarks that are not substitutions.
+    pub(crate) notes: Vec<Diagnostic>,
+    /// Features without an exact equivalent and their substitutes.
+    pub(crate) substitutions: Vec<Diagnostic>,
+}
+
+/// A foreign file converted to a scene file, ready to be written.
+#[derive(Debug)]
+pub struct ImportedScene {
+    /// Scene text. Its paths are relative to the scene file.
+    pub text: String,
+    /// Files referenced by the text, with paths relative to the scene file.
+    pub files: Vec<(PathBuf, Vec<u8>)>,
+    /// Features without an exact equivalent and their substitutes.
+    pub substitutions: Vec<Diagnostic>,
+}
+
+/// Reason why a foreign file cannot be read.
+#[derive(Debug)]
+pub(crate) enum ImportFailure {
+    /// The file, or a file that it references, cannot be used.
+    File(AssetError),
+    /// The scene in the file, or an override, has errors.
+    Scene(Vec<Diagnostic>),
+}
+
+impl From<AssetError> for ImportFailure {
+    fn from(error: AssetError) -> Self {
+        Self::File(error)
+    }
+}
+
+impl ForeignFormat {
+    /// Returns the format with the path's extension. The file need not exist.
+    fn from_extension(path: &Path) -> Option<&'static Self> {
+        let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
+        FORMATS.iter().find(|format| format.extensions.iter().any(|known| extension == *known))
+    }
+
+    /// Returns the format of a readable file, or `None` if the file must be read as a scene file. A scene file
+    /// may have any extension.
+    pub(crate) fn of_file(path: &Path) -> Option<&'static Self> {
+        Self::from_extension(path).filter(|_| lacks_camera_header(path))
+    }
+}
+
+/// Whether a path has a foreign format's extension.
+pub fn has_foreign_extension(path: &Path) -> bool {
+    ForeignFormat::from_extension(path).is_some()
+}
+
+/// Whether a path has a model's extension.
+pub fn has_model_extension(path: &Path) -> bool {
+    ForeignFormat::from_extension(path).is_some_and(|format| format.is_model)
+}
+
+/// Whether a path has the extension of a format that `glimt import` accepts.
+pub fn has_importable_extension(path: &Path) -> bool {
+    ForeignFormat::from_extension(path).is_some_and(|format| format.convert.is_some())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::keys::endings::MESHES;
+
+    #[test]
+    fn extensions_are_unique_and_every_mesh_is_a_model() {
+        let mut all: Vec<_> = FORMATS.iter().flat_map(|format| format.extensions).collect();
+        all.sort_unstable();
+        assert!(all.windows(2).all(|two| two[0] != two[1]), "{all:?}");
+        for extension in MESHES {
+            let path = PathBuf::from(format!("a.{}", extension.to_uppercase()));
+            assert!(has_model_extension(&path) && has_foreign_extension(&path), "{extension}");
+        }
+        for other in ["a.toml", "a.png", "obj", "a"] {
+            assert!(!has_foreign_extension(Path::new(other)), "{other}");
+        }
+    }
+
+    #[test]
+    fn scene_files_may_have_any_extension() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("a.obj");
+        assert!(ForeignFormat::of_file(&path).is_none(), "missing files have no format");
+        std::fs::write(&path, "v 0 0 0\n").expect("written");
+        assert!(ForeignFormat::of_file(&path).is_some());
+        std::fs::write(&path, "[camera]\n").expect("written");
+        assert!(ForeignFormat::of_file(&path).is_none());
+    }
+}
