@@ -70,16 +70,21 @@ fn distant_boards_are_gray_for_every_key() {
         ("pane", |board| plain(MaterialKind::Pane { ior: 1.0, tint: ColorSource::Texture(board) })),
     ];
     for (what, material) in materials {
-        let mut build = scene().background(1.0).with(|scene| scene.render.ambient = Vec3::ONE);
-        let board = checkers(&mut build, TextureFilter::Mipmap, 200.0);
-        // Also add a material without a texture.
-        let build = build
-            .quad(v(-100.0, 0.0, 0.0), v(200.0, 0.0, 0.0), v(0.0, 0.0, -200.0), material(board))
-            .sphere(v(0.0, 90.0, 0.0), 1.0, matte(0.5))
-            .pictured(v(0.0, 40.0, 20.0), v(0.0, 0.0, -40.0), 40.0, 16, 16);
-        for gray in grays(&build) {
+        let seen = |filter| {
+            let mut build = scene().background(1.0).with(|scene| scene.render.ambient = Vec3::ONE);
+            let board = checkers(&mut build, filter, 200.0);
+            // Also add a material without a texture.
+            let build = build
+                .quad(v(-100.0, 0.0, 0.0), v(200.0, 0.0, 0.0), v(0.0, 0.0, -200.0), material(board))
+                .sphere(v(0.0, 90.0, 0.0), 1.0, matte(0.5))
+                .pictured(v(0.0, 40.0, 20.0), v(0.0, 0.0, -40.0), 40.0, 16, 16);
+            grays(&build)
+        };
+        for gray in seen(TextureFilter::Mipmap) {
             assert!((gray - 0.5).abs() < 0.01, "{what}: {gray}");
         }
+        let (mean, error) = mean_and_error(&seen(TextureFilter::Bilinear));
+        assert!(error * 16.0 > 0.4, "{what}: bilinear lookups must alias: {mean} ± {error}");
     }
 }
 

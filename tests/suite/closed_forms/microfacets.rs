@@ -2,9 +2,11 @@
 
 use glimt::choice::Choice;
 use glimt::integrators::ViewMode;
-use glimt::math::{DVec3, Vec3};
+use glimt::math::{DVec3, Vec2, Vec3};
 use glimt::scene::description::light::Falloff;
-use glimt::scene::description::{EmissionSource, Integrator, Material, ShadowMode};
+use glimt::scene::description::{
+    EmissionSource, Integrator, Material, MaterialKind, NumberSource, ShadowMode, TextureFilter, Wrap,
+};
 
 use super::global::{by_paths, lamps_over_a_floor};
 use super::photons::{assert_same_light, both};
@@ -195,7 +197,15 @@ fn round_metal_mesh_has_no_black_edge() {
 #[test]
 fn coarse_smooth_meshes_conserve_energy() {
     let ball = lat_long_sphere(8, 16, 1.0, DVec3::ZERO);
+    let mut open = scene().environment(1.0);
+    // Surfaces with a textured roughness are not prepared in packets.
+    let texture = open.texture(&[&[Vec3::splat(0.1)][..]], TextureFilter::Nearest, Wrap::Repeat, Vec2::ONE);
+    let mut textured = metal(1.0, 0.1, 0.0);
+    if let MaterialKind::Metal { roughness, .. } = &mut textured.kind {
+        *roughness = NumberSource::Texture { texture, channel: None };
+    }
     for (name, material) in [
+        ("textured metal", textured),
         ("polished metal", metal(1.0, 0.01, 0.0)),
         ("narrow metal", metal(1.0, 0.1, 0.0)),
         ("brushed metal", metal(1.0, 0.3, 0.8)),
@@ -203,8 +213,8 @@ fn coarse_smooth_meshes_conserve_energy() {
         ("principled", principled(1.0, 0.5, 0.1)),
         ("sheet", translucent(1.0, 0.1, 0.5)),
     ] {
-        let build = scene()
-            .environment(1.0)
+        let build = open
+            .clone()
             .mesh(ball.clone(), [DVec3::ONE, DVec3::ZERO, v(0.0, 0.0, -5.0)], material)
             .smooth()
             .pictured(DVec3::ZERO, v(0.0, 0.0, -5.0), 24.0, 32, 32);
