@@ -1,4 +1,4 @@
-//! The scene file contract: all keys, their defaults, and whether they are required.
+//! The scene file contract: what keys accept beyond their definitions, which `docs::tables` checks.
 
 use std::fs;
 use std::path::PathBuf;
@@ -8,296 +8,7 @@ use glimt::scene::description::{AffineMap, Camera, Scene};
 use glimt::scene::diagnostic::{Diagnostic, Severity};
 use glimt::scene::{parse, starter_scene};
 
-/// Whether a key is optional, and whether its example value is the default.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Promise {
-    /// Optional. The default is the example value.
-    Default,
-    /// Optional. The default differs from the example value.
-    Other,
-    /// Required.
-    Required,
-}
-
-use Promise::{Default, Other, Required};
-
-/// Key name, example value, and whether it is required.
-type KeyContract = (&'static str, &'static str, Promise);
-
-/// All tables with their keys and example values.
-const TABLES: &[(&str, &[KeyContract])] = &[
-    (
-        "[render]",
-        &[
-            ("width", "640", Default),
-            ("height", "480", Default),
-            ("samples", "64", Default),
-            ("error", "0.0", Default),
-            ("max_depth", "8", Default),
-            ("integrator", "\"whitted\"", Default),
-            ("clamp", "0.0", Default),
-            ("shadows", "\"soft\"", Default),
-            ("ambient", "[0, 0, 0]", Default),
-            ("background", "[0, 0, 0]", Default),
-            ("filter", "\"box\"", Default),
-            ("exposure", "0.0", Default),
-            ("tonemap", "\"none\"", Default),
-            ("accel", "\"bvh\"", Default),
-            ("seed", "0", Default),
-            ("output", "\"cornell.png\"", Other),
-        ],
-    ),
-    (
-        "[camera]",
-        &[
-            ("position", "[0, 1, 4]", Required),
-            ("look_at", "[0, 1, 0]", Required),
-            ("up", "[0, 1, 0]", Default),
-            ("fov", "40.0", Default),
-            ("aperture", "0.0", Default),
-            ("focus", "4.0", Default),
-        ],
-    ),
-    (
-        "[photons]",
-        &[
-            ("enabled", "false", Default),
-            ("count", "0", Default),
-            ("radius", "0.0", Default),
-            ("bounces", "16", Default),
-        ],
-    ),
-    (
-        "[textures.bricks]",
-        &[
-            ("file", "\"textures/bricks.png\"", Required),
-            ("filter", "\"bilinear\"", Default),
-            ("wrap", "\"repeat\"", Default),
-            ("repeat", "[1, 1]", Default),
-            ("rotate", "0.0", Default),
-            ("offset", "[0, 0]", Default),
-            ("factor", "1", Default),
-            ("uv", "0", Default),
-            ("encoding", "\"auto\"", Default),
-        ],
-    ),
-    (
-        "[materials.wall]",
-        &[
-            ("type", "\"phong\"", Default),
-            ("diffuse", "[0.7, 0.7, 0.7]", Default),
-            ("specular", "[0, 0, 0]", Default),
-            ("shininess", "32.0", Default),
-            ("ambient", "[1, 1, 1]", Other),
-            ("emission", "[0, 0, 0]", Default),
-            ("emission_sides", "\"front\"", Default),
-            ("normal_map", "\"bumps\"", Other),
-            ("normal_strength", "1.0", Default),
-            ("bump", "\"bumps\"", Other),
-            ("bump_scale", "0.01", Default),
-            ("opacity", "1.0", Default),
-            ("opacity_cutoff", "0.0", Default),
-        ],
-    ),
-    (
-        "[materials.steel]",
-        &[
-            ("type", "\"mirror\"", Other),
-            ("reflectance", "[0.9, 0.9, 0.9]", Default),
-            ("emission", "[0, 0, 0]", Default),
-            ("emission_sides", "\"front\"", Default),
-            ("normal_map", "\"bumps\"", Other),
-            ("normal_strength", "1.0", Default),
-            ("bump", "\"bumps\"", Other),
-            ("bump_scale", "0.01", Default),
-            ("opacity", "1.0", Default),
-            ("opacity_cutoff", "0.0", Default),
-        ],
-    ),
-    (
-        "[materials.crystal]",
-        &[
-            ("type", "\"glass\"", Other),
-            ("ior", "1.5", Default),
-            ("tint", "[1, 1, 1]", Default),
-            ("roughness", "0.0", Default),
-            ("thin", "false", Default),
-            ("emission", "[0, 0, 0]", Default),
-            ("emission_sides", "\"front\"", Default),
-            ("normal_map", "\"bumps\"", Other),
-            ("normal_strength", "1.0", Default),
-            ("bump", "\"bumps\"", Other),
-            ("bump_scale", "0.01", Default),
-        ],
-    ),
-    (
-        "[materials.brass]",
-        &[
-            ("type", "\"metal\"", Other),
-            ("color", "[0.89, 0.79, 0.43]", Required),
-            ("roughness", "0.2", Default),
-            ("anisotropy", "0.0", Default),
-        ],
-    ),
-    (
-        "[materials.enamel]",
-        &[
-            ("type", "\"plastic\"", Other),
-            ("diffuse", "[0.7, 0.7, 0.7]", Default),
-            ("specular", "[1, 1, 1]", Default),
-            ("ior", "1.5", Default),
-            ("roughness", "0.1", Default),
-        ],
-    ),
-    (
-        "[materials.car]",
-        &[
-            ("type", "\"principled\"", Other),
-            ("color", "[0.8, 0.8, 0.8]", Default),
-            ("metallic", "0.0", Default),
-            ("roughness", "0.5", Default),
-            ("ior", "1.5", Default),
-            ("specular", "1.0", Default),
-            ("specular_color", "[1, 1, 1]", Default),
-            ("transmission", "0.0", Default),
-            ("clearcoat", "0.0", Default),
-            ("clearcoat_roughness", "0.0", Default),
-        ],
-    ),
-    (
-        "[[sphere]]",
-        &[
-            ("center", "[0, 0.5, 0]", Required),
-            ("radius", "0.5", Required),
-            ("material", "\"crystal\"", Required),
-        ],
-    ),
-    (
-        "[[quad]]",
-        &[
-            ("corner", "[-1, 0, 1]", Default),
-            ("u", "[2, 0, 0]", Default),
-            ("v", "[0, 0, -2]", Default),
-            ("material", "\"wall\"", Required),
-        ],
-    ),
-    (
-        "[[plane]]",
-        &[
-            ("point", "[0, 0, 0]", Default),
-            ("normal", "[0, 1, 0]", Default),
-            ("material", "\"wall\"", Required),
-        ],
-    ),
-    (
-        "[[box]]",
-        &[
-            ("center", "[0, 0.5, 0]", Default),
-            ("size", "[1, 1, 1]", Default),
-            ("rotate", "[0, 30, 0]", Other),
-            ("material", "\"wall\"", Required),
-        ],
-    ),
-    (
-        "[[triangle]]",
-        &[
-            ("a", "[0, 0, 0]", Default),
-            ("b", "[1, 0, 0]", Default),
-            ("c", "[0, 1, 0]", Default),
-            ("material", "\"wall\"", Required),
-        ],
-    ),
-    (
-        "[[disk]]",
-        &[
-            ("center", "[0, 0, 0]", Default),
-            ("normal", "[0, 1, 0]", Default),
-            ("radius", "0.5", Default),
-            ("material", "\"wall\"", Required),
-        ],
-    ),
-    (
-        "[[cylinder]]",
-        &[
-            ("a", "[0, 0, 0]", Default),
-            ("b", "[0, 1, 0]", Default),
-            ("radius", "0.5", Default),
-            ("caps", "true", Default),
-            ("material", "\"wall\"", Required),
-        ],
-    ),
-    (
-        "[[cone]]",
-        &[
-            ("base", "[0, 0, 0]", Default),
-            ("tip", "[0, 1, 0]", Default),
-            ("radius", "0.5", Default),
-            ("cap", "true", Default),
-            ("material", "\"wall\"", Required),
-        ],
-    ),
-    (
-        "[[torus]]",
-        &[
-            ("center", "[0, 0, 0]", Default),
-            ("axis", "[0, 1, 0]", Default),
-            ("radius", "0.5", Default),
-            ("tube", "0.125", Default),
-            ("material", "\"wall\"", Required),
-        ],
-    ),
-    (
-        "[[mesh]]",
-        &[
-            ("file", "\"../assets/knot.obj\"", Required),
-            ("material", "\"wall\"", Other),
-            ("scale", "1.0", Default),
-            ("rotate", "[0, 0, 0]", Default),
-            ("translate", "[0, 0, 0]", Default),
-            ("smooth", "true", Default),
-            ("vertex_colors", "false", Default),
-        ],
-    ),
-    (
-        "[[light]]",
-        &[
-            ("type", "\"point\"", Default),
-            ("position", "[0, 3, 0]", Default),
-            ("intensity", "[10, 10, 10]", Default),
-            ("falloff", "\"square\"", Default),
-        ],
-    ),
-    (
-        "[[light]]",
-        &[
-            ("type", "\"spot\"", Other),
-            ("position", "[0, 3, 0]", Default),
-            ("look_at", "[0, 0, 0]", Default),
-            ("intensity", "[10, 10, 10]", Default),
-            ("angle", "45", Default),
-            ("blend", "0.2", Default),
-            ("falloff", "\"square\"", Default),
-        ],
-    ),
-    (
-        "[[light]]",
-        &[
-            ("type", "\"directional\"", Other),
-            ("direction", "[0, -1, 0]", Default),
-            ("irradiance", "[1, 1, 1]", Default),
-            ("angle", "0", Default),
-        ],
-    ),
-    (
-        "[environment]",
-        &[("color", "[1, 1, 1]", Default), ("file", "\"sky.hdr\"", Other), ("rotate", "0.0", Default)],
-    ),
-];
-
-/// A texture that the materials refer to.
-const BUMPS: &str = "[textures.bumps]\nfile = \"textures/bumps.png\"\n";
-
-/// A directory with every file that the example refers to, and the path of the scene in it.
+/// A directory with every file that the scenes refer to, and the path of the scene in it.
 fn folder() -> (tempfile::TempDir, PathBuf) {
     let folder = tempfile::tempdir().expect("a folder");
     for name in ["scenes/textures", "assets"] {
@@ -314,18 +25,6 @@ fn folder() -> (tempfile::TempDir, PathBuf) {
     }
     let scene = folder.path().join("scenes/cornell.toml");
     (folder, scene)
-}
-
-/// The example without the keys for which `is_out` is true.
-fn example(is_out: impl Fn(usize, &str) -> bool) -> String {
-    let mut text = String::from(BUMPS);
-    for (table, (header, keys)) in TABLES.iter().enumerate() {
-        text.push_str(&format!("{header}\n"));
-        for (key, value, _) in keys.iter().filter(|(key, ..)| !is_out(table, key)) {
-            text.push_str(&format!("{key} = {value}\n"));
-        }
-    }
-    text
 }
 
 /// The messages of all errors.
@@ -345,33 +44,6 @@ pub(crate) fn placeless(mut scene: Scene) -> Scene {
 }
 
 #[test]
-fn unmarked_keys_are_optional() {
-    let (_folder, path) = folder();
-    let outcome = |text: String| parse(text.into(), &path);
-    let whole = outcome(example(|_, _| false));
-    assert_eq!(errors(&whole.diagnostics), [""; 0]);
-    let whole = placeless(whole.scene.expect("a scene"));
-    for (table, (header, keys)) in TABLES.iter().enumerate() {
-        for &(key, _, promise) in *keys {
-            // A Phong material has no `reflectance`. Non-default values are tested below.
-            if key == "type" && promise == Other {
-                continue;
-            }
-            let without = outcome(example(|of, name| (of, name) == (table, key)));
-            let said = errors(&without.diagnostics);
-            match promise {
-                Required => assert_eq!(said, [format!("{header} needs `{key}`")], "{header} {key}"),
-                Default | Other => {
-                    assert_eq!(said, [""; 0], "{header} {key}");
-                    let scene = placeless(without.scene.expect("a scene"));
-                    assert_eq!(scene == whole, promise == Default, "{header} {key}: wrong default");
-                }
-            }
-        }
-    }
-}
-
-#[test]
 fn environment_without_a_map_is_black() {
     let (_folder, path) = folder();
     let camera = "[camera]\nposition = [0, 1, 4]\nlook_at = [0, 1, 0]\n";
@@ -381,20 +53,6 @@ fn environment_without_a_map_is_black() {
     };
     assert_eq!([color(""), color("[environment]\n")], [None, Some([0.0; 3])]);
     assert_eq!(color("[environment]\nfile = \"sky.hdr\"\n"), Some([1.0; 3]));
-}
-
-#[test]
-fn required_keys_suffice() {
-    let (_folder, path) = folder();
-    let is_kept = |table: usize, key: &str| {
-        let (_, keys) = TABLES[table];
-        keys.iter().any(|(name, _, promise)| *name == key && *promise == Required) || key == "type"
-    };
-    let outcome = parse(example(|table, key| !is_kept(table, key)).into(), &path);
-    assert_eq!(errors(&outcome.diagnostics), [""; 0]);
-    let scene = outcome.scene.expect("a scene");
-    assert_eq!((scene.objects.len(), scene.lights.len(), scene.materials.len()), (10, 3, 6));
-    assert_eq!(scene.output, None);
 }
 
 #[test]
@@ -440,34 +98,6 @@ fn every_shape_accepts_a_matrix() {
         let map = AffineMap { linear: [x, y, z], translate: DVec3::new(5.0, 6.0, 7.0) };
         assert_eq!(shape(matrix), shape("").transformed(map), "{kind}");
         assert_eq!(shape(matrix).kind(), kind);
-    }
-}
-
-#[test]
-fn every_choice_is_accepted() {
-    let (_folder, path) = folder();
-    let camera = "[camera]\nposition = [0, 1, 4]\nlook_at = [0, 1, 0]\n";
-    let words: &[(&str, &[&str])] = &[
-        ("[render]\nshadows", &["off", "hard", "soft"]),
-        ("[render]\naccel", &["bvh", "bvh-high", "kdtree"]),
-        ("[render]\nfilter", &["box", "tent", "gaussian", "mitchell"]),
-        ("[render]\ntonemap", &["none", "reinhard", "aces", "agx"]),
-        ("[textures.bumps]\nfile = \"textures/bumps.png\"\nfilter", &["nearest", "bilinear"]),
-        ("[textures.bumps]\nfile = \"textures/bumps.png\"\nwrap", &["repeat", "clamp", "mirror"]),
-        ("[textures.bumps]\nfile = \"textures/bumps.png\"\nencoding", &["auto", "srgb", "linear"]),
-        ("[materials.a]\ntype", &["phong", "mirror", "glass", "plastic", "principled"]),
-        (
-            "[materials.a]\ntype = \"metal\"\nelement",
-            &["gold", "silver", "copper", "aluminium", "iron", "chromium", "titanium"],
-        ),
-        ("[materials.a]\nemission_sides", &["front", "both"]),
-        ("[[light]]\nfalloff", &["square", "none"]),
-    ];
-    for (key, words) in words {
-        for word in *words {
-            let outcome = parse(format!("{camera}{key} = \"{word}\"\n").into(), &path);
-            assert_eq!(errors(&outcome.diagnostics), [""; 0], "{key} {word}");
-        }
     }
 }
 
@@ -540,23 +170,12 @@ fn ranges_include_their_limits() {
 #[test]
 fn paths_are_relative_to_the_scene() {
     let (folder, path) = folder();
-    let outcome = parse(example(|_, _| false).into(), &path);
-    let scene = outcome.scene.expect("a scene");
+    let text = "[render]\noutput = \"cornell.png\"\n[camera]\nposition = [0, 1, 4]\nlook_at = [0, 1, 0]\n\
+                [textures.bricks]\nfile = \"textures/bricks.png\"\n[[mesh]]\nfile = \"../assets/knot.obj\"\n";
+    let scene = parse(text.into(), &path).scene.expect("a scene");
     assert_eq!(scene.output, Some(folder.path().join("scenes/cornell.png")));
     assert_eq!(scene.mesh_files[0].value, folder.path().join("scenes/../assets/knot.obj"));
-    assert_eq!(scene.textures[1].file.value, folder.path().join("scenes/textures/bricks.png"));
-}
-
-#[test]
-fn starter_has_every_key() {
-    for (header, keys) in TABLES {
-        for (key, ..) in *keys {
-            let has = |line: &str| line.trim_start_matches("# ").starts_with(&format!("{key} = "));
-            assert!(starter_scene().lines().any(has), "starter: {header} {key}");
-        }
-    }
-    // `name` is an optional key of every shape.
-    assert!(starter_scene().contains("# name = "), "name");
+    assert_eq!(scene.textures[0].file.value, folder.path().join("scenes/textures/bricks.png"));
 }
 
 #[test]

@@ -25,7 +25,8 @@ use crate::pipeline::settings::{
     CheckpointSettings, OutputLayer, Overrides, ResumeMode, UpAxis, ViewMode, ViewSide,
 };
 use crate::pipeline::turntable::{self, TurntableFrame};
-use crate::scene::description::{Accel, Integrator, KeyRange, RenderOptions, ShadowMode, render_keys};
+use crate::scene::description::{Accel, Integrator, ShadowMode, render_keys};
+use crate::scene::keys::{ValueKind, find_key};
 use crate::tui::{ColorDepthChoice, PreviewChoice};
 
 /// Examples for the long help and the manual page, in lines of at most 80 columns.
@@ -654,11 +655,9 @@ fn parse_u32(text: &str) -> Result<u32, String> {
 fn integer_override_parser(
     key: &'static str,
 ) -> impl Fn(&str) -> Result<u32, String> + Clone + Send + Sync + 'static {
-    move |text| match RenderOptions::find_key_spec(key).map(|key| key.range) {
-        Some(KeyRange::Whole(range)) => parse_integer_in_range(text, range),
-        Some(KeyRange::Number(_) | KeyRange::Names(_) | KeyRange::Color) | None => {
-            Err(format!("`{key}` is not an integer key of [render]"))
-        }
+    move |text| match find_key("render", key).map(|key| key.kind) {
+        Some(ValueKind::Whole(least, most)) => parse_integer_in_range(text, least as u32..=most as u32),
+        Some(_) | None => Err(format!("`{key}` is not an integer key of [render]")),
     }
 }
 
@@ -669,13 +668,10 @@ fn number_override_parser(
     expected: &'static str,
 ) -> impl Fn(&str) -> Result<f32, String> + Clone + Send + Sync + 'static {
     move |text| {
-        let range = match RenderOptions::find_key_spec(key).map(|key| key.range) {
-            Some(KeyRange::Number(range)) => range,
-            Some(KeyRange::Whole(_) | KeyRange::Names(_) | KeyRange::Color) | None => {
-                return Err(format!("`{key}` is not a number key of [render]"));
-            }
-        };
-        let number = text.parse::<f32>().ok().filter(|number| range.contains(&f64::from(*number)));
+        let limits = find_key("render", key).and_then(|key| key.kind.limits());
+        let limits = limits.ok_or_else(|| format!("`{key}` is not a number key of [render]"))?;
+        let number = text.parse::<f32>().ok();
+        let number = number.filter(|number| limits.violation(f64::from(*number)).is_none());
         number.ok_or_else(|| expected.to_owned())
     }
 }

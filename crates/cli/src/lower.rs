@@ -158,8 +158,11 @@ mod tests {
     use crate::args::{Args, Subcommand};
     use crate::choice::Choice;
     use crate::film::Rect;
+    use crate::math::limits::LARGEST;
     use crate::pipeline::settings::{CheckpointSettings, ResumeMode, ViewMode};
-    use crate::scene::description::{self, KeyRange};
+    use crate::scene::description::{self, render_keys};
+    use crate::scene::keys::limits::Limits;
+    use crate::scene::keys::{ValueKind, find_table};
 
     fn lowered(line: &str) -> Result<RenderRequest, String> {
         let words = std::iter::once("glimt").chain(line.split_whitespace());
@@ -261,27 +264,39 @@ mod tests {
         }
     }
 
+    macro_rules! names {
+        ($(
+            $(#[doc = $doc:literal])* $name:ident: $type:ty = $default:expr, $range:ident $(($($limit:expr),*))?, $unit:literal, option;
+        )*) => {
+            &[$(stringify!($name)),*]
+        };
+    }
+
     /// Checks that options accept and reject the same values as the corresponding `[render]` keys.
     #[test]
     fn options_have_the_same_ranges_as_keys() {
+        const NAMES: &[&str] = render_keys!(names, option);
         let command = Args::command();
-        for key in description::RenderOptions::key_specs() {
+        let keys = find_table("render").expect("a table").keys.iter().filter(|key| key.name != "output");
+        for key in keys {
             let name = key.name.replace('_', "-");
             let option = command.get_arguments().find(|option| option.get_long() == Some(&*name));
-            assert_eq!(option.is_some(), key.has_option, "--{name}");
+            assert_eq!(option.is_some(), NAMES.contains(&key.name), "--{name}");
             let Some(option) = option else { continue };
             assert!(option.get_help().is_some(), "--{name} has no help");
-            let (accepted, refused) = match key.range {
-                KeyRange::Whole(range) => {
-                    let (least, most) = (i64::from(*range.start()), i64::from(*range.end()));
-                    ([least, most].map(|end| end.to_string()).to_vec(), vec![least - 1, most + 1])
+            let (accepted, refused) = match key.kind {
+                ValueKind::Whole(least, most) => (
+                    [least, most].map(|end| end.to_string()).to_vec(),
+                    vec![least as i64 - 1, most as i64 + 1],
+                ),
+                ValueKind::Number(Limits::AtLeast(least)) => {
+                    let ends = [least as f32, LARGEST as f32];
+                    (ends.map(|end| end.to_string()).to_vec(), vec![least as i64 - 1])
                 }
-                KeyRange::Number(range) => {
-                    let ends = [*range.start() as f32, *range.end() as f32];
-                    (ends.map(|end| end.to_string()).to_vec(), vec![*range.start() as i64 - 1])
+                ValueKind::Words(values) => {
+                    (values().iter().map(|value| value.name.to_owned()).collect(), Vec::new())
                 }
-                KeyRange::Names(names) => (names.into_iter().map(str::to_owned).collect(), Vec::new()),
-                KeyRange::Color => panic!("--{name}: no option takes a color"),
+                kind => panic!("--{name}: no option takes a {kind:?}"),
             };
             let refused = refused.iter().map(i64::to_string).chain(["another".to_owned()]);
             for value in accepted {

@@ -2,8 +2,8 @@
 
 use std::ops::Range;
 
-use super::description::{Pose, ResolvedCamera, is_same_distance};
-use super::document::{FOV_DEGREES, parse_camera};
+use super::description::{Camera, Pose, ResolvedCamera, is_same_distance};
+use super::document::parse_camera;
 use super::source::SceneText;
 use super::toml::{self, Entries, KeyValue, TomlValue, Value};
 use crate::math::DVec3;
@@ -38,6 +38,11 @@ struct CameraEdits<'t> {
 impl CameraEdits<'_> {
     fn set_camera(&mut self, wanted: &ResolvedCamera) {
         let ResolvedCamera { pose: Pose { position, look_at, up }, fov, aperture, focus } = *wanted;
+        let with_defaults = "[camera]\nposition = [0, 1, 4]\nlook_at = [0, 1, 0]";
+        let default = match parse_camera(&SceneText::from_file_text(with_defaults.into())) {
+            Some(Camera::LookAt { up, fov, aperture, .. }) => (up, fov, aperture),
+            Some(Camera::Orbiter { .. }) | None => return,
+        };
         match self.table.get("orbiter") {
             Some(orbiter) => {
                 let place = [("position", position), ("look_at", look_at)];
@@ -50,9 +55,9 @@ impl CameraEdits<'_> {
                 self.set_vector("look_at", look_at, None);
             }
         }
-        self.set_vector("up", up, Some(DVec3::Y));
-        self.set_number("fov", fov, FOV_DEGREES);
-        self.set_number("aperture", aperture, 0.0);
+        self.set_vector("up", up, Some(default.0));
+        self.set_number("fov", fov, default.1);
+        self.set_number("aperture", aperture, default.2);
         match self.table.get("focus") {
             // Ignore rounding errors in the distance while orbiting.
             Some(given) if wanted.is_focused_on_look_at() && is_nearly_equal(&given.value, focus) => {}

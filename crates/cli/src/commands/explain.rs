@@ -131,12 +131,13 @@ fn key_details(path: &str, key: &KeyInfo) -> String {
         "default",
         match key.default {
             DefaultValue::Required(_) => "required".to_owned(),
-            DefaultValue::Is(_) | DefaultValue::By(_) | DefaultValue::Absent => {
-                without_backticks(&key.default_markdown())
-            }
+            DefaultValue::Is(_)
+            | DefaultValue::By(_)
+            | DefaultValue::Alternative(_)
+            | DefaultValue::Absent => without_backticks(&key.default_markdown()),
         },
     );
-    row("example", format!("{} = {}", key.name, key.default_or_example()));
+    row("example", key.example_line());
     if let ValueKind::Words(list) = key.kind {
         text.push('\n');
         for word in list() {
@@ -153,7 +154,7 @@ fn key_summary(path: &str, key: &KeyInfo) -> String {
         DefaultValue::Is(_) | DefaultValue::By(_) => {
             format!("default {}", without_backticks(&key.default_markdown()))
         }
-        DefaultValue::Absent => String::new(),
+        DefaultValue::Alternative(_) | DefaultValue::Absent => String::new(),
     };
     let facts = [without_backticks(&key.kind_text()), key.unit.to_owned(), key.range_text(), default];
     let facts: Vec<String> = facts.into_iter().filter(|fact| !fact.is_empty()).collect();

@@ -21,9 +21,7 @@ pub use material::{
     TextureEncoding, TextureFilter, TextureRole, UvSet, Wrap,
 };
 pub use method::{Integrator, IntegratorProperties};
-pub use render::{
-    Accel, KeyRange, MAX_BOUNCES, PixelFilter, RenderKeySpec, RenderOptions, ShadowMode, Tonemap, render_keys,
-};
+pub use render::{Accel, MAX_BOUNCES, PixelFilter, RenderOptions, ShadowMode, Tonemap, render_keys};
 pub use shape::{
     AffineMap, LoweredShape, MeshReference, MeshTransform, Object, OpenSurface, Shape, max_projection,
 };

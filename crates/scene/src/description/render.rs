@@ -1,15 +1,13 @@
 //! The `[render]` table: render settings and the definitions of their keys.
 
-use std::ops::RangeInclusive;
-
 use super::super::fingerprint::{FingerprintContext, FingerprintHasher, Fingerprinted};
-use super::super::keys::key::{ChoiceValuesFn, choice_values};
+use super::super::keys::key::{COLOR, DefaultValue, KeyInfo, ValueKind, choice_values, doc_text};
+use super::super::keys::limits::Limits;
 use super::method::Integrator;
 use crate::choice;
 use crate::choice::Choice;
 pub use crate::film::tone::Tonemap;
 use crate::math::Vec3;
-use crate::math::limits::LARGEST;
 pub use crate::sampling::filter::PixelFilter;
 
 /// Maximum value of `max_depth`, which is the only limit for paths between perfect mirrors.
@@ -89,7 +87,7 @@ macro_rules! __render_keys {
 }
 
 /// Passes the definitions of all `[render]` keys to a macro, each as `doc name: type = default, range, unit,
-/// change;`. The parser, [`RenderOptions`], overrides and command-line options are generated from them.
+/// change;`. [`RenderOptions`], its reader, overrides and command-line options are generated from them.
 ///
 /// The ranges are `whole(MIN, MAX)`, `at_least(MIN)`, `between(MIN, MAX)`, `choice` and `color`. `change`
 /// specifies what can override the key:
@@ -108,62 +106,21 @@ macro_rules! __render_keys {
 #[doc(inline)]
 pub use __render_keys as render_keys;
 
-/// Range of values for a `[render]` key.
-#[derive(Clone, Debug, PartialEq)]
-pub enum KeyRange {
-    /// Whole numbers.
-    Whole(RangeInclusive<u32>),
-    /// Numbers in this range, at most [`LARGEST`].
-    Number(RangeInclusive<f64>),
-    /// One of these names.
-    Names(Vec<&'static str>),
-    /// A color.
-    Color,
-}
-
-/// A `[render]` key.
-#[derive(Clone, Debug)]
-pub struct RenderKeySpec {
-    /// Name of the key.
-    pub name: &'static str,
-    /// Description: one sentence without a final period.
-    pub doc: &'static str,
-    /// Unit of the value, or an empty string.
-    pub unit: &'static str,
-    /// Accepted values.
-    pub range: KeyRange,
-    /// Returns the accepted names and their meanings, or an empty list if the value is not a choice.
-    pub choice_values: ChoiceValuesFn,
-    /// The default, in scene file syntax.
-    pub default: String,
-    /// Whether a command-line option overrides the key.
-    pub has_option: bool,
-}
-
-macro_rules! range {
+macro_rules! kind {
     (whole($least:expr, $most:expr), $type:ty) => {
-        KeyRange::Whole($least..=$most)
+        ValueKind::Whole(<u64 as From<u32>>::from($least), <u64 as From<u32>>::from($most))
     };
     (at_least($least:expr), $type:ty) => {
-        KeyRange::Number($least..=LARGEST)
+        ValueKind::Number(Limits::AtLeast($least))
     };
     (between($least:expr, $most:expr), $type:ty) => {
-        KeyRange::Number($least..=$most)
+        ValueKind::Number(Limits::Between($least, $most))
     };
     (choice, $type:ty) => {
-        KeyRange::Names(<$type>::ALL.iter().map(|one| one.name()).collect())
+        ValueKind::Words(choice_values::<$type>)
     };
     (color, $type:ty) => {
-        KeyRange::Color
-    };
-}
-
-macro_rules! choice_values {
-    (choice, $type:ty) => {
-        choice_values::<$type>
-    };
-    ($range:ident, $type:ty) => {
-        Vec::new
+        COLOR
     };
 }
 
@@ -193,22 +150,15 @@ macro_rules! settings {
             /// The default settings.
             pub const DEFAULT: Self = Self { $($name: $default),* };
 
-            /// Returns the keys in `[render]`, except `output`.
-            pub fn key_specs() -> Vec<RenderKeySpec> {
-                vec![$(RenderKeySpec {
+            /// Returns the definitions of the keys in `[render]`, except `output`.
+            pub(crate) fn keys() -> Vec<KeyInfo> {
+                vec![$(KeyInfo {
                     name: stringify!($name),
-                    doc: concat!($($doc),*).trim().trim_end_matches('.'),
+                    kind: kind!($range $(($($limit),*))?, $type),
                     unit: $unit,
-                    range: range!($range $(($($limit),*))?, $type),
-                    choice_values: choice_values!($range, $type),
-                    default: in_toml!($range, Self::DEFAULT.$name),
-                    has_option: stringify!($change) == "option",
+                    default: DefaultValue::Is(in_toml!($range, Self::DEFAULT.$name).leak()),
+                    doc: doc_text(concat!($($doc),*)),
                 }),*]
-            }
-
-            /// Finds a key by its name.
-            pub fn find_key_spec(name: &str) -> Option<RenderKeySpec> {
-                Self::key_specs().into_iter().find(|key| key.name == name)
             }
         }
     };
@@ -246,9 +196,9 @@ impl RenderOptions {
     pub fn reset_ignored(self) -> Self {
         let method = self.integrator.properties();
         Self {
-            shadows: if method.honors_shadows { self.shadows } else { ShadowMode::Soft },
-            ambient: if method.honors_ambient { self.ambient } else { Vec3::ZERO },
-            clamp: if method.honors_clamp { self.clamp } else { 0.0 },
+            shadows: if method.honors_shadows { self.shadows } else { Self::DEFAULT.shadows },
+            ambient: if method.honors_ambient { self.ambient } else { Self::DEFAULT.ambient },
+            clamp: if method.honors_clamp { self.clamp } else { Self::DEFAULT.clamp },
             ..self
         }
     }

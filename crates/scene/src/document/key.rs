@@ -1,79 +1,124 @@
-//! Reads a table's key as the expected type. Every method returns `None` if the key is absent or invalid.
-//! If the key is invalid, the method also reports an error.
+//! Reads a table's key as the expected type. Every method takes the range and the default from the key's
+//! definition. If the key is absent, the method returns the default, or `None` if there is no default. If
+//! the value is invalid, it reports an error and returns `None`.
 
 mod color;
 mod file;
 mod number;
+mod vector;
 
-use std::ops::{Range, RangeInclusive};
+use std::ops::Range;
 
+use super::super::keys::key::{DefaultValue, KeyInfo, ValueKind};
 use super::super::nearest::foreign_or_nearest_name;
 use super::super::sanitize::escape_and_truncate;
+use super::super::toml::KeyValue;
 use super::context::{FileContext, Issue};
 use super::limits::Limits;
 use super::names::DefinedNames;
 use super::table::{TableReader, TableTitle};
-use super::value::{
-    TomlValue, Value, describe_value, number_within, parse_integer_in_radix, report_wrong_type,
-};
+use super::value::{TomlValue, Value, default_value, describe_value, parse_integer_in_radix, to_number};
 use crate::choice::Choice;
-use crate::math::limits::{SHORTEST, is_nonzero_but_too_short, robust_length};
-use crate::math::{DVec3, Vec2};
 
 /// A table's key, which may be absent.
 pub(super) struct KeyInTable<'a> {
     pub(super) context: &'a FileContext<'a>,
-    pub(super) name: &'static str,
-    pub(super) value: Option<Value<'a>>,
-    key_span: Option<Range<usize>>,
+    /// The key's definition.
+    pub(super) info: &'static KeyInfo,
+    /// The value in the file. If the key is absent, the default, if any.
+    value: Option<Value<'a>>,
+    /// The spans of the key and the value, if the file has the key.
+    spans: Option<[Range<usize>; 2]>,
 }
 
 impl<'a> KeyInTable<'a> {
     pub(super) fn new(
         context: &'a FileContext<'a>,
-        name: &'static str,
-        key_span: Option<Range<usize>>,
-        value: Option<Value<'a>>,
+        info: &'static KeyInfo,
+        entry: Option<KeyValue<'a>>,
     ) -> Self {
-        Self { context, name, value, key_span }
+        let Some(KeyValue { key: _, span, value }) = entry else {
+            let value = if let DefaultValue::Is(text) = info.default { default_value(text) } else { None };
+            return Self { context, info, value, spans: None };
+        };
+        Self { context, info, value: Some(value), spans: Some([span, value.span()]) }
     }
 
     /// Whether the file has the key.
     pub(super) fn is_present(&self) -> bool {
-        self.value.is_some()
+        self.spans.is_some()
     }
 
     /// The span of the key.
     pub(super) fn key_span(&self) -> Option<Range<usize>> {
-        self.key_span.clone()
+        self.spans.clone().map(|[key, _]| key)
     }
 
     /// The span of the value.
     pub(super) fn value_span(&self) -> Option<Range<usize>> {
-        self.value.map(|value| value.span())
+        self.spans.clone().map(|[_, value]| value)
+    }
+
+    /// Returns the result of `read`. If the value is invalid, returns the default, so that the reader can
+    /// continue and find more errors.
+    pub(super) fn or_default<T>(&self, read: impl Fn(&Self) -> Option<T>) -> T {
+        read(self).unwrap_or_else(|| self.default(read))
+    }
+
+    /// Reads the default, even if the file has the key.
+    pub(super) fn default<T>(&self, read: impl Fn(&Self) -> Option<T>) -> T {
+        read(&Self::new(self.context, self.info, None)).expect("a test reads every default")
     }
 
     /// Reads a number, which may be an integer.
-    pub(super) fn number(&self, limits: Limits) -> Option<f64> {
-        number_within(self.context, self.name, self.value?, limits, "a number")
+    pub(super) fn number(&self) -> Option<f64> {
+        self.number_in(self.value?, "a number")
     }
 
     /// Reads a number in single precision.
-    pub(super) fn number_f32(&self, limits: Limits) -> Option<f32> {
-        self.number(limits).map(|number| number as f32)
+    pub(super) fn number_f32(&self) -> Option<f32> {
+        self.number().map(|number| number as f32)
     }
 
-    /// Reads an integer. `N` must be able to represent all of `range`.
-    pub(super) fn integer<N: TryFrom<i128>>(&self, range: RangeInclusive<i128>) -> Option<N> {
-        let value = self.value?;
-        let TomlValue::Integer { digits, radix } = value.decode() else {
-            report_wrong_type(self.context, self.name, value, "a whole number");
+    /// Reads a number, which may be part of the key's value. Error messages call the value's type `expected`.
+    fn number_in(&self, value: Value<'_>, expected: &str) -> Option<f64> {
+        let Some(number) = to_number(value) else {
+            self.report_wrong_type(value, expected);
             return None;
         };
+        let violation = self.info.kind.limits().unwrap_or(Limits::Any).violation(number);
+        if let Some(words) = &violation {
+            let label = format!("found {}", describe_value(self.context, value));
+            let issue = Issue::error(value.span(), format!("`{}` {words}", self.info.name));
+            self.context.report(issue.with_label(label));
+        }
+        violation.is_none().then_some(number)
+    }
+
+    /// Reports a value of the wrong type.
+    fn report_wrong_type(&self, value: Value<'_>, expected: &str) {
+        let name = self.info.name;
+        let label = format!("found {}", describe_value(self.context, value));
+        let issue = Issue::error(value.span(), format!("`{name}` must be {expected}")).with_label(label);
+        // Explain that textures are not allowed here. Otherwise, users would look for a typo.
+        let is_texture = matches!(value.decode(), TomlValue::Table(table) if table.get("texture").is_some());
+        self.context.report(match is_texture && !expected.contains("texture") {
+            true => issue.with_help(format!("`{name}` cannot be a texture")),
+            false => issue,
+        });
+    }
+
+    /// Reads an integer. `N` must be able to represent the whole range.
+    pub(super) fn integer<N: TryFrom<i128>>(&self) -> Option<N> {
+        let (value, ValueKind::Whole(low, high)) = (self.value?, self.info.kind) else { return None };
+        let TomlValue::Integer { digits, radix } = value.decode() else {
+            self.report_wrong_type(value, "a whole number");
+            return None;
+        };
+        let range = i128::from(low)..=i128::from(high);
         let number = parse_integer_in_radix(digits, radix).filter(|number| range.contains(number));
         if number.is_none() {
-            let (name, low, high) = (self.name, range.start(), range.end());
-            let message = format!("`{name}` must be a whole number between {low} and {high}");
+            let message = format!("`{}` must be a whole number between {low} and {high}", self.info.name);
             let label = format!("found {}", describe_value(self.context, value));
             self.context.report(Issue::error(value.span(), message).with_label(label));
         }
@@ -86,7 +131,7 @@ impl<'a> KeyInTable<'a> {
         if let TomlValue::Boolean(flag) = value.decode() {
             return Some(flag);
         }
-        report_wrong_type(self.context, self.name, value, "true or false");
+        self.report_wrong_type(value, "true or false");
         None
     }
 
@@ -101,7 +146,7 @@ impl<'a> KeyInTable<'a> {
         if let TomlValue::String(text) = value.decode() {
             return Some(text);
         }
-        report_wrong_type(self.context, self.name, value, &expected());
+        self.report_wrong_type(value, &expected());
         None
     }
 
@@ -114,7 +159,7 @@ impl<'a> KeyInTable<'a> {
         if text.bytes().any(|byte| !byte.is_ascii_digit()) {
             return Some(Some(text.into()));
         }
-        let issue = Issue::error(self.value_span()?, format!("`{}` must not be a number", self.name));
+        let issue = Issue::error(self.value_span()?, format!("`{}` must not be a number", self.info.name));
         self.context.report(
             issue.with_help("use a name with a letter, because shapes can also be referenced by number"),
         );
@@ -137,7 +182,7 @@ impl<'a> KeyInTable<'a> {
             return Some(meant);
         }
         let (span, name, shown, list) =
-            (self.value_span()?, self.name, escape_and_truncate(text, 32), list());
+            (self.value_span()?, self.info.name, escape_and_truncate(text, 32), list());
         let mut issue = if C::UNAVAILABLE.contains(&text) {
             let message = format!("{name} \"{shown}\" is not available in this version; use {list}");
             Issue::error(span, message)
@@ -153,64 +198,19 @@ impl<'a> KeyInTable<'a> {
         None
     }
 
-    /// Reads three numbers as a vector.
-    pub(super) fn vector(&self, limits: Limits) -> Option<DVec3> {
-        self.numbers(limits, "three numbers, [x, y, z]").map(DVec3::from_array)
-    }
-
-    /// Reads three numbers as a vector. Returns `default` if the key is absent.
-    pub(super) fn vector_or(&self, limits: Limits, default: DVec3) -> Option<DVec3> {
-        if self.is_present() { self.vector(limits) } else { Some(default) }
-    }
-
-    /// Checks that a vector is long enough to compute with, and reports an error if not. For vectors of
-    /// length 0, the caller reports a more specific error.
-    pub(super) fn check_vector_zero_or_long_enough(&self, vector: DVec3) -> bool {
-        let length = robust_length(vector);
-        let Some(span) = self.value_span().filter(|_| is_nonzero_but_too_short(length)) else { return true };
-        let issue = Issue::error(span, format!("`{}` must be more than {SHORTEST:e} long", self.name));
-        self.context.report(issue.with_label(format!("its length is {length:e}")));
-        false
-    }
-
-    /// Checks that the points at the keys `self` and `other` are far enough apart to compute with, and
-    /// reports an error if not. For equal points, the caller reports a more specific error.
-    pub(super) fn check_points_equal_or_far_apart(&self, from: DVec3, other: &Self, to: DVec3) -> bool {
-        let distance = robust_length(to - from);
-        let span = other.value_span().or(self.value_span());
-        let Some(span) = span.filter(|_| is_nonzero_but_too_short(distance)) else { return true };
-        let (first, second) = (self.name, other.name);
-        let message = format!("`{first}` and `{second}` must be more than {SHORTEST:e} apart");
-        self.context.report(Issue::error(span, message).with_label(format!("they are {distance:e} apart")));
-        false
-    }
-
-    /// Reads a pair of numbers.
-    pub(super) fn pair(&self, limits: Limits) -> Option<Vec2> {
-        self.numbers(limits, "two numbers, [u, v]").map(|[u, v]: [f64; 2]| Vec2::new(u as f32, v as f32))
-    }
-
     /// Reads an array of `N` numbers. Reports every invalid number.
-    pub(super) fn numbers<const N: usize>(&self, limits: Limits, expected: &str) -> Option<[f64; N]> {
+    pub(super) fn numbers<const N: usize>(&self, expected: &str) -> Option<[f64; N]> {
         let value = self.value?;
         let Some(array) = value.as_array().filter(|array| array.len() == N) else {
-            report_wrong_type(self.context, self.name, value, expected);
+            self.report_wrong_type(value, expected);
             return None;
         };
         let mut numbers = [Some(0.0); N];
         for (number, one) in numbers.iter_mut().zip(array.iter()) {
-            *number = number_within(self.context, self.name, one, limits, expected);
+            *number = self.number_in(one, expected);
         }
         let is_whole = numbers.iter().all(Option::is_some);
         is_whole.then(|| numbers.map(Option::unwrap_or_default))
-    }
-
-    /// Reads scale factors: one number for all three axes, or three numbers.
-    pub(super) fn scale_factors(&self, limits: Limits) -> Option<DVec3> {
-        if matches!(self.value?.decode(), TomlValue::Integer { .. } | TomlValue::Float(_)) {
-            return self.number(limits).map(DVec3::splat);
-        }
-        self.numbers(limits, "a number, or three numbers [x, y, z]").map(DVec3::from_array)
     }
 
     /// Reads a name and returns the name's index in `names`.
@@ -234,6 +234,6 @@ impl<'a> KeyInTable<'a> {
 
     /// Reads an inline table: `{ … }`.
     pub(super) fn inline_table(&self) -> Option<TableReader<'a>> {
-        TableReader::from_value(self.context, self.value?, TableTitle::Key(self.name))
+        TableReader::from_value(self.context, self.value?, TableTitle::Key(self.info.name))
     }
 }

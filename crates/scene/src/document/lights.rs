@@ -1,65 +1,95 @@
-//! Reads the `[[light]]` tables.
+//! The `[[light]]` tables.
 
 use super::super::description::Light;
 use super::super::description::light::{DirectionalLight, Falloff, PointLight, SpotLight};
+use super::super::keys::key::DefaultValue::Is;
+use super::super::keys::key::ValueKind::{Number, Words};
+use super::super::keys::key::{COLOR, DIRECTION, POINT, TableInfo, TableSyntax, choice_values, table_types};
 use super::context::Issue;
-use super::limits::Limits;
-use super::shapes::read_unnormalized_direction;
+use super::key::KeyInTable;
+use super::limits::Limits::{Between, Inside};
 use super::table::TableReader;
-use crate::choice;
-use crate::math::{DVec3, Vec3};
 
-choice! {
+table_types! {
     /// Types of lights.
-    enum LightKind {
-        /// A point light.
-        Point = "point",
-        /// A point light that shines only within a cone.
-        Spot = "spot",
-        /// A distant light.
-        Directional = "directional",
+    enum LightType, const TYPES;
+    /// A point light.
+    Point = "point" {
+        /// Position.
+        position: POINT, Is("[0, 3, 0]"), "length";
+        /// Radiant intensity, the same in all directions.
+        intensity: COLOR, Is("[10, 10, 10]"), "W/sr";
+        /// `"square"`: inverse-square falloff, physically correct; `"none"`: `intensity` is the irradiance at
+        /// normal incidence, at any distance.
+        falloff: Words(choice_values::<Falloff>), Is("\"square\"");
+    }
+    /// A point light that shines only within a cone.
+    Spot = "spot" {
+        /// Position.
+        position: POINT, Is("[0, 3, 0]"), "length";
+        /// A point on the cone's axis.
+        look_at: POINT, Is("[0, 0, 0]"), "length";
+        /// Radiant intensity on the axis.
+        intensity: COLOR, Is("[10, 10, 10]"), "W/sr";
+        /// Full apex angle of the cone.
+        angle: Number(Inside(0.0, 360.0)), Is("45"), "degrees";
+        /// Outer part of the cone where the light fades out.
+        blend: Number(Between(0.0, 1.0)), Is("0.2"), "fraction of the half angle";
+        /// As for a point light.
+        falloff: Words(choice_values::<Falloff>), Is("\"square\"");
+    }
+    /// Light from a distant source, such as the sun.
+    Directional = "directional" {
+        /// Direction in which the light travels.
+        direction: DIRECTION, Is("[0, -1, 0]");
+        /// Irradiance at normal incidence.
+        irradiance: COLOR, Is("[1, 1, 1]"), "W/m²";
+        /// Apparent diameter, 0 or at least 0.001; use 0.53 for the sun. Above 0, shadows are soft and the
+        /// disk is visible.
+        angle: Number(Between(0.0, 180.0)), Is("0"), "degrees";
     }
 }
 
+pub(crate) static LIGHT: TableInfo =
+    TableInfo { types: TYPES, ..TableInfo::new("light", TableSyntax::List, "A light without a shape", &[]) };
+
 pub(super) fn read_lights(root: &TableReader<'_>) -> Option<Vec<Light>> {
-    let read: Vec<Option<Light>> = root.tables("light").map(|table| read_light(&table)).collect();
+    let read: Vec<Option<Light>> = root.tables(&LIGHT).map(read_light).collect();
     read.into_iter().collect()
 }
 
-fn read_light(table: &TableReader<'_>) -> Option<Light> {
-    let key = table.optional_key("type");
+fn read_light(mut table: TableReader<'_>) -> Option<Light> {
     // Without a valid type, keys cannot be checked.
-    let kind = if key.is_present() { key.choice()? } else { LightKind::Point };
-    let light = match kind {
-        LightKind::Point => read_point_light(table).map(Light::Point),
-        LightKind::Spot => read_spot_light(table).map(Light::Spot),
-        LightKind::Directional => read_directional_light(table).map(Light::Directional),
+    let light = match table.read_type()? {
+        LightType::Point => read_point_light(&table).map(Light::Point),
+        LightType::Spot => read_spot_light(&table).map(Light::Spot),
+        LightType::Directional => read_directional_light(&table).map(Light::Directional),
     };
     table.report_unknown_and_missing_keys();
     light
 }
 
 fn read_point_light(table: &TableReader<'_>) -> Option<PointLight> {
-    let position = table.optional_key("position").vector_or(Limits::Any, DVec3::new(0.0, 3.0, 0.0));
-    let intensity = table.optional_key("intensity").color().unwrap_or(Vec3::splat(10.0));
-    let falloff = table.optional_key("falloff").choice().unwrap_or(Falloff::Square);
+    let position = table.key("position").vector();
+    let intensity = table.key("intensity").or_default(KeyInTable::color);
+    let falloff = table.key("falloff").or_default(KeyInTable::choice);
     Some(PointLight { position: position?, intensity, falloff })
 }
 
 fn read_spot_light(table: &TableReader<'_>) -> Option<SpotLight> {
     let point = read_point_light(table);
-    let aim = table.optional_key("look_at");
-    let look_at = aim.vector_or(Limits::Any, DVec3::ZERO);
-    let angle = table.optional_key("angle");
-    let angle = if angle.is_present() { angle.number(table.key_limits("spot.angle")) } else { Some(45.0) };
-    let blend = table.optional_key("blend");
-    let blend = if blend.is_present() { blend.number_f32(table.key_limits("spot.blend")) } else { Some(0.2) };
+    let (place, aim) = (table.key("position"), table.key("look_at"));
+    let look_at = aim.vector();
+    let (angle, blend) = (table.key("angle").number(), table.key("blend").number_f32());
     let (point, look_at) = (point?, look_at?);
-    let place = table.optional_key("position");
     if point.position == look_at {
         let issue = Issue::error(aim.value_span().or(place.value_span())?, "the spotlight has no direction")
             .with_label("`position` and `look_at` are the same point")
-            .with_help("the defaults are `position = [0, 3, 0]` and `look_at = [0, 0, 0]`");
+            .with_help(format!(
+                "the defaults are `{}` and `{}`",
+                place.info.example_line(),
+                aim.info.example_line()
+            ));
         table.context.report(issue);
         return None;
     }
@@ -74,15 +104,15 @@ fn read_spot_light(table: &TableReader<'_>) -> Option<SpotLight> {
 const MIN_ANGLE_DEGREES: f64 = 1e-3;
 
 fn read_directional_light(table: &TableReader<'_>) -> Option<DirectionalLight> {
-    let direction = read_unnormalized_direction(table, "direction", "light", DVec3::NEG_Y);
-    let irradiance = table.optional_key("irradiance").color().unwrap_or(Vec3::ONE);
-    let key = table.optional_key("angle");
-    let angle = if key.is_present() { key.number(table.key_limits("directional.angle")) } else { Some(0.0) };
+    let direction = table.key("direction").direction("light");
+    let irradiance = table.key("irradiance").color();
+    let key = table.key("angle");
+    let angle = key.number();
     if angle.is_some_and(|angle| angle != 0.0 && angle < MIN_ANGLE_DEGREES) {
         let issue =
             Issue::error(key.value_span()?, format!("`angle` must be 0, or at least {MIN_ANGLE_DEGREES:e}"));
         table.context.report(issue.with_help("0 means no extent; use 0.53 for the sun"));
         return None;
     }
-    Some(DirectionalLight { direction: direction?, irradiance, angle: angle? })
+    Some(DirectionalLight { direction: direction?, irradiance: irradiance?, angle: angle? })
 }

@@ -1,17 +1,136 @@
-//! Reads the `[materials.*]` tables.
+//! The `[materials.NAME]` tables.
 
 use super::super::description::{
-    ColorSource, FresnelSource, Material, MaterialKind, NumberSource, OpacitySource, PhongParameters,
+    Bump, ColorSource, EmissionSides, EmissionSource, FresnelSource, Material, MaterialKind, NormalMap,
+    NumberSource, OpacitySource, PhongParameters,
 };
-use super::common;
+use super::super::keys::key::DefaultValue::{Absent, Alternative, By, Is};
+use super::super::keys::key::ValueKind::{
+    ColorOrTexture, Emission, Flag, Heights, Number, NumberOrTexture, Texture, Words,
+};
+use super::super::keys::key::{TableInfo, TableSyntax, ValueKind, choice_values, keys, table_types};
 use super::context::Issue;
 use super::key::KeyInTable;
-use super::limits::Limits;
+use super::limits::Limits::{Any, AtLeast, Between};
 use super::names::DefinedNames;
 use super::table::TableReader;
-use crate::choice;
 use crate::materials::conductor::elements::MetalElement;
-use crate::math::{DVec3, Vec3};
+use crate::math::Vec3;
+
+/// A color or texture of which no component exceeds 1.
+const REFLECTANCE: ValueKind = ColorOrTexture(Between(0.0, 1.0));
+
+/// A number or texture from 0 to 1.
+const FRACTION: ValueKind = NumberOrTexture(Between(0.0, 1.0));
+
+table_types! {
+    /// Types of materials.
+    enum MaterialType, const TYPES;
+    /// A diffuse surface with a glossy highlight.
+    Phong = "phong" {
+        /// Diffuse reflectance, kd.
+        diffuse: ColorOrTexture(AtLeast(0.0)), Is("[0.7, 0.7, 0.7]"), "reflectance";
+        /// Glossy reflectance, ks; glimt warns if `diffuse` + `specular` exceeds 1, which is not energy
+        /// conserving.
+        specular: ColorOrTexture(AtLeast(0.0)), Is("[0, 0, 0]"), "reflectance";
+        /// Phong exponent; larger values make smaller highlights.
+        shininess: Number(Between(0.0, 1000000.0)), Is("32.0");
+        /// Reflectance for `[render] ambient`.
+        ambient: ColorOrTexture(AtLeast(0.0)), By("as `diffuse`");
+    }
+    /// A perfect mirror.
+    Mirror = "mirror" {
+        /// Reflectance at every angle.
+        reflectance: REFLECTANCE, Is("[0.9, 0.9, 0.9]"), "reflectance";
+    }
+    /// A smooth or rough dielectric, or a thin pane.
+    Glass = "glass" {
+        /// Index of refraction, relative to air.
+        ior: Number(Between(0.1, 10.0)), Is("1.5");
+        /// Square root of the GGX α; 0 is smooth. Thin panes are always smooth.
+        roughness: FRACTION, Is("0.0");
+        /// Transmittance per unit length (Beer's law); for a thin pane, transmittance at any angle, which may
+        /// be a texture.
+        tint: REFLECTANCE, Is("[1, 1, 1]"), "per unit length";
+        /// Whether the glass is an infinitely thin pane.
+        thin: Flag, Is("false");
+    }
+    /// A rough or smooth conductor, defined by exactly one of `color`, `eta` with `k`, and `element`.
+    Metal = "metal" {
+        /// Reflectance at normal incidence; other angles use Schlick's approximation.
+        color: REFLECTANCE, Alternative("[0.9, 0.8, 0.4]"), "reflectance";
+        /// Index of refraction for red, green and blue, used in the exact Fresnel equations.
+        eta: ColorOrTexture(AtLeast(0.0)), Alternative("[0.2, 0.9, 1.1]");
+        /// Extinction coefficient for red, green and blue.
+        k: ColorOrTexture(AtLeast(0.0)), Alternative("[0.2, 0.9, 1.1]");
+        /// Measured `eta` and `k` of a metal.
+        element: Words(choice_values::<MetalElement>), Absent;
+        /// Square root of the GGX α; 0 is a mirror.
+        roughness: FRACTION, Is("0.2");
+        /// Stretches the highlight along u, or along v if negative.
+        anisotropy: NumberOrTexture(Between(-1.0, 1.0)), Is("0.0");
+    }
+    /// A diffuse base under a rough or smooth coat.
+    Plastic = "plastic" {
+        /// Reflectance of the base.
+        diffuse: REFLECTANCE, Is("[0.7, 0.7, 0.7]"), "reflectance";
+        /// Scale factor for the coat's reflectance.
+        specular: REFLECTANCE, Is("[1, 1, 1]");
+        /// The coat's index of refraction.
+        ior: Number(Between(1.0, 10.0)), Is("1.5");
+        /// Square root of the coat's GGX α; 0 is smooth.
+        roughness: FRACTION, Is("0.1");
+    }
+    /// The glTF material model.
+    Principled = "principled" {
+        /// Diffuse reflectance of the dielectric part, and the metal's reflectance at normal incidence.
+        color: REFLECTANCE, Is("[0.8, 0.8, 0.8]"), "reflectance";
+        /// Weight of the metal.
+        metallic: FRACTION, Is("0.0");
+        /// Square root of the specular lobe's GGX α.
+        roughness: FRACTION, Is("0.5");
+        /// Index of refraction of the dielectric part.
+        ior: Number(Between(1.0, 10.0)), Is("1.5");
+        /// Scale factor for the dielectric part's specular reflectance.
+        specular: FRACTION, Is("1.0");
+        /// Scale factor for the dielectric part's specular reflectance at normal incidence.
+        specular_color: ColorOrTexture(AtLeast(0.0)), Is("[1, 1, 1]");
+        /// Fraction of light that is transmitted straight through, as by a thin sheet, instead of scattered.
+        transmission: FRACTION, Is("0.0");
+        /// Weight of the clear coat on top.
+        clearcoat: FRACTION, Is("0.0");
+        /// Square root of the clear coat's GGX α.
+        clearcoat_roughness: FRACTION, Is("0.0");
+    }
+}
+
+pub(crate) static MATERIALS: TableInfo = TableInfo {
+    types: TYPES,
+    ..TableInfo::new(
+        "materials",
+        TableSyntax::Named,
+        "A material, which shapes refer to by name",
+        keys! {
+            /// Emitted radiance; if not black, every shape with this material is an area light.
+            emission: Emission(AtLeast(0.0)), Is("[0, 0, 0]"), "radiance";
+            /// The sides that emit light.
+            emission_sides: Words(choice_values::<EmissionSides>), Is("\"front\"");
+            /// Tangent-space normal map.
+            normal_map: Texture, Absent;
+            /// Strength of the normal map.
+            normal_strength: Number(AtLeast(0.0)), Is("1.0");
+            /// Height map that perturbs the normals.
+            bump: Heights, Absent;
+            /// Displacement of white; negative values invert the relief.
+            bump_scale: Number(Any), Is("0.01"), "length";
+            /// Probability that a ray hits the surface instead of passing through.
+            opacity: FRACTION, Is("1.0");
+            /// If above 0, alpha testing: opaque where the opacity is at least this, invisible elsewhere.
+            /// With `filter = "mipmap"`, distant surfaces keep their coverage.
+            opacity_cutoff: Number(Between(0.0, 1.0)), Is("0.0");
+        },
+    )
+};
 
 /// The materials defined in a file.
 pub(super) struct MaterialList {
@@ -31,78 +150,205 @@ impl MaterialList {
 }
 
 pub(super) fn read_materials(root: &TableReader<'_>, textures: &DefinedNames) -> MaterialList {
-    let tables = root.named_tables("materials");
+    let tables = root.named_tables(&MATERIALS);
     let names =
         DefinedNames::new("material", tables.iter().map(|(name, span, _)| (name.clone(), span.clone())));
     let read: Vec<Option<Material>> =
-        tables.into_iter().map(|(name, _, table)| read_material(name, &table?, textures)).collect();
+        tables.into_iter().map(|(name, _, table)| read_material(name, table?, textures)).collect();
     let emits = |material: &Material| material.emits();
     let emissive = read.iter().map(|material| material.as_ref().is_some_and(emits)).collect();
     MaterialList { names, list: read.into_iter().collect(), emissive }
 }
 
-choice! {
-    /// Types of materials.
-    enum MaterialType {
-        /// Diffuse and glossy.
-        Phong = "phong",
-        /// A perfect mirror.
-        Mirror = "mirror",
-        /// A smooth or rough dielectric.
-        Glass = "glass",
-        /// A rough or smooth conductor.
-        Metal = "metal",
-        /// A diffuse base under a rough or smooth coat.
-        Plastic = "plastic",
-        /// The glTF inputs.
-        Principled = "principled",
-    }
-}
-
-fn read_material(name: String, table: &TableReader<'_>, textures: &DefinedNames) -> Option<Material> {
-    let key = table.optional_key("type");
+fn read_material(name: String, mut table: TableReader<'_>, textures: &DefinedNames) -> Option<Material> {
     // Without a valid type, keys cannot be checked.
-    let kind = if key.is_present() { key.choice()? } else { MaterialType::Phong };
+    let kind = table.read_type()?;
+    let table = &MaterialReader { table, textures };
     let kind = match kind {
-        MaterialType::Phong => Some(MaterialKind::Phong(read_phong(table, textures))),
-        MaterialType::Mirror => Some(read_mirror(table, textures)),
-        MaterialType::Glass => read_glass(table, textures),
-        MaterialType::Metal => read_metal(table, textures),
-        MaterialType::Plastic => Some(read_plastic(table, textures)),
-        MaterialType::Principled => Some(read_principled(table, textures)),
+        MaterialType::Phong => Some(MaterialKind::Phong(table.read_phong())),
+        MaterialType::Mirror => Some(MaterialKind::Mirror { reflectance: table.color("reflectance") }),
+        MaterialType::Glass => table.read_glass(),
+        MaterialType::Metal => table.read_metal(),
+        MaterialType::Plastic => Some(table.read_plastic()),
+        MaterialType::Principled => Some(table.read_principled()),
     };
-    let (emission, normal_map) =
-        (common::read_emission(table, textures), common::read_normal_map(table, textures));
-    let bump = common::read_bump(table, textures);
+    let (emission, normal_map, bump) = (table.read_emission(), table.read_normal_map(), table.read_bump());
     let opacity = if kind.as_ref().is_some_and(MaterialKind::is_solid_glass) {
-        common::reject_opacity_keys(table);
+        table.reject_opacity_keys();
         OpacitySource::FULL
     } else {
-        common::read_opacity_and_cutoff(table, textures)
+        table.read_opacity_and_cutoff()
     };
-    table.report_unknown_and_missing_keys();
+    table.table.report_unknown_and_missing_keys();
     Some(Material { name, kind: kind?, emission, normal_map, bump, opacity })
 }
 
-fn read_phong(table: &TableReader<'_>, textures: &DefinedNames) -> PhongParameters {
-    let (diffuse_key, specular_key) = (table.optional_key("diffuse"), table.optional_key("specular"));
-    let ambient_key = table.optional_key("ambient");
-    let color = |key: &KeyInTable<'_>, name| key.color_or_texture(textures, table.key_limits(name));
-    let (diffuse, specular) = (color(&diffuse_key, "phong.diffuse"), color(&specular_key, "phong.specular"));
-    let is_wrong = |key: &KeyInTable<'_>, color: &Option<ColorSource>| key.is_present() && color.is_none();
-    let is_invalid = is_wrong(&diffuse_key, &diffuse) || is_wrong(&specular_key, &specular);
-    let diffuse = diffuse.unwrap_or(ColorSource::Constant(Vec3::splat(0.7)));
-    let specular = specular.unwrap_or(ColorSource::Constant(Vec3::ZERO));
-    let are_bytes = [&diffuse_key, &specular_key, &ambient_key]
-        .map(|key| key.report_byte_color(|span| Issue::warning(span, ENERGY_GAIN)));
-    if !is_invalid && are_bytes == [false; 3] {
-        warn_about_energy_gain(&diffuse_key, &specular_key, &diffuse, &specular);
+/// A material's table, and the textures that it may refer to.
+struct MaterialReader<'a> {
+    table: TableReader<'a>,
+    textures: &'a DefinedNames,
+}
+
+impl<'a> MaterialReader<'a> {
+    fn key(&self, name: &str) -> KeyInTable<'a> {
+        self.table.key(name)
     }
-    PhongParameters {
-        diffuse,
-        specular,
-        shininess: read_or_default(table, "phong.shininess", 32.0, KeyInTable::number_f32),
-        ambient: color(&ambient_key, "phong.ambient"),
+
+    /// Reads a color or a texture.
+    fn color(&self, name: &str) -> ColorSource {
+        self.key(name).or_default(|key| key.color_or_texture(self.textures))
+    }
+
+    /// Reads a number or a texture.
+    fn number(&self, name: &str) -> NumberSource {
+        self.key(name).or_default(|key| key.number_or_texture(self.textures))
+    }
+
+    /// Reads a number that cannot be a texture.
+    fn constant(&self, name: &str) -> f32 {
+        self.key(name).or_default(KeyInTable::number_f32)
+    }
+
+    fn read_phong(&self) -> PhongParameters {
+        let keys = ["diffuse", "specular", "ambient"].map(|name| self.key(name));
+        let [diffuse_key, specular_key, ambient_key] = &keys;
+        let color = |key: &KeyInTable<'_>| key.color_or_texture(self.textures);
+        let (diffuse, specular) = (color(diffuse_key), color(specular_key));
+        let are_bytes =
+            [0, 1, 2].map(|i| keys[i].report_byte_color(|span| Issue::warning(span, ENERGY_GAIN)));
+        if let (Some(kd), Some(ks), [false, false, false]) = (&diffuse, &specular, are_bytes) {
+            warn_about_energy_gain(diffuse_key, specular_key, kd, ks);
+        }
+        PhongParameters {
+            diffuse: diffuse.unwrap_or_else(|| diffuse_key.default(color)),
+            specular: specular.unwrap_or_else(|| specular_key.default(color)),
+            shininess: self.constant("shininess"),
+            ambient: color(ambient_key),
+        }
+    }
+
+    fn read_glass(&self) -> Option<MaterialKind> {
+        let ior = self.constant("ior");
+        let (tint, thin) = (self.key("tint"), self.key("thin"));
+        let roughness = self.number("roughness");
+        // If `thin` is present but invalid, the user probably wants a pane.
+        if !thin.boolean().unwrap_or(thin.is_present()) {
+            return Some(MaterialKind::Glass {
+                ior,
+                tint: tint.or_default(KeyInTable::color_f64),
+                roughness,
+            });
+        }
+        if roughness != NumberSource::Constant(0.0) {
+            let issue = Issue::error(self.key("roughness").value_span()?, "thin panes cannot be rough")
+                .with_help("remove `thin` and give the glass a thickness: use a box instead of a quad");
+            self.table.context.report(issue);
+            return None;
+        }
+        Some(MaterialKind::Pane { ior, tint: self.color("tint") })
+    }
+
+    fn read_metal(&self) -> Option<MaterialKind> {
+        let fresnel = self.read_metal_reflectance();
+        let (roughness, anisotropy) = (self.number("roughness"), self.number("anisotropy"));
+        Some(MaterialKind::Metal { roughness, anisotropy, fresnel: fresnel? })
+    }
+
+    /// Reads a metal's reflectance. Exactly one of three groups of keys must specify it.
+    fn read_metal_reflectance(&self) -> Option<FresnelSource> {
+        let [color, eta, k, element] = ["color", "eta", "k", "element"].map(|name| self.key(name));
+        let is_index = eta.is_present() || k.is_present();
+        let count =
+            [color.is_present(), is_index, element.is_present()].into_iter().filter(|given| *given).count();
+        if count > 1 {
+            let given = [&element, &k, &eta, &color].into_iter().find(|key| key.is_present());
+            let issue = Issue::error(
+                given.and_then(KeyInTable::key_span)?,
+                "the reflectance of this metal is specified twice",
+            )
+            .with_help("use exactly one of `color`, `eta` with `k`, and `element`");
+            self.table.context.report(issue);
+            return None;
+        }
+        if element.is_present() {
+            let [eta, k] = element.choice::<MetalElement>()?.complex_ior().map(ColorSource::Constant);
+            return Some(FresnelSource::Index { eta, k });
+        }
+        let required = |name| self.table.required_alternative(name).color_or_texture(self.textures);
+        if is_index {
+            let (eta, k) = (required("eta"), required("k"));
+            return Some(FresnelSource::Index { eta: eta?, k: k? });
+        }
+        required("color").map(FresnelSource::Schlick)
+    }
+
+    fn read_plastic(&self) -> MaterialKind {
+        MaterialKind::Plastic {
+            diffuse: self.color("diffuse"),
+            specular: self.color("specular"),
+            ior: self.constant("ior"),
+            roughness: self.number("roughness"),
+        }
+    }
+
+    fn read_principled(&self) -> MaterialKind {
+        self.warn_if_ineffective_without("clearcoat_roughness", "clearcoat");
+        MaterialKind::Principled {
+            color: self.color("color"),
+            metallic: self.number("metallic"),
+            roughness: self.number("roughness"),
+            ior: self.constant("ior"),
+            specular: self.number("specular"),
+            specular_color: self.color("specular_color"),
+            transmission: self.number("transmission"),
+            clearcoat: self.number("clearcoat"),
+            clearcoat_roughness: self.number("clearcoat_roughness"),
+        }
+    }
+
+    fn read_emission(&self) -> EmissionSource {
+        let source = self.key("emission").or_default(|key| key.emission_source(self.textures));
+        let sides = self.key("emission_sides").or_default(KeyInTable::choice);
+        self.warn_if_ineffective_without("emission_sides", "emission");
+        EmissionSource { sides, ..source }
+    }
+
+    fn read_normal_map(&self) -> Option<NormalMap> {
+        let texture = self.key("normal_map").index_by_name(self.textures);
+        let strength = self.constant("normal_strength");
+        self.warn_if_ineffective_without("normal_strength", "normal_map");
+        texture.map(|texture| NormalMap { texture, strength })
+    }
+
+    fn read_bump(&self) -> Option<Bump> {
+        let texture = self.key("bump").texture_with_optional_channel(self.textures);
+        let scale = self.constant("bump_scale");
+        self.warn_if_ineffective_without("bump_scale", "bump");
+        texture.map(|(texture, channel)| Bump { texture, channel, scale })
+    }
+
+    fn read_opacity_and_cutoff(&self) -> OpacitySource {
+        let (value, cutoff) = (self.number("opacity"), self.constant("opacity_cutoff"));
+        self.warn_if_ineffective_without("opacity_cutoff", "opacity");
+        OpacitySource { value, cutoff }
+    }
+
+    /// Reports opacity keys on solid glass as errors.
+    fn reject_opacity_keys(&self) {
+        for name in ["opacity", "opacity_cutoff"] {
+            let message = format!("solid glass cannot have `{name}`");
+            self.table.reject_key(name, &message, Some("use `thin = true` for a pane"));
+        }
+    }
+
+    /// Warns if a key has no effect because another key is missing.
+    fn warn_if_ineffective_without(&self, name: &'static str, other: &'static str) {
+        if let Some(entry) = self.table.entry(name)
+            && self.table.entry(other).is_none()
+        {
+            let message = format!("`{name}` has no effect without `{other}`");
+            self.table.context.report(Issue::warning(entry.span, message));
+        }
     }
 }
 
@@ -131,140 +377,4 @@ fn warn_about_energy_gain(
         .with_label(format!("diffuse + specular is {:.3} in {channel}", most))
         .with_help("keep `diffuse` + `specular` at or below 1 in every channel");
     kd_key.context.report(issue);
-}
-
-fn read_metal(table: &TableReader<'_>, textures: &DefinedNames) -> Option<MaterialKind> {
-    let fresnel = read_metal_reflectance(table, textures);
-    Some(MaterialKind::Metal {
-        roughness: read_number_or_texture(table, textures, "metal.roughness", 0.2),
-        anisotropy: read_number_or_texture(table, textures, "metal.anisotropy", 0.0),
-        fresnel: fresnel?,
-    })
-}
-
-fn read_plastic(table: &TableReader<'_>, textures: &DefinedNames) -> MaterialKind {
-    MaterialKind::Plastic {
-        diffuse: read_color(table, textures, "plastic.diffuse", 0.7),
-        specular: read_color(table, textures, "plastic.specular", 1.0),
-        ior: read_ior(table, "plastic.ior"),
-        roughness: read_number_or_texture(table, textures, "plastic.roughness", 0.1),
-    }
-}
-
-fn read_principled(table: &TableReader<'_>, textures: &DefinedNames) -> MaterialKind {
-    common::warn_if_ineffective_without(table, "clearcoat_roughness", "clearcoat");
-    let (color, number) = (
-        |path, default| read_color(table, textures, path, default),
-        |path, default| read_number_or_texture(table, textures, path, default),
-    );
-    MaterialKind::Principled {
-        color: color("principled.color", 0.8),
-        metallic: number("principled.metallic", 0.0),
-        roughness: number("principled.roughness", 0.5),
-        ior: read_ior(table, "principled.ior"),
-        specular: number("principled.specular", 1.0),
-        specular_color: color("principled.specular_color", 1.0),
-        transmission: number("principled.transmission", 0.0),
-        clearcoat: number("principled.clearcoat", 0.0),
-        clearcoat_roughness: number("principled.clearcoat_roughness", 0.0),
-    }
-}
-
-/// Returns the key at the path `TYPE.KEY`.
-fn key_at_typed_path<'a>(table: &TableReader<'a>, path: &'static str) -> KeyInTable<'a> {
-    table.optional_key(path.split_once('.').map_or(path, |(_, name)| name))
-}
-
-/// Reads the key at the path `TYPE.KEY` and checks its limits. Returns `default` if the key is missing or
-/// invalid.
-fn read_or_default<'a, T>(
-    table: &TableReader<'a>,
-    path: &'static str,
-    default: T,
-    read: impl FnOnce(&KeyInTable<'a>, Limits) -> Option<T>,
-) -> T {
-    read(&key_at_typed_path(table, path), table.key_limits(path)).unwrap_or(default)
-}
-
-/// Reads a color or a texture.
-fn read_color(
-    table: &TableReader<'_>,
-    textures: &DefinedNames,
-    path: &'static str,
-    default: f32,
-) -> ColorSource {
-    let default = ColorSource::Constant(Vec3::splat(default));
-    read_or_default(table, path, default, |key, limits| key.color_or_texture(textures, limits))
-}
-
-/// Reads a number or a texture.
-fn read_number_or_texture(
-    table: &TableReader<'_>,
-    textures: &DefinedNames,
-    path: &'static str,
-    default: f32,
-) -> NumberSource {
-    let default = NumberSource::Constant(default);
-    read_or_default(table, path, default, |key, limits| key.number_or_texture(textures, limits))
-}
-
-/// Reads an index of refraction.
-fn read_ior(table: &TableReader<'_>, path: &'static str) -> f32 {
-    read_or_default(table, path, 1.5, KeyInTable::number_f32)
-}
-
-/// Reads a metal's reflectance. Exactly one of three groups of keys must specify it.
-fn read_metal_reflectance(table: &TableReader<'_>, textures: &DefinedNames) -> Option<FresnelSource> {
-    let [color, eta, k, element] = ["color", "eta", "k", "element"].map(|name| table.optional_key(name));
-    let is_index = eta.is_present() || k.is_present();
-    let count =
-        [color.is_present(), is_index, element.is_present()].into_iter().filter(|given| *given).count();
-    if count > 1 {
-        let given = [&element, &k, &eta, &color].into_iter().find(|key| key.is_present());
-        let issue = Issue::error(
-            given.and_then(KeyInTable::key_span)?,
-            "the reflectance of this metal is specified twice",
-        )
-        .with_help("use exactly one of `color`, `eta` with `k`, and `element`");
-        table.context.report(issue);
-        return None;
-    }
-    if element.is_present() {
-        let [eta, k] = element.choice::<MetalElement>()?.complex_ior().map(ColorSource::Constant);
-        return Some(FresnelSource::Index { eta, k });
-    }
-    if is_index {
-        let [eta, k] = [("eta", "metal.eta"), ("k", "metal.k")].map(|(name, path)| {
-            table.required_key(name, "[0.2, 0.9, 1.1]").color_or_texture(textures, table.key_limits(path))
-        });
-        return Some(FresnelSource::Index { eta: eta?, k: k? });
-    }
-    let color = table.required_key("color", "[0.9, 0.8, 0.4]");
-    color.color_or_texture(textures, table.key_limits("metal.color")).map(FresnelSource::Schlick)
-}
-
-fn read_mirror(table: &TableReader<'_>, textures: &DefinedNames) -> MaterialKind {
-    MaterialKind::Mirror { reflectance: read_color(table, textures, "mirror.reflectance", 0.9) }
-}
-
-fn read_glass(table: &TableReader<'_>, textures: &DefinedNames) -> Option<MaterialKind> {
-    let ior = read_ior(table, "glass.ior");
-    let (tint, thin) = (table.optional_key("tint"), table.optional_key("thin"));
-    let rough = table.optional_key("roughness");
-    let roughness = read_number_or_texture(table, textures, "glass.roughness", 0.0);
-    // If `thin` is present but invalid, the user probably wants a pane.
-    if !thin.boolean().unwrap_or(thin.is_present()) {
-        let tint = tint.color_f64(table.key_limits("glass.tint")).unwrap_or(DVec3::ONE);
-        return Some(MaterialKind::Glass { ior, tint, roughness });
-    }
-    if roughness != NumberSource::Constant(0.0) {
-        let issue = Issue::error(rough.value_span()?, "thin panes cannot be rough")
-            .with_help("remove `thin` and give the glass a thickness: use a box instead of a quad");
-        table.context.report(issue);
-        return None;
-    }
-    let tint = tint
-        .color_or_texture(textures, table.key_limits("glass.tint"))
-        .unwrap_or(ColorSource::Constant(Vec3::ONE));
-    Some(MaterialKind::Pane { ior, tint })
 }

@@ -1,21 +1,22 @@
-//! Lowers TOML to a scene. Each group of tables is read by its own module. Readers return `None` for missing
-//! or invalid values and continue after errors so that all errors are reported.
+//! Lowers TOML to a scene. Each table has a module with the definitions of its keys and their reader. Readers
+//! return `None` for missing or invalid values and continue after errors so that all errors are reported.
 
-mod camera;
-mod common;
+pub(super) mod camera;
 mod context;
-mod environment;
+pub(super) mod environment;
 mod key;
-mod lights;
-mod materials;
+pub(super) mod lights;
+pub(super) mod materials;
+mod mesh;
 mod names;
-mod photons;
-mod render;
+pub(super) mod photons;
+pub(super) mod render;
 mod sets;
-mod shapes;
+mod shape_table;
+pub(super) mod shapes;
 mod syntax;
 mod table;
-mod textures;
+pub(super) mod textures;
 mod value;
 
 use std::path::{Path, PathBuf};
@@ -29,11 +30,10 @@ use crate::math::Vec3;
 use context::{FileContext, Issue};
 use table::TableReader;
 
-pub(super) use camera::FOV_DEGREES;
 pub use context::MORE_LIKE_THESE;
 #[cfg(test)]
 pub(super) use materials::ENERGY_GAIN;
-pub(super) use shapes::has_mesh_extension;
+pub(super) use mesh::has_mesh_extension;
 #[cfg(test)]
 pub(super) use syntax::MISSING_VALUE;
 

@@ -1,17 +1,22 @@
 //! Applies `--set` values to a document.
 
+use super::super::keys::find_table;
+use super::super::keys::key::TableSyntax;
 use super::super::nearest::nearest_name;
 use super::super::sanitize::escape_and_truncate;
 use super::super::source::SceneText;
 use super::super::toml::{Document, KeyError, KeyErrorKind, TopLevelTableKinds, apply_assignment};
 use super::context::{FileContext, Issue};
-use super::shapes;
 
 /// The top-level scene keys that are groups of named tables or lists of tables.
 const LAYOUT: TopLevelTableKinds = TopLevelTableKinds {
-    groups: &["materials", "textures"],
-    is_list: |name| name == "light" || shapes::is_shape_table_name(name),
+    is_group: |name| has_form(name, TableSyntax::Named),
+    is_list: |name| has_form(name, TableSyntax::List),
 };
+
+fn has_form(name: &str, form: TableSyntax) -> bool {
+    find_table(name).is_some_and(|info| info.form == form)
+}
 
 /// Applies all `--set` values and reports keys that cannot be set.
 pub(super) fn apply_set_args<'s>(

@@ -2,40 +2,70 @@
 
 use std::cell::RefCell;
 use std::fmt;
-use std::ops::{Range, RangeInclusive};
+use std::ops::Range;
 
-use super::super::keys::find_table as table_info;
-use super::super::keys::key::ValueKind;
+use super::super::description::Channel;
+use super::super::keys::key::{
+    COLOR, DefaultValue, KeyInfo, TableInfo, TableSyntax, ValueKind, choice_values, keys,
+};
 use super::super::nearest::{foreign_or_nearest_name, nearest_name};
 use super::super::sanitize::escape_and_truncate;
 use super::super::toml::{Entries, KeyValue};
 use super::context::{FileContext, Issue};
 use super::key::KeyInTable;
-use super::limits::Limits;
-use super::value::{TomlValue, Value, describe_value};
+use super::value::{TomlValue, Value, default_value, describe_value};
+use crate::choice::Choice;
 
-/// How messages refer to a table.
+/// A table's definition, and how messages refer to it.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum TableTitle<'a> {
     /// The root table of the file.
     Root,
-    /// A single table, such as `[render]`.
-    Table(&'static str),
-    /// A table in a list, such as `[[sphere]]`.
-    List(&'static str),
+    /// A single table such as `[render]`, a table in a list such as `[[sphere]]`, or the group of all named
+    /// tables.
+    Table(&'static TableInfo),
     /// A named table, such as `[materials.wall]`.
-    Named(&'static str, &'a str),
+    Named(&'static TableInfo, &'a str),
     /// An inline table, identified by its key.
     Key(&'static str),
 }
+
+impl TableTitle<'_> {
+    fn definition(self) -> Option<&'static TableInfo> {
+        match self {
+            Self::Table(info) | Self::Named(info, _) => Some(info),
+            Self::Root | Self::Key(_) => None,
+        }
+    }
+
+    fn keys(self) -> &'static [KeyInfo] {
+        match self {
+            Self::Root => &[],
+            Self::Table(info) | Self::Named(info, _) => info.keys,
+            Self::Key(_) => TEXTURE_REFERENCE,
+        }
+    }
+}
+
+/// Keys of an inline table that refers to a texture. Not every value allows all of them.
+const TEXTURE_REFERENCE: &[KeyInfo] = keys! {
+    /// The texture.
+    texture: ValueKind::Texture, DefaultValue::Required("\"name\"");
+    /// The channel for a number.
+    channel: ValueKind::Words(choice_values::<Channel>), DefaultValue::Absent;
+    /// A factor on emitted radiance.
+    scale: COLOR, DefaultValue::Is("[1, 1, 1]");
+};
 
 impl fmt::Display for TableTitle<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Root => Ok(()),
-            Self::Table(name) => write!(f, "[{name}]"),
-            Self::List(name) => write!(f, "[[{name}]]"),
-            Self::Named(group, name) => write!(f, "[{group}.{}]", escape_and_truncate(name, 40)),
+            Self::Table(info) => match info.form {
+                TableSyntax::List => write!(f, "[[{}]]", info.name),
+                TableSyntax::Single | TableSyntax::Named => write!(f, "[{}]", info.name),
+            },
+            Self::Named(group, name) => write!(f, "[{}.{}]", group.name, escape_and_truncate(name, 40)),
             Self::Key(name) => write!(f, "`{name}`"),
         }
     }
@@ -47,6 +77,8 @@ pub(super) struct TableReader<'a> {
     /// Byte range of the header or the braces.
     pub(super) span: Range<usize>,
     title: TableTitle<'a>,
+    /// Definitions of the keys of the table's type and of the keys of all types.
+    keys: [&'static [KeyInfo]; 2],
     entries: Entries<'a>,
     known: RefCell<Vec<&'static str>>,
     unavailable: RefCell<Vec<&'static str>>,
@@ -61,7 +93,7 @@ impl<'a> TableReader<'a> {
         title: TableTitle<'a>,
     ) -> Self {
         let (known, unavailable, missing) = Default::default();
-        Self { context, span, title, entries, known, unavailable, missing }
+        Self { context, span, title, keys: [&[], title.keys()], entries, known, unavailable, missing }
     }
 
     /// Creates a reader for the file's root table.
@@ -91,120 +123,101 @@ impl<'a> TableReader<'a> {
         }
     }
 
-    /// Reads an optional key.
-    pub(super) fn optional_key(&self, name: &'static str) -> KeyInTable<'a> {
+    /// Finds the entry called `name`, which then counts as known.
+    pub(super) fn entry(&self, name: &'static str) -> Option<KeyValue<'a>> {
         let mut known = self.known.borrow_mut();
         if !known.contains(&name) {
             known.push(name);
         }
-        let entry = self.entries.get(name);
-        KeyInTable::new(
-            self.context,
-            name,
-            entry.as_ref().map(|one| one.span.clone()),
-            entry.map(|one| one.value),
-        )
+        self.entries.get(name)
     }
 
-    /// Returns the range defined for the key `name`, which has the form `KEY` or `TYPE.KEY`.
-    pub(super) fn key_limits(&self, name: &str) -> Limits {
-        match self.expected_value_kind(name) {
-            Some(
-                ValueKind::Number(limits)
-                | ValueKind::Color(limits)
-                | ValueKind::ColorOrTexture(limits)
-                | ValueKind::Emission(limits)
-                | ValueKind::NumberOrTexture(limits)
-                | ValueKind::Numbers(_, _, limits)
-                | ValueKind::Scale(limits),
-            ) => limits,
-            Some(
-                ValueKind::Whole(..)
-                | ValueKind::Flag
-                | ValueKind::Words(_)
-                | ValueKind::Text
-                | ValueKind::File(_)
-                | ValueKind::Texture
-                | ValueKind::Heights
-                | ValueKind::Material,
-            )
-            | None => Limits::Any,
-        }
-    }
-
-    /// Returns the range defined for an integer key.
-    pub(super) fn integer_key_range(&self, name: &str) -> RangeInclusive<i128> {
-        match self.expected_value_kind(name) {
-            Some(ValueKind::Whole(least, most)) => least.into()..=most.into(),
-            Some(_) | None => 0..=u32::MAX.into(),
-        }
-    }
-
-    /// Returns the type defined for a key. A test checks that the definitions match the keys that are read.
-    fn expected_value_kind(&self, name: &str) -> Option<ValueKind> {
-        let info = match self.title {
-            TableTitle::Table(table) | TableTitle::List(table) | TableTitle::Named(table, _) => {
-                table_info(table)?
-            }
-            TableTitle::Root | TableTitle::Key(_) => return None,
-        };
-        let (kind, name) = match name.split_once('.') {
-            Some((kind, name)) => (info.find_type_or_default(Some(kind)), name),
-            None => (None, name),
-        };
-        info.keys_for_type(kind).find(|key| key.name == name).map(|key| key.kind)
-    }
-
-    /// Reads a required key. `example` is a valid value to show in the help text.
-    pub(super) fn required_key(&self, name: &'static str, example: &'static str) -> KeyInTable<'a> {
-        let key = self.optional_key(name);
-        if !key.is_present() {
-            self.missing.borrow_mut().push((name, example));
+    /// Finds a key by its name. Reports an error later if the key is required and absent.
+    pub(super) fn key(&self, name: &str) -> KeyInTable<'a> {
+        let mut all = self.keys.into_iter().flatten();
+        let info =
+            all.find(|key| key.name == name).expect("tests read every key, and all of them are defined");
+        let key = KeyInTable::new(self.context, info, self.entry(info.name));
+        if let DefaultValue::Required(example) = info.default {
+            self.require(&key, example);
         }
         key
     }
 
-    /// Reports an error if the table contains the key `name`, which is not allowed here.
-    pub(super) fn reject_key(&self, name: &'static str, message: &str, help: Option<&str>) {
-        let key = self.optional_key(name);
-        self.unavailable.borrow_mut().push(name);
-        if let Some(span) = key.key_span() {
-            self.context.report(Issue::error(span, message).with_optional_help(help.map(str::to_owned)));
+    /// Finds a key which is required because no alternative key is present.
+    pub(super) fn required_alternative(&self, name: &str) -> KeyInTable<'a> {
+        let key = self.key(name);
+        if let DefaultValue::Alternative(example) = key.info.default {
+            self.require(&key, example);
+        }
+        key
+    }
+
+    fn require(&self, key: &KeyInTable<'a>, example: &'static str) {
+        let mut missing = self.missing.borrow_mut();
+        let line = (key.info.name, example);
+        if !key.is_present() && !missing.contains(&line) {
+            missing.push(line);
         }
     }
 
-    /// Reads the `[name]` table, if present.
-    pub(super) fn table(&self, name: &'static str) -> Option<Self> {
-        let value = self.optional_key(name).value?;
-        Self::from_value(self.context, value, TableTitle::Table(name))
+    /// Reads the key `type`, and finds the type's keys from then on. The first type is the default.
+    pub(super) fn read_type<C: Choice>(&mut self) -> Option<C> {
+        const TYPE: &KeyInfo = &keys! {
+            /// The type.
+            type: ValueKind::Text, DefaultValue::Absent;
+        }[0];
+        let key = KeyInTable::new(self.context, TYPE, self.entry(TYPE.name));
+        let kind = if key.is_present() { key.choice()? } else { *C::ALL.first()? };
+        let info = self.title.definition()?.find_type_or_default(Some(kind.name()))?;
+        self.keys[0] = info.keys;
+        Some(kind)
     }
 
-    /// Reads the `[name.NAME]` tables in file order, with their names and the names' spans.
-    pub(super) fn named_tables(&self, name: &'static str) -> Vec<(String, Range<usize>, Option<Self>)> {
-        let Some(group) = self.table(name) else { return Vec::new() };
+    /// Reports an error if the table contains the key `name`, which is not allowed here.
+    pub(super) fn reject_key(&self, name: &'static str, message: &str, help: Option<&str>) {
+        self.unavailable.borrow_mut().push(name);
+        if let Some(entry) = self.entry(name) {
+            self.context
+                .report(Issue::error(entry.span, message).with_optional_help(help.map(str::to_owned)));
+        }
+    }
+
+    /// Reads a single table, if present.
+    pub(super) fn table(&self, info: &'static TableInfo) -> Option<Self> {
+        Self::from_value(self.context, self.entry(info.name)?.value, TableTitle::Table(info))
+    }
+
+    /// Reads a single table, or an empty table if it is absent.
+    pub(super) fn table_or_empty(&self, info: &'static TableInfo) -> Option<Self> {
+        let value = self.entry(info.name).map_or_else(|| default_value("{}"), |entry| Some(entry.value))?;
+        Self::from_value(self.context, value, TableTitle::Table(info))
+    }
+
+    /// Reads named tables in file order, with their names and the names' spans.
+    pub(super) fn named_tables(&self, info: &'static TableInfo) -> Vec<(String, Range<usize>, Option<Self>)> {
+        let Some(group) = self.table(info) else { return Vec::new() };
         let mut entries: Vec<_> = group.entries.iter().collect();
         entries.sort_by_key(|entry| entry.span.start);
-        let read = |key, value| Self::from_value(self.context, value, TableTitle::Named(name, key));
+        let read = |key, value| Self::from_value(self.context, value, TableTitle::Named(info, key));
         entries.into_iter().map(|one| (one.key.to_owned(), one.span, read(one.key, one.value))).collect()
     }
 
-    /// Reads the `[[name]]` tables.
-    pub(super) fn tables(&self, name: &'static str) -> impl Iterator<Item = Self> + use<'a> {
-        let context = self.context;
-        let key = self.optional_key(name);
-        let list = key.value.and_then(|value| {
-            if let Some(array) = value.as_array() {
+    /// Reads a list of tables.
+    pub(super) fn tables(&self, info: &'static TableInfo) -> impl Iterator<Item = Self> + use<'a> {
+        let (context, name) = (self.context, info.name);
+        let list = self.entry(name).and_then(|entry| {
+            if let Some(array) = entry.value.as_array() {
                 return Some(array);
             }
-            let span = key.key_span().unwrap_or_default();
-            let issue = Issue::error(span, format!("`{name}` must be a list of tables"))
-                .with_label(format!("found {}", describe_value(context, value)))
+            let issue = Issue::error(entry.span, format!("`{name}` must be a list of tables"))
+                .with_label(format!("found {}", describe_value(context, entry.value)))
                 .with_help(format!("write [[{name}]] with double brackets"));
             context.report(issue);
             None
         });
         let values = list.into_iter().flat_map(|list| list.iter());
-        values.filter_map(move |value| Self::from_value(context, value, TableTitle::List(name)))
+        values.filter_map(move |value| Self::from_value(context, value, TableTitle::Table(info)))
     }
 
     /// Reports unknown and missing keys. A misspelled required key is reported only once.
@@ -255,10 +268,7 @@ impl<'a> TableReader<'a> {
                 format!("unknown table `{shown}`")
             }
             TableTitle::Root => format!("unknown key `{shown}` outside of any table"),
-            title @ (TableTitle::Table(_)
-            | TableTitle::List(_)
-            | TableTitle::Named(..)
-            | TableTitle::Key(_)) => {
+            title @ (TableTitle::Table(_) | TableTitle::Named(..) | TableTitle::Key(_)) => {
                 format!("unknown key `{shown}` in {title}")
             }
         };

@@ -1,9 +1,12 @@
-//! Converts TOML values to numbers and describes them.
+//! Converts TOML values to numbers, describes them and parses defaults.
+
+use std::collections::BTreeMap;
+use std::sync::{Mutex, PoisonError};
 
 use super::super::sanitize::escape_and_truncate;
+use super::super::toml;
 pub(super) use super::super::toml::{TomlValue, Value};
-use super::context::{FileContext, Issue};
-use super::limits::Limits;
+use super::context::FileContext;
 
 /// Describes a value for use in messages, as in `found the string "a"`.
 pub(super) fn describe_value(context: &FileContext<'_>, value: Value<'_>) -> String {
@@ -48,34 +51,13 @@ pub(super) fn parse_integer_in_radix(digits: &str, radix: u32) -> Option<i128> {
     i128::from_str_radix(digits, radix).ok()
 }
 
-/// Reads a number within limits. Error messages call the number `name` and its type `expected`.
-pub(super) fn number_within(
-    context: &FileContext<'_>,
-    name: &str,
-    value: Value<'_>,
-    limits: Limits,
-    expected: &str,
-) -> Option<f64> {
-    let Some(number) = to_number(value) else {
-        report_wrong_type(context, name, value, expected);
-        return None;
-    };
-    let violation = limits.violation(number);
-    if let Some(words) = &violation {
-        let label = format!("found {}", describe_value(context, value));
-        context.report(Issue::error(value.span(), format!("`{name}` {words}")).with_label(label));
-    }
-    violation.is_none().then_some(number)
-}
-
-/// Reports a value of the wrong type.
-pub(super) fn report_wrong_type(context: &FileContext<'_>, name: &str, value: Value<'_>, expected: &str) {
-    let label = format!("found {}", describe_value(context, value));
-    let issue = Issue::error(value.span(), format!("`{name}` must be {expected}")).with_label(label);
-    // Explain that textures are not allowed here. Otherwise, users would look for a typo.
-    let is_texture = matches!(value.decode(), TomlValue::Table(table) if table.get("texture").is_some());
-    context.report(match is_texture && !expected.contains("texture") {
-        true => issue.with_help(format!("`{name}` cannot be a texture")),
-        false => issue,
-    });
+/// Parses the text of a default. Each text is parsed once and never freed, so that defaults can be read like
+/// values in a file.
+pub(super) fn default_value(text: &'static str) -> Option<Value<'static>> {
+    static PARSED: Mutex<BTreeMap<&str, Option<Value<'static>>>> = Mutex::new(BTreeMap::new());
+    let mut parsed = PARSED.lock().unwrap_or_else(PoisonError::into_inner);
+    *parsed.entry(text).or_insert_with(|| {
+        let document = Box::leak(Box::new(toml::parse(format!("default = {text}").leak()).0));
+        document.root().get("default").map(|found| found.value)
+    })
 }

@@ -110,6 +110,27 @@ impl ValueKind {
             | Self::Scale(_) => None,
         }
     }
+
+    /// Returns the limits of the value's numbers, or `None` if the value has no numbers, or is an integer.
+    pub fn limits(self) -> Option<Limits> {
+        match self {
+            Self::Number(limits)
+            | Self::Color(limits)
+            | Self::ColorOrTexture(limits)
+            | Self::Emission(limits)
+            | Self::NumberOrTexture(limits)
+            | Self::Numbers(_, _, limits)
+            | Self::Scale(limits) => Some(limits),
+            Self::Whole(..)
+            | Self::Flag
+            | Self::Words(_)
+            | Self::Text
+            | Self::File(_)
+            | Self::Texture
+            | Self::Heights
+            | Self::Material => None,
+        }
+    }
 }
 
 /// A function that returns a choice's named values in display order.
@@ -138,25 +159,88 @@ pub enum DefaultValue {
     Is(&'static str),
     /// Description of a value that depends on other keys.
     By(&'static str),
+    /// The key has no default, but is required unless other keys replace it. Contains an example value.
+    Alternative(&'static str),
     /// The key has no default value.
     Absent,
 }
 
 /// Upper bound for integer keys without a specific limit.
-pub(super) const MOST_WHOLE: u64 = u32::MAX as u64;
+pub(crate) const MOST_WHOLE: u64 = u32::MAX as u64;
 
-/// Defines a key.
-pub(super) const fn define_key(
-    name: &'static str,
-    kind: ValueKind,
-    unit: &'static str,
-    default: DefaultValue,
-    doc: &'static str,
-) -> KeyInfo {
-    KeyInfo { name, kind, unit, default, doc }
+/// Three coordinates.
+pub(crate) const POINT: ValueKind = ValueKind::Numbers(3, "point", Limits::Any);
+
+/// A vector of any nonzero length.
+pub(crate) const DIRECTION: ValueKind = ValueKind::Numbers(3, "direction", Limits::Any);
+
+/// Angles about the three axes.
+pub(crate) const ANGLES: ValueKind = ValueKind::Numbers(3, "three numbers", Limits::Any);
+
+/// A non-negative color.
+pub(crate) const COLOR: ValueKind = ValueKind::Color(Limits::AtLeast(0.0));
+
+/// Defines a list of keys, each as `/// DOC` and `NAME: KIND, DEFAULT, UNIT;`. The unit is optional.
+macro_rules! keys {
+    ($($(#[doc = $doc:literal])+ $name:ident: $kind:expr, $default:expr $(, $unit:literal)?;)*) => {
+        &[
+            $($crate::keys::key::KeyInfo {
+                name: stringify!($name),
+                kind: $kind,
+                unit: concat!($($unit)?),
+                default: $default,
+                doc: $crate::keys::key::doc_text(concat!($($doc),+)),
+            },)*
+        ]
+    };
+}
+pub(crate) use keys;
+
+/// Defines the types of a table: an enum of the values of `type`, starting with the default, and a constant
+/// with the keys of each type.
+macro_rules! table_types {
+    (
+        $(#[doc = $about:literal])+
+        enum $enum:ident, const $types:ident;
+        $($(#[doc = $doc:literal])+ $variant:ident = $name:literal { $($keys:tt)* })+
+    ) => {
+        $crate::choice! {
+            $(#[doc = $about])+
+            enum $enum {
+                $($(#[doc = $doc])+ $variant = $name,)+
+            }
+        }
+
+        const $types: &[$crate::keys::key::TableTypeInfo] = &[
+            $($crate::keys::key::TableTypeInfo {
+                name: $name,
+                doc: $crate::keys::key::doc_text(concat!($($doc),+)),
+                keys: $crate::keys::key::keys! { $($keys)* },
+            }),+
+        ];
+    };
+}
+pub(crate) use table_types;
+
+/// Returns the text of a doc comment without its final period.
+pub(crate) const fn doc_text(lines: &'static str) -> &'static str {
+    match lines.trim_ascii().as_bytes() {
+        [.., b'.'] => lines.trim_ascii().split_at(lines.trim_ascii().len() - 1).0,
+        _ => lines.trim_ascii(),
+    }
 }
 
 impl TableInfo {
+    /// Defines a table without types.
+    pub(crate) const fn new(
+        name: &'static str,
+        form: TableSyntax,
+        doc: &'static str,
+        keys: &'static [KeyInfo],
+    ) -> Self {
+        Self { name, form, doc, keys, types: &[] }
+    }
+
     /// Returns the type called `name`, or the default type if `name` is `None`. Returns `None` if the type is
     /// unknown.
     pub fn find_type_or_default(&self, name: Option<&str>) -> Option<&'static TableTypeInfo> {
@@ -187,10 +271,17 @@ impl TableInfo {
 impl KeyInfo {
     /// The default value, or an example.
     pub fn default_or_example(&self) -> String {
-        match (self.default, self.kind) {
-            (DefaultValue::Required(value) | DefaultValue::Is(value), _) => value.to_owned(),
-            (DefaultValue::By(_) | DefaultValue::Absent, kind) => kind.example(),
+        match self.default {
+            DefaultValue::Required(value) | DefaultValue::Is(value) | DefaultValue::Alternative(value) => {
+                value.to_owned()
+            }
+            DefaultValue::By(_) | DefaultValue::Absent => self.kind.example(),
         }
+    }
+
+    /// Returns a line for a scene file that sets the key to its default or an example.
+    pub fn example_line(&self) -> String {
+        format!("{} = {}", self.name, self.default_or_example())
     }
 
     /// Returns the range, such as `0 … 1`, or an empty string if the type implies the range.
@@ -209,7 +300,7 @@ impl KeyInfo {
             DefaultValue::Required(_) => "*required*".to_owned(),
             DefaultValue::Is(value) => format!("`{value}`"),
             DefaultValue::By(words) => words.to_owned(),
-            DefaultValue::Absent => "none".to_owned(),
+            DefaultValue::Alternative(_) | DefaultValue::Absent => "none".to_owned(),
         }
     }
 }
@@ -258,23 +349,9 @@ impl ValueKind {
     }
 
     fn range_text(self) -> String {
-        match self {
-            Self::Whole(least, most) if least == most => least.to_string(),
-            Self::Whole(least, most) => format!("{least} … {most}"),
-            Self::Number(limits)
-            | Self::Color(limits)
-            | Self::ColorOrTexture(limits)
-            | Self::Emission(limits)
-            | Self::NumberOrTexture(limits)
-            | Self::Numbers(_, _, limits)
-            | Self::Scale(limits) => limits.range_text(),
-            Self::Flag
-            | Self::Words(_)
-            | Self::Text
-            | Self::File(_)
-            | Self::Texture
-            | Self::Heights
-            | Self::Material => String::new(),
+        if let Self::Whole(least, most) = self {
+            return if least == most { least.to_string() } else { format!("{least} … {most}") };
         }
+        self.limits().map_or_else(String::new, Limits::range_text)
     }
 }

@@ -1,22 +1,24 @@
-//! Definitions of all scene keys: names, types, units, ranges, defaults and descriptions. The reader uses
-//! these ranges, except for colors and vectors outside of materials. A test compares ranges and defaults with
-//! the reader. The schema, `glimt explain` and completions are generated from these definitions, and a test
-//! compares the documentation with them.
+//! The vocabulary of scene key definitions: names, types, units, ranges, defaults and descriptions.
+//!
+//! Each table is defined once, next to its reader in `document/`. The reader takes ranges and defaults from the
+//! definition, and the schema, `glimt explain` and completions are generated from it. A test compares the
+//! documentation with the definitions.
 
-mod colors;
+pub(crate) mod colors;
 pub mod endings;
 pub mod key;
-mod lights;
 pub mod limits;
-mod materials;
-mod render;
-mod shapes;
-mod singles;
-mod textures;
 
 use std::sync::LazyLock;
 
-pub(super) use colors::hex_digits;
+use super::document::camera::CAMERA;
+use super::document::environment::ENVIRONMENT;
+use super::document::lights::LIGHT;
+use super::document::materials::MATERIALS;
+use super::document::photons::PHOTONS;
+use super::document::render::RENDER;
+use super::document::shapes::SHAPES;
+use super::document::textures::TEXTURES;
 pub use colors::{color_names, parse_hex_or_named_srgb8};
 pub use key::{
     ChoiceValue, ChoiceValuesFn, DefaultValue, KeyInfo, TableInfo, TableSyntax, TableTypeInfo, ValueKind,
@@ -26,11 +28,9 @@ pub use key::{
 /// Returns all tables, in the same order as in the documentation.
 pub fn all_tables() -> &'static [TableInfo] {
     static TABLES: LazyLock<Vec<TableInfo>> = LazyLock::new(|| {
-        let before = [render::render_table(), singles::CAMERA, singles::PHOTONS];
-        let named = [textures::TEXTURES, materials::MATERIALS];
-        let shapes = shapes::SHAPES.iter().cloned();
-        let lights = [lights::LIGHT, singles::ENVIRONMENT];
-        before.into_iter().chain(named).chain(shapes).chain(lights).collect()
+        let before = [&RENDER, &CAMERA, &PHOTONS, &TEXTURES, &MATERIALS];
+        let shapes = SHAPES.iter().map(|shape| &shape.info);
+        before.into_iter().chain(shapes).chain([&LIGHT, &ENVIRONMENT]).cloned().collect()
     });
     &TABLES
 }
@@ -56,6 +56,11 @@ pub fn all_paths_with_descriptions() -> Vec<(String, &'static str)> {
 /// Returns the table with this name.
 pub fn find_table(name: &str) -> Option<&'static TableInfo> {
     all_tables().iter().find(|table| table.name == name)
+}
+
+/// Returns the key `name` of a table without types.
+pub fn find_key(table: &str, name: &str) -> Option<&'static KeyInfo> {
+    find_table(table)?.keys.iter().find(|key| key.name == name)
 }
 
 #[cfg(test)]

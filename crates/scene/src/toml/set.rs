@@ -44,8 +44,8 @@ pub(crate) enum KeyErrorKind {
 /// The groups and lists of tables at the top level of a document.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct TopLevelTableKinds {
-    /// Top-level tables that contain named tables. Named tables are never created.
-    pub(crate) groups: &'static [&'static str],
+    /// Whether a top-level name denotes a group of named tables. Named tables are never created.
+    pub(crate) is_group: fn(&str) -> bool,
     /// Whether a top-level name denotes a list of tables.
     pub(crate) is_list: fn(&str) -> bool,
 }
@@ -125,7 +125,7 @@ impl<'s> Document<'s> {
         table: TableId,
         layout: TopLevelTableKinds,
     ) -> Result<(), KeyError> {
-        let is_in_group = depth == 1 && layout.groups.contains(&&*keys[0].text);
+        let is_in_group = depth == 1 && (layout.is_group)(&keys[0].text);
         if is_in_group && self.find_in_table(table, &keys[1].text).is_none() {
             return Err(key_error(keys, 1, KeyErrorKind::Unknown { known: self.keys(table) }));
         }

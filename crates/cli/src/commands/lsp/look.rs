@@ -64,7 +64,7 @@ pub(super) fn describe_key(key: &KeyInfo) -> String {
     row(
         "default",
         match key.default {
-            DefaultValue::Absent => String::new(),
+            DefaultValue::Alternative(_) | DefaultValue::Absent => String::new(),
             DefaultValue::Required(_) | DefaultValue::Is(_) | DefaultValue::By(_) => key.default_markdown(),
         },
     );

@@ -117,7 +117,7 @@ fn key_description_markdown(key: &KeyInfo) -> String {
     let default = match key.default {
         DefaultValue::Required(_) => "\n\nRequired.".to_owned(),
         DefaultValue::Is(_) | DefaultValue::By(_) => named("Default", key.default_markdown()),
-        DefaultValue::Absent => String::new(),
+        DefaultValue::Alternative(_) | DefaultValue::Absent => String::new(),
     };
     format!("{}.{}{}{default}", key.doc, named("Unit", key.unit.to_owned()), named("Range", key.range_text()))
 }

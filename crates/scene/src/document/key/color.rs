@@ -3,12 +3,12 @@
 use std::ops::Range;
 
 use super::super::super::description::{ColorSource, EmissionSource};
-use super::super::super::keys::{color_names, hex_digits, parse_hex_or_named_srgb8};
+use super::super::super::keys::colors::{color_names, hex_digits, parse_hex_or_named_srgb8};
 use super::super::super::nearest::nearest_name;
 use super::super::context::Issue;
 use super::super::limits::Limits;
 use super::super::names::DefinedNames;
-use super::super::value::{TomlValue, Value, number_within, parse_integer_in_radix, report_wrong_type};
+use super::super::value::{TomlValue, Value, parse_integer_in_radix};
 use super::KeyInTable;
 use crate::math::color::srgb8_color_to_linear;
 use crate::math::{DVec3, Vec3};
@@ -23,33 +23,29 @@ const EMISSION: &str =
     "a color, [r, g, b], a number, \"#rrggbb\" or a name, or { texture = \"name\", scale = 1.0 }";
 
 impl KeyInTable<'_> {
-    /// Reads a non-negative color and converts it to linear.
+    /// Reads a color and converts it to linear.
     pub(in super::super) fn color(&self) -> Option<Vec3> {
-        self.color_f64(Limits::AtLeast(0.0)).map(DVec3::as_vec3)
+        self.color_f64().map(DVec3::as_vec3)
     }
 
     /// Reads a color in double precision, because `f32` would round some values to 0 or 1.
-    pub(in super::super) fn color_f64(&self, limits: Limits) -> Option<DVec3> {
-        self.color_in_limits(limits, COLOR)
+    pub(in super::super) fn color_f64(&self) -> Option<DVec3> {
+        self.color_described_as(COLOR)
     }
 
     /// Reads a color or a texture.
-    pub(in super::super) fn color_or_texture(
-        &self,
-        textures: &DefinedNames,
-        limits: Limits,
-    ) -> Option<ColorSource> {
+    pub(in super::super) fn color_or_texture(&self, textures: &DefinedNames) -> Option<ColorSource> {
         if self.is_table() {
             return self.inline_table_texture_index(textures).map(ColorSource::Texture);
         }
         self.reject_bare_texture_name(textures, COLOR_OR_TEXTURE)?;
-        self.color_in_limits(limits, COLOR_OR_TEXTURE).map(|color| ColorSource::Constant(color.as_vec3()))
+        self.color_described_as(COLOR_OR_TEXTURE).map(|color| ColorSource::Constant(color.as_vec3()))
     }
 
     /// Reads the texture in `{ texture = "name" }`.
     fn inline_table_texture_index(&self, textures: &DefinedNames) -> Option<usize> {
         let table = self.inline_table()?;
-        let texture = table.required_key("texture", "\"name\"").index_by_name(textures);
+        let texture = table.key("texture").index_by_name(textures);
         table.report_unknown_and_missing_keys();
         texture
     }
@@ -58,15 +54,13 @@ impl KeyInTable<'_> {
     pub(in super::super) fn emission_source(&self, textures: &DefinedNames) -> Option<EmissionSource> {
         if self.is_table() {
             let table = self.inline_table()?;
-            let texture = table.required_key("texture", "\"name\"").index_by_name(textures);
-            let scale = table.optional_key("scale");
-            let scale = if scale.is_present() { scale.color() } else { Some(Vec3::ONE) };
+            let texture = table.key("texture").index_by_name(textures);
+            let scale = table.key("scale").color();
             table.report_unknown_and_missing_keys();
             return Some(EmissionSource { texture: Some(texture?), ..EmissionSource::from_constant(scale?) });
         }
         self.reject_bare_texture_name(textures, EMISSION)?;
-        self.color_in_limits(Limits::AtLeast(0.0), EMISSION)
-            .map(|color| EmissionSource::from_constant(color.as_vec3()))
+        self.color_described_as(EMISSION).map(|color| EmissionSource::from_constant(color.as_vec3()))
     }
 
     /// Returns `None` and reports an error if the value is a bare texture name.
@@ -75,7 +69,7 @@ impl KeyInTable<'_> {
             && parse_hex_or_named_srgb8(text).is_none()
             && textures.find_and_mark_used(text).is_some()
         {
-            let issue = Issue::error(self.value_span()?, format!("`{}` must be {expected}", self.name))
+            let issue = Issue::error(self.value_span()?, format!("`{}` must be {expected}", self.info.name))
                 .with_label("found the name of a texture")
                 .with_help(format!("write {{ texture = {} }}", self.context.span_text(&self.value_span()?)));
             self.context.report(issue);
@@ -84,25 +78,27 @@ impl KeyInTable<'_> {
         Some(())
     }
 
-    fn color_in_limits(&self, limits: Limits, expected: &str) -> Option<DVec3> {
+    /// Reads a color. Error messages call the value's type `expected`.
+    fn color_described_as(&self, expected: &str) -> Option<DVec3> {
         let value = self.value?;
-        if let Limits::Between(..) = limits
-            && self.report_byte_color(|span| Issue::error(span, format!("`{}` must be {COLOR}", self.name)))
+        if let Some(Limits::Between(..)) = self.info.kind.limits()
+            && self
+                .report_byte_color(|span| Issue::error(span, format!("`{}` must be {COLOR}", self.info.name)))
         {
             return None;
         }
         match value.decode() {
             TomlValue::String(text) => return self.parse_hex_or_named_color(text).map(Vec3::as_dvec3),
             TomlValue::Integer { .. } | TomlValue::Float(_) => {
-                return number_within(self.context, self.name, value, limits, expected).map(DVec3::splat);
+                return self.number_in(value, expected).map(DVec3::splat);
             }
             TomlValue::Boolean(_) | TomlValue::Datetime | TomlValue::Array(_) | TomlValue::Table(_) => {}
         }
         if value.as_array().is_some_and(|array| array.len() == 3) {
-            let rgb: [f64; 3] = self.numbers(limits, "three numbers, [r, g, b]")?;
+            let rgb: [f64; 3] = self.numbers("three numbers, [r, g, b]")?;
             return Some(DVec3::from_array(rgb));
         }
-        report_wrong_type(self.context, self.name, value, expected);
+        self.report_wrong_type(value, expected);
         None
     }
 
@@ -141,7 +137,7 @@ impl KeyInTable<'_> {
         if let Some(bytes) = parse_hex_or_named_srgb8(text) {
             return Some(srgb8_color_to_linear(bytes));
         }
-        let issue = Issue::error(self.value_span()?, format!("`{}` must be {COLOR}", self.name));
+        let issue = Issue::error(self.value_span()?, format!("`{}` must be {COLOR}", self.info.name));
         let small = text.to_ascii_lowercase();
         let issue = match (normalize_hex_color(text), nearest_name(&small, color_names())) {
             (Some(long), _) => issue

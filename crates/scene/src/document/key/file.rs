@@ -4,6 +4,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use super::super::super::description::Spanned;
+use super::super::super::keys::key::ValueKind;
 use super::super::super::nearest::nearest_name;
 use super::super::super::read::{MAX_FOLDER_FILES, is_symlink, similar_file};
 use super::super::super::sanitize::{escape_and_truncate, escape_invisible_chars};
@@ -13,14 +14,22 @@ use crate::system::describe_error;
 use crate::system::file::{self, FileKind};
 
 impl KeyInTable<'_> {
-    /// Reads the path of an existing file and resolves it against the scene's folder. The file must have one
-    /// of the extensions `endings`, unless the list is empty.
-    pub(in super::super) fn existing_file(&self, endings: &[&str]) -> Option<Spanned<PathBuf>> {
+    /// Reads the path of an existing file and resolves it against the scene's folder.
+    pub(in super::super) fn existing_file(&self) -> Option<Spanned<PathBuf>> {
+        self.existing_file_with_extension(self.extensions())
+    }
+
+    /// Like [`Self::existing_file`], for a file with one of the extensions `endings`. If the list is empty,
+    /// any file is allowed.
+    pub(in super::super) fn existing_file_with_extension(
+        &self,
+        endings: &[&str],
+    ) -> Option<Spanned<PathBuf>> {
         let text = self.string("a file path")?;
         let span = self.value_span()?;
         if text.is_empty() {
             self.context
-                .report(Issue::error(span, format!("`{}` is empty; expected a file path", self.name)));
+                .report(Issue::error(span, format!("`{}` is empty; expected a file path", self.info.name)));
             return None;
         }
         if !endings.is_empty() && !self.check_extension(text, endings) {
@@ -51,6 +60,11 @@ impl KeyInTable<'_> {
         Some(Spanned { value: path, span })
     }
 
+    /// Extensions of the key's files.
+    pub(in super::super) fn extensions(&self) -> &'static [&'static str] {
+        if let ValueKind::File(extensions) = self.info.kind { extensions } else { &[] }
+    }
+
     /// Checks a path's extension and reports an error if it is wrong.
     pub(in super::super) fn check_extension(&self, text: &str, endings: &[&str]) -> bool {
         let ending = lowercase_extension(text);
@@ -61,8 +75,8 @@ impl KeyInTable<'_> {
         let list = endings.iter().map(|ending| format!(".{ending}")).collect::<Vec<_>>().join(", ");
         let shown = escape_and_truncate(&ending, 16);
         let message = match ending.as_str() {
-            "" => format!("`{}` needs a file extension", self.name),
-            _ => format!("`{}`: unknown file extension .{shown}", self.name),
+            "" => format!("`{}` needs a file extension", self.info.name),
+            _ => format!("`{}`: unknown file extension .{shown}", self.info.name),
         };
         let mut issue = Issue::error(span, message).with_help(format!("expected one of {list}"));
         if let Some(near) = nearest_name(&ending, endings.iter().copied()) {

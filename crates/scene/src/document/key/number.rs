@@ -2,9 +2,8 @@
 
 use super::super::super::description::{Channel, NumberSource};
 use super::super::context::Issue;
-use super::super::limits::Limits;
 use super::super::names::DefinedNames;
-use super::super::value::{TomlValue, number_within};
+use super::super::value::TomlValue;
 use super::KeyInTable;
 
 const NUMBER_OR_TEXTURE: &str = "a number, or { texture = \"name\" }";
@@ -12,11 +11,7 @@ const NAME_OR_TEXTURE: &str = "the name of a texture, or { texture = \"name\" }"
 
 impl KeyInTable<'_> {
     /// Reads a number, or a texture with an optional channel.
-    pub(in super::super) fn number_or_texture(
-        &self,
-        textures: &DefinedNames,
-        limits: Limits,
-    ) -> Option<NumberSource> {
+    pub(in super::super) fn number_or_texture(&self, textures: &DefinedNames) -> Option<NumberSource> {
         if self.is_table() {
             let (texture, channel) = self.texture_channel_table(textures)?;
             return Some(NumberSource::Texture { texture, channel });
@@ -25,14 +20,14 @@ impl KeyInTable<'_> {
         if let TomlValue::String(text) = value.decode()
             && textures.find_and_mark_used(text).is_some()
         {
-            let issue = Issue::error(value.span(), format!("`{}` must be {NUMBER_OR_TEXTURE}", self.name))
-                .with_label("found the name of a texture")
-                .with_help(format!("write {{ texture = {} }}", self.context.span_text(&value.span())));
+            let issue =
+                Issue::error(value.span(), format!("`{}` must be {NUMBER_OR_TEXTURE}", self.info.name))
+                    .with_label("found the name of a texture")
+                    .with_help(format!("write {{ texture = {} }}", self.context.span_text(&value.span())));
             self.context.report(issue);
             return None;
         }
-        let number = number_within(self.context, self.name, value, limits, NUMBER_OR_TEXTURE);
-        number.map(|number| NumberSource::Constant(number as f32))
+        self.number_in(value, NUMBER_OR_TEXTURE).map(|number| NumberSource::Constant(number as f32))
     }
 
     /// Reads the name of a texture, or `{ texture = "name", channel = "r" }`.
@@ -50,8 +45,8 @@ impl KeyInTable<'_> {
     /// Reads the texture and the channel in `{ texture = "name", channel = "r" }`.
     fn texture_channel_table(&self, textures: &DefinedNames) -> Option<(usize, Option<Channel>)> {
         let table = self.inline_table()?;
-        let texture = table.required_key("texture", "\"name\"").index_by_name(textures);
-        let key = table.optional_key("channel");
+        let texture = table.key("texture").index_by_name(textures);
+        let key = table.key("channel");
         let channel = if key.is_present() { key.choice().map(Some) } else { Some(None) };
         table.report_unknown_and_missing_keys();
         Some((texture?, channel?))

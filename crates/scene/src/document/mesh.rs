@@ -1,0 +1,79 @@
+//! The `[[mesh]]` tables.
+
+use std::path::{Path, PathBuf};
+
+use super::super::description::{MeshReference, MeshTransform, Shape, Spanned};
+use super::super::keys::endings::{GLTF, MESHES};
+use super::super::keys::key::DefaultValue::{Absent, By, Is, Required};
+use super::super::keys::key::ValueKind::{File, Flag, Numbers, Scale, Whole};
+use super::super::keys::key::{ANGLES, MOST_WHOLE};
+use super::context::Issue;
+use super::limits::Limits::{Any, NotZero};
+use super::shape_table::{MeshFileRegistry, read_affine_matrix, shape_table};
+use super::table::TableReader;
+
+shape_table! {
+    /// A triangle mesh from a file.
+    pub(super) const MESH = "mesh", read_mesh, material: By("the file's");
+    /// An OBJ (with MTL), OFF, PLY, STL or glTF (.glb, .gltf) file; the extension determines the
+    /// format.
+    file: File(MESHES), Required("\"mesh.obj\"");
+    /// Index of a primitive in a glTF file, counted across all meshes. Without this key, the mesh is
+    /// the file's whole scene.
+    part: Whole(0, MOST_WHOLE), Absent;
+    /// Scale, applied first.
+    scale: Scale(NotZero), Is("1.0");
+    /// Rotation about x, then y, then z.
+    rotate: ANGLES, Is("[0, 0, 0]"), "degrees";
+    /// Translation, applied last.
+    translate: Numbers(3, "three numbers", Any), Is("[0, 0, 0]"), "length";
+    /// Whether vertex normals are interpolated; glimt computes them if the file has none.
+    smooth: Flag, Is("true");
+    /// Whether vertex colors multiply the material's color.
+    vertex_colors: Flag, Is("false");
+}
+
+fn read_mesh(table: &TableReader<'_>, files: &mut MeshFileRegistry) -> Option<Shape> {
+    let file = table.key("file").existing_file();
+    let part = read_part_index(table, file.as_ref());
+    let placed = read_placement(table);
+    let (smooth, vertex_colors) = (table.key("smooth").boolean(), table.key("vertex_colors").boolean());
+    let (file, placed) = (files.add_file(file?, part?), placed?);
+    Some(Shape::Mesh(MeshReference { file, placed, smooth: smooth?, vertex_colors: vertex_colors? }))
+}
+
+/// Reads the index of a glTF part.
+fn read_part_index(table: &TableReader<'_>, file: Option<&Spanned<PathBuf>>) -> Option<Option<u32>> {
+    let key = table.key("part");
+    let Some(span) = key.value_span() else { return Some(None) };
+    let number = key.integer().map(Some);
+    let ending = file.and_then(|file| file.value.extension()).unwrap_or_default().to_ascii_lowercase();
+    if file.is_some() && !GLTF.iter().any(|known| ending == *known) {
+        key.context.report(Issue::error(span, "`part` needs a .glb or .gltf file"));
+        return None;
+    }
+    number
+}
+
+/// Reads either `matrix`, or `scale`, `rotate` and `translate`.
+fn read_placement(table: &TableReader<'_>) -> Option<MeshTransform> {
+    let (matrix, steps) = (table.key("matrix"), ["scale", "rotate", "translate"].map(|name| table.key(name)));
+    if matrix.is_present() {
+        for key in &steps {
+            if let Some(span) = key.key_span() {
+                let message = format!("`{}` conflicts with `matrix`", key.info.name);
+                key.context.report(Issue::error(span, message));
+            }
+        }
+        return read_affine_matrix(&matrix).map(MeshTransform::Matrix);
+    }
+    let [scale, rotate, translate] = steps;
+    let (scale, rotate, translate) = (scale.scale_factors(), rotate.vector(), translate.vector());
+    Some(MeshTransform::Steps { scale: scale?, rotate: rotate?, translate: translate? })
+}
+
+/// Whether a file has a mesh extension.
+pub(crate) fn has_mesh_extension(path: &Path) -> bool {
+    let ending = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+    MESHES.iter().any(|known| *known == ending)
+}
