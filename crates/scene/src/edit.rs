@@ -38,6 +38,7 @@ struct CameraEdits<'t> {
 impl CameraEdits<'_> {
     fn set_camera(&mut self, wanted: &ResolvedCamera) {
         let ResolvedCamera { pose: Pose { position, look_at, up }, fov, aperture, focus } = *wanted;
+        // Read the defaults from the definitions of the keys. The required keys have arbitrary values.
         let with_defaults = "[camera]\nposition = [0, 1, 4]\nlook_at = [0, 1, 0]";
         let default = match parse_camera(&SceneText::from_file_text(with_defaults.into())) {
             Some(Camera::LookAt { up, fov, aperture, .. }) => (up, fov, aperture),

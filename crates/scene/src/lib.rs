@@ -98,8 +98,8 @@ pub fn read_current_text(path: &Path) -> Result<Arc<str>, Box<Diagnostic>> {
 }
 
 impl LoadedScene {
-    /// Whether the scene was generated for the model at [`Self::path`].
-    pub fn is_model(&self) -> bool {
+    /// Whether the scene's text was generated because the file at [`Self::path`] is not a scene file.
+    pub fn is_generated(&self) -> bool {
         self.source.is_generated()
     }
 

@@ -3,8 +3,9 @@
 use super::sum_order::add_finite_and_count_non_finite;
 use crate::math::{DVec3, Vec3};
 
-/// Number of values per sample if all layers are recorded.
-const ALL_VALUES: usize = 21;
+/// Number of values per sample if all layers are recorded. [`LayerSums::add_pixel_samples`] is fastest for this
+/// number.
+pub const ALL_LAYER_VALUES: usize = 21;
 
 /// Sums of the layers' values for a set of pixels, stored pixel by pixel. The sample counts are the image's.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -30,9 +31,11 @@ impl LayerSums {
         let (pixel, size) = (pixel * self.count..(pixel + 1) * self.count, 3 * self.count);
         let Some(is_negative) = is_negative else {
             let sums = &mut self.sums[pixel];
-            // The loops over all layers compile to vector instructions.
+            // With a constant number of values per sample, the loops compile to vector instructions.
             let is_done = match size {
-                ALL_VALUES => try_add_samples::<ALL_VALUES>(bytemuck::cast_slice_mut(sums), values),
+                ALL_LAYER_VALUES => {
+                    try_add_samples::<ALL_LAYER_VALUES>(bytemuck::cast_slice_mut(sums), values)
+                }
                 _ => false,
             };
             if !is_done {
@@ -52,7 +55,8 @@ impl LayerSums {
         self.sums.resize(area * self.count, DVec3::ZERO);
     }
 
-    /// Replaces the sums of all pixels and returns the previous sums.
+    /// Replaces the sums of all pixels and returns the previous sums. If the sizes differ, does nothing and
+    /// returns `other`.
     pub(super) fn replace_all(&mut self, mut other: Self) -> Self {
         if self.sums.len() == other.sums.len() {
             std::mem::swap(self, &mut other);

@@ -112,9 +112,8 @@ fn write_blocks(
     }
 }
 
-/// Compresses a block of scan lines as ZIP: predicts the bytes and deflates the result. The encoder's own
-/// function deflates at a higher level, which takes several times as long for files that are a few percent
-/// smaller.
+/// Compresses a block of scan lines as ZIP: applies the predictor and deflates the result. The encoder's own
+/// function uses a higher level, which takes several times as long.
 fn compress_scan_lines(index: BlockIndex, channels: &[Channel<'_>]) -> ::exr::error::Result<Chunk> {
     let samples = scan_line_bytes(index, channels);
     let deflated = Vec::with_capacity(samples.len());
@@ -142,7 +141,7 @@ fn scan_line_bytes(index: BlockIndex, channels: &[Channel<'_>]) -> Vec<u8> {
 }
 
 /// Separates the bytes at even positions from those at odd positions, and replaces each byte except the first
-/// by its difference from the previous one, plus 128.
+/// with its difference from the previous byte, plus 128.
 fn predicted_bytes(samples: &[u8]) -> Vec<u8> {
     let mut separated = vec![0; samples.len()];
     let (even, odd) = separated.split_at_mut(samples.len() / 2);

@@ -1,4 +1,4 @@
-//! Mesh files: OBJ, OFF, PLY and STL.
+//! Reads mesh files: OBJ, OFF, PLY and STL.
 
 use std::fs::File;
 use std::io::Read;
@@ -10,7 +10,7 @@ use super::model::{
     write_render_settings, write_sky_and_key_light,
 };
 use super::toml::TomlWriter;
-use super::{ForeignScene, ImportContext, ImportFailure};
+use super::{ForeignReadContext, ForeignReadError, ForeignScene};
 use crate::assets::{AssetError, FileMaterial, LoadedMesh};
 use crate::control::ignore_progress;
 use crate::math::DVec3;
@@ -76,19 +76,25 @@ fn is_mesh_fully_transparent(loaded: &LoadedMesh) -> bool {
 }
 
 /// Reads an OBJ or OFF file.
-pub(super) fn read(path: &Path, context: &ImportContext<'_>) -> Result<ForeignScene, ImportFailure> {
+pub(super) fn read(path: &Path, context: &ForeignReadContext<'_>) -> Result<ForeignScene, ForeignReadError> {
     scene_text(path, UpAxis::Y, false, context)?.into_scene(path, context.sets)
 }
 
-/// Reads a PLY file. Blender exports them with z as the up axis.
-pub(super) fn read_ply(path: &Path, context: &ImportContext<'_>) -> Result<ForeignScene, ImportFailure> {
+/// Reads a PLY file. The default up axis is z for files from Blender, and y for all others.
+pub(super) fn read_ply(
+    path: &Path,
+    context: &ForeignReadContext<'_>,
+) -> Result<ForeignScene, ForeignReadError> {
     let up = if is_from_blender(path) { UpAxis::Z } else { UpAxis::Y };
     scene_text(path, up, false, context)?.into_scene(path, context.sets)
 }
 
 /// Reads an STL file. By the convention of CAD and 3D printing, z is the up axis. STL has no vertex normals,
 /// and mechanical parts have sharp edges.
-pub(super) fn read_stl(path: &Path, context: &ImportContext<'_>) -> Result<ForeignScene, ImportFailure> {
+pub(super) fn read_stl(
+    path: &Path,
+    context: &ForeignReadContext<'_>,
+) -> Result<ForeignScene, ForeignReadError> {
     scene_text(path, UpAxis::Z, true, context)?.into_scene(path, context.sets)
 }
 
@@ -97,7 +103,7 @@ fn scene_text(
     path: &Path,
     up: UpAxis,
     is_faceted: bool,
-    &ImportContext { view, containers, token, .. }: &ImportContext<'_>,
+    &ForeignReadContext { view, containers, token, .. }: &ForeignReadContext<'_>,
 ) -> Result<GeneratedText, AssetError> {
     let loaded = containers.load_any_mesh((path, None), &ignore_progress, token)?;
     let Some([least, greatest]) = loaded.mesh.bounds_in_file_coordinates() else {

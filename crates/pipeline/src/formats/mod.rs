@@ -1,7 +1,7 @@
 //! Foreign formats: files that glimt renders or imports although they are not scene files.
 //!
-//! [`FORMATS`] lists the formats, each with its extensions and its importer. This is the only place that
-//! decides from a file's name which format it has. An importer reads a file into a [`ForeignScene`]; the rest
+//! [`FORMATS`] lists the formats, each with its extensions and its importer. For a file on
+//! the command line, only this table decides which format it has. An importer reads it into a [`ForeignScene`]; the rest
 //! of the pipeline does not know the format. `model` generates the view and the lights for models, which
 //! `glimt MODEL` and `glimt import` share so that they produce the same image.
 
@@ -52,12 +52,12 @@ pub(crate) struct ForeignFormat {
     convert: Option<ConvertFn>,
 }
 
-type ReadFn = fn(&Path, &ImportContext<'_>) -> Result<ForeignScene, ImportFailure>;
-type ConvertFn = fn(&Path, &str, &ImportContext<'_>) -> Result<ImportedScene, AssetError>;
+type ReadFn = fn(&Path, &ForeignReadContext<'_>) -> Result<ForeignScene, ForeignReadError>;
+type ConvertFn = fn(&Path, &str, &ForeignReadContext<'_>) -> Result<ImportedScene, AssetError>;
 
 /// Inputs of an importer other than the file.
 #[derive(Clone, Copy)]
-pub(crate) struct ImportContext<'a> {
+pub(crate) struct ForeignReadContext<'a> {
     /// Scene key overrides from the command line.
     pub(crate) sets: &'a [String],
     /// View of a model.
@@ -74,10 +74,10 @@ pub(crate) struct ForeignScene {
     pub(crate) loaded: LoadedScene,
     /// Hash of the file.
     pub(crate) hash: FileHash,
-    /// Other files that affect the scene, and therefore are watched. The assets that the scene references are
+    /// Other files that affect the scene and are therefore watched. The assets that the scene references are
     /// not included.
     pub(crate) companions: Vec<Companion>,
-    /// Remarks that are not substitutions.
+    /// Other warnings about the file, such as missing materials.
     pub(crate) notes: Vec<Diagnostic>,
     /// Features without an exact equivalent and their substitutes.
     pub(crate) substitutions: Vec<Diagnostic>,
@@ -96,14 +96,14 @@ pub struct ImportedScene {
 
 /// Reason why a foreign file cannot be read.
 #[derive(Debug)]
-pub(crate) enum ImportFailure {
+pub(crate) enum ForeignReadError {
     /// The file, or a file that it references, cannot be used.
     File(AssetError),
     /// The scene in the file, or an override, has errors.
     Scene(Vec<Diagnostic>),
 }
 
-impl From<AssetError> for ImportFailure {
+impl From<AssetError> for ForeignReadError {
     fn from(error: AssetError) -> Self {
         Self::File(error)
     }

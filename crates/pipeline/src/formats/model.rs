@@ -8,7 +8,7 @@ use super::frame::{
     round_to_decimals_of_step,
 };
 use super::toml::{TomlWriter, format_exact_vector, format_number, format_vector, round_significant};
-use super::{ForeignScene, ImportFailure};
+use super::{ForeignReadError, ForeignScene};
 use crate::assets::{Companion, FileHash};
 use crate::math::DVec3;
 use crate::scene::diagnostic::{Diagnostic, Severity};
@@ -82,14 +82,14 @@ pub(super) struct GeneratedText {
 
 impl GeneratedText {
     /// Lowers the text to a scene, with the overrides from the command line.
-    pub(super) fn into_scene(self, path: &Path, sets: &[String]) -> Result<ForeignScene, ImportFailure> {
+    pub(super) fn into_scene(self, path: &Path, sets: &[String]) -> Result<ForeignScene, ForeignReadError> {
         let Self { text, hash, companions, notes, substitutions } = self;
         let loaded = load_generated(text.into(), path, sets).map_err(|mut errors| {
-            // Say that errors outside the overrides are not in a file.
+            // Mark errors in the generated text, which the user cannot see. Errors in overrides need no mark.
             for error in errors.iter_mut().filter(|error| error.path == path) {
                 error.message = format!("in the scene generated for this model, {}", error.message);
             }
-            ImportFailure::Scene(errors)
+            ForeignReadError::Scene(errors)
         })?;
         Ok(ForeignScene { loaded, hash, companions, notes, substitutions })
     }

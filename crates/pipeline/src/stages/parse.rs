@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use super::super::cache::Memo;
 use super::super::formats::model::ModelViewOptions;
-use super::super::formats::{ForeignFormat, ForeignScene, ImportContext, ImportFailure};
+use super::super::formats::{ForeignFormat, ForeignReadContext, ForeignReadError, ForeignScene};
 use super::super::protocol::{Failure, reasons};
 use super::super::watch::content::{FileContentId, FilePathAndContentId, FilesSeenByRequest};
 use super::containers::GltfContainers;
@@ -50,14 +50,14 @@ pub(crate) struct SceneParseRequest<'a> {
 
 /// Converts an importer's error. Watches missing files to detect when they are created.
 fn abort_reason(
-    failure: ImportFailure,
+    failure: ForeignReadError,
     contents: &FilesSeenByRequest,
     findings: &mut Findings,
     token: &CancelToken,
 ) -> AbortReason {
     let error = match failure {
-        ImportFailure::Scene(errors) => return AbortReason::Failed(Failure::Scene(errors)),
-        ImportFailure::File(error) => error,
+        ForeignReadError::Scene(errors) => return AbortReason::Failed(Failure::Scene(errors)),
+        ForeignReadError::File(error) => error,
     };
     match error {
         AssetError::Cancelled(_) => AbortReason::Cancelled,
@@ -171,7 +171,7 @@ fn read_scene(
             contents.record_decoded(path, *blake3::hash(loaded.source.file_text().as_bytes()).as_bytes());
         return Ok((Arc::new(loaded), content, Vec::new(), Vec::new()));
     };
-    let context = ImportContext { sets, view: show, containers, token };
+    let context = ForeignReadContext { sets, view: show, containers, token };
     let ForeignScene { loaded, hash, companions, notes, substitutions } =
         (format.read)(path, &context).map_err(|failure| abort_reason(failure, contents, findings, token))?;
     let content = contents.record_decoded(path, hash);

@@ -37,7 +37,7 @@ const MIN_SINE: f64 = 1e-6;
 
 pub(super) fn read_camera(root: &TableReader<'_>) -> Option<Camera> {
     if root.entry("camera").is_none() {
-        // The misspelled table has already been reported.
+        // `report_unknown_and_missing_keys` reports the misspelled table.
         if root.has_misspelled_table("camera") {
             return None;
         }

@@ -17,7 +17,7 @@ use super::table::TableReader;
 use crate::materials::conductor::elements::MetalElement;
 use crate::math::Vec3;
 
-/// A color or texture of which no component exceeds 1.
+/// A color with components from 0 to 1, or a texture.
 const REFLECTANCE: ValueKind = ColorOrTexture(Between(0.0, 1.0));
 
 /// A number or texture from 0 to 1.

@@ -1,4 +1,5 @@
-//! The parts that the tables of all shapes share: the form of their definitions and the key `matrix`.
+//! Code shared by the tables of all shapes: the macro that defines them, the list of mesh files, and the key
+//! `matrix`.
 
 use std::collections::HashMap;
 use std::path::PathBuf;

@@ -132,11 +132,11 @@ impl<'a> TableReader<'a> {
         self.entries.get(name)
     }
 
-    /// Finds a key by its name. Reports an error later if the key is required and absent.
+    /// Finds a key by its name. If it is required and absent,
+    /// [`Self::report_unknown_and_missing_keys`] reports it.
     pub(super) fn key(&self, name: &str) -> KeyInTable<'a> {
         let mut all = self.keys.into_iter().flatten();
-        let info =
-            all.find(|key| key.name == name).expect("tests read every key, and all of them are defined");
+        let info = all.find(|key| key.name == name).expect("readers use only defined keys, as tests check");
         let key = KeyInTable::new(self.context, info, self.entry(info.name));
         if let DefaultValue::Required(example) = info.default {
             self.require(&key, example);
@@ -144,7 +144,7 @@ impl<'a> TableReader<'a> {
         key
     }
 
-    /// Finds a key which is required because no alternative key is present.
+    /// Finds a key that is required because no alternative key is present.
     pub(super) fn required_alternative(&self, name: &str) -> KeyInTable<'a> {
         let key = self.key(name);
         if let DefaultValue::Alternative(example) = key.info.default {
@@ -161,7 +161,8 @@ impl<'a> TableReader<'a> {
         }
     }
 
-    /// Reads the key `type`, and finds the type's keys from then on. The first type is the default.
+    /// Reads the key `type`. Afterwards, [`Self::key`] also finds the keys of this type. The first type is the
+    /// default.
     pub(super) fn read_type<C: Choice>(&mut self) -> Option<C> {
         const TYPE: &KeyInfo = &keys! {
             /// The type.

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use crate::accel::InstructionSet;
-use crate::film::LayerSums;
+use crate::film::{ALL_LAYER_VALUES, LayerSums};
 use crate::math::Vec3;
 use crate::math::lanes::Simd;
 use crate::world::SimdKernel;
@@ -39,6 +39,8 @@ impl SampleLayer {
         Self::Emission,
     ];
 }
+
+const _: () = assert!(3 * SampleLayer::ALL.len() == ALL_LAYER_VALUES);
 
 /// A set of layers, ordered as in [`SampleLayer::ALL`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

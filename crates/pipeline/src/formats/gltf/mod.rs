@@ -1,4 +1,4 @@
-//! glTF files.
+//! Reads and imports glTF files.
 
 mod materials;
 
@@ -13,7 +13,7 @@ use super::model::{
     write_ground, write_render_settings, write_sky_and_key_light,
 };
 use super::toml::{TomlWriter, format_color, format_list, format_number, format_vector};
-use super::{ForeignScene, ImportContext, ImportFailure, ImportedScene};
+use super::{ForeignReadContext, ForeignReadError, ForeignScene, ImportedScene};
 use crate::assets::gltf::{
     Alpha, GltfFile, ImageLocation, ModelCamera, ModelInstance, ModelLight, ModelLightKind, ModelMaterial,
     ModelScene, TexturedValue,
@@ -47,7 +47,7 @@ enum GltfPartOrImage {
 }
 
 /// Reads a glTF file.
-pub(super) fn read(path: &Path, context: &ImportContext<'_>) -> Result<ForeignScene, ImportFailure> {
+pub(super) fn read(path: &Path, context: &ForeignReadContext<'_>) -> Result<ForeignScene, ForeignReadError> {
     if context.view.up.is_some_and(|up| up != UpAxis::Y) {
         let reason = "glTF files are always y-up; `--up` applies to obj, off, ply and stl";
         return Err(AssetError::malformed(path, None, reason).into());
@@ -60,9 +60,9 @@ pub(super) fn read(path: &Path, context: &ImportContext<'_>) -> Result<ForeignSc
 pub(super) fn convert(
     path: &Path,
     folder: &str,
-    context: &ImportContext<'_>,
+    context: &ForeignReadContext<'_>,
 ) -> Result<ImportedScene, AssetError> {
-    let &ImportContext { containers, token, .. } = context;
+    let &ForeignReadContext { containers, token, .. } = context;
     let (GeneratedText { text, substitutions, .. }, assets) =
         scene_text(path, &SceneAssetLocation::Folder(folder), context)?;
     check_shown_scene(path, context)?;
@@ -87,11 +87,11 @@ pub(super) fn convert(
 
 /// Rejects a file that `glimt check` would reject. Checks the scene that `glimt MODEL` would render, because the
 /// files referenced by that scene already exist.
-fn check_shown_scene(path: &Path, context: &ImportContext<'_>) -> Result<(), AssetError> {
+fn check_shown_scene(path: &Path, context: &ForeignReadContext<'_>) -> Result<(), AssetError> {
     let errors = match read(path, context) {
         Ok(_) => return Ok(()),
-        Err(ImportFailure::File(error)) => return Err(error),
-        Err(ImportFailure::Scene(errors)) => errors,
+        Err(ForeignReadError::File(error)) => return Err(error),
+        Err(ForeignReadError::Scene(errors)) => errors,
     };
     // Ignore errors about file names, because the imported scene uses different file names.
     let counts = |one: &Diagnostic| one.severity == Severity::Error && !one.message.contains("`file`");
@@ -104,7 +104,7 @@ fn check_shown_scene(path: &Path, context: &ImportContext<'_>) -> Result<(), Ass
 fn scene_text(
     path: &Path,
     naming: &SceneAssetLocation<'_>,
-    &ImportContext { view, containers, token, .. }: &ImportContext<'_>,
+    &ForeignReadContext { view, containers, token, .. }: &ForeignReadContext<'_>,
 ) -> Result<(GeneratedText, Vec<(String, GltfPartOrImage)>), AssetError> {
     let container = containers.open(path, &ignore_progress, token)?;
     let scene = container.convert_scene(token)?;

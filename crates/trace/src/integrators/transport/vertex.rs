@@ -246,7 +246,7 @@ impl<'a> SurfaceVertex<'a> {
         if self.has_uv { self.surface.dpdu } else { Vec3::ZERO }
     }
 
-    /// What light sampling and BSDF sampling need to know about the vertex.
+    /// Returns the geometry for light sampling and BSDF sampling.
     #[inline(always)]
     pub fn scattering_geometry(
         &self,
@@ -320,8 +320,8 @@ const MIN_LIFT: f32 = 8.0;
 pub struct ScatteringGeometry {
     /// Origin of light samples and shadow rays.
     pub origin: ShadowOrigin,
-    /// The surface point and the geometric normal on the lit side, or `None` if the origin and the shading
-    /// normal take their place.
+    /// The surface point, and the geometric normal oriented toward the viewer. `None` if the vertex is not on
+    /// a surface. The origin and the shading normal are then used instead.
     pub facet: Option<(Vec3, Vec3)>,
     /// Unit direction toward the viewer.
     pub wo: Vec3,
