@@ -2,11 +2,10 @@
 
 use std::ops::Range;
 
-use crate::accel::InstructionSet;
 use crate::film::{ALL_LAYER_VALUES, LayerSums};
 use crate::math::Vec3;
 use crate::math::lanes::Simd;
-use crate::world::SimdKernel;
+use crate::world::{InstructionSet, SimdKernel};
 
 /// A quantity recorded along with the beauty image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

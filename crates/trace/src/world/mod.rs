@@ -31,7 +31,7 @@ mod unlit_glass;
 use std::collections::HashMap;
 use std::sync::Arc;
 
-pub use crate::accel::{PACKET_SIZE, RayBoxInterval, SimdKernel, TreeNodeInfo};
+pub use crate::accel::{InstructionSet, PACKET_SIZE, RayBoxInterval, SimdKernel, TreeNodeInfo};
 pub use camera::Camera;
 pub use camera_interior::CompoundSolid;
 pub use contact::{
