@@ -655,9 +655,11 @@ fn parse_u32(text: &str) -> Result<u32, String> {
 fn integer_override_parser(
     key: &'static str,
 ) -> impl Fn(&str) -> Result<u32, String> + Clone + Send + Sync + 'static {
-    move |text| match find_key("render", key).map(|key| key.kind) {
-        Some(ValueKind::Whole(least, most)) => parse_integer_in_range(text, least as u32..=most as u32),
-        Some(_) | None => Err(format!("`{key}` is not an integer key of [render]")),
+    move |text| {
+        let Some(ValueKind::Whole(least, most)) = find_key("render", key).map(|key| key.kind) else {
+            return Err(format!("`{key}` is not an integer key of [render]"));
+        };
+        parse_integer_in_range(text, least as u32..=most as u32)
     }
 }
 

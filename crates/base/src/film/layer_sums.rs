@@ -3,8 +3,8 @@
 use super::sum_order::add_finite_and_count_non_finite;
 use crate::math::{DVec3, Vec3};
 
-/// Number of values per sample if all layers are recorded. [`LayerSums::add_pixel_samples`] is fastest for this
-/// number.
+/// Number of values per sample if all layers are recorded. [`LayerSums::add_pixel_samples`] is fastest for
+/// this number.
 pub const ALL_LAYER_VALUES: usize = 21;
 
 /// Sums of the layers' values for a set of pixels, stored pixel by pixel. The sample counts are the image's.
@@ -31,14 +31,7 @@ impl LayerSums {
         let (pixel, size) = (pixel * self.count..(pixel + 1) * self.count, 3 * self.count);
         let Some(is_negative) = is_negative else {
             let sums = &mut self.sums[pixel];
-            // With a constant number of values per sample, the loops compile to vector instructions.
-            let is_done = match size {
-                ALL_LAYER_VALUES => {
-                    try_add_samples::<ALL_LAYER_VALUES>(bytemuck::cast_slice_mut(sums), values)
-                }
-                _ => false,
-            };
-            if !is_done {
+            if !try_add_all_layers(bytemuck::cast_slice_mut(sums), values) {
                 values.chunks_exact(size).for_each(|sample| add_finite_layers(sums, sample));
             }
             return;
@@ -98,12 +91,14 @@ fn add_finite_layers(sums: &mut [DVec3], sample: &[f32]) {
     }
 }
 
-/// Adds samples with `N` values. Does nothing and returns false if a sum would not be finite.
+/// Adds samples with values of all layers. Because their number is constant, the loops compile to vector
+/// instructions. Does nothing and returns false if only some layers are recorded, or if a sum would not be
+/// finite.
 #[inline(always)]
-fn try_add_samples<const N: usize>(sums: &mut [f64], values: &[f32]) -> bool {
-    let Some(sums) = sums.as_mut_array::<N>() else { return false };
+fn try_add_all_layers(sums: &mut [f64], values: &[f32]) -> bool {
+    let Some(sums) = sums.as_mut_array::<ALL_LAYER_VALUES>() else { return false };
     let mut totals = *sums;
-    for sample in values.as_chunks::<N>().0 {
+    for sample in values.as_chunks::<ALL_LAYER_VALUES>().0 {
         for (total, value) in totals.iter_mut().zip(sample) {
             *total += f64::from(*value);
         }
@@ -122,10 +117,17 @@ mod tests {
 
     #[test]
     fn non_finite_layer_values_are_black() {
-        let mut sums = LayerSums::zero(2, 2);
-        let samples = [[f32::NAN, 1.0, 1.0, 1.0, 1.0, 1.0], [1.0; 6]];
-        sums.add_pixel_samples(1, samples.as_flattened(), None);
-        assert_eq!(sums.sums, [DVec3::ZERO, DVec3::ZERO, DVec3::ONE, DVec3::splat(2.0)]);
+        for count in [2, ALL_LAYER_VALUES / 3] {
+            for value in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+                let mut sums = LayerSums::zero(count, 2);
+                let mut samples = vec![1.0; 2 * 3 * count];
+                samples[1] = value;
+                sums.add_pixel_samples(1, &samples, None);
+                let (first, second) = sums.sums.split_at(count);
+                assert_eq!(first, vec![DVec3::ZERO; count]);
+                assert_eq!((second[0], &second[1..]), (DVec3::ONE, &*vec![DVec3::splat(2.0); count - 1]));
+            }
+        }
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! Foreign formats: files that glimt renders or imports although they are not scene files.
 //!
-//! [`FORMATS`] lists the formats, each with its extensions and its importer. For a file on
-//! the command line, only this table decides which format it has. An importer reads it into a [`ForeignScene`]; the rest
+//! [`FORMATS`] lists the formats, each with its extensions and its importer. For a file on the command line,
+//! only this table decides which format it has. An importer reads the file into a [`ForeignScene`]; the rest
 //! of the pipeline does not know the format. `model` generates the view and the lights for models, which
 //! `glimt MODEL` and `glimt import` share so that they produce the same image.
 

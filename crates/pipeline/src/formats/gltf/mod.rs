@@ -65,7 +65,7 @@ pub(super) fn convert(
     let &ForeignReadContext { containers, token, .. } = context;
     let (GeneratedText { text, substitutions, .. }, assets) =
         scene_text(path, &SceneAssetLocation::Folder(folder), context)?;
-    check_shown_scene(path, context)?;
+    check_rendered_scene(path, context)?;
     let container = containers.open(path, &ignore_progress, token)?;
     let encode = |(name, content)| {
         let bytes = match content {
@@ -85,17 +85,17 @@ pub(super) fn convert(
     Ok(ImportedScene { text, files, substitutions })
 }
 
-/// Rejects a file that `glimt check` would reject. Checks the scene that `glimt MODEL` would render, because the
-/// files referenced by that scene already exist.
-fn check_shown_scene(path: &Path, context: &ForeignReadContext<'_>) -> Result<(), AssetError> {
+/// Rejects a file that `glimt check` would reject. Checks the scene that `glimt MODEL` would render, because
+/// the files referenced by that scene already exist.
+fn check_rendered_scene(path: &Path, context: &ForeignReadContext<'_>) -> Result<(), AssetError> {
     let errors = match read(path, context) {
         Ok(_) => return Ok(()),
         Err(ForeignReadError::File(error)) => return Err(error),
         Err(ForeignReadError::Scene(errors)) => errors,
     };
     // Ignore errors about file names, because the imported scene uses different file names.
-    let counts = |one: &Diagnostic| one.severity == Severity::Error && !one.message.contains("`file`");
-    let first = errors.into_iter().find(counts);
+    let is_relevant = |one: &Diagnostic| one.severity == Severity::Error && !one.message.contains("`file`");
+    let first = errors.into_iter().find(is_relevant);
     first.map_or(Ok(()), |error| Err(AssetError::malformed(path, None, error.message)))
 }
 
@@ -103,7 +103,7 @@ fn check_shown_scene(path: &Path, context: &ForeignReadContext<'_>) -> Result<()
 /// references but that do not exist yet. The names are relative to the scene.
 fn scene_text(
     path: &Path,
-    naming: &SceneAssetLocation<'_>,
+    asset_location: &SceneAssetLocation<'_>,
     &ForeignReadContext { view, containers, token, .. }: &ForeignReadContext<'_>,
 ) -> Result<(GeneratedText, Vec<(String, GltfPartOrImage)>), AssetError> {
     let container = containers.open(path, &ignore_progress, token)?;
@@ -114,7 +114,7 @@ fn scene_text(
     let mut writer = SceneWriter {
         container: &container,
         path,
-        naming,
+        asset_location,
         toml: TomlWriter::default(),
         files: UsedNames::default(),
         assets: Vec::new(),
@@ -130,7 +130,7 @@ fn scene_text(
     let notes = is_fully_transparent.then(|| warning(path, INVISIBLE_MODEL)).into_iter().collect();
     let substitutions = scene.notes.into_iter().map(|note| warning(path, note)).collect();
     // Previews tolerate unreadable images, but imports do not.
-    if let SceneAssetLocation::Folder(_) = naming {
+    if let SceneAssetLocation::Folder(_) = asset_location {
         images.into_iter().try_for_each(|image| container.check_image_header(image, token))?;
     }
     let (text, hash) = (toml.finish(), container.file_hash());
@@ -140,7 +140,7 @@ fn scene_text(
 struct SceneWriter<'a> {
     container: &'a GltfFile,
     path: &'a Path,
-    naming: &'a SceneAssetLocation<'a>,
+    asset_location: &'a SceneAssetLocation<'a>,
     toml: TomlWriter,
     /// File names already used in the folder.
     files: UsedNames,
@@ -238,7 +238,7 @@ impl SceneWriter<'_> {
             self.toml.key_value("name", quote_toml_string(&shapes.make_unique(&instance.name, "mesh")));
         }
         let base = if instance.name.is_empty() { "part" } else { &instance.name };
-        match self.naming {
+        match self.asset_location {
             SceneAssetLocation::Inside => {
                 self.toml.key_value("file", quote_toml_string(&file_name(self.path)));
                 self.toml.key_value("part", instance.part.to_string());
@@ -285,7 +285,7 @@ impl SceneWriter<'_> {
         if let Some(known) = self.names.get(&content) {
             return known.clone();
         }
-        let folder = match self.naming {
+        let folder = match self.asset_location {
             SceneAssetLocation::Inside => String::new(),
             SceneAssetLocation::Folder(folder) => format!("{folder}/"),
         };
@@ -312,7 +312,7 @@ impl SceneWriter<'_> {
     fn image_file_reference(&mut self, image: usize) -> TextureFileReference {
         self.images.insert(image);
         let bytes = self.container.locate_image(image);
-        match (self.naming, bytes) {
+        match (self.asset_location, bytes) {
             (SceneAssetLocation::Inside, Ok(ImageLocation::File(file)))
                 if image_extension(&file).is_some() && file.is_file() =>
             {
