@@ -63,12 +63,12 @@ fn assert_no_leftovers(dir: &TestDir) {
     assert!(left.is_empty(), "{left:?}");
 }
 
-/// Methods, each with options for a render that takes a few seconds.
+/// Methods, each with options for a render that takes about a second.
 const LONG: [(&str, &str); 4] = [
-    ("whitted", "--samples 4096"),
-    ("path", "--integrator path --samples 1024"),
-    ("error", "--integrator path --samples 2048 --error 0.03"),
-    ("photons", "--photons on --samples 250 --set photons.count=20000"),
+    ("whitted", "--samples 2048"),
+    ("path", "--integrator path --samples 512"),
+    ("error", "--integrator path --samples 1024 --error 0.04"),
+    ("photons", "--photons on --samples 128 --set photons.count=20000"),
 ];
 
 #[test]

@@ -352,8 +352,8 @@ fn light_inside_split_solid_emits_photons() {
         .sphere(v(0.3, 0.2, 0.6), 0.1, emitter(20.0))
         .pictured(v(0.0, 0.0, 6.0), v(0.0, 0.0, 0.0), 16.0, 12, 12)
         .depth(4);
-    for (what, build, depth) in [("a hollow", hollow, 5), ("a pool", pool, 4)] {
-        let means = both(&build, depth, [384, 12], (4_000, 0.05));
+    for (what, build, depth, passes) in [("a hollow", hollow, 5, 6), ("a pool", pool, 4, 12)] {
+        let means = both(&build, depth, [384, passes], (4_000, 0.05));
         assert_same_light(what, means, 1.2e-2, 4e-3);
     }
 }

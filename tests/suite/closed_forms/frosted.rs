@@ -227,7 +227,7 @@ fn photons_scatter_to_both_sides_of_rough_glass() {
             .depth(depth)
     };
     for depth in [2, 6] {
-        let means = both(&room(depth), depth, [512, 48], (20_000, 0.03));
+        let means = both(&room(depth), depth, [1024, 28], (20_000, 0.03));
         assert_same_light(&format!("depth {depth}"), means, 1.2e-2, 4e-3);
     }
 }
@@ -425,7 +425,7 @@ fn sheet_on_glass_transmits_into_the_glass() {
     for from in [v(0.0, 2.4, 1.5), v(0.2, -2.4, 1.0)] {
         let clear = label(block(glass(1.5)), 0.0).environment(1.0).depth(8);
         let clear = clear.pictured(from, DVec3::ZERO, 8.0, 4, 4);
-        let means = both(&clear, 8, [128, 16], (20_000, 0.03));
+        let means = both(&clear, 8, [128, 14], (20_000, 0.03));
         assert_same_light(&format!("from {from}"), means, 1e-2, 6e-3);
         assert!(means.iter().all(|(mean, error)| *mean < 1.0 + 4.0 * error), "{means:?}");
     }

@@ -119,7 +119,7 @@ fn transformed_shapes_equal_their_meshes() {
         assert_same_mean(&format!("{what} as a light"), both(floor(), emitter(1.0)), 0.02);
         let photons = |build: Build| {
             let whitted = build.with(|scene| scene.render.integrator = Integrator::Whitted);
-            whitted.photons(40_000, 0.05)
+            whitted.photons(5_000, 0.05)
         };
         assert_same_mean(&format!("{what} with photons"), both(lit(), matte(0.5)).map(photons), 0.02);
         let light = both(floor(), emitter(1.0)).map(photons);
