@@ -1,11 +1,12 @@
 //! Time until the worker starts on a newer request, whatever kind of work is in progress.
 
 use std::path::Path;
+use std::sync::mpsc::Receiver;
 use std::time::{Duration, Instant};
 
 use glimt::pipeline::protocol::{Command, Event, MaxPreviewSize, Request, WriteRequirement};
 use glimt::pipeline::settings::Overrides;
-use glimt::pipeline::{Handle, start};
+use glimt::pipeline::{Handle, start_with_channel};
 
 use super::BenchResult;
 
@@ -17,27 +18,32 @@ const LIMIT: Duration = Duration::from_secs(20);
 pub fn times(scene: &Path) -> BenchResult<Vec<Duration>> {
     let mut times = Vec::new();
     for step in 0..12 {
-        let worker = start(0)?;
+        let worker = start_with_channel(0)?;
         let mut generation = 0;
-        send(&worker, scene, &mut generation);
+        send(&worker.0, scene, &mut generation);
         times.push(cancel(&worker, scene, &mut generation, Duration::from_millis(step * step * 4))?);
     }
-    let worker = start(0)?;
+    let worker = start_with_channel(0)?;
     let mut generation = 0;
-    send(&worker, scene, &mut generation);
-    while !matches!(worker.events.recv_timeout(LIMIT)?, Event::Preview { .. }) {}
+    send(&worker.0, scene, &mut generation);
+    while !matches!(worker.1.recv_timeout(LIMIT)?, Event::Preview { .. }) {}
     for after in (0..60).chain([200, 333, 500, 777]) {
         times.push(cancel(&worker, scene, &mut generation, Duration::from_millis(after))?);
     }
     Ok(times)
 }
 
-fn cancel(worker: &Handle, scene: &Path, generation: &mut u64, after: Duration) -> BenchResult<Duration> {
+fn cancel(
+    (worker, events): &(Handle, Receiver<Event>),
+    scene: &Path,
+    generation: &mut u64,
+    after: Duration,
+) -> BenchResult<Duration> {
     std::thread::sleep(after);
     let begin = Instant::now();
     send(worker, scene, generation);
     loop {
-        match worker.events.recv_timeout(LIMIT)? {
+        match events.recv_timeout(LIMIT)? {
             Event::Started { generation: started } if started == *generation => return Ok(begin.elapsed()),
             Event::Failed { failure, .. } => return Err(format!("{failure:?}").into()),
             _ => {}

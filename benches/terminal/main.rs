@@ -114,13 +114,13 @@ fn replay(edit: &Edit, columns: u16, rows: u16) -> Result<(), Box<dyn Error>> {
     }
     // Write the file next to the scenes so that relative paths work.
     let scene = tempfile::Builder::new().prefix("bench").suffix(".toml").tempfile_in(&scenes)?;
-    let handle = glimt::pipeline::start(0)?;
+    let worker = glimt::pipeline::start_with_channel(0)?;
     let mut window = Window::new(columns, rows);
     for (generation, name, text) in
         [(1, "start", text.clone()), (2, edit.name, text.replace(edit.from, edit.to))]
     {
         fs::write(scene.path(), text)?;
-        let shots = sequence::render(&handle, generation, scene.path(), size)?;
+        let shots = sequence::render(&worker, generation, scene.path(), size)?;
         let line = window.show(&shots)?;
         println!("{:<18} {line}", format!("{} {name}", edit.scene));
     }

@@ -3,6 +3,7 @@
 use std::error::Error;
 use std::path::Path;
 use std::sync::PoisonError;
+use std::sync::mpsc::Receiver;
 use std::time::Instant;
 
 use glimt::film::Srgb8Image;
@@ -22,7 +23,7 @@ pub(crate) struct RecordedPreview {
 
 /// Renders the scene and records every preview that the front end receives, including the final image.
 pub(crate) fn render(
-    handle: &Handle,
+    (handle, events): &(Handle, Receiver<Event>),
     generation: u64,
     scene: &Path,
     size: MaxPreviewSize,
@@ -41,7 +42,7 @@ pub(crate) fn render(
     let start = Instant::now();
     handle.send(Command::Render(Box::new(request)));
     let (mut shots, mut samples) = (Vec::<RecordedPreview>::new(), 0.0);
-    for event in &handle.events {
+    for event in events {
         match event {
             Event::Progress { progress, .. } => {
                 samples = progress.fraction * f64::from(progress.total_samples);

@@ -1,6 +1,7 @@
 //! Number of bytes sent to the terminal for a bundled scene's first preview, whole render, and edits.
 
 use std::path::{Path, PathBuf};
+use std::sync::mpsc::Receiver;
 use std::sync::{Arc, PoisonError};
 
 use glimt::film::Srgb8Image;
@@ -25,6 +26,7 @@ const FILM: u32 = 320;
 /// Renders previews, one scene at a time.
 struct PreviewRenderer {
     handle: Handle,
+    events: Receiver<Event>,
     preview: MaxPreviewSize,
     generation: u64,
     folder: tempfile::TempDir,
@@ -32,8 +34,9 @@ struct PreviewRenderer {
 
 impl PreviewRenderer {
     fn new(preview: MaxPreviewSize) -> Self {
-        let handle = glimt::pipeline::start(0).expect("a worker");
-        Self { handle, preview, generation: 0, folder: tempfile::tempdir().expect("a temporary folder") }
+        let (handle, events) = glimt::pipeline::start_with_channel(0).expect("a worker");
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        Self { handle, events, preview, generation: 0, folder }
     }
 
     /// Returns the last preview of a scene. If `samples` is `None`, this is the coarse preview with one
@@ -61,7 +64,7 @@ impl PreviewRenderer {
             first: None,
         };
         self.handle.send(Command::Render(Box::new(request)));
-        for event in &self.handle.events {
+        for event in &self.events {
             assert!(!matches!(event, Event::Failed { .. }), "{event:?}");
             if matches!(event, Event::Done { generation, .. } if generation == self.generation) {
                 break;

@@ -1,7 +1,6 @@
 //! Connects the worker, the file watcher and the terminal UI.
 
 use std::path::{Path, PathBuf};
-use std::sync::mpsc::{Receiver, channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
@@ -20,9 +19,9 @@ use crate::pipeline::watch::{
 use crate::scene::diagnostic::Diagnostic;
 use crate::scene::sanitize::escape_invisible_chars;
 use crate::scene::{SAME_TEXT, is_file_not_found, read_current_text};
-use crate::system::threads::{describe_start_failure, spawn};
+use crate::system::threads::describe_start_failure;
 use crate::tui::messages::{OLDER_THAN_EDIT, WAITING_FOR_FILE};
-use crate::tui::{self, ExitStatus, Options, TuiError, TuiOutcome};
+use crate::tui::{self, EventQueue, EventSender, ExitStatus, Options, TuiError, TuiOutcome};
 
 /// How long to wait at exit for an image to be written. After that, glimt exits if it received a signal; if
 /// the user quit with a key, it prints a message and keeps waiting.
@@ -47,22 +46,15 @@ pub(super) fn run(order: RenderRequest, console: &Console) -> Exit {
 
 fn run_terminal_ui(order: RenderRequest, console: &Console) -> Result<Exit, (Exit, String)> {
     let no_thread = |error: std::io::Error| (Exit::FAILED, describe_start_failure(1, false, &error));
-    let mut worker = start(order.nice).map_err(no_thread)?;
-    let (sender, news) = channel();
-    let watcher = Watcher::start(order.poll, worker.file_hashes(), move |said| {
-        // Ignore the error if the front end has exited.
-        let _ = sender.send(said);
-    })
-    .map_err(no_thread)?;
-    let (forward, events) = channel();
-    let from_worker = std::mem::replace(&mut worker.events, channel().1);
+    let (contents, events) = (Arc::<FileHashCache>::default(), EventQueue::default());
+    let changes = events.watcher_sender();
+    let watcher = Watcher::start(order.poll, Arc::clone(&contents), move |change| changes.send(change))
+        .map_err(no_thread)?;
     let writes = SharedWriteLog::default();
-    let recorder = writes.clone();
-    let forward_all =
-        move || forward_events(&from_worker, &watcher, &recorder, |event| forward.send(event).is_ok());
-    let forwarder = spawn("glimt-events", forward_all).map_err(no_thread)?;
-    let (remote, contents) = (worker.command_sender(), worker.file_hashes());
-    let asked = writes.clone();
+    let listener = WorkerListener { watcher, writes: writes.clone(), ui: events.worker_sender() };
+    let worker = start(order.nice, Arc::clone(&contents), move |event| listener.handle_event(event))
+        .map_err(no_thread)?;
+    let (remote, asked) = (worker.command_sender(), writes.clone());
     let outcome = tui::run(Options {
         scene: order.scene,
         overrides: order.overrides,
@@ -87,7 +79,6 @@ fn run_terminal_ui(order: RenderRequest, console: &Console) -> Result<Exit, (Exi
         }),
         events,
         previews: worker.previews.clone(),
-        news,
     });
     let waits = |ended: &TuiOutcome| {
         ended.status == ExitStatus::QUIT && (ended.is_write_unanswered || writes.is_in_write_stage())
@@ -98,10 +89,6 @@ fn run_terminal_ui(order: RenderRequest, console: &Console) -> Result<Exit, (Exi
         console.print_line_to_stderr("waiting for the image to be written; press ctrl-c to quit without it");
         worker.stop_or_abandon(Duration::MAX)
     };
-    if has_ended {
-        // The forwarder ends with the worker. Ignore a panic in it.
-        let _ = forwarder.join();
-    }
     if let Ok(ended) = &outcome {
         let lost = contents.outputs.list_external_changes(&contents);
         let is_older = ended.is_current && writes.is_image_older_than_inputs(&contents);
@@ -312,31 +299,27 @@ impl SharedWriteLog {
     }
 }
 
-/// Forwards events, updates the watched files and records written images.
-fn forward_events(
-    events: &Receiver<Event>,
-    watcher: &Watcher,
-    writes: &SharedWriteLog,
-    forward: impl Fn(Event) -> bool,
-) {
-    let mut is_connected = true;
-    for mut event in events {
-        writes.record_event(&event);
-        // The UI has exited: only record written images.
-        if !is_connected {
-            continue;
-        }
+/// Passes the worker's events to the terminal UI, the watcher and the log of written images.
+struct WorkerListener {
+    watcher: Watcher,
+    writes: SharedWriteLog,
+    ui: EventSender<Event>,
+}
+
+impl WorkerListener {
+    fn handle_event(&self, mut event: Event) {
+        self.writes.record_event(&event);
         if matches!(event, Event::Written { .. }) {
-            watcher.watch_outputs();
+            self.watcher.watch_outputs();
         }
         if let Event::Files { files, read, since, .. } = &event {
             let (read, before) = files.split_at((*read).min(files.len()));
-            watcher.set_files(read.to_vec(), before.to_vec(), *since);
+            self.watcher.set_files(read.to_vec(), before.to_vec(), *since);
         }
         if let Event::Failed { failure: Failure::Scene(all), .. } = &mut event {
             all.iter_mut().for_each(add_waiting_help);
         }
-        is_connected = forward(event);
+        self.ui.send(event);
     }
 }
 

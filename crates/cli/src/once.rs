@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::RecvTimeoutError;
+use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::time::{Duration, Instant};
 
 use crate::console::Console;
@@ -15,7 +15,7 @@ use crate::pipeline::protocol::{
 };
 use crate::pipeline::settings::{EffectiveSettingsSummary, Overrides};
 use crate::pipeline::turntable::{TurntableFrame, leftover_frames};
-use crate::pipeline::{Handle, start};
+use crate::pipeline::{Handle, start_with_channel};
 use crate::progress::{self, Reporter};
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::signals;
@@ -33,8 +33,8 @@ const TICK: Duration = Duration::from_millis(50);
 pub(super) fn run(order: &RenderRequest, console: &Console) -> Exit {
     // Lower the priority before starting threads, because threads inherit it.
     priority::lower_priority_including_spawned_threads(order.nice);
-    let worker = match start(0) {
-        Ok(worker) => worker,
+    let (worker, events) = match start_with_channel(0) {
+        Ok(started) => started,
         Err(error) => return console.print_error(Exit::FAILED, &describe_start_failure(1, false, &error)),
     };
     let remote = worker.command_sender();
@@ -84,7 +84,7 @@ pub(super) fn run(order: &RenderRequest, console: &Console) -> Exit {
         })));
         image_reporter = reporter();
         let reporter = &mut *image_reporter;
-        exit = handle_events(&worker, (order, turn), console, reporter, &mut written, &mut is_over);
+        exit = handle_events(&worker, &events, (order, turn), console, reporter, &mut written, &mut is_over);
         reporter.clear_output();
         is_whole = exit == Exit::DONE && turn.is_none_or(TurntableFrame::is_last);
         if exit != Exit::DONE || ended.signal_number().is_some() {
@@ -174,6 +174,7 @@ impl ExitDeadline {
 /// Handles events until the request is finished or aborted by a signal.
 fn handle_events(
     worker: &Handle,
+    events: &Receiver<Event>,
     (order, turn): (&RenderRequest, Option<TurntableFrame>),
     console: &Console,
     reporter: &mut dyn Reporter,
@@ -190,7 +191,7 @@ fn handle_events(
         if is_over(is_writing) {
             return Exit::FAILED;
         }
-        let mut event = match worker.events.recv_timeout(TICK) {
+        let mut event = match events.recv_timeout(TICK) {
             Ok(event) => event,
             Err(RecvTimeoutError::Timeout) => continue,
             Err(RecvTimeoutError::Disconnected) => {

@@ -2,12 +2,11 @@
 
 use std::path::Path;
 use std::sync::Arc;
-use std::sync::mpsc;
 
 use super::engine::{Engine, EngineConfig};
 use super::memory::MemoryEstimate;
 use super::plan::resolve_plan;
-use super::protocol::{Failure, PreviewSlot};
+use super::protocol::Failure;
 use super::settings::Overrides;
 use super::sink::EventSink;
 use super::stages::meshes::MeshesByFileIndex;
@@ -59,15 +58,10 @@ pub fn estimate_memory(path: &Path, overrides: &Overrides) -> Result<u64, Failur
     let IncrementalSceneChecker(mut engine) = IncrementalSceneChecker::default();
     let token = CancelToken::new();
     let (parsed, meshes, textures, _) =
-        engine.load_scene_and_all_assets(path, &overrides.sets, &silent_sink(), &token)?;
+        engine.load_scene_and_all_assets(path, &overrides.sets, &EventSink::silent(0), &token)?;
     let plan =
         resolve_plan(&parsed.loaded.scene, path, overrides).map_err(|error| Failure::Scene(vec![*error]))?;
     Ok(MemoryEstimate::for_image_and_scene(&plan, &plan.scene, &meshes, textures.memory_bytes).bytes())
-}
-
-fn silent_sink() -> EventSink {
-    let (events, _) = mpsc::channel();
-    EventSink { generation: 0, events, previews: PreviewSlot::default() }
 }
 
 impl IncrementalSceneChecker {
@@ -83,7 +77,7 @@ impl IncrementalSceneChecker {
         token: &CancelToken,
     ) -> Result<SceneSummary, Failure> {
         let (parsed, meshes, textures, warnings) =
-            self.0.load_scene_and_all_assets(path, sets, &silent_sink(), token)?;
+            self.0.load_scene_and_all_assets(path, sets, &EventSink::silent(0), token)?;
         Ok(summarize(&parsed, &meshes, &textures, warnings))
     }
 }

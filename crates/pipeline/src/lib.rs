@@ -1,6 +1,7 @@
 //! The render pipeline: stages, caches, the worker that runs them, and the file watcher.
 //!
-//! [`start`] returns a [`Handle`], which accepts commands and provides events and the latest preview.
+//! [`start`] takes a function for events and returns a [`Handle`], which accepts commands and provides the latest
+//! preview.
 //! `engine` runs the stages of a request. `stages` contains one file per stage, and `render` the render loop.
 //! Stages are functions of their inputs. Each stage compares a [fingerprint](crate::scene::fingerprint) of
 //! its inputs (`keys`) with the fingerprint of its cached value (`cache`), and reports whether it was done,
@@ -56,4 +57,4 @@ pub use formats::{
 };
 pub use stages::parse::files_referenced_by_assets;
 pub use watch::content::{FileContentId, FilePathAndContentId};
-pub use worker::{CommandSender, Handle, start};
+pub use worker::{CommandSender, Handle, start, start_with_channel};

@@ -2,11 +2,10 @@
 
 use std::path::Path;
 use std::sync::Arc;
-use std::sync::mpsc;
 
 use super::engine::{Engine, EngineConfig, Interruption, PendingCommands, RequestContext};
 pub use super::engine::{RenderFailure, RenderedImage};
-use super::protocol::{MaxPreviewSize, PreviewSlot, Request, WriteRequirement};
+use super::protocol::{MaxPreviewSize, Request, WriteRequirement};
 use super::queries::QueryOrEdit;
 use super::settings::Overrides;
 use super::sink::EventSink;
@@ -48,8 +47,7 @@ impl HeadlessSession {
             force: true,
         };
         // Events are not needed, because the result is returned.
-        let (events, _) = mpsc::channel();
-        let sink = EventSink { generation: self.generation, events, previews: PreviewSlot::default() };
+        let sink = EventSink::silent(self.generation);
         let context = RequestContext::new(token, token, &NoPendingCommands);
         self.engine.render_radiance_image(&request, &sink, &context)
     }

@@ -2,7 +2,6 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::mpsc::Sender;
 use std::sync::{Arc, PoisonError};
 use std::time::Instant;
 
@@ -15,17 +14,33 @@ use crate::film::Srgb8Image;
 use crate::output::WriteWarning;
 use crate::scene::diagnostic::Diagnostic;
 
-/// Sends the events of one request. Ignores a disconnected front end.
-#[derive(Clone, Debug)]
+/// The front end's function for receiving events. It is called from any of the worker's threads.
+pub(super) type EventListener = Arc<dyn Fn(Event) + Send + Sync>;
+
+/// Sends the events of one request.
+#[derive(Clone)]
 pub(super) struct EventSink {
     pub(super) generation: u64,
-    pub(super) events: Sender<Event>,
+    pub(super) listener: EventListener,
     pub(super) previews: PreviewSlot,
 }
 
 impl EventSink {
+    /// Creates a sink that ignores all events.
+    pub(super) fn silent(generation: u64) -> Self {
+        Self { generation, listener: Arc::new(drop), previews: PreviewSlot::default() }
+    }
+
+    /// Creates a sink, and a channel that receives its events.
+    #[cfg(test)]
+    pub(super) fn with_channel(generation: u64) -> (Self, std::sync::mpsc::Receiver<Event>) {
+        let (sender, events) = std::sync::mpsc::channel();
+        let listener = Arc::new(move |event| drop(sender.send(event)));
+        (Self { generation, listener, previews: PreviewSlot::default() }, events)
+    }
+
     pub(super) fn send(&self, event: Event) {
-        let _ = self.events.send(event);
+        (self.listener)(event);
     }
 
     pub(super) fn send_stage_report(&self, stage: StageReport) {
@@ -146,12 +161,10 @@ const PARTS: u64 = 100;
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::sync::mpsc;
 
     #[test]
     fn asset_progress_is_throttled_and_completes() {
-        let (events, received) = mpsc::channel();
-        let sink = EventSink { generation: 3, events, previews: PreviewSlot::default() };
+        let (sink, received) = EventSink::with_channel(3);
         let load = |progress: &(dyn Fn(u64, u64) + Sync)| -> Result<(), ()> {
             for done in 0..10_000 {
                 progress(done, 10_000);
@@ -176,8 +189,7 @@ mod tests {
 
     #[test]
     fn failed_asset_does_not_report_completion() {
-        let (events, received) = mpsc::channel();
-        let sink = EventSink { generation: 3, events, previews: PreviewSlot::default() };
+        let (sink, received) = EventSink::with_channel(3);
         sink.load_asset_with_progress("bricks", |_| -> Result<(), ()> { Err(()) }).expect_err("failed");
         drop(sink);
         let ends = received.into_iter().filter(

@@ -6,7 +6,7 @@
 use std::any::Any;
 use std::collections::VecDeque;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::mpsc::{self, Receiver, Sender};
+use std::sync::mpsc::{self, Receiver};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
@@ -15,41 +15,63 @@ use super::engine::{Engine, EngineConfig, Interruption, PendingCommands, Request
 use super::protocol::{Command, Event, Failure, MaxPreviewSize, PreviewSlot, Request, WriteRequirement};
 use super::queries::QueryOrEdit;
 use super::settings::Overrides;
-use super::sink::EventSink;
+use super::sink::{EventListener, EventSink};
 use super::watch::content::FileHashCache;
 use crate::control::CancelToken;
 use crate::system::threads::spawn;
 
 /// Starts a worker thread. On Linux, its render threads have the current thread's niceness plus `nice`, so
-/// that the front end and other programs have priority.
+/// that the front end and other programs have priority. A watcher of the same files can share `contents`.
+///
+/// The worker passes its events to `listener`, from any of its threads. `listener` must neither block nor send
+/// commands.
 ///
 /// # Errors
 /// The system cannot start a thread.
-pub fn start(nice: u8) -> std::io::Result<Handle> {
-    start_with_config(EngineConfig { nice, ..EngineConfig::default() })
+pub fn start(
+    nice: u8,
+    contents: Arc<FileHashCache>,
+    listener: impl Fn(Event) + Send + Sync + 'static,
+) -> std::io::Result<Handle> {
+    start_with_config(EngineConfig { nice, ..EngineConfig::default() }, contents, Arc::new(listener))
 }
 
-/// Starts a worker with this configuration.
-pub(super) fn start_with_config(config: EngineConfig) -> std::io::Result<Handle> {
+/// Starts a worker thread, and returns a channel that receives its events.
+///
+/// # Errors
+/// The system cannot start a thread.
+pub fn start_with_channel(nice: u8) -> std::io::Result<(Handle, Receiver<Event>)> {
+    start_with_config_and_channel(EngineConfig { nice, ..EngineConfig::default() }, Arc::default())
+}
+
+/// Like [`start_with_channel`], with this configuration and cache of file hashes.
+pub(super) fn start_with_config_and_channel(
+    config: EngineConfig,
+    contents: Arc<FileHashCache>,
+) -> std::io::Result<(Handle, Receiver<Event>)> {
     let (sender, events) = mpsc::channel();
-    let remote = CommandSender { mailbox: Arc::default(), events: sender };
+    // Ignore a disconnected front end.
+    let listener = move |event| drop(sender.send(event));
+    Ok((start_with_config(config, contents, Arc::new(listener))?, events))
+}
+
+fn start_with_config(
+    config: EngineConfig,
+    contents: Arc<FileHashCache>,
+    listener: EventListener,
+) -> std::io::Result<Handle> {
+    let remote = CommandSender { mailbox: Arc::default(), listener };
     let previews = PreviewSlot::default();
-    let contents = Arc::<FileHashCache>::default();
-    let worker =
-        Worker { remote: remote.clone(), previews: previews.clone(), config, contents: contents.clone() };
+    let worker = Worker { remote: remote.clone(), previews: previews.clone(), config, contents };
     let thread = spawn("glimt-worker", move || worker.run_loop())?;
-    Ok(Handle { events, previews, remote, contents, thread: Some(thread) })
+    Ok(Handle { previews, remote, thread: Some(thread) })
 }
 
 /// A handle to a running worker. Dropping it stops the worker and blocks while a file is being written.
-#[derive(Debug)]
 pub struct Handle {
-    /// Events from the worker.
-    pub events: Receiver<Event>,
     /// Slot for the latest preview.
     pub previews: PreviewSlot,
     remote: CommandSender,
-    contents: Arc<FileHashCache>,
     thread: Option<JoinHandle<()>>,
 }
 
@@ -62,11 +84,6 @@ impl Handle {
     /// Returns a handle for sending commands from other threads.
     pub fn command_sender(&self) -> CommandSender {
         self.remote.clone()
-    }
-
-    /// Returns the worker's cache of file hashes, which a watcher of the same files can share.
-    pub fn file_hashes(&self) -> Arc<FileHashCache> {
-        Arc::clone(&self.contents)
     }
 
     /// Stops the worker and waits at most `patience` for it to stop. Returns whether it has stopped. If an
@@ -105,10 +122,10 @@ impl Drop for Handle {
 }
 
 /// Sends commands to a worker.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub struct CommandSender {
     mailbox: Arc<(Mutex<Mailbox>, Condvar)>,
-    events: Sender<Event>,
+    listener: EventListener,
 }
 
 #[derive(Debug, Default)]
@@ -214,8 +231,7 @@ impl CommandSender {
 
     fn report_cancelled(&self, request: Option<Box<Request>>) {
         if let Some(request) = request {
-            // Ignore a disconnected front end.
-            let _ = self.events.send(Event::Cancelled { generation: request.generation });
+            (self.listener)(Event::Cancelled { generation: request.generation });
         }
     }
 
@@ -309,8 +325,8 @@ impl Worker {
     fn run_loop(self) {
         let _last_words = PanicReporter(&self.remote);
         let mut engine = Engine::new(self.config, self.contents.clone());
-        let mut sink =
-            EventSink { generation: 0, events: self.remote.events.clone(), previews: self.previews.clone() };
+        let listener = self.remote.listener.clone();
+        let mut sink = EventSink { generation: 0, listener, previews: self.previews.clone() };
         loop {
             let outcome = match self.remote.wait_for_next_task() {
                 Task::Quit => {
@@ -352,8 +368,7 @@ impl Drop for PanicReporter<'_> {
         if std::thread::panicking() {
             let generation = self.0.lock().newest;
             let failure = Failure::Work("internal error: the worker thread panicked".to_owned());
-            // Ignore a disconnected front end.
-            let _ = self.0.events.send(Event::Failed { generation, failure });
+            (self.0.listener)(Event::Failed { generation, failure });
         }
     }
 }
@@ -382,6 +397,10 @@ mod tests {
         }))
     }
 
+    fn silent_sender() -> CommandSender {
+        CommandSender { mailbox: Arc::default(), listener: EventSink::silent(0).listener }
+    }
+
     fn token(remote: &CommandSender) -> CancelToken {
         let Task::Render(_, token, _) = remote.wait_for_next_task() else {
             panic!("expected a pending request")
@@ -391,8 +410,8 @@ mod tests {
 
     #[test]
     fn panicking_worker_reports_failure() {
-        let (events, received) = mpsc::channel();
-        let remote = CommandSender { mailbox: Arc::default(), events };
+        let (sink, received) = EventSink::with_channel(0);
+        let remote = CommandSender { mailbox: Arc::default(), listener: sink.listener };
         remote.send(render(7));
         let panicking = remote;
         let thread = std::thread::spawn(move || {
@@ -405,7 +424,7 @@ mod tests {
 
     #[test]
     fn pause_applies_to_newest_request() {
-        let remote = CommandSender { mailbox: Arc::default(), events: mpsc::channel().0 };
+        let remote = silent_sender();
         remote.send(render(1));
         let ending = token(&remote);
         remote.send(render(2));
@@ -423,7 +442,7 @@ mod tests {
 
     #[test]
     fn write_before_quit_is_carried_out() {
-        let remote = CommandSender { mailbox: Arc::default(), events: mpsc::channel().0 };
+        let remote = silent_sender();
         remote.send(render(1));
         let token = token(&remote);
         remote.send(render(2));
@@ -437,7 +456,7 @@ mod tests {
 
     #[test]
     fn write_stage_is_cancelled_only_by_newer_image() {
-        let remote = CommandSender { mailbox: Arc::default(), events: mpsc::channel().0 };
+        let remote = silent_sender();
         let begin = |number| {
             remote.send(render(number));
             let Task::Render(_, token, writing) = remote.wait_for_next_task() else {
@@ -463,7 +482,7 @@ mod tests {
 
     #[test]
     fn write_order_does_not_apply_to_another_view() {
-        let remote = CommandSender { mailbox: Arc::default(), events: mpsc::channel().0 };
+        let remote = silent_sender();
         remote.send(render(1));
         let _ = token(&remote);
         remote.send(Command::Write);
@@ -485,7 +504,7 @@ mod tests {
 
     #[test]
     fn pending_orders_are_handled_in_sequence() {
-        let remote = CommandSender { mailbox: Arc::default(), events: mpsc::channel().0 };
+        let remote = silent_sender();
         remote.send(render(1));
         remote.send(Command::Write);
         remote.send(Command::Preview(None));

@@ -12,6 +12,7 @@ mod display;
 mod editor;
 mod environment;
 mod event;
+mod event_queue;
 mod exit_summary;
 mod file_urls;
 mod graphics;
@@ -55,6 +56,7 @@ use glimt_scene as scene;
 
 pub use color::{ColorDepth, ColorDepthChoice, xterm_rgb};
 pub use editor::editor_and_variable;
+pub use event_queue::{EventQueue, EventSender};
 pub use graphics::TestImageTerminal;
 pub use mosaic::filled_squares;
 pub use options::{ContentChangeTime, ExitStatus, Options, PreviewChoice, TuiError, TuiOutcome, WatchEvent};

@@ -3,7 +3,7 @@
 //! Pressing `w` makes the front end panic.
 
 use std::path::PathBuf;
-use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::mpsc::{Receiver, channel};
 use std::sync::{Arc, Mutex};
 use std::thread;
 use std::time::{Duration, Instant};
@@ -11,7 +11,9 @@ use std::time::{Duration, Instant};
 use super::fixtures::{
     asset_progress, camera, diagnostic, done_event, effective_settings, scene_settings, stage_report,
 };
-use super::{ColorDepthChoice, ContentChangeTime, Options, PreviewChoice, WatchEvent, run};
+use super::{
+    ColorDepthChoice, ContentChangeTime, EventQueue, EventSender, Options, PreviewChoice, WatchEvent, run,
+};
 use crate::film::Srgb8Image;
 use crate::pipeline::protocol::{
     Command, Event, Failure, PreviewSlot, PreviewUpdate, RenderProgress, Request, Stage, Status,
@@ -24,8 +26,8 @@ use crate::scene::diagnostic::Severity;
 fn interactive_session() {
     let scene = PathBuf::from(std::env::var("GLIMT_MANUAL_SCENE").unwrap_or_default());
     let (commands, orders) = channel();
-    let (sender, events) = channel();
-    let (watcher, news) = channel();
+    let events = EventQueue::default();
+    let (sender, watcher) = (events.worker_sender(), events.watcher_sender());
     let previews = PreviewSlot::default();
     let slot = Arc::clone(&previews);
     thread::spawn(move || run_simulated_worker(&orders, &sender, &slot));
@@ -44,7 +46,6 @@ fn interactive_session() {
         }),
         events,
         previews,
-        news,
     });
     match outcome {
         Ok(ended) => std::process::exit(i32::from(ended.status.0)),
@@ -55,7 +56,7 @@ fn interactive_session() {
     }
 }
 
-fn poll_scene_file_changes(scene: &PathBuf, news: &Sender<WatchEvent>) {
+fn poll_scene_file_changes(scene: &PathBuf, news: &EventSender<WatchEvent>) {
     let mut last = std::fs::read(scene).ok();
     loop {
         thread::sleep(Duration::from_millis(30));
@@ -63,16 +64,14 @@ fn poll_scene_file_changes(scene: &PathBuf, news: &Sender<WatchEvent>) {
         if now != last {
             last = now;
             let changed = WatchEvent::Changed(ContentChangeTime { noticed: Instant::now() });
-            if [changed, WatchEvent::Settled].into_iter().any(|said| news.send(said).is_err()) {
-                return;
-            }
+            [changed, WatchEvent::Settled].into_iter().for_each(|event| news.send(event));
         }
     }
 }
 
 fn run_simulated_worker(
     orders: &Receiver<Command>,
-    events: &Sender<Event>,
+    events: &EventSender<Event>,
     slot: &Mutex<Option<PreviewUpdate>>,
 ) {
     let mut next = None;
@@ -89,11 +88,11 @@ fn run_simulated_worker(
 fn simulate_render(
     request: &Request,
     orders: &Receiver<Command>,
-    events: &Sender<Event>,
+    events: &EventSender<Event>,
     slot: &Mutex<Option<PreviewUpdate>>,
 ) -> Option<Command> {
     let generation = request.generation;
-    let say = |event| events.send(event).unwrap_or_default();
+    let say = |event| events.send(event);
     say(Event::Started { generation });
     let text = std::fs::read_to_string(&request.scene).unwrap_or_default();
     assert!(!text.contains("panic"), "the file contains `panic`");

@@ -1,12 +1,12 @@
 //! Front-end options and results.
 
 use std::path::PathBuf;
-use std::sync::mpsc::Receiver;
 use std::time::Duration;
 
 use super::color::ColorDepthChoice;
+use super::event_queue::EventQueue;
 use crate::choice;
-use crate::pipeline::protocol::{Command, Event, PreviewSlot};
+use crate::pipeline::protocol::{Command, PreviewSlot};
 use crate::pipeline::settings::Overrides;
 pub use crate::pipeline::watch::{ContentChangeTime, ExternalChange, OutputChange, WatchEvent};
 use crate::system::describe_error;
@@ -54,12 +54,10 @@ pub struct Options {
     pub notify_after: Option<Duration>,
     /// Sends commands to the worker. Must not block.
     pub commands: Box<dyn FnMut(Command)>,
-    /// Events from the worker. If the channel closes, the front end exits with an error.
-    pub events: Receiver<Event>,
+    /// Events from the worker and from the file watcher.
+    pub events: EventQueue,
     /// Slot for previews from the worker.
     pub previews: PreviewSlot,
-    /// Events from the file watcher. If the channel closes, the front end shows a message.
-    pub news: Receiver<WatchEvent>,
 }
 
 /// The program's exit code.
@@ -95,7 +93,8 @@ pub struct TuiOutcome {
     pub summary: String,
     /// Whether the summary claims that the scene's own image is up to date.
     pub is_current: bool,
-    /// Number of handled events for which [`Event::is_write_result`] is true.
+    /// Number of handled events for which
+    /// [`is_write_result`](crate::pipeline::protocol::Event::is_write_result) is true.
     pub write_results: u64,
     /// Whether any image file was written.
     pub has_written: bool,

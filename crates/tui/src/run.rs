@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 use std::io;
-use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender};
+use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::time::{Duration, Instant};
 
 use super::color::{self, ColorDepth};
@@ -10,7 +10,8 @@ use super::display::{Display, TerminalEnvironment};
 use super::editor;
 use super::environment::{select_terminal_queries, terminal_environment_from_variables};
 use super::event::FilePosition;
-use super::event::{Effect, Event, RequiredEventSource};
+use super::event::{Effect, Event};
+use super::event_queue::EventQueue;
 use super::exit_summary;
 use super::input;
 use super::options::{ExitStatus, Options, TuiError, TuiOutcome};
@@ -23,7 +24,6 @@ use super::terminals::TerminalId;
 use super::update::{request_first_render, update};
 use super::writer;
 use crate::pipeline::protocol::{self, Command};
-use crate::system::threads::spawn;
 
 /// Maximum time to plan a slice before sending it and handling keys.
 const TURN: Duration = Duration::from_millis(3);
@@ -39,7 +39,7 @@ pub fn run(options: Options) -> Result<TuiOutcome, TuiError> {
     // Prevent crossterm from dropping named colors when NO_COLOR is set.
     crossterm::style::force_color_output(depth != ColorDepth::None);
 
-    let (sender, events) = mpsc::channel();
+    let EventQueue { sender, events } = options.events;
     let listener = SignalListener::start(&sender).map_err(terminal_error_mapper("handle signals for"))?;
     let variable = |name: &str| std::env::var(name).ok();
     let capabilities =
@@ -64,8 +64,6 @@ pub fn run(options: Options) -> Result<TuiOutcome, TuiError> {
         capabilities,
         notify_after: options.notify_after,
     };
-    forward_channel("worker-events", options.events, &sender, Event::Worker, RequiredEventSource::Worker)?;
-    forward_channel("news", options.news, &sender, Event::from_watcher, RequiredEventSource::Watcher)?;
     input::start_reader(&sender).map_err(terminal_error_mapper("read keys from"))?;
     writer::start_writer(&sender).map_err(terminal_error_mapper("write to"))?;
 
@@ -87,27 +85,6 @@ pub fn run(options: Options) -> Result<TuiOutcome, TuiError> {
 
 fn terminal_error_mapper(action: &'static str) -> impl Fn(io::Error) -> TuiError {
     move |source| TuiError::Terminal { action, source }
-}
-
-/// Forwards messages from a channel to the event loop and reports when the channel closes.
-fn forward_channel<T: Send + 'static>(
-    name: &str,
-    from: Receiver<T>,
-    events: &Sender<Event>,
-    wrap: impl Fn(T) -> Event + Send + 'static,
-    source: RequiredEventSource,
-) -> Result<(), TuiError> {
-    let events = events.clone();
-    let pass = move || {
-        while let Ok(message) = from.recv() {
-            if events.send(wrap(message)).is_err() {
-                return;
-            }
-        }
-        let _ = events.send(Event::Lost(source));
-    };
-    spawn(name, pass).map_err(terminal_error_mapper("start a thread for"))?;
-    Ok(())
 }
 
 struct EventLoop {
@@ -328,7 +305,3 @@ fn end_for_write_error(error: io::Error) -> LoopEnd {
         LoopEnd::Quit(ExitStatus::HANGUP)
     }
 }
-
-#[cfg(test)]
-#[path = "run_tests.rs"]
-mod tests;

@@ -1,10 +1,9 @@
 //! Tests that values are kept between requests.
 
 use std::fs;
-use std::sync::mpsc;
 
 use super::*;
-use crate::protocol::{PreviewSlot, WriteRequirement};
+use crate::protocol::WriteRequirement;
 use crate::session::NoPendingCommands;
 use crate::tests::{OBJ, SCENE};
 use crate::world::{Geometry, MeshTree};
@@ -40,8 +39,7 @@ impl EngineFixture {
 
     fn send_unsaved(&mut self) -> Vec<Event> {
         let scene = self.folder.path().join("scene.toml");
-        let (events, received) = mpsc::channel();
-        let sink = EventSink { generation: 1, events, previews: PreviewSlot::default() };
+        let (sink, received) = EventSink::with_channel(1);
         let request = Request {
             generation: 1,
             scene,
@@ -196,8 +194,7 @@ fn check_never_mixes_file_versions() {
         }
         let replacement = (scene.clone(), renamed.clone().into_bytes());
         fixture.engine.contents.replacements.lock().expect("not poisoned").insert(at("one.obj"), replacement);
-        let events = mpsc::channel().0;
-        let sink = EventSink { generation: 1, events, previews: PreviewSlot::default() };
+        let sink = EventSink::silent(1);
         let read = fixture.engine.load_scene_and_all_assets(&scene, &[], &sink, &CancelToken::new());
         let (parsed, ..) = read.expect("a valid scene");
         assert_eq!(parsed.loaded.source.file_text(), renamed);

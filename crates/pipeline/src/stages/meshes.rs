@@ -391,8 +391,7 @@ mod tests {
     impl MeshFixture {
         fn new() -> Self {
             let folder = tempfile::tempdir().expect("a scratch folder");
-            let events = std::sync::mpsc::channel().0;
-            let sink = EventSink { generation: 0, events, previews: Default::default() };
+            let sink = EventSink::silent(0);
             let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().expect("a pool");
             let fixture =
                 Self { folder, sink, pool, cache: CacheOfNamedValues::default(), contents: Arc::default() };

@@ -14,6 +14,8 @@ mod targets;
 use std::cell::Cell;
 use std::fs;
 use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::mpsc::Receiver;
 use std::time::Duration;
 
 use crate::engine::EngineConfig;
@@ -26,7 +28,8 @@ use crate::scene::description::ResolvedCamera;
 use crate::scene::diagnostic::Diagnostic;
 use crate::settings::Overrides;
 use crate::trace::TileKernel;
-use crate::worker::{Handle, start_with_config};
+use crate::watch::content::FileHashCache;
+use crate::worker::{Handle, start_with_config_and_channel};
 
 /// Loads a scene from text, with a default camera.
 pub(crate) fn loaded_of(text: &str) -> LoadedScene {
@@ -82,6 +85,8 @@ pub(crate) struct Bench {
     /// File name of the scene or model.
     pub(super) scene: &'static str,
     pub(super) worker: Handle,
+    pub(super) events: Receiver<Event>,
+    pub(super) contents: Arc<FileHashCache>,
     pub(super) generation: u64,
     pub(super) overrides: Overrides,
     pub(super) preview: Option<MaxPreviewSize>,
@@ -107,11 +112,15 @@ impl Bench {
         let folder = tempfile::tempdir().expect("a scratch folder");
         let output = folder.path().join("out.ppm");
         let overrides = Overrides { outputs: vec![output], threads: Some(2), ..Default::default() };
-        let worker = start_with_config(config).expect("a thread");
+        let contents = Arc::<FileHashCache>::default();
+        let (worker, events) =
+            start_with_config_and_channel(config, Arc::clone(&contents)).expect("a thread");
         let bench = Self {
             folder,
             scene: "scene.toml",
             worker,
+            events,
+            contents,
             generation: 0,
             overrides,
             preview: None,
@@ -159,8 +168,7 @@ impl Bench {
     }
 
     pub(super) fn next(&self) -> Event {
-        let event =
-            self.worker.events.recv_timeout(Duration::from_secs(60)).expect("an event within a minute");
+        let event = self.events.recv_timeout(Duration::from_secs(60)).expect("an event within a minute");
         if let Event::Settings { camera, .. } = &event {
             self.own.set(Some(*camera));
         }

@@ -352,7 +352,8 @@ fn own_checkpoint_is_saved_during_another_view() {
         assert!(keys.0.worker.stop_within(Duration::from_secs(60)));
         assert_eq!(path.exists(), is_kept, "a short render should be saved only after a signal");
         if is_kept {
-            keys.0.worker = crate::worker::start_with_config(EngineConfig::default()).expect("a thread");
+            (keys.0.worker, keys.0.events) =
+                start_with_config_and_channel(EngineConfig::default(), Arc::default()).expect("a thread");
             let (report, _) = keys.0.done();
             assert_resumed(&report);
             assert!(!path.exists(), "the checkpoint should be removed once the image is written");

@@ -202,7 +202,7 @@ fn image_never_uses_unhashed_bytes() {
                 bench.done();
                 bench.write(name, old);
             }
-            let contents = bench.worker.file_hashes();
+            let contents = Arc::clone(&bench.contents);
             let replacements = || contents.replacements.lock().expect("not poisoned");
             replacements().insert(bench.path(name), (bench.path(name), new.clone().into()));
             let shown = image(&mut bench);
@@ -238,7 +238,7 @@ fn files_replaced_while_others_load_are_read_again() {
     // Replace the scene after it has been read, while its texture is being read.
     let mut bench = Bench::new(SCENE);
     let replacement = (bench.path("scene.toml"), new.into_bytes());
-    let contents = bench.worker.file_hashes();
+    let contents = Arc::clone(&bench.contents);
     contents.replacements.lock().expect("not poisoned").insert(bench.path("skin.ppm"), replacement);
     assert!(image(&mut bench) == new_image);
 }
@@ -252,7 +252,7 @@ fn files_replaced_before_an_error_are_read_again() {
     std::fs::rename(bench.path("skin.ppm"), bench.path("new.ppm")).expect("renamed");
     bench.write("skin.ppm", "P6\n");
     let replacement = (bench.path("scene.toml"), new.into_bytes());
-    let contents = bench.worker.file_hashes();
+    let contents = Arc::clone(&bench.contents);
     contents.replacements.lock().expect("not poisoned").insert(bench.path("one.obj"), replacement);
     bench.done();
     // An error in unchanged files is reported.
@@ -274,8 +274,7 @@ fn unchanged_files_are_hashed_once() {
     // The output is new after the first request.
     for expected in [&["one.obj", "out.ppm", "scene.toml", "skin.ppm"][..], &["one.mtl", "out.ppm"], &[]] {
         bench.done();
-        let mut hashed =
-            std::mem::take(&mut *bench.worker.file_hashes().hashed.lock().expect("not poisoned"));
+        let mut hashed = std::mem::take(&mut *bench.contents.hashed.lock().expect("not poisoned"));
         hashed.sort_unstable();
         let expected: Vec<_> = expected.iter().map(|name| bench.path(name)).collect();
         // The output has a recent timestamp until two seconds have passed.
