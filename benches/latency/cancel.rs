@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::mpsc::Receiver;
 use std::time::{Duration, Instant};
 
-use glimt::pipeline::protocol::{Command, Event, MaxPreviewSize, Request, WriteRequirement};
+use glimt::pipeline::protocol::{Command, Event, MaxPreviewSize, Request};
 use glimt::pipeline::settings::Overrides;
 use glimt::pipeline::{Handle, start_with_channel};
 
@@ -56,15 +56,7 @@ fn send(worker: &Handle, scene: &Path, generation: &mut u64) {
     *generation += 1;
     let overrides =
         Overrides { samples: Some(100_000), seed: u32::try_from(*generation).ok(), ..Overrides::default() };
-    worker.send(Command::Render(Box::new(Request {
-        generation: *generation,
-        scene: scene.to_owned(),
-        overrides,
-        preview: Some(MaxPreviewSize { width: 118, height: 74, around: None }),
-        write: WriteRequirement::No,
-        own: None,
-        saves: 0,
-        force: false,
-        first: None,
-    })));
+    let preview = Some(MaxPreviewSize { width: 118, height: 74, around: None });
+    let request = Request::new(*generation, scene.to_owned(), overrides);
+    worker.send(Command::Render(Box::new(Request { preview, ..request })));
 }

@@ -8,7 +8,7 @@ use std::time::Instant;
 
 use glimt::film::Srgb8Image;
 use glimt::pipeline::Handle;
-use glimt::pipeline::protocol::{Command, Event, MaxPreviewSize, Request, WriteRequirement};
+use glimt::pipeline::protocol::{Command, Event, MaxPreviewSize, Request};
 use glimt::pipeline::settings::Overrides;
 
 /// A preview of an image, which may still be rendering.
@@ -28,17 +28,8 @@ pub(crate) fn render(
     scene: &Path,
     size: MaxPreviewSize,
 ) -> Result<Vec<RecordedPreview>, Box<dyn Error>> {
-    let request = Request {
-        generation,
-        scene: scene.to_owned(),
-        overrides: Overrides::default(),
-        preview: Some(size),
-        write: WriteRequirement::No,
-        own: None,
-        saves: 0,
-        force: false,
-        first: None,
-    };
+    let request = Request::new(generation, scene.to_owned(), Overrides::default());
+    let request = Request { preview: Some(size), ..request };
     let start = Instant::now();
     handle.send(Command::Render(Box::new(request)));
     let (mut shots, mut samples) = (Vec::<RecordedPreview>::new(), 0.0);

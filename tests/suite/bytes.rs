@@ -6,7 +6,7 @@ use std::sync::{Arc, PoisonError};
 
 use glimt::film::Srgb8Image;
 use glimt::pipeline::Handle;
-use glimt::pipeline::protocol::{Command, Event, MaxPreviewSize, Request, WriteRequirement};
+use glimt::pipeline::protocol::{Command, Event, MaxPreviewSize, Request};
 use glimt::pipeline::settings::Overrides;
 use glimt::tui::ColorDepth;
 use glimt::tui::paint::{Fidelity, Painter};
@@ -52,17 +52,8 @@ impl PreviewRenderer {
             ..Overrides::default()
         };
         self.generation += 1;
-        let request = Request {
-            generation: self.generation,
-            scene: path,
-            overrides,
-            preview: Some(self.preview),
-            write: WriteRequirement::No,
-            own: None,
-            saves: 0,
-            force: false,
-            first: None,
-        };
+        let request = Request::new(self.generation, path, overrides);
+        let request = Request { preview: Some(self.preview), ..request };
         self.handle.send(Command::Render(Box::new(request)));
         for event in &self.events {
             assert!(!matches!(event, Event::Failed { .. }), "{event:?}");

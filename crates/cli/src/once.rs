@@ -71,17 +71,9 @@ pub(super) fn run(order: &RenderRequest, console: &Console) -> Exit {
         if let Some(TurntableFrame { number, of }) = turn.filter(|_| image_reporter.allows_text_results()) {
             console.print_line_to_stderr(&format!("frame {} of {of}", number + 1));
         }
-        worker.send(Command::Render(Box::new(Request {
-            generation: turn.map_or(1, |turn| u64::from(turn.number) + 1),
-            scene: order.scene.clone(),
-            overrides,
-            preview: None,
-            write: WriteRequirement::Must,
-            own: None,
-            saves: 0,
-            force: false,
-            first: None,
-        })));
+        let generation = turn.map_or(1, |turn| u64::from(turn.number) + 1);
+        let request = Request::new(generation, order.scene.clone(), overrides);
+        worker.send(Command::Render(Box::new(Request { write: WriteRequirement::Must, ..request })));
         image_reporter = reporter();
         let reporter = &mut *image_reporter;
         exit = handle_events(&worker, &events, (order, turn), console, reporter, &mut written, &mut is_over);

@@ -79,6 +79,14 @@ pub struct Request {
     pub first: Option<NormalizedRect>,
 }
 
+impl Request {
+    /// Creates a request without previews that writes no files.
+    pub fn new(generation: u64, scene: PathBuf, overrides: Overrides) -> Self {
+        let (preview, write, own, first) = (None, WriteRequirement::No, None, None);
+        Self { generation, scene, overrides, preview, write, own, saves: 0, force: false, first }
+    }
+}
+
 /// Whether to write the finished image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum WriteRequirement {
