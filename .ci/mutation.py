@@ -194,7 +194,7 @@ FAULTS = [
      "pipeline::tests::photons::first_preview_does_not_wait_for_photons"),
     ("unbounded photon map cache", "pipeline/stages/photons.rs", "let has_room = ⟦self.cached_bytes() + pass.memory_bytes() <= MAX_KEPT_BYTES⟧;",
      "true", "pipeline::tests::photons::maps_are_kept_while_there_is_room"),
-    ("no cache for the previous scene", "pipeline/engine/eviction.rs", "oldest_request_to_keep(candidates, ⟦MAX_SPARE_BYTES⟧)", "0",
+    ("no cache for the previous scene", "pipeline/prepare/mod.rs", "oldest_request_to_keep(candidates, ⟦MAX_SPARE_BYTES⟧)", "0",
      "pipeline::tests::switching::switching_back_reuses_trees_and_textures"),
     ("unbounded cache of previous scenes", "pipeline/cache.rs", "⟦total <= most_bytes⟧", "true",
      "pipeline::cache::tests::oldest_scene_is_evicted_entirely"),

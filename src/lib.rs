@@ -24,7 +24,7 @@
 //! | [`integrators`] | whitted, path, photons, AOVs |
 //! | [`compare`] | error metrics for an image compared with a reference |
 //! | [`output`] | encoders, atomic writes, metadata |
-//! | [`pipeline`] | stages, caches, the worker, file watching, importers of foreign formats |
+//! | [`pipeline`] | scene preparation, sessions, the worker, file watching, importers of foreign formats |
 //! | [`tui`] | the terminal front end |
 //! | [`cli`] | arguments, subcommands, the headless front end; `bench`, which plots error against time |
 //!
@@ -53,28 +53,30 @@
 //! From a file notification to the preview and the written image. Paths start with the module: `tui/run.rs`
 //! is `crates/tui/src/run.rs`. The table above lists each module's crate.
 //!
-//! 1. `pipeline/watch/mod.rs`: the operating system reports a change. The watcher compares contents and
-//!    forwards only actual changes, through `cli/live.rs`.
-//! 2. `tui/run.rs` receives the change as an event (`tui/event.rs`), and `tui/update/mod.rs` updates the
-//!    state.
+//! 1. `pipeline/watch/mod.rs`: the operating system reports a change. The watcher compares contents and puts
+//!    only actual changes into the event loop's queue (`tui/event_queue.rs`).
+//! 2. `tui/run.rs` takes the change from the queue (`tui/event.rs`), and `tui/update/mod.rs` updates the state.
 //! 3. `tui/update/request.rs` creates a request, and `tui/run.rs` sends it. The header (`tui/view/header.rs`)
 //!    changes first: it is redrawn as in step 9 and shows that a render is running.
 //! 4. `pipeline/worker.rs` holds at most one pending request in its mailbox. A newer request cancels the
 //!    current render.
-//! 5. `pipeline/engine/mod.rs` runs the stages: `pipeline/stages/parse.rs`, `pipeline/plan.rs`, then meshes,
-//!    glass, textures, accel, lights and photons. A stage reuses its result if its key in `pipeline/keys.rs`
-//!    is unchanged. If the scene has errors, the render ends here and the last image stays on the screen.
-//! 6. `pipeline/render/scheduler.rs` schedules passes, and `pipeline/trace.rs` renders their tiles on the
-//!    thread pool. For large images, `pipeline/render/first_picture.rs` renders a coarse image first. With
-//!    photons, `engine/mod.rs` shows a coarse image before tracing photons.
+//! 5. `pipeline/session/request.rs` runs the steps of the request. The first is
+//!    `pipeline/session/preparation.rs`: it reads the scene and builds its world with `pipeline/prepare/mod.rs`
+//!    (`pipeline/stages/parse.rs`, `pipeline/plan.rs`, then meshes, textures, glass, accel and lights). A stage
+//!    reuses its result if its key in `pipeline/keys.rs` is unchanged. If the scene has errors, the request
+//!    ends here and the last image stays on the screen.
+//! 6. `pipeline/session/render.rs` traces photons and renders the film: `pipeline/render/scheduler.rs`
+//!    schedules passes, and `pipeline/trace.rs` renders their tiles on the thread pool. For large images, and
+//!    while photons are traced, `pipeline/render/first_picture.rs` renders a coarse image first.
 //! 7. `integrators/mod.rs` renders a tile (see below). `pipeline/render/film_state.rs` adds the samples to
 //!    the film.
-//! 8. `pipeline/render/preview.rs` puts a preview into its slot, and `cli/live.rs` notifies the front end.
+//! 8. `pipeline/render/preview.rs` puts a preview into its slot, and `cli/live.rs` puts an event into the event
+//!    loop's queue.
 //! 9. `tui/presenter.rs` takes the preview when a frame is due, `tui/view/preview.rs` converts it to cells,
 //!    `tui/display.rs` limits the cells per frame, `tui/paint/mod.rs` encodes them in the fewest bytes, and
 //!    `tui/writer.rs` writes the bytes.
-//! 10. `pipeline/stages/write.rs` encodes the finished image. `output/write.rs` writes it to a temporary file
-//!     and renames the file.
+//! 10. `pipeline/session/outputs.rs` writes the finished image: `pipeline/stages/write.rs` encodes it, and
+//!     `output/write.rs` writes it to a temporary file and renames the file.
 //!
 //! ## The life of a ray
 //!

@@ -3,20 +3,28 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use super::engine::{Engine, EngineConfig};
+use super::formats::model::ModelViewOptions;
+use super::inputs::ProtectedInputs;
 use super::memory::MemoryEstimate;
-use super::plan::resolve_plan;
+use super::plan::{OutputNameSource, resolve_plan};
+use super::prepare::{FileReader, SceneAssets, SceneCache};
 use super::protocol::Failure;
 use super::settings::Overrides;
 use super::sink::EventSink;
-use super::stages::meshes::MeshesByFileIndex;
-use super::stages::parse::ParsedScene;
-use super::stages::textures::Textures;
+use super::stages::parse::SceneParseRequest;
+use super::stages::textures::TextureSelection;
+use super::stages::{AbortReason, Findings};
+use super::table::StageRunner;
+use super::targets::output_conflicts;
+use super::threads::RenderThreads;
+use super::warnings::settings_warnings;
+use super::watch::content::FileHashCache;
 use crate::assets::FileMaterial;
 use crate::control::CancelToken;
 use crate::math::{DVec3, Vec3};
 use crate::scene::description::{LoweredShape, Object, Shape};
 use crate::scene::diagnostic::{Diagnostic, Severity};
+use crate::system::threads::logical_cpu_count;
 
 /// Object counts and warnings for a valid scene.
 #[derive(Clone, Debug, PartialEq)]
@@ -42,12 +50,11 @@ pub fn check_scene(path: &Path, sets: &[String]) -> Result<SceneSummary, Failure
 }
 
 /// Checks scenes repeatedly, rereading only files that have changed.
-pub struct IncrementalSceneChecker(Engine);
-
-impl Default for IncrementalSceneChecker {
-    fn default() -> Self {
-        Self(Engine::new(EngineConfig::default(), Arc::default()))
-    }
+#[derive(Default)]
+pub struct IncrementalSceneChecker {
+    contents: Arc<FileHashCache>,
+    threads: RenderThreads,
+    scenes: SceneCache,
 }
 
 /// Returns a conservative estimate of a render's memory use in bytes. Reads all of the scene's files.
@@ -55,13 +62,12 @@ impl Default for IncrementalSceneChecker {
 /// # Errors
 /// Returns all errors in the scene and its files.
 pub fn estimate_memory(path: &Path, overrides: &Overrides) -> Result<u64, Failure> {
-    let IncrementalSceneChecker(mut engine) = IncrementalSceneChecker::default();
-    let token = CancelToken::new();
-    let (parsed, meshes, textures, _) =
-        engine.load_scene_and_all_assets(path, &overrides.sets, &EventSink::silent(0), &token)?;
-    let plan =
-        resolve_plan(&parsed.loaded.scene, path, overrides).map_err(|error| Failure::Scene(vec![*error]))?;
-    Ok(MemoryEstimate::for_image_and_scene(&plan, &plan.scene, &meshes, textures.memory_bytes).bytes())
+    let mut checker = IncrementalSceneChecker::default();
+    let (assets, _) = checker.load_all(path, &overrides.sets, &CancelToken::new())?;
+    let plan = resolve_plan(&assets.parsed.loaded.scene, path, overrides)
+        .map_err(|error| Failure::Scene(vec![*error]))?;
+    let bytes = assets.textures.memory_bytes;
+    Ok(MemoryEstimate::for_image_and_scene(&plan, &plan.scene, &assets.meshes, bytes).bytes())
 }
 
 impl IncrementalSceneChecker {
@@ -76,18 +82,64 @@ impl IncrementalSceneChecker {
         sets: &[String],
         token: &CancelToken,
     ) -> Result<SceneSummary, Failure> {
-        let (parsed, meshes, textures, warnings) =
-            self.0.load_scene_and_all_assets(path, sets, &EventSink::silent(0), token)?;
-        Ok(summarize(&parsed, &meshes, &textures, warnings))
+        let (assets, warnings) = self.load_all(path, sets, token)?;
+        Ok(summarize(&assets, warnings))
+    }
+
+    /// Loads a scene and all files it references. Returns the warnings about them.
+    fn load_all(
+        &mut self,
+        path: &Path,
+        sets: &[String],
+        token: &CancelToken,
+    ) -> Result<(SceneAssets, Vec<Diagnostic>), Failure> {
+        let mut findings = Findings::default();
+        let assets = self.load_consistently(path, sets, token, &mut findings);
+        self.scenes.end_request(assets.is_ok());
+        match assets {
+            Ok(assets) if findings.errors.is_empty() => Ok((assets, findings.warnings)),
+            Ok(_) => Err(findings.take_diagnostics_as_failure()),
+            Err(AbortReason::Failed(failure)) => Err(failure),
+            Err(AbortReason::Cancelled) => Err(Failure::Work("cancelled".to_owned())),
+        }
+    }
+
+    /// Loads one consistent version of a scene and its files. Adds all errors and warnings to the findings.
+    fn load_consistently(
+        &mut self,
+        path: &Path,
+        sets: &[String],
+        token: &CancelToken,
+        findings: &mut Findings,
+    ) -> Result<SceneAssets, AbortReason> {
+        let sink = EventSink::silent(0);
+        let pool = self.threads.pool(logical_cpu_count(), false)?;
+        let reader = FileReader { contents: &self.contents, pool: &pool, sink: &sink, token };
+        let (scenes, mut table) = (&mut self.scenes, StageRunner::silent(&sink, token));
+        reader.read_consistently(&mut table, findings, |reading| {
+            let scene = SceneParseRequest { path, sets, show: ModelViewOptions::default() };
+            let parsed = scenes.parse(scene, reading)?;
+            let assets = scenes.load(&parsed, TextureSelection::ForCheck, reading)?;
+            reading.verify_files_unchanged()?;
+            check_settings(path, &assets, reading.findings)?;
+            Ok(assets)
+        })
     }
 }
 
-fn summarize(
-    parsed: &ParsedScene,
-    meshes: &MeshesByFileIndex,
-    textures: &Textures,
-    mut warnings: Vec<Diagnostic>,
-) -> SceneSummary {
+/// Warns about the scene's settings, and checks that its output file is not one of its inputs.
+fn check_settings(path: &Path, assets: &SceneAssets, findings: &mut Findings) -> Result<(), AbortReason> {
+    let (loaded, overrides) = (&assets.parsed.loaded, Overrides::default());
+    let plan = resolve_plan(&loaded.scene, path, &overrides)?;
+    findings.warnings.extend(settings_warnings(loaded, &plan.scene, &plan.settings, &overrides));
+    if plan.named_by == OutputNameSource::Scene {
+        findings.errors.extend(output_conflicts(&plan, &ProtectedInputs::from_assets(assets)));
+    }
+    Ok(())
+}
+
+fn summarize(assets: &SceneAssets, mut warnings: Vec<Diagnostic>) -> SceneSummary {
+    let SceneAssets { parsed, meshes, textures, .. } = assets;
     let scene = &parsed.loaded.scene;
     let triangles = |shape: &Shape| match shape.to_traced_shape_relative_to(DVec3::ZERO) {
         LoweredShape::Shape(shape) => shape.triangle_count(),
@@ -114,5 +166,40 @@ fn summarize(
         textures: textures.images.len() as u64,
         lights: count as u64,
         warnings,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use super::*;
+    use crate::tests::{OBJ, SCENE};
+
+    #[test]
+    fn check_never_mixes_file_versions() {
+        for (renamed, is_moved) in [
+            (SCENE.replace("radius = 0.5", "radius = 0.6"), false),
+            (SCENE.replace("skin.ppm", "new.ppm"), true),
+        ] {
+            let folder = tempfile::tempdir().expect("a scratch folder");
+            let at = |name: &str| folder.path().join(name);
+            let scene = at("scene.toml");
+            fs::write(&scene, SCENE).expect("written");
+            fs::write(at("one.obj"), OBJ).expect("written");
+            fs::write(at("skin.ppm"), "P6\n1 1\n255\nabc").expect("written");
+            // The scene is replaced while its mesh is being read. In the second case, the texture has been
+            // renamed and the file with the old name is invalid.
+            if is_moved {
+                fs::rename(at("skin.ppm"), at("new.ppm")).expect("renamed");
+                fs::write(at("skin.ppm"), "P6\n").expect("written");
+            }
+            let mut checker = IncrementalSceneChecker::default();
+            let replacement = (scene.clone(), renamed.clone().into_bytes());
+            checker.contents.replacements.lock().expect("not poisoned").insert(at("one.obj"), replacement);
+            let read = checker.load_all(&scene, &[], &CancelToken::new());
+            let (assets, _) = read.expect("a valid scene");
+            assert_eq!(assets.parsed.loaded.source.file_text(), renamed);
+        }
     }
 }

@@ -1,26 +1,23 @@
 //! Synchronous in-memory rendering, for benchmarks.
 
 use std::path::Path;
-use std::sync::Arc;
 
-use super::engine::{Engine, EngineConfig, Interruption, PendingCommands, RequestContext};
-pub use super::engine::{RenderFailure, RenderedImage};
-use super::protocol::{MaxPreviewSize, Request, WriteRequirement};
-use super::queries::QueryOrEdit;
+use super::protocol::{Report, Request};
+use super::render::commands::PendingCommands;
+use super::session::{CompletedRequest, RequestContext, Session};
 use super::settings::Overrides;
 use super::sink::EventSink;
+pub use super::stages::AbortReason;
 use crate::control::CancelToken;
+use crate::film::{FilmQuantity, RadianceImage};
+use crate::scene::diagnostic::Diagnostic;
+use crate::scene::fingerprint::Fingerprint;
 
 /// Renders images in memory and keeps caches between renders.
+#[derive(Default)]
 pub struct HeadlessSession {
-    engine: Engine,
+    session: Session,
     generation: u64,
-}
-
-impl Default for HeadlessSession {
-    fn default() -> Self {
-        Self { engine: Engine::new(EngineConfig::default(), Arc::default()), generation: 0 }
-    }
 }
 
 impl HeadlessSession {
@@ -33,55 +30,44 @@ impl HeadlessSession {
         scene: &Path,
         overrides: &Overrides,
         token: &CancelToken,
-    ) -> Result<RenderedImage, RenderFailure> {
+    ) -> Result<RenderedImage, AbortReason> {
         self.generation += 1;
-        let request = Request {
-            generation: self.generation,
-            scene: scene.to_owned(),
-            overrides: overrides.clone(),
-            preview: None,
-            first: None,
-            write: WriteRequirement::No,
-            own: None,
-            saves: 0,
-            force: true,
-        };
+        let request = Request::new(self.generation, scene.to_owned(), overrides.clone());
+        let request = Request { force: true, ..request };
         // Events are not needed, because the result is returned.
         let sink = EventSink::silent(self.generation);
-        let context = RequestContext::new(token, token, &NoPendingCommands);
-        self.engine.render_radiance_image(&request, &sink, &context)
+        let context = RequestContext::new(&request, &sink, token, token, &NoPendingCommands);
+        // An in-memory image is not written, so there are no conflicts.
+        let CompletedRequest { report, warnings, conflicts: _, unchanged: _ } =
+            self.session.run_request(&context)?;
+        let state = self.session.film()?;
+        let image = state.film.image(FilmQuantity::Radiance);
+        Ok(RenderedImage { image, report: Box::new(report), warnings, key: state.key })
     }
 
     /// Whether the last image depends on the file at a path.
     pub fn depends_on_file(&self, path: &Path) -> bool {
-        self.engine.has_read_file(path)
+        self.session.has_read_file(path)
     }
 }
 
-/// Commands for a request without a front end: none ever arrive.
-pub(super) struct NoPendingCommands;
-
-impl PendingCommands for NoPendingCommands {
-    fn wants_write(&self) -> bool {
-        false
-    }
-
-    fn take_write(&self) -> bool {
-        false
-    }
-
-    fn take_preview_resize(&self) -> Option<Option<MaxPreviewSize>> {
-        None
-    }
-
-    fn take_query(&self) -> Option<QueryOrEdit> {
-        None
-    }
-
-    fn cancellation_cause(&self) -> Interruption {
-        Interruption::Replaced
-    }
+/// A rendered image.
+#[derive(Clone, Debug)]
+pub struct RenderedImage {
+    /// Linear radiance, before exposure.
+    pub image: RadianceImage,
+    /// Report of the request.
+    pub report: Box<Report>,
+    /// Likely mistakes in the scene.
+    pub warnings: Vec<Diagnostic>,
+    /// Key that covers everything that affects the image except the number of samples.
+    pub key: Fingerprint,
 }
+
+/// Commands for a request without a front end.
+struct NoPendingCommands;
+
+impl PendingCommands for NoPendingCommands {}
 
 #[cfg(test)]
 mod tests {
@@ -119,12 +105,12 @@ mod tests {
             &Overrides::default(),
             &token,
         );
-        assert!(matches!(missing, Err(RenderFailure::Failed(Failure::Scene(_)))));
+        assert!(matches!(missing, Err(AbortReason::Failed(Failure::Scene(_)))));
         let folder = tempfile::tempdir().expect("a folder");
         let scene = folder.path().join("a.toml");
         std::fs::write(&scene, SCENE).expect("written");
         token.cancel();
         let cancelled = HeadlessSession::default().render_in_memory(&scene, &Overrides::default(), &token);
-        assert!(matches!(cancelled, Err(RenderFailure::Cancelled)));
+        assert!(matches!(cancelled, Err(AbortReason::Cancelled)));
     }
 }

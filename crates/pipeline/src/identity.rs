@@ -4,10 +4,10 @@
 
 use std::path::{Path, PathBuf};
 
-use super::assembly::RequestCamera;
 use super::build::BUILD;
 use super::keys;
 use super::plan::RenderPlan;
+use super::prepare::RequestCamera;
 use super::stages::parse::ParsedScene;
 use super::watch::content::{FileContentId, FilePathAndContentId};
 use crate::choice::Choice;
@@ -94,7 +94,7 @@ impl ImageDependencies<'_> {
     fn fingerprint(&self) -> Fingerprint {
         let scene = self.copy_scene_with_content_hashes();
         let eye = RequestCamera::new(&scene, self.parsed.orbiter, self.camera);
-        let orbiter = eye.orbiter.map(|camera| format!("{camera:?}"));
+        let orbiter = eye.orbiter_text();
         let meshes: Vec<Fingerprint> = scene
             .mesh_files
             .iter()

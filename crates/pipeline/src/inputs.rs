@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::identity::path_relative_to_scene;
+use super::prepare::SceneAssets;
 use super::stages::meshes::MeshesByFileIndex;
 use super::stages::parse::ParsedScene;
 use super::watch::content::FilePathAndContentId;
@@ -62,8 +63,16 @@ impl ProtectedInputs {
         inputs
     }
 
+    /// Collects the files that a loaded scene references and all other files that were read.
+    pub(super) fn from_assets(assets: &SceneAssets) -> Self {
+        let mut inputs = Self::from_scene(&assets.parsed);
+        inputs.add_mesh_dependencies(&assets.parsed.loaded, &assets.meshes);
+        inputs.add_read(&assets.files);
+        inputs
+    }
+
     /// Adds the material libraries and images used by mesh files, and the files referenced by glTF files.
-    pub(super) fn add_mesh_dependencies(&mut self, loaded: &Arc<LoadedScene>, meshes: &MeshesByFileIndex) {
+    fn add_mesh_dependencies(&mut self, loaded: &Arc<LoadedScene>, meshes: &MeshesByFileIndex) {
         for (file, kept) in loaded.scene.mesh_files.iter().zip(meshes) {
             let name = file.value.file_name().unwrap_or_default().to_string_lossy();
             let mut add = |path: &PathBuf, role: String| {

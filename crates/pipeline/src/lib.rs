@@ -1,37 +1,40 @@
-//! The render pipeline: stages, caches, the worker that runs them, and the file watcher.
+//! The render pipeline: from scene files to previews and images.
 //!
-//! [`start`] takes a function for events and returns a [`Handle`], which accepts commands and provides the latest
-//! preview.
-//! `engine` runs the stages of a request. `stages` contains one file per stage, and `render` the render loop.
-//! Stages are functions of their inputs. Each stage compares a [fingerprint](crate::scene::fingerprint) of
-//! its inputs (`keys`) with the fingerprint of its cached value (`cache`), and reports whether it was done,
-//! reused or skipped. [`watch`] reports files whose content has changed.
+//! [`start`] starts a worker thread and returns a [`Handle`], which accepts commands. The worker owns a session
+//! (`session`), which runs the steps of each request: it prepares the scene (`prepare`), renders its film
+//! (`render`) and writes the image. [`headless`] renders without a worker. [`watch`] reports files whose content
+//! has changed.
+//!
+//! `stages` contains one file per stage. Stages are functions of their inputs. Each stage compares a
+//! [fingerprint](crate::scene::fingerprint) of its inputs (`keys`) with the fingerprint of its cached value
+//! (`cache`), and reports whether it was done, reused or skipped.
 
 mod answers;
-mod assembly;
 mod build;
 mod cache;
 mod check;
-mod engine;
 mod formats;
+pub mod headless;
 mod identity;
 mod inputs;
 mod keys;
 mod memory;
 pub mod messages;
 mod plan;
+mod prepare;
 mod protected;
 pub mod protocol;
 mod queries;
 mod render;
 mod report;
-pub mod session;
+mod session;
 pub mod settings;
 mod sink;
 mod stages;
 mod stopwatch;
 mod table;
 mod targets;
+mod threads;
 mod trace;
 pub mod turntable;
 mod warnings;

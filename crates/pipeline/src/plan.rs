@@ -4,6 +4,7 @@ use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use super::protocol::Request;
 use super::settings::{
     CheckpointSettings, EffectiveSettingsSummary, OutputLayer, Overrides, UpAxis, ViewMode, ViewSide,
     layers_to_record,
@@ -20,6 +21,7 @@ use crate::output::{BitDepth, Format, OutputError};
 use crate::scene::description::{Accel, PhotonOptions, Scene, Tonemap};
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::system::threads::logical_cpu_count;
+use crate::world::TextureRolesNeededByRender;
 
 /// Resolved settings of a request, merged from the scene, the command line and the keyboard.
 #[derive(Clone, Debug)]
@@ -62,6 +64,31 @@ pub(super) struct RenderPlan {
     /// Maximum memory use of the render, in bytes.
     pub(super) memory: Option<u64>,
     pub(super) effective: EffectiveSettingsSummary,
+}
+
+/// Resolved settings of a request's image and, if it is not the scene's own image, of that image too.
+pub(super) struct RequestPlans {
+    pub(super) shown: RenderPlan,
+    /// Settings of the scene's own image, or `None` if the request is for that image.
+    pub(super) own: Option<RenderPlan>,
+}
+
+impl RequestPlans {
+    /// Merges a scene and the overrides of a request.
+    ///
+    /// # Errors
+    /// See [`resolve_plan`].
+    pub(super) fn resolve(scene: &Arc<Scene>, request: &Request) -> Result<Self, Box<Diagnostic>> {
+        let plan = |overrides: &Overrides| resolve_plan(scene, &request.scene, overrides);
+        Ok(Self { shown: plan(&request.overrides)?, own: request.own.as_deref().map(plan).transpose()? })
+    }
+
+    /// Returns the textures that the request needs, including those for the scene's own image, because its
+    /// film key depends on them.
+    pub(super) fn texture_needs(&self) -> TextureRolesNeededByRender {
+        let shown = self.shown.settings.texture_needs();
+        self.own.as_ref().map_or(shown, |own| shown.union(own.settings.texture_needs()))
+    }
 }
 
 /// Source of the output file names.
@@ -238,6 +265,12 @@ impl OutputPathsByKind {
     }
 }
 
+/// Creates an error about the command line.
+pub(super) fn argument_error(message: String, help: &str) -> Box<Diagnostic> {
+    let error = Diagnostic::about_file(Path::new(""), Severity::Error, message);
+    Box::new(Diagnostic { help: Some(help.to_owned()), ..error })
+}
+
 /// Checks that the requested layers can be written.
 fn check_layers(
     outputs: &[PathBuf],
@@ -248,10 +281,7 @@ fn check_layers(
     if overrides.layers.is_empty() {
         return Ok(());
     }
-    let refused = |message: String, help: &str| {
-        let (severity, path, help) = (Severity::Error, PathBuf::new(), Some(help.to_owned()));
-        Err(Box::new(Diagnostic { severity, message, path, place: None, help }))
-    };
+    let refused = |message: String, help: &str| Err(argument_error(message, help));
     let is_exr = |path: &&PathBuf| Format::from_path(path).is_ok_and(|format| format == Format::Exr);
     if let Some(other) = outputs.iter().find(|path| !is_exr(path)).or(moving.first()) {
         let message = format!("`--layers` needs EXR output; {} is not an EXR file", other.display());
@@ -276,8 +306,8 @@ fn check_animation_size_and_depth(
         Ok(()) if bit_depth != 8 => format!("animated {format} files have 8 bits per channel"),
         Ok(()) => return Ok(()),
     };
-    let help = Some("use numbered files, for example a_####.png".to_owned());
-    Err(Box::new(Diagnostic { severity: Severity::Error, message, path: path.to_owned(), place: None, help }))
+    let error = argument_error(message, "use numbered files, for example a_####.png");
+    Err(Box::new(Diagnostic { path: path.to_owned(), ..*error }))
 }
 
 fn check_crop(crop: Option<Rect>, width: u32, height: u32) -> Result<(), Box<Diagnostic>> {
@@ -287,16 +317,13 @@ fn check_crop(crop: Option<Rect>, width: u32, height: u32) -> Result<(), Box<Dia
             && rect.y.checked_add(rect.height).is_some_and(|bottom| bottom <= height)
     };
     match crop {
-        Some(rect) if !inside(rect) => Err(Box::new(Diagnostic {
-            severity: Severity::Error,
-            message: format!(
-                "`--crop {},{},{},{}` is not inside the image of {width}×{height} pixels",
-                rect.x, rect.y, rect.width, rect.height
-            ),
-            path: PathBuf::new(),
-            place: None,
-            help: Some("X,Y,W,H are the left edge, top edge, width and height in pixels".to_owned()),
-        })),
+        Some(rect) if !inside(rect) => {
+            let Rect { x, y, width: w, height: h } = rect;
+            let message =
+                format!("`--crop {x},{y},{w},{h}` is not inside the image of {width}×{height} pixels");
+            let help = "X,Y,W,H are the left edge, top edge, width and height in pixels";
+            Err(argument_error(message, help))
+        }
         _ => Ok(()),
     }
 }
@@ -304,16 +331,7 @@ fn check_crop(crop: Option<Rect>, width: u32, height: u32) -> Result<(), Box<Dia
 /// Checks that an image with these settings can be rendered in parts and that exactly one output file is
 /// specified.
 fn check_shardable(settings: &RenderSettings, overrides: &Overrides) -> Result<(), Box<Diagnostic>> {
-    let refused = |message: &str, help: &str| {
-        let (message, help) = (message.to_owned(), Some(help.to_owned()));
-        Err(Box::new(Diagnostic {
-            severity: Severity::Error,
-            message,
-            path: PathBuf::new(),
-            place: None,
-            help,
-        }))
-    };
+    let refused = |message: &str, help: &str| Err(argument_error(message.to_owned(), help));
     if overrides.outputs.len() != 1 {
         return refused("`--shard` needs exactly one output file", "name it, for example -o night.1.part");
     }

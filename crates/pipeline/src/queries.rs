@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::inputs::ProtectedInputs;
+use super::prepare::{ReadyScene, RequestCamera};
 use super::protocol::{
     CameraSaveResult, Event, ImagePosition, MovedCamera, PickedObject, PickedPixel, ResolvedCamera,
     SavedCameraEdit,
@@ -20,6 +21,7 @@ use crate::messages::{
     ALREADY_EXISTS, CAMERA_CHANGED, MODEL_MISSING, NOT_UNDONE, SCENE_FILE_CHANGED, SCENE_FILE_MISSING,
 };
 use crate::output::{AttributeLossPolicy, OutputError, write};
+use crate::scene::description::CameraOverrides;
 use crate::scene::{LoadedScene, read_current_text};
 use crate::system::{describe_error, file};
 use crate::world::World;
@@ -49,18 +51,30 @@ impl QueryOrEdit {
 }
 
 /// Scene, world and settings of the current image, used to answer queries.
-#[derive(Clone)]
 pub(super) struct QueryContext {
-    pub(super) parsed: Arc<ParsedScene>,
+    parsed: Arc<ParsedScene>,
     /// Scene key overrides from the command line.
-    pub(super) sets: Vec<String>,
-    pub(super) world: Arc<World>,
-    pub(super) settings: RenderSettings,
+    sets: Vec<String>,
+    world: Arc<World>,
+    settings: RenderSettings,
     /// The scene's camera.
-    pub(super) own: ResolvedCamera,
+    own: ResolvedCamera,
 }
 
 impl QueryContext {
+    /// Creates the context for a scene's image. `sets` contains scene key overrides from the command line.
+    pub(super) fn new(scene: &ReadyScene, sets: &[String]) -> Self {
+        let (parsed, plan) = (&scene.assets.parsed, &scene.plan);
+        let own = RequestCamera::new(&plan.scene, parsed.orbiter, &CameraOverrides::default());
+        Self {
+            parsed: Arc::clone(parsed),
+            sets: sets.to_vec(),
+            world: Arc::clone(&scene.world),
+            settings: plan.settings,
+            own: own.resolved_camera(),
+        }
+    }
+
     pub(super) fn run(
         &self,
         query: &QueryOrEdit,

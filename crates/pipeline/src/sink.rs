@@ -31,14 +31,6 @@ impl EventSink {
         Self { generation, listener: Arc::new(drop), previews: PreviewSlot::default() }
     }
 
-    /// Creates a sink, and a channel that receives its events.
-    #[cfg(test)]
-    pub(super) fn with_channel(generation: u64) -> (Self, std::sync::mpsc::Receiver<Event>) {
-        let (sender, events) = std::sync::mpsc::channel();
-        let listener = Arc::new(move |event| drop(sender.send(event)));
-        (Self { generation, listener, previews: PreviewSlot::default() }, events)
-    }
-
     pub(super) fn send(&self, event: Event) {
         (self.listener)(event);
     }
@@ -99,28 +91,17 @@ impl EventSink {
         source: PreviewedImageState,
     ) {
         let (generation, picture, source) = (self.generation, Arc::new(picture), Some(source));
-        self.replace_preview_and_notify(PreviewUpdate {
-            generation,
-            picture,
-            range,
-            section,
-            lacks_photons: false,
-            source,
-        });
+        let lacks_photons = false;
+        let update = PreviewUpdate { generation, picture, range, section, lacks_photons, source };
+        self.replace_preview_and_notify(update);
     }
 
     /// Sends a preview without light from photons, before the photons are traced.
     pub(super) fn send_preview_without_photons(&self, picture: Srgb8Image) {
-        let (generation, picture) = (self.generation, Arc::new(picture));
+        let (generation, picture, lacks_photons) = (self.generation, Arc::new(picture), true);
         let (range, section, source) = (None, None, None);
-        self.replace_preview_and_notify(PreviewUpdate {
-            generation,
-            picture,
-            range,
-            section,
-            lacks_photons: true,
-            source,
-        });
+        let update = PreviewUpdate { generation, picture, range, section, lacks_photons, source };
+        self.replace_preview_and_notify(update);
     }
 
     fn replace_preview_and_notify(&self, latest: PreviewUpdate) {
@@ -161,10 +142,11 @@ const PARTS: u64 = 100;
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::tests::sink_with_channel;
 
     #[test]
     fn asset_progress_is_throttled_and_completes() {
-        let (sink, received) = EventSink::with_channel(3);
+        let (sink, received) = sink_with_channel(3);
         let load = |progress: &(dyn Fn(u64, u64) + Sync)| -> Result<(), ()> {
             for done in 0..10_000 {
                 progress(done, 10_000);
@@ -189,7 +171,7 @@ mod tests {
 
     #[test]
     fn failed_asset_does_not_report_completion() {
-        let (sink, received) = EventSink::with_channel(3);
+        let (sink, received) = sink_with_channel(3);
         sink.load_asset_with_progress("bricks", |_| -> Result<(), ()> { Err(()) }).expect_err("failed");
         drop(sink);
         let ends = received.into_iter().filter(

@@ -9,15 +9,24 @@ use crate::system::cpu_time::process_cpu_seconds;
 
 /// Runs the stages of one request and records their reports.
 pub(super) struct StageRunner<'a> {
-    pub(super) sink: &'a EventSink,
+    sink: &'a EventSink,
     /// Token for pausing work. Pauses do not count toward stage times.
     pub(super) token: &'a CancelToken,
     pub(super) stages: Vec<StageReport>,
     /// Whether events are suppressed.
-    pub(super) is_silent: bool,
+    is_silent: bool,
 }
 
-impl StageRunner<'_> {
+impl<'a> StageRunner<'a> {
+    pub(super) fn new(sink: &'a EventSink, token: &'a CancelToken) -> Self {
+        Self { sink, token, stages: Vec::new(), is_silent: false }
+    }
+
+    /// Creates a runner that does not report the stages.
+    pub(super) fn silent(sink: &'a EventSink, token: &'a CancelToken) -> Self {
+        Self { is_silent: true, ..Self::new(sink, token) }
+    }
+
     /// Runs a stage and reports its start and end.
     ///
     /// # Errors

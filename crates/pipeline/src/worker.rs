@@ -1,4 +1,4 @@
-//! The worker thread, which owns the engine, and its handle for front ends.
+//! The worker thread, which owns the session, and its handle for front ends.
 //!
 //! The mailbox has room for one pending request. A newer request replaces it and cancels the current request.
 //! A single lock protects the token and the mailbox, so that no cancellation is lost between requests.
@@ -11,9 +11,11 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use super::engine::{Engine, EngineConfig, Interruption, PendingCommands, RequestContext};
 use super::protocol::{Command, Event, Failure, MaxPreviewSize, PreviewSlot, Request, WriteRequirement};
 use super::queries::QueryOrEdit;
+use super::render::checkpointer::Interruption;
+use super::render::commands::PendingCommands;
+use super::session::{RequestContext, Session, SessionConfig};
 use super::settings::Overrides;
 use super::sink::{EventListener, EventSink};
 use super::watch::content::FileHashCache;
@@ -33,7 +35,7 @@ pub fn start(
     contents: Arc<FileHashCache>,
     listener: impl Fn(Event) + Send + Sync + 'static,
 ) -> std::io::Result<Handle> {
-    start_with_config(EngineConfig { nice, ..EngineConfig::default() }, contents, Arc::new(listener))
+    start_with_config(SessionConfig { nice, ..SessionConfig::default() }, contents, Arc::new(listener))
 }
 
 /// Starts a worker thread, and returns a channel that receives its events.
@@ -41,22 +43,14 @@ pub fn start(
 /// # Errors
 /// The system cannot start a thread.
 pub fn start_with_channel(nice: u8) -> std::io::Result<(Handle, Receiver<Event>)> {
-    start_with_config_and_channel(EngineConfig { nice, ..EngineConfig::default() }, Arc::default())
-}
-
-/// Like [`start_with_channel`], with this configuration and cache of file hashes.
-pub(super) fn start_with_config_and_channel(
-    config: EngineConfig,
-    contents: Arc<FileHashCache>,
-) -> std::io::Result<(Handle, Receiver<Event>)> {
     let (sender, events) = mpsc::channel();
     // Ignore a disconnected front end.
-    let listener = move |event| drop(sender.send(event));
-    Ok((start_with_config(config, contents, Arc::new(listener))?, events))
+    Ok((start(nice, Arc::default(), move |event| drop(sender.send(event)))?, events))
 }
 
-fn start_with_config(
-    config: EngineConfig,
+/// Starts a worker with this configuration.
+pub(super) fn start_with_config(
+    config: SessionConfig,
     contents: Arc<FileHashCache>,
     listener: EventListener,
 ) -> std::io::Result<Handle> {
@@ -304,7 +298,7 @@ impl PendingCommands for CommandSender {
         self.lock().queries.pop_front()
     }
 
-    fn cancellation_cause(&self) -> Interruption {
+    fn interruption(&self) -> Interruption {
         let mailbox = self.lock();
         match (mailbox.suspended, mailbox.quit) {
             (true, _) => Interruption::Ended,
@@ -318,40 +312,40 @@ struct Worker {
     remote: CommandSender,
     contents: Arc<FileHashCache>,
     previews: PreviewSlot,
-    config: EngineConfig,
+    config: SessionConfig,
 }
 
 impl Worker {
     fn run_loop(self) {
         let _last_words = PanicReporter(&self.remote);
-        let mut engine = Engine::new(self.config, self.contents.clone());
+        let mut session = Session::new(self.config, self.contents.clone());
         let listener = self.remote.listener.clone();
         let mut sink = EventSink { generation: 0, listener, previews: self.previews.clone() };
         loop {
             let outcome = match self.remote.wait_for_next_task() {
                 Task::Quit => {
-                    engine.checkpoint_saved_scene_image(&sink, self.remote.cancellation_cause());
+                    session.checkpoint_own_image(&sink, self.remote.interruption());
                     break;
                 }
                 Task::Write
-                    if self.remote.try_postpone_write_to_pending(engine.has_sample_in_every_pixel()) =>
+                    if self.remote.try_postpone_write_to_pending(session.has_sample_in_every_pixel()) =>
                 {
                     continue;
                 }
-                Task::Write => catch_unwind(AssertUnwindSafe(|| engine.write_now(&sink))),
+                Task::Write => catch_unwind(AssertUnwindSafe(|| session.write_now(&sink))),
                 Task::Preview(size, token) => {
-                    catch_unwind(AssertUnwindSafe(|| engine.send_resized_preview(size, &sink, &token)))
+                    catch_unwind(AssertUnwindSafe(|| session.send_resized_preview(size, &sink, &token)))
                 }
-                Task::Query(query) => catch_unwind(AssertUnwindSafe(|| engine.answer_query(&query, &sink))),
+                Task::Query(query) => catch_unwind(AssertUnwindSafe(|| session.answer_query(&query, &sink))),
                 Task::Render(request, token, writing) => {
                     sink.generation = request.generation;
-                    let context = RequestContext::new(&token, &writing, &self.remote);
-                    catch_unwind(AssertUnwindSafe(|| engine.handle_request(&request, &sink, &context)))
+                    let context = RequestContext::new(&request, &sink, &token, &writing, &self.remote);
+                    catch_unwind(AssertUnwindSafe(|| session.handle_request(&context)))
                 }
             };
             if let Err(payload) = outcome {
-                // Discard the engine's state, which may be inconsistent after a panic.
-                engine = Engine::new(self.config, self.contents.clone());
+                // Discard the session's state, which may be inconsistent after a panic.
+                session = Session::new(self.config, self.contents.clone());
                 let failure = Failure::Work(format!("internal error: {}", panic_reason(payload.as_ref())));
                 sink.send(Event::Failed { generation: sink.generation, failure });
             }
@@ -384,17 +378,7 @@ mod tests {
     use crate::settings::ViewMode;
 
     fn render(generation: u64) -> Command {
-        Command::Render(Box::new(Request {
-            generation,
-            scene: "a.toml".into(),
-            overrides: Default::default(),
-            preview: None,
-            write: WriteRequirement::No,
-            own: None,
-            saves: 0,
-            force: false,
-            first: None,
-        }))
+        Command::Render(Box::new(Request::new(generation, "a.toml".into(), Overrides::default())))
     }
 
     fn silent_sender() -> CommandSender {
@@ -410,7 +394,7 @@ mod tests {
 
     #[test]
     fn panicking_worker_reports_failure() {
-        let (sink, received) = EventSink::with_channel(0);
+        let (sink, received) = crate::tests::sink_with_channel(0);
         let remote = CommandSender { mailbox: Arc::default(), listener: sink.listener };
         remote.send(render(7));
         let panicking = remote;

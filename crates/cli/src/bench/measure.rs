@@ -12,8 +12,8 @@ use super::table::{format_error_or_near_zero, format_samples_with_unit};
 use super::time_budget::TimeBudget;
 use crate::compare::IndependentReferences;
 use crate::film::RadianceImage;
+use crate::pipeline::headless::{HeadlessSession, RenderedImage};
 use crate::pipeline::protocol::{Failure, Report, Stage};
-use crate::pipeline::session::{HeadlessSession, RenderedImage};
 use crate::pipeline::settings::Overrides;
 use crate::pipeline::words;
 

@@ -8,7 +8,7 @@ use super::results::ReferenceResult;
 use crate::compare::{IndependentReferences, Pair};
 use crate::control::CancelToken;
 use crate::pipeline::BUILD;
-use crate::pipeline::session::{HeadlessSession, RenderedImage};
+use crate::pipeline::headless::{HeadlessSession, RenderedImage};
 use crate::pipeline::settings::Overrides;
 use crate::scene::description::Integrator;
 use crate::scene::diagnostic::Diagnostic;

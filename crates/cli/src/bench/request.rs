@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use super::methods::MethodSweep;
 use super::results::Results;
+use crate::pipeline::headless::AbortReason;
 use crate::pipeline::protocol::Failure;
-use crate::pipeline::session::RenderFailure;
 use crate::pipeline::settings::Overrides;
 use crate::scene::diagnostic::Diagnostic;
 
@@ -110,11 +110,11 @@ pub enum BenchError {
     Cancelled,
 }
 
-impl From<RenderFailure> for BenchError {
-    fn from(why: RenderFailure) -> Self {
+impl From<AbortReason> for BenchError {
+    fn from(why: AbortReason) -> Self {
         match why {
-            RenderFailure::Failed(failure) => Self::Failed(failure),
-            RenderFailure::Cancelled => Self::Cancelled,
+            AbortReason::Failed(failure) => Self::Failed(failure),
+            AbortReason::Cancelled => Self::Cancelled,
         }
     }
 }

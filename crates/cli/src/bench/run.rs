@@ -15,8 +15,8 @@ use super::request::{
 use super::results::{Results, SceneResult, StepResult};
 use super::time_budget::TimeBudget;
 use crate::control::CancelToken;
+use crate::pipeline::headless::HeadlessSession;
 use crate::pipeline::protocol::Failure;
-use crate::pipeline::session::HeadlessSession;
 use crate::pipeline::settings::Overrides;
 use crate::pipeline::words;
 use crate::scene;

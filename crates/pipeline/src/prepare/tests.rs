@@ -3,9 +3,14 @@
 use std::fs;
 
 use super::*;
-use crate::protocol::WriteRequirement;
-use crate::session::NoPendingCommands;
+use crate::control::CancelToken;
+use crate::formats::model::ModelViewOptions;
+use crate::plan::resolve_plan;
+use crate::protocol::Failure;
+use crate::settings::Overrides;
+use crate::sink::EventSink;
 use crate::tests::{OBJ, SCENE};
+use crate::watch::content::FileHashCache;
 use crate::world::{Geometry, MeshTree};
 
 /// Values created by a request.
@@ -16,53 +21,60 @@ struct CreatedValues {
     world: Arc<World>,
 }
 
-/// A scene that is edited and requested repeatedly.
-struct EngineFixture {
+/// A scene that is edited and prepared repeatedly.
+struct SceneFixture {
     folder: tempfile::TempDir,
-    engine: Engine,
+    contents: Arc<FileHashCache>,
+    pool: ThreadPool,
+    scenes: SceneCache,
     text: String,
 }
 
-impl EngineFixture {
+impl SceneFixture {
     fn new(text: &str) -> Self {
         let folder = tempfile::tempdir().expect("a scratch folder");
         fs::write(folder.path().join("one.obj"), OBJ).expect("written");
         fs::write(folder.path().join("skin.ppm"), "P6\n1 1\n255\nabc").expect("written");
-        Self { folder, engine: Engine::new(EngineConfig::default(), Arc::default()), text: text.to_owned() }
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().expect("a pool");
+        let (contents, scenes) = (Arc::default(), SceneCache::default());
+        Self { folder, contents, pool, scenes, text: text.to_owned() }
     }
 
-    /// Requests the current scene and returns the events.
-    fn send(&mut self) -> Vec<Event> {
+    /// Prepares the current scene.
+    fn prepare(&mut self) -> Result<ReadyScene, AbortReason> {
         fs::write(self.folder.path().join("scene.toml"), &self.text).expect("written");
-        self.send_unsaved()
+        self.prepare_unsaved()
     }
 
-    fn send_unsaved(&mut self) -> Vec<Event> {
-        let scene = self.folder.path().join("scene.toml");
-        let (sink, received) = EventSink::with_channel(1);
-        let request = Request {
-            generation: 1,
-            scene,
-            overrides: Default::default(),
-            preview: None,
-            write: WriteRequirement::No,
-            own: None,
-            saves: 0,
-            force: false,
-            first: None,
-        };
-        let token = CancelToken::new();
-        self.engine.handle_request(&request, &sink, &RequestContext::new(&token, &token, &NoPendingCommands));
-        received.try_iter().collect()
+    fn prepare_unsaved(&mut self) -> Result<ReadyScene, AbortReason> {
+        let path = self.folder.path().join("scene.toml");
+        let (sink, token, mut findings) = (EventSink::silent(1), CancelToken::new(), Findings::default());
+        let mut table = StageRunner::silent(&sink, &token);
+        let reader = FileReader { contents: &self.contents, pool: &self.pool, sink: &sink, token: &token };
+        let scenes = &mut self.scenes;
+        let assets = reader.read_consistently(&mut table, &mut findings, |reading| {
+            let scene = SceneParseRequest { path: &path, sets: &[], show: ModelViewOptions::default() };
+            let parsed = scenes.parse(scene, reading)?;
+            let all = TextureSelection::ForImage(TextureRolesNeededByRender::ALL);
+            let assets = scenes.load(&parsed, all, reading)?;
+            match reading.findings.errors.is_empty() {
+                true => Ok(Arc::new(assets)),
+                false => Err(AbortReason::Failed(reading.findings.take_diagnostics_as_failure())),
+            }
+        });
+        let ready = assets.and_then(|assets| {
+            let plan = resolve_plan(&assets.parsed.loaded.scene, &path, &Overrides::default())?;
+            scenes.build(assets, plan, &CameraOverrides::default(), &mut table, &self.pool)
+        });
+        self.scenes.end_request(ready.is_ok());
+        ready
     }
 
     fn request(&mut self) -> CreatedValues {
-        let events = self.send();
-        assert!(matches!(events.last(), Some(Event::Done { .. })), "{events:?}");
-        let geometry = self.engine.accel.latest().expect("the geometry was built").clone();
+        let ready = self.prepare().expect("a valid scene");
+        let (geometry, lights) = (Arc::clone(&ready.world.geometry), Arc::clone(&ready.world.lights));
         let mesh = geometry.objects()[1].mesh().expect("the second object is a mesh").tree.clone();
-        let lights = self.engine.lights.latest().expect("the lights were collected").clone();
-        CreatedValues { geometry, mesh, lights, world: self.engine.world.latest().expect("a world").clone() }
+        CreatedValues { geometry, mesh, lights, world: ready.world }
     }
 
     /// Returns whether an edit kept the geometry, mesh, lights and world. Compares pointers, not values.
@@ -71,8 +83,6 @@ impl EngineFixture {
         assert!(self.text.contains(from), "{from}");
         self.text = self.text.replace(from, to);
         let after = self.request();
-        assert!(Arc::ptr_eq(&after.world.geometry, &after.geometry), "the world uses the new geometry");
-        assert!(Arc::ptr_eq(&after.world.lights, &after.lights), "the world uses the new lights");
         [
             Arc::ptr_eq(&before.geometry, &after.geometry),
             Arc::ptr_eq(&before.mesh, &after.mesh),
@@ -84,7 +94,7 @@ impl EngineFixture {
 
 #[test]
 fn edits_keep_unaffected_values() {
-    let mut fixture = EngineFixture::new(&format!("{SCENE}[materials.light]\nemission = [0, 0, 0]\n"));
+    let mut fixture = SceneFixture::new(&format!("{SCENE}[materials.light]\nemission = [0, 0, 0]\n"));
     let mut kept = |from: &str, to: &str| fixture.kept(from, to);
     assert_eq!(kept("[camera]", "# a comment\n[camera]"), [true, true, true, true]);
     let settings = "exposure = 0.0\nbackground = [1, 0, 0]\nambient = [1, 1, 1]\nseed = 3\nmax_depth = 2";
@@ -118,7 +128,7 @@ fn edits_keep_unaffected_values() {
 
 #[test]
 fn switching_back_reuses_cached_trees() {
-    let mut fixture = EngineFixture::new(SCENE);
+    let mut fixture = SceneFixture::new(SCENE);
     fs::write(fixture.folder.path().join("two.obj"), format!("{OBJ}f 1 3 2\n")).expect("written");
     let own = fixture.text.clone();
     let before = fixture.request();
@@ -127,12 +137,11 @@ fn switching_back_reuses_cached_trees() {
         assert!(!Arc::ptr_eq(&fixture.request().mesh, &before.mesh));
         if broken {
             fixture.text = own.replace("one.obj", "three.obj");
-            assert!(matches!(fixture.send()[..], [.., Event::Failed { .. }, Event::LastGoodEnded { .. }]));
+            assert!(matches!(fixture.prepare(), Err(AbortReason::Failed(Failure::Scene(_)))));
         }
         fixture.text = own.clone();
         let after = fixture.request();
         assert!(Arc::ptr_eq(&after.geometry, &before.geometry) && Arc::ptr_eq(&after.mesh, &before.mesh));
-        assert!(Arc::ptr_eq(&after.world.geometry, &before.geometry), "the world uses the cached trees");
     }
 }
 
@@ -140,63 +149,40 @@ fn switching_back_reuses_cached_trees() {
 fn unchanged_textures_are_kept() {
     let other = "[textures.bark]\nfile = \"bark.ppm\"\n[materials.trunk]\ndiffuse = { texture = \"bark\" }\n\
                  [[sphere]]\ncenter = [1, 1, 0]\nradius = 0.2\nmaterial = \"trunk\"\n";
-    let mut fixture = EngineFixture::new(&format!("{SCENE}{other}"));
-    let write = |fixture: &EngineFixture, text: &str| {
+    let mut fixture = SceneFixture::new(&format!("{SCENE}{other}"));
+    let write = |fixture: &SceneFixture, text: &str| {
         fs::write(fixture.folder.path().join("bark.ppm"), format!("P6\n1 1\n255\n{text}")).expect("written");
     };
-    let texels = |fixture: &EngineFixture, name: &str| {
-        fixture.engine.textures.latest(&fixture.folder.path().join(name)).expect("a loaded texture").clone()
+    let texels = |fixture: &mut SceneFixture| {
+        let ready = fixture.prepare().expect("a valid scene");
+        let images = &ready.assets.textures.images;
+        ["skin.ppm", "bark.ppm"].map(|name| {
+            let image = images.iter().find(|(source, _)| source.path.ends_with(name));
+            Arc::clone(&image.expect("a loaded texture").1.texels)
+        })
     };
     write(&fixture, "xyz");
-    fixture.request();
-    let (skin, bark) = (texels(&fixture, "skin.ppm"), texels(&fixture, "bark.ppm"));
+    let [skin, bark] = texels(&mut fixture);
     write(&fixture, "uvw");
-    fixture.request();
-    assert!(Arc::ptr_eq(&texels(&fixture, "skin.ppm"), &skin));
-    assert!(!Arc::ptr_eq(&texels(&fixture, "bark.ppm"), &bark));
+    let [skin_after, bark_after] = texels(&mut fixture);
+    assert!(Arc::ptr_eq(&skin_after, &skin) && !Arc::ptr_eq(&bark_after, &bark));
 }
 
 #[test]
 fn error_mentions_the_renamed_scene() {
-    let mut fixture = EngineFixture::new(SCENE);
+    let mut fixture = SceneFixture::new(SCENE);
     fixture.request();
     let renamed = fixture.folder.path().join("third.toml");
     fs::rename(fixture.folder.path().join("scene.toml"), &renamed).expect("renamed");
-    let help = |events: Vec<Event>| {
-        let of_scene = |event| match event {
-            Event::Failed { failure: Failure::Scene(errors), .. } => errors.into_iter().next()?.help,
-            _ => None,
-        };
-        events.into_iter().find_map(of_scene).expect("an error with a hint")
+    let mut help = || match fixture.prepare_unsaved() {
+        Err(AbortReason::Failed(Failure::Scene(errors))) => errors[0].help.clone().expect("a hint"),
+        Err(other) => panic!("{other:?}"),
+        Ok(_) => panic!("the scene should be missing"),
     };
-    let found = help(fixture.send_unsaved());
+    let found = help();
     let is_same_text = |help: &str| help.contains(crate::scene::SAME_TEXT);
     assert!(found.contains("third.toml") && is_same_text(&found), "{found}");
     fs::write(&renamed, "another text").expect("written");
-    let other = help(fixture.send_unsaved());
+    let other = help();
     assert!(!is_same_text(&other), "{other}");
-}
-
-#[test]
-fn check_never_mixes_file_versions() {
-    for (renamed, is_moved) in
-        [(SCENE.replace("radius = 0.5", "radius = 0.6"), false), (SCENE.replace("skin.ppm", "new.ppm"), true)]
-    {
-        let mut fixture = EngineFixture::new(SCENE);
-        let at = |name: &str| fixture.folder.path().join(name);
-        let scene = at("scene.toml");
-        fs::write(&scene, SCENE).expect("written");
-        // The scene is replaced while its mesh is being read. In the second case, the texture has been
-        // renamed and the file with the old name is invalid.
-        if is_moved {
-            fs::rename(at("skin.ppm"), at("new.ppm")).expect("renamed");
-            fs::write(at("skin.ppm"), "P6\n").expect("written");
-        }
-        let replacement = (scene.clone(), renamed.clone().into_bytes());
-        fixture.engine.contents.replacements.lock().expect("not poisoned").insert(at("one.obj"), replacement);
-        let sink = EventSink::silent(1);
-        let read = fixture.engine.load_scene_and_all_assets(&scene, &[], &sink, &CancelToken::new());
-        let (parsed, ..) = read.expect("a valid scene");
-        assert_eq!(parsed.loaded.source.file_text(), renamed);
-    }
 }

@@ -2,6 +2,7 @@
 
 use super::film_state::FilmState;
 use crate::scene::fingerprint::Fingerprint;
+use crate::stages::AbortReason;
 
 /// Memory limit for all films except the current one.
 const MAX_KEPT_BYTES: u64 = 256 << 20;
@@ -28,6 +29,14 @@ impl Default for FilmCache {
 impl FilmCache {
     pub(crate) fn current(&self) -> Option<&FilmState> {
         self.current.as_ref()
+    }
+
+    /// Returns the current film.
+    ///
+    /// # Errors
+    /// There is no film.
+    pub(crate) fn existing(&self) -> Result<&FilmState, AbortReason> {
+        self.current().ok_or_else(|| AbortReason::work_failure("the film is missing"))
     }
 
     pub(crate) fn current_mut(&mut self) -> Option<&mut FilmState> {

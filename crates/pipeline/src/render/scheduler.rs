@@ -6,6 +6,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use super::checkpointer::Checkpointer;
+use super::commands::RenderCommands;
 use super::film_state::{EarlierProcessWork, FilmState};
 use super::first_picture::CoarseImageRenderer;
 use super::forecast::{Forecast, RenderSnapshot};
@@ -16,9 +17,9 @@ use super::time_budget::next_round_goals;
 use crate::film::{BrightnessPrepassPixels, PREPASS_SAMPLES, Rect, TILE_SIZE, TileSamples};
 use crate::integrators::{PhotonMaps, RayCounters};
 use crate::plan::RenderPlan;
-use crate::protocol::{MaxPreviewSize, NormalizedRect};
+use crate::protocol::NormalizedRect;
 use crate::scene::description::RenderOptions;
-use crate::sink::EventSink;
+use crate::scene::fingerprint::Fingerprint;
 use crate::stages::AbortReason;
 use crate::stages::photons::{PhotonContext, PhotonStore};
 use crate::stopwatch::PausableClock;
@@ -33,36 +34,45 @@ const PREVIEW_SHARE: u32 = 10;
 
 /// Inputs of the render stage.
 pub(crate) struct RenderStageInputs<'a> {
+    pub(crate) film: FilmRequest,
     pub(crate) tracer: Tracer<'a>,
     pub(crate) plan: &'a RenderPlan,
     /// The scene's photons, if the image uses them.
     pub(crate) photons: Option<&'a PhotonStore>,
-    pub(crate) preview: Option<MaxPreviewSize>,
-    pub(crate) most_film_bytes: u64,
-    /// Whether to start with an empty film even if a film is cached.
-    pub(crate) force: bool,
-    /// Section to render first.
-    pub(crate) first: Option<NormalizedRect>,
-    pub(crate) sink: &'a EventSink,
-    /// Handles commands during the render. It is called often. Its arguments are the current film and whether
-    /// every pixel has a sample.
-    pub(crate) pulse: &'a dyn Fn(&FilmState, bool),
-    /// Takes a pending command to change the preview size.
-    pub(crate) take_preview: &'a dyn Fn() -> Option<Option<MaxPreviewSize>>,
-    /// Whether the camera is being moved. If so, the first image must appear quickly, even if it is small.
-    pub(crate) is_moved: bool,
-    /// Speed at which the most recent first image was rendered, in pixels per second.
-    pub(crate) coarse_rate: &'a Cell<Option<f64>>,
-    /// Share of the image to render, or `None` for the whole image.
-    pub(crate) share: Option<Shard>,
+    pub(crate) display: DisplayOptions<'a>,
+    pub(crate) commands: &'a RenderCommands<'a>,
     /// Checkpointer, if the render uses checkpoints.
     pub(crate) checkpointer: Option<&'a Checkpointer<'a>>,
 }
 
+/// The film to render.
+pub(crate) struct FilmRequest {
+    pub(crate) key: Fingerprint,
+    /// Share of the image to render, or `None` for the whole image.
+    pub(crate) share: Option<Shard>,
+    /// Whether to start with an empty film even if a film is cached.
+    pub(crate) force: bool,
+    /// Maximum size of the film in bytes.
+    pub(crate) most_bytes: u64,
+}
+
+/// How a render is displayed.
+#[derive(Clone, Copy)]
+pub(crate) struct DisplayOptions<'a> {
+    /// Sender of previews, with their size when the render starts.
+    pub(crate) screen: PreviewSender<'a>,
+    /// Section to render first.
+    pub(crate) first: Option<NormalizedRect>,
+    /// Whether the camera is being moved. If so, the first image must appear quickly, even if it is small.
+    pub(crate) is_moved: bool,
+    /// Speed at which the most recent first image was rendered, in pixels per second.
+    pub(crate) coarse_rate: &'a Cell<Option<f64>>,
+}
+
 /// Runs passes and rounds over a film. Reports progress and sends previews between tiles.
-pub(crate) struct Scheduler<'a> {
-    pub(crate) state: &'a mut FilmState,
-    rendering: &'a RenderStageInputs<'a>,
+pub(crate) struct Scheduler<'s, 'a> {
+    pub(crate) state: &'s mut FilmState,
+    rendering: &'s RenderStageInputs<'a>,
     screen: PreviewSender<'a>,
     clock: PausableClock,
     forecast: Forecast,
@@ -80,17 +90,18 @@ pub(crate) struct Scheduler<'a> {
     next_preview: Instant,
 }
 
-impl<'a> Scheduler<'a> {
-    pub(crate) fn new(state: &'a mut FilmState, rendering: &'a RenderStageInputs<'a>) -> Self {
+impl<'s, 'a> Scheduler<'s, 'a> {
+    pub(crate) fn new(state: &'s mut FilmState, rendering: &'s RenderStageInputs<'a>) -> Self {
         let units = state.total_pixel_samples();
-        let bounds = (rendering.take_preview)().unwrap_or(rendering.preview);
+        let screen = rendering.display.screen;
+        let bounds = rendering.commands.pending.take_preview_resize().unwrap_or(screen.bounds);
         let forecast = Forecast::new(state, rendering.plan.settings.render.samples);
         let EarlierProcessWork { rays, seconds: seconds_before } = std::mem::take(&mut state.before);
         Self {
             is_first: !state.has_sampled_all_pixels(),
             state,
             rendering,
-            screen: PreviewSender { bounds, plan: rendering.plan, sink: rendering.sink },
+            screen: PreviewSender { bounds, ..screen },
             clock: PausableClock::start(),
             forecast,
             units,
@@ -112,7 +123,8 @@ impl<'a> Scheduler<'a> {
         let ran = self.run_passes_to_end();
         let (traced, seconds) = (self.rays_of_all_requests(), self.seconds_across_requests());
         if let (Some(checkpointer), Err(AbortReason::Cancelled)) = (self.rendering.checkpointer, &ran) {
-            self.state.is_kept = checkpointer.save_if_cancelled(self.state, traced, seconds);
+            let interruption = self.rendering.commands.pending.interruption();
+            self.state.is_kept = checkpointer.save_if_cancelled(self.state, traced, seconds, interruption);
         }
         self.state.traced = traced;
         ran
@@ -171,7 +183,7 @@ impl<'a> Scheduler<'a> {
     /// Returns the pixels to render first.
     fn priority_rect(&self) -> Option<Rect> {
         let RenderOptions { width, height, .. } = self.rendering.plan.settings.render;
-        self.rendering.first.map(|section| section.pixels((width, height)))
+        self.rendering.display.first.map(|section| section.pixels((width, height)))
     }
 
     /// Renders a prepass over the whole image, even if this process renders only a share of it.
@@ -273,8 +285,9 @@ impl<'a> Scheduler<'a> {
         photons: &PhotonStore,
         samples: Range<u32>,
     ) -> Result<PhotonMaps, AbortReason> {
-        let RenderStageInputs { plan, sink, tracer, .. } = *self.rendering;
+        let RenderStageInputs { plan, tracer, .. } = *self.rendering;
         let Tracer { pool, world, token, .. } = tracer;
+        let sink = self.screen.sink;
         let begin = self.clock.update_active_seconds(token.is_paused());
         self.forecast.begin_photons_at(begin);
         let maps =
@@ -352,13 +365,13 @@ impl<'a> Scheduler<'a> {
             self.next_progress = now + PROGRESS_INTERVAL;
             self.report_progress(false);
         }
-        if let Some(bounds) = (self.rendering.take_preview)() {
+        if let Some(bounds) = self.rendering.commands.pending.take_preview_resize() {
             (self.screen.bounds, self.next_preview) = (bounds, now);
         }
         if now >= self.next_preview && self.screen.update_briefly_and_send(self.state) {
             self.next_preview = Instant::now() + PREVIEW_INTERVAL.max(now.elapsed() * PREVIEW_SHARE);
         }
-        (self.rendering.pulse)(self.state, !self.is_first);
+        self.rendering.commands.run_pending(Some(self.state), !self.is_first);
         let seconds = self.total_render_seconds();
         if let Some(checkpointer) = self.rendering.checkpointer {
             let rendered = self.seconds_across_requests();
@@ -377,14 +390,15 @@ impl<'a> Scheduler<'a> {
     /// Reports the render's progress and expected end.
     fn report_progress(&mut self, is_last: bool) {
         let elapsed_seconds = self.clock.update_active_seconds(self.rendering.tracer.token.is_paused());
-        let RenderStageInputs { plan, photons, sink, .. } = *self.rendering;
+        let RenderStageInputs { plan, photons, .. } = *self.rendering;
         let (state, units, is_first) = (&*self.state, self.units, self.is_first);
         let moment = RenderSnapshot { state, plan, photons, elapsed_seconds, units, is_first, is_last };
-        sink.send_progress(self.forecast.progress_and_predictions(&moment));
+        self.screen.sink.send_progress(self.forecast.progress_and_predictions(&moment));
     }
 
     fn coarse_image_renderer(&self) -> CoarseImageRenderer<'a> {
-        let RenderStageInputs { tracer, plan, is_moved, coarse_rate: rate, .. } = *self.rendering;
+        let RenderStageInputs { tracer, plan, .. } = *self.rendering;
+        let DisplayOptions { is_moved, coarse_rate: rate, .. } = self.rendering.display;
         CoarseImageRenderer { tracer, plan, is_moved, rate }
     }
 

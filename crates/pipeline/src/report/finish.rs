@@ -1,6 +1,6 @@
 //! Creates and writes reports.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use super::{ImageReport, LightSamplingReport, PhotonsReport, Report, SampledLightSet, WorkCounters};
 use crate::control::CancelToken;
@@ -10,24 +10,21 @@ use crate::integrators::{RayCounters, light_sampling_purpose};
 use crate::output::write::{ExistingFilePolicy, atomic_with_policy};
 use crate::output::{OutputError, json};
 use crate::plan::RenderPlan;
+use crate::prepare::ReadyScene;
 use crate::protocol::StageReport;
 use crate::render::film_cache::FilmCache;
 use crate::render::film_state::FilmState;
 use crate::sink::EventSink;
 use crate::targets::{OutputTarget, write_guarded};
-use crate::world::World;
 
 /// Results of a request.
 #[derive(Clone, Copy)]
 pub(crate) struct RequestResults<'a> {
-    pub(crate) scene: &'a Path,
+    pub(crate) scene: &'a ReadyScene,
     pub(crate) plan: &'a RenderPlan,
-    pub(crate) world: &'a World,
     pub(crate) state: &'a FilmState,
     pub(crate) films: &'a FilmCache,
     pub(crate) rays: RayCounters,
-    pub(crate) texels_loaded: u64,
-    pub(crate) texture_memory_bytes: u64,
     pub(crate) photons: Option<PhotonsReport>,
     pub(crate) is_written: bool,
 }
@@ -35,7 +32,7 @@ pub(crate) struct RequestResults<'a> {
 pub(crate) fn make_report(finished: &RequestResults<'_>, stages: Vec<StageReport>, seconds: f64) -> Report {
     Report {
         glimt: env!("CARGO_PKG_VERSION"),
-        scene: finished.scene.to_string_lossy().into_owned(),
+        scene: finished.scene.assets.parsed.loaded.path.to_string_lossy().into_owned(),
         image: image_report(finished),
         settings: finished.plan.effective.clone(),
         lights: light_sampling_report(finished),
@@ -66,16 +63,15 @@ pub(crate) fn write_report(
     write_guarded(plan, inputs, target, sink, |guard| atomic_with_policy(path, text.as_bytes(), guard, token))
 }
 
-/// Removes the report for an earlier image after an unfinished image has replaced that image. Does not remove
-/// files that a report must not replace.
-///
-/// # Errors
-/// The file cannot be removed. The error contains the file name.
-pub(crate) fn remove_stale_report(
-    plan: &RenderPlan,
-    inputs: &ProtectedInputs,
-    sink: &EventSink,
-) -> Result<(), OutputError> {
+/// Removes the report for an earlier image after another image has replaced that image. Does not remove files
+/// that a report must not replace. Reports failures as events.
+pub(crate) fn remove_outdated_report(plan: &RenderPlan, inputs: &ProtectedInputs, sink: &EventSink) {
+    if let Err(error) = remove_report(plan, inputs, sink) {
+        sink.send_write_failed(None, format!("the report describes an earlier image: {error}"));
+    }
+}
+
+fn remove_report(plan: &RenderPlan, inputs: &ProtectedInputs, sink: &EventSink) -> Result<(), OutputError> {
     let Some(path) = plan.report.as_ref().filter(|path| path.is_file()) else { return Ok(()) };
     let failed = |source| OutputError::File { path: path.clone(), source };
     let remove = |guard: &ExistingFilePolicy<'_>| {
@@ -105,7 +101,7 @@ fn image_report(finished: &RequestResults<'_>) -> ImageReport {
 }
 
 fn light_sampling_report(finished: &RequestResults<'_>) -> LightSamplingReport {
-    let lights = &finished.world.lights;
+    let lights = &finished.scene.world.lights;
     let settings = &finished.plan.settings;
     let samples = u64::from(settings.render.shadow_samples);
     let are_gathered =
@@ -134,7 +130,8 @@ fn data_view_value_range(finished: &RequestResults<'_>) -> Option<[f32; 2]> {
 }
 
 fn count_work(finished: &RequestResults<'_>) -> WorkCounters {
-    let (world, rays) = (finished.world, finished.rays);
+    let (world, textures) = (&finished.scene.world, &finished.scene.assets.textures);
+    let rays = finished.rays;
     WorkCounters {
         triangles: world.triangle_count(),
         objects: world.object_count(),
@@ -145,8 +142,8 @@ fn count_work(finished: &RequestResults<'_>) -> WorkCounters {
         scattered_rays: rays.scattered_rays,
         photons_emitted: finished.photons.map_or(0, |photons| photons.emitted),
         photons_stored: finished.photons.map_or(0, |photons| photons.stored),
-        texels_loaded: finished.texels_loaded,
-        texture_memory_bytes: finished.texture_memory_bytes,
+        texels_loaded: textures.texels_loaded,
+        texture_memory_bytes: textures.memory_bytes,
         texture_lookups: rays.texture_lookups + finished.photons.map_or(0, |photons| photons.lookups),
         non_finite_samples: finished.state.film.non_finite_samples(),
         accel_memory_bytes: world.accel_memory_bytes() as u64,

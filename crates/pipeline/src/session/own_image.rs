@@ -1,67 +1,60 @@
 //! The scene's own image, which is the saved scene rendered with the command-line overrides. While the user
 //! changes settings with keys to view other images, its film, checkpoint and files are kept.
 
+use std::cell::RefCell;
 use std::sync::Arc;
 
-use super::orders::Interruption;
-use super::{Engine, ReadyScene};
-use crate::assembly::RequestCamera;
-use crate::control::CancelToken;
 use crate::identity::ImageDependencies;
+use crate::inputs::ProtectedInputs;
 use crate::keys;
 use crate::memory::MemoryEstimate;
-use crate::output::part::NamedRenderInput;
-use crate::plan::{RenderPlan, resolve_plan};
-use crate::protocol::{Failure, Request, SavedSceneImageState, Status, WriteRequirement, reasons};
-use crate::render::checkpointer::{CheckpointContext, Checkpointer};
+use crate::plan::{RenderPlan, RequestPlans};
+use crate::prepare::{ReadyScene, RequestCamera, SceneAssets};
+use crate::protocol::{Request, SavedSceneImageState, WriteRequirement};
+use crate::render::checkpointer::{CheckpointContext, CheckpointLock, Checkpointer};
+use crate::render::film_cache::FilmCache;
 use crate::render::film_state::FilmState;
 use crate::render::share::Shard;
 use crate::scene::description::CameraOverrides;
 use crate::scene::fingerprint::{Fingerprint, FingerprintHasher};
 use crate::settings::{CheckpointSettings, Overrides, ResumeMode};
 use crate::sink::EventSink;
-use crate::stages::parse::ParsedScene;
-use crate::stages::write::{ImageWriteContext, image_encoding_settings, write_if_wanted};
-use crate::stages::{AbortReason, StageResult};
-use crate::watch::content::FilePathAndContentId;
-use crate::world::TextureRolesNeededByRender;
+use crate::stages::AbortReason;
+use crate::stages::write::{WrittenImages, image_encoding_settings};
 
-/// The scene's own image for the newest request.
+/// The scene's own image for one version of the scene.
 pub(super) struct SavedSceneImage {
     /// Key of the film.
     pub(super) film: Fingerprint,
     /// Key for the finished image and its output files.
     pub(super) image: Fingerprint,
-    parsed: Arc<ParsedScene>,
+    assets: Arc<SceneAssets>,
     pub(super) plan: RenderPlan,
     camera: CameraOverrides,
-    /// Files that the image depends on.
-    files: Vec<FilePathAndContentId>,
     /// Share of the image that this process renders, or `None` for the whole image.
     pub(super) share: Option<Shard>,
 }
 
 impl SavedSceneImage {
-    /// Computes the keys for the scene's own image. `eye` is the scene's camera. `surfaces` and `meshes` are
-    /// the keys for the surfaces and meshes.
-    pub(super) fn new(
-        (parsed, plan, eye): (&Arc<ParsedScene>, RenderPlan, &RequestCamera),
-        (surfaces, meshes): (&Fingerprint, &[Fingerprint]),
-        (camera, files): (CameraOverrides, &[FilePathAndContentId]),
-    ) -> Self {
-        let orbiter = eye.orbiter.map(|camera| format!("{camera:?}"));
-        let of = keys::scene_references_for_fingerprint(&plan.scene, meshes, orbiter.as_deref());
-        let world = keys::world_key(surfaces, &eye.camera, &of);
+    /// Computes the keys for the scene's own image. `scene` is the prepared scene of the request, and `plan`
+    /// contains the settings of the scene's own image.
+    pub(super) fn new(scene: &ReadyScene, plan: RenderPlan, camera: CameraOverrides) -> Self {
+        let assets = Arc::clone(&scene.assets);
+        let eye =
+            RequestCamera::new(&plan.scene, assets.parsed.orbiter, &camera).rotated_for_turntable(plan.turn);
+        let (meshes, orbiter) = (assets.mesh_keys(), eye.orbiter_text());
+        let of = keys::scene_references_for_fingerprint(&plan.scene, &meshes, orbiter.as_deref());
+        let world = keys::world_key(&scene.surfaces, &eye.camera, &of);
         let film = keys::film_sums_key(world, &plan.settings, plan.crop);
         let image = image_with_outputs_key(film, &plan);
-        Self { film, image, parsed: Arc::clone(parsed), plan, camera, files: files.to_vec(), share: None }
+        Self { film, image, assets, plan, camera, share: None }
     }
 
-    /// Returns the names and values of everything that affects the image.
-    pub(super) fn dependencies(&self) -> Vec<NamedRenderInput> {
-        let divided = self.share.as_ref().map(|share| share.samples);
-        let Self { parsed, plan, camera, files, .. } = self;
-        ImageDependencies { parsed, plan, camera, files, divided }.names_and_values()
+    /// Returns everything that affects the image.
+    pub(super) fn dependencies(&self) -> ImageDependencies<'_> {
+        let Self { assets, plan, camera, share, .. } = self;
+        let divided = share.as_ref().map(|share| share.samples);
+        ImageDependencies { parsed: &assets.parsed, plan, camera, files: &assets.files, divided }
     }
 }
 
@@ -78,21 +71,49 @@ fn image_with_outputs_key(film: Fingerprint, plan: &RenderPlan) -> Fingerprint {
     key.finish()
 }
 
-impl Engine {
-    /// Sets the scene's own image for a request and keeps its film while other images are rendered.
-    pub(super) fn pin_saved_scene_image(&mut self, mut own: SavedSceneImage) {
-        if self.pins_own {
-            self.films.pin(own.film);
+/// The scene's own image across requests.
+#[derive(Default)]
+pub(super) struct OwnImage {
+    /// The image for the newest request with a valid scene.
+    pub(super) current: Option<SavedSceneImage>,
+    /// Save count from the newest request with a valid scene.
+    saves: u64,
+    /// Whether the film may be dropped while other images are rendered.
+    is_film_expendable: bool,
+    /// Lock on the checkpoint file, and the checkpoints already reported.
+    checkpoint_lock: RefCell<CheckpointLock>,
+}
+
+impl OwnImage {
+    /// Sets the image for a request and keeps its film while other images are rendered.
+    pub(super) fn set(&mut self, mut image: SavedSceneImage, films: &mut FilmCache) {
+        if !self.is_film_expendable {
+            films.pin(image.film);
         }
-        if let Some(before) = self.own.take().filter(|before| before.film == own.film) {
-            own.share = before.share;
+        if let Some(before) = self.current.take().filter(|before| before.film == image.film) {
+            image.share = before.share;
         }
-        self.own = Some(own);
+        self.current = Some(image);
     }
 
-    /// Checks whether a request fits in memory. If the request shows another image, the film of the scene's
-    /// own image also counts. If the two films do not fit together, the film of the scene's own image may be
-    /// dropped, but only if that image has been written.
+    /// Whether the output files contain the current version of the image.
+    pub(super) fn is_written(&self, written: &WrittenImages) -> bool {
+        self.current.as_ref().is_some_and(|own| written.own == Some(own.image))
+    }
+
+    /// Records whether the output files contain the current version of the image.
+    pub(super) fn record_written(&self, is_written: bool, written: &mut WrittenImages) {
+        written.own = self.current.as_ref().filter(|_| is_written).map(|own| own.image);
+    }
+
+    /// Whether the scene has been saved since the last call.
+    pub(super) fn has_been_saved(&mut self, saves: u64) -> bool {
+        std::mem::replace(&mut self.saves, saves) != saves
+    }
+
+    /// Checks whether a request fits in memory, and limits the cached films to the remaining memory. If the
+    /// request shows another image, the film of the scene's own image also counts. If the two films do not fit
+    /// together, the film of the scene's own image may be dropped, but only if that image has been written.
     ///
     /// # Errors
     /// The request needs more memory than is available.
@@ -100,157 +121,60 @@ impl Engine {
         &mut self,
         estimate: &MemoryEstimate,
         request: &Request,
-        plans: (&RenderPlan, Option<&RenderPlan>),
+        plans: &RequestPlans,
+        films: &mut FilmCache,
+        written: &WrittenImages,
     ) -> Result<(), AbortReason> {
-        let (plan, bytes) = (plans.0, self.additional_scene_film_bytes(request, plans));
-        let all = estimate.clone().with_saved_scene_film(bytes).check(plan);
-        self.pins_own = all.is_ok() || !self.is_saved_scene_image_written();
-        let room = if self.pins_own { all? } else { estimate.check(plan)? };
-        if !self.pins_own {
-            self.films.unpin();
+        let bytes = self.additional_film_bytes(request, plans, films);
+        let all = estimate.clone().with_saved_scene_film(bytes).check(&plans.shown);
+        self.is_film_expendable = all.is_err() && self.is_written(written);
+        let room = if self.is_film_expendable { estimate.check(&plans.shown)? } else { all? };
+        if self.is_film_expendable {
+            films.unpin();
         }
-        self.films.set_byte_limit(room);
+        films.set_byte_limit(room);
         Ok(())
     }
 
-    /// Returns the size of the scene's own film in bytes if it is kept in addition to the request's film.
-    fn additional_scene_film_bytes(
-        &self,
-        request: &Request,
-        (plan, own_image_plan): (&RenderPlan, Option<&RenderPlan>),
-    ) -> u64 {
-        let (Some(own), Some(own_image_plan)) = (&self.own, own_image_plan) else { return 0 };
+    /// Returns the size of the film in bytes if it is kept in addition to the request's film.
+    fn additional_film_bytes(&self, request: &Request, plans: &RequestPlans, films: &FilmCache) -> u64 {
+        let (Some(own), Some(own_plan)) = (&self.current, &plans.own) else { return 0 };
         let of = |plan: &RenderPlan| keys::film_sums_key(own.film, &plan.settings, plan.crop);
-        let is_shared = of(plan) == of(own_image_plan)
-            && request.overrides.camera == saved_scene_overrides(request).camera;
-        let state = self.films.get(own.film).filter(|state| state.has_samples() && !is_shared);
+        let is_shared = of(&plans.shown) == of(own_plan)
+            && request.overrides.camera == own_image_overrides(request).camera;
+        let state = films.get(own.film).filter(|state| state.has_samples() && !is_shared);
         state.map_or(0, FilmState::memory_bytes)
     }
 
-    /// If the scene has been saved since the last request, allows its own image to replace an image that was
-    /// written with keyboard changes.
-    pub(super) fn allow_replacing_after_scene_save(&mut self, saves: u64) {
-        if std::mem::replace(&mut self.saves, saves) != saves {
-            self.written.allow_replacing_user_written_image();
-        }
-    }
-
-    /// If the scene's own image is being rendered, records which share of it this process renders.
-    pub(super) fn record_scene_image_shard(&mut self, request: &Request, ready: &ReadyScene) {
-        if let Some(own) = self.own.as_mut().filter(|_| request.own.is_none()) {
-            own.share.clone_from(&ready.share);
-        }
-    }
-
-    /// Reports the state of the scene's own image while another image is shown.
-    pub(super) fn report_saved_scene_image_state(
+    /// Returns the state of the image while a request shows another image with this film.
+    pub(super) fn state(
         &self,
-        request: &Request,
         film: Fingerprint,
-        sink: &EventSink,
-    ) {
-        let Some(own) = self.own.as_ref().filter(|_| request.own.is_some()) else { return };
-        sink.send_saved_scene_image_state(match self.films.get(own.film) {
-            _ if self.is_saved_scene_image_written() => SavedSceneImageState::Written,
+        films: &FilmCache,
+        written: &WrittenImages,
+    ) -> Option<SavedSceneImageState> {
+        let own = self.current.as_ref()?;
+        Some(match films.get(own.film) {
+            _ if self.is_written(written) => SavedSceneImageState::Written,
             Some(state) if state.has_samples() => {
                 SavedSceneImageState::Begun { is_rendering: own.film == film }
             }
             Some(_) | None => SavedSceneImageState::NotBegun,
-        });
+        })
     }
 
-    /// Whether the output files contain the current version of the scene's own image.
-    pub(super) fn is_saved_scene_image_written(&self) -> bool {
-        self.own.as_ref().is_some_and(|own| self.written.own == Some(own.image))
-    }
-
-    /// Records whether the current plan's output files contain the finished image.
-    pub(super) fn record_saved_scene_image_written(&mut self, is_written: bool) {
-        let own = self.own.as_ref().filter(|_| is_written && self.is_own);
-        self.written.own = own.map(|own| own.image);
-    }
-
-    /// Writes the scene's own image if the current view is based on its finished film.
-    ///
-    /// # Errors
-    /// Returns [`AbortReason::Cancelled`] if the token is canceled.
-    pub(super) fn write_image_without_overrides(
-        &mut self,
-        sink: &EventSink,
-        token: &CancelToken,
-    ) -> Result<StageResult<bool>, AbortReason> {
-        let only_shown = || Ok(StageResult::skipped(false, reasons::PREVIEW_ONLY));
-        if self.is_saved_scene_image_written() || self.written.has_user_written_image_on_disk(&self.contents)
-        {
-            return only_shown();
-        }
-        let (Some(own), Some(state), Some(pool)) = (&self.own, self.films.current(), &self.pool) else {
-            return only_shown();
-        };
-        let is_simple = own.plan.layers.is_empty() && own.plan.turn.is_none() && !own.plan.outputs.is_empty();
-        if state.key != own.film || !is_simple || !state.is_finished(&own.plan) {
-            return only_shown();
-        }
-        let to = ImageWriteContext {
-            plan: &own.plan,
-            inputs: &self.inputs,
-            contents: &self.contents,
-            is_own: true,
-            sink,
-        };
-        let written = &mut self.written;
-        let wrote = pool.install(|| write_if_wanted(WriteRequirement::Try, state, to, written, token))?;
-        written.own = wrote.value.then_some(own.image);
-        Ok(StageResult { value: false, status: Status::Skipped, why: reasons::PREVIEW_ONLY.to_owned() })
-    }
-
-    /// Calls `work`, with a checkpointer if `film` belongs to the scene's own image and that image uses
-    /// checkpoints.
-    pub(super) fn with_checkpointer<T>(
-        &self,
-        film: Option<Fingerprint>,
-        sink: &EventSink,
-        interruption: &dyn Fn() -> Interruption,
-        work: impl FnOnce(Option<&Checkpointer<'_>>, &Self) -> T,
-    ) -> T {
-        let own = self.own.as_ref().filter(|own| film == Some(own.film) && uses_checkpoints(&own.plan));
-        let Some((own, output)) = own.and_then(|own| Some((own, own.plan.outputs.first()?))) else {
-            return work(None, self);
-        };
-        let finish = image_encoding_settings(&own.plan);
-        let name = || own.dependencies();
-        let around = CheckpointContext {
-            finish: &finish,
-            inputs: &self.inputs,
-            sink,
-            name: &name,
-            interruption,
-            lock: &self.checkpoint_lock,
-        };
-        work(Some(&Checkpointer::new(output, own.plan.checkpoints, around)), self)
-    }
-
-    /// Removes the checkpoint of the scene's own image after that image has been written.
-    pub(super) fn remove_saved_scene_checkpoint(&self, sink: &EventSink) {
-        let Some(state) = self.own.as_ref().and_then(|own| self.films.get(own.film)) else { return };
-        self.with_checkpointer(Some(state.key), sink, &|| Interruption::Replaced, |checkpointer, _| {
-            if let Some(checkpointer) = checkpointer {
-                checkpointer.detect_own_checkpoint(state);
-                checkpointer.finish(state, state.traced, true);
-            }
-        });
-    }
-
-    /// Saves a checkpoint of the scene's own image if the worker stops while showing another image.
-    pub(crate) fn checkpoint_saved_scene_image(&self, sink: &EventSink, interruption: Interruption) {
-        let Some(own) = self.own.as_ref().filter(|_| !self.is_saved_scene_image_written()) else { return };
-        let Some(state) = self.films.get(own.film).filter(|state| !state.is_kept) else { return };
-        self.with_checkpointer(Some(own.film), sink, &|| interruption, |checkpointer, _| {
-            if let Some(checkpointer) = checkpointer {
-                checkpointer.detect_own_checkpoint(state);
-                checkpointer.save_if_cancelled(state, state.traced, state.render_seconds);
-            }
-        });
+    /// Returns a checkpointer if `film` belongs to this image and the image uses checkpoints.
+    pub(super) fn checkpointer<'a>(
+        &'a self,
+        film: Fingerprint,
+        inputs: &'a ProtectedInputs,
+        sink: &'a EventSink,
+    ) -> Option<Checkpointer<'a>> {
+        let own = self.current.as_ref().filter(|own| film == own.film && uses_checkpoints(&own.plan))?;
+        let (output, finish) = (own.plan.outputs.first()?, image_encoding_settings(&own.plan));
+        let lock = &self.checkpoint_lock;
+        let around = CheckpointContext { finish, dependencies: own.dependencies(), inputs, sink, lock };
+        Some(Checkpointer::new(output, own.plan.checkpoints, around))
     }
 }
 
@@ -263,35 +187,12 @@ fn uses_checkpoints(plan: &RenderPlan) -> bool {
     (seconds > 0.0 || resume == ResumeMode::Asked) && is_file
 }
 
-/// Returns the plan for the scene's own image if the request shows another image.
-///
-/// # Errors
-/// Returns the errors from [`resolve_plan`].
-pub(super) fn saved_scene_plan(
-    request: &Request,
-    parsed: &ParsedScene,
-) -> Result<Option<RenderPlan>, AbortReason> {
-    let plan = |own: &Overrides| resolve_plan(&parsed.loaded.scene, &request.scene, own);
-    let own = request.own.as_deref().map(plan).transpose();
-    own.map_err(|error| AbortReason::Failed(Failure::Scene(vec![*error])))
-}
-
-/// Returns the textures that a request needs, including those for the scene's own image, because its film key
-/// depends on them.
-pub(super) fn texture_needs_with_saved_scene(
-    plan: &RenderPlan,
-    own: Option<&RenderPlan>,
-) -> TextureRolesNeededByRender {
-    let shown = plan.settings.texture_needs();
-    own.map_or(shown, |own| shown.union(own.settings.texture_needs()))
-}
-
 /// Returns the overrides that apply to the scene's own image.
-pub(super) fn saved_scene_overrides(request: &Request) -> &Overrides {
+pub(super) fn own_image_overrides(request: &Request) -> &Overrides {
     request.own.as_deref().unwrap_or(&request.overrides)
 }
 
 /// Whether the scene's own image should be written.
-pub(super) fn request_writes_saved_scene_image(request: &Request) -> bool {
+pub(super) fn writes_own_image(request: &Request) -> bool {
     request.own.is_some() || request.write != WriteRequirement::No
 }

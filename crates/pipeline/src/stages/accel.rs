@@ -3,11 +3,13 @@
 
 use std::sync::Arc;
 
+use rayon::ThreadPool;
+
 use super::super::cache::{CacheOfNamedValues, EvictionCandidate, Memo};
 use super::super::keys;
 use super::super::protocol::reasons;
 use super::meshes::{CachedMesh, MeshesByFileIndex};
-use super::{AbortReason, FileReadContext, StageResult};
+use super::{AbortReason, StageResult};
 use crate::assets::LoadedMesh;
 use crate::control::CancelToken;
 use crate::math::DVec3;
@@ -51,12 +53,6 @@ impl AccelCache {
         self.distinct.evict_unused_before(request);
         self.geometry.evict_unused_before(request);
     }
-
-    /// Returns the most recently built or reused geometry.
-    #[cfg(test)]
-    pub(crate) fn latest(&self) -> Option<&Arc<Geometry>> {
-        self.geometry.get_by_name(&self.last?)
-    }
 }
 
 /// Result of the accel stage.
@@ -74,13 +70,15 @@ pub(crate) struct AccelResult {
 /// Returns [`AbortReason::Cancelled`] if the token is canceled.
 pub(crate) fn build_accel_structures(
     scene: &Scene,
-    (of, origin): (&FingerprintContext<'_>, DVec3),
+    of: &FingerprintContext<'_>,
+    origin: DVec3,
     meshes: &MeshesByFileIndex,
     cache: &mut AccelCache,
-    reading: &FileReadContext<'_>,
+    pool: &ThreadPool,
+    token: &CancelToken,
 ) -> Result<StageResult<AccelResult>, AbortReason> {
-    let distinct = separate_coincident_mesh_emitters(scene, meshes, cache, reading.token)?;
-    let (meshes, kept) = build_mesh_trees(scene, (meshes, &distinct), cache, reading)?;
+    let distinct = separate_coincident_mesh_emitters(scene, meshes, cache, token)?;
+    let (meshes, kept) = build_mesh_trees(scene, meshes, &distinct, cache, pool, token)?;
     let lights_key = keys::key_with_coordinate_origin(&keys::coplanar_lights_key(scene, of), origin);
     let lifts = cache.lifts.get(lights_key).cloned().unwrap_or_else(|| light_lifts(scene, &meshes, origin));
     cache.lifts.set(lights_key, lifts.clone());
@@ -92,8 +90,8 @@ pub(crate) fn build_accel_structures(
         let why = if is_last { reasons::UNCHANGED } else { reasons::CACHED };
         return Ok(StageResult::reused(AccelResult { meshes, geometry }, why));
     }
-    let build = || Geometry::from_scene_with_light_lifts(scene, &meshes, (origin, lifts), reading.token);
-    let geometry = Arc::new(reading.pool.install(build)?);
+    let build = || Geometry::from_scene_with_light_lifts(scene, &meshes, (origin, lifts), token);
+    let geometry = Arc::new(pool.install(build)?);
     cache.geometry.insert(key, key, (geometry.clone(), geometry.top_level_memory_bytes()));
     cache.last = Some(key);
     let built = meshes.len() - kept;
@@ -134,9 +132,11 @@ fn separate_coincident_mesh_emitters(
 /// Returns the trees for all meshes, and how many of them were cached.
 fn build_mesh_trees(
     scene: &Scene,
-    (meshes, distinct): (&MeshesByFileIndex, &[Option<KeyedMeshWithSeparateEmitters>]),
+    meshes: &MeshesByFileIndex,
+    distinct: &[Option<KeyedMeshWithSeparateEmitters>],
     cache: &mut AccelCache,
-    reading: &FileReadContext<'_>,
+    pool: &ThreadPool,
+    token: &CancelToken,
 ) -> Result<(Vec<Arc<MeshTree>>, usize), AbortReason> {
     let mut kept = 0;
     let accel = scene.render.accel;
@@ -150,8 +150,8 @@ fn build_mesh_trees(
             }
             None => {
                 let loaded = distinct.as_ref().map_or(&mesh.mesh, |(_, distinct)| distinct).clone();
-                let build = || MeshTree::build(loaded, accel, reading.token);
-                let tree = Arc::new(reading.pool.install(build)?);
+                let build = || MeshTree::build(loaded, accel, token);
+                let tree = Arc::new(pool.install(build)?);
                 // The tree keeps its mesh alive even if the file is reloaded.
                 let bytes = tree.memory_bytes() + mesh.mesh.mesh.memory_bytes();
                 cache.trees.insert(key, key, (tree.clone(), bytes));

@@ -14,8 +14,13 @@ use crate::scene::description::{Scene, TextureRole};
 use crate::scene::fingerprint::{Fingerprint, FingerprintContext};
 use crate::world::{self, Geometry, TextureSource};
 
-/// Cache of the environment map's importance distribution, which does not depend on the map's rotation.
-pub(crate) type EnvironmentMapMemo = Memo<Option<Arc<EnvironmentMap>>>;
+/// Cache of the lights stage.
+#[derive(Default)]
+pub(crate) struct LightCache {
+    lights: Memo<Arc<Lights>>,
+    /// The environment map's importance distribution, which does not depend on the map's rotation.
+    environment: Memo<Option<Arc<EnvironmentMap>>>,
+}
 
 /// Collects the lights, or reuses them if they are unchanged.
 pub(crate) fn collect_lights(
@@ -23,7 +28,7 @@ pub(crate) fn collect_lights(
     of: &FingerprintContext<'_>,
     geometry: &Geometry,
     textures: &Textures,
-    (memo, skies): (&mut Memo<Arc<Lights>>, &mut EnvironmentMapMemo),
+    cache: &mut LightCache,
     token: &CancelToken,
 ) -> Result<StageResult<Arc<Lights>>, Cancelled> {
     let map = textures.environment.as_ref().map(|(key, _)| key);
@@ -35,11 +40,12 @@ pub(crate) fn collect_lights(
         (geometry.coordinate_origin(), geometry.coplanar_light_offsets()),
         (map, &patterns),
     );
-    if let Some(lights) = memo.get(key).filter(|lights| !lights.is_empty()) {
+    if let Some(lights) = cache.lights.get(key).filter(|lights| !lights.is_empty()) {
         return Ok(StageResult::reused(lights.clone(), reasons::UNCHANGED));
     }
-    let lights = world::build_lights(scene, geometry, &textures.images, sky_map(textures, skies), token)?;
-    memo.set(key, lights.clone());
+    let environment = environment_map(textures, &mut cache.environment);
+    let lights = world::build_lights(scene, geometry, &textures.images, environment, token)?;
+    cache.lights.set(key, lights.clone());
     Ok(match lights.len() {
         0 => StageResult::skipped(lights, reasons::NO_LIGHTS),
         1 => StageResult::done(lights, "1 light"),
@@ -79,15 +85,18 @@ fn emissive_material_textures(scene: &Scene) -> impl Iterator<Item = TextureSour
     })
 }
 
-fn sky_map(textures: &Textures, memo: &mut EnvironmentMapMemo) -> Option<Arc<EnvironmentMap>> {
+fn environment_map(
+    textures: &Textures,
+    memo: &mut Memo<Option<Arc<EnvironmentMap>>>,
+) -> Option<Arc<EnvironmentMap>> {
     let Some((key, texels)) = &textures.environment else {
-        *memo = EnvironmentMapMemo::default();
+        *memo = Memo::default();
         return None;
     };
-    if let Some(sky) = memo.get(*key) {
-        return sky.clone();
+    if let Some(environment) = memo.get(*key) {
+        return environment.clone();
     }
-    let sky = world::build_environment_map(texels);
-    memo.set(*key, sky.clone());
-    sky
+    let environment = world::build_environment_map(texels);
+    memo.set(*key, environment.clone());
+    environment
 }

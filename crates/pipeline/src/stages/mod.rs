@@ -13,6 +13,8 @@ pub(super) mod textures;
 pub(super) mod write;
 
 use std::collections::HashSet;
+use std::error::Error;
+use std::fmt;
 use std::ops::Range;
 use std::path::Path;
 use std::sync::Arc;
@@ -21,6 +23,7 @@ use std::time::Instant;
 use rayon::ThreadPool;
 
 use self::containers::GltfContainers;
+use super::plan::argument_error;
 use super::protocol::{Failure, Status, reasons};
 use super::sink::EventSink;
 use super::watch::content::{FileHashCache, FilePathAndContentId, FilesSeenByRequest};
@@ -28,17 +31,43 @@ use crate::assets::AssetError;
 use crate::control::{CancelToken, Cancelled};
 use crate::scene::LoadedScene;
 use crate::scene::diagnostic::{Diagnostic, Severity};
+use crate::scene::report::{ReportStyle, render_report};
+
+/// Line width for diagnostics in error messages.
+const COLUMNS: usize = 120;
 
 /// Reasons for ending a request early.
-#[derive(Debug)]
-pub(super) enum AbortReason {
+#[derive(Clone, Debug)]
+pub enum AbortReason {
+    /// A cancel token stopped the work.
     Cancelled,
+    /// The scene is invalid, or the work failed.
     Failed(Failure),
 }
+
+impl fmt::Display for AbortReason {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Failed(Failure::Scene(diagnostics)) => {
+                f.write_str(render_report(diagnostics, COLUMNS, ReportStyle::Plain).trim_end())
+            }
+            Self::Failed(Failure::Work(message)) => f.write_str(message),
+            Self::Cancelled => f.write_str("the render was cancelled"),
+        }
+    }
+}
+
+impl Error for AbortReason {}
 
 impl From<Cancelled> for AbortReason {
     fn from(_: Cancelled) -> Self {
         Self::Cancelled
+    }
+}
+
+impl From<Box<Diagnostic>> for AbortReason {
+    fn from(error: Box<Diagnostic>) -> Self {
+        Self::Failed(Failure::Scene(vec![*error]))
     }
 }
 
@@ -50,9 +79,7 @@ impl AbortReason {
 
     /// A failure without a location in the scene, and how to fix it.
     pub(super) fn failure_with_remedy(message: String, help: &str) -> Self {
-        let (severity, help) = (Severity::Error, Some(help.to_owned()));
-        let path = std::path::PathBuf::new();
-        Self::Failed(Failure::Scene(vec![Diagnostic { severity, message, path, place: None, help }]))
+        argument_error(message, help).into()
     }
 }
 

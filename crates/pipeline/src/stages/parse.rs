@@ -8,9 +8,8 @@ use super::super::cache::Memo;
 use super::super::formats::model::ModelViewOptions;
 use super::super::formats::{ForeignFormat, ForeignReadContext, ForeignReadError, ForeignScene};
 use super::super::protocol::{Failure, reasons};
-use super::super::watch::content::{FileContentId, FilePathAndContentId, FilesSeenByRequest};
-use super::containers::GltfContainers;
-use super::{AbortReason, Findings, StageResult};
+use super::super::watch::content::{FileContentId, FilePathAndContentId};
+use super::{AbortReason, FileReadContext, Findings, StageResult};
 use crate::assets::gltf::{self, is_gltf};
 use crate::assets::mesh;
 use crate::assets::orbiter::load as load_orbiter;
@@ -51,9 +50,8 @@ pub(crate) struct SceneParseRequest<'a> {
 /// Converts an importer's error. Watches missing files to detect when they are created.
 fn abort_reason(
     failure: ForeignReadError,
-    contents: &FilesSeenByRequest,
     findings: &mut Findings,
-    token: &CancelToken,
+    reading: &FileReadContext<'_>,
 ) -> AbortReason {
     let error = match failure {
         ForeignReadError::Scene(errors) => return AbortReason::Failed(Failure::Scene(errors)),
@@ -65,7 +63,7 @@ fn abort_reason(
             AbortReason::work_failure(error)
         }
         AssetError::Unreadable { path, reason } => {
-            if let Ok(content) = contents.first_seen_content_id(&path, token) {
+            if let Ok(content) = reading.contents.first_seen_content_id(&path, reading.token) {
                 findings.add_file(FilePathAndContentId { path: path.clone(), content });
             }
             scene_failure_from_message(&path, format!("cannot read it: {reason}"))
@@ -87,12 +85,12 @@ fn scene_failure_from_message(path: &Path, message: String) -> AbortReason {
 /// Returns all errors in the scene file.
 pub(crate) fn parse(
     origin: SceneParseRequest<'_>,
-    (contents, containers): (&FilesSeenByRequest, &GltfContainers),
     memo: &mut Memo<Arc<ParsedScene>>,
     findings: &mut Findings,
-    token: &CancelToken,
+    reading: &FileReadContext<'_>,
 ) -> Result<StageResult<Arc<ParsedScene>>, AbortReason> {
     let SceneParseRequest { path, show, .. } = origin;
+    let FileReadContext { contents, token, .. } = *reading;
     if let BackupRecovery::Differs(held) = held::recover_backup(path) {
         let help =
             Some("compare both files, save the one you need as the scene, and remove the other".to_owned());
@@ -130,13 +128,12 @@ pub(crate) fn parse(
             // Record the current content in case parsing fails. After a successful parse, replace it with the
             // parsed content.
             findings.add_file(FilePathAndContentId { path: path.to_owned(), content });
-            read_scene(origin, format, (contents, containers), memo.latest(), findings, token)?
+            read_scene(origin, format, memo.latest(), findings, reading)?
         }
     };
     findings.replace_read_file(FilePathAndContentId { path: path.to_owned(), content });
     companions.iter().for_each(|file| findings.add_file(file.clone()));
-    let (orbiter, orbiter_content) =
-        read_orbiter_camera_file(&loaded, known.as_deref(), contents, findings, token)?;
+    let (orbiter, orbiter_content) = read_orbiter_camera_file(&loaded, known.as_deref(), findings, reading)?;
     findings.warnings.extend(notes.iter().chain(&loaded.warnings).cloned());
     if let Some(parsed) = known.filter(|parsed| parsed.orbiter_content == orbiter_content) {
         return Ok(StageResult::reused(parsed, reasons::UNCHANGED));
@@ -158,11 +155,11 @@ type SceneAndDependencies =
 fn read_scene(
     SceneParseRequest { path, sets, show }: SceneParseRequest<'_>,
     format: Option<&ForeignFormat>,
-    (contents, containers): (&FilesSeenByRequest, &GltfContainers),
     last: Option<&Arc<ParsedScene>>,
     findings: &mut Findings,
-    token: &CancelToken,
+    reading: &FileReadContext<'_>,
 ) -> Result<SceneAndDependencies, AbortReason> {
+    let FileReadContext { contents, containers, token, .. } = *reading;
     let Some(format) = format else {
         let loaded = scene::load(path, sets).map_err(|errors| {
             AbortReason::Failed(Failure::Scene(add_renamed_file_hint(errors, path, last)))
@@ -173,7 +170,7 @@ fn read_scene(
     };
     let context = ForeignReadContext { sets, view: show, containers, token };
     let ForeignScene { loaded, hash, companions, notes, substitutions } =
-        (format.read)(path, &context).map_err(|failure| abort_reason(failure, contents, findings, token))?;
+        (format.read)(path, &context).map_err(|failure| abort_reason(failure, findings, reading))?;
     let content = contents.record_decoded(path, hash);
     let companions = companions.iter().map(|companion| contents.record_companion(companion, token));
     let companions = companions.collect::<Result<_, Cancelled>>()?;
@@ -250,11 +247,11 @@ type OrbiterCameraAndFileContentId = (Option<GkitOrbiterCamera>, Option<FileCont
 fn read_orbiter_camera_file(
     loaded: &scene::LoadedScene,
     known: Option<&ParsedScene>,
-    contents: &FilesSeenByRequest,
     findings: &mut Findings,
-    token: &CancelToken,
+    reading: &FileReadContext<'_>,
 ) -> Result<OrbiterCameraAndFileContentId, AbortReason> {
     let Camera::Orbiter { file, .. } = &loaded.scene.camera else { return Ok((None, None)) };
+    let FileReadContext { contents, token, .. } = *reading;
     let content = contents.first_seen_content_id(&file.value, token)?;
     if let Some(parsed) = known.filter(|parsed| parsed.orbiter_content == Some(content)) {
         findings.add_file(FilePathAndContentId { path: file.value.clone(), content });

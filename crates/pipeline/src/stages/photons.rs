@@ -11,12 +11,14 @@ use std::sync::mpsc::{self, RecvTimeoutError};
 use rayon::ThreadPool;
 
 use super::super::cache::Memo;
+use super::super::keys;
 use super::super::plan::RenderPlan;
+use super::super::prepare::ReadyScene;
 use super::super::protocol::{PhotonsReport, reasons};
 use super::super::sink::EventSink;
 use super::super::stopwatch::PausableStopwatch;
 use super::super::trace::TICK;
-use super::{AbortReason, StageResult};
+use super::StageResult;
 use crate::control::{CancelToken, Cancelled, Progress};
 use crate::integrators::{PhotonMapper, PhotonMaps, PhotonPass, PhotonSettings, RenderSettings};
 use crate::scene::description::RenderOptions;
@@ -184,45 +186,64 @@ fn run_with_ticks<T: Send>(
     })
 }
 
-/// Traces the first photons if the image uses them. `wanted` comes from the command line, and `enabled` from
-/// the scene. Calls `tick` regularly, and calls `before` once before tracing any photons.
+/// The photons that an image needs, each with the key of the image's photons.
+pub(crate) enum PhotonTask {
+    /// None, for this reason.
+    Skip(&'static str),
+    /// The cached photons.
+    Reuse(Fingerprint),
+    /// New photons.
+    Trace(Fingerprint, PhotonSettings),
+}
+
+impl PhotonTask {
+    /// Determines the photons for a scene's image. `wanted` comes from the command line.
+    pub(crate) fn new(scene: &ReadyScene, wanted: Option<bool>, cache: &PhotonCache) -> Self {
+        let ReadyScene { plan, surfaces, origin, .. } = scene;
+        let (settings, enabled) = (plan.settings.without_ineffective_settings(), plan.scene.photons.enabled);
+        let Some(of_photons) = settings.photons else {
+            return Self::Skip(match wanted.unwrap_or(enabled) {
+                true => reasons::NOT_USED_BY_PATH,
+                false if enabled => reasons::PHOTONS_OVERRIDDEN,
+                false => reasons::PHOTONS_OFF,
+            });
+        };
+        if !settings.gathers_photons() {
+            let deeper = RenderOptions { max_depth: u32::MAX, ..settings.render };
+            return Self::Skip(match (RenderSettings { render: deeper, ..settings }).gathers_photons() {
+                true => reasons::TOO_FEW_BOUNCES,
+                false => reasons::NOT_NEEDED_FOR_VIEW,
+            });
+        }
+        let key = keys::photons_key(surfaces, *origin, &plan.settings.render, of_photons);
+        if cache.get(key).is_some() { Self::Reuse(key) } else { Self::Trace(key, of_photons) }
+    }
+}
+
+/// Traces an image's first photons unless they are cached. Calls `tick` regularly. Returns the key of the
+/// image's photons, if it uses them.
 ///
 /// # Errors
-/// The token is canceled, or `before` fails.
+/// Returns [`Cancelled`] if the token is canceled.
 pub(crate) fn trace_first_photons(
-    (enabled, wanted): (bool, Option<bool>),
-    key: impl FnOnce(PhotonSettings) -> Fingerprint,
+    task: PhotonTask,
     cache: &mut PhotonCache,
     sending: PhotonContext<'_>,
     mut tick: impl FnMut(),
-    before: impl FnOnce() -> Result<(), AbortReason>,
-) -> Result<StageResult<()>, AbortReason> {
-    let settings = sending.plan.settings.without_ineffective_settings();
-    let skipped = |why: &str| Ok(StageResult::skipped((), why));
-    let Some(of_photons) = settings.photons else {
-        return match wanted.unwrap_or(enabled) {
-            true => skipped(reasons::NOT_USED_BY_PATH),
-            false if enabled => skipped(reasons::PHOTONS_OVERRIDDEN),
-            false => skipped(reasons::PHOTONS_OFF),
-        };
+) -> Result<StageResult<Option<Fingerprint>>, Cancelled> {
+    let (key, of_photons) = match task {
+        PhotonTask::Skip(why) => return Ok(StageResult::skipped(None, why)),
+        PhotonTask::Reuse(key) => {
+            let store = cache.get(key).inspect(|store| store.sent.set(PhotonCounts::default()));
+            return Ok(match store.is_some_and(PhotonStore::has_lit_caustic_casters) {
+                true => StageResult::reused(Some(key), reasons::UNCHANGED),
+                false => StageResult::skipped(Some(key), reasons::NO_SPECULAR_SURFACES),
+            });
+        }
+        PhotonTask::Trace(key, of_photons) => (key, of_photons),
     };
-    if !settings.gathers_photons() {
-        let deeper = RenderOptions { max_depth: u32::MAX, ..settings.render };
-        return skipped(match (RenderSettings { render: deeper, ..settings }).gathers_photons() {
-            true => reasons::TOO_FEW_BOUNCES,
-            false => reasons::NOT_NEEDED_FOR_VIEW,
-        });
-    }
-    let key = key(of_photons);
-    if let Some(store) = cache.get(key) {
-        store.sent.set(PhotonCounts::default());
-        return Ok(match store.photons.emits_photons() {
-            true => StageResult::reused((), reasons::UNCHANGED),
-            false => StageResult::skipped((), reasons::NO_SPECULAR_SURFACES),
-        });
-    }
-    before()?;
-    let PhotonContext { world, pool, token, .. } = sending;
+    let PhotonContext { world, plan, pool, token, .. } = sending;
+    let settings = plan.settings.without_ineffective_settings();
     let watch = PausableStopwatch::start(token);
     let send = |progress: Progress<'_>| {
         run_with_ticks(pool, &mut tick, || {
@@ -238,8 +259,8 @@ pub(crate) fn trace_first_photons(
     let store = PhotonStore { photons, kept, sent: Cell::new(sent) };
     cache.set(key, store);
     Ok(if emits_photons {
-        StageResult::done((), "")
+        StageResult::done(Some(key), "")
     } else {
-        StageResult::skipped((), reasons::NO_SPECULAR_SURFACES)
+        StageResult::skipped(Some(key), reasons::NO_SPECULAR_SURFACES)
     })
 }

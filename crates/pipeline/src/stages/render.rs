@@ -11,31 +11,29 @@ use crate::integrators::RayCounters;
 use crate::protocol::reasons;
 use crate::render::film_cache::FilmCache;
 use crate::render::film_state::FilmState;
-use crate::render::scheduler::{RenderStageInputs, Scheduler};
+use crate::render::scheduler::{FilmRequest, RenderStageInputs, Scheduler};
 use crate::scene::description::RenderOptions;
-use crate::scene::fingerprint::Fingerprint;
 
-/// Renders the film with this key until it has the requested number of samples or reaches the noise target.
+/// Renders the requested film until it has the requested number of samples or reaches the noise target.
 ///
 /// # Errors
 /// The token is canceled, or there is not enough memory for the film. The film keeps its samples.
 pub(crate) fn render(
-    key: Fingerprint,
     films: &mut FilmCache,
     rendering: &RenderStageInputs<'_>,
 ) -> Result<StageResult<RayCounters>, AbortReason> {
     let RenderOptions { samples: wanted, error, .. } = rendering.plan.settings.render;
+    let FilmRequest { key, ref share, force, most_bytes } = rendering.film;
     let is_other = films.current().is_some_and(|current| current.key != key);
-    films.switch_to_cached(key, |kept| !rendering.force && kept.has_at_most_samples(wanted));
+    films.switch_to_cached(key, |kept| !force && kept.has_at_most_samples(wanted));
     if films.current().is_none() {
         let convergence = match rendering.photons.is_some_and(PhotonStore::has_lit_caustic_casters) {
             true => ConvergenceModel::Photons,
             false => ConvergenceModel::Stratified,
         };
-        let (plan, most_bytes) = (rendering.plan, rendering.most_film_bytes);
-        let state = || FilmState::new(key, plan, most_bytes, convergence, rendering.share.clone());
+        let state = || FilmState::new(key, rendering.plan, most_bytes, convergence, share.clone());
         let empty = films.replace_current_with_retry(state).map_err(AbortReason::work_failure)?;
-        let is_of_use = match rendering.checkpointer.filter(|_| !rendering.force) {
+        let is_of_use = match rendering.checkpointer.filter(|_| !force) {
             Some(checkpointer) => checkpointer.resume(empty, wanted)?,
             None => true,
         };
@@ -64,7 +62,7 @@ pub(crate) fn render(
         return Ok(StageResult::reused(scheduler.rays, why));
     }
     scheduler.state.ended_by = None;
-    scheduler.state.is_passing = rendering.is_moved;
+    scheduler.state.is_passing = rendering.display.is_moved;
     scheduler.run()?;
     let rays = scheduler.rays;
     Ok(match (!scheduler.state.is_complete(wanted), had) {

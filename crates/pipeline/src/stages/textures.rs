@@ -81,13 +81,6 @@ impl TextureCache {
         let texels = &self.texels;
         self.linked.retain(|name, _| texels.get_by_name(name).is_some());
     }
-
-    /// Returns the texels last read from a file.
-    #[cfg(test)]
-    pub(crate) fn latest(&self, path: &Path) -> Option<&Arc<Texels>> {
-        let name = (canonical(path), None, ImageEncoding::Color, None);
-        self.texels.get_by_name(&name).map(|decoded| &decoded.texels)
-    }
 }
 
 /// The loaded textures of a scene. Excludes textures that failed to load.
@@ -118,17 +111,33 @@ pub(crate) struct NeededTextures {
     pub(crate) are_required: bool,
 }
 
-/// Returns the textures that visible materials need for this view. If all of the scene's textures are cached,
-/// returns all of them, so that the lights and trees that depend on them can be reused.
-pub(crate) fn find_textures_needed_for_view(
+/// Which textures of a scene to load.
+#[derive(Clone, Copy)]
+pub(crate) enum TextureSelection {
+    /// Textures used by visible materials in these roles. If all of the scene's textures are cached, all of
+    /// them, so that the lights and trees that depend on them can be reused.
+    ForImage(TextureRolesNeededByRender),
+    /// All textures, used or not, all of which must be readable.
+    ForCheck,
+}
+
+/// Returns the selected textures.
+pub(crate) fn find_needed_textures(
     loaded: &LoadedScene,
     meshes: &MeshesByFileIndex,
-    lookups: TextureRolesNeededByRender,
+    selection: TextureSelection,
     cache: &TextureCache,
 ) -> NeededTextures {
     let meshes: Vec<_> = meshes.iter().map(|kept| kept.mesh.clone()).collect();
-    let all = textures_needed(&loaded.scene, &meshes, TextureRolesNeededByRender::ALL);
-    let for_image = textures_needed(&loaded.scene, &meshes, lookups);
+    let mut all = textures_needed(&loaded.scene, &meshes, TextureRolesNeededByRender::ALL);
+    let roles = match selection {
+        TextureSelection::ForImage(roles) => roles,
+        TextureSelection::ForCheck => {
+            add_check_only_textures(loaded, &mut all);
+            return NeededTextures { textures: all, left_out: 0, are_required: true };
+        }
+    };
+    let for_image = textures_needed(&loaded.scene, &meshes, roles);
     let left_out = all.len() - for_image.len();
     if left_out == 0 || cache.has_all(&all) {
         return NeededTextures { textures: all, ..NeededTextures::default() };
@@ -600,7 +609,7 @@ fn image_dimensions_and_memory(
 }
 
 /// Adds textures that only `check` loads: unused textures from the scene file, and a black environment map.
-pub(crate) fn add_check_only_textures(loaded: &LoadedScene, wanted: &mut Vec<NeededTexture>) {
+fn add_check_only_textures(loaded: &LoadedScene, wanted: &mut Vec<NeededTexture>) {
     let name = |path: &Path, image: Option<u32>| (path.to_owned(), image);
     let mut known: HashSet<_> = wanted.iter().map(|one| name(&one.source.path, one.source.image)).collect();
     for (index, texture) in loaded.scene.textures.iter().enumerate() {

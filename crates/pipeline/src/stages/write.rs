@@ -43,6 +43,8 @@ pub(crate) struct WrittenImages {
     /// Folders from which this write or turntable has already removed temporary files left by killed
     /// processes.
     sweep: SweptFolders,
+    /// Finished frames of a turntable, with their sample counts.
+    frames: Vec<(Srgb8Image, SampleCountStats)>,
 }
 
 impl WrittenImages {
@@ -269,10 +271,6 @@ pub(crate) fn write_on_request(
     is_written
 }
 
-/// Finished turntable frames, with their sample counts.
-#[derive(Debug, Default)]
-pub(crate) struct RenderedTurntableFrames(Vec<(Srgb8Image, SampleCountStats)>);
-
 /// Adds an image to the turntable's frames. After the last frame, writes the animations. Returns whether they
 /// have been written.
 ///
@@ -281,21 +279,22 @@ pub(crate) struct RenderedTurntableFrames(Vec<(Srgb8Image, SampleCountStats)>);
 pub(crate) fn add_frame_and_write_if_last(
     state: &FilmState,
     to: ImageWriteContext<'_>,
-    (turn, frames): (TurntableFrame, &mut RenderedTurntableFrames),
+    turn: TurntableFrame,
+    written: &mut WrittenImages,
     token: &CancelToken,
 ) -> Result<StageResult<bool>, AbortReason> {
     let ImageWriteContext { plan, inputs, sink, .. } = to;
     let finish = image_encoding_settings(plan);
     let image = finish.quantity_image(&state.film);
-    frames.0.truncate(turn.number as usize);
-    frames.0.push((
+    written.frames.truncate(turn.number as usize);
+    written.frames.push((
         tone_map_to_8_bits(&image, &finish.tone.with_image_range(&image)),
         state.film.sample_count_stats(),
     ));
     if !turn.is_last() {
         return Ok(StageResult::skipped(false, format!("frame {} of {}", turn.number + 1, turn.of)));
     }
-    let (frames, samples): (Vec<_>, Vec<_>) = std::mem::take(frames).0.into_iter().unzip();
+    let (frames, samples): (Vec<_>, Vec<_>) = std::mem::take(&mut written.frames).into_iter().unzip();
     let samples = SampleCountStats {
         min: samples.iter().map(|one| one.min).min().unwrap_or(0),
         mean: samples.iter().map(|one| one.mean).sum::<f64>() / samples.len() as f64,

@@ -15,21 +15,22 @@ use std::cell::Cell;
 use std::fs;
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::sync::mpsc::Receiver;
+use std::sync::mpsc::{self, Receiver};
 use std::time::Duration;
 
-use crate::engine::EngineConfig;
 use crate::protocol::{
-    Command, Event, Failure, ImagePosition, MaxPreviewSize, NormalizedRect, PreviewUpdate, Report, Request,
-    Stage, Status, WriteRequirement, reasons,
+    Command, Event, Failure, ImagePosition, MaxPreviewSize, NormalizedRect, PreviewSlot, PreviewUpdate,
+    Report, Request, Stage, Status, WriteRequirement, reasons,
 };
 use crate::scene::LoadedScene;
 use crate::scene::description::ResolvedCamera;
 use crate::scene::diagnostic::Diagnostic;
+use crate::session::SessionConfig;
 use crate::settings::Overrides;
+use crate::sink::EventSink;
 use crate::trace::TileKernel;
 use crate::watch::content::FileHashCache;
-use crate::worker::{Handle, start_with_config_and_channel};
+use crate::worker::{Handle, start_with_config};
 
 /// Loads a scene from text, with a default camera.
 pub(crate) fn loaded_of(text: &str) -> LoadedScene {
@@ -80,6 +81,22 @@ pub(super) const OBJ: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
 
 pub(super) const KERNEL: TileKernel = crate::integrators::render_tile_with_photons;
 
+/// Creates a sink, and a channel that receives its events.
+pub(crate) fn sink_with_channel(generation: u64) -> (EventSink, Receiver<Event>) {
+    let (sender, events) = mpsc::channel();
+    let listener = Arc::new(move |event| drop(sender.send(event)));
+    (EventSink { generation, listener, previews: PreviewSlot::default() }, events)
+}
+
+/// Starts a worker, and returns a channel that receives its events.
+pub(super) fn start_worker(
+    config: SessionConfig,
+    contents: &Arc<FileHashCache>,
+) -> (Handle, Receiver<Event>) {
+    let (sink, events) = sink_with_channel(0);
+    (start_with_config(config, Arc::clone(contents), sink.listener).expect("a thread"), events)
+}
+
 pub(crate) struct Bench {
     pub(super) folder: tempfile::TempDir,
     /// File name of the scene or model.
@@ -105,16 +122,15 @@ impl Bench {
     }
 
     pub(super) fn with(scene: &str, kernel: TileKernel) -> Self {
-        Self::with_config(scene, EngineConfig { kernel, ..EngineConfig::default() })
+        Self::with_config(scene, SessionConfig { kernel, ..SessionConfig::default() })
     }
 
-    pub(super) fn with_config(scene: &str, config: EngineConfig) -> Self {
+    pub(super) fn with_config(scene: &str, config: SessionConfig) -> Self {
         let folder = tempfile::tempdir().expect("a scratch folder");
         let output = folder.path().join("out.ppm");
         let overrides = Overrides { outputs: vec![output], threads: Some(2), ..Default::default() };
-        let contents = Arc::<FileHashCache>::default();
-        let (worker, events) =
-            start_with_config_and_channel(config, Arc::clone(&contents)).expect("a thread");
+        let contents = Arc::default();
+        let (worker, events) = start_worker(config, &contents);
         let bench = Self {
             folder,
             scene: "scene.toml",

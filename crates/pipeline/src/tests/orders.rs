@@ -6,12 +6,12 @@ use std::time::Instant;
 
 use super::*;
 use crate::control::{CancelToken, Cancelled};
-use crate::engine::EngineConfig;
 use crate::film::{Rect, SelectedPixels, TileSamples};
 use crate::integrators::{PhotonMaps, RayCounters, RenderSettings};
 use crate::messages::{INCOMPLETE_IMAGE, NEWEST_IMAGE_NOT_WRITTEN};
 use crate::protocol::LastValidSceneRenderOutcome;
 use crate::scene::description::{Integrator, ShadowMode};
+use crate::session::SessionConfig;
 use crate::settings::ViewMode;
 use crate::world::World;
 
@@ -157,7 +157,7 @@ fn panic_stops_the_current_pass() {
 
 #[test]
 fn oversized_film_is_an_error() {
-    let config = EngineConfig { most_film_bytes: 100_000, ..EngineConfig::default() };
+    let config = SessionConfig { most_film_bytes: 100_000, ..SessionConfig::default() };
     let mut bench = Bench::with_config(&SCENE.replace("width = 40", "width = 400"), config);
     assert!(matches!(bench.failed(), Failure::Work(message) if message.contains("400×30")));
     assert!(!bench.path("out.ppm").exists());

@@ -27,17 +27,9 @@ impl ToggledBench {
         change(&mut self.0.overrides);
         let shown = std::mem::replace(&mut self.0.overrides, own);
         self.0.generation += 1;
-        self.0.worker.send(Command::Render(Box::new(Request {
-            generation: self.0.generation,
-            scene: self.0.path(self.0.scene),
-            own: Some(Box::new(self.0.overrides.clone())),
-            overrides: shown,
-            preview: None,
-            write: WriteRequirement::No,
-            saves: self.0.saves.get(),
-            force: false,
-            first: None,
-        })));
+        let request = Request::new(self.0.generation, self.0.path(self.0.scene), shown);
+        let (own, saves) = (Some(Box::new(self.0.overrides.clone())), self.0.saves.get());
+        self.0.worker.send(Command::Render(Box::new(Request { own, saves, ..request })));
         self.0.generation
     }
 
@@ -352,8 +344,7 @@ fn own_checkpoint_is_saved_during_another_view() {
         assert!(keys.0.worker.stop_within(Duration::from_secs(60)));
         assert_eq!(path.exists(), is_kept, "a short render should be saved only after a signal");
         if is_kept {
-            (keys.0.worker, keys.0.events) =
-                start_with_config_and_channel(EngineConfig::default(), Arc::default()).expect("a thread");
+            (keys.0.worker, keys.0.events) = start_worker(SessionConfig::default(), &keys.0.contents);
             let (report, _) = keys.0.done();
             assert_resumed(&report);
             assert!(!path.exists(), "the checkpoint should be removed once the image is written");

@@ -12,8 +12,8 @@ use self::state::NonFilmRenderState;
 use super::film_state::FilmState;
 use super::share::Shard;
 use crate::control::CancelToken;
-use crate::engine::Interruption;
 use crate::film::Film;
+use crate::identity::ImageDependencies;
 use crate::inputs::ProtectedInputs;
 use crate::integrators::RayCounters;
 use crate::messages;
@@ -70,16 +70,24 @@ pub(crate) fn checkpoint_path(output: &Path) -> PathBuf {
     name.into()
 }
 
+/// Reasons for interrupting a render.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Interruption {
+    /// The user requested another image, or none at all. The render will not be resumed.
+    Replaced,
+    /// The user quit. A long render will be resumed later.
+    Left,
+    /// The process is being terminated. The render will be resumed later.
+    Ended,
+}
+
 /// Context for rendering with checkpoints.
-#[derive(Clone, Copy)]
 pub(crate) struct CheckpointContext<'a> {
-    pub(crate) finish: &'a FilmEncodingSettings,
+    pub(crate) finish: FilmEncodingSettings,
+    /// Everything that affects the image.
+    pub(crate) dependencies: ImageDependencies<'a>,
     pub(crate) inputs: &'a ProtectedInputs,
     pub(crate) sink: &'a EventSink,
-    /// Computes the names and values of everything that affects the image. This is slow.
-    pub(crate) name: &'a dyn Fn() -> Vec<NamedRenderInput>,
-    /// Returns why the render is interrupted.
-    pub(crate) interruption: &'a dyn Fn() -> Interruption,
     /// The process's checkpoint state.
     pub(crate) lock: &'a RefCell<CheckpointLock>,
 }
@@ -90,6 +98,7 @@ pub(crate) struct Checkpointer<'a> {
     path: PathBuf,
     settings: CheckpointSettings,
     around: CheckpointContext<'a>,
+    /// Names and values of the dependencies, which are slow to compute.
     identity: OnceCell<Vec<NamedRenderInput>>,
     due: Cell<Instant>,
     /// Whether the checkpoint held by this process belongs to this render.
@@ -111,7 +120,7 @@ impl<'a> Checkpointer<'a> {
     }
 
     fn current_render_inputs(&self) -> &[NamedRenderInput] {
-        self.identity.get_or_init(self.around.name)
+        self.identity.get_or_init(|| self.around.dependencies.names_and_values())
     }
 
     /// Restores an empty film from a checkpoint if the settings request it, or from the output file if it
@@ -318,7 +327,7 @@ impl<'a> Checkpointer<'a> {
     }
 
     fn create_header(&self, kind: PartOrCheckpoint, state: &FilmState) -> PartHeader {
-        create_header(kind, state, self.current_render_inputs().to_vec(), self.around.finish)
+        create_header(kind, state, self.current_render_inputs().to_vec(), &self.around.finish)
     }
 
     /// Returns the differences between a file header and this render.
@@ -349,8 +358,14 @@ impl<'a> Checkpointer<'a> {
 
     /// When a render is canceled, saves a checkpoint if it will be resumed later. Returns whether one was
     /// saved.
-    pub(crate) fn save_if_cancelled(&self, state: &FilmState, rays: RayCounters, seconds: f64) -> bool {
-        let is_kept = match (self.around.interruption)() {
+    pub(crate) fn save_if_cancelled(
+        &self,
+        state: &FilmState,
+        rays: RayCounters,
+        seconds: f64,
+        interruption: Interruption,
+    ) -> bool {
+        let is_kept = match interruption {
             Interruption::Replaced => false,
             // Update an existing checkpoint even after a short render.
             Interruption::Left => seconds >= self.settings.seconds || self.is_own.get(),
@@ -372,9 +387,15 @@ impl<'a> Checkpointer<'a> {
     /// Removes the checkpoint once the image has been written, or saves a final one if checkpoints are kept.
     /// If the image was not written, saves a checkpoint if checkpoints are kept, the render was long, or the
     /// process is being terminated.
-    pub(crate) fn finish(&self, state: &FilmState, rays: RayCounters, is_written: bool) {
+    pub(crate) fn finish(
+        &self,
+        state: &FilmState,
+        rays: RayCounters,
+        is_written: bool,
+        interruption: Interruption,
+    ) {
         let was_long = state.render_seconds >= self.settings.seconds;
-        let is_ended = match (self.around.interruption)() {
+        let is_ended = match interruption {
             Interruption::Ended => true,
             Interruption::Left | Interruption::Replaced => false,
         };
@@ -440,7 +461,7 @@ impl<'a> Checkpointer<'a> {
         state: &serde_json::Value,
         durability: Durability,
     ) -> Result<(), OutputError> {
-        let (path, CheckpointContext { inputs, lock, .. }) = (&self.path, self.around);
+        let (path, CheckpointContext { inputs, lock, .. }) = (&self.path, &self.around);
         let may_replace = |at: &Path| {
             let refused = |reason| Err(OutputError::Refused { reason });
             match at.symlink_metadata() {
@@ -472,7 +493,7 @@ impl<'a> Checkpointer<'a> {
     }
 
     fn report_failure(&self, why: &str) {
-        let CheckpointContext { sink, lock, .. } = self.around;
+        let CheckpointContext { sink, lock, .. } = &self.around;
         if lock.borrow_mut().record_first_failure_of_request(sink.generation) {
             self.send_update(CheckpointUpdate::Failed { message: format!("no checkpoint: {why}") });
         }

@@ -1,0 +1,99 @@
+//! Reads one consistent version of a scene's files.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use rayon::ThreadPool;
+
+use crate::control::CancelToken;
+use crate::sink::EventSink;
+use crate::stages::containers::GltfContainers;
+use crate::stages::{AbortReason, FileReadContext, Findings};
+use crate::table::StageRunner;
+use crate::watch::content::{FileHashCache, FilesSeenByRequest};
+
+/// Maximum number of attempts to read one consistent version of the scene's files.
+const MAX_READS: usize = 16;
+
+/// One attempt to read a scene's files.
+pub(crate) struct Reading<'a, 't> {
+    pub(crate) files: FileReadContext<'a>,
+    pub(crate) table: &'a mut StageRunner<'t>,
+    pub(crate) findings: &'a mut Findings,
+}
+
+/// Everything needed to read files.
+#[derive(Clone, Copy)]
+pub(crate) struct FileReader<'a> {
+    pub(crate) contents: &'a Arc<FileHashCache>,
+    pub(crate) pool: &'a ThreadPool,
+    pub(crate) sink: &'a EventSink,
+    pub(crate) token: &'a CancelToken,
+}
+
+impl FileReader<'_> {
+    /// Calls `read` repeatedly until no file changes in the meantime, so that images and errors never result
+    /// from a mix of file versions. `read` must verify the files that it loads.
+    ///
+    /// # Errors
+    /// Returns the error from `read`, or an error if the files keep changing.
+    pub(crate) fn read_consistently<T>(
+        &self,
+        table: &mut StageRunner<'_>,
+        findings: &mut Findings,
+        mut read: impl FnMut(&mut Reading<'_, '_>) -> Result<T, AbortReason>,
+    ) -> Result<T, AbortReason> {
+        for _ in 0..MAX_READS {
+            let contents = FilesSeenByRequest::new(Arc::clone(self.contents));
+            let containers = GltfContainers::default();
+            let files = self.context(&contents, &containers);
+            let result = read(&mut Reading { files, table, findings });
+            if result.is_err() && !self.token.is_cancelled() {
+                contents.recheck_seen_files(self.token)?;
+            }
+            if self.token.is_cancelled() || contents.changed_file().is_none() {
+                return result;
+            }
+            findings.reset();
+            table.stages.clear();
+        }
+        Err(AbortReason::work_failure(
+            "the scene's files keep changing while they are being read; try again once they are complete",
+        ))
+    }
+
+    /// Calls `read` once. Returns `None` if a file changed in the meantime.
+    ///
+    /// # Errors
+    /// Returns the error from `read`.
+    pub(crate) fn read_once<T>(
+        &self,
+        read: impl FnOnce(&FileReadContext<'_>) -> Result<T, AbortReason>,
+    ) -> Result<Option<T>, AbortReason> {
+        let contents = FilesSeenByRequest::new(Arc::clone(self.contents));
+        let result = read(&self.context(&contents, &GltfContainers::default()))?;
+        contents.recheck_seen_files(self.token)?;
+        Ok(Some(result).filter(|_| contents.changed_file().is_none()))
+    }
+
+    fn context<'a>(
+        &'a self,
+        contents: &'a FilesSeenByRequest,
+        containers: &'a GltfContainers,
+    ) -> FileReadContext<'a> {
+        FileReadContext { sink: self.sink, token: self.token, contents, pool: self.pool, containers }
+    }
+}
+
+impl Reading<'_, '_> {
+    /// Checks that no file has changed since the request first saw it.
+    ///
+    /// # Errors
+    /// A file has changed, or the token is canceled.
+    pub(crate) fn verify_files_unchanged(&self) -> Result<(), AbortReason> {
+        self.files.contents.recheck_seen_files(self.files.token)?;
+        let changed = self.files.contents.changed_file();
+        let message = |path: PathBuf| format!("{} changed while it was being read", path.display());
+        changed.map_or(Ok(()), |path| Err(AbortReason::work_failure(message(path))))
+    }
+}

@@ -1,0 +1,120 @@
+//! The files of the current scene.
+
+use std::collections::HashSet;
+use std::path::Path;
+use std::sync::Arc;
+
+use crate::inputs::ProtectedInputs;
+use crate::plan::RenderPlan;
+use crate::prepare::SceneAssets;
+use crate::protocol::{Event, Failure, Report, WriteRequirement};
+use crate::sink::EventSink;
+use crate::stages::parse::ParsedScene;
+use crate::stages::{AbortReason, Findings};
+use crate::targets::output_conflicts;
+use crate::watch::content::FilePathAndContentId;
+
+/// The scene's files: which to watch, which not to write, and the last valid scene that was read from them.
+#[derive(Default)]
+pub(super) struct SceneFiles {
+    /// Files of the last loaded scene, which are watched while the scene file is broken.
+    loaded: Vec<FilePathAndContentId>,
+    /// All files that must not be written: the files of the last valid scene and all files referenced since.
+    pub(super) protected: ProtectedInputs,
+    /// Whether the current scene file is invalid, which means that its referenced files are unknown.
+    pub(super) is_broken: bool,
+    pub(super) last_valid: Option<Arc<SceneAssets>>,
+}
+
+impl SceneFiles {
+    /// Protects the files that a parsed scene references, and checks the output files against them. The
+    /// previous scene's files remain protected, because its image is still shown and may have to be written.
+    ///
+    /// # Errors
+    /// See [`Self::check_conflicts`].
+    pub(super) fn protect_parsed(
+        &mut self,
+        parsed: &ParsedScene,
+        writing: WriteRequirement,
+        plan: &RenderPlan,
+        findings: &mut Findings,
+        sink: &EventSink,
+    ) -> Result<(), AbortReason> {
+        let before = std::mem::replace(&mut self.protected, ProtectedInputs::from_scene(parsed));
+        let checked = self.check_conflicts(writing, plan, findings, sink);
+        self.protected.merge(before);
+        checked
+    }
+
+    /// Records the files of a loaded scene, and reports them and the warnings to the front end.
+    ///
+    /// # Errors
+    /// Returns all errors in the files.
+    pub(super) fn record_loaded(
+        &mut self,
+        findings: &mut Findings,
+        sink: &EventSink,
+    ) -> Result<(), AbortReason> {
+        self.loaded.clone_from(&findings.files);
+        if !findings.errors.is_empty() {
+            return Err(AbortReason::Failed(findings.take_diagnostics_as_failure()));
+        }
+        self.report_read(findings, sink);
+        let warnings = [findings.conflicts.as_slice(), &findings.warnings].concat();
+        sink.send(Event::Warnings { generation: sink.generation, warnings });
+        Ok(())
+    }
+
+    /// Checks for outputs that must not be written. If the request can continue without writing them, sends
+    /// the conflicts to the front end and adds them to the findings.
+    ///
+    /// # Errors
+    /// Returns all conflicts if the image must be written.
+    pub(super) fn check_conflicts(
+        &self,
+        writing: WriteRequirement,
+        plan: &RenderPlan,
+        findings: &mut Findings,
+        sink: &EventSink,
+    ) -> Result<(), AbortReason> {
+        let found = output_conflicts(plan, &self.protected);
+        if found.is_empty() {
+            findings.conflicts = found;
+            return Ok(());
+        }
+        if writing == WriteRequirement::Must {
+            findings.errors.extend(found);
+            return Err(AbortReason::Failed(findings.take_diagnostics_as_failure()));
+        }
+        if found != findings.conflicts {
+            sink.send_write_conflicts(found.clone());
+        }
+        findings.conflicts = found;
+        Ok(())
+    }
+
+    /// Records the outcome of a request, and reports the files that it read.
+    pub(super) fn end_request(
+        &mut self,
+        outcome: &Result<Report, AbortReason>,
+        findings: &Findings,
+        sink: &EventSink,
+    ) {
+        // Watched files must not be written.
+        self.protected.add_read(&findings.files);
+        match outcome {
+            Ok(_) => self.is_broken = false,
+            Err(AbortReason::Failed(Failure::Scene(_))) => self.is_broken = true,
+            Err(AbortReason::Failed(Failure::Work(_)) | AbortReason::Cancelled) => {}
+        }
+        self.report_read(findings, sink);
+    }
+
+    /// Reports the files that a request read, followed by other files of the last loaded scene.
+    fn report_read(&self, findings: &Findings, sink: &EventSink) {
+        let mut files = findings.files.clone();
+        let known: HashSet<&Path> = findings.files.iter().map(|file| file.path.as_path()).collect();
+        files.extend(self.loaded.iter().filter(|file| !known.contains(file.path.as_path())).cloned());
+        sink.send_files_read(files, findings.files.len(), findings.begun);
+    }
+}

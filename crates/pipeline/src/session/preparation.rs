@@ -1,0 +1,132 @@
+//! Prepares the scene of a request, and checks in between whether its image fits in memory and may be written.
+
+use std::sync::Arc;
+
+use rayon::ThreadPool;
+
+use super::own_image::{SavedSceneImage, own_image_overrides};
+use super::{RequestContext, Session};
+use crate::formats::model::ModelViewOptions;
+use crate::inputs::ProtectedInputs;
+use crate::memory::MemoryEstimate;
+use crate::plan::{RenderPlan, RequestPlans};
+use crate::prepare::{FileReader, Reading, ReadyScene, RequestCamera, SceneAssets};
+use crate::protocol::{Event, Request};
+use crate::scene::description::CameraOverrides;
+use crate::settings::KeyboardOverridableSettings;
+use crate::sink::EventSink;
+use crate::stages::parse::{ParsedScene, SceneParseRequest};
+use crate::stages::textures::TextureSelection;
+use crate::stages::write::check_targets;
+use crate::stages::{AbortReason, Findings};
+use crate::table::StageRunner;
+use crate::warnings::settings_warnings;
+
+impl Session {
+    /// Reads one consistent version of the request's scene and builds its world.
+    pub(super) fn prepare(
+        &mut self,
+        context: &RequestContext<'_>,
+        pool: &ThreadPool,
+        table: &mut StageRunner<'_>,
+        findings: &mut Findings,
+    ) -> Result<ReadyScene, AbortReason> {
+        let RequestContext { request, sink, token, .. } = *context;
+        let contents = Arc::clone(&self.contents);
+        let reader = FileReader { contents: &contents, pool, sink, token };
+        let read = |reading: &mut Reading<'_, '_>| self.read_scene(request, reading);
+        let (assets, plans) = reader.read_consistently(table, findings, read)?;
+        let ready = self.build_world(request, Arc::new(assets), plans, table, pool)?;
+        if self.own.has_been_saved(request.saves) {
+            self.written.allow_replacing_user_written_image();
+        }
+        self.files.last_valid = Some(Arc::clone(&ready.assets));
+        Ok(ready)
+    }
+
+    /// Reads the scene and all files it needs. Rejects the request as early as possible if its image does not
+    /// fit in memory or cannot be written.
+    fn read_scene(
+        &mut self,
+        request: &Request,
+        reading: &mut Reading<'_, '_>,
+    ) -> Result<(SceneAssets, RequestPlans), AbortReason> {
+        let (Request { overrides, write, .. }, sink) = (request, reading.files.sink);
+        let show = ModelViewOptions::from_overrides(overrides);
+        let scene = SceneParseRequest { path: &request.scene, sets: &overrides.sets, show };
+        let parsed = self.scenes.parse(scene, reading)?;
+        let text = parsed.loaded.source.file_text_as_arc();
+        sink.send(Event::Text { generation: request.generation, text });
+        let plans = RequestPlans::resolve(&parsed.loaded.scene, request)?;
+        let plan = &plans.shown;
+        self.check_memory(&MemoryEstimate::for_image(plan), request, &plans)?;
+        let findings = &mut *reading.findings;
+        findings.warnings.extend(settings_warnings(&parsed.loaded, &plan.scene, &plan.settings, overrides));
+        send_settings(&parsed, plan, sink);
+        self.files.protect_parsed(&parsed, *write, plan, findings, sink)?;
+        if findings.conflicts.is_empty() {
+            check_targets(*write, plan, sink)?;
+        }
+        let textures = TextureSelection::ForImage(plans.texture_needs());
+        let assets = self.scenes.load(&parsed, textures, reading)?;
+        self.files.record_loaded(reading.findings, sink)?;
+        // Otherwise, parts rendered from a half-written file could be merged.
+        if plan.shard.is_some() {
+            reading.files.contents.wait_for_writers(reading.files.token)?;
+        }
+        reading.verify_files_unchanged()?;
+        let bytes = assets.textures.memory_bytes;
+        let estimate = MemoryEstimate::for_image_and_scene(plan, &plan.scene, &assets.meshes, bytes);
+        self.check_memory(&estimate, request, &plans)?;
+        self.files.protected = ProtectedInputs::from_assets(&assets);
+        self.files.check_conflicts(*write, plan, reading.findings, sink)?;
+        Ok((assets, plans))
+    }
+
+    /// Checks whether a request fits in memory.
+    ///
+    /// # Errors
+    /// See [`OwnImage::check_memory`](super::own_image::OwnImage::check_memory).
+    pub(super) fn check_memory(
+        &mut self,
+        estimate: &MemoryEstimate,
+        request: &Request,
+        plans: &RequestPlans,
+    ) -> Result<(), AbortReason> {
+        self.own.check_memory(estimate, request, plans, &mut self.films, &self.written)
+    }
+
+    /// Builds the world for the request, and determines the scene's own image.
+    pub(super) fn build_world(
+        &mut self,
+        request: &Request,
+        assets: Arc<SceneAssets>,
+        plans: RequestPlans,
+        table: &mut StageRunner<'_>,
+        pool: &ThreadPool,
+    ) -> Result<ReadyScene, AbortReason> {
+        let RequestPlans { shown, own } = plans;
+        let ready = self.scenes.build(assets, shown, &request.overrides.camera, table, pool)?;
+        let own = own.unwrap_or_else(|| ready.plan.clone());
+        let image = SavedSceneImage::new(&ready, own, own_image_overrides(request).camera);
+        self.own.set(image, &mut self.films);
+        Ok(ready)
+    }
+}
+
+/// Sends a valid scene's settings.
+fn send_settings(parsed: &ParsedScene, plan: &RenderPlan, sink: &EventSink) {
+    let scene = &parsed.loaded.scene;
+    let camera = RequestCamera::new(&plan.scene, parsed.orbiter, &CameraOverrides::default());
+    sink.send(Event::Settings {
+        generation: sink.generation,
+        settings: Box::new(plan.effective.clone()),
+        camera: camera.resolved_camera(),
+        exposure: scene.render.exposure,
+        own: KeyboardOverridableSettings {
+            integrator: scene.render.integrator,
+            shadows: scene.render.shadows,
+            photons: scene.photons.enabled,
+        },
+    });
+}

@@ -1,0 +1,142 @@
+//! The steps of a request.
+
+use super::render::RequestImage;
+use super::{RequestContext, Session};
+use crate::plan::thread_count;
+use crate::protocol::{Event, Failure, Report, Stage, Status};
+use crate::render::film_cache::FilmCache;
+use crate::report::finish::{RequestResults, make_report};
+use crate::scene::diagnostic::Diagnostic;
+use crate::scene::fingerprint::Fingerprint;
+use crate::settings::ViewMode;
+use crate::stages::photons::PhotonStore;
+use crate::stages::{AbortReason, Findings};
+use crate::stopwatch::PausableStopwatch;
+use crate::table::StageRunner;
+
+/// Outcome of a finished request.
+pub(crate) struct CompletedRequest {
+    pub(crate) report: Report,
+    /// Reasons why the image is not written.
+    pub(crate) conflicts: Vec<Diagnostic>,
+    /// Likely mistakes in the scene.
+    pub(crate) warnings: Vec<Diagnostic>,
+    /// Whether the displayed image is unchanged.
+    pub(crate) unchanged: bool,
+}
+
+impl Session {
+    /// Runs a request and sends its outcome. If the scene is invalid, renders the last valid one.
+    pub(crate) fn handle_request(&mut self, context: &RequestContext<'_>) {
+        let generation = context.request.generation;
+        let outcome = self.run_request(context);
+        let is_broken = matches!(outcome, Err(AbortReason::Failed(Failure::Scene(_))));
+        context.sink.send(match outcome {
+            Ok(CompletedRequest { report, conflicts, warnings, unchanged }) => {
+                let warnings = [conflicts, warnings].concat();
+                Event::Done { generation, report: Box::new(report), warnings, unchanged }
+            }
+            Err(AbortReason::Cancelled) => Event::Cancelled { generation },
+            Err(AbortReason::Failed(failure)) => Event::Failed { generation, failure },
+        });
+        if is_broken {
+            self.render_and_write_last_valid_scene(context);
+        }
+    }
+
+    /// Runs a request and returns its outcome.
+    pub(crate) fn run_request(
+        &mut self,
+        context: &RequestContext<'_>,
+    ) -> Result<CompletedRequest, AbortReason> {
+        let RequestContext { request, sink, .. } = *context;
+        sink.send(Event::Started { generation: request.generation });
+        let mut findings = Findings::default();
+        let before = self.current_image_key_and_view();
+        let outcome = self.run_stages(context, &mut findings);
+        if let Err(AbortReason::Failed(Failure::Scene(diagnostics))) = &outcome {
+            findings.watch_underlined_files(diagnostics, &request.scene, &self.contents, context.token);
+        }
+        if let (Ok(report), Some(current)) = (&outcome, &mut self.current) {
+            current.report = Some(report.clone());
+            let is_by_hand = self.written.has_user_written_image_on_disk(&self.contents);
+            if request.own.is_none() && findings.conflicts.is_empty() && !is_by_hand {
+                self.write_report(report, sink, context.writing);
+            }
+        }
+        self.files.end_request(&outcome, &findings, sink);
+        let report = outcome?;
+        let settled = |stage: Stage| report.stages[stage as usize].status != Status::Done;
+        let unchanged =
+            self.current_image_key_and_view() == before && settled(Stage::Render) && settled(Stage::Write);
+        let Findings { conflicts, warnings, .. } = findings;
+        Ok(CompletedRequest { report, conflicts, warnings, unchanged })
+    }
+
+    /// Runs all stages of a request and returns its report.
+    fn run_stages(
+        &mut self,
+        context: &RequestContext<'_>,
+        findings: &mut Findings,
+    ) -> Result<Report, AbortReason> {
+        let RequestContext { request, sink, token, .. } = *context;
+        let watch = PausableStopwatch::start(token);
+        let mut table = StageRunner::new(sink, token);
+        // A turntable never revisits earlier images.
+        if request.overrides.turn.is_some() {
+            self.films = FilmCache::default();
+        }
+        // Prepare the scene, from its files to the world.
+        let pool = self.threads.pool(thread_count(&request.overrides), true)?;
+        let scene = self.prepare(context, &pool, &mut table, findings);
+        // Even if the render is stopped, keep the files for later requests.
+        self.scenes.end_request(scene.is_ok());
+        // Trace photons and render the film.
+        let mut image = self.trace_photons(context, scene?, &mut table, &pool)?;
+        self.assign_share(context, &mut image);
+        self.report_own_image_state(context, &image);
+        let rays = table.run(Stage::Render, || self.render(context, &image, &pool))?;
+        // Write the image. Symbolic links and files may have changed during the render.
+        let plan = &image.scene.plan;
+        self.files.check_conflicts(request.write, plan, findings, sink)?;
+        let was_own_written = self.own.is_written(&self.written);
+        let written = table.run(Stage::Write, || self.run_write_stage(context, plan, findings, &pool));
+        self.report_own_image_state(context, &image);
+        self.finish_checkpoint(context, &image, written.as_ref().is_ok_and(|is_written| *is_written));
+        // Report the results.
+        let results = RequestResults {
+            scene: &image.scene,
+            plan,
+            is_written: written?,
+            state: self.films.existing()?,
+            films: &self.films,
+            rays,
+            photons: image.photons.and_then(|key| self.photons.get(key)).map(PhotonStore::report),
+        };
+        let (stages, seconds) = (table.stages, watch.seconds());
+        if let Some(own) = self.own.current.as_ref().filter(|_| request.own.is_some())
+            && self.own.is_written(&self.written)
+            && !was_own_written
+        {
+            let results = RequestResults { plan: &own.plan, is_written: true, ..results };
+            let report = pool.install(|| make_report(&results, stages.clone(), seconds));
+            self.write_report(&report, sink, context.writing);
+        }
+        Ok(pool.install(|| make_report(&results, stages, seconds)))
+    }
+
+    /// Returns the current image's key and view.
+    pub(super) fn current_image_key_and_view(&self) -> (Option<Fingerprint>, Option<ViewMode>) {
+        let view = self.current.as_ref().map(|current| current.plan.settings.view);
+        (self.films.current().map(|state| state.key), view)
+    }
+
+    /// Reports the state of the scene's own image while another image is shown.
+    fn report_own_image_state(&self, context: &RequestContext<'_>, image: &RequestImage) {
+        if context.request.own.is_some()
+            && let Some(state) = self.own.state(image.film, &self.films, &self.written)
+        {
+            context.sink.send_saved_scene_image_state(state);
+        }
+    }
+}
