@@ -19,7 +19,7 @@ pub use super::answers::{
 pub use super::report::{
     ImageReport, LightSamplingReport, PhotonsReport, Report, SampleCounts, SampledLightSet, WorkCounters,
 };
-use super::settings::{EffectiveSettingsSummary, KeyboardOverridableSettings, Overrides};
+use super::settings::{EffectiveSettingsSummary, Overrides, SceneSettings};
 use super::watch::content::FilePathAndContentId;
 use crate::film::Srgb8Image;
 pub use crate::output::WriteWarning;
@@ -159,12 +159,8 @@ pub enum Event {
         generation: u64,
         /// Effective settings of the request.
         settings: Box<EffectiveSettingsSummary>,
-        /// The scene's camera.
-        camera: ResolvedCamera,
-        /// The scene's exposure in stops.
-        exposure: f32,
-        /// The scene's values for the other settings that keys can change.
-        own: KeyboardOverridableSettings,
+        /// The scene's values for the settings that keys can change.
+        own: SceneSettings,
     },
     /// The scene file was read.
     Text {

@@ -8,7 +8,7 @@ use crate::film::Rect;
 pub use crate::integrators::ViewMode;
 use crate::integrators::{LayerSet, RenderSettings, SampleLayer};
 pub use crate::scene::description::CameraOverrides;
-use crate::scene::description::{Accel, Integrator, RenderOptions, ShadowMode, render_keys};
+use crate::scene::description::{Accel, Integrator, RenderOptions, ResolvedCamera, ShadowMode, render_keys};
 
 macro_rules! overrides {
     ($(
@@ -185,9 +185,13 @@ pub enum ResumeMode {
     IfSame,
 }
 
-/// Scene settings that can be overridden with keys.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct KeyboardOverridableSettings {
+/// The scene's values for the settings that keys can change.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SceneSettings {
+    /// Camera.
+    pub camera: ResolvedCamera,
+    /// Exposure in stops.
+    pub exposure: f32,
     /// Integrator.
     pub integrator: Integrator,
     /// Shadow type.

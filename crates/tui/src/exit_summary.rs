@@ -398,7 +398,7 @@ mod tests {
         let mut ui = TestUi::new();
         ui.finish_render([200, 30, 30]);
         ui.state.request.text = Some(text.into());
-        ui.state.request.camera.as_mut().expect("a camera").aperture = 0.1;
+        ui.state.request.own.as_mut().expect("a scene").camera.aperture = 0.1;
         ui.press_character('l');
         let moved = ui.state.request.viewpoint().expect("a camera");
         let words = unsaved_changes_as_options(&ui.state).expect("moved");

@@ -22,7 +22,7 @@ use crate::pipeline::protocol::{
     self, AssetProgress, Command, Failure, ImageReport, RenderProgress, Report, Request, ResolvedCamera,
     SampleCounts, Stage, StageReport, Status, WorkCounters,
 };
-use crate::pipeline::settings::{EffectiveSettingsSummary, KeyboardOverridableSettings, Overrides, ViewMode};
+use crate::pipeline::settings::{EffectiveSettingsSummary, Overrides, SceneSettings, ViewMode};
 use crate::scene::description::{Accel, Integrator, Pose, ShadowMode};
 use crate::scene::diagnostic::{Diagnostic, Severity, SourceSpan};
 
@@ -112,8 +112,6 @@ impl TestUi {
         self.worker_event(protocol::Event::Settings {
             generation,
             settings: Box::new(effective_settings()),
-            camera: camera(),
-            exposure: 0.0,
             own: scene_settings(),
         });
     }
@@ -202,8 +200,9 @@ pub(super) fn effective_settings() -> EffectiveSettingsSummary {
 }
 
 /// Settings from the scene file, before any overrides.
-pub(super) fn scene_settings() -> KeyboardOverridableSettings {
-    KeyboardOverridableSettings { integrator: Integrator::Whitted, shadows: ShadowMode::Soft, photons: false }
+pub(super) fn scene_settings() -> SceneSettings {
+    let (integrator, shadows) = (Integrator::Whitted, ShadowMode::Soft);
+    SceneSettings { camera: camera(), exposure: 0.0, integrator, shadows, photons: false }
 }
 
 /// A camera at (0, 1, 4) that looks along −z at a point 4 units away.

@@ -9,7 +9,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use super::fixtures::{
-    asset_progress, camera, diagnostic, done_event, effective_settings, scene_settings, stage_report,
+    asset_progress, diagnostic, done_event, effective_settings, scene_settings, stage_report,
 };
 use super::{
     ColorDepthChoice, ContentChangeTime, EventQueue, EventSender, Options, PreviewChoice, WatchEvent, run,
@@ -102,13 +102,7 @@ fn simulate_render(
         return None;
     }
     say(Event::Stage { generation, stage: stage_report(Stage::Parse, Status::Done, 0.0003, "") });
-    say(Event::Settings {
-        generation,
-        settings: Box::new(effective_settings()),
-        camera: camera(),
-        exposure: 0.0,
-        own: scene_settings(),
-    });
+    say(Event::Settings { generation, settings: Box::new(effective_settings()), own: scene_settings() });
     say(Event::Stage { generation, stage: stage_report(Stage::Textures, Status::Running, 0.0, "") });
     let start = Instant::now();
     for step in 0..=20_u32 {

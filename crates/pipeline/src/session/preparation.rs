@@ -13,7 +13,7 @@ use crate::plan::{RenderPlan, RequestPlans};
 use crate::prepare::{FileReader, Reading, ReadyScene, RequestCamera, SceneAssets};
 use crate::protocol::{Event, Request};
 use crate::scene::description::CameraOverrides;
-use crate::settings::KeyboardOverridableSettings;
+use crate::settings::SceneSettings;
 use crate::sink::EventSink;
 use crate::stages::parse::{ParsedScene, SceneParseRequest};
 use crate::stages::textures::TextureSelection;
@@ -121,9 +121,9 @@ fn send_settings(parsed: &ParsedScene, plan: &RenderPlan, sink: &EventSink) {
     sink.send(Event::Settings {
         generation: sink.generation,
         settings: Box::new(plan.effective.clone()),
-        camera: camera.resolved_camera(),
-        exposure: scene.render.exposure,
-        own: KeyboardOverridableSettings {
+        own: SceneSettings {
+            camera: camera.resolved_camera(),
+            exposure: scene.render.exposure,
             integrator: scene.render.integrator,
             shadows: scene.render.shadows,
             photons: scene.photons.enabled,

@@ -20,7 +20,7 @@ fn camera(bench: &mut Bench) -> ResolvedCamera {
     let of = bench.send();
     let events = bench.until_end(of);
     let camera = |event: &Event| match event {
-        Event::Settings { camera, .. } => Some(*camera),
+        Event::Settings { own, .. } => Some(own.camera),
         _ => None,
     };
     let own = events.iter().find_map(camera).expect("a camera");

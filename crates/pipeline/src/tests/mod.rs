@@ -185,8 +185,8 @@ impl Bench {
 
     pub(super) fn next(&self) -> Event {
         let event = self.events.recv_timeout(Duration::from_secs(60)).expect("an event within a minute");
-        if let Event::Settings { camera, .. } = &event {
-            self.own.set(Some(*camera));
+        if let Event::Settings { own, .. } = &event {
+            self.own.set(Some(own.camera));
         }
         event
     }

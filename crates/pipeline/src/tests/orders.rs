@@ -695,9 +695,9 @@ fn settings_event_includes_scene_values() {
     let of = bench.send();
     let events = bench.until_end(of);
     let reported = |event: &Event| {
-        let Event::Settings { settings, camera, exposure, own, .. } = event else { return None };
+        let Event::Settings { settings, own, .. } = event else { return None };
         let shadows = (settings.shadows, own.shadows);
-        Some((settings.exposure, *exposure, camera.fov, shadows, own.integrator, own.photons))
+        Some((settings.exposure, own.exposure, own.camera.fov, shadows, own.integrator, own.photons))
     };
     let shadows = (ShadowMode::Off, ShadowMode::Soft);
     assert_eq!(events.iter().find_map(reported), Some((2.0, 0.5, 40.0, shadows, Integrator::Whitted, false)));

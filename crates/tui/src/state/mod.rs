@@ -89,7 +89,7 @@ impl State {
         let is_at_work = match work.activity {
             RequestStatus::Running { .. } => true,
             RequestStatus::Waiting | RequestStatus::Broken => {
-                request.camera.is_some() && self.is_failure_in_scene()
+                request.own.is_some() && self.is_failure_in_scene()
             }
             RequestStatus::Done | RequestStatus::Cancelled => false,
         };

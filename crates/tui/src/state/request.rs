@@ -10,7 +10,7 @@ use crate::pipeline::FilePathAndContentId;
 use crate::pipeline::has_model_extension;
 use crate::pipeline::protocol::{MaxPreviewSize, NormalizedRect, ResolvedCamera};
 use crate::pipeline::settings::{
-    CameraOverrides, EffectiveSettingsSummary, KeyboardOverridableSettings, Overrides, ViewMode,
+    CameraOverrides, EffectiveSettingsSummary, Overrides, SceneSettings, ViewMode,
 };
 use crate::scene::description::{Integrator, Pose, ShadowMode};
 use crate::scene::list_changes;
@@ -190,12 +190,8 @@ pub(crate) struct RequestState {
     pub files: Arc<[FilePathAndContentId]>,
     /// Effective settings, as reported by the worker.
     pub effective: Option<EffectiveSettingsSummary>,
-    /// The scene's own camera for the newest valid request.
-    pub camera: Option<ResolvedCamera>,
-    /// The scene's own exposure in stops.
-    pub exposure: Option<f32>,
-    /// Other scene settings that keys can change.
-    pub own: Option<KeyboardOverridableSettings>,
+    /// The scene's own settings for the newest valid request.
+    pub own: Option<SceneSettings>,
 }
 
 impl RequestState {
@@ -216,8 +212,6 @@ impl RequestState {
             text: None,
             files: Arc::default(),
             effective: None,
-            camera: None,
-            exposure: None,
             own: None,
         }
     }
@@ -261,7 +255,8 @@ impl RequestState {
     pub(crate) fn drop_overrides_saved_to_scene(&mut self) {
         let (shadows, integrator, photons) =
             (self.shadows_without_toggles(), self.integrator_without_toggles(), self.base_photons_enabled());
-        let (exposure, own) = (self.command_line.exposure.or(self.exposure), self.camera);
+        let own = self.camera();
+        let exposure = self.command_line.exposure.or(self.own.map(|own| own.exposure));
         let KeyOverrides { camera, .. } = &mut self.toggles;
         camera.pose.take_if(|pose| own.is_some_and(|own| own.pose == *pose));
         camera.fov.take_if(|fov| own.is_some_and(|own| own.fov == *fov));
@@ -273,13 +268,18 @@ impl RequestState {
 
     /// The camera, including changes made with keys, or `None` until a valid scene has been read.
     pub(crate) fn viewpoint(&self) -> Option<ResolvedCamera> {
-        self.camera.map(|camera| camera.with_change(&self.toggles.camera))
+        self.camera().map(|camera| camera.with_change(&self.toggles.camera))
+    }
+
+    /// The scene's own camera, or `None` until a valid scene has been read.
+    pub(crate) fn camera(&self) -> Option<ResolvedCamera> {
+        self.own.map(|own| own.camera)
     }
 
     /// Records the original values of camera parts that were moved with keys. Does not overwrite values
     /// recorded earlier.
     pub(crate) fn record_original_camera(&mut self) {
-        let Some(own) = self.camera else { return };
+        let Some(own) = self.camera() else { return };
         let (moved, from) = (&self.toggles.camera, self.moved_from);
         self.moved_from = CameraOverrides {
             pose: moved.pose.and(from.pose.or(Some(own.pose))),
@@ -297,7 +297,7 @@ impl RequestState {
     /// Lists camera settings that changed in the scene file after the camera was moved with keys, with their
     /// current values.
     pub(crate) fn scene_camera_edits_since_move(&self) -> Vec<String> {
-        let Some((own, moved)) = self.camera.zip(self.viewpoint()) else { return Vec::new() };
+        let Some((own, moved)) = self.camera().zip(self.viewpoint()) else { return Vec::new() };
         let from = &self.moved_from;
         let of_pose = |key: &str, of: fn(&Pose) -> DVec3| {
             let (before, now) = (of(&from.pose?), of(&own.pose));

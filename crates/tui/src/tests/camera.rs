@@ -5,7 +5,7 @@ use crate::event::{Effect, Event, KeyPress};
 use crate::fixtures::*;
 use crate::messages;
 use crate::pipeline::protocol::{self, Command, ResolvedCamera, WriteRequirement};
-use crate::pipeline::settings::Overrides;
+use crate::pipeline::settings::{Overrides, SceneSettings};
 use crate::preview_style::PreviewStyle;
 use crate::scene::description::Pose;
 use crate::scene::diagnostic::Severity;
@@ -129,7 +129,7 @@ fn camera_keys_need_a_scene() {
 fn exposure_changes_start_from_scene_value() {
     let mut ui = TestUi::new();
     ui.finish_render(RED);
-    ui.state.request.exposure = Some(1.0);
+    ui.state.request.own.as_mut().expect("a scene").exposure = 1.0;
     ui.press_character(']');
     show(&mut ui);
     let effects = ui.press_character(']');
@@ -244,9 +244,7 @@ fn save(ui: &mut TestUi, camera: ResolvedCamera) {
     ui.worker_event(protocol::Event::Settings {
         generation,
         settings: effective_settings().into(),
-        camera,
-        exposure: 0.0,
-        own: scene_settings(),
+        own: SceneSettings { camera, ..scene_settings() },
     });
     show(ui);
 }

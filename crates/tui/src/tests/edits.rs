@@ -376,7 +376,7 @@ fn d_and_f_report_a_pinhole_camera() {
         ui.save_scene(text);
         ui.report_scene_read();
         ui.state.request.effective = Some(EffectiveSettingsSummary { dof: false, ..effective_settings() });
-        ui.state.request.camera.as_mut().expect("a camera").aperture = 0.0;
+        ui.state.request.own.as_mut().expect("a scene").camera.aperture = 0.0;
         ui.press_character('d');
         assert!(ui.screen_text().contains(messages::PINHOLE), "{}", ui.screen_text());
         ui.press_character('f');

@@ -158,13 +158,7 @@ impl WatchedRender {
         let generation = ui.state.request.generation;
         ui.worker_event(protocol::Event::Started { generation });
         let settings = Box::new(effective_settings());
-        ui.worker_event(protocol::Event::Settings {
-            generation,
-            settings,
-            camera: camera(),
-            exposure: 0.0,
-            own: scene_settings(),
-        });
+        ui.worker_event(protocol::Event::Settings { generation, settings, own: scene_settings() });
         let size = ui.state.request.preview_size.expect("a preview size");
         let (outbox, slot) = (Rc::<RefCell<Vec<Vec<u8>>>>::default(), PreviewSlot::default());
         let images = match preview {

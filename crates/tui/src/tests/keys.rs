@@ -10,7 +10,7 @@ use crate::keymap::{self, KEYMAP};
 use crate::math::DVec3;
 use crate::messages;
 use crate::pipeline::protocol::{self, Command, ImagePosition, SavedCameraEdit, WriteRequirement};
-use crate::pipeline::settings::{EffectiveSettingsSummary, KeyboardOverridableSettings, Overrides, ViewMode};
+use crate::pipeline::settings::{EffectiveSettingsSummary, Overrides, SceneSettings, ViewMode};
 use crate::preview_style::PreviewStyle;
 use crate::scene::description::{Integrator, Pose, ShadowMode};
 use crate::scene::diagnostic::Severity;
@@ -343,34 +343,16 @@ fn toggles_start_from_the_command_line() {
 fn pinhole_has_no_depth_of_field() {
     let mut ui = TestUi::new();
     let pinhole = || Box::new(EffectiveSettingsSummary { dof: false, ..effective_settings() });
-    ui.worker_event(protocol::Event::Settings {
-        generation: 1,
-        settings: pinhole(),
-        camera: camera(),
-        exposure: 0.0,
-        own: scene_settings(),
-    });
+    ui.worker_event(protocol::Event::Settings { generation: 1, settings: pinhole(), own: scene_settings() });
     assert!(ui.press_character('d').is_empty());
     assert!(ui.screen_text().contains(messages::PINHOLE));
 
     let base = Overrides { dof: Some(false), ..Overrides::default() };
     let state = state_with(80, 24, PreviewStyle::HalfBlock, ColorDepth::TrueColor, base);
     let mut ui = TestUi::from_state(state);
-    ui.worker_event(protocol::Event::Settings {
-        generation: 1,
-        settings: pinhole(),
-        camera: camera(),
-        exposure: 0.0,
-        own: scene_settings(),
-    });
+    ui.worker_event(protocol::Event::Settings { generation: 1, settings: pinhole(), own: scene_settings() });
     assert_eq!(find_render_request(&ui.press_character('d')).expect("a request").overrides.dof, Some(true));
-    ui.worker_event(protocol::Event::Settings {
-        generation: 2,
-        settings: pinhole(),
-        camera: camera(),
-        exposure: 0.0,
-        own: scene_settings(),
-    });
+    ui.worker_event(protocol::Event::Settings { generation: 2, settings: pinhole(), own: scene_settings() });
     assert!(ui.screen_text().contains(messages::PINHOLE));
 }
 
@@ -491,12 +473,10 @@ fn saved_settings_are_the_base_for_toggles() {
     ui.finish_render(BLUE);
     // The saved scene has hard shadows, as set with the key.
     ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
-    let (generation, own) = (
-        ui.state.request.generation,
-        KeyboardOverridableSettings { shadows: ShadowMode::Hard, ..scene_settings() },
-    );
+    let generation = ui.state.request.generation;
+    let own = SceneSettings { shadows: ShadowMode::Hard, ..scene_settings() };
     let settings = Box::new(EffectiveSettingsSummary { shadows: ShadowMode::Hard, ..effective_settings() });
-    ui.worker_event(protocol::Event::Settings { generation, settings, camera: camera(), exposure: 0.0, own });
+    ui.worker_event(protocol::Event::Settings { generation, settings, own });
     let shadows: Vec<Option<ShadowMode>> = "sss"
         .chars()
         .map(|key| {

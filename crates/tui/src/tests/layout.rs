@@ -28,13 +28,7 @@ fn rendered(ui: &mut TestUi, (width, height): (u32, u32)) {
     let generation = ui.state.request.generation;
     ui.worker_event(protocol::Event::Started { generation });
     let settings = Box::new(EffectiveSettingsSummary { width, height, ..effective_settings() });
-    ui.worker_event(protocol::Event::Settings {
-        generation,
-        settings,
-        camera: camera(),
-        exposure: 0.0,
-        own: scene_settings(),
-    });
+    ui.worker_event(protocol::Event::Settings { generation, settings, own: scene_settings() });
     show(ui, (width, height));
 }
 
@@ -131,16 +125,12 @@ fn new_aspect_ratio_requests_another_preview() {
     let same = ui.worker_event(protocol::Event::Settings {
         generation: 1,
         settings: settings(640),
-        camera: camera(),
-        exposure: 0.0,
         own: scene_settings(),
     });
     assert!(same.is_empty(), "{same:?}");
     let wide = ui.worker_event(protocol::Event::Settings {
         generation: 1,
         settings: settings(1200),
-        camera: camera(),
-        exposure: 0.0,
         own: scene_settings(),
     });
     assert!(
@@ -301,13 +291,7 @@ fn hints_wrap_at_the_panel_width() {
         let mut ui = TestUi::from_state(state(columns, rows));
         ui.finish_render(RED);
         let settings = Box::new(EffectiveSettingsSummary { width, height: 480, ..effective_settings() });
-        ui.worker_event(protocol::Event::Settings {
-            generation: 1,
-            settings,
-            camera: camera(),
-            exposure: 0.0,
-            own: scene_settings(),
-        });
+        ui.worker_event(protocol::Event::Settings { generation: 1, settings, own: scene_settings() });
         let panel = Layout::for_state(&ui.state).panel;
         let hint = messages::save_to_render_hint("cornell.toml", true);
         assert_eq!(

@@ -33,13 +33,7 @@ fn sample_count_is_approximate_with_noise_target() {
     ui.worker_event(protocol::Event::Started { generation: 1 });
     let settings =
         Box::new(crate::pipeline::settings::EffectiveSettingsSummary { error: 0.02, ..effective_settings() });
-    ui.worker_event(protocol::Event::Settings {
-        generation: 1,
-        settings,
-        camera: camera(),
-        exposure: 0.0,
-        own: scene_settings(),
-    });
+    ui.worker_event(protocol::Event::Settings { generation: 1, settings, own: scene_settings() });
     ui.worker_event(protocol::Event::Progress {
         generation: 1,
         progress: RenderProgress { is_total_fixed: false, ..render_progress(0.5, None) },

@@ -218,13 +218,7 @@ fn no_partial_lines_remain_below_the_view_list() {
     let mut ui = TestUi::from_state(state(120, 40));
     ui.finish_render(RED);
     let settings = Box::new(EffectiveSettingsSummary { width: 480, height: 480, ..effective_settings() });
-    ui.worker_event(protocol::Event::Settings {
-        generation: 1,
-        settings,
-        camera: camera(),
-        exposure: 0.0,
-        own: scene_settings(),
-    });
+    ui.worker_event(protocol::Event::Settings { generation: 1, settings, own: scene_settings() });
     ui.press_character('v');
     let generation = ui.state.request.generation;
     ui.worker_event(protocol::Event::Started { generation });
@@ -323,13 +317,7 @@ fn diagnostics_are_next_to_the_image_if_possible() {
         let mut ui = TestUi::from_state(state(columns, rows));
         ui.finish_render(RED);
         let settings = Box::new(EffectiveSettingsSummary { width, height: 480, ..effective_settings() });
-        ui.worker_event(protocol::Event::Settings {
-            generation: 1,
-            settings,
-            camera: camera(),
-            exposure: 0.0,
-            own: scene_settings(),
-        });
+        ui.worker_event(protocol::Event::Settings { generation: 1, settings, own: scene_settings() });
         let before = cells_of(&mut ui, RED);
         ui.report_scene_errors(vec![diagnostic(Severity::Error, "misspelled")]);
         assert!(ui.screen_text().contains("error: misspelled"), "{}", ui.screen_text());

@@ -148,7 +148,7 @@ fn click_after_f_sets_the_focus() {
     assert!((spot.x - 12.5 / 55.0).abs() < 1e-9, "expected the last click: {spot:?}");
     assert!(answer(&mut ui, None).is_empty());
     assert!(ui.screen_text().contains(messages::NOTHING_TO_FOCUS));
-    ui.state.request.camera.as_mut().expect("a camera").aperture = 0.0;
+    ui.state.request.own.as_mut().expect("a scene").camera.aperture = 0.0;
     ui.press_character('f');
     assert!(answer(&mut ui, Some(thing())).is_empty());
     assert!(ui.screen_text().contains(messages::PINHOLE));
@@ -520,7 +520,7 @@ fn digit_without_the_view_list_shows_a_hint() {
 #[test]
 fn focusing_requires_an_aperture() {
     let mut ui = ui();
-    ui.state.request.camera.as_mut().expect("a camera").aperture = 0.0;
+    ui.state.request.own.as_mut().expect("a scene").camera.aperture = 0.0;
     assert!(ui.press_character('f').is_empty());
     assert!(ui.screen_text().contains(messages::PINHOLE), "{}", ui.screen_text());
     assert!(!ui.state.selection.is_focusing, "the next click should not set the focus");

@@ -25,8 +25,6 @@ fn rendered(ui: &mut TestUi, error: f32) {
     ui.worker_event(protocol::Event::Settings {
         generation,
         settings: settings.clone(),
-        camera: camera(),
-        exposure: 0.0,
         own: scene_settings(),
     });
     let picture = uniform_picture(90, 68, RED);

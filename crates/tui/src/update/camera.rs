@@ -43,7 +43,7 @@ pub(super) fn orbit_by(state: &mut State, right: f64, up: f64) -> Vec<Effect> {
 
 /// Moves the camera closer by a number of steps.
 pub(super) fn dolly(state: &mut State, steps: f64) -> Vec<Effect> {
-    let Some((view, own)) = state.request.viewpoint().zip(state.request.camera) else {
+    let Some((view, own)) = state.request.viewpoint().zip(state.request.camera()) else {
         return show_no_scene_notice(state);
     };
     let pose = dollied(&view.pose, libm::pow(NEARER, steps), own.pose.distance());
@@ -69,7 +69,7 @@ pub(super) fn widen_field_of_view(state: &mut State, steps: f64) -> Vec<Effect> 
 
 /// Increases the exposure by a number of steps.
 pub(super) fn change_exposure(state: &mut State, steps: f32) -> Vec<Effect> {
-    let Some(scene) = state.request.exposure else { return show_no_scene_notice(state) };
+    let Some(scene) = state.request.own.map(|own| own.exposure) else { return show_no_scene_notice(state) };
     let own = state.request.command_line.exposure.unwrap_or(scene);
     let before = state.request.toggles.exposure.unwrap_or(own);
     let stops = (before + steps * STOPS).clamp((-MAX_STOPS).min(before), MAX_STOPS.max(before));
@@ -108,7 +108,7 @@ pub(super) fn render_camera_step(state: &mut State) -> Vec<Effect> {
 
 /// Drops camera changes that are equal to the scene's own values.
 fn drop_noop_camera_changes(state: &mut State) {
-    let Some(own) = state.request.camera else { return };
+    let Some(own) = state.request.camera() else { return };
     let camera = &mut state.request.toggles.camera;
     camera.pose = camera.pose.filter(|pose| *pose != own.pose);
     camera.fov = camera.fov.filter(|fov| (fov - own.fov).abs() > ROUNDING);
@@ -118,7 +118,7 @@ fn drop_noop_camera_changes(state: &mut State) {
 
 /// Asks the worker to write the current camera into the scene file.
 pub(super) fn save_camera(state: &mut State) -> Vec<Effect> {
-    let Some((camera, own)) = state.request.viewpoint().zip(state.request.camera) else {
+    let Some((camera, own)) = state.request.viewpoint().zip(state.request.camera()) else {
         return show_no_scene_notice(state);
     };
     let is_set = state.request.command_line.sets.iter().any(|set| set.trim_start().starts_with("camera"));

@@ -123,7 +123,7 @@ fn send_pick_query(state: &mut State, purpose: PickPurpose) -> Vec<Effect> {
     if state.picture.history.is_viewing_older() {
         return show_notice_without_effects(state, messages::OLDER_RENDER);
     }
-    if state.request.camera.is_none() {
+    if state.request.own.is_none() {
         return show_notice_without_effects(state, messages::NO_SCENE);
     }
     state.selection.purpose = purpose;

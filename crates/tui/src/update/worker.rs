@@ -59,9 +59,8 @@ pub(super) fn handle_worker_event(state: &mut State, event: Event) -> Vec<Effect
         Event::Started { .. } => reset_work_for_new_request(state),
         Event::Stage { stage, .. } => record_stage(state, stage),
         Event::Asset { progress, .. } => update_asset_bar(state, progress),
-        Event::Settings { settings, camera, exposure, own, .. } => {
+        Event::Settings { settings, own, .. } => {
             state.request.own = Some(own);
-            (state.request.camera, state.request.exposure) = (Some(camera), Some(exposure));
             state.request.drop_overrides_saved_to_scene();
             let pinhole = state.request.combined_overrides().dof == Some(true) && !settings.dof;
             state.request.effective = Some(*settings);
