@@ -17,6 +17,7 @@ mod formats;
 pub mod headless;
 mod identity;
 mod inputs;
+pub mod key_overrides;
 mod keys;
 mod memory;
 pub mod messages;

@@ -11,12 +11,12 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
+use super::key_overrides::KeyOverrides;
 use super::protocol::{Command, Event, Failure, MaxPreviewSize, PreviewSlot, Request, WriteRequirement};
 use super::queries::QueryOrEdit;
 use super::render::checkpointer::Interruption;
 use super::render::commands::PendingCommands;
 use super::session::{RequestContext, Session, SessionConfig};
-use super::settings::Overrides;
 use super::sink::{EventListener, EventSink};
 use super::watch::content::FileHashCache;
 use crate::control::CancelToken;
@@ -131,7 +131,7 @@ struct Mailbox {
     /// Whether a write order arrived after the pending request and therefore applies to it.
     is_write_of_waiting: bool,
     /// The current request's overrides that the user can change with keys.
-    shown: Overrides,
+    shown: KeyOverrides,
     /// Pending preview size change.
     preview: Option<Option<MaxPreviewSize>>,
     queries: VecDeque<QueryOrEdit>,
@@ -147,12 +147,6 @@ struct Mailbox {
     writing: CancelToken,
     /// Generation of the newest request.
     newest: u64,
-}
-
-/// Returns the request's overrides that the user can change with keys, without the others.
-fn keyboard_adjustable_overrides(request: &Request) -> Overrides {
-    let Overrides { shadows, integrator, dof, photons, view, camera, exposure, .. } = request.overrides;
-    Overrides { shadows, integrator, dof, photons, view, camera, exposure, ..Overrides::default() }
 }
 
 /// The next task for the worker.
@@ -240,7 +234,7 @@ impl CommandSender {
         let mut mailbox = self.lock();
         let is_meant = mailbox.is_write_of_waiting;
         let postponed = mailbox.request.as_ref().is_some_and(|request| {
-            is_meant || !can_write && keyboard_adjustable_overrides(request) == mailbox.shown
+            is_meant || !can_write && KeyOverrides::of(&request.overrides) == mailbox.shown
         });
         (mailbox.write, mailbox.is_write_postponed) = (postponed, postponed);
         postponed
@@ -264,7 +258,7 @@ impl CommandSender {
             if let Some(request) = mailbox.request.take() {
                 (mailbox.token, mailbox.writing) = (CancelToken::new(), CancelToken::new());
                 mailbox.is_write_of_waiting = false;
-                mailbox.shown = keyboard_adjustable_overrides(&request);
+                mailbox.shown = KeyOverrides::of(&request.overrides);
                 mailbox.token.set_paused(mailbox.paused);
                 return Task::Render(request, mailbox.token.clone(), mailbox.writing.clone());
             }
@@ -375,7 +369,7 @@ fn panic_reason(payload: &(dyn Any + Send)) -> &str {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::settings::ViewMode;
+    use crate::settings::{Overrides, ViewMode};
 
     fn render(generation: u64) -> Command {
         Command::Render(Box::new(Request::new(generation, "a.toml".into(), Overrides::default())))

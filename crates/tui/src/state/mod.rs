@@ -14,7 +14,7 @@ use std::time::{Duration, Instant};
 pub(super) use self::display::TerminalDisplayState;
 pub(super) use self::overlays::{BlockingErrors, Message, OverlayState, PaneState, ViewList};
 pub(super) use self::picture::PictureState;
-pub(super) use self::request::{CameraStepStatus, ImageProvenance, KeyOverrides, RequestState, format_stops};
+pub(super) use self::request::{CameraStepStatus, ImageProvenance, RequestState};
 pub(super) use self::saving::{SavedFilesState, SceneImageProgress, UndisplayedChange, WrittenFile};
 pub(super) use self::selection::{MousePress, PickPurpose, PointerState};
 pub(super) use self::work::{AssetProgressBar, RenderState, RequestStatus, WorkState};
@@ -24,6 +24,7 @@ use super::options::ExternalChange;
 use super::preview_style::PreviewStyle;
 use super::terminal_replies::TerminalQueries;
 use super::terminals::DesktopCapabilities;
+pub(super) use crate::pipeline::key_overrides::{KeyOverrides, format_stops};
 use crate::pipeline::settings::Overrides;
 use crate::scene::diagnostic::{Diagnostic, Severity};
 

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
 
-use crate::choice::Choice;
+use super::{KeyOverrides, format_stops};
 use crate::math::DVec3;
 use crate::pipeline::FilePathAndContentId;
 use crate::pipeline::has_model_extension;
@@ -15,82 +15,6 @@ use crate::pipeline::settings::{
 use crate::scene::description::{Integrator, Pose, ShadowMode};
 use crate::scene::list_changes;
 use crate::scene::sanitize::escape_invisible_chars;
-
-/// Settings changed with keys. They override the command line.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct KeyOverrides {
-    pub shadows: Option<ShadowMode>,
-    pub integrator: Option<Integrator>,
-    pub dof: Option<bool>,
-    pub photons: Option<bool>,
-    pub view: Option<ViewMode>,
-    pub camera: CameraOverrides,
-    pub exposure: Option<f32>,
-}
-
-impl KeyOverrides {
-    /// Formats the settings as command-line options. A camera position replaces the scene's orbiter camera,
-    /// so the options then also include the field of view and focus of `orbiter`.
-    pub(crate) fn as_command_line_options(&self, orbiter: Option<ResolvedCamera>) -> Vec<String> {
-        let on_off = |is_on: bool| if is_on { "on" } else { "off" };
-        let vector = |key: &str, DVec3 { x, y, z }: DVec3| format!("--set 'camera.{key}=[{x},{y},{z}]'");
-        let CameraOverrides { pose, fov, focus } = self.camera;
-        let mut options: Vec<String> = [
-            self.integrator.map(|it| format!("--integrator {}", it.name())),
-            self.shadows.map(|it| format!("--shadows {}", it.name())),
-            self.photons.map(|it| format!("--photons {}", on_off(it))),
-            self.dof.map(|it| format!("--dof {}", on_off(it))),
-            self.view.map(|it| format!("--view {}", it.name())),
-            self.exposure.map(|it| format!("--set render.exposure={it}")),
-        ]
-        .into_iter()
-        .flatten()
-        .collect();
-        if let Some(Pose { position, look_at, up }) = pose {
-            options.extend(
-                [("position", position), ("look_at", look_at), ("up", up)]
-                    .map(|(key, value)| vector(key, value)),
-            );
-        }
-        let orbiter = orbiter.filter(|_| pose.is_some());
-        let fov = fov.or(orbiter.map(|camera| camera.fov));
-        let focus = focus.or(orbiter.filter(|camera| camera.aperture > 0.0).map(|camera| camera.focus));
-        options.extend(fov.map(|it| format!("--set camera.fov={it}")));
-        options.extend(focus.map(|it| format!("--set camera.focus={it}")));
-        options
-    }
-
-    /// Describes settings that differ from `before`. If `is_camera_written`, a camera reset is omitted
-    /// because it only reflects the camera's move into the scene.
-    pub(crate) fn describe_changes_since(&self, before: &Self, is_camera_written: bool) -> Vec<String> {
-        let on_off = |is_on: bool| if is_on { "on" } else { "off" }.to_owned();
-        let camera = self.camera.has_changes().then(|| "moved".to_owned());
-        let name = |name: &str| name.to_owned();
-        let all = [
-            ("shadows", self.shadows != before.shadows, self.shadows.map(|it| name(it.name()))),
-            ("integrator", self.integrator != before.integrator, self.integrator.map(|it| name(it.name()))),
-            ("dof", self.dof != before.dof, self.dof.map(on_off)),
-            ("photons", self.photons != before.photons, self.photons.map(on_off)),
-            ("view", self.view != before.view, self.view.map(|it| name(it.name()))),
-            ("camera", self.camera != before.camera && !(is_camera_written && camera.is_none()), camera),
-            ("exposure", self.exposure != before.exposure, self.exposure.map(format_stops)),
-        ];
-        let differing = || all.iter().filter(|(_, differs, _)| *differs);
-        let now = differing().filter_map(|(name, _, now)| Some(format!("{name} {}", now.as_ref()?)));
-        // Settings that were reset are grouped together.
-        let back: Vec<&str> = differing().filter(|it| it.2.is_none()).map(|it| it.0).collect();
-        let back = (!back.is_empty()).then(|| format!("{} reset", join_names(&back)));
-        now.chain(back).collect()
-    }
-}
-
-/// Joins names: `a`, `a and b`, `a, b and c`.
-fn join_names(names: &[&str]) -> String {
-    match names {
-        [rest @ .., last] if !rest.is_empty() => format!("{} and {last}", rest.join(", ")),
-        _ => names.concat(),
-    }
-}
 
 /// The scene and settings from which an image was rendered.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -137,15 +61,6 @@ impl ImageProvenance {
             .filter(is_changed)
             .map(|file| format!("{} changed", escape_invisible_chars(&name(file))));
         of_text.into_iter().chain(of_files).collect()
-    }
-}
-
-/// Formats exposure stops with a sign.
-pub(crate) fn format_stops(stops: f32) -> String {
-    match stops {
-        0.0 => "0".to_owned(),
-        stops if stops < 0.0 => format!("−{}", -stops),
-        stops => format!("+{stops}"),
     }
 }
 
@@ -235,15 +150,7 @@ impl RequestState {
 
     /// Overrides from the command line combined with changes made with keys.
     pub(crate) fn combined_overrides(&self) -> Overrides {
-        let mut overrides = self.command_line.clone();
-        overrides.shadows = self.toggles.shadows.or(overrides.shadows);
-        overrides.integrator = self.toggles.integrator.or(overrides.integrator);
-        overrides.dof = self.toggles.dof.or(overrides.dof);
-        overrides.photons = self.toggles.photons.or(overrides.photons);
-        overrides.view = self.toggles.view.or(overrides.view);
-        overrides.camera = self.toggles.camera;
-        overrides.exposure = self.toggles.exposure.or(overrides.exposure);
-        overrides
+        self.toggles.apply_to(&self.command_line)
     }
 
     /// Overrides for the scene's own image, or `None` unless keys have changed the displayed image.
@@ -383,15 +290,5 @@ impl RequestState {
             .as_ref()
             .map_or(USUAL, |it| it.width as f32 / it.height.max(1) as f32)
             .clamp(0.02, 50.0)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn exposure_uses_a_minus_sign() {
-        assert_eq!([-0.25, 0.0, 1.5].map(format_stops), ["−0.25", "0", "+1.5"]);
     }
 }

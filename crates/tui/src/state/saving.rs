@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-use super::request::KeyOverrides;
+use super::KeyOverrides;
 use crate::event::WriteFailure;
 use crate::messages;
 use crate::options::ExternalChange;
