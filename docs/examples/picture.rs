@@ -4,7 +4,7 @@ use std::error::Error;
 
 use glimt::control::CancelToken;
 use glimt::output::{EncodeOptions, Format, encode};
-use glimt::pipeline::{session::HeadlessSession, settings::Overrides};
+use glimt::pipeline::{headless::HeadlessSession, settings::Overrides};
 
 fn main() -> Result<(), Box<dyn Error>> {
     render_to_png("scenes/cornell.toml", "cornell.png")
