@@ -17,7 +17,7 @@
 //! | [`sampling`] | sample streams, warps, distributions |
 //! | [`materials`] | BSDFs in packets (Phong, metal, plastic, principled, frosted glass), smooth coats, mirrors, glass, panes; opacity; texture lookup, normal maps, height maps, Fresnel |
 //! | [`lights`] | point lights (`delta`), lights beyond the scene (`infinite`) and emitting shapes (`area`); the light tree; photon emission |
-//! | [`scene`] | the scene file: definitions of its keys, parsing, validation, diagnostics, the lowered description |
+//! | [`scene`] | the scene file: definitions of its keys, parsing, writing, validation, diagnostics, the lowered description |
 //! | [`assets`] | readers for meshes, images, glTF and orbiter cameras |
 //! | [`world`] | the immutable structures that rays are traced against |
 //! | [`film`] | pixel sums, convergence and noise estimates, tone mapping |

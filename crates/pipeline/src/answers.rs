@@ -84,8 +84,8 @@ pub struct PickedObject {
     pub name: Option<String>,
     /// The scene file.
     pub path: PathBuf,
-    /// 1-based line number where the shape starts.
-    pub line: usize,
+    /// 1-based line number where the shape starts. `None` if the scene is not text.
+    pub line: Option<usize>,
     /// Type and name of the material.
     pub material: String,
     /// Hit point.

@@ -35,7 +35,7 @@ impl ProtectedInputs {
         let loaded = &parsed.loaded;
         let scene = &loaded.scene;
         let path = loaded.path.clone();
-        let role = if loaded.is_generated() { "the model" } else { "the scene file" };
+        let role = if loaded.is_foreign() { "the model" } else { "the scene file" };
         let mut inputs = Self(vec![ProtectedInput { path, role: role.to_owned(), place: None }]);
         let mut add = |path: &Path, span: &Range<usize>, role: String| {
             let place = Some((Arc::clone(loaded), span.clone()));

@@ -144,7 +144,7 @@ impl QueryContext {
     ) -> Result<CameraSaveResult, String> {
         let loaded = &self.parsed.loaded;
         let path = loaded.path.clone();
-        if loaded.is_generated() {
+        if loaded.is_foreign() {
             return match is_file_missing(&path) {
                 true => Err(format!("{} {MODEL_MISSING}", path.display())),
                 false => save_model_scene_with_camera(loaded, camera),

@@ -44,7 +44,7 @@ fn warning_at_setting(
         let help = Some(format!("caused by `{option}`, not by the scene"));
         return Diagnostic { severity, message, path: PathBuf::new(), place: None, help };
     }
-    if cause == WarnedSetting::Clamp && loaded.is_generated() {
+    if cause == WarnedSetting::Clamp && loaded.is_foreign() {
         let message = message.replace(CLAMP_EFFECT, CLAMP_EFFECT_ON_MODELS);
         let help = Some("`--clamp 0` turns it off".to_owned());
         return Diagnostic { severity, message, path: loaded.path.clone(), place: None, help };

@@ -5,7 +5,7 @@ use std::ops::Range;
 use super::description::{Camera, Pose, ResolvedCamera, is_same_distance};
 use super::document::parse_camera;
 use super::source::SceneText;
-use super::toml::{self, Entries, KeyValue, TomlValue, Value};
+use super::toml::{self, Entries, KeyValue, Number, Value};
 use crate::math::DVec3;
 
 /// Returns a scene's source text with the camera replaced by `wanted`.
@@ -15,7 +15,7 @@ use crate::math::DVec3;
 pub(super) fn replace_camera(text: &str, wanted: &ResolvedCamera) -> Result<String, String> {
     let (document, errors) = toml::parse(text);
     let found = document.root().get("camera").filter(|_| errors.is_empty());
-    let Some(TomlValue::Table(table)) = found.map(|found| found.value.decode()) else {
+    let Some(table) = found.and_then(|found| found.value.as_table()) else {
         return Err("the scene file has no readable [camera] table".to_owned());
     };
     let mut edits = CameraEdits { text, table, replaced: Vec::new(), added: Vec::new() };
@@ -91,18 +91,7 @@ impl CameraEdits<'_> {
 
     /// Replaces a number unless it already equals `wanted`.
     fn replace_number(&mut self, found: &Value<'_>, wanted: f64) {
-        let is_same = match found.decode() {
-            TomlValue::Integer { digits, radix: 10 } | TomlValue::Float(digits) => {
-                digits.parse() == Ok(wanted)
-            }
-            TomlValue::Integer { .. }
-            | TomlValue::String(_)
-            | TomlValue::Boolean(_)
-            | TomlValue::Datetime
-            | TomlValue::Array(_)
-            | TomlValue::Table(_) => false,
-        };
-        if !is_same {
+        if found.as_number().and_then(Number::to_f64) != Some(wanted) {
             self.replaced.push((found.span(), format_number(wanted)));
         }
     }
@@ -165,16 +154,7 @@ impl CameraEdits<'_> {
 
 /// Whether a value equals `distance` up to rounding.
 fn is_nearly_equal(value: &Value<'_>, distance: f64) -> bool {
-    let given: Option<f64> = match value.decode() {
-        TomlValue::Integer { digits, radix: 10 } | TomlValue::Float(digits) => digits.parse().ok(),
-        TomlValue::Integer { .. }
-        | TomlValue::String(_)
-        | TomlValue::Boolean(_)
-        | TomlValue::Datetime
-        | TomlValue::Array(_)
-        | TomlValue::Table(_) => None,
-    };
-    given.is_some_and(|given| is_same_distance(given, distance))
+    value.as_number().and_then(Number::to_f64).is_some_and(|given| is_same_distance(given, distance))
 }
 
 fn format_vector(vector: DVec3) -> String {

@@ -3,13 +3,6 @@
 use unicode_width::UnicodeWidthStr;
 
 use super::sanitize::{escape_and_truncate, escape_invisible_chars};
-use super::source::quote_toml_string;
-
-/// Formats one part of a dotted key, in quotes if it is not a bare key.
-pub(super) fn quote_key_part(name: &str) -> String {
-    let is_bare = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
-    if !name.is_empty() && name.chars().all(is_bare) { name.to_owned() } else { quote_toml_string(name) }
-}
 
 /// Splits a dotted key into its parts, which keep their quotes. Ignores dots inside quotes.
 pub fn key_parts(key: &str) -> Vec<&str> {

@@ -2,7 +2,8 @@
 //!
 //! [`load`] checks a file's size and type and reads it. [`parse`] converts its text to a
 //! [`description::Scene`] and a list of [`diagnostic::Diagnostic`]s. [`report`] formats diagnostics for the
-//! terminal.
+//! terminal. Importers of foreign formats build a [`BuiltDocument`] instead of a text, and [`load_built`]
+//! validates it in the same way.
 
 mod changes;
 pub mod description;
@@ -30,6 +31,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+pub use self::toml::{BuiltDocument, BuiltValue, quote_toml_string};
 pub use changes::{MOST_COMPARED_BYTES, list_changes};
 use description::{Camera, ResolvedCamera, Scene};
 use diagnostic::{Diagnostic, Severity};
@@ -38,7 +40,7 @@ pub use facing::MeshBoundingBox;
 pub use key_path::{key_parts, shortened_key, split_at_unquoted_space};
 pub use other_content::{detect_image_or_part, has_scene_extension};
 pub use read::{find_renamed_scene, lacks_camera_header};
-pub use source::{SceneText, quote_toml_string};
+pub use source::SceneText;
 
 /// Maximum size of a scene file in bytes.
 pub const MAX_FILE_BYTES: u64 = 128 << 20;
@@ -67,6 +69,8 @@ pub struct LoadedScene {
     pub scene: Arc<Scene>,
     /// The file's text followed by the `--set` values. All spans in [`Self::scene`] index into it.
     pub source: SceneText,
+    /// The document built from a foreign file, without the `--set` values. `None` for a scene file.
+    pub built: Option<Arc<BuiltDocument>>,
     /// The path as passed by the caller.
     pub path: PathBuf,
     /// Likely mistakes, in file order.
@@ -98,18 +102,21 @@ pub fn read_current_text(path: &Path) -> Result<Arc<str>, Box<Diagnostic>> {
 }
 
 impl LoadedScene {
-    /// Whether the scene's text was generated because the file at [`Self::path`] is not a scene file.
-    pub fn is_generated(&self) -> bool {
-        self.source.is_generated()
+    /// Whether the file at [`Self::path`] is not a scene file.
+    pub fn is_foreign(&self) -> bool {
+        self.built.is_some()
     }
 
-    /// Returns the file's text after writing `camera` to `[camera]`. Replaces numbers in place and adds
-    /// missing keys. Comments and formatting stay unchanged.
+    /// Returns the text of the scene file after writing `camera` to `[camera]`. Replaces numbers in place and
+    /// adds missing keys. Comments and formatting stay unchanged.
     ///
     /// # Errors
     /// Returns the reason why the `[camera]` table cannot be edited.
     pub fn text_with_camera(&self, camera: &ResolvedCamera) -> Result<String, String> {
-        edit::replace_camera(self.source.file_text(), camera)
+        match &self.built {
+            Some(built) => edit::replace_camera(&built.to_toml(), camera),
+            None => edit::replace_camera(self.source.file_text(), camera),
+        }
     }
 
     /// Reads the camera from a scene's text, with `--set` values applied. Returns `None` if the text or a
@@ -138,10 +145,12 @@ impl LoadedScene {
         facing::lights_facing_away(&self.scene, bounds).into_iter().map(warning).collect()
     }
 
-    /// Returns the 1-based line number in the file where `span` starts.
-    pub fn line_number(&self, span: &Range<usize>) -> usize {
+    /// Returns the 1-based line number in the file where `span` starts, or `None` if the file has no text for
+    /// it.
+    pub fn line_number(&self, span: &Range<usize>) -> Option<usize> {
         let before = self.source.file_text().get(..span.start).unwrap_or_default();
-        before.bytes().filter(|byte| *byte == b'\n').count() + 1
+        let line = before.bytes().filter(|byte| *byte == b'\n').count() + 1;
+        self.source.has_text_at(span).then_some(line)
     }
 
     /// Returns the span of a setting's value in the file or in a `--set` argument, or `None` if neither sets
@@ -183,33 +192,40 @@ pub struct ParseOutcome {
 /// [`MAX_FILE_BYTES`] bytes, without blocking.
 pub fn load(path: &Path, sets: &[String]) -> Result<LoadedScene, Vec<Diagnostic>> {
     let text = read::read_scene_text(path).map_err(|problem| vec![*problem])?;
-    load_from_scene_text(SceneText::with_set_args(text, sets)?, path, sets)
+    let source = SceneText::with_set_args(text, sets)?;
+    let outcome = document::parse_and_lower(&source, path);
+    let named = || document::files_referenced_by_text(source.file_text(), path);
+    let named = if sets.is_empty() { Vec::new() } else { named() };
+    loaded_scene(outcome, source, None, path, named)
 }
 
-/// Like [`load`], for a scene generated for the model at `path`. Diagnostics have no line numbers because the
-/// text is not in a file.
+/// Like [`load`], for a document built from the foreign file at `path`. Diagnostics have no position if the
+/// document has no spans.
 ///
 /// # Errors
-/// Returns the same errors as [`load`].
-pub fn load_generated(text: Arc<str>, path: &Path, sets: &[String]) -> Result<LoadedScene, Vec<Diagnostic>> {
-    load_from_scene_text(SceneText::with_set_args(text, sets)?.mark_generated(), path, sets)
-}
-
-fn load_from_scene_text(
-    source: SceneText,
+/// Returns all errors and warnings.
+pub fn load_built(
+    built: BuiltDocument,
     path: &Path,
     sets: &[String],
 ) -> Result<LoadedScene, Vec<Diagnostic>> {
-    let ParseOutcome { scene, diagnostics, settings } = document::parse_and_lower(&source, path);
+    let source = SceneText::with_set_args(Arc::clone(&built.source), sets)?.mark_foreign();
+    let outcome = document::lower_built(&source, &built.document, path);
+    let named = if sets.is_empty() { Vec::new() } else { document::referenced_files(&built.document, path) };
+    loaded_scene(outcome, source, Some(Arc::new(built)), path, named)
+}
+
+fn loaded_scene(
+    ParseOutcome { scene, diagnostics, settings }: ParseOutcome,
+    source: SceneText,
+    built: Option<Arc<BuiltDocument>>,
+    path: &Path,
+    named: Vec<PathBuf>,
+) -> Result<LoadedScene, Vec<Diagnostic>> {
     match scene {
         Some(scene) => {
-            let named = if sets.is_empty() {
-                Vec::new()
-            } else {
-                document::referenced_files(source.file_text(), path)
-            };
             let (scene, path) = (Arc::new(scene), path.to_owned());
-            Ok(LoadedScene { scene, source, path, warnings: diagnostics, named, settings })
+            Ok(LoadedScene { scene, source, built, path, warnings: diagnostics, named, settings })
         }
         None => Err(diagnostics),
     }
@@ -218,7 +234,7 @@ fn load_from_scene_text(
 /// Returns the files that a scene file references, even if the scene has errors. The list is empty for
 /// unreadable files and files that are not scene files.
 pub fn referenced_files(path: &Path) -> Vec<PathBuf> {
-    read::read_scene_text(path).map_or(Vec::new(), |text| document::referenced_files(&text, path))
+    read::read_scene_text(path).map_or(Vec::new(), |text| document::files_referenced_by_text(&text, path))
 }
 
 /// Validates the text of a scene file. `path` is used in diagnostics and to resolve relative paths, but the
@@ -239,6 +255,8 @@ pub fn starter_scene() -> &'static str {
     include_str!("starter.toml")
 }
 
+#[cfg(test)]
+mod built_tests;
 #[cfg(test)]
 mod set_tests;
 #[cfg(test)]

@@ -3,10 +3,9 @@
 
 use std::ops::Range;
 
-use super::key_path;
 use super::keys::all_tables;
 use super::keys::key::{KeyInfo, TableInfo, TableSyntax, TableTypeInfo};
-use super::toml::{self, Entries, KeyValue, TomlValue, Value};
+use super::toml::{self, Entries, KeyValue, Value};
 
 /// A table with a known definition.
 #[derive(Clone, Debug)]
@@ -61,17 +60,18 @@ pub fn document_outline(text: &str) -> Vec<OutlineTable> {
 /// Returns the tables whose definition is `info`.
 fn outline_tables_of_definition(info: &'static TableInfo, found: &KeyValue<'_>) -> Vec<OutlineTable> {
     match info.form {
-        TableSyntax::Single => entries_if_table(found.value)
+        TableSyntax::Single => found
+            .value
+            .as_table()
             .map(|all| outline_table(info, None, 1, found.value, &all))
             .into_iter()
             .collect(),
         TableSyntax::Named => {
-            let named =
-                entries_if_table(found.value).into_iter().flat_map(|all| all.iter().collect::<Vec<_>>());
+            let named = found.value.as_table().into_iter().flat_map(|all| all.iter().collect::<Vec<_>>());
             named
                 .filter_map(|one| {
                     let name = SpannedName { text: one.key.to_owned(), span: one.span };
-                    Some(outline_table(info, Some(name), 1, one.value, &entries_if_table(one.value)?))
+                    Some(outline_table(info, Some(name), 1, one.value, &one.value.as_table()?))
                 })
                 .collect()
         }
@@ -81,7 +81,7 @@ fn outline_tables_of_definition(info: &'static TableInfo, found: &KeyValue<'_>) 
             elements
                 .enumerate()
                 .filter_map(|(index, value)| {
-                    let all = entries_if_table(value)?;
+                    let all = value.as_table()?;
                     let name = all.get("name").and_then(|name| spanned_string_value(name.value));
                     Some(outline_table(info, name, index + 1, value, &all))
                 })
@@ -111,34 +111,14 @@ fn outline_keys(all: &Entries<'_>) -> Vec<OutlineKey> {
         name: SpannedName { text: one.key.to_owned(), span: one.span },
         value: one.value.span(),
         text: spanned_string_value(one.value).map(|text| text.text),
-        inner: entries_if_table(one.value).map_or_else(Vec::new, |inner| outline_keys(&inner)),
+        inner: one.value.as_table().map_or_else(Vec::new, |inner| outline_keys(&inner)),
     };
     all.iter().map(key).collect()
 }
 
 /// Returns a string value with its span, or `None` for other values.
 fn spanned_string_value(value: Value<'_>) -> Option<SpannedName> {
-    match value.decode() {
-        TomlValue::String(text) => Some(SpannedName { text: text.to_owned(), span: value.span() }),
-        TomlValue::Integer { .. }
-        | TomlValue::Float(_)
-        | TomlValue::Boolean(_)
-        | TomlValue::Datetime
-        | TomlValue::Array(_)
-        | TomlValue::Table(_) => None,
-    }
-}
-
-fn entries_if_table(value: Value<'_>) -> Option<Entries<'_>> {
-    match value.decode() {
-        TomlValue::Table(entries) => Some(entries),
-        TomlValue::String(_)
-        | TomlValue::Integer { .. }
-        | TomlValue::Float(_)
-        | TomlValue::Boolean(_)
-        | TomlValue::Datetime
-        | TomlValue::Array(_) => None,
-    }
+    value.as_str().map(|text| SpannedName { text: text.to_owned(), span: value.span() })
 }
 
 impl OutlineTable {
@@ -162,7 +142,7 @@ impl OutlineTable {
     /// Returns the key prefixes with which `--set` can refer to this table.
     pub fn set_arg_prefixes(&self) -> Vec<String> {
         let table = self.info.name;
-        let name = self.name.as_ref().map(|name| format!("{table}.{}", key_path::quote_key_part(&name.text)));
+        let name = self.name.as_ref().map(|name| format!("{table}.{}", toml::quote_key_part(&name.text)));
         match self.info.form {
             TableSyntax::Single => vec![table.to_owned()],
             TableSyntax::Named => name.into_iter().collect(),

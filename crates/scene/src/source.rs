@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::diagnostic::{Diagnostic, Severity, SourceSpan};
-use super::toml::is_dotted_key_value;
+use super::toml::{is_dotted_key_value, quote_toml_string};
 
 /// File name shown in diagnostics about `--set` values.
 const SET_OPTION: &str = "--set";
@@ -17,8 +17,8 @@ pub struct SceneText {
     /// Length of the file's text, the first part of `all`.
     file: usize,
     sets: Vec<SetArg>,
-    /// Whether the text was generated for a model and therefore is not in a file.
-    is_generated: bool,
+    /// Whether the scene is from a foreign file. Only some of its values have a span in the file's text.
+    is_foreign: bool,
 }
 
 /// A `--set` value: its span in the whole text, and a copy of its text for diagnostics.
@@ -31,7 +31,7 @@ struct SetArg {
 impl SceneText {
     /// Wraps the text of a file, without `--set` values.
     pub fn from_file_text(text: Arc<str>) -> Self {
-        Self { file: text.len(), all: text, sets: Vec::new(), is_generated: false }
+        Self { file: text.len(), all: text, sets: Vec::new(), is_foreign: false }
     }
 
     /// Combines a file's text with `--set` values of the form `TABLE.KEY=VALUE`. Values that are neither
@@ -56,7 +56,7 @@ impl SceneText {
             }
         }
         if wrong.is_empty() {
-            Ok(Self { all: all.into(), file: file.len(), sets: known, is_generated: false })
+            Ok(Self { all: all.into(), file: file.len(), sets: known, is_foreign: false })
         } else {
             Err(wrong)
         }
@@ -84,20 +84,22 @@ impl SceneText {
 
     /// Whether a span is in a `--set` value rather than in the file.
     pub(super) fn is_span_in_set_arg(&self, span: &Range<usize>) -> bool {
-        span.start >= self.file
+        // A newline separates the values from the file.
+        span.start > self.file
     }
 
-    /// Whether the text was generated for a model and therefore is not in a file.
-    pub(super) fn is_generated(&self) -> bool {
-        self.is_generated
+    /// Whether a span refers to text. In a scene from a foreign file, values without a span have an empty span
+    /// at the start.
+    pub(super) fn has_text_at(&self, span: &Range<usize>) -> bool {
+        !self.is_foreign || *span != (0..0)
     }
 
-    /// Marks the text as generated for a model.
-    pub(super) fn mark_generated(self) -> Self {
-        Self { is_generated: true, ..self }
+    /// Marks the text as the text of a foreign file, which is empty if the file is not text.
+    pub(super) fn mark_foreign(self) -> Self {
+        Self { is_foreign: true, ..self }
     }
 
-    /// Maps a span to the file at `path` or to a `--set` value. Returns no span if the text was generated.
+    /// Maps a span to the file at `path` or to a `--set` value. Returns no span if it does not refer to text.
     pub(super) fn resolve_span(
         &self,
         path: &Path,
@@ -109,7 +111,7 @@ impl SceneText {
             Some(SetArg { span: own, text }) => {
                 (Path::new(SET_OPTION), text, span.start - own.start..span.end - own.start)
             }
-            None if self.is_generated => return (path.to_owned(), None),
+            None if !self.has_text_at(&span) => return (path.to_owned(), None),
             None => (path, &self.all, span),
         };
         let is_inside = source.get(span.clone()).is_some();
@@ -135,20 +137,6 @@ fn set_arg_to_toml(set: &str) -> Option<String> {
 fn decimal_to_toml(text: &str) -> Option<String> {
     let number: f64 = text.parse().ok().filter(|number: &f64| number.is_finite())?;
     text.contains('.').then(|| format!("{number:?}"))
-}
-
-/// Formats a TOML basic string.
-pub fn quote_toml_string(text: &str) -> String {
-    let mut quoted = String::from('"');
-    for character in text.chars() {
-        match character {
-            '"' | '\\' => quoted.extend(['\\', character]),
-            control if control.is_control() => quoted.push_str(&format!("\\U{:08x}", u32::from(control))),
-            other => quoted.push(other),
-        }
-    }
-    quoted.push('"');
-    quoted
 }
 
 /// Error message for a malformed `--set` value.

@@ -87,7 +87,8 @@ fn report_approximations(substitutions: &[Diagnostic], console: &Console) {
 /// Writes all files or none. The scene is written last.
 fn write_all(scene: &Path, imported: &ImportedScene, token: &CancelToken) -> Result<(), OutputError> {
     let name = PathBuf::from(scene.file_name().unwrap_or_default());
+    let text = imported.document.to_toml();
     let others = imported.files.iter().map(|(name, bytes)| (name.clone(), bytes.as_slice()));
-    let files: Vec<_> = others.chain([(name, imported.text.as_bytes())]).collect();
+    let files: Vec<_> = others.chain([(name, text.as_bytes())]).collect();
     create_files_atomically(scene.parent().unwrap_or(Path::new("")), &files, token)
 }

@@ -1,6 +1,6 @@
 //! Frames a model: computes its default camera and key light.
 
-use super::toml::round_significant;
+use super::rounding::round_significant;
 use crate::math::DVec3;
 use crate::settings::ViewSide;
 use crate::turntable::TurntableFrame;

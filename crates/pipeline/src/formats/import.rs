@@ -35,7 +35,7 @@ pub fn import_scene(path: &Path, folder: &str, token: &CancelToken) -> Result<Im
     };
     let pool = logical_cpu_pool().map_err(ImportError::Work)?;
     let (view, containers) = (ModelViewOptions::default(), GltfContainers::default());
-    let context = ForeignReadContext { sets: &[], view, containers: &containers, token };
+    let context = ForeignReadContext { view, containers: &containers, token };
     pool.install(|| convert(path, folder, &context)).map_err(|error| match error {
         AssetError::OutOfMemory { .. } | AssetError::TooManyOpenFiles { .. } => {
             ImportError::Work(error.to_string())

@@ -6,17 +6,16 @@ use std::path::Path;
 
 use super::frame::{FOV, frame_model};
 use super::model::{
-    GeneratedText, Lighting, NARROW, ROUGH, SIZE, UsedNames, file_name, warning, write_camera, write_ground,
-    write_render_settings, write_sky_and_key_light,
+    Lighting, NARROW, ROUGH, SIZE, UsedNames, add_camera, add_ground, add_render_settings,
+    add_sky_and_key_light, file_name, warning,
 };
-use super::toml::TomlWriter;
-use super::{ForeignReadContext, ForeignReadError, ForeignScene};
+use super::{ForeignReadContext, ForeignScene};
 use crate::assets::{AssetError, FileMaterial, LoadedMesh};
 use crate::control::ignore_progress;
 use crate::math::DVec3;
 use crate::math::limits::LARGEST;
 use crate::messages::INVISIBLE_MODEL;
-use crate::scene::{MORE_LIKE_THESE, quote_toml_string};
+use crate::scene::{BuiltDocument, BuiltValue, MORE_LIKE_THESE};
 use crate::settings::{UpAxis, ViewSide};
 use crate::stages::meshes::MAX_WARNINGS;
 
@@ -33,11 +32,11 @@ fn is_from_blender(path: &Path) -> bool {
 
 impl UpAxis {
     /// Euler angles in degrees that rotate this axis to y, or `None` for y itself.
-    fn rotation(self) -> Option<[i32; 3]> {
+    fn rotation(self) -> Option<[f64; 3]> {
         match self {
-            Self::X => Some([0, 0, 90]),
+            Self::X => Some([0.0, 0.0, 90.0]),
             Self::Y => None,
-            Self::Z => Some([-90, 0, 0]),
+            Self::Z => Some([-90.0, 0.0, 0.0]),
         }
     }
 
@@ -76,35 +75,29 @@ fn is_mesh_fully_transparent(loaded: &LoadedMesh) -> bool {
 }
 
 /// Reads an OBJ or OFF file.
-pub(super) fn read(path: &Path, context: &ForeignReadContext<'_>) -> Result<ForeignScene, ForeignReadError> {
-    scene_text(path, UpAxis::Y, false, context)?.into_scene(path, context.sets)
+pub(super) fn read(path: &Path, context: &ForeignReadContext<'_>) -> Result<ForeignScene, AssetError> {
+    scene_of_mesh(path, UpAxis::Y, false, context)
 }
 
 /// Reads a PLY file. The default up axis is z for files from Blender, and y for all others.
-pub(super) fn read_ply(
-    path: &Path,
-    context: &ForeignReadContext<'_>,
-) -> Result<ForeignScene, ForeignReadError> {
+pub(super) fn read_ply(path: &Path, context: &ForeignReadContext<'_>) -> Result<ForeignScene, AssetError> {
     let up = if is_from_blender(path) { UpAxis::Z } else { UpAxis::Y };
-    scene_text(path, up, false, context)?.into_scene(path, context.sets)
+    scene_of_mesh(path, up, false, context)
 }
 
 /// Reads an STL file. By the convention of CAD and 3D printing, z is the up axis. STL has no vertex normals,
 /// and mechanical parts have sharp edges.
-pub(super) fn read_stl(
-    path: &Path,
-    context: &ForeignReadContext<'_>,
-) -> Result<ForeignScene, ForeignReadError> {
-    scene_text(path, UpAxis::Z, true, context)?.into_scene(path, context.sets)
+pub(super) fn read_stl(path: &Path, context: &ForeignReadContext<'_>) -> Result<ForeignScene, AssetError> {
+    scene_of_mesh(path, UpAxis::Z, true, context)
 }
 
-/// Generates the scene text for a mesh file. `up` is the format's default up axis.
-fn scene_text(
+/// Generates the scene for a mesh file. `up` is the format's default up axis.
+fn scene_of_mesh(
     path: &Path,
     up: UpAxis,
     is_faceted: bool,
-    &ForeignReadContext { view, containers, token, .. }: &ForeignReadContext<'_>,
-) -> Result<GeneratedText, AssetError> {
+    &ForeignReadContext { view, containers, token }: &ForeignReadContext<'_>,
+) -> Result<ForeignScene, AssetError> {
     let loaded = containers.load_any_mesh((path, None), &ignore_progress, token)?;
     let Some([least, greatest]) = loaded.mesh.bounds_in_file_coordinates() else {
         return Err(AssetError::malformed(path, None, "no usable face"));
@@ -129,42 +122,42 @@ fn scene_text(
         );
         return Err(AssetError::malformed(path, None, reason));
     }
-    let (mut toml, mut names) = (TomlWriter::default(), UsedNames::default());
-    toml.comment(&format!("{}, as glimt shows it.", file_name(path)));
+    let (mut document, mut names) = (BuiltDocument::default(), UsedNames::default());
+    document.comment(format!("{}, as glimt shows it.", file_name(path)));
     let lighting = Lighting::Default { is_polished: loaded.materials.iter().any(material_may_cast_caustics) };
-    write_render_settings(&mut toml, None, lighting);
-    write_camera(&mut toml, &eye, FOV);
-    write_sky_and_key_light(&mut toml, &eye, lighting);
+    add_render_settings(&mut document, None, lighting);
+    add_camera(&mut document, &eye, FOV);
+    add_sky_and_key_light(&mut document, &eye, lighting);
     let is_colored = !loaded.mesh.colors.is_empty();
     let needs_material = loaded.lacks_materials();
     let name = names.make_unique("model", "model");
     if needs_material {
-        toml.table(&format!("[materials.{name}]"));
-        toml.key_value("type", "\"principled\"");
-        toml.key_value("color", if is_colored { "1" } else { "[0.7, 0.68, 0.64]" });
+        document.named_table("materials", &name);
+        document.set("type", "principled");
+        document.set("color", if is_colored { 1.0.into() } else { BuiltValue::from([0.7, 0.68, 0.64]) });
     }
-    toml.table("[[mesh]]");
-    toml.key_value("file", quote_toml_string(&file_name(path)));
-    if let Some([x, y, z]) = up.rotation() {
-        toml.key_value("rotate", format!("[{x}, {y}, {z}]"));
+    document.list_table("mesh");
+    document.set("file", file_name(path));
+    if let Some(angles) = up.rotation() {
+        document.set("rotate", angles);
     }
     if is_faceted || loaded.has_flat_faces_and_no_normals() {
-        toml.key_value("smooth", "false");
+        document.set("smooth", false);
     }
     if needs_material {
-        toml.key_value("material", format!("\"{name}\""));
+        document.set("material", name);
     }
     if is_colored {
-        toml.key_value("vertex_colors", "true");
+        document.set("vertex_colors", true);
     }
-    write_ground(&mut toml, &mut names, bounds, &eye);
+    add_ground(&mut document, &mut names, bounds, &eye);
     // The generated material hides the fact that the file has no materials, so report it here.
     let mut notes = if needs_material { first_warnings(&loaded.material_warnings) } else { Vec::new() };
     notes.extend(is_mesh_fully_transparent(&loaded).then(|| INVISIBLE_MODEL.to_owned()));
     let notes = notes.into_iter().map(|note| warning(path, note)).collect();
     let (hash, companions) = (loaded.hash, loaded.companions.clone());
     containers.store_mesh_for_next_load(path, loaded);
-    Ok(GeneratedText { text: toml.finish(), hash, companions, notes, substitutions: Vec::new() })
+    Ok(ForeignScene { document, hash, companions, notes, substitutions: Vec::new() })
 }
 
 /// Returns the first warnings and, if there are more, a line that counts the rest.
@@ -191,7 +184,7 @@ mod tests {
     #[test]
     fn up_axis_matches_scene_rotation() {
         for (up, axis) in [(UpAxis::X, DVec3::X), (UpAxis::Y, DVec3::Y), (UpAxis::Z, DVec3::Z)] {
-            let rotation = rotation_xyz(DVec3::from(up.rotation().unwrap_or_default().map(f64::from)));
+            let rotation = rotation_xyz(DVec3::from(up.rotation().unwrap_or_default()));
             assert_eq!(up.rotate_point_upright(axis), DVec3::Y, "{up:?}");
             for at in [axis, DVec3::new(1.0, 2.0, 3.0)] {
                 assert_eq!(rotation * at, up.rotate_point_upright(at), "{up:?}");

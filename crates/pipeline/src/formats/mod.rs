@@ -1,16 +1,18 @@
 //! Foreign formats: files that glimt renders or imports although they are not scene files.
 //!
 //! [`FORMATS`] lists the formats, each with its extensions and its importer. For a file on the command line,
-//! only this table decides which format it has. An importer reads the file into a [`ForeignScene`]; the rest
-//! of the pipeline does not know the format. `model` generates the view and the lights for models, which
-//! `glimt MODEL` and `glimt import` share so that they produce the same image.
+//! only this table decides which format it has. An importer reads the file into a [`ForeignScene`], whose
+//! document consists of the same tables and keys as a scene file. [`lower`] validates it like a scene file,
+//! and `glimt import` writes it as one; the rest of the pipeline does not know the format. `model` generates
+//! the view and the lights for models, which `glimt MODEL` and `glimt import` share so that they produce the
+//! same image.
 
 mod frame;
 mod gltf;
 mod import;
 mod mesh;
 pub(crate) mod model;
-mod toml;
+mod rounding;
 
 use std::path::{Path, PathBuf};
 
@@ -19,22 +21,21 @@ use super::stages::containers::GltfContainers;
 use crate::assets::{AssetError, Companion, FileHash};
 use crate::control::CancelToken;
 use crate::scene::diagnostic::Diagnostic;
-use crate::scene::{LoadedScene, lacks_camera_header};
+use crate::scene::{BuiltDocument, LoadedScene, lacks_camera_header, load_built};
 
 pub use import::{ImportError, import_scene};
 
 /// All foreign formats.
-const FORMATS: [ForeignFormat; 5] = [
+const FORMATS: [ForeignFormat; 4] = [
+    ForeignFormat { extensions: &["obj", "off"], is_model: true, read: mesh::read, convert: None },
+    ForeignFormat { extensions: &["ply"], is_model: true, read: mesh::read_ply, convert: None },
+    ForeignFormat { extensions: &["stl"], is_model: true, read: mesh::read_stl, convert: None },
     ForeignFormat {
-        extensions: &["gltf", "glb"],
+        extensions: &["glb", "gltf"],
         is_model: true,
         read: gltf::read,
         convert: Some(gltf::convert),
     },
-    ForeignFormat { extensions: &["obj"], is_model: true, read: mesh::read, convert: None },
-    ForeignFormat { extensions: &["off"], is_model: true, read: mesh::read, convert: None },
-    ForeignFormat { extensions: &["ply"], is_model: true, read: mesh::read_ply, convert: None },
-    ForeignFormat { extensions: &["stl"], is_model: true, read: mesh::read_stl, convert: None },
 ];
 
 /// A foreign format.
@@ -52,14 +53,12 @@ pub(crate) struct ForeignFormat {
     convert: Option<ConvertFn>,
 }
 
-type ReadFn = fn(&Path, &ForeignReadContext<'_>) -> Result<ForeignScene, ForeignReadError>;
+type ReadFn = fn(&Path, &ForeignReadContext<'_>) -> Result<ForeignScene, AssetError>;
 type ConvertFn = fn(&Path, &str, &ForeignReadContext<'_>) -> Result<ImportedScene, AssetError>;
 
 /// Inputs of an importer other than the file.
 #[derive(Clone, Copy)]
 pub(crate) struct ForeignReadContext<'a> {
-    /// Scene key overrides from the command line.
-    pub(crate) sets: &'a [String],
     /// View of a model.
     pub(crate) view: ModelViewOptions,
     /// Files that are open. Meshes stored here are not read again when the scene's assets are loaded.
@@ -70,8 +69,8 @@ pub(crate) struct ForeignReadContext<'a> {
 /// The scene in a foreign file.
 #[derive(Debug)]
 pub(crate) struct ForeignScene {
-    /// The scene, with overrides applied.
-    pub(crate) loaded: LoadedScene,
+    /// The tables and keys of the scene.
+    pub(crate) document: BuiltDocument,
     /// Hash of the file.
     pub(crate) hash: FileHash,
     /// Other files that affect the scene and are therefore watched. The assets that the scene references are
@@ -86,34 +85,36 @@ pub(crate) struct ForeignScene {
 /// A foreign file converted to a scene file, ready to be written.
 #[derive(Debug)]
 pub struct ImportedScene {
-    /// Scene text. Its paths are relative to the scene file.
-    pub text: String,
-    /// Files referenced by the text, with paths relative to the scene file.
+    /// The scene. Its paths are relative to the scene file.
+    pub document: BuiltDocument,
+    /// Files referenced by the scene, with paths relative to the scene file.
     pub files: Vec<(PathBuf, Vec<u8>)>,
     /// Features without an exact equivalent and their substitutes.
     pub substitutions: Vec<Diagnostic>,
 }
 
-/// Reason why a foreign file cannot be read.
-#[derive(Debug)]
-pub(crate) enum ForeignReadError {
-    /// The file, or a file that it references, cannot be used.
-    File(AssetError),
-    /// The scene in the file, or an override, has errors.
-    Scene(Vec<Diagnostic>),
-}
-
-impl From<AssetError> for ForeignReadError {
-    fn from(error: AssetError) -> Self {
-        Self::File(error)
-    }
+/// Validates a document like a scene file, with the overrides from the command line.
+///
+/// # Errors
+/// Returns all errors and warnings.
+pub(crate) fn lower(
+    document: BuiltDocument,
+    path: &Path,
+    sets: &[String],
+) -> Result<LoadedScene, Vec<Diagnostic>> {
+    load_built(document, path, sets).map_err(|mut errors| {
+        // Mark errors in generated values, which the user cannot see. Errors in overrides need no mark.
+        for error in errors.iter_mut().filter(|error| error.path == path && error.place.is_none()) {
+            error.message = format!("in the scene generated for this model, {}", error.message);
+        }
+        errors
+    })
 }
 
 impl ForeignFormat {
     /// Returns the format with the path's extension. The file need not exist.
     fn from_extension(path: &Path) -> Option<&'static Self> {
-        let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
-        FORMATS.iter().find(|format| format.extensions.iter().any(|known| extension == *known))
+        FORMATS.iter().find(|format| format.extensions.contains(&lowercase_extension(path).as_str()))
     }
 
     /// Returns the format of a readable file, or `None` if the file must be read as a scene file. A scene file
@@ -121,6 +122,11 @@ impl ForeignFormat {
     pub(crate) fn of_file(path: &Path) -> Option<&'static Self> {
         Self::from_extension(path).filter(|_| lacks_camera_header(path))
     }
+}
+
+/// Returns a path's extension in lowercase, or an empty string.
+fn lowercase_extension(path: &Path) -> String {
+    path.extension().unwrap_or_default().to_string_lossy().to_lowercase()
 }
 
 /// Whether a path has a foreign format's extension.

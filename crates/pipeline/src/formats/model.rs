@@ -7,13 +7,11 @@ use super::frame::{
     CameraPose, KEY, SKY, ground_reflectance_matching_sky, key_light_travel_direction,
     round_to_decimals_of_step,
 };
-use super::toml::{TomlWriter, format_exact_vector, format_number, format_vector, round_significant};
-use super::{ForeignReadError, ForeignScene};
-use crate::assets::{Companion, FileHash};
+use super::rounding::{round_significant, shorten, shorten_vector};
 use crate::math::DVec3;
+use crate::scene::BuiltDocument;
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::fingerprint::FingerprintHasher;
-use crate::scene::load_generated;
 use crate::settings::{Overrides, UpAxis, ViewSide};
 
 /// View of a model, as specified on the command line.
@@ -71,30 +69,6 @@ impl ModelViewOptions {
     }
 }
 
-/// The scene text generated for a model, and the other contents of a [`ForeignScene`].
-pub(super) struct GeneratedText {
-    pub(super) text: String,
-    pub(super) hash: FileHash,
-    pub(super) companions: Vec<Companion>,
-    pub(super) notes: Vec<Diagnostic>,
-    pub(super) substitutions: Vec<Diagnostic>,
-}
-
-impl GeneratedText {
-    /// Lowers the text to a scene, with the overrides from the command line.
-    pub(super) fn into_scene(self, path: &Path, sets: &[String]) -> Result<ForeignScene, ForeignReadError> {
-        let Self { text, hash, companions, notes, substitutions } = self;
-        let loaded = load_generated(text.into(), path, sets).map_err(|mut errors| {
-            // Mark errors in the generated text, which the user cannot see. Errors in overrides need no mark.
-            for error in errors.iter_mut().filter(|error| error.path == path) {
-                error.message = format!("in the scene generated for this model, {}", error.message);
-            }
-            ForeignReadError::Scene(errors)
-        })?;
-        Ok(ForeignScene { loaded, hash, companions, notes, substitutions })
-    }
-}
-
 /// Creates a warning about a model.
 pub(super) fn warning(path: &Path, message: impl Into<String>) -> Diagnostic {
     Diagnostic::about_file(path, Severity::Warning, message.into())
@@ -107,7 +81,7 @@ pub(super) fn file_name(path: &Path) -> String {
 
 /// Limit on indirect radiance per bounce: four times the sky's radiance. It is used for scenes with polished
 /// surfaces, in which caustics from the key light would appear as fireflies at low sample counts.
-const CLAMP: &str = "2";
+const CLAMP: f64 = 2.0;
 /// Roughness above which surfaces do not cause fireflies. At 64 samples, clamping changes the error by a
 /// quarter at roughness 0.4, but by a factor of ten at roughness 0.2.
 pub(super) const ROUGH: f64 = 0.3;
@@ -150,55 +124,54 @@ impl Lighting {
     }
 }
 
-/// Writes the `[render]` table.
-pub(super) fn write_render_settings(toml: &mut TomlWriter, size: Option<[u32; 2]>, light: Lighting) {
-    toml.table("[render]");
+/// Adds the `[render]` table.
+pub(super) fn add_render_settings(document: &mut BuiltDocument, size: Option<[f64; 2]>, light: Lighting) {
+    document.table("render");
     if let Some([width, height]) = size {
-        toml.key_value("width", width.to_string());
-        toml.key_value("height", height.to_string());
+        document.set("width", width);
+        document.set("height", height);
     }
-    toml.key_value("samples", "256");
-    toml.key_value("error", "0.05");
-    toml.key_value("integrator", "\"path\"");
+    document.set("samples", 256.0);
+    document.set("error", 0.05);
+    document.set("integrator", "path");
     match light {
-        Lighting::Default { is_polished: true } => toml.key_value("clamp", CLAMP),
+        Lighting::Default { is_polished: true } => document.set("clamp", CLAMP),
         Lighting::Default { is_polished: false } => {}
-        Lighting::FromFile { exposure } if exposure != 0.0 => {
-            toml.key_value("exposure", format_number(exposure));
-        }
+        Lighting::FromFile { exposure } if exposure != 0.0 => document.set("exposure", exposure),
         Lighting::FromFile { .. } => {}
     }
 }
 
-/// Writes the `[camera]` table.
-pub(super) fn write_camera(toml: &mut TomlWriter, eye: &CameraPose, fov: f64) {
-    toml.table("[camera]");
-    toml.key_value("position", format_exact_vector(eye.position));
-    toml.key_value("look_at", format_exact_vector(eye.look_at));
+/// Adds the `[camera]` table. Keeps all digits of the points, because a small model may be far from the
+/// origin.
+pub(super) fn add_camera(document: &mut BuiltDocument, eye: &CameraPose, fov: f64) {
+    document.table("camera");
+    document.set("position", eye.position);
+    document.set("look_at", eye.look_at);
     if eye.up != DVec3::Y {
-        toml.key_value("up", format_vector(eye.up));
+        document.set("up", shorten_vector(eye.up));
     }
     if fov != 40.0 {
-        toml.key_value("fov", format_number(fov));
+        document.set("fov", shorten(fov));
     }
 }
 
-/// Writes a sky, plus a key light if the model has no lights.
-pub(super) fn write_sky_and_key_light(toml: &mut TomlWriter, eye: &CameraPose, light: Lighting) {
-    toml.table("[environment]");
-    toml.key_value("color", format_number(light.sky_radiance()));
+/// Adds a sky, plus a key light if the model has no lights.
+pub(super) fn add_sky_and_key_light(document: &mut BuiltDocument, eye: &CameraPose, light: Lighting) {
+    document.table("environment");
+    document.set("color", shorten(light.sky_radiance()));
     if matches!(light, Lighting::Default { .. }) {
-        toml.table("[[light]]");
-        toml.key_value("type", "\"directional\"");
-        toml.key_value("direction", format_vector(key_light_travel_direction(eye)));
-        toml.key_value("irradiance", format_number(KEY));
-        toml.key_value("angle", "6");
+        document.list_table("light");
+        document.set("type", "directional");
+        document.set("direction", shorten_vector(key_light_travel_direction(eye)));
+        document.set("irradiance", KEY);
+        document.set("angle", 6.0);
     }
 }
 
-/// Writes a ground plane below the model, unless the camera is below it.
-pub(super) fn write_ground(
-    toml: &mut TomlWriter,
+/// Adds a ground plane below the model, unless the camera is below it.
+pub(super) fn add_ground(
+    document: &mut BuiltDocument,
     names: &mut UsedNames,
     [least, greatest]: [DVec3; 2],
     eye: &CameraPose,
@@ -209,14 +182,11 @@ pub(super) fn write_ground(
         return;
     }
     let name = names.make_unique("ground", "ground");
-    toml.table(&format!("[materials.{name}]"));
-    toml.key_value("diffuse", format_number(ground_reflectance_matching_sky()));
-    toml.table("[[plane]]");
-    toml.key_value(
-        "point",
-        format_exact_vector(DVec3::new(0.0, round_to_decimals_of_step(height, size * 1e-5), 0.0)),
-    );
-    toml.key_value("material", format!("\"{name}\""));
+    document.named_table("materials", &name);
+    document.set("diffuse", shorten(ground_reflectance_matching_sky()));
+    document.list_table("plane");
+    document.set("point", [0.0, round_to_decimals_of_step(height, size * 1e-5), 0.0]);
+    document.set("material", name);
 }
 
 /// Names already used in a generated scene.

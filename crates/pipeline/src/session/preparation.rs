@@ -55,8 +55,10 @@ impl Session {
         let show = ModelViewOptions::from_overrides(overrides);
         let scene = SceneParseRequest { path: &request.scene, sets: &overrides.sets, show };
         let parsed = self.scenes.parse(scene, reading)?;
-        let text = parsed.loaded.source.file_text_as_arc();
-        sink.send(Event::Text { generation: request.generation, text });
+        if !parsed.loaded.is_foreign() {
+            let text = parsed.loaded.source.file_text_as_arc();
+            sink.send(Event::Text { generation: request.generation, text });
+        }
         let plans = RequestPlans::resolve(&parsed.loaded.scene, request)?;
         let plan = &plans.shown;
         self.check_memory(&MemoryEstimate::for_image(plan), request, &plans)?;

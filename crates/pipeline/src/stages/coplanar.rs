@@ -37,7 +37,8 @@ pub(crate) fn warn_about_coplanar_lights(
     let named = |number: usize| {
         let Object { shape, name, span, .. } = &scene.objects[number];
         let name = name.as_deref().map(|name| format!(" \"{name}\"")).unwrap_or_default();
-        format!("the {}{name} on line {}", shape.kind(), loaded.line_number(span))
+        let line = loaded.line_number(span).map_or(String::new(), |line| format!(" on line {line}"));
+        format!("the {}{name}{line}", shape.kind())
     };
     let (lifted, doubled): (Vec<_>, Vec<_>) = found.iter().partition(|pair| pair.lift.is_some());
     let mut warn = |pairs: &[&CoplanarLight], describe: &dyn Fn(usize, usize, &str) -> String, help: &str| {

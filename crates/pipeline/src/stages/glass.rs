@@ -140,12 +140,14 @@ fn warning(loaded: &LoadedScene, flaw: GlassFlaw, members: &[&OpenGlass]) -> Dia
     diagnostic
 }
 
-/// Lists the first few objects by name, or by line if they are unnamed: `"pane", line 12 and 3 more`.
+/// Lists the first few objects by name, or by line if they are unnamed: `"pane", line 12 and 3 more`. Objects
+/// in foreign files may have neither.
 fn list_object_names(loaded: &LoadedScene, members: &[&OpenGlass]) -> String {
     let name = |open: &&OpenGlass| {
         let object = &loaded.scene.objects[open.object as usize];
-        let line = || format!("line {}", loaded.line_number(&object.span));
-        object.name.as_deref().map_or_else(line, |name| format!("\"{name}\""))
+        let line = || loaded.line_number(&object.span).map(|line| format!("line {line}"));
+        let name = object.name.as_deref().map(|name| format!("\"{name}\""));
+        name.or_else(line).unwrap_or_else(|| "an unnamed mesh".to_owned())
     };
     // Replacing only one name with "1 more" would not make the list shorter.
     let most = if members.len() == MAX_NAMES + 1 { MAX_NAMES + 1 } else { MAX_NAMES };

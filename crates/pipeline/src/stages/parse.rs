@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use super::super::cache::Memo;
 use super::super::formats::model::ModelViewOptions;
-use super::super::formats::{ForeignFormat, ForeignReadContext, ForeignReadError, ForeignScene};
+use super::super::formats::{ForeignFormat, ForeignReadContext, ForeignScene, lower};
 use super::super::protocol::{Failure, reasons};
 use super::super::watch::content::{FileContentId, FilePathAndContentId};
 use super::{AbortReason, FileReadContext, Findings, StageResult};
@@ -49,14 +49,10 @@ pub(crate) struct SceneParseRequest<'a> {
 
 /// Converts an importer's error. Watches missing files to detect when they are created.
 fn abort_reason(
-    failure: ForeignReadError,
+    error: AssetError,
     findings: &mut Findings,
     reading: &FileReadContext<'_>,
 ) -> AbortReason {
-    let error = match failure {
-        ForeignReadError::Scene(errors) => return AbortReason::Failed(Failure::Scene(errors)),
-        ForeignReadError::File(error) => error,
-    };
     match error {
         AssetError::Cancelled(_) => AbortReason::Cancelled,
         AssetError::OutOfMemory { .. } | AssetError::TooManyOpenFiles { .. } => {
@@ -168,9 +164,10 @@ fn read_scene(
             contents.record_decoded(path, *blake3::hash(loaded.source.file_text().as_bytes()).as_bytes());
         return Ok((Arc::new(loaded), content, Vec::new(), Vec::new()));
     };
-    let context = ForeignReadContext { sets, view: show, containers, token };
-    let ForeignScene { loaded, hash, companions, notes, substitutions } =
-        (format.read)(path, &context).map_err(|failure| abort_reason(failure, findings, reading))?;
+    let context = ForeignReadContext { view: show, containers, token };
+    let ForeignScene { document, hash, companions, notes, substitutions } =
+        (format.read)(path, &context).map_err(|error| abort_reason(error, findings, reading))?;
+    let loaded = lower(document, path, sets).map_err(|errors| AbortReason::Failed(Failure::Scene(errors)))?;
     let content = contents.record_decoded(path, hash);
     let companions = companions.iter().map(|companion| contents.record_companion(companion, token));
     let companions = companions.collect::<Result<_, Cancelled>>()?;
@@ -201,7 +198,7 @@ fn add_renamed_file_hint(
     path: &Path,
     last: Option<&Arc<ParsedScene>>,
 ) -> Vec<Diagnostic> {
-    let last = last.filter(|last| last.loaded.path == path);
+    let last = last.filter(|last| last.loaded.path == path && !last.loaded.is_foreign());
     if let [error] = &mut errors[..]
         && scene::is_file_not_found(error)
         && let Some(last) = last

@@ -233,7 +233,7 @@ pub(crate) fn load_textures(
             Err(error @ (AssetError::OutOfMemory { .. } | AssetError::TooManyOpenFiles { .. })) => {
                 return Err(AbortReason::work_failure(error));
             }
-            Err(error) if !are_required && loaded.is_generated() => {
+            Err(error) if !are_required && loaded.is_foreign() => {
                 counts.failed += 1;
                 for one in &image.asked_by {
                     replace_unreadable_image(loaded, one, &error, &mut textures.images, findings);

@@ -292,7 +292,7 @@ fn pick_identifies_object_and_material() {
         ("sphere", Some("globe"), "phong ball")
     );
     let line = SCENE.lines().position(|line| line == "[[sphere]]").expect("a sphere") + 1;
-    assert_eq!((thing.path, thing.line), (bench.path("scene.toml"), line));
+    assert_eq!((thing.path, thing.line), (bench.path("scene.toml"), Some(line)));
     assert!(
         (thing.position[2] - 0.5).abs() < 0.01 && (thing.distance - 3.5).abs() < 0.01,
         "{:?}",

@@ -2,9 +2,9 @@
 
 use std::collections::HashMap;
 
-use crate::key_path::{quote_key_part, shortened_key};
+use crate::key_path::shortened_key;
 use crate::sanitize::escape_and_truncate;
-use crate::toml::{self, Elements, Entries, TomlValue, Value};
+use crate::toml::{self, Elements, Entries, TomlValue, Value, quote_key_part};
 
 /// Maximum size of documents to parse, in bytes. Parsing a document of this size delays the new render by a
 /// few milliseconds.
@@ -121,8 +121,7 @@ impl KeyDifferences<'_> {
             TomlValue::Array(_)
             | TomlValue::Table(_)
             | TomlValue::String(_)
-            | TomlValue::Integer { .. }
-            | TomlValue::Float(_)
+            | TomlValue::Number(_)
             | TomlValue::Boolean(_)
             | TomlValue::Datetime => self.add_unmatched_entry(sign, name, value, text),
         }
@@ -133,11 +132,7 @@ impl KeyDifferences<'_> {
         let is_short = match value.decode() {
             TomlValue::Table(_) => false,
             TomlValue::Array(array) => !array.starts_with_table(),
-            TomlValue::String(_)
-            | TomlValue::Integer { .. }
-            | TomlValue::Float(_)
-            | TomlValue::Boolean(_)
-            | TomlValue::Datetime => true,
+            TomlValue::String(_) | TomlValue::Number(_) | TomlValue::Boolean(_) | TomlValue::Datetime => true,
         };
         let shown = if is_short { format!(" = {}", self.value_text(text, value)) } else { String::new() };
         self.add(|| format!("{sign} {}{shown}", shortened_key(name, MAX_KEY_COLUMNS)));
@@ -178,16 +173,7 @@ fn element_path_segments(all: &[Value<'_>]) -> Vec<String> {
 }
 
 fn value_of_name_key<'t>(value: &Value<'t>) -> Option<&'t str> {
-    let TomlValue::Table(table) = value.decode() else { return None };
-    match table.get("name")?.value.decode() {
-        TomlValue::String(name) => Some(name),
-        TomlValue::Array(_)
-        | TomlValue::Table(_)
-        | TomlValue::Integer { .. }
-        | TomlValue::Float(_)
-        | TomlValue::Boolean(_)
-        | TomlValue::Datetime => None,
-    }
+    value.as_table()?.get("name")?.value.as_str()
 }
 
 /// Whether two values are equal, ignoring formatting and key order.
@@ -205,10 +191,7 @@ fn is_equal_value(a: &Value<'_>, b: &Value<'_>) -> bool {
             a.len() == b.len() && a.iter().zip(b.iter()).all(|(a, b)| is_equal_value(&a, &b))
         }
         (TomlValue::String(a), TomlValue::String(b)) => a == b,
-        (TomlValue::Integer { digits: a, radix: of_a }, TomlValue::Integer { digits: b, radix: of_b }) => {
-            (a, of_a) == (b, of_b)
-        }
-        (TomlValue::Float(a), TomlValue::Float(b)) => a == b,
+        (TomlValue::Number(a), TomlValue::Number(b)) => a == b,
         (TomlValue::Boolean(a), TomlValue::Boolean(b)) => a == b,
         _ => false,
     }

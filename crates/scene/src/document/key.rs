@@ -12,12 +12,12 @@ use std::ops::Range;
 use super::super::keys::key::{DefaultValue, KeyInfo, ValueKind};
 use super::super::nearest::foreign_or_nearest_name;
 use super::super::sanitize::escape_and_truncate;
-use super::super::toml::KeyValue;
+use super::super::toml::{KeyValue, Number};
 use super::context::{FileContext, Issue};
 use super::limits::Limits;
 use super::names::DefinedNames;
 use super::table::{TableReader, TableTitle};
-use super::value::{TomlValue, Value, default_value, describe_value, parse_integer_in_radix, to_number};
+use super::value::{TomlValue, Value, default_value, describe_value};
 use crate::choice::Choice;
 
 /// A table's key, which may be absent.
@@ -82,7 +82,7 @@ impl<'a> KeyInTable<'a> {
 
     /// Reads a number, which may be part of the key's value. Error messages call the value's type `expected`.
     fn number_in(&self, value: Value<'_>, expected: &str) -> Option<f64> {
-        let Some(number) = to_number(value) else {
+        let Some(number) = value.as_number().and_then(Number::to_f64) else {
             self.report_wrong_type(value, expected);
             return None;
         };
@@ -101,7 +101,7 @@ impl<'a> KeyInTable<'a> {
         let label = format!("found {}", describe_value(self.context, value));
         let issue = Issue::error(value.span(), format!("`{name}` must be {expected}")).with_label(label);
         // Explain that textures are not allowed here. Otherwise, users would look for a typo.
-        let is_texture = matches!(value.decode(), TomlValue::Table(table) if table.get("texture").is_some());
+        let is_texture = value.as_table().is_some_and(|table| table.get("texture").is_some());
         self.context.report(match is_texture && !expected.contains("texture") {
             true => issue.with_help(format!("`{name}` cannot be a texture")),
             false => issue,
@@ -111,12 +111,12 @@ impl<'a> KeyInTable<'a> {
     /// Reads an integer. `N` must be able to represent the whole range.
     pub(super) fn integer<N: TryFrom<i128>>(&self) -> Option<N> {
         let (value, ValueKind::Whole(low, high)) = (self.value?, self.info.kind) else { return None };
-        let TomlValue::Integer { digits, radix } = value.decode() else {
+        let Some(written) = value.as_number().filter(|number| number.is_integer()) else {
             self.report_wrong_type(value, "a whole number");
             return None;
         };
         let range = i128::from(low)..=i128::from(high);
-        let number = parse_integer_in_radix(digits, radix).filter(|number| range.contains(number));
+        let number = written.to_integer().filter(|number| range.contains(number));
         if number.is_none() {
             let message = format!("`{}` must be a whole number between {low} and {high}", self.info.name);
             let label = format!("found {}", describe_value(self.context, value));
@@ -143,11 +143,11 @@ impl<'a> KeyInTable<'a> {
     /// Reads a string. `expected` returns the description of the string for error messages.
     fn string_described_by(&self, expected: impl FnOnce() -> String) -> Option<&'a str> {
         let value = self.value?;
-        if let TomlValue::String(text) = value.decode() {
-            return Some(text);
+        let text = value.as_str();
+        if text.is_none() {
+            self.report_wrong_type(value, &expected());
         }
-        self.report_wrong_type(value, &expected());
-        None
+        text
     }
 
     /// Reads the name of a shape, if any. Reports names that look like numbers.
@@ -168,7 +168,7 @@ impl<'a> KeyInTable<'a> {
 
     /// Whether the value is a table.
     pub(super) fn is_table(&self) -> bool {
-        self.value.is_some_and(|value| matches!(value.decode(), TomlValue::Table(_)))
+        self.value.is_some_and(|value| value.as_table().is_some())
     }
 
     /// Reads a choice by its name.

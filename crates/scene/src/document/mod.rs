@@ -19,12 +19,14 @@ mod table;
 pub(super) mod textures;
 mod value;
 
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use super::description::{Camera, Environment, Light, Scene};
 use super::keys::limits;
 use super::other_content::NEW_SCENE_HELP;
 use super::source::SceneText;
+use super::toml::Document;
 use super::{MAX_FILE_BYTES, ParseOutcome, SettingSpan, facing, toml};
 use crate::math::Vec3;
 use context::{FileContext, Issue};
@@ -62,28 +64,32 @@ pub(super) fn parse_and_lower(source: &SceneText, path: &Path) -> ParseOutcome {
     let (document, errors) = toml::parse(text);
     let broken_lines = syntax::report_errors_and_collect_broken_lines(&context, errors);
     let document = sets::apply_set_args(&context, source, document);
+    lower(context, &document, &broken_lines)
+}
+
+/// Validates a document that was built in memory.
+pub(super) fn lower_built(source: &SceneText, document: &Document<'static>, path: &Path) -> ParseOutcome {
+    let context = FileContext::new(source.clone(), path);
+    let is_overridden = source.override_arg_offsets().next().is_some();
+    let overridden = is_overridden.then(|| sets::apply_set_args(&context, source, document.clone()));
+    lower(context, overridden.as_ref().unwrap_or(document), &[])
+}
+
+fn lower(context: FileContext<'_>, document: &Document<'_>, broken_lines: &[Range<usize>]) -> ParseOutcome {
     let scene = read_scene(&TableReader::root(&context, document.root()));
     let has_errors = context.has_errors();
-    let settings = render_and_photons_value_spans(&document);
+    let settings = render_and_photons_value_spans(document);
     ParseOutcome {
         scene: scene.filter(|_| !has_errors),
-        diagnostics: context.into_diagnostics(&broken_lines),
+        diagnostics: context.into_diagnostics(broken_lines),
         settings,
     }
 }
 
 /// Returns the spans of all values in `[render]` and `[photons]`.
-fn render_and_photons_value_spans(document: &toml::Document<'_>) -> Vec<SettingSpan> {
+fn render_and_photons_value_spans(document: &Document<'_>) -> Vec<SettingSpan> {
     let values = |table: &'static str| {
-        let entries = document.root().get(table).and_then(|found| match found.value.decode() {
-            toml::TomlValue::Table(entries) => Some(entries),
-            toml::TomlValue::String(_)
-            | toml::TomlValue::Integer { .. }
-            | toml::TomlValue::Float(_)
-            | toml::TomlValue::Boolean(_)
-            | toml::TomlValue::Datetime
-            | toml::TomlValue::Array(_) => None,
-        });
+        let entries = document.root().get(table).and_then(|found| found.value.as_table());
         let of = move |one: toml::KeyValue<'_>| SettingSpan {
             table,
             key: one.key.to_owned(),
@@ -103,32 +109,25 @@ pub(super) fn parse_camera(source: &SceneText) -> Option<Camera> {
     camera.filter(|_| errors.is_empty() && !context.has_errors())
 }
 
-/// Returns the files that a scene references, even if the scene has errors.
-pub(super) fn referenced_files(text: &str, path: &Path) -> Vec<PathBuf> {
+/// Returns the files that a scene's text references, even if it has errors.
+pub(super) fn files_referenced_by_text(text: &str, path: &Path) -> Vec<PathBuf> {
+    referenced_files(&toml::parse(text).0, path)
+}
+
+/// Returns the files that a document references.
+pub(super) fn referenced_files(document: &Document<'_>, path: &Path) -> Vec<PathBuf> {
     fn collect_file_names(table: toml::Entries<'_>, names: &mut Vec<String>) {
         for toml::KeyValue { key, value, .. } in table.iter() {
-            match value.decode() {
-                toml::TomlValue::String(name) if matches!(key, "file" | "orbiter") => {
-                    names.push(name.to_owned());
-                }
-                toml::TomlValue::Table(inner) => collect_file_names(inner, names),
-                toml::TomlValue::Array(array) => {
-                    for element in array.iter() {
-                        if let toml::TomlValue::Table(inner) = element.decode() {
-                            collect_file_names(inner, names);
-                        }
-                    }
-                }
-                toml::TomlValue::String(_)
-                | toml::TomlValue::Integer { .. }
-                | toml::TomlValue::Float(_)
-                | toml::TomlValue::Boolean(_)
-                | toml::TomlValue::Datetime => {}
+            let name = value.as_str().filter(|_| matches!(key, "file" | "orbiter"));
+            names.extend(name.map(str::to_owned));
+            let elements = value.as_array().into_iter().flat_map(|array| array.iter());
+            for inner in elements.chain([value]).filter_map(|value| value.as_table()) {
+                collect_file_names(inner, names);
             }
         }
     }
     let mut names = Vec::new();
-    collect_file_names(toml::parse(text).0.root(), &mut names);
+    collect_file_names(document.root(), &mut names);
     let folder = path.parent().unwrap_or(Path::new(""));
     names.into_iter().map(|name| folder.join(name)).collect()
 }

@@ -14,7 +14,7 @@ use super::shape_table::{MeshFileRegistry, ShapeTable, read_affine_matrix, shape
 use super::table::TableReader;
 use crate::math::DVec3;
 
-/// All shapes. [`read_objects`] sorts the objects into file order.
+/// All shapes. [`read_objects`] sorts the objects into text order.
 pub(crate) static SHAPES: [ShapeTable; 10] =
     [SPHERE, QUAD, PLANE, BOX, TRIANGLE, DISK, CYLINDER, CONE, TORUS, MESH];
 
@@ -225,17 +225,24 @@ pub(super) fn read_objects(
     materials: &MaterialList,
 ) -> (Option<Vec<Object>>, Vec<MeshFile>) {
     let mut files = MeshFileRegistry::default();
-    let mut objects = Vec::new();
+    let (mut objects, mut order) = (Vec::new(), Vec::new());
     let mut is_valid = true;
     for shape in &SHAPES {
         for table in root.tables(&shape.info) {
             match read_object(shape, &table, materials, &mut files) {
-                Some(object) => objects.push(object),
+                Some(object) => {
+                    objects.push(object);
+                    order.push(table.id());
+                }
                 None => is_valid = false,
             }
         }
     }
-    objects.sort_by_key(|object| object.span.start);
+    if !order.is_sorted() {
+        let mut sorted: Vec<_> = order.into_iter().zip(objects).collect();
+        sorted.sort_unstable_by_key(|(table, _)| *table);
+        objects = sorted.into_iter().map(|(_, object)| object).collect();
+    }
     (is_valid.then_some(objects), files.into_list())
 }
 

@@ -10,7 +10,7 @@ use super::super::keys::key::{
 };
 use super::super::nearest::{foreign_or_nearest_name, nearest_name};
 use super::super::sanitize::escape_and_truncate;
-use super::super::toml::{Entries, KeyValue};
+use super::super::toml::{Entries, KeyValue, TableId};
 use super::context::{FileContext, Issue};
 use super::key::KeyInTable;
 use super::value::{TomlValue, Value, default_value, describe_value};
@@ -121,6 +121,11 @@ impl<'a> TableReader<'a> {
                 None
             }
         }
+    }
+
+    /// The table's ID, which orders tables as in the text.
+    pub(super) fn id(&self) -> TableId {
+        self.entries.id()
     }
 
     /// Finds the entry called `name`, which then counts as known.
@@ -251,7 +256,7 @@ impl<'a> TableReader<'a> {
 
     /// Whether the file contains a table whose name is probably a misspelling of `name`.
     pub(super) fn has_misspelled_table(&self, name: &'static str) -> bool {
-        let is_table = |value: Value<'_>| matches!(value.decode(), TomlValue::Table(_));
+        let is_table = |value: Value<'_>| value.as_table().is_some();
         let mut others = self.entries.iter().filter(|one| one.key != name && is_table(one.value));
         others.any(|one| nearest_name(one.key, [name]).is_some())
     }

@@ -1,20 +1,24 @@
-//! Converts TOML values to numbers, describes them and parses defaults.
+//! Describes TOML values in messages and parses defaults.
 
 use std::collections::BTreeMap;
 use std::sync::{Mutex, PoisonError};
 
 use super::super::sanitize::escape_and_truncate;
-use super::super::toml;
+use super::super::toml::{self, format_value};
 pub(super) use super::super::toml::{TomlValue, Value};
 use super::context::FileContext;
 
-/// Describes a value for use in messages, as in `found the string "a"`.
+/// Describes a value for use in messages, as in `found the string "a"`. Quotes the text, or formats the value
+/// if it is not in a text.
 pub(super) fn describe_value(context: &FileContext<'_>, value: Value<'_>) -> String {
     const LONGEST: usize = 32;
-    let written = || escape_and_truncate(context.span_text(&value.span()), LONGEST);
+    let written = || match context.span_text(&value.span()) {
+        "" => escape_and_truncate(&format_value(value), LONGEST),
+        text => escape_and_truncate(text, LONGEST),
+    };
     match value.decode() {
         TomlValue::String(_) => format!("the string {}", written()),
-        TomlValue::Integer { .. } | TomlValue::Float(_) | TomlValue::Boolean(_) => written(),
+        TomlValue::Number(_) | TomlValue::Boolean(_) => written(),
         TomlValue::Datetime => format!("the date {}", written()),
         TomlValue::Array(array) => match array.len() {
             0 => "an empty array".to_owned(),
@@ -23,32 +27,6 @@ pub(super) fn describe_value(context: &FileContext<'_>, value: Value<'_>) -> Str
         },
         TomlValue::Table(_) => "a table".to_owned(),
     }
-}
-
-/// Converts an integer or a float to a double, clamping it to the range of doubles. Returns `None` for other
-/// values.
-pub(super) fn to_number(value: Value<'_>) -> Option<f64> {
-    match value.decode() {
-        // Round to the nearest double, as if the number were written as a float.
-        TomlValue::Integer { digits, radix } => {
-            Some(parse_integer_in_radix(digits, radix).map_or(f64::MAX, |number| number as f64))
-        }
-        TomlValue::Float(text) => {
-            let number: f64 = text.parse().ok()?;
-            let is_digits = number.is_infinite() && !text.contains("inf");
-            Some(if is_digits { f64::MAX } else { number })
-        }
-        TomlValue::String(_)
-        | TomlValue::Boolean(_)
-        | TomlValue::Datetime
-        | TomlValue::Array(_)
-        | TomlValue::Table(_) => None,
-    }
-}
-
-/// Parses an integer, or returns `None` if it overflows.
-pub(super) fn parse_integer_in_radix(digits: &str, radix: u32) -> Option<i128> {
-    i128::from_str_radix(digits, radix).ok()
 }
 
 /// Parses the text of a default. Each text is parsed once and never freed, so that defaults can be read like

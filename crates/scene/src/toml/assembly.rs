@@ -260,7 +260,7 @@ impl<'s> DocumentBuilder<'s> {
         let what = match kind {
             NodeKind::String(_) => "string",
             NodeKind::Integer(..) => "integer",
-            NodeKind::Float(_) => "float",
+            NodeKind::Float(_) | NodeKind::Number(_) => "float",
             NodeKind::Boolean(_) => "boolean",
             NodeKind::Datetime => "datetime",
             NodeKind::Array(_) | NodeKind::List(_) => "array",

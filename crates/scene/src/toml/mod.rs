@@ -3,7 +3,7 @@
 //! [`parse`] reads a document line by line. [`plain`] handles simple lines, the majority in large scenes. For
 //! all other lines, [`expression`] splits the text, `toml_parser` parses it, and [`events`] converts it to
 //! values. [`assembly`] inserts keys and values into the tables of a [`tree`]. This module is independent of
-//! scenes and recovers from errors.
+//! scenes and recovers from errors. [`build`] builds the same tree in memory, and [`mod@write`] formats it.
 //!
 //! ## Why not use the `toml` crate's tree
 //!
@@ -23,20 +23,26 @@
 
 mod assembly;
 mod brackets;
+mod build;
 mod error;
 mod events;
 mod expression;
 mod plain;
 mod set;
 mod tree;
+mod write;
 
 use assembly::DocumentBuilder;
 use expression::StatementParser;
 
+pub use build::{BuiltDocument, BuiltValue};
+pub use write::quote_toml_string;
+
 pub(super) use brackets::{BracketToken, find_all_array_brackets, innermost_bracket_open_at_end};
 pub(super) use error::SyntaxError;
 pub(super) use set::{KeyError, KeyErrorKind, TopLevelTableKinds};
-pub(super) use tree::{Document, Elements, Entries, KeyValue, TomlValue, Value};
+pub(super) use tree::{Document, Elements, Entries, KeyValue, Number, TableId, TomlValue, Value};
+pub(super) use write::{format_value, quote_key_part};
 
 /// Maximum nesting depth of arrays and tables, and maximum number of parts in a dotted key.
 const MAX_DEPTH: u32 = 80;

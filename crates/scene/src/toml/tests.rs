@@ -31,10 +31,12 @@ fn assert_same_table(text: &str, ours: Entries<'_>, theirs: &DeTable<'_>) {
 fn assert_same_value(text: &str, ours: Value<'_>, theirs: &DeValue<'_>) {
     match (ours.decode(), theirs) {
         (TomlValue::String(ours), DeValue::String(theirs)) => assert_eq!(ours, theirs, "{text:?}"),
-        (TomlValue::Integer { digits, radix }, DeValue::Integer(theirs)) => {
+        (TomlValue::Number(Number::Integer { digits, radix }), DeValue::Integer(theirs)) => {
             assert_eq!((digits, radix), (theirs.as_str(), theirs.radix()), "{text:?}");
         }
-        (TomlValue::Float(ours), DeValue::Float(theirs)) => assert_eq!(ours, theirs.as_str(), "{text:?}"),
+        (TomlValue::Number(Number::Float(ours)), DeValue::Float(theirs)) => {
+            assert_eq!(ours, theirs.as_str(), "{text:?}");
+        }
         (TomlValue::Boolean(ours), DeValue::Boolean(theirs)) => assert_eq!(ours, *theirs, "{text:?}"),
         (TomlValue::Datetime, DeValue::Datetime(_)) => {}
         (TomlValue::Array(ours), DeValue::Array(theirs)) => {

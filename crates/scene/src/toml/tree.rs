@@ -1,6 +1,7 @@
 //! The document tree: 16-byte nodes in a few vectors, and strings that are spans of the source.
 //!
-//! A sphere with a center, a radius and a material takes about 180 bytes.
+//! A sphere with a center, a radius and a material takes about 180 bytes. Documents that are built in memory
+//! have no source: they store their strings and numbers.
 
 use std::borrow::Cow;
 use std::collections::HashMap;
@@ -44,9 +45,9 @@ pub(super) enum Radix {
     Hexadecimal = 16,
 }
 
-/// Index of a table in the document.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub(super) struct TableId(u32);
+/// Index of a table in the document. Tables are numbered in text order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub(crate) struct TableId(u32);
 
 /// Kind of a value.
 #[derive(Clone, Copy, Debug)]
@@ -54,6 +55,8 @@ pub(super) enum NodeKind {
     String(DecodedTextIndex),
     Integer(DecodedTextIndex, Radix),
     Float(DecodedTextIndex),
+    /// An index into the numbers.
+    Number(u32),
     Boolean(bool),
     Datetime,
     /// `[…]`: an index into the arrays.
@@ -122,11 +125,13 @@ pub(super) struct Name<'s> {
 }
 
 /// A TOML document.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Document<'s> {
     source: &'s str,
     /// Decoded strings that differ from the source.
-    texts: Vec<String>,
+    texts: Vec<Cow<'s, str>>,
+    /// Numbers that are not in the source.
+    numbers: Vec<f64>,
     tables: Vec<TableRecord>,
     entries: Vec<TableEntry>,
     /// Each array's range in `elements`.
@@ -145,6 +150,7 @@ impl<'s> Document<'s> {
         let mut document = Self {
             source,
             texts: Vec::new(),
+            numbers: Vec::new(),
             tables: Vec::new(),
             entries: Vec::new(),
             arrays: Vec::new(),
@@ -169,6 +175,11 @@ impl<'s> Document<'s> {
     pub(super) fn add_table(&mut self, origin: TableOrigin) -> TableId {
         self.tables.push(TableRecord { first: NONE, last: NONE, length: 0, origin });
         TableId(index_to_u32_or_sentinel(self.tables.len() - 1))
+    }
+
+    /// ID of the table that is added next.
+    pub(super) fn next_table(&self) -> TableId {
+        TableId(index_to_u32_or_sentinel(self.tables.len()))
     }
 
     pub(super) fn table_origin(&self, table: TableId) -> TableOrigin {
@@ -200,14 +211,20 @@ impl<'s> Document<'s> {
     /// Stores the decoded string at `span`.
     pub(super) fn store_decoded_string(&mut self, span: Span, text: Cow<'s, str>) -> DecodedTextIndex {
         let written = self.source.get(span.range()).unwrap_or_default();
-        if text == written {
+        if text == written && !text.is_empty() {
             return DecodedTextIndex::WHOLE;
         }
         if written.len() >= 2 && written.get(1..written.len() - 1) == Some(&text) {
             return DecodedTextIndex::QUOTED;
         }
-        self.texts.push(text.into_owned());
+        self.texts.push(text);
         DecodedTextIndex(index_to_u32_or_sentinel(self.texts.len() - 1))
+    }
+
+    /// Adds a number that is not in the source.
+    pub(super) fn add_number(&mut self, number: f64) -> NodeKind {
+        self.numbers.push(number);
+        NodeKind::Number(index_to_u32_or_sentinel(self.numbers.len() - 1))
     }
 
     fn resolve_string(&self, span: Span, text: DecodedTextIndex) -> &str {
@@ -332,6 +349,7 @@ impl<'s> Document<'s> {
             NodeKind::String(_)
             | NodeKind::Integer(..)
             | NodeKind::Float(_)
+            | NodeKind::Number(_)
             | NodeKind::Boolean(_)
             | NodeKind::Datetime
             | NodeKind::Table(_) => None,
@@ -381,10 +399,8 @@ pub(crate) struct Value<'d> {
 pub(crate) enum TomlValue<'d> {
     /// A decoded string, without quotes or escapes.
     String(&'d str),
-    /// Digits with a sign, but without underscores or a radix prefix.
-    Integer { digits: &'d str, radix: u32 },
-    /// Text accepted by `f64::from_str`.
-    Float(&'d str),
+    /// An integer or a float.
+    Number(Number<'d>),
     /// `true` or `false`.
     Boolean(bool),
     /// A date, a time, or both.
@@ -395,10 +411,61 @@ pub(crate) enum TomlValue<'d> {
     Table(Entries<'d>),
 }
 
+/// A number, as text or as a value.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Number<'d> {
+    /// Digits with a sign, but without underscores or a radix prefix.
+    Integer { digits: &'d str, radix: u32 },
+    /// Text accepted by `f64::from_str`.
+    Float(&'d str),
+    /// The value of a number that is not in the source.
+    Exact(f64),
+}
+
+impl Number<'_> {
+    /// Converts the number to a double, clamping text to the range of doubles. Returns `None` for text that is
+    /// not a number.
+    pub(crate) fn to_f64(self) -> Option<f64> {
+        match self {
+            // Round to the nearest double, as if the number were written as a float.
+            Self::Integer { .. } => Some(self.to_integer().map_or(f64::MAX, |number| number as f64)),
+            Self::Float(text) => {
+                let number: f64 = text.parse().ok()?;
+                let is_digits = number.is_infinite() && !text.contains("inf");
+                Some(if is_digits { f64::MAX } else { number })
+            }
+            Self::Exact(number) => Some(number),
+        }
+    }
+
+    /// Whether this is an integer. Text with a decimal point or an exponent is not an integer.
+    pub(crate) fn is_integer(self) -> bool {
+        match self {
+            Self::Integer { .. } => true,
+            Self::Float(_) => false,
+            Self::Exact(number) => number.fract() == 0.0,
+        }
+    }
+
+    /// Converts an integer, or returns `None` if it overflows or is not an integer.
+    pub(crate) fn to_integer(self) -> Option<i128> {
+        match self {
+            Self::Integer { digits, radix } => i128::from_str_radix(digits, radix).ok(),
+            Self::Float(_) => None,
+            Self::Exact(number) => Some(number as i128).filter(|_| self.is_integer()),
+        }
+    }
+}
+
 impl<'d> Value<'d> {
     /// Returns the byte range in the source. For a table, this is the range of its header or braces.
     pub(crate) fn span(&self) -> Range<usize> {
         self.node.span.range()
+    }
+
+    /// Returns the value's text in the source.
+    pub(super) fn source_text(&self) -> &'d str {
+        self.document.source.get(self.span()).unwrap_or_default()
     }
 
     /// Returns the elements of an array, or `None` if the value is not an array.
@@ -406,15 +473,32 @@ impl<'d> Value<'d> {
         if let TomlValue::Array(array) = self.decode() { Some(array) } else { None }
     }
 
+    /// Returns the entries of a table, or `None` if the value is not a table.
+    pub(crate) fn as_table(&self) -> Option<Entries<'d>> {
+        if let TomlValue::Table(entries) = self.decode() { Some(entries) } else { None }
+    }
+
+    /// Returns the number, or `None` if the value is not a number.
+    pub(crate) fn as_number(&self) -> Option<Number<'d>> {
+        if let TomlValue::Number(number) = self.decode() { Some(number) } else { None }
+    }
+
+    /// Returns the decoded string, or `None` if the value is not a string.
+    pub(crate) fn as_str(&self) -> Option<&'d str> {
+        if let TomlValue::String(text) = self.decode() { Some(text) } else { None }
+    }
+
     /// Decodes the value.
     pub(crate) fn decode(&self) -> TomlValue<'d> {
         let (document, span) = (self.document, self.node.span);
         match self.node.kind {
             NodeKind::String(text) => TomlValue::String(document.resolve_string(span, text)),
-            NodeKind::Integer(text, radix) => {
-                TomlValue::Integer { digits: document.resolve_string(span, text), radix: radix as u32 }
-            }
-            NodeKind::Float(text) => TomlValue::Float(document.resolve_string(span, text)),
+            NodeKind::Integer(text, radix) => TomlValue::Number(Number::Integer {
+                digits: document.resolve_string(span, text),
+                radix: radix as u32,
+            }),
+            NodeKind::Float(text) => TomlValue::Number(Number::Float(document.resolve_string(span, text))),
+            NodeKind::Number(number) => TomlValue::Number(Number::Exact(document.numbers[number as usize])),
             NodeKind::Boolean(value) => TomlValue::Boolean(value),
             NodeKind::Datetime => TomlValue::Datetime,
             NodeKind::Array(array) => {
@@ -473,6 +557,21 @@ pub(crate) struct KeyValue<'d> {
 }
 
 impl<'d> Entries<'d> {
+    /// The table's ID.
+    pub(crate) fn id(&self) -> TableId {
+        self.table
+    }
+
+    /// Whether the table has no header because a longer header created it.
+    pub(super) fn is_implicit(&self) -> bool {
+        self.document.table_origin(self.table).is_implicit
+    }
+
+    /// Whether the table is an inline table.
+    pub(super) fn is_inline(&self) -> bool {
+        self.document.table_origin(self.table).is_inline
+    }
+
     /// Finds the entry with this key.
     pub(crate) fn get(&self, name: &str) -> Option<KeyValue<'d>> {
         self.document.find_entry(self.table, name).map(|entry| self.key_value_at(entry))

@@ -142,7 +142,7 @@ impl RequestState {
     pub(crate) fn image_provenance(&self, is_unfinished: bool) -> ImageProvenance {
         ImageProvenance {
             toggles: self.sent_toggles,
-            text: self.text.clone().filter(|_| !has_model_extension(&self.scene)),
+            text: self.text.clone(),
             files: self.files.clone(),
             is_unfinished,
         }

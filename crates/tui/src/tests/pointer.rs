@@ -45,7 +45,7 @@ fn thing() -> PickedObject {
         shape: "sphere",
         name: Some("ball".to_owned()),
         path: "scenes/cornell.toml".into(),
-        line: 47,
+        line: Some(47),
         material: "glass crystal".to_owned(),
         position: [0.2, 0.5, -0.3],
         normal: [0.0, 1.0, 0.0],

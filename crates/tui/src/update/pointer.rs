@@ -9,7 +9,6 @@ use crate::event::{Effect, MouseEvent, MouseEventKind};
 use crate::keymap::OverlayAction;
 use crate::math::decimal::{decimal_step_at_distance, round_to_step};
 use crate::messages;
-use crate::pipeline::has_model_extension;
 use crate::pipeline::protocol::{Command, PickedObject, PickedPixel};
 use crate::scene::sanitize::escape_invisible_chars;
 use crate::state::{MousePress, PickPurpose, State};
@@ -144,9 +143,10 @@ pub(super) fn handle_pick(state: &mut State, picked: &PickedPixel) -> Vec<Effect
     if state.picture.history.is_viewing_older() {
         return Vec::new();
     }
-    let in_text = picked.thing.as_ref().filter(|thing| !has_model_extension(&thing.path));
-    state.selection.picked =
-        in_text.map(|thing| FilePosition { path: thing.path.clone(), line: thing.line, column: 1 });
+    state.selection.picked = picked
+        .thing
+        .as_ref()
+        .and_then(|thing| Some(FilePosition { path: thing.path.clone(), line: thing.line?, column: 1 }));
     match (state.selection.purpose, &picked.thing) {
         (PickPurpose::Inspect, _) => {
             state.overlays.message = None;
@@ -214,8 +214,7 @@ fn inspected_values(PickedPixel { thing, color, pixel: [x, y] }: &PickedPixel) -
     let file = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
     let back = if *is_front { "" } else { " (back)" };
     let mut facts = vec![format!("{shape}{name}")];
-    // A model's scene is generated, so its lines do not exist in any file.
-    facts.extend((!has_model_extension(path)).then(|| format!("{}:{line}", escape_invisible_chars(&file))));
+    facts.extend(line.map(|line| format!("{}:{line}", escape_invisible_chars(&file))));
     facts.extend([
         escape_invisible_chars(material).into_owned(),
         format!("distance {}", format_three_significant_digits(*distance)),
@@ -246,7 +245,7 @@ mod tests {
             shape: "sphere",
             name: Some("ball".to_owned()),
             path: "scenes/still.toml".into(),
-            line: 47,
+            line: Some(47),
             material: "glass crystal".to_owned(),
             position: [0.214, 0.4996, -33.06],
             normal: [0.0, 1.0, -0.0],
@@ -267,8 +266,7 @@ mod tests {
                 "normal (0, 1, 0)"
             ]
         );
-        let of_model =
-            picked.thing.clone().map(|thing| PickedObject { path: "scenes/vase.obj".into(), ..thing });
+        let of_model = picked.thing.clone().map(|thing| PickedObject { line: None, ..thing });
         let of_model = inspected_values(&PickedPixel { thing: of_model, ..picked });
         assert_eq!(of_model[..2], ["sphere \"ball\"", "glass crystal"], "models should have no line numbers");
         assert_eq!(

@@ -1,13 +1,13 @@
-//! Writes the `[textures]` and `[materials]` tables of a converted glTF file.
+//! Adds the `[textures]` and `[materials]` tables of a glTF file.
 
 use std::collections::HashMap;
 
 use super::super::model::UsedNames;
-use super::super::toml::{format_color, format_key, format_number, format_pair};
-use super::SceneWriter;
+use super::super::rounding::{shorten, shorten_color, shorten_pair};
+use super::SceneBuilder;
 use crate::assets::gltf::{Alpha, ModelMaterial, TextureRef, TextureWrap, TexturedValue};
 use crate::math::{DVec3, Vec2};
-use crate::scene::quote_toml_string;
+use crate::scene::BuiltValue;
 
 /// A texture's file.
 #[derive(Clone, Debug, PartialEq)]
@@ -27,60 +27,60 @@ enum TextureUse {
 }
 
 /// Keys and values of a table.
-type TomlEntries = Vec<(&'static str, String)>;
+type Entries = Vec<(&'static str, BuiltValue)>;
 
-/// Identity of a texture: its image, its use and its other table keys.
+/// Identity of a texture: its image, its use and its other table keys, formatted.
 type TextureIdentity = (usize, TextureUse, String);
 
-/// Writer for materials and their textures.
-pub(super) struct MaterialWriter<'a, 'b> {
-    scene: &'a mut SceneWriter<'b>,
+/// Builder for materials and their textures.
+pub(super) struct MaterialBuilder<'a, 'b> {
+    scene: &'a mut SceneBuilder<'b>,
     textures: HashMap<TextureIdentity, String>,
     names: UsedNames,
 }
 
-impl MaterialWriter<'_, '_> {
-    /// Writes the tables and returns the material names.
-    pub(super) fn write_all(
+impl MaterialBuilder<'_, '_> {
+    /// Adds the tables and returns the material names.
+    pub(super) fn add_all(
         materials: &[ModelMaterial],
         names: &mut UsedNames,
-        scene: &mut SceneWriter<'_>,
+        scene: &mut SceneBuilder<'_>,
     ) -> Vec<String> {
-        let mut all = MaterialWriter { scene, textures: HashMap::new(), names: UsedNames::default() };
+        let mut all = MaterialBuilder { scene, textures: HashMap::new(), names: UsedNames::default() };
         materials
             .iter()
             .map(|material| {
                 let name = names.make_unique(&material.name, "material");
-                all.write_material(material, &name);
+                all.add_material(material, &name);
                 name
             })
             .collect()
     }
 
-    fn write_material(&mut self, material: &ModelMaterial, name: &str) {
+    fn add_material(&mut self, material: &ModelMaterial, name: &str) {
         // Collect the keys first, because texture tables must precede the material's table.
-        let mut keys = TomlEntries::new();
+        let mut keys = Entries::new();
         match material.glass {
             Some(glass) => {
-                keys.push(("type", "\"glass\"".to_owned()));
+                keys.push(("type", "glass".into()));
                 self.push_number_or_texture(&mut keys, ("roughness", 0.0), &material.roughness, "g");
                 if glass.tint != DVec3::ONE {
-                    keys.push(("tint", format_color(glass.tint)));
+                    keys.push(("tint", shorten_color(glass.tint)));
                 }
             }
-            None => self.write_principled(&mut keys, material),
+            None => self.add_principled_keys(&mut keys, material),
         }
         if material.ior != 1.5 {
-            keys.push(("ior", format_number(material.ior)));
+            keys.push(("ior", shorten(material.ior).into()));
         }
-        self.write_common_keys(&mut keys, material);
-        let toml = &mut self.scene.toml;
-        toml.table(&format!("[materials.{}]", format_key(name)));
-        keys.iter().for_each(|(key, value)| toml.key_value(key, value));
+        self.add_common_keys(&mut keys, material);
+        let document = &mut self.scene.document;
+        document.named_table("materials", name);
+        keys.into_iter().for_each(|(key, value)| document.set(key, value));
     }
 
-    fn write_principled(&mut self, keys: &mut TomlEntries, material: &ModelMaterial) {
-        keys.push(("type", "\"principled\"".to_owned()));
+    fn add_principled_keys(&mut self, keys: &mut Entries, material: &ModelMaterial) {
+        keys.push(("type", "principled".into()));
         self.push_color_or_texture(keys, ("color", 0.8), &material.color);
         self.push_number_or_texture(keys, ("metallic", 0.0), &material.metallic, "b");
         self.push_number_or_texture(keys, ("roughness", 0.5), &material.roughness, "g");
@@ -99,31 +99,28 @@ impl MaterialWriter<'_, '_> {
     }
 
     /// Adds the keys that all material types share.
-    fn write_common_keys(&mut self, keys: &mut TomlEntries, material: &ModelMaterial) {
+    fn add_common_keys(&mut self, keys: &mut Entries, material: &ModelMaterial) {
         let emission = &material.emission;
         if emission.factor != DVec3::ZERO {
             match &emission.texture {
                 Some(texture) => {
                     let name = self.ensure_texture_table(texture, TextureUse::Colors, DVec3::ONE);
-                    let scale = emission.factor;
-                    let scale = if scale == DVec3::ONE {
-                        String::new()
-                    } else {
-                        format!(", scale = {}", format_color(scale))
-                    };
-                    keys.push(("emission", format!("{{ texture = {}{scale} }}", quote_toml_string(&name))));
+                    let scale =
+                        (emission.factor != DVec3::ONE).then(|| ("scale", shorten_color(emission.factor)));
+                    let texture = ("texture", name.into());
+                    keys.push(("emission", BuiltValue::Table([texture].into_iter().chain(scale).collect())));
                 }
-                None => keys.push(("emission", format_color(emission.factor))),
+                None => keys.push(("emission", shorten_color(emission.factor))),
             }
             if material.is_two_sided {
-                keys.push(("emission_sides", "\"both\"".to_owned()));
+                keys.push(("emission_sides", "both".into()));
             }
         }
         if let Some(normal) = &material.normal {
             let name = self.ensure_texture_table(normal, TextureUse::Normals, DVec3::ONE);
-            keys.push(("normal_map", quote_toml_string(&name)));
+            keys.push(("normal_map", name.into()));
             if material.normal_strength != 1.0 {
-                keys.push(("normal_strength", format_number(material.normal_strength)));
+                keys.push(("normal_strength", shorten(material.normal_strength).into()));
             }
         }
         if material.glass.is_some() {
@@ -132,18 +129,18 @@ impl MaterialWriter<'_, '_> {
         match &material.alpha {
             Alpha::Opaque => {}
             Alpha::Mask { value, cutoff } => {
-                self.write_opacity(keys, value, &material.color);
+                self.add_opacity(keys, value, &material.color);
                 // A cutoff has no effect if it is 0 or if alpha is always 1.
                 if *cutoff > 0.0 && (value.texture.is_some() || value.factor != DVec3::ONE) {
-                    keys.push(("opacity_cutoff", format_number(*cutoff)));
+                    keys.push(("opacity_cutoff", shorten(*cutoff).into()));
                 }
             }
-            Alpha::Blend(value) => self.write_opacity(keys, value, &material.color),
+            Alpha::Blend(value) => self.add_opacity(keys, value, &material.color),
         }
     }
 
-    /// Writes the opacity, reading it from the texture's alpha channel if there is a texture.
-    fn write_opacity(&mut self, keys: &mut TomlEntries, value: &TexturedValue, color: &TexturedValue) {
+    /// Adds the opacity, reading it from the texture's alpha channel if there is a texture.
+    fn add_opacity(&mut self, keys: &mut Entries, value: &TexturedValue, color: &TexturedValue) {
         match &value.texture {
             Some(texture) => {
                 // Without factors, color and alpha can share a texture table.
@@ -154,30 +151,27 @@ impl MaterialWriter<'_, '_> {
                     TextureUse::Numbers
                 };
                 let name = self.ensure_texture_table(texture, use_, value.factor);
-                keys.push((
-                    "opacity",
-                    format!("{{ texture = {}, channel = \"a\" }}", quote_toml_string(&name)),
-                ));
+                keys.push(("opacity", texture_channel(name, "a")));
             }
-            None if value.factor != DVec3::ONE => keys.push(("opacity", format_number(value.factor.x))),
+            None if value.factor != DVec3::ONE => keys.push(("opacity", shorten(value.factor.x).into())),
             None => {}
         }
     }
 
     fn push_color_or_texture(
         &mut self,
-        keys: &mut TomlEntries,
+        keys: &mut Entries,
         (key, usual): (&'static str, f64),
         slot: &TexturedValue,
     ) {
         match &slot.texture {
             Some(texture) => {
                 let name = self.ensure_texture_table(texture, TextureUse::Colors, slot.factor);
-                keys.push((key, format!("{{ texture = {} }}", quote_toml_string(&name))));
+                keys.push((key, BuiltValue::Table(vec![("texture", name.into())])));
             }
             None if slot.factor != DVec3::splat(usual) => {
                 let most = if key == "color" { slot.factor.min(DVec3::ONE) } else { slot.factor };
-                keys.push((key, format_color(most)));
+                keys.push((key, shorten_color(most)));
             }
             None => {}
         }
@@ -185,66 +179,67 @@ impl MaterialWriter<'_, '_> {
 
     fn push_number_or_texture(
         &mut self,
-        keys: &mut TomlEntries,
+        keys: &mut Entries,
         (key, usual): (&'static str, f64),
         slot: &TexturedValue,
-        channel: &str,
+        channel: &'static str,
     ) {
         match &slot.texture {
             Some(texture) => {
                 let name = self.ensure_texture_table(texture, TextureUse::Numbers, slot.factor);
-                keys.push((
-                    key,
-                    format!("{{ texture = {}, channel = \"{channel}\" }}", quote_toml_string(&name)),
-                ));
+                keys.push((key, texture_channel(name, channel)));
             }
-            None if slot.factor.x != usual => keys.push((key, format_number(slot.factor.x))),
+            None if slot.factor.x != usual => keys.push((key, shorten(slot.factor.x).into())),
             None => {}
         }
     }
 
-    /// Returns a texture's name, writing its table if the texture is new.
+    /// Returns a texture's name, adding its table if the texture is new.
     fn ensure_texture_table(&mut self, texture: &TextureRef, use_: TextureUse, factor: DVec3) -> String {
-        let mut keys = TomlEntries::new();
+        let mut keys = Entries::new();
         if texture.is_nearest {
-            keys.push(("filter", "\"nearest\"".to_owned()));
+            keys.push(("filter", "nearest".into()));
         }
         match texture.wrap {
             TextureWrap::Repeat => {}
-            TextureWrap::Clamp => keys.push(("wrap", "\"clamp\"".to_owned())),
-            TextureWrap::Mirror => keys.push(("wrap", "\"mirror\"".to_owned())),
+            TextureWrap::Clamp => keys.push(("wrap", "clamp".into())),
+            TextureWrap::Mirror => keys.push(("wrap", "mirror".into())),
         }
         if texture.is_second {
-            keys.push(("uv", "1".to_owned()));
+            keys.push(("uv", 1.0.into()));
         }
         if texture.repeat != Vec2::ONE {
-            keys.push(("repeat", format_pair(texture.repeat)));
+            keys.push(("repeat", shorten_pair(texture.repeat).into()));
         }
         if texture.rotate != 0.0 {
-            keys.push(("rotate", format_number(texture.rotate)));
+            keys.push(("rotate", shorten(texture.rotate).into()));
         }
         if texture.offset != Vec2::ZERO {
-            keys.push(("offset", format_pair(texture.offset)));
+            keys.push(("offset", shorten_pair(texture.offset).into()));
         }
         if factor != DVec3::ONE {
-            keys.push(("factor", format_color(factor)));
+            keys.push(("factor", shorten_color(factor)));
         }
-        let shared = keys.iter().map(|(key, value)| format!("{key}={value};")).collect();
-        let identity = (texture.image, use_, shared);
+        let identity = (texture.image, use_, format!("{keys:?}"));
         if let Some(known) = self.textures.get(&identity) {
             return known.clone();
         }
         let wanted = self.scene.image_name(texture.image);
         let name = self.names.make_unique(&wanted, "image");
         let TextureFileReference { file, image } = self.scene.image_file_reference(texture.image);
-        let toml = &mut self.scene.toml;
-        toml.table(&format!("[textures.{}]", format_key(&name)));
-        toml.key_value("file", quote_toml_string(&file));
+        let document = &mut self.scene.document;
+        document.named_table("textures", &name);
+        document.set("file", file);
         if let Some(image) = image {
-            toml.key_value("image", image.to_string());
+            document.set("image", image as f64);
         }
-        keys.iter().for_each(|(key, value)| toml.key_value(key, value));
+        keys.into_iter().for_each(|(key, value)| document.set(key, value));
         self.textures.insert(identity, name.clone());
         name
     }
+}
+
+/// Returns the value that reads a number from a texture's channel.
+fn texture_channel(texture: String, channel: &'static str) -> BuiltValue {
+    BuiltValue::Table(vec![("texture", texture.into()), ("channel", channel.into())])
 }

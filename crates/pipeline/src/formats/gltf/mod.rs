@@ -6,14 +6,14 @@ use std::collections::{BTreeSet, HashMap};
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use self::materials::{MaterialWriter, TextureFileReference};
+use self::materials::{MaterialBuilder, TextureFileReference};
 use super::frame::{CameraPose, FOV, frame_model, round_to_decimals_of_step};
 use super::model::{
-    GeneratedText, Lighting, ModelViewOptions, ROUGH, SIZE, UsedNames, file_name, warning, write_camera,
-    write_ground, write_render_settings, write_sky_and_key_light,
+    Lighting, ModelViewOptions, ROUGH, SIZE, UsedNames, add_camera, add_ground, add_render_settings,
+    add_sky_and_key_light, file_name, warning,
 };
-use super::toml::{TomlWriter, format_color, format_list, format_number, format_vector};
-use super::{ForeignReadContext, ForeignReadError, ForeignScene, ImportedScene};
+use super::rounding::{shorten, shorten_color, shorten_vector};
+use super::{ForeignReadContext, ForeignScene, ImportedScene, lower};
 use crate::assets::gltf::{
     Alpha, GltfFile, ImageLocation, ModelCamera, ModelInstance, ModelLight, ModelLightKind, ModelMaterial,
     ModelScene, TexturedValue,
@@ -24,9 +24,9 @@ use crate::control::ignore_progress;
 use crate::math::color::luminance;
 use crate::math::{DMat3, DVec3};
 use crate::messages::INVISIBLE_MODEL;
+use crate::scene::BuiltDocument;
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::keys::endings::MAPS;
-use crate::scene::quote_toml_string;
 use crate::settings::{UpAxis, ViewSide};
 
 /// Where the generated scene's meshes and images are stored.
@@ -47,24 +47,24 @@ enum GltfPartOrImage {
 }
 
 /// Reads a glTF file.
-pub(super) fn read(path: &Path, context: &ForeignReadContext<'_>) -> Result<ForeignScene, ForeignReadError> {
+pub(super) fn read(path: &Path, context: &ForeignReadContext<'_>) -> Result<ForeignScene, AssetError> {
     if context.view.up.is_some_and(|up| up != UpAxis::Y) {
         let reason = "glTF files are always y-up; `--up` applies to obj, off, ply and stl";
-        return Err(AssetError::malformed(path, None, reason).into());
+        return Err(AssetError::malformed(path, None, reason));
     }
-    let (text, _) = scene_text(path, &SceneAssetLocation::Inside, context)?;
-    text.into_scene(path, context.sets)
+    let (scene, _) = scene_of_file(path, &SceneAssetLocation::Inside, context)?;
+    Ok(scene)
 }
 
-/// Converts a glTF file to a scene file, and to files in `folder` that contain its meshes and images.
+/// Converts a glTF file to a scene, and to files in `folder` that contain its meshes and images.
 pub(super) fn convert(
     path: &Path,
     folder: &str,
     context: &ForeignReadContext<'_>,
 ) -> Result<ImportedScene, AssetError> {
     let &ForeignReadContext { containers, token, .. } = context;
-    let (GeneratedText { text, substitutions, .. }, assets) =
-        scene_text(path, &SceneAssetLocation::Folder(folder), context)?;
+    let (ForeignScene { document, substitutions, .. }, assets) =
+        scene_of_file(path, &SceneAssetLocation::Folder(folder), context)?;
     check_rendered_scene(path, context)?;
     let container = containers.open(path, &ignore_progress, token)?;
     let encode = |(name, content)| {
@@ -82,40 +82,36 @@ pub(super) fn convert(
         Ok((PathBuf::from(name), bytes))
     };
     let files = assets.into_iter().map(encode).collect::<Result<_, AssetError>>()?;
-    Ok(ImportedScene { text, files, substitutions })
+    Ok(ImportedScene { document, files, substitutions })
 }
 
 /// Rejects a file that `glimt check` would reject. Checks the scene that `glimt MODEL` would render, because
 /// the files referenced by that scene already exist.
 fn check_rendered_scene(path: &Path, context: &ForeignReadContext<'_>) -> Result<(), AssetError> {
-    let errors = match read(path, context) {
-        Ok(_) => return Ok(()),
-        Err(ForeignReadError::File(error)) => return Err(error),
-        Err(ForeignReadError::Scene(errors)) => errors,
-    };
+    let errors = lower(read(path, context)?.document, path, &[]).err();
     // Ignore errors about file names, because the imported scene uses different file names.
     let is_relevant = |one: &Diagnostic| one.severity == Severity::Error && !one.message.contains("`file`");
-    let first = errors.into_iter().find(is_relevant);
+    let first = errors.into_iter().flatten().find(is_relevant);
     first.map_or(Ok(()), |error| Err(AssetError::malformed(path, None, error.message)))
 }
 
-/// Generates the scene text for a glTF file. Also returns the names and contents of the files that the text
+/// Generates the scene for a glTF file. Also returns the names and contents of the files that the scene
 /// references but that do not exist yet. The names are relative to the scene.
-fn scene_text(
+fn scene_of_file(
     path: &Path,
     asset_location: &SceneAssetLocation<'_>,
-    &ForeignReadContext { view, containers, token, .. }: &ForeignReadContext<'_>,
-) -> Result<(GeneratedText, Vec<(String, GltfPartOrImage)>), AssetError> {
+    &ForeignReadContext { view, containers, token }: &ForeignReadContext<'_>,
+) -> Result<(ForeignScene, Vec<(String, GltfPartOrImage)>), AssetError> {
     let container = containers.open(path, &ignore_progress, token)?;
     let scene = container.convert_scene(token)?;
     let Some(bounds) = scene.bounds else {
         return Err(AssetError::malformed(path, None, "its scene has no visible faces"));
     };
-    let mut writer = SceneWriter {
+    let mut builder = SceneBuilder {
         container: &container,
         path,
         asset_location,
-        toml: TomlWriter::default(),
+        document: BuiltDocument::default(),
         files: UsedNames::default(),
         assets: Vec::new(),
         names: HashMap::new(),
@@ -123,8 +119,8 @@ fn scene_text(
         image_names: scene.images.clone(),
         companions: container.external_buffers().to_vec(),
     };
-    writer.write(&scene, bounds, view);
-    let SceneWriter { toml, assets, images, companions, .. } = writer;
+    builder.add_all(&scene, bounds, view);
+    let SceneBuilder { document, assets, images, companions, .. } = builder;
     let is_fully_transparent =
         scene.instances.iter().all(|one| is_fully_transparent(&scene.materials[one.material]));
     let notes = is_fully_transparent.then(|| warning(path, INVISIBLE_MODEL)).into_iter().collect();
@@ -133,49 +129,48 @@ fn scene_text(
     if let SceneAssetLocation::Folder(_) = asset_location {
         images.into_iter().try_for_each(|image| container.check_image_header(image, token))?;
     }
-    let (text, hash) = (toml.finish(), container.file_hash());
-    Ok((GeneratedText { text, hash, companions, notes, substitutions }, assets))
+    let hash = container.file_hash();
+    Ok((ForeignScene { document, hash, companions, notes, substitutions }, assets))
 }
 
-struct SceneWriter<'a> {
+/// Builder for the scene of a glTF file.
+struct SceneBuilder<'a> {
     container: &'a GltfFile,
     path: &'a Path,
     asset_location: &'a SceneAssetLocation<'a>,
-    toml: TomlWriter,
+    document: BuiltDocument,
     /// File names already used in the folder.
     files: UsedNames,
-    /// Names and contents of files that the text references but that do not exist yet.
+    /// Names and contents of files that the scene references but that do not exist yet.
     assets: Vec<(String, GltfPartOrImage)>,
     names: HashMap<GltfPartOrImage, String>,
     /// Images that materials use.
     images: BTreeSet<usize>,
     image_names: Vec<String>,
-    /// Other files that the text depends on.
+    /// Other files that the scene depends on.
     companions: Vec<Companion>,
 }
 
-impl SceneWriter<'_> {
-    fn write(&mut self, scene: &ModelScene, bounds: [DVec3; 2], view: ModelViewOptions) {
+impl SceneBuilder<'_> {
+    fn add_all(&mut self, scene: &ModelScene, bounds: [DVec3; 2], view: ModelViewOptions) {
         // Describe the model and its approximations.
-        self.toml.comment(&format!("{}, as glimt shows it.", file_name(self.path)));
+        self.document.comment(format!("{}, as glimt shows it.", file_name(self.path)));
         for note in &scene.notes {
-            self.toml.comment(note);
+            self.document.comment(note);
         }
-        // Write the render settings, the camera and the lights.
+        // Add the render settings, the camera and the lights.
         let own = scene.cameras.first().filter(|_| view.from.is_none());
         let aspect = view.aspect.or(own.and_then(|camera| camera.aspect));
-        let size = own
-            .and_then(|camera| camera.aspect)
-            .map(|aspect| [(SIZE[1] * aspect).round().max(1.0) as u32, SIZE[1] as u32]);
+        let size = own.and_then(|camera| camera.aspect).map(|aspect| [(SIZE[1] * aspect).round(), SIZE[1]]);
         let lighting = match scene.lights.is_empty() {
             true => Lighting::Default { is_polished: scene.materials.iter().any(material_may_cast_caustics) },
             false => Lighting::from_file_light_irradiance(max_irradiance(&scene.lights, bounds)),
         };
-        write_render_settings(&mut self.toml, size, lighting);
+        add_render_settings(&mut self.document, size, lighting);
         let eye = match own {
             Some(own) => {
                 let eye = camera_pose(own, bounds);
-                write_camera(&mut self.toml, &eye, own.fov);
+                add_camera(&mut self.document, &eye, own.fov);
                 eye
             }
             None => {
@@ -185,99 +180,97 @@ impl SceneWriter<'_> {
                     (view.from.unwrap_or(ViewSide::Iso), view.turns),
                     aspect.unwrap_or(SIZE[0] / SIZE[1]),
                 );
-                write_camera(&mut self.toml, &eye, FOV);
+                add_camera(&mut self.document, &eye, FOV);
                 eye
             }
         };
-        write_sky_and_key_light(&mut self.toml, &eye, lighting);
+        add_sky_and_key_light(&mut self.document, &eye, lighting);
         if !scene.lights.is_empty() {
-            self.toml.section_comment("1 cd in the file is treated as 1 W/sr, and 1 lx as 1 W/m².");
+            self.document.comment("1 cd in the file is treated as 1 W/sr, and 1 lx as 1 W/m².");
         }
-        scene.lights.iter().for_each(|light| self.write_light_table(light));
-        // Write the materials, then the meshes that use them.
+        scene.lights.iter().for_each(|light| self.add_light(light));
+        // Add the materials, then the meshes that use them.
         let mut names = UsedNames::default();
-        let materials = MaterialWriter::write_all(&scene.materials, &mut names, self);
+        let materials = MaterialBuilder::add_all(&scene.materials, &mut names, self);
         let mut shapes = UsedNames::default();
         for instance in &scene.instances {
-            self.write_mesh_table(instance, &materials[instance.material], &mut shapes);
+            self.add_mesh(instance, &materials[instance.material], &mut shapes);
         }
-        write_ground(&mut self.toml, &mut names, bounds, &eye);
+        add_ground(&mut self.document, &mut names, bounds, &eye);
     }
 
-    fn write_light_table(&mut self, light: &ModelLight) {
-        let toml = &mut self.toml;
-        toml.table("[[light]]");
+    fn add_light(&mut self, light: &ModelLight) {
+        let document = &mut self.document;
+        document.list_table("light");
         if !light.name.is_empty() {
-            toml.comment(&light.name);
+            document.table_comment(&light.name);
         }
         match light.kind {
             ModelLightKind::Point => {}
-            ModelLightKind::Spot { .. } => toml.key_value("type", "\"spot\""),
-            ModelLightKind::Directional => toml.key_value("type", "\"directional\""),
+            ModelLightKind::Spot { .. } => document.set("type", "spot"),
+            ModelLightKind::Directional => document.set("type", "directional"),
         }
         match light.kind {
             ModelLightKind::Directional => {
-                toml.key_value("direction", format_vector(light.direction));
-                toml.key_value("irradiance", format_color(light.intensity));
+                document.set("direction", shorten_vector(light.direction));
+                document.set("irradiance", shorten_color(light.intensity));
             }
             ModelLightKind::Point | ModelLightKind::Spot { .. } => {
-                toml.key_value("position", format_vector(light.position));
-                toml.key_value("intensity", format_color(light.intensity));
+                document.set("position", shorten_vector(light.position));
+                document.set("intensity", shorten_color(light.intensity));
             }
         }
         if let ModelLightKind::Spot { angle, blend } = light.kind {
-            toml.key_value("look_at", format_vector(light.position + light.direction));
-            toml.key_value("angle", format_number(angle.min(359.0)));
-            toml.key_value("blend", format_number(blend));
+            document.set("look_at", shorten_vector(light.position + light.direction));
+            document.set("angle", shorten(angle.min(359.0)));
+            document.set("blend", shorten(blend));
         }
     }
 
-    fn write_mesh_table(&mut self, instance: &ModelInstance, material: &str, shapes: &mut UsedNames) {
-        self.toml.table("[[mesh]]");
+    fn add_mesh(&mut self, instance: &ModelInstance, material: &str, shapes: &mut UsedNames) {
+        self.document.list_table("mesh");
         if !instance.name.is_empty() {
-            self.toml.key_value("name", quote_toml_string(&shapes.make_unique(&instance.name, "mesh")));
+            self.document.set("name", shapes.make_unique(&instance.name, "mesh"));
         }
         let base = if instance.name.is_empty() { "part" } else { &instance.name };
         match self.asset_location {
             SceneAssetLocation::Inside => {
-                self.toml.key_value("file", quote_toml_string(&file_name(self.path)));
-                self.toml.key_value("part", instance.part.to_string());
+                self.document.set("file", file_name(self.path));
+                self.document.set("part", instance.part as f64);
             }
             SceneAssetLocation::Folder(_) => {
                 let name = self.add_exported_file(GltfPartOrImage::Part(instance.part), base, "ply");
-                self.toml.key_value("file", quote_toml_string(&name));
+                self.document.set("file", name);
             }
         }
-        self.toml.key_value("material", quote_toml_string(material));
-        self.write_placement(&instance.placed.linear, instance.placed.translate);
+        self.document.set("material", material.to_owned());
+        self.add_placement(&instance.placed.linear, instance.placed.translate);
         if !instance.has_normals {
-            self.toml.key_value("smooth", "false");
+            self.document.set("smooth", false);
         }
         if instance.has_colors {
-            self.toml.key_value("vertex_colors", "true");
+            self.document.set("vertex_colors", true);
         }
     }
 
-    /// Writes the placement as `scale` and `translate` if possible, and as `matrix` if not.
-    fn write_placement(&mut self, linear: &DMat3, translate: DVec3) {
+    /// Adds the placement as `scale` and `translate` if possible, and as `matrix` if not.
+    fn add_placement(&mut self, linear: &DMat3, translate: DVec3) {
         let scale = DVec3::new(linear.x_axis.x, linear.y_axis.y, linear.z_axis.z);
         if *linear == DMat3::from_diagonal(scale) {
             if scale != DVec3::ONE {
-                self.toml.key_value("scale", format_color(scale));
+                self.document.set("scale", shorten_color(scale));
             }
             if translate != DVec3::ZERO {
-                self.toml.key_value("translate", format_vector(translate));
+                self.document.set("translate", shorten_vector(translate));
             }
             return;
         }
         let rows = linear.transpose();
-        let row = |axis: DVec3, last: f64| {
-            let row = format_list(&[axis.x, axis.y, axis.z, last].map(zero_if_tiny));
-            row[1..row.len() - 1].to_owned()
-        };
-        let matrix = [(rows.x_axis, translate.x), (rows.y_axis, translate.y), (rows.z_axis, translate.z)];
-        let matrix = matrix.map(|(axis, last)| row(axis, last)).join(",  ");
-        self.toml.key_value("matrix", format!("[{matrix},  0, 0, 0, 1]"));
+        let row = |axis: DVec3, last: f64| [axis.x, axis.y, axis.z, last].map(zero_if_tiny).map(shorten);
+        let rows =
+            [row(rows.x_axis, translate.x), row(rows.y_axis, translate.y), row(rows.z_axis, translate.z)];
+        let matrix = [&rows[..], &[[0.0, 0.0, 0.0, 1.0]]].concat().concat();
+        self.document.set("matrix", matrix);
     }
 
     /// Returns the file name for `content`, adding a file if the content is new.

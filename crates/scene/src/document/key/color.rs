@@ -8,7 +8,7 @@ use super::super::super::nearest::nearest_name;
 use super::super::context::Issue;
 use super::super::limits::Limits;
 use super::super::names::DefinedNames;
-use super::super::value::{TomlValue, Value, parse_integer_in_radix};
+use super::super::value::{TomlValue, Value};
 use super::KeyInTable;
 use crate::math::color::srgb8_color_to_linear;
 use crate::math::{DVec3, Vec3};
@@ -65,7 +65,7 @@ impl KeyInTable<'_> {
 
     /// Returns `None` and reports an error if the value is a bare texture name.
     fn reject_bare_texture_name(&self, textures: &DefinedNames, expected: &str) -> Option<()> {
-        if let TomlValue::String(text) = self.value?.decode()
+        if let Some(text) = self.value?.as_str()
             && parse_hex_or_named_srgb8(text).is_none()
             && textures.find_and_mark_used(text).is_some()
         {
@@ -89,9 +89,7 @@ impl KeyInTable<'_> {
         }
         match value.decode() {
             TomlValue::String(text) => return self.parse_hex_or_named_color(text).map(Vec3::as_dvec3),
-            TomlValue::Integer { .. } | TomlValue::Float(_) => {
-                return self.number_in(value, expected).map(DVec3::splat);
-            }
+            TomlValue::Number(_) => return self.number_in(value, expected).map(DVec3::splat),
             TomlValue::Boolean(_) | TomlValue::Datetime | TomlValue::Array(_) | TomlValue::Table(_) => {}
         }
         if value.as_array().is_some_and(|array| array.len() == 3) {
@@ -114,15 +112,7 @@ impl KeyInTable<'_> {
     /// Converts one or three integers up to 255 to `#rrggbb`, if any of them is too large for a linear
     /// component.
     fn byte_color_to_hex(&self) -> Option<String> {
-        let byte = |value: Value<'_>| match value.decode() {
-            TomlValue::Integer { digits, radix } => u8::try_from(parse_integer_in_radix(digits, radix)?).ok(),
-            TomlValue::String(_)
-            | TomlValue::Float(_)
-            | TomlValue::Boolean(_)
-            | TomlValue::Datetime
-            | TomlValue::Array(_)
-            | TomlValue::Table(_) => None,
-        };
+        let byte = |value: Value<'_>| u8::try_from(value.as_number()?.to_integer()?).ok();
         let value = self.value?;
         let bytes: Vec<u8> = match value.as_array() {
             Some(array) => array.iter().map(byte).collect::<Option<_>>()?,

@@ -3,7 +3,6 @@
 use super::super::super::description::{Channel, NumberSource};
 use super::super::context::Issue;
 use super::super::names::DefinedNames;
-use super::super::value::TomlValue;
 use super::KeyInTable;
 
 const NUMBER_OR_TEXTURE: &str = "a number, or { texture = \"name\" }";
@@ -17,7 +16,7 @@ impl KeyInTable<'_> {
             return Some(NumberSource::Texture { texture, channel });
         }
         let value = self.value?;
-        if let TomlValue::String(text) = value.decode()
+        if let Some(text) = value.as_str()
             && textures.find_and_mark_used(text).is_some()
         {
             let issue =

@@ -1,7 +1,6 @@
 //! Reads vectors.
 
 use super::super::context::Issue;
-use super::super::value::TomlValue;
 use super::KeyInTable;
 use crate::math::limits::{SHORTEST, is_nonzero_but_too_short, robust_length};
 use crate::math::{DVec3, Vec2};
@@ -62,7 +61,7 @@ impl KeyInTable<'_> {
 
     /// Reads scale factors: one number for all three axes, or three numbers.
     pub(in super::super) fn scale_factors(&self) -> Option<DVec3> {
-        if matches!(self.value?.decode(), TomlValue::Integer { .. } | TomlValue::Float(_)) {
+        if self.value?.as_number().is_some() {
             return self.number().map(DVec3::splat);
         }
         self.numbers("a number, or three numbers [x, y, z]").map(DVec3::from_array)
