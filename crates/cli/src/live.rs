@@ -12,10 +12,10 @@ use crate::output::held;
 use crate::pipeline::protocol::{
     CheckpointUpdate, Command, Event, Failure, SavedSceneImageState, Stage, Status,
 };
-use crate::pipeline::start;
 use crate::pipeline::watch::{
     ExternalChange, FileHashCache, FilePathAndContentId, Watcher, find_missing_parent_or_working_folder,
 };
+use crate::pipeline::{foreign_file_error, start};
 use crate::scene::diagnostic::Diagnostic;
 use crate::scene::sanitize::escape_invisible_chars;
 use crate::scene::{SAME_TEXT, is_file_not_found, read_current_text};
@@ -156,7 +156,9 @@ fn scene_not_found_error(scene: &Path) -> Option<Diagnostic> {
     if scene.symlink_metadata().is_ok() {
         return None;
     }
-    read_current_text(scene).err().map(|problem| *problem).filter(is_file_not_found)
+    let problem =
+        foreign_file_error(scene).or_else(|| read_current_text(scene).err().map(|problem| *problem));
+    problem.filter(is_file_not_found)
 }
 
 /// A log of written images, shared between threads.

@@ -56,8 +56,8 @@ use glimt_trace::{integrators, world};
 pub use build::BUILD;
 pub use check::{IncrementalSceneChecker, SceneSummary, check_scene, estimate_memory};
 pub use formats::{
-    ImportError, ImportedScene, has_foreign_extension, has_importable_extension, has_model_extension,
-    import_scene,
+    ImportError, ImportedScene, foreign_file_error, has_foreign_extension, has_importable_extension,
+    has_model_extension, import_scene,
 };
 pub use stages::parse::files_referenced_by_assets;
 pub use watch::content::{FileContentId, FilePathAndContentId};

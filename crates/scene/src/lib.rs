@@ -38,8 +38,8 @@ use diagnostic::{Diagnostic, Severity};
 pub use document::MORE_LIKE_THESE;
 pub use facing::MeshBoundingBox;
 pub use key_path::{key_parts, shortened_key, split_at_unquoted_space};
-pub use other_content::{detect_image_or_part, has_scene_extension};
-pub use read::{find_renamed_scene, lacks_camera_header};
+pub use other_content::{NEW_SCENE_HELP, detect_image_or_part, has_scene_extension};
+pub use read::{find_renamed_scene, lacks_camera_header, missing_file_help};
 pub use source::SceneText;
 
 /// Maximum size of a scene file in bytes.

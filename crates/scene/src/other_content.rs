@@ -9,7 +9,7 @@ use super::sanitize::escape_invisible_chars;
 use crate::system::file::{self, PART_MAGIC};
 
 /// Hint for errors about files that are not scenes.
-pub(super) const NEW_SCENE_HELP: &str = "`glimt new FILE` writes a scene to start from";
+pub const NEW_SCENE_HELP: &str = "`glimt new FILE` writes a scene to start from";
 
 /// Whether a path has a scene file's extension.
 pub fn has_scene_extension(found: &Path) -> bool {

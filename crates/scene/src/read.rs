@@ -5,19 +5,15 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::diagnostic::{Diagnostic, SourceSpan};
-use super::document::has_mesh_extension;
-use super::keys::endings::MESHES;
 use super::nearest::nearest_name;
 use super::other_content::{NEW_SCENE_HELP, NonSceneContent, detect_image_or_part, has_scene_extension};
 use super::sanitize::escape_invisible_chars;
-use super::{MAX_FILE_BYTES, MAX_PARTS, MODEL_NOT_FOUND, SCENE_NOT_FOUND};
+use super::{MAX_FILE_BYTES, MAX_PARTS, SCENE_NOT_FOUND};
 use crate::system::file::{self, FileKind};
 use crate::system::{RAISE_FILE_LIMIT, describe_error, folder, is_too_many_open_files};
 
 /// Error message for binary files.
 const NOT_TEXT: &str = "this is a binary file, not a scene";
-/// Error message for meshes passed instead of a scene.
-const MESH_NOT_SCENE: &str = "this is a mesh, not a scene";
 /// Error message for dangling symbolic links.
 const DANGLING_LINK: &str = "this is a symbolic link to a file that does not exist";
 /// Error message and hint for files not downloaded by Git LFS.
@@ -26,15 +22,6 @@ const LFS_HELP: &str = "run `git lfs pull`";
 
 /// Reads the text of a scene file.
 pub(super) fn read_scene_text(path: &Path) -> Result<Arc<str>, Box<Diagnostic>> {
-    if has_mesh_extension(path) && lacks_camera_header(path) {
-        return Err(mesh_instead_of_scene_error(path));
-    }
-    if is_unsupported_model(path) {
-        let ending = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
-        let message = format!("glimt cannot read .{ending} models");
-        let help = format!("export it in one of these formats: .{}", MESHES.join(", ."));
-        return Err(Diagnostic::error_in_file(path, message, Some(help), None));
-    }
     let bytes = read_bytes(path).map_err(|(message, help)| {
         // Report a large image as an image rather than as a large scene.
         detect_image_or_part(path)
@@ -65,33 +52,6 @@ pub(super) fn binary_file_error(path: &Path) -> Box<Diagnostic> {
     )
 }
 
-/// Creates the error for a mesh passed instead of a scene.
-fn mesh_instead_of_scene_error(path: &Path) -> Box<Diagnostic> {
-    let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
-    let help = format!(
-        "to use it in a scene, add [[mesh]] with {}; {NEW_SCENE_HELP}",
-        format_mesh_file_key(&escape_invisible_chars(&name))
-    );
-    Diagnostic::error_in_file(path, MESH_NOT_SCENE.to_owned(), Some(help), None)
-}
-
-/// Formats the key `file` in `[[mesh]]` for help texts.
-fn format_mesh_file_key(name: &str) -> String {
-    format!("`file = \"{name}\"`")
-}
-
-/// Extensions of unsupported model formats.
-const UNSUPPORTED_MODELS: [&str; 22] = [
-    "3dm", "3ds", "3mf", "abc", "blend", "c4d", "dae", "fbx", "iges", "igs", "lwo", "ma", "max", "mb",
-    "step", "stp", "usd", "usda", "usdc", "usdz", "wrl", "x3d",
-];
-
-/// Whether a readable file has an unsupported model format's extension and does not contain a scene.
-fn is_unsupported_model(path: &Path) -> bool {
-    let ending = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
-    UNSUPPORTED_MODELS.contains(&ending.as_str()) && lacks_camera_header(path)
-}
-
 /// Whether a file is readable and has no `[camera]` header near its start, and therefore is not a scene file.
 pub fn lacks_camera_header(path: &Path) -> bool {
     const START: u64 = 1 << 16;
@@ -118,8 +78,7 @@ type RefusalMessageAndHelp = (String, Option<String>);
 
 fn read_bytes(path: &Path) -> Result<Vec<u8>, RefusalMessageAndHelp> {
     let unreadable = |error: io::Error| unreadable_refusal(path, &error);
-    let (file, metadata) =
-        file::open_regular_file(path).map_err(unreadable)?.map_err(|kind| not_regular_refusal(path, kind))?;
+    let (file, metadata) = file::open_regular_file(path).map_err(unreadable)?.map_err(not_regular_refusal)?;
     if metadata.len() > MAX_FILE_BYTES {
         return Err(too_large_refusal());
     }
@@ -142,10 +101,7 @@ fn count_syntax_elements(text: &[u8]) -> usize {
     text.iter().filter(|byte| b"[]{}=,\n".contains(byte)).count()
 }
 
-fn not_regular_refusal(path: &Path, kind: FileKind) -> RefusalMessageAndHelp {
-    if has_mesh_extension(path) {
-        return (format!("this is {}, not a model", kind.description()), None);
-    }
+fn not_regular_refusal(kind: FileKind) -> RefusalMessageAndHelp {
     let help = match kind {
         FileKind::Folder => "pass a scene file, such as scene.toml",
         FileKind::Regular | FileKind::Special | FileKind::Kernel => {
@@ -171,22 +127,21 @@ fn unreadable_refusal(path: &Path, error: &io::Error) -> RefusalMessageAndHelp {
         return (DANGLING_LINK.to_owned(), None);
     }
     if error.kind() == io::ErrorKind::NotFound {
-        let shown = |path: &Path| escape_invisible_chars(&path.to_string_lossy()).into_owned();
-        let missing = path.parent().filter(|folder| !folder.as_os_str().is_empty() && !folder.exists());
-        let is_model = has_mesh_extension(path);
-        let near = similar_file(path, if is_model { has_mesh_extension } else { has_scene_extension });
-        let help = match (missing, near) {
-            (Some(folder), _) => Some(format!("the folder {} does not exist", shown(folder))),
-            (None, Some(near)) => Some(format!("did you mean {}?", shown(&near))),
-            // `glimt new` does not write models.
-            (None, None) if is_model => None,
-            (None, None) => Some(NEW_SCENE_HELP.to_owned()),
-        };
-        let message = if is_model { MODEL_NOT_FOUND } else { SCENE_NOT_FOUND };
-        return (message.to_owned(), help);
+        let help = missing_file_help(path, has_scene_extension).unwrap_or_else(|| NEW_SCENE_HELP.to_owned());
+        return (SCENE_NOT_FOUND.to_owned(), Some(help));
     }
     let help = is_too_many_open_files(error).then(|| RAISE_FILE_LIMIT.to_owned());
     (format!("cannot read the scene file: {}", describe_error(error)), help)
+}
+
+/// Returns the help text for a missing file: the missing folder, or a file with a similar name among those
+/// accepted by `may_be_meant`.
+pub fn missing_file_help(path: &Path, may_be_meant: impl Fn(&Path) -> bool) -> Option<String> {
+    let shown = |path: &Path| escape_invisible_chars(&path.to_string_lossy()).into_owned();
+    match path.parent().filter(|folder| !folder.as_os_str().is_empty() && !folder.exists()) {
+        Some(folder) => Some(format!("the folder {} does not exist", shown(folder))),
+        None => similar_file(path, may_be_meant).map(|near| format!("did you mean {}?", shown(&near))),
+    }
 }
 
 /// Maximum number of files to examine per folder.
@@ -298,33 +253,8 @@ mod tests {
         std::fs::write(folder.path().join("my_hall.png"), "").expect("written");
         let picture = message(&folder.path().join("my_hall.toml"));
         assert!(picture.help.expect("a help text").contains("glimt new"));
-        // `glimt new` does not write models.
-        std::fs::write(folder.path().join("knot.obj"), "").expect("written");
-        for (name, help) in [("know.obj", Some("knot.obj")), ("nothing.glb", None), ("cornell.ply", None)] {
-            let model = message(&folder.path().join(name));
-            assert_eq!(model.message, MODEL_NOT_FOUND);
-            assert_eq!(model.help.is_some(), help.is_some(), "{name}: {:?}", model.help);
-            assert!(model.help.is_none_or(|help| help.contains("did you mean") && help.contains("knot.obj")));
-        }
         let lonely = message(&folder.path().join("zebra"));
         assert!(lonely.help.expect("a help text").contains("glimt new"));
-    }
-
-    #[test]
-    fn meshes_are_not_scenes() {
-        let folder = tempfile::tempdir().expect("a folder");
-        let contents: [(&str, &[u8]); 3] =
-            [("a.obj", b"v 0 0 0\n"), ("b.PLY", b"ply\n"), ("c.glb", b"glTF\0\0")];
-        for (name, content) in contents {
-            let path = folder.path().join(name);
-            std::fs::write(&path, content).expect("written");
-            let Diagnostic { message, help, .. } = message(&path);
-            assert_eq!(message, MESH_NOT_SCENE);
-            assert!(help.expect("a help text").contains(&format_mesh_file_key(name)));
-        }
-        let scene = folder.path().join("scene.obj");
-        std::fs::write(&scene, "[camera]\n").expect("written");
-        assert!(read_scene_text(&scene).is_ok());
     }
 
     #[test]

@@ -15,6 +15,7 @@ use super::request::{
 use super::results::{Results, SceneResult, StepResult};
 use super::time_budget::TimeBudget;
 use crate::control::CancelToken;
+use crate::pipeline::foreign_file_error;
 use crate::pipeline::headless::HeadlessSession;
 use crate::pipeline::protocol::Failure;
 use crate::pipeline::settings::Overrides;
@@ -135,7 +136,9 @@ impl SceneRun<'_> {
     fn load_and_validate(&self, session: &mut HeadlessSession) -> Result<ValidatedScene, BenchError> {
         let order = self.order;
         self.report_task_begin("reading", None);
-        let loaded = scene::load(self.path, &order.common.sets)
+        let foreign = foreign_file_error(self.path).map_or(Ok(()), |error| Err(vec![error]));
+        let loaded = foreign
+            .and_then(|()| scene::load(self.path, &order.common.sets))
             .map_err(|diagnostics| BenchError::Failed(Failure::Scene(diagnostics)))?;
         let given = match &order.reference {
             ReferenceSource::Files(files) => Some(load_reference_files(files)?),

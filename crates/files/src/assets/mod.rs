@@ -11,11 +11,25 @@ mod read;
 use std::io;
 use std::path::{Path, PathBuf};
 
+use crate::control::{CancelToken, Cancelled};
 use crate::geometry::mesh::TriangleMesh;
 use crate::system::file::FileStamp;
 use crate::system::{RAISE_FILE_LIMIT, describe_error, is_too_many_open_files};
 
 pub use file_material::{FileLine, FileMaterial, FileMaterialKind, FileTexture, PhysicalMaterial};
+
+/// Lists the files that a mesh or glTF file references, without loading them. Returns an empty list for other
+/// formats and unreadable files.
+///
+/// # Errors
+/// Returns [`Cancelled`] if the token is canceled.
+pub fn referenced_files(path: &Path, token: &CancelToken) -> Result<Vec<PathBuf>, Cancelled> {
+    if gltf::is_gltf(path) {
+        gltf::referenced_files(path, token)
+    } else {
+        mesh::referenced_files(path, token)
+    }
+}
 
 /// Reason why a file cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -54,7 +68,7 @@ pub enum AssetError {
     },
     /// The work was canceled.
     #[error("cancelled")]
-    Cancelled(#[from] crate::control::Cancelled),
+    Cancelled(#[from] Cancelled),
 }
 
 impl AssetError {

@@ -14,14 +14,20 @@ mod mesh;
 pub(crate) mod model;
 mod rounding;
 
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use self::model::ModelViewOptions;
 use super::stages::containers::GltfContainers;
 use crate::assets::{AssetError, Companion, FileHash};
 use crate::control::CancelToken;
-use crate::scene::diagnostic::Diagnostic;
-use crate::scene::{BuiltDocument, LoadedScene, lacks_camera_header, load_built};
+use crate::scene::diagnostic::{Diagnostic, Severity};
+use crate::scene::sanitize::escape_invisible_chars;
+use crate::scene::{
+    BuiltDocument, LoadedScene, MODEL_NOT_FOUND, NEW_SCENE_HELP, lacks_camera_header, load_built,
+    missing_file_help,
+};
+use crate::system::file::{FileKind, file_kind};
 
 pub use import::{ImportError, import_scene};
 
@@ -36,6 +42,12 @@ const FORMATS: [ForeignFormat; 4] = [
         read: gltf::read,
         convert: Some(gltf::convert),
     },
+];
+
+/// Extensions of unsupported model formats.
+const UNSUPPORTED: [&str; 22] = [
+    "3dm", "3ds", "3mf", "abc", "blend", "c4d", "dae", "fbx", "iges", "igs", "lwo", "ma", "max", "mb",
+    "step", "stp", "usd", "usda", "usdc", "usdz", "wrl", "x3d",
 ];
 
 /// A foreign format.
@@ -124,6 +136,39 @@ impl ForeignFormat {
     }
 }
 
+/// Returns the error for a file that is not a scene file, or `None` if the file must be read as a scene file.
+/// Files with the extension of a foreign format are not scene files unless they have a scene's header.
+pub fn foreign_file_error(path: &Path) -> Option<Diagnostic> {
+    let error = |message: String, help| {
+        Some(Diagnostic { help, ..Diagnostic::about_file(path, Severity::Error, message) })
+    };
+    let extension = lowercase_extension(path);
+    if UNSUPPORTED.contains(&extension.as_str()) && lacks_camera_header(path) {
+        let models = FORMATS.iter().filter(|format| format.is_model).flat_map(|format| format.extensions);
+        let models: Vec<_> = models.map(|one| format!(".{one}")).collect();
+        let help = format!("export it in one of these formats: {}", models.join(", "));
+        return error(format!("glimt cannot read .{extension} models"), Some(help));
+    }
+    ForeignFormat::from_extension(path)?;
+    match file_kind(path) {
+        Ok((FileKind::Regular, _)) if lacks_camera_header(path) => {
+            let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
+            let help = format!(
+                "to use it in a scene, add [[mesh]] with `file = \"{}\"`; {NEW_SCENE_HELP}",
+                escape_invisible_chars(&name)
+            );
+            error("this is a mesh, not a scene".to_owned(), Some(help))
+        }
+        Ok((FileKind::Regular, _)) => None,
+        Ok((kind, _)) => error(format!("this is {}, not a model", kind.description()), None),
+        // `scene::load` reports dangling links and other errors.
+        Err(failure) if failure.kind() == ErrorKind::NotFound && !path.is_symlink() => {
+            error(MODEL_NOT_FOUND.to_owned(), missing_file_help(path, has_foreign_extension))
+        }
+        Err(_) => None,
+    }
+}
+
 /// Returns a path's extension in lowercase, or an empty string.
 fn lowercase_extension(path: &Path) -> String {
     path.extension().unwrap_or_default().to_string_lossy().to_lowercase()
@@ -172,5 +217,46 @@ mod tests {
         assert!(ForeignFormat::of_file(&path).is_some());
         std::fs::write(&path, "[camera]\n").expect("written");
         assert!(ForeignFormat::of_file(&path).is_none());
+    }
+
+    fn message(path: &Path) -> Diagnostic {
+        foreign_file_error(path).expect("a diagnostic")
+    }
+
+    #[test]
+    fn missing_models_suggest_similar_names() {
+        let folder = tempfile::tempdir().expect("a folder");
+        std::fs::write(folder.path().join("cornell.toml"), "").expect("written");
+        std::fs::write(folder.path().join("knot.obj"), "").expect("written");
+        for (name, help) in [("know.obj", Some("knot.obj")), ("nothing.glb", None), ("cornell.ply", None)] {
+            let model = message(&folder.path().join(name));
+            assert_eq!(model.message, MODEL_NOT_FOUND);
+            assert_eq!(model.help.is_some(), help.is_some(), "{name}: {:?}", model.help);
+            assert!(model.help.is_none_or(|help| help.contains("did you mean") && help.contains("knot.obj")));
+        }
+        std::fs::create_dir(folder.path().join("folder.ply")).expect("made");
+        assert!(message(&folder.path().join("folder.ply")).message.ends_with("not a model"));
+        assert_eq!(foreign_file_error(&folder.path().join("missing.fbx")), None);
+    }
+
+    #[test]
+    fn models_are_not_scenes() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let contents: [(&str, &[u8]); 4] =
+            [("a.obj", b"v 0 0 0\n"), ("b.PLY", b"ply\n"), ("c.glb", b"glTF\0\0"), ("d.FBX", b"Kaydara\n")];
+        for (name, content) in contents {
+            let path = folder.path().join(name);
+            std::fs::write(&path, content).expect("written");
+            let Diagnostic { message, help, .. } = message(&path);
+            let help = help.expect("a help text");
+            if name == "d.FBX" {
+                assert!(message.contains(".fbx") && help.contains(".obj, .off, .ply, .stl, .glb, .gltf"));
+            } else {
+                assert_eq!(message, "this is a mesh, not a scene");
+                assert!(help.contains(&format!("`file = \"{name}\"`")), "{help}");
+            }
+            std::fs::write(&path, "[camera]\n").expect("written");
+            assert_eq!(foreign_file_error(&path), None);
+        }
     }
 }

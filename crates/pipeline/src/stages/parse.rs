@@ -6,14 +6,12 @@ use std::sync::Arc;
 
 use super::super::cache::Memo;
 use super::super::formats::model::ModelViewOptions;
-use super::super::formats::{ForeignFormat, ForeignReadContext, ForeignScene, lower};
+use super::super::formats::{ForeignFormat, ForeignReadContext, ForeignScene, foreign_file_error, lower};
 use super::super::protocol::{Failure, reasons};
 use super::super::watch::content::{FileContentId, FilePathAndContentId};
 use super::{AbortReason, FileReadContext, Findings, StageResult};
-use crate::assets::gltf::{self, is_gltf};
-use crate::assets::mesh;
 use crate::assets::orbiter::load as load_orbiter;
-use crate::assets::{AssetError, GkitOrbiterCamera};
+use crate::assets::{self, AssetError, GkitOrbiterCamera};
 use crate::control::{CancelToken, Cancelled};
 use crate::output::held::{self, BackupRecovery};
 use crate::scene;
@@ -157,7 +155,8 @@ fn read_scene(
 ) -> Result<SceneAndDependencies, AbortReason> {
     let FileReadContext { contents, containers, token, .. } = *reading;
     let Some(format) = format else {
-        let loaded = scene::load(path, sets).map_err(|errors| {
+        let foreign = foreign_file_error(path).map_or(Ok(()), |error| Err(vec![error]));
+        let loaded = foreign.and_then(|()| scene::load(path, sets)).map_err(|errors| {
             AbortReason::Failed(Failure::Scene(add_renamed_file_hint(errors, path, last)))
         })?;
         let content =
@@ -214,10 +213,10 @@ fn add_renamed_file_hint(
 /// that have not been read.
 fn referenced_files(loaded: &scene::LoadedScene, token: &CancelToken) -> Result<Vec<PathBuf>, Cancelled> {
     let is_read = |path: &&PathBuf| loaded.scene.mesh_files.iter().any(|file| file.value == **path);
-    let textures: BTreeSet<_> = loaded.scene.textures.iter().map(|texture| &texture.file.value).collect();
     let named = loaded.named.iter().filter(|path| !is_read(path));
-    let textures = textures.into_iter().filter(|path| is_gltf(path) && !is_read(path));
-    let referenced = files_referenced_by_assets(named.chain(textures), token)?;
+    let containers = loaded.scene.textures.iter().filter(|texture| texture.image.is_some());
+    let containers = containers.map(|texture| &texture.file.value).filter(|path| !is_read(path));
+    let referenced = files_referenced_by_assets(named.chain(containers), token)?;
     Ok(loaded.named.iter().cloned().chain(referenced).collect())
 }
 
@@ -232,8 +231,7 @@ pub fn files_referenced_by_assets<'a>(
 ) -> Result<BTreeSet<PathBuf>, Cancelled> {
     let mut companions = BTreeSet::new();
     for path in files.collect::<BTreeSet<_>>() {
-        let referenced = if is_gltf(path) { gltf::referenced_files } else { mesh::referenced_files };
-        companions.extend(referenced(path, token)?);
+        companions.extend(assets::referenced_files(path, token)?);
     }
     Ok(companions)
 }

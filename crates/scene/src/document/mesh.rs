@@ -1,6 +1,6 @@
 //! The `[[mesh]]` tables.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use super::super::description::{MeshReference, MeshTransform, Shape, Spanned};
 use super::super::keys::endings::{GLTF, MESHES};
@@ -70,10 +70,4 @@ fn read_placement(table: &TableReader<'_>) -> Option<MeshTransform> {
     let [scale, rotate, translate] = steps;
     let (scale, rotate, translate) = (scale.scale_factors(), rotate.vector(), translate.vector());
     Some(MeshTransform::Steps { scale: scale?, rotate: rotate?, translate: translate? })
-}
-
-/// Whether a file has a mesh extension.
-pub(crate) fn has_mesh_extension(path: &Path) -> bool {
-    let ending = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
-    MESHES.iter().any(|known| *known == ending)
 }

@@ -35,7 +35,6 @@ use table::TableReader;
 pub use context::MORE_LIKE_THESE;
 #[cfg(test)]
 pub(super) use materials::ENERGY_GAIN;
-pub(super) use mesh::has_mesh_extension;
 #[cfg(test)]
 pub(super) use syntax::MISSING_VALUE;
 

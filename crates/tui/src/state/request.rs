@@ -134,8 +134,13 @@ impl RequestState {
     /// Records the newest request's input files. Includes a model but not a scene file, whose text is
     /// compared separately.
     pub(crate) fn record_input_files(&mut self, files: Vec<FilePathAndContentId>) {
-        let is_model = has_model_extension(&self.scene);
+        let is_model = self.is_model();
         self.files = files.into_iter().filter(|file| is_model || file.path != self.scene).collect();
+    }
+
+    /// Whether the scene is a model, which has no text that the user could edit.
+    pub(crate) fn is_model(&self) -> bool {
+        has_model_extension(&self.scene)
     }
 
     /// Returns the origin of the newest request's image.

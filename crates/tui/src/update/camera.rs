@@ -10,7 +10,6 @@ use super::request::request_render;
 use crate::camera::{dollied, orbited, zoomed_fov};
 use crate::event::Effect;
 use crate::messages;
-use crate::pipeline::has_model_extension;
 use crate::pipeline::protocol::{CameraSaveResult, Command, MovedCamera};
 use crate::pipeline::settings::CameraOverrides;
 use crate::scene::description::Pose;
@@ -123,12 +122,12 @@ pub(super) fn save_camera(state: &mut State) -> Vec<Effect> {
     };
     let is_set = state.request.command_line.sets.iter().any(|set| set.trim_start().starts_with("camera"));
     // For models, `c` writes a new scene file, even with the default camera.
-    if !state.request.toggles.camera.has_changes() && !is_set && !has_model_extension(&state.request.scene) {
+    if !state.request.toggles.camera.has_changes() && !is_set && !state.request.is_model() {
         return show_notice_without_effects(state, messages::NOTHING_TO_KEEP);
     }
     let saved = state.request.scene_camera_edits_since_move();
     // Models do not contain a camera that could be overwritten.
-    if !saved.is_empty() && !has_model_extension(&state.request.scene) {
+    if !saved.is_empty() && !state.request.is_model() {
         // The message below lists the saved values, so they cause no further conflict.
         state.request.reset_move_origin_to_scene_camera();
         let saved = saved.join(", ");
@@ -151,7 +150,7 @@ pub(super) fn handle_saved_camera(
         Ok(kept) => kept,
         Err(why) => {
             state.saving.camera_refused = Some(state.now);
-            state.saving.has_scene_of_model |= has_model_extension(&state.request.scene);
+            state.saving.has_scene_of_model |= state.request.is_model();
             return show_until_key_without_effects(
                 state,
                 &format!("error: {}", escape_invisible_chars(&why)),

@@ -12,7 +12,6 @@ use crate::choice::Choice;
 use crate::event::{Effect, KeyPress};
 use crate::keymap;
 use crate::messages;
-use crate::pipeline::has_model_extension;
 use crate::pipeline::protocol::Command;
 use crate::pipeline::settings::ViewMode;
 use crate::preview_style::PreviewStyle;
@@ -65,7 +64,7 @@ pub(super) fn perform_action(state: &mut State, action: Action) -> Vec<Effect> {
         Action::ActualPixels => toggle_actual_pixels(state),
         Action::RenderRegionFirst => region::start_confirm_or_clear_region(state),
         Action::ToggleMouse => pointer::toggle_mouse(state),
-        Action::Edit if has_model_extension(&state.request.scene) => {
+        Action::Edit if state.request.is_model() => {
             show_notice_without_effects(state, messages::NO_EDITOR_FOR_MODELS)
         }
         Action::Edit => vec![Effect::Edit(edit_position::position_to_edit(state))],

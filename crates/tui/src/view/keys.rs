@@ -10,7 +10,6 @@ use super::text::{TextRole, put_text, remaining_row_area, text_columns};
 use crate::action::Action;
 use crate::choice::Choice;
 use crate::keymap::{self, KEYMAP, KeyBinding, OVERLAY, OverlayAction};
-use crate::pipeline::has_model_extension;
 use crate::preview_style::PreviewStyle;
 use crate::scene::report::summarize_counts;
 use crate::state::{KeyOverrides, RequestStatus, State, ViewList};
@@ -165,7 +164,7 @@ fn urgent_and_other_hints(state: &State) -> (Vec<KeyHint>, Vec<KeyHint>) {
     urgent.extend(hidden_diagnostics_hint(state));
     let named = |action, words| keymap::binding_for_action(action).map(|it| KeyHint::new(it.label, words));
     let has_place = state.overlays.problems.is_some() || state.selection.picked.is_some();
-    if has_place && !has_model_extension(&state.request.scene) {
+    if has_place && !state.request.is_model() {
         urgent.extend(named(Action::Edit, "edit"));
     }
     if state.picture.history.is_viewing_older() {

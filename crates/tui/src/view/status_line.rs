@@ -14,7 +14,6 @@ use super::text::{
 };
 use crate::exit_summary;
 use crate::messages;
-use crate::pipeline::has_model_extension;
 use crate::pipeline::protocol::{NoisePrediction, RenderProgress, SavedSceneImageState};
 use crate::pipeline::words::format_mean_samples;
 use crate::preview_style::PreviewStyle;
@@ -193,7 +192,7 @@ fn draw_summary(
     }
     let used = drawn.put_line_with_links(state, area, &pieces, buffer);
     let free = remaining_row_area(area, used + 2);
-    let short = if has_model_extension(&state.request.scene) { SHORT_HINT_OF_MODEL } else { SHORT_HINT };
+    let short = if state.request.is_model() { SHORT_HINT_OF_MODEL } else { SHORT_HINT };
     let words = [save_scene_hint(state), short.to_owned()];
     if layout.panel.is_empty() && state.saving.edits == 0 {
         let fitting = words.into_iter().find(|words| text_columns(words) <= free.width);
@@ -292,7 +291,7 @@ pub(super) fn save_scene_hint(state: &State) -> String {
         state.request.scene.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
     let name = escape_invisible_chars(&name);
     // Models are usually exported by a program rather than saved by the user.
-    if has_model_extension(&state.request.scene) {
+    if state.request.is_model() {
         return messages::renders_on_changes(&name);
     }
     messages::save_to_render_hint(&name, state.picture.shown.is_some() || state.work.renders > 0)

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use crate::control::{CancelToken, Cancelled};
 use crate::output::part::{self, PartFile};
 use crate::output::{is_same_file, scene_path};
-use crate::pipeline::files_referenced_by_assets;
+use crate::pipeline::{files_referenced_by_assets, foreign_file_error};
 use crate::scene::referenced_files;
 use crate::scene::sanitize::escape_invisible_chars;
 
@@ -28,7 +28,8 @@ impl<'a> RenderInputFiles<'a> {
         let target = out.canonicalize().ok();
         let outs = [Some(out), target.as_deref()].into_iter().flatten();
         let scenes: BTreeSet<PathBuf> = outs.flat_map(|out| possible_scene_paths(parts, out)).collect();
-        let named = scenes.iter().flat_map(|scene| referenced_files(scene)).collect::<Vec<_>>();
+        let texts = scenes.iter().filter(|scene| foreign_file_error(scene).is_none());
+        let named = texts.flat_map(|scene| referenced_files(scene)).collect::<Vec<_>>();
         Self { parts, token, named: scenes.into_iter().chain(named).collect(), companions: OnceCell::new() }
     }
 
