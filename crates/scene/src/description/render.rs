@@ -1,7 +1,9 @@
 //! The `[render]` table: render settings and the definitions of their keys.
 
 use super::super::fingerprint::{FingerprintContext, FingerprintHasher, Fingerprinted};
-use super::super::keys::key::{COLOR, DefaultValue, KeyInfo, ValueKind, choice_values, doc_text};
+use super::super::keys::key::{
+    COLOR, DefaultValue, KeyInfo, ValueKind, choice_values, doc_text, parsed_default,
+};
 use super::super::keys::limits::Limits;
 use super::method::Integrator;
 use crate::choice;
@@ -157,6 +159,9 @@ macro_rules! settings {
                     kind: kind!($range $(($($limit),*))?, $type),
                     unit: $unit,
                     default: DefaultValue::Is(in_toml!($range, Self::DEFAULT.$name).leak()),
+                    default_value: parsed_default!(DefaultValue::Is(
+                        in_toml!($range, RenderOptions::DEFAULT.$name).leak()
+                    )),
                     doc: doc_text(concat!($($doc),*)),
                 }),*]
             }

@@ -9,7 +9,7 @@ mod vector;
 
 use std::ops::Range;
 
-use super::super::keys::key::{DefaultValue, KeyInfo, ValueKind};
+use super::super::keys::key::{KeyInfo, ValueKind};
 use super::super::nearest::foreign_or_nearest_name;
 use super::super::sanitize::escape_and_truncate;
 use super::super::toml::{KeyValue, Number};
@@ -17,7 +17,7 @@ use super::context::{FileContext, Issue};
 use super::limits::Limits;
 use super::names::DefinedNames;
 use super::table::{TableReader, TableTitle};
-use super::value::{TomlValue, Value, default_value, describe_value};
+use super::value::{TomlValue, Value, describe_value};
 use crate::choice::Choice;
 
 /// A table's key, which may be absent.
@@ -38,8 +38,7 @@ impl<'a> KeyInTable<'a> {
         entry: Option<KeyValue<'a>>,
     ) -> Self {
         let Some(KeyValue { key: _, span, value }) = entry else {
-            let value = if let DefaultValue::Is(text) = info.default { default_value(text) } else { None };
-            return Self { context, info, value, spans: None };
+            return Self { context, info, value: (info.default_value)(), spans: None };
         };
         Self { context, info, value: Some(value), spans: Some([span, value.span()]) }
     }

@@ -6,14 +6,14 @@ use std::ops::Range;
 
 use super::super::description::Channel;
 use super::super::keys::key::{
-    COLOR, DefaultValue, KeyInfo, TableInfo, TableSyntax, ValueKind, choice_values, keys,
+    COLOR, DefaultValue, KeyInfo, TableInfo, TableSyntax, ValueKind, choice_values, keys, parsed_default,
 };
 use super::super::nearest::{foreign_or_nearest_name, nearest_name};
 use super::super::sanitize::escape_and_truncate;
 use super::super::toml::{Entries, KeyValue, TableId};
 use super::context::{FileContext, Issue};
 use super::key::KeyInTable;
-use super::value::{TomlValue, Value, default_value, describe_value};
+use super::value::{TomlValue, Value, describe_value};
 use crate::choice::Choice;
 
 /// A table's definition, and how messages refer to it.
@@ -196,7 +196,10 @@ impl<'a> TableReader<'a> {
 
     /// Reads a single table, or an empty table if it is absent.
     pub(super) fn table_or_empty(&self, info: &'static TableInfo) -> Option<Self> {
-        let value = self.entry(info.name).map_or_else(|| default_value("{}"), |entry| Some(entry.value))?;
+        let value = match self.entry(info.name) {
+            Some(entry) => entry.value,
+            None => parsed_default!(DefaultValue::Is("{}"))()?,
+        };
         Self::from_value(self.context, value, TableTitle::Table(info))
     }
 

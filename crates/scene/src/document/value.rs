@@ -1,10 +1,7 @@
-//! Describes TOML values in messages and parses defaults.
-
-use std::collections::BTreeMap;
-use std::sync::{Mutex, PoisonError};
+//! Describes TOML values in messages.
 
 use super::super::sanitize::escape_and_truncate;
-use super::super::toml::{self, format_value};
+use super::super::toml::format_value;
 pub(super) use super::super::toml::{TomlValue, Value};
 use super::context::FileContext;
 
@@ -27,15 +24,4 @@ pub(super) fn describe_value(context: &FileContext<'_>, value: Value<'_>) -> Str
         },
         TomlValue::Table(_) => "a table".to_owned(),
     }
-}
-
-/// Parses the text of a default. Each text is parsed once and never freed, so that defaults can be read like
-/// values in a file.
-pub(super) fn default_value(text: &'static str) -> Option<Value<'static>> {
-    static PARSED: Mutex<BTreeMap<&str, Option<Value<'static>>>> = Mutex::new(BTreeMap::new());
-    let mut parsed = PARSED.lock().unwrap_or_else(PoisonError::into_inner);
-    *parsed.entry(text).or_insert_with(|| {
-        let document = Box::leak(Box::new(toml::parse(format!("default = {text}").leak()).0));
-        document.root().get("default").map(|found| found.value)
-    })
 }

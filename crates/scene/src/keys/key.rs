@@ -2,6 +2,7 @@
 
 use super::limits::Limits;
 use crate::choice::Choice;
+use crate::toml::{self, Value};
 
 /// Definition of a scene file table.
 #[derive(Clone, Debug)]
@@ -51,6 +52,8 @@ pub struct KeyInfo {
     pub unit: &'static str,
     /// The value used if the key is absent.
     pub default: DefaultValue,
+    /// Returns the default in the form of a value in a file, or `None` if it is not a constant.
+    pub(crate) default_value: fn() -> Option<Value<'static>>,
     /// Description: one sentence without a final period.
     pub doc: &'static str,
 }
@@ -165,6 +168,13 @@ pub enum DefaultValue {
     Absent,
 }
 
+impl DefaultValue {
+    /// Parses a constant default.
+    pub(crate) fn parse(self) -> Option<Value<'static>> {
+        if let Self::Is(text) = self { toml::parse_constant(text) } else { None }
+    }
+}
+
 /// Upper bound for integer keys without a specific limit.
 pub(crate) const MOST_WHOLE: u64 = u32::MAX as u64;
 
@@ -180,6 +190,20 @@ pub(crate) const ANGLES: ValueKind = ValueKind::Numbers(3, "three numbers", Limi
 /// A non-negative color.
 pub(crate) const COLOR: ValueKind = ValueKind::Color(Limits::AtLeast(0.0));
 
+/// Defines a function that parses a default on its first call. A default is read for every absent key, so
+/// later calls must be fast.
+macro_rules! parsed_default {
+    ($default:expr) => {{
+        fn value() -> Option<$crate::toml::Value<'static>> {
+            static PARSED: std::sync::OnceLock<Option<$crate::toml::Value<'static>>> =
+                std::sync::OnceLock::new();
+            *PARSED.get_or_init(|| $default.parse())
+        }
+        value
+    }};
+}
+pub(crate) use parsed_default;
+
 /// Defines a list of keys, each as `/// DOC` and `NAME: KIND, DEFAULT, UNIT;`. The unit is optional.
 macro_rules! keys {
     ($($(#[doc = $doc:literal])+ $name:ident: $kind:expr, $default:expr $(, $unit:literal)?;)*) => {
@@ -189,6 +213,7 @@ macro_rules! keys {
                 kind: $kind,
                 unit: concat!($($unit)?),
                 default: $default,
+                default_value: $crate::keys::key::parsed_default!($default),
                 doc: $crate::keys::key::doc_text(concat!($($doc),+)),
             },)*
         ]

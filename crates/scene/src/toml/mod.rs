@@ -57,6 +57,14 @@ pub(super) fn is_dotted_key_value(text: &str) -> bool {
         && document.sole_assignment_in_table(tree::Document::ROOT).is_some_and(|(keys, _)| keys.len() >= 2)
 }
 
+/// Parses a value that is read often. Its memory is never freed.
+pub(super) fn parse_constant(text: &str) -> Option<Value<'static>> {
+    let (mut document, _) = parse(format!("constant = {text}").leak());
+    document.decode_numbers();
+    let document: &Document<'_> = Box::leak(Box::new(document));
+    document.root().get("constant").map(|found| found.value)
+}
+
 /// Applies a `KEY = VALUE` assignment to the document. The assignment is at byte `at` of `source`, and
 /// `source` starts with the document's text.
 ///

@@ -371,6 +371,21 @@ impl<'s> Document<'s> {
         Some(entry.node)
     }
 
+    /// Parses all numbers, so that reading them takes no time.
+    pub(super) fn decode_numbers(&mut self) {
+        for index in 0..self.elements.len() {
+            self.elements[index] = self.decode_number(self.elements[index]);
+        }
+        for index in 0..self.entries.len() {
+            self.entries[index].node = self.decode_number(self.entries[index].node);
+        }
+    }
+
+    fn decode_number(&mut self, node: ValueNode) -> ValueNode {
+        let number = Value { document: self, node }.as_number().and_then(Number::to_f64);
+        number.map_or(node, |number| ValueNode { kind: self.add_number(number), ..node })
+    }
+
     /// Size of the tree in bytes.
     #[cfg(test)]
     pub(super) fn bytes(&self) -> usize {
