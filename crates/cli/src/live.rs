@@ -55,7 +55,7 @@ fn run_terminal_ui(order: RenderRequest, console: &Console) -> Result<Exit, (Exi
     let worker = start(order.nice, Arc::clone(&contents), move |event| listener.handle_event(event))
         .map_err(no_thread)?;
     let (remote, asked) = (worker.command_sender(), writes.clone());
-    let outcome = tui::run(Options {
+    let options = Options {
         scene: order.scene,
         overrides: order.overrides,
         color: order.color,
@@ -77,9 +77,9 @@ fn run_terminal_ui(order: RenderRequest, console: &Console) -> Result<Exit, (Exi
             }
             remote.send(command);
         }),
-        events,
         previews: worker.previews.clone(),
-    });
+    };
+    let outcome = tui::run(options, events);
     let waits = |ended: &TuiOutcome| {
         ended.status == ExitStatus::QUIT && (ended.is_write_unanswered || writes.is_in_write_stage())
     };

@@ -33,7 +33,7 @@ fn interactive_session() {
     thread::spawn(move || run_simulated_worker(&orders, &sender, &slot));
     let watched = scene.clone();
     thread::spawn(move || poll_scene_file_changes(&watched, &watcher));
-    let outcome = run(Options {
+    let options = Options {
         scene,
         overrides: Overrides::default(),
         color: ColorDepthChoice::Auto,
@@ -44,10 +44,9 @@ fn interactive_session() {
             assert!(!matches!(command, Command::Write), "pressing w panics in the front-end thread");
             commands.send(command).unwrap_or_default();
         }),
-        events,
         previews,
-    });
-    match outcome {
+    };
+    match run(options, events) {
         Ok(ended) => std::process::exit(i32::from(ended.status.0)),
         Err(error) => {
             println!("error: {error}");

@@ -4,7 +4,6 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use super::color::ColorDepthChoice;
-use super::event_queue::EventQueue;
 use crate::choice;
 use crate::pipeline::protocol::{Command, PreviewSlot};
 use crate::pipeline::settings::Overrides;
@@ -54,8 +53,6 @@ pub struct Options {
     pub notify_after: Option<Duration>,
     /// Sends commands to the worker. Must not block.
     pub commands: Box<dyn FnMut(Command)>,
-    /// Events from the worker and from the file watcher.
-    pub events: EventQueue,
     /// Slot for previews from the worker.
     pub previews: PreviewSlot,
 }

@@ -29,17 +29,18 @@ use crate::pipeline::protocol::{self, Command};
 const TURN: Duration = Duration::from_millis(3);
 
 /// Runs the front end until a key or signal ends it, then restores the terminal and sends [`Command::Quit`]
-/// to the worker. Must not be called more than once per process.
+/// to the worker. `queue` receives the events of the worker and the file watcher. Must not be called more than
+/// once per process.
 ///
 /// # Errors
 /// Returns a [`TuiError`] if there is no terminal, if writing to it fails, or if the worker has ended.
-pub fn run(options: Options) -> Result<TuiOutcome, TuiError> {
+pub fn run(options: Options, queue: EventQueue) -> Result<TuiOutcome, TuiError> {
     terminal::require_terminal()?;
     let depth = color::resolve_depth(options.color, |name| std::env::var(name).ok());
     // Prevent crossterm from dropping named colors when NO_COLOR is set.
     crossterm::style::force_color_output(depth != ColorDepth::None);
 
-    let EventQueue { sender, events } = options.events;
+    let EventQueue { sender, events } = queue;
     let listener = SignalListener::start(&sender).map_err(terminal_error_mapper("handle signals for"))?;
     let variable = |name: &str| std::env::var(name).ok();
     let capabilities =

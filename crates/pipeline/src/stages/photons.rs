@@ -187,6 +187,7 @@ fn run_with_ticks<T: Send>(
 }
 
 /// The photons that an image needs, each with the key of the image's photons.
+#[derive(Clone, Copy)]
 pub(crate) enum PhotonTask {
     /// None, for this reason.
     Skip(&'static str),
