@@ -6,18 +6,13 @@ use std::fs;
 use std::process::{Child, Stdio};
 use std::time::{Duration, Instant};
 
+use glimt::math::random::TestRandom;
 use nix::errno::Errno;
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 
 use crate::parts::{METHODS, ROOM, room_dir};
 use crate::test_dir::{TestDir, assert_mentions, mentions, system_error};
-
-/// Random number generator for values in [0, 1).
-fn random(seed: u64) -> impl FnMut() -> f64 {
-    let mut next = glimt::math::random::unit_generator(seed);
-    move || f64::from(next())
-}
 
 fn begin(dir: &TestDir, line: &str) -> Child {
     dir.glimt(line).stderr(Stdio::null()).spawn().expect("it runs")
@@ -85,7 +80,7 @@ fn render_killed_20_times_resumes_identically() {
 /// Kills renders of each method at random times.
 fn kill_at_any_time(times: u32) {
     let dir = room_dir();
-    let mut next = random(3);
+    let mut random = TestRandom::new(3);
     for (method, options) in LONG {
         dir.expect(&format!("room.toml --once --progress none -o one.exr --checkpoint 0 {options}"), 0);
         dir.write("out.exr", "the image before");
@@ -94,7 +89,7 @@ fn kill_at_any_time(times: u32) {
         let mut kills = 0;
         while kills < times {
             let child = begin(&dir, &line);
-            std::thread::sleep(Duration::from_secs_f64(0.03 + 0.2 * next()));
+            std::thread::sleep(Duration::from_secs_f64(0.03 + 0.2 * random.unit()));
             end(child, Signal::SIGKILL);
             if dir.bytes("out.exr") == b"the image before" {
                 kills += 1;
@@ -129,7 +124,7 @@ fn writer_killed_200_times_keeps_checkpoint() {
 /// Kills a render that writes checkpoints continuously.
 fn kill_while_it_writes(times: u32) {
     let dir = room_dir();
-    let mut next = random(5);
+    let mut random = TestRandom::new(5);
     let line = "room.toml --once --progress none -o out.exr --checkpoint 0.000001 --samples 100000 --resume";
     for round in 0..times {
         let mut child = begin(&dir, line);
@@ -137,7 +132,7 @@ fn kill_while_it_writes(times: u32) {
             // On a busy machine, the process may be killed before its first checkpoint.
             dir.await_file("out.exr.checkpoint", &mut child);
         }
-        std::thread::sleep(Duration::from_secs_f64(0.02 + 0.1 * next()));
+        std::thread::sleep(Duration::from_secs_f64(0.02 + 0.1 * random.unit()));
         end(child, Signal::SIGKILL);
         if dir.path("out.exr.checkpoint").exists() {
             // The error mentions the seed only if the checkpoint is intact.
@@ -281,9 +276,9 @@ fn damaged_checkpoint_is_rejected() {
     let dir = room_dir();
     kept(&dir, "");
     let (image, checkpoint) = (dir.bytes("out.exr"), dir.bytes("out.exr.checkpoint"));
-    let mut next = random(8);
+    let mut random = TestRandom::new(8);
     for number in 0..40 {
-        let index = (next() * checkpoint.len() as f64) as usize;
+        let index = (random.unit() * checkpoint.len() as f64) as usize;
         let mut bytes = checkpoint.clone();
         if number % 2 == 0 {
             bytes.truncate(index);

@@ -2,6 +2,8 @@
 
 use std::fmt::Write as _;
 
+use glimt::math::random::TestRandom;
+
 use super::frames::mesh;
 use super::{CAMERA, CaseSet, SceneFiles, StressRow, head};
 
@@ -74,7 +76,7 @@ fn coplanar(kind: &str) -> StressRow {
 
 /// Needles as long as the scene and a thousandth as thick. Compares the two acceleration structures.
 fn needles(accel: &str) -> StressRow {
-    let mut random = RandomNumbers(5);
+    let mut random = TestRandom::new(5);
     let (mut points, mut faces) = (Vec::new(), Vec::new());
     for number in 0..20_000 {
         let mut inside = || [random.signed() * 3.0, random.signed() * 2.0, random.signed() * 2.0 - 6.0];
@@ -95,7 +97,7 @@ fn needles(accel: &str) -> StressRow {
 /// Spheres at pseudo-random positions, compared with spheres so small that hardly any overlap.
 fn overlapping(count: u32, accel: &str) -> StressRow {
     let spheres = |radius: f64, accel: &str| {
-        let mut random = RandomNumbers(9);
+        let mut random = TestRandom::new(9);
         let mut scene =
             head(1, &format!("accel = \"{accel}\"")) + CAMERA + "[materials]\nm = { diffuse = 0.6 }\n" + LAMP;
         for _ in 0..count {
@@ -145,15 +147,4 @@ fn nested(count: u32, accel: &str) -> StressRow {
     let all = spheres(count);
     let pairs = vec![(SceneFiles::new(all.clone()), SceneFiles::new(outermost(all)))];
     StressRow::alike(format!("{count} nested spheres vs. only the outermost, {accel}"), pairs, 0.0)
-}
-
-/// A small random number generator.
-struct RandomNumbers(u64);
-
-impl RandomNumbers {
-    /// A number in [−1, 1).
-    fn signed(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        ((self.0 >> 11) as f64) / (1_u64 << 52) as f64 - 1.0
-    }
 }

@@ -4,13 +4,14 @@
 use glimt::assets::LoadedMesh;
 use glimt::control::CancelToken;
 use glimt::geometry::mesh::TriangleMesh;
+use glimt::math::random::TestRandom;
 use glimt::math::{DVec3, Vec3};
 use glimt::scene::description::{Integrator, Material, Shape};
 use glimt::world::GlassSolids;
 
 use super::photons::{assert_same_light, both};
 use super::scenes::{AS_IT_IS, Build, emitter, glass, lat_long_sphere, matte, scene, tinted};
-use super::{Random, v};
+use super::v;
 
 /// The glass solids in a built scene.
 fn bodies(build: &Build) -> GlassSolids {
@@ -84,7 +85,7 @@ fn part(mesh: &TriangleMesh, holds: impl Fn(usize) -> bool) -> TriangleMesh {
 }
 
 /// Splits a mesh into parts by assigning each triangle to the nearest of several random points.
-fn cut(mesh: &TriangleMesh, count: usize, random: &mut Random) -> Vec<TriangleMesh> {
+fn cut(mesh: &TriangleMesh, count: usize, random: &mut TestRandom) -> Vec<TriangleMesh> {
     let middle = |i: usize| mesh.corners(i as u32).iter().sum::<Vec3>() / 3.0;
     let seeds: Vec<Vec3> =
         (0..count).map(|_| middle((random.unit() * mesh.triangles.len() as f64) as usize)).collect();
@@ -118,7 +119,7 @@ fn by_path(build: Build) -> Build {
 
 #[test]
 fn solid_split_into_parts_renders_the_same() {
-    let mut random = Random(11);
+    let mut random = TestRandom::new(11);
     for round in 0..12 {
         let whole = closed(round);
         let count = 2 + (random.unit() * 5.0) as usize;
@@ -148,7 +149,7 @@ fn solid_split_into_parts_renders_the_same() {
 
 #[test]
 fn reversed_part_is_flipped() {
-    let mut random = Random(5);
+    let mut random = TestRandom::new(5);
     for round in 0..8 {
         let whole = closed(round);
         let mut parts = cut(&whole, 4, &mut random);
@@ -410,7 +411,7 @@ fn texture_seams_are_not_holes() {
 
 #[test]
 fn glass_with_a_hole_is_reported() {
-    let mut random = Random(3);
+    let mut random = TestRandom::new(3);
     for round in 0..40 {
         let whole = closed(round);
         // Remove a triangle.

@@ -2,12 +2,13 @@
 
 use glimt::film::Rect;
 use glimt::integrators::RenderSettings;
+use glimt::math::random::TestRandom;
 use glimt::math::{DVec2, DVec3, Vec2};
 use glimt::scene::description::Camera;
 use glimt::scene::description::RenderOptions;
 
 use super::scenes::{emitter, scene, tile};
-use super::{Random, assert_close, assert_mean, v};
+use super::{assert_close, assert_mean, v};
 
 /// A camera looking along −z, with aperture 0.2, focal distance 5, and a field of view of 40° over 480
 /// pixels.
@@ -31,7 +32,7 @@ fn pixels_per_length(d: f64) -> f64 {
 
 #[test]
 fn rays_pass_through_projected_points() {
-    let mut random = Random(1);
+    let mut random = TestRandom::new(1);
     for _ in 0..200 {
         let (position, target) = (random.direction() * 7.0, random.direction() * 2.0);
         let (up, fov) = (random.direction(), 20.0 + 80.0 * random.unit());

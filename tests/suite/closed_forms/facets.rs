@@ -4,12 +4,13 @@ use std::f64::consts::PI;
 
 use glimt::geometry::Ray;
 use glimt::geometry::mesh::TriangleMesh;
+use glimt::math::random::TestRandom;
 use glimt::math::{DVec3, Vec2, Vec3};
 use glimt::scene::description::light::Falloff;
 use glimt::scene::description::{Bump, NormalMap, ShadowMode, TextureFilter, Wrap};
 
 use super::scenes::{AS_IT_IS, Build, emitter, lat_long_sphere, matte, scene};
-use super::{Random, v};
+use super::v;
 
 /// Number of lit pixels in an image, and the largest pixel value.
 fn lit(build: &Build) -> (usize, f64) {
@@ -89,7 +90,7 @@ fn coarse_smooth_ball_is_shaded_like_a_sphere() {
 }
 
 /// A closed surface around the center, with random radii from `1 − rough` to `1 + rough`.
-fn blob(random: &mut Random, rough: f64) -> TriangleMesh {
+fn blob(random: &mut TestRandom, rough: f64) -> TriangleMesh {
     let (rings, steps) = (3 + (random.unit() * 6.0) as u32, 3 + (random.unit() * 8.0) as u32);
     let mut mesh = match (random.unit() * 5.0) as u32 {
         0 => cube(DVec3::splat(-0.7), DVec3::splat(0.7)),
@@ -127,7 +128,7 @@ fn radius_of(mesh: &TriangleMesh, direction: DVec3) -> f64 {
 }
 
 /// Case `number`: a closed opaque mesh with a camera inside and lights outside.
-fn closed(number: u32, random: &mut Random) -> Build {
+fn closed(number: u32, random: &mut TestRandom) -> Build {
     let rough = [0.0, 0.2, 0.6][number as usize % 3];
     let mesh = blob(random, rough);
     let towards = random.direction();
@@ -194,7 +195,7 @@ fn closed(number: u32, random: &mut Random) -> Build {
 /// normals.
 #[test]
 fn no_light_enters_a_closed_opaque_mesh() {
-    let mut random = Random(77);
+    let mut random = TestRandom::new(77);
     let mut leaky = Vec::new();
     for number in 0..1000 {
         let build = closed(number, &mut random);

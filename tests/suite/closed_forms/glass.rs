@@ -4,6 +4,7 @@ use glimt::geometry::Ray;
 use glimt::geometry::mesh::TriangleMesh;
 use glimt::geometry::ray::offset_origin;
 use glimt::materials::fresnel::{dielectric, refract_given_transmitted_cosine};
+use glimt::math::random::TestRandom;
 use glimt::math::{DVec3, Vec3};
 use glimt::scene::description::{Material, MeshReference, Shape};
 use glimt::world::Geometry;
@@ -234,7 +235,7 @@ fn glass_with_surrounding_ior_is_invisible() {
     };
     let plain = behind(scene());
     let ball = behind(scene().sphere(v(0.0, 0.0, -5.0), 1.0, glass(1.0)));
-    let mut random = super::Random(5);
+    let mut random = TestRandom::new(5);
     for i in 0..3000 {
         // Rays near the rim, passing the center of the ball at distances 1 − 10⁻¹ … 1 − 10⁻⁷.
         let rim = 1.0 / (1.0 - 1.0 / 25.0_f64).sqrt();
@@ -332,7 +333,7 @@ fn shading_normals_create_no_light() {
         }
     });
     let geometry = seen.world().geometry;
-    let mut random = super::Random(77);
+    let mut random = TestRandom::new(77);
     let mut along = 0;
     for _ in 0..30_000 {
         let eye = (random.direction() * 0.85).as_vec3();

@@ -4,13 +4,14 @@ use glimt::film::Rect;
 use glimt::geometry::mesh::TriangleMesh;
 use glimt::integrators::ViewMode;
 use glimt::lights::LightSamplingPurpose;
+use glimt::math::random::TestRandom;
 use glimt::math::{DVec3, Vec3};
 use glimt::scene::description::light::{DirectionalLight, Falloff, PointLight, SpotLight};
 use glimt::scene::description::{Light, ShadowMode, Shape};
 
 use super::global::by_paths;
 use super::scenes::{AS_IT_IS, Build, emitter, glass, lat_long_sphere, matte, mirror, phong, scene, tile};
-use super::{Random, mean_and_error, v};
+use super::{mean_and_error, v};
 
 /// Adds so many nearly black lights that each vertex samples only a subset of the lights. Black lights would
 /// be removed.
@@ -153,7 +154,7 @@ fn divided_light_keeps_sharp_highlight() {
 
 /// Triangles above the floor whose sizes vary by a factor of 100. Most of them face down.
 fn uneven_triangles(count: u32) -> Vec<[DVec3; 3]> {
-    let mut random = Random(4);
+    let mut random = TestRandom::new(4);
     let triangle = |i: u32| {
         let size = 0.004 * 10_f64.powf(2.0 * random.unit().powi(3));
         let place = v(random.signed() * 1.5, 2.0 + 0.3 * random.unit(), random.signed() * 1.5);
@@ -188,7 +189,7 @@ fn mesh_light_matches_separate_triangles() {
 #[test]
 fn hundred_point_lights_match_their_sum() {
     // E = Σ I·cos/d² and L = ρ·E/π. Only the choice of lights is random.
-    let mut random = Random(9);
+    let mut random = TestRandom::new(9);
     let places: Vec<DVec3> =
         (0..100).map(|_| v(random.signed() * 2.0, 1.0 + random.unit(), random.signed() * 2.0)).collect();
     let floor = scene().quad(v(-4.0, 0.0, 4.0), v(8.0, 0.0, 0.0), v(0.0, 0.0, -8.0), matte(0.7));

@@ -79,26 +79,3 @@ pub fn lambert(point: DVec3, normal: DVec3, polygon: &[DVec3]) -> f64 {
     });
     (0.5 * sum.sum::<f64>()).abs()
 }
-
-/// A small random number generator for aiming rays.
-pub struct Random(pub u64);
-
-impl Random {
-    /// A number in [0, 1).
-    pub fn unit(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        ((self.0 >> 11) as f64) / (1_u64 << 53) as f64
-    }
-
-    /// A number in [−1, 1).
-    pub fn signed(&mut self) -> f64 {
-        2.0 * self.unit() - 1.0
-    }
-
-    /// A uniformly distributed direction.
-    pub fn direction(&mut self) -> DVec3 {
-        let (z, phi) = (self.signed(), std::f64::consts::TAU * self.unit());
-        let r = (1.0 - z * z).sqrt();
-        v(r * phi.cos(), r * phi.sin(), z)
-    }
-}

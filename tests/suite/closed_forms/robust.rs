@@ -9,6 +9,7 @@ use glimt::geometry::{Ray, SurfacePoint};
 use glimt::integrators::render_tile;
 use glimt::lights::LightGeometry;
 use glimt::materials::fresnel::dielectric;
+use glimt::math::random::TestRandom;
 use glimt::math::transform::Transform;
 use glimt::math::{DVec3, Vec3};
 use glimt::scene::description::light::Falloff;
@@ -16,17 +17,17 @@ use glimt::scene::description::{Integrator, Shape};
 use glimt::world::{Geometry, Hit};
 
 use super::scenes::{AS_IT_IS, Build, emitter, glass, lat_long_sphere, matte, mirror, phong, scene};
-use super::{Random, v};
+use super::v;
 
 /// The surface hit by a ray from outside toward a point.
-fn aimed(geometry: &Geometry, random: &mut Random, at: DVec3, far: f64) -> Option<SurfacePoint> {
+fn aimed(geometry: &Geometry, random: &mut TestRandom, at: DVec3, far: f64) -> Option<SurfacePoint> {
     let origin = (at + random.direction() * far).as_vec3();
     let ray = Ray::new(origin, (at - origin.as_dvec3()).as_vec3().normalize());
     geometry.closest_hit(&ray).map(|hit| geometry.surface(&ray, &hit))
 }
 
 /// A ray from a surface into the hemisphere around `side`, often at a grazing angle.
-pub fn leaving(random: &mut Random, surface: &SurfacePoint, side: Vec3) -> Ray {
+pub fn leaving(random: &mut TestRandom, surface: &SurfacePoint, side: Vec3) -> Ray {
     let across = random.direction();
     let n = side.as_dvec3();
     let flat = across - n * n.dot(across);
@@ -35,7 +36,7 @@ pub fn leaving(random: &mut Random, surface: &SurfacePoint, side: Vec3) -> Ray {
 }
 
 /// Counts rays that leave a convex shape outward but hit it again. Returns this count and the number of rays.
-pub fn self_hits(build: &Build, random: &mut Random, center: DVec3, size: f64, tries: u32) -> (u32, u32) {
+pub fn self_hits(build: &Build, random: &mut TestRandom, center: DVec3, size: f64, tries: u32) -> (u32, u32) {
     let world = build.world();
     let (mut hits, mut tried) = (0, 0);
     for _ in 0..tries {
@@ -49,7 +50,7 @@ pub fn self_hits(build: &Build, random: &mut Random, center: DVec3, size: f64, t
 }
 
 /// Random positions up to 10⁶ from the origin. The first few place the shape's surface near the origin.
-pub fn places(random: &mut Random, size: f64) -> Vec<DVec3> {
+pub fn places(random: &mut TestRandom, size: f64) -> Vec<DVec3> {
     let mut places = vec![v(0.0, -size, 0.0), random.direction() * size, DVec3::ZERO];
     for far in [1.0, 1e2, 1e4, 1e6] {
         if far < size * 1e6 {
@@ -62,7 +63,7 @@ pub fn places(random: &mut Random, size: f64) -> Vec<DVec3> {
 #[test]
 fn convex_shapes_do_not_self_hit() {
     // A convex shape lies on one side of its tangent plane, so a ray leaving on the other side never hits it.
-    let mut random = Random(11);
+    let mut random = TestRandom::new(11);
     for size in [1e-3, 1.0, 1e3, 1e6] {
         for center in places(&mut random, size) {
             let angles = v(17.0, 33.0, -71.0);
@@ -119,7 +120,7 @@ fn room_of_triangles(size: DVec3) -> TriangleMesh {
 fn no_ray_escapes_through_room_edges() {
     // Trace rays to points on the walls very close to edges and corners, and from there in a random inward
     // direction. All of them must hit another wall.
-    let mut random = Random(29);
+    let mut random = TestRandom::new(29);
     for size in [v(1.0, 1.0, 1.0), v(8.0, 0.4, 2.0), v(200.0, 0.02, 0.02), v(3e-3, 5e-3, 4e-3)] {
         let small = size.min_element();
         for place in [DVec3::ZERO, v(0.1, 0.1, 0.1), random.direction() * 300.0 * small] {
@@ -131,10 +132,10 @@ fn no_ray_escapes_through_room_edges() {
                 let (mut lost, mut tried) = (0, 0);
                 for _ in 0..3000 {
                     // Aim at a point close to one, two or three walls.
-                    let within = |random: &mut Random| 1.0 - 2.0 * random.unit();
+                    let within = |random: &mut TestRandom| 1.0 - 2.0 * random.unit();
                     let mut at = [0; 3].map(|_| 0.495 * within(&mut random));
                     let from = transform.point(DVec3::from(at) * size);
-                    let near = |random: &mut Random| 0.5 - 10.0_f64.powf(-4.0 - 5.0 * random.unit());
+                    let near = |random: &mut TestRandom| 0.5 - 10.0_f64.powf(-4.0 - 5.0 * random.unit());
                     for axis in 0..3 {
                         let side = if random.unit() < 0.5 { -1.0 } else { 1.0 };
                         let is_beside = axis == 0 || random.unit() < 0.7;
@@ -185,7 +186,7 @@ fn cone_through_origin(normal: DVec3, towards: DVec3, radius: f64) -> Shape {
 fn shapes_through_the_origin_do_not_self_hit() {
     // The hit's coordinates are nearly 0 although the shape is large, so rounding errors in the summands
     // dominate.
-    let mut random = Random(3);
+    let mut random = TestRandom::new(3);
     for _ in 0..200 {
         let (u, w) = (random.direction() * 1e4, random.direction() * 1e4);
         let corner = -(u * random.unit() + w * random.unit());
@@ -216,7 +217,7 @@ fn shapes_through_the_origin_do_not_self_hit() {
 #[test]
 fn ray_into_a_ball_hits_its_back_and_exits() {
     // From inside, the next hit is on the back of the sphere, and nothing is behind it.
-    let mut random = Random(17);
+    let mut random = TestRandom::new(17);
     for radius in [1e-3, 0.75, 1.0, 1e3, 1e6] {
         for center in places(&mut random, radius) {
             let world = scene().sphere(center, radius, glass(1.5)).world();
@@ -238,7 +239,7 @@ fn ray_into_a_ball_hits_its_back_and_exits() {
 #[test]
 fn closed_mesh_has_no_leaks() {
     // Every ray from inside must hit, even when aimed at vertices and edges.
-    let mut random = Random(23);
+    let mut random = TestRandom::new(23);
     let far = v(148_376.0, 1234.0, -223_423.0);
     let at_origin = lat_long_sphere(16, 16, 2.0, DVec3::ZERO);
     let baked = lat_long_sphere(16, 16, 2.0, far);
@@ -396,7 +397,7 @@ fn invalid_rays_hit_nothing() {
 fn tree_finds_the_same_hit_as_brute_force() {
     // If several shapes are at the same distance, the lowest index wins, regardless of their order in the
     // tree.
-    let mut random = Random(31);
+    let mut random = TestRandom::new(31);
     let mut build = scene();
     for _ in 0..60 {
         let corner = v(random.signed(), random.signed(), 0.0) * 3.0;
@@ -433,7 +434,7 @@ fn tree_finds_the_same_hit_as_brute_force() {
 #[test]
 fn fresnel_matches_double_precision() {
     // The reference averages both polarizations in double precision from the same f32 cosine and IOR.
-    let mut random = Random(41);
+    let mut random = TestRandom::new(41);
     for _ in 0..100_000 {
         let cosine = 10.0_f64.powf(-6.0 * random.unit()) as f32;
         let eta = [1.0, 1.0001, 1.0 / 1.0001, 1.5, 1.0 / 1.5, 2.4, 1.0 / 2.4][(random.unit() * 7.0) as usize];

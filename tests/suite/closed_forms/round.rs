@@ -3,13 +3,14 @@
 use glimt::geometry::Ray;
 use glimt::geometry::ray::offset_origin;
 use glimt::lights::LightGeometry;
+use glimt::math::random::TestRandom;
 use glimt::math::{DVec2, DVec3};
 use glimt::scene::description::Shape;
 use glimt::world::Geometry;
 
 use super::robust::{leaving, places, self_hits};
 use super::scenes::{matte, scene};
-use super::{Random, v};
+use super::v;
 
 pub fn geometry(shape: &Shape) -> std::sync::Arc<Geometry> {
     scene().shape(shape.clone(), matte(0.5)).world().geometry
@@ -115,35 +116,35 @@ fn check(shape: &Shape, geometry: &Geometry, ray: &Ray, sign: f64) -> bool {
     true
 }
 
-pub fn torus(random: &mut Random, center: DVec3, size: f64, slimness: f64) -> Shape {
+pub fn torus(random: &mut TestRandom, center: DVec3, size: f64, slimness: f64) -> Shape {
     Shape::Torus { center, axis: random.direction() * 3.0, radius: size, tube: size * slimness }
 }
 
-pub fn cylinder(random: &mut Random, center: DVec3, size: f64, caps: bool) -> Shape {
+pub fn cylinder(random: &mut TestRandom, center: DVec3, size: f64, caps: bool) -> Shape {
     let half = random.direction() * (size * random.unit().max(0.01));
     Shape::Cylinder { a: center - half, b: center + half, radius: size * random.unit().max(0.01), caps }
 }
 
-pub fn cone(random: &mut Random, center: DVec3, size: f64, cap: bool) -> Shape {
+pub fn cone(random: &mut TestRandom, center: DVec3, size: f64, cap: bool) -> Shape {
     let half = random.direction() * (size * random.unit().max(0.01));
     Shape::Cone { base: center - half, tip: center + half, radius: size * random.unit().max(0.01), cap }
 }
 
 /// A line parallel to the tangent plane at a surface point, at a random distance from it.
-fn grazing(random: &mut Random, point: DVec3, normal: DVec3, size: f64) -> Ray {
+fn grazing(random: &mut TestRandom, point: DVec3, normal: DVec3, size: f64) -> Ray {
     let tangent = random.direction().cross(normal).normalize();
     let off = normal * (size * random.signed().signum() * 10.0_f64.powf(-9.0 * random.unit()));
     let start = point + off - tangent * (size * 4.0 * random.unit());
     Ray::new(start.as_vec3(), tangent.as_vec3())
 }
 
-pub fn random_in(random: &mut Random, center: DVec3, size: f64) -> DVec3 {
+pub fn random_in(random: &mut TestRandom, center: DVec3, size: f64) -> DVec3 {
     center + v(random.signed(), random.signed(), random.signed()) * size
 }
 
 #[test]
 fn torus_hits_match_distance_function() {
-    let mut random = Random(5);
+    let mut random = TestRandom::new(5);
     let (mut rays, mut hits) = (0, 0);
     for slimness in [1e-3, 0.03, 0.2, 0.5, 0.8, 0.97, 0.9999] {
         for center in [DVec3::ZERO, v(3.0, -2.0, 1.0), v(1e3, 2e3, -5e2)] {
@@ -190,7 +191,7 @@ fn torus_hits_match_distance_function() {
 #[test]
 fn ray_from_torus_finds_next_intersection() {
     // From each hit, one ray goes outward (sometimes through the hole) and one goes into the tube.
-    let mut random = Random(29);
+    let mut random = TestRandom::new(29);
     for size in [1e-8, 1e-4, 1.0, 1e4, 1e8] {
         for center in places(&mut random, size) {
             for slimness in [0.05, 0.5, 0.9] {
@@ -219,7 +220,7 @@ fn ray_from_torus_finds_next_intersection() {
 
 #[test]
 fn cylinder_and_cone_hits_match_distance_bound() {
-    let mut random = Random(13);
+    let mut random = TestRandom::new(13);
     let (mut rays, mut hits) = (0, 0);
     for i in 0..400 {
         let far = 10.0_f64.powf(3.0 * random.unit());
@@ -270,7 +271,7 @@ fn cylinder_and_cone_hits_match_distance_bound() {
 
 #[test]
 fn rays_pass_through_missing_caps() {
-    let mut random = Random(37);
+    let mut random = TestRandom::new(37);
     let mut through = 0;
     for i in 0..200 {
         let center = random_in(&mut random, DVec3::ZERO, 3.0);
@@ -312,7 +313,7 @@ fn rays_pass_through_missing_caps() {
 #[test]
 fn convex_round_shapes_do_not_self_hit() {
     // A convex shape lies on one side of its tangent plane, even without caps.
-    let mut random = Random(19);
+    let mut random = TestRandom::new(19);
     for size in [1e-8, 1e-4, 1.0, 1e4, 1e8] {
         for center in places(&mut random, size) {
             for closed in [true, false] {
@@ -330,7 +331,7 @@ fn convex_round_shapes_do_not_self_hit() {
 
 #[test]
 fn ray_into_closed_round_shape_hits_its_back() {
-    let mut random = Random(43);
+    let mut random = TestRandom::new(43);
     for size in [1e-8, 1.0, 1e8] {
         for center in places(&mut random, size) {
             for shape in [cylinder(&mut random, center, size, true), cone(&mut random, center, size, true)] {

@@ -1,14 +1,15 @@
 //! General properties of disks, cylinders, cones and tori: scale invariance, signed zeros, bounds, tangents.
 
 use glimt::geometry::Ray;
+use glimt::math::random::TestRandom;
 use glimt::math::{DVec3, Vec3};
 use glimt::scene::description::Shape;
 
 use super::round::{cone, cylinder, geometry, random_in, torus};
-use super::{Random, v};
+use super::v;
 
 /// One shape of each kind.
-fn each(random: &mut Random, center: DVec3) -> Vec<Shape> {
+fn each(random: &mut TestRandom, center: DVec3) -> Vec<Shape> {
     vec![
         Shape::Disk { center, normal: random.direction(), radius: 0.8 },
         cylinder(random, center, 1.0, true),
@@ -39,7 +40,7 @@ fn scaled(shape: &Shape, s: f64) -> Shape {
 
 #[test]
 fn hits_are_bit_identical_at_any_scale() {
-    let mut random = Random(53);
+    let mut random = TestRandom::new(53);
     for shape in each(&mut random, v(0.3, -0.2, 0.5)) {
         let rays: Vec<Ray> = (0..400)
             .map(|_| {
@@ -100,7 +101,7 @@ fn signed_zero_direction_does_not_change_hit() {
 
 #[test]
 fn bounds_contain_every_hit() {
-    let (mut random, mut met) = (Random(61), 0);
+    let (mut random, mut met) = (TestRandom::new(61), 0);
     for i in 0..40 {
         let center = random_in(&mut random, DVec3::ZERO, 10.0_f64.powi(i % 5));
         for shape in each(&mut random, center) {
@@ -126,7 +127,7 @@ fn bounds_contain_every_hit() {
 fn tangents_are_texture_coordinate_derivatives() {
     // Hits of neighboring rays differ by dpdu·Δu + dpdv·Δv. u × v points outward, so textures are not
     // mirrored.
-    let mut random = Random(67);
+    let mut random = TestRandom::new(67);
     let mut checked = 0;
     for _ in 0..30 {
         for shape in each(&mut random, DVec3::ZERO) {

@@ -3,6 +3,7 @@
 use std::f64::consts::{PI, TAU};
 
 use glimt::integrators::ViewMode;
+use glimt::math::random::TestRandom;
 use glimt::math::{DVec3, Vec3};
 use glimt::scene::description::light::DirectionalLight;
 use glimt::scene::description::{Integrator, Light, ShadowMode};
@@ -261,11 +262,8 @@ fn whitted_and_path_agree_on_sky_light() {
 /// A black map with a few equally bright texels, and the equivalent directional lights.
 fn dotted(width: u32, height: u32, count: u32) -> [Build; 2] {
     let mut bright = std::collections::BTreeSet::new();
-    let mut state = 12_345_u64;
-    let mut next = |below: u32| {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        ((state >> 33) % u64::from(below)) as u32
-    };
+    let mut random = TestRandom::new(12_345);
+    let mut next = |below: u32| random.below(below as usize) as u32;
     while bright.len() < count as usize {
         bright.insert((next(width), height / 16 + next(height / 3)));
     }

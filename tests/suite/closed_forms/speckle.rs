@@ -3,10 +3,11 @@
 use glimt::geometry::Ray;
 use glimt::geometry::mesh::TriangleMesh;
 use glimt::math::DVec3;
+use glimt::math::random::TestRandom;
 use glimt::scene::description::Accel;
 
 use super::scenes::{AS_IT_IS, Build, matte, scene};
-use super::{Random, v};
+use super::v;
 
 /// Distance at which a ray enters the cube [−h, h]³. `None` if it misses the cube.
 fn entry(ray: &Ray, h: f64) -> Option<f64> {
@@ -76,7 +77,7 @@ fn cubes_do_not_speckle() {
         ("mesh, BVH", mesh(Accel::Bvh)),
         ("mesh, k-d tree", mesh(Accel::KdTree)),
     ] {
-        let mut random = Random(7);
+        let mut random = TestRandom::new(7);
         let geometry = build.world().geometry;
         let mut inside = 0;
         for _ in 0..1000 {

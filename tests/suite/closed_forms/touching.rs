@@ -3,6 +3,7 @@
 
 use glimt::geometry::mesh::TriangleMesh;
 use glimt::materials::Dielectric;
+use glimt::math::random::TestRandom;
 use glimt::math::transform::rotation_xyz;
 use glimt::math::{DMat3, DVec3, Vec3};
 use glimt::scene::description::Shape;
@@ -10,7 +11,7 @@ use glimt::scene::description::Shape;
 use super::glass::boxes;
 use super::global::by_paths;
 use super::scenes::{self, AS_IT_IS, Build, emitter, file_material, glass, matte, mirror, scene};
-use super::{Random, assert_close, mean_and_error, v};
+use super::{assert_close, mean_and_error, v};
 
 /// Unpolarized reflectance between IORs `n` and `m` from the Fresnel equations. `sine` is the sine of the
 /// ray's angle in air.
@@ -61,7 +62,7 @@ impl Turned {
         Self { degrees, axes: rotation_xyz(degrees) }
     }
 
-    fn any(random: &mut Random) -> Self {
+    fn any(random: &mut TestRandom) -> Self {
         Self::by(v(random.signed(), random.signed(), random.signed()) * 180.0)
     }
 
@@ -166,7 +167,7 @@ fn gaps_and_overlaps_match_layers() {
 
 #[test]
 fn random_box_stacks_match_layers() {
-    let mut random = Random(2026);
+    let mut random = TestRandom::new(2026);
     for round in 0..40 {
         let turned = if round % 8 == 0 { Turned::by(DVec3::ZERO) } else { Turned::any(&mut random) };
         let count = 2 + (random.unit() * 5.0) as usize;
@@ -192,7 +193,7 @@ fn random_box_stacks_match_layers() {
 
 #[test]
 fn drink_in_a_glass_matches_layers() {
-    let mut random = Random(7);
+    let mut random = TestRandom::new(7);
     for round in 0..6 {
         let turned = if round == 0 { Turned::by(DVec3::ZERO) } else { Turned::any(&mut random) };
         let bar = |low: f64, high: f64, radius: f64| Shape::Cylinder {
@@ -256,7 +257,7 @@ fn coincident_and_inscribed_balls_match_layers() {
 
 #[test]
 fn touching_meshes_match_layers() {
-    let mut random = Random(11);
+    let mut random = TestRandom::new(11);
     for round in 0..12 {
         let turned = if round == 0 { Turned::by(DVec3::ZERO) } else { Turned::any(&mut random) };
         // Aim close to the faces' diagonal.
@@ -295,7 +296,7 @@ fn touching_meshes_match_layers() {
 
 #[test]
 fn glass_on_an_opaque_surface_is_exact() {
-    let mut random = Random(5);
+    let mut random = TestRandom::new(5);
     let r = fresnel(1.0, 1.5, 0.0);
     for round in 0..12 {
         let turned = if round < 2 { Turned::by(DVec3::ZERO) } else { Turned::any(&mut random) };
@@ -357,7 +358,7 @@ fn later_glass_determines_overlaps() {
         let build = build.shape(level.square(-3.0, 5000.0), emitter(1.0)).depth(4);
         assert_close("overlap", build.seen(v(0.3, 3.0, 0.2), v(0.3, 0.0, 0.2)).value(), exact);
     }
-    let mut random = Random(3);
+    let mut random = TestRandom::new(3);
     for round in 0..10 {
         let turned = Turned::any(&mut random);
         let boxes = [
@@ -393,7 +394,7 @@ fn camera_inside_glass_finds_its_medium() {
 
 #[test]
 fn nested_glass_is_invisible_in_a_furnace() {
-    let mut random = Random(99);
+    let mut random = TestRandom::new(99);
     for round in 0..6 {
         let turned = if round == 0 { Turned::by(DVec3::ZERO) } else { Turned::any(&mut random) };
         let mut things = vec![
@@ -434,7 +435,7 @@ fn nested_glass_is_invisible_in_a_furnace() {
 fn ambient_light_is_uniform_in_and_under_glass() {
     // Lossless glass on a white floor under ambient light 1 with a white background. The radiance is 1
     // everywhere, inside and outside the glass.
-    let mut random = Random(17);
+    let mut random = TestRandom::new(17);
     for round in 0..6 {
         let turned = if round == 0 { Turned::by(DVec3::ZERO) } else { Turned::any(&mut random) };
         let build = scene()

@@ -4,6 +4,7 @@
 use glimt::assets::LoadedMesh;
 use glimt::geometry::Ray;
 use glimt::geometry::mesh::TriangleMesh;
+use glimt::math::random::TestRandom;
 use glimt::math::{DVec3, Vec3};
 use glimt::scene::description::{AffineMap, EmissionSides, Integrator, Material, MeshTransform, Shape};
 
@@ -11,7 +12,7 @@ use super::direct::{assert_irradiance, at_origin};
 use super::round_lights::assert_same;
 use super::scenes::{AS_IT_IS, Build, emitter, glass, lat_long_sphere, matte, phong, scene, tinted};
 use super::touching::{assert_white, block};
-use super::{Random, assert_close, lambert, mean_and_error, v};
+use super::{assert_close, lambert, mean_and_error, v};
 
 const UNIT: Shape = Shape::Sphere { center: DVec3::ZERO, radius: 1.0 };
 
@@ -193,7 +194,7 @@ fn rays_from_inside_are_tinted_up_to_the_surface() {
         for mirror in [1.0, -1.0] {
             let matrix = shear(mirror, v(0.1, 0.0, -0.1));
             let build = scene().shape(shape.clone().transformed(matrix), tinted(1.0, DVec3::splat(0.3)));
-            let mut random = Random(3);
+            let mut random = TestRandom::new(3);
             for _ in 0..20 {
                 let (from, direction) = (matrix.translate, random.direction());
                 let seen = build.clone().background(1.0).seen(from, from + direction);

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::random::FuzzRandom;
+use glimt::math::random::TestRandom;
 
 /// Maximum length of the result. Longer files only take more time.
 const MOST_BYTES: usize = 1 << 20;
@@ -117,7 +117,7 @@ const EDGES: &[u64] = &[
 ];
 
 /// Applies one to five mutations in sequence.
-pub(super) fn changed(bytes: &[u8], other: &[u8], random: &mut FuzzRandom) -> Vec<u8> {
+pub(super) fn changed(bytes: &[u8], other: &[u8], random: &mut TestRandom) -> Vec<u8> {
     let mut bytes = bytes.to_vec();
     for _ in 0..=random.below(5) {
         change(&mut bytes, other, random);
@@ -126,7 +126,7 @@ pub(super) fn changed(bytes: &[u8], other: &[u8], random: &mut FuzzRandom) -> Ve
     bytes
 }
 
-type FileChange = fn(&mut Vec<u8>, &[u8], &mut FuzzRandom);
+type FileChange = fn(&mut Vec<u8>, &[u8], &mut TestRandom);
 
 const CHANGES: &[FileChange] = &[
     flip_bits,
@@ -148,7 +148,7 @@ const CHANGES: &[FileChange] = &[
     splice,
 ];
 
-fn change(bytes: &mut Vec<u8>, other: &[u8], random: &mut FuzzRandom) {
+fn change(bytes: &mut Vec<u8>, other: &[u8], random: &mut TestRandom) {
     if bytes.is_empty() {
         bytes.extend_from_slice(other);
     }
@@ -158,13 +158,13 @@ fn change(bytes: &mut Vec<u8>, other: &[u8], random: &mut FuzzRandom) {
 }
 
 /// A random position, biased toward the start, where headers are.
-fn place(bytes: &[u8], random: &mut FuzzRandom) -> usize {
+fn place(bytes: &[u8], random: &mut TestRandom) -> usize {
     let within = if random.below(2) == 0 { bytes.len().min(256) } else { bytes.len() };
     random.below(within)
 }
 
 #[expect(clippy::ptr_arg, reason = "one signature for all changes")]
-fn flip_bits(bytes: &mut Vec<u8>, _: &[u8], random: &mut FuzzRandom) {
+fn flip_bits(bytes: &mut Vec<u8>, _: &[u8], random: &mut TestRandom) {
     for _ in 0..=random.below(8) {
         let at = place(bytes, random);
         bytes[at] ^= 1 << random.below(8);
@@ -172,16 +172,16 @@ fn flip_bits(bytes: &mut Vec<u8>, _: &[u8], random: &mut FuzzRandom) {
 }
 
 #[expect(clippy::ptr_arg, reason = "one signature for all changes")]
-fn set_bytes(bytes: &mut Vec<u8>, _: &[u8], random: &mut FuzzRandom) {
+fn set_bytes(bytes: &mut Vec<u8>, _: &[u8], random: &mut TestRandom) {
     for _ in 0..=random.below(8) {
         let at = place(bytes, random);
-        bytes[at] = random.next() as u8;
+        bytes[at] = random.bits() as u8;
     }
 }
 
 /// Writes a 1-, 2-, 4- or 8-byte number in either byte order.
 #[expect(clippy::ptr_arg, reason = "one signature for all changes")]
-fn set_number(bytes: &mut Vec<u8>, _: &[u8], random: &mut FuzzRandom) {
+fn set_number(bytes: &mut Vec<u8>, _: &[u8], random: &mut TestRandom) {
     let (at, length) = (place(bytes, random), 1 << random.below(4));
     let number = *random.pick(EDGES);
     let mut number = number.to_le_bytes()[..length].to_vec();
@@ -191,7 +191,7 @@ fn set_number(bytes: &mut Vec<u8>, _: &[u8], random: &mut FuzzRandom) {
     bytes.iter_mut().skip(at).zip(number).for_each(|(byte, new)| *byte = new);
 }
 
-fn cut(bytes: &mut Vec<u8>, _: &[u8], random: &mut FuzzRandom) {
+fn cut(bytes: &mut Vec<u8>, _: &[u8], random: &mut TestRandom) {
     bytes.truncate(random.below(bytes.len()));
 }
 
@@ -219,12 +219,12 @@ fn words(bytes: &[u8]) -> Vec<Range<usize>> {
     pieces(bytes, |byte| byte.is_ascii_whitespace() || b"[]{}=,\"/".contains(&byte))
 }
 
-fn delete_line(bytes: &mut Vec<u8>, _: &[u8], random: &mut FuzzRandom) {
+fn delete_line(bytes: &mut Vec<u8>, _: &[u8], random: &mut TestRandom) {
     let line = random.pick(&lines(bytes)).clone();
     bytes.drain(line);
 }
 
-fn repeat_line(bytes: &mut Vec<u8>, _: &[u8], random: &mut FuzzRandom) {
+fn repeat_line(bytes: &mut Vec<u8>, _: &[u8], random: &mut TestRandom) {
     let line = random.pick(&lines(bytes)).clone();
     let text = [b"\n", &bytes[line.clone()]].concat();
     // Do not repeat long lines beyond the limit, because the worker's memory use is measured.
@@ -232,12 +232,12 @@ fn repeat_line(bytes: &mut Vec<u8>, _: &[u8], random: &mut FuzzRandom) {
     bytes.splice(line.end..line.end, text.repeat(times));
 }
 
-fn swap_lines(bytes: &mut Vec<u8>, _: &[u8], random: &mut FuzzRandom) {
+fn swap_lines(bytes: &mut Vec<u8>, _: &[u8], random: &mut TestRandom) {
     let lines = lines(bytes);
     swap(bytes, random.pick(&lines).clone(), random.pick(&lines).clone());
 }
 
-fn swap_words(bytes: &mut Vec<u8>, _: &[u8], random: &mut FuzzRandom) {
+fn swap_words(bytes: &mut Vec<u8>, _: &[u8], random: &mut TestRandom) {
     let words = words(bytes);
     swap(bytes, random.pick(&words).clone(), random.pick(&words).clone());
 }
@@ -251,13 +251,13 @@ fn swap(bytes: &mut Vec<u8>, one: Range<usize>, other: Range<usize>) {
     }
 }
 
-fn replace_word(bytes: &mut Vec<u8>, _: &[u8], random: &mut FuzzRandom) {
+fn replace_word(bytes: &mut Vec<u8>, _: &[u8], random: &mut TestRandom) {
     let word = random.pick(&words(bytes)).clone();
     bytes.splice(word, random.pick(WORDS).bytes());
 }
 
 /// Adds digits, an exponent or a sign to a word that starts like a number.
-fn grow_number(bytes: &mut Vec<u8>, _: &[u8], random: &mut FuzzRandom) {
+fn grow_number(bytes: &mut Vec<u8>, _: &[u8], random: &mut TestRandom) {
     let mut numbers = words(bytes);
     numbers.retain(|word| bytes.get(word.start).is_some_and(|byte| byte.is_ascii_digit() || *byte == b'-'));
     if numbers.is_empty() {
@@ -272,20 +272,20 @@ fn grow_number(bytes: &mut Vec<u8>, _: &[u8], random: &mut FuzzRandom) {
     }
 }
 
-fn insert_word(bytes: &mut Vec<u8>, _: &[u8], random: &mut FuzzRandom) {
+fn insert_word(bytes: &mut Vec<u8>, _: &[u8], random: &mut TestRandom) {
     let word = random.pick(&words(bytes)).clone();
     let text = format!(" {} ", random.pick(WORDS));
     bytes.splice(word.end..word.end, text.into_bytes());
 }
 
 /// Inserts bytes that are not valid UTF-8.
-fn insert_bytes(bytes: &mut Vec<u8>, _: &[u8], random: &mut FuzzRandom) {
+fn insert_bytes(bytes: &mut Vec<u8>, _: &[u8], random: &mut TestRandom) {
     let at = place(bytes, random);
-    let new: Vec<u8> = (0..=random.below(16)).map(|_| random.next() as u8 | 0x80).collect();
+    let new: Vec<u8> = (0..=random.below(16)).map(|_| random.bits() as u8 | 0x80).collect();
     bytes.splice(at..at, new);
 }
 
-fn nest(bytes: &mut Vec<u8>, _: &[u8], random: &mut FuzzRandom) {
+fn nest(bytes: &mut Vec<u8>, _: &[u8], random: &mut TestRandom) {
     let word = random.pick(&words(bytes)).clone();
     let depth = 1 << random.below(18);
     let (open, close) =
@@ -295,26 +295,26 @@ fn nest(bytes: &mut Vec<u8>, _: &[u8], random: &mut FuzzRandom) {
     bytes.splice(word.start..word.start, open.repeat(depth).into_bytes());
 }
 
-fn part(bytes: &[u8], random: &mut FuzzRandom) -> Range<usize> {
+fn part(bytes: &[u8], random: &mut TestRandom) -> Range<usize> {
     let start = place(bytes, random);
     let most = 1 << random.below(12);
     let length = 1 + random.below((bytes.len() - start).min(most));
     start..start + length
 }
 
-fn repeat_part(bytes: &mut Vec<u8>, _: &[u8], random: &mut FuzzRandom) {
+fn repeat_part(bytes: &mut Vec<u8>, _: &[u8], random: &mut TestRandom) {
     let part = part(bytes, random);
     let text = bytes[part.clone()].repeat(1 << random.below(10));
     bytes.splice(part.end..part.end, text);
 }
 
-fn delete_part(bytes: &mut Vec<u8>, _: &[u8], random: &mut FuzzRandom) {
+fn delete_part(bytes: &mut Vec<u8>, _: &[u8], random: &mut TestRandom) {
     let part = part(bytes, random);
     bytes.drain(part);
 }
 
 /// Joins the start of one file with the end of another.
-fn splice(bytes: &mut Vec<u8>, other: &[u8], random: &mut FuzzRandom) {
+fn splice(bytes: &mut Vec<u8>, other: &[u8], random: &mut TestRandom) {
     bytes.truncate(random.below(bytes.len()) + 1);
     if !other.is_empty() {
         bytes.extend_from_slice(&other[random.below(other.len())..]);

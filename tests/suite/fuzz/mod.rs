@@ -14,7 +14,6 @@
 
 mod change;
 mod program;
-mod random;
 mod seeds;
 mod worker;
 
@@ -22,7 +21,7 @@ use std::fmt;
 use std::fs;
 use std::path::PathBuf;
 
-use random::FuzzRandom;
+use glimt::math::random::TestRandom;
 use seeds::{Seed, assets, scenes};
 
 /// Kind of the mutated file.
@@ -64,7 +63,7 @@ impl Corpus {
             FuzzInput::Scene => &self.scenes,
             FuzzInput::Asset => &self.assets,
         };
-        let mut random = FuzzRandom::new(case.seed ^ (case.kind as u64) << 32, case.number);
+        let mut random = TestRandom::stream(case.seed ^ (case.kind as u64) << 32, case.number);
         let seed = random.pick(seeds);
         let other = random.pick(seeds);
         Seed { bytes: change::changed(&seed.bytes, &other.bytes, &mut random), ..seed.clone() }

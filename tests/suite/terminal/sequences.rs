@@ -6,6 +6,7 @@ use std::path::Path;
 use std::process::Command;
 use std::time::Duration;
 
+use glimt::math::random::TestRandom;
 use glimt::tui::messages;
 use nix::sys::signal::Signal;
 
@@ -20,15 +21,6 @@ const LONG: u64 = 300;
 const BUNDLED: [&str; 6] = ["dof", "path", "phong", "photons", "shadows", "textures"];
 /// Keys that change only the preview.
 const LOOKING: [&str; 12] = ["s", "s", "d", "p", "i", "[", "]", "v", "l", "<", "0", "0"];
-
-/// A random number generator.
-struct Dice(Box<dyn FnMut() -> f32>);
-
-impl Dice {
-    fn below(&mut self, count: usize) -> usize {
-        ((self.0)() * count as f32) as usize % count
-    }
-}
 
 /// A scene in a folder, the program rendering it, and all previous actions.
 struct RandomSession<'a> {
@@ -58,11 +50,11 @@ impl<'a> RandomSession<'a> {
     }
 
     /// Performs a random step.
-    fn step(&mut self, dice: &mut Dice) {
+    fn step(&mut self, random: &mut TestRandom) {
         let first = self.saved[0].clone();
-        match dice.below(12) {
+        match random.below(12) {
             0 => {
-                let seed = dice.below(3);
+                let seed = random.below(3);
                 self.log.push(format!("save seed {seed}"));
                 self.save(first.replacen("[render]\n", &format!("[render]\nseed = {seed}\n"), 1));
             }
@@ -71,7 +63,7 @@ impl<'a> RandomSession<'a> {
                 let last = self.saved.last().cloned().unwrap_or_default();
                 self.save(format!("{last}# {}\n", self.saved.len()));
             }
-            2 if dice.below(3) == 0 => {
+            2 if random.below(3) == 0 => {
                 self.log.push("w".to_owned());
                 self.has_written = true;
                 self.terminal.press("w");
@@ -83,9 +75,9 @@ impl<'a> RandomSession<'a> {
                     first.contains("✓ done") || first.contains("! unwritten")
                 });
             }
-            5 => std::thread::sleep(Duration::from_millis(10 * dice.below(20) as u64)),
+            5 => std::thread::sleep(Duration::from_millis(10 * random.below(20) as u64)),
             _ => {
-                let key = LOOKING[dice.below(LOOKING.len())];
+                let key = *random.pick(&LOOKING);
                 self.log.push(key.to_owned());
                 self.terminal.press(key);
             }
@@ -124,14 +116,14 @@ enum SequenceEnd {
 }
 
 fn run(seed: u64, text: &str, options: &[&str], known: &mut HashMap<String, Vec<u8>>) {
-    let mut dice = Dice(Box::new(glimt::math::random::unit_generator(seed)));
+    let mut random = TestRandom::new(seed);
     let mut run = RandomSession::new(text, options);
     run.terminal.wait("the screen", |screen| screen.contents().contains("scene.toml"));
-    for _ in 0..3 + dice.below(8) {
-        run.step(&mut dice);
+    for _ in 0..3 + random.below(8) {
+        run.step(&mut random);
     }
     let ends = [Signal::SIGTERM, Signal::SIGHUP, Signal::SIGKILL].map(SequenceEnd::Signal);
-    let end = if dice.below(3) > 0 { SequenceEnd::Quit } else { ends[dice.below(ends.len())] };
+    let end = if random.below(3) > 0 { SequenceEnd::Quit } else { *random.pick(&ends) };
     match end {
         SequenceEnd::Quit => run.terminal.press("q"),
         SequenceEnd::Signal(signal) => run.terminal.signal(signal),

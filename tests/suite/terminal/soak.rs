@@ -10,6 +10,7 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::time::{Duration, Instant};
 
+use glimt::math::random::TestRandom;
 use nix::sys::signal::Signal;
 
 use super::pty::{Folder, Terminal};
@@ -21,31 +22,13 @@ const LIMIT: Duration = Duration::from_secs(300);
 /// Maximum memory growth, in KiB, from the middle to the end of the test.
 const SLACK: u64 = 16 << 10;
 
-/// A random number generator.
-struct Dice(Box<dyn FnMut() -> f32>);
-
-impl Dice {
-    fn new(seed: u64) -> Self {
-        Self(Box::new(glimt::math::random::unit_generator(seed)))
-    }
-
-    /// An integer less than `count`.
-    fn below(&mut self, count: usize) -> usize {
-        ((self.0)() * count as f32) as usize % count
-    }
-
-    fn of<T: Copy>(&mut self, all: &[T]) -> T {
-        all[self.below(all.len())]
-    }
-}
-
 /// A scene with a mesh and a texture.
-fn scene(dice: &mut Dice, samples: u32, number: u32) -> String {
-    let (width, height) = (32 + dice.below(48), 24 + dice.below(32));
-    let photons = dice.of(&["", "", "[photons]\nenabled = true\ncount = 2000\n"]);
-    let radius = 0.2 + dice.below(8) as f32 / 20.0;
-    let floor = dice.of(&["{ texture = \"tiles\" }", "[0.7, 0.5, 0.3]", "\"#8090a0\""]);
-    let ball = dice.of(&["type = \"glass\"", "type = \"mirror\"", "diffuse = [0.8, 0.1, 0.1]"]);
+fn scene(random: &mut TestRandom, samples: u32, number: u32) -> String {
+    let (width, height) = (32 + random.below(48), 24 + random.below(32));
+    let photons = *random.pick(&["", "", "[photons]\nenabled = true\ncount = 2000\n"]);
+    let radius = 0.2 + random.below(8) as f32 / 20.0;
+    let floor = *random.pick(&["{ texture = \"tiles\" }", "[0.7, 0.5, 0.3]", "\"#8090a0\""]);
+    let ball = *random.pick(&["type = \"glass\"", "type = \"mirror\"", "diffuse = [0.8, 0.1, 0.1]"]);
     format!(
         "# {number}\n[render]\nwidth = {width}\nheight = {height}\nsamples = {samples}\nseed = {number}\n{photons}\
         [camera]\nposition = [0, 1.2, 4]\nlook_at = [0, 0.7, 0]\naperture = 0.05\n\
@@ -59,9 +42,9 @@ fn scene(dice: &mut Dice, samples: u32, number: u32) -> String {
 }
 
 /// Writes a file like a randomly chosen editor.
-fn save(folder: &Folder, dice: &mut Dice, name: &str, text: &str) {
+fn save(folder: &Folder, random: &mut TestRandom, name: &str, text: &str) {
     let new = folder.path("new~");
-    match dice.below(4) {
+    match random.below(4) {
         0 => folder.write(name, text),
         1 => {
             fs::write(&new, text).expect("written");
@@ -83,12 +66,12 @@ fn save(folder: &Folder, dice: &mut Dice, name: &str, text: &str) {
 }
 
 /// Writes slightly changed versions of the mesh and the texture.
-fn save_assets(folder: &Folder, dice: &mut Dice) {
-    let top = 0.5 + dice.below(8) as f32 / 10.0;
-    let gray = 100 + dice.below(100);
-    save(folder, dice, "step.obj", &format!("v -1.5 0 0\nv -0.6 0 0\nv -1 {top} -0.2\nf 1 2 3\n"));
+fn save_assets(folder: &Folder, random: &mut TestRandom) {
+    let top = 0.5 + random.below(8) as f32 / 10.0;
+    let gray = 100 + random.below(100);
+    save(folder, random, "step.obj", &format!("v -1.5 0 0\nv -0.6 0 0\nv -1 {top} -0.2\nf 1 2 3\n"));
     let tiles = format!("P3\n2 2\n255\n{gray} 200 200 40 40 60\n40 40 60 {gray} 200 200\n");
-    save(folder, dice, "tiles.ppm", &tiles);
+    save(folder, random, "tiles.ppm", &tiles);
 }
 
 /// Metrics of a process.
@@ -160,14 +143,14 @@ fn soak() {
     let number =
         |name: &str, default: u64| std::env::var(name).map_or(default, |text| text.parse().expect(name));
     let minutes = number("GLIMT_SOAK_MINUTES", 3);
-    let mut dice = Dice::new(number("GLIMT_SOAK_SEED", 1));
+    let mut random = TestRandom::new(number("GLIMT_SOAK_SEED", 1));
     let begin = Instant::now();
     let end = begin + Duration::from_secs(60 * minutes);
     let folders = [Folder::new(), Folder::new()];
     let [own, other] = &folders;
     for folder in &folders {
-        save_assets(folder, &mut dice);
-        folder.write("scene.toml", &scene(&mut dice, 4, 0));
+        save_assets(folder, &mut random);
+        folder.write("scene.toml", &scene(&mut random, 4, 0));
     }
     let long = ["--checkpoint", "0.3"];
     let begin_other =
@@ -178,26 +161,31 @@ fn soak() {
     let mut next = begin + PAUSE;
     while Instant::now() < end {
         events += 1;
-        match dice.below(14) {
+        match random.below(14) {
             0..=3 => {
-                let text = scene(&mut dice, 1 + events % 8, events);
-                save(own, &mut dice, "scene.toml", &text);
+                let text = scene(&mut random, 1 + events % 8, events);
+                save(own, &mut random, "scene.toml", &text);
             }
             4 => {
-                let text = scene(&mut dice, 4, events);
+                let text = scene(&mut random, 4, events);
                 let broken =
-                    dice.of(&["samples = ", "material = \"ball\"", "[camera]", "file = \"tiles.ppm\""]);
-                let with =
-                    dice.of(&["samples = -", "material = \"bell\"", "[[", "file = \"none.ppm\"", "\u{0}"]);
-                save(own, &mut dice, "scene.toml", &text.replace(broken, with));
+                    *random.pick(&["samples = ", "material = \"ball\"", "[camera]", "file = \"tiles.ppm\""]);
+                let with = *random.pick(&[
+                    "samples = -",
+                    "material = \"bell\"",
+                    "[[",
+                    "file = \"none.ppm\"",
+                    "\u{0}",
+                ]);
+                save(own, &mut random, "scene.toml", &text.replace(broken, with));
             }
-            5 => save_assets(own, &mut dice),
+            5 => save_assets(own, &mut random),
             6..=9 => {
-                for _ in 0..1 + dice.below(6) {
-                    lives.press(dice.of(&KEYS));
+                for _ in 0..1 + random.below(6) {
+                    lives.press(*random.pick(&KEYS));
                 }
             }
-            10 => lives.resize(20 + dice.below(140) as u16, 6 + dice.below(50) as u16),
+            10 => lives.resize(20 + random.below(140) as u16, 6 + random.below(50) as u16),
             11 => {
                 // Drop the connection.
                 lives.set_reading(false);
@@ -205,12 +193,12 @@ fn soak() {
                 lives.set_reading(true);
             }
             12 => {
-                let text = scene(&mut dice, 2000, events % 5);
-                save(other, &mut dice, "scene.toml", &text);
-                falls.press(dice.of(&["s", "0", "r", "h", "i"]));
+                let text = scene(&mut random, 2000, events % 5);
+                save(other, &mut random, "scene.toml", &text);
+                falls.press(*random.pick(&["s", "0", "r", "h", "i"]));
             }
             _ => {
-                let signal = dice.of(&[
+                let signal = *random.pick(&[
                     Signal::SIGHUP,
                     Signal::SIGHUP,
                     Signal::SIGKILL,
@@ -225,14 +213,14 @@ fn soak() {
                 falls = begin_other();
             }
         }
-        std::thread::sleep(Duration::from_millis(dice.below(250) as u64));
+        std::thread::sleep(Duration::from_millis(random.below(250) as u64));
         if Instant::now() < next {
             continue;
         }
         // Check the images of both programs, then the metrics of the long-running program.
-        let text = scene(&mut dice, 8, events);
+        let text = scene(&mut random, 8, events);
         assert_image(&mut lives, own, &text, &[]);
-        let text = scene(&mut dice, 64, events % 5);
+        let text = scene(&mut random, 64, events % 5);
         assert_image(&mut falls, other, &text, &[]);
         images += 2;
         figures.push(Figures::of(&lives, own, begin));

@@ -117,17 +117,14 @@ mod tests {
     use super::*;
     use crate::compare::Pair;
     use crate::math::Vec3;
+    use crate::math::random::TestRandom;
 
-    /// Pseudorandom numbers (SplitMix64).
-    struct Noise(u64);
+    /// Generator of images with noise.
+    struct NoisyImages(TestRandom);
 
-    impl Noise {
-        fn uniform(&mut self) -> f32 {
-            self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-            let mut mixed = self.0;
-            mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-            mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-            ((mixed ^ (mixed >> 31)) >> 40) as f32 / (1 << 23) as f32 - 1.0
+    impl NoisyImages {
+        fn new(seed: u64) -> Self {
+            Self(TestRandom::new(seed))
         }
 
         /// Returns an image with gray value 0.5 + `offset`, plus noise. Each block of `block`² pixels shares
@@ -137,7 +134,7 @@ mod tests {
             let mut picture = RadianceImage::black(SIDE, SIDE);
             for y in (0..SIDE).step_by(block as usize) {
                 for x in (0..SIDE).step_by(block as usize) {
-                    let value = Vec3::splat(0.5 + offset + noise * self.uniform());
+                    let value = Vec3::splat(0.5 + offset + noise * self.0.signed_f32());
                     for (dx, dy) in (0..block).flat_map(|dy| (0..block).map(move |dx| (dx, dy))) {
                         picture.pixels[((y + dy) * SIDE + x + dx) as usize] = value;
                     }
@@ -158,7 +155,7 @@ mod tests {
     #[test]
     fn false_positive_rate_is_as_specified() {
         for (seeds, block) in [(3, 1), (6, 1), (6, 4), (6, 16)] {
-            let mut noise = Noise(seeds as u64 * 1000 + u64::from(block));
+            let mut noise = NoisyImages::new(seeds as u64 * 1000 + u64::from(block));
             let alarms = (0..1000).filter(|_| noise.found(seeds, 0.0, block).is_significant()).count();
             // The expected count is 1. A Poisson variable with this mean exceeds 6 with probability 1e-4.
             assert!(alarms <= 6, "{seeds} seeds, blocks of {block}: {alarms} false alarms in 1000 trials");
@@ -167,7 +164,7 @@ mod tests {
 
     #[test]
     fn known_bias_is_estimated_correctly() {
-        let mut noise = Noise(7);
+        let mut noise = NoisyImages::new(7);
         let truth = 0.06_f64.powi(2) / 0.26;
         let mut sizes = Vec::new();
         for _ in 0..50 {
@@ -184,7 +181,7 @@ mod tests {
 
     #[test]
     fn standard_error_matches_repeated_trials() {
-        let mut noise = Noise(11);
+        let mut noise = NoisyImages::new(11);
         for offset in [0.0, 0.04] {
             let tries: Vec<SquaredBias> = (0..200).map(|_| noise.found(6, offset, 1)).collect();
             let sizes: Vec<f64> = tries.iter().map(|found| found.size).collect();
@@ -200,7 +197,7 @@ mod tests {
 
     #[test]
     fn noise_free_images_have_exact_bias() {
-        let mut noise = Noise(1);
+        let mut noise = NoisyImages::new(1);
         let pair = Pair::new(
             [Path::new("a"), Path::new("b")],
             noise.picture(0.0, 0.0, 1),

@@ -108,12 +108,11 @@ mod tests {
     use std::path::Path;
 
     use super::*;
+    use crate::math::random::hash;
 
     /// Hashes a number to a uniform value in [−1, 1).
     fn uniform(number: u32) -> f32 {
-        let mixed = number.wrapping_mul(0x9e37_79b9) ^ (number.wrapping_mul(0x85eb_ca6b) >> 13);
-        let mixed = (mixed ^ (mixed >> 15)).wrapping_mul(0x2c1b_3c6d);
-        ((mixed ^ (mixed >> 12)) >> 8) as f32 / (1 << 23) as f32 - 1.0
+        (hash(number.into()) >> 40) as f32 / (1 << 23) as f32 - 1.0
     }
 
     const SIDE: u32 = 64;

@@ -131,15 +131,10 @@ pub fn triangle_margin(origin: Vec3, whole: &Aabb) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::random::signed_generator;
 
     fn enters(origin: Vec3, direction: Vec3, min: Vec3, max: Vec3) -> Option<f32> {
         SlabRay::new(origin, direction).entry_distance(min, max, f32::INFINITY)
-    }
-
-    /// A small random number generator for aimed rays.
-    fn random(state: &mut u64) -> f32 {
-        *state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        ((*state >> 40) as f32) / (1_u64 << 24) as f32
     }
 
     #[test]
@@ -156,10 +151,9 @@ mod tests {
 
     #[test]
     fn corners_of_flat_boxes_are_never_missed() {
-        let mut state = 7;
+        let mut next = signed_generator(7);
         let mut misses = 0;
         for _ in 0..400_000 {
-            let mut next = || random(&mut state) * 2.0 - 1.0;
             let origin = Vec3::new(next(), next(), next()) * 10.0;
             let min = Vec3::new(next(), next(), next());
             let mut max = min + Vec3::new(next().abs(), next().abs(), next().abs());

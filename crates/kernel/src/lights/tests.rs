@@ -15,6 +15,7 @@ use crate::geometry::triangle::Triangle;
 use crate::geometry::{Ray, Shape, ShapeHit};
 use crate::lights::delta::{Falloff, PointLight};
 use crate::math::lanes::{F32x16, PACKET_SIZE, Vec3x16, lane};
+use crate::math::random::unit_generator;
 use crate::math::{DVec3, Vec2, Vec3};
 use crate::sampling::{Dimension, PixelSampler};
 
@@ -75,11 +76,7 @@ fn samples(light: &Light, number: u32, from: Vec3, count: u32) -> Vec<(Vec3, Vec
 
 #[test]
 fn packet_samples_match_single_samples() {
-    let mut state = 1_u32;
-    let mut next = || {
-        state = state.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
-        (state >> 8) as f32 / (1 << 24) as f32
-    };
+    let mut next = unit_generator(1);
     for shape in shapes() {
         for (_, light) in lights_of(&shape).iter() {
             let points: Vec3x16 = std::array::from_fn(|_| std::array::from_fn(|_| next() * 6.0 - 3.0));

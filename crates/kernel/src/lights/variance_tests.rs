@@ -15,26 +15,16 @@ use crate::geometry::sphere::Sphere;
 use crate::geometry::torus::Torus;
 use crate::geometry::triangle::Triangle;
 use crate::math::frame::Frame;
+use crate::math::random::TestRandom;
 use crate::math::{DVec3, Vec3};
 
 const OBJECT: u32 = 7;
 
-/// A permuted congruential generator of numbers in [0, 1).
-struct PcgRandom(u64);
-
-impl PcgRandom {
-    fn next_f32(&mut self) -> f32 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        let word = ((self.0 >> ((self.0 >> 59) + 5)) ^ self.0).wrapping_mul(12_605_985_483_714_917_081);
-        (word >> 40) as f32 / (1 << 24) as f32
-    }
-}
-
 /// Samples of the irradiance from a light with radiance 1, at a point on the floor y = 0.
 fn irradiance_samples(light: &AreaLight, from: Vec3, count: u32) -> Vec<f64> {
-    let mut random = PcgRandom(5);
+    let mut random = TestRandom::new(5);
     let mut one = || {
-        let sample = light.sample(from, Vec3::Y, [random.next_f32(), random.next_f32()]);
+        let sample = light.sample(from, Vec3::Y, [random.unit_f32(), random.unit_f32()]);
         sample.map_or(0.0, |sample| f64::from(sample.weight.x * sample.direction.y.max(0.0)))
     };
     (0..count).map(|_| one()).collect()
@@ -207,12 +197,12 @@ fn textured_quads(gap: f64) -> Vec<(&'static str, Shape, AreaLight)> {
 
 #[test]
 fn textured_quad_pdf_matches_its_samples() {
-    let mut random = PcgRandom(9);
+    let mut random = TestRandom::new(9);
     for (name, shape, light) in [0.02, 0.8].into_iter().flat_map(textured_quads) {
         let (mut compared, mut apart) = (0, 0);
         for _ in 0..4000 {
-            let from = Vec3::new(random.next_f32() - 0.5, 0.0, random.next_f32() - 0.5);
-            let Some(sample) = light.sample(from, Vec3::Y, [random.next_f32(), random.next_f32()]) else {
+            let from = Vec3::new(random.unit_f32() - 0.5, 0.0, random.unit_f32() - 0.5);
+            let Some(sample) = light.sample(from, Vec3::Y, [random.unit_f32(), random.unit_f32()]) else {
                 continue;
             };
             let Some((met, _)) = light_hit(&shape, from, sample.direction) else { continue };
@@ -245,9 +235,9 @@ fn small_bright_areas_have_low_variance() {
         ))
         .0;
         let scatter = [&plain, &with_texture].map(|light| {
-            let mut random = PcgRandom(5);
+            let mut random = TestRandom::new(5);
             let mut one = || {
-                let sample = light.sample(Vec3::ZERO, Vec3::Y, [random.next_f32(), random.next_f32()]);
+                let sample = light.sample(Vec3::ZERO, Vec3::Y, [random.unit_f32(), random.unit_f32()]);
                 sample.map_or(0.0, |sample| {
                     let ShadowRayEnd::At(target) = sample.end else { panic!("expected a finite light") };
                     let at = [target.x + 0.5, target.z + 0.5].map(f64::from);
@@ -273,12 +263,12 @@ fn expected_counts(
     directions: &DirectionGrid,
 ) -> Vec<(f64, f64)> {
     let square = directions.total_solid_angle() / (SIDE * SIDE * FINE * FINE) as f64 * COUNT as f64;
-    let mut random = PcgRandom(3);
+    let mut random = TestRandom::new(3);
     let mut bins = vec![(0.0, 0.0); SIDE * SIDE];
     for i in 0..SIDE * FINE {
         let mut before = 0.0;
         for j in 0..SIDE * FINE {
-            let place = [i, j].map(|k| (k as f32 + random.next_f32()) / (SIDE * FINE) as f32);
+            let place = [i, j].map(|k| (k as f32 + random.unit_f32()) / (SIDE * FINE) as f32);
             let met = light_hit(shape, from, directions.direction(place));
             let share = met.map_or(0.0, |(met, _)| f64::from(light.pdf(from, Vec3::Y, &met)) * square);
             let (wanted, variance) = &mut bins[i / FINE * SIDE + j / FINE];
@@ -406,9 +396,9 @@ impl DirectionGrid {
 
 /// Counts the samples in each direction cell. Returns `None` if there are no samples.
 fn histogram(light: &AreaLight, from: Vec3) -> Option<(DirectionGrid, Vec<usize>)> {
-    let mut random = PcgRandom(11);
+    let mut random = TestRandom::new(11);
     let samples: Vec<Vec3> = (0..COUNT)
-        .filter_map(|_| light.sample(from, Vec3::Y, [random.next_f32(), random.next_f32()]))
+        .filter_map(|_| light.sample(from, Vec3::Y, [random.unit_f32(), random.unit_f32()]))
         .map(|sample| sample.direction)
         .collect();
     let middle = samples.iter().sum::<Vec3>().try_normalize()?;

@@ -9,24 +9,12 @@ use crate::assets::LoadedMesh;
 use crate::control::CancelToken;
 use crate::geometry::mesh::TriangleMesh;
 use crate::geometry::{Ray, SurfaceRequest};
+use crate::math::random::TestRandom;
 use crate::math::{DVec3, Vec3};
 use crate::scene::description::{Accel, MeshFile, MeshReference, MeshTransform, Object, Scene, Shape};
 
 fn v(x: f64, y: f64, z: f64) -> DVec3 {
     DVec3::new(x, y, z)
-}
-
-struct SceneRandom(u64);
-
-impl SceneRandom {
-    fn unit(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        ((self.0 >> 11) as f64) / (1_u64 << 53) as f64
-    }
-
-    fn random_point(&mut self) -> DVec3 {
-        v(self.unit(), self.unit(), self.unit()) * 2.0 - 1.0
-    }
 }
 
 /// Builder for test scenes. Material 0 is matte, and materials 1 and 2 are glass.
@@ -105,7 +93,7 @@ fn sphere_mesh(steps: u32) -> TriangleMesh {
 }
 
 /// Scenes with touching and non-touching surfaces, each with target points for rays.
-fn contact_scenes(random: &mut SceneRandom) -> Vec<(World, Vec<DVec3>)> {
+fn contact_scenes(random: &mut TestRandom) -> Vec<(World, Vec<DVec3>)> {
     let floor = Shape::Quad { corner: v(-4.0, -4.0, -1.0), u: v(8.0, 0.0, 0.0), v: v(0.0, 8.0, 0.0) };
     let cube = |x: f64, size: f64| Shape::Box {
         center: v(x, 0.0, 0.0),
@@ -124,7 +112,7 @@ fn contact_scenes(random: &mut SceneRandom) -> Vec<(World, Vec<DVec3>)> {
             .map(|i| v(f64::from(i & 1), f64::from(i >> 1 & 1), f64::from(i >> 2)) * (2.0 * half) - half)
             .collect::<Vec<_>>()
     };
-    let turned = random.random_point() * 90.0;
+    let turned = random.in_cube() * 90.0;
     let rotated = crate::math::transform::rotation_xyz(turned);
     let scenes = vec![
         // Blocks on a floor, side by side.
@@ -235,20 +223,20 @@ fn contact_scenes(random: &mut SceneRandom) -> Vec<(World, Vec<DVec3>)> {
 
 #[test]
 fn isolated_regions_match_the_full_search() {
-    let mut random = SceneRandom(1);
+    let mut random = TestRandom::new(1);
     let (mut isolated, mut asked, mut touching) = (0, 0, 0);
     for (number, (world, places)) in contact_scenes(&mut random).into_iter().enumerate() {
         for round in 0..30_000 {
             // Aim at a target point, between two target points, near one, or at a random point.
-            let pick = |random: &mut SceneRandom| places[(random.unit() * places.len() as f64) as usize];
+            let pick = |random: &mut TestRandom| places[(random.unit() * places.len() as f64) as usize];
             let (one, other) = (pick(&mut random), pick(&mut random));
             let target = match round % 4 {
                 0 => one,
                 1 => one + (other - one) * random.unit(),
-                2 => one + random.random_point() * 0.1_f64.powf(1.0 + 5.0 * random.unit()),
-                _ => random.random_point() * 1.2,
+                2 => one + random.in_cube() * 0.1_f64.powf(1.0 + 5.0 * random.unit()),
+                _ => random.in_cube() * 1.2,
             };
-            let from = random.random_point().normalize()
+            let from = random.in_cube().normalize()
                 * if round % 3 == 0 { 0.2 } else { 3.0 + 40.0 * random.unit().powi(4) };
             let ray = Ray::new(from.as_vec3(), (target - from).normalize().as_vec3());
             let Some(hit) = world.geometry.closest_hit(&ray) else { continue };
@@ -307,11 +295,11 @@ fn nested_sphere_search_takes_log_squared_time() {
         let material = |i: u32| [1, 2, 1, 2, 0][i as usize % 5];
         let scene = (0..count).fold(SceneBuilder::new(), |scene, i| scene.shape(globe(i), material(i)));
         let world = scene.world();
-        let mut random = SceneRandom(3);
+        let mut random = TestRandom::new(3);
         let mut memory = CoincidenceScratch::default();
         for _ in 0..200 {
-            let from = (v(0.1, 0.2, 0.3) + random.random_point() * 1.5).as_vec3();
-            let ray = Ray::new(from, random.random_point().normalize().as_vec3());
+            let from = (v(0.1, 0.2, 0.3) + random.in_cube() * 1.5).as_vec3();
+            let ray = Ray::new(from, random.in_cube().normalize().as_vec3());
             let Some(hit) = world.geometry.closest_hit(&ray) else { continue };
             let surface = world.geometry.surface(&ray, &hit);
             let facing = surface.normal.dot(ray.direction);

@@ -10,24 +10,19 @@ use crate::geometry::parallelogram::Parallelogram;
 use crate::geometry::plane::Plane;
 use crate::geometry::sphere::Sphere;
 use crate::geometry::triangle::Triangle;
+use crate::math::random::TestRandom;
 use crate::math::{DVec3, Vec3};
 
-/// Pseudo-random numbers, including adversarial ones.
-struct HostileRandom(u64);
+/// Random rays, including adversarial ones.
+struct HostileRays(TestRandom);
 
-impl HostileRandom {
+impl HostileRays {
     fn below(&mut self, count: usize) -> usize {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 33) as usize % count
-    }
-
-    /// A random number in [−1, 1).
-    fn number(&mut self) -> f32 {
-        self.below(1 << 24) as f32 / (1 << 23) as f32 - 1.0
+        self.0.below(count)
     }
 
     fn vector(&mut self) -> Vec3 {
-        Vec3::new(self.number(), self.number(), self.number())
+        self.0.in_cube_f32()
     }
 
     /// An adversarial coordinate: on a corner or face, zero, or so large or small that products overflow or
@@ -146,7 +141,7 @@ fn assert_packet_matches_rays(
 
 #[test]
 fn packet_and_single_hits_are_bit_identical() {
-    let mut random = HostileRandom(11);
+    let mut random = HostileRays(TestRandom::new(11));
     for scale in [1.0_f32, 1e-18, 1e15] {
         for object in test_shapes(f64::from(scale)) {
             let (mut hits, mut rays_in_all) = (0, 0);

@@ -215,24 +215,18 @@ impl UnitTorusLine {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// A small random number generator for lines.
-    fn random(state: &mut u64) -> f64 {
-        *state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        ((*state >> 11) as f64) / (1_u64 << 53) as f64 * 2.0 - 1.0
-    }
+    use crate::math::random::TestRandom;
 
     /// Lines close to the circle. Some are parallel to the axis, and some pass through it.
     fn lines(tube: f64) -> impl Iterator<Item = UnitTorusLine> {
-        let mut state = 3;
+        let mut random = TestRandom::new(3);
         (0..30_000).map(move |i| {
-            let mut next = || random(&mut state);
-            let (sin, cos) = (next() * 4.0).sin_cos();
-            let near = DVec3::new(cos, sin, 0.0) + DVec3::new(next(), next(), next()) * (1.2 * tube);
+            let (sin, cos) = (random.signed() * 4.0).sin_cos();
+            let near = DVec3::new(cos, sin, 0.0) + random.in_cube() * (1.2 * tube);
             let direction = match i % 4 {
                 0 => DVec3::Z,
-                1 => near - DVec3::Z * next(),
-                _ => DVec3::new(next(), next(), next()),
+                1 => near - DVec3::Z * random.signed(),
+                _ => random.in_cube(),
             };
             let direction = direction.normalize();
             UnitTorusLine { foot: near - direction * near.dot(direction), direction, tube }

@@ -1,4 +1,5 @@
 use super::*;
+use crate::math::random::TestRandom;
 
 pub(in crate::assets::mesh) type Points = Vec<(f32, f32)>;
 
@@ -55,20 +56,6 @@ pub(in crate::assets::mesh) fn layers(
 
 pub(in crate::assets::mesh) fn reversed(points: &[(f32, f32)]) -> Points {
     points.iter().rev().copied().collect()
-}
-
-/// Uniform random numbers in [0, 1) (a linear congruential generator).
-struct Lcg(u64);
-
-impl Lcg {
-    fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    fn below(&mut self, count: usize) -> usize {
-        (self.next() * count as f64) as usize
-    }
 }
 
 #[test]
@@ -131,8 +118,8 @@ fn gear(teeth: usize) -> Points {
 }
 
 fn coast(corners: usize) -> Points {
-    let mut random = Lcg(5);
-    let radii: Vec<f64> = (0..corners).map(|_| 5.0 + random.next()).collect();
+    let mut random = TestRandom::new(5);
+    let radii: Vec<f64> = (0..corners).map(|_| 5.0 + random.unit()).collect();
     around(corners, |index| radii[index])
 }
 
@@ -273,7 +260,7 @@ fn collinear_corners_are_kept() {
 
 #[test]
 fn random_outlines_are_covered_exactly_once() {
-    let mut random = Lcg(3);
+    let mut random = TestRandom::new(3);
     for case in 0..2000 {
         // A polyomino's outline touches itself where two cells share only a corner.
         let points = if case % 2 == 0 { polyomino(&mut random, 4 + case % 40) } else { coast(5 + case % 60) };
@@ -282,7 +269,7 @@ fn random_outlines_are_covered_exactly_once() {
 }
 
 /// The outline of a simply connected polyomino, with its cells on the left.
-fn polyomino(random: &mut Lcg, size: usize) -> Points {
+fn polyomino(random: &mut TestRandom, size: usize) -> Points {
     let mut cells = vec![(0_i32, 0_i32)];
     let has = |cells: &[(i32, i32)], x, y| cells.contains(&(x, y));
     while cells.len() < size {
