@@ -319,12 +319,12 @@ mod properties {
 
     proptest! {
         #[test]
-        fn random_text_never_panics(parts in prop::collection::vec(fragment(), 0..40)) {
+        fn fuzzed_text_never_panics(parts in prop::collection::vec(fragment(), 0..40)) {
             check(&outcome(&parts.concat()).diagnostics);
         }
 
         #[test]
-        fn mutations_of_a_scene_never_panic(
+        fn fuzzed_scenes_never_panic(
             changes in prop::collection::vec((any::<prop::sample::Index>(), 0_usize..12, fragment()), 1..8),
         ) {
             let mut text: Vec<char> = starter_scene().chars().collect();
@@ -340,7 +340,7 @@ mod properties {
         }
 
         #[test]
-        fn random_bytes_never_panic(bytes in prop::collection::vec(any::<u8>(), 0..400)) {
+        fn fuzzed_bytes_never_panic(bytes in prop::collection::vec(any::<u8>(), 0..400)) {
             let folder = tempfile::tempdir().expect("a folder");
             let path = folder.path().join("scene.toml");
             std::fs::write(&path, bytes).expect("written");

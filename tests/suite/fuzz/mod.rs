@@ -102,12 +102,12 @@ fn settle(failures: &[(Case, String)]) {
 }
 
 #[test]
-fn mutated_scenes_are_accepted_or_rejected() {
+fn fuzzed_scenes_are_accepted_or_rejected() {
     settle(&worker::check_all(FuzzInput::Scene, seed(), counts()[0]));
 }
 
 #[test]
-fn mutated_assets_are_accepted_or_rejected() {
+fn fuzzed_assets_are_accepted_or_rejected() {
     settle(&worker::check_all(FuzzInput::Asset, seed(), counts()[1]));
 }
 

@@ -311,12 +311,12 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(4_000))]
 
     #[test]
-    fn random_lines_match_the_crate(text in lines()) {
+    fn fuzzed_lines_match_the_crate(text in lines()) {
         assert_same(&text);
     }
 
     #[test]
-    fn mutated_scenes_match_the_crate(
+    fn fuzzed_scenes_match_the_crate(
         changes in prop::collection::vec((any::<prop::sample::Index>(), 0_usize..12, line()), 1..5),
     ) {
         let mut text: Vec<char> = super::super::starter_scene().chars().collect();

@@ -584,9 +584,9 @@ fn truncated_and_invalid_glbs_are_rejected() {
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(400))]
-    /// Mutated files are either read or rejected. They never cause a panic.
+    /// Fuzzes a file, which is then either read or rejected but never causes a panic.
     #[test]
-    fn mutated_files_never_panic(changes in proptest::collection::vec((any::<u16>(), any::<u8>()), 1..8), cut in any::<u16>()) {
+    fn fuzzed_files_never_panic(changes in proptest::collection::vec((any::<u16>(), any::<u8>()), 1..8), cut in any::<u16>()) {
         let mut json = square();
         json["buffers"][0].as_object_mut().expect("an object").remove("uri");
         let mut file = glb(&json, &bytes());

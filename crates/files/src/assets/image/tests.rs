@@ -327,7 +327,7 @@ fn progress_ends_at_the_file_length() {
 
 proptest::proptest! {
     #[test]
-    fn garbage_never_panics(bytes in proptest::collection::vec(proptest::prelude::any::<u8>(), 0..300)) {
+    fn fuzzed_images_never_panic(bytes in proptest::collection::vec(proptest::prelude::any::<u8>(), 0..300)) {
         for (name, start) in [
             ("a.png", &small_png()[..33]),
             ("a.ppm", b"P6 2 2 255\n"),

@@ -197,7 +197,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn garbage_never_panics(bytes in proptest::collection::vec(any::<u8>(), 0..200), text in wordy()) {
+        fn fuzzed_meshes_never_panic(bytes in proptest::collection::vec(any::<u8>(), 0..200), text in wordy()) {
             for ending in EXTENSIONS {
                 let _ = try_bytes(&format!("a.{ending}"), &bytes);
                 let _ = try_bytes(&format!("a.{ending}"), text.as_bytes());
