@@ -7,8 +7,7 @@ use std::process::Command;
 
 use glimt::cli::environment::VARIABLES;
 
-use crate::terminal::pty::Folder;
-use crate::test_dir::{TestDir, assert_mentions, mentions};
+use crate::test_dir::{PROGRAM, TestDir, assert_mentions, mentions};
 
 /// Bash's completions for the last word of a line.
 fn in_bash(dir: &TestDir, line: &str) -> Vec<String> {
@@ -192,8 +191,8 @@ fn doctor_works_without_a_terminal() {
 
 #[test]
 fn doctor_reports_terminal_replies() {
-    let folder = Folder::new();
-    let program = folder.program();
+    let folder = TestDir::with_board();
+    let program = PROGRAM;
     let mut terminal = folder.terminal_with(&[program, "doctor"], &[]);
     terminal.press("\x1b[0n\x1bP>|foot(1.20.2)\x1b\\\x1b_Gi=4211;OK\x1b\\\x1b[?2026;2$y\x1b[?62;4;22c");
     terminal.wait_for("cache");

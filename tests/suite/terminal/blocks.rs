@@ -1,6 +1,7 @@
 //! Characters used for the preview, depending on the terminal's name.
 
-use super::pty::{Folder, SCENE};
+use super::pty::SCENE;
+use crate::test_dir::{PROGRAM, TestDir};
 
 /// A board viewed from the side, with oblique edges.
 fn oblique() -> String {
@@ -16,7 +17,7 @@ fn has_finer_blocks(screen: &vt100::Screen) -> bool {
 
 #[test]
 fn known_terminal_gets_finest_blocks() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     folder.write("scene.toml", &oblique());
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
@@ -30,9 +31,9 @@ fn known_terminal_gets_finest_blocks() {
 
 #[test]
 fn preview_option_overrides_the_terminal() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     folder.write("scene.toml", &oblique());
-    let mut terminal = folder.terminal_with(&[folder.program(), "scene.toml", "--preview", "halfblock"], &[]);
+    let mut terminal = folder.terminal_with(&[PROGRAM, "scene.toml", "--preview", "halfblock"], &[]);
     terminal.wait_for_render(1);
     terminal.press("\x1bP>|kitty(0.40.1)\x1b\\");
     assert!(!terminal.settled(has_finer_blocks));
@@ -48,8 +49,8 @@ fn pixel_preview_does_not_cover_text() {
         ("iterm2", "\x1bP>|iTerm2 3.5.0\x1b\\"),
     ];
     for (protocol, answer) in answers {
-        let folder = Folder::new();
-        let call = [folder.program(), "scene.toml", "--preview", protocol];
+        let folder = TestDir::with_board();
+        let call = [PROGRAM, "scene.toml", "--preview", protocol];
         let mut terminal = folder.terminal_with(&call, &[]);
         terminal.wait_for_render(1);
         terminal.press(answer);
@@ -77,8 +78,8 @@ fn unsupported_pixels_fall_back_to_half_blocks() {
         ("iterm2", &[], "iTerm2 images"),
         ("kitty", &[("TMUX", "/tmp/tmux-0/default,1,0")], "allow-passthrough on"),
     ] {
-        let folder = Folder::new();
-        let call = [folder.program(), "scene.toml", "--preview", protocol];
+        let folder = TestDir::with_board();
+        let call = [PROGRAM, "scene.toml", "--preview", protocol];
         let mut terminal = folder.terminal_with(&call, variables);
         // The terminal replied to all queries except those about images.
         terminal.press("\x1b[?62;22c");

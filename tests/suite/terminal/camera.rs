@@ -2,7 +2,8 @@
 
 use glimt::tui::messages;
 
-use super::pty::{Colors, Folder, Terminal};
+use super::pty::{Colors, Terminal};
+use crate::test_dir::TestDir;
 
 /// Waits until the preview's number of red cells satisfies `holds`.
 #[track_caller]
@@ -12,7 +13,7 @@ fn wait_for_red(terminal: &Terminal, what: &str, holds: impl Fn(usize) -> bool) 
 
 #[test]
 fn moved_camera_resets_without_writing() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
     let own = folder.bytes("scene.png");
@@ -42,7 +43,7 @@ fn moved_camera_resets_without_writing() {
 
 #[test]
 fn saved_image_has_the_moved_camera() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
     terminal.press(">");
@@ -54,7 +55,7 @@ fn saved_image_has_the_moved_camera() {
 
 #[test]
 fn saved_image_has_the_changed_exposure() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
     let own = folder.bytes("scene.png");

@@ -4,7 +4,8 @@ use std::fs;
 
 use glimt::tui::messages;
 
-use super::pty::{Folder, SCENE, Terminal};
+use super::pty::{SCENE, Terminal};
+use crate::test_dir::TestDir;
 
 const UP: &str = "\x1b[A";
 const DOWN: &str = "\x1b[B";
@@ -12,7 +13,7 @@ const RIGHT: &str = "\x1b[C";
 const LEFT: &str = "\x1b[D";
 
 /// The numbers of a key's value in the scene file.
-fn numbers(folder: &Folder, key: &str) -> Vec<f64> {
+fn numbers(folder: &TestDir, key: &str) -> Vec<f64> {
     let text = fs::read_to_string(folder.path("scene.toml")).expect("a scene");
     let line = text.lines().find_map(|line| line.strip_prefix(key)?.strip_prefix(" = ")).expect(key);
     line.trim_matches(['[', ']']).split(',').map(|it| it.trim().parse().expect("a number")).collect()
@@ -20,7 +21,7 @@ fn numbers(folder: &Folder, key: &str) -> Vec<f64> {
 
 /// Presses `keys` and `c`. Returns the value of `key` in the scene file, then restores the file and waits for
 /// its image.
-fn kept(folder: &Folder, terminal: &mut Terminal, own: &[u8], keys: &str, key: &str) -> Vec<f64> {
+fn kept(folder: &TestDir, terminal: &mut Terminal, own: &[u8], keys: &str, key: &str) -> Vec<f64> {
     terminal.press(keys);
     terminal.wait_for_message(messages::CAMERA_MOVED);
     terminal.press("c");
@@ -50,7 +51,7 @@ const AHEAD: f64 = 3.9945;
 
 #[test]
 fn camera_keys_move_by_documented_steps() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
     let own = folder.bytes("scene.png");
@@ -83,7 +84,7 @@ fn dragged(from: (u16, u16), to: (u16, u16)) -> String {
 
 #[test]
 fn drag_orbits_and_wheel_moves_the_camera() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
     let own = folder.bytes("scene.png");
@@ -100,7 +101,7 @@ fn drag_orbits_and_wheel_moves_the_camera() {
 
 #[test]
 fn drag_outside_the_preview_has_no_effect() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
     terminal.press(&dragged((20, 1), (30, 10)));
@@ -110,7 +111,7 @@ fn drag_outside_the_preview_has_no_effect() {
 
 #[test]
 fn reset_undoes_every_key() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
     let own = folder.bytes("scene.png");
@@ -139,7 +140,7 @@ fn reset_undoes_every_key() {
 
 #[test]
 fn saved_orbiter_becomes_position_and_look_at() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     let text = SCENE.replace("position = [0, 0, 4]\nlook_at = [0, 0, 0]", "orbiter = \"eye.txt\" # gKit");
     folder.write("eye.txt", "c 0 0 0\ns 4 2\n");
     folder.write("scene.toml", &text);
@@ -157,7 +158,7 @@ fn saved_orbiter_becomes_position_and_look_at() {
 
 #[test]
 fn camera_is_not_saved_to_a_changed_file() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
     terminal.press(">");

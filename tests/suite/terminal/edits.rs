@@ -2,7 +2,8 @@
 
 use glimt::tui::messages;
 
-use super::pty::{Folder, SCENE, Terminal};
+use super::pty::{SCENE, Terminal};
+use crate::test_dir::{PROGRAM, TestDir};
 use glimt::pipeline::protocol::reasons;
 
 /// A triangle next to the board.
@@ -24,8 +25,8 @@ fn scene() -> String {
     SCENE.replace("samples = 4", "samples = 4\nexposure = 0").replace("[materials]", &textures) + balls + mesh
 }
 
-fn folder(text: &str) -> Folder {
-    let folder = Folder::new();
+fn folder(text: &str) -> TestDir {
+    let folder = TestDir::with_board();
     folder.write("one.obj", OBJ);
     folder.write("two.obj", &OBJ.replace("0.5", "0.6"));
     folder.write("skin.ppm", &paint("200 150 100"));
@@ -35,15 +36,15 @@ fn folder(text: &str) -> Folder {
 }
 
 /// The program rendering the scene, in a terminal large enough for every line.
-fn terminal(folder: &Folder) -> Terminal {
-    let call = [folder.program(), "scene.toml", "--report", "report.json"];
+fn terminal(folder: &TestDir) -> Terminal {
+    let call = [PROGRAM, "scene.toml", "--report", "report.json"];
     let mut terminal = folder.terminal_with(&call, &[]);
     terminal.resize(160, 40);
     terminal
 }
 
 /// `d`one, `r`eused or `s`kipped for each stage in order, and the message from stage `name`.
-fn stages(folder: &Folder, name: &str) -> (String, String) {
+fn stages(folder: &TestDir, name: &str) -> (String, String) {
     let report: serde_json::Value = serde_json::from_slice(&folder.bytes("report.json")).expect("JSON");
     let stages = report["stages"].as_array().expect("stages");
     let text = |stage: &serde_json::Value, key: &str| stage[key].as_str().expect(key).to_owned();

@@ -3,11 +3,12 @@
 use glimt::tui::messages;
 use nix::sys::signal::Signal;
 
-use super::pty::{Folder, SCENE};
+use super::pty::SCENE;
+use crate::test_dir::{PROGRAM, TestDir};
 
 #[test]
 fn keys_and_signals_restore_the_terminal() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     for (key, code) in [("q", 0), ("\x03", 130)] {
         let mut terminal = folder.terminal();
         terminal.wait_for_color("red");
@@ -42,10 +43,10 @@ fn keys_and_signals_restore_the_terminal() {
 
 #[test]
 fn terminal_is_restored_without_free_descriptors() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     for limit in 4..=16 {
         let script = format!("ulimit -n {limit} && exec \"$0\" scene.toml");
-        let mut terminal = folder.terminal_with(&["sh", "-c", &script, folder.program()], &[]);
+        let mut terminal = folder.terminal_with(&["sh", "-c", &script, PROGRAM], &[]);
         // The program either cannot start or, with more descriptors, runs until it reads this key.
         while !terminal.has_ended() {
             terminal.press("q");
@@ -58,7 +59,7 @@ fn terminal_is_restored_without_free_descriptors() {
 
 #[test]
 fn abort_restores_the_terminal_and_is_reported() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     let terminal = folder.terminal();
     terminal.wait_for_color("red");
     terminal.signal(Signal::SIGABRT);
@@ -67,7 +68,7 @@ fn abort_restores_the_terminal_and_is_reported() {
 
 #[test]
 fn quit_while_rendering_keeps_the_last_image() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
     let before = folder.bytes("scene.png");
@@ -80,7 +81,7 @@ fn quit_while_rendering_keeps_the_last_image() {
 
 #[test]
 fn quit_after_save_writes_or_explains_why_not() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     let slow = SCENE.replace("samples = 4", "samples = 10000000");
     folder.write("scene.toml", &slow);
     let mut terminal = folder.terminal();
@@ -107,7 +108,7 @@ fn quit_after_save_writes_or_explains_why_not() {
 /// The write may or may not have started, but the image must not be lost.
 #[test]
 fn keys_during_a_write_never_lose_the_image() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     let large = SCENE
         .replace("samples = 4", "samples = 1")
         .replace("width = 64", "width = 3000")
@@ -142,7 +143,7 @@ fn keys_during_a_write_never_lose_the_image() {
 
 #[test]
 fn render_resumes_after_a_dropped_connection() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     let slow = SCENE.replace("samples = 4", "samples = 4000");
     folder.write("scene.toml", &slow);
     let terminal = folder.terminal();
@@ -173,10 +174,10 @@ fn render_resumes_after_a_dropped_connection() {
 
 #[test]
 fn ctrl_z_suspends_and_fg_resumes() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     let mut terminal = folder.terminal_with(&["/bin/sh", "-i"], &[("PS1", "shell> ")]);
     terminal.wait_for("shell> ");
-    terminal.press(&format!("{} scene.toml\n", folder.program()));
+    terminal.press(&format!("{} scene.toml\n", PROGRAM));
     terminal.wait_for_color("red");
     terminal.press("\x1a");
     let is_shell = |screen: &vt100::Screen| {
@@ -200,7 +201,7 @@ fn ctrl_z_suspends_and_fg_resumes() {
 
 #[test]
 fn ctrl_z_without_a_shell_is_reported() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     let mut terminal = folder.terminal();
     terminal.wait_for_color("red");
     terminal.press("\x1a");

@@ -4,8 +4,9 @@
 use glimt::tui::messages;
 use nix::sys::signal::Signal;
 
-use super::pty::{Folder, SCENE, Terminal, cells, upper};
+use super::pty::{SCENE, Terminal, cells, upper};
 use super::relay::Answers;
+use crate::test_dir::{PROGRAM, TestDir};
 
 /// Environment variables that identify terminals, with the terminals' features: title, progress, a
 /// notification protocol, links, clipboard.
@@ -67,14 +68,14 @@ fn endless() -> String {
 }
 
 /// Starts the program with a notification for every finished render.
-fn open(folder: &Folder, variables: &[(&str, &str)]) -> Terminal {
-    folder.terminal_with(&[folder.program(), "scene.toml", "--notify-after", "0.001"], variables)
+fn open(folder: &TestDir, variables: &[(&str, &str)]) -> Terminal {
+    folder.terminal_with(&[PROGRAM, "scene.toml", "--notify-after", "0.001"], variables)
 }
 
 /// Makes the program send every kind of sequence: a render with a title, the end of a render without focus, a
 /// click and a copy. Returns all output until the program exits.
 fn through(variables: &[(&str, &str)], has_title: bool) -> Vec<u8> {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     folder.write("scene.toml", &endless());
     let mut terminal = open(&folder, variables);
     terminal.wait_for("ETA");
@@ -169,7 +170,7 @@ fn unknown_terminals_get_no_extra_sequences() {
 
 #[test]
 fn signals_clear_title_and_progress() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     folder.write("scene.toml", &SCENE.replace("samples = 4", "samples = 10000000"));
     for (signal, code) in
         [(Signal::SIGTERM, 143), (Signal::SIGHUP, 129), (Signal::SIGINT, 130), (Signal::SIGABRT, 1)]
@@ -196,9 +197,9 @@ fn only_unfocused_long_renders_notify() {
     for (focus, after) in
         [("\x1b[I", "0.001"), ("\x1b[O\x1b[I", "0.001"), ("\x1b[O", "3600"), ("\x1b[O", "0")]
     {
-        let folder = Folder::new();
+        let folder = TestDir::with_board();
         folder.write("scene.toml", &endless());
-        let command = [folder.program(), "scene.toml", "--notify-after", after];
+        let command = [PROGRAM, "scene.toml", "--notify-after", after];
         let mut terminal = folder.terminal_with(&command, &[("TERM", "xterm-kitty")]);
         terminal.wait_for("ETA");
         terminal.press(focus);
@@ -212,7 +213,7 @@ fn only_unfocused_long_renders_notify() {
 /// Title and progress are sent after the preview, and do not increase the number of queued bytes.
 #[test]
 fn slow_connection_sends_the_preview_first() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     folder.write("scene.toml", &endless());
     let terminal = folder.thin_line_in(Answers::Terminal, &[("WT_SESSION", "1-2-3")]);
     terminal.wait("a title", |_| has(&terminal.bytes(), b"\x1b]2;scene.toml: rendering"));
@@ -241,7 +242,7 @@ fn slow_connection_sends_the_preview_first() {
 
 #[test]
 fn late_terminal_reply_enables_features() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
     assert!(!has(&terminal.bytes(), b"\x1b]2;"));

@@ -1,6 +1,6 @@
 //! Help and key descriptions fill the width of the terminal.
 
-use super::pty::Folder;
+use crate::test_dir::{PROGRAM, TestDir};
 
 /// Columns of a terminal that is wider than every paragraph.
 const WIDE: u16 = 2000;
@@ -10,7 +10,7 @@ const EXPLAINED: [&str; 4] = ["", "camera", "materials.metal", "render.integrato
 
 /// Arguments for each invocation under test: the short help of the program and of each command, and the key
 /// descriptions.
-fn calls(folder: &Folder) -> Vec<String> {
+fn calls(folder: &TestDir) -> Vec<String> {
     let program = lines(folder, "-h", WIDE);
     let list =
         program.split(|line| line == "Commands:").nth(1).and_then(|rest| rest.split(String::is_empty).next());
@@ -21,10 +21,10 @@ fn calls(folder: &Folder) -> Vec<String> {
 }
 
 /// Prints the output of `glimt CALL` on a terminal with this many columns. Returns its lines.
-fn lines(folder: &Folder, call: &str, columns: u16) -> Vec<String> {
+fn lines(folder: &TestDir, call: &str, columns: u16) -> Vec<String> {
     let script = format!("\"$0\" {call}; echo \"exit code $?\"");
     let mut terminal =
-        folder.sized_terminal(&["sh", "-c", &script, folder.program()], &[("NO_COLOR", "1")], (columns, 400));
+        folder.sized_terminal(&["sh", "-c", &script, PROGRAM], &[("NO_COLOR", "1")], (columns, 400));
     assert_eq!(terminal.code(), 0, "{call}");
     let text = || String::from_utf8_lossy(&terminal.bytes()).into_owned();
     terminal.wait("the exit code", |_| {
@@ -73,7 +73,7 @@ fn words(lines: &[String]) -> Vec<(Separator, &str)> {
 
 #[test]
 fn help_is_not_wider_than_the_terminal() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     for call in calls(&folder) {
         for columns in [50, 100] {
             for line in lines(&folder, &call, columns) {
@@ -87,7 +87,7 @@ fn help_is_not_wider_than_the_terminal() {
 
 #[test]
 fn help_breaks_lines_only_where_they_are_full() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     let mut wrapped_lines = 0;
     for call in calls(&folder) {
         let wide = lines(&folder, &call, WIDE);
@@ -123,7 +123,7 @@ fn text_columns(line: &str) -> [Option<usize>; 2] {
 
 #[test]
 fn paragraphs_are_single_lines_on_wide_terminals() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     for call in calls(&folder) {
         let wide = lines(&folder, &call, WIDE);
         for pair in wide.windows(2) {

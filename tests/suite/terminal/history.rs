@@ -4,8 +4,9 @@ use std::fs;
 
 use glimt::tui::messages;
 
-use super::pty::{BLUE, Colors, Folder, GREEN, RED, SCENE, Terminal, cells, upper};
+use super::pty::{BLUE, Colors, GREEN, RED, SCENE, Terminal, cells, upper};
 use super::relay::Answers;
+use crate::test_dir::{PROGRAM, TestDir};
 
 /// The text on the screen as a single line.
 fn words(screen: &vt100::Screen) -> String {
@@ -40,7 +41,7 @@ fn colors_from(screen: &vt100::Screen, column: u16) -> [usize; 3] {
 }
 
 /// Saves the scene three times with different colors.
-fn edited(folder: &Folder, terminal: &Terminal) {
+fn edited(folder: &TestDir, terminal: &Terminal) {
     terminal.wait_for_render(1);
     for (render, (color, value)) in (2..).zip([("green", GREEN), ("blue", BLUE)]) {
         folder.write("scene.toml", &SCENE.replace(RED, value));
@@ -54,7 +55,7 @@ const PANEL: u16 = 97;
 
 #[test]
 fn history_shows_images_and_their_changes() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     let mut terminal = folder.terminal_of(120, 40);
     terminal.wait_for_render(1);
     assert!(!terminal.text().contains(messages::HISTORY), "no history with a single render");
@@ -100,7 +101,7 @@ fn history_shows_images_and_their_changes() {
 /// `c` does not add an entry for the moved camera, and a broken save does not change the next entry.
 #[test]
 fn history_entry_shows_only_its_own_change() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     let mut terminal = folder.terminal_of(120, 40);
     terminal.wait_for_render(1);
     let is_told = |screen: &vt100::Screen, words: &str| {
@@ -126,7 +127,7 @@ fn history_entry_shows_only_its_own_change() {
 /// tests check that it is sent after the image.)
 #[test]
 fn history_is_sent_over_slow_connections() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     let terminal = folder.thin_line(Answers::Terminal);
     edited(&folder, &terminal);
     terminal.wait_for(messages::HISTORY);
@@ -135,10 +136,10 @@ fn history_is_sent_over_slow_connections() {
 
 #[test]
 fn noise_curve_shows_the_target() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     let noisy = SCENE.replace("samples = 4", "samples = 10000000\nerror = 0.0001\nintegrator = \"path\"");
     folder.write("scene.toml", &noisy);
-    let command = [folder.program(), "scene.toml", "--time", "5"];
+    let command = [PROGRAM, "scene.toml", "--time", "5"];
     let mut terminal = folder.terminal_with(&command, &[]);
     terminal.resize(120, 40);
     terminal.wait_for_render(1);
@@ -163,7 +164,7 @@ fn noise_curve_shows_the_target() {
 
 #[test]
 fn undo_reverts_only_the_saved_camera() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     let text = || fs::read_to_string(folder.path("scene.toml")).expect("a scene");
     let mut terminal = folder.terminal_of(120, 40);
     terminal.wait_for_render(1);

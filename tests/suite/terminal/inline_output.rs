@@ -2,15 +2,16 @@
 
 use nix::sys::signal::Signal;
 
-use super::pty::{Folder, GREEN, RED, SCENE, Terminal, cells};
+use super::pty::{GREEN, RED, SCENE, Terminal, cells};
+use crate::test_dir::{PROGRAM, TestDir};
 
-fn compared(options: &[&str], variables: &[(&str, &str)]) -> (Folder, Terminal) {
-    let folder = Folder::new();
+fn compared(options: &[&str], variables: &[(&str, &str)]) -> (TestDir, Terminal) {
+    let folder = TestDir::with_board();
     folder.once(&[]);
     std::fs::rename(folder.path("once.png"), folder.path("red.png")).expect("renamed");
     folder.write("scene.toml", &SCENE.replace(RED, GREEN));
     folder.once(&[]);
-    let mut command = vec![folder.program(), "compare", "once.png", "red.png"];
+    let mut command = vec![PROGRAM, "compare", "once.png", "red.png"];
     command.extend(options);
     let mut terminal = folder.terminal_with(&command, variables);
     assert_eq!(terminal.code(), 0);
@@ -60,17 +61,9 @@ fn compare_uses_the_terminal_color_depth() {
     });
 }
 
-fn measured(folder: &Folder, samples: &str) -> Terminal {
-    let command = [
-        folder.program(),
-        "bench",
-        "scene.toml",
-        "--samples",
-        samples,
-        "--reference-samples",
-        "64",
-        "--no-cache",
-    ];
+fn measured(folder: &TestDir, samples: &str) -> Terminal {
+    let command =
+        [PROGRAM, "bench", "scene.toml", "--samples", samples, "--reference-samples", "64", "--no-cache"];
     folder.terminal_with(&command, &[])
 }
 
@@ -82,7 +75,7 @@ fn has_plot(screen: &vt100::Screen) -> bool {
 
 #[test]
 fn bench_removes_its_plot_when_interrupted() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     let mut terminal = measured(&folder, "1,4,16,64,65536");
     terminal.wait("the plot above the bar", |screen| has_plot(screen) && screen.contents().contains('%'));
     terminal.resize(60, 20);
@@ -99,7 +92,7 @@ fn bench_removes_its_plot_when_interrupted() {
 
 #[test]
 fn bench_keeps_its_plot_at_the_end() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     let mut terminal = measured(&folder, "1,4");
     assert_eq!(terminal.code(), 0);
     terminal.wait("the plot without the bar", |screen| has_plot(screen) && !screen.contents().contains('█'));

@@ -5,7 +5,8 @@ use std::time::Duration;
 
 use glimt::tui::messages;
 
-use super::pty::{Folder, SCENE};
+use super::pty::SCENE;
+use crate::test_dir::TestDir;
 
 /// An unbound key.
 const UNBOUND: &str = "Y";
@@ -16,7 +17,7 @@ fn pause(milliseconds: u64) {
 
 #[test]
 fn key_after_a_burst_is_handled() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
     // The last key must be handled without waiting for more input.
@@ -28,7 +29,7 @@ fn key_after_a_burst_is_handled() {
 
 #[test]
 fn pasted_text_is_not_keys() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
     assert!(terminal.look(vt100::Screen::bracketed_paste));
@@ -44,7 +45,7 @@ fn pasted_text_is_not_keys() {
 
 #[test]
 fn long_paste_is_not_keys() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
     // Each of these keys has an effect. The last two write the camera to the scene and quit.
@@ -57,7 +58,7 @@ fn long_paste_is_not_keys() {
 
 #[test]
 fn unterminated_paste_ends_after_a_second() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
     terminal.burst(format!("\x1b[200~{}", "q".repeat(9_000)));
@@ -69,7 +70,7 @@ fn unterminated_paste_ends_after_a_second() {
 
 #[test]
 fn split_terminal_replies_are_not_keys() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
     for answer in
@@ -101,7 +102,7 @@ fn split_terminal_replies_are_not_keys() {
 fn unterminated_sequences_do_not_block_keys() {
     // Use a separate terminal for each sequence, because the test mostly waits.
     let terminals = ["\x1b]0;", "\x1bP", "\x1b[", "\x1bO", "\x1b[1;", "\x1bX", "\u{e9}\x1b"].map(|begun| {
-        let folder = Folder::new();
+        let folder = TestDir::with_board();
         let mut terminal = folder.terminal();
         terminal.wait_for_render(1);
         terminal.press(begun);

@@ -6,7 +6,8 @@ use std::os::unix::fs::PermissionsExt;
 use glimt::tui::messages;
 
 use super::mouse_and_editor::{EDITOR, editing};
-use super::pty::{Colors, Folder, SCENE, Terminal};
+use super::pty::{Colors, SCENE, Terminal};
+use crate::test_dir::{PROGRAM, TestDir};
 
 /// A click on a cell, numbered from 1.
 fn click(column: u16, row: u16) -> String {
@@ -23,9 +24,9 @@ fn line_of_ball() -> usize {
     centered().lines().position(|line| line == "[[sphere]]").expect("a ball") + 1
 }
 
-fn terminal(folder: &Folder, text: &str, variables: &[(&str, &str)]) -> Terminal {
+fn terminal(folder: &TestDir, text: &str, variables: &[(&str, &str)]) -> Terminal {
     folder.write("scene.toml", text);
-    let mut terminal = folder.terminal_with(&[folder.program(), "scene.toml"], variables);
+    let mut terminal = folder.terminal_with(&[PROGRAM, "scene.toml"], variables);
     terminal.wait_for_render(1);
     // Enlarge the window so that each fact fits on a line.
     terminal.resize(120, 40);
@@ -37,7 +38,7 @@ fn terminal(folder: &Folder, text: &str, variables: &[(&str, &str)]) -> Terminal
 
 #[test]
 fn crosshair_shows_all_facts() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     let mut terminal = terminal(&folder, &centered(), &[]);
     terminal.press("\r");
     let place = format!("scene.toml:{}", line_of_ball());
@@ -60,7 +61,7 @@ fn crosshair_shows_all_facts() {
 
 #[test]
 fn focus_moves_to_crosshair_and_is_saved() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     let mut terminal = terminal(&folder, &centered(), &[]);
     terminal.press("f");
     terminal.wait_for(messages::CLICK_TO_FOCUS);
@@ -87,7 +88,7 @@ fn focus_moves_to_crosshair_and_is_saved() {
 
 #[test]
 fn pinhole_has_no_focus() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     let mut terminal = terminal(&folder, &centered().replace("aperture = 0.2\n", ""), &[]);
     terminal.press("ff");
     terminal.wait_for(messages::PINHOLE);
@@ -99,7 +100,7 @@ fn pinhole_has_no_focus() {
 
 #[test]
 fn editor_opens_at_the_clicked_object() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     folder.write("vi", EDITOR);
     fs::set_permissions(folder.path("vi"), fs::Permissions::from_mode(0o755)).expect("permitted");
     let editor = folder.path("vi");
@@ -115,7 +116,7 @@ fn editor_opens_at_the_clicked_object() {
 
 #[test]
 fn actual_size_preview_centers_on_the_click() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     let large = SCENE.replace("width = 64", "width = 320").replace("height = 48", "height = 240");
     let mut terminal = terminal(&folder, &large, &[]);
     let before = terminal.settled(|screen| Colors::of(screen).red);
@@ -132,7 +133,7 @@ fn actual_size_preview_centers_on_the_click() {
 
 #[test]
 fn region_without_mouse_uses_the_crosshair() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     folder.write("scene.toml", &SCENE.replace("samples = 4", "samples = 10000000"));
     let mut terminal = folder.terminal();
     terminal.wait_for("ETA");

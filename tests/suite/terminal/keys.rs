@@ -4,7 +4,8 @@ use std::fs;
 
 use glimt::tui::messages;
 
-use super::pty::{Folder, SCENE, cells, upper};
+use super::pty::{SCENE, cells, upper};
+use crate::test_dir::TestDir;
 
 const ESCAPE: &str = "\x1b";
 const PAGE_UP: &str = "\x1b[5~";
@@ -14,7 +15,7 @@ const DOWN: &str = "\x1b[B";
 
 #[test]
 fn keys_change_and_reset_settings() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
     let own = folder.bytes("scene.png");
@@ -57,7 +58,7 @@ fn keys_change_and_reset_settings() {
 
 #[test]
 fn views_are_shown_and_saved_on_request() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
     let beauty = folder.bytes("scene.png");
@@ -112,7 +113,7 @@ fn views_are_shown_and_saved_on_request() {
 
 #[test]
 fn paused_render_can_be_saved_and_resumed() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     folder.write("scene.toml", &SCENE.replace("samples = 4", "samples = 10000000"));
     let mut terminal = folder.terminal();
     terminal.wait_for_color("red");
@@ -146,7 +147,7 @@ fn paused_render_can_be_saved_and_resumed() {
 
 #[test]
 fn help_and_errors_open_scroll_and_close() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
     let gone = |text: &'static str| move |screen: &vt100::Screen| !screen.contents().contains(text);

@@ -4,8 +4,8 @@ use std::fs;
 
 use glimt::tui::messages;
 
-use super::pty::{Folder, SCENE, Terminal, shows};
-use crate::test_dir::{assert_mentions, mentions};
+use super::pty::{SCENE, Terminal, shows};
+use crate::test_dir::{PROGRAM, TestDir, assert_mentions, mentions};
 
 /// The scene with `samples` samples per pixel.
 fn scene(samples: u32, rest: &str) -> String {
@@ -13,11 +13,11 @@ fn scene(samples: u32, rest: &str) -> String {
 }
 
 /// A folder with the checkpoint of a finished render.
-fn with_checkpoint(samples: u32) -> Folder {
-    let folder = Folder::new();
+fn with_checkpoint(samples: u32) -> TestDir {
+    let folder = TestDir::with_board();
     folder.write("scene.toml", &scene(samples, ""));
     let options = ["-o", "scene.png", "--keep-checkpoint"];
-    let mut process = std::process::Command::new(folder.program());
+    let mut process = std::process::Command::new(PROGRAM);
     process.current_dir(folder.path("")).args(["scene.toml", "--once"]).args(options);
     assert!(process.output().expect("it runs").status.success());
     assert!(folder.path("scene.png.checkpoint").is_file());
@@ -25,8 +25,8 @@ fn with_checkpoint(samples: u32) -> Folder {
     folder
 }
 
-fn terminal(folder: &Folder, options: &[&str]) -> Terminal {
-    folder.terminal_with(&[&[folder.program(), "scene.toml"], options].concat(), &[])
+fn terminal(folder: &TestDir, options: &[&str]) -> Terminal {
+    folder.terminal_with(&[&[PROGRAM, "scene.toml"], options].concat(), &[])
 }
 
 /// Start of the message about an ignored checkpoint.
@@ -72,7 +72,7 @@ fn ignored_checkpoint_is_reported() {
 
 #[test]
 fn quit_saves_and_reports_a_long_render() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     folder.write("scene.toml", &scene(10_000_000, ""));
     let mut long = terminal(&folder, &["--checkpoint", "0.2"]);
     long.wait_for("ETA");
@@ -95,9 +95,9 @@ fn quit_saves_and_reports_a_long_render() {
 
 #[test]
 fn watching_merge_shows_arriving_parts() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     let run = |line: &str| {
-        let mut process = std::process::Command::new(folder.program());
+        let mut process = std::process::Command::new(PROGRAM);
         process.current_dir(folder.path("")).args(line.split_whitespace());
         assert!(process.output().expect("it runs").status.success(), "{line}");
     };
@@ -107,7 +107,7 @@ fn watching_merge_shows_arriving_parts() {
     run("scene.toml --once -o one.png");
     fs::rename(folder.path("1"), folder.path("1.part")).expect("renamed");
     let parts = ["1.part", "2.part", "3.part"];
-    let command = [&[folder.program(), "merge", "joined.png"], parts.as_slice(), &["--watch"]].concat();
+    let command = [&[PROGRAM, "merge", "joined.png"], parts.as_slice(), &["--watch"]].concat();
     let merge = folder.terminal_with(&command, &[]);
     let cells = |merge: &Terminal| merge.settled(|screen| super::Colors::of(screen).total());
     merge.wait_for("1 of 3 parts");

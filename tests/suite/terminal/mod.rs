@@ -32,11 +32,12 @@ mod unchanged_saves;
 
 use std::fs;
 
-use pty::{BLUE, Colors, Folder, GREEN, RED, SCENE, cells};
+use crate::test_dir::{PROGRAM, TestDir};
+use pty::{BLUE, Colors, GREEN, RED, SCENE, cells};
 
 #[test]
 fn preview_matches_the_written_image() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     let terminal = folder.terminal();
     terminal.wait_for_color("red");
     terminal.wait_for_render(1);
@@ -45,7 +46,7 @@ fn preview_matches_the_written_image() {
 
 #[test]
 fn each_save_renders_once() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     let terminal = folder.terminal();
     terminal.wait_for_render(1);
     let path = folder.path("scene.toml");
@@ -77,7 +78,7 @@ fn each_save_renders_once() {
 
 #[test]
 fn last_of_many_fast_saves_wins() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     let terminal = folder.terminal();
     terminal.wait_for_render(1);
     for i in 0..40 {
@@ -93,7 +94,7 @@ fn last_of_many_fast_saves_wins() {
 
 #[test]
 fn broken_scene_shows_position_and_last_image() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     let terminal = folder.terminal();
     terminal.wait_for_render(1);
     let before = (folder.bytes("scene.png"), modified(&folder));
@@ -117,14 +118,14 @@ fn broken_scene_shows_position_and_last_image() {
     terminal.wait_for_render(2);
 }
 
-fn modified(folder: &Folder) -> std::time::SystemTime {
+fn modified(folder: &TestDir) -> std::time::SystemTime {
     let metadata = fs::metadata(folder.path("scene.png")).expect("an image");
     metadata.modified().expect("a time")
 }
 
 #[test]
 fn recreated_scene_is_rendered() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     let terminal = folder.terminal();
     terminal.wait_for_render(1);
     fs::remove_file(folder.path("scene.toml")).expect("removed");
@@ -136,7 +137,7 @@ fn recreated_scene_is_rendered() {
 
 #[test]
 fn changed_asset_renders_again() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     let texture = "[textures.paint]\nfile = \"paint.ppm\"\n";
     let scene = SCENE
         .replace(RED, "{ texture = \"paint\" }")
@@ -154,7 +155,7 @@ fn changed_asset_renders_again() {
 
 #[test]
 fn preview_follows_the_window_size() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
     let small = terminal.settled(|screen| Colors::of(screen).red);
@@ -174,8 +175,8 @@ fn preview_follows_the_window_size() {
 
 #[test]
 fn no_color_preview_uses_characters() {
-    let folder = Folder::new();
-    let terminal = folder.terminal_with(&[folder.program(), "scene.toml"], &[("NO_COLOR", "1")]);
+    let folder = TestDir::with_board();
+    let terminal = folder.terminal_with(&[PROGRAM, "scene.toml"], &[("NO_COLOR", "1")]);
     let is_ink = |cell: &vt100::Cell| "=+*#%@$&{}[]?".contains(cell.contents()) && cell.has_contents();
     terminal.wait("an image", |screen| cells(screen).filter(|cell| is_ink(cell)).count() > 100);
     terminal.wait_for("done");

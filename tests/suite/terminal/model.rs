@@ -4,7 +4,7 @@ use std::fs;
 
 use glimt::tui::messages;
 
-use super::pty::Folder;
+use crate::test_dir::{PROGRAM, TestDir};
 
 /// An OBJ file of a red wall that faces the camera, one unit wide and `height` units high.
 fn wall(height: f32) -> String {
@@ -13,11 +13,11 @@ fn wall(height: f32) -> String {
 
 #[test]
 fn model_is_watched_and_imported_once() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     folder.write("a.mtl", "newmtl red\nKd 0.9 0 0\nKe 1 0 0\n");
     folder.write("wall.obj", &wall(0.1));
     let small = ["--samples", "2", "--width", "64", "--height", "48", "--from", "front"];
-    let call = [&[folder.program(), "wall.obj"][..], &small].concat();
+    let call = [&[PROGRAM, "wall.obj"][..], &small].concat();
     let mut terminal = folder.terminal_with(&call, &[]);
     terminal.wait_for_render(1);
     let low = folder.bytes("wall.png");
@@ -48,8 +48,8 @@ fn model_is_watched_and_imported_once() {
 }
 
 /// The image file that `--once` writes.
-fn once(folder: &Folder, options: &[&str]) -> Vec<u8> {
-    let mut process = std::process::Command::new(folder.program());
+fn once(folder: &TestDir, options: &[&str]) -> Vec<u8> {
+    let mut process = std::process::Command::new(PROGRAM);
     process.args(["wall.obj", "--once", "-o", "once.png", "--progress", "none"]).args(options);
     assert!(process.current_dir(folder.path("")).status().expect("it runs").success());
     folder.bytes("once.png")
@@ -57,11 +57,11 @@ fn once(folder: &Folder, options: &[&str]) -> Vec<u8> {
 
 #[test]
 fn missing_model_is_named() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     folder.write("a.mtl", "newmtl red\nKd 0.9 0 0\n");
     folder.write("wall.obj", &wall(0.1));
     let small = ["--width", "32", "--height", "24", "--samples", "4"];
-    let call = [&[folder.program(), "wall.obj"][..], &small].concat();
+    let call = [&[PROGRAM, "wall.obj"][..], &small].concat();
     let mut terminal = folder.terminal_with(&call, &[]);
     terminal.wait_for_render(1);
     terminal.resize(120, 40);

@@ -8,7 +8,8 @@ use nix::errno::Errno;
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 
-use super::pty::{Colors, Folder, GREEN, RED, SCENE, Terminal};
+use super::pty::{Colors, GREEN, RED, SCENE, Terminal};
+use crate::test_dir::{PROGRAM, TestDir};
 
 /// The terminal sequence for pressing the left button over a cell, numbered from 1.
 fn press(column: u16, row: u16) -> String {
@@ -29,7 +30,7 @@ fn red(terminal: &Terminal) -> usize {
 
 #[test]
 fn mouse_orbits_zooms_and_inspects() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
     let before = red(&terminal);
@@ -54,7 +55,7 @@ fn mouse_orbits_zooms_and_inspects() {
 #[test]
 fn mouse_mode_is_restored() {
     use vt100::MouseProtocolMode::{ButtonMotion, None};
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
     let is_on = |screen: &vt100::Screen| screen.mouse_protocol_mode() == ButtonMotion;
@@ -71,7 +72,7 @@ fn mouse_mode_is_restored() {
 
 #[test]
 fn saved_camera_becomes_the_scene_camera() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     let text = SCENE.replace("[camera]", "# the eye\n[camera]");
     folder.write("scene.toml", &text);
     let mut terminal = folder.terminal();
@@ -96,7 +97,7 @@ fn saved_camera_becomes_the_scene_camera() {
 
 #[test]
 fn click_sets_the_focus() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     folder.write("scene.toml", &SCENE.replace("focus = 4.0", "focus = 3.0"));
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
@@ -119,12 +120,12 @@ pub(super) fn editing(line: usize) -> String {
 
 #[test]
 fn editor_uses_the_terminal() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     folder.write("vi", EDITOR);
     fs::set_permissions(folder.path("vi"), fs::Permissions::from_mode(0o755)).expect("permitted");
     let editor = folder.path("vi");
     let variables = [("VISUAL", ""), ("EDITOR", editor.to_str().expect("a name"))];
-    let mut terminal = folder.terminal_with(&[folder.program(), "scene.toml"], &variables);
+    let mut terminal = folder.terminal_with(&[PROGRAM, "scene.toml"], &variables);
     terminal.wait_for_render(1);
     folder.write("scene.toml", &SCENE.replace("samples = 4", "samples = \"four\""));
     terminal.wait_for("scene.toml:4:11");
@@ -142,12 +143,12 @@ fn editor_uses_the_terminal() {
 
 #[test]
 fn echo_is_restored_after_killed_editor() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     folder.write("vi", "#!/bin/sh\nstty raw -echo\nkill -9 $$\n");
     fs::set_permissions(folder.path("vi"), fs::Permissions::from_mode(0o755)).expect("permitted");
     let editor = folder.path("vi");
     let variables = [("VISUAL", ""), ("EDITOR", editor.to_str().expect("a name"))];
-    let mut terminal = folder.terminal_with(&[folder.program(), "scene.toml"], &variables);
+    let mut terminal = folder.terminal_with(&[PROGRAM, "scene.toml"], &variables);
     terminal.wait_for_render(1);
     terminal.press("o");
     terminal.wait_for("killed by");
@@ -156,7 +157,7 @@ fn echo_is_restored_after_killed_editor() {
 }
 
 /// The program after it has opened a shell script as its editor, which now controls the terminal.
-fn in_editor(folder: &Folder, command: &[&str], script: &str, options: &str) -> Terminal {
+fn in_editor(folder: &TestDir, command: &[&str], script: &str, options: &str) -> Terminal {
     folder.write("vi", &format!("#!/bin/sh\necho $PPID > parent\necho $$ > id\n{script}\n"));
     fs::set_permissions(folder.path("vi"), fs::Permissions::from_mode(0o755)).expect("permitted");
     let editor = format!("{}{options}", folder.path("vi").to_str().expect("a name"));
@@ -168,7 +169,7 @@ fn in_editor(folder: &Folder, command: &[&str], script: &str, options: &str) -> 
 }
 
 /// The process with the ID stored in a file.
-fn process(folder: &Folder, file: &str) -> Pid {
+fn process(folder: &TestDir, file: &str) -> Pid {
     let number = String::from_utf8(folder.bytes(file)).expect("a number");
     Pid::from_raw(number.trim().parse().expect("a number"))
 }
@@ -179,8 +180,8 @@ const FROM_SHELL: &str = "modes=$(stty -g); \"$0\" scene.toml; code=$?; test \"$
 #[test]
 fn signal_ends_editor_and_restores_modes() {
     for (signal, code) in [(Signal::SIGTERM, 143), (Signal::SIGHUP, 129), (Signal::SIGUSR1, 138)] {
-        let folder = Folder::new();
-        let command = ["/bin/sh", "-c", FROM_SHELL, folder.program()];
+        let folder = TestDir::with_board();
+        let command = ["/bin/sh", "-c", FROM_SHELL, PROGRAM];
         let script = "stty raw -echo\nprintf at-work\nexec sleep 1000";
         let terminal = in_editor(&folder, &command, script, "");
         kill(process(&folder, "parent"), signal).expect("sent");
@@ -192,8 +193,8 @@ fn signal_ends_editor_and_restores_modes() {
 
 #[test]
 fn raw_mode_ends_if_editor_ignores_signals() {
-    let folder = Folder::new();
-    let command = ["/bin/sh", "-c", FROM_SHELL, folder.program()];
+    let folder = TestDir::with_board();
+    let command = ["/bin/sh", "-c", FROM_SHELL, PROGRAM];
     // The editor exits when the terminal closes.
     let script = "trap '' TERM HUP\nstty raw -echo\nprintf at-work\nread -r line";
     let terminal = in_editor(&folder, &command, script, "");
@@ -203,10 +204,10 @@ fn raw_mode_ends_if_editor_ignores_signals() {
 
 #[test]
 fn signal_reaches_editor_through_a_shell() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     // A shell with job control, whose terminal stays open.
     let jobs = format!("set -m; {FROM_SHELL}");
-    let command = ["/bin/sh", "-c", &jobs, folder.program()];
+    let command = ["/bin/sh", "-c", &jobs, PROGRAM];
     let script = "ps -o ppid= -p $PPID > parent\nprintf at-work\nexec sleep 1000";
     let terminal = in_editor(&folder, &command, script, " #");
     kill(process(&folder, "parent"), Signal::SIGTERM).expect("sent");
@@ -217,8 +218,8 @@ fn signal_reaches_editor_through_a_shell() {
 
 #[test]
 fn ctrl_c_in_the_editor_does_not_end_glimt() {
-    let folder = Folder::new();
-    let command = [folder.program(), "scene.toml"];
+    let folder = TestDir::with_board();
+    let command = [PROGRAM, "scene.toml"];
     let mut terminal = in_editor(&folder, &command, "printf at-work\nexec sleep 1000", "");
     for _ in 0..20 {
         terminal
@@ -237,9 +238,9 @@ fn ctrl_c_in_the_editor_does_not_end_glimt() {
 
 #[test]
 fn missing_editor_is_reported() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     let variables = [("VISUAL", "no-such-editor")];
-    let mut terminal = folder.terminal_with(&[folder.program(), "scene.toml"], &variables);
+    let mut terminal = folder.terminal_with(&[PROGRAM, "scene.toml"], &variables);
     terminal.wait_for_render(1);
     terminal.press("o");
     terminal.wait_for("`no-such-editor`");
@@ -248,7 +249,7 @@ fn missing_editor_is_reported() {
 
 #[test]
 fn earlier_renders_can_be_browsed() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
     folder.write("scene.toml", &SCENE.replace(RED, GREEN));
@@ -270,7 +271,7 @@ fn earlier_renders_can_be_browsed() {
 
 #[test]
 fn zoom_shows_actual_pixels() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     folder.write(
         "scene.toml",
         &SCENE.replace("width = 64", "width = 320").replace("height = 48", "height = 240"),
@@ -290,7 +291,7 @@ fn zoom_shows_actual_pixels() {
 
 #[test]
 fn region_first_does_not_change_the_image() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
     terminal.press("z");

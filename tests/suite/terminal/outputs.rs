@@ -7,8 +7,8 @@ use std::time::Duration;
 use glimt::pipeline::watch::ExternalChange;
 use glimt::tui::messages;
 
-use super::pty::{Folder, GREEN, RED, SCENE};
-use crate::test_dir::assert_mentions;
+use super::pty::{GREEN, RED, SCENE};
+use crate::test_dir::{PROGRAM, TestDir, assert_mentions};
 
 /// An image with one red texel.
 const PAINT: &str = "P3\n1 1\n255\n230 20 20\n";
@@ -26,7 +26,7 @@ fn wait_a_while() {
 
 #[test]
 fn texture_named_like_the_image_is_kept() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     image::RgbImage::from_pixel(2, 2, image::Rgb([230, 20, 20]))
         .save(folder.path("scene.png"))
         .expect("saved");
@@ -53,8 +53,8 @@ fn texture_named_like_the_image_is_kept() {
 
 #[test]
 fn output_that_becomes_an_input_is_kept() {
-    let folder = Folder::new();
-    let terminal = folder.terminal_with(&[folder.program(), "scene.toml", "--report", "r.json"], &[]);
+    let folder = TestDir::with_board();
+    let terminal = folder.terminal_with(&[PROGRAM, "scene.toml", "--report", "r.json"], &[]);
     terminal.wait_for_render(1);
     let (picture, report) = (folder.bytes("scene.png"), folder.bytes("r.json"));
     folder.write("scene.toml", &textured("scene.png"));
@@ -72,7 +72,7 @@ fn output_that_becomes_an_input_is_kept() {
 
 #[test]
 fn unrelated_image_is_not_replaced() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     let terminal = folder.terminal();
     terminal.wait_for_render(1);
     image::RgbImage::new(3, 2).save(folder.path("scene.png")).expect("saved");
@@ -85,12 +85,12 @@ fn unrelated_image_is_not_replaced() {
 
 #[test]
 fn w_is_not_offered_for_another_scenes_image() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
     fs::create_dir(folder.path("other")).expect("a folder");
     folder.write("other/scene.toml", &SCENE.replace(RED, GREEN));
-    let mut other = std::process::Command::new(folder.program());
+    let mut other = std::process::Command::new(PROGRAM);
     other.current_dir(folder.path("")).args(["other/scene.toml", "--once", "--force"]);
     assert!(other.output().expect("it runs").status.success());
     let image = folder.bytes("scene.png");
@@ -106,12 +106,12 @@ fn w_is_not_offered_for_another_scenes_image() {
 
 #[test]
 fn link_changed_while_rendering_is_detected() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     folder.write("paint.ppm", PAINT);
     symlink("first.ppm", folder.path("out.ppm")).expect("a link");
     let endless = textured("paint.ppm").replace("samples = 4", "samples = 10000000");
     folder.write("scene.toml", &endless);
-    let mut terminal = folder.terminal_with(&[folder.program(), "scene.toml", "-o", "out.ppm"], &[]);
+    let mut terminal = folder.terminal_with(&[PROGRAM, "scene.toml", "-o", "out.ppm"], &[]);
     terminal.wait_for_color("red");
     terminal.wait_for("ETA");
     terminal.press("w");
@@ -126,11 +126,11 @@ fn link_changed_while_rendering_is_detected() {
 
 #[test]
 fn finishing_render_keeps_image_written_with_w() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     let text = SCENE.replace("samples = 4", "samples = 12000");
     folder.write("scene.toml", &text);
     for (keys, changes) in [("]]", "exposure +0.5"), ("s", "shadows hard")] {
-        let mut terminal = folder.terminal_with(&[folder.program(), "scene.toml", "-o", "a.png"], &[]);
+        let mut terminal = folder.terminal_with(&[PROGRAM, "scene.toml", "-o", "a.png"], &[]);
         terminal.wait_for_coverage();
         terminal.press(keys);
         terminal.press("w");
@@ -154,7 +154,7 @@ fn finishing_render_keeps_image_written_with_w() {
 
 #[test]
 fn scene_save_replaces_image_written_with_w() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
     let own = folder.bytes("scene.png");
@@ -166,10 +166,10 @@ fn scene_save_replaces_image_written_with_w() {
 
 #[test]
 fn own_writes_do_not_trigger_renders() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     folder.write("paint.ppm", PAINT);
     folder.write("scene.toml", &textured("paint.ppm"));
-    let command = [folder.program(), "scene.toml", "-o", "a.png", "-o", "b.ppm", "--report", "r.json"];
+    let command = [PROGRAM, "scene.toml", "-o", "a.png", "-o", "b.ppm", "--report", "r.json"];
     for poll in [&[][..], &["--poll"]] {
         let mut terminal = folder.terminal_with(&[&command[..], poll].concat(), &[]);
         terminal.wait_for_render(1);

@@ -1,9 +1,8 @@
 //! A pseudo-terminal that runs the program, with its screen and keyboard.
 
-use std::fs;
 use std::io::{Read, Write};
 use std::num::NonZeroU16;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Command as Process;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
@@ -12,7 +11,7 @@ use std::time::{Duration, Instant};
 use glimt::tui::messages;
 
 use super::relay::{Answers, Relay, Seen};
-use crate::test_dir::PROGRAM;
+use crate::test_dir::{PROGRAM, TestDir};
 use nix::sys::signal::{Signal, kill};
 use nix::sys::termios::LocalFlags;
 use nix::unistd::Pid;
@@ -75,27 +74,12 @@ pub const RED: &str = "[0.8, 0.02, 0.02]";
 pub const GREEN: &str = "[0.02, 0.8, 0.02]";
 pub const BLUE: &str = "[0.02, 0.02, 0.8]";
 
-/// A temporary folder with the scene.
-pub struct Folder(tempfile::TempDir);
-
-impl Folder {
-    pub fn new() -> Self {
-        let folder = Self(tempfile::tempdir().expect("a temporary folder"));
-        folder.write("scene.toml", SCENE);
-        folder
-    }
-
-    pub fn path(&self, name: &str) -> PathBuf {
-        self.0.path().join(name)
-    }
-
-    /// Writes in place, after truncating the file.
-    pub fn write(&self, name: &str, text: &str) {
-        fs::write(self.path(name), text).expect("written");
-    }
-
-    pub fn bytes(&self, name: &str) -> Vec<u8> {
-        fs::read(self.path(name)).expect(name)
+impl TestDir {
+    /// A directory with [`SCENE`] in `scene.toml`.
+    pub fn with_board() -> Self {
+        let dir = Self(tempfile::tempdir().expect("a temporary folder"));
+        dir.write("scene.toml", SCENE);
+        dir
     }
 
     /// The image rendered with `--once` from the current scene.
@@ -149,10 +133,6 @@ impl Folder {
         (columns, rows): (u16, u16),
     ) -> Terminal {
         Terminal::open(command, variables, self.0.path(), size(columns, rows), None)
-    }
-
-    pub fn program(&self) -> &'static str {
-        PROGRAM
     }
 }
 

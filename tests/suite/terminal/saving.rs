@@ -5,7 +5,8 @@ use std::io::Write;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use super::pty::{BLUE, Folder, GREEN, RED, SCENE, Terminal};
+use super::pty::{BLUE, GREEN, RED, SCENE, Terminal};
+use crate::test_dir::{PROGRAM, TestDir};
 
 /// A way to save text to a file.
 type Save = fn(&Path, &str);
@@ -61,8 +62,8 @@ fn shades() -> impl Iterator<Item = (&'static str, &'static str)> {
 #[test]
 fn every_way_of_saving_a_scene_renders_once() {
     for options in [&[][..], &["--poll"]] {
-        let folder = Folder::new();
-        let terminal = folder.terminal_with(&[&[folder.program(), "scene.toml"], options].concat(), &[]);
+        let folder = TestDir::with_board();
+        let terminal = folder.terminal_with(&[&[PROGRAM, "scene.toml"], options].concat(), &[]);
         terminal.wait_for_render(1);
         for ((render, (way, save)), (color, value)) in (2..).zip(WAYS).zip(shades()) {
             save(&folder.path("scene.toml"), &SCENE.replace(RED, value));
@@ -80,12 +81,12 @@ fn every_way_of_saving_a_scene_renders_once() {
 #[test]
 fn every_way_of_saving_an_asset_renders_once() {
     for options in [&[][..], &["--poll"]] {
-        let folder = Folder::new();
+        let folder = TestDir::with_board();
         let texture = "[textures.paint]\nfile = \"paint.ppm\"\n";
         let scene = SCENE.replace(RED, "{ texture = \"paint\" }");
         folder.write("scene.toml", &scene.replace("[materials]", &format!("{texture}[materials]")));
         folder.write("paint.ppm", "P3\n1 1\n255\n230 20 20\n");
-        let terminal = folder.terminal_with(&[&[folder.program(), "scene.toml"], options].concat(), &[]);
+        let terminal = folder.terminal_with(&[&[PROGRAM, "scene.toml"], options].concat(), &[]);
         terminal.wait_for_render(1);
         for ((render, (way, save)), (color, _)) in (2..).zip(WAYS).zip(shades()) {
             let paint = if color == "green" { "20 230 20" } else { "20 20 230" };
@@ -118,7 +119,7 @@ const PAUSE: Duration = Duration::from_millis(200);
 
 #[test]
 fn slow_save_shows_no_error() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     let terminal = folder.terminal();
     terminal.wait_for_render(1);
     let mut render = 1;
@@ -152,7 +153,7 @@ fn slow_save_shows_no_error() {
 
 #[test]
 fn persistent_error_is_shown() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     let terminal = folder.terminal();
     terminal.wait_for_render(1);
     let (half, _) = halves(SCENE);
@@ -169,7 +170,7 @@ fn persistent_error_is_shown() {
 
 #[test]
 fn broken_save_does_not_stop_the_render() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     // A render slow enough for the scene to be saved before it ends.
     let slow = SCENE.replace("samples = 4", "samples = 1000").replace("width = 64", "width = 320");
     let slow = slow.replace("height = 48", "height = 240");
@@ -195,13 +196,13 @@ fn recreated_folder_is_watched() {
         ("cd work && exec \"$0\" scene.toml", "work/scene.png"),
         ("exec \"$0\" work/scene.toml", "scene.png"),
     ] {
-        let folder = Folder::new();
+        let folder = TestDir::with_board();
         let make = |color: &str| {
             fs::create_dir(folder.path("work")).expect("a folder");
             folder.write("work/scene.toml", &SCENE.replace(RED, color));
         };
         make(RED);
-        let terminal = folder.terminal_with(&["/bin/sh", "-c", line, folder.program()], &[]);
+        let terminal = folder.terminal_with(&["/bin/sh", "-c", line, PROGRAM], &[]);
         terminal.wait_for_render(1);
         fs::remove_dir_all(folder.path("work")).expect("removed");
         terminal.wait_for("missing");

@@ -2,8 +2,8 @@
 
 use glimt::tui::messages;
 
-use super::pty::{Colors, Folder, SCENE, Terminal, shows};
-use crate::test_dir::assert_mentions;
+use super::pty::{Colors, SCENE, Terminal, shows};
+use crate::test_dir::{PROGRAM, TestDir, assert_mentions};
 
 const TAB: &str = "\t";
 const ESCAPE: &str = "\x1b";
@@ -24,7 +24,7 @@ fn resized(terminal: &mut Terminal, columns: u16, rows: u16) -> usize {
 
 #[test]
 fn tab_shows_only_the_preview() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
     let beside = terminal.settled(|screen| Colors::of(screen).red);
@@ -44,7 +44,7 @@ fn tab_shows_only_the_preview() {
 
 #[test]
 fn help_scrolls_in_small_windows() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
     resized(&mut terminal, 60, 12);
@@ -65,7 +65,7 @@ fn help_scrolls_in_small_windows() {
 
 #[test]
 fn digits_choose_from_the_view_list() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
     terminal.press("v");
@@ -85,7 +85,7 @@ fn digits_choose_from_the_view_list() {
 
 #[test]
 fn small_windows_show_preview_errors_and_keys() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
     for (columns, rows) in [(40, 12), (30, 8)] {
@@ -109,8 +109,8 @@ fn small_windows_show_preview_errors_and_keys() {
 
 #[test]
 fn every_state_has_a_symbol_and_a_word() {
-    let folder = Folder::new();
-    let mut terminal = folder.terminal_with(&[folder.program(), "scene.toml"], &[("NO_COLOR", "1")]);
+    let folder = TestDir::with_board();
+    let mut terminal = folder.terminal_with(&[PROGRAM, "scene.toml"], &[("NO_COLOR", "1")]);
     terminal.wait_for("✓ done");
     folder.write("scene.toml", &SCENE.replace("samples = 4", "samples = 10000000"));
     terminal.wait_for("● rendering");
@@ -126,7 +126,7 @@ fn every_state_has_a_symbol_and_a_word() {
 
 #[test]
 fn last_of_many_resizes_wins() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
     let red = terminal.settled(|screen| Colors::of(screen).red);
@@ -150,7 +150,7 @@ fn last_of_many_resizes_wins() {
 
 #[test]
 fn quit_leaves_one_line() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
     terminal.press("q");
@@ -161,8 +161,8 @@ fn quit_leaves_one_line() {
 
 #[test]
 fn terminal_with_256_colors_gets_no_others() {
-    let folder = Folder::new();
-    let mut terminal = folder.terminal_with(&[folder.program(), "scene.toml"], &[("COLORTERM", "")]);
+    let folder = TestDir::with_board();
+    let mut terminal = folder.terminal_with(&[PROGRAM, "scene.toml"], &[("COLORTERM", "")]);
     terminal.wait_for_render(1);
     let is_of_palette = |color| matches!(color, vt100::Color::Default | vt100::Color::Idx(_));
     let fixed = |screen: &vt100::Screen| {

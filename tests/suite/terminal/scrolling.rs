@@ -3,11 +3,12 @@
 
 use glimt::tui::messages;
 
-use super::pty::{BLUE, Folder, GREEN, RED, SCENE};
+use super::pty::{BLUE, GREEN, RED, SCENE};
+use crate::test_dir::TestDir;
 
 #[test]
 fn warnings_are_counted_and_shown_on_request() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     folder.write("scene.toml", &SCENE.replace(RED, "[0.8, 0.02, 0.02], specular = [0.5, 0.5, 0.5]"));
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
@@ -24,7 +25,7 @@ fn warnings_are_counted_and_shown_on_request() {
 
 #[test]
 fn wheel_scrolls_only_the_help() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
     terminal.resize(60, 12);
@@ -41,7 +42,7 @@ fn wheel_scrolls_only_the_help() {
 
 #[test]
 fn history_ends_at_oldest_and_newest() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
     terminal.press("b");
@@ -72,7 +73,7 @@ fn history_ends_at_oldest_and_newest() {
 
 #[test]
 fn ctrl_l_redraws_the_screen() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
     let text = "written by another program";

@@ -10,8 +10,8 @@ use glimt::math::random::TestRandom;
 use glimt::tui::messages;
 use nix::sys::signal::Signal;
 
-use super::pty::{Folder, SCENE, Terminal};
-use crate::test_dir::{PROGRAM, assert_mentions, mentions};
+use super::pty::{SCENE, Terminal};
+use crate::test_dir::{PROGRAM, TestDir, assert_mentions, mentions};
 
 /// Number of sequences in the regular test.
 const SEQUENCES: u64 = 12;
@@ -24,7 +24,7 @@ const LOOKING: [&str; 12] = ["s", "s", "d", "p", "i", "[", "]", "v", "l", "<", "
 
 /// A scene in a folder, the program rendering it, and all previous actions.
 struct RandomSession<'a> {
-    folder: Folder,
+    folder: TestDir,
     terminal: Terminal,
     options: &'a [&'a str],
     /// All versions of the scene file.
@@ -36,7 +36,7 @@ struct RandomSession<'a> {
 
 impl<'a> RandomSession<'a> {
     fn new(text: &str, options: &'a [&'a str]) -> Self {
-        let folder = Folder::new();
+        let folder = TestDir::with_board();
         folder.write("scene.toml", text);
         let call = [&[PROGRAM, "scene.toml"], options].concat();
         let terminal = folder.wide_terminal_with(&call);
@@ -202,7 +202,7 @@ fn random_keys_are_safe_in_bundled_scenes() {
 
 #[test]
 fn preview_keys_keep_the_finished_image() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     let mut terminal = folder.wide_terminal_with(&[PROGRAM, "scene.toml"]);
     terminal.wait_for_render(1);
     let image = folder.bytes("scene.png");
@@ -221,7 +221,7 @@ fn preview_keys_keep_the_finished_image() {
 
 #[test]
 fn interrupted_image_resumes_in_the_next_run() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     let whole = {
         folder.write("scene.toml", &SCENE.replace("samples = 4", "samples = 3000"));
         folder.once(&[])
@@ -243,7 +243,7 @@ fn interrupted_image_resumes_in_the_next_run() {
 
 #[test]
 fn external_change_to_image_is_reported() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     let mut terminal = folder.wide_terminal_with(&[PROGRAM, "scene.toml"]);
     terminal.wait_for_render(1);
     let image = folder.bytes("scene.png");

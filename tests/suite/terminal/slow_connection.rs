@@ -4,8 +4,9 @@ use std::time::{Duration, Instant};
 
 use glimt::tui::messages;
 
-use super::pty::{Folder, GREEN, RED, SCENE, Terminal};
+use super::pty::{GREEN, RED, SCENE, Terminal};
 use super::relay::Answers;
+use crate::test_dir::TestDir;
 
 /// Limit on bytes that the terminal has not acknowledged.
 const MOST: usize = 24_000;
@@ -15,8 +16,8 @@ const SEEN: Duration = Duration::from_millis(400);
 const ALL: [Answers; 3] = [Answers::Terminal, Answers::Multiplexer, Answers::Nothing];
 
 /// Starts a render that does not finish.
-fn endless(answers: Answers) -> (Folder, Terminal) {
-    let folder = Folder::new();
+fn endless(answers: Answers) -> (TestDir, Terminal) {
+    let folder = TestDir::with_board();
     folder.write("scene.toml", &SCENE.replace("samples = 4", "samples = 10000000"));
     let terminal = folder.thin_line(answers);
     terminal.wait_for("ETA");
@@ -97,7 +98,7 @@ fn quit_returns_quickly() {
 fn idle_program_sends_nothing() {
     // Test all connections concurrently, because the test mostly waits.
     let terminals = ALL.map(|answers| {
-        let folder = Folder::new();
+        let folder = TestDir::with_board();
         let terminal = folder.thin_line(answers);
         terminal.wait_for_render(1);
         (folder, terminal)
@@ -124,7 +125,7 @@ fn connection_is_measured_and_shown() {
     }
     // A busy machine can only delay replies.
     assert_at_once("the round trip on the screen", || {
-        let folder = Folder::new();
+        let folder = TestDir::with_board();
         let mut terminal = folder.thin_line(Answers::Terminal);
         terminal.wait_for_render(1);
         // If the machine stalls for a second, the first reply is too late to be measured, so request another
@@ -148,7 +149,7 @@ fn connection_is_measured_and_shown() {
 #[test]
 fn stalled_terminal_does_not_block_quitting() {
     assert_at_once("the end", || {
-        let folder = Folder::new();
+        let folder = TestDir::with_board();
         folder.write("scene.toml", &SCENE.replace("samples = 4", "samples = 10000000"));
         let mut terminal = folder.terminal();
         terminal.wait_for("ETA");
@@ -172,7 +173,7 @@ fn stalled_terminal_does_not_block_quitting() {
 /// only the last size.
 #[test]
 fn quick_shrink_and_grow_redraws_the_window() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
     for _ in 0..8 {

@@ -13,7 +13,8 @@ use std::time::{Duration, Instant};
 use glimt::math::random::TestRandom;
 use nix::sys::signal::Signal;
 
-use super::pty::{Folder, Terminal};
+use super::pty::Terminal;
+use crate::test_dir::{PROGRAM, TestDir};
 
 /// Interval between checks.
 const PAUSE: Duration = Duration::from_secs(20);
@@ -42,7 +43,7 @@ fn scene(random: &mut TestRandom, samples: u32, number: u32) -> String {
 }
 
 /// Writes a file like a randomly chosen editor.
-fn save(folder: &Folder, random: &mut TestRandom, name: &str, text: &str) {
+fn save(folder: &TestDir, random: &mut TestRandom, name: &str, text: &str) {
     let new = folder.path("new~");
     match random.below(4) {
         0 => folder.write(name, text),
@@ -66,7 +67,7 @@ fn save(folder: &Folder, random: &mut TestRandom, name: &str, text: &str) {
 }
 
 /// Writes slightly changed versions of the mesh and the texture.
-fn save_assets(folder: &Folder, random: &mut TestRandom) {
+fn save_assets(folder: &TestDir, random: &mut TestRandom) {
     let top = 0.5 + random.below(8) as f32 / 10.0;
     let gray = 100 + random.below(100);
     save(folder, random, "step.obj", &format!("v -1.5 0 0\nv -0.6 0 0\nv -1 {top} -0.2\nf 1 2 3\n"));
@@ -85,7 +86,7 @@ struct Figures {
 }
 
 impl Figures {
-    fn of(terminal: &Terminal, folder: &Folder, begin: Instant) -> Self {
+    fn of(terminal: &Terminal, folder: &TestDir, begin: Instant) -> Self {
         let process = format!("/proc/{}", terminal.id());
         let status = fs::read_to_string(format!("{process}/status")).expect("a process");
         let field = |name: &str| {
@@ -112,7 +113,7 @@ impl Figures {
 }
 
 /// Saves a final scene, and waits until its image equals that of `--once`.
-fn assert_image(terminal: &mut Terminal, folder: &Folder, text: &str, options: &[&str]) {
+fn assert_image(terminal: &mut Terminal, folder: &TestDir, text: &str, options: &[&str]) {
     folder.write("scene.toml", text);
     let once = folder.once(options);
     let (begin, mut next) = (Instant::now(), Instant::now());
@@ -146,15 +147,14 @@ fn soak() {
     let mut random = TestRandom::new(number("GLIMT_SOAK_SEED", 1));
     let begin = Instant::now();
     let end = begin + Duration::from_secs(60 * minutes);
-    let folders = [Folder::new(), Folder::new()];
+    let folders = [TestDir::with_board(), TestDir::with_board()];
     let [own, other] = &folders;
     for folder in &folders {
         save_assets(folder, &mut random);
         folder.write("scene.toml", &scene(&mut random, 4, 0));
     }
     let long = ["--checkpoint", "0.3"];
-    let begin_other =
-        || other.terminal_with(&[&[other.program(), "scene.toml"], long.as_slice()].concat(), &[]);
+    let begin_other = || other.terminal_with(&[&[PROGRAM, "scene.toml"], long.as_slice()].concat(), &[]);
     let (mut lives, mut falls) = (own.terminal(), begin_other());
     let (mut events, mut images, mut ends) = (0_u32, 0_u32, BTreeSet::new());
     let mut figures: Vec<Figures> = Vec::new();

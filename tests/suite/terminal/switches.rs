@@ -4,7 +4,8 @@ use std::fs;
 
 use glimt::tui::messages;
 
-use super::pty::{Folder, SCENE, Terminal};
+use super::pty::{SCENE, Terminal};
+use crate::test_dir::{PROGRAM, TestDir};
 
 /// The scene with a glass ball in front of the board, so that photons are emitted.
 fn glassy() -> String {
@@ -12,16 +13,16 @@ fn glassy() -> String {
     SCENE.replace("ball = { diffuse = [0.02, 0.02, 0.02] }", ball) + "[photons]\ncount = 2000\n"
 }
 
-fn setting(folder: &Folder, name: &str) -> serde_json::Value {
+fn setting(folder: &TestDir, name: &str) -> serde_json::Value {
     let report: serde_json::Value = serde_json::from_slice(&folder.bytes("report.json")).expect("JSON");
     report["settings"][name].clone()
 }
 
 #[test]
 fn keys_override_photons_and_integrator() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     folder.write("scene.toml", &glassy());
-    let call = [folder.program(), "scene.toml", "--report", "report.json"];
+    let call = [PROGRAM, "scene.toml", "--report", "report.json"];
     let mut terminal = folder.terminal_with(&call, &[]);
     terminal.wait_for_render(1);
     terminal.wait_for("p off");
@@ -52,7 +53,7 @@ fn keys_override_photons_and_integrator() {
 
 #[test]
 fn keys_ignored_by_path_are_explained() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     folder.write("scene.toml", &glassy());
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
@@ -76,7 +77,7 @@ fn wait_for_view(terminal: &Terminal, name: &str) {
 
 #[test]
 fn digits_choose_views_in_the_open_list() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
     let views =
@@ -104,7 +105,7 @@ fn digits_choose_views_in_the_open_list() {
 
 #[test]
 fn views_wrap_around() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
     terminal.press("V");
@@ -118,8 +119,8 @@ fn views_wrap_around() {
 
 #[test]
 fn render_again_retraces_every_sample() {
-    let folder = Folder::new();
-    let call = [folder.program(), "scene.toml", "--report", "report.json"];
+    let folder = TestDir::with_board();
+    let call = [PROGRAM, "scene.toml", "--report", "report.json"];
     let mut terminal = folder.terminal_with(&call, &[]);
     terminal.wait_for_render(1);
     let own = folder.bytes("scene.png");

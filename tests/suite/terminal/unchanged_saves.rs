@@ -3,7 +3,8 @@
 
 use glimt::tui::messages;
 
-use super::pty::{BLUE, Folder, RED, SCENE, Terminal};
+use super::pty::{BLUE, RED, SCENE, Terminal};
+use crate::test_dir::{PROGRAM, TestDir};
 
 /// Text of the panel, without thumbnails.
 fn words(screen: &vt100::Screen) -> String {
@@ -12,7 +13,7 @@ fn words(screen: &vt100::Screen) -> String {
 }
 
 /// Breaks the scene, then repairs it.
-fn typo(folder: &Folder, terminal: &Terminal, text: &str, while_broken: &str) {
+fn typo(folder: &TestDir, terminal: &Terminal, text: &str, while_broken: &str) {
     folder.write("scene.toml", &text.replace("radius", "radus"));
     terminal.wait_for("broken");
     terminal.wait_for(while_broken);
@@ -22,7 +23,7 @@ fn typo(folder: &Folder, terminal: &Terminal, text: &str, while_broken: &str) {
 
 #[test]
 fn comparison_ignores_a_typo() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
     let blue = SCENE.replace(RED, BLUE);
@@ -42,12 +43,12 @@ fn comparison_ignores_a_typo() {
 /// With dithered colors, some cells of a cached preview differ from the preview shown during the render.
 #[test]
 fn comment_and_typo_add_no_history_entry() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     let soft = "samples = 200\nintegrator = \"path\"";
     let scene =
         SCENE.replace("width = 64\nheight = 48\nsamples = 4", &format!("width = 160\nheight = 120\n{soft}"));
     folder.write("scene.toml", &scene);
-    let mut terminal = folder.terminal_with(&[folder.program(), "scene.toml"], &[("COLORTERM", "")]);
+    let mut terminal = folder.terminal_with(&[PROGRAM, "scene.toml"], &[("COLORTERM", "")]);
     terminal.resize(120, 40);
     terminal.wait_for_render(1);
     let blue = scene.replace(RED, BLUE);
@@ -73,7 +74,7 @@ fn comment_and_typo_add_no_history_entry() {
 
 #[test]
 fn typo_while_rendering_adds_one_entry() {
-    let folder = Folder::new();
+    let folder = TestDir::with_board();
     let mut terminal = folder.terminal_of(120, 40);
     terminal.wait_for_render(1);
     let long = SCENE.replace("samples = 4", "samples = 10000000");
