@@ -39,9 +39,34 @@ FROSTED = "closed_forms::frosted::"
 ROUGH_GLASS = "materials::bxdfs::rough_dielectric::tests::"
 STRAIGHT = "closed_forms::straight::"
 TWO_SIDED = "closed_forms::two_sided::"
+DIRECT = "integrators::direct::tests::"
+PICKS = "integrators::direct::light_tree::tests::"
 
 # Fault, file, the code around the expression in ⟦⟧, its replacement, and the test that must fail.
 FAULTS = [
+    ("light samples that are not averaged", "integrators/direct/all_lights.rs",
+     "self.unoccluded_contributions(&samples, ⟦1.0 / count as f32⟧, simd);", "1.0",
+     DIRECT + "estimators::light_samples_match_the_quadrature"),
+    ("light samples without a cosine", "integrators/direct/all_lights.rs", "(⟦cosines[i]⟧ * share);", "1.0",
+     DIRECT + "estimators::light_samples_match_the_quadrature"),
+    ("BSDF samples without a cosine", "integrators/transport/scatter.rs", "let share = ⟦cosines[i]⟧ / pdfs[i];", "1.0",
+     DIRECT + "estimators::bsdf_samples_match_the_quadrature"),
+    ("path weights that ignore the number of light samples", "integrators/direct/mis.rs",
+     "power_heuristic_from_ratio(of_light * ⟦samples⟧ / pdf);", "1.0",
+     DIRECT + "mis_weights::weights_of_both_techniques_sum_to_one"),
+    ("path weights with the pdf of the other side", "integrators/direct/mis.rs",
+     "let side = if ⟦of_light.dot(direction) > 0.0⟧ { Side::Back } else { Side::Front };\n        lights", "of_light.dot(direction) < 0.0",
+     DIRECT + "mis_weights::weights_of_both_techniques_sum_to_one"),
+    ("picked lights without their pick probability", "integrators/direct/light_tree.rs",
+     "lane(&samples.weights, i) * ⟦pick.shares[i]⟧;", "1.0", DIRECT + "estimators::all_techniques_have_equal_means"),
+    ("pick probabilities of a single pick", "integrators/direct/light_tree.rs", "1.0 / (share * ⟦count⟧));", "1.0",
+     PICKS + "each_light_is_picked_once_on_average"),
+    ("infinite lights that the tree leaves out", "integrators/direct/light_tree.rs", "if ⟦selection.leaves_beyond⟧ {", "false",
+     DIRECT + "estimators::all_techniques_have_equal_means"),
+    ("pooled shadow rays without occlusion", "integrators/direct/shadow_rays.rs", "for to in set_bit_lanes(⟦occluded⟧) {", "0",
+     DIRECT + "occlusion::occluded_samples_contribute_nothing"),
+    ("light from behind the surface", "integrators/direct/all_lights.rs", "let brings = (⟦cosines[i] > 0.0⟧) &", "true",
+     DIRECT + "occlusion::unlit_sides_are_never_sampled"),
     ("light from behind a perturbed normal", "integrators/transport/batch.rs", "let g = ⟦if g > 0.0 { g } else { 0.0 }⟧;", "g",
      "closed_forms::bumps::no_light_from_behind_the_shading_normal"),
     ("a sheet on glass that transmits into air", "integrators/transport/walk.rs", "far = ⟦crossing.far⟧;",

@@ -1,65 +1,25 @@
-use std::path::{Path, PathBuf};
-use std::sync::Arc;
-
 use super::super::contact::{
     CoincidenceQuery, CoincidenceScratch, CoincidentOrEnclosingSurface, OffsetPoints,
 };
-use super::super::{Geometry, Hit, Images, MAX_INTERIORS, MeshTree, World, WorldInputs, build_lights};
-use crate::assets::LoadedMesh;
-use crate::control::CancelToken;
+use super::super::test_world::TestWorldBuilder;
+use super::super::{Hit, MAX_INTERIORS, World};
 use crate::geometry::mesh::TriangleMesh;
 use crate::geometry::{Ray, SurfaceRequest};
 use crate::math::random::TestRandom;
 use crate::math::{DVec3, Vec3};
-use crate::scene::description::{Accel, MeshFile, MeshReference, MeshTransform, Object, Scene, Shape};
+use crate::scene::description::Shape;
 
 fn v(x: f64, y: f64, z: f64) -> DVec3 {
     DVec3::new(x, y, z)
 }
 
-/// Builder for test scenes. Material 0 is matte, and materials 1 and 2 are glass.
-struct SceneBuilder {
-    scene: Scene,
-    meshes: Vec<Arc<MeshTree>>,
-}
-
-impl SceneBuilder {
-    fn new() -> Self {
-        let text = "[camera]\nposition = [0, -9, 2]\nlook_at = [0, 0, 0]\nup = [0, 0, 1]\n\
-                    [materials.a]\ntype = 'phong'\n[materials.b]\ntype = 'glass'\n\
-                    [materials.c]\ntype = 'glass'\nior = 1.33\n";
-        let outcome = crate::scene::parse(Arc::from(text), Path::new("scene.toml"));
-        Self { scene: outcome.scene.expect("a scene"), meshes: Vec::new() }
-    }
-
-    fn shape(mut self, shape: Shape, material: usize) -> Self {
-        self.scene.objects.push(Object { shape, material: Some(material), name: None, span: 0..0 });
-        self
-    }
-
-    fn mesh(mut self, mesh: TriangleMesh, [scale, rotate, translate]: [DVec3; 3], material: usize) -> Self {
-        let loaded = Arc::new(LoadedMesh { mesh, ..LoadedMesh::default() });
-        let tree = MeshTree::build(loaded, Accel::Bvh, &CancelToken::new()).expect("never canceled");
-        self.meshes.push(Arc::new(tree));
-        self.scene.mesh_files.push(MeshFile { value: PathBuf::new(), span: 0..0, part: None });
-        let file = self.meshes.len() - 1;
-        let placed = MeshTransform::Steps { scale, rotate, translate };
-        self.shape(Shape::Mesh(MeshReference { file, placed, smooth: false, vertex_colors: false }), material)
-    }
-
-    fn world(self) -> World {
-        let token = CancelToken::new();
-        let geometry = Geometry::from_scene(&self.scene, &self.meshes, DVec3::ZERO, &token);
-        let geometry = Arc::new(geometry.expect("never canceled"));
-        let lights =
-            build_lights(&self.scene, &geometry, &Images::new(), None, &token).expect("never canceled");
-        World::new(
-            &self.scene,
-            &WorldInputs { meshes: self.meshes, ..WorldInputs::default() },
-            geometry,
-            lights,
-        )
-    }
+/// A scene without objects. Material 0 is matte, and materials 1 and 2 are glass.
+fn empty_scene() -> TestWorldBuilder {
+    TestWorldBuilder::from_text(
+        "[camera]\nposition = [0, -9, 2]\nlook_at = [0, 0, 0]\nup = [0, 0, 1]\n\
+         [materials.a]\ntype = 'phong'\n[materials.b]\ntype = 'glass'\n\
+         [materials.c]\ntype = 'glass'\nior = 1.33\n",
+    )
 }
 
 /// The cube from −1 to 1, each face divided into `steps` × `steps` squares.
@@ -117,7 +77,7 @@ fn contact_scenes(random: &mut TestRandom) -> Vec<(World, Vec<DVec3>)> {
     let scenes = vec![
         // Blocks on a floor, side by side.
         (
-            SceneBuilder::new().shape(floor.clone(), 0).mesh(coarse.clone(), at(DVec3::ZERO), 1).mesh(
+            empty_scene().shape(floor.clone(), 0).mesh(coarse.clone(), at(DVec3::ZERO), 1).mesh(
                 coarse.clone(),
                 at(v(2.0, 0.0, 0.0)),
                 2,
@@ -126,7 +86,7 @@ fn contact_scenes(random: &mut TestRandom) -> Vec<(World, Vec<DVec3>)> {
         ),
         // A floating sphere, and another sphere that touches it at a point.
         (
-            SceneBuilder::new().shape(floor.clone(), 0).mesh(fine.clone(), at(v(0.0, 0.0, 0.5)), 1).mesh(
+            empty_scene().shape(floor.clone(), 0).mesh(fine.clone(), at(v(0.0, 0.0, 0.5)), 1).mesh(
                 fine.clone(),
                 at(v(2.0, 0.0, 0.5)),
                 1,
@@ -135,7 +95,7 @@ fn contact_scenes(random: &mut TestRandom) -> Vec<(World, Vec<DVec3>)> {
         ),
         // Nested spheres on a plane.
         (
-            SceneBuilder::new()
+            empty_scene()
                 .shape(plane, 0)
                 .shape(globe(DVec3::ZERO, 1.0), 1)
                 .shape(globe(v(0.3, 0.0, 0.0), 0.5), 2)
@@ -144,7 +104,7 @@ fn contact_scenes(random: &mut TestRandom) -> Vec<(World, Vec<DVec3>)> {
         ),
         // Boxes that share a face, one of which is a mesh, and a box of another size.
         (
-            SceneBuilder::new()
+            empty_scene()
                 .shape(floor, 0)
                 .shape(cube(0.0, 2.0), 1)
                 .mesh(coarse.clone(), at(v(2.0, 0.0, 0.0)), 2)
@@ -153,7 +113,7 @@ fn contact_scenes(random: &mut TestRandom) -> Vec<(World, Vec<DVec3>)> {
         ),
         // A rotated box, a thin box, and a small box in a corner of the rotated box.
         (
-            SceneBuilder::new()
+            empty_scene()
                 .shape(Shape::Box { center: DVec3::ZERO, size: v(1.2, 0.8, 1.0), rotate: turned }, 1)
                 .shape(
                     Shape::Box { center: v(0.0, 0.0, 1.5), size: v(2.0, 2.0, 1e-6), rotate: DVec3::ZERO },
@@ -181,7 +141,7 @@ fn contact_scenes(random: &mut TestRandom) -> Vec<(World, Vec<DVec3>)> {
         ),
         // A triangulated sphere inside a sphere and a room, and a triangle coplanar with one of its faces.
         (
-            SceneBuilder::new()
+            empty_scene()
                 .shape(
                     Shape::Quad { corner: v(-3.0, -3.0, -3.0), u: v(6.0, 0.0, 0.0), v: v(0.0, 6.0, 0.0) },
                     0,
@@ -200,7 +160,7 @@ fn contact_scenes(random: &mut TestRandom) -> Vec<(World, Vec<DVec3>)> {
         ),
         // A crease: two sheets at a small angle, and a third at a large angle.
         (
-            SceneBuilder::new().mesh(
+            empty_scene().mesh(
                 TriangleMesh {
                     positions: vec![
                         Vec3::ZERO,
@@ -293,7 +253,7 @@ fn nested_sphere_search_takes_log_squared_time() {
         let radius = |i: u32| 1.0 + f64::from(i * 37 % count) / f64::from(count);
         let globe = |i: u32| Shape::Sphere { center: v(0.1, 0.2, 0.3), radius: radius(i) };
         let material = |i: u32| [1, 2, 1, 2, 0][i as usize % 5];
-        let scene = (0..count).fold(SceneBuilder::new(), |scene, i| scene.shape(globe(i), material(i)));
+        let scene = (0..count).fold(empty_scene(), |scene, i| scene.shape(globe(i), material(i)));
         let world = scene.world();
         let mut random = TestRandom::new(3);
         let mut memory = CoincidenceScratch::default();

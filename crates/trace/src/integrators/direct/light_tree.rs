@@ -360,3 +360,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         }
     }
 }
+
+#[cfg(test)]
+#[path = "light_tree_tests.rs"]
+mod tests;
