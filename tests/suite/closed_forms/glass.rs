@@ -48,7 +48,7 @@ fn slab_includes_all_internal_reflections() {
         let r = reflectance(degrees);
         assert_close("the formula", (1.0 - r) / (1.0 + r), exact);
         let values = lit_from_below(slab(degrees, glass(1.5))).depth(100).values(64, 64);
-        assert_mean(&format!("{degrees}°"), &values, (1.0 - r) / (1.0 + r));
+        assert_mean(&format!("{degrees}°"), &values, (1.0 - r) / (1.0 + r), 3e-4);
     }
 }
 
@@ -173,7 +173,7 @@ fn lossless_glass_under_a_sky_is_invisible() {
         v(0.3, -2.0, -6.0),
     ] {
         let values = seen.clone().seen(v(0.1, 0.05, 0.2), target).values(32, 32);
-        assert_mean(&format!("towards {target}"), &values, 1.0);
+        assert_mean(&format!("towards {target}"), &values, 1.0, 1e-6);
     }
 }
 
@@ -204,7 +204,7 @@ fn slab_and_ball_absorption_is_exact() {
             let a = tint[channel].powf(d);
             assert_close("straight through", straight[channel], 0.96 * 0.96 * a);
             let all: Vec<f64> = all.iter().map(|color| color[channel]).collect();
-            assert_mean("all", &all, 0.96 * 0.96 * a / (1.0 - 0.0016 * a * a));
+            assert_mean("all", &all, 0.96 * 0.96 * a / (1.0 - 0.0016 * a * a), 2.5e-4);
         }
     }
     // Through a ball at angle θ, the chord is 2R·cos θ' and T = (1 − R(θ))²·a^chord.
@@ -260,7 +260,12 @@ fn nested_glass_transmits_exactly() {
     // A ball with n = 2 in the slab. The reflectance of the inner surfaces is ((2 − 1.5)/(2 + 1.5))².
     let dense = slab(0.0, glass(1.5)).sphere(v(0.0, -0.5, 0.0), 0.25, glass(2.0));
     let inner = 1.0 - 1.0 / 49.0;
-    assert_mean("dense", &lit_from_below(dense).depth(4).values(64, 64), (0.96 * inner) * (0.96 * inner));
+    assert_mean(
+        "dense",
+        &lit_from_below(dense).depth(4).values(64, 64),
+        (0.96 * inner) * (0.96 * inner),
+        1e-6,
+    );
     // From inside the slab, only one surface remains. Radiance is basic radiance, L/n².
     let within = slab(0.0, glass(1.5)).seen(v(0.0, -0.5, 0.0), v(0.0, -1.0, 0.0));
     assert_close("from within", lit_from_below(within).depth(1).value(), 0.96);
@@ -316,7 +321,7 @@ fn mesh_parts_can_be_nested() {
     let nested = scene().own_mesh(mesh, vec![file_material(9, 1.5), file_material(9, 2.0)]);
     let straight = lit_from_below(nested.seen(v(0.05, 3.0, 0.1), v(0.05, 0.0, 0.1))).depth(4);
     let exact = (0.96 * (1.0 - 1.0 / 49.0_f64)).powi(2);
-    assert_mean("nested", &straight.values(64, 64), exact);
+    assert_mean("nested", &straight.values(64, 64), exact, 1e-6);
 }
 
 #[test]

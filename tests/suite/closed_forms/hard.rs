@@ -8,7 +8,7 @@ use glimt::scene::description::{ShadowMode, Shape};
 
 use super::glass::boxes;
 use super::scenes::{AS_IT_IS, Build, emitter, matte, metal, receiver, scene};
-use super::{mean_and_error, v};
+use super::{assert_mean, assert_same_mean, mean_and_error, v};
 
 /// Every kind of light, with the specified size and height above a receiver.
 fn lights(height: f64, size: f64) -> Vec<(&'static str, Build)> {
@@ -43,12 +43,8 @@ fn unoccluded_light_ignores_shadow_mode() {
             let [off, hard, soft] = [ShadowMode::Off, ShadowMode::Hard, ShadowMode::Soft].map(values);
             assert!(off[0] > 0.0, "{name}");
             assert_eq!(off, hard, "{name} at {height}");
-            let ((mean, error), (soft, soft_error)) = (mean_and_error(&off), mean_and_error(&soft));
-            let allowed = 4.0 * error.hypot(soft_error) + 1e-5 * mean;
-            assert!(
-                (mean - soft).abs() <= allowed,
-                "{name} at {height}: {mean} ± {error}, soft {soft} ± {soft_error}"
-            );
+            let what = format!("{name} at {height}");
+            assert_same_mean(&what, mean_and_error(&soft), mean_and_error(&off), 1.5e-3);
         }
     }
 }
@@ -78,13 +74,11 @@ fn metal_lobes_use_the_same_shadow_ray() {
             "no light must arrive if the center is hidden"
         );
         let beside = corner + v(0.0, 1.5, 1.9);
-        for (name, (mean, error)) in [
+        for (name, found) in [
             ("off-center blocker", with(beside * 0.5, ShadowMode::Hard)),
             ("without shadows", with(middle * 0.5, ShadowMode::Off)),
         ] {
-            let error = error.hypot(open.1);
-            assert!(error < 0.02 * open.0, "{name}: too noisy: ± {error} of {}", open.0);
-            assert!((mean - open.0).abs() < 4.0 * error, "{name}: {mean}, unoccluded {open:?}");
+            assert_same_mean(name, found, open, 6e-4);
         }
     }
 }
@@ -95,9 +89,7 @@ fn hard_shadows_are_exact_for_close_lights() {
     let corner = v(-0.5, 0.1, -0.5);
     let lamp = receiver(DVec3::ZERO, 0.8).quad(corner, v(1.0, 0.0, 0.0), v(0.0, 0.0, 1.0), emitter(1.0));
     let values = lamp.shadows(ShadowMode::Hard, 16).values(256, 16);
-    let (mean, error) = mean_and_error(&values);
-    let exact = 3.042_128 * 0.8 / std::f64::consts::PI;
-    assert!((mean - exact).abs() < 4.0 * error + 1e-4 * exact, "{mean} ± {error}, expected {exact}");
+    assert_mean("close square", &values, 3.042_128 * 0.8 / std::f64::consts::PI, 1e-5);
 }
 
 #[test]

@@ -14,7 +14,7 @@ use super::scenes::{
     Build, emitter, frosted, glass, lat_long_sphere, matte, metal, phong, plastic, principled, scene,
     translucent,
 };
-use super::{assert_close, mean_and_error, v};
+use super::{assert_close, assert_same_mean, mean_and_error, v};
 
 /// Materials with lobes of every width.
 fn materials() -> Vec<(&'static str, Material)> {
@@ -83,14 +83,8 @@ fn techniques_agree_on_area_lights() {
             // In these two cases, a ball occludes part of a light.
             let others = if ["two", "half a sun"].contains(&what) { &others[..1] } else { &others[..] };
             for &(technique, build, samples) in others {
-                let (mean, error) = mean_and_error(&build.values(samples, 16));
-                let both = error.hypot(path.1);
-                let off = (mean - path.0).abs();
-                assert!(
-                    off < 5.0 * both + 1e-5 * mean,
-                    "{material}, {what}: {technique} {mean}, path {path:?}, ± {both}"
-                );
-                assert!(both < 0.03 * mean, "{material}, {what}, {technique}: too noisy: ± {both} of {mean}");
+                let found = mean_and_error(&build.values(samples, 16));
+                assert_same_mean(&format!("{material}, {what}, {technique}"), found, path, 0.03);
             }
         }
     }
@@ -107,9 +101,7 @@ fn lobe_samples_find_area_lights() {
         let lit = by_paths(floor.clone().sphere(at, 0.6, emitter(2.0)), 2);
         let hidden = by_paths(floor.sphere(at, 0.6, emitter(2.0)).sphere(at, 0.65, glass(1.0)), 3);
         let (both, lobes) = (mean_and_error(&lit.values(1024, 16)), mean_and_error(&hidden.values(4096, 16)));
-        let error = both.1.hypot(lobes.1);
-        assert!(error < 0.02 * both.0, "{material}: too noisy: {both:?}, lobe samples {lobes:?}");
-        assert!((both.0 - lobes.0).abs() < 5.0 * error, "{material}: {both:?}, lobe samples {lobes:?}");
+        assert_same_mean(material, lobes, both, 0.02);
     }
 }
 
@@ -128,9 +120,7 @@ fn whitted_shows_reflections_in_rough_lobes() {
         if material == "smooth plastic" {
             continue;
         }
-        let error = whitted.1.hypot(path.1);
-        assert!(error < 0.02 * path.0, "{material}: too noisy: {whitted:?}, path {path:?}");
-        assert!((whitted.0 - path.0).abs() < 5.0 * error, "{material}: whitted {whitted:?}, path {path:?}");
+        assert_same_mean(material, whitted, path, 0.02);
     }
 }
 
@@ -235,5 +225,5 @@ fn metal_emission_adds_to_its_reflection() {
     let dark = mean_and_error(&in_the_open(lamp.clone(), 1).values(256, 16));
     lamp.emission = EmissionSource::from_constant(Vec3::splat(2.0));
     let lit = mean_and_error(&in_the_open(lamp, 1).values(256, 16));
-    assert!((lit.0 - dark.0 - 2.0).abs() < 5.0 * dark.1.hypot(lit.1) + 1e-5, "{lit:?} {dark:?}");
+    assert_same_mean("without emission", (lit.0 - 2.0, lit.1), dark, 8e-4);
 }

@@ -52,13 +52,26 @@ pub fn mean_and_error(values: &[f64]) -> (f64, f64) {
     (mean, (variance / n).sqrt())
 }
 
-/// Checks that |mean − exact| ≤ max(3·SE, 1e-5·exact), where mean and SE are over seeds.
+/// Checks that the mean over seeds equals `exact` to within four standard errors. Noise would hide errors, so
+/// the standard error must be at most `max_relative_error`·`exact`.
 #[track_caller]
-pub fn assert_mean(what: &str, values: &[f64], exact: f64) {
+pub fn assert_mean(what: &str, values: &[f64], exact: f64, max_relative_error: f64) {
     assert!(values.len() >= 16, "too few seeds");
     let (mean, error) = mean_and_error(values);
-    let allowed = (3.0 * error).max(1e-5 * exact.abs());
+    assert!(error <= max_relative_error * exact, "{what}: too noisy: {mean} ± {error}, expected {exact}");
+    let allowed = (4.0 * error).max(2e-5 * exact);
     assert!((mean - exact).abs() <= allowed, "{what}: {mean} ± {error}, expected {exact}");
+}
+
+/// Checks that two means, each with its standard error, are equal to within five standard errors of their
+/// difference. Noise would hide errors, so this standard error must be at most `max_relative_error` of the
+/// second mean.
+#[track_caller]
+pub fn assert_same_mean(what: &str, one: (f64, f64), other: (f64, f64), max_relative_error: f64) {
+    let error = one.1.hypot(other.1);
+    assert!(error <= max_relative_error * other.0, "{what}: too noisy: {one:?}, {other:?}");
+    let allowed = (5.0 * error).max(2e-5 * other.0);
+    assert!((one.0 - other.0).abs() <= allowed, "{what}: {one:?}, expected {other:?}");
 }
 
 /// Checks that a value is exact to within a relative error of 1e-5.

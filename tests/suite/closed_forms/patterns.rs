@@ -57,9 +57,9 @@ fn checkered_quad_light_matches_its_squares() {
     let mut lit = at_origin();
     let texture = grays(&mut lit, &CHECKER, TextureFilter::Nearest, Vec2::ONE);
     let lit = lit.quad(CORNER, U, V, shining(texture, 2.0));
-    assert_irradiance("whitted", &lit, by_squares(2.0));
-    assert_irradiance("path", &by_paths(&lit), by_squares(2.0));
-    assert_hard("hard shadows", &lit, by_squares(2.0));
+    assert_irradiance("whitted", &lit, by_squares(2.0), 5e-4);
+    assert_irradiance("path", &by_paths(&lit), by_squares(2.0), 5e-4);
+    assert_hard("hard shadows", &lit, by_squares(2.0), 1e-3);
     // A mirrored texture must change the result.
     let half = lit.with(|scene| scene.textures[0].repeat = Vec2::new(-1.0, 1.0));
     let turned = half.values(256, 64);
@@ -82,8 +82,8 @@ fn checkered_mesh_light_matches_its_squares() {
         let texture = grays(&mut lit, &CHECKER, TextureFilter::Nearest, Vec2::ONE);
         let placed = [v(mirror, 1.0, 1.0), AS_IT_IS[1], AS_IT_IS[2]];
         let lit = lit.mesh(mesh, placed, shining(texture, 1.0));
-        assert_irradiance("whitted", &lit, by_squares(1.0));
-        assert_irradiance("path", &by_paths(&lit), by_squares(1.0));
+        assert_irradiance("whitted", &lit, by_squares(1.0), 5e-5);
+        assert_irradiance("path", &by_paths(&lit), by_squares(1.0), 4e-4);
     }
 }
 
@@ -134,7 +134,7 @@ fn every_shape_maps_its_emission_texture() {
         assert!(exact > 0.01, "{name} too dim");
         for (how, lit) in [("whitted", lit.clone()), ("path", by_paths(&lit))] {
             let (mean, error) = mean_and_error(&lit.values(256, 64));
-            assert!(error < 0.01 * exact, "{name}, {how}: too noisy: ± {error} of {exact}");
+            assert!(error < 3e-3 * exact, "{name}, {how}: too noisy: ± {error} of {exact}");
             let allowed = 4.9 * error + 1e-3 * exact;
             assert!((mean - exact).abs() < allowed, "{name}, {how}: {mean} ± {error}, expected {exact}");
         }
@@ -202,6 +202,6 @@ fn sampled_lights_keep_their_textures() {
     }
     assert!(build.world().lights.sampler_for_purpose(LightSamplingPurpose::Eye).is_some());
     for (name, build) in [("whitted", build.clone()), ("path", by_paths(&build))] {
-        assert_irradiance(name, &build, expected);
+        assert_irradiance(name, &build, expected, 1e-3);
     }
 }

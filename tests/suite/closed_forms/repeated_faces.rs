@@ -6,7 +6,7 @@ use glimt::scene::description::{Material, Shape};
 
 use super::scenes::{AS_IT_IS, emitter, metal, scene};
 use super::two_sided::{assert_lit, at_origin, both};
-use super::{assert_mean, lambert, mean_and_error, v};
+use super::{assert_same_mean, lambert, mean_and_error, v};
 
 /// A square light. Its first two triangles face down, and vertices 4 to 7 have the same positions as 0 to 3.
 fn light(more: &[[u32; 3]]) -> TriangleMesh {
@@ -38,8 +38,8 @@ fn coincident_faces_emit_once() {
     for (name, more) in MORE {
         // Sheets that face in opposite directions are moved apart.
         let exact = irradiance(if name.starts_with("reversed") { 1.0 / 4096.0 } else { 0.0 });
-        assert_lit(name, &lit(&more, emitter(1.0)), exact);
-        assert_lit(&format!("{name}, both sides"), &lit(&more, both()), exact);
+        assert_lit(name, &lit(&more, emitter(1.0)), exact, 3e-4);
+        assert_lit(&format!("{name}, both sides"), &lit(&more, both()), exact, 3e-4);
     }
 }
 
@@ -48,11 +48,11 @@ fn coincident_faces_keep_reflections_in_metal() {
     let floor = Shape::Plane { point: DVec3::ZERO, normal: DVec3::Y };
     let mirrored = |more: &[[u32; 3]]| {
         let floor = scene().shape(floor.clone(), metal(0.9, 0.4, 0.0)).seen(v(0.3, 1.0, 0.2), DVec3::ZERO);
-        floor.mesh(light(more), AS_IT_IS, emitter(1.0)).values(256, 256)
+        mean_and_error(&floor.mesh(light(more), AS_IT_IS, emitter(1.0)).values(256, 256))
     };
-    let (exact, _) = mean_and_error(&mirrored(&[]));
+    let exact = mirrored(&[]);
     for (name, more) in MORE {
-        assert_mean(name, &mirrored(&more), exact);
+        assert_same_mean(name, mirrored(&more), exact, 1.5e-3);
     }
 }
 

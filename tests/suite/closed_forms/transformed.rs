@@ -89,7 +89,7 @@ fn shapes_and_meshes() -> [(&'static str, Shape, TriangleMesh, AffineMap); 3] {
 /// Checks that two scenes have the same mean over the image, within five standard errors of at most `noise`,
 /// and a share of the difference due to the facets.
 #[track_caller]
-fn assert_same_mean(what: &str, scenes: [Build; 2], noise: f64) {
+fn assert_same_image_mean(what: &str, scenes: [Build; 2], noise: f64) {
     let means = |build: &Build| {
         let mean = |seed| {
             let picture = build.picture(4, seed);
@@ -116,17 +116,17 @@ fn transformed_shapes_equal_their_meshes() {
             [shape, mesh_under(build, mesh.clone(), matrix, own)]
         };
         let lit = || floor().quad(v(-1.0, 4.0, -1.0), v(2.0, 0.0, 0.0), v(0.0, 0.0, 2.0), emitter(8.0));
-        assert_same_mean(&format!("{what} as a surface"), both(lit(), matte(0.5)), 0.02);
-        assert_same_mean(&format!("{what} as a light"), both(floor(), emitter(1.0)), 0.02);
+        assert_same_image_mean(&format!("{what} as a surface"), both(lit(), matte(0.5)), 0.02);
+        assert_same_image_mean(&format!("{what} as a light"), both(floor(), emitter(1.0)), 0.02);
         let photons = |build: Build| {
             let whitted = build.with(|scene| scene.render.integrator = Integrator::Whitted);
             whitted.photons(5_000, 0.05)
         };
-        assert_same_mean(&format!("{what} with photons"), both(lit(), matte(0.5)).map(photons), 0.02);
+        assert_same_image_mean(&format!("{what} with photons"), both(lit(), matte(0.5)).map(photons), 0.02);
         let light = both(floor(), emitter(1.0)).map(photons);
-        assert_same_mean(&format!("{what} emitting photons"), light, 0.02);
+        assert_same_image_mean(&format!("{what} emitting photons"), light, 0.02);
         let own = tinted(1.5, v(0.3, 0.3, 0.3));
-        assert_same_mean(&format!("{what} as glass"), both(floor().environment(1.0), own), 0.02);
+        assert_same_image_mean(&format!("{what} as glass"), both(floor().environment(1.0), own), 0.02);
     }
 }
 
@@ -153,7 +153,7 @@ fn elliptic_disk_light_matches_a_polygon() {
             })
             .collect();
         let lit = at_origin().shape(disk.clone().transformed(matrix), emitter(1.0));
-        assert_irradiance("ellipse", &lit, lambert(DVec3::ZERO, DVec3::Y, &polygon));
+        assert_irradiance("ellipse", &lit, lambert(DVec3::ZERO, DVec3::Y, &polygon), 1e-4);
     }
 }
 
@@ -181,7 +181,7 @@ fn transformed_shapes_are_white_in_a_furnace() {
             let mean = |seed| furnace.picture(16, seed).iter().map(|pixel| pixel.x).sum::<f64>() / 36.0;
             let values: Vec<f64> = (0..32).map(mean).collect();
             let (mean, error) = mean_and_error(&values);
-            assert!(error < 5e-3, "{own:?}: {mean} ± {error}");
+            assert!(error < 6e-4, "{own:?}: {mean} ± {error}");
             assert!((mean - 1.0).abs() < 4.0 * error + 1e-5, "{own:?}: {mean} ± {error}");
         }
     }

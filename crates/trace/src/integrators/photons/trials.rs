@@ -125,6 +125,7 @@ mod tests {
                 let p = f64::from(chance);
                 let lost = (1.0 - p).powi(MAX_TRIALS as i32 + 1) / p;
                 let off = (mean - 1.0 / p).abs();
+                assert!(error < 6e-3 / p, "{chance}: too noisy: {mean} ± {error}");
                 assert!(off < 4.0 * error + lost + 1e-9, "{chance}: {mean} ± {error}");
             }
         }
