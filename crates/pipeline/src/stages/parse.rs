@@ -46,11 +46,7 @@ pub(crate) struct SceneParseRequest<'a> {
 }
 
 /// Converts an importer's error. Watches missing files to detect when they are created.
-fn abort_reason(
-    error: AssetError,
-    findings: &mut Findings,
-    reading: &FileReadContext<'_>,
-) -> AbortReason {
+fn abort_reason(error: AssetError, findings: &mut Findings, reading: &FileReadContext<'_>) -> AbortReason {
     match error {
         AssetError::Cancelled(_) => AbortReason::Cancelled,
         AssetError::OutOfMemory { .. } | AssetError::TooManyOpenFiles { .. } => {
