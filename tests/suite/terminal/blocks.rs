@@ -18,7 +18,7 @@ fn has_finer_blocks(screen: &vt100::Screen) -> bool {
 #[test]
 fn known_terminal_gets_finest_blocks() {
     let folder = TestDir::with_board();
-    folder.write("scene.toml", &oblique());
+    folder.write("scene.toml", oblique());
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
     terminal.wait_for_color("red");
@@ -32,7 +32,7 @@ fn known_terminal_gets_finest_blocks() {
 #[test]
 fn preview_option_overrides_the_terminal() {
     let folder = TestDir::with_board();
-    folder.write("scene.toml", &oblique());
+    folder.write("scene.toml", oblique());
     let mut terminal = folder.terminal_with(&[PROGRAM, "scene.toml", "--preview", "halfblock"], &[]);
     terminal.wait_for_render(1);
     terminal.press("\x1bP>|kitty(0.40.1)\x1b\\");

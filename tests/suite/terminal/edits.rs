@@ -28,9 +28,9 @@ fn scene() -> String {
 fn folder(text: &str) -> TestDir {
     let folder = TestDir::with_board();
     folder.write("one.obj", OBJ);
-    folder.write("two.obj", &OBJ.replace("0.5", "0.6"));
-    folder.write("skin.ppm", &paint("200 150 100"));
-    folder.write("bark.ppm", &paint("100 150 50"));
+    folder.write("two.obj", OBJ.replace("0.5", "0.6"));
+    folder.write("skin.ppm", paint("200 150 100"));
+    folder.write("bark.ppm", paint("100 150 50"));
     folder.write("scene.toml", text);
     folder
 }
@@ -60,7 +60,7 @@ fn edits_rerun_only_dependent_stages() {
     terminal.wait_for_render(1);
     assert_eq!(stages(&folder, "photons"), ("dddddsdd".to_owned(), reasons::PHOTONS_OFF.to_owned()));
 
-    folder.write("scene.toml", &own.replace("[camera]", "# the eye\n\n[camera]"));
+    folder.write("scene.toml", own.replace("[camera]", "# the eye\n\n[camera]"));
     terminal.wait_for(&format!("unchanged · {}", messages::render_number(1)));
     terminal.wait_for(&messages::cached_stage_count("6 stages"));
     assert_eq!(stages(&folder, "render").0, "drrrrsrr");
@@ -97,7 +97,7 @@ fn edits_rerun_only_dependent_stages() {
             });
         }
     }
-    folder.write("bark.ppm", &paint("50 150 100"));
+    folder.write("bark.ppm", paint("50 150 100"));
     terminal.wait_for_render(renders + 1);
     terminal.wait("reused stages", |screen| {
         ["4 stages", "4"].iter().any(|count| screen.contents().contains(&messages::cached_stage_count(count)))
@@ -132,7 +132,7 @@ fn stages_report_their_state_while_rendering() {
     let moved = other_light.replace("center = [0.5, 0.2", "center = [0.4, 0.2");
     folder.write("scene.toml", &moved);
     wait_for_stages(&terminal, &[kept, ("✓", "accel", " "), ("=", "lights", "reused"), rendering]);
-    folder.write("skin.ppm", &paint("50 150 100"));
+    folder.write("skin.ppm", paint("50 150 100"));
     let saved = [("=", "parse", "reused"), kept, ("✓", "textures", " "), ("=", "accel", "reused"), rendering];
     wait_for_stages(&terminal, &saved);
 

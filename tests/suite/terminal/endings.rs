@@ -72,7 +72,7 @@ fn quit_while_rendering_keeps_the_last_image() {
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
     let before = folder.bytes("scene.png");
-    folder.write("scene.toml", &SCENE.replace("samples = 4", "samples = 10000000"));
+    folder.write("scene.toml", SCENE.replace("samples = 4", "samples = 10000000"));
     terminal.wait_for("rendering");
     terminal.press("q");
     assert_eq!(terminal.end(), 0);
@@ -94,7 +94,7 @@ fn quit_after_save_writes_or_explains_why_not() {
     std::fs::remove_file(folder.path("scene.png")).expect("removed");
     folder.write(
         "scene.toml",
-        &slow.replace("width = 64", "width = 2000").replace("height = 48", "height = 2000"),
+        slow.replace("width = 64", "width = 2000").replace("height = 48", "height = 2000"),
     );
     let mut terminal = folder.terminal();
     terminal.wait_for("rendering");
@@ -131,7 +131,7 @@ fn keys_during_a_write_never_lose_the_image() {
         std::fs::remove_file(folder.path("scene.png")).expect(key);
     }
     // Request a write, then quit immediately.
-    folder.write("scene.toml", &large.replace("samples = 1", "samples = 100000"));
+    folder.write("scene.toml", large.replace("samples = 1", "samples = 100000"));
     let mut terminal = folder.terminal();
     terminal.wait_for("ETA");
     terminal.press("w");
@@ -157,7 +157,7 @@ fn render_resumes_after_a_dropped_connection() {
     let checkpoint = folder.path("scene.png.checkpoint");
     assert!(checkpoint.is_file(), "the samples must be saved");
     // A different scene starts over and does not touch the checkpoint.
-    folder.write("scene.toml", &SCENE.replace("samples = 4", "samples = 4000\nseed = 7"));
+    folder.write("scene.toml", SCENE.replace("samples = 4", "samples = 4000\nseed = 7"));
     let mut terminal = folder.terminal();
     terminal.wait_for("ETA");
     terminal.press("q");

@@ -76,7 +76,7 @@ fn open(folder: &TestDir, variables: &[(&str, &str)]) -> Terminal {
 /// click and a copy. Returns all output until the program exits.
 fn through(variables: &[(&str, &str)], has_title: bool) -> Vec<u8> {
     let folder = TestDir::with_board();
-    folder.write("scene.toml", &endless());
+    folder.write("scene.toml", endless());
     let mut terminal = open(&folder, variables);
     terminal.wait_for("ETA");
     if has_title {
@@ -171,7 +171,7 @@ fn unknown_terminals_get_no_extra_sequences() {
 #[test]
 fn signals_clear_title_and_progress() {
     let folder = TestDir::with_board();
-    folder.write("scene.toml", &SCENE.replace("samples = 4", "samples = 10000000"));
+    folder.write("scene.toml", SCENE.replace("samples = 4", "samples = 10000000"));
     for (signal, code) in
         [(Signal::SIGTERM, 143), (Signal::SIGHUP, 129), (Signal::SIGINT, 130), (Signal::SIGABRT, 1)]
     {
@@ -198,7 +198,7 @@ fn only_unfocused_long_renders_notify() {
         [("\x1b[I", "0.001"), ("\x1b[O\x1b[I", "0.001"), ("\x1b[O", "3600"), ("\x1b[O", "0")]
     {
         let folder = TestDir::with_board();
-        folder.write("scene.toml", &endless());
+        folder.write("scene.toml", endless());
         let command = [PROGRAM, "scene.toml", "--notify-after", after];
         let mut terminal = folder.terminal_with(&command, &[("TERM", "xterm-kitty")]);
         terminal.wait_for("ETA");
@@ -214,7 +214,7 @@ fn only_unfocused_long_renders_notify() {
 #[test]
 fn slow_connection_sends_the_preview_first() {
     let folder = TestDir::with_board();
-    folder.write("scene.toml", &endless());
+    folder.write("scene.toml", endless());
     let terminal = folder.thin_line_in(Answers::Terminal, &[("WT_SESSION", "1-2-3")]);
     terminal.wait("a title", |_| has(&terminal.bytes(), b"\x1b]2;scene.toml: rendering"));
     folder.write("scene.toml", SCENE);

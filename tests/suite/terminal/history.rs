@@ -44,7 +44,7 @@ fn colors_from(screen: &vt100::Screen, column: u16) -> [usize; 3] {
 fn edited(folder: &TestDir, terminal: &Terminal) {
     terminal.wait_for_render(1);
     for (render, (color, value)) in (2..).zip([("green", GREEN), ("blue", BLUE)]) {
-        folder.write("scene.toml", &SCENE.replace(RED, value));
+        folder.write("scene.toml", SCENE.replace(RED, value));
         terminal.wait(color, |screen| Colors::of(screen).is_most(color) || render == 3);
         terminal.wait_for_render(render);
     }
@@ -119,7 +119,7 @@ fn history_entry_shows_only_its_own_change() {
     let kept = fs::read_to_string(folder.path("scene.toml")).expect("a scene");
     folder.write("scene.toml", "[render");
     terminal.wait_for("broken");
-    folder.write("scene.toml", &kept.replace(RED, BLUE));
+    folder.write("scene.toml", kept.replace(RED, BLUE));
     terminal.wait("the edit", |screen| is_told(screen, " materials. board.diffuse"));
 }
 

@@ -9,7 +9,7 @@ fn compared(options: &[&str], variables: &[(&str, &str)]) -> (TestDir, Terminal)
     let folder = TestDir::with_board();
     folder.once(&[]);
     std::fs::rename(folder.path("once.png"), folder.path("red.png")).expect("renamed");
-    folder.write("scene.toml", &SCENE.replace(RED, GREEN));
+    folder.write("scene.toml", SCENE.replace(RED, GREEN));
     folder.once(&[]);
     let mut command = vec![PROGRAM, "compare", "once.png", "red.png"];
     command.extend(options);

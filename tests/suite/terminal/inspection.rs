@@ -134,7 +134,7 @@ fn actual_size_preview_centers_on_the_click() {
 #[test]
 fn region_without_mouse_uses_the_crosshair() {
     let folder = TestDir::with_board();
-    folder.write("scene.toml", &SCENE.replace("samples = 4", "samples = 10000000"));
+    folder.write("scene.toml", SCENE.replace("samples = 4", "samples = 10000000"));
     let mut terminal = folder.terminal();
     terminal.wait_for("ETA");
     let has_corners = |screen: &vt100::Screen| {

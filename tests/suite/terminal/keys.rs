@@ -114,7 +114,7 @@ fn views_are_shown_and_saved_on_request() {
 #[test]
 fn paused_render_can_be_saved_and_resumed() {
     let folder = TestDir::with_board();
-    folder.write("scene.toml", &SCENE.replace("samples = 4", "samples = 10000000"));
+    folder.write("scene.toml", SCENE.replace("samples = 4", "samples = 10000000"));
     let mut terminal = folder.terminal();
     terminal.wait_for_color("red");
     terminal.wait_for("ETA");
@@ -162,7 +162,7 @@ fn help_and_errors_open_scroll_and_close() {
     terminal.press("e");
     terminal.wait_for(messages::NO_DIAGNOSTICS);
 
-    folder.write("scene.toml", &SCENE.replace("[0", "[\"0\"").replace("radius =", "radios ="));
+    folder.write("scene.toml", SCENE.replace("[0", "[\"0\"").replace("radius =", "radios ="));
     terminal.wait_for(messages::LAST_GOOD_RENDER);
     terminal.wait_for("lines 1-");
     for (forth, back) in [(PAGE_DOWN, PAGE_UP), (DOWN, UP)] {

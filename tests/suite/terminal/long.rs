@@ -15,7 +15,7 @@ fn scene(samples: u32, rest: &str) -> String {
 /// A folder with the checkpoint of a finished render.
 fn with_checkpoint(samples: u32) -> TestDir {
     let folder = TestDir::with_board();
-    folder.write("scene.toml", &scene(samples, ""));
+    folder.write("scene.toml", scene(samples, ""));
     let options = ["-o", "scene.png", "--keep-checkpoint"];
     let mut process = std::process::Command::new(PROGRAM);
     process.current_dir(folder.path("")).args(["scene.toml", "--once"]).args(options);
@@ -45,17 +45,17 @@ fn ignored_checkpoint_is_reported() {
     };
     // The checkpoint has more samples than requested.
     let folder = with_checkpoint(8);
-    folder.write("scene.toml", &scene(3, ""));
+    folder.write("scene.toml", scene(3, ""));
     let long = terminal(&folder, &[]);
     is_fine(&long, &[&glimt::pipeline::messages::oversampled_checkpoint_message(3)]);
     assert_eq!(folder.bytes("scene.png"), folder.once(&[]), "the image must not contain its samples");
     assert!(folder.path("scene.png.checkpoint").exists(), "it has more samples than the image");
     drop(long);
     // The checkpoint belongs to a different image. This is reported once, not after each edit.
-    folder.write("scene.toml", &scene(9, "seed = 5"));
+    folder.write("scene.toml", scene(9, "seed = 5"));
     let other = terminal(&folder, &[]);
     is_fine(&other, &["seed", "0", "5"]);
-    folder.write("scene.toml", &scene(9, "seed = 6"));
+    folder.write("scene.toml", scene(9, "seed = 6"));
     other.wait_for_render(2);
     assert!(!other.look(|screen| shows(screen, &ignored())), "{}", other.text());
     drop(other);
@@ -64,7 +64,7 @@ fn ignored_checkpoint_is_reported() {
     let middle = bytes.len() / 2;
     bytes[middle] ^= 1;
     fs::write(folder.path("scene.png.checkpoint"), bytes).expect("written");
-    folder.write("scene.toml", &scene(9, ""));
+    folder.write("scene.toml", scene(9, ""));
     let damaged = terminal(&folder, &["--resume"]);
     is_fine(&damaged, &[glimt::pipeline::messages::DAMAGED]);
     assert_eq!(folder.bytes("scene.png"), folder.once(&[]));
@@ -73,7 +73,7 @@ fn ignored_checkpoint_is_reported() {
 #[test]
 fn quit_saves_and_reports_a_long_render() {
     let folder = TestDir::with_board();
-    folder.write("scene.toml", &scene(10_000_000, ""));
+    folder.write("scene.toml", scene(10_000_000, ""));
     let mut long = terminal(&folder, &["--checkpoint", "0.2"]);
     long.wait_for("ETA");
     std::thread::sleep(std::time::Duration::from_millis(400));

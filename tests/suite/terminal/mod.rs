@@ -51,11 +51,11 @@ fn each_save_renders_once() {
     terminal.wait_for_render(1);
     let path = folder.path("scene.toml");
 
-    folder.write("scene.toml", &SCENE.replace(RED, GREEN));
+    folder.write("scene.toml", SCENE.replace(RED, GREEN));
     terminal.wait_for_color("green");
     terminal.wait_for_render(2);
 
-    folder.write(".scene.tmp", &SCENE.replace(RED, BLUE));
+    folder.write(".scene.tmp", SCENE.replace(RED, BLUE));
     fs::rename(folder.path(".scene.tmp"), &path).expect("renamed");
     terminal.wait_for_color("blue");
     terminal.wait_for_render(3);
@@ -71,7 +71,7 @@ fn each_save_renders_once() {
     // Saving unchanged contents or an unrelated file does not trigger a render.
     folder.write("scene.toml", SCENE);
     folder.write("notes.txt", "nothing");
-    folder.write("scene.toml", &SCENE.replace(RED, GREEN));
+    folder.write("scene.toml", SCENE.replace(RED, GREEN));
     terminal.wait_for_color("green");
     terminal.wait_for_render(5);
 }
@@ -82,9 +82,9 @@ fn last_of_many_fast_saves_wins() {
     let terminal = folder.terminal();
     terminal.wait_for_render(1);
     for i in 0..40 {
-        folder.write("scene.toml", &SCENE.replace(RED, [RED, GREEN][i % 2]));
+        folder.write("scene.toml", SCENE.replace(RED, [RED, GREEN][i % 2]));
     }
-    folder.write("scene.toml", &SCENE.replace(RED, BLUE));
+    folder.write("scene.toml", SCENE.replace(RED, BLUE));
     terminal.wait_for_color("blue");
     let expected = folder.once(&[]);
     terminal.wait("the last image on disk", |_| {
@@ -99,7 +99,7 @@ fn broken_scene_shows_position_and_last_image() {
     terminal.wait_for_render(1);
     let before = (folder.bytes("scene.png"), modified(&folder));
 
-    folder.write("scene.toml", &SCENE.replace("samples = 4", "samples = \"four\""));
+    folder.write("scene.toml", SCENE.replace("samples = 4", "samples = \"four\""));
     terminal.wait_for("scene.toml:4:11");
     terminal.wait_for("broken");
     let colors = terminal.look(Colors::of);
@@ -113,7 +113,7 @@ fn broken_scene_shows_position_and_last_image() {
 
     folder.write("scene.toml", "[render");
     terminal.wait_for("scene.toml:1:");
-    folder.write("scene.toml", &SCENE.replace(RED, GREEN));
+    folder.write("scene.toml", SCENE.replace(RED, GREEN));
     terminal.wait_for_color("green");
     terminal.wait_for_render(2);
 }
@@ -130,7 +130,7 @@ fn recreated_scene_is_rendered() {
     terminal.wait_for_render(1);
     fs::remove_file(folder.path("scene.toml")).expect("removed");
     terminal.wait_for("missing");
-    folder.write("scene.toml", &SCENE.replace(RED, BLUE));
+    folder.write("scene.toml", SCENE.replace(RED, BLUE));
     terminal.wait_for_color("blue");
     terminal.wait_for_render(2);
 }

@@ -15,14 +15,14 @@ fn wall(height: f32) -> String {
 fn model_is_watched_and_imported_once() {
     let folder = TestDir::with_board();
     folder.write("a.mtl", "newmtl red\nKd 0.9 0 0\nKe 1 0 0\n");
-    folder.write("wall.obj", &wall(0.1));
+    folder.write("wall.obj", wall(0.1));
     let small = ["--samples", "2", "--width", "64", "--height", "48", "--from", "front"];
     let call = [&[PROGRAM, "wall.obj"][..], &small].concat();
     let mut terminal = folder.terminal_with(&call, &[]);
     terminal.wait_for_render(1);
     let low = folder.bytes("wall.png");
     // Another program saves the model.
-    folder.write("wall.obj", &wall(0.7));
+    folder.write("wall.obj", wall(0.7));
     terminal.wait_for_render(2);
     let options = &call[2..];
     assert_ne!(folder.bytes("wall.png"), low);
@@ -41,7 +41,7 @@ fn model_is_watched_and_imported_once() {
     folder.write("wall.obj", "v 0 0");
     terminal.wait_for("wall.obj");
     terminal.wait_for("broken");
-    folder.write("wall.obj", &wall(0.1));
+    folder.write("wall.obj", wall(0.1));
     terminal.wait("the low wall", |_| fs::read(folder.path("wall.png")).is_ok_and(|bytes| bytes == low));
     terminal.press("q");
     assert_eq!(terminal.end(), 0);
@@ -59,7 +59,7 @@ fn once(folder: &TestDir, options: &[&str]) -> Vec<u8> {
 fn missing_model_is_named() {
     let folder = TestDir::with_board();
     folder.write("a.mtl", "newmtl red\nKd 0.9 0 0\n");
-    folder.write("wall.obj", &wall(0.1));
+    folder.write("wall.obj", wall(0.1));
     let small = ["--width", "32", "--height", "24", "--samples", "4"];
     let call = [&[PROGRAM, "wall.obj"][..], &small].concat();
     let mut terminal = folder.terminal_with(&call, &[]);

@@ -91,14 +91,14 @@ fn saved_camera_becomes_the_scene_camera() {
     // key without other effects to close the message that covers the table.
     terminal.press("??");
     terminal.wait("no new render", |screen| screen.contents().contains(messages::CACHED));
-    folder.write("scene.toml", &kept.replace(RED, GREEN));
+    folder.write("scene.toml", kept.replace(RED, GREEN));
     terminal.wait_for_color("green");
 }
 
 #[test]
 fn click_sets_the_focus() {
     let folder = TestDir::with_board();
-    folder.write("scene.toml", &SCENE.replace("focus = 4.0", "focus = 3.0"));
+    folder.write("scene.toml", SCENE.replace("focus = 4.0", "focus = 3.0"));
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
     terminal.press("f");
@@ -127,7 +127,7 @@ fn editor_uses_the_terminal() {
     let variables = [("VISUAL", ""), ("EDITOR", editor.to_str().expect("a name"))];
     let mut terminal = folder.terminal_with(&[PROGRAM, "scene.toml"], &variables);
     terminal.wait_for_render(1);
-    folder.write("scene.toml", &SCENE.replace("samples = 4", "samples = \"four\""));
+    folder.write("scene.toml", SCENE.replace("samples = 4", "samples = \"four\""));
     terminal.wait_for("scene.toml:4:11");
     terminal.press("o");
     terminal.wait_for(&editing(4));
@@ -158,7 +158,7 @@ fn echo_is_restored_after_killed_editor() {
 
 /// The program after it has opened a shell script as its editor, which now controls the terminal.
 fn in_editor(folder: &TestDir, command: &[&str], script: &str, options: &str) -> Terminal {
-    folder.write("vi", &format!("#!/bin/sh\necho $PPID > parent\necho $$ > id\n{script}\n"));
+    folder.write("vi", format!("#!/bin/sh\necho $PPID > parent\necho $$ > id\n{script}\n"));
     fs::set_permissions(folder.path("vi"), fs::Permissions::from_mode(0o755)).expect("permitted");
     let editor = format!("{}{options}", folder.path("vi").to_str().expect("a name"));
     let mut terminal = folder.terminal_with(command, &[("VISUAL", ""), ("EDITOR", &editor)]);
@@ -252,7 +252,7 @@ fn earlier_renders_can_be_browsed() {
     let folder = TestDir::with_board();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
-    folder.write("scene.toml", &SCENE.replace(RED, GREEN));
+    folder.write("scene.toml", SCENE.replace(RED, GREEN));
     terminal.wait_for_color("green");
     terminal.wait_for_render(2);
     terminal.press("b");
@@ -274,7 +274,7 @@ fn zoom_shows_actual_pixels() {
     let folder = TestDir::with_board();
     folder.write(
         "scene.toml",
-        &SCENE.replace("width = 64", "width = 320").replace("height = 48", "height = 240"),
+        SCENE.replace("width = 64", "width = 320").replace("height = 48", "height = 240"),
     );
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
@@ -304,7 +304,7 @@ fn region_first_does_not_change_the_image() {
     terminal.wait("a corner", corner(19, 9, "┘"));
     terminal.press(&release(20, 10));
     terminal.wait_for(messages::REGION_NEXT);
-    folder.write("scene.toml", &SCENE.replace(RED, GREEN).replace("samples = 4", "samples = 64"));
+    folder.write("scene.toml", SCENE.replace(RED, GREEN).replace("samples = 4", "samples = 64"));
     terminal.wait_for_color("green");
     terminal.wait_for_render(2);
     assert_eq!(folder.bytes("scene.png"), folder.once(&[]));

@@ -30,7 +30,7 @@ fn texture_named_like_the_image_is_kept() {
     image::RgbImage::from_pixel(2, 2, image::Rgb([230, 20, 20]))
         .save(folder.path("scene.png"))
         .expect("saved");
-    folder.write("scene.toml", &textured("scene.png"));
+    folder.write("scene.toml", textured("scene.png"));
     let before = folder.bytes("scene.png");
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
@@ -43,8 +43,7 @@ fn texture_named_like_the_image_is_kept() {
     terminal.press("w");
     terminal.wait_for_message(messages::NOT_WRITTEN);
     assert_eq!(folder.bytes("scene.png"), before);
-    folder
-        .write("scene.toml", &textured("scene.png").replace("[render]", "[render]\noutput = \"other.png\""));
+    folder.write("scene.toml", textured("scene.png").replace("[render]", "[render]\noutput = \"other.png\""));
     terminal.wait_for_render(2);
     terminal.wait("no error", |screen| !screen.contents().contains("error"));
     assert!(folder.path("other.png").is_file());
@@ -57,7 +56,7 @@ fn output_that_becomes_an_input_is_kept() {
     let terminal = folder.terminal_with(&[PROGRAM, "scene.toml", "--report", "r.json"], &[]);
     terminal.wait_for_render(1);
     let (picture, report) = (folder.bytes("scene.png"), folder.bytes("r.json"));
-    folder.write("scene.toml", &textured("scene.png"));
+    folder.write("scene.toml", textured("scene.png"));
     terminal.wait_for("`paint`");
     wait_a_while();
     assert_eq!(
@@ -65,7 +64,7 @@ fn output_that_becomes_an_input_is_kept() {
         (picture, report),
         "nothing must be written"
     );
-    folder.write("scene.toml", &SCENE.replace(RED, GREEN));
+    folder.write("scene.toml", SCENE.replace(RED, GREEN));
     terminal.wait_for_color("green");
     terminal.wait("the image on disk", |_| folder.bytes("scene.png") == folder.once(&[]));
 }
@@ -77,7 +76,7 @@ fn unrelated_image_is_not_replaced() {
     terminal.wait_for_render(1);
     image::RgbImage::new(3, 2).save(folder.path("scene.png")).expect("saved");
     let photograph = folder.bytes("scene.png");
-    folder.write("scene.toml", &SCENE.replace(RED, GREEN));
+    folder.write("scene.toml", SCENE.replace(RED, GREEN));
     terminal.wait_for("-o FILE");
     terminal.wait_for_render(2);
     assert_eq!(folder.bytes("scene.png"), photograph);
@@ -89,7 +88,7 @@ fn w_is_not_offered_for_another_scenes_image() {
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
     fs::create_dir(folder.path("other")).expect("a folder");
-    folder.write("other/scene.toml", &SCENE.replace(RED, GREEN));
+    folder.write("other/scene.toml", SCENE.replace(RED, GREEN));
     let mut other = std::process::Command::new(PROGRAM);
     other.current_dir(folder.path("")).args(["other/scene.toml", "--once", "--force"]);
     assert!(other.output().expect("it runs").status.success());
@@ -160,7 +159,7 @@ fn scene_save_replaces_image_written_with_w() {
     let own = folder.bytes("scene.png");
     terminal.press("]w");
     terminal.wait("the brighter image", |_| folder.bytes("scene.png") != own);
-    folder.write("scene.toml", &format!("{SCENE}# saved"));
+    folder.write("scene.toml", format!("{SCENE}# saved"));
     terminal.wait("the image of the save", |_| folder.bytes("scene.png") == own);
 }
 
@@ -168,7 +167,7 @@ fn scene_save_replaces_image_written_with_w() {
 fn own_writes_do_not_trigger_renders() {
     let folder = TestDir::with_board();
     folder.write("paint.ppm", PAINT);
-    folder.write("scene.toml", &textured("paint.ppm"));
+    folder.write("scene.toml", textured("paint.ppm"));
     let command = [PROGRAM, "scene.toml", "-o", "a.png", "-o", "b.ppm", "--report", "r.json"];
     for poll in [&[][..], &["--poll"]] {
         let mut terminal = folder.terminal_with(&[&command[..], poll].concat(), &[]);

@@ -84,7 +84,7 @@ fn every_way_of_saving_an_asset_renders_once() {
         let folder = TestDir::with_board();
         let texture = "[textures.paint]\nfile = \"paint.ppm\"\n";
         let scene = SCENE.replace(RED, "{ texture = \"paint\" }");
-        folder.write("scene.toml", &scene.replace("[materials]", &format!("{texture}[materials]")));
+        folder.write("scene.toml", scene.replace("[materials]", &format!("{texture}[materials]")));
         folder.write("paint.ppm", "P3\n1 1\n255\n230 20 20\n");
         let terminal = folder.terminal_with(&[&[PROGRAM, "scene.toml"], options].concat(), &[]);
         terminal.wait_for_render(1);
@@ -162,7 +162,7 @@ fn persistent_error_is_shown() {
     // The error is reported even if the file remains open.
     terminal.wait_for("broken");
     drop(file);
-    folder.write("scene.toml", &SCENE.replace(RED, GREEN));
+    folder.write("scene.toml", SCENE.replace(RED, GREEN));
     terminal.wait_for_color("green");
     folder.write("scene.toml", half);
     terminal.wait_for("broken");
@@ -199,7 +199,7 @@ fn recreated_folder_is_watched() {
         let folder = TestDir::with_board();
         let make = |color: &str| {
             fs::create_dir(folder.path("work")).expect("a folder");
-            folder.write("work/scene.toml", &SCENE.replace(RED, color));
+            folder.write("work/scene.toml", SCENE.replace(RED, color));
         };
         make(RED);
         let terminal = folder.terminal_with(&["/bin/sh", "-c", line, PROGRAM], &[]);
@@ -211,7 +211,7 @@ fn recreated_folder_is_watched() {
         terminal.wait_for_render(2);
         assert!(folder.path(picture).is_file(), "{picture}");
         // Saving must work as before.
-        folder.write("work/scene.toml", &SCENE.replace(RED, GREEN));
+        folder.write("work/scene.toml", SCENE.replace(RED, GREEN));
         terminal.wait_for_color("green");
         terminal.wait_for_render(3);
         // Remove and recreate the folder between two polls.
@@ -219,7 +219,7 @@ fn recreated_folder_is_watched() {
         make(GREEN);
         folder.write("work/scene.toml", SCENE);
         terminal.wait_for_color("red");
-        folder.write("work/scene.toml", &SCENE.replace(RED, BLUE));
+        folder.write("work/scene.toml", SCENE.replace(RED, BLUE));
         terminal.wait_for_color("blue");
     }
 }

@@ -93,7 +93,7 @@ fn small_windows_show_preview_errors_and_keys() {
         terminal.wait_for("done");
         resized(&mut terminal, columns, rows);
         terminal.wait_for("s soft");
-        folder.write("scene.toml", &SCENE.replace("samples = 4", "samples = \"four\""));
+        folder.write("scene.toml", SCENE.replace("samples = 4", "samples = \"four\""));
         terminal.wait_for("broken");
         terminal.wait_for("scene.toml:4:11");
         // Count only now: right after resizing, a slow machine may still show the stretched preview.
@@ -112,7 +112,7 @@ fn every_state_has_a_symbol_and_a_word() {
     let folder = TestDir::with_board();
     let mut terminal = folder.terminal_with(&[PROGRAM, "scene.toml"], &[("NO_COLOR", "1")]);
     terminal.wait_for("✓ done");
-    folder.write("scene.toml", &SCENE.replace("samples = 4", "samples = 10000000"));
+    folder.write("scene.toml", SCENE.replace("samples = 4", "samples = 10000000"));
     terminal.wait_for("● rendering");
     terminal.wait_for("ETA");
     terminal.press(" ");

@@ -9,7 +9,7 @@ use crate::test_dir::TestDir;
 #[test]
 fn warnings_are_counted_and_shown_on_request() {
     let folder = TestDir::with_board();
-    folder.write("scene.toml", &SCENE.replace(RED, "[0.8, 0.02, 0.02], specular = [0.5, 0.5, 0.5]"));
+    folder.write("scene.toml", SCENE.replace(RED, "[0.8, 0.02, 0.02], specular = [0.5, 0.5, 0.5]"));
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
     terminal.wait_for("1 warning");
@@ -48,7 +48,7 @@ fn history_ends_at_oldest_and_newest() {
     terminal.press("b");
     terminal.wait_for(messages::NO_EARLIER_RENDER);
     for (render, (color, value)) in (2..).zip([("green", GREEN), ("blue", BLUE)]) {
-        folder.write("scene.toml", &SCENE.replace(RED, value));
+        folder.write("scene.toml", SCENE.replace(RED, value));
         terminal.wait_for_color(color);
         terminal.wait_for_render(render);
     }

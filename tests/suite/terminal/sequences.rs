@@ -223,7 +223,7 @@ fn preview_keys_keep_the_finished_image() {
 fn interrupted_image_resumes_in_the_next_run() {
     let folder = TestDir::with_board();
     let whole = {
-        folder.write("scene.toml", &SCENE.replace("samples = 4", "samples = 3000"));
+        folder.write("scene.toml", SCENE.replace("samples = 4", "samples = 3000"));
         folder.once(&[])
     };
     let mut terminal = folder.wide_terminal_with(&[PROGRAM, "scene.toml", "--checkpoint", "0.01"]);

@@ -18,7 +18,7 @@ const ALL: [Answers; 3] = [Answers::Terminal, Answers::Multiplexer, Answers::Not
 /// Starts a render that does not finish.
 fn endless(answers: Answers) -> (TestDir, Terminal) {
     let folder = TestDir::with_board();
-    folder.write("scene.toml", &SCENE.replace("samples = 4", "samples = 10000000"));
+    folder.write("scene.toml", SCENE.replace("samples = 4", "samples = 10000000"));
     let terminal = folder.thin_line(answers);
     terminal.wait_for("ETA");
     terminal.wait("an image", |screen| super::Colors::of(screen).red > 500);
@@ -76,7 +76,7 @@ fn most_on_the_way(answers: Answers) -> usize {
         });
     }
     // After an edit while the connection is busy, only the newest image is sent.
-    folder.write("scene.toml", &SCENE.replace(RED, GREEN).replace("samples = 4", "samples = 10000000"));
+    folder.write("scene.toml", SCENE.replace(RED, GREEN).replace("samples = 4", "samples = 10000000"));
     terminal.wait_for_color("green");
     let (unanswered, waiting) = terminal.line(|seen| (seen.most_unanswered, seen.most_waiting));
     if answers == Answers::Terminal { unanswered } else { waiting }
@@ -150,7 +150,7 @@ fn connection_is_measured_and_shown() {
 fn stalled_terminal_does_not_block_quitting() {
     assert_at_once("the end", || {
         let folder = TestDir::with_board();
-        folder.write("scene.toml", &SCENE.replace("samples = 4", "samples = 10000000"));
+        folder.write("scene.toml", SCENE.replace("samples = 4", "samples = 10000000"));
         let mut terminal = folder.terminal();
         terminal.wait_for("ETA");
         terminal.set_reading(false);

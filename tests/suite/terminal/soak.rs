@@ -151,7 +151,7 @@ fn soak() {
     let [own, other] = &folders;
     for folder in &folders {
         save_assets(folder, &mut random);
-        folder.write("scene.toml", &scene(&mut random, 4, 0));
+        folder.write("scene.toml", scene(&mut random, 4, 0));
     }
     let long = ["--checkpoint", "0.3"];
     let begin_other = || other.terminal_with(&[&[PROGRAM, "scene.toml"], long.as_slice()].concat(), &[]);
@@ -182,7 +182,8 @@ fn soak() {
             5 => save_assets(own, &mut random),
             6..=9 => {
                 for _ in 0..1 + random.below(6) {
-                    lives.press(*random.pick(&KEYS));
+                    let key = *random.pick(&KEYS);
+                    lives.press(key);
                 }
             }
             10 => lives.resize(20 + random.below(140) as u16, 6 + random.below(50) as u16),
@@ -195,7 +196,8 @@ fn soak() {
             12 => {
                 let text = scene(&mut random, 2000, events % 5);
                 save(other, &mut random, "scene.toml", &text);
-                falls.press(*random.pick(&["s", "0", "r", "h", "i"]));
+                let key = *random.pick(&["s", "0", "r", "h", "i"]);
+                falls.press(key);
             }
             _ => {
                 let signal = *random.pick(&[

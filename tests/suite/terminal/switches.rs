@@ -21,7 +21,7 @@ fn setting(folder: &TestDir, name: &str) -> serde_json::Value {
 #[test]
 fn keys_override_photons_and_integrator() {
     let folder = TestDir::with_board();
-    folder.write("scene.toml", &glassy());
+    folder.write("scene.toml", glassy());
     let call = [PROGRAM, "scene.toml", "--report", "report.json"];
     let mut terminal = folder.terminal_with(&call, &[]);
     terminal.wait_for_render(1);
@@ -54,7 +54,7 @@ fn keys_override_photons_and_integrator() {
 #[test]
 fn keys_ignored_by_path_are_explained() {
     let folder = TestDir::with_board();
-    folder.write("scene.toml", &glassy());
+    folder.write("scene.toml", glassy());
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
     terminal.press("i");

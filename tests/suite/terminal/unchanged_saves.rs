@@ -14,7 +14,7 @@ fn words(screen: &vt100::Screen) -> String {
 
 /// Breaks the scene, then repairs it.
 fn typo(folder: &TestDir, terminal: &Terminal, text: &str, while_broken: &str) {
-    folder.write("scene.toml", &text.replace("radius", "radus"));
+    folder.write("scene.toml", text.replace("radius", "radus"));
     terminal.wait_for("broken");
     terminal.wait_for(while_broken);
     folder.write("scene.toml", text);

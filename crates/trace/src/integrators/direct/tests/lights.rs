@@ -287,7 +287,7 @@ fn spheres(count: u32, radius: f64) -> String {
             far * across * cos,
             far * height,
             far * across * sin,
-            radius * if i % 3 == 0 { 0.5 } else { 1.0 },
+            radius * if i.is_multiple_of(3) { 0.5 } else { 1.0 },
         )
     };
     (0..count).map(sphere).collect()
