@@ -131,11 +131,11 @@ fn sphere_cosine_deviations(shape: &Shape, from: Vec3) -> (f64, f64) {
 }
 
 /// Number of direction cells along each axis.
-const SIDE: usize = 12;
+const SIDE: usize = 20;
 /// Number of squares along each side of a cell. The pdf is evaluated once per square.
 const FINE: usize = 30;
 /// Number of samples per light.
-const COUNT: usize = 150_000;
+const COUNT: usize = 400_000;
 
 /// Distances from the floor to the lights, and points on the floor for which the lights are sampled.
 const PLACES: [(f64, Vec3); 2] = [(0.02, Vec3::ZERO), (0.8, Vec3::new(0.3, 0.0, -0.2))];
