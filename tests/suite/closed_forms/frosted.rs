@@ -436,8 +436,9 @@ fn photons_pass_rough_glass_with_ior_1() {
 #[test]
 fn sheet_on_glass_adds_no_light() {
     // A camera in glass below a sheet, with a sky above. The transmitted basic radiance is 1/n² of the
-    // transmitted radiance in air. Nothing is reflected from below.
-    let sky: Vec<Vec3> = [1.0, 1.0, 0.0, 0.0].map(Vec3::splat).to_vec();
+    // transmitted radiance in air. The sky is dark below the horizon, so that nothing is reflected from below.
+    // It has many rows, because it is interpolated between the two rows at the horizon.
+    let sky: Vec<Vec3> = (0..64).flat_map(|row| [Vec3::splat(f32::from(u8::from(row < 32))); 2]).collect();
     let sheet = |build: Build| {
         let build =
             build.quad(v(-3.0, 0.0, 3.0), v(6.0, 0.0, 0.0), v(0.0, 0.0, -6.0), translucent(0.9, 0.6, 0.8));
@@ -449,18 +450,11 @@ fn sheet_on_glass_adds_no_light() {
         ("before", sheet(scene()).shape(half_space, glass(1.5))),
     ] {
         let means = |build: Build| {
-            let values: Vec<f64> = by_paths(build, 4).values(256, 16);
+            let values: Vec<f64> = by_paths(build, 4).values(1024, 32);
             mean_and_error(&values)
         };
-        let ((air, error), (inside, other)) = (means(sheet(scene())), means(build));
-        let exact = air / 2.25;
-        assert!(
-            air > 0.3 && other < 0.01 * exact,
-            "{what}: {inside} ± {other} in glass, {air} ± {error} in air"
-        );
-        assert!(
-            (inside - exact).abs() < 4.0 * other.hypot(error),
-            "{what}: {inside} ± {other}, expected {exact}"
-        );
+        let (air, inside) = (means(sheet(scene())), means(build));
+        assert!(air.0 > 0.3, "{what}: {air:?} in air");
+        assert_same_mean(what, inside, (air.0 / 2.25, air.1 / 2.25), 4e-3);
     }
 }
