@@ -66,7 +66,7 @@ pub(super) struct RenderPlan {
     pub(super) effective: EffectiveSettingsSummary,
 }
 
-/// Resolved settings of a request's image and, if it is not the scene's own image, of that image too.
+/// Resolved settings of the image to show, and of the image that the scene specifies.
 pub(super) struct RequestPlans {
     pub(super) shown: RenderPlan,
     /// Settings of the scene's own image, or `None` if the request is for that image.
