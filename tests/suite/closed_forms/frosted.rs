@@ -288,13 +288,7 @@ fn clear_coat_attenuates_emission() {
     };
     for (number, shape) in shapes.into_iter().enumerate() {
         let lit = floor().shape(shape.clone(), coated(2.0));
-        let means = |build: &Build, samples: u32| {
-            let means = |seed| {
-                let picture = build.picture(samples, seed);
-                picture.iter().map(|color| color.x).sum::<f64>() / picture.len() as f64
-            };
-            mean_and_error(&(0..16).map(means).collect::<Vec<_>>())
-        };
+        let means = |build: &Build, samples: u32| mean_and_error(&build.mean_reds(samples));
         let samples = means(&lit, 32);
         // Light samples cannot find a light inside a glass shell.
         let hidden = lit.clone().sphere(v(0.0, 1.0, 0.0), 0.75, glass(1.0));

@@ -199,7 +199,7 @@ fn slab_and_ball_absorption_is_exact() {
     for (build, d) in [(slab(0.0, green), 1.0), (ball, 1.5)] {
         let lit = lit_from_below(build);
         let straight = lit.clone().depth(2).color();
-        let all: Vec<DVec3> = (0..64).map(|seed| lit.clone().depth(60).picture(16, seed)[0]).collect();
+        let all: Vec<DVec3> = lit.depth(60).pictures(16, 0..64).iter().map(|picture| picture[0]).collect();
         for channel in 0..3 {
             let a = tint[channel].powf(d);
             assert_close("straight through", straight[channel], 0.96 * 0.96 * a);

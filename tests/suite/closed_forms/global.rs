@@ -330,12 +330,7 @@ fn path_follows_mirrors_and_glass_like_whitted() {
             .pictured(v(0.0, 0.3, 6.0), DVec3::ZERO, 35.0, 12, 8)
     };
     for depth in [0, 1, 2, 3, 8] {
-        let mean = |build: Build| {
-            let values: Vec<f64> = (0..16)
-                .map(|seed| build.picture(64, seed).iter().map(|pixel| pixel.x).sum::<f64>() / 96.0)
-                .collect();
-            mean_and_error(&values)
-        };
+        let mean = |build: Build| mean_and_error(&build.mean_reds(64));
         let (path, whitted) = (mean(by_paths(build(), depth)), mean(build().depth(depth)));
         assert_same_mean(&format!("depth {depth}"), path, whitted, 1.5e-3);
     }
@@ -384,7 +379,7 @@ fn reflectances_multiply_per_color_channel() {
         }
     });
     let build = by_paths(room, 60);
-    let pixels: Vec<DVec3> = (0..32).map(|seed| build.picture(512, seed)[0]).collect();
+    let pixels: Vec<DVec3> = build.pictures(512, 0..32).iter().map(|picture| picture[0]).collect();
     for axis in 0..3 {
         let values: Vec<f64> = pixels.iter().map(|pixel| pixel[axis]).collect();
         assert_mean("a color", &values, 1.0 / (1.0 - f64::from(colors[axis])), 4e-3);

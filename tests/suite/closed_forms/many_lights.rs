@@ -1,6 +1,5 @@
 //! Many lights: sampling a subset matches the sum of all lights.
 
-use glimt::film::Rect;
 use glimt::geometry::mesh::TriangleMesh;
 use glimt::integrators::ViewMode;
 use glimt::lights::LightSamplingPurpose;
@@ -10,7 +9,7 @@ use glimt::scene::description::light::{DirectionalLight, Falloff, PointLight, Sp
 use glimt::scene::description::{Light, ShadowMode, Shape};
 
 use super::global::by_paths;
-use super::scenes::{AS_IT_IS, Build, emitter, glass, lat_long_sphere, matte, mirror, phong, scene, tile};
+use super::scenes::{AS_IT_IS, Build, emitter, glass, lat_long_sphere, matte, mirror, phong, scene};
 use super::{assert_mean, assert_same_mean, mean_and_error, v};
 
 /// Adds so many nearly black lights that each vertex samples only a subset of the lights. Black lights would
@@ -23,14 +22,10 @@ fn with_dark_lights(build: Build) -> Build {
 #[track_caller]
 fn assert_same(what: &str, a: &Build, b: &Build, (samples, seeds): (u32, u32), max_relative_error: f64) {
     let means = |build: &Build| -> Vec<f64> {
-        let world = build.world();
-        let (width, height) = (build.scene.render.width, build.scene.render.height);
-        let rect = Rect { x: 0, y: 0, width, height };
-        let mean = |seed| {
-            let picture = tile(&world, &build.settings(seed), rect, samples);
+        let mean = |picture: &Vec<DVec3>| {
             picture.iter().map(|c| c.element_sum() / 3.0).sum::<f64>() / picture.len() as f64
         };
-        (0..seeds).map(mean).collect()
+        build.pictures(samples, 0..seeds).iter().map(mean).collect()
     };
     assert_same_mean(what, mean_and_error(&means(a)), mean_and_error(&means(b)), max_relative_error);
 }

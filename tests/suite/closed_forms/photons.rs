@@ -117,8 +117,7 @@ fn furnace_with_emitter_in_glass_is_uniform() {
         .pictured(v(0.1, 0.2, 0.6), v(0.3, -1.0, 0.4), 20.0, 8, 8)
         .depth(400);
     for build in [furnace.clone().photons(10_000, 0.03), by_paths(furnace, 400)] {
-        let means: Vec<f64> = (0..16).map(|seed| mean(&build.picture(10, seed))).collect();
-        let (mean, error) = mean_and_error(&means);
+        let (mean, error) = mean_and_error(&build.mean_reds(10));
         assert!(error < 1e-2, "{mean} ± {error}");
         assert!((mean - 1.0).abs() < 4.0 * error + 2e-3, "{mean} ± {error}");
     }
@@ -156,10 +155,7 @@ fn caustics_alone(depth: u32) -> Build {
 
 /// Means and standard errors of path-traced and photon-mapped images.
 pub fn both(build: &Build, depth: u32, samples: [u32; 2], (count, radius): (u64, f64)) -> [(f64, f64); 2] {
-    let means = |build: &Build, samples| -> (f64, f64) {
-        let means: Vec<f64> = (0..16).map(|seed| mean(&build.picture(samples, seed))).collect();
-        mean_and_error(&means)
-    };
+    let means = |build: &Build, samples| mean_and_error(&build.mean_reds(samples));
     let by_photons = build.clone().photons(count, radius);
     [means(&by_paths(build.clone(), depth), samples[0]), means(&by_photons, samples[1])]
 }

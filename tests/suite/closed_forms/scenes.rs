@@ -265,8 +265,22 @@ impl Build {
 
     /// The whole image. Each pixel is the mean of its samples.
     pub fn picture(&self, samples: u32, seed: u32) -> Vec<DVec3> {
+        self.pictures(samples, [seed]).remove(0)
+    }
+
+    /// The whole image with each seed.
+    pub fn pictures(&self, samples: u32, seeds: impl IntoIterator<Item = u32>) -> Vec<Vec<DVec3>> {
+        let world = self.world();
         let (width, height) = (self.scene.render.width, self.scene.render.height);
-        tile(&self.world(), &self.settings(seed), Rect { x: 0, y: 0, width, height }, samples)
+        let rect = Rect { x: 0, y: 0, width, height };
+        seeds.into_iter().map(|seed| tile(&world, &self.settings(seed), rect, samples)).collect()
+    }
+
+    /// The mean of the whole image's red components with each of 16 seeds.
+    pub fn mean_reds(&self, samples: u32) -> Vec<f64> {
+        let mean =
+            |picture: Vec<DVec3>| picture.iter().map(|pixel| pixel.x).sum::<f64>() / picture.len() as f64;
+        self.pictures(samples, 0..16).into_iter().map(mean).collect()
     }
 
     /// Color of the only pixel, with one sample.
@@ -279,7 +293,7 @@ impl Build {
         self.color().x
     }
 
-    /// Values of the only pixel, one for each seed.
+    /// Values of the first pixel, one for each seed.
     pub fn values(&self, samples: u32, seeds: u32) -> Vec<f64> {
         let world = self.world();
         let rect = Rect { x: 0, y: 0, width: 1, height: 1 };

@@ -218,8 +218,9 @@ fn courtyard() -> Build {
 fn assert_same_picture(what: &str, one: &Build, other: &Build, [samples, others]: [u32; 2], seeds: u32) {
     let (width, height) = (48_usize, 32_usize);
     let blocks = |build: &Build, samples| -> Vec<Vec<f64>> {
-        let pictures = (0..seeds).map(|seed| build.picture(samples, seed));
+        let pictures = build.pictures(samples, 0..seeds);
         pictures
+            .iter()
             .map(|picture| {
                 let mut means = vec![0.0; (width / 16) * (height / 16) + 1];
                 let all = means.len() - 1;
@@ -299,7 +300,7 @@ fn a_thousand_texels_match_directional_lights() {
 #[test]
 fn single_texel_map_is_a_constant_color() {
     for build in both(&lit(receiver(DVec3::ZERO, 0.5), (1, vec![Vec3::new(1.0, 2.0, 4.0)]), 10.0)) {
-        let colors: Vec<DVec3> = (0..64).map(|seed| build.picture(64, seed)[0]).collect();
+        let colors: Vec<DVec3> = build.pictures(64, 0..64).iter().map(|picture| picture[0]).collect();
         for (axis, expected) in [0.5, 1.0, 2.0].into_iter().enumerate() {
             let values: Vec<f64> = colors.iter().map(|color| color[axis]).collect();
             assert_mean("one texel", &values, expected, 6e-4);

@@ -90,15 +90,9 @@ fn shapes_and_meshes() -> [(&'static str, Shape, TriangleMesh, AffineMap); 3] {
 /// and a share of the difference due to the facets.
 #[track_caller]
 fn assert_same_image_mean(what: &str, scenes: [Build; 2], noise: f64) {
-    let means = |build: &Build| {
-        let mean = |seed| {
-            let picture = build.picture(4, seed);
-            picture.iter().map(|pixel| pixel.x).sum::<f64>() / picture.len() as f64
-        };
-        (0..16).map(mean).collect::<Vec<f64>>()
-    };
-    let [(a, error_a), (b, error_b)] = scenes
-        .map(|build| mean_and_error(&means(&build.pictured(v(1.5, 2.0, 4.0), DVec3::ZERO, 30.0, 24, 18))));
+    let [(a, error_a), (b, error_b)] = scenes.map(|build| {
+        mean_and_error(&build.pictured(v(1.5, 2.0, 4.0), DVec3::ZERO, 30.0, 24, 18).mean_reds(4))
+    });
     let error = error_a.hypot(error_b);
     assert!(error < noise * a, "{what}: too noisy: {a} ± {error}");
     assert!((a - b).abs() < 5.0 * error + 2e-4 * a, "{what}: {a} and {b} ± {error}");
@@ -178,9 +172,7 @@ fn transformed_shapes_are_white_in_a_furnace() {
                 .depth(64)
                 .with(|scene| scene.render.integrator = Integrator::Path)
                 .pictured(v(1.2, 2.0, 3.0), DVec3::ZERO, 25.0, 6, 6);
-            let mean = |seed| furnace.picture(16, seed).iter().map(|pixel| pixel.x).sum::<f64>() / 36.0;
-            let values: Vec<f64> = (0..32).map(mean).collect();
-            let (mean, error) = mean_and_error(&values);
+            let (mean, error) = mean_and_error(&furnace.mean_reds(32));
             assert!(error < 6e-4, "{own:?}: {mean} ± {error}");
             assert!((mean - 1.0).abs() < 4.0 * error + 1e-5, "{own:?}: {mean} ± {error}");
         }

@@ -320,26 +320,18 @@ mod tests {
 
     #[test]
     fn traversals_match_brute_force_bit_for_bit() {
-        let of_each =
-            |mesh: &[[Vec3; 3]]| [Quality::Medium, Quality::High].map(|quality| built_with(quality, mesh));
         for (number, mesh) in difficult_meshes().iter().enumerate() {
-            for (tree, instructions) in
-                of_each(mesh).iter().flat_map(|tree| InstructionSet::ALL.map(|one| (tree, one)))
-            {
-                let tree = tree.clone().with_instruction_set(instructions);
-                for ray in difficult_rays(mesh) {
-                    let expected = closest_by_brute_force(mesh, &ray);
-                    let found = tree.closest_hit(&ray);
-                    assert_eq!(
-                        hit_bits(found),
-                        hit_bits(expected),
-                        "mesh {number}, {instructions:?}, {ray:?}"
-                    );
-                    assert_eq!(
-                        tree.any_hit(&ray, None),
-                        expected.is_some(),
-                        "mesh {number}, {instructions:?}, {ray:?}"
-                    );
+            let trees = [Quality::Medium, Quality::High].map(|quality| built_with(quality, mesh));
+            let trees = trees.iter().flat_map(|tree| {
+                InstructionSet::ALL.map(|instructions| tree.clone().with_instruction_set(instructions))
+            });
+            let trees: Vec<_> = trees.collect();
+            for ray in difficult_rays(mesh) {
+                let expected = closest_by_brute_force(mesh, &ray);
+                for tree in &trees {
+                    let context = || format!("mesh {number}, {:?}, {ray:?}", tree.instruction_set());
+                    assert_eq!(hit_bits(tree.closest_hit(&ray)), hit_bits(expected), "{}", context());
+                    assert_eq!(tree.any_hit(&ray, None), expected.is_some(), "{}", context());
                 }
             }
         }
@@ -369,38 +361,29 @@ mod tests {
     #[test]
     fn packets_match_single_rays() {
         for (number, mesh) in difficult_meshes().iter().enumerate() {
-            let mut tree = built(mesh);
-            for instructions in InstructionSet::ALL {
-                tree = tree.with_instruction_set(instructions);
-                for rays in packets(mesh) {
+            let trees = InstructionSet::ALL.map(|one| built(mesh).with_instruction_set(one));
+            for rays in packets(mesh) {
+                let expected: Vec<_> = rays.iter().map(|ray| closest_by_brute_force(mesh, ray)).collect();
+                let bits = |hits: &[Option<ShapeHit>]| hits.iter().copied().map(hit_bits).collect::<Vec<_>>();
+                let except: Vec<_> = (0..rays.len())
+                    .map(|i| expected[i].filter(|_| i % 3 == 0).map(|hit| hit.primitive))
+                    .collect();
+                let hits_another = |(i, ray): (usize, &Ray)| {
+                    let is_left_out = |id: u32| Some(id) == except[i] || id == ray.start;
+                    let sheared = ShearedRay::new(ray.origin, ray.direction);
+                    let mut others = mesh.iter().zip(0..).filter(|&(_, id)| !is_left_out(id));
+                    expected[i].is_some()
+                        && others.any(|(corners, _)| sheared.intersect(corners, ray.t_max).is_some())
+                };
+                let any = rays.iter().enumerate().map(hits_another);
+                let any = any.enumerate().fold(0, |bits, (i, hit)| bits | u32::from(hit) << i);
+                for tree in &trees {
+                    let context = || format!("mesh {number}, {:?}, {rays:?}", tree.instruction_set());
                     let mut found = vec![None; rays.len()];
                     tree.closest_hit_packet(&rays, &packet_ray_ends(&rays), &mut found);
-                    let expected: Vec<_> = rays.iter().map(|ray| closest_by_brute_force(mesh, ray)).collect();
-                    let bits = |hits: &[Option<ShapeHit>]| -> Vec<_> {
-                        let bits = |hit: &ShapeHit| {
-                            (hit.t.to_bits(), hit.primitive, hit.u.to_bits(), hit.v.to_bits())
-                        };
-                        hits.iter().map(|hit| hit.as_ref().map(bits)).collect()
-                    };
-                    assert_eq!(bits(&found), bits(&expected), "mesh {number}, {instructions:?}, {rays:?}");
-                    let except: Vec<_> = (0..rays.len())
-                        .map(|i| expected[i].filter(|_| i % 3 == 0).map(|hit| hit.primitive))
-                        .collect();
-                    let any = tree.any_hit_packet(&rays, &packet_ray_ends(&rays), &except);
-                    for (i, ray) in rays.iter().enumerate() {
-                        let is_left_out = |id: u32| Some(id) == except[i] || id == ray.start;
-                        let others = mesh.iter().zip(0..).filter(|&(_, id)| !is_left_out(id));
-                        let sheared = ShearedRay::new(ray.origin, ray.direction);
-                        let hit = others
-                            .clone()
-                            .any(|(corners, _)| sheared.intersect(corners, ray.t_max).is_some());
-                        let hit = hit && expected[i].is_some();
-                        assert_eq!(
-                            any & 1 << i != 0,
-                            hit,
-                            "mesh {number}, {instructions:?}, ray {i} of {rays:?}"
-                        );
-                    }
+                    assert_eq!(bits(&found), bits(&expected), "{}", context());
+                    let found = tree.any_hit_packet(&rays, &packet_ray_ends(&rays), &except);
+                    assert_eq!(found, any, "{}", context());
                 }
             }
         }

@@ -206,18 +206,20 @@ mod tests {
             let angle = id as f32 * 0.1;
             [Vec3::ZERO, Vec3::new(angle.cos(), angle.sin(), 1.0), Vec3::new(angle.sin(), 1.0, angle.cos())]
         };
+        const COUNT: u64 = 2000;
         let size = |room| {
-            let built = build_with_budget(room, 6000, fan, &CancelToken::new()).expect("never canceled");
+            let built =
+                build_with_budget(room, COUNT as u32, fan, &CancelToken::new()).expect("never canceled");
             let leaf = |node: &&PackedKdNode| matches!(node.decode(), DecodedNode::Leaf { .. });
-            assert_eq!(built.triangles.len(), 6000);
+            assert_eq!(built.triangles.len() as u64, COUNT);
             (built.nodes.iter().filter(leaf).count() + built.references.len()) as u64
         };
         let whole = size(MOST_ROOM);
-        assert!(whole > 20_000, "{whole}");
-        for room in [6001, 12_001, 12_002, 14_000, 20_000] {
+        assert!(whole > 3 * COUNT, "{whole}");
+        for room in [COUNT + 1, 2 * COUNT + 1, 2 * COUNT + 2, 2 * COUNT + 700, 3 * COUNT] {
             assert!(size(room) <= room, "{} in {room}", size(room));
         }
-        assert_eq!(size(6001), 6001, "one leaf");
-        assert!(size(20_000) > 6001, "the tree should use the available room");
+        assert_eq!(size(COUNT + 1), COUNT + 1, "one leaf");
+        assert!(size(3 * COUNT) > COUNT + 1, "the tree should use the available room");
     }
 }
