@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 
 use glimt::tui::messages;
 
-use super::relay::{Answers, Relay, Seen};
+use super::relay::{Answers, Relay, Scanner, Seen};
 use crate::test_dir::{PROGRAM, TestDir};
 use nix::sys::signal::{Signal, kill};
 use nix::sys::termios::LocalFlags;
@@ -184,11 +184,16 @@ impl Terminal {
         let relay = match line {
             Some(answers) => Some(Relay::start(output, keys.clone(), (shared, kept), answers)),
             None => {
+                let input = keys.clone();
                 std::thread::spawn(move || {
-                    let mut bytes = [0; 1 << 16];
+                    let (mut bytes, mut queries) = ([0; 1 << 16], Scanner::default());
                     while let Ok(count @ 1..) = output.read(&mut bytes) {
                         kept.lock().expect("not poisoned").extend_from_slice(&bytes[..count]);
                         shared.lock().expect("not poisoned").process(&bytes[..count]);
+                        for (answer, _) in queries.answers(&bytes[..count]) {
+                            // Ignore errors: the program may have exited.
+                            let _ = input.lock().expect("not poisoned").write_all(answer);
+                        }
                         while !reads.load(Ordering::Acquire) {
                             std::thread::sleep(Duration::from_millis(5));
                         }

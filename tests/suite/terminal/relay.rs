@@ -165,7 +165,7 @@ fn raise(rising: &Receiver<Due>, input: &Mutex<Box<dyn Write + Send>>, seen: &Mu
 
 /// Finds queries in a stream that may be split at any byte.
 #[derive(Default)]
-struct Scanner {
+pub struct Scanner {
     last: Vec<u8>,
     /// Number of bytes scanned so far.
     count: usize,
@@ -173,7 +173,7 @@ struct Scanner {
 
 impl Scanner {
     /// Replies to queries, each with the number of bytes up to its query.
-    fn answers(&mut self, bytes: &[u8]) -> Vec<(&'static [u8], usize)> {
+    pub fn answers(&mut self, bytes: &[u8]) -> Vec<(&'static [u8], usize)> {
         let mut found = Vec::new();
         for byte in bytes {
             self.last.push(*byte);
