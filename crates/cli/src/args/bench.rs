@@ -2,11 +2,11 @@
 
 use std::path::PathBuf;
 
-use super::{
-    CLAMP, ProgressMode, Switch, candidates, choice_long_help, choice_parser, integer_override_parser,
-    number_override_parser, parse_integer_in_range, parse_niceness, parse_positive_seconds,
-    parse_thread_count, parse_u32,
+use super::parsers::{
+    CLAMP, choice_long_help, choice_parser, integer_override_parser, number_override_parser,
+    parse_integer_in_range, parse_niceness, parse_positive_seconds, parse_thread_count, parse_u32,
 };
+use super::{ProgressMode, Switch, candidates};
 use crate::scene::description::{Accel, Integrator, ShadowMode};
 use crate::tui::ColorDepthChoice;
 

@@ -2,12 +2,10 @@
 
 use std::path::PathBuf;
 
-use super::{ProgressMode, candidates, choice_long_help, choice_parser};
+use super::parsers::{MAX_PARTS, choice_long_help, choice_parser};
+use super::{ProgressMode, candidates};
 use crate::choice;
 use crate::tui::ColorDepthChoice;
-
-/// Maximum number of parts per image.
-pub(super) const MAX_PARTS: u32 = 1 << 20;
 
 pub(super) const MERGE_HELP: &str = "\
 The result is identical to that of a single run: the same linear values in an EXR file, the same pixel bytes in a PNG \
