@@ -6,6 +6,9 @@ use std::sync::atomic::{AtomicI32, Ordering};
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use signal_hook::iterator::Signals;
 
+use crate::console::Console;
+use crate::control::CancelToken;
+use crate::exit::Exit;
 use crate::system::describe_error;
 use crate::system::threads::{describe_start_failure, spawn};
 
@@ -26,6 +29,22 @@ pub(super) fn signal_name(number: i32) -> Option<&'static str> {
         SIGTERM => Some("SIGTERM"),
         _ => None,
     }
+}
+
+/// Runs a command whose token a signal cancels. The command must not write anything once it is canceled.
+pub(super) fn run_until_signal(console: &Console, command: impl FnOnce(&CancelToken) -> Exit) -> Exit {
+    let token = CancelToken::new();
+    let cancel = token.clone();
+    let ended = match install_signal_handlers(move || cancel.cancel()) {
+        Ok(ended) => ended,
+        Err(message) => return console.print_error(Exit::FAILED, &message),
+    };
+    let exit = command(&token);
+    let Some(number) = ended.signal_number() else { return exit };
+    if let Some(signal) = signal_name(number).filter(|_| exit != Exit::DONE) {
+        console.print_line_to_stderr(&format!("terminated by {signal}: nothing was written"));
+    }
+    Exit::from_signal(number)
 }
 
 /// Installs handlers that call `on_signal` on a separate thread instead of terminating the process.

@@ -144,7 +144,8 @@ fn report_unfinished(
             if progress.is_text() {
                 console.print_diagnostics(diagnostics);
             } else {
-                let messages: Vec<_> = diagnostics.iter().map(format_diagnostic).collect();
+                let message = |one: &Diagnostic| format!("{}: {}", one.path.display(), one.message);
+                let messages: Vec<_> = diagnostics.iter().map(message).collect();
                 progress.report_failure("scene", &messages.join("; "));
             }
             Exit::WRONG
@@ -159,10 +160,6 @@ fn report_unfinished(
         }
         BenchError::Cancelled => Exit::FAILED,
     }
-}
-
-fn format_diagnostic(diagnostic: &Diagnostic) -> String {
-    format!("{}: {}", diagnostic.path.display(), diagnostic.message)
 }
 
 /// Converts the arguments to a benchmark request.

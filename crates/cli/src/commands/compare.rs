@@ -47,7 +47,8 @@ fn run_in_pool(pool: &ThreadPool, args: &CompareArgs, console: &Console) -> Resu
         print_json(&summary, console);
     } else {
         pictures::print_images(&pool.install(|| pictures::render_images(args, &pair, &measured)), console);
-        print_table(&summary, console);
+        let lines = format_table(&summary, console.stdout_columns());
+        lines.iter().for_each(|line| console.print_line(line));
     }
     if let Some(diff) = diff {
         let written = pool.install(|| diff.write(args, &pair, &measured));
@@ -223,10 +224,6 @@ fn print_json(summary: &Summary<'_>, console: &Console) {
         Ok(text) => console.print_line(&text),
         Err(error) => console.print_line_to_stderr(&format!("error: {error}")),
     }
-}
-
-fn print_table(summary: &Summary<'_>, console: &Console) {
-    format_table(summary, console.stdout_columns()).iter().for_each(|line| console.print_line(line));
 }
 
 /// Formats the table as lines, wrapped to `columns`.

@@ -1,7 +1,6 @@
 //! `glimt doctor`: reports the detected environment.
 
 use std::env::consts::{ARCH, OS};
-use std::path::Path;
 
 use crate::accel::wide_bvh::InstructionSet;
 use crate::bench::cache;
@@ -132,11 +131,9 @@ fn describe_cache_folder() -> String {
             let bytes = sizes.iter().sum::<u64>();
             format!("{name}: {}, {:.1} MB", format_count(sizes.len() as u64, "file"), bytes as f64 / 1e6)
         }
-        Err(_) if !path_exists(&folder) => format!("{name}: does not exist yet; created by `bench`"),
+        Err(_) if folder.symlink_metadata().is_err() => {
+            format!("{name}: does not exist yet; created by `bench`")
+        }
         Err(error) => format!("{name}: cannot be read: {error}"),
     }
-}
-
-fn path_exists(folder: &Path) -> bool {
-    folder.symlink_metadata().is_ok()
 }

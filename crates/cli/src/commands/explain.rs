@@ -73,7 +73,10 @@ fn explain_path(path: &str) -> Option<String> {
                     .filter_map(|table| Some(type_details(table, table.find_type_or_default(Some(name))?)));
                 Some(texts.collect::<Vec<_>>().join("\n"))
             }
-            None => found(all_keys_with_paths().filter(|(_, key)| key.name == *name).collect()),
+            None => {
+                let all = all_tables().iter().flat_map(table_keys_with_paths);
+                found(all.filter(|(_, key)| key.name == *name).collect())
+            }
         },
         [name, second] => {
             let table = find_table(name)?;
@@ -104,11 +107,7 @@ fn explain_path(path: &str) -> Option<String> {
     }
 }
 
-/// Returns all keys with their full paths, such as `TABLE.TYPE.KEY`.
-fn all_keys_with_paths() -> impl Iterator<Item = (String, &'static KeyInfo)> {
-    all_tables().iter().flat_map(table_keys_with_paths)
-}
-
+/// Returns a table's keys with their full paths, such as `TABLE.TYPE.KEY`.
 fn table_keys_with_paths(table: &'static TableInfo) -> impl Iterator<Item = (String, &'static KeyInfo)> {
     let own = table.types.iter().flat_map(move |kind| {
         kind.keys.iter().map(move |key| (format!("{}.{}.{}", table.name, kind.name, key.name), key))

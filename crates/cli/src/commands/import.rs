@@ -15,18 +15,7 @@ use crate::scene::has_scene_extension;
 use crate::signals;
 
 pub(crate) fn run(args: &ImportArgs, console: &Console) -> Exit {
-    let token = CancelToken::new();
-    let cancel = token.clone();
-    let ended = match signals::install_signal_handlers(move || cancel.cancel()) {
-        Ok(ended) => ended,
-        Err(message) => return console.print_error(Exit::FAILED, &message),
-    };
-    let exit = convert_and_write(args, console, &token);
-    let Some(number) = ended.signal_number() else { return exit };
-    if let Some(signal) = signals::signal_name(number).filter(|_| exit != Exit::DONE) {
-        console.print_line_to_stderr(&format!("terminated by {signal}: nothing was written"));
-    }
-    Exit::from_signal(number)
+    signals::run_until_signal(console, |token| convert_and_write(args, console, token))
 }
 
 /// Converts the file. Does not report an error if the token is canceled.

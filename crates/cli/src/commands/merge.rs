@@ -37,21 +37,7 @@ pub(crate) fn run(args: &MergeArgs, console: &Console) -> Exit {
         Ok(pool) => pool,
         Err(message) => return console.print_error(Exit::FAILED, &message),
     };
-    let token = CancelToken::new();
-    let cancel = token.clone();
-    let ended = match signals::install_signal_handlers(move || cancel.cancel()) {
-        Ok(ended) => ended,
-        Err(message) => return console.print_error(Exit::FAILED, &message),
-    };
-    let exit = MergeCommand { args, console, token: &token, pool: &pool }.run();
-    ended.signal_number().map_or(exit, |number| report_signal(number, console))
-}
-
-fn report_signal(number: i32, console: &Console) -> Exit {
-    if let Some(signal) = signals::signal_name(number) {
-        console.print_line_to_stderr(&format!("terminated by {signal}: nothing was written"));
-    }
-    Exit::from_signal(number)
+    signals::run_until_signal(console, |token| MergeCommand { args, console, token, pool: &pool }.run())
 }
 
 /// The context of a running `merge` command.

@@ -91,7 +91,7 @@ fn write_schema(path: &Path) -> Result<bool, (Exit, String)> {
 fn message_if_image_or_mesh_extension(file: &Path) -> Option<String> {
     let what = if has_model_extension(file) {
         "a mesh"
-    } else if has_image_extension(file) {
+    } else if Format::from_path(file).is_ok() {
         "an image"
     } else {
         return None;
@@ -111,11 +111,6 @@ fn quote_file_name(file: &Path) -> Option<String> {
     let is_bare = !name.contains(['/', '.']) || name.starts_with('-');
     let name = if is_bare { format!("./{name}") } else { name.to_owned() };
     shlex::try_quote(&name).ok().map(Cow::into_owned)
-}
-
-/// Whether a file has an image extension.
-fn has_image_extension(file: &Path) -> bool {
-    Format::from_path(file).is_ok()
 }
 
 #[cfg(test)]

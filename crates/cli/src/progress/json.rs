@@ -14,7 +14,6 @@
 //!
 //! A diagnostic has the keys of `check --json` ([`diagnostic_json`](crate::diagnostic_json)), and `path`.
 
-use std::borrow::Cow;
 use std::io::Write;
 
 use serde_json::{Value, json};
@@ -144,14 +143,10 @@ fn diagnostics_to_json(all: &[Diagnostic]) -> Vec<Value> {
     let mut places = LineColumnLocator::default();
     let with_path = |one: &Diagnostic| {
         let mut value = diagnostic_to_json(one, &mut places);
-        value["path"] = json!(diagnostic_path(one));
+        value["path"] = json!(Some(one.path.to_string_lossy()).filter(|path| !path.is_empty()));
         value
     };
     all.iter().map(with_path).collect()
-}
-
-fn diagnostic_path(diagnostic: &Diagnostic) -> Option<Cow<'_, str>> {
-    Some(diagnostic.path.to_string_lossy()).filter(|path| !path.is_empty())
 }
 
 #[cfg(test)]
