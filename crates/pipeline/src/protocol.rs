@@ -465,3 +465,16 @@ pub struct PreviewedImageState {
     /// Whether the image has all of its samples.
     pub is_finished: bool,
 }
+impl PreviewUpdate {
+    /// Whether two previews show the same image, regardless of size and sample count.
+    pub fn shows_same_image(&self, other: &Self) -> bool {
+        let images = self.source.zip(other.source);
+        images.is_some_and(|(own, other)| own.image == other.image)
+    }
+
+    /// Whether all samples are known to be included in the image.
+    pub fn is_finished(&self) -> bool {
+        self.source.is_some_and(|source| source.is_finished)
+    }
+}
+

@@ -2,15 +2,13 @@
 
 use std::io::ErrorKind;
 use std::path::PathBuf;
-use std::sync::Arc;
 use std::time::Duration;
 
 use crossterm::event::{KeyCode, KeyModifiers};
 
 use super::options::{ContentChangeTime, OutputChange, WatchEvent};
 use super::terminal_replies::TerminalReply;
-use crate::film::Srgb8Image;
-use crate::pipeline::protocol::{self, NormalizedRect, PreviewedImageState};
+use crate::pipeline::protocol::{self, PreviewUpdate};
 
 /// An input to the front end.
 #[derive(Clone, Debug)]
@@ -33,16 +31,8 @@ pub(super) enum Event {
     Resize(WindowSize),
     /// A message from the worker. Previews arrive as [`Event::Picture`].
     Worker(protocol::Event),
-    /// A new preview. `range` is the range of displayed values, for views that map values to colors.
-    /// `section` is set if only part of the image is shown, at 1:1 scale.
-    Picture {
-        generation: u64,
-        picture: Arc<Srgb8Image>,
-        range: Option<[f32; 2]>,
-        section: Option<NormalizedRect>,
-        lacks_photons: bool,
-        source: Option<PreviewedImageState>,
-    },
+    /// A new preview.
+    Picture(PreviewUpdate),
     /// A file that the scene depends on was written.
     Changed(ContentChangeTime),
     /// The changed files have been fully written.

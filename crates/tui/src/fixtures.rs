@@ -19,8 +19,8 @@ use super::view;
 use crate::film::Srgb8Image;
 use crate::math::DVec3;
 use crate::pipeline::protocol::{
-    self, AssetProgress, Command, Failure, ImageReport, RenderProgress, Report, Request, ResolvedCamera,
-    SampleCounts, Stage, StageReport, Status, WorkCounters,
+    self, AssetProgress, Command, Failure, ImageReport, PreviewUpdate, RenderProgress, Report, Request,
+    ResolvedCamera, SampleCounts, Stage, StageReport, Status, WorkCounters,
 };
 use crate::pipeline::settings::{EffectiveSettingsSummary, Overrides, SceneSettings, ViewMode};
 use crate::scene::description::{Accel, Integrator, Pose, ShadowMode};
@@ -118,14 +118,14 @@ impl TestUi {
 
     /// Delivers a preview of the current request.
     pub(super) fn show_preview(&mut self, color: [u8; 3]) {
-        self.handle_event(Event::Picture {
+        self.handle_event(Event::Picture(PreviewUpdate {
             generation: self.state.request.generation,
             picture: uniform_picture(50, 38, color),
             range: None,
             section: None,
             lacks_photons: false,
             source: None,
-        });
+        }));
     }
 
     /// Simulates a complete render of a uniform image.

@@ -19,7 +19,7 @@ use super::view::FileLinksAndDelayedText;
 use super::view::layout::Layout;
 use super::window_title::TitleAndProgress;
 use crate::film::Srgb8Image;
-use crate::pipeline::protocol::{PreviewSlot, PreviewUpdate};
+use crate::pipeline::protocol::PreviewSlot;
 
 /// Frame interval. Output is limited to 20 frames per second, except in response to keys.
 const FRAME: Duration = Duration::from_millis(50);
@@ -133,9 +133,7 @@ impl FramePresenter {
 
     fn take_preview_event(&mut self) -> Option<Event> {
         self.drawn.is_old = false;
-        let latest = self.previews.lock().unwrap_or_else(PoisonError::into_inner).take()?;
-        let PreviewUpdate { generation, picture, range, section, lacks_photons, source } = latest;
-        Some(Event::Picture { generation, picture, range, section, lacks_photons, source })
+        self.previews.lock().unwrap_or_else(PoisonError::into_inner).take().map(Event::Picture)
     }
 
     /// Delays the next frame, even an urgent one, until one frame interval after `now`.

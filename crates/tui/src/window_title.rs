@@ -87,7 +87,7 @@ impl TitleAndProgress {
 
 /// The window title, such as `cornell.toml: rendering 38 % · glimt`.
 fn title_text(state: &State, percent: Option<u32>) -> String {
-    let word = view::activity_word(state);
+    let word = view::worker_activity_word(state);
     let percent = percent.map_or(String::new(), |percent| format!(" {percent} %"));
     format!("{}: {word}{percent} · glimt", scene_file_name(state))
 }
@@ -112,7 +112,7 @@ pub(super) fn notification_bytes(state: &State, notice: NotificationProtocol, ti
     let words = format!(
         "{}: {} after {}",
         scene_file_name(state),
-        view::activity_word(state),
+        view::worker_activity_word(state),
         view::text::format_duration(time)
     );
     match notice {

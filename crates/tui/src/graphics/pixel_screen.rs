@@ -12,7 +12,6 @@ pub struct TestImageTerminal {
     /// Base64 data from the kitty chunks received so far.
     chunks: Vec<u8>,
     shown: Option<Srgb8Image>,
-    count: usize,
 }
 
 impl TestImageTerminal {
@@ -39,11 +38,6 @@ impl TestImageTerminal {
         self.shown.as_ref()
     }
 
-    /// Number of images shown so far.
-    pub fn received_image_count(&self) -> usize {
-        self.count
-    }
-
     fn end_control_string(&mut self, string: &[u8]) {
         let picture = match string {
             [b'_', b'G', command @ ..] => self.handle_kitty_chunk(command),
@@ -52,7 +46,6 @@ impl TestImageTerminal {
         };
         if picture.is_some() {
             self.shown = picture;
-            self.count += 1;
         }
     }
 

@@ -1,12 +1,12 @@
 //! The displayed image and the history.
 
-use crate::history::{RenderHistory, ShownImage};
-use crate::pipeline::protocol::ImagePosition;
+use crate::history::RenderHistory;
+use crate::pipeline::protocol::{ImagePosition, PreviewUpdate};
 
 /// The displayed image, and how it is shown.
 #[derive(Default)]
 pub(crate) struct PictureState {
-    pub shown: Option<ShownImage>,
+    pub shown: Option<PreviewUpdate>,
     pub history: RenderHistory,
     /// Center of the section shown at 1:1 scale, or `None` if the whole image is shown.
     pub close_up: Option<ImagePosition>,

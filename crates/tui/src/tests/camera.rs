@@ -4,7 +4,7 @@ use super::{BLUE, RED};
 use crate::event::{Effect, Event, KeyPress};
 use crate::fixtures::*;
 use crate::messages;
-use crate::pipeline::protocol::{self, Command, ResolvedCamera, WriteRequirement};
+use crate::pipeline::protocol::{self, Command, PreviewUpdate, ResolvedCamera, WriteRequirement};
 use crate::pipeline::settings::{Overrides, SceneSettings};
 use crate::preview_style::PreviewStyle;
 use crate::scene::description::Pose;
@@ -14,14 +14,14 @@ use crossterm::event::KeyCode;
 
 fn show(ui: &mut TestUi) -> Vec<crate::event::Effect> {
     let generation = ui.state.request.generation;
-    ui.handle_event(Event::Picture {
+    ui.handle_event(Event::Picture(PreviewUpdate {
         generation,
         picture: uniform_picture(50, 38, BLUE),
         range: None,
         section: None,
         lacks_photons: false,
         source: None,
-    })
+    }))
 }
 
 #[test]

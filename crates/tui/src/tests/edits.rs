@@ -6,7 +6,7 @@ use crate::event::{Event, PreviewSendReport};
 use crate::fixtures::*;
 use crate::messages;
 use crate::pipeline::protocol::{
-    self, CameraSaveResult, LastValidSceneRenderOutcome, PreviewedImageState, Stage, Status,
+    self, CameraSaveResult, LastValidSceneRenderOutcome, PreviewUpdate, PreviewedImageState, Stage, Status,
 };
 use crate::pipeline::settings::EffectiveSettingsSummary;
 use crate::scene::diagnostic::{Diagnostic, Severity};
@@ -27,7 +27,14 @@ fn preview(ui: &mut TestUi, name: &str, color: [u8; 3], is_finished: bool) {
     let source = Some(PreviewedImageState { image: FingerprintHasher::new(name).finish(), is_finished });
     let picture = uniform_picture(50, 38, color);
     let (range, section, lacks_photons) = (None, None, false);
-    ui.handle_event(Event::Picture { generation, picture, range, section, lacks_photons, source });
+    ui.handle_event(Event::Picture(PreviewUpdate {
+        generation,
+        picture,
+        range,
+        section,
+        lacks_photons,
+        source,
+    }));
 }
 
 /// Finishes a request whose render stage took `seconds`. The image took `of_image` seconds in total.

@@ -6,7 +6,7 @@ use super::{BLUE, RED, cells_of};
 use crate::event::{Effect, Event, KeyPress, RequiredEventSource, Signal};
 use crate::fixtures::*;
 use crate::messages;
-use crate::pipeline::protocol::{self, Command, Failure, MaxPreviewSize, WriteRequirement};
+use crate::pipeline::protocol::{self, Command, Failure, MaxPreviewSize, PreviewUpdate, WriteRequirement};
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::state::RequestStatus;
 use crate::{ContentChangeTime, ExitStatus};
@@ -27,14 +27,14 @@ fn images_of_older_requests_are_dropped() {
     let old = ui.state.request.generation;
     ui.press_character('r');
     ui.draw_screen();
-    ui.handle_event(Event::Picture {
+    ui.handle_event(Event::Picture(PreviewUpdate {
         generation: old,
         picture: uniform_picture(50, 38, BLUE),
         range: None,
         section: None,
         lacks_photons: false,
         source: None,
-    });
+    }));
     ui.worker_event(protocol::Event::Progress { generation: old, progress: render_progress(0.5, None) });
     ui.worker_event(protocol::Event::Failed { generation: old, failure: Failure::Work("old".to_owned()) });
     assert!(!ui.state.dirty, "outdated events should not cause a redraw");
@@ -53,14 +53,14 @@ fn first_change_is_timed_from_the_save() {
     assert_eq!(find_render_request(&effects).map(|it| it.generation), Some(2));
     ui.handle_event(Event::Shown { generation: 1 });
     assert_eq!(ui.state.saving.first_change, None, "the old preview should not count");
-    ui.handle_event(Event::Picture {
+    ui.handle_event(Event::Picture(PreviewUpdate {
         generation: 2,
         picture: uniform_picture(50, 38, BLUE),
         range: None,
         section: None,
         lacks_photons: false,
         source: None,
-    });
+    }));
     ui.now += Duration::from_millis(20);
     ui.handle_event(Event::Shown { generation: 2 });
     ui.worker_event(done_event(2, Vec::new(), false));
@@ -78,14 +78,14 @@ fn only_the_first_preview_is_urgent() {
     let mut ui = TestUi::new();
     let picture = |ui: &mut TestUi, generation| {
         ui.state.urgent = false;
-        ui.handle_event(Event::Picture {
+        ui.handle_event(Event::Picture(PreviewUpdate {
             generation,
             picture: uniform_picture(50, 38, RED),
             range: None,
             section: None,
             lacks_photons: false,
             source: None,
-        });
+        }));
         ui.state.urgent
     };
     assert!(picture(&mut ui, 1));
@@ -136,14 +136,14 @@ fn preview_is_resized_after_a_delay() {
         effects[..],
         [Effect::Send(Command::Preview(Some(MaxPreviewSize { width: 152, height: 114, around: None })))]
     ));
-    ui.handle_event(Event::Picture {
+    ui.handle_event(Event::Picture(PreviewUpdate {
         generation: 1,
         picture: uniform_picture(149, 112, BLUE),
         range: None,
         section: None,
         lacks_photons: false,
         source: None,
-    });
+    }));
     assert!(cells_of(&mut ui, BLUE) > 0, "the new preview should be shown");
     ui.finish_render(RED);
     ui.handle_event(Event::Resize(window(200, 60)));

@@ -8,7 +8,9 @@ use crate::color::ColorDepth;
 use crate::event::{Effect, Event, KeyPress, MouseEvent, MouseEventKind};
 use crate::fixtures::*;
 use crate::messages;
-use crate::pipeline::protocol::{CameraSaveResult, Command, Event as WorkerEvent, PickedPixel};
+use crate::pipeline::protocol::{
+    CameraSaveResult, Command, Event as WorkerEvent, PickedPixel, PreviewUpdate,
+};
 use crate::pipeline::settings::Overrides;
 use crate::preview_style::PreviewStyle;
 
@@ -109,14 +111,14 @@ fn newest_render_progress_is_shown() {
     let generation = ui.state.request.generation;
     ui.worker_event(WorkerEvent::Started { generation });
     let picture = uniform_picture(50, 38, RED);
-    ui.handle_event(Event::Picture {
+    ui.handle_event(Event::Picture(PreviewUpdate {
         generation,
         picture,
         range: None,
         section: None,
         lacks_photons: false,
         source: None,
-    });
+    }));
     ui.worker_event(WorkerEvent::Progress { generation, progress: render_progress(0.25, Some(3.0)) });
     ui.press_character('n');
     let words = format!("{}, 0 s ago  newest 25 %  ETA 3.0 s", messages::render_number_of_count(2, 3));

@@ -7,7 +7,7 @@ use crate::event::{Effect, Event};
 use crate::fixtures::*;
 use crate::graphics::ImageProtocol;
 use crate::messages;
-use crate::pipeline::protocol::{self, Command, MaxPreviewSize, Stage, Status};
+use crate::pipeline::protocol::{self, Command, MaxPreviewSize, PreviewUpdate, Stage, Status};
 use crate::pipeline::settings::{EffectiveSettingsSummary, Overrides};
 use crate::preview_style::PreviewStyle;
 use crate::scene::diagnostic::Severity;
@@ -36,14 +36,14 @@ fn show(ui: &mut TestUi, size: (u32, u32)) {
     let generation = ui.state.request.generation;
     let (width, height) = fitted_preview_size(size, ui.state.request.preview_size.expect("a preview"));
     let picture = uniform_picture(width, height, RED);
-    ui.handle_event(Event::Picture {
+    ui.handle_event(Event::Picture(PreviewUpdate {
         generation,
         picture,
         range: None,
         section: None,
         lacks_photons: false,
         source: None,
-    });
+    }));
 }
 
 /// Returns the number of cells that an image can cover in a window with one line of text.

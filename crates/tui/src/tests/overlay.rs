@@ -8,7 +8,7 @@ use crate::event::{Event, KeyPress};
 use crate::fixtures::*;
 use crate::keymap::{KEYMAP, OVERLAY};
 use crate::messages;
-use crate::pipeline::protocol::{self, Failure};
+use crate::pipeline::protocol::{self, Failure, PreviewUpdate};
 use crate::pipeline::settings::{EffectiveSettingsSummary, ViewMode};
 use crate::scene::diagnostic::{Diagnostic, Severity, SourceSpan};
 
@@ -359,14 +359,14 @@ fn camera_steps_wait_while_the_scene_is_broken() {
     );
     let generation = ui.state.request.generation;
     let picture = uniform_picture(50, 38, RED);
-    let effects = ui.handle_event(Event::Picture {
+    let effects = ui.handle_event(Event::Picture(PreviewUpdate {
         generation,
         picture,
         range: None,
         section: None,
         lacks_photons: false,
         source: None,
-    });
+    }));
     assert!(find_render_request(&effects).is_some(), "the preview should trigger the waiting step");
 }
 

@@ -9,7 +9,7 @@ use crate::event::{Effect, Event, KeyPress, MouseEvent, MouseEventKind};
 use crate::fixtures::*;
 use crate::messages;
 use crate::pipeline::protocol::{
-    self, CameraSaveResult, Command, ImagePosition, NormalizedRect, PickedObject, PickedPixel,
+    self, CameraSaveResult, Command, ImagePosition, NormalizedRect, PickedObject, PickedPixel, PreviewUpdate,
     SavedCameraEdit, WriteRequirement,
 };
 use crate::pipeline::settings::Overrides;
@@ -305,14 +305,14 @@ fn older_render_is_shown_until_the_next_render() {
         ui.screen_text()
     );
     let generation = ui.state.request.generation;
-    ui.handle_event(Event::Picture {
+    ui.handle_event(Event::Picture(PreviewUpdate {
         generation,
         picture: uniform_picture(50, 38, [10, 200, 10]),
         range: None,
         section: None,
         lacks_photons: false,
         source: None,
-    });
+    }));
     assert!(super::cells_of(&mut ui, RED) > 0, "the older render should stay visible");
     ui.press_character('N');
     assert!(
@@ -406,14 +406,14 @@ fn clicks_in_a_close_up_select_the_right_pixel() {
     let section = Some(NormalizedRect { left: 0.2, top: 0.4, width: 0.1, height: 0.2 });
     let generation = ui.state.request.generation;
     let picture = uniform_picture(20, 10, BLUE);
-    ui.handle_event(Event::Picture {
+    ui.handle_event(Event::Picture(PreviewUpdate {
         generation,
         picture,
         range: None,
         section,
         lacks_photons: false,
         source: None,
-    });
+    }));
     assert_eq!(super::cells_of(&mut ui, BLUE), 20 * 5, "{}", ui.screen_text());
     assert!(ui.screen_text().contains("cornell.toml  1:1"), "{}", ui.screen_text());
     // The area has 56 × 21 cells at (0, 1), so the image starts at (18, 9).

@@ -13,7 +13,7 @@ use crate::event::{Event, KeyPress};
 use crate::fixtures::*;
 use crate::keymap::KEYMAP;
 use crate::messages;
-use crate::pipeline::protocol::{self, Failure, RenderProgress, Stage, StageReport, Status};
+use crate::pipeline::protocol::{self, Failure, PreviewUpdate, RenderProgress, Stage, StageReport, Status};
 use crate::pipeline::settings::{Overrides, ViewMode};
 use crate::preview_style::PreviewStyle;
 use crate::scene::diagnostic::Severity;
@@ -41,14 +41,14 @@ fn half_blocks_show_two_pixels() {
             *pixel = BLUE;
         }
     }
-    ui.handle_event(Event::Picture {
+    ui.handle_event(Event::Picture(PreviewUpdate {
         generation,
         picture: picture.into(),
         range: None,
         section: None,
         lacks_photons: false,
         source: None,
-    });
+    }));
     let screen = ui.draw_screen();
     for place in [(0, 1), (55, 21), (17, 9)] {
         assert_eq!((screen[place].fg, screen[place].bg), (Color::Rgb(200, 20, 10), Color::Rgb(10, 20, 200)));
@@ -78,14 +78,14 @@ fn value_range_is_shown_after_the_view_name() {
         (None, "view depth  "),
     ] {
         let generation = ui.state.request.generation;
-        ui.handle_event(Event::Picture {
+        ui.handle_event(Event::Picture(PreviewUpdate {
             generation,
             picture: uniform_picture(51, 40, RED),
             range,
             section: None,
             lacks_photons: false,
             source: None,
-        });
+        }));
         assert!(ui.screen_text().contains(words), "{words}: {}", ui.screen_text());
     }
 }
@@ -95,14 +95,14 @@ fn wrongly_sized_image_is_not_shown() {
     let mut ui = TestUi::new();
     let mut picture = (*uniform_picture(4, 4, RED)).clone();
     picture.pixels.truncate(3);
-    ui.handle_event(Event::Picture {
+    ui.handle_event(Event::Picture(PreviewUpdate {
         generation: 1,
         picture: picture.into(),
         range: None,
         section: None,
         lacks_photons: false,
         source: None,
-    });
+    }));
     assert!(ui.state.picture.shown.is_none());
 }
 
@@ -465,7 +465,7 @@ proptest! {
                 3 => { ui.worker_event(protocol::Event::Progress { generation, progress: render_progress(0.3, Some(9.0)) }); }
                 4 => {
                     let picture = uniform_picture(picture.0, picture.1, BLUE);
-                    ui.handle_event(Event::Picture { generation, picture, range: None, section: None, lacks_photons: false, source: None });
+                    ui.handle_event(Event::Picture(PreviewUpdate { generation, picture, range: None, section: None, lacks_photons: false, source: None }));
                 }
                 5 => { ui.handle_event(Event::Resize(window(rows, columns.min(80)))); }
                 6 => { ui.advance_clock(300); }
@@ -651,13 +651,15 @@ fn preview_without_photons_is_marked() {
         stage: stage_report(Stage::Photons, Status::Running, 0.0, ""),
     });
     assert!(!ui.screen_text().contains(messages::WITHOUT_PHOTONS), "no preview yet");
-    let picture = |lacks_photons| Event::Picture {
-        generation: 1,
-        picture: uniform_picture(50, 38, RED),
-        range: None,
-        section: None,
-        lacks_photons,
-        source: None,
+    let picture = |lacks_photons| {
+        Event::Picture(PreviewUpdate {
+            generation: 1,
+            picture: uniform_picture(50, 38, RED),
+            range: None,
+            section: None,
+            lacks_photons,
+            source: None,
+        })
     };
     ui.handle_event(picture(true));
     assert!(ui.screen_text().contains(messages::WITHOUT_PHOTONS), "{}", ui.screen_text());

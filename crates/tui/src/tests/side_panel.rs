@@ -9,7 +9,7 @@ use crate::event::{Effect, Event, KeyPress, MouseEvent, MouseEventKind};
 use crate::fixtures::*;
 use crate::graphics::ImageProtocol;
 use crate::messages;
-use crate::pipeline::protocol::{self, NoisePrediction, RenderProgress};
+use crate::pipeline::protocol::{self, NoisePrediction, PreviewUpdate, RenderProgress};
 use crate::pipeline::settings::{EffectiveSettingsSummary, Overrides};
 use crate::preview_style::PreviewStyle;
 use crate::terminal_replies::TerminalReply;
@@ -28,14 +28,14 @@ fn rendered(ui: &mut TestUi, error: f32) {
         own: scene_settings(),
     });
     let picture = uniform_picture(90, 68, RED);
-    ui.handle_event(Event::Picture {
+    ui.handle_event(Event::Picture(PreviewUpdate {
         generation,
         picture,
         range: None,
         section: None,
         lacks_photons: false,
         source: None,
-    });
+    }));
     for step in 0..=40 {
         let seconds = 10_f64.powf(f64::from(step) / 20.0);
         let noise = Some(NoisePrediction { now: 0.1 / seconds.sqrt(), seconds, next: None });
@@ -223,7 +223,14 @@ fn actual_pixels_are_not_used_as_a_thumbnail() {
     let (generation, picture) = (ui.state.request.generation, uniform_picture(50, 38, RED));
     let section = Some(protocol::NormalizedRect { left: 0.4, top: 0.4, width: 0.2, height: 0.2 });
     let (range, lacks_photons, source) = (None, false, None);
-    ui.handle_event(Event::Picture { generation, picture, range, section, lacks_photons, source });
+    ui.handle_event(Event::Picture(PreviewUpdate {
+        generation,
+        picture,
+        range,
+        section,
+        lacks_photons,
+        source,
+    }));
     ui.handle_event(Event::Shown { generation });
     assert_eq!(small_color(&ui), BLUE);
 }

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use super::notices::{show_notice, show_notice_without_effects, show_until_key};
 use crate::event::Effect;
 use crate::messages;
+use crate::pipeline::protocol::PreviewUpdate;
 use crate::state::{RenderState, State};
 
 /// Adds the current image to the history.
@@ -54,7 +55,7 @@ pub(super) fn open_entry_at_index(state: &mut State, at: usize) -> Vec<Effect> {
     if at + 1 >= state.picture.history.len() {
         return return_to_newest(state, messages::NEWEST_RENDER);
     }
-    match state.picture.history.open_at(at, newest) {
+    match state.picture.history.open_entry(at, newest) {
         Some(shown) => show_history_render(state, shown),
         None => Vec::new(),
     }
@@ -94,7 +95,7 @@ fn report_no_image(state: &mut State) -> Vec<Effect> {
     show_notice_without_effects(state, if is_shown { messages::NO_IMAGE } else { messages::NO_PREVIEW })
 }
 
-fn newest_image(state: &State) -> Option<crate::history::ShownImage> {
+fn newest_image(state: &State) -> Option<PreviewUpdate> {
     if state.picture.history.is_viewing_older() {
         state.picture.history.newest_while_viewing_older()
     } else {
@@ -102,7 +103,7 @@ fn newest_image(state: &State) -> Option<crate::history::ShownImage> {
     }
 }
 
-fn show_history_render(state: &mut State, shown: crate::history::ShownImage) -> Vec<Effect> {
+fn show_history_render(state: &mut State, shown: PreviewUpdate) -> Vec<Effect> {
     state.picture.shown = Some(shown);
     // The header already shows the render's number and age.
     let keys = &messages::HISTORY_KEYS[usize::from(state.picture.history.is_viewing_oldest())..];

@@ -20,14 +20,13 @@ use self::notices::show_until_key;
 use self::request::{request_render, request_resized_preview};
 use super::ExitStatus;
 use super::event::{Effect, Event, RequiredEventSource, Signal, WindowSize};
-use super::history::ShownImage;
 use super::messages;
 use super::options::ContentChangeTime;
 use super::preview_style::PreviewStyle;
 use super::state::{Message, SceneImageProgress, State, UndisplayedChange};
 use super::view::layout::Layout;
 use crate::film::Srgb8Image;
-use crate::pipeline::protocol::{Command, SavedSceneImageState};
+use crate::pipeline::protocol::{Command, PreviewUpdate, SavedSceneImageState};
 
 /// How long the window size must stay the same before a new preview is requested.
 const RESIZE_QUIET: Duration = Duration::from_millis(60);
@@ -66,9 +65,7 @@ fn handle_event(state: &mut State, event: Event) -> Vec<Effect> {
         }
         Event::Resize(window) => handle_resize(state, window),
         Event::Worker(event) => worker::handle_worker_event(state, event),
-        Event::Picture { generation, picture, range, section, lacks_photons, source } => {
-            show_image(state, ShownImage { generation, picture, range, section, lacks_photons, source })
-        }
+        Event::Picture(shown) => show_image(state, shown),
         Event::Changed(ContentChangeTime { noticed }) => {
             // Keep the message if glimt made the change by writing the camera, or if glimt refused to write
             // the camera because of the change.
@@ -122,7 +119,7 @@ fn handle_event(state: &mut State, event: Event) -> Vec<Effect> {
     }
 }
 
-fn show_image(state: &mut State, shown: ShownImage) -> Vec<Effect> {
+fn show_image(state: &mut State, shown: PreviewUpdate) -> Vec<Effect> {
     if shown.generation == state.request.generation
         && has_consistent_pixel_count(&shown.picture)
         && state.display.kind != PreviewStyle::None
@@ -132,7 +129,8 @@ fn show_image(state: &mut State, shown: ShownImage) -> Vec<Effect> {
             return Vec::new();
         }
         state.urgent |= state.picture.shown.as_ref().is_none_or(|last| last.generation != shown.generation);
-        let is_its = |last: &ShownImage| last.generation == shown.generation || last.shows_same_image(&shown);
+        let is_its =
+            |last: &PreviewUpdate| last.generation == shown.generation || last.shows_same_image(&shown);
         let last = state.picture.shown.take().filter(is_its);
         state.picture.shown = Some(match last {
             Some(last) if state.display.dithers_colors() => keep_nearly_unchanged_pixels(shown, &last),
@@ -145,9 +143,9 @@ fn show_image(state: &mut State, shown: ShownImage) -> Vec<Effect> {
 
 /// Keeps the previous color of each pixel that has changed by at most one code value since the last preview,
 /// because even such a small difference could change the dither pattern.
-fn keep_nearly_unchanged_pixels(mut shown: ShownImage, last: &ShownImage) -> ShownImage {
+fn keep_nearly_unchanged_pixels(mut shown: PreviewUpdate, last: &PreviewUpdate) -> PreviewUpdate {
     const MAX_DIFFERENCE: u8 = 1;
-    let what = |shown: &ShownImage| (shown.picture.width, shown.picture.height, shown.section);
+    let what = |shown: &PreviewUpdate| (shown.picture.width, shown.picture.height, shown.section);
     if what(&shown) == what(last) {
         let mut picture = (*shown.picture).clone();
         for (new, old) in picture.pixels.iter_mut().zip(&last.picture.pixels) {

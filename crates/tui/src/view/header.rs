@@ -100,7 +100,7 @@ fn worker_symbol_word_and_role(state: &State) -> (&'static str, &'static str, Te
 }
 
 /// Returns a word for the worker's state, regardless of the displayed image.
-pub(super) fn worker_activity_word(state: &State) -> &'static str {
+pub(crate) fn worker_activity_word(state: &State) -> &'static str {
     worker_symbol_word_and_role(state).1
 }
 

@@ -23,13 +23,9 @@ pub(super) mod views;
 use ratatui::buffer::Buffer;
 
 pub(super) use self::extras::FileLinksAndDelayedText;
+pub(super) use self::header::worker_activity_word;
 use self::layout::Layout;
 use super::state::State;
-
-/// The worker's state as a single word.
-pub(super) fn activity_word(state: &State) -> &'static str {
-    header::worker_activity_word(state)
-}
 
 /// Returns the index of the history entry shown at a cell in the history strip.
 pub(super) fn history_index_at(state: &State, column: u16, row: u16) -> Option<usize> {

@@ -16,6 +16,7 @@ use crate::history::ShownImage;
 use crate::messages;
 use crate::mosaic::{CellGrid, fit_cell};
 use crate::options::PreviewChoice;
+use crate::pipeline::protocol::PreviewUpdate;
 use crate::pipeline::protocol::ImagePosition;
 use crate::preview_style::PreviewStyle;
 use crate::rescale::resized_pixels;
@@ -169,7 +170,7 @@ struct PreviewPlacement {
 
 impl PreviewPlacement {
     /// Placement of the current preview, either as large as possible or showing actual pixels.
-    fn for_preview(state: &State, shown: &ShownImage, area: Rect, kind: PreviewStyle) -> Self {
+    fn for_preview(state: &State, shown: &PreviewUpdate, area: Rect, kind: PreviewStyle) -> Self {
         let across = kind.grid().map_or(1, CellGrid::columns_per_cell);
         let one_to_one = across as f32 / state.display.horizontal_pixels_per_cell() as f32;
         let most = if shown.section.is_some() { one_to_one } else { f32::INFINITY };
