@@ -27,7 +27,7 @@ fn rewrite(path: &Path, change: impl FnOnce(&mut PartHeader, &mut Value)) {
         sweep: None,
         losses: AttributeLossPolicy::Refuse,
     };
-    part::save(path, &head, &film, &state, &guard, (&token, Durability::Process)).expect("written");
+    part::save(path, &head, &film, &state, &guard, &token, Durability::Process).expect("written");
 }
 
 /// Changes the build that is recorded in a part or checkpoint.

@@ -92,7 +92,7 @@ fn run_terminal_ui(order: RenderRequest, console: &Console) -> Result<Exit, (Exi
     if let Ok(ended) = &outcome {
         let lost = contents.outputs.list_external_changes(&contents);
         let is_older = ended.is_current && writes.is_image_older_than_inputs(&contents);
-        exit_summary_lines(&writes, ended, (has_ended, is_older, &lost, &shell_quoted_command_line()))
+        exit_summary_lines(&writes, ended, has_ended, is_older, &lost, &shell_quoted_command_line())
             .iter()
             .for_each(|line| console.print_line_to_stderr(line));
     }
@@ -114,7 +114,10 @@ fn run_terminal_ui(order: RenderRequest, console: &Console) -> Result<Exit, (Exi
 fn exit_summary_lines(
     writes: &SharedWriteLog,
     ended: &TuiOutcome,
-    (has_ended, is_older, lost, call): (bool, bool, &[(PathBuf, ExternalChange)], &str),
+    has_ended: bool,
+    is_older: bool,
+    lost: &[(PathBuf, ExternalChange)],
+    call: &str,
 ) -> Vec<String> {
     let mut lines = writes.unreported_lines(ended, has_ended);
     let has_earlier_files =
@@ -370,8 +373,7 @@ mod tests {
         let message = "the latest image is not written".to_owned();
         writes.record_event(&Event::WriteFailed { generation: 2, path: None, message });
         let error = "error: the latest image is not written";
-        let said =
-            |ended: TuiOutcome| exit_summary_lines(&writes, &ended, (true, false, &[], "glimt a.toml"));
+        let said = |ended: TuiOutcome| exit_summary_lines(&writes, &ended, true, false, &[], "glimt a.toml");
         assert_eq!(said(ended(true)), [error, summary]);
         assert_eq!(said(ended(false)), [error]);
         writes.record_event(&written(2));
@@ -393,7 +395,7 @@ mod tests {
         let writes = SharedWriteLog::default();
         let lost = [(PathBuf::from("a.png"), ExternalChange::Removed)];
         let said = |status, lost: &[(PathBuf, ExternalChange)]| {
-            exit_summary_lines(&writes, &ended(status), (true, false, lost, "glimt a.toml --seed 1"))
+            exit_summary_lines(&writes, &ended(status), true, false, lost, "glimt a.toml --seed 1")
         };
         let not_kept = "not kept: --shadows off";
         assert_eq!(said(ExitStatus::QUIT, &[]), ["a.png not finished (10 %)", not_kept]);
@@ -442,7 +444,7 @@ mod tests {
             is_unwritten: false,
             not_kept: None,
         };
-        let said = |is_older| exit_summary_lines(&writes, &ended, (true, is_older, &[], "glimt a.toml"));
+        let said = |is_older| exit_summary_lines(&writes, &ended, true, is_older, &[], "glimt a.toml");
         assert_eq!(said(false), ["wrote a.png"]);
         assert_eq!(said(true), [format!("wrote a.png{OLDER_THAN_EDIT}")]);
     }
@@ -465,7 +467,7 @@ mod tests {
             is_unwritten: false,
             not_kept: None,
         };
-        let said = |seen| exit_summary_lines(&writes, &ended(seen), (true, false, &[], "glimt a.toml"));
+        let said = |seen| exit_summary_lines(&writes, &ended(seen), true, false, &[], "glimt a.toml");
         assert_eq!(said(0), ["wrote a.png"]);
         assert_eq!(said(1), ["a.png not finished (3 %)"]);
     }

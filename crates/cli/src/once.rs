@@ -72,11 +72,11 @@ pub(super) fn run(order: &RenderRequest, console: &Console) -> Exit {
             console.print_line_to_stderr(&format!("frame {} of {of}", number + 1));
         }
         let generation = turn.map_or(1, |turn| u64::from(turn.number) + 1);
-        let request = Request::new(generation, order.scene.clone(), overrides);
+        let request = Request::new(generation, order.scene.clone(), overrides.clone());
         worker.send(Command::Render(Box::new(Request { write: WriteRequirement::Must, ..request })));
         image_reporter = reporter();
         let reporter = &mut *image_reporter;
-        exit = handle_events(&worker, &events, (order, turn), console, reporter, &mut written, &mut is_over);
+        exit = handle_events(&worker, &events, &overrides, console, reporter, &mut written, &mut is_over);
         reporter.clear_output();
         is_whole = exit == Exit::DONE && turn.is_none_or(TurntableFrame::is_last);
         if exit != Exit::DONE || ended.signal_number().is_some() {
@@ -167,7 +167,7 @@ impl ExitDeadline {
 fn handle_events(
     worker: &Handle,
     events: &Receiver<Event>,
-    (order, turn): (&RenderRequest, Option<TurntableFrame>),
+    overrides: &Overrides,
     console: &Console,
     reporter: &mut dyn Reporter,
     written: &mut CompletedWrites,
@@ -177,7 +177,7 @@ fn handle_events(
     let mut unwritten: Vec<String> = Vec::new();
     let mut call_warnings: Vec<Diagnostic> = Vec::new();
     // Warnings about the first frame apply to all frames.
-    let is_first = turn.is_none_or(|turn| turn.number == 0);
+    let is_first = overrides.turn.is_none_or(|turn| turn.number == 0);
     let before = written.images.len();
     loop {
         if is_over(is_writing) {
@@ -192,7 +192,7 @@ fn handle_events(
         };
         // Report warnings about the arguments together with warnings about the scene.
         if let Event::Settings { settings, .. } = &event {
-            call_warnings.extend(ineffective_option_warnings(&order.overrides, settings));
+            call_warnings.extend(ineffective_option_warnings(overrides, settings));
         } else if let Event::Stage { stage, .. } = &event
             && !is_first
             && has_stage_reread_changed_file(stage)
@@ -228,7 +228,8 @@ fn handle_events(
                 }
                 return report_written_and_failed_images(
                     &report,
-                    (&written.images[before..], turn),
+                    &written.images[before..],
+                    overrides.turn,
                     &unwritten,
                     console,
                     reporter,
@@ -358,7 +359,8 @@ fn ineffective_option_warnings(asked: &Overrides, settings: &EffectiveSettingsSu
 
 fn report_written_and_failed_images(
     report: &Report,
-    (written, turn): (&[PathBuf], Option<TurntableFrame>),
+    written: &[PathBuf],
+    turn: Option<TurntableFrame>,
     unwritten: &[String],
     console: &Console,
     reporter: &dyn Reporter,

@@ -478,3 +478,11 @@ impl PreviewUpdate {
     }
 }
 
+/// The image that a preview shows, and whether it is finished.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PreviewedImageState {
+    /// Previews with the same key show the same image, although their sizes and sample counts may differ.
+    pub image: Fingerprint,
+    /// Whether the image has all of its samples.
+    pub is_finished: bool,
+}

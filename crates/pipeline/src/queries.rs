@@ -167,7 +167,7 @@ impl QueryContext {
         let edit = if text == read {
             None
         } else {
-            replace_scene_text_if_unchanged(&path, (read, &text), inputs, (changed, "camera not saved"))?;
+            replace_scene_text_if_unchanged(&path, read, &text, inputs, changed, "camera not saved")?;
             Some(SavedCameraEdit { path: path.clone(), before: read.into(), after: text.as_str().into() })
         };
         let is_own = LoadedScene::parse_camera_from_text(&text, &self.sets)
@@ -186,7 +186,7 @@ fn undo_camera_edit(edit: &SavedCameraEdit, inputs: &ProtectedInputs) -> Result<
     if !file_text_equals(path, after) {
         return Err(changed);
     }
-    replace_scene_text_if_unchanged(path, (after, before), inputs, (&changed, "not undone"))?;
+    replace_scene_text_if_unchanged(path, after, before, inputs, &changed, "not undone")?;
     Ok(path.clone())
 }
 
@@ -204,9 +204,11 @@ fn file_text_equals(path: &Path, text: &str) -> bool {
 /// file metadata would be lost, fails with a message that ends with `outcome`.
 fn replace_scene_text_if_unchanged(
     path: &Path,
-    (old, new): (&str, &str),
+    old: &str,
+    new: &str,
     inputs: &ProtectedInputs,
-    (changed, outcome): (&str, &str),
+    changed: &str,
+    outcome: &str,
 ) -> Result<(), String> {
     let metadata =
         file::file_kind(path).map(|(_, metadata)| metadata).map_err(|error| describe_error(&error))?;
@@ -221,7 +223,7 @@ fn replace_scene_text_if_unchanged(
         sweep: None,
         losses: AttributeLossPolicy::Refuse,
     };
-    write::atomic_if_unchanged(path, (old.as_bytes(), new.as_bytes()), &guard, &CancelToken::new())
+    write::atomic_if_unchanged(path, old.as_bytes(), new.as_bytes(), &guard, &CancelToken::new())
         .map_err(|error| error.to_string())
 }
 

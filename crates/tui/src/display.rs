@@ -152,7 +152,8 @@ impl Display {
         wanted: &Buffer,
         picture: Rect,
         fidelity: Fidelity,
-        (is_new, extras): (bool, &LinksAndDelayedText),
+        is_new: bool,
+        extras: &LinksAndDelayedText,
     ) {
         if !extras.links.is_empty() {
             terminal::mark_links_used();
@@ -359,7 +360,7 @@ mod tests {
         }
         let show = |display: &mut Display, buffer: &Buffer| {
             let before = all.get();
-            display.set_target(buffer, area, Fidelity::Still, (true, &LinksAndDelayedText::default()));
+            display.set_target(buffer, area, Fidelity::Still, true, &LinksAndDelayedText::default());
             for second in 1..100 {
                 let (now, sent) = (now + Duration::from_millis(second), all.get());
                 display.send_next_slice(now, || false);

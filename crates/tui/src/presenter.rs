@@ -165,7 +165,7 @@ impl FramePresenter {
         let area = Layout::for_state(state).preview;
         self.display.place_pixels(view::preview::terminal_image(state, area), is_final_preview(state));
         let extras = self.links_and_delayed_text(state, drawn);
-        self.display.set_target(&buffer, area, self.fidelity(state), (is_new, &extras));
+        self.display.set_target(&buffer, area, self.fidelity(state), is_new, &extras);
     }
 
     /// The frame's hyperlinks, if the terminal supports them, and the text to draw after the preview.

@@ -45,9 +45,9 @@ pub fn images_as_text(pictures: &[NamedImage], color: ColorDepthChoice, is_termi
         shades: &shades,
         is_light: color::colorfgbg_indicates_light_background(variable),
     };
-    let (size, aspect) =
+    let ((columns, rows), aspect) =
         if is_terminal { window_size_and_aspect(&terminal::query_window(None)) } else { ((80, 24), 2.0) };
-    let buffers = draw_images_beside_or_stacked(pictures, inks, size, aspect);
+    let buffers = draw_images_beside_or_stacked(pictures, inks, columns, rows, aspect);
     buffers.iter().map(|buffer| buffer_to_text_lines(buffer, depth != ColorDepth::None)).collect()
 }
 
@@ -62,37 +62,39 @@ fn window_size_and_aspect(window: &WindowSize) -> ((u16, u16), f32) {
 fn draw_images_beside_or_stacked(
     pictures: &[NamedImage],
     inks: PreviewColors<'_>,
-    (across, down): (u16, u16),
+    columns: u16,
+    rows: u16,
     aspect: f32,
 ) -> Vec<Buffer> {
     let count = pictures.len().max(1) as u16;
-    let beside = across.saturating_sub(GAP * (count - 1)) / count;
-    let rows = down.saturating_sub(WORDS).max(MIN_ROWS);
-    if across < MIN_COLUMNS {
+    let beside = columns.saturating_sub(GAP * (count - 1)) / count;
+    let rows = rows.saturating_sub(WORDS).max(MIN_ROWS);
+    if columns < MIN_COLUMNS {
         Vec::new()
     } else if beside >= MIN_BESIDE {
-        vec![draw_images_side_by_side(pictures, inks, (beside, rows), aspect)]
+        vec![draw_images_side_by_side(pictures, inks, beside, rows, aspect)]
     } else {
-        pictures.chunks(1).map(|one| draw_images_side_by_side(one, inks, (across, rows), aspect)).collect()
+        pictures.chunks(1).map(|one| draw_images_side_by_side(one, inks, columns, rows, aspect)).collect()
     }
 }
 
-/// Draws images side by side below their captions, each scaled to fit into `room`.
+/// Draws images side by side below their captions, each scaled to fit into `columns` × `rows` cells.
 fn draw_images_side_by_side(
     pictures: &[NamedImage],
     inks: PreviewColors<'_>,
-    room: (u16, u16),
+    columns: u16,
+    rows: u16,
     aspect: f32,
 ) -> Buffer {
-    let sizes = pictures.iter().map(|one| size_in_cells(&one.picture, inks.depth, room, aspect));
+    let sizes = pictures.iter().map(|one| size_in_cells(&one.picture, inks.depth, columns, rows, aspect));
     let (width, height) = sizes.fold((0, 0), |most, size| (most.0.max(size.0), most.1.max(size.1)));
-    let names = pictures.iter().map(|one| text_columns(&one.name).min(room.0)).max().unwrap_or(0);
+    let names = pictures.iter().map(|one| text_columns(&one.name).min(columns)).max().unwrap_or(0);
     let stride = width.max(names) + GAP;
     let mut buffer = Buffer::empty(Rect::new(0, 0, stride * pictures.len() as u16, height + 1));
     for (x, one) in (0..).step_by(usize::from(stride)).zip(pictures) {
-        buffer.set_string(x, 0, truncated_text(&one.name, room.0), Style::new());
+        buffer.set_string(x, 0, truncated_text(&one.name, columns), Style::new());
         let area = Rect::new(x, 1, width, height);
-        buffer.merge(&draw_image(&one.picture, PreviewChoice::HalfBlock, inks, (area, aspect)));
+        buffer.merge(&draw_image(&one.picture, PreviewChoice::HalfBlock, inks, area, aspect));
     }
     buffer
 }
@@ -110,7 +112,8 @@ mod tests {
         let buffers = draw_images_beside_or_stacked(
             &["a.png", "b.png", "a difference image with a long name"].map(named),
             inks,
-            size,
+            size.0,
+            size.1,
             2.0,
         );
         let text: String = buffers.iter().map(|buffer| buffer_to_text_lines(buffer, false)).collect();

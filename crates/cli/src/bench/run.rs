@@ -187,7 +187,7 @@ impl SceneRun<'_> {
             reference.two.reference_pair().measured_image().width,
             reference.two.reference_pair().measured_image().height,
         );
-        self.report_references(&reference, (width, height));
+        self.report_references(&reference, width, height);
         let most_samples = max_measurable_samples(reference.result.samples);
         let mut measured = Vec::new();
         for method in &methods {
@@ -252,7 +252,7 @@ impl SceneRun<'_> {
         }
     }
 
-    fn report_references(&self, reference: &SceneReferences, (width, height): (u32, u32)) {
+    fn report_references(&self, reference: &SceneReferences, width: u32, height: u32) {
         if !reference.warnings.is_empty() {
             (self.tell)(BenchEvent::Warnings(reference.warnings.clone()));
         }

@@ -62,7 +62,7 @@ impl MergeCommand<'_> {
         let Some(finish) = parts.first().and_then(|part| part.head.picture.develop_settings()) else {
             return Err(self.console.print_error(Exit::WRONG, "the parts contain no output settings"));
         };
-        self.write_image(format, finish, &merged, (&parts, &inputs))?;
+        self.write_image(format, finish, &merged, &parts, &inputs)?;
         self.report_missing_parts(&merged);
         Ok(Exit::DONE)
     }
@@ -296,7 +296,8 @@ impl MergeCommand<'_> {
         format: Format,
         mut finish: FilmEncodingSettings,
         merged: &MergedParts,
-        (parts, inputs): (&[PartFile], &RenderInputFiles<'_>),
+        parts: &[PartFile],
+        inputs: &RenderInputFiles<'_>,
     ) -> Result<(), Exit> {
         let (out, token) = (&self.args.out, self.token);
         set_relative_scene_path(&mut finish, parts, out);
@@ -317,7 +318,7 @@ impl MergeCommand<'_> {
             losses: AttributeLossPolicy::Report(&tell),
         };
         let bytes = self.pool.install(|| {
-            finish.encode_with_film_metadata(film, (&finish.quantity_image(film), &[]), format, token)
+            finish.encode_with_film_metadata(film, &finish.quantity_image(film), &[], format, token)
         });
         let written = bytes.and_then(|bytes| atomic_with_policy(out, &bytes, &guard, token));
         written.map_err(|error| match error {

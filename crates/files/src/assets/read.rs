@@ -142,14 +142,15 @@ fn read_if_start_accepted(
     (&mut file).take(START as u64).read_to_end(&mut start).map_err(unreadable)?;
     accept(&start)?;
     file.rewind().map_err(unreadable)?;
-    read_rest(path, file, (length, limit), monitor)
+    read_rest(path, file, length, limit, monitor)
 }
 
 /// Reads the rest of an open file of about `length` bytes. Reports progress in the way [`read_bytes`] does.
 pub(crate) fn read_rest(
     path: &Path,
     file: File,
-    (length, limit): (u64, u64),
+    length: u64,
+    limit: u64,
     monitor: Monitor<'_>,
 ) -> Result<Vec<u8>, AssetError> {
     let unreadable = |error: std::io::Error| AssetError::from_io(path, &error);

@@ -48,7 +48,8 @@ pub(super) fn for_each_tone_mapped_part(
 /// Tone maps an image to three bytes per pixel.
 pub(super) fn tone_map_all(
     image: &RadianceImage,
-    (options, format): (&EncodeOptions, Format),
+    options: &EncodeOptions,
+    format: Format,
     token: &CancelToken,
 ) -> Result<Vec<u8>, OutputError> {
     let mut picture = Vec::with_capacity(3 * image.pixels.len());

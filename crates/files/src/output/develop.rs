@@ -45,7 +45,8 @@ impl FilmEncodingSettings {
     pub fn encode_with_film_metadata(
         &self,
         film: &Film,
-        (image, layers): (&RadianceImage, &[LayerImage]),
+        image: &RadianceImage,
+        layers: &[LayerImage],
         format: Format,
         token: &CancelToken,
     ) -> Result<Vec<u8>, OutputError> {
@@ -57,6 +58,6 @@ impl FilmEncodingSettings {
         metadata.extend(range.map(|range| ("glimt:range".to_owned(), range)));
         let mean_luminance_error = if self.is_light { film.mean_luminance_error() } else { None };
         let options = EncodeOptions { tone, bit_depth: self.bit_depth, metadata, mean_luminance_error };
-        encode_with_layers((image, layers), &options, format, token)
+        encode_with_layers(image, layers, &options, format, token)
     }
 }

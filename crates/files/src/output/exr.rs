@@ -41,7 +41,8 @@ pub fn read_mean_luminance_error(path: &Path) -> Option<f64> {
 }
 
 pub(super) fn encode(
-    (image, layers): (&RadianceImage, &[LayerImage]),
+    image: &RadianceImage,
+    layers: &[LayerImage],
     options: &EncodeOptions,
     token: &CancelToken,
 ) -> Result<Vec<u8>, OutputError> {

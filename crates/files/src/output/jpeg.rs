@@ -17,7 +17,7 @@ pub(super) fn encode(
     options: &EncodeOptions,
     token: &CancelToken,
 ) -> Result<Vec<u8>, OutputError> {
-    let pixels = cancellable::tone_map_all(image, (options, Format::Jpeg), token)?;
+    let pixels = cancellable::tone_map_all(image, options, Format::Jpeg, token)?;
     let mut bytes = CancellableBuffer::new(token);
     JpegEncoder::new_with_quality(&mut bytes, QUALITY)
         .encode(&pixels, image.width, image.height, ExtendedColorType::Rgb8)

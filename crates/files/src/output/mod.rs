@@ -90,12 +90,13 @@ pub fn encode(
     format: Format,
     token: &CancelToken,
 ) -> Result<Vec<u8>, OutputError> {
-    encode_with_layers((image, &[]), options, format, token)
+    encode_with_layers(image, &[], options, format, token)
 }
 
 /// Like [`encode`], but with layers. Only EXR files support layers.
 pub(crate) fn encode_with_layers(
-    (image, layers): (&RadianceImage, &[LayerImage]),
+    image: &RadianceImage,
+    layers: &[LayerImage],
     options: &EncodeOptions,
     format: Format,
     token: &CancelToken,
@@ -111,7 +112,7 @@ pub(crate) fn encode_with_layers(
     }
     let bytes = match format {
         Format::Png => png::encode(image, options, token),
-        Format::Exr => exr::encode((image, layers), options, token),
+        Format::Exr => exr::encode(image, layers, options, token),
         Format::Hdr => hdr::encode(image, options, token),
         Format::Jpeg => jpeg::encode(image, options, token),
         Format::Ppm => ppm::encode(image, options, token),

@@ -381,8 +381,17 @@ fn unsynchronized_files_are_reported_as_written() {
         (Durability::Power, Some(&b"old"[..]), 2),
     ] {
         std::fs::write(&path, "old").expect("written");
-        let order = (&CancelToken::new(), durability, expected);
-        write::write_atomically_or_in_place(&path, &content, &guard, order, &failing_sync).expect("written");
+        let token = CancelToken::new();
+        write::write_atomically_or_in_place(
+            &path,
+            &content,
+            &guard,
+            &token,
+            durability,
+            expected,
+            &failing_sync,
+        )
+        .expect("written");
         assert_eq!((synced.get(), warnings.borrow().len()), (count, count), "{durability:?} {expected:?}");
         assert_eq!(std::fs::read(&path).expect("read"), b"new");
     }
@@ -473,7 +482,7 @@ fn concurrent_saves_are_not_overwritten() {
     let swap = |may_replace: &dyn Fn(&Path) -> Result<(), OutputError>| {
         std::fs::write(&path, "read").expect("written");
         let guard = write::ExistingFilePolicy { may_replace, ..NOTHING_KEPT };
-        write::atomic_if_unchanged(&path, (b"read", b"new"), &guard, &CancelToken::new())
+        write::atomic_if_unchanged(&path, b"read", b"new", &guard, &CancelToken::new())
     };
     let has = |text: &str| std::fs::read(&path).expect("read") == text.as_bytes();
     let is_as_read = |path: &Path| match std::fs::read(path) {

@@ -12,7 +12,7 @@ pub(super) fn encode(
     options: &EncodeOptions,
     token: &CancelToken,
 ) -> Result<Vec<u8>, OutputError> {
-    let pixels = cancellable::tone_map_all(image, (options, Format::WebP), token)?;
+    let pixels = cancellable::tone_map_all(image, options, Format::WebP, token)?;
     let mut bytes = CancellableBuffer::new(token);
     let mut encoder = WebPEncoder::new(&mut bytes);
     encoder.set_xmp_metadata(xmp_packet(options).into_bytes());

@@ -93,13 +93,8 @@ pub fn atomic_with_policy(
     guard: &ExistingFilePolicy<'_>,
     token: &CancelToken,
 ) -> Result<(), OutputError> {
-    atomic_generated(
-        path,
-        &|file| cancellable::write_all(file, bytes, token),
-        guard,
-        (token, Durability::Power),
-    )
-    .map(drop)
+    let content = |file: &mut dyn Write| cancellable::write_all(file, bytes, token);
+    atomic_generated(path, &content, guard, token, Durability::Power).map(drop)
 }
 
 /// Like [`atomic_with_policy`], but replaces the file only if it has the expected content. If the content has
@@ -109,20 +104,15 @@ pub fn atomic_with_policy(
 /// Same as [`atomic_with_policy`].
 pub fn atomic_if_unchanged(
     path: &Path,
-    (expected, bytes): (&[u8], &[u8]),
+    expected: &[u8],
+    bytes: &[u8],
     guard: &ExistingFilePolicy<'_>,
     token: &CancelToken,
 ) -> Result<(), OutputError> {
-    let content: &dyn Fn(&mut dyn Write) -> io::Result<()> =
-        &|file| cancellable::write_all(file, bytes, token);
-    write_atomically_or_in_place(
-        path,
-        content,
-        guard,
-        (token, Durability::Power, Some(expected)),
-        &sync_directory,
-    )
-    .map(drop)
+    let content = |file: &mut dyn Write| cancellable::write_all(file, bytes, token);
+    let (durability, expected) = (Durability::Power, Some(expected));
+    write_atomically_or_in_place(path, &content, guard, token, durability, expected, &sync_directory)
+        .map(drop)
 }
 
 /// Events that a renamed file is guaranteed to survive.
@@ -144,9 +134,10 @@ pub fn atomic_generated(
     path: &Path,
     content: &dyn Fn(&mut dyn Write) -> io::Result<()>,
     guard: &ExistingFilePolicy<'_>,
-    (token, durability): (&CancelToken, Durability),
+    token: &CancelToken,
+    durability: Durability,
 ) -> Result<Option<File>, OutputError> {
-    write_atomically_or_in_place(path, content, guard, (token, durability, None), &sync_directory)
+    write_atomically_or_in_place(path, content, guard, token, durability, None, &sync_directory)
 }
 
 /// Like [`atomic_generated`], but if `expected` is set, replaces only a file with this content. `sync`
@@ -155,7 +146,9 @@ pub(super) fn write_atomically_or_in_place(
     path: &Path,
     content: &dyn Fn(&mut dyn Write) -> io::Result<()>,
     guard: &ExistingFilePolicy<'_>,
-    (token, durability, expected): (&CancelToken, Durability, Option<&[u8]>),
+    token: &CancelToken,
+    durability: Durability,
+    expected: Option<&[u8]>,
     sync: &dyn Fn(&Path) -> io::Result<()>,
 ) -> Result<Option<File>, OutputError> {
     ignore_file_size_signal();

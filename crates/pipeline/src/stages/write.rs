@@ -334,9 +334,8 @@ fn write_one(
     }
     let layers = layer_images(state, plan);
     let bytes =
-        finish.encode_with_film_metadata(&state.film, (image, &layers), Format::from_path(path)?, token)?;
-    let target = (OutputTarget::for_image(plan, path), Some(sweep));
-    write_guarded(plan, inputs, target, sink, |guard| {
+        finish.encode_with_film_metadata(&state.film, image, &layers, Format::from_path(path)?, token)?;
+    write_guarded(plan, inputs, OutputTarget::for_image(plan, path), Some(sweep), sink, |guard| {
         output::write::atomic_with_policy(path, &bytes, guard, token)
     })?;
     Ok(bytes.len() as u64)
@@ -355,7 +354,7 @@ fn write_part(
     let head = create_header(PartOrCheckpoint::Part, state, identity, &image_encoding_settings(plan));
     let head = PartHeader { scene, references, ..head };
     let save = |guard: &ExistingFilePolicy<'_>| {
-        part::save(path, &head, &state.film, &Value::Null, guard, (token, Durability::Power)).map(drop)
+        part::save(path, &head, &state.film, &Value::Null, guard, token, Durability::Power).map(drop)
     };
     write_guarded(plan, inputs, (OutputTarget::for_image(plan, path), Some(sweep)), sink, save)?;
     Ok(path.metadata().map_or(0, |found| found.len()))

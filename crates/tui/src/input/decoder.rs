@@ -144,7 +144,7 @@ impl Decoder {
                 if introducer == b'_' {
                     self.command.push(byte);
                 }
-                self.continue_sequence(byte, (begin, bytes + 1, introducer), now);
+                self.continue_sequence(byte, begin, bytes + 1, introducer, now);
             }
             PendingSequence::Doubtful(bytes) => self.continue_ambiguous_sequence(bytes, byte, now),
             PendingSequence::Paste(mut paste) => {
@@ -185,17 +185,12 @@ impl Decoder {
                 self.push_escape_key();
                 self.process_byte_outside_sequence(byte, now);
             }
-            _ => self.continue_sequence(byte, (now, 2, byte), now),
+            _ => self.continue_sequence(byte, now, 2, byte, now),
         }
     }
 
     /// Continues a sequence with one more byte.
-    fn continue_sequence(
-        &mut self,
-        byte: u8,
-        (begin, bytes, introducer): (Instant, usize, u8),
-        now: Instant,
-    ) {
+    fn continue_sequence(&mut self, byte: u8, begin: Instant, bytes: usize, introducer: u8, now: Instant) {
         self.meaning.has_ended = false;
         self.parser.advance(&mut self.meaning, &[byte]);
         if std::mem::take(&mut self.meaning.is_paste) {
@@ -210,7 +205,7 @@ impl Decoder {
     fn continue_ambiguous_sequence(&mut self, mut bytes: Vec<u8>, byte: u8, now: Instant) {
         let before = self.meaning.found.len();
         if (0x20..0x7f).contains(&byte) {
-            self.continue_sequence(byte, (now, bytes.len(), b'['), now);
+            self.continue_sequence(byte, now, bytes.len(), b'[', now);
         }
         let is_known = self.meaning.found.len() > before || matches!(self.held, PendingSequence::Paste(_));
         if is_known {

@@ -53,7 +53,7 @@ impl DecodedInputCollector {
 
     /// Handles a mouse report in SGR format (mode 1006). The report contains the button, its modifier bits
     /// and the cell, counted from 1.
-    fn push_mouse(&mut self, code: u16, (column, row): (u16, u16), is_pressed: bool) {
+    fn push_mouse(&mut self, code: u16, column: u16, row: u16, is_pressed: bool) {
         const MODIFIERS: u16 = 4 | 8 | 16;
         let kind = match (code & !MODIFIERS, is_pressed) {
             (0, true) => MouseEventKind::Press,
@@ -138,7 +138,7 @@ impl Perform for DecodedInputCollector {
         self.has_ended = true;
         match (intermediates, action) {
             ([], 'n') if first == 0 => self.push_decoded_reply(TerminalReply::Ready),
-            (b"<", 'M' | 'm') => self.push_mouse(first, (second, number(2)), action == 'M'),
+            (b"<", 'M' | 'm') => self.push_mouse(first, second, number(2), action == 'M'),
             (b"?", 'c') => {
                 if params.iter().any(|param| param == [4]) {
                     self.push_decoded_reply(TerminalReply::Images(ImageProtocol::Sixel));

@@ -40,7 +40,7 @@ pub(super) fn handle_worker_event(state: &mut State, event: Event) -> Vec<Effect
         Event::Written { path, bytes, generation, is_own, unfinished }
             if generation != state.request.generation =>
         {
-            record_written_file(state, path, bytes, (generation, is_own), unfinished);
+            record_written_file(state, path, bytes, generation, is_own, unfinished);
             return Vec::new();
         }
         Event::Done { generation, report, .. } if generation != state.request.generation => {
@@ -93,7 +93,7 @@ pub(super) fn handle_worker_event(state: &mut State, event: Event) -> Vec<Effect
         | Event::CameraUndone { .. }
         | Event::Picked { .. } => {}
         Event::Written { path, bytes, generation, is_own, unfinished } => {
-            handle_written_file(state, path, bytes, (generation, is_own), unfinished);
+            record_written_file(state, path, bytes, generation, is_own, unfinished);
         }
         Event::OwnImage { state: own, .. } => state.saving.own.state = own,
         Event::WriteFailed { path, message, .. } => {
@@ -261,32 +261,21 @@ fn report_written_files(state: &mut State, paths: &[PathBuf]) {
     show_notice(state, messages::files_written(&names.join(", ")) + which);
 }
 
-/// Records a written file. The file is listed next to the image because a message would cover the keys.
-fn handle_written_file(
-    state: &mut State,
-    path: PathBuf,
-    bytes: u64,
-    (generation, is_own): (u64, bool),
-    unfinished: Option<SampleCounts>,
-) {
-    // If the render is still running, writing another output may have failed.
-    let is_by_hand = state.work.activity == RequestStatus::Done;
-    if is_by_hand {
-        (state.saving.unwritten, state.saving.write_failed) = (None, None);
-        close_empty_pane(state);
-    }
-    record_written_file(state, path, bytes, (generation, is_own), unfinished);
-}
-
 /// Records that an image has been written, possibly while its render is still running. If a report exists,
-/// it describes the same image.
+/// it describes the same image. The file is listed next to the image because a message would cover the keys.
 fn record_written_file(
     state: &mut State,
     path: PathBuf,
     bytes: u64,
-    (generation, is_own): (u64, bool),
+    generation: u64,
+    is_own: bool,
     unfinished: Option<SampleCounts>,
 ) {
+    // If the render is still running, writing another output may have failed.
+    if generation == state.request.generation && state.work.activity == RequestStatus::Done {
+        (state.saving.unwritten, state.saving.write_failed) = (None, None);
+        close_empty_pane(state);
+    }
     let shows = (!is_own).then_some(state.saving.write_shows);
     let view = shows.and_then(|shows| shows.view).unwrap_or(state.request.base_view_mode());
     let made = match (unfinished, &state.work.report) {

@@ -61,7 +61,8 @@ pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
     let room = area.width.saturating_sub(width(ways, true).saturating_sub(GAP));
     let is_long = width(&toggles, true) + OF_USE <= room;
     let mut left = Rect { width: room, ..area };
-    for hint in fit_hints(urgent_and_other_hints(state), toggles, room, is_long) {
+    let (urgent, useful) = urgent_and_other_hints(state);
+    for hint in fit_hints(urgent, useful, toggles, room, is_long) {
         left = remaining_row_area(left, draw_hint(&hint, left, is_long, state, buffer));
     }
     let mut right = remaining_row_area(area, room);
@@ -72,7 +73,8 @@ pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
 
 /// Combines toggles and other hints. Space goes to urgent hints first, then to toggles, then to the others.
 fn fit_hints(
-    (urgent, useful): (Vec<KeyHint>, Vec<KeyHint>),
+    urgent: Vec<KeyHint>,
+    useful: Vec<KeyHint>,
     toggles: Vec<KeyHint>,
     room: u16,
     is_long: bool,

@@ -31,7 +31,7 @@ use super::state::State;
 pub(super) fn history_index_at(state: &State, column: u16, row: u16) -> Option<usize> {
     let layout = Layout::for_state(state);
     let is_open = state.overlays.help.open || layout.panel.is_empty();
-    (!is_open).then(|| panel::history_index_at(state, layout.panel, (column, row))).flatten()
+    (!is_open).then(|| panel::history_index_at(state, layout.panel, column, row)).flatten()
 }
 
 /// Draws the whole screen.

@@ -47,9 +47,9 @@ pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) -> FileLinksA
 }
 
 /// Returns the index of the history entry shown at a cell in the history strip.
-pub(super) fn history_index_at(state: &State, area: Rect, place: (u16, u16)) -> Option<usize> {
+pub(super) fn history_index_at(state: &State, area: Rect, column: u16, row: u16) -> Option<usize> {
     let PanelTextLayout { lines, columns, room } = lay_out_panel_text(state, area);
-    side_panel::history_index_at(state, area, rows_used(&lines, columns, room), place)
+    side_panel::history_index_at(state, area, rows_used(&lines, columns, room), column, row)
 }
 
 /// The panel's lines, the number of columns, and the area available for them.
@@ -62,14 +62,14 @@ struct PanelTextLayout {
 fn lay_out_panel_text(state: &State, area: Rect) -> PanelTextLayout {
     let room = Rect { width: side_panel::available_line_width(state, area), ..area };
     let is_one_column = |lines: &[StyledLine]| lines.len() <= usize::from(room.height);
-    let mut lines = panel_lines(state, (room.width, room.width), true);
+    let mut lines = panel_lines(state, room.width, room.width, true);
     if !is_one_column(&lines) {
-        lines = self::panel_lines(state, (room.width, room.width), false);
+        lines = panel_lines(state, room.width, room.width, false);
     }
     let mut room = room;
     if !is_one_column(&lines) {
         room = area;
-        lines = self::panel_lines(state, (room.width, room.width.min(ENTRY_WIDTH)), false);
+        lines = panel_lines(state, room.width, room.width.min(ENTRY_WIDTH), false);
     }
     let wanted = lines.len().div_ceil(usize::from(room.height.max(1)));
     let columns = u16::try_from(wanted).unwrap_or(u16::MAX).clamp(1, (room.width / ENTRY_WIDTH).max(1));
@@ -83,7 +83,7 @@ fn rows_used(lines: &[StyledLine], columns: u16, room: Rect) -> u16 {
 
 /// Creates the panel's lines for `width`, with hints wrapped to `column`. Stage reasons are shown in full if
 /// `is_in_full`, and otherwise shortened to fit next to the stages.
-fn panel_lines(state: &State, (width, column): (u16, u16), is_in_full: bool) -> Vec<StyledLine> {
+fn panel_lines(state: &State, width: u16, column: u16, is_in_full: bool) -> Vec<StyledLine> {
     let is_done = matches!(state.work.activity, RequestStatus::Done);
     let mut lines = inspected_lines(state, width);
     // Stages and results describe the newest render.

@@ -12,12 +12,11 @@ use super::text::{TextRole, put_text};
 use crate::color::{ColorDepth, ColorMapper, XTERM};
 use crate::film::Srgb8Image;
 use crate::graphics::PlacedImage;
-use crate::history::ShownImage;
 use crate::messages;
 use crate::mosaic::{CellGrid, fit_cell};
 use crate::options::PreviewChoice;
-use crate::pipeline::protocol::PreviewUpdate;
 use crate::pipeline::protocol::ImagePosition;
+use crate::pipeline::protocol::PreviewUpdate;
 use crate::preview_style::PreviewStyle;
 use crate::rescale::resized_pixels;
 use crate::state::State;
@@ -125,7 +124,7 @@ pub fn draw_for_dark_xterm(
 ) -> Buffer {
     let shades = ColorMapper::new(depth, &XTERM);
     let inks = PreviewColors { depth, shades: &shades, is_light: false };
-    draw_image(picture, choice, inks, (area, 2.0))
+    draw_image(picture, choice, inks, area, 2.0)
 }
 
 /// Draws an image with the given color settings and cell aspect ratio.
@@ -133,7 +132,8 @@ pub(crate) fn draw_image(
     picture: &Srgb8Image,
     choice: PreviewChoice,
     inks: PreviewColors<'_>,
-    (area, cell_aspect): (Rect, f32),
+    area: Rect,
+    cell_aspect: f32,
 ) -> Buffer {
     let mut buffer = Buffer::empty(area);
     let kind = cell_based_kind(PreviewStyle::from_choice(choice, inks.depth), inks.depth);
@@ -151,7 +151,8 @@ pub(crate) fn draw_image(
 pub(crate) fn size_in_cells(
     picture: &Srgb8Image,
     depth: ColorDepth,
-    (columns, rows): (u16, u16),
+    columns: u16,
+    rows: u16,
     cell_aspect: f32,
 ) -> (u16, u16) {
     let kind = PreviewStyle::from_choice(PreviewChoice::HalfBlock, depth);
@@ -213,11 +214,11 @@ impl PreviewPlacement {
             }
         };
         match kind.grid() {
-            Some(grid) => each(&|x, y, cell| draw_two_color_cell(&scaled, grid, inks.shades, (x, y), cell)),
+            Some(grid) => each(&|x, y, cell| draw_two_color_cell(&scaled, grid, inks.shades, x, y, cell)),
             None if kind == PreviewStyle::None => {}
             None => {
                 let ramp = AsciiRamp::for_picture(picture, inks.is_light);
-                each(&|x, y, cell| draw_ascii_cell(&scaled, ramp, inks, (x, y), cell));
+                each(&|x, y, cell| draw_ascii_cell(&scaled, ramp, inks, x, y, cell));
             }
         }
     }
@@ -242,7 +243,8 @@ fn draw_two_color_cell(
     scaled: &ScaledImage<'_>,
     grid: CellGrid,
     shades: &ColorMapper,
-    (x, y): (usize, usize),
+    x: usize,
+    y: usize,
     cell: &mut Cell,
 ) {
     let (left, top) = (x as u32 * grid.columns_per_cell(), y as u32 * grid.rows_per_cell());
@@ -265,7 +267,8 @@ fn draw_ascii_cell(
     scaled: &ScaledImage<'_>,
     ramp: AsciiRamp,
     inks: PreviewColors<'_>,
-    (x, y): (usize, usize),
+    x: usize,
+    y: usize,
     cell: &mut Cell,
 ) {
     let Some(rgb) = scaled.pixel(x as u32, y as u32) else { return };

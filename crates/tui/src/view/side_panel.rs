@@ -61,9 +61,15 @@ pub(super) fn draw_chart_and_history_strip(
 }
 
 /// Returns the index of the history entry shown at a cell in the history strip.
-pub(super) fn history_index_at(state: &State, panel: Rect, lines: u16, place: (u16, u16)) -> Option<usize> {
+pub(super) fn history_index_at(
+    state: &State,
+    panel: Rect,
+    lines: u16,
+    column: u16,
+    row: u16,
+) -> Option<usize> {
     let (_, strip) = divide_chart_and_history_strip(state, panel, lines);
-    strip::entry_index_at(state, strip, place)
+    strip::entry_index_at(state, strip, column, row)
 }
 
 /// Divides the area between the curve and the strip. The strip is placed at the bottom so that it does not

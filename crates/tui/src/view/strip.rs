@@ -154,7 +154,7 @@ fn visible_entries(state: &State, area: Rect) -> Vec<StripEntryLayout> {
 }
 
 /// Returns the index of the history entry shown at a cell in the strip.
-pub(super) fn entry_index_at(state: &State, area: Rect, (column, row): (u16, u16)) -> Option<usize> {
+pub(super) fn entry_index_at(state: &State, area: Rect, column: u16, row: u16) -> Option<usize> {
     let is_there = |item: &StripEntryLayout| item.cells.contains((column, row).into());
     visible_entries(state, area).into_iter().find(is_there).map(|item| item.index)
 }

@@ -40,7 +40,7 @@ pub(super) fn draw_view_mode_list(state: &State, layout: &Layout, buffer: &mut B
         } else {
             "▾"
         };
-        draw_view_line(state, number, (current, more), place, buffer);
+        draw_view_line(state, number, number == current, more, place, buffer);
     }
 }
 
@@ -53,12 +53,12 @@ pub(crate) fn views_per_column(state: &State) -> usize {
 fn draw_view_line(
     state: &State,
     number: usize,
-    (current, more): (usize, &str),
+    is_current: bool,
+    more: &str,
     place: Rect,
     buffer: &mut Buffer,
 ) {
     let digit = if number < DIGITS { (number + 1).to_string() } else { " ".to_owned() };
-    let is_current = number == current;
     let sign = if is_current { "▸" } else { " " };
     let name = format!(" {:<11}", ViewMode::ALL[number].name());
     let tone = if is_current { TextRole::Chosen } else { TextRole::Plain };

@@ -64,21 +64,25 @@ impl ConvergenceChart {
 
     /// Renders the chart as text for a terminal of this size. The text is empty if there are no points or if
     /// the chart does not fit.
-    pub(super) fn render_text(&self, (columns, rows): (u16, u16), is_colored: bool) -> String {
+    pub(super) fn render_text(&self, columns: u16, rows: u16, is_colored: bool) -> String {
         // Some terminals wrap lines that fill the whole width.
-        let size = (columns.saturating_sub(1).min(MAX_COLUMNS), rows.saturating_sub(RESERVED_ROWS).min(ROWS));
-        if self.methods.is_empty() || size.0 < MIN_SIZE.0 || size.1 < MIN_SIZE.1 {
+        let columns = columns.saturating_sub(1).min(MAX_COLUMNS);
+        let rows = rows.saturating_sub(RESERVED_ROWS).min(ROWS);
+        if self.methods.is_empty() || columns < MIN_SIZE.0 || rows < MIN_SIZE.1 {
             return String::new();
         }
-        buffer_to_text_lines(&self.draw_to_buffer(size), is_colored)
+        buffer_to_text_lines(&self.draw_to_buffer(columns, rows), is_colored)
     }
 
-    fn draw_to_buffer(&self, (columns, rows): (u16, u16)) -> Buffer {
+    fn draw_to_buffer(&self, columns: u16, rows: u16) -> Buffer {
         let points: Vec<Vec<(f64, f64)>> = self.methods.iter().map(MethodCurve::log_points).collect();
         let styles = MARKERS.iter().cycle().zip(COLORS.iter().cycle());
         let lines = self.methods.iter().zip(&points).zip(styles);
-        let (trends, signs): (Vec<_>, Vec<_>) =
-            lines.map(|((line, points), style)| line_and_marker_datasets(&line.name, points, style)).unzip();
+        let (trends, signs): (Vec<_>, Vec<_>) = lines
+            .map(|((line, points), (sign, color))| {
+                line_and_marker_datasets(&line.name, points, *sign, *color)
+            })
+            .unzip();
         let across = axis_bounds(points.iter().flatten().map(|point| point.0));
         let up = axis_bounds(points.iter().flatten().map(|point| point.1));
         // Draw markers on top of all lines.
@@ -97,10 +101,11 @@ impl ConvergenceChart {
 fn line_and_marker_datasets<'a>(
     name: &str,
     points: &'a [(f64, f64)],
-    (sign, color): (&char, &Color),
+    sign: char,
+    color: Color,
 ) -> (Dataset<'a>, Dataset<'a>) {
-    let shared = Dataset::default().data(points).style(Style::new().fg(*color));
-    let signs = shared.clone().marker(Marker::Custom(*sign)).graph_type(GraphType::Scatter);
+    let shared = Dataset::default().data(points).style(Style::new().fg(color));
+    let signs = shared.clone().marker(Marker::Custom(sign)).graph_type(GraphType::Scatter);
     let trend = shared.marker(Marker::Braille).graph_type(GraphType::Line);
     (trend, signs.name(format!("{sign} {}", escape_invisible_chars(name))))
 }
@@ -123,7 +128,7 @@ pub(super) fn print_charts(results: &Results, console: &Console) {
     for scene in &results.scenes {
         console.print_line(&format!("{}: relMSE over seconds (log–log)", scene.scene));
         console.print_trusted_text(&buffer_to_text_lines(
-            &ConvergenceChart::from_scene(scene).draw_to_buffer((columns, ROWS)),
+            &ConvergenceChart::from_scene(scene).draw_to_buffer(columns, ROWS),
             console.is_colored(),
         ));
     }
@@ -174,7 +179,7 @@ mod tests {
 
     #[test]
     fn charts_have_lines_names_and_labels() {
-        let buffer = ConvergenceChart::from_scene(&scene()).draw_to_buffer((60, ROWS));
+        let buffer = ConvergenceChart::from_scene(&scene()).draw_to_buffer(60, ROWS);
         let plain = buffer_to_text_lines(&buffer, false);
         assert!(plain.chars().any(|c| ('\u{2801}'..='\u{28ff}').contains(&c)), "{plain}");
         assert!(plain.contains("o path") && plain.contains("201 ms") && plain.contains("1e-1"), "{plain}");
@@ -190,7 +195,7 @@ mod tests {
         let mut empty = scene();
         empty.methods.clear();
         assert!(
-            !buffer_to_text_lines(&ConvergenceChart::from_scene(&empty).draw_to_buffer((30, ROWS)), true)
+            !buffer_to_text_lines(&ConvergenceChart::from_scene(&empty).draw_to_buffer(30, ROWS), true)
                 .is_empty()
         );
     }
@@ -198,19 +203,16 @@ mod tests {
     #[test]
     fn progress_charts_show_one_scene() {
         let mut lines = ConvergenceChart::default();
-        assert_eq!(lines.render_text((80, 24), false), "");
+        assert_eq!(lines.render_text(80, 24, false), "");
         lines.add_point("a.toml", "path", (0.1, 0.5));
         lines.add_point("a.toml", "path", (0.4, 0.1));
         lines.add_point("a.toml", "whitted", (0.1, 0.01));
-        let text = lines.render_text((80, 24), false);
+        let text = lines.render_text(80, 24, false);
         assert!(text.contains("o path") && text.contains("x whitted"), "{text}");
         assert!(text.lines().count() == 16 && text.lines().all(|line| line.chars().count() < 80), "{text}");
-        assert_eq!(lines.render_text((80, 18), false).lines().count(), 12);
-        assert_eq!(
-            (lines.render_text((80, 13), false), lines.render_text((30, 24), false)),
-            Default::default()
-        );
+        assert_eq!(lines.render_text(80, 18, false).lines().count(), 12);
+        assert_eq!((lines.render_text(80, 13, false), lines.render_text(30, 24, false)), Default::default());
         lines.add_point("b.toml", "path", (0.1, 0.5));
-        assert!(!lines.render_text((80, 24), false).contains("whitted"));
+        assert!(!lines.render_text(80, 24, false).contains("whitted"));
     }
 }

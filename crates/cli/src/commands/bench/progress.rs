@@ -109,8 +109,8 @@ impl BenchProgress {
         match &self.format {
             ProgressFormat::Bar(bar, lines) => {
                 // Query the size every time, because the terminal may be resized.
-                let size = crossterm::terminal::size().unwrap_or_default();
-                let plot = lines.render_text(size, self.console.is_colored());
+                let (columns, rows) = crossterm::terminal::size().unwrap_or_default();
+                let plot = lines.render_text(columns, rows, self.console.is_colored());
                 bar.set_message(plot + &escape_invisible_chars(&self.what));
                 bar.set_prefix(to_go);
                 bar.set_position((self.fraction * STEPS as f64) as u64);

@@ -59,18 +59,19 @@ pub(super) fn cursor_context(text: &str, offset: usize) -> Option<CursorContext>
         // `[materials]` followed by `wall = { … }`.
         let (_, braces) = line.split_once('{')?;
         let items = format!("{braces}{after}").replace(',', "\n");
-        return context_in_table(info, &items, (braces, after), true);
+        return context_in_table(info, &items, braces, after, true);
     }
-    context_in_table(info, body, (line, after), false)
+    context_in_table(info, body, line, after, false)
 }
 
-/// Returns the context in a table. `body` contains the lines of a table or the items of an inline table. The
-/// tuple contains the text before the cursor and the text after it. Returns `None` in arrays and after
+/// Returns the context in a table. `body` contains the lines of a table or the items of an inline table.
+/// `typed` is the text before the cursor, and `after` the text after it. Returns `None` in arrays and after
 /// complete values.
 fn context_in_table(
     info: &'static TableInfo,
     body: &str,
-    (typed, after): (&str, &str),
+    typed: &str,
+    after: &str,
     is_inline: bool,
 ) -> Option<CursorContext> {
     let of = CursorTable { info, kind: table_type(info, body) };

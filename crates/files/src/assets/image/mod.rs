@@ -379,7 +379,7 @@ impl OpenImage {
             Some(found) => found,
             None => {
                 let monitor = Monitor { progress: &ignore_progress, token };
-                let bytes = read::read_rest(path, file, (length, FILE_LIMIT), monitor)?;
+                let bytes = read::read_rest(path, file, length, FILE_LIMIT, monitor)?;
                 let hash = read::hash_bytes(&bytes);
                 (bytes, hash)
             }

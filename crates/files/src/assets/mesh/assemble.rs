@@ -57,7 +57,7 @@ pub(super) fn assemble_text_mesh(
     cutter.add_all_faces(source, &faces)?;
     let FaceTriangulator { triangles, triangle_materials, dropped, crossing, .. } = cutter;
     let line_of = |face: usize| start_of(face).map(|start| source.line_number(start));
-    warnings.extend(self_intersection_warning(crossing, line_of));
+    warnings.extend(self_intersection_warning(crossing.0, crossing.1, line_of));
     if triangles.is_empty() {
         return Err(source.malformed_error_without_line(no_usable_face_message(faces.len(), dropped)));
     }
@@ -153,7 +153,8 @@ fn face_label(face: usize, line: Option<usize>) -> String {
 
 /// Warns about self-intersecting polygons.
 fn self_intersection_warning(
-    (count, first): (u64, usize),
+    count: u64,
+    first: usize,
     line_of: impl Fn(usize) -> Option<usize>,
 ) -> Option<String> {
     let first_face = || face_label(first, line_of(first));
@@ -435,11 +436,11 @@ mod tests {
         assert!(warnings(&[&[0, 1, 3, 2]]).is_empty());
         assert_eq!(
             warnings(&[&[0, 1, 2], &[0, 1, 2, 3]]),
-            Vec::from_iter(self_intersection_warning((1, 1), |_| None))
+            Vec::from_iter(self_intersection_warning(1, 1, |_| None))
         );
         assert_eq!(
             warnings(&[&[0, 1, 2, 3], &[0, 1, 3, 2], &[2, 3, 0, 1]]),
-            Vec::from_iter(self_intersection_warning((2, 0), |_| None))
+            Vec::from_iter(self_intersection_warning(2, 0, |_| None))
         );
     }
 

@@ -241,7 +241,8 @@ impl ImageHeader {
 pub fn render_input_differences(
     a: &[NamedRenderInput],
     b: &[NamedRenderInput],
-    (here, there): (&str, &str),
+    here: &str,
+    there: &str,
 ) -> Vec<String> {
     let value_of = |all: &[NamedRenderInput], name: &str| {
         all.iter().find(|input| input.name == name).map(|input| input.value.clone())

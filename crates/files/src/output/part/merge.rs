@@ -45,7 +45,7 @@ pub fn check_and_list_missing(parts: &[PartFile]) -> Result<Vec<u32>, PartError>
 
 /// Describes how two headers differ in the image or in its division into parts.
 fn head_differences(a: &PartHeader, b: &PartHeader) -> Vec<String> {
-    let mut found = render_input_differences(&a.identity, &b.identity, ("here", "there"));
+    let mut found = render_input_differences(&a.identity, &b.identity, "here", "there");
     let counts = (a.share.count, b.share.count);
     if counts.0 != counts.1 {
         found.push(format!("the image has {} parts here and {} there", counts.0, counts.1));

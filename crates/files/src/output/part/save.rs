@@ -25,9 +25,10 @@ pub fn save(
     film: &Film,
     state: &Value,
     guard: &ExistingFilePolicy<'_>,
-    (token, durability): (&CancelToken, Durability),
+    token: &CancelToken,
+    durability: Durability,
 ) -> Result<Option<File>, OutputError> {
-    atomic_generated(path, &|file| write(file, head, film, state, token), guard, (token, durability))
+    atomic_generated(path, &|file| write(file, head, film, state, token), guard, token, durability)
 }
 
 /// Size of the chunks passed to the writing thread.

@@ -66,7 +66,7 @@ const OPEN: ExistingFilePolicy<'static> = ExistingFilePolicy {
 
 fn put(folder: &Path, name: &str, head: &PartHeader, film: &Film) -> PathBuf {
     let path = folder.join(name);
-    save(&path, head, film, &json!({ "a": 1 }), &OPEN, (&CancelToken::new(), Durability::Process))
+    save(&path, head, film, &json!({ "a": 1 }), &OPEN, &CancelToken::new(), Durability::Process)
         .expect("saved");
     path
 }
@@ -244,8 +244,8 @@ fn parts_from_different_builds_do_not_match() {
         vec![NamedRenderInput::from_setting("glimt", build), NamedRenderInput::from_setting("width", "4")]
     };
     let [a, b] = ["0.1.0 (build 1)", "0.1.0 (build 2)"].map(inputs);
-    assert_eq!(render_input_differences(&a, &a, ("here", "there")), [""; 0]);
-    let found = render_input_differences(&a, &b, ("here", "there"));
+    assert_eq!(render_input_differences(&a, &a, "here", "there"), [""; 0]);
+    let found = render_input_differences(&a, &b, "here", "there");
     assert!(found.len() == 1 && found[0].contains("build 1") && found[0].contains("build 2"), "{found:?}");
 }
 

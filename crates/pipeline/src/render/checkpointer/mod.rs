@@ -333,7 +333,7 @@ impl<'a> Checkpointer<'a> {
     /// Returns the differences between a file header and this render.
     fn differences_from(&self, head: &PartHeader, state: &FilmState) -> Vec<String> {
         let mut unlike =
-            render_input_differences(&head.identity, self.current_render_inputs(), ("there", "here"));
+            render_input_differences(&head.identity, self.current_render_inputs(), "there", "here");
         let share = part_index_and_blocks(state.share.as_ref());
         let name = |share: &PartShare| match share.count {
             1 => "the whole image".to_owned(),
@@ -487,7 +487,7 @@ impl<'a> Checkpointer<'a> {
             losses: AttributeLossPolicy::Report(&|_| ()),
         };
         // This write is short and never canceled, because it may have been triggered by a signal.
-        let file = part::save(path, head, film, state, &guard, (&CancelToken::new(), durability))?;
+        let file = part::save(path, head, film, state, &guard, &CancelToken::new(), durability)?;
         lock.borrow_mut().keep_open(path, file);
         Ok(())
     }

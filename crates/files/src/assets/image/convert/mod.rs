@@ -111,12 +111,13 @@ fn alpha_sample_index(image: &DynamicImage, metadata: &ImageMetadata) -> Option<
 fn is_channel_filled_with(image: &DynamicImage, index: usize, value: f32) -> bool {
     fn are_channel_samples_equal_to<T: Sample>(
         samples: &[T],
-        (channels, index): (usize, usize),
+        channels: usize,
+        index: usize,
         value: f32,
     ) -> bool {
         samples.chunks_exact(channels).all(|pixel| pixel[index].to_float_scaling_integers() == value)
     }
-    with_samples!(image, samples => are_channel_samples_equal_to(samples, (channel_count(image), index), value))
+    with_samples!(image, samples => are_channel_samples_equal_to(samples, channel_count(image), index, value))
 }
 
 /// Returns the warning, if any, about an opacity read from an alpha channel that is constant or not decoded.
@@ -169,7 +170,7 @@ pub(super) fn texels(image: DynamicImage, encoding: ImageEncoding, metadata: &Im
     };
     match encoding {
         ImageEncoding::Number { of, is_srgb } => {
-            return scalars::scalar_texels(&image, (of, is_srgb), metadata);
+            return scalars::scalar_texels(&image, of, is_srgb, metadata);
         }
         ImageEncoding::CutOut(curve) => return cutout::cutout_texels(image, curve, metadata),
         ImageEncoding::Color | ImageEncoding::Srgb | ImageEncoding::Linear | ImageEncoding::Raw => {}
@@ -261,7 +262,8 @@ fn convert_color_space(
     fn convert_samples_color_space<T: Sample>(
         samples: &[T],
         channels: usize,
-        (space, is_raw): (&ColorSpace, bool),
+        space: &ColorSpace,
+        is_raw: bool,
         unusable: &mut u64,
     ) -> TexelData {
         let tables = T::linearization_tables(space);
@@ -277,8 +279,10 @@ fn convert_color_space(
         TexelData::Float(samples.chunks_exact(channels).map(&mut texel).collect())
     }
     let space = encoding.color_space(metadata);
-    let options = (&space, encoding == ImageEncoding::Raw);
-    with_samples!(image, samples => convert_samples_color_space(samples, channel_count(image), options, unusable))
+    let is_raw = encoding == ImageEncoding::Raw;
+    with_samples!(image, samples => {
+        convert_samples_color_space(samples, channel_count(image), &space, is_raw, unusable)
+    })
 }
 
 /// Linearizes a pixel, using tables for integers.

@@ -25,7 +25,8 @@ enum ScalarSource {
 /// Selects the samples from which the scalar is computed.
 fn choose_scalar_source(
     image: &DynamicImage,
-    (of, is_srgb): (ChannelSelector, bool),
+    of: ChannelSelector,
+    is_srgb: bool,
     metadata: &ImageMetadata,
 ) -> ScalarSource {
     let is_gray = channel_count(image) < 3;
@@ -66,33 +67,31 @@ fn is_grayscale(image: &DynamicImage) -> bool {
 /// Converts an image to texels that contain the scalar in all channels.
 pub(super) fn scalar_texels(
     image: &DynamicImage,
-    of: (ChannelSelector, bool),
+    of: ChannelSelector,
+    is_srgb: bool,
     metadata: &ImageMetadata,
 ) -> Texels {
     let (width, height) = (image.width(), image.height());
-    let (channels, samples) = (channel_count(image), choose_scalar_source(image, of, metadata));
+    let (channels, samples) = (channel_count(image), choose_scalar_source(image, of, is_srgb, metadata));
     let mut unusable = 0;
     let data = match (image, samples) {
         (_, ScalarSource::One) => TexelData::Linear8(vec![[u8::MAX; 3]; width as usize * height as usize]),
         (DynamicImage::ImageLuma8(pixels), ScalarSource::Sample(place, is_srgb)) => {
-            scalar_texels_from_bytes(pixels, (channels, place), is_srgb)
+            scalar_texels_from_bytes(pixels, channels, place, is_srgb)
         }
         (DynamicImage::ImageLumaA8(pixels), ScalarSource::Sample(place, is_srgb)) => {
-            scalar_texels_from_bytes(pixels, (channels, place), is_srgb)
+            scalar_texels_from_bytes(pixels, channels, place, is_srgb)
         }
         (DynamicImage::ImageRgb8(pixels), ScalarSource::Sample(place, is_srgb)) => {
-            scalar_texels_from_bytes(pixels, (channels, place), is_srgb)
+            scalar_texels_from_bytes(pixels, channels, place, is_srgb)
         }
         (DynamicImage::ImageRgba8(pixels), ScalarSource::Sample(place, is_srgb)) => {
-            scalar_texels_from_bytes(pixels, (channels, place), is_srgb)
+            scalar_texels_from_bytes(pixels, channels, place, is_srgb)
         }
-        (image, samples) => {
-            let is_srgb = of.1;
-            with_samples!(image, pixels => {
-                unusable = count_unusable_pixels(pixels, channels, samples);
-                scalar_texels_from_samples(pixels, channels, samples, is_srgb)
-            })
-        }
+        (image, samples) => with_samples!(image, pixels => {
+            unusable = count_unusable_pixels(pixels, channels, samples);
+            scalar_texels_from_samples(pixels, channels, samples, is_srgb)
+        }),
     };
     Texels { width, height, data, unusable }
 }
@@ -114,7 +113,7 @@ fn count_unusable_pixels<T: Sample>(pixels: &[T], channels: usize, samples: Scal
 
 /// Converts 8-bit samples to texels. `channels` is the number of samples per pixel, and `index` selects the
 /// sample to use.
-fn scalar_texels_from_bytes(samples: &[u8], (channels, index): (usize, usize), is_srgb: bool) -> TexelData {
+fn scalar_texels_from_bytes(samples: &[u8], channels: usize, index: usize, is_srgb: bool) -> TexelData {
     let texels = samples.chunks_exact(channels).map(|pixel| [pixel[index]; 3]).collect();
     if is_srgb { TexelData::Srgb8(texels) } else { TexelData::Linear8(texels) }
 }

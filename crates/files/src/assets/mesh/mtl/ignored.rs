@@ -56,7 +56,7 @@ fn material_warnings(found: &MtlMaterial) -> Vec<MtlWarning> {
     warn_about_unrenderable_reflectance(found, &converted, &mut add);
     warn_about_ineffective_pbr(found, &converted, &mut add);
     for (kind, map) in &found.maps {
-        warn_about_map(found, &converted, (*kind, map), &mut add);
+        warn_about_map(found, &converted, *kind, map, &mut add);
     }
     ignored
 }
@@ -254,7 +254,8 @@ fn warn_about_ineffective_pbr(
 fn warn_about_map(
     found: &MtlMaterial,
     converted: &FileMaterial,
-    (kind, map): (MapKind, &Map),
+    kind: MapKind,
+    map: &Map,
     add: &mut impl FnMut(Option<usize>, &str),
 ) {
     let line = Some(map.line);
