@@ -64,6 +64,17 @@ impl<N, T> Default for CacheOfNamedValues<N, T> {
     }
 }
 
+/// A cache that evicts the values that recent requests did not use.
+pub(super) trait RequestCache {
+    /// Ends a request. If it failed, the values used by the last successful request stay protected, so that
+    /// fixing a typo does not reload anything.
+    fn record_request_usage(&mut self, success: bool, request: u64);
+    /// Returns the values not used by the last successful request.
+    fn eviction_candidates(&self) -> Vec<EvictionCandidate>;
+    /// Drops unused values that were last used before request number `request`.
+    fn evict_unused_before(&mut self, request: u64);
+}
+
 impl<N: Hash + Eq, T> CacheOfNamedValues<N, T> {
     /// Returns the value with this name if its key matches.
     pub(super) fn get(&mut self, name: &N, key: Fingerprint) -> Option<Arc<T>> {
@@ -78,13 +89,13 @@ impl<N: Hash + Eq, T> CacheOfNamedValues<N, T> {
     }
 
     /// Inserts or replaces the value with this name. `bytes` is its size.
-    pub(super) fn insert(&mut self, name: N, key: Fingerprint, (value, bytes): (Arc<T>, usize)) {
+    pub(super) fn insert(&mut self, name: N, key: Fingerprint, value: Arc<T>, bytes: usize) {
         self.entries.insert(name, CacheEntry { key, value, bytes, used: true, proven: false, request: 0 });
     }
+}
 
-    /// Ends a request. If it failed, the values used by the last successful request stay protected, so that
-    /// fixing a typo does not reload anything.
-    pub(super) fn record_request_usage(&mut self, success: bool, request: u64) {
+impl<N: Hash + Eq, T> RequestCache for CacheOfNamedValues<N, T> {
+    fn record_request_usage(&mut self, success: bool, request: u64) {
         for entry in self.entries.values_mut() {
             entry.request = if entry.used { request } else { entry.request };
             entry.proven = if success { entry.used } else { entry.proven };
@@ -92,13 +103,12 @@ impl<N: Hash + Eq, T> CacheOfNamedValues<N, T> {
         }
     }
 
-    /// Returns the values not used by the last successful request.
-    pub(super) fn eviction_candidates(&self) -> impl Iterator<Item = EvictionCandidate> {
-        self.entries.values().filter(|entry| !entry.proven).map(|entry| (entry.request, entry.bytes))
+    fn eviction_candidates(&self) -> Vec<EvictionCandidate> {
+        let unused = self.entries.values().filter(|entry| !entry.proven);
+        unused.map(|entry| (entry.request, entry.bytes)).collect()
     }
 
-    /// Drops unused values that were last used before request number `request`.
-    pub(super) fn evict_unused_before(&mut self, request: u64) {
+    fn evict_unused_before(&mut self, request: u64) {
         self.entries.retain(|_, entry| entry.proven || entry.request >= request);
     }
 }
@@ -107,7 +117,7 @@ impl<N: Hash + Eq, T> CacheOfNamedValues<N, T> {
 /// all later requests. A request's values are all evicted together, because half a scene is of little use and
 /// trees keep their meshes alive.
 pub(super) fn oldest_request_to_keep(
-    eviction_candidates: impl Iterator<Item = EvictionCandidate>,
+    eviction_candidates: impl IntoIterator<Item = EvictionCandidate>,
     most_bytes: usize,
 ) -> u64 {
     let mut bytes_of = BTreeMap::<u64, usize>::new();
@@ -151,8 +161,8 @@ mod tests {
     #[test]
     fn unused_values_are_evicted_when_out_of_room() {
         let mut pool = CacheOfNamedValues::default();
-        pool.insert("x", key("1"), (Arc::new(1), 10));
-        pool.insert("y", key("1"), (Arc::new(2), 10));
+        pool.insert("x", key("1"), Arc::new(1), 10);
+        pool.insert("y", key("1"), Arc::new(2), 10);
         end_request(&mut pool, true, 1, NOTHING);
         assert!(pool.get(&"x", key("1")).is_some());
         assert!(pool.get(&"x", key("2")).is_none(), "different content");
@@ -164,9 +174,9 @@ mod tests {
     #[test]
     fn failed_request_keeps_last_valid_values() {
         let mut pool = CacheOfNamedValues::default();
-        pool.insert("good", key("1"), (Arc::new(1), 10));
+        pool.insert("good", key("1"), Arc::new(1), 10);
         end_request(&mut pool, true, 1, NOTHING);
-        pool.insert("wrong", key("1"), (Arc::new(2), 10));
+        pool.insert("wrong", key("1"), Arc::new(2), 10);
         end_request(&mut pool, false, 2, NOTHING);
         end_request(&mut pool, false, 3, NOTHING);
         assert!(pool.get(&"good", key("1")).is_some());
@@ -178,7 +188,7 @@ mod tests {
         let mut pool = CacheOfNamedValues::default();
         for (request, names) in [(1, ["a", "b"]), (2, ["c", "d"]), (3, ["e", "f"])] {
             for name in names {
-                pool.insert(name, key("1"), (Arc::new(1), 10));
+                pool.insert(name, key("1"), Arc::new(1), 10);
             }
             end_request(&mut pool, true, request, 30);
         }
@@ -187,7 +197,7 @@ mod tests {
         assert!(is_kept("c") && is_kept("d") && is_kept("e"));
         // Reuse the second request's values, so that the third request's unused value is now the oldest.
         end_request(&mut pool, true, 4, 30);
-        pool.insert("g", key("1"), (Arc::new(1), 30));
+        pool.insert("g", key("1"), Arc::new(1), 30);
         end_request(&mut pool, true, 5, 30);
         let mut is_kept = |name| pool.get(&name, key("1")).is_some();
         assert!(is_kept("c") && is_kept("d") && is_kept("e") && is_kept("g") && !is_kept("f"));

@@ -35,7 +35,8 @@ pub(crate) fn mesh_accel_key(mesh: &Fingerprint, accel: Accel, distinct: Option<
 pub(crate) fn geometry_key(
     scene: &Scene,
     of: &FingerprintContext<'_>,
-    (origin, lifts): (DVec3, &[DVec3]),
+    origin: DVec3,
+    lifts: &[DVec3],
     distinct: impl Iterator<Item = Option<Fingerprint>>,
 ) -> Fingerprint {
     let mut key = FingerprintHasher::new("lifted");
@@ -107,8 +108,10 @@ pub(crate) fn glass_key(scene: &Scene, of: &FingerprintContext<'_>) -> Fingerpri
 pub(crate) fn lights_key(
     scene: &Scene,
     of: &FingerprintContext<'_>,
-    (origin, lifts): (DVec3, &[DVec3]),
-    (sky, patterns): (Option<&Fingerprint>, &[&Fingerprint]),
+    origin: DVec3,
+    lifts: &[DVec3],
+    sky: Option<&Fingerprint>,
+    patterns: &[&Fingerprint],
 ) -> Fingerprint {
     let mut key = FingerprintHasher::new("lights");
     key.add_fingerprint(&key_with_coordinate_origin(&light_descriptions_key(scene, of), origin))
@@ -255,8 +258,8 @@ mod tests {
         let scene = loaded_of(text).scene;
         let of = scene_references_for_fingerprint(&scene, &[], None);
         (
-            geometry_key(&scene, &of, (DVec3::ZERO, &[]), std::iter::empty()),
-            lights_key(&scene, &of, (DVec3::ZERO, &[]), (None, &[])),
+            geometry_key(&scene, &of, DVec3::ZERO, &[], std::iter::empty()),
+            lights_key(&scene, &of, DVec3::ZERO, &[], None, &[]),
             world_key(&surfaces_and_lights_key(&scene, &of, &[]), &scene.camera, &of),
         )
     }
@@ -291,7 +294,8 @@ mod tests {
             geometry_key(
                 &scene,
                 &scene_references_for_fingerprint(&scene, &[], None),
-                (DVec3::ZERO, &[lift]),
+                DVec3::ZERO,
+                &[lift],
                 std::iter::empty(),
             )
         };

@@ -45,7 +45,8 @@ impl ViewSide {
 pub(super) fn frame_model(
     [least, greatest]: [DVec3; 2],
     points: &[DVec3],
-    (from, turns): (ViewSide, u32),
+    from: ViewSide,
+    turns: u32,
     aspect: f64,
 ) -> CameraPose {
     let (back, up) = from.to_camera_and_up_axes();
@@ -129,7 +130,7 @@ mod tests {
                 let corners: Vec<DVec3> = (0..8)
                     .map(|corner| DVec3::from([0, 1, 2].map(|axis: usize| bounds[corner >> axis & 1][axis])))
                     .collect();
-                let eye = frame_model(bounds, &corners, (from, 1), aspect);
+                let eye = frame_model(bounds, &corners, from, 1, aspect);
                 let back = (eye.position - eye.look_at).normalize();
                 let right = eye.up.cross(back).normalize();
                 let above = back.cross(right);
@@ -154,10 +155,10 @@ mod tests {
         let bounds = [DVec3::new(-0.5, 0.0, -4.0), DVec3::new(0.5, 1.0, 4.0)];
         let corners = [bounds[0], bounds[1], DVec3::new(-0.5, 1.0, 4.0), DVec3::new(0.5, 0.0, -4.0)];
         let distance = |turns| {
-            let eye = frame_model(bounds, &corners, (ViewSide::Front, turns), 1.0);
+            let eye = frame_model(bounds, &corners, ViewSide::Front, turns, 1.0);
             (eye.position - eye.look_at).length()
         };
-        let side = frame_model(bounds, &corners, (ViewSide::Right, 1), 1.0);
+        let side = frame_model(bounds, &corners, ViewSide::Right, 1, 1.0);
         let of_side = (side.position - side.look_at).length();
         assert!(distance(1) < 0.6 * of_side && distance(4) >= of_side - 1e-3, "{} {of_side}", distance(4));
     }
@@ -171,7 +172,7 @@ mod tests {
     /// A plane lit only by the sky and the key light has the sky's radiance.
     #[test]
     fn ground_is_as_bright_as_the_sky() {
-        let eye = frame_model([DVec3::ZERO, DVec3::ONE], &[DVec3::ZERO, DVec3::ONE], (ViewSide::Iso, 1), 1.0);
+        let eye = frame_model([DVec3::ZERO, DVec3::ONE], &[DVec3::ZERO, DVec3::ONE], ViewSide::Iso, 1, 1.0);
         let direction = key_light_travel_direction(&eye).normalize();
         let irradiance = std::f64::consts::PI * SKY - direction.y * KEY;
         let radiance = ground_reflectance_matching_sky() * irradiance / std::f64::consts::PI;

@@ -17,7 +17,7 @@ use crate::math::limits::LARGEST;
 use crate::messages::INVISIBLE_MODEL;
 use crate::scene::{BuiltDocument, BuiltValue, MORE_LIKE_THESE};
 use crate::settings::{UpAxis, ViewSide};
-use crate::stages::meshes::MAX_WARNINGS;
+use crate::stages::mesh_warnings::MAX_WARNINGS;
 
 /// Whether the header of a PLY file mentions Blender, which exports PLY files with z as the up axis.
 fn is_from_blender(path: &Path) -> bool {
@@ -98,7 +98,7 @@ fn scene_of_mesh(
     is_faceted: bool,
     &ForeignReadContext { view, containers, token }: &ForeignReadContext<'_>,
 ) -> Result<ForeignScene, AssetError> {
-    let loaded = containers.load_any_mesh((path, None), &ignore_progress, token)?;
+    let loaded = containers.load_any_mesh(path, None, &ignore_progress, token)?;
     let Some([least, greatest]) = loaded.mesh.bounds_in_file_coordinates() else {
         return Err(AssetError::malformed(path, None, "no usable face"));
     };
@@ -110,7 +110,8 @@ fn scene_of_mesh(
     let eye = frame_model(
         bounds,
         &points,
-        (view.from.unwrap_or(ViewSide::Iso), view.turns),
+        view.from.unwrap_or(ViewSide::Iso),
+        view.turns,
         view.aspect.unwrap_or(SIZE[0] / SIZE[1]),
     );
     // Report the file's coordinates as the cause, because the user did not choose the camera position.

@@ -17,11 +17,7 @@ use rayon::ThreadPool;
 pub(crate) use self::assets::SceneAssets;
 pub(crate) use self::camera::RequestCamera;
 pub(crate) use self::consistent::{FileReader, Reading};
-use crate::cache::{CacheOfNamedValues, Memo, oldest_request_to_keep};
-use crate::keys;
-use crate::lights::Lights;
-use crate::math::DVec3;
-use crate::plan::RenderPlan;
+use crate::cache::{CacheOfNamedValues, Memo, RequestCache, oldest_request_to_keep};
 use crate::protocol::Stage;
 use crate::scene::description::CameraOverrides;
 use crate::scene::fingerprint::Fingerprint;
@@ -193,12 +189,11 @@ impl SceneCache {
     /// Ends a request. If it succeeded, values that it did not use become eviction candidates.
     pub(crate) fn end_request(&mut self, success: bool) {
         self.requests += 1;
-        self.meshes.record_request_usage(success, self.requests);
-        self.textures.record_request_usage(success, self.requests);
-        self.accel.record_request_usage(success, self.requests);
-        let meshes = self.meshes.eviction_candidates();
-        let candidates =
-            meshes.chain(self.textures.eviction_candidates()).chain(self.accel.eviction_candidates());
+        let meshes: [&mut dyn RequestCache; 1] = [&mut self.meshes];
+        let caches = meshes.into_iter().chain(self.textures.caches()).chain(self.accel.caches());
+        let mut caches: Vec<_> = caches.collect();
+        caches.iter_mut().for_each(|cache| cache.record_request_usage(success, self.requests));
+        let candidates = caches.iter().flat_map(|cache| cache.eviction_candidates());
         let first = oldest_request_to_keep(candidates, MAX_SPARE_BYTES);
         self.meshes.evict_unused_before(first);
         self.textures.evict_unused_before(first);

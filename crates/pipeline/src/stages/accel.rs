@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use rayon::ThreadPool;
 
-use super::super::cache::{CacheOfNamedValues, EvictionCandidate, Memo};
+use super::super::cache::{CacheOfNamedValues, Memo, RequestCache};
 use super::super::keys;
 use super::super::protocol::reasons;
 use super::meshes::{CachedMesh, MeshesByFileIndex};
@@ -37,21 +37,8 @@ pub(crate) struct AccelCache {
 }
 
 impl AccelCache {
-    pub(crate) fn record_request_usage(&mut self, success: bool, request: u64) {
-        self.trees.record_request_usage(success, request);
-        self.distinct.record_request_usage(success, request);
-        self.geometry.record_request_usage(success, request);
-    }
-
-    pub(crate) fn eviction_candidates(&self) -> impl Iterator<Item = EvictionCandidate> {
-        let meshes = self.trees.eviction_candidates().chain(self.distinct.eviction_candidates());
-        meshes.chain(self.geometry.eviction_candidates())
-    }
-
-    pub(crate) fn evict_unused_before(&mut self, request: u64) {
-        self.trees.evict_unused_before(request);
-        self.distinct.evict_unused_before(request);
-        self.geometry.evict_unused_before(request);
+    pub(crate) fn caches(&mut self) -> [&mut dyn RequestCache; 3] {
+        [&mut self.trees, &mut self.distinct, &mut self.geometry]
     }
 }
 
@@ -83,7 +70,7 @@ pub(crate) fn build_accel_structures(
     let lifts = cache.lifts.get(lights_key).cloned().unwrap_or_else(|| light_lifts(scene, &meshes, origin));
     cache.lifts.set(lights_key, lifts.clone());
     let changed = distinct.iter().map(|distinct| distinct.as_ref().map(|(key, _)| *key));
-    let key = keys::geometry_key(scene, of, (origin, &lifts), changed);
+    let key = keys::geometry_key(scene, of, origin, &lifts, changed);
     let is_last = cache.last == Some(key);
     if let Some(geometry) = cache.geometry.get(&key, key) {
         cache.last = Some(key);
@@ -92,7 +79,7 @@ pub(crate) fn build_accel_structures(
     }
     let build = || Geometry::from_scene_with_light_lifts(scene, &meshes, (origin, lifts), token);
     let geometry = Arc::new(pool.install(build)?);
-    cache.geometry.insert(key, key, (geometry.clone(), geometry.top_level_memory_bytes()));
+    cache.geometry.insert(key, key, geometry.clone(), geometry.top_level_memory_bytes());
     cache.last = Some(key);
     let built = meshes.len() - kept;
     let value = AccelResult { meshes, geometry };
@@ -120,7 +107,7 @@ fn separate_coincident_mesh_emitters(
                 let found =
                     Arc::new(separate_coincident_emitters(&mesh.mesh, is_emissive, token)?.map(Arc::new));
                 let bytes = found.as_ref().as_ref().map_or(0, |distinct| distinct.mesh.memory_bytes());
-                cache.distinct.insert(key, key, (found.clone(), bytes));
+                cache.distinct.insert(key, key, found.clone(), bytes);
                 found
             }
         };
@@ -154,7 +141,7 @@ fn build_mesh_trees(
                 let tree = Arc::new(pool.install(build)?);
                 // The tree keeps its mesh alive even if the file is reloaded.
                 let bytes = tree.memory_bytes() + mesh.mesh.mesh.memory_bytes();
-                cache.trees.insert(key, key, (tree.clone(), bytes));
+                cache.trees.insert(key, key, tree.clone(), bytes);
                 tree
             }
         };

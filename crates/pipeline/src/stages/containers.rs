@@ -48,7 +48,8 @@ impl GltfContainers {
     /// Reads a mesh file, a part of a glTF file, or a whole glTF file as a single mesh.
     pub(crate) fn load_any_mesh(
         &self,
-        (path, part): (&Path, Option<u32>),
+        path: &Path,
+        part: Option<u32>,
         progress: Progress<'_>,
         token: &CancelToken,
     ) -> Result<LoadedMesh, AssetError> {
@@ -71,7 +72,8 @@ impl GltfContainers {
     /// Returns the bytes or the path of an image used by a glTF file, plus the glTF file's hash.
     pub(crate) fn image_input(
         &self,
-        (path, number): (&Path, u32),
+        path: &Path,
+        number: u32,
         token: &CancelToken,
     ) -> Result<(ImageInput, FileHash), AssetError> {
         let container = self.open(path, &ignore_progress, token)?;

@@ -37,8 +37,10 @@ pub(crate) fn collect_lights(
     let key = keys::lights_key(
         scene,
         of,
-        (geometry.coordinate_origin(), geometry.coplanar_light_offsets()),
-        (map, &patterns),
+        geometry.coordinate_origin(),
+        geometry.coplanar_light_offsets(),
+        map,
+        &patterns,
     );
     if let Some(lights) = cache.lights.get(key).filter(|lights| !lights.is_empty()) {
         return Ok(StageResult::reused(lights.clone(), reasons::UNCHANGED));

@@ -5,10 +5,13 @@ pub(super) mod containers;
 pub(super) mod coplanar;
 pub(super) mod glass;
 pub(super) mod lights;
+pub(super) mod mesh_warnings;
 pub(super) mod meshes;
 pub(super) mod parse;
 pub(super) mod photons;
 pub(super) mod render;
+mod texture_images;
+mod texture_warnings;
 pub(super) mod textures;
 pub(super) mod write;
 
@@ -75,6 +78,17 @@ impl AbortReason {
     #[allow(clippy::needless_pass_by_value, reason = "`map_err` passes ownership")]
     pub(super) fn work_failure(message: impl ToString) -> Self {
         Self::Failed(Failure::Work(message.to_string()))
+    }
+
+    /// Passes on errors about an asset, except for those that end the request.
+    pub(super) fn unless_fatal(error: AssetError) -> Result<AssetError, Self> {
+        match error {
+            AssetError::Cancelled(_) => Err(Self::Cancelled),
+            AssetError::OutOfMemory { .. } | AssetError::TooManyOpenFiles { .. } => {
+                Err(Self::work_failure(error))
+            }
+            AssetError::Unreadable { .. } | AssetError::Malformed { .. } => Ok(error),
+        }
     }
 
     /// A failure without a location in the scene, and how to fix it.

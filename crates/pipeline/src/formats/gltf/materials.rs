@@ -63,7 +63,7 @@ impl MaterialBuilder<'_, '_> {
         match material.glass {
             Some(glass) => {
                 keys.push(("type", "glass".into()));
-                self.push_number_or_texture(&mut keys, ("roughness", 0.0), &material.roughness, "g");
+                self.push_number_or_texture(&mut keys, "roughness", 0.0, &material.roughness, "g");
                 if glass.tint != DVec3::ONE {
                     keys.push(("tint", shorten_color(glass.tint)));
                 }
@@ -81,20 +81,15 @@ impl MaterialBuilder<'_, '_> {
 
     fn add_principled_keys(&mut self, keys: &mut Entries, material: &ModelMaterial) {
         keys.push(("type", "principled".into()));
-        self.push_color_or_texture(keys, ("color", 0.8), &material.color);
-        self.push_number_or_texture(keys, ("metallic", 0.0), &material.metallic, "b");
-        self.push_number_or_texture(keys, ("roughness", 0.5), &material.roughness, "g");
-        self.push_number_or_texture(keys, ("specular", 1.0), &material.specular, "a");
-        self.push_color_or_texture(keys, ("specular_color", 1.0), &material.specular_color);
-        self.push_number_or_texture(keys, ("transmission", 0.0), &material.transmission, "r");
-        self.push_number_or_texture(keys, ("clearcoat", 0.0), &material.clearcoat, "r");
+        self.push_color_or_texture(keys, "color", 0.8, &material.color);
+        self.push_number_or_texture(keys, "metallic", 0.0, &material.metallic, "b");
+        self.push_number_or_texture(keys, "roughness", 0.5, &material.roughness, "g");
+        self.push_number_or_texture(keys, "specular", 1.0, &material.specular, "a");
+        self.push_color_or_texture(keys, "specular_color", 1.0, &material.specular_color);
+        self.push_number_or_texture(keys, "transmission", 0.0, &material.transmission, "r");
+        self.push_number_or_texture(keys, "clearcoat", 0.0, &material.clearcoat, "r");
         if material.clearcoat.factor != DVec3::ZERO {
-            self.push_number_or_texture(
-                keys,
-                ("clearcoat_roughness", 0.0),
-                &material.clearcoat_roughness,
-                "g",
-            );
+            self.push_number_or_texture(keys, "clearcoat_roughness", 0.0, &material.clearcoat_roughness, "g");
         }
     }
 
@@ -161,7 +156,8 @@ impl MaterialBuilder<'_, '_> {
     fn push_color_or_texture(
         &mut self,
         keys: &mut Entries,
-        (key, usual): (&'static str, f64),
+        key: &'static str,
+        usual: f64,
         slot: &TexturedValue,
     ) {
         match &slot.texture {
@@ -180,7 +176,8 @@ impl MaterialBuilder<'_, '_> {
     fn push_number_or_texture(
         &mut self,
         keys: &mut Entries,
-        (key, usual): (&'static str, f64),
+        key: &'static str,
+        usual: f64,
         slot: &TexturedValue,
         channel: &'static str,
     ) {

@@ -177,7 +177,8 @@ impl SceneBuilder<'_> {
                 let eye = frame_model(
                     bounds,
                     &scene.outline,
-                    (view.from.unwrap_or(ViewSide::Iso), view.turns),
+                    view.from.unwrap_or(ViewSide::Iso),
+                    view.turns,
                     aspect.unwrap_or(SIZE[0] / SIZE[1]),
                 );
                 add_camera(&mut self.document, &eye, FOV);
