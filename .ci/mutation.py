@@ -215,7 +215,7 @@ FAULTS = [
     ("a time limit ignored while photons are traced", "pipeline/render/scheduler.rs",
      "numbers.clone())?;\n            if ⟦self.is_over_time⟧ {", "false",
      "pipeline::tests::photons::time_limit_ends_a_photon_pass"),
-    ("a first image without photons", "pipeline/render/scheduler.rs", "coarse.trace_coarse_image(⟦maps.as_ref()⟧, size", "None",
+    ("a first image without photons", "pipeline/render/scheduler.rs", "coarse.trace_coarse_image(⟦maps.as_ref()⟧, width", "None",
      "pipeline::tests::photons::first_preview_does_not_wait_for_photons"),
     ("unbounded photon map cache", "pipeline/stages/photons.rs", "let has_room = ⟦self.cached_bytes() + pass.memory_bytes() <= MAX_KEPT_BYTES⟧;",
      "true", "pipeline::tests::photons::maps_are_kept_while_there_is_room"),

@@ -61,10 +61,11 @@
 //! 4. `pipeline/worker.rs` holds at most one pending request in its mailbox. A newer request cancels the
 //!    current render.
 //! 5. `pipeline/session/request.rs` runs the steps of the request. The first is
-//!    `pipeline/session/preparation.rs`: it reads the scene and builds its world with `pipeline/prepare/mod.rs`
-//!    (`pipeline/stages/parse.rs`, `pipeline/plan.rs`, then meshes, textures, glass, accel and lights). A stage
-//!    reuses its result if its key in `pipeline/keys.rs` is unchanged. If the scene has errors, the request
-//!    ends here and the last image stays on the screen.
+//!    `pipeline/session/preparation.rs`: it reads the scene with `pipeline/prepare/mod.rs`
+//!    (`pipeline/stages/parse.rs`, `pipeline/plan.rs`, then meshes, textures and glass), and builds its world
+//!    with `pipeline/prepare/build.rs` (accel and lights). A stage reuses its result if its key in
+//!    `pipeline/keys.rs` is unchanged. If the scene has errors, the request ends here and the last image stays
+//!    on the screen.
 //! 6. `pipeline/session/render.rs` traces photons and renders the film: `pipeline/render/scheduler.rs`
 //!    schedules passes, and `pipeline/trace.rs` renders their tiles on the thread pool. For large images, and
 //!    while photons are traced, `pipeline/render/first_picture.rs` renders a coarse image first.

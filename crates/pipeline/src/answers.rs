@@ -36,7 +36,7 @@ impl NormalizedRect {
     }
 
     /// Normalizes a pixel rectangle of an image with `columns` × `rows` pixels.
-    pub(super) fn from_pixels(rect: Rect, (columns, rows): (u32, u32)) -> Self {
+    pub(super) fn from_pixels(rect: Rect, columns: u32, rows: u32) -> Self {
         let share = |pixels: u32, side: u32| f64::from(pixels) / f64::from(side);
         Self {
             left: share(rect.x, columns),
@@ -47,7 +47,7 @@ impl NormalizedRect {
     }
 
     /// Returns the pixels that overlap the rectangle in an image with `columns` × `rows` pixels.
-    pub(super) fn pixels(self, (columns, rows): (u32, u32)) -> Rect {
+    pub(super) fn pixels(self, columns: u32, rows: u32) -> Rect {
         let along = |start: f64, length: f64, side: u32| {
             let at = |share: f64| share.clamp(0.0, 1.0) * f64::from(side);
             let first = (at(start) as u32).min(side.saturating_sub(1));
@@ -141,27 +141,28 @@ mod tests {
 
     #[test]
     fn section_covers_all_overlapping_pixels() {
-        let size = (40, 30);
+        let (columns, rows) = (40, 30);
         for rect in [
             Rect { x: 0, y: 0, width: 40, height: 30 },
             Rect { x: 7, y: 11, width: 13, height: 1 },
             Rect { x: 39, y: 29, width: 1, height: 1 },
         ] {
             // Rounding errors must not add pixels.
-            let NormalizedRect { left, top, width, height } = NormalizedRect::from_pixels(rect, size);
+            let NormalizedRect { left, top, width, height } =
+                NormalizedRect::from_pixels(rect, columns, rows);
             let inside = NormalizedRect {
                 left: left + 1e-9,
                 top: top + 1e-9,
                 width: width - 2e-9,
                 height: height - 2e-9,
             };
-            assert_eq!(inside.pixels(size), rect);
+            assert_eq!(inside.pixels(columns, rows), rect);
         }
         let one =
             NormalizedRect::between(ImagePosition { x: 0.99, y: 0.5 }, ImagePosition { x: 0.99, y: 0.5 });
-        assert_eq!(one.pixels(size), Rect { x: 39, y: 15, width: 1, height: 1 });
+        assert_eq!(one.pixels(columns, rows), Rect { x: 39, y: 15, width: 1, height: 1 });
         let wide =
             NormalizedRect::between(ImagePosition { x: 1.5, y: -0.2 }, ImagePosition { x: 0.5, y: 2.0 });
-        assert_eq!(wide.pixels(size), Rect { x: 20, y: 0, width: 20, height: 30 });
+        assert_eq!(wide.pixels(columns, rows), Rect { x: 20, y: 0, width: 20, height: 30 });
     }
 }

@@ -14,7 +14,7 @@ use super::sink::EventSink;
 use super::stages::parse::SceneParseRequest;
 use super::stages::textures::TextureSelection;
 use super::stages::{AbortReason, Findings};
-use super::table::StageRunner;
+use super::table::StageTable;
 use super::targets::output_conflicts;
 use super::threads::RenderThreads;
 use super::warnings::settings_warnings;
@@ -66,8 +66,7 @@ pub fn estimate_memory(path: &Path, overrides: &Overrides) -> Result<u64, Failur
     let (assets, _) = checker.load_all(path, &overrides.sets, &CancelToken::new())?;
     let plan = resolve_plan(&assets.parsed.loaded.scene, path, overrides)
         .map_err(|error| Failure::Scene(vec![*error]))?;
-    let bytes = assets.textures.memory_bytes;
-    Ok(MemoryEstimate::for_image_and_scene(&plan, &plan.scene, &assets.meshes, bytes).bytes())
+    Ok(MemoryEstimate::for_image_and_scene(&plan, &assets).bytes())
 }
 
 impl IncrementalSceneChecker {
@@ -115,7 +114,7 @@ impl IncrementalSceneChecker {
         let sink = EventSink::silent(0);
         let pool = self.threads.pool(logical_cpu_count(), false)?;
         let reader = FileReader { contents: &self.contents, pool: &pool, sink: &sink, token };
-        let (scenes, mut table) = (&mut self.scenes, StageRunner::silent(&sink, token));
+        let (scenes, mut table) = (&mut self.scenes, StageTable::new(None, token));
         reader.read_consistently(&mut table, findings, |reading| {
             let scene = SceneParseRequest { path, sets, show: ModelViewOptions::default() };
             let parsed = scenes.parse(scene, reading)?;
@@ -132,7 +131,7 @@ fn check_settings(path: &Path, assets: &SceneAssets, findings: &mut Findings) ->
     let (loaded, overrides) = (&assets.parsed.loaded, Overrides::default());
     let plan = resolve_plan(&loaded.scene, path, &overrides)?;
     findings.warnings.extend(settings_warnings(loaded, &plan.scene, &plan.settings, &overrides));
-    if plan.named_by == OutputNameSource::Scene {
+    if plan.outputs.named_by == OutputNameSource::Scene {
         findings.errors.extend(output_conflicts(&plan, &ProtectedInputs::from_assets(assets)));
     }
     Ok(())

@@ -1,5 +1,6 @@
 //! Synchronous in-memory rendering, for benchmarks.
 
+use std::cell::Cell;
 use std::path::Path;
 
 use super::protocol::{Report, Request};
@@ -36,7 +37,9 @@ impl HeadlessSession {
         let request = Request { force: true, ..request };
         // Events are not needed, because the result is returned.
         let sink = EventSink::silent(self.generation);
-        let context = RequestContext::new(&request, &sink, token, token, &NoPendingCommands);
+        let (commands, is_postponed) = (&NoPendingCommands, Cell::default());
+        let context =
+            RequestContext { request: &request, sink: &sink, token, writing: token, commands, is_postponed };
         // An in-memory image is not written, so there are no conflicts.
         let CompletedRequest { report, warnings, conflicts: _, unchanged: _ } =
             self.session.run_request(&context)?;

@@ -84,8 +84,9 @@ impl ImageDependencies<'_> {
         }
         if let Some(samples) = self.divided {
             add("samples", samples.to_string());
-            add("exposure", self.plan.tone.exposure_stops.to_string());
-            add("tonemap", self.plan.tone.curve.name().to_owned());
+            let tone = self.plan.tone();
+            add("exposure", tone.exposure_stops.to_string());
+            add("tonemap", tone.curve.name().to_owned());
             add("bits per channel", self.plan.bit_depth.to_string());
         }
     }

@@ -235,10 +235,11 @@ pub(crate) fn film_sums_key(
 /// key includes `film_number`.
 pub(crate) fn developed_image_key(film: Fingerprint, plan: &RenderPlan, film_number: u64) -> Fingerprint {
     let RenderOptions { samples, error, .. } = plan.settings.render;
+    let tone = plan.tone();
     let mut key = FingerprintHasher::new("image");
     key.add_fingerprint(&film).add_u64(samples.into()).add_f32(error);
-    key.add_choice(plan.settings.view).add_f32(plan.tone.exposure_stops).add_choice(plan.tone.curve);
-    if let Some(seconds) = plan.time_seconds {
+    key.add_choice(plan.settings.view).add_f32(tone.exposure_stops).add_choice(tone.curve);
+    if let Some(seconds) = plan.limits.seconds {
         key.add_f64(seconds).add_u64(film_number);
     }
     key.finish()

@@ -5,12 +5,12 @@
 //! sizes are conservative estimates based on measured peak memory per triangle and per emitted photon.
 
 use super::plan::RenderPlan;
+use super::prepare::SceneAssets;
 use super::render::share::Shard;
 use super::stages::AbortReason;
-use super::stages::meshes::MeshesByFileIndex;
 use crate::film::{Film, Rect, SumOrder};
 use crate::integrators::PhotonSettings;
-use crate::scene::description::{Accel, Scene};
+use crate::scene::description::Accel;
 use crate::system::memory::{MemoryLimit, ulimit_or_cgroup_limit};
 
 /// Bytes used by the program itself.
@@ -55,7 +55,7 @@ impl MemoryEstimate {
             plan.crop.unwrap_or(whole),
             sample_summation_order(plan),
         );
-        let threads = plan.threads as u64 * THREAD;
+        let threads = plan.limits.threads as u64 * THREAD;
         let mut items = vec![
             ("the program", PROGRAM),
             ("the film", film),
@@ -67,7 +67,7 @@ impl MemoryEstimate {
             let sums = Film::layer_memory(plan.crop.unwrap_or(whole), recorded);
             items.push(("the layers", sums + picture * plan.layers.len() as u64));
         }
-        if let Some(turn) = plan.turn.filter(|_| !plan.moving.is_empty()) {
+        if let Some(turn) = plan.turn.filter(|_| !plan.outputs.animations.is_empty()) {
             let frame = u64::from(render.width) * u64::from(render.height) * 3;
             items.push((FRAMES, frame * u64::from(turn.of)));
         }
@@ -75,13 +75,9 @@ impl MemoryEstimate {
     }
 
     /// Estimates the memory for the image and everything the scene references.
-    pub(super) fn for_image_and_scene(
-        plan: &RenderPlan,
-        scene: &Scene,
-        meshes: &MeshesByFileIndex,
-        texture_bytes: u64,
-    ) -> Self {
+    pub(super) fn for_image_and_scene(plan: &RenderPlan, assets: &SceneAssets) -> Self {
         let Self(mut items) = Self::for_image(plan);
+        let (scene, meshes) = (&plan.scene, &assets.meshes);
         let triangle = match scene.render.accel {
             Accel::Bvh => 110,
             Accel::BvhHigh => 170,
@@ -91,7 +87,7 @@ impl MemoryEstimate {
         let triangles: u64 = meshes.iter().map(|kept| kept.mesh.mesh.triangles.len() as u64).sum();
         items.push(("meshes", of_meshes));
         items.push(("trees", triangles * triangle + scene.objects.len() as u64 * OBJECT));
-        items.push(("textures", texture_bytes));
+        items.push(("textures", assets.textures.memory_bytes));
         if let Some(PhotonSettings { count, .. }) = plan.settings.without_ineffective_settings().photons {
             let kept =
                 (u64::from(count) * u64::from(plan.settings.render.samples)).saturating_mul(PHOTON / 4);
@@ -132,7 +128,7 @@ impl MemoryEstimate {
     ) -> Result<u64, AbortReason> {
         let all = self.bytes();
         let frames = self.0.iter().find(|(name, bytes)| *name == FRAMES && *bytes > MAX_FRAMES);
-        if let (Some((_, bytes)), None) = (frames, plan.memory) {
+        if let (Some((_, bytes)), None) = (frames, plan.limits.memory) {
             return Err(AbortReason::work_failure(format!(
                 "the frames need {} of memory until the animation is written; render fewer or smaller frames, or \
                  numbered files such as a_####.png; --memory {} allows it",
@@ -141,8 +137,11 @@ impl MemoryEstimate {
             )));
         }
         // A command-line limit replaces the system limit, because the estimate is conservative.
-        let limit =
-            plan.memory.map(|bytes| MemoryLimit { bytes, setting: "--memory".to_owned() }).or_else(limit);
+        let limit = plan
+            .limits
+            .memory
+            .map(|bytes| MemoryLimit { bytes, setting: "--memory".to_owned() })
+            .or_else(limit);
         let Some(MemoryLimit { bytes: most, setting }) = limit else { return Ok(u64::MAX) };
         if all <= most {
             return Ok(most - all);
@@ -174,7 +173,7 @@ impl MemoryEstimate {
             format_bytes(all),
             items.join(", "),
             format_bytes(most),
-            if plan.memory.is_some() { "" } else { &try_anyway }
+            if plan.limits.memory.is_some() { "" } else { &try_anyway }
         )))
     }
 }
@@ -184,7 +183,9 @@ impl MemoryEstimate {
 fn sample_summation_order(plan: &RenderPlan) -> SumOrder {
     let gathers = plan.settings.gathers_photons();
     match plan.shard {
-        Some(shard) => Shard::new(shard, gathers, plan.settings.render.samples).summation_order(),
+        Some((index, count)) => {
+            Shard::new(index, count, gathers, plan.settings.render.samples).summation_order()
+        }
         None if gathers => SumOrder::Blocked,
         None => SumOrder::Sequential,
     }

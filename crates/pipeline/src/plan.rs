@@ -4,10 +4,10 @@ use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use super::formats::model::ModelViewOptions;
 use super::protocol::Request;
 use super::settings::{
-    CheckpointSettings, EffectiveSettingsSummary, OutputLayer, Overrides, UpAxis, ViewMode, ViewSide,
-    layers_to_record,
+    CheckpointSettings, EffectiveSettingsSummary, OutputLayer, Overrides, ViewMode, layers_to_record,
 };
 use super::turntable::{self, TurntableFrame};
 use crate::choice::Choice;
@@ -18,7 +18,7 @@ use crate::integrators::{AovSource, FirstHitQuantity, LightAov, PhotonSettings, 
 use crate::math::Vec3;
 use crate::output::AnimationFormat;
 use crate::output::{BitDepth, Format, OutputError};
-use crate::scene::description::{Accel, PhotonOptions, Scene, Tonemap};
+use crate::scene::description::{Accel, PhotonOptions, RenderOptions, Scene};
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::system::threads::logical_cpu_count;
 use crate::world::TextureRolesNeededByRender;
@@ -28,42 +28,110 @@ use crate::world::TextureRolesNeededByRender;
 pub(super) struct RenderPlan {
     /// Path of the scene file or model.
     pub(super) path: PathBuf,
-    /// File name of the scene, which is stored in part files.
-    pub(super) name: String,
     /// The scene, with the acceleration structure from the overrides. All other overrides are in `settings`.
     pub(super) scene: Arc<Scene>,
     pub(super) settings: RenderSettings,
-    pub(super) threads: usize,
     pub(super) crop: Option<Rect>,
-    pub(super) time_seconds: Option<f64>,
-    pub(super) tone: ToneMapping,
-    pub(super) bit_depth: u8,
-    /// Output files of this image.
-    pub(super) outputs: Vec<PathBuf>,
-    /// Animation files that contain this image as a frame.
-    pub(super) moving: Vec<PathBuf>,
+    /// 1-based number of the part to render, and the number of parts.
+    pub(super) shard: Option<(u32, u32)>,
     /// The turntable frame, or `None` for a still image.
     pub(super) turn: Option<TurntableFrame>,
+    /// The view of a model, as specified on the command line.
+    pub(super) model_view: ModelViewOptions,
     /// Additional layers for EXR files.
     pub(super) layers: Vec<OutputLayer>,
-    /// The side of a model that faces the camera, or `None` if not set on the command line.
-    pub(super) from: Option<ViewSide>,
-    /// The model's up axis, or `None` if not set on the command line.
-    pub(super) up: Option<UpAxis>,
-    /// Output files for later turntable frames.
-    pub(super) later_outputs: Vec<PathBuf>,
+    /// Bits per channel.
+    pub(super) bit_depth: u8,
+    pub(super) outputs: OutputFiles,
+    pub(super) checkpoints: CheckpointSettings,
+    pub(super) limits: RenderLimits,
+}
+
+/// Limits on the resources that a render uses.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct RenderLimits {
+    /// Number of render threads.
+    pub(super) threads: usize,
+    /// Time limit in seconds.
+    pub(super) seconds: Option<f64>,
+    /// Maximum memory use in bytes.
+    pub(super) memory: Option<u64>,
+}
+
+/// The files that a request writes.
+#[derive(Clone, Debug)]
+pub(super) struct OutputFiles {
+    /// Files of this image.
+    pub(super) images: Vec<PathBuf>,
+    /// Animations that contain this image as a frame.
+    pub(super) animations: Vec<PathBuf>,
+    /// Image files of later turntable frames.
+    pub(super) later_images: Vec<PathBuf>,
+    pub(super) report: Option<PathBuf>,
     pub(super) named_by: OutputNameSource,
     /// Default file name pattern for turntable frames, with `#` for the number, or `None` if this is not a
     /// turntable or the user named the files.
     pub(super) default_names: Option<PathBuf>,
-    pub(super) report: Option<PathBuf>,
+    /// Whether the report, and images with default names, may replace files that glimt did not write.
     pub(super) replaces_foreign: bool,
-    /// 1-based number of the part to render, and the number of parts.
-    pub(super) shard: Option<(u32, u32)>,
-    pub(super) checkpoints: CheckpointSettings,
-    /// Maximum memory use of the render, in bytes.
-    pub(super) memory: Option<u64>,
-    pub(super) effective: EffectiveSettingsSummary,
+}
+
+impl RenderPlan {
+    /// Returns the file name of the scene, which is stored in part files.
+    pub(super) fn name(&self) -> String {
+        self.path.file_name().unwrap_or_default().to_string_lossy().into_owned()
+    }
+
+    /// Returns the tone mapping for the view. Exposure and tone curve apply only to light, not to data.
+    pub(super) fn tone(&self) -> ToneMapping {
+        let RenderOptions { exposure, tonemap: curve, .. } = self.settings.render;
+        match self.settings.view.aov_source() {
+            AovSource::Light(LightAov::Radiance(_))
+            | AovSource::Bounds
+            | AovSource::Film(FilmQuantity::Radiance) => {
+                ToneMapping { exposure_stops: exposure, curve, ..Default::default() }
+            }
+            AovSource::FirstHit(FirstHitQuantity::Depth) => {
+                ToneMapping { range_map: RangeMap::Unresolved(DataKind::Distances), ..ToneMapping::DATA }
+            }
+            AovSource::Light(LightAov::TraversalCost)
+            | AovSource::FirstHit(FirstHitQuantity::Photons)
+            | AovSource::Film(FilmQuantity::Samples | FilmQuantity::Error) => {
+                ToneMapping { range_map: RangeMap::Unresolved(DataKind::Amounts), ..ToneMapping::DATA }
+            }
+            AovSource::FirstHit(
+                FirstHitQuantity::Normal
+                | FirstHitQuantity::Barycentric
+                | FirstHitQuantity::Uv
+                | FirstHitQuantity::Albedo,
+            ) => ToneMapping::DATA,
+            // The values are linear, but exposure must not scale them.
+            AovSource::Light(LightAov::LitFraction) => ToneMapping::default(),
+        }
+    }
+
+    /// Summarizes the settings for status lines and reports.
+    pub(super) fn effective_settings(&self) -> EffectiveSettingsSummary {
+        let RenderSettings { render, dof, view, photons, layers: _ } =
+            self.settings.without_ineffective_settings();
+        EffectiveSettingsSummary {
+            width: render.width,
+            height: render.height,
+            samples: render.samples,
+            error: render.error,
+            integrator: render.integrator,
+            shadows: self.settings.render.shadows,
+            clamp: render.clamp,
+            photons: photons.is_some(),
+            dof,
+            accel: render.accel,
+            view,
+            exposure: render.exposure,
+            seed: render.seed,
+            threads: self.limits.threads,
+            outputs: [self.outputs.images.as_slice(), &self.outputs.animations].concat(),
+        }
+    }
 }
 
 /// Resolved settings of the image to show, and of the image that the scene specifies.
@@ -117,62 +185,42 @@ pub(super) fn resolve_plan(
     }
     check_crop(overrides.crop, render.width, render.height)?;
     let aperture = scene.camera.lens_radius();
+    let photons = overrides.photons.unwrap_or(scene.photons.enabled);
     let settings = RenderSettings {
         render,
         dof: overrides.dof != Some(false) && aperture > 0.0,
         view: overrides.view.unwrap_or(ViewMode::Beauty),
-        photons: overrides
-            .photons
-            .unwrap_or(scene.photons.enabled)
-            .then(|| photon_settings(&scene.photons, (render.width, render.height))),
+        photons: photons.then(|| photon_settings(&scene.photons, &render)),
         layers: layers_to_record(&overrides.layers),
     };
-    let threads = thread_count(overrides);
-    let (outputs, named_by) = output_paths(scene.output.as_ref(), path, overrides);
-    let is_usual = named_by == OutputNameSource::Default && overrides.turn.is_some();
-    let default_names = outputs.first().filter(|_| is_usual).cloned();
-    let OutputPathsByKind { outputs, moving, later_outputs } =
-        OutputPathsByKind::classify_output_paths(outputs, overrides.turn);
-    let bit_depth = overrides.bit_depth.unwrap_or(8);
-    match overrides.shard {
+    let plan = RenderPlan {
+        path: path.to_owned(),
+        scene: scene_with_accel(scene, render.accel),
+        settings,
+        crop: overrides.crop,
+        shard: overrides.shard,
+        turn: overrides.turn,
+        model_view: ModelViewOptions::from_overrides(overrides),
+        layers: overrides.layers.clone(),
+        bit_depth: overrides.bit_depth.unwrap_or(8),
+        outputs: OutputFiles::resolve(scene.output.as_ref(), path, overrides),
+        checkpoints: overrides.checkpoints,
+        limits: RenderLimits {
+            threads: thread_count(overrides),
+            seconds: overrides.time_seconds,
+            memory: overrides.memory,
+        },
+    };
+    match plan.shard {
         // Part files do not use an image format.
-        Some(_) => check_shardable(&settings, overrides)?,
+        Some(_) => check_shardable(&plan.settings, overrides)?,
         None => {
-            let check =
-                |path: &PathBuf| check_format_supports_image(path, (render.width, render.height), bit_depth);
-            outputs.iter().try_for_each(check)?;
-            check_layers(&outputs, &moving, settings.view, overrides)?;
-            moving.iter().try_for_each(|path| {
-                check_animation_size_and_depth(path, (render.width, render.height), bit_depth)
-            })?;
+            plan.outputs.images.iter().try_for_each(|path| check_image_format(&plan, path))?;
+            check_layers(&plan)?;
+            plan.outputs.animations.iter().try_for_each(|path| check_animation_format(&plan, path))?;
         }
     }
-    Ok(RenderPlan {
-        path: path.to_owned(),
-        name: path.file_name().unwrap_or_default().to_string_lossy().into_owned(),
-        settings,
-        threads,
-        crop: overrides.crop,
-        time_seconds: overrides.time_seconds,
-        tone: tone_mapping_for_view(render.exposure, render.tonemap, settings.view),
-        bit_depth,
-        effective: EffectiveSettingsSummary::new(&settings, threads, &[outputs.as_slice(), &moving].concat()),
-        outputs,
-        moving,
-        later_outputs,
-        turn: overrides.turn,
-        layers: overrides.layers.clone(),
-        from: overrides.from,
-        up: overrides.up,
-        named_by,
-        default_names,
-        report: requested_report_path(overrides),
-        replaces_foreign: overrides.replaces_foreign,
-        shard: overrides.shard,
-        checkpoints: overrides.checkpoints,
-        memory: overrides.memory,
-        scene: scene_with_accel(scene, render.accel),
-    })
+    Ok(plan)
 }
 
 /// Maximum number of photons per pass, limited by memory.
@@ -183,11 +231,11 @@ pub(super) const MAX_PHOTONS: u64 = 4_000_000;
 /// and delay the first image.
 const PHOTONS_BY_PIXELS: RangeInclusive<u64> = 8192..=200_000;
 
-/// Returns the photon settings for an image of the given size.
-fn photon_settings(requested: &PhotonOptions, (width, height): (u32, u32)) -> PhotonSettings {
+/// Returns the photon settings for an image.
+fn photon_settings(requested: &PhotonOptions, image: &RenderOptions) -> PhotonSettings {
     let PhotonOptions { enabled: _, count, radius, bounces } = *requested;
     let by_pixels = || {
-        let pixels = u64::from(width) * u64::from(height);
+        let pixels = u64::from(image.width) * u64::from(image.height);
         pixels.clamp(*PHOTONS_BY_PIXELS.start(), *PHOTONS_BY_PIXELS.end())
     };
     let count = if count == 0 { by_pixels() } else { count.min(MAX_PHOTONS) };
@@ -237,31 +285,34 @@ fn requested_report_path(overrides: &Overrides) -> Option<PathBuf> {
     Some(numbered.unwrap_or_else(|| path.clone()))
 }
 
-/// A request's output files, grouped by kind.
-struct OutputPathsByKind {
-    outputs: Vec<PathBuf>,
-    moving: Vec<PathBuf>,
-    later_outputs: Vec<PathBuf>,
-}
-
-impl OutputPathsByKind {
-    fn classify_output_paths(paths: Vec<PathBuf>, turn: Option<TurntableFrame>) -> Self {
-        let (mut moving, mut later_outputs) = (Vec::new(), Vec::new());
-        let Some(turn) = turn else { return Self { outputs: paths, moving, later_outputs } };
-        let mut outputs = Vec::new();
+impl OutputFiles {
+    /// Resolves the files that a request writes. `of_scene` is the output file specified in the scene.
+    fn resolve(of_scene: Option<&PathBuf>, scene: &Path, overrides: &Overrides) -> Self {
+        let (paths, named_by) = output_paths(of_scene, scene, overrides);
+        let mut files = Self {
+            images: Vec::new(),
+            animations: Vec::new(),
+            later_images: Vec::new(),
+            report: requested_report_path(overrides),
+            named_by,
+            default_names: None,
+            replaces_foreign: overrides.replaces_foreign,
+        };
+        let Some(turn) = overrides.turn else { return Self { images: paths, ..files } };
+        files.default_names = paths.first().filter(|_| named_by == OutputNameSource::Default).cloned();
         for path in paths {
             if AnimationFormat::from_path(&path).is_some() {
-                moving.push(path);
+                files.animations.push(path);
                 continue;
             }
             // For the first frame, also list the files for later frames, so that conflicts are detected
             // before hours of rendering.
             let others = (turn.number + 1..turn.of).filter(|_| turn.number == 0);
             let of = |number| turntable::frame_path(&path, TurntableFrame { number, ..turn });
-            later_outputs.extend(others.filter_map(of));
-            outputs.push(of(turn.number).unwrap_or(path));
+            files.later_images.extend(others.filter_map(of));
+            files.images.push(of(turn.number).unwrap_or(path));
         }
-        Self { outputs, moving, later_outputs }
+        files
     }
 }
 
@@ -272,21 +323,18 @@ pub(super) fn argument_error(message: String, help: &str) -> Box<Diagnostic> {
 }
 
 /// Checks that the requested layers can be written.
-fn check_layers(
-    outputs: &[PathBuf],
-    moving: &[PathBuf],
-    view: ViewMode,
-    overrides: &Overrides,
-) -> Result<(), Box<Diagnostic>> {
-    if overrides.layers.is_empty() {
+fn check_layers(plan: &RenderPlan) -> Result<(), Box<Diagnostic>> {
+    if plan.layers.is_empty() {
         return Ok(());
     }
     let refused = |message: String, help: &str| Err(argument_error(message, help));
     let is_exr = |path: &&PathBuf| Format::from_path(path).is_ok_and(|format| format == Format::Exr);
-    if let Some(other) = outputs.iter().find(|path| !is_exr(path)).or(moving.first()) {
+    let OutputFiles { images, animations, .. } = &plan.outputs;
+    if let Some(other) = images.iter().find(|path| !is_exr(path)).or(animations.first()) {
         let message = format!("`--layers` needs EXR output; {} is not an EXR file", other.display());
         return refused(message, "write an EXR file, for example -o layers.exr");
     }
+    let view = plan.settings.view;
     if view != ViewMode::Beauty {
         let message = format!("`--layers` needs the `beauty` view, not `{}`", view.name());
         return refused(message, "remove --view, or request it as a layer");
@@ -295,15 +343,12 @@ fn check_layers(
 }
 
 /// Checks that an animation format supports the image size and bit depth.
-fn check_animation_size_and_depth(
-    path: &Path,
-    size: (u32, u32),
-    bit_depth: u8,
-) -> Result<(), Box<Diagnostic>> {
+fn check_animation_format(plan: &RenderPlan, path: &Path) -> Result<(), Box<Diagnostic>> {
     let Some(format) = AnimationFormat::from_path(path) else { return Ok(()) };
-    let message = match format.check_size(size.0, size.1) {
+    let RenderOptions { width, height, .. } = plan.settings.render;
+    let message = match format.check_size(width, height) {
         Err(error) => error.to_string(),
-        Ok(()) if bit_depth != 8 => format!("animated {format} files have 8 bits per channel"),
+        Ok(()) if plan.bit_depth != 8 => format!("animated {format} files have 8 bits per channel"),
         Ok(()) => return Ok(()),
     };
     let error = argument_error(message, "use numbered files, for example a_####.png");
@@ -356,38 +401,12 @@ fn check_shardable(settings: &RenderSettings, overrides: &Overrides) -> Result<(
 }
 
 /// Checks that the file format supports the image size and bit depth.
-fn check_format_supports_image(path: &Path, size: (u32, u32), bit_depth: u8) -> Result<(), Box<Diagnostic>> {
-    let check = || Format::from_path(path)?.check_image(size.0, size.1, BitDepth::try_from(bit_depth)?);
+fn check_image_format(plan: &RenderPlan, path: &Path) -> Result<(), Box<Diagnostic>> {
+    let RenderOptions { width, height, .. } = plan.settings.render;
+    let check = || Format::from_path(path)?.check_image(width, height, BitDepth::try_from(plan.bit_depth)?);
     check().map_err(|error: OutputError| {
         Box::new(Diagnostic::about_file(path, Severity::Error, error.to_string()))
     })
-}
-
-/// Returns the tone mapping for a view. Exposure and tone curve apply only to light, not to data.
-fn tone_mapping_for_view(exposure: f32, curve: Tonemap, view: ViewMode) -> ToneMapping {
-    match view.aov_source() {
-        AovSource::Light(LightAov::Radiance(_))
-        | AovSource::Bounds
-        | AovSource::Film(FilmQuantity::Radiance) => {
-            ToneMapping { exposure_stops: exposure, curve, ..Default::default() }
-        }
-        AovSource::FirstHit(FirstHitQuantity::Depth) => {
-            ToneMapping { range_map: RangeMap::Unresolved(DataKind::Distances), ..ToneMapping::DATA }
-        }
-        AovSource::Light(LightAov::TraversalCost)
-        | AovSource::FirstHit(FirstHitQuantity::Photons)
-        | AovSource::Film(FilmQuantity::Samples | FilmQuantity::Error) => {
-            ToneMapping { range_map: RangeMap::Unresolved(DataKind::Amounts), ..ToneMapping::DATA }
-        }
-        AovSource::FirstHit(
-            FirstHitQuantity::Normal
-            | FirstHitQuantity::Barycentric
-            | FirstHitQuantity::Uv
-            | FirstHitQuantity::Albedo,
-        ) => ToneMapping::DATA,
-        // The values are linear, but exposure must not scale them.
-        AovSource::Light(LightAov::LitFraction) => ToneMapping::default(),
-    }
 }
 
 /// Returns the number of render threads: the requested number, or one per core.
@@ -425,7 +444,10 @@ mod tests {
         };
         let changed = planned(text, &overrides);
         assert_eq!(size(&changed), (8, 24, 2));
-        assert_eq!((changed.threads, changed.settings.render.seed, changed.effective.width), (3, 9, 8));
+        assert_eq!(
+            (changed.limits.threads, changed.settings.render.seed, changed.effective_settings().width),
+            (3, 9, 8)
+        );
     }
 
     #[test]
@@ -464,12 +486,12 @@ mod tests {
 
     #[test]
     fn default_output_is_named_after_the_scene() {
-        assert_eq!(planned("", &Overrides::default()).outputs, [PathBuf::from("my.scene.png")]);
+        assert_eq!(planned("", &Overrides::default()).outputs.images, [PathBuf::from("my.scene.png")]);
         let scene = "[render]\noutput = \"a/b.exr\"\n";
-        let of_scene = planned(scene, &Overrides::default()).outputs;
+        let of_scene = planned(scene, &Overrides::default()).outputs.images;
         assert!(of_scene.len() == 1 && of_scene[0].is_absolute() && of_scene[0].ends_with("a/b.exr"));
         let overrides = Overrides { outputs: vec!["x.png".into(), "y.exr".into()], ..Default::default() };
-        assert_eq!(planned(scene, &overrides).outputs, overrides.outputs);
+        assert_eq!(planned(scene, &overrides).outputs.images, overrides.outputs);
     }
 
     /// The `scene` and `files` crates each have their own list of formats because neither depends on the
@@ -500,9 +522,9 @@ mod tests {
     #[test]
     fn depth_of_field_needs_an_aperture() {
         let on = Overrides { dof: Some(true), ..Default::default() };
-        assert!(!planned("", &on).effective.dof);
+        assert!(!planned("", &on).effective_settings().dof);
         let lens = "[camera]\naperture = 0.1\n";
-        assert!(planned(lens, &Overrides::default()).effective.dof);
+        assert!(planned(lens, &Overrides::default()).effective_settings().dof);
         assert!(!planned(lens, &Overrides { dof: Some(false), ..Default::default() }).settings.dof);
     }
 
@@ -525,9 +547,9 @@ mod tests {
     #[test]
     fn exposure_applies_only_to_light() {
         let text = "[render]\nexposure = 2.0\n";
-        assert_eq!(planned(text, &Overrides::default()).tone.exposure_stops, 2.0);
+        assert_eq!(planned(text, &Overrides::default()).tone().exposure_stops, 2.0);
         let normals = Overrides { view: Some(ViewMode::Normal), ..Default::default() };
-        assert_eq!(planned(text, &normals).tone.exposure_stops, 0.0);
+        assert_eq!(planned(text, &normals).tone().exposure_stops, 0.0);
     }
 
     #[test]
@@ -535,7 +557,7 @@ mod tests {
         use crate::film::tone::Transfer;
         for &view in ViewMode::ALL {
             let overrides = Overrides { view: Some(view), ..Default::default() };
-            let transfer = planned("", &overrides).tone.transfer;
+            let transfer = planned("", &overrides).tone().transfer;
             let is_display_value = match view.aov_source() {
                 AovSource::FirstHit(_) | AovSource::Light(LightAov::TraversalCost) => true,
                 AovSource::Film(quantity) => quantity != FilmQuantity::Radiance,

@@ -85,6 +85,16 @@ impl Request {
         let (preview, write, own, first) = (None, WriteRequirement::No, None, None);
         Self { generation, scene, overrides, preview, write, own, saves: 0, force: false, first }
     }
+
+    /// Returns the overrides for the scene's own image.
+    pub(super) fn own_overrides(&self) -> &Overrides {
+        self.own.as_deref().unwrap_or(&self.overrides)
+    }
+
+    /// Whether the scene's own image should be written.
+    pub(super) fn writes_own_image(&self) -> bool {
+        self.own.is_some() || self.write != WriteRequirement::No
+    }
 }
 
 /// Whether to write the finished image.
@@ -457,14 +467,6 @@ pub struct PreviewUpdate {
     pub source: Option<PreviewedImageState>,
 }
 
-/// The image that a preview shows, and whether it is finished.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct PreviewedImageState {
-    /// Previews with the same key show the same image, although their sizes and sample counts may differ.
-    pub image: Fingerprint,
-    /// Whether the image has all of its samples.
-    pub is_finished: bool,
-}
 impl PreviewUpdate {
     /// Whether two previews show the same image, regardless of size and sample count.
     pub fn shows_same_image(&self, other: &Self) -> bool {

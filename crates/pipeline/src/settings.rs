@@ -6,7 +6,7 @@ use super::turntable::TurntableFrame;
 use crate::choice;
 use crate::film::Rect;
 pub use crate::integrators::ViewMode;
-use crate::integrators::{LayerSet, RenderSettings, SampleLayer};
+use crate::integrators::{LayerSet, SampleLayer};
 pub use crate::scene::description::CameraOverrides;
 use crate::scene::description::{Accel, Integrator, RenderOptions, ResolvedCamera, ShadowMode, render_keys};
 
@@ -238,30 +238,6 @@ pub struct EffectiveSettingsSummary {
     /// Output files of the image.
     #[serde(serialize_with = "serialize_paths_lossily")]
     pub outputs: Vec<PathBuf>,
-}
-
-impl EffectiveSettingsSummary {
-    pub(super) fn new(settings: &RenderSettings, threads: usize, outputs: &[PathBuf]) -> Self {
-        let RenderSettings { render, dof, view, photons, layers: _ } =
-            settings.without_ineffective_settings();
-        Self {
-            width: render.width,
-            height: render.height,
-            samples: render.samples,
-            error: render.error,
-            integrator: render.integrator,
-            shadows: settings.render.shadows,
-            clamp: render.clamp,
-            photons: photons.is_some(),
-            dof,
-            accel: render.accel,
-            view,
-            exposure: render.exposure,
-            seed: render.seed,
-            threads,
-            outputs: outputs.to_vec(),
-        }
-    }
 }
 
 /// Serializes paths lossily, so that a report can be written even if a path is not valid UTF-8.

@@ -1,17 +1,13 @@
 //! Sends a request's events, tagged with the request's generation.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, PoisonError};
-use std::time::Instant;
 
 use super::protocol::{
-    AssetProgress, CheckpointUpdate, Event, NormalizedRect, PreviewSlot, PreviewUpdate, PreviewedImageState,
-    RenderProgress, SampleCounts, SavedSceneImageState, StageReport,
+    AssetProgress, Event, NormalizedRect, PreviewSlot, PreviewUpdate, PreviewedImageState, SampleCounts,
 };
-use super::watch::content::FilePathAndContentId;
 use crate::film::Srgb8Image;
-use crate::output::WriteWarning;
 use crate::scene::diagnostic::Diagnostic;
 
 /// The front end's function for receiving events. It is called from any of the worker's threads.
@@ -35,18 +31,6 @@ impl EventSink {
         (self.listener)(event);
     }
 
-    pub(super) fn send_stage_report(&self, stage: StageReport) {
-        self.send(Event::Stage { generation: self.generation, stage });
-    }
-
-    pub(super) fn send_progress(&self, progress: RenderProgress) {
-        self.send(Event::Progress { generation: self.generation, progress });
-    }
-
-    pub(super) fn send_files_read(&self, files: Vec<FilePathAndContentId>, read: usize, since: Instant) {
-        self.send(Event::Files { generation: self.generation, files, read, since });
-    }
-
     pub(super) fn send_image_written(
         &self,
         path: &Path,
@@ -58,25 +42,9 @@ impl EventSink {
         self.send(Event::Written { generation, path, bytes, is_own, unfinished });
     }
 
-    pub(super) fn send_saved_scene_image_state(&self, state: SavedSceneImageState) {
-        self.send(Event::OwnImage { generation: self.generation, state });
-    }
-
-    pub(super) fn send_write_done(&self, paths: Vec<PathBuf>) {
-        self.send(Event::WriteDone { generation: self.generation, paths });
-    }
-
     pub(super) fn send_write_failed(&self, path: Option<&Path>, message: String) {
         let path = path.map(Path::to_owned);
         self.send(Event::WriteFailed { generation: self.generation, path, message });
-    }
-
-    pub(super) fn send_write_warning(&self, warning: WriteWarning) {
-        self.send(Event::WriteWarning { generation: self.generation, warning });
-    }
-
-    pub(super) fn send_checkpoint_update(&self, news: CheckpointUpdate) {
-        self.send(Event::Checkpoint { generation: self.generation, news });
     }
 
     pub(super) fn send_write_conflicts(&self, conflicts: Vec<Diagnostic>) {

@@ -1,58 +1,62 @@
 //! The stage table, which times each stage and reports its start and end.
 
-use super::protocol::{Stage, StageReport, Status};
+use super::protocol::{Event, Stage, StageReport, Status};
 use super::sink::EventSink;
-use super::stages::{AbortReason, StageResult};
+use super::stages::StageResult;
 use super::stopwatch::PausableStopwatch;
 use crate::control::CancelToken;
 use crate::system::cpu_time::process_cpu_seconds;
 
-/// Runs the stages of one request and records their reports.
-pub(super) struct StageRunner<'a> {
-    sink: &'a EventSink,
+/// Times the stages of one request and records their reports.
+pub(super) struct StageTable<'a> {
+    /// Receives reports of the start and end of each stage.
+    sink: Option<&'a EventSink>,
     /// Token for pausing work. Pauses do not count toward stage times.
     pub(super) token: &'a CancelToken,
     pub(super) stages: Vec<StageReport>,
-    /// Whether events are suppressed.
-    is_silent: bool,
 }
 
-impl<'a> StageRunner<'a> {
-    pub(super) fn new(sink: &'a EventSink, token: &'a CancelToken) -> Self {
-        Self { sink, token, stages: Vec::new(), is_silent: false }
+impl<'a> StageTable<'a> {
+    pub(super) fn new(sink: Option<&'a EventSink>, token: &'a CancelToken) -> Self {
+        Self { sink, token, stages: Vec::new() }
     }
 
-    /// Creates a runner that does not report the stages.
-    pub(super) fn silent(sink: &'a EventSink, token: &'a CancelToken) -> Self {
-        Self { is_silent: true, ..Self::new(sink, token) }
+    /// Starts a stage and reports it as running. A stage that fails is dropped without finishing it.
+    pub(super) fn start(&mut self, name: Stage) -> RunningStage<'_, 'a> {
+        let (watch, cpu_seconds) = (PausableStopwatch::start(self.token), process_cpu_seconds());
+        let stage = RunningStage { table: self, name, watch, cpu_seconds };
+        stage.table.send_report(stage.report(Status::Running, String::new()));
+        stage
     }
 
-    /// Runs a stage and reports its start and end.
-    ///
-    /// # Errors
-    /// Returns the error from `work`.
-    pub(super) fn run<T>(
-        &mut self,
-        name: Stage,
-        work: impl FnOnce() -> Result<StageResult<T>, AbortReason>,
-    ) -> Result<T, AbortReason> {
-        let watch = PausableStopwatch::start(self.token);
-        let before = process_cpu_seconds();
-        let report = |status, why| {
-            let processor_seconds = process_cpu_seconds() - before;
-            StageReport { name, status, seconds: watch.seconds(), processor_seconds, why }
-        };
-        self.send_report(report(Status::Running, String::new()));
-        let staged = work()?;
-        let report = report(staged.status, staged.why);
-        self.send_report(report.clone());
-        self.stages.push(report);
-        Ok(staged.value)
-    }
-
-    fn send_report(&self, report: StageReport) {
-        if !self.is_silent {
-            self.sink.send_stage_report(report);
+    fn send_report(&self, stage: StageReport) {
+        if let Some(sink) = self.sink {
+            sink.send(Event::Stage { generation: sink.generation, stage });
         }
+    }
+}
+
+/// A stage that has been started.
+#[must_use]
+pub(super) struct RunningStage<'r, 'a> {
+    table: &'r mut StageTable<'a>,
+    name: Stage,
+    watch: PausableStopwatch<'a>,
+    /// Processor time of the process at the start.
+    cpu_seconds: f64,
+}
+
+impl RunningStage<'_, '_> {
+    /// Records and reports the end of the stage, and returns its value.
+    pub(super) fn finish<T>(self, result: StageResult<T>) -> T {
+        let report = self.report(result.status, result.why);
+        self.table.send_report(report.clone());
+        self.table.stages.push(report);
+        result.value
+    }
+
+    fn report(&self, status: Status, why: String) -> StageReport {
+        let processor_seconds = process_cpu_seconds() - self.cpu_seconds;
+        StageReport { name: self.name, status, seconds: self.watch.seconds(), processor_seconds, why }
     }
 }

@@ -6,8 +6,9 @@ use std::path::{Path, PathBuf};
 
 use super::formats::has_model_extension;
 use super::inputs::{InputIndex, ProtectedInput, ProtectedInputs};
-use super::plan::{OutputNameSource, RenderPlan};
+use super::plan::{OutputFiles, OutputNameSource, RenderPlan};
 use super::protected::{OverwriteProtection, recorded_scene_if_different};
+use super::protocol::Event;
 use super::render::checkpointer::checkpoint_path;
 use super::report::ReportRecognitionFields;
 use super::sink::EventSink;
@@ -28,7 +29,7 @@ pub(super) struct OutputTarget<'a> {
 impl<'a> OutputTarget<'a> {
     /// Creates the target for one of the plan's images.
     pub(super) fn for_image(plan: &RenderPlan, path: &'a Path) -> Self {
-        Self { path, kind: TargetKind::Picture(plan.named_by) }
+        Self { path, kind: TargetKind::Picture(plan.outputs.named_by) }
     }
 
     /// Creates the target for a report.
@@ -45,8 +46,8 @@ enum TargetKind {
 
 /// Returns which existing files the plan's image must not replace.
 pub(super) fn overwrite_protection(plan: &RenderPlan) -> OverwriteProtection {
-    match plan.named_by {
-        _ if plan.replaces_foreign => OverwriteProtection::Nothing,
+    match plan.outputs.named_by {
+        _ if plan.outputs.replaces_foreign => OverwriteProtection::Nothing,
         OutputNameSource::Default => OverwriteProtection::OtherImages(plan.path.clone()),
         OutputNameSource::CommandLine | OutputNameSource::Scene => OverwriteProtection::Parts,
     }
@@ -74,12 +75,13 @@ pub(super) fn output_conflicts(plan: &RenderPlan, inputs: &ProtectedInputs) -> V
 /// would replace an earlier one.
 fn linked_frame_conflicts(plan: &RenderPlan) -> Vec<Diagnostic> {
     let (mut seen, mut found) = (HashMap::new(), Vec::new());
-    for path in plan.outputs.iter().chain(&plan.later_outputs).filter(|_| !plan.later_outputs.is_empty()) {
+    let OutputFiles { images, later_images, .. } = &plan.outputs;
+    for path in images.iter().chain(later_images).filter(|_| !later_images.is_empty()) {
         let Some(identity) = FileIdentity::from_existing_or_new_path(path) else { continue };
         match seen.entry(identity) {
             Entry::Vacant(new) => drop(new.insert(path)),
             Entry::Occupied(twin) if *twin.get() != path => {
-                let target = OutputTarget { path, kind: TargetKind::Picture(plan.named_by) };
+                let target = OutputTarget { path, kind: TargetKind::Picture(plan.outputs.named_by) };
                 found.push(same_file_error(plan, target, twin.get()));
             }
             Entry::Occupied(_) => {}
@@ -96,7 +98,8 @@ fn linked_frame_conflicts(plan: &RenderPlan) -> Vec<Diagnostic> {
 pub(super) fn write_guarded<'a, T>(
     plan: &'a RenderPlan,
     inputs: &ProtectedInputs,
-    (target, sweep): (OutputTarget<'a>, Option<&SweptFolders>),
+    target: OutputTarget<'a>,
+    sweep: Option<&SweptFolders>,
     sink: &EventSink,
     write: impl FnOnce(&ExistingFilePolicy<'_>) -> Result<T, OutputError>,
 ) -> Result<T, OutputError> {
@@ -120,7 +123,9 @@ pub(super) fn write_guarded<'a, T>(
         is_kept: &|path| inputs.contains_path(path),
         may_replace: &may_replace,
         sweep,
-        losses: AttributeLossPolicy::Report(&|warning| sink.send_write_warning(warning)),
+        losses: AttributeLossPolicy::Report(&|warning| {
+            sink.send(Event::WriteWarning { generation: sink.generation, warning });
+        }),
     })
 }
 
@@ -133,14 +138,15 @@ fn format_conflict_line(conflict: &Diagnostic) -> String {
 /// Returns the files of this request, then the files of later turntable frames.
 fn targets_of_all_frames(plan: &RenderPlan) -> impl Iterator<Item = OutputTarget<'_>> {
     let picture = |path| OutputTarget::for_image(plan, path);
-    current_targets(plan).chain(plan.later_outputs.iter().map(PathBuf::as_path).map(picture))
+    current_targets(plan).chain(plan.outputs.later_images.iter().map(PathBuf::as_path).map(picture))
 }
 
 /// Returns the files of this request: the images, then the report.
 fn current_targets(plan: &RenderPlan) -> impl Iterator<Item = OutputTarget<'_>> {
     let picture = |path| OutputTarget::for_image(plan, path);
-    let report = plan.report.iter().map(|path| OutputTarget::for_report(path));
-    let pictures = plan.outputs.iter().chain(&plan.moving);
+    let OutputFiles { images, animations, report, .. } = &plan.outputs;
+    let report = report.iter().map(|path| OutputTarget::for_report(path));
+    let pictures = images.iter().chain(animations);
     pictures.map(PathBuf::as_path).map(picture).chain(report)
 }
 
@@ -160,13 +166,15 @@ fn find_conflict<'a>(
         if let Some(twin) = twin(target, &identity) {
             return Some(same_file_error(plan, target, twin.path));
         }
-        if let Some(output) = plan.outputs.first().filter(|output| is_checkpoint_for(output, &identity)) {
+        if let Some(output) =
+            plan.outputs.images.first().filter(|output| is_checkpoint_for(output, &identity))
+        {
             let (name, output) = (target.path.display(), output.display());
             let message = format!("cannot write {name}: it is the checkpoint for {output}");
             return Some(command_line_error(message, Some(conflict_help(plan, target.kind).to_owned())));
         }
     }
-    if plan.replaces_foreign { None } else { foreign_file_error(plan, target, at) }
+    if plan.outputs.replaces_foreign { None } else { foreign_file_error(plan, target, at) }
 }
 
 /// Whether a file is the checkpoint for an output.
@@ -199,7 +207,7 @@ fn foreign_file_error(plan: &RenderPlan, target: OutputTarget<'_>, at: &Path) ->
     let (name, remedy) = (target.path.display(), conflict_help(plan, target.kind));
     let (replaced, help) = match target.kind {
         TargetKind::Picture(OutputNameSource::Default) => {
-            let own = match &plan.default_names {
+            let own = match &plan.outputs.default_names {
                 Some(names) => format!("'{}'", names.display()),
                 None => name.to_string(),
             };
@@ -250,7 +258,7 @@ fn conflict_help(plan: &RenderPlan, kind: TargetKind) -> &'static str {
         TargetKind::Picture(OutputNameSource::Default) if plan.turn.is_some() => {
             "choose other names with -o 'NAME_####.png'"
         }
-        TargetKind::Picture(OutputNameSource::Default) if has_model_extension(Path::new(&plan.name)) => {
+        TargetKind::Picture(OutputNameSource::Default) if has_model_extension(&plan.path) => {
             "name a file with -o FILE"
         }
         TargetKind::Picture(OutputNameSource::CommandLine) => "name another file with -o FILE",

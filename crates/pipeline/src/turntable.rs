@@ -89,12 +89,12 @@ pub fn add_frame_placeholder(path: &Path) -> PathBuf {
 /// `None` if there is no `#`.
 pub(super) fn frame_path(path: &Path, turn: TurntableFrame) -> Option<PathBuf> {
     let (before, digits, after) = split_placeholder(path)?;
-    Some(path.with_file_name(insert_frame_number(before, (turn.number + 1, digits), after)))
+    Some(path.with_file_name(insert_frame_number(before, turn.number + 1, digits, after)))
 }
 
 /// Inserts a number, zero-padded to `digits` digits. Does not use format strings, because they do not support
 /// widths above 65,535.
-fn insert_frame_number(before: &[u8], (number, digits): (u32, usize), after: &[u8]) -> OsString {
+fn insert_frame_number(before: &[u8], number: u32, digits: usize, after: &[u8]) -> OsString {
     let number = number.to_string();
     let zeros = vec![b'0'; digits.saturating_sub(number.len())];
     OsString::from_vec([before, &zeros, number.as_bytes(), after].concat())
@@ -120,7 +120,7 @@ pub fn leftover_frames(last: &Path, turn: TurntableFrame) -> Vec<PathBuf> {
         return Vec::new();
     };
     let file = |next: u32| {
-        last.with_file_name(insert_frame_number(&name[..run.start], (next, run.len()), &name[run.end..]))
+        last.with_file_name(insert_frame_number(&name[..run.start], next, run.len(), &name[run.end..]))
     };
     (turn.number + 2..=MAX_FRAMES).map(file).take_while(|path| path.symlink_metadata().is_ok()).collect()
 }

@@ -4,6 +4,7 @@
 //! A single lock protects the token and the mailbox, so that no cancellation is lost between requests.
 
 use std::any::Any;
+use std::cell::Cell;
 use std::collections::VecDeque;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::mpsc::{self, Receiver};
@@ -333,7 +334,14 @@ impl Worker {
                 Task::Query(query) => catch_unwind(AssertUnwindSafe(|| session.answer_query(&query, &sink))),
                 Task::Render(request, token, writing) => {
                     sink.generation = request.generation;
-                    let context = RequestContext::new(&request, &sink, &token, &writing, &self.remote);
+                    let context = RequestContext {
+                        request: &request,
+                        sink: &sink,
+                        token: &token,
+                        writing: &writing,
+                        commands: &self.remote,
+                        is_postponed: Cell::default(),
+                    };
                     catch_unwind(AssertUnwindSafe(|| session.handle_request(&context)))
                 }
             };

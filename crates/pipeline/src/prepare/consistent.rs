@@ -9,7 +9,7 @@ use crate::control::CancelToken;
 use crate::sink::EventSink;
 use crate::stages::containers::GltfContainers;
 use crate::stages::{AbortReason, FileReadContext, Findings};
-use crate::table::StageRunner;
+use crate::table::StageTable;
 use crate::watch::content::{FileHashCache, FilesSeenByRequest};
 
 /// Maximum number of attempts to read one consistent version of the scene's files.
@@ -18,7 +18,7 @@ const MAX_READS: usize = 16;
 /// One attempt to read a scene's files.
 pub(crate) struct Reading<'a, 't> {
     pub(crate) files: FileReadContext<'a>,
-    pub(crate) table: &'a mut StageRunner<'t>,
+    pub(crate) table: &'a mut StageTable<'t>,
     pub(crate) findings: &'a mut Findings,
 }
 
@@ -39,7 +39,7 @@ impl FileReader<'_> {
     /// Returns the error from `read`, or an error if the files keep changing.
     pub(crate) fn read_consistently<T>(
         &self,
-        table: &mut StageRunner<'_>,
+        table: &mut StageTable<'_>,
         findings: &mut Findings,
         mut read: impl FnMut(&mut Reading<'_, '_>) -> Result<T, AbortReason>,
     ) -> Result<T, AbortReason> {

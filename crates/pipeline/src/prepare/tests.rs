@@ -2,13 +2,18 @@
 
 use std::fs;
 
+use rayon::ThreadPool;
+
 use super::*;
 use crate::control::CancelToken;
 use crate::formats::model::ModelViewOptions;
+use crate::lights::Lights;
 use crate::plan::resolve_plan;
 use crate::protocol::Failure;
+use crate::scene::description::CameraOverrides;
 use crate::settings::Overrides;
 use crate::sink::EventSink;
+use crate::table::StageTable;
 use crate::tests::{OBJ, SCENE};
 use crate::watch::content::FileHashCache;
 use crate::world::{Geometry, MeshTree};
@@ -49,7 +54,7 @@ impl SceneFixture {
     fn prepare_unsaved(&mut self) -> Result<ReadyScene, AbortReason> {
         let path = self.folder.path().join("scene.toml");
         let (sink, token, mut findings) = (EventSink::silent(1), CancelToken::new(), Findings::default());
-        let mut table = StageRunner::silent(&sink, &token);
+        let mut table = StageTable::new(None, &token);
         let reader = FileReader { contents: &self.contents, pool: &self.pool, sink: &sink, token: &token };
         let scenes = &mut self.scenes;
         let assets = reader.read_consistently(&mut table, &mut findings, |reading| {

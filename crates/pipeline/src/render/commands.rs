@@ -7,7 +7,7 @@ use super::film_state::FilmState;
 use crate::protocol::{Event, MaxPreviewSize};
 use crate::queries::{QueryContext, QueryOrEdit};
 use crate::report::finish::remove_outdated_report;
-use crate::stages::write::{ImageWriteContext, WrittenImages, write_on_request};
+use crate::stages::write::{ImageWriteContext, WriteState, write_on_request};
 
 /// Commands that arrive during a request. By default, none arrive.
 pub(crate) trait PendingCommands {
@@ -38,7 +38,7 @@ pub(crate) struct RenderCommands<'a> {
     pub(crate) pending: &'a dyn PendingCommands,
     pub(crate) queries: &'a QueryContext,
     pub(crate) to: ImageWriteContext<'a>,
-    pub(crate) written: RefCell<&'a mut WrittenImages>,
+    pub(crate) written: RefCell<&'a mut WriteState>,
     /// Whether the postponement of a write command has already been reported to the front end.
     pub(crate) is_postponed: &'a Cell<bool>,
 }

@@ -169,7 +169,7 @@ impl FilmState {
 
     /// Whether a plan's image is finished because it has all samples or because the time limit was reached.
     pub(crate) fn is_finished(&self, plan: &RenderPlan) -> bool {
-        let is_over_time = plan.time_seconds.is_some() && self.ended_by == plan.time_seconds;
+        let is_over_time = plan.limits.seconds.is_some() && self.ended_by == plan.limits.seconds;
         self.is_finished_part || is_over_time || self.is_complete(plan.settings.render.samples)
     }
 

@@ -29,16 +29,17 @@ pub(crate) struct CoarseImageRenderer<'a> {
 impl<'a> CoarseImageRenderer<'a> {
     /// Returns the sizes of the first images: about the preview's size, preceded by a smaller size if the
     /// camera is being moved. Excludes sizes that would take almost as long as a full pass.
-    pub(crate) fn sizes(&self, shown: (u32, u32)) -> Vec<(u32, u32)> {
-        let usual = self.reduce_size_for_large_scenes(shown);
+    pub(crate) fn sizes(&self, shown_width: u32, shown_height: u32) -> Vec<(u32, u32)> {
+        let (width, height) = self.reduce_size_for_large_scenes(shown_width, shown_height);
         let rate = self.rate.get().filter(|_| self.is_moved);
-        let hasty = rate.and_then(|rate| size_for_time_budget(usual, rate));
-        hasty.into_iter().chain([usual]).filter(|size| self.is_less_work(*size)).collect()
+        let hasty = rate.and_then(|rate| size_for_time_budget(width, height, rate));
+        let sizes = hasty.into_iter().chain([(width, height)]);
+        sizes.filter(|(width, height)| self.is_less_work(*width, *height)).collect()
     }
 
     /// Returns the preview's size, or a size with half as many pixels if the trees do not fit in the CPU
     /// caches, because tracing rays is then slow.
-    fn reduce_size_for_large_scenes(&self, (width, height): (u32, u32)) -> (u32, u32) {
+    fn reduce_size_for_large_scenes(&self, width: u32, height: u32) -> (u32, u32) {
         /// Trees with this many triangles take up tens of megabytes.
         const LARGE: u64 = 250_000;
         let side =
@@ -46,7 +47,7 @@ impl<'a> CoarseImageRenderer<'a> {
         if self.tracer.world.triangle_count() < LARGE { (width, height) } else { (side(width), side(height)) }
     }
 
-    fn is_less_work(&self, (width, height): (u32, u32)) -> bool {
+    fn is_less_work(&self, width: u32, height: u32) -> bool {
         let RenderOptions { width: full_width, height: full_height, .. } = self.plan.settings.render;
         let pixels = |width: u32, height: u32| u64::from(width) * u64::from(height);
         pixels(width, height) * 2 <= pixels(full_width, full_height)
@@ -56,7 +57,8 @@ impl<'a> CoarseImageRenderer<'a> {
     pub(crate) fn trace_coarse_image(
         &self,
         photons: Option<&PhotonMaps>,
-        (width, height): (u32, u32),
+        width: u32,
+        height: u32,
         tick: impl Fn(),
     ) -> Result<RadianceImage, AbortReason> {
         let plan = self.plan;
@@ -97,20 +99,24 @@ impl<'a> CoarseImageRenderer<'a> {
         let is_whole = screen.bounds.is_some_and(|bounds| bounds.around.is_none());
         // Skip data views, because they depend on the value range of the whole image or show the photons
         // themselves.
-        let is_of_light = self.plan.tone.range_map == RangeMap::None;
-        let Some(shown) = screen.fitted_image_size().filter(|_| is_whole && is_of_light) else {
+        let is_of_light = self.plan.tone().range_map == RangeMap::None;
+        let Some((shown_width, shown_height)) =
+            screen.fitted_image_size().filter(|_| is_whole && is_of_light)
+        else {
             return Ok(());
         };
-        let Some(size) = self.sizes(shown).into_iter().next() else { return Ok(()) };
-        let picture = self.trace_coarse_image(None, size, tick)?;
-        screen.show_without_photons(&picture.resized(shown.0, shown.1));
+        let Some((width, height)) = self.sizes(shown_width, shown_height).into_iter().next() else {
+            return Ok(());
+        };
+        let picture = self.trace_coarse_image(None, width, height, tick)?;
+        screen.show_without_photons(&picture.resized(shown_width, shown_height));
         Ok(())
     }
 }
 
 /// Returns an image size that takes [`MOVING_TIME_BUDGET`] to render at `rate` pixels per second, or `None`
 /// if rendering at the usual size is about as fast.
-fn size_for_time_budget((width, height): (u32, u32), rate: f64) -> Option<(u32, u32)> {
+fn size_for_time_budget(width: u32, height: u32, rate: f64) -> Option<(u32, u32)> {
     /// Minimum width in pixels.
     const LEAST: f64 = 16.0;
     let share = (rate * MOVING_TIME_BUDGET.as_secs_f64() / (f64::from(width) * f64::from(height))).sqrt();
@@ -167,11 +173,11 @@ mod tests {
 
     #[test]
     fn first_image_fits_its_time_budget() {
-        let pixels_of = |rate: f64| size_for_time_budget((120, 80), rate / MOVING_TIME_BUDGET.as_secs_f64());
+        let pixels_of = |rate: f64| size_for_time_budget(120, 80, rate / MOVING_TIME_BUDGET.as_secs_f64());
         assert_eq!(pixels_of(9600.0), None, "the usual size should be fast enough");
         assert_eq!(pixels_of(2400.0), Some((60, 40)));
         assert_eq!(pixels_of(1.0), Some((16, 11)), "the size should not fall below the minimum");
-        assert_eq!(size_for_time_budget((10, 5), 0.0), Some((10, 5)));
+        assert_eq!(size_for_time_budget(10, 5, 0.0), Some((10, 5)));
     }
 
     #[test]

@@ -36,13 +36,12 @@ impl PreviewSender<'_> {
     /// Sends a preview of the whole film unless canceled. Must not be called while tiles are rendering,
     /// because it uses the thread pool.
     pub(crate) fn send_film_preview(&self, state: &mut FilmState, pool: &ThreadPool, token: &CancelToken) {
-        let Some(size) = self.fitted_image_size() else { return };
+        let Some((width, height)) = self.fitted_image_size() else { return };
+        let quantity = self.plan.settings.view.displayed_film_quantity();
         if self.send_section_if_requested(state, true) {
             return;
         }
-        while !pool.install(|| {
-            update_previewer_briefly(state, self.plan.settings.view.displayed_film_quantity(), size)
-        }) {
+        while !pool.install(|| update_previewer_briefly(state, quantity, width, height)) {
             if token.is_cancelled() {
                 return;
             }
@@ -53,11 +52,12 @@ impl PreviewSender<'_> {
     /// Spends a short time between tiles on updating the preview, on the current thread. Returns whether it
     /// was completed and sent.
     pub(crate) fn update_briefly_and_send(&self, state: &mut FilmState) -> bool {
-        let Some(size) = self.fitted_image_size() else { return false };
+        let Some((width, height)) = self.fitted_image_size() else { return false };
         if self.send_section_if_requested(state, false) {
             return true;
         }
-        update_previewer_briefly(state, self.plan.settings.view.displayed_film_quantity(), size);
+        let quantity = self.plan.settings.view.displayed_film_quantity();
+        update_previewer_briefly(state, quantity, width, height);
         let is_whole = state.previewer.as_ref().is_some_and(Previewer::has_processed_all_tiles);
         if is_whole {
             self.send_current(state, false);
@@ -81,7 +81,7 @@ impl PreviewSender<'_> {
         let quantity = self.plan.settings.view.displayed_film_quantity();
         let base = state.base.as_ref().filter(|_| quantity == FilmQuantity::Radiance);
         let render = &self.plan.settings.render;
-        let section = NormalizedRect::from_pixels(rect, (render.width, render.height));
+        let section = NormalizedRect::from_pixels(rect, render.width, render.height);
         let image = state.film.image_in_rect(quantity, rect, base);
         self.send(state, &image, &self.choose_tone_mapping(state, &image, has_time), Some(section));
         true
@@ -89,8 +89,10 @@ impl PreviewSender<'_> {
 
     /// Sends a radiance image that lacks light from photons.
     pub(crate) fn show_without_photons(&self, image: &RadianceImage) {
-        self.sink
-            .send_preview_without_photons(tone_map_to_8_bits(image, &self.plan.tone.with_image_range(image)));
+        self.sink.send_preview_without_photons(tone_map_to_8_bits(
+            image,
+            &self.plan.tone().with_image_range(image),
+        ));
     }
 
     fn send(
@@ -114,7 +116,7 @@ impl PreviewSender<'_> {
     fn choose_tone_mapping(&self, state: &FilmState, image: &RadianceImage, has_time: bool) -> ToneMapping {
         /// Number of pixels that can be scanned in a few milliseconds.
         const QUICK: usize = 1 << 18;
-        let tone = self.plan.tone;
+        let tone = self.plan.tone();
         let is_known = state.has_sampled_all_pixels() && (has_time || state.film.crop_rect().area() <= QUICK);
         if tone.range_map == RangeMap::None || !is_known {
             return tone.with_image_range(image);
@@ -139,11 +141,7 @@ impl PreviewSender<'_> {
 }
 
 /// Spends a short time on updating the previewer. Returns whether it is now up to date.
-fn update_previewer_briefly(
-    state: &mut FilmState,
-    quantity: FilmQuantity,
-    (width, height): (u32, u32),
-) -> bool {
+fn update_previewer_briefly(state: &mut FilmState, quantity: FilmQuantity, width: u32, height: u32) -> bool {
     state.previewer.take_if(|it| it.size() != (width, height) || it.quantity() != quantity);
     let previewer = state.previewer.get_or_insert_with(|| Previewer::for_quantity(quantity, width, height));
     previewer.refresh_changed_tiles(&state.film, Some(Instant::now() + PATIENCE))

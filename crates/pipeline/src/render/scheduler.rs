@@ -17,7 +17,7 @@ use super::time_budget::next_round_goals;
 use crate::film::{BrightnessPrepassPixels, PREPASS_SAMPLES, Rect, TILE_SIZE, TileSamples};
 use crate::integrators::{PhotonMaps, RayCounters};
 use crate::plan::RenderPlan;
-use crate::protocol::NormalizedRect;
+use crate::protocol::{Event, NormalizedRect};
 use crate::scene::description::RenderOptions;
 use crate::scene::fingerprint::Fingerprint;
 use crate::stages::AbortReason;
@@ -183,7 +183,7 @@ impl<'s, 'a> Scheduler<'s, 'a> {
     /// Returns the pixels to render first.
     fn priority_rect(&self) -> Option<Rect> {
         let RenderOptions { width, height, .. } = self.rendering.plan.settings.render;
-        self.rendering.display.first.map(|section| section.pixels((width, height)))
+        self.rendering.display.first.map(|section| section.pixels(width, height))
     }
 
     /// Renders a prepass over the whole image, even if this process renders only a share of it.
@@ -304,7 +304,7 @@ impl<'s, 'a> Scheduler<'s, 'a> {
     fn next_round_goals(&self) -> Option<Vec<[u32; 2]>> {
         let RenderStageInputs { plan, photons, .. } = *self.rendering;
         let RenderOptions { samples, error, .. } = plan.settings.render;
-        if plan.time_seconds.is_none() || photons.is_some() || error > 0.0 {
+        if plan.limits.seconds.is_none() || photons.is_some() || error > 0.0 {
             return None;
         }
         next_round_goals(&self.state.film, &self.state.done, &self.state.rays, samples)
@@ -377,7 +377,7 @@ impl<'s, 'a> Scheduler<'s, 'a> {
             let rendered = self.seconds_across_requests();
             checkpointer.save_if_due(self.state, self.rays_of_all_requests(), rendered);
         }
-        let budget = self.rendering.plan.time_seconds;
+        let budget = self.rendering.plan.limits.seconds;
         self.is_over_time = !self.is_first && budget.is_some_and(|budget| seconds >= budget);
     }
 
@@ -393,7 +393,8 @@ impl<'s, 'a> Scheduler<'s, 'a> {
         let RenderStageInputs { plan, photons, .. } = *self.rendering;
         let (state, units, is_first) = (&*self.state, self.units, self.is_first);
         let moment = RenderSnapshot { state, plan, photons, elapsed_seconds, units, is_first, is_last };
-        self.screen.sink.send_progress(self.forecast.progress_and_predictions(&moment));
+        let (sink, progress) = (self.screen.sink, self.forecast.progress_and_predictions(&moment));
+        sink.send(Event::Progress { generation: sink.generation, progress });
     }
 
     fn coarse_image_renderer(&self) -> CoarseImageRenderer<'a> {
@@ -404,15 +405,15 @@ impl<'s, 'a> Scheduler<'s, 'a> {
 
     /// Traces first images with one sample per pixel, unless they take almost as long as a full pass.
     fn trace_coarse_images(&mut self) -> Result<(), AbortReason> {
-        let Some(shown) = self.screen.fitted_image_size() else { return Ok(()) };
+        let Some((shown_width, shown_height)) = self.screen.fitted_image_size() else { return Ok(()) };
         let coarse = self.coarse_image_renderer();
-        for size in coarse.sizes(shown) {
+        for (width, height) in coarse.sizes(shown_width, shown_height) {
             let maps = match self.rendering.photons {
                 Some(photons) => Some(self.trace_photons(photons, 0..1)?),
                 None => None,
             };
-            let picture = coarse.trace_coarse_image(maps.as_ref(), size, || {})?;
-            self.state.base = Some(picture.resized(shown.0, shown.1));
+            let picture = coarse.trace_coarse_image(maps.as_ref(), width, height, || {})?;
+            self.state.base = Some(picture.resized(shown_width, shown_height));
             self.show();
         }
         Ok(())

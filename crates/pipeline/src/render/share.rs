@@ -28,7 +28,7 @@ pub(crate) struct Shard {
 impl Shard {
     /// Creates share `index` of `count` for an image with `samples` samples per pixel. If `has_photons`,
     /// divides the image by photon passes.
-    pub(crate) fn new((index, count): (u32, u32), has_photons: bool, samples: u32) -> Self {
+    pub(crate) fn new(index: u32, count: u32, has_photons: bool, samples: u32) -> Self {
         let number = index - 1;
         if !has_photons {
             return Self { index, count, samples, blocks: None, of_tiles: (number, count) };
@@ -121,7 +121,7 @@ mod tests {
                 for has_photons in [false, true] {
                     let mut seen = HashSet::new();
                     for index in 1..=count {
-                        let share = Shard::new((index, count), has_photons, samples);
+                        let share = Shard::new(index, count, has_photons, samples);
                         let own = share.tile_mask(tiles);
                         for tile in (0..tiles).filter(|tile| own[*tile]) {
                             let mut done = 0;
@@ -144,11 +144,11 @@ mod tests {
 
     #[test]
     fn share_blocks_are_spread_out() {
-        let share = Shard::new((1, 2), true, 4096);
+        let share = Shard::new(1, 2, true, 4096);
         let first = share.sample_block_indices().iter().filter(|block| **block < 128).count();
         assert!((44..=84).contains(&first), "{first} of 128 in the first half");
         assert_eq!(share.summation_order(), SumOrder::SeparateBlocks(128));
-        assert_eq!(Shard::new((1, 1), true, 40).summation_order(), SumOrder::SeparateBlocks(2));
-        assert_eq!(Shard::new((1, 1), true, 40).image_block_count(), 3);
+        assert_eq!(Shard::new(1, 1, true, 40).summation_order(), SumOrder::SeparateBlocks(2));
+        assert_eq!(Shard::new(1, 1, true, 40).image_block_count(), 3);
     }
 }

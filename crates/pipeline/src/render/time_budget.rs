@@ -34,7 +34,7 @@ pub(crate) fn next_round_goals(
     let least = done.as_flattened().iter().copied().min().filter(|least| *least >= LEAST.min(most))?;
     // Every half has at least this many samples, regardless of earlier goals.
     let known = 1 << least.ilog2();
-    let halves = half_cells_with_costs(film, done, rays, (known, most))?;
+    let halves = half_cells_with_costs(film, done, rays, known, most)?;
     let pixels: f64 = halves.iter().map(|half| half.pixels).sum();
     let mean = halves.iter().map(|half| half.pixels * f64::from(half.samples)).sum::<f64>() / pixels;
     let work: f64 = halves.iter().map(|half| half.cost_of_samples(half.samples)).sum();
@@ -88,7 +88,8 @@ fn half_cells_with_costs(
     film: &Film,
     done: &[[u32; 2]],
     rays: &[u64],
-    (known, most): (u32, u32),
+    known: u32,
+    most: u32,
 ) -> Option<Vec<HalfCell>> {
     let mut halves = Vec::with_capacity(2 * done.len());
     for (cell, done) in done.iter().enumerate().filter(|(cell, _)| film.cell_rect(*cell).is_some()) {

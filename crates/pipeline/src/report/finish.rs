@@ -30,11 +30,16 @@ pub(crate) struct RequestResults<'a> {
 }
 
 pub(crate) fn make_report(finished: &RequestResults<'_>, stages: Vec<StageReport>, seconds: f64) -> Report {
+    let mut settings = finished.plan.effective_settings();
+    // The plan has the samples of this process's share.
+    if let Some(share) = &finished.state.share {
+        settings.samples = share.samples;
+    }
     Report {
         glimt: env!("CARGO_PKG_VERSION"),
         scene: finished.scene.assets.parsed.loaded.path.to_string_lossy().into_owned(),
         image: image_report(finished),
-        settings: finished.plan.effective.clone(),
+        settings,
         lights: light_sampling_report(finished),
         photons: finished.photons,
         stages,
@@ -55,12 +60,13 @@ pub(crate) fn write_report(
     sink: &EventSink,
     token: &CancelToken,
 ) -> Result<(), OutputError> {
-    let Some(path) = &plan.report else { return Ok(()) };
+    let Some(path) = &plan.outputs.report else { return Ok(()) };
     let unwritable =
         |error: serde_json::Error| OutputError::File { path: path.clone(), source: error.into() };
     let text = json::to_pretty_text(report).map_err(unwritable)?;
-    let target = (OutputTarget::for_report(path), None);
-    write_guarded(plan, inputs, target, sink, |guard| atomic_with_policy(path, text.as_bytes(), guard, token))
+    write_guarded(plan, inputs, OutputTarget::for_report(path), None, sink, |guard| {
+        atomic_with_policy(path, text.as_bytes(), guard, token)
+    })
 }
 
 /// Removes the report for an earlier image after another image has replaced that image. Does not remove files
@@ -72,20 +78,20 @@ pub(crate) fn remove_outdated_report(plan: &RenderPlan, inputs: &ProtectedInputs
 }
 
 fn remove_report(plan: &RenderPlan, inputs: &ProtectedInputs, sink: &EventSink) -> Result<(), OutputError> {
-    let Some(path) = plan.report.as_ref().filter(|path| path.is_file()) else { return Ok(()) };
+    let Some(path) = plan.outputs.report.as_ref().filter(|path| path.is_file()) else { return Ok(()) };
     let failed = |source| OutputError::File { path: path.clone(), source };
     let remove = |guard: &ExistingFilePolicy<'_>| {
         let real = std::fs::canonicalize(path).map_err(failed)?;
         (guard.may_replace)(&real)?;
         std::fs::remove_file(&real).map_err(failed)
     };
-    write_guarded(plan, inputs, (OutputTarget::for_report(path), None), sink, remove)
+    write_guarded(plan, inputs, OutputTarget::for_report(path), None, sink, remove)
 }
 
 fn image_report(finished: &RequestResults<'_>) -> ImageReport {
     let plan = finished.plan;
     let samples = finished.state.film.sample_count_stats();
-    let outputs: &[PathBuf] = if finished.is_written { &plan.outputs } else { &[] };
+    let outputs: &[PathBuf] = if finished.is_written { &plan.outputs.images } else { &[] };
     let paths: Vec<String> = outputs.iter().map(|path| path.to_string_lossy().into_owned()).collect();
     ImageReport {
         path: paths.first().cloned(),
@@ -122,11 +128,12 @@ fn light_sampling_report(finished: &RequestResults<'_>) -> LightSamplingReport {
 
 fn data_view_value_range(finished: &RequestResults<'_>) -> Option<[f32; 2]> {
     let RequestResults { plan, state, .. } = finished;
-    if plan.tone.range_map == RangeMap::None {
+    let tone = plan.tone();
+    if tone.range_map == RangeMap::None {
         return None;
     }
     let image = state.film.image(plan.settings.view.displayed_film_quantity());
-    plan.tone.with_image_range(&image).range_map.range().map(|range| range.limits())
+    tone.with_image_range(&image).range_map.range().map(|range| range.limits())
 }
 
 fn count_work(finished: &RequestResults<'_>) -> WorkCounters {

@@ -50,12 +50,13 @@ impl Session {
         let CurrentImage { plan, is_own, .. } = current;
         if !state.has_sampled_all_pixels() {
             // Earlier requests may have written images.
-            let what = if self.written.is_empty() { "no image written" } else { NEWEST_IMAGE_NOT_WRITTEN };
+            let what =
+                if self.contents.outputs.is_empty() { "no image written" } else { NEWEST_IMAGE_NOT_WRITTEN };
             let message = format!("{what}: {INCOMPLETE_IMAGE}");
             return sink.send_write_failed(None, message);
         }
         if self.files.is_broken
-            && let Some(path) = self.written.first_foreign_file(&plan.outputs, &self.contents)
+            && let Some(path) = self.contents.outputs.first_foreign_file(&plan.outputs.images, &self.contents)
         {
             let path = path.display();
             let message = format!(
@@ -68,11 +69,12 @@ impl Session {
         let to = ImageWriteContext { plan, inputs, contents, is_own: *is_own, sink };
         let written = &mut self.written;
         let is_written = pool.install(|| write_on_request(state, to, written));
-        self.own.record_written(is_written && state.is_finished(plan) && *is_own, &mut self.written);
+        let is_own_written = is_written && state.is_finished(plan) && *is_own;
+        written.own = self.own.current.as_ref().filter(|_| is_own_written).map(|own| own.image);
         if is_written {
             self.write_or_remove_report(current, sink);
         }
-        if self.own.is_written(&self.written) {
+        if self.is_own_image_written() {
             self.remove_own_checkpoint(sink);
         }
     }
@@ -82,7 +84,7 @@ impl Session {
     fn write_or_remove_report(&self, CurrentImage { plan, report, .. }: &CurrentImage, sink: &EventSink) {
         let Some(report) = report else { return remove_outdated_report(plan, &self.files.protected, sink) };
         let paths: Vec<String> =
-            plan.outputs.iter().map(|path| path.to_string_lossy().into_owned()).collect();
+            plan.outputs.images.iter().map(|path| path.to_string_lossy().into_owned()).collect();
         let image = ImageReport { path: paths.first().cloned(), paths, ..report.image.clone() };
         // Use a token that is never canceled, because the user requested the image.
         self.write_report(&Report { image, ..report.clone() }, sink, &CancelToken::new());
@@ -99,7 +101,7 @@ impl Session {
 
     /// Saves a checkpoint of the scene's own image if the worker stops while showing another image.
     pub(crate) fn checkpoint_own_image(&self, sink: &EventSink, interruption: Interruption) {
-        let own = self.own.current.as_ref().filter(|_| !self.own.is_written(&self.written));
+        let own = self.own.current.as_ref().filter(|_| !self.is_own_image_written());
         let Some(state) = own.and_then(|own| self.films.get(own.film)).filter(|state| !state.is_kept) else {
             return;
         };

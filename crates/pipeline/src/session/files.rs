@@ -7,7 +7,8 @@ use std::sync::Arc;
 use crate::inputs::ProtectedInputs;
 use crate::plan::RenderPlan;
 use crate::prepare::SceneAssets;
-use crate::protocol::{Event, Failure, Report, WriteRequirement};
+use crate::protocol::{Event, Failure, Report};
+use crate::scene::diagnostic::Diagnostic;
 use crate::sink::EventSink;
 use crate::stages::parse::ParsedScene;
 use crate::stages::{AbortReason, Findings};
@@ -27,23 +28,14 @@ pub(super) struct SceneFiles {
 }
 
 impl SceneFiles {
-    /// Protects the files that a parsed scene references, and checks the output files against them. The
-    /// previous scene's files remain protected, because its image is still shown and may have to be written.
-    ///
-    /// # Errors
-    /// See [`Self::check_conflicts`].
-    pub(super) fn protect_parsed(
-        &mut self,
-        parsed: &ParsedScene,
-        writing: WriteRequirement,
-        plan: &RenderPlan,
-        findings: &mut Findings,
-        sink: &EventSink,
-    ) -> Result<(), AbortReason> {
+    /// Protects the files that a parsed scene references, and returns the output files that conflict with
+    /// them. The previous scene's files remain protected, because its image is still shown and may have to be
+    /// written.
+    pub(super) fn protect_parsed(&mut self, parsed: &ParsedScene, plan: &RenderPlan) -> Vec<Diagnostic> {
         let before = std::mem::replace(&mut self.protected, ProtectedInputs::from_scene(parsed));
-        let checked = self.check_conflicts(writing, plan, findings, sink);
+        let conflicts = output_conflicts(plan, &self.protected);
         self.protected.merge(before);
-        checked
+        conflicts
     }
 
     /// Records the files of a loaded scene, and reports them and the warnings to the front end.
@@ -62,34 +54,6 @@ impl SceneFiles {
         self.report_read(findings, sink);
         let warnings = [findings.conflicts.as_slice(), &findings.warnings].concat();
         sink.send(Event::Warnings { generation: sink.generation, warnings });
-        Ok(())
-    }
-
-    /// Checks for outputs that must not be written. If the request can continue without writing them, sends
-    /// the conflicts to the front end and adds them to the findings.
-    ///
-    /// # Errors
-    /// Returns all conflicts if the image must be written.
-    pub(super) fn check_conflicts(
-        &self,
-        writing: WriteRequirement,
-        plan: &RenderPlan,
-        findings: &mut Findings,
-        sink: &EventSink,
-    ) -> Result<(), AbortReason> {
-        let found = output_conflicts(plan, &self.protected);
-        if found.is_empty() {
-            findings.conflicts = found;
-            return Ok(());
-        }
-        if writing == WriteRequirement::Must {
-            findings.errors.extend(found);
-            return Err(AbortReason::Failed(findings.take_diagnostics_as_failure()));
-        }
-        if found != findings.conflicts {
-            sink.send_write_conflicts(found.clone());
-        }
-        findings.conflicts = found;
         Ok(())
     }
 
@@ -115,6 +79,7 @@ impl SceneFiles {
         let mut files = findings.files.clone();
         let known: HashSet<&Path> = findings.files.iter().map(|file| file.path.as_path()).collect();
         files.extend(self.loaded.iter().filter(|file| !known.contains(file.path.as_path())).cloned());
-        sink.send_files_read(files, findings.files.len(), findings.begun);
+        let (generation, read, since) = (sink.generation, findings.files.len(), findings.begun);
+        sink.send(Event::Files { generation, files, read, since });
     }
 }

@@ -10,7 +10,7 @@ use crate::prepare::FileReader;
 use crate::protocol::{Event, LastValidSceneRenderOutcome, Request, Status};
 use crate::report::finish::remove_outdated_report;
 use crate::stages::{AbortReason, Findings};
-use crate::table::StageRunner;
+use crate::table::StageTable;
 
 impl Session {
     /// Renders and writes the last valid scene with the overrides from the newest request, whose own scene
@@ -44,23 +44,23 @@ impl Session {
         };
         // Load the textures needed for another view if their files are still valid.
         let plans = RequestPlans::resolve(&last.parsed.loaded.scene, request)?;
-        let pool = self.threads.pool(plans.shown.threads, true)?;
+        let pool = self.threads.pool(plans.shown.limits.threads, true)?;
         let reader = FileReader { contents: &self.contents, pool: &pool, sink, token };
         let roles = plans.texture_needs();
         let assets = reader.read_once(|reading| self.scenes.load_missing_textures(last, roles, reading))?;
         let Some(assets) = assets.flatten() else { return Ok(None) };
         *last = Arc::clone(&assets);
-        let (plan, bytes) = (&plans.shown, assets.textures.memory_bytes);
-        let estimate = MemoryEstimate::for_image_and_scene(plan, &plan.scene, &assets.meshes, bytes);
+        let estimate = MemoryEstimate::for_image_and_scene(&plans.shown, &assets);
         self.check_memory(&estimate, request, &plans)?;
         // Prepare the scene, reusing unchanged values, and render it.
-        let mut table = StageRunner::silent(sink, token);
+        let mut table = StageTable::new(None, token);
         let scene = self.build_world(request, assets, plans, &mut table, &pool)?;
         let image = self.trace_photons(context, scene, &mut table, &pool)?;
         let rendered = self.render(context, &image, &pool)?;
         // Write the image. The write stage reports files that cannot be written.
         let plan = &image.scene.plan;
-        let is_kept = self.written.first_foreign_file(&plan.outputs, &self.contents).is_some();
+        let is_kept =
+            self.contents.outputs.first_foreign_file(&plan.outputs.images, &self.contents).is_some();
         let is_written_now = !is_kept
             && self
                 .run_write_stage(context, plan, &Findings::default(), &pool)

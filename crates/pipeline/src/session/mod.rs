@@ -9,10 +9,8 @@
 //! | [`last_valid`] | renders the last valid scene while the scene file is broken |
 //! | [`between_requests`] | commands that arrive while no request is running |
 //! | [`files`], [`own_image`] | the scene's files, and the image to write while another one is shown |
-//! | [`context`] | the request and its cancel tokens |
 
 mod between_requests;
-mod context;
 mod files;
 mod last_valid;
 mod outputs;
@@ -25,19 +23,21 @@ use std::cell::Cell;
 use std::path::Path;
 use std::sync::Arc;
 
-pub(super) use self::context::RequestContext;
 use self::files::SceneFiles;
 use self::own_image::OwnImage;
 pub(super) use self::request::CompletedRequest;
+use crate::control::CancelToken;
 use crate::plan::RenderPlan;
 use crate::prepare::SceneCache;
-use crate::protocol::Report;
+use crate::protocol::{Report, Request};
 use crate::queries::QueryContext;
+use crate::render::commands::PendingCommands;
 use crate::render::film_cache::FilmCache;
 use crate::render::film_state::FilmState;
+use crate::sink::EventSink;
 use crate::stages::AbortReason;
 use crate::stages::photons::PhotonCache;
-use crate::stages::write::WrittenImages;
+use crate::stages::write::WriteState;
 use crate::threads::RenderThreads;
 use crate::trace::TileKernel;
 use crate::watch::content::FileHashCache;
@@ -58,6 +58,18 @@ impl Default for SessionConfig {
     }
 }
 
+/// A running request, with its cancel tokens and the front end.
+pub(crate) struct RequestContext<'a> {
+    pub(crate) request: &'a Request,
+    pub(crate) sink: &'a EventSink,
+    pub(crate) token: &'a CancelToken,
+    /// Cancels the write stage, which runs last.
+    pub(crate) writing: &'a CancelToken,
+    pub(crate) commands: &'a dyn PendingCommands,
+    /// Whether the postponement of a write command has already been reported to the front end.
+    pub(crate) is_postponed: Cell<bool>,
+}
+
 /// Runs requests and keeps state between them.
 #[derive(Default)]
 pub(super) struct Session {
@@ -71,7 +83,7 @@ pub(super) struct Session {
     /// The image of the current film, or `None` before the first image.
     current: Option<CurrentImage>,
     own: OwnImage,
-    written: WrittenImages,
+    written: WriteState,
     /// Speed at which the most recent first image was rendered, in pixels per second.
     coarse_rate: Cell<Option<f64>>,
 }

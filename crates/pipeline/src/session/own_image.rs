@@ -7,20 +7,16 @@ use std::sync::Arc;
 use crate::identity::ImageDependencies;
 use crate::inputs::ProtectedInputs;
 use crate::keys;
-use crate::memory::MemoryEstimate;
-use crate::plan::{RenderPlan, RequestPlans};
+use crate::plan::RenderPlan;
 use crate::prepare::{ReadyScene, RequestCamera, SceneAssets};
-use crate::protocol::{Request, SavedSceneImageState, WriteRequirement};
 use crate::render::checkpointer::{CheckpointContext, CheckpointLock, Checkpointer};
 use crate::render::film_cache::FilmCache;
-use crate::render::film_state::FilmState;
 use crate::render::share::Shard;
 use crate::scene::description::CameraOverrides;
 use crate::scene::fingerprint::{Fingerprint, FingerprintHasher};
-use crate::settings::{CheckpointSettings, Overrides, ResumeMode};
+use crate::settings::{CheckpointSettings, ResumeMode};
 use crate::sink::EventSink;
-use crate::stages::AbortReason;
-use crate::stages::write::{WrittenImages, image_encoding_settings};
+use crate::stages::write::image_encoding_settings;
 
 /// The scene's own image for one version of the scene.
 pub(super) struct SavedSceneImage {
@@ -38,7 +34,7 @@ pub(super) struct SavedSceneImage {
 impl SavedSceneImage {
     /// Computes the keys for the scene's own image. `scene` is the prepared scene of the request, and `plan`
     /// contains the settings of the scene's own image.
-    pub(super) fn new(scene: &ReadyScene, plan: RenderPlan, camera: CameraOverrides) -> Self {
+    fn new(scene: &ReadyScene, plan: RenderPlan, camera: CameraOverrides) -> Self {
         let assets = Arc::clone(&scene.assets);
         let eye =
             RequestCamera::new(&plan.scene, assets.parsed.orbiter, &camera).rotated_for_turntable(plan.turn);
@@ -65,7 +61,7 @@ fn image_with_outputs_key(film: Fingerprint, plan: &RenderPlan) -> Fingerprint {
     plan.layers.iter().for_each(|layer| {
         key.add_choice(*layer);
     });
-    plan.outputs.iter().for_each(|path| {
+    plan.outputs.images.iter().for_each(|path| {
         key.add_path_bytes(path);
     });
     key.finish()
@@ -76,17 +72,23 @@ fn image_with_outputs_key(film: Fingerprint, plan: &RenderPlan) -> Fingerprint {
 pub(super) struct OwnImage {
     /// The image for the newest request with a valid scene.
     pub(super) current: Option<SavedSceneImage>,
-    /// Save count from the newest request with a valid scene.
-    saves: u64,
     /// Whether the film may be dropped while other images are rendered.
-    is_film_expendable: bool,
+    pub(super) is_film_expendable: bool,
     /// Lock on the checkpoint file, and the checkpoints already reported.
     checkpoint_lock: RefCell<CheckpointLock>,
 }
 
 impl OwnImage {
-    /// Sets the image for a request and keeps its film while other images are rendered.
-    pub(super) fn set(&mut self, mut image: SavedSceneImage, films: &mut FilmCache) {
+    /// Sets the image for a request and keeps its film while other images are rendered. See
+    /// [`SavedSceneImage::new`].
+    pub(super) fn set(
+        &mut self,
+        scene: &ReadyScene,
+        plan: RenderPlan,
+        camera: CameraOverrides,
+        films: &mut FilmCache,
+    ) {
+        let mut image = SavedSceneImage::new(scene, plan, camera);
         if !self.is_film_expendable {
             films.pin(image.film);
         }
@@ -94,73 +96,6 @@ impl OwnImage {
             image.share = before.share;
         }
         self.current = Some(image);
-    }
-
-    /// Whether the output files contain the current version of the image.
-    pub(super) fn is_written(&self, written: &WrittenImages) -> bool {
-        self.current.as_ref().is_some_and(|own| written.own == Some(own.image))
-    }
-
-    /// Records whether the output files contain the current version of the image.
-    pub(super) fn record_written(&self, is_written: bool, written: &mut WrittenImages) {
-        written.own = self.current.as_ref().filter(|_| is_written).map(|own| own.image);
-    }
-
-    /// Whether the scene has been saved since the last call.
-    pub(super) fn has_been_saved(&mut self, saves: u64) -> bool {
-        std::mem::replace(&mut self.saves, saves) != saves
-    }
-
-    /// Checks whether a request fits in memory, and limits the cached films to the remaining memory. If the
-    /// request shows another image, the film of the scene's own image also counts. If the two films do not fit
-    /// together, the film of the scene's own image may be dropped, but only if that image has been written.
-    ///
-    /// # Errors
-    /// The request needs more memory than is available.
-    pub(super) fn check_memory(
-        &mut self,
-        estimate: &MemoryEstimate,
-        request: &Request,
-        plans: &RequestPlans,
-        films: &mut FilmCache,
-        written: &WrittenImages,
-    ) -> Result<(), AbortReason> {
-        let bytes = self.additional_film_bytes(request, plans, films);
-        let all = estimate.clone().with_saved_scene_film(bytes).check(&plans.shown);
-        self.is_film_expendable = all.is_err() && self.is_written(written);
-        let room = if self.is_film_expendable { estimate.check(&plans.shown)? } else { all? };
-        if self.is_film_expendable {
-            films.unpin();
-        }
-        films.set_byte_limit(room);
-        Ok(())
-    }
-
-    /// Returns the size of the film in bytes if it is kept in addition to the request's film.
-    fn additional_film_bytes(&self, request: &Request, plans: &RequestPlans, films: &FilmCache) -> u64 {
-        let (Some(own), Some(own_plan)) = (&self.current, &plans.own) else { return 0 };
-        let of = |plan: &RenderPlan| keys::film_sums_key(own.film, &plan.settings, plan.crop);
-        let is_shared = of(&plans.shown) == of(own_plan)
-            && request.overrides.camera == own_image_overrides(request).camera;
-        let state = films.get(own.film).filter(|state| state.has_samples() && !is_shared);
-        state.map_or(0, FilmState::memory_bytes)
-    }
-
-    /// Returns the state of the image while a request shows another image with this film.
-    pub(super) fn state(
-        &self,
-        film: Fingerprint,
-        films: &FilmCache,
-        written: &WrittenImages,
-    ) -> Option<SavedSceneImageState> {
-        let own = self.current.as_ref()?;
-        Some(match films.get(own.film) {
-            _ if self.is_written(written) => SavedSceneImageState::Written,
-            Some(state) if state.has_samples() => {
-                SavedSceneImageState::Begun { is_rendering: own.film == film }
-            }
-            Some(_) | None => SavedSceneImageState::NotBegun,
-        })
     }
 
     /// Returns a checkpointer if `film` belongs to this image and the image uses checkpoints.
@@ -171,7 +106,7 @@ impl OwnImage {
         sink: &'a EventSink,
     ) -> Option<Checkpointer<'a>> {
         let own = self.current.as_ref().filter(|own| film == own.film && uses_checkpoints(&own.plan))?;
-        let (output, finish) = (own.plan.outputs.first()?, image_encoding_settings(&own.plan));
+        let (output, finish) = (own.plan.outputs.images.first()?, image_encoding_settings(&own.plan));
         let lock = &self.checkpoint_lock;
         let around = CheckpointContext { finish, dependencies: own.dependencies(), inputs, sink, lock };
         Some(Checkpointer::new(output, own.plan.checkpoints, around))
@@ -182,17 +117,7 @@ impl OwnImage {
 /// checkpoints must be enabled unless the render was explicitly resumed.
 fn uses_checkpoints(plan: &RenderPlan) -> bool {
     let is_file =
-        plan.outputs.first().is_some_and(|path| path.metadata().map_or(true, |found| found.is_file()));
+        plan.outputs.images.first().is_some_and(|path| path.metadata().map_or(true, |found| found.is_file()));
     let CheckpointSettings { seconds, resume, .. } = plan.checkpoints;
     (seconds > 0.0 || resume == ResumeMode::Asked) && is_file
-}
-
-/// Returns the overrides that apply to the scene's own image.
-pub(super) fn own_image_overrides(request: &Request) -> &Overrides {
-    request.own.as_deref().unwrap_or(&request.overrides)
-}
-
-/// Whether the scene's own image should be written.
-pub(super) fn writes_own_image(request: &Request) -> bool {
-    request.own.is_some() || request.write != WriteRequirement::No
 }

@@ -4,14 +4,15 @@ use std::sync::Arc;
 
 use rayon::ThreadPool;
 
-use super::own_image::{SavedSceneImage, own_image_overrides};
 use super::{RequestContext, Session};
 use crate::formats::model::ModelViewOptions;
 use crate::inputs::ProtectedInputs;
+use crate::keys;
 use crate::memory::MemoryEstimate;
 use crate::plan::{RenderPlan, RequestPlans};
 use crate::prepare::{FileReader, Reading, ReadyScene, RequestCamera, SceneAssets};
 use crate::protocol::{Event, Request};
+use crate::render::film_state::FilmState;
 use crate::scene::description::CameraOverrides;
 use crate::settings::SceneSettings;
 use crate::sink::EventSink;
@@ -19,7 +20,8 @@ use crate::stages::parse::{ParsedScene, SceneParseRequest};
 use crate::stages::textures::TextureSelection;
 use crate::stages::write::check_targets;
 use crate::stages::{AbortReason, Findings};
-use crate::table::StageRunner;
+use crate::table::StageTable;
+use crate::targets::output_conflicts;
 use crate::warnings::settings_warnings;
 
 impl Session {
@@ -28,7 +30,7 @@ impl Session {
         &mut self,
         context: &RequestContext<'_>,
         pool: &ThreadPool,
-        table: &mut StageRunner<'_>,
+        table: &mut StageTable<'_>,
         findings: &mut Findings,
     ) -> Result<ReadyScene, AbortReason> {
         let RequestContext { request, sink, token, .. } = *context;
@@ -37,9 +39,7 @@ impl Session {
         let read = |reading: &mut Reading<'_, '_>| self.read_scene(request, reading);
         let (assets, plans) = reader.read_consistently(table, findings, read)?;
         let ready = self.build_world(request, Arc::new(assets), plans, table, pool)?;
-        if self.own.has_been_saved(request.saves) {
-            self.written.allow_replacing_user_written_image();
-        }
+        self.written.record_saves(request.saves);
         self.files.last_valid = Some(Arc::clone(&ready.assets));
         Ok(ready)
     }
@@ -65,7 +65,7 @@ impl Session {
         let findings = &mut *reading.findings;
         findings.warnings.extend(settings_warnings(&parsed.loaded, &plan.scene, &plan.settings, overrides));
         send_settings(&parsed, plan, sink);
-        self.files.protect_parsed(&parsed, *write, plan, findings, sink)?;
+        findings.record_conflicts(self.files.protect_parsed(&parsed, plan), *write, sink)?;
         if findings.conflicts.is_empty() {
             check_targets(*write, plan, sink)?;
         }
@@ -77,25 +77,44 @@ impl Session {
             reading.files.contents.wait_for_writers(reading.files.token)?;
         }
         reading.verify_files_unchanged()?;
-        let bytes = assets.textures.memory_bytes;
-        let estimate = MemoryEstimate::for_image_and_scene(plan, &plan.scene, &assets.meshes, bytes);
-        self.check_memory(&estimate, request, &plans)?;
+        self.check_memory(&MemoryEstimate::for_image_and_scene(plan, &assets), request, &plans)?;
         self.files.protected = ProtectedInputs::from_assets(&assets);
-        self.files.check_conflicts(*write, plan, reading.findings, sink)?;
+        reading.findings.record_conflicts(output_conflicts(plan, &self.files.protected), *write, sink)?;
         Ok((assets, plans))
     }
 
-    /// Checks whether a request fits in memory.
+    /// Checks whether a request fits in memory, and limits the cached films to the remaining memory. If the
+    /// request shows another image, the film of the scene's own image also counts. If the two films do not fit
+    /// together, the film of the scene's own image may be dropped, but only if that image has been written.
     ///
     /// # Errors
-    /// See [`OwnImage::check_memory`](super::own_image::OwnImage::check_memory).
+    /// The request needs more memory than is available.
     pub(super) fn check_memory(
         &mut self,
         estimate: &MemoryEstimate,
         request: &Request,
         plans: &RequestPlans,
     ) -> Result<(), AbortReason> {
-        self.own.check_memory(estimate, request, plans, &mut self.films, &self.written)
+        let bytes = self.additional_film_bytes(request, plans);
+        let all = estimate.clone().with_saved_scene_film(bytes).check(&plans.shown);
+        let is_expendable = all.is_err() && self.is_own_image_written();
+        self.own.is_film_expendable = is_expendable;
+        let room = if is_expendable { estimate.check(&plans.shown)? } else { all? };
+        if is_expendable {
+            self.films.unpin();
+        }
+        self.films.set_byte_limit(room);
+        Ok(())
+    }
+
+    /// Returns the size of the own image's film in bytes if it is kept in addition to the request's film.
+    fn additional_film_bytes(&self, request: &Request, plans: &RequestPlans) -> u64 {
+        let (Some(own), Some(own_plan)) = (&self.own.current, &plans.own) else { return 0 };
+        let of = |plan: &RenderPlan| keys::film_sums_key(own.film, &plan.settings, plan.crop);
+        let is_shared =
+            of(&plans.shown) == of(own_plan) && request.overrides.camera == request.own_overrides().camera;
+        let state = self.films.get(own.film).filter(|state| state.has_samples() && !is_shared);
+        state.map_or(0, FilmState::memory_bytes)
     }
 
     /// Builds the world for the request, and determines the scene's own image.
@@ -104,14 +123,13 @@ impl Session {
         request: &Request,
         assets: Arc<SceneAssets>,
         plans: RequestPlans,
-        table: &mut StageRunner<'_>,
+        table: &mut StageTable<'_>,
         pool: &ThreadPool,
     ) -> Result<ReadyScene, AbortReason> {
         let RequestPlans { shown, own } = plans;
         let ready = self.scenes.build(assets, shown, &request.overrides.camera, table, pool)?;
         let own = own.unwrap_or_else(|| ready.plan.clone());
-        let image = SavedSceneImage::new(&ready, own, own_image_overrides(request).camera);
-        self.own.set(image, &mut self.films);
+        self.own.set(&ready, own, request.own_overrides().camera, &mut self.films);
         Ok(ready)
     }
 }
@@ -122,7 +140,7 @@ fn send_settings(parsed: &ParsedScene, plan: &RenderPlan, sink: &EventSink) {
     let camera = RequestCamera::new(&plan.scene, parsed.orbiter, &CameraOverrides::default());
     sink.send(Event::Settings {
         generation: sink.generation,
-        settings: Box::new(plan.effective.clone()),
+        settings: Box::new(plan.effective_settings()),
         own: SceneSettings {
             camera: camera.resolved_camera(),
             exposure: scene.render.exposure,

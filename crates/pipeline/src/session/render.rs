@@ -4,7 +4,6 @@ use std::cell::RefCell;
 
 use rayon::ThreadPool;
 
-use super::own_image::writes_own_image;
 use super::{CurrentImage, RequestContext, Session};
 use crate::control::CancelToken;
 use crate::integrators::RayCounters;
@@ -23,7 +22,7 @@ use crate::stages::render::render;
 use crate::stages::write::ImageWriteContext;
 use crate::stages::{AbortReason, StageResult};
 use crate::stopwatch::PausableStopwatch;
-use crate::table::StageRunner;
+use crate::table::StageTable;
 use crate::trace::{TileKernel, Tracer};
 
 /// The image of a request.
@@ -43,7 +42,7 @@ impl Session {
         &mut self,
         context: &RequestContext<'_>,
         scene: ReadyScene,
-        table: &mut StageRunner<'_>,
+        table: &mut StageTable<'_>,
         pool: &ThreadPool,
     ) -> Result<RequestImage, AbortReason> {
         let RequestContext { request, sink, token, .. } = *context;
@@ -68,15 +67,14 @@ impl Session {
             is_moved: is_camera_moving(request),
             rate: &self.coarse_rate,
         };
-        let photons = table.run(Stage::Photons, || {
-            let task = PhotonTask::new(&scene, request.overrides.photons, photons);
-            // Show the scene while the first photons are traced.
-            if is_new && matches!(task, PhotonTask::Trace(..)) {
-                coarse.show_without_photons(screen, tick)?;
-            }
-            let sending = PhotonContext { world: &scene.world, plan, pool, token, sink };
-            Ok(trace_first_photons(task, photons, sending, tick)?)
-        })?;
+        let stage = table.start(Stage::Photons);
+        let task = PhotonTask::new(&scene, request.overrides.photons, photons);
+        // Show the scene while the first photons are traced.
+        if is_new && matches!(task, PhotonTask::Trace(..)) {
+            coarse.show_without_photons(screen, tick)?;
+        }
+        let sending = PhotonContext { world: &scene.world, plan, pool, token, sink };
+        let photons = stage.finish(trace_first_photons(task, photons, sending, tick)?);
         let plan = plan.clone();
         self.current = Some(CurrentImage { plan, queries, is_own, report: None });
         Ok(RequestImage { scene, film, photons, share: None })
@@ -87,7 +85,8 @@ impl Session {
         let photons = image.photons.and_then(|key| self.photons.get(key));
         let emits_photons = photons.is_some_and(PhotonStore::has_lit_caustic_casters);
         let plan = &mut image.scene.plan;
-        image.share = plan.shard.map(|shard| Shard::new(shard, emits_photons, plan.settings.render.samples));
+        let samples = plan.settings.render.samples;
+        image.share = plan.shard.map(|(index, count)| Shard::new(index, count, emits_photons, samples));
         // A share may render fewer samples than the whole image.
         if let Some(share) = &image.share {
             plan.settings.render.samples = share.samples_per_pixel();
@@ -119,7 +118,7 @@ impl Session {
             is_postponed: &context.is_postponed,
         };
         let checkpointer =
-            writes_own_image(request).then(|| self.own.checkpointer(image.film, inputs, sink)).flatten();
+            request.writes_own_image().then(|| self.own.checkpointer(image.film, inputs, sink)).flatten();
         let rendering = RenderStageInputs {
             film: FilmRequest {
                 key: image.film,

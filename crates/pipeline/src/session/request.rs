@@ -1,6 +1,5 @@
 //! The steps of a request.
 
-use super::render::RequestImage;
 use super::{RequestContext, Session};
 use crate::plan::thread_count;
 use crate::protocol::{Event, Failure, Report, Stage, Status};
@@ -12,7 +11,7 @@ use crate::settings::ViewMode;
 use crate::stages::photons::PhotonStore;
 use crate::stages::{AbortReason, Findings};
 use crate::stopwatch::PausableStopwatch;
-use crate::table::StageRunner;
+use crate::table::StageTable;
 
 /// Outcome of a finished request.
 pub(crate) struct CompletedRequest {
@@ -81,7 +80,7 @@ impl Session {
     ) -> Result<Report, AbortReason> {
         let RequestContext { request, sink, token, .. } = *context;
         let watch = PausableStopwatch::start(token);
-        let mut table = StageRunner::new(sink, token);
+        let mut table = StageTable::new(Some(sink), token);
         // A turntable never revisits earlier images.
         if request.overrides.turn.is_some() {
             self.films = FilmCache::default();
@@ -95,29 +94,22 @@ impl Session {
         let mut image = self.trace_photons(context, scene?, &mut table, &pool)?;
         self.assign_share(context, &mut image);
         self.report_own_image_state(context, &image);
-        let rays = table.run(Stage::Render, || self.render(context, &image, &pool))?;
-        // Write the image. Symbolic links and files may have changed during the render.
-        let plan = &image.scene.plan;
-        self.files.check_conflicts(request.write, plan, findings, sink)?;
-        let was_own_written = self.own.is_written(&self.written);
-        let written = table.run(Stage::Write, || self.run_write_stage(context, plan, findings, &pool));
-        self.report_own_image_state(context, &image);
-        self.finish_checkpoint(context, &image, written.as_ref().is_ok_and(|is_written| *is_written));
+        let stage = table.start(Stage::Render);
+        let rays = stage.finish(self.render(context, &image, &pool)?);
+        // Write the image.
+        let wrote = self.write_image(context, &image, &mut table, findings, &pool)?;
         // Report the results.
         let results = RequestResults {
             scene: &image.scene,
-            plan,
-            is_written: written?,
+            plan: &image.scene.plan,
+            is_written: wrote.is_written,
             state: self.films.existing()?,
             films: &self.films,
             rays,
             photons: image.photons.and_then(|key| self.photons.get(key)).map(PhotonStore::report),
         };
         let (stages, seconds) = (table.stages, watch.seconds());
-        if let Some(own) = self.own.current.as_ref().filter(|_| request.own.is_some())
-            && self.own.is_written(&self.written)
-            && !was_own_written
-        {
+        if let Some(own) = self.own.current.as_ref().filter(|_| wrote.has_written_own) {
             let results = RequestResults { plan: &own.plan, is_written: true, ..results };
             let report = pool.install(|| make_report(&results, stages.clone(), seconds));
             self.write_report(&report, sink, context.writing);
@@ -129,14 +121,5 @@ impl Session {
     pub(super) fn current_image_key_and_view(&self) -> (Option<Fingerprint>, Option<ViewMode>) {
         let view = self.current.as_ref().map(|current| current.plan.settings.view);
         (self.films.current().map(|state| state.key), view)
-    }
-
-    /// Reports the state of the scene's own image while another image is shown.
-    fn report_own_image_state(&self, context: &RequestContext<'_>, image: &RequestImage) {
-        if context.request.own.is_some()
-            && let Some(state) = self.own.state(image.film, &self.films, &self.written)
-        {
-            context.sink.send_saved_scene_image_state(state);
-        }
     }
 }

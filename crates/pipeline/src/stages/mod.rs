@@ -27,7 +27,7 @@ use rayon::ThreadPool;
 
 use self::containers::GltfContainers;
 use super::plan::argument_error;
-use super::protocol::{Failure, Status, reasons};
+use super::protocol::{Failure, Status, WriteRequirement, reasons};
 use super::sink::EventSink;
 use super::watch::content::{FileHashCache, FilePathAndContentId, FilesSeenByRequest};
 use crate::assets::AssetError;
@@ -214,6 +214,27 @@ impl Findings {
 
     pub(super) fn add_warning(&mut self, loaded: &LoadedScene, span: Range<usize>, message: String) {
         self.warnings.push(diagnostic_at_span(loaded, span, Severity::Warning, message));
+    }
+
+    /// Records the outputs that must not be written, and sends them to the front end if they have changed.
+    ///
+    /// # Errors
+    /// Returns all conflicts if the image must be written.
+    pub(super) fn record_conflicts(
+        &mut self,
+        found: Vec<Diagnostic>,
+        writing: WriteRequirement,
+        sink: &EventSink,
+    ) -> Result<(), AbortReason> {
+        if !found.is_empty() && writing == WriteRequirement::Must {
+            self.errors.extend(found);
+            return Err(AbortReason::Failed(self.take_diagnostics_as_failure()));
+        }
+        if !found.is_empty() && found != self.conflicts {
+            sink.send_write_conflicts(found.clone());
+        }
+        self.conflicts = found;
+        Ok(())
     }
 
     /// Takes all errors and warnings, errors first.

@@ -44,7 +44,7 @@ pub(crate) fn render(
     let Some(state) = films.current_mut() else {
         return Err(AbortReason::work_failure("the film is missing"));
     };
-    let budget = rendering.plan.time_seconds;
+    let budget = rendering.plan.limits.seconds;
     let is_part = state.is_finished_part;
     let finished = state.is_finished(rendering.plan);
     let had = state.min_unfinished_samples(wanted);

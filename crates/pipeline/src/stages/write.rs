@@ -1,41 +1,41 @@
 //! The write stage: encodes and writes images that have changed since they were last written.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
 use super::super::inputs::ProtectedInputs;
 use super::super::plan::RenderPlan;
-use super::super::protocol::{WriteRequirement, reasons};
+use super::super::protocol::{Event, WriteRequirement, reasons};
 use super::super::render::checkpointer::create_header;
 use super::super::render::film_state::FilmState;
 use super::super::render::layers::layer_images;
 use super::super::sink::EventSink;
 use super::super::targets::{OutputTarget, output_conflicts, overwrite_protection, write_guarded};
 use super::super::turntable::TurntableFrame;
-use super::super::watch::content::{FileContentId, FileHashCache};
+use super::super::watch::content::FileHashCache;
 use super::{AbortReason, StageResult};
 use crate::choice::Choice;
 use crate::control::CancelToken;
 use crate::film::tone::tone_map_to_8_bits;
 use crate::film::{RadianceImage, Rect, SampleCountStats, Srgb8Image};
-use crate::integrators::{AovSource, LightAov};
+use crate::integrators::{AovSource, LightAov, RenderSettings};
 use crate::output::part::{self, PartHeader, PartOrCheckpoint};
 use crate::output::write::{Durability, ExistingFilePolicy, SweptFolders};
 use crate::output::{self, BitDepth, FilmEncodingSettings, Format, OutputError, scene_path};
 use crate::output::{AnimationFormat, animation};
+use crate::scene::description::RenderOptions;
 use crate::scene::fingerprint::{Fingerprint, FingerprintHasher};
 
 /// Metadata key for the scene file.
 const SCENE: &str = "glimt:scene";
 
-/// Images written by glimt.
+/// State of the write stage between requests.
 #[derive(Debug, Default)]
-pub(crate) struct WrittenImages {
-    /// For each file, the image key and the file content after the write. Files without a key are written
-    /// again.
-    files: HashMap<PathBuf, (Option<Fingerprint>, FileContentId)>,
+pub(crate) struct WriteState {
+    /// Save count of the newest request with a valid scene.
+    saves: u64,
     /// Whether the files contain an image with keyboard changes.
     is_by_hand: bool,
     /// Key of the scene's own image, if all of its output files are up to date.
@@ -47,47 +47,20 @@ pub(crate) struct WrittenImages {
     frames: Vec<(Srgb8Image, SampleCountStats)>,
 }
 
-impl WrittenImages {
-    /// Returns the first existing file whose content was not written by glimt.
-    pub(crate) fn first_foreign_file<'a>(
-        &self,
-        paths: &'a [PathBuf],
-        contents: &FileHashCache,
-    ) -> Option<&'a Path> {
-        let is_ours = |path: &Path| {
-            self.files.get(path).is_some_and(|(_, known)| has_content_id(path, *known, contents))
-        };
-        let is_there = |path: &Path| path.symlink_metadata().is_ok();
-        paths.iter().map(PathBuf::as_path).find(|path| is_there(path) && !is_ours(path))
-    }
-
-    /// Whether no file was written.
-    pub(crate) fn is_empty(&self) -> bool {
-        self.files.is_empty()
-    }
-
+impl WriteState {
     /// Whether a file on disk contains an image that the user wrote and that includes keyboard changes. Such
     /// a file is replaced only after the scene is saved, or when the user writes another image.
     pub(crate) fn has_user_written_image_on_disk(&self, contents: &FileHashCache) -> bool {
-        self.is_by_hand && self.files.iter().any(|(path, (_, known))| has_content_id(path, *known, contents))
+        self.is_by_hand && contents.outputs.has_unchanged_file(contents)
     }
 
-    /// Allows the scene's own image to replace any other image.
-    pub(crate) fn allow_replacing_user_written_image(&mut self) {
-        self.is_by_hand = false;
+    /// Allows the scene's own image to replace any other image if the scene has been saved since the last
+    /// call.
+    pub(crate) fn record_saves(&mut self, saves: u64) {
+        if std::mem::replace(&mut self.saves, saves) != saves {
+            self.is_by_hand = false;
+        }
     }
-
-    /// Forgets which images the files contain, so that the next write stage writes them again.
-    fn mark_all_outdated(&mut self) {
-        self.files.values_mut().for_each(|(key, _)| *key = None);
-        self.own = None;
-    }
-}
-
-/// Whether a file has the given content.
-fn has_content_id(path: &Path, known: FileContentId, contents: &FileHashCache) -> bool {
-    // Use a token that is never canceled.
-    contents.read_content_id(path, &CancelToken::new()).is_ok_and(|content| content == known)
 }
 
 /// An image's output files, and files that must not be overwritten.
@@ -145,12 +118,12 @@ fn check_each_target_is_writable(
     };
     match plan.shard {
         // A part file may have any extension.
-        Some(_) => plan.outputs.iter().try_for_each(|path| place(path))?,
+        Some(_) => plan.outputs.images.iter().try_for_each(|path| place(path))?,
         // Also check later turntable frames, to detect problems before hours of rendering.
-        None => plan.outputs.iter().chain(&plan.later_outputs).try_for_each(check)?,
+        None => plan.outputs.images.iter().chain(&plan.outputs.later_images).try_for_each(check)?,
     }
-    plan.moving.iter().try_for_each(|path| place(path))?;
-    plan.report.iter().try_for_each(|path| place(path))
+    plan.outputs.animations.iter().try_for_each(|path| place(path))?;
+    plan.outputs.report.iter().try_for_each(|path| place(path))
 }
 
 /// Runs the last stage of a request. Returns whether the image is on disk.
@@ -161,7 +134,7 @@ pub(crate) fn write_if_wanted(
     writing: WriteRequirement,
     state: &FilmState,
     to: ImageWriteContext<'_>,
-    written: &mut WrittenImages,
+    written: &mut WriteState,
     token: &CancelToken,
 ) -> Result<StageResult<bool>, AbortReason> {
     match writing {
@@ -181,7 +154,7 @@ pub(crate) fn write_if_wanted(
 fn write_outdated_outputs(
     state: &FilmState,
     to: ImageWriteContext<'_>,
-    written: &mut WrittenImages,
+    written: &mut WriteState,
     token: &CancelToken,
     is_must: bool,
 ) -> Result<StageResult<bool>, AbortReason> {
@@ -192,24 +165,23 @@ fn write_outdated_outputs(
     let unfinished = (!state.is_finished(plan)).then(|| state.film.sample_count_stats().into());
     let mut radiance: Option<RadianceImage> = None;
     let (mut count, mut errors) = (0, Vec::new());
-    for path in &plan.outputs {
+    for path in &plan.outputs.images {
         let key = image_file_key(state, plan, path);
-        if let Some((known, content)) = written.files.get(path)
-            && *known == Some(key)
-            && contents.read_content_id(path, token)? == *content
+        if let Some(content) = contents.outputs.content_of_image(path, key)
+            && contents.read_content_id(path, token)? == content
         {
             continue;
         }
         contents.outputs.begin_write(path, overwrite_protection(plan));
         let wrote = match state.share {
-            Some(_) => write_part(state, to, (path, &written.sweep), token),
+            Some(_) => write_part(state, to, path, &written.sweep, token),
             None => {
                 let image = radiance
                     .get_or_insert_with(|| state.film.image(plan.settings.view.displayed_film_quantity()));
                 token
                     .check_pause_and_cancel()
                     .map_err(OutputError::from)
-                    .and_then(|()| write_one(image, state, to, (path, &written.sweep), token))
+                    .and_then(|()| write_one(image, state, to, path, &written.sweep, token))
             }
         };
         match wrote {
@@ -219,7 +191,7 @@ fn write_outdated_outputs(
                 // programs, which may change the file.
                 let content = contents.read_content_id(path, &CancelToken::new())?;
                 contents.outputs.end_write(path, Some(content));
-                written.files.insert(path.clone(), (Some(key), content));
+                contents.outputs.set_image(path, key);
                 written.is_by_hand = !is_own;
                 sink.send_image_written(path, bytes, is_own, unfinished);
             }
@@ -232,8 +204,7 @@ fn write_outdated_outputs(
             }
         }
     }
-    let outputs: HashSet<&PathBuf> = plan.outputs.iter().collect();
-    written.files.retain(|path, _| outputs.contains(path));
+    let outputs: HashSet<&PathBuf> = plan.outputs.images.iter().collect();
     contents.outputs.retain(|path| outputs.contains(path));
     match (errors.is_empty(), count) {
         (false, _) => {
@@ -254,19 +225,21 @@ fn write_outdated_outputs(
 pub(crate) fn write_on_request(
     state: &FilmState,
     to: ImageWriteContext<'_>,
-    written: &mut WrittenImages,
+    written: &mut WriteState,
 ) -> bool {
     let conflicts = output_conflicts(to.plan, to.inputs);
     if !conflicts.is_empty() {
         to.sink.send_write_conflicts(conflicts);
         return false;
     }
-    written.mark_all_outdated();
+    to.contents.outputs.forget_images();
+    written.own = None;
     // Use a token that is never canceled, because the user requested the image.
     let outcome = write_outdated_outputs(state, to, written, &CancelToken::new(), false);
     let is_written = outcome.is_ok_and(|stage| stage.value);
     if is_written {
-        to.sink.send_write_done(to.plan.outputs.clone());
+        let (generation, paths) = (to.sink.generation, to.plan.outputs.images.clone());
+        to.sink.send(Event::WriteDone { generation, paths });
     }
     is_written
 }
@@ -280,7 +253,7 @@ pub(crate) fn add_frame_and_write_if_last(
     state: &FilmState,
     to: ImageWriteContext<'_>,
     turn: TurntableFrame,
-    written: &mut WrittenImages,
+    written: &mut WriteState,
     token: &CancelToken,
 ) -> Result<StageResult<bool>, AbortReason> {
     let ImageWriteContext { plan, inputs, sink, .. } = to;
@@ -300,7 +273,7 @@ pub(crate) fn add_frame_and_write_if_last(
         mean: samples.iter().map(|one| one.mean).sum::<f64>() / samples.len() as f64,
         max: samples.iter().map(|one| one.max).max().unwrap_or(0),
     };
-    for path in &plan.moving {
+    for path in &plan.outputs.animations {
         let Some(format) = AnimationFormat::from_path(path) else { continue };
         let write = || {
             let metadata = encoding_settings_with_relative_scene(plan, path).metadata_with_samples(samples);
@@ -308,7 +281,7 @@ pub(crate) fn add_frame_and_write_if_last(
             let write = |guard: &ExistingFilePolicy<'_>| {
                 output::write::atomic_with_policy(path, &bytes, guard, token)
             };
-            write_guarded(plan, inputs, (OutputTarget::for_image(plan, path), None), sink, write)?;
+            write_guarded(plan, inputs, OutputTarget::for_image(plan, path), None, sink, write)?;
             Ok(bytes.len() as u64)
         };
         match write() {
@@ -324,7 +297,8 @@ fn write_one(
     image: &RadianceImage,
     state: &FilmState,
     ImageWriteContext { plan, inputs, sink, .. }: ImageWriteContext<'_>,
-    (path, sweep): (&Path, &SweptFolders),
+    path: &Path,
+    sweep: &SweptFolders,
     token: &CancelToken,
 ) -> Result<u64, OutputError> {
     let mut finish = encoding_settings_with_relative_scene(plan, path);
@@ -345,7 +319,8 @@ fn write_one(
 fn write_part(
     state: &FilmState,
     ImageWriteContext { plan, inputs, sink, .. }: ImageWriteContext<'_>,
-    (path, sweep): (&Path, &SweptFolders),
+    path: &Path,
+    sweep: &SweptFolders,
     token: &CancelToken,
 ) -> Result<u64, OutputError> {
     let identity = state.identity.clone().unwrap_or_default();
@@ -356,7 +331,7 @@ fn write_part(
     let save = |guard: &ExistingFilePolicy<'_>| {
         part::save(path, &head, &state.film, &Value::Null, guard, token, Durability::Power).map(drop)
     };
-    write_guarded(plan, inputs, (OutputTarget::for_image(plan, path), Some(sweep)), sink, save)?;
+    write_guarded(plan, inputs, OutputTarget::for_image(plan, path), Some(sweep), sink, save)?;
     Ok(path.metadata().map_or(0, |found| found.len()))
 }
 
@@ -364,7 +339,7 @@ fn write_part(
 pub(crate) fn image_encoding_settings(plan: &RenderPlan) -> FilmEncodingSettings {
     FilmEncodingSettings {
         quantity: plan.settings.view.displayed_film_quantity(),
-        tone: plan.tone,
+        tone: plan.tone(),
         bit_depth: BitDepth::try_from(plan.bit_depth).unwrap_or_default(),
         metadata: metadata(plan),
         is_light: matches!(plan.settings.view.aov_source(), AovSource::Light(LightAov::Radiance(_))),
@@ -383,29 +358,31 @@ fn encoding_settings_with_relative_scene(plan: &RenderPlan, path: &Path) -> Film
 
 /// Returns the metadata needed to reproduce an image, except for metadata stored in the film.
 fn metadata(plan: &RenderPlan) -> Vec<(String, String)> {
-    let settings = &plan.effective;
+    let RenderSettings { render, dof, view, photons, layers: _ } =
+        plan.settings.without_ineffective_settings();
+    let RenderOptions { shadows, max_depth, .. } = plan.settings.render;
     let pairs = [
-        (SCENE, plan.name.clone()),
-        ("glimt:integrator", settings.integrator.name().to_owned()),
-        ("glimt:shadows", settings.shadows.name().to_owned()),
-        ("glimt:max_depth", plan.settings.render.max_depth.to_string()),
-        ("glimt:dof", settings.dof.to_string()),
-        ("glimt:view", settings.view.name().to_owned()),
-        ("glimt:photons", settings.photons.to_string()),
-        ("glimt:error", settings.error.to_string()),
-        ("glimt:seed", settings.seed.to_string()),
-        ("glimt:exposure", plan.tone.exposure_stops.to_string()),
+        (SCENE, plan.name()),
+        ("glimt:integrator", render.integrator.name().to_owned()),
+        ("glimt:shadows", shadows.name().to_owned()),
+        ("glimt:max_depth", max_depth.to_string()),
+        ("glimt:dof", dof.to_string()),
+        ("glimt:view", view.name().to_owned()),
+        ("glimt:photons", photons.is_some().to_string()),
+        ("glimt:error", render.error.to_string()),
+        ("glimt:seed", render.seed.to_string()),
+        ("glimt:exposure", plan.tone().exposure_stops.to_string()),
     ];
     let mut pairs = pairs.map(|(key, value)| (key.to_owned(), value)).to_vec();
     let mut add = |name: &str, value: String| pairs.push((format!("glimt:{name}"), value));
-    if let Some(from) = plan.from {
+    if let Some(from) = plan.model_view.from {
         add("from", from.name().to_owned());
     }
-    if let Some(up) = plan.up {
+    if let Some(up) = plan.model_view.up {
         add("up", up.name().to_owned());
     }
-    if settings.clamp > 0.0 {
-        add("clamp", settings.clamp.to_string());
+    if render.clamp > 0.0 {
+        add("clamp", render.clamp.to_string());
     }
     if let Some(Rect { x, y, width, height }) = plan.crop {
         add("crop", format!("{x},{y},{width},{height}"));
@@ -415,7 +392,11 @@ fn metadata(plan: &RenderPlan) -> Vec<(String, String)> {
         add("layers", names.join(","));
     }
     if let Some(TurntableFrame { number, of }) = plan.turn {
-        let which = if plan.moving.is_empty() { format!("{} of {of}", number + 1) } else { of.to_string() };
+        let which = if plan.outputs.animations.is_empty() {
+            format!("{} of {of}", number + 1)
+        } else {
+            of.to_string()
+        };
         add("turntable", which);
     }
     pairs
@@ -423,10 +404,11 @@ fn metadata(plan: &RenderPlan) -> Vec<(String, String)> {
 
 fn image_file_key(state: &FilmState, plan: &RenderPlan, path: &Path) -> Fingerprint {
     let SampleCountStats { min, mean, max } = state.film.sample_count_stats();
+    let tone = plan.tone();
     let mut key = FingerprintHasher::new("write");
     key.add_fingerprint(&state.key).add_u64(min.into()).add_f64(mean).add_u64(max.into());
-    key.add_choice(plan.settings.view).add_f32(plan.tone.exposure_stops).add_usize(plan.tone.curve as usize);
-    key.add_usize(plan.tone.transfer as usize).add_u64(plan.bit_depth.into());
+    key.add_choice(plan.settings.view).add_f32(tone.exposure_stops).add_usize(tone.curve as usize);
+    key.add_usize(tone.transfer as usize).add_u64(plan.bit_depth.into());
     plan.layers.iter().for_each(|layer| {
         key.add_choice(*layer);
     });

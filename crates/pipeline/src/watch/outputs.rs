@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 use super::content::{FileContentId, FileHashCache};
 use crate::control::CancelToken;
 use crate::protected::{OverwriteProtection, OverwriteRefusalReason};
+use crate::scene::fingerprint::Fingerprint;
 
 /// A change that another program made to a file written by glimt.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -58,12 +59,27 @@ pub struct WrittenOutputs(Mutex<HashMap<PathBuf, WrittenOutput>>);
 struct WrittenOutput {
     /// The content written by glimt.
     content: FileContentId,
+    /// Key of the image in the file. A file without a key is written again.
+    image: Option<Fingerprint>,
     /// Number of writes started so far.
     writes: u64,
     is_being_written: bool,
     protection: OverwriteProtection,
     /// The last reported change.
     reported: Option<ExternalChange>,
+}
+
+impl WrittenOutput {
+    /// Whether the file is a regular file. Special files are not watched.
+    fn is_regular(&self) -> bool {
+        matches!(self.content, FileContentId::Hash(_))
+    }
+
+    /// Whether the file at `path` still has the content written by glimt.
+    fn is_unchanged(&self, path: &Path, contents: &FileHashCache) -> bool {
+        // Use a token that is never canceled.
+        contents.read_content_id(path, &CancelToken::new()).is_ok_and(|content| content == self.content)
+    }
 }
 
 impl WrittenOutputs {
@@ -73,6 +89,7 @@ impl WrittenOutputs {
         let mut known = self.lock();
         let output = known.entry(path.to_owned()).or_insert(WrittenOutput {
             content: FileContentId::Missing,
+            image: None,
             writes: 0,
             is_being_written: true,
             protection: OverwriteProtection::Nothing,
@@ -82,7 +99,7 @@ impl WrittenOutputs {
         output.protection = protection;
     }
 
-    /// Records a written file's content, or `None` if the write failed. Special files are not watched.
+    /// Records a written file's content, or `None` if the write failed.
     pub(crate) fn end_write(&self, path: &Path, content: Option<FileContentId>) {
         let mut known = self.lock();
         let Some(output) = known.get_mut(path) else { return };
@@ -90,9 +107,51 @@ impl WrittenOutputs {
         if let Some(content) = content {
             (output.content, output.reported) = (content, None);
         }
-        if !matches!(output.content, FileContentId::Hash(_)) {
+        if output.content == FileContentId::Missing {
             known.remove(path);
         }
+    }
+
+    /// Records which image a written file contains.
+    pub(crate) fn set_image(&self, path: &Path, key: Fingerprint) {
+        if let Some(output) = self.lock().get_mut(path) {
+            output.image = Some(key);
+        }
+    }
+
+    /// Returns the content of a file when glimt wrote this image to it.
+    pub(crate) fn content_of_image(&self, path: &Path, key: Fingerprint) -> Option<FileContentId> {
+        self.lock().get(path).filter(|output| output.image == Some(key)).map(|output| output.content)
+    }
+
+    /// Forgets which images the files contain, so that the next write stage writes them again.
+    pub(crate) fn forget_images(&self) {
+        self.lock().values_mut().for_each(|output| output.image = None);
+    }
+
+    /// Whether no file was written.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.lock().is_empty()
+    }
+
+    /// Whether a file still has the content written by glimt.
+    pub(crate) fn has_unchanged_file(&self, contents: &FileHashCache) -> bool {
+        let known = self.lock().clone();
+        known.iter().any(|(path, output)| output.is_unchanged(path, contents))
+    }
+
+    /// Returns the first existing file whose content was not written by glimt.
+    pub(crate) fn first_foreign_file<'a>(
+        &self,
+        paths: &'a [PathBuf],
+        contents: &FileHashCache,
+    ) -> Option<&'a Path> {
+        let known = self.lock().clone();
+        let is_foreign = |path: &&Path| {
+            let is_ours = known.get(*path).is_some_and(|output| output.is_unchanged(path, contents));
+            !is_ours && path.symlink_metadata().is_ok()
+        };
+        paths.iter().map(PathBuf::as_path).find(is_foreign)
     }
 
     /// Forgets all files for which `keep` returns false.
@@ -100,9 +159,11 @@ impl WrittenOutputs {
         self.lock().retain(|path, _| keep(path));
     }
 
-    /// Returns the paths of all files.
+    /// Returns the paths of all files to watch.
     pub(super) fn paths(&self) -> Vec<PathBuf> {
-        self.lock().keys().cloned().collect()
+        let known = self.lock();
+        let watched = known.iter().filter(|(_, output)| output.is_being_written || output.is_regular());
+        watched.map(|(path, _)| path.clone()).collect()
     }
 
     /// Returns the files that no longer have the content written by glimt.
@@ -127,7 +188,7 @@ impl WrittenOutputs {
     ) -> Vec<(PathBuf, Option<ExternalChange>, Option<ExternalChange>)> {
         let before: Vec<(PathBuf, WrittenOutput)> = {
             let known = self.lock();
-            let idle = known.iter().filter(|(_, output)| !output.is_being_written);
+            let idle = known.iter().filter(|(_, output)| !output.is_being_written && output.is_regular());
             idle.map(|(path, output)| (path.clone(), output.clone())).collect()
         };
         let state = |(path, output): (PathBuf, WrittenOutput)| {

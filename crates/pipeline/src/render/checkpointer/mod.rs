@@ -23,7 +23,7 @@ use crate::output::part::{
 };
 use crate::output::write::{Durability, ExistingFilePolicy};
 use crate::output::{AttributeLossPolicy, FilmEncodingSettings, OutputError};
-use crate::protocol::CheckpointUpdate;
+use crate::protocol::{CheckpointUpdate, Event};
 use crate::settings::{CheckpointSettings, ResumeMode};
 use crate::sink::EventSink;
 use crate::stages::AbortReason;
@@ -500,7 +500,8 @@ impl<'a> Checkpointer<'a> {
     }
 
     fn send_update(&self, news: CheckpointUpdate) {
-        self.around.sink.send_checkpoint_update(news);
+        let sink = self.around.sink;
+        sink.send(Event::Checkpoint { generation: sink.generation, news });
     }
 }
 

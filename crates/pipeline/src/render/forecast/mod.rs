@@ -108,7 +108,7 @@ impl Forecast {
     /// Measures the film's noise if a measurement is due. `seconds` is the time since the stage started.
     pub(crate) fn measure_noise_if_due(&mut self, state: &FilmState, pool: &ThreadPool, seconds: f64) {
         let least = state.min_unfinished_samples(u32::MAX);
-        pool.install(|| self.noise.measure_if_due(&state.film, least, (state.cpu_seconds(), seconds)));
+        pool.install(|| self.noise.measure_if_due(&state.film, least, state.cpu_seconds(), seconds));
     }
 
     /// Returns the progress, including the predicted time and noise.
@@ -118,7 +118,7 @@ impl Forecast {
         let work = self.done_and_total_work(moment);
         let (mut fraction, mut eta_seconds) = self.rate.update_fraction_and_time_left(elapsed_seconds, work);
         // Apply the time limit if it ends the render earlier.
-        if let Some(budget) = moment.plan.time_seconds {
+        if let Some(budget) = moment.plan.limits.seconds {
             // The first pass always completes, even after the time limit.
             let of_first = eta_seconds.map_or(0.0, |eta| eta * self.first_pass_share_of_remaining(moment));
             let left = (budget - elapsed_seconds).max(of_first);
@@ -137,7 +137,8 @@ impl Forecast {
             samples: (moment.units / pixels) as u32,
             mean_samples: moment.units as f64 / pixels as f64,
             total_samples: self.total_units.div_ceil(pixels) as u32,
-            is_total_fixed: !(moment.plan.settings.render.error > 0.0) && moment.plan.time_seconds.is_none(),
+            is_total_fixed: !(moment.plan.settings.render.error > 0.0)
+                && moment.plan.limits.seconds.is_none(),
             noise: self.noise.current_and_predicted_noise(work, self.rate.rate(), left),
         }
     }

@@ -36,7 +36,7 @@ impl NoiseTracker {
     }
 
     /// Measures the noise if a measurement is due. `samples` is the minimum number of samples per pixel.
-    pub(crate) fn measure_if_due(&mut self, film: &Film, samples: u32, (done, seconds): (f64, f64)) {
+    pub(crate) fn measure_if_due(&mut self, film: &Film, samples: u32, done: f64, seconds: f64) {
         if samples < LEAST || Instant::now() < self.due {
             return;
         }
