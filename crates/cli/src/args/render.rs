@@ -169,7 +169,7 @@ pub struct RenderArgs {
 
 impl RenderArgs {
     /// Returns the overrides specified by these options.
-    pub(super) fn overrides(&self) -> Overrides {
+    pub fn overrides(&self) -> Overrides {
         let mut overrides = Overrides {
             sets: self.sets.clone(),
             outputs: self.outputs.clone(),

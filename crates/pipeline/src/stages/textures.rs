@@ -273,7 +273,6 @@ fn add_check_only_textures(loaded: &LoadedScene, wanted: &mut Vec<NeededTexture>
 mod tests {
     use std::fs;
 
-    use super::*;
     use crate::protocol::{Stage, Status};
     use crate::tests::{Bench, SCENE};
 
