@@ -148,7 +148,7 @@ fn mesh_files_are_listed_once() {
         .iter()
         .map(|object| match object.shape {
             Shape::Mesh(MeshReference {
-                file, placed: MeshTransform::Steps { scale, .. }, smooth, ..
+                file, placed: ObjectTransform::Steps { scale, .. }, smooth, ..
             }) => (file, scale, smooth, object.material),
             _ => panic!("not a mesh"),
         })

@@ -16,7 +16,7 @@ use glimt::math::{DVec3, Vec2, Vec3};
 use glimt::scene::description::light::{Falloff, PointLight};
 use glimt::scene::description::{
     Accel, Camera, ColorSource, EmissionSource, Environment, FresnelSource, Integrator, Light, Material,
-    MaterialKind, MeshFile, MeshReference, MeshTransform, NumberSource, Object, OpacitySource,
+    MaterialKind, MeshFile, MeshReference, NumberSource, Object, ObjectTransform, OpacitySource,
     PhongParameters, PhotonOptions, PixelFilter, RenderOptions, Scene, ShadowMode, Shape, Spanned, Texture,
     TextureEncoding, TextureFilter, Tonemap, UvSet, Wrap,
 };
@@ -167,7 +167,7 @@ impl Build {
         self.scene.mesh_files.push(MeshFile { value: PathBuf::new(), span: 0..0, part: None });
         let [scale, rotate, translate] = placed;
         let file = self.parts.meshes.len() - 1;
-        let placed = MeshTransform::Steps { scale, rotate, translate };
+        let placed = ObjectTransform::Steps { scale, rotate, translate };
         self.shape(Shape::Mesh(MeshReference { file, placed, smooth: false, vertex_colors: false }), material)
     }
 

@@ -6,7 +6,7 @@ use glimt::geometry::Ray;
 use glimt::geometry::mesh::TriangleMesh;
 use glimt::math::random::TestRandom;
 use glimt::math::{DVec3, Vec3};
-use glimt::scene::description::{AffineMap, EmissionSides, Integrator, Material, MeshTransform, Shape};
+use glimt::scene::description::{AffineMap, EmissionSides, Integrator, Material, ObjectTransform, Shape};
 
 use super::direct::{assert_irradiance, at_origin};
 use super::round_lights::assert_same;
@@ -53,7 +53,7 @@ fn mesh_under(build: Build, mesh: TriangleMesh, matrix: AffineMap, material: Mat
     let loaded = LoadedMesh { mesh, ..LoadedMesh::default() };
     build.loaded(loaded, AS_IT_IS, material).with(|scene| {
         if let Some(Shape::Mesh(mesh)) = scene.objects.last_mut().map(|object| &mut object.shape) {
-            mesh.placed = MeshTransform::Matrix(matrix);
+            mesh.placed = ObjectTransform::Matrix(matrix);
         }
     })
 }

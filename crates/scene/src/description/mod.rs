@@ -9,6 +9,7 @@ mod material;
 mod method;
 mod render;
 mod shape;
+mod transform;
 
 use std::ops::Range;
 use std::path::PathBuf;
@@ -22,9 +23,8 @@ pub use material::{
 };
 pub use method::{Integrator, IntegratorProperties};
 pub use render::{Accel, MAX_BOUNCES, PixelFilter, RenderOptions, ShadowMode, Tonemap, render_keys};
-pub use shape::{
-    AffineMap, LoweredShape, MeshReference, MeshTransform, Object, OpenSurface, Shape, max_projection,
-};
+pub use shape::{LoweredShape, MeshReference, Object, OpenSurface, Shape, max_projection};
+pub use transform::{AffineMap, ObjectTransform};
 
 /// A validated scene.
 #[derive(Clone, Debug, PartialEq)]

@@ -1,8 +1,9 @@
-//! Shapes and the placement of meshes.
+//! Shapes.
 
 use std::ops::Range;
 
 use super::super::fingerprint::{FingerprintContext, FingerprintHasher, Fingerprinted};
+use super::transform::{AffineMap, ObjectTransform};
 use crate::geometry;
 use crate::geometry::cone::Cone;
 use crate::geometry::cuboid::OrientedBox;
@@ -14,8 +15,7 @@ use crate::geometry::sphere::Sphere;
 use crate::geometry::torus::Torus;
 use crate::geometry::transformed::TransformedShape;
 use crate::geometry::triangle::Triangle;
-use crate::math::transform::Transform;
-use crate::math::{DMat3, DVec3};
+use crate::math::DVec3;
 
 /// A shape and its material.
 #[derive(Clone, Debug, PartialEq)]
@@ -170,70 +170,11 @@ pub struct MeshReference {
     /// Index into [`Scene::mesh_files`](super::Scene::mesh_files).
     pub file: usize,
     /// Transform from file coordinates to scene coordinates.
-    pub placed: MeshTransform,
+    pub placed: ObjectTransform,
     /// Whether vertex normals are interpolated.
     pub smooth: bool,
     /// Whether vertex colors multiply the material's color.
     pub vertex_colors: bool,
-}
-
-/// Transform from a mesh file's coordinates to scene coordinates.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum MeshTransform {
-    /// Scale, rotation and translation.
-    Steps {
-        /// Scale factors, applied first. No component is 0.
-        scale: DVec3,
-        /// Rotation in degrees about x, then y, then z.
-        rotate: DVec3,
-        /// Translation, applied last.
-        translate: DVec3,
-    },
-    /// An invertible affine map.
-    Matrix(AffineMap),
-}
-
-/// An invertible affine map.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct AffineMap {
-    /// Images of the coordinate axes.
-    pub linear: [DVec3; 3],
-    /// Image of the origin.
-    pub translate: DVec3,
-}
-
-impl AffineMap {
-    /// Returns the map and its inverse.
-    pub fn to_transform(&self) -> Transform {
-        let [x, y, z] = self.linear;
-        Transform::from_mat3_translation(DMat3::from_cols(x, y, z), self.translate)
-    }
-
-    /// Returns the scale of a map that consists of a uniform scale > 0 and a translation, or `None` for other
-    /// maps.
-    fn unrotated_uniform_scale(&self) -> Option<f64> {
-        let scale = self.linear[0].x;
-        (scale > 0.0 && self.linear == DVec3::AXES.map(|axis| axis * scale)).then_some(scale)
-    }
-}
-
-impl Fingerprinted for AffineMap {
-    fn add_to(&self, key: &mut FingerprintHasher, _: &FingerprintContext<'_>) {
-        let [x, y, z] = self.linear;
-        key.add_dvec3(x).add_dvec3(y).add_dvec3(z).add_dvec3(self.translate);
-    }
-}
-
-impl MeshTransform {
-    /// Returns the transform.
-    pub fn to_transform(&self) -> Transform {
-        match *self {
-            Self::Steps { scale, rotate, translate } => {
-                Transform::scale_rotate_translate(scale, rotate, translate)
-            }
-            Self::Matrix(map) => map.to_transform(),
-        }
-    }
 }
 
 /// A shape in the representation used for tracing.
@@ -468,14 +409,6 @@ impl Fingerprinted for MeshReference {
     fn add_to(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
         // Vertex colors do not affect the geometry.
         let Self { file, placed, smooth, vertex_colors: _ } = *self;
-        key.add_fingerprint(&of.meshes[file]).add_bool(smooth);
-        match placed {
-            MeshTransform::Steps { scale, rotate, translate } => {
-                key.add_usize(0).add_dvec3(scale).add_dvec3(rotate).add_dvec3(translate);
-            }
-            MeshTransform::Matrix(map) => {
-                key.add_usize(1).add(&map, of);
-            }
-        }
+        key.add_fingerprint(&of.meshes[file]).add_bool(smooth).add(&placed, of);
     }
 }

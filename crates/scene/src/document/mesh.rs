@@ -2,15 +2,16 @@
 
 use std::path::PathBuf;
 
-use super::super::description::{MeshReference, MeshTransform, Shape, Spanned};
+use super::super::description::{MeshReference, Shape, Spanned};
 use super::super::keys::endings::{GLTF, MESHES};
 use super::super::keys::key::DefaultValue::{Absent, By, Is, Required};
 use super::super::keys::key::ValueKind::{File, Flag, Numbers, Scale, Whole};
 use super::super::keys::key::{ANGLES, MOST_WHOLE};
 use super::context::Issue;
 use super::limits::Limits::{Any, NotZero};
-use super::shape_table::{MeshFileRegistry, read_affine_matrix, shape_table};
+use super::shape_table::{MeshFileRegistry, shape_table};
 use super::table::TableReader;
+use super::transform::read_transform;
 
 shape_table! {
     /// A triangle mesh from a file.
@@ -36,7 +37,7 @@ shape_table! {
 fn read_mesh(table: &TableReader<'_>, files: &mut MeshFileRegistry) -> Option<Shape> {
     let file = table.key("file").existing_file();
     let part = read_part_index(table, file.as_ref());
-    let placed = read_placement(table);
+    let placed = read_transform(table);
     let (smooth, vertex_colors) = (table.key("smooth").boolean(), table.key("vertex_colors").boolean());
     let (file, placed) = (files.add_file(file?, part?), placed?);
     Some(Shape::Mesh(MeshReference { file, placed, smooth: smooth?, vertex_colors: vertex_colors? }))
@@ -53,21 +54,4 @@ fn read_part_index(table: &TableReader<'_>, file: Option<&Spanned<PathBuf>>) -> 
         return None;
     }
     number
-}
-
-/// Reads either `matrix`, or `scale`, `rotate` and `translate`.
-fn read_placement(table: &TableReader<'_>) -> Option<MeshTransform> {
-    let (matrix, steps) = (table.key("matrix"), ["scale", "rotate", "translate"].map(|name| table.key(name)));
-    if matrix.is_present() {
-        for key in &steps {
-            if let Some(span) = key.key_span() {
-                let message = format!("`{}` conflicts with `matrix`", key.info.name);
-                key.context.report(Issue::error(span, message));
-            }
-        }
-        return read_affine_matrix(&matrix).map(MeshTransform::Matrix);
-    }
-    let [scale, rotate, translate] = steps;
-    let (scale, rotate, translate) = (scale.scale_factors(), rotate.vector(), translate.vector());
-    Some(MeshTransform::Steps { scale: scale?, rotate: rotate?, translate: translate? })
 }

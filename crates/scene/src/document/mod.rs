@@ -17,6 +17,7 @@ pub(super) mod shapes;
 mod syntax;
 mod table;
 pub(super) mod textures;
+mod transform;
 mod value;
 
 use std::ops::Range;

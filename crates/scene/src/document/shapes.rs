@@ -10,8 +10,9 @@ use super::key::KeyInTable;
 use super::limits::Limits::{Any, Length};
 use super::materials::MaterialList;
 use super::mesh::MESH;
-use super::shape_table::{MeshFileRegistry, ShapeTable, read_affine_matrix, shape_table};
+use super::shape_table::{MeshFileRegistry, ShapeTable, shape_table};
 use super::table::TableReader;
+use super::transform::read_affine_matrix;
 use crate::math::DVec3;
 
 /// All shapes. [`read_objects`] sorts the objects into text order.

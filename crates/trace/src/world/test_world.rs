@@ -10,7 +10,7 @@ use crate::geometry::mesh::TriangleMesh;
 use crate::materials::texels::Texels;
 use crate::math::{DVec3, Vec3};
 use crate::scene::description::{
-    Accel, Environment, MeshFile, MeshReference, MeshTransform, Object, Scene, Shape, Spanned,
+    Accel, Environment, MeshFile, MeshReference, Object, ObjectTransform, Scene, Shape, Spanned,
 };
 
 /// A world under construction.
@@ -51,7 +51,7 @@ impl TestWorldBuilder {
         self.meshes.push(Arc::new(tree));
         self.scene.mesh_files.push(MeshFile { value: PathBuf::new(), span: 0..0, part: None });
         let file = self.meshes.len() - 1;
-        let placed = MeshTransform::Steps { scale, rotate, translate };
+        let placed = ObjectTransform::Steps { scale, rotate, translate };
         self.shape(Shape::Mesh(MeshReference { file, placed, smooth: false, vertex_colors: false }), material)
     }
 
