@@ -224,6 +224,34 @@ impl Shape {
         }
     }
 
+    /// Replaces the transform of a mesh, or the matrix of another shape; see [`Shape::transformed`].
+    #[must_use]
+    pub fn with_transform(self, transform: ObjectTransform) -> Self {
+        match self {
+            Self::Mesh(mesh) => Self::Mesh(MeshReference { placed: transform, ..mesh }),
+            Self::Transformed { shape, matrix: _ } => shape.transformed(transform.to_affine_map()),
+            shape if transform == ObjectTransform::IDENTITY => shape,
+            shape => shape.transformed(transform.to_affine_map()),
+        }
+    }
+
+    /// Returns the transform of a mesh, or the matrix of another shape. Without a matrix, returns the identity.
+    pub fn transform(&self) -> ObjectTransform {
+        match self {
+            Self::Mesh(mesh) => mesh.placed,
+            Self::Transformed { matrix, .. } => ObjectTransform::Matrix(*matrix),
+            Self::Sphere { .. }
+            | Self::Quad { .. }
+            | Self::Plane { .. }
+            | Self::Box { .. }
+            | Self::Triangle { .. }
+            | Self::Disk { .. }
+            | Self::Cylinder { .. }
+            | Self::Cone { .. }
+            | Self::Torus { .. } => ObjectTransform::IDENTITY,
+        }
+    }
+
     /// Lowers the shape for tracing, with coordinates relative to `origin`.
     pub fn to_traced_shape_relative_to(&self, origin: DVec3) -> LoweredShape<'_> {
         let at = |place: DVec3| place - origin;
