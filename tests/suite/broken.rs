@@ -131,6 +131,24 @@ const BROKEN: &[(&str, &[ExpectedDiagnostic])] = &[
             (12, 12, r#"there is no material "␛[31m␊red""#),
         ],
     ),
+    ("group_cycle", &[(10, 1, r#"the group "shelf" contains itself; shelf → rack → shelf"#)]),
+    (
+        "groups",
+        &[
+            (11, 10, "`radius` must be greater than 0; found 0"),
+            (14, 16, "unknown key `bx` in [groups.stool]; did you mean `box`?"),
+            (17, 16, "a group cannot contain lights without a shape"),
+            (21, 1, "`sphere` must be a list of tables; found a table"),
+            (24, 9, r#"there is no group "stol"; did you mean "stool"?"#),
+            (26, 1, "[[instance]] needs `group`; `group` is missing"),
+            (27, 13, "`translate` must be three numbers, [x, y, z]; found an array of 2 values"),
+            (31, 9, "`scale` must not be 0; found 0"),
+            (32, 8, "`name` must not be a number"),
+            (36, 1, "`rotate` conflicts with `matrix`"),
+            (38, 1, "unknown key `material` in [[instance]]"),
+            (40, 2, "unknown table `instances`; did you mean `instance`?"),
+        ],
+    ),
     (
         "huge_numbers",
         &[

@@ -36,6 +36,7 @@ pub(crate) fn errors(diagnostics: &[Diagnostic]) -> Vec<&str> {
 /// Removes source positions from the scene, because they change when a key is omitted.
 pub(crate) fn placeless(mut scene: Scene) -> Scene {
     scene.objects.iter_mut().for_each(|object| object.span = 0..0);
+    scene.instances.iter_mut().for_each(|instance| instance.span = 0..0);
     scene.textures.iter_mut().for_each(|texture| texture.file.span = 0..0);
     scene.mesh_files.iter_mut().for_each(|file| file.span = 0..0);
     let maps = scene.environment.iter_mut().filter_map(|environment| environment.file.as_mut());
@@ -200,5 +201,5 @@ fn starter_lines_can_be_uncommented() {
     assert!(text.lines().filter(|line| line.starts_with('#')).count() < 12, "{text}");
     let outcome = parse(text.into(), &folder.path().join("scene.toml"));
     assert_eq!(errors(&outcome.diagnostics), [""; 0]);
-    assert_eq!(outcome.scene.expect("a scene").objects.len(), 11);
+    assert_eq!(outcome.scene.expect("a scene").objects.len(), 12);
 }

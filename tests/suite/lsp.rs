@@ -206,6 +206,12 @@ fn hover_and_go_to_definition_work() {
     assert_eq!(place["range"]["start"], json!({ "line": 7, "character": 11 }));
     let place = editor.at("textDocument/definition", &TEXT.replace("\"bricks\" }", "\"bri|cks\" }"));
     assert_eq!(place["range"]["start"], json!({ "line": 4, "character": 10 }));
+    let text = format!("[[groups.stool.box]]\nmaterial = \"wa|ll\"\n[[instance]]\ngroup = \"stool\"\n{TEXT}");
+    let place = editor.at("textDocument/definition", &text);
+    assert_eq!(place["range"]["start"], json!({ "line": 11, "character": 11 }));
+    let text = text.replace('|', "").replace("\"stool\"", "\"st|ool\"");
+    let place = editor.at("textDocument/definition", &text);
+    assert_eq!(place["range"]["start"], json!({ "line": 0, "character": 9 }));
 }
 
 #[test]

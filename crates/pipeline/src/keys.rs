@@ -185,7 +185,7 @@ pub(crate) fn surfaces_and_lights_key(
 ) -> Fingerprint {
     // A new field of the scene must be added to one of the keys. This key includes the keys of the lights and
     // of the objects' shapes. The settings, the camera and the photons have separate keys. The context and
-    // `textures` contain the files and their parts.
+    // `textures` contain the files and their parts. The instances only locate objects in the scene file.
     let Scene {
         objects,
         materials,
@@ -193,6 +193,7 @@ pub(crate) fn surfaces_and_lights_key(
         environment: _,
         textures: _,
         mesh_files: _,
+        instances: _,
         render: _,
         camera: _,
         photons: _,

@@ -258,6 +258,8 @@ pub fn starter_scene() -> &'static str {
 #[cfg(test)]
 mod built_tests;
 #[cfg(test)]
+mod group_tests;
+#[cfg(test)]
 mod set_tests;
 #[cfg(test)]
 mod tests;

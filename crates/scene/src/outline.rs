@@ -12,6 +12,8 @@ use super::toml::{self, Entries, KeyValue, Value};
 pub struct OutlineTable {
     /// The table's definition.
     pub info: &'static TableInfo,
+    /// Key of the table, or of the list that contains it, such as `sphere` or `groups.chair.sphere`.
+    path: String,
     /// The type that the key `type` selects, or the default type. `None` if the definition has no types or if
     /// the type is unknown.
     pub kind: Option<&'static TableTypeInfo>,
@@ -52,58 +54,58 @@ pub fn document_outline(text: &str) -> Vec<OutlineTable> {
     let (document, _) = toml::parse(text);
     let of = |info: &'static TableInfo| {
         let found = document.root().get(info.name);
-        found.map_or_else(Vec::new, |found| outline_tables_of_definition(info, &found))
+        found.map_or_else(Vec::new, |found| outline_tables_of_definition(info, info.name, found.value))
     };
     all_tables().iter().flat_map(of).collect()
 }
 
-/// Returns the tables whose definition is `info`.
-fn outline_tables_of_definition(info: &'static TableInfo, found: &KeyValue<'_>) -> Vec<OutlineTable> {
+/// Returns the tables with the definition `info` at `path`, and the tables inside them.
+fn outline_tables_of_definition(info: &'static TableInfo, path: &str, found: Value<'_>) -> Vec<OutlineTable> {
     match info.form {
-        TableSyntax::Single => found
-            .value
-            .as_table()
-            .map(|all| outline_table(info, None, 1, found.value, &all))
-            .into_iter()
-            .collect(),
+        TableSyntax::Single => outline_table(info, path, None, (1, found)).into_iter().collect(),
         TableSyntax::Named => {
-            let named = found.value.as_table().into_iter().flat_map(|all| all.iter().collect::<Vec<_>>());
-            named
-                .filter_map(|one| {
-                    let name = SpannedName { text: one.key.to_owned(), span: one.span };
-                    Some(outline_table(info, Some(name), 1, one.value, &one.value.as_table()?))
-                })
-                .collect()
+            let named = found.as_table().into_iter().flat_map(|all| all.iter().collect::<Vec<_>>());
+            let of_name = |one: KeyValue<'_>| {
+                let path = format!("{path}.{}", toml::quote_key_part(one.key));
+                let name = SpannedName { text: one.key.to_owned(), span: one.span };
+                let inner = (info.tables)().iter().flat_map(|inner| {
+                    let found = one.value.as_table().and_then(|all| all.get(inner.name));
+                    let path = format!("{path}.{}", inner.name);
+                    found.map_or_else(Vec::new, |list| outline_tables_of_definition(inner, &path, list.value))
+                });
+                let own = outline_table(info, &path, Some(name), (1, one.value));
+                own.into_iter().chain(inner).collect::<Vec<_>>()
+            };
+            named.flat_map(of_name).collect()
         }
         TableSyntax::List => {
-            let elements =
-                found.value.as_array().into_iter().flat_map(|array| array.iter().collect::<Vec<_>>());
-            elements
-                .enumerate()
-                .filter_map(|(index, value)| {
-                    let all = value.as_table()?;
-                    let name = all.get("name").and_then(|name| spanned_string_value(name.value));
-                    Some(outline_table(info, name, index + 1, value, &all))
-                })
-                .collect()
+            let elements = found.as_array().into_iter().flat_map(|array| array.iter().collect::<Vec<_>>());
+            let of_element = |(number, value): (usize, Value<'_>)| {
+                let name = value.as_table()?.get("name").and_then(|name| spanned_string_value(name.value));
+                outline_table(info, path, name, (number, value))
+            };
+            (1..).zip(elements).filter_map(of_element).collect()
         }
     }
 }
 
+/// Returns the table `value`, or `None` if the value is not a table.
 fn outline_table(
     info: &'static TableInfo,
+    path: &str,
     name: Option<SpannedName>,
-    number: usize,
-    value: Value<'_>,
-    all: &Entries<'_>,
-) -> OutlineTable {
+    (number, value): (usize, Value<'_>),
+) -> Option<OutlineTable> {
+    let all = &value.as_table()?;
     let kind = all.get("type").map(|kind| spanned_string_value(kind.value));
     let kind = match &kind {
         Some(Some(kind)) => info.find_type_or_default(Some(&kind.text)),
         Some(None) => None,
         None => info.find_type_or_default(None),
     };
-    OutlineTable { info, kind, name, number, span: value.span(), keys: outline_keys(all) }
+    let mut keys = outline_keys(all);
+    keys.retain(|key| info.find_inner(&key.name.text).is_none());
+    Some(OutlineTable { info, path: path.to_owned(), kind, name, number, span: value.span(), keys })
 }
 
 fn outline_keys(all: &Entries<'_>) -> Vec<OutlineKey> {
@@ -141,12 +143,11 @@ impl OutlineTable {
 
     /// Returns the key prefixes with which `--set` can refer to this table.
     pub fn set_arg_prefixes(&self) -> Vec<String> {
-        let table = self.info.name;
-        let name = self.name.as_ref().map(|name| format!("{table}.{}", toml::quote_key_part(&name.text)));
+        let of = |part: &str| format!("{}.{part}", self.path);
+        let name = self.name.as_ref().map(|name| of(&toml::quote_key_part(&name.text)));
         match self.info.form {
-            TableSyntax::Single => vec![table.to_owned()],
-            TableSyntax::Named => name.into_iter().collect(),
-            TableSyntax::List => [format!("{table}.{}", self.number)].into_iter().chain(name).collect(),
+            TableSyntax::Single | TableSyntax::Named => vec![self.path.clone()],
+            TableSyntax::List => [of(&self.number.to_string())].into_iter().chain(name).collect(),
         }
     }
 }
@@ -156,7 +157,7 @@ mod tests {
     use super::*;
 
     const TEXT: &str = "[render]\nsamples = 3\n[materials]\nwall = { type = \"mirror\" }\n\"back wall\".diffuse = { texture = \"a\" }\n\
-                        [[sphere]]\nname = \"ball\"\n[[sphere]]\n[[light]]\ntype = \"sun\"\n[nonsense]\na = 1\n[broken";
+                        [[sphere]]\nname = \"ball\"\n[[sphere]]\n[[groups.\"a b\".box]]\nname = \"lid\"\n[[light]]\ntype = \"sun\"\n[nonsense]\na = 1\n[broken";
 
     #[test]
     fn tables_have_names_types_and_paths() {
@@ -164,12 +165,14 @@ mod tests {
             .iter()
             .map(|table| (table.set_arg_prefixes(), table.kind.map_or("", |kind| kind.name)))
             .collect();
-        let expected: [(&[&str], &str); 6] = [
+        let expected: [(&[&str], &str); 8] = [
             (&["render"], ""),
             (&["materials.wall"], "mirror"),
             (&["materials.\"back wall\""], "phong"),
             (&["sphere.1", "sphere.ball"], ""),
             (&["sphere.2"], ""),
+            (&["groups.\"a b\""], ""),
+            (&["groups.\"a b\".box.1", "groups.\"a b\".box.lid"], ""),
             (&["light.1"], ""),
         ];
         assert_eq!(found.len(), expected.len(), "{found:?}");

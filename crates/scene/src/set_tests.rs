@@ -20,11 +20,13 @@ const BALLS: &str = "[render]\nsamples = 4
 [materials.wall]\ndiffuse = [0.1, 0.2, 0.3]
 [[sphere]]\ncenter=[0,0,0]\nradius=1\nmaterial='wall'
 [[sphere]]\ncenter=[1,0,0]\nradius=2\nmaterial='wall'\nname='ball'
-[[sphere]]\ncenter=[2,0,0]\nradius=3\nmaterial='wall'\nname='big ball'";
+[[sphere]]\ncenter=[2,0,0]\nradius=3\nmaterial='wall'\nname='big ball'
+[[groups.pair.sphere]]\ncenter=[0,0,0]\nradius=4\nmaterial='wall'\nname='small'
+[[instance]]\ngroup='pair'\ntranslate=[4, 5, 6]";
 
 #[test]
 fn set_is_equivalent_to_editing_the_file() {
-    let cases: [(&[&str], &str, &str); 11] = [
+    let cases: [(&[&str], &str, &str); 13] = [
         (&["render.samples=3"], "samples = 4", "samples = 3"),
         (&["render.width=7"], "samples = 4", "samples = 4\nwidth = 7"),
         (&["render.samples=3", "render.samples=9"], "samples = 4", "samples = 9"),
@@ -36,6 +38,8 @@ fn set_is_equivalent_to_editing_the_file() {
         (&["sphere.ball.radius=0.25"], "radius=2", "radius=0.25"),
         (&["sphere.'big ball'.radius=0.25"], "radius=3", "radius=0.25"),
         (&["photons.count=77"], "[render]", "[photons]\ncount = 77\n[render]"),
+        (&["groups.pair.sphere.small.radius=7"], "radius=4", "radius=7"),
+        (&["instance.1.translate=[1, 2, 3]"], "[4, 5, 6]", "[1, 2, 3]"),
     ];
     for (sets, old, new) in cases {
         let text = format!("{BALLS}\n{CAMERA}").replace(old, new);
@@ -67,6 +71,11 @@ fn mistakes_in_set_are_reported() {
         ("sphere.ball.radius=1", "2 [[sphere]] tables are named `ball`", "ball"),
         ("cone.1.radius=1", "the scene has no [[cone]]", "1"),
         ("light.1.intensity=1", "the scene has no [[light]]", "1"),
+        ("groups.triple.sphere.1.radius=1", "the scene has no table [groups.triple]", "triple"),
+        ("groups.pair.cone.1.radius=1", "the scene has no [[groups.pair.cone]]", "1"),
+        ("groups.pair.sphere.2.radius=1", "there is no [[groups.pair.sphere]] with number or name `2`", "2"),
+        ("groups.pair.sphere.1.raduis=1", "unknown key `raduis` in [[groups.pair.sphere]]", "raduis"),
+        ("instance.1.group=triple", "there is no group \"triple\"", "\"triple\""),
         (
             "camera.position.1=3",
             "`camera.position` is an array of values and can only be set as a whole",

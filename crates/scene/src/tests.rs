@@ -11,14 +11,14 @@ fn outcome(text: &str) -> ParseOutcome {
 }
 
 /// Adds a camera to `text` and parses it. Panics on errors.
-fn scene(text: &str) -> Scene {
+pub fn scene(text: &str) -> Scene {
     let outcome = outcome(&format!("{text}\n{CAMERA}"));
     let messages: Vec<&str> = outcome.diagnostics.iter().map(|one| one.message.as_str()).collect();
     outcome.scene.unwrap_or_else(|| panic!("{messages:?}"))
 }
 
 /// Adds a camera to `text`, parses it and returns the messages.
-fn messages(text: &str) -> Vec<String> {
+pub fn messages(text: &str) -> Vec<String> {
     outcome(&format!("{text}\n{CAMERA}")).diagnostics.into_iter().map(|one| one.message).collect()
 }
 

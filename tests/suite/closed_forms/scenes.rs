@@ -66,6 +66,7 @@ pub fn scene() -> Build {
         materials: Vec::new(),
         mesh_files: Vec::new(),
         objects: Vec::new(),
+        instances: Vec::new(),
         lights: Vec::new(),
         environment: None,
     };

@@ -26,7 +26,7 @@ struct DefinedTable {
     keys: Vec<&'static KeyInfo>,
 }
 
-const WALL: &str = "[materials.wall]\n";
+const WALL: &str = "[materials.wall]\n[groups.stool]\n";
 const CAMERA: &str = "[camera]\nposition = [0, 1, 4]\nlook_at = [0, 1, 0]\n";
 
 fn tables() -> Vec<DefinedTable> {
@@ -40,11 +40,14 @@ fn of_definition(info: &'static TableInfo) -> Vec<DefinedTable> {
     if info.types.is_empty() {
         let keys: Vec<&KeyInfo> = info.keys.iter().collect();
         let headings = match info.form {
+            TableSyntax::Named if keys.is_empty() => Vec::new(),
             // The last three keys are common to all shapes.
-            TableSyntax::List => {
+            TableSyntax::List if keys.iter().any(|key| key.name == "material") => {
                 vec![(heading(info.header()), keys.len() - 3), ("Every shape".to_owned(), 3)]
             }
-            TableSyntax::Single | TableSyntax::Named => vec![(heading(info.header()), keys.len())],
+            TableSyntax::Single | TableSyntax::Named | TableSyntax::List => {
+                vec![(heading(info.header()), keys.len())]
+            }
         };
         return vec![DefinedTable { info, kind: None, head: format!("{head}\n"), headings, keys }];
     }
@@ -69,6 +72,7 @@ fn example(head: &str, key: &str) -> &'static str {
         "center" => "[0, 0.5, 0]",
         "radius" => "0.5",
         "material" => "\"wall\"",
+        "group" => "\"stool\"",
         "file" if head.starts_with("[[mesh]]") => "\"../assets/knot.obj\"",
         "file" => "\"../assets/textures/bricks.png\"",
         _ => "\"a key without an example\"",
@@ -296,14 +300,16 @@ fn reader_schema_and_explain_follow_definitions() {
 #[test]
 fn definition_has_every_key() {
     let tables = tables();
-    assert_eq!(tables.len(), 24);
+    assert_eq!(tables.len(), 26);
     for table in tables {
         let text = table.scene("", "zzz = 1");
         let outcome = parse(text.into(), &root().join("scenes/page.toml"));
         let mut all = outcome.diagnostics.iter();
         let unknown = all.find(|one| mentions(&one.message, "`zzz`")).expect("an unknown key");
         let mut expected = codes(unknown.help.as_deref().unwrap_or_default());
-        let documented: BTreeSet<String> = table.keys.iter().map(|key| key.name.to_owned()).collect();
+        let inner = (table.info.tables)().iter().map(|inner| inner.name);
+        let documented: BTreeSet<String> =
+            table.keys.iter().map(|key| key.name).chain(inner).map(str::to_owned).collect();
         if table.kind.is_some() {
             expected.remove("type");
         }

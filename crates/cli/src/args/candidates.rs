@@ -123,7 +123,7 @@ fn key_value_completions(kind: ValueKind, outline: &[OutlineTable]) -> Vec<Descr
         ValueKind::Color(_) | ValueKind::ColorOrTexture(_) | ValueKind::Emission(_) => {
             color_names().map(plain).collect()
         }
-        ValueKind::Texture | ValueKind::Heights | ValueKind::Material => {
+        ValueKind::Texture | ValueKind::Heights | ValueKind::Material | ValueKind::Group => {
             let named = outline.iter().filter(|table| Some(table.info.name) == kind.defining_table());
             named.filter_map(|table| table.name.as_ref()).map(|name| plain(&name.text)).collect()
         }
@@ -157,6 +157,9 @@ mod tests {
             offered(text, "sphere.b"),
             ["center", "radius", "material", "name", "matrix"].map(|key| format!("sphere.ball.{key}="))
         );
+        let text = "[[groups.bar.instance]]\n[groups.stool]\n";
+        assert_eq!(offered(text, "groups.bar.instance.1.tr"), ["groups.bar.instance.1.translate="]);
+        assert_eq!(offered(text, "groups.bar.instance.1.group=s"), ["groups.bar.instance.1.group=stool"]);
         assert_eq!(offered("", "render.sam"), ["render.samples="]);
         assert_eq!(offered("", "sphere"), [""; 0]);
     }

@@ -65,6 +65,9 @@ fn explain_path(path: &str) -> Option<String> {
         }
     };
     match parts.as_slice() {
+        [group, _, inner, rest @ ..] if find_table(group)?.find_inner(inner).is_some() => {
+            explain_path(&[&[*inner], rest].concat().join("."))
+        }
         [name] => match find_table(name) {
             Some(table) => Some(table_details(table)),
             None if all_tables().iter().any(|table| defines_type_named(table, name)) => {
@@ -80,6 +83,9 @@ fn explain_path(path: &str) -> Option<String> {
         },
         [name, second] => {
             let table = find_table(name)?;
+            if !(table.tables)().is_empty() {
+                return Some(table_details(table));
+            }
             if let Some(kind) = table.find_type_or_default(Some(second)) {
                 return Some(type_details(table, kind));
             }
@@ -164,7 +170,10 @@ fn key_summary(path: &str, key: &KeyInfo) -> String {
 fn table_details(table: &'static TableInfo) -> String {
     let head = format!("{}\n    {}\n\n", table.header(), sentence_without_backticks(table.doc));
     let types = if table.types.is_empty() { String::new() } else { format!("{}\n", format_type_list(table)) };
-    format!("{head}{types}{}", format_key_list(table.keys.iter()))
+    let inner =
+        |(header, inner): (String, &TableInfo)| format!("    {header:<26}{}\n", without_backticks(inner.doc));
+    let tables: String = table.inner_headers().map(inner).collect();
+    format!("{head}{types}{tables}{}", format_key_list(table.keys.iter()))
 }
 
 fn format_type_list(table: &TableInfo) -> String {
@@ -278,6 +287,9 @@ mod tests {
         }
         assert!(explain_path("phong").is_some_and(|text| text.contains("shininess")));
         assert_eq!(explain_path("materials.metal.type"), explain_path("materials.type"));
+        assert!(explain_path("groups").is_some_and(|text| text.contains("[[groups.NAME.sphere]]")));
+        assert_eq!(explain_path("groups.stool"), explain_path("groups"));
+        assert_eq!(explain_path("groups.stool.sphere.radius"), explain_path("sphere.radius"));
         assert_eq!(explain_path("nothing"), None);
         assert_eq!(explain_path("materials.gold.roughness"), None);
     }

@@ -218,6 +218,7 @@ mod tests {
         assert_change("[0.8, 0.02, 0.02]", "\"red\"", "materials.wall.diffuse [0.8, 0.02, 0.02] → \"red\"");
         assert_change("radius = 0.5", "radius = 0.7", "sphere.ball.radius 0.5 → 0.7");
         assert_change("radius = 1", "radius = 3", "sphere.2.radius 1 → 3");
+        assert_change_to_two("[[groups.bar.box]]\nname = \"lid\"\nsize = 1", "groups.bar.box.lid.size 1 → 2");
     }
 
     #[track_caller]

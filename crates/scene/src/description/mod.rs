@@ -11,6 +11,7 @@ mod render;
 mod shape;
 mod transform;
 
+use std::collections::HashSet;
 use std::ops::Range;
 use std::path::PathBuf;
 
@@ -43,12 +44,40 @@ pub struct Scene {
     pub materials: Vec<Material>,
     /// The mesh files and glTF parts that `[[mesh]]` tables reference, without duplicates.
     pub mesh_files: Vec<MeshFile>,
-    /// All shapes, in file order.
+    /// All shapes, in file order. The objects of each [`Instance`] are consecutive.
     pub objects: Vec<Object>,
+    /// The top-level `[[instance]]` tables, in file order.
+    pub instances: Vec<Instance>,
     /// `[[light]]`, in file order.
     pub lights: Vec<Light>,
     /// `[environment]`, which replaces [`RenderOptions::background`].
     pub environment: Option<Environment>,
+}
+
+/// A copy of a group, including the groups nested in it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Instance {
+    /// Indices of the copied objects in [`Scene::objects`].
+    pub objects: Range<usize>,
+    /// Value of the key `name`, if any.
+    pub name: Option<Box<str>>,
+    /// Byte range of the table header in the file.
+    pub span: Range<usize>,
+}
+
+impl Scene {
+    /// Returns the instance that contains an object, or `None` if the object is not in a group.
+    pub fn instance_of(&self, object: usize) -> Option<&Instance> {
+        let index = self.instances.partition_point(|instance| instance.objects.end <= object);
+        self.instances.get(index).filter(|instance| instance.objects.contains(&object))
+    }
+
+    /// Returns a filter that accepts an object only if it is the first copy that is passed to the filter, so
+    /// that a problem in a group is reported once. Accepts all objects that are not in a group.
+    pub fn first_copy_filter(&self) -> impl FnMut(usize) -> bool {
+        let mut known = HashSet::new();
+        move |object| self.instances.is_empty() || known.insert(self.objects[object].span.start)
+    }
 }
 
 /// A value and its span in the scene file.

@@ -4,11 +4,13 @@
 pub(super) mod camera;
 mod context;
 pub(super) mod environment;
+pub(super) mod groups;
 mod key;
 pub(super) mod lights;
 pub(super) mod materials;
 mod mesh;
 mod names;
+mod objects;
 pub(super) mod photons;
 pub(super) mod render;
 mod sets;
@@ -31,6 +33,7 @@ use super::toml::Document;
 use super::{MAX_FILE_BYTES, ParseOutcome, SettingSpan, facing, toml};
 use crate::math::Vec3;
 use context::{FileContext, Issue};
+use objects::ObjectList;
 use table::TableReader;
 
 pub use context::MORE_LIKE_THESE;
@@ -132,7 +135,7 @@ pub(super) fn referenced_files(document: &Document<'_>, path: &Path) -> Vec<Path
     names.into_iter().map(|name| folder.join(name)).collect()
 }
 
-/// Reads the whole scene. Textures and materials are read before the tables that refer to them by name.
+/// Reads the whole scene. Textures, materials and groups are read before the tables that refer to them by name.
 fn read_scene(root: &TableReader<'_>) -> Option<Scene> {
     let (render, output) = render::read_render_table(root);
     let camera = camera::read_camera(root);
@@ -142,11 +145,12 @@ fn read_scene(root: &TableReader<'_>) -> Option<Scene> {
     if let Some(list) = &materials.list {
         textures::report_ambiguous_encodings(root.context, &textures, list);
     }
-    let (objects, mesh_files) = shapes::read_objects(root, &materials);
+    let objects = objects::read_objects(root, &materials);
     let lights = lights::read_lights(root);
     let environment = environment::read_environment(root);
     root.report_unknown_and_missing_keys();
 
+    let ObjectList { objects, instances, mesh_files, groups } = objects?;
     let scene = Scene {
         render: render?,
         output,
@@ -154,7 +158,8 @@ fn read_scene(root: &TableReader<'_>) -> Option<Scene> {
         photons: photons?,
         textures: textures.list?,
         mesh_files,
-        objects: objects?,
+        objects,
+        instances,
         lights: lights?,
         environment: environment?,
         materials: materials.list?,
@@ -162,6 +167,7 @@ fn read_scene(root: &TableReader<'_>) -> Option<Scene> {
     if !root.context.has_errors() {
         textures.names.warn_about_unused(root.context);
         materials.names.warn_about_unused(root.context);
+        groups.names.warn_about_unused(root.context);
         warn_if_empty_or_unlit(root.context, &scene);
         // If there are meshes, wait until their bounds are known.
         if scene.mesh_files.is_empty() {

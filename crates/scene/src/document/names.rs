@@ -8,9 +8,9 @@ use super::super::nearest::nearest_name;
 use super::super::sanitize::escape_and_truncate;
 use super::context::{FileContext, Issue};
 
-/// The names of all textures, or of all materials, in a file.
+/// The names of all textures, materials or groups in a file.
 pub(super) struct DefinedNames {
-    /// `texture` or `material`.
+    /// `texture`, `material` or `group`.
     pub(super) kind: &'static str,
     entries: Vec<NameEntry>,
     indices: HashMap<String, usize>,
@@ -29,6 +29,11 @@ impl DefinedNames {
             names.map(|(name, span)| NameEntry { name, span, used: Cell::new(false) }).collect();
         let indices = entries.iter().enumerate().map(|(index, entry)| (entry.name.clone(), index)).collect();
         Self { kind, entries, indices }
+    }
+
+    /// Returns a name, or an empty string if the index is out of range.
+    pub(super) fn name(&self, index: usize) -> &str {
+        self.entries.get(index).map_or("", |entry| &entry.name)
     }
 
     /// Returns a name's span, or the start of the file if the index is out of range.

@@ -5,14 +5,20 @@ use super::super::keys::key::TableSyntax;
 use super::super::nearest::nearest_name;
 use super::super::sanitize::escape_and_truncate;
 use super::super::source::SceneText;
-use super::super::toml::{Document, KeyError, KeyErrorKind, TopLevelTableKinds, apply_assignment};
+use super::super::toml::{Document, KeyError, KeyErrorKind, TableLayout, apply_assignment};
 use super::context::{FileContext, Issue};
 
-/// The top-level scene keys that are groups of named tables or lists of tables.
-const LAYOUT: TopLevelTableKinds = TopLevelTableKinds {
-    is_group: |name| has_form(name, TableSyntax::Named),
-    is_list: |name| has_form(name, TableSyntax::List),
-};
+/// The scene keys that are groups of named tables or lists of tables.
+const LAYOUT: TableLayout =
+    TableLayout { is_group: |name| has_form(name, TableSyntax::Named), is_list: is_list_of_tables };
+
+fn is_list_of_tables(path: &[&str]) -> bool {
+    match path {
+        [name] => has_form(name, TableSyntax::List),
+        [group, _, name] => find_table(group).is_some_and(|info| info.find_inner(name).is_some()),
+        _ => false,
+    }
+}
 
 fn has_form(name: &str, form: TableSyntax) -> bool {
     find_table(name).is_some_and(|info| info.form == form)

@@ -1,9 +1,10 @@
 //! The tables of shapes, such as `[[sphere]]`, except meshes.
 
-use super::super::description::{MeshFile, Object, Shape};
+use super::super::description::{Object, Shape};
 use super::super::keys::key::DefaultValue::{By, Is, Required};
 use super::super::keys::key::ValueKind::{Flag, Number, Numbers};
 use super::super::keys::key::{ANGLES, DIRECTION, POINT};
+use super::super::toml::TableId;
 use super::NO_AREA;
 use super::context::Issue;
 use super::key::KeyInTable;
@@ -15,7 +16,7 @@ use super::table::TableReader;
 use super::transform::read_affine_matrix;
 use crate::math::DVec3;
 
-/// All shapes. [`read_objects`] sorts the objects into text order.
+/// All shapes.
 pub(crate) static SHAPES: [ShapeTable; 10] =
     [SPHERE, QUAD, PLANE, BOX, TRIANGLE, DISK, CYLINDER, CONE, TORUS, MESH];
 
@@ -219,34 +220,27 @@ fn read_torus(table: &TableReader<'_>) -> Option<Shape> {
     Some(Shape::Torus { center: center?, axis: axis?, radius, tube })
 }
 
-/// Reads all shapes and collects the mesh files they reference. The list of shapes is `None` if any shape is
-/// invalid.
-pub(super) fn read_objects(
-    root: &TableReader<'_>,
+/// Reads the shapes of a scene or a group, and passes them to `add` with the IDs of their tables. Returns
+/// whether all are valid.
+pub(super) fn read_shapes(
+    parent: &TableReader<'_>,
     materials: &MaterialList,
-) -> (Option<Vec<Object>>, Vec<MeshFile>) {
-    let mut files = MeshFileRegistry::default();
-    let (mut objects, mut order) = (Vec::new(), Vec::new());
+    files: &mut MeshFileRegistry,
+    mut add: impl FnMut(TableId, Object),
+) -> bool {
     let mut is_valid = true;
     for shape in &SHAPES {
-        for table in root.tables(&shape.info) {
-            match read_object(shape, &table, materials, &mut files) {
-                Some(object) => {
-                    objects.push(object);
-                    order.push(table.id());
-                }
+        for table in parent.tables(&shape.info) {
+            match read_object(shape, &table, materials, files) {
+                Some(object) => add(table.id(), object),
                 None => is_valid = false,
             }
         }
     }
-    if !order.is_sorted() {
-        let mut sorted: Vec<_> = order.into_iter().zip(objects).collect();
-        sorted.sort_unstable_by_key(|(table, _)| *table);
-        objects = sorted.into_iter().map(|(_, object)| object).collect();
-    }
-    (is_valid.then_some(objects), files.into_list())
+    is_valid
 }
 
+/// Reads an object. Its matrix is not yet applied to its shape; see [`Shape::with_transform`].
 fn read_object(
     kind: &ShapeTable,
     table: &TableReader<'_>,
@@ -273,7 +267,7 @@ fn read_object(
         return None;
     }
     let shape = match matrix {
-        Some(matrix) => shape?.transformed(matrix?),
+        Some(matrix) => Shape::Transformed { shape: Box::new(shape?), matrix: matrix? },
         None => shape?,
     };
     Some(Object { shape, material, name: name?, span: table.span.clone() })

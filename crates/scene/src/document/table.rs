@@ -26,14 +26,24 @@ pub(super) enum TableTitle<'a> {
     Table(&'static TableInfo),
     /// A named table, such as `[materials.wall]`.
     Named(&'static TableInfo, &'a str),
+    /// A table in a list of a named table, such as `[[groups.chair.box]]`.
+    Inner(&'static TableInfo, &'a str, &'static TableInfo),
     /// An inline table, identified by its key.
     Key(&'static str),
 }
 
 impl TableTitle<'_> {
+    /// Returns the title of the tables in a list of this table.
+    fn list(self, info: &'static TableInfo) -> Self {
+        match self {
+            Self::Named(group, name) => Self::Inner(group, name, info),
+            Self::Root | Self::Table(_) | Self::Inner(..) | Self::Key(_) => Self::Table(info),
+        }
+    }
+
     fn definition(self) -> Option<&'static TableInfo> {
         match self {
-            Self::Table(info) | Self::Named(info, _) => Some(info),
+            Self::Table(info) | Self::Named(info, _) | Self::Inner(.., info) => Some(info),
             Self::Root | Self::Key(_) => None,
         }
     }
@@ -41,7 +51,7 @@ impl TableTitle<'_> {
     fn keys(self) -> &'static [KeyInfo] {
         match self {
             Self::Root => &[],
-            Self::Table(info) | Self::Named(info, _) => info.keys,
+            Self::Table(info) | Self::Named(info, _) | Self::Inner(.., info) => info.keys,
             Self::Key(_) => TEXTURE_REFERENCE,
         }
     }
@@ -66,6 +76,9 @@ impl fmt::Display for TableTitle<'_> {
                 TableSyntax::Single | TableSyntax::Named => write!(f, "[{}]", info.name),
             },
             Self::Named(group, name) => write!(f, "[{}.{}]", group.name, escape_and_truncate(name, 40)),
+            Self::Inner(group, name, info) => {
+                write!(f, "[[{}.{}.{}]]", group.name, escape_and_truncate(name, 40), info.name)
+            }
             Self::Key(name) => write!(f, "`{name}`"),
         }
     }
@@ -214,19 +227,19 @@ impl<'a> TableReader<'a> {
 
     /// Reads a list of tables.
     pub(super) fn tables(&self, info: &'static TableInfo) -> impl Iterator<Item = Self> + use<'a> {
-        let (context, name) = (self.context, info.name);
+        let (context, name, title) = (self.context, info.name, self.title.list(info));
         let list = self.entry(name).and_then(|entry| {
             if let Some(array) = entry.value.as_array() {
                 return Some(array);
             }
             let issue = Issue::error(entry.span, format!("`{name}` must be a list of tables"))
                 .with_label(format!("found {}", describe_value(context, entry.value)))
-                .with_help(format!("write [[{name}]] with double brackets"));
+                .with_help(format!("write {title} with double brackets"));
             context.report(issue);
             None
         });
         let values = list.into_iter().flat_map(|list| list.iter());
-        values.filter_map(move |value| Self::from_value(context, value, TableTitle::Table(info)))
+        values.filter_map(move |value| Self::from_value(context, value, title))
     }
 
     /// Reports unknown and missing keys. A misspelled required key is reported only once.
@@ -277,7 +290,10 @@ impl<'a> TableReader<'a> {
                 format!("unknown table `{shown}`")
             }
             TableTitle::Root => format!("unknown key `{shown}` outside of any table"),
-            title @ (TableTitle::Table(_) | TableTitle::Named(..) | TableTitle::Key(_)) => {
+            title @ (TableTitle::Table(_)
+            | TableTitle::Named(..)
+            | TableTitle::Inner(..)
+            | TableTitle::Key(_)) => {
                 format!("unknown key `{shown}` in {title}")
             }
         };

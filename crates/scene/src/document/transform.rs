@@ -5,7 +5,7 @@ use super::context::Issue;
 use super::key::KeyInTable;
 use super::table::TableReader;
 use crate::math::DVec3;
-use crate::math::limits::{SHORTEST, is_nonzero_but_too_short, robust_length};
+use crate::math::limits::{LARGEST, SHORTEST, is_nonzero_but_too_short, robust_length};
 
 /// Reads either `matrix`, or `scale`, `rotate` and `translate`.
 pub(super) fn read_transform(table: &TableReader<'_>) -> Option<ObjectTransform> {
@@ -24,32 +24,49 @@ pub(super) fn read_transform(table: &TableReader<'_>) -> Option<ObjectTransform>
     Some(ObjectTransform::Steps { scale: scale?, rotate: rotate?, translate: translate? })
 }
 
-/// Minimum ratio of a matrix's determinant to the product of its column lengths. A matrix with a smaller
-/// ratio is singular up to rounding.
-const MIN_VOLUME_RATIO: f64 = 1e-12;
-
 /// Reads an invertible affine transform in row-major order.
 pub(super) fn read_affine_matrix(key: &KeyInTable<'_>) -> Option<AffineMap> {
     let numbers: [f64; 16] = key.numbers("16 numbers, row by row")?;
     let [x, y, z, translate] =
         std::array::from_fn(|column| DVec3::from_array(std::array::from_fn(|row| numbers[4 * row + column])));
-    let wrong = |message: &str, label: String| {
-        key.context.report(Issue::error(key.value_span().unwrap_or_default(), message).with_label(label));
-        None
-    };
-    if numbers[12..] != [0.0, 0.0, 0.0, 1.0] {
+    let map = AffineMap { linear: [x, y, z], translate };
+    let (message, label) = if numbers[12..] != [0.0, 0.0, 0.0, 1.0] {
         let [a, b, c, d] = [12, 13, 14, 15].map(|place| numbers[place]);
-        return wrong("the last row of `matrix` must be 0, 0, 0, 1", format!("it is {a}, {b}, {c}, {d}"));
+        ("the last row of `matrix` must be 0, 0, 0, 1".to_owned(), format!("it is {a}, {b}, {c}, {d}"))
+    } else if let Some((problem, label)) = affine_map_problem(&map) {
+        (format!("`matrix` {problem}"), label)
+    } else {
+        return Some(map);
+    };
+    key.context.report(Issue::error(key.value_span().unwrap_or_default(), message).with_label(label));
+    None
+}
+
+/// Returns the reason why the composition of several transforms cannot be used and its details, or `None` if
+/// it can.
+pub(super) fn composed_transform_problem(transform: &ObjectTransform) -> Option<(&'static str, String)> {
+    let map = transform.to_affine_map();
+    let [x, y, z] = map.linear;
+    let largest = [x, y, z, map.translate].map(|column| column.abs().max_element());
+    if largest.iter().any(|number| *number > LARGEST) {
+        return Some(("makes the shape too large", format!("its numbers must be at most {LARGEST:e}")));
     }
+    affine_map_problem(&map)
+}
+
+/// Minimum ratio of a matrix's determinant to the product of its column lengths. A matrix with a smaller
+/// ratio is singular up to rounding.
+const MIN_VOLUME_RATIO: f64 = 1e-12;
+
+fn affine_map_problem(map: &AffineMap) -> Option<(&'static str, String)> {
+    let [x, y, z] = map.linear;
     let (volume, edges) = (x.cross(y).dot(z), x.length() * y.length() * z.length());
     if !(volume.abs() > MIN_VOLUME_RATIO * edges) {
-        return wrong("`matrix` is not invertible", format!("its determinant is {volume:e}"));
+        return Some(("is not invertible", format!("its determinant is {volume:e}")));
     }
-    if [x, y, z].iter().any(|axis| is_nonzero_but_too_short(robust_length(*axis))) {
-        return wrong(
-            "`matrix` makes the shape too small",
-            format!("its columns must be more than {SHORTEST:e} long"),
-        );
-    }
-    Some(AffineMap { linear: [x, y, z], translate })
+    let is_short = |axis: &DVec3| is_nonzero_but_too_short(robust_length(*axis));
+    map.linear
+        .iter()
+        .any(is_short)
+        .then(|| ("makes the shape too small", format!("its columns must be more than {SHORTEST:e} long")))
 }

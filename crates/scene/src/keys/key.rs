@@ -17,6 +17,8 @@ pub struct TableInfo {
     pub keys: &'static [KeyInfo],
     /// The values of the key `type`, starting with the default. Empty if the table has no key `type`.
     pub types: &'static [TableTypeInfo],
+    /// Returns the lists of tables inside each named table, such as `[[groups.NAME.sphere]]`.
+    pub tables: fn() -> &'static [TableInfo],
 }
 
 /// Syntax of a table.
@@ -91,6 +93,8 @@ pub enum ValueKind {
     Heights,
     /// The name of a material.
     Material,
+    /// The name of a group.
+    Group,
 }
 
 impl ValueKind {
@@ -99,6 +103,7 @@ impl ValueKind {
         match self {
             Self::Material => Some("materials"),
             Self::Texture | Self::Heights => Some("textures"),
+            Self::Group => Some("groups"),
             Self::Whole(..)
             | Self::Number(_)
             | Self::Flag
@@ -131,7 +136,8 @@ impl ValueKind {
             | Self::File(_)
             | Self::Texture
             | Self::Heights
-            | Self::Material => None,
+            | Self::Material
+            | Self::Group => None,
         }
     }
 }
@@ -263,7 +269,7 @@ impl TableInfo {
         doc: &'static str,
         keys: &'static [KeyInfo],
     ) -> Self {
-        Self { name, form, doc, keys, types: &[] }
+        Self { name, form, doc, keys, types: &[], tables: || &[] }
     }
 
     /// Returns the type called `name`, or the default type if `name` is `None`. Returns `None` if the type is
@@ -290,6 +296,17 @@ impl TableInfo {
             TableSyntax::Named => format!("[{}.NAME]", self.name),
             TableSyntax::List => format!("[[{}]]", self.name),
         }
+    }
+
+    /// Returns the headers of the tables inside each named table, such as `[[groups.NAME.sphere]]`.
+    pub fn inner_headers(&self) -> impl Iterator<Item = (String, &'static Self)> {
+        let header = |inner: &'static Self| (format!("[[{}.NAME.{}]]", self.name, inner.name), inner);
+        (self.tables)().iter().map(header)
+    }
+
+    /// Returns the table `name` inside each named table.
+    pub fn find_inner(&self, name: &str) -> Option<&'static Self> {
+        (self.tables)().iter().find(|inner| inner.name == name)
     }
 }
 
@@ -339,7 +356,9 @@ impl ValueKind {
             Self::NumberOrTexture(_) | Self::Scale(_) => "0.5".to_owned(),
             Self::Flag => "true".to_owned(),
             Self::Words(list) => format!("\"{}\"", list().first().map_or("", |word| word.name)),
-            Self::Text | Self::Texture | Self::Heights | Self::Material => "\"name\"".to_owned(),
+            Self::Text | Self::Texture | Self::Heights | Self::Material | Self::Group => {
+                "\"name\"".to_owned()
+            }
             Self::File(endings) => format!("\"file.{}\"", endings.first().copied().unwrap_or("txt")),
             Self::Color(_) | Self::ColorOrTexture(_) | Self::Emission(_) => "[0.5, 0.5, 0.5]".to_owned(),
             // The identity matrix.
@@ -370,6 +389,7 @@ impl ValueKind {
             Self::Texture => "name of a texture".to_owned(),
             Self::Heights => "name of a texture, or `{ texture = \"NAME\", channel = \"r\" }`".to_owned(),
             Self::Material => "name of a material".to_owned(),
+            Self::Group => "name of a group".to_owned(),
         }
     }
 

@@ -13,11 +13,11 @@ use std::sync::LazyLock;
 
 use super::document::camera::CAMERA;
 use super::document::environment::ENVIRONMENT;
+use super::document::groups::{GROUPS, object_tables};
 use super::document::lights::LIGHT;
 use super::document::materials::MATERIALS;
 use super::document::photons::PHOTONS;
 use super::document::render::RENDER;
-use super::document::shapes::SHAPES;
 use super::document::textures::TEXTURES;
 pub use colors::{color_names, parse_hex_or_named_srgb8};
 pub use key::{
@@ -29,8 +29,8 @@ pub use key::{
 pub fn all_tables() -> &'static [TableInfo] {
     static TABLES: LazyLock<Vec<TableInfo>> = LazyLock::new(|| {
         let before = [&RENDER, &CAMERA, &PHOTONS, &TEXTURES, &MATERIALS];
-        let shapes = SHAPES.iter().map(|shape| &shape.info);
-        before.into_iter().chain(shapes).chain([&LIGHT, &ENVIRONMENT]).cloned().collect()
+        let after = [&GROUPS, &LIGHT, &ENVIRONMENT];
+        before.into_iter().chain(object_tables()).chain(after).cloned().collect()
     });
     &TABLES
 }
@@ -100,7 +100,7 @@ mod tests {
         let mut text = String::new();
         for (table, body) in [
             ("camera", "[camera]\nposition = [0, 1, 4]\nlook_at = [0, 1, 0]\n"),
-            ("", "[textures.name]\nfile = \"a.png\"\n[materials.name]\n"),
+            ("", "[textures.name]\nfile = \"a.png\"\n[materials.name]\n[groups.name]\n"),
         ] {
             if table != info.name {
                 text.push_str(body);

@@ -41,13 +41,13 @@ pub(crate) enum KeyErrorKind {
     Element,
 }
 
-/// The groups and lists of tables at the top level of a document.
+/// The groups and lists of tables in a document.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct TopLevelTableKinds {
+pub(crate) struct TableLayout {
     /// Whether a top-level name denotes a group of named tables. Named tables are never created.
     pub(crate) is_group: fn(&str) -> bool,
-    /// Whether a top-level name denotes a list of tables.
-    pub(crate) is_list: fn(&str) -> bool,
+    /// Whether the parts of a key denote a list of tables.
+    pub(crate) is_list: fn(&[&str]) -> bool,
 }
 
 impl<'s> Document<'s> {
@@ -56,7 +56,7 @@ impl<'s> Document<'s> {
         &mut self,
         keys: &[Name<'s>],
         value: ValueNode,
-        layout: TopLevelTableKinds,
+        layout: TableLayout,
     ) -> Result<(), KeyError> {
         let mut table = Self::ROOT;
         let mut depth = 0;
@@ -89,10 +89,13 @@ impl<'s> Document<'s> {
         keys: &[Name<'s>],
         depth: usize,
         table: TableId,
-        layout: TopLevelTableKinds,
+        layout: TableLayout,
     ) -> Result<KeyPartTarget, KeyError> {
         let (name, next) = (&keys[depth], &keys[depth + 1]);
-        let is_list = depth == 0 && (layout.is_list)(&name.text);
+        let is_list = || {
+            let path: Vec<&str> = keys[..=depth].iter().map(|name| name.text.as_ref()).collect();
+            (layout.is_list)(&path)
+        };
         self.check_group_member_exists(keys, depth, table, layout)?;
         let found = self.find_in_table(table, &name.text).map(|node| node.kind);
         if let Some(inner) = found.and_then(NodeKind::table) {
@@ -107,7 +110,7 @@ impl<'s> Document<'s> {
                     .map(|index| KeyPartTarget::Element(list, index))
                     .map_err(|why| key_error(keys, depth + 1, why))
             }
-            None if is_list => {
+            None if is_list() => {
                 Err(key_error(keys, depth + 1, KeyErrorKind::NoEntry { count: 0, names: Vec::new() }))
             }
             Some(_) if !elements.is_empty() && next.text.parse::<u64>().is_ok() => {
@@ -123,7 +126,7 @@ impl<'s> Document<'s> {
         keys: &[Name<'s>],
         depth: usize,
         table: TableId,
-        layout: TopLevelTableKinds,
+        layout: TableLayout,
     ) -> Result<(), KeyError> {
         let is_in_group = depth == 1 && (layout.is_group)(&keys[0].text);
         if is_in_group && self.find_in_table(table, &keys[1].text).is_none() {

@@ -63,17 +63,18 @@ fn header_items(document: &OpenDocument, offset: usize) -> Vec<CompletionItem> {
     let [start, end] = [offset - line.len(), offset + closed].map(|at| document.position(at));
     let is_there = |table: &str| document.tables.iter().any(|one| one.info.name == table);
     let open = all_tables().iter().filter(|table| table.form != TableSyntax::Single || !is_there(table.name));
-    open.map(|table| {
-        let head = table.header();
-        let edit = TextEdit { range: Range { start, end }, new_text: head.clone() };
-        CompletionItem {
-            text_edit: Some(CompletionTextEdit::Edit(edit)),
-            filter_text: Some(head.clone()),
-            insert_text: None,
-            ..completion_item(&head, CompletionItemKind::MODULE, table.doc, String::new())
-        }
-    })
-    .collect()
+    let headers = open.flat_map(|table| [(table.header(), table)].into_iter().chain(table.inner_headers()));
+    headers
+        .map(|(head, table)| {
+            let edit = TextEdit { range: Range { start, end }, new_text: head.clone() };
+            CompletionItem {
+                text_edit: Some(CompletionTextEdit::Edit(edit)),
+                filter_text: Some(head.clone()),
+                insert_text: None,
+                ..completion_item(&head, CompletionItemKind::MODULE, table.doc, String::new())
+            }
+        })
+        .collect()
 }
 
 /// Returns candidates for a table's missing keys. They include example values unless `=` follows the cursor.
@@ -131,7 +132,7 @@ fn value_items(document: &OpenDocument, kind: ValueKind, is_quoted: bool) -> Vec
         ValueKind::Flag => ["true", "false"]
             .map(|flag| completion_item(flag, CompletionItemKind::VALUE, "", flag.to_owned()))
             .to_vec(),
-        ValueKind::Material | ValueKind::Texture | ValueKind::Heights => kind
+        ValueKind::Material | ValueKind::Texture | ValueKind::Heights | ValueKind::Group => kind
             .defining_table()
             .map_or_else(Vec::new, |table| defined_name_items(document, table, is_quoted)),
         ValueKind::Color(_) => colors(),

@@ -1,8 +1,9 @@
 //! Determines what can be completed at the cursor. Works line by line, because incomplete text may have
 //! syntax errors.
 
+use crate::scene::key_parts;
 use crate::scene::keys::find_table;
-use crate::scene::keys::key::{KeyInfo, TableInfo, TableTypeInfo};
+use crate::scene::keys::key::{KeyInfo, TableInfo, TableSyntax, TableTypeInfo};
 
 /// The kind of text to complete at the cursor.
 #[derive(Debug)]
@@ -53,9 +54,11 @@ pub(super) fn cursor_context(text: &str, offset: usize) -> Option<CursorContext>
         return (!trimmed.contains('=')).then_some(CursorContext::Header);
     };
     let after = text[offset..].split('\n').next().unwrap_or_default();
-    let mut parts = header.split('.');
-    let info = find_table(parts.next().unwrap_or_default().trim())?;
-    if parts.next().is_none() && info.form == crate::scene::keys::key::TableSyntax::Named {
+    let parts: Vec<&str> = key_parts(header).into_iter().map(str::trim).collect();
+    let mut info = find_table(parts[0])?;
+    if let Some(inner) = parts.get(2) {
+        info = info.find_inner(inner)?;
+    } else if parts.len() == 1 && info.form == TableSyntax::Named {
         // `[materials]` followed by `wall = { … }`.
         let (_, braces) = line.split_once('{')?;
         let items = format!("{braces}{after}").replace(',', "\n");
@@ -258,6 +261,13 @@ mod tests {
         };
         assert_eq!((of.kind.map(|kind| kind.name), key.as_str(), is_quoted), (Some("spot"), "falloff", true));
         assert!(at("[nonsense]\na|").is_none());
+        let table = |text: &str| match at(text) {
+            Some(CursorContext::Key { of, .. }) => Some(of.info.name),
+            _ => None,
+        };
+        assert_eq!(table("[[groups.\"a.b\".box]]\nce|"), Some("box"));
+        assert_eq!(table("[materials.\"a.b\"]\nro|"), Some("materials"));
+        assert_eq!(table("[[groups.a.light]]\nin|"), None);
     }
 
     #[test]

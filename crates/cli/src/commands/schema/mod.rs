@@ -72,6 +72,9 @@ fn table_schema(info: &'static TableInfo, draft: SchemaDraft) -> Value {
     for (name, condition) in table_key_conditions(info.name, draft) {
         table[name] = condition;
     }
+    for inner in (info.tables)() {
+        table["properties"][inner.name] = json!({ "$ref": format!("#/properties/{}", inner.name) });
+    }
     table
 }
 
@@ -225,7 +228,9 @@ fn table_key_conditions(table: &str, draft: SchemaDraft) -> Vec<(&'static str, V
             ("anyOf", json!([{ "required": ["orbiter"] }, { "required": ["position", "look_at"] }])),
             (dependent, json!({ "orbiter": none_of(&["position", "look_at", "up"]) })),
         ],
-        ("mesh", _) => vec![(dependent, json!({ "matrix": none_of(&["scale", "rotate", "translate"]) }))],
+        ("mesh" | "instance", _) => {
+            vec![(dependent, json!({ "matrix": none_of(&["scale", "rotate", "translate"]) }))]
+        }
         ("materials", SchemaDraft::Four) => {
             let is_other =
                 json!({ "not": { "properties": { "type": { "enum": ["metal"] } }, "required": ["type"] } });

@@ -44,7 +44,9 @@ pub(super) fn value_schema(kind: ValueKind, draft: SchemaDraft) -> Value {
         ValueKind::Scale(limits) => {
             json!({ "anyOf": [number_schema(limits, draft), number_array_schema(3, limits, draft)] })
         }
-        ValueKind::Texture | ValueKind::Material => json!({ "type": "string", "minLength": 1 }),
+        ValueKind::Texture | ValueKind::Material | ValueKind::Group => {
+            json!({ "type": "string", "minLength": 1 })
+        }
         ValueKind::Heights => {
             any_of(vec![json!({ "type": "string", "minLength": 1 })], texture_with_channel_schema())
         }
