@@ -18,7 +18,8 @@ pub type MeshBoundingBox = Option<[DVec3; 2]>;
 /// ceiling just above it.
 const MIN_FRONT_RATIO: f64 = 0.02;
 
-/// Returns the spans of one-sided quad lights that have shapes behind them and nothing in front of them.
+/// Returns the spans of one-sided quad lights that have shapes behind them and nothing in front of them. Checks
+/// only the first copy of a light in a group, because each check visits all objects.
 /// Calls `bounds` only if the scene has one-sided quad lights.
 pub(super) fn lights_facing_away(
     scene: &Scene,
@@ -33,11 +34,13 @@ pub(super) fn lights_facing_away(
         let front = u.cross(v).try_normalize()?;
         emits(object).then_some((corner, front))
     };
+    let mut is_first_copy = scene.first_copy_filter();
     let lights: Vec<_> = scene
         .objects
         .iter()
         .enumerate()
         .filter_map(|(number, object)| Some((number, quad(object)?)))
+        .filter(|(number, _)| is_first_copy(*number))
         .collect();
     if lights.is_empty() {
         return Vec::new();

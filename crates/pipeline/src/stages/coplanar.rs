@@ -42,7 +42,9 @@ pub(crate) fn warn_about_coplanar_lights(
     };
     let (lifted, doubled): (Vec<_>, Vec<_>) = found.iter().partition(|pair| pair.lift.is_some());
     let mut warn = |pairs: &[&CoplanarLight], describe: &dyn Fn(usize, usize, &str) -> String, help: &str| {
-        for of_light in pairs.chunk_by(|a, b| a.light == b.light).take(MAX_WARNINGS) {
+        let mut is_first_copy = scene.first_copy_filter();
+        let by_light = pairs.chunk_by(|a, b| a.light == b.light);
+        for of_light in by_light.filter(|pairs| is_first_copy(pairs[0].light)).take(MAX_WARNINGS) {
             let [CoplanarLight { light, surface, .. }, others @ ..] = of_light else { continue };
             let more = if others.is_empty() { String::new() } else { format!(" and {} more", others.len()) };
             let message = describe(*light, *surface, &more);

@@ -40,9 +40,9 @@ pub(crate) fn find_glass_solids(
     };
     memo.set(key, Arc::clone(&bodies));
     findings.warnings.extend(open_glass_warnings(loaded, bodies.open_objects()));
-    findings.warnings.extend(
-        bodies.zero_volume_objects().iter().map(|&object| duplicate_faces_glass_warning(loaded, object)),
-    );
+    let mut is_first_copy = scene.first_copy_filter();
+    let flat = bodies.zero_volume_objects().iter().filter(|&&object| is_first_copy(object as usize));
+    findings.warnings.extend(flat.map(|&object| duplicate_faces_glass_warning(loaded, object)));
     Ok(bodies)
 }
 
@@ -64,7 +64,8 @@ const MAX_NAMES: usize = 5;
 /// by opaque surfaces.
 fn open_glass_warnings(loaded: &LoadedScene, open: &[OpenGlass]) -> Vec<Diagnostic> {
     let mut groups: Vec<(GlassFlaw, Vec<&OpenGlass>)> = Vec::new();
-    for open in open.iter().filter(|open| !open.is_covered) {
+    let mut is_first_copy = loaded.scene.first_copy_filter();
+    for open in open.iter().filter(|open| !open.is_covered && is_first_copy(open.object as usize)) {
         let Some(flaw) = flaw(loaded, open) else { continue };
         match groups.iter_mut().find(|(other, _)| *other == flaw) {
             Some((_, members)) => members.push(open),

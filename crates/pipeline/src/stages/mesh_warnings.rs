@@ -103,8 +103,9 @@ pub(super) fn warn_about_missing_mesh_data<'a>(
     mesh_of_file: impl Fn(usize) -> &'a LoadedMesh,
     findings: &mut Findings,
 ) {
-    for object in &loaded.scene.objects {
-        let Some(mesh) = object.shape.as_mesh() else { continue };
+    let mut is_first_copy = loaded.scene.first_copy_filter();
+    for (number, object) in loaded.scene.objects.iter().enumerate() {
+        let Some(mesh) = object.shape.as_mesh().filter(|_| is_first_copy(number)) else { continue };
         let (file, read) =
             (loaded.scene.mesh_files[mesh.file].value.display(), &mesh_of_file(mesh.file).mesh);
         if read.positions.is_empty() {

@@ -110,9 +110,12 @@ pub(crate) fn load_meshes(
         meshes.push(mesh);
     }
     add_limited_mesh_warnings(loaded, warnings.messages(), findings);
-    for object in loaded.scene.objects.iter().filter(|object| object.material.is_none()) {
-        if let Some(mesh) = object.shape.as_mesh()
+    let mut is_first_copy = loaded.scene.first_copy_filter();
+    for (number, object) in loaded.scene.objects.iter().enumerate() {
+        if object.material.is_none()
+            && let Some(mesh) = object.shape.as_mesh()
             && meshes[mesh.file].mesh.lacks_materials()
+            && is_first_copy(number)
         {
             let name = files[mesh.file].value.display();
             let message = format!("[[mesh]] needs `material`: {name} has no materials of its own");
