@@ -86,6 +86,8 @@ pub struct PickedObject {
     pub path: PathBuf,
     /// 1-based line number where the shape starts. `None` if the scene is not text.
     pub line: Option<usize>,
+    /// The instance that contains the shape, if the shape is in a group.
+    pub instance: Option<PickedInstance>,
     /// Type and name of the material.
     pub material: String,
     /// Hit point.
@@ -98,6 +100,15 @@ pub struct PickedObject {
     pub distance: f64,
     /// Distance from the camera along the view axis.
     pub depth: f64,
+}
+
+/// The instance that contains a picked shape.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PickedInstance {
+    /// Name of the instance, if it has one.
+    pub name: Option<String>,
+    /// 1-based line number where the instance starts. `None` if the scene is not text.
+    pub line: Option<usize>,
 }
 
 /// A camera that the user moved with the keyboard.

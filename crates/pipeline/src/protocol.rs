@@ -14,7 +14,8 @@ use std::time::Instant;
 
 pub use self::stage::{Stage, StageReport, Status};
 pub use super::answers::{
-    CameraSaveResult, ImagePosition, MovedCamera, NormalizedRect, PickedObject, PickedPixel, SavedCameraEdit,
+    CameraSaveResult, ImagePosition, MovedCamera, NormalizedRect, PickedInstance, PickedObject, PickedPixel,
+    SavedCameraEdit,
 };
 pub use super::report::{
     ImageReport, LightSamplingReport, PhotonsReport, Report, SampleCounts, SampledLightSet, WorkCounters,

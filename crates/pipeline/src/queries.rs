@@ -7,8 +7,8 @@ use std::sync::Arc;
 use super::inputs::ProtectedInputs;
 use super::prepare::{ReadyScene, RequestCamera};
 use super::protocol::{
-    CameraSaveResult, Event, ImagePosition, MovedCamera, PickedObject, PickedPixel, ResolvedCamera,
-    SavedCameraEdit,
+    CameraSaveResult, Event, ImagePosition, MovedCamera, PickedInstance, PickedObject, PickedPixel,
+    ResolvedCamera, SavedCameraEdit,
 };
 use super::render::film_state::FilmState;
 use super::sink::EventSink;
@@ -120,12 +120,17 @@ impl QueryContext {
                 None => "no material in the file".to_owned(),
             },
         };
+        let instance = loaded.scene.instance_of(hit.object as usize).map(|instance| PickedInstance {
+            name: instance.name.as_deref().map(str::to_owned),
+            line: loaded.line_number(&instance.span),
+        });
         let is_front = surface.shading_normal.dot(ray.direction) <= 0.0;
         Some(PickedObject {
             shape: object.shape.kind(),
             name: object.name.as_deref().map(str::to_owned),
             path: loaded.path.clone(),
             line: loaded.line_number(&object.span),
+            instance,
             material,
             position: (surface.point.as_dvec3() + world.geometry.coordinate_origin()).to_array(),
             normal: surface.shading_normal.to_array(),

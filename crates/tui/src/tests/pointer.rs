@@ -46,6 +46,7 @@ fn thing() -> PickedObject {
         name: Some("ball".to_owned()),
         path: "scenes/cornell.toml".into(),
         line: Some(47),
+        instance: None,
         material: "glass crystal".to_owned(),
         position: [0.2, 0.5, -0.3],
         normal: [0.0, 1.0, 0.0],

@@ -9,7 +9,7 @@ use crate::event::{Effect, MouseEvent, MouseEventKind};
 use crate::keymap::OverlayAction;
 use crate::math::decimal::{decimal_step_at_distance, round_to_step};
 use crate::messages;
-use crate::pipeline::protocol::{Command, PickedObject, PickedPixel};
+use crate::pipeline::protocol::{Command, PickedInstance, PickedObject, PickedPixel};
 use crate::scene::sanitize::escape_invisible_chars;
 use crate::state::{MousePress, PickPurpose, State};
 use crate::view;
@@ -209,15 +209,21 @@ fn inspected_values(PickedPixel { thing, color, pixel: [x, y] }: &PickedPixel) -
     let Some(thing) = thing else {
         return [format!("nothing at pixel {x}, {y}")].into_iter().chain(light).collect();
     };
-    let PickedObject { shape, name, path, line, material, position, normal, is_front, distance, .. } = thing;
-    let name = name.as_ref().map_or(String::new(), |name| format!(" \"{}\"", escape_invisible_chars(name)));
+    let PickedObject { shape, name, path, line, instance, material, position, normal, is_front, .. } = thing;
+    let quoted = |name: &Option<String>| {
+        name.as_ref().map_or(String::new(), |name| format!(" \"{}\"", escape_invisible_chars(name)))
+    };
     let file = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
     let back = if *is_front { "" } else { " (back)" };
-    let mut facts = vec![format!("{shape}{name}")];
+    let mut facts = vec![format!("{shape}{}", quoted(name))];
     facts.extend(line.map(|line| format!("{}:{line}", escape_invisible_chars(&file))));
+    facts.extend(instance.as_ref().map(|PickedInstance { name, line }| {
+        let line = line.map_or(String::new(), |line| format!(" on line {line}"));
+        format!("instance{}{line}", quoted(name))
+    }));
     facts.extend([
         escape_invisible_chars(material).into_owned(),
-        format!("distance {}", format_three_significant_digits(*distance)),
+        format!("distance {}", format_three_significant_digits(thing.distance)),
         format!("position {}", format_vector(*position)),
     ]);
     facts.extend(light);
@@ -246,6 +252,7 @@ mod tests {
             name: Some("ball".to_owned()),
             path: "scenes/still.toml".into(),
             line: Some(47),
+            instance: None,
             material: "glass crystal".to_owned(),
             position: [0.214, 0.4996, -33.06],
             normal: [0.0, 1.0, -0.0],
@@ -266,6 +273,10 @@ mod tests {
                 "normal (0, 1, 0)"
             ]
         );
+        let instance = Some(PickedInstance { name: Some("left".to_owned()), line: Some(52) });
+        let in_group = picked.thing.clone().map(|thing| PickedObject { instance, ..thing });
+        let in_group = inspected_values(&PickedPixel { thing: in_group, ..picked });
+        assert_eq!(in_group[1..3], ["still.toml:47", "instance \"left\" on line 52"]);
         let of_model = picked.thing.clone().map(|thing| PickedObject { line: None, ..thing });
         let of_model = inspected_values(&PickedPixel { thing: of_model, ..picked });
         assert_eq!(of_model[..2], ["sphere \"ball\"", "glass crystal"], "models should have no line numbers");
