@@ -18,6 +18,7 @@ mod gltf;
 mod hostile;
 mod info;
 mod inputs;
+mod instances;
 mod json;
 mod kernel;
 mod layers;

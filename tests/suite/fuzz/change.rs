@@ -94,6 +94,9 @@ const WORDS: &[&str] = &[
     "OFF",
     "STCN4OFF",
     "BINARY",
+    "[[instance]]",
+    "group = \"things\"",
+    "group = \"pair\"",
 ];
 
 /// Numbers at the limits of their types.

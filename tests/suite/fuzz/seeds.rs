@@ -42,12 +42,9 @@ pub(super) fn scenes() -> Vec<Seed> {
         Err(other) => other.into_bytes(),
     };
     let seed = |bytes| Seed { file: "case.toml".to_owned(), bytes };
-    files
-        .iter()
-        .map(bytes)
-        .map(seed)
-        .chain([seed(glimt::scene::starter_scene().as_bytes().to_vec())])
-        .collect()
+    let starter = glimt::scene::starter_scene().as_bytes().to_vec();
+    let groups = crate::instances::nested_scene("../assets/knot.obj", "small.png").into_bytes();
+    files.iter().map(bytes).chain([starter, groups.clone(), groups]).map(seed).collect()
 }
 
 /// Meshes, images, materials and cameras.

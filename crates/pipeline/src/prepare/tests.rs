@@ -132,6 +132,32 @@ fn edits_keep_unaffected_values() {
 }
 
 #[test]
+fn edits_of_groups_keep_unaffected_values() {
+    let text = SCENE.replace("[[mesh]]", "[[groups.flags.mesh]]");
+    let instance = |x: u32| format!("[[instance]]\ngroup = \"flags\"\ntranslate = [{x}, 0, 1]\n");
+    let mut fixture = SceneFixture::new(&format!("{text}{}{}", instance(1), instance(2)));
+    let meshes: Vec<Arc<MeshTree>> = fixture
+        .request()
+        .geometry
+        .objects()
+        .iter()
+        .filter_map(|one| Some(Arc::clone(&one.mesh()?.tree)))
+        .collect();
+    assert!(meshes.len() == 2 && Arc::ptr_eq(&meshes[0], &meshes[1]), "copies share a tree");
+    let mut kept = |from: &str, to: &str| fixture.kept(from, to);
+    assert_eq!(kept("[2, 0, 1]", "[3, 0, 1]"), [false, true, true, false], "an instance moved");
+    assert_eq!(kept("translate = [0, 0, 0]", "scale = 2"), [false, true, true, false], "a group's mesh");
+    assert_eq!(kept("[0.5, 0.5, 0.5]", "[0.6, 0.5, 0.5]"), [true, true, true, false], "a color");
+    assert_eq!(kept("group = ", "name = \"flag\"\ngroup = "), [true, true, true, true], "names");
+    let third = instance(4);
+    assert_eq!(
+        kept("[[light]]", &format!("{third}[[light]]")),
+        [false, true, true, false],
+        "another instance"
+    );
+}
+
+#[test]
 fn switching_back_reuses_cached_trees() {
     let mut fixture = SceneFixture::new(SCENE);
     fs::write(fixture.folder.path().join("two.obj"), format!("{OBJ}f 1 3 2\n")).expect("written");
