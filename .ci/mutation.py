@@ -30,6 +30,7 @@ pub fn injected(fault: u32) -> bool {
 GLOBAL = "closed_forms::global::"
 MANY = "closed_forms::many_lights::"
 PHOTONS = "closed_forms::photons::"
+PROJECTIONS = "closed_forms::projections::"
 CAUSTICS = "closed_forms::caustics::"
 MICROFACETS = "closed_forms::microfacets::"
 METAL = "materials::bxdfs::conductor::tests::"
@@ -44,6 +45,32 @@ PICKS = "integrators::direct::light_tree::tests::"
 
 # Fault, file, the code around the expression in ⟦⟧, its replacement, and the test that must fail.
 FAULTS = [
+    ("panoramas of half the sky", "world/camera.rs", "sin_cos_f64(⟦FRAC_PI_2⟧ * place.y);", "0.5 * FRAC_PI_2",
+     PROJECTIONS + "panorama_directions_are_those_of_the_environment"),
+    ("fisheyes with a linear sine", "world/camera.rs", "sin_cos_f64(⟦radius.min(1.0) * half_fov⟧);", "(radius.min(1.0) * half_fov.min(1.0)).asin()",
+     PROJECTIONS + "fisheye_angles_are_linear_in_the_radius"),
+    ("fisheyes that fill the corners", "world/camera.rs", "valid |= u32::from(⟦radius <= 1.0⟧) << lane;", "true",
+     PROJECTIONS + "fisheye_is_black_outside_its_circle"),
+    ("parallel rays from the center", "world/camera.rs", "self.position + (⟦center + self.right * place.x + self.up * place.y⟧)", "center",
+     PROJECTIONS + "ball_silhouettes_have_their_closed_form_areas"),
+    ("shifts by half", "world/camera.rs", "let shift = ⟦2.0⟧ * window.shift;", "1.0",
+     PROJECTIONS + "shifted_rays_are_those_of_a_larger_image"),
+    ("parallel rays whose footprint spreads", "world/camera.rs", "PixelFootprint { width: ⟦per_row(2.0 * half_height)⟧, spread: 0.0 }", "0.0",
+     PROJECTIONS + "orthographic_textures_are_equally_sharp_at_any_distance"),
+    ("panorama depth along the view axis", "world/camera.rs", "Projection::Fisheye { .. } => ⟦arm.length()⟧,", "arm.dot(self.forward)",
+     PROJECTIONS + "panorama_depth_is_the_distance_from_the_camera"),
+    ("mirrored columns that are off by one", "integrators/transport/tile.rs", "*x = ⟦(width - 1).wrapping_sub(*x)⟧;", "width.wrapping_sub(*x)",
+     PROJECTIONS + "mirrored_images_are_flipped_exactly"),
+    ("clicks that ignore mirroring", "integrators/settings.rs", "let x = if ⟦camera.is_mirrored()⟧ {", "false",
+     PROJECTIONS + "clicks_hit_the_object_shown_at_the_pixel"),
+    ("parallel rays that always start in air", "world/camera_interior.rs", "solids.retain(|body| ⟦body.is_covered || self.camera.may_start_rays_in(&body.bounds)⟧);", "false",
+     PROJECTIONS + "parallel_rays_can_start_in_glass"),
+    ("gain on data", "integrators/mod.rs", "LightAov::LitFraction | LightAov::TraversalCost => ⟦1.0⟧,", "settings.render.gain",
+     PROJECTIONS + "gain_scales_light_but_not_data"),
+    ("environments rotated backwards", "lights/infinite/environment.rs", "Self::Rotation(rotation) => (⟦rotation.transpose()⟧ * direction, 0.0),", "rotation",
+     "lights::infinite::environment::tests::rotated_maps_move_with_their_axes"),
+    ("environment samples that are not rotated", "lights/infinite/environment.rs", "Self::Rotation(rotation) => ⟦rotation * direction⟧,", "direction",
+     "lights::infinite::environment::tests::sample_frequencies_match_the_pdf"),
     ("light samples that are not averaged", "integrators/direct/all_lights.rs",
      "self.unoccluded_contributions(&samples, ⟦1.0 / count as f32⟧, simd);", "1.0",
      DIRECT + "estimators::light_samples_match_the_quadrature"),

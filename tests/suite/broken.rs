@@ -79,7 +79,7 @@ const BROKEN: &[(&str, &[ExpectedDiagnostic])] = &[
         "crlf_tabs",
         &[
             (4, 19, r#"`look_at` must be three numbers, [x, y, z]; found the string "ä""#),
-            (5, 8, "`fov` must be greater than 0 and less than 180; found 0"),
+            (5, 8, "`fov` must be greater than 0 and at most 360; found 0"),
         ],
     ),
     ("dark", &[(1, 1, "warning: nothing lights this scene")]),
@@ -273,6 +273,14 @@ const BROKEN: &[(&str, &[ExpectedDiagnostic])] = &[
             (29, 5, "the quad has no area; `u` and `v` are parallel, or one of them is 0"),
         ],
     ),
+    (
+        "fisheye",
+        &[
+            (6, 7, "`fov` must be greater than 0 and at most 360; found 361"),
+            (7, 1, r#"`aperture` conflicts with `projection = "fisheye"`"#),
+            (11, 10, "`matrix` must be a rotation; the last row and the last column must be 0, 0, 0, 1"),
+        ],
+    ),
     ("no_camera", &[(1, 1, "the scene has no [camera]")]),
     ("no_shapes", &[(1, 1, "warning: the scene has no shapes")]),
     (
@@ -343,6 +351,32 @@ const BROKEN: &[(&str, &[ExpectedDiagnostic])] = &[
         ],
     ),
     (
+        "panorama",
+        &[
+            (6, 1, r#"`fov` conflicts with `projection = "panorama"`"#),
+            (7, 1, r#"`view_height` conflicts with `projection = "panorama"`"#),
+            (8, 1, r#"`aperture` conflicts with `projection = "panorama"`"#),
+            (9, 1, r#"`focus` conflicts with `projection = "panorama"`"#),
+            (13, 10, "`matrix` must be a rotation; it mirrors: its determinant is -1"),
+        ],
+    ),
+    (
+        "projections",
+        &[
+            (2, 1, "[camera] needs `view_height`; `view_height` is missing"),
+            (6, 1, r#"`fov` conflicts with `projection = "orthographic"`"#),
+            (7, 9, "`shift` must be two numbers, [right, up]; found a list of 3"),
+            (8, 10, r#"`mirror` must be true or false; found the string "yes""#),
+            (11, 8, "`gain` must be at least 0; found -1"),
+            (15, 1, "`rotate` conflicts with `matrix`"),
+            (
+                16,
+                10,
+                "`matrix` must be a rotation; the rows must have length 1 and be perpendicular to each other",
+            ),
+        ],
+    ),
+    (
         "ranges",
         &[
             (3, 9, "`width` must be a whole number between 1 and 65536; found 0"),
@@ -353,7 +387,7 @@ const BROKEN: &[(&str, &[ExpectedDiagnostic])] = &[
             (8, 18, "`shadow_samples` must be a whole number between 1 and 4096; found 5000"),
             (9, 8, "`seed` must be a whole number between 0 and 4294967295; found 4294967296"),
             (10, 9, "`error` must be at least 0; found -0.5"),
-            (15, 7, "`fov` must be greater than 0 and less than 180; found 180"),
+            (15, 7, "`fov` of a perspective must be less than 180; found 180"),
             (16, 12, "`aperture` must be at least 0; found -0.1"),
             (17, 9, "`focus` must be greater than 0; found 0"),
         ],

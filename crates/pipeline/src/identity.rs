@@ -57,6 +57,7 @@ impl ImageDependencies<'_> {
         add("ambient", render.ambient.to_string());
         add("background", render.background.to_string());
         add("filter", render.filter.name().to_owned());
+        add("gain", render.gain.to_string());
         add("seed", render.seed.to_string());
         add("depth of field", if dof { "on" } else { "off" }.to_owned());
         // All parts must have the same view. Checkpoints only need the same samples.

@@ -50,7 +50,7 @@ impl KeyOverrides {
     pub fn as_command_line_options(&self, orbiter: Option<ResolvedCamera>) -> Vec<String> {
         let on_off = |is_on: bool| if is_on { "on" } else { "off" };
         let vector = |key: &str, DVec3 { x, y, z }: DVec3| format!("--set 'camera.{key}=[{x},{y},{z}]'");
-        let CameraOverrides { pose, fov, focus } = self.camera;
+        let CameraOverrides { pose, fov, view_height, focus } = self.camera;
         let mut options: Vec<String> = [
             self.integrator.map(|it| format!("--integrator {}", it.name())),
             self.shadows.map(|it| format!("--shadows {}", it.name())),
@@ -69,9 +69,10 @@ impl KeyOverrides {
             );
         }
         let orbiter = orbiter.filter(|_| pose.is_some());
-        let fov = fov.or(orbiter.map(|camera| camera.fov));
+        let fov = fov.or(orbiter.and_then(|camera| camera.projection.fov()));
         let focus = focus.or(orbiter.filter(|camera| camera.aperture > 0.0).map(|camera| camera.focus));
         options.extend(fov.map(|it| format!("--set camera.fov={it}")));
+        options.extend(view_height.map(|it| format!("--set camera.view_height={it}")));
         options.extend(focus.map(|it| format!("--set camera.focus={it}")));
         options
     }

@@ -16,7 +16,6 @@ use super::stages::parse::ParsedScene;
 use crate::control::CancelToken;
 use crate::film::FilmQuantity;
 use crate::integrators::RenderSettings;
-use crate::math::DVec2;
 use crate::messages::{
     ALREADY_EXISTS, CAMERA_CHANGED, MODEL_MISSING, NOT_UNDONE, SCENE_FILE_CHANGED, SCENE_FILE_MISSING,
 };
@@ -102,14 +101,13 @@ impl QueryContext {
         let pixel = |at: f64, side: u32| ((at * f64::from(side)).max(0.0) as u32).min(side - 1);
         let (x, y) = (pixel(spot.x, width), pixel(spot.y, height));
         let color = state.and_then(|state| state.film.pixel(FilmQuantity::Radiance, x, y));
-        let middle = DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5);
-        let thing = self.object_at(self.settings.pixel_to_image_plane(middle));
+        let thing = self.object_at([x, y]);
         PickedPixel { pixel: [x, y], thing, color: color.map(|color| color.to_array()) }
     }
 
-    fn object_at(&self, place: DVec2) -> Option<PickedObject> {
+    fn object_at(&self, pixel: [u32; 2]) -> Option<PickedObject> {
         let (world, loaded) = (&self.world, &self.parsed.loaded);
-        let ray = world.camera.pinhole_ray(place);
+        let ray = self.settings.ray_through_pixel(&world.camera, pixel)?;
         let hit = world.geometry.closest_hit(&ray)?;
         let surface = world.geometry.surface(&ray, &hit);
         let object = loaded.scene.objects.get(hit.object as usize)?;
@@ -253,14 +251,20 @@ fn save_model_scene_with_camera(
 mod tests {
     use super::*;
     use crate::math::DVec3;
-    use crate::scene::description::Pose;
+    use crate::scene::description::{ImageWindow, Pose, Projection};
     use crate::tests::loaded_of;
 
     #[test]
     fn unwritable_model_scene_is_reported() {
         let loaded = LoadedScene { path: "gone/a.obj".into(), ..loaded_of("[environment]\ncolor = 1\n") };
         let pose = Pose { position: DVec3::Z, look_at: DVec3::ZERO, up: DVec3::Y };
-        let camera = ResolvedCamera { pose, fov: 40.0, aperture: 0.0, focus: 1.0 };
+        let camera = ResolvedCamera {
+            pose,
+            projection: Projection::Perspective { fov: 40.0 },
+            window: ImageWindow::default(),
+            aperture: 0.0,
+            focus: 1.0,
+        };
         let said = save_model_scene_with_camera(&loaded, &camera).expect_err("no folder");
         assert_eq!(said, "cannot write gone/a.toml: no such file or directory");
     }

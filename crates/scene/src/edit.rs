@@ -6,6 +6,7 @@ use super::description::{Camera, Pose, ResolvedCamera, is_same_distance};
 use super::document::parse_camera;
 use super::source::SceneText;
 use super::toml::{self, Entries, KeyValue, Number, Value};
+use crate::choice::Choice;
 use crate::math::DVec3;
 
 /// Returns a scene's source text with the camera replaced by `wanted`.
@@ -37,17 +38,21 @@ struct CameraEdits<'t> {
 
 impl CameraEdits<'_> {
     fn set_camera(&mut self, wanted: &ResolvedCamera) {
-        let ResolvedCamera { pose: Pose { position, look_at, up }, fov, aperture, focus } = *wanted;
+        let ResolvedCamera { pose: Pose { position, look_at, up }, projection, window, aperture, focus } =
+            *wanted;
         // Read the defaults from the definitions of the keys. The required keys have arbitrary values.
         let with_defaults = "[camera]\nposition = [0, 1, 4]\nlook_at = [0, 1, 0]";
         let default = match parse_camera(&SceneText::from_file_text(with_defaults.into())) {
-            Some(Camera::LookAt { up, fov, aperture, .. }) => (up, fov, aperture),
+            Some(Camera::LookAt { up, projection, window, aperture, .. }) => {
+                (up, projection, window, aperture)
+            }
             Some(Camera::Orbiter { .. }) | None => return,
         };
         match self.table.get("orbiter") {
             Some(orbiter) => {
                 let place = [("position", position), ("look_at", look_at)];
-                let lines = place.map(|(name, vector)| format!("{name} = {}", format_vector(vector)));
+                let lines =
+                    place.map(|(name, vector)| format!("{name} = {}", format_numbers(&vector.to_array())));
                 let both = lines.join(&self.separator_after(&orbiter));
                 self.replaced.push((orbiter.span.start..orbiter.value.span().end, both));
             }
@@ -57,34 +62,69 @@ impl CameraEdits<'_> {
             }
         }
         self.set_vector("up", up, Some(default.0));
-        self.set_number("fov", fov, default.1);
-        self.set_number("aperture", aperture, default.2);
+        self.set_word("projection", projection.kind().name(), default.1.kind().name());
+        if let Some(fov) = projection.fov() {
+            self.set_number("fov", fov, default.1.fov());
+        }
+        if let Some(height) = projection.view_height() {
+            self.set_number("view_height", height, None);
+        }
+        self.set_numbers("shift", &window.shift.to_array(), Some(&default.2.shift.to_array()));
+        self.set_flag("mirror", window.mirror, default.2.mirror);
+        self.set_number("aperture", aperture, Some(default.3));
         match self.table.get("focus") {
             // Ignore rounding errors in the distance while orbiting.
             Some(given) if wanted.is_focused_on_look_at() && is_nearly_equal(&given.value, focus) => {}
-            Some(_) | None => self.set_number("focus", focus, wanted.pose.distance()),
+            Some(_) | None => self.set_number("focus", focus, Some(wanted.pose.distance())),
         }
     }
 
-    fn set_number(&mut self, name: &str, wanted: f64, default: f64) {
+    fn set_number(&mut self, name: &str, wanted: f64, default: Option<f64>) {
         match self.table.get(name) {
             Some(found) => self.replace_number(&found.value, wanted),
-            None if wanted != default => self.added.push(format!("{name} = {}", format_number(wanted))),
+            None if Some(wanted) != default => self.added.push(format!("{name} = {}", format_number(wanted))),
+            None => {}
+        }
+    }
+
+    fn set_word(&mut self, name: &str, wanted: &str, default: &str) {
+        match self.table.get(name).map(|found| (found.value.as_str(), found.value.span())) {
+            Some((Some(word), _)) if word == wanted => {}
+            Some((_, span)) => self.replaced.push((span, format!("\"{wanted}\""))),
+            None if wanted != default => self.added.push(format!("{name} = \"{wanted}\"")),
+            None => {}
+        }
+    }
+
+    fn set_flag(&mut self, name: &str, wanted: bool, default: bool) {
+        match self.table.get(name) {
+            Some(found) => self.replaced.push((found.value.span(), wanted.to_string())),
+            None if wanted != default => self.added.push(format!("{name} = {wanted}")),
             None => {}
         }
     }
 
     fn set_vector(&mut self, name: &str, wanted: DVec3, default: Option<DVec3>) {
+        self.set_numbers(
+            name,
+            &wanted.to_array(),
+            default.map(|it| it.to_array()).as_ref().map(|it| &it[..]),
+        );
+    }
+
+    fn set_numbers(&mut self, name: &str, wanted: &[f64], default: Option<&[f64]>) {
         match self.table.get(name) {
             Some(found) => match found.value.as_array() {
-                Some(elements) if elements.len() == 3 => {
-                    for (element, wanted) in elements.iter().zip(wanted.to_array()) {
-                        self.replace_number(&element, wanted);
+                Some(elements) if elements.len() == wanted.len() => {
+                    for (element, wanted) in elements.iter().zip(wanted) {
+                        self.replace_number(&element, *wanted);
                     }
                 }
-                Some(_) | None => self.replaced.push((found.value.span(), format_vector(wanted))),
+                Some(_) | None => self.replaced.push((found.value.span(), format_numbers(wanted))),
             },
-            None if Some(wanted) != default => self.added.push(format!("{name} = {}", format_vector(wanted))),
+            None if Some(wanted) != default => {
+                self.added.push(format!("{name} = {}", format_numbers(wanted)));
+            }
             None => {}
         }
     }
@@ -157,8 +197,8 @@ fn is_nearly_equal(value: &Value<'_>, distance: f64) -> bool {
     value.as_number().and_then(Number::to_f64).is_some_and(|given| is_same_distance(given, distance))
 }
 
-fn format_vector(vector: DVec3) -> String {
-    format!("[{}]", vector.to_array().map(format_number).join(", "))
+fn format_numbers(numbers: &[f64]) -> String {
+    format!("[{}]", numbers.iter().copied().map(format_number).collect::<Vec<_>>().join(", "))
 }
 
 /// Formats a number as TOML: decimal digits without an exponent, and 0 instead of -0.
@@ -169,10 +209,18 @@ fn format_number(number: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::description::{ImageWindow, Projection};
+    use crate::math::DVec2;
 
     fn view(position: [f64; 3]) -> ResolvedCamera {
         let pose = Pose { position: DVec3::from_array(position), look_at: DVec3::Y, up: DVec3::Y };
-        ResolvedCamera { pose, fov: 40.0, aperture: 0.0, focus: pose.distance() }
+        ResolvedCamera {
+            pose,
+            projection: Projection::Perspective { fov: 40.0 },
+            window: ImageWindow::default(),
+            aperture: 0.0,
+            focus: pose.distance(),
+        }
     }
 
     fn written(text: &str, wanted: &ResolvedCamera) -> String {
@@ -189,7 +237,11 @@ mod tests {
 
     #[test]
     fn missing_keys_are_added_after_the_last_key() {
-        let wanted = ResolvedCamera { fov: 35.5, focus: 2.5, ..view([0.0, 1.0, 4.0]) };
+        let wanted = ResolvedCamera {
+            projection: Projection::Perspective { fov: 35.5 },
+            focus: 2.5,
+            ..view([0.0, 1.0, 4.0])
+        };
         let camera = "position = [0, 1, 4]\nlook_at = [0, 1, 0]";
         for (text, expected) in [
             (
@@ -217,7 +269,8 @@ mod tests {
 
     #[test]
     fn added_keys_use_the_same_line_ending() {
-        let wanted = ResolvedCamera { fov: 35.5, ..view([0.0, 1.0, 4.0]) };
+        let wanted =
+            ResolvedCamera { projection: Projection::Perspective { fov: 35.5 }, ..view([0.0, 1.0, 4.0]) };
         // The first line and the lines of the camera table have different line endings.
         for (first, end) in [("\r\n", "\n"), ("\n", "\r\n")] {
             let text = format!("# a{first}[camera]{end}position = [0, 1, 4]{end}look_at = [0, 1, 0]");
@@ -245,11 +298,31 @@ mod tests {
         let expected = text.replace("orbiter = \"a.txt\"", "position = [0, 1, 4]\n  look_at = [0, 1, 0]");
         assert_eq!(written(text, &wanted), expected);
         let inline = "camera = { orbiter = \"a.txt\" }\n";
-        let upright = ResolvedCamera { fov: 45.0, ..view([0.0, 1.0, 4.0]) };
+        let upright =
+            ResolvedCamera { projection: Projection::Perspective { fov: 45.0 }, ..view([0.0, 1.0, 4.0]) };
         assert_eq!(
             written(inline, &upright),
             "camera = { position = [0, 1, 4], look_at = [0, 1, 0], fov = 45 }\n"
         );
+    }
+
+    #[test]
+    fn projections_are_written() {
+        let window = ImageWindow { shift: DVec2::new(0.25, 0.0), mirror: true };
+        let projection = Projection::Orthographic { view_height: 2.5 };
+        let wanted = ResolvedCamera { projection, window, ..view([0.0, 1.0, 4.0]) };
+        let text = "[camera]\nposition = [0, 1, 4]\nlook_at = [0, 1, 0]\n";
+        let more = "projection = \"orthographic\"\nview_height = 2.5\nshift = [0.25, 0]\nmirror = true\n";
+        let new = written(text, &wanted);
+        assert_eq!(new, format!("{text}{more}"));
+        let wider = Projection::Orthographic { view_height: 3.0 };
+        let wider = ResolvedCamera { projection: wider, ..wanted };
+        assert_eq!(written(&new, &wider), new.replace("2.5", "3"));
+        // `fov` would conflict with the projection.
+        assert!(replace_camera(&format!("{text}fov = 30\n"), &wanted).is_err());
+        let round =
+            ResolvedCamera { projection: Projection::Fisheye { fov: 200.0 }, ..view([0.0, 1.0, 4.0]) };
+        assert_eq!(written(text, &round), format!("{text}projection = \"fisheye\"\nfov = 200\n"));
     }
 
     #[test]
@@ -276,7 +349,11 @@ mod tests {
         assert!(paths.len() > 15);
         for path in paths.iter().filter(|path| path.extension().is_some_and(|ending| ending == "toml")) {
             let text = std::fs::read_to_string(path).expect("a scene");
-            let wanted = ResolvedCamera { fov: 33.3, focus: 2.25, ..view([0.125, -2.0, 3.5]) };
+            let wanted = ResolvedCamera {
+                projection: Projection::Perspective { fov: 33.3 },
+                focus: 2.25,
+                ..view([0.125, -2.0, 3.5])
+            };
             let new = written(&text, &wanted);
             assert_eq!(comments(&new), comments(&text), "{}", path.display());
             let is_camera = |line: &str| {

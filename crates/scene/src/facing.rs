@@ -2,7 +2,9 @@
 
 use std::ops::Range;
 
-use super::description::{Camera, EmissionSides, MeshReference, Object, Scene, Shape, max_projection};
+use super::description::{
+    Camera, EmissionSides, MeshReference, Object, Projection, Scene, Shape, max_projection,
+};
 use crate::math::DVec3;
 
 /// Warning message about a quad light that faces away from everything. Its label and help text follow.
@@ -67,6 +69,10 @@ pub(super) fn lights_facing_away(
 /// read here.
 fn is_camera_in_front_of_light(camera: &Camera, corner: DVec3, front: DVec3) -> bool {
     match camera {
+        // Parallel rays see the front from any position.
+        Camera::LookAt { position, look_at, projection: Projection::Orthographic { .. }, .. } => {
+            front.dot(*look_at - *position) < 0.0
+        }
         Camera::LookAt { position, .. } => front.dot(*position - corner) > 0.0,
         Camera::Orbiter { .. } => true,
     }

@@ -21,7 +21,7 @@ pub fn nearest_name<'a>(written: &str, candidates: impl IntoIterator<Item = &'a 
 }
 
 /// Names used by other renderers and the corresponding names in glimt.
-const FOREIGN_NAMES: [(&[&str], &[&str]); 17] = [
+const FOREIGN_NAMES: [(&[&str], &[&str]); 20] = [
     (
         &["color", "colour", "albedo", "base_color", "kd"],
         &["diffuse", "reflectance", "tint", "intensity", "irradiance"],
@@ -36,6 +36,9 @@ const FOREIGN_NAMES: [(&[&str], &[&str]); 17] = [
     (&["refraction", "eta", "index"], &["ior"]),
     (&["pos", "location", "eye", "from", "origin"], &["position", "center", "corner", "point", "base"]),
     (&["target", "to", "at", "aim"], &["look_at"]),
+    (&["ortho_scale", "orthographic_size", "ymag"], &["view_height"]),
+    (&["pinhole", "thinlens"], &["perspective"]),
+    (&["spherical", "equirectangular", "latlong"], &["panorama"]),
     (&["cube", "cuboid"], &["box"]),
     (&["ball"], &["sphere"]),
     (&["rectangle", "rect", "square", "parallelogram"], &["quad"]),

@@ -117,13 +117,35 @@ fn position_and_look_at_override_the_orbiter() {
         document::parse_camera(&source)
     };
     let place = ["camera.position=[1,2,3]", "camera.look_at=[0,0,0]"];
-    let Some(Camera::LookAt { position, fov, focus, .. }) = camera(&[place[0], place[1], "camera.fov=30"])
+    let Some(Camera::LookAt { position, projection, focus, .. }) =
+        camera(&[place[0], place[1], "camera.fov=30"])
     else {
         panic!("expected a camera defined by vectors")
     };
-    assert_eq!((position, fov, focus), (crate::math::DVec3::new(1.0, 2.0, 3.0), 30.0, 2.0));
+    assert_eq!(
+        (position, projection.fov(), focus),
+        (crate::math::DVec3::new(1.0, 2.0, 3.0), Some(30.0), 2.0)
+    );
     let orbiter = "camera.orbiter=b.txt";
     for sets in [vec![place[0]], vec![place[1]], vec![place[0], place[1], orbiter]] {
         assert!(!matches!(camera(&sets), Some(Camera::LookAt { .. })), "{sets:?}");
     }
+}
+
+#[test]
+fn projection_from_set_ignores_keys_of_the_file() {
+    let text = "[camera]\nposition = [0, 1, 4]\nlook_at = [0, 1, 0]\nfov = 30\naperture = 0.1\nfocus = 2\n";
+    let camera = |sets: &[&str]| {
+        let sets: Vec<String> = sets.iter().map(|set| (*set).to_owned()).collect();
+        document::parse_camera(&SceneText::with_set_args(text.into(), &sets).expect("sets"))
+    };
+    let Some(Camera::LookAt { projection, aperture, focus, .. }) = camera(&["camera.projection=panorama"])
+    else {
+        panic!("expected a panorama")
+    };
+    assert_eq!((projection, aperture, focus), (Projection::Spherical, 0.0, 4.0));
+    assert!(camera(&["camera.projection=orthographic"]).is_none());
+    assert!(camera(&["camera.projection=orthographic", "camera.view_height=2"]).is_some());
+    assert!(camera(&["camera.projection=panorama", "camera.fov=20"]).is_none());
+    assert!(camera(&["camera.view_height=2"]).is_none());
 }

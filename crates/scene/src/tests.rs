@@ -43,7 +43,8 @@ fn empty_scene_has_the_documented_defaults() {
         position: DVec3::new(0.0, 1.0, 4.0),
         look_at: DVec3::Y,
         up: DVec3::Y,
-        fov: 40.0,
+        projection: Projection::Perspective { fov: 40.0 },
+        window: ImageWindow::default(),
         aperture: 0.0,
         focus: 4.0,
     };
@@ -179,9 +180,10 @@ fn orbiter_replaces_position_and_look_at() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/broken/scene.toml");
     let text = "[camera]\norbiter='files/view.txt'\naperture=0.5\nfov=30";
     let camera = parse(text.into(), &path).scene.expect("a scene").camera;
-    let Camera::Orbiter { file, fov, aperture, focus } = camera else { panic!("no orbiter") };
+    let Camera::Orbiter { file, projection, window, aperture, focus } = camera else { panic!("no orbiter") };
     assert_eq!(file.value, path.with_file_name("files/view.txt"));
-    assert_eq!((fov, aperture, focus), (Some(30.0), 0.5, None));
+    let expected = (Some(Projection::Perspective { fov: 30.0 }), ImageWindow::default(), 0.5, None);
+    assert_eq!((projection, window, aperture, focus), expected);
 }
 
 #[test]

@@ -3,14 +3,18 @@
 
 use crate::math::DVec3;
 use crate::math::decimal::{decimal_step_at_distance, round_to_step};
-use crate::pipeline::protocol::ResolvedCamera;
-use crate::scene::description::Pose;
+use crate::scene::description::{Pose, Projection};
 
 /// Minimum angle in degrees between the orbit axis and the direction from `look_at` to the eye.
 const POLE: f64 = 1.0;
-/// Minimum and maximum field of view, in degrees.
-const FIELD: (f64, f64) = (1.0, 160.0);
-/// Limit on dollying: the distance to `look_at` stays within this factor of its value in the scene.
+/// Minimum field of view, in degrees.
+const MIN_FIELD: f64 = 1.0;
+/// Maximum field of view of a perspective, in degrees.
+const MAX_FIELD: f64 = 160.0;
+/// Maximum field of view of a fisheye, in degrees.
+const MAX_FISHEYE_FIELD: f64 = 360.0;
+/// Limit on dollying: the distance to `look_at` stays within this factor of its value in the scene. The same
+/// limit applies to the height of an orthographic image.
 pub(super) const REACH: f64 = 1000.0;
 
 /// Orbits the camera around `look_at` by `right` and `up` degrees.
@@ -38,10 +42,23 @@ pub(super) fn dollied(pose: &Pose, factor: f64, own: f64) -> Pose {
     if wanted == distance { *pose } else { with_target_to_eye_vector(pose, arm * (wanted / distance)) }
 }
 
-/// Multiplies the field of view by `factor`, within limits.
-pub(super) fn zoomed_fov(view: &ResolvedCamera, factor: f64) -> f64 {
-    let (least, most) = (FIELD.0.min(view.fov), FIELD.1.max(view.fov));
-    round_to_step((view.fov * factor).clamp(least, most), 0.01)
+/// Multiplies the field of view, or the height of an orthographic image, by `factor`, within limits. `own` is
+/// the scene's projection.
+pub(super) fn zoomed(view: Projection, own: Projection, factor: f64) -> Projection {
+    let zoomed_fov =
+        |fov: f64, most: f64| round_to_step((fov * factor).clamp(MIN_FIELD.min(fov), most.max(fov)), 0.01);
+    match view {
+        Projection::Perspective { fov } => Projection::Perspective { fov: zoomed_fov(fov, MAX_FIELD) },
+        Projection::Fisheye { fov } => Projection::Fisheye { fov: zoomed_fov(fov, MAX_FISHEYE_FIELD) },
+        Projection::Orthographic { view_height: now } => {
+            let own = own.view_height().unwrap_or(now);
+            let wanted = (now * factor).clamp((own / REACH).min(now), (own * REACH).max(now));
+            let view_height =
+                if wanted == now { now } else { round_to_step(wanted, decimal_step_at_distance(wanted)) };
+            Projection::Orthographic { view_height }
+        }
+        Projection::Spherical => Projection::Spherical,
+    }
 }
 
 /// Moves the eye to `look_at + arm`, rounding its position by at most 1/10,000 of the distance.
@@ -97,13 +114,16 @@ mod tests {
         }
         let far = Pose { position: DVec3::new(0.0, 1.0, 1e6), ..POSE };
         assert_eq!(dollied(&far, 2.0, 4.0), far, "a camera that starts beyond the limit should stay there");
-        let view = ResolvedCamera { pose: POSE, fov: 40.0, aperture: 0.0, focus: 4.0 };
-        assert_eq!(zoomed_fov(&view, 1.1), 44.0);
-        assert_eq!(zoomed_fov(&view, 100.0), 160.0);
-        assert_eq!(
-            zoomed_fov(&ResolvedCamera { fov: 170.0, ..view }, 1.1),
-            170.0,
-            "zooming should not narrow a wider field of view"
-        );
+        let perspective = |fov| Projection::Perspective { fov };
+        let zoom = |view: Projection, factor| zoomed(view, view, factor);
+        assert_eq!(zoom(perspective(40.0), 1.1), perspective(44.0));
+        assert_eq!(zoom(perspective(40.0), 100.0), perspective(160.0));
+        let wide = zoom(perspective(170.0), 1.1);
+        assert_eq!(wide, perspective(170.0), "zooming should not narrow a wider field of view");
+        assert_eq!(zoom(Projection::Fisheye { fov: 300.0 }, 2.0), Projection::Fisheye { fov: 360.0 });
+        assert_eq!(zoom(Projection::Spherical, 2.0), Projection::Spherical);
+        let [own, tall, tallest] =
+            [3.0, 3.3, 3000.0].map(|view_height| Projection::Orthographic { view_height });
+        assert_eq!((zoom(own, 1.1), zoomed(tall, own, 1e9)), (tall, tallest));
     }
 }

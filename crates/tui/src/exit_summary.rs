@@ -405,9 +405,11 @@ mod tests {
         let sets = words.split("--set ").skip(1).map(|set| set.trim().replace('\'', ""));
         let sets: Vec<String> = sets.collect();
         let camera = crate::scene::LoadedScene::parse_camera_from_text(text, &sets);
-        let Some(Camera::LookAt { position, look_at, fov, focus, .. }) = camera else { panic!("{words}") };
+        let Some(Camera::LookAt { position, look_at, projection, focus, .. }) = camera else {
+            panic!("{words}")
+        };
         assert_eq!((position, look_at), (moved.pose.position, moved.pose.look_at));
-        assert_eq!((fov, focus), (moved.fov, moved.focus));
+        assert_eq!((projection, focus), (moved.projection, moved.focus));
     }
 
     #[test]

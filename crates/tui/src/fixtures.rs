@@ -23,7 +23,7 @@ use crate::pipeline::protocol::{
     ResolvedCamera, SampleCounts, Stage, StageReport, Status, WorkCounters,
 };
 use crate::pipeline::settings::{EffectiveSettingsSummary, Overrides, SceneSettings, ViewMode};
-use crate::scene::description::{Accel, Integrator, Pose, ShadowMode};
+use crate::scene::description::{Accel, ImageWindow, Integrator, Pose, Projection, ShadowMode};
 use crate::scene::diagnostic::{Diagnostic, Severity, SourceSpan};
 
 pub(super) fn window(columns: u16, rows: u16) -> WindowSize {
@@ -208,7 +208,13 @@ pub(super) fn scene_settings() -> SceneSettings {
 /// A camera at (0, 1, 4) that looks along −z at a point 4 units away.
 pub(super) fn camera() -> ResolvedCamera {
     let pose = Pose { position: DVec3::new(0.0, 1.0, 4.0), look_at: DVec3::Y, up: DVec3::Y };
-    ResolvedCamera { pose, fov: 40.0, aperture: 0.1, focus: 4.0 }
+    ResolvedCamera {
+        pose,
+        projection: Projection::Perspective { fov: 40.0 },
+        window: ImageWindow::default(),
+        aperture: 0.1,
+        focus: 4.0,
+    }
 }
 
 pub(super) fn stage_report(name: Stage, status: Status, seconds: f64, why: &str) -> StageReport {

@@ -31,6 +31,14 @@ pub fn fov_limit(degrees: f64) -> String {
     format!("field of view limit: {degrees}°")
 }
 
+/// Shown when the height of an orthographic image is at its limit.
+pub fn view_height_limit(height: f64) -> String {
+    format!("view height limit: {height}")
+}
+
+/// Shown when the field of view of a panorama is changed.
+pub const NO_FIELD_OF_VIEW: &str = "a panorama shows all directions";
+
 /// Shown when the exposure is at its limit.
 pub fn exposure_limit(stops: &str) -> String {
     format!("exposure limit: {stops}")

@@ -4,8 +4,8 @@ use glimt::film::Rect;
 use glimt::integrators::RenderSettings;
 use glimt::math::random::TestRandom;
 use glimt::math::{DVec2, DVec3, Vec2};
-use glimt::scene::description::Camera;
-use glimt::scene::description::RenderOptions;
+use glimt::scene::description::{Camera, ImageWindow, Projection, RenderOptions};
+use glimt::world::FilmPosition;
 
 use super::scenes::{emitter, scene, tile};
 use super::{assert_close, assert_mean, v};
@@ -17,7 +17,8 @@ fn lens() -> Camera {
         position: DVec3::ZERO,
         look_at: v(0.0, 0.0, -5.0),
         up: DVec3::Y,
-        fov: 40.0,
+        projection: Projection::Perspective { fov: 40.0 },
+        window: ImageWindow::default(),
         aperture: 0.1,
         focus: 5.0,
     }
@@ -37,7 +38,16 @@ fn rays_pass_through_projected_points() {
         let (position, target) = (random.direction() * 7.0, random.direction() * 2.0);
         let (up, fov) = (random.direction(), 20.0 + 80.0 * random.unit());
         let build = scene().with(|scene| {
-            scene.camera = Camera::LookAt { position, look_at: target, up, fov, aperture: 0.0, focus: 1.0 };
+            let (projection, window) = (Projection::Perspective { fov }, ImageWindow::default());
+            scene.camera = Camera::LookAt {
+                position,
+                look_at: target,
+                up,
+                projection,
+                window,
+                aperture: 0.0,
+                focus: 1.0,
+            };
         });
         let camera = build.world().camera;
         // The textbook view matrix with rows s, u, −f, followed by perspective division.
@@ -52,7 +62,7 @@ fn rays_pass_through_projected_points() {
         let render = RenderOptions { width: 333, height: 200, ..settings.render };
         let settings = RenderSettings { render, ..settings };
         let pixel = DVec2::new((ndc.x + 1.0) / 2.0 * 333.0, (1.0 - ndc.y) / 2.0 * 200.0);
-        let ray = camera.ray(settings.pixel_to_image_plane(pixel), Vec2::ZERO);
+        let ray = camera.ray(settings.film_position(pixel), Vec2::ZERO).expect("a ray");
         let along = (point - ray.origin.as_dvec3()).normalize();
         assert!((along - ray.direction.as_dvec3()).length() < 1e-6, "{point} is not on its ray");
         assert_close("depth", camera.depth_of(point), eye.z);
@@ -72,7 +82,8 @@ fn circle_of_confusion_diameter_is_exact() {
         let mut extent = DVec3::ZERO;
         for step in 0..3600 {
             let (sin, cos) = (f64::from(step) / 1800.0 * std::f64::consts::PI).sin_cos();
-            let ray = camera.ray(DVec2::ZERO, Vec2::new(cos as f32, sin as f32));
+            let film = FilmPosition { offset: DVec2::ZERO, half_width: 1.0 };
+            let ray = camera.ray(film, Vec2::new(cos as f32, sin as f32)).expect("a ray");
             let (o, k) = (ray.origin.as_dvec3(), ray.direction.as_dvec3());
             extent = extent.max((o + k * ((-d - o.z) / k.z)) * 2.0 * pixels_per_length(d));
         }

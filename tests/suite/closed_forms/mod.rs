@@ -20,6 +20,7 @@ mod microfacets;
 mod mirror;
 mod patterns;
 mod photons;
+mod projections;
 mod repeated_faces;
 mod robust;
 mod round;

@@ -15,10 +15,10 @@ use glimt::materials::texels::{TexelData, Texels};
 use glimt::math::{DVec3, Vec2, Vec3};
 use glimt::scene::description::light::{Falloff, PointLight};
 use glimt::scene::description::{
-    Accel, Camera, ColorSource, EmissionSource, Environment, FresnelSource, Integrator, Light, Material,
-    MaterialKind, MeshFile, MeshReference, NumberSource, Object, ObjectTransform, OpacitySource,
-    PhongParameters, PhotonOptions, PixelFilter, RenderOptions, Scene, ShadowMode, Shape, Spanned, Texture,
-    TextureEncoding, TextureFilter, Tonemap, UvSet, Wrap,
+    Accel, Camera, ColorSource, EmissionSource, Environment, FresnelSource, ImageWindow, Integrator, Light,
+    MapOrientation, Material, MaterialKind, MeshFile, MeshReference, NumberSource, Object, ObjectTransform,
+    OpacitySource, PhongParameters, PhotonOptions, PixelFilter, Projection, RenderOptions, Scene, ShadowMode,
+    Shape, Spanned, Texture, TextureEncoding, TextureFilter, Tonemap, UvSet, Wrap,
 };
 use glimt::world::{
     Geometry, Image, MeshTree, TextureRolesNeededByRender, World, WorldInputs, build_environment_map,
@@ -79,7 +79,15 @@ const NARROW: f64 = 1e-6;
 fn look_at(position: DVec3, look_at: DVec3, fov: f64) -> Camera {
     let along = (look_at - position).normalize();
     let up = if along.y.abs() > 0.9 { DVec3::X } else { DVec3::Y };
-    Camera::LookAt { position, look_at, up, fov, aperture: 0.0, focus: (look_at - position).length() }
+    Camera::LookAt {
+        position,
+        look_at,
+        up,
+        projection: Projection::Perspective { fov },
+        window: ImageWindow::default(),
+        aperture: 0.0,
+        focus: (look_at - position).length(),
+    }
 }
 
 impl Build {
@@ -220,15 +228,23 @@ impl Build {
     /// Adds an environment with constant radiance.
     pub fn environment(self, radiance: f32) -> Self {
         let color = Vec3::splat(radiance);
-        self.with(|scene| scene.environment = Some(Environment { color, file: None, rotate: 0.0 }))
+        self.with(|scene| {
+            scene.environment =
+                Some(Environment { color, file: None, orientation: MapOrientation::Turn(0.0) })
+        })
     }
 
     /// Adds an equirectangular environment map with `width` columns, top row first.
-    pub fn sky(mut self, width: u32, texels: Vec<Vec3>, rotate: f64) -> Self {
+    pub fn sky(self, width: u32, texels: Vec<Vec3>, rotate: f64) -> Self {
+        self.oriented_sky(width, texels, MapOrientation::Turn(rotate))
+    }
+
+    /// Adds an equirectangular environment map with `width` columns, top row first.
+    pub fn oriented_sky(mut self, width: u32, texels: Vec<Vec3>, orientation: MapOrientation) -> Self {
         let height = texels.len() as u32 / width;
         self.sky = Some(Arc::new(Texels { width, height, data: TexelData::Float(texels), unusable: 0 }));
         let file = Some(Spanned { value: PathBuf::from("sky.exr"), span: 0..0 });
-        self.with(|scene| scene.environment = Some(Environment { color: Vec3::ONE, file, rotate }))
+        self.with(|scene| scene.environment = Some(Environment { color: Vec3::ONE, file, orientation }))
     }
 
     pub fn world(&self) -> World {

@@ -94,6 +94,10 @@ impl DefinedTable {
         let material = if is_bare { "material = \"wall\"\n" } else { "" };
         // A metal needs exactly one of three groups of keys.
         let group = match without {
+            // Each projection has its own keys.
+            "fov" => "projection = \"fisheye\"\n",
+            "view_height" => "projection = \"orthographic\"\n",
+            "projection" if line.contains("orthographic") => "view_height = 1\n",
             _ if !self.head.contains("\"metal\"") => "",
             "color" | "element" => "",
             "eta" => "k = 1\n",
@@ -202,6 +206,7 @@ fn ends(limits: Limits) -> (Vec<f64>, Vec<f64>) {
         Limits::LengthOrZero => (vec![0.0], vec![-1.0]),
         Limits::Between(least, most) => (vec![least, most], vec![least - STEP, most + STEP]),
         Limits::Inside(low, high) => (vec![low + STEP, high - STEP], vec![low, high]),
+        Limits::UpTo(low, most) => (vec![low + STEP, most], vec![low, most + STEP]),
     }
 }
 

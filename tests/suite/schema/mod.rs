@@ -69,7 +69,7 @@ fn bundled_scenes_and_starter_are_valid() {
     }
     assert_eq!(found(starter_scene()), [[], []]);
     // The starter scene with all keys that can be combined.
-    let stands_alone = ["orbiter", "matrix", "image", "opacity"];
+    let stands_alone = ["orbiter", "view_height", "matrix", "image", "opacity"];
     let uncommented = |line: &str| match line.strip_prefix("# ") {
         Some(text)
             if text.starts_with('[')
@@ -145,6 +145,36 @@ fn exclusive_keys_are_an_error() {
         assert!(found(wrong).iter().all(|faults| !faults.is_empty()), "{wrong}: {:?}", found(wrong));
     }
     assert_eq!(found("[camera]\norbiter = \"a.txt\"\nfov = 30"), [[], []]);
+    let rotation = format!("{SCENE}[environment]\nmatrix = [1, 0, 0, 0, 1, 0, 0, 0, 1]\n");
+    assert_eq!(found(&rotation), [[], []]);
+    assert!(found(&format!("{rotation}rotate = 90")).iter().all(|faults| !faults.is_empty()));
+}
+
+#[test]
+fn each_projection_has_its_own_keys() {
+    for (keys, is_valid) in [
+        ("fov = 179", true),
+        ("fov = 180", false),
+        ("view_height = 2", false),
+        ("projection = \"perspective\"\naperture = 0.1", true),
+        ("projection = \"orthographic\"", false),
+        ("projection = \"orthographic\"\nview_height = 2\naperture = 0.1\nfocus = 3", true),
+        ("projection = \"orthographic\"\nview_height = 2\nfov = 30", false),
+        ("projection = \"panorama\"\nmirror = true\nshift = [0.5, 0]", true),
+        ("projection = \"panorama\"\nfov = 30", false),
+        ("projection = \"panorama\"\nfocus = 3", false),
+        ("projection = \"fisheye\"\nfov = 360", true),
+        ("projection = \"fisheye\"\nfov = 361", false),
+        ("projection = \"fisheye\"\naperture = 0.1", false),
+        ("projection = \"fisheye\"\nview_height = 2", false),
+    ] {
+        let text = format!("{SCENE}{keys}\n");
+        for faults in found(&text) {
+            assert_eq!(faults.is_empty(), is_valid, "{keys}: {faults:?}");
+        }
+        let scene = glimt::scene::parse(text.as_str().into(), Path::new("a.toml")).scene;
+        assert_eq!(scene.is_some(), is_valid, "{keys}");
+    }
 }
 
 /// Every scene that the program accepts must satisfy the schema, if it can be checked without other files.

@@ -128,6 +128,29 @@ pub fn sin_cos(angle: f32) -> (f32, f32) {
     (sign(of_sin, quarter), sign(of_cos, quarter.wrapping_add(1)))
 }
 
+/// Sine and cosine, within 1e-13, of an angle between −100,000 and 100,000. Subtracts the nearest multiple of
+/// π/2 in two parts, as in [`sin_cos`], then uses Taylor series on [−π/4, π/4].
+#[inline(always)]
+pub fn sin_cos_f64(angle: f64) -> (f64, f64) {
+    // Adding 1.5·2⁵² rounds to an integer, as in `exp2_f64`.
+    const ROUND: f64 = 6_755_399_441_055_744.0;
+    let sum = angle * std::f64::consts::FRAC_2_PI + ROUND;
+    let (k, quarter) = (sum - ROUND, sum.to_bits());
+    // The first part of π/2 has 33 significant bits.
+    let r = (angle - k * 1.570_796_326_734_125_6) - k * 6.077_100_506_506_192e-11;
+    let z = r * r;
+    let sin = -1.0 / 39_916_800.0 + z * (1.0 / 6_227_020_800.0);
+    let sin = -1.0 / 5040.0 + z * (1.0 / 362_880.0 + z * sin);
+    let sin = r + r * z * (-1.0 / 6.0 + z * (1.0 / 120.0 + z * sin));
+    let cos = 1.0 / 479_001_600.0 + z * (-1.0 / 87_178_291_200.0);
+    let cos = 1.0 / 40_320.0 + z * (-1.0 / 3_628_800.0 + z * cos);
+    let cos = 1.0 + z * (-0.5 + z * (1.0 / 24.0 + z * (-1.0 / 720.0 + z * cos)));
+    let is_odd = quarter & 1 == 1;
+    let (of_sin, of_cos) = if is_odd { (cos, sin) } else { (sin, cos) };
+    let sign = |value: f64, is_negative: u64| f64::from_bits(value.to_bits() ^ (is_negative & 2) << 62);
+    (sign(of_sin, quarter), sign(of_cos, quarter.wrapping_add(1)))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -209,6 +232,17 @@ mod tests {
             let (exact_sin, exact_cos) = libm::sincos(f64::from(angle));
             assert!((f64::from(sin) - exact_sin).abs() < 1.2e-7, "sin {angle}: {sin}");
             assert!((f64::from(cos) - exact_cos).abs() < 1.2e-7, "cos {angle}: {cos}");
+        }
+    }
+
+    #[test]
+    fn sin_cos_f64_is_accurate_over_many_turns() {
+        for (i, scale) in (-20_000..=20_000_i32).flat_map(|i| [1e-4, 3.1, 4.9].map(|scale| (i, scale))) {
+            let angle = f64::from(i) * scale;
+            let (sin, cos) = sin_cos_f64(angle);
+            let (exact_sin, exact_cos) = libm::sincos(angle);
+            assert!((sin - exact_sin).abs() < 1e-13, "sin {angle}: {sin}");
+            assert!((cos - exact_cos).abs() < 1e-13, "cos {angle}: {cos}");
         }
     }
 }

@@ -133,7 +133,8 @@ fn key_value_completions(kind: ValueKind, outline: &[OutlineTable]) -> Vec<Descr
         | ValueKind::File(_)
         | ValueKind::NumberOrTexture(_)
         | ValueKind::Numbers(..)
-        | ValueKind::Scale(_) => Vec::new(),
+        | ValueKind::Scale(_)
+        | ValueKind::Rotation => Vec::new(),
     }
 }
 

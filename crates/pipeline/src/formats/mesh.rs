@@ -10,6 +10,7 @@ use super::model::{
     add_sky_and_key_light, file_name, warning,
 };
 use super::{ForeignReadContext, ForeignScene};
+use crate::assets::gltf::ModelProjection;
 use crate::assets::{AssetError, FileMaterial, LoadedMesh};
 use crate::control::ignore_progress;
 use crate::math::DVec3;
@@ -127,7 +128,7 @@ fn scene_of_mesh(
     document.comment(format!("{}, as glimt shows it.", file_name(path)));
     let lighting = Lighting::Default { is_polished: loaded.materials.iter().any(material_may_cast_caustics) };
     add_render_settings(&mut document, None, lighting);
-    add_camera(&mut document, &eye, FOV);
+    add_camera(&mut document, &eye, ModelProjection::Perspective { fov: FOV });
     add_sky_and_key_light(&mut document, &eye, lighting);
     let is_colored = !loaded.mesh.colors.is_empty();
     let needs_material = loaded.lacks_materials();

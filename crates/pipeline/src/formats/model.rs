@@ -8,6 +8,7 @@ use super::frame::{
     round_to_decimals_of_step,
 };
 use super::rounding::{round_significant, shorten, shorten_vector};
+use crate::assets::gltf::ModelProjection;
 use crate::math::DVec3;
 use crate::scene::BuiltDocument;
 use crate::scene::diagnostic::{Diagnostic, Severity};
@@ -144,15 +145,20 @@ pub(super) fn add_render_settings(document: &mut BuiltDocument, size: Option<[f6
 
 /// Adds the `[camera]` table. Keeps all digits of the points, because a small model may be far from the
 /// origin.
-pub(super) fn add_camera(document: &mut BuiltDocument, eye: &CameraPose, fov: f64) {
+pub(super) fn add_camera(document: &mut BuiltDocument, eye: &CameraPose, projection: ModelProjection) {
     document.table("camera");
     document.set("position", eye.position);
     document.set("look_at", eye.look_at);
     if eye.up != DVec3::Y {
         document.set("up", shorten_vector(eye.up));
     }
-    if fov != 40.0 {
-        document.set("fov", shorten(fov));
+    match projection {
+        ModelProjection::Perspective { fov: 40.0 } => {}
+        ModelProjection::Perspective { fov } => document.set("fov", shorten(fov)),
+        ModelProjection::Orthographic { view_height } => {
+            document.set("projection", "orthographic");
+            document.set("view_height", shorten(view_height));
+        }
     }
 }
 

@@ -384,6 +384,9 @@ fn metadata(plan: &RenderPlan) -> Vec<(String, String)> {
     if render.clamp > 0.0 {
         add("clamp", render.clamp.to_string());
     }
+    if plan.settings.render.gain != 1.0 {
+        add("gain", plan.settings.render.gain.to_string());
+    }
     if let Some(Rect { x, y, width, height }) = plan.crop {
         add("crop", format!("{x},{y},{width},{height}"));
     }

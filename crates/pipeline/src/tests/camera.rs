@@ -4,7 +4,7 @@ use super::*;
 use crate::math::DVec3;
 use crate::messages;
 use crate::protocol::{CameraSaveResult, ImagePosition, MovedCamera, PickedPixel, SavedCameraEdit};
-use crate::scene::description::{CameraOverrides, Pose, ResolvedCamera};
+use crate::scene::description::{CameraOverrides, ImageWindow, Pose, Projection, ResolvedCamera};
 
 /// Tables that add a mirror and photons to a scene.
 const PHOTONS: &str = "[[quad]]\ncorner = [-2, 0, -2]\nu = [4, 0, 0]\nv = [0, 4, 0]\nmaterial = \"steel\"\n\
@@ -12,7 +12,7 @@ const PHOTONS: &str = "[[quad]]\ncorner = [-2, 0, -2]\nu = [4, 0, 0]\nv = [0, 4,
 
 fn moved() -> CameraOverrides {
     let pose = Pose { position: DVec3::new(0.5, 1.5, 4.25), look_at: DVec3::Y, up: DVec3::Y };
-    CameraOverrides { pose: Some(pose), fov: Some(35.0), focus: None }
+    CameraOverrides { pose: Some(pose), fov: Some(35.0), ..CameraOverrides::default() }
 }
 
 /// Returns a request's camera, which is the scene's camera with the front end's changes.
@@ -77,7 +77,10 @@ fn orbiter_camera_can_be_moved() {
     let mut bench = Bench::new(&orbiter);
     bench.write("camera.txt", "c 0 1 0\np 0 0\nr 0 0\ns 4 5\nf 40 4 3\n");
     let own = camera(&mut bench);
-    assert_eq!((own.pose.position, own.pose.look_at, own.fov), (DVec3::new(0.0, 1.0, 4.0), DVec3::Y, 40.0));
+    assert_eq!(
+        (own.pose.position, own.pose.look_at, own.projection.fov()),
+        (DVec3::new(0.0, 1.0, 4.0), DVec3::Y, Some(40.0))
+    );
     bench.overrides.camera = moved();
     bench.done();
     let shown = bench.picture();
@@ -175,7 +178,7 @@ fn outdated_camera_is_not_saved() {
     assert_eq!(why, messages::CAMERA_CHANGED);
     assert_eq!(fs::read_to_string(bench.path("scene.toml")).expect("a scene"), text);
     // If the move starts from the file's current camera, the camera is saved and the edit is preserved.
-    let moved = ResolvedCamera { fov: 20.0, ..moved };
+    let moved = ResolvedCamera { projection: Projection::Perspective { fov: 20.0 }, ..moved };
     assert!(keep(&mut bench, moved).expect("written").is_new);
     let text = fs::read_to_string(bench.path("scene.toml")).expect("a scene");
     assert!(text.contains("fov = 20") && text.contains("[0.5, 1.5, 4.25]"), "{text}");
@@ -315,7 +318,13 @@ fn queries_do_not_interrupt_a_render() {
     let of = bench.send();
     while !matches!(bench.next(), Event::Progress { progress, .. } if progress.samples > 0) {}
     assert!(pick(&mut bench, 0.5, 0.5).thing.is_some());
-    let camera = ResolvedCamera { pose: moved().pose.expect("a pose"), fov: 40.0, aperture: 0.0, focus: 1.0 };
+    let camera = ResolvedCamera {
+        pose: moved().pose.expect("a pose"),
+        projection: Projection::Perspective { fov: 40.0 },
+        window: ImageWindow::default(),
+        aperture: 0.0,
+        focus: 1.0,
+    };
     assert!(keep(&mut bench, camera).expect("written").is_new);
     assert!(
         matches!(bench.next(), Event::Progress { .. } | Event::Preview { .. }),
@@ -323,6 +332,23 @@ fn queries_do_not_interrupt_a_render() {
     );
     bench.worker.send(Command::Cancel);
     bench.until_end(of);
+}
+
+#[test]
+fn clicks_follow_the_image_as_shown() {
+    // The ball is at the center of the unshifted image. `shift` moves the window, not the ball.
+    for (keys, ball, other) in [
+        ("shift = [0.25, 0]", [0.31, 0.5], [0.69, 0.5]),
+        ("shift = [0.25, 0]\nmirror = true", [0.69, 0.5], [0.31, 0.5]),
+        ("projection = \"panorama\"", [0.5, 0.5], [0.01, 0.5]),
+        ("projection = \"fisheye\"\nshift = [0, 0.25]", [0.5, 0.75], [0.5, 0.25]),
+    ] {
+        let mut bench = Bench::new(&SCENE.replace("[camera]\n", &format!("[camera]\n{keys}\n")));
+        bench.done();
+        let mut shape = |[x, y]: [f64; 2]| pick(&mut bench, x, y).thing.map(|thing| thing.shape);
+        assert_eq!(shape(ball), Some("sphere"), "{keys}");
+        assert_ne!(shape(other), Some("sphere"), "{keys}");
+    }
 }
 
 #[test]

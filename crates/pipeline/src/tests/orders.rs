@@ -697,8 +697,18 @@ fn settings_event_includes_scene_values() {
     let reported = |event: &Event| {
         let Event::Settings { settings, own, .. } = event else { return None };
         let shadows = (settings.shadows, own.shadows);
-        Some((settings.exposure, own.exposure, own.camera.fov, shadows, own.integrator, own.photons))
+        Some((
+            settings.exposure,
+            own.exposure,
+            own.camera.projection.fov(),
+            shadows,
+            own.integrator,
+            own.photons,
+        ))
     };
     let shadows = (ShadowMode::Off, ShadowMode::Soft);
-    assert_eq!(events.iter().find_map(reported), Some((2.0, 0.5, 40.0, shadows, Integrator::Whitted, false)));
+    assert_eq!(
+        events.iter().find_map(reported),
+        Some((2.0, 0.5, Some(40.0), shadows, Integrator::Whitted, false))
+    );
 }

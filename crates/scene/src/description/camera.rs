@@ -4,7 +4,102 @@ use std::path::PathBuf;
 
 use super::super::fingerprint::{FingerprintContext, FingerprintHasher, Fingerprinted};
 use super::Spanned;
-use crate::math::DVec3;
+use crate::choice;
+use crate::math::{DVec2, DVec3};
+
+choice! {
+    /// Values of the key `projection`.
+    pub enum ProjectionKind {
+        /// Rays through one point, onto a flat image.
+        Perspective = "perspective",
+        /// Parallel rays: the size of an object in the image does not depend on its distance.
+        Orthographic = "orthographic",
+        /// All directions, as in an environment map; the center is towards `look_at`.
+        Panorama = "panorama",
+        /// A circle in which the distance from the center is proportional to the angle from the view axis.
+        Fisheye = "fisheye",
+    }
+}
+
+/// Mapping from image positions to rays.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Projection {
+    /// Rays through one point, onto a flat image.
+    Perspective {
+        /// Vertical field of view in degrees, in (0, 180).
+        fov: f64,
+    },
+    /// Parallel rays.
+    Orthographic {
+        /// Height of the image in scene units, > 0.
+        view_height: f64,
+    },
+    /// Equirectangular image of all directions, stretched to the image's size.
+    Spherical,
+    /// Equidistant fisheye: the distance from the image center is proportional to the angle from the view
+    /// axis. The image is black outside a circle as high as the image.
+    Fisheye {
+        /// Angle across the circle in degrees, in (0, 360].
+        fov: f64,
+    },
+}
+
+impl Projection {
+    /// Value of the key `projection`.
+    pub fn kind(self) -> ProjectionKind {
+        match self {
+            Self::Perspective { .. } => ProjectionKind::Perspective,
+            Self::Orthographic { .. } => ProjectionKind::Orthographic,
+            Self::Spherical => ProjectionKind::Panorama,
+            Self::Fisheye { .. } => ProjectionKind::Fisheye,
+        }
+    }
+
+    /// Field of view in degrees, or `None` if the projection has no field of view.
+    pub fn fov(self) -> Option<f64> {
+        match self {
+            Self::Perspective { fov } | Self::Fisheye { fov } => Some(fov),
+            Self::Orthographic { .. } | Self::Spherical => None,
+        }
+    }
+
+    /// Height of the image in scene units, or `None` unless the projection is orthographic.
+    pub fn view_height(self) -> Option<f64> {
+        match self {
+            Self::Orthographic { view_height } => Some(view_height),
+            Self::Perspective { .. } | Self::Spherical | Self::Fisheye { .. } => None,
+        }
+    }
+
+    /// Whether the camera has a lens, which can be out of focus.
+    pub fn has_lens(self) -> bool {
+        match self {
+            Self::Perspective { .. } | Self::Orthographic { .. } => true,
+            Self::Spherical | Self::Fisheye { .. } => false,
+        }
+    }
+
+    /// Returns the projection with another field of view or image height, if it has one.
+    pub fn with_change(self, fov: Option<f64>, view_height: Option<f64>) -> Self {
+        match self {
+            Self::Perspective { fov: own } => Self::Perspective { fov: fov.unwrap_or(own) },
+            Self::Orthographic { view_height: own } => {
+                Self::Orthographic { view_height: view_height.unwrap_or(own) }
+            }
+            Self::Spherical => Self::Spherical,
+            Self::Fisheye { fov: own } => Self::Fisheye { fov: fov.unwrap_or(own) },
+        }
+    }
+}
+
+/// Part of the image plane that the image shows.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ImageWindow {
+    /// Offset of the window to the right and up, in units of the image height.
+    pub shift: DVec2,
+    /// Whether the image is flipped horizontally, after the shift.
+    pub mirror: bool,
+}
 
 /// A scene's camera.
 #[derive(Clone, Debug, PartialEq)]
@@ -17,8 +112,10 @@ pub enum Camera {
         look_at: DVec3,
         /// Up direction in the image.
         up: DVec3,
-        /// Vertical field of view in degrees, in (0, 180).
-        fov: f64,
+        /// Mapping from image positions to rays.
+        projection: Projection,
+        /// Part of the image plane that the image shows.
+        window: ImageWindow,
         /// Lens radius, ≥ 0.
         aperture: f64,
         /// Focus distance along the view axis, > 0.
@@ -28,8 +125,10 @@ pub enum Camera {
     Orbiter {
         /// The orbiter file.
         file: Spanned<PathBuf>,
-        /// Vertical field of view in degrees, in (0, 180). `None` uses the field of view in the file.
-        fov: Option<f64>,
+        /// Mapping from image positions to rays. `None` is a perspective with the field of view in the file.
+        projection: Option<Projection>,
+        /// Part of the image plane that the image shows.
+        window: ImageWindow,
         /// Lens radius, ≥ 0.
         aperture: f64,
         /// Focus distance. `None` focuses on the orbiter's center.
@@ -43,8 +142,10 @@ pub enum Camera {
 pub struct ResolvedCamera {
     /// Position and orientation.
     pub pose: Pose,
-    /// Vertical field of view in degrees.
-    pub fov: f64,
+    /// Mapping from image positions to rays.
+    pub projection: Projection,
+    /// Part of the image plane that the image shows.
+    pub window: ImageWindow,
     /// Lens radius.
     pub aperture: f64,
     /// Focus distance along the view axis.
@@ -67,8 +168,10 @@ pub struct Pose {
 pub struct CameraOverrides {
     /// Position and orientation.
     pub pose: Option<Pose>,
-    /// Vertical field of view in degrees, in (0, 180).
+    /// Field of view in degrees, in the projection's range. Ignored by projections without one.
     pub fov: Option<f64>,
+    /// Height of an orthographic image in scene units, > 0. Ignored by other projections.
+    pub view_height: Option<f64>,
     /// Focus distance, > 0.
     pub focus: Option<f64>,
 }
@@ -95,9 +198,9 @@ impl ResolvedCamera {
         let focus = if self.is_focused_on_look_at() { pose.distance() } else { self.focus };
         Self {
             pose,
-            fov: change.fov.unwrap_or(self.fov),
+            projection: self.projection.with_change(change.fov, change.view_height),
             focus: change.focus.unwrap_or(focus),
-            aperture: self.aperture,
+            ..*self
         }
     }
 
@@ -109,8 +212,9 @@ impl ResolvedCamera {
 
 impl From<ResolvedCamera> for Camera {
     fn from(view: ResolvedCamera) -> Self {
-        let ResolvedCamera { pose: Pose { position, look_at, up }, fov, aperture, focus } = view;
-        Self::LookAt { position, look_at, up, fov, aperture, focus }
+        let ResolvedCamera { pose: Pose { position, look_at, up }, projection, window, aperture, focus } =
+            view;
+        Self::LookAt { position, look_at, up, projection, window, aperture, focus }
     }
 }
 
@@ -140,24 +244,37 @@ impl Camera {
     }
 }
 
+impl Fingerprinted for Projection {
+    fn add_to(&self, key: &mut FingerprintHasher, _: &FingerprintContext<'_>) {
+        let size = self.fov().or(self.view_height());
+        key.add_choice(self.kind()).add_f64(size.unwrap_or(0.0));
+    }
+}
+
 impl Fingerprinted for Camera {
     fn add_to(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
-        match self {
-            Self::LookAt { position, look_at, up, fov, aperture, focus } => {
+        let window = match self {
+            Self::LookAt { position, look_at, up, projection, window, aperture, focus } => {
                 key.add_usize(0)
                     .add_dvec3(*position)
                     .add_dvec3(*look_at)
                     .add_dvec3(*up)
-                    .add_f64(*fov)
+                    .add(projection, of)
                     .add_f64(*aperture)
                     .add_f64(*focus);
+                window
             }
             // Hash the file's contents rather than its name.
-            Self::Orbiter { file: _, fov, aperture, focus } => {
-                // 0 is neither a valid angle nor a valid distance.
-                key.add_usize(1).add_f64(*aperture).add_f64(fov.unwrap_or(0.0)).add_f64(focus.unwrap_or(0.0));
-                key.add_str(of.orbiter.unwrap_or(""));
+            Self::Orbiter { file: _, projection, window, aperture, focus } => {
+                key.add_usize(1).add_f64(*aperture).add_bool(projection.is_some());
+                if let Some(projection) = projection {
+                    key.add(projection, of);
+                }
+                // 0 is not a valid distance.
+                key.add_f64(focus.unwrap_or(0.0)).add_str(of.orbiter.unwrap_or(""));
+                window
             }
-        }
+        };
+        key.add_f64(window.shift.x).add_f64(window.shift.y).add_bool(window.mirror);
     }
 }

@@ -6,7 +6,7 @@ use super::super::fingerprint::{FingerprintContext, FingerprintHasher, Fingerpri
 use super::Spanned;
 use crate::lights;
 pub use crate::lights::delta::Falloff;
-use crate::math::{DVec3, Vec3};
+use crate::math::{DMat3, DVec3, Vec3};
 
 /// A light that is not a shape.
 #[derive(Clone, Debug, PartialEq)]
@@ -61,8 +61,17 @@ pub struct Environment {
     pub color: Vec3,
     /// Path to an equirectangular map, resolved against the scene's folder.
     pub file: Option<Spanned<PathBuf>>,
-    /// Rotation of the map about +y in degrees, counterclockwise when seen from above.
-    pub rotate: f64,
+    /// Orientation of the map.
+    pub orientation: MapOrientation,
+}
+
+/// Orientation of an environment map.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum MapOrientation {
+    /// Rotation about +y in degrees, counterclockwise when seen from above.
+    Turn(f64),
+    /// Rotation from the map's axes to the world's.
+    Rotation(DMat3),
 }
 
 impl Light {
@@ -156,8 +165,14 @@ impl Fingerprinted for PointLight {
 /// Covers only the lookup parameters. The texels have a separate fingerprint.
 impl Fingerprinted for Environment {
     fn add_to(&self, key: &mut FingerprintHasher, _: &FingerprintContext<'_>) {
-        let Self { color, file, rotate } = self;
-        key.add_vec3(*color).add_f64(*rotate).add_bool(file.is_some());
+        let Self { color, file, orientation } = self;
+        key.add_vec3(*color).add_bool(file.is_some());
+        match orientation {
+            MapOrientation::Turn(degrees) => key.add_usize(0).add_f64(*degrees),
+            MapOrientation::Rotation(DMat3 { x_axis, y_axis, z_axis }) => {
+                key.add_usize(1).add_dvec3(*x_axis).add_dvec3(*y_axis).add_dvec3(*z_axis)
+            }
+        };
         if let Some(file) = file {
             key.add_path_bytes(&file.value);
         }

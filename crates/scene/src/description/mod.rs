@@ -15,8 +15,10 @@ use std::collections::HashSet;
 use std::ops::Range;
 use std::path::PathBuf;
 
-pub use camera::{Camera, CameraOverrides, Pose, ResolvedCamera, is_same_distance};
-pub use light::{Environment, Light};
+pub use camera::{
+    Camera, CameraOverrides, ImageWindow, Pose, Projection, ProjectionKind, ResolvedCamera, is_same_distance,
+};
+pub use light::{Environment, Light, MapOrientation};
 pub use material::{
     Bump, Channel, ChannelSelector, ColorSource, EmissionSides, EmissionSource, FresnelSource, Material,
     MaterialKind, NormalMap, NumberSource, OpacitySource, PhongParameters, PixelInterpretation, Texture,

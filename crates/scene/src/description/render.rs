@@ -47,6 +47,8 @@ macro_rules! __render_keys {
             background: Vec3 = Vec3::ZERO, color, "radiance", scene;
             /// Pixel reconstruction filter.
             filter: PixelFilter = PixelFilter::Box, choice, "", scene;
+            /// Factor on the image, in float files too.
+            gain: f32 = 1.0, at_least(0.0), "", scene;
             /// Image exposure: each stop doubles the brightness.
             exposure: f32 = 0.0, between(-100.0, 100.0), "stops", live;
             /// Tone curve for 8- and 16-bit formats and the screen.
@@ -226,6 +228,7 @@ impl Fingerprinted for RenderOptions {
             ambient,
             background,
             filter,
+            gain,
             // These affect only the output.
             exposure: _,
             tonemap: _,
@@ -245,6 +248,7 @@ impl Fingerprinted for RenderOptions {
             .add_vec3(ambient)
             .add_vec3(background)
             .add_choice(filter)
+            .add_f32(gain)
             .add_u64(seed.into());
     }
 }

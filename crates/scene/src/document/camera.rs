@@ -1,13 +1,15 @@
 //! The `[camera]` table.
 
-use super::super::description::Camera;
-use super::super::keys::key::DefaultValue::{Absent, By, Is, Required};
-use super::super::keys::key::ValueKind::{File, Number};
-use super::super::keys::key::{DIRECTION, POINT, TableInfo, TableSyntax, keys};
+use super::super::description::{Camera, ImageWindow, Projection, ProjectionKind};
+use super::super::keys::key::DefaultValue::{Absent, Alternative, By, Is, Required};
+use super::super::keys::key::ValueKind::{File, Flag, Number, Numbers, Words};
+use super::super::keys::key::{DIRECTION, POINT, TableInfo, TableSyntax, choice_values, keys};
 use super::context::Issue;
-use super::limits::Limits::{Inside, Length, LengthOrZero};
+use super::key::KeyInTable;
+use super::limits::Limits::{Between, Length, LengthOrZero, UpTo};
 use super::table::TableReader;
-use crate::math::DVec3;
+use crate::choice::Choice;
+use crate::math::{DVec2, DVec3};
 
 pub(crate) static CAMERA: TableInfo = TableInfo::new(
     "camera",
@@ -20,9 +22,17 @@ pub(crate) static CAMERA: TableInfo = TableInfo::new(
         look_at: POINT, Required("[0, 1, 0]"), "length";
         /// Up direction in the image; not parallel to the view direction.
         up: DIRECTION, Is("[0, 1, 0]");
-        /// Vertical field of view.
-        fov: Number(Inside(0.0, 180.0)), Is("40.0"), "degrees";
-        /// Lens radius; 0 is a pinhole without depth of field.
+        /// How the camera maps the scene to the image.
+        projection: Words(choice_values::<ProjectionKind>), Is("\"perspective\"");
+        /// Vertical field of view of a perspective, less than 180, or of a fisheye.
+        fov: Number(UpTo(0.0, 360.0)), Is("40.0"), "degrees";
+        /// Height of an orthographic image; required there instead of `fov`.
+        view_height: Number(Length), Alternative("4.0"), "length";
+        /// Offset of the image to the right and up, such as for architecture without converging verticals.
+        shift: Numbers(2, "two numbers", Between(-1000.0, 1000.0)), Is("[0, 0]"), "image heights";
+        /// Flips the image horizontally.
+        mirror: Flag, Is("false");
+        /// Lens radius of a perspective or orthographic camera; 0 is a pinhole without depth of field.
         aperture: Number(LengthOrZero), Is("0.0"), "length";
         /// Focus distance along the view axis.
         focus: Number(Length), By("the distance to `look_at`"), "length";
@@ -72,9 +82,8 @@ fn read_look_at_camera(table: &TableReader<'_>) -> Option<Camera> {
     let (position_key, look_at_key) = (table.key("position"), table.key("look_at"));
     let (position, look_at) = (position_key.vector(), look_at_key.vector());
     let up_vector = table.key("up").vector();
-    let [fov, aperture, focus] = ["fov", "aperture", "focus"].map(|name| table.key(name));
-    let (fov, aperture) = (fov.number(), aperture.number());
-    let focus = focus.number();
+    let (projection, window) = (read_projection(table), read_window(table));
+    let [aperture, focus] = read_lens(table, projection.map(Projection::kind));
 
     let (position, look_at) = (position?, look_at?);
     if !position_key.check_points_equal_or_far_apart(position, &look_at_key, look_at) {
@@ -91,7 +100,89 @@ fn read_look_at_camera(table: &TableReader<'_>) -> Option<Camera> {
     };
     let up = check_up_vector(table, direction, up_vector?)?;
     let focus = focus.unwrap_or(view.length());
-    Some(Camera::LookAt { position, look_at, up, fov: fov?, aperture: aperture?, focus })
+    Some(Camera::LookAt {
+        position,
+        look_at,
+        up,
+        projection: projection?,
+        window: window?,
+        aperture: aperture?,
+        focus,
+    })
+}
+
+/// Reads the projection and the key for its size.
+fn read_projection(table: &TableReader<'_>) -> Option<Projection> {
+    let [projection, fov, view_height] = ["projection", "fov", "view_height"].map(|name| table.key(name));
+    let kind = projection.choice()?;
+    reject_unused_keys(table, kind);
+    match kind {
+        ProjectionKind::Perspective => {
+            let degrees = fov.number()?;
+            let span = fov.value_span().filter(|_| degrees >= 180.0);
+            if let Some(span) = span {
+                let issue = Issue::error(span, "`fov` of a perspective must be less than 180");
+                let issue = issue.with_label(format!("found {degrees}"));
+                table.context.report(issue.with_help("for a wider view, use `projection = \"fisheye\"`"));
+                return None;
+            }
+            Some(Projection::Perspective { fov: degrees })
+        }
+        ProjectionKind::Orthographic => {
+            table.required_alternative(view_height.info.name);
+            Some(Projection::Orthographic { view_height: view_height.number()? })
+        }
+        ProjectionKind::Panorama => Some(Projection::Spherical),
+        ProjectionKind::Fisheye => Some(Projection::Fisheye { fov: fov.number()? }),
+    }
+}
+
+/// Reports keys that the projection does not use. If `--set` chooses the projection, the scene file may
+/// contain such keys.
+fn reject_unused_keys(table: &TableReader<'_>, kind: ProjectionKind) {
+    const NO_LENS: &str = "this projection has no lens, so everything is sharp; remove the key";
+    let unused: &[(&'static str, &str)] = match kind {
+        ProjectionKind::Perspective => {
+            &[("view_height", "use `fov`, or add `projection = \"orthographic\"`")]
+        }
+        ProjectionKind::Orthographic => &[("fov", "`view_height` is the height of the view; remove `fov`")],
+        ProjectionKind::Panorama => &[
+            ("fov", "a panorama shows all directions; remove the key"),
+            ("view_height", "a panorama shows all directions; remove the key"),
+            ("aperture", NO_LENS),
+            ("focus", NO_LENS),
+        ],
+        ProjectionKind::Fisheye => &[("view_height", "use `fov`"), ("aperture", NO_LENS), ("focus", NO_LENS)],
+    };
+    let is_set =
+        |key: &KeyInTable<'_>| key.value_span().is_some_and(|span| table.context.is_span_in_set_arg(&span));
+    let is_chosen = is_set(&table.key("projection"));
+    for &(name, help) in unused {
+        let key = table.key(name);
+        if key.is_present() && (!is_chosen || is_set(&key)) {
+            let message = format!("`{name}` conflicts with `projection = \"{}\"`", kind.name());
+            table.reject_key(name, &message, Some(help));
+        }
+    }
+}
+
+fn read_window(table: &TableReader<'_>) -> Option<ImageWindow> {
+    let shift = table.key("shift").numbers("two numbers, [right, up]").map(DVec2::from_array);
+    let mirror = table.key("mirror").boolean();
+    Some(ImageWindow { shift: shift?, mirror: mirror? })
+}
+
+/// Reads aperture and focus. Projections without a lens have the default values.
+fn read_lens(table: &TableReader<'_>, kind: Option<ProjectionKind>) -> [Option<f64>; 2] {
+    let [aperture, focus] = ["aperture", "focus"].map(|name| table.key(name));
+    match kind {
+        Some(ProjectionKind::Panorama | ProjectionKind::Fisheye) => {
+            [Some(aperture.default(KeyInTable::number)), None]
+        }
+        Some(ProjectionKind::Perspective | ProjectionKind::Orthographic) | None => {
+            [aperture.number(), focus.number()]
+        }
+    }
 }
 
 /// Returns `up` if it is long enough and not parallel to `view`.
@@ -124,14 +215,17 @@ fn check_up_vector(table: &TableReader<'_>, view: DVec3, up: DVec3) -> Option<DV
 
 fn read_orbiter_camera(table: &TableReader<'_>) -> Option<Camera> {
     let file = table.key("orbiter").existing_file();
-    let fov = table.key("fov");
-    // Without this key, the file's field of view applies.
-    let fov = if fov.is_present() { fov.number().map(Some) } else { Some(None) };
-    let (aperture, focus) = (table.key("aperture").number(), table.key("focus").number());
+    let (projection, window) = (read_projection(table), read_window(table));
+    let [aperture, focus] = read_lens(table, projection.map(Projection::kind));
+    // Without `fov`, the file's field of view applies.
+    let is_of_file = |projection: &Projection| {
+        projection.kind() == ProjectionKind::Perspective && !table.key("fov").is_present()
+    };
     for name in ["position", "look_at", "up"] {
         let message = format!("`{name}` conflicts with `orbiter`");
         let help = "the orbiter file already sets the camera position; remove one of the two";
         table.reject_key(name, &message, Some(help));
     }
-    Some(Camera::Orbiter { file: file?, fov: fov?, aperture: aperture?, focus })
+    let projection = Some(projection?).filter(|projection| !is_of_file(projection));
+    Some(Camera::Orbiter { file: file?, projection, window: window?, aperture: aperture?, focus })
 }

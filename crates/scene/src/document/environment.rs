@@ -1,9 +1,9 @@
 //! The `[environment]` table.
 
-use super::super::description::{Environment, Scene};
+use super::super::description::{Environment, MapOrientation, Scene};
 use super::super::keys::endings::MAPS;
 use super::super::keys::key::DefaultValue::{Absent, By, Is};
-use super::super::keys::key::ValueKind::{File, Number};
+use super::super::keys::key::ValueKind::{File, Number, Rotation};
 use super::super::keys::key::{COLOR, TableInfo, TableSyntax, keys};
 use super::context::Issue;
 use super::limits::Limits::Any;
@@ -22,6 +22,8 @@ pub(crate) static ENVIRONMENT: TableInfo = TableInfo::new(
         file: File(MAPS), Absent;
         /// Rotation of the map about +y, counterclockwise seen from above.
         rotate: Number(Any), Is("0.0"), "degrees";
+        /// Rotation from the map's own axes to the world's, instead of `rotate`: 9 or 16 numbers, row by row.
+        matrix: Rotation, Absent;
     },
 );
 
@@ -35,19 +37,27 @@ pub(super) fn read_environment(root: &TableReader<'_>) -> Option<Option<Environm
     let map = if file.is_present() { file.existing_file().map(Some) } else { Some(None) };
     let default = if file.is_present() { Vec3::ONE } else { Vec3::ZERO };
     let radiance = if color.is_present() { color.color() } else { Some(default) };
-    let rotate = table.key("rotate");
-    let degrees = rotate.number();
+    let (rotate, matrix) = (table.key("rotate"), table.key("matrix"));
+    let orientation = if matrix.is_present() {
+        table.reject_key("rotate", "`rotate` conflicts with `matrix`", Some("remove one of the two"));
+        matrix.rotation().map(MapOrientation::Rotation)
+    } else {
+        rotate.number().map(MapOrientation::Turn)
+    };
     table.report_unknown_and_missing_keys();
     if let (Some(Vec3::ZERO), Some(span)) = (radiance, color.value_span().filter(|_| file.is_present())) {
         let issue = Issue::warning(span, "`color` is black, so the environment is black")
             .with_label("this scales the map in `file`");
         table.context.report(issue.with_help("remove it to use the map unchanged"));
     }
-    if let Some(span) = rotate.value_span().filter(|_| !file.is_present()) {
-        let issue = Issue::warning(span, "`rotate` has no effect without `file`");
-        table.context.report(issue.with_help("a constant environment looks the same from every direction"));
+    for key in [rotate, matrix] {
+        if let Some(span) = key.value_span().filter(|_| !file.is_present()) {
+            let issue = Issue::warning(span, format!("`{}` has no effect without `file`", key.info.name));
+            let help = "a constant environment looks the same from every direction";
+            table.context.report(issue.with_help(help));
+        }
     }
-    Some(Some(Environment { color: radiance?, file: map?, rotate: degrees? }))
+    Some(Some(Environment { color: radiance?, file: map?, orientation: orientation? }))
 }
 
 /// Warns about a background that the environment hides.

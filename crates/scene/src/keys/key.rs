@@ -87,6 +87,8 @@ pub enum ValueKind {
     Numbers(usize, &'static str, Limits),
     /// A number or an array of three numbers.
     Scale(Limits),
+    /// A rotation matrix of 9 or 16 numbers, row by row.
+    Rotation,
     /// The name of a texture.
     Texture,
     /// The name of a height map, optionally with a channel.
@@ -115,7 +117,8 @@ impl ValueKind {
             | Self::Emission(_)
             | Self::NumberOrTexture(_)
             | Self::Numbers(..)
-            | Self::Scale(_) => None,
+            | Self::Scale(_)
+            | Self::Rotation => None,
         }
     }
 
@@ -134,6 +137,7 @@ impl ValueKind {
             | Self::Words(_)
             | Self::Text
             | Self::File(_)
+            | Self::Rotation
             | Self::Texture
             | Self::Heights
             | Self::Material
@@ -361,6 +365,7 @@ impl ValueKind {
             }
             Self::File(endings) => format!("\"file.{}\"", endings.first().copied().unwrap_or("txt")),
             Self::Color(_) | Self::ColorOrTexture(_) | Self::Emission(_) => "[0.5, 0.5, 0.5]".to_owned(),
+            Self::Rotation => "[1, 0, 0, 0, 1, 0, 0, 0, 1]".to_owned(),
             // The identity matrix.
             Self::Numbers(16, ..) => {
                 let number = |i: usize| if i.is_multiple_of(5) { "1" } else { "0" };
@@ -386,6 +391,7 @@ impl ValueKind {
             Self::NumberOrTexture(_) => "number or texture".to_owned(),
             Self::Numbers(_, words, _) => words.to_owned(),
             Self::Scale(_) => "number or three numbers".to_owned(),
+            Self::Rotation => "9 or 16 numbers".to_owned(),
             Self::Texture => "name of a texture".to_owned(),
             Self::Heights => "name of a texture, or `{ texture = \"NAME\", channel = \"r\" }`".to_owned(),
             Self::Material => "name of a material".to_owned(),

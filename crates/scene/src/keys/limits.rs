@@ -19,6 +19,8 @@ pub enum Limits {
     Between(f64, f64),
     /// Exclusive bounds.
     Inside(f64, f64),
+    /// Greater than the first bound, and at most the second.
+    UpTo(f64, f64),
 }
 
 impl Limits {
@@ -52,6 +54,7 @@ impl Limits {
             Self::LengthOrZero => number >= 0.0,
             Self::Between(least, most) => (least..=most).contains(&number),
             Self::Inside(low, high) => low < number && number < high,
+            Self::UpTo(low, most) => low < number && number <= most,
         }
     }
 
@@ -65,6 +68,7 @@ impl Limits {
             Self::LengthOrZero => "0 …".to_owned(),
             Self::Between(least, most) => format!("{least} … {most}"),
             Self::Inside(low, high) => format!("> {low}, < {high}"),
+            Self::UpTo(low, most) => format!("> {low}, ≤ {most}"),
         }
     }
 
@@ -77,6 +81,7 @@ impl Limits {
             Self::LengthOrZero => "must be at least 0".to_owned(),
             Self::Between(least, most) => format!("must be between {least} and {most}"),
             Self::Inside(low, high) => format!("must be greater than {low} and less than {high}"),
+            Self::UpTo(low, most) => format!("must be greater than {low} and at most {most}"),
         }
     }
 }
@@ -92,6 +97,7 @@ mod tests {
         assert!(!ok(Limits::Length, 0.0) && ok(Limits::Length, 1e-9) && !ok(Limits::Length, 1e-30));
         assert!(!ok(Limits::Inside(0.0, 180.0), 180.0) && ok(Limits::Between(0.0, 1.0), 1.0));
         assert!(ok(Limits::LengthOrZero, 0.0) && !ok(Limits::LengthOrZero, 1e-30));
+        assert!(ok(Limits::UpTo(0.0, 360.0), 360.0) && !ok(Limits::UpTo(0.0, 360.0), 0.0));
         assert!(!ok(Limits::NotZero, -0.0) && ok(Limits::NotZero, -2.0));
         for bad in [f64::NAN, f64::INFINITY, 1.1e18, -1e300] {
             assert!(!ok(Limits::Any, bad), "{bad}");

@@ -144,7 +144,7 @@ fn count_nearby_photons(
     [&pass.caustic, &pass.bounced].map(|map| map.count_near(&look, PortableSimd) as f32).iter().sum()
 }
 
-/// Depth of a surface point along the view axis.
+/// Depth of a surface point as seen from the camera.
 fn view_depth(tile: &TileContext<'_>, point: Vec3) -> f32 {
     tile.world.camera.depth_of(point.as_dvec3()).max(0.0) as f32
 }

@@ -6,7 +6,7 @@ use crate::control::Cancelled;
 use crate::geometry::{Aabb, Ray};
 use crate::math::Vec3;
 use crate::math::elementary::exp2;
-use crate::world::{RayBoxInterval, TreeNodeInfo};
+use crate::world::{PixelFootprint, RayBoxInterval, TreeNodeInfo};
 
 /// Line width in pixels.
 const LINE_WIDTH: f32 = 1.25;
@@ -41,12 +41,12 @@ pub fn draw_box_edges(
     radiance: &mut [Vec3],
 ) -> Result<(), Cancelled> {
     let render = &tile.settings.render;
-    let spread = tile.world.camera.pixel_spread(render.height);
+    let footprint = tile.world.camera.pixel_footprint(render.height);
     let brightness = exp2(-render.exposure);
     tile.closest_hits(&scratch.rays, &mut scratch.hits)?;
     for (path, hit) in scratch.rays.iter().zip(&scratch.hits) {
         let end = hit.map_or(f32::INFINITY, |hit| hit.shape.t);
-        if let Some(NearbyBoxEdge { is_behind, depth }) = find_edge_to_draw(tile, &path.ray, end, spread) {
+        if let Some(NearbyBoxEdge { is_behind, depth }) = find_edge_to_draw(tile, &path.ray, end, footprint) {
             let color = COLORS[depth as usize % COLORS.len()] * brightness;
             let own = &mut radiance[path.slot as usize];
             *own = own.lerp(color, if is_behind { HIDDEN_OPACITY } else { 1.0 });
@@ -57,11 +57,16 @@ pub fn draw_box_edges(
 
 /// The box edge to draw for a ray. Edges in front of the surface at `end` take priority over edges behind it.
 /// Otherwise, larger boxes take priority over smaller boxes.
-fn find_edge_to_draw(tile: &TileContext<'_>, ray: &Ray, end: f32, spread: f32) -> Option<NearbyBoxEdge> {
+fn find_edge_to_draw(
+    tile: &TileContext<'_>,
+    ray: &Ray,
+    end: f32,
+    footprint: PixelFootprint,
+) -> Option<NearbyBoxEdge> {
     let mut best: Option<NearbyBoxEdge> = None;
     tile.world.geometry.visit_nodes_along_ray(ray, |local, TreeNodeInfo { bounds, depth, .. }, stretch| {
         let unit = local.direction.length();
-        let pixel = |t: f32| t * spread * unit;
+        let pixel = |t: f32| (footprint.width + t * footprint.spread) * unit;
         let RayBoxInterval { enter, leave } = *stretch;
         let size = bounds.extent().length();
         if size < MIN_BOX_SIZE * pixel(enter.0.max(0.0)) {

@@ -188,6 +188,15 @@ impl SampleLayerValues {
         }
     }
 
+    /// Multiplies the light components of all samples by `gain`.
+    pub fn scale_light(&mut self, gain: f32) {
+        let first_hits =
+            self.set.iter().filter(|layer| LayerSet::FIRST_HIT.0 & 1 << *layer as u8 != 0).count();
+        for sample in self.values.chunks_mut(self.size.max(1)) {
+            sample[3 * first_hits..].iter_mut().for_each(|value| *value *= gain);
+        }
+    }
+
     /// Ends the batch and adds its values to the sums of the pixels. There are `samples` samples per pixel.
     /// `radiance` and `is_negative` describe the samples of all pixels. Where the radiance is not finite, all
     /// values are replaced with zero, just as the film replaces the radiance.

@@ -98,7 +98,8 @@ pub fn render_tile_with_layers(
     token: &CancelToken,
 ) -> Result<(TileSamples, RayCounters), Cancelled> {
     // Allocate the samples.
-    let block = SampleBlock { pixels, samples };
+    let mirrored_width = world.camera.is_mirrored().then_some(settings.render.width);
+    let block = SampleBlock { pixels, samples, mirrored_width };
     let weight = settings.render.filter.negative_weight();
     let mut is_negative = vec![false; if weight.is_some() { block.len() } else { 0 }];
     let mut radiance = vec![Vec3::ZERO; block.len()];
@@ -112,6 +113,10 @@ pub fn render_tile_with_layers(
         0.0
     } else {
         settings.render.clamp
+    };
+    let gain = match settings.view.aov_source().light_transport_aov_or_all() {
+        LightAov::Radiance(_) => settings.render.gain,
+        LightAov::LitFraction | LightAov::TraversalCost => 1.0,
     };
     // Render one batch after another.
     let mut memory = ThreadMemory::take_from_thread();
@@ -146,6 +151,10 @@ pub fn render_tile_with_layers(
                     &mut counters,
                     negative,
                 )?;
+                if gain != 1.0 {
+                    radiance[start..slots.end as usize].iter_mut().for_each(|radiance| *radiance *= gain);
+                    values.scale_light(gain);
+                }
                 if shown == AovSource::Bounds {
                     tile.replace_queue_with_camera_rays(slots, &mut memory.scratch.rays, |_, _| {});
                     bounds::draw_box_edges(&tile, &mut memory.scratch, &mut radiance)?;

@@ -233,7 +233,7 @@ impl CameraWavefront<'_, '_> {
         let policy = || BounceContinuation::new(self.tile, self.depth, LobesToSample::All);
         self.continuation = self.tile.behavior.scatters.then(policy);
         let has_fractions = self.accumulator.fractions().is_some();
-        self.direct.begin_bounce(paths, self.tile.pixel_spread > 0.0, has_fractions);
+        self.direct.begin_bounce(paths, self.tile.camera_cone.is_some(), has_fractions);
     }
 
     /// Starts the next bounce with the rays generated in this bounce, reusing the old queue for output.

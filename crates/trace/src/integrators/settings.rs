@@ -1,10 +1,11 @@
 //! Render settings.
 
 use super::{AovSource, FirstHitQuantity, LayerSet, LightAov, ViewMode};
-use crate::math::{DVec2, Vec3};
+use crate::geometry::Ray;
+use crate::math::{DVec2, Vec2, Vec3};
 use crate::scene::description::RenderOptions;
 use crate::scene::fingerprint::{FingerprintContext, FingerprintHasher, Fingerprinted};
-use crate::world::TextureRolesNeededByRender;
+use crate::world::{Camera, FilmPosition, TextureRolesNeededByRender};
 
 /// Settings for rendering a world.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -102,13 +103,22 @@ impl RenderSettings {
         }
     }
 
-    /// Converts a position in pixels, measured from the image's top left corner, to camera units: the offsets
-    /// right of and above the image center, in units of half the image height.
+    /// Converts a position in pixels, measured from the image's top left corner, to a film position.
     #[inline(always)]
-    pub fn pixel_to_image_plane(&self, from_corner: DVec2) -> DVec2 {
+    pub fn film_position(&self, from_corner: DVec2) -> FilmPosition {
         let RenderOptions { width, height, .. } = self.render;
         let (half_width, half_height) = (0.5 * f64::from(width), 0.5 * f64::from(height));
-        DVec2::new(from_corner.x - half_width, half_height - from_corner.y) * (1.0 / half_height)
+        let scale = 1.0 / half_height;
+        let offset = DVec2::new(from_corner.x - half_width, half_height - from_corner.y) * scale;
+        FilmPosition { offset, half_width: half_width * scale }
+    }
+
+    /// Returns the ray for the pixel in column `x` and row `y` of the image as shown: the ray
+    /// through the pixel's center and the center of the lens, or `None` if the camera has no ray there.
+    pub fn ray_through_pixel(&self, camera: &Camera, [x, y]: [u32; 2]) -> Option<Ray> {
+        let x = if camera.is_mirrored() { self.render.width - 1 - x } else { x };
+        let center = DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5);
+        camera.ray(self.film_position(center), Vec2::ZERO)
     }
 }
 

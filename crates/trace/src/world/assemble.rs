@@ -42,6 +42,7 @@ impl World {
             lens_glass: Vec::new(),
             enclosing_glass: Box::default(),
             camera_solids: Vec::new(),
+            solids_near_ray_origins: Vec::new(),
             has_second_uvs: scene_uses_second_uvs(scene, inputs),
             colored: vertex_color_usage_by_object(scene),
             see_through: None,
@@ -51,6 +52,7 @@ impl World {
             lens_glass: world.find_closed_glass_near_lens(),
             enclosing_glass: world.closed_glass_shapes_by_subtree(),
             camera_solids: world.find_solids_around_camera(),
+            solids_near_ray_origins: world.find_solids_near_ray_origins(),
             see_through: SeeThroughObjects::from_world(&world).map(Box::new),
             ..world
         }

@@ -1,56 +1,138 @@
-//! Pinhole and thin-lens camera.
+//! Cameras: perspective and orthographic with a thin lens, equirectangular panoramas and fisheyes.
+
+use std::f64::consts::{FRAC_PI_2, PI};
 
 use crate::assets::GkitOrbiterCamera;
-use crate::geometry::Ray;
+use crate::geometry::packet::RayPacket;
+use crate::geometry::{Aabb, Ray};
 use crate::math::decimal::{decimal_step_at_distance, round_to_step};
+use crate::math::elementary::sin_cos_f64;
+use crate::math::lanes::{F32x16, PACKET_SIZE, set_lane};
 use crate::math::transform::rotation_xyz;
-use crate::math::{DMat3, DVec2, DVec3, Vec2};
-use crate::scene::description::{self, Pose, ResolvedCamera};
+use crate::math::{DMat3, DVec2, DVec3, Vec2, Vec3};
+use crate::scene::description::{self, ImageWindow, Pose, ResolvedCamera};
 
-/// A perspective camera with a plane of focus.
+/// A camera. All projections have the same axes: `look_at` is at the center of an image that is not shifted.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
-    /// Center of the lens.
+    /// Center of the lens. For an orthographic camera, a point on the plane on which the rays start.
     pub position: DVec3,
     /// Orthonormal axes: image right, image up, and view direction.
     right: DVec3,
     up: DVec3,
     forward: DVec3,
-    /// Tangent of half the vertical field of view.
-    tan_half_fov: f64,
+    projection: Projection,
+    /// Whether the image is flipped horizontally.
+    mirror: bool,
     /// Lens radius, or 0 for a pinhole.
     pub aperture: f64,
     /// Distance to the plane of focus along the view axis.
     pub focus: f64,
 }
 
+/// Mapping from image positions to rays, with the constants that it needs. Names as in pbrt.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Projection {
+    /// Rays through one point, onto a flat image.
+    Perspective {
+        /// Direction towards the image center. Its component along the view axis is 1.
+        center: DVec3,
+        /// Tangent of half the vertical field of view.
+        tan_half_fov: f64,
+    },
+    /// Parallel rays that start on the plane through the camera's position.
+    Orthographic {
+        /// Offset of the image center from the camera's position.
+        center: DVec3,
+        /// Half the height of the image in scene units.
+        half_height: f64,
+    },
+    /// Equirectangular image of all directions, in the coordinates of environment maps.
+    Spherical {
+        /// Offset of the image center in units of half the image height.
+        shift: DVec2,
+    },
+    /// Equidistant fisheye.
+    Fisheye {
+        /// Offset of the image center in units of half the image height.
+        shift: DVec2,
+        /// Angle from the view axis at the top of the circle, in radians.
+        half_fov: f64,
+    },
+}
+
+/// A position on the film.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FilmPosition {
+    /// Offset to the right of and above the image center, in units of half the image height.
+    pub offset: DVec2,
+    /// Half the image width in the same units.
+    pub half_width: f64,
+}
+
+/// The film positions of a packet of rays.
+#[derive(Clone, Copy, Debug)]
+pub struct FilmPositionPacket {
+    /// Offsets to the right of and above the image center, in units of half the image height.
+    pub offset: [[f64; PACKET_SIZE]; 2],
+    /// Half the image width in the same units.
+    pub half_width: f64,
+}
+
+/// Width of a pixel's footprint at the center of the image, as a function of distance.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PixelFootprint {
+    /// Width at the start of the rays.
+    pub width: f32,
+    /// Increase of the width per unit of distance.
+    pub spread: f32,
+}
+
 impl Camera {
     /// Creates the camera described by the scene, using the contents of the orbiter file if there is one.
     pub fn from_description(camera: &description::Camera, orbiter: Option<&GkitOrbiterCamera>) -> Self {
         match camera {
-            description::Camera::LookAt { position, look_at, up, fov, aperture, focus } => {
+            description::Camera::LookAt { position, look_at, up, projection, window, aperture, focus } => {
                 let forward = (*look_at - *position).normalize();
                 let right = forward.cross(*up).normalize();
-                Self {
-                    position: *position,
-                    right,
-                    up: right.cross(forward),
-                    forward,
-                    tan_half_fov: libm::tan(fov.to_radians() * 0.5),
-                    aperture: *aperture,
-                    focus: *focus,
-                }
+                let axes = [right, right.cross(forward), forward];
+                Self::from_axes(*position, axes, *projection, window, [*aperture, *focus])
             }
-            description::Camera::Orbiter { fov, aperture, focus, .. } => {
-                let file = orbiter.copied().unwrap_or(DEFAULT_ORBITER);
-                let orbiter = GkitOrbiterCamera { fov: fov.unwrap_or(file.fov), ..file };
-                Self {
-                    aperture: *aperture,
-                    focus: focus.unwrap_or(orbiter.size),
-                    ..Self::from_orbiter(&orbiter)
-                }
+            description::Camera::Orbiter { projection, window, aperture, focus, .. } => {
+                let orbiter = orbiter.copied().unwrap_or(DEFAULT_ORBITER);
+                let of_file = description::Projection::Perspective { fov: orbiter.fov };
+                let lens = [*aperture, focus.unwrap_or(orbiter.size)];
+                let (position, axes) = orbiter_position_and_axes(&orbiter);
+                Self::from_axes(position, axes, projection.unwrap_or(of_file), window, lens)
             }
         }
+    }
+
+    /// Creates a camera with the axes right, up and forward.
+    fn from_axes(
+        position: DVec3,
+        [right, up, forward]: [DVec3; 3],
+        projection: description::Projection,
+        window: &ImageWindow,
+        [aperture, focus]: [f64; 2],
+    ) -> Self {
+        let shift = 2.0 * window.shift;
+        let across = right * shift.x + up * shift.y;
+        let projection = match projection {
+            description::Projection::Perspective { fov } => {
+                let tan_half_fov = libm::tan(fov.to_radians() * 0.5);
+                Projection::Perspective { center: forward + across * tan_half_fov, tan_half_fov }
+            }
+            description::Projection::Orthographic { view_height } => {
+                let half_height = 0.5 * view_height;
+                Projection::Orthographic { center: across * half_height, half_height }
+            }
+            description::Projection::Spherical => Projection::Spherical { shift },
+            description::Projection::Fisheye { fov } => {
+                Projection::Fisheye { shift, half_fov: 0.5 * fov.to_radians() }
+            }
+        };
+        Self { position, right, up, forward, projection, mirror: window.mirror, aperture, focus }
     }
 
     /// Returns the point that the camera orbits, and the distance to it.
@@ -75,16 +157,18 @@ impl Camera {
         orbiter: Option<&GkitOrbiterCamera>,
     ) -> ResolvedCamera {
         match camera {
-            description::Camera::LookAt { position, look_at, up, fov, aperture, focus } => ResolvedCamera {
-                pose: Pose { position: *position, look_at: *look_at, up: *up },
-                fov: *fov,
-                aperture: *aperture,
-                focus: *focus,
-            },
-            description::Camera::Orbiter { fov, focus, .. } => {
+            description::Camera::LookAt { position, look_at, up, projection, window, aperture, focus } => {
+                ResolvedCamera {
+                    pose: Pose { position: *position, look_at: *look_at, up: *up },
+                    projection: *projection,
+                    window: *window,
+                    aperture: *aperture,
+                    focus: *focus,
+                }
+            }
+            description::Camera::Orbiter { projection, window, focus, aperture, .. } => {
                 let file = orbiter.copied().unwrap_or(DEFAULT_ORBITER);
-                let Self { position, up, forward, aperture, .. } =
-                    Self::from_description(camera, Some(&file));
+                let Self { position, up, forward, .. } = Self::from_description(camera, Some(&file));
                 let look_at = position + forward * file.size;
                 let short = |place: DVec3| {
                     DVec3::from_array(
@@ -95,8 +179,14 @@ impl Camera {
                 // An orbiter does not roll. Unless it is upside down, y points up in the image.
                 let is_upright = up.y > UPRIGHT;
                 let pose = Pose { position, look_at, up: if is_upright { DVec3::Y } else { up } };
-                let focus = focus.unwrap_or_else(|| pose.distance());
-                ResolvedCamera { pose, fov: fov.unwrap_or(file.fov), aperture, focus }
+                let of_file = description::Projection::Perspective { fov: file.fov };
+                ResolvedCamera {
+                    pose,
+                    projection: projection.unwrap_or(of_file),
+                    window: *window,
+                    aperture: *aperture,
+                    focus: focus.unwrap_or_else(|| pose.distance()),
+                }
             }
         }
     }
@@ -106,59 +196,165 @@ impl Camera {
         Self { position: self.position - origin, ..self }
     }
 
-    /// Camera of a gKit orbiter. The world-to-camera transform is T(−p, −size)·Rx(r.x)·Ry(r.y)·T(−center).
-    fn from_orbiter(orbiter: &GkitOrbiterCamera) -> Self {
-        let [x, y] = orbiter.rotation;
-        // `rotation_xyz` rotates about x first, but the orbiter rotates about y first.
-        let view: DMat3 = rotation_xyz(DVec3::new(x, 0.0, 0.0)) * rotation_xyz(DVec3::new(0.0, y, 0.0));
-        let axes = view.transpose();
-        let eye = DVec3::new(orbiter.position[0], orbiter.position[1], orbiter.size);
-        Self {
-            position: DVec3::from_array(orbiter.center) + axes * eye,
-            right: axes.x_axis,
-            up: axes.y_axis,
-            forward: -axes.z_axis,
-            tan_half_fov: libm::tan(orbiter.fov.to_radians() * 0.5),
-            aperture: 0.0,
-            focus: orbiter.size,
+    /// Whether the image is flipped horizontally.
+    pub fn is_mirrored(&self) -> bool {
+        self.mirror
+    }
+
+    /// Returns the camera ray through a film position and a point on the unit lens disk, or `None` outside
+    /// the circle of a fisheye. Its direction is normalized. The position is in the image before mirroring.
+    pub fn ray(&self, film: FilmPosition, lens: Vec2) -> Option<Ray> {
+        let offset = [[film.offset.x; PACKET_SIZE], [film.offset.y; PACKET_SIZE]];
+        let film = FilmPositionPacket { offset, half_width: film.half_width };
+        let lens = [[lens.x; PACKET_SIZE], [lens.y; PACKET_SIZE]];
+        let (rays, valid) = self.ray_packet(&film, (self.aperture > 0.0).then_some(&lens));
+        (valid & 1 != 0).then(|| rays.ray(0))
+    }
+
+    /// Returns the camera rays through film positions and points on the unit lens disk, `None` for the lens
+    /// center, and the mask of the lanes with a ray.
+    #[inline(always)]
+    pub fn ray_packet(&self, film: &FilmPositionPacket, lens: Option<&[F32x16; 2]>) -> (RayPacket, u32) {
+        let place = |lane: usize| DVec2::new(film.offset[0][lane], film.offset[1][lane]);
+        let eye = self.position.as_vec3();
+        match self.projection {
+            Projection::Perspective { center, tan_half_fov } => {
+                let direction = |lane: usize| {
+                    let place = place(lane) * tan_half_fov;
+                    center + self.right * place.x + self.up * place.y
+                };
+                let rays = match lens {
+                    Some(lens) => fill(|lane| self.lens_ray(self.position, direction(lane), lens, lane)),
+                    None => fill(|lane| (eye, direction(lane).normalize().as_vec3())),
+                };
+                (rays, u32::MAX)
+            }
+            Projection::Orthographic { center, half_height } => {
+                let origin = |lane: usize| {
+                    let place = place(lane) * half_height;
+                    self.position + (center + self.right * place.x + self.up * place.y)
+                };
+                let forward = self.forward.as_vec3();
+                let rays = match lens {
+                    Some(lens) => fill(|lane| self.lens_ray(origin(lane), self.forward, lens, lane)),
+                    None => fill(|lane| (origin(lane).as_vec3(), forward)),
+                };
+                (rays, u32::MAX)
+            }
+            Projection::Spherical { shift } => {
+                let rays = fill(|lane| {
+                    let place = place(lane) + shift;
+                    // Reduce the azimuth to one turn, because narrow images can be shifted by many.
+                    let turns = 0.5 * place.x / film.half_width;
+                    let (sin, cos) = sin_cos_f64(2.0 * PI * (turns - turns.floor()));
+                    let (height, across) = sin_cos_f64(FRAC_PI_2 * place.y);
+                    let level = self.right * sin + self.forward * cos;
+                    (eye, (level * across + self.up * height).as_vec3())
+                });
+                (rays, u32::MAX)
+            }
+            Projection::Fisheye { shift, half_fov } => {
+                let mut valid = 0;
+                let rays = fill(|lane| {
+                    let place = place(lane) + shift;
+                    let radius = place.length();
+                    valid |= u32::from(radius <= 1.0) << lane;
+                    let (sin, cos) = sin_cos_f64(radius.min(1.0) * half_fov);
+                    let slope = if radius > 0.0 { sin / radius } else { half_fov };
+                    let across = self.right * place.x + self.up * place.y;
+                    (eye, (self.forward * cos + across * slope).as_vec3())
+                });
+                (rays, valid)
+            }
         }
     }
 
-    /// Returns the camera ray through an image point and a point on the unit lens disk. Its direction is
-    /// normalized. `place` is measured from the image center to the right and up, in units of half the image
-    /// height.
-    #[inline(always)]
-    pub fn ray(&self, place: DVec2, lens: Vec2) -> Ray {
-        let direction = self.image_point_direction(place);
-        let lens = lens.as_dvec2() * self.aperture;
-        let offset = self.right * lens.x + self.up * lens.y;
-        let aimed = direction - offset / self.focus;
-        Ray::new((self.position + offset).as_vec3(), aimed.normalize().as_vec3())
-    }
-
-    /// Like [`Camera::ray`], but through the lens center.
-    #[inline(always)]
-    pub fn pinhole_ray(&self, place: DVec2) -> Ray {
-        Ray::new(self.position.as_vec3(), self.image_point_direction(place).normalize().as_vec3())
-    }
-
-    /// Unnormalized direction from the lens center through an image point. Its component along the view axis
+    /// Origin and unit direction of the ray that starts at a lane's lens point and meets the pinhole ray on
+    /// the plane of focus. The component of `direction`, the pinhole ray's direction, along the view axis
     /// is 1.
     #[inline(always)]
-    fn image_point_direction(&self, place: DVec2) -> DVec3 {
-        let place = place * self.tan_half_fov;
-        self.forward + self.right * place.x + self.up * place.y
+    fn lens_ray(&self, center: DVec3, direction: DVec3, lens: &[F32x16; 2], lane: usize) -> (Vec3, Vec3) {
+        let lens = Vec2::new(lens[0][lane], lens[1][lane]).as_dvec2() * self.aperture;
+        let offset = self.right * lens.x + self.up * lens.y;
+        let aimed = direction - offset / self.focus;
+        ((center + offset).as_vec3(), aimed.normalize().as_vec3())
     }
 
-    /// Width of a pixel's footprint per unit of distance, at the center of an image with `rows` rows.
-    pub fn pixel_spread(&self, rows: u32) -> f32 {
-        (2.0 * self.tan_half_fov / f64::from(rows)) as f32
+    /// Width of a pixel's footprint at the center of an image with `rows` rows.
+    pub fn pixel_footprint(&self, rows: u32) -> PixelFootprint {
+        let per_row = |extent: f64| (extent / f64::from(rows)) as f32;
+        match self.projection {
+            Projection::Perspective { tan_half_fov, .. } => {
+                PixelFootprint { width: 0.0, spread: per_row(2.0 * tan_half_fov) }
+            }
+            Projection::Orthographic { half_height, .. } => {
+                PixelFootprint { width: per_row(2.0 * half_height), spread: 0.0 }
+            }
+            Projection::Spherical { .. } => PixelFootprint { width: 0.0, spread: per_row(PI) },
+            Projection::Fisheye { half_fov, .. } => {
+                PixelFootprint { width: 0.0, spread: per_row(2.0 * half_fov) }
+            }
+        }
     }
 
-    /// Depth of a point along the view axis.
+    /// Depth of a point: the distance along the view axis, or for panoramas and fisheyes, which also show
+    /// points behind the camera, the distance from the camera.
     pub fn depth_of(&self, point: DVec3) -> f64 {
-        (point - self.position).dot(self.forward)
+        let arm = point - self.position;
+        match self.projection {
+            Projection::Perspective { .. } | Projection::Orthographic { .. } => arm.dot(self.forward),
+            Projection::Spherical { .. } | Projection::Fisheye { .. } => arm.length(),
+        }
     }
+
+    /// Whether the rays start on a plane rather than on the lens.
+    pub fn has_parallel_rays(&self) -> bool {
+        match self.projection {
+            Projection::Orthographic { .. } => true,
+            Projection::Perspective { .. } | Projection::Spherical { .. } | Projection::Fisheye { .. } => {
+                false
+            }
+        }
+    }
+
+    /// Whether rays can start in a box. For an orthographic camera, whether the box touches the plane on
+    /// which the rays start.
+    pub fn may_start_rays_in(&self, bounds: &Aabb) -> bool {
+        let eye = self.position.as_vec3();
+        // Origins are rounded to `f32`.
+        let rounding = eye.abs() * f32::EPSILON;
+        if self.has_parallel_rays() {
+            let bounds = bounds.expanded(rounding);
+            let (min, max) = (bounds.min.as_dvec3() - self.position, bounds.max.as_dvec3() - self.position);
+            let reach = (max - min).dot(self.forward.abs());
+            return (min + max).dot(self.forward).abs() <= reach;
+        }
+        let lens = Vec3::splat(self.aperture as f32);
+        bounds.overlaps(&Aabb { min: eye, max: eye }.expanded(lens + rounding))
+    }
+}
+
+/// Fills a packet with origins and directions.
+#[inline(always)]
+fn fill(mut ray: impl FnMut(usize) -> (Vec3, Vec3)) -> RayPacket {
+    let (mut origins, mut directions) = ([[0.0; PACKET_SIZE]; 3], [[0.0; PACKET_SIZE]; 3]);
+    for lane in 0..PACKET_SIZE {
+        let (origin, direction) = ray(lane);
+        set_lane(&mut origins, lane, origin);
+        set_lane(&mut directions, lane, direction);
+    }
+    RayPacket::from_soa(origins, directions)
+}
+
+/// Position of a gKit orbiter camera, and its axes right, up and forward. The world-to-camera transform is
+/// T(−p, −size)·Rx(r.x)·Ry(r.y)·T(−center).
+fn orbiter_position_and_axes(orbiter: &GkitOrbiterCamera) -> (DVec3, [DVec3; 3]) {
+    let [x, y] = orbiter.rotation;
+    // `rotation_xyz` rotates about x first, but the orbiter rotates about y first.
+    let view: DMat3 = rotation_xyz(DVec3::new(x, 0.0, 0.0)) * rotation_xyz(DVec3::new(0.0, y, 0.0));
+    let axes = view.transpose();
+    let eye = DVec3::new(orbiter.position[0], orbiter.position[1], orbiter.size);
+    (DVec3::from_array(orbiter.center) + axes * eye, [axes.x_axis, axes.y_axis, -axes.z_axis])
 }
 
 /// Minimum y component of the up axis for a camera that is neither upside down nor looking straight up or
@@ -178,88 +374,5 @@ const DEFAULT_ORBITER: GkitOrbiterCamera = GkitOrbiterCamera {
 };
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::math::Vec3;
-
-    fn look_at(aperture: f64) -> Camera {
-        let camera = description::Camera::LookAt {
-            position: DVec3::new(0.0, 1.0, 4.0),
-            look_at: DVec3::new(0.0, 1.0, 0.0),
-            up: DVec3::Y,
-            fov: 90.0,
-            aperture,
-            focus: 4.0,
-        };
-        Camera::from_description(&camera, None)
-    }
-
-    #[test]
-    fn rays_pass_through_image_points() {
-        let camera = look_at(0.0);
-        let direction = |x, y| camera.ray(DVec2::new(x, y), Vec2::ZERO).direction;
-        assert!((direction(0.0, 0.0) - Vec3::NEG_Z).length() < 1e-6);
-        assert!((direction(0.0, 1.0) - Vec3::new(0.0, 1.0, -1.0).normalize()).length() < 1e-6);
-        assert!((direction(2.0, 0.0) - Vec3::new(2.0, 0.0, -1.0).normalize()).length() < 1e-6);
-    }
-
-    #[test]
-    fn focal_plane_is_sharp_for_all_lens_points() {
-        let camera = look_at(0.5);
-        let on_plane = |lens| {
-            let ray = camera.ray(DVec2::new(0.6, 0.6), lens);
-            ray.at((0.0 - ray.origin.z) / ray.direction.z)
-        };
-        let sharp = on_plane(Vec2::ZERO);
-        for lens in [Vec2::X, Vec2::new(-0.3, 0.8)] {
-            assert!((on_plane(lens) - sharp).length() < 1e-5);
-        }
-    }
-
-    #[test]
-    fn orbiter_looks_at_its_center() {
-        let orbiter = GkitOrbiterCamera {
-            center: [1.0, 2.0, 3.0],
-            rotation: [30.0, 90.0],
-            size: 5.0,
-            ..DEFAULT_ORBITER
-        };
-        let camera = Camera::from_orbiter(&orbiter);
-        let to_center = DVec3::new(1.0, 2.0, 3.0) - camera.position;
-        assert!((to_center - camera.forward * 5.0).length() < 1e-12);
-        // A rotation by 90° about y places the camera on the scene's −x axis, and 30° about x raises it.
-        let expected = DVec3::new(-30.0_f64.to_radians().cos(), 30.0_f64.to_radians().sin(), 0.0) * 5.0;
-        assert!((-to_center - expected).length() < 1e-12, "{to_center}");
-        assert!(camera.up.y > 0.8);
-    }
-
-    #[test]
-    fn orbiter_viewpoint_matches_the_camera() {
-        let file = description::Spanned { value: "camera.txt".into(), span: 0..0 };
-        for rotation in [[30.0, 90.0], [18.0, 16.0], [90.0, 20.0], [120.0, -7.0], [-90.0, 0.0]] {
-            let orbiter = GkitOrbiterCamera {
-                center: [1.0, 2.0, 3.0],
-                position: [0.5, -0.25],
-                rotation,
-                size: 5.0,
-                ..DEFAULT_ORBITER
-            };
-            let scene =
-                description::Camera::Orbiter { file: file.clone(), fov: None, aperture: 0.1, focus: None };
-            let of_file = Camera::from_description(&scene, Some(&orbiter));
-            let view = Camera::look_at_from_description(&scene, Some(&orbiter));
-            let by_vectors = Camera::from_description(&view.into(), None);
-            for (a, b) in [
-                (of_file.position, by_vectors.position),
-                (of_file.right, by_vectors.right),
-                (of_file.up, by_vectors.up),
-                (of_file.forward, by_vectors.forward),
-            ] {
-                assert!((a - b).length() < 1e-4 * 5.0, "{rotation:?}: {a} {b}");
-            }
-            assert_eq!(of_file.tan_half_fov, by_vectors.tan_half_fov);
-            assert!((by_vectors.focus - 5.0).abs() < 1e-4 * 5.0 && by_vectors.aperture == 0.1);
-            assert!(view.is_focused_on_look_at());
-        }
-    }
-}
+#[path = "camera_tests.rs"]
+mod tests;

@@ -33,38 +33,55 @@ pub struct CompoundSolid {
 }
 
 impl World {
-    /// Glass around a point on the lens, with its materials: closed shapes that contain the point, and other
-    /// solids that contain the camera.
+    /// Glass around the origin of a camera ray, with its materials: closed shapes that contain the origin, and
+    /// other solids that contain the camera or, if rays are parallel, the origin.
     pub fn glass_around_lens_point(&self, point: Vec3) -> impl Iterator<Item = (u32, u32)> {
         let is_inside = move |&(object, _): &(u32, u32)| match &self.geometry.objects()[object as usize] {
             Object::Shape(shape) => shape.encloses_point_if_closed(point.as_dvec3()) == Some(true),
             Object::Mesh(_) => false,
         };
-        self.lens_glass.iter().copied().filter(is_inside).chain(self.camera_solids.iter().copied())
+        let around_origin = self
+            .solids_near_ray_origins
+            .iter()
+            .filter_map(move |body| Some((body.body, self.enclosing_glass_material(body, point, None)?)));
+        let around_camera = self.camera_solids.iter().copied();
+        self.lens_glass.iter().copied().filter(is_inside).chain(around_camera).chain(around_origin)
     }
 
-    /// Whether the lens is entirely outside closed glass shapes and the camera is not inside any other glass
-    /// solid.
+    /// Whether all camera rays start outside closed glass shapes and other glass solids.
     pub fn is_camera_in_air(&self) -> bool {
-        self.lens_glass.is_empty() && self.camera_solids.is_empty()
+        self.lens_glass.is_empty() && self.camera_solids.is_empty() && self.solids_near_ray_origins.is_empty()
     }
 
-    /// Closed glass shapes whose bounding boxes overlap the lens, with their materials.
+    /// Closed glass shapes in whose bounding boxes camera rays may start, with their materials.
     pub(super) fn find_closed_glass_near_lens(&self) -> Vec<(u32, u32)> {
-        let (eye, lens) = (self.camera.position.as_vec3(), Vec3::splat(self.camera.aperture as f32));
-        let lens = Aabb { min: eye, max: eye }.expanded(lens + eye.abs() * f32::EPSILON);
         let objects = (0_u32..).zip(self.geometry.objects());
         let near = objects.filter_map(|(id, object)| {
             let material = self.material_index(&Hit { shape: ShapeHit::from_t(0.0), object: id }) as u32;
-            let is_near = object.bounds().is_none_or(|bounds| bounds.overlaps(&lens));
+            let is_near = object.bounds().is_none_or(|bounds| self.camera.may_start_rays_in(&bounds));
             (is_near && self.is_closed_shape(id) && self.is_glass_material(material))
                 .then_some((id, material))
         });
         near.collect()
     }
 
-    /// Other glass solids that contain the camera, each with its material at the camera.
+    /// Other glass solids that parallel rays may start in. For each ray, the solids around its origin must be
+    /// found.
+    pub(super) fn find_solids_near_ray_origins(&self) -> Vec<CompoundSolid> {
+        if !self.camera.has_parallel_rays() {
+            return Vec::new();
+        }
+        let mut solids = self.compound_solids();
+        solids.retain(|body| body.is_covered || self.camera.may_start_rays_in(&body.bounds));
+        solids
+    }
+
+    /// Other glass solids that contain the camera, each with its material at the camera. Empty if rays do not
+    /// start at the camera.
     pub(super) fn find_solids_around_camera(&self) -> Vec<(u32, u32)> {
+        if self.camera.has_parallel_rays() {
+            return Vec::new();
+        }
         let eye = self.camera.position.as_vec3();
         let at = Aabb { min: eye, max: eye };
         let near =

@@ -10,7 +10,7 @@ use crate::assets::FileMaterial;
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::Shape;
 use crate::lights::MeshEmitter;
-use crate::lights::infinite::{Environment, EnvironmentMap};
+use crate::lights::infinite::{Environment, EnvironmentMap, MapOrientation};
 use crate::lights::{
     AreaLight, BoundingSphere, EmissionModulation, Light, LightBounds, Lights, PhotonEmitter, Side,
     TriangleWithUvs, UvMapping, back_area_light, front_area_light, see_through_shape_side_light,
@@ -85,9 +85,13 @@ fn environment_light(
     if !environment.has_emission() {
         return None;
     }
-    let description::Environment { color, file, rotate } = environment;
+    let description::Environment { color, file, orientation } = environment;
+    let orientation = match orientation {
+        description::MapOrientation::Turn(degrees) => MapOrientation::from_degrees(*degrees),
+        description::MapOrientation::Rotation(rotation) => MapOrientation::Rotation(rotation.as_mat3()),
+    };
     match file {
-        Some(_) => Some(Environment::from_map(sky?, *color, *rotate)),
+        Some(_) => Some(Environment::from_map(sky?, *color, orientation)),
         None => Some(Environment::Constant(*color)),
     }
 }

@@ -34,7 +34,7 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 pub use crate::accel::{InstructionSet, PACKET_SIZE, RayBoxInterval, SimdKernel, TreeNodeInfo};
-pub use camera::Camera;
+pub use camera::{Camera, FilmPosition, FilmPositionPacket, PixelFootprint};
 pub use camera_interior::CompoundSolid;
 pub use contact::{
     CoincidenceQuery, CoincidenceScratch, CoincidentOrEnclosingSurface, MAX_INTERIORS, OffsetPoints,
@@ -129,6 +129,8 @@ pub struct World {
     enclosing_glass: Box<[contact::LastClosedGlassIdsInSubtree]>,
     /// Other glass solids that contain the camera, with their materials.
     camera_solids: Vec<(u32, u32)>,
+    /// Other glass solids in which parallel camera rays may start.
+    solids_near_ray_origins: Vec<CompoundSolid>,
     /// Whether each material is mipmapped; see [`Material::is_mipmapped`].
     mipmapped: Box<[bool]>,
     /// Whether any texture uses a mesh's second UV set.

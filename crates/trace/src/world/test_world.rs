@@ -10,7 +10,8 @@ use crate::geometry::mesh::TriangleMesh;
 use crate::materials::texels::Texels;
 use crate::math::{DVec3, Vec3};
 use crate::scene::description::{
-    Accel, Environment, MeshFile, MeshReference, Object, ObjectTransform, Scene, Shape, Spanned,
+    Accel, Environment, MapOrientation, MeshFile, MeshReference, Object, ObjectTransform, Scene, Shape,
+    Spanned,
 };
 
 /// A world under construction.
@@ -58,7 +59,8 @@ impl TestWorldBuilder {
     /// Adds an environment map.
     pub fn sky(mut self, texels: &Arc<Texels>) -> Self {
         let file = Some(Spanned { value: PathBuf::from("sky.exr"), span: 0..0 });
-        self.scene.environment = Some(Environment { color: Vec3::ONE, file, rotate: 0.0 });
+        self.scene.environment =
+            Some(Environment { color: Vec3::ONE, file, orientation: MapOrientation::Turn(0.0) });
         self.sky = Some(Arc::clone(texels));
         self
     }

@@ -171,7 +171,10 @@ impl RequestState {
         let exposure = self.command_line.exposure.or(self.own.map(|own| own.exposure));
         let KeyOverrides { camera, .. } = &mut self.toggles;
         camera.pose.take_if(|pose| own.is_some_and(|own| own.pose == *pose));
-        camera.fov.take_if(|fov| own.is_some_and(|own| own.fov == *fov));
+        camera.fov.take_if(|fov| own.is_some_and(|own| own.projection.fov() == Some(*fov)));
+        camera
+            .view_height
+            .take_if(|height| own.is_some_and(|own| own.projection.view_height() == Some(*height)));
         self.toggles.shadows.take_if(|now| Some(*now) == shadows);
         self.toggles.integrator.take_if(|now| Some(*now) == integrator);
         self.toggles.photons.take_if(|now| Some(*now) == photons);
@@ -195,7 +198,8 @@ impl RequestState {
         let (moved, from) = (&self.toggles.camera, self.moved_from);
         self.moved_from = CameraOverrides {
             pose: moved.pose.and(from.pose.or(Some(own.pose))),
-            fov: moved.fov.and(from.fov.or(Some(own.fov))),
+            fov: moved.fov.and(from.fov.or(own.projection.fov())),
+            view_height: moved.view_height.and(from.view_height.or(own.projection.view_height())),
             focus: moved.focus.and(from.focus.or(Some(own.focus))),
         };
     }
@@ -216,9 +220,9 @@ impl RequestState {
             let DVec3 { x, y, z } = now;
             (before != now && now != of(&moved.pose)).then(|| format!("camera.{key} = [{x}, {y}, {z}]"))
         };
-        let of_number = |key: &str, before: Option<f64>, now: f64, moved: f64| {
-            let is_saved = before.is_some_and(|before| before != now) && now != moved;
-            is_saved.then(|| format!("camera.{key} = {now}"))
+        let of_number = |key: &str, before: Option<f64>, now: Option<f64>, moved: Option<f64>| {
+            let now = now.filter(|_| before.is_some() && before != now && now != moved)?;
+            Some(format!("camera.{key} = {now}"))
         };
         // A focal plane that passes through `look_at` follows the camera.
         let focus = from.focus.filter(|_| !own.is_focused_on_look_at());
@@ -226,16 +230,22 @@ impl RequestState {
             of_pose("position", |pose| pose.position),
             of_pose("look_at", |pose| pose.look_at),
             of_pose("up", |pose| pose.up),
-            of_number("fov", from.fov, own.fov, moved.fov),
-            of_number("focus", focus, own.focus, moved.focus),
+            of_number("fov", from.fov, own.projection.fov(), moved.projection.fov()),
+            of_number(
+                "view_height",
+                from.view_height,
+                own.projection.view_height(),
+                moved.projection.view_height(),
+            ),
+            of_number("focus", focus, Some(own.focus), Some(moved.focus)),
         ];
         all.into_iter().flatten().collect()
     }
 
     /// Describes camera, focus and exposure changes made with keys, which may not be obvious from the image.
     pub(crate) fn describe_camera_and_exposure_changes(&self) -> Vec<String> {
-        let CameraOverrides { pose, fov, focus } = self.toggles.camera;
-        let is_moved = pose.is_some() || fov.is_some();
+        let CameraOverrides { pose, fov, view_height, focus } = self.toggles.camera;
+        let is_moved = pose.is_some() || fov.is_some() || view_height.is_some();
         let moved = is_moved.then(|| "camera".to_owned());
         let focused = (focus.is_some() && !is_moved).then(|| "focus".to_owned());
         let exposed = self.toggles.exposure.map(|it| format!("exposure ({})", format_stops(it)));

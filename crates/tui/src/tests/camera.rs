@@ -7,7 +7,7 @@ use crate::messages;
 use crate::pipeline::protocol::{self, Command, PreviewUpdate, ResolvedCamera, WriteRequirement};
 use crate::pipeline::settings::{Overrides, SceneSettings};
 use crate::preview_style::PreviewStyle;
-use crate::scene::description::Pose;
+use crate::scene::description::{Pose, Projection};
 use crate::scene::diagnostic::Severity;
 use crate::{ColorDepth, ContentChangeTime};
 use crossterm::event::KeyCode;
@@ -70,6 +70,48 @@ fn newest_camera_step_waits_for_a_preview() {
     let effects = ui.press_character('s');
     assert!(find_render_request(&effects).expect("a request").overrides.camera != newest);
     assert!(show(&mut ui).is_empty());
+}
+
+/// A user interface whose scene has this projection.
+fn with_projection(projection: Projection, mirror: bool) -> TestUi {
+    let mut ui = TestUi::from_state(state(160, 40));
+    ui.finish_render(RED);
+    let camera = &mut ui.state.request.own.as_mut().expect("a scene").camera;
+    (camera.projection, camera.window.mirror) = (projection, mirror);
+    ui
+}
+
+#[test]
+fn zoom_and_dolly_follow_the_projection() {
+    let own = Projection::Orthographic { view_height: 3.0 };
+    for (key, factor) in [('>', 1.05), ('<', 1.0 / 1.05), ('+', 0.95), ('-', 1.0 / 0.95)] {
+        let mut ui = with_projection(own, false);
+        let moved = find_render_request(&ui.press_character(key)).expect("a request").overrides.camera;
+        let height = moved.view_height.expect("a height");
+        assert!((height / 3.0 - factor).abs() < 1e-3, "{key}: {height}");
+        assert_eq!(moved.fov, None);
+        assert_eq!(moved.pose.is_some(), "+-".contains(key), "{key}");
+        assert_eq!(kept(&mut ui).map(|camera| camera.projection.view_height()), Some(Some(height)));
+        let text = ui.state.request.toggles.as_command_line_options(None).join(" ");
+        assert!(text.contains(&format!("--set camera.view_height={height}")), "{text}");
+    }
+    let mut ui = with_projection(Projection::Fisheye { fov: 359.0 }, false);
+    let wide = find_render_request(&ui.press_character('>')).expect("a request").overrides.camera;
+    assert_eq!((wide.fov, wide.view_height), (Some(360.0), None));
+    let mut ui = with_projection(Projection::Spherical, false);
+    assert!(find_render_request(&ui.press_character('>')).is_none());
+    assert!(ui.screen_text().contains(messages::NO_FIELD_OF_VIEW));
+}
+
+#[test]
+fn orbiting_follows_the_mirrored_image() {
+    let x = |mirror| {
+        let mut ui = with_projection(Projection::Perspective { fov: 40.0 }, mirror);
+        let moved = find_render_request(&ui.press_character('l')).expect("a request").overrides.camera;
+        moved.pose.expect("a pose").position.x
+    };
+    assert!(x(false) > 0.1);
+    assert_eq!(x(true), -x(false));
 }
 
 #[test]
@@ -265,10 +307,10 @@ fn viewpoint_at(position: [f64; 3]) -> ResolvedCamera {
 
 #[test]
 fn first_c_lists_conflicting_saves() {
-    let wide = |fov| ResolvedCamera { fov, ..camera() };
+    let wide = |fov| ResolvedCamera { projection: Projection::Perspective { fov }, ..camera() };
     let look_at =
         ResolvedCamera { pose: Pose { look_at: [0.0, 0.5, 0.0].into(), ..camera().pose }, ..camera() };
-    let both = ResolvedCamera { fov: 25.0, ..viewpoint_at([0.0, 2.0, 4.0]) };
+    let both = ResolvedCamera { projection: wide(25.0).projection, ..viewpoint_at([0.0, 2.0, 4.0]) };
     for (keys, saved, words) in [
         ("h", viewpoint_at([0.0, 2.0, 4.0]), "camera.position = [0, 2, 4]"),
         ("h", look_at, "camera.look_at = [0, 0.5, 0]"),
@@ -314,7 +356,7 @@ fn later_conflicting_saves_are_also_listed() {
 
 #[test]
 fn saving_keeps_camera_settings_that_did_not_move() {
-    let saved = ResolvedCamera { fov: 25.0, ..camera() };
+    let saved = ResolvedCamera { projection: Projection::Perspective { fov: 25.0 }, ..camera() };
     let mut ui = TestUi::from_state(state(160, 40));
     ui.finish_render(RED);
     ui.press_character('h');

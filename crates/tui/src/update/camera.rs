@@ -7,12 +7,12 @@ use super::notices::{
     show_key_change, show_notice, show_notice_without_effects, show_until_key_without_effects,
 };
 use super::request::request_render;
-use crate::camera::{dollied, orbited, zoomed_fov};
+use crate::camera::{dollied, orbited, zoomed};
 use crate::event::Effect;
 use crate::messages;
 use crate::pipeline::protocol::{CameraSaveResult, Command, MovedCamera};
 use crate::pipeline::settings::CameraOverrides;
-use crate::scene::description::Pose;
+use crate::scene::description::{Pose, Projection, is_same_distance};
 use crate::scene::sanitize::escape_invisible_chars;
 use crate::state::{State, format_stops};
 
@@ -35,12 +35,14 @@ pub(super) fn orbit(state: &mut State, right: f64, up: f64) -> Vec<Effect> {
     orbit_by(state, right * TURN, up * TURN)
 }
 
-/// Orbits the camera by `right` degrees to the right and `up` degrees upward.
+/// Orbits the camera by `right` degrees to the right, as seen in the image, and `up` degrees upward.
 pub(super) fn orbit_by(state: &mut State, right: f64, up: f64) -> Vec<Effect> {
-    move_camera(state, |pose| orbited(pose, right, up))
+    let is_mirrored = state.request.viewpoint().is_some_and(|view| view.window.mirror);
+    move_camera(state, |pose| orbited(pose, if is_mirrored { -right } else { right }, up))
 }
 
-/// Moves the camera closer by a number of steps.
+/// Moves the camera closer by a number of steps. The height of an orthographic image, in which the distance has
+/// no effect, changes by the same factor.
 pub(super) fn dolly(state: &mut State, steps: f64) -> Vec<Effect> {
     let Some((view, own)) = state.request.viewpoint().zip(state.request.camera()) else {
         return show_no_scene_notice(state);
@@ -52,17 +54,29 @@ pub(super) fn dolly(state: &mut State, steps: f64) -> Vec<Effect> {
             if steps > 0.0 { messages::CLOSEST } else { messages::FARTHEST },
         );
     }
+    let factor = pose.distance() / view.pose.distance();
+    if let height @ Some(_) = zoomed(view.projection, own.projection, factor).view_height() {
+        state.request.toggles.camera.view_height = height;
+    }
     move_camera(state, |_| pose)
 }
 
-/// Widens the field of view by a number of steps.
+/// Widens the field of view, or the view of an orthographic camera, by a number of steps.
 pub(super) fn widen_field_of_view(state: &mut State, steps: f64) -> Vec<Effect> {
-    let Some(view) = state.request.viewpoint() else { return show_no_scene_notice(state) };
-    let fov = zoomed_fov(&view, libm::pow(WIDER, steps));
-    if fov == view.fov {
-        return show_notice_without_effects(state, &messages::fov_limit(fov));
+    let Some((view, own)) = state.request.viewpoint().zip(state.request.camera()) else {
+        return show_no_scene_notice(state);
+    };
+    let projection = zoomed(view.projection, own.projection, libm::pow(WIDER, steps));
+    if projection == view.projection {
+        let limit = match projection {
+            Projection::Perspective { fov } | Projection::Fisheye { fov } => messages::fov_limit(fov),
+            Projection::Orthographic { view_height } => messages::view_height_limit(view_height),
+            Projection::Spherical => messages::NO_FIELD_OF_VIEW.to_owned(),
+        };
+        return show_notice_without_effects(state, &limit);
     }
-    state.request.toggles.camera.fov = Some(fov);
+    let camera = &mut state.request.toggles.camera;
+    (camera.fov, camera.view_height) = (projection.fov(), projection.view_height());
     render_camera_step(state)
 }
 
@@ -110,7 +124,10 @@ fn drop_noop_camera_changes(state: &mut State) {
     let Some(own) = state.request.camera() else { return };
     let camera = &mut state.request.toggles.camera;
     camera.pose = camera.pose.filter(|pose| *pose != own.pose);
-    camera.fov = camera.fov.filter(|fov| (fov - own.fov).abs() > ROUNDING);
+    let (fov, height) = (own.projection.fov(), own.projection.view_height());
+    camera.fov = camera.fov.filter(|now| fov.is_some_and(|fov| (now - fov).abs() > ROUNDING));
+    camera.view_height =
+        camera.view_height.filter(|now| height.is_some_and(|height| !is_same_distance(*now, height)));
     let pose = CameraOverrides { focus: None, ..*camera };
     camera.focus = camera.focus.filter(|focus| *focus != own.with_change(&pose).focus);
 }

@@ -146,7 +146,8 @@ fn value_items(document: &OpenDocument, kind: ValueKind, is_quoted: bool) -> Vec
         | ValueKind::Text
         | ValueKind::File(_)
         | ValueKind::Numbers(..)
-        | ValueKind::Scale(_) => Vec::new(),
+        | ValueKind::Scale(_)
+        | ValueKind::Rotation => Vec::new(),
     }
 }
 

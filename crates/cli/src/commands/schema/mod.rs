@@ -226,8 +226,9 @@ fn table_key_conditions(table: &str, draft: SchemaDraft) -> Vec<(&'static str, V
     match (table, draft) {
         ("camera", _) => vec![
             ("anyOf", json!([{ "required": ["orbiter"] }, { "required": ["position", "look_at"] }])),
-            (dependent, json!({ "orbiter": none_of(&["position", "look_at", "up"]) })),
+            (dependent, projection_key_conditions(none_of(&["position", "look_at", "up"]))),
         ],
+        ("environment", _) => vec![(dependent, json!({ "matrix": none_of(&["rotate"]) }))],
         ("mesh" | "instance", _) => {
             vec![(dependent, json!({ "matrix": none_of(&["scale", "rotate", "translate"]) }))]
         }
@@ -242,6 +243,24 @@ fn table_key_conditions(table: &str, draft: SchemaDraft) -> Vec<(&'static str, V
         }
         _ => Vec::new(),
     }
+}
+
+/// Returns conditions on the keys of a camera, with the condition of `orbiter`: which keys each projection uses.
+fn projection_key_conditions(orbiter: Value) -> Value {
+    let any_of = |names: &[&str]| json!({ "properties": { "projection": { "enum": names } } });
+    let only = |name: &str| json!({ "properties": { "projection": { "enum": [name] } }, "required": ["projection"] });
+    let has_lens = any_of(&["perspective", "orthographic"]);
+    let mut is_narrow = any_of(&["perspective"]);
+    is_narrow["properties"]["fov"] = json!({ "not": { "minimum": 180 } });
+    let is_sized = json!({ "required": ["view_height"] });
+    json!({
+        "orbiter": orbiter,
+        "projection": { "anyOf": [any_of(&["perspective", "panorama", "fisheye"]), is_sized] },
+        "fov": { "anyOf": [is_narrow, only("fisheye")] },
+        "view_height": only("orthographic"),
+        "aperture": has_lens,
+        "focus": has_lens,
+    })
 }
 
 /// Returns conditions on combinations of a type's keys.

@@ -44,6 +44,9 @@ pub(super) fn value_schema(kind: ValueKind, draft: SchemaDraft) -> Value {
         ValueKind::Scale(limits) => {
             json!({ "anyOf": [number_schema(limits, draft), number_array_schema(3, limits, draft)] })
         }
+        ValueKind::Rotation => json!({
+            "anyOf": [9, 16].map(|count| number_array_schema(count, Limits::Between(-1.001, 1.001), draft))
+        }),
         ValueKind::Texture | ValueKind::Material | ValueKind::Group => {
             json!({ "type": "string", "minLength": 1 })
         }
@@ -81,6 +84,14 @@ fn number_schema(limits: Limits, draft: SchemaDraft) -> Value {
             SchemaDraft::Latest => {
                 json!({ "type": "number", "exclusiveMinimum": low, "exclusiveMaximum": high })
             }
+        },
+        Limits::UpTo(low, most) => match draft {
+            SchemaDraft::Four => {
+                let mut schema = between(low, most);
+                schema["exclusiveMinimum"] = true.into();
+                schema
+            }
+            SchemaDraft::Latest => json!({ "type": "number", "exclusiveMinimum": low, "maximum": most }),
         },
     }
 }

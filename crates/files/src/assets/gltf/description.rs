@@ -226,7 +226,7 @@ pub enum ModelLightKind {
     Directional,
 }
 
-/// A perspective camera.
+/// A camera.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ModelCamera {
     /// Name, possibly empty.
@@ -237,10 +237,25 @@ pub struct ModelCamera {
     pub direction: DVec3,
     /// Up direction in the image.
     pub up: DVec3,
-    /// Vertical field of view in degrees.
-    pub fov: f64,
+    /// Projection.
+    pub projection: ModelProjection,
     /// Aspect ratio (width / height), or `None` if the file does not specify it.
     pub aspect: Option<f64>,
+}
+
+/// Projection of a camera.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ModelProjection {
+    /// Perspective.
+    Perspective {
+        /// Vertical field of view in degrees.
+        fov: f64,
+    },
+    /// Orthographic.
+    Orthographic {
+        /// Height of the view in scene units.
+        view_height: f64,
+    },
 }
 
 /// Deduplicated notes about an import.

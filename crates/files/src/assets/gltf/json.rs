@@ -567,6 +567,7 @@ pub(super) struct Perspective {
 
 #[derive(Debug, Deserialize)]
 pub(super) struct Orthographic {
+    pub(super) xmag: Option<f64>,
     pub(super) ymag: f64,
 }
 

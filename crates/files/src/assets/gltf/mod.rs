@@ -23,8 +23,8 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 pub use self::description::{
-    AffineMap, Alpha, ModelCamera, ModelInstance, ModelLight, ModelLightKind, ModelMaterial, ModelScene,
-    TextureRef, TextureWrap, TexturedValue, TintedGlass,
+    AffineMap, Alpha, ModelCamera, ModelInstance, ModelLight, ModelLightKind, ModelMaterial, ModelProjection,
+    ModelScene, TextureRef, TextureWrap, TexturedValue, TintedGlass,
 };
 use self::json::{JsonImage, Root, Uri};
 pub use self::references::referenced_files;

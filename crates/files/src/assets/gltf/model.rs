@@ -6,7 +6,7 @@ use std::collections::hash_map::Entry;
 use super::accessor::AccessorReader;
 use super::description::{
     AffineMap, Alpha, ImportNotes, ModelCamera, ModelInstance, ModelLight, ModelLightKind, ModelMaterial,
-    ModelScene,
+    ModelProjection, ModelScene,
 };
 use super::json::{JsonCamera, JsonLight, JsonNode, Primitive};
 use super::materials::convert_material;
@@ -369,21 +369,22 @@ impl SceneWalk<'_> {
         let up = (placed.linear * DVec3::Y).try_normalize();
         let (Some(direction), Some(up)) = (direction, up) else { return };
         let position = placed.translate;
-        let (fov, aspect, position) = match (&json.perspective, &json.orthographic) {
-            (Some(lens), _) => (lens.yfov.to_degrees(), lens.aspect_ratio, position),
+        let (projection, is_in_range, aspect) = match (&json.perspective, &json.orthographic) {
+            (Some(lens), _) => {
+                let fov = lens.yfov.to_degrees();
+                (ModelProjection::Perspective { fov }, fov > 0.0 && fov < 180.0, lens.aspect_ratio)
+            }
             (None, Some(lens)) => {
-                self.notes
-                    .add(place, "the orthographic camera is approximated by a distant perspective camera");
-                const FIELD_OF_VIEW: f64 = 5.0;
-                let back = lens.ymag.abs() / libm::tan((FIELD_OF_VIEW * 0.5).to_radians());
-                (FIELD_OF_VIEW, None, position - direction * back)
+                let view_height = 2.0 * lens.ymag.abs();
+                let is_in_range = view_height > 1.0 / LIMIT && view_height < LIMIT;
+                let aspect = lens.xmag.map(|xmag| (xmag / lens.ymag).abs());
+                (ModelProjection::Orthographic { view_height }, is_in_range, aspect)
             }
             (None, None) => {
                 return self.notes.add(place, UNKNOWN_CAMERA);
             }
         };
-        let is_usable = position.abs().max_element() < LIMIT && fov > 0.0 && fov < 180.0;
-        if is_usable {
+        if position.abs().max_element() < LIMIT && is_in_range {
             let name = if json.name.is_empty() { node } else { &json.name };
             let aspect = aspect.filter(|aspect| *aspect > 0.05 && *aspect < 20.0);
             self.scene.cameras.push(ModelCamera {
@@ -391,11 +392,11 @@ impl SceneWalk<'_> {
                 position,
                 direction,
                 up,
-                fov,
+                projection,
                 aspect,
             });
         } else {
-            self.notes.add(place, "the camera is skipped: invalid position or field of view");
+            self.notes.add(place, "the camera is skipped: invalid position, field of view or size");
         }
     }
 }

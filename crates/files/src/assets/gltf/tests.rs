@@ -241,7 +241,8 @@ fn nodes_transform_parts_cameras_and_lights() {
     assert_eq!((plate.name.as_str(), plate.has_normals, plate.has_colors), ("plate", false, false));
     let camera = &scene.cameras[0];
     assert!(near(camera.position, DVec3::new(10.0, 0.0, 0.0)) && near(camera.direction, DVec3::NEG_X));
-    assert_eq!((camera.fov, camera.aspect), (0.5_f64.to_degrees(), Some(1.5)));
+    let fov = 0.5_f64.to_degrees();
+    assert_eq!((camera.projection, camera.aspect), (ModelProjection::Perspective { fov }, Some(1.5)));
     let light = &scene.lights[0];
     assert_eq!(light.intensity, DVec3::new(7.0, 3.5, 0.0));
     assert_eq!(light.kind, ModelLightKind::Spot { angle: 0.8_f64.to_degrees(), blend: 0.5 });

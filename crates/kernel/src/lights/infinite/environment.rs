@@ -10,7 +10,7 @@ use crate::lights::sample::{LightGeometry, LightSample, ShadowRayEnd};
 use crate::lights::tree::bounds::{DistanceFalloff, EmissionCone, LightBounds, mean_channel};
 use crate::math::frame::Frame;
 use crate::math::lanes::{F32x16, PACKET_SIZE, Vec3x16, lane, set_lane};
-use crate::math::{DVec3, Vec3};
+use crate::math::{DVec3, Mat3, Vec3};
 use crate::sampling::warp;
 
 /// Light from all directions, visible to rays that leave the scene.
@@ -24,18 +24,75 @@ pub enum Environment {
         sky: Arc<EnvironmentMap>,
         /// Radiance of a white texel.
         factor: Vec3,
-        /// Rotation about +y as a fraction of 360°, counterclockwise when seen from above, in [0, 1).
-        turn: f32,
+        /// Orientation of the map.
+        orientation: MapOrientation,
     },
+}
+
+/// Orientation of an environment map.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum MapOrientation {
+    /// Rotation about +y as a fraction of 360°, counterclockwise when seen from above, in [0, 1).
+    Turn(f32),
+    /// Rotation from the map's axes to the world's.
+    Rotation(Mat3),
+}
+
+impl MapOrientation {
+    /// Rotation about +y by an angle in degrees, counterclockwise when seen from above.
+    pub fn from_degrees(degrees: f64) -> Self {
+        Self::Turn((degrees / 360.0).rem_euclid(1.0) as f32)
+    }
+
+    /// Converts a direction in the world to a direction and a turn, for lookups in the map.
+    #[inline(always)]
+    fn to_map(self, direction: Vec3) -> (Vec3, f32) {
+        match self {
+            Self::Turn(turn) => (direction, turn),
+            Self::Rotation(rotation) => (rotation.transpose() * direction, 0.0),
+        }
+    }
+
+    /// The turn to use for samples of the map, whose directions are then passed to [`Self::to_world`].
+    #[inline(always)]
+    fn turn(self) -> f32 {
+        match self {
+            Self::Turn(turn) => turn,
+            Self::Rotation(_) => 0.0,
+        }
+    }
+
+    /// Converts the direction of a sample to a direction in the world.
+    #[inline(always)]
+    fn to_world(self, direction: Vec3) -> Vec3 {
+        match self {
+            Self::Turn(_) => direction,
+            Self::Rotation(rotation) => rotation * direction,
+        }
+    }
+
+    /// Converts a packet of directions with `convert`, unless the map is only turned.
+    #[inline(always)]
+    fn convert_packet(self, directions: &mut Vec3x16, convert: impl Fn(Self, Vec3) -> Vec3) {
+        match self {
+            Self::Turn(_) => {}
+            Self::Rotation(_) => {
+                for i in 0..PACKET_SIZE {
+                    let direction = convert(self, lane(directions, i));
+                    set_lane(directions, i, direction);
+                }
+            }
+        }
+    }
 }
 
 /// Pdf for sampling a constant environment, uniformly over the hemisphere above the surface.
 const HEMISPHERE_PDF: f32 = 1.0 / (2.0 * PI);
 
 impl Environment {
-    /// A map that is scaled by `factor` and rotated by an angle in degrees.
-    pub fn from_map(sky: Arc<EnvironmentMap>, factor: Vec3, degrees: f64) -> Self {
-        Self::Map { sky, factor, turn: (degrees / 360.0).rem_euclid(1.0) as f32 }
+    /// A map that is scaled by `factor`.
+    pub fn from_map(sky: Arc<EnvironmentMap>, factor: Vec3, orientation: MapOrientation) -> Self {
+        Self::Map { sky, factor, orientation }
     }
 
     /// Radiance from a unit direction, and pdf of [`Environment::sample`] in sr⁻¹. The pdf is for directions
@@ -44,8 +101,9 @@ impl Environment {
     pub fn radiance_and_pdf(&self, direction: Vec3) -> (Vec3, f32) {
         match self {
             Self::Constant(radiance) => (*radiance, HEMISPHERE_PDF),
-            Self::Map { sky, factor, turn } => {
-                let (color, pdf) = sky.lookup_color_and_pdf(direction, *turn);
+            Self::Map { sky, factor, orientation } => {
+                let (direction, turn) = orientation.to_map(direction);
+                let (color, pdf) = sky.lookup_color_and_pdf(direction, turn);
                 (color * *factor, pdf)
             }
         }
@@ -58,8 +116,10 @@ impl Environment {
             Self::Constant(Vec3 { x, y, z }) => {
                 ([[*x; PACKET_SIZE], [*y; PACKET_SIZE], [*z; PACKET_SIZE]], [HEMISPHERE_PDF; PACKET_SIZE])
             }
-            Self::Map { sky, factor, turn } => {
-                let (mut colors, pdfs) = sky.lookup_color_and_pdf_packet(directions, *turn);
+            Self::Map { sky, factor, orientation } => {
+                let mut directions = *directions;
+                orientation.convert_packet(&mut directions, |own, direction| own.to_map(direction).0);
+                let (mut colors, pdfs) = sky.lookup_color_and_pdf_packet(&directions, orientation.turn());
                 for i in 0..PACKET_SIZE {
                     let color = lane(&colors, i) * *factor;
                     set_lane(&mut colors, i, color);
@@ -82,8 +142,9 @@ impl Environment {
                 let (radiance, pdfs) = self.radiance_and_pdf_packet(&directions);
                 (directions, radiance, pdfs)
             }
-            Self::Map { sky, factor, turn } => {
-                let (directions, mut colors, pdfs) = sky.sample_packet(u, *turn);
+            Self::Map { sky, factor, orientation } => {
+                let (mut directions, mut colors, pdfs) = sky.sample_packet(u, orientation.turn());
+                orientation.convert_packet(&mut directions, MapOrientation::to_world);
                 for i in 0..PACKET_SIZE {
                     let color = lane(&colors, i) * *factor;
                     set_lane(&mut colors, i, color);
@@ -129,9 +190,9 @@ impl Environment {
             Self::Constant(radiance) => {
                 (Frame::from_normal(normal).to_world(warp::cone(u, 1.0)), *radiance, HEMISPHERE_PDF)
             }
-            Self::Map { sky, factor, turn } => {
-                let (direction, color, pdf) = sky.sample(u, *turn);
-                (direction, color * *factor, pdf)
+            Self::Map { sky, factor, orientation } => {
+                let (direction, color, pdf) = sky.sample(u, orientation.turn());
+                (orientation.to_world(direction), color * *factor, pdf)
             }
         };
         let weight = radiance * if pdf > 0.0 { 1.0 / pdf } else { 0.0 };
@@ -149,10 +210,10 @@ impl InfiniteLight for Environment {
     fn sample_direction_and_weight(&self, u: [f32; 2]) -> (Vec3, Vec3) {
         match self {
             Self::Constant(radiance) => (warp::cone(u, 2.0), *radiance * (4.0 * PI)),
-            Self::Map { sky, factor, turn } => {
-                let (direction, color, pdf) = sky.sample(u, *turn);
+            Self::Map { sky, factor, orientation } => {
+                let (direction, color, pdf) = sky.sample(u, orientation.turn());
                 // The pdf is 0 at the centers of black texels.
-                (direction, color * *factor * if pdf > 0.0 { 1.0 / pdf } else { 0.0 })
+                (orientation.to_world(direction), color * *factor * if pdf > 0.0 { 1.0 / pdf } else { 0.0 })
             }
         }
     }

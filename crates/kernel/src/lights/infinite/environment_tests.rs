@@ -2,7 +2,7 @@ use std::f64::consts::{PI, TAU};
 
 use super::*;
 use crate::materials::texels::{TexelData, Texels};
-use crate::math::DVec3;
+use crate::math::{DMat3, DVec3};
 use crate::sampling::{Dimension, PixelSampler};
 
 /// A map with texels that are computed from their column and row.
@@ -13,11 +13,17 @@ fn texels_from_fn(width: u32, height: u32, color: impl Fn(u32, u32) -> Vec3) -> 
 }
 
 fn environment_from_texels(texels: &Arc<Texels>, degrees: f64) -> Environment {
-    Environment::from_map(
-        Arc::new(EnvironmentMap::new(Arc::clone(texels)).expect("light")),
-        Vec3::ONE,
-        degrees,
-    )
+    oriented(texels, MapOrientation::from_degrees(degrees))
+}
+
+fn oriented(texels: &Arc<Texels>, orientation: MapOrientation) -> Environment {
+    let sky = EnvironmentMap::new(Arc::clone(texels)).expect("light");
+    Environment::from_map(Arc::new(sky), Vec3::ONE, orientation)
+}
+
+/// A rotation about a direction that is not an axis.
+fn tilted() -> DMat3 {
+    DMat3::from_axis_angle(DVec3::new(2.0, -1.0, 3.0).normalize(), 1.2)
 }
 
 /// An irregular map with black areas and a few bright spots.
@@ -73,7 +79,7 @@ fn lookups_match_the_reference() {
                         .expect("light"),
                 ),
                 factor: Vec3::new(1.0, 2.0, 3.0),
-                turn: (degrees / 360.0_f64).rem_euclid(1.0) as f32,
+                orientation: MapOrientation::from_degrees(degrees),
             };
             // At the poles, any azimuth is correct.
             for direction in random_directions(4000).filter(|direction| direction.y.abs() < 1.0) {
@@ -90,6 +96,32 @@ fn lookups_match_the_reference() {
 }
 
 #[test]
+fn rotated_maps_move_with_their_axes() {
+    let texels = irregular_texels(16, 8);
+    let rotated = oriented(&texels, MapOrientation::Rotation(tilted().as_mat3()));
+    let packet = |direction: Vec3| direction.to_array().map(|part| [part; PACKET_SIZE]);
+    // Near the poles of the map, rounding errors change the azimuth.
+    let directions = || random_directions(1000).filter(|direction| direction.y.abs() < 0.99);
+    for direction in directions() {
+        let in_world = tilted() * direction.as_dvec3();
+        let expected = reference_color(&texels, direction.as_dvec3(), 0.0);
+        let (found, pdf) = rotated.radiance_and_pdf(in_world.as_vec3());
+        assert!((found.as_dvec3() - expected).length() < 1e-2, "{direction}: {found} {expected}");
+        let (colors, pdfs) = rotated.radiance_and_pdf_packet(&packet(in_world.as_vec3()));
+        assert_eq!((lane(&colors, 5), pdfs[5]), (found, pdf));
+    }
+    // A rotation about +y equals a turn.
+    let turned = environment_from_texels(&texels, 50.0);
+    let about_y = DMat3::from_rotation_y(50.0_f64.to_radians()).as_mat3();
+    let rotated = oriented(&texels, MapOrientation::Rotation(about_y));
+    for direction in directions() {
+        let [turned, rotated] =
+            [&turned, &rotated].map(|environment| environment.radiance_and_pdf(direction).0);
+        assert!((turned - rotated).length() < 1e-2, "{direction}: {turned} {rotated}");
+    }
+}
+
+#[test]
 fn sample_pdfs_equal_direction_pdfs() {
     for texels in [
         irregular_texels(64, 32),
@@ -98,9 +130,12 @@ fn sample_pdfs_equal_direction_pdfs() {
         irregular_texels(1000, 500),
     ] {
         let Some(sky) = EnvironmentMap::new(texels) else { continue };
-        let environment = Environment::from_map(Arc::new(sky), Vec3::new(1.0, 0.5, 2.0), 77.0);
+        let sky = Arc::new(sky);
+        let orientations = [MapOrientation::from_degrees(77.0), MapOrientation::Rotation(tilted().as_mat3())];
         let (mut found, mut off) = (0, 0);
         for i in 0..20_000 {
+            let orientation = orientations[i as usize % 2];
+            let environment = Environment::from_map(Arc::clone(&sky), Vec3::new(1.0, 0.5, 2.0), orientation);
             let Some(sample) = environment.sample(Vec3::Y, random_pair(i)) else { continue };
             let (radiance, density) = environment.radiance_and_pdf(sample.direction);
             // Rounding the direction changes the result near a black corner of a cell and at cell borders.
@@ -165,8 +200,8 @@ fn pdfs_integrate_to_one_and_cover_all_light() {
 #[test]
 fn sample_frequencies_match_the_pdf() {
     let (width, height) = (24_usize, 12_usize);
-    for degrees in [0.0, 135.0] {
-        let environment = environment_from_texels(&irregular_texels(width as u32, height as u32), degrees);
+    for orientation in [MapOrientation::from_degrees(135.0), MapOrientation::Rotation(tilted().as_mat3())] {
+        let environment = oriented(&irregular_texels(width as u32, height as u32), orientation);
         let (columns, rows) = (3 * width, 64);
         let count = 1_000_000;
         let mut counts = vec![0.0; columns * rows];
@@ -178,8 +213,7 @@ fn sample_frequencies_match_the_pdf() {
                 let bits = (bits ^ bits >> 12).wrapping_mul(0x297a_2d39);
                 ((bits ^ bits >> 15) >> 8) as f32 / (1 << 24) as f32
             };
-            let Environment::Map { sky, turn, .. } = &environment else { panic!("a map") };
-            let direction = sky.sample([number(0), number(1)], *turn).0.as_dvec3();
+            let direction = environment.sample_direction_and_weight([number(0), number(1)]).0.as_dvec3();
             let across = (0.5 + direction.x.atan2(-direction.z) / TAU).clamp(0.0, 1.0 - 1e-12);
             let up = (0.5 - direction.y * 0.5).clamp(0.0, 1.0 - 1e-12);
             counts[(up * rows as f64) as usize * columns + (across * columns as f64) as usize] += 1.0;
@@ -210,7 +244,7 @@ fn sample_frequencies_match_the_pdf() {
         // borders.
         let normal =
             ((statistic / freedom).cbrt() - (1.0 - 2.0 / (9.0 * freedom))) / (2.0 / (9.0 * freedom)).sqrt();
-        assert!(freedom > 500.0 && normal.abs() < 5.0, "{degrees}: {normal}, {freedom} cells");
+        assert!(freedom > 500.0 && normal.abs() < 5.0, "{orientation:?}: {normal}, {freedom} cells");
     }
 }
 

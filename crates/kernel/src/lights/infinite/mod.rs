@@ -5,7 +5,7 @@ mod environment;
 mod environment_map;
 
 pub use directional::DirectionalLight;
-pub use environment::Environment;
+pub use environment::{Environment, MapOrientation};
 pub use environment_map::EnvironmentMap;
 
 use super::tree::LightBounds;

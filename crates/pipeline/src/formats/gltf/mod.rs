@@ -16,7 +16,7 @@ use super::rounding::{shorten, shorten_color, shorten_vector};
 use super::{ForeignReadContext, ForeignScene, ImportedScene, lower};
 use crate::assets::gltf::{
     Alpha, GltfFile, ImageLocation, ModelCamera, ModelInstance, ModelLight, ModelLightKind, ModelMaterial,
-    ModelScene, TexturedValue,
+    ModelProjection, ModelScene, TexturedValue,
 };
 use crate::assets::mesh::ply::write;
 use crate::assets::{AssetError, Companion};
@@ -170,7 +170,7 @@ impl SceneBuilder<'_> {
         let eye = match own {
             Some(own) => {
                 let eye = camera_pose(own, bounds);
-                add_camera(&mut self.document, &eye, own.fov);
+                add_camera(&mut self.document, &eye, own.projection);
                 eye
             }
             None => {
@@ -181,7 +181,7 @@ impl SceneBuilder<'_> {
                     view.turns,
                     aspect.unwrap_or(SIZE[0] / SIZE[1]),
                 );
-                add_camera(&mut self.document, &eye, FOV);
+                add_camera(&mut self.document, &eye, ModelProjection::Perspective { fov: FOV });
                 eye
             }
         };

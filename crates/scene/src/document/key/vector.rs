@@ -3,7 +3,11 @@
 use super::super::context::Issue;
 use super::KeyInTable;
 use crate::math::limits::{SHORTEST, is_nonzero_but_too_short, robust_length};
-use crate::math::{DVec3, Vec2};
+use crate::math::{DMat3, DVec3, Vec2};
+
+/// Maximum deviation of the product of a rotation and its transpose from the identity. Files contain rotations
+/// with as few as four decimals.
+const ROTATION_TOLERANCE: f64 = 1e-3;
 
 impl KeyInTable<'_> {
     /// Reads three numbers as a vector.
@@ -52,6 +56,43 @@ impl KeyInTable<'_> {
         let message = format!("`{first}` and `{second}` must be more than {SHORTEST:e} apart");
         self.context.report(Issue::error(span, message).with_label(format!("they are {distance:e} apart")));
         false
+    }
+
+    /// Reads a rotation matrix of 9 or 16 numbers, row by row. Removes rounding errors.
+    pub(in super::super) fn rotation(&self) -> Option<DMat3> {
+        let is_4x4 = self.value?.as_array().is_some_and(|array| array.len() == 16);
+        let expected = "9 or 16 numbers, row by row";
+        let rows: [f64; 9] = if is_4x4 {
+            let numbers: [f64; 16] = self.numbers(expected)?;
+            let rest = [3, 7, 11, 12, 13, 14, 15].map(|place| numbers[place]);
+            if rest != [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0] {
+                self.report_not_a_rotation("the last row and the last column must be 0, 0, 0, 1");
+                return None;
+            }
+            [0, 1, 2, 4, 5, 6, 8, 9, 10].map(|place| numbers[place])
+        } else {
+            self.numbers(expected)?
+        };
+        let matrix = DMat3::from_cols_array(&rows).transpose();
+        let product = matrix * matrix.transpose() - DMat3::IDENTITY;
+        let error = product.to_cols_array().into_iter().map(f64::abs).fold(0.0, f64::max);
+        if !(error <= ROTATION_TOLERANCE) {
+            self.report_not_a_rotation("the rows must have length 1 and be perpendicular to each other");
+            return None;
+        }
+        if matrix.determinant() < 0.0 {
+            self.report_not_a_rotation("it mirrors: its determinant is -1");
+            return None;
+        }
+        let x = matrix.x_axis.normalize();
+        let z = x.cross(matrix.y_axis).normalize();
+        Some(DMat3::from_cols(x, z.cross(x), z))
+    }
+
+    fn report_not_a_rotation(&self, label: &str) {
+        let span = self.value_span().unwrap_or_default();
+        let issue = Issue::error(span, format!("`{}` must be a rotation", self.info.name)).with_label(label);
+        self.context.report(issue.with_help("remove scaling, shearing, mirroring and translation"));
     }
 
     /// Reads a pair of numbers.

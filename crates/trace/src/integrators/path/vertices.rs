@@ -22,7 +22,7 @@ impl CameraWavefront<'_, '_> {
 
     /// Stores the ray cones at the vertices of plain surfaces, if ray cones are used.
     pub(super) fn store_cones(&mut self, rays: &PacketSource<'_>, packet: &PacketHits) {
-        if self.tile.pixel_spread > 0.0 {
+        if self.tile.camera_cone.is_some() {
             for lane in set_bit_lanes(packet.plain) {
                 let Some(hit) = packet.hit(lane) else { continue };
                 let cone = rays.path(self.tile, lane).cone.propagated_by(hit.shape.t);

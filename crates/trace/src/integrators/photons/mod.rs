@@ -264,9 +264,9 @@ impl PhotonMapper {
             let start = number % at_once * count;
             let samples = start + first..start + (first + CHUNK).min(count);
             let place = Rect { x: number / at_once, y: u32::MAX, width: 1, height: 1 };
-            let block = SampleBlock { pixels: place.into(), samples };
+            let block = SampleBlock { pixels: place.into(), samples, mirrored_width: None };
             let tile = TileContext {
-                pixel_spread: 0.0,
+                camera_cone: None,
                 ..TileContext::new(world, &settings, &block, token, behavior)
             };
             let (share, most_depth) = (1.0 / count as f32, self.most_depth);

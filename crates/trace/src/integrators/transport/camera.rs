@@ -2,17 +2,16 @@
 
 use std::ops::Range;
 
-use super::cone::RayCone;
 use super::interiors::{Interior, InteriorList};
 use super::ray::{PathHistory, PathRay};
 use super::tile::TileContext;
 use crate::geometry::Ray;
 use crate::geometry::packet::{F32x16, RayPacket};
-use crate::math::lanes::{Simd, set_lane};
+use crate::math::lanes::Simd;
 use crate::math::{DVec2, Vec2, Vec3};
 use crate::sampling::filter::FilterSample;
 use crate::sampling::{CAMERA_PATH, Dimension, SamplerPacket, warp};
-use crate::world::{PACKET_SIZE, SimdKernel};
+use crate::world::{FilmPosition, FilmPositionPacket, PACKET_SIZE, SimdKernel};
 
 /// Number of camera-ray packets generated together to hide the latency of random number generation.
 pub const CAMERA_ROWS: usize = 8;
@@ -24,6 +23,8 @@ pub struct CameraRayPacket {
     pub rays: RayPacket,
     /// Mask of rays whose filter weight is negative.
     pub negative: u32,
+    /// Mask of lanes with a ray. The other lanes are outside the circle of a fisheye and remain black.
+    pub valid: u32,
 }
 
 impl TileContext<'_> {
@@ -42,9 +43,8 @@ impl TileContext<'_> {
             for (first, row) in (first..).step_by(PACKET_SIZE).zip(&rows) {
                 negative(first, row.negative);
                 let slots = first..slots.end.min(first + PACKET_SIZE as u32);
-                queue.extend(
-                    slots.zip(0..).map(|(slot, lane)| self.path_from_camera_ray(row.rays.ray(lane), slot)),
-                );
+                let valid = slots.zip(0..).filter(|(_, lane)| row.valid >> lane & 1 != 0);
+                queue.extend(valid.map(|(slot, lane)| self.path_from_camera_ray(row.rays.ray(lane), slot)));
             }
         }
     }
@@ -71,7 +71,7 @@ impl TileContext<'_> {
             self.camera_interiors(ray.origin)
         };
         let state = PathHistory::CAMERA;
-        let cone = RayCone { width: 0.0, spread: self.pixel_spread };
+        let cone = self.camera_cone.unwrap_or_default();
         PathRay { ray, throughput: Vec3::ONE, slot, path: CAMERA_PATH + 1, interiors, state, cone }
     }
 
@@ -98,31 +98,22 @@ impl TileContext<'_> {
         settings.render.filter.sample_packet(&mut in_pixel, |lane, sample: FilterSample| {
             negative |= u32::from(sample.is_negative) << lane;
         });
-        let mut places = [[0.0; PACKET_SIZE]; 2];
+        let mut film = FilmPositionPacket { offset: [[0.0; PACKET_SIZE]; 2], half_width: 0.0 };
         for lane in 0..PACKET_SIZE {
             let corner = DVec2::new(f64::from(xs[lane]), f64::from(ys[lane])) + DVec2::splat(0.5);
             let place = corner + DVec2::new(f64::from(in_pixel[0][lane]), f64::from(in_pixel[1][lane]));
-            let place = settings.pixel_to_image_plane(place);
-            (places[0][lane], places[1][lane]) = (place.x, place.y);
+            let FilmPosition { offset, half_width } = settings.film_position(place);
+            (film.offset[0][lane], film.offset[1][lane]) = (offset.x, offset.y);
+            film.half_width = half_width;
         }
         // Generate rays through these positions, from points on the lens if the camera has an aperture.
-        let (mut origin, mut direction) = ([[0.0; PACKET_SIZE]; 3], [[0.0; PACKET_SIZE]; 3]);
-        if settings.dof && camera.aperture > 0.0 {
+        let (rays, valid) = if settings.dof && camera.aperture > 0.0 {
             let lens = sample_unit_disk_packet(sampler.pairs(&paths, Dimension::Lens, 0, 1));
-            for lane in 0..PACKET_SIZE {
-                let place = DVec2::new(places[0][lane], places[1][lane]);
-                let ray = camera.ray(place, Vec2::new(lens[0][lane], lens[1][lane]));
-                set_lane(&mut origin, lane, ray.origin);
-                set_lane(&mut direction, lane, ray.direction);
-            }
+            camera.ray_packet(&film, Some(&lens))
         } else {
-            for lane in 0..PACKET_SIZE {
-                let ray = camera.pinhole_ray(DVec2::new(places[0][lane], places[1][lane]));
-                set_lane(&mut origin, lane, ray.origin);
-                set_lane(&mut direction, lane, ray.direction);
-            }
-        }
-        CameraRayPacket { rays: RayPacket::from_soa(origin, direction), negative }
+            camera.ray_packet(&film, None)
+        };
+        CameraRayPacket { rays, negative, valid }
     }
 }
 
@@ -165,8 +156,9 @@ mod tests {
     #[test]
     fn packed_slots_match_single_slots() {
         let tile = Rect { x: 5, y: 7, width: 3, height: 40 };
-        for samples in [3..4, 0..5, 100..116, 7..40] {
-            let block = SampleBlock { pixels: tile.into(), samples };
+        let cases = [(3..4, None), (0..5, Some(9)), (100..116, None), (100..116, Some(8)), (7..40, Some(20))];
+        for (samples, mirrored_width) in cases {
+            let block = SampleBlock { pixels: tile.into(), samples, mirrored_width };
             for first in [0, 1, 2, 15, 33] {
                 let (xs, ys, samples) = block.pixels_and_samples_of_consecutive_slots(first);
                 for lane in 0..PACKET_SIZE {

@@ -134,7 +134,7 @@ impl TileContext<'_> {
     #[inline(always)]
     fn surface_packet_suffices_for_material(&self, material: usize) -> bool {
         // Ray cones need tangents and curvatures.
-        self.pixel_spread == 0.0 && !self.world.material_needs_uvs_or_tangents(material)
+        self.camera_cone.is_none() && !self.world.material_needs_uvs_or_tangents(material)
     }
 
     /// Packet-shading data and non-specular BSDF of a material, or `None` if the material is not plain.
@@ -183,6 +183,11 @@ impl SimdKernel for PacketIntersector<'_> {
             PacketSource::Camera(row, _, count, _) => {
                 ends[..count].fill(f32::INFINITY);
                 traced = rays.mask();
+                if row.valid != u32::MAX {
+                    for lane in 0..PACKET_SIZE {
+                        ends[lane] = if traced >> lane & 1 != 0 { f32::INFINITY } else { -1.0 };
+                    }
+                }
                 &row.rays
             }
             PacketSource::Paths(..) | PacketSource::Traced(..) => {

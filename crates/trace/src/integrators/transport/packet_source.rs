@@ -17,7 +17,7 @@ pub enum PacketSource<'a> {
 }
 
 impl PacketSource<'_> {
-    /// Number of rays.
+    /// Number of lanes, which may include lanes without a camera ray.
     pub fn count(&self) -> usize {
         match self {
             Self::Camera(_, _, count, _) => *count,
@@ -28,7 +28,11 @@ impl PacketSource<'_> {
 
     /// Mask of the lanes with a ray.
     pub fn mask(&self) -> u32 {
-        ((1_u64 << self.count()) - 1) as u32
+        let all = ((1_u64 << self.count()) - 1) as u32;
+        match self {
+            Self::Camera(row, ..) => all & row.valid,
+            Self::Paths(..) | Self::Traced(..) => all,
+        }
     }
 
     /// Queue index of a lane's path, or an arbitrary number if the lane has no path.

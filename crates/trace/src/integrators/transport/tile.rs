@@ -3,6 +3,7 @@
 use std::array;
 use std::ops::Range;
 
+use super::cone::RayCone;
 use crate::control::CancelToken;
 use crate::film::{PixelSubset, SelectedPixels};
 use crate::integrators::RenderSettings;
@@ -11,7 +12,7 @@ use crate::lights::LightSamplingPurpose;
 use crate::lights::infinite::Environment;
 use crate::sampling::PixelSampler;
 use crate::scene::description::ShadowMode;
-use crate::world::{PACKET_SIZE, World};
+use crate::world::{PACKET_SIZE, PixelFootprint, World};
 
 /// Tile context: the world, the settings, and the samples to render.
 pub struct TileContext<'a> {
@@ -23,8 +24,8 @@ pub struct TileContext<'a> {
     pub block: &'a SampleBlock,
     /// Token that cancels the work.
     pub token: &'a CancelToken,
-    /// Spread of a pixel's ray cone, or 0 if ray cones are not needed because there are no mip levels.
-    pub pixel_spread: f32,
+    /// Ray cones of camera rays, or `None` if ray cones are not needed because there are no mip levels.
+    pub camera_cone: Option<RayCone>,
     /// How paths continue at surfaces.
     pub behavior: PathBehavior,
     /// Whether a constant environment is sampled only by BSDF sampling. The continuing ray is then at least
@@ -43,8 +44,10 @@ impl<'a> TileContext<'a> {
         token: &'a CancelToken,
         behavior: PathBehavior,
     ) -> Self {
-        let pixel_spread =
-            if world.has_mipmaps() { world.camera.pixel_spread(settings.render.height) } else { 0.0 };
+        let camera_cone = world.has_mipmaps().then(|| {
+            let PixelFootprint { width, spread } = world.camera.pixel_footprint(settings.render.height);
+            RayCone { width, spread }
+        });
         let render = &settings.render;
         let is_constant = match world.lights.environment() {
             Some(Environment::Constant(_)) => true,
@@ -58,7 +61,7 @@ impl<'a> TileContext<'a> {
             && render.clamp == 0.0;
         let lobes_find_sky =
             is_constant && world.lights.sampler_for_purpose(LightSamplingPurpose::Eye).is_none();
-        Self { world, settings, block, token, pixel_spread, behavior, paths_find_sky, lobes_find_sky }
+        Self { world, settings, block, token, camera_cone, behavior, paths_find_sky, lobes_find_sky }
     }
 
     /// Sampler for a slot.
@@ -74,6 +77,9 @@ pub struct SampleBlock {
     pub pixels: SelectedPixels,
     /// Range of sample indices for each pixel.
     pub samples: Range<u32>,
+    /// Width of the image if it is mirrored. A pixel's samples are then those of the mirrored pixel in the
+    /// image before mirroring.
+    pub mirrored_width: Option<u32>,
 }
 
 impl SampleBlock {
@@ -82,15 +88,22 @@ impl SampleBlock {
         self.pixels.count() * self.samples.len()
     }
 
-    /// Returns a slot's column, row and sample index.
+    /// Returns a slot's column, row and sample index, in the image before mirroring.
     pub fn pixel_and_sample(&self, slot: u32) -> (u32, u32, u32) {
+        let (x, y, sample) = self.shown_pixel_and_sample(slot);
+        (self.mirrored_width.map_or(x, |width| width - 1 - x), y, sample)
+    }
+
+    /// Returns a slot's column, row and sample index, in the image as shown.
+    fn shown_pixel_and_sample(&self, slot: u32) -> (u32, u32, u32) {
         let samples = self.samples.len() as u32;
         let (pixel, sample) = (slot / samples, slot % samples);
         let (x, y) = self.pixels.image_position(pixel);
         (x, y, self.samples.start + sample)
     }
 
-    /// Columns, rows and sample indices of slots, with arbitrary values for slots without a sample.
+    /// Columns, rows and sample indices of slots in the image before mirroring, with arbitrary values for
+    /// slots without a sample.
     #[inline(always)]
     pub fn pixels_and_samples_of_slots(
         &self,
@@ -118,23 +131,34 @@ impl SampleBlock {
             xs[lane] = rect.x.wrapping_add(index[lane].wrapping_sub(y.wrapping_mul(rect.width)));
             ys[lane] = rect.y.wrapping_add(y);
         }
-        (xs, ys, samples)
+        (self.before_mirroring(xs), ys, samples)
     }
 
-    /// Columns, rows and sample indices of the sixteen slots starting at `first`, even if some are past the
-    /// last slot.
+    /// Converts columns of the image as shown to columns before mirroring.
+    #[inline(always)]
+    fn before_mirroring(&self, mut xs: [u32; PACKET_SIZE]) -> [u32; PACKET_SIZE] {
+        if let Some(width) = self.mirrored_width {
+            for x in &mut xs {
+                *x = (width - 1).wrapping_sub(*x);
+            }
+        }
+        xs
+    }
+
+    /// Columns, rows and sample indices of the sixteen slots starting at `first` in the image before
+    /// mirroring, even if some are past the last slot.
     #[inline(always)]
     pub fn pixels_and_samples_of_consecutive_slots(
         &self,
         first: u32,
     ) -> ([u32; PACKET_SIZE], [u32; PACKET_SIZE], [u32; PACKET_SIZE]) {
         let [mut xs, mut ys, mut samples] = [[0; PACKET_SIZE]; 3];
-        let (mut x, mut y, mut sample) = self.pixel_and_sample(first);
+        let (mut x, mut y, mut sample) = self.shown_pixel_and_sample(first);
         if self.samples.end - sample >= PACKET_SIZE as u32 {
             for lane in 0..PACKET_SIZE {
                 samples[lane] = sample + lane as u32;
             }
-            return ([x; PACKET_SIZE], [y; PACKET_SIZE], samples);
+            return (self.before_mirroring([x; PACKET_SIZE]), [y; PACKET_SIZE], samples);
         }
         if self.pixels.part != PixelSubset::All {
             return self.pixels_and_samples_of_slots(&array::from_fn(|lane| first + lane as u32));
@@ -150,7 +174,7 @@ impl SampleBlock {
                 }
             }
         }
-        (xs, ys, samples)
+        (self.before_mirroring(xs), ys, samples)
     }
 }
 

@@ -105,7 +105,7 @@ impl<'a> SurfaceVertex<'a> {
         let side = if surface.normal.dot(wo) < 0.0 { -1.0 } else { 1.0 };
         let cone = path.cone.propagated_by(distance);
         // If ray cones are used, compute the footprint and the curvature.
-        let has_beam = tile.pixel_spread > 0.0;
+        let has_beam = tile.camera_cone.is_some();
         let footprint = |tangents| match has_beam && tile.world.is_material_mipmapped(index) {
             true => Footprint::from_ray_cone(cone.width.abs(), path.ray.direction, surface.normal, tangents),
             false => Footprint::POINT,

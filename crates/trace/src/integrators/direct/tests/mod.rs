@@ -127,7 +127,7 @@ impl LitScene {
             Some(material) => material.with_white_textures(),
             None => BxdfPoint::DielectricReflection(RoughDielectricPoint { near: 1.0, far: 1.5, alpha: 0.5 }),
         };
-        let block = SampleBlock { pixels, samples: 0..samples };
+        let block = SampleBlock { pixels, samples: 0..samples, mirrored_width: None };
         Self { world, settings, block, token: CancelToken::new(), bsdf }
     }
 
