@@ -38,7 +38,7 @@ pub enum Command {
     /// Change the preview size and show the current image again. Rendering continues.
     Preview(Option<MaxPreviewSize>),
     /// Write this camera to the scene file. [`Event::CameraKept`] reports the result. Rendering continues.
-    KeepCamera(MovedCamera),
+    KeepCamera(Box<MovedCamera>),
     /// Undo this edit of the scene file unless the file has changed since then. [`Event::CameraUndone`]
     /// reports the result. Rendering continues.
     UndoCamera(SavedCameraEdit),

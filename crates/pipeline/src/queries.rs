@@ -28,7 +28,7 @@ use crate::world::World;
 /// A query or edit requested by the user.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum QueryOrEdit {
-    KeepCamera(MovedCamera),
+    KeepCamera(Box<MovedCamera>),
     UndoCamera(SavedCameraEdit),
     Pick(ImagePosition),
 }

@@ -52,6 +52,7 @@ pub fn scene() -> Build {
         ambient: Vec3::ZERO,
         background: Vec3::ZERO,
         filter: PixelFilter::Box,
+        gain: 1.0,
         exposure: 0.0,
         tonemap: Tonemap::None,
         accel: Accel::Bvh,
@@ -230,7 +231,7 @@ impl Build {
         let color = Vec3::splat(radiance);
         self.with(|scene| {
             scene.environment =
-                Some(Environment { color, file: None, orientation: MapOrientation::Turn(0.0) })
+                Some(Environment { color, file: None, orientation: MapOrientation::Turn(0.0) });
         })
     }
 

@@ -111,7 +111,7 @@ fn keep_moved_from(
     camera: ResolvedCamera,
     own: ResolvedCamera,
 ) -> Result<CameraSaveResult, String> {
-    match answer(bench, Command::KeepCamera(MovedCamera { camera, own })) {
+    match answer(bench, Command::KeepCamera(Box::new(MovedCamera { camera, own }))) {
         Event::CameraKept { outcome, .. } => outcome,
         other => panic!("{other:?}"),
     }

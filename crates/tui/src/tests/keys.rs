@@ -129,7 +129,7 @@ fn check(action: Action, key: KeyPress, ui: &mut TestUi) {
             ui.press_character('l');
             let wanted = ui.state.request.viewpoint().expect("a camera");
             assert!(
-                matches!(ui.press_key(key)[..], [Effect::Send(Command::KeepCamera(moved))] if moved.camera == wanted && moved.own == camera())
+                matches!(&ui.press_key(key)[..], [Effect::Send(Command::KeepCamera(moved))] if moved.camera == wanted && moved.own == camera())
             );
         }
         Action::Inspect => {

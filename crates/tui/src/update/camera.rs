@@ -154,7 +154,7 @@ pub(super) fn save_camera(state: &mut State) -> Vec<Effect> {
         );
     }
     state.saving.is_camera_of_newest = state.picture.history.is_viewing_older();
-    vec![Effect::Send(Command::KeepCamera(MovedCamera { camera, own }))]
+    vec![Effect::Send(Command::KeepCamera(Box::new(MovedCamera { camera, own })))]
 }
 
 /// Handles the result of writing the camera. If the scene now uses this camera, the camera no longer counts

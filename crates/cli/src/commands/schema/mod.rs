@@ -226,7 +226,7 @@ fn table_key_conditions(table: &str, draft: SchemaDraft) -> Vec<(&'static str, V
     match (table, draft) {
         ("camera", _) => vec![
             ("anyOf", json!([{ "required": ["orbiter"] }, { "required": ["position", "look_at"] }])),
-            (dependent, projection_key_conditions(none_of(&["position", "look_at", "up"]))),
+            (dependent, projection_key_conditions(&none_of(&["position", "look_at", "up"]))),
         ],
         ("environment", _) => vec![(dependent, json!({ "matrix": none_of(&["rotate"]) }))],
         ("mesh" | "instance", _) => {
@@ -245,8 +245,8 @@ fn table_key_conditions(table: &str, draft: SchemaDraft) -> Vec<(&'static str, V
     }
 }
 
-/// Returns conditions on the keys of a camera, with the condition of `orbiter`: which keys each projection uses.
-fn projection_key_conditions(orbiter: Value) -> Value {
+/// Returns the conditions under which a camera's keys have an effect. `orbiter` is the condition of that key.
+fn projection_key_conditions(orbiter: &Value) -> Value {
     let any_of = |names: &[&str]| json!({ "properties": { "projection": { "enum": names } } });
     let only = |name: &str| json!({ "properties": { "projection": { "enum": [name] } }, "required": ["projection"] });
     let has_lens = any_of(&["perspective", "orthographic"]);

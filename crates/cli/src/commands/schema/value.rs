@@ -44,9 +44,10 @@ pub(super) fn value_schema(kind: ValueKind, draft: SchemaDraft) -> Value {
         ValueKind::Scale(limits) => {
             json!({ "anyOf": [number_schema(limits, draft), number_array_schema(3, limits, draft)] })
         }
-        ValueKind::Rotation => json!({
-            "anyOf": [9, 16].map(|count| number_array_schema(count, Limits::Between(-1.001, 1.001), draft))
-        }),
+        ValueKind::Rotation => {
+            let rotation = |count| number_array_schema(count, Limits::Between(-1.001, 1.001), draft);
+            any_of(vec![rotation(9)], rotation(16))
+        }
         ValueKind::Texture | ValueKind::Material | ValueKind::Group => {
             json!({ "type": "string", "minLength": 1 })
         }
