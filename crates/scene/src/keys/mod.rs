@@ -77,6 +77,9 @@ mod tests {
             ("materials", "metal", "k") => &[("eta", "[0.2, 0.9, 1.1]")],
             ("materials", "metal", _) => &[("element", "\"gold\"")],
             ("camera", _, "orbiter") => &[],
+            ("camera", _, "view_height") => {
+                &[("position", "[0, 1, 4]"), ("look_at", "[0, 1, 0]"), ("projection", "\"orthographic\"")]
+            }
             ("camera", ..) => &[("position", "[0, 1, 4]"), ("look_at", "[0, 1, 0]")],
             ("textures", _, "image") | ("mesh", _, "part") => &[("file", "\"model.glb\"")],
             _ => &[],
