@@ -1,7 +1,7 @@
 use super::*;
 use crate::math::random::TestRandom;
 
-pub(in crate::assets::mesh) type Points = Vec<(f32, f32)>;
+pub(crate) type Points = Vec<(f32, f32)>;
 
 /// Triangulates a polygon in two planes, checks both triangulations, and returns the one in the plane y = 7.
 fn cut(points: &[(f32, f32)]) -> Vec<[usize; 3]> {
@@ -25,7 +25,7 @@ fn covering(space: &[Vec3], points: &[(f32, f32)]) -> Vec<[usize; 3]> {
 }
 
 /// Twice the signed area that the corners enclose (the shoelace formula).
-pub(in crate::assets::mesh) fn area(points: &[(f32, f32)], corners: &[usize]) -> f64 {
+pub(crate) fn area(points: &[(f32, f32)], corners: &[usize]) -> f64 {
     let at = |index: usize| {
         let (x, y) = points[corners[index % corners.len()]];
         DVec2::new(f64::from(x), f64::from(y))
@@ -34,12 +34,7 @@ pub(in crate::assets::mesh) fn area(points: &[(f32, f32)], corners: &[usize]) ->
 }
 
 /// Number of triangles that contain a point in their interior.
-pub(in crate::assets::mesh) fn layers(
-    points: &[(f32, f32)],
-    triangles: &[[usize; 3]],
-    x: f64,
-    y: f64,
-) -> usize {
+pub(crate) fn layers(points: &[(f32, f32)], triangles: &[[usize; 3]], x: f64, y: f64) -> usize {
     let at = |corner: usize| DVec2::new(f64::from(points[corner].0), f64::from(points[corner].1));
     let holds = |triangle: &&[usize; 3]| {
         let [a, b, c] = triangle.map(at);
@@ -54,7 +49,7 @@ pub(in crate::assets::mesh) fn layers(
     triangles.iter().filter(holds).count()
 }
 
-pub(in crate::assets::mesh) fn reversed(points: &[(f32, f32)]) -> Points {
+pub(crate) fn reversed(points: &[(f32, f32)]) -> Points {
     points.iter().rev().copied().collect()
 }
 
@@ -146,7 +141,7 @@ fn smooth_outlines_are_not_triangulated_as_fans() {
 
 /// A square with a grid of square holes. Each hole is connected to the outline or an earlier hole by a double
 /// edge.
-pub(in crate::assets::mesh) fn sieve(side: usize) -> Points {
+pub(crate) fn sieve(side: usize) -> Points {
     let size = 3.0 * side as f32 + 1.0;
     let mut outline = vec![(0.0, 0.0), (size, 0.0), (size, size), (0.0, size)];
     for hole in 0..side * side {
