@@ -131,6 +131,14 @@ const BROKEN: &[(&str, &[ExpectedDiagnostic])] = &[
             (12, 12, r#"there is no material "␛[31m␊red""#),
         ],
     ),
+    (
+        "fisheye",
+        &[
+            (6, 7, "`fov` must be greater than 0 and at most 360; found 361"),
+            (7, 1, r#"`aperture` conflicts with `projection = "fisheye"`"#),
+            (11, 10, "`matrix` must be a rotation; the last row and the last column must be 0, 0, 0, 1"),
+        ],
+    ),
     ("group_cycle", &[(10, 1, r#"the group "shelf" contains itself; shelf → rack → shelf"#)]),
     (
         "groups",
@@ -273,14 +281,6 @@ const BROKEN: &[(&str, &[ExpectedDiagnostic])] = &[
             (29, 5, "the quad has no area; `u` and `v` are parallel, or one of them is 0"),
         ],
     ),
-    (
-        "fisheye",
-        &[
-            (6, 7, "`fov` must be greater than 0 and at most 360; found 361"),
-            (7, 1, r#"`aperture` conflicts with `projection = "fisheye"`"#),
-            (11, 10, "`matrix` must be a rotation; the last row and the last column must be 0, 0, 0, 1"),
-        ],
-    ),
     ("no_camera", &[(1, 1, "the scene has no [camera]")]),
     ("no_shapes", &[(1, 1, "warning: the scene has no shapes")]),
     (
@@ -332,6 +332,16 @@ const BROKEN: &[(&str, &[ExpectedDiagnostic])] = &[
     ),
     ("output_ending", &[(3, 10, "`output`: unknown file extension .tiff")]),
     (
+        "panorama",
+        &[
+            (6, 1, r#"`fov` conflicts with `projection = "panorama"`"#),
+            (7, 1, r#"`view_height` conflicts with `projection = "panorama"`"#),
+            (8, 1, r#"`aperture` conflicts with `projection = "panorama"`"#),
+            (9, 1, r#"`focus` conflicts with `projection = "panorama"`"#),
+            (13, 10, "`matrix` must be a rotation; it mirrors: its determinant is -1"),
+        ],
+    ),
+    (
         "partners",
         &[
             (10, 1, "warning: `normal_strength` has no effect without `normal_map`"),
@@ -351,21 +361,11 @@ const BROKEN: &[(&str, &[ExpectedDiagnostic])] = &[
         ],
     ),
     (
-        "panorama",
-        &[
-            (6, 1, r#"`fov` conflicts with `projection = "panorama"`"#),
-            (7, 1, r#"`view_height` conflicts with `projection = "panorama"`"#),
-            (8, 1, r#"`aperture` conflicts with `projection = "panorama"`"#),
-            (9, 1, r#"`focus` conflicts with `projection = "panorama"`"#),
-            (13, 10, "`matrix` must be a rotation; it mirrors: its determinant is -1"),
-        ],
-    ),
-    (
         "projections",
         &[
             (2, 1, "[camera] needs `view_height`; `view_height` is missing"),
             (6, 1, r#"`fov` conflicts with `projection = "orthographic"`"#),
-            (7, 9, "`shift` must be two numbers, [right, up]; found a list of 3"),
+            (7, 9, "`shift` must be two numbers, [right, up]; found an array of 3 values"),
             (8, 10, r#"`mirror` must be true or false; found the string "yes""#),
             (11, 8, "`gain` must be at least 0; found -1"),
             (15, 1, "`rotate` conflicts with `matrix`"),
