@@ -238,7 +238,8 @@ fn shifted_rays_are_those_of_a_larger_image() {
     ] {
         let [small, large] = [camera(projection, ImageWindow { shift, mirror: false }), unshifted(larger)]
             .map(|it| world_camera(&it));
-        for (x, y) in [(0.0, 0.0), (-0.4, 0.9), (0.1, -0.3), (0.15, 0.4)] {
+        // All of these are in the circle of the shifted fisheye.
+        for (x, y) in [(0.0, 0.0), (-0.4, 0.9), (0.05, 0.1), (0.15, 0.4)] {
             let place = DVec2::new(x, y);
             let ray = |camera: &world::Camera, offset| {
                 camera.ray(FilmPosition { offset, half_width: 1.5 }, Vec2::ZERO).expect("a ray")
@@ -284,7 +285,7 @@ fn clicks_hit_the_object_shown_at_the_pixel() {
                     checked += 1;
                 }
             }
-            assert!(checked > 60, "{projection:?}: {checked}");
+            assert!(checked > 40, "{projection:?}: {checked}");
         }
     }
 }
