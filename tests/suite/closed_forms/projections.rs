@@ -265,7 +265,10 @@ fn shifted_rays_are_those_of_a_larger_image() {
 fn clicks_hit_the_object_shown_at_the_pixel() {
     let mut random = TestRandom::new(8);
     let places: Vec<DVec3> = (0..24).map(|_| random.direction() * (2.0 + 2.0 * random.unit())).collect();
-    let radiance = |number: usize| (number as f32 + 2.0).sqrt();
+    // Square roots of primes: no mean of several radiances and black equals another radiance.
+    let primes = (2_u32..).filter(|n| (2..*n).all(|divisor| n % divisor != 0));
+    let primes: Vec<u32> = primes.take(places.len()).collect();
+    let radiance = |number: usize| (primes[number] as f32).sqrt();
     let balls = places.iter().enumerate();
     let balls =
         balls.fold(scene(), |build, (number, place)| build.sphere(*place, 0.9, emitter(radiance(number))));
@@ -285,7 +288,7 @@ fn clicks_hit_the_object_shown_at_the_pixel() {
                     checked += 1;
                 }
             }
-            assert!(checked > 40, "{projection:?}: {checked}");
+            assert!(checked > 30, "{projection:?}: {checked}");
         }
     }
 }
