@@ -76,7 +76,12 @@ fn set_arg_candidates(text: &str, typed: &str) -> Vec<CompletionCandidate> {
         let known = table.keys_allowed_for_type();
         paths.into_iter().flat_map(move |path| known.clone().into_iter().map(move |key| (path.clone(), key)))
     };
-    let keys = outline.iter().flat_map(of).chain(of_absent);
+    let with_inner_keys = |(path, key): (String, &'static KeyInfo)| {
+        let inner_path = format!("{path}.{}", key.name);
+        let inner = key.kind.inner_keys().iter().map(move |inner| (inner_path.clone(), inner));
+        std::iter::once((path, key)).chain(inner)
+    };
+    let keys = outline.iter().flat_map(of).chain(of_absent).flat_map(with_inner_keys);
     let of_key = |(path, key): (String, &'static KeyInfo)| {
         key_or_value_candidates(&format!("{path}.{}=", key.name), key.doc, typed, || {
             key_value_completions(key.kind, &outline)
@@ -134,7 +139,8 @@ fn key_value_completions(kind: ValueKind, outline: &[OutlineTable]) -> Vec<Descr
         | ValueKind::NumberOrTexture(_)
         | ValueKind::Numbers(..)
         | ValueKind::Scale(_)
-        | ValueKind::Rotation => Vec::new(),
+        | ValueKind::Rotation
+        | ValueKind::InlineTable(_) => Vec::new(),
     }
 }
 

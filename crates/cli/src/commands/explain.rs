@@ -96,6 +96,10 @@ fn explain_path(path: &str) -> Option<String> {
         }
         [name, second, third] => {
             let table = find_table(name)?;
+            if let Some(key) = table.keys.iter().find(|key| key.name == *second) {
+                let inner = key.kind.inner_keys().iter().filter(|key| key.name == *third);
+                return found(inner.map(|inner| (path.to_owned(), inner)).collect());
+            }
             let kind = table.find_type_or_default(Some(second))?;
             if *third == "type" {
                 return Some(format_type_list(table));
@@ -148,6 +152,10 @@ fn key_details(path: &str, key: &KeyInfo) -> String {
         for word in list() {
             text.push_str(&format!("    {:<13}{}\n", format!("\"{}\"", word.name), word.meaning));
         }
+    }
+    let inner = key.kind.inner_keys();
+    if !inner.is_empty() {
+        text.push_str(&format!("\n{}", format_key_list(inner.iter())));
     }
     text
 }

@@ -16,7 +16,7 @@ use super::super::toml::{KeyValue, Number};
 use super::context::{FileContext, Issue};
 use super::limits::Limits;
 use super::names::DefinedNames;
-use super::table::{TableReader, TableTitle};
+use super::table::{TEXTURE_REFERENCE, TableReader, TableTitle};
 use super::value::{TomlValue, Value, describe_value};
 use crate::choice::Choice;
 
@@ -233,6 +233,7 @@ impl<'a> KeyInTable<'a> {
 
     /// Reads an inline table: `{ … }`.
     pub(super) fn inline_table(&self) -> Option<TableReader<'a>> {
-        TableReader::from_value(self.context, self.value?, TableTitle::Key(self.info.name))
+        let keys = if let ValueKind::InlineTable(keys) = self.info.kind { keys } else { TEXTURE_REFERENCE };
+        TableReader::from_value(self.context, self.value?, TableTitle::Key(self.info.name, keys))
     }
 }

@@ -28,8 +28,8 @@ pub(super) enum TableTitle<'a> {
     Named(&'static TableInfo, &'a str),
     /// A table in a list of a named table, such as `[[groups.chair.box]]`.
     Inner(&'static TableInfo, &'a str, &'static TableInfo),
-    /// An inline table, identified by its key.
-    Key(&'static str),
+    /// An inline table, identified by its key, and the keys that it may have.
+    Key(&'static str, &'static [KeyInfo]),
 }
 
 impl TableTitle<'_> {
@@ -37,14 +37,14 @@ impl TableTitle<'_> {
     fn list(self, info: &'static TableInfo) -> Self {
         match self {
             Self::Named(group, name) => Self::Inner(group, name, info),
-            Self::Root | Self::Table(_) | Self::Inner(..) | Self::Key(_) => Self::Table(info),
+            Self::Root | Self::Table(_) | Self::Inner(..) | Self::Key(..) => Self::Table(info),
         }
     }
 
     fn definition(self) -> Option<&'static TableInfo> {
         match self {
             Self::Table(info) | Self::Named(info, _) | Self::Inner(.., info) => Some(info),
-            Self::Root | Self::Key(_) => None,
+            Self::Root | Self::Key(..) => None,
         }
     }
 
@@ -52,13 +52,13 @@ impl TableTitle<'_> {
         match self {
             Self::Root => &[],
             Self::Table(info) | Self::Named(info, _) | Self::Inner(.., info) => info.keys,
-            Self::Key(_) => TEXTURE_REFERENCE,
+            Self::Key(_, keys) => keys,
         }
     }
 }
 
 /// Keys of an inline table that refers to a texture. Not every value allows all of them.
-const TEXTURE_REFERENCE: &[KeyInfo] = keys! {
+pub(super) const TEXTURE_REFERENCE: &[KeyInfo] = keys! {
     /// The texture.
     texture: ValueKind::Texture, DefaultValue::Required("\"name\"");
     /// The channel for a number.
@@ -79,7 +79,7 @@ impl fmt::Display for TableTitle<'_> {
             Self::Inner(group, name, info) => {
                 write!(f, "[[{}.{}.{}]]", group.name, escape_and_truncate(name, 40), info.name)
             }
-            Self::Key(name) => write!(f, "`{name}`"),
+            Self::Key(name, _) => write!(f, "`{name}`"),
         }
     }
 }
@@ -293,7 +293,7 @@ impl<'a> TableReader<'a> {
             title @ (TableTitle::Table(_)
             | TableTitle::Named(..)
             | TableTitle::Inner(..)
-            | TableTitle::Key(_)) => {
+            | TableTitle::Key(..)) => {
                 format!("unknown key `{shown}` in {title}")
             }
         };

@@ -97,6 +97,8 @@ pub enum ValueKind {
     Material,
     /// The name of a group.
     Group,
+    /// A table with these keys.
+    InlineTable(&'static [KeyInfo]),
 }
 
 impl ValueKind {
@@ -118,8 +120,14 @@ impl ValueKind {
             | Self::NumberOrTexture(_)
             | Self::Numbers(..)
             | Self::Scale(_)
-            | Self::Rotation => None,
+            | Self::Rotation
+            | Self::InlineTable(_) => None,
         }
+    }
+
+    /// Returns the keys of a table, or nothing for other values.
+    pub fn inner_keys(self) -> &'static [KeyInfo] {
+        if let Self::InlineTable(keys) = self { keys } else { &[] }
     }
 
     /// Returns the limits of the value's numbers, or `None` if the value has no numbers, or is an integer.
@@ -141,7 +149,8 @@ impl ValueKind {
             | Self::Texture
             | Self::Heights
             | Self::Material
-            | Self::Group => None,
+            | Self::Group
+            | Self::InlineTable(_) => None,
         }
     }
 }
@@ -372,6 +381,10 @@ impl ValueKind {
                 format!("[{}]", (0..16).map(number).collect::<Vec<_>>().join(", "))
             }
             Self::Numbers(count, ..) => format!("[{}]", vec!["0"; count].join(", ")),
+            Self::InlineTable(keys) => {
+                let required = keys.iter().filter(|key| matches!(key.default, DefaultValue::Required(_)));
+                format!("{{ {} }}", required.map(KeyInfo::example_line).collect::<Vec<_>>().join(", "))
+            }
         }
     }
 
@@ -396,6 +409,7 @@ impl ValueKind {
             Self::Heights => "name of a texture, or `{ texture = \"NAME\", channel = \"r\" }`".to_owned(),
             Self::Material => "name of a material".to_owned(),
             Self::Group => "name of a group".to_owned(),
+            Self::InlineTable(_) => "table".to_owned(),
         }
     }
 

@@ -42,7 +42,10 @@ pub fn all_paths_with_descriptions() -> Vec<(String, &'static str)> {
     for table in all_tables() {
         all.push((table.name.to_owned(), table.doc));
         for key in table.keys {
-            all.push((format!("{}.{}", table.name, key.name), key.doc));
+            let path = format!("{}.{}", table.name, key.name);
+            let inner = key.kind.inner_keys().iter();
+            all.extend(inner.map(|inner| (format!("{path}.{}", inner.name), inner.doc)));
+            all.push((path, key.doc));
         }
         for kind in table.types {
             let path = format!("{}.{}", table.name, kind.name);

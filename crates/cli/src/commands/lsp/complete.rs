@@ -7,7 +7,7 @@ use lsp_types::{
 use serde_json::{Value, json};
 
 use super::document::OpenDocument;
-use super::look::{describe_key, texture_inline_table_keys};
+use super::look::{describe_key, inline_table_keys};
 use super::place::{CursorContext, CursorTable, cursor_context};
 use crate::scene::keys::key::{ChoiceValue, KeyInfo, TableSyntax, ValueKind};
 use crate::scene::keys::{all_tables, color_names};
@@ -21,23 +21,28 @@ pub(super) fn complete(document: &OpenDocument, offset: usize) -> Option<Value> 
         CursorContext::Value { of, key, is_quoted } => {
             of.find_allowed_key(&key).map(|key| value_items(document, key.kind, is_quoted))?
         }
-        CursorContext::InnerKey { given } => {
-            let keys = texture_inline_table_keys()
+        CursorContext::InnerKey { of, outer, given } => {
+            let keys = inline_table_keys(of.find_allowed_key(&outer))
                 .into_iter()
                 .filter(|(name, _)| !given.iter().any(|one| one == name));
             keys.map(|(name, doc)| {
-                completion_item(name, CompletionItemKind::PROPERTY, doc, format!("{name} = "))
+                completion_item(name, CompletionItemKind::PROPERTY, &doc, format!("{name} = "))
             })
             .collect()
         }
-        CursorContext::InnerValue { key, is_quoted } => match key.as_str() {
-            "texture" => defined_name_items(document, "textures", is_quoted),
-            "channel" => choice_items(
-                &crate::scene::keys::key::choice_values::<crate::scene::description::Channel>(),
-                is_quoted,
-            ),
-            _ => Vec::new(),
-        },
+        CursorContext::InnerValue { of, outer, key, is_quoted } => {
+            let inner =
+                of.find_allowed_key(&outer).map_or(&[] as &[KeyInfo], |outer| outer.kind.inner_keys());
+            match (inner.iter().find(|inner| inner.name == key), key.as_str()) {
+                (Some(inner), _) => value_items(document, inner.kind, is_quoted),
+                (None, "texture") => defined_name_items(document, "textures", is_quoted),
+                (None, "channel") => choice_items(
+                    &crate::scene::keys::key::choice_values::<crate::scene::description::Channel>(),
+                    is_quoted,
+                ),
+                (None, _) => Vec::new(),
+            }
+        }
     };
     Some(json!(items))
 }
@@ -147,7 +152,8 @@ fn value_items(document: &OpenDocument, kind: ValueKind, is_quoted: bool) -> Vec
         | ValueKind::File(_)
         | ValueKind::Numbers(..)
         | ValueKind::Scale(_)
-        | ValueKind::Rotation => Vec::new(),
+        | ValueKind::Rotation
+        | ValueKind::InlineTable(_) => Vec::new(),
     }
 }
 

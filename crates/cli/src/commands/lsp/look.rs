@@ -45,7 +45,8 @@ pub(super) fn hover(document: &OpenDocument, offset: usize) -> Option<Value> {
             None => return None,
         }
     } else {
-        texture_inline_table_keys().into_iter().find(|(known, _)| *known == name)?.1.to_owned()
+        let outer = table.keys_allowed_for_type().into_iter().find(|one| one.name == outer.name.text);
+        inline_table_keys(outer).into_iter().find(|(known, _)| *known == name)?.1
     };
     let contents = HoverContents::Markup(MarkupContent { kind: MarkupKind::Markdown, value: text });
     Some(json!(Hover { contents, range: Some(document.to_lsp_range(&key.name.span)) }))
@@ -74,13 +75,19 @@ pub(super) fn describe_key(key: &KeyInfo) -> String {
     text
 }
 
-/// Returns the keys allowed in a texture's inline table.
-pub(super) fn texture_inline_table_keys() -> [(&'static str, &'static str); 3] {
-    [
+/// Returns the keys allowed in the inline table that is the value of `outer`, with their descriptions: the table's
+/// own keys, or those that refer to a texture.
+pub(super) fn inline_table_keys(outer: Option<&KeyInfo>) -> Vec<(&'static str, String)> {
+    let own = outer.map_or(&[] as &[KeyInfo], |outer| outer.kind.inner_keys());
+    if !own.is_empty() {
+        return own.iter().map(|key| (key.name, describe_key(key))).collect();
+    }
+    let texture = [
         ("texture", "The name of a texture."),
         ("channel", "The channel to read: `\"r\"`, `\"g\"`, `\"b\"` or `\"a\"`."),
         ("scale", "A scale factor for the texture. Only allowed in `emission`."),
-    ]
+    ];
+    texture.map(|(name, doc)| (name, doc.to_owned())).to_vec()
 }
 
 /// Returns the location of the definition of the name under the cursor.

@@ -14,10 +14,10 @@ pub(super) enum CursorContext {
     Key { of: CursorTable, given: Vec<String>, is_assigned: bool },
     /// The value of a key.
     Value { of: CursorTable, key: String, is_quoted: bool },
-    /// A key in an inline table.
-    InnerKey { given: Vec<String> },
-    /// The value of a key in an inline table.
-    InnerValue { key: String, is_quoted: bool },
+    /// A key in the inline table that is the value of the key `outer`.
+    InnerKey { of: CursorTable, outer: String, given: Vec<String> },
+    /// The value of a key in such an inline table.
+    InnerValue { of: CursorTable, outer: String, key: String, is_quoted: bool },
 }
 
 /// The table at the cursor and its type.
@@ -80,7 +80,7 @@ fn context_in_table(
     let of = CursorTable { info, kind: table_type(info, body) };
     let (opened, closed) = (typed.matches('{').count(), typed.matches('}').count());
     if opened > closed {
-        return Some(context_in_inline_table(typed.rsplit('{').next().unwrap_or_default()));
+        return Some(context_in_inline_table(of, typed.rsplit_once('{').unwrap_or_default()));
     }
     let current = if is_inline { last_list_item(typed) } else { typed };
     let Some((key, value)) = current.split_once('=') else {
@@ -93,14 +93,20 @@ fn context_in_table(
     is_open.then(|| CursorContext::Value { of, key: key.trim().to_owned(), is_quoted: is_in_quotes(value) })
 }
 
-fn context_in_inline_table(typed: &str) -> CursorContext {
+/// Returns the context in an inline table, from the text before and after its opening brace.
+fn context_in_inline_table(of: CursorTable, (before, typed): (&str, &str)) -> CursorContext {
+    let outer = before.trim_end().trim_end_matches('=').trim_end();
+    let outer =
+        outer.rsplit(|c: char| !(c.is_alphanumeric() || c == '_')).next().unwrap_or_default().to_owned();
     let current = last_list_item(typed);
     match current.split_once('=') {
         Some((key, value)) => {
-            CursorContext::InnerValue { key: key.trim().to_owned(), is_quoted: is_in_quotes(value) }
+            let (key, is_quoted) = (key.trim().to_owned(), is_in_quotes(value));
+            CursorContext::InnerValue { of, outer, key, is_quoted }
         }
         None => {
-            CursorContext::InnerKey { given: other_keys_present(&typed.replace(',', "\n"), current.trim()) }
+            let given = other_keys_present(&typed.replace(',', "\n"), current.trim());
+            CursorContext::InnerKey { of, outer, given }
         }
     }
 }
@@ -283,13 +289,19 @@ mod tests {
                 (Some("metal"), vec!["color".to_owned(), "type".to_owned()])
             );
         }
-        let Some(CursorContext::InnerValue { key, is_quoted }) =
+        let Some(CursorContext::InnerValue { key, is_quoted, .. }) =
             at("[materials.a]\ndiffuse = { texture = \"|\" }")
         else {
             panic!()
         };
         assert_eq!((key.as_str(), is_quoted), ("texture", true));
         assert!(matches!(at("[materials]\na = { diffuse = { |"), Some(CursorContext::InnerKey { .. })));
+        let Some(CursorContext::InnerKey { of, outer, given }) =
+            at("[environment]\nsky = { sun = [0, 1, 0], tur|")
+        else {
+            panic!()
+        };
+        assert_eq!((of.info.name, outer.as_str(), given), ("environment", "sky", vec!["sun".to_owned()]));
         let Some(CursorContext::Value { key, .. }) =
             at("[materials]\na = { diffuse = [1, 2, 3], emission = |")
         else {

@@ -2,6 +2,7 @@
 
 use serde_json::{Value, json};
 
+use super::{key_schema, object_schema};
 use crate::args::SchemaDraft;
 use crate::choice::Choice;
 use crate::math::limits::{LARGEST, SHORTEST};
@@ -50,6 +51,9 @@ pub(super) fn value_schema(kind: ValueKind, draft: SchemaDraft) -> Value {
         }
         ValueKind::Texture | ValueKind::Material | ValueKind::Group => {
             json!({ "type": "string", "minLength": 1 })
+        }
+        ValueKind::InlineTable(keys) => {
+            object_schema(&keys.iter().collect::<Vec<_>>(), draft, |key| key_schema(key, draft))
         }
         ValueKind::Heights => {
             any_of(vec![json!({ "type": "string", "minLength": 1 })], texture_with_channel_schema())
