@@ -110,7 +110,7 @@ impl Lights {
             if let Some(light) = light.as_area() {
                 lights.add_light_to_object_index(number, light);
             } else if let Some(sun) = light.as_directional().filter(|sun| !sun.is_single_direction()) {
-                lights.suns.push((number, *sun));
+                lights.suns.push((number, sun.clone()));
             } else if let Some(light) = light.as_environment() {
                 lights.environment = Some((number, light.clone()));
             }

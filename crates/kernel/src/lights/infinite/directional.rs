@@ -3,6 +3,7 @@
 use std::f32::consts::PI;
 
 use super::InfiniteLight;
+use super::sky::sun::OrientedSunDisk;
 use crate::lights::packet::{LightSamplePacket, infinite_packet_of};
 use crate::lights::sample::{LightGeometry, LightSample, ShadowRayEnd};
 use crate::lights::tree::bounds::{DistanceFalloff, EmissionCone, LightBounds, mean_channel};
@@ -11,8 +12,9 @@ use crate::math::frame::Frame;
 use crate::math::lanes::F32x16;
 use crate::sampling::warp;
 
-/// Light from one direction, or from a disk of directions with uniform radiance.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// Light from one direction, or from a disk of directions, whose radiance is uniform unless the light is the sun
+/// of a sky.
+#[derive(Clone, Debug, PartialEq)]
 pub struct DirectionalLight {
     /// Unit direction toward the light's center.
     pub to_light: Vec3,
@@ -20,8 +22,10 @@ pub struct DirectionalLight {
     pub irradiance: Vec3,
     /// 1 − cos of half the angular diameter, or 0 for a light without extent.
     one_minus_cos: f32,
-    /// Radiance of the disk, or 0 for a light without extent.
+    /// Mean radiance of the disk, or 0 for a light without extent.
     radiance: Vec3,
+    /// The disk, if its radiance is not uniform.
+    sun: Option<OrientedSunDisk>,
 }
 
 impl DirectionalLight {
@@ -34,7 +38,14 @@ impl DirectionalLight {
         } else {
             Vec3::ZERO
         };
-        Self { to_light, irradiance, one_minus_cos: (2.0 * quarter * quarter) as f32, radiance }
+        Self { to_light, irradiance, one_minus_cos: (2.0 * quarter * quarter) as f32, radiance, sun: None }
+    }
+
+    /// Creates the sun of a sky. `to_light` is the unit direction toward its center.
+    pub fn from_sun(to_light: Vec3, sun: OrientedSunDisk) -> Self {
+        let (one_minus_cos, radiance) = (sun.disk.one_minus_cos() as f32, sun.disk.mean());
+        let irradiance = radiance * (2.0 * PI * one_minus_cos);
+        Self { to_light, irradiance, one_minus_cos, radiance, sun: Some(sun) }
     }
 
     /// Samples the disk uniformly over its solid angle.
@@ -51,6 +62,16 @@ impl DirectionalLight {
     /// [`DirectionalLight::sample`] for a packet.
     #[inline(always)]
     pub fn sample_packet(&self, u: &[F32x16; 2]) -> LightSamplePacket {
+        match &self.sun {
+            None => infinite_packet_of!(i => self.sample_uniform_disk([u[0][i], u[1][i]])),
+            Some(_) => self.sample_sun_packet(u),
+        }
+    }
+
+    /// [`DirectionalLight::sample_packet`] for the sun of a sky.
+    #[cold]
+    #[inline(never)]
+    fn sample_sun_packet(&self, u: &[F32x16; 2]) -> LightSamplePacket {
         infinite_packet_of!(i => self.sample_direction_and_irradiance([u[0][i], u[1][i]]))
     }
 
@@ -58,6 +79,16 @@ impl DirectionalLight {
     /// if the light has no extent.
     #[inline(always)]
     pub fn sample_direction_and_irradiance(&self, u: [f32; 2]) -> (Vec3, Vec3) {
+        let (direction, irradiance) = self.sample_uniform_disk(u);
+        match &self.sun {
+            None => (direction, irradiance),
+            Some(sun) => (direction, sun.radiance(self.to_light, direction) * self.inverse_pdf()),
+        }
+    }
+
+    /// Samples a unit direction to the light as if the radiance of the disk were uniform.
+    #[inline(always)]
+    fn sample_uniform_disk(&self, u: [f32; 2]) -> (Vec3, Vec3) {
         if self.is_single_direction() {
             return (self.to_light, self.irradiance);
         }
@@ -67,7 +98,11 @@ impl DirectionalLight {
 
     /// Radiance from a direction, or 0 for a light without extent.
     pub fn radiance(&self, direction: Vec3) -> Vec3 {
-        if self.contains(direction) { self.radiance } else { Vec3::ZERO }
+        match (&self.sun, self.contains(direction)) {
+            (_, false) => Vec3::ZERO,
+            (None, true) => self.radiance,
+            (Some(sun), true) => sun.radiance(self.to_light, direction),
+        }
     }
 
     /// Pdf of [`DirectionalLight::sample`] in sr⁻¹, or 0 for a light without extent.
@@ -94,7 +129,7 @@ impl InfiniteLight for DirectionalLight {
     }
 
     fn power_through(&self, area: f64) -> Vec3 {
-        (self.sample_direction_and_irradiance([0.5; 2]).1.as_dvec3() * area).as_vec3()
+        (self.sample_uniform_disk([0.5; 2]).1.as_dvec3() * area).as_vec3()
     }
 
     fn direction_and_irradiance_bounds(&self) -> LightBounds {

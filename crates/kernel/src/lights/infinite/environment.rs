@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use super::InfiniteLight;
 use super::environment_map::EnvironmentMap;
+use super::sky::{SkyDome, SkyFrame};
 use crate::lights::packet::LightSamplePacket;
 use crate::lights::sample::{LightGeometry, LightSample, ShadowRayEnd};
 use crate::lights::tree::bounds::{DistanceFalloff, EmissionCone, LightBounds, mean_channel};
@@ -26,6 +27,13 @@ pub enum Environment {
         factor: Vec3,
         /// Orientation of the map.
         orientation: MapOrientation,
+    },
+    /// A clear sky above a diffuse ground.
+    Sky {
+        /// The sky.
+        dome: Arc<SkyDome>,
+        /// Its orientation.
+        frame: SkyFrame,
     },
 }
 
@@ -106,6 +114,7 @@ impl Environment {
                 let (color, pdf) = sky.lookup_color_and_pdf(direction, turn);
                 (color * *factor, pdf)
             }
+            Self::Sky { dome, frame } => dome.radiance_and_pdf(frame, direction),
         }
     }
 
@@ -126,6 +135,7 @@ impl Environment {
                 }
                 (colors, pdfs)
             }
+            Self::Sky { dome, frame } => dome.radiance_and_pdf_packet(frame, directions),
         }
     }
 
@@ -151,6 +161,7 @@ impl Environment {
                 }
                 (directions, colors, pdfs)
             }
+            Self::Sky { dome, frame } => dome.sample_packet(frame, u),
         };
         let mut inverse_pdfs = [0.0; PACKET_SIZE];
         for i in 0..PACKET_SIZE {
@@ -181,6 +192,7 @@ impl Environment {
         match self {
             Self::Constant(radiance) => *radiance,
             Self::Map { sky, factor, .. } => sky.mean() * *factor,
+            Self::Sky { dome, .. } => dome.mean(),
         }
     }
 
@@ -194,6 +206,7 @@ impl Environment {
                 let (direction, color, pdf) = sky.sample(u, orientation.turn());
                 (orientation.to_world(direction), color * *factor, pdf)
             }
+            Self::Sky { dome, frame } => dome.sample(frame, u),
         };
         let weight = radiance * if pdf > 0.0 { 1.0 / pdf } else { 0.0 };
         let is_light = weight != Vec3::ZERO;
@@ -215,6 +228,10 @@ impl InfiniteLight for Environment {
                 // The pdf is 0 at the centers of black texels.
                 (orientation.to_world(direction), color * *factor * if pdf > 0.0 { 1.0 / pdf } else { 0.0 })
             }
+            Self::Sky { dome, frame } => {
+                let (direction, radiance, pdf) = dome.sample(frame, u);
+                (direction, radiance / pdf)
+            }
         }
     }
 
@@ -228,6 +245,7 @@ impl InfiniteLight for Environment {
         let mean = match self {
             Self::Constant(radiance) => mean_channel(*radiance),
             Self::Map { sky, factor, .. } => sky.mean_luminance() * mean_channel(*factor),
+            Self::Sky { dome, .. } => mean_channel(dome.mean()),
         };
         let power = std::f64::consts::PI * mean;
         LightBounds {

@@ -3,6 +3,7 @@
 mod directional;
 mod environment;
 mod environment_map;
+pub mod sky;
 
 pub use directional::DirectionalLight;
 pub use environment::{Environment, MapOrientation};

@@ -14,6 +14,8 @@ use crate::geometry::triangle::Triangle;
 use crate::lights::area::Side;
 use crate::lights::delta::DeltaLight;
 use crate::lights::delta::SpotLight;
+use crate::lights::infinite::sky::sun::OrientedSunDisk;
+use crate::lights::infinite::sky::{Sky, SkyFrame, SkyParameters};
 use crate::lights::infinite::{DirectionalLight, Environment, EnvironmentMap};
 use crate::lights::{
     AreaLight, EmissionModulation, Emitter, EmittingTriangleSelection, MeshEmitter, TriangleWithUvs,
@@ -69,6 +71,48 @@ fn spot(degrees: f64, blend: f32) -> SpotLight {
 
 fn sun(degrees: f64) -> DirectionalLight {
     DirectionalLight::new(Vec3::new(-0.6, 0.64, -0.48), COLOR, degrees.to_radians())
+}
+
+/// Lights whose photons have different fluxes: a sky and its sun, with their powers in the green channel.
+fn sky_lights() -> Vec<(Light, Option<Shape>, f64)> {
+    let (disk, mut all) = (PI * SCENE.radius * SCENE.radius, Vec::new());
+    let (sky, sun) = sky_and_sun();
+    for (light, one_minus_cos) in [(sky, 2.0), (sun, 1.0 - 5_f64.to_radians().cos())] {
+        let radiance = |direction: Vec3| match &light {
+            Light::Environment(sky) => sky.radiance_and_pdf(direction).0.y,
+            Light::Directional(sun) => sun.radiance(direction).y,
+            Light::Point(_) | Light::Spot(_) | Light::Area(_) => 0.0,
+        };
+        // A grid over the directions within an angle of the sun.
+        let (n, to_sun) = (800, DVec3::new(-0.6, 0.8, 0.0));
+        let at = |i: u32| (f64::from(i) + 0.5) / f64::from(n);
+        let sum: f64 = (0..n)
+            .flat_map(|i| (0..n).map(move |j| (i, j)))
+            .map(|(i, j)| {
+                let (cos, (sin, azimuth)) = (1.0 - one_minus_cos * at(i), (TAU * at(j)).sin_cos());
+                let side = DVec3::new(0.8, 0.6, 0.0) * sin + DVec3::Z * azimuth;
+                f64::from(radiance((to_sun * cos + side * (1.0 - cos * cos).sqrt()).as_vec3()))
+            })
+            .sum();
+        all.push((light, None, disk * TAU * one_minus_cos * sum / f64::from(n * n)));
+    }
+    all
+}
+
+/// A sky, and its sun with a diameter of 10°.
+fn sky_and_sun() -> (Light, Light) {
+    let parameters = SkyParameters {
+        sun_elevation: 0.8_f64.asin(),
+        turbidity: 3.0,
+        ground: Vec3::splat(0.3),
+        sun_angle: 10_f64.to_radians(),
+        sun_scale: 1.0,
+        sky_scale: 1.0,
+    };
+    let (sky, frame) = (Sky::new(&parameters), SkyFrame::new(DVec3::new(-0.6, 0.8, 0.0), DVec3::Y));
+    let disk = OrientedSunDisk { disk: sky.sun.expect("a sun"), up: Vec3::Y };
+    let dome = Environment::Sky { dome: sky.dome.expect("a sky"), frame };
+    (Light::Environment(dome), Light::Directional(DirectionalLight::from_sun(frame.sun(), disk)))
 }
 
 /// Lights with their shapes and their powers relative to [`COLOR`].
@@ -157,7 +201,7 @@ fn targets() -> [BoundingSphere; 4] {
 
 #[test]
 fn mean_flux_equals_power_for_any_aimed_fraction() {
-    for (light, shape, power) in lights() {
+    for (light, shape, power) in lights().into_iter().chain(sky_lights()) {
         let plain = source_of(light.clone(), shape.as_ref());
         for (targets, share) in [(&targets()[..], 0.5), (&targets()[..3], 0.9), (&targets()[..1], 0.3)] {
             let source = plain.clone().with_targets(targets, share);
@@ -231,7 +275,7 @@ fn assert_same_irradiance(name: &str, light: &Light, source: &PhotonEmitter, sha
 
 #[test]
 fn photon_irradiance_matches_light_sampling() {
-    for (light, shape, _) in lights() {
+    for (light, shape, _) in lights().into_iter().chain(sky_lights()) {
         if matches!(light, Light::Spot(_)) {
             continue;
         }

@@ -51,7 +51,7 @@ impl<'a> TileContext<'a> {
         let render = &settings.render;
         let is_constant = match world.lights.environment() {
             Some(Environment::Constant(_)) => true,
-            Some(Environment::Map { .. }) | None => false,
+            Some(Environment::Map { .. } | Environment::Sky { .. }) | None => false,
         };
         let paths_find_sky = is_constant
             && behavior.scatters
