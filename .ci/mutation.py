@@ -42,6 +42,7 @@ STRAIGHT = "closed_forms::straight::"
 TWO_SIDED = "closed_forms::two_sided::"
 DIRECT = "integrators::direct::tests::"
 PICKS = "integrators::direct::light_tree::tests::"
+SKY = "lights::infinite::sky::tests::"
 
 # Fault, file, the code around the expression in ⟦⟧, its replacement, and the test that must fail.
 FAULTS = [
@@ -354,6 +355,23 @@ FAULTS = [
      FROSTED + "photons_scatter_to_both_sides_of_rough_glass"),
     ("photons that are not transmitted", "integrators/photons/emit.rs", "if ⟦self.open_behind.used != 0⟧ {", "false",
      FROSTED + "photons_scatter_to_both_sides_of_rough_glass"),
+    ("a sky without the gradient at the horizon", "lights/infinite/sky/mod.rs",
+     "let horizon = 1.0 + ⟦a * exp2(b / (height + 0.01))⟧;", "0.0", SKY + "radiances_match_the_published_model"),
+    ("a sky with the wrong power of the aureole", "lights/infinite/sky/mod.rs",
+     "let anisotropy = (1.0 + cos * cos) / ⟦(base * base.sqrt())⟧;", "base", SKY + "radiances_match_the_published_model"),
+    ("sky samples with the pdf of a whole hemisphere", "lights/infinite/sky/mod.rs",
+     "let extent = if row < ROWS { ⟦1.0 / ROWS as f32⟧ } else { 1.0 };", "1.0", SKY + "samples_have_the_pdf_of_their_direction"),
+    ("a ground without the light of the sun", "lights/infinite/sky/mod.rs",
+     "let lit = (irradiance * solid_angle + ⟦sun_irradiance⟧)", "DVec3::ZERO", SKY + "ground_reflects_the_light_of_sky_and_sun"),
+    ("a sun without limb darkening", "lights/infinite/sky/sun.rs", "radiance * ⟦Vec3::from_array(limb)⟧", "Vec3::ONE",
+     SKY + "sun_matches_the_published_model"),
+    ("a sun in front of the horizon", "lights/infinite/sky/sun.rs", "if ⟦height < 0.0⟧ {", "false",
+     SKY + "horizon_hides_the_lower_part_of_the_sun"),
+    ("a wider sun with more irradiance", "lights/infinite/sky/sun.rs",
+     "let scale = f64::from(sun_scale) * ⟦(one_minus_cos(model_angle) / one_minus_cos(sun_angle))⟧;", "1.0",
+     SKY + "sun_irradiance_is_radiance_times_solid_angle"),
+    ("a sun that does not rotate with its sky", "world/emitters.rs", "SkyFrame::new(⟦rotation * sky.sun⟧, rotation.y_axis);",
+     "sky.sun", "closed_forms::sky::rotating_a_sky_equals_rotating_its_sun"),
     ("rough lobe rays counted on top of light samples", "integrators/direct/mis.rs",
      "Self::Paths | Self::NarrowPaths => ⟦1.0 / count as f32⟧,", "0.0", MICROFACETS + "techniques_agree_on_area_lights"),
 ]

@@ -117,6 +117,18 @@ const BROKEN: &[(&str, &[ExpectedDiagnostic])] = &[
         ],
     ),
     (
+        "environment_sky",
+        &[
+            (7, 1, "`color` cannot be combined with `sky`"),
+            (10, 7, "the sun is not above the horizon"),
+            (11, 13, "`turbidity` must be between 1 and 10; found 11"),
+            (12, 16, "`ground` must be between 0 and 1; found 1.5"),
+            (13, 13, "`sun_angle` must be between 0.001 and 90; found 0"),
+            (14, 13, "`sky_scale` must be at least 0; found -1"),
+            (15, 1, "unknown key `sun_scales` in `sky`; did you mean `sun_scale`?"),
+        ],
+    ),
+    (
         "environment_warnings",
         &[
             (1, 1, "warning: nothing lights this scene"),

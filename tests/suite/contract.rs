@@ -194,7 +194,7 @@ fn starter_lines_can_be_uncommented() {
         // These keys conflict with other keys.
         Some(text)
             if is_key(text)
-                && !["orbiter", "matrix", "view_height"].iter().any(|key| text.starts_with(key)) =>
+                && !["orbiter", "matrix", "sky", "view_height"].iter().any(|key| text.starts_with(key)) =>
         {
             format!("{text}\n")
         }

@@ -18,11 +18,12 @@ use glimt::scene::description::{
     Accel, Camera, ColorSource, EmissionSource, Environment, FresnelSource, ImageWindow, Integrator, Light,
     MapOrientation, Material, MaterialKind, MeshFile, MeshReference, NumberSource, Object, ObjectTransform,
     OpacitySource, PhongParameters, PhotonOptions, PixelFilter, Projection, RenderOptions, Scene, ShadowMode,
-    Shape, Spanned, Texture, TextureEncoding, TextureFilter, Tonemap, UvSet, Wrap,
+    Shape, Sky, Spanned, Texture, TextureEncoding, TextureFilter, Tonemap, UvSet, Wrap,
 };
 use glimt::world::{
-    Geometry, Image, MeshTree, TextureRolesNeededByRender, World, WorldInputs, build_environment_map,
-    build_lights, choose_origin_near_camera_target, separate_coincident_emitters, textures_needed,
+    EnvironmentSource, Geometry, Image, MeshTree, TextureRolesNeededByRender, World, WorldInputs,
+    build_environment_map, build_lights, build_sky, choose_origin_near_camera_target,
+    separate_coincident_emitters, textures_needed,
 };
 
 use super::v;
@@ -231,7 +232,7 @@ impl Build {
         let color = Vec3::splat(radiance);
         self.with(|scene| {
             scene.environment =
-                Some(Environment { color, file: None, orientation: MapOrientation::Turn(0.0) });
+                Some(Environment { color, file: None, sky: None, orientation: MapOrientation::Turn(0.0) });
         })
     }
 
@@ -245,7 +246,13 @@ impl Build {
         let height = texels.len() as u32 / width;
         self.sky = Some(Arc::new(Texels { width, height, data: TexelData::Float(texels), unusable: 0 }));
         let file = Some(Spanned { value: PathBuf::from("sky.exr"), span: 0..0 });
-        self.with(|scene| scene.environment = Some(Environment { color: Vec3::ONE, file, orientation }))
+        self.with(|scene| scene.environment = Some(Environment { color: Vec3::ONE, file, sky: None, orientation }))
+    }
+
+    /// Adds a sky with a sun.
+    pub fn clear_sky(self, sky: Sky, rotate: f64) -> Self {
+        let environment = Environment { color: Vec3::ONE, file: None, sky: Some(sky), orientation: MapOrientation::Turn(rotate) };
+        self.with(|scene| scene.environment = Some(environment))
     }
 
     pub fn world(&self) -> World {
@@ -262,7 +269,9 @@ impl Build {
         let origin = choose_origin_near_camera_target(&self.scene.camera, None);
         let geometry = Geometry::from_scene(&self.scene, &parts.meshes, origin, &CancelToken::new());
         let geometry = Arc::new(geometry.expect("not cancelled"));
-        let sky = self.sky.as_ref().and_then(build_environment_map);
+        let sky = self.scene.environment.as_ref().and_then(|environment| environment.sky.as_ref());
+        let map = || self.sky.as_ref().and_then(build_environment_map).map(EnvironmentSource::Map);
+        let sky = sky.map(|sky| EnvironmentSource::Sky(build_sky(sky))).or_else(map);
         let lights = build_lights(&self.scene, &geometry, &parts.images, sky, &CancelToken::new())
             .expect("not cancelled");
         World::new(&self.scene, &parts, geometry, lights)

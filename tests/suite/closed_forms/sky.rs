@@ -6,11 +6,12 @@ use glimt::integrators::ViewMode;
 use glimt::math::random::TestRandom;
 use glimt::math::{DVec3, Vec3};
 use glimt::scene::description::light::DirectionalLight;
-use glimt::scene::description::{Integrator, Light, ShadowMode};
+use glimt::scene::description::{Integrator, Light, ShadowMode, Sky};
 
 use super::direct::at_origin;
+use super::photons::{assert_same_light, both as both_methods};
 use super::scenes::{Build, glass, matte, mirror, phong, receiver, scene};
-use super::{assert_close, assert_mean, v};
+use super::{assert_close, assert_mean, assert_same_mean, mean_and_error, v};
 
 fn path(build: Build) -> Build {
     build.with(|scene| scene.render.integrator = Integrator::Path)
@@ -306,4 +307,65 @@ fn single_texel_map_is_a_constant_color() {
             assert_mean("one texel", &values, expected, 6e-4);
         }
     }
+}
+
+/// A sky with the sun toward `sun`.
+fn clear(sun: DVec3, sun_scale: f32, sky_scale: f32) -> Sky {
+    let ground = Vec3::splat(0.3);
+    Sky { sun: sun.normalize(), turbidity: 3.0, ground, sun_angle: 0.5338, sun_scale, sky_scale }
+}
+
+#[test]
+fn rotating_a_sky_equals_rotating_its_sun() {
+    let from = v(3.0, 2.0, 1.0);
+    for (rotate, sun) in [(90.0, v(1.0, 2.0, -3.0)), (180.0, v(-3.0, 2.0, -1.0))] {
+        let seen = |sun: DVec3, rotate: f64, at: DVec3| {
+            scene().clear_sky(clear(sun, 1.0, 1.0), rotate).seen(DVec3::ZERO, at).color()
+        };
+        for at in [sun, v(0.3, 0.1, 1.0), v(-1.0, 0.02, 0.2), v(1.0, -0.1, 0.0)] {
+            let (rotated, moved) = (seen(from, rotate, at), seen(sun, 0.0, at));
+            assert!((rotated - moved).abs().max_element() < 1e-5 * moved.max_element(), "{rotated} {moved}");
+        }
+    }
+}
+
+#[test]
+fn clear_sky_ends_at_a_sharp_horizon() {
+    let sky = clear(v(1.0, 1.0, 0.0), 0.0, 1.0);
+    let toward = |y: f64| scene().clear_sky(sky.clone(), 0.0).seen(DVec3::ZERO, v(-1.0, y, 0.0)).color();
+    let (above, below) = (toward(1e-5), toward(-1e-5));
+    assert!((toward(1e-4) - above).abs().max_element() < 0.05 * above.max_element(), "{above}");
+    assert!((toward(-1.0) - below).abs().max_element() == 0.0);
+    // A white plane facing up shows E/π, and the ground below the horizon shows 0.3·E/π.
+    let white = path(receiver(DVec3::ZERO, 1.0).clear_sky(sky, 0.0)).depth(1);
+    assert_mean("ground", &white.values(64, 64), below.x / 0.3, 1.5e-3);
+}
+
+#[test]
+fn integrators_agree_under_a_clear_sky() {
+    // A low sun, so that the box casts a shadow on the floor. `hard` treats the small sun as fully visible or hidden.
+    for sky in [clear(v(1.0, 0.6, 0.5), 1.0, 0.0), clear(v(1.0, 0.6, 0.5), 1.0, 1.0)] {
+        let build = receiver(DVec3::ZERO, 0.7)
+            .cuboid(v(-0.6, 0.5, 0.0), v(0.5, 1.0, 2.0), DVec3::ZERO, matte(0.0))
+            .clear_sky(sky, 0.0)
+            .depth(1);
+        let reference = mean_and_error(&path(build.clone()).values(64, 32));
+        for shadows in [ShadowMode::Soft, ShadowMode::Hard] {
+            let whitted = mean_and_error(&build.clone().shadows(shadows, 1).values(64, 32));
+            assert_same_mean(&format!("{shadows:?}"), whitted, reference, 3e-3);
+        }
+    }
+}
+
+#[test]
+fn photons_match_path_under_a_clear_sky() {
+    // A mirror throws light on the floor. With a wide sun, paths find it, too.
+    let sky = Sky { sun_angle: 20.0, ..clear(v(1.0, 1.2, 0.3), 1.0, 1.0) };
+    let build = scene()
+        .quad(v(-1.0, 0.0, 1.0), v(2.0, 0.0, 0.0), v(0.0, 0.0, -2.0), matte(0.6))
+        .quad(v(-0.8, 0.0, -0.8), v(0.0, 0.0, 1.6), v(0.0, 1.0, 0.0), mirror(0.9))
+        .clear_sky(sky, 0.0)
+        .pictured(v(0.0, 3.0, 2.0), v(-0.2, 0.0, 0.0), 30.0, 8, 8)
+        .depth(3);
+    assert_same_light("clear sky", both_methods(&build, 3, [64, 8], (10_000, 0.05)), 8e-3, 4e-3);
 }

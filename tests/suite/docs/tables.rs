@@ -17,6 +17,7 @@ use crate::contract::placeless;
 use crate::test_dir::{TestDir, mentions};
 
 /// A defined table with its header in a scene.
+#[derive(Clone)]
 struct DefinedTable {
     info: &'static TableInfo,
     kind: Option<&'static TableTypeInfo>,
@@ -49,7 +50,10 @@ fn of_definition(info: &'static TableInfo) -> Vec<DefinedTable> {
                 vec![(heading(info.header()), keys.len())]
             }
         };
-        return vec![DefinedTable { info, kind: None, head: format!("{head}\n"), headings, keys }];
+        let inner = info.keys.iter().filter(|key| !key.kind.inner_keys().is_empty());
+        let inner = inner.map(|key| of_inline_table(info, key)).collect::<Vec<_>>();
+        let own = DefinedTable { info, kind: None, head: format!("{head}\n"), headings, keys };
+        return [vec![own], inner].concat();
     }
     let of_type = |kind: &'static TableTypeInfo| {
         let code = format!("type = \"{}\"", kind.name);
@@ -64,6 +68,15 @@ fn of_definition(info: &'static TableInfo) -> Vec<DefinedTable> {
     info.types.iter().map(of_type).collect()
 }
 
+/// The table `[TABLE.KEY]`, which can also be written inline.
+fn of_inline_table(info: &'static TableInfo, key: &'static KeyInfo) -> DefinedTable {
+    let name: &'static str = format!("{}.{}", info.name, key.name).leak();
+    let keys = key.kind.inner_keys();
+    let info = Box::leak(Box::new(TableInfo { name, keys, ..info.clone() }));
+    let headings = vec![(format!("`[{name}]`"), keys.len())];
+    DefinedTable { info, kind: None, head: format!("[{name}]\n"), headings, keys: keys.iter().collect() }
+}
+
 /// A value for a required key.
 fn example(head: &str, key: &str) -> &'static str {
     match key {
@@ -73,6 +86,7 @@ fn example(head: &str, key: &str) -> &'static str {
         "radius" => "0.5",
         "material" => "\"wall\"",
         "group" => "\"stool\"",
+        "sun" => "[1, 1, 0]",
         "file" if head.starts_with("[[mesh]]") => "\"../assets/knot.obj\"",
         "file" => "\"../assets/textures/bricks.png\"",
         _ => "\"a key without an example\"",
@@ -159,7 +173,7 @@ impl DefinedTable {
 
     /// The schema of a key.
     fn schema<'s>(&self, schema: &'s Value, key: &KeyInfo) -> &'s Value {
-        let table = &schema["properties"][self.info.name];
+        let table = self.info.name.split('.').fold(schema, |table, name| &table["properties"][name]);
         let table = match self.info.form {
             TableSyntax::Single => table,
             TableSyntax::Named => &table["additionalProperties"],
@@ -305,7 +319,7 @@ fn reader_schema_and_explain_follow_definitions() {
 #[test]
 fn definition_has_every_key() {
     let tables = tables();
-    assert_eq!(tables.len(), 26);
+    assert_eq!(tables.len(), 27);
     for table in tables {
         let text = table.scene("", "zzz = 1");
         let outcome = parse(text.into(), &root().join("scenes/page.toml"));

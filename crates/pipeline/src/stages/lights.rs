@@ -9,10 +9,11 @@ use super::StageResult;
 use super::textures::Textures;
 use crate::control::{CancelToken, Cancelled};
 use crate::lights::infinite::EnvironmentMap;
+use crate::lights::infinite::sky::Sky;
 use crate::lights::{LightSamplingPurpose, Lights};
 use crate::scene::description::{Scene, TextureRole};
-use crate::scene::fingerprint::{Fingerprint, FingerprintContext};
-use crate::world::{self, Geometry, TextureSource};
+use crate::scene::fingerprint::{Fingerprint, FingerprintContext, FingerprintHasher};
+use crate::world::{self, EnvironmentSource, Geometry, TextureSource};
 
 /// Cache of the lights stage.
 #[derive(Default)]
@@ -20,6 +21,8 @@ pub(crate) struct LightCache {
     lights: Memo<Arc<Lights>>,
     /// The environment map's importance distribution, which does not depend on the map's rotation.
     environment: Memo<Option<Arc<EnvironmentMap>>>,
+    /// The sky, which depends on the rotation only through its frame.
+    sky: Memo<Sky>,
 }
 
 /// Collects the lights, or reuses them if they are unchanged.
@@ -45,7 +48,7 @@ pub(crate) fn collect_lights(
     if let Some(lights) = cache.lights.get(key).filter(|lights| !lights.is_empty()) {
         return Ok(StageResult::reused(lights.clone(), reasons::UNCHANGED));
     }
-    let environment = environment_map(textures, &mut cache.environment);
+    let environment = environment_source(scene, of, textures, cache);
     let lights = world::build_lights(scene, geometry, &textures.images, environment, token)?;
     cache.lights.set(key, lights.clone());
     Ok(match lights.len() {
@@ -85,6 +88,25 @@ fn emissive_material_textures(scene: &Scene) -> impl Iterator<Item = TextureSour
         });
         textures.map(|texture| world::scene_material_texture_source(scene, material, texture))
     })
+}
+
+/// Returns the environment's sky or map, which are reused if they are unchanged.
+fn environment_source(
+    scene: &Scene,
+    of: &FingerprintContext<'_>,
+    textures: &Textures,
+    cache: &mut LightCache,
+) -> Option<EnvironmentSource> {
+    let map = environment_map(textures, &mut cache.environment);
+    let Some(sky) = scene.environment.as_ref().and_then(|environment| environment.sky.as_ref()) else {
+        cache.sky = Memo::default();
+        return map.map(EnvironmentSource::Map);
+    };
+    let key = FingerprintHasher::new("sky").add(sky, of).finish();
+    if cache.sky.get(key).is_none() {
+        cache.sky.set(key, world::build_sky(sky));
+    }
+    cache.sky.get(key).cloned().map(EnvironmentSource::Sky)
 }
 
 fn environment_map(

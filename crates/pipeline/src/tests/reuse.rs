@@ -545,6 +545,26 @@ fn rotating_the_environment_does_not_reload_files() {
 }
 
 #[test]
+fn camera_and_materials_do_not_affect_the_sky() {
+    let sky = "[environment]\nsky = { sun = [1, 1, 0] }\nrotate = 0\n";
+    let mut bench = Bench::new(&format!("{SCENE}{sky}"));
+    let report = bench.done().0;
+    assert_eq!(report.stages[Stage::Lights as usize].why, "3 lights");
+    for (old, new) in
+        [("position = [0, 1, 4]", "position = [0, 1, 5]"), ("[0.5, 0.5, 0.5]", "[0.6, 0.5, 0.5]")]
+    {
+        bench.edit(old, new);
+        assert_statuses(&bench.done().0, "drrrrsdd");
+    }
+    for (old, new) in [("rotate = 0", "rotate = 90"), ("sun = [1, 1, 0]", "sun = [1, 1, 0], turbidity = 2")] {
+        bench.edit(old, new);
+        assert_statuses(&bench.done().0, "drrrdsdd");
+    }
+    bench.edit("turbidity = 2", "sun_scale = 0");
+    assert_eq!(bench.done().0.stages[Stage::Lights as usize].why, "2 lights");
+}
+
+#[test]
 fn black_map_and_bad_texels_cause_warnings() {
     let around = "[environment]\nfile = \"sky.exr\"\n";
     let messages = |values: &[f32]| {

@@ -6,6 +6,8 @@ use super::super::fingerprint::{FingerprintContext, FingerprintHasher, Fingerpri
 use super::Spanned;
 use crate::lights;
 pub use crate::lights::delta::Falloff;
+use crate::lights::infinite::sky::{SkyParameters, elevation};
+use crate::math::transform::rotation_xyz;
 use crate::math::{DMat3, DVec3, Vec3};
 
 /// A light that is not a shape.
@@ -61,17 +63,36 @@ pub struct Environment {
     pub color: Vec3,
     /// Path to an equirectangular map, resolved against the scene's folder.
     pub file: Option<Spanned<PathBuf>>,
-    /// Orientation of the map.
+    /// A sky, which replaces the color and the map.
+    pub sky: Option<Sky>,
+    /// Orientation of the map or the sky.
     pub orientation: MapOrientation,
 }
 
-/// Orientation of an environment map.
+/// Orientation of an environment map or a sky.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum MapOrientation {
     /// Rotation about +y in degrees, counterclockwise when seen from above.
     Turn(f64),
-    /// Rotation from the map's axes to the world's.
+    /// Rotation from the environment's own axes to the world's.
     Rotation(DMat3),
+}
+
+/// A Hosek–Wilkie sky and its sun.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sky {
+    /// Unit direction toward the sun, before the environment's rotation. Above the horizon.
+    pub sun: DVec3,
+    /// Turbidity of the air, from 1 to 10.
+    pub turbidity: f64,
+    /// Albedo of the ground.
+    pub ground: Vec3,
+    /// Apparent diameter of the sun in degrees.
+    pub sun_angle: f64,
+    /// Factor on the sun's radiance.
+    pub sun_scale: f32,
+    /// Factor on the sky's radiance.
+    pub sky_scale: f32,
 }
 
 impl Light {
@@ -134,9 +155,35 @@ impl PointLight {
 }
 
 impl Environment {
-    /// Whether the color is not black, regardless of the map.
+    /// Whether the environment emits light, regardless of the map.
     pub fn has_emission(&self) -> bool {
-        self.color != Vec3::ZERO
+        match &self.sky {
+            Some(sky) => sky.sun_scale > 0.0 || sky.sky_scale > 0.0,
+            None => self.color != Vec3::ZERO,
+        }
+    }
+
+    /// Rotation from the environment's axes to the world's.
+    pub fn rotation(&self) -> DMat3 {
+        match self.orientation {
+            MapOrientation::Turn(degrees) => rotation_xyz(DVec3::new(0.0, degrees, 0.0)),
+            MapOrientation::Rotation(rotation) => rotation,
+        }
+    }
+}
+
+impl Sky {
+    /// The parameters of the model.
+    pub fn parameters(&self) -> SkyParameters {
+        let Self { sun, turbidity, ground, sun_angle, sun_scale, sky_scale } = *self;
+        SkyParameters {
+            sun_elevation: elevation(sun),
+            turbidity,
+            ground,
+            sun_angle: sun_angle.to_radians(),
+            sun_scale,
+            sky_scale,
+        }
     }
 }
 
@@ -162,10 +209,18 @@ impl Fingerprinted for PointLight {
     }
 }
 
+impl Fingerprinted for Sky {
+    fn add_to(&self, key: &mut FingerprintHasher, _: &FingerprintContext<'_>) {
+        let Self { sun, turbidity, ground, sun_angle, sun_scale, sky_scale } = *self;
+        key.add_dvec3(sun).add_f64(turbidity).add_vec3(ground).add_f64(sun_angle);
+        key.add_f32(sun_scale).add_f32(sky_scale);
+    }
+}
+
 /// Covers only the lookup parameters. The texels have a separate fingerprint.
 impl Fingerprinted for Environment {
-    fn add_to(&self, key: &mut FingerprintHasher, _: &FingerprintContext<'_>) {
-        let Self { color, file, orientation } = self;
+    fn add_to(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
+        let Self { color, file, sky, orientation } = self;
         key.add_vec3(*color).add_bool(file.is_some());
         match orientation {
             MapOrientation::Turn(degrees) => key.add_usize(0).add_f64(*degrees),
@@ -173,6 +228,9 @@ impl Fingerprinted for Environment {
                 key.add_usize(1).add_dvec3(*x_axis).add_dvec3(*y_axis).add_dvec3(*z_axis)
             }
         };
+        if let Some(sky) = sky {
+            key.add_str("sky").add(sky, of);
+        }
         if let Some(file) = file {
             key.add_path_bytes(&file.value);
         }

@@ -18,7 +18,7 @@ use std::path::PathBuf;
 pub use camera::{
     Camera, CameraOverrides, ImageWindow, Pose, Projection, ProjectionKind, ResolvedCamera, is_same_distance,
 };
-pub use light::{Environment, Light, MapOrientation};
+pub use light::{Environment, Light, MapOrientation, Sky};
 pub use material::{
     Bump, Channel, ChannelSelector, ColorSource, EmissionSides, EmissionSource, FresnelSource, Material,
     MaterialKind, NormalMap, NumberSource, OpacitySource, PhongParameters, PixelInterpretation, Texture,

@@ -10,7 +10,9 @@ use crate::assets::FileMaterial;
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::Shape;
 use crate::lights::MeshEmitter;
-use crate::lights::infinite::{Environment, EnvironmentMap, MapOrientation};
+use crate::lights::infinite::sky::sun::OrientedSunDisk;
+use crate::lights::infinite::sky::{Sky, SkyFrame};
+use crate::lights::infinite::{DirectionalLight, Environment, EnvironmentMap, MapOrientation};
 use crate::lights::{
     AreaLight, BoundingSphere, EmissionModulation, Light, LightBounds, Lights, PhotonEmitter, Side,
     TriangleWithUvs, UvMapping, back_area_light, front_area_light, see_through_shape_side_light,
@@ -26,9 +28,23 @@ pub fn build_environment_map(texels: &Arc<Texels>) -> Option<Arc<EnvironmentMap>
     EnvironmentMap::new(Arc::clone(texels)).map(Arc::new)
 }
 
-/// Builds all lights: delta and directional lights first, then the environment, then emitting objects. A mesh
-/// becomes one light per emitting material. Two-sided emission becomes two lights. `sky` is the environment
-/// map, if there is one.
+/// Evaluates the environment's sky.
+pub fn build_sky(sky: &description::Sky) -> Sky {
+    Sky::new(&sky.parameters())
+}
+
+/// The environment map or the sky.
+#[derive(Clone, Debug)]
+pub enum EnvironmentSource {
+    /// A map.
+    Map(Arc<EnvironmentMap>),
+    /// A sky.
+    Sky(Sky),
+}
+
+/// Builds all lights: delta and directional lights first, then the environment and its sun, then emitting
+/// objects. A mesh becomes one light per emitting material. Two-sided emission becomes two lights. `sky` is the
+/// environment map or the sky, if there is one that is not black.
 ///
 /// # Errors
 /// [`Cancelled`] if the token is canceled.
@@ -36,7 +52,7 @@ pub fn build_lights(
     scene: &Scene,
     geometry: &Geometry,
     images: &Images,
-    sky: Option<Arc<EnvironmentMap>>,
+    sky: Option<EnvironmentSource>,
     token: &CancelToken,
 ) -> Result<Arc<Lights>, Cancelled> {
     let points = scene.lights.iter().filter(|light| light.has_emission());
@@ -47,8 +63,8 @@ pub fn build_lights(
         EmissionWithOpacity::new(emission, lower_opacity(scene, images, material))
     });
     let emissive: Vec<EmissionWithOpacity> = emissive.collect();
-    let environment = scene.environment.as_ref().and_then(|environment| environment_light(environment, sky));
-    let mut all: Vec<Light> = points.chain(environment.map(Light::Environment)).collect();
+    let environment = scene.environment.as_ref().map(|environment| environment_lights(environment, sky));
+    let mut all: Vec<Light> = points.chain(environment.into_iter().flatten()).collect();
     for ((id, object), described) in objects {
         let emissive = described.material.map(|index| &emissive[index]);
         match object {
@@ -77,22 +93,36 @@ pub fn scene_photon_emitter(geometry: &Geometry, lights: &Arc<Lights>) -> Option
     PhotonEmitter::new(lights, emitter_geometry, BoundingSphere::enclosing_spheres(&balls))
 }
 
-/// The environment light, or `None` if it is black.
-fn environment_light(
+/// The environment light and its sun, unless they are black.
+fn environment_lights(
     environment: &description::Environment,
-    sky: Option<Arc<EnvironmentMap>>,
-) -> Option<Environment> {
+    source: Option<EnvironmentSource>,
+) -> Vec<Light> {
     if !environment.has_emission() {
-        return None;
+        return Vec::new();
     }
-    let description::Environment { color, file, orientation } = environment;
-    let orientation = match orientation {
-        description::MapOrientation::Turn(degrees) => MapOrientation::from_degrees(*degrees),
-        description::MapOrientation::Rotation(rotation) => MapOrientation::Rotation(rotation.as_mat3()),
-    };
-    match file {
-        Some(_) => Some(Environment::from_map(sky?, *color, orientation)),
-        None => Some(Environment::Constant(*color)),
+    let description::Environment { color, file, sky, orientation } = environment;
+    match (sky, file, source) {
+        (Some(sky), _, Some(EnvironmentSource::Sky(Sky { dome, sun }))) => {
+            let rotation = environment.rotation();
+            let frame = SkyFrame::new(rotation * sky.sun, rotation.y_axis);
+            let dome = dome.map(|dome| Light::Environment(Environment::Sky { dome, frame }));
+            let sun = sun.map(|disk| {
+                let disk = OrientedSunDisk { disk, up: frame.up() };
+                Light::Directional(DirectionalLight::from_sun(frame.sun(), disk))
+            });
+            dome.into_iter().chain(sun).collect()
+        }
+        (None, Some(_), Some(EnvironmentSource::Map(map))) => {
+            let orientation = match orientation {
+                description::MapOrientation::Turn(degrees) => MapOrientation::from_degrees(*degrees),
+                description::MapOrientation::Rotation(rotation) => MapOrientation::Rotation(rotation.as_mat3()),
+            };
+            vec![Light::Environment(Environment::from_map(map, *color, orientation))]
+        }
+        (None, None, _) => vec![Light::Environment(Environment::Constant(*color))],
+        // The map is black.
+        (Some(_), _, _) | (None, Some(_), _) => Vec::new(),
     }
 }
 

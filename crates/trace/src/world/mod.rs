@@ -41,7 +41,7 @@ pub use contact::{
 };
 pub use coplanar::{CoplanarLight, coplanar_lights, light_lifts};
 pub use distinct_lights::{emissive_override_flags_by_mesh_file, separate_coincident_emitters};
-pub use emitters::{build_environment_map, build_lights, scene_photon_emitter};
+pub use emitters::{EnvironmentSource, build_environment_map, build_lights, build_sky, scene_photon_emitter};
 pub use geometry::{Geometry, Hit};
 pub use glass_solids::{GlassSolids, OpenGlass};
 pub use merged::MergedMeshes;

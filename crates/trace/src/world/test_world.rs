@@ -3,7 +3,10 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::{Geometry, Images, MeshTree, World, WorldInputs, build_environment_map, build_lights};
+use super::{
+    EnvironmentSource, Geometry, Images, MeshTree, World, WorldInputs, build_environment_map, build_lights,
+    build_sky,
+};
 use crate::assets::LoadedMesh;
 use crate::control::CancelToken;
 use crate::geometry::mesh::TriangleMesh;
@@ -60,7 +63,7 @@ impl TestWorldBuilder {
     pub fn sky(mut self, texels: &Arc<Texels>) -> Self {
         let file = Some(Spanned { value: PathBuf::from("sky.exr"), span: 0..0 });
         self.scene.environment =
-            Some(Environment { color: Vec3::ONE, file, orientation: MapOrientation::Turn(0.0) });
+            Some(Environment { color: Vec3::ONE, file, sky: None, orientation: MapOrientation::Turn(0.0) });
         self.sky = Some(Arc::clone(texels));
         self
     }
@@ -70,7 +73,9 @@ impl TestWorldBuilder {
         let (token, scene) = (CancelToken::new(), &self.scene);
         let geometry = Geometry::from_scene(scene, &self.meshes, DVec3::ZERO, &token);
         let geometry = Arc::new(geometry.expect("never canceled"));
-        let sky = self.sky.as_ref().and_then(build_environment_map);
+        let sky = scene.environment.as_ref().and_then(|environment| environment.sky.as_ref());
+        let map = || self.sky.as_ref().and_then(build_environment_map).map(EnvironmentSource::Map);
+        let sky = sky.map(|sky| EnvironmentSource::Sky(build_sky(sky))).or_else(map);
         let lights = build_lights(scene, &geometry, &Images::new(), sky, &token).expect("never canceled");
         World::new(scene, &WorldInputs { meshes: self.meshes, ..WorldInputs::default() }, geometry, lights)
     }
