@@ -246,12 +246,19 @@ impl Build {
         let height = texels.len() as u32 / width;
         self.sky = Some(Arc::new(Texels { width, height, data: TexelData::Float(texels), unusable: 0 }));
         let file = Some(Spanned { value: PathBuf::from("sky.exr"), span: 0..0 });
-        self.with(|scene| scene.environment = Some(Environment { color: Vec3::ONE, file, sky: None, orientation }))
+        self.with(|scene| {
+            scene.environment = Some(Environment { color: Vec3::ONE, file, sky: None, orientation });
+        })
     }
 
     /// Adds a sky with a sun.
     pub fn clear_sky(self, sky: Sky, rotate: f64) -> Self {
-        let environment = Environment { color: Vec3::ONE, file: None, sky: Some(sky), orientation: MapOrientation::Turn(rotate) };
+        let environment = Environment {
+            color: Vec3::ONE,
+            file: None,
+            sky: Some(sky),
+            orientation: MapOrientation::Turn(rotate),
+        };
         self.with(|scene| scene.environment = Some(environment))
     }
 

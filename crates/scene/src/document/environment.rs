@@ -73,7 +73,8 @@ pub(super) fn read_environment(root: &TableReader<'_>) -> Option<Option<Environm
     }
     for key in [rotate, matrix] {
         if let Some(span) = key.value_span().filter(|_| !file.is_present() && !sky.is_present()) {
-            let issue = Issue::warning(span, format!("`{}` has no effect without `file` or `sky`", key.info.name));
+            let issue =
+                Issue::warning(span, format!("`{}` has no effect without `file` or `sky`", key.info.name));
             let help = "a constant environment looks the same from every direction";
             table.context.report(issue.with_help(help));
         }

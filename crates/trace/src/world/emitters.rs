@@ -116,7 +116,9 @@ fn environment_lights(
         (None, Some(_), Some(EnvironmentSource::Map(map))) => {
             let orientation = match orientation {
                 description::MapOrientation::Turn(degrees) => MapOrientation::from_degrees(*degrees),
-                description::MapOrientation::Rotation(rotation) => MapOrientation::Rotation(rotation.as_mat3()),
+                description::MapOrientation::Rotation(rotation) => {
+                    MapOrientation::Rotation(rotation.as_mat3())
+                }
             };
             vec![Light::Environment(Environment::from_map(map, *color, orientation))]
         }
