@@ -64,7 +64,9 @@ fn materials_have_the_documented_defaults() {
     let kinds: Vec<_> = scene.materials.into_iter().map(|material| material.kind).collect();
     let mirror = MaterialKind::Mirror { reflectance: ColorSource::Constant(Vec3::splat(0.9)) };
     let roughness = NumberSource::Constant(0.0);
-    assert_eq!(kinds, [phong, mirror, MaterialKind::Glass { ior: 1.5, tint: DVec3::ONE, roughness }]);
+    let distribution = MicrofacetDistribution::Ggx;
+    let glass = MaterialKind::Glass { ior: 1.5, tint: DVec3::ONE, roughness, distribution };
+    assert_eq!(kinds, [phong, mirror, glass]);
 }
 
 #[test]

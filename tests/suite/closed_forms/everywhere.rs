@@ -10,15 +10,16 @@ use glimt::scene::description::{
     EmissionSides, EmissionSource, Integrator, Material, MaterialKind, NumberSource, OpacitySource, Shape,
 };
 
-use super::scenes::{AS_IT_IS, Build, metal, plastic, principled, receiver, scene};
+use super::scenes::{AS_IT_IS, Build, beckmann, metal, plastic, principled, receiver, scene};
 use super::{assert_mean, v};
 
 /// Materials, each with a name for messages.
-fn materials() -> [(&'static str, Material); 6] {
+fn materials() -> [(&'static str, Material); 7] {
     [
         ("metal", metal(0.8, 0.5, 0.0)),
         ("brushed metal", metal(0.8, 0.5, 0.6)),
         ("plastic", plastic(0.6, 0.4)),
+        ("Beckmann plastic", beckmann(plastic(0.6, 0.4))),
         ("smooth plastic", plastic(0.6, 0.0)),
         ("principled", principled(0.7, 0.0, 0.5)),
         ("principled metal", principled(0.7, 1.0, 0.5)),

@@ -10,7 +10,7 @@ use glimt::scene::description::{
 use super::global::by_paths;
 use super::photons::{assert_same_light, both};
 use super::scenes::{
-    Build, emitter, frosted, glass, matte, metal, mirror, plastic, scene, tinted, translucent,
+    Build, beckmann, emitter, frosted, glass, matte, metal, mirror, plastic, scene, tinted, translucent,
 };
 use super::{assert_close, assert_same_mean, mean_and_error, v};
 
@@ -31,7 +31,10 @@ fn sheet(material: Material) -> Build {
 fn boundaries() -> Vec<(String, Build, DVec3)> {
     let mut all = Vec::new();
     for roughness in [0.1, 0.3, 0.6, 1.0] {
-        let glass = frosted(1.5, roughness);
+        let glass = match roughness {
+            0.6 => beckmann(frosted(1.5, roughness)),
+            _ => frosted(1.5, roughness),
+        };
         // The refracted angle is asin(sin 45°/1.5). From inside, use a steeper direction to avoid total
         // internal reflection.
         all.push((
@@ -181,7 +184,7 @@ fn room() -> Build {
         .quad(v(-1.0, 0.0, 1.0), v(2.0, 0.0, 0.0), v(0.0, 0.0, -2.0), matte(0.6))
         .quad(v(-1.0, 0.0, -1.0), v(2.0, 0.0, 0.0), v(0.0, 2.0, 0.0), matte(0.7))
         .quad(v(1.0, 0.0, 1.0), v(0.0, 0.0, -2.0), v(0.0, 2.0, 0.0), plastic(0.6, 0.4))
-        .cuboid(v(-0.3, 0.25, 0.1), v(0.5, 0.5, 0.5), v(0.0, 30.0, 0.0), frosted(1.5, 0.6))
+        .cuboid(v(-0.3, 0.25, 0.1), v(0.5, 0.5, 0.5), v(0.0, 30.0, 0.0), beckmann(frosted(1.5, 0.6)))
         .sphere(v(0.4, 0.35, 0.0), 0.35, mirror(0.9))
         .sphere(v(-0.5, 0.75, 0.1), 0.25, glass(1.5))
         .quad(v(-0.9, 0.0, -0.5), v(0.4, 0.0, -0.3), v(0.0, 0.8, 0.0), translucent(0.8, 0.5, 0.6))

@@ -11,8 +11,8 @@ use glimt::scene::description::{
 use super::global::{by_paths, lamps_over_a_floor};
 use super::photons::{assert_same_light, both};
 use super::scenes::{
-    Build, emitter, frosted, glass, lat_long_sphere, matte, metal, phong, plastic, principled, scene,
-    translucent,
+    Build, beckmann, emitter, frosted, glass, lat_long_sphere, matte, metal, phong, plastic, principled,
+    scene, translucent,
 };
 use super::{assert_close, assert_same_mean, mean_and_error, v};
 
@@ -29,6 +29,8 @@ fn materials() -> Vec<(&'static str, Material)> {
         ("principled", principled(0.6, 0.3, 0.4)),
         ("rough glass", frosted(1.5, 0.5)),
         ("sheet", translucent(0.6, 0.4, 0.5)),
+        ("Beckmann metal", beckmann(metal(0.8, 0.4, 0.3))),
+        ("Beckmann plastic", beckmann(plastic(0.6, 0.4))),
     ]
 }
 
@@ -130,7 +132,7 @@ fn photons_match_path_on_coats_and_metals() {
         scene()
             .quad(v(-1.0, 0.0, 1.0), v(2.0, 0.0, 0.0), v(0.0, 0.0, -2.0), plastic(0.6, 0.0))
             .quad(v(-1.0, 0.0, -1.0), v(2.0, 0.0, 0.0), v(0.0, 2.0, 0.0), matte(0.7))
-            .quad(v(1.0, 0.0, 1.0), v(0.0, 0.0, -2.0), v(0.0, 2.0, 0.0), metal(0.9, 0.3, 0.0))
+            .quad(v(1.0, 0.0, 1.0), v(0.0, 0.0, -2.0), v(0.0, 2.0, 0.0), beckmann(metal(0.9, 0.3, 0.0)))
             .sphere(v(-0.4, 0.35, 0.0), 0.35, metal(0.8, 0.0, 0.0))
             .quad(v(-0.5, 1.9, -0.5), v(1.0, 0.0, 0.0), v(0.0, 0.0, 1.0), emitter(4.0))
             .pictured(v(0.0, 1.0, 3.5), v(0.2, 0.6, -0.9), 30.0, 12, 12)

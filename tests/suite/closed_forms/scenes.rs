@@ -15,10 +15,7 @@ use glimt::materials::texels::{TexelData, Texels};
 use glimt::math::{DVec3, Vec2, Vec3};
 use glimt::scene::description::light::{Falloff, PointLight};
 use glimt::scene::description::{
-    Accel, Camera, ColorSource, EmissionSource, Environment, FresnelSource, ImageWindow, Integrator, Light,
-    MapOrientation, Material, MaterialKind, MeshFile, MeshReference, NumberSource, Object, ObjectTransform,
-    OpacitySource, PhongParameters, PhotonOptions, PixelFilter, Projection, RenderOptions, Scene, ShadowMode,
-    Shape, Sky, Spanned, Texture, TextureEncoding, TextureFilter, Tonemap, UvSet, Wrap,
+    Accel, Camera, ColorSource, EmissionSource, Environment, FresnelSource, ImageWindow, Integrator, Light, MapOrientation, Material, MaterialKind, MeshFile, MeshReference, MicrofacetDistribution, NumberSource, Object, ObjectTransform, OpacitySource, PhongParameters, PhotonOptions, PixelFilter, Projection, RenderOptions, Scene, ShadowMode, Shape, Sky, Spanned, Texture, TextureEncoding, TextureFilter, Tonemap, UvSet, Wrap,
 };
 use glimt::world::{
     EnvironmentSource, Geometry, Image, MeshTree, TextureRolesNeededByRender, World, WorldInputs,
@@ -412,7 +409,22 @@ pub fn metal(reflectance: f32, roughness: f32, anisotropy: f32) -> Material {
         fresnel: FresnelSource::Schlick(ColorSource::Constant(Vec3::splat(reflectance))),
         roughness: NumberSource::Constant(roughness),
         anisotropy: NumberSource::Constant(anisotropy),
+        distribution: MicrofacetDistribution::Ggx,
     })
+}
+
+/// The material with the Beckmann distribution.
+pub fn beckmann(mut material: Material) -> Material {
+    match &mut material.kind {
+        MaterialKind::Metal { distribution, .. }
+        | MaterialKind::Plastic { distribution, .. }
+        | MaterialKind::Glass { distribution, .. } => *distribution = MicrofacetDistribution::Beckmann,
+        MaterialKind::Phong(_)
+        | MaterialKind::Mirror { .. }
+        | MaterialKind::Pane { .. }
+        | MaterialKind::Principled { .. } => {}
+    }
+    material
 }
 
 /// Plastic with IOR 1.5 and full specular reflection.
@@ -422,6 +434,7 @@ pub fn plastic(diffuse: f32, roughness: f32) -> Material {
         specular: ColorSource::Constant(Vec3::ONE),
         ior: 1.5,
         roughness: NumberSource::Constant(roughness),
+        distribution: MicrofacetDistribution::Ggx,
     })
 }
 
@@ -448,7 +461,8 @@ pub fn glass(ior: f32) -> Material {
 /// Rough glass.
 pub fn frosted(ior: f32, roughness: f32) -> Material {
     let roughness = NumberSource::Constant(roughness);
-    plain(MaterialKind::Glass { ior, tint: DVec3::ONE, roughness })
+    let distribution = MicrofacetDistribution::Ggx;
+    plain(MaterialKind::Glass { ior, tint: DVec3::ONE, roughness, distribution })
 }
 
 /// A principled material with a clear coat and the specified transmission.
@@ -462,7 +476,8 @@ pub fn translucent(color: f32, roughness: f32, transmission: f32) -> Material {
 
 /// Glass with the given transmittance per unit length.
 pub fn tinted(ior: f32, tint: DVec3) -> Material {
-    plain(MaterialKind::Glass { ior, tint, roughness: NumberSource::Constant(0.0) })
+    let (roughness, distribution) = (NumberSource::Constant(0.0), MicrofacetDistribution::Ggx);
+    plain(MaterialKind::Glass { ior, tint, roughness, distribution })
 }
 
 /// A material from a mesh file with the given illumination model: 2 is matte gray, 9 is glass.

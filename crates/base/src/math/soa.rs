@@ -184,7 +184,7 @@ impl Soa for bool {
 macro_rules! soa {
     (
         $(#[$attribute:meta])*
-        $vis:vis struct $Name:ident $(<const $N:ident: $Of:ty>)? in $Packet:ident {
+        $vis:vis struct $Name:ident $(<$(const $N:ident: $Of:ty),+>)? in $Packet:ident {
             $($(#[$field_attribute:meta])* $field_vis:vis $field:ident: $type:ty = $default:expr),+ $(,)?
         }
         $(with {
@@ -193,11 +193,11 @@ macro_rules! soa {
     ) => {
         $(#[$attribute])*
         #[derive(Clone, Copy, Debug)]
-        $vis struct $Name $(<const $N: $Of>)? {
+        $vis struct $Name $(<$(const $N: $Of),+>)? {
             $($(#[$field_attribute])* $field_vis $field: $type),+
         }
 
-        impl $(<const $N: $Of>)? Default for $Name $(<$N>)? {
+        impl $(<$(const $N: $Of),+>)? Default for $Name $(<$($N),+>)? {
             #[inline(always)]
             fn default() -> Self {
                 Self { $($field: $default),+ }
@@ -207,13 +207,13 @@ macro_rules! soa {
         #[doc = concat!("A packet of [`", stringify!($Name), "`].")]
         #[derive(Clone, Debug)]
         #[repr(align(64))]
-        $vis struct $Packet $(<const $N: $Of>)? {
+        $vis struct $Packet $(<$(const $N: $Of),+>)? {
             $($(#[$field_attribute])* $field_vis $field: <$type as $crate::math::soa::Soa>::Packet,)+
             $($($(#[$shared_attribute])* $shared_vis $shared: $shared_type,)+)?
         }
 
-        impl $(<const $N: $Of>)? $crate::math::soa::Soa for $Name $(<$N>)? {
-            type Packet = $Packet $(<$N>)?;
+        impl $(<$(const $N: $Of),+>)? $crate::math::soa::Soa for $Name $(<$($N),+>)? {
+            type Packet = $Packet $(<$($N),+>)?;
 
             #[inline(always)]
             fn splat(self) -> Self::Packet {

@@ -348,7 +348,7 @@ impl<B: Bxdf> BxdfPacket<B> {
     }
 }
 
-impl<const THROUGH: bool> BxdfPacket<DielectricBxdf<THROUGH>> {
+impl<const THROUGH: bool, const BECKMANN: bool> BxdfPacket<DielectricBxdf<THROUGH, BECKMANN>> {
     /// Samples a direction on either side of each surface.
     #[inline(always)]
     pub fn sample_reflection_or_transmission(
@@ -359,7 +359,7 @@ impl<const THROUGH: bool> BxdfPacket<DielectricBxdf<THROUGH>> {
         let (mut wi, mut beyond) = ([[0.0; PACKET_SIZE]; 3], [0; PACKET_SIZE]);
         let (mut pdfs, mut weights) = ([0.0; PACKET_SIZE], [0.0; PACKET_SIZE]);
         for i in 0..PACKET_SIZE {
-            let bsdf = DielectricBxdf::<THROUGH>::get(&self.bsdf, i);
+            let bsdf = DielectricBxdf::<THROUGH, BECKMANN>::get(&self.bsdf, i);
             let view = Soa::get(&self.view, i);
             let sample = bsdf.sample_reflection_or_transmission(&view, choices[i], [u[0][i], u[1][i]]);
             set_lane(&mut wi, i, sample.wi);
@@ -420,7 +420,7 @@ impl<B: Bxdf> BxdfPacket<B> {
     }
 }
 
-impl<const THROUGH: bool> BxdfPacket<DielectricBxdf<THROUGH>> {
+impl<const THROUGH: bool, const BECKMANN: bool> BxdfPacket<DielectricBxdf<THROUGH, BECKMANN>> {
     /// [`BxdfPacket::sample_reflection_or_transmission`].
     #[inline(always)]
     pub(super) fn sample_reflection_or_transmission_out_of_line(
@@ -485,13 +485,15 @@ impl<B: Bxdf> SimdKernel for SamplingKernel<'_, B> {
 }
 
 /// Kernel of [`BxdfPacket::sample_reflection_or_transmission`].
-struct EitherSideSamplingKernel<'a, const THROUGH: bool> {
-    packet: &'a BxdfPacket<DielectricBxdf<THROUGH>>,
+struct EitherSideSamplingKernel<'a, const THROUGH: bool, const BECKMANN: bool> {
+    packet: &'a BxdfPacket<DielectricBxdf<THROUGH, BECKMANN>>,
     choices: &'a F32x16,
     u: &'a [F32x16; 2],
 }
 
-impl<const THROUGH: bool> SimdKernel for EitherSideSamplingKernel<'_, THROUGH> {
+impl<const THROUGH: bool, const BECKMANN: bool> SimdKernel
+    for EitherSideSamplingKernel<'_, THROUGH, BECKMANN>
+{
     type Output = DielectricSamplePacket;
 
     #[inline(always)]

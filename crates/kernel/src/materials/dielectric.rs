@@ -1,7 +1,7 @@
 //! Dielectrics that fill closed shapes.
 
 use super::footprint::TexturePoint;
-use super::microfacet;
+use super::microfacet::{self, MicrofacetDistribution};
 use super::scalar::ScalarParameter;
 use crate::math::elementary::exp2;
 use crate::math::{DVec3, Vec3};
@@ -15,6 +15,8 @@ pub struct Dielectric {
     pub tint: Vec3,
     /// The square root of α. For smooth glass, it is a constant 0.
     pub roughness: ScalarParameter,
+    /// Distribution of the facets of a rough surface.
+    pub distribution: MicrofacetDistribution,
     /// Absorption in halvings per unit length. If the tint of colored glass were stored in `f32`, it could
     /// underflow in scenes with large units and round to 1 in scenes with small units.
     density: Vec3,
@@ -27,12 +29,13 @@ impl Dielectric {
         let halvings =
             |part: f64| if part < 1.0 { (-libm::log2(part)).min(f32::MAX.into()) as f32 } else { 0.0 };
         let density = Vec3::from_array(tint.to_array().map(halvings));
-        Self { ior, tint: tint.as_vec3(), roughness: ScalarParameter::Constant(0.0), density }
+        let (roughness, distribution) = (ScalarParameter::Constant(0.0), MicrofacetDistribution::Ggx);
+        Self { ior, tint: tint.as_vec3(), roughness, distribution, density }
     }
 
-    /// The same glass with a different surface roughness.
-    pub fn with_roughness(self, roughness: ScalarParameter) -> Self {
-        Self { roughness, ..self }
+    /// The same glass with a different surface.
+    pub fn with_roughness(self, roughness: ScalarParameter, distribution: MicrofacetDistribution) -> Self {
+        Self { roughness, distribution, ..self }
     }
 
     /// Whether the surface is smooth.

@@ -7,8 +7,11 @@
 //! Interpolation in roughness tables adds an error of at most 2e-3. Therefore, the base under a lobe never
 //! receives too much light.
 
+mod beckmann;
+
 use std::f64::consts::TAU;
 
+use super::microfacet::MicrofacetDistribution;
 use crate::math::{DVec3, Vec3};
 
 /// Number of polynomial terms.
@@ -38,8 +41,15 @@ impl LobeAlbedoPolynomial {
 
     /// Computes the albedo of a lobe with an isotropic α. `reflectance` maps a cosine to the reflectance of a
     /// facet.
-    pub fn for_microfacet_lobe(alpha: f64, reflectance: impl Fn(f64) -> f64) -> Self {
-        Self::fit(|cosine| integrate_albedo::<12, 16>(cosine, alpha, &reflectance))
+    pub fn for_microfacet_lobe(
+        distribution: MicrofacetDistribution,
+        alpha: f64,
+        reflectance: impl Fn(f64) -> f64,
+    ) -> Self {
+        Self::fit(|cosine| match distribution {
+            MicrofacetDistribution::Ggx => integrate_albedo::<12, 16>(cosine, alpha, &reflectance),
+            MicrofacetDistribution::Beckmann => beckmann::integrate_albedo(cosine, alpha, &reflectance),
+        })
     }
 
     /// Fits a polynomial to an albedo function, and stores the function's exact mean.
@@ -100,9 +110,15 @@ pub struct AlbedoTable {
 
 impl AlbedoTable {
     /// A table for lobes with α = `alpha(roughness)`. It has a single entry if the roughness is constant.
-    pub fn new(roughness: Option<f32>, alpha: impl Fn(f32) -> f32, reflectance: impl Fn(f64) -> f64) -> Self {
-        let row =
-            |roughness: f32| LobeAlbedoPolynomial::for_microfacet_lobe(alpha(roughness).into(), &reflectance);
+    pub fn new(
+        distribution: MicrofacetDistribution,
+        roughness: Option<f32>,
+        alpha: impl Fn(f32) -> f32,
+        reflectance: impl Fn(f64) -> f64,
+    ) -> Self {
+        let row = |roughness: f32| {
+            LobeAlbedoPolynomial::for_microfacet_lobe(distribution, alpha(roughness).into(), &reflectance)
+        };
         let rows = match roughness {
             Some(one) => vec![row(one)],
             None => (0..TABLE_SIZE).map(|i| row(i as f32 / (TABLE_SIZE - 1) as f32)).collect(),
@@ -352,6 +368,9 @@ pub fn reflectance_under_coat(diffuse: Vec3, returned: f32) -> Vec3 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::choice::Choice;
+
+    const GGX: MicrofacetDistribution = MicrofacetDistribution::Ggx;
 
     #[test]
     fn polynomials_are_tight_upper_bounds() {
@@ -363,7 +382,7 @@ mod tests {
         for (reflectance, eta) in exact.into_iter().chain([(grazing, 0.0), (normal, 0.0)]) {
             let reflectance = |cosine: f64| reflectance(cosine, eta);
             for alpha in [0.001, 0.003, 0.01, 0.03, 0.1, 0.3, 0.6, 1.0] {
-                let fit = LobeAlbedoPolynomial::for_microfacet_lobe(alpha, reflectance);
+                let fit = LobeAlbedoPolynomial::for_microfacet_lobe(GGX, alpha, reflectance);
                 for step in (5..=100_u32).step_by(5) {
                     let cosine = f64::from(step) / 100.0;
                     let exact = integrate_albedo::<24, 48>(cosine, alpha, &reflectance);
@@ -415,8 +434,9 @@ mod tests {
         let smooth =
             LobeAlbedoPolynomial::fit_storing_exact_mean(|cosine| fresnel_dielectric_f64(cosine, 1.5));
         assert!((smooth.mean - 0.091_778_0).abs() < 2e-5, "{}", smooth.mean);
-        let narrow =
-            LobeAlbedoPolynomial::for_microfacet_lobe(0.001, |cosine| fresnel_dielectric_f64(cosine, 1.5));
+        let narrow = LobeAlbedoPolynomial::for_microfacet_lobe(GGX, 0.001, |cosine| {
+            fresnel_dielectric_f64(cosine, 1.5)
+        });
         assert!((narrow.mean - smooth.mean).abs() < 1e-3, "{}", narrow.mean);
     }
 
@@ -424,17 +444,20 @@ mod tests {
     fn interpolated_tables_match_single_entries() {
         let fresnel = |cosine: f64| fresnel_dielectric_f64(cosine, 1.5);
         let alpha = |roughness: f32| (roughness * roughness).max(0.001);
-        let table = AlbedoTable::new(None, alpha, fresnel);
-        for roughness in [0.0, 0.1, 0.23, 0.5, 0.77, 1.0] {
-            let single = AlbedoTable::new(Some(roughness), alpha, fresnel).lobe_at_roughness(roughness);
-            let lerp = table.lobe_at_roughness(roughness);
-            assert!((lerp.mean - single.mean).abs() < 5e-4);
-            for cosine in [0.05, 0.1, 0.3, 0.6, 1.0] {
-                let (one, other) = (lerp.at_cosine(cosine), single.at_cosine(cosine));
-                assert!(
-                    (one - other).abs() < 2e-3,
-                    "roughness {roughness}, μ {cosine}: {one} instead of {other}"
-                );
+        for &distribution in MicrofacetDistribution::ALL {
+            let table = AlbedoTable::new(distribution, None, alpha, fresnel);
+            for roughness in [0.0, 0.1, 0.23, 0.5, 0.77, 1.0] {
+                let single = AlbedoTable::new(distribution, Some(roughness), alpha, fresnel);
+                let single = single.lobe_at_roughness(roughness);
+                let lerp = table.lobe_at_roughness(roughness);
+                assert!((lerp.mean - single.mean).abs() < 5e-4);
+                for cosine in [0.05, 0.1, 0.3, 0.6, 1.0] {
+                    let (one, other) = (lerp.at_cosine(cosine), single.at_cosine(cosine));
+                    assert!(
+                        (one - other).abs() < 2e-3,
+                        "{distribution:?}, roughness {roughness}, μ {cosine}: {one} instead of {other}"
+                    );
+                }
             }
         }
     }

@@ -1,18 +1,38 @@
-//! Microfacets with single scattering: the GGX distribution (Walter et al., *Microfacet Models for Refraction
-//! through Rough Surfaces*, 2007) with height-correlated Smith masking and shadowing (Heitz, *Understanding
-//! the Masking-Shadowing Function in Microfacet-Based BRDFs*, JCGT 3(2), 2014).
+//! Microfacets with single scattering: the GGX and Beckmann distributions (Walter et al., *Microfacet Models
+//! for Refraction through Rough Surfaces*, 2007) with height-correlated Smith masking and shadowing (Heitz,
+//! *Understanding the Masking-Shadowing Function in Microfacet-Based BRDFs*, JCGT 3(2), 2014).
 //!
-//! A lobe is f = F·D·G/(4 cosθᵢ cosθₒ) with G = 1/(1 + Λᵢ + Λₒ). Let s(θ) = √(cos²θ + α² sin²θ), which
-//! implies 1 + 2Λ = s/cosθ. Then G/(4 cosθᵢ cosθₒ) = 1/(2(cosθᵢ sₒ + cosθₒ sᵢ)), and the pdf of a direction
+//! A lobe is f = F·D·G/(4 cosθᵢ cosθₒ) with G = 1/(1 + Λᵢ + Λₒ). Let s(θ) = cosθ (1 + 2Λ), which is √(cos²θ +
+//! α² sin²θ) for GGX. Then G/(4 cosθᵢ cosθₒ) = 1/(2(cosθᵢ sₒ + cosθₒ sᵢ)), and the pdf of a direction
 //! reflected at a visible normal is D/(2(cosθₒ + sₒ)). This avoids dividing by the cosine of a grazing
 //! direction. The tangent of the half vector's angle is computed from the component perpendicular to the
 //! normal, which is accurate even near the peak of a narrow lobe.
 
-use std::f32::consts::{FRAC_1_PI, PI};
+mod beckmann;
 
+use std::f32::consts::{FRAC_1_PI, LOG2_E, PI};
+
+use crate::choice;
 use crate::math::Vec3;
-use crate::math::elementary::sin_cos;
+use crate::math::elementary::{exp2, sin_cos};
 use crate::math::frame::Frame;
+
+choice! {
+    /// Distributions of microfacet normals.
+    pub enum MicrofacetDistribution {
+        /// GGX, whose highlights have long tails.
+        Ggx = "ggx",
+        /// Beckmann, with normally distributed slopes.
+        Beckmann = "beckmann",
+    }
+}
+
+impl MicrofacetDistribution {
+    /// Beckmann if the condition holds, and GGX otherwise.
+    pub const fn beckmann_if(condition: bool) -> Self {
+        if condition { Self::Beckmann } else { Self::Ggx }
+    }
+}
 
 /// Minimum α. Narrower lobes cannot be resolved by `f32` directions.
 pub const MIN_ALPHA: f32 = 1e-3;
@@ -97,24 +117,49 @@ impl UnnormalizedHalfVector {
 
     /// Isotropic D in sr⁻¹.
     #[inline(always)]
-    pub fn evaluate_isotropic_ggx(&self, alpha: f32) -> f32 {
+    pub fn isotropic_d(&self, distribution: MicrofacetDistribution, alpha: f32) -> f32 {
         let squared = alpha * alpha;
-        self.ggx_ndf_from_stretched(self.across.length_squared() / squared, squared)
+        self.d_from_stretched(distribution, self.across.length_squared() / squared, squared)
     }
 
     /// Anisotropic D in sr⁻¹, with a separate α along each tangent of a frame.
     #[inline(always)]
-    pub fn anisotropic_ggx_d(&self, frame: &Frame, [u, v]: [f32; 2]) -> f32 {
+    pub fn anisotropic_d(
+        &self,
+        distribution: MicrofacetDistribution,
+        frame: &Frame,
+        [u, v]: [f32; 2],
+    ) -> f32 {
         let (x, y) = (self.across.dot(frame.s) / u, self.across.dot(frame.t) / v);
-        self.ggx_ndf_from_stretched(x * x + y * y, u * v)
+        self.d_from_stretched(distribution, x * x + y * y, u * v)
     }
 
     /// Computes D from the squared perpendicular component divided by α², and the product of the two α
     /// values.
     #[inline(always)]
+    fn d_from_stretched(&self, distribution: MicrofacetDistribution, stretched: f32, product: f32) -> f32 {
+        match distribution {
+            MicrofacetDistribution::Ggx => self.ggx_ndf_from_stretched(stretched, product),
+            MicrofacetDistribution::Beckmann => self.beckmann_ndf_from_stretched(stretched, product),
+        }
+    }
+
+    #[inline(always)]
     fn ggx_ndf_from_stretched(&self, stretched: f32, product: f32) -> f32 {
         let slope = self.along * self.along + stretched;
         self.squared * self.squared * FRAC_1_PI / (product * slope * slope)
+    }
+
+    /// exp(−tan²θ/α²)/(π α² cos⁴θ).
+    #[inline(always)]
+    fn beckmann_ndf_from_stretched(&self, stretched: f32, product: f32) -> f32 {
+        // Beyond this slope, D is negligible, and its terms may overflow.
+        const MAX_SQUARED_SLOPE: f32 = 80.0;
+        let along = self.along * self.along;
+        let slope = stretched / along;
+        let cosine = self.squared / along;
+        let value = cosine * cosine * exp2(slope * -LOG2_E) * FRAC_1_PI / product;
+        if slope < MAX_SQUARED_SLOPE { value } else { 0.0 }
     }
 }
 
@@ -130,19 +175,37 @@ pub struct SmithTerms {
 impl SmithTerms {
     /// Computes the isotropic terms for a direction.
     #[inline(always)]
-    pub fn isotropic(normal: Vec3, direction: Vec3, alpha: f32) -> Self {
+    pub fn isotropic(
+        distribution: MicrofacetDistribution,
+        normal: Vec3,
+        direction: Vec3,
+        alpha: f32,
+    ) -> Self {
         let cosine = normal.dot(direction);
         let squared = cosine * cosine;
-        let slope = (squared + alpha * alpha * (1.0 - squared).max(0.0)).sqrt();
+        let stretched = alpha * alpha * (1.0 - squared).max(0.0);
+        let slope = match distribution {
+            MicrofacetDistribution::Ggx => (squared + stretched).sqrt(),
+            MicrofacetDistribution::Beckmann => beckmann::smith_slope(cosine, stretched.sqrt()),
+        };
         Self { cosine, slope }
     }
 
     /// Computes the anisotropic terms for a direction, with a separate α along each tangent of a frame.
     #[inline(always)]
-    pub fn anisotropic(frame: &Frame, direction: Vec3, [u, v]: [f32; 2]) -> Self {
+    pub fn anisotropic(
+        distribution: MicrofacetDistribution,
+        frame: &Frame,
+        direction: Vec3,
+        [u, v]: [f32; 2],
+    ) -> Self {
         let cosine = frame.n.dot(direction);
         let (x, y) = (frame.s.dot(direction) * u, frame.t.dot(direction) * v);
-        Self { cosine, slope: (cosine * cosine + x * x + y * y).sqrt() }
+        let slope = match distribution {
+            MicrofacetDistribution::Ggx => (cosine * cosine + x * x + y * y).sqrt(),
+            MicrofacetDistribution::Beckmann => beckmann::smith_slope(cosine, (x * x + y * y).sqrt()),
+        };
+        Self { cosine, slope }
     }
 
     /// Whether the direction is above the surface.
@@ -193,11 +256,17 @@ pub fn frame_with_tangent(normal: Vec3, tangent: Vec3) -> Frame {
     Frame { s, t: normal.cross(s), n: normal }
 }
 
-/// Samples a direction by reflecting the view direction at a visible normal (Heitz, *Sampling the GGX
-/// Distribution of Visible Normals*, JCGT 7(4), 2018). The result may be below the surface, where f is 0.
+/// Samples a direction by reflecting the view direction at a visible normal. The result may be below the
+/// surface, where f is 0.
 #[inline(always)]
-pub fn sample_reflection(frame: &Frame, to_eye: Vec3, alphas: [f32; 2], u: [f32; 2]) -> Vec3 {
-    reflect_at(sample_visible_normal(frame, to_eye, alphas, u), to_eye)
+pub fn sample_reflection(
+    distribution: MicrofacetDistribution,
+    frame: &Frame,
+    to_eye: Vec3,
+    alphas: [f32; 2],
+    u: [f32; 2],
+) -> Vec3 {
+    reflect_at(sample_visible_normal(distribution, frame, to_eye, alphas, u), to_eye)
 }
 
 /// Reflects the view direction at a facet with the given unit normal.
@@ -221,18 +290,32 @@ pub fn refract_at(half: Vec3, to_eye: Vec3, eta: f32) -> Vec3 {
 
 /// Samples the unit normal of a visible facet.
 #[inline(always)]
-pub fn sample_visible_normal(frame: &Frame, to_eye: Vec3, alphas: [f32; 2], u: [f32; 2]) -> Vec3 {
+pub fn sample_visible_normal(
+    distribution: MicrofacetDistribution,
+    frame: &Frame,
+    to_eye: Vec3,
+    alphas: [f32; 2],
+    u: [f32; 2],
+) -> Vec3 {
+    let [along_u, along_v] = alphas;
+    // Stretch the view direction to a surface with α = 1.
     let local = Vec3::new(frame.s.dot(to_eye), frame.t.dot(to_eye), frame.n.dot(to_eye));
-    frame.to_world(sample_local_visible_normal(local, alphas, u))
+    let stretched = Vec3::new(along_u * local.x, along_v * local.y, local.z);
+    let view = stretched * (1.0 / stretched.length_squared().sqrt());
+    let normal = match distribution {
+        MicrofacetDistribution::Ggx => sample_ggx_visible_normal(view, u),
+        MicrofacetDistribution::Beckmann => beckmann::sample_visible_normal(view, u),
+    };
+    // Unstretch the normal.
+    let shrunk = Vec3::new(along_u * normal.x, along_v * normal.y, normal.z);
+    frame.to_world(shrunk * (1.0 / shrunk.length_squared().sqrt()))
 }
 
-/// Samples a visible unit normal in the surface's local frame.
+/// Samples a visible normal of a GGX surface with α = 1 in its local frame (Heitz, *Sampling the GGX
+/// Distribution of Visible Normals*, JCGT 7(4), 2018). The result is not normalized.
 #[inline(always)]
-fn sample_local_visible_normal(eye: Vec3, [along_u, along_v]: [f32; 2], u: [f32; 2]) -> Vec3 {
-    // Stretch the view direction to the hemisphere configuration.
-    let stretched = Vec3::new(along_u * eye.x, along_v * eye.y, eye.z);
-    let view = stretched * (1.0 / stretched.length_squared().sqrt());
-    // Build an orthonormal basis around the result.
+fn sample_ggx_visible_normal(view: Vec3, u: [f32; 2]) -> Vec3 {
+    // Build an orthonormal basis around the view direction.
     let squared = view.x * view.x + view.y * view.y;
     let is_upright = squared < 1e-14;
     let inverse = 1.0 / if is_upright { 1.0 } else { squared.sqrt() };
@@ -247,8 +330,7 @@ fn sample_local_visible_normal(eye: Vec3, [along_u, along_v]: [f32; 2], u: [f32;
     let part = 0.5 * (1.0 + view.z);
     let y = (1.0 - part) * (1.0 - x * x).max(0.0).sqrt() + part * (radius * sin);
     let z = (1.0 - x * x - y * y).max(0.0).sqrt();
-    // Project onto the hemisphere and unstretch.
+    // Project onto the hemisphere.
     let normal = first * x + second * y + view * z;
-    let shrunk = Vec3::new(along_u * normal.x, along_v * normal.y, normal.z.max(1e-6));
-    shrunk * (1.0 / shrunk.length_squared().sqrt())
+    Vec3::new(normal.x, normal.y, normal.z.max(1e-6))
 }

@@ -6,6 +6,7 @@ use super::super::fingerprint::{FingerprintContext, FingerprintHasher, Fingerpri
 use super::Spanned;
 use crate::choice;
 pub use crate::materials::UvSet;
+pub use crate::materials::microfacet::MicrofacetDistribution;
 pub use crate::materials::texture::{TextureFilter, Wrap};
 pub use crate::materials::{Channel, ChannelSelector, EmissionSides};
 use crate::math::{DVec3, Vec2, Vec3};
@@ -246,9 +247,7 @@ impl MaterialKind {
     /// but not its roughness. Returns `None` for other materials.
     pub fn glass_medium_identity(&self) -> Option<[u64; 4]> {
         match *self {
-            Self::Glass { ior, tint, roughness: _ } => {
-                Some([f64::from(ior), tint.x, tint.y, tint.z].map(f64::to_bits))
-            }
+            Self::Glass { ior, tint, .. } => Some([f64::from(ior), tint.x, tint.y, tint.z].map(f64::to_bits)),
             Self::Phong(_)
             | Self::Mirror { .. }
             | Self::Pane { .. }
@@ -370,8 +369,10 @@ pub enum MaterialKind {
         ior: f32,
         /// Transmittance of the interior per unit length, in [0, 1].
         tint: DVec3,
-        /// Square root of the GGX α, in [0, 1]; 0 is smooth.
+        /// Square root of α, in [0, 1]; 0 is smooth.
         roughness: NumberSource,
+        /// Distribution of the facets.
+        distribution: MicrofacetDistribution,
     },
     /// An infinitely thin pane of smooth glass.
     Pane {
@@ -384,10 +385,12 @@ pub enum MaterialKind {
     Metal {
         /// Fresnel reflectance of the facets.
         fresnel: FresnelSource,
-        /// Square root of the GGX α, in [0, 1]; 0 is a mirror.
+        /// Square root of α, in [0, 1]; 0 is a mirror.
         roughness: NumberSource,
         /// Stretch of the highlight along u, in [−1, 1].
         anisotropy: NumberSource,
+        /// Distribution of the facets.
+        distribution: MicrofacetDistribution,
     },
     /// A diffuse base under a dielectric microfacet coat.
     Plastic {
@@ -397,8 +400,10 @@ pub enum MaterialKind {
         specular: ColorSource,
         /// Index of refraction, in [1, 10].
         ior: f32,
-        /// Square root of the coat's GGX α, in [0, 1]; 0 is smooth.
+        /// Square root of the coat's α, in [0, 1]; 0 is smooth.
         roughness: NumberSource,
+        /// Distribution of the coat's facets.
+        distribution: MicrofacetDistribution,
     },
     /// The glTF material model. Colors and numbers are in [0, 1], except for `ior` and `specular_color`.
     Principled {
@@ -446,7 +451,7 @@ impl MaterialKind {
             Self::Metal { fresnel: FresnelSource::Index { eta, k }, .. } => {
                 vec![(eta, TextureRole::Facets), (k, TextureRole::Facets)]
             }
-            Self::Plastic { diffuse, specular, ior: _, roughness: _ } => vec![
+            Self::Plastic { diffuse, specular, .. } => vec![
                 (diffuse, TextureRole::Diffuse),
                 (diffuse, TextureRole::Ambient),
                 (specular, TextureRole::Specular),
@@ -459,14 +464,14 @@ impl MaterialKind {
             Self::Mirror { reflectance: color } | Self::Pane { ior: _, tint: color } => {
                 vec![(color, TextureRole::Facets)]
             }
-            Self::Glass { ior: _, tint: _, roughness: _ } => Vec::new(),
+            Self::Glass { .. } => Vec::new(),
         }
     }
 
     /// Returns the numeric parameters that may be textures.
     fn texturable_number_parameters(&self) -> Vec<NumberSource> {
         match self {
-            Self::Metal { fresnel: _, roughness, anisotropy } => vec![*roughness, *anisotropy],
+            Self::Metal { roughness, anisotropy, .. } => vec![*roughness, *anisotropy],
             Self::Plastic { roughness, .. } | Self::Glass { roughness, .. } => vec![*roughness],
             Self::Principled {
                 metallic,
@@ -633,17 +638,19 @@ impl Fingerprinted for MaterialKind {
             Self::Mirror { reflectance } => {
                 key.add_usize(1).add(reflectance, of);
             }
-            Self::Glass { ior, tint, roughness } => {
-                key.add_usize(2).add_f32(*ior).add_dvec3(*tint).add(roughness, of);
+            Self::Glass { ior, tint, roughness, distribution } => {
+                key.add_usize(2).add_f32(*ior).add_dvec3(*tint).add(roughness, of).add_choice(*distribution);
             }
             Self::Pane { ior, tint } => {
                 key.add_usize(3).add_f32(*ior).add(tint, of);
             }
-            Self::Metal { fresnel, roughness, anisotropy } => {
+            Self::Metal { fresnel, roughness, anisotropy, distribution } => {
                 key.add_usize(6).add(fresnel, of).add(roughness, of).add(anisotropy, of);
+                key.add_choice(*distribution);
             }
-            Self::Plastic { diffuse, specular, ior, roughness } => {
+            Self::Plastic { diffuse, specular, ior, roughness, distribution } => {
                 key.add_usize(4).add(diffuse, of).add(specular, of).add_f32(*ior).add(roughness, of);
+                key.add_choice(*distribution);
             }
             Self::Principled {
                 color,

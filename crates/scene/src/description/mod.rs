@@ -21,8 +21,8 @@ pub use camera::{
 pub use light::{Environment, Light, MapOrientation, Sky};
 pub use material::{
     Bump, Channel, ChannelSelector, ColorSource, EmissionSides, EmissionSource, FresnelSource, Material,
-    MaterialKind, NormalMap, NumberSource, OpacitySource, PhongParameters, PixelInterpretation, Texture,
-    TextureEncoding, TextureFilter, TextureRole, UvSet, Wrap,
+    MaterialKind, MicrofacetDistribution, NormalMap, NumberSource, OpacitySource, PhongParameters,
+    PixelInterpretation, Texture, TextureEncoding, TextureFilter, TextureRole, UvSet, Wrap,
 };
 pub use method::{Integrator, IntegratorProperties};
 pub use render::{Accel, MAX_BOUNCES, PixelFilter, RenderOptions, ShadowMode, Tonemap, render_keys};

@@ -1,8 +1,8 @@
 //! The `[materials.NAME]` tables.
 
 use super::super::description::{
-    Bump, ColorSource, EmissionSides, EmissionSource, FresnelSource, Material, MaterialKind, NormalMap,
-    NumberSource, OpacitySource, PhongParameters,
+    Bump, ColorSource, EmissionSides, EmissionSource, FresnelSource, Material, MaterialKind,
+    MicrofacetDistribution, NormalMap, NumberSource, OpacitySource, PhongParameters,
 };
 use super::super::keys::key::DefaultValue::{Absent, Alternative, By, Is};
 use super::super::keys::key::ValueKind::{
@@ -47,8 +47,10 @@ table_types! {
     Glass = "glass" {
         /// Index of refraction, relative to air.
         ior: Number(Between(0.1, 10.0)), Is("1.5");
-        /// Square root of the GGX α; 0 is smooth. Thin panes are always smooth.
+        /// Square root of α; 0 is smooth. Thin panes are always smooth.
         roughness: FRACTION, Is("0.0");
+        /// Distribution of the facets of a rough surface.
+        distribution: Words(choice_values::<MicrofacetDistribution>), Is("\"ggx\"");
         /// Transmittance per unit length (Beer's law); for a thin pane, transmittance at any angle, which may
         /// be a texture.
         tint: REFLECTANCE, Is("[1, 1, 1]"), "per unit length";
@@ -65,8 +67,10 @@ table_types! {
         k: ColorOrTexture(AtLeast(0.0)), Alternative("[0.2, 0.9, 1.1]");
         /// Measured `eta` and `k` of a metal.
         element: Words(choice_values::<MetalElement>), Absent;
-        /// Square root of the GGX α; 0 is a mirror.
+        /// Square root of α; 0 is a mirror.
         roughness: FRACTION, Is("0.2");
+        /// Distribution of the facets.
+        distribution: Words(choice_values::<MicrofacetDistribution>), Is("\"ggx\"");
         /// Stretches the highlight along u, or along v if negative.
         anisotropy: NumberOrTexture(Between(-1.0, 1.0)), Is("0.0");
     }
@@ -78,8 +82,10 @@ table_types! {
         specular: REFLECTANCE, Is("[1, 1, 1]");
         /// The coat's index of refraction.
         ior: Number(Between(1.0, 10.0)), Is("1.5");
-        /// Square root of the coat's GGX α; 0 is smooth.
+        /// Square root of the coat's α; 0 is smooth.
         roughness: FRACTION, Is("0.1");
+        /// Distribution of the coat's facets.
+        distribution: Words(choice_values::<MicrofacetDistribution>), Is("\"ggx\"");
     }
     /// The glTF material model.
     Principled = "principled" {
@@ -231,12 +237,14 @@ impl<'a> MaterialReader<'a> {
         let ior = self.constant("ior");
         let (tint, thin) = (self.key("tint"), self.key("thin"));
         let roughness = self.number("roughness");
+        let distribution = self.read_distribution(roughness);
         // If `thin` is present but invalid, the user probably wants a pane.
         if !thin.boolean().unwrap_or(thin.is_present()) {
             return Some(MaterialKind::Glass {
                 ior,
                 tint: tint.or_default(KeyInTable::color_f64),
                 roughness,
+                distribution,
             });
         }
         if roughness != NumberSource::Constant(0.0) {
@@ -251,7 +259,21 @@ impl<'a> MaterialReader<'a> {
     fn read_metal(&self) -> Option<MaterialKind> {
         let fresnel = self.read_metal_reflectance();
         let (roughness, anisotropy) = (self.number("roughness"), self.number("anisotropy"));
-        Some(MaterialKind::Metal { roughness, anisotropy, fresnel: fresnel? })
+        let distribution = self.read_distribution(roughness);
+        Some(MaterialKind::Metal { roughness, anisotropy, distribution, fresnel: fresnel? })
+    }
+
+    /// Reads the distribution of the facets. Smooth surfaces ignore it.
+    fn read_distribution(&self, roughness: NumberSource) -> MicrofacetDistribution {
+        let key = self.key("distribution");
+        if roughness == NumberSource::Constant(0.0)
+            && let Some(span) = key.key_span()
+        {
+            let message = "`distribution` has no effect on a smooth surface";
+            let issue = Issue::warning(span, message).with_help("set `roughness` above 0");
+            self.table.context.report(issue);
+        }
+        key.or_default(KeyInTable::choice)
     }
 
     /// Reads a metal's reflectance. Exactly one of three groups of keys must specify it.
@@ -283,11 +305,13 @@ impl<'a> MaterialReader<'a> {
     }
 
     fn read_plastic(&self) -> MaterialKind {
+        let roughness = self.number("roughness");
         MaterialKind::Plastic {
             diffuse: self.color("diffuse"),
             specular: self.color("specular"),
             ior: self.constant("ior"),
-            roughness: self.number("roughness"),
+            roughness,
+            distribution: self.read_distribution(roughness),
         }
     }
 

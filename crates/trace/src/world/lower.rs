@@ -8,6 +8,7 @@ use super::textures::{
 };
 use super::{Image, Images};
 use crate::assets::{FileMaterial, FileMaterialKind, FileTexture, PhysicalMaterial};
+use crate::materials::microfacet::MicrofacetDistribution;
 use crate::materials::texels::{TexelData, Texels};
 use crate::materials::texture::{
     ColorOrTexture, Texture, TextureFilter, UvTransform, ValueScaleAndOffset, Wrap,
@@ -31,11 +32,11 @@ pub fn lower_material(scene: &Scene, images: &Images, material: &description::Ma
     let bsdf = match &material.kind {
         MaterialKind::Phong(parameters) => Bsdf::NonSpecular(NonSpecular::Phong(phong(parameters, color))),
         MaterialKind::Mirror { reflectance } => Bsdf::Mirror(Mirror::Constant(color(reflectance))),
-        MaterialKind::Metal { fresnel, roughness, anisotropy } => {
-            metal(lower_fresnel(fresnel, color), number(roughness), number(anisotropy))
+        MaterialKind::Metal { fresnel, roughness, anisotropy, distribution } => {
+            metal(lower_fresnel(fresnel, color), number(roughness), number(anisotropy), *distribution)
         }
-        MaterialKind::Plastic { diffuse, specular, ior, roughness } => {
-            plastic(color(diffuse), color(specular), number(roughness), *ior)
+        MaterialKind::Plastic { diffuse, specular, ior, roughness, distribution } => {
+            plastic(color(diffuse), color(specular), number(roughness), *ior, *distribution)
         }
         MaterialKind::Principled {
             color: base,
@@ -58,8 +59,8 @@ pub fn lower_material(scene: &Scene, images: &Images, material: &description::Ma
             clearcoat: number(clearcoat),
             clearcoat_roughness: number(clearcoat_roughness),
         })))),
-        MaterialKind::Glass { ior, tint, roughness } => {
-            Bsdf::Dielectric(Dielectric::new(*ior, *tint).with_roughness(number(roughness)))
+        MaterialKind::Glass { ior, tint, roughness, distribution } => {
+            Bsdf::Dielectric(Dielectric::new(*ior, *tint).with_roughness(number(roughness), *distribution))
         }
         MaterialKind::Pane { ior, tint } => {
             Bsdf::ThinDielectric(ThinDielectric { ior: *ior, tint: color(tint) })
@@ -110,24 +111,41 @@ fn phong(parameters: &PhongParameters, color: impl Fn(&ColorSource) -> ColorOrTe
 }
 
 /// BSDF of a metal: a mirror if its roughness is 0, and otherwise a microfacet conductor.
-fn metal(fresnel: ConductorFresnel, roughness: ScalarParameter, anisotropy: ScalarParameter) -> Bsdf {
+fn metal(
+    fresnel: ConductorFresnel,
+    roughness: ScalarParameter,
+    anisotropy: ScalarParameter,
+    distribution: MicrofacetDistribution,
+) -> Bsdf {
     if roughness.as_untextured() == Some(0.0) {
         return Bsdf::Mirror(Mirror::Conductor(fresnel));
     }
     let is_brushed = anisotropy.as_untextured() != Some(0.0);
     let metal = Conductor { fresnel, roughness, anisotropy };
-    Bsdf::NonSpecular(if is_brushed {
-        NonSpecular::BrushedConductor(metal)
-    } else {
-        NonSpecular::Conductor(metal)
+    Bsdf::NonSpecular(match distribution {
+        MicrofacetDistribution::Ggx if is_brushed => NonSpecular::BrushedConductor(metal),
+        MicrofacetDistribution::Ggx => NonSpecular::Conductor(metal),
+        MicrofacetDistribution::Beckmann => NonSpecular::BeckmannConductor(metal),
     })
 }
 
 /// Converts plastic. With roughness 0, the coat becomes a δ lobe over the diffuse base.
-fn plastic(diffuse: ColorOrTexture, specular: ColorOrTexture, roughness: ScalarParameter, ior: f32) -> Bsdf {
+fn plastic(
+    diffuse: ColorOrTexture,
+    specular: ColorOrTexture,
+    roughness: ScalarParameter,
+    ior: f32,
+    distribution: MicrofacetDistribution,
+) -> Bsdf {
     let is_smooth = roughness.as_untextured() == Some(0.0);
-    let base = NonSpecular::Plastic(Plastic::new(diffuse, specular.clone(), roughness, ior));
-    if is_smooth { Bsdf::Coated(Coated { specular, ior, base }) } else { Bsdf::NonSpecular(base) }
+    let base = Plastic::new(diffuse, specular.clone(), roughness, ior, distribution);
+    if is_smooth {
+        return Bsdf::Coated(Coated { specular, ior, base: NonSpecular::Plastic(base) });
+    }
+    Bsdf::NonSpecular(match distribution {
+        MicrofacetDistribution::Ggx => NonSpecular::Plastic(base),
+        MicrofacetDistribution::Beckmann => NonSpecular::BeckmannPlastic(base),
+    })
 }
 
 fn lower_fresnel(source: &FresnelSource, color: impl Fn(&ColorSource) -> ColorOrTexture) -> ConductorFresnel {
@@ -194,7 +212,10 @@ pub fn lower_file_material(images: &Images, own: &FileMaterial) -> Material {
         (FileMaterialKind::Coated, _) => file_mirror_over_diffuse(images, own),
         (FileMaterialKind::Glass, Some((ior, tint))) => {
             let roughness = own.physical.as_ref().map_or(0.0, |physical| physical.roughness);
-            Bsdf::Dielectric(Dielectric::new(ior, tint).with_roughness(ScalarParameter::Constant(roughness)))
+            let roughness = ScalarParameter::Constant(roughness);
+            Bsdf::Dielectric(
+                Dielectric::new(ior, tint).with_roughness(roughness, MicrofacetDistribution::Ggx),
+            )
         }
         (FileMaterialKind::Principled(physical), _) => {
             return file_material_from_non_specular(images, own, file_principled(images, own, physical));
@@ -241,7 +262,8 @@ fn file_mirror_over_diffuse(images: &Images, own: &FileMaterial) -> Bsdf {
     let diffuse =
         file_material_color_parameter(images, own, own.diffuse_texture.as_ref(), own.diffuse.min(Vec3::ONE));
     let tint = ColorOrTexture::Constant(specular / specular.max_element());
-    plastic(diffuse, tint, ScalarParameter::Constant(0.0), (1.0 + root) / (1.0 - root))
+    let (roughness, ior) = (ScalarParameter::Constant(0.0), (1.0 + root) / (1.0 - root));
+    plastic(diffuse, tint, roughness, ior, MicrofacetDistribution::Ggx)
 }
 
 fn file_phong(images: &Images, own: &FileMaterial) -> NonSpecular {

@@ -6,7 +6,10 @@ mod lobe_tests;
 pub mod phong;
 pub mod plastic;
 pub mod principled;
+#[cfg(test)]
+mod reference_tests;
 pub mod rough_dielectric;
+mod transmission;
 
 pub use conductor::{Conductor, ConductorFresnel};
 pub use phong::Phong;
@@ -17,8 +20,7 @@ pub use rough_dielectric::RoughDielectricPoint;
 use std::sync::Arc;
 
 use crate::materials::bsdf::{
-    BsdfValues, BxdfMaterial, BxdfParameters, DielectricSamplePacket, LobesToSample, NarrowLobe, ShownLobes,
-    UvPacket,
+    BsdfValues, BxdfMaterial, BxdfParameters, LobesToSample, NarrowLobe, ShownLobes, UvPacket,
 };
 use crate::materials::bxdf::{Bxdf, ShadingGeometry, lobe_shading_normal};
 use crate::materials::bxdf_packet::BxdfPacket;
@@ -378,19 +380,27 @@ kinds! {
     /// The normalized Phong model.
     Phong(Phong, PhongBxdf, kept: BxdfPacket<PhongBxdf>),
     /// An isotropic microfacet conductor.
-    Conductor(Conductor, ConductorBxdf<false>, kept: Box<BxdfPacket<ConductorBxdf<false>>>),
+    Conductor(Conductor, ConductorBxdf<false, false>, kept: Box<BxdfPacket<ConductorBxdf<false, false>>>),
     /// A microfacet conductor whose lobe is stretched along u or v.
-    BrushedConductor(Conductor, ConductorBxdf<true>, kept: Box<BxdfPacket<ConductorBxdf<true>>>),
+    BrushedConductor(Conductor, ConductorBxdf<true, false>, kept: Box<BxdfPacket<ConductorBxdf<true, false>>>),
+    /// A conductor with the Beckmann distribution, whose lobe may be stretched along u or v.
+    BeckmannConductor(Conductor, ConductorBxdf<true, true>, kept: Box<BxdfPacket<ConductorBxdf<true, true>>>),
     /// A diffuse base under a microfacet coat.
-    Plastic(Plastic, PlasticBxdf, kept: Box<BxdfPacket<PlasticBxdf>>),
+    Plastic(Plastic, PlasticBxdf<false>, kept: Box<BxdfPacket<PlasticBxdf<false>>>),
+    /// Plastic whose coat has the Beckmann distribution.
+    BeckmannPlastic(Plastic, PlasticBxdf<true>, kept: Box<BxdfPacket<PlasticBxdf<true>>>),
     /// A material with the parameters of glTF.
     Principled(Box<Principled>, PrincipledBxdf<false>, kept: Box<BxdfPacket<PrincipledBxdf<false>>>),
     }
     parts {
     /// Reflection from rough glass.
-    DielectricReflection(DielectricBxdf<false>),
+    DielectricReflection(DielectricBxdf<false, false>),
     /// Transmission through rough glass.
-    DielectricTransmission(DielectricBxdf<true>),
+    DielectricTransmission(DielectricBxdf<true, false>),
+    /// Reflection from rough glass with the Beckmann distribution.
+    BeckmannReflection(DielectricBxdf<false, true>),
+    /// Transmission through rough glass with the Beckmann distribution.
+    BeckmannTransmission(DielectricBxdf<true, true>),
     /// Transmission through a principled material.
     PrincipledTransmission(PrincipledBxdf<true>),
     }
@@ -426,52 +436,8 @@ impl NonSpecular {
     }
 }
 
-impl BxdfPoint {
-    /// The BSDF for transmitted light, which is of a different kind, or `None` if no light is transmitted.
-    #[inline(always)]
-    pub fn bsdf_for_transmitted_light(&self) -> Option<Self> {
-        match self {
-            Self::DielectricReflection(glass) => Some(Self::DielectricTransmission(*glass)),
-            Self::Principled(point) => point.transmits().then_some(Self::PrincipledTransmission(*point)),
-            Self::Phong(_)
-            | Self::Conductor(_)
-            | Self::BrushedConductor(_)
-            | Self::Plastic(_)
-            | Self::DielectricTransmission(_)
-            | Self::PrincipledTransmission(_) => None,
-        }
-    }
-}
-
 impl Default for BsdfPacket {
     fn default() -> Self {
         Self::Phong(BxdfPacket::default())
-    }
-}
-
-impl BsdfPacket {
-    /// Samples a direction on either side of each surface, using the same random numbers as
-    /// [`BxdfPacket::sample`]. Returns `None` for kinds that do not support this.
-    #[inline(always)]
-    pub fn sample_reflection_or_transmission(
-        &self,
-        choices: &F32x16,
-        u: &[F32x16; 2],
-        simd: impl Simd,
-    ) -> Option<DielectricSamplePacket> {
-        match self {
-            Self::DielectricReflection(row) => {
-                Some(row.sample_reflection_or_transmission_out_of_line(choices, u, simd))
-            }
-            Self::DielectricTransmission(row) => {
-                Some(row.sample_reflection_or_transmission_out_of_line(choices, u, simd))
-            }
-            Self::Phong(_)
-            | Self::Conductor(_)
-            | Self::BrushedConductor(_)
-            | Self::Plastic(_)
-            | Self::Principled(_)
-            | Self::PrincipledTransmission(_) => None,
-        }
     }
 }

@@ -112,8 +112,7 @@ impl CameraWavefront<'_, '_> {
         let shading = vertex.perturbed_and_smooth_normals(self.counters);
         let aov = self.light_aov_at_vertex(path);
         let near = &path.interiors;
-        let reflection = BxdfPoint::DielectricReflection(rough);
-        let transmission = BxdfPoint::DielectricTransmission(rough);
+        let (reflection, transmission) = (rough.reflection(), rough.transmission());
         // The lit fraction is measured on the viewer's side. Blocked light is included, so a dark side is
         // sampled like any other.
         if aov == LightAov::LitFraction {

@@ -189,12 +189,7 @@ impl<'a> PathStepper<'a> for PhotonWavefront<'a> {
             // Direct light is found by light samples.
             Interaction::Glass(..) if self.depth == 0 && !has_passed => {}
             Interaction::Glass(vertex, _, Interface { far, rough: Some(rough) }) => {
-                self.store_and_scatter(
-                    path,
-                    vertex,
-                    BxdfPoint::DielectricReflection(rough),
-                    (far, Some(1.0)),
-                );
+                self.store_and_scatter(path, vertex, rough.reflection(), (far, Some(1.0)));
             }
             Interaction::Nothing | Interaction::Hidden => {}
         }

@@ -258,7 +258,8 @@ fn rough_dielectric_point<'a, W: PathStepper<'a>>(
         touching.map(|other| SurfaceVertex::at_coincident_surface(tile, path, (sides, &other), hit.shape.t));
     let at = touching.as_ref().map_or(&vertex.texture_point, |other| &other.texture_point);
     let alpha = glass.alpha(at, stepper.texture_lookup_counter())?;
-    Some(RoughDielectricPoint { near: indices[0], far: indices[1], alpha })
+    let [near, far] = indices;
+    Some(RoughDielectricPoint { near, far, alpha, distribution: glass.distribution })
 }
 
 /// Determines whether a path passes straight through a surface that may be a null interaction.

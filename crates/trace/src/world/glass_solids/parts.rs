@@ -10,7 +10,7 @@ use crate::geometry::mesh::TriangleMesh;
 use crate::math::DVec3;
 use crate::math::transform::Transform;
 use crate::scene::description::{
-    MaterialKind, MeshReference, NumberSource, Object, OpenSurface, Scene, Shape,
+    MaterialKind, MeshReference, MicrofacetDistribution, NumberSource, Object, OpenSurface, Scene, Shape,
 };
 
 /// Chords per circular rim. All rims on one circle use the same points.
@@ -277,7 +277,10 @@ fn glass_medium_key_of_object(scene: &Scene, meshes: &[&LoadedMesh], object: &Ob
         (Some(index), _) => scene.materials[index].kind.glass_medium_identity(),
         (None, Some(mesh)) => {
             let roughness = NumberSource::Constant(0.0);
-            let of = |(ior, tint)| MaterialKind::Glass { ior, tint, roughness }.glass_medium_identity();
+            let distribution = MicrofacetDistribution::Ggx;
+            let of = |(ior, tint)| {
+                MaterialKind::Glass { ior, tint, roughness, distribution }.glass_medium_identity()
+            };
             let mut each =
                 meshes[mesh.file].materials.iter().filter_map(file_glass_properties).filter_map(of);
             let first = each.next()?;

@@ -5,15 +5,15 @@ use crate::materials::bsdf::NarrowLobe;
 use crate::materials::bxdf::{Bxdf, BxdfFlags, LobeValue, SampledLobes, ShadingGeometry};
 use crate::materials::fresnel::schlick_weight;
 use crate::materials::microfacet::{
-    SmithTerms, UnnormalizedHalfVector, frame_with_tangent, sample_reflection,
+    MicrofacetDistribution, SmithTerms, UnnormalizedHalfVector, frame_with_tangent, sample_reflection,
 };
 use crate::math::Vec3;
 use crate::math::frame::Frame;
 use glimt_base::soa;
 
 soa! {
-    /// A conductor, either isotropic or brushed along u.
-    pub struct ConductorBxdf<const BRUSHED: bool> in ConductorPacket {
+    /// A conductor, either isotropic or brushed along u, with the GGX or the Beckmann distribution.
+    pub struct ConductorBxdf<const BRUSHED: bool, const BECKMANN: bool> in ConductorPacket {
         /// α along u and along v.
         alphas: [f32; 2] = [1.0; 2],
         /// [`FresnelPoint::first`].
@@ -38,7 +38,9 @@ soa! {
 /// Set if the conductor has an index of refraction instead of a color.
 const INDEX: BxdfFlags = BxdfFlags(1 << BxdfFlags::FIRST_OWN);
 
-impl<const BRUSHED: bool> ConductorBxdf<BRUSHED> {
+impl<const BRUSHED: bool, const BECKMANN: bool> ConductorBxdf<BRUSHED, BECKMANN> {
+    const DISTRIBUTION: MicrofacetDistribution = MicrofacetDistribution::beckmann_if(BECKMANN);
+
     #[inline(always)]
     fn frame(view: &ConductorViewTerms) -> Frame {
         if BRUSHED { frame_with_tangent(view.normal, view.tangent) } else { Frame::from_normal(view.normal) }
@@ -50,20 +52,20 @@ impl<const BRUSHED: bool> ConductorBxdf<BRUSHED> {
         if BRUSHED {
             let frame = Self::frame(view);
             [
-                SmithTerms::anisotropic(&frame, view.wo, self.alphas),
-                SmithTerms::anisotropic(&frame, wi, self.alphas),
+                SmithTerms::anisotropic(Self::DISTRIBUTION, &frame, view.wo, self.alphas),
+                SmithTerms::anisotropic(Self::DISTRIBUTION, &frame, wi, self.alphas),
             ]
         } else {
             let alpha = self.alphas[0];
             [
-                SmithTerms::isotropic(view.normal, view.wo, alpha),
-                SmithTerms::isotropic(view.normal, wi, alpha),
+                SmithTerms::isotropic(Self::DISTRIBUTION, view.normal, view.wo, alpha),
+                SmithTerms::isotropic(Self::DISTRIBUTION, view.normal, wi, alpha),
             ]
         }
     }
 }
 
-impl<const BRUSHED: bool> Bxdf for ConductorBxdf<BRUSHED> {
+impl<const BRUSHED: bool, const BECKMANN: bool> Bxdf for ConductorBxdf<BRUSHED, BECKMANN> {
     type Point = ConductorPoint;
     type View = ConductorViewTerms;
 
@@ -96,9 +98,9 @@ impl<const BRUSHED: bool> Bxdf for ConductorBxdf<BRUSHED> {
     fn narrow_lobe_value(&self, view: &ConductorViewTerms, wi: Vec3, any: BxdfFlags) -> LobeValue {
         let half = UnnormalizedHalfVector::from_reflection(view.normal, view.wo, wi);
         let distribution = if BRUSHED {
-            half.anisotropic_ggx_d(&Self::frame(view), self.alphas)
+            half.anisotropic_d(Self::DISTRIBUTION, &Self::frame(view), self.alphas)
         } else {
-            half.evaluate_isotropic_ggx(self.alphas[0])
+            half.isotropic_d(Self::DISTRIBUTION, self.alphas[0])
         };
         let [eye, light] = self.view_and_light_smith_terms(view, wi);
         let white = eye.torrance_sparrow_without_fresnel(&light, distribution);
@@ -131,7 +133,7 @@ impl<const BRUSHED: bool> Bxdf for ConductorBxdf<BRUSHED> {
         [_, u @ ..]: [f32; 3],
         _: BxdfFlags,
     ) -> Vec3 {
-        sample_reflection(&Self::frame(view), view.wo, self.alphas, u)
+        sample_reflection(Self::DISTRIBUTION, &Self::frame(view), view.wo, self.alphas, u)
     }
 
     #[inline(always)]

@@ -6,10 +6,14 @@ use super::*;
 use crate::choice::Choice;
 use crate::materials::bsdf::LobesToSample;
 use crate::materials::bxdfs::lobe_tests::{
-    ALPHAS, COSINES, TestSurface, check_lane_independence, check_values, reference_microfacet_brdf,
+    ALPHAS, COSINES, TestSurface, check_beckmann_values, check_lane_independence, check_values,
     spherical_direction,
 };
+use crate::materials::bxdfs::reference_tests::{reference_beckmann_brdf, reference_microfacet_brdf};
 use crate::math::DVec3;
+
+/// The values of α that are tested with the Beckmann distribution, whose samples are slow.
+const BECKMANN_ALPHAS: [f32; 4] = [0.004, 0.05, 0.2, 1.0];
 
 /// α along u and v for each α: isotropic, stretched along v, and stretched along u.
 fn shapes(alpha: f32) -> [[f32; 2]; 3] {
@@ -31,7 +35,7 @@ fn values_match_the_formulas_and_are_reciprocal() {
         let wide = alphas.map(f64::from);
         let cosine = |o: DVec3, i: DVec3| (o + i).length() * 0.5;
         let first = DVec3::new(1.0, 0.78, 0.34);
-        check_values::<ConductorBxdf<true>>(
+        check_values::<ConductorBxdf<true, false>>(
             &format!("Schlick {alphas:?}"),
             &schlick(alphas),
             alphas,
@@ -41,7 +45,7 @@ fn values_match_the_formulas_and_are_reciprocal() {
             },
         );
         let copper = of_element(MetalElement::Copper, alphas);
-        check_values::<ConductorBxdf<true>>(&format!("copper {alphas:?}"), &copper, alphas, |o, i| {
+        check_values::<ConductorBxdf<true, false>>(&format!("copper {alphas:?}"), &copper, alphas, |o, i| {
             let fresnel = copper.fresnel.reflectance(cosine(o, i) as f32).as_dvec3();
             fresnel * reference_microfacet_brdf(o, i, wide)
         });
@@ -53,22 +57,64 @@ fn lanes_are_independent() {
     let points = ALPHAS
         .into_iter()
         .flat_map(|alpha| [schlick([alpha; 2]), of_element(MetalElement::Iron, [alpha; 2])]);
-    check_lane_independence::<ConductorBxdf<false>>(&points.collect::<Vec<_>>());
+    check_lane_independence::<ConductorBxdf<false, false>>(&points.collect::<Vec<_>>());
     let points = ALPHAS.into_iter().flat_map(shapes).map(|alphas| of_element(MetalElement::Iron, alphas));
-    check_lane_independence::<ConductorBxdf<true>>(&points.collect::<Vec<_>>());
+    let points = points.collect::<Vec<_>>();
+    check_lane_independence::<ConductorBxdf<true, false>>(&points);
+    check_lane_independence::<ConductorBxdf<true, true>>(&points);
+}
+
+#[test]
+fn beckmann_values_match_the_formulas_and_are_reciprocal() {
+    for alphas in ALPHAS.into_iter().flat_map(shapes) {
+        let wide = alphas.map(f64::from);
+        let first = DVec3::new(1.0, 0.78, 0.34);
+        let what = format!("Beckmann {alphas:?}");
+        check_beckmann_values::<ConductorBxdf<true, true>>(&what, &schlick(alphas), alphas, |o, i| {
+            let fresnel = first + (DVec3::ONE - first) * (1.0 - (o + i).length() * 0.5).powi(5);
+            fresnel * reference_beckmann_brdf(o, i, wide)
+        });
+    }
+}
+
+#[test]
+fn beckmann_samples_follow_the_pdf() {
+    for alphas in BECKMANN_ALPHAS.into_iter().flat_map(shapes) {
+        for cosine in COSINES {
+            let at = spherical_direction(cosine, 0.7);
+            let subject = TestSurface::<ConductorBxdf<true, true>>::new(&schlick(alphas), alphas, at);
+            subject.check_samples(&format!("α {alphas:?} at a cosine of {cosine}"), LobesToSample::All);
+        }
+    }
+}
+
+#[test]
+fn beckmann_albedos_match_quadrature() {
+    for alphas in BECKMANN_ALPHAS.into_iter().flat_map(shapes) {
+        for cosine in COSINES {
+            let at = spherical_direction(cosine, 0.3);
+            let white = ConductorPoint { fresnel: FresnelPoint::from_schlick(Vec3::ONE), alphas };
+            let subject = TestSurface::<ConductorBxdf<true, true>>::new(&white, alphas, at);
+            let sampled = subject.sampled_albedo(192).x;
+            let exact = subject.reference_albedo(|o, i| reference_beckmann_brdf(o, i, alphas.map(f64::from)));
+            let what = format!("α {alphas:?} at a cosine of {cosine}: {sampled} instead of {exact}");
+            assert!((sampled - exact).abs() < 1e-3, "{what}");
+            assert!(sampled < 1.0 + 1e-5, "{what}");
+        }
+    }
 }
 
 #[test]
 fn isotropic_packets_match_brushed_packets() {
     for alpha in ALPHAS {
         let (point, at) = (schlick([alpha; 2]), spherical_direction(0.6, 0.3));
-        let round = TestSurface::<ConductorBxdf<false>>::new(&point, [alpha; 2], at);
-        let brushed = TestSurface::<ConductorBxdf<true>>::new(&point, [alpha; 2], at);
+        let round = TestSurface::<ConductorBxdf<false, false>>::new(&point, [alpha; 2], at);
+        let brushed = TestSurface::<ConductorBxdf<true, false>>::new(&point, [alpha; 2], at);
         let (one, other) = (round.sampled_albedo(64), brushed.sampled_albedo(64));
         assert!((one - other).abs().max_element() < 1e-3, "α {alpha}: {one} and {other}");
         round.check_samples(&format!("α {alpha}"), LobesToSample::All);
         let wide = [f64::from(alpha); 2];
-        check_values::<ConductorBxdf<false>>(&format!("α {alpha}"), &point, [alpha; 2], |o, i| {
+        check_values::<ConductorBxdf<false, false>>(&format!("α {alpha}"), &point, [alpha; 2], |o, i| {
             let first = DVec3::new(1.0, 0.78, 0.34);
             (first + (DVec3::ONE - first) * (1.0 - (o + i).length() * 0.5).powi(5))
                 * reference_microfacet_brdf(o, i, wide)
@@ -81,7 +127,7 @@ fn samples_follow_the_pdf() {
     // Test 21 lobes in five directions.
     for alphas in ALPHAS.into_iter().flat_map(shapes) {
         for cosine in COSINES {
-            let subject = TestSurface::<ConductorBxdf<true>>::new(
+            let subject = TestSurface::<ConductorBxdf<true, false>>::new(
                 &schlick(alphas),
                 alphas,
                 spherical_direction(cosine, 0.7),
@@ -96,8 +142,11 @@ fn sampled_albedos_match_quadrature() {
     for alphas in ALPHAS.into_iter().flat_map(shapes) {
         for cosine in COSINES {
             for point in [schlick(alphas), of_element(MetalElement::Gold, alphas)] {
-                let subject =
-                    TestSurface::<ConductorBxdf<true>>::new(&point, alphas, spherical_direction(cosine, 0.3));
+                let subject = TestSurface::<ConductorBxdf<true, false>>::new(
+                    &point,
+                    alphas,
+                    spherical_direction(cosine, 0.3),
+                );
                 let (sampled, exact) = (subject.sampled_albedo(192), subject.albedo());
                 let what = format!("α {alphas:?} at a cosine of {cosine}: {sampled} instead of {exact}");
                 assert!((sampled - exact).abs().max_element() < 1e-3, "{what}");
@@ -112,9 +161,12 @@ fn narrow_lobes_approach_a_mirror() {
     for element in MetalElement::ALL {
         for cosine in [0.3, 0.7, 1.0] {
             let point = of_element(*element, [0.001; 2]);
-            let albedo =
-                TestSurface::<ConductorBxdf<true>>::new(&point, [0.001; 2], spherical_direction(cosine, 0.0))
-                    .sampled_albedo(64);
+            let albedo = TestSurface::<ConductorBxdf<true, false>>::new(
+                &point,
+                [0.001; 2],
+                spherical_direction(cosine, 0.0),
+            )
+            .sampled_albedo(64);
             let mirror = point.fresnel.reflectance(cosine as f32).as_dvec3();
             assert!((albedo - mirror).abs().max_element() < 1e-3, "{element:?}: {albedo}, not {mirror}");
         }

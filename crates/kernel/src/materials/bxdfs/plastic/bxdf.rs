@@ -9,15 +9,17 @@ use crate::materials::bxdf::{
 };
 use crate::materials::fresnel::dielectric_from_outside;
 use crate::materials::lobe_albedo::{TERMS, evaluate_albedo_fit};
-use crate::materials::microfacet::{SmithTerms, UnnormalizedHalfVector, sample_reflection};
+use crate::materials::microfacet::{
+    MicrofacetDistribution, SmithTerms, UnnormalizedHalfVector, sample_reflection,
+};
 use crate::materials::phong::lobes::direction_about_axis;
 use crate::math::Vec3;
 use crate::math::frame::Frame;
 use glimt_base::soa;
 
 soa! {
-    /// A diffuse base under a microfacet coat.
-    pub struct PlasticBxdf in PlasticPacket {
+    /// A diffuse base under a microfacet coat, with the GGX or the Beckmann distribution.
+    pub struct PlasticBxdf<const BECKMANN: bool> in PlasticPacket {
         /// [`PlasticPoint::base`].
         base: Vec3 = Vec3::ZERO,
         /// [`PlasticPoint::specular`].
@@ -50,7 +52,9 @@ soa! {
 /// Set if the coat is smooth.
 const SMOOTH: BxdfFlags = BxdfFlags(1 << BxdfFlags::FIRST_OWN);
 
-impl PlasticBxdf {
+impl<const BECKMANN: bool> PlasticBxdf<BECKMANN> {
+    const DISTRIBUTION: MicrofacetDistribution = MicrofacetDistribution::beckmann_if(BECKMANN);
+
     /// Albedo of the coat at a cosine ≥ 0.
     #[inline(always)]
     fn coat_albedo(&self, cosine: f32, any: BxdfFlags) -> f32 {
@@ -75,21 +79,24 @@ impl PlasticBxdf {
     /// Smith terms for the directions to the viewer and to the light.
     #[inline(always)]
     fn view_and_light_smith_terms(&self, view: &PlasticViewTerms, wi: Vec3) -> [SmithTerms; 2] {
-        let of = |direction| SmithTerms::isotropic(view.normal, direction, self.alpha);
-        [of(view.wo), of(wi)]
+        [
+            SmithTerms::isotropic(Self::DISTRIBUTION, view.normal, view.wo, self.alpha),
+            SmithTerms::isotropic(Self::DISTRIBUTION, view.normal, wi, self.alpha),
+        ]
     }
 
     /// The coat's D for a direction, and the reflectance of the coat's facets.
     #[inline(always)]
     fn distribution_and_fresnel(&self, view: &PlasticViewTerms, wi: Vec3) -> [f32; 2] {
         let half = UnnormalizedHalfVector::from_reflection(view.normal, view.wo, wi);
-        let distribution = half.evaluate_isotropic_ggx(if self.alpha > 0.0 { self.alpha } else { 1.0 });
+        let alpha = if self.alpha > 0.0 { self.alpha } else { 1.0 };
+        let distribution = half.isotropic_d(Self::DISTRIBUTION, alpha);
         let fresnel = dielectric_from_outside(half.cosine_to_either_direction(), self.ior);
         [if self.alpha > 0.0 { distribution } else { 0.0 }, fresnel]
     }
 }
 
-impl Bxdf for PlasticBxdf {
+impl<const BECKMANN: bool> Bxdf for PlasticBxdf<BECKMANN> {
     type Point = PlasticPoint;
     type View = PlasticViewTerms;
 
@@ -178,7 +185,8 @@ impl Bxdf for PlasticBxdf {
         if !any.contains(BxdfFlags::NARROW) {
             return diffuse;
         }
-        let coat = sample_reflection(&Frame::from_normal(view.normal), view.wo, [self.alpha; 2], u);
+        let frame = Frame::from_normal(view.normal);
+        let coat = sample_reflection(Self::DISTRIBUTION, &frame, view.wo, [self.alpha; 2], u);
         let is_coat = match lobes {
             LobesToSample::All => choice < view.coat_share,
             LobesToSample::Narrow => self.alpha > 0.0,

@@ -13,7 +13,7 @@ use crate::materials::lobe_albedo::{
     AlbedoTable, LobeAlbedoPolynomial, fresnel_dielectric_f64, reflectance_under_coat,
 };
 use crate::materials::lookup::ParameterLookup;
-use crate::materials::microfacet;
+use crate::materials::microfacet::{self, MicrofacetDistribution};
 use crate::materials::scalar::ScalarParameter;
 use crate::materials::texture::ColorOrTexture;
 use crate::math::Vec3;
@@ -49,13 +49,14 @@ pub struct PlasticPoint {
 }
 
 impl Plastic {
-    /// Creates a plastic material from kd, a factor for the coat's reflectance, the square root of α, and an
-    /// index of refraction of at least 1.
+    /// Creates a plastic material from kd, a factor for the coat's reflectance, the square root of α, an
+    /// index of refraction of at least 1, and the distribution of the coat's facets.
     pub fn new(
         diffuse: ColorOrTexture,
         specular: ColorOrTexture,
         roughness: ScalarParameter,
         ior: f32,
+        distribution: MicrofacetDistribution,
     ) -> Self {
         let fresnel = |cosine: f64| fresnel_dielectric_f64(cosine, ior.into());
         let is_smooth = roughness.as_untextured() == Some(0.0);
@@ -63,6 +64,7 @@ impl Plastic {
             AlbedoTable::from_single_albedo(LobeAlbedoPolynomial::fit_storing_exact_mean(fresnel))
         } else {
             AlbedoTable::new(
+                distribution,
                 roughness.as_untextured(),
                 |one| microfacet::alphas_from_roughness(one, 0.0)[0],
                 fresnel,

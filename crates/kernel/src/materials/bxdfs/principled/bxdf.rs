@@ -9,7 +9,9 @@ use crate::materials::bxdf::{
 };
 use crate::materials::fresnel::schlick_weight;
 use crate::materials::lobe_albedo::{TERMS, evaluate_albedo_fit};
-use crate::materials::microfacet::{SmithTerms, UnnormalizedHalfVector, sample_reflection};
+use crate::materials::microfacet::{
+    MicrofacetDistribution, SmithTerms, UnnormalizedHalfVector, sample_reflection,
+};
 use crate::materials::phong::lobes::direction_about_axis;
 use crate::math::Vec3;
 use crate::math::frame::Frame;
@@ -68,6 +70,9 @@ soa! {
     }
 }
 
+/// The distribution of all facets.
+const GGX: MicrofacetDistribution = MicrofacetDistribution::Ggx;
+
 /// Set if there is a clear coat.
 const COATED: BxdfFlags = BxdfFlags(1 << BxdfFlags::FIRST_OWN);
 
@@ -110,7 +115,10 @@ impl<const THROUGH: bool> PrincipledBxdf<THROUGH> {
     /// Smith terms for the directions to the viewer and to the light.
     #[inline(always)]
     fn view_and_light_smith_terms(view: &PrincipledViewTerms, wi: Vec3, alpha: f32) -> [SmithTerms; 2] {
-        [SmithTerms::isotropic(view.normal, view.wo, alpha), SmithTerms::isotropic(view.normal, wi, alpha)]
+        [
+            SmithTerms::isotropic(GGX, view.normal, view.wo, alpha),
+            SmithTerms::isotropic(GGX, view.normal, wi, alpha),
+        ]
     }
 
     /// The coat's transmittance in both directions.
@@ -130,12 +138,11 @@ impl<const THROUGH: bool> PrincipledBxdf<THROUGH> {
         let weight = schlick_weight(half.cosine_to_either_direction());
         let [eye, light] = Self::view_and_light_smith_terms(view, wi, self.alpha);
         let reflectance = self.facets + (Vec3::splat(self.grazing) - self.facets) * weight;
-        let white = eye.torrance_sparrow_without_fresnel(&light, half.evaluate_isotropic_ggx(self.alpha));
+        let white = eye.torrance_sparrow_without_fresnel(&light, half.isotropic_d(GGX, self.alpha));
         let specular = reflectance * (white * self.two_way_coat_transmittance(view, light.cosine, any));
         if any.contains(COATED) {
             let [eye, light] = Self::view_and_light_smith_terms(view, wi, self.coat_alpha);
-            let white =
-                eye.torrance_sparrow_without_fresnel(&light, half.evaluate_isotropic_ggx(self.coat_alpha));
+            let white = eye.torrance_sparrow_without_fresnel(&light, half.isotropic_d(GGX, self.coat_alpha));
             let reflectance = COAT_REFLECTANCE + (1.0 - COAT_REFLECTANCE) * weight;
             specular + Vec3::splat(self.coat * reflectance * white)
         } else {
@@ -151,7 +158,7 @@ impl<const THROUGH: bool> PrincipledBxdf<THROUGH> {
         let [eye, light] = Self::view_and_light_smith_terms(view, wi, self.alpha);
         let (facets, grazing) = (self.dielectric, self.dielectric_grazing);
         let rest = Vec3::ONE - (facets + (Vec3::splat(grazing) - facets) * weight);
-        let white = eye.torrance_sparrow_without_fresnel(&light, half.evaluate_isotropic_ggx(self.alpha));
+        let white = eye.torrance_sparrow_without_fresnel(&light, half.isotropic_d(GGX, self.alpha));
         self.transmission * rest * (white * self.two_way_coat_transmittance(view, light.cosine, any))
     }
 
@@ -160,7 +167,7 @@ impl<const THROUGH: bool> PrincipledBxdf<THROUGH> {
     fn microfacet_lobe_pdf(view: &PrincipledViewTerms, wi: Vec3, alpha: f32) -> f32 {
         let half = UnnormalizedHalfVector::from_reflection(view.normal, view.wo, wi);
         let [eye, light] = Self::view_and_light_smith_terms(view, wi, alpha);
-        let pdf = eye.reflection_pdf(half.evaluate_isotropic_ggx(alpha));
+        let pdf = eye.reflection_pdf(half.isotropic_d(GGX, alpha));
         if light.is_direction_above_surface() { pdf } else { 0.0 }
     }
 }
@@ -305,7 +312,7 @@ impl<const THROUGH: bool> Bxdf for PrincipledBxdf<THROUGH> {
             LobesToSample::Narrow => false,
         };
         let is_wide = is_wide & !THROUGH;
-        let narrow = sample_reflection(&Frame::from_normal(view.normal), view.wo, [alpha; 2], u);
+        let narrow = sample_reflection(GGX, &Frame::from_normal(view.normal), view.wo, [alpha; 2], u);
         let wide = direction_about_axis(normal, u[0].sqrt(), (1.0 - u[0]).sqrt(), u[1]);
         // If the path continues on the other side, this direction is not used.
         choose_vec3_by_bool(is_through == THROUGH, choose_vec3_by_bool(is_wide, wide, narrow), -view.normal)

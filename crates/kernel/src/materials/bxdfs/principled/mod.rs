@@ -20,7 +20,7 @@ use crate::materials::bsdf::{BxdfMaterial, BxdfParameters};
 use crate::materials::footprint::TexturePoint;
 use crate::materials::lobe_albedo::{AlbedoTable, LobeAlbedoPolynomial};
 use crate::materials::lookup::ParameterLookup;
-use crate::materials::microfacet;
+use crate::materials::microfacet::{self, MicrofacetDistribution};
 use crate::materials::scalar::ScalarParameter;
 use crate::materials::texture::{ColorOrTexture, Texture};
 use crate::math::Vec3;
@@ -180,8 +180,9 @@ fn build_schlick_albedo_tables(roughness: Option<f32>) -> [AlbedoTable; 2] {
         let rest = 1.0 - cosine;
         rest * rest * rest * rest * rest
     };
-    let normal = AlbedoTable::new(roughness, alpha, |cosine| 1.0 - weight(cosine));
-    [normal, AlbedoTable::new(roughness, alpha, weight)]
+    const GGX: MicrofacetDistribution = MicrofacetDistribution::Ggx;
+    let normal = AlbedoTable::new(GGX, roughness, alpha, |cosine| 1.0 - weight(cosine));
+    [normal, AlbedoTable::new(GGX, roughness, alpha, weight)]
 }
 
 impl Principled {

@@ -5,8 +5,9 @@ use super::*;
 use crate::materials::bsdf::LobesToSample;
 use crate::materials::bxdfs::lobe_tests::{
     ALPHAS, COSINES, NarrowLightPath, TestSurface, check_lane_independence, check_lane_independence_with,
-    check_values, reference_microfacet_brdf, spherical_direction,
+    check_values, spherical_direction,
 };
+use crate::materials::bxdfs::reference_tests::reference_microfacet_brdf;
 use crate::materials::lookup::WhiteLookup;
 use crate::math::DVec3;
 

@@ -7,15 +7,15 @@ use crate::materials::bxdf::{
 };
 use crate::materials::fresnel::{dielectric_for_any_eta, fresnel_transmittance};
 use crate::materials::microfacet::{
-    SmithTerms, UnnormalizedHalfVector, reflect_at, refract_at, sample_visible_normal,
+    MicrofacetDistribution, SmithTerms, UnnormalizedHalfVector, reflect_at, refract_at, sample_visible_normal,
 };
 use crate::math::Vec3;
 use crate::math::frame::Frame;
 use glimt_base::soa;
 
 soa! {
-    /// Reflection from rough glass, or transmission through it.
-    pub struct DielectricBxdf<const THROUGH: bool> in DielectricPacket {
+    /// Reflection from rough glass, or transmission through it, with the GGX or the Beckmann distribution.
+    pub struct DielectricBxdf<const THROUGH: bool, const BECKMANN: bool> in DielectricPacket {
         /// [`RoughDielectricPoint::near`].
         near: f32 = 1.0,
         /// [`RoughDielectricPoint::far`].
@@ -51,19 +51,25 @@ pub struct DielectricSample {
     pub is_beyond: bool,
 }
 
-impl<const THROUGH: bool> DielectricBxdf<THROUGH> {
+impl<const THROUGH: bool, const BECKMANN: bool> DielectricBxdf<THROUGH, BECKMANN> {
+    const DISTRIBUTION: MicrofacetDistribution = MicrofacetDistribution::beckmann_if(BECKMANN);
+
     /// Smith terms for the directions to the viewer and to the light. Each direction uses the normal on its
     /// side.
     #[inline(always)]
     fn view_and_light_smith_terms(&self, view: &DielectricViewTerms, wi: Vec3) -> [SmithTerms; 2] {
         let lit = if THROUGH { -view.normal } else { view.normal };
-        [SmithTerms::isotropic(view.normal, view.wo, self.alpha), SmithTerms::isotropic(lit, wi, self.alpha)]
+        [
+            SmithTerms::isotropic(Self::DISTRIBUTION, view.normal, view.wo, self.alpha),
+            SmithTerms::isotropic(Self::DISTRIBUTION, lit, wi, self.alpha),
+        ]
     }
 
     /// Samples the normal of a visible facet.
     #[inline(always)]
     fn sample_facet(&self, view: &DielectricViewTerms, u: [f32; 2]) -> Vec3 {
-        sample_visible_normal(&Frame::from_normal(view.normal), view.wo, [self.alpha; 2], u)
+        let frame = Frame::from_normal(view.normal);
+        sample_visible_normal(Self::DISTRIBUTION, &frame, view.wo, [self.alpha; 2], u)
     }
 
     /// f of the lobe.
@@ -74,7 +80,10 @@ impl<const THROUGH: bool> DielectricBxdf<THROUGH> {
             let half = UnnormalizedHalfVector::from_reflection(view.normal, view.wo, wi);
             let reflectance = dielectric_for_any_eta(half.cosine_to_either_direction(), self.far / self.near);
             return reflectance
-                * eye.torrance_sparrow_without_fresnel(&light, half.evaluate_isotropic_ggx(self.alpha));
+                * eye.torrance_sparrow_without_fresnel(
+                    &light,
+                    half.isotropic_d(Self::DISTRIBUTION, self.alpha),
+                );
         }
         let indices = [self.near, self.far];
         let (half, sum) = UnnormalizedHalfVector::from_refraction(view.normal, [view.wo, wi], indices);
@@ -85,7 +94,10 @@ impl<const THROUGH: bool> DielectricBxdf<THROUGH> {
         let by_facet = cosines[0] * cosines[1] * fresnel_transmittance(cosines, indices) / half.squared;
         let value = 4.0
             * (by_facet
-                * eye.torrance_sparrow_without_fresnel(&light, half.evaluate_isotropic_ggx(self.alpha)));
+                * eye.torrance_sparrow_without_fresnel(
+                    &light,
+                    half.isotropic_d(Self::DISTRIBUTION, self.alpha),
+                ));
         let value = value * (self.far * self.far);
         // If the indices are nearly equal, there is no usable half vector.
         if is_through & (value < f32::MAX) { value } else { 0.0 }
@@ -117,12 +129,12 @@ impl<const THROUGH: bool> DielectricBxdf<THROUGH> {
         let by_facet = if is_reflected { reflectance } else { through * (indices[1] * indices[1]) };
         let is_through = (cosine > MIN_COSINE) & (behind > MIN_COSINE);
         // Light on the wrong side of the surface does not contribute.
-        let eye = SmithTerms::isotropic(normal, wo, self.alpha);
+        let eye = SmithTerms::isotropic(Self::DISTRIBUTION, normal, wo, self.alpha);
         let side = if is_reflected { 1.0 } else { -1.0 };
-        let light = SmithTerms::isotropic(normal * side, wi, self.alpha);
+        let light = SmithTerms::isotropic(Self::DISTRIBUTION, normal * side, wi, self.alpha);
         let along = normal.dot(half);
         let half = UnnormalizedHalfVector { squared: 1.0, along, across: half - normal * along };
-        let pdf = by_facet * eye.reflection_pdf(half.evaluate_isotropic_ggx(self.alpha));
+        let pdf = by_facet * eye.reflection_pdf(half.isotropic_d(Self::DISTRIBUTION, self.alpha));
         let is_seen = light.is_direction_above_surface()
             & eye.is_direction_above_surface()
             & (is_reflected | is_through)
@@ -138,7 +150,7 @@ impl<const THROUGH: bool> DielectricBxdf<THROUGH> {
     }
 }
 
-impl<const THROUGH: bool> Bxdf for DielectricBxdf<THROUGH> {
+impl<const THROUGH: bool, const BECKMANN: bool> Bxdf for DielectricBxdf<THROUGH, BECKMANN> {
     type Point = RoughDielectricPoint;
     type View = DielectricViewTerms;
 
@@ -147,7 +159,7 @@ impl<const THROUGH: bool> Bxdf for DielectricBxdf<THROUGH> {
 
     #[inline(always)]
     fn new(point: &RoughDielectricPoint, _: Vec3) -> Self {
-        let &RoughDielectricPoint { near, far, alpha } = point;
+        let &RoughDielectricPoint { near, far, alpha, .. } = point;
         Self { near, far, alpha }
     }
 

@@ -15,7 +15,9 @@
 
 mod bxdf;
 
+use super::BxdfPoint;
 use crate::materials::bsdf::BxdfParameters;
+use crate::materials::microfacet::MicrofacetDistribution;
 use crate::math::Vec3;
 pub use bxdf::DielectricBxdf;
 
@@ -28,6 +30,26 @@ pub struct RoughDielectricPoint {
     pub far: f32,
     /// α.
     pub alpha: f32,
+    /// Distribution of the facets.
+    pub distribution: MicrofacetDistribution,
+}
+
+impl RoughDielectricPoint {
+    /// The BSDF for reflected light.
+    pub fn reflection(self) -> BxdfPoint {
+        match self.distribution {
+            MicrofacetDistribution::Ggx => BxdfPoint::DielectricReflection(self),
+            MicrofacetDistribution::Beckmann => BxdfPoint::BeckmannReflection(self),
+        }
+    }
+
+    /// The BSDF for transmitted light.
+    pub fn transmission(self) -> BxdfPoint {
+        match self.distribution {
+            MicrofacetDistribution::Ggx => BxdfPoint::DielectricTransmission(self),
+            MicrofacetDistribution::Beckmann => BxdfPoint::BeckmannTransmission(self),
+        }
+    }
 }
 
 impl BxdfParameters for RoughDielectricPoint {

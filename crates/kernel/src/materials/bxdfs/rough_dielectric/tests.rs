@@ -6,7 +6,10 @@ use crate::materials::bxdf::Bxdf;
 use crate::materials::bxdf_packet::BxdfPacket;
 use crate::materials::bxdfs::lobe_tests::{
     ALPHAS, COSINES, NarrowLightPath, TestSurface, TwoSidedSample, check_lane_independence,
-    check_lane_independence_with, reference_microfacet_brdf, spherical_direction,
+    check_lane_independence_with, spherical_direction,
+};
+use crate::materials::bxdfs::reference_tests::{
+    beckmann_d, beckmann_lambda, reference_beckmann_brdf, reference_microfacet_brdf, squared_slope,
 };
 use crate::materials::fresnel::dielectric;
 use crate::math::DVec3;
@@ -18,39 +21,46 @@ use std::f64::consts::{PI, TAU};
 const INDICES: [[f32; 2]; 5] = [[1.0, 1.5], [1.5, 1.0], [1.0, 1.33], [2.4, 1.0], [1.5, 1.33]];
 
 fn glass([near, far]: [f32; 2], alpha: f32) -> RoughDielectricPoint {
-    RoughDielectricPoint { near, far, alpha }
+    RoughDielectricPoint { near, far, alpha, distribution: MicrofacetDistribution::Ggx }
 }
 
 /// The reflection and the transmission of a surface that is seen from a direction.
-fn parts(
+fn parts<const BECKMANN: bool>(
     point: &RoughDielectricPoint,
     to_eye: DVec3,
-) -> (TestSurface<DielectricBxdf<false>>, TestSurface<DielectricBxdf<true>>) {
+) -> (TestSurface<DielectricBxdf<false, BECKMANN>>, TestSurface<DielectricBxdf<true, BECKMANN>>) {
     let (alphas, eta) = ([point.alpha; 2], f64::from(point.far) / f64::from(point.near));
     let reflection = TestSurface::new(point, alphas, to_eye);
     (reflection, TestSurface::with_light_path(point, alphas, to_eye, NarrowLightPath::Refracted(eta)))
 }
 
-/// Computes f for transmission of basic radiance, as in Walter et al. (equations 16, 20, 21, and 33, with our
-/// G).
-fn transmission(point: &RoughDielectricPoint, o: DVec3, i: DVec3) -> f64 {
+/// Computes f for transmission of basic radiance, as in Walter et al. (equations 16, 20, 21, 25, and 33, with
+/// our G). Also returns the factor by which rounding errors may exceed those of GGX.
+fn transmission<const BECKMANN: bool>(point: &RoughDielectricPoint, o: DVec3, i: DVec3) -> [f64; 2] {
     let [near, far, alpha] = [point.near, point.far, point.alpha].map(f64::from);
     let half = -(i * far + o * near).normalize();
     let half = half * half.z.signum();
     let (cos_o, cos_i) = (o.dot(half), i.dot(half));
     if cos_o * o.z <= 0.0 || cos_i * i.z <= 0.0 {
-        return 0.0;
+        return [0.0, 1.0];
     }
     let tangent2 = (half.x * half.x + half.y * half.y) / (half.z * half.z);
-    let distribution = alpha.powi(2) / (PI * half.z.powi(4) * (alpha.powi(2) + tangent2).powi(2));
+    let distribution = match BECKMANN {
+        true => beckmann_d(half, [alpha; 2]),
+        false => alpha.powi(2) / (PI * half.z.powi(4) * (alpha.powi(2) + tangent2).powi(2)),
+    };
     let lambda = |d: DVec3| {
+        if BECKMANN {
+            return beckmann_lambda(d, [alpha; 2]);
+        }
         let tangent2 = (1.0 - d.z * d.z) / (d.z * d.z);
         0.5 * ((1.0 + alpha * alpha * tangent2).sqrt() - 1.0)
     };
     let shadowing = 1.0 / (1.0 + lambda(o) + lambda(i));
     let fresnel = exact_reflectance(cos_o.abs(), far / near);
     let jacobian = far * far / (far * cos_i + near * cos_o).powi(2);
-    (cos_o * cos_i / (o.z * i.z)).abs() * (1.0 - fresnel) * shadowing * distribution * jacobian
+    let f = (cos_o * cos_i / (o.z * i.z)).abs() * (1.0 - fresnel) * shadowing * distribution * jacobian;
+    [f, if BECKMANN { 1.0 + squared_slope(half, [alpha; 2]) } else { 1.0 }]
 }
 
 /// Double-precision Fresnel reflectance.
@@ -76,7 +86,7 @@ fn ways(
     let (y, turn) = (f64::from(0.98 * next()), f64::from(next()) * TAU);
     if is_near {
         let eta = f64::from(point.far) / f64::from(point.near);
-        let there = TestSurface::<DielectricBxdf<true>>::with_light_path(
+        let there = TestSurface::<DielectricBxdf<true, false>>::with_light_path(
             point,
             [point.alpha; 2],
             to_eye,
@@ -91,6 +101,11 @@ fn ways(
 
 #[test]
 fn transmission_matches_the_formulas() {
+    check_transmission::<false>();
+    check_transmission::<true>();
+}
+
+fn check_transmission<const BECKMANN: bool>() {
     let mut next = random(9);
     for (indices, alpha) in INDICES.into_iter().flat_map(|one| ALPHAS.map(|alpha| (one, alpha))) {
         let point = glass(indices, alpha);
@@ -105,7 +120,7 @@ fn transmission_matches_the_formulas() {
             }
             let eta = f64::from(indices[1]) / f64::from(indices[0]);
             let subject = |point: &RoughDielectricPoint, eye: DVec3, eta: f64| {
-                TestSurface::<DielectricBxdf<true>>::with_light_path(
+                TestSurface::<DielectricBxdf<true, BECKMANN>>::with_light_path(
                     point,
                     [alpha; 2],
                     eye,
@@ -123,9 +138,9 @@ fn transmission_matches_the_formulas() {
             let (one, other) = (there / (far * far), again / (near * near));
             let what = format!("α {alpha}, {indices:?}, from {light} to {to_eye}");
             assert!((one - other).abs() <= reciprocity * one.max(other), "{what}: {one}, reversed {other}");
-            let exact = transmission(&point, to_eye.normalize(), light.normalize());
+            let [exact, room] = transmission::<BECKMANN>(&point, to_eye.normalize(), light.normalize());
             assert!(
-                (there - exact).abs() <= error * (0.5 / least) * exact + 1e-9,
+                (there - exact).abs() <= room * error * (0.5 / least) * exact + 1e-9,
                 "{what}: {there} instead of {exact}"
             );
         }
@@ -134,6 +149,11 @@ fn transmission_matches_the_formulas() {
 
 #[test]
 fn reflection_matches_the_formulas() {
+    check_reflection::<false>();
+    check_reflection::<true>();
+}
+
+fn check_reflection<const BECKMANN: bool>() {
     let mut next = random(10);
     for (indices, alpha) in INDICES.into_iter().flat_map(|one| ALPHAS.map(|alpha| (one, alpha))) {
         let point = glass(indices, alpha);
@@ -145,21 +165,26 @@ fn reflection_matches_the_formulas() {
                     .as_dvec3()
             };
             let to_eye = place(&mut next);
-            let subject = TestSurface::<DielectricBxdf<false>>::new(&point, [alpha; 2], to_eye);
+            let subject = TestSurface::<DielectricBxdf<false, BECKMANN>>::new(&point, [alpha; 2], to_eye);
             let (y, turn) = (f64::from(0.98 * next()), f64::from(next()) * TAU);
             let near = subject.map_to_direction(y, turn).map(|(way, _)| way.as_vec3().as_dvec3());
             for light in [Some(place(&mut next)), near].into_iter().flatten().filter(|one| one.z > 0.02) {
                 let there = subject.evaluate_bsdf(LobesToSample::All, &[light])[0].0.x;
-                let back = TestSurface::<DielectricBxdf<false>>::new(&point, [alpha; 2], light);
+                let back = TestSurface::<DielectricBxdf<false, BECKMANN>>::new(&point, [alpha; 2], light);
                 let back = back.evaluate_bsdf(LobesToSample::All, &[to_eye])[0].0.x;
                 let what = format!("α {alpha}, {indices:?}, from {light} to {to_eye}");
                 assert!((there - back).abs() <= reciprocity * there, "{what}: {there}, reversed {back}");
                 let (o, i) = (to_eye.normalize(), light.normalize());
                 let eta = f64::from(point.far) / f64::from(point.near);
                 let fresnel = exact_reflectance((o + i).length() * 0.5, eta);
-                let exact = fresnel * reference_microfacet_brdf(o, i, [f64::from(alpha); 2]);
+                let alphas = [f64::from(alpha); 2];
+                let (lobe, room) = match BECKMANN {
+                    true => (reference_beckmann_brdf(o, i, alphas), 1.0 + squared_slope(o + i, alphas)),
+                    false => (reference_microfacet_brdf(o, i, alphas), 1.0),
+                };
+                let exact = fresnel * lobe;
                 // Near total reflection, the slope of the reflectance is unbounded.
-                let room = if fresnel > 0.5 && fresnel < 1.0 { 20.0 } else { 1.0 };
+                let room = if fresnel > 0.5 && fresnel < 1.0 { 20.0 * room } else { room };
                 assert!(
                     (there - exact).abs() <= room * error * exact + 1e-12,
                     "{what}: {there} instead of {exact}"
@@ -172,9 +197,19 @@ fn reflection_matches_the_formulas() {
 #[test]
 fn samples_on_both_sides_follow_the_pdf() {
     // 210 cases: three boundaries, seven lobes, five directions, and both sides.
-    for (indices, alpha) in INDICES[..3].iter().flat_map(|one| ALPHAS.map(|alpha| (*one, alpha))) {
+    check_samples::<false>(&INDICES[..3], &ALPHAS);
+}
+
+#[test]
+fn beckmann_samples_on_both_sides_follow_the_pdf() {
+    check_samples::<true>(&INDICES[..2], &[0.02, 0.2, 1.0]);
+}
+
+fn check_samples<const BECKMANN: bool>(indices: &[[f32; 2]], alphas: &[f32]) {
+    for (indices, &alpha) in indices.iter().flat_map(|one| alphas.iter().map(|alpha| (*one, alpha))) {
         for cosine in COSINES {
-            let (reflection, transmission) = parts(&glass(indices, alpha), spherical_direction(cosine, 0.7));
+            let (reflection, transmission) =
+                parts::<BECKMANN>(&glass(indices, alpha), spherical_direction(cosine, 0.7));
             let what = format!("α {alpha}, {indices:?} at a cosine of {cosine}");
             reflection.check_samples(&format!("reflection, {what}"), LobesToSample::All);
             transmission.check_samples(&format!("transmission, {what}"), LobesToSample::All);
@@ -184,9 +219,19 @@ fn samples_on_both_sides_follow_the_pdf() {
 
 #[test]
 fn two_sided_albedos_match_quadrature() {
-    for (indices, alpha) in INDICES.into_iter().flat_map(|one| ALPHAS.map(|alpha| (one, alpha))) {
+    check_albedos::<false>(&INDICES, &ALPHAS);
+}
+
+#[test]
+fn two_sided_beckmann_albedos_match_quadrature() {
+    check_albedos::<true>(&INDICES[..3], &[0.004, 0.05, 0.2, 1.0]);
+}
+
+fn check_albedos<const BECKMANN: bool>(indices: &[[f32; 2]], alphas: &[f32]) {
+    for (indices, &alpha) in indices.iter().flat_map(|one| alphas.iter().map(|alpha| (*one, alpha))) {
         for cosine in COSINES {
-            let (reflection, transmission) = parts(&glass(indices, alpha), spherical_direction(cosine, 0.3));
+            let (reflection, transmission) =
+                parts::<BECKMANN>(&glass(indices, alpha), spherical_direction(cosine, 0.3));
             let sampled =
                 [reflection.lobe_stratified_albedo(128).x, transmission.lobe_stratified_albedo(128).x];
             // Use fine steps because the integrand changes abruptly where total reflection begins.
@@ -207,7 +252,8 @@ fn two_sided_albedos_match_quadrature() {
 fn narrow_lobes_approach_smooth_glass() {
     for indices in INDICES {
         for cosine in [0.3, 0.7, 1.0] {
-            let (reflection, transmission) = parts(&glass(indices, 0.001), spherical_direction(cosine, 0.2));
+            let (reflection, transmission) =
+                parts::<false>(&glass(indices, 0.001), spherical_direction(cosine, 0.2));
             let smooth = f64::from(dielectric(cosine as f32, indices[1] / indices[0]).0);
             let (reflected, through) = (reflection.sampled_albedo(128).x, transmission.sampled_albedo(128).x);
             assert!((reflected - smooth).abs() < 1e-3, "{indices:?}, {cosine}: {reflected}, not {smooth}");
@@ -222,7 +268,7 @@ fn narrow_lobes_approach_smooth_glass() {
 #[test]
 fn paths_continue_on_exactly_one_side() {
     for indices in INDICES {
-        let (reflection, transmission) = parts(&glass(indices, 0.4), spherical_direction(0.5, 0.3));
+        let (reflection, transmission) = parts::<false>(&glass(indices, 0.4), spherical_direction(0.5, 0.3));
         let (up, down) = (
             reflection.sample_directions(LobesToSample::All, 32),
             transmission.sample_directions(LobesToSample::All, 32),
@@ -240,10 +286,15 @@ fn paths_continue_on_exactly_one_side() {
 
 #[test]
 fn two_sided_samples_match_one_sided_samples() {
+    check_two_sided_samples::<false>();
+    check_two_sided_samples::<true>();
+}
+
+fn check_two_sided_samples<const BECKMANN: bool>() {
     for (indices, alpha) in INDICES.iter().flat_map(|one| ALPHAS.map(|alpha| (*one, alpha))) {
         for cosine in COSINES {
             let point = glass(indices, alpha);
-            let (reflection, transmission) = parts(&point, spherical_direction(cosine, 0.3));
+            let (reflection, transmission) = parts::<BECKMANN>(&point, spherical_direction(cosine, 0.3));
             let alone = [
                 reflection.sample_directions(LobesToSample::All, 16),
                 transmission.sample_directions(LobesToSample::All, 16),
@@ -281,7 +332,8 @@ fn two_sided_samples_match_one_sided_samples() {
                 );
                 let refracted = (eta * eta - 1.0 + at_facet * at_facet).abs();
                 let rounding = 2.0 * f64::from(f32::EPSILON) / refracted.max(1e-9);
-                let error = 0.5 / least * (1e-4 + 3e-6 / f64::from(alpha) + rounding);
+                let room = if BECKMANN { 1.0 + squared_slope(half, [f64::from(alpha); 2]) } else { 1.0 };
+                let error = room * 0.5 / least * (1e-4 + 3e-6 / f64::from(alpha) + rounding);
                 if height < 0.02 || pdf == 0.0 || up.density == 0.0 {
                     assert!(
                         height < 0.02 || pdf == 0.0 && up.density == 0.0,
@@ -302,7 +354,9 @@ fn two_sided_samples_match_one_sided_samples() {
 fn lanes_are_independent() {
     let points: Vec<RoughDielectricPoint> =
         INDICES.into_iter().flat_map(|one| [0.001, 0.2, 1.0].map(|alpha| glass(one, alpha))).collect();
-    check_lane_independence::<DielectricBxdf<false>>(&points);
-    check_lane_independence_with::<DielectricBxdf<true>>(&points, NarrowLightPath::Through);
-    const { assert!(<DielectricBxdf<true> as Bxdf>::SENDS_RAYS) };
+    check_lane_independence::<DielectricBxdf<false, false>>(&points);
+    check_lane_independence::<DielectricBxdf<false, true>>(&points);
+    check_lane_independence_with::<DielectricBxdf<true, false>>(&points, NarrowLightPath::Through);
+    check_lane_independence_with::<DielectricBxdf<true, true>>(&points, NarrowLightPath::Through);
+    const { assert!(<DielectricBxdf<true, false> as Bxdf>::SENDS_RAYS) };
 }

@@ -1,0 +1,60 @@
+//! Kinds that transmit light: the BSDF for transmitted light, and samples on either side of a surface.
+
+use super::{BsdfPacket, BxdfPoint};
+use crate::materials::bsdf::DielectricSamplePacket;
+use crate::math::lanes::{F32x16, Simd};
+
+impl BxdfPoint {
+    /// The BSDF for transmitted light, which is of a different kind, or `None` if no light is transmitted.
+    #[inline(always)]
+    pub fn bsdf_for_transmitted_light(&self) -> Option<Self> {
+        match self {
+            Self::DielectricReflection(glass) | Self::BeckmannReflection(glass) => Some(glass.transmission()),
+            Self::Principled(point) => point.transmits().then_some(Self::PrincipledTransmission(*point)),
+            Self::Phong(_)
+            | Self::Conductor(_)
+            | Self::BrushedConductor(_)
+            | Self::BeckmannConductor(_)
+            | Self::Plastic(_)
+            | Self::BeckmannPlastic(_)
+            | Self::DielectricTransmission(_)
+            | Self::BeckmannTransmission(_)
+            | Self::PrincipledTransmission(_) => None,
+        }
+    }
+}
+
+impl BsdfPacket {
+    /// Samples a direction on either side of each surface, using the same random numbers as
+    /// [`BxdfPacket::sample`]. Returns `None` for kinds that do not support this.
+    #[inline(always)]
+    pub fn sample_reflection_or_transmission(
+        &self,
+        choices: &F32x16,
+        u: &[F32x16; 2],
+        simd: impl Simd,
+    ) -> Option<DielectricSamplePacket> {
+        match self {
+            Self::DielectricReflection(row) => {
+                Some(row.sample_reflection_or_transmission_out_of_line(choices, u, simd))
+            }
+            Self::DielectricTransmission(row) => {
+                Some(row.sample_reflection_or_transmission_out_of_line(choices, u, simd))
+            }
+            Self::BeckmannReflection(row) => {
+                Some(row.sample_reflection_or_transmission_out_of_line(choices, u, simd))
+            }
+            Self::BeckmannTransmission(row) => {
+                Some(row.sample_reflection_or_transmission_out_of_line(choices, u, simd))
+            }
+            Self::Phong(_)
+            | Self::Conductor(_)
+            | Self::BrushedConductor(_)
+            | Self::BeckmannConductor(_)
+            | Self::Plastic(_)
+            | Self::BeckmannPlastic(_)
+            | Self::Principled(_)
+            | Self::PrincipledTransmission(_) => None,
+        }
+    }
+}
