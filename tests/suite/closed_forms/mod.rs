@@ -18,6 +18,7 @@ mod hard;
 mod many_lights;
 mod microfacets;
 mod mirror;
+mod one_sided;
 mod patterns;
 mod photons;
 mod projections;

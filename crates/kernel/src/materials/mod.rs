@@ -37,14 +37,27 @@ pub use thin_dielectric::ThinDielectric;
 
 use std::sync::Arc;
 
+use crate::choice;
 use crate::math::Vec3;
 use texture::Texture;
+
+choice! {
+    /// Which sides of an opaque surface reflect light.
+    pub enum ReflectingSides {
+        /// Both sides.
+        Both = "both",
+        /// Only the front; the back is black.
+        Front = "front",
+    }
+}
 
 /// A material that is ready for texture lookups.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Material {
     /// How the surface scatters light.
     pub bsdf: Bsdf,
+    /// Which sides scatter light.
+    pub sides: ReflectingSides,
     /// Emitted radiance.
     pub emission: Emission,
     /// Perturbation of the shading normals by a normal map, a bump map, or both.
@@ -54,6 +67,15 @@ pub struct Material {
 }
 
 impl Material {
+    /// Whether a side of the surface scatters light.
+    #[inline]
+    pub fn scatters_on_side(&self, is_front: bool) -> bool {
+        match self.sides {
+            ReflectingSides::Both => true,
+            ReflectingSides::Front => is_front,
+        }
+    }
+
     /// Whether any material property depends on texture coordinates or tangents.
     pub fn needs_uvs_or_tangents(&self) -> bool {
         self.normal_perturbation.is_some() || self.bsdf.is_anisotropic() || !self.textures().is_empty()

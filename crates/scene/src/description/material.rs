@@ -8,7 +8,7 @@ use crate::choice;
 pub use crate::materials::UvSet;
 pub use crate::materials::microfacet::MicrofacetDistribution;
 pub use crate::materials::texture::{TextureFilter, Wrap};
-pub use crate::materials::{Channel, ChannelSelector, EmissionSides};
+pub use crate::materials::{Channel, ChannelSelector, EmissionSides, ReflectingSides};
 use crate::math::{DVec3, Vec2, Vec3};
 
 /// An image used by materials.
@@ -164,6 +164,8 @@ pub struct Material {
     pub name: String,
     /// Reflection and transmission.
     pub kind: MaterialKind,
+    /// The sides that reflect light.
+    pub sides: ReflectingSides,
     /// Emitted radiance.
     pub emission: EmissionSource,
     /// Normal map, if any.
@@ -235,6 +237,15 @@ impl MaterialKind {
             | Self::Pane { .. }
             | Self::Plastic { .. }
             | Self::Principled { .. } => true,
+        }
+    }
+
+    /// Whether some light passes through the surface where its opacity is 1.
+    pub fn transmits(&self) -> bool {
+        match self {
+            Self::Glass { .. } | Self::Pane { .. } => true,
+            Self::Principled { transmission, .. } => *transmission != NumberSource::Constant(0.0),
+            Self::Phong(_) | Self::Mirror { .. } | Self::Metal { .. } | Self::Plastic { .. } => false,
         }
     }
 
@@ -513,7 +524,7 @@ impl Material {
     /// Returns the material's textures, as indices into [`Scene::textures`](super::Scene::textures) with
     /// their roles. A texture may occur several times.
     pub fn textures(&self) -> Vec<(usize, TextureRole)> {
-        let Self { name: _, kind, emission, normal_map, bump, opacity } = self;
+        let Self { name: _, kind, sides: _, emission, normal_map, bump, opacity } = self;
         let colors = kind
             .color_parameters_with_roles()
             .into_iter()
@@ -673,7 +684,8 @@ impl Fingerprinted for MaterialKind {
 
 impl Fingerprinted for Material {
     fn add_to(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
-        let Self { name: _, kind, emission, normal_map, bump, opacity } = self;
+        let Self { name: _, kind, sides, emission, normal_map, bump, opacity } = self;
         key.add(kind, of).add(emission, of).add(normal_map, of).add(bump, of).add(opacity, of);
+        key.add_choice(*sides);
     }
 }

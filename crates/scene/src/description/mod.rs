@@ -22,7 +22,7 @@ pub use light::{Environment, Light, MapOrientation, Sky};
 pub use material::{
     Bump, Channel, ChannelSelector, ColorSource, EmissionSides, EmissionSource, FresnelSource, Material,
     MaterialKind, MicrofacetDistribution, NormalMap, NumberSource, OpacitySource, PhongParameters,
-    PixelInterpretation, Texture, TextureEncoding, TextureFilter, TextureRole, UvSet, Wrap,
+    PixelInterpretation, ReflectingSides, Texture, TextureEncoding, TextureFilter, TextureRole, UvSet, Wrap,
 };
 pub use method::{Integrator, IntegratorProperties};
 pub use render::{Accel, MAX_BOUNCES, PixelFilter, RenderOptions, ShadowMode, Tonemap, render_keys};

@@ -2,7 +2,7 @@
 
 use super::super::description::{
     Bump, ColorSource, EmissionSides, EmissionSource, FresnelSource, Material, MaterialKind,
-    MicrofacetDistribution, NormalMap, NumberSource, OpacitySource, PhongParameters,
+    MicrofacetDistribution, NormalMap, NumberSource, OpacitySource, PhongParameters, ReflectingSides,
 };
 use super::super::keys::key::DefaultValue::{Absent, Alternative, By, Is};
 use super::super::keys::key::ValueKind::{
@@ -117,6 +117,8 @@ pub(crate) static MATERIALS: TableInfo = TableInfo {
         TableSyntax::Named,
         "A material, which shapes refer to by name",
         keys! {
+            /// The sides of an opaque surface that reflect light; the back is otherwise black.
+            sides: Words(choice_values::<ReflectingSides>), Is("\"both\"");
             /// Emitted radiance; if not black, every shape with this material is an area light.
             emission: Emission(AtLeast(0.0)), Is("[0, 0, 0]"), "radiance";
             /// The sides that emit light.
@@ -185,8 +187,9 @@ fn read_material(name: String, mut table: TableReader<'_>, textures: &DefinedNam
     } else {
         table.read_opacity_and_cutoff()
     };
+    let sides = table.read_sides(kind.as_ref());
     table.table.report_unknown_and_missing_keys();
-    Some(Material { name, kind: kind?, emission, normal_map, bump, opacity })
+    Some(Material { name, kind: kind?, sides, emission, normal_map, bump, opacity })
 }
 
 /// A material's table, and the textures that it may refer to.
@@ -328,6 +331,20 @@ impl<'a> MaterialReader<'a> {
             clearcoat: self.number("clearcoat"),
             clearcoat_roughness: self.number("clearcoat_roughness"),
         }
+    }
+
+    /// Reads the sides that reflect light. Surfaces that transmit light scatter it on both sides.
+    fn read_sides(&self, kind: Option<&MaterialKind>) -> ReflectingSides {
+        let key = self.key("sides");
+        let sides = key.or_default(KeyInTable::choice);
+        if sides == ReflectingSides::Both || !kind.is_some_and(MaterialKind::transmits) {
+            return sides;
+        }
+        if let Some(span) = key.value_span() {
+            let message = "`sides` has no effect on a material that transmits light";
+            self.table.context.report(Issue::warning(span, message));
+        }
+        ReflectingSides::Both
     }
 
     fn read_emission(&self) -> EmissionSource {

@@ -72,11 +72,13 @@ pub fn record_first_hits_on_plain_surfaces(
     left
 }
 
-/// Returns the albedo of a material if its albedo and shading normals are constant over each surface, and
-/// none of its surfaces is a null interaction.
+/// Returns the albedo of a material if its albedo and shading normals are constant over each surface and the
+/// same on both sides, and none of its surfaces is a null interaction.
 fn constant_albedo(tile: &TileContext<'_>, index: usize) -> Option<Vec3> {
     let material = &tile.world.materials[index];
-    let is_constant = !tile.world.material_needs_uvs_or_tangents(index) && !material.has_null_interaction();
+    let is_constant = !tile.world.material_needs_uvs_or_tangents(index)
+        && !material.has_null_interaction()
+        && material.scatters_on_side(false);
     is_constant.then(|| material.bsdf.albedo(&TexturePoint::from_uv(DVec2::ZERO), &mut 0))
 }
 
@@ -127,6 +129,9 @@ fn first_opaque_hit(
 
 /// Diffuse reflectance at a vertex.
 fn vertex_albedo(vertex: &SurfaceVertex<'_>, counters: &mut RayCounters) -> Vec3 {
+    if !vertex.scatters() {
+        return Vec3::ZERO;
+    }
     let albedo = vertex.material.bsdf.albedo(&vertex.texture_point, &mut counters.texture_lookups);
     vertex.times_vertex_color(albedo)
 }

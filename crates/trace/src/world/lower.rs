@@ -16,7 +16,7 @@ use crate::materials::texture::{
 use crate::materials::{
     Bsdf, Bump, Coated, Conductor, ConductorFresnel, Dielectric, Emission, EmissionCoat, Material, Mirror,
     NonSpecular, NormalMap, NormalPerturbation, Opacity, Phong, Plastic, Principled, PrincipledInputs,
-    ScalarParameter, ThinDielectric, UvSet,
+    ReflectingSides, ScalarParameter, ThinDielectric, UvSet,
 };
 use crate::math::{DVec3, Vec3};
 use crate::scene::description::{
@@ -76,7 +76,8 @@ pub fn lower_material(scene: &Scene, images: &Images, material: &description::Ma
         scale: bump.scale,
     });
     let normal_perturbation = NormalPerturbation::new(normal_map, bump);
-    Material { bsdf, emission, normal_perturbation, opacity: lower_opacity(scene, images, material) }
+    let opacity = lower_opacity(scene, images, material);
+    Material { bsdf, sides: material.sides, emission, normal_perturbation, opacity }
 }
 
 /// Opacity of a material from the scene file, or `None` if it is fully opaque.
@@ -224,7 +225,13 @@ pub fn lower_file_material(images: &Images, own: &FileMaterial) -> Material {
             return file_material_from_non_specular(images, own, file_phong(images, own));
         }
     };
-    Material { bsdf, emission: Emission::NONE, normal_perturbation: None, opacity: file_opacity(images, own) }
+    Material {
+        bsdf,
+        sides: ReflectingSides::Both,
+        emission: Emission::NONE,
+        normal_perturbation: None,
+        opacity: file_opacity(images, own),
+    }
 }
 
 /// Non-specular material from a mesh file, including its emission and normal map.
@@ -237,6 +244,7 @@ fn file_material_from_non_specular(images: &Images, own: &FileMaterial, rough: N
     let normals = normals.filter(|map| !map.texture.texels.are_all_gray());
     Material {
         bsdf: Bsdf::NonSpecular(rough),
+        sides: ReflectingSides::Both,
         emission: file_emission(images, own),
         normal_perturbation: NormalPerturbation::new(normals, None),
         opacity: file_opacity(images, own),
@@ -323,6 +331,7 @@ pub fn fallback_material() -> Material {
     };
     Material {
         bsdf: Bsdf::NonSpecular(NonSpecular::Phong(phong)),
+        sides: ReflectingSides::Both,
         emission: Emission::NONE,
         normal_perturbation: None,
         opacity: None,

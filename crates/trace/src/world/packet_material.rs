@@ -12,27 +12,34 @@ pub struct PacketMaterial {
     pub kind: BxdfKind,
     /// UV set for the BSDF texture used in packet shading, or `None` without a texture.
     pub row_texture: Option<UvSet>,
-    /// Ambient reflectance, if the BSDF is constant over the surface.
+    /// Ambient reflectance, if the BSDF is constant over the surface and the same on both sides.
     pub ambient: Option<Vec3>,
     /// Emitted radiance.
     pub emission: Vec3,
     /// Whether both sides emit.
     pub is_two_sided: bool,
+    /// Whether only the front scatters light.
+    pub is_black_from_behind: bool,
 }
 
 impl PacketMaterial {
     /// Creates the packet-shading data for a material. Returns `None` if the material perturbs normals, has
     /// textured or coated emission, may be a null interaction, or has a BSDF that does not support packets.
     pub(super) fn from_material(material: &Material) -> Option<Self> {
-        let Material { bsdf, emission, normal_perturbation, opacity } = material;
+        let Material { bsdf, sides: _, emission, normal_perturbation, opacity } = material;
+        let is_black_from_behind = !material.scatters_on_side(false);
         let is_even = emission.texture.is_none() && emission.coat.is_none();
         let rough = bsdf.as_non_specular().filter(|rough| rough.supports_packets())?;
         (is_even && normal_perturbation.is_none() && opacity.is_none()).then(|| Self {
             kind: rough.kind(),
             row_texture: rough.packet_texture().map(Texture::uv_set),
-            ambient: rough.as_untextured().map(|bsdf| bsdf.ambient_reflectance()),
+            ambient: rough
+                .as_untextured()
+                .filter(|_| !is_black_from_behind)
+                .map(|bsdf| bsdf.ambient_reflectance()),
             emission: emission.scale,
             is_two_sided: emission.is_two_sided(),
+            is_black_from_behind,
         })
     }
 }

@@ -48,7 +48,7 @@ impl<'a> PathStepper<'a> for CameraWavefront<'a, '_> {
                 if !has_passed && matches!(hit, DirectOrCoincidentHit::Direct(_)) {
                     self.record_camera_vertex(path, vertex);
                 }
-                if self.add_path_emission(path, vertex, hit) {
+                if self.add_path_emission(path, vertex, hit) && vertex.scatters() {
                     match &vertex.material.bsdf {
                         Bsdf::NonSpecular(rough) => self.shade_rough(path, vertex, rough, far),
                         Bsdf::Mirror(mirror) => self.shade_mirror(path, vertex, mirror),

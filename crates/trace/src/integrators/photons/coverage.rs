@@ -62,7 +62,7 @@ pub fn kernel_coverage(world: &World, look: &GatherPoint, radius: f32) -> Kernel
     let bounds = look.kernel_box(radius);
     let is_exact = world.geometry.visit_objects_in_box(&bounds, |id, object| match object {
         Object::Shape(shape) => {
-            around.add_shape(shape, || can_store_photons(primitive_material(world, id, 0)))
+            around.add_shape(shape, |is_front| can_store_photons(primitive_material(world, id, 0), is_front))
         }
         Object::Mesh(mesh) => around.add_mesh((world, id), mesh, &bounds, &mut is_crowded),
     });
@@ -79,11 +79,12 @@ pub fn primitive_material(world: &World, object: u32, primitive: u32) -> &Materi
     &world.materials[world.material_index(&Hit { shape, object })]
 }
 
-/// Whether photons are stored on a material.
-pub fn can_store_photons(material: &Material) -> bool {
+/// Whether photons are stored on a side of a material.
+pub fn can_store_photons(material: &Material, is_front: bool) -> bool {
     let is_lit = |rough: &NonSpecular| rough.as_untextured().is_none_or(|bsdf| !bsdf.is_black());
     let is_rough_glass = || material.bsdf.as_dielectric().is_some_and(|glass| !glass.is_smooth());
-    material.bsdf.non_specular_part().is_some_and(is_lit) || is_rough_glass()
+    let is_stored = material.bsdf.non_specular_part().is_some_and(is_lit) || is_rough_glass();
+    is_stored && material.scatters_on_side(is_front)
 }
 
 /// A wall perpendicular to the kernel's plane, represented as a half-plane containing the center. The dot
@@ -160,8 +161,9 @@ impl KernelNeighborhood {
         (MIN_COVERAGE..=1.0 + FLAT).contains(&part).then_some(part.min(1.0))
     }
 
-    /// Adds a shape and returns whether the coverage still has a closed form.
-    fn add_shape(&mut self, shape: &Shape, receives: impl Fn() -> bool) -> bool {
+    /// Adds a shape and returns whether the coverage still has a closed form. `receives` returns whether
+    /// photons are stored on the front or on the back.
+    fn add_shape(&mut self, shape: &Shape, receives: impl Fn(bool) -> bool) -> bool {
         match shape.geometry_near(self.point) {
             LocalGeometry::Polygons(count) => (0..count)
                 .filter_map(|number| shape.polygon_face(number))
@@ -175,13 +177,14 @@ impl KernelNeighborhood {
 
     /// Adds a surface if it extends over the whole kernel and has the kernel's normal. Otherwise, returns
     /// false.
-    fn try_add_covering_surface(&mut self, ground: &NearestSurface, receives: impl Fn() -> bool) -> bool {
+    fn try_add_covering_surface(&mut self, ground: &NearestSurface, receives: impl Fn(bool) -> bool) -> bool {
         let is_wide = match ground.extent {
             FlatOrRoundExtent::Flat(reach) => reach > FAR * self.radius,
             FlatOrRoundExtent::Round(radius) => radius > WIDE * self.radius,
         };
-        let is_same = ground.normal.dot(self.normal).abs() > SAME_PLANE && ground.height < FLAT * self.radius;
-        self.whole += u32::from(is_wide && is_same && receives());
+        let cosine = ground.normal.dot(self.normal);
+        let is_same = cosine.abs() > SAME_PLANE && ground.height < FLAT * self.radius;
+        self.whole += u32::from(is_wide && is_same && receives(cosine > 0.0));
         is_wide && is_same
     }
 
@@ -209,14 +212,14 @@ impl KernelNeighborhood {
         near.sort_unstable();
         near.iter().all(|&triangle| {
             let piece = mesh.world_corners(triangle).into_iter().collect();
-            self.add_polygon_piece_or_wall(piece, || {
-                can_store_photons(primitive_material(world, id, triangle))
+            self.add_polygon_piece_or_wall(piece, |is_front| {
+                can_store_photons(primitive_material(world, id, triangle), is_front)
             })
         })
     }
 
     /// Adds a flat piece and returns whether the coverage still has a closed form.
-    fn add_polygon_piece_or_wall(&mut self, piece: FlatPolygon, receives: impl Fn() -> bool) -> bool {
+    fn add_polygon_piece_or_wall(&mut self, piece: FlatPolygon, receives: impl Fn(bool) -> bool) -> bool {
         let normal = (piece[1] - piece[0]).cross(piece[2] - piece[0]);
         let from = piece[0] - self.point;
         let (size, distance, cosine) = (normal.length_squared(), normal.dot(from), normal.dot(self.normal));
@@ -227,7 +230,7 @@ impl KernelNeighborhood {
             return true;
         }
         if cosine * cosine > SAME_PLANE * SAME_PLANE * size && is_within(FLAT) {
-            return !receives() || self.pieces.try_push(piece).is_ok();
+            return !receives(cosine > 0.0) || self.pieces.try_push(piece).is_ok();
         }
         let heights = piece.iter().map(|&corner| self.normal.dot(corner - self.point));
         let (low, high) = heights.fold((f64::MAX, f64::MIN), |(low, high), z| (low.min(z), high.max(z)));
@@ -235,7 +238,7 @@ impl KernelNeighborhood {
         let is_steep = cosine * cosine <= f64::from(MIN_COSINE * MIN_COSINE) * size;
         if high < -reach
             || low > reach
-            || !rises && (is_steep || !receives())
+            || !rises && (is_steep || !receives(cosine > 0.0))
             || !polygon_overlaps_unit_disk(&self.project_polygon(&piece))
         {
             return true;
@@ -276,7 +279,7 @@ mod tests {
     fn coverage_at(x: f32, z: f32, shapes: &[&Shape]) -> Option<f64> {
         let look = GatherPoint { point: Vec3::new(x, 0.0, z), normal: Vec3::Y, most_depth: 1 };
         let mut around = KernelNeighborhood::new(&look, 0.1);
-        let is_exact = shapes.iter().all(|shape| around.add_shape(shape, || true));
+        let is_exact = shapes.iter().all(|shape| around.add_shape(shape, |_| true));
         around.coverage().filter(|_| is_exact)
     }
 

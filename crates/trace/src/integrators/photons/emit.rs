@@ -314,6 +314,9 @@ impl PhotonWavefront<'_> {
         vertex: &SurfaceVertex<'_>,
         (far, lacks_photons): (&InteriorList, bool),
     ) {
+        if !vertex.scatters() {
+            return;
+        }
         match &vertex.material.bsdf {
             // Direct light is found by light samples.
             Bsdf::NonSpecular(_) if lacks_photons => {}

@@ -73,7 +73,9 @@ fn receives_photons(world: &World, look: &GatherPoint, place: Vec3, radius: f32)
     let above = REACH * radius * look.normal;
     let end = place - above;
     let mut start = place + above;
-    let may_receive = |id: u32| world.materials_of(id).any(can_store_photons);
+    let may_receive = |id: u32| {
+        world.materials_of(id).any(|one| can_store_photons(one, true) || can_store_photons(one, false))
+    };
     for _ in 0..LAYERS {
         let ray = Ray::segment_ending_before_point(start, end);
         // Find the next surface below that may receive photons.
@@ -85,7 +87,7 @@ fn receives_photons(world: &World, look: &GatherPoint, place: Vec3, radius: f32)
         let normal = if cosine < 0.0 { -surface.normal } else { surface.normal };
         let photon = PhotonPositionAndNormal { point: surface.point, normal };
         if cosine.abs() > MIN_COSINE
-            && can_store_photons(primitive_material(world, hit.object, hit.shape.primitive))
+            && can_store_photons(primitive_material(world, hit.object, hit.shape.primitive), cosine > 0.0)
             && !is_occluded(&world.geometry, look, &photon, radius)
         {
             return true;

@@ -164,6 +164,8 @@ struct PlainSurfaceMasks {
     shining: u32,
     /// Surfaces that emit on both sides.
     two_sided: u32,
+    /// Surfaces that are black from behind.
+    black_from_behind: u32,
     /// Number of texture lookups for plain surfaces.
     lookups: u64,
 }
@@ -239,6 +241,7 @@ impl SimdKernel for PacketIntersector<'_> {
         } else {
             self.row.set_plain_vertices(&rays, rows, self.surface, lifts, simd)
         };
+        self.row.used &= front | !plain.black_from_behind;
         // Compute the other surfaces, and the environment for rays that leave the scene.
         let found = tile.fill_packable_non_plain_surfaces(
             self.surface,
@@ -269,7 +272,8 @@ impl PacketIntersector<'_> {
         simd: impl Simd,
     ) -> PlainSurfaceMasks {
         let Self { tile, aov, are_lit, row, surface, .. } = self;
-        let mut plain = PlainSurfaceMasks { all: 0, shining: 0, two_sided: 0, lookups: 0 };
+        let mut plain =
+            PlainSurfaceMasks { all: 0, shining: 0, two_sided: 0, black_from_behind: 0, lookups: 0 };
         while left != 0 {
             let (id, of_object) = first_index_and_matching_lanes(object, left, simd);
             left &= !of_object;
@@ -299,6 +303,7 @@ impl PacketIntersector<'_> {
                 of |= alike;
                 plain.shining |= if material.is_emissive() { alike } else { 0 };
                 plain.two_sided |= if material.is_two_sided { alike } else { 0 };
+                plain.black_from_behind |= if material.is_black_from_behind { alike } else { 0 };
                 groups.push((rough, own_uvs.is_some(), alike));
             }
             if of == 0 {

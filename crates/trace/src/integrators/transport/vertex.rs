@@ -131,6 +131,11 @@ impl<'a> SurfaceVertex<'a> {
         }
     }
 
+    /// Whether the surface scatters light on the path's side.
+    pub fn scatters(&self) -> bool {
+        self.material.scatters_on_side(self.is_front)
+    }
+
     /// Whether the vertex emits toward the path.
     pub fn emits(&self) -> bool {
         self.material.emission.emits_on_side(self.is_front)
