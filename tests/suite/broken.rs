@@ -361,6 +361,12 @@ const BROKEN: &[(&str, &[ExpectedDiagnostic])] = &[
             (12, 1, "warning: `opacity_cutoff` has no effect without `opacity`"),
             (13, 1, "warning: `emission_sides` has no effect without `emission`"),
             (17, 1, "warning: `clearcoat_roughness` has no effect without `clearcoat`"),
+            (33, 1, "warning: `distribution` has no effect on a smooth surface"),
+            (
+                37,
+                24,
+                "warning: `diffuse_transmission` is limited to 1 − `color`; color + diffuse_transmission is 1.200 in green",
+            ),
         ],
     ),
     (
@@ -455,6 +461,11 @@ const BROKEN: &[(&str, &[ExpectedDiagnostic])] = &[
             (64, 10, "`matrix` is not invertible; its determinant is 0e0"),
             (68, 10, "the last row of `matrix` must be 0, 0, 0, 1; it is 0, 0, 1, 1"),
             (75, 7, "`ior` must be a number; found a table"),
+            (78, 25, "`diffuse_transmission` must be at least 0; found -1"),
+            (79, 9, r#"`sides` cannot be "back""#),
+            (83, 9, "warning: `sides` has no effect on a material that transmits light"),
+            (88, 16, r#"`distribution` cannot be "gauss""#),
+            (89, 9, "warning: `sides` has no effect on a material that transmits light"),
         ],
     ),
     (

@@ -165,6 +165,8 @@ file = "waves.ppm"
 repeat = [3, 2]
 rotate = 25
 filter = "mipmap"
+[textures.dapples]
+file = "waves.ppm"
 [materials]
 floor = { type = "plastic", diffuse = 0.5, roughness = 0.3, bump = "waves", bump_scale = 0.05 }
 gold = { type = "metal", element = "gold", roughness = 0.3, anisotropy = 0.5 }
@@ -175,8 +177,42 @@ lacquer = { type = "principled", metallic = 0.5, clearcoat = 0.8, clearcoat_roug
 glass = { type = "glass", bump = "waves", bump_scale = 0.03 }
 pane = { type = "glass", thin = true, tint = [0.8, 0.9, 0.9] }
 lamp = { diffuse = 0, emission = [6, 5, 4], emission_sides = "both" }
+bronze = { type = "metal", color = [0.8, 0.6, 0.3], roughness = 0.4, anisotropy = 0.4, distribution = "beckmann" }
+rubber = { type = "plastic", diffuse = 0.4, roughness = { texture = "waves" }, distribution = "beckmann" }
+frosted = { type = "glass", roughness = 0.4, distribution = "beckmann" }
+paper = { diffuse = 0.3, specular = 0.2, diffuse_transmission = { texture = "dapples" } }
+shade = { type = "principled", color = 0.4, diffuse_transmission = [0.5, 0.4, 0.3], roughness = 0.4 }
+back = { diffuse = [0.2, 0.4, 0.7], sides = "front" }
 [[plane]]
 material = "floor"
+[[sphere]]
+center = [-1, 1.4, -0.5]
+radius = 0.4
+material = "bronze"
+[[sphere]]
+center = [0, 1.4, -0.5]
+radius = 0.4
+material = "rubber"
+[[sphere]]
+center = [1, 1.4, -0.5]
+radius = 0.4
+material = "frosted"
+[[quad]]
+corner = [-2.2, 0, 0.5]
+u = [0.4, 0, 0.3]
+v = [0, 0.7, 0]
+material = "paper"
+[[quad]]
+corner = [1.8, 0, 0.8]
+u = [0.4, 0, -0.3]
+v = [0, 0.7, 0]
+material = "shade"
+[[cylinder]]
+a = [0.8, 0, 1.4]
+b = [0.8, 0.3, 1.4]
+radius = 0.25
+caps = false
+material = "back"
 [[sphere]]
 center = [-1.6, 0.5, 0]
 radius = 0.5

@@ -59,6 +59,7 @@ fn materials_have_the_documented_defaults() {
         specular: ColorSource::Constant(Vec3::ZERO),
         shininess: 32.0,
         ambient: None,
+        diffuse_transmission: ColorSource::BLACK,
     });
     assert!(scene.materials.iter().all(|material| !material.emits() && material.normal_map.is_none()));
     let kinds: Vec<_> = scene.materials.into_iter().map(|material| material.kind).collect();

@@ -59,7 +59,13 @@ fn distant_boards_are_gray_for_every_key() {
         ("diffuse", |board| {
             let diffuse = ColorSource::Texture(board);
             let specular = ColorSource::Constant(Vec3::ZERO);
-            plain(MaterialKind::Phong(PhongParameters { diffuse, specular, shininess: 1.0, ambient: None }))
+            plain(MaterialKind::Phong(PhongParameters {
+                diffuse,
+                specular,
+                shininess: 1.0,
+                ambient: None,
+                diffuse_transmission: ColorSource::BLACK,
+            }))
         }),
         ("emission", |board| {
             let own = emitter(1.0);

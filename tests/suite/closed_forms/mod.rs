@@ -35,6 +35,7 @@ mod speckle;
 mod straight;
 mod touching;
 mod transformed;
+mod translucent;
 mod two_sided;
 mod uv_sets;
 mod views;

@@ -20,7 +20,13 @@ fn pictured(paint: impl Fn(&mut Build, Vec3) -> ColorSource) -> Build {
     let mut build = scene();
     let phong = |build: &mut Build, r: f32, ks: f32| -> Material {
         let (diffuse, specular) = (paint(build, Vec3::new(r, 0.5, 0.3)), paint(build, Vec3::splat(ks)));
-        plain(MaterialKind::Phong(PhongParameters { diffuse, specular, shininess: 12.5, ambient: None }))
+        plain(MaterialKind::Phong(PhongParameters {
+            diffuse,
+            specular,
+            shininess: 12.5,
+            ambient: None,
+            diffuse_transmission: ColorSource::BLACK,
+        }))
     };
     let shapes = [
         Shape::Plane { point: v(0.0, -0.3, 0.0), normal: v(0.1, 1.0, 0.0) },

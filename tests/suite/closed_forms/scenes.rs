@@ -388,6 +388,7 @@ pub fn phong(diffuse: f32, specular: f32, shininess: f32, emission: f32) -> Mate
         specular: gray(specular),
         shininess,
         ambient: None,
+        diffuse_transmission: ColorSource::BLACK,
     });
     Material { emission: EmissionSource::from_constant(Vec3::splat(emission)), ..plain(kind) }
 }
@@ -450,6 +451,7 @@ pub fn principled(color: f32, metallic: f32, roughness: f32) -> Material {
         specular: number(1.0),
         specular_color: ColorSource::Constant(Vec3::ONE),
         transmission: number(0.0),
+        diffuse_transmission: ColorSource::BLACK,
         clearcoat: number(0.5),
         clearcoat_roughness: number(0.1),
     })

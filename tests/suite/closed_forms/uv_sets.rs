@@ -42,6 +42,7 @@ fn materials(texture: usize) -> Vec<(&'static str, Material)> {
         specular: ColorSource::Constant(Vec3::ZERO),
         shininess: 1.0,
         ambient: None,
+        diffuse_transmission: ColorSource::BLACK,
     });
     let mut rough = principled(0.5, 1.0, 0.5);
     if let MaterialKind::Principled { roughness, .. } = &mut rough.kind {
@@ -130,6 +131,7 @@ fn one_material_can_use_both_uv_sets() {
                 specular: ColorSource::Constant(Vec3::ZERO),
                 shininess: 1.0,
                 ambient: None,
+                diffuse_transmission: ColorSource::BLACK,
             }),
             emission: EmissionSource { texture: Some(light), ..EmissionSource::from_constant(Vec3::ONE) },
             normal_map: has_relief.then_some(NormalMap { texture: flat, strength: 1.0 }),

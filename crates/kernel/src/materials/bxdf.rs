@@ -106,6 +106,9 @@ pub trait Bxdf: Soa + Default {
     /// Whether the BSDF is for light from behind the surface.
     const IS_TRANSMISSION: bool = false;
 
+    /// Whether the first random number also chooses between the two sides of the surface.
+    const CHOOSES_SIDE: bool = false;
+
     /// Whether rays in the narrow lobe continue beyond the point where other paths end, to show reflections.
     const SENDS_RAYS: bool = true;
 

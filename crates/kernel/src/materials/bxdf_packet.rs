@@ -161,10 +161,16 @@ impl<B: Bxdf> BxdfPacket<B> {
         }
     }
 
-    /// Whether any surface may have a narrow lobe. If not, [`BxdfPacket::sample`] ignores `choices`.
+    /// Whether any surface may have a narrow lobe.
     #[inline(always)]
     pub fn any_has_narrow_lobe(&self) -> bool {
         B::ALWAYS.contains(BxdfFlags::NARROW) || self.any.contains(BxdfFlags::NARROW)
+    }
+
+    /// Whether [`BxdfPacket::sample`] uses `choices`.
+    #[inline(always)]
+    pub fn uses_lobe_choices(&self) -> bool {
+        B::CHOOSES_SIDE || self.any_has_narrow_lobe()
     }
 
     /// Whether any surface may have wide lobes.

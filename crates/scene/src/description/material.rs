@@ -244,8 +244,13 @@ impl MaterialKind {
     pub fn transmits(&self) -> bool {
         match self {
             Self::Glass { .. } | Self::Pane { .. } => true,
-            Self::Principled { transmission, .. } => *transmission != NumberSource::Constant(0.0),
-            Self::Phong(_) | Self::Mirror { .. } | Self::Metal { .. } | Self::Plastic { .. } => false,
+            Self::Principled { transmission, diffuse_transmission, .. } => {
+                *transmission != NumberSource::Constant(0.0) || *diffuse_transmission != ColorSource::BLACK
+            }
+            Self::Phong(PhongParameters { diffuse_transmission, .. }) => {
+                *diffuse_transmission != ColorSource::BLACK
+            }
+            Self::Mirror { .. } | Self::Metal { .. } | Self::Plastic { .. } => false,
         }
     }
 
@@ -361,6 +366,8 @@ pub struct PhongParameters {
     pub shininess: f32,
     /// Ambient reflectance ka. `None` uses the diffuse color.
     pub ambient: Option<ColorSource>,
+    /// Diffuse transmittance kt.
+    pub diffuse_transmission: ColorSource,
 }
 
 /// Reflection and transmission of a material.
@@ -432,6 +439,8 @@ pub enum MaterialKind {
         specular_color: ColorSource,
         /// Fraction of the non-specular light that is transmitted instead of scattered diffusely.
         transmission: NumberSource,
+        /// Diffuse transmittance kt, at most 1 − `color`.
+        diffuse_transmission: ColorSource,
         /// Weight of a clear coat.
         clearcoat: NumberSource,
         /// Square root of the coat's GGX α.
@@ -440,6 +449,9 @@ pub enum MaterialKind {
 }
 
 impl ColorSource {
+    /// Constant black.
+    pub const BLACK: Self = Self::Constant(Vec3::ZERO);
+
     /// Returns the texture's index, or `None` if the color is constant.
     fn texture_index(&self) -> Option<usize> {
         match self {
@@ -453,8 +465,9 @@ impl MaterialKind {
     /// Returns the color parameters that may be textures, each with its role.
     fn color_parameters_with_roles(&self) -> Vec<(&ColorSource, TextureRole)> {
         match self {
-            Self::Phong(PhongParameters { diffuse, specular, shininess: _, ambient }) => vec![
+            Self::Phong(PhongParameters { diffuse, specular, ambient, diffuse_transmission, .. }) => vec![
                 (diffuse, TextureRole::Diffuse),
+                (diffuse_transmission, TextureRole::Diffuse),
                 (specular, TextureRole::Specular),
                 (ambient.as_ref().unwrap_or(diffuse), TextureRole::Ambient),
             ],
@@ -467,7 +480,8 @@ impl MaterialKind {
                 (diffuse, TextureRole::Ambient),
                 (specular, TextureRole::Specular),
             ],
-            Self::Principled { color, specular_color, .. } => vec![
+            Self::Principled { color, specular_color, diffuse_transmission, .. } => vec![
+                (diffuse_transmission, TextureRole::Facets),
                 (color, TextureRole::Facets),
                 (color, TextureRole::Ambient),
                 (specular_color, TextureRole::Facets),
@@ -643,8 +657,9 @@ impl Fingerprinted for Bump {
 impl Fingerprinted for MaterialKind {
     fn add_to(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
         match self {
-            Self::Phong(PhongParameters { diffuse, specular, shininess, ambient }) => {
+            Self::Phong(PhongParameters { diffuse, specular, shininess, ambient, diffuse_transmission }) => {
                 key.add_usize(0).add_f32(*shininess).add(diffuse, of).add(specular, of).add(ambient, of);
+                key.add(diffuse_transmission, of);
             }
             Self::Mirror { reflectance } => {
                 key.add_usize(1).add(reflectance, of);
@@ -671,12 +686,13 @@ impl Fingerprinted for MaterialKind {
                 specular,
                 specular_color,
                 transmission,
+                diffuse_transmission,
                 clearcoat,
                 clearcoat_roughness,
             } => {
                 key.add_usize(5).add(color, of).add(metallic, of).add(roughness, of).add_f32(*ior);
                 key.add(specular, of).add(specular_color, of).add(transmission, of);
-                key.add(clearcoat, of).add(clearcoat_roughness, of);
+                key.add(clearcoat, of).add(clearcoat_roughness, of).add(diffuse_transmission, of);
             }
         }
     }

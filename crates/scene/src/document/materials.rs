@@ -30,13 +30,15 @@ table_types! {
     Phong = "phong" {
         /// Diffuse reflectance, kd.
         diffuse: ColorOrTexture(AtLeast(0.0)), Is("[0.7, 0.7, 0.7]"), "reflectance";
-        /// Glossy reflectance, ks; glimt warns if `diffuse` + `specular` exceeds 1, which is not energy
-        /// conserving.
+        /// Glossy reflectance, ks; glimt warns if `diffuse` + `specular` + `diffuse_transmission` exceeds 1,
+        /// which is not energy conserving.
         specular: ColorOrTexture(AtLeast(0.0)), Is("[0, 0, 0]"), "reflectance";
         /// Phong exponent; larger values make smaller highlights.
         shininess: Number(Between(0.0, 1000000.0)), Is("32.0");
         /// Reflectance for `[render] ambient`.
         ambient: ColorOrTexture(AtLeast(0.0)), By("as `diffuse`");
+        /// Diffuse transmittance through the surface, kt, as of leaves and paper.
+        diffuse_transmission: ColorOrTexture(AtLeast(0.0)), Is("[0, 0, 0]"), "reflectance";
     }
     /// A perfect mirror.
     Mirror = "mirror" {
@@ -103,6 +105,8 @@ table_types! {
         specular_color: ColorOrTexture(AtLeast(0.0)), Is("[1, 1, 1]");
         /// Fraction of light that is transmitted straight through, as by a thin sheet, instead of scattered.
         transmission: FRACTION, Is("0.0");
+        /// Diffuse transmittance through the surface, as of leaves and paper; at most 1 − `color`.
+        diffuse_transmission: REFLECTANCE, Is("[0, 0, 0]"), "reflectance";
         /// Weight of the clear coat on top.
         clearcoat: FRACTION, Is("0.0");
         /// Square root of the clear coat's GGX α.
@@ -219,18 +223,20 @@ impl<'a> MaterialReader<'a> {
     }
 
     fn read_phong(&self) -> PhongParameters {
-        let keys = ["diffuse", "specular", "ambient"].map(|name| self.key(name));
-        let [diffuse_key, specular_key, ambient_key] = &keys;
+        let keys = ["diffuse", "specular", "diffuse_transmission", "ambient"].map(|name| self.key(name));
+        let [diffuse_key, specular_key, transmission_key, ambient_key] = &keys;
         let color = |key: &KeyInTable<'_>| key.color_or_texture(self.textures);
-        let (diffuse, specular) = (color(diffuse_key), color(specular_key));
+        let albedos = [diffuse_key, specular_key, transmission_key].map(color);
         let are_bytes =
-            [0, 1, 2].map(|i| keys[i].report_byte_color(|span| Issue::warning(span, ENERGY_GAIN)));
-        if let (Some(kd), Some(ks), [false, false, false]) = (&diffuse, &specular, are_bytes) {
-            warn_about_energy_gain(diffuse_key, specular_key, kd, ks);
+            keys.each_ref().map(|key| key.report_byte_color(|span| Issue::warning(span, ENERGY_GAIN)));
+        if let ([Some(kd), Some(ks), Some(kt)], false) = (&albedos, are_bytes.contains(&true)) {
+            warn_about_albedo_above_one(ENERGY_GAIN, &keys[..3], &[kd, ks, kt]);
         }
+        let [diffuse, specular, transmission] = albedos;
         PhongParameters {
             diffuse: diffuse.unwrap_or_else(|| diffuse_key.default(color)),
             specular: specular.unwrap_or_else(|| specular_key.default(color)),
+            diffuse_transmission: transmission.unwrap_or_else(|| transmission_key.default(color)),
             shininess: self.constant("shininess"),
             ambient: color(ambient_key),
         }
@@ -320,8 +326,14 @@ impl<'a> MaterialReader<'a> {
 
     fn read_principled(&self) -> MaterialKind {
         self.warn_if_ineffective_without("clearcoat_roughness", "clearcoat");
+        let names = ["color", "diffuse_transmission"];
+        let [color, diffuse_transmission] = names.map(|name| self.color(name));
+        let message = "`diffuse_transmission` is limited to 1 − `color`";
+        let keys = names.map(|name| self.key(name));
+        warn_about_albedo_above_one(message, &keys, &[&color, &diffuse_transmission]);
         MaterialKind::Principled {
-            color: self.color("color"),
+            color,
+            diffuse_transmission,
             metallic: self.number("metallic"),
             roughness: self.number("roughness"),
             ior: self.constant("ior"),
@@ -396,26 +408,26 @@ impl<'a> MaterialReader<'a> {
 /// Warning message for materials that violate energy conservation.
 pub(crate) const ENERGY_GAIN: &str = "this material reflects more light than it receives";
 
-/// Warns about a material that reflects more light than it receives.
-fn warn_about_energy_gain(
-    kd_key: &KeyInTable<'_>,
-    ks_key: &KeyInTable<'_>,
-    kd: &ColorSource,
-    ks: &ColorSource,
-) {
-    let constant = |source: &ColorSource| match source {
+/// Warns if these albedos, which have these keys, add up to more than 1.
+fn warn_about_albedo_above_one(message: &str, keys: &[KeyInTable<'_>], albedos: &[&ColorSource]) {
+    let constant = |source: &&ColorSource| match source {
         ColorSource::Constant(color) => *color,
         ColorSource::Texture(_) => Vec3::ZERO,
     };
-    let sum = constant(kd) + constant(ks);
+    let sum: Vec3 = albedos.iter().map(constant).sum();
     // Decimal values that sum to 1 may sum to slightly more in binary.
     let most = sum.max_element();
-    let Some(span) = ks_key.value_span().or(kd_key.value_span()).filter(|_| most > 1.0 + 1e-5) else {
-        return;
-    };
+    let last = keys.iter().rev().find(|key| key.is_present());
+    let Some(key) = last.filter(|_| most > 1.0 + 1e-5) else { return };
+    let Some(span) = key.value_span() else { return };
     let channel = ["red", "green", "blue"][sum.max_position()];
-    let issue = Issue::warning(span, ENERGY_GAIN)
-        .with_label(format!("diffuse + specular is {:.3} in {channel}", most))
-        .with_help("keep `diffuse` + `specular` at or below 1 in every channel");
-    kd_key.context.report(issue);
+    // Name only the keys that contribute.
+    let named = |(key, albedo): (&KeyInTable<'_>, &&ColorSource)| {
+        (constant(albedo) != Vec3::ZERO).then_some(key.info.name)
+    };
+    let names: Vec<&str> = keys.iter().zip(albedos).filter_map(named).collect();
+    let issue = Issue::warning(span, message)
+        .with_label(format!("{} is {most:.3} in {channel}", names.join(" + ")))
+        .with_help(format!("keep {} at or below 1 in every channel", names.join(" + ")));
+    key.context.report(issue);
 }

@@ -16,7 +16,7 @@ use crate::materials::texture::{
 use crate::materials::{
     Bsdf, Bump, Coated, Conductor, ConductorFresnel, Dielectric, Emission, EmissionCoat, Material, Mirror,
     NonSpecular, NormalMap, NormalPerturbation, Opacity, Phong, Plastic, Principled, PrincipledInputs,
-    ReflectingSides, ScalarParameter, ThinDielectric, UvSet,
+    ReflectingSides, ScalarParameter, ThinDielectric, TranslucentPhong, UvSet,
 };
 use crate::math::{DVec3, Vec3};
 use crate::scene::description::{
@@ -30,7 +30,7 @@ pub fn lower_material(scene: &Scene, images: &Images, material: &description::Ma
     let color = |source: &ColorSource| of.lower_color(source);
     let number = |source: &NumberSource| of.lower_number(source, TextureRole::Roughness);
     let bsdf = match &material.kind {
-        MaterialKind::Phong(parameters) => Bsdf::NonSpecular(NonSpecular::Phong(phong(parameters, color))),
+        MaterialKind::Phong(parameters) => Bsdf::NonSpecular(phong(parameters, color)),
         MaterialKind::Mirror { reflectance } => Bsdf::Mirror(Mirror::Constant(color(reflectance))),
         MaterialKind::Metal { fresnel, roughness, anisotropy, distribution } => {
             metal(lower_fresnel(fresnel, color), number(roughness), number(anisotropy), *distribution)
@@ -46,6 +46,7 @@ pub fn lower_material(scene: &Scene, images: &Images, material: &description::Ma
             specular,
             specular_color,
             transmission,
+            diffuse_transmission,
             clearcoat,
             clearcoat_roughness,
         } => Bsdf::NonSpecular(NonSpecular::Principled(Box::new(Principled::new(PrincipledInputs {
@@ -56,6 +57,7 @@ pub fn lower_material(scene: &Scene, images: &Images, material: &description::Ma
             specular: number(specular),
             specular_color: color(specular_color),
             transmission: number(transmission),
+            diffuse_transmission: color(diffuse_transmission),
             clearcoat: number(clearcoat),
             clearcoat_roughness: number(clearcoat_roughness),
         })))),
@@ -101,14 +103,18 @@ pub fn lower_opacity(scene: &Scene, images: &Images, material: &description::Mat
     Some(Opacity { value, cutoff })
 }
 
-fn phong(parameters: &PhongParameters, color: impl Fn(&ColorSource) -> ColorOrTexture) -> Phong {
-    let PhongParameters { diffuse, specular, shininess, ambient } = parameters;
-    Phong {
+fn phong(parameters: &PhongParameters, color: impl Fn(&ColorSource) -> ColorOrTexture) -> NonSpecular {
+    let PhongParameters { diffuse, specular, shininess, ambient, diffuse_transmission } = parameters;
+    let reflection = Phong {
         diffuse: color(diffuse),
         specular: color(specular),
         shininess: *shininess,
-        ambient: ambient.as_ref().map(color),
+        ambient: ambient.as_ref().map(&color),
+    };
+    if *diffuse_transmission == ColorSource::BLACK {
+        return NonSpecular::Phong(reflection);
     }
+    NonSpecular::TranslucentPhong(TranslucentPhong { reflection, transmission: color(diffuse_transmission) })
 }
 
 /// BSDF of a metal: a mirror if its roughness is 0, and otherwise a microfacet conductor.
@@ -316,6 +322,7 @@ fn file_principled(images: &Images, own: &FileMaterial, physical: &PhysicalMater
         specular: ScalarParameter::Constant(1.0),
         specular_color: ColorOrTexture::Constant(Vec3::ONE),
         transmission: ScalarParameter::Constant(0.0),
+        diffuse_transmission: ColorOrTexture::Constant(Vec3::ZERO),
         clearcoat: ScalarParameter::Constant(physical.clearcoat),
         clearcoat_roughness: ScalarParameter::Constant(physical.clearcoat_roughness),
     })))

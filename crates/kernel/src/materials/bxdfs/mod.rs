@@ -9,6 +9,7 @@ pub mod principled;
 #[cfg(test)]
 mod reference_tests;
 pub mod rough_dielectric;
+pub mod translucent;
 mod transmission;
 
 pub use conductor::{Conductor, ConductorFresnel};
@@ -16,6 +17,7 @@ pub use phong::Phong;
 pub use plastic::Plastic;
 pub use principled::{EmissionCoat, Principled, PrincipledInputs};
 pub use rough_dielectric::RoughDielectricPoint;
+pub use translucent::TranslucentPhong;
 
 use std::sync::Arc;
 
@@ -34,6 +36,7 @@ use phong::PhongBxdf;
 use plastic::PlasticBxdf;
 use principled::PrincipledBxdf;
 use rough_dielectric::DielectricBxdf;
+use translucent::TranslucentBxdf;
 
 /// Generates enums over all kinds. Their methods dispatch to the trait methods of the same name. `materials`
 /// lists kinds that are entire materials. `parts` lists kinds that other materials use for part of their
@@ -318,6 +321,15 @@ macro_rules! kinds {
                 }
             }
 
+            /// [`BxdfPacket::uses_lobe_choices`].
+            #[inline(always)]
+            pub fn uses_lobe_choices(&self) -> bool {
+                match self {
+                    $(Self::$kind(row) => row.uses_lobe_choices(),)+
+                    $(Self::$part(row) => row.uses_lobe_choices()),+
+                }
+            }
+
             /// [`BxdfPacket::any_has_wide_lobe`].
             #[inline(always)]
             pub fn has_wide_lobes(&self) -> bool {
@@ -379,6 +391,8 @@ kinds! {
     materials {
     /// The normalized Phong model.
     Phong(Phong, PhongBxdf, kept: BxdfPacket<PhongBxdf>),
+    /// The Phong model with diffuse transmission.
+    TranslucentPhong(TranslucentPhong, TranslucentBxdf<false>, kept: Box<BxdfPacket<TranslucentBxdf<false>>>),
     /// An isotropic microfacet conductor.
     Conductor(Conductor, ConductorBxdf<false, false>, kept: Box<BxdfPacket<ConductorBxdf<false, false>>>),
     /// A microfacet conductor whose lobe is stretched along u or v.
@@ -393,6 +407,8 @@ kinds! {
     Principled(Box<Principled>, PrincipledBxdf<false>, kept: Box<BxdfPacket<PrincipledBxdf<false>>>),
     }
     parts {
+    /// Transmission through a translucent Phong surface.
+    PhongTransmission(TranslucentBxdf<true>),
     /// Reflection from rough glass.
     DielectricReflection(DielectricBxdf<false, false>),
     /// Transmission through rough glass.

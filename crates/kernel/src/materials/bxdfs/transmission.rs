@@ -11,7 +11,9 @@ impl BxdfPoint {
         match self {
             Self::DielectricReflection(glass) | Self::BeckmannReflection(glass) => Some(glass.transmission()),
             Self::Principled(point) => point.transmits().then_some(Self::PrincipledTransmission(*point)),
+            Self::TranslucentPhong(point) => point.transmits().then_some(Self::PhongTransmission(*point)),
             Self::Phong(_)
+            | Self::PhongTransmission(_)
             | Self::Conductor(_)
             | Self::BrushedConductor(_)
             | Self::BeckmannConductor(_)
@@ -48,6 +50,8 @@ impl BsdfPacket {
                 Some(row.sample_reflection_or_transmission_out_of_line(choices, u, simd))
             }
             Self::Phong(_)
+            | Self::TranslucentPhong(_)
+            | Self::PhongTransmission(_)
             | Self::Conductor(_)
             | Self::BrushedConductor(_)
             | Self::BeckmannConductor(_)

@@ -165,8 +165,7 @@ impl SimdKernel for BsdfSampler<'_> {
         let sampler = row.sampler_packet(tile);
         // Sample a direction at each vertex.
         let u = sampler.pairs(&row.path, Dimension::Direction, 0, 1);
-        let are_narrow = row.bsdf.has_narrow_lobes();
-        let [lobe, _] = if are_narrow {
+        let [lobe, _] = if row.bsdf.uses_lobe_choices() {
             sampler.pairs(&row.path, Dimension::Lobe, 0, 1)
         } else {
             [[0.0; PACKET_SIZE]; 2]

@@ -15,7 +15,7 @@ use crate::materials::{
     bxdf::{Bxdf, SampledLobes, ShadingGeometry},
 };
 use crate::math::Vec3;
-pub use bxdf::PhongBxdf;
+pub use bxdf::{PhongBxdf, PhongViewTerms};
 
 /// A material with diffuse and glossy reflection on both sides.
 #[derive(Clone, Debug, PartialEq)]

@@ -20,10 +20,11 @@ use glimt_base::soa;
 soa! {
     /// A principled BSDF, for either reflected or transmitted light.
     pub struct PrincipledBxdf<const THROUGH: bool> in PrincipledPacket {
-        /// [`PrincipledPoint::base`].
+        /// f of the diffuse lobe on this side: [`PrincipledPoint::base`] or
+        /// [`PrincipledPoint::transmitted_base`].
         base: Vec3 = Vec3::ZERO,
-        /// The largest component of the diffuse lobe's albedo, not including the lobes above it.
-        diffuse: f32 = 0.0,
+        /// [`PrincipledPoint::diffuse_albedos`].
+        diffuse_albedos: [f32; 2] = [0.0; 2],
         /// [`PrincipledPoint::facets`].
         facets: Vec3 = Vec3::ZERO,
         /// [`PrincipledPoint::grazing`].
@@ -65,8 +66,10 @@ soa! {
         specular_share: f32 = 1.0,
         /// Probability of choosing the coat's lobe.
         coat_share: f32 = 0.0,
-        /// Probability of choosing transmission.
+        /// Probability of choosing specular transmission.
         transmission_share: f32 = 0.0,
+        /// Probability of choosing diffuse transmission.
+        diffuse_transmission_share: f32 = 0.0,
     }
 }
 
@@ -181,10 +184,10 @@ impl<const THROUGH: bool> Bxdf for PrincipledBxdf<THROUGH> {
 
     #[inline(always)]
     fn new(point: &PrincipledPoint, _: Vec3) -> Self {
-        let &PrincipledPoint { base, facets, grazing, transmission, alpha, coat, coat_alpha, .. } = point;
+        let &PrincipledPoint { facets, grazing, transmission, alpha, coat, coat_alpha, .. } = point;
         Self {
-            base,
-            diffuse: point.ambient.max_element(),
+            base: if THROUGH { point.transmitted_base } else { point.base },
+            diffuse_albedos: point.diffuse_albedos,
             facets,
             grazing,
             dielectric: point.dielectric.0,
@@ -201,8 +204,7 @@ impl<const THROUGH: bool> Bxdf for PrincipledBxdf<THROUGH> {
 
     #[inline(always)]
     fn flags(&self) -> BxdfFlags {
-        let is_diffuse = !THROUGH && self.base != Vec3::ZERO;
-        let of_lobes = BxdfFlags::WIDE.when(is_diffuse).union(COATED.when(self.coat > 0.0));
+        let of_lobes = BxdfFlags::WIDE.when(self.base != Vec3::ZERO).union(COATED.when(self.coat > 0.0));
         of_lobes.union(TRANSMITS.when(self.transmission != Vec3::ZERO))
     }
 
@@ -216,8 +218,10 @@ impl<const THROUGH: bool> Bxdf for PrincipledBxdf<THROUGH> {
         let transmittance = self.one_minus_specular_albedo(cosine);
         let [at_normal, at_grazing] = self.specular_albedos(cosine);
         let specular = self.facets.max_element() * at_normal + self.grazing * at_grazing;
-        let diffuse = self.diffuse * transmittance.max_element();
-        let mut all = specular + diffuse;
+        let [diffuse, through] = self.diffuse_albedos;
+        let (diffuse, through) =
+            (diffuse * transmittance.max_element(), through * transmittance.max_element());
+        let mut all = specular + diffuse + through;
         let mut transmission = 0.0;
         if any.contains(TRANSMITS) {
             let rest = transmittance + Vec3::splat(at_normal + at_grazing - 1.0);
@@ -235,6 +239,7 @@ impl<const THROUGH: bool> Bxdf for PrincipledBxdf<THROUGH> {
             // probability is split among the other lobes.
             coat_share: if self.coat > 0.0 { 1.0 - below * all } else { 0.0 },
             transmission_share: below * transmission,
+            diffuse_transmission_share: below * through,
         }
     }
 
@@ -276,9 +281,10 @@ impl<const THROUGH: bool> Bxdf for PrincipledBxdf<THROUGH> {
             specular_share * specular + coat_share * coat
         };
         match lobes {
-            LobesToSample::All if THROUGH => narrow,
             LobesToSample::All => {
-                let diffuse_share = 1.0 - specular_share - coat_share - transmission_share;
+                let through = view.diffuse_transmission_share;
+                let reflected = 1.0 - specular_share - coat_share - transmission_share - through;
+                let diffuse_share = if THROUGH { through } else { reflected };
                 narrow + diffuse_share * nonnegative_cosine(normal.dot(wi)) * FRAC_1_PI
             }
             LobesToSample::Narrow => {
@@ -300,18 +306,18 @@ impl<const THROUGH: bool> Bxdf for PrincipledBxdf<THROUGH> {
             LobesToSample::All => choice,
             LobesToSample::Narrow => choice * (specular_share + coat_share + transmission_share),
         };
-        // The lobes are in this order: coat, specular, diffuse, transmission.
-        let last = match lobes {
-            LobesToSample::All => 1.0 - transmission_share,
-            LobesToSample::Narrow => specular_share + coat_share,
+        // The lobes are in this order: coat, specular, diffuse, diffuse transmission, specular transmission.
+        let (last, diffuse_through) = match lobes {
+            LobesToSample::All => (1.0 - transmission_share, view.diffuse_transmission_share),
+            LobesToSample::Narrow => (specular_share + coat_share, 0.0),
         };
-        let is_through = (transmission_share > 0.0) & (choice >= last);
+        let is_through = (transmission_share + diffuse_through > 0.0) & (choice >= last - diffuse_through);
         let alpha = if (choice < coat_share) & !THROUGH { self.coat_alpha } else { self.alpha };
         let is_wide = match lobes {
+            LobesToSample::All if THROUGH => choice < last,
             LobesToSample::All => choice >= coat_share + specular_share,
             LobesToSample::Narrow => false,
         };
-        let is_wide = is_wide & !THROUGH;
         let narrow = sample_reflection(GGX, &Frame::from_normal(view.normal), view.wo, [alpha; 2], u);
         let wide = direction_about_axis(normal, u[0].sqrt(), (1.0 - u[0]).sqrt(), u[1]);
         // If the path continues on the other side, this direction is not used.
@@ -321,7 +327,7 @@ impl<const THROUGH: bool> Bxdf for PrincipledBxdf<THROUGH> {
     #[inline(always)]
     fn narrow_lobe(&self, view: &PrincipledViewTerms) -> Option<NarrowLobe> {
         let reflectance = self.facets.max_element();
-        let wide = if THROUGH { 0.0 } else { (self.base * view.transmittance).max_element() };
+        let wide = (self.base * view.transmittance).max_element();
         Some(NarrowLobe::from_microfacets(view.normal, view.wo, self.alpha, reflectance, wide))
     }
 }

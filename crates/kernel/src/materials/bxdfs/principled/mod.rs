@@ -8,6 +8,8 @@
 //! - Transmission through a thin sheet: the specular lobe, mirrored to the other side, times (1 − metallic) ·
 //!   transmission · color · (1 − F), where F is the reflectance of the dielectric. Transmissive surfaces are
 //!   represented by two vertices, see [`bsdf`](crate::materials::bsdf).
+//! - Diffuse transmission kt: f = (1 − metallic)(1 − transmission) · min(kt, 1 − color)/π · (1 − E(μᵢ))(1 −
+//!   E(μₒ))/(1 − Ē) for light from the other side.
 //! - Clear coat c: a lobe with F0 = 0.04, times c. All other lobes are multiplied by (1 − c·E_c(μ)) for each
 //!   of the two directions.
 
@@ -54,6 +56,8 @@ pub struct PrincipledInputs {
     pub specular_color: ColorOrTexture,
     /// Fraction of the light that enters the dielectric and is transmitted instead of scattered.
     pub transmission: ScalarParameter,
+    /// Diffuse transmittance kt.
+    pub diffuse_transmission: ColorOrTexture,
     /// Weight of the clear coat.
     pub clearcoat: ScalarParameter,
     /// The square root of the clear coat's α.
@@ -65,6 +69,10 @@ pub struct PrincipledInputs {
 pub struct PrincipledPoint {
     /// f of the diffuse lobe in sr⁻¹, for light that passes through the lobes above it in both directions.
     pub base: Vec3,
+    /// [`PrincipledPoint::base`] for light from the other side.
+    pub transmitted_base: Vec3,
+    /// The largest components of the albedos of these two lobes, not including the lobes above them.
+    pub diffuse_albedos: [f32; 2],
     /// Reflectance of the specular lobe at normal incidence.
     pub facets: Vec3,
     /// The metallic part of [`PrincipledPoint::facets`].
@@ -93,7 +101,7 @@ impl PrincipledPoint {
     /// Whether the material transmits light.
     #[inline]
     pub fn transmits(&self) -> bool {
-        self.transmission != Vec3::ZERO
+        self.transmission != Vec3::ZERO || self.transmitted_base != Vec3::ZERO
     }
 }
 
@@ -209,6 +217,7 @@ impl BxdfMaterial for Principled {
         let (specular, through) = (unit(&inputs.specular), unit(&inputs.transmission));
         let (coat, coat_roughness) = (unit(&inputs.clearcoat), unit(&inputs.clearcoat_roughness));
         let color = lookup.color(&inputs.color).min(Vec3::ONE);
+        let transmitted = lookup.color(&inputs.diffuse_transmission).min(Vec3::ONE - color);
         let ratio = (inputs.ior - 1.0) / (inputs.ior + 1.0);
         let specular_color = lookup.color(&inputs.specular_color);
         let reflectance = (specular_color * (ratio * ratio)).min(Vec3::ONE) * specular;
@@ -219,8 +228,12 @@ impl BxdfMaterial for Principled {
         let mean = reflectance * albedo.normal.mean + Vec3::splat(specular * albedo.grazing.mean);
         let below = color * (1.0 - metallic);
         let diffuse = below * (1.0 - through);
+        let transmitted = transmitted * ((1.0 - metallic) * (1.0 - through));
+        let entering = (Vec3::ONE - mean).max(Vec3::splat(1e-3));
         PrincipledPoint {
-            base: diffuse * FRAC_1_PI / (Vec3::ONE - mean).max(Vec3::splat(1e-3)),
+            base: diffuse * FRAC_1_PI / entering,
+            transmitted_base: transmitted * FRAC_1_PI / entering,
+            diffuse_albedos: [diffuse, transmitted].map(Vec3::max_element),
             facets: reflectance.lerp(color, metallic),
             metal: color * metallic,
             grazing: specular + (1.0 - specular) * metallic,
@@ -248,7 +261,8 @@ impl BxdfMaterial for Principled {
     }
 
     fn is_transmissive(&self) -> bool {
-        self.inputs.transmission.as_untextured() != Some(0.0)
+        let PrincipledInputs { transmission, diffuse_transmission, .. } = &self.inputs;
+        transmission.as_untextured() != Some(0.0) || diffuse_transmission.as_untextured() != Some(Vec3::ZERO)
     }
 }
 

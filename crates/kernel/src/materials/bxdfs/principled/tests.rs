@@ -25,9 +25,17 @@ fn transmitting(color: Vec3, metallic: f32, transmission: f32, alpha: f32, coat:
         specular: number(0.8),
         specular_color: ColorOrTexture::Constant(Vec3::new(1.0, 0.6, 1.2)),
         transmission: number(transmission),
+        diffuse_transmission: ColorOrTexture::Constant(Vec3::ZERO),
         clearcoat: number(coat[0]),
         clearcoat_roughness: number(coat[1].sqrt()),
     })
+}
+
+/// A material with diffuse transmission.
+fn leaf(color: Vec3, metallic: f32, transmission: f32, alpha: f32, coat: [f32; 2]) -> Principled {
+    let Principled { inputs, .. } = transmitting(color, metallic, transmission, alpha, coat);
+    let diffuse_transmission = ColorOrTexture::Constant(Vec3::new(0.25, 1.0, 0.6));
+    Principled::new(PrincipledInputs { diffuse_transmission, ..inputs })
 }
 
 fn point(principled: &Principled) -> PrincipledPoint {
@@ -148,6 +156,7 @@ fn fully_reflective_facets_have_bounded_weights() {
             specular: number(1.0),
             specular_color: ColorOrTexture::Constant(Vec3::splat(25.0)),
             transmission: number(0.0),
+            diffuse_transmission: ColorOrTexture::Constant(Vec3::ZERO),
             clearcoat: number(0.0),
             clearcoat_roughness: number(0.0),
         });
@@ -207,6 +216,54 @@ fn transmission_is_the_mirrored_specular_lobe() {
 }
 
 #[test]
+fn diffuse_transmission_is_coupled_like_the_diffuse_lobe() {
+    for (alpha, metallic, coat) in subjects().filter(|one| one.1 < 1.0) {
+        let point = point(&leaf(RED, metallic, 0.3, alpha, coat));
+        let at = spherical_direction(0.6, 0.7);
+        let behind = TestSurface::<PrincipledBxdf<true>>::with_light_path(
+            &point,
+            [1.0; 2],
+            at,
+            NarrowLightPath::Through,
+        );
+        let front = TestSurface::<PrincipledBxdf<false>>::new(&point, [1.0; 2], at);
+        // The transmittance is limited to 1 − color.
+        let ratio = Vec3::new(0.25, 0.9, 0.6).as_dvec3() / RED.as_dvec3();
+        for light in COSINES.map(|cosine| spherical_direction(cosine, 1.9)) {
+            let below = DVec3::new(light.x, light.y, -light.z);
+            let [of_front, of_back] = [
+                front.evaluate_bsdf(LobesToSample::All, &[light])[0].1,
+                behind.evaluate_bsdf(LobesToSample::All, &[below])[0].1,
+            ];
+            let off = (of_back - of_front * ratio).abs().max_element();
+            assert!(off <= 1e-5 * of_back.max_element(), "α {alpha}: {of_back} and {of_front}");
+        }
+    }
+}
+
+#[test]
+fn diffuse_transmission_samples_follow_the_pdf() {
+    for (alpha, metallic, coat) in subjects().filter(|one| one.0 >= 0.2 && one.1 < 1.0) {
+        for cosine in COSINES {
+            let point = point(&leaf(RED, metallic, 0.3, alpha, coat));
+            let at = spherical_direction(cosine, 0.7);
+            let behind = TestSurface::<PrincipledBxdf<true>>::with_light_path(
+                &point,
+                [alpha; 2],
+                at,
+                NarrowLightPath::Through,
+            );
+            let front = TestSurface::<PrincipledBxdf<false>>::new(&point, [alpha; 2], at);
+            for lobes in [LobesToSample::Narrow, LobesToSample::All] {
+                let what = format!("{lobes:?}, α {alpha}, metallic {metallic} at a cosine of {cosine}");
+                behind.check_samples(&format!("other side, {what}"), lobes);
+                front.check_samples(&format!("viewer's side, {what}"), lobes);
+            }
+        }
+    }
+}
+
+#[test]
 fn samples_on_both_sides_follow_the_pdf() {
     for (alpha, metallic, coat) in subjects().filter(|one| one.1 < 1.0) {
         for cosine in COSINES {
@@ -232,11 +289,19 @@ fn samples_on_both_sides_follow_the_pdf() {
 
 #[test]
 fn two_sided_albedos_match_quadrature() {
-    for ((alpha, metallic, coat), transmission) in
-        subjects().flat_map(|one| TRANSMISSIONS.map(|part| (one, part)))
+    let materials = subjects().flat_map(|one| {
+        let (alpha, metallic, coat) = one;
+        let clear = |part| transmitting(Vec3::ONE, metallic, part, alpha, coat);
+        let leaf = leaf(RED, metallic, 0.3, alpha, coat);
+        [(one, "clear", clear(0.6)), (one, "clear", clear(1.0)), (one, "leaf", leaf)]
+    });
+    // Leaves need many samples, because they have four lobes.
+    let is_tested = |alpha: f32, name: &str| name != "leaf" || [0.02, 0.2, 1.0].contains(&alpha);
+    for ((alpha, metallic, _), transmission, material) in
+        materials.filter(|((alpha, ..), name, _)| is_tested(*alpha, name))
     {
         for cosine in COSINES {
-            let point = point(&transmitting(Vec3::ONE, metallic, transmission, alpha, coat));
+            let point = point(&material);
             let at = spherical_direction(cosine, 0.3);
             let behind = TestSurface::<PrincipledBxdf<true>>::with_light_path(
                 &point,
@@ -245,7 +310,10 @@ fn two_sided_albedos_match_quadrature() {
                 NarrowLightPath::Through,
             );
             let front = TestSurface::<PrincipledBxdf<false>>::new(&point, [alpha; 2], at);
-            let sampled = front.sampled_albedo(192) + behind.sampled_albedo(192);
+            let sampled = match transmission {
+                "leaf" => front.lobe_stratified_albedo(128) + behind.lobe_stratified_albedo(128),
+                _ => front.sampled_albedo(192) + behind.sampled_albedo(192),
+            };
             let exact = front.albedo() + behind.albedo();
             let what =
                 format!("α {alpha}, metallic {metallic}, {transmission} at {cosine}: {sampled}, {exact}");
@@ -259,7 +327,11 @@ fn two_sided_albedos_match_quadrature() {
 fn transmissive_lanes_are_independent() {
     let points: Vec<PrincipledPoint> = subjects()
         .flat_map(|(alpha, metallic, coat)| {
-            [0.0, 0.6, 1.0].map(|part| transmitting(RED, metallic, part, alpha, coat))
+            let leaf = leaf(RED, metallic, 0.3, alpha, coat);
+            [0.0, 0.6, 1.0]
+                .map(|part| transmitting(RED, metallic, part, alpha, coat))
+                .into_iter()
+                .chain([leaf])
         })
         .map(|one| point(&one))
         .collect();

@@ -1,0 +1,95 @@
+//! Phong surfaces that also transmit light diffusely, like leaves and paper: f = kt/π for light from the other
+//! side. A surface is represented by two vertices, see [`bsdf`](crate::materials::bsdf). The side on which a
+//! path continues is chosen by albedo.
+
+mod bxdf;
+
+use std::f32::consts::FRAC_1_PI;
+
+use super::phong::{Phong, PhongBsdf};
+use crate::materials::bsdf::{BxdfMaterial, BxdfParameters};
+use crate::materials::lookup::ParameterLookup;
+use crate::materials::texture::ColorOrTexture;
+use crate::math::Vec3;
+pub use bxdf::TranslucentBxdf;
+
+/// A Phong material with diffuse transmission.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TranslucentPhong {
+    /// The reflecting lobes.
+    pub reflection: Phong,
+    /// Diffuse transmittance kt.
+    pub transmission: ColorOrTexture,
+}
+
+/// [`TranslucentPhong`] at a point, after texture lookups.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TranslucentPoint {
+    /// The reflecting lobes.
+    pub reflection: PhongBsdf,
+    /// Diffuse transmittance kt.
+    pub transmission: Vec3,
+}
+
+impl TranslucentPoint {
+    /// Whether the surface transmits light.
+    #[inline]
+    pub fn transmits(&self) -> bool {
+        self.transmission != Vec3::ZERO
+    }
+
+    /// f in sr⁻¹ of transmitted light.
+    fn transmission_f(&self) -> Vec3 {
+        self.transmission * FRAC_1_PI
+    }
+
+    /// Probability that a path continues on the other side.
+    fn transmission_share(&self) -> f32 {
+        let PhongBsdf { diffuse, specular, .. } = self.reflection;
+        let through = self.transmission.max_element();
+        let all = diffuse.max_element() + specular.max_element() + through;
+        through / all.max(f32::MIN_POSITIVE)
+    }
+}
+
+impl BxdfMaterial for TranslucentPhong {
+    type Point = TranslucentPoint;
+
+    #[inline]
+    fn look_up_parameters<'m>(&'m self, lookup: &mut impl ParameterLookup<'m>) -> TranslucentPoint {
+        let reflection = self.reflection.look_up_parameters(lookup);
+        TranslucentPoint { reflection, transmission: lookup.color(&self.transmission) }
+    }
+
+    #[inline]
+    fn albedo<'m>(&'m self, lookup: &mut impl ParameterLookup<'m>) -> Vec3 {
+        self.reflection.albedo(lookup)
+    }
+
+    fn ambient<'m>(&'m self, lookup: &mut impl ParameterLookup<'m>) -> Vec3 {
+        self.reflection.ambient(lookup)
+    }
+
+    fn is_transmissive(&self) -> bool {
+        true
+    }
+}
+
+impl BxdfParameters for TranslucentPoint {
+    #[inline]
+    fn is_black(&self) -> bool {
+        self.reflection.is_black() && !self.transmits()
+    }
+
+    #[inline]
+    fn ambient_reflectance(&self) -> Vec3 {
+        self.reflection.ambient_reflectance()
+    }
+
+    fn tinted(self, color: Vec3) -> Self {
+        Self { reflection: self.reflection.tinted(color), ..self }
+    }
+}
+
+#[cfg(test)]
+mod tests;
