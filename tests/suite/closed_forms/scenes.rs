@@ -15,7 +15,11 @@ use glimt::materials::texels::{TexelData, Texels};
 use glimt::math::{DVec3, Vec2, Vec3};
 use glimt::scene::description::light::{Falloff, PointLight};
 use glimt::scene::description::{
-    Accel, Camera, ColorSource, EmissionSource, Environment, FresnelSource, ImageWindow, Integrator, Light, MapOrientation, Material, MaterialKind, MeshFile, MeshReference, MicrofacetDistribution, NumberSource, Object, ObjectTransform, OpacitySource, PhongParameters, PhotonOptions, PixelFilter, Projection, ReflectingSides, RenderOptions, Scene, ShadowMode, Shape, Sky, Spanned, Texture, TextureEncoding, TextureFilter, Tonemap, UvSet, Wrap,
+    Accel, Camera, ColorSource, EmissionSource, Environment, FresnelSource, ImageWindow, Integrator, Light,
+    MapOrientation, Material, MaterialKind, MeshFile, MeshReference, MicrofacetDistribution, NumberSource,
+    Object, ObjectTransform, OpacitySource, PhongParameters, PhotonOptions, PixelFilter, Projection,
+    ReflectingSides, RenderOptions, Scene, ShadowMode, Shape, Sky, Spanned, Texture, TextureEncoding,
+    TextureFilter, Tonemap, UvSet, Wrap,
 };
 use glimt::world::{
     EnvironmentSource, Geometry, Image, MeshTree, TextureRolesNeededByRender, World, WorldInputs,

@@ -24,6 +24,7 @@ use crate::integrators::transport::tile::{SampleBlock, TileContext};
 use crate::integrators::view::{LightAov, ViewMode};
 use crate::materials::bsdf::{LobesToSample, ShownLobes};
 use crate::materials::bxdf::ShadingGeometry;
+use crate::materials::microfacet::MicrofacetDistribution;
 use crate::materials::{BxdfPoint, Footprint, RoughDielectricPoint};
 use crate::math::lanes::PACKET_SIZE;
 use crate::math::soa::Soa;
@@ -125,7 +126,12 @@ impl LitScene {
         let pixels = Rect { x: 0, y: 0, width: PACKET_SIZE as u32, height: 1 }.into();
         let bsdf = match world.materials[number].bsdf.as_non_specular() {
             Some(material) => material.with_white_textures(),
-            None => BxdfPoint::DielectricReflection(RoughDielectricPoint { near: 1.0, far: 1.5, alpha: 0.5 }),
+            None => BxdfPoint::DielectricReflection(RoughDielectricPoint {
+                near: 1.0,
+                far: 1.5,
+                alpha: 0.5,
+                distribution: MicrofacetDistribution::Ggx,
+            }),
         };
         let block = SampleBlock { pixels, samples: 0..samples, mirrored_width: None };
         Self { world, settings, block, token: CancelToken::new(), bsdf }
