@@ -46,7 +46,7 @@ LINES = [
     ("glimt kn\t", ["knot.obj"]),
     ("glimt ball.toml --integ\tp\t", ["ball.toml", "--integrator", "path"]),
     ("glimt ball.toml --integrator=wh\t", ["ball.toml", "--integrator=whitted"]),
-    ("glimt ball.toml --set materials.wall.dif\ttomat\t", ["ball.toml", "--set", "materials.wall.diffuse=tomato"]),
+    ("glimt ball.toml --set materials.wall.spec\ttomat\t", ["ball.toml", "--set", "materials.wall.specular=tomato"]),
     ("glimt ball.toml --set render.integ\tp\t", ["ball.toml", "--set", "render.integrator=path"]),
     ("glimt ball.toml --set=photons.en\tt\t", ["ball.toml", "--set=photons.enabled=true"]),
     ("glimt ball.toml --set sphere.ball.mate\twi\t", ["ball.toml", "--set", "sphere.ball.material=window"]),

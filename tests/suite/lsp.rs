@@ -199,7 +199,7 @@ fn hover_and_go_to_definition_work() {
     let mut editor = Editor::open(TEXT);
     let hover = editor.at("textDocument/hover", &TEXT.replace("roughness", "rough|ness"));
     let text = hover["contents"]["value"].as_str().expect("a text");
-    assert!(["GGX", "`0.2`", "0 … 1"].iter().all(|fact| mentions(text, fact)), "{text}");
+    assert!(["mirror", "`0.2`", "0 … 1"].iter().all(|fact| mentions(text, fact)), "{text}");
     assert_eq!(editor.at("textDocument/hover", &TEXT.replace("[[light]]", "|[[light]]")), Value::Null);
     let place = editor.at("textDocument/definition", &TEXT.replace("\"wall\"", "\"wa|ll\""));
     assert_eq!(place["uri"], editor.uri);

@@ -48,7 +48,7 @@ fn bash_completes_commands_files_and_keys() {
     assert_eq!(in_bash(&dir, "glimt check k"), [""; 0], "only scenes must be offered");
     assert_eq!(in_bash(&dir, "glimt compl"), ["completions"]);
     assert_eq!(in_bash(&dir, "glimt ball.toml --integrator "), ["whitted", "path"]);
-    assert_eq!(in_bash(&dir, "glimt ball.toml --set materials.ball.d"), ["materials.ball.diffuse="]);
+    assert_eq!(in_bash(&dir, "glimt ball.toml --set materials.ball.sh"), ["materials.ball.shininess="]);
     assert_eq!(in_bash(&dir, "glimt check ball.toml --set light.1.f"), ["light.1.falloff="]);
     assert_eq!(in_bash(&dir, "glimt ball.toml --set photons.e"), ["photons.enabled="]);
 }
