@@ -34,7 +34,7 @@ pub fn gaussian(x: f32) -> f32 {
     exp2_f64(-LOG2_E * (x * x)) as f32
 }
 
-/// erf(x) within 5e-7, and exp(−x²) (Abramowitz and Stegun, *Handbook of Mathematical Functions*, 1964,
+/// erf(x) within 6e-7, and exp(−x²) (Abramowitz and Stegun, *Handbook of Mathematical Functions*, 1964,
 /// equation 7.1.26).
 #[inline(always)]
 pub fn erf_and_gaussian(x: f32) -> (f32, f32) {
@@ -257,7 +257,7 @@ mod tests {
             let x = i as f32 * 1e-4;
             let (erf, gaussian) = erf_and_gaussian(x);
             let off = (f64::from(erf) - libm::erf(f64::from(x))).abs();
-            assert!(off < 5e-7, "erf({x}) is off by {off}");
+            assert!(off < 6e-7, "erf({x}) is off by {off}");
             let exact = libm::exp(-f64::from(x) * f64::from(x));
             let is_normal = exact > f64::from(f32::MIN_POSITIVE);
             assert!(!is_normal || ulps(gaussian, exact) <= 1.0, "exp(−{x}²)");
