@@ -28,7 +28,7 @@ impl BxdfPoint {
 
 impl BsdfPacket {
     /// Samples a direction on either side of each surface, using the same random numbers as
-    /// [`BxdfPacket::sample`]. Returns `None` for kinds that do not support this.
+    /// [`BxdfPacket::sample`](super::super::bxdf_packet::BxdfPacket::sample). Returns `None` for kinds that do not support this.
     #[inline(always)]
     pub fn sample_reflection_or_transmission(
         &self,
