@@ -46,6 +46,18 @@ const BROKEN: &[(&str, &[ExpectedDiagnostic])] = &[
         ],
     ),
     (
+        "coats",
+        &[
+            (10, 8, "`coat` must be between 0 and 1; found 1.5"),
+            (11, 18, "`coat_roughness` must be between 0 and 1; found -1"),
+            (12, 12, "`coat_ior` must be between 1 and 10; found 0.9"),
+            (13, 13, "`coat_tint` must be between 0 and 1; found 2"),
+            (17, 1, "the coat of this material is specified twice"),
+            (22, 1, "glass cannot have `coat`"),
+            (26, 1, "warning: `coat_tint` has no effect without `coat`"),
+        ],
+    ),
+    (
         "colours",
         &[
             (3, 15, "`ambient` must be at least 0; found -0.1"),

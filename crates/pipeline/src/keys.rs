@@ -142,9 +142,7 @@ fn light_descriptions_key(scene: &Scene, of: &FingerprintContext<'_>) -> Fingerp
                     .add(&object.shape, of)
                     .add(&material.emission, of)
                     .add(&material.opacity, of);
-                for number in material.emitter_coat_weight_and_roughness().iter().flatten() {
-                    key.add(number, of);
-                }
+                key.add(&material.emitter_coat().cloned(), of);
             }
             // Materials from the mesh file may emit.
             None => {

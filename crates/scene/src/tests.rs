@@ -440,3 +440,16 @@ fn shapes_may_have_names() {
         ["`name` must be the name of this shape"]
     );
 }
+
+#[test]
+fn clearcoat_keys_are_coat_keys() {
+    let material = |keys: &str| {
+        let scene = scene(&format!("[materials.a]\ntype = 'principled'\n{keys}"));
+        scene.materials.into_iter().next()
+    };
+    assert_eq!(
+        material("clearcoat = 0.5\nclearcoat_roughness = 0.2"),
+        material("coat = 0.5\ncoat_roughness = 0.2")
+    );
+    assert_eq!(material("clearcoat = 0\nclearcoat_roughness = 0.2"), material("coat = 0\ncoat_tint = 0.5"));
+}

@@ -7,7 +7,7 @@ use glimt::geometry::mesh::TriangleMesh;
 use glimt::math::{DVec3, Vec3};
 use glimt::scene::description::light::Falloff;
 use glimt::scene::description::{
-    EmissionSides, EmissionSource, Integrator, Material, MaterialKind, NumberSource, OpacitySource, Shape,
+    CoatSource, EmissionSides, EmissionSource, Integrator, Material, NumberSource, OpacitySource, Shape,
 };
 
 use super::scenes::{AS_IT_IS, Build, beckmann, metal, plastic, principled, receiver, scene};
@@ -27,11 +27,8 @@ fn materials() -> [(&'static str, Material); 7] {
 }
 
 /// The material without its clear coat, which would attenuate emission.
-fn uncoated(mut material: Material) -> Material {
-    if let MaterialKind::Principled { clearcoat, .. } = &mut material.kind {
-        *clearcoat = NumberSource::Constant(0.0);
-    }
-    material
+fn uncoated(material: Material) -> Material {
+    Material { coat: CoatSource::NONE, ..material }
 }
 
 /// The scene once per integrator, with the integrator's name.

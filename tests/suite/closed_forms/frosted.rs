@@ -10,7 +10,8 @@ use glimt::scene::description::{
 use super::global::by_paths;
 use super::photons::{assert_same_light, both};
 use super::scenes::{
-    Build, beckmann, emitter, frosted, glass, matte, metal, mirror, plastic, scene, tinted, translucent,
+    Build, beckmann, coated, emitter, frosted, glass, matte, metal, mirror, plastic, scene, tinted,
+    translucent,
 };
 use super::{assert_close, assert_same_mean, mean_and_error, v};
 
@@ -260,17 +261,17 @@ fn clear_coat_attenuates_emission() {
     // The factor is 1 − c·E(μ), with c = ½. A sufficiently smooth coat has E = F0 + (1 − F0)(1 − μ)⁵ and F0 =
     // 0.04.
     let left = |cosine: f64| 1.0 - 0.5 * (0.04 + 0.96 * (1.0 - cosine).powi(5));
-    let coated = |radiance: f32| {
-        let mut lamp = translucent(0.0, 0.5, 0.0);
-        if let MaterialKind::Principled { clearcoat_roughness, specular, .. } = &mut lamp.kind {
-            (*clearcoat_roughness, *specular) = (NumberSource::Constant(0.02), NumberSource::Constant(0.0));
+    let coated_lamp = |radiance: f32| {
+        let mut lamp = coated(0.5, 0.02, translucent(0.0, 0.5, 0.0));
+        if let MaterialKind::Principled { specular, .. } = &mut lamp.kind {
+            *specular = NumberSource::Constant(0.0);
         }
         lamp.emission = EmissionSource::from_constant(Vec3::splat(radiance));
         lamp
     };
     for cosine in [1.0_f64, 0.6, 0.3] {
         let from = v((1.0 - cosine * cosine).sqrt(), cosine, 0.0) * 3.0;
-        let lamp = scene().quad(v(-1.0, 0.0, 1.0), v(2.0, 0.0, 0.0), v(0.0, 0.0, -2.0), coated(3.0));
+        let lamp = scene().quad(v(-1.0, 0.0, 1.0), v(2.0, 0.0, 0.0), v(0.0, 0.0, -2.0), coated_lamp(3.0));
         let seen = lamp.seen(from, DVec3::ZERO);
         for build in [seen.clone(), by_paths(seen, 2)] {
             let value = build.value();
@@ -290,7 +291,7 @@ fn clear_coat_attenuates_emission() {
         floor.pictured(v(0.0, 0.6, 3.0), v(1.0, -0.5, 0.0), 36.0, 8, 8).depth(1)
     };
     for (number, shape) in shapes.into_iter().enumerate() {
-        let lit = floor().shape(shape.clone(), coated(2.0));
+        let lit = floor().shape(shape.clone(), coated_lamp(2.0));
         let means = |build: &Build, samples: u32| mean_and_error(&build.mean_reds(samples));
         let samples = means(&lit, 32);
         // Light samples cannot find a light inside a glass shell.

@@ -11,8 +11,8 @@ use glimt::scene::description::{
 use super::global::{by_paths, lamps_over_a_floor};
 use super::photons::{assert_same_light, both};
 use super::scenes::{
-    Build, beckmann, emitter, frosted, glass, lat_long_sphere, matte, metal, phong, plastic, principled,
-    scene, translucent,
+    Build, beckmann, coated, emitter, frosted, glass, lat_long_sphere, matte, metal, mirror, phong, plastic,
+    principled, scene, translucent,
 };
 use super::{assert_close, assert_same_mean, mean_and_error, v};
 
@@ -29,6 +29,8 @@ fn materials() -> Vec<(&'static str, Material)> {
         ("principled", principled(0.6, 0.3, 0.4)),
         ("rough glass", frosted(1.5, 0.5)),
         ("sheet", translucent(0.6, 0.4, 0.5)),
+        ("coated phong", coated(0.8, 0.4, phong(0.5, 0.3, 20.0, 0.0))),
+        ("coated mirror", coated(1.0, 0.5, mirror(0.5))),
         ("Beckmann metal", beckmann(metal(0.8, 0.4, 0.3))),
         ("Beckmann plastic", beckmann(plastic(0.6, 0.4))),
     ]
@@ -119,7 +121,7 @@ fn whitted_shows_reflections_in_rough_lobes() {
         // Whitted excludes indirect light from the diffuse lobe, so compare only the specular components.
         let part = |build: Build| mean_and_error(&build.viewed(ViewMode::Specular).values(1024, 16));
         let (whitted, path) = (part(build.clone().depth(2)), part(by_paths(build, 2)));
-        if material == "smooth plastic" {
+        if ["smooth plastic", "coated mirror"].contains(&material) {
             continue;
         }
         assert_same_mean(material, whitted, path, 0.02);
@@ -151,6 +153,8 @@ fn rough_reflection_components_add_up() {
         .sphere(v(-1.2, 0.0, -6.0), 1.0, metal(0.9, 0.3, 0.0))
         .sphere(v(1.2, 0.0, -6.0), 1.0, plastic(0.6, 0.0))
         .sphere(v(0.0, 1.5, -6.5), 0.6, principled(0.7, 0.2, 0.3))
+        .sphere(v(1.2, 1.5, -6.5), 0.5, coated(0.7, 0.3, phong(0.4, 0.3, 9.0, 0.0)))
+        .sphere(v(-1.2, 1.5, -6.5), 0.5, coated(1.0, 0.2, mirror(0.8)))
         .cuboid(v(0.0, -0.75, -4.0), v(0.6, 0.5, 0.6), DVec3::ZERO, phong(0.5, 0.4, 20.0, 0.0))
         .quad(v(-1.0, 3.0, -7.0), v(2.0, 0.0, 0.0), v(0.0, 0.0, 2.0), emitter(4.0))
         .point_light(v(3.0, 4.0, 0.0), 20.0, Falloff::Square)

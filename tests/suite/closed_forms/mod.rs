@@ -4,6 +4,7 @@ mod bodies;
 mod bumps;
 mod camera;
 mod caustics;
+mod coats;
 mod direct;
 mod distant;
 mod everywhere;

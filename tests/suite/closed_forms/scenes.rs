@@ -15,11 +15,11 @@ use glimt::materials::texels::{TexelData, Texels};
 use glimt::math::{DVec3, Vec2, Vec3};
 use glimt::scene::description::light::{Falloff, PointLight};
 use glimt::scene::description::{
-    Accel, Camera, ColorSource, EmissionSource, Environment, FresnelSource, ImageWindow, Integrator, Light,
-    MapOrientation, Material, MaterialKind, MeshFile, MeshReference, MicrofacetDistribution, NumberSource,
-    Object, ObjectTransform, OpacitySource, PhongParameters, PhotonOptions, PixelFilter, Projection,
-    ReflectingSides, RenderOptions, Scene, ShadowMode, Shape, Sky, Spanned, Texture, TextureEncoding,
-    TextureFilter, Tonemap, UvSet, Wrap,
+    Accel, Camera, CoatSource, ColorSource, EmissionSource, Environment, FresnelSource, ImageWindow,
+    Integrator, Light, MapOrientation, Material, MaterialKind, MeshFile, MeshReference,
+    MicrofacetDistribution, NumberSource, Object, ObjectTransform, OpacitySource, PhongParameters,
+    PhotonOptions, PixelFilter, Projection, ReflectingSides, RenderOptions, Scene, ShadowMode, Shape, Sky,
+    Spanned, Texture, TextureEncoding, TextureFilter, Tonemap, UvSet, Wrap,
 };
 use glimt::world::{
     EnvironmentSource, Geometry, Image, MeshTree, TextureRolesNeededByRender, World, WorldInputs,
@@ -382,7 +382,14 @@ pub fn plain(kind: MaterialKind) -> Material {
         normal_map: None,
         bump: None,
         opacity: OpacitySource::FULL,
+        coat: CoatSource::NONE,
     }
+}
+
+/// The material under a coat with these weight and roughness.
+pub fn coated(weight: f32, roughness: f32, material: Material) -> Material {
+    let [weight, roughness] = [weight, roughness].map(NumberSource::Constant);
+    Material { coat: CoatSource { weight, roughness, ..CoatSource::NONE }, ..material }
 }
 
 pub fn phong(diffuse: f32, specular: f32, shininess: f32, emission: f32) -> Material {
@@ -447,7 +454,7 @@ pub fn plastic(diffuse: f32, roughness: f32) -> Material {
 /// A principled material with a clear coat of weight 0.5.
 pub fn principled(color: f32, metallic: f32, roughness: f32) -> Material {
     let number = NumberSource::Constant;
-    plain(MaterialKind::Principled {
+    let uncoated = plain(MaterialKind::Principled {
         color: ColorSource::Constant(Vec3::splat(color)),
         metallic: number(metallic),
         roughness: number(roughness),
@@ -456,9 +463,8 @@ pub fn principled(color: f32, metallic: f32, roughness: f32) -> Material {
         specular_color: ColorSource::Constant(Vec3::ONE),
         transmission: number(0.0),
         diffuse_transmission: ColorSource::BLACK,
-        clearcoat: number(0.5),
-        clearcoat_roughness: number(0.1),
-    })
+    });
+    coated(0.5, 0.1, uncoated)
 }
 
 pub fn glass(ior: f32) -> Material {

@@ -57,9 +57,12 @@ fn of_definition(info: &'static TableInfo) -> Vec<DefinedTable> {
     }
     let of_type = |kind: &'static TableTypeInfo| {
         let code = format!("type = \"{}\"", kind.name);
-        // Opacity applies only to surfaces.
-        let is_solid = |info: &&KeyInfo| kind.name == "glass" && info.name.starts_with("opacity");
-        let keys = info.keys_for_type(Some(kind)).filter(|info| !is_solid(info)).collect();
+        // Opacity applies only to surfaces, and coats only to opaque materials.
+        let is_refused = |key: &&KeyInfo| match kind.name {
+            "glass" => key.name.starts_with("opacity") || key.name.starts_with("coat"),
+            _ => false,
+        };
+        let keys = info.keys_for_type(Some(kind)).filter(|key| !is_refused(key)).collect();
         let own = (heading(code.clone()), kind.keys.len());
         let common = ("Every material".to_owned(), info.keys.len());
         let headings = [own, common].into_iter().filter(|(_, count)| *count > 0).collect();

@@ -1,41 +1,101 @@
-//! A smooth coat over a non-specular base. The coat has a δ lobe, and the base's lobes scatter the
-//! transmitted light.
+//! Surfaces with a δ lobe and non-specular lobes: plastic under a smooth coat, and mirrors and smooth plastic
+//! under a clear coat.
 
 use std::sync::Arc;
 
 use super::bxdfs::NonSpecular;
+use super::coat::Coat;
 use super::footprint::TexturePoint;
 use super::fresnel::dielectric;
+use super::mirror::Mirror;
 use super::texture::{ColorOrTexture, Texture};
 use crate::math::Vec3;
 
-/// A smooth dielectric coat over a base. The base's lobes already account for the coat's transmittance.
+/// A surface with a δ lobe and non-specular lobes. The non-specular lobes already account for the
+/// transmittance of all layers above them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Coated {
-    /// Factor applied to the coat's reflection.
-    pub specular: ColorOrTexture,
-    /// Index of refraction of the coat, at least 1.
-    pub ior: f32,
-    /// The surface under the coat.
+    /// The surface with the δ lobe.
+    pub specular: SpecularPart,
+    /// A clear coat over the δ lobe, if there is one.
+    pub coat: Option<Coat>,
+    /// The non-specular lobes.
     pub base: NonSpecular,
 }
 
+/// A surface with a δ lobe.
+#[derive(Clone, Debug, PartialEq)]
+pub enum SpecularPart {
+    /// A smooth dielectric coat.
+    SmoothCoat {
+        /// Factor applied to the coat's reflection.
+        tint: ColorOrTexture,
+        /// Index of refraction of the coat, at least 1.
+        ior: f32,
+    },
+    /// A mirror.
+    Mirror(Mirror),
+}
+
 impl Coated {
-    /// Computes the coat's Fresnel reflectance from the cosine of the angle of incidence. Does not include
-    /// the factor `specular`.
+    /// The probability of choosing the δ lobe at an incident angle with the given cosine. `mirror` is the
+    /// reflectance of [`SpecularPart::Mirror`]. Counts texture lookups in `lookups`.
     #[inline]
-    pub fn fresnel(&self, cosine: f32) -> f32 {
-        dielectric(cosine, self.ior).0
+    pub fn specular_probability(
+        &self,
+        cosine: f32,
+        mirror: Vec3,
+        at: &TexturePoint,
+        lookups: &mut u64,
+    ) -> f32 {
+        match &self.specular {
+            SpecularPart::SmoothCoat { tint: _, ior } => {
+                let left = self.coat_transmittance(cosine, Vec3::ZERO, at, lookups);
+                left.max_element() * dielectric(cosine, *ior).0
+            }
+            SpecularPart::Mirror(_) => {
+                (self.coat_transmittance(cosine, mirror, at, lookups) * mirror).max_element()
+            }
+        }
     }
 
-    /// The factor applied to the coat's reflection. Counts texture lookups in `lookups`.
+    /// Reflectance of the δ lobe divided by [`Coated::specular_probability`], with the same parameters.
     #[inline]
-    pub fn specular_tint(&self, at: &TexturePoint, lookups: &mut u64) -> Vec3 {
-        self.specular.evaluate(at, lookups)
+    pub fn specular_weight(&self, cosine: f32, mirror: Vec3, at: &TexturePoint, lookups: &mut u64) -> Vec3 {
+        let relative = |color: Vec3| color / color.max_element().max(f32::MIN_POSITIVE);
+        match &self.specular {
+            SpecularPart::SmoothCoat { tint, ior: _ } => {
+                relative(self.coat_transmittance(cosine, Vec3::ZERO, at, lookups))
+                    * tint.evaluate(at, lookups)
+            }
+            SpecularPart::Mirror(_) => {
+                relative(self.coat_transmittance(cosine, mirror, at, lookups) * mirror)
+            }
+        }
     }
 
-    /// All textures of the coat.
-    pub fn coat_textures(&self) -> impl Iterator<Item = &Arc<Texture>> {
-        self.specular.texture().into_iter()
+    /// The clear coat's transmittance in and out at the same angle, including the light that it returns to a
+    /// base with the given reflectance.
+    #[inline]
+    fn coat_transmittance(&self, cosine: f32, base: Vec3, at: &TexturePoint, lookups: &mut u64) -> Vec3 {
+        self.coat.as_ref().map_or(Vec3::ONE, |coat| coat.two_way_transmittance(at, cosine, base, lookups))
+    }
+
+    /// The surface's main color. Counts texture lookups in `lookups`.
+    #[inline]
+    pub fn albedo(&self, at: &TexturePoint, lookups: &mut u64) -> Vec3 {
+        match &self.specular {
+            SpecularPart::SmoothCoat { .. } => self.base.albedo(at, lookups),
+            SpecularPart::Mirror(mirror) => mirror.reflectance(1.0, None, at, lookups),
+        }
+    }
+
+    /// All textures of the δ lobe. The coat has the same textures as the coat of the base.
+    pub fn specular_textures(&self) -> impl Iterator<Item = &Arc<Texture>> {
+        let (tint, mirror) = match &self.specular {
+            SpecularPart::SmoothCoat { tint, ior: _ } => (tint.texture(), None),
+            SpecularPart::Mirror(mirror) => (None, Some(mirror)),
+        };
+        tint.into_iter().chain(mirror.into_iter().flat_map(Mirror::textures))
     }
 }

@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
+use super::coat::Coat;
 use super::footprint::TexturePoint;
-use super::principled::EmissionCoat;
 use super::texture::Texture;
 use crate::choice;
 use crate::math::Vec3;
@@ -28,7 +28,7 @@ pub struct Emission {
     /// Which sides emit.
     pub sides: EmissionSides,
     /// Clear coat that attenuates the radiance by a direction-dependent factor, if there is one.
-    pub coat: Option<Arc<EmissionCoat>>,
+    pub coat: Option<Arc<Coat>>,
 }
 
 impl Emission {
@@ -64,7 +64,7 @@ impl Emission {
     /// Counts texture lookups in `lookups`.
     #[inline]
     pub fn radiance_of_emitting_side(&self, at: &TexturePoint, cosine: f32, lookups: &mut u64) -> Vec3 {
-        let left = self.coat.as_ref().map_or(1.0, |coat| coat.transmittance(at, cosine, lookups));
+        let left = self.coat.as_ref().map_or(Vec3::ONE, |coat| coat.transmittance(at, cosine, lookups));
         let Some(texture) = self.texture.as_ref().filter(|_| self.is_emissive()) else {
             return self.scale * left;
         };

@@ -4,6 +4,7 @@ pub mod bsdf;
 pub mod bxdf;
 pub mod bxdf_packet;
 pub mod bxdfs;
+pub mod coat;
 pub mod coated;
 pub mod dielectric;
 pub mod emission;
@@ -18,12 +19,14 @@ pub mod normal_map;
 pub mod normal_perturbation;
 pub mod opacity;
 pub mod scalar;
+pub mod schlick_albedo;
 pub mod texels;
 pub mod texture;
 pub mod thin_dielectric;
 
 pub use bxdfs::*;
-pub use coated::Coated;
+pub use coat::{Coat, CoatInputs};
+pub use coated::{Coated, SpecularPart};
 pub use dielectric::Dielectric;
 pub use emission::{Emission, EmissionSides};
 pub use footprint::{Footprint, SecondUvPoint, TexturePoint, UvSet};
@@ -109,7 +112,7 @@ impl Material {
         let mut textures: Vec<_> = match &self.bsdf {
             Bsdf::NonSpecular(rough) => rough.textures().collect(),
             Bsdf::Mirror(mirror) => mirror.textures().collect(),
-            Bsdf::Coated(coated) => coated.coat_textures().chain(coated.base.textures()).collect(),
+            Bsdf::Coated(coated) => coated.specular_textures().chain(coated.base.textures()).collect(),
             Bsdf::Dielectric(glass) => glass.roughness.texture().into_iter().collect(),
             Bsdf::ThinDielectric(pane) => pane.tint.texture().into_iter().collect(),
         };
@@ -131,7 +134,7 @@ pub enum Bsdf {
     Dielectric(Dielectric),
     /// A thin dielectric pane.
     ThinDielectric(ThinDielectric),
-    /// A non-specular surface under a smooth coat.
+    /// A surface with a δ lobe and non-specular lobes.
     Coated(Coated),
 }
 
@@ -206,7 +209,7 @@ impl Bsdf {
             Self::Mirror(mirror) => mirror.reflectance(1.0, None, at, lookups),
             Self::Dielectric(glass) => glass.tint,
             Self::ThinDielectric(pane) => pane.tint.evaluate(at, lookups),
-            Self::Coated(coated) => coated.base.albedo(at, lookups),
+            Self::Coated(coated) => coated.albedo(at, lookups),
         }
     }
 }

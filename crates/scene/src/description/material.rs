@@ -122,6 +122,40 @@ impl OpacitySource {
     }
 }
 
+/// A dielectric layer over a material.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CoatSource {
+    /// Weight of the layer, in [0, 1].
+    pub weight: NumberSource,
+    /// Square root of the GGX α, in [0, 1].
+    pub roughness: NumberSource,
+    /// Index of refraction, in [1, 10].
+    pub ior: f32,
+    /// Transmittance of the layer, in and out together, at normal incidence, in [0, 1].
+    pub tint: ColorSource,
+}
+
+impl CoatSource {
+    /// No coat.
+    pub const NONE: Self = Self {
+        weight: NumberSource::Constant(0.0),
+        roughness: NumberSource::Constant(0.0),
+        ior: 1.5,
+        tint: ColorSource::Constant(Vec3::ONE),
+    };
+
+    /// Whether there is a coat.
+    pub fn exists(&self) -> bool {
+        self.weight != NumberSource::Constant(0.0)
+    }
+
+    /// The coat, or [`CoatSource::NONE`] if its weight is 0, so that its other keys do not matter.
+    #[must_use]
+    pub fn or_none(self) -> Self {
+        if self.exists() { self } else { Self::NONE }
+    }
+}
+
 /// Reflectance of a smooth conductor.
 #[derive(Clone, Debug, PartialEq)]
 pub enum FresnelSource {
@@ -174,6 +208,8 @@ pub struct Material {
     pub bump: Option<Bump>,
     /// Opacity of the surface.
     pub opacity: OpacitySource,
+    /// Layer over the surface.
+    pub coat: CoatSource,
 }
 
 impl MaterialKind {
@@ -441,10 +477,6 @@ pub enum MaterialKind {
         transmission: NumberSource,
         /// Diffuse transmittance kt, at most 1 − `color`.
         diffuse_transmission: ColorSource,
-        /// Weight of a clear coat.
-        clearcoat: NumberSource,
-        /// Square root of the coat's GGX α.
-        clearcoat_roughness: NumberSource,
     },
 }
 
@@ -498,15 +530,9 @@ impl MaterialKind {
         match self {
             Self::Metal { roughness, anisotropy, .. } => vec![*roughness, *anisotropy],
             Self::Plastic { roughness, .. } | Self::Glass { roughness, .. } => vec![*roughness],
-            Self::Principled {
-                metallic,
-                roughness,
-                specular,
-                transmission,
-                clearcoat,
-                clearcoat_roughness,
-                ..
-            } => vec![*metallic, *roughness, *specular, *transmission, *clearcoat, *clearcoat_roughness],
+            Self::Principled { metallic, roughness, specular, transmission, .. } => {
+                vec![*metallic, *roughness, *specular, *transmission]
+            }
             Self::Phong(_) | Self::Mirror { .. } | Self::Pane { .. } => Vec::new(),
         }
     }
@@ -518,34 +544,28 @@ impl Material {
         self.emission.scale != Vec3::ZERO
     }
 
-    /// Returns the weight and roughness of an emitter's clear coat, or `None` if there is no emission or no
-    /// clear coat.
-    pub fn emitter_coat_weight_and_roughness(&self) -> Option<[NumberSource; 2]> {
-        match self.kind {
-            MaterialKind::Principled { clearcoat, clearcoat_roughness, .. } => {
-                let has_coat = self.emits() && clearcoat != NumberSource::Constant(0.0);
-                has_coat.then_some([clearcoat, clearcoat_roughness])
-            }
-            MaterialKind::Phong(_)
-            | MaterialKind::Mirror { .. }
-            | MaterialKind::Glass { .. }
-            | MaterialKind::Pane { .. }
-            | MaterialKind::Metal { .. }
-            | MaterialKind::Plastic { .. } => None,
-        }
+    /// Returns the coat, or `None` if it does not attenuate any emission.
+    pub fn emitter_coat(&self) -> Option<&CoatSource> {
+        (self.emits() && self.coat.exists()).then_some(&self.coat)
     }
 
     /// Returns the material's textures, as indices into [`Scene::textures`](super::Scene::textures) with
     /// their roles. A texture may occur several times.
     pub fn textures(&self) -> Vec<(usize, TextureRole)> {
-        let Self { name: _, kind, sides: _, emission, normal_map, bump, opacity } = self;
+        let Self { name: _, kind, sides: _, emission, normal_map, bump, opacity, coat } = self;
+        let coat = Some(coat).filter(|coat| coat.exists());
+        let coat_tint = coat.map(|coat| (&coat.tint, TextureRole::Facets));
+        let emitter_tint = self.emitter_coat().map(|coat| (&coat.tint, TextureRole::Emission));
         let colors = kind
             .color_parameters_with_roles()
             .into_iter()
+            .chain(coat_tint)
+            .chain(emitter_tint)
             .filter_map(|(color, role)| Some((color.texture_index()?, role)));
         let numbers = kind
             .texturable_number_parameters()
             .into_iter()
+            .chain(coat.into_iter().flat_map(|coat| [coat.weight, coat.roughness]))
             .filter_map(|number| number.texture_index_and_channel(ChannelSelector::Luminance));
         let numbers = numbers.map(|(texture, number)| (texture, TextureRole::Roughness(number)));
         let shown = emission.texture.filter(|_| self.emits()).map(|index| (index, TextureRole::Emission));
@@ -554,10 +574,11 @@ impl Material {
         let opacity = opacity
             .texture_index_and_channel()
             .map(|(texture, number)| (texture, TextureRole::Opacity(number)));
-        let coat = self.emitter_coat_weight_and_roughness().into_iter().flatten();
+        let coat = self.emitter_coat().into_iter().flat_map(|coat| [coat.weight, coat.roughness]);
         let coat = coat.filter_map(|number| number.texture_index_and_channel(ChannelSelector::Luminance));
         let coat = coat.map(|(texture, number)| (texture, TextureRole::EmissionCoat(number)));
-        colors.chain(numbers).chain(shown).chain(normals).chain(heights).chain(opacity).chain(coat).collect()
+        let surface = shown.into_iter().chain(normals).chain(heights).chain(opacity).chain(coat);
+        colors.chain(numbers).chain(surface).collect()
     }
 }
 
@@ -597,6 +618,13 @@ impl Fingerprinted for OpacitySource {
     fn add_to(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
         let Self { value, cutoff } = self;
         key.add_f32(*cutoff).add(value, of);
+    }
+}
+
+impl Fingerprinted for CoatSource {
+    fn add_to(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
+        let Self { weight, roughness, ior, tint } = self;
+        key.add(weight, of).add(roughness, of).add_f32(*ior).add(tint, of);
     }
 }
 
@@ -687,12 +715,10 @@ impl Fingerprinted for MaterialKind {
                 specular_color,
                 transmission,
                 diffuse_transmission,
-                clearcoat,
-                clearcoat_roughness,
             } => {
                 key.add_usize(5).add(color, of).add(metallic, of).add(roughness, of).add_f32(*ior);
                 key.add(specular, of).add(specular_color, of).add(transmission, of);
-                key.add(clearcoat, of).add(clearcoat_roughness, of).add(diffuse_transmission, of);
+                key.add(diffuse_transmission, of);
             }
         }
     }
@@ -700,8 +726,8 @@ impl Fingerprinted for MaterialKind {
 
 impl Fingerprinted for Material {
     fn add_to(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
-        let Self { name: _, kind, sides, emission, normal_map, bump, opacity } = self;
-        key.add(kind, of).add(emission, of).add(normal_map, of).add(bump, of).add(opacity, of);
+        let Self { name: _, kind, sides, emission, normal_map, bump, opacity, coat } = self;
+        key.add(kind, of).add(emission, of).add(normal_map, of).add(bump, of).add(opacity, of).add(coat, of);
         key.add_choice(*sides);
     }
 }

@@ -20,8 +20,8 @@ pub use camera::{
 };
 pub use light::{Environment, Light, MapOrientation, Sky};
 pub use material::{
-    Bump, Channel, ChannelSelector, ColorSource, EmissionSides, EmissionSource, FresnelSource, Material,
-    MaterialKind, MicrofacetDistribution, NormalMap, NumberSource, OpacitySource, PhongParameters,
+    Bump, Channel, ChannelSelector, CoatSource, ColorSource, EmissionSides, EmissionSource, FresnelSource,
+    Material, MaterialKind, MicrofacetDistribution, NormalMap, NumberSource, OpacitySource, PhongParameters,
     PixelInterpretation, ReflectingSides, Texture, TextureEncoding, TextureFilter, TextureRole, UvSet, Wrap,
 };
 pub use method::{Integrator, IntegratorProperties};

@@ -1,7 +1,7 @@
 //! The `[materials.NAME]` tables.
 
 use super::super::description::{
-    Bump, ColorSource, EmissionSides, EmissionSource, FresnelSource, Material, MaterialKind,
+    Bump, CoatSource, ColorSource, EmissionSides, EmissionSource, FresnelSource, Material, MaterialKind,
     MicrofacetDistribution, NormalMap, NumberSource, OpacitySource, PhongParameters, ReflectingSides,
 };
 use super::super::keys::key::DefaultValue::{Absent, Alternative, By, Is};
@@ -107,9 +107,9 @@ table_types! {
         transmission: FRACTION, Is("0.0");
         /// Diffuse transmittance through the surface, as of leaves and paper; at most 1 − `color`.
         diffuse_transmission: REFLECTANCE, Is("[0, 0, 0]"), "reflectance";
-        /// Weight of the clear coat on top.
+        /// Weight of the clear coat on top; another name for `coat`.
         clearcoat: FRACTION, Is("0.0");
-        /// Square root of the clear coat's GGX α.
+        /// Square root of the clear coat's GGX α; another name for `coat_roughness`.
         clearcoat_roughness: FRACTION, Is("0.0");
     }
 }
@@ -135,6 +135,14 @@ pub(crate) static MATERIALS: TableInfo = TableInfo {
             bump: Heights, Absent;
             /// Displacement of white; negative values invert the relief.
             bump_scale: Number(Any), Is("0.01"), "length";
+            /// Weight of a dielectric layer over everything below it, emission included.
+            coat: FRACTION, Is("0.0");
+            /// Square root of the layer's GGX α.
+            coat_roughness: FRACTION, Is("0.05");
+            /// The layer's index of refraction.
+            coat_ior: Number(Between(1.0, 10.0)), Is("1.5");
+            /// Transmittance of the layer, in and out together, at normal incidence.
+            coat_tint: REFLECTANCE, Is("[1, 1, 1]");
             /// Probability that a ray hits the surface instead of passing through.
             opacity: FRACTION, Is("1.0");
             /// If above 0, alpha testing: opaque where the opacity is at least this, invisible elsewhere.
@@ -176,13 +184,18 @@ fn read_material(name: String, mut table: TableReader<'_>, textures: &DefinedNam
     // Without a valid type, keys cannot be checked.
     let kind = table.read_type()?;
     let table = &MaterialReader { table, textures };
-    let kind = match kind {
-        MaterialType::Phong => Some(MaterialKind::Phong(table.read_phong())),
-        MaterialType::Mirror => Some(MaterialKind::Mirror { reflectance: table.color("reflectance") }),
-        MaterialType::Glass => table.read_glass(),
-        MaterialType::Metal => table.read_metal(),
-        MaterialType::Plastic => Some(table.read_plastic()),
-        MaterialType::Principled => Some(table.read_principled()),
+    let (kind, coat) = match kind {
+        MaterialType::Phong => (Some(MaterialKind::Phong(table.read_phong())), table.read_coat()),
+        MaterialType::Mirror => {
+            (Some(MaterialKind::Mirror { reflectance: table.color("reflectance") }), table.read_coat())
+        }
+        MaterialType::Glass => {
+            table.reject_coat_keys();
+            (table.read_glass(), CoatSource::NONE)
+        }
+        MaterialType::Metal => (table.read_metal(), table.read_coat()),
+        MaterialType::Plastic => (Some(table.read_plastic()), table.read_coat()),
+        MaterialType::Principled => (Some(table.read_principled()), table.read_coat_or_clearcoat()),
     };
     let (emission, normal_map, bump) = (table.read_emission(), table.read_normal_map(), table.read_bump());
     let opacity = if kind.as_ref().is_some_and(MaterialKind::is_solid_glass) {
@@ -193,7 +206,7 @@ fn read_material(name: String, mut table: TableReader<'_>, textures: &DefinedNam
     };
     let sides = table.read_sides(kind.as_ref());
     table.table.report_unknown_and_missing_keys();
-    Some(Material { name, kind: kind?, sides, emission, normal_map, bump, opacity })
+    Some(Material { name, kind: kind?, sides, emission, normal_map, bump, opacity, coat })
 }
 
 /// A material's table, and the textures that it may refer to.
@@ -325,7 +338,6 @@ impl<'a> MaterialReader<'a> {
     }
 
     fn read_principled(&self) -> MaterialKind {
-        self.warn_if_ineffective_without("clearcoat_roughness", "clearcoat");
         let names = ["color", "diffuse_transmission"];
         let [color, diffuse_transmission] = names.map(|name| self.color(name));
         let message = "`diffuse_transmission` is limited to 1 − `color`";
@@ -340,8 +352,6 @@ impl<'a> MaterialReader<'a> {
             specular: self.number("specular"),
             specular_color: self.color("specular_color"),
             transmission: self.number("transmission"),
-            clearcoat: self.number("clearcoat"),
-            clearcoat_roughness: self.number("clearcoat_roughness"),
         }
     }
 
@@ -386,6 +396,46 @@ impl<'a> MaterialReader<'a> {
         OpacitySource { value, cutoff }
     }
 
+    fn read_coat(&self) -> CoatSource {
+        for name in &COAT_KEYS[1..] {
+            self.warn_if_ineffective_without(name, "coat");
+        }
+        let coat = CoatSource {
+            weight: self.number("coat"),
+            roughness: self.number("coat_roughness"),
+            ior: self.constant("coat_ior"),
+            tint: self.color("coat_tint"),
+        };
+        coat.or_none()
+    }
+
+    /// Reads the coat of a principled material, which has two names for some keys.
+    fn read_coat_or_clearcoat(&self) -> CoatSource {
+        self.warn_if_ineffective_without("clearcoat_roughness", "clearcoat");
+        let (coat, clearcoat) = (self.read_coat(), ["clearcoat", "clearcoat_roughness"]);
+        let clear = CoatSource {
+            weight: self.number("clearcoat"),
+            roughness: self.number("clearcoat_roughness"),
+            ..CoatSource::NONE
+        };
+        if !COAT_KEYS.iter().any(|name| self.key(name).is_present()) {
+            return clear.or_none();
+        }
+        if let Some(span) = clearcoat.iter().find_map(|name| self.key(name).key_span()) {
+            let issue = Issue::error(span, "the coat of this material is specified twice")
+                .with_help("use the `coat` keys instead of the `clearcoat` keys");
+            self.table.context.report(issue);
+        }
+        coat
+    }
+
+    /// Reports coat keys on glass as errors.
+    fn reject_coat_keys(&self) {
+        for name in COAT_KEYS {
+            self.table.reject_key(name, &format!("glass cannot have `{name}`"), None);
+        }
+    }
+
     /// Reports opacity keys on solid glass as errors.
     fn reject_opacity_keys(&self) {
         for name in ["opacity", "opacity_cutoff"] {
@@ -404,6 +454,9 @@ impl<'a> MaterialReader<'a> {
         }
     }
 }
+
+/// The keys of a coat, starting with its weight.
+const COAT_KEYS: [&str; 4] = ["coat", "coat_roughness", "coat_ior", "coat_tint"];
 
 /// Warning message for materials that violate energy conservation.
 pub(crate) const ENERGY_GAIN: &str = "this material reflects more light than it receives";

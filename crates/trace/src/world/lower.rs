@@ -14,14 +14,15 @@ use crate::materials::texture::{
     ColorOrTexture, Texture, TextureFilter, UvTransform, ValueScaleAndOffset, Wrap,
 };
 use crate::materials::{
-    Bsdf, Bump, Coated, Conductor, ConductorFresnel, Dielectric, Emission, EmissionCoat, Material, Mirror,
-    NonSpecular, NormalMap, NormalPerturbation, Opacity, Phong, Plastic, Principled, PrincipledInputs,
-    ReflectingSides, ScalarParameter, ThinDielectric, TranslucentPhong, UvSet,
+    Bsdf, Bump, Coat, CoatInputs, Coated, CoatedMaterial, Conductor, ConductorFresnel, Dielectric, Emission,
+    Material, Mirror, NonSpecular, NormalMap, NormalPerturbation, Opacity, Phong, Plastic, Principled,
+    PrincipledInputs, ReflectingSides, ScalarParameter, SpecularPart, ThinDielectric, TranslucentPhong,
+    UvSet,
 };
 use crate::math::{DVec3, Vec3};
 use crate::scene::description::{
-    self, ChannelSelector, ColorSource, FresnelSource, MaterialKind, NumberSource, PhongParameters,
-    PixelInterpretation, Scene, TextureRole,
+    self, ChannelSelector, CoatSource, ColorSource, FresnelSource, MaterialKind, NumberSource,
+    PhongParameters, PixelInterpretation, Scene, TextureRole,
 };
 
 /// Converts a material from the scene file.
@@ -47,8 +48,6 @@ pub fn lower_material(scene: &Scene, images: &Images, material: &description::Ma
             specular_color,
             transmission,
             diffuse_transmission,
-            clearcoat,
-            clearcoat_roughness,
         } => Bsdf::NonSpecular(NonSpecular::Principled(Box::new(Principled::new(PrincipledInputs {
             color: color(base),
             metallic: number(metallic),
@@ -58,8 +57,6 @@ pub fn lower_material(scene: &Scene, images: &Images, material: &description::Ma
             specular_color: color(specular_color),
             transmission: number(transmission),
             diffuse_transmission: color(diffuse_transmission),
-            clearcoat: number(clearcoat),
-            clearcoat_roughness: number(clearcoat_roughness),
         })))),
         MaterialKind::Glass { ior, tint, roughness, distribution } => {
             Bsdf::Dielectric(Dielectric::new(*ior, *tint).with_roughness(number(roughness), *distribution))
@@ -67,6 +64,11 @@ pub fn lower_material(scene: &Scene, images: &Images, material: &description::Ma
         MaterialKind::Pane { ior, tint } => {
             Bsdf::ThinDielectric(ThinDielectric { ior: *ior, tint: color(tint) })
         }
+    };
+    let coat = of.lower_coat(&material.coat, TextureRole::Roughness);
+    let bsdf = match coat {
+        Some(coat) => coated(coat, bsdf),
+        None => bsdf,
     };
     let emission = lower_emission(scene, images, material);
     let normal_map = material.normal_map.map(|map| NormalMap {
@@ -147,12 +149,60 @@ fn plastic(
     let is_smooth = roughness.as_untextured() == Some(0.0);
     let base = Plastic::new(diffuse, specular.clone(), roughness, ior, distribution);
     if is_smooth {
-        return Bsdf::Coated(Coated { specular, ior, base: NonSpecular::Plastic(base) });
+        let specular = SpecularPart::SmoothCoat { tint: specular, ior };
+        return Bsdf::Coated(Coated { specular, coat: None, base: NonSpecular::Plastic(base) });
     }
     Bsdf::NonSpecular(match distribution {
         MicrofacetDistribution::Ggx => NonSpecular::Plastic(base),
         MicrofacetDistribution::Beckmann => NonSpecular::BeckmannPlastic(base),
     })
+}
+
+/// A BSDF under a clear coat. Transparent materials have none.
+fn coated(coat: Coat, bsdf: Bsdf) -> Bsdf {
+    match bsdf {
+        Bsdf::NonSpecular(base) => Bsdf::NonSpecular(coated_lobes(coat, base)),
+        Bsdf::Coated(Coated { specular, coat: _, base }) => {
+            Bsdf::Coated(Coated { specular, base: coated_lobes(coat.clone(), base), coat: Some(coat) })
+        }
+        Bsdf::Mirror(mirror) => {
+            let black = ColorOrTexture::Constant(Vec3::ZERO);
+            let none = Phong { diffuse: black.clone(), specular: black, shininess: 1.0, ambient: None };
+            let base = coated_lobes(coat.clone(), NonSpecular::Phong(none));
+            Bsdf::Coated(Coated { specular: SpecularPart::Mirror(mirror), coat: Some(coat), base })
+        }
+        Bsdf::Dielectric(_) | Bsdf::ThinDielectric(_) => bsdf,
+    }
+}
+
+/// Non-specular lobes under a clear coat. Lobes that already have one keep it.
+fn coated_lobes(coat: Coat, base: NonSpecular) -> NonSpecular {
+    match base {
+        NonSpecular::Phong(base) => NonSpecular::CoatedPhong(Box::new(CoatedMaterial { coat, base })),
+        NonSpecular::TranslucentPhong(base) => {
+            NonSpecular::CoatedTranslucent(Box::new(CoatedMaterial { coat, base }))
+        }
+        NonSpecular::BeckmannConductor(base) => {
+            NonSpecular::CoatedBeckmannConductor(Box::new(CoatedMaterial { coat, base }))
+        }
+        NonSpecular::BeckmannPlastic(base) => {
+            NonSpecular::CoatedBeckmannPlastic(Box::new(CoatedMaterial { coat, base }))
+        }
+        NonSpecular::Conductor(base) | NonSpecular::BrushedConductor(base) => {
+            NonSpecular::CoatedConductor(Box::new(CoatedMaterial { coat, base }))
+        }
+        NonSpecular::Plastic(base) => NonSpecular::CoatedPlastic(Box::new(CoatedMaterial { coat, base })),
+        NonSpecular::Principled(base) => {
+            NonSpecular::CoatedPrincipled(Box::new(CoatedMaterial { coat, base: *base }))
+        }
+        NonSpecular::CoatedPhong(_)
+        | NonSpecular::CoatedTranslucent(_)
+        | NonSpecular::CoatedConductor(_)
+        | NonSpecular::CoatedBeckmannConductor(_)
+        | NonSpecular::CoatedPlastic(_)
+        | NonSpecular::CoatedBeckmannPlastic(_)
+        | NonSpecular::CoatedPrincipled(_) => base,
+    }
 }
 
 fn lower_fresnel(source: &FresnelSource, color: impl Fn(&ColorSource) -> ColorOrTexture) -> ConductorFresnel {
@@ -165,12 +215,9 @@ fn lower_fresnel(source: &FresnelSource, color: impl Fn(&ColorSource) -> ColorOr
 /// Emission of a material from the scene file.
 pub fn lower_emission(scene: &Scene, images: &Images, material: &description::Material) -> Emission {
     let (emission, of) = (&material.emission, MaterialParameterConverter { scene, images, material });
-    let coat = material.emitter_coat_weight_and_roughness().and_then(|numbers| {
-        let [weight, roughness] = numbers.map(|number| of.lower_number(&number, TextureRole::EmissionCoat));
-        EmissionCoat::new(weight, roughness).map(Arc::new)
-    });
+    let coat = material.emitter_coat().and_then(|coat| of.lower_coat(coat, TextureRole::EmissionCoat));
     let texture = emission.texture.map(|index| of.texture(index, TextureRole::Emission));
-    Emission { scale: emission.scale, texture, sides: emission.sides, coat }
+    Emission { scale: emission.scale, texture, sides: emission.sides, coat: coat.map(Arc::new) }
 }
 
 /// Index of refraction and transmittance per unit length of a mesh file's glass, or `None` for other
@@ -309,7 +356,7 @@ fn file_principled(images: &Images, own: &FileMaterial, physical: &PhysicalMater
         let texture = texture.as_ref().and_then(|texture| file_texture(images, texture, FILE_NUMBER));
         texture.map_or(ScalarParameter::Constant(constant), ScalarParameter::Texture)
     };
-    NonSpecular::Principled(Box::new(Principled::new(PrincipledInputs {
+    let base = NonSpecular::Principled(Box::new(Principled::new(PrincipledInputs {
         color: file_material_color_parameter(
             images,
             own,
@@ -323,9 +370,17 @@ fn file_principled(images: &Images, own: &FileMaterial, physical: &PhysicalMater
         specular_color: ColorOrTexture::Constant(Vec3::ONE),
         transmission: ScalarParameter::Constant(0.0),
         diffuse_transmission: ColorOrTexture::Constant(Vec3::ZERO),
-        clearcoat: ScalarParameter::Constant(physical.clearcoat),
-        clearcoat_roughness: ScalarParameter::Constant(physical.clearcoat_roughness),
-    })))
+    })));
+    let coat = Coat::new(CoatInputs {
+        weight: ScalarParameter::Constant(physical.clearcoat),
+        roughness: ScalarParameter::Constant(physical.clearcoat_roughness),
+        ior: FileMaterial::DEFAULT_IOR,
+        tint: ColorOrTexture::Constant(Vec3::ONE),
+    });
+    match coat {
+        Some(coat) => coated_lobes(coat, base),
+        None => base,
+    }
 }
 
 /// Material for triangles to which the mesh file does not assign a material.
@@ -360,6 +415,20 @@ impl MaterialParameterConverter<'_> {
             // The choice of color role does not matter because all of them use textures in the same way.
             ColorSource::Texture(index) => ColorOrTexture::Texture(self.texture(*index, TextureRole::Facets)),
         }
+    }
+
+    /// Converts a coat, or returns `None` if there is none. `role` is the role of its numbers.
+    fn lower_coat(self, source: &CoatSource, role: fn(ChannelSelector) -> TextureRole) -> Option<Coat> {
+        let CoatSource { weight, roughness, ior, tint } = source;
+        source
+            .exists()
+            .then(|| CoatInputs {
+                weight: self.lower_number(weight, role),
+                roughness: self.lower_number(roughness, role),
+                ior: *ior,
+                tint: self.lower_color(tint),
+            })
+            .and_then(Coat::new)
     }
 
     /// Converts a number to a scalar parameter, which uses the texture's luminance if the scene does not

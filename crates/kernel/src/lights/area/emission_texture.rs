@@ -9,7 +9,7 @@ use std::sync::Arc;
 use crate::geometry::triangle::barycentric_weights_at_point;
 use crate::geometry::{RayF64, Shape};
 use crate::materials::texture::Texture;
-use crate::materials::{EmissionCoat, Footprint, Opacity, SecondUvPoint, TexturePoint};
+use crate::materials::{Coat, Footprint, Opacity, SecondUvPoint, TexturePoint};
 use crate::math::{DVec2, DVec3, Vec2, Vec3};
 
 /// A factor on a light's radiance that varies with position and direction.
@@ -17,7 +17,7 @@ use crate::math::{DVec2, DVec3, Vec2, Vec3};
 pub struct EmissionModulation {
     texture: Option<Arc<Texture>>,
     opacity: Option<Opacity>,
-    coat: Option<Arc<EmissionCoat>>,
+    coat: Option<Arc<Coat>>,
     chart: UvMapping,
 }
 
@@ -53,7 +53,7 @@ impl EmissionModulation {
     pub fn new_with_coat(
         texture: Option<&Arc<Texture>>,
         opacity: Option<&Opacity>,
-        coat: Option<&Arc<EmissionCoat>>,
+        coat: Option<&Arc<Coat>>,
         chart: UvMapping,
     ) -> Option<Self> {
         let is_any = texture.is_some() || opacity.is_some() || coat.is_some();
@@ -106,8 +106,8 @@ impl EmissionModulation {
     }
 
     /// The clear coat's transmittance for a ray in a given direction.
-    pub fn coat_transmittance(&self, point: Vec3, primitive: u32, direction: Vec3) -> f32 {
-        let Some(coat) = &self.coat else { return 1.0 };
+    pub fn coat_transmittance(&self, point: Vec3, primitive: u32, direction: Vec3) -> Vec3 {
+        let Some(coat) = &self.coat else { return Vec3::ONE };
         let (point, direction) = (point.as_dvec3(), direction.as_dvec3());
         let at = self.chart.texture_point(point, primitive);
         // At a shape's edge, the probe ray may miss the shape because of rounding.

@@ -275,7 +275,7 @@ impl PhotonEmitter {
                 let left = |texture: &EmissionModulation| {
                     texture.coat_transmittance(place.point, place.primitive, -direction)
                 };
-                let flux = place.flux * light.texture.as_deref().map_or(1.0, left);
+                let flux = place.flux * light.texture.as_deref().map_or(Vec3::ONE, left);
                 Some(PhotonSample { start, direction, flux, ratio })
             }
         }

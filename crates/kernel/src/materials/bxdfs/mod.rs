@@ -1,5 +1,6 @@
 //! The table of non-specular BSDFs, and enums over all of them for materials, points, and packets.
 
+pub mod coated;
 pub mod conductor;
 #[cfg(test)]
 mod lobe_tests;
@@ -12,10 +13,11 @@ pub mod rough_dielectric;
 pub mod translucent;
 mod transmission;
 
+pub use coated::CoatedMaterial;
 pub use conductor::{Conductor, ConductorFresnel};
 pub use phong::Phong;
 pub use plastic::Plastic;
-pub use principled::{EmissionCoat, Principled, PrincipledInputs};
+pub use principled::{Principled, PrincipledInputs};
 pub use rough_dielectric::RoughDielectricPoint;
 pub use translucent::TranslucentPhong;
 
@@ -31,6 +33,7 @@ use crate::materials::lookup::{MaterialTextureCollector, PointLookup, WhiteLooku
 use crate::materials::texture::{ColorOrTexture, Texture};
 use crate::math::Vec3;
 use crate::math::lanes::{F32x16, Mask, Simd, Vec3x16};
+use coated::CoatedBxdf;
 use conductor::ConductorBxdf;
 use phong::PhongBxdf;
 use plastic::PlasticBxdf;
@@ -405,6 +408,20 @@ kinds! {
     BeckmannPlastic(Plastic, PlasticBxdf<true>, kept: Box<BxdfPacket<PlasticBxdf<true>>>),
     /// A material with the parameters of glTF.
     Principled(Box<Principled>, PrincipledBxdf<false>, kept: Box<BxdfPacket<PrincipledBxdf<false>>>),
+    /// Phong under a clear coat.
+    CoatedPhong(Box<CoatedMaterial<Phong>>, CoatedBxdf<PhongBxdf>, kept: Box<BxdfPacket<CoatedBxdf<PhongBxdf>>>),
+    /// Translucent Phong under a clear coat.
+    CoatedTranslucent(Box<CoatedMaterial<TranslucentPhong>>, CoatedBxdf<TranslucentBxdf<false>>, kept: Box<BxdfPacket<CoatedBxdf<TranslucentBxdf<false>>>>),
+    /// A conductor under a clear coat, brushed or not.
+    CoatedConductor(Box<CoatedMaterial<Conductor>>, CoatedBxdf<ConductorBxdf<true, false>>, kept: Box<BxdfPacket<CoatedBxdf<ConductorBxdf<true, false>>>>),
+    /// A conductor with the Beckmann distribution under a clear coat.
+    CoatedBeckmannConductor(Box<CoatedMaterial<Conductor>>, CoatedBxdf<ConductorBxdf<true, true>>, kept: Box<BxdfPacket<CoatedBxdf<ConductorBxdf<true, true>>>>),
+    /// Plastic under a clear coat.
+    CoatedPlastic(Box<CoatedMaterial<Plastic>>, CoatedBxdf<PlasticBxdf<false>>, kept: Box<BxdfPacket<CoatedBxdf<PlasticBxdf<false>>>>),
+    /// Plastic with the Beckmann distribution under a clear coat.
+    CoatedBeckmannPlastic(Box<CoatedMaterial<Plastic>>, CoatedBxdf<PlasticBxdf<true>>, kept: Box<BxdfPacket<CoatedBxdf<PlasticBxdf<true>>>>),
+    /// A material with the parameters of glTF under a clear coat.
+    CoatedPrincipled(Box<CoatedMaterial<Principled>>, CoatedBxdf<PrincipledBxdf<false>>, kept: Box<BxdfPacket<CoatedBxdf<PrincipledBxdf<false>>>>),
     }
     parts {
     /// Transmission through a translucent Phong surface.
@@ -419,6 +436,10 @@ kinds! {
     BeckmannTransmission(DielectricBxdf<true, true>),
     /// Transmission through a principled material.
     PrincipledTransmission(PrincipledBxdf<true>),
+    /// Transmission through translucent Phong under a clear coat.
+    CoatedPhongTransmission(CoatedBxdf<TranslucentBxdf<true>>),
+    /// Transmission through a principled material under a clear coat.
+    CoatedPrincipledTransmission(CoatedBxdf<PrincipledBxdf<true>>),
     }
 }
 

@@ -12,6 +12,12 @@ impl BxdfPoint {
             Self::DielectricReflection(glass) | Self::BeckmannReflection(glass) => Some(glass.transmission()),
             Self::Principled(point) => point.transmits().then_some(Self::PrincipledTransmission(*point)),
             Self::TranslucentPhong(point) => point.transmits().then_some(Self::PhongTransmission(*point)),
+            Self::CoatedPrincipled(point) => {
+                point.base.transmits().then_some(Self::CoatedPrincipledTransmission(*point))
+            }
+            Self::CoatedTranslucent(point) => {
+                point.base.transmits().then_some(Self::CoatedPhongTransmission(*point))
+            }
             Self::Phong(_)
             | Self::PhongTransmission(_)
             | Self::Conductor(_)
@@ -21,7 +27,14 @@ impl BxdfPoint {
             | Self::BeckmannPlastic(_)
             | Self::DielectricTransmission(_)
             | Self::BeckmannTransmission(_)
-            | Self::PrincipledTransmission(_) => None,
+            | Self::PrincipledTransmission(_)
+            | Self::CoatedPhong(_)
+            | Self::CoatedConductor(_)
+            | Self::CoatedBeckmannConductor(_)
+            | Self::CoatedPlastic(_)
+            | Self::CoatedBeckmannPlastic(_)
+            | Self::CoatedPhongTransmission(_)
+            | Self::CoatedPrincipledTransmission(_) => None,
         }
     }
 }
@@ -58,7 +71,16 @@ impl BsdfPacket {
             | Self::Plastic(_)
             | Self::BeckmannPlastic(_)
             | Self::Principled(_)
-            | Self::PrincipledTransmission(_) => None,
+            | Self::PrincipledTransmission(_)
+            | Self::CoatedPhong(_)
+            | Self::CoatedTranslucent(_)
+            | Self::CoatedConductor(_)
+            | Self::CoatedBeckmannConductor(_)
+            | Self::CoatedPlastic(_)
+            | Self::CoatedBeckmannPlastic(_)
+            | Self::CoatedPrincipled(_)
+            | Self::CoatedPhongTransmission(_)
+            | Self::CoatedPrincipledTransmission(_) => None,
         }
     }
 }

@@ -12,7 +12,7 @@ use crate::integrators::transport::packet::PacketHits;
 use crate::integrators::transport::packet_source::PacketSource;
 use crate::integrators::transport::ray::PathRay;
 use crate::integrators::transport::tile::TileContext;
-use crate::integrators::transport::vertex::SurfaceVertex;
+use crate::integrators::transport::vertex::{SpecularLobe, SurfaceVertex};
 use crate::integrators::transport::walk::{
     DirectOrCoincidentHit, Interaction, Interface, NullInteraction, PathStepper, walk_to_interaction,
 };
@@ -177,8 +177,8 @@ impl CameraWavefront<'_, '_> {
         self.roulette_and_push_reflected(reflected_path(path, vertex, &shading, reflectance));
     }
 
-    /// Splits a path at a smooth coat, or randomly chooses the coat or the base. The probability of choosing
-    /// the coat is its Fresnel reflectance.
+    /// Splits a path at a surface with a δ lobe and non-specular lobes, or randomly chooses the δ lobe or the
+    /// others.
     pub(super) fn shade_coated(
         &mut self,
         path: &PathRay,
@@ -187,22 +187,23 @@ impl CameraWavefront<'_, '_> {
         far: &InteriorList,
     ) {
         let shading = vertex.perturbed_and_smooth_normals(self.counters);
-        let fresnel = vertex.coat_reflectance(coated, &shading);
-        let weaker = fresnel.min(1.0 - fresnel) * path.throughput.abs().max_element();
+        let is_colored = self.accumulator.aov.applies_surface_colors();
+        let lobe = vertex.specular_lobe(coated, &shading, is_colored, self.counters);
+        let SpecularLobe { probability, .. } = lobe;
+        let weaker = probability.min(1.0 - probability) * path.throughput.abs().max_element();
         let splits = self.tile.behavior.splits && path.state.only_specular_before;
         let both = weaker >= MIN_SPLIT && splits;
-        let is_coat = !both && self.tile.chooses_reflection(path, fresnel);
-        if both || is_coat {
-            let lookups = &mut self.counters.texture_lookups;
+        let is_specular = !both && self.tile.chooses_reflection(path, probability);
+        if both || is_specular {
             let specular =
-                coated.specular_tint(&vertex.texture_point, lookups) * if both { fresnel } else { 1.0 };
+                vertex.specular_weight(coated, &lobe, self.counters) * if both { probability } else { 1.0 };
             if specular != Vec3::ZERO {
                 self.roulette_and_push_reflected(reflected_path(path, vertex, &shading, specular));
             }
         }
-        if !is_coat {
+        if !is_specular {
             // Divide by the probability of choosing the base.
-            let by_chance = if both { 1.0 } else { 1.0 / (1.0 - fresnel) };
+            let by_chance = if both { 1.0 } else { 1.0 / (1.0 - probability) };
             let mut state = path.state;
             state.roulette_throughput *= by_chance;
             let path = PathRay { throughput: path.throughput * by_chance, state, ..*path };

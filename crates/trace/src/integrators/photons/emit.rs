@@ -23,7 +23,7 @@ use crate::integrators::transport::packet_source::PacketSource;
 use crate::integrators::transport::ray::{PathHistory, PathRay};
 use crate::integrators::transport::scatter::{BounceContinuation, BsdfSampler};
 use crate::integrators::transport::tile::TileContext;
-use crate::integrators::transport::vertex::{ShadingVertex, SurfaceVertex};
+use crate::integrators::transport::vertex::{ShadingVertex, SpecularLobe, SurfaceVertex};
 use crate::integrators::transport::walk::{
     DirectOrCoincidentHit, Interaction, Interface, MAX_PASSED_SURFACES, NullInteraction, PathStepper,
     opacity_at, walk_to_interaction,
@@ -324,7 +324,7 @@ impl PhotonWavefront<'_> {
                 self.store_and_scatter_at_rough(path, vertex, rough, (far, Some(1.0)));
             }
             Bsdf::Coated(coated) => {
-                self.store_and_reflect_at_coat(path, vertex, coated, (far, lacks_photons));
+                self.store_and_reflect_at_coated(path, vertex, coated, (far, lacks_photons));
             }
             Bsdf::Mirror(mirror) if self.may_scatter() => {
                 let shading = vertex.perturbed_and_smooth_normals(&mut self.counters);
@@ -336,10 +336,10 @@ impl PhotonWavefront<'_> {
         }
     }
 
-    /// Stores a photon at the base of a smooth coat and reflects it from the coat. Caustic photons are
-    /// reflected with a probability equal to the coat's Fresnel reflectance, and otherwise scattered at the
-    /// base. Other photons never scatter at the base, so all of them are reflected.
-    fn store_and_reflect_at_coat(
+    /// Stores a photon at a surface with a δ lobe and non-specular lobes, and reflects it in the δ lobe.
+    /// Caustic photons are randomly reflected or scattered by the other lobes. Other photons never scatter in
+    /// those lobes, so all of them are reflected.
+    fn store_and_reflect_at_coated(
         &mut self,
         path: &PathRay,
         vertex: &SurfaceVertex<'_>,
@@ -347,16 +347,18 @@ impl PhotonWavefront<'_> {
         (far, lacks_photons): (&InteriorList, bool),
     ) {
         let shading = vertex.perturbed_and_smooth_normals(&mut self.counters);
-        let fresnel = vertex.coat_reflectance(coated, &shading);
+        let lobe = vertex.specular_lobe(coated, &shading, true, &mut self.counters);
+        let SpecularLobe { probability, .. } = lobe;
         let chooses = path.state.only_specular_before && !lacks_photons;
-        let is_reflected = !chooses || self.tracing.tile.chooses_reflection(path, fresnel);
+        let is_reflected = !chooses || self.tracing.tile.chooses_reflection(path, probability);
         if !lacks_photons {
-            let by_chance = (!is_reflected).then(|| 1.0 / (1.0 - fresnel));
+            let by_chance = (!is_reflected).then(|| 1.0 / (1.0 - probability));
             self.store_and_scatter_at_rough(path, vertex, &coated.base, (far, by_chance));
         }
         if is_reflected && self.may_scatter() {
-            let specular = coated.specular_tint(&vertex.texture_point, &mut self.counters.texture_lookups);
-            let ray = reflected_path(path, vertex, &shading, specular * if chooses { 1.0 } else { fresnel });
+            let specular = vertex.specular_weight(coated, &lobe, &mut self.counters);
+            let part = if chooses { 1.0 } else { probability };
+            let ray = reflected_path(path, vertex, &shading, specular * part);
             self.queue_specular_photon(path, vertex, (shading.normal, 1.0), ray);
         }
     }

@@ -9,7 +9,9 @@ use super::tile::TileContext;
 use crate::geometry::ray::offset_origin;
 use crate::geometry::{Ray, SurfacePoint, SurfaceRequest};
 use crate::integrators::RayCounters;
-use crate::materials::{BxdfPoint, Coated, Footprint, Material, Mirror, TexturePoint, ThinDielectric};
+use crate::materials::{
+    BxdfPoint, Coated, Footprint, Material, Mirror, SpecularPart, TexturePoint, ThinDielectric,
+};
 use crate::math::Vec3;
 use crate::scene::description::ShadowMode;
 use crate::world::{Hit, OffsetPoints};
@@ -241,9 +243,29 @@ impl<'a> SurfaceVertex<'a> {
         }
     }
 
-    /// Fresnel reflectance of a smooth coat at this vertex, using the shading normal.
-    pub fn coat_reflectance(&self, coated: &Coated, shading: &PerturbedAndSmoothNormals) -> f32 {
-        coated.fresnel(shading.normal.dot(self.wo).abs().min(1.0))
+    /// The δ lobe of a surface that also has non-specular lobes, using the shading normal. Mirrors are
+    /// treated as white unless `is_colored` is true.
+    pub fn specular_lobe(
+        &self,
+        coated: &Coated,
+        shading: &PerturbedAndSmoothNormals,
+        is_colored: bool,
+        counters: &mut RayCounters,
+    ) -> SpecularLobe {
+        let cosine = shading.normal.dot(self.wo).abs().min(1.0);
+        let mirror = match &coated.specular {
+            SpecularPart::Mirror(mirror) => self.mirror_reflectance(mirror, shading, is_colored, counters),
+            SpecularPart::SmoothCoat { .. } => Vec3::ONE,
+        };
+        let lookups = &mut counters.texture_lookups;
+        let probability = coated.specular_probability(cosine, mirror, &self.texture_point, lookups);
+        SpecularLobe { cosine, mirror, probability }
+    }
+
+    /// Reflectance of the δ lobe, divided by its probability.
+    pub fn specular_weight(&self, coated: &Coated, lobe: &SpecularLobe, counters: &mut RayCounters) -> Vec3 {
+        let &SpecularLobe { cosine, mirror, probability: _ } = lobe;
+        coated.specular_weight(cosine, mirror, &self.texture_point, &mut counters.texture_lookups)
     }
 
     /// ∂p/∂u, or zero on a mesh without texture coordinates, where u is not defined.
@@ -320,6 +342,14 @@ pub fn lift_significance_and_t_max(on_facet: Vec3, to: Vec3, normal: Vec3, error
 
 /// Minimum lift, in units of the point's error. Below it, the point on the facet is used.
 const MIN_LIFT: f32 = 8.0;
+
+/// The δ lobe of a surface that also has non-specular lobes, for one view direction.
+pub struct SpecularLobe {
+    cosine: f32,
+    mirror: Vec3,
+    /// Probability of choosing the δ lobe.
+    pub probability: f32,
+}
 
 /// Geometry of a vertex at which light is sampled and the path may scatter, on a surface or elsewhere.
 pub struct ScatteringGeometry {

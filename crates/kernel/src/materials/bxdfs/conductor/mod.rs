@@ -138,6 +138,11 @@ impl BxdfParameters for ConductorPoint {
     fn tinted(self, color: Vec3) -> Self {
         Self { fresnel: self.fresnel.tinted(color), ..self }
     }
+
+    #[inline(always)]
+    fn reflectances_under_coat(&self) -> [Vec3; 2] {
+        [Vec3::ZERO, self.fresnel.reflectance(1.0)]
+    }
 }
 
 #[cfg(test)]

@@ -121,6 +121,16 @@ impl Bxdf for PhongBxdf {
     }
 
     #[inline(always)]
+    fn narrow_share(&self, _: &PhongViewTerms) -> f32 {
+        self.albedos[1] / (self.albedos[0] + self.albedos[1]).max(f32::MIN_POSITIVE)
+    }
+
+    #[inline(always)]
+    fn albedo_estimate(&self, _: &PhongViewTerms) -> f32 {
+        self.albedos[0] + self.albedos[1]
+    }
+
+    #[inline(always)]
     fn narrow_lobe(&self, view: &PhongViewTerms) -> Option<NarrowLobe> {
         // The normal is not used here.
         let lobes = self.lobes(view, SampledLobes { lobes: LobesToSample::All, normal: Vec3::Z });

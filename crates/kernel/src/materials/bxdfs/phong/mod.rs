@@ -86,6 +86,11 @@ impl BxdfParameters for PhongBsdf {
     fn tinted(self, color: Vec3) -> Self {
         Self { diffuse: self.diffuse * color, ambient: self.ambient * color, ..self }
     }
+
+    #[inline(always)]
+    fn reflectances_under_coat(&self) -> [Vec3; 2] {
+        [self.diffuse, self.specular]
+    }
 }
 
 impl PhongBsdf {

@@ -7,14 +7,9 @@ use crate::materials::bsdf::{LobesToSample, NarrowLobe};
 use crate::materials::bxdf::{
     Bxdf, BxdfFlags, LobeValue, SampledLobes, ShadingGeometry, choose_vec3_by_bool,
 };
-use crate::materials::fresnel::dielectric_from_outside;
-use crate::materials::lobe_albedo::{TERMS, evaluate_albedo_fit};
-use crate::materials::microfacet::{
-    MicrofacetDistribution, SmithTerms, UnnormalizedHalfVector, sample_reflection,
-};
+use crate::materials::coat::{CoatLayer, nonnegative_cosine};
 use crate::materials::phong::lobes::direction_about_axis;
 use crate::math::Vec3;
-use crate::math::frame::Frame;
 use glimt_base::soa;
 
 soa! {
@@ -24,14 +19,12 @@ soa! {
         base: Vec3 = Vec3::ZERO,
         /// [`PlasticPoint::specular`].
         specular: Vec3 = Vec3::ZERO,
-        /// [`PlasticPoint::ior`].
-        ior: f32 = 1.5,
-        /// [`PlasticPoint::alpha`].
-        alpha: f32 = 1.0,
-        /// Polynomial terms of the coat's albedo.
-        terms: [f32; TERMS] = [0.0; TERMS],
+        /// The coat. Its α is 1 if it is smooth.
+        coat: CoatLayer<true, BECKMANN> = CoatLayer::default(),
         /// Mean albedo of the coat.
         mean: f32 = 0.0,
+        /// [`PlasticPoint::alpha`].
+        alpha: f32 = 1.0,
     }
 }
 
@@ -53,14 +46,12 @@ soa! {
 const SMOOTH: BxdfFlags = BxdfFlags(1 << BxdfFlags::FIRST_OWN);
 
 impl<const BECKMANN: bool> PlasticBxdf<BECKMANN> {
-    const DISTRIBUTION: MicrofacetDistribution = MicrofacetDistribution::beckmann_if(BECKMANN);
-
     /// Albedo of the coat at a cosine ≥ 0.
     #[inline(always)]
     fn coat_albedo(&self, cosine: f32, any: BxdfFlags) -> f32 {
-        let rough = evaluate_albedo_fit(cosine, |number| self.terms[number]);
+        let rough = self.coat.albedo(cosine);
         if any.contains(SMOOTH) {
-            let smooth = dielectric_from_outside(cosine, self.ior);
+            let smooth = self.coat.fresnel(cosine);
             if self.alpha == 0.0 { smooth } else { rough }
         } else {
             rough
@@ -71,28 +62,8 @@ impl<const BECKMANN: bool> PlasticBxdf<BECKMANN> {
     #[inline(always)]
     fn two_way_coat_transmittance(&self, view: &PlasticViewTerms, wi: Vec3, any: BxdfFlags) -> f32 {
         let cosine = view.normal.dot(wi);
-        let is_ahead = cosine > 0.0;
-        let entering = 1.0 - self.coat_albedo(if is_ahead { cosine } else { 0.0 }, any);
-        if is_ahead { view.transmittance * entering } else { 0.0 }
-    }
-
-    /// Smith terms for the directions to the viewer and to the light.
-    #[inline(always)]
-    fn view_and_light_smith_terms(&self, view: &PlasticViewTerms, wi: Vec3) -> [SmithTerms; 2] {
-        [
-            SmithTerms::isotropic(Self::DISTRIBUTION, view.normal, view.wo, self.alpha),
-            SmithTerms::isotropic(Self::DISTRIBUTION, view.normal, wi, self.alpha),
-        ]
-    }
-
-    /// The coat's D for a direction, and the reflectance of the coat's facets.
-    #[inline(always)]
-    fn distribution_and_fresnel(&self, view: &PlasticViewTerms, wi: Vec3) -> [f32; 2] {
-        let half = UnnormalizedHalfVector::from_reflection(view.normal, view.wo, wi);
-        let alpha = if self.alpha > 0.0 { self.alpha } else { 1.0 };
-        let distribution = half.isotropic_d(Self::DISTRIBUTION, alpha);
-        let fresnel = dielectric_from_outside(half.cosine_to_either_direction(), self.ior);
-        [if self.alpha > 0.0 { distribution } else { 0.0 }, fresnel]
+        let entering = 1.0 - self.coat_albedo(nonnegative_cosine(cosine), any);
+        if cosine > 0.0 { view.transmittance * entering } else { 0.0 }
     }
 }
 
@@ -105,7 +76,9 @@ impl<const BECKMANN: bool> Bxdf for PlasticBxdf<BECKMANN> {
     #[inline(always)]
     fn new(point: &PlasticPoint, _: Vec3) -> Self {
         let &PlasticPoint { base, specular, ior, alpha, albedo, .. } = point;
-        Self { base, specular, ior, alpha, terms: albedo.terms, mean: albedo.mean }
+        let width = if alpha > 0.0 { alpha } else { 1.0 };
+        let coat = CoatLayer { weight: 1.0, alpha: width, ior, terms: albedo.terms, ..CoatLayer::default() };
+        Self { base, specular, coat, mean: albedo.mean, alpha }
     }
 
     #[inline(always)]
@@ -126,8 +99,7 @@ impl<const BECKMANN: bool> Bxdf for PlasticBxdf<BECKMANN> {
     #[inline(always)]
     fn compute_view_terms(&self, directions: &ShadingGeometry, any: BxdfFlags) -> PlasticViewTerms {
         let &ShadingGeometry { normal, wo, .. } = directions;
-        let cosine = normal.dot(wo);
-        let albedo = self.coat_albedo(if cosine > 0.0 { cosine } else { 0.0 }, any);
+        let albedo = self.coat_albedo(nonnegative_cosine(normal.dot(wo)), any);
         let diffuse = (1.0 - albedo) * (1.0 - self.mean) * PI * self.base.max_element();
         let coat = albedo * self.specular.max_element();
         let coat_share = coat / (coat + diffuse).max(f32::MIN_POSITIVE);
@@ -143,9 +115,7 @@ impl<const BECKMANN: bool> Bxdf for PlasticBxdf<BECKMANN> {
 
     #[inline(always)]
     fn narrow_lobe_value(&self, view: &PlasticViewTerms, wi: Vec3, _: BxdfFlags) -> LobeValue {
-        let [distribution, fresnel] = self.distribution_and_fresnel(view, wi);
-        let [eye, light] = self.view_and_light_smith_terms(view, wi);
-        let coat = fresnel * eye.torrance_sparrow_without_fresnel(&light, distribution);
+        let coat = self.coat.lobe_f(view.normal, view.wo, wi);
         LobeValue { f: self.specular * coat, max: self.specular.max_element() * coat, shape: 0.0 }
     }
 
@@ -160,13 +130,10 @@ impl<const BECKMANN: bool> Bxdf for PlasticBxdf<BECKMANN> {
     ) -> f32 {
         let mut coat = 0.0;
         if any.contains(BxdfFlags::NARROW) {
-            let [distribution, _] = self.distribution_and_fresnel(view, wi);
-            let [eye, light] = self.view_and_light_smith_terms(view, wi);
-            let pdf = eye.reflection_pdf(distribution);
-            coat = if light.is_direction_above_surface() { pdf } else { 0.0 };
+            let pdf = self.coat.pdf(view.normal, view.wo, wi);
+            coat = if self.alpha > 0.0 { pdf } else { 0.0 };
         }
-        let cosine = normal.dot(wi);
-        let diffuse = if cosine > 0.0 { cosine * FRAC_1_PI } else { 0.0 };
+        let diffuse = nonnegative_cosine(normal.dot(wi)) * FRAC_1_PI;
         match lobes {
             LobesToSample::All => view.coat_share * coat + (1.0 - view.coat_share) * diffuse,
             LobesToSample::Narrow => coat,
@@ -185,8 +152,7 @@ impl<const BECKMANN: bool> Bxdf for PlasticBxdf<BECKMANN> {
         if !any.contains(BxdfFlags::NARROW) {
             return diffuse;
         }
-        let frame = Frame::from_normal(view.normal);
-        let coat = sample_reflection(Self::DISTRIBUTION, &frame, view.wo, [self.alpha; 2], u);
+        let coat = self.coat.sample(view.normal, view.wo, u);
         let is_coat = match lobes {
             LobesToSample::All => choice < view.coat_share,
             LobesToSample::Narrow => self.alpha > 0.0,
@@ -195,10 +161,20 @@ impl<const BECKMANN: bool> Bxdf for PlasticBxdf<BECKMANN> {
     }
 
     #[inline(always)]
+    fn narrow_share(&self, view: &PlasticViewTerms) -> f32 {
+        view.coat_share
+    }
+
+    #[inline(always)]
+    fn albedo_estimate(&self, view: &PlasticViewTerms) -> f32 {
+        let diffuse = view.transmittance * (1.0 - self.mean) * PI * self.base.max_element();
+        (1.0 - view.transmittance) * self.specular.max_element() + diffuse
+    }
+
+    #[inline(always)]
     fn narrow_lobe(&self, view: &PlasticViewTerms) -> Option<NarrowLobe> {
-        let cosine = view.normal.dot(view.wo);
-        let reflectance = dielectric_from_outside(cosine, self.ior) * self.specular.max_element();
+        let reflectance = self.coat.fresnel(view.normal.dot(view.wo)) * self.specular.max_element();
         let wide = view.transmittance * self.base.max_element() * (1.0 - self.mean);
-        Some(NarrowLobe::from_microfacets(view.normal, view.wo, self.alpha, reflectance, wide))
+        Some(NarrowLobe::from_microfacets(view.normal, view.wo, self.coat.alpha, reflectance, wide))
     }
 }

@@ -2,11 +2,12 @@
 
 use std::f32::consts::FRAC_1_PI;
 
-use super::{COAT_REFLECTANCE, PrincipledPoint};
+use super::PrincipledPoint;
 use crate::materials::bsdf::{LobesToSample, NarrowLobe};
 use crate::materials::bxdf::{
     Bxdf, BxdfFlags, LobeValue, SampledLobes, ShadingGeometry, choose_vec3_by_bool,
 };
+use crate::materials::coat::nonnegative_cosine;
 use crate::materials::fresnel::schlick_weight;
 use crate::materials::lobe_albedo::{TERMS, evaluate_albedo_fit};
 use crate::materials::microfacet::{
@@ -41,12 +42,6 @@ soa! {
         terms: [f32; TERMS] = [0.0; TERMS],
         /// Terms of [`PrincipledPoint::albedo`] at grazing angles.
         grazing_terms: [f32; TERMS] = [0.0; TERMS],
-        /// [`PrincipledPoint::coat`].
-        coat: f32 = 0.0,
-        /// [`PrincipledPoint::coat_alpha`].
-        coat_alpha: f32 = 1.0,
-        /// Terms of [`PrincipledPoint::coat_albedo`].
-        coat_terms: [f32; TERMS] = [0.0; TERMS],
     }
 }
 
@@ -60,12 +55,8 @@ soa! {
         /// Fraction of the light that passes through the specular lobe between the diffuse lobe and the
         /// viewer.
         transmittance: Vec3 = Vec3::ONE,
-        /// Fraction of the light that the coat transmits toward the viewer.
-        coat_transmittance: f32 = 1.0,
         /// Probability of choosing the specular lobe.
         specular_share: f32 = 1.0,
-        /// Probability of choosing the coat's lobe.
-        coat_share: f32 = 0.0,
         /// Probability of choosing specular transmission.
         transmission_share: f32 = 0.0,
         /// Probability of choosing diffuse transmission.
@@ -76,25 +67,10 @@ soa! {
 /// The distribution of all facets.
 const GGX: MicrofacetDistribution = MicrofacetDistribution::Ggx;
 
-/// Set if there is a clear coat.
-const COATED: BxdfFlags = BxdfFlags(1 << BxdfFlags::FIRST_OWN);
-
 /// Set if the material transmits light.
-const TRANSMITS: BxdfFlags = BxdfFlags(2 << BxdfFlags::FIRST_OWN);
-
-/// Limits a cosine to at least 0.
-#[inline(always)]
-fn nonnegative_cosine(cosine: f32) -> f32 {
-    if cosine > 0.0 { cosine } else { 0.0 }
-}
+const TRANSMITS: BxdfFlags = BxdfFlags(1 << BxdfFlags::FIRST_OWN);
 
 impl<const THROUGH: bool> PrincipledBxdf<THROUGH> {
-    /// Albedo of the coat at a cosine ≥ 0, including the coat's weight.
-    #[inline(always)]
-    fn coat_albedo(&self, cosine: f32) -> f32 {
-        self.coat * evaluate_albedo_fit(cosine, |number| self.coat_terms[number])
-    }
-
     /// Albedos of the specular lobe at a cosine ≥ 0, per unit of reflectance at normal incidence and at
     /// grazing angles.
     #[inline(always)]
@@ -117,61 +93,11 @@ impl<const THROUGH: bool> PrincipledBxdf<THROUGH> {
 
     /// Smith terms for the directions to the viewer and to the light.
     #[inline(always)]
-    fn view_and_light_smith_terms(view: &PrincipledViewTerms, wi: Vec3, alpha: f32) -> [SmithTerms; 2] {
+    fn view_and_light_smith_terms(&self, view: &PrincipledViewTerms, wi: Vec3) -> [SmithTerms; 2] {
         [
-            SmithTerms::isotropic(GGX, view.normal, view.wo, alpha),
-            SmithTerms::isotropic(GGX, view.normal, wi, alpha),
+            SmithTerms::isotropic(GGX, view.normal, view.wo, self.alpha),
+            SmithTerms::isotropic(GGX, view.normal, wi, self.alpha),
         ]
-    }
-
-    /// The coat's transmittance in both directions.
-    #[inline(always)]
-    fn two_way_coat_transmittance(&self, view: &PrincipledViewTerms, cosine: f32, any: BxdfFlags) -> f32 {
-        if any.contains(COATED) {
-            view.coat_transmittance * (1.0 - self.coat_albedo(nonnegative_cosine(cosine)))
-        } else {
-            1.0
-        }
-    }
-
-    /// f of the specular lobe and of the coat, or 0 for light from behind.
-    #[inline(always)]
-    fn specular_and_coat_f(&self, view: &PrincipledViewTerms, wi: Vec3, any: BxdfFlags) -> Vec3 {
-        let half = UnnormalizedHalfVector::from_reflection(view.normal, view.wo, wi);
-        let weight = schlick_weight(half.cosine_to_either_direction());
-        let [eye, light] = Self::view_and_light_smith_terms(view, wi, self.alpha);
-        let reflectance = self.facets + (Vec3::splat(self.grazing) - self.facets) * weight;
-        let white = eye.torrance_sparrow_without_fresnel(&light, half.isotropic_d(GGX, self.alpha));
-        let specular = reflectance * (white * self.two_way_coat_transmittance(view, light.cosine, any));
-        if any.contains(COATED) {
-            let [eye, light] = Self::view_and_light_smith_terms(view, wi, self.coat_alpha);
-            let white = eye.torrance_sparrow_without_fresnel(&light, half.isotropic_d(GGX, self.coat_alpha));
-            let reflectance = COAT_REFLECTANCE + (1.0 - COAT_REFLECTANCE) * weight;
-            specular + Vec3::splat(self.coat * reflectance * white)
-        } else {
-            specular
-        }
-    }
-
-    /// f of transmitted light.
-    #[inline(always)]
-    fn transmission_f(&self, view: &PrincipledViewTerms, wi: Vec3, any: BxdfFlags) -> Vec3 {
-        let half = UnnormalizedHalfVector::from_reflection(view.normal, view.wo, wi);
-        let weight = schlick_weight(half.cosine_to_either_direction());
-        let [eye, light] = Self::view_and_light_smith_terms(view, wi, self.alpha);
-        let (facets, grazing) = (self.dielectric, self.dielectric_grazing);
-        let rest = Vec3::ONE - (facets + (Vec3::splat(grazing) - facets) * weight);
-        let white = eye.torrance_sparrow_without_fresnel(&light, half.isotropic_d(GGX, self.alpha));
-        self.transmission * rest * (white * self.two_way_coat_transmittance(view, light.cosine, any))
-    }
-
-    /// Pdf of a direction that is sampled from a lobe with this α.
-    #[inline(always)]
-    fn microfacet_lobe_pdf(view: &PrincipledViewTerms, wi: Vec3, alpha: f32) -> f32 {
-        let half = UnnormalizedHalfVector::from_reflection(view.normal, view.wo, wi);
-        let [eye, light] = Self::view_and_light_smith_terms(view, wi, alpha);
-        let pdf = eye.reflection_pdf(half.isotropic_d(GGX, alpha));
-        if light.is_direction_above_surface() { pdf } else { 0.0 }
     }
 }
 
@@ -184,7 +110,7 @@ impl<const THROUGH: bool> Bxdf for PrincipledBxdf<THROUGH> {
 
     #[inline(always)]
     fn new(point: &PrincipledPoint, _: Vec3) -> Self {
-        let &PrincipledPoint { facets, grazing, transmission, alpha, coat, coat_alpha, .. } = point;
+        let &PrincipledPoint { facets, grazing, transmission, alpha, .. } = point;
         Self {
             base: if THROUGH { point.transmitted_base } else { point.base },
             diffuse_albedos: point.diffuse_albedos,
@@ -196,16 +122,12 @@ impl<const THROUGH: bool> Bxdf for PrincipledBxdf<THROUGH> {
             alpha,
             terms: point.albedo.normal.terms,
             grazing_terms: point.albedo.grazing.terms,
-            coat,
-            coat_alpha,
-            coat_terms: point.coat_albedo.terms,
         }
     }
 
     #[inline(always)]
     fn flags(&self) -> BxdfFlags {
-        let of_lobes = BxdfFlags::WIDE.when(self.base != Vec3::ZERO).union(COATED.when(self.coat > 0.0));
-        of_lobes.union(TRANSMITS.when(self.transmission != Vec3::ZERO))
+        BxdfFlags::WIDE.when(self.base != Vec3::ZERO).union(TRANSMITS.when(self.transmission != Vec3::ZERO))
     }
 
     #[inline(always)]
@@ -214,7 +136,6 @@ impl<const THROUGH: bool> Bxdf for PrincipledBxdf<THROUGH> {
         let mirrored = wo - normal * (2.0 * normal.dot(wo));
         let wo = if THROUGH { mirrored } else { wo };
         let cosine = nonnegative_cosine(normal.dot(wo));
-        let coat = self.coat_albedo(cosine);
         let transmittance = self.one_minus_specular_albedo(cosine);
         let [at_normal, at_grazing] = self.specular_albedos(cosine);
         let specular = self.facets.max_element() * at_normal + self.grazing * at_grazing;
@@ -228,36 +149,37 @@ impl<const THROUGH: bool> Bxdf for PrincipledBxdf<THROUGH> {
             transmission = nonnegative_cosine((self.transmission * rest).max_element());
             all += transmission;
         }
-        let below = (1.0 - coat) / all.max(f32::MIN_POSITIVE);
+        let by_albedo = 1.0 / all.max(f32::MIN_POSITIVE);
         PrincipledViewTerms {
             normal,
             wo,
             transmittance,
-            coat_transmittance: 1.0 - coat,
-            specular_share: below * specular,
-            // The coat is chosen with a probability that is at least its fraction of the light. The remaining
-            // probability is split among the other lobes.
-            coat_share: if self.coat > 0.0 { 1.0 - below * all } else { 0.0 },
-            transmission_share: below * transmission,
-            diffuse_transmission_share: below * through,
+            specular_share: by_albedo * specular,
+            transmission_share: by_albedo * transmission,
+            diffuse_transmission_share: by_albedo * through,
         }
     }
 
     #[inline(always)]
-    fn wide_lobe_value(&self, view: &PrincipledViewTerms, wi: Vec3, any: BxdfFlags) -> LobeValue {
+    fn wide_lobe_value(&self, view: &PrincipledViewTerms, wi: Vec3, _: BxdfFlags) -> LobeValue {
         let cosine = view.normal.dot(wi);
         let transmittance = self.one_minus_specular_albedo(nonnegative_cosine(cosine)) * view.transmittance;
-        let coat = if cosine > 0.0 { self.two_way_coat_transmittance(view, cosine, any) } else { 0.0 };
-        let f = self.base * transmittance * coat;
+        let f = self.base * transmittance * if cosine > 0.0 { 1.0 } else { 0.0 };
         LobeValue { f, max: f.max_element(), shape: 0.0 }
     }
 
     #[inline(always)]
-    fn narrow_lobe_value(&self, view: &PrincipledViewTerms, wi: Vec3, any: BxdfFlags) -> LobeValue {
+    fn narrow_lobe_value(&self, view: &PrincipledViewTerms, wi: Vec3, _: BxdfFlags) -> LobeValue {
+        let half = UnnormalizedHalfVector::from_reflection(view.normal, view.wo, wi);
+        let weight = schlick_weight(half.cosine_to_either_direction());
+        let [eye, light] = self.view_and_light_smith_terms(view, wi);
+        let white = eye.torrance_sparrow_without_fresnel(&light, half.isotropic_d(GGX, self.alpha));
         let f = if THROUGH {
-            self.transmission_f(view, wi, any)
+            let (facets, grazing) = (self.dielectric, self.dielectric_grazing);
+            let rest = Vec3::ONE - (facets + (Vec3::splat(grazing) - facets) * weight);
+            self.transmission * rest * white
         } else {
-            self.specular_and_coat_f(view, wi, any)
+            (self.facets + (Vec3::splat(self.grazing) - self.facets) * weight) * white
         };
         LobeValue { f, max: f.max_element(), shape: 0.0 }
     }
@@ -269,27 +191,22 @@ impl<const THROUGH: bool> Bxdf for PrincipledBxdf<THROUGH> {
         SampledLobes { lobes, normal }: SampledLobes,
         wi: Vec3,
         _: f32,
-        any: BxdfFlags,
+        _: BxdfFlags,
     ) -> f32 {
-        let PrincipledViewTerms { specular_share, coat_share, transmission_share, .. } = *view;
-        let specular = Self::microfacet_lobe_pdf(view, wi, self.alpha);
-        let coat =
-            if any.contains(COATED) { Self::microfacet_lobe_pdf(view, wi, self.coat_alpha) } else { 0.0 };
-        let narrow = if THROUGH {
-            transmission_share * specular
-        } else {
-            specular_share * specular + coat_share * coat
-        };
+        let PrincipledViewTerms { specular_share, transmission_share, .. } = *view;
+        let half = UnnormalizedHalfVector::from_reflection(view.normal, view.wo, wi);
+        let [eye, light] = self.view_and_light_smith_terms(view, wi);
+        let pdf = eye.reflection_pdf(half.isotropic_d(GGX, self.alpha));
+        let specular = if light.is_direction_above_surface() { pdf } else { 0.0 };
+        let narrow = if THROUGH { transmission_share * specular } else { specular_share * specular };
         match lobes {
             LobesToSample::All => {
                 let through = view.diffuse_transmission_share;
-                let reflected = 1.0 - specular_share - coat_share - transmission_share - through;
+                let reflected = 1.0 - specular_share - transmission_share - through;
                 let diffuse_share = if THROUGH { through } else { reflected };
                 narrow + diffuse_share * nonnegative_cosine(normal.dot(wi)) * FRAC_1_PI
             }
-            LobesToSample::Narrow => {
-                narrow / (specular_share + coat_share + transmission_share).max(f32::MIN_POSITIVE)
-            }
+            LobesToSample::Narrow => narrow / (specular_share + transmission_share).max(f32::MIN_POSITIVE),
         }
     }
 
@@ -301,27 +218,38 @@ impl<const THROUGH: bool> Bxdf for PrincipledBxdf<THROUGH> {
         [choice, u @ ..]: [f32; 3],
         _: BxdfFlags,
     ) -> Vec3 {
-        let PrincipledViewTerms { specular_share, coat_share, transmission_share, .. } = *view;
+        let PrincipledViewTerms { specular_share, transmission_share, .. } = *view;
         let choice = match lobes {
             LobesToSample::All => choice,
-            LobesToSample::Narrow => choice * (specular_share + coat_share + transmission_share),
+            LobesToSample::Narrow => choice * (specular_share + transmission_share),
         };
-        // The lobes are in this order: coat, specular, diffuse, diffuse transmission, specular transmission.
+        // The lobes are in this order: specular, diffuse, diffuse transmission, specular transmission.
         let (last, diffuse_through) = match lobes {
             LobesToSample::All => (1.0 - transmission_share, view.diffuse_transmission_share),
-            LobesToSample::Narrow => (specular_share + coat_share, 0.0),
+            LobesToSample::Narrow => (specular_share, 0.0),
         };
         let is_through = (transmission_share + diffuse_through > 0.0) & (choice >= last - diffuse_through);
-        let alpha = if (choice < coat_share) & !THROUGH { self.coat_alpha } else { self.alpha };
         let is_wide = match lobes {
             LobesToSample::All if THROUGH => choice < last,
-            LobesToSample::All => choice >= coat_share + specular_share,
+            LobesToSample::All => choice >= specular_share,
             LobesToSample::Narrow => false,
         };
-        let narrow = sample_reflection(GGX, &Frame::from_normal(view.normal), view.wo, [alpha; 2], u);
+        let narrow = sample_reflection(GGX, &Frame::from_normal(view.normal), view.wo, [self.alpha; 2], u);
         let wide = direction_about_axis(normal, u[0].sqrt(), (1.0 - u[0]).sqrt(), u[1]);
         // If the path continues on the other side, this direction is not used.
         choose_vec3_by_bool(is_through == THROUGH, choose_vec3_by_bool(is_wide, wide, narrow), -view.normal)
+    }
+
+    #[inline(always)]
+    fn narrow_share(&self, view: &PrincipledViewTerms) -> f32 {
+        view.specular_share + view.transmission_share
+    }
+
+    #[inline(always)]
+    fn albedo_estimate(&self, _: &PrincipledViewTerms) -> f32 {
+        let [diffuse, through] = self.diffuse_albedos;
+        let reflects = (diffuse + through > 0.0) | (self.grazing > 0.0) | (self.facets != Vec3::ZERO);
+        if reflects | (self.transmission != Vec3::ZERO) { 1.0 } else { 0.0 }
     }
 
     #[inline(always)]

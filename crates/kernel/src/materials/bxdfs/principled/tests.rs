@@ -11,11 +11,11 @@ use crate::materials::bxdfs::reference_tests::reference_microfacet_brdf;
 use crate::materials::lookup::WhiteLookup;
 use crate::math::DVec3;
 
-fn principled(color: Vec3, metallic: f32, alpha: f32, coat: [f32; 2]) -> Principled {
-    transmitting(color, metallic, 0.0, alpha, coat)
+fn principled(color: Vec3, metallic: f32, alpha: f32) -> Principled {
+    transmitting(color, metallic, 0.0, alpha)
 }
 
-fn transmitting(color: Vec3, metallic: f32, transmission: f32, alpha: f32, coat: [f32; 2]) -> Principled {
+fn transmitting(color: Vec3, metallic: f32, transmission: f32, alpha: f32) -> Principled {
     let number = ScalarParameter::Constant;
     Principled::new(PrincipledInputs {
         color: ColorOrTexture::Constant(color),
@@ -26,14 +26,12 @@ fn transmitting(color: Vec3, metallic: f32, transmission: f32, alpha: f32, coat:
         specular_color: ColorOrTexture::Constant(Vec3::new(1.0, 0.6, 1.2)),
         transmission: number(transmission),
         diffuse_transmission: ColorOrTexture::Constant(Vec3::ZERO),
-        clearcoat: number(coat[0]),
-        clearcoat_roughness: number(coat[1].sqrt()),
     })
 }
 
 /// A material with diffuse transmission.
-fn leaf(color: Vec3, metallic: f32, transmission: f32, alpha: f32, coat: [f32; 2]) -> Principled {
-    let Principled { inputs, .. } = transmitting(color, metallic, transmission, alpha, coat);
+fn leaf(color: Vec3, metallic: f32, transmission: f32, alpha: f32) -> Principled {
+    let Principled { inputs, .. } = transmitting(color, metallic, transmission, alpha);
     let diffuse_transmission = ColorOrTexture::Constant(Vec3::new(0.25, 1.0, 0.6));
     Principled::new(PrincipledInputs { diffuse_transmission, ..inputs })
 }
@@ -44,19 +42,14 @@ fn point(principled: &Principled) -> PrincipledPoint {
 
 const RED: Vec3 = Vec3::new(0.7, 0.1, 0.05);
 
-fn subjects() -> impl Iterator<Item = (f32, f32, [f32; 2])> {
-    ALPHAS.into_iter().flat_map(|alpha| {
-        // The coat has a different roughness, so samples from different lobes cannot be mistaken for each
-        // other.
-        [(0.0, [0.0, 0.0]), (0.4, [0.6, 0.7 * alpha]), (1.0, [0.0, 0.0])]
-            .map(|(metallic, coat)| (alpha, metallic, coat))
-    })
+fn subjects() -> impl Iterator<Item = (f32, f32)> {
+    ALPHAS.into_iter().flat_map(|alpha| [0.0, 0.4, 1.0].map(|metallic| (alpha, metallic)))
 }
 
 #[test]
 fn values_match_the_formulas_and_are_reciprocal() {
-    for (alpha, metallic, coat) in subjects() {
-        let point = point(&principled(RED, metallic, alpha, coat));
+    for (alpha, metallic) in subjects() {
+        let point = point(&principled(RED, metallic, alpha));
         // F0 = min(((ior − 1)/(ior + 1))²·specular_color, 1)·specular.
         let f0 = DVec3::new(1.0, 0.6, 1.2) * (0.6_f64 / 2.6).powi(2) * 0.8;
         let (color, m) = (RED.as_dvec3(), f64::from(metallic));
@@ -67,8 +60,6 @@ fn values_match_the_formulas_and_are_reciprocal() {
         };
         let mean = f0 * f64::from(point.albedo.normal.mean)
             + DVec3::splat(0.8 * f64::from(point.albedo.grazing.mean));
-        let c = f64::from(coat[0]);
-        let through = |cosine: f64| 1.0 - c * f64::from(point.coat_albedo.at_cosine(cosine as f32));
         check_values::<PrincipledBxdf<false>>(
             &format!("α {alpha}, metallic {metallic}"),
             &point,
@@ -83,10 +74,7 @@ fn values_match_the_formulas_and_are_reciprocal() {
                     * (DVec3::ONE - albedo(o.z))
                     * (DVec3::ONE - albedo(i.z))
                     / (DVec3::ONE - mean);
-                let clear = c
-                    * (0.04 + 0.96 * weight)
-                    * reference_microfacet_brdf(o, i, [f64::from(point.coat_alpha); 2]);
-                (specular + diffuse) * (through(o.z) * through(i.z)) + DVec3::splat(clear)
+                specular + diffuse
             },
         );
     }
@@ -95,9 +83,7 @@ fn values_match_the_formulas_and_are_reciprocal() {
 #[test]
 fn lanes_are_independent() {
     let points: Vec<PrincipledPoint> = subjects()
-        .flat_map(|(alpha, metallic, coat)| {
-            [RED, Vec3::ZERO].map(|color| principled(color, metallic, alpha, coat))
-        })
+        .flat_map(|(alpha, metallic)| [RED, Vec3::ZERO].map(|color| principled(color, metallic, alpha)))
         .map(|one| point(&one))
         .collect();
     check_lane_independence::<PrincipledBxdf<false>>(&points);
@@ -105,9 +91,9 @@ fn lanes_are_independent() {
 
 #[test]
 fn samples_follow_the_pdf() {
-    for (alpha, metallic, coat) in subjects() {
+    for (alpha, metallic) in subjects() {
         for cosine in COSINES {
-            let point = point(&principled(RED, metallic, alpha, coat));
+            let point = point(&principled(RED, metallic, alpha));
             let subject = TestSurface::<PrincipledBxdf<false>>::new(
                 &point,
                 [alpha; 2],
@@ -124,10 +110,10 @@ fn samples_follow_the_pdf() {
 
 #[test]
 fn albedos_match_quadrature_and_stay_below_1() {
-    for (alpha, metallic, coat) in subjects() {
+    for (alpha, metallic) in subjects() {
         for cosine in COSINES {
             for color in [RED, Vec3::ONE] {
-                let point = point(&principled(color, metallic, alpha, coat));
+                let point = point(&principled(color, metallic, alpha));
                 let subject = TestSurface::<PrincipledBxdf<false>>::new(
                     &point,
                     [alpha; 2],
@@ -157,8 +143,6 @@ fn fully_reflective_facets_have_bounded_weights() {
             specular_color: ColorOrTexture::Constant(Vec3::splat(25.0)),
             transmission: number(0.0),
             diffuse_transmission: ColorOrTexture::Constant(Vec3::ZERO),
-            clearcoat: number(0.0),
-            clearcoat_roughness: number(0.0),
         });
         for cosine in [0.01, 0.05, 0.3, 1.0] {
             let subject = TestSurface::<PrincipledBxdf<false>>::new(
@@ -178,13 +162,11 @@ const TRANSMISSIONS: [f32; 2] = [0.6, 1.0];
 
 #[test]
 fn transmission_is_the_mirrored_specular_lobe() {
-    for ((alpha, metallic, coat), transmission) in
+    for ((alpha, metallic), transmission) in
         subjects().filter(|one| one.1 < 1.0).flat_map(|one| TRANSMISSIONS.map(|part| (one, part)))
     {
-        let point = point(&transmitting(RED, metallic, transmission, alpha, coat));
+        let point = point(&transmitting(RED, metallic, transmission, alpha));
         let f0 = DVec3::new(1.0, 0.6, 1.2) * (0.6_f64 / 2.6).powi(2) * 0.8;
-        let c = f64::from(coat[0]);
-        let left = |cosine: f64| 1.0 - c * f64::from(point.coat_albedo.at_cosine(cosine as f32));
         let (part, m) = (f64::from(transmission), f64::from(metallic));
         for (number, cosine) in COSINES.into_iter().enumerate() {
             let to_eye = spherical_direction(cosine, 0.7).as_vec3().as_dvec3();
@@ -204,7 +186,7 @@ fn transmission_is_the_mirrored_specular_lobe() {
                 let (o, i) = (to_eye.normalize(), DVec3::new(light.x, light.y, -light.z).normalize());
                 let weight = (1.0 - (o + i).length() * 0.5).powi(5);
                 let fresnel = f0 + (DVec3::splat(0.8) - f0) * weight;
-                let lobe = reference_microfacet_brdf(o, i, [f64::from(alpha); 2]) * left(o.z) * left(i.z);
+                let lobe = reference_microfacet_brdf(o, i, [f64::from(alpha); 2]);
                 let exact = RED.as_dvec3() * (DVec3::ONE - fresnel) * (part * (1.0 - m) * lobe);
                 let found = subject.evaluate_bsdf(LobesToSample::All, &[light])[0].0;
                 let error = if alpha >= 0.05 { 3e-5 } else { 5e-3 };
@@ -217,8 +199,8 @@ fn transmission_is_the_mirrored_specular_lobe() {
 
 #[test]
 fn diffuse_transmission_is_coupled_like_the_diffuse_lobe() {
-    for (alpha, metallic, coat) in subjects().filter(|one| one.1 < 1.0) {
-        let point = point(&leaf(RED, metallic, 0.3, alpha, coat));
+    for (alpha, metallic) in subjects().filter(|one| one.1 < 1.0) {
+        let point = point(&leaf(RED, metallic, 0.3, alpha));
         let at = spherical_direction(0.6, 0.7);
         let behind = TestSurface::<PrincipledBxdf<true>>::with_light_path(
             &point,
@@ -243,9 +225,9 @@ fn diffuse_transmission_is_coupled_like_the_diffuse_lobe() {
 
 #[test]
 fn diffuse_transmission_samples_follow_the_pdf() {
-    for (alpha, metallic, coat) in subjects().filter(|one| one.0 >= 0.2 && one.1 < 1.0) {
+    for (alpha, metallic) in subjects().filter(|one| one.0 >= 0.2 && one.1 < 1.0) {
         for cosine in COSINES {
-            let point = point(&leaf(RED, metallic, 0.3, alpha, coat));
+            let point = point(&leaf(RED, metallic, 0.3, alpha));
             let at = spherical_direction(cosine, 0.7);
             let behind = TestSurface::<PrincipledBxdf<true>>::with_light_path(
                 &point,
@@ -265,9 +247,9 @@ fn diffuse_transmission_samples_follow_the_pdf() {
 
 #[test]
 fn samples_on_both_sides_follow_the_pdf() {
-    for (alpha, metallic, coat) in subjects().filter(|one| one.1 < 1.0) {
+    for (alpha, metallic) in subjects().filter(|one| one.1 < 1.0) {
         for cosine in COSINES {
-            let point = point(&transmitting(RED, metallic, 0.6, alpha, coat));
+            let point = point(&transmitting(RED, metallic, 0.6, alpha));
             let at = spherical_direction(cosine, 0.7);
             let behind = TestSurface::<PrincipledBxdf<true>>::with_light_path(
                 &point,
@@ -290,14 +272,14 @@ fn samples_on_both_sides_follow_the_pdf() {
 #[test]
 fn two_sided_albedos_match_quadrature() {
     let materials = subjects().flat_map(|one| {
-        let (alpha, metallic, coat) = one;
-        let clear = |part| transmitting(Vec3::ONE, metallic, part, alpha, coat);
-        let leaf = leaf(RED, metallic, 0.3, alpha, coat);
+        let (alpha, metallic) = one;
+        let clear = |part| transmitting(Vec3::ONE, metallic, part, alpha);
+        let leaf = leaf(RED, metallic, 0.3, alpha);
         [(one, "clear", clear(0.6)), (one, "clear", clear(1.0)), (one, "leaf", leaf)]
     });
     // Leaves need many samples, because they have four lobes.
     let is_tested = |alpha: f32, name: &str| name != "leaf" || [0.02, 0.2, 1.0].contains(&alpha);
-    for ((alpha, metallic, _), transmission, material) in
+    for ((alpha, metallic), transmission, material) in
         materials.filter(|((alpha, ..), name, _)| is_tested(*alpha, name))
     {
         for cosine in COSINES {
@@ -326,12 +308,9 @@ fn two_sided_albedos_match_quadrature() {
 #[test]
 fn transmissive_lanes_are_independent() {
     let points: Vec<PrincipledPoint> = subjects()
-        .flat_map(|(alpha, metallic, coat)| {
-            let leaf = leaf(RED, metallic, 0.3, alpha, coat);
-            [0.0, 0.6, 1.0]
-                .map(|part| transmitting(RED, metallic, part, alpha, coat))
-                .into_iter()
-                .chain([leaf])
+        .flat_map(|(alpha, metallic)| {
+            let leaf = leaf(RED, metallic, 0.3, alpha);
+            [0.0, 0.6, 1.0].map(|part| transmitting(RED, metallic, part, alpha)).into_iter().chain([leaf])
         })
         .map(|one| point(&one))
         .collect();

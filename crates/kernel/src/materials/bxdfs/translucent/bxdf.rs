@@ -1,6 +1,6 @@
 //! The lobes of a translucent Phong surface.
 
-use std::f32::consts::FRAC_1_PI;
+use std::f32::consts::{FRAC_1_PI, PI};
 
 use super::TranslucentPoint;
 use crate::materials::bsdf::{LobesToSample, NarrowLobe};
@@ -105,6 +105,16 @@ impl<const THROUGH: bool> Bxdf for TranslucentBxdf<THROUGH> {
         };
         // If the path continues on the other side, this direction is not used.
         choose_vec3_by_bool((choice >= reflected_share) == THROUGH, wi, -from.normal)
+    }
+
+    #[inline(always)]
+    fn narrow_share(&self, view: &PhongViewTerms) -> f32 {
+        (1.0 - self.transmission_share) * self.reflection.narrow_share(view)
+    }
+
+    #[inline(always)]
+    fn albedo_estimate(&self, view: &PhongViewTerms) -> f32 {
+        self.reflection.albedo_estimate(view) + self.transmission.max_element() * PI
     }
 
     #[inline(always)]

@@ -89,6 +89,11 @@ impl BxdfParameters for TranslucentPoint {
     fn tinted(self, color: Vec3) -> Self {
         Self { reflection: self.reflection.tinted(color), ..self }
     }
+
+    #[inline(always)]
+    fn reflectances_under_coat(&self) -> [Vec3; 2] {
+        self.reflection.reflectances_under_coat()
+    }
 }
 
 #[cfg(test)]

@@ -39,7 +39,7 @@ pub(super) const NORMAL: Vec3 = Vec3::Y;
 pub(super) const WO: Vec3 = Vec3::new(-0.6, 0.8, 0.0);
 
 /// Materials with every kind of reflective BSDF.
-pub(super) const MATERIALS: [(&str, &str); 7] = [
+pub(super) const MATERIALS: [(&str, &str); 8] = [
     ("diffuse", "diffuse = 0.7"),
     ("phong", PHONG),
     ("metal", "type = 'metal'\ncolor = 0.8\nroughness = 0.6"),
@@ -48,6 +48,10 @@ pub(super) const MATERIALS: [(&str, &str); 7] = [
     (
         "principled",
         "type = 'principled'\ncolor = 0.6\nmetallic = 0.3\nroughness = 0.6\nclearcoat = 0.5\nclearcoat_roughness = 0.4",
+    ),
+    (
+        "coated phong",
+        "diffuse = 0.4\nspecular = 0.3\nshininess = 5\ncoat = 0.8\ncoat_roughness = 0.6\ncoat_tint = 0.7",
     ),
     ("rough glass", "type = 'glass'\nroughness = 0.7"),
 ];
