@@ -15,6 +15,24 @@ type ExpectedDiagnostic = (usize, usize, &'static str);
 const BROKEN: &[(&str, &[ExpectedDiagnostic])] = &[
     ("away", &[(15, 1, "warning: this light shines away from everything; all shapes are behind it")]),
     (
+        "blends",
+        &[
+            (14, 1, "[materials.lonely] needs `materials`; `materials` is missing"),
+            (16, 10, "`weight` must be between 0 and 1; found 2"),
+            (
+                20,
+                13,
+                "`materials` must be an array with the names of two materials; found an array of 3 values",
+            ),
+            (24, 23, r#"there is no material "pant"; did you mean "paint"?"#),
+            (29, 1, "a blend cannot have `emission`"),
+            (30, 1, "a blend cannot have `opacity`"),
+            (31, 1, "a blend cannot have `normal_map`"),
+            (35, 13, "solid glass cannot be blended"),
+            (43, 13, r#"the blend "egg" contains itself"#),
+        ],
+    ),
+    (
         "brackets",
         &[
             (2, 1, "[render] must be a table; found an array of tables"),

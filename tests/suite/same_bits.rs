@@ -176,6 +176,7 @@ leaf = { type = "principled", color = [0.2, 0.6, 0.2], opacity = { texture = "wa
 lacquer = { type = "principled", metallic = 0.5, clearcoat = 0.8, clearcoat_roughness = 0.1, normal_map = "waves" }
 varnish = { diffuse = [0.6, 0.3, 0.1], coat = { texture = "waves" }, coat_roughness = 0.2, coat_tint = [0.9, 0.7, 0.5] }
 chrome = { type = "mirror", coat = 0.5, coat_roughness = { texture = "waves" }, coat_tint = 0.5 }
+worn = { type = "blend", materials = ["varnish", "chrome"], weight = { texture = "waves" } }
 glass = { type = "glass", bump = "waves", bump_scale = 0.03 }
 pane = { type = "glass", thin = true, tint = [0.8, 0.9, 0.9] }
 lamp = { diffuse = 0, emission = [6, 5, 4], emission_sides = "both" }
@@ -232,13 +233,9 @@ center = [1.7, 0.5, 0]
 radius = 0.5
 material = "lacquer"
 [[sphere]]
-center = [-0.6, 1.5, -0.5]
+center = [0, 1.5, -0.5]
 radius = 0.5
-material = "varnish"
-[[sphere]]
-center = [0.6, 1.5, -0.5]
-radius = 0.5
-material = "chrome"
+material = "worn"
 [[sphere]]
 center = [0, 0.4, 1.2]
 radius = 0.4

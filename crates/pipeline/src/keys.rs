@@ -5,7 +5,7 @@ use crate::film::Rect;
 use crate::integrators::{PhotonSettings, RenderSettings};
 use crate::math::DVec3;
 use crate::plan::RenderPlan;
-use crate::scene::description::{Accel, Camera, Object, RenderOptions, Scene, Shape};
+use crate::scene::description::{Accel, Camera, Material, Object, RenderOptions, Scene, Shape};
 use crate::scene::fingerprint::{Fingerprint, FingerprintContext, FingerprintHasher};
 
 /// Returns the context for fingerprinting scene descriptions: the textures, meshes and orbiter that they
@@ -61,7 +61,7 @@ pub(crate) fn coplanar_lights_key(scene: &Scene, of: &FingerprintContext<'_>) ->
     let is_round = |object: &&Object| matches!(object.shape, Shape::Sphere { .. } | Shape::Torus { .. });
     for object in scene.objects.iter().filter(|object| !is_round(object)) {
         let material = object.material.map(|index| &scene.materials[index]);
-        let emission = material.filter(|material| material.emits()).map(|material| material.emission.sides);
+        let emission = material.filter(|material| material.emits()).map(Material::emission_sides);
         let is_glass = material.is_some_and(|material| material.kind.is_solid_glass());
         key.add_bool(object.material.is_some()).add_bool(is_glass).add_bool(emission.is_some());
         if let Some(sides) = emission {
@@ -143,6 +143,10 @@ fn light_descriptions_key(scene: &Scene, of: &FingerprintContext<'_>) -> Fingerp
                     .add(&material.emission, of)
                     .add(&material.opacity, of);
                 key.add(&material.emitter_coat().cloned(), of);
+                // A blend emits like its parts.
+                if !material.kind.parts().is_empty() {
+                    key.add(material, of);
+                }
             }
             // Materials from the mesh file may emit.
             None => {

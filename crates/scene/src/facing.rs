@@ -29,7 +29,7 @@ pub(super) fn lights_facing_away(
 ) -> Vec<Range<usize>> {
     let emits = |object: &Object| {
         let material = object.material.map(|index| &scene.materials[index]);
-        material.is_some_and(|material| material.emits() && material.emission.sides == EmissionSides::Front)
+        material.is_some_and(|material| material.emits() && material.emission_sides() == EmissionSides::Front)
     };
     let quad = |object: &Object| {
         let Shape::Quad { corner, u, v } = object.shape else { return None };

@@ -453,3 +453,31 @@ fn clearcoat_keys_are_coat_keys() {
     );
     assert_eq!(material("clearcoat = 0\nclearcoat_roughness = 0.2"), material("coat = 0\ncoat_tint = 0.5"));
 }
+
+#[test]
+fn blends_may_precede_their_parts() {
+    let scene = scene(
+        "[materials.outer]\ntype = 'blend'\nmaterials = ['inner', 'c']\n\
+         [materials.inner]\ntype = 'blend'\nmaterials = ['a', 'b']\nweight = 0.25\n\
+         [materials.a]\n[materials.b]\nemission = 1\nemission_sides = 'both'\n[materials.c]",
+    );
+    let names: Vec<_> = scene.materials[0].with_parts().iter().map(|part| part.name.clone()).collect();
+    assert_eq!(names, ["outer", "inner", "a", "b", "c"]);
+    let emitting: Vec<_> = scene.materials.iter().map(|material| material.emits()).collect();
+    assert_eq!(emitting, [true, true, false, true, false]);
+    assert_eq!(scene.materials[0].emission_sides(), EmissionSides::Both);
+}
+
+#[test]
+fn blends_have_at_most_64_parts() {
+    // Each blend contains the next one and one more material.
+    let chain = |length: usize| {
+        let link =
+            |i: usize| format!("[materials.b{i}]\ntype = 'blend'\nmaterials = ['b{}', 'b{length}']\n", i + 1);
+        (0..length).map(link).collect::<String>() + &format!("[materials.b{length}]\n")
+    };
+    assert_eq!(scene(&chain(63)).materials.len(), 64);
+    let message = r#"the blend "b0" combines more than 64 materials"#;
+    assert_eq!(messages(&chain(64)), [message]);
+    assert!(messages(&chain(20_000))[0].contains("more than 64 materials"));
+}

@@ -1,5 +1,6 @@
 //! Rendered values against closed forms, which are derived in comments.
 
+mod blends;
 mod bodies;
 mod bumps;
 mod camera;

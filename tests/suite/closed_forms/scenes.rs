@@ -392,6 +392,11 @@ pub fn coated(weight: f32, roughness: f32, material: Material) -> Material {
     Material { coat: CoatSource { weight, roughness, ..CoatSource::NONE }, ..material }
 }
 
+/// A blend of two materials. `weight` is the weight of the second one.
+pub fn blend(first: Material, second: Material, weight: NumberSource) -> Material {
+    plain(MaterialKind::Blend { weight, parts: Box::new([first, second]) })
+}
+
 pub fn phong(diffuse: f32, specular: f32, shininess: f32, emission: f32) -> Material {
     let gray = |x| ColorSource::Constant(Vec3::splat(x));
     let kind = MaterialKind::Phong(PhongParameters {
@@ -435,7 +440,8 @@ pub fn beckmann(mut material: Material) -> Material {
         MaterialKind::Phong(_)
         | MaterialKind::Mirror { .. }
         | MaterialKind::Pane { .. }
-        | MaterialKind::Principled { .. } => {}
+        | MaterialKind::Principled { .. }
+        | MaterialKind::Blend { .. } => {}
     }
     material
 }

@@ -23,7 +23,8 @@ fn leaf(mut material: Material, transmission: ColorSource) -> Material {
         | MaterialKind::Glass { .. }
         | MaterialKind::Pane { .. }
         | MaterialKind::Metal { .. }
-        | MaterialKind::Plastic { .. } => {}
+        | MaterialKind::Plastic { .. }
+        | MaterialKind::Blend { .. } => {}
     }
     material
 }

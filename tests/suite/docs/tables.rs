@@ -57,9 +57,11 @@ fn of_definition(info: &'static TableInfo) -> Vec<DefinedTable> {
     }
     let of_type = |kind: &'static TableTypeInfo| {
         let code = format!("type = \"{}\"", kind.name);
-        // Opacity applies only to surfaces, and coats only to opaque materials.
+        // Opacity applies only to surfaces, coats only to opaque materials, and blends have only their own
+        // keys.
         let is_refused = |key: &&KeyInfo| match kind.name {
             "glass" => key.name.starts_with("opacity") || key.name.starts_with("coat"),
+            "blend" => info.keys.iter().any(|common| common.name == key.name),
             _ => false,
         };
         let keys = info.keys_for_type(Some(kind)).filter(|key| !is_refused(key)).collect();
@@ -90,6 +92,7 @@ fn example(head: &str, key: &str) -> &'static str {
         "material" => "\"wall\"",
         "group" => "\"stool\"",
         "sun" => "[1, 1, 0]",
+        "materials" => "[\"wall\", \"wall\"]",
         "file" if head.starts_with("[[mesh]]") => "\"../assets/knot.obj\"",
         "file" => "\"../assets/textures/bricks.png\"",
         _ => "\"a key without an example\"",
@@ -322,7 +325,7 @@ fn reader_schema_and_explain_follow_definitions() {
 #[test]
 fn definition_has_every_key() {
     let tables = tables();
-    assert_eq!(tables.len(), 27);
+    assert_eq!(tables.len(), 28);
     for table in tables {
         let text = table.scene("", "zzz = 1");
         let outcome = parse(text.into(), &root().join("scenes/page.toml"));

@@ -24,6 +24,8 @@ pub enum Dimension {
     Fresnel,
     /// Stochastic transparency: whether the surface is opaque at this point.
     Opacity,
+    /// Choice among the materials of a blend.
+    Blend,
     /// Choice of the BSDF lobe to sample.
     Lobe,
     /// Direction within a lobe.
@@ -69,6 +71,7 @@ impl Dimension {
             Self::SpecularRoulette => u32::MAX - 13,
             Self::Gather => u32::MAX - 14,
             Self::Opacity => u32::MAX - 15,
+            Self::Blend => u32::MAX - 16,
             Self::Trial(number) => (1 << 31) + number,
         };
         mix_bits(mix_bits(path.wrapping_add(1)) ^ number.wrapping_mul(0x9e37_79b9))

@@ -140,7 +140,8 @@ fn key_value_completions(kind: ValueKind, outline: &[OutlineTable]) -> Vec<Descr
         | ValueKind::Numbers(..)
         | ValueKind::Scale(_)
         | ValueKind::Rotation
-        | ValueKind::InlineTable(_) => Vec::new(),
+        | ValueKind::InlineTable(_)
+        | ValueKind::MaterialPair => Vec::new(),
     }
 }
 

@@ -45,8 +45,9 @@ mod set;
 pub mod tree;
 
 pub use area::{
-    AreaLight, EmissionModulation, Emitter, EmittingTriangleSelection, MeshEmitter, Side, TriangleWithUvs,
-    UvMapping, back_area_light, front_area_light, see_through_shape_side_light,
+    AreaLight, BlendWeight, EmissionModulation, EmissionTerm, Emitter, EmittingTriangleSelection,
+    MeshEmitter, Side, TriangleWithUvs, UvMapping, back_area_light, front_area_light,
+    see_through_shape_side_light,
 };
 pub use light::{Light, LightFamily};
 pub use packet::{LightGeometryPacket, LightSamplePacket};

@@ -1,5 +1,6 @@
 //! Materials: reflection, transmission, and emission of surfaces.
 
+pub mod blend;
 pub mod bsdf;
 pub mod bxdf;
 pub mod bxdf_packet;
@@ -24,6 +25,7 @@ pub mod texels;
 pub mod texture;
 pub mod thin_dielectric;
 
+pub use blend::Blend;
 pub use bxdfs::*;
 pub use coat::{Coat, CoatInputs};
 pub use coated::{Coated, SpecularPart};
@@ -70,7 +72,7 @@ pub struct Material {
 }
 
 impl Material {
-    /// Whether a side of the surface scatters light.
+    /// Whether a side of the surface scatters light. The parts of a blend have their own sides.
     #[inline]
     pub fn scatters_on_side(&self, is_front: bool) -> bool {
         match self.sides {
@@ -79,21 +81,110 @@ impl Material {
         }
     }
 
+    /// Whether the surface, or any part of a blend, scatters light only on its front.
+    pub fn is_black_from_behind(&self) -> bool {
+        !self.scatters_on_side(false) || self.is_any_part(Self::is_black_from_behind)
+    }
+
     /// Whether any material property depends on texture coordinates or tangents.
     pub fn needs_uvs_or_tangents(&self) -> bool {
-        self.normal_perturbation.is_some() || self.bsdf.is_anisotropic() || !self.textures().is_empty()
+        self.normal_perturbation.is_some()
+            || self.bsdf.is_anisotropic()
+            || !self.textures().is_empty()
+            || self.is_any_part(Self::needs_uvs_or_tangents)
+    }
+
+    /// The parts of a blend, or `None` for other materials.
+    #[inline]
+    fn blend(&self) -> Option<&Blend> {
+        match &self.bsdf {
+            Bsdf::Blend(blend) => Some(blend),
+            Bsdf::NonSpecular(_)
+            | Bsdf::Mirror(_)
+            | Bsdf::Dielectric(_)
+            | Bsdf::ThinDielectric(_)
+            | Bsdf::Coated(_) => None,
+        }
+    }
+
+    /// Whether a property holds for any part of a blend.
+    fn is_any_part(&self, property: impl Fn(&Self) -> bool) -> bool {
+        self.blend().is_some_and(|blend| blend.parts.iter().any(property))
+    }
+
+    /// Chooses one of the materials of a blend with a random number in [0, 1). Other materials are their own
+    /// only choice. Counts texture lookups in `lookups`.
+    #[inline]
+    pub fn choose_part(&self, at: &TexturePoint, u: impl FnOnce() -> f32, lookups: &mut u64) -> &Self {
+        let Some(mut blend) = self.blend() else { return self };
+        let mut u = u();
+        loop {
+            let part = blend.choose(at, &mut u, lookups);
+            match part.blend() {
+                Some(nested) => blend = nested,
+                None => return part,
+            }
+        }
+    }
+
+    /// Whether the surface may emit light.
+    pub fn is_emissive(&self) -> bool {
+        self.emission.is_emissive() || self.is_any_part(Self::is_emissive)
+    }
+
+    /// Expected radiance that a side emits, in a direction at the given cosine to the normal: the radiance
+    /// times the opacity, averaged over the parts of a blend. Counts texture lookups in `lookups`.
+    pub fn expected_emission(
+        &self,
+        at: &TexturePoint,
+        is_front: bool,
+        cosine: f32,
+        lookups: &mut u64,
+    ) -> Vec3 {
+        if let Some(blend) = self.blend() {
+            return blend
+                .mean(at, lookups, |part, lookups| part.expected_emission(at, is_front, cosine, lookups));
+        }
+        if !self.emission.emits_on_side(is_front) {
+            return Vec3::ZERO;
+        }
+        let radiance = self.emission.radiance_of_emitting_side(at, cosine, lookups);
+        match &self.opacity {
+            Some(opacity) => radiance * opacity.evaluate(at, lookups),
+            None => radiance,
+        }
+    }
+
+    /// Probability that the surface exists at a point with a material for which `is_meant` is true. Counts
+    /// texture lookups in `lookups`.
+    pub fn presence(&self, at: &TexturePoint, is_meant: &dyn Fn(&Self) -> bool, lookups: &mut u64) -> f32 {
+        match self.blend() {
+            Some(blend) => {
+                let of_part =
+                    |part: &Self, lookups: &mut u64| Vec3::splat(part.presence(at, is_meant, lookups));
+                blend.mean(at, lookups, of_part).x
+            }
+            None if !is_meant(self) => 0.0,
+            None => self.opacity.as_ref().map_or(1.0, |opacity| opacity.evaluate(at, lookups)),
+        }
     }
 
     /// Whether light may pass through the surface undeflected, because the surface is a thin pane or is
     /// partially transparent.
     #[inline]
     pub fn has_null_interaction(&self) -> bool {
-        self.bsdf.as_thin_dielectric().is_some() || self.opacity.is_some()
+        self.bsdf.as_thin_dielectric().is_some()
+            || self.opacity.is_some()
+            || self.is_any_part(Self::has_null_interaction)
     }
 
     /// Fraction of the light that passes undeflected at a point, for an incident angle with the given cosine.
     /// `color` multiplies a pane's transmittance. Counts texture lookups in `lookups`.
     pub fn null_transmittance(&self, at: &TexturePoint, color: Vec3, cosine: f32, lookups: &mut u64) -> Vec3 {
+        if let Some(blend) = self.blend() {
+            return blend
+                .mean(at, lookups, |part, lookups| part.null_transmittance(at, color, cosine, lookups));
+        }
         let there = self.opacity.as_ref().map_or(1.0, |opacity| opacity.evaluate(at, lookups));
         let through = self.bsdf.as_thin_dielectric().map_or(Vec3::ZERO, |pane| {
             let tint = pane.tint.evaluate(at, lookups).min(Vec3::ONE);
@@ -115,6 +206,12 @@ impl Material {
             Bsdf::Coated(coated) => coated.specular_textures().chain(coated.base.textures()).collect(),
             Bsdf::Dielectric(glass) => glass.roughness.texture().into_iter().collect(),
             Bsdf::ThinDielectric(pane) => pane.tint.texture().into_iter().collect(),
+            Bsdf::Blend(blend) => blend
+                .weight
+                .texture()
+                .into_iter()
+                .chain(blend.parts.iter().flat_map(Self::textures))
+                .collect(),
         };
         textures.extend(&self.emission.texture);
         textures.extend(self.opacity.as_ref().and_then(|opacity| opacity.value.texture()));
@@ -136,6 +233,8 @@ pub enum Bsdf {
     ThinDielectric(ThinDielectric),
     /// A surface with a δ lobe and non-specular lobes.
     Coated(Coated),
+    /// A blend of two materials.
+    Blend(Box<Blend>),
 }
 
 impl Bsdf {
@@ -146,27 +245,35 @@ impl Bsdf {
             Self::NonSpecular(_) => false,
             Self::Dielectric(glass) => glass.is_smooth(),
             Self::Mirror(_) | Self::ThinDielectric(_) | Self::Coated(_) => true,
+            Self::Blend(blend) => blend.parts.iter().any(|part| part.bsdf.has_delta()),
         }
     }
 
     /// Whether the surface has non-δ lobes, which light sampling can reach.
     #[inline]
     pub fn has_non_delta_lobes(&self) -> bool {
-        self.non_specular_part().is_some()
+        match self {
+            Self::Blend(blend) => blend.parts.iter().any(|part| part.bsdf.has_non_delta_lobes()),
+            Self::NonSpecular(_)
+            | Self::Mirror(_)
+            | Self::Dielectric(_)
+            | Self::ThinDielectric(_)
+            | Self::Coated(_) => self.non_specular_part().is_some(),
+        }
     }
 
     /// Whether the lobes depend on the directions of the texture axes.
     #[inline]
     pub fn is_anisotropic(&self) -> bool {
-        self.non_specular_part().is_some_and(NonSpecular::is_anisotropic)
+        self.is_any_non_specular_part(NonSpecular::is_anisotropic)
     }
 
-    /// The non-δ lobes, or `None` if the surface has no such lobes.
+    /// The non-δ lobes, or `None` for blends and for surfaces without such lobes.
     #[inline]
     pub fn non_specular_part(&self) -> Option<&NonSpecular> {
         match self {
             Self::NonSpecular(rough) | Self::Coated(Coated { base: rough, .. }) => Some(rough),
-            Self::Mirror(_) | Self::Dielectric(_) | Self::ThinDielectric(_) => None,
+            Self::Mirror(_) | Self::Dielectric(_) | Self::ThinDielectric(_) | Self::Blend(_) => None,
         }
     }
 
@@ -175,7 +282,11 @@ impl Bsdf {
     pub fn as_non_specular(&self) -> Option<&NonSpecular> {
         match self {
             Self::NonSpecular(rough) => Some(rough),
-            Self::Mirror(_) | Self::Dielectric(_) | Self::ThinDielectric(_) | Self::Coated(_) => None,
+            Self::Mirror(_)
+            | Self::Dielectric(_)
+            | Self::ThinDielectric(_)
+            | Self::Coated(_)
+            | Self::Blend(_) => None,
         }
     }
 
@@ -184,7 +295,11 @@ impl Bsdf {
     pub fn as_thin_dielectric(&self) -> Option<&ThinDielectric> {
         match self {
             Self::ThinDielectric(pane) => Some(pane),
-            Self::NonSpecular(_) | Self::Mirror(_) | Self::Dielectric(_) | Self::Coated(_) => None,
+            Self::NonSpecular(_)
+            | Self::Mirror(_)
+            | Self::Dielectric(_)
+            | Self::Coated(_)
+            | Self::Blend(_) => None,
         }
     }
 
@@ -192,13 +307,29 @@ impl Bsdf {
     pub fn as_dielectric(&self) -> Option<&Dielectric> {
         match self {
             Self::Dielectric(glass) => Some(glass),
-            Self::NonSpecular(_) | Self::Mirror(_) | Self::Coated(_) | Self::ThinDielectric(_) => None,
+            Self::NonSpecular(_)
+            | Self::Mirror(_)
+            | Self::Coated(_)
+            | Self::ThinDielectric(_)
+            | Self::Blend(_) => None,
         }
     }
 
     /// Whether the surface also scatters light to the other side.
     pub fn is_transmissive(&self) -> bool {
-        self.non_specular_part().is_some_and(NonSpecular::is_transmissive)
+        self.is_any_non_specular_part(NonSpecular::is_transmissive)
+    }
+
+    /// Whether a property holds for the non-δ lobes of the surface, or of any part of a blend.
+    fn is_any_non_specular_part(&self, property: fn(&NonSpecular) -> bool) -> bool {
+        match self {
+            Self::Blend(blend) => blend.parts.iter().any(|part| part.bsdf.is_any_non_specular_part(property)),
+            Self::NonSpecular(_)
+            | Self::Mirror(_)
+            | Self::Dielectric(_)
+            | Self::ThinDielectric(_)
+            | Self::Coated(_) => self.non_specular_part().is_some_and(property),
+        }
     }
 
     /// The surface's main color. Counts texture lookups in `lookups`.
@@ -210,6 +341,7 @@ impl Bsdf {
             Self::Dielectric(glass) => glass.tint,
             Self::ThinDielectric(pane) => pane.tint.evaluate(at, lookups),
             Self::Coated(coated) => coated.albedo(at, lookups),
+            Self::Blend(blend) => blend.mean(at, lookups, |part, lookups| part.bsdf.albedo(at, lookups)),
         }
     }
 }

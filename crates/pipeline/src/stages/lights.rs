@@ -11,7 +11,7 @@ use crate::control::{CancelToken, Cancelled};
 use crate::lights::infinite::EnvironmentMap;
 use crate::lights::infinite::sky::Sky;
 use crate::lights::{LightSamplingPurpose, Lights};
-use crate::scene::description::{Scene, TextureRole};
+use crate::scene::description::{Material, Scene, TextureRole};
 use crate::scene::fingerprint::{Fingerprint, FingerprintContext, FingerprintHasher};
 use crate::world::{self, EnvironmentSource, Geometry, TextureSource};
 
@@ -75,9 +75,12 @@ fn describe_light_tree(which: &str, lights: &Lights) -> String {
 /// Returns the textures used by the scene file's emissive materials.
 fn emissive_material_textures(scene: &Scene) -> impl Iterator<Item = TextureSource> {
     let shining = scene.materials.iter().filter(|material| material.emits());
-    shining.flat_map(move |material| {
+    shining.flat_map(Material::with_parts).flat_map(move |material| {
         let textures = material.textures().into_iter().filter(|(_, role)| match role {
-            TextureRole::Emission | TextureRole::EmissionCoat(_) | TextureRole::Opacity(_) => true,
+            TextureRole::Emission
+            | TextureRole::EmissionCoat(_)
+            | TextureRole::Opacity(_)
+            | TextureRole::BlendWeight(_) => true,
             TextureRole::Diffuse
             | TextureRole::Specular
             | TextureRole::Ambient

@@ -6,7 +6,7 @@ use std::path::Path;
 use super::Findings;
 use crate::assets::{DroppedFaces, LoadedMesh};
 use crate::scene::LoadedScene;
-use crate::scene::description::{MeshFile, UvSet};
+use crate::scene::description::{Material, MeshFile, UvSet};
 
 /// Warnings about mesh files, without duplicates. The dropped faces in all parts of a file are counted
 /// together.
@@ -125,10 +125,11 @@ pub(super) fn warn_about_missing_mesh_data<'a>(
         let name = &material.name;
         let textures = &loaded.scene.textures;
         let is_second = |(texture, _): &(usize, _)| textures[*texture].uv == UvSet::Second;
-        if let Some((texture, _)) = material.textures().into_iter().find(is_second)
+        let all: Vec<_> = material.with_parts().into_iter().flat_map(Material::textures).collect();
+        if let Some((texture, _)) = all.iter().find(|texture| is_second(texture))
             && read.second_uvs.is_empty()
         {
-            let texture = &textures[texture].name;
+            let texture = &textures[*texture].name;
             warn(format!(
                 "{file} has no second set of texture coordinates: texture \"{texture}\" of \"{name}\" uses the first"
             ));
@@ -141,7 +142,7 @@ pub(super) fn warn_about_missing_mesh_data<'a>(
                 "{file} has no texture coordinates, which the `anisotropy` of \"{name}\" needs to determine its direction"
             ));
         }
-        if !material.textures().is_empty() {
+        if !all.is_empty() {
             warn(format!(
                 "{file} has no texture coordinates: each triangle shows half of every texture of \"{name}\""
             ));

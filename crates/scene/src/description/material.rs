@@ -222,6 +222,7 @@ impl MaterialKind {
             Self::Metal { .. } => "metal",
             Self::Plastic { .. } => "plastic",
             Self::Principled { .. } => "principled",
+            Self::Blend { .. } => "blend",
         }
     }
 
@@ -233,7 +234,27 @@ impl MaterialKind {
             | Self::Plastic { roughness, .. }
             | Self::Glass { roughness, .. } => *roughness == NumberSource::Constant(0.0),
             Self::Mirror { .. } | Self::Pane { .. } => true,
+            Self::Blend { .. } => self.is_any_part(|part| part.kind.has_delta_lobe()),
         }
+    }
+
+    /// The materials of a blend, or an empty slice for other materials.
+    pub fn parts(&self) -> &[Material] {
+        match self {
+            Self::Blend { weight: _, parts } => &**parts,
+            Self::Phong(_)
+            | Self::Mirror { .. }
+            | Self::Glass { .. }
+            | Self::Pane { .. }
+            | Self::Metal { .. }
+            | Self::Plastic { .. }
+            | Self::Principled { .. } => &[],
+        }
+    }
+
+    /// Whether a property holds for any part of a blend.
+    fn is_any_part(&self, property: impl Fn(&Material) -> bool) -> bool {
+        self.parts().iter().any(property)
     }
 
     /// Whether the material is solid glass with index of refraction 1, which does not refract in air.
@@ -245,7 +266,8 @@ impl MaterialKind {
             | Self::Pane { .. }
             | Self::Metal { .. }
             | Self::Plastic { .. }
-            | Self::Principled { .. } => false,
+            | Self::Principled { .. }
+            | Self::Blend { .. } => false,
         }
     }
 
@@ -260,6 +282,7 @@ impl MaterialKind {
             | Self::Pane { .. }
             | Self::Plastic { .. }
             | Self::Principled { .. } => false,
+            Self::Blend { .. } => self.is_any_part(|part| part.kind.is_anisotropic()),
         }
     }
 
@@ -273,6 +296,7 @@ impl MaterialKind {
             | Self::Pane { .. }
             | Self::Plastic { .. }
             | Self::Principled { .. } => true,
+            Self::Blend { .. } => self.is_any_part(|part| part.kind.accepts_vertex_colors()),
         }
     }
 
@@ -287,6 +311,7 @@ impl MaterialKind {
                 *diffuse_transmission != ColorSource::BLACK
             }
             Self::Mirror { .. } | Self::Metal { .. } | Self::Plastic { .. } => false,
+            Self::Blend { .. } => self.is_any_part(|part| part.kind.transmits()),
         }
     }
 
@@ -305,7 +330,8 @@ impl MaterialKind {
             | Self::Pane { .. }
             | Self::Metal { .. }
             | Self::Plastic { .. }
-            | Self::Principled { .. } => None,
+            | Self::Principled { .. }
+            | Self::Blend { .. } => None,
         }
     }
 }
@@ -373,6 +399,8 @@ pub enum TextureRole {
     Opacity(ChannelSelector),
     /// Weight or roughness of an emitter's clear coat.
     EmissionCoat(ChannelSelector),
+    /// Weight of a blend.
+    BlendWeight(ChannelSelector),
 }
 
 impl TextureRole {
@@ -385,7 +413,8 @@ impl TextureRole {
             Self::Roughness(number)
             | Self::Bump(number)
             | Self::Opacity(number)
-            | Self::EmissionCoat(number) => PixelInterpretation::Number(number),
+            | Self::EmissionCoat(number)
+            | Self::BlendWeight(number) => PixelInterpretation::Number(number),
             Self::NormalMap => PixelInterpretation::Normal,
         }
     }
@@ -478,6 +507,13 @@ pub enum MaterialKind {
         /// Diffuse transmittance kt, at most 1 − `color`.
         diffuse_transmission: ColorSource,
     },
+    /// A blend of two materials, which may be blends.
+    Blend {
+        /// Weight of the second material, in [0, 1].
+        weight: NumberSource,
+        /// The materials.
+        parts: Box<[Material; 2]>,
+    },
 }
 
 impl ColorSource {
@@ -521,7 +557,7 @@ impl MaterialKind {
             Self::Mirror { reflectance: color } | Self::Pane { ior: _, tint: color } => {
                 vec![(color, TextureRole::Facets)]
             }
-            Self::Glass { .. } => Vec::new(),
+            Self::Glass { .. } | Self::Blend { .. } => Vec::new(),
         }
     }
 
@@ -533,7 +569,7 @@ impl MaterialKind {
             Self::Principled { metallic, roughness, specular, transmission, .. } => {
                 vec![*metallic, *roughness, *specular, *transmission]
             }
-            Self::Phong(_) | Self::Mirror { .. } | Self::Pane { .. } => Vec::new(),
+            Self::Phong(_) | Self::Mirror { .. } | Self::Pane { .. } | Self::Blend { .. } => Vec::new(),
         }
     }
 }
@@ -541,7 +577,19 @@ impl MaterialKind {
 impl Material {
     /// Whether shapes with this material are lights.
     pub fn emits(&self) -> bool {
-        self.emission.scale != Vec3::ZERO
+        self.emission.scale != Vec3::ZERO || self.kind.is_any_part(Self::emits)
+    }
+
+    /// The sides of the surface that may emit light.
+    pub fn emission_sides(&self) -> EmissionSides {
+        let is_both = |part: &Self| part.emits() && part.emission_sides() == EmissionSides::Both;
+        if self.kind.is_any_part(is_both) { EmissionSides::Both } else { self.emission.sides }
+    }
+
+    /// The material and, for a blend, all of its parts.
+    pub fn with_parts(&self) -> Vec<&Self> {
+        let parts = self.kind.parts().iter().flat_map(Self::with_parts);
+        std::iter::once(self).chain(parts).collect()
     }
 
     /// Returns the coat, or `None` if it does not attenuate any emission.
@@ -550,7 +598,7 @@ impl Material {
     }
 
     /// Returns the material's textures, as indices into [`Scene::textures`](super::Scene::textures) with
-    /// their roles. A texture may occur several times.
+    /// their roles, but not those of the parts of a blend. A texture may occur several times.
     pub fn textures(&self) -> Vec<(usize, TextureRole)> {
         let Self { name: _, kind, sides: _, emission, normal_map, bump, opacity, coat } = self;
         let coat = Some(coat).filter(|coat| coat.exists());
@@ -577,8 +625,21 @@ impl Material {
         let coat = self.emitter_coat().into_iter().flat_map(|coat| [coat.weight, coat.roughness]);
         let coat = coat.filter_map(|number| number.texture_index_and_channel(ChannelSelector::Luminance));
         let coat = coat.map(|(texture, number)| (texture, TextureRole::EmissionCoat(number)));
+        let weight = match kind {
+            MaterialKind::Blend { weight, parts: _ } => {
+                weight.texture_index_and_channel(ChannelSelector::Luminance)
+            }
+            MaterialKind::Phong(_)
+            | MaterialKind::Mirror { .. }
+            | MaterialKind::Glass { .. }
+            | MaterialKind::Pane { .. }
+            | MaterialKind::Metal { .. }
+            | MaterialKind::Plastic { .. }
+            | MaterialKind::Principled { .. } => None,
+        };
+        let weight = weight.map(|(texture, number)| (texture, TextureRole::BlendWeight(number)));
         let surface = shown.into_iter().chain(normals).chain(heights).chain(opacity).chain(coat);
-        colors.chain(numbers).chain(surface).collect()
+        colors.chain(numbers).chain(surface).chain(weight).collect()
     }
 }
 
@@ -719,6 +780,10 @@ impl Fingerprinted for MaterialKind {
                 key.add_usize(5).add(color, of).add(metallic, of).add(roughness, of).add_f32(*ior);
                 key.add(specular, of).add(specular_color, of).add(transmission, of);
                 key.add(diffuse_transmission, of);
+            }
+            Self::Blend { weight, parts } => {
+                let [first, second] = &**parts;
+                key.add_usize(7).add(weight, of).add(first, of).add(second, of);
             }
         }
     }

@@ -214,18 +214,36 @@ impl<'a> KeyInTable<'a> {
 
     /// Reads a name and returns the name's index in `names`.
     pub(super) fn index_by_name(&self, names: &DefinedNames) -> Option<usize> {
-        self.resolve_name_or_report(
-            names,
-            self.string_described_by(|| format!("the name of a {}", names.kind))?,
-        )
+        let text = self.string_described_by(|| format!("the name of a {}", names.kind))?;
+        self.resolve_name_or_report(names, text, self.value_span())
     }
 
-    /// Looks up the name `text`, which is the key's value. Reports an error if it is undefined.
-    fn resolve_name_or_report(&self, names: &DefinedNames, text: &str) -> Option<usize> {
+    /// Reads an array of two names and returns their indices in `names`.
+    pub(super) fn index_pair_by_names(&self, names: &DefinedNames) -> Option<[usize; 2]> {
+        let value = self.value?;
+        let texts = value.as_array().filter(|array| array.len() == 2).and_then(|array| {
+            let mut texts = array.iter().map(|name| Some((name.as_str()?, name.span())));
+            Some([texts.next()??, texts.next()??])
+        });
+        let Some(texts) = texts else {
+            self.report_wrong_type(value, &format!("an array with the names of two {}s", names.kind));
+            return None;
+        };
+        let [first, second] = texts.map(|(text, span)| self.resolve_name_or_report(names, text, Some(span)));
+        Some([first?, second?])
+    }
+
+    /// Looks up the name `text` at `span`. Reports an error if it is undefined.
+    fn resolve_name_or_report(
+        &self,
+        names: &DefinedNames,
+        text: &str,
+        span: Option<Range<usize>>,
+    ) -> Option<usize> {
         let index = names.find_and_mark_used(text);
         if index.is_none() {
             let message = format!("there is no {} \"{}\"", names.kind, escape_and_truncate(text, 40));
-            let issue = Issue::error(self.value_span()?, message).with_missing_value_cause();
+            let issue = Issue::error(span?, message).with_missing_value_cause();
             self.context.report(names.add_name_suggestions(self.context, issue, text));
         }
         index

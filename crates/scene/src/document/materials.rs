@@ -4,11 +4,12 @@ use super::super::description::{
     Bump, CoatSource, ColorSource, EmissionSides, EmissionSource, FresnelSource, Material, MaterialKind,
     MicrofacetDistribution, NormalMap, NumberSource, OpacitySource, PhongParameters, ReflectingSides,
 };
-use super::super::keys::key::DefaultValue::{Absent, Alternative, By, Is};
+use super::super::keys::key::DefaultValue::{Absent, Alternative, By, Is, Required};
 use super::super::keys::key::ValueKind::{
-    ColorOrTexture, Emission, Flag, Heights, Number, NumberOrTexture, Texture, Words,
+    ColorOrTexture, Emission, Flag, Heights, MaterialPair, Number, NumberOrTexture, Texture, Words,
 };
 use super::super::keys::key::{TableInfo, TableSyntax, ValueKind, choice_values, keys, table_types};
+use super::blends::{ReadMaterial, UnresolvedBlend, resolve_blends};
 use super::context::Issue;
 use super::key::KeyInTable;
 use super::limits::Limits::{Any, AtLeast, Between};
@@ -112,6 +113,13 @@ table_types! {
         /// Square root of the clear coat's GGX α; another name for `coat_roughness`.
         clearcoat_roughness: FRACTION, Is("0.0");
     }
+    /// A blend of two materials.
+    Blend = "blend" {
+        /// The materials, which may be blends, but not solid glass.
+        materials: MaterialPair, Required("[\"paint\", \"rust\"]");
+        /// Weight of the second material: 0 shows the first, 1 the second.
+        weight: FRACTION, Is("0.5");
+    }
 }
 
 pub(crate) static MATERIALS: TableInfo = TableInfo {
@@ -173,14 +181,19 @@ pub(super) fn read_materials(root: &TableReader<'_>, textures: &DefinedNames) ->
     let tables = root.named_tables(&MATERIALS);
     let names =
         DefinedNames::new("material", tables.iter().map(|(name, span, _)| (name.clone(), span.clone())));
-    let read: Vec<Option<Material>> =
-        tables.into_iter().map(|(name, _, table)| read_material(name, table?, textures)).collect();
+    let read = tables.into_iter().map(|(name, _, table)| read_material(name, table?, textures, &names));
+    let read = resolve_blends(root.context, read.collect());
     let emits = |material: &Material| material.emits();
     let emissive = read.iter().map(|material| material.as_ref().is_some_and(emits)).collect();
     MaterialList { names, list: read.into_iter().collect(), emissive }
 }
 
-fn read_material(name: String, mut table: TableReader<'_>, textures: &DefinedNames) -> Option<Material> {
+fn read_material(
+    name: String,
+    mut table: TableReader<'_>,
+    textures: &DefinedNames,
+    materials: &DefinedNames,
+) -> Option<ReadMaterial> {
     // Without a valid type, keys cannot be checked.
     let kind = table.read_type()?;
     let table = &MaterialReader { table, textures };
@@ -196,6 +209,7 @@ fn read_material(name: String, mut table: TableReader<'_>, textures: &DefinedNam
         MaterialType::Metal => (table.read_metal(), table.read_coat()),
         MaterialType::Plastic => (Some(table.read_plastic()), table.read_coat()),
         MaterialType::Principled => (Some(table.read_principled()), table.read_coat_or_clearcoat()),
+        MaterialType::Blend => return table.read_blend(name, materials).map(ReadMaterial::Blend),
     };
     let (emission, normal_map, bump) = (table.read_emission(), table.read_normal_map(), table.read_bump());
     let opacity = if kind.as_ref().is_some_and(MaterialKind::is_solid_glass) {
@@ -206,7 +220,8 @@ fn read_material(name: String, mut table: TableReader<'_>, textures: &DefinedNam
     };
     let sides = table.read_sides(kind.as_ref());
     table.table.report_unknown_and_missing_keys();
-    Some(Material { name, kind: kind?, sides, emission, normal_map, bump, opacity, coat })
+    let material = Material { name, kind: kind?, sides, emission, normal_map, bump, opacity, coat };
+    Some(ReadMaterial::Complete(Box::new(material)))
 }
 
 /// A material's table, and the textures that it may refer to.
@@ -353,6 +368,18 @@ impl<'a> MaterialReader<'a> {
             specular_color: self.color("specular_color"),
             transmission: self.number("transmission"),
         }
+    }
+
+    /// Reads a blend, which takes everything else from its materials.
+    fn read_blend(&self, name: String, materials: &DefinedNames) -> Option<UnresolvedBlend> {
+        for key in MATERIALS.keys {
+            let help = format!("set `{}` on the materials of the blend", key.name);
+            self.table.reject_key(key.name, &format!("a blend cannot have `{}`", key.name), Some(&help));
+        }
+        let (pair, weight) = (self.key("materials"), self.number("weight"));
+        let parts = pair.index_pair_by_names(materials);
+        self.table.report_unknown_and_missing_keys();
+        Some(UnresolvedBlend { name, weight, parts: parts?, span: pair.value_span()? })
     }
 
     /// Reads the sides that reflect light. Surfaces that transmit light scatter it on both sides.

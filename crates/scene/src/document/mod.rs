@@ -1,6 +1,7 @@
 //! Lowers TOML to a scene. Each table has a module with the definitions of its keys and their reader. Readers
 //! return `None` for missing or invalid values and continue after errors so that all errors are reported.
 
+mod blends;
 pub(super) mod camera;
 mod context;
 pub(super) mod environment;

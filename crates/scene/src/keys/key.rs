@@ -95,6 +95,8 @@ pub enum ValueKind {
     Heights,
     /// The name of a material.
     Material,
+    /// The names of two materials.
+    MaterialPair,
     /// The name of a group.
     Group,
     /// A table with these keys.
@@ -105,7 +107,7 @@ impl ValueKind {
     /// Returns the table in which the name is defined, or `None` if the value is not a name.
     pub fn defining_table(self) -> Option<&'static str> {
         match self {
-            Self::Material => Some("materials"),
+            Self::Material | Self::MaterialPair => Some("materials"),
             Self::Texture | Self::Heights => Some("textures"),
             Self::Group => Some("groups"),
             Self::Whole(..)
@@ -149,6 +151,7 @@ impl ValueKind {
             | Self::Texture
             | Self::Heights
             | Self::Material
+            | Self::MaterialPair
             | Self::Group
             | Self::InlineTable(_) => None,
         }
@@ -372,6 +375,7 @@ impl ValueKind {
             Self::Text | Self::Texture | Self::Heights | Self::Material | Self::Group => {
                 "\"name\"".to_owned()
             }
+            Self::MaterialPair => "[\"name\", \"other\"]".to_owned(),
             Self::File(endings) => format!("\"file.{}\"", endings.first().copied().unwrap_or("txt")),
             Self::Color(_) | Self::ColorOrTexture(_) | Self::Emission(_) => "[0.5, 0.5, 0.5]".to_owned(),
             Self::Rotation => "[1, 0, 0, 0, 1, 0, 0, 0, 1]".to_owned(),
@@ -408,6 +412,7 @@ impl ValueKind {
             Self::Texture => "name of a texture".to_owned(),
             Self::Heights => "name of a texture, or `{ texture = \"NAME\", channel = \"r\" }`".to_owned(),
             Self::Material => "name of a material".to_owned(),
+            Self::MaterialPair => "names of two materials".to_owned(),
             Self::Group => "name of a group".to_owned(),
             Self::InlineTable(_) => "table".to_owned(),
         }

@@ -78,7 +78,7 @@ fn constant_albedo(tile: &TileContext<'_>, index: usize) -> Option<Vec3> {
     let material = &tile.world.materials[index];
     let is_constant = !tile.world.material_needs_uvs_or_tangents(index)
         && !material.has_null_interaction()
-        && material.scatters_on_side(false);
+        && !material.is_black_from_behind();
     is_constant.then(|| material.bsdf.albedo(&TexturePoint::from_uv(DVec2::ZERO), &mut 0))
 }
 

@@ -14,7 +14,7 @@ use crate::geometry::cuboid::OrientedBox;
 use crate::materials::EmissionSides;
 use crate::math::transform::Transform;
 use crate::math::{DVec3, Vec2, Vec3};
-use crate::scene::description::{Scene, Shape};
+use crate::scene::description::{Material, Scene, Shape};
 
 /// Distance between a light and a plane, relative to the light's size, below which they are considered
 /// coplanar.
@@ -301,7 +301,7 @@ fn visit_flat_faces(
 ) {
     let object = &scene.objects[number];
     let material = object.material.map(|index| &scene.materials[index]);
-    let emits = material.filter(|material| material.emits()).map(|material| material.emission.sides);
+    let emits = material.filter(|material| material.emits()).map(Material::emission_sides);
     let (shape, matrix) = object.shape.shape_and_matrix();
     let map = matrix.map(|matrix| matrix.to_transform().relative_to_origins(DVec3::ZERO, origin));
     // The map also translates the origin.

@@ -4,7 +4,7 @@ use std::collections::HashSet;
 use std::sync::Arc;
 
 use super::distinct_lights::duplicate_emissive_triangles;
-use super::lower::{file_emission, file_opacity, lower_emission, lower_opacity};
+use super::lower::{file_emission, file_opacity, lower_blend_weight, lower_emission, lower_opacity};
 use super::{Geometry, Images, MeshInstance, Object};
 use crate::assets::FileMaterial;
 use crate::control::{CancelToken, Cancelled};
@@ -14,14 +14,15 @@ use crate::lights::infinite::sky::sun::OrientedSunDisk;
 use crate::lights::infinite::sky::{Sky, SkyFrame};
 use crate::lights::infinite::{DirectionalLight, Environment, EnvironmentMap, MapOrientation};
 use crate::lights::{
-    AreaLight, BoundingSphere, EmissionModulation, Light, LightBounds, Lights, PhotonEmitter, Side,
-    TriangleWithUvs, UvMapping, back_area_light, front_area_light, see_through_shape_side_light,
+    AreaLight, BlendWeight, BoundingSphere, EmissionModulation, EmissionTerm, Light, LightBounds, Lights,
+    PhotonEmitter, Side, TriangleWithUvs, UvMapping, back_area_light, front_area_light,
+    see_through_shape_side_light,
 };
 use crate::lights::{Emitter, EmittingTriangleSelection};
 use crate::materials::texels::Texels;
 use crate::materials::{Emission, EmissionSides, Opacity};
 use crate::math::Vec3;
-use crate::scene::description::{self, Scene};
+use crate::scene::description::{self, MaterialKind, Scene};
 
 /// Sampling tables for the environment map, or `None` if the image is black.
 pub fn build_environment_map(texels: &Arc<Texels>) -> Option<Arc<EnvironmentMap>> {
@@ -59,10 +60,11 @@ pub fn build_lights(
     let points = points.map(|light| light.to_traced_light(geometry.coordinate_origin()));
     let objects = (0_u32..).zip(geometry.objects()).zip(&scene.objects);
     let emissive = scene.materials.iter().map(|material| {
-        let emission = emission_unless_texture_black(lower_emission(scene, images, material));
-        EmissionWithOpacity::new(emission, lower_opacity(scene, images, material))
+        let mut terms = SurfaceEmission::default();
+        terms.add_material(scene, images, material, &[]);
+        terms
     });
-    let emissive: Vec<EmissionWithOpacity> = emissive.collect();
+    let emissive: Vec<SurfaceEmission> = emissive.collect();
     let environment = scene.environment.as_ref().map(|environment| environment_lights(environment, sky));
     let mut all: Vec<Light> = points.chain(environment.into_iter().flatten()).collect();
     for ((id, object), described) in objects {
@@ -136,71 +138,107 @@ fn emission_unless_texture_black(emission: Emission) -> Emission {
     }
 }
 
-/// Emission of a material, combined with its opacity.
-#[derive(Clone)]
-struct EmissionWithOpacity {
-    /// Emission, scaled by the opacity if it is constant.
-    emission: Emission,
-    /// Opacity, if it varies over the surface.
-    opacity: Option<Opacity>,
+/// Emission of a surface, combined with its opacity.
+#[derive(Clone, Default)]
+struct SurfaceEmission {
+    /// One term per emissive material. [`EmissionTerm::scale`] is the radiance.
+    terms: Vec<(EmissionTerm, EmissionSides)>,
     /// Whether light may pass through the surface without changing direction.
     is_sheer: bool,
 }
 
-impl EmissionWithOpacity {
+impl SurfaceEmission {
     fn new(emission: Emission, opacity: Option<Opacity>) -> Self {
-        match opacity.as_ref().and_then(Opacity::as_untextured) {
-            Some(part) => {
-                let emission = Emission { scale: emission.scale * part, ..emission };
-                Self { emission, opacity: None, is_sheer: true }
+        let mut terms = Self::default();
+        terms.add_term(emission, opacity, &[]);
+        terms
+    }
+
+    /// Adds the emission of a material, or of all parts of a blend. `weights` are the weights of the blends
+    /// that contain the material.
+    fn add_material(
+        &mut self,
+        scene: &Scene,
+        images: &Images,
+        material: &description::Material,
+        weights: &[BlendWeight],
+    ) {
+        if let MaterialKind::Blend { weight, parts } = &material.kind {
+            let second = lower_blend_weight(scene, images, material, weight);
+            for (part, is_second) in parts.iter().zip([false, true]) {
+                let weight = BlendWeight { second: second.clone(), is_second };
+                self.add_material(scene, images, part, &[weights, &[weight]].concat());
             }
-            None => Self { is_sheer: opacity.is_some(), emission, opacity },
+        } else {
+            let emission = emission_unless_texture_black(lower_emission(scene, images, material));
+            self.add_term(emission, lower_opacity(scene, images, material), weights);
+        }
+    }
+
+    /// Adds the emission of a single material. Constant factors become part of the radiance.
+    fn add_term(&mut self, emission: Emission, opacity: Option<Opacity>, weights: &[BlendWeight]) {
+        self.is_sheer |= opacity.is_some();
+        let Emission { mut scale, texture, sides, coat } = emission;
+        scale *= opacity.as_ref().and_then(Opacity::as_untextured).unwrap_or(1.0);
+        let opacity = opacity.filter(|opacity| opacity.as_untextured().is_none());
+        let (constant, weights): (Vec<BlendWeight>, Vec<_>) =
+            weights.iter().cloned().partition(|weight| weight.second.as_untextured().is_some());
+        for weight in constant {
+            scale *= weight.of_part(weight.second.as_untextured().unwrap_or(1.0));
+        }
+        if scale != Vec3::ZERO {
+            self.terms.push((EmissionTerm { scale, texture, opacity, coat, weights }, sides));
         }
     }
 
     /// The emitting sides.
     fn sides(&self) -> &'static [Side] {
-        match (self.emission.is_emissive(), self.emission.sides) {
-            (false, _) => &[],
-            (true, EmissionSides::Front) => &[Side::Front],
-            (true, EmissionSides::Both) => &[Side::Front, Side::Back],
+        if self.terms.is_empty() {
+            &[]
+        } else if self.terms.iter().any(|(_, sides)| *sides == EmissionSides::Both) {
+            &[Side::Front, Side::Back]
+        } else {
+            &[Side::Front]
         }
     }
 
-    /// Scales light bounds by the means of the emission and opacity textures.
-    fn scale_light_bounds_by_texture_means(&self, bounds: LightBounds) -> LightBounds {
-        let texture = self.emission.texture.as_ref();
-        let bounds = texture.map_or(bounds, |texture| bounds.scaled_by(texture.mean()));
-        self.opacity.as_ref().map_or(bounds, |opacity| bounds.scaled_by(Vec3::splat(opacity.mean())))
+    /// Radiance of a side if nothing modulates it, and the terms that do. Their scales are relative to the
+    /// radiance.
+    fn radiance_and_terms(&self, side: Side) -> (Vec3, Vec<EmissionTerm>) {
+        let of_side = |sides: EmissionSides| side == Side::Front || sides == EmissionSides::Both;
+        let terms = self.terms.iter().filter(|(_, sides)| of_side(*sides)).map(|(term, _)| term);
+        let radiance: Vec3 = terms.clone().map(|term| term.scale).sum();
+        let part = |scale: f32, all: f32| if scale == all { 1.0 } else { scale / all };
+        let relative = |scale: Vec3| {
+            Vec3::new(part(scale.x, radiance.x), part(scale.y, radiance.y), part(scale.z, radiance.z))
+        };
+        (radiance, terms.map(|term| EmissionTerm { scale: relative(term.scale), ..term.clone() }).collect())
     }
+}
 
-    /// Emission factor that varies with position or direction. `chart` maps points on the emitter to UVs.
-    fn build_emission_modulation(&self, chart: UvMapping) -> Option<EmissionModulation> {
-        let Emission { texture, coat, .. } = &self.emission;
-        EmissionModulation::new_with_coat(texture.as_ref(), self.opacity.as_ref(), coat.as_ref(), chart)
-    }
-
-    /// Whether emission varies with position or direction.
-    fn has_varying_emission(&self) -> bool {
-        self.emission.texture.is_some() || self.opacity.is_some() || self.emission.coat.is_some()
+/// Scales light bounds by the mean of the terms that modulate the light.
+fn scale_light_bounds_by_term_means(bounds: LightBounds, terms: &[EmissionTerm]) -> LightBounds {
+    match terms.iter().any(EmissionTerm::varies) {
+        true => bounds.scaled_by(terms.iter().map(EmissionTerm::mean).sum()),
+        false => bounds,
     }
 }
 
 /// Creates the lights for an emitting shape, one per emitting side.
 fn area_lights_of_shape(
     shape: &Shape,
-    emissive: &EmissionWithOpacity,
+    emissive: &SurfaceEmission,
     object: u32,
 ) -> impl Iterator<Item = AreaLight> {
     let of_side = move |side: &Side| {
-        let radiance = emissive.emission.scale;
+        let (radiance, terms) = emissive.radiance_and_terms(*side);
         let light = match (emissive.is_sheer, side) {
             (true, side) => see_through_shape_side_light(shape, *side, radiance, object)?,
             (false, Side::Front) => front_area_light(shape, radiance, object)?,
             (false, Side::Back) => back_area_light(shape, radiance, object)?,
         };
-        let light = AreaLight { bounds: emissive.scale_light_bounds_by_texture_means(light.bounds), ..light };
-        Some(match emissive.build_emission_modulation(UvMapping::Shape(shape.clone())) {
+        let light = AreaLight { bounds: scale_light_bounds_by_term_means(light.bounds, &terms), ..light };
+        Some(match EmissionModulation::from_terms(terms, UvMapping::Shape(shape.clone())) {
             Some(texture) => light.with_texture(texture),
             None => light,
         })
@@ -212,16 +250,16 @@ fn area_lights_of_shape(
 fn mesh_lights_by_material_and_side(
     object: u32,
     mesh: &MeshInstance,
-    emissive: Option<&EmissionWithOpacity>,
+    emissive: Option<&SurfaceEmission>,
     images: &Images,
     token: &CancelToken,
 ) -> Result<Vec<AreaLight>, Cancelled> {
     let loaded = mesh.tree.loaded();
-    let all: Vec<(Option<u32>, EmissionWithOpacity)> = match emissive {
+    let all: Vec<(Option<u32>, SurfaceEmission)> = match emissive {
         Some(emissive) => vec![(None, emissive.clone())],
         None => {
             let of_file = |material| {
-                EmissionWithOpacity::new(
+                SurfaceEmission::new(
                     emission_unless_texture_black(file_emission(images, material)),
                     file_opacity(images, material),
                 )
@@ -241,7 +279,7 @@ fn mesh_lights_by_material_and_side(
         HashSet::new()
     };
     let light =
-        |(own, emissive, side): (Option<u32>, &EmissionWithOpacity, Side)| -> Result<Option<AreaLight>, Cancelled> {
+        |(own, emissive, side): (Option<u32>, &SurfaceEmission, Side)| -> Result<Option<AreaLight>, Cancelled> {
             let corners = |id| match (mesh.world_corners(id), side) {
                 (corners, Side::Front) => corners,
                 ([a, b, c], Side::Back) => [a, c, b],
@@ -249,8 +287,8 @@ fn mesh_lights_by_material_and_side(
             let distinct = triangles_with_material(mesh, own).filter(|id| !repeated.contains(id));
             let triangles = distinct.map(|id| (corners(id), id)).collect();
             let Some(emitter) = MeshEmitter::new(triangles, token)? else { return Ok(None) };
-            let radiance = emissive.emission.scale;
-            let bounds = emissive.scale_light_bounds_by_texture_means(emitter.light_bounds().scaled_by(radiance));
+            let (radiance, terms) = emissive.radiance_and_terms(side);
+            let bounds = scale_light_bounds_by_term_means(emitter.light_bounds().scaled_by(radiance), &terms);
             let patches = || {
                 let patch = |id| TriangleWithUvs {
                     primitive: id,
@@ -260,7 +298,9 @@ fn mesh_lights_by_material_and_side(
                 };
                 UvMapping::Triangles(triangles_with_material(mesh, own).map(patch).collect())
             };
-            let texture = if emissive.has_varying_emission() { emissive.build_emission_modulation(patches()).map(Box::new) } else { None };
+            let is_varying = terms.iter().any(EmissionTerm::varies);
+            let texture = is_varying.then(|| EmissionModulation::from_terms(terms, patches())).flatten();
+            let texture = texture.map(Box::new);
             let (shape, part) = (Emitter::Mesh(emitter), EmittingTriangleSelection::Listed);
             Ok(Some(AreaLight { shape, side, radiance, texture, object, part, bounds }))
         };
@@ -306,7 +346,7 @@ mod tests {
         ] {
             let transform = Transform::scale_rotate_translate(scale, turned, at);
             let mesh = MeshInstance::new(Arc::clone(&tree), transform, false);
-            let emissive = EmissionWithOpacity::new(Emission::from_constant(Vec3::ONE), None);
+            let emissive = SurfaceEmission::new(Emission::from_constant(Vec3::ONE), None);
             let lights = mesh_lights_by_material_and_side(
                 0,
                 &mesh,

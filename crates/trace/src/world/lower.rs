@@ -14,10 +14,10 @@ use crate::materials::texture::{
     ColorOrTexture, Texture, TextureFilter, UvTransform, ValueScaleAndOffset, Wrap,
 };
 use crate::materials::{
-    Bsdf, Bump, Coat, CoatInputs, Coated, CoatedMaterial, Conductor, ConductorFresnel, Dielectric, Emission,
-    Material, Mirror, NonSpecular, NormalMap, NormalPerturbation, Opacity, Phong, Plastic, Principled,
-    PrincipledInputs, ReflectingSides, ScalarParameter, SpecularPart, ThinDielectric, TranslucentPhong,
-    UvSet,
+    Blend, Bsdf, Bump, Coat, CoatInputs, Coated, CoatedMaterial, Conductor, ConductorFresnel, Dielectric,
+    Emission, Material, Mirror, NonSpecular, NormalMap, NormalPerturbation, Opacity, Phong, Plastic,
+    Principled, PrincipledInputs, ReflectingSides, ScalarParameter, SpecularPart, ThinDielectric,
+    TranslucentPhong, UvSet,
 };
 use crate::math::{DVec3, Vec3};
 use crate::scene::description::{
@@ -64,6 +64,10 @@ pub fn lower_material(scene: &Scene, images: &Images, material: &description::Ma
         MaterialKind::Pane { ior, tint } => {
             Bsdf::ThinDielectric(ThinDielectric { ior: *ior, tint: color(tint) })
         }
+        MaterialKind::Blend { weight, parts } => Bsdf::Blend(Box::new(Blend {
+            weight: lower_blend_weight(scene, images, material, weight),
+            parts: parts.each_ref().map(|part| lower_material(scene, images, part)),
+        })),
     };
     let coat = of.lower_coat(&material.coat, TextureRole::Roughness);
     let bsdf = match coat {
@@ -158,7 +162,17 @@ fn plastic(
     })
 }
 
-/// A BSDF under a clear coat. Transparent materials have none.
+/// Weight of the second part of a blend.
+pub fn lower_blend_weight(
+    scene: &Scene,
+    images: &Images,
+    material: &description::Material,
+    weight: &NumberSource,
+) -> ScalarParameter {
+    MaterialParameterConverter { scene, images, material }.lower_number(weight, TextureRole::BlendWeight)
+}
+
+/// A BSDF under a clear coat. Transparent materials and blends have none.
 fn coated(coat: Coat, bsdf: Bsdf) -> Bsdf {
     match bsdf {
         Bsdf::NonSpecular(base) => Bsdf::NonSpecular(coated_lobes(coat, base)),
@@ -171,7 +185,7 @@ fn coated(coat: Coat, bsdf: Bsdf) -> Bsdf {
             let base = coated_lobes(coat.clone(), NonSpecular::Phong(none));
             Bsdf::Coated(Coated { specular: SpecularPart::Mirror(mirror), coat: Some(coat), base })
         }
-        Bsdf::Dielectric(_) | Bsdf::ThinDielectric(_) => bsdf,
+        Bsdf::Dielectric(_) | Bsdf::ThinDielectric(_) | Bsdf::Blend(_) => bsdf,
     }
 }
 

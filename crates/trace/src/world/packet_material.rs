@@ -27,7 +27,7 @@ impl PacketMaterial {
     /// textured or coated emission, may be a null interaction, or has a BSDF that does not support packets.
     pub(super) fn from_material(material: &Material) -> Option<Self> {
         let Material { bsdf, sides: _, emission, normal_perturbation, opacity } = material;
-        let is_black_from_behind = !material.scatters_on_side(false);
+        let is_black_from_behind = material.is_black_from_behind();
         let is_even = emission.texture.is_none() && emission.coat.is_none();
         let rough = bsdf.as_non_specular().filter(|rough| rough.supports_packets())?;
         (is_even && normal_perturbation.is_none() && opacity.is_none()).then(|| Self {

@@ -139,7 +139,7 @@ impl TextureRolesNeededByRender {
             TextureRole::Ambient => self.ambient,
             TextureRole::Emission | TextureRole::EmissionCoat(_) => self.lights,
             TextureRole::NormalMap | TextureRole::Bump(_) => self.normals || self.by_delta && is_delta,
-            TextureRole::Opacity(_) => true,
+            TextureRole::Opacity(_) | TextureRole::BlendWeight(_) => true,
         }
     }
 }
@@ -164,7 +164,8 @@ pub fn textures_needed(
         }
     };
     let (used_materials, own_materials) = used_material_and_mesh_file_flags(scene);
-    for (material, _) in scene.materials.iter().zip(used_materials).filter(|(_, used)| *used) {
+    let used = scene.materials.iter().zip(used_materials).filter(|(_, used)| *used);
+    for material in used.flat_map(|(material, _)| material.with_parts()) {
         let (textures, is_delta) = (material.textures().into_iter(), material.kind.has_delta_lobe());
         for (texture, role) in textures.filter(|(_, role)| lookups.includes_role(*role, is_delta)) {
             add(NeededTexture {
@@ -261,6 +262,7 @@ pub fn scene_material_texture_source(
         | TextureRole::Roughness(_)
         | TextureRole::Emission
         | TextureRole::EmissionCoat(_)
+        | TextureRole::BlendWeight(_)
         | TextureRole::NormalMap
         | TextureRole::Bump(_) => source,
     }

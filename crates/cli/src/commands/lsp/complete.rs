@@ -137,7 +137,11 @@ fn value_items(document: &OpenDocument, kind: ValueKind, is_quoted: bool) -> Vec
         ValueKind::Flag => ["true", "false"]
             .map(|flag| completion_item(flag, CompletionItemKind::VALUE, "", flag.to_owned()))
             .to_vec(),
-        ValueKind::Material | ValueKind::Texture | ValueKind::Heights | ValueKind::Group => kind
+        ValueKind::Material
+        | ValueKind::MaterialPair
+        | ValueKind::Texture
+        | ValueKind::Heights
+        | ValueKind::Group => kind
             .defining_table()
             .map_or_else(Vec::new, |table| defined_name_items(document, table, is_quoted)),
         ValueKind::Color(_) => colors(),

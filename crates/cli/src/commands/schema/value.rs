@@ -52,6 +52,10 @@ pub(super) fn value_schema(kind: ValueKind, draft: SchemaDraft) -> Value {
         ValueKind::Texture | ValueKind::Material | ValueKind::Group => {
             json!({ "type": "string", "minLength": 1 })
         }
+        ValueKind::MaterialPair => {
+            let name = json!({ "type": "string", "minLength": 1 });
+            json!({ "type": "array", "items": name, "minItems": 2, "maxItems": 2 })
+        }
         ValueKind::InlineTable(keys) => {
             object_schema(&keys.iter().collect::<Vec<_>>(), draft, |key| key_schema(key, draft))
         }

@@ -1,5 +1,5 @@
-//! Emission textures: radiance that varies with position because of a texture or opacity, or with direction
-//! because of a clear coat.
+//! Emission textures: radiance that varies with position because of textures, opacity or the weight of a
+//! blend, or with direction because of a clear coat.
 //!
 //! The texture is importance sampled on quads, but not on other shapes. Each sample is multiplied by the
 //! texture value at its point. Pdfs depend only on the emitter.
@@ -9,16 +9,94 @@ use std::sync::Arc;
 use crate::geometry::triangle::barycentric_weights_at_point;
 use crate::geometry::{RayF64, Shape};
 use crate::materials::texture::Texture;
-use crate::materials::{Coat, Footprint, Opacity, SecondUvPoint, TexturePoint};
+use crate::materials::{Coat, Footprint, Opacity, ScalarParameter, SecondUvPoint, TexturePoint};
 use crate::math::{DVec2, DVec3, Vec2, Vec3};
 
-/// A factor on a light's radiance that varies with position and direction.
+/// A factor on a light's radiance that varies with position and direction: the sum of its terms.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EmissionModulation {
-    texture: Option<Arc<Texture>>,
-    opacity: Option<Opacity>,
-    coat: Option<Arc<Coat>>,
+    terms: Vec<EmissionTerm>,
     chart: UvMapping,
+}
+
+/// A part of a light's radiance. Blends have one term for each of their parts.
+#[derive(Clone, Debug, PartialEq)]
+pub struct EmissionTerm {
+    /// Constant factor.
+    pub scale: Vec3,
+    /// Texture that modulates the radiance.
+    pub texture: Option<Arc<Texture>>,
+    /// Opacity, if it varies.
+    pub opacity: Option<Opacity>,
+    /// Clear coat.
+    pub coat: Option<Arc<Coat>>,
+    /// Weights in the blends that contain the term, if they vary.
+    pub weights: Vec<BlendWeight>,
+}
+
+/// Weight of a part of a blend.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BlendWeight {
+    /// Weight of the second part.
+    pub second: ScalarParameter,
+    /// Whether this is the weight of the second part.
+    pub is_second: bool,
+}
+
+impl BlendWeight {
+    /// The weight of the part if the weight of the second part is `second`.
+    pub fn of_part(&self, second: f32) -> f32 {
+        let second = second.clamp(0.0, 1.0);
+        if self.is_second { second } else { 1.0 - second }
+    }
+}
+
+impl EmissionTerm {
+    /// Unmodulated emission.
+    pub const CONSTANT: Self =
+        Self { scale: Vec3::ONE, texture: None, opacity: None, coat: None, weights: Vec::new() };
+
+    /// Whether the term varies with position.
+    fn varies_with_position(&self) -> bool {
+        self.texture.is_some() || self.opacity.is_some() || !self.weights.is_empty()
+    }
+
+    /// Whether the term varies with position or direction.
+    pub fn varies(&self) -> bool {
+        self.varies_with_position() || self.coat.is_some()
+    }
+
+    /// The factor without the coat.
+    #[inline]
+    fn lookup_without_coat(&self, at: &TexturePoint) -> Vec3 {
+        let color = self.texture.as_ref().map_or(Vec3::ONE, |texture| texture.lookup(at));
+        let mut color = color * self.scale;
+        if let Some(opacity) = &self.opacity {
+            color *= opacity.evaluate(at, &mut 0);
+        }
+        for weight in &self.weights {
+            color *= weight.of_part(weight.second.evaluate(at, &mut 0));
+        }
+        color
+    }
+
+    /// The mean of the factor, estimated as the product of the means.
+    pub fn mean(&self) -> Vec3 {
+        let color = self.texture.as_ref().map_or(Vec3::ONE, |texture| texture.mean());
+        let mut mean = color * self.scale * self.opacity.as_ref().map_or(1.0, Opacity::mean);
+        for weight in &self.weights {
+            let second = weight.second.texture().map_or(1.0, |texture| texture.mean().x);
+            mean *= weight.of_part(weight.second.as_untextured().unwrap_or(second));
+        }
+        mean
+    }
+
+    /// All textures that vary with position.
+    fn textures(&self) -> impl Iterator<Item = &Arc<Texture>> {
+        let of_opacity = self.opacity.as_ref().and_then(|opacity| opacity.value.texture());
+        let of_weights = self.weights.iter().filter_map(|weight| weight.second.texture());
+        self.texture.iter().chain(of_opacity).chain(of_weights)
+    }
 }
 
 /// Maps points on a light to texture coordinates.
@@ -46,50 +124,36 @@ pub struct TriangleWithUvs {
 impl EmissionModulation {
     /// Creates the factor from a texture and an opacity. Returns `None` if there is neither.
     pub fn new(texture: Option<&Arc<Texture>>, opacity: Option<&Opacity>, chart: UvMapping) -> Option<Self> {
-        Self::new_with_coat(texture, opacity, None, chart)
+        let (texture, opacity) = (texture.cloned(), opacity.cloned());
+        Self::from_terms(vec![EmissionTerm { texture, opacity, ..EmissionTerm::CONSTANT }], chart)
     }
 
-    /// [`EmissionModulation::new`] under a clear coat.
-    pub fn new_with_coat(
-        texture: Option<&Arc<Texture>>,
-        opacity: Option<&Opacity>,
-        coat: Option<&Arc<Coat>>,
-        chart: UvMapping,
-    ) -> Option<Self> {
-        let is_any = texture.is_some() || opacity.is_some() || coat.is_some();
-        let own =
-            || Self { texture: texture.cloned(), opacity: opacity.cloned(), coat: coat.cloned(), chart };
-        is_any.then(own)
+    /// Creates the factor from its terms. Returns `None` if none of them varies.
+    pub fn from_terms(terms: Vec<EmissionTerm>, chart: UvMapping) -> Option<Self> {
+        terms.iter().any(EmissionTerm::varies).then_some(Self { terms, chart })
     }
 
     /// Whether the factor varies with position.
     pub fn varies_with_position(&self) -> bool {
-        self.texture.is_some() || self.opacity.is_some()
+        self.terms.iter().any(EmissionTerm::varies_with_position)
     }
 
-    /// The factor at the given texture coordinates.
+    /// The factor at the given texture coordinates, without coats.
     #[inline]
     pub fn factor_at_uv(&self, uv: DVec2) -> Vec3 {
-        self.lookup_texture_point(&TexturePoint::from_uv(uv))
+        self.sum_without_coat(&TexturePoint::from_uv(uv))
     }
 
     #[inline]
-    fn lookup_texture_point(&self, at: &TexturePoint) -> Vec3 {
-        let color = self.texture.as_ref().map_or(Vec3::ONE, |texture| texture.lookup(at));
-        match &self.opacity {
-            Some(opacity) => color * opacity.evaluate(at, &mut 0),
-            None => color,
-        }
+    fn sum_without_coat(&self, at: &TexturePoint) -> Vec3 {
+        self.terms.iter().map(|term| term.lookup_without_coat(at)).sum()
     }
 
-    /// Number of texels per unit of u and v. If there is both a color texture and an opacity texture, returns
-    /// the larger number.
+    /// Largest number of texels per unit of u and v in any of the textures.
     pub fn texels_per_uv_unit(&self) -> [f64; 2] {
-        let of_opacity = self.opacity.as_ref().and_then(|opacity| opacity.value.texture());
-        let across =
-            [self.texture.as_ref(), of_opacity].map(|texture| texture.map(|one| one.texels_per_unit()));
+        let across = self.terms.iter().flat_map(EmissionTerm::textures).map(|one| one.texels_per_unit());
         let finer = |[u, v]: [f64; 2], [own_u, own_v]: [f64; 2]| [u.max(own_u), v.max(own_v)];
-        across.into_iter().flatten().reduce(finer).unwrap_or([1.0; 2])
+        across.reduce(finer).unwrap_or([1.0; 2])
     }
 
     /// The factor at a point on the light, for a ray in a given direction. `primitive` is the mesh triangle
@@ -100,19 +164,31 @@ impl EmissionModulation {
             * self.coat_transmittance(point, primitive, direction)
     }
 
-    /// [`EmissionModulation::radiance_factor`] without the coat.
+    /// [`EmissionModulation::radiance_factor`] without coats.
     pub fn radiance_factor_without_coat(&self, point: Vec3, primitive: u32) -> Vec3 {
-        self.lookup_texture_point(&self.chart.texture_point(point.as_dvec3(), primitive))
+        self.sum_without_coat(&self.chart.texture_point(point.as_dvec3(), primitive))
     }
 
-    /// The clear coat's transmittance for a ray in a given direction.
+    /// The clear coats' transmittance for a ray in a given direction, averaged over the emission.
     pub fn coat_transmittance(&self, point: Vec3, primitive: u32, direction: Vec3) -> Vec3 {
-        let Some(coat) = &self.coat else { return Vec3::ONE };
+        if self.terms.iter().all(|term| term.coat.is_none()) {
+            return Vec3::ONE;
+        }
         let (point, direction) = (point.as_dvec3(), direction.as_dvec3());
         let at = self.chart.texture_point(point, primitive);
         // At a shape's edge, the probe ray may miss the shape because of rounding.
         let normal = self.chart.geometric_normal_at_point(point, primitive, direction);
-        coat.transmittance(&at, normal.map_or(1.0, |normal| normal.dot(direction)) as f32, &mut 0)
+        let cosine = normal.map_or(1.0, |normal| normal.dot(direction)) as f32;
+        let left = |term: &EmissionTerm| {
+            term.coat.as_ref().map_or(Vec3::ONE, |coat| coat.transmittance(&at, cosine, &mut 0))
+        };
+        if let [term] = &self.terms[..] {
+            return left(term);
+        }
+        let coated: Vec3 = self.terms.iter().map(|term| term.lookup_without_coat(&at) * left(term)).sum();
+        let bare = self.sum_without_coat(&at);
+        let part = |coated: f32, bare: f32| if bare > 0.0 { coated / bare } else { 0.0 };
+        Vec3::new(part(coated.x, bare.x), part(coated.y, bare.y), part(coated.z, bare.z))
     }
 }
 

@@ -22,7 +22,7 @@ pub mod torus;
 pub mod transformed;
 pub mod triangle;
 
-pub use emission_texture::{EmissionModulation, TriangleWithUvs, UvMapping};
+pub use emission_texture::{BlendWeight, EmissionModulation, EmissionTerm, TriangleWithUvs, UvMapping};
 pub use mesh::MeshEmitter;
 pub use sample_point::LightSamplePoint;
 

@@ -38,7 +38,7 @@ impl KeyInTable<'_> {
             return self.texture_channel_table(textures);
         }
         let name = self.string_described_by(|| NAME_OR_TEXTURE.to_owned())?;
-        Some((self.resolve_name_or_report(textures, name)?, None))
+        Some((self.resolve_name_or_report(textures, name, self.value_span())?, None))
     }
 
     /// Reads the texture and the channel in `{ texture = "name", channel = "r" }`.

@@ -237,19 +237,16 @@ impl TileContext<'_> {
     ) -> Vec3 {
         let world = self.world;
         let material = &world.materials[world.material_index(hit)];
-        let emission = &material.emission;
-        if !emission.is_emissive() {
+        if !material.is_emissive() {
             return Vec3::ZERO;
         }
         let surface = world.geometry.surface(ray, hit);
         let normal = surface.normal;
-        if !emission.emits_on_side(normal.dot(ray.direction) < 0.0) {
-            return Vec3::ZERO;
-        }
         let at = world.texture_point(hit, &surface, |_| Footprint::POINT);
-        let mut radiance = emission.radiance_of_emitting_side(&at, normal.dot(ray.direction), lookups);
-        if let Some(opacity) = &material.opacity {
-            radiance *= opacity.evaluate(&at, lookups);
+        let cosine = normal.dot(ray.direction);
+        let radiance = material.expected_emission(&at, cosine < 0.0, cosine, lookups);
+        if radiance == Vec3::ZERO {
+            return Vec3::ZERO;
         }
         radiance * power_heuristic_from_ratio(self.light_pdf(ray, from_normal, (hit, normal)) / pdf)
     }

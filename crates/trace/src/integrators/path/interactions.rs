@@ -53,7 +53,8 @@ impl<'a> PathStepper<'a> for CameraWavefront<'a, '_> {
                         Bsdf::NonSpecular(rough) => self.shade_rough(path, vertex, rough, far),
                         Bsdf::Mirror(mirror) => self.shade_mirror(path, vertex, mirror),
                         Bsdf::Coated(coated) => self.shade_coated(path, vertex, coated, far),
-                        Bsdf::Dielectric(_) | Bsdf::ThinDielectric(_) => {}
+                        // Vertices at blends have the material of one part.
+                        Bsdf::Dielectric(_) | Bsdf::ThinDielectric(_) | Bsdf::Blend(_) => {}
                     }
                 }
             }

@@ -9,7 +9,7 @@ use super::kernel::kernel_integral_over_polygon;
 use super::map::{GatherPoint, MIN_COSINE, REACH};
 use crate::geometry::local_geometry::{FlatOrRoundExtent, FlatPolygon, NearestSurface};
 use crate::geometry::{Aabb, LocalGeometry, Shape, ShapeHit};
-use crate::materials::{Material, NonSpecular};
+use crate::materials::{Bsdf, Material, NonSpecular};
 use crate::math::frame::Frame;
 use crate::math::{DVec2, DVec3};
 use crate::world::{Hit, MeshInstance, Object, World};
@@ -79,8 +79,11 @@ pub fn primitive_material(world: &World, object: u32, primitive: u32) -> &Materi
     &world.materials[world.material_index(&Hit { shape, object })]
 }
 
-/// Whether photons are stored on a side of a material.
+/// Whether photons are stored on a side of a material, or of any part of a blend.
 pub fn can_store_photons(material: &Material, is_front: bool) -> bool {
+    if let Bsdf::Blend(blend) = &material.bsdf {
+        return blend.parts.iter().any(|part| can_store_photons(part, is_front));
+    }
     let is_lit = |rough: &NonSpecular| rough.as_untextured().is_none_or(|bsdf| !bsdf.is_black());
     let is_rough_glass = || material.bsdf.as_dielectric().is_some_and(|glass| !glass.is_smooth());
     let is_stored = material.bsdf.non_specular_part().is_some_and(is_lit) || is_rough_glass();

@@ -6,6 +6,7 @@
 //! scattering uses the adjoint of its BSDF: f·|wi·Ns|·|wo·Ng|/|wi·Ng| (Veach, *Robust Monte Carlo Methods for
 //! Light Transport Simulation*, 1997, section 5.3).
 
+use super::coverage::can_store_photons;
 use super::map::Photon;
 use crate::control::Cancelled;
 use crate::geometry::packet::set_bit_lanes;
@@ -32,7 +33,7 @@ use crate::integrators::view::LightAov;
 use crate::integrators::{PACKET_SIZE, RayCounters};
 use crate::lights::{EmittedPhoton, PhotonEmitter, PhotonOrigin, PhotonRandomNumbers};
 use crate::materials::bsdf::LobesToSample;
-use crate::materials::{Bsdf, BxdfPoint, Coated, NonSpecular, ThinDielectric};
+use crate::materials::{Bsdf, BxdfPoint, Coated, Material, NonSpecular, ThinDielectric};
 use crate::math::Vec3;
 use crate::math::lanes::{Simd, lane, set_lane};
 use crate::sampling::{CAMERA_PATH, Dimension, SamplerPacket};
@@ -332,7 +333,7 @@ impl PhotonWavefront<'_> {
                 let ray = reflected_path(path, vertex, &shading, reflectance);
                 self.queue_specular_photon(path, vertex, (shading.normal, 1.0), ray);
             }
-            Bsdf::Mirror(_) | Bsdf::Dielectric(_) | Bsdf::ThinDielectric(_) => {}
+            Bsdf::Mirror(_) | Bsdf::Dielectric(_) | Bsdf::ThinDielectric(_) | Bsdf::Blend(_) => {}
         }
     }
 
@@ -376,7 +377,18 @@ impl PhotonWavefront<'_> {
         vertex.tint_bsdf_by_vertex_color(&mut bsdf);
         if !bsdf.is_black() {
             self.store_and_scatter(path, vertex, bsdf, (far, scattered));
+        } else if vertex.is_blended() {
+            // Other parts of the blend may reflect the photon.
+            self.store_at_vertex(path, vertex);
         }
+    }
+
+    /// Stores a photon at a vertex. It also represents photons that passed through the surface as a null
+    /// interaction, or chose a part of a blend on which no photons are stored.
+    fn store_at_vertex(&mut self, path: &PathRay, vertex: &SurfaceVertex<'_>) {
+        let chance = storage_probability(path, vertex, &mut self.counters.texture_lookups);
+        let all = PathRay { throughput: path.throughput / chance, ..*path };
+        self.store_photon(&all, vertex.surface.point, vertex.normal);
     }
 
     /// Like [`PhotonWavefront::store_and_scatter_at_rough`], with the BSDF already evaluated.
@@ -388,10 +400,7 @@ impl PhotonWavefront<'_> {
         (far, scattered): (&InteriorList, Option<f32>),
     ) {
         let tile = self.tracing.tile;
-        // Store the photon. It also represents photons that passed through the surface as a null interaction.
-        let chance = opacity_at(path, vertex, &mut self.counters.texture_lookups);
-        let all = PathRay { throughput: path.throughput / chance, ..*path };
-        self.store_photon(&all, vertex.surface.point, vertex.normal);
+        self.store_at_vertex(path, vertex);
         let Some(by_chance) = scattered.filter(|_| path.state.only_specular_before && self.may_scatter())
         else {
             return;
@@ -539,6 +548,16 @@ impl PhotonWavefront<'_> {
         }
         self.next.truncate(kept);
     }
+}
+
+/// Probability that a photon is stored where it hits a surface.
+fn storage_probability(path: &PathRay, vertex: &SurfaceVertex<'_>, lookups: &mut u64) -> f32 {
+    if !vertex.is_blended() {
+        return opacity_at(path, vertex, lookups);
+    }
+    let at = vertex.lookup_point(path.state.pdf > 0.0);
+    let is_stored = |part: &Material| can_store_photons(part, vertex.is_front);
+    vertex.surface_material.presence(&at, &is_stored, lookups)
 }
 
 /// Largest component of a photon's flux in W. Unlike basic flux, it does not depend on the medium.

@@ -9,6 +9,7 @@ use super::ray::{PathHistory, PathRay};
 use super::tile::TileContext;
 use crate::geometry::Ray;
 use crate::geometry::packet::set_bit_lanes;
+use crate::materials::Material;
 use crate::materials::bsdf::{DielectricSamplePacket, LobesToSample};
 use crate::math::Vec3;
 use crate::math::lanes::{F32x16, PACKET_SIZE, Simd, TRUE, Vec3x16, lane, set_lane};
@@ -34,7 +35,7 @@ impl BounceContinuation {
 
     /// Determines how paths continue in these lobes after `depth` bounces.
     pub fn new(tile: &TileContext<'_>, depth: u32, lobes: LobesToSample) -> Self {
-        let emits = || tile.world.materials.iter().any(|material| material.emission.is_emissive());
+        let emits = || tile.world.materials.iter().any(Material::is_emissive);
         let max_depth = tile.settings.render.max_depth;
         let shines = || tile.world.lights.has_visible_infinite_lights() || emits();
         let continues = depth + 1 < max_depth || depth + 1 == max_depth && shines();

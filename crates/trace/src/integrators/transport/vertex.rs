@@ -13,6 +13,7 @@ use crate::materials::{
     BxdfPoint, Coated, Footprint, Material, Mirror, SpecularPart, TexturePoint, ThinDielectric,
 };
 use crate::math::Vec3;
+use crate::sampling::Dimension;
 use crate::scene::description::ShadowMode;
 use crate::world::{Hit, OffsetPoints};
 
@@ -20,8 +21,10 @@ use crate::world::{Hit, OffsetPoints};
 pub struct SurfaceVertex<'a> {
     /// The surface.
     pub surface: SurfacePoint,
-    /// Material of the surface.
+    /// Material of the surface. At a blend, this is the chosen part.
     pub material: &'a Material,
+    /// The blend to which [`SurfaceVertex::material`] belongs, or the same material.
+    pub surface_material: &'a Material,
     /// [`Ray::start`] for rays that leave the vertex.
     start: u32,
     /// Origins for rays on either side, if they are known more precisely than the surface's error bound
@@ -101,7 +104,7 @@ impl<'a> SurfaceVertex<'a> {
         hit: &Hit,
         distance: f32,
     ) -> Self {
-        let material = &tile.world.materials[index];
+        let surface_material = &tile.world.materials[index];
         // Determine the path's side.
         let wo = -path.ray.direction;
         let side = if surface.normal.dot(wo) < 0.0 { -1.0 } else { 1.0 };
@@ -112,16 +115,19 @@ impl<'a> SurfaceVertex<'a> {
             true => Footprint::from_ray_cone(cone.width.abs(), path.ray.direction, surface.normal, tangents),
             false => Footprint::POINT,
         };
+        let texture_point = tile.world.texture_point(hit, &surface, footprint);
+        let material = chosen_material(tile, path, surface_material, &texture_point);
         let curvature = match has_beam && material.bsdf.has_delta() {
             true => side * tile.world.geometry.mean_curvature(hit, &surface),
             false => 0.0,
         };
         Self {
-            texture_point: tile.world.texture_point(hit, &surface, footprint),
+            texture_point,
             cone,
             color: tile.world.vertex_color(hit),
             curvature,
             material,
+            surface_material,
             has_uv: tile.world.object_has_texture_axes_if_needed(hit.object),
             is_front: surface.normal.dot(path.ray.direction) < 0.0,
             wo,
@@ -131,6 +137,11 @@ impl<'a> SurfaceVertex<'a> {
             start: tile.world.geometry.scene_triangle_number(hit),
             sides: None,
         }
+    }
+
+    /// Whether the surface is a blend.
+    pub fn is_blended(&self) -> bool {
+        !std::ptr::eq(self.material, self.surface_material)
     }
 
     /// Whether the surface scatters light on the path's side.
@@ -328,6 +339,23 @@ impl<'a> SurfaceVertex<'a> {
         let lift =
             (is_above && only_specular_before).then_some(ShadowOriginLiftSegment { to: shadow_point, end });
         ShadowOrigin { point: on_facet, start: self.start, horizon, lift }
+    }
+}
+
+/// Chooses a material of a blend. All vertices of one interaction make the same choice, because the random
+/// number depends only on the path. If light samples compete with the path, the texture of the weight is
+/// looked up without filtering, as for light samples and shadow rays.
+#[inline]
+fn chosen_material<'a>(
+    tile: &TileContext<'_>,
+    path: &PathRay,
+    material: &'a Material,
+    at: &TexturePoint,
+) -> &'a Material {
+    let number = || tile.sampler_for_slot(path.slot).pair(path.path, Dimension::Blend).x;
+    match path.state.pdf > 0.0 {
+        true => material.choose_part(&at.without_footprint(), number, &mut 0),
+        false => material.choose_part(at, number, &mut 0),
     }
 }
 
