@@ -106,7 +106,8 @@ mod tests {
         let mut text = String::new();
         for (table, body) in [
             ("camera", "[camera]\nposition = [0, 1, 4]\nlook_at = [0, 1, 0]\n"),
-            ("", "[textures.name]\nfile = \"a.png\"\n[materials.name]\n[groups.name]\n"),
+            ("", "[textures.name]\nfile = \"a.png\"\n[groups.name]\n"),
+            ("", "[materials.name]\n[materials.paint]\n[materials.rust]\n"),
         ] {
             if table != info.name {
                 text.push_str(body);
@@ -133,9 +134,13 @@ mod tests {
             };
             for kind in kinds {
                 for key in info.keys_for_type(kind) {
-                    // Solid glass has no opacity.
-                    let is_glass = kind.is_some_and(|kind| kind.name == "glass");
-                    if is_glass && key.name.starts_with("opacity") {
+                    // Solid glass has no opacity and no coat. A blend has only its own keys.
+                    let is_refused = match kind.map(|kind| (kind.name, kind.keys)) {
+                        Some(("glass", _)) => ["opacity", "coat"].iter().any(|one| key.name.starts_with(one)),
+                        Some(("blend", own)) => own.iter().all(|one| one.name != key.name),
+                        Some(_) | None => false,
+                    };
+                    if is_refused {
                         continue;
                     }
                     let text = with_example(info, kind, key);
