@@ -91,7 +91,7 @@ fn textured_weights_show_the_parts() {
 
 #[test]
 fn blends_emit_the_weighted_sum() {
-    // The lamp faces down, 1 above the receiver. Its parts emit 6 and 1 with weights 0.25 and 0.75.
+    // The light faces down, 1 above the receiver. Its parts emit 6 and 1 with weights 0.25 and 0.75.
     let corners = [v(-0.5, 1.0, -0.5), v(0.5, 1.0, -0.5), v(0.5, 1.0, 0.5), v(-0.5, 1.0, 0.5)];
     let lit = lambert(DVec3::ZERO, DVec3::Y, &corners) * 0.5 / PI;
     for name in ["constant", "textured"] {
@@ -109,7 +109,7 @@ fn blends_emit_the_weighted_sum() {
             let values = build.values(256, 16);
             assert_mean(&format!("{name}, {integrator}"), &values, lit * 2.25, 1e-2);
         }
-        // The lamp itself.
+        // The light as seen by the camera.
         let seen = build.seen(v(0.0, 0.5, 0.0), v(0.0, 1.0, 0.0));
         assert_mean(&format!("{name}, seen"), &seen.values(256, 16), 2.25, 4e-3);
     }
@@ -153,7 +153,7 @@ fn shadow_rays_pass_blends_with_the_mean_transmittance() {
 
 #[test]
 fn light_behind_blends_reaches_paths_and_light_samples_alike() {
-    // A veil between a lamp and the receiver: half absent, and half a pane.
+    // A veil between a light and the receiver: half of it is absent, and half is a pane.
     let mut veil = matte(0.0);
     veil.opacity = OpacitySource { value: number(0.25), cutoff: 0.0 };
     let tint = ColorSource::Constant(Vec3::ONE);

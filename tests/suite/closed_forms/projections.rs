@@ -101,7 +101,7 @@ fn fisheye_is_black_outside_its_circle() {
             assert_eq!(pixel, DVec3::ONE, "{x}, {y}");
         }
     }
-    // Views of first hits are black there, too.
+    // Views of first hits are also black there.
     let inside = scene().sphere(DVec3::ZERO, 3.0, matte(0.5)).viewed(ViewMode::Depth);
     let corner = with_camera(inside, unshifted(Fisheye { fov: 360.0 }), (width, height)).picture(4, 0)[0];
     assert_eq!(corner, DVec3::ZERO);

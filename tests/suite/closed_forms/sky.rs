@@ -359,7 +359,7 @@ fn integrators_agree_under_a_clear_sky() {
 
 #[test]
 fn photons_match_path_under_a_clear_sky() {
-    // A mirror throws light on the floor. With a wide sun, paths find it, too.
+    // A mirror reflects light onto the floor. The sun is so wide that paths find it as well as photons.
     let sky = Sky { sun_angle: 20.0, ..clear(v(1.0, 1.2, 0.3), 1.0, 1.0) };
     let build = scene()
         .quad(v(-1.0, 0.0, 1.0), v(2.0, 0.0, 0.0), v(0.0, 0.0, -2.0), matte(0.6))

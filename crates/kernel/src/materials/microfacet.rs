@@ -28,7 +28,7 @@ choice! {
 }
 
 impl MicrofacetDistribution {
-    /// Beckmann if the condition holds, and GGX otherwise.
+    /// Beckmann if the condition holds, or else GGX.
     pub const fn beckmann_if(condition: bool) -> Self {
         if condition { Self::Beckmann } else { Self::Ggx }
     }

@@ -85,7 +85,7 @@ pub(super) fn add_unreadable_image_errors(
                 let help = format!("it is used by the material \"{material}\" in {file}");
                 findings.add_error(loaded, span, prefix_mtl_line(one, error), &help);
             }
-            _ => findings.add_asset_error(loaded, span, error),
+            (Some(_), None) | (None, _) => findings.add_asset_error(loaded, span, error),
         }
     }
 }

@@ -77,8 +77,7 @@ pub struct SampleBlock {
     pub pixels: SelectedPixels,
     /// Range of sample indices for each pixel.
     pub samples: Range<u32>,
-    /// Width of the image if it is mirrored. A pixel's samples are then those of the mirrored pixel in the
-    /// image before mirroring.
+    /// Width of the image if it is mirrored. Each pixel then takes the samples of the pixel that it mirrors.
     pub mirrored_width: Option<u32>,
 }
 

@@ -52,7 +52,7 @@ fn radiances_match_the_published_model() {
 }
 
 /// The means are the authors' spectral tables of the sun, integrated in double precision with the CIE color
-/// matching functions. The limb darkening is that of the spectrum at 60° and turbidity 2.
+/// matching functions. The limb darkening belongs to the spectrum at 60° and turbidity 2.
 #[test]
 fn sun_matches_the_published_model() {
     for (turbidity, degrees, expected) in [

@@ -11,7 +11,7 @@ use crate::math::lanes::Mask;
 use crate::math::soa::Soa;
 use glimt_base::soa;
 
-/// A layer and what it covers: a coat over the lobes of a material, or their values for a view direction.
+/// A layer and its base: a coat over the lobes of a material, or their values for a view direction.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct LayerOver<L, B> {
     layer: L,
