@@ -78,7 +78,7 @@ FAULTS = [
      DIRECT + "estimators::light_samples_match_the_quadrature"),
     ("light samples without a cosine", "integrators/direct/all_lights.rs", "(⟦cosines[i]⟧ * share);", "1.0",
      DIRECT + "estimators::light_samples_match_the_quadrature"),
-    ("BSDF samples without a cosine", "integrators/transport/scatter.rs", "let share = ⟦cosines[i]⟧ / pdfs[i];", "1.0",
+    ("BSDF samples without a cosine", "integrators/transport/scatter.rs", "let share = ⟦cosines[i] / pdfs[i]⟧;", "1.0 / pdfs[i]",
      DIRECT + "estimators::bsdf_samples_match_the_quadrature"),
     ("path weights that ignore the number of light samples", "integrators/direct/mis.rs",
      "power_heuristic_from_ratio(of_light * ⟦samples⟧ / pdf);", "1.0",
