@@ -341,7 +341,8 @@ fn orthographic_textures_are_equally_sharp_at_any_distance() {
     }
 }
 
-/// Parallel rays that start inside glass are tinted from there on; the others start in air.
+/// Parallel rays that start inside glass are tinted from there on, whether they leave it or end at a lamp
+/// inside; the others start in air.
 #[test]
 fn parallel_rays_can_start_in_glass() {
     let gray = || tinted(1.0, DVec3::splat(0.5));
@@ -351,18 +352,23 @@ fn parallel_rays_can_start_in_glass() {
         ("shape", scene().sphere(center, 1.0, gray())),
         ("mesh", scene().mesh(mesh, [DVec3::ONE, DVec3::ZERO, DVec3::ZERO], gray())),
     ] {
-        let seen = |x: f64| {
+        let build = build.environment(1.0);
+        let with_lamp =
+            build.clone().quad(v(0.6, -0.05, -0.25), 1.8 * DVec3::X, 0.1 * DVec3::Y, emitter(1.0));
+        let seen = |build: &Build, x: f64| {
             let shift = DVec2::new(x * 1000.0, 0.0);
             let camera = camera(Orthographic { view_height: 1e-3 }, ImageWindow { shift, mirror: false });
-            with_camera(build.clone().environment(1.0), camera, (1, 1)).value()
+            with_camera(build.clone(), camera, (1, 1)).value()
         };
         for x in [1.2, 1.5, 2.1_f64] {
-            let inside = (1.0 - (x - 1.5).powi(2)).sqrt();
-            let (found, expected) = (seen(x), 0.5_f64.powf(inside));
-            assert!((found - expected).abs() < 2e-3, "{what} at {x}: {found} {expected}");
+            let to_surface = (1.0 - (x - 1.5).powi(2)).sqrt();
+            for (build, inside) in [(&build, to_surface), (&with_lamp, 0.25)] {
+                let (found, expected) = (seen(build, x), 0.5_f64.powf(inside));
+                assert!((found - expected).abs() < 2e-3, "{what} at {x}: {found} {expected}");
+            }
         }
-        assert_close(what, seen(-1.5), 1.0);
-        assert_close(what, seen(0.4), 1.0);
+        assert_close(what, seen(&build, -1.5), 1.0);
+        assert_close(what, seen(&build, 0.4), 1.0);
     }
 }
 
