@@ -8,16 +8,15 @@ use glimt::film::Rect;
 use glimt::geometry::mesh::TriangleMesh;
 use glimt::integrators::ViewMode;
 use glimt::math::{DVec3, Vec3};
-use glimt::scene::description::{Material, Shape};
+use glimt::scene::description::{Material, NumberSource, ReflectingSides, Shape};
 use rayon::prelude::*;
 
 use super::distant::sun;
 use super::global::by_paths;
-use super::mean_and_error;
 use super::scenes::{
-    AS_IT_IS, Build, emitter, glass, lat_long_sphere, maps, matte, mirror, phong, scene, tile_by,
+    AS_IT_IS, Build, blend, emitter, glass, lat_long_sphere, maps, matte, mirror, phong, scene, tile_by,
 };
-use super::v;
+use super::{assert_mean, mean_and_error, v};
 
 /// Seeds per method.
 const SEEDS: u32 = 16;
@@ -334,6 +333,26 @@ fn photon_light_is_uniform_up_to_rims() {
         let rim = strip(lit, v(-1.024, 0.0, 0.0), (0.04, 0.06));
         assert_even(&format!("the rim of {what}"), &rim, (3000, 0.05), even());
     }
+}
+
+#[test]
+fn photon_light_is_uniform_up_to_black_backs() {
+    // Next to the floor is another that faces down. Its black back stores no photons.
+    let front_only = || Material { sides: ReflectingSides::Front, ..matte(0.7) };
+    let build = scene()
+        .quad(v(-2.0, 0.0, 0.5), v(1.0, 0.0, 0.0), v(0.0, 0.0, -1.0), front_only())
+        .quad(v(-1.0, 0.0, 0.5), v(0.0, 0.0, -1.0), v(1.0, 0.0, 0.0), front_only());
+    let edge = strip(mirrored(build, (-1.25, -0.95), (0.0, 0.6)), v(-1.05, 0.0, 0.0), (0.099, 0.3));
+    assert_even("a strip next to a black back", &edge, (3500, 0.1), even());
+}
+
+#[test]
+fn photons_on_blends_represent_all_that_arrive() {
+    // No photons are stored on the mirror. The camera sees the black sky in it.
+    let floor = blend(matte(0.7), mirror(1.0), NumberSource::Constant(0.4));
+    let build = scene().quad(v(-2.0, 0.0, 0.5), v(1.0, 0.0, 0.0), v(0.0, 0.0, -1.0), floor);
+    let middle = strip(mirrored(build, (-1.7, -1.3), (0.0, 0.4)), v(-1.5, 0.0, 0.0), (0.1, 0.1));
+    assert_mean("floor", &middle.photons(6000, 0.1).mean_reds(16), 0.6 * even(), 1.5e-2);
 }
 
 #[test]

@@ -222,6 +222,10 @@ fn photons_scatter_to_both_sides_of_rough_glass() {
         let means = both(&room(depth), depth, [1024, 28], (20_000, 0.03));
         assert_same_light(&format!("depth {depth}"), means, 1.2e-2, 4e-3);
     }
+    // The matte box, seen from inside the frosted one.
+    let inside = room(6).pictured(v(-0.2, 0.38, 0.2), v(-0.4, 0.29, 0.0), 60.0, 8, 8);
+    let means = both(&inside, 6, [256, 14], (20_000, 0.03));
+    assert_same_light("inside", means, 4e-2, 4e-3);
 }
 
 #[test]
