@@ -74,8 +74,8 @@ impl Coated {
         }
     }
 
-    /// The clear coat's transmittance in and out at the same angle, including the light that it returns to a
-    /// base with the given reflectance.
+    /// Transmittance of the clear coat in and out at the same angle, including interreflection with a base of
+    /// the given reflectance.
     #[inline]
     fn coat_transmittance(&self, cosine: f32, base: Vec3, at: &TexturePoint, lookups: &mut u64) -> Vec3 {
         self.coat.as_ref().map_or(Vec3::ONE, |coat| coat.two_way_transmittance(at, cosine, base, lookups))

@@ -47,7 +47,7 @@ use crate::math::Vec3;
 use texture::Texture;
 
 choice! {
-    /// Which sides of an opaque surface reflect light.
+    /// The sides of an opaque surface that reflect light.
     pub enum ReflectingSides {
         /// Both sides.
         Both = "both",
@@ -61,7 +61,7 @@ choice! {
 pub struct Material {
     /// How the surface scatters light.
     pub bsdf: Bsdf,
-    /// Which sides scatter light.
+    /// The sides that scatter light.
     pub sides: ReflectingSides,
     /// Emitted radiance.
     pub emission: Emission,
@@ -72,7 +72,8 @@ pub struct Material {
 }
 
 impl Material {
-    /// Whether a side of the surface scatters light. The parts of a blend have their own sides.
+    /// Whether the front or the back scatters light. Always true for blends, whose parts have their own
+    /// `sides`.
     #[inline]
     pub fn scatters_on_side(&self, is_front: bool) -> bool {
         match self.sides {
@@ -112,8 +113,8 @@ impl Material {
         self.blend().is_some_and(|blend| blend.parts.iter().any(property))
     }
 
-    /// Chooses one of the materials of a blend with a random number in [0, 1). Other materials are their own
-    /// only choice. Counts texture lookups in `lookups`.
+    /// Chooses a part of a blend, or of blends nested in it, with a random number in [0, 1). Returns other
+    /// materials unchanged. Counts texture lookups in `lookups`.
     #[inline]
     pub fn choose_part(&self, at: &TexturePoint, u: impl FnOnce() -> f32, lookups: &mut u64) -> &Self {
         let Some(mut blend) = self.blend() else { return self };
@@ -132,8 +133,9 @@ impl Material {
         self.emission.is_emissive() || self.is_any_part(Self::is_emissive)
     }
 
-    /// Expected radiance that a side emits, in a direction at the given cosine to the normal: the radiance
-    /// times the opacity, averaged over the parts of a blend. Counts texture lookups in `lookups`.
+    /// Expected radiance emitted from one side, at the given cosine to the normal: the radiance times the
+    /// opacity, or for a blend, the weighted mean of this over its parts. Counts texture lookups in
+    /// `lookups`.
     pub fn expected_emission(
         &self,
         at: &TexturePoint,
@@ -198,7 +200,7 @@ impl Material {
         self.textures().iter().any(|texture| texture.mipmaps.is_some())
     }
 
-    /// All textures. The emission's coat is omitted because it has the same textures as the BSDF's coat.
+    /// All textures. Skips the coat of the emission, which has the same textures as the coat of the BSDF.
     fn textures(&self) -> Vec<&Arc<Texture>> {
         let mut textures: Vec<_> = match &self.bsdf {
             Bsdf::NonSpecular(rough) => rough.textures().collect(),

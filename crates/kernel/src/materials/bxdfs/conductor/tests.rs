@@ -12,7 +12,7 @@ use crate::materials::bxdfs::lobe_tests::{
 use crate::materials::bxdfs::reference_tests::{reference_beckmann_brdf, reference_microfacet_brdf};
 use crate::math::DVec3;
 
-/// The values of α that are tested with the Beckmann distribution, whose samples are slow.
+/// Values of α for tests of the Beckmann distribution. There are few, because sampling it is slow.
 const BECKMANN_ALPHAS: [f32; 4] = [0.004, 0.05, 0.2, 1.0];
 
 /// α along u and v for each α: isotropic, stretched along v, and stretched along u.

@@ -103,7 +103,7 @@ impl<const THROUGH: bool> Bxdf for TranslucentBxdf<THROUGH> {
         } else {
             self.reflection.sample(view, from, [choice / reflected_share, u[0], u[1]], any)
         };
-        // If the path continues on the other side, this direction is not used.
+        // This direction is unused if the path continues on the other side.
         choose_vec3_by_bool((choice >= reflected_share) == THROUGH, wi, -from.normal)
     }
 

@@ -1,6 +1,6 @@
-//! Phong surfaces that also transmit light diffusely, like leaves and paper: f = kt/π for light from the other
-//! side. A surface is represented by two vertices, see [`bsdf`](crate::materials::bsdf). The side on which a
-//! path continues is chosen by albedo.
+//! Phong surfaces that also transmit light diffusely, such as leaves and paper: f = kt/π for light from the
+//! other side. Each interaction has two vertices, one per side; see [`bsdf`](crate::materials::bsdf). The
+//! side on which a path continues is chosen in proportion to the albedos.
 
 mod bxdf;
 
