@@ -42,7 +42,7 @@ pub(crate) static INSTANCE: TableInfo = TableInfo::new(
         rotate: ANGLES, Is("[0, 0, 0]"), "degrees";
         /// Translation, applied last.
         translate: Numbers(3, "three numbers", Any), Is("[0, 0, 0]"), "length";
-        /// Name used for clicks and by `--set`.
+        /// Name shown after a click and used by `--set`.
         name: Text, Absent;
         /// An affine transform in row-major order, with 0, 0, 0, 1 as the last row; instead of `scale`,
         /// `rotate` and `translate`.

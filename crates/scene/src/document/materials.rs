@@ -38,7 +38,7 @@ table_types! {
         shininess: Number(Between(0.0, 1000000.0)), Is("32.0");
         /// Reflectance for `[render] ambient`.
         ambient: ColorOrTexture(AtLeast(0.0)), By("as `diffuse`");
-        /// Diffuse transmittance through the surface, kt, as of leaves and paper.
+        /// Diffuse transmittance, kt, for thin surfaces such as leaves and paper.
         diffuse_transmission: ColorOrTexture(AtLeast(0.0)), Is("[0, 0, 0]"), "reflectance";
     }
     /// A perfect mirror.
@@ -104,9 +104,9 @@ table_types! {
         specular: FRACTION, Is("1.0");
         /// Scale factor for the dielectric part's specular reflectance at normal incidence.
         specular_color: ColorOrTexture(AtLeast(0.0)), Is("[1, 1, 1]");
-        /// Fraction of light that is transmitted straight through, as by a thin sheet, instead of scattered.
+        /// Fraction of the diffuse light that is transmitted instead, as through a thin sheet.
         transmission: FRACTION, Is("0.0");
-        /// Diffuse transmittance through the surface, as of leaves and paper; at most 1 − `color`.
+        /// Diffuse transmittance, for thin surfaces such as leaves and paper; at most 1 − `color`.
         diffuse_transmission: REFLECTANCE, Is("[0, 0, 0]"), "reflectance";
         /// Weight of the clear coat on top; another name for `coat`.
         clearcoat: FRACTION, Is("0.0");
@@ -129,7 +129,7 @@ pub(crate) static MATERIALS: TableInfo = TableInfo {
         TableSyntax::Named,
         "A material, which shapes refer to by name",
         keys! {
-            /// The sides of an opaque surface that reflect light; the back is otherwise black.
+            /// The sides of an opaque surface that reflect light; with `front`, the back is black.
             sides: Words(choice_values::<ReflectingSides>), Is("\"both\"");
             /// Emitted radiance; if not black, every shape with this material is an area light.
             emission: Emission(AtLeast(0.0)), Is("[0, 0, 0]"), "radiance";
@@ -143,13 +143,13 @@ pub(crate) static MATERIALS: TableInfo = TableInfo {
             bump: Heights, Absent;
             /// Displacement of white; negative values invert the relief.
             bump_scale: Number(Any), Is("0.01"), "length";
-            /// Weight of a dielectric layer over everything below it, emission included.
+            /// Weight of a clear dielectric layer on top of the material, which also attenuates its emission.
             coat: FRACTION, Is("0.0");
             /// Square root of the layer's GGX α.
             coat_roughness: FRACTION, Is("0.05");
             /// The layer's index of refraction.
             coat_ior: Number(Between(1.0, 10.0)), Is("1.5");
-            /// Transmittance of the layer, in and out together, at normal incidence.
+            /// Transmittance for a round trip through the layer at normal incidence.
             coat_tint: REFLECTANCE, Is("[1, 1, 1]");
             /// Probability that a ray hits the surface instead of passing through.
             opacity: FRACTION, Is("1.0");
