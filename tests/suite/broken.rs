@@ -380,7 +380,7 @@ const BROKEN: &[(&str, &[ExpectedDiagnostic])] = &[
             (7, 1, r#"`view_height` conflicts with `projection = "panorama"`"#),
             (8, 1, r#"`aperture` conflicts with `projection = "panorama"`"#),
             (9, 1, r#"`focus` conflicts with `projection = "panorama"`"#),
-            (13, 10, "`matrix` must be a rotation; it mirrors: its determinant is -1"),
+            (13, 10, "`matrix` must be a rotation; it is a reflection: its determinant is -1"),
         ],
     ),
     (

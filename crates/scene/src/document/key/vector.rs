@@ -5,8 +5,8 @@ use super::KeyInTable;
 use crate::math::limits::{SHORTEST, is_nonzero_but_too_short, robust_length};
 use crate::math::{DMat3, DVec3, Vec2};
 
-/// Maximum deviation of the product of a rotation and its transpose from the identity. Files contain rotations
-/// with as few as four decimals.
+/// Maximum deviation of the product of a rotation and its transpose from the identity. Some files write
+/// rotations with only four decimals.
 const ROTATION_TOLERANCE: f64 = 1e-3;
 
 impl KeyInTable<'_> {
@@ -58,7 +58,8 @@ impl KeyInTable<'_> {
         false
     }
 
-    /// Reads a rotation matrix of 9 or 16 numbers, row by row. Removes rounding errors.
+    /// Reads a rotation matrix of 9 or 16 numbers in row-major order, and orthonormalizes it to remove
+    /// rounding errors.
     pub(in super::super) fn rotation(&self) -> Option<DMat3> {
         let is_4x4 = self.value?.as_array().is_some_and(|array| array.len() == 16);
         let expected = "9 or 16 numbers, row by row";
@@ -81,7 +82,7 @@ impl KeyInTable<'_> {
             return None;
         }
         if matrix.determinant() < 0.0 {
-            self.report_not_a_rotation("it mirrors: its determinant is -1");
+            self.report_not_a_rotation("it is a reflection: its determinant is -1");
             return None;
         }
         let x = matrix.x_axis.normalize();
