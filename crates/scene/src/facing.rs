@@ -69,7 +69,7 @@ pub(super) fn lights_facing_away(
 /// read here.
 fn is_camera_in_front_of_light(camera: &Camera, corner: DVec3, front: DVec3) -> bool {
     match camera {
-        // Parallel rays see the front from any position.
+        // For parallel rays, only the view direction matters.
         Camera::LookAt { position, look_at, projection: Projection::Orthographic { .. }, .. } => {
             front.dot(*look_at - *position) < 0.0
         }

@@ -14,7 +14,7 @@ const MAX_FIELD: f64 = 160.0;
 /// Maximum field of view of a fisheye, in degrees.
 const MAX_FISHEYE_FIELD: f64 = 360.0;
 /// Limit on dollying: the distance to `look_at` stays within this factor of its value in the scene. The same
-/// limit applies to the height of an orthographic image.
+/// limit applies to the height of an orthographic view.
 pub(super) const REACH: f64 = 1000.0;
 
 /// Orbits the camera around `look_at` by `right` and `up` degrees.

@@ -21,7 +21,7 @@ pub(crate) struct LightCache {
     lights: Memo<Arc<Lights>>,
     /// The environment map's importance distribution, which does not depend on the map's rotation.
     environment: Memo<Option<Arc<EnvironmentMap>>>,
-    /// The sky, which depends on the rotation only through its frame.
+    /// The evaluated sky. It does not depend on the rotation, which affects only the sky's frame.
     sky: Memo<Sky>,
 }
 
@@ -93,7 +93,7 @@ fn emissive_material_textures(scene: &Scene) -> impl Iterator<Item = TextureSour
     })
 }
 
-/// Returns the environment's sky or map, which are reused if they are unchanged.
+/// Returns the environment's sky or map. Reuses it if it is unchanged.
 fn environment_source(
     scene: &Scene,
     of: &FingerprintContext<'_>,

@@ -80,7 +80,7 @@ impl AbortReason {
         Self::Failed(Failure::Work(message.to_string()))
     }
 
-    /// Passes on errors about an asset, except for those that end the request.
+    /// Returns the error as `Ok` unless it must end the request.
     pub(super) fn unless_fatal(error: AssetError) -> Result<AssetError, Self> {
         match error {
             AssetError::Cancelled(_) => Err(Self::Cancelled),

@@ -112,7 +112,7 @@ fn read_look_at_camera(table: &TableReader<'_>) -> Option<Camera> {
     })
 }
 
-/// Reads the projection and the key for its size.
+/// Reads the projection and its field of view or height.
 fn read_projection(table: &TableReader<'_>) -> Option<Projection> {
     let [projection, fov, view_height] = ["projection", "fov", "view_height"].map(|name| table.key(name));
     let kind = projection.choice()?;
@@ -173,7 +173,7 @@ fn read_window(table: &TableReader<'_>) -> Option<ImageWindow> {
     Some(ImageWindow { shift: shift?, mirror: mirror? })
 }
 
-/// Reads aperture and focus. Projections without a lens have the default values.
+/// Reads aperture and focus. Returns the defaults for projections without a lens.
 fn read_lens(table: &TableReader<'_>, kind: Option<ProjectionKind>) -> [Option<f64>; 2] {
     let [aperture, focus] = ["aperture", "focus"].map(|name| table.key(name));
     match kind {

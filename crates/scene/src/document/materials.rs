@@ -300,7 +300,7 @@ impl<'a> MaterialReader<'a> {
         Some(MaterialKind::Metal { roughness, anisotropy, distribution, fresnel: fresnel? })
     }
 
-    /// Reads the distribution of the facets. Smooth surfaces ignore it.
+    /// Reads the distribution of the facets. Warns if the surface is smooth.
     fn read_distribution(&self, roughness: NumberSource) -> MicrofacetDistribution {
         let key = self.key("distribution");
         if roughness == NumberSource::Constant(0.0)
@@ -370,7 +370,7 @@ impl<'a> MaterialReader<'a> {
         }
     }
 
-    /// Reads a blend, which takes everything else from its materials.
+    /// Reads a blend, which has no keys of its own except `materials` and `weight`.
     fn read_blend(&self, name: String, materials: &DefinedNames) -> Option<UnresolvedBlend> {
         for key in MATERIALS.keys {
             let help = format!("set `{}` on the materials of the blend", key.name);
@@ -382,7 +382,7 @@ impl<'a> MaterialReader<'a> {
         Some(UnresolvedBlend { name, weight, parts: parts?, span: pair.value_span()? })
     }
 
-    /// Reads the sides that reflect light. Surfaces that transmit light scatter it on both sides.
+    /// Reads the sides that reflect light. Transmissive surfaces always scatter light on both sides.
     fn read_sides(&self, kind: Option<&MaterialKind>) -> ReflectingSides {
         let key = self.key("sides");
         let sides = key.or_default(KeyInTable::choice);
@@ -436,7 +436,7 @@ impl<'a> MaterialReader<'a> {
         coat.or_none()
     }
 
-    /// Reads the coat of a principled material, which has two names for some keys.
+    /// Reads the coat of a principled material, where some keys have two names.
     fn read_coat_or_clearcoat(&self) -> CoatSource {
         self.warn_if_ineffective_without("clearcoat_roughness", "clearcoat");
         let (coat, clearcoat) = (self.read_coat(), ["clearcoat", "clearcoat_roughness"]);
@@ -488,7 +488,7 @@ const COAT_KEYS: [&str; 4] = ["coat", "coat_roughness", "coat_ior", "coat_tint"]
 /// Warning message for materials that violate energy conservation.
 pub(crate) const ENERGY_GAIN: &str = "this material reflects more light than it receives";
 
-/// Warns if these albedos, which have these keys, add up to more than 1.
+/// Warns if the sum of `albedos`, the values of `keys`, exceeds 1.
 fn warn_about_albedo_above_one(message: &str, keys: &[KeyInTable<'_>], albedos: &[&ColorSource]) {
     let constant = |source: &&ColorSource| match source {
         ColorSource::Constant(color) => *color,

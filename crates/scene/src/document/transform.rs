@@ -42,8 +42,8 @@ pub(super) fn read_affine_matrix(key: &KeyInTable<'_>) -> Option<AffineMap> {
     None
 }
 
-/// Returns the reason why the composition of several transforms cannot be used and its details, or `None` if
-/// it can.
+/// Returns the reason why a composed transform cannot be used, and its details. Returns `None` if it can be
+/// used.
 pub(super) fn composed_transform_problem(transform: &ObjectTransform) -> Option<(&'static str, String)> {
     let map = transform.to_affine_map();
     let [x, y, z] = map.linear;
@@ -55,7 +55,7 @@ pub(super) fn composed_transform_problem(transform: &ObjectTransform) -> Option<
 }
 
 /// Minimum ratio of a matrix's determinant to the product of its column lengths. A matrix with a smaller
-/// ratio is singular up to rounding.
+/// ratio counts as singular.
 const MIN_VOLUME_RATIO: f64 = 1e-12;
 
 fn affine_map_problem(map: &AffineMap) -> Option<(&'static str, String)> {

@@ -127,7 +127,7 @@ impl ValueKind {
         }
     }
 
-    /// Returns the keys of a table, or nothing for other values.
+    /// Returns the keys of an inline table, or an empty slice for other kinds.
     pub fn inner_keys(self) -> &'static [KeyInfo] {
         if let Self::InlineTable(keys) = self { keys } else { &[] }
     }

@@ -73,7 +73,7 @@ pub fn record_first_hits_on_plain_surfaces(
 }
 
 /// Returns the albedo of a material if its albedo and shading normals are constant over each surface and the
-/// same on both sides, and none of its surfaces is a null interaction.
+/// same on both sides, and if it has no null interactions.
 fn constant_albedo(tile: &TileContext<'_>, index: usize) -> Option<Vec3> {
     let material = &tile.world.materials[index];
     let is_constant = !tile.world.material_needs_uvs_or_tangents(index)

@@ -43,9 +43,9 @@ pub enum EnvironmentSource {
     Sky(Sky),
 }
 
-/// Builds all lights: delta and directional lights first, then the environment and its sun, then emitting
-/// objects. A mesh becomes one light per emitting material. Two-sided emission becomes two lights. `sky` is the
-/// environment map or the sky, if there is one that is not black.
+/// Builds all lights: delta and directional lights first, then the environment and its sun, then emissive
+/// objects. A mesh becomes one light per emissive material, and two-sided emission becomes two lights. `sky`
+/// is the environment map or the sky, or `None` if there is none or it is black.
 ///
 /// # Errors
 /// [`Cancelled`] if the token is canceled.
@@ -175,7 +175,7 @@ impl SurfaceEmission {
         }
     }
 
-    /// Adds the emission of a single material. Constant factors become part of the radiance.
+    /// Adds the emission of a material that is not a blend. Constant factors become part of the radiance.
     fn add_term(&mut self, emission: Emission, opacity: Option<Opacity>, weights: &[BlendWeight]) {
         self.is_sheer |= opacity.is_some();
         let Emission { mut scale, texture, sides, coat } = emission;
@@ -191,7 +191,7 @@ impl SurfaceEmission {
         }
     }
 
-    /// The emitting sides.
+    /// The sides that emit light.
     fn sides(&self) -> &'static [Side] {
         if self.terms.is_empty() {
             &[]
@@ -202,8 +202,7 @@ impl SurfaceEmission {
         }
     }
 
-    /// Radiance of a side if nothing modulates it, and the terms that do. Their scales are relative to the
-    /// radiance.
+    /// Unmodulated radiance of a side, and the terms that modulate it, with scales relative to this radiance.
     fn radiance_and_terms(&self, side: Side) -> (Vec3, Vec<EmissionTerm>) {
         let of_side = |sides: EmissionSides| side == Side::Front || sides == EmissionSides::Both;
         let terms = self.terms.iter().filter(|(_, sides)| of_side(*sides)).map(|(term, _)| term);

@@ -172,7 +172,7 @@ pub fn lower_blend_weight(
     MaterialParameterConverter { scene, images, material }.lower_number(weight, TextureRole::BlendWeight)
 }
 
-/// A BSDF under a clear coat. Transparent materials and blends have none.
+/// Adds a clear coat to a BSDF. Glass, panes and blends are returned unchanged.
 fn coated(coat: Coat, bsdf: Bsdf) -> Bsdf {
     match bsdf {
         Bsdf::NonSpecular(base) => Bsdf::NonSpecular(coated_lobes(coat, base)),
@@ -189,7 +189,7 @@ fn coated(coat: Coat, bsdf: Bsdf) -> Bsdf {
     }
 }
 
-/// Non-specular lobes under a clear coat. Lobes that already have one keep it.
+/// Adds a clear coat to non-specular lobes. Lobes that already have one are returned unchanged.
 fn coated_lobes(coat: Coat, base: NonSpecular) -> NonSpecular {
     match base {
         NonSpecular::Phong(base) => NonSpecular::CoatedPhong(Box::new(CoatedMaterial { coat, base })),
@@ -431,7 +431,7 @@ impl MaterialParameterConverter<'_> {
         }
     }
 
-    /// Converts a coat, or returns `None` if there is none. `role` is the role of its numbers.
+    /// Converts a coat. Returns `None` if its weight is 0. `role` is the role of its textured numbers.
     fn lower_coat(self, source: &CoatSource, role: fn(ChannelSelector) -> TextureRole) -> Option<Coat> {
         let CoatSource { weight, roughness, ior, tint } = source;
         source

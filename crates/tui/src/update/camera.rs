@@ -41,8 +41,8 @@ pub(super) fn orbit_by(state: &mut State, right: f64, up: f64) -> Vec<Effect> {
     move_camera(state, |pose| orbited(pose, if is_mirrored { -right } else { right }, up))
 }
 
-/// Moves the camera closer by a number of steps. The height of an orthographic image, in which the distance has
-/// no effect, changes by the same factor.
+/// Moves the camera closer by a number of steps. Scales the height of an orthographic view by the same
+/// factor, because the distance has no effect there.
 pub(super) fn dolly(state: &mut State, steps: f64) -> Vec<Effect> {
     let Some((view, own)) = state.request.viewpoint().zip(state.request.camera()) else {
         return show_no_scene_notice(state);
@@ -61,7 +61,7 @@ pub(super) fn dolly(state: &mut State, steps: f64) -> Vec<Effect> {
     move_camera(state, |_| pose)
 }
 
-/// Widens the field of view, or the view of an orthographic camera, by a number of steps.
+/// Widens the field of view, or the height of an orthographic view, by a number of steps.
 pub(super) fn widen_field_of_view(state: &mut State, steps: f64) -> Vec<Effect> {
     let Some((view, own)) = state.request.viewpoint().zip(state.request.camera()) else {
         return show_no_scene_notice(state);

@@ -53,7 +53,7 @@ impl<'a> PathStepper<'a> for CameraWavefront<'a, '_> {
                         Bsdf::NonSpecular(rough) => self.shade_rough(path, vertex, rough, far),
                         Bsdf::Mirror(mirror) => self.shade_mirror(path, vertex, mirror),
                         Bsdf::Coated(coated) => self.shade_coated(path, vertex, coated, far),
-                        // Vertices at blends have the material of one part.
+                        // At a blend, each vertex has the material of the chosen part.
                         Bsdf::Dielectric(_) | Bsdf::ThinDielectric(_) | Bsdf::Blend(_) => {}
                     }
                 }
@@ -178,8 +178,7 @@ impl CameraWavefront<'_, '_> {
         self.roulette_and_push_reflected(reflected_path(path, vertex, &shading, reflectance));
     }
 
-    /// Splits a path at a surface with a δ lobe and non-specular lobes, or randomly chooses the δ lobe or the
-    /// others.
+    /// Splits a path at a surface with a δ lobe and non-specular lobes, or randomly chooses one of the two.
     pub(super) fn shade_coated(
         &mut self,
         path: &PathRay,

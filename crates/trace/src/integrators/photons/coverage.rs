@@ -79,7 +79,7 @@ pub fn primitive_material(world: &World, object: u32, primitive: u32) -> &Materi
     &world.materials[world.material_index(&Hit { shape, object })]
 }
 
-/// Whether photons are stored on a side of a material, or of any part of a blend.
+/// Whether photons are stored on one side of a material, or of any part of a blend.
 pub fn can_store_photons(material: &Material, is_front: bool) -> bool {
     if let Bsdf::Blend(blend) = &material.bsdf {
         return blend.parts.iter().any(|part| can_store_photons(part, is_front));
@@ -165,7 +165,7 @@ impl KernelNeighborhood {
     }
 
     /// Adds a shape and returns whether the coverage still has a closed form. `receives` returns whether
-    /// photons are stored on the front or on the back.
+    /// photons are stored on the front (`true`) or the back.
     fn add_shape(&mut self, shape: &Shape, receives: impl Fn(bool) -> bool) -> bool {
         match shape.geometry_near(self.point) {
             LocalGeometry::Polygons(count) => (0..count)

@@ -337,9 +337,9 @@ impl PhotonWavefront<'_> {
         }
     }
 
-    /// Stores a photon at a surface with a δ lobe and non-specular lobes, and reflects it in the δ lobe.
-    /// Caustic photons are randomly reflected or scattered by the other lobes. Other photons never scatter in
-    /// those lobes, so all of them are reflected.
+    /// Stores a photon at a surface with a δ lobe and non-specular lobes, and reflects it from the δ lobe.
+    /// Caustic photons are randomly reflected by the δ lobe or scattered by the others. All other photons are
+    /// reflected, because they never scatter from the other lobes.
     fn store_and_reflect_at_coated(
         &mut self,
         path: &PathRay,
@@ -378,13 +378,13 @@ impl PhotonWavefront<'_> {
         if !bsdf.is_black() {
             self.store_and_scatter(path, vertex, bsdf, (far, scattered));
         } else if vertex.is_blended() {
-            // Other parts of the blend may reflect the photon.
+            // The photon may be reflected by another part of the blend.
             self.store_at_vertex(path, vertex);
         }
     }
 
-    /// Stores a photon at a vertex. It also represents photons that passed through the surface as a null
-    /// interaction, or chose a part of a blend on which no photons are stored.
+    /// Stores a photon at a vertex. The stored photon also stands for photons that passed through the surface
+    /// as a null interaction, or chose a part of a blend on which no photons are stored.
     fn store_at_vertex(&mut self, path: &PathRay, vertex: &SurfaceVertex<'_>) {
         let chance = storage_probability(path, vertex, &mut self.counters.texture_lookups);
         let all = PathRay { throughput: path.throughput / chance, ..*path };

@@ -23,7 +23,7 @@ pub struct SurfaceVertex<'a> {
     pub surface: SurfacePoint,
     /// Material of the surface. At a blend, this is the chosen part.
     pub material: &'a Material,
-    /// The blend to which [`SurfaceVertex::material`] belongs, or the same material.
+    /// Material of the surface before choosing a part of a blend.
     pub surface_material: &'a Material,
     /// [`Ray::start`] for rays that leave the vertex.
     start: u32,
@@ -144,7 +144,7 @@ impl<'a> SurfaceVertex<'a> {
         !std::ptr::eq(self.material, self.surface_material)
     }
 
-    /// Whether the surface scatters light on the path's side.
+    /// Whether the surface scatters light on the side of the path.
     pub fn scatters(&self) -> bool {
         self.material.scatters_on_side(self.is_front)
     }
@@ -166,7 +166,7 @@ impl<'a> SurfaceVertex<'a> {
         )
     }
 
-    /// Point for texture lookups, without the footprint if light samples compete with the path.
+    /// Point for texture lookups, without a footprint if `is_shared`: if light samples compete with the path.
     pub fn lookup_point(&self, is_shared: bool) -> Cow<'_, TexturePoint> {
         match is_shared {
             true => Cow::Owned(self.texture_point.without_footprint()),
@@ -273,7 +273,7 @@ impl<'a> SurfaceVertex<'a> {
         SpecularLobe { cosine, mirror, probability }
     }
 
-    /// Reflectance of the δ lobe, divided by its probability.
+    /// Reflectance of the δ lobe, divided by the probability of choosing it.
     pub fn specular_weight(&self, coated: &Coated, lobe: &SpecularLobe, counters: &mut RayCounters) -> Vec3 {
         let &SpecularLobe { cosine, mirror, probability: _ } = lobe;
         coated.specular_weight(cosine, mirror, &self.texture_point, &mut counters.texture_lookups)
@@ -342,9 +342,9 @@ impl<'a> SurfaceVertex<'a> {
     }
 }
 
-/// Chooses a material of a blend. All vertices of one interaction make the same choice, because the random
-/// number depends only on the path. If light samples compete with the path, the texture of the weight is
-/// looked up without filtering, as for light samples and shadow rays.
+/// Chooses a part of a blend. All vertices of one interaction choose the same part, because the random number
+/// depends only on the path. If light samples compete with the path, the weight's texture is looked up
+/// without filtering, as for light samples and shadow rays.
 #[inline]
 fn chosen_material<'a>(
     tile: &TileContext<'_>,
