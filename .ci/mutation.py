@@ -39,7 +39,7 @@ PRINCIPLED = "materials::bxdfs::principled::tests::"
 COATED = "materials::bxdfs::coated::tests::"
 FROSTED = "closed_forms::frosted::"
 ROUGH_GLASS = "materials::bxdfs::rough_dielectric::tests::"
-STRAIGHT = "closed_forms::straight::"
+NULL_INTERACTIONS = "closed_forms::null_interactions::"
 TWO_SIDED = "closed_forms::two_sided::"
 DIRECT = "integrators::direct::tests::"
 PICKS = "integrators::direct::light_tree::tests::"
@@ -48,7 +48,7 @@ SKY = "lights::infinite::sky::tests::"
 # Fault, file, the code around the expression in ⟦⟧, its replacement, and the test that must fail.
 FAULTS = [
     ("panoramas of half the sky", "world/camera.rs", "sin_cos_f64(⟦FRAC_PI_2⟧ * place.y);", "0.5 * FRAC_PI_2",
-     PROJECTIONS + "panorama_directions_are_those_of_the_environment"),
+     PROJECTIONS + "panorama_directions_match_environment_maps"),
     ("fisheyes with a linear sine", "world/camera.rs", "sin_cos_f64(⟦radius.min(1.0) * half_fov⟧);", "(radius.min(1.0) * half_fov.min(1.0)).asin()",
      PROJECTIONS + "fisheye_angles_are_linear_in_the_radius"),
     ("fisheyes that fill the corners", "world/camera.rs", "valid |= u32::from(⟦radius <= 1.0⟧) << lane;", "true",
@@ -56,11 +56,11 @@ FAULTS = [
     ("parallel rays from the center", "world/camera.rs", "self.position + (⟦center + self.right * place.x + self.up * place.y⟧)", "center",
      PROJECTIONS + "ball_silhouettes_have_their_closed_form_areas"),
     ("shifts by half", "world/camera.rs", "let shift = ⟦2.0⟧ * window.shift;", "1.0",
-     PROJECTIONS + "shifted_rays_are_those_of_a_larger_image"),
+     PROJECTIONS + "shifted_image_is_a_crop_of_a_larger_one"),
     ("parallel rays whose footprint spreads", "world/camera.rs", "PixelFootprint { width: ⟦per_row(2.0 * half_height)⟧, spread: 0.0 }", "0.0",
-     PROJECTIONS + "orthographic_textures_are_equally_sharp_at_any_distance"),
+     PROJECTIONS + "orthographic_footprints_ignore_distance"),
     ("panorama depth along the view axis", "world/camera.rs", "Projection::Fisheye { .. } => ⟦arm.length()⟧,", "arm.dot(self.forward)",
-     PROJECTIONS + "panorama_depth_is_the_distance_from_the_camera"),
+     PROJECTIONS + "panorama_depth_is_distance_from_camera"),
     ("mirrored columns that are off by one", "integrators/transport/tile.rs", "*x = ⟦(width - 1).wrapping_sub(*x)⟧;", "width.wrapping_sub(*x)",
      PROJECTIONS + "mirrored_images_are_flipped_exactly"),
     ("clicks that ignore mirroring", "integrators/settings.rs", "let x = if ⟦camera.is_mirrored()⟧ {", "false",
@@ -147,7 +147,7 @@ FAULTS = [
      "closed_forms::touching::no_boundary_between_equal_iors"),
     ("an emitter's near side that attenuates nothing", "world/null_interaction.rs",
      "if ⟦source == LightGeometry::SeeThrough(hit.object) && hit.shape.t >= ray.t_max - end⟧ {",
-     "source == LightGeometry::SeeThrough(hit.object)", STRAIGHT + "half_opaque_lights_transmit_their_own_light"),
+     "source == LightGeometry::SeeThrough(hit.object)", NULL_INTERACTIONS + "half_opaque_lights_transmit_their_own_light"),
     ("a texel in place of its neighbor", "materials/texture.rs", "[self.wrap_index(first, size), self.wrap_index(⟦first + 1⟧, size)]",
      "first", "materials::texture::tests::bilinear_lookups_return_expected_values"),
     ("negative texel coordinates rounded toward zero", "materials/texture.rs",
@@ -194,11 +194,11 @@ FAULTS = [
     ("a wrong glossy pdf", "materials/bxdfs/phong/lobes.rs", "let glossy = ⟦(self.shininess + 1.0) * (0.5 * FRAC_1_PI)⟧ * gloss;",
      "(self.shininess + 2.0) * (0.5 * FRAC_1_PI)", "materials::bxdfs::phong::lobes::tests::glossy_samples_follow_the_pdf"),
     ("a pane with one reflecting side", "materials/thin_dielectric.rs", "⟦2.0 * side / (1.0 + side)⟧", "side",
-     STRAIGHT + "pane_transmits_by_angle"),
+     NULL_INTERACTIONS + "pane_transmits_by_angle"),
     ("partial opacity that blocks shadow rays", "materials/mod.rs", "through * there + ⟦Vec3::splat(1.0 - there)⟧", "Vec3::ZERO",
-     STRAIGHT + "shadows_multiply_transmittances"),
+     NULL_INTERACTIONS + "shadows_multiply_transmittances"),
     ("MIS weight measured from a pane", "integrators/transport/walk.rs", "path.ray.origin = ⟦self.origin⟧;",
-     "path.ray.origin", STRAIGHT + "light_passes_through_panes"),
+     "path.ray.origin", NULL_INTERACTIONS + "light_passes_through_panes"),
     ("an emitter's back weighted as its front", "lights/area/mod.rs", "Side::Back => ⟦LightHit { normal: -met.normal, ..*met }⟧",
      "*met", TWO_SIDED + "flat_two_sided_lights_are_symmetric"),
     ("textures rotated the wrong way", "materials/texture.rs", "DVec2::new(⟦by.x * cos - by.y * sin⟧,",
@@ -290,10 +290,10 @@ FAULTS = [
     ("sampling of invisible normals", "materials/microfacet.rs", "let part = ⟦0.5 * (1.0 + view.z)⟧;", "1.0",
      METAL + "samples_follow_the_pdf"),
     ("a Beckmann distribution of slopes per solid angle", "materials/microfacet.rs",
-     "let value = ⟦cosine * cosine⟧ * exp2(slope * -LOG2_E)", "1.0", METAL + "beckmann_values_match_the_formulas_and_are_reciprocal"),
+     "let value = ⟦cosine * cosine⟧ * exp2(slope * -LOG2_E)", "1.0", METAL + "beckmann_values_match_the_formulas"),
     ("Beckmann masking without the Gaussian", "materials/microfacet/beckmann.rs",
      "cosine * erf + ⟦sine * (0.5 * FRAC_2_SQRT_PI) * gaussian⟧", "0.0",
-     METAL + "beckmann_values_match_the_formulas_and_are_reciprocal"),
+     METAL + "beckmann_values_match_the_formulas"),
     ("visible slopes sampled for the wrong view", "materials/microfacet/beckmann.rs",
      "let weight = ⟦sine * (0.25 * FRAC_2_SQRT_PI)⟧;", "1.1 * sine * (0.25 * FRAC_2_SQRT_PI)", METAL + "beckmann_samples_follow_the_pdf"),
     ("too few Newton steps for visible slopes", "materials/microfacet/beckmann.rs", "for _ in 0..⟦STEPS⟧ {", "0",
@@ -317,7 +317,7 @@ FAULTS = [
      "row.bsdf.has_narrow_lobes()", "closed_forms::translucent::furnace_returns_the_sum_of_the_albedos"),
     ("unlimited diffuse transmission", "materials/bxdfs/principled/mod.rs",
      "let transmitted = ⟦lookup.color(&inputs.diffuse_transmission).min(Vec3::ONE - color)⟧;", "lookup.color(&inputs.diffuse_transmission)",
-     PRINCIPLED + "diffuse_transmission_is_coupled_like_the_diffuse_lobe"),
+     PRINCIPLED + "diffuse_lobes_are_attenuated_alike"),
     ("diffuse transmission sampled too rarely", "materials/bxdfs/principled/bxdf.rs", "diffuse_transmission_share: ⟦by_albedo * through⟧,",
      "0.7 * by_albedo * through", PRINCIPLED + "two_sided_albedos_match_quadrature"),
     ("η and k swapped", "materials/bxdfs/conductor/mod.rs", "let exact = ⟦conductor(cosine, first, second)⟧;", "conductor(cosine, second, first)",
@@ -349,7 +349,7 @@ FAULTS = [
     ("light samples of a blend with the wrong weights", "lights/area/emission_texture.rs", "if self.is_second { second } else { ⟦1.0 - second⟧ }", "1.0",
      "closed_forms::blends::blends_emit_the_weighted_sum"),
     ("shadow rays that see only one part of a blend", "materials/blend.rs", "sum += value(part, lookups) * ⟦weight⟧;", "1.0",
-     "closed_forms::blends::shadow_rays_pass_blends_with_the_mean_transmittance"),
+     "closed_forms::blends::shadow_rays_use_mean_transmittance_of_blends"),
     ("photons lost on the other part of a blend", "integrators/photons/emit.rs", "⟦vertex.surface_material.presence(&at, &is_stored, lookups)⟧", "1.0",
      "closed_forms::blends::photons_match_path_on_blends"),
     ("selection of the δ lobe without reweighting", "integrators/path/interactions.rs",

@@ -450,7 +450,7 @@ mod tests {
     }
 
     #[test]
-    fn image_written_before_exit_but_not_shown_is_reported() {
+    fn unshown_image_written_before_exit_is_reported() {
         let writes = SharedWriteLog::default();
         let written = || {
             let path = "a.png".into();

@@ -194,7 +194,7 @@ impl Build {
 
     /// Adds a flat-shaded instance of a mesh with the materials from its file.
     pub fn own_mesh(self, mesh: TriangleMesh, materials: Vec<FileMaterial>) -> Self {
-        let mut build = self.mesh(mesh, AS_IT_IS, matte(0.5));
+        let mut build = self.mesh(mesh, IDENTITY_PLACEMENT, matte(0.5));
         let file = build.parts.meshes.len() - 1;
         let loaded = LoadedMesh { materials, ..build.parts.meshes[file].loaded().clone() };
         let loaded = distinct_lights(loaded, false);
@@ -338,7 +338,7 @@ impl Build {
 
 /// Renders a tile. Returns the mean of each pixel's samples.
 pub fn tile(world: &World, settings: &RenderSettings, rect: Rect, samples: u32) -> Vec<DVec3> {
-    tile_by(maps(world, settings, samples).as_ref(), world, settings, rect, samples)
+    tile_with_photons(maps(world, settings, samples).as_ref(), world, settings, rect, samples)
 }
 
 /// Photon maps for `samples` samples. `None` if no photons are gathered.
@@ -358,7 +358,7 @@ pub fn maps(world: &World, settings: &RenderSettings, samples: u32) -> Option<Ph
 }
 
 /// Renders a tile like [`tile`], with existing photon maps.
-pub fn tile_by(
+pub fn tile_with_photons(
     maps: Option<&PhotonMaps>,
     world: &World,
     settings: &RenderSettings,
@@ -566,7 +566,7 @@ pub fn lat_long_sphere(rings: u32, steps: u32, radius: f64, center: DVec3) -> Tr
 }
 
 /// The identity transform.
-pub const AS_IT_IS: [DVec3; 3] = [DVec3::ONE, DVec3::ZERO, DVec3::ZERO];
+pub const IDENTITY_PLACEMENT: [DVec3; 3] = [DVec3::ONE, DVec3::ZERO, DVec3::ZERO];
 
 /// The mesh as the pipeline prepares it for its tree.
 fn distinct_lights(loaded: LoadedMesh, all_emit: bool) -> LoadedMesh {

@@ -61,7 +61,7 @@ fn boxes_contain_ray_origins_where_rays_start() {
 }
 
 #[test]
-fn footprints_equal_the_distance_between_neighboring_rays() {
+fn footprints_equal_ray_spacing() {
     for projection in
         [Perspective { fov: 90.0 }, Orthographic { view_height: 3.0 }, Spherical, Fisheye { fov: 200.0 }]
     {

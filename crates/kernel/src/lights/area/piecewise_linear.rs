@@ -46,7 +46,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn samples_follow_the_density() {
+    fn samples_follow_the_pdf() {
         for linear in [
             PiecewiseLinear([1.0, 3.0, 0.0, 2.0]),
             PiecewiseLinear([0.0, 0.0, 1.0, 1.0]),

@@ -148,7 +148,7 @@ fn values_match_the_formulas_and_are_reciprocal() {
 }
 
 #[test]
-fn tint_is_the_transmittance_in_and_out_at_normal_incidence() {
+fn tint_is_round_trip_transmittance() {
     let [bare, tinted] = [Vec3::ONE, TINT].map(|tint| {
         let point = coated(phong(Vec3::ONE, 0.0, 1.0), 1.0, 0.3, 1.5, tint);
         let surface = TestSurface::<CoatedBxdf<PhongBxdf>>::new(&point, [0.3; 2], DVec3::Z);

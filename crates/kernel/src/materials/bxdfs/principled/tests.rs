@@ -198,7 +198,7 @@ fn transmission_is_the_mirrored_specular_lobe() {
 }
 
 #[test]
-fn diffuse_transmission_is_coupled_like_the_diffuse_lobe() {
+fn diffuse_lobes_are_attenuated_alike() {
     for (alpha, metallic) in subjects().filter(|one| one.1 < 1.0) {
         let point = point(&leaf(RED, metallic, 0.3, alpha));
         let at = spherical_direction(0.6, 0.7);
