@@ -73,7 +73,7 @@ pub(super) struct Display {
     /// Bytes sent since the newest preview's render began.
     sent: usize,
     /// Whether a preview is being sent.
-    is_picture_due: bool,
+    is_preview_due: bool,
     /// Bytes and round-trip time for sending the last preview.
     report: Option<PreviewSendReport>,
     /// Whether the last preview's report has been returned.
@@ -100,7 +100,7 @@ impl Display {
             window_titles: Default::default(),
             asides: Vec::new(),
             sent: 0,
-            is_picture_due: false,
+            is_preview_due: false,
             report: None,
             is_reported: true,
         };
@@ -160,7 +160,7 @@ impl Display {
         }
         self.painter.set_target_with_extras(wanted, picture, fidelity, extras);
         self.is_complete = false;
-        self.is_picture_due |= is_new;
+        self.is_preview_due |= is_new;
     }
 
     /// Starts counting bytes for a new render.
@@ -241,7 +241,7 @@ impl Display {
 
     fn mark_target_complete(&mut self) {
         self.is_complete = true;
-        if std::mem::take(&mut self.is_picture_due) {
+        if std::mem::take(&mut self.is_preview_due) {
             self.report = Some(PreviewSendReport {
                 bytes: self.sent,
                 round_trip: self.connection.min_round_trip_time(),

@@ -265,7 +265,7 @@ mod tests {
             ui.finish_render([200, 30, 30]);
             let before = summary_text(&ui.state);
             assert!(before.starts_with(made) && !before.contains("save"), "{key}: {before}");
-            ui.handle_event(crate::event::Event::Changed(ContentChangeTime { noticed: ui.now }));
+            ui.handle_event(crate::event::Event::FileChanged(ContentChangeTime { noticed: ui.now }));
             ui.finish_render([30, 30, 200]);
             let after = summary_text(&ui.state);
             assert_eq!(after, format!("{made}{}", messages::OLDER_THAN_EDIT), "{key}");
@@ -274,7 +274,7 @@ mod tests {
                 key == 'l'
             );
             // Saving the file without changing the image does not make the image newer.
-            ui.handle_event(crate::event::Event::Changed(ContentChangeTime { noticed: ui.now }));
+            ui.handle_event(crate::event::Event::FileChanged(ContentChangeTime { noticed: ui.now }));
             let generation = ui.state.request.generation;
             ui.worker_event(Event::Started { generation });
             ui.worker_event(done_event(generation, Vec::new(), true));
@@ -474,7 +474,7 @@ mod tests {
         ui.press_character('s');
         own(&mut ui, SavedSceneImageState::Written);
         assert_eq!(summary_text(&ui.state), "wrote cornell.png: 640×480, 64 samples, 1.93 s");
-        ui.handle_event(crate::event::Event::Changed(ContentChangeTime { noticed: ui.now }));
+        ui.handle_event(crate::event::Event::FileChanged(ContentChangeTime { noticed: ui.now }));
         assert!(summary_text(&ui.state).ends_with(messages::OLDER_THAN_EDIT), "{}", summary_text(&ui.state));
     }
 }

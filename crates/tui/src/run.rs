@@ -228,7 +228,7 @@ impl EventLoop {
             Effect::GiveUp => {
                 return Some(LoopEnd::Error(TuiError::WorkerGone { reason: terminal::last_panic() }));
             }
-            Effect::StopJob if !signals::has_shell() => return self.apply_event(Event::NoShell),
+            Effect::StopJob if !signals::has_shell() => return self.apply_event(Event::SuspendFailed),
             Effect::StopJob => {
                 return signals::stop_job()
                     .err()
@@ -267,9 +267,9 @@ impl EventLoop {
         let outcome = editor::run(&editor::editor_from_environment(|name| std::env::var(name).ok()), place);
         terminal::restore_modes();
         input::set_input_paused(false);
-        let end = self.apply_event(Event::Back).or_else(|| self.resume_and_redraw());
+        let end = self.apply_event(Event::EditorExited).or_else(|| self.resume_and_redraw());
         drop(child_signals);
-        end.or_else(|| outcome.err().and_then(|why| self.apply_event(Event::NoEditor(why))))
+        end.or_else(|| outcome.err().and_then(|why| self.apply_event(Event::EditorFailed(why))))
     }
 
     fn resume_and_redraw(&mut self) -> Option<LoopEnd> {

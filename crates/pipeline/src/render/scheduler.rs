@@ -6,9 +6,9 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use super::checkpointer::Checkpointer;
+use super::coarse_image::CoarseImageRenderer;
 use super::commands::RenderCommands;
 use super::film_state::{EarlierProcessWork, FilmState};
-use super::first_picture::CoarseImageRenderer;
 use super::forecast::{Forecast, RenderSnapshot};
 use super::noise_goals::LEAST;
 use super::preview::PreviewSender;

@@ -235,7 +235,7 @@ fn broken_scene_file_does_not_stop_a_render() {
 }
 
 /// Applies a change to a valid scene and returns its image.
-fn picture_by(scene: &str, change: impl Fn(&mut Bench)) -> Vec<u8> {
+fn image_after(scene: &str, change: impl Fn(&mut Bench)) -> Vec<u8> {
     let mut bench = Bench::new(scene);
     change(&mut bench);
     bench.done();
@@ -287,7 +287,7 @@ fn last_valid_scene_applies_new_overrides() {
                 }
             }
             assert!(is_seen);
-            assert_eq!(bench.picture(), picture_by(SCENE, |bench| change(bench, moved)));
+            assert_eq!(bench.picture(), image_after(SCENE, |bench| change(bench, moved)));
             // The fixed scene reuses this image.
             fix(&bench);
             assert_eq!(bench.done().0.stages[Stage::Render as usize].status, Status::Reused);
@@ -320,7 +320,7 @@ fn last_valid_scene_never_mixes_file_versions() {
             assert_eq!(end, LastValidSceneRenderOutcome::Stopped);
             assert_eq!(bench.picture(), depth);
         } else {
-            let expected = picture_by(SCENE, |bench| bench.write("skin.ppm", "P6\n1 1\n255\nxyz"));
+            let expected = image_after(SCENE, |bench| bench.write("skin.ppm", "P6\n1 1\n255\nxyz"));
             assert_eq!(bench.picture(), expected);
         }
     }

@@ -28,7 +28,7 @@ pub(super) struct Palette {
 
 impl Palette {
     /// Returns the palette for an image, reusing the previous one if it still fits.
-    pub(super) fn reused_or_new_for_picture(picture: &Srgb8Image, before: Option<Self>) -> Self {
+    pub(super) fn reused_or_new(picture: &Srgb8Image, before: Option<Self>) -> Self {
         let mut bins = histogram(picture);
         let colors = choose_palette_colors(&mut bins);
         let fits = |palette: &Self| {
@@ -165,17 +165,17 @@ mod tests {
         let (red, blue) = ([255, 0, 0], [0, 0, 255]);
         let pixels = (0..4096).map(|i| if i == 77 { red } else { blue }).collect();
         let picture = Srgb8Image { width: 64, height: 64, pixels };
-        let mut palette = Palette::reused_or_new_for_picture(&picture, None);
+        let mut palette = Palette::reused_or_new(&picture, None);
         assert_eq!(palette.colors().len(), 2);
         assert_eq!(mean_error(&picture, &mut palette), 0.0);
         let spot = ramp(255.0);
-        assert!(Palette::reused_or_new_for_picture(&spot, None).colors().contains(&[200, 10, 10]));
+        assert!(Palette::reused_or_new(&spot, None).colors().contains(&[200, 10, 10]));
     }
 
     #[test]
     fn ramp_has_no_visible_banding() {
         let picture = ramp(255.0);
-        let mut palette = Palette::reused_or_new_for_picture(&picture, None);
+        let mut palette = Palette::reused_or_new(&picture, None);
         let error = mean_error(&picture, &mut palette);
         // For comparison: xterm's cube has steps of 40 code values.
         assert!(error < 4.0, "{error}");
@@ -191,12 +191,12 @@ mod tests {
 
     #[test]
     fn palette_is_reused_while_it_fits() {
-        let first = Palette::reused_or_new_for_picture(&ramp(255.0), None);
+        let first = Palette::reused_or_new(&ramp(255.0), None);
         let colors = first.colors().to_vec();
-        let same = Palette::reused_or_new_for_picture(&ramp(253.0), Some(first));
+        let same = Palette::reused_or_new(&ramp(253.0), Some(first));
         assert_eq!(same.colors(), colors, "the palette should be reused for a nearly identical image");
         let mut other = ramp(255.0);
         other.pixels.iter_mut().for_each(|rgb| rgb.swap(0, 2));
-        assert_ne!(Palette::reused_or_new_for_picture(&other, Some(same)).colors(), colors);
+        assert_ne!(Palette::reused_or_new(&other, Some(same)).colors(), colors);
     }
 }

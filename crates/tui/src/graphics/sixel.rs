@@ -26,7 +26,7 @@ pub(super) fn encode(
     let smaller = (picture.width > width || picture.height > height)
         .then(|| resized(picture, picture.width.min(width), picture.height.min(height)));
     let picture = smaller.as_ref().unwrap_or(picture);
-    let fitting = Palette::reused_or_new_for_picture(picture, palette.take());
+    let fitting = Palette::reused_or_new(picture, palette.take());
     let palette = palette.insert(fitting);
     let registers: Vec<u8> =
         palette.indices(picture).into_iter().map(|index| FIRST.saturating_add(index)).collect();

@@ -10,7 +10,7 @@ use super::target_screen::cell_contents;
 use super::terminal_color::TerminalColor;
 use super::*;
 
-mod pictures;
+mod previews;
 
 /// A painter and the terminal it draws on.
 struct TestTerminal {

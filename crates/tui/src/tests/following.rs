@@ -203,7 +203,7 @@ impl WatchedRender {
             if asked.is_some_and(|asked| self.ui.now >= asked + FIRST) {
                 asked = None;
                 self.turn += 1;
-                self.put_picture(1.0);
+                self.send_preview(1.0);
             }
             if self.ui.now >= key {
                 key += REPEAT;
@@ -219,7 +219,7 @@ impl WatchedRender {
     /// Finishes drawing the final preview.
     fn finish(&mut self) {
         let generation = self.ui.state.request.generation;
-        self.put_picture(SAMPLES);
+        self.send_preview(SAMPLES);
         self.ui.worker_event(done_event(generation, Vec::new(), false));
         self.advance(self.ui.now + Duration::from_secs(5), false);
     }
@@ -270,12 +270,12 @@ impl WatchedRender {
         }
         if is_at_work && now >= self.next[1] {
             self.next[1] = now + PICTURE;
-            self.put_picture((done * SAMPLES).max(1.0));
+            self.send_preview((done * SAMPLES).max(1.0));
         }
         self.ui.handle_event(Event::Tick);
     }
 
-    fn put_picture(&mut self, samples: f64) {
+    fn send_preview(&mut self, samples: f64) {
         let generation = self.ui.state.request.generation;
         let picture = Arc::new(picture(self.size, samples, self.turn));
         *self.slot.lock().expect("a slot") = Some(PreviewUpdate {
@@ -293,7 +293,7 @@ impl WatchedRender {
     }
 
     fn send_event(&mut self, event: Event) {
-        self.shown += usize::from(matches!(event, Event::Shown { .. }));
+        self.shown += usize::from(matches!(event, Event::FirstPreviewSent { .. }));
         self.ui.handle_event(event);
     }
 }

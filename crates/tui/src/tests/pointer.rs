@@ -124,7 +124,7 @@ fn clicked_object_is_shown_and_can_be_edited() {
     );
     let mut fresh = self::ui();
     assert_eq!(place(&fresh.press_character('o')).1, 1, "without errors, the scene file should be opened");
-    fresh.handle_event(Event::NoEditor("no editor `x`".to_owned()));
+    fresh.handle_event(Event::EditorFailed("no editor `x`".to_owned()));
     assert!(fresh.screen_text().contains("no editor `x`"));
 }
 
@@ -181,13 +181,13 @@ fn saved_camera_becomes_the_scene_camera() {
         "{text}"
     );
     // The watcher also reports this save.
-    ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
+    ui.handle_event(Event::FileChanged(ContentChangeTime { noticed: ui.now }));
     assert!(
         ui.screen_text().contains(&messages::camera_saved("scenes/cornell.toml")),
         "{}",
         ui.screen_text()
     );
-    ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
+    ui.handle_event(Event::FileChanged(ContentChangeTime { noticed: ui.now }));
     assert!(
         !ui.screen_text().contains(&messages::camera_saved("scenes/cornell.toml")),
         "{}",
@@ -201,9 +201,9 @@ fn saved_camera_becomes_the_scene_camera() {
     let text = ui.screen_text();
     assert!(text.contains("error: outdated") && text.contains("reset camera"), "{text}");
     // The watcher reports this save slightly later.
-    ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
+    ui.handle_event(Event::FileChanged(ContentChangeTime { noticed: ui.now }));
     assert!(ui.screen_text().contains("error: outdated"), "{}", ui.screen_text());
-    ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
+    ui.handle_event(Event::FileChanged(ContentChangeTime { noticed: ui.now }));
     assert!(!ui.screen_text().contains("error: outdated"), "{}", ui.screen_text());
 }
 
@@ -306,7 +306,7 @@ fn older_render_is_shown_until_the_next_render() {
         ui.screen_text()
     );
     let generation = ui.state.request.generation;
-    ui.handle_event(Event::Picture(PreviewUpdate {
+    ui.handle_event(Event::Preview(PreviewUpdate {
         generation,
         picture: uniform_picture(50, 38, [10, 200, 10]),
         range: None,
@@ -317,7 +317,7 @@ fn older_render_is_shown_until_the_next_render() {
     assert!(super::cells_of(&mut ui, RED) > 0, "the older render should stay visible");
     ui.press_character('N');
     assert!(
-        !ui.state.picture.history.is_viewing_older() && ui.screen_text().contains(messages::NEWEST_RENDER),
+        !ui.state.preview.history.is_viewing_older() && ui.screen_text().contains(messages::NEWEST_RENDER),
         "{}",
         ui.screen_text()
     );
@@ -407,7 +407,7 @@ fn clicks_in_a_close_up_select_the_right_pixel() {
     let section = Some(NormalizedRect { left: 0.2, top: 0.4, width: 0.1, height: 0.2 });
     let generation = ui.state.request.generation;
     let picture = uniform_picture(20, 10, BLUE);
-    ui.handle_event(Event::Picture(PreviewUpdate {
+    ui.handle_event(Event::Preview(PreviewUpdate {
         generation,
         picture,
         range: None,
@@ -426,7 +426,7 @@ fn clicks_in_a_close_up_select_the_right_pixel() {
 #[test]
 fn header_marks_an_older_render() {
     let mut ui = ui();
-    ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
+    ui.handle_event(Event::FileChanged(ContentChangeTime { noticed: ui.now }));
     ui.finish_render(BLUE);
     ui.press_character('b');
     let first = |ui: &mut TestUi| ui.screen_text().lines().next().map(str::to_owned).unwrap_or_default();
@@ -460,7 +460,7 @@ fn saved_camera_can_be_compared_with_the_old_one() {
     ui.finish_render(BLUE);
     ui.press_character('c');
     kept(&mut ui, true, true);
-    ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
+    ui.handle_event(Event::FileChanged(ContentChangeTime { noticed: ui.now }));
     ui.finish_render(BLUE);
     ui.press_character('b');
     assert!(super::cells_of(&mut ui, RED) > 0, "expected the previous camera: {}", ui.screen_text());
@@ -480,13 +480,13 @@ fn escape_cancels_gestures_and_closes_history() {
     ui.state.selection.facts = Some(vec!["sphere".to_owned()]);
     escape(&mut ui);
     assert_eq!(ui.state.selection.facts, None);
-    ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
+    ui.handle_event(Event::FileChanged(ContentChangeTime { noticed: ui.now }));
     ui.finish_render(BLUE);
     ui.press_character('b');
-    assert!(ui.state.picture.history.is_viewing_older());
+    assert!(ui.state.preview.history.is_viewing_older());
     escape(&mut ui);
     assert!(
-        !ui.state.picture.history.is_viewing_older() && ui.screen_text().contains(messages::NEWEST_RENDER),
+        !ui.state.preview.history.is_viewing_older() && ui.screen_text().contains(messages::NEWEST_RENDER),
         "{}",
         ui.screen_text()
     );
@@ -530,7 +530,7 @@ fn focusing_requires_an_aperture() {
 #[test]
 fn exposure_changes_add_no_history_entry() {
     let mut ui = ui();
-    ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
+    ui.handle_event(Event::FileChanged(ContentChangeTime { noticed: ui.now }));
     ui.finish_render(BLUE);
     for color in [[1, 2, 3], [4, 5, 6], [7, 8, 9]] {
         ui.press_character(']');
@@ -552,7 +552,7 @@ fn older_render_is_shown_with_its_changes() {
     use crate::pipeline::protocol;
     let mut ui = TestUi::from_state(state(120, 40));
     for (color, text) in [(RED, "r = 1\nfov = 40"), (BLUE, "r = 2\nfov = 40"), (RED, "r = 2\nfov = 30")] {
-        ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
+        ui.handle_event(Event::FileChanged(ContentChangeTime { noticed: ui.now }));
         let generation = ui.state.request.generation;
         ui.worker_event(protocol::Event::Text { generation, text: text.into() });
         ui.finish_render(color);

@@ -132,7 +132,7 @@ fn written_image_is_outdated_only_after_a_save() {
     finish_unwritten(&mut ui, BLUE);
     assert_shows(&mut ui, &messages::image_written_with_changes("cornell.png", "shadows hard"));
     assert!(!ui.screen_words().contains("older than your last"), "{}", ui.screen_text());
-    ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
+    ui.handle_event(Event::FileChanged(ContentChangeTime { noticed: ui.now }));
     own_image(&mut ui, SavedSceneImageState::NotBegun);
     finish_unwritten(&mut ui, RED);
     assert_shows(&mut ui, &messages::scene_image_outdated("cornell.png"));
@@ -157,7 +157,7 @@ fn w_is_offered_only_if_it_replaces_the_file() {
         let mut ui = TestUi::from_state(state(120, 40));
         ui.worker_event(written_event(1, "cornell.png", true));
         ui.finish_render(RED);
-        ui.handle_event(Event::Output(OutputChange { path: "cornell.png".into(), lost: Some(lost) }));
+        ui.handle_event(Event::OutputChanged(OutputChange { path: "cornell.png".into(), lost: Some(lost) }));
         let words =
             if is_kept { messages::output_not_overwritten } else { messages::output_modified_externally };
         assert_shows(&mut ui, &words("cornell.png", lost.describe()));

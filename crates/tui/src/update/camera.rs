@@ -153,7 +153,7 @@ pub(super) fn save_camera(state: &mut State) -> Vec<Effect> {
             &format!("error: {saved} {}", messages::CAMERA_CONFLICT),
         );
     }
-    state.saving.is_camera_of_newest = state.picture.history.is_viewing_older();
+    state.saving.is_camera_of_newest = state.preview.history.is_viewing_older();
     vec![Effect::Send(Command::KeepCamera(Box::new(MovedCamera { camera, own })))]
 }
 
@@ -188,7 +188,7 @@ pub(super) fn handle_saved_camera(
     state.saving.camera_edits.extend(edit);
     let mut effects = Vec::new();
     if let Some(since) = state.request.moved_since.filter(|_| is_new) {
-        state.picture.history.record_camera_save_as_edit(since);
+        state.preview.history.record_camera_save_as_edit(since);
     }
     if is_own && state.request.toggles.camera.has_changes() {
         state.request.toggles.camera = CameraOverrides::default();
@@ -223,7 +223,7 @@ pub(super) fn handle_undone_camera(state: &mut State, outcome: Result<PathBuf, S
         }
     };
     state.saving.camera_edits.pop();
-    state.picture.history.record_scene_edit();
+    state.preview.history.record_scene_edit();
     let effects = request_render(state, false);
     state.saving.camera_kept = Some(state.now);
     let name = escape_invisible_chars(&path.to_string_lossy()).into_owned();

@@ -24,14 +24,14 @@ const TURN_ACROSS: f64 = 180.0;
 pub(super) fn handle_mouse(state: &mut State, mouse: MouseEvent) -> Vec<Effect> {
     match mouse.kind {
         MouseEventKind::Press => {
-            let is_on_picture = Layout::for_state(state).preview.contains((mouse.column, mouse.row).into());
+            let is_on_preview = Layout::for_state(state).preview.contains((mouse.column, mouse.row).into());
             let MouseEvent { column, row, .. } = mouse;
             if let Some(at) = view::history_index_at(state, column, row) {
                 return history::open_entry_at_index(state, at);
             }
             let from = image_position_at(state, column, row);
             state.selection.press =
-                is_on_picture.then_some(MousePress { column, row, has_moved: false, from });
+                is_on_preview.then_some(MousePress { column, row, has_moved: false, from });
             Vec::new()
         }
         MouseEventKind::Drag => drag_region_or_orbit(state, mouse),
@@ -83,7 +83,7 @@ fn drag_region_or_orbit(state: &mut State, mouse: MouseEvent) -> Vec<Effect> {
 }
 
 fn pick_object_at_click(state: &mut State, mouse: MouseEvent) -> Vec<Effect> {
-    if state.picture.history.is_viewing_older() {
+    if state.preview.history.is_viewing_older() {
         return show_notice_without_effects(state, messages::OLDER_RENDER);
     }
     let Some(spot) = image_position_at(state, mouse.column, mouse.row) else { return Vec::new() };
@@ -103,7 +103,7 @@ pub(super) fn inspect_at_crosshair(state: &mut State) -> Vec<Effect> {
 
 /// Waits for a click that sets the focus. If already waiting, focuses on the object at the crosshair.
 pub(super) fn start_or_confirm_focus_pick(state: &mut State) -> Vec<Effect> {
-    if state.picture.history.is_viewing_older() {
+    if state.preview.history.is_viewing_older() {
         return show_notice_without_effects(state, messages::OLDER_RENDER);
     }
     if state.request.viewpoint().is_some_and(|view| view.aperture == 0.0) {
@@ -119,7 +119,7 @@ pub(super) fn start_or_confirm_focus_pick(state: &mut State) -> Vec<Effect> {
 }
 
 fn send_pick_query(state: &mut State, purpose: PickPurpose) -> Vec<Effect> {
-    if state.picture.history.is_viewing_older() {
+    if state.preview.history.is_viewing_older() {
         return show_notice_without_effects(state, messages::OLDER_RENDER);
     }
     if state.request.own.is_none() {
@@ -140,7 +140,7 @@ pub(super) fn toggle_mouse(state: &mut State) -> Vec<Effect> {
 /// Handles the reply to a pick query.
 pub(super) fn handle_pick(state: &mut State, picked: &PickedPixel) -> Vec<Effect> {
     // Ignore the reply if an older render was opened after the click.
-    if state.picture.history.is_viewing_older() {
+    if state.preview.history.is_viewing_older() {
         return Vec::new();
     }
     state.selection.picked = picked
@@ -189,7 +189,7 @@ fn join_values_with_pixel_position(
 
 /// Copies the inspected values if the terminal supports it.
 pub(super) fn copy_values(state: &mut State) -> Vec<Effect> {
-    if state.picture.history.is_viewing_older() {
+    if state.preview.history.is_viewing_older() {
         return show_notice_without_effects(state, messages::OLDER_RENDER);
     }
     let Some(clicked) = state.selection.clicked.clone() else {

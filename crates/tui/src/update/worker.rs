@@ -65,7 +65,7 @@ pub(super) fn handle_worker_event(state: &mut State, event: Event) -> Vec<Effect
             let pinhole = state.request.combined_overrides().dof == Some(true) && !settings.dof;
             state.request.effective = Some(*settings);
             clear_blocking_errors(state);
-            state.picture.history.record_scene_read();
+            state.preview.history.record_scene_read();
             if pinhole {
                 show_notice(state, messages::PINHOLE);
             }
@@ -254,7 +254,7 @@ fn update_asset_bar(state: &mut State, progress: AssetProgress) {
 /// Reports the files written at the user's request.
 fn report_written_files(state: &mut State, paths: &[PathBuf]) {
     state.saving.is_write_requested = false;
-    let is_open = state.picture.history.is_viewing_older();
+    let is_open = state.preview.history.is_viewing_older();
     let which = if is_open { messages::WROTE_NEWEST } else { "" };
     let names: Vec<String> =
         paths.iter().map(|path| escape_invisible_chars(&path.to_string_lossy()).into_owned()).collect();
@@ -410,11 +410,11 @@ fn add_seconds_of_earlier_requests(report: &mut Report) {
 fn count_finished_render(state: &mut State, unchanged: bool) {
     let is_counted = std::mem::replace(&mut state.work.is_counted, true);
     let is_new = !unchanged && !is_counted || state.work.renders == 0;
-    let is_shown = state.picture.history.is_newest_from_request(state.request.generation);
-    if is_new || is_shown && state.picture.history.is_newest_unfinished() {
+    let is_shown = state.preview.history.is_newest_from_request(state.request.generation);
+    if is_new || is_shown && state.preview.history.is_newest_unfinished() {
         state.work.renders += 1;
         if is_shown {
-            state.picture.history.finish_newest(state.work.renders);
+            state.preview.history.finish_newest(state.work.renders);
         }
     }
 }
@@ -460,7 +460,7 @@ fn handle_failure(state: &mut State, failure: Failure) {
     state.saving.change = None;
     match failure {
         // The last valid scene is being rendered.
-        Failure::Scene(_) => state.picture.history.discard_edits_of_invalid_scene(),
+        Failure::Scene(_) => state.preview.history.discard_edits_of_invalid_scene(),
         Failure::Work(_) => state.work.rendering = RenderState::Stopped,
     }
     match failure {

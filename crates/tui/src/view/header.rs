@@ -38,7 +38,7 @@ pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
     if layout.keys.is_empty() && message::has_message_to_show(state, layout) {
         return;
     }
-    if state.picture.is_alone {
+    if state.preview.is_image_only {
         let back = keymap::binding_for_action(Action::ShowImageOnly)
             .map_or(String::new(), |it| format!("  {} back", it.label));
         room.width -= put_text_right(buffer, room, &back, TextRole::Faint, state.display.depth);
@@ -79,7 +79,7 @@ fn draw_activity_block(state: &State, area: Rect, buffer: &mut Buffer) -> u16 {
 
 /// Symbol, word and color for the state. Each identifies the state on its own.
 pub(super) fn state_symbol_word_and_role(state: &State) -> (&'static str, &'static str, TextRole) {
-    if state.picture.history.is_viewing_older() {
+    if state.preview.history.is_viewing_older() {
         ("◂", "older", TextRole::Warning)
     } else {
         worker_symbol_word_and_role(state)
@@ -110,7 +110,7 @@ fn draw_scene_info(state: &State, area: Rect, buffer: &mut Buffer) {
     let (folder, file) = path.rsplit_once('/').map_or(("", &*path), |(folder, file)| (folder, file));
     let (folder, file) = (escape_invisible_chars(folder), escape_invisible_chars(file));
     // The image size of older renders is unknown.
-    let effective = state.request.effective.as_ref().filter(|_| !state.picture.history.is_viewing_older());
+    let effective = state.request.effective.as_ref().filter(|_| !state.preview.history.is_viewing_older());
     let size = effective.map_or(String::new(), |it| format!("  {}×{}", it.width, it.height));
     let folder = if folder.is_empty() { String::new() } else { format!("{folder}/") };
     let view = actual_pixels_label(state) + &view_label(state);
@@ -130,14 +130,14 @@ fn draw_scene_info(state: &State, area: Rect, buffer: &mut Buffer) {
 
 /// The view and its range of values, or an empty string for the beauty view.
 fn view_label(state: &State) -> String {
-    let open = state.picture.history.viewed_older_scene_and_settings();
+    let open = state.preview.history.viewed_older_scene_and_settings();
     let of_open = open.map(|origin| origin.toggles.view.unwrap_or_else(|| state.request.base_view_mode()));
     let view = of_open.unwrap_or_else(|| state.request.view_mode());
     if view == ViewMode::Beauty {
         return String::new();
     }
     let is_at_hand = |generation: u64| open.is_some() || generation == state.request.generation;
-    let shown = state.picture.shown.as_ref().filter(|shown| is_at_hand(shown.generation));
+    let shown = state.preview.shown.as_ref().filter(|shown| is_at_hand(shown.generation));
     let range = shown.and_then(|shown| shown.range);
     let range = range.map_or(String::new(), |[least, most]| {
         format!(" {} to {}", format_number_to_three_digits(least), format_number_to_three_digits(most))
@@ -156,13 +156,13 @@ fn lacks_photons(state: &State) -> bool {
 
 /// Label for a preview that shows actual pixels.
 fn actual_pixels_label(state: &State) -> String {
-    let is_close = state.picture.shown.as_ref().is_some_and(|shown| shown.section.is_some());
+    let is_close = state.preview.shown.as_ref().is_some_and(|shown| shown.section.is_some());
     if is_close { "  1:1".to_owned() } else { String::new() }
 }
 
 /// Progress or result in several variants, from longest to shortest.
 fn progress_or_result_variants(state: &State) -> Vec<String> {
-    if let Some((run, time)) = state.picture.history.viewed_render_number_and_time() {
+    if let Some((run, time)) = state.preview.history.viewed_render_number_and_time() {
         let is_unfinished = state
             .picture
             .history
@@ -226,7 +226,7 @@ fn progress_or_result_variants(state: &State) -> Vec<String> {
 
 /// Number of the newest render. A running render counts if it has an image.
 fn newest_render_number(state: &State) -> u64 {
-    let history = &state.picture.history;
+    let history = &state.preview.history;
     let is_under_way = state.work.is_rendering()
         && history.is_newest_from_request(state.request.generation)
         && history.is_newest_unfinished();

@@ -104,7 +104,7 @@ fn draw_hint(hint: &KeyHint, area: Rect, is_long: bool, state: &State, buffer: &
 /// Hints for the toggles and their values. Toggles that were changed with keys are bold.
 fn hints_for_toggles(state: &State) -> Vec<KeyHint> {
     // The values belong to the newest render, not to the one being viewed.
-    if state.picture.history.is_viewing_older() {
+    if state.preview.history.is_viewing_older() {
         return Vec::new();
     }
     let honors_shadows = state.request.integrator().properties().honors_shadows;
@@ -169,9 +169,9 @@ fn urgent_and_other_hints(state: &State) -> (Vec<KeyHint>, Vec<KeyHint>) {
     if has_place && !state.request.is_model() {
         urgent.extend(named(Action::Edit, "edit"));
     }
-    if state.picture.history.is_viewing_older() {
+    if state.preview.history.is_viewing_older() {
         urgent.extend(named(Action::CompareLastEdit, "newest"));
-        let both = if state.picture.history.is_viewing_oldest() {
+        let both = if state.preview.history.is_viewing_oldest() {
             named(Action::NewerRender, "newer")
         } else {
             named(Action::OlderRender, "older, newer")
@@ -183,7 +183,7 @@ fn urgent_and_other_hints(state: &State) -> (Vec<KeyHint>, Vec<KeyHint>) {
     if state.request.toggles.camera.has_changes() && !state.saving.has_scene_of_model {
         urgent.extend(named(Action::KeepCamera, "keep"));
     }
-    if state.picture.close_up.is_some() {
+    if state.preview.close_up.is_some() {
         urgent.extend(named(Action::ActualPixels, "back"));
     }
     if state.request.first_section.is_some() {
@@ -210,8 +210,8 @@ fn urgent_and_other_hints(state: &State) -> (Vec<KeyHint>, Vec<KeyHint>) {
     let is_other = |it: &&KeyBinding| {
         !it.hint.is_empty() && !now.contains(&it.action) && !ELSEWHERE.contains(&it.action)
     };
-    let has_picture = state.display.kind != PreviewStyle::None;
-    let is_shown = |it: &&KeyBinding| it.action != Action::ShowImageOnly || has_picture;
+    let has_preview = state.display.kind != PreviewStyle::None;
+    let is_shown = |it: &&KeyBinding| it.action != Action::ShowImageOnly || has_preview;
     let is_idle = |it: &&KeyBinding| it.action != Action::TogglePause || state.work.is_request_running();
     // If there are changes to list, a hint added above already shows them next to this key.
     let is_of_use = state.request.toggles != KeyOverrides::default()

@@ -87,7 +87,7 @@ fn panel_lines(state: &State, width: u16, column: u16, is_in_full: bool) -> Vec<
     let is_done = matches!(state.work.activity, RequestStatus::Done);
     let mut lines = inspected_lines(state, width);
     // Stages and results describe the newest render.
-    if state.picture.history.is_viewing_older() {
+    if state.preview.history.is_viewing_older() {
         return lines;
     }
     // If the scene is broken, its stages have no visible result.
@@ -217,7 +217,7 @@ fn reached_limit(state: &State) -> Option<RenderLimit> {
 /// A wrapped hint for users who have not saved yet. If the scene is broken and there is no image, the status
 /// line shows the hint instead.
 fn wrapped_save_scene_hint(state: &State, width: u16) -> Vec<StyledLine> {
-    if is_scene_broken(state) && state.picture.shown.is_none() {
+    if is_scene_broken(state) && state.preview.shown.is_none() {
         return Vec::new();
     }
     let mut lines: Vec<String> = Vec::new();

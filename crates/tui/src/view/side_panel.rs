@@ -76,7 +76,7 @@ pub(super) fn history_index_at(
 /// move when the results change.
 fn divide_chart_and_history_strip(state: &State, panel: Rect, lines: u16) -> (Rect, Rect) {
     let area = curve_and_history_area(state, panel, lines);
-    let is_over = state.work.activity == RequestStatus::Done && !state.picture.history.is_viewing_older();
+    let is_over = state.work.activity == RequestStatus::Done && !state.preview.history.is_viewing_older();
     let wants_curve = |area| is_over && curve::chart_height(state, area).is_some();
     if area.width >= DIVIDED {
         // Place them side by side.
