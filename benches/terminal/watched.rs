@@ -52,7 +52,7 @@ pub(crate) struct FarEnd {
 
 impl FarEnd {
     /// Colors of the image's pixels, or of its cell subdivisions.
-    pub(crate) fn seen(&self) -> Vec<[u8; 3]> {
+    pub(crate) fn colors(&self) -> Vec<[u8; 3]> {
         if let Some(picture) = self.pixels.displayed_image() {
             return picture.pixels.clone();
         }
@@ -132,16 +132,16 @@ impl WatchedTerminal {
     }
 
     /// The state at the far end.
-    pub(crate) fn far(&self) -> MutexGuard<'_, FarEnd> {
+    pub(crate) fn far_end(&self) -> MutexGuard<'_, FarEnd> {
         lock(&self.far)
     }
 
     /// Waits until the far end satisfies `holds`.
     pub(crate) fn wait(&self, what: &str, holds: impl Fn(&FarEnd) -> bool) -> Result<(), Box<dyn Error>> {
         let deadline = Instant::now() + LIMIT;
-        while !holds(&self.far()) {
+        while !holds(&self.far_end()) {
             if Instant::now() > deadline {
-                let screen = self.far().cells.screen().contents();
+                let screen = self.far_end().cells.screen().contents();
                 return Err(format!("timed out waiting for {what}\n{screen}").into());
             }
             thread::sleep(Duration::from_millis(2));

@@ -16,7 +16,7 @@ use crate::settings::ViewMode;
 use crate::world::World;
 
 /// Blocks until its token is canceled.
-fn endless(
+fn block_until_canceled(
     _: Option<&PhotonMaps>,
     _: &World,
     _: &RenderSettings,
@@ -32,7 +32,7 @@ fn endless(
 
 #[test]
 fn cancel_stops_a_render() {
-    let mut bench = Bench::with(SCENE, endless);
+    let mut bench = Bench::with(SCENE, block_until_canceled);
     let of = bench.send();
     while !matches!(bench.next(), Event::Progress { .. }) {}
     bench.worker.send(Command::Cancel);
@@ -42,7 +42,7 @@ fn cancel_stops_a_render() {
 
 #[test]
 fn paused_render_can_be_cancelled() {
-    let mut bench = Bench::with(SCENE, endless);
+    let mut bench = Bench::with(SCENE, block_until_canceled);
     let of = bench.send();
     while !matches!(bench.next(), Event::Progress { .. }) {}
     bench.worker.send(Command::Pause(true));
@@ -52,7 +52,7 @@ fn paused_render_can_be_cancelled() {
 
 #[test]
 fn replaced_requests_are_cancelled() {
-    let mut bench = Bench::with(SCENE, endless);
+    let mut bench = Bench::with(SCENE, block_until_canceled);
     let ends: Vec<u64> = (0..4).map(|_| bench.send()).collect();
     bench.worker.send(Command::Cancel);
     let mut cancelled = Vec::new();
@@ -143,7 +143,7 @@ fn breaks_first(
     token: &CancelToken,
 ) -> Result<(TileSamples, RayCounters), Cancelled> {
     assert!(TILES.fetch_add(1, Ordering::SeqCst) != 0, "the first tile failed");
-    slow(photons, world, settings, pixels, samples, token)
+    render_slowly(photons, world, settings, pixels, samples, token)
 }
 
 #[test]
@@ -166,7 +166,7 @@ fn oversized_film_is_an_error() {
 }
 
 /// Renders so slowly that orders arrive during the render.
-pub(super) fn slow(
+pub(super) fn render_slowly(
     photons: Option<&PhotonMaps>,
     world: &World,
     settings: &RenderSettings,
@@ -179,7 +179,7 @@ pub(super) fn slow(
 }
 
 /// For a request with an invalid scene, waits until the render of the last valid scene ends.
-fn last_good_end(bench: &Bench, of: u64) -> LastValidSceneRenderOutcome {
+fn last_valid_scene_outcome(bench: &Bench, of: u64) -> LastValidSceneRenderOutcome {
     loop {
         match bench.next() {
             Event::LastGoodEnded { generation, end } if generation == of => return end,
@@ -194,12 +194,12 @@ fn nothing_is_rendered_without_a_valid_scene() {
     let mut bench = Bench::new(&SCENE.replace("width = 40", "width = = 40"));
     bench.writing = WriteRequirement::Try;
     assert!(matches!(bench.failed(), Failure::Scene(_)));
-    assert_eq!(last_good_end(&bench, 1), LastValidSceneRenderOutcome::Stopped);
+    assert_eq!(last_valid_scene_outcome(&bench, 1), LastValidSceneRenderOutcome::Stopped);
 }
 
 #[test]
 fn broken_scene_file_does_not_stop_a_render() {
-    let mut bench = Bench::with(&SCENE.replace("samples = 4", "samples = 10000"), slow);
+    let mut bench = Bench::with(&SCENE.replace("samples = 4", "samples = 10000"), render_slowly);
     (bench.writing, bench.preview) =
         (WriteRequirement::Try, Some(MaxPreviewSize { width: 12, height: 12, around: None }));
     let first = bench.send();
@@ -223,11 +223,11 @@ fn broken_scene_file_does_not_stop_a_render() {
     }
     assert!(is_seen && samples_on_disk(&bench).starts_with("10000"), "{}", samples_on_disk(&bench));
     let finished = |unchanged| LastValidSceneRenderOutcome::Finished { unchanged };
-    assert_eq!(last_good_end(&bench, broken), finished(false));
+    assert_eq!(last_valid_scene_outcome(&bench, broken), finished(false));
     // A second typo does not keep the image from being finished.
     bench.edit("width = = 40", "width = = = 40");
     assert!(matches!(bench.failed(), Failure::Scene(_)));
-    assert_eq!(last_good_end(&bench, bench.generation), finished(true));
+    assert_eq!(last_valid_scene_outcome(&bench, bench.generation), finished(true));
     bench.edit("width = = = 40", "width = = 40");
     bench.edit("width = = 40", "width = 40");
     let report = bench.done().0;
@@ -342,7 +342,7 @@ fn samples_on_disk(bench: &Bench) -> String {
 fn priority_region_is_rendered_first() {
     let text = wide().replace("width = 640", "width = 256").replace("height = 640", "height = 256");
     let text = text.replace("samples = 4", "samples = 32");
-    let mut bench = Bench::with(&text, slow);
+    let mut bench = Bench::with(&text, render_slowly);
     bench.overrides.view = Some(ViewMode::Samples);
     bench.preview = Some(MaxPreviewSize { width: 256, height: 256, around: None });
     bench.first = Some(NormalizedRect { left: 0.0, top: 0.0, width: 0.1, height: 0.1 });
@@ -365,7 +365,7 @@ fn priority_region_is_rendered_first() {
 
 #[test]
 fn time_limit_waits_for_the_first_pass() {
-    let mut bench = Bench::with(&wide(), slow);
+    let mut bench = Bench::with(&wide(), render_slowly);
     bench.overrides.time_seconds = Some(0.001);
     let report = bench.done().0;
     assert!(report.image.samples.min >= 1, "{:?}", report.image.samples);
@@ -375,7 +375,7 @@ fn time_limit_waits_for_the_first_pass() {
 
 #[test]
 fn write_waits_for_the_first_pass() {
-    let mut bench = Bench::with(&wide(), slow);
+    let mut bench = Bench::with(&wide(), render_slowly);
     let of = bench.send();
     while !matches!(bench.next(), Event::Progress { .. }) {}
     bench.worker.send(Command::Write);
@@ -389,7 +389,7 @@ fn write_waits_for_the_first_pass() {
 
 #[test]
 fn incomplete_images_are_not_written() {
-    let mut bench = Bench::with(&wide(), slow);
+    let mut bench = Bench::with(&wide(), render_slowly);
     bench.write("out.ppm", "the old one");
     let of = bench.send();
     while !matches!(bench.next(), Event::Progress { .. }) {}
@@ -409,7 +409,7 @@ fn incomplete_images_are_not_written() {
 
 #[test]
 fn refusal_mentions_the_newest_image() {
-    let mut bench = Bench::with(SCENE, slow);
+    let mut bench = Bench::with(SCENE, render_slowly);
     bench.done();
     bench.write("scene.toml", &wide());
     let of = bench.send();
@@ -424,7 +424,7 @@ fn refusal_mentions_the_newest_image() {
 
 #[test]
 fn next_request_carries_out_postponed_write() {
-    let mut bench = Bench::with(&wide(), slow);
+    let mut bench = Bench::with(&wide(), render_slowly);
     bench.send();
     while !matches!(bench.next(), Event::Progress { .. }) {}
     bench.worker.send(Command::Write);
@@ -441,7 +441,7 @@ fn next_request_carries_out_postponed_write() {
 
 #[test]
 fn write_during_a_render_saves_current_samples() {
-    let mut bench = Bench::with(&SCENE.replace("samples = 4", "samples = 1000000"), slow);
+    let mut bench = Bench::with(&SCENE.replace("samples = 4", "samples = 1000000"), render_slowly);
     let of = bench.send();
     while !matches!(bench.next(), Event::Progress { progress, .. } if progress.samples > 0) {}
     bench.worker.send(Command::Write);
@@ -510,7 +510,7 @@ fn write_without_an_image_fails() {
 
 #[test]
 fn time_limit_ends_a_render() {
-    let mut bench = Bench::with(&SCENE.replace("samples = 4", "samples = 1000000"), slow);
+    let mut bench = Bench::with(&SCENE.replace("samples = 4", "samples = 1000000"), render_slowly);
     bench.overrides.time_seconds = Some(0.3);
     let begin = Instant::now();
     let (report, _) = bench.done();
@@ -525,7 +525,7 @@ fn time_limit_ends_a_render() {
 
 #[test]
 fn unwritable_output_fails_before_rendering() {
-    let mut bench = Bench::with(SCENE, endless);
+    let mut bench = Bench::with(SCENE, block_until_canceled);
     bench.overrides.outputs = vec![bench.path("nowhere/out.png")];
     assert!(matches!(bench.failed(), Failure::Work(message) if message.contains("nowhere")));
 }
@@ -607,7 +607,7 @@ fn anisotropy_without_uvs_causes_a_warning() {
 }
 
 /// Renders slightly more slowly than usual.
-fn leisurely(
+fn render_slightly_slowly(
     photons: Option<&PhotonMaps>,
     world: &World,
     settings: &RenderSettings,
@@ -623,7 +623,7 @@ fn leisurely(
 #[test]
 fn paused_time_is_not_counted() {
     const HOLD: f64 = 0.6;
-    let mut bench = Bench::with(&SCENE.replace("samples = 4", "samples = 32"), leisurely);
+    let mut bench = Bench::with(&SCENE.replace("samples = 4", "samples = 32"), render_slightly_slowly);
     let begin = Instant::now();
     let of = bench.send();
     while !matches!(bench.next(), Event::Progress { .. }) {}
@@ -641,7 +641,7 @@ fn paused_time_is_not_counted() {
 
 #[test]
 fn reused_image_reports_original_render_time() {
-    let mut bench = Bench::with(SCENE, leisurely);
+    let mut bench = Bench::with(SCENE, render_slightly_slowly);
     let (first, _) = bench.done();
     bench.overrides.shadows = Some(crate::scene::description::ShadowMode::Off);
     bench.done();
@@ -657,7 +657,7 @@ fn continued_render_reports_total_time() {
     // Rendering about a hundred tiles takes seconds.
     let large =
         SCENE.replace("width = 40\nheight = 30\nsamples = 4", "width = 400\nheight = 300\nsamples = 64");
-    let mut bench = Bench::with(&large, leisurely);
+    let mut bench = Bench::with(&large, render_slightly_slowly);
     bench.send();
     let is_on_its_way = |event: &Event, of: u64| {
         matches!(event, Event::Progress { progress, generation }

@@ -33,14 +33,14 @@ fn click(ui: &mut TestUi, column: u16, row: u16) -> Vec<Effect> {
     mouse(ui, MouseEventKind::Release, column, row)
 }
 
-fn asked(effects: &[Effect]) -> ImagePosition {
+fn queried_position(effects: &[Effect]) -> ImagePosition {
     match effects {
         [Effect::Send(Command::Pick(spot))] => *spot,
         other => panic!("{other:?}"),
     }
 }
 
-fn thing() -> PickedObject {
+fn picked_object() -> PickedObject {
     PickedObject {
         shape: "sphere",
         name: Some("ball".to_owned()),
@@ -72,7 +72,7 @@ fn drag_orbits_and_click_inspects() {
         mouse(&mut ui, MouseEventKind::Release, 30, 10).is_empty(),
         "a drag should not be treated as a click"
     );
-    let spot = asked(&click(&mut ui, 12, 10));
+    let spot = queried_position(&click(&mut ui, 12, 10));
     assert!((spot.x - 12.5 / 55.0).abs() < 1e-9 && (spot.y - 9.5 / 21.0).abs() < 1e-9, "{spot:?}");
     for (column, row) in [(70, 10), (20, 0), (20, 23)] {
         assert!(click(&mut ui, column, row).is_empty(), "clicks outside the image should be ignored");
@@ -102,7 +102,7 @@ fn wheel_zooms_and_scrolls_diagnostics() {
 fn clicked_object_is_shown_and_can_be_edited() {
     let mut ui = ui();
     click(&mut ui, 12, 10);
-    assert!(answer(&mut ui, Some(thing())).is_empty());
+    assert!(answer(&mut ui, Some(picked_object())).is_empty());
     let text = ui.screen_words();
     for words in
         ["sphere \"ball\"", "cornell.toml:47", "glass crystal", "distance 3.9", "position (0.2, 0.5, -0.3)"]
@@ -134,7 +134,7 @@ fn click_after_f_sets_the_focus() {
     assert!(ui.press_character('f').is_empty());
     assert!(ui.screen_text().contains(messages::CLICK_TO_FOCUS), "{}", ui.screen_text());
     click(&mut ui, 12, 10);
-    let effects = answer(&mut ui, Some(thing()));
+    let effects = answer(&mut ui, Some(picked_object()));
     let focused = find_render_request(&effects).expect("a request");
     assert_eq!((focused.overrides.camera.focus, focused.write), (Some(3.8167), WriteRequirement::No));
     assert!(ui.screen_text().contains(&messages::focus_moved(3.8167)[..40]), "{}", ui.screen_text());
@@ -142,16 +142,16 @@ fn click_after_f_sets_the_focus() {
     ui.press_character('f');
     ui.press_character('e');
     click(&mut ui, 12, 10);
-    assert!(answer(&mut ui, Some(thing())).is_empty());
+    assert!(answer(&mut ui, Some(picked_object())).is_empty());
     // If the mouse is off, `f` focuses at the crosshair immediately.
     ui.press_character('m');
-    let spot = asked(&ui.press_character('f'));
+    let spot = queried_position(&ui.press_character('f'));
     assert!((spot.x - 12.5 / 55.0).abs() < 1e-9, "expected the last click: {spot:?}");
     assert!(answer(&mut ui, None).is_empty());
     assert!(ui.screen_text().contains(messages::NOTHING_TO_FOCUS));
     ui.state.request.own.as_mut().expect("a scene").camera.aperture = 0.0;
     ui.press_character('f');
-    assert!(answer(&mut ui, Some(thing())).is_empty());
+    assert!(answer(&mut ui, Some(picked_object())).is_empty());
     assert!(ui.screen_text().contains(messages::PINHOLE));
 }
 
@@ -248,7 +248,7 @@ fn y_copies_if_the_terminal_supports_it() {
     assert!(ui.press_character('y').is_empty());
     assert!(ui.screen_text().contains(messages::NOTHING_TO_COPY), "{}", ui.screen_text());
     click(&mut ui, 12, 10);
-    answer(&mut ui, Some(thing()));
+    answer(&mut ui, Some(picked_object()));
     assert!(ui.press_character('y').is_empty());
     let text: String = ui.screen_text().split_whitespace().collect::<Vec<_>>().join(" ");
     assert!(text.contains(&format!("{} sphere", messages::SELECT_TO_COPY)), "{text}");
@@ -333,7 +333,7 @@ fn small_windows_show_all_inspected_values() {
         let mut ui = TestUi::from_state(state(columns, rows));
         ui.finish_render(RED);
         ui.press_key(crate::event::KeyPress::special(crossterm::event::KeyCode::Enter));
-        answer(&mut ui, Some(thing()));
+        answer(&mut ui, Some(picked_object()));
         let text = ui.screen_text().replace('\n', " ");
         let text = text.split_whitespace().collect::<Vec<_>>().join(" ");
         for words in
@@ -358,7 +358,7 @@ fn small_windows_show_how_to_copy() {
         let mut ui = TestUi::from_state(state(columns, rows));
         ui.finish_render(RED);
         ui.press_key(crate::event::KeyPress::special(crossterm::event::KeyCode::Enter));
-        answer(&mut ui, Some(thing()));
+        answer(&mut ui, Some(picked_object()));
         ui.press_character('y');
         let text = ui.screen_text();
         assert!(
@@ -399,7 +399,7 @@ fn drag_after_z_selects_the_region_to_render() {
 #[test]
 fn clicks_in_a_close_up_select_the_right_pixel() {
     let mut ui = ui();
-    let spot = asked(&click(&mut ui, 12, 10));
+    let spot = queried_position(&click(&mut ui, 12, 10));
     ui.press_character('x');
     let around = ui.state.request.preview_size.expect("a size").around;
     assert_eq!(around, Some(spot));
@@ -418,7 +418,7 @@ fn clicks_in_a_close_up_select_the_right_pixel() {
     assert_eq!(super::cells_of(&mut ui, BLUE), 20 * 5, "{}", ui.screen_text());
     assert!(ui.screen_text().contains("cornell.toml  1:1"), "{}", ui.screen_text());
     // The area has 56 × 21 cells at (0, 1), so the image starts at (18, 9).
-    let spot = asked(&click(&mut ui, 18, 9));
+    let spot = queried_position(&click(&mut ui, 18, 9));
     assert!((spot.x - (0.2 + 0.1 * 0.5 / 20.0)).abs() < 1e-9, "{spot:?}");
     assert!((spot.y - (0.4 + 0.2 * 0.5 / 5.0)).abs() < 1e-9, "{spot:?}");
 }

@@ -334,7 +334,7 @@ fn photons_leave_convex_lights() {
 
 /// χ² test of counts in cells with equal expected counts.
 #[track_caller]
-fn assert_even(name: &str, counts: &[u32]) {
+fn assert_uniform(name: &str, counts: &[u32]) {
     let freedom = (counts.len() - 1) as f64;
     let expected = f64::from(counts.iter().sum::<u32>()) / counts.len() as f64;
     let chi2: f64 = counts.iter().map(|&count| (f64::from(count) - expected).powi(2) / expected).sum();
@@ -364,7 +364,7 @@ fn photon_directions_follow_the_intensity() {
             // sin² is uniformly distributed.
             counts[cell(1.0 - z * z, 16) * 16 + cell(turn, 16)] += 1;
         }
-        assert_even(&format!("{shape:?}"), &counts);
+        assert_uniform(&format!("{shape:?}"), &counts);
     }
     for (degrees, blend) in [(40.0, 0.0), (40.0, 0.2), (90.0, 1.0), (1.0, 0.5), (300.0, 0.7), (360.0, 1.0)] {
         let spot = spot(degrees, blend);
@@ -392,7 +392,7 @@ fn photon_directions_follow_the_intensity() {
             let turn = f64::from(y.atan2(x)) / TAU + 0.5;
             counts[cell(sum / sums[sums.len() - 1], 16) * 16 + cell(turn, 16)] += 1;
         }
-        assert_even(&format!("spotlight with {degrees}°, blend {blend}"), &counts);
+        assert_uniform(&format!("spotlight with {degrees}°, blend {blend}"), &counts);
     }
 }
 
@@ -413,7 +413,7 @@ fn photons_from_infinity_fill_the_disk() {
             let share = flat.length_squared() / (SCENE.radius * SCENE.radius);
             counts[cell(share, 8) * 8 + cell(turn, 8)] += 1;
         }
-        assert_even("disk", &counts);
+        assert_uniform("disk", &counts);
     }
 }
 
