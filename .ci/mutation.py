@@ -240,7 +240,7 @@ FAULTS = [
      "radius * (wanted / (NEAR * step as f32)).sqrt()", "integrators::photons::tests::first_radius_is_bounded_by_the_scene"),
     ("photons through a wall", "integrators/photons/occlusion.rs", "if ⟦!is_blocked(from, to)⟧ {", "true", CAUSTICS + "photons_do_not_leak_under_a_wall"),
     ("requests that wait for photons", "pipeline/stages/photons.rs", "Err(RecvTimeoutError::Timeout) => ⟦tick()⟧,", "()",
-     "pipeline::tests::photons::orders_are_handled_during_first_photon_pass"),
+     "pipeline::tests::photons::commands_are_handled_during_first_photon_pass"),
     ("a time limit ignored while photons are traced", "pipeline/render/scheduler.rs",
      "numbers.clone())?;\n            if ⟦self.is_over_time⟧ {", "false",
      "pipeline::tests::photons::time_limit_ends_a_photon_pass"),

@@ -127,9 +127,9 @@ pub struct CommandSender {
 struct Mailbox {
     request: Option<Box<Request>>,
     write: bool,
-    /// Whether a write order is postponed until the pending request runs.
+    /// Whether a write command is postponed until the pending request runs.
     is_write_postponed: bool,
-    /// Whether a write order arrived after the pending request and therefore applies to it.
+    /// Whether a write command arrived after the pending request and therefore applies to it.
     is_write_of_waiting: bool,
     /// The current request's overrides that the user can change with keys.
     shown: KeyOverrides,
@@ -228,9 +228,9 @@ impl CommandSender {
         self.mailbox.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Postpones a write order until the pending request runs if the order was meant for that request, or if
-    /// the current image is incomplete and the pending request has the same settings. Returns whether the
-    /// order was postponed.
+    /// Postpones a write command until the pending request runs if the command was meant for that request, or
+    /// if the current image is incomplete and the pending request has the same settings. Returns whether the
+    /// command was postponed.
     fn try_postpone_write_to_pending(&self, can_write: bool) -> bool {
         let mut mailbox = self.lock();
         let is_meant = mailbox.is_write_of_waiting;
@@ -244,7 +244,7 @@ impl CommandSender {
     fn wait_for_next_task(&self) -> Task {
         let mut mailbox = self.lock();
         loop {
-            // Carry out a write order that arrived before the quit command.
+            // Carry out a write command that arrived before the quit command.
             if mailbox.write && !(mailbox.is_write_postponed && mailbox.request.is_some()) {
                 mailbox.write = false;
                 return Task::Write;
@@ -467,7 +467,7 @@ mod tests {
     }
 
     #[test]
-    fn write_order_does_not_apply_to_another_view() {
+    fn write_command_does_not_apply_to_another_view() {
         let remote = silent_sender();
         remote.send(render(1));
         let _ = token(&remote);
@@ -478,32 +478,35 @@ mod tests {
         assert!(matches!(remote.wait_for_next_task(), Task::Write));
         assert!(
             !remote.try_postpone_write_to_pending(false),
-            "the order should not be postponed, so that an error is reported"
+            "the command should not be postponed, so that an error is reported"
         );
-        // An order sent after the view was requested applies to the view, even if the first image is
+        // A command sent after the view was requested applies to the view, even if the first image is
         // complete.
         remote.send(Command::Write);
-        assert!(!remote.wants_write() && !remote.take_write(), "the ending request should ignore the order");
+        assert!(
+            !remote.wants_write() && !remote.take_write(),
+            "the ending request should ignore the command"
+        );
         assert!(matches!(remote.wait_for_next_task(), Task::Write));
         assert!(remote.try_postpone_write_to_pending(true));
     }
 
     #[test]
-    fn pending_orders_are_handled_in_sequence() {
+    fn pending_commands_are_handled_in_sequence() {
         let remote = silent_sender();
         remote.send(render(1));
         remote.send(Command::Write);
         remote.send(Command::Preview(None));
         assert!(
             matches!(remote.wait_for_next_task(), Task::Write),
-            "the order should apply to the shown image first"
+            "the command should apply to the shown image first"
         );
         assert!(
             remote.try_postpone_write_to_pending(false),
-            "the order should be postponed while the image is incomplete"
+            "the command should be postponed while the image is incomplete"
         );
         assert!(matches!(remote.wait_for_next_task(), Task::Render(..)));
-        assert!(remote.take_write(), "the request should take the order");
+        assert!(remote.take_write(), "the request should take the command");
         assert!(!remote.take_write());
         assert!(matches!(remote.wait_for_next_task(), Task::Preview(None, _)));
         assert!(!remote.try_postpone_write_to_pending(false), "no request should be pending");

@@ -2,7 +2,7 @@
 
 mod adaptive;
 mod camera;
-mod orders;
+mod commands;
 mod own;
 mod photons;
 mod previews;

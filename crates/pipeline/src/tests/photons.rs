@@ -25,7 +25,7 @@ fn until_first_are_sent(bench: &Bench) {
 }
 
 #[test]
-fn orders_are_handled_during_first_photon_pass() {
+fn commands_are_handled_during_first_photon_pass() {
     let mut bench = Bench::new(&wrapped(1_500_000));
     let of = bench.send();
     until_first_are_sent(&bench);

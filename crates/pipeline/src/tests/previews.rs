@@ -1,6 +1,6 @@
 //! Tests for previews: size, section and range.
 
-use super::orders::render_slowly;
+use super::commands::render_slowly;
 use super::*;
 use crate::settings::ViewMode;
 

@@ -1,4 +1,4 @@
-//! Tests for failures, and for orders that arrive during a render: cancel, pause and write.
+//! Tests for failures, and for commands that arrive during a render: cancel, pause and write.
 
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -165,7 +165,7 @@ fn oversized_film_is_an_error() {
     bench.done();
 }
 
-/// Renders so slowly that orders arrive during the render.
+/// Renders so slowly that commands arrive during the render.
 pub(super) fn render_slowly(
     photons: Option<&PhotonMaps>,
     world: &World,
@@ -326,7 +326,7 @@ fn last_valid_scene_never_mixes_file_versions() {
     }
 }
 
-/// Returns a scene with enough tiles for orders to arrive during the first pass.
+/// Returns a scene with enough tiles for commands to arrive during the first pass.
 fn wide() -> String {
     SCENE.replace("width = 40", "width = 640").replace("height = 30", "height = 640")
 }
@@ -401,9 +401,9 @@ fn incomplete_images_are_not_written() {
         Event::WriteFailed { message, .. } => message.contains(INCOMPLETE_IMAGE),
         _ => false,
     };
-    assert!(is_refusal(bench.next()), "the postponed order should be refused");
+    assert!(is_refusal(bench.next()), "the postponed command should be refused");
     bench.worker.send(Command::Write);
-    assert!(is_refusal(bench.next()), "a later order should be refused");
+    assert!(is_refusal(bench.next()), "a later command should be refused");
     assert_eq!(bench.picture(), b"the old one");
 }
 
@@ -494,7 +494,7 @@ fn write_is_handled_during_pause_between_passes() {
 }
 
 #[test]
-fn write_order_rewrites_an_unchanged_image() {
+fn write_command_rewrites_an_unchanged_image() {
     let mut bench = Bench::new(SCENE);
     bench.done();
     bench.worker.send(Command::Write);
