@@ -7,7 +7,8 @@ use std::time::{Duration, Instant};
 
 use crate::watched::{Connection, WatchedTerminal};
 
-/// Key repeat interval. The key is first held for `WARM_UP_TIME`, then for `HOLD_TIME` while the connection is measured.
+/// Key repeat interval. The key is first held for `WARM_UP_TIME`, then for `HOLD_TIME` while the connection
+/// is measured.
 const REPEAT: Duration = Duration::from_millis(33);
 /// Number of presses in one direction, few enough that the camera stays in front of the scene. Behind a
 /// room's wall, the image would be black, with nothing to send.

@@ -346,12 +346,15 @@ fn argument_warning(message: &str, help: &str) -> Diagnostic {
 
 /// Returns warnings about options that have no effect. The terminal UI has its own messages for these
 /// options.
-fn ineffective_option_warnings(asked: &Overrides, settings: &EffectiveSettingsSummary) -> Vec<Diagnostic> {
-    let dof = (asked.dof == Some(true) && !settings.dof).then(|| {
+fn ineffective_option_warnings(
+    requested: &Overrides,
+    settings: &EffectiveSettingsSummary,
+) -> Vec<Diagnostic> {
+    let dof = (requested.dof == Some(true) && !settings.dof).then(|| {
         let help = "set `aperture` in [camera], for example to 0.1";
         argument_warning("--dof on has no effect: the camera's aperture is 0", help)
     });
-    let photons = (asked.photons == Some(true) && !settings.photons).then(|| {
+    let photons = (requested.photons == Some(true) && !settings.photons).then(|| {
         let help = "use `--integrator whitted`";
         argument_warning("--photons on has no effect: photons work with whitted only", help)
     });

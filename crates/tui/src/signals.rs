@@ -311,8 +311,8 @@ mod tests {
     #[cfg(target_os = "linux")]
     #[test]
     fn real_time_signals_are_handled() {
-        let heard: Vec<i32> = linux_terminating_signals().collect();
-        assert!(heard.contains(&libc::SIGRTMIN()) && heard.contains(&libc::SIGRTMAX()));
+        let numbers: Vec<i32> = linux_terminating_signals().collect();
+        assert!(numbers.contains(&libc::SIGRTMIN()) && numbers.contains(&libc::SIGRTMAX()));
         assert_eq!(exit_status_for(Signal::Other(libc::SIGRTMAX())), Some(ExitStatus(128 + 64)));
     }
 

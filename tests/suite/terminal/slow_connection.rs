@@ -38,8 +38,8 @@ fn response_time(
     begin.elapsed()
 }
 
-/// Checks that the fastest of several attempts is within [`RESPONSE_LIMIT`]. Only the fastest attempt is meaningful,
-/// because other tests may occupy the processors.
+/// Checks that the fastest of several attempts is within [`RESPONSE_LIMIT`]. Only the fastest attempt is
+/// meaningful, because other tests may occupy the processors.
 #[track_caller]
 fn assert_at_once(what: &str, mut once: impl FnMut() -> Duration) {
     const ATTEMPTS: u32 = 12;

@@ -75,15 +75,15 @@ fn check_scenes(runs: &[SceneRun<'_>]) -> Result<(), BenchError> {
     if wrong.is_empty() { Ok(()) } else { Err(BenchError::Failed(Failure::Scene(wrong))) }
 }
 
-/// Returns the size of a scene's benchmark images: `asked`, with missing dimensions computed from the scene's
-/// aspect ratio and a default size.
-pub fn image_size(scene: &Scene, asked: (Option<u32>, Option<u32>)) -> (u32, u32) {
+/// Returns the size of a scene's benchmark images. Computes dimensions missing from `requested` with the
+/// scene's aspect ratio and a default size.
+pub fn image_size(scene: &Scene, requested: (Option<u32>, Option<u32>)) -> (u32, u32) {
     let (width, height) = (f64::from(scene.render.width), f64::from(scene.render.height));
     let side = |length: f64| length.round().clamp(1.0, 65536.0) as u32;
-    match asked {
+    match requested {
         (Some(width), Some(height)) => (width, height),
-        (Some(asked), None) => (asked, side(height * f64::from(asked) / width)),
-        (None, Some(asked)) => (side(width * f64::from(asked) / height), asked),
+        (Some(requested), None) => (requested, side(height * f64::from(requested) / width)),
+        (None, Some(requested)) => (side(width * f64::from(requested) / height), requested),
         (None, None) => {
             let scale = (f64::from(LONG_SIDE) / width.max(height)).min(1.0);
             (side(width * scale), side(height * scale))
@@ -163,7 +163,7 @@ impl SceneRun<'_> {
     }
 
     pub(super) fn reference_renderer<'a>(&'a self, common: &'a Overrides) -> ReferenceRenderer<'a> {
-        let asked = match &self.request.reference {
+        let requested_samples = match &self.request.reference {
             ReferenceSource::Samples(samples) => Some(*samples),
             ReferenceSource::InTime | ReferenceSource::Files(_) => None,
         };
@@ -172,7 +172,7 @@ impl SceneRun<'_> {
             common,
             token: self.token,
             cache: self.request.cache.as_deref(),
-            asked,
+            requested_samples,
         }
     }
 
@@ -308,10 +308,10 @@ mod tests {
     #[test]
     fn images_keep_the_aspect_ratio() {
         let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../../scenes/cornell.toml");
-        let of = |width, height, asked| {
+        let of = |width, height, requested| {
             let mut scene = Scene::clone(&scene::load(Path::new(file), &[]).expect("a scene").scene);
             (scene.render.width, scene.render.height) = (width, height);
-            image_size(&scene, asked)
+            image_size(&scene, requested)
         };
         assert_eq!(of(640, 480, (None, None)), (96, 72));
         assert_eq!(of(480, 640, (None, None)), (72, 96));

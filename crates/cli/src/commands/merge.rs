@@ -145,7 +145,7 @@ impl MergeCommand<'_> {
     fn wait_for_parts(&self) -> Result<Vec<PartFile>, Exit> {
         let mut parts: Vec<PartFile> = Vec::new();
         let mut waiting: Vec<AwaitedPart> = self.args.parts.iter().cloned().map(AwaitedPart::new).collect();
-        let mut said = None;
+        let mut reported = None;
         let mut block = InPlaceTerminalBlock::default();
         loop {
             let mut rest = Vec::new();
@@ -165,8 +165,8 @@ impl MergeCommand<'_> {
             let unfinished: Vec<&Path> =
                 waiting.iter().filter_map(AwaitedPart::existing_path_if_incomplete).collect();
             let state = (parts.len(), unfinished.iter().map(|path| path.to_path_buf()).collect::<Vec<_>>());
-            if said.as_ref() != Some(&state) {
-                let is_new = said.is_none_or(|(count, _)| count != parts.len());
+            if reported.as_ref() != Some(&state) {
+                let is_new = reported.is_none_or(|(count, _)| count != parts.len());
                 let words = self.describe_completed_parts(parts.len(), &unfinished);
                 if self.redraws_in_place() {
                     self.redraw_image(&parts, &words, &mut block)?;
@@ -175,7 +175,7 @@ impl MergeCommand<'_> {
                     part::check_and_list_missing(&parts).map_err(|error| self.report_part_error(&error))?;
                 }
                 self.report_parts(parts.len(), &unfinished, &words);
-                said = Some(state);
+                reported = Some(state);
             }
             if waiting.is_empty() {
                 return Ok(parts);
@@ -396,7 +396,7 @@ struct StepProgressBar {
     what: &'static str,
     bar: Option<ProgressBar>,
     is_json: bool,
-    said: usize,
+    reported: usize,
 }
 
 impl StepProgressBar {
@@ -405,17 +405,17 @@ impl StepProgressBar {
         let has_bar = progress == ProgressMode::Auto && console.is_terminal;
         let bar = has_bar
             .then(|| ProgressBar::new(1).with_style(bar_style_from_template(template)).with_message(what));
-        Self { what, bar, is_json: progress == ProgressMode::Json, said: 0 }
+        Self { what, bar, is_json: progress == ProgressMode::Json, reported: 0 }
     }
 
     fn update(&mut self, done: usize, total: usize) {
         /// Maximum number of progress reports per step.
         const STEPS: usize = 100;
         let step = done * STEPS / total.max(1);
-        if step == self.said {
+        if step == self.reported {
             return;
         }
-        self.said = step;
+        self.reported = step;
         if let Some(bar) = &self.bar {
             bar.set_length(total as u64);
             bar.set_position(done as u64);

@@ -159,19 +159,19 @@ impl TriangleList {
         Some(Self { facets, corners, low, high })
     }
 
-    /// Updates `found` with the nearest hits of the rays in `met`. All other rays must have negative ends.
+    /// Updates `found` with the nearest hits of the rays in `active`. All other rays must have negative ends.
     /// Returns the mask of undecided rays, whose hits are left unchanged.
     #[inline(always)]
     pub fn update_decided_closest_hits(
         &self,
         rays: &RayPacket,
-        (met, ends): (u32, &F32x16),
+        (active, ends): (u32, &F32x16),
         found: &mut HitPacket,
         simd: impl Simd,
     ) -> u32 {
         let candidates = self.find_nearest_candidates(rays, ends, &[NONE; PACKET_SIZE], simd);
         let CandidateTestResults { hit, undecided, hits } =
-            self.test_candidates(rays, &candidates, (met, ends), simd);
+            self.test_candidates(rays, &candidates, (active, ends), simd);
         select(&hit, &hits.t, &mut found.t);
         select(&hit, &hits.u, &mut found.u);
         select(&hit, &hits.v, &mut found.v);
@@ -179,13 +179,13 @@ impl TriangleList {
         undecided
     }
 
-    /// Returns the mask of the rays in `met` that hit any triangle other than the ray's entry in `except`,
+    /// Returns the mask of the rays in `active` that hit any triangle other than the ray's entry in `except`,
     /// and the mask of undecided rays. All other rays must have negative ends.
     #[inline(always)]
     pub fn any_hit_and_undecided_masks(
         &self,
         rays: &RayPacket,
-        (met, ends): (u32, &F32x16),
+        (active, ends): (u32, &F32x16),
         except: &[u32; PACKET_SIZE],
         simd: impl Simd,
     ) -> [u32; 2] {
@@ -194,12 +194,12 @@ impl TriangleList {
         for i in 0..PACKET_SIZE {
             is_met[i] |= if candidates.near[i] < f32::INFINITY { TRUE } else { 0 };
         }
-        if simd.movemask(&is_met) & met == 0 {
+        if simd.movemask(&is_met) & active == 0 {
             return [0; 2];
         }
         let CandidateTestResults { hit, undecided, .. } =
-            self.test_candidates(rays, &candidates, (met, ends), simd);
-        [simd.movemask(&hit) & met, undecided]
+            self.test_candidates(rays, &candidates, (active, ends), simd);
+        [simd.movemask(&hit) & active, undecided]
     }
 
     /// Finds the nearest candidates. Excludes each ray's start triangle and its triangle in `except`.
@@ -295,7 +295,7 @@ impl TriangleList {
         &self,
         rays: &RayPacket,
         candidates: &NearestCandidates,
-        (met, ends): (u32, &F32x16),
+        (active, ends): (u32, &F32x16),
         simd: impl Simd,
     ) -> CandidateTestResults {
         let mut corners = [[[0.0; PACKET_SIZE]; 3]; 3];
@@ -318,7 +318,7 @@ impl TriangleList {
             hit[i] = if is_nearest { TRUE } else { 0 };
             undecided[i] = if is_open | (candidates.doubtful[i] != 0) { TRUE } else { 0 };
         }
-        CandidateTestResults { hit, undecided: simd.movemask(&undecided) & met, hits }
+        CandidateTestResults { hit, undecided: simd.movemask(&undecided) & active, hits }
     }
 
     /// Computes the error terms for the rays.

@@ -123,8 +123,8 @@ impl Light {
     /// Light-sampling pdf of a hit's direction in sr⁻¹, for the surface point `from` with the given normal.
     /// It is 0 if light sampling never generates the direction, or if rays cannot hit the light.
     #[inline]
-    pub fn pdf(&self, from: Vec3, normal: Vec3, met: &LightHit) -> f32 {
-        self.as_area().map_or(0.0, |light| light.pdf(from, normal, met))
+    pub fn pdf(&self, from: Vec3, normal: Vec3, hit: &LightHit) -> f32 {
+        self.as_area().map_or(0.0, |light| light.pdf(from, normal, hit))
     }
 
     /// Bounds on the light's position and emission for a [`LightTree`](super::LightTree), or `None` if the

@@ -157,16 +157,16 @@ impl Material {
         }
     }
 
-    /// Probability that the surface exists at a point with a material for which `is_meant` is true. Counts
+    /// Probability that the surface exists at a point with a material for which `accepts` is true. Counts
     /// texture lookups in `lookups`.
-    pub fn presence(&self, at: &TexturePoint, is_meant: &dyn Fn(&Self) -> bool, lookups: &mut u64) -> f32 {
+    pub fn presence(&self, at: &TexturePoint, accepts: &dyn Fn(&Self) -> bool, lookups: &mut u64) -> f32 {
         match self.blend() {
             Some(blend) => {
                 let of_part =
-                    |part: &Self, lookups: &mut u64| Vec3::splat(part.presence(at, is_meant, lookups));
+                    |part: &Self, lookups: &mut u64| Vec3::splat(part.presence(at, accepts, lookups));
                 blend.mean(at, lookups, of_part).x
             }
-            None if !is_meant(self) => 0.0,
+            None if !accepts(self) => 0.0,
             None => self.opacity.as_ref().map_or(1.0, |opacity| opacity.evaluate(at, lookups)),
         }
     }

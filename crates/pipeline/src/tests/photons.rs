@@ -34,7 +34,7 @@ fn commands_are_handled_during_first_photon_pass() {
     bench.worker.send(Command::Write);
     while !matches!(bench.next(), Event::WritePostponed { generation } if generation == of) {}
     bench.worker.send(Command::Pick(ImagePosition { x: 0.5, y: 0.5 }));
-    while !matches!(bench.next(), Event::Picked { picked, .. } if picked.thing.is_some()) {}
+    while !matches!(bench.next(), Event::Picked { picked, .. } if picked.object.is_some()) {}
     bench.worker.send(Command::Pause(false));
     let events = bench.until_end(of);
     assert!(

@@ -312,8 +312,8 @@ fn mesh_lights_by_material_and_side(
 /// Triangles with one of the mesh file's materials, or all triangles if `own` is `None`.
 fn triangles_with_material(mesh: &MeshInstance, own: Option<u32>) -> impl Iterator<Item = u32> {
     let mesh = &mesh.tree.loaded().mesh;
-    let is_meant = move |id: &u32| own.is_none() || mesh.materials.get(*id as usize).copied() == own;
-    (0..mesh.triangles.len() as u32).filter(is_meant)
+    let has_material = move |id: &u32| own.is_none() || mesh.materials.get(*id as usize).copied() == own;
+    (0..mesh.triangles.len() as u32).filter(has_material)
 }
 
 #[cfg(test)]

@@ -314,8 +314,8 @@ impl Geometry {
     }
 
     /// Returns the requested surface attributes at a hit.
-    pub fn requested_surface(&self, ray: &Ray, hit: &Hit, asked: SurfaceRequest) -> SurfacePoint {
-        self.objects[hit.object as usize].surface(ray, &hit.shape, asked)
+    pub fn requested_surface(&self, ray: &Ray, hit: &Hit, request: SurfaceRequest) -> SurfacePoint {
+        self.objects[hit.object as usize].surface(ray, &hit.shape, request)
     }
 
     /// Mean curvature at a hit, positive if the surface is convex on its front side.

@@ -166,22 +166,22 @@ impl MergedMeshes {
     /// Invalid triangle number.
     pub const NO_TRIANGLE: u32 = u32::MAX;
 
-    /// Finds the nearest hits of the rays in `met`. The hits' primitives are triangle indices into the tree.
-    /// Other lanes have negative `ends`.
+    /// Finds the nearest hits of the rays in `active`. The hits' primitives are triangle indices into the
+    /// tree. Other lanes have negative `ends`.
     #[inline(never)]
     pub fn closest_hit_packet(
         &self,
         by: InstructionSet,
         rows: &RayPacket,
-        (met, ends): (u32, &F32x16),
+        (active, ends): (u32, &F32x16),
         found: &mut HitPacket,
     ) {
-        let Some(facets) = &self.facets else { return self.closest_hit_by_tree(rows, met, ends, found) };
+        let Some(facets) = &self.facets else { return self.closest_hit_by_tree(rows, active, ends, found) };
         let size = self.bounds().extent();
-        match by.run(TriangleListClosestHitKernel { facets, size, rows, met, ends, found }) {
+        match by.run(TriangleListClosestHitKernel { facets, size, rows, active, ends, found }) {
             Some(0) => {}
             Some(undecided) => self.closest_hit_per_ray(rows, undecided, ends, found),
-            None => self.closest_hit_by_tree(rows, met, ends, found),
+            None => self.closest_hit_by_tree(rows, active, ends, found),
         }
     }
 
@@ -197,9 +197,9 @@ impl MergedMeshes {
     }
 
     #[inline(never)]
-    fn closest_hit_by_tree(&self, rows: &RayPacket, met: u32, ends: &F32x16, found: &mut HitPacket) {
+    fn closest_hit_by_tree(&self, rows: &RayPacket, active: u32, ends: &F32x16, found: &mut HitPacket) {
         let mut hits = [None; PACKET_SIZE];
-        self.tree.closest_hit_packet(&unpack_rays(rows, met), ends, &mut hits);
+        self.tree.closest_hit_packet(&unpack_rays(rows, active), ends, &mut hits);
         for (lane, hit) in hits.iter().enumerate() {
             if let Some(hit) = hit {
                 found.set(lane, hit);
@@ -207,23 +207,23 @@ impl MergedMeshes {
         }
     }
 
-    /// Returns the mask of rays in `met` that hit any triangle other than the lane's entry in `except`, which
-    /// may be [`MergedMeshes::NO_TRIANGLE`].
+    /// Returns the mask of rays in `active` that hit any triangle other than the lane's entry in `except`,
+    /// which may be [`MergedMeshes::NO_TRIANGLE`].
     #[inline(never)]
     pub fn any_hit_packet(
         &self,
         by: InstructionSet,
         rows: &RayPacket,
-        (met, ends): (u32, &F32x16),
+        (active, ends): (u32, &F32x16),
         except: Option<&[u32; PACKET_SIZE]>,
     ) -> u32 {
-        let Some(facets) = &self.facets else { return self.any_hit_by_tree(rows, met, ends, except) };
+        let Some(facets) = &self.facets else { return self.any_hit_by_tree(rows, active, ends, except) };
         let own = except.unwrap_or(&[Self::NO_TRIANGLE; PACKET_SIZE]);
         let size = self.bounds().extent();
-        match by.run(TriangleListAnyHitKernel { facets, size, rows, met, ends, except: own }) {
+        match by.run(TriangleListAnyHitKernel { facets, size, rows, active, ends, except: own }) {
             Some([hit, 0]) => hit,
             Some([hit, undecided]) => hit | self.any_hit_one_by_one(rows, undecided, ends, own),
-            None => self.any_hit_by_tree(rows, met, ends, except),
+            None => self.any_hit_by_tree(rows, active, ends, except),
         }
     }
 
@@ -248,11 +248,11 @@ impl MergedMeshes {
     fn any_hit_by_tree(
         &self,
         rows: &RayPacket,
-        met: u32,
+        active: u32,
         ends: &F32x16,
         except: Option<&[u32; PACKET_SIZE]>,
     ) -> u32 {
-        let rays = unpack_rays(rows, met);
+        let rays = unpack_rays(rows, active);
         let Some(numbers) = except else { return self.tree.any_hit_packet(&rays, ends, &[]) };
         let own = numbers.map(|number| (number != Self::NO_TRIANGLE).then_some(number));
         self.tree.any_hit_packet(&rays, ends, &own)
@@ -265,11 +265,11 @@ impl MergedMeshes {
     }
 }
 
-/// Whether the rays in `met` start close together, relative to `size`, and have similar directions. Such rays
-/// are faster with the tree than without it.
+/// Whether the rays in `active` start close together, relative to `size`, and have similar directions. Such
+/// rays are faster with the tree than without it.
 #[inline(always)]
-fn are_coherent(rows: &RayPacket, met: u32, size: Vec3, simd: impl Simd) -> bool {
-    let first = met.trailing_zeros() as usize % PACKET_SIZE;
+fn are_coherent(rows: &RayPacket, active: u32, size: Vec3, simd: impl Simd) -> bool {
+    let first = active.trailing_zeros() as usize % PACKET_SIZE;
     let near = size.element_sum() * COHERENCE;
     let along = (0..3).map(|axis| rows.direction[axis][first].abs()).sum::<f32>() * COHERENCE;
     let from = [0, 1, 2].map(|axis| rows.origin[axis][first]);
@@ -281,7 +281,7 @@ fn are_coherent(rows: &RayPacket, met: u32, size: Vec3, simd: impl Simd) -> bool
         let aside = (dx[lane] - way[0]).abs() + (dy[lane] - way[1]).abs() + (dz[lane] - way[2]).abs();
         differs[lane] = if (apart <= near) & (aside <= along) { 0 } else { TRUE };
     }
-    simd.movemask(&differs) & met == 0
+    simd.movemask(&differs) & active == 0
 }
 
 /// Coherence threshold: maximum difference between ray origins relative to the size of all triangles, and
@@ -294,7 +294,7 @@ struct TriangleListClosestHitKernel<'a> {
     facets: &'a TriangleList,
     size: Vec3,
     rows: &'a RayPacket,
-    met: u32,
+    active: u32,
     ends: &'a F32x16,
     found: &'a mut HitPacket,
 }
@@ -304,11 +304,11 @@ impl SimdKernel for TriangleListClosestHitKernel<'_> {
 
     #[inline(always)]
     fn run(self, simd: impl Simd) -> Option<u32> {
-        let Self { facets, size, rows, met, ends, found } = self;
-        if are_coherent(rows, met, size, simd) {
+        let Self { facets, size, rows, active, ends, found } = self;
+        if are_coherent(rows, active, size, simd) {
             return None;
         }
-        Some(facets.update_decided_closest_hits(rows, (met, ends), found, simd))
+        Some(facets.update_decided_closest_hits(rows, (active, ends), found, simd))
     }
 }
 
@@ -318,7 +318,7 @@ struct TriangleListAnyHitKernel<'a> {
     facets: &'a TriangleList,
     size: Vec3,
     rows: &'a RayPacket,
-    met: u32,
+    active: u32,
     ends: &'a F32x16,
     except: &'a [u32; PACKET_SIZE],
 }
@@ -328,20 +328,20 @@ impl SimdKernel for TriangleListAnyHitKernel<'_> {
 
     #[inline(always)]
     fn run(self, simd: impl Simd) -> Option<[u32; 2]> {
-        let Self { facets, size, rows, met, ends, except } = self;
-        if are_coherent(rows, met, size, simd) {
+        let Self { facets, size, rows, active, ends, except } = self;
+        if are_coherent(rows, active, size, simd) {
             return None;
         }
-        Some(facets.any_hit_and_undecided_masks(rows, (met, ends), except, simd))
+        Some(facets.any_hit_and_undecided_masks(rows, (active, ends), except, simd))
     }
 }
 
-/// Returns the rays of a packet. Lanes outside `met` contain a copy of the first ray in `met`, whose
+/// Returns the rays of a packet. Lanes outside `active` contain a copy of the first ray in `active`, whose
 /// direction is likely similar.
 #[inline]
-fn unpack_rays(rows: &RayPacket, met: u32) -> [Ray; PACKET_SIZE] {
-    let mut rays = [rows.ray(met.trailing_zeros() as usize % PACKET_SIZE); PACKET_SIZE];
-    for lane in set_bit_lanes(met & met.wrapping_sub(1)) {
+fn unpack_rays(rows: &RayPacket, active: u32) -> [Ray; PACKET_SIZE] {
+    let mut rays = [rows.ray(active.trailing_zeros() as usize % PACKET_SIZE); PACKET_SIZE];
+    for lane in set_bit_lanes(active & active.wrapping_sub(1)) {
         rays[lane] = rows.ray(lane);
     }
     rays
@@ -537,10 +537,11 @@ pub(super) mod tests {
                 let direction =
                     direction * if direction.dot(surface.normal) * side < 0.0 { -1.0 } else { 1.0 };
                 let origin = offset_origin(surface.point, surface.error, surface.normal, direction);
-                let met = geometry.closest_hit(&Ray::new(origin, direction));
-                let is_own =
-                    |met: Hit| (met.object, met.shape.primitive) == (hit.object, hit.shape.primitive);
-                (started, again) = (started + 1, again + u32::from(met.is_some_and(is_own)));
+                let second = geometry.closest_hit(&Ray::new(origin, direction));
+                let is_own = |second: Hit| {
+                    (second.object, second.shape.primitive) == (hit.object, hit.shape.primitive)
+                };
+                (started, again) = (started + 1, again + u32::from(second.is_some_and(is_own)));
             }
         }
         assert!(started > 5000, "{started} rays");

@@ -92,7 +92,7 @@ pub(super) struct TerminalFlowControl {
     /// sent, so only their replies can show that the connection has recovered.
     recent: VecDeque<Duration>,
     /// Time when the last reply arrived or the oldest pending query was sent, whichever is later.
-    heard: Instant,
+    waiting_since: Instant,
     bucket: TokenBucket,
     /// Bytes that the operating system has not accepted yet.
     unwritten: usize,
@@ -111,7 +111,7 @@ impl TerminalFlowControl {
             shrunk: None,
             round_trips: MinRoundTripTracker::default(),
             recent: VecDeque::with_capacity(RECENT_SLICES),
-            heard: now,
+            waiting_since: now,
             bucket: TokenBucket::full(now),
             unwritten: 0,
         }
@@ -146,7 +146,7 @@ impl TerminalFlowControl {
         self.bucket.take(bytes, now);
         let Some(question) = question else { return };
         if self.flight.is_empty() {
-            self.heard = now;
+            self.waiting_since = now;
         }
         self.in_flight += bytes;
         let is_limited =
@@ -162,7 +162,7 @@ impl TerminalFlowControl {
     /// Records a reply from the terminal.
     pub(super) fn handle_reply(&mut self, question: QueryKind, now: Instant) {
         self.replies = ReplySupport::Answering;
-        self.heard = now;
+        self.waiting_since = now;
         let Some(place) = self.flight.iter().position(|slice| slice.question == question) else { return };
         // Replies arrive in order, so replies to earlier slices have been lost.
         let passed: Vec<SentSlice> = self.flight.drain(..=place).collect();
@@ -184,7 +184,8 @@ impl TerminalFlowControl {
         let filled = self.bucket.available_at(MIN_SLICE + QUERY_BYTES, now);
         match self.replies {
             ReplySupport::Answering => {
-                let lost = (!self.flight.is_empty()).then_some(self.heard + self.lost_reply_timeout());
+                let lost =
+                    (!self.flight.is_empty()).then_some(self.waiting_since + self.lost_reply_timeout());
                 let filled = self.is_multiplexed.then_some(filled).filter(|filled| *filled > now);
                 [lost, filled].into_iter().flatten().min()
             }
@@ -245,7 +246,7 @@ impl TerminalFlowControl {
                 self.clear_in_flight();
             }
             ReplySupport::Answering
-                if self.awaits_reply() && now >= self.heard + self.lost_reply_timeout() =>
+                if self.awaits_reply() && now >= self.waiting_since + self.lost_reply_timeout() =>
             {
                 // The connection is stalled or a reply was lost. Send little until the next reply.
                 self.clear_in_flight();

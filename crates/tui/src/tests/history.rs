@@ -47,7 +47,7 @@ fn older_render_cannot_be_inspected() {
     assert!(!asks(&ui.handle_event(mouse(MouseEventKind::Release))));
     assert!(ui.screen_text().contains(messages::OLDER_RENDER), "{}", ui.screen_text());
     // A late reply is not shown for the older render.
-    let picked = PickedPixel { pixel: [3, 4], thing: None, color: None };
+    let picked = PickedPixel { pixel: [3, 4], object: None, color: None };
     ui.worker_event(WorkerEvent::Picked { generation: 1, picked: Box::new(picked) });
     assert!(!ui.screen_text().contains("pixel 3, 4"), "{}", ui.screen_text());
     ui.press_character('b');

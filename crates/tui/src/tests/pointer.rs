@@ -56,8 +56,8 @@ fn picked_object() -> PickedObject {
     }
 }
 
-fn answer(ui: &mut TestUi, thing: Option<PickedObject>) -> Vec<Effect> {
-    let picked = Box::new(PickedPixel { pixel: [1, 2], thing, color: Some([0.5; 3]) });
+fn answer(ui: &mut TestUi, object: Option<PickedObject>) -> Vec<Effect> {
+    let picked = Box::new(PickedPixel { pixel: [1, 2], object, color: Some([0.5; 3]) });
     ui.worker_event(protocol::Event::Picked { generation: 0, picked })
 }
 

@@ -82,8 +82,8 @@ fn nested_box_queries_match_brute_force() {
             let at = Vec3::X + Vec3::new(next(), next(), next()) * 2.0;
             let near = Aabb { min: at, max: at }.expanded(Vec3::splat([1e-5, 0.1][i % 2]));
             let (mut visited, mut enclosing) = (Vec::new(), Vec::new());
-            tree.visit_surfaces_overlapping_box(&near, |met| {
-                match met {
+            tree.visit_surfaces_overlapping_box(&near, |surface| {
+                match surface {
                     PrimitiveOrEnclosingSubtree::Primitive(id) => visited.push(id),
                     PrimitiveOrEnclosingSubtree::Enclosing(subtree) => enclosing.extend(&last[subtree]),
                 }
@@ -118,18 +118,18 @@ fn nested_sphere_traversal_is_logarithmic() {
         let mut most_met = 0;
         for ray in rays(600) {
             let near = Aabb { min: ray.origin, max: ray.origin };
-            let mut met = 0;
+            let mut visited = 0;
             tree.visit_surfaces_overlapping_box(&near, |_| {
-                met += 1;
+                visited += 1;
                 true
             });
-            most_met = most_met.max(met);
+            most_met = most_met.max(visited);
         }
         (most, most_met)
     };
     for count in [500, 1000, 2000, 4000, 8000] {
-        let (tests, met) = work(count);
+        let (tests, visited) = work(count);
         let bound = 3 * count.ilog2() as usize;
-        assert!(tests <= bound && met <= bound, "{tests} tests, {met} overlaps for {count} spheres");
+        assert!(tests <= bound && visited <= bound, "{tests} tests, {visited} overlaps for {count} spheres");
     }
 }

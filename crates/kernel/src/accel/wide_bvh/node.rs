@@ -106,14 +106,14 @@ impl WideNode {
     /// Mask of the slots whose boxes overlap `other`.
     #[inline]
     pub fn overlap_mask(&self, other: &Aabb) -> u32 {
-        let mut met = [true; WIDTH];
+        let mut overlaps = [true; WIDTH];
         for axis in 0..3 {
             let (least, greatest) = (&self.rows[2 * axis], &self.rows[2 * axis + 1]);
             for slot in 0..WIDTH {
-                met[slot] &= (least[slot] <= other.max[axis]) & (other.min[axis] <= greatest[slot]);
+                overlaps[slot] &= (least[slot] <= other.max[axis]) & (other.min[axis] <= greatest[slot]);
             }
         }
-        (0..WIDTH).fold(0, |bits, slot| bits | u32::from(met[slot]) << slot)
+        (0..WIDTH).fold(0, |bits, slot| bits | u32::from(overlaps[slot]) << slot)
     }
 
     /// Child of a slot.

@@ -174,16 +174,16 @@ impl MeshEmitter {
     }
 
     /// Implements [`Light::pdf`](crate::lights::Light::pdf).
-    pub fn pdf(&self, from: Vec3, normal: Vec3, met: &LightHit) -> f32 {
+    pub fn pdf(&self, from: Vec3, normal: Vec3, hit: &LightHit) -> f32 {
         let tree = match &self.sampling {
-            MeshSampling::Quad(quad) => return quad.quad.pdf(from, met),
-            MeshSampling::Area(_) => return met.uniform_area_pdf(self.by_area.total()),
+            MeshSampling::Quad(quad) => return quad.quad.pdf(from, hit),
+            MeshSampling::Area(_) => return hit.uniform_area_pdf(self.by_area.total()),
             MeshSampling::Tree(tree) => tree,
         };
-        let index = self.triangles.binary_search_by_key(&met.primitive, |(_, primitive)| *primitive);
+        let index = self.triangles.binary_search_by_key(&hit.primitive, |(_, primitive)| *primitive);
         let own = index.ok().and_then(|index| Some((index, triangle_emitter(&self.triangles[index].0)?)));
         own.map_or(0.0, |(index, own)| {
-            tree.probability(&Receiver::with_unknown_lobe(from, normal), index as u32) * own.pdf(from, met)
+            tree.probability(&Receiver::with_unknown_lobe(from, normal), index as u32) * own.pdf(from, hit)
         })
     }
 

@@ -53,8 +53,8 @@ pub trait ShapeEmitter {
     /// Samples a point on the front that is visible from `point`. `u` is in [0, 1)².
     fn sample(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint;
 
-    /// Pdf of [`ShapeEmitter::sample`] in sr⁻¹. `met` is the point on the front that a ray from `from` hits.
-    fn pdf(&self, from: Vec3, met: &LightHit) -> f32;
+    /// Pdf of [`ShapeEmitter::sample`] in sr⁻¹. `hit` is the point on the front that a ray from `from` hits.
+    fn pdf(&self, from: Vec3, hit: &LightHit) -> f32;
 
     /// Centroid of the area.
     fn area_centroid(&self) -> DVec3;
@@ -131,20 +131,20 @@ pub enum Emitter {
 /// Evaluates an expression with `$it` bound to the concrete emitter. Meshes have a separate arm because their
 /// triangles are separate primitives.
 macro_rules! of_any {
-    ($emitter:expr, $it:ident => $asked:expr, $mesh:ident => $of_mesh:expr) => {
+    ($emitter:expr, $it:ident => $body:expr, $mesh:ident => $of_mesh:expr) => {
         match $emitter {
-            Emitter::Sphere($it) => $asked,
-            Emitter::Quad($it) => $asked,
-            Emitter::TexturedQuad($it) => $asked,
-            Emitter::Box($it) => $asked,
-            Emitter::Triangle($it) => $asked,
-            Emitter::Disk($it) => $asked,
-            Emitter::Cylinder($it) => $asked,
-            Emitter::Cone($it) => $asked,
-            Emitter::Torus($it) => $asked,
-            Emitter::Transformed($it) => $asked,
-            Emitter::Inside($it) => $asked,
-            Emitter::SeeThrough($it) => $asked,
+            Emitter::Sphere($it) => $body,
+            Emitter::Quad($it) => $body,
+            Emitter::TexturedQuad($it) => $body,
+            Emitter::Box($it) => $body,
+            Emitter::Triangle($it) => $body,
+            Emitter::Disk($it) => $body,
+            Emitter::Cylinder($it) => $body,
+            Emitter::Cone($it) => $body,
+            Emitter::Torus($it) => $body,
+            Emitter::Transformed($it) => $body,
+            Emitter::Inside($it) => $body,
+            Emitter::SeeThrough($it) => $body,
             Emitter::Mesh($mesh) => $of_mesh,
         }
     };
@@ -156,8 +156,8 @@ impl ShapeEmitter for Emitter {
         of_any!(self, it => it.sample(point, u), _mesh => LightSamplePoint::NOTHING)
     }
 
-    fn pdf(&self, from: Vec3, met: &LightHit) -> f32 {
-        of_any!(self, it => it.pdf(from, met), _mesh => 0.0)
+    fn pdf(&self, from: Vec3, hit: &LightHit) -> f32 {
+        of_any!(self, it => it.pdf(from, hit), _mesh => 0.0)
     }
 
     fn area_centroid(&self) -> DVec3 {
@@ -375,15 +375,15 @@ impl AreaLight {
     }
 
     /// Implements [`Light::pdf`](super::Light::pdf).
-    pub fn pdf(&self, from: Vec3, normal: Vec3, met: &LightHit) -> f32 {
-        let met = &match self.side {
-            Side::Front => *met,
-            Side::Back => LightHit { normal: -met.normal, ..*met },
+    pub fn pdf(&self, from: Vec3, normal: Vec3, hit: &LightHit) -> f32 {
+        let hit = &match self.side {
+            Side::Front => *hit,
+            Side::Back => LightHit { normal: -hit.normal, ..*hit },
         };
-        if !(met.normal.dot(met.direction) < 0.0) {
+        if !(hit.normal.dot(hit.direction) < 0.0) {
             return 0.0;
         }
-        of_any!(&self.shape, it => it.pdf(from, met), mesh => mesh.pdf(from, normal, met))
+        of_any!(&self.shape, it => it.pdf(from, hit), mesh => mesh.pdf(from, normal, hit))
     }
 
     /// Centroid of the area.

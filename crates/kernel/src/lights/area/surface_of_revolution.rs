@@ -75,14 +75,14 @@ impl<S: RevolutionSide> ShapeEmitter for CappedRevolutionEmitter<S> {
         LightSamplePoint { direction, target: point + direction * distance as f32, factor: factor as f32 }
     }
 
-    fn pdf(&self, from: Vec3, met: &LightHit) -> f32 {
+    fn pdf(&self, from: Vec3, hit: &LightHit) -> f32 {
         let view = self.view_from(from);
         let share = f64::from(view.share as f32);
-        let is_cap = |normal: DVec3| met.normal.as_dvec3().dot(normal) > 1.0 - 1e-5;
+        let is_cap = |normal: DVec3| hit.normal.as_dvec3().dot(normal) > 1.0 - 1e-5;
         let density = match (view.side, view.cap) {
-            (_, Some((cap, normal))) if is_cap(normal) => (1.0 - share) * cap.pdf(met.direction),
+            (_, Some((cap, normal))) if is_cap(normal) => (1.0 - share) * cap.pdf(hit.direction),
             (Some((side, meridians)), _) => {
-                let angle = side.polar_frame().azimuth(met.direction);
+                let angle = side.polar_frame().azimuth(hit.direction);
                 share * meridians.pdf(angle)
                     / side.visible_cosine_extent_at_azimuth(SinCos::from_radians(angle.abs()))
             }

@@ -65,10 +65,10 @@ impl ShapeEmitter for TexturedQuadEmitter {
         LightSamplePoint { factor: 1.0 / density, ..own }
     }
 
-    fn pdf(&self, from: Vec3, met: &LightHit) -> f32 {
+    fn pdf(&self, from: Vec3, hit: &LightHit) -> f32 {
         let to_corner = self.quad.offset_to_corner(from);
-        let quad_pdf = self.quad.pdf(from, met);
-        if quad_pdf > 0.0 { self.mixture_pdf(met.direction * met.distance, to_corner, quad_pdf) } else { 0.0 }
+        let quad_pdf = self.quad.pdf(from, hit);
+        if quad_pdf > 0.0 { self.mixture_pdf(hit.direction * hit.distance, to_corner, quad_pdf) } else { 0.0 }
     }
 
     fn area_centroid(&self) -> DVec3 {

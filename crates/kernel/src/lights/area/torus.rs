@@ -115,12 +115,12 @@ impl ShapeEmitter for TorusEmitter {
         }
     }
 
-    fn pdf(&self, from: Vec3, met: &LightHit) -> f32 {
+    fn pdf(&self, from: Vec3, hit: &LightHit) -> f32 {
         TorusView::new(&self.torus, from).map_or(0.0, |view| {
             let slices = view.slice_distribution();
-            let (density, first) = view.sum_entry_pdfs(&self.torus, &slices, met.direction.as_dvec3());
+            let (density, first) = view.sum_entry_pdfs(&self.torus, &slices, hit.direction.as_dvec3());
             // A ray may continue through the first surface and hit another one, which is never sampled.
-            let is_later = first.is_some_and(|first| f64::from(met.distance) > first * (1.0 + SAME_DISTANCE));
+            let is_later = first.is_some_and(|first| f64::from(hit.distance) > first * (1.0 + SAME_DISTANCE));
             if is_later { 0.0 } else { density as f32 }
         })
     }

@@ -54,12 +54,12 @@ impl ShapeEmitter for TriangleEmitter {
         LightSamplePoint { direction, target: point + direction * distance as f32, factor: factor as f32 }
     }
 
-    fn pdf(&self, from: Vec3, met: &LightHit) -> f32 {
+    fn pdf(&self, from: Vec3, hit: &LightHit) -> f32 {
         match self.spherical_triangle(from.as_dvec3()) {
             Some((_, spherical)) if spherical.has_accurate_solid_angle() => {
                 (1.0 / spherical.solid_angle) as f32
             }
-            Some(_) => met.uniform_area_pdf(self.area),
+            Some(_) => hit.uniform_area_pdf(self.area),
             None => 0.0,
         }
     }

@@ -461,7 +461,7 @@ fn mesh_pdf_matches_its_samples() {
             };
             let Emitter::Mesh(mesh) = &light.shape else { panic!("a mesh") };
             let front = mesh.normal_of(primitive).expect("expected one of the light's triangles").as_vec3();
-            let met = crate::lights::LightHit {
+            let hit = crate::lights::LightHit {
                 direction: sample.direction,
                 distance: (target - point).length(),
                 normal: front,
@@ -470,7 +470,7 @@ fn mesh_pdf_matches_its_samples() {
             if front.dot(sample.direction) > -0.01 {
                 continue;
             }
-            let product = light.pdf(point, normal, &met) * sample.weight.x;
+            let product = light.pdf(point, normal, &hit) * sample.weight.x;
             assert!((product - 1.0).abs() < 5e-3, "{count}: {product}");
             compared += 1;
         }

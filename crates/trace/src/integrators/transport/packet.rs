@@ -381,9 +381,9 @@ impl TileContext<'_> {
         while left != 0 {
             let (id, of_object) = first_index_and_matching_lanes(object, left, simd);
             left &= !of_object;
-            let thing = &self.world.geometry.objects()[id as usize];
+            let shown_object = &self.world.geometry.objects()[id as usize];
             // A single hit on a shape is cheaper to evaluate separately.
-            if matches!(thing, Object::Shape(_)) && of_object.is_power_of_two() {
+            if matches!(shown_object, Object::Shape(_)) && of_object.is_power_of_two() {
                 continue;
             }
             let materials = self.world.packet_material_indices(id, of_object, &hits.primitive);
@@ -396,7 +396,7 @@ impl TileContext<'_> {
             if of == 0 {
                 continue;
             }
-            let is_filled = match thing {
+            let is_filled = match shown_object {
                 Object::Shape(shape) => surface.try_fill_points_of_shape_lanes(shape, rows, hits, of),
                 Object::Mesh(mesh) => {
                     mesh.fill_surfaces(surface, rows, hits, of, None, simd);

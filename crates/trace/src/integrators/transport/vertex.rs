@@ -88,9 +88,9 @@ impl<'a> SurfaceVertex<'a> {
     fn from_ray_hit(tile: &TileContext<'a>, path: &PathRay, (by, hit): (&Ray, &Hit), distance: f32) -> Self {
         let index = tile.world.material_index(hit);
         let is_lit = tile.world.materials[index].bsdf.has_non_delta_lobes();
-        let asked =
+        let request =
             SurfaceRequest { uv: tile.world.material_needs_uvs_or_tangents(index), shadow_point: is_lit };
-        let surface = tile.world.geometry.requested_surface(by, hit, asked);
+        let surface = tile.world.geometry.requested_surface(by, hit, request);
         Self::at_surface(tile, path, index, surface, hit, distance)
     }
 
