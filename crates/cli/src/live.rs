@@ -241,7 +241,7 @@ impl SharedWriteLog {
                     log.image_files = Some(log.read.1.clone());
                 }
             }
-            Event::Failed { .. } | Event::Cancelled { .. } => log.is_last_stage = false,
+            Event::Failed { .. } | Event::Canceled { .. } => log.is_last_stage = false,
             Event::Checkpoint { news, .. } if has_left => match news {
                 CheckpointUpdate::Written { path } => log.checkpoint = Some(Ok(path.clone())),
                 CheckpointUpdate::Failed { message } => log.checkpoint = Some(Err(message.clone())),

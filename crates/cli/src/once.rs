@@ -246,7 +246,7 @@ fn handle_events(
                     .for_each(|message| console.print_line_to_stderr(&format!("error: {message}")));
                 return report_failure(&failure, console);
             }
-            Event::Cancelled { .. } => return Exit::FAILED,
+            Event::Canceled { .. } => return Exit::FAILED,
             Event::Started { .. }
             | Event::Stage { .. }
             | Event::Files { .. }

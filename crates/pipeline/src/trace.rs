@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use rayon::ThreadPool;
 
-use crate::control::{CancelToken, Cancelled};
+use crate::control::{CancelToken, Canceled};
 use crate::film::{Film, SelectedPixels, TILE_SIZE, TileSamples};
 use crate::integrators::{PhotonMaps, RayCounters, RenderSettings, render_tile_with_layers};
 use crate::system::cpu_time::thread_cpu_seconds;
@@ -22,7 +22,7 @@ pub(super) type TileKernel = fn(
     SelectedPixels,
     Range<u32>,
     &CancelToken,
-) -> Result<(TileSamples, RayCounters), Cancelled>;
+) -> Result<(TileSamples, RayCounters), Canceled>;
 
 /// Maximum time between calls to the callback.
 pub(super) const TICK: Duration = Duration::from_millis(20);
@@ -71,7 +71,7 @@ impl TileJob {
 }
 
 impl Tracer<'_> {
-    fn trace_tile(&self, job: &TileJob) -> Result<(TileSamples, TraceCost), Cancelled> {
+    fn trace_tile(&self, job: &TileJob) -> Result<(TileSamples, TraceCost), Canceled> {
         let Self { kernel, world, settings, token, photons, first, layers, .. } = *self;
         let samples = first + job.samples.start..first + job.samples.end;
         let begin = thread_cpu_seconds();
@@ -91,13 +91,13 @@ impl Tracer<'_> {
     /// It returns whether to continue. Jobs that have already started are always finished.
     ///
     /// # Errors
-    /// Returns [`Cancelled`] if the token is canceled.
+    /// Returns [`Canceled`] if the token is canceled.
     pub(super) fn run_all_jobs_in_parallel<K: Send>(
         &self,
         jobs: &[TileJob],
         keep: impl Fn(&TileJob, TileSamples) -> K + Sync,
         mut each: impl FnMut(Option<(&TileJob, K, TraceCost)>) -> bool,
-    ) -> Result<(), Cancelled> {
+    ) -> Result<(), Canceled> {
         let (next, stopped) = (AtomicUsize::new(0), AtomicBool::new(false));
         let threads = self.pool.current_num_threads();
         // Bound the channel so that results do not pile up while a preview is created.
@@ -141,7 +141,7 @@ impl Tracer<'_> {
             }
         });
         // Do not call `check_pause_and_cancel`. It blocks while work is paused, which would delay commands.
-        if self.token.is_cancelled() { Err(Cancelled) } else { Ok(()) }
+        if self.token.is_canceled() { Err(Canceled) } else { Ok(()) }
     }
 }
 

@@ -181,13 +181,13 @@ impl CommandSender {
                 mailbox.token.cancel();
                 mailbox.writing.cancel();
                 let dropped = mailbox.request.take();
-                self.report_cancelled(dropped);
+                self.report_canceled(dropped);
             }
             Command::Suspend => {
                 mailbox.suspended = true;
                 mailbox.token.cancel();
                 let dropped = mailbox.request.take();
-                self.report_cancelled(dropped);
+                self.report_canceled(dropped);
             }
             Command::Pause(paused) => {
                 mailbox.paused = paused;
@@ -206,7 +206,7 @@ impl CommandSender {
     /// Replaces the pending request unless the pending one is newer. Requests may arrive in any order.
     fn replace_older_pending_request(&self, mailbox: &mut Mailbox, request: Box<Request>) {
         if request.generation < mailbox.newest {
-            return self.report_cancelled(Some(request));
+            return self.report_canceled(Some(request));
         }
         mailbox.newest = request.generation;
         mailbox.token.cancel();
@@ -215,12 +215,12 @@ impl CommandSender {
         }
         (mailbox.paused, mailbox.preview) = (false, None);
         let replaced = mailbox.request.replace(request);
-        self.report_cancelled(replaced);
+        self.report_canceled(replaced);
     }
 
-    fn report_cancelled(&self, request: Option<Box<Request>>) {
+    fn report_canceled(&self, request: Option<Box<Request>>) {
         if let Some(request) = request {
-            (self.listener)(Event::Cancelled { generation: request.generation });
+            (self.listener)(Event::Canceled { generation: request.generation });
         }
     }
 
@@ -416,7 +416,7 @@ mod tests {
         remote.send(render(2));
         // The user presses the key while the first request is still ending.
         remote.send(Command::Pause(true));
-        assert!(ending.is_cancelled());
+        assert!(ending.is_canceled());
         let second = token(&remote);
         assert!(second.is_paused());
         remote.send(Command::Pause(false));
@@ -434,14 +434,14 @@ mod tests {
         remote.send(render(2));
         remote.send(Command::Write);
         remote.send(Command::Quit);
-        assert!(token.is_cancelled());
+        assert!(token.is_canceled());
         assert!(matches!(remote.wait_for_next_task(), Task::Write));
         assert!(!remote.try_postpone_write_to_pending(false), "no request should be pending");
         assert!(matches!(remote.wait_for_next_task(), Task::Quit));
     }
 
     #[test]
-    fn write_stage_is_cancelled_only_by_newer_image() {
+    fn write_stage_is_canceled_only_by_newer_image() {
         let remote = silent_sender();
         let begin = |number| {
             remote.send(render(number));
@@ -455,15 +455,15 @@ mod tests {
         assert!(token.is_paused() && !writing.is_paused());
         remote.send(render(2));
         assert!(
-            token.is_cancelled() && !writing.is_cancelled(),
+            token.is_canceled() && !writing.is_canceled(),
             "a request without output should not cancel writing"
         );
         let Command::Render(request) = render(3) else { panic!("a request") };
         remote.send(Command::Render(Box::new(Request { write: WriteRequirement::Try, ..*request })));
-        assert!(writing.is_cancelled());
+        assert!(writing.is_canceled());
         let (token, writing) = begin(4);
         remote.send(Command::Quit);
-        assert!(token.is_cancelled() && !writing.is_cancelled());
+        assert!(token.is_canceled() && !writing.is_canceled());
     }
 
     #[test]

@@ -89,10 +89,10 @@ fn describe_events_since_writing(state: &State) -> String {
     let is_after = written.iter().any(|written| written.generation != state.request.generation);
     let next = if is_after { NEXT_RENDER } else { "the render" };
     match (state.work.activity, &state.work.progress) {
-        (RequestStatus::Running { .. } | RequestStatus::Cancelled, Some(progress)) => {
+        (RequestStatus::Running { .. } | RequestStatus::Canceled, Some(progress)) => {
             format!("; {next} was stopped at {:.0} %", (progress.fraction * 100.0).floor())
         }
-        (RequestStatus::Running { .. } | RequestStatus::Cancelled, None) => format!("; {next} was stopped"),
+        (RequestStatus::Running { .. } | RequestStatus::Canceled, None) => format!("; {next} was stopped"),
         (RequestStatus::Done | RequestStatus::Waiting | RequestStatus::Broken, _) => String::new(),
     }
 }

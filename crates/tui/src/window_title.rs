@@ -103,7 +103,7 @@ fn progress_bar_state(state: &State, percent: Option<u32>) -> ProgressBar {
         RequestStatus::Running { .. } if state.work.paused => ProgressBar::Paused(percent.unwrap_or(0)),
         RequestStatus::Running { .. } => percent.map_or(ProgressBar::Busy, ProgressBar::Percent),
         RequestStatus::Broken => ProgressBar::Broken,
-        RequestStatus::Done | RequestStatus::Waiting | RequestStatus::Cancelled => ProgressBar::None,
+        RequestStatus::Done | RequestStatus::Waiting | RequestStatus::Canceled => ProgressBar::None,
     }
 }
 

@@ -16,7 +16,7 @@ use super::v;
 /// The glass solids in a built scene.
 fn bodies(build: &Build) -> GlassSolids {
     let meshes: Vec<&LoadedMesh> = build.parts.meshes.iter().map(|mesh| mesh.loaded()).collect();
-    GlassSolids::find(&build.scene, &meshes, &CancelToken::new()).expect("the token is not cancelled")
+    GlassSolids::find(&build.scene, &meshes, &CancelToken::new()).expect("the token is not canceled")
 }
 
 /// A prism whose base is a polygon in the plane z = 0, specified counterclockwise as viewed from +z. Each

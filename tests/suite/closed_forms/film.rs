@@ -16,7 +16,7 @@ fn add_samples(film: &Film, world: &World, build: &Build, seed: u32, from: u32, 
     for tile in 0..film.tile_count() {
         let rect = film.tile_rect(tile).expect("a tile");
         let done = render_tile(world, &build.settings(seed), rect, from..to, &CancelToken::new());
-        film.add_samples(tile, done.expect("the token is not cancelled").0);
+        film.add_samples(tile, done.expect("the token is not canceled").0);
     }
 }
 

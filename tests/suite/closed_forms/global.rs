@@ -309,7 +309,7 @@ fn no_rays_for_unreachable_sharp_highlights() {
         let rect = glimt::film::Rect { x: 0, y: 0, width: 1, height: 1 };
         let token = glimt::control::CancelToken::new();
         let tile = glimt::integrators::render_tile(&lit.world(), &lit.settings(0), rect, 0..32, &token);
-        tile.expect("the token is not cancelled").1.scattered_rays
+        tile.expect("the token is not canceled").1.scattered_rays
     };
     assert_eq!((scattered(99.0, true, 4), scattered(1e4, false, 4), scattered(1e4, true, 0)), (0, 0, 0));
     assert!(scattered(1e4, true, 1) > 24);

@@ -116,7 +116,7 @@ fn shadow_rays_per_sample(build: &Build) -> u64 {
     let whole = glimt::film::Rect { x: 0, y: 0, width: 1, height: 1 };
     let token = glimt::control::CancelToken::new();
     render_tile(&build.world(), &build.settings(1), whole, 0..1, &token)
-        .expect("the token is not cancelled")
+        .expect("the token is not canceled")
         .1
         .shadow_rays
 }

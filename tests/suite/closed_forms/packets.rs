@@ -73,7 +73,7 @@ fn sample_bits_do_not_depend_on_tiling() {
     let (world, settings) = (build.world(), build.settings(4));
     let samples = |rect: Rect, samples: Range<u32>| {
         let done = render_tile(&world, &settings, rect, samples, &CancelToken::new());
-        done.expect("the token is not cancelled").0.radiance
+        done.expect("the token is not canceled").0.radiance
     };
     let whole = Rect { x: 0, y: 0, width: 37, height: 23 };
     let all = samples(whole, 0..7);

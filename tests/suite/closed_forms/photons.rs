@@ -51,7 +51,7 @@ fn stored_photons_carry_emitted_power() {
         let settings = build.photons(count.into(), 0.1).settings(3);
         let (_, pass) =
             PhotonMapper::new_with_first_pass(&world, &settings, of_photons, &ignore_progress, &token)
-                .expect("the token is not cancelled");
+                .expect("the token is not canceled");
         let (power, n) = (4.0 * PI, f64::from(count));
         let flux = |map: &PhotonMap| map.iter_photons().map(|photon| f64::from(photon.flux.x)).sum::<f64>();
         let error = (reflectance * (1.0 - reflectance) / n).sqrt();
@@ -73,7 +73,7 @@ fn no_photons_without_mirrors_or_glass() {
     let of_photons = settings.photons.expect("photons are on");
     let (photons, pass) =
         PhotonMapper::new_with_first_pass(&world, &settings, of_photons, &ignore_progress, &token)
-            .expect("the token is not cancelled");
+            .expect("the token is not canceled");
     assert!(!photons.emits_photons());
     assert_eq!((pass.emitted, pass.stored_photon_count()), (0, 0));
 }
@@ -291,8 +291,8 @@ fn photons_do_not_depend_on_threads_or_tiles() {
         pool.install(|| {
             let (photons, _) =
                 PhotonMapper::new_with_first_pass(&world, &settings, of_photons, &ignore_progress, &token)
-                    .expect("the token is not cancelled");
-            photons.trace_passes(&world, &settings, 0..4, &token).expect("the token is not cancelled")
+                    .expect("the token is not canceled");
+            photons.trace_passes(&world, &settings, 0..4, &token).expect("the token is not canceled")
         })
     };
     let all = maps(1);
@@ -308,7 +308,7 @@ fn photons_do_not_depend_on_threads_or_tiles() {
     }
     let render = |maps: &PhotonMaps, rect: Rect, samples: Range<u32>| {
         let tile = render_tile_with_photons(Some(maps), &world, &settings, rect, samples, &token);
-        tile.expect("the token is not cancelled").0.radiance
+        tile.expect("the token is not canceled").0.radiance
     };
     let whole = Rect { x: 0, y: 0, width: 16, height: 16 };
     let at_once = render(&all, whole, 0..4);
@@ -318,10 +318,10 @@ fn photons_do_not_depend_on_threads_or_tiles() {
             let samples = part[0]..part[1];
             let (photons, _) =
                 PhotonMapper::new_with_first_pass(&world, &settings, of_photons, &ignore_progress, &token)
-                    .expect("the token is not cancelled");
+                    .expect("the token is not canceled");
             let maps = photons
                 .trace_passes(&world, &settings, samples.clone(), &token)
-                .expect("the token is not cancelled");
+                .expect("the token is not canceled");
             let own: Vec<_> = at_once
                 .chunks(4)
                 .flat_map(|pixel| &pixel[samples.start as usize..samples.end as usize])
@@ -349,6 +349,6 @@ fn photons_are_aimed_at_glass_from_mesh_file() {
     let of_photons = settings.photons.expect("photons are on");
     let (_, pass) =
         PhotonMapper::new_with_first_pass(&world, &settings, of_photons, &ignore_progress, &token)
-            .expect("the token is not cancelled");
+            .expect("the token is not canceled");
     assert!(pass.caustic.len() > 500, "{} of 1000", pass.caustic.len());
 }

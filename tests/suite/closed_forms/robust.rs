@@ -363,7 +363,7 @@ fn assert_no_split(build: &Build) {
     let (world, settings, token) = (build.world(), build.settings(4), CancelToken::new());
     let render = |x, y, width, height, samples| {
         let rect = Rect { x, y, width, height };
-        let tile = render_tile(&world, &settings, rect, samples, &token).expect("the token is not cancelled");
+        let tile = render_tile(&world, &settings, rect, samples, &token).expect("the token is not canceled");
         tile.0.radiance
     };
     let whole = render(0, 0, 24, 20, 0..6);
@@ -381,7 +381,7 @@ fn assert_no_split(build: &Build) {
     other.render.seed = 5;
     let rect = Rect { x: 0, y: 0, width: 24, height: 20 };
     let reseeded =
-        render_tile(&world, &other, rect, 0..6, &token).expect("the token is not cancelled").0.radiance;
+        render_tile(&world, &other, rect, 0..6, &token).expect("the token is not canceled").0.radiance;
     assert_ne!(whole, reseeded);
 }
 

@@ -66,7 +66,7 @@ fn check_scenes(runs: &[SceneRun<'_>]) -> Result<(), BenchError> {
             Ok(_) => {}
             Err(BenchError::Failed(Failure::Scene(diagnostics))) => wrong.extend(diagnostics),
             Err(
-                error @ (BenchError::Failed(Failure::Work(_)) | BenchError::Call(_) | BenchError::Cancelled),
+                error @ (BenchError::Failed(Failure::Work(_)) | BenchError::Call(_) | BenchError::Canceled),
             ) => {
                 return Err(error);
             }

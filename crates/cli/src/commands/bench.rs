@@ -45,7 +45,7 @@ fn run_and_print_errors(args: &BenchArgs, console: &Console) -> Result<Exit, Exi
     // The first signal stops measuring. The second stops writing results.
     let (token, writing) = (CancelToken::new(), CancelToken::new());
     let stop = [token.clone(), writing.clone()];
-    let ended = signals::install_signal_handlers(move || stop[usize::from(stop[0].is_cancelled())].cancel())
+    let ended = signals::install_signal_handlers(move || stop[usize::from(stop[0].is_canceled())].cancel())
         .map_err(|message| console.print_error(Exit::FAILED, &message))?;
     let mut progress = BenchProgress::new(args.progress, console);
     let (news, work) = spawn_benchmark(request, token.clone())
@@ -60,7 +60,7 @@ fn run_and_print_errors(args: &BenchArgs, console: &Console) -> Result<Exit, Exi
                 &results,
                 &progress,
                 console,
-                if token.is_cancelled() { &writing } else { &token },
+                if token.is_canceled() { &writing } else { &token },
             )?;
             progress.report_done(&results);
             Ok(ended.signal_number().map_or(Exit::DONE, Exit::from_signal))
@@ -133,7 +133,7 @@ fn report_unfinished(
     if let Some(number) = ended.signal_number() {
         if let Some(signal) = signals::signal_name(number) {
             let (done, all) = scenes;
-            progress.report_cancelled(&format!(
+            progress.report_canceled(&format!(
                 "terminated by {signal} after {done} of {all} scenes; finished references are cached"
             ));
         }
@@ -158,7 +158,7 @@ fn report_unfinished(
             progress.report_failure("call", &format!("error: {message}"));
             Exit::WRONG
         }
-        BenchError::Cancelled => Exit::FAILED,
+        BenchError::Canceled => Exit::FAILED,
     }
 }
 

@@ -13,7 +13,7 @@ use serde_json::json;
 use self::inputs::{RenderInputFiles, possible_scene_paths};
 use crate::args::{MergeArgs, ProgressMode};
 use crate::console::{Console, stdout_columns_or_default};
-use crate::control::{CancelToken, Cancelled};
+use crate::control::{CancelToken, Canceled};
 use crate::exit::Exit;
 use crate::film::Film;
 use crate::film::tone::tone_map_to_8_bits;
@@ -91,7 +91,7 @@ impl MergeCommand<'_> {
         match self.message_if_render_input(inputs, &self.args.out) {
             Ok(None) => Ok(()),
             Ok(Some(message)) => Err(self.console.print_error(Exit::WRONG, &message)),
-            Err(Cancelled) => Err(Exit::FAILED),
+            Err(Canceled) => Err(Exit::FAILED),
         }
     }
 
@@ -100,7 +100,7 @@ impl MergeCommand<'_> {
         &self,
         inputs: &RenderInputFiles<'_>,
         path: &Path,
-    ) -> Result<Option<String>, Cancelled> {
+    ) -> Result<Option<String>, Canceled> {
         let why = inputs.reason_not_to_overwrite(path)?;
         Ok(why.map(|why| format!("cannot write {}: {why}; choose another output", self.args.out.display())))
     }
@@ -118,7 +118,7 @@ impl MergeCommand<'_> {
                 }
                 Err(PartError::Unreadable { source, .. })
                     if self.args.partial && source.kind() == std::io::ErrorKind::NotFound => {}
-                Err(PartError::Cancelled(_)) => return Err(Exit::FAILED),
+                Err(PartError::Canceled(_)) => return Err(Exit::FAILED),
                 Err(error) => wrong.push(error),
             }
             bar.update(index + 1, self.args.parts.len());
@@ -187,7 +187,7 @@ impl MergeCommand<'_> {
     fn pause(&self) -> Result<(), Exit> {
         let end = Instant::now() + POLL_INTERVAL;
         while Instant::now() < end {
-            if self.token.is_cancelled() {
+            if self.token.is_canceled() {
                 return Err(Exit::FAILED);
             }
             std::thread::sleep(Duration::from_millis(20));
@@ -276,7 +276,7 @@ impl MergeCommand<'_> {
 
     fn report_part_error(&self, error: &PartError) -> Exit {
         match error {
-            PartError::Cancelled(_) => Exit::FAILED,
+            PartError::Canceled(_) => Exit::FAILED,
             PartError::Film(_) => self.console.print_error(Exit::FAILED, &error.to_string()),
             PartError::Unreadable { .. }
             | PartError::NotRegular { .. }
@@ -322,7 +322,7 @@ impl MergeCommand<'_> {
         });
         let written = bytes.and_then(|bytes| atomic_with_policy(out, &bytes, &guard, token));
         written.map_err(|error| match error {
-            OutputError::Cancelled(_) => Exit::FAILED,
+            OutputError::Canceled(_) => Exit::FAILED,
             other => self.console.print_error(Exit::FAILED, &other.to_string()),
         })?;
         if self.args.progress != ProgressMode::None {

@@ -5,7 +5,7 @@ use std::io::{Read, Seek};
 use std::path::Path;
 
 use super::{AssetError, FileHash};
-use crate::control::{CancelToken, Cancelled, Progress};
+use crate::control::{CancelToken, Canceled, Progress};
 use crate::system::file::{self, FileKind};
 use crate::system::memory::try_reserve_exact;
 
@@ -33,7 +33,7 @@ pub(crate) struct Monitor<'a> {
 
 impl Monitor<'_> {
     /// Reports progress, then polls the token.
-    pub(crate) fn report_and_check_cancel(&self, done: usize, total: usize) -> Result<(), Cancelled> {
+    pub(crate) fn report_and_check_cancel(&self, done: usize, total: usize) -> Result<(), Canceled> {
         (self.progress)(done as u64, total as u64);
         self.token.check_pause_and_cancel()
     }
@@ -279,7 +279,7 @@ mod tests {
     }
 
     #[test]
-    fn reading_reports_progress_and_can_be_cancelled() {
+    fn reading_reports_progress_and_can_be_canceled() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("some");
         fs::write(&path, vec![7; 3 * CHUNK]).expect("written");
@@ -292,7 +292,7 @@ mod tests {
             }
         };
         let result = read_bytes(&path, u64::MAX, Monitor { progress: &note, token: &token });
-        assert!(matches!(result, Err(AssetError::Cancelled(_))));
+        assert!(matches!(result, Err(AssetError::Canceled(_))));
         let total = 6 * CHUNK as u64;
         let expected: Vec<_> = (0..3).map(|chunk| (chunk * CHUNK as u64, total)).collect();
         assert_eq!(*seen.lock().expect("no panic"), expected);

@@ -70,8 +70,8 @@ pub enum OutputError {
         reason: String,
     },
     /// The work was canceled.
-    #[error("cancelled")]
-    Cancelled(#[from] crate::control::Cancelled),
+    #[error("canceled")]
+    Canceled(#[from] crate::control::Canceled),
     /// The operating system reported an error.
     #[error("cannot write {}: {}; {}", path.display(), describe_error(source), write_error_advice(source))]
     File {

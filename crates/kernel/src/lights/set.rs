@@ -7,7 +7,7 @@ use super::area::{AreaLight, EmittingTriangleSelection, MeshEmitter, Side};
 use super::infinite::{DirectionalLight, Environment, InfiniteLight};
 use super::light::Light;
 use super::tree::{AdaptiveLightTreeCut, LightTree, MAX_WITHOUT_TREE, Receiver};
-use crate::control::{CancelToken, Cancelled};
+use crate::control::{CancelToken, Canceled};
 use crate::math::Vec3;
 
 /// The lights of a scene.
@@ -103,8 +103,8 @@ impl Lights {
     /// Indexes the lights and builds the trees over them.
     ///
     /// # Errors
-    /// [`Cancelled`] if the token is canceled.
-    pub fn new(all: Vec<Light>, token: &CancelToken) -> Result<Self, Cancelled> {
+    /// [`Canceled`] if the token is canceled.
+    pub fn new(all: Vec<Light>, token: &CancelToken) -> Result<Self, Canceled> {
         let mut lights = Self::default();
         for (number, light) in (0_u32..).zip(&all) {
             if let Some(light) = light.as_area() {
@@ -115,7 +115,7 @@ impl Lights {
                 lights.environment = Some((number, light.clone()));
             }
         }
-        let tree_over = |taken: &dyn Fn(&&Light) -> bool, most| -> Result<_, Cancelled> {
+        let tree_over = |taken: &dyn Fn(&&Light) -> bool, most| -> Result<_, Canceled> {
             if count_lights_once_per_object(all.iter().filter(taken)) <= most {
                 return Ok(None);
             }

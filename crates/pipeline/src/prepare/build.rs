@@ -34,7 +34,7 @@ impl SceneCache {
     /// Builds the trees, lights and world for a scene. `change` contains the camera changes of the request.
     ///
     /// # Errors
-    /// Returns [`AbortReason::Cancelled`] if the token is canceled.
+    /// Returns [`AbortReason::Canceled`] if the token is canceled.
     pub(crate) fn build(
         &mut self,
         assets: Arc<SceneAssets>,

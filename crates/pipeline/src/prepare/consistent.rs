@@ -48,10 +48,10 @@ impl FileReader<'_> {
             let containers = GltfContainers::default();
             let files = self.context(&contents, &containers);
             let result = read(&mut Reading { files, table, findings });
-            if result.is_err() && !self.token.is_cancelled() {
+            if result.is_err() && !self.token.is_canceled() {
                 contents.recheck_seen_files(self.token)?;
             }
-            if self.token.is_cancelled() || contents.changed_file().is_none() {
+            if self.token.is_canceled() || contents.changed_file().is_none() {
                 return result;
             }
             findings.reset();

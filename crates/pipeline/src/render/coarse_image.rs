@@ -90,7 +90,7 @@ impl<'a> CoarseImageRenderer<'a> {
     /// would take almost as long as a full pass. Does not change the film. Calls `tick` regularly.
     ///
     /// # Errors
-    /// Returns [`AbortReason::Cancelled`] if the token is canceled.
+    /// Returns [`AbortReason::Canceled`] if the token is canceled.
     pub(crate) fn show_without_photons(
         &self,
         screen: PreviewSender<'_>,

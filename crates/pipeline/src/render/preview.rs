@@ -42,7 +42,7 @@ impl PreviewSender<'_> {
             return;
         }
         while !pool.install(|| update_previewer_briefly(state, quantity, width, height)) {
-            if token.is_cancelled() {
+            if token.is_canceled() {
                 return;
             }
         }

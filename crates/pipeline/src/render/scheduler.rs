@@ -117,14 +117,14 @@ impl<'s, 'a> Scheduler<'s, 'a> {
     /// Renders the film until it reaches the requested number of samples or the noise target.
     ///
     /// # Errors
-    /// Returns [`AbortReason::Cancelled`] if the token is canceled. The film keeps its samples.
+    /// Returns [`AbortReason::Canceled`] if the token is canceled. The film keeps its samples.
     pub(crate) fn run(&mut self) -> Result<(), AbortReason> {
         self.state.is_kept = false;
         let ran = self.run_passes_to_end();
         let (traced, seconds) = (self.rays_of_all_requests(), self.seconds_across_requests());
-        if let (Some(checkpointer), Err(AbortReason::Cancelled)) = (self.rendering.checkpointer, &ran) {
+        if let (Some(checkpointer), Err(AbortReason::Canceled)) = (self.rendering.checkpointer, &ran) {
             let interruption = self.rendering.commands.pending.interruption();
-            self.state.is_kept = checkpointer.save_if_cancelled(self.state, traced, seconds, interruption);
+            self.state.is_kept = checkpointer.save_if_canceled(self.state, traced, seconds, interruption);
         }
         self.state.traced = traced;
         ran

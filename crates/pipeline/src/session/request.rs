@@ -35,7 +35,7 @@ impl Session {
                 let warnings = [conflicts, warnings].concat();
                 Event::Done { generation, report: Box::new(report), warnings, unchanged }
             }
-            Err(AbortReason::Cancelled) => Event::Cancelled { generation },
+            Err(AbortReason::Canceled) => Event::Canceled { generation },
             Err(AbortReason::Failed(failure)) => Event::Failed { generation, failure },
         });
         if is_broken {

@@ -7,7 +7,7 @@ use super::super::keys;
 use super::super::protocol::reasons;
 use super::StageResult;
 use super::textures::Textures;
-use crate::control::{CancelToken, Cancelled};
+use crate::control::{CancelToken, Canceled};
 use crate::lights::infinite::EnvironmentMap;
 use crate::lights::infinite::sky::Sky;
 use crate::lights::{LightSamplingPurpose, Lights};
@@ -33,7 +33,7 @@ pub(crate) fn collect_lights(
     textures: &Textures,
     cache: &mut LightCache,
     token: &CancelToken,
-) -> Result<StageResult<Arc<Lights>>, Cancelled> {
+) -> Result<StageResult<Arc<Lights>>, Canceled> {
     let map = textures.environment.as_ref().map(|(key, _)| key);
     let declared = emissive_material_textures(scene).filter_map(|source| textures.key_of.get(&source));
     let patterns: Vec<&Fingerprint> = declared.chain(&textures.of_files).collect();

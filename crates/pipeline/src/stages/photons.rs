@@ -19,7 +19,7 @@ use super::super::sink::EventSink;
 use super::super::stopwatch::PausableStopwatch;
 use super::super::trace::TICK;
 use super::StageResult;
-use crate::control::{CancelToken, Cancelled, Progress};
+use crate::control::{CancelToken, Canceled, Progress};
 use crate::integrators::{PhotonMapper, PhotonMaps, PhotonPass, PhotonSettings, RenderSettings};
 use crate::scene::description::RenderOptions;
 use crate::scene::fingerprint::Fingerprint;
@@ -93,13 +93,13 @@ impl PhotonStore {
     /// Returns the maps for the given samples. Calls `tick` regularly.
     ///
     /// # Errors
-    /// Returns [`Cancelled`] if the token is canceled.
+    /// Returns [`Canceled`] if the token is canceled.
     pub(crate) fn get_or_trace_maps(
         &self,
         samples: Range<u32>,
         sending: PhotonContext<'_>,
         mut tick: impl FnMut(),
-    ) -> Result<PhotonMaps, Cancelled> {
+    ) -> Result<PhotonMaps, Canceled> {
         let first = samples.start;
         let pass = |number| self.get_or_trace_pass(number, sending, &mut tick);
         let passes = samples.map(pass).collect::<Result<Vec<_>, _>>()?;
@@ -114,7 +114,7 @@ impl PhotonStore {
         number: u32,
         sending: PhotonContext<'_>,
         tick: &mut impl FnMut(),
-    ) -> Result<Arc<PhotonPass>, Cancelled> {
+    ) -> Result<Arc<PhotonPass>, Canceled> {
         let number_kept = if self.has_lit_caustic_casters() { number } else { 0 };
         if let Some(pass) = self.kept.borrow().get(number_kept as usize) {
             return Ok(Arc::clone(pass));
@@ -170,8 +170,8 @@ impl PhotonStore {
 fn run_with_ticks<T: Send>(
     pool: &ThreadPool,
     tick: &mut impl FnMut(),
-    work: impl FnOnce() -> Result<T, Cancelled> + Send,
-) -> Result<T, Cancelled> {
+    work: impl FnOnce() -> Result<T, Canceled> + Send,
+) -> Result<T, Canceled> {
     let (sender, result) = mpsc::sync_channel(1);
     pool.in_place_scope(|scope| {
         // The receiver is not dropped before the result arrives.
@@ -180,7 +180,7 @@ fn run_with_ticks<T: Send>(
             match result.recv_timeout(TICK) {
                 Ok(result) => return result,
                 Err(RecvTimeoutError::Timeout) => tick(),
-                Err(RecvTimeoutError::Disconnected) => return Err(Cancelled),
+                Err(RecvTimeoutError::Disconnected) => return Err(Canceled),
             }
         }
     })
@@ -225,13 +225,13 @@ impl PhotonTask {
 /// image's photons, if it uses them.
 ///
 /// # Errors
-/// Returns [`Cancelled`] if the token is canceled.
+/// Returns [`Canceled`] if the token is canceled.
 pub(crate) fn trace_first_photons(
     task: PhotonTask,
     cache: &mut PhotonCache,
     sending: PhotonContext<'_>,
     mut tick: impl FnMut(),
-) -> Result<StageResult<Option<Fingerprint>>, Cancelled> {
+) -> Result<StageResult<Option<Fingerprint>>, Canceled> {
     let (key, of_photons) = match task {
         PhotonTask::Skip(why) => return Ok(StageResult::skipped(None, why)),
         PhotonTask::Reuse(key) => {

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::Instant;
 
 use super::*;
-use crate::control::{CancelToken, Cancelled};
+use crate::control::{CancelToken, Canceled};
 use crate::film::{Rect, SelectedPixels, TileSamples};
 use crate::integrators::{PhotonMaps, RayCounters, RenderSettings};
 use crate::messages::{INCOMPLETE_IMAGE, NEWEST_IMAGE_NOT_WRITTEN};
@@ -23,7 +23,7 @@ fn block_until_canceled(
     _: SelectedPixels,
     _: Range<u32>,
     token: &CancelToken,
-) -> Result<(TileSamples, RayCounters), Cancelled> {
+) -> Result<(TileSamples, RayCounters), Canceled> {
     loop {
         token.check_pause_and_cancel()?;
         std::thread::sleep(Duration::from_millis(1));
@@ -36,33 +36,33 @@ fn cancel_stops_a_render() {
     let of = bench.send();
     while !matches!(bench.next(), Event::Progress { .. }) {}
     bench.worker.send(Command::Cancel);
-    assert!(matches!(bench.until_end(of).last(), Some(Event::Cancelled { .. })));
+    assert!(matches!(bench.until_end(of).last(), Some(Event::Canceled { .. })));
     assert!(!bench.path("out.ppm").exists());
 }
 
 #[test]
-fn paused_render_can_be_cancelled() {
+fn paused_render_can_be_canceled() {
     let mut bench = Bench::with(SCENE, block_until_canceled);
     let of = bench.send();
     while !matches!(bench.next(), Event::Progress { .. }) {}
     bench.worker.send(Command::Pause(true));
     bench.worker.send(Command::Cancel);
-    assert!(matches!(bench.until_end(of).last(), Some(Event::Cancelled { .. })));
+    assert!(matches!(bench.until_end(of).last(), Some(Event::Canceled { .. })));
 }
 
 #[test]
-fn replaced_requests_are_cancelled() {
+fn replaced_requests_are_canceled() {
     let mut bench = Bench::with(SCENE, block_until_canceled);
     let ends: Vec<u64> = (0..4).map(|_| bench.send()).collect();
     bench.worker.send(Command::Cancel);
-    let mut cancelled = Vec::new();
-    while cancelled.len() < ends.len() {
-        if let Event::Cancelled { generation } = bench.next() {
-            cancelled.push(generation);
+    let mut canceled = Vec::new();
+    while canceled.len() < ends.len() {
+        if let Event::Canceled { generation } = bench.next() {
+            canceled.push(generation);
         }
     }
-    cancelled.sort_unstable();
-    assert_eq!(cancelled, ends);
+    canceled.sort_unstable();
+    assert_eq!(canceled, ends);
 }
 
 #[test]
@@ -72,7 +72,7 @@ fn older_request_arriving_late_is_dropped() {
     bench.done();
     bench.generation = 3;
     let of = bench.send();
-    assert!(matches!(bench.until_end(of).last(), Some(Event::Cancelled { generation: 4 })));
+    assert!(matches!(bench.until_end(of).last(), Some(Event::Canceled { generation: 4 })));
 }
 
 static BREAKS: AtomicBool = AtomicBool::new(true);
@@ -84,7 +84,7 @@ fn breaks_once(
     pixels: SelectedPixels,
     samples: Range<u32>,
     token: &CancelToken,
-) -> Result<(TileSamples, RayCounters), Cancelled> {
+) -> Result<(TileSamples, RayCounters), Canceled> {
     assert!(!BREAKS.swap(false, Ordering::SeqCst), "a tile failed");
     KERNEL(photons, world, settings, pixels, samples, token)
 }
@@ -115,7 +115,7 @@ fn panics_on_drop(
     pixels: SelectedPixels,
     samples: Range<u32>,
     token: &CancelToken,
-) -> Result<(TileSamples, RayCounters), Cancelled> {
+) -> Result<(TileSamples, RayCounters), Canceled> {
     if !HAS_PANICKED.swap(true, Ordering::SeqCst) {
         std::panic::panic_any(PanicsOnDrop);
     }
@@ -141,7 +141,7 @@ fn breaks_first(
     pixels: SelectedPixels,
     samples: Range<u32>,
     token: &CancelToken,
-) -> Result<(TileSamples, RayCounters), Cancelled> {
+) -> Result<(TileSamples, RayCounters), Canceled> {
     assert!(TILES.fetch_add(1, Ordering::SeqCst) != 0, "the first tile failed");
     render_slowly(photons, world, settings, pixels, samples, token)
 }
@@ -173,7 +173,7 @@ pub(super) fn render_slowly(
     pixels: SelectedPixels,
     samples: Range<u32>,
     token: &CancelToken,
-) -> Result<(TileSamples, RayCounters), Cancelled> {
+) -> Result<(TileSamples, RayCounters), Canceled> {
     std::thread::sleep(Duration::from_millis(2));
     KERNEL(photons, world, settings, pixels, samples, token)
 }
@@ -206,7 +206,7 @@ fn broken_scene_file_does_not_stop_a_render() {
     while !matches!(bench.next(), Event::Progress { progress, .. } if progress.samples > 0) {}
     bench.edit("width = 40", "width = = 40");
     let broken = bench.send();
-    assert!(matches!(bench.until_end(first).last(), Some(Event::Cancelled { .. })));
+    assert!(matches!(bench.until_end(first).last(), Some(Event::Canceled { .. })));
     assert!(matches!(bench.until_end(broken).last(), Some(Event::Failed { failure: Failure::Scene(_), .. })));
     // The render continues under the newest generation until the image is finished and written.
     let mut is_seen = false;
@@ -465,7 +465,7 @@ fn held_between_passes(
     pixels: SelectedPixels,
     samples: Range<u32>,
     token: &CancelToken,
-) -> Result<(TileSamples, RayCounters), Cancelled> {
+) -> Result<(TileSamples, RayCounters), Canceled> {
     token.check_pause_and_cancel()?;
     let first = samples.start == 0;
     let done = KERNEL(photons, world, settings, pixels, samples, &CancelToken::new());
@@ -614,7 +614,7 @@ fn render_slightly_slowly(
     pixels: SelectedPixels,
     samples: Range<u32>,
     token: &CancelToken,
-) -> Result<(TileSamples, RayCounters), Cancelled> {
+) -> Result<(TileSamples, RayCounters), Canceled> {
     token.check_pause_and_cancel()?;
     std::thread::sleep(Duration::from_millis(5));
     KERNEL(photons, world, settings, pixels, samples, token)

@@ -278,7 +278,7 @@ fn render_slowly(
     pixels: crate::film::SelectedPixels,
     samples: std::ops::Range<u32>,
     token: &crate::control::CancelToken,
-) -> Result<(crate::film::TileSamples, crate::integrators::RayCounters), crate::control::Cancelled> {
+) -> Result<(crate::film::TileSamples, crate::integrators::RayCounters), crate::control::Canceled> {
     if samples.start > 1 && settings.render.shadows == ShadowMode::Soft {
         std::thread::sleep(Duration::from_millis(20));
     }

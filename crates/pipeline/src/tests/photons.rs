@@ -4,7 +4,7 @@ use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::*;
-use crate::control::{CancelToken, Cancelled};
+use crate::control::{CancelToken, Canceled};
 use crate::film::{SelectedPixels, TileSamples};
 use crate::integrators::{PhotonMaps, RayCounters, RenderSettings};
 use crate::world::World;
@@ -81,7 +81,7 @@ fn without(
     pixels: SelectedPixels,
     samples: Range<u32>,
     token: &CancelToken,
-) -> Result<(TileSamples, RayCounters), Cancelled> {
+) -> Result<(TileSamples, RayCounters), Canceled> {
     WITHOUT.fetch_or(photons.is_none(), Ordering::SeqCst);
     KERNEL(photons, world, settings, pixels, samples, token)
 }
@@ -155,7 +155,7 @@ fn black(
     pixels: SelectedPixels,
     samples: Range<u32>,
     token: &CancelToken,
-) -> Result<(TileSamples, RayCounters), Cancelled> {
+) -> Result<(TileSamples, RayCounters), Canceled> {
     WITH.fetch_or(photons.is_some(), Ordering::SeqCst);
     let (mut samples, rays) = KERNEL(photons, world, settings, pixels, samples, token)?;
     samples.radiance.fill(crate::math::Vec3::ZERO);

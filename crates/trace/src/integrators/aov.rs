@@ -8,7 +8,7 @@ use super::transport::scratch::TraceBuffers;
 use super::transport::tile::TileContext;
 use super::transport::vertex::SurfaceVertex;
 use super::{FirstHitQuantity, RayCounters};
-use crate::control::Cancelled;
+use crate::control::Canceled;
 use crate::geometry::packet::set_bit_lanes;
 use crate::geometry::surface_packet::SurfacePacket;
 use crate::materials::TexturePoint;
@@ -24,7 +24,7 @@ pub fn shade_aov(
     scratch: &mut TraceBuffers,
     radiance: &mut [Vec3],
     counters: &mut RayCounters,
-) -> Result<(), Cancelled> {
+) -> Result<(), Canceled> {
     tile.closest_hits(&scratch.rays, &mut scratch.hits)?;
     for (path, hit) in scratch.rays.iter().zip(&scratch.hits) {
         let Some(hit) = hit else { continue };

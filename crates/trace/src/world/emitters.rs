@@ -7,7 +7,7 @@ use super::distinct_lights::duplicate_emissive_triangles;
 use super::lower::{file_emission, file_opacity, lower_blend_weight, lower_emission, lower_opacity};
 use super::{Geometry, Images, MeshInstance, Object};
 use crate::assets::FileMaterial;
-use crate::control::{CancelToken, Cancelled};
+use crate::control::{CancelToken, Canceled};
 use crate::geometry::Shape;
 use crate::lights::MeshEmitter;
 use crate::lights::infinite::sky::sun::OrientedSunDisk;
@@ -48,14 +48,14 @@ pub enum EnvironmentSource {
 /// is the environment map or the sky, or `None` if there is none or it is black.
 ///
 /// # Errors
-/// [`Cancelled`] if the token is canceled.
+/// [`Canceled`] if the token is canceled.
 pub fn build_lights(
     scene: &Scene,
     geometry: &Geometry,
     images: &Images,
     sky: Option<EnvironmentSource>,
     token: &CancelToken,
-) -> Result<Arc<Lights>, Cancelled> {
+) -> Result<Arc<Lights>, Canceled> {
     let points = scene.lights.iter().filter(|light| light.has_emission());
     let points = points.map(|light| light.to_traced_light(geometry.coordinate_origin()));
     let objects = (0_u32..).zip(geometry.objects()).zip(&scene.objects);
@@ -252,7 +252,7 @@ fn mesh_lights_by_material_and_side(
     emissive: Option<&SurfaceEmission>,
     images: &Images,
     token: &CancelToken,
-) -> Result<Vec<AreaLight>, Cancelled> {
+) -> Result<Vec<AreaLight>, Canceled> {
     let loaded = mesh.tree.loaded();
     let all: Vec<(Option<u32>, SurfaceEmission)> = match emissive {
         Some(emissive) => vec![(None, emissive.clone())],
@@ -278,7 +278,7 @@ fn mesh_lights_by_material_and_side(
         HashSet::new()
     };
     let light =
-        |(own, emissive, side): (Option<u32>, &SurfaceEmission, Side)| -> Result<Option<AreaLight>, Cancelled> {
+        |(own, emissive, side): (Option<u32>, &SurfaceEmission, Side)| -> Result<Option<AreaLight>, Canceled> {
             let corners = |id| match (mesh.world_corners(id), side) {
                 (corners, Side::Front) => corners,
                 ([a, b, c], Side::Back) => [a, c, b],

@@ -8,7 +8,7 @@
 use super::triangle_tree::TriangleTree;
 use super::{MeshInstance, Object};
 use crate::accel::{F32x16, InstructionSet, PACKET_SIZE, SimdKernel};
-use crate::control::{CancelToken, Cancelled};
+use crate::control::{CancelToken, Canceled};
 use crate::geometry::packet::{HitPacket, RayPacket, set_bit_lanes};
 use crate::geometry::triangle_list::{self, TriangleList};
 use crate::geometry::{Aabb, Ray, ShapeHit};
@@ -60,11 +60,8 @@ impl MergedMeshes {
     /// Merges the small meshes among `objects`. Returns `None` if merging is not worthwhile.
     ///
     /// # Errors
-    /// [`Cancelled`] if the token is canceled.
-    pub fn merge_small_meshes(
-        objects: &mut [Object],
-        token: &CancelToken,
-    ) -> Result<Option<Self>, Cancelled> {
+    /// [`Canceled`] if the token is canceled.
+    pub fn merge_small_meshes(objects: &mut [Object], token: &CancelToken) -> Result<Option<Self>, Canceled> {
         // Choose the smallest meshes first, up to the maximum number of triangles to rebuild after each edit.
         let count = |object: &Object| object.mesh().map_or(0, MeshInstance::triangle_count);
         let least = smallest_object_size(objects);

@@ -92,7 +92,7 @@ impl State {
             RequestStatus::Waiting | RequestStatus::Broken => {
                 request.own.is_some() && self.is_failure_in_scene()
             }
-            RequestStatus::Done | RequestStatus::Cancelled => false,
+            RequestStatus::Done | RequestStatus::Canceled => false,
         };
         let is_newest = request.camera_step.generation == Some(request.generation);
         is_newest && is_at_work && request.preview_size.is_some() && !is_shown

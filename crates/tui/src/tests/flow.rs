@@ -203,10 +203,10 @@ fn lost_event_sources_are_handled() {
 }
 
 #[test]
-fn cancelled_render_is_reported() {
+fn canceled_render_is_reported() {
     let mut ui = TestUi::new();
-    ui.worker_event(protocol::Event::Cancelled { generation: 1 });
-    assert_eq!(ui.state.work.activity, RequestStatus::Cancelled);
+    ui.worker_event(protocol::Event::Canceled { generation: 1 });
+    assert_eq!(ui.state.work.activity, RequestStatus::Canceled);
     assert!(ui.screen_text().contains("stopped"));
 }
 

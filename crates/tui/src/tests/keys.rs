@@ -421,10 +421,10 @@ fn postponed_write_is_reported_again_when_done() {
 }
 
 #[test]
-fn cancelled_render_is_not_paused() {
+fn canceled_render_is_not_paused() {
     let mut ui = TestUi::new();
     ui.press_character(' ');
-    ui.worker_event(protocol::Event::Cancelled { generation: 1 });
+    ui.worker_event(protocol::Event::Canceled { generation: 1 });
     assert!(!ui.state.work.paused && !ui.screen_text().contains("paused"), "{}", ui.screen_text());
 }
 

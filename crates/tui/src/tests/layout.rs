@@ -209,7 +209,7 @@ fn stage_times_are_compared_with_last_render() {
     render(&mut ui, 2.24);
     assert!(
         ui.screen_text().contains("render  2.24 s +1.1 s"),
-        "cancelled renders should not count: {}",
+        "canceled renders should not count: {}",
         ui.screen_text()
     );
 }

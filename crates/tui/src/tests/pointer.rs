@@ -493,7 +493,7 @@ fn escape_cancels_gestures_and_closes_history() {
 }
 
 #[test]
-fn cancelled_region_drag_has_no_effect() {
+fn canceled_region_drag_has_no_effect() {
     for key in [KeyCode::Esc, KeyCode::Char('v'), KeyCode::Char('z')] {
         let mut ui = ui();
         ui.press_character('z');

@@ -160,8 +160,8 @@ pub(super) fn handle_worker_event(state: &mut State, event: Event) -> Vec<Effect
             return notify_long_render_ended(state, time);
         }
         Event::LastGoodEnded { end, .. } => handle_last_valid_render_end(state, end),
-        Event::Cancelled { .. } => {
-            (state.work.activity, state.work.rendering) = (RequestStatus::Cancelled, RenderState::Stopped);
+        Event::Canceled { .. } => {
+            (state.work.activity, state.work.rendering) = (RequestStatus::Canceled, RenderState::Stopped);
             state.set_clock_paused(false);
             state.work.assets.clear();
         }
@@ -207,7 +207,7 @@ fn event_generation(event: &Event) -> u64 {
         | Event::Picked { generation, .. }
         | Event::Done { generation, .. }
         | Event::Failed { generation, .. }
-        | Event::Cancelled { generation } => *generation,
+        | Event::Canceled { generation } => *generation,
     }
 }
 

@@ -95,7 +95,7 @@ fn worker_symbol_word_and_role(state: &State) -> (&'static str, &'static str, Te
         RequestStatus::Waiting => ("…", "waiting", TextRole::Warning),
         RequestStatus::Broken if state.overlays.is_scene_missing() => ("✗", "missing", TextRole::Error),
         RequestStatus::Broken => ("✗", "broken", TextRole::Error),
-        RequestStatus::Cancelled => ("■", "stopped", TextRole::Warning),
+        RequestStatus::Canceled => ("■", "stopped", TextRole::Warning),
     }
 }
 
@@ -220,7 +220,7 @@ fn progress_or_result_variants(state: &State) -> Vec<String> {
             vec![messages::WAITING_FOR_FILE.to_owned()]
         }
         (RequestStatus::Broken, _, _) => vec![format_problem_count(state)],
-        (RequestStatus::Done | RequestStatus::Cancelled, _, _) => Vec::new(),
+        (RequestStatus::Done | RequestStatus::Canceled, _, _) => Vec::new(),
     }
 }
 

@@ -197,9 +197,7 @@ fn urgent_and_other_hints(state: &State) -> (Vec<KeyHint>, Vec<KeyHint>) {
     let now: &[Action] = match state.work.activity {
         _ if state.work.paused => &[Action::TogglePause, Action::WriteImage],
         RequestStatus::Running { .. } => &[Action::TogglePause],
-        RequestStatus::Done | RequestStatus::Waiting | RequestStatus::Broken | RequestStatus::Cancelled => {
-            &[]
-        }
+        RequestStatus::Done | RequestStatus::Waiting | RequestStatus::Broken | RequestStatus::Canceled => &[],
     };
     let first = now
         .iter()

@@ -124,7 +124,7 @@ fn inspected_lines(state: &State, width: u16) -> Vec<StyledLine> {
 fn is_scene_broken(state: &State) -> bool {
     let is_at_rest = match state.work.activity {
         RequestStatus::Waiting | RequestStatus::Broken => true,
-        RequestStatus::Running { .. } | RequestStatus::Done | RequestStatus::Cancelled => false,
+        RequestStatus::Running { .. } | RequestStatus::Done | RequestStatus::Canceled => false,
     };
     is_at_rest && state.overlays.problems.as_ref().is_none_or(|problems| problems.work.is_none())
 }

@@ -60,7 +60,7 @@ fn status_content(state: &State) -> StatusContent {
     match state.work.activity {
         RequestStatus::Running { .. } => StatusContent::ProgressBar,
         RequestStatus::Done => StatusContent::Summary,
-        RequestStatus::Waiting | RequestStatus::Cancelled => StatusContent::Nothing,
+        RequestStatus::Waiting | RequestStatus::Canceled => StatusContent::Nothing,
         RequestStatus::Broken if let Some(progress) = last_valid_scene_progress(state) => {
             StatusContent::Words(format!(
                 "{}: {} %",

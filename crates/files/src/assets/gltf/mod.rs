@@ -281,14 +281,14 @@ impl GltfFile {
             }
             other @ (AssetError::OutOfMemory { .. }
             | AssetError::TooManyOpenFiles { .. }
-            | AssetError::Cancelled(_)) => other,
+            | AssetError::Canceled(_)) => other,
         }
     }
 
     /// Checks that an image exists and has a valid header.
     ///
     /// # Errors
-    /// [`AssetError::Malformed`] with the image's index, or [`AssetError::Cancelled`].
+    /// [`AssetError::Malformed`] with the image's index, or [`AssetError::Canceled`].
     pub fn check_image_header(&self, number: usize, token: &CancelToken) -> Result<(), AssetError> {
         let (limits, encoding) = (ImageLimits::default(), ImageEncoding::Color);
         let size = match self.locate_image(number)? {

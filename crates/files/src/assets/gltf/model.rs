@@ -58,7 +58,7 @@ impl GltfFile {
             let (mesh, extremes) = match parts.entry(instance.part) {
                 Entry::Occupied(known) => &*known.into_mut(),
                 Entry::Vacant(new) => match self.build_part(instance.part, &ignore_progress, token) {
-                    Err(AssetError::Cancelled(cancelled)) => return Err(cancelled.into()),
+                    Err(AssetError::Canceled(canceled)) => return Err(canceled.into()),
                     loaded => {
                         let mesh = loaded.map(|loaded| loaded.mesh).unwrap_or_else(|wrong| {
                             first_wrong.get_or_insert(wrong);

@@ -9,7 +9,7 @@ use super::parsed::{Faces, ParsedMesh};
 use super::polygon::triangulate;
 use super::{MeshFileBytes, corners};
 use crate::assets::{AssetError, DroppedFaces, FileHash, LoadedMesh};
-use crate::control::{CancelToken, Cancelled};
+use crate::control::{CancelToken, Canceled};
 use crate::geometry::mesh::TriangleMesh;
 use crate::math::origin::local_coordinate_origin;
 use crate::math::{DVec3, Vec2, Vec3};
@@ -323,7 +323,7 @@ fn retain_used<T>(values: &mut Vec<T>, new_index: &[u32]) {
     values.retain(|_| indices.next().is_some_and(|index| *index != u32::MAX));
 }
 
-fn complete_normals(mesh: &mut TriangleMesh, token: &CancelToken) -> Result<(), Cancelled> {
+fn complete_normals(mesh: &mut TriangleMesh, token: &CancelToken) -> Result<(), Canceled> {
     for normal in &mut mesh.normals {
         *normal = normal.as_dvec3().try_normalize().map_or(Vec3::ZERO, |unit| unit.as_vec3());
     }

@@ -7,7 +7,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 use rayon::prelude::*;
 
 use super::coincident;
-use crate::control::{CancelToken, Cancelled};
+use crate::control::{CancelToken, Canceled};
 use crate::geometry::mesh::{TriangleMesh, VertexNormalGroup};
 use crate::math::{DVec3, Vec3};
 
@@ -29,8 +29,8 @@ const BATCH: usize = 1 << 16;
 /// out, the normal of one face is used. The result does not depend on the number of threads.
 ///
 /// # Errors
-/// [`Cancelled`].
-pub fn vertex_normals(mesh: &TriangleMesh, token: &CancelToken) -> Result<Vec<Vec3>, Cancelled> {
+/// [`Canceled`].
+pub fn vertex_normals(mesh: &TriangleMesh, token: &CancelToken) -> Result<Vec<Vec3>, Canceled> {
     let mut sums = sum_weighted_face_normals(mesh, token)?;
     let groups = &mesh.normal_groups;
     let firsts = first_vertex_with_same_normal(groups);
@@ -112,7 +112,7 @@ pub(crate) fn is_polyhedral_without_normals(mesh: &TriangleMesh) -> bool {
 }
 
 /// Replaces zero normals with computed vertex normals.
-pub(super) fn fill_missing_normals(mesh: &mut TriangleMesh, token: &CancelToken) -> Result<(), Cancelled> {
+pub(super) fn fill_missing_normals(mesh: &mut TriangleMesh, token: &CancelToken) -> Result<(), Canceled> {
     let made = vertex_normals(mesh, token)?;
     for (normal, made) in mesh.normals.iter_mut().zip(made) {
         if *normal == Vec3::ZERO {
@@ -124,7 +124,7 @@ pub(super) fn fill_missing_normals(mesh: &mut TriangleMesh, token: &CancelToken)
 
 /// Sums the unit face normals around each vertex in face order, weighted by the faces' angles at the vertex.
 /// Each thread owns a range of vertices, so the order does not depend on the number of threads.
-fn sum_weighted_face_normals(mesh: &TriangleMesh, token: &CancelToken) -> Result<Vec<DVec3>, Cancelled> {
+fn sum_weighted_face_normals(mesh: &TriangleMesh, token: &CancelToken) -> Result<Vec<DVec3>, Canceled> {
     let mut sums = vec![DVec3::ZERO; mesh.positions.len()];
     let share = sums.len().div_ceil(rayon::current_num_threads()).max(1);
     let mut weighted = Vec::with_capacity(BATCH.min(mesh.triangles.len()));
@@ -201,7 +201,7 @@ fn replace_canceled_normals(
     mesh: &TriangleMesh,
     normals: &mut [Vec3],
     token: &CancelToken,
-) -> Result<(), Cancelled> {
+) -> Result<(), Canceled> {
     for triangles in mesh.triangles.chunks(BATCH) {
         token.check_pause_and_cancel()?;
         for triangle in triangles {
@@ -224,7 +224,7 @@ mod tests {
     use super::*;
 
     fn vertex_normals(mesh: &TriangleMesh) -> Vec<Vec3> {
-        super::vertex_normals(mesh, &CancelToken::new()).expect("not cancelled")
+        super::vertex_normals(mesh, &CancelToken::new()).expect("not canceled")
     }
 
     fn mesh(positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> TriangleMesh {
@@ -314,7 +314,7 @@ mod tests {
         assert_eq!(with(1), with(3));
         let token = CancelToken::new();
         token.cancel();
-        assert_eq!(super::vertex_normals(&mesh, &token), Err(Cancelled));
+        assert_eq!(super::vertex_normals(&mesh, &token), Err(Canceled));
     }
 
     #[test]

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::coincident;
 use crate::assets::{Companion, FileMaterial};
-use crate::control::{CancelToken, Cancelled};
+use crate::control::{CancelToken, Canceled};
 use crate::geometry::mesh::VertexNormalGroup;
 use crate::math::{DVec3, Vec2, Vec3};
 
@@ -55,7 +55,7 @@ impl Faces {
         &mut self,
         positions: &[Vec3],
         token: &CancelToken,
-    ) -> Result<(), Cancelled> {
+    ) -> Result<(), Canceled> {
         let mut first: Vec<u32> = (0..positions.len() as u32).collect();
         for place in coincident::find_coincident_vertex_sets(positions, token)? {
             place.iter().for_each(|&vertex| first[vertex as usize] = place[0]);

@@ -3,7 +3,7 @@
 
 use std::collections::HashMap;
 
-use crate::control::{CancelToken, Cancelled};
+use crate::control::{CancelToken, Canceled};
 use crate::film::Srgb8Image;
 
 /// Width and height of the pattern.
@@ -30,7 +30,7 @@ impl Dither {
         &self,
         picture: &Srgb8Image,
         token: &CancelToken,
-    ) -> Result<Vec<u8>, Cancelled> {
+    ) -> Result<Vec<u8>, Canceled> {
         let mut known: HashMap<[u8; 3], [u8; MIXED]> = HashMap::new();
         let mut indices = Vec::with_capacity(picture.pixels.len());
         for (y, row) in picture.pixels.chunks(picture.width.max(1) as usize).enumerate() {

@@ -17,7 +17,7 @@ const SHORTEST_FRAME: f64 = 0.02;
 ///
 /// # Errors
 /// The format does not support the frames, the encoder fails, or the work is canceled
-/// ([`OutputError::Cancelled`]).
+/// ([`OutputError::Canceled`]).
 pub fn encode(
     frames: &[Srgb8Image],
     metadata: &[(String, String)],

@@ -5,7 +5,7 @@ use super::quad::QuadEmitter;
 use super::sample_point::LightSamplePoint;
 use super::triangle::TriangleEmitter;
 use super::{LightHit, ShapeEmitter};
-use crate::control::{CancelToken, Cancelled};
+use crate::control::{CancelToken, Canceled};
 use crate::geometry::SurfaceSample;
 use crate::geometry::triangle::Triangle;
 use crate::lights::sample::{LightGeometry, LightSample, ShadowRayEnd};
@@ -74,8 +74,8 @@ impl MeshEmitter {
     /// have no area.
     ///
     /// # Errors
-    /// [`Cancelled`] if the token is canceled.
-    pub fn new(triangles: Vec<([DVec3; 3], u32)>, token: &CancelToken) -> Result<Option<Self>, Cancelled> {
+    /// [`Canceled`] if the token is canceled.
+    pub fn new(triangles: Vec<([DVec3; 3], u32)>, token: &CancelToken) -> Result<Option<Self>, Canceled> {
         let vector_area_of = |[a, b, c]: &[DVec3; 3]| (*b - *a).cross(*c - *a) * 0.5;
         let areas = triangles.iter().map(|(corners, _)| vector_area_of(corners).length());
         let Some(by_area) = DiscreteDistribution::new(areas) else { return Ok(None) };

@@ -2,7 +2,7 @@ use proptest::prelude::*;
 
 use super::bounds::{ConeFalloff, DistanceFalloff};
 use super::*;
-use crate::control::{CancelToken, Cancelled};
+use crate::control::{CancelToken, Canceled};
 use crate::geometry::Shape;
 use crate::geometry::cuboid::OrientedBox;
 use crate::geometry::cylinder::Cylinder;
@@ -366,8 +366,8 @@ fn canceled_builds_return_an_error() {
     let token = CancelToken::new();
     assert!(LightTree::new(&bounds, &token).is_ok_and(|tree| tree.is_some()));
     token.cancel();
-    assert_eq!(LightTree::new(&bounds, &token), Err(Cancelled));
-    assert_eq!(Lights::new(lights_of(100, &mut next), &token), Err(Cancelled));
+    assert_eq!(LightTree::new(&bounds, &token), Err(Canceled));
+    assert_eq!(Lights::new(lights_of(100, &mut next), &token), Err(Canceled));
 }
 
 #[test]

@@ -250,7 +250,7 @@ impl<'a> Checkpointer<'a> {
                     | PartError::Doubled { .. }
                     | PartError::Missing { .. }
                     | PartError::Film(_)
-                    | PartError::Cancelled(_),
+                    | PartError::Canceled(_),
                 ) => Ok(()),
             };
         };
@@ -358,7 +358,7 @@ impl<'a> Checkpointer<'a> {
 
     /// When a render is canceled, saves a checkpoint if it will be resumed later. Returns whether one was
     /// saved.
-    pub(crate) fn save_if_cancelled(
+    pub(crate) fn save_if_canceled(
         &self,
         state: &FilmState,
         rays: RayCounters,
@@ -529,7 +529,7 @@ fn rejection_message(error: &PartError) -> String {
         | PartError::Doubled { .. }
         | PartError::Missing { .. }
         | PartError::Film(_)
-        | PartError::Cancelled(_) => error.to_string(),
+        | PartError::Canceled(_) => error.to_string(),
     }
 }
 

@@ -8,7 +8,7 @@
 
 use super::coverage::can_store_photons;
 use super::map::Photon;
-use crate::control::Cancelled;
+use crate::control::Canceled;
 use crate::geometry::packet::set_bit_lanes;
 use crate::geometry::ray::offset_origin;
 use crate::geometry::surface_packet::SurfacePacket;
@@ -73,8 +73,8 @@ impl PhotonTracer<'_> {
     /// Traces this chunk's photons.
     ///
     /// # Errors
-    /// [`Cancelled`] if the token is canceled.
-    pub fn trace_photons(&self) -> Result<PhotonChunk, Cancelled> {
+    /// [`Canceled`] if the token is canceled.
+    pub fn trace_photons(&self) -> Result<PhotonChunk, Canceled> {
         let count = self.tile.block.len() as u32;
         let mut wavefront = PhotonWavefront {
             tracing: self,

@@ -3,7 +3,7 @@
 
 use super::packed::{self, PackedDirectionPacket};
 use super::reservoir::{PhotonPositionAndNormal, ReservoirPacket};
-use crate::control::{CancelToken, Cancelled};
+use crate::control::{CancelToken, Canceled};
 use crate::geometry::Aabb;
 use crate::geometry::packet::set_bit_lanes;
 use crate::math::Vec3;
@@ -134,8 +134,8 @@ impl PhotonMap {
     /// Builds a map for kernels of this radius. Photons in one cell keep their order.
     ///
     /// # Errors
-    /// [`Cancelled`] if the token is canceled.
-    pub fn new(photons: &[Photon], radius: f32, token: &CancelToken) -> Result<Self, Cancelled> {
+    /// [`Canceled`] if the token is canceled.
+    pub fn new(photons: &[Photon], radius: f32, token: &CancelToken) -> Result<Self, Canceled> {
         // Count the photons in each bucket.
         let cells = 1.0 / (CELL * radius);
         let mask = (photons.len().max(1).next_power_of_two() - 1) as u32;

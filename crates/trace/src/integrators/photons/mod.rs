@@ -48,7 +48,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use rayon::prelude::*;
 
-use crate::control::{CancelToken, Cancelled, Progress, ignore_progress};
+use crate::control::{CancelToken, Canceled, Progress, ignore_progress};
 use crate::film::Rect;
 use crate::geometry::{Aabb, ShapeHit};
 use crate::integrators::behavior::PathBehavior;
@@ -138,14 +138,14 @@ impl PhotonMapper {
     /// receives the number of photons traced so far and the total number.
     ///
     /// # Errors
-    /// [`Cancelled`] if the token is canceled.
+    /// [`Canceled`] if the token is canceled.
     pub fn new_with_first_pass(
         world: &World,
         settings: &RenderSettings,
         photons: PhotonSettings,
         progress: Progress<'_>,
         token: &CancelToken,
-    ) -> Result<(Self, PhotonPass), Cancelled> {
+    ) -> Result<(Self, PhotonPass), Canceled> {
         // Aim photons at the mirrors and glass.
         let specular = SpecularObjects::from_world(world);
         let emission = scene_photon_emitter(&world.geometry, &world.lights).filter(|_| specular.has_any());
@@ -188,14 +188,14 @@ impl PhotonMapper {
     /// Traces a pass. The result depends on the pass number but not on the number of threads.
     ///
     /// # Errors
-    /// [`Cancelled`] if the token is canceled.
+    /// [`Canceled`] if the token is canceled.
     pub fn trace_pass(
         &self,
         world: &World,
         settings: &RenderSettings,
         number: u32,
         token: &CancelToken,
-    ) -> Result<PhotonPass, Cancelled> {
+    ) -> Result<PhotonPass, Canceled> {
         let sent = self.trace_photons((world, settings), number, &ignore_progress, token)?;
         self.build_maps(&sent, number, token)
     }
@@ -206,7 +206,7 @@ impl PhotonMapper {
         sent: &StoredPhotons,
         number: u32,
         token: &CancelToken,
-    ) -> Result<PhotonPass, Cancelled> {
+    ) -> Result<PhotonPass, Canceled> {
         let shrunk = radius_factor(number);
         let [of_caustic, of_bounced] = self.radii.map(|radius| (f64::from(radius) * shrunk) as f32);
         let map = |of: &[Photon], radius: f32| PhotonMap::new(of, radius, token);
@@ -223,14 +223,14 @@ impl PhotonMapper {
     /// Traces the photon passes for a range of samples.
     ///
     /// # Errors
-    /// [`Cancelled`] if the token is canceled.
+    /// [`Canceled`] if the token is canceled.
     pub fn trace_passes(
         &self,
         world: &World,
         settings: &RenderSettings,
         samples: Range<u32>,
         token: &CancelToken,
-    ) -> Result<PhotonMaps, Cancelled> {
+    ) -> Result<PhotonMaps, Canceled> {
         let first = samples.start;
         let pass = |number| self.trace_pass(world, settings, number, token).map(Arc::new);
         Ok(PhotonMaps { first, passes: samples.map(pass).collect::<Result<_, _>>()? })
@@ -243,7 +243,7 @@ impl PhotonMapper {
         number: u32,
         progress: Progress<'_>,
         token: &CancelToken,
-    ) -> Result<StoredPhotons, Cancelled> {
+    ) -> Result<StoredPhotons, Canceled> {
         let Some(emission) = self.emission.as_ref().filter(|_| self.emits_photons()) else {
             return Ok(StoredPhotons::default());
         };
@@ -282,7 +282,7 @@ impl PhotonMapper {
             .map(|number| chunk(number * CHUNK))
             .collect::<Result<_, _>>()?;
         let lookups = chunks.iter().map(|chunk| chunk.lookups).sum();
-        let joined = |of: fn(&PhotonChunk) -> &[Photon]| -> Result<Vec<Photon>, Cancelled> {
+        let joined = |of: fn(&PhotonChunk) -> &[Photon]| -> Result<Vec<Photon>, Canceled> {
             let mut all = Vec::with_capacity(chunks.iter().map(|chunk| of(chunk).len()).sum());
             for chunk in &chunks {
                 token.check_pause_and_cancel()?;
@@ -319,7 +319,7 @@ fn radius_for_neighbor_count(
     wanted: f32,
     size: f32,
     token: &CancelToken,
-) -> Result<f32, Cancelled> {
+) -> Result<f32, Canceled> {
     /// Maximum number of photons examined.
     const MOST: usize = 1 << 14;
     const LOOKS: usize = 256;

@@ -8,7 +8,7 @@ use super::packet_source::PacketSource;
 use super::plain_vertices::ShadowLiftSelection;
 use super::ray::PathRay;
 use super::tile::TileContext;
-use crate::control::Cancelled;
+use crate::control::Canceled;
 use crate::geometry::packet::{self, HitPacket, RayPacket};
 use crate::geometry::surface_packet::SurfacePacket;
 use crate::geometry::{Ray, SurfacePoint};
@@ -94,8 +94,8 @@ impl TileContext<'_> {
     /// Finds the closest hit of every ray in a queue, replacing the content of `hits`.
     ///
     /// # Errors
-    /// [`Cancelled`] if the token is canceled.
-    pub fn closest_hits(&self, rays: &[PathRay], hits: &mut Vec<Option<Hit>>) -> Result<(), Cancelled> {
+    /// [`Canceled`] if the token is canceled.
+    pub fn closest_hits(&self, rays: &[PathRay], hits: &mut Vec<Option<Hit>>) -> Result<(), Canceled> {
         hits.clear();
         hits.resize(rays.len(), None);
         for (paths, hits) in rays.chunks(POLL_INTERVAL).zip(hits.chunks_mut(POLL_INTERVAL)) {

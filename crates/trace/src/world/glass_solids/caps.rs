@@ -3,7 +3,7 @@
 use super::parts::{GlassParts, GlassTriangleCoverage, RimEdge, glass_triangle_coverage};
 use crate::accel::Bvh;
 use crate::assets::LoadedMesh;
-use crate::control::{CancelToken, Cancelled};
+use crate::control::{CancelToken, Canceled};
 use crate::geometry::{Aabb, RayF64, Shape};
 use crate::math::DVec3;
 use crate::scene::description::{LoweredShape, MeshReference, Scene};
@@ -37,7 +37,7 @@ pub(super) fn covered_rim_fractions(
     parts: &GlassParts,
     holes: &[&[RimEdge]],
     token: &CancelToken,
-) -> Result<Vec<f64>, Cancelled> {
+) -> Result<Vec<f64>, Canceled> {
     let examined: Vec<Vec<&RimEdge>> = holes.iter().map(|rims| subsample_rim_edges(rims)).collect();
     let queries: Vec<OpaqueQuery> = examined.iter().flat_map(|rims| rim_edge_queries(parts, rims)).collect();
     if queries.is_empty() {
@@ -123,7 +123,7 @@ fn evaluate_queries(
     origin: DVec3,
     queries: &[OpaqueQuery],
     token: &CancelToken,
-) -> Result<Vec<bool>, Cancelled> {
+) -> Result<Vec<bool>, Canceled> {
     let bounds: Vec<Aabb> = queries.iter().map(OpaqueQuery::search_box).collect();
     let all = bounds.iter().fold(Aabb::EMPTY, |all, own| all.union(*own));
     // Use a tree over the queries because there are many queries and many surfaces.

@@ -27,7 +27,7 @@ use parts::{GlassParts, GlassSolidPart, RimEdge};
 use shared_edges::{MatchedAndOpenEdges, RimEdgeWithEndpointIds, SharedEdge, find_set_root};
 
 use crate::assets::LoadedMesh;
-use crate::control::{CancelToken, Cancelled};
+use crate::control::{CancelToken, Canceled};
 use crate::math::DVec3;
 use crate::scene::description::Scene;
 
@@ -82,8 +82,8 @@ impl GlassSolids {
     /// Finds the glass solids in a scene.
     ///
     /// # Errors
-    /// [`Cancelled`] if the token is canceled.
-    pub fn find(scene: &Scene, meshes: &[&LoadedMesh], token: &CancelToken) -> Result<Self, Cancelled> {
+    /// [`Canceled`] if the token is canceled.
+    pub fn find(scene: &Scene, meshes: &[&LoadedMesh], token: &CancelToken) -> Result<Self, Canceled> {
         let parts = GlassParts::find_in_scene(scene, meshes, token)?;
         if parts.list.is_empty() {
             return Ok(Self::default());
@@ -186,7 +186,7 @@ fn hole_covered_flags(
     parts: &GlassParts,
     holes: &[SolidHole],
     token: &CancelToken,
-) -> Result<Vec<bool>, Cancelled> {
+) -> Result<Vec<bool>, Canceled> {
     let is_large = |hole: &&SolidHole| hole.part > SMALL_HOLE;
     let rims: Vec<&[RimEdge]> = holes.iter().filter(is_large).map(|hole| &*hole.rims).collect();
     let mut parts = caps::covered_rim_fractions(scene, meshes, parts, &rims, token)?.into_iter();

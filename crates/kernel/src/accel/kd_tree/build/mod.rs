@@ -14,7 +14,7 @@ mod sweep;
 use rayon::prelude::*;
 
 use super::node::{self, LeafTriangle, PackedKdNode};
-use crate::control::{CancelToken, Cancelled};
+use crate::control::{CancelToken, Canceled};
 use crate::geometry::Aabb;
 use crate::geometry::mesh::TriangleMesh;
 use crate::math::Vec3;
@@ -64,12 +64,12 @@ pub fn depth_limit(count: usize) -> u32 {
 /// Builds a tree over `count` triangles. Triangles without a finite bounding box are skipped.
 ///
 /// # Errors
-/// [`Cancelled`] if the build was canceled.
+/// [`Canceled`] if the build was canceled.
 pub fn build(
     count: u32,
     corners: impl Fn(u32) -> [Vec3; 3] + Sync,
     token: &CancelToken,
-) -> Result<BuiltKdTree, Cancelled> {
+) -> Result<BuiltKdTree, Canceled> {
     let room = MOST_ROOM.min(MOST_PER_TRIANGLE * (u64::from(count) + FEW));
     build_with_budget(room, count, corners, token)
 }
@@ -80,7 +80,7 @@ fn build_with_budget(
     count: u32,
     corners: impl Fn(u32) -> [Vec3; 3] + Sync,
     token: &CancelToken,
-) -> Result<BuiltKdTree, Cancelled> {
+) -> Result<BuiltKdTree, Canceled> {
     let references = TriangleReference::collect_finite(count, &corners, token)?;
     if references.is_empty() {
         let (nodes, references, triangles) = Default::default();
@@ -158,7 +158,7 @@ fn build_part(
     mut references: Vec<TriangleReference>,
     corners: &(impl Fn(u32) -> [Vec3; 3] + Sync),
     token: &CancelToken,
-) -> Result<TreePart, Cancelled> {
+) -> Result<TreePart, Canceled> {
     token.check_pause_and_cancel()?;
     let plane = if references.len() > TASK_SIZE { cell.choose_split(&references) } else { None };
     let Some(plane) = plane else {

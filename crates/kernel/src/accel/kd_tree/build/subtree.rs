@@ -4,7 +4,7 @@ use super::Cell;
 use super::partition::PartitionBuffers;
 use crate::accel::kd_tree::node::{DecodedNode, PackedKdNode};
 use crate::accel::reference::TriangleReference;
-use crate::control::{CancelToken, Cancelled};
+use crate::control::{CancelToken, Canceled};
 use crate::math::Vec3;
 
 /// Nodes and references, with indices relative to the subtree.
@@ -18,13 +18,13 @@ impl KdSubtree {
     /// Builds the subtree for a cell and its references.
     ///
     /// # Errors
-    /// [`Cancelled`] if the build was canceled.
+    /// [`Canceled`] if the build was canceled.
     pub fn build(
         cell: &Cell,
         references: Vec<TriangleReference>,
         corners: &impl Fn(u32) -> [Vec3; 3],
         token: &CancelToken,
-    ) -> Result<Self, Cancelled> {
+    ) -> Result<Self, Canceled> {
         let mut builder = KdSubtreeBuilder {
             built: Self::default(),
             references,
@@ -50,7 +50,7 @@ struct KdSubtreeBuilder<'a, C> {
 impl<C: Fn(u32) -> [Vec3; 3]> KdSubtreeBuilder<'_, C> {
     /// Builds the nodes for a cell and removes the cell's references, which begin at `first`. The recursion
     /// depth is limited by the tree depth.
-    fn build_cell(&mut self, first: usize, cell: &Cell) -> Result<(), Cancelled> {
+    fn build_cell(&mut self, first: usize, cell: &Cell) -> Result<(), Canceled> {
         let place = self.built.nodes.len();
         let own = &self.references[first..];
         let leaf = DecodedNode::Leaf { first: self.built.ids.len() as u32, count: own.len() as u32 };

@@ -5,7 +5,7 @@
 use rayon::prelude::*;
 
 use crate::accel::reference::{SimdBounds, TriangleReference};
-use crate::control::{CancelToken, Cancelled};
+use crate::control::{CancelToken, Canceled};
 use crate::math::Vec3;
 use crate::math::elementary::exp2;
 
@@ -21,12 +21,12 @@ const CHUNK: usize = 4096;
 /// Splits the references of large triangles. The result depends only on the triangles.
 ///
 /// # Errors
-/// [`Cancelled`] if the build was canceled.
+/// [`Canceled`] if the build was canceled.
 pub fn split_large_triangles(
     references: &[TriangleReference],
     corners: &(impl Fn(u32) -> [Vec3; 3] + Sync),
     token: &CancelToken,
-) -> Result<Vec<TriangleReference>, Cancelled> {
+) -> Result<Vec<TriangleReference>, Canceled> {
     let grid = BisectionGrid::around(references);
     let priority = |reference: &TriangleReference| grid.priority(reference, corners(reference.id()));
     let priorities: Vec<f32> = references.par_iter().map(priority).collect();
