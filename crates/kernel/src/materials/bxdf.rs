@@ -168,7 +168,7 @@ pub trait Bxdf: Soa + Default {
 
     /// Probability that sampling all lobes chooses a narrow lobe.
     #[inline(always)]
-    fn narrow_share(&self, _view: &Self::View) -> f32 {
+    fn narrow_lobe_probability(&self, _view: &Self::View) -> f32 {
         1.0
     }
 

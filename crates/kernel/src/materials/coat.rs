@@ -169,7 +169,7 @@ pub(super) fn nonnegative_cosine(cosine: f32) -> f32 {
 }
 
 impl<const EXACT: bool, const BECKMANN: bool> CoatLayer<EXACT, BECKMANN> {
-    const DISTRIBUTION: MicrofacetDistribution = MicrofacetDistribution::beckmann_if(BECKMANN);
+    const DISTRIBUTION: MicrofacetDistribution = MicrofacetDistribution::ggx_or_beckmann(BECKMANN);
 
     /// Directional albedo c·E at a cosine ≥ 0.
     #[inline(always)]

@@ -28,9 +28,9 @@ choice! {
 }
 
 impl MicrofacetDistribution {
-    /// Returns Beckmann if `condition` is true, and GGX otherwise.
-    pub const fn beckmann_if(condition: bool) -> Self {
-        if condition { Self::Beckmann } else { Self::Ggx }
+    /// Returns Beckmann if `is_beckmann` is true, and GGX otherwise.
+    pub const fn ggx_or_beckmann(is_beckmann: bool) -> Self {
+        if is_beckmann { Self::Beckmann } else { Self::Ggx }
     }
 }
 

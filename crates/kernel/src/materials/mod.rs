@@ -6,7 +6,6 @@ pub mod bxdf;
 pub mod bxdf_packet;
 pub mod bxdfs;
 pub mod coat;
-pub mod coated;
 pub mod dielectric;
 pub mod emission;
 pub mod footprint;
@@ -21,6 +20,7 @@ pub mod normal_perturbation;
 pub mod opacity;
 pub mod scalar;
 pub mod schlick_albedo;
+pub mod specular_over_base;
 pub mod texels;
 pub mod texture;
 pub mod thin_dielectric;
@@ -28,7 +28,6 @@ pub mod thin_dielectric;
 pub use blend::Blend;
 pub use bxdfs::*;
 pub use coat::{Coat, CoatInputs};
-pub use coated::{Coated, SpecularPart};
 pub use dielectric::Dielectric;
 pub use emission::{Emission, EmissionSides};
 pub use footprint::{Footprint, SecondUvPoint, TexturePoint, UvSet};
@@ -38,6 +37,7 @@ pub use normal_map::NormalMap;
 pub use normal_perturbation::{Bump, NormalPerturbation};
 pub use opacity::Opacity;
 pub use scalar::{Channel, ChannelSelector, ScalarParameter};
+pub use specular_over_base::{SpecularOverBase, SpecularPart};
 pub use thin_dielectric::ThinDielectric;
 
 use std::sync::Arc;
@@ -104,7 +104,7 @@ impl Material {
             | Bsdf::Mirror(_)
             | Bsdf::Dielectric(_)
             | Bsdf::ThinDielectric(_)
-            | Bsdf::Coated(_) => None,
+            | Bsdf::SpecularOverBase(_) => None,
         }
     }
 
@@ -162,9 +162,9 @@ impl Material {
     pub fn presence(&self, at: &TexturePoint, accepts: &dyn Fn(&Self) -> bool, lookups: &mut u64) -> f32 {
         match self.blend() {
             Some(blend) => {
-                let of_part =
+                let for_part =
                     |part: &Self, lookups: &mut u64| Vec3::splat(part.presence(at, accepts, lookups));
-                blend.mean(at, lookups, of_part).x
+                blend.mean(at, lookups, for_part).x
             }
             None if !accepts(self) => 0.0,
             None => self.opacity.as_ref().map_or(1.0, |opacity| opacity.evaluate(at, lookups)),
@@ -205,7 +205,9 @@ impl Material {
         let mut textures: Vec<_> = match &self.bsdf {
             Bsdf::NonSpecular(rough) => rough.textures().collect(),
             Bsdf::Mirror(mirror) => mirror.textures().collect(),
-            Bsdf::Coated(coated) => coated.specular_textures().chain(coated.base.textures()).collect(),
+            Bsdf::SpecularOverBase(layers) => {
+                layers.specular_textures().chain(layers.base.textures()).collect()
+            }
             Bsdf::Dielectric(glass) => glass.roughness.texture().into_iter().collect(),
             Bsdf::ThinDielectric(pane) => pane.tint.texture().into_iter().collect(),
             Bsdf::Blend(blend) => blend
@@ -234,7 +236,7 @@ pub enum Bsdf {
     /// A thin dielectric pane.
     ThinDielectric(ThinDielectric),
     /// A surface with a δ lobe and non-specular lobes.
-    Coated(Coated),
+    SpecularOverBase(SpecularOverBase),
     /// A blend of two materials.
     Blend(Box<Blend>),
 }
@@ -246,7 +248,7 @@ impl Bsdf {
         match self {
             Self::NonSpecular(_) => false,
             Self::Dielectric(glass) => glass.is_smooth(),
-            Self::Mirror(_) | Self::ThinDielectric(_) | Self::Coated(_) => true,
+            Self::Mirror(_) | Self::ThinDielectric(_) | Self::SpecularOverBase(_) => true,
             Self::Blend(blend) => blend.parts.iter().any(|part| part.bsdf.has_delta()),
         }
     }
@@ -260,7 +262,7 @@ impl Bsdf {
             | Self::Mirror(_)
             | Self::Dielectric(_)
             | Self::ThinDielectric(_)
-            | Self::Coated(_) => self.non_specular_part().is_some(),
+            | Self::SpecularOverBase(_) => self.non_specular_part().is_some(),
         }
     }
 
@@ -274,7 +276,9 @@ impl Bsdf {
     #[inline]
     pub fn non_specular_part(&self) -> Option<&NonSpecular> {
         match self {
-            Self::NonSpecular(rough) | Self::Coated(Coated { base: rough, .. }) => Some(rough),
+            Self::NonSpecular(rough) | Self::SpecularOverBase(SpecularOverBase { base: rough, .. }) => {
+                Some(rough)
+            }
             Self::Mirror(_) | Self::Dielectric(_) | Self::ThinDielectric(_) | Self::Blend(_) => None,
         }
     }
@@ -287,7 +291,7 @@ impl Bsdf {
             Self::Mirror(_)
             | Self::Dielectric(_)
             | Self::ThinDielectric(_)
-            | Self::Coated(_)
+            | Self::SpecularOverBase(_)
             | Self::Blend(_) => None,
         }
     }
@@ -300,7 +304,7 @@ impl Bsdf {
             Self::NonSpecular(_)
             | Self::Mirror(_)
             | Self::Dielectric(_)
-            | Self::Coated(_)
+            | Self::SpecularOverBase(_)
             | Self::Blend(_) => None,
         }
     }
@@ -311,7 +315,7 @@ impl Bsdf {
             Self::Dielectric(glass) => Some(glass),
             Self::NonSpecular(_)
             | Self::Mirror(_)
-            | Self::Coated(_)
+            | Self::SpecularOverBase(_)
             | Self::ThinDielectric(_)
             | Self::Blend(_) => None,
         }
@@ -330,7 +334,7 @@ impl Bsdf {
             | Self::Mirror(_)
             | Self::Dielectric(_)
             | Self::ThinDielectric(_)
-            | Self::Coated(_) => self.non_specular_part().is_some_and(property),
+            | Self::SpecularOverBase(_) => self.non_specular_part().is_some_and(property),
         }
     }
 
@@ -342,7 +346,7 @@ impl Bsdf {
             Self::Mirror(mirror) => mirror.reflectance(1.0, None, at, lookups),
             Self::Dielectric(glass) => glass.tint,
             Self::ThinDielectric(pane) => pane.tint.evaluate(at, lookups),
-            Self::Coated(coated) => coated.albedo(at, lookups),
+            Self::SpecularOverBase(layers) => layers.albedo(at, lookups),
             Self::Blend(blend) => blend.mean(at, lookups, |part, lookups| part.bsdf.albedo(at, lookups)),
         }
     }

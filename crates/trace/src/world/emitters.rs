@@ -184,7 +184,7 @@ impl SurfaceEmission {
         let (constant, weights): (Vec<BlendWeight>, Vec<_>) =
             weights.iter().cloned().partition(|weight| weight.second.as_untextured().is_some());
         for weight in constant {
-            scale *= weight.of_part(weight.second.as_untextured().unwrap_or(1.0));
+            scale *= weight.for_part(weight.second.as_untextured().unwrap_or(1.0));
         }
         if scale != Vec3::ZERO {
             self.terms.push((EmissionTerm { scale, texture, opacity, coat, weights }, sides));

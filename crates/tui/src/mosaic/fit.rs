@@ -27,9 +27,9 @@ pub(crate) fn fit_cell(grid: CellGrid, pixels: &[[u8; 3]]) -> FittedCell {
     let pixels: Vec<Vec3> = pixels.iter().map(|pixel| srgb8_color_to_linear(*pixel)).collect();
     let CellDivision { first, tile } = best_division(grid, &pixels);
     let mean = |is_first: bool| {
-        let of_part = (0..pixels.len()).filter(|i| (first >> i & 1 == 1) == is_first);
-        let count = of_part.clone().count().max(1);
-        to_srgb_bytes(of_part.map(|i| pixels[i]).sum::<Vec3>() / count as f32)
+        let for_part = (0..pixels.len()).filter(|i| (first >> i & 1 == 1) == is_first);
+        let count = for_part.clone().count().max(1);
+        to_srgb_bytes(for_part.map(|i| pixels[i]).sum::<Vec3>() / count as f32)
     };
     FittedCell { tile, pair: [mean(true), mean(false)] }
 }

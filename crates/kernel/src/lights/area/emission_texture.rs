@@ -45,7 +45,7 @@ pub struct BlendWeight {
 
 impl BlendWeight {
     /// Weight of this part, given the weight `second` of the second part.
-    pub fn of_part(&self, second: f32) -> f32 {
+    pub fn for_part(&self, second: f32) -> f32 {
         let second = second.clamp(0.0, 1.0);
         if self.is_second { second } else { 1.0 - second }
     }
@@ -75,7 +75,7 @@ impl EmissionTerm {
             color *= opacity.evaluate(at, &mut 0);
         }
         for weight in &self.weights {
-            color *= weight.of_part(weight.second.evaluate(at, &mut 0));
+            color *= weight.for_part(weight.second.evaluate(at, &mut 0));
         }
         color
     }
@@ -86,7 +86,7 @@ impl EmissionTerm {
         let mut mean = color * self.scale * self.opacity.as_ref().map_or(1.0, Opacity::mean);
         for weight in &self.weights {
             let second = weight.second.texture().map_or(1.0, |texture| texture.mean().x);
-            mean *= weight.of_part(weight.second.as_untextured().unwrap_or(second));
+            mean *= weight.for_part(weight.second.as_untextured().unwrap_or(second));
         }
         mean
     }

@@ -212,7 +212,7 @@ impl PhotonEmitter {
     }
 
     /// Fraction of the photons that are aimed at targets.
-    pub fn aimed_share(&self) -> f32 {
+    pub fn aimed_probability(&self) -> f32 {
         self.aim.as_ref().map_or(0.0, |aim| aim.share)
     }
 
@@ -226,7 +226,7 @@ impl PhotonEmitter {
             .sample_photon_from_light(number, targets, u)
             .filter(|sample_photon| sample_photon.flux != Vec3::ZERO)?;
         let (all, of_light) =
-            (f64::from(self.aimed_share()), |by: &DiscreteDistribution| by.probability(number));
+            (f64::from(self.aimed_probability()), |by: &DiscreteDistribution| by.probability(number));
         let aimed = self.aim.as_ref().map_or(0.0, |aim| all * of_light(&aim.by_light) * sample_photon.ratio);
         let density = (1.0 - all) * of_light(&self.by_power) + aimed;
         let flux = (sample_photon.flux.as_dvec3() / density).as_vec3();

@@ -205,7 +205,7 @@ fn mean_flux_equals_power_for_any_aimed_fraction() {
         let plain = source_of(light.clone(), shape.as_ref());
         for (targets, share) in [(&targets()[..], 0.5), (&targets()[..3], 0.9), (&targets()[..1], 0.3)] {
             let source = plain.clone().with_targets(targets, share);
-            assert_eq!(source.aimed_share(), share);
+            assert_eq!(source.aimed_probability(), share);
             let found = mean(&source, 1 << 14, |photon| f64::from(photon.flux.y));
             let exact = power;
             let greatest_error = if share > 0.5 { 3e-3 } else { 1e-3 };

@@ -33,7 +33,7 @@ use crate::integrators::view::LightAov;
 use crate::integrators::{PACKET_SIZE, RayCounters};
 use crate::lights::{EmittedPhoton, PhotonEmitter, PhotonOrigin, PhotonRandomNumbers};
 use crate::materials::bsdf::LobesToSample;
-use crate::materials::{Bsdf, BxdfPoint, Coated, Material, NonSpecular, ThinDielectric};
+use crate::materials::{Bsdf, BxdfPoint, Material, NonSpecular, SpecularOverBase, ThinDielectric};
 use crate::math::Vec3;
 use crate::math::lanes::{Simd, lane, set_lane};
 use crate::sampling::{CAMERA_PATH, Dimension, SamplerPacket};
@@ -324,8 +324,8 @@ impl PhotonWavefront<'_> {
             Bsdf::NonSpecular(rough) => {
                 self.store_and_scatter_at_rough(path, vertex, rough, (far, Some(1.0)));
             }
-            Bsdf::Coated(coated) => {
-                self.store_and_reflect_at_coated(path, vertex, coated, (far, lacks_photons));
+            Bsdf::SpecularOverBase(layers) => {
+                self.store_and_reflect_at_specular_over_base(path, vertex, layers, (far, lacks_photons));
             }
             Bsdf::Mirror(mirror) if self.may_scatter() => {
                 let shading = vertex.perturbed_and_smooth_normals(&mut self.counters);
@@ -340,24 +340,24 @@ impl PhotonWavefront<'_> {
     /// Stores a photon at a surface with a δ lobe and non-specular lobes, and reflects it from the δ lobe.
     /// Caustic photons are randomly reflected by the δ lobe or scattered by the others. All other photons are
     /// reflected, because they never scatter from the other lobes.
-    fn store_and_reflect_at_coated(
+    fn store_and_reflect_at_specular_over_base(
         &mut self,
         path: &PathRay,
         vertex: &SurfaceVertex<'_>,
-        coated: &Coated,
+        layers: &SpecularOverBase,
         (far, lacks_photons): (&InteriorList, bool),
     ) {
         let shading = vertex.perturbed_and_smooth_normals(&mut self.counters);
-        let lobe = vertex.specular_lobe(coated, &shading, true, &mut self.counters);
+        let lobe = vertex.specular_lobe(layers, &shading, true, &mut self.counters);
         let SpecularLobe { probability, .. } = lobe;
         let chooses = path.state.only_specular_before && !lacks_photons;
         let is_reflected = !chooses || self.tracing.tile.chooses_reflection(path, probability);
         if !lacks_photons {
             let by_chance = (!is_reflected).then(|| 1.0 / (1.0 - probability));
-            self.store_and_scatter_at_rough(path, vertex, &coated.base, (far, by_chance));
+            self.store_and_scatter_at_rough(path, vertex, &layers.base, (far, by_chance));
         }
         if is_reflected && self.may_scatter() {
-            let specular = vertex.specular_weight(coated, &lobe, &mut self.counters);
+            let specular = vertex.specular_weight(layers, &lobe, &mut self.counters);
             let part = if chooses { 1.0 } else { probability };
             let ray = reflected_path(path, vertex, &shading, specular * part);
             self.queue_specular_photon(path, vertex, (shading.normal, 1.0), ray);

@@ -10,7 +10,7 @@ use crate::geometry::ray::offset_origin;
 use crate::geometry::{Ray, SurfacePoint, SurfaceRequest};
 use crate::integrators::RayCounters;
 use crate::materials::{
-    BxdfPoint, Coated, Footprint, Material, Mirror, SpecularPart, TexturePoint, ThinDielectric,
+    BxdfPoint, Footprint, Material, Mirror, SpecularOverBase, SpecularPart, TexturePoint, ThinDielectric,
 };
 use crate::math::Vec3;
 use crate::sampling::Dimension;
@@ -258,25 +258,30 @@ impl<'a> SurfaceVertex<'a> {
     /// treated as white unless `is_colored` is true.
     pub fn specular_lobe(
         &self,
-        coated: &Coated,
+        layers: &SpecularOverBase,
         shading: &PerturbedAndSmoothNormals,
         is_colored: bool,
         counters: &mut RayCounters,
     ) -> SpecularLobe {
         let cosine = shading.normal.dot(self.wo).abs().min(1.0);
-        let mirror = match &coated.specular {
+        let mirror = match &layers.specular {
             SpecularPart::Mirror(mirror) => self.mirror_reflectance(mirror, shading, is_colored, counters),
             SpecularPart::SmoothCoat { .. } => Vec3::ONE,
         };
         let lookups = &mut counters.texture_lookups;
-        let probability = coated.specular_probability(cosine, mirror, &self.texture_point, lookups);
+        let probability = layers.specular_probability(cosine, mirror, &self.texture_point, lookups);
         SpecularLobe { cosine, mirror, probability }
     }
 
     /// Reflectance of the δ lobe, divided by the probability of choosing it.
-    pub fn specular_weight(&self, coated: &Coated, lobe: &SpecularLobe, counters: &mut RayCounters) -> Vec3 {
+    pub fn specular_weight(
+        &self,
+        layers: &SpecularOverBase,
+        lobe: &SpecularLobe,
+        counters: &mut RayCounters,
+    ) -> Vec3 {
         let &SpecularLobe { cosine, mirror, probability: _ } = lobe;
-        coated.specular_weight(cosine, mirror, &self.texture_point, &mut counters.texture_lookups)
+        layers.specular_weight(cosine, mirror, &self.texture_point, &mut counters.texture_lookups)
     }
 
     /// ∂p/∂u, or zero on a mesh without texture coordinates, where u is not defined.

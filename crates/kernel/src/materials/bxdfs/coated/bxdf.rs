@@ -80,7 +80,7 @@ soa! {
         /// Probability of choosing the coat's lobe.
         share: f32 = 0.0,
         /// Probability of choosing a narrow lobe if the base is chosen.
-        base_narrow_share: f32 = 1.0,
+        base_narrow_lobe_probability: f32 = 1.0,
     }
 }
 
@@ -103,7 +103,7 @@ impl LobeChoice {
         match lobes {
             LobesToSample::All => Self { coat: view.share, base },
             LobesToSample::Narrow => {
-                let narrow = base * view.base_narrow_share;
+                let narrow = base * view.base_narrow_lobe_probability;
                 let all = (view.share + narrow).max(f32::MIN_POSITIVE);
                 Self { coat: view.share / all, base: narrow / all }
             }
@@ -176,7 +176,7 @@ impl<B: Bxdf> Bxdf for CoatedBxdf<B> {
             transmittance: 1.0 - albedo,
             path_length: self.layer.coat.path_length(cosine),
             share: albedo / (albedo + below).max(f32::MIN_POSITIVE),
-            base_narrow_share: self.base.narrow_share(&base),
+            base_narrow_lobe_probability: self.base.narrow_lobe_probability(&base),
         };
         LayerOver { layer, base }
     }

@@ -39,7 +39,7 @@ soa! {
 const INDEX: BxdfFlags = BxdfFlags(1 << BxdfFlags::FIRST_OWN);
 
 impl<const BRUSHED: bool, const BECKMANN: bool> ConductorBxdf<BRUSHED, BECKMANN> {
-    const DISTRIBUTION: MicrofacetDistribution = MicrofacetDistribution::beckmann_if(BECKMANN);
+    const DISTRIBUTION: MicrofacetDistribution = MicrofacetDistribution::ggx_or_beckmann(BECKMANN);
 
     #[inline(always)]
     fn frame(view: &ConductorViewTerms) -> Frame {

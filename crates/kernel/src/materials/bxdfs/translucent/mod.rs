@@ -44,7 +44,7 @@ impl TranslucentPoint {
     }
 
     /// Probability that a path continues on the other side.
-    fn transmission_share(&self) -> f32 {
+    fn transmission_probability(&self) -> f32 {
         let PhongBsdf { diffuse, specular, .. } = self.reflection;
         let through = self.transmission.max_element();
         let all = diffuse.max_element() + specular.max_element() + through;
