@@ -238,7 +238,7 @@ fn area_lights_of_shape(
         };
         let light = AreaLight { bounds: scale_light_bounds_by_term_means(light.bounds, &terms), ..light };
         Some(match EmissionModulation::from_terms(terms, UvMapping::Shape(shape.clone())) {
-            Some(texture) => light.with_texture(texture),
+            Some(modulation) => light.with_modulation(modulation),
             None => light,
         })
     };
@@ -298,10 +298,10 @@ fn mesh_lights_by_material_and_side(
                 UvMapping::Triangles(triangles_with_material(mesh, own).map(patch).collect())
             };
             let is_varying = terms.iter().any(EmissionTerm::varies);
-            let texture = is_varying.then(|| EmissionModulation::from_terms(terms, patches())).flatten();
-            let texture = texture.map(Box::new);
+            let modulation = is_varying.then(|| EmissionModulation::from_terms(terms, patches())).flatten();
+            let modulation = modulation.map(Box::new);
             let (shape, part) = (Emitter::Mesh(emitter), EmittingTriangleSelection::Listed);
-            Ok(Some(AreaLight { shape, side, radiance, texture, object, part, bounds }))
+            Ok(Some(AreaLight { shape, side, radiance, modulation, object, part, bounds }))
         };
     let of_sides = all
         .iter()

@@ -272,10 +272,10 @@ impl PhotonEmitter {
                 );
                 let start = PhotonOrigin::Surface { point: place.point, error: place.error, normal };
                 // Apply the clear coat's transmittance in the photon's direction.
-                let left = |texture: &EmissionModulation| {
-                    texture.coat_transmittance(place.point, place.primitive, -direction)
+                let left = |modulation: &EmissionModulation| {
+                    modulation.coat_transmittance(place.point, place.primitive, -direction)
                 };
-                let flux = place.flux * light.texture.as_deref().map_or(Vec3::ONE, left);
+                let flux = place.flux * light.modulation.as_deref().map_or(Vec3::ONE, left);
                 Some(PhotonSample { start, direction, flux, ratio })
             }
         }

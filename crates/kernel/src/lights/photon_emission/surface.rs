@@ -77,7 +77,7 @@ impl DividedEmissiveSurface {
         let (on, count) = match emitter_geometry {
             EmissiveObjectGeometry::Shape(shape) => {
                 let areas = shape.local_part_areas();
-                let is_uneven = light.texture.is_some() || matches!(shape, Shape::Transformed(_));
+                let is_uneven = light.modulation.is_some() || matches!(shape, Shape::Transformed(_));
                 let most = if is_uneven { PIECES / areas.len().max(1) } else { 1 };
                 let side = most.isqrt().max(1);
                 let count = areas.len() * side * side;
@@ -96,7 +96,7 @@ impl DividedEmissiveSurface {
                 (DividedSurfaceGeometry::Mesh { rounding: *rounding }, mesh.primitive_indices().count())
             }
         };
-        let per_side = if light.texture.is_some() { LOOKUPS_PER_SIDE } else { 1 };
+        let per_side = if light.modulation.is_some() { LOOKUPS_PER_SIDE } else { 1 };
         let of = |index: usize| {
             let mut sum = DVec3::ZERO;
             let mut area = 0.0;
@@ -172,10 +172,10 @@ impl DividedSurfaceGeometry {
 
 /// Radiance at a point in W·sr⁻¹·m⁻², without a clear coat.
 fn radiance_without_coat(light: &AreaLight, place: &PiecePoint) -> Vec3 {
-    let texture = light.texture.as_ref();
+    let modulation = light.modulation.as_ref();
     light.radiance
-        * texture.map_or(Vec3::ONE, |texture| {
-            texture.radiance_factor_without_coat(place.point.as_vec3(), place.primitive)
+        * modulation.map_or(Vec3::ONE, |modulation| {
+            modulation.radiance_factor_without_coat(place.point.as_vec3(), place.primitive)
         })
 }
 

@@ -255,7 +255,7 @@ fn sampled(light: &Light, count: u32) -> MeanEstimate {
 #[track_caller]
 fn assert_same_irradiance(name: &str, light: &Light, source: &PhotonEmitter, shape: Option<&Shape>) {
     let expected = sampled(light, 1 << 12);
-    let greatest_error = if light.emission_texture().is_some() { 5e-3 } else { 3e-3 };
+    let greatest_error = if light.emission_modulation().is_some() { 5e-3 } else { 3e-3 };
     assert!(expected.mean > 0.0, "{name}");
     let around = BoundingSphere { radius: DISK.radius * 1.001, ..DISK };
     let beside = BoundingSphere { center: DISK.center + DVec3::new(0.1, 0.0, 0.05), radius: 0.15 };
@@ -463,13 +463,14 @@ fn aimed_pdfs_integrate_to_one() {
 
 #[test]
 fn lights_are_chosen_by_power() {
-    let lamp = |i: u32| {
+    let light_at = |i: u32| {
         let intensity = Vec3::new(0.5 + (i % 7) as f32, 1.0, 0.0);
         let position = DVec3::new(f64::from(i % 100), f64::from(i / 100), 0.0);
         Light::Point(PointLight { position, intensity, falloff: Falloff::Square })
     };
-    let lights =
-        Arc::new(Lights::new((0..10_000).map(lamp).collect(), &CancelToken::new()).expect("never canceled"));
+    let lights = Arc::new(
+        Lights::new((0..10_000).map(light_at).collect(), &CancelToken::new()).expect("never canceled"),
+    );
     let source = PhotonEmitter::new(&lights, |_| None, SCENE).expect("power");
     let (mut next, mut counts) = (numbers(random::unit_generator(8)), [0.0; 7]);
     let power = source.total_light_power();

@@ -449,7 +449,7 @@ fn mesh_pdf_matches_its_samples() {
             object: 4,
             part: EmittingTriangleSelection::Listed,
             bounds,
-            texture: None,
+            modulation: None,
         };
         let (mut next, mut compared) = (random::unit_generator(5), 0);
         for _ in 0..2000 {

@@ -171,12 +171,13 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
                     }
                     Some(_) | None => [[0.0; PACKET_SIZE]; 2],
                 };
-                let samples = light.sample_untextured_packet(&self.row.from, &self.row.normal, self.used, &u);
+                let samples =
+                    light.sample_unmodulated_packet(&self.row.from, &self.row.normal, self.used, &u);
                 let (mut values, active, response) =
                     self.unoccluded_contributions(&samples, 1.0 / count as f32, simd);
                 // Multiply by the emission texture.
-                if let Some(pattern) = light.emission_texture() {
-                    values = self.apply_emission_texture(pattern, &samples, active, values);
+                if let Some(pattern) = light.emission_modulation() {
+                    values = self.apply_emission_modulation(pattern, &samples, active, values);
                     sums.rays.lookups += u64::from(active.count_ones());
                 }
                 let mut fraction = self.splits_lobes.then(|| response.bsdf.wide_fraction());
@@ -239,10 +240,10 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         values
     }
 
-    /// Multiplies values by the emission texture at the sampled points.
+    /// Multiplies values by the emission modulation at the sampled points.
     #[cold]
     #[inline(never)]
-    fn apply_emission_texture(
+    fn apply_emission_modulation(
         &self,
         pattern: &EmissionModulation,
         samples: &LightSamplePacket,

@@ -358,22 +358,23 @@ fn radius_for_neighbor_count(
 
 /// Closed glass shapes and other glass solids that may contain lights.
 fn light_enclosing_glass_candidates(world: &World) -> (Vec<u32>, Vec<CompoundSolid>) {
-    let lamps = world.finite_light_boxes();
-    let may_hold_light = |object: &u32| {
+    let light_boxes = world.finite_light_boxes();
+    let may_contain_light = |object: &u32| {
         let bounds = world.geometry.objects()[*object as usize].bounds();
-        bounds.is_none_or(|bounds| lamps.iter().any(|lamp| lamp.may_light_intersect_box(&bounds)))
+        bounds.is_none_or(|bounds| light_boxes.iter().any(|light| light.may_light_intersect_box(&bounds)))
     };
-    let closed = world.closed_glass_shapes().map(|(object, _)| object).filter(may_hold_light).collect();
+    let closed = world.closed_glass_shapes().map(|(object, _)| object).filter(may_contain_light).collect();
     // A solid closed by opaque surfaces may extend beyond its bounding box, so test the center and corners of
     // each light.
-    let is_around = |body: &CompoundSolid, lamp: &LightBoundingBoxes| {
-        lamp.smaller_box_center_and_corners()
-            .any(|point| world.enclosing_glass_material(body, point, lamp.object).is_some())
+    let is_around = |body: &CompoundSolid, light: &LightBoundingBoxes| {
+        light
+            .smaller_box_center_and_corners()
+            .any(|point| world.enclosing_glass_material(body, point, light.object).is_some())
     };
     let mut bodies = world.compound_solids();
     bodies.retain(|body| {
-        lamps.iter().any(|lamp| {
-            lamp.may_light_intersect_box(&body.bounds) || body.is_covered && is_around(body, lamp)
+        light_boxes.iter().any(|light| {
+            light.may_light_intersect_box(&body.bounds) || body.is_covered && is_around(body, light)
         })
     });
     (closed, bodies)

@@ -68,21 +68,21 @@ impl TileContext<'_> {
         known: &InteriorList,
         found: &[CoincidentOrEnclosingSurface],
     ) -> (Option<[InteriorList; 2]>, InteriorList) {
-        let is_told_by_record = |glass: Interior| !self.world.is_closed_shape(glass.body);
+        let is_only_recorded = |glass: Interior| !self.world.is_closed_shape(glass.body);
         // With only closed shapes, most rays enter at most one shape.
         if !self.world.has_open_glass() {
             match *found {
-                [] => return (None, known.retained(is_told_by_record)),
+                [] => return (None, known.retained(is_only_recorded)),
                 [CoincidentOrEnclosingSurface::Around { object, material }] => {
                     let entered = Interior { body: object, material };
-                    return (None, known.retained(is_told_by_record).entered(entered));
+                    return (None, known.retained(is_only_recorded).entered(entered));
                 }
                 [CoincidentOrEnclosingSurface::Surface { .. }] | [_, _, ..] => {}
             }
         }
         // Start with the recorded media, without open solids.
         let (mut arrived, mut near) = (*known, self.interiors_without_open_solids(*known));
-        let mut far = near.retained(is_told_by_record);
+        let mut far = near.retained(is_only_recorded);
         let crossed = |as_front: bool| {
             found.iter().filter_map(move |surface_or_solid| match *surface_or_solid {
                 CoincidentOrEnclosingSurface::Surface { hit, material, is_front } if is_front == as_front => {
