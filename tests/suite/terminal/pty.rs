@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 
 use glimt::tui::messages;
 
-use super::relay::{Relay, Responder, Scanner, Seen};
+use super::relay::{Relay, Responder, Scanner, Traffic};
 use crate::test_dir::{PROGRAM, TestDir};
 use nix::sys::signal::{Signal, kill};
 use nix::sys::termios::LocalFlags;
@@ -288,7 +288,7 @@ impl Terminal {
     }
 
     /// Traffic of the slow connection.
-    pub fn line<T>(&self, what: impl FnOnce(&Seen) -> T) -> T {
+    pub fn line<T>(&self, what: impl FnOnce(&Traffic) -> T) -> T {
         let relay = self.relay.as_ref().expect("a thin line");
         what(&relay.seen.lock().expect("no panic"))
     }
