@@ -29,7 +29,7 @@ pub(super) const TICK: Duration = Duration::from_millis(20);
 
 /// Minimum time between two reports from a thread. Waking the calling thread takes longer than the smallest
 /// jobs.
-const AT_ONCE: Duration = Duration::from_micros(300);
+const MIN_REPORT_INTERVAL: Duration = Duration::from_micros(300);
 
 /// State shared by all jobs.
 #[derive(Clone, Copy)]
@@ -114,7 +114,7 @@ impl Tracer<'_> {
                         && let Ok((samples, cost)) = self.trace_tile(job)
                     {
                         done.push((job, keep(job, samples), cost));
-                        if since.elapsed() >= AT_ONCE {
+                        if since.elapsed() >= MIN_REPORT_INTERVAL {
                             if sender.send(std::mem::take(&mut done)).is_err() {
                                 return;
                             }
@@ -167,9 +167,9 @@ pub(super) fn samples_after_next_pass(done: u32, total: u32, pixels: usize) -> u
 
 /// Returns the number of samples per pixel in the longest pass.
 fn max_pass_samples(pixels: usize) -> u32 {
-    const LONGEST: usize = 32;
+    const MAX_PASS_SAMPLES: usize = 32;
     const TILE: usize = (TILE_SIZE * TILE_SIZE) as usize;
-    (LONGEST * (TILE / pixels.clamp(1, TILE))) as u32
+    (MAX_PASS_SAMPLES * (TILE / pixels.clamp(1, TILE))) as u32
 }
 
 /// Estimates the number of jobs needed to take a pixel from `done` to `total` samples using

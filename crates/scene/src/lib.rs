@@ -32,7 +32,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 pub use self::toml::{BuiltDocument, BuiltValue, quote_toml_string};
-pub use changes::{MOST_COMPARED_BYTES, list_changes};
+pub use changes::{MAX_COMPARED_BYTES, list_changes};
 use description::{Camera, ResolvedCamera, Scene};
 use diagnostic::{Diagnostic, Severity};
 pub use document::MORE_LIKE_THESE;

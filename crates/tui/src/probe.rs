@@ -69,7 +69,7 @@ impl TerminalProbeResult {
 }
 
 /// Timeout for the terminal's replies.
-const PATIENCE: Duration = Duration::from_secs(1);
+const REPLY_TIMEOUT: Duration = Duration::from_secs(1);
 
 /// Queries the terminal. Returns `None` if stdin or stdout is not a terminal.
 ///
@@ -151,7 +151,7 @@ fn read_replies_until(
     let stdin = io::stdin();
     let mut bytes = [0; 4096];
     while !is_all(replies) {
-        let rest = PATIENCE.saturating_sub(begin.elapsed());
+        let rest = REPLY_TIMEOUT.saturating_sub(begin.elapsed());
         let timeout = PollTimeout::try_from(rest).unwrap_or(PollTimeout::ZERO);
         let mut ends = [PollFd::new(stdin.as_fd(), PollFlags::POLLIN)];
         if rest.is_zero() || poll(&mut ends, timeout)? == 0 {

@@ -30,7 +30,7 @@ use crate::system::threads::spawn;
 /// Grace period for the event loop to exit after a signal.
 const GRACE: Duration = Duration::from_millis(1500);
 /// Time allowed for a stalled terminal to accept the bytes that restore it.
-const RESCUE: Duration = Duration::from_millis(100);
+const RESTORE_TIME_LIMIT: Duration = Duration::from_millis(100);
 /// How often to check that the terminal still exists.
 const WATCH: Duration = Duration::from_millis(500);
 
@@ -277,7 +277,7 @@ fn exit_after_grace_period(signal: Signal, status: ExitStatus, over: &AtomicBool
             return;
         }
         terminal::restore_from_other_thread();
-        thread::sleep(RESCUE);
+        thread::sleep(RESTORE_TIME_LIMIT);
     }
     terminal::restore_modes();
     low_level::exit(i32::from(status.0));

@@ -44,7 +44,7 @@ const DARKEST: f32 = 0.1;
 const QUARTER: f32 = 0.25;
 
 /// Minimum bias, which limits the steepness of the curve.
-const LEAST_BIAS: f32 = 1e-3;
+const MIN_BIAS: f32 = 1e-3;
 
 impl RangeMap {
     /// Sets the range from the values in an image.
@@ -94,7 +94,7 @@ impl DataRange {
         let (_, &mut median, _) = seen.select_nth_unstable_by(middle, f32::total_cmp);
         let place = linear.position_in_range(median);
         let bias = (1.0 - QUARTER) / QUARTER * place / (1.0 - place).max(f32::MIN_POSITIVE);
-        Self { bias: bias.clamp(LEAST_BIAS, 1.0), ..linear }
+        Self { bias: bias.clamp(MIN_BIAS, 1.0), ..linear }
     }
 
     /// Minimum and maximum of the range.

@@ -78,7 +78,7 @@ impl SimdBounds {
 /// slow on some processors.
 const NORMAL: u32 = 1 << 29;
 
-const _: () = assert!(TriangleMesh::MOST_TRIANGLES < 1 << 29);
+const _: () = assert!(TriangleMesh::MAX_TRIANGLES < 1 << 29);
 
 /// A triangle id and the bounding box of the triangle clipped to a cell.
 #[derive(Clone, Copy, Debug)]

@@ -48,7 +48,7 @@ impl VertexNormalGroup {
 impl TriangleMesh {
     /// Maximum number of triangles. Triangle indices must fit in the nodes of every tree type, even after
     /// triangle splitting.
-    pub const MOST_TRIANGLES: u32 = 1 << 27;
+    pub const MAX_TRIANGLES: u32 = 1 << 27;
 
     /// Corners of a triangle.
     #[inline]

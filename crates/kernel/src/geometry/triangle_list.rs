@@ -33,7 +33,7 @@ use crate::math::lanes::{Mask, Simd, TRUE, select, select_u32, set_lane};
 use crate::math::{DVec3, Vec3};
 
 /// Maximum number of triangles in a [`TriangleList`].
-pub const MOST: usize = 64;
+pub const MAX_TRIANGLES: usize = 64;
 
 /// Error of the intersection with a plane, relative to the largest coordinate.
 const PLANE: f32 = 128.0 * UNIT_ROUNDOFF;
@@ -45,10 +45,10 @@ const ALONG: [f32; 2] = [256.0 * UNIT_ROUNDOFF, 2048.0 * UNIT_ROUNDOFF];
 const ACROSS: f32 = 1024.0 * UNIT_ROUNDOFF;
 
 /// Maximum coordinate error at which a miss is still certain.
-const BLUNT: f32 = 0.125;
+const MAX_CERTAIN_ERROR: f32 = 0.125;
 
 /// Maximum product of a triangle's D/(2A) and the extent of all triangles.
-const MOST_SLENDER: f64 = 1e3;
+const MAX_SLENDERNESS: f64 = 1e3;
 
 /// Placeholder index that excludes no triangle.
 const NONE: u32 = u32::MAX;
@@ -127,9 +127,9 @@ impl TriangleList {
         let points = || corners.iter().flatten().copied();
         let (low, high) = (points().reduce(Vec3::min)?, points().reduce(Vec3::max)?);
         let size = (high - low).max_element();
-        let is_fit = |of: &[Vec3; 3]| slenderness(of)[0] * f64::from(size) <= MOST_SLENDER;
+        let is_fit = |of: &[Vec3; 3]| slenderness(of)[0] * f64::from(size) <= MAX_SLENDERNESS;
         let is_finite = size.is_finite() && size > 1e-9 && low.abs().max(high.abs()).max_element() < 1e9;
-        if corners.len() > MOST || !is_finite || !corners.iter().all(is_fit) {
+        if corners.len() > MAX_TRIANGLES || !is_finite || !corners.iter().all(is_fit) {
             return None;
         }
         let reach = low.abs().max(high.abs()).max_element();
@@ -269,7 +269,7 @@ impl TriangleList {
                     | (t + error < 0.0)
                     | (least > ends[i]);
                 let is_far = above.abs() > simd.mul_add_relaxed(falls.abs(), end[i], distance);
-                let is_sharp = margin < BLUNT;
+                let is_sharp = margin < MAX_CERTAIN_ERROR;
                 // Decide which of the facet's triangles is hit.
                 let number = other ^ (between & if over < 0.0 { TRUE } else { 0 });
                 let is_sure = is_sharp & (over.abs() > split * margin);

@@ -11,7 +11,7 @@ pub(super) const FOV: f64 = 30.0;
 const FILLED: f64 = 0.88;
 
 /// Minimum model size.
-const LEAST: f64 = 1e-30;
+const MIN_SIZE: f64 = 1e-30;
 
 /// Maximum number of turntable frames for which to measure the model. More would not change the result
 /// noticeably.
@@ -64,9 +64,9 @@ pub(super) fn frame_model(
             distance = distance.max(near + (across / (tangent * aspect)).max(upwards / tangent));
         }
     }
-    let distance = distance.max(LEAST);
+    let distance = distance.max(MIN_SIZE);
     // Drop digits that make no visible difference.
-    let size = half.length().max(LEAST);
+    let size = half.length().max(MIN_SIZE);
     let step = size * 1e-4;
     let tidy = |at: DVec3| DVec3::from(at.to_array().map(|part| round_to_decimals_of_step(part, step)));
     CameraPose { position: tidy(middle + back * distance), look_at: tidy(middle), up }

@@ -109,8 +109,8 @@ impl Lighting {
     /// Creates lighting that uses the file's lights. `irradiance` is their irradiance on the model.
     pub(super) fn from_file_light_irradiance(irradiance: f64) -> Self {
         // At this irradiance, a white surface is as bright as under the default lights.
-        const USUAL: f64 = 3.0;
-        let over = (irradiance / USUAL).max(1.0);
+        const USUAL_IRRADIANCE: f64 = 3.0;
+        let over = (irradiance / USUAL_IRRADIANCE).max(1.0);
         // Keep the sky's radiance in the valid range even if a light is very close.
         const MAX_STOPS: f64 = 40.0;
         Self::FromFile { exposure: -(libm::log2(over).min(MAX_STOPS) * 10.0).round() / 10.0 }

@@ -118,10 +118,10 @@ impl<'a> CoarseImageRenderer<'a> {
 /// if rendering at the usual size is about as fast.
 fn size_for_time_budget(width: u32, height: u32, rate: f64) -> Option<(u32, u32)> {
     /// Minimum width in pixels.
-    const LEAST: f64 = 16.0;
+    const MIN_WIDTH: f64 = 16.0;
     let share = (rate * MOVING_TIME_BUDGET.as_secs_f64() / (f64::from(width) * f64::from(height))).sqrt();
     let side =
-        |length: u32| ((f64::from(length) * share.max(LEAST / f64::from(width))).round() as u32).max(1);
+        |length: u32| ((f64::from(length) * share.max(MIN_WIDTH / f64::from(width))).round() as u32).max(1);
     (share < 0.8).then(|| (side(width).min(width), side(height).min(height)))
 }
 

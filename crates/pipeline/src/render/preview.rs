@@ -15,7 +15,7 @@ use crate::protocol::{ImagePosition, MaxPreviewSize, NormalizedRect, PreviewedIm
 use crate::sink::EventSink;
 
 /// Maximum time spent on updating a preview before checking for commands.
-const PATIENCE: Duration = Duration::from_millis(4);
+const UPDATE_TIME_LIMIT: Duration = Duration::from_millis(4);
 
 /// Sender of previews to the front end.
 #[derive(Clone, Copy)]
@@ -144,7 +144,7 @@ impl PreviewSender<'_> {
 fn update_previewer_briefly(state: &mut FilmState, quantity: FilmQuantity, width: u32, height: u32) -> bool {
     state.previewer.take_if(|it| it.size() != (width, height) || it.quantity() != quantity);
     let previewer = state.previewer.get_or_insert_with(|| Previewer::for_quantity(quantity, width, height));
-    previewer.refresh_changed_tiles(&state.film, Some(Instant::now() + PATIENCE))
+    previewer.refresh_changed_tiles(&state.film, Some(Instant::now() + UPDATE_TIME_LIMIT))
 }
 
 /// Returns the largest size that fits into the bounds and keeps the aspect ratio.

@@ -10,7 +10,7 @@ use super::coarse_image::CoarseImageRenderer;
 use super::commands::RenderCommands;
 use super::film_state::{EarlierProcessWork, FilmState};
 use super::forecast::{Forecast, RenderSnapshot};
-use super::noise_goals::LEAST;
+use super::noise_goals::MIN_SAMPLES;
 use super::preview::PreviewSender;
 use super::share::Shard;
 use super::time_budget::next_round_goals;
@@ -165,12 +165,12 @@ impl<'s, 'a> Scheduler<'s, 'a> {
             self.run_due_tasks();
         }
         let RenderOptions { samples, error, .. } = self.rendering.plan.settings.render;
-        if error > 0.0 && samples >= LEAST && self.state.share.is_some() {
+        if error > 0.0 && samples >= MIN_SAMPLES && self.state.share.is_some() {
             self.estimate_reference_brightness()?;
         }
         if let Some(first) = self.priority_rect() {
             // Noise is relative to the brightness of the whole image, so sample the whole image first.
-            let of_all = if error > 0.0 { LEAST.min(samples) } else { 1 };
+            let of_all = if error > 0.0 { MIN_SAMPLES.min(samples) } else { 1 };
             self.run_passes(None, of_all)?;
             self.run_passes(Some(first), samples)?;
         }
@@ -218,7 +218,7 @@ impl<'s, 'a> Scheduler<'s, 'a> {
         let RenderOptions { samples, error, .. } = self.rendering.plan.settings.render;
         let done = self.state.min_unfinished_samples_in(part, samples);
         // With fewer samples, no goals are decided.
-        if error > 0.0 && (LEAST..samples).contains(&done) && done.is_power_of_two() {
+        if error > 0.0 && (MIN_SAMPLES..samples).contains(&done) && done.is_power_of_two() {
             self.rendering.tracer.pool.install(|| self.state.decide_goals(done, error.into()));
         }
     }

@@ -12,7 +12,7 @@
 use crate::film::Film;
 
 /// Minimum number of samples for noise estimates.
-const LEAST: u32 = 16;
+const MIN_SAMPLES: u32 = 16;
 
 /// Minimum number of samples per pixel, as a fraction of the mean. Noise is estimated from these samples.
 const SHARE: f64 = 1.0 / 8.0;
@@ -31,7 +31,7 @@ pub(crate) fn next_round_goals(
     rays: &[u64],
     most: u32,
 ) -> Option<Vec<[u32; 2]>> {
-    let least = done.as_flattened().iter().copied().min().filter(|least| *least >= LEAST.min(most))?;
+    let least = done.as_flattened().iter().copied().min().filter(|least| *least >= MIN_SAMPLES.min(most))?;
     // Every half has at least this many samples, regardless of earlier goals.
     let known = 1 << least.ilog2();
     let halves = half_cells_with_costs(film, done, rays, known, most)?;

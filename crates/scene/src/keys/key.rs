@@ -198,7 +198,7 @@ impl DefaultValue {
 }
 
 /// Upper bound for integer keys without a specific limit.
-pub(crate) const MOST_WHOLE: u64 = u32::MAX as u64;
+pub(crate) const MAX_INTEGER: u64 = u32::MAX as u64;
 
 /// Three coordinates.
 pub(crate) const POINT: ValueKind = ValueKind::Numbers(3, "point", Limits::Any);

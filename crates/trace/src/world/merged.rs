@@ -23,7 +23,7 @@ const MAX_PER_MESH: usize = 1 << 14;
 const MAX_TOTAL: usize = 1 << 17;
 
 /// Maximum triangle count at which packets test all triangles without a tree.
-const MAX_FACETS: usize = triangle_list::MOST;
+const MAX_FACETS: usize = triangle_list::MAX_TRIANGLES;
 
 /// Maximum coordinate of a merged mesh, relative to its size. Beyond this, rounding would distort the mesh.
 const MAX_RELATIVE_COORDINATE: f32 = 1024.0;

@@ -12,10 +12,10 @@ use crate::mosaic::{FittedCell, TwoPartBlockPattern};
 use ratatui::style::Color;
 
 /// How strongly dithering favors inks close to the target color on 256-color and 16-color terminals.
-const CALM_256: f32 = 3.0;
-const CALM_16: f32 = 3.0;
+const CLOSENESS_256: f32 = 3.0;
+const CLOSENESS_16: f32 = 3.0;
 /// How strongly dithering favors inks close to the target color in cells whose halves are drawn separately.
-const CALM_EDGES: f32 = 200.0;
+const CLOSENESS_EDGES: f32 = 200.0;
 /// Squared Oklab distance above which the two halves of a cell are drawn separately. Below it, a shade
 /// character approximates their mean color.
 const EDGE: f32 = 0.01;
@@ -58,7 +58,7 @@ impl ColorMapper {
                 let inks = (palette::FIRST_FIXED..=u8::MAX)
                     .filter_map(palette::fixed_palette_color)
                     .map(SolidOrPatternColor::solid);
-                shades.plain = RefCell::new(DitherRecipeCache::new(inks.collect(), CALM_256));
+                shades.plain = RefCell::new(DitherRecipeCache::new(inks.collect(), CLOSENESS_256));
             }
             ColorDepth::Ansi16 => {
                 let inks: Vec<SolidOrPatternColor> =
@@ -70,8 +70,8 @@ impl ColorMapper {
                         SolidOrPatternColor::from_two_color_pattern(front, back, LEVELS[level])
                     })
                 });
-                shades.mixed = RefCell::new(DitherRecipeCache::new(mixed.collect(), CALM_16));
-                shades.plain = RefCell::new(DitherRecipeCache::new(inks, CALM_EDGES));
+                shades.mixed = RefCell::new(DitherRecipeCache::new(mixed.collect(), CLOSENESS_16));
+                shades.plain = RefCell::new(DitherRecipeCache::new(inks, CLOSENESS_EDGES));
             }
         }
         shades

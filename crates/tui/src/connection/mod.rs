@@ -32,10 +32,10 @@ const MIN_WINDOW: f64 = 1_500.0;
 const MAX_QUEUE: Duration = Duration::from_millis(60);
 /// Timeout for the terminal's first reply.
 const REPLY_TIMEOUT: Duration = Duration::from_secs(1);
-/// Outstanding replies are considered lost after this time or `SILENCE_ROUND_TRIPS` round trips, whichever is
+/// Outstanding replies are considered lost after this time or `LOST_REPLY_ROUND_TRIPS` round trips, whichever is
 /// longer.
-const SILENCE: Duration = Duration::from_secs(1);
-const SILENCE_ROUND_TRIPS: u32 = 4;
+const LOST_REPLY_TIMEOUT: Duration = Duration::from_secs(1);
+const LOST_REPLY_ROUND_TRIPS: u32 = 4;
 /// A terminal is fast if it replied to most of the last `RECENT_SLICES` slices within this time.
 const FAST_REPLY: Duration = Duration::from_millis(20);
 const RECENT_SLICES: usize = 8;
@@ -258,7 +258,7 @@ impl TerminalFlowControl {
 
     /// How long to wait before considering missing replies lost.
     fn lost_reply_timeout(&self) -> Duration {
-        SILENCE.max(self.round_trips.minimum().unwrap_or_default() * SILENCE_ROUND_TRIPS)
+        LOST_REPLY_TIMEOUT.max(self.round_trips.minimum().unwrap_or_default() * LOST_REPLY_ROUND_TRIPS)
     }
 
     fn clear_in_flight(&mut self) {

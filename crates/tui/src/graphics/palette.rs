@@ -14,9 +14,9 @@ use crate::film::Srgb8Image;
 const MAX: usize = 240;
 /// Histogram bits per channel.
 const BITS: u32 = 6;
-/// An existing palette is reused while its RMS error is at most `WORSE` times a new palette's error, plus
+/// An existing palette is reused while its RMS error is at most `MAX_ERROR_RATIO` times a new palette's error, plus
 /// `ALLOWED` code values.
-const WORSE: f64 = 1.2;
+const MAX_ERROR_RATIO: f64 = 1.2;
 const ALLOWED: f64 = 1.5;
 
 /// Palette colors for an image.
@@ -32,7 +32,7 @@ impl Palette {
         let mut bins = histogram(picture);
         let colors = choose_palette_colors(&mut bins);
         let fits = |palette: &Self| {
-            palette_error(&bins, &palette.colors) <= WORSE * palette_error(&bins, &colors) + ALLOWED
+            palette_error(&bins, &palette.colors) <= MAX_ERROR_RATIO * palette_error(&bins, &colors) + ALLOWED
         };
         before.filter(fits).unwrap_or_else(|| Self { dither: PaletteDither::new(&colors), colors })
     }

@@ -22,7 +22,7 @@ const LONE_ESCAPE: Duration = Duration::from_millis(50);
 const SEQUENCE: Duration = Duration::from_secs(1);
 /// Maximum duration and length of a sequence. Without these limits, a key press such as alt-`]`, which looks
 /// like the start of a sequence, would block all further input.
-const LONGEST: Duration = Duration::from_secs(2);
+const MAX_DURATION: Duration = Duration::from_secs(2);
 const MAX_BYTES: usize = 4096;
 /// Maximum delay of a `[` after its escape character, which has already been treated as a key press.
 const LATE_SEQUENCE: Duration = Duration::from_secs(2);
@@ -88,7 +88,9 @@ impl Decoder {
             PendingSequence::Nothing => None,
             PendingSequence::Escape => after(LONE_ESCAPE),
             PendingSequence::StringEnd => after(SEQUENCE),
-            PendingSequence::Sequence { begin, .. } => after(SEQUENCE).map(|end| end.min(*begin + LONGEST)),
+            PendingSequence::Sequence { begin, .. } => {
+                after(SEQUENCE).map(|end| end.min(*begin + MAX_DURATION))
+            }
             PendingSequence::Doubtful(_) => after(DOUBT_TIMEOUT),
             PendingSequence::Paste(paste) => Some(paste.deadline()),
         }

@@ -8,7 +8,7 @@ use crate::color::nearest_256;
 /// Maximum number of candidates for each part, and for filling both parts with one color.
 const MAX: usize = 6;
 /// Maximum number of cells that a candidate may cover.
-const LONGEST: usize = 8;
+const MAX_CELLS: usize = 8;
 
 /// First palette entry used as a candidate. Base16 themes with 22 colors overwrite the first six entries of
 /// the color cube, so only the remaining entries are used.
@@ -77,7 +77,7 @@ struct RunColorRange {
 /// becomes empty.
 fn shared_color_range(wanted: impl Iterator<Item = TerminalColor>, span: u8) -> RunColorRange {
     let mut common = RunColorRange { low: [0; 3], high: [255; 3], sum: [0; 3], count: 0 };
-    for shade in wanted.take(LONGEST) {
+    for shade in wanted.take(MAX_CELLS) {
         let TerminalColor::Rgb(rgb) = shade else { break };
         let low = std::array::from_fn(|i| common.low[i].max(rgb[i].saturating_sub(span)));
         let high = std::array::from_fn(|i| common.high[i].min(rgb[i].saturating_add(span)));

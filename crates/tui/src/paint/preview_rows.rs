@@ -17,7 +17,7 @@ const ROW_BYTES: u32 = 4;
 /// Factor by which the cost per byte changes between attempts.
 const STEP: f32 = 1.6;
 /// Cost per byte above which no further bytes can be saved.
-const DEAREST: f32 = 4000.0;
+const MAX_BYTE_COST: f32 = 4000.0;
 
 /// Byte budget for a first preview.
 #[derive(Clone, Copy, Debug)]
@@ -44,7 +44,7 @@ impl FirstPreviewByteBudget {
         loop {
             let found = plan_row(targets, start, self.model);
             let bytes = found.bytes + ROW_BYTES;
-            if bytes <= self.bytes || self.model.byte > DEAREST {
+            if bytes <= self.bytes || self.model.byte > MAX_BYTE_COST {
                 self.bytes = self.bytes.saturating_sub(bytes);
                 return found;
             }

@@ -16,7 +16,7 @@ use crate::pipeline::protocol::{
     AssetProgress, CheckpointUpdate, Event, Failure, LastValidSceneRenderOutcome, Report, SampleCounts,
     SavedSceneImageState, Stage, StageReport, Status,
 };
-use crate::scene::MOST_COMPARED_BYTES;
+use crate::scene::MAX_COMPARED_BYTES;
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::sanitize::escape_invisible_chars;
 use crate::state::{
@@ -145,7 +145,7 @@ pub(super) fn handle_worker_event(state: &mut State, event: Event) -> Vec<Effect
             | CheckpointUpdate::Ignored { .. } => {}
         },
         Event::Refused { conflicts, .. } => show_write_conflicts(state, conflicts),
-        Event::Text { text, .. } => state.request.text = (text.len() <= MOST_COMPARED_BYTES).then_some(text),
+        Event::Text { text, .. } => state.request.text = (text.len() <= MAX_COMPARED_BYTES).then_some(text),
         Event::WritePostponed { .. } => {
             show_notice(state, messages::WRITE_POSTPONED);
         }

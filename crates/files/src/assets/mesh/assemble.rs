@@ -52,7 +52,7 @@ pub(super) fn assemble_text_mesh(
     if has_separate_corners {
         faces.merge_coincident_vertices(&positions, source.monitor.token)?;
     }
-    let most_triangles = TriangleMesh::MOST_TRIANGLES as usize;
+    let most_triangles = TriangleMesh::MAX_TRIANGLES as usize;
     let mut cutter = FaceTriangulator::new(&positions, &face_materials, most_triangles);
     cutter.add_all_faces(source, &faces)?;
     let FaceTriangulator { triangles, triangle_materials, dropped, crossing, .. } = cutter;

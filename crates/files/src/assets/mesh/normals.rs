@@ -88,7 +88,7 @@ fn first_vertex_with_same_normal(groups: &[VertexNormalGroup]) -> Vec<usize> {
 pub(crate) fn is_polyhedral_without_normals(mesh: &TriangleMesh) -> bool {
     /// Minimum length of the mean unit normal around a vertex on a smooth surface. It corresponds to normals
     /// that form a cone with a half-angle of 32 degrees.
-    const LEAST: f32 = 0.85;
+    const MIN_MEAN_LENGTH: f32 = 0.85;
     let groups = &mesh.normal_groups;
     if !mesh.normals.is_empty() || groups.iter().any(|group| group.group != VertexNormalGroup::BY_ANGLE) {
         return false;
@@ -108,7 +108,7 @@ pub(crate) fn is_polyhedral_without_normals(mesh: &TriangleMesh) -> bool {
     let means = sums.iter().filter(|(_, count)| *count > 0).map(|(sum, count)| sum.length() / *count as f32);
     let (total, vertices) =
         means.fold((0.0, 0), |(total, vertices), mean| (total + f64::from(mean), vertices + 1));
-    total < f64::from(LEAST) * f64::from(vertices)
+    total < f64::from(MIN_MEAN_LENGTH) * f64::from(vertices)
 }
 
 /// Replaces zero normals with computed vertex normals.

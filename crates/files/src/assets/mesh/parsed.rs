@@ -65,7 +65,7 @@ impl Faces {
     }
 
     /// Maximum number of corners, limited by 32-bit vertex indices.
-    pub(crate) const MOST_CORNERS: usize = u32::MAX as usize;
+    pub(crate) const MAX_CORNERS: usize = u32::MAX as usize;
 
     /// Index of the face that contains a corner.
     pub(super) fn face_of_corner(&self, corner: usize) -> usize {

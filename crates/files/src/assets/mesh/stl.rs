@@ -197,7 +197,7 @@ impl TextReader<'_> {
             } else if !(is("facet") || is("outer") || is("endfacet")) {
                 return self.fail_with_line(start, expected_message(KEYWORD, word));
             }
-            if parsed.positions.len() > Faces::MOST_CORNERS {
+            if parsed.positions.len() > Faces::MAX_CORNERS {
                 return self
                     .fail_with_line(start, "too many corners for one mesh; split it into several files");
             }

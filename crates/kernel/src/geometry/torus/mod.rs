@@ -15,7 +15,7 @@ use crossing::UnitTorusLine;
 
 /// Margin around a torus, relative to the tube radius. It ensures that the searched interval of a line starts
 /// outside the torus.
-const ROOM: f64 = 0.01;
+const MARGIN: f64 = 0.01;
 
 /// All points whose distance from a circle around an axis equals the tube radius. The front is outside.
 ///
@@ -50,7 +50,7 @@ impl Torus {
 
     fn intersect_f64(&self, ray: &RayF64) -> Option<(f64, u32)> {
         let (line, unit_line, unit) = self.unit_line(ray);
-        let (enter, leave) = unit_line.nearby_interval(ROOM)?;
+        let (enter, leave) = unit_line.nearby_interval(MARGIN)?;
         let from = enter.max(-line.start / unit);
         if !(line.start + from * unit <= ray.t_max) {
             return None;
@@ -75,7 +75,7 @@ impl Torus {
     /// Values of t (at most two) at which a ray that starts outside enters the torus.
     pub fn entry_parameters(&self, ray: &RayF64) -> [Option<f64>; 2] {
         let (line, unit_line, unit) = self.unit_line(ray);
-        let Some((enter, leave)) = unit_line.nearby_interval(ROOM) else { return [None; 2] };
+        let Some((enter, leave)) = unit_line.nearby_interval(MARGIN) else { return [None; 2] };
         let from = enter.max(-line.start / unit);
         unit_line.surface_entry_parameters(from, leave).map(|entry| entry.map(|s| line.start + s * unit))
     }

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use super::work_rate::WorkAmount;
 use crate::film::{Film, ImageNoiseAndConvergence};
 use crate::protocol::NoisePrediction;
-use crate::render::noise_goals::LEAST;
+use crate::render::noise_goals::MIN_SAMPLES;
 
 /// Minimum time before the first measurement and between measurements, each of which requires a sum over all
 /// pixels.
@@ -37,7 +37,7 @@ impl NoiseTracker {
 
     /// Measures the noise if a measurement is due. `samples` is the minimum number of samples per pixel.
     pub(crate) fn measure_if_due(&mut self, film: &Film, samples: u32, done: f64, seconds: f64) {
-        if samples < LEAST || Instant::now() < self.due {
+        if samples < MIN_SAMPLES || Instant::now() < self.due {
             return;
         }
         self.last_measurement = film.image_noise().map(|noise| NoiseMeasurement { noise, done, seconds });

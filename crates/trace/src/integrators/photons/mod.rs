@@ -321,14 +321,14 @@ fn radius_for_neighbor_count(
     token: &CancelToken,
 ) -> Result<f32, Canceled> {
     /// Maximum number of photons examined.
-    const MOST: usize = 1 << 14;
+    const MAX_EXAMINED: usize = 1 << 14;
     const LOOKS: usize = 256;
     /// Number of neighbors to find among the examined photons.
     const NEAR: f32 = 12.0;
     /// Maximum radius, and default radius for too few photons, both relative to the scene's radius.
     const LARGEST: f32 = 0.05;
     const BY_DEFAULT: f32 = 0.02;
-    let step = photons.len().div_ceil(MOST).max(1);
+    let step = photons.len().div_ceil(MAX_EXAMINED).max(1);
     let some: Vec<Photon> = photons.iter().step_by(step).copied().collect();
     let bounds = some.iter().fold(Aabb::EMPTY, |all, one| all.union(Aabb { min: one.point, max: one.point }));
     let extent = (bounds.max - bounds.min).length();

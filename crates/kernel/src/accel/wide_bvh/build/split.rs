@@ -4,7 +4,7 @@
 use rayon::prelude::*;
 
 use crate::accel::reference::{SimdBounds, TriangleReference};
-use crate::accel::wide_bvh::node::{MOST_PACKS, PACK};
+use crate::accel::wide_bvh::node::{MAX_PACKS, PACK};
 use crate::accel::wide_bvh::simd;
 use crate::math::Vec4;
 
@@ -102,7 +102,7 @@ fn choose_split(
     level: u32,
 ) -> (Option<Split>, bool) {
     let count = references.len();
-    let must = count > PACK * MOST_PACKS as usize;
+    let must = count > PACK * MAX_PACKS as usize;
     let ReferenceBounds { bounds, centroids } = boxes;
     let bins = BinMapping::new(centroids, count);
     let best = if level >= SURFACE_AREA_LEVELS {

@@ -10,7 +10,7 @@ use crate::math::Vec3;
 use crate::math::elementary::exp2;
 
 /// Maximum number of additional references as a fraction of the number of triangles.
-const MOST_MORE: f64 = 0.3;
+const MAX_ADDITIONAL: f64 = 0.3;
 
 /// Number of levels in the grid of planes. The grid has 2^`LEVELS` cells along each axis.
 const LEVELS: u32 = 20;
@@ -30,7 +30,7 @@ pub fn split_large_triangles(
     let grid = BisectionGrid::around(references);
     let priority = |reference: &TriangleReference| grid.priority(reference, corners(reference.id()));
     let priorities: Vec<f32> = references.par_iter().map(priority).collect();
-    let factor = find_priority_scale(&priorities, (references.len() as f64 * MOST_MORE) as u64);
+    let factor = find_priority_scale(&priorities, (references.len() as f64 * MAX_ADDITIONAL) as u64);
     let of_chunk = |(references, priorities): (&[TriangleReference], &[f32])| {
         token.check_pause_and_cancel()?;
         let mut pieces = Vec::new();
