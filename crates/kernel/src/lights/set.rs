@@ -60,7 +60,7 @@ pub struct LightSamplingEffort {
 
 impl LightSamplingEffort {
     /// Effort for direct lighting. The results are as good as if each of a thousand lights were examined.
-    pub const DIRECT: Self = Self { count: MAX_WITHOUT_TREE as u32, nodes: AdaptiveLightTreeCut::MOST };
+    pub const DIRECT: Self = Self { count: MAX_WITHOUT_TREE as u32, nodes: AdaptiveLightTreeCut::MAX_NODES };
 
     /// Effort for path vertices. Additional shadow rays are not worthwhile because the image also has other
     /// noise.

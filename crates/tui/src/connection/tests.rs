@@ -162,8 +162,8 @@ fn lost_reply_delays_output_by_a_second() {
     let sent = now + Duration::from_millis(100);
     connection.record_sent(connection.window_bytes(), Some(QueryKind::Status), sent);
     assert_eq!(connection.max_sendable_bytes(sent + Duration::from_millis(900)), 0);
-    assert_eq!(connection.next_send_time(sent), Some(sent + SILENCE));
-    assert!(connection.max_sendable_bytes(sent + SILENCE) > 0);
+    assert_eq!(connection.next_send_time(sent), Some(sent + LOST_REPLY_TIMEOUT));
+    assert!(connection.max_sendable_bytes(sent + LOST_REPLY_TIMEOUT) > 0);
     // The timeout grows with the round-trip time.
     let mut slow = TerminalFlowControl::new(false, now);
     slow.record_sent(100, Some(QueryKind::Attributes), now);
