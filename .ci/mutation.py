@@ -442,7 +442,7 @@ def source(file):
     return crate / "src" / (rest if crate.name == module else file)
 
 
-def copy_with_faults(faults_asked):
+def copy_with_faults(selected):
     # Remove old sources, but keep the build.
     for entry in COPY.iterdir() if COPY.is_dir() else []:
         if entry.name != "target":
@@ -453,7 +453,7 @@ def copy_with_faults(faults_asked):
             (COPY / name).parent.mkdir(parents=True, exist_ok=True)
             shutil.copyfile(ROOT / name, COPY / name)
     places = {}
-    for number, (fault, file, place, wrong, _) in enumerate(faults_asked):
+    for number, (fault, file, place, wrong, _) in enumerate(selected):
         places.setdefault((file, place), []).append((fault, number, wrong))
     for (file, place), faults in places.items():
         path = source(file)
@@ -464,7 +464,7 @@ def copy_with_faults(faults_asked):
         for _, number, wrong in faults:
             chosen = f'if crate::injected({number}) {{ {wrong} }} else {{ {chosen} }}'
         path.write_text(path.read_text().replace(head + right + tail, f"{head}({chosen}){tail}"))
-    for lib in {crate_of(file.split("/")[0]) / "src" / "lib.rs" for _, file, *_ in faults_asked}:
+    for lib in {crate_of(file.split("/")[0]) / "src" / "lib.rs" for _, file, *_ in selected}:
         lib.write_text(lib.read_text() + SWITCH)
 
 
@@ -492,14 +492,14 @@ def passes(programs, test, fault=None):
 
 def main():
     profile, word = (sys.argv[1:] + ["dev", ""][len(sys.argv) - 1 :])[:2]
-    asked = [row for row in FAULTS if word in row[1] or word in row[4]]
-    copy_with_faults(asked)
+    selected = [row for row in FAULTS if word in row[1] or word in row[4]]
+    copy_with_faults(selected)
     programs = executables(profile)
-    for test in dict.fromkeys(row[4] for row in asked):
+    for test in dict.fromkeys(row[4] for row in selected):
         if not passes(programs, test):
             sys.exit(f"{test} fails without a fault")
     missed = 0
-    for number, (fault, _, _, _, test) in enumerate(asked):
+    for number, (fault, _, _, _, test) in enumerate(selected):
         found = not passes(programs, test, number)
         missed += not found
         print(f"{'found ' if found else 'MISSED'}  {fault:45} {test}", flush=True)
