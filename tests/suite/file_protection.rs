@@ -226,8 +226,8 @@ fn scenes_with_the_same_name_keep_their_images() {
     let absolute = dir.path("a/scene.toml");
     dir.expect(&format!("{} --once --samples 1", absolute.display()), 0);
     assert_eq!(dir.bytes("scene.png"), first);
-    for way_out in ["-o b.png", "--force", "-o scene.png"] {
-        dir.expect(&format!("b/scene.toml --once --samples 1 {way_out}"), 0);
+    for advice in ["-o b.png", "--force", "-o scene.png"] {
+        dir.expect(&format!("b/scene.toml --once --samples 1 {advice}"), 0);
     }
     // Turntable files are also checked.
     dir.expect("a/scene.toml --once --samples 1 --turntable 2", 0);

@@ -18,13 +18,14 @@ pub struct BrightnessDifference {
     /// Standard error of `value`.
     pub error: f64,
     /// Two-sided p-value for the null hypothesis of no bias.
-    pub by_chance: f64,
+    #[serde(rename = "by_chance")]
+    pub p_value: f64,
 }
 
 impl BrightnessDifference {
     /// Whether the bias is significant.
     pub fn is_biased(&self) -> bool {
-        self.by_chance < FALSE_POSITIVE_RATE
+        self.p_value < FALSE_POSITIVE_RATE
     }
 }
 
@@ -53,11 +54,11 @@ pub fn compare_brightness(
     };
     let of_references = references.relative_bias_standard_error();
     let error = (of_pictures * of_pictures + of_references * of_references).sqrt();
-    let by_chance = match error > 0.0 {
+    let p_value = match error > 0.0 {
         true => 2.0 * student_t_tail(value.abs() / error, freedom),
         false => f64::from(u8::from(value == 0.0)),
     };
-    Some(BrightnessDifference { value, error, by_chance })
+    Some(BrightnessDifference { value, error, p_value })
 }
 
 /// Standard error of the images' mean luminance, from the variance of each pixel.

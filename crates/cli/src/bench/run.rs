@@ -104,8 +104,8 @@ fn check_seed_overlap(request: &BenchRequest) -> Result<(), BenchError> {
     if last < u64::from(SEEDS[0]) {
         return Ok(());
     }
-    let way_out = "the references use the same seeds; choose a smaller --seed";
-    Err(BenchError::Call(format!("--seed {} is too large: {way_out}", request.seed)))
+    let advice = "the references use the same seeds; choose a smaller --seed";
+    Err(BenchError::Call(format!("--seed {} is too large: {advice}", request.seed)))
 }
 
 /// A benchmark of one scene.

@@ -162,7 +162,7 @@ pub(super) fn write_atomically_or_in_place(
                 return Err(OutputError::Target {
                     path: path.to_owned(),
                     why,
-                    way_out: "edit a copy instead",
+                    advice: "edit a copy instead",
                 });
             }
             cancelable::write_error_or_canceled(fill(&new, content, carried.as_ref(), durability), named)?;

@@ -46,7 +46,7 @@ pub struct LightSampler<'a> {
     pub picks: LightSamplingEffort,
     /// Whether lights at infinity are sampled at every vertex instead of being in the tree, because their
     /// bounds ignore occlusion.
-    pub leaves_beyond: bool,
+    pub samples_infinite: bool,
 }
 
 /// Effort to spend on picking lights at a vertex.
@@ -81,7 +81,7 @@ impl ExpectedSamplesPerLight<'_> {
     #[inline]
     pub fn for_light(&self, number: u32) -> f32 {
         self.0.as_ref().map_or(1.0, |(sampler, cut)| {
-            if sampler.leaves_beyond && !sampler.tree.contains(number) {
+            if sampler.samples_infinite && !sampler.tree.contains(number) {
                 1.0
             } else {
                 sampler.picks.count as f32 * cut.probability(number)
@@ -140,12 +140,12 @@ impl Lights {
         match receivers {
             LightSamplingPurpose::Eye => {
                 let sampler =
-                    |tree| LightSampler { tree, picks: LightSamplingEffort::DIRECT, leaves_beyond: false };
+                    |tree| LightSampler { tree, picks: LightSamplingEffort::DIRECT, samples_infinite: false };
                 self.tree.as_deref().map(sampler)
             }
             LightSamplingPurpose::Paths => {
                 let sampler =
-                    |tree| LightSampler { tree, picks: LightSamplingEffort::PATHS, leaves_beyond: true };
+                    |tree| LightSampler { tree, picks: LightSamplingEffort::PATHS, samples_infinite: true };
                 self.local_tree.as_deref().map(sampler)
             }
         }

@@ -159,7 +159,7 @@ fn textured_quad_samples_follow_their_pdf() {
         // If the quad were closer, the edges of bright areas would be too slanted relative to the squares.
         for (name, shape, light) in textured_quads(gap + 0.3) {
             let name = format!("{name} at {gap}");
-            // Use finer squares, because of the edges between texels.
+            // Use finer squares to resolve the edges between texels.
             assert!(follows_its_pdf(&name, &shape, &light, from, 30), "{name}");
         }
     }

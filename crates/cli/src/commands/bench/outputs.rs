@@ -118,8 +118,8 @@ impl BenchOutputs {
             OutputKind::Plot => plot_replace_check(real, &plot::AXES),
         };
         let Some(why) = replaced.reason_to_keep() else { return Ok(()) };
-        let way_out = format!("choose another file with {option} FILE, or use --force");
-        Err(OutputError::Refused { reason: format!("cannot write {}: {why}; {way_out}", path.display()) })
+        let advice = format!("choose another file with {option} FILE, or use --force");
+        Err(OutputError::Refused { reason: format!("cannot write {}: {why}; {advice}", path.display()) })
     }
 
     /// Reads the baseline and returns its name and results.
@@ -129,8 +129,8 @@ impl BenchOutputs {
         let read = read_baseline_bytes(path)
             .map_err(|why| console.print_error(Exit::WRONG, &format!("cannot read {name}: {why}")))?;
         let results = serde_json::from_slice(&read).map_err(|error| {
-            let way_out = "pass a file written by `glimt bench --json FILE`";
-            console.print_error(Exit::WRONG, &format!("{name} is not a baseline: {error}; {way_out}"))
+            let advice = "pass a file written by `glimt bench --json FILE`";
+            console.print_error(Exit::WRONG, &format!("{name} is not a baseline: {error}; {advice}"))
         })?;
         Ok(Some((name, results)))
     }

@@ -22,7 +22,7 @@ pub struct EnvironmentMap {
     cells: PiecewiseConstant2D,
     /// Cosines of the polar angles at the tops of the rows of cells, followed by −1.
     heights: Vec<f64>,
-    /// Pdf in sr⁻¹ of each row, if it were constant within the row.
+    /// Probability of each row divided by the solid angle of one of its cells, in sr⁻¹.
     pdfs: Vec<f32>,
     /// Mean luminance over all directions.
     mean_luminance: f64,

@@ -205,10 +205,10 @@ impl CameraWavefront<'_, '_> {
         }
         if !is_specular {
             // Divide by the probability of choosing the base.
-            let by_chance = if both { 1.0 } else { 1.0 / (1.0 - probability) };
+            let base_factor = if both { 1.0 } else { 1.0 / (1.0 - probability) };
             let mut state = path.state;
-            state.roulette_throughput *= by_chance;
-            let path = PathRay { throughput: path.throughput * by_chance, state, ..*path };
+            state.roulette_throughput *= base_factor;
+            let path = PathRay { throughput: path.throughput * base_factor, state, ..*path };
             self.shade_rough(&path, vertex, &layers.base, far);
         }
     }

@@ -353,8 +353,8 @@ impl PhotonWavefront<'_> {
         let chooses = path.state.only_specular_before && !lacks_photons;
         let is_reflected = !chooses || self.tracing.tile.chooses_reflection(path, probability);
         if !lacks_photons {
-            let by_chance = (!is_reflected).then(|| 1.0 / (1.0 - probability));
-            self.store_and_scatter_at_rough(path, vertex, &layers.base, (far, by_chance));
+            let factor = (!is_reflected).then(|| 1.0 / (1.0 - probability));
+            self.store_and_scatter_at_rough(path, vertex, &layers.base, (far, factor));
         }
         if is_reflected && self.may_scatter() {
             let specular = vertex.specular_weight(layers, &lobe, &mut self.counters);
@@ -401,8 +401,7 @@ impl PhotonWavefront<'_> {
     ) {
         let tile = self.tracing.tile;
         self.store_at_vertex(path, vertex);
-        let Some(by_chance) = scattered.filter(|_| path.state.only_specular_before && self.may_scatter())
-        else {
+        let Some(factor) = scattered.filter(|_| path.state.only_specular_before && self.may_scatter()) else {
             return;
         };
         // Queue the photon for scattering.
@@ -416,7 +415,7 @@ impl PhotonWavefront<'_> {
         let i = self.open.used.trailing_ones() as usize;
         let lit = ShadingVertex { path, interiors: &path.interiors, place: 0, vertex, shading, bsdf: &bsdf };
         self.open.set_vertex(i, tile, &lit, LightAov::ALL, interiors);
-        let counts = self.open.adjoint_photon_weight(i, vertex.wo) * by_chance;
+        let counts = self.open.adjoint_photon_weight(i, vertex.wo) * factor;
         set_lane(&mut self.open.throughput, i, path.throughput * counts);
         // Queue the transmitted photon. The medium behind the surface changes its basic flux.
         let Some((bsdf, shading)) = behind else { return };
