@@ -296,7 +296,7 @@ FAULTS = [
      METAL + "beckmann_values_match_the_formulas"),
     ("visible slopes sampled for the wrong view direction", "materials/microfacet/beckmann.rs",
      "let weight = ⟦sine * (0.25 * FRAC_2_SQRT_PI)⟧;", "1.1 * sine * (0.25 * FRAC_2_SQRT_PI)", METAL + "beckmann_samples_follow_the_pdf"),
-    ("too few Newton steps for visible slopes", "materials/microfacet/beckmann.rs", "for _ in 0..⟦STEPS⟧ {", "0",
+    ("too few Newton steps for visible slopes", "materials/microfacet/beckmann.rs", "for _ in 0..⟦NEWTON_STEPS⟧ {", "0",
      METAL + "beckmann_samples_follow_the_pdf"),
     ("slopes rotated the wrong way", "materials/microfacet/beckmann.rs", "Vec3::new(⟦across * y - along * x⟧,", "-across * y - along * x",
      METAL + "beckmann_samples_follow_the_pdf"),

@@ -158,7 +158,7 @@ mod tests {
     use crate::args::{Args, Subcommand};
     use crate::choice::Choice;
     use crate::film::Rect;
-    use crate::math::limits::LARGEST;
+    use crate::math::limits::MAX_MAGNITUDE;
     use crate::pipeline::settings::{CheckpointSettings, ResumeMode, ViewMode};
     use crate::scene::description::{self, render_keys};
     use crate::scene::keys::limits::Limits;
@@ -290,7 +290,7 @@ mod tests {
                     vec![least as i64 - 1, most as i64 + 1],
                 ),
                 ValueKind::Number(Limits::AtLeast(least)) => {
-                    let ends = [least as f32, LARGEST as f32];
+                    let ends = [least as f32, MAX_MAGNITUDE as f32];
                     (ends.map(|end| end.to_string()).to_vec(), vec![least as i64 - 1])
                 }
                 ValueKind::Words(values) => {

@@ -22,7 +22,7 @@ use crate::film::Srgb8Image;
 use crate::pipeline::protocol::PreviewSlot;
 
 /// Frame interval. Output is limited to 20 frames per second, except in response to keys.
-const FRAME: Duration = Duration::from_millis(50);
+const FRAME_INTERVAL: Duration = Duration::from_millis(50);
 
 /// Draws the state to the terminal.
 pub(super) struct FramePresenter {
@@ -139,7 +139,7 @@ impl FramePresenter {
     /// Delays the next frame, even an urgent one, until one frame interval after `now`.
     pub(super) fn postpone_next_frame(&mut self, state: &mut State, now: Instant) {
         state.urgent = false;
-        self.next_frame = now + FRAME;
+        self.next_frame = now + FRAME_INTERVAL;
     }
 
     /// Updates the display's target if a frame is due.

@@ -26,7 +26,7 @@ use super::writer;
 use crate::pipeline::protocol::{self, Command};
 
 /// Maximum time to plan a slice before sending it and handling keys.
-const TURN: Duration = Duration::from_millis(3);
+const MAX_PLANNING_TIME: Duration = Duration::from_millis(3);
 
 /// Runs the front end until a key or signal ends it, then restores the terminal and sends [`Command::Quit`]
 /// to the worker. `queue` receives the events of the worker and the file watcher. Must not be called more than
@@ -292,7 +292,7 @@ impl EventLoop {
         }
         self.presenter.draw_if_due(&mut self.state, Instant::now());
         let begin = Instant::now();
-        let events = self.presenter.send_pending(&self.state, begin, || begin.elapsed() >= TURN);
+        let events = self.presenter.send_pending(&self.state, begin, || begin.elapsed() >= MAX_PLANNING_TIME);
         events.into_iter().find_map(|event| self.apply_event(event))
     }
 }

@@ -266,9 +266,9 @@ const MAX_REDUCTION: f64 = 12.0;
 /// can cause them by chance.
 const CHANCE_REDUCTION: f64 = 2.3;
 
-/// Fraction of the variance reduction above [`CHANCE_REDUCTION`] that is expected to continue. The smooth parts of
-/// a tile converge first, and the rest converges more slowly.
-const LASTING: f64 = 0.65;
+/// Fraction of the variance reduction above [`CHANCE_REDUCTION`] that is expected to continue. The smooth
+/// parts of a tile converge first, and the rest converges more slowly.
+const LASTING_FRACTION: f64 = 0.65;
 
 /// Penalty for a variance reduction measured from few pixels: the coefficient of the squared
 /// [`SquaredMeanChanges::variance_uncertainty`].
@@ -283,7 +283,7 @@ const INDEPENDENT_QUADRUPLING_REDUCTION: f64 = 4.0;
 /// Like [`CHANCE_REDUCTION`], for quadrupled sample counts.
 const CHANCE_QUADRUPLING_REDUCTION: f64 = 5.2;
 
-/// Like [`LASTING`], for quadrupled sample counts.
+/// Like [`LASTING_FRACTION`], for quadrupled sample counts.
 const LASTING_QUADRUPLING: f64 = 1.2;
 
 /// Maximum variance reduction expected from quadrupling the sample count.
@@ -373,7 +373,7 @@ impl ConvergenceModel {
 /// Variance reduction expected from the next doubling. `fall` is the measured reduction, and `trust` is the
 /// confidence in this measurement.
 fn predict_doubling_variance_reduction(fall: f64, trust: f64) -> f64 {
-    INDEPENDENT_REDUCTION + LASTING * (fall - CHANCE_REDUCTION).max(0.0) * trust
+    INDEPENDENT_REDUCTION + LASTING_FRACTION * (fall - CHANCE_REDUCTION).max(0.0) * trust
 }
 
 /// Variance of the mean of `count` ≥ 2 samples, computed from the squared step at the last power of two and

@@ -38,10 +38,10 @@ pub struct DataRange {
 }
 
 /// Brightness of the largest distance.
-const DARKEST: f32 = 0.1;
+const FARTHEST_BRIGHTNESS: f32 = 0.1;
 
 /// Minimum brightness of the median value.
-const QUARTER: f32 = 0.25;
+const MIN_MEDIAN_BRIGHTNESS: f32 = 0.25;
 
 /// Minimum bias, which limits the steepness of the curve.
 const MIN_BIAS: f32 = 1e-3;
@@ -93,7 +93,8 @@ impl DataRange {
         let middle = seen.len() / 2;
         let (_, &mut median, _) = seen.select_nth_unstable_by(middle, f32::total_cmp);
         let place = linear.position_in_range(median);
-        let bias = (1.0 - QUARTER) / QUARTER * place / (1.0 - place).max(f32::MIN_POSITIVE);
+        let bias = (1.0 - MIN_MEDIAN_BRIGHTNESS) / MIN_MEDIAN_BRIGHTNESS * place
+            / (1.0 - place).max(f32::MIN_POSITIVE);
         Self { bias: bias.clamp(MIN_BIAS, 1.0), ..linear }
     }
 
@@ -117,7 +118,7 @@ impl DataRange {
         if distance < self.least {
             return if self.least.is_finite() { distance / self.least } else { distance.min(1.0) };
         }
-        1.0 - (1.0 - DARKEST) * self.position_in_range(distance)
+        1.0 - (1.0 - FARTHEST_BRIGHTNESS) * self.position_in_range(distance)
     }
 }
 

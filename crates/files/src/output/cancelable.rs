@@ -14,20 +14,20 @@ use crate::film::tone::{tone_map_to_8_bits, tone_map_to_16_bits};
 
 /// Number of pixels between polls of the cancel token. Processing them takes a few milliseconds and keeps
 /// all threads busy.
-const PIXELS: usize = 1 << 18;
+const PIXELS_PER_POLL: usize = 1 << 18;
 
 /// Number of bytes to compress or write between polls of the cancel token.
-pub(super) const BYTES: usize = 1 << 15;
+pub(super) const BYTES_PER_POLL: usize = 1 << 15;
 
-/// Tone maps an image from top to bottom and passes the bytes to `take` in order, at most [`BYTES`] at a
-/// time. Each component is one byte, or two bytes in big-endian order as in PNG and PPM.
+/// Tone maps an image from top to bottom and passes the bytes to `take` in order, at most [`BYTES_PER_POLL`]
+/// at a time. Each component is one byte, or two bytes in big-endian order as in PNG and PPM.
 pub(super) fn for_each_tone_mapped_part(
     image: &RadianceImage,
     options: &EncodeOptions,
     token: &CancelToken,
     mut take: impl FnMut(&[u8]) -> io::Result<()>,
 ) -> io::Result<()> {
-    for pixels in image.pixels.chunks(PIXELS) {
+    for pixels in image.pixels.chunks(PIXELS_PER_POLL) {
         token.check_pause_and_cancel().map_err(io::Error::other)?;
         let part = RadianceImage { width: pixels.len() as u32, height: 1, pixels: pixels.to_vec() };
         let bytes = match options.bit_depth {
@@ -37,7 +37,7 @@ pub(super) fn for_each_tone_mapped_part(
                 components.iter().flat_map(|component| component.to_be_bytes()).collect()
             }
         };
-        for bytes in bytes.chunks(BYTES) {
+        for bytes in bytes.chunks(BYTES_PER_POLL) {
             token.check_pause_and_cancel().map_err(io::Error::other)?;
             take(bytes)?;
         }
@@ -156,14 +156,14 @@ mod tests {
 
     #[test]
     fn parts_form_the_image_and_can_be_canceled() {
-        let count = PIXELS + 70_000;
+        let count = PIXELS_PER_POLL + 70_000;
         let pixels = (0..count).map(|i| crate::math::Vec3::splat((i % 256) as f32 / 255.0)).collect();
         let image = RadianceImage { width: count as u32, height: 1, pixels };
         let options = EncodeOptions { bit_depth: BitDepth::Sixteen, ..Default::default() };
         let token = CancelToken::new();
         let mut all = Vec::new();
         let take = |bytes: &[u8]| {
-            assert!(bytes.len() <= BYTES);
+            assert!(bytes.len() <= BYTES_PER_POLL);
             all.extend_from_slice(bytes);
             Ok(())
         };

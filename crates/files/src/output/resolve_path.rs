@@ -14,7 +14,7 @@ use super::protection::{self, ProtectionFlag};
 use super::{OutputError, temporary};
 
 /// Maximum number of links to follow, as in Linux.
-const LINKS: usize = 40;
+const MAX_LINKS: usize = 40;
 
 /// Destination for the bytes written to a path.
 #[derive(Debug)]
@@ -75,7 +75,7 @@ pub(super) fn check_writable(path: &Path) -> Result<(), OutputError> {
 /// /dev/stdout) are not followed, because an open descriptor may have no path.
 pub(super) fn follow_links(path: &Path) -> io::Result<(PathBuf, Option<Metadata>)> {
     let mut target = path.to_owned();
-    for _ in 0..LINKS {
+    for _ in 0..MAX_LINKS {
         let metadata = match fs::symlink_metadata(&target) {
             Ok(metadata) => metadata,
             Err(error) if error.kind() == ErrorKind::NotFound => return Ok((target, None)),

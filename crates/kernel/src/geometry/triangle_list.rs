@@ -36,13 +36,13 @@ use crate::math::{DVec3, Vec3};
 pub const MAX_TRIANGLES: usize = 64;
 
 /// Error of the intersection with a plane, relative to the largest coordinate.
-const PLANE: f32 = 128.0 * UNIT_ROUNDOFF;
+const PLANE_ERROR: f32 = 128.0 * UNIT_ROUNDOFF;
 
 /// Error terms of t in the watertight test, relative to R² D/(2A) and R D²/(2A).
-const ALONG: [f32; 2] = [256.0 * UNIT_ROUNDOFF, 2048.0 * UNIT_ROUNDOFF];
+const T_ERRORS: [f32; 2] = [256.0 * UNIT_ROUNDOFF, 2048.0 * UNIT_ROUNDOFF];
 
 /// Error of barycentric coordinates in the watertight test, relative to R D/(2A).
-const ACROSS: f32 = 1024.0 * UNIT_ROUNDOFF;
+const BARYCENTRIC_ERROR: f32 = 1024.0 * UNIT_ROUNDOFF;
 
 /// Maximum coordinate error at which a miss is still certain.
 const MAX_CERTAIN_ERROR: f32 = 0.125;
@@ -79,7 +79,7 @@ struct TriangleOrQuad {
     numbers: [u32; 2],
     /// D/(2A), which is at least the length of both vectors in `across`.
     slender: f32,
-    /// [`ALONG`] times D/(2A), and [`ALONG`] times D.
+    /// [`T_ERRORS`] times D/(2A), and [`T_ERRORS`] times D.
     along: [f32; 2],
 }
 
@@ -107,12 +107,12 @@ struct NearestCandidates {
 
 /// Error terms for the rays in a packet.
 struct ErrorTerms {
-    /// Error term with the factor [`PLANE`] for each ray.
+    /// Error term with the factor [`PLANE_ERROR`] for each ray.
     plane: F32x16,
     /// R: largest distance along an axis from the ray's origin to a corner.
     far: F32x16,
-    /// Error term with the factors [`PLANE`] and [`ACROSS`] for each ray, without the ray's length and
-    /// D/(2A).
+    /// Error term with the factors [`PLANE_ERROR`] and [`BARYCENTRIC_ERROR`] for each ray, without the ray's
+    /// length and D/(2A).
     across: F32x16,
     /// Upper bound on the length of the direction.
     length: F32x16,
@@ -340,9 +340,9 @@ impl TriangleList {
             // Set the bound to NaN for NaN origins. Comparisons with NaN would leave `most` unchanged.
             let sum = rays.origin[0][i] + rays.origin[1][i] + rays.origin[2][i];
             let most = if sum.is_nan() { f32::NAN } else { most };
-            errors.plane[i] = PLANE * most;
+            errors.plane[i] = PLANE_ERROR * most;
             errors.far[i] = far;
-            errors.across[i] = PLANE * most + ACROSS * far;
+            errors.across[i] = PLANE_ERROR * most + BARYCENTRIC_ERROR * far;
             errors.length[i] = length;
             // Distances are at most 2√3 R, and `length` is at most √3 times the direction's length.
             errors.end[i] = 6.0 * far / length;
@@ -400,7 +400,7 @@ impl TriangleOrQuad {
             split: if apex.is_some() { 2.0 } else { -1.0 },
             numbers,
             slender: slender as f32,
-            along: [ALONG[0] * slender as f32, ALONG[1] * wide as f32],
+            along: [T_ERRORS[0] * slender as f32, T_ERRORS[1] * wide as f32],
         }
     }
 }
@@ -421,17 +421,17 @@ fn reorder_corners_into_quad(one: &[Vec3; 3], other: &[Vec3; 3], reach: f32) -> 
     let normal = u.cross(v);
     let squared = normal.length_squared();
     let at = [v.cross(normal), normal.cross(u)].map(|across| across.dot(way) / squared);
-    let is_flat = normal.dot(way).abs() <= f64::from(FLAT * reach) * squared.sqrt();
-    let is_near = at.iter().all(|along| (along - 1.0).abs() <= ASKEW);
+    let is_flat = normal.dot(way).abs() <= f64::from(MAX_PLANE_DISTANCE * reach) * squared.sqrt();
+    let is_near = at.iter().all(|along| (along - 1.0).abs() <= MAX_CORNER_DEVIATION);
     (is_flat && is_near).then_some([[a, b, c], [b, c, d]])
 }
 
 /// Maximum distance of the fourth corner of a flat quadrilateral from the plane of the other three, relative
 /// to the largest coordinate.
-const FLAT: f32 = 4.0 * UNIT_ROUNDOFF;
+const MAX_PLANE_DISTANCE: f32 = 4.0 * UNIT_ROUNDOFF;
 
 /// Maximum deviation of the fourth corner from a parallelogram, relative to the edges.
-const ASKEW: f64 = 0.25;
+const MAX_CORNER_DEVIATION: f64 = 0.25;
 
 /// D/(2A) and D²/(2A) of a triangle.
 fn slenderness([a, b, c]: &[Vec3; 3]) -> [f64; 2] {

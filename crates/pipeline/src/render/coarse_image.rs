@@ -41,10 +41,14 @@ impl<'a> CoarseImageRenderer<'a> {
     /// caches, because tracing rays is then slow.
     fn reduce_size_for_large_scenes(&self, width: u32, height: u32) -> (u32, u32) {
         /// Trees with this many triangles take up tens of megabytes.
-        const LARGE: u64 = 250_000;
+        const MIN_LARGE_TRIANGLES: u64 = 250_000;
         let side =
             |length: u32| ((f64::from(length) * std::f64::consts::FRAC_1_SQRT_2).round() as u32).max(1);
-        if self.tracer.world.triangle_count() < LARGE { (width, height) } else { (side(width), side(height)) }
+        if self.tracer.world.triangle_count() < MIN_LARGE_TRIANGLES {
+            (width, height)
+        } else {
+            (side(width), side(height))
+        }
     }
 
     fn is_less_work(&self, width: u32, height: u32) -> bool {

@@ -115,9 +115,10 @@ impl PreviewSender<'_> {
     /// use the preview's range instead.
     fn choose_tone_mapping(&self, state: &FilmState, image: &RadianceImage, has_time: bool) -> ToneMapping {
         /// Number of pixels that can be scanned in a few milliseconds.
-        const QUICK: usize = 1 << 18;
+        const MAX_SCANNED_PIXELS: usize = 1 << 18;
         let tone = self.plan.tone();
-        let is_known = state.has_sampled_all_pixels() && (has_time || state.film.crop_rect().area() <= QUICK);
+        let is_known = state.has_sampled_all_pixels()
+            && (has_time || state.film.crop_rect().area() <= MAX_SCANNED_PIXELS);
         if tone.range_map == RangeMap::None || !is_known {
             return tone.with_image_range(image);
         }

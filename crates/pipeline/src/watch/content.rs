@@ -62,7 +62,7 @@ const STAMP_RESOLUTION: Duration = Duration::from_secs(2);
 /// metadata to avoid reading sparse files of several terabytes.
 const MAX_HASHED: u64 = 4 << 30;
 /// Number of bytes to read between checks of the token.
-const CHUNK: usize = 1 << 20;
+const BYTES_PER_POLL: usize = 1 << 20;
 
 /// Cache of file hashes.
 #[derive(Debug, Default)]
@@ -310,7 +310,7 @@ fn hash_file_contents(path: &Path, token: &CancelToken) -> Result<FileContentId,
         Err(error) => return Ok(unreadable_content_id(&error)),
     };
     let mut hasher = blake3::Hasher::new();
-    let mut buffer = vec![0; CHUNK];
+    let mut buffer = vec![0; BYTES_PER_POLL];
     loop {
         token.check_pause_and_cancel()?;
         match file.read(&mut buffer) {

@@ -5,7 +5,7 @@ use super::context::Issue;
 use super::key::KeyInTable;
 use super::table::TableReader;
 use crate::math::DVec3;
-use crate::math::limits::{LARGEST, SHORTEST, is_nonzero_but_too_short, robust_length};
+use crate::math::limits::{MAX_MAGNITUDE, MIN_LENGTH, is_nonzero_but_too_short, robust_length};
 
 /// Reads either `matrix`, or `scale`, `rotate` and `translate`.
 pub(super) fn read_transform(table: &TableReader<'_>) -> Option<ObjectTransform> {
@@ -48,8 +48,8 @@ pub(super) fn composed_transform_problem(transform: &ObjectTransform) -> Option<
     let map = transform.to_affine_map();
     let [x, y, z] = map.linear;
     let largest = [x, y, z, map.translate].map(|column| column.abs().max_element());
-    if largest.iter().any(|number| *number > LARGEST) {
-        return Some(("makes the shape too large", format!("its numbers must be at most {LARGEST:e}")));
+    if largest.iter().any(|number| *number > MAX_MAGNITUDE) {
+        return Some(("makes the shape too large", format!("its numbers must be at most {MAX_MAGNITUDE:e}")));
     }
     affine_map_problem(&map)
 }
@@ -68,5 +68,5 @@ fn affine_map_problem(map: &AffineMap) -> Option<(&'static str, String)> {
     map.linear
         .iter()
         .any(is_short)
-        .then(|| ("makes the shape too small", format!("its columns must be more than {SHORTEST:e} long")))
+        .then(|| ("makes the shape too small", format!("its columns must be more than {MIN_LENGTH:e} long")))
 }

@@ -32,8 +32,8 @@ const MIN_WINDOW: f64 = 1_500.0;
 const MAX_QUEUE: Duration = Duration::from_millis(60);
 /// Timeout for the terminal's first reply.
 const REPLY_TIMEOUT: Duration = Duration::from_secs(1);
-/// Outstanding replies are considered lost after this time or `LOST_REPLY_ROUND_TRIPS` round trips, whichever is
-/// longer.
+/// Outstanding replies are considered lost after this time or `LOST_REPLY_ROUND_TRIPS` round trips, whichever
+/// is longer.
 const LOST_REPLY_TIMEOUT: Duration = Duration::from_secs(1);
 const LOST_REPLY_ROUND_TRIPS: u32 = 4;
 /// A terminal is fast if it replied to most of the last `RECENT_SLICES` slices within this time.
@@ -215,7 +215,7 @@ impl TerminalFlowControl {
         };
         let rate = match self.replies {
             ReplySupport::Answering if !self.is_multiplexed => window_rate(),
-            ReplySupport::Answering | ReplySupport::Silent => Some(bucket::RATE),
+            ReplySupport::Answering | ReplySupport::Silent => Some(bucket::BYTES_PER_SECOND),
             ReplySupport::Asked { .. } => None,
         };
         rate.filter(|rate| *rate < FAST)

@@ -11,11 +11,11 @@ use crate::color::{PaletteDither, dither_color_to_6_bits};
 use crate::film::Srgb8Image;
 
 /// Maximum number of colors. Registers below 16 are reserved for the terminal.
-const MAX: usize = 240;
+const MAX_COLORS: usize = 240;
 /// Histogram bits per channel.
-const BITS: u32 = 6;
-/// An existing palette is reused while its RMS error is at most `MAX_ERROR_RATIO` times a new palette's error, plus
-/// `ALLOWED` code values.
+const HISTOGRAM_BITS: u32 = 6;
+/// An existing palette is reused while its RMS error is at most `MAX_ERROR_RATIO` times a new palette's
+/// error, plus `ALLOWED` code values.
 const MAX_ERROR_RATIO: f64 = 1.2;
 const ALLOWED: f64 = 1.5;
 
@@ -67,9 +67,11 @@ impl HistogramBin {
 
 /// Histogram of an image's colors, without empty bins.
 fn histogram(picture: &Srgb8Image) -> Vec<HistogramBin> {
-    let mut bins = vec![HistogramBin::default(); 1 << (3 * BITS)];
+    let mut bins = vec![HistogramBin::default(); 1 << (3 * HISTOGRAM_BITS)];
     for rgb in &picture.pixels {
-        let place = rgb.iter().fold(0, |place, channel| place << BITS | usize::from(channel >> (8 - BITS)));
+        let place = rgb
+            .iter()
+            .fold(0, |place, channel| place << HISTOGRAM_BITS | usize::from(channel >> (8 - HISTOGRAM_BITS)));
         let bin = &mut bins[place];
         bin.count += 1.0;
         for (sum, channel) in bin.sum.iter_mut().zip(rgb) {
@@ -106,11 +108,11 @@ impl ColorBox {
     }
 }
 
-/// Repeatedly splits the box with the largest error until there are `MAX` boxes or all are exact. Returns the
-/// mean color of each box.
+/// Repeatedly splits the box with the largest error until there are `MAX_COLORS` boxes or all are exact.
+/// Returns the mean color of each box.
 fn choose_palette_colors(bins: &mut [HistogramBin]) -> Vec<[u8; 3]> {
     let mut boxes = vec![ColorBox::for_bins(bins, 0..bins.len())];
-    while boxes.len() < MAX {
+    while boxes.len() < MAX_COLORS {
         let worst = (0..boxes.len()).max_by(|a, b| boxes[*a].error.total_cmp(&boxes[*b].error));
         let Some(worst) = worst.filter(|worst| boxes[*worst].error > 0.0) else { break };
         let ColorBox { bins: range, mean, axis, .. } = boxes.swap_remove(worst);

@@ -6,7 +6,7 @@ use super::terminal_color::{TerminalColor, decimal_digit_count};
 use crate::color::nearest_256;
 
 /// Maximum number of candidates for each part, and for filling both parts with one color.
-const MAX: usize = 6;
+const MAX_CANDIDATES: usize = 6;
 /// Maximum number of cells that a candidate may cover.
 const MAX_CELLS: usize = 8;
 
@@ -42,10 +42,10 @@ fn candidate_colors_for_run(
     wanted: &(impl Iterator<Item = TerminalColor> + Clone),
     model: RateDistortion,
 ) -> Vec<TerminalColor> {
-    let mut shades = Vec::with_capacity(MAX);
+    let mut shades = Vec::with_capacity(MAX_CANDIDATES);
     let Some(first) = wanted.clone().next() else { return shades };
     let mut add = |shade| {
-        if shades.len() < MAX && !shades.contains(&shade) {
+        if shades.len() < MAX_CANDIDATES && !shades.contains(&shade) {
             shades.push(shade);
         }
     };

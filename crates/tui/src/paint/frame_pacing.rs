@@ -55,7 +55,7 @@ const MIN_PIXEL_INTERVAL: Duration = Duration::from_millis(180);
 /// Time after which any improvement is drawn.
 const MAX_INTERVAL: Duration = Duration::from_secs(2);
 /// Fraction of the bandwidth available for intermediate previews.
-const SHARE: f64 = 0.5;
+const PREVIEW_BANDWIDTH: f64 = 0.5;
 
 /// Decides whether a preview is worth its cost. The first and last previews always are. A fast terminal gets
 /// 5 to 10 previews per second. A slow connection gets few intermediate previews, and none that would delay
@@ -71,7 +71,7 @@ pub fn pace_preview(moment: &PacingInputs) -> PacingAdvice {
     }
     let frame = moment.estimate_send_duration();
     let is_too_late = moment.final_in.is_some_and(|left| left < frame);
-    let is_too_soon = moment.since_aim < MIN_INTERVAL.max(frame.div_f64(SHARE));
+    let is_too_soon = moment.since_aim < MIN_INTERVAL.max(frame.div_f64(PREVIEW_BANDWIDTH));
     if is_too_late || is_too_soon {
         return PacingAdvice::Wait;
     }

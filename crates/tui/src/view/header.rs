@@ -5,7 +5,7 @@ use std::time::Duration;
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
-use super::layout::{BLOCK, Layout};
+use super::layout::{Layout, STATE_BLOCK_WIDTH};
 use super::message;
 use super::stages::running_stage_name;
 use super::text::{
@@ -26,7 +26,7 @@ use crate::scene::sanitize::escape_invisible_chars;
 use crate::state::{RequestStatus, State};
 
 /// Minimum header width at which the state block has a fixed width.
-const WIDE: u16 = 60;
+const MIN_FIXED_BLOCK_WIDTH: u16 = 60;
 /// Minimum width of a shortened scene name.
 const MIN_NAME: u16 = 6;
 
@@ -65,8 +65,8 @@ pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
 fn draw_activity_block(state: &State, area: Rect, buffer: &mut Buffer) -> u16 {
     let (sign, word, tone) = state_symbol_word_and_role(state);
     let mut text = format!(" {sign} {word} ");
-    if area.width >= WIDE {
-        text = format!("{text:<BLOCK$}");
+    if area.width >= MIN_FIXED_BLOCK_WIDTH {
+        text = format!("{text:<STATE_BLOCK_WIDTH$}");
     }
     let area = area.intersection(buffer.area);
     if area.is_empty() {
@@ -236,11 +236,11 @@ fn newest_render_number(state: &State) -> u64 {
 /// Formats the remaining time, or returns an empty string if the render is paused.
 fn format_eta(state: &State, progress: &RenderProgress) -> String {
     /// Minimum time shown, in seconds. Shorter times would round to zero.
-    const MIN: f64 = 0.05;
+    const MIN_SHOWN_SECONDS: f64 = 0.05;
     let eta = match Eta::from_progress(progress) {
         None => "…".to_owned(),
         Some(Eta::OverADay) => Eta::OverADay.format(),
-        Some(Eta::Seconds(eta)) if eta < MIN => "under 1 s".to_owned(),
+        Some(Eta::Seconds(eta)) if eta < MIN_SHOWN_SECONDS => "under 1 s".to_owned(),
         Some(Eta::Seconds(eta)) => {
             format_running_time_with_tenths(Duration::try_from_secs_f64(eta).unwrap_or_default())
         }

@@ -33,7 +33,7 @@ impl KeyHint {
     }
 
     fn width(&self, is_long: bool) -> u16 {
-        text_columns(self.key) + 1 + text_columns(self.description(is_long)) + GAP
+        text_columns(self.key) + 1 + text_columns(self.description(is_long)) + HINT_GAP
     }
 
     fn description(&self, is_long: bool) -> &str {
@@ -42,7 +42,7 @@ impl KeyHint {
 }
 
 /// Number of columns between hints.
-const GAP: u16 = 2;
+const HINT_GAP: u16 = 2;
 /// Columns reserved for currently useful keys when deciding whether to show toggles in their long form.
 const OF_USE: u16 = 26;
 
@@ -58,7 +58,7 @@ pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
     let skipped = usize::from(area.width < 44 && ways.len() > 1);
     let ways = &ways[skipped..];
     let toggles = if state.overlays.help.open { Vec::new() } else { hints_for_toggles(state) };
-    let room = area.width.saturating_sub(width(ways, true).saturating_sub(GAP));
+    let room = area.width.saturating_sub(width(ways, true).saturating_sub(HINT_GAP));
     let is_long = width(&toggles, true) + OF_USE <= room;
     let mut left = Rect { width: room, ..area };
     let (urgent, useful) = urgent_and_other_hints(state);

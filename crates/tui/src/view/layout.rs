@@ -27,7 +27,7 @@ pub(crate) struct Layout {
 }
 
 /// Width of the state block, which is fixed so that the name following it does not move.
-pub(super) const BLOCK: usize = 13;
+pub(super) const STATE_BLOCK_WIDTH: usize = 13;
 /// Windows with fewer rows than this have only one line of text.
 const TWO_LINES: u16 = 6;
 /// Windows with fewer rows than this have two lines of text.

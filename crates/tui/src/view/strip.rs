@@ -25,11 +25,11 @@ struct EntryRowCounts {
 const NARROW_ROWS: EntryRowCounts = EntryRowCounts { picture: 3, entry: 4, pitch: 4 };
 const WIDE_ROWS: EntryRowCounts = EntryRowCounts { picture: 5, entry: 5, pitch: 6 };
 /// Minimum width of a wide strip.
-const WIDE: u16 = 40;
+const MIN_WIDE_STRIP: u16 = 40;
 /// Minimum width of the text next to a thumbnail.
 const MIN_WORDS: u16 = 10;
 /// Column width in a strip with several columns.
-const COLUMN: u16 = 44;
+const COLUMN_WIDTH: u16 = 44;
 
 /// A history entry and its position in the strip.
 struct StripEntryLayout {
@@ -124,8 +124,8 @@ pub(super) fn rows_used_by_strip(state: &State, area: Rect) -> u16 {
 /// The entries that fit at the bottom of an area, newest first. The entry being viewed is always included.
 fn visible_entries(state: &State, area: Rect) -> Vec<StripEntryLayout> {
     let count = state.preview.history.len();
-    let rows = if area.width >= WIDE { WIDE_ROWS } else { NARROW_ROWS };
-    let columns = (area.width / COLUMN).max(1);
+    let rows = if area.width >= MIN_WIDE_STRIP { WIDE_ROWS } else { NARROW_ROWS };
+    let columns = (area.width / COLUMN_WIDTH).max(1);
     let gap = rows.pitch - rows.entry;
     // The title uses one row.
     let most = (area.height + gap).saturating_sub(1) / rows.pitch;

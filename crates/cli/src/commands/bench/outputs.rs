@@ -110,7 +110,7 @@ impl BenchOutputs {
     fn check_written_by_glimt(&self, index: usize, real: &Path) -> Result<(), OutputError> {
         let (option, path, kind) = &self.files[index];
         let replaced = match kind {
-            OutputKind::Csv => table_replace_check(real, csv::HEAD),
+            OutputKind::Csv => table_replace_check(real, csv::HEADER_LINE),
             // Replace only valid baselines, which contain at least one scene.
             OutputKind::Json => {
                 json_replace_check(real, "a results file", |found: &Results| !found.scenes.is_empty())

@@ -403,7 +403,7 @@ fn errors_include_their_location() {
     let nodes = |nodes: Value| with(&|json| json["nodes"] = nodes.clone());
     assert_eq!(nodes(json!([{"children": [0]}])), model::node_visited_twice_message(0));
     assert_eq!(nodes(json!([{"children": [1, 1]}, {"mesh": 0}])), model::node_visited_twice_message(1));
-    for (name, help) in &MISSING[..4] {
+    for (name, help) in &UNSUPPORTED_EXTENSIONS[..4] {
         let found = with(&|json| json["extensionsRequired"] = json!([name]));
         assert_eq!(found, unsupported_extension_message(name, help));
     }

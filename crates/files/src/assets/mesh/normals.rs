@@ -18,7 +18,7 @@ const SEAM_COSINE: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
 /// Maximum number of coincident vertices whose normals are compared pairwise, which takes quadratic time.
 /// Larger sets are merged without comparing normals.
-const COMPARED: usize = 64;
+const MAX_COMPARED: usize = 64;
 
 /// Number of triangles or vertices between polls of the cancel token.
 const BATCH: usize = 1 << 16;
@@ -182,7 +182,7 @@ fn fast_atan2_upper_half(x: f64, y: f64) -> f64 {
 
 fn merge_normals_within_seam_angle(group: &[u32], sums: &[DVec3], joined: &mut [DVec3]) {
     let own = |vertex: u32| sums[vertex as usize];
-    if group.len() > COMPARED {
+    if group.len() > MAX_COMPARED {
         let sum: DVec3 = group.iter().map(|&vertex| own(vertex)).sum();
         group.iter().for_each(|&vertex| joined[vertex as usize] = sum);
         return;

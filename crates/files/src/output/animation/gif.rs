@@ -13,7 +13,7 @@ use crate::film::Srgb8Image;
 /// Size of the palette.
 const COLORS: usize = 256;
 /// Approximate number of pixels used to compute the palette.
-const SAMPLES: usize = 1 << 20;
+const PALETTE_SAMPLES: usize = 1 << 20;
 /// Quantizer setting: 1 uses every sample.
 const EVERY_SAMPLE: i32 = 1;
 
@@ -63,7 +63,7 @@ pub(super) fn encode(
 fn palette(frames: &[Srgb8Image]) -> Vec<u8> {
     let pixels: usize = frames.iter().map(|frame| frame.pixels.len()).sum();
     // An odd step avoids sampling the same columns in every row.
-    let step = (pixels / SAMPLES) | 1;
+    let step = (pixels / PALETTE_SAMPLES) | 1;
     let all = frames.iter().flat_map(|frame| &frame.pixels);
     let samples: Vec<[u8; 4]> =
         all.step_by(step).map(|&[red, green, blue]| [red, green, blue, 255]).collect();

@@ -10,7 +10,7 @@ use crate::geometry::watertight::ShearedRay;
 use crate::geometry::{Aabb, Ray, ShapeHit};
 
 /// Displacement of a ray due to rounding, relative to the largest length.
-const PAD: f32 = 32.0 * f32::EPSILON;
+const RAY_DISPLACEMENT: f32 = 32.0 * f32::EPSILON;
 
 /// Stack size. The depth limit is lower even for the largest possible number of triangles.
 pub(super) const STACK_SIZE: usize = 64;
@@ -39,7 +39,7 @@ impl PlaneRay {
             origin: ray.origin.to_array(),
             inverse: inverse.to_array(),
             backward: inverse.to_array().map(|inverse| inverse.is_sign_negative()),
-            pad: reach * PAD,
+            pad: reach * RAY_DISPLACEMENT,
             steps,
         }
     }

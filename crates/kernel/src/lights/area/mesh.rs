@@ -201,7 +201,7 @@ impl MeshEmitter {
 
 impl TrianglePairQuad {
     /// Maximum deviation of the fourth corner from a parallelogram, relative to its size.
-    const FLATNESS: f64 = 1e-5;
+    const MAX_CORNER_DEVIATION: f64 = 1e-5;
 
     /// The parallelogram formed by two triangles that share an edge, or `None` if they do not form one.
     fn from_triangles(triangles: &[([DVec3; 3], u32)]) -> Option<Self> {
@@ -216,7 +216,7 @@ impl TrianglePairQuad {
         let far = second.iter().find(|other| !first.contains(other))?;
         let (u, v) = (x - p, y - p);
         let is_shared = second.contains(&x) && second.contains(&y);
-        let is_flat = (p + u + v - far).length() <= Self::FLATNESS * (u.length() + v.length());
+        let is_flat = (p + u + v - far).length() <= Self::MAX_CORNER_DEVIATION * (u.length() + v.length());
         if !(is_shared && is_flat) {
             return None;
         }

@@ -23,7 +23,7 @@ pub struct TorusEmitter {
 const SLICES: usize = 7;
 
 /// Number of points on a slice's circle at which the density is evaluated.
-const PLACES: usize = 5;
+const SLICE_POINTS: usize = 5;
 
 /// Minimum closeness. Without it, closeness would be 0 on the axis, where all slices look the same.
 const MIN_CLOSENESS: f64 = 0.01;
@@ -278,8 +278,8 @@ impl TorusSlice {
     }
 
     /// Distribution of the relative sine of the elevation, mapped from [−1, 1] to [0, 1].
-    fn elevation_distribution(&self, view: &TorusView) -> PiecewiseLinear<PLACES> {
-        let sine = |i: usize| 2.0 * i as f64 / (PLACES - 1) as f64 - 1.0;
+    fn elevation_distribution(&self, view: &TorusView) -> PiecewiseLinear<SLICE_POINTS> {
+        let sine = |i: usize| 2.0 * i as f64 / (SLICE_POINTS - 1) as f64 - 1.0;
         PiecewiseLinear(std::array::from_fn(|i| {
             self.near_intersection(view, self.slice_tangent_from_elevation_sine(sine(i))).factor
         }))

@@ -367,7 +367,8 @@ impl PhotonEmitter {
             LightFamily::Infinite(_) => targets.total_disk_area() / disk,
             LightFamily::Area(light) => source.surface.as_ref().map_or(0.0, |surface| {
                 let of = |i: u32| {
-                    let (u, piece) = (low_discrepancy_point(i), (i as f32 + 0.5) / PLACES as f32);
+                    let (u, piece) =
+                        (low_discrepancy_point(i), (i as f32 + 0.5) / POWER_SAMPLE_POINTS as f32);
                     let place = surface.sample_point(light, piece, u);
                     let part = targets
                         .view_from(place.from, &EmissionProfile::Front(place.normal))
@@ -375,7 +376,7 @@ impl PhotonEmitter {
                         / PI;
                     part.min(1.0) * mean_channel(place.flux)
                 };
-                (0..PLACES).map(of).sum::<f64>() / f64::from(PLACES) / power
+                (0..POWER_SAMPLE_POINTS).map(of).sum::<f64>() / f64::from(POWER_SAMPLE_POINTS) / power
             }),
         };
         power * part.min(1.0)
@@ -383,7 +384,7 @@ impl PhotonEmitter {
 }
 
 /// Number of points on an area light that are used to estimate the power toward the targets.
-const PLACES: u32 = 16;
+const POWER_SAMPLE_POINTS: u32 = 16;
 
 /// A low-discrepancy sequence in the unit square (Roberts, *The Unreasonable Effectiveness of Quasirandom
 /// Sequences*, 2018).

@@ -63,7 +63,7 @@ struct PiecePoint {
 }
 
 /// Maximum number of pieces for a textured or transformed light.
-const PIECES: usize = 1024;
+const MAX_PIECES: usize = 1024;
 
 /// Number of texture lookups per side of a piece.
 const LOOKUPS_PER_SIDE: u32 = 4;
@@ -78,7 +78,7 @@ impl DividedEmissiveSurface {
             EmissiveObjectGeometry::Shape(shape) => {
                 let areas = shape.local_part_areas();
                 let is_uneven = light.modulation.is_some() || matches!(shape, Shape::Transformed(_));
-                let most = if is_uneven { PIECES / areas.len().max(1) } else { 1 };
+                let most = if is_uneven { MAX_PIECES / areas.len().max(1) } else { 1 };
                 let side = most.isqrt().max(1);
                 let count = areas.len() * side * side;
                 (

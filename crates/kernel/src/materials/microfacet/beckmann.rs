@@ -18,10 +18,10 @@ use crate::math::Vec3;
 use crate::math::elementary::{erf_and_gaussian, gaussian, gaussian_quantile, log2};
 
 /// Number of Newton iterations, which reduce the error of H to less than 1e-6.
-const STEPS: u32 = 3;
+const NEWTON_STEPS: u32 = 3;
 
 /// Range of v. The probability of slopes outside of it is below the resolution of a random number.
-const RANGE: [f32; 2] = [6e-8, 1.0 - 6e-8];
+const V_RANGE: [f32; 2] = [6e-8, 1.0 - 6e-8];
 
 /// cosθ (1 + 2Λ). `sine` is α sinθ.
 #[inline(always)]
@@ -40,27 +40,27 @@ pub fn sample_visible_normal(view: Vec3, u: [f32; 2]) -> Vec3 {
     let inverse = 1.0 / if is_upright { 1.0 } else { sine };
     let (x, y) = (if is_upright { 1.0 } else { view.x * inverse }, view.y * inverse);
     let along = sample_slope_along_view(view.z, sine, u[0]);
-    let across = gaussian_quantile(u[1].max(RANGE[0]).min(RANGE[1]));
+    let across = gaussian_quantile(u[1].max(V_RANGE[0]).min(V_RANGE[1]));
     Vec3::new(across * y - along * x, -along * y - across * x, 1.0)
 }
 
 /// Samples the slope along the view direction.
 #[inline(always)]
 fn sample_slope_along_view(cosine: f32, sine: f32, u: f32) -> f32 {
-    let u = u.max(RANGE[0]);
+    let u = u.max(V_RANGE[0]);
     let (erf, at_end) = erf_and_gaussian(cosine / sine);
     let weight = sine * (0.25 * FRAC_2_SQRT_PI);
     // v and H at the steepest visible slope.
-    let end = (0.5 + 0.5 * erf).min(RANGE[1]);
+    let end = (0.5 + 0.5 * erf).min(V_RANGE[1]);
     let wanted = u * (cosine * end + weight * at_end);
     // Start from a blend of the solutions for normal and grazing incidence.
     let (erf, _) = erf_and_gaussian((-LN_2 * log2(u)).sqrt());
     let upright = cosine / (cosine + 2.0 * weight);
-    let mut v = (end * (upright * u + (1.0 - upright) * (1.0 - erf))).max(RANGE[0]).min(end);
+    let mut v = (end * (upright * u + (1.0 - upright) * (1.0 - erf))).max(V_RANGE[0]).min(end);
     let mut slope = gaussian_quantile(v);
-    for _ in 0..STEPS {
+    for _ in 0..NEWTON_STEPS {
         let missing = wanted - (cosine * v + weight * gaussian(slope));
-        v = (v + missing / (cosine - slope * sine).max(1e-6)).max(RANGE[0]).min(end);
+        v = (v + missing / (cosine - slope * sine).max(1e-6)).max(V_RANGE[0]).min(end);
         slope = gaussian_quantile(v);
     }
     slope

@@ -11,7 +11,7 @@ use crate::render::noise_goals::MIN_SAMPLES;
 /// pixels.
 const INTERVAL: Duration = Duration::from_millis(500);
 /// Minimum ratio of the current noise to the next reported level.
-const STEP: f64 = 1.5;
+const MIN_LEVEL_RATIO: f64 = 1.5;
 
 /// The last noise measurement and the time when the next one is due.
 #[derive(Debug)]
@@ -74,7 +74,7 @@ fn predict_next_noise_milestone(
     left: f64,
 ) -> Option<(f64, f64)> {
     let WorkAmount { done, aside: [aside, _], .. } = work;
-    let level = round_down_to_1_2_5_series(by_now / STEP);
+    let level = round_down_to_1_2_5_series(by_now / MIN_LEVEL_RATIO);
     let more = done * (libm::pow(by_now / level, 2.0 / power) - 1.0);
     // Assume that other activities keep taking the same fraction of the time.
     let seconds = more / rate * (1.0 + aside * rate / done);

@@ -66,10 +66,10 @@ pub struct PhotonMap {
 pub(super) const MIN_COSINE: f32 = 0.7;
 
 /// Maximum distance of photons from the tangent plane, in radii.
-pub(super) const REACH: f32 = 0.3;
+pub(super) const MAX_PLANE_DISTANCE: f32 = 0.3;
 
-/// Cell size in radii: larger than the bounding box of any kernel, 2·√(1 + REACH²), so that a kernel overlaps
-/// at most two cells along each axis.
+/// Cell size in radii: larger than the bounding box of any kernel, 2·√(1 + MAX_PLANE_DISTANCE²), so that a
+/// kernel overlaps at most two cells along each axis.
 const CELL: f32 = 2.1;
 
 /// A query for photons near a surface point.
@@ -95,7 +95,7 @@ impl GatherPoint {
     fn unit_kernel_half_extents(&self) -> Vec3 {
         let own = self.normal.abs();
         let along = (Vec3::ONE - own * own).max(Vec3::ZERO);
-        Vec3::new(along.x.sqrt(), along.y.sqrt(), along.z.sqrt()) + own * REACH
+        Vec3::new(along.x.sqrt(), along.y.sqrt(), along.z.sqrt()) + own * MAX_PLANE_DISTANCE
     }
 }
 
@@ -345,7 +345,7 @@ impl PhotonMap {
         let GatherPoint { point, normal, most_depth } = *look;
         let block = &self.blocks[number];
         let radius_squared = self.radius * self.radius;
-        let (reach, share) = (REACH * self.radius, 1.0 / radius_squared);
+        let (reach, share) = (MAX_PLANE_DISTANCE * self.radius, 1.0 / radius_squared);
         let [xs, ys, zs] = &block.point;
         let (mut near, mut weights) = ([0; PACKET_SIZE], [0.0; PACKET_SIZE]);
         let first = (number * PACKET_SIZE) as u32;
@@ -495,7 +495,7 @@ mod tests {
                         let way = photon.point - point;
                         let above = way.dot(normal);
                         let is_near = way.length_squared() - above * above < radius * radius;
-                        let is_flat = above.abs() < REACH * radius;
+                        let is_flat = above.abs() < MAX_PLANE_DISTANCE * radius;
                         is_near && is_flat && photon.normal.dot(normal) > MIN_COSINE
                     };
                     let mut expected: Vec<_> =

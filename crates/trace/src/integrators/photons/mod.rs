@@ -64,17 +64,17 @@ pub(super) use map::GatherPoint;
 pub use map::{Photon, PhotonMap};
 
 /// Number of photons that a thread emits at a time.
-const CHUNK: u32 = 2048;
+const PHOTONS_PER_JOB: u32 = 2048;
 
 /// α, the fraction of a pass's photons kept by the shrinking kernel.
 const ALPHA: f64 = 2.0 / 3.0;
 
 /// Target median photon count in the first pass's kernels, for caustic and bounced photons.
-const WANTED: [f32; 2] = [12.0, 8.0];
+const TARGET_KERNEL_PHOTONS: [f32; 2] = [12.0, 8.0];
 
 /// Fractions of photons aimed at mirrors and glass: the first if all of these objects are bounded, the second
 /// if some are unbounded.
-const AIMED: [f32; 2] = [0.9, 0.5];
+const AIMED_FRACTIONS: [f32; 2] = [0.9, 0.5];
 
 /// Photon emission for an image, shared by all passes.
 #[derive(Debug)]
@@ -149,7 +149,7 @@ impl PhotonMapper {
         // Aim photons at the mirrors and glass.
         let specular = SpecularObjects::from_world(world);
         let emission = scene_photon_emitter(&world.geometry, &world.lights).filter(|_| specular.has_any());
-        let aimed = AIMED[usize::from(specular.is_unbounded)];
+        let aimed = AIMED_FRACTIONS[usize::from(specular.is_unbounded)];
         let emission = emission.map(|emission| emission.with_targets(&specular.balls, aimed));
         let (glasses, bodies) = light_enclosing_glass_candidates(world);
         let most_depth = photons.bounces.min(settings.render.max_depth.saturating_sub(1));
@@ -161,7 +161,7 @@ impl PhotonMapper {
             let kinds = [&sent.caustic, &sent.bounced];
             let size =
                 own.emission.as_ref().map_or(1.0, |emission| emission.finite_scene_bounds().radius as f32);
-            let radii = kinds.into_par_iter().zip(WANTED);
+            let radii = kinds.into_par_iter().zip(TARGET_KERNEL_PHOTONS);
             let radii = radii.map(|(of, wanted)| radius_for_neighbor_count(of, wanted, size, token));
             let radii = radii.collect::<Result<Vec<_>, _>>()?;
             own.radii.iter_mut().zip(radii).for_each(|(own, radius)| *own = radius);
@@ -262,7 +262,7 @@ impl PhotonMapper {
             let count = self.settings.count;
             let at_once = u32::MAX / count;
             let start = number % at_once * count;
-            let samples = start + first..start + (first + CHUNK).min(count);
+            let samples = start + first..start + (first + PHOTONS_PER_JOB).min(count);
             let place = Rect { x: number / at_once, y: u32::MAX, width: 1, height: 1 };
             let block = SampleBlock { pixels: place.into(), samples, mirrored_width: None };
             let tile = TileContext {
@@ -277,9 +277,9 @@ impl PhotonMapper {
             progress(done, count.into());
             Ok(stored)
         };
-        let chunks: Vec<PhotonChunk> = (0..self.settings.count.div_ceil(CHUNK))
+        let chunks: Vec<PhotonChunk> = (0..self.settings.count.div_ceil(PHOTONS_PER_JOB))
             .into_par_iter()
-            .map(|number| chunk(number * CHUNK))
+            .map(|number| chunk(number * PHOTONS_PER_JOB))
             .collect::<Result<_, _>>()?;
         let lookups = chunks.iter().map(|chunk| chunk.lookups).sum();
         let joined = |of: fn(&PhotonChunk) -> &[Photon]| -> Result<Vec<Photon>, Canceled> {

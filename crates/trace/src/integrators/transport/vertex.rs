@@ -166,8 +166,8 @@ impl<'a> SurfaceVertex<'a> {
         )
     }
 
-    /// Point for texture lookups. Has no footprint if `is_shared`, which means that light samples compete with
-    /// the path.
+    /// Point for texture lookups. Has no footprint if `is_shared`, which means that light samples compete
+    /// with the path.
     pub fn lookup_point(&self, is_shared: bool) -> Cow<'_, TexturePoint> {
         match is_shared {
             true => Cow::Owned(self.texture_point.without_footprint()),

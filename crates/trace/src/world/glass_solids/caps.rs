@@ -12,7 +12,7 @@ use crate::scene::description::{LoweredShape, MeshReference, Scene};
 const MAX_RIM_EDGES: usize = 64;
 
 /// Search distance beyond a rim, relative to the length of the ray toward the rim.
-const REACH: f64 = 1e-3;
+const SEARCH_DISTANCE: f64 = 1e-3;
 
 /// Queries per edge: two rays and two points.
 const QUERIES: usize = 4;
@@ -77,11 +77,12 @@ fn rim_edge_queries<'a>(
             OpaqueQuery::Way(RayF64 {
                 origin,
                 direction,
-                t_max: 1.0 + REACH + tolerance / direction.length(),
+                t_max: 1.0 + SEARCH_DISTANCE + tolerance / direction.length(),
             })
         });
-        let [from, to] =
-            rim.ends.map(|end| OpaqueQuery::Point(end, REACH * end.distance(rim.inner) + tolerance));
+        let [from, to] = rim
+            .ends
+            .map(|end| OpaqueQuery::Point(end, SEARCH_DISTANCE * end.distance(rim.inner) + tolerance));
         [inner, middle, from, to]
     })
 }

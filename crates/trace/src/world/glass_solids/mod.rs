@@ -42,7 +42,7 @@ const NO_HOLE: f64 = 1e-7;
 const NO_VOLUME: f64 = 1e-9;
 
 /// A rim is closed if opaque surfaces cover at least this fraction of it.
-const COVERED: f64 = 0.95;
+const MIN_COVERED_FRACTION: f64 = 0.95;
 
 /// Glass solids of a scene.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -190,7 +190,8 @@ fn hole_covered_flags(
     let is_large = |hole: &&SolidHole| hole.part > SMALL_HOLE;
     let rims: Vec<&[RimEdge]> = holes.iter().filter(is_large).map(|hole| &*hole.rims).collect();
     let mut parts = caps::covered_rim_fractions(scene, meshes, parts, &rims, token)?.into_iter();
-    let is_covered = |hole: &SolidHole| is_large(&hole) && parts.next().is_some_and(|part| part >= COVERED);
+    let is_covered =
+        |hole: &SolidHole| is_large(&hole) && parts.next().is_some_and(|part| part >= MIN_COVERED_FRACTION);
     Ok(holes.iter().map(is_covered).collect())
 }
 

@@ -128,7 +128,7 @@ impl Cell {
         let has_room = 2 * room_needed_by_leaf(references.len()) <= self.room;
         if self.levels == 0 || references.is_empty() || !has_room {
             None
-        } else if references.len() <= sweep::SWEPT {
+        } else if references.len() <= sweep::MAX_SWEPT_REFERENCES {
             sweep::cheapest_plane(references, &self.bounds)
         } else {
             bins::cheapest_plane(references, &self.bounds)

@@ -60,7 +60,7 @@ impl<C: Fn(u32) -> [Vec3; 3]> KdSubtreeBuilder<'_, C> {
             self.references.truncate(first);
             return Ok(());
         };
-        if own.len() > POLLED {
+        if own.len() > MIN_POLLED_REFERENCES {
             self.token.check_pause_and_cancel()?;
         }
         let left = self.scratch.partition_references(&mut self.references, first, &plane, self.corners);
@@ -76,4 +76,4 @@ impl<C: Fn(u32) -> [Vec3; 3]> KdSubtreeBuilder<'_, C> {
 }
 
 /// Number of references above which splitting a cell polls the cancellation token.
-const POLLED: usize = 256;
+const MIN_POLLED_REFERENCES: usize = 256;

@@ -16,7 +16,7 @@ const MAX_ADDITIONAL: f64 = 0.3;
 const LEVELS: u32 = 20;
 
 /// Number of references processed between polls of the cancellation token.
-const CHUNK: usize = 4096;
+const REFERENCES_PER_POLL: usize = 4096;
 
 /// Splits the references of large triangles. The result depends only on the triangles.
 ///
@@ -44,7 +44,7 @@ pub fn split_large_triangles(
         }
         Ok(pieces)
     };
-    let chunks = references.par_chunks(CHUNK).zip(priorities.par_chunks(CHUNK));
+    let chunks = references.par_chunks(REFERENCES_PER_POLL).zip(priorities.par_chunks(REFERENCES_PER_POLL));
     Ok(chunks.map(of_chunk).collect::<Result<Vec<_>, _>>()?.concat())
 }
 

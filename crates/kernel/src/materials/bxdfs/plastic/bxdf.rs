@@ -43,14 +43,14 @@ soa! {
 }
 
 /// Set if the coat is smooth.
-const SMOOTH: BxdfFlags = BxdfFlags(1 << BxdfFlags::FIRST_OWN);
+const HAS_SMOOTH_COAT: BxdfFlags = BxdfFlags(1 << BxdfFlags::FIRST_OWN);
 
 impl<const BECKMANN: bool> PlasticBxdf<BECKMANN> {
     /// Albedo of the coat at a cosine ≥ 0.
     #[inline(always)]
     fn coat_albedo(&self, cosine: f32, any: BxdfFlags) -> f32 {
         let rough = self.coat.albedo(cosine);
-        if any.contains(SMOOTH) {
+        if any.contains(HAS_SMOOTH_COAT) {
             let smooth = self.coat.fresnel(cosine);
             if self.alpha == 0.0 { smooth } else { rough }
         } else {
@@ -88,7 +88,7 @@ impl<const BECKMANN: bool> Bxdf for PlasticBxdf<BECKMANN> {
 
     #[inline(always)]
     fn flags(&self) -> BxdfFlags {
-        BxdfFlags::NARROW.when(self.alpha > 0.0).union(SMOOTH.when(self.alpha == 0.0))
+        BxdfFlags::NARROW.when(self.alpha > 0.0).union(HAS_SMOOTH_COAT.when(self.alpha == 0.0))
     }
 
     #[inline(always)]
