@@ -94,7 +94,7 @@ FAULTS = [
      DIRECT + "estimators::all_techniques_have_equal_means"),
     ("pooled shadow rays without occlusion", "integrators/direct/shadow_rays.rs", "for to in set_bit_lanes(⟦occluded⟧) {", "0",
      DIRECT + "occlusion::occluded_samples_contribute_nothing"),
-    ("light from behind the surface", "integrators/direct/all_lights.rs", "let brings = (⟦cosines[i] > 0.0⟧) &", "true",
+    ("light from behind the surface", "integrators/direct/all_lights.rs", "let contributes = (⟦cosines[i] > 0.0⟧) &", "true",
      DIRECT + "occlusion::unlit_sides_are_never_sampled"),
     ("light from behind a perturbed normal", "integrators/transport/batch.rs", "let g = ⟦if g > 0.0 { g } else { 0.0 }⟧;", "g",
      "closed_forms::bumps::no_light_from_behind_the_shading_normal"),

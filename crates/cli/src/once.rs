@@ -38,12 +38,12 @@ pub(super) fn run(render_request: &RenderRequest, console: &Console) -> Exit {
         Err(error) => return console.print_error(Exit::FAILED, &describe_start_failure(1, false, &error)),
     };
     let remote = worker.command_sender();
-    let is_again = AtomicBool::new(false);
+    let was_signaled = AtomicBool::new(false);
     let ended = match signals::install_signal_handlers(move || {
         // Stop rendering and save a checkpoint. Finish a file that is being written unless a second signal
         // arrives.
         remote.send(Command::Suspend);
-        if is_again.swap(true, Ordering::Relaxed) {
+        if was_signaled.swap(true, Ordering::Relaxed) {
             remote.send(Command::Cancel);
         }
     }) {

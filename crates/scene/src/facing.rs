@@ -89,10 +89,10 @@ fn shape_projection_upper_bound(shape: &Shape, bounds: &[MeshBoundingBox], direc
 }
 
 /// Returns the transformed corners of a mesh's bounding box.
-fn transformed_box_corners(mesh: &MeshReference, [least, greatest]: [DVec3; 2]) -> [DVec3; 8] {
+fn transformed_box_corners(mesh: &MeshReference, [min, max]: [DVec3; 2]) -> [DVec3; 8] {
     let place = mesh.placed.to_transform();
     std::array::from_fn(|number| {
         let far = DVec3::new((number & 1) as f64, (number >> 1 & 1) as f64, (number >> 2) as f64);
-        place.point(least + (greatest - least) * far)
+        place.point(min + (max - min) * far)
     })
 }

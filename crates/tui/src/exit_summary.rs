@@ -75,12 +75,12 @@ fn describe_events_since_writing(state: &State) -> String {
         return String::new();
     }
     if !state.request.has_no_keyboard_overrides() {
-        let is_by_hand = written.iter().any(|written| written.shows.is_some());
+        let is_user_written = written.iter().any(|written| written.shows.is_some());
         return match state.saving.own {
             SceneImageProgress { .. } if state.saving.are_images_outdated() => {
                 messages::OLDER_THAN_EDIT.to_owned()
             }
-            SceneImageProgress { .. } if is_by_hand => String::new(),
+            SceneImageProgress { .. } if is_user_written => String::new(),
             SceneImageProgress { fraction, .. } => {
                 format!("; {NEXT_RENDER} is not finished ({:.0} %)", (fraction * 100.0).floor())
             }

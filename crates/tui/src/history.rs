@@ -196,8 +196,8 @@ impl RenderHistory {
 
     /// Drops the unfinished entry for a request.
     pub(super) fn drop_unfinished_of_request(&mut self, generation: u64) {
-        let is_it = |past: &HistoryEntry| past.shown.generation == generation && past.run.is_none();
-        if let Some(at) = self.past.iter().position(is_it) {
+        let is_displayed = |past: &HistoryEntry| past.shown.generation == generation && past.run.is_none();
+        if let Some(at) = self.past.iter().position(is_displayed) {
             self.remove(at);
         }
     }

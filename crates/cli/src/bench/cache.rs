@@ -40,13 +40,13 @@ pub fn write_starter_scene(folder: &Path) -> Result<PathBuf, OutputError> {
     ));
     create_folder(&folder)?;
     let path = folder.join("starter.toml");
-    let is_there = || fs::read(&path).is_ok_and(|found| found == text);
-    if is_there() {
+    let exists_unchanged = || fs::read(&path).is_ok_and(|found| found == text);
+    if exists_unchanged() {
         return Ok(path);
     }
     match staged::create_files_atomically(&folder, &[("starter.toml".into(), text)], &CancelToken::new()) {
         // Another process may have written the file in the meantime.
-        Err(_) if is_there() => Ok(path),
+        Err(_) if exists_unchanged() => Ok(path),
         Err(_) if path.symlink_metadata().is_ok() => Err(foreign_file_error(&path, "the starter scene")),
         written => written.map(|()| path),
     }

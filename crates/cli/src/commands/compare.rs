@@ -249,10 +249,10 @@ fn format_row(figures: &str, note: &str, columns: Option<usize>) -> Vec<String> 
     const INDENT: usize = 4;
     let start = figures.chars().count();
     let Some(columns) = columns else { return vec![format!("{figures}{note}").trim_end().to_owned()] };
-    let is_beside = columns >= start + MIN_NOTE_COLUMNS;
-    let indent = if is_beside { start } else { INDENT };
+    let fits_beside = columns >= start + MIN_NOTE_COLUMNS;
+    let indent = if fits_beside { start } else { INDENT };
     let mut note = wrap_text(note, columns.saturating_sub(indent).max(1));
-    let first = if is_beside && !note.is_empty() { note.remove(0) } else { String::new() };
+    let first = if fits_beside && !note.is_empty() { note.remove(0) } else { String::new() };
     let first = format!("{figures}{first}").trim_end().to_owned();
     let rest = note.into_iter().map(|line| format!("{:indent$}{line}", ""));
     std::iter::once(first).chain(rest).collect()

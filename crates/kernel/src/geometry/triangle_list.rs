@@ -190,11 +190,11 @@ impl TriangleList {
         simd: impl Simd,
     ) -> [u32; 2] {
         let candidates = self.find_nearest_candidates(rays, ends, except, simd);
-        let mut is_met = candidates.doubtful;
+        let mut may_hit = candidates.doubtful;
         for i in 0..PACKET_SIZE {
-            is_met[i] |= if candidates.near[i] < f32::INFINITY { TRUE } else { 0 };
+            may_hit[i] |= if candidates.near[i] < f32::INFINITY { TRUE } else { 0 };
         }
-        if simd.movemask(&is_met) & active == 0 {
+        if simd.movemask(&may_hit) & active == 0 {
             return [0; 2];
         }
         let CandidateTestResults { hit, undecided, .. } =

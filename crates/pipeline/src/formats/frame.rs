@@ -41,19 +41,19 @@ impl ViewSide {
 }
 
 /// Returns the closest camera that keeps all `points` inside the image in each of the `turns` turntable
-/// frames. `least` and `greatest` are opposite corners of the model's bounding box.
+/// frames. `min` and `max` are opposite corners of the model's bounding box.
 pub(super) fn frame_model(
-    [least, greatest]: [DVec3; 2],
+    [min, max]: [DVec3; 2],
     points: &[DVec3],
     from: ViewSide,
     turns: u32,
     aspect: f64,
 ) -> CameraPose {
     let (back, up) = from.to_camera_and_up_axes();
-    let middle = (least + greatest) * 0.5;
+    let middle = (min + max) * 0.5;
     let tangent = libm::tan((FOV * 0.5).to_radians()) * MAX_FILL;
     // Move the camera back until every point is inside the frame.
-    let half = (greatest - least) * 0.5;
+    let half = (max - min) * 0.5;
     let mut distance = 0.0_f64;
     for back in TurntableFrame::target_to_camera_vectors(turns.min(MAX_MEASURED), back, up) {
         let right = up.cross(back).normalize_or(DVec3::X);

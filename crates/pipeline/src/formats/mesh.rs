@@ -100,12 +100,12 @@ fn scene_of_mesh(
     &ForeignReadContext { view, containers, token }: &ForeignReadContext<'_>,
 ) -> Result<ForeignScene, AssetError> {
     let loaded = containers.load_any_mesh(path, None, &ignore_progress, token)?;
-    let Some([least, greatest]) = loaded.mesh.bounds_in_file_coordinates() else {
+    let Some([min, max]) = loaded.mesh.bounds_in_file_coordinates() else {
         return Err(AssetError::malformed(path, None, "no usable face"));
     };
     let up = view.up.unwrap_or(up);
     let upright = |at: DVec3| up.rotate_point_upright(at);
-    let (a, b) = (upright(least), upright(greatest));
+    let (a, b) = (upright(min), upright(max));
     let bounds = [a.min(b), a.max(b)];
     let points: Vec<DVec3> = loaded.mesh.extreme_vertices().into_iter().map(upright).collect();
     let eye = frame_model(
@@ -118,7 +118,7 @@ fn scene_of_mesh(
     // Report the file's coordinates as the cause, because the user did not choose the camera position.
     let eye_reach = eye.position.abs().max(eye.look_at.abs()).max_element();
     if eye_reach >= MAX_MAGNITUDE {
-        let farthest = least.abs().max(greatest.abs()).max_element() as f32;
+        let farthest = min.abs().max(max.abs()).max_element() as f32;
         let reason = format!(
             "its coordinates extend to {farthest:e}, which places the camera at {eye_reach:.0e}; coordinates must be below {MAX_MAGNITUDE:e}"
         );

@@ -179,11 +179,11 @@ pub(super) fn add_sky_and_key_light(document: &mut BuiltDocument, eye: &CameraPo
 pub(super) fn add_ground(
     document: &mut BuiltDocument,
     names: &mut UsedNames,
-    [least, greatest]: [DVec3; 2],
+    [min, max]: [DVec3; 2],
     eye: &CameraPose,
 ) {
-    let size = (greatest - least).length();
-    let height = least.y - size * 1e-4;
+    let size = (max - min).length();
+    let height = min.y - size * 1e-4;
     if eye.position.y <= height {
         return;
     }

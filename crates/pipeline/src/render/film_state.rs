@@ -328,19 +328,19 @@ impl FilmState {
         let is_there =
             |cell: &usize| self.is_tile_in_shard(cell / CELLS) && self.film.cell_rect(*cell).is_some();
         for cell in (0..self.done.len()).filter(is_there) {
-            let lacks = |half: usize| {
+            let remaining_samples = |half: usize| {
                 let (done, end) = (self.done[cell][half], self.expected_samples(cell, half, most));
                 let pixels = self.film.cell_half_pixel_count(cell, half) as f64;
                 let samples = pixels * f64::from(end.saturating_sub(done));
                 self.pixel_share.samples_including_overhead(samples, pixels * f64::from(jobs(done, end)))
             };
-            let (lacking, cost) = (lacks(0) + lacks(1), &self.costs[cell]);
+            let (remaining, cost) = (remaining_samples(0) + remaining_samples(1), &self.costs[cell]);
             if cost.is_unknown() {
-                others += lacking;
+                others += remaining;
                 continue;
             }
             let of_cell = cost.cost_in_samples_with_overhead(self.pixel_share);
-            seconds += lacking * cost.decayed_seconds_sum() / of_cell;
+            seconds += remaining * cost.decayed_seconds_sum() / of_cell;
             known += cost.decayed_seconds_sum();
             worth += of_cell;
         }

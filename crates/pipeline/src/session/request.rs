@@ -58,8 +58,8 @@ impl Session {
         }
         if let (Ok(report), Some(current)) = (&outcome, &mut self.current) {
             current.report = Some(report.clone());
-            let is_by_hand = self.written.has_user_written_image_on_disk(&self.contents);
-            if request.own.is_none() && findings.conflicts.is_empty() && !is_by_hand {
+            let is_user_written = self.written.has_user_written_image_on_disk(&self.contents);
+            if request.own.is_none() && findings.conflicts.is_empty() && !is_user_written {
                 self.write_report(report, sink, context.writing);
             }
         }

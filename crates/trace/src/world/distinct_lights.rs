@@ -115,8 +115,8 @@ fn find_triangle_lifts(
             }
         }
     }
-    let greatest = lights.faces.iter().map(|face| reach(face).max(sizes * face.size())).fold(0.0, f64::max);
-    Ok((found, LIFT * greatest))
+    let largest = lights.faces.iter().map(|face| reach(face).max(sizes * face.size())).fold(0.0, f64::max);
+    Ok((found, LIFT * largest))
 }
 
 /// Moves triangles by `height` along their normals in `lifts`. The moved triangles no longer share vertices

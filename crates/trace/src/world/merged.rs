@@ -64,9 +64,9 @@ impl MergedMeshes {
     pub fn merge_small_meshes(objects: &mut [Object], token: &CancelToken) -> Result<Option<Self>, Canceled> {
         // Choose the smallest meshes first, up to the maximum number of triangles to rebuild after each edit.
         let count = |object: &Object| object.mesh().map_or(0, MeshInstance::triangle_count);
-        let least = smallest_object_size(objects);
+        let smallest = smallest_object_size(objects);
         let mut chosen: Vec<usize> =
-            (0..objects.len()).filter(|&id| may_be_merged(&objects[id], least)).collect();
+            (0..objects.len()).filter(|&id| may_be_merged(&objects[id], smallest)).collect();
         chosen.sort_by_key(|&id| (count(&objects[id]), id));
         let mut total = 0;
         chosen.retain(|&id| {
@@ -352,17 +352,17 @@ fn smallest_object_size(objects: &[Object]) -> f32 {
 }
 
 /// Whether an object is a mesh that is small enough to merge and whose world coordinates are accurate enough
-/// in `f32`. `least` is the size of the scene's smallest object.
-fn may_be_merged(object: &Object, least: f32) -> bool {
+/// in `f32`. `smallest` is the size of the scene's smallest object.
+fn may_be_merged(object: &Object, smallest: f32) -> bool {
     let Some(mesh) = object.mesh() else { return false };
     let Some(bounds) = object.bounds().filter(|bounds| !bounds.is_empty()) else { return false };
-    let greatest = bounds.min.abs().max(bounds.max.abs()).max_element();
+    let largest = bounds.min.abs().max(bounds.max.abs()).max_element();
     let size = bounds.extent().max_element();
-    if mesh.is_transformed() && size > MAX_RELATIVE_SIZE * least {
+    if mesh.is_transformed() && size > MAX_RELATIVE_SIZE * smallest {
         return false;
     }
     let count = mesh.triangle_count();
-    (1..=MAX_PER_MESH).contains(&count) && greatest.is_finite() && greatest <= MAX_RELATIVE_COORDINATE * size
+    (1..=MAX_PER_MESH).contains(&count) && largest.is_finite() && largest <= MAX_RELATIVE_COORDINATE * size
 }
 
 #[cfg(test)]

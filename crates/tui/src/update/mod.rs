@@ -129,9 +129,9 @@ fn show_image(state: &mut State, shown: PreviewUpdate) -> Vec<Effect> {
             return Vec::new();
         }
         state.urgent |= state.preview.shown.as_ref().is_none_or(|last| last.generation != shown.generation);
-        let is_its =
+        let is_same_image =
             |last: &PreviewUpdate| last.generation == shown.generation || last.shows_same_image(&shown);
-        let last = state.preview.shown.take().filter(is_its);
+        let last = state.preview.shown.take().filter(is_same_image);
         state.preview.shown = Some(match last {
             Some(last) if state.display.dithers_colors() => keep_nearly_unchanged_pixels(shown, &last),
             Some(_) | None => shown,

@@ -97,13 +97,18 @@ pub(super) fn handle_worker_event(state: &mut State, event: Event) -> Vec<Effect
         }
         Event::OwnImage { state: own, .. } => state.saving.own.state = own,
         Event::WriteFailed { path, message, .. } => {
-            let is_by_hand = std::mem::take(&mut state.saving.is_write_requested);
+            let was_requested_by_user = std::mem::take(&mut state.saving.is_write_requested);
             // A failed write requested during the render does not affect the final image.
-            if !is_by_hand || state.work.activity == RequestStatus::Done {
+            if !was_requested_by_user || state.work.activity == RequestStatus::Done {
                 state.saving.unwritten = Some(messages::NOT_WRITTEN.to_owned());
             }
-            let is_it = |written: &&mut WrittenFile| Some(&written.path) == path.as_ref();
-            state.saving.written.iter_mut().filter(is_it).for_each(|written| written.is_stale = true);
+            let is_failed_file = |written: &&mut WrittenFile| Some(&written.path) == path.as_ref();
+            state
+                .saving
+                .written
+                .iter_mut()
+                .filter(is_failed_file)
+                .for_each(|written| written.is_stale = true);
             show_until_key(state, format!("error: {}", escape_invisible_chars(&message)));
             state.saving.write_failed =
                 Some(WriteFailure { why: message, generation: state.request.generation, is_refused: false });

@@ -212,15 +212,15 @@ fn urgent_and_other_hints(state: &State) -> (Vec<KeyHint>, Vec<KeyHint>) {
     let is_shown = |it: &&KeyBinding| it.action != Action::ShowImageOnly || has_preview;
     let is_idle = |it: &&KeyBinding| it.action != Action::TogglePause || state.work.is_request_running();
     // If there are changes to list, a hint added above already shows them next to this key.
-    let is_of_use = state.request.toggles != KeyOverrides::default()
+    let has_unlisted_changes = state.request.toggles != KeyOverrides::default()
         && state.request.describe_camera_and_exposure_changes().is_empty();
-    let is_back = |it: &&KeyBinding| it.action != Action::ResetSettings || is_of_use;
+    let is_useful = |it: &&KeyBinding| it.action != Action::ResetSettings || has_unlisted_changes;
     let others = KEYMAP
         .iter()
         .filter(is_other)
         .filter(is_shown)
         .filter(is_idle)
-        .filter(is_back)
+        .filter(is_useful)
         .map(|it| KeyHint::new(it.label, it.hint));
     (urgent, first.into_iter().chain(others).collect())
 }

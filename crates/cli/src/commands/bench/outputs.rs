@@ -87,7 +87,7 @@ impl BenchOutputs {
         if FileIdentity::from_existing_or_new_path(real).is_none() {
             return Ok(());
         }
-        let is_it = |path: &Path| is_same_file(real, path);
+        let is_target = |path: &Path| is_same_file(real, path);
         let (option, path, _) = &self.files[index];
         let refused = |what: &str| {
             let reason = format!(
@@ -96,10 +96,10 @@ impl BenchOutputs {
             );
             Err(OutputError::Refused { reason })
         };
-        if let Some((what, _)) = self.inputs.iter().find(|(_, input)| is_it(input)) {
+        if let Some((what, _)) = self.inputs.iter().find(|(_, input)| is_target(input)) {
             return refused(what);
         }
-        if let Some((other, ..)) = self.files[..index].iter().find(|(_, other, _)| is_it(other)) {
+        if let Some((other, ..)) = self.files[..index].iter().find(|(_, other, _)| is_target(other)) {
             return refused(&format!("the output of {other}"));
         }
         if self.replaces_foreign { Ok(()) } else { self.check_written_by_glimt(index, real) }

@@ -263,9 +263,9 @@ impl Bvh {
                 continue;
             }
             let (node, shells) = (&self.nodes[first as usize], &shells[first as usize]);
-            let is_met =
+            let is_hit =
                 |side: &usize| enter.entry_distance(&node.bounds[*side], &shells[*side], ray.t_max).is_some();
-            stack.extend((0..2).filter(is_met).map(|side| node.child[side]));
+            stack.extend((0..2).filter(is_hit).map(|side| node.child[side]));
         }
         false
     }

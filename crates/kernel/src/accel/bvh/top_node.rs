@@ -78,8 +78,8 @@ impl WideTopNode {
         for axis in 0..3 {
             let (least, greatest) = (other.min[axis], other.max[axis]);
             for i in 0..PACKET_SIZE {
-                let meets = (self.min[axis][i] <= greatest) & (least <= self.max[axis][i]);
-                hits[i] = if meets { hits[i] } else { 0 };
+                let overlaps = (self.min[axis][i] <= greatest) & (least <= self.max[axis][i]);
+                hits[i] = if overlaps { hits[i] } else { 0 };
             }
         }
         PortableSimd.movemask(&hits) & self.used
@@ -230,10 +230,10 @@ mod tests {
                 for (id, bounds) in boxes.iter().enumerate() {
                     for lane in set_bit_lanes((1 << rays.len()) - 1).filter(|&lane| ends[lane] >= 0.0) {
                         let slabs = SlabRay::new(rays[lane].origin, rays[lane].direction);
-                        let is_met = slabs.entry_distance(bounds.min, bounds.max, ends[lane]).is_some();
+                        let is_hit = slabs.entry_distance(bounds.min, bounds.max, ends[lane]).is_some();
                         let seen = [closest.0[id], any.0[id]].map(|seen| seen & 1 << lane != 0);
-                        assert!(!is_met || seen == [true; 2], "{lane} of {rays:?}: {bounds:?} {seen:?}");
-                        hits += u32::from(is_met);
+                        assert!(!is_hit || seen == [true; 2], "{lane} of {rays:?}: {bounds:?} {seen:?}");
+                        hits += u32::from(is_hit);
                     }
                     tested += closest.0[id].count_ones();
                 }

@@ -29,10 +29,10 @@ struct PlaneRay {
 
 impl PlaneRay {
     fn new(ray: &Ray, bounds: &Aabb) -> Self {
-        let greatest = ray.direction.abs().max_element();
+        let largest = ray.direction.abs().max_element();
         // Compute the next lower power of two from the exponent bits. Scaling by a power of two is exact.
-        let steps = f32::from_bits(greatest.to_bits() & 0x7f80_0000)
-            .clamp(f32::MIN_POSITIVE, 1.0 / f32::MIN_POSITIVE);
+        let steps =
+            f32::from_bits(largest.to_bits() & 0x7f80_0000).clamp(f32::MIN_POSITIVE, 1.0 / f32::MIN_POSITIVE);
         let inverse = (ray.direction * (1.0 / steps)).recip();
         let reach = (bounds.min - ray.origin).abs().max((bounds.max - ray.origin).abs()).max_element();
         Self {

@@ -116,9 +116,9 @@ fn invert_edge_integral(half: f64, width: f64, part: f64) -> f64 {
         (low, high) = if off > 0.0 { (low, delta) } else { (delta, high) };
         let next = delta - off / (delta * libm::sin(half - delta));
         let next = if next > low && next < high { next } else { 0.5 * (low + high) };
-        let is_there = (next - delta).abs() <= 1e-6 * delta;
+        let has_converged = (next - delta).abs() <= 1e-6 * delta;
         delta = next;
-        if is_there {
+        if has_converged {
             break;
         }
     }

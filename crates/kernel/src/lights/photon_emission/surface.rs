@@ -186,6 +186,6 @@ fn coordinate_bound(shape: &Shape) -> Option<f64> {
         return Some(own.length_bound_to_world(coordinate_bound(&own.shape)?));
     }
     let bounds = shape.bounds()?;
-    let greatest = bounds.min.abs().max(bounds.max.abs()).as_dvec3().max_element();
-    Some(greatest + 2.0 * bounds.extent().as_dvec3().length())
+    let largest = bounds.min.abs().max(bounds.max.abs()).as_dvec3().max_element();
+    Some(largest + 2.0 * bounds.extent().as_dvec3().length())
 }

@@ -367,8 +367,8 @@ fn material_may_cast_caustics(material: &ModelMaterial) -> bool {
 
 /// Upper bound on the total irradiance at the center of a bounding box, assuming normal incidence from all
 /// lights. Distances to lights are clamped to at least a quarter of the box's diagonal.
-fn max_irradiance(lights: &[ModelLight], [least, greatest]: [DVec3; 2]) -> f64 {
-    let (middle, size) = ((least + greatest) * 0.5, (greatest - least).length());
+fn max_irradiance(lights: &[ModelLight], [min, max]: [DVec3; 2]) -> f64 {
+    let (middle, size) = ((min + max) * 0.5, (max - min).length());
     let of_light = |light: &ModelLight| {
         let luminance = f64::from(luminance(light.intensity.as_vec3()));
         match light.kind {
@@ -406,9 +406,9 @@ fn zero_if_tiny(value: f64) -> f64 {
 }
 
 /// Converts a camera from the file. Places `look_at` on its view axis, at the depth of the model's center.
-fn camera_pose(camera: &ModelCamera, [least, greatest]: [DVec3; 2]) -> CameraPose {
-    let size = (greatest - least).length().max(1e-12);
-    let depth = ((least + greatest) * 0.5 - camera.position).dot(camera.direction).max(size * 0.05);
+fn camera_pose(camera: &ModelCamera, [min, max]: [DVec3; 2]) -> CameraPose {
+    let size = (max - min).length().max(1e-12);
+    let depth = ((min + max) * 0.5 - camera.position).dot(camera.direction).max(size * 0.05);
     let look_at = camera.position + camera.direction * depth;
     let step = size.min(depth) * 1e-6;
     let tidy = |at: DVec3| DVec3::from(at.to_array().map(|part| round_to_decimals_of_step(part, step)));

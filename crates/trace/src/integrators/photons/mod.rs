@@ -366,7 +366,7 @@ fn light_enclosing_glass_candidates(world: &World) -> (Vec<u32>, Vec<CompoundSol
     let closed = world.closed_glass_shapes().map(|(object, _)| object).filter(may_contain_light).collect();
     // A solid closed by opaque surfaces may extend beyond its bounding box, so test the center and corners of
     // each light.
-    let is_around = |body: &CompoundSolid, light: &LightBoundingBoxes| {
+    let encloses_light = |body: &CompoundSolid, light: &LightBoundingBoxes| {
         light
             .smaller_box_center_and_corners()
             .any(|point| world.enclosing_glass_material(body, point, light.object).is_some())
@@ -374,7 +374,7 @@ fn light_enclosing_glass_candidates(world: &World) -> (Vec<u32>, Vec<CompoundSol
     let mut bodies = world.compound_solids();
     bodies.retain(|body| {
         light_boxes.iter().any(|light| {
-            light.may_light_intersect_box(&body.bounds) || body.is_covered && is_around(body, light)
+            light.may_light_intersect_box(&body.bounds) || body.is_covered && encloses_light(body, light)
         })
     });
     (closed, bodies)
@@ -396,11 +396,12 @@ impl GlassObjectBoundsList {
     /// refraction is 1 or the object may touch or overlap glass with the same index.
     fn may_be_index_matched(&self, id: u32, ior: f32) -> bool {
         let own = self.0.iter().find(|(other, ..)| *other == id).and_then(|(_, bounds, _)| *bounds);
-        let meets = |other: &Aabb| own.is_none_or(|own| own.expanded(own.extent() * NEAR).overlaps(other));
-        let is_met = |(other, bounds, index): &(u32, Option<Aabb>, f32)| {
-            *other != id && *index == ior && bounds.as_ref().is_none_or(meets)
+        let may_touch =
+            |other: &Aabb| own.is_none_or(|own| own.expanded(own.extent() * NEAR).overlaps(other));
+        let matches_other_glass = |(other, bounds, index): &(u32, Option<Aabb>, f32)| {
+            *other != id && *index == ior && bounds.as_ref().is_none_or(may_touch)
         };
-        ior == 1.0 || self.0.iter().any(is_met)
+        ior == 1.0 || self.0.iter().any(matches_other_glass)
     }
 }
 

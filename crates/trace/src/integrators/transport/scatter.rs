@@ -218,9 +218,9 @@ impl BsdfSampler<'_> {
             roulette_throughput[i] = row.roulette_throughput[i] * bsdf.max[i] * share;
             let factor = lane(&f, i) * share;
             set_lane(&mut factors, i, factor);
-            let brings = (factor.x > 0.0) | (factor.y > 0.0) | (factor.z > 0.0);
+            let contributes = (factor.x > 0.0) | (factor.y > 0.0) | (factor.z > 0.0);
             let bit = 1 << i;
-            alive |= if (cosines[i] > 0.0) & (pdfs[i] > 0.0) & brings { bit } else { 0 };
+            alive |= if (cosines[i] > 0.0) & (pdfs[i] > 0.0) & contributes { bit } else { 0 };
         }
         let diffuse = match continuation.lobes {
             LobesToSample::All if self.has_fractions => bsdf.wide_fraction(),

@@ -97,12 +97,12 @@ mod tests {
         if !(at > cell.min[axis] && at < cell.max_corner()[axis]) {
             return f32::INFINITY;
         }
-        let goes = |reference: &TriangleReference, right: bool| {
+        let belongs = |reference: &TriangleReference, right: bool| {
             let (min, max) = (reference.bounds.min[axis], reference.bounds.max_corner()[axis]);
             let is_planar = min == at && max == at;
             if is_planar { right == planar_right } else { if right { max > at } else { min < at } }
         };
-        let count = |right| references.iter().filter(|reference| goes(reference, right)).count() as f32;
+        let count = |right| references.iter().filter(|reference| belongs(reference, right)).count() as f32;
         let share = cell.split_at_plane(axis, at).map(|half| half.half_area() / cell.half_area());
         let cost = 1.0 + share[0] * count(false) + share[1] * count(true);
         if count(false) == 0.0 || count(true) == 0.0 { 0.8 * cost } else { cost }
