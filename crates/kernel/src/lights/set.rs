@@ -254,11 +254,11 @@ impl Lights {
         }
     }
 
-    /// Radiance from infinity in a unit direction. `share` returns the weight of a light, given its index and
+    /// Radiance from infinity in a unit direction. `weight` returns the weight of a light, given its index and
     /// its light-sampling pdf in sr⁻¹.
-    pub fn radiance_from_infinity(&self, direction: Vec3, share: impl Fn(u32, f32) -> f32) -> Vec3 {
+    pub fn radiance_from_infinity(&self, direction: Vec3, weight: impl Fn(u32, f32) -> f32) -> Vec3 {
         let sky = self.environment().map(|environment| environment.radiance_and_pdf(direction));
-        self.radiance_from_infinity_with_precomputed_sky(sky, direction, share)
+        self.radiance_from_infinity_with_precomputed_sky(sky, direction, weight)
     }
 
     /// [`Lights::radiance_from_infinity`] with a precomputed result of [`Environment::radiance_and_pdf`].
@@ -266,13 +266,13 @@ impl Lights {
         &self,
         sky: Option<(Vec3, f32)>,
         direction: Vec3,
-        share: impl Fn(u32, f32) -> f32,
+        weight: impl Fn(u32, f32) -> f32,
     ) -> Vec3 {
         let suns =
             self.suns.iter().map(|(number, sun)| (*number, (sun.radiance(direction), sun.pdf(direction))));
         let number = self.environment.iter().map(|(number, _)| *number);
         let seen = suns.chain(number.zip(sky)).filter(|(_, (radiance, _))| *radiance != Vec3::ZERO);
-        seen.map(|(number, (radiance, density))| radiance * share(number, density)).sum()
+        seen.map(|(number, (radiance, density))| radiance * weight(number, density)).sum()
     }
 
     /// The light with the given index.

@@ -153,7 +153,7 @@ struct LightEmissionInfo {
 struct PhotonAim {
     targets: PhotonTargets,
     /// Fraction of the photons that are aimed.
-    share: f32,
+    aimed_fraction: f32,
     /// Distribution of the lights, weighted by their estimated power toward the targets.
     by_light: DiscreteDistribution,
 }
@@ -177,11 +177,11 @@ impl PhotonEmitter {
         Some(Self { lights: Arc::clone(lights), sources, around, by_power, aim: None })
     }
 
-    /// Aims a fraction `share` in [0, 1] of the photons at targets. If `share` is 1, all photons hit a
+    /// Aims the fraction `aimed_fraction` of the photons at targets. If the fraction is 1, all photons hit a
     /// target, and their mean flux is the power that reaches the targets.
     #[must_use]
-    pub fn with_targets(self, targets: &[BoundingSphere], share: f32) -> Self {
-        let targets = PhotonTargets::new(targets).filter(|_| share > 0.0);
+    pub fn with_targets(self, targets: &[BoundingSphere], aimed_fraction: f32) -> Self {
+        let targets = PhotonTargets::new(targets).filter(|_| aimed_fraction > 0.0);
         let aim = targets.and_then(|targets| {
             let power_toward = |(number, light)| self.estimate_power_toward_targets(number, light, &targets);
             let power_toward: Vec<f64> = self.lights.iter().map(power_toward).collect();
@@ -191,7 +191,7 @@ impl PhotonEmitter {
                 estimate + BY_POWER * mean_channel(self.sources[number].power) / total
             };
             let by_light = DiscreteDistribution::new(power_toward.iter().enumerate().map(weight))?;
-            Some(PhotonAim { targets, share: share.min(1.0), by_light })
+            Some(PhotonAim { targets, aimed_fraction: aimed_fraction.min(1.0), by_light })
         });
         Self { aim, ..self }
     }
@@ -213,12 +213,12 @@ impl PhotonEmitter {
 
     /// Fraction of the photons that are aimed at targets.
     pub fn aimed_probability(&self) -> f32 {
-        self.aim.as_ref().map_or(0.0, |aim| aim.share)
+        self.aim.as_ref().map_or(0.0, |aim| aim.aimed_fraction)
     }
 
     /// Emits a photon, or returns `None` if the sample carries no flux.
     pub fn emit(&self, u: &PhotonRandomNumbers) -> Option<EmittedPhoton> {
-        let aim = self.aim.as_ref().filter(|aim| u.aim[0] < aim.share);
+        let aim = self.aim.as_ref().filter(|aim| u.aim[0] < aim.aimed_fraction);
         let by_light = aim.map_or(&self.by_power, |aim| &aim.by_light);
         let (number, _) = by_light.sample(u.light[0]);
         let targets = aim.map(|aim| &aim.targets);

@@ -53,7 +53,7 @@ pub struct PhotonTracer<'a> {
     /// Other glass solids that may contain lights.
     pub bodies: &'a [CompoundSolid],
     /// Reciprocal of the number of photons.
-    pub share: f32,
+    pub flux_scale: f32,
     /// Maximum number of bounces per photon.
     pub most_depth: u32,
 }
@@ -246,7 +246,7 @@ impl PhotonWavefront<'_> {
                 let offset = begin as usize + i;
                 let path = PathRay {
                     ray,
-                    throughput: emitted.flux * tracing.share,
+                    throughput: emitted.flux * tracing.flux_scale,
                     slot: offset as u32,
                     path: CAMERA_PATH + 1,
                     interiors: tracing.interiors_at(ray.origin, &emitted),

@@ -269,9 +269,9 @@ impl PhotonMapper {
                 camera_cone: None,
                 ..TileContext::new(world, &settings, &block, token, behavior)
             };
-            let (share, most_depth) = (1.0 / count as f32, self.most_depth);
+            let (flux_scale, most_depth) = (1.0 / count as f32, self.most_depth);
             let stored =
-                PhotonTracer { tile: &tile, emission, glasses, bodies: &self.bodies, share, most_depth }
+                PhotonTracer { tile: &tile, emission, glasses, bodies: &self.bodies, flux_scale, most_depth }
                     .trace_photons()?;
             let done = done.fetch_add(block.len() as u64, Ordering::Relaxed) + block.len() as u64;
             progress(done, count.into());

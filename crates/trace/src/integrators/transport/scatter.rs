@@ -214,9 +214,9 @@ impl BsdfSampler<'_> {
         let mut factors = f;
         let mut alive = 0_u32;
         for i in 0..PACKET_SIZE {
-            let share = cosines[i] / pdfs[i];
-            roulette_throughput[i] = row.roulette_throughput[i] * bsdf.max[i] * share;
-            let factor = lane(&f, i) * share;
+            let cosine_over_pdf = cosines[i] / pdfs[i];
+            roulette_throughput[i] = row.roulette_throughput[i] * bsdf.max[i] * cosine_over_pdf;
+            let factor = lane(&f, i) * cosine_over_pdf;
             set_lane(&mut factors, i, factor);
             let contributes = (factor.x > 0.0) | (factor.y > 0.0) | (factor.z > 0.0);
             let bit = 1 << i;

@@ -78,7 +78,7 @@ soa! {
         /// Length of the path through the layer toward the viewer.
         path_length: f32 = 1.0,
         /// Probability of choosing the coat's lobe.
-        share: f32 = 0.0,
+        coat_probability: f32 = 0.0,
         /// Probability of choosing a narrow lobe if the base is chosen.
         base_narrow_lobe_probability: f32 = 1.0,
     }
@@ -99,13 +99,13 @@ impl LobeChoice {
     /// The probabilities if `lobes` are sampled.
     #[inline(always)]
     fn new(view: &CoatViewTerms, lobes: LobesToSample) -> Self {
-        let base = 1.0 - view.share;
+        let base = 1.0 - view.coat_probability;
         match lobes {
-            LobesToSample::All => Self { coat: view.share, base },
+            LobesToSample::All => Self { coat: view.coat_probability, base },
             LobesToSample::Narrow => {
                 let narrow = base * view.base_narrow_lobe_probability;
-                let all = (view.share + narrow).max(f32::MIN_POSITIVE);
-                Self { coat: view.share / all, base: narrow / all }
+                let all = (view.coat_probability + narrow).max(f32::MIN_POSITIVE);
+                Self { coat: view.coat_probability / all, base: narrow / all }
             }
         }
     }
@@ -175,7 +175,7 @@ impl<B: Bxdf> Bxdf for CoatedBxdf<B> {
             wo,
             transmittance: 1.0 - albedo,
             path_length: self.layer.coat.path_length(cosine),
-            share: albedo / (albedo + below).max(f32::MIN_POSITIVE),
+            coat_probability: albedo / (albedo + below).max(f32::MIN_POSITIVE),
             base_narrow_lobe_probability: self.base.narrow_lobe_probability(&base),
         };
         LayerOver { layer, base }
