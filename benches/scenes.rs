@@ -14,9 +14,9 @@ use nix::sys::time::TimeValLike;
 const HEAD: &str = "[camera]\nposition = [0, 1, 4]\nlook_at = [0, 1, 0]\n[[light]]\n";
 
 /// Generates a scene file with the requested number of elements.
-type Family = fn(usize) -> String;
+type SceneGenerator = fn(usize) -> String;
 
-const FAMILIES: [(&str, Family); 14] = [
+const FAMILIES: [(&str, SceneGenerator); 14] = [
     ("wrong materials", |n| {
         repeated(n, |i| format!("[materials.mat{i}]\n")) + &repeated(n, |i| sphere(i, "mot"))
     }),

@@ -163,7 +163,7 @@ fn lock<T>(of: &Mutex<T>) -> MutexGuard<'_, T> {
 }
 
 /// Bytes with their arrival time.
-type Due = (Instant, Vec<u8>);
+type DelayedBytes = (Instant, Vec<u8>);
 
 /// Simulates the connection: delays output on its way to the far end, and answers on the way back.
 fn simulate_connection(
@@ -172,7 +172,8 @@ fn simulate_connection(
     keys: Arc<Mutex<Box<dyn Write + Send>>>,
     line: Connection,
 ) {
-    let ((down, arriving), (up, rising)) = (channel::<Due>(), channel::<(Instant, usize, &'static [u8])>());
+    let ((down, arriving), (up, rising)) =
+        (channel::<DelayedBytes>(), channel::<(Instant, usize, &'static [u8])>());
     let at_end = far.clone();
     thread::spawn(move || process_arrivals(&arriving, &at_end, &up, line.delay));
     let at_start = far.clone();
@@ -205,7 +206,7 @@ fn simulate_connection(
 }
 
 fn process_arrivals(
-    arriving: &Receiver<Due>,
+    arriving: &Receiver<DelayedBytes>,
     far: &Mutex<FarEnd>,
     up: &Sender<(Instant, usize, &'static [u8])>,
     delay: Duration,

@@ -116,7 +116,7 @@ mod tests {
     use std::path::Path;
 
     use super::*;
-    use crate::compare::Pair;
+    use crate::compare::ImagePair;
     use crate::math::Vec3;
     use crate::math::random::TestRandom;
 
@@ -146,7 +146,7 @@ mod tests {
 
         fn found(&mut self, seeds: usize, offset: f32, block: u32) -> SquaredBias {
             let names = [Path::new("r1"), Path::new("r2")];
-            let pair = Pair::new(names, self.picture(0.02, 0.0, 1), self.picture(0.02, 0.0, 1));
+            let pair = ImagePair::new(names, self.picture(0.02, 0.0, 1), self.picture(0.02, 0.0, 1));
             let references = IndependentReferences::new(pair.expect("a pair"));
             let pictures: Vec<_> = (0..seeds).map(|_| self.picture(0.2, offset, block)).collect();
             estimate_bias(&references, &pictures).expect("enough seeds")
@@ -199,7 +199,7 @@ mod tests {
     #[test]
     fn noise_free_images_have_exact_bias() {
         let mut noise = NoisyImages::new(1);
-        let pair = Pair::new(
+        let pair = ImagePair::new(
             [Path::new("a"), Path::new("b")],
             noise.picture(0.0, 0.0, 1),
             noise.picture(0.0, 0.0, 1),

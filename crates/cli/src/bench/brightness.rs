@@ -80,7 +80,7 @@ mod tests {
 
     use super::*;
     use crate::bench::bias::estimate_bias;
-    use crate::compare::Pair;
+    use crate::compare::ImagePair;
     use crate::math::Vec3;
     use crate::math::random::unit_generator;
 
@@ -98,7 +98,7 @@ mod tests {
     fn references(next: &mut impl FnMut() -> f32) -> IndependentReferences {
         let pair = [Path::new("r1"), Path::new("r2")];
         let [a, b] = [picture(next, 0.0, 0.02, 0.0), picture(next, 0.0, 0.02, 0.0)];
-        IndependentReferences::new(Pair::new(pair, a, b).expect("a pair"))
+        IndependentReferences::new(ImagePair::new(pair, a, b).expect("a pair"))
     }
 
     #[test]
@@ -148,7 +148,7 @@ mod tests {
         let pictures: Vec<_> = (0..2).map(|_| picture(&mut next, 0.0, 0.1, 0.0)).collect();
         assert_eq!(compare_brightness(&references, &pictures, true), None);
         let black = || RadianceImage::black(2, 2);
-        let dark = Pair::new([Path::new("a"), Path::new("b")], black(), black()).expect("a pair");
+        let dark = ImagePair::new([Path::new("a"), Path::new("b")], black(), black()).expect("a pair");
         assert_eq!(
             compare_brightness(&IndependentReferences::new(dark), &[black(), black(), black()], true),
             None

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use super::cache::{self, ReferenceCost, ReferencesWithCost};
 use super::request::BenchError;
 use super::results::ReferenceResult;
-use crate::compare::{IndependentReferences, Pair};
+use crate::compare::{ImagePair, IndependentReferences};
 use crate::control::CancelToken;
 use crate::pipeline::BUILD;
 use crate::pipeline::headless::{HeadlessSession, RenderedImage};
@@ -81,7 +81,7 @@ pub(super) struct UncachedReferences {
 
 /// Loads references from files.
 pub(super) fn load_reference_files(files: &[PathBuf; 2]) -> Result<SceneReferences, BenchError> {
-    let pair = Pair::load(&files[0], &files[1]).map_err(|errors| {
+    let pair = ImagePair::load(&files[0], &files[1]).map_err(|errors| {
         BenchError::Call(errors.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))
     })?;
     let mut names: Vec<String> = files.iter().map(|file| file.to_string_lossy().into_owned()).collect();
@@ -148,7 +148,7 @@ impl ReferenceRenderer<'_> {
             seconds: first.report.seconds + second.report.seconds,
         };
         let names = ["the first reference", "the second reference"].map(Path::new);
-        let pair = Pair::new(names, first.image, second.image).map_err(|errors| {
+        let pair = ImagePair::new(names, first.image, second.image).map_err(|errors| {
             BenchError::Call(errors.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))
         })?;
         let keys = ReferenceFingerprints([first.key, second.key]);

@@ -9,7 +9,7 @@ use rayon::ThreadPool;
 use serde::Serialize;
 
 use crate::args::CompareArgs;
-use crate::compare::{self, Bias, ErrorMetrics, PIXELS_PER_DEGREE, Pair, PairMeasurements};
+use crate::compare::{self, Bias, ErrorMetrics, ImagePair, PIXELS_PER_DEGREE, PairMeasurements};
 use crate::console::Console;
 use crate::control::CancelToken;
 use crate::exit::Exit;
@@ -33,7 +33,7 @@ pub(crate) fn run(args: &CompareArgs, console: &Console) -> Exit {
 fn run_in_pool(pool: &ThreadPool, args: &CompareArgs, console: &Console) -> Result<Exit, Exit> {
     let diff =
         args.diff.as_deref().map(|path| ErrorImageOutput::try_from_args(path, args, console)).transpose()?;
-    let pair = Pair::load(&args.a, &args.b).map_err(|errors| {
+    let pair = ImagePair::load(&args.a, &args.b).map_err(|errors| {
         errors.iter().for_each(|error| console.print_line_to_stderr(&format!("error: {error}")));
         Exit::WRONG
     })?;
@@ -121,7 +121,7 @@ impl<'a> ErrorImageOutput<'a> {
     fn write(
         &self,
         args: &CompareArgs,
-        pair: &Pair,
+        pair: &ImagePair,
         measured: &PairMeasurements,
     ) -> Result<Vec<WriteWarning>, OutputError> {
         let image: RadianceImage = if self.is_float() {
@@ -192,7 +192,7 @@ struct Summary<'a> {
 }
 
 impl<'a> Summary<'a> {
-    fn new(args: &CompareArgs, pair: &Pair, errors: &'a ErrorMetrics, bias: Bias) -> Self {
+    fn new(args: &CompareArgs, pair: &ImagePair, errors: &'a ErrorMetrics, bias: Bias) -> Self {
         let &ErrorMetrics { rmse, relmse, relmse_trimmed, dropped_pixels, max, psnr_db, ssim, flip, .. } =
             errors;
         Self {

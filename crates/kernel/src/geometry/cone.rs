@@ -280,7 +280,7 @@ fn mirror_y(p: DVec2) -> DVec2 {
 mod tests {
     use super::*;
     use crate::geometry::Ray;
-    use crate::geometry::surface_of_revolution::tests::{Thin, hits_from_afar};
+    use crate::geometry::surface_of_revolution::tests::{ThinShape, hits_from_afar};
     use crate::math::Vec3;
 
     /// A cone with its tip at y = 2 and a base of radius 1 at y = 0.
@@ -356,7 +356,7 @@ mod tests {
         assert!((slanting.max - Vec3::new(3.0, 4.0, 1.0)).abs().max_element() < 1e-6);
     }
 
-    impl Thin for Cone {
+    impl ThinShape for Cone {
         fn thin(radius: f64, capped: bool) -> Self {
             Self::new(DVec3::NEG_Z, DVec3::Z, radius, capped)
         }

@@ -240,7 +240,7 @@ impl Cylinder {
 mod tests {
     use super::*;
     use crate::geometry::Ray;
-    use crate::geometry::surface_of_revolution::tests::{Thin, hits_from_afar};
+    use crate::geometry::surface_of_revolution::tests::{ThinShape, hits_from_afar};
     use crate::math::Vec3;
 
     /// A cylinder around the axis x = 1, z = 0, from y = 0 to y = 4.
@@ -298,7 +298,7 @@ mod tests {
         assert!((slanting.max - Vec3::new(3.8, 4.6, 1.0)).abs().max_element() < 1e-6);
     }
 
-    impl Thin for Cylinder {
+    impl ThinShape for Cylinder {
         fn thin(radius: f64, capped: bool) -> Self {
             Self::new(DVec3::NEG_Z, DVec3::Z, radius, capped)
         }

@@ -212,9 +212,9 @@ mod tests {
     use crate::math::lanes::{Simd, mask_from_bits};
     use crate::math::random::signed_generator;
 
-    struct Folding(u32);
+    struct MovemaskKernel(u32);
 
-    impl SimdKernel for Folding {
+    impl SimdKernel for MovemaskKernel {
         type Output = u32;
 
         #[inline(always)]
@@ -227,14 +227,14 @@ mod tests {
     fn movemask_is_equal_on_all_instruction_sets() {
         for instructions in InstructionSet::ALL {
             for bits in 0..1 << 16 {
-                assert_eq!(instructions.run(Folding(bits)), bits, "{instructions:?}");
+                assert_eq!(instructions.run(MovemaskKernel(bits)), bits, "{instructions:?}");
             }
         }
     }
 
-    struct Spanning<'a>(&'a F32x16, u32);
+    struct ReductionKernel<'a>(&'a F32x16, u32);
 
-    impl SimdKernel for Spanning<'_> {
+    impl SimdKernel for ReductionKernel<'_> {
         type Output = ([f32; 2], F32x16);
 
         #[inline(always)]
@@ -253,7 +253,7 @@ mod tests {
                 row[(round as usize * 7 + i * 5) % PACKET_SIZE] = odd[(round as usize / 4 + i) % odd.len()];
             }
             let of = (next().to_bits() >> 3 & 0xffff) | 1 << (round % 16);
-            let each = InstructionSet::ALL.map(|instructions| instructions.run(Spanning(&row, of)));
+            let each = InstructionSet::ALL.map(|instructions| instructions.run(ReductionKernel(&row, of)));
             let bits =
                 |(span, inverse): ([f32; 2], F32x16)| (span.map(f32::to_bits), inverse.map(f32::to_bits));
             assert!(each.iter().all(|one| bits(*one) == bits(each[0])), "{row:?} {of:b} {each:?}");
