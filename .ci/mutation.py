@@ -250,7 +250,7 @@ FAULTS = [
      "true", "pipeline::tests::photons::maps_are_kept_while_there_is_room"),
     ("no cache for the previous scene", "pipeline/prepare/mod.rs", "oldest_request_to_keep(candidates, ⟦MAX_SPARE_BYTES⟧)", "0",
      "pipeline::tests::switching::switching_back_reuses_trees_and_textures"),
-    ("unbounded cache of previous scenes", "pipeline/cache.rs", "⟦total <= most_bytes⟧", "true",
+    ("unbounded cache of previous scenes", "pipeline/cache.rs", "⟦total <= max_bytes⟧", "true",
      "pipeline::cache::tests::oldest_scene_is_evicted_entirely"),
     ("no photons aimed at glass from mesh files", "integrators/photons/mod.rs", "own.balls.extend(⟦object.bounding_sphere()⟧);",
      "object.bounding_sphere().filter(|_| object.mesh().is_none())", PHOTONS + "photons_are_aimed_at_glass_from_mesh_file"),

@@ -45,7 +45,7 @@ fn orbit(scene: &str) -> Result<(f64, usize), Box<dyn Error>> {
     hold(&terminal, HOLD_TIME)?;
     let far = terminal.far_end();
     let most = Connection::SLOW.bytes_per_second * HOLD_TIME.as_secs_f64();
-    Ok(((far.came - before) as f64 / most, far.most_unanswered))
+    Ok(((far.came - before) as f64 / most, far.max_unanswered))
 }
 
 /// Alternates between two opposite orbit keys, held with keyboard repeat.

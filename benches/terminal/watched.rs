@@ -47,7 +47,7 @@ pub(crate) struct FarEnd {
     /// Number of bytes sent in total, and before the last answered query.
     sent: usize,
     answered: usize,
-    pub(crate) most_unanswered: usize,
+    pub(crate) max_unanswered: usize,
 }
 
 impl FarEnd {
@@ -120,7 +120,7 @@ impl WatchedTerminal {
             came: 0,
             sent: 0,
             answered: 0,
-            most_unanswered: 0,
+            max_unanswered: 0,
         }));
         simulate_connection(pair.master.try_clone_reader()?, far.clone(), keys.clone(), line);
         Ok(Self { _master: pair.master, child, keys, far })
@@ -193,7 +193,7 @@ fn simulate_connection(
             {
                 let mut far = lock(&far);
                 far.sent += count;
-                far.most_unanswered = far.most_unanswered.max(far.sent - far.answered);
+                far.max_unanswered = far.max_unanswered.max(far.sent - far.answered);
             }
             for part in bytes[..count].chunks(1 << 10) {
                 free = free.max(now) + Duration::from_secs_f64(part.len() as f64 / line.bytes_per_second);

@@ -421,8 +421,8 @@ const MAX_CELLS: u32 = 1 << 20;
 /// Limits a window to the maximum size.
 fn clamp_window_size(window: WindowSize) -> WindowSize {
     let columns = window.columns.min(MAX_COLUMNS);
-    let most_rows = MAX_CELLS / u32::from(columns.max(1));
-    let rows = u16::try_from(most_rows).map_or(window.rows, |most| window.rows.min(most));
+    let max_rows = MAX_CELLS / u32::from(columns.max(1));
+    let rows = u16::try_from(max_rows).map_or(window.rows, |most| window.rows.min(most));
     WindowSize { columns, rows, ..window }
 }
 

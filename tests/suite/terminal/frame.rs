@@ -240,7 +240,7 @@ fn slow_connection_sends_the_preview_first() {
         image > 3000 && preview > image - image / 100,
         "{preview} of {image} cells of the preview before the first title"
     );
-    assert!(terminal.line(|seen| seen.most_unanswered) <= 24_000);
+    assert!(terminal.line(|seen| seen.max_unanswered) <= 24_000);
 }
 
 #[test]

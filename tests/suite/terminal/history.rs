@@ -131,7 +131,7 @@ fn history_is_sent_over_slow_connections() {
     let terminal = folder.thin_line(Responder::Terminal);
     edited(&folder, &terminal);
     terminal.wait_for(messages::HISTORY);
-    assert!(terminal.line(|seen| seen.most_unanswered) <= 24_000);
+    assert!(terminal.line(|seen| seen.max_unanswered) <= 24_000);
 }
 
 #[test]

@@ -37,9 +37,9 @@ pub struct Traffic {
     /// Number of bytes sent up to the last query whose reply has reached the program.
     answered: usize,
     /// Largest number of unacknowledged bytes.
-    pub most_unanswered: usize,
+    pub max_unanswered: usize,
     /// Largest number of queued bytes.
-    pub most_waiting: usize,
+    pub max_waiting: usize,
 }
 
 /// Bytes in transit with their arrival time. A reply also has the number of bytes sent up to its query.
@@ -111,8 +111,8 @@ impl Relay {
 fn record_sent(seen: &Mutex<Traffic>, count: usize) {
     let mut seen = seen.lock().expect("no panic");
     seen.sent += count;
-    seen.most_unanswered = seen.most_unanswered.max(seen.sent - seen.answered);
-    seen.most_waiting = seen.most_waiting.max(seen.sent - seen.shown);
+    seen.max_unanswered = seen.max_unanswered.max(seen.sent - seen.answered);
+    seen.max_waiting = seen.max_waiting.max(seen.sent - seen.shown);
 }
 
 fn show(

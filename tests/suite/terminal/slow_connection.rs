@@ -83,7 +83,7 @@ fn max_bytes_in_flight(answers: Responder) -> usize {
     // After an edit while the connection is busy, only the newest image is sent.
     folder.write("scene.toml", SCENE.replace(RED, GREEN).replace("samples = 4", "samples = 10000000"));
     terminal.wait_for_color("green");
-    let (unanswered, waiting) = terminal.line(|seen| (seen.most_unanswered, seen.most_waiting));
+    let (unanswered, waiting) = terminal.line(|seen| (seen.max_unanswered, seen.max_waiting));
     if answers == Responder::Terminal { unanswered } else { waiting }
 }
 

@@ -38,7 +38,7 @@ pub(super) struct MethodRun<'a> {
     pub(super) keys: &'a ReferenceFingerprints,
     pub(super) two: &'a IndependentReferences,
     /// Default maximum number of samples per step.
-    pub(super) most_samples: f64,
+    pub(super) max_samples: f64,
 }
 
 impl MethodRun<'_> {
@@ -89,7 +89,7 @@ impl MethodRun<'_> {
             StepSchedule::Climb => {
                 let samples = SAMPLE_RATIO
                     .checked_pow(index)
-                    .filter(|samples| f64::from(*samples) <= self.most_samples)?;
+                    .filter(|samples| f64::from(*samples) <= self.max_samples)?;
                 let expected = took.last().map_or(0.0, |seconds| seconds * f64::from(SAMPLE_RATIO));
                 let has_time = budget.method_elapsed_seconds() + expected <= budget.method_allowance();
                 (index == 0 || has_time).then_some(StepTarget { index, samples, budget: None })

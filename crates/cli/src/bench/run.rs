@@ -192,7 +192,7 @@ impl SceneRun<'_> {
             reference.two.reference_pair().measured_image().height,
         );
         self.report_references(&reference, width, height);
-        let most_samples = max_measurable_samples(reference.result.samples);
+        let max_samples = max_measurable_samples(reference.result.samples);
         let mut measured = Vec::new();
         for method in &methods {
             budget.begin_method();
@@ -202,7 +202,7 @@ impl SceneRun<'_> {
                 method,
                 keys: &keys,
                 two: &reference.two,
-                most_samples,
+                max_samples,
             };
             measured.push(method.measure(budget, threads)?);
             budget.end_method();

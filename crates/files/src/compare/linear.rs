@@ -91,16 +91,16 @@ fn trimmed_relmse(pair: &ImagePair, dropped: usize) -> f64 {
     let pixels = pair.measured_image().pixels.par_iter().zip(&pair.reference().pixels);
     let mut errors: Vec<f64> = pixels.map(|(&a, &b)| relative_squared_error(a, b)).collect();
     let kept = errors.len() - dropped;
-    let (_, &mut least_dropped, _) = errors.select_nth_unstable_by(kept, f64::total_cmp);
+    let (_, &mut min_dropped, _) = errors.select_nth_unstable_by(kept, f64::total_cmp);
     drop(errors);
     let rows = map_rows(pair, |a, b| {
         let errors = a.iter().zip(b).map(|(&a, &b)| relative_squared_error(a, b));
         errors
-            .filter(|error| *error < least_dropped)
+            .filter(|error| *error < min_dropped)
             .fold((0.0, 0), |(sum, count), error| (sum + error, count + 1))
     });
     let (sum, count) =
         rows.into_iter().fold((0.0, 0_usize), |all, row: (f64, usize)| (all.0 + row.0, all.1 + row.1));
     // Several values may equal the smallest dropped value. Count as many of them as are kept.
-    (sum + (kept - count) as f64 * least_dropped) / kept as f64
+    (sum + (kept - count) as f64 * min_dropped) / kept as f64
 }

@@ -76,14 +76,14 @@ pub(crate) struct EarlierProcessWork {
 }
 
 impl FilmState {
-    /// Creates a state without samples. The film may use at most `most_bytes`.
+    /// Creates a state without samples. The film may use at most `max_bytes`.
     ///
     /// # Errors
     /// There is not enough memory for the film.
     pub(crate) fn new(
         key: Fingerprint,
         plan: &RenderPlan,
-        most_bytes: u64,
+        max_bytes: u64,
         convergence: ConvergenceModel,
         share: Option<Shard>,
     ) -> Result<Self, FilmCreationError> {
@@ -93,7 +93,7 @@ impl FilmState {
             (None, ConvergenceModel::Stratified) => SumOrder::Sequential,
         };
         let film = Film::with_memory_limit(
-            most_bytes,
+            max_bytes,
             plan.settings.render.width,
             plan.settings.render.height,
             plan.crop,
@@ -351,12 +351,12 @@ impl FilmState {
     /// Returns two sample counts: the highest current count and the highest expected final count of any
     /// pixel. These are also the current and final numbers of photon passes.
     pub(crate) fn current_and_final_photon_passes(&self, most: u32) -> [u32; 2] {
-        let most_of = |samples: &dyn Fn(usize, usize) -> u32| {
+        let max_of = |samples: &dyn Fn(usize, usize) -> u32| {
             self.shard_cell_halves().map(|(cell, half)| samples(cell, half)).max().unwrap_or(0)
         };
         [
-            most_of(&|cell, half| self.done[cell][half]),
-            most_of(&|cell, half| self.expected_samples(cell, half, most)),
+            max_of(&|cell, half| self.done[cell][half]),
+            max_of(&|cell, half| self.expected_samples(cell, half, most)),
         ]
     }
 

@@ -53,7 +53,7 @@ pub(crate) struct FilmRequest {
     /// Whether to start with an empty film even if a film is cached.
     pub(crate) force: bool,
     /// Maximum size of the film in bytes.
-    pub(crate) most_bytes: u64,
+    pub(crate) max_bytes: u64,
 }
 
 /// How a render is displayed.

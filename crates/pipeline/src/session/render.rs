@@ -124,7 +124,7 @@ impl Session {
                 key: image.film,
                 share: image.share.clone(),
                 force: request.force,
-                most_bytes: self.config.most_film_bytes,
+                max_bytes: self.config.max_film_bytes,
             },
             tracer: create_tracer(self.config.kernel, pool, &image.scene, token),
             plan,

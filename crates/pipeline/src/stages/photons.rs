@@ -66,7 +66,7 @@ struct PhotonCounts {
     stored: u64,
     lookups: u64,
     seconds: f64,
-    most_alive_bytes: usize,
+    max_alive_bytes: usize,
 }
 
 impl PhotonStore {
@@ -105,7 +105,7 @@ impl PhotonStore {
         let passes = samples.map(pass).collect::<Result<Vec<_>, _>>()?;
         let bytes = passes.iter().map(|pass| pass.memory_bytes()).sum();
         let sent = self.sent.get();
-        self.sent.set(PhotonCounts { most_alive_bytes: sent.most_alive_bytes.max(bytes), ..sent });
+        self.sent.set(PhotonCounts { max_alive_bytes: sent.max_alive_bytes.max(bytes), ..sent });
         Ok(PhotonMaps { first, passes })
     }
 
@@ -148,7 +148,7 @@ impl PhotonStore {
 
     /// Reports the photons traced since the stage started, and the cached maps.
     pub(crate) fn report(&self) -> PhotonsReport {
-        let PhotonCounts { passes, emitted, stored, lookups, seconds, most_alive_bytes } = self.sent.get();
+        let PhotonCounts { passes, emitted, stored, lookups, seconds, max_alive_bytes } = self.sent.get();
         let [caustic, bounced] = self.photons.initial_radii();
         PhotonsReport {
             count: self.photons.photons_per_pass(),
@@ -161,7 +161,7 @@ impl PhotonStore {
             caustic_radius: caustic,
             bounced_radius: bounced,
             kept_memory_bytes: self.cached_bytes() as u64,
-            used_memory_bytes: most_alive_bytes as u64,
+            used_memory_bytes: max_alive_bytes as u64,
         }
     }
 }
@@ -254,7 +254,7 @@ pub(crate) fn trace_first_photons(
     let (photons, first) = sending.sink.load_asset_with_progress("photons", send)?;
     let seconds = watch.seconds();
     let (passes, emitted, stored, lookups) = (1, first.emitted, first.stored_photon_count(), first.lookups);
-    let sent = PhotonCounts { passes, emitted, stored, lookups, seconds, most_alive_bytes: 0 };
+    let sent = PhotonCounts { passes, emitted, stored, lookups, seconds, max_alive_bytes: 0 };
     let kept = RefCell::new(vec![Arc::new(first)]);
     let emits_photons = photons.emits_photons();
     let store = PhotonStore { photons, kept, sent: Cell::new(sent) };

@@ -23,7 +23,7 @@ pub(crate) fn render(
     rendering: &RenderStageInputs<'_>,
 ) -> Result<StageResult<RayCounters>, AbortReason> {
     let RenderOptions { samples: wanted, error, .. } = rendering.plan.settings.render;
-    let FilmRequest { key, ref share, force, most_bytes } = rendering.film;
+    let FilmRequest { key, ref share, force, max_bytes } = rendering.film;
     let is_other_image = films.current().is_some_and(|current| current.key != key);
     films.switch_to_cached(key, |kept| !force && kept.has_at_most_samples(wanted));
     if films.current().is_none() {
@@ -31,7 +31,7 @@ pub(crate) fn render(
             true => ConvergenceModel::Photons,
             false => ConvergenceModel::Stratified,
         };
-        let state = || FilmState::new(key, rendering.plan, most_bytes, convergence, share.clone());
+        let state = || FilmState::new(key, rendering.plan, max_bytes, convergence, share.clone());
         let empty = films.replace_current_with_retry(state).map_err(AbortReason::work_failure)?;
         let is_usable = match rendering.checkpointer.filter(|_| !force) {
             Some(checkpointer) => checkpointer.resume(empty, wanted)?,

@@ -157,7 +157,7 @@ fn panic_stops_the_current_pass() {
 
 #[test]
 fn oversized_film_is_an_error() {
-    let config = SessionConfig { most_film_bytes: 100_000, ..SessionConfig::default() };
+    let config = SessionConfig { max_film_bytes: 100_000, ..SessionConfig::default() };
     let mut bench = Bench::with_config(&SCENE.replace("width = 40", "width = 400"), config);
     assert!(matches!(bench.failed(), Failure::Work(message) if message.contains("400×30")));
     assert!(!bench.path("out.ppm").exists());

@@ -143,7 +143,7 @@ fn count_nearby_photons(
     slot: u32,
     vertex: &SurfaceVertex<'_>,
 ) -> f32 {
-    let look = GatherPoint { point: vertex.surface.point, normal: vertex.normal, most_depth: u32::MAX };
+    let look = GatherPoint { point: vertex.surface.point, normal: vertex.normal, max_depth: u32::MAX };
     let (_, _, sample) = tile.block.pixel_and_sample(slot);
     let pass = maps.pass_for_sample(sample);
     [&pass.caustic, &pass.bounced].map(|map| map.count_near(&look, PortableSimd) as f32).iter().sum()

@@ -177,17 +177,17 @@ impl Painter {
         self.budget = FirstPreviewByteBudget::default();
     }
 
-    /// Returns the next bytes to output, at most `most_bytes` unless a single cell needs more, or no bytes
+    /// Returns the next bytes to output, at most `max_bytes` unless a single cell needs more, or no bytes
     /// once the screen matches the target. The caller must write the bytes because later slices build on
     /// them. No other output may move the cursor or change colors between slices.
-    pub fn next_slice(&mut self, most_bytes: usize) -> Vec<u8> {
-        self.next_slice_before_deadline(most_bytes, || false)
+    pub fn next_slice(&mut self, max_bytes: usize) -> Vec<u8> {
+        self.next_slice_before_deadline(max_bytes, || false)
     }
 
     /// Like [`Painter::next_slice`], but stops early once `is_late` returns true. `is_late` is called before
     /// each row because planning a whole preview would delay the response to a key press too much.
-    pub fn next_slice_before_deadline(&mut self, most_bytes: usize, is_late: impl Fn() -> bool) -> Vec<u8> {
-        let mut slice = LimitedOutputSlice { bytes: Vec::new(), most: most_bytes };
+    pub fn next_slice_before_deadline(&mut self, max_bytes: usize, is_late: impl Fn() -> bool) -> Vec<u8> {
+        let mut slice = LimitedOutputSlice { bytes: Vec::new(), most: max_bytes };
         if self.wanted.is_empty() {
             return slice.bytes;
         }

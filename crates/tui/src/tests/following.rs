@@ -55,7 +55,7 @@ struct SimulatedTerminal {
     sent: usize,
     /// Each unacknowledged slice's reply time and size, and the peak number of unacknowledged bytes.
     unanswered: VecDeque<(Instant, usize)>,
-    most_unanswered: usize,
+    max_unanswered: usize,
 }
 
 impl SimulatedTerminal {
@@ -71,7 +71,7 @@ impl SimulatedTerminal {
             bytes: Vec::new(),
             sent: 0,
             unanswered: VecDeque::new(),
-            most_unanswered: 0,
+            max_unanswered: 0,
         }
     }
 
@@ -85,7 +85,7 @@ impl SimulatedTerminal {
         self.sent += bytes.len();
         self.unanswered.push_back((self.free + round_trip, bytes.len()));
         let unanswered = self.unanswered.iter().map(|(_, bytes)| bytes).sum();
-        self.most_unanswered = self.most_unanswered.max(unanswered);
+        self.max_unanswered = self.max_unanswered.max(unanswered);
         self.arriving.push_back((self.free + round_trip / 2, bytes));
     }
 
@@ -373,7 +373,7 @@ fn slow_connection_gets_few_previews() {
     assert!(watch.shown <= 12, "{} previews in 10 s", watch.shown);
     let sent = watch.terminal.sent;
     assert!(sent <= 300_000, "{sent} bytes");
-    assert!(watch.terminal.most_unanswered <= 24_000, "{} bytes", watch.terminal.most_unanswered);
+    assert!(watch.terminal.max_unanswered <= 24_000, "{} bytes", watch.terminal.max_unanswered);
     let before = watch.terminal.visible_colors();
     watch.finish();
     let apart = mean_difference(&before, &watch.terminal.visible_colors());
@@ -389,7 +389,7 @@ fn held_key_uses_most_of_the_bandwidth() {
     watch.orbit(Duration::from_secs(6));
     let used = (watch.terminal.sent - before) as f64 / (6.0 * SLOW.bytes_per_second);
     assert!(used >= 0.7, "{used} of the bandwidth used");
-    assert!(watch.terminal.most_unanswered <= 24_000, "{} bytes", watch.terminal.most_unanswered);
+    assert!(watch.terminal.max_unanswered <= 24_000, "{} bytes", watch.terminal.max_unanswered);
 }
 
 /// kitty 0.26 does not show images that are sent within synchronized output.

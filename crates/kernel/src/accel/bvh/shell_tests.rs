@@ -115,7 +115,7 @@ fn nested_sphere_traversal_is_logarithmic() {
         let tree = tree(&spheres[..count as usize]);
         let most =
             rays(600).iter().map(|ray| closest_hit_and_test_count(&tree, &spheres, ray).1).max().unwrap_or(0);
-        let mut most_met = 0;
+        let mut max_visited = 0;
         for ray in rays(600) {
             let near = Aabb { min: ray.origin, max: ray.origin };
             let mut visited = 0;
@@ -123,9 +123,9 @@ fn nested_sphere_traversal_is_logarithmic() {
                 visited += 1;
                 true
             });
-            most_met = most_met.max(visited);
+            max_visited = max_visited.max(visited);
         }
-        (most, most_met)
+        (most, max_visited)
     };
     for count in [500, 1000, 2000, 4000, 8000] {
         let (tests, visited) = work(count);

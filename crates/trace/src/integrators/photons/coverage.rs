@@ -283,7 +283,7 @@ mod tests {
 
     /// Coverage of an upward-facing kernel of radius 0.1 at (x, 0, z) among shapes.
     fn coverage_at(x: f32, z: f32, shapes: &[&Shape]) -> Option<f64> {
-        let look = GatherPoint { point: Vec3::new(x, 0.0, z), normal: Vec3::Y, most_depth: 1 };
+        let look = GatherPoint { point: Vec3::new(x, 0.0, z), normal: Vec3::Y, max_depth: 1 };
         let mut around = KernelNeighborhood::new(&look, 0.1);
         let is_exact = shapes.iter().all(|shape| around.add_shape(shape, |_| true));
         around.coverage().filter(|_| is_exact)

@@ -55,7 +55,7 @@ pub struct PhotonTracer<'a> {
     /// Reciprocal of the number of photons.
     pub flux_scale: f32,
     /// Maximum number of bounces per photon.
-    pub most_depth: u32,
+    pub max_depth: u32,
 }
 
 /// Photons stored by one chunk of a pass.
@@ -261,7 +261,7 @@ impl PhotonWavefront<'_> {
 
     /// Whether photons may scatter at the current hits.
     fn may_scatter(&self) -> bool {
-        self.depth < self.tracing.most_depth
+        self.depth < self.tracing.max_depth
     }
 
     /// Traces a packet of photons to their hits, where they are stored and scattered.

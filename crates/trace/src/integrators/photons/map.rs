@@ -59,7 +59,7 @@ pub struct PhotonMap {
     blocks: Vec<PhotonBlock>,
     depths: Vec<[u32; PACKET_SIZE]>,
     /// Maximum number of bounces of any stored photon.
-    most_depth: u32,
+    max_depth: u32,
 }
 
 /// Minimum cosine between the normals of surfaces within one kernel.
@@ -80,7 +80,7 @@ pub struct GatherPoint {
     /// Geometric normal on the queried side.
     pub normal: Vec3,
     /// Maximum number of bounces per photon.
-    pub most_depth: u32,
+    pub max_depth: u32,
 }
 
 impl GatherPoint {
@@ -179,8 +179,8 @@ impl PhotonMap {
                 depths.push(depth);
             }
         }
-        let most_depth = depths.as_flattened().iter().copied().max().unwrap_or(0);
-        Ok(Self { radius, cells, mask, starts, count: photons.len(), blocks, depths, most_depth })
+        let max_depth = depths.as_flattened().iter().copied().max().unwrap_or(0);
+        Ok(Self { radius, cells, mask, starts, count: photons.len(), blocks, depths, max_depth })
     }
 
     /// All photons, in bucket order.
@@ -342,7 +342,7 @@ impl PhotonMap {
         simd: impl Simd,
     ) -> Option<F32x16> {
         // Weight the photons within the kernel by their distance.
-        let GatherPoint { point, normal, most_depth } = *look;
+        let GatherPoint { point, normal, max_depth } = *look;
         let block = &self.blocks[number];
         let radius_squared = self.radius * self.radius;
         let (reach, share) = (MAX_PLANE_DISTANCE * self.radius, 1.0 / radius_squared);
@@ -379,10 +379,10 @@ impl PhotonMap {
             weights[i] *= cosine / squared.sqrt();
         }
         // Reject photons with too many bounces.
-        if most_depth < self.most_depth {
+        if max_depth < self.max_depth {
             let depths = &self.depths[number];
             for i in 0..PACKET_SIZE {
-                near[i] &= if depths[i] <= most_depth { TRUE } else { 0 };
+                near[i] &= if depths[i] <= max_depth { TRUE } else { 0 };
             }
         }
         for i in 0..PACKET_SIZE {
@@ -485,7 +485,7 @@ mod tests {
                     };
                     let mut found = Vec::new();
                     map.visit_weighted_photons(
-                        &GatherPoint { point, normal, most_depth: 1 },
+                        &GatherPoint { point, normal, max_depth: 1 },
                         PortableSimd,
                         |photon, density| {
                             found.push((photon.point.to_array(), density));
@@ -524,9 +524,9 @@ mod tests {
         let place = |i: i32| photon(Vec3::new(at(i % 200 - 100), 0.5, at(i / 200 - 100)), Vec3::Y);
         let photons: Vec<Photon> = (0..40_000).map(place).collect();
         let map = PhotonMap::new(&photons, 0.4, &CancelToken::new()).expect("never canceled");
-        let sum = |most_depth: u32, normal: Vec3| {
+        let sum = |max_depth: u32, normal: Vec3| {
             let mut sum = 0.0;
-            let look = GatherPoint { point: Vec3::new(0.1, 0.5, -0.2), normal, most_depth };
+            let look = GatherPoint { point: Vec3::new(0.1, 0.5, -0.2), normal, max_depth };
             map.visit_weighted_photons(&look, PortableSimd, |_, density| sum += density * step * step);
             let flux =
                 f64::from(map.irradiance_and_chosen_photon(&look, [0.5; 2], PortableSimd).0.x * step * step);

@@ -81,7 +81,7 @@ const AIMED_FRACTIONS: [f32; 2] = [0.9, 0.5];
 pub struct PhotonMapper {
     settings: PhotonSettings,
     /// Maximum number of bounces per photon before it is gathered.
-    most_depth: u32,
+    max_depth: u32,
     /// Source of the photons, or `None` if the scene has no mirrors or glass.
     emission: Option<PhotonEmitter>,
     /// Closed glass shapes that may contain lights.
@@ -152,9 +152,9 @@ impl PhotonMapper {
         let aimed = AIMED_FRACTIONS[usize::from(specular.is_unbounded)];
         let emission = emission.map(|emission| emission.with_targets(&specular.balls, aimed));
         let (glasses, bodies) = light_enclosing_glass_candidates(world);
-        let most_depth = photons.bounces.min(settings.render.max_depth.saturating_sub(1));
+        let max_depth = photons.bounces.min(settings.render.max_depth.saturating_sub(1));
         let radii = [photons.radius; 2];
-        let mut own = Self { settings: photons, most_depth, emission, glasses, bodies, radii };
+        let mut own = Self { settings: photons, max_depth, emission, glasses, bodies, radii };
         // Trace pass 0, and choose the radii from its photons.
         let sent = own.trace_photons((world, settings), 0, progress, token)?;
         if photons.radius == 0.0 {
@@ -182,7 +182,7 @@ impl PhotonMapper {
 
     /// Whether photons are emitted, which requires mirrors or glass and a light that illuminates them.
     pub fn emits_photons(&self) -> bool {
-        self.emission.is_some() && self.most_depth > 0
+        self.emission.is_some() && self.max_depth > 0
     }
 
     /// Traces a pass. The result depends on the pass number but not on the number of threads.
@@ -269,9 +269,9 @@ impl PhotonMapper {
                 camera_cone: None,
                 ..TileContext::new(world, &settings, &block, token, behavior)
             };
-            let (flux_scale, most_depth) = (1.0 / count as f32, self.most_depth);
+            let (flux_scale, max_depth) = (1.0 / count as f32, self.max_depth);
             let stored =
-                PhotonTracer { tile: &tile, emission, glasses, bodies: &self.bodies, flux_scale, most_depth }
+                PhotonTracer { tile: &tile, emission, glasses, bodies: &self.bodies, flux_scale, max_depth }
                     .trace_photons()?;
             let done = done.fetch_add(block.len() as u64, Ordering::Relaxed) + block.len() as u64;
             progress(done, count.into());
@@ -341,7 +341,7 @@ fn radius_for_neighbor_count(
         let map = PhotonMap::new(&some, radius, token)?;
         // Do not count the photon itself.
         let count = |&Photon { point, normal, .. }: &Photon| {
-            map.count_near(&GatherPoint { point, normal, most_depth: u32::MAX }, PortableSimd)
+            map.count_near(&GatherPoint { point, normal, max_depth: u32::MAX }, PortableSimd)
                 .saturating_sub(1)
         };
         let mut counts: Vec<u32> = some.iter().step_by(some.len().div_ceil(LOOKS)).map(count).collect();
