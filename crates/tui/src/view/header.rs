@@ -148,7 +148,7 @@ fn view_label(state: &State) -> String {
 /// Whether light from photons is missing from the current preview.
 fn lacks_photons(state: &State) -> bool {
     state
-        .picture
+        .preview
         .shown
         .as_ref()
         .is_some_and(|shown| shown.lacks_photons && shown.generation == state.request.generation)
@@ -164,7 +164,7 @@ fn actual_pixels_label(state: &State) -> String {
 fn progress_or_result_variants(state: &State) -> Vec<String> {
     if let Some((run, time)) = state.preview.history.viewed_render_number_and_time() {
         let is_unfinished = state
-            .picture
+            .preview
             .history
             .viewed_older_scene_and_settings()
             .is_some_and(|origin| origin.is_unfinished);

@@ -93,7 +93,7 @@ fn draw_entry(
 fn render_number_label(state: &State, index: usize) -> String {
     let under_way = is_entry_rendering(state, index).then_some(state.work.renders + 1);
     state
-        .picture
+        .preview
         .history
         .render_number_at(index)
         .or(under_way)

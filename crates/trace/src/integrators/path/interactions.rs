@@ -53,7 +53,7 @@ impl<'a> PathStepper<'a> for CameraWavefront<'a, '_> {
                         Bsdf::NonSpecular(rough) => self.shade_rough(path, vertex, rough, far),
                         Bsdf::Mirror(mirror) => self.shade_mirror(path, vertex, mirror),
                         Bsdf::SpecularOverBase(layers) => {
-                            self.shade_specular_over_base(path, vertex, layers, far)
+                            self.shade_specular_over_base(path, vertex, layers, far);
                         }
                         // At a blend, each vertex has the material of the chosen part.
                         Bsdf::Dielectric(_) | Bsdf::ThinDielectric(_) | Bsdf::Blend(_) => {}
