@@ -16,7 +16,7 @@ import tempfile
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 # Minimum number of files in which Taplo must find a mistake on the right line.
-LEAST_FILES = 30
+MIN_FILES = 30
 
 
 def run(*command):
@@ -29,7 +29,7 @@ def mistakes(glimt, path):
     return {one["line"] for one in report["diagnostics"] if one["severity"] == "error" and one["line"]}
 
 
-def by_taplo(schema, path):
+def taplo_errors(schema, path):
     """Lines on which Taplo reports errors."""
     said = run("taplo", "lint", "--colors", "never", "--schema", schema.as_uri(), path)
     lines = set()
@@ -64,7 +64,7 @@ def main():
             wrong = mistakes(glimt, path)
             if not wrong:
                 continue
-            lines, _ = by_taplo(drafts["4"], path)
+            lines, _ = taplo_errors(drafts["4"], path)
             kind = found if wrong <= lines else partly if wrong & lines else left
             kind.append((path.stem, sorted(wrong), sorted(lines)))
         for name, all_of in [("all mistakes on their lines", found), ("some of them", partly), ("none", left)]:
@@ -77,7 +77,7 @@ def main():
             if run("check-jsonschema", "--schemafile", drafts["2020-12"], path).returncode
         ]
         print(f"check-jsonschema rejects {len(rejected)} files")
-        if len(found) + len(partly) < LEAST_FILES:
+        if len(found) + len(partly) < MIN_FILES:
             faults.append(f"Taplo finds mistakes in only {len(found) + len(partly)} files")
     print(f"{len(scenes)} scenes are valid" if not faults else "\n".join(faults))
     sys.exit(bool(faults))

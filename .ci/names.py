@@ -13,7 +13,7 @@ from collections import defaultdict
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-MOST = 2
+MAX_TYPES = 2
 DEFINITION = re.compile(r"^(\s*)(?:pub(?:\([^)]*\))? )?(?:unsafe )?(struct|enum|union|trait|type) (\w+)")
 
 
@@ -37,10 +37,10 @@ def main():
     for name in listed.stdout.split():
         for number, found in definitions((ROOT / name).read_text()):
             places[found].append(f"{name}:{number}")
-    common = {name: where for name, where in places.items() if len(where) > MOST}
+    common = {name: where for name, where in places.items() if len(where) > MAX_TYPES}
     for name, where in sorted(common.items(), key=lambda item: -len(item[1])):
         print(f"{len(where):3} {name}: {', '.join(where)}")
-    print(f"{len(places)} names, {len(common)} of them used for more than {MOST} types")
+    print(f"{len(places)} names, {len(common)} of them used for more than {MAX_TYPES} types")
     sys.exit(1 if common else 0)
 
 

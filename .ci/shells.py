@@ -19,7 +19,7 @@ import tempfile
 import time
 
 # Seconds that a busy machine may take for one line.
-PATIENCE = 120
+TIMEOUT = 120
 PROMPT = "ready to type"
 SCENE = """[camera]
 position = [0, 1, 4]
@@ -83,7 +83,7 @@ LISTS = [
     ("glimt ball.toml --integrator \t\t", ["whitted", "path"]),
     ("glimt ball.toml --set render.integrator=\t\t", ["whitted", "path"]),
 ]
-STAND_IN = """#!/bin/sh
+FAKE_GLIMT = """#!/bin/sh
 if [ -n "$GLIMT_COMPLETE" ] || [ "$1" = completions -a -n "$2" ]; then exec {program} "$@"; fi
 printf '%s\\n' "$@" > "$GLIMT_CALL.new"
 mv "$GLIMT_CALL.new" "$GLIMT_CALL"
@@ -125,7 +125,7 @@ class Shell:
 
     def wait(self, holds, what):
         """Reads the screen until a condition holds."""
-        deadline = time.monotonic() + PATIENCE
+        deadline = time.monotonic() + TIMEOUT
         while not holds():
             if time.monotonic() > deadline:
                 raise TimeoutError(f"timed out waiting for {what}; the screen shows {self.screen[-400:]!r}")
@@ -176,7 +176,7 @@ def main():
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name).resolve()
         (folder / "bin").mkdir()
-        (folder / "bin" / "glimt").write_text(STAND_IN.format(program=f"'{program}'"))
+        (folder / "bin" / "glimt").write_text(FAKE_GLIMT.format(program=f"'{program}'"))
         (folder / "bin" / "glimt").chmod(0o755)
         (folder / "ball.toml").write_text(SCENE)
         (folder / "F older").mkdir()

@@ -22,7 +22,7 @@ const RUNS: usize = 3;
 const GOAL: f64 = 1e-2;
 
 /// Maximum number of samples per pixel to try.
-const MOST_SAMPLES: u32 = 64;
+const MAX_SAMPLES: u32 = 64;
 
 fn main() -> Result<(), Box<dyn error::Error>> {
     let asked: Vec<String> = std::env::args().skip(1).filter(|name| !name.starts_with("--")).collect();
@@ -43,7 +43,7 @@ fn main() -> Result<(), Box<dyn error::Error>> {
             let RenderFigures { lights, seconds, rays, relmse } = fastest_render(folder.path(), 4)?;
             let to_goal = seconds * relmse / GOAL;
             let (mut samples, mut enough) = (1, fastest_render(folder.path(), 1)?);
-            while enough.relmse > GOAL && samples < MOST_SAMPLES {
+            while enough.relmse > GOAL && samples < MAX_SAMPLES {
                 samples += 1;
                 enough = fastest_render(folder.path(), samples)?;
             }

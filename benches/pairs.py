@@ -51,15 +51,15 @@ def main():
     parser.add_argument("scenes", nargs="+", metavar="SCENE")
     parser.add_argument("--pairs", type=int, default=9, metavar="N", help="maximum number of pairs per scene")
     parser.add_argument("--layers", action="store_true", help="write EXR files, AFTER with all layers")
-    asked = parser.parse_args(arguments)
-    binaries, ratios = (asked.before, asked.after), []
+    args = parser.parse_args(arguments)
+    binaries, ratios = (args.before, args.after), []
     with tempfile.TemporaryDirectory() as folder:
-        names = ("before.exr", "after.exr") if asked.layers else ("before.ppm", "after.ppm")
+        names = ("before.exr", "after.exr") if args.layers else ("before.ppm", "after.ppm")
         pictures = [os.path.join(folder, name) for name in names]
-        both = (options, [*options, "--layers", "all"]) if asked.layers else (options, options)
-        for scene in asked.scenes:
+        both = (options, [*options, "--layers", "all"]) if args.layers else (options, options)
+        for scene in args.scenes:
             first = seconds(binaries[0], scene, pictures[0], both[0])
-            count = max(3, min(asked.pairs, int(BUDGET_SECONDS / max(first, 1e-3))))
+            count = max(3, min(args.pairs, int(BUDGET_SECONDS / max(first, 1e-3))))
             times = ([], [])
             for number in range(count):
                 for which in (0, 1) if number % 2 == 0 else (1, 0):
@@ -67,7 +67,7 @@ def main():
             ratio = statistics.median(after / before for before, after in zip(*times))
             ratios.append(ratio)
             same = ""
-            if not asked.layers:
+            if not args.layers:
                 same = ", same pixels" if content(pictures[0]) == content(pictures[1]) else ", different pixels"
             medians = [statistics.median(of) for of in times]
             print(

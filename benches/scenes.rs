@@ -14,35 +14,39 @@ use nix::sys::time::TimeValLike;
 const HEAD: &str = "[camera]\nposition = [0, 1, 4]\nlook_at = [0, 1, 0]\n[[light]]\n";
 
 /// Generates a scene file with the requested number of elements.
-type Family = fn(usize) -> String;
+type SceneGenerator = fn(usize) -> String;
 
-const FAMILIES: [(&str, Family); 14] = [
-    ("wrong materials", |n| each(n, |i| format!("[materials.mat{i}]\n")) + &each(n, |i| sphere(i, "mot"))),
-    ("right materials", |n| each(n, |i| format!("[materials.mat{i}]\n")) + &each(n, |i| sphere(i, "mat"))),
+const FAMILIES: [(&str, SceneGenerator); 14] = [
+    ("wrong materials", |n| {
+        repeated(n, |i| format!("[materials.mat{i}]\n")) + &repeated(n, |i| sphere(i, "mot"))
+    }),
+    ("right materials", |n| {
+        repeated(n, |i| format!("[materials.mat{i}]\n")) + &repeated(n, |i| sphere(i, "mat"))
+    }),
     ("wrong textures", |n| {
-        each(n, |i| format!("[textures.tex{i}]\nfile = \"t.png\"\n"))
-            + &each(n, |i| format!("[materials.m{i}]\ndiffuse = {{ texture = \"tox{i}\" }}\n"))
+        repeated(n, |i| format!("[textures.tex{i}]\nfile = \"t.png\"\n"))
+            + &repeated(n, |i| format!("[materials.m{i}]\ndiffuse = {{ texture = \"tox{i}\" }}\n"))
     }),
-    ("missing files", |n| each(n, |i| format!("[[mesh]]\nfile = \"file{i}.obj\"\n"))),
+    ("missing files", |n| repeated(n, |i| format!("[[mesh]]\nfile = \"file{i}.obj\"\n"))),
     ("mesh files", |n| {
-        each(n, |i| format!("[[mesh]]\nfile = \"m{i}.obj\"\nmaterial = \"a\"\n")) + "[materials.a]\n"
+        repeated(n, |i| format!("[[mesh]]\nfile = \"m{i}.obj\"\nmaterial = \"a\"\n")) + "[materials.a]\n"
     }),
-    ("picture files", |n| each(n, |i| format!("[textures.t{i}]\nfile = \"t{i}.png\"\n"))),
-    ("duplicate tables", |n| each(n, |i| format!("[materials.m{i}]\n")).repeat(2)),
+    ("picture files", |n| repeated(n, |i| format!("[textures.t{i}]\nfile = \"t{i}.png\"\n"))),
+    ("duplicate tables", |n| repeated(n, |i| format!("[materials.m{i}]\n")).repeat(2)),
     ("nested tables", |n| {
-        each(n, |i| format!("[materials.m{i}.sub]\n")) + &each(n, |i| format!("[materials.m{i}]\n"))
+        repeated(n, |i| format!("[materials.m{i}.sub]\n")) + &repeated(n, |i| format!("[materials.m{i}]\n"))
     }),
-    ("duplicate keys", |n| format!("[render]\n{}", each(n, |i| format!("k{i} = 1\n")).repeat(2))),
-    ("unknown keys", |n| format!("[render]\n{}", each(n, |i| format!("width{i} = 1\n")))),
-    ("dotted keys", |n| format!("[materials]\n{}", each(n, |i| format!("m{i}.diffuse = 0.5\n")))),
-    ("broken lines", |n| format!("[render]\n{}", each(n, |i| format!("k{i} = = 3 4\n")))),
+    ("duplicate keys", |n| format!("[render]\n{}", repeated(n, |i| format!("k{i} = 1\n")).repeat(2))),
+    ("unknown keys", |n| format!("[render]\n{}", repeated(n, |i| format!("width{i} = 1\n")))),
+    ("dotted keys", |n| format!("[materials]\n{}", repeated(n, |i| format!("m{i}.diffuse = 0.5\n")))),
+    ("broken lines", |n| format!("[render]\n{}", repeated(n, |i| format!("k{i} = = 3 4\n")))),
     ("one long broken line", |n| format!("sphere = [{}]\nx = tru\n", "{ a = 1, b = tru },".repeat(n))),
     ("lights", |n| {
-        each(n, |i| format!("[[light]]\nposition = [0, {i}, 0]\n")) + &sphere(0, "m") + "[materials.m0]\n"
+        repeated(n, |i| format!("[[light]]\nposition = [0, {i}, 0]\n")) + &sphere(0, "m") + "[materials.m0]\n"
     }),
 ];
 
-fn each(count: usize, one: impl Fn(usize) -> String) -> String {
+fn repeated(count: usize, one: impl Fn(usize) -> String) -> String {
     (0..count).map(one).collect()
 }
 
@@ -60,7 +64,7 @@ fn million() -> String {
             i % 8
         )
     };
-    each(8, |i| format!("[materials.m{i}]\ndiffuse = [0.5, 0.5, 0.3]\n")) + &each(1_000_000, sphere)
+    repeated(8, |i| format!("[materials.m{i}]\ndiffuse = [0.5, 0.5, 0.3]\n")) + &repeated(1_000_000, sphere)
 }
 
 /// Returns the CPU seconds that `check` takes for a file.

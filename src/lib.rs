@@ -68,7 +68,7 @@
 //!    on the screen.
 //! 6. `pipeline/session/render.rs` traces photons and renders the film: `pipeline/render/scheduler.rs`
 //!    schedules passes, and `pipeline/trace.rs` renders their tiles on the thread pool. For large images, and
-//!    while photons are traced, `pipeline/render/first_picture.rs` renders a coarse image first.
+//!    while photons are traced, `pipeline/render/coarse_image.rs` renders a coarse image first.
 //! 7. `integrators/mod.rs` renders a tile (see below). `pipeline/render/film_state.rs` adds the samples to
 //!    the film.
 //! 8. `pipeline/render/preview.rs` puts a preview into its slot, and `cli/live.rs` puts an event into the event

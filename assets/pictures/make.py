@@ -33,11 +33,11 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("files", nargs="*", metavar="FILE", choices=[*PICTURES, []])
     parser.add_argument("--glimt", type=Path, default=ROOT / "target" / "release" / "glimt")
-    asked = parser.parse_args()
-    for file in asked.files or PICTURES:
+    args = parser.parse_args()
+    for file in args.files or PICTURES:
         picture = HERE / file
         scene, options = ROOT / "scenes" / f"{picture.stem}.toml", PICTURES[file].split()
-        subprocess.run([asked.glimt.absolute(), scene, "--once", *options, "-o", picture], check=True)
+        subprocess.run([args.glimt.absolute(), scene, "--once", *options, "-o", picture], check=True)
         print(f"{picture.name}: {picture.stat().st_size // 1000} kB")
 
 

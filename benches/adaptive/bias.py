@@ -18,7 +18,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from truth import MOST, ROOT, WEIGHTS, size_of, within_environment
+from truth import MAX_SAMPLES, ROOT, WEIGHTS, size_of, within_environment
 
 
 def arguments():
@@ -32,32 +32,32 @@ def arguments():
     return parser.parse_args()
 
 
-def mean_of(asked, scene, folder, seed, options):
+def mean_of(args, scene, folder, seed, options):
     """The mean luminance of an image, its mean number of samples, and the seconds of its render stage."""
     import mitsuba as mi
     import numpy as np
 
     mi.set_variant("scalar_rgb")
     picture, report = folder / "picture.exr", folder / "report.json"
-    call = [asked.glimt, scene, "--once", "--progress", "none", *size_of(scene, asked.side), "-o", picture]
+    call = [args.glimt, scene, "--once", "--progress", "none", *size_of(scene, args.side), "-o", picture]
     call += ["--report", report, "--seed", seed, *options]
     subprocess.run([str(word) for word in call], check=True, stderr=subprocess.DEVNULL)
     image = np.array(mi.Bitmap(str(picture)).convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.Float32, False))
-    told = json.loads(report.read_text())
-    seconds = sum(stage["seconds"] for stage in told["stages"] if stage["name"] == "render")
-    return float((image.astype(np.float64) @ np.array(WEIGHTS)).mean()), told["image"]["samples"]["mean"], seconds
+    data = json.loads(report.read_text())
+    seconds = sum(stage["seconds"] for stage in data["stages"] if stage["name"] == "render")
+    return float((image.astype(np.float64) @ np.array(WEIGHTS)).mean()), data["image"]["samples"]["mean"], seconds
 
 
-def row(asked, scene, folder):
-    if asked.time_share is None:
-        options = ["--error", asked.error, "--samples", MOST]
+def row(args, scene, folder):
+    if args.time_share is None:
+        options = ["--error", args.error, "--samples", MAX_SAMPLES]
     else:
-        seconds = mean_of(asked, scene, folder, 1, ["--error", 0, "--samples", 256])[2]
-        options = ["--error", 0, "--samples", MOST, "--time", max(0.001, asked.time_share * seconds)]
-    runs = [mean_of(asked, scene, folder, seed, options) for seed in range(1, asked.seeds + 1)]
+        seconds = mean_of(args, scene, folder, 1, ["--error", 0, "--samples", 256])[2]
+        options = ["--error", 0, "--samples", MAX_SAMPLES, "--time", max(0.001, args.time_share * seconds)]
+    runs = [mean_of(args, scene, folder, seed, options) for seed in range(1, args.seeds + 1)]
     samples = max(run[1] for run in runs)
     equal = ["--error", 0, "--samples", 8 * int(samples)]
-    references = [mean_of(asked, scene, folder, 100_000 + seed, equal) for seed in range(max(2, asked.seeds // 4))]
+    references = [mean_of(args, scene, folder, 100_000 + seed, equal) for seed in range(max(2, args.seeds // 4))]
     means, others = [run[0] for run in runs], [run[0] for run in references]
     of_other = statistics.fmean(others)
     apart = statistics.fmean(means) / of_other - 1
@@ -67,13 +67,13 @@ def row(asked, scene, folder):
 
 
 def main():
-    asked = arguments()
-    how = f"error = {asked.error}" if asked.time_share is None else f"--time, {asked.time_share} of 256 samples"
-    print(f"{how}, {asked.side} pixels, {asked.seeds} seeds")
+    args = arguments()
+    how = f"error = {args.error}" if args.time_share is None else f"--time, {args.time_share} of 256 samples"
+    print(f"{how}, {args.side} pixels, {args.seeds} seeds")
     print(f"{'':18}{'samples':>9}{'bias %':>10}{'± %':>10}{'ratio':>8}")
-    for scene in asked.scenes or [ROOT / "scenes" / name for name in ("cornell.toml", "cornell_glass.toml")]:
+    for scene in args.scenes or [ROOT / "scenes" / name for name in ("cornell.toml", "cornell_glass.toml")]:
         with tempfile.TemporaryDirectory() as folder:
-            row(asked, scene, Path(folder))
+            row(args, scene, Path(folder))
 
 
 if __name__ == "__main__":

@@ -46,39 +46,39 @@ def mean_error(picture):
     return None if at < 0 else struct.unpack("<d", head[at + len(MEAN_ERROR) + 4 :][:8])[0]
 
 
-def rendered(asked, scene, integrator, samples, folder):
+def rendered(args, scene, integrator, samples, folder):
     """Luminance for each seed, and the values from reports and files."""
     import mitsuba as mi
     import numpy as np
 
     mi.set_variant("scalar_rgb")
     picture, report = folder / "picture.exr", folder / "report.json"
-    call = [asked.glimt, scene, "--once", "--progress", "none", "--width", asked.side, "--height", asked.side, "--error", 0]
+    call = [args.glimt, scene, "--once", "--progress", "none", "--width", args.side, "--height", args.side, "--error", 0]
     call += ["--integrator", integrator, "--samples", samples, "-o", picture, "--report", report]
-    luminance, told, of_means = [], [], []
-    for seed in range(1, asked.seeds + 1):
+    luminance, reported_errors, of_means = [], [], []
+    for seed in range(1, args.seeds + 1):
         subprocess.run([str(word) for word in [*call, "--seed", seed]], check=True, stderr=subprocess.DEVNULL)
         image = np.array(mi.Bitmap(str(picture)).convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.Float32, False))
         luminance.append(image.astype(np.float64) @ np.array(WEIGHTS))
-        told.append(json.loads(report.read_text())["image"]["error"])
+        reported_errors.append(json.loads(report.read_text())["image"]["error"])
         of_means.append(mean_error(picture))
-    return np.array(luminance), np.array(told), of_means
+    return np.array(luminance), np.array(reported_errors), of_means
 
 
-def row(asked, scene, integrator, samples, folder):
+def row(args, scene, integrator, samples, folder):
     """Prints a row; returns its ratio, its interval and the squared ratio of the mean's error, or None if there is no noise."""
     import numpy as np
 
-    luminance, told, of_means = rendered(asked, scene, integrator, samples, folder)
+    luminance, reported_errors, of_means = rendered(args, scene, integrator, samples, folder)
     # Sums of squares per seed, for the bootstrap.
     means = luminance.mean(axis=(1, 2))
 
     def ratio(seeds):
         true = np.sqrt(luminance[seeds].var(axis=0, ddof=1).mean()) / means[seeds].mean()
-        return np.sqrt((told[seeds] ** 2).mean()) / true if true > 0 else float("nan")
+        return np.sqrt((reported_errors[seeds] ** 2).mean()) / true if true > 0 else float("nan")
 
-    everyone = np.arange(len(told))
-    found = ratio(everyone)
+    all_seeds = np.arange(len(reported_errors))
+    found = ratio(all_seeds)
     if not np.isfinite(found):
         print(f"{scene.stem:16}{integrator:9}{samples:5}  no noise", flush=True)
         return None
@@ -86,7 +86,7 @@ def row(asked, scene, integrator, samples, folder):
 
     def drawn():
         # Draw half of the seeds without replacement, as repeated seeds would bias the variance. The spread of the ratio is the same.
-        return ratio(random.choice(everyone, size=len(everyone) // 2, replace=False))
+        return ratio(random.choice(all_seeds, size=len(all_seeds) // 2, replace=False))
 
     low, high = np.quantile([drawn() for _ in range(RESAMPLES)], [0.025, 0.975])
     square = None
@@ -99,15 +99,15 @@ def row(asked, scene, integrator, samples, folder):
 
 
 def main():
-    asked = arguments()
-    print(f"{asked.seeds} seeds, {asked.side} × {asked.side} pixels")
+    args = arguments()
+    print(f"{args.seeds} seeds, {args.side} × {args.side} pixels")
     print(f"{'':30}{'ratio':>8}{'95 % interval':>16}{'mean':>7}")
     rows = []
-    for scene in asked.scenes or sorted((ROOT / "scenes").glob("*.toml")):
-        for integrator in asked.integrators.split(","):
-            for samples in map(int, asked.samples.split(",")):
+    for scene in args.scenes or sorted((ROOT / "scenes").glob("*.toml")):
+        for integrator in args.integrators.split(","):
+            for samples in map(int, args.samples.split(",")):
                 with tempfile.TemporaryDirectory() as folder:
-                    rows.append(row(asked, scene, integrator, samples, Path(folder)))
+                    rows.append(row(args, scene, integrator, samples, Path(folder)))
     rows = [one for one in rows if one]
     outside = [one for one in rows if not BAND[0] <= one[0] <= BAND[1]]
     surely = [one for one in outside if one[2] < BAND[0] or one[1] > BAND[1]]

@@ -22,7 +22,7 @@ from pathlib import Path
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
 REFERENCE_TIMES = 32
-MOST = 65536
+MAX_SAMPLES = 65536
 
 
 def arguments():
@@ -55,16 +55,16 @@ class Render:
         report = self.folder / "report.json"
         command = [*self.call, "-o", str(self.folder / name), "--report", str(report), *map(str, options)]
         subprocess.run(command, check=True, stderr=subprocess.DEVNULL)
-        told = json.loads(report.read_text())
-        seconds = sum(stage["seconds"] for stage in told["stages"] if stage["name"] in ("render", "photons"))
-        return seconds, told["image"]["samples"]["mean"]
+        data = json.loads(report.read_text())
+        seconds = sum(stage["seconds"] for stage in data["stages"] if stage["name"] in ("render", "photons"))
+        return seconds, data["image"]["samples"]["mean"]
 
     def error(self):
         command = [self.glimt, "compare", "--json", str(self.folder / "picture.exr"), str(self.reference)]
         return json.loads(subprocess.run(command, check=True, capture_output=True).stdout)["relmse"]
 
     def adaptive(self, error, seed):
-        seconds, samples = self.run("picture.exr", ["--error", error, "--samples", MOST, "--seed", seed])
+        seconds, samples = self.run("picture.exr", ["--error", error, "--samples", MAX_SAMPLES, "--seed", seed])
         return seconds, samples, self.error()
 
     def fixed(self, samples, seed):
@@ -100,7 +100,7 @@ standard error of the ratio."""
     for seed in range(1, seeds + 1):
         fixed.append(render.fixed(samples, seed))
         for part in PARTS:
-            budget = ["--time", max(0.001, part * fixed[-1][0]), "--samples", MOST, "--seed", seed]
+            budget = ["--time", max(0.001, part * fixed[-1][0]), "--samples", MAX_SAMPLES, "--seed", seed]
             seconds, mean = render.run("picture.exr", ["--error", 0, *budget])
             runs[part].append((seconds / fixed[-1][0], render.error(), mean))
     ratio, mean = where_equal(fixed, runs)
@@ -117,8 +117,8 @@ standard error of the ratio."""
 def compared(render, error, seeds):
     """Returns the seconds of adaptive and uniform sampling at equal relMSE, their ratio, the samples of both, the relMSE, and the standard
 error of the ratio."""
-    _, samples = render.run("picture.exr", ["--error", error, "--samples", MOST])
-    render.run("reference.exr", ["--error", 0, "--samples", min(MOST, max(1024, round(REFERENCE_TIMES * samples))), "--seed", 999])
+    _, samples = render.run("picture.exr", ["--error", error, "--samples", MAX_SAMPLES])
+    render.run("reference.exr", ["--error", 0, "--samples", min(MAX_SAMPLES, max(1024, round(REFERENCE_TIMES * samples))), "--seed", 999])
     tried = {}
 
     def mean_of_fixed(count):
@@ -151,17 +151,17 @@ error of the ratio."""
 
 
 def main():
-    asked = arguments()
-    scenes = asked.scenes or sorted((ROOT / "scenes").glob("*.toml"))
-    print(f"{'--time' if asked.error is None else f'error = {asked.error}'}, {asked.side} pixels, {asked.seeds} seeds")
+    args = arguments()
+    scenes = args.scenes or sorted((ROOT / "scenes").glob("*.toml"))
+    print(f"{'--time' if args.error is None else f'error = {args.error}'}, {args.side} pixels, {args.seeds} seeds")
     print(f"{'':18} {'seconds':>9} {'samples':>9} {'fixed, s':>9} {'samples':>9} {'relMSE':>10} {'ratio':>7} {'±':>6}")
     for scene in scenes:
         with tempfile.TemporaryDirectory() as folder:
-            render = Render(asked.glimt, scene, asked.side, folder)
-            if asked.error is None:
-                figures = in_time(render, asked.samples, asked.seeds)
+            render = Render(args.glimt, scene, args.side, folder)
+            if args.error is None:
+                figures = in_time(render, args.samples, args.seeds)
             else:
-                figures = compared(render, asked.error, asked.seeds)
+                figures = compared(render, args.error, args.seeds)
             own, fixed, ratio, samples, fixed_samples, goal, error = figures
         print(f"{scene.stem:18} {own:9.3f} {samples:9.1f} {fixed:9.3f} {fixed_samples:9.1f} {goal:10.2e} {ratio:7.3f} {error:6.3f}", flush=True)
 

@@ -24,9 +24,9 @@ from pathlib import Path
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
 TILE = 32
-LEAST = 16
-LEAST_BRIGHTNESS = 0.01
-MOST = 65536
+MIN_SAMPLES = 16
+MIN_BRIGHTNESS = 0.01
+MAX_SAMPLES = 65536
 WEIGHTS = (0.2126, 0.7152, 0.0722)
 
 
@@ -68,32 +68,32 @@ def size_of(scene, side):
     return ["--width", max(1, round(width * scale)), "--height", max(1, round(height * scale))]
 
 
-def rendered(asked, scene, folder):
+def rendered(args, scene, folder):
     """Luminance for each seed, samples of each pixel, and the reported errors and samples."""
     import mitsuba as mi
     import numpy as np
 
     mi.set_variant("scalar_rgb")
-    size = size_of(scene, asked.side)
+    size = size_of(scene, args.side)
     picture, report = folder / "picture.exr", folder / "report.json"
 
     def render(seed, options):
-        call = [asked.glimt, scene, "--once", "--progress", "json", *size, "-o", picture, "--report", report, "--seed", seed]
-        call += ["--error", asked.error, "--samples", MOST, *options]
-        told = subprocess.run([str(word) for word in call], check=True, stderr=subprocess.PIPE, text=True).stderr
+        call = [args.glimt, scene, "--once", "--progress", "json", *size, "-o", picture, "--report", report, "--seed", seed]
+        call += ["--error", args.error, "--samples", MAX_SAMPLES, *options]
+        stderr = subprocess.run([str(word) for word in call], check=True, stderr=subprocess.PIPE, text=True).stderr
         image = np.array(mi.Bitmap(str(picture)).convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.Float32, False))
-        return image.astype(np.float64), json.loads(report.read_text())["image"], foretold(told)
+        return image.astype(np.float64), json.loads(report.read_text())["image"], eta_ratio(stderr)
 
-    options = ["--photons", "on"] if asked.photons else []
-    options += ["--integrator", asked.integrator] if asked.integrator else []
-    runs = [render(seed, options) for seed in range(1, asked.seeds + 1)]
+    options = ["--photons", "on"] if args.photons else []
+    options += ["--integrator", args.integrator] if args.integrator else []
+    runs = [render(seed, options) for seed in range(1, args.seeds + 1)]
     counts = render(1, [*options, "--view", "samples"])[0][..., 0]
-    told = [image["error"] for _, image, _ in runs], [image["samples"]["mean"] for _, image, _ in runs]
+    reported = [image["error"] for _, image, _ in runs], [image["samples"]["mean"] for _, image, _ in runs]
     luminance = np.array([picture @ np.array(WEIGHTS) for picture, _, _ in runs])
-    return luminance, counts, *told, [share for _, _, share in runs if share]
+    return luminance, counts, *reported, [share for _, _, share in runs if share]
 
 
-def foretold(lines):
+def eta_ratio(lines):
     """The ETA shown after a quarter of the render, divided by the true remaining time."""
     events = [json.loads(line) for line in lines.splitlines()]
     events = [event for event in events if event["event"] == "progress"]
@@ -103,38 +103,38 @@ def foretold(lines):
     return at["eta_seconds"] / (events[-1]["elapsed_seconds"] - at["elapsed_seconds"])
 
 
-def row(asked, scene, folder):
+def row(args, scene, folder):
     import numpy as np
 
-    luminance, counts, errors, samples, foretold = rendered(asked, scene, folder)
+    luminance, counts, errors, samples, eta_ratios = rendered(args, scene, folder)
     mean, variance = luminance.mean(axis=0), luminance.var(axis=0, ddof=1)
     whole = mean.mean()
     noise = np.array(
         [
-            np.sqrt(v.mean()) / max(m.mean(), LEAST_BRIGHTNESS * whole, 1e-300)
+            np.sqrt(v.mean()) / max(m.mean(), MIN_BRIGHTNESS * whole, 1e-300)
             for m, v in zip(tiles(mean), tiles(variance))
         ]
     )
-    noise /= asked.error
-    needed = np.array([tile.mean() > LEAST for tile in tiles(counts)])
+    noise /= args.error
+    needed = np.array([tile.mean() > MIN_SAMPLES for tile in tiles(counts)])
     of_needed = np.sqrt((noise[needed] ** 2).mean()) if needed.any() else float("nan")
-    told = np.mean([error for error in errors if error is not None] or [float("nan")])
+    mean_error = np.mean([error for error in errors if error is not None] or [float("nan")])
     true = np.sqrt(variance.mean()) / whole
     print(
         f"{scene.stem:18}{np.sqrt((noise**2).mean()):7.2f}{of_needed:8.2f}{noise.max():8.2f}{needed.mean():8.2f}"
-        f"{np.mean(samples):9.1f}{told:10.2e}{true:10.2e}{true / told:7.2f}"
-        f"{np.median(foretold) if foretold else float('nan'):7.2f}",
+        f"{np.mean(samples):9.1f}{mean_error:10.2e}{true:10.2e}{true / mean_error:7.2f}"
+        f"{np.median(eta_ratios) if eta_ratios else float('nan'):7.2f}",
         flush=True,
     )
 
 
 def main():
-    asked = arguments()
-    print(f"error = {asked.error}, {asked.side} pixels, {asked.seeds} seeds")
+    args = arguments()
+    print(f"error = {args.error}, {args.side} pixels, {args.seeds} seeds")
     print(f"{'':18}{'all':>7}{'needed':>8}{'largest':>8}{'part':>8}{'samples':>9}{'reported':>10}{'true':>10}{'ratio':>7}{'ETA':>7}")
-    for scene in asked.scenes or sorted((ROOT / "scenes").glob("*.toml")):
+    for scene in args.scenes or sorted((ROOT / "scenes").glob("*.toml")):
         with tempfile.TemporaryDirectory() as folder:
-            row(asked, scene, Path(folder))
+            row(args, scene, Path(folder))
 
 
 if __name__ == "__main__":

@@ -25,7 +25,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent.parent
 SETUP = ("parse", "meshes", "textures", "accel", "lights")
 COUNTS = (1, 2, 4, 8)
-FORETOLD = (1, 10, 100, 1000, 10000)
+PART_COUNTS = (1, 10, 100, 1000, 10000)
 # 16 blocks of photons for 8 parts.
 OPTIONS = {"path": ["--samples", "64"], "photons": ["--samples", "256", "--width", "256", "--height", "256"]}
 LARGE = ["--width", "2560", "--height", "1600"]
@@ -59,7 +59,7 @@ def part(program, scene, options, index, count, folder):
     return {"setup": setup, "work": work, "write": write, "bytes": size, "tracing": tracing, "blocks": blocks}
 
 
-def least(rounds, measure):
+def minimum_of(rounds, measure):
     """Repeats a measurement; returns the minimum of each figure."""
     all_rounds = [measure() for _ in range(rounds)]
     return {name: min(figures[name] for figures in all_rounds) for name in all_rounds[0]}
@@ -67,7 +67,7 @@ def least(rounds, measure):
 
 def parts(program, scene, options, count, rounds, folder):
     return [
-        least(rounds, lambda: part(program, scene, options, index, count, folder)) for index in range(1, count + 1)
+        minimum_of(rounds, lambda: part(program, scene, options, index, count, folder)) for index in range(1, count + 1)
     ]
 
 
@@ -109,11 +109,11 @@ def table(scene, options, arguments, counts, folder):
     return single, last
 
 
-def foretell(single, last, opening):
+def extrapolate(single, last, opening):
     """Prints the efficiency of up to 10,000 parts, for this image and for a render with 16 hours of work. With photons, the longer
     render has more passes."""
     print("\n| parts | efficiency | with 16 hours of work |\n| --- | --- | --- |")
-    for count in FORETOLD:
+    for count in PART_COUNTS:
         def of(work):
             alone = single["setup"] + work + single["write"]
             # A nearly empty part takes no time to write, but still needs the set-up.
@@ -156,7 +156,7 @@ def main():
                 table(scene, LARGE + LARGE_SAMPLES.get(scene.stem, ["--samples", "4"]), arguments, (8,), folder)
             else:
                 single, last = table(scene, OPTIONS.get(scene.stem, []), arguments, COUNTS, folder)
-                foretell(single, last, opening)
+                extrapolate(single, last, opening)
 
 
 if __name__ == "__main__":

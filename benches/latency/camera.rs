@@ -9,7 +9,7 @@ use super::{COLUMNS, PAUSE, ROUNDS, ROWS, figures};
 use crate::BenchResult;
 
 /// How long a key is held.
-const HELD: Duration = Duration::from_secs(2);
+const HOLD_TIME: Duration = Duration::from_secs(2);
 /// Key repeat interval.
 const REPEAT: Duration = Duration::from_millis(33);
 
@@ -25,18 +25,18 @@ pub fn row(folder: &Path, scene: &Path) -> BenchResult<String> {
         let before = terminal.cells();
         let begin = Instant::now();
         terminal.press(["l", "k", ">"][round % 3])?;
-        times.push(terminal.when(PAUSE, |now| is_other(&before, now))? - begin);
+        times.push(terminal.time_of_change(PAUSE, |now| shows_other_image(&before, now))? - begin);
     }
-    Ok(format!("first {}  held {:5.1} images per second", figures(times), held(&mut terminal)?))
+    Ok(format!("first {}  held {:5.1} images per second", figures(times), time_held_keys(&mut terminal)?))
 }
 
 /// Holds opposite camera keys alternately, with keyboard repeat. Refined images arrive only after the next
 /// press, so each burst of bytes is an image from a new camera position.
-fn held(terminal: &mut TimedTerminal) -> BenchResult<f64> {
+fn time_held_keys(terminal: &mut TimedTerminal) -> BenchResult<f64> {
     terminal.cells();
     let begin = Instant::now();
     let mut presses = 0;
-    while begin.elapsed() < HELD {
+    while begin.elapsed() < HOLD_TIME {
         terminal.press(["l", "h"][presses / 10 % 2])?;
         presses += 1;
         thread::sleep((begin + REPEAT * presses as u32).saturating_duration_since(Instant::now()));
@@ -45,7 +45,7 @@ fn held(terminal: &mut TimedTerminal) -> BenchResult<f64> {
 }
 
 /// Returns whether a different image is shown, ignoring differences due to noise.
-fn is_other(before: &Cells, now: &Cells) -> bool {
+fn shows_other_image(before: &Cells, now: &Cells) -> bool {
     let pairs = before.iter().zip(now).filter_map(|(a, b)| Some(((*a)?, (*b)?)));
     let far = |(a, b): &([[u8; 3]; 2], [[u8; 3]; 2])| {
         a.as_flattened().iter().zip(b.as_flattened()).any(|(a, b)| a.abs_diff(*b) > 16)

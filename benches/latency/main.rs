@@ -89,7 +89,7 @@ impl Mode {
 
     /// Returns whether a different image is shown. If rendering is in progress, differences due to noise are
     /// ignored.
-    fn is_other(self, before: &Cells, now: &Cells) -> bool {
+    fn shows_other_image(self, before: &Cells, now: &Cells) -> bool {
         let differ = |most: u8| {
             let pairs = before.iter().zip(now).filter_map(|(a, b)| Some(((*a)?, (*b)?)));
             let far = move |(a, b): &([[u8; 3]; 2], [[u8; 3]; 2])| {
@@ -123,7 +123,7 @@ fn row(copies: &mut SceneCopies, scene: &EditedScene, mode: Mode) -> BenchResult
             let begin = Instant::now();
             fs::write(&file, &bytes)?;
             let end = terminal
-                .when(PAUSE, |now| mode.is_other(&before, now))
+                .time_of_change(PAUSE, |now| mode.shows_other_image(&before, now))
                 .map_err(|error| format!("{} {}: {error}", scene.name, edit.0))?;
             times.push(end - begin);
         }
@@ -142,7 +142,7 @@ fn row(copies: &mut SceneCopies, scene: &EditedScene, mode: Mode) -> BenchResult
             let begin = Instant::now();
             terminal.press(key)?;
             let end = terminal
-                .when(PAUSE, |now| mode.is_other(&before, now))
+                .time_of_change(PAUSE, |now| mode.shows_other_image(&before, now))
                 .map_err(|error| format!("{} {key}: {error}", scene.name))?;
             times.push(end - begin);
         }

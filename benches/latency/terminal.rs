@@ -63,7 +63,7 @@ impl TimedTerminal {
     pub fn wait(&mut self, what: &str, holds: impl Fn(&vt100::Screen) -> bool) -> BenchResult<()> {
         let deadline = Instant::now() + LIMIT;
         loop {
-            self.catch_up();
+            self.read_pending_output();
             if holds(self.screen.screen()) {
                 return Ok(());
             }
@@ -78,12 +78,16 @@ impl TimedTerminal {
 
     /// The current cells of the image.
     pub fn cells(&mut self) -> Cells {
-        self.catch_up();
+        self.read_pending_output();
         cells(self.screen.screen())
     }
 
     /// Returns the time at which the image first satisfies `differs`. Starts checking after `pause`.
-    pub fn when(&mut self, pause: Duration, differs: impl Fn(&Cells) -> bool) -> BenchResult<Instant> {
+    pub fn time_of_change(
+        &mut self,
+        pause: Duration,
+        differs: impl Fn(&Cells) -> bool,
+    ) -> BenchResult<Instant> {
         let deadline = Instant::now() + LIMIT;
         thread::sleep(pause);
         while Instant::now() < deadline {
@@ -105,7 +109,7 @@ impl TimedTerminal {
 
     /// Counts the bursts of output that are large enough for an image. Bursts are separated by pauses.
     pub fn bursts(&mut self) -> usize {
-        const LEAST: usize = 300;
+        const MIN_IMAGE_BYTES: usize = 300;
         const GAP: Duration = Duration::from_millis(8);
         let chunks = std::mem::take(&mut *lock(&self.chunks));
         let mut bursts: Vec<(Instant, usize)> = Vec::new();
@@ -116,10 +120,10 @@ impl TimedTerminal {
                 Some(_) | None => bursts.push((*time, bytes.len())),
             }
         }
-        bursts.iter().filter(|(_, size)| *size >= LEAST).count()
+        bursts.iter().filter(|(_, size)| *size >= MIN_IMAGE_BYTES).count()
     }
 
-    fn catch_up(&mut self) {
+    fn read_pending_output(&mut self) {
         for (_, bytes) in std::mem::take(&mut *lock(&self.chunks)) {
             self.screen.process(&bytes);
         }
@@ -169,14 +173,14 @@ fn cells(screen: &vt100::Screen) -> Cells {
     let mut cells = Cells::new();
     for row in 0..rows.get() {
         for column in 0..columns.get() {
-            cells.push(screen.cell(row, column).and_then(shades));
+            cells.push(screen.cell(row, column).and_then(half_cell_colors));
         }
     }
     cells
 }
 
 /// Colors of the upper and lower halves of an image cell.
-fn shades(cell: &vt100::Cell) -> Option<[[u8; 3]; 2]> {
+fn half_cell_colors(cell: &vt100::Cell) -> Option<[[u8; 3]; 2]> {
     let rgb = |color| match color {
         vt100::Color::Rgb(r, g, b) => Some([r, g, b]),
         _ => None,

@@ -32,13 +32,13 @@ def regions(picture):
     return np.array([part.mean(axis=(0, 1)) for row in rows for part in np.array_split(row, REGIONS[1], axis=1)])
 
 
-def by_mitsuba(file, content, size, options, made):
+def render_with_mitsuba(file, content, size, options, made):
     scene = mi.load_dict(Conversion(mi, content, file.parent, size, made).scene())
     for seed in range(options.pictures):
         yield np.array(mi.render(scene, spp=options.samples, seed=seed))
 
 
-def by_glimt(file, size, options, made):
+def render_with_glimt(file, size, options, made):
     out = made / "picture.exr"
     call = [options.binary, file, "--once", "-o", out, "--progress", "none", "--integrator", options.integrator]
     call += ["--width", size[0], "--height", size[1], "--samples", options.samples]
@@ -52,13 +52,13 @@ def compare(file, options, made):
     width, height = content["render"]["width"], content["render"]["height"]
     scale = min(1, options.side / max(width, height))
     size = (round(width * scale), round(height * scale))
-    ways = [by_glimt(file, size, options, made), by_mitsuba(file, content, size, options, made)]
+    ways = [render_with_glimt(file, size, options, made), render_with_mitsuba(file, content, size, options, made)]
     (own, own_error), (other, other_error) = (mean_and_error([regions(one) for one in way]) for way in ways)
     off, error = own / other - 1, np.hypot(own_error, other_error) / other
     print(f"{file.stem}: worst region {np.abs(off).max():.3%}, root mean square {np.sqrt((off**2).mean()):.3%}, ± {error.max():.3%}")
     for number, (one, noise) in enumerate(zip(off, error)):
-        told = "  ".join(f"{100 * x:+7.3f} ± {100 * y:.3f} %" for x, y in zip(one, noise))
-        print(f"  {number // REGIONS[1] + 1},{number % REGIONS[1] + 1}  {told}")
+        text = "  ".join(f"{100 * x:+7.3f} ± {100 * y:.3f} %" for x, y in zip(one, noise))
+        print(f"  {number // REGIONS[1] + 1},{number % REGIONS[1] + 1}  {text}")
 
 
 def mean_and_error(values):

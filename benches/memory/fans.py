@@ -73,10 +73,10 @@ def main():
     parser.add_argument("--program", default=str(ROOT / "target" / "release" / "glimt"))
     parser.add_argument("--triangles", default="5000,20000,100000")
     parser.add_argument("--rounds", type=int, default=3)
-    asked = parser.parse_args()
+    args = parser.parse_args()
     print(f"{'':8}{'triangles':>10}{'fan s':>9}{'soup s':>9}{'fan/soup':>10}")
     for accel in ["bvh", "kdtree"]:
-        for count in map(int, asked.triangles.split(",")):
+        for count in map(int, args.triangles.split(",")):
             best = {}
             with tempfile.TemporaryDirectory() as folder:
                 for kind in [fan, soup]:
@@ -86,9 +86,9 @@ def main():
                     lines = ["v %.9g %.9g %.9g" % one for one in vertices] + ["f %d %d %d" % one for one in faces]
                     (place / "mesh.obj").write_text("\n".join(lines) + "\n")
                     (place / "scene.toml").write_text(SCENE)
-                for _ in range(asked.rounds):
+                for _ in range(args.rounds):
                     for kind in ["fan", "soup"]:
-                        found = rendered(asked.program, accel, Path(folder) / kind)
+                        found = rendered(args.program, accel, Path(folder) / kind)
                         best[kind] = min(found, best.get(kind, found))
             ratio = best["fan"] / best["soup"]
             print(f"{accel:8}{count:10}{best['fan']:9.3f}{best['soup']:9.3f}{ratio:10.2f}", flush=True)

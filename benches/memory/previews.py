@@ -25,7 +25,7 @@ WINDOWS = [(120, 40, 8, 16), (400, 120, 20, 40), (600, 200, 20, 40)]
 ANSWERS = [(b"\x1b[5n", b"\x1b[0n"), (b"\x1b[c", b"\x1b[?62;4;22c")]
 
 
-def most_memory(process):
+def max_memory(process):
     """The maximum resident memory so far, in bytes; 0 after the process has ended."""
     lines = Path(f"/proc/{process.pid}/status").read_text().splitlines()
     return max((int(line.split()[1]) * 1024 for line in lines if line.startswith("VmHWM")), default=0)
@@ -51,7 +51,7 @@ def watched(program, preview, window, folder):
                 for _ in range((tail + came).count(question) - tail.count(question)):
                     os.write(master, answer)
             tail = (tail + came)[-8:]
-        most = max(most, most_memory(process))
+        most = max(most, max_memory(process))
     process.kill()
     process.wait()
     os.close(master)
@@ -62,12 +62,12 @@ def watched(program, preview, window, folder):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--program", default=str(ROOT / "target" / "release" / "glimt"))
-    asked = parser.parse_args()
+    args = parser.parse_args()
     print(f"{'columns × rows of cells':32}{'preview':12}{'MB':>8}{'MB sent':>10}")
     for window in WINDOWS:
         for preview in ["halfblock", "kitty", "sixel"]:
             with tempfile.TemporaryDirectory() as folder:
-                most, sent = watched(asked.program, preview, window, folder)
+                most, sent = watched(args.program, preview, window, folder)
             name = "{} × {} of {} × {} pixels".format(*window)
             print(f"{name:32}{preview:12}{most / 1e6:8.0f}{sent / 1e6:10.1f}", flush=True)
 

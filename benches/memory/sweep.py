@@ -24,7 +24,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 SCENES = ["cornell", "cornell_glass", "lamps", "mesh", "photons", "shapes", "textures", "million"]
-LEAST, MOST = 30e6, 1e9
+MIN_BYTES, MAX_BYTES = 30e6, 1e9
 SECONDS = 20
 ALLOWED = {0, 1, 2}
 
@@ -55,14 +55,14 @@ def in_terminal(program, scene, size, folder):
     command = [program, scene, "--width", "160", "--height", "120", "--samples", "4", "-o", os.path.join(folder, "y.png")]
     child = subprocess.Popen(command, preexec_fn=lambda: (os.setsid(), limited(size)()), stdin=slave, stdout=slave,
                              stderr=slave, cwd=folder)
-    seen, start, asked = b"", time.monotonic(), False
+    seen, start, args = b"", time.monotonic(), False
     while child.poll() is None and time.monotonic() - start < SECONDS:
         if select.select([master], [], [], 0.05)[0]:
             seen += os.read(master, 1 << 16)
         # By now, an image or an error is shown: quit.
-        if not asked and time.monotonic() - start > 2.5:
+        if not args and time.monotonic() - start > 2.5:
             os.write(master, b"q")
-            asked = True
+            args = True
     faults = []
     if child.poll() is None:
         faults.append("hangs")
@@ -88,27 +88,27 @@ def main():
     parser.add_argument("--runs", type=int, default=200)
     parser.add_argument("--csv")
     parser.add_argument("scenes", nargs="*", default=[str(ROOT / f"scenes/{name}.toml") for name in SCENES])
-    asked = parser.parse_args()
+    args = parser.parse_args()
     ways = {"once": headless, "terminal": in_terminal}
-    each = max(1, asked.runs // (len(asked.scenes) * len(ways)))
+    each = max(1, args.runs // (len(args.scenes) * len(ways)))
     rows, wrong = [], 0
     with tempfile.TemporaryDirectory() as folder:
-        for way, run in ways.items():
-            for scene in map(os.path.abspath, asked.scenes):
+        for method, run in ways.items():
+            for scene in map(os.path.abspath, args.scenes):
                 for step in range(each):
-                    size = int(LEAST * (MOST / LEAST) ** ((step + 0.5) / each))
-                    code, faults, said = run(os.path.abspath(asked.program), scene, size, folder)
-                    rows.append((way, Path(scene).stem, size, code, "; ".join(faults)))
+                    size = int(MIN_BYTES * (MAX_BYTES / MIN_BYTES) ** ((step + 0.5) / each))
+                    code, faults, said = run(os.path.abspath(args.program), scene, size, folder)
+                    rows.append((method, Path(scene).stem, size, code, "; ".join(faults)))
                     wrong += bool(faults)
                     if faults:
-                        print(way, Path(scene).stem, f"{size / 1e6:.0f} MB", code, faults, said, flush=True)
-    for way in ways:
-        codes = collections.Counter(row[3] for row in rows if row[0] == way)
-        print(f"{way}: " + ", ".join(f"{count} × exit code {code}" for code, count in sorted(codes.items())))
+                        print(method, Path(scene).stem, f"{size / 1e6:.0f} MB", code, faults, said, flush=True)
+    for method in ways:
+        codes = collections.Counter(row[3] for row in rows if row[0] == method)
+        print(f"{method}: " + ", ".join(f"{count} × exit code {code}" for code, count in sorted(codes.items())))
     print(f"{len(rows)} runs, {wrong} wrong")
-    if asked.csv:
-        with open(asked.csv, "w", newline="") as file:
-            csv.writer(file).writerows([("way", "scene", "bytes", "code", "faults"), *rows])
+    if args.csv:
+        with open(args.csv, "w", newline="") as file:
+            csv.writer(file).writerows([("method", "scene", "bytes", "code", "faults"), *rows])
     sys.exit(1 if wrong else 0)
 
 

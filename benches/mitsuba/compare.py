@@ -23,7 +23,7 @@ ROOT = Path(__file__).resolve().parent.parent.parent
 THREADS = 2
 SAMPLES = 256
 # By default, Mitsuba's direct integrator samples the light and the BSDF; with only light samples, it does half of the work.
-LIGHT_ALONE = {"emitter_samples": 1, "bsdf_samples": 0}
+LIGHT_SAMPLES_ONLY = {"emitter_samples": 1, "bsdf_samples": 0}
 # The noise at which glimt stops sampling a tile, in an additional row.
 STOP = "3e-4"
 # Number of renders for a reference: for direct light, which is quick, and for paths.
@@ -88,7 +88,7 @@ def spread(pictures):
 
 def compare(scene, binaries, rounds, by_spread):
     """Prints the rows of a scene."""
-    ways = {"Mitsuba": {}, "only light samples": LIGHT_ALONE} if scene.max_depth == 1 else {"Mitsuba": {}}
+    ways = {"Mitsuba": {}, "only light samples": LIGHT_SAMPLES_ONLY} if scene.max_depth == 1 else {"Mitsuba": {}}
     loaded = {name: Mitsuba(scene, options) for name, options in ways.items()}
     by_glimt = lambda binary, *more: lambda samples, seed: glimt(binary, scene, samples, seed, more)
     # Each renderer has its own reference: Mitsuba offsets shadow rays by a fixed epsilon, which moves the edges of shadows.

@@ -154,25 +154,25 @@ def main():
     parser.add_argument("--reference", type=int, default=512)
     parser.add_argument("--glimt", default=ROOT / "target" / "release" / "glimt")
     parser.add_argument("--side", type=int, default=256)
-    asked = parser.parse_args()
-    passes = asked.passes or powers(asked.most)
+    args = parser.parse_args()
+    passes = args.passes or powers(args.most)
     dr.set_thread_count(THREADS)
     print(f"{'':12}{'':10}{'passes':>6}{'seconds':>10}{'relMSE':>11}{'slope':>8}{'mean':>11}")
-    square = (asked.side, asked.side)
-    by_paths = ["--integrator", "path"]
-    if "caustic" in asked.names:
-        subject = Subject(asked.glimt, CAUSTIC, square, asked.reference, True)
-        last_slope(subject, subject.rows("photons", passes, asked.seeds))
-        subject.rows("path", [256], 3, by_paths)
+    square = (args.side, args.side)
+    path_tracer = ["--integrator", "path"]
+    if "caustic" in args.names:
+        subject = Subject(args.glimt, CAUSTIC, square, args.reference, True)
+        last_slope(subject, subject.rows("photons", passes, args.seeds))
+        subject.rows("path", [256], 3, path_tracer)
         mitsuba(subject)
-    if "box" in asked.names:
+    if "box" in args.names:
         box = Scene(name="box", anchor=None, boxes=BLOCKS, max_depth=DEPTH, **BOX)
-        subject = Subject(asked.glimt, box, square, asked.reference, False)
-        last_slope(subject, subject.rows("photons", passes, asked.seeds))
-        subject.rows("path", [64, 256], asked.seeds, by_paths)
-    if "large" in asked.names:
+        subject = Subject(args.glimt, box, square, args.reference, False)
+        last_slope(subject, subject.rows("photons", passes, args.seeds))
+        subject.rows("path", [64, 256], args.seeds, path_tracer)
+    if "large" in args.names:
         settings = ["render.max_depth=30", "photons.bounces=30"]
-        subject = Subject(asked.glimt, CAUSTIC, (1074, 1051), asked.reference // 8, False, settings)
+        subject = Subject(args.glimt, CAUSTIC, (1074, 1051), args.reference // 8, False, settings)
         subject.rows("photons", [8, 12, 16, 24], 1)
 
 

@@ -121,7 +121,7 @@ fn measure(name: &str, mesh: &TriangleMesh, embree: Option<&Embree>, options: &B
     let build = || {
         let corners = |id| mesh.corners(id);
         WideBvh::build_with_quality(quality, count, corners, &CancelToken::new())
-            .expect("the token is not cancelled")
+            .expect("the token is not canceled")
     };
     let (mut own_build, mut peer_build) = (f64::INFINITY, f64::INFINITY);
     let mut tree = None;
@@ -265,7 +265,7 @@ fn kd_tree(mesh: &TriangleMesh, rays: &meshes::Rays) {
     let count = mesh.triangles.len() as u32;
     let build = || {
         KdTree::from_triangles(count, |id| mesh.corners(id), &CancelToken::new())
-            .expect("the token is not cancelled")
+            .expect("the token is not canceled")
     };
     let mut best = f64::INFINITY;
     let mut tree = None;

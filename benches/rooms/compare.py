@@ -35,8 +35,8 @@ HEADER = f"{'scene':14}{'by':24}{'samples':>8}{'seconds':>9}{'us/path':>9}{'erro
 
 
 @dataclass
-class Way:
-    """One way to render a scene with one program, and its results."""
+class Method:
+    """A method: a program with an integrator, and its results for a scene."""
 
     name: str
     renderer: object
@@ -74,47 +74,47 @@ def error(pictures, reference, by_reference):
     return float(np.mean(squares / (reference**2 + 0.01)))
 
 
-def ways(scene, asked):
-    """Returns the ways to render the scene: Mitsuba first, then each binary with each integrator."""
-    found = [Way("Mitsuba path", Mitsuba(scene, asked.samples), asked.samples, is_mitsuba=True)]
-    for binary in asked.glimt:
+def methods(scene, args):
+    """Returns the methods for the scene: Mitsuba first, then each binary with each integrator."""
+    found = [Method("Mitsuba path", Mitsuba(scene, args.samples), args.samples, is_mitsuba=True)]
+    for binary in args.glimt:
         name = Path(binary).name
-        by_paths = Glimt(binary, scene, HOME / "out", ["--integrator", "path"])
-        found.append(Way(f"{name} path", by_paths, asked.samples))
-        if asked.photons:
+        path_tracer = Glimt(binary, scene, HOME / "out", ["--integrator", "path"])
+        found.append(Method(f"{name} path", path_tracer, args.samples))
+        if args.photons:
             by_photons = Glimt(binary, scene, HOME / "out", ["--integrator", "whitted", "--photons", "on"])
-            found.append(Way(f"{name} photons", by_photons, asked.passes, by_reference=True))
+            found.append(Method(f"{name} photons", by_photons, args.passes, by_reference=True))
     return found
 
 
-def row(scene, way, mitsuba):
-    """Formats the row of results for one way."""
-    reference, by_reference = scene.luminance, way.by_reference
-    seconds, spread = way.seconds(), way.error(reference, by_reference)
-    paths = scene.width * scene.height * way.samples
-    figures = f"{way.samples:8}{seconds:9.3f}{1e6 * seconds / paths:9.3f}{spread:10.2e}{seconds * spread:10.2e}"
+def row(scene, method, mitsuba):
+    """Formats the row of results for one method."""
+    reference, by_reference = scene.luminance, method.by_reference
+    seconds, spread = method.seconds(), method.error(reference, by_reference)
+    paths = scene.width * scene.height * method.samples
+    figures = f"{method.samples:8}{seconds:9.3f}{1e6 * seconds / paths:9.3f}{spread:10.2e}{seconds * spread:10.2e}"
     ratio = ""
-    if not way.is_mitsuba:
-        of = lambda number=None: way.product(reference, by_reference, number) / mitsuba.product(reference, by_reference, number)
-        each = [of(number) for number in range(len(way.rounds))]
+    if not method.is_mitsuba:
+        of = lambda number=None: method.product(reference, by_reference, number) / mitsuba.product(reference, by_reference, number)
+        each = [of(number) for number in range(len(method.rounds))]
         ratio = f"{of():.2f} ({min(each):.2f} to {max(each):.2f})"
-    means = way.means()
+    means = method.means()
     mean, whole = statistics.mean(means), float(reference.mean())
     apart, scatter = mean / whole - 1, statistics.stdev(means) / len(means) ** 0.5 / whole
-    return f"{scene.name:14}{way.name:24}{figures}  {ratio:22}{mean:9.5f} {apart:+.2%} ± {scatter:.2%}"
+    return f"{scene.name:14}{method.name:24}{figures}  {ratio:22}{mean:9.5f} {apart:+.2%} ± {scatter:.2%}"
 
 
-def compare(scene, asked):
+def compare(scene, args):
     """Prints the rows of a scene."""
-    every = ways(scene, asked)
-    for number in range(asked.rounds):
+    every = methods(scene, args)
+    for number in range(args.rounds):
         # Every image of a scene has its own seed.
-        first = 1 + number * asked.seeds
-        for way in every:
-            way.render(range(first, first + asked.seeds))
-        print(f"{scene.name}: round {number + 1} of {asked.rounds}", file=sys.stderr, flush=True)
-    for way in every:
-        print(row(scene, way, every[0]), flush=True)
+        first = 1 + number * args.seeds
+        for method in every:
+            method.render(range(first, first + args.seeds))
+        print(f"{scene.name}: round {number + 1} of {args.rounds}", file=sys.stderr, flush=True)
+    for method in every:
+        print(row(scene, method, every[0]), flush=True)
     print(f"{scene.name:14}{'reference':24}{'':8}{'':9}{'':9}{'':10}{'':10}  {'':22}{scene.luminance.mean():9.5f}", flush=True)
 
 
@@ -145,13 +145,13 @@ def main():
     parser.add_argument("--side", type=at_least(1), default=256, help="pixels along the longer side, for scene files")
     parser.add_argument("--reference", type=at_least(1), default=8192, help="samples of the reference, for scene files")
     parser.add_argument("--glimt", action="append", help="glimt binary; may be repeated")
-    asked = parser.parse_args()
-    asked.glimt = asked.glimt or [ROOT / "target" / "release" / "glimt"]
+    args = parser.parse_args()
+    args.glimt = args.glimt or [ROOT / "target" / "release" / "glimt"]
     dr.set_thread_count(THREADS)
     print(HEADER)
-    for path in asked.scenes:
+    for path in args.scenes:
         try:
-            compare(subject(path, asked, HOME), asked)
+            compare(subject(path, args, HOME), args)
         except Unknown as unknown:
             sys.exit(f"{path}: cannot convert {unknown}")
 

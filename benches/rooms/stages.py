@@ -81,19 +81,19 @@ def stage(names):
     return "other"
 
 
-def measure(scene, asked):
+def measure(scene, args):
     """Prints the stages of a scene."""
     with tempfile.TemporaryDirectory() as folder:
         profile = f"{folder}/profile"
-        render = [asked.glimt, scene, "--once", "--integrator", "path", "--threads", "1", "--progress", "none"]
-        size = ["--samples", asked.samples, "--width", asked.side, "--height", asked.side, "-o", f"{folder}/out.exr"]
+        render = [args.glimt, scene, "--once", "--integrator", "path", "--threads", "1", "--progress", "none"]
+        size = ["--samples", args.samples, "--width", args.side, "--height", args.side, "-o", f"{folder}/out.exr"]
         run([str(part) for part in ["perf", "record", "-q", "-e", "cpu-clock", "-F", RATE, "-o", profile, *render, *size]])
-        found = samples(profile, asked.glimt)
-    names = frames(asked.glimt, [place for place in found if isinstance(place, int)])
+        found = samples(profile, args.glimt)
+    names = frames(args.glimt, [place for place in found if isinstance(place, int)])
     totals = collections.Counter()
     for place, count in found.items():
         totals[stage(names[place] if isinstance(place, int) else [place])] += count
-    paths = asked.samples * asked.side**2
+    paths = args.samples * args.side**2
     microseconds = lambda count: 1e6 * count / RATE / paths
     setup = totals.pop("reading, trees, writing", 0)
     whole = sum(totals.values())
@@ -108,9 +108,9 @@ def main():
     parser.add_argument("--glimt", default=str(ROOT / "target/profiling/glimt"))
     parser.add_argument("--samples", type=int, default=64)
     parser.add_argument("--side", type=int, default=128, help="image width and height in pixels")
-    asked = parser.parse_args()
-    for scene in asked.scenes:
-        measure(scene, asked)
+    args = parser.parse_args()
+    for scene in args.scenes:
+        measure(scene, args)
 
 
 if __name__ == "__main__":

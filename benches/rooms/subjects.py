@@ -14,9 +14,9 @@ from renderers import luminance
 CHUNK = 64
 
 
-def subject(path, asked, home):
+def subject(path, args, home):
     """Returns the subject for a scene file, or for a folder with a scene."""
-    return Folder(path) if path.is_dir() else File(path, asked.side, asked.reference, home)
+    return Folder(path) if path.is_dir() else File(path, args.side, args.reference, home)
 
 
 class Folder:

@@ -85,7 +85,7 @@ fn ratios(pair: &FeaturePair, rounds: usize) -> Result<PairResult, String> {
             (run::render(&pair.off)?, on)
         };
         is_same &= off.pixels.iter().map(|x| x.to_bits()).eq(on.pixels.iter().map(|x| x.to_bits()));
-        said = pair.skipped.map_or(String::new(), |(stage, _)| why(&on.report, stage));
+        said = pair.skipped.map_or(String::new(), |(stage, _)| stage_reason(&on.report, stage));
         ratios.push(on.seconds / off.seconds);
         seconds = seconds.min(off.seconds);
     }
@@ -115,7 +115,7 @@ fn instructions(picture: &SceneFiles) -> Option<f64> {
 }
 
 /// Returns the reason that the report gives for a stage's status.
-fn why(report: &serde_json::Value, stage: &str) -> String {
+fn stage_reason(report: &serde_json::Value, stage: &str) -> String {
     let stages = report["stages"].as_array().into_iter().flatten();
     let said = stages.filter(|one| one["name"] == stage);
     said.map(|one| format!("{stage} {}: {}", one["status"], one["why"]).replace('"', "")).collect()

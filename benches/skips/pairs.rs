@@ -47,7 +47,7 @@ const POINT: &str = "[[light]]\nposition = [1, 3, 2]\nintensity = 20\n";
 
 const LAMP: &str = "[materials.lamp]\nemission = 5\n[[quad]]\ncorner = [-0.5, 3, -0.5]\nu = [1, 0, 0]\nv = [0, 0, 1]\nmaterial = \"lamp\"\n";
 
-const PICTURE: &str = "P3 2 2 255 90 120 200 20 30 40 255 250 200 70 70 80";
+const IMAGE: &str = "P3 2 2 255 90 120 200 20 30 40 255 250 200 70 70 80";
 
 /// Returns all pairs, rendered with this image size and number of samples per pixel.
 pub(crate) fn pairs([width, height, samples]: [u32; 3]) -> Vec<FeaturePair> {
@@ -56,38 +56,50 @@ pub(crate) fn pairs([width, height, samples]: [u32; 3]) -> Vec<FeaturePair> {
         let sized =
             size.iter().fold(ROOM.to_owned(), |text, (key, value)| text.replace(key, &value.to_string()));
         let filled = sized.replace("RENDER", render).replace("CAMERA", camera).replace("BALL", ball);
-        SceneFiles::new(filled + rest).with("a.ppm", PICTURE.to_owned())
+        SceneFiles::new(filled + rest).with("a.ppm", IMAGE.to_owned())
     };
     let plain = || scene("", "", "", POINT);
     let lit = || scene("", "", "", LAMP);
     let path = || scene("integrator = \"path\"", "", "", LAMP);
     let with = |rest: &str| scene("", "", "", &(POINT.to_owned() + rest));
-    let lens = |options| scene("", "aperture = 0.1", "", POINT).by(options);
+    let lens = |options| scene("", "aperture = 0.1", "", POINT).with_options(options);
     let pair = |name, off, on| FeaturePair { name, off, on, skipped: None };
     let texture = "[textures.t]\nfile = \"a.ppm\"\n";
     let unused = "[textures.t]\nfile = \"a.ppm\"\nfilter = \"mipmap\"\n[materials.unused]\ndiffuse = { texture = \"t\" }\nnormal_map = \"t\"\n";
     vec![
         FeaturePair {
             skipped: Some(("photons", reasons::NOT_USED_BY_PATH)),
-            ..pair("photons with path", path(), path().by("--photons on"))
+            ..pair("photons with path", path(), path().with_options("--photons on"))
         },
         FeaturePair {
             skipped: Some(("photons", reasons::TOO_FEW_BOUNCES)),
             ..pair(
                 "photons, direct light only",
                 scene("max_depth = 1", "", "", POINT),
-                scene("max_depth = 1", "", "", POINT).by("--photons on"),
+                scene("max_depth = 1", "", "", POINT).with_options("--photons on"),
             )
         },
         FeaturePair {
             skipped: Some(("photons", reasons::PHOTONS_OFF)),
             ..pair("photons not enabled", plain(), with("[photons]\ncount = 4000000\nradius = 0.5\n"))
         },
-        pair("depth of field without an aperture", plain().by("--dof off"), plain().by("--dof on")),
+        pair(
+            "depth of field without an aperture",
+            plain().with_options("--dof off"),
+            plain().with_options("--dof on"),
+        ),
         pair("aperture with depth of field off", plain(), lens("--dof off")),
-        pair("soft shadows from point lights", plain().by("--shadows hard"), plain().by("--shadows soft")),
+        pair(
+            "soft shadows from point lights",
+            plain().with_options("--shadows hard"),
+            plain().with_options("--shadows soft"),
+        ),
         pair("shadow samples for point lights", plain(), scene("shadow_samples = 8", "", "", POINT)),
-        pair("shadows with path", path().by("--shadows off"), path().by("--shadows soft")),
+        pair(
+            "shadows with path",
+            path().with_options("--shadows off"),
+            path().with_options("--shadows soft"),
+        ),
         FeaturePair {
             skipped: Some(("textures", reasons::NO_TEXTURES)),
             ..pair("unused texture", plain(), with(texture))
@@ -103,7 +115,7 @@ pub(crate) fn pairs([width, height, samples]: [u32; 3]) -> Vec<FeaturePair> {
         ),
         pair("highlight strength 0", plain(), scene("", "", ", specular = 0, shininess = 1e5", POINT)),
         pair("emission 0", plain(), scene("", "", ", emission = 0", POINT)),
-        pair("adaptive sampling without an error target", lit(), lit().by("--error 0")),
+        pair("adaptive sampling without an error target", lit(), lit().with_options("--error 0")),
         pair("clamp 0", lit(), scene("clamp = 0", "", "", LAMP)),
         pair("ambient light with path", path(), scene("integrator = \"path\"\nambient = 0.5", "", "", LAMP)),
         pair("light with intensity 0", plain(), with("[[light]]\nposition = [2, 3, 2]\nintensity = 0\n")),

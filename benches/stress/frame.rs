@@ -32,7 +32,7 @@ impl Frame {
     }
 
     /// An edge or offset vector: scaled, but not moved.
-    pub(crate) fn way(self, x: f64, y: f64, z: f64) -> String {
+    pub(crate) fn vector(self, x: f64, y: f64, z: f64) -> String {
         Self { at: [0.0; 3], ..self }.point(x, y, z)
     }
 

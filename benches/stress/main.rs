@@ -60,7 +60,7 @@ fn line(row: &StressRow, faulty: &mut u32) -> String {
     let start = format!("| {} | {} | {kind} |", row.name, row.pairs.len());
     match run::measure(row, rounds) {
         Ok(measured) => {
-            let faults = measured.faults(row);
+            let faults = measured.failures(row);
             *faulty += u32::from(!faults.is_empty());
             let [seconds, twins] = measured.seconds;
             let ratio = if row.is_timed { format!("{:.2}", seconds / twins) } else { String::new() };

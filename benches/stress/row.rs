@@ -19,7 +19,7 @@ impl SceneFiles {
         self
     }
 
-    pub(crate) fn by(mut self, options: &'static str) -> Self {
+    pub(crate) fn with_options(mut self, options: &'static str) -> Self {
         self.options = options;
         self
     }
@@ -47,7 +47,11 @@ pub(crate) struct StressRow {
 
 impl StressRow {
     /// A row whose images must match their references.
-    pub(crate) fn alike(name: impl Into<String>, pairs: Vec<(SceneFiles, SceneFiles)>, bound: f64) -> Self {
+    pub(crate) fn matching(
+        name: impl Into<String>,
+        pairs: Vec<(SceneFiles, SceneFiles)>,
+        bound: f64,
+    ) -> Self {
         Self { name: name.into(), pairs, figure: RowMeasure::Difference(1.0), bound, is_timed: false }
     }
 

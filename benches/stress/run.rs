@@ -8,10 +8,10 @@ use std::time::{Duration, Instant};
 use super::row::{RowMeasure, SceneFiles, StressRow};
 
 /// Time limit for a render, after which it is considered hung.
-const LONGEST: Duration = Duration::from_secs(120);
+const RENDER_TIME_LIMIT: Duration = Duration::from_secs(120);
 
 /// Maximum time relative to the reference.
-pub(crate) const MOST_SLOWER: f64 = 3.0;
+pub(crate) const MAX_SLOWDOWN: f64 = 3.0;
 
 /// A rendered image.
 #[derive(Clone)]
@@ -35,17 +35,17 @@ pub(crate) struct RowResult {
 
 impl RowResult {
     /// Whether the images are within their bounds, regardless of time.
-    pub(crate) fn is_right(&self, row: &StressRow) -> bool {
+    pub(crate) fn is_within_bounds(&self, row: &StressRow) -> bool {
         self.figure <= row.bound && self.non_finite == 0
     }
 
     /// The reasons why the row fails.
-    pub(crate) fn faults(&self, row: &StressRow) -> Vec<&'static str> {
+    pub(crate) fn failures(&self, row: &StressRow) -> Vec<&'static str> {
         let slower = self.seconds[0] / self.seconds[1];
         let faults = [
             (!(self.figure <= row.bound), "exceeds its bound"),
             (self.non_finite > 0, "has non-finite samples"),
-            (row.is_timed && !(slower <= MOST_SLOWER), "too slow"),
+            (row.is_timed && !(slower <= MAX_SLOWDOWN), "too slow"),
         ];
         faults.into_iter().filter(|(holds, _)| *holds).map(|(_, what)| what).collect()
     }
@@ -135,7 +135,7 @@ fn render_in(folder: &Path, picture: &SceneFiles) -> Result<Rendered, String> {
         if let Some(status) = child.try_wait().map_err(said)? {
             break status;
         }
-        if begin.elapsed() > LONGEST {
+        if begin.elapsed() > RENDER_TIME_LIMIT {
             child.kill().and_then(|()| child.wait()).map_err(said)?;
             return Err("hangs".to_owned());
         }

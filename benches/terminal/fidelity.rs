@@ -22,12 +22,12 @@ const CELL: (usize, usize) = (12, 24);
 const BLUR: f32 = 6.0;
 const WINDOW: Rect = Rect { x: 0, y: 0, width: 80, height: 30 };
 /// Default colors of the terminal.
-const INK: [u8; 3] = [229; 3];
-const GROUND: [u8; 3] = [0; 3];
+const FOREGROUND: [u8; 3] = [229; 3];
+const BACKGROUND: [u8; 3] = [0; 3];
 /// Ink coverage of the ASCII characters from space to `~` on a scale of 0 to 255: the means of their DejaVu
 /// Sans Mono bitmaps.
 #[rustfmt::skip]
-const INK_OF_ASCII: [u8; 95] = [0, 21, 16, 61, 52, 45, 58, 8, 28, 28, 24, 27, 11, 7, 7, 27, 61, 38, 44, 46, 49, 48, 58, 36, 62, 58, 14, 17, 29, 28, 29, 31, 66, 54, 68, 40, 60, 53, 43, 53, 59, 43, 39, 57, 35, 68, 68, 58, 52, 63, 62, 49, 38, 55, 47, 67, 50, 39, 48, 35, 27, 35, 17, 17, 6, 48, 54, 32, 54, 48, 37, 60, 47, 34, 36, 47, 32, 54, 40, 45, 54, 54, 26, 38, 36, 40, 34, 47, 36, 42, 36, 39, 30, 38, 15];
+const ASCII_INK_COVERAGE: [u8; 95] = [0, 21, 16, 61, 52, 45, 58, 8, 28, 28, 24, 27, 11, 7, 7, 27, 61, 38, 44, 46, 49, 48, 58, 36, 62, 58, 14, 17, 29, 28, 29, 31, 66, 54, 68, 40, 60, 53, 43, 53, 59, 43, 39, 57, 35, 68, 68, 58, 52, 63, 62, 49, 38, 55, 47, 67, 50, 39, 48, 35, 27, 35, 17, 17, 6, 48, 54, 32, 54, 48, 37, 60, 47, 34, 36, 47, 32, 54, 40, 45, 54, 54, 26, 38, 36, 40, 34, 47, 36, 42, 36, 39, 30, 38, 15];
 
 /// A display mode, with the corresponding settings for glimt and chafa.
 struct DisplayMode {
@@ -110,16 +110,16 @@ fn errors(
     let pixels = image.pixels().map(|pixel| pixel.0).collect();
     let picture = Srgb8Image { width: image.width(), height: image.height(), pixels };
     let place =
-        place(&draw_for_dark_xterm(&picture, PreviewChoice::HalfBlock, ColorDepth::TrueColor, WINDOW));
+        image_area(&draw_for_dark_xterm(&picture, PreviewChoice::HalfBlock, ColorDepth::TrueColor, WINDOW));
     let Some(buffer) = draw(&picture, place)? else { return Ok(None) };
     let area = if buffer.area == WINDOW { place } else { buffer.area };
-    let seen = LinearImage::of_cells(&buffer, area);
-    let truth = LinearImage::of_picture(&picture, seen.width, seen.height);
+    let seen = LinearImage::from_cells(&buffer, area);
+    let truth = LinearImage::from_image(&picture, seen.width, seen.height);
     Ok(Some([seen.error(&truth), seen.blurred().error(&truth.blurred())]))
 }
 
 /// Position of the image in the window.
-fn place(buffer: &Buffer) -> Rect {
+fn image_area(buffer: &Buffer) -> Rect {
     let is_picture = |x: u16, y: u16| buffer[(x, y)].symbol() != " ";
     let columns: Vec<u16> =
         (0..buffer.area.width).filter(|x| (0..buffer.area.height).any(|y| is_picture(*x, y))).collect();
@@ -180,7 +180,7 @@ fn copy(from: &vt100::Cell, to: &mut Cell) {
         let own = |color, own: [u8; 3]| {
             if color == Color::Reset { Color::Rgb(own[0], own[1], own[2]) } else { color }
         };
-        (fg, bg) = (own(bg, GROUND), own(fg, INK));
+        (fg, bg) = (own(bg, BACKGROUND), own(fg, FOREGROUND));
     }
     to.set_symbol(if from.has_contents() { from.contents() } else { " " }).set_fg(fg).set_bg(bg);
 }
@@ -193,18 +193,21 @@ struct LinearImage {
 }
 
 impl LinearImage {
-    fn of_cells(buffer: &Buffer, area: Rect) -> Self {
+    fn from_cells(buffer: &Buffer, area: Rect) -> Self {
         let (width, height) = (usize::from(area.width) * CELL.0, usize::from(area.height) * CELL.1);
         let pixel = |i: usize| {
             let (x, y) = (i % width, i / width);
             let cell = &buffer[(area.x + (x / CELL.0) as u16, area.y + (y / CELL.1) as u16)];
             let place = y % CELL.1 / (CELL.1 / 12) * 2 + x % CELL.0 / (CELL.0 / 2);
             let symbol = cell.symbol().chars().next().unwrap_or(' ');
-            let [ink, ground] = [xterm_rgb(cell.fg).unwrap_or(INK), xterm_rgb(cell.bg).unwrap_or(GROUND)];
+            let [ink, ground] =
+                [xterm_rgb(cell.fg).unwrap_or(FOREGROUND), xterm_rgb(cell.bg).unwrap_or(BACKGROUND)];
             let [ink, ground] = [ink, ground].map(srgb8_color_to_linear);
             let part = match (filled_squares(symbol), (symbol as usize).checked_sub(0x20)) {
                 (Some(filled_squares), _) => f32::from(u8::from(filled_squares[place])),
-                (None, Some(number)) => INK_OF_ASCII.get(number).map_or(0.0, |ink| f32::from(*ink) / 255.0),
+                (None, Some(number)) => {
+                    ASCII_INK_COVERAGE.get(number).map_or(0.0, |ink| f32::from(*ink) / 255.0)
+                }
                 (None, None) => 0.0,
             };
             ground + (ink - ground) * part
@@ -212,7 +215,7 @@ impl LinearImage {
         Self { width, height, pixels: (0..width * height).map(pixel).collect() }
     }
 
-    fn of_picture(picture: &Srgb8Image, width: usize, height: usize) -> Self {
+    fn from_image(picture: &Srgb8Image, width: usize, height: usize) -> Self {
         let linear = picture.pixels.iter().map(|pixel| srgb8_color_to_linear(*pixel)).collect();
         let image =
             glimt::film::RadianceImage { width: picture.width, height: picture.height, pixels: linear };

@@ -10,9 +10,9 @@ use crate::watched::{COLUMNS, Connection, ROWS, WatchedTerminal};
 
 /// Render progress in percent at which to compare the screen, with the maximum difference on a scale of 0 to
 /// 255.
-const LOOKS: [(u32, f64); 3] = [(10, 1.5), (25, 0.8), (50, 0.5)];
+const CHECKPOINTS: [(u32, f64); 3] = [(10, 1.5), (25, 0.8), (50, 0.5)];
 
-const WAYS: [(&str, &[&str]); 5] = [
+const TERMINALS: [(&str, &[&str]); 5] = [
     ("half blocks", &["--preview", "halfblock", "--color", "truecolor"]),
     ("sextants", &["--preview", "sextant", "--color", "truecolor"]),
     ("256 colors", &["--preview", "halfblock", "--color", "256"]),
@@ -29,14 +29,14 @@ pub(crate) fn print() -> Result<(), Box<dyn Error>> {
     println!(
         "mean absolute difference from the final screen on a scale of 0 to 255: cornell_glass, 256 samples,"
     );
-    println!("{COLUMNS}×{ROWS} cells, a terminal that answers immediately; bounds {LOOKS:?}\n");
+    println!("{COLUMNS}×{ROWS} cells, a terminal that answers immediately; bounds {CHECKPOINTS:?}\n");
     println!("{:<14} {:>7} {:>7} {:>7} {:>9} {:>9}", "", "10 %", "25 %", "50 %", "seconds", "kB/s");
     let program = std::env::var("GLIMT").unwrap_or(env!("CARGO_BIN_EXE_glimt").to_owned());
     let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell_glass.toml");
     let scene = scene.to_str().ok_or("a file name is not valid UTF-8")?;
     let folder = tempfile::tempdir()?;
     let render = [&*program, scene, "--samples", "256", "-o", "out.png"];
-    for (name, options) in WAYS {
+    for (name, options) in TERMINALS {
         println!("{name:<14} {}", follow(&[&render, options].concat(), folder.path())?);
     }
     let settings = folder.path().join("tmux.conf");
@@ -44,7 +44,7 @@ pub(crate) fn print() -> Result<(), Box<dyn Error>> {
     let settings = settings.to_str().ok_or("a file name is not valid UTF-8")?;
     let socket = format!("glimt-bench-{}", std::process::id());
     let tmux = ["tmux", "-L", &socket, "-f", settings, "new-session"];
-    let line = follow(&[&tmux, &render[..], WAYS[0].1].concat(), folder.path());
+    let line = follow(&[&tmux, &render[..], TERMINALS[0].1].concat(), folder.path());
     // Ignore errors: the server exits with its last session.
     let _ = std::process::Command::new("tmux").args(["-L", &socket, "kill-server"]).output();
     println!("{:<14} {}", "through tmux", line?);
@@ -56,25 +56,25 @@ fn follow(command: &[&str], folder: &Path) -> Result<String, Box<dyn Error>> {
     let terminal = WatchedTerminal::open(command, folder, Connection::NONE)?;
     let begin = std::time::Instant::now();
     let mut screens = Vec::new();
-    for (percent, _) in LOOKS {
+    for (percent, _) in CHECKPOINTS {
         terminal.wait("progress", |far| far.percent().is_some_and(|now| now >= percent))?;
-        screens.push(terminal.far().seen());
+        screens.push(terminal.far_end().colors());
     }
     terminal.wait("the end", |far| far.percent() == Some(100))?;
-    let (seconds, came) = (begin.elapsed().as_secs_f64(), terminal.far().came);
+    let (seconds, came) = (begin.elapsed().as_secs_f64(), terminal.far_end().came);
     // The last image may still be in transit.
     thread::sleep(Duration::from_secs(2));
-    let last = terminal.far().seen();
+    let last = terminal.far_end().colors();
     let figures: Vec<String> = screens
         .iter()
-        .map(|screen| apart(screen, &last).map_or("–".into(), |it| format!("{it:.2}")))
+        .map(|screen| mean_difference(screen, &last).map_or("–".into(), |it| format!("{it:.2}")))
         .collect();
     let rate = came as f64 / seconds / 1e3;
     Ok(format!("{:>7} {:>7} {:>7} {seconds:>9.1} {rate:>9.0}", figures[0], figures[1], figures[2]))
 }
 
 /// Returns the mean absolute difference between pixels. `None` if the sizes differ.
-fn apart(a: &[[u8; 3]], b: &[[u8; 3]]) -> Option<f64> {
+fn mean_difference(a: &[[u8; 3]], b: &[[u8; 3]]) -> Option<f64> {
     let pairs = a.iter().zip(b).filter(|(a, b)| **a != [0; 3] || **b != [0; 3]);
     let (mut sum, mut count) = (0, 0);
     for (a, b) in pairs {

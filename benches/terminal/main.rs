@@ -34,10 +34,10 @@ use crate::sequence::RecordedPreview;
 
 /// Columns and rows of the window. The image is slightly smaller.
 const WINDOWS: [(u16, u16); 3] = [(80, 24), (120, 40), (200, 60)];
-const BESIDE: u16 = 30;
-const ABOVE_AND_BELOW: u16 = 4;
+const SIDE_COLUMNS: u16 = 30;
+const OUTER_ROWS: u16 = 4;
 /// Maximum channel difference that does not count as a change.
-const SAME: u8 = 1;
+const MAX_UNCHANGED_DIFFERENCE: u8 = 1;
 
 /// An edit to save after the scene has been rendered.
 struct Edit {
@@ -103,8 +103,8 @@ fn main() -> Result<(), Box<dyn Error>> {
 /// Renders a scene and its edited version, and prints a line for each.
 fn replay(edit: &Edit, columns: u16, rows: u16) -> Result<(), Box<dyn Error>> {
     let size = MaxPreviewSize {
-        width: u32::from(columns - BESIDE),
-        height: 2 * u32::from(rows - ABOVE_AND_BELOW),
+        width: u32::from(columns - SIDE_COLUMNS),
+        height: 2 * u32::from(rows - OUTER_ROWS),
         around: None,
     };
     let scenes = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
@@ -181,7 +181,7 @@ impl Window {
         }
         let plain: usize = shots.iter().map(|shot| self.plain.draw(&self.cells(&shot.picture).0)).sum();
         let exact = self.exact(&last.picture);
-        let (plain_exact, chafa_exact) = self.others(&last.picture)?;
+        let (plain_exact, chafa_exact) = self.bytes_of_other_programs(&last.picture)?;
         self.last = Some(last.picture.clone());
         let by = |bytes: usize, cells: usize| bytes as f64 / cells.max(1) as f64;
         let chafa = chafa_exact.map_or("–".to_owned(), |bytes| format!("{:.0}", by(bytes, cells)));
@@ -231,7 +231,10 @@ impl Window {
         drain(&mut painter)
     }
 
-    fn others(&self, picture: &Srgb8Image) -> Result<(usize, Option<usize>), Box<dyn Error>> {
+    fn bytes_of_other_programs(
+        &self,
+        picture: &Srgb8Image,
+    ) -> Result<(usize, Option<usize>), Box<dyn Error>> {
         Ok((PlainRatatui::new(self.area).draw(&self.cells(picture).0), chafa(picture)?))
     }
 
@@ -268,7 +271,10 @@ fn drain(painter: &mut Painter) -> usize {
 fn changed(before: Option<&Srgb8Image>, after: &Srgb8Image) -> usize {
     let width = after.width as usize;
     let differs = |i: usize| match before.and_then(|before| before.pixels.get(i)) {
-        Some(old) => after.pixels.get(i).is_some_and(|new| (0..3).any(|k| old[k].abs_diff(new[k]) > SAME)),
+        Some(old) => after
+            .pixels
+            .get(i)
+            .is_some_and(|new| (0..3).any(|k| old[k].abs_diff(new[k]) > MAX_UNCHANGED_DIFFERENCE)),
         None => true,
     };
     let rows = (after.height as usize).div_ceil(2);

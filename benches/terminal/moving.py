@@ -106,7 +106,7 @@ def frame(screens, x, y):
     return image
 
 
-def told(taken):
+def distinct_frames(taken):
     """Returns the distinct frames and their durations in milliseconds."""
     frames, times = [], []
     for index, (at, most, seen) in enumerate(taken):
@@ -122,9 +122,9 @@ def told(taken):
 
 
 def main():
-    asked = arguments()
+    args = arguments()
     with tempfile.TemporaryDirectory() as folder:
-        frames, times = told(play(folder, asked.glimt))
+        frames, times = distinct_frames(play(folder, args.glimt))
     # Compute one palette for all frames from a dozen of them.
     some = frames[:: max(1, len(frames) // 12)]
     strip = Image.new("RGB", (frames[0].width, frames[0].height * len(some)))
@@ -132,12 +132,12 @@ def main():
         strip.paste(image, (0, index * image.height))
     palette = strip.quantize(256, method=Image.Quantize.MEDIANCUT)
     frames = [image.quantize(palette=palette, dither=Image.Dither.NONE) for image in frames]
-    if asked.frames:
-        asked.frames.mkdir(exist_ok=True, parents=True)
+    if args.frames:
+        args.frames.mkdir(exist_ok=True, parents=True)
         for index, (image, milliseconds) in enumerate(zip(frames, times)):
-            image.save(asked.frames / f"{index:03}_{milliseconds}ms.png")
-    frames[0].save(asked.output, save_all=True, append_images=frames[1:], duration=times, loop=0, optimize=True)
-    print(f"{asked.output}: {len(frames)} frames, {sum(times) / 1000:.1f} s, {asked.output.stat().st_size // 1000} kB")
+            image.save(args.frames / f"{index:03}_{milliseconds}ms.png")
+    frames[0].save(args.output, save_all=True, append_images=frames[1:], duration=times, loop=0, optimize=True)
+    print(f"{args.output}: {len(frames)} frames, {sum(times) / 1000:.1f} s, {args.output.stat().st_size // 1000} kB")
 
 
 if __name__ == "__main__":

@@ -7,19 +7,20 @@ use std::time::{Duration, Instant};
 
 use crate::watched::{Connection, WatchedTerminal};
 
-/// Key repeat interval. The key is first held for `BEFORE`, then for `HELD` while the connection is measured.
+/// Key repeat interval. The key is first held for `WARM_UP_TIME`, then for `HOLD_TIME` while the connection
+/// is measured.
 const REPEAT: Duration = Duration::from_millis(33);
 /// Number of presses in one direction, few enough that the camera stays in front of the scene. Behind a
 /// room's wall, the image would be black, with nothing to send.
-const SWING: u32 = 8;
-const BEFORE: Duration = Duration::from_secs(2);
-const HELD: Duration = Duration::from_secs(6);
+const PRESSES_PER_DIRECTION: u32 = 8;
+const WARM_UP_TIME: Duration = Duration::from_secs(2);
+const HOLD_TIME: Duration = Duration::from_secs(6);
 
 /// Prints one line per scene.
 pub(crate) fn print() -> Result<(), Box<dyn Error>> {
     println!(
         "camera keys held for {} s over a 1 Mbit/s connection with a round-trip time of 150 ms",
-        HELD.as_secs()
+        HOLD_TIME.as_secs()
     );
     println!("{:<16} {:>14} {:>22}", "", "used", "max. unacknowledged bytes");
     for scene in ["cornell", "cornell_glass", "textures", "spheres"] {
@@ -38,13 +39,13 @@ fn orbit(scene: &str) -> Result<(f64, usize), Box<dyn Error>> {
     let command = [&*program, scene, "--samples", "100000", "-o", "out.png"];
     let terminal = WatchedTerminal::open(&command, folder.path(), Connection::SLOW)?;
     terminal.wait("a picture", |far| far.percent().is_some())?;
-    thread::sleep(BEFORE);
-    hold(&terminal, BEFORE)?;
-    let before = terminal.far().came;
-    hold(&terminal, HELD)?;
-    let far = terminal.far();
-    let most = Connection::SLOW.bytes_per_second * HELD.as_secs_f64();
-    Ok(((far.came - before) as f64 / most, far.most_unanswered))
+    thread::sleep(WARM_UP_TIME);
+    hold(&terminal, WARM_UP_TIME)?;
+    let before = terminal.far_end().came;
+    hold(&terminal, HOLD_TIME)?;
+    let far = terminal.far_end();
+    let most = Connection::SLOW.bytes_per_second * HOLD_TIME.as_secs_f64();
+    Ok(((far.came - before) as f64 / most, far.max_unanswered))
 }
 
 /// Alternates between two opposite orbit keys, held with keyboard repeat.
@@ -53,7 +54,7 @@ fn hold(terminal: &WatchedTerminal, time: Duration) -> Result<(), Box<dyn Error>
     let mut presses = 0;
     while begin.elapsed() < time {
         // The first and last swings are half as long, to center them on the scene's camera.
-        let is_right = ((presses + SWING / 2) / SWING).is_multiple_of(2);
+        let is_right = ((presses + PRESSES_PER_DIRECTION / 2) / PRESSES_PER_DIRECTION).is_multiple_of(2);
         terminal.press(if is_right { "l" } else { "h" })?;
         presses += 1;
         thread::sleep((begin + REPEAT * presses).saturating_duration_since(Instant::now()));

@@ -38,7 +38,7 @@ def arguments():
     return parser.parse_args()
 
 
-def shown(asked):
+def shown(args):
     """Returns the text of the terminal, with color sequences."""
     with tempfile.TemporaryDirectory() as folder:
         tmux = ["tmux", "-S", f"{folder}/socket", "-f", "/dev/null"]
@@ -46,15 +46,15 @@ def shown(asked):
         def call(*words):
             return subprocess.run([*tmux, *words], check=True, capture_output=True, text=True).stdout
 
-        size = ["-x", str(asked.columns), "-y", str(asked.rows)]
+        size = ["-x", str(args.columns), "-y", str(args.rows)]
         for name in ("scenes", "assets"):
             os.symlink(ROOT / name, f"{folder}/{name}")
-        program = f"cd {folder} && COLORTERM=truecolor {asked.glimt.absolute()} {asked.scene}"
+        program = f"cd {folder} && COLORTERM=truecolor {args.glimt.absolute()} {args.scene}"
         call("new-session", "-d", *size, program)
         try:
             call("set", "-g", "status", "off")
             wait(call)
-            for key in asked.keys:
+            for key in args.keys:
                 call("send-keys", "-l", key)
                 wait(call)
             return call("capture-pane", "-e", "-N", "-p")
@@ -138,8 +138,8 @@ def drawn(text, columns, rows):
 
 
 def main():
-    asked = arguments()
-    drawn(shown(asked), asked.columns, asked.rows).save(asked.output, optimize=True)
+    args = arguments()
+    drawn(shown(args), args.columns, args.rows).save(args.output, optimize=True)
 
 
 if __name__ == "__main__":

@@ -67,7 +67,7 @@ pub(crate) fn render(
             | Event::CameraKept { .. }
             | Event::CameraUndone { .. }
             | Event::Picked { .. }
-            | Event::Cancelled { .. } => {}
+            | Event::Canceled { .. } => {}
         }
     }
     shots.last_mut().ok_or("no preview arrived")?.is_final = true;

@@ -47,12 +47,12 @@ pub(crate) struct FarEnd {
     /// Number of bytes sent in total, and before the last answered query.
     sent: usize,
     answered: usize,
-    pub(crate) most_unanswered: usize,
+    pub(crate) max_unanswered: usize,
 }
 
 impl FarEnd {
     /// Colors of the image's pixels, or of its cell subdivisions.
-    pub(crate) fn seen(&self) -> Vec<[u8; 3]> {
+    pub(crate) fn colors(&self) -> Vec<[u8; 3]> {
         if let Some(picture) = self.pixels.displayed_image() {
             return picture.pixels.clone();
         }
@@ -120,7 +120,7 @@ impl WatchedTerminal {
             came: 0,
             sent: 0,
             answered: 0,
-            most_unanswered: 0,
+            max_unanswered: 0,
         }));
         simulate_connection(pair.master.try_clone_reader()?, far.clone(), keys.clone(), line);
         Ok(Self { _master: pair.master, child, keys, far })
@@ -132,16 +132,16 @@ impl WatchedTerminal {
     }
 
     /// The state at the far end.
-    pub(crate) fn far(&self) -> MutexGuard<'_, FarEnd> {
+    pub(crate) fn far_end(&self) -> MutexGuard<'_, FarEnd> {
         lock(&self.far)
     }
 
     /// Waits until the far end satisfies `holds`.
     pub(crate) fn wait(&self, what: &str, holds: impl Fn(&FarEnd) -> bool) -> Result<(), Box<dyn Error>> {
         let deadline = Instant::now() + LIMIT;
-        while !holds(&self.far()) {
+        while !holds(&self.far_end()) {
             if Instant::now() > deadline {
-                let screen = self.far().cells.screen().contents();
+                let screen = self.far_end().cells.screen().contents();
                 return Err(format!("timed out waiting for {what}\n{screen}").into());
             }
             thread::sleep(Duration::from_millis(2));
@@ -163,7 +163,7 @@ fn lock<T>(of: &Mutex<T>) -> MutexGuard<'_, T> {
 }
 
 /// Bytes with their arrival time.
-type Due = (Instant, Vec<u8>);
+type DelayedBytes = (Instant, Vec<u8>);
 
 /// Simulates the connection: delays output on its way to the far end, and answers on the way back.
 fn simulate_connection(
@@ -172,7 +172,8 @@ fn simulate_connection(
     keys: Arc<Mutex<Box<dyn Write + Send>>>,
     line: Connection,
 ) {
-    let ((down, arriving), (up, rising)) = (channel::<Due>(), channel::<(Instant, usize, &'static [u8])>());
+    let ((down, arriving), (up, rising)) =
+        (channel::<DelayedBytes>(), channel::<(Instant, usize, &'static [u8])>());
     let at_end = far.clone();
     thread::spawn(move || process_arrivals(&arriving, &at_end, &up, line.delay));
     let at_start = far.clone();
@@ -192,7 +193,7 @@ fn simulate_connection(
             {
                 let mut far = lock(&far);
                 far.sent += count;
-                far.most_unanswered = far.most_unanswered.max(far.sent - far.answered);
+                far.max_unanswered = far.max_unanswered.max(far.sent - far.answered);
             }
             for part in bytes[..count].chunks(1 << 10) {
                 free = free.max(now) + Duration::from_secs_f64(part.len() as f64 / line.bytes_per_second);
@@ -205,7 +206,7 @@ fn simulate_connection(
 }
 
 fn process_arrivals(
-    arriving: &Receiver<Due>,
+    arriving: &Receiver<DelayedBytes>,
     far: &Mutex<FarEnd>,
     up: &Sender<(Instant, usize, &'static [u8])>,
     delay: Duration,

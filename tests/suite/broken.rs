@@ -380,7 +380,7 @@ const BROKEN: &[(&str, &[ExpectedDiagnostic])] = &[
             (7, 1, r#"`view_height` conflicts with `projection = "panorama"`"#),
             (8, 1, r#"`aperture` conflicts with `projection = "panorama"`"#),
             (9, 1, r#"`focus` conflicts with `projection = "panorama"`"#),
-            (13, 10, "`matrix` must be a rotation; it mirrors: its determinant is -1"),
+            (13, 10, "`matrix` must be a rotation; it is a reflection: its determinant is -1"),
         ],
     ),
     (
@@ -568,7 +568,7 @@ fn diagnostics(path: &Path) -> Vec<Diagnostic> {
     }
 }
 
-fn said(diagnostic: &Diagnostic) -> (usize, usize, String) {
+fn position_and_message(diagnostic: &Diagnostic) -> (usize, usize, String) {
     let place = diagnostic.place.as_ref().expect("a place");
     let (line, column) = line_and_column(&place.source, place.span.start);
     let kind = if diagnostic.severity == Severity::Warning { "warning: " } else { "" };
@@ -583,8 +583,10 @@ fn said(diagnostic: &Diagnostic) -> (usize, usize, String) {
 #[test]
 fn broken_scenes_have_expected_diagnostics() {
     for (name, expected) in BROKEN {
-        let found: Vec<_> =
-            diagnostics(&folder().join(name).with_extension("toml")).iter().map(said).collect();
+        let found: Vec<_> = diagnostics(&folder().join(name).with_extension("toml"))
+            .iter()
+            .map(position_and_message)
+            .collect();
         let found: Vec<_> =
             found.iter().map(|(line, column, text)| (*line, *column, text.as_str())).collect();
         assert_eq!(&found, expected, "{name}");
@@ -626,7 +628,7 @@ fn reports_show_positions_and_escape_controls() {
 }
 
 /// The only diagnostic for a file with the given contents.
-fn of_bytes(bytes: &[u8]) -> Diagnostic {
+fn diagnostic_for_bytes(bytes: &[u8]) -> Diagnostic {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("scene.toml");
     fs::write(&path, bytes).expect("written");
@@ -637,21 +639,26 @@ fn of_bytes(bytes: &[u8]) -> Diagnostic {
 
 #[test]
 fn non_text_files_are_rejected() {
-    let latin = said(&of_bytes(b"[camera]\n# caf\xe9\n"));
+    let latin = position_and_message(&diagnostic_for_bytes(b"[camera]\n# caf\xe9\n"));
     assert_eq!((latin.0, latin.1), (2, 6));
     assert_mentions(&latin.2, &["line 2", "UTF-8", "0xe9", "offset 14"]);
-    assert!(of_bytes(b"\x7fELF\x02\x01\0\0").message.contains("binary"));
-    assert_mentions(&of_bytes(b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR").message, &["(PNG)"]);
-    let model = of_bytes(b"# by hand\nv 0 0 0\n");
+    assert!(diagnostic_for_bytes(b"\x7fELF\x02\x01\0\0").message.contains("binary"));
+    assert_mentions(&diagnostic_for_bytes(b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR").message, &["(PNG)"]);
+    let model = diagnostic_for_bytes(b"# by hand\nv 0 0 0\n");
     assert!(model.message.contains("a model (OBJ)"), "{}", model.message);
     assert_mentions(&model.help.expect("help"), &["scene.obj"]);
     assert!(
-        of_bytes("[camera]".encode_utf16().flat_map(u16::to_le_bytes).collect::<Vec<_>>().as_slice())
-            .message
-            .contains("binary")
+        diagnostic_for_bytes(
+            "[camera]".encode_utf16().flat_map(u16::to_le_bytes).collect::<Vec<_>>().as_slice()
+        )
+        .message
+        .contains("binary")
     );
     for nothing in ["", " \n\t\r\n", "\u{feff}\n"] {
-        assert_eq!(said(&of_bytes(nothing.as_bytes())), (1, 1, "the scene file is empty".to_owned()));
+        assert_eq!(
+            position_and_message(&diagnostic_for_bytes(nothing.as_bytes())),
+            (1, 1, "the scene file is empty".to_owned())
+        );
     }
 }
 
@@ -659,9 +666,9 @@ fn non_text_files_are_rejected() {
 fn deep_nesting_does_not_overflow_the_stack() {
     for (open, close) in [("[", "]"), ("{a=", "}"), ("a.", "a=1")] {
         let text = format!("x = {}{close}\n", open.repeat(200_000));
-        assert_eq!(said(&of_bytes(text.as_bytes())).0, 1);
+        assert_eq!(position_and_message(&diagnostic_for_bytes(text.as_bytes())).0, 1);
         let header = format!("[{}a]\nb = 1\n", "a.".repeat(200_000));
-        assert_eq!(said(&of_bytes(header.as_bytes())).0, 1);
+        assert_eq!(position_and_message(&diagnostic_for_bytes(header.as_bytes())).0, 1);
     }
 }
 
@@ -680,7 +687,7 @@ fn eight_bit_colors_get_a_hex_suggestion() {
         ("mirror", "reflectance", Severity::Error),
         ("glass", "tint", Severity::Error),
     ] {
-        let found = of_bytes(scene(kind, key).as_bytes());
+        let found = diagnostic_for_bytes(scene(kind, key).as_bytes());
         assert_eq!(found.severity, severity, "{key}");
         assert!(
             found.place.as_ref().is_some_and(|place| place.label == "this looks like 0–255"),
@@ -689,15 +696,15 @@ fn eight_bit_colors_get_a_hex_suggestion() {
         assert!(found.help.as_ref().is_some_and(|help| help.starts_with("write \"#a00f0c\"")), "{found:?}");
     }
     for (kind, key) in [("phong", "diffuse"), ("mirror", "reflectance")] {
-        let found = of_bytes(scene(kind, key).replace("[160, 15, 12]", "160").as_bytes());
+        let found = diagnostic_for_bytes(scene(kind, key).replace("[160, 15, 12]", "160").as_bytes());
         assert!(found.help.as_ref().is_some_and(|help| help.starts_with("write \"#a0a0a0\"")), "{found:?}");
     }
     let text = scene("phong", "emission").replace("[160", "[16");
     assert!(!text.is_empty() && diagnostics_of(&text).is_empty(), "radiance may exceed 1");
     let text = scene("phong", "diffuse").replace("[160, 15, 12]", "[2, 0, 0]");
-    let said = diagnostics_of(&text);
-    assert!(said.len() == 1 && said[0].severity == Severity::Warning, "{said:?}");
-    assert!(!said[0].place.as_ref().is_some_and(|place| place.label.contains("255")));
+    let reported = diagnostics_of(&text);
+    assert!(reported.len() == 1 && reported[0].severity == Severity::Warning, "{reported:?}");
+    assert!(!reported[0].place.as_ref().is_some_and(|place| place.label.contains("255")));
 }
 
 #[test]
@@ -725,14 +732,14 @@ fn lists_in_other_syntax_get_a_suggestion() {
     ] {
         let camera = "[camera]\nlook_at = [0, 1, 0]\nposition = ";
         for rest in ["", "\n", "\nfov = 30\n", "\n\n[render]\nwidth = 3\n", "\n[[sphere]]\n"] {
-            let said = diagnostics_of(&format!("{camera}{value}{rest}"));
-            let first = &said[0];
+            let reported = diagnostics_of(&format!("{camera}{value}{rest}"));
+            let first = &reported[0];
             let place = first.place.as_ref().expect("a place");
             let found =
                 (&*first.message, line_and_column(&place.source, place.span.start), first.help.as_deref());
-            assert_eq!(found, (message, (3, column), help), "{value}{rest}: {said:?}");
-            let others = said[1..].iter().filter(|one| one.message != "the scene has no shapes");
-            assert_eq!(others.count(), 0, "{value}{rest}: {said:?}");
+            assert_eq!(found, (message, (3, column), help), "{value}{rest}: {reported:?}");
+            let others = reported[1..].iter().filter(|one| one.message != "the scene has no shapes");
+            assert_eq!(others.count(), 0, "{value}{rest}: {reported:?}");
         }
     }
 }
@@ -748,9 +755,9 @@ fn diagnostics_of(text: &str) -> Vec<Diagnostic> {
 #[test]
 fn unclosed_bracket_is_reported_first() {
     for rest in ["fov = 30\nup = [0, 1, 0]\n", "[render]\nwidth = 3\n", "", "[[sphere]]\nradius = 1\n"] {
-        let said = diagnostics_of(&format!("[camera]\nposition = [0, 1, 4]\nlook_at = [0, 1, 0\n{rest}"));
-        assert_eq!(said[0].message, "`[` opened here is not closed", "{rest:?}: {said:?}");
-        let place = said[0].place.as_ref().expect("a place");
+        let reported = diagnostics_of(&format!("[camera]\nposition = [0, 1, 4]\nlook_at = [0, 1, 0\n{rest}"));
+        assert_eq!(reported[0].message, "`[` opened here is not closed", "{rest:?}: {reported:?}");
+        let place = reported[0].place.as_ref().expect("a place");
         assert_eq!(line_and_column(&place.source, place.span.start), (3, 11), "{rest:?}");
     }
 }

@@ -159,7 +159,7 @@ fn scene(name: &str) -> String {
 }
 
 /// Number of cells in which a color channel differs by more than 1.
-fn changed(a: &Srgb8Image, b: &Srgb8Image) -> usize {
+fn count_changed_cells(a: &Srgb8Image, b: &Srgb8Image) -> usize {
     let width = a.width as usize;
     let is_off = |i: usize| (0..3).any(|k| a.pixels[i][k].abs_diff(b.pixels[i][k]) > 1);
     let tops = (0..a.pixels.len()).filter(|i| (i / width).is_multiple_of(2));
@@ -168,7 +168,7 @@ fn changed(a: &Srgb8Image, b: &Srgb8Image) -> usize {
 
 /// Shows all previews of a render. Returns the number of bytes for the first preview and for all
 /// previews.
-fn through(screen: &mut PaintedScreen, pictures: &[(Srgb8Image, Fidelity)]) -> (usize, usize) {
+fn show_all(screen: &mut PaintedScreen, pictures: &[(Srgb8Image, Fidelity)]) -> (usize, usize) {
     let sent: Vec<usize> =
         pictures.iter().map(|(picture, fidelity)| screen.show(picture, *fidelity)).collect();
     let (last, _) = pictures.last().expect("pictures");
@@ -198,11 +198,11 @@ fn renders_and_edits_stay_within_byte_budgets() {
         let new = studio.pictures(&before.replace(from, to));
         let [(old_last, _), (new_last, _)] = [&old, &new].map(|pictures| pictures.last().expect("pictures"));
         let cells = old_last.pixels.len() / 2;
-        let (first, all) = through(&mut screen, &old);
+        let (first, all) = show_all(&mut screen, &old);
         assert!(first <= 12 * cells, "{place}: {first} bytes for the first preview with {cells} cells");
         assert!(all <= 48 * cells, "{place}: {all} bytes for {cells} cells");
-        let edited = changed(old_last, new_last);
-        let (_, all) = through(&mut screen, &new);
+        let edited = count_changed_cells(old_last, new_last);
+        let (_, all) = show_all(&mut screen, &new);
         assert!(edited > 0 && all <= 48 * edited, "{place}: {all} bytes for {edited} changed cells");
     }
 }

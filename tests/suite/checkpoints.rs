@@ -21,7 +21,7 @@ fn begin(dir: &TestDir, line: &str) -> Child {
 /// Runs glimt and checks the exit code. Returns stderr with line breaks removed, because messages are
 /// wrapped.
 #[track_caller]
-fn said(dir: &TestDir, line: &str, code: i32) -> String {
+fn stderr_of(dir: &TestDir, line: &str, code: i32) -> String {
     dir.expect(line, code).split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
@@ -136,8 +136,8 @@ fn kill_while_it_writes(times: u32) {
         end(child, Signal::SIGKILL);
         if dir.path("out.exr.checkpoint").exists() {
             // The error mentions the seed only if the checkpoint is intact.
-            let said = self::said(&dir, "room.toml --once -o out.exr --seed 9 --resume", 2);
-            assert_mentions(&said, &["seed", "0", "9"]);
+            let stderr = stderr_of(&dir, "room.toml --once -o out.exr --seed 9 --resume", 2);
+            assert_mentions(&stderr, &["seed", "0", "9"]);
         }
     }
     assert!(dir.path("out.exr.checkpoint").exists());
@@ -171,8 +171,8 @@ fn hangup_writes_a_checkpoint_within_two_seconds() {
         eprintln!("{options:?}: exited after {seconds:.2} s with a {} MB checkpoint", bytes / 1_000_000);
         assert!(seconds < 2.0, "{options}: {seconds} s");
         // The error mentions the seed only if the checkpoint's digest is valid.
-        let said = self::said(&dir, &format!("room.toml --once -o out.exr {size} --seed 9 --resume"), 2);
-        assert_mentions(&said, &["seed", "0", "9"]);
+        let stderr = stderr_of(&dir, &format!("room.toml --once -o out.exr {size} --seed 9 --resume"), 2);
+        assert_mentions(&stderr, &["seed", "0", "9"]);
         fs::remove_file(dir.path("out.exr.checkpoint")).expect("removed");
     }
     is_over.store(true, std::sync::atomic::Ordering::Relaxed);
@@ -207,7 +207,7 @@ fn signal_leaves_a_resumable_checkpoint() {
 }
 
 /// Completes a render and keeps its checkpoint.
-fn kept(dir: &TestDir, options: &str) {
+fn finish_and_keep_checkpoint(dir: &TestDir, options: &str) {
     dir.expect(&format!("room.toml --once --progress none -o out.exr --keep-checkpoint {options}"), 0);
     assert!(dir.path("out.exr.checkpoint").exists());
 }
@@ -220,27 +220,27 @@ fn finished_render_can_add_samples() {
         let (samples, rest) = samples.split_once(' ').unwrap_or((samples, ""));
         let samples: u32 = samples.parse().expect("a number");
         for before in [1, samples / 2, samples - 1].into_iter().filter(|before| *before > 0) {
-            kept(&dir, &format!("{head} --samples {before} {rest}"));
+            finish_and_keep_checkpoint(&dir, &format!("{head} --samples {before} {rest}"));
             dir.expect(&format!("room.toml --once --progress none -o out.exr --resume {options}"), 0);
             dir.expect(&format!("room.toml --once --progress none -o one.exr {options}"), 0);
             assert!(dir.bytes("out.exr") == dir.bytes("one.exr"), "{method} after {before}");
             assert!(!dir.path("out.exr.checkpoint").exists());
         }
     }
-    kept(&dir, "--samples 8");
-    let said = self::said(&dir, "room.toml --once -o out.exr --resume --samples 4", 2);
-    assert_mentions(&said, &["out.exr.checkpoint", "samples", "4"]);
+    finish_and_keep_checkpoint(&dir, "--samples 8");
+    let stderr = stderr_of(&dir, "room.toml --once -o out.exr --resume --samples 4", 2);
+    assert_mentions(&stderr, &["out.exr.checkpoint", "samples", "4"]);
 }
 
 #[test]
 fn checkpoint_for_another_image_is_rejected() {
     let dir = room_dir();
-    kept(&dir, "");
+    finish_and_keep_checkpoint(&dir, "");
     let (image, checkpoint) = (dir.bytes("out.exr"), dir.bytes("out.exr.checkpoint"));
     let refused = |options: &str, facts: &[&str]| {
-        let said = self::said(&dir, &format!("room.toml --once -o out.exr --resume {options}"), 2);
-        assert_mentions(&said, facts);
-        assert_mentions(&said, &["out.exr.checkpoint"]);
+        let stderr = stderr_of(&dir, &format!("room.toml --once -o out.exr --resume {options}"), 2);
+        assert_mentions(&stderr, facts);
+        assert_mentions(&stderr, &["out.exr.checkpoint"]);
         assert!(dir.bytes("out.exr") == image);
     };
     refused("--seed 4", &["seed", "0", "4"]);
@@ -274,7 +274,7 @@ fn checkpoint_for_another_image_is_rejected() {
 #[test]
 fn damaged_checkpoint_is_rejected() {
     let dir = room_dir();
-    kept(&dir, "");
+    finish_and_keep_checkpoint(&dir, "");
     let (image, checkpoint) = (dir.bytes("out.exr"), dir.bytes("out.exr.checkpoint"));
     let mut random = TestRandom::new(8);
     for number in 0..40 {
@@ -286,8 +286,8 @@ fn damaged_checkpoint_is_rejected() {
             bytes[index] ^= 1 << (number / 2 % 8);
         }
         dir.write("out.exr.checkpoint", bytes);
-        let said = self::said(&dir, "room.toml --once -o out.exr --resume", 2);
-        assert_mentions(&said, &["out.exr.checkpoint"]);
+        let stderr = stderr_of(&dir, "room.toml --once -o out.exr --resume", 2);
+        assert_mentions(&stderr, &["out.exr.checkpoint"]);
         assert!(dir.bytes("out.exr") == image);
     }
 }
@@ -295,11 +295,11 @@ fn damaged_checkpoint_is_rejected() {
 #[test]
 fn checkpoints_are_used_only_with_resume() {
     let dir = room_dir();
-    let said = self::said(&dir, "room.toml --once -o out.exr --resume", 0);
-    assert!(mentions(&said, "out.exr.checkpoint") && !mentions(&said, "--resume"), "{said}");
-    kept(&dir, "");
-    let said = self::said(&dir, "room.toml --once -o out.exr", 0);
-    assert_mentions(&said, &["warning", "out.exr.checkpoint", "--resume"]);
+    let stderr = stderr_of(&dir, "room.toml --once -o out.exr --resume", 0);
+    assert!(mentions(&stderr, "out.exr.checkpoint") && !mentions(&stderr, "--resume"), "{stderr}");
+    finish_and_keep_checkpoint(&dir, "");
+    let stderr = stderr_of(&dir, "room.toml --once -o out.exr", 0);
+    assert_mentions(&stderr, &["warning", "out.exr.checkpoint", "--resume"]);
     assert!(!dir.path("out.exr.checkpoint").exists(), "a finished image must remove its checkpoint");
     // A longer render's checkpoint survives a new render without --resume.
     let line = "room.toml --once --progress none -o out.exr --samples 100000";
@@ -322,12 +322,12 @@ fn checkpoints_are_used_only_with_resume() {
     assert!(dir.bytes("out.exr.checkpoint") == longer);
     fs::remove_file(dir.path("out.exr.checkpoint")).expect("removed");
     // A checkpoint for another image survives, and so does a file that is not a checkpoint.
-    kept(&dir, "");
+    finish_and_keep_checkpoint(&dir, "");
     dir.expect("room.toml --once --progress none -o out.exr --seed 3", 0);
     assert!(dir.path("out.exr.checkpoint").exists());
     dir.write("out.exr.checkpoint", "the user's notes");
-    let said = self::said(&dir, "room.toml --once -o out.exr --keep-checkpoint", 0);
-    assert_mentions(&said, &["warning", "out.exr.checkpoint", "--checkpoint 0"]);
+    let stderr = stderr_of(&dir, "room.toml --once -o out.exr --keep-checkpoint", 0);
+    assert_mentions(&stderr, &["warning", "out.exr.checkpoint", "--checkpoint 0"]);
     assert_eq!(dir.bytes("out.exr.checkpoint"), b"the user's notes");
     let child = begin(&dir, "room.toml --once --progress none -o other.exr --samples 100000 --checkpoint 0");
     std::thread::sleep(Duration::from_millis(300));
@@ -340,8 +340,8 @@ fn running_process_keeps_its_checkpoint() {
     let dir = room_dir();
     let line = "room.toml --once -o out.exr --samples 1000000 --checkpoint 0.05";
     let seed_is = |seed: u32| {
-        let said = self::said(&dir, "room.toml --once -o out.exr --seed 9 --resume", 2);
-        assert_mentions(&said, &["seed", &seed.to_string(), "9"]);
+        let stderr = stderr_of(&dir, "room.toml --once -o out.exr --seed 9 --resume", 2);
+        assert_mentions(&stderr, &["seed", &seed.to_string(), "9"]);
     };
     let mut first = begin(&dir, &format!("{line} --seed 1"));
     dir.await_file("out.exr.checkpoint", &mut first);
@@ -355,9 +355,9 @@ fn running_process_keeps_its_checkpoint() {
         let output = second.wait_with_output().expect("a child");
         let text = String::from_utf8(output.stderr).expect("UTF-8");
         let words: Vec<_> = text.split_whitespace().collect();
-        let said = words.join(" ");
-        assert!(mentions(&said, "out.exr.checkpoint"), "{said}");
-        assert!(!dir.path("out.exr").exists(), "{said}");
+        let stderr = words.join(" ");
+        assert!(mentions(&stderr, "out.exr.checkpoint"), "{stderr}");
+        assert!(!dir.path("out.exr").exists(), "{stderr}");
         seed_is(1);
     }
     // Finishing another render to the same file does not remove the running process's checkpoint.
@@ -388,17 +388,17 @@ fn full_disk_reports_the_checkpoint_once() {
     };
     let line = "room.toml --once --samples 2000 --checkpoint 0.02";
     let too_large = system_error(Errno::EFBIG);
-    let (code, said) = limited(100, &format!("{line} -o out.png"));
-    assert_eq!(code, Some(0), "{said}");
-    assert_eq!(said.to_lowercase().matches(&too_large).count(), 1, "{said}");
-    assert_mentions(&said, &["out.png.checkpoint", "out.png"]);
-    assert!(dir.bytes("out.png").starts_with(b"\x89PNG"), "{said}");
+    let (code, stderr) = limited(100, &format!("{line} -o out.png"));
+    assert_eq!(code, Some(0), "{stderr}");
+    assert_eq!(stderr.to_lowercase().matches(&too_large).count(), 1, "{stderr}");
+    assert_mentions(&stderr, &["out.png.checkpoint", "out.png"]);
+    assert!(dir.bytes("out.png").starts_with(b"\x89PNG"), "{stderr}");
     // The limit also prevents writing the image.
     dir.write("out.png", "the image before");
-    let (code, said) = limited(2, &format!("{line} -o out.png"));
-    assert_eq!(code, Some(1), "{said}");
-    assert_eq!(said.to_lowercase().matches(&too_large).count(), 2, "{said}");
-    assert_mentions(&said, &["out.png.checkpoint", "error", "out.png"]);
+    let (code, stderr) = limited(2, &format!("{line} -o out.png"));
+    assert_eq!(code, Some(1), "{stderr}");
+    assert_eq!(stderr.to_lowercase().matches(&too_large).count(), 2, "{stderr}");
+    assert_mentions(&stderr, &["out.png.checkpoint", "error", "out.png"]);
     assert_eq!(dir.bytes("out.png"), b"the image before");
     assert_no_leftovers(&dir);
 }
@@ -406,10 +406,10 @@ fn full_disk_reports_the_checkpoint_once() {
 #[test]
 fn render_without_checkpoints_can_resume() {
     let dir = room_dir();
-    kept(&dir, "--samples 2");
+    finish_and_keep_checkpoint(&dir, "--samples 2");
     dir.expect("room.toml --once --progress none -o one.exr --samples 5", 0);
-    let said = self::said(&dir, "room.toml --once -o out.exr --samples 5 --resume --checkpoint 0", 0);
-    assert_mentions(&said, &["out.exr.checkpoint", "2 samples"]);
+    let stderr = stderr_of(&dir, "room.toml --once -o out.exr --samples 5 --resume --checkpoint 0", 0);
+    assert_mentions(&stderr, &["out.exr.checkpoint", "2 samples"]);
     assert!(dir.bytes("out.exr") == dir.bytes("one.exr"));
     assert!(!dir.path("out.exr.checkpoint").exists());
 }
@@ -420,16 +420,16 @@ fn pipe_as_checkpoint_does_not_block() {
     for name in ["out.exr.checkpoint", "a.part"] {
         nix::unistd::mkfifo(&dir.path(name), nix::sys::stat::Mode::S_IRWXU).expect("a pipe");
     }
-    let said = self::said(&dir, "room.toml --once -o out.exr --keep-checkpoint", 0);
-    assert_mentions(&said, &["warning", "out.exr.checkpoint", "--checkpoint 0"]);
-    self::said(&dir, "room.toml --once -o a.part --shard 1/2 --resume", 1);
-    self::said(&dir, "merge joined.exr a.part", 2);
+    let stderr = stderr_of(&dir, "room.toml --once -o out.exr --keep-checkpoint", 0);
+    assert_mentions(&stderr, &["warning", "out.exr.checkpoint", "--checkpoint 0"]);
+    stderr_of(&dir, "room.toml --once -o a.part --shard 1/2 --resume", 1);
+    stderr_of(&dir, "merge joined.exr a.part", 2);
 }
 
 #[test]
 fn newer_checkpoint_is_moved_not_replaced() {
     let dir = room_dir();
-    kept(&dir, "");
+    finish_and_keep_checkpoint(&dir, "");
     let mut newer = dir.bytes("out.exr.checkpoint");
     newer[12] = 9;
     dir.write("out.exr.checkpoint", &newer);
@@ -454,8 +454,8 @@ fn resume_keeps_finished_and_unrelated_parts() {
             report["counters"]["camera_rays"], 0,
             "{options}: a finished part must not be rendered again"
         );
-        let said = self::said(&dir, &format!("{line} --resume"), 0);
-        assert_mentions(&said, &["a.part", "finished"]);
+        let stderr = stderr_of(&dir, &format!("{line} --resume"), 0);
+        assert_mentions(&stderr, &["a.part", "finished"]);
         for (other, facts) in [
             ("--seed 4", &["seed", "0", "4"][..]),
             ("--set render.exposure=1", &["exposure", "0", "1"]),
@@ -463,15 +463,15 @@ fn resume_keeps_finished_and_unrelated_parts() {
         ] {
             let line =
                 line.replace("--shard 1/2", if other.starts_with("--shard") { "" } else { "--shard 1/2" });
-            let said = self::said(&dir, &format!("{line} --resume {other}"), 2);
-            assert_mentions(&said, facts);
-            assert_mentions(&said, &["--resume", "-o"]);
+            let stderr = stderr_of(&dir, &format!("{line} --resume {other}"), 2);
+            assert_mentions(&stderr, facts);
+            assert_mentions(&stderr, &["--resume", "-o"]);
             assert!(dir.bytes("a.part") == part, "{options} {other}");
         }
         // A truncated part is rendered again.
         dir.write("a.part", &part[..part.len() / 2]);
-        let said = self::said(&dir, &format!("{line} --resume"), 0);
-        assert_mentions(&said, &["a.part", &format!("byte {}", part.len() / 2)]);
+        let stderr = stderr_of(&dir, &format!("{line} --resume"), 0);
+        assert_mentions(&stderr, &["a.part", &format!("byte {}", part.len() / 2)]);
         assert!(dir.bytes("a.part") == part, "{options}");
         fs::remove_file(dir.path("a.part")).expect("removed");
     }
@@ -498,6 +498,6 @@ fn part_resumes_from_its_own_checkpoint() {
     let child = begin(&dir, "room.toml --once --progress none -o a.part --shard 1/2 --samples 100000");
     std::thread::sleep(Duration::from_millis(300));
     assert_eq!(end(child, Signal::SIGTERM), Some(143));
-    let said = self::said(&dir, "room.toml --once -o a.part --shard 2/2 --samples 100000 --resume", 2);
-    assert_mentions(&said, &["1/2", "2/2"]);
+    let stderr = stderr_of(&dir, "room.toml --once -o a.part --shard 2/2 --samples 100000 --resume", 2);
+    assert_mentions(&stderr, &["1/2", "2/2"]);
 }

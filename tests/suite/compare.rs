@@ -15,7 +15,7 @@ fn reference(x: u32, y: u32, c: u32) -> u8 {
     ((x * 5 + y * 9 + c * 31 + (x * y + c) % 7) % 256) as u8
 }
 
-fn judged(x: u32, y: u32, c: u32) -> u8 {
+fn distorted(x: u32, y: u32, c: u32) -> u8 {
     ((x * 5 + y * 9 + c * 31) % 256) as u8
 }
 
@@ -31,10 +31,10 @@ fn floats(value: impl Fn(u32, u32, u32) -> f32) -> Rgb32FImage {
 fn dir() -> TestDir {
     let dir = TestDir::new();
     for ending in ["png", "ppm", "tga", "bmp", "webp"] {
-        bytes(judged).save(dir.path(&format!("a.{ending}"))).expect("written");
+        bytes(distorted).save(dir.path(&format!("a.{ending}"))).expect("written");
         bytes(reference).save(dir.path(&format!("b.{ending}"))).expect("written");
     }
-    floats(|x, y, c| f32::from(judged(x, y, c)) / 64.0).save(dir.path("a.exr")).expect("written");
+    floats(|x, y, c| f32::from(distorted(x, y, c)) / 64.0).save(dir.path("a.exr")).expect("written");
     floats(|x, y, c| f32::from(reference(x, y, c)) / 64.0).save(dir.path("b.exr")).expect("written");
     dir
 }
@@ -62,7 +62,7 @@ fn assert_near(object: &Value, key: &str, expected: f64) {
 /// Checks the metrics against values computed with numpy in double precision from the decoded sRGB bytes.
 /// SSIM is from scikit-image 0.26. For FLIP, flip-evaluator 1.7 computes 0.107067652 in single precision.
 #[track_caller]
-fn assert_figures_of_bytes(object: &Value) {
+fn assert_byte_metrics(object: &Value) {
     for (key, expected) in [
         ("rmse", 0.066_788_365_202),
         ("relmse", 0.421_549_825_497),
@@ -84,7 +84,7 @@ fn every_format_matches_numpy_metrics() {
     let dir = dir();
     for (a, b) in [("png", "png"), ("ppm", "tga"), ("bmp", "webp"), ("webp", "png")] {
         let (object, stderr) = json(&dir, &format!("a.{a} b.{b}"), 0);
-        assert_figures_of_bytes(&object);
+        assert_byte_metrics(&object);
         assert_eq!((&object["a"], &object["b"]), (&format!("a.{a}").into(), &format!("b.{b}").into()));
         assert_eq!(stderr, "");
     }
@@ -93,23 +93,24 @@ fn every_format_matches_numpy_metrics() {
 #[test]
 fn sixteen_bit_and_float_metrics_are_equal() {
     let dir = dir();
-    let wide =
-        ImageBuffer::from_fn(SIZE.0, SIZE.1, |x, y| Rgb([0, 1, 2].map(|c| u16::from(judged(x, y, c)) * 257)));
+    let wide = ImageBuffer::from_fn(SIZE.0, SIZE.1, |x, y| {
+        Rgb([0, 1, 2].map(|c| u16::from(distorted(x, y, c)) * 257))
+    });
     DynamicImage::ImageRgb16(wide).save(dir.path("wide.png")).expect("written");
     let (object, _) = json(&dir, "wide.png b.png", 0);
-    assert_figures_of_bytes(&object);
+    assert_byte_metrics(&object);
     let linear = |byte: u8| {
         let encoded = f64::from(byte) / 255.0;
         let linear = if encoded <= 0.04045 { encoded / 12.92 } else { ((encoded + 0.055) / 1.055).powf(2.4) };
         linear as f32
     };
-    floats(|x, y, c| linear(judged(x, y, c))).save(dir.path("linear.exr")).expect("written");
+    floats(|x, y, c| linear(distorted(x, y, c))).save(dir.path("linear.exr")).expect("written");
     let (object, _) = json(&dir, "linear.exr b.png", 0);
-    assert_figures_of_bytes(&object);
-    floats(|x, y, c| linear(judged(x, y, c))).save(dir.path("linear.hdr")).expect("written");
+    assert_byte_metrics(&object);
+    floats(|x, y, c| linear(distorted(x, y, c))).save(dir.path("linear.hdr")).expect("written");
     let (object, _) = json(&dir, "linear.hdr linear.exr", 0);
     assert!(object["relmse"].as_f64().expect("a number") < 1e-4, "the mantissa has 8 bits: {object}");
-    bytes(judged).save(dir.path("a.jpg")).expect("written");
+    bytes(distorted).save(dir.path("a.jpg")).expect("written");
     let (object, _) = json(&dir, "a.jpg a.png", 0);
     assert!(object["psnr_db"].as_f64().expect("a number") > 10.0, "{object}");
 }
@@ -226,7 +227,7 @@ fn diff_writes_the_error_image() {
     assert!(mentions(&stderr, "d.exr") && stderr.lines().count() == 1, "{stderr}");
     let diff = image::open(dir.path("d.exr")).expect("an EXR").into_rgb32f();
     let expected =
-        floats(|x, y, c| (f32::from(judged(x, y, c)) / 64.0 - f32::from(reference(x, y, c)) / 64.0).abs());
+        floats(|x, y, c| (f32::from(distorted(x, y, c)) / 64.0 - f32::from(reference(x, y, c)) / 64.0).abs());
     assert_eq!(diff, expected);
     for ending in ["png", "jpg", "ppm"] {
         let (_, stderr) = json(&dir, &format!("a.png b.png --diff d.{ending}"), 0);

@@ -34,7 +34,7 @@ pub(crate) fn errors(diagnostics: &[Diagnostic]) -> Vec<&str> {
 }
 
 /// Removes source positions from the scene, because they change when a key is omitted.
-pub(crate) fn placeless(mut scene: Scene) -> Scene {
+pub(crate) fn without_positions(mut scene: Scene) -> Scene {
     scene.objects.iter_mut().for_each(|object| object.span = 0..0);
     scene.instances.iter_mut().for_each(|instance| instance.span = 0..0);
     scene.textures.iter_mut().for_each(|texture| texture.file.span = 0..0);

@@ -201,13 +201,13 @@ fn bundled() -> Vec<PathBuf> {
 }
 
 /// Whether the scene refers to a file that is generated only on demand.
-fn is_made_on_demand(scene: &Path) -> bool {
+fn needs_generated_files(scene: &Path) -> bool {
     scene.file_stem().is_some_and(|stem| stem == "million" || stem == "figure")
 }
 
 #[test]
 fn bundled_scenes_do_not_depend_on_threads() {
-    for scene in bundled().iter().filter(|scene| !is_made_on_demand(scene)) {
+    for scene in bundled().iter().filter(|scene| !needs_generated_files(scene)) {
         let dir = TestDir::new();
         let path = scene.display();
         for integrator in ["whitted", "path"] {

@@ -9,7 +9,7 @@ use super::test_dir::{SCENE, TestDir, assert_mentions, mentions};
 /// An unrelated file with a report's extension.
 const PACKAGE: &str = "{\n  \"name\": \"somebody\",\n  \"glimt\": \"0.1.0\"\n}\n";
 /// A file about a render, written by hand.
-const BY_HAND: &str = "{\n  \"glimt\": \"0.1.0\",\n  \"scene\": \"a.toml\",\n  \"seconds\": 3.5\n}\n";
+const HANDWRITTEN: &str = "{\n  \"glimt\": \"0.1.0\",\n  \"scene\": \"a.toml\",\n  \"seconds\": 3.5\n}\n";
 /// Options for a render that never ends.
 const ENDLESS: &str = "--once --samples 4000000 --width 4000";
 /// Options for a measurement that never ends.
@@ -27,7 +27,7 @@ fn report_never_replaces_unrelated_file() {
         assert_mentions(&stderr, &["package.json", "report", "--force"]);
         assert_eq!(dir.bytes("package.json"), foreign);
     };
-    for foreign in [PACKAGE, BY_HAND, "[1, 2]", "{}", "{\"glimt\": \"0.1.0\", \"scene\": \"a\"", "text"] {
+    for foreign in [PACKAGE, HANDWRITTEN, "[1, 2]", "{}", "{\"glimt\": \"0.1.0\", \"scene\": \"a\"", "text"] {
         refused(foreign.as_bytes());
     }
     dir.run(&format!("bench ball.toml {SHORT} --json results.json"));
@@ -89,7 +89,7 @@ fn bench_never_replaces_unrelated_file() {
     let described = "<svg width=\"8\" height=\"8\" xmlns=\"http://www.w3.org/2000/svg\">\n<desc>glimt ";
     for (option, name, foreign) in [
         ("--json", "a.json", PACKAGE),
-        ("--json", "a.json", BY_HAND),
+        ("--json", "a.json", HANDWRITTEN),
         ("--json", "a.json", &report),
         ("--json", "a.json", "{ \"glimt\": \"0.1.0\", \"threads\": 2, \"seconds\": 3.5, \"scenes\": [] }"),
         ("--csv", "a.csv", "name,age\nsomebody,3\n"),
@@ -226,8 +226,8 @@ fn scenes_with_the_same_name_keep_their_images() {
     let absolute = dir.path("a/scene.toml");
     dir.expect(&format!("{} --once --samples 1", absolute.display()), 0);
     assert_eq!(dir.bytes("scene.png"), first);
-    for way_out in ["-o b.png", "--force", "-o scene.png"] {
-        dir.expect(&format!("b/scene.toml --once --samples 1 {way_out}"), 0);
+    for advice in ["-o b.png", "--force", "-o scene.png"] {
+        dir.expect(&format!("b/scene.toml --once --samples 1 {advice}"), 0);
     }
     // Turntable files are also checked.
     dir.expect("a/scene.toml --once --samples 1 --turntable 2", 0);

@@ -13,7 +13,7 @@ use super::test_dir::{SCENE, TestDir, assert_mentions};
 
 /// Time limit for rejecting a file. Rejection takes milliseconds, but reading the whole file would take
 /// minutes.
-const AT_ONCE: Duration = Duration::from_secs(60);
+const REJECTION_TIME_LIMIT: Duration = Duration::from_secs(60);
 
 const MESH: &str = "\n[[mesh]]\nfile = \"FILE\"\nmaterial = \"ball\"\n";
 const TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
@@ -37,11 +37,11 @@ fn scene(file: &str) -> (String, &'static str) {
 
 /// Renders a scene, and checks that the error contains all expected words.
 #[track_caller]
-fn refused(dir: &TestDir, scene: &str, words: &[&str]) -> String {
+fn rejection_message(dir: &TestDir, scene: &str, words: &[&str]) -> String {
     dir.write("ball.png", "the old one");
     let start = Instant::now();
     let stderr = dir.expect(&format!("{scene} --once -o ball.png"), 2);
-    assert!(start.elapsed() < AT_ONCE, "{scene}: {:?}", start.elapsed());
+    assert!(start.elapsed() < REJECTION_TIME_LIMIT, "{scene}: {:?}", start.elapsed());
     for word in words {
         assert!(stderr.contains(word), "{scene}: {word:?} not found in\n{stderr}");
     }
@@ -107,7 +107,7 @@ fn scene_must_be_a_regular_file() {
     for what in KINDS {
         let dir = TestDir::new();
         if let Some(words) = make(&dir.path("bad.toml"), what) {
-            let stderr = refused(&dir, "bad.toml", words);
+            let stderr = rejection_message(&dir, "bad.toml", words);
             assert!(stderr.contains("bad.toml"), "{what}: {stderr}");
         }
     }
@@ -138,7 +138,7 @@ fn asset_must_be_a_regular_file() {
             if let Some(words) = make(&dir.path(&file), what) {
                 let (text, place) = scene(&file);
                 dir.write("scene.toml", text);
-                let stderr = refused(&dir, "scene.toml", words);
+                let stderr = rejection_message(&dir, "scene.toml", words);
                 assert!(stderr.contains(&file), "{what}: {stderr}");
                 assert_mentions(&stderr, &[&format!("scene.toml:{place}")]);
             }
@@ -167,15 +167,15 @@ fn assets_with_wrong_contents_are_rejected() {
         dir.write("scene.toml", text);
         let place = format!("scene.toml:{place}");
         dir.write(&file, "");
-        refused(&dir, "scene.toml", &[&file, empty, &place]);
+        rejection_message(&dir, "scene.toml", &[&file, empty, &place]);
         for bytes in [&noise, &zeros] {
             dir.write(&file, bytes);
-            refused(&dir, "scene.toml", &[wrong, &place]);
+            rejection_message(&dir, "scene.toml", &[wrong, &place]);
         }
         // Many zeros.
         let huge = File::create(dir.path(&file)).and_then(|file| file.set_len(1 << 27));
         huge.expect("a sparse file");
-        refused(&dir, "scene.toml", &[&file, &place]);
+        rejection_message(&dir, "scene.toml", &[&file, &place]);
     }
 }
 
@@ -183,16 +183,16 @@ fn assets_with_wrong_contents_are_rejected() {
 fn huge_and_binary_scenes_are_rejected() {
     let dir = TestDir::new();
     File::create(dir.path("huge.toml")).and_then(|file| file.set_len(1 << 30)).expect("a sparse file");
-    refused(&dir, "huge.toml", &["huge.toml", "larger than", "[[mesh]]"]);
+    rejection_message(&dir, "huge.toml", &["huge.toml", "larger than", "[[mesh]]"]);
     dir.write("latin.toml", SCENE.replace("[0.8, 0.2, 0.1]", "0.8 # caf\u{e9}").replace('\u{e9}', "@"));
     let latin: Vec<u8> =
         dir.bytes("latin.toml").iter().map(|&byte| if byte == b'@' { 0xe9 } else { byte }).collect();
     dir.write("latin.toml", latin);
-    refused(&dir, "latin.toml", &["latin.toml:12:20", "0xe9", "UTF-8"]);
+    rejection_message(&dir, "latin.toml", &["latin.toml:12:20", "0xe9", "UTF-8"]);
     dir.write("deep.toml", format!("x = {}\n", "[".repeat(500_000)));
-    refused(&dir, "deep.toml", &["deep.toml:1:", "nested too deeply"]);
+    rejection_message(&dir, "deep.toml", &["deep.toml:1:", "nested too deeply"]);
     dir.write("zeros.toml", [0; 999]);
-    refused(&dir, "zeros.toml", &["zeros.toml", "binary file"]);
+    rejection_message(&dir, "zeros.toml", &["zeros.toml", "binary file"]);
 }
 
 /// Checks that a mesh is rejected with an error that contains the expected words and the mesh's position in
@@ -202,7 +202,7 @@ fn mesh_refused(name: &str, content: &[u8], words: &[&str]) {
     let dir = TestDir::new();
     dir.write(name, content);
     dir.write("scene.toml", scene(name).0);
-    let stderr = refused(&dir, "scene.toml", words);
+    let stderr = rejection_message(&dir, "scene.toml", words);
     assert!(stderr.contains("scene.toml:25:8") && stderr.contains(name), "{stderr}");
 }
 
@@ -261,7 +261,7 @@ fn unreadable_mtl_fails_only_if_it_is_used() {
         assert!(!stderr.contains("warning"), "{what}: {stderr}");
         // An error if the scene does not set it.
         dir.write("scene.toml", text.trim_end().trim_end_matches("material = \"ball\""));
-        refused(
+        rejection_message(
             &dir,
             "scene.toml",
             &["needs `material`: a.obj has no", "cannot read bad.mtl", "scene.toml:24:1"],
@@ -280,7 +280,7 @@ fn malformed_mtl_is_rejected() {
         dir.write("bad.mtl", content);
         dir.write("a.obj", format!("mtllib bad.mtl\n{TRIANGLE}"));
         dir.write("scene.toml", scene("a.obj").0);
-        refused(&dir, "scene.toml", &[words, "scene.toml:25:8"]);
+        rejection_message(&dir, "scene.toml", &[words, "scene.toml:25:8"]);
     }
 }
 
@@ -303,7 +303,7 @@ fn images_with_wrong_sizes_are_rejected() {
         let dir = TestDir::new();
         dir.write(name, content);
         dir.write("scene.toml", scene("a.png").0.replace("a.png", name));
-        refused(&dir, "scene.toml", &[name, "scene.toml:25:8"]);
+        rejection_message(&dir, "scene.toml", &[name, "scene.toml:25:8"]);
     }
 }
 
@@ -398,7 +398,7 @@ fn newline_in_a_name_is_escaped() {
 }
 
 /// Characters that a terminal would interpret or hide.
-const EVIL: &str = "\u{1b}]52;c;ZXZpbA==\u{7}\u{1b}[2J\u{9b}31m\r\u{202e}gnp\u{8}";
+const CONTROL_CHARACTERS: &str = "\u{1b}]52;c;ZXZpbA==\u{7}\u{1b}[2J\u{9b}31m\r\u{202e}gnp\u{8}";
 
 #[track_caller]
 fn assert_harmless(output: &std::process::Output, code: i32) {
@@ -414,12 +414,12 @@ fn assert_harmless(output: &std::process::Output, code: i32) {
 #[test]
 fn names_are_escaped_for_the_terminal() {
     let dir = TestDir::new();
-    let toml: String = EVIL.chars().map(|c| format!("\\U{:08x}", u32::from(c))).collect();
+    let toml: String = CONTROL_CHARACTERS.chars().map(|c| format!("\\U{:08x}", u32::from(c))).collect();
     let run = |arguments: &[&str]| {
         let mut process = dir.glimt("");
         process.args(arguments).output().expect("it runs")
     };
-    let name = format!("{EVIL}.toml");
+    let name = format!("{CONTROL_CHARACTERS}.toml");
     // The scene's path, for a missing, an invalid and a valid scene.
     assert_harmless(&run(&[&name, "--once"]), 2);
     dir.write(&name, "[render]\nwidth = 0\n");
@@ -430,10 +430,10 @@ fn names_are_escaped_for_the_terminal() {
     assert_harmless(&run(&[&name, "--once"]), 0);
     assert_harmless(&run(&[&name, "--once", "--progress", "plain"]), 0);
     assert_harmless(&run(&["check", &name]), 0);
-    assert_harmless(&run(&["ball.toml", "--once", "-o", &format!("{EVIL}.xyz")]), 2);
-    assert_harmless(&run(&["ball.toml", "--once", "-o", &format!("{EVIL}/a.png")]), 1);
-    assert_harmless(&run(&["ball.toml", "--once", "--report", &format!("{EVIL}/a.json")]), 1);
-    assert_harmless(&run(&["ball.toml", "--once", "--view", EVIL]), 2);
+    assert_harmless(&run(&["ball.toml", "--once", "-o", &format!("{CONTROL_CHARACTERS}.xyz")]), 2);
+    assert_harmless(&run(&["ball.toml", "--once", "-o", &format!("{CONTROL_CHARACTERS}/a.png")]), 1);
+    assert_harmless(&run(&["ball.toml", "--once", "--report", &format!("{CONTROL_CHARACTERS}/a.json")]), 1);
+    assert_harmless(&run(&["ball.toml", "--once", "--view", CONTROL_CHARACTERS]), 2);
     // Names in the scene.
     for (from, to) in [
         ("material = \"ball\"", format!("material = \"{toml}\"")),
@@ -444,19 +444,28 @@ fn names_are_escaped_for_the_terminal() {
         ("[[sphere]]", format!("[[\"{toml}\"]]")),
         ("[materials.ball]", format!("[materials.\"{toml}\"]")),
         ("position = [0, 1, 4]", format!("orbiter = \"{toml}.txt\"")),
-        ("samples = 2", format!("output = \"{toml}.png\"\nwidth = 3 {EVIL}")),
+        ("samples = 2", format!("output = \"{toml}.png\"\nwidth = 3 {CONTROL_CHARACTERS}")),
     ] {
         dir.write("ball.toml", SCENE.replace(from, &to));
         assert_harmless(&run(&["ball.toml", "--once"]), 2);
     }
     // Names in meshes.
     for (obj, mtl) in [
-        (format!("usemtl {EVIL}\n{TRIANGLE}"), String::new()),
-        (format!("mtllib {EVIL}.mtl\n{TRIANGLE}"), String::new()),
-        (format!("g {EVIL}\no {EVIL}\n{}f 1/1 2/1 3\n", TRIANGLE.replace("f ", "vt 0 0\nf ")), String::new()),
-        (format!("mtllib a.mtl\nusemtl {EVIL}\n{TRIANGLE}"), format!("newmtl {EVIL}\nmap_Kd {EVIL}.png\n")),
-        (format!("mtllib a.mtl\nusemtl a\n{TRIANGLE}"), format!("newmtl a\nKd {EVIL}\n")),
-        (format!("v {EVIL} 0 0\n"), String::new()),
+        (format!("usemtl {CONTROL_CHARACTERS}\n{TRIANGLE}"), String::new()),
+        (format!("mtllib {CONTROL_CHARACTERS}.mtl\n{TRIANGLE}"), String::new()),
+        (
+            format!(
+                "g {CONTROL_CHARACTERS}\no {CONTROL_CHARACTERS}\n{}f 1/1 2/1 3\n",
+                TRIANGLE.replace("f ", "vt 0 0\nf ")
+            ),
+            String::new(),
+        ),
+        (
+            format!("mtllib a.mtl\nusemtl {CONTROL_CHARACTERS}\n{TRIANGLE}"),
+            format!("newmtl {CONTROL_CHARACTERS}\nmap_Kd {CONTROL_CHARACTERS}.png\n"),
+        ),
+        (format!("mtllib a.mtl\nusemtl a\n{TRIANGLE}"), format!("newmtl a\nKd {CONTROL_CHARACTERS}\n")),
+        (format!("v {CONTROL_CHARACTERS} 0 0\n"), String::new()),
     ] {
         dir.write("a.obj", obj);
         dir.write("a.mtl", mtl);

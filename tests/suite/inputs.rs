@@ -42,7 +42,7 @@ fn studio() -> TestDir {
 const TEXTURES: &str = "[textures.skin]\nfile = \"skin.ppm\"\n[textures.unused]\nfile = \"unused.ppm\"\n";
 
 /// All regular files in the directory tree with their contents.
-fn everything(dir: &TestDir) -> Vec<(std::path::PathBuf, Vec<u8>)> {
+fn all_files(dir: &TestDir) -> Vec<(std::path::PathBuf, Vec<u8>)> {
     let mut folders = vec![dir.0.path().to_owned()];
     let mut found = Vec::new();
     while let Some(folder) = folders.pop() {
@@ -63,14 +63,14 @@ fn everything(dir: &TestDir) -> Vec<(std::path::PathBuf, Vec<u8>)> {
 /// Runs glimt and checks that it exits with code 2, prints a message with the expected words, renders nothing
 /// and changes no file. Returns the message.
 #[track_caller]
-fn refused(dir: &TestDir, line: &str, words: &[&str]) -> String {
-    let before = everything(dir);
+fn rejection_message(dir: &TestDir, line: &str, words: &[&str]) -> String {
+    let before = all_files(dir);
     let stderr = dir.expect(line, 2);
     for word in words {
         assert!(stderr.contains(word), "{line}: {word}: {stderr}");
     }
     assert!(!stderr.lines().any(|line| line.starts_with("render")), "{line}: {stderr}");
-    assert!(everything(dir) == before, "{line}: a file was changed: {stderr}");
+    assert!(all_files(dir) == before, "{line}: a file was changed: {stderr}");
     stderr
 }
 
@@ -83,7 +83,8 @@ fn default_output_never_replaces_an_input() {
     dir.write("marble.toml", scene);
     // This image was written by glimt, so the default output could replace it if it were not an input.
     dir.expect("ball.toml --once -o marble.png", 0);
-    let stderr = refused(&dir, &format!("marble.toml {ENDLESS}"), &["marble.png", "texture `marble`", "-o"]);
+    let stderr =
+        rejection_message(&dir, &format!("marble.toml {ENDLESS}"), &["marble.png", "texture `marble`", "-o"]);
     assert!(stderr.contains("marble.toml:11:8") && stderr.contains("`output = "), "{stderr}");
     dir.expect("marble.toml --once -o other.png", 0);
 }
@@ -92,11 +93,11 @@ fn default_output_never_replaces_an_input() {
 fn scene_named_like_its_image_is_kept() {
     let dir = TestDir::new();
     dir.write("scene.png", SCENE);
-    refused(&dir, &format!("scene.png {ENDLESS}"), &["scene.png", "the scene file", "-o"]);
+    rejection_message(&dir, &format!("scene.png {ENDLESS}"), &["scene.png", "the scene file", "-o"]);
     symlink("ball.toml", dir.path("ln.png")).expect("a link");
-    refused(&dir, &format!("ball.toml {ENDLESS} -o ln.png"), &["ln.png", "ball.toml", "-o"]);
+    rejection_message(&dir, &format!("ball.toml {ENDLESS} -o ln.png"), &["ln.png", "ball.toml", "-o"]);
     fs::hard_link(dir.path("ball.toml"), dir.path("hard.png")).expect("a link");
-    refused(&dir, &format!("ball.toml {ENDLESS} -o hard.png"), &["hard.png", "ball.toml"]);
+    rejection_message(&dir, &format!("ball.toml {ENDLESS} -o hard.png"), &["hard.png", "ball.toml"]);
 }
 
 #[test]
@@ -119,11 +120,15 @@ fn no_path_to_an_input_is_accepted_as_output() {
         "hard.ppm",
         skin.to_str().expect("UTF-8"),
     ] {
-        refused(&dir, &format!("scene.toml {ENDLESS} -o {output}"), &[output, "skin.ppm", "texture `skin`"]);
-        refused(&dir, &format!("scene.toml {ENDLESS} -o good.png -o {output}"), &[output]);
+        rejection_message(
+            &dir,
+            &format!("scene.toml {ENDLESS} -o {output}"),
+            &[output, "skin.ppm", "texture `skin`"],
+        );
+        rejection_message(&dir, &format!("scene.toml {ENDLESS} -o good.png -o {output}"), &[output]);
     }
     // A folder under another name. After a link, `..` refers to the parent of the link's target.
-    refused(
+    rejection_message(
         &dir,
         &format!("scene.toml {ENDLESS} -o elsewhere/wood.ppm"),
         &["elsewhere/wood.ppm", "deep/wood.ppm"],
@@ -146,7 +151,7 @@ fn every_kind_of_input_is_kept() {
         // The material file refers to this image, but nothing uses it.
         ("deep/alpha.ppm", "one.obj"),
     ] {
-        let stderr = refused(&dir, &format!("scene.toml {ENDLESS} -o {output}"), &[output, role]);
+        let stderr = rejection_message(&dir, &format!("scene.toml {ENDLESS} -o {output}"), &[output, role]);
         assert!(stderr.contains("--> scene.toml:"), "{output}: expected a position in the scene: {stderr}");
     }
     for (report, role) in [
@@ -160,13 +165,17 @@ fn every_kind_of_input_is_kept() {
         // This file does not exist yet, but the mesh refers to it.
         ("deep/gone.mtl", "one.obj"),
     ] {
-        refused(&dir, &format!("scene.toml {ENDLESS} --report {report}"), &[report, role, "--report"]);
-        refused(&dir, &format!("scene.toml {ENDLESS} --report deep/../{report}"), &[report, role]);
+        rejection_message(
+            &dir,
+            &format!("scene.toml {ENDLESS} --report {report}"),
+            &[report, role, "--report"],
+        );
+        rejection_message(&dir, &format!("scene.toml {ENDLESS} --report deep/../{report}"), &[report, role]);
     }
     // Images of the mesh's own materials are inputs even if the scene overrides the materials.
     let text = fs::read_to_string(dir.path("scene.toml")).expect("the scene");
     dir.write("scene.toml", text.replace("one.obj\"", "one.obj\"\nmaterial = \"ball\""));
-    refused(&dir, &format!("scene.toml {ENDLESS} -o deep/wood.ppm"), &["deep/wood.ppm", "one.obj"]);
+    rejection_message(&dir, &format!("scene.toml {ENDLESS} -o deep/wood.ppm"), &["deep/wood.ppm", "one.obj"]);
 }
 
 #[test]
@@ -205,8 +214,11 @@ fn gltf_images_are_never_replaced() {
             "textured.toml",
             "scene.toml --set mesh.1.file=other.off --set mesh.1.material=ball",
         ] {
-            let stderr =
-                refused(&dir, &format!("{call} {ENDLESS} --force -o {picture}"), &[picture, "cannot write"]);
+            let stderr = rejection_message(
+                &dir,
+                &format!("{call} {ENDLESS} --force -o {picture}"),
+                &[picture, "cannot write"],
+            );
             assert!(stderr.contains("m.glb") || stderr.contains("scene"), "{call}: {stderr}");
         }
     }
@@ -218,7 +230,7 @@ fn output_key_must_not_name_an_input() {
     let text = fs::read_to_string(dir.path("scene.toml")).expect("the scene");
     dir.write("scene.toml", text.replace("[render]", "[render]\noutput = \"deep/../skin.ppm\""));
     let words = ["deep/../skin.ppm", "texture `skin`", "--> scene.toml:", "`output`"];
-    refused(&dir, &format!("scene.toml {ENDLESS}"), &words);
+    rejection_message(&dir, &format!("scene.toml {ENDLESS}"), &words);
     let output = dir.run("check scene.toml");
     assert_eq!(output.status.code(), Some(2), "{output:?}");
     dir.expect("scene.toml --once -o other.png", 0);
@@ -247,7 +259,7 @@ fn outputs_and_report_must_differ() {
     ] {
         let names = line.split_whitespace().filter(|word| !word.starts_with('-'));
         let names: Vec<&str> = names.skip_while(|name| *name == "b.png").collect();
-        let stderr = refused(&dir, &format!("ball.toml {ENDLESS} {line}"), &names);
+        let stderr = rejection_message(&dir, &format!("ball.toml {ENDLESS} {line}"), &names);
         assert_eq!(stderr.matches("error: ").count(), 1, "{line}: {stderr}");
     }
     dir.expect("ball.toml --once -o o/a.png -o a.png --report o/p/a.png.json", 0);
@@ -267,15 +279,15 @@ fn default_output_replaces_only_glimt_images() {
     other[at] = b'G';
     for foreign in [PHOTOGRAPH, b"", b"\x89PNG\r\n\x1a\n", truncated, SCENE.as_bytes(), &other] {
         dir.write("ball.png", foreign);
-        refused(&dir, &format!("ball.toml {ENDLESS}"), &ways);
+        rejection_message(&dir, &format!("ball.toml {ENDLESS}"), &ways);
     }
     // An image from another encoder, without glimt's text chunk.
     image::RgbImage::new(3, 2).save(dir.path("ball.png")).expect("a photograph");
-    refused(&dir, &format!("ball.toml {ENDLESS}"), &ways);
+    rejection_message(&dir, &format!("ball.toml {ENDLESS}"), &ways);
     dir.write("photo.png", dir.bytes("ball.png"));
     fs::remove_file(dir.path("ball.png")).expect("removed");
     symlink("photo.png", dir.path("ball.png")).expect("a link");
-    refused(&dir, &format!("ball.toml {ENDLESS}"), &ways);
+    rejection_message(&dir, &format!("ball.toml {ENDLESS}"), &ways);
     // An explicitly named output is replaced.
     dir.expect("ball.toml --once -o ball.png", 0);
     assert_eq!(dir.bytes("photo.png").len(), own.len());
@@ -301,7 +313,7 @@ fn report_replaces_only_reports() {
     report("empty");
     for (name, content) in [("m.obj", b"v 0 0 0\n".as_slice()), ("notes", b"glimt"), ("x.ppm", PHOTOGRAPH)] {
         dir.write(name, content);
-        refused(&dir, &format!("ball.toml {ENDLESS} --report {name}"), &[name, ".json"]);
+        rejection_message(&dir, &format!("ball.toml {ENDLESS} --report {name}"), &[name, ".json"]);
     }
     // If stdout was opened for appending, the report is appended to the file.
     dir.write("log", "before\n");
@@ -339,7 +351,7 @@ fn new_never_overwrites() {
     fs::create_dir(dir.path("folder.toml")).expect("a folder");
     for name in ["dangling.toml", "link.toml", "folder.toml", "deep/../ball.toml", "ball.toml"] {
         fs::create_dir_all(dir.path("deep")).expect("a folder");
-        refused(&dir, &format!("new {name}"), &["error: ", name]);
+        rejection_message(&dir, &format!("new {name}"), &["error: ", name]);
     }
     assert!(!dir.path("nowhere.toml").exists());
     assert!(fs::symlink_metadata(dir.path("dangling.toml")).expect("a link").is_symlink());
@@ -354,7 +366,8 @@ fn environment_map_is_never_an_output() {
     for (name, color) in [("lit.toml", ""), ("dark.toml", "color = 0\n")] {
         dir.write(name, format!("{SCENE}\n[environment]\nfile = \"sky.ppm\"\n{color}"));
         dir.write("sky.ppm", PHOTOGRAPH);
-        let said = refused(&dir, &format!("{name} {ENDLESS} -o sky.ppm"), &["sky.ppm", "environment"]);
+        let said =
+            rejection_message(&dir, &format!("{name} {ENDLESS} -o sky.ppm"), &["sky.ppm", "environment"]);
         assert!(said.contains(name), "{said}");
         let checked = dir.glimt(&format!("check {name}")).output().expect("it runs");
         let counted = String::from_utf8_lossy(&checked.stdout).into_owned();
@@ -382,17 +395,21 @@ fn overridden_files_are_kept() {
         ("mesh.1.file=deep/two.obj --set mesh.1.material=ball", "deep/wood.ppm"),
         ("textures.skin.file=other.ppm", "other.ppm"),
     ] {
-        refused(&dir, &format!("scene.toml {ENDLESS} --set {set} -o {output}"), &[output]);
+        rejection_message(&dir, &format!("scene.toml {ENDLESS} --set {set} -o {output}"), &[output]);
     }
     for (set, report) in [
         ("camera.orbiter=other.txt", "camera.txt"),
         ("mesh.1.file=deep/two.obj --set mesh.1.material=ball", "deep/one.obj"),
     ] {
-        refused(&dir, &format!("scene.toml {ENDLESS} --set {set} --report {report}"), &[report, "--report"]);
+        rejection_message(
+            &dir,
+            &format!("scene.toml {ENDLESS} --set {set} --report {report}"),
+            &[report, "--report"],
+        );
     }
     // The default output, with a texture written by glimt.
     dir.expect("scene.toml --once --samples 1 -o made.png", 0);
     let text = fs::read_to_string(dir.path("scene.toml")).expect("the scene");
     dir.write("made.toml", text.replace("unused.ppm", "made.png"));
-    refused(&dir, "made.toml --once --set textures.unused.file=other.ppm", &["made.png"]);
+    rejection_message(&dir, "made.toml --once --set textures.unused.file=other.ppm", &["made.png"]);
 }

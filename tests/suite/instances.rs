@@ -175,7 +175,7 @@ fn images_equal_written_out_scenes() {
 }
 
 #[test]
-fn steps_equal_keys_of_a_mesh() {
+fn instance_transforms_equal_mesh_transforms() {
     let dir = folder();
     let steps = "scale = [1.5, -0.7, 1.1]\nrotate = [10, 20, 30]\ntranslate = [0.3, 0.6, 0.1]\n";
     let mesh = "file = \"tent.obj\"\nmaterial = \"bumpy\"\n";

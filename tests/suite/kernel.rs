@@ -63,7 +63,7 @@ fn placed(mesh: &TriangleMesh, scale: f32, offset: Vec3) -> TriangleMesh {
 
 fn tree(mesh: &TriangleMesh) -> WideBvh {
     let tree = WideBvh::build(mesh.triangles.len() as u32, |id| mesh.corners(id), &CancelToken::new());
-    tree.expect("the token is not cancelled")
+    tree.expect("the token is not canceled")
 }
 
 /// Number of rays that escape from a closed mesh. Each ray starts inside and is aimed at a vertex or an edge.
@@ -102,7 +102,7 @@ fn leaks(mesh: &TriangleMesh, scale: f32, offset: Vec3, rays: usize, instruction
 fn leaks_of_planes(mesh: &TriangleMesh, scale: f32, offset: Vec3, rays: usize) -> usize {
     let count = mesh.triangles.len() as u32;
     let tree = KdTree::from_triangles(count, |id| mesh.corners(id), &CancelToken::new())
-        .expect("the token is not cancelled");
+        .expect("the token is not canceled");
     let mut random = TestRandom::new(rays as u64 + 1);
     let mut leaks = 0;
     for i in 0..rays {
@@ -303,9 +303,9 @@ fn hits_close_to_the_ray_origin_are_found() {
     }
     let count = slivers.len() as u32;
     let corners = |id: u32| slivers[id as usize];
-    let boxes = WideBvh::build(count, corners, &CancelToken::new()).expect("the token is not cancelled");
+    let boxes = WideBvh::build(count, corners, &CancelToken::new()).expect("the token is not canceled");
     let planes =
-        KdTree::from_triangles(count, corners, &CancelToken::new()).expect("the token is not cancelled");
+        KdTree::from_triangles(count, corners, &CancelToken::new()).expect("the token is not canceled");
     let trees = InstructionSet::ALL.map(|instructions| boxes.clone().with_instruction_set(instructions));
     let (mut before, mut behind, mut missed, mut wrong) = (0, 0, 0, 0);
     for i in 0..40_000 {

@@ -33,12 +33,12 @@ impl Editor {
         let uri = format!("file://{}", dir.path("scene.toml").display());
         let mut editor = Self { child, keys, screen: BufReader::new(screen), uri, next: 0, version: 1, dir };
         let answer =
-            editor.ask("initialize", &json!({ "processId": null, "rootUri": null, "capabilities": {} }));
+            editor.request("initialize", &json!({ "processId": null, "rootUri": null, "capabilities": {} }));
         assert_eq!(answer["serverInfo"]["name"], "glimt");
         assert_eq!(answer["capabilities"]["hoverProvider"], true);
-        editor.tell("initialized", &json!({}));
+        editor.notify("initialized", &json!({}));
         let document = json!({ "uri": editor.uri, "languageId": "toml", "version": 1, "text": text });
-        editor.tell("textDocument/didOpen", &json!({ "textDocument": document }));
+        editor.notify("textDocument/didOpen", &json!({ "textDocument": document }));
         editor
     }
 
@@ -48,11 +48,11 @@ impl Editor {
         self.keys.flush().expect("sent");
     }
 
-    fn tell(&mut self, method: &str, params: &Value) {
+    fn notify(&mut self, method: &str, params: &Value) {
         self.send(&json!({ "jsonrpc": "2.0", "method": method, "params": params }));
     }
 
-    fn hear(&mut self) -> Value {
+    fn receive(&mut self) -> Value {
         let mut length = 0;
         loop {
             let mut line = String::new();
@@ -69,12 +69,12 @@ impl Editor {
     }
 
     /// Sends a request and returns its result.
-    fn ask(&mut self, method: &str, params: &Value) -> Value {
+    fn request(&mut self, method: &str, params: &Value) -> Value {
         self.next += 1;
         let id = self.next;
         self.send(&json!({ "jsonrpc": "2.0", "id": id, "method": method, "params": params }));
         loop {
-            let mut message = self.hear();
+            let mut message = self.receive();
             if message["id"] == id {
                 assert_eq!(message.get("error"), None, "{message}");
                 return message["result"].take();
@@ -83,9 +83,9 @@ impl Editor {
     }
 
     /// The next diagnostics that satisfy `holds`.
-    fn mistakes(&mut self, holds: impl Fn(&[Value]) -> bool) -> Vec<Value> {
+    fn wait_for_diagnostics(&mut self, holds: impl Fn(&[Value]) -> bool) -> Vec<Value> {
         loop {
-            let message = self.hear();
+            let message = self.receive();
             if message["method"] == "textDocument/publishDiagnostics" {
                 let list = message["params"]["diagnostics"].as_array().expect("a list").clone();
                 if holds(&list) {
@@ -98,25 +98,25 @@ impl Editor {
     fn change(&mut self, text: &str) {
         self.version += 1;
         let document = json!({ "uri": self.uri, "version": self.version });
-        self.tell(
+        self.notify(
             "textDocument/didChange",
             &json!({ "textDocument": document, "contentChanges": [{ "text": text }] }),
         );
     }
 
     /// Changes the document to `text`, and sends a request at the position of `|`.
-    fn at(&mut self, method: &str, text: &str) -> Value {
+    fn request_at_cursor(&mut self, method: &str, text: &str) -> Value {
         let offset = text.find('|').expect("a cursor");
         self.change(&text.replacen('|', "", 1));
         let line = text[..offset].matches('\n').count();
         let character = text[..offset].rsplit('\n').next().expect("a line").encode_utf16().count();
         let position = json!({ "line": line, "character": character });
-        self.ask(method, &json!({ "textDocument": { "uri": self.uri }, "position": position }))
+        self.request(method, &json!({ "textDocument": { "uri": self.uri }, "position": position }))
     }
 
     /// Labels of the completions at `|`, and the text inserted by the first completion.
-    fn offered(&mut self, text: &str) -> (Vec<String>, String) {
-        let answer = self.at("textDocument/completion", text);
+    fn completions(&mut self, text: &str) -> (Vec<String>, String) {
+        let answer = self.request_at_cursor("textDocument/completion", text);
         let items = answer.as_array().cloned().unwrap_or_default();
         let text = |item: &Value, name: &str| item[name].as_str().unwrap_or_default().to_owned();
         let first = items.first().map_or(String::new(), |item| text(item, "insertText"));
@@ -134,9 +134,9 @@ impl Drop for Editor {
 #[test]
 fn diagnostics_follow_edits_and_saves() {
     let mut editor = Editor::open(TEXT);
-    assert_eq!(editor.mistakes(|_| true), [Value::Null; 0]);
+    assert_eq!(editor.wait_for_diagnostics(|_| true), [Value::Null; 0]);
     editor.change(&TEXT.replace("radius", "# ä\nraduis"));
-    let list = editor.mistakes(|list| !list.is_empty());
+    let list = editor.wait_for_diagnostics(|list| !list.is_empty());
     let unknown =
         list.iter().find(|one| one["message"].as_str().is_some_and(|text| text.contains("`raduis`")));
     let unknown = unknown.expect("the mistake");
@@ -150,8 +150,8 @@ fn diagnostics_follow_edits_and_saves() {
     editor.dir.write("bricks.png", "no image");
     editor.change(TEXT);
     let uri = editor.uri.clone();
-    editor.tell("textDocument/didSave", &json!({ "textDocument": { "uri": uri } }));
-    let list = editor.mistakes(|list| {
+    editor.notify("textDocument/didSave", &json!({ "textDocument": { "uri": uri } }));
+    let list = editor.wait_for_diagnostics(|list| {
         !list.is_empty() && !list[0]["message"].as_str().unwrap_or_default().contains("raduis")
     });
     assert!(list[0]["message"].as_str().is_some_and(|text| text.contains("bricks")), "{list:?}");
@@ -160,25 +160,25 @@ fn diagnostics_follow_edits_and_saves() {
 #[test]
 fn completions_offer_keys_choices_and_names() {
     let mut editor = Editor::open(TEXT);
-    let (keys, first) = editor.offered(&TEXT.replace("radius = 0.5", "r|"));
+    let (keys, first) = editor.completions(&TEXT.replace("radius = 0.5", "r|"));
     assert_eq!(
         (keys.as_slice(), first.as_str()),
         (["radius", "name", "matrix"].map(str::to_owned).as_slice(), "radius = 0.5")
     );
-    let (keys, _) = editor.offered(&TEXT.replace("color = [1, 0.5, 0]", "an|"));
+    let (keys, _) = editor.completions(&TEXT.replace("color = [1, 0.5, 0]", "an|"));
     assert!(keys.contains(&"anisotropy".to_owned()) && !keys.contains(&"diffuse".to_owned()), "{keys:?}");
-    let (types, first) = editor.offered(&TEXT.replace("\"metal\"", "|"));
+    let (types, first) = editor.completions(&TEXT.replace("\"metal\"", "|"));
     assert!(types.contains(&"glass".to_owned()) && first == "\"phong\"", "{types:?} {first}");
     assert_eq!(
-        editor.offered(&TEXT.replace("\"wall\"", "\"|\"")),
+        editor.completions(&TEXT.replace("\"wall\"", "\"|\"")),
         (vec!["wall".to_owned()], "wall".to_owned())
     );
-    assert_eq!(editor.offered(&TEXT.replace("\"bricks\" }", "| }")).1, "\"bricks\"");
-    let (heads, _) = editor.offered(&format!("{TEXT}\n[ren|"));
+    assert_eq!(editor.completions(&TEXT.replace("\"bricks\" }", "| }")).1, "\"bricks\"");
+    let (heads, _) = editor.completions(&format!("{TEXT}\n[ren|"));
     assert!(heads.contains(&"[render]".to_owned()) && !heads.contains(&"[camera]".to_owned()), "{heads:?}");
     // A header completion replaces the typed text, including brackets closed by the editor.
     for (typed, label) in [("[ren|", "[render]"), ("[|]", "[render]"), ("[[sp|]]", "[[sphere]]")] {
-        let items = editor.at("textDocument/completion", &format!("{TEXT}\n{typed}"));
+        let items = editor.request_at_cursor("textDocument/completion", &format!("{TEXT}\n{typed}"));
         let items = items.as_array().expect("candidates");
         let item = items.iter().find(|item| item["label"] == label).expect(label);
         let range = &item["textEdit"]["range"];
@@ -186,31 +186,35 @@ fn completions_offer_keys_choices_and_names() {
         assert_eq!((&range["start"]["character"], &range["end"]["character"]), (&json!(0), &json!(length)));
         assert_eq!((&item["textEdit"]["newText"], &item["filterText"]), (&json!(label), &json!(label)));
     }
-    assert_eq!(editor.offered(&TEXT.replace("0.5, 0]", "0.5, 0] # r|")).0, [""; 0]);
+    assert_eq!(editor.completions(&TEXT.replace("0.5, 0]", "0.5, 0] # r|")).0, [""; 0]);
     // Lines within an array contain numbers, not keys.
     for typed in ["|", "1, 0,\n|\n]"] {
         let text = TEXT.replace("[[light]]", &format!("[[mesh]]\nmatrix = [\n{typed}"));
-        assert_eq!(editor.offered(&text).0, [""; 0], "{text}");
+        assert_eq!(editor.completions(&text).0, [""; 0], "{text}");
     }
 }
 
 #[test]
 fn hover_and_go_to_definition_work() {
     let mut editor = Editor::open(TEXT);
-    let hover = editor.at("textDocument/hover", &TEXT.replace("roughness", "rough|ness"));
+    let hover = editor.request_at_cursor("textDocument/hover", &TEXT.replace("roughness", "rough|ness"));
     let text = hover["contents"]["value"].as_str().expect("a text");
     assert!(["mirror", "`0.2`", "0 … 1"].iter().all(|fact| mentions(text, fact)), "{text}");
-    assert_eq!(editor.at("textDocument/hover", &TEXT.replace("[[light]]", "|[[light]]")), Value::Null);
-    let place = editor.at("textDocument/definition", &TEXT.replace("\"wall\"", "\"wa|ll\""));
+    assert_eq!(
+        editor.request_at_cursor("textDocument/hover", &TEXT.replace("[[light]]", "|[[light]]")),
+        Value::Null
+    );
+    let place = editor.request_at_cursor("textDocument/definition", &TEXT.replace("\"wall\"", "\"wa|ll\""));
     assert_eq!(place["uri"], editor.uri);
     assert_eq!(place["range"]["start"], json!({ "line": 7, "character": 11 }));
-    let place = editor.at("textDocument/definition", &TEXT.replace("\"bricks\" }", "\"bri|cks\" }"));
+    let place =
+        editor.request_at_cursor("textDocument/definition", &TEXT.replace("\"bricks\" }", "\"bri|cks\" }"));
     assert_eq!(place["range"]["start"], json!({ "line": 4, "character": 10 }));
     let text = format!("[[groups.stool.box]]\nmaterial = \"wa|ll\"\n[[instance]]\ngroup = \"stool\"\n{TEXT}");
-    let place = editor.at("textDocument/definition", &text);
+    let place = editor.request_at_cursor("textDocument/definition", &text);
     assert_eq!(place["range"]["start"], json!({ "line": 11, "character": 11 }));
     let text = text.replace('|', "").replace("\"stool\"", "\"st|ool\"");
-    let place = editor.at("textDocument/definition", &text);
+    let place = editor.request_at_cursor("textDocument/definition", &text);
     assert_eq!(place["range"]["start"], json!({ "line": 0, "character": 9 }));
 }
 
@@ -220,7 +224,7 @@ fn colors_are_shown_in_srgb_and_written_linear() {
         TEXT.replace("[[light]]", "[[light]]\nintensity = \"tomato\"\n[[light]]\nintensity = \"#+12345\"");
     let mut editor = Editor::open(&text);
     let uri = editor.uri.clone();
-    let colors = editor.ask("textDocument/documentColor", &json!({ "textDocument": { "uri": uri } }));
+    let colors = editor.request("textDocument/documentColor", &json!({ "textDocument": { "uri": uri } }));
     let [linear, named] = colors.as_array().expect("a list").as_slice() else { panic!("{colors}") };
     let parts =
         |color: &Value| ["red", "green", "blue"].map(|name| color["color"][name].as_f64().expect("a number"));
@@ -229,7 +233,7 @@ fn colors_are_shown_in_srgb_and_written_linear() {
     assert!((red - 1.0).abs() < 1e-6 && (green - 0.7354).abs() < 1e-3 && blue == 0.0);
     assert_eq!(parts(named).map(|part| (part * 255.0).round()), [255.0, 99.0, 71.0]);
     let asked = json!({ "textDocument": { "uri": uri }, "range": linear["range"], "color": { "red": 1, "green": 0.5, "blue": 0, "alpha": 1 } });
-    let texts = editor.ask("textDocument/colorPresentation", &asked);
+    let texts = editor.request("textDocument/colorPresentation", &asked);
     assert_eq!(
         (&texts[0]["label"], &texts[1]["label"]),
         (&json!("\"#ff8000\""), &json!("[1.000, 0.216, 0.000]"))
@@ -239,14 +243,14 @@ fn colors_are_shown_in_srgb_and_written_linear() {
 #[test]
 fn server_exits_and_rejects_unknown_methods() {
     let mut editor = Editor::open(TEXT);
-    assert_eq!(editor.ask("shutdown", &Value::Null), Value::Null);
-    editor.tell("exit", &Value::Null);
+    assert_eq!(editor.request("shutdown", &Value::Null), Value::Null);
+    editor.notify("exit", &Value::Null);
     assert!(editor.child.wait().expect("its end").success());
     let mut editor = Editor::open(TEXT);
     editor.next += 1;
     editor.send(&json!({ "jsonrpc": "2.0", "id": editor.next, "method": "workspace/symbol", "params": {} }));
     let unknown = loop {
-        let message = editor.hear();
+        let message = editor.receive();
         if message["id"] == editor.next {
             break message;
         }
@@ -255,7 +259,7 @@ fn server_exits_and_rejects_unknown_methods() {
 }
 
 /// Sends frames to a new server. Returns the exit code, stdout and stderr.
-fn answers(frames: &[&str]) -> (Option<i32>, String, String) {
+fn serve(frames: &[&str]) -> (Option<i32>, String, String) {
     let dir = TestDir::new();
     let mut process = dir.glimt("lsp");
     process.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
@@ -281,7 +285,7 @@ const HOVER: &str = r#"{"jsonrpc":"2.0","id":3,"method":"textDocument/hover","pa
 #[test]
 fn server_replies_to_malformed_messages() {
     let (code, said, _) =
-        answers(&[INITIALIZE, "{no json", r#"{"jsonrpc":"2.0","id":"x"}"#, HOVER, SHUTDOWN, EXIT]);
+        serve(&[INITIALIZE, "{no json", r#"{"jsonrpc":"2.0","id":"x"}"#, HOVER, SHUTDOWN, EXIT]);
     assert_eq!(code, Some(0), "{said}");
     for part in ["-32700", "-32600", r#""id":"x""#, r#""id":3,"result":null"#] {
         assert!(said.contains(part), "{part}: {said}");
@@ -290,10 +294,10 @@ fn server_replies_to_malformed_messages() {
 
 #[test]
 fn server_exit_code_depends_on_shutdown() {
-    let (code, said, _) = answers(&[INITIALIZE, SHUTDOWN, HOVER, EXIT]);
+    let (code, said, _) = serve(&[INITIALIZE, SHUTDOWN, HOVER, EXIT]);
     assert!(code == Some(0) && said.contains("-32600") && said.contains(r#""id":3"#), "{said}");
-    assert_eq!(answers(&[INITIALIZE, EXIT]).0, Some(1), "exit without shutdown must fail");
-    assert!(answers(&[HOVER, EXIT]).1.contains("-32002"), "requests before initialize must fail");
+    assert_eq!(serve(&[INITIALIZE, EXIT]).0, Some(1), "exit without shutdown must fail");
+    assert!(serve(&[HOVER, EXIT]).1.contains("-32002"), "requests before initialize must fail");
 }
 
 #[test]
@@ -305,13 +309,13 @@ fn pipes_as_documents_do_not_block_the_server() {
         r#"{{"jsonrpc":"2.0","method":"textDocument/didOpen","params":{{"textDocument":{{"uri":"file://{}","languageId":"toml","version":1,"text":""}}}}}}"#,
         pipe.display()
     );
-    let (code, said, _) = answers(&[INITIALIZE, &open, SHUTDOWN, EXIT]);
+    let (code, said, _) = serve(&[INITIALIZE, &open, SHUTDOWN, EXIT]);
     assert_eq!(code, Some(0), "{said}");
 }
 
 #[test]
 fn excessive_content_length_is_an_error() {
-    let (code, _, said) = answers(&[INITIALIZE, "Content-Length: 1000000000000\r\n\r\n{}"]);
+    let (code, _, said) = serve(&[INITIALIZE, "Content-Length: 1000000000000\r\n\r\n{}"]);
     assert!(code == Some(1) && said.contains("1000000000000 bytes") && said.lines().count() == 1, "{said}");
 }
 
@@ -325,19 +329,19 @@ fn invalid_text_and_range_edits_are_handled() {
         json!({ "jsonrpc": "2.0", "method": "textDocument/didChange", "params": change }).to_string();
     let message = message.replace("HALF", "\\ud83d");
     write!(editor.keys, "Content-Length: {}\r\n\r\n{message}", message.len()).expect("sent");
-    editor.mistakes(|list| {
+    editor.wait_for_diagnostics(|list| {
         list.iter().any(|one| one["message"].as_str().is_some_and(|text| text.contains('x')))
     });
     // A file with a NUL is binary, which is the only error, as in `glimt check`.
     editor.change("a\0b = = 1\n");
-    let list = editor.mistakes(|list| {
+    let list = editor.wait_for_diagnostics(|list| {
         list.iter().any(|one| one["message"].as_str().is_some_and(|text| text.contains("binary")))
     });
     assert_eq!(list.len(), 1, "{list:?}");
     // Range edits are not supported.
     let start = json!({ "line": 0, "character": 0 });
     let change = json!({ "range": { "start": start, "end": start }, "text": "y" });
-    editor.tell("textDocument/didChange", &json!({ "textDocument": document, "contentChanges": [change] }));
-    let message = editor.hear();
+    editor.notify("textDocument/didChange", &json!({ "textDocument": document, "contentChanges": [change] }));
+    let message = editor.receive();
     assert_eq!(message["method"], "window/logMessage", "{message}");
 }

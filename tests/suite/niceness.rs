@@ -18,14 +18,14 @@ fn of_thread(stat: &str) -> Option<(String, i32)> {
 }
 
 /// The nice value that child processes inherit.
-fn own() -> i32 {
+fn inherited_niceness() -> i32 {
     let stat = fs::read_to_string("/proc/thread-self/stat").expect("the stat line of this thread");
     of_thread(&stat).expect("a nice value").1
 }
 
 /// The inherited nice value plus `steps`, up to the system's limit.
-pub(crate) fn raised(steps: i32) -> i32 {
-    (own() + steps).min(19)
+pub(crate) fn raised_niceness(steps: i32) -> i32 {
+    (inherited_niceness() + steps).min(19)
 }
 
 /// Nice values of a process's render threads.
@@ -77,7 +77,11 @@ fn once_and_bench_keep_priority_by_default() {
         ),
     ];
     for (call, sign) in calls {
-        assert_eq!(of_program(dir.glimt(call), sign), [raised(0)], "{call}");
-        assert_eq!(of_program(dir.glimt(&format!("{call} --nice 7")), sign), [raised(7)], "{call} --nice 7");
+        assert_eq!(of_program(dir.glimt(call), sign), [raised_niceness(0)], "{call}");
+        assert_eq!(
+            of_program(dir.glimt(&format!("{call} --nice 7")), sign),
+            [raised_niceness(7)],
+            "{call} --nice 7"
+        );
     }
 }

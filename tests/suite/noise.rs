@@ -98,13 +98,13 @@ fn render(dir: &TestDir, options: &str) -> (Vec<f64>, f64) {
 }
 
 /// Statistics over several seeds: the mean and variance of each pixel, and the RMS of the reported errors.
-struct Seeds {
+struct SeedStatistics {
     means: Vec<f64>,
     variances: Vec<f64>,
     reported: f64,
 }
 
-impl Seeds {
+impl SeedStatistics {
     fn of(dir: &TestDir, count: u32, options: &str) -> Self {
         let runs: Vec<_> = (1..=count).map(|seed| render(dir, &format!("--seed {seed} {options}"))).collect();
         let count = f64::from(count);
@@ -150,7 +150,7 @@ fn reported_error_matches_actual_error() {
     for (name, scene) in [("penumbra", PENUMBRA), ("caustic", CAUSTIC)] {
         let dir = dir(&format!("{HEAD}{scene}"));
         for samples in [16, 64] {
-            let seeds = Seeds::of(&dir, 24, &format!("--integrator path --samples {samples}"));
+            let seeds = SeedStatistics::of(&dir, 24, &format!("--integrator path --samples {samples}"));
             let ratio = seeds.reported / seeds.error();
             assert!((0.9..1.35).contains(&ratio), "{name}, {samples} samples: {ratio}");
         }
@@ -161,7 +161,8 @@ fn reported_error_matches_actual_error() {
 fn stopped_tiles_reach_the_noise_target() {
     for (name, scene, error) in [("penumbra", PENUMBRA, 0.05), ("caustic", CAUSTIC, 0.4)] {
         let dir = dir(&format!("{HEAD}{scene}"));
-        let seeds = Seeds::of(&dir, 24, &format!("--integrator path --samples 4096 --error {error}"));
+        let seeds =
+            SeedStatistics::of(&dir, 24, &format!("--integrator path --samples 4096 --error {error}"));
         let tiles = seeds.tiles();
         let parts =
             (tiles.iter().map(|tile| (tile / error).powi(2)).sum::<f64>() / tiles.len() as f64).sqrt();
@@ -177,8 +178,9 @@ fn whitted_glossy_noise_matches_path() {
     for sky in skies {
         for shininess in [5, 60, 99, 300] {
             let dir = dir(&ball(sky, shininess));
-            let [whitted, path] = ["whitted", "path"]
-                .map(|integrator| Seeds::of(&dir, 8, &format!("--samples 16 --integrator {integrator}")));
+            let [whitted, path] = ["whitted", "path"].map(|integrator| {
+                SeedStatistics::of(&dir, 8, &format!("--samples 16 --integrator {integrator}"))
+            });
             let ratio = whitted.variance() / path.variance();
             assert!(ratio <= 2.0, "{sky}, shininess {shininess}: {ratio} times the variance");
             let error = ((whitted.variance() + path.variance()) / 8.0 / whitted.means.len() as f64).sqrt();
@@ -193,7 +195,11 @@ fn whitted_glossy_noise_matches_path() {
 fn negative_filter_lobes_preserve_the_mean() {
     let smooth = dir(&format!("{HEAD}{PENUMBRA}"));
     let of = |filter: &str| {
-        Seeds::of(&smooth, 16, &format!("--integrator path --samples 8 --set render.filter={filter}"))
+        SeedStatistics::of(
+            &smooth,
+            16,
+            &format!("--integrator path --samples 8 --set render.filter={filter}"),
+        )
     };
     let [mitchell, plain] = ["mitchell", "box"].map(of);
     let pixels = (16 * plain.means.len()) as f64;

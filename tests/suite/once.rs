@@ -449,7 +449,7 @@ fn unprintable_names_are_not_suggested() {
 
 /// Starts a render and sends it `signals` signals while it writes the image. Returns the exit code and
 /// stderr.
-fn ended_in_the_write(dir: &TestDir, line: &str, signals: usize) -> (Option<i32>, String) {
+fn signal_during_write(dir: &TestDir, line: &str, signals: usize) -> (Option<i32>, String) {
     let stderr = fs::File::create(dir.path("stderr")).expect("a file");
     let mut child = dir.glimt(line).stderr(stderr).spawn().expect("it runs");
     let said = || fs::read_to_string(dir.path("stderr")).expect("there");
@@ -475,7 +475,7 @@ fn signal_during_the_write_keeps_the_render() {
     for (size, signals) in [("--width 700 --height 500", 1), ("--width 1600 --height 1200", 2)] {
         let dir = TestDir::new();
         let render = format!("ball.toml --once -o out.png --samples 1 --progress json {size}");
-        let (code, said) = ended_in_the_write(&dir, &render, signals);
+        let (code, said) = signal_during_write(&dir, &render, signals);
         let (picture, checkpoint) = (dir.path("out.png"), dir.path("out.png.checkpoint"));
         assert!(code == Some(143) || code == Some(0) && picture.exists(), "{code:?}: {said}");
         assert!(picture.exists() != checkpoint.exists(), "{said}");

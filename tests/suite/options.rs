@@ -72,7 +72,7 @@ fn room() -> TestDir {
 
 /// Renders with additional options. Returns the contents of the image file.
 #[track_caller]
-fn picture(dir: &TestDir, options: &str) -> Vec<u8> {
+fn rendered_bytes(dir: &TestDir, options: &str) -> Vec<u8> {
     dir.expect(&format!("room.toml --once -o picture.ppm --progress none {options}"), 0);
     dir.bytes("picture.ppm")
 }
@@ -85,8 +85,8 @@ fn pixels(ppm: &[u8], count: usize) -> &[u8] {
 #[test]
 fn options_change_the_image_and_report() {
     let dir = room();
-    let plain = picture(&dir, "");
-    assert_eq!(plain, picture(&dir, ""), "equal options must have equal images");
+    let plain = rendered_bytes(&dir, "");
+    assert_eq!(plain, rendered_bytes(&dir, ""), "equal options must have equal images");
     let cases: [(&str, &str, serde_json::Value); 8] = [
         ("--shadows hard", "shadows", "hard".into()),
         ("--shadows off", "shadows", "off".into()),
@@ -98,12 +98,12 @@ fn options_change_the_image_and_report() {
         ("--view shadow", "view", "shadow".into()),
     ];
     for (option, key, value) in cases {
-        assert_ne!(picture(&dir, option), plain, "{option}");
+        assert_ne!(rendered_bytes(&dir, option), plain, "{option}");
         let report = dir.report(&format!("room.toml {option}"));
         assert_eq!(report["settings"][key], value, "{option}");
     }
     for option in ["--max-depth 0", "--max-depth 1", "--samples 3"] {
-        assert_ne!(picture(&dir, option), plain, "{option}");
+        assert_ne!(rendered_bytes(&dir, option), plain, "{option}");
     }
     for same in [
         "--seed 3",
@@ -119,7 +119,7 @@ fn options_change_the_image_and_report() {
         "--preview none",
         "--photons off",
     ] {
-        assert_eq!(picture(&dir, same), plain, "{same}");
+        assert_eq!(rendered_bytes(&dir, same), plain, "{same}");
     }
 }
 
@@ -127,15 +127,15 @@ fn options_change_the_image_and_report() {
 fn set_option_matches_editing_the_file() {
     let dir = room();
     let sets = "--set materials.ball.diffuse=[0.1,0.2,0.3] --set sphere.2.radius=.4 --set render.samples=3";
-    let by_call = picture(&dir, sets);
+    let by_call = rendered_bytes(&dir, sets);
     let edited = ROOM.replace("[0.8, 0.2, 0.1]", "[0.1, 0.2, 0.3]").replace("samples = 2", "samples = 3");
     let (first, second) = edited.split_at(edited.rfind("[[sphere]]").expect("a ball"));
     dir.write("room.toml", format!("{first}{}", second.replacen("radius = 0.5", "radius = 0.4", 1)));
-    assert_eq!(by_call, picture(&dir, ""));
+    assert_eq!(by_call, rendered_bytes(&dir, ""));
     dir.write("room.toml", ROOM);
-    assert_ne!(by_call, picture(&dir, ""));
+    assert_ne!(by_call, rendered_bytes(&dir, ""));
     // Dedicated options take precedence over `--set`.
-    assert_eq!(picture(&dir, "--set render.samples=5 --samples 2"), picture(&dir, ""));
+    assert_eq!(rendered_bytes(&dir, "--set render.samples=5 --samples 2"), rendered_bytes(&dir, ""));
     let checked = dir.run("check room.toml --set materials.ball.diffuse=tomatoe");
     let words = String::from_utf8(checked.stderr).expect("UTF-8");
     assert_eq!(checked.status.code(), Some(2));
@@ -175,8 +175,8 @@ fn size_samples_and_time_are_applied() {
 #[test]
 fn crop_keeps_pixels_and_is_black_outside() {
     let dir = room();
-    let whole = picture(&dir, "");
-    let cut = picture(&dir, "--crop 5,4,10,8");
+    let whole = rendered_bytes(&dir, "");
+    let cut = rendered_bytes(&dir, "--crop 5,4,10,8");
     let (whole, cut) = (pixels(&whole, 24 * 18), pixels(&cut, 24 * 18));
     for (index, (a, b)) in whole.chunks(3).zip(cut.chunks(3)).enumerate() {
         let (x, y) = (index % 24, index / 24);

@@ -45,7 +45,7 @@ fn names(directory: &Path) -> Vec<String> {
     names
 }
 
-fn refused(path: &Path) -> String {
+fn refusal(path: &Path) -> String {
     let before = check_image_path(path).expect_err("rejection before rendering").to_string();
     let after = atomic(path, b"new").expect_err("refused at the end").to_string();
     assert_eq!(before, after);
@@ -99,7 +99,7 @@ fn link_loop_is_an_error() {
     let directory = scratch();
     symlink("b.png", directory.path().join("a.png")).expect("a link");
     symlink("a.png", directory.path().join("b.png")).expect("a link");
-    let message = refused(&directory.path().join("a.png"));
+    let message = refusal(&directory.path().join("a.png"));
     assert_mentions(&message, &["a.png", &system_error(Errno::ELOOP)]);
 }
 
@@ -171,15 +171,15 @@ fn impossible_targets_are_reported() {
     let inside = |name: &str| directory.path().join(name);
     fs::create_dir(inside("dir.png")).expect("a directory");
     fs::write(inside("file"), "").expect("a file");
-    let message = refused(&inside("missing/out.png"));
+    let message = refusal(&inside("missing/out.png"));
     assert_mentions(&message, &[&format!("directory {}", inside("missing").display())]);
     for name in ["dir.png", "dir.png/", "new.png/"] {
-        let message = refused(&inside(name));
+        let message = refusal(&inside(name));
         assert_mentions(&message, &[&inside(name).display().to_string(), "a directory"]);
     }
-    let message = refused(&inside("file/out.png"));
+    let message = refusal(&inside("file/out.png"));
     assert_mentions(&message, &[&system_error(Errno::ENOTDIR)]);
-    let message = refused(&inside(&format!("{}.png", "n".repeat(300))));
+    let message = refusal(&inside(&format!("{}.png", "n".repeat(300))));
     assert_mentions(&message, &[&system_error(Errno::ENAMETOOLONG)]);
     assert_eq!(names(directory.path()), ["dir.png", "file"]);
 }
@@ -196,9 +196,9 @@ fn longest_possible_name_is_written() {
 #[test]
 fn missing_permission_is_an_error() {
     if let Some(directory) = child_path() {
-        let message = refused(&directory.join("closed/out.png"));
+        let message = refusal(&directory.join("closed/out.png"));
         assert_mentions(&message, &[&system_error(Errno::EACCES)]);
-        let message = refused(&directory.join("open/protected.png"));
+        let message = refusal(&directory.join("open/protected.png"));
         assert_mentions(&message, &["protected.png", &system_error(Errno::EACCES)]);
         atomic(&directory.join("open/other.png"), b"new").expect("written");
         return;
@@ -231,14 +231,14 @@ fn missing_permission_is_an_error() {
             other => break other.expect("a child"),
         }
     };
-    succeeded(&output);
+    assert_success(&output);
     mode("closed", 0o755);
     assert_eq!(names(&directory.path().join("closed")), [""; 0]);
     assert_eq!(names(&directory.path().join("open")), ["other.png", "protected.png"]);
     assert_eq!(fs::read(directory.path().join("open/protected.png")).expect("a file"), b"old");
 }
 
-fn succeeded(output: &Output) {
+fn assert_success(output: &Output) {
     assert!(output.status.success(), "{}: {}", output.status, String::from_utf8_lossy(&output.stderr));
 }
 
@@ -257,7 +257,7 @@ fn file_size_limit_is_an_error() {
     let test = "output::file_size_limit_is_an_error";
     let mut command = Command::new("sh");
     command.args(["-c", script]).arg(this_binary()).arg(test).env(CHILD, &path);
-    succeeded(&command.output().expect("a child"));
+    assert_success(&command.output().expect("a child"));
     assert_eq!(fs::read(&path).expect("a file"), b"old");
     assert_eq!(names(directory.path()), ["out.png"]);
 }
@@ -278,14 +278,14 @@ fn concurrent_writers_leave_a_complete_file() {
 }
 
 /// Two images whose contents would reveal a torn write.
-fn two_pictures() -> [Vec<u8>; 2] {
+fn two_images() -> [Vec<u8>; 2] {
     [vec![0xaa; 3_000_000], vec![0x55; 2_000_001]]
 }
 
 #[test]
 fn kill_leaves_a_whole_file_and_cleans_up() {
     let test = "output::kill_leaves_a_whole_file_and_cleans_up";
-    let pictures = two_pictures();
+    let pictures = two_images();
     if let Some(path) = child_path() {
         for bytes in pictures.iter().cycle() {
             atomic(&path, bytes).expect("written");

@@ -305,7 +305,7 @@ fn merge_never_replaces_an_unread_input() {
 
 /// Files referenced only by an option, and the files of a mesh that does not parse.
 #[test]
-fn merge_never_replaces_an_unread_input_of_an_option() {
+fn merge_never_replaces_an_unread_option_input() {
     let dir = room_dir();
     fs::create_dir_all(dir.path("common")).expect("a folder");
     let image = "P3 1 1 255 9 9 9\n";

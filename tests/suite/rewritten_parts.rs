@@ -47,7 +47,7 @@ fn other_build() -> String {
 
 /// Runs glimt and checks the exit code. Returns stderr with line breaks removed.
 #[track_caller]
-fn said(dir: &TestDir, line: &str, code: i32) -> String {
+fn stderr_of(dir: &TestDir, line: &str, code: i32) -> String {
     dir.expect(line, code).split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
@@ -61,8 +61,8 @@ fn merge_refuses_parts_of_another_build() {
     dir.write("out.png", "the image before");
     replace_build(&second, BUILD, &other);
     for options in ["", "--watch", "--partial"] {
-        let said = said(&dir, &format!("merge out.png 1.part 2.part --progress none {options}"), 2);
-        assert_mentions(&said, &["2.part", BUILD, &other]);
+        let stderr = stderr_of(&dir, &format!("merge out.png 1.part 2.part --progress none {options}"), 2);
+        assert_mentions(&stderr, &["2.part", BUILD, &other]);
         assert_eq!(dir.bytes("out.png"), b"the image before", "{options}");
     }
     // Only the build made the difference.
@@ -85,7 +85,7 @@ fn resume_refuses_checkpoints_of_another_build() {
     let (image, path, other) = (dir.bytes("out.exr"), dir.path("out.exr.checkpoint"), other_build());
     replace_build(&path, BUILD, &other);
     let checkpoint = dir.bytes("out.exr.checkpoint");
-    let refusal = said(&dir, &format!("{RENDER} --resume --samples 5"), 2);
+    let refusal = stderr_of(&dir, &format!("{RENDER} --resume --samples 5"), 2);
     assert_mentions(&refusal, &["out.exr.checkpoint", BUILD, &other]);
     assert!(dir.bytes("out.exr") == image && dir.bytes("out.exr.checkpoint") == checkpoint);
     replace_build(&path, &other, BUILD);
@@ -104,7 +104,7 @@ fn implausible_render_times_do_not_hang() {
                 assert!(state[key].is_f64(), "{key}: {state}");
                 state[key] = json!(seconds);
             });
-            let refusal = said(&dir, &format!("{RENDER} --resume --samples 5 --time 1000"), 2);
+            let refusal = stderr_of(&dir, &format!("{RENDER} --resume --samples 5 --time 1000"), 2);
             assert_mentions(&refusal, &["out.exr.checkpoint", "state"]);
             assert!(dir.bytes("out.exr") == image, "{key}: {seconds}");
             // A new render replaces the checkpoint.

@@ -127,7 +127,7 @@ fn only_long_help_lists_environment_variables() {
 }
 
 /// Names of the environment variables that a source file reads.
-fn asked_in(text: &str) -> BTreeSet<String> {
+fn environment_variables_in(text: &str) -> BTreeSet<String> {
     let code = text.split("#[cfg(test)]").next().unwrap_or_default();
     let is_name = |word: &&str| {
         word.len() > 2
@@ -158,7 +158,7 @@ fn variable_list_matches_source_code() {
                 ["env::var", "variable(", "Fn(&str) -> Option<String>"].iter().any(|way| text.contains(way));
             let is_source = path.extension().is_some_and(|ending| ending == "rs");
             if asks && is_source && !path.ends_with("manual_test.rs") {
-                asked.extend(asked_in(&text));
+                asked.extend(environment_variables_in(&text));
             }
         }
     }

@@ -30,7 +30,7 @@ fn box_of([x, y, z]: [i32; 3]) -> String {
 }
 
 /// Ranges of columns and rows that contain pixels other than ground and sky.
-fn covered(pixels: &[f32]) -> [usize; 4] {
+fn covered_ranges(pixels: &[f32]) -> [usize; 4] {
     let mut bounds = [48, 0, 36, 0];
     for (index, pixel) in pixels.chunks(3).enumerate() {
         let (x, y) = (index % 48, index / 48);
@@ -50,7 +50,7 @@ fn model_is_framed_from_every_side() {
     dir.write("box.obj", box_of([3, 2, 1]));
     for (side, ratio) in [("front", 1.5), ("back", 1.5), ("left", 0.5), ("right", 0.5)] {
         let [left, right, top, bottom] =
-            covered(&picture(&dir, &format!("box.obj --view normal --from {side}")));
+            covered_ranges(&picture(&dir, &format!("box.obj --view normal --from {side}")));
         let (width, height) = ((right - left + 1) as f32, (bottom - top + 1) as f32);
         assert!(left > 0 && top > 0 && right < 47 && bottom < 35, "{side}: {left} {right} {top} {bottom}");
         assert!((width / height / ratio - 1.0).abs() < 0.25, "{side}: {width} × {height}");
@@ -60,7 +60,7 @@ fn model_is_framed_from_every_side() {
     for (up, sizes) in [("x", [4, 1, 1]), ("y", [1, 4, 1]), ("z", [1, 1, 4])] {
         dir.write("tower.obj", box_of(sizes));
         let [left, right, top, bottom] =
-            covered(&picture(&dir, &format!("tower.obj --view normal --from front --up {up}")));
+            covered_ranges(&picture(&dir, &format!("tower.obj --view normal --from front --up {up}")));
         let (width, height) = ((right - left + 1) as f32, (bottom - top + 1) as f32);
         assert!((3.0..5.0).contains(&(height / width)), "{up}: {width} × {height}");
     }
@@ -68,7 +68,7 @@ fn model_is_framed_from_every_side() {
                  property list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n1 0 4\n0 0 4\n3 0 1 2\n3 0 2 3\n";
     for (comment, is_high) in [("Created in Blender version 4.5.0", true), ("by hand", false)] {
         dir.write("tower.ply", format!("ply\nformat ascii 1.0\ncomment {comment}\n{tower}"));
-        let [left, right, top, bottom] = covered(&picture(&dir, "tower.ply --view normal --from iso"));
+        let [left, right, top, bottom] = covered_ranges(&picture(&dir, "tower.ply --view normal --from iso"));
         assert_eq!(bottom - top > right - left, is_high, "{comment}");
     }
     let stderr = dir.expect(&format!("ball.toml {SMALL} --up z"), 2);
@@ -95,7 +95,7 @@ fn stl_files_are_z_up() {
     };
     dir.write("box.stl", format!("solid box\n{}endsolid box\n", faces.map(facet).collect::<String>()));
     let [obj, stl] = ["box.obj", "box.stl"]
-        .map(|file| covered(&picture(&dir, &format!("{file} --view normal --from front"))));
+        .map(|file| covered_ranges(&picture(&dir, &format!("{file} --view normal --from front"))));
     assert_eq!(obj, stl);
 }
 

@@ -67,7 +67,7 @@ fn lit_from_ceiling(height: f64, reversed: bool, camera: &str) -> String {
 }
 
 #[test]
-fn lights_in_the_plane_of_a_ceiling_are_seen_and_lit() {
+fn lights_flush_with_a_ceiling_still_shine() {
     let dir = TestDir::new();
     let up = "[camera]\nposition = [0, 1, 0]\nlook_at = [0, 2, 0]\nup = [0, 0, 1]\nfov = 20\n";
     let down = "[camera]\nposition = [0, 1, 0]\nlook_at = [0, 0, 0]\nup = [0, 0, 1]\nfov = 60\n";

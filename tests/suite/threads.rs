@@ -97,7 +97,7 @@ fn info_reads_parts_with_one_descriptor() {
 }
 
 /// Runs a command with a limit on open files. Returns the exit code and stderr.
-fn with_descriptors(dir: &TestDir, limit: u32, line: &str) -> (Option<i32>, String) {
+fn run_with_descriptor_limit(dir: &TestDir, limit: u32, line: &str) -> (Option<i32>, String) {
     let mut process = Process::new("bash");
     process.args(["-c", &format!("ulimit -n {limit} && exec \"$0\" {line}"), PROGRAM]);
     process.current_dir(dir.0.path()).stdin(Stdio::null());
@@ -133,7 +133,7 @@ fn too_few_descriptors_are_one_message() {
         "merge new.png 1.part 2.part --progress none",
     ] {
         for limit in 4.. {
-            let (code, said) = with_descriptors(&dir, limit, line);
+            let (code, said) = run_with_descriptor_limit(&dir, limit, line);
             if code == Some(0) {
                 assert!(limit > 4 && dir.path("new.png").exists(), "{line} with {limit}");
                 break;
@@ -156,7 +156,7 @@ fn merging_too_many_parts_is_one_message() {
     let parts = "1.part ".repeat(200);
     for options in ["", "--watch", "--partial"] {
         let line = format!("merge new.png {parts} --progress none {options}");
-        let (code, said) = with_descriptors(&dir, 64, &line);
+        let (code, said) = run_with_descriptor_limit(&dir, 64, &line);
         assert_eq!((code, said.lines().count()), (Some(1), 1), "{options}: {said}");
         assert!(said.starts_with("error: ") && said.contains("200") && said.contains("ulimit -n"), "{said}");
         assert!(!dir.path("new.png").exists(), "{options}");

@@ -11,7 +11,7 @@ use super::test_dir::{TestDir, assert_mentions, mentions};
 const SMALL: &str = "--once --width 32 --height 24 --samples 2 --error 0";
 
 /// Four balls with different colors around a point, one on each side.
-fn around() -> TestDir {
+fn four_balls() -> TestDir {
     let dir = TestDir::new();
     let ball = |name: &str, color: &str, center: &str| {
         format!(
@@ -55,7 +55,7 @@ fn frames(bytes: &[u8]) -> Vec<Vec<u8>> {
 
 #[test]
 fn turntable_writes_files_and_animations() {
-    let dir = around();
+    let dir = four_balls();
     let stderr =
         dir.expect(&format!("around.toml {SMALL} --turntable 4 -o a_####.png -o a.apng -o a.gif"), 0);
     let names = ["a_0001.png", "a_0002.png", "a_0003.png", "a_0004.png"];
@@ -148,7 +148,7 @@ fn impossible_turntables_are_rejected() {
 
 #[test]
 fn frames_linked_to_one_file_are_rejected() {
-    let dir = around();
+    let dir = four_balls();
     std::os::unix::fs::symlink("a_3.png", dir.path("a_1.png")).expect("a link");
     dir.write("a_3.png", std::fs::read("assets/textures/checker.png").expect("an image"));
     let stderr = dir.expect(&format!("around.toml {SMALL} --turntable 4 -o a_#.png"), 2);
@@ -176,7 +176,7 @@ fn default_frames_keep_unrelated_images() {
 
 #[test]
 fn interrupted_turntable_leaves_whole_files() {
-    let dir = around();
+    let dir = four_balls();
     let line = "around.toml --once --width 64 --height 48 --samples 1000 --error 0 --turntable 5000 -o a_#.png -o a.gif";
     let mut process = dir.glimt(line).stderr(Stdio::piped()).spawn().expect("it runs");
     dir.await_file("a_2.png", &mut process);
@@ -193,7 +193,7 @@ fn interrupted_turntable_leaves_whole_files() {
 
 #[test]
 fn changed_scene_ends_the_turntable() {
-    let dir = around();
+    let dir = four_balls();
     let line =
         "around.toml --once --width 64 --height 48 --samples 200 --error 0 --turntable 5000 -o a_#.png";
     let mut process = dir.glimt(line).stderr(Stdio::piped()).spawn().expect("it runs");
@@ -209,7 +209,7 @@ fn changed_scene_ends_the_turntable() {
 
 #[test]
 fn frames_of_a_longer_turntable_are_kept() {
-    let dir = around();
+    let dir = four_balls();
     assert!(!mentions(&dir.expect(&format!("around.toml {SMALL} --turntable 4 -o w_##.png"), 0), "more"));
     let third = dir.bytes("w_03.png");
     let said = dir.expect(&format!("around.toml {SMALL} --turntable 2 -o w_##.png"), 0);

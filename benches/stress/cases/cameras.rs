@@ -10,7 +10,7 @@ pub(super) fn rows(_: CaseSet) -> Vec<StressRow> {
     let mut rows = Vec::new();
     let plain = signs("", CAMERA, "");
     rows.push(
-        StressRow::alike(
+        StressRow::matching(
             "aperture 0 vs. no lens",
             vec![(signs("", &with("aperture = 0\nfocus = 3"), ""), plain.clone())],
             0.0,
@@ -18,7 +18,7 @@ pub(super) fn rows(_: CaseSet) -> Vec<StressRow> {
         .timed(),
     );
     rows.push(
-        StressRow::alike(
+        StressRow::matching(
             "aperture 1e-12 vs. no lens",
             vec![(signs("", &with("aperture = 1e-12"), ""), plain.clone())],
             1e-3,
@@ -40,13 +40,13 @@ pub(super) fn rows(_: CaseSet) -> Vec<StressRow> {
     );
     rows.extend([1e-3, 179.0].map(angle_of_view));
     for (name, place) in [("glass with IOR 1", "1"), ("glass with IOR 1.000001", "1.000001")] {
-        let ball = around_the_camera(place);
+        let ball = glass_around_camera(place);
         let pairs = vec![(signs("", CAMERA, &ball), plain.clone())];
-        rows.push(StressRow::alike(format!("camera in {name} vs. air"), pairs, 1e-3));
-        let white = (furnace(64, CAMERA, &ball), furnace(64, CAMERA, &around_the_camera("1.5")));
+        rows.push(StressRow::matching(format!("camera in {name} vs. air"), pairs, 1e-3));
+        let white = (furnace(64, CAMERA, &ball), furnace(64, CAMERA, &glass_around_camera("1.5")));
         rows.push(StressRow::mean(format!("camera in {name} under uniform light"), white, 1.0, 1e-3).timed());
     }
-    let inside = (furnace(64, CAMERA, &around_the_camera("1.5")), furnace(64, CAMERA, WHITE));
+    let inside = (furnace(64, CAMERA, &glass_around_camera("1.5")), furnace(64, CAMERA, WHITE));
     rows.push(StressRow::mean("camera in glass with IOR 1.5 under uniform light", inside, 1.0, 1e-3));
     let black = "[materials.k]\ndiffuse = 0\n";
     for (name, thing) in [
@@ -64,7 +64,7 @@ pub(super) fn rows(_: CaseSet) -> Vec<StressRow> {
             let camera = format!("[camera]\nposition = [0, 0, {z:?}]\nlook_at = [0, 0, -5]\n");
             signs("", &camera, &format!("{black}{thing}\nmaterial = \"k\"\n"))
         };
-        rows.push(StressRow::alike(
+        rows.push(StressRow::matching(
             format!("camera on a {name} vs. no {name}"),
             vec![(picture(0.0), plain.clone())],
             0.0,
@@ -72,7 +72,9 @@ pub(super) fn rows(_: CaseSet) -> Vec<StressRow> {
         // The reference must also include the cost of the invisible object, so place its camera as close in
         // front of the object as single precision allows.
         let beside = vec![(picture(0.0), picture(-2_f64.powi(-20)))];
-        rows.push(StressRow::alike(format!("camera on a {name} vs. in front of it"), beside, 1e-3).timed());
+        rows.push(
+            StressRow::matching(format!("camera on a {name} vs. in front of it"), beside, 1e-3).timed(),
+        );
     }
     rows.extend(images());
     rows
@@ -82,7 +84,7 @@ fn with(key: &str) -> String {
     format!("{CAMERA}{key}\n")
 }
 
-fn around_the_camera(ior: &str) -> String {
+fn glass_around_camera(ior: &str) -> String {
     format!(
         "[materials.g]\ntype = \"glass\"\nior = {ior}\n[[sphere]]\ncenter = [0.1, 0, 0]\nradius = 0.5\nmaterial = \"g\"\n"
     )
@@ -113,7 +115,7 @@ material = "blue"
         SceneFiles::new(head(64, "") + &camera + wall)
     };
     let name = format!("wall at a field of view of {fov}° vs. 40°");
-    StressRow::alike(name, vec![(picture(fov), picture(40.0))], 1e-3).timed()
+    StressRow::matching(name, vec![(picture(fov), picture(40.0))], 1e-3).timed()
 }
 
 /// A sphere with reflectance ρ around the camera and a point light with intensity I. Every pixel has radiance

@@ -39,10 +39,14 @@ pub(super) fn rows(extent: CaseSet) -> Vec<StressRow> {
             frames.into_iter().map(move |frame| (scene(frame), scene(Frame::PLAIN)))
         };
         let scaled = twins(steps.iter().map(|&k| Frame::scaled(k)).collect(), SAMPLES);
-        rows.push(StressRow::alike(format!("scene scaled by 2^−30 … 2^30, {name}"), scaled.collect(), 0.0));
+        rows.push(StressRow::matching(
+            format!("scene scaled by 2^−30 … 2^30, {name}"),
+            scaled.collect(),
+            0.0,
+        ));
         for &sizes in distances {
             let moved = twins(vec![Frame::moved(sizes)], moved_samples).collect();
-            rows.push(StressRow::alike(
+            rows.push(StressRow::matching(
                 format!("scene moved by {sizes:e} times its size, {name}"),
                 moved,
                 MOVED,
@@ -79,14 +83,14 @@ fn shape_rows(extent: CaseSet) -> Vec<StressRow> {
     };
     let mut rows = Vec::new();
     for shape in SHAPES {
-        rows.push(StressRow::alike(
+        rows.push(StressRow::matching(
             format!("{shape} with every material, moved by 1e8 times the scene size"),
             pairs(shape, Frame::moved(1e8)),
             MOVED,
         ));
         if extent == CaseSet::Long {
             let scaled = [-30, -11, 7, 30].into_iter().flat_map(|k| pairs(shape, Frame::scaled(k)));
-            rows.push(StressRow::alike(
+            rows.push(StressRow::matching(
                 format!("{shape} with every material, scaled by 2^−30 … 2^30"),
                 scaled.collect(),
                 0.0,
@@ -111,8 +115,8 @@ fn light_rows(extent: CaseSet) -> Vec<StressRow> {
         let moved = pairs(&[Frame::moved(1e8)]);
         let scaled = pairs(&[Frame::scaled(-30), Frame::scaled(30)]);
         [
-            StressRow::alike(format!("light: {light}, moved by 1e8 times the scene size"), moved, MOVED),
-            StressRow::alike(format!("light: {light}, scaled by 2^−30 and 2^30"), scaled, 0.0),
+            StressRow::matching(format!("light: {light}, moved by 1e8 times the scene size"), moved, MOVED),
+            StressRow::matching(format!("light: {light}, scaled by 2^−30 and 2^30"), scaled, 0.0),
         ]
     });
     rows.collect()
@@ -133,7 +137,7 @@ fn georeferenced(ending: &'static str) -> StressRow {
     };
     let pairs = vec![(picture(Frame::moved(1e8)), picture(Frame::PLAIN))];
     let title = format!(".{ending} mesh with vertices 1e8 times the scene size from the origin");
-    StressRow::alike(title, pairs, MOVED)
+    StressRow::matching(title, pairs, MOVED)
 }
 
 const SHAPES: [&str; 10] =
@@ -174,13 +178,13 @@ fn camera(frame: Frame, more: &str) -> String {
 
 /// A shape above a floor.
 fn around(frame: Frame, shape: &str) -> String {
-    let floor = (frame.point(-4.0, -1.0, 0.0), frame.way(8.0, 0.0, 0.0), frame.way(0.0, 0.0, -8.0));
+    let floor = (frame.point(-4.0, -1.0, 0.0), frame.vector(8.0, 0.0, 0.0), frame.vector(0.0, 0.0, -8.0));
     let (corner, u, v) = floor;
     format!("{TABLES}[[quad]]\ncorner = {corner}\nu = {u}\nv = {v}\nmaterial = \"matte\"\n{shape}")
 }
 
 fn shape_of(shape: &str, frame: Frame, material: &str) -> String {
-    let (p, w, l) = (|x, y, z| frame.point(x, y, z), |x, y, z| frame.way(x, y, z), |x| frame.length(x));
+    let (p, w, l) = (|x, y, z| frame.point(x, y, z), |x, y, z| frame.vector(x, y, z), |x| frame.length(x));
     let rest = match shape {
         "sphere" => format!("center = {}\nradius = {}", p(0.0, 0.0, -5.0), l(0.75)),
         "quad" => {
@@ -236,8 +240,8 @@ fn lights_of(frame: Frame, lights: &[&str]) -> String {
         "quad" => format!(
             "[[quad]]\ncorner = {}\nu = {}\nv = {}\nmaterial = \"lamp\"\n",
             p(-0.5, 2.0, -5.5),
-            frame.way(1.0, 0.0, 0.0),
-            frame.way(0.0, 0.0, 1.0)
+            frame.vector(1.0, 0.0, 0.0),
+            frame.vector(0.0, 0.0, 1.0)
         ),
         _ => {
             format!("[[sphere]]\ncenter = {}\nradius = {}\nmaterial = \"lamp\"\n", p(1.5, 2.0, -4.0), l(0.25))

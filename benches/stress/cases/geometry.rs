@@ -12,20 +12,20 @@ pub(super) fn rows(extent: CaseSet) -> Vec<StressRow> {
     let counts: &[u32] = if extent == CaseSet::Short { &[1000] } else { &[1000, 1_000_000] };
     for &count in counts {
         rows.push(overlapping(count, "bvh"));
-        rows.push(nested(count.min(MOST_NESTED), "bvh"));
+        rows.push(nested(count.min(MAX_NESTED), "bvh"));
         if extent == CaseSet::Long {
-            rows.push(nested(count.min(MOST_NESTED), "kdtree"));
+            rows.push(nested(count.min(MAX_NESTED), "kdtree"));
         }
     }
     rows
 }
 
 /// Maximum number of nested spheres.
-const MOST_NESTED: u32 = 1_000_000;
+const MAX_NESTED: u32 = 1_000_000;
 
 const LAMP: &str = "[[light]]\nposition = [1, 2, 0]\nintensity = 9\n";
 
-fn of_mesh(text: String, render: &str) -> SceneFiles {
+fn scene_with_mesh(text: String, render: &str) -> SceneFiles {
     let scene = head(16, render)
         + CAMERA
         + "[materials]\nm = { diffuse = 0.6 }\n[[mesh]]\nfile = \"a.obj\"\nmaterial = \"m\"\nsmooth = false\n"
@@ -50,10 +50,10 @@ fn slivers() -> StressRow {
             (0..lines).flat_map(|line| (0..columns).map(move |column| line * (columns + 1) + column));
         let faces =
             squares.flat_map(|a| [[a, a + 1, a + columns + 2], [a, a + columns + 2, a + columns + 1]]);
-        of_mesh(mesh("obj", &points, &faces.collect::<Vec<_>>()), "")
+        scene_with_mesh(mesh("obj", &points, &faces.collect::<Vec<_>>()), "")
     };
     let pairs = vec![(wall(16_384, 1), wall(128, 128))];
-    StressRow::alike("wall of 32,768 slivers with aspect ratio 1 : 12,000", pairs, 1e-3).timed()
+    StressRow::matching("wall of 32,768 slivers with aspect ratio 1 : 12,000", pairs, 1e-3).timed()
 }
 
 /// Sixteen coplanar surfaces with the same material, compared with a single surface.
@@ -61,7 +61,7 @@ fn coplanar(kind: &str) -> StressRow {
     let layers = |count: usize| match kind {
         "mesh" => {
             let points = [(-4.0, -3.0), (4.0, -3.0), (4.0, 3.0), (-4.0, 3.0)].map(|(x, y)| point(x, y, -5.0));
-            of_mesh(mesh("obj", &points, &[[0, 1, 2], [0, 2, 3]].repeat(count)), "")
+            scene_with_mesh(mesh("obj", &points, &[[0, 1, 2], [0, 2, 3]].repeat(count)), "")
         }
         _ => {
             let layer = "[[quad]]\ncorner = [-4, -3, -5]\nu = [8, 0, 0]\nv = [0, 6, 0]\nmaterial = \"m\"\n";
@@ -71,7 +71,7 @@ fn coplanar(kind: &str) -> StressRow {
         }
     };
     let what = if kind == "mesh" { "mesh layers" } else { "quads" };
-    StressRow::alike(format!("16 coplanar {what} vs. one"), vec![(layers(16), layers(1))], 0.0)
+    StressRow::matching(format!("16 coplanar {what} vs. one"), vec![(layers(16), layers(1))], 0.0)
 }
 
 /// Needles as long as the scene and a thousandth as thick. Compares the two acceleration structures.
@@ -85,9 +85,9 @@ fn needles(accel: &str) -> StressRow {
         faces.push([3 * number, 3 * number + 1, 3 * number + 2]);
     }
     let text = mesh("obj", &points, &faces);
-    let by = |accel: &str| of_mesh(text.clone(), &format!("accel = \"{accel}\""));
+    let by = |accel: &str| scene_with_mesh(text.clone(), &format!("accel = \"{accel}\""));
     let other = if accel == "bvh" { "kdtree" } else { "bvh" };
-    StressRow::alike(
+    StressRow::matching(
         format!("20,000 needles with aspect ratio 1 : 1000, {accel} vs. {other}"),
         vec![(by(accel), by(other))],
         0.0,
@@ -114,7 +114,7 @@ fn overlapping(count: u32, accel: &str) -> StressRow {
     let (wide, narrow) = (2.0 * spacing, 0.25 * spacing);
     StressRow {
         figure: super::super::row::RowMeasure::Difference(0.0),
-        ..StressRow::alike(
+        ..StressRow::matching(
             format!("{count} overlapping spheres vs. mostly separate spheres"),
             vec![(spheres(wide, accel), spheres(narrow, accel))],
             1.0,
@@ -146,5 +146,5 @@ fn nested(count: u32, accel: &str) -> StressRow {
     };
     let all = spheres(count);
     let pairs = vec![(SceneFiles::new(all.clone()), SceneFiles::new(outermost(all)))];
-    StressRow::alike(format!("{count} nested spheres vs. only the outermost, {accel}"), pairs, 0.0)
+    StressRow::matching(format!("{count} nested spheres vs. only the outermost, {accel}"), pairs, 0.0)
 }

@@ -6,13 +6,13 @@ use super::super::row::RowMeasure;
 use super::{CAMERA, CaseSet, SceneFiles, StressRow, head};
 
 pub(super) fn rows(_: CaseSet) -> Vec<StressRow> {
-    let mut rows = vec![tiny("sphere"), tiny("quad"), tiny("disk"), vast()];
+    let mut rows = vec![tiny("sphere"), tiny("quad"), tiny("disk"), huge()];
     for (name, light) in POWERS {
         for times in [1e-9, 1e9] {
             rows.push(
                 StressRow {
                     figure: RowMeasure::Difference(1.0 / times),
-                    ..StressRow::alike(
+                    ..StressRow::matching(
                         format!("{name} with {times:e} times the power"),
                         vec![(powered(light, times), powered(light, 1.0))],
                         1e-6,
@@ -41,7 +41,7 @@ const POWERS: [(&str, &str); 6] = [
 ];
 
 /// A floor and a ball.
-const THINGS: &str = r#"
+const FLOOR_AND_BALL: &str = r#"
 [materials.floor]
 diffuse = 0.6
 [[quad]]
@@ -56,7 +56,7 @@ material = "floor"
 "#;
 
 fn powered(light: &str, power: f64) -> SceneFiles {
-    SceneFiles::new(head(64, "") + CAMERA + THINGS + &light.replace("POWER", &format!("{power:?}")))
+    SceneFiles::new(head(64, "") + CAMERA + FLOOR_AND_BALL + &light.replace("POWER", &format!("{power:?}")))
 }
 
 /// A light of size 1e-9 above the scene, compared with a point light with intensity radiance × projected
@@ -79,12 +79,13 @@ fn tiny(kind: &str) -> StressRow {
     let picture = |light: String| SceneFiles::new(head(64, "") + camera + receiver + &light);
     let case = picture(format!("[materials.lamp]\ndiffuse = 0\nemission = {radiance:?}\n{lamp}"));
     let twin = picture(format!("[[light]]\nposition = [0, 2, -5]\nintensity = {:?}\n", radiance * area));
-    StressRow::alike(format!("{kind} light of size 1e-9 vs. point light"), vec![(case, twin)], 1e-3).timed()
+    StressRow::matching(format!("{kind} light of size 1e-9 vs. point light"), vec![(case, twin)], 1e-3)
+        .timed()
 }
 
 /// A quad of size 2e9 fills the hemisphere above the floor, so E = πL, and a floor with reflectance 0.6 has
 /// radiance 0.6 L.
-fn vast() -> StressRow {
+fn huge() -> StressRow {
     let picture = |size: f64| {
         let lamp = format!(
             "[materials.lamp]\ndiffuse = 0\nemission = 1\n[[quad]]\ncorner = [{:?}, 2, {:?}]\nu = [{size:?}, 0, 0]\nv = [0, 0, {size:?}]\nmaterial = \"lamp\"\n",

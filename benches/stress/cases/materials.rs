@@ -11,8 +11,8 @@ pub(super) fn rows(_: CaseSet) -> Vec<StressRow> {
     let clear = |ior: &str| (signs("", CAMERA, &ball(ior)), signs("", CAMERA, ""));
     let white = |ior: &str| (furnace(64, CAMERA, &ball(ior)), furnace(64, CAMERA, &ball("1.5")));
     vec![
-        StressRow::alike("ball with IOR 1 vs. no ball", vec![clear("1")], 1e-3),
-        StressRow::alike("ball with IOR 1.000001 vs. no ball", vec![clear("1.000001")], 1e-3),
+        StressRow::matching("ball with IOR 1 vs. no ball", vec![clear("1")], 1e-3),
+        StressRow::matching("ball with IOR 1.000001 vs. no ball", vec![clear("1.000001")], 1e-3),
         StressRow::mean("ball with IOR 3 under uniform light", white("3"), 1.0, 1e-3).timed(),
         StressRow::mean("ball with IOR 1 under uniform light", white("1"), 1.0, 1e-3).timed(),
         StressRow::mean("ball with IOR 1.000001 under uniform light", white("1.000001"), 1.0, 1e-3).timed(),
@@ -32,7 +32,7 @@ fn wide_highlight() -> StressRow {
         SceneFiles::new(head(64, "") + CAMERA + &floor + "[[light]]\nposition = [0, 0, 0]\nintensity = 9\n")
     };
     let pair = (picture("diffuse = 0\nspecular = 0.6\nshininess = 0"), picture("diffuse = 0.6"));
-    StressRow::alike("Phong exponent 0 vs. diffuse", vec![pair], 1e-5).timed()
+    StressRow::matching("Phong exponent 0 vs. diffuse", vec![pair], 1e-5).timed()
 }
 
 /// With exponent 1e5, reflection is within 0.3° of the mirror direction. Compared with a mirror under uniform

@@ -369,7 +369,7 @@ choice! {
         /// Occasional lines.
         Plain = "plain",
         /// One JSON object per line. The key "event" is stage, asset, progress, written, done, failed or
-        /// cancelled.
+        /// canceled.
         Json = "json",
         /// Only errors and warnings.
         None = "none",

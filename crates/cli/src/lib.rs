@@ -81,9 +81,9 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> Exit {
         Some(Subcommand::Lsp { .. }) => commands::lsp::run(&console),
         Some(Subcommand::Doctor) => commands::doctor::run(&console),
         None => match lower::lower_args(args.render) {
-            Ok(order) => match message_if_mistyped_command(&order.scene) {
+            Ok(request) => match message_if_mistyped_command(&request.scene) {
                 Some(message) => console.print_error(Exit::WRONG, &message),
-                None => render(order, &console),
+                None => render(request, &console),
             },
             Err(message) => console.print_error(Exit::WRONG, &message),
         },
@@ -91,11 +91,15 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> Exit {
     console.final_exit_code(exit)
 }
 
-fn render(order: lower::RenderRequest, console: &Console) -> Exit {
-    match commands::info::report_image_instead_of_scene(&order.scene, order.reports_json_errors(), console) {
+fn render(request: lower::RenderRequest, console: &Console) -> Exit {
+    match commands::info::report_image_instead_of_scene(
+        &request.scene,
+        request.reports_json_errors(),
+        console,
+    ) {
         Some(exit) => exit,
-        None if order.is_once => once::run(&order, console),
-        None => live::run(order, console),
+        None if request.is_once => once::run(&request, console),
+        None => live::run(request, console),
     }
 }
 

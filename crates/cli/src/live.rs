@@ -31,37 +31,37 @@ const EXIT_TIMEOUT: Duration = Duration::from_secs(2);
 const NOT_WRITTEN: &str = "the image was not written: glimt exited first";
 
 /// Runs the terminal UI.
-pub(super) fn run(order: RenderRequest, console: &Console) -> Exit {
+pub(super) fn run(request: RenderRequest, console: &Console) -> Exit {
     // Restore a scene whose replacement was interrupted.
-    held::recover_backup(&order.scene);
-    if let Some(absent) = scene_not_found_error(&order.scene) {
+    held::recover_backup(&request.scene);
+    if let Some(absent) = scene_not_found_error(&request.scene) {
         console.print_diagnostics(&[absent]);
         return Exit::WRONG;
     }
-    match run_terminal_ui(order, console) {
+    match run_terminal_ui(request, console) {
         Ok(exit) => exit,
         Err((exit, message)) => console.print_error(exit, &message),
     }
 }
 
-fn run_terminal_ui(order: RenderRequest, console: &Console) -> Result<Exit, (Exit, String)> {
+fn run_terminal_ui(request: RenderRequest, console: &Console) -> Result<Exit, (Exit, String)> {
     let no_thread = |error: std::io::Error| (Exit::FAILED, describe_start_failure(1, false, &error));
     let (contents, events) = (Arc::<FileHashCache>::default(), EventQueue::default());
     let changes = events.watcher_sender();
-    let watcher = Watcher::start(order.poll, Arc::clone(&contents), move |change| changes.send(change))
+    let watcher = Watcher::start(request.poll, Arc::clone(&contents), move |change| changes.send(change))
         .map_err(no_thread)?;
     let writes = SharedWriteLog::default();
     let listener = WorkerListener { watcher, writes: writes.clone(), ui: events.worker_sender() };
-    let worker = start(order.nice, Arc::clone(&contents), move |event| listener.handle_event(event))
+    let worker = start(request.nice, Arc::clone(&contents), move |event| listener.handle_event(event))
         .map_err(no_thread)?;
     let (remote, asked) = (worker.command_sender(), writes.clone());
     let options = Options {
-        scene: order.scene,
-        overrides: order.overrides,
-        color: order.color,
-        preview: order.preview,
+        scene: request.scene,
+        overrides: request.overrides,
+        color: request.color,
+        preview: request.preview,
         cell_aspect: None,
-        notify_after: Duration::try_from_secs_f64(order.notify_after).ok().filter(|time| !time.is_zero()),
+        notify_after: Duration::try_from_secs_f64(request.notify_after).ok().filter(|time| !time.is_zero()),
         commands: Box::new(move |command| {
             match command {
                 Command::Write => asked.clear_for_write_command(),
@@ -241,7 +241,7 @@ impl SharedWriteLog {
                     log.image_files = Some(log.read.1.clone());
                 }
             }
-            Event::Failed { .. } | Event::Cancelled { .. } => log.is_last_stage = false,
+            Event::Failed { .. } | Event::Canceled { .. } => log.is_last_stage = false,
             Event::Checkpoint { news, .. } if has_left => match news {
                 CheckpointUpdate::Written { path } => log.checkpoint = Some(Ok(path.clone())),
                 CheckpointUpdate::Failed { message } => log.checkpoint = Some(Err(message.clone())),
@@ -450,7 +450,7 @@ mod tests {
     }
 
     #[test]
-    fn image_written_before_exit_but_not_shown_is_reported() {
+    fn unshown_image_written_before_exit_is_reported() {
         let writes = SharedWriteLog::default();
         let written = || {
             let path = "a.png".into();

@@ -158,7 +158,7 @@ mod tests {
     use crate::args::{Args, Subcommand};
     use crate::choice::Choice;
     use crate::film::Rect;
-    use crate::math::limits::LARGEST;
+    use crate::math::limits::MAX_MAGNITUDE;
     use crate::pipeline::settings::{CheckpointSettings, ResumeMode, ViewMode};
     use crate::scene::description::{self, render_keys};
     use crate::scene::keys::limits::Limits;
@@ -176,17 +176,17 @@ mod tests {
 
     #[test]
     fn default_arguments_change_no_settings() {
-        let order = lowered("a.toml").expect("valid arguments");
+        let request = lowered("a.toml").expect("valid arguments");
         let checkpoints = CheckpointSettings { seconds: 60.0, resume: ResumeMode::IfSame, are_kept: false };
-        assert_eq!(order.overrides, Overrides { checkpoints, ..Overrides::default() });
+        assert_eq!(request.overrides, Overrides { checkpoints, ..Overrides::default() });
         let once = lowered("a.toml --once").expect("valid arguments").overrides.checkpoints;
         assert_eq!(once, CheckpointSettings { resume: ResumeMode::No, ..checkpoints });
-        assert!(!order.is_once && !order.poll);
+        assert!(!request.is_once && !request.poll);
     }
 
     #[test]
     fn every_option_is_lowered() {
-        let order = lowered(
+        let request = lowered(
             "a.toml --once --set a.b=1 --set a.c=x -o a.png --output b.exr --width 3 --height 4 --samples 5 --error 0.02 --time 0.5 --max-depth 0 \
              --integrator path --shadows hard --clamp 2.5 --photons on --dof off --accel bvh --view normal --seed 7 \
              --threads 2 --crop 1,2,3,4 --bit-depth 16 --report r.json --force --progress json --color 256 --poll \
@@ -219,10 +219,10 @@ mod tests {
             checkpoints: CheckpointSettings { seconds: 5.0, resume: ResumeMode::Asked, are_kept: true },
             ..Default::default()
         };
-        assert_eq!(order.overrides, expected);
-        assert!(order.is_once && order.poll);
-        assert_eq!((order.nice, order.notify_after), (3, 7.0));
-        assert_eq!((order.progress, order.color), (ProgressMode::Json, ColorDepthChoice::Indexed256));
+        assert_eq!(request.overrides, expected);
+        assert!(request.is_once && request.poll);
+        assert_eq!((request.nice, request.notify_after), (3, 7.0));
+        assert_eq!((request.progress, request.color), (ProgressMode::Json, ColorDepthChoice::Indexed256));
     }
 
     #[test]
@@ -290,7 +290,7 @@ mod tests {
                     vec![least as i64 - 1, most as i64 + 1],
                 ),
                 ValueKind::Number(Limits::AtLeast(least)) => {
-                    let ends = [least as f32, LARGEST as f32];
+                    let ends = [least as f32, MAX_MAGNITUDE as f32];
                     (ends.map(|end| end.to_string()).to_vec(), vec![least as i64 - 1])
                 }
                 ValueKind::Words(values) => {
@@ -300,8 +300,8 @@ mod tests {
             };
             let refused = refused.iter().map(i64::to_string).chain(["another".to_owned()]);
             for value in accepted {
-                let order = lowered(&format!("a.toml --{name} {value}")).expect(&name);
-                assert_ne!(order.overrides, Overrides::default(), "--{name} {value} has no effect");
+                let request = lowered(&format!("a.toml --{name} {value}")).expect(&name);
+                assert_ne!(request.overrides, Overrides::default(), "--{name} {value} has no effect");
             }
             for value in refused {
                 assert!(lowered(&format!("a.toml --{name} {value}")).is_err(), "--{name} {value}");
@@ -320,8 +320,8 @@ mod tests {
     #[test]
     fn every_view_has_a_name() {
         for &view in ViewMode::ALL {
-            let order = lowered(&format!("a.toml --view {}", view.name())).expect("valid arguments");
-            assert_eq!(order.overrides.view, Some(view));
+            let request = lowered(&format!("a.toml --view {}", view.name())).expect("valid arguments");
+            assert_eq!(request.overrides.view, Some(view));
         }
     }
 }

@@ -30,20 +30,20 @@ const WRITE_TIMEOUT: Duration = Duration::from_secs(1);
 const TICK: Duration = Duration::from_millis(50);
 
 /// Runs `--once`.
-pub(super) fn run(order: &RenderRequest, console: &Console) -> Exit {
+pub(super) fn run(render_request: &RenderRequest, console: &Console) -> Exit {
     // Lower the priority before starting threads, because threads inherit it.
-    priority::lower_priority_including_spawned_threads(order.nice);
+    priority::lower_priority_including_spawned_threads(render_request.nice);
     let (worker, events) = match start_with_channel(0) {
         Ok(started) => started,
         Err(error) => return console.print_error(Exit::FAILED, &describe_start_failure(1, false, &error)),
     };
     let remote = worker.command_sender();
-    let is_again = AtomicBool::new(false);
+    let was_signaled = AtomicBool::new(false);
     let ended = match signals::install_signal_handlers(move || {
         // Stop rendering and save a checkpoint. Finish a file that is being written unless a second signal
         // arrives.
         remote.send(Command::Suspend);
-        if is_again.swap(true, Ordering::Relaxed) {
+        if was_signaled.swap(true, Ordering::Relaxed) {
             remote.send(Command::Cancel);
         }
     }) {
@@ -52,7 +52,7 @@ pub(super) fn run(order: &RenderRequest, console: &Console) -> Exit {
     };
     let mut deadline = ExitDeadline::default();
     let mut written = CompletedWrites::default();
-    let has_checkpoints = order.overrides.checkpoints.seconds > 0.0;
+    let has_checkpoints = render_request.overrides.checkpoints.seconds > 0.0;
     let mut is_over = |is_writing: bool| {
         let now = Instant::now();
         // Without checkpoints, the image being written would be lost.
@@ -64,15 +64,16 @@ pub(super) fn run(order: &RenderRequest, console: &Console) -> Exit {
     };
     let (mut exit, mut is_whole) = (Exit::DONE, false);
     // Use one reporter per image to clear the progress of the previous frame.
-    let reporter = || progress::create_reporter(order.progress, order.overrides.time_seconds, console);
+    let reporter =
+        || progress::create_reporter(render_request.progress, render_request.overrides.time_seconds, console);
     let mut image_reporter = reporter();
-    for overrides in overrides_per_turntable_frame(&order.overrides) {
+    for overrides in overrides_per_turntable_frame(&render_request.overrides) {
         let turn = overrides.turn;
         if let Some(TurntableFrame { number, of }) = turn.filter(|_| image_reporter.allows_text_results()) {
             console.print_line_to_stderr(&format!("frame {} of {of}", number + 1));
         }
         let generation = turn.map_or(1, |turn| u64::from(turn.number) + 1);
-        let request = Request::new(generation, order.scene.clone(), overrides.clone());
+        let request = Request::new(generation, render_request.scene.clone(), overrides.clone());
         worker.send(Command::Render(Box::new(Request { write: WriteRequirement::Must, ..request })));
         image_reporter = reporter();
         let reporter = &mut *image_reporter;
@@ -245,7 +246,7 @@ fn handle_events(
                     .for_each(|message| console.print_line_to_stderr(&format!("error: {message}")));
                 return report_failure(&failure, console);
             }
-            Event::Cancelled { .. } => return Exit::FAILED,
+            Event::Canceled { .. } => return Exit::FAILED,
             Event::Started { .. }
             | Event::Stage { .. }
             | Event::Files { .. }
@@ -345,12 +346,15 @@ fn argument_warning(message: &str, help: &str) -> Diagnostic {
 
 /// Returns warnings about options that have no effect. The terminal UI has its own messages for these
 /// options.
-fn ineffective_option_warnings(asked: &Overrides, settings: &EffectiveSettingsSummary) -> Vec<Diagnostic> {
-    let dof = (asked.dof == Some(true) && !settings.dof).then(|| {
+fn ineffective_option_warnings(
+    requested: &Overrides,
+    settings: &EffectiveSettingsSummary,
+) -> Vec<Diagnostic> {
+    let dof = (requested.dof == Some(true) && !settings.dof).then(|| {
         let help = "set `aperture` in [camera], for example to 0.1";
         argument_warning("--dof on has no effect: the camera's aperture is 0", help)
     });
-    let photons = (asked.photons == Some(true) && !settings.photons).then(|| {
+    let photons = (requested.photons == Some(true) && !settings.photons).then(|| {
         let help = "use `--integrator whitted`";
         argument_warning("--photons on has no effect: photons work with whitted only", help)
     });

@@ -70,7 +70,7 @@ pub struct PickedPixel {
     /// Column and row of the pixel.
     pub pixel: [u32; 2],
     /// The visible object, or `None` if the ray hits nothing.
-    pub thing: Option<PickedObject>,
+    pub object: Option<PickedObject>,
     /// Current linear pixel color, or `None` before the first sample.
     pub color: Option<[f32; 3]>,
 }

@@ -113,12 +113,12 @@ impl<N: Hash + Eq, T> RequestCache for CacheOfNamedValues<N, T> {
     }
 }
 
-/// Returns the earliest request whose unused values fit into `most_bytes` together with the unused values of
+/// Returns the earliest request whose unused values fit into `max_bytes` together with the unused values of
 /// all later requests. A request's values are all evicted together, because half a scene is of little use and
 /// trees keep their meshes alive.
 pub(super) fn oldest_request_to_keep(
     eviction_candidates: impl IntoIterator<Item = EvictionCandidate>,
-    most_bytes: usize,
+    max_bytes: usize,
 ) -> u64 {
     let mut bytes_of = BTreeMap::<u64, usize>::new();
     for (request, bytes) in eviction_candidates {
@@ -127,7 +127,7 @@ pub(super) fn oldest_request_to_keep(
     let mut total = 0;
     let has_room = |(_, bytes): &(&u64, &usize)| {
         total += **bytes;
-        total <= most_bytes
+        total <= max_bytes
     };
     bytes_of.iter().rev().take_while(has_room).last().map_or(u64::MAX, |(request, _)| *request)
 }
@@ -152,10 +152,10 @@ mod tests {
 
     const NOTHING: usize = 0;
 
-    /// Ends a request and evicts unused values until the remaining unused values fit into `most_bytes`.
-    fn end_request(pool: &mut CacheOfNamedValues<&str, i32>, success: bool, request: u64, most_bytes: usize) {
+    /// Ends a request and evicts unused values until the remaining unused values fit into `max_bytes`.
+    fn end_request(pool: &mut CacheOfNamedValues<&str, i32>, success: bool, request: u64, max_bytes: usize) {
         pool.record_request_usage(success, request);
-        pool.evict_unused_before(oldest_request_to_keep(pool.eviction_candidates(), most_bytes));
+        pool.evict_unused_before(oldest_request_to_keep(pool.eviction_candidates(), max_bytes));
     }
 
     #[test]

@@ -99,7 +99,7 @@ impl IncrementalSceneChecker {
             Ok(assets) if findings.errors.is_empty() => Ok((assets, findings.warnings)),
             Ok(_) => Err(findings.take_diagnostics_as_failure()),
             Err(AbortReason::Failed(failure)) => Err(failure),
-            Err(AbortReason::Cancelled) => Err(Failure::Work("cancelled".to_owned())),
+            Err(AbortReason::Canceled) => Err(Failure::Work("canceled".to_owned())),
         }
     }
 

@@ -101,7 +101,7 @@ mod tests {
     }
 
     #[test]
-    fn failed_or_cancelled_render_returns_no_image() {
+    fn failed_or_canceled_render_returns_no_image() {
         let token = CancelToken::new();
         let missing = HeadlessSession::default().render_in_memory(
             Path::new("none.toml"),
@@ -113,7 +113,7 @@ mod tests {
         let scene = folder.path().join("a.toml");
         std::fs::write(&scene, SCENE).expect("written");
         token.cancel();
-        let cancelled = HeadlessSession::default().render_in_memory(&scene, &Overrides::default(), &token);
-        assert!(matches!(cancelled, Err(AbortReason::Cancelled)));
+        let canceled = HeadlessSession::default().render_in_memory(&scene, &Overrides::default(), &token);
+        assert!(matches!(canceled, Err(AbortReason::Canceled)));
     }
 }

@@ -143,7 +143,7 @@ fn light_descriptions_key(scene: &Scene, of: &FingerprintContext<'_>) -> Fingerp
                     .add(&material.emission, of)
                     .add(&material.opacity, of);
                 key.add(&material.emitter_coat().cloned(), of);
-                // A blend emits like its parts.
+                // Blends emit through their parts, so add the whole material.
                 if !material.kind.parts().is_empty() {
                     key.add(material, of);
                 }
@@ -187,7 +187,7 @@ pub(crate) fn surfaces_and_lights_key(
 ) -> Fingerprint {
     // A new field of the scene must be added to one of the keys. This key includes the keys of the lights and
     // of the objects' shapes. The settings, the camera and the photons have separate keys. The context and
-    // `textures` contain the files and their parts. The instances only locate objects in the scene file.
+    // The files and their parts are in `textures`. Instances only locate objects in the scene file.
     let Scene {
         objects,
         materials,

@@ -14,13 +14,13 @@ use crate::scene::description::Accel;
 use crate::system::memory::{MemoryLimit, ulimit_or_cgroup_limit};
 
 /// Bytes used by the program itself.
-const PROGRAM: u64 = 24 << 20;
+const PROGRAM_BYTES: u64 = 24 << 20;
 /// Stack and buffer size per render thread, in bytes. Rough glass needs the most.
-const THREAD: u64 = 640 << 10;
+const THREAD_BYTES: u64 = 640 << 10;
 /// Bytes per object in the acceleration structures.
-const OBJECT: u64 = 250;
+const OBJECT_BYTES: u64 = 250;
 /// Bytes per emitted photon while the maps for a pass are being built.
-const PHOTON: u64 = 220;
+const PHOTON_BYTES: u64 = 220;
 /// Maximum size of the cached photon maps in bytes.
 const KEPT_MAPS: u64 = 128 << 20;
 
@@ -55,9 +55,9 @@ impl MemoryEstimate {
             plan.crop.unwrap_or(whole),
             sample_summation_order(plan),
         );
-        let threads = plan.limits.threads as u64 * THREAD;
+        let threads = plan.limits.threads as u64 * THREAD_BYTES;
         let mut items = vec![
-            ("the program", PROGRAM),
+            ("the program", PROGRAM_BYTES),
             ("the film", film),
             ("the image", picture),
             ("the threads", threads),
@@ -86,12 +86,12 @@ impl MemoryEstimate {
         let of_meshes: u64 = meshes.iter().map(|kept| kept.mesh.mesh.memory_bytes() as u64).sum();
         let triangles: u64 = meshes.iter().map(|kept| kept.mesh.mesh.triangles.len() as u64).sum();
         items.push(("meshes", of_meshes));
-        items.push(("trees", triangles * triangle + scene.objects.len() as u64 * OBJECT));
+        items.push(("trees", triangles * triangle + scene.objects.len() as u64 * OBJECT_BYTES));
         items.push(("textures", assets.textures.memory_bytes));
         if let Some(PhotonSettings { count, .. }) = plan.settings.without_ineffective_settings().photons {
             let kept =
-                (u64::from(count) * u64::from(plan.settings.render.samples)).saturating_mul(PHOTON / 4);
-            items.push(("photons", u64::from(count) * PHOTON + kept.min(KEPT_MAPS)));
+                (u64::from(count) * u64::from(plan.settings.render.samples)).saturating_mul(PHOTON_BYTES / 4);
+            items.push(("photons", u64::from(count) * PHOTON_BYTES + kept.min(KEPT_MAPS)));
         }
         Self(items)
     }
@@ -229,7 +229,7 @@ mod tests {
             let overrides = Overrides { threads: Some(threads), ..Overrides::default() };
             MemoryEstimate::for_image(&planned(&overrides)).bytes()
         };
-        assert_eq!(bytes(65) - bytes(1), 64 * THREAD);
+        assert_eq!(bytes(65) - bytes(1), 64 * THREAD_BYTES);
     }
 
     #[test]

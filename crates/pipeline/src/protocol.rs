@@ -304,7 +304,7 @@ pub enum Event {
         end: LastValidSceneRenderOutcome,
     },
     /// The request was canceled by a newer request or by [`Command::Cancel`].
-    Cancelled {
+    Canceled {
         /// Request number.
         generation: u64,
     },

@@ -101,8 +101,8 @@ impl QueryContext {
         let pixel = |at: f64, side: u32| ((at * f64::from(side)).max(0.0) as u32).min(side - 1);
         let (x, y) = (pixel(spot.x, width), pixel(spot.y, height));
         let color = state.and_then(|state| state.film.pixel(FilmQuantity::Radiance, x, y));
-        let thing = self.object_at([x, y]);
-        PickedPixel { pixel: [x, y], thing, color: color.map(|color| color.to_array()) }
+        let object = self.object_at([x, y]);
+        PickedPixel { pixel: [x, y], object, color: color.map(|color| color.to_array()) }
     }
 
     fn object_at(&self, pixel: [u32; 2]) -> Option<PickedObject> {

@@ -29,7 +29,7 @@ pub(super) struct OutputTarget<'a> {
 impl<'a> OutputTarget<'a> {
     /// Creates the target for one of the plan's images.
     pub(super) fn for_image(plan: &RenderPlan, path: &'a Path) -> Self {
-        Self { path, kind: TargetKind::Picture(plan.outputs.named_by) }
+        Self { path, kind: TargetKind::Image(plan.outputs.named_by) }
     }
 
     /// Creates the target for a report.
@@ -40,7 +40,7 @@ impl<'a> OutputTarget<'a> {
 
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum TargetKind {
-    Picture(OutputNameSource),
+    Image(OutputNameSource),
     Report,
 }
 
@@ -81,7 +81,7 @@ fn linked_frame_conflicts(plan: &RenderPlan) -> Vec<Diagnostic> {
         match seen.entry(identity) {
             Entry::Vacant(new) => drop(new.insert(path)),
             Entry::Occupied(twin) if *twin.get() != path => {
-                let target = OutputTarget { path, kind: TargetKind::Picture(plan.outputs.named_by) };
+                let target = OutputTarget { path, kind: TargetKind::Image(plan.outputs.named_by) };
                 found.push(same_file_error(plan, target, twin.get()));
             }
             Entry::Occupied(_) => {}
@@ -196,7 +196,7 @@ fn input_error(plan: &RenderPlan, target: OutputTarget<'_>, input: &ProtectedInp
 fn same_file_error(plan: &RenderPlan, target: OutputTarget<'_>, twin: &Path) -> Diagnostic {
     let (name, twin) = (target.path.display(), twin.display());
     let message = match target.kind {
-        TargetKind::Picture(_) => format!("the outputs {twin} and {name} are the same file"),
+        TargetKind::Image(_) => format!("the outputs {twin} and {name} are the same file"),
         TargetKind::Report => format!("the image {twin} and the report {name} are the same file"),
     };
     command_line_error(message, Some(format!("use separate files: {}", conflict_help(plan, target.kind))))
@@ -206,7 +206,7 @@ fn same_file_error(plan: &RenderPlan, target: OutputTarget<'_>, twin: &Path) -> 
 fn foreign_file_error(plan: &RenderPlan, target: OutputTarget<'_>, at: &Path) -> Option<Diagnostic> {
     let (name, remedy) = (target.path.display(), conflict_help(plan, target.kind));
     let (replaced, help) = match target.kind {
-        TargetKind::Picture(OutputNameSource::Default) => {
+        TargetKind::Image(OutputNameSource::Default) => {
             let own = match &plan.outputs.default_names {
                 Some(names) => format!("'{}'", names.display()),
                 None => name.to_string(),
@@ -224,7 +224,7 @@ fn foreign_file_error(plan: &RenderPlan, target: OutputTarget<'_>, at: &Path) ->
             let replaced = json_replace_check(at, "a report", ReportRecognitionFields::have_all_stages);
             (replaced, format!("{remedy}; --force replaces it"))
         }
-        TargetKind::Picture(OutputNameSource::CommandLine | OutputNameSource::Scene) => {
+        TargetKind::Image(OutputNameSource::CommandLine | OutputNameSource::Scene) => {
             return other_part_error(plan, target, at);
         }
     };
@@ -255,17 +255,17 @@ fn other_part_error(plan: &RenderPlan, target: OutputTarget<'_>, at: &Path) -> O
 
 fn conflict_help(plan: &RenderPlan, kind: TargetKind) -> &'static str {
     match kind {
-        TargetKind::Picture(OutputNameSource::Default) if plan.turn.is_some() => {
+        TargetKind::Image(OutputNameSource::Default) if plan.turn.is_some() => {
             "choose other names with -o 'NAME_####.png'"
         }
-        TargetKind::Picture(OutputNameSource::Default) if has_model_extension(&plan.path) => {
+        TargetKind::Image(OutputNameSource::Default) if has_model_extension(&plan.path) => {
             "name a file with -o FILE"
         }
-        TargetKind::Picture(OutputNameSource::CommandLine) => "name another file with -o FILE",
-        TargetKind::Picture(OutputNameSource::Scene) => {
+        TargetKind::Image(OutputNameSource::CommandLine) => "name another file with -o FILE",
+        TargetKind::Image(OutputNameSource::Scene) => {
             "name another file with -o FILE, or as `output` in [render]"
         }
-        TargetKind::Picture(OutputNameSource::Default) => {
+        TargetKind::Image(OutputNameSource::Default) => {
             "name a file with -o FILE, or with `output = \"FILE\"` in [render]"
         }
         TargetKind::Report => "name another file with --report FILE.json",

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use rayon::ThreadPool;
 
-use crate::control::{CancelToken, Cancelled};
+use crate::control::{CancelToken, Canceled};
 use crate::film::{Film, SelectedPixels, TILE_SIZE, TileSamples};
 use crate::integrators::{PhotonMaps, RayCounters, RenderSettings, render_tile_with_layers};
 use crate::system::cpu_time::thread_cpu_seconds;
@@ -22,14 +22,14 @@ pub(super) type TileKernel = fn(
     SelectedPixels,
     Range<u32>,
     &CancelToken,
-) -> Result<(TileSamples, RayCounters), Cancelled>;
+) -> Result<(TileSamples, RayCounters), Canceled>;
 
 /// Maximum time between calls to the callback.
 pub(super) const TICK: Duration = Duration::from_millis(20);
 
 /// Minimum time between two reports from a thread. Waking the calling thread takes longer than the smallest
 /// jobs.
-const AT_ONCE: Duration = Duration::from_micros(300);
+const MIN_REPORT_INTERVAL: Duration = Duration::from_micros(300);
 
 /// State shared by all jobs.
 #[derive(Clone, Copy)]
@@ -71,7 +71,7 @@ impl TileJob {
 }
 
 impl Tracer<'_> {
-    fn trace_tile(&self, job: &TileJob) -> Result<(TileSamples, TraceCost), Cancelled> {
+    fn trace_tile(&self, job: &TileJob) -> Result<(TileSamples, TraceCost), Canceled> {
         let Self { kernel, world, settings, token, photons, first, layers, .. } = *self;
         let samples = first + job.samples.start..first + job.samples.end;
         let begin = thread_cpu_seconds();
@@ -91,13 +91,13 @@ impl Tracer<'_> {
     /// It returns whether to continue. Jobs that have already started are always finished.
     ///
     /// # Errors
-    /// Returns [`Cancelled`] if the token is canceled.
+    /// Returns [`Canceled`] if the token is canceled.
     pub(super) fn run_all_jobs_in_parallel<K: Send>(
         &self,
         jobs: &[TileJob],
         keep: impl Fn(&TileJob, TileSamples) -> K + Sync,
         mut each: impl FnMut(Option<(&TileJob, K, TraceCost)>) -> bool,
-    ) -> Result<(), Cancelled> {
+    ) -> Result<(), Canceled> {
         let (next, stopped) = (AtomicUsize::new(0), AtomicBool::new(false));
         let threads = self.pool.current_num_threads();
         // Bound the channel so that results do not pile up while a preview is created.
@@ -114,7 +114,7 @@ impl Tracer<'_> {
                         && let Ok((samples, cost)) = self.trace_tile(job)
                     {
                         done.push((job, keep(job, samples), cost));
-                        if since.elapsed() >= AT_ONCE {
+                        if since.elapsed() >= MIN_REPORT_INTERVAL {
                             if sender.send(std::mem::take(&mut done)).is_err() {
                                 return;
                             }
@@ -141,7 +141,7 @@ impl Tracer<'_> {
             }
         });
         // Do not call `check_pause_and_cancel`. It blocks while work is paused, which would delay commands.
-        if self.token.is_cancelled() { Err(Cancelled) } else { Ok(()) }
+        if self.token.is_canceled() { Err(Canceled) } else { Ok(()) }
     }
 }
 
@@ -167,9 +167,9 @@ pub(super) fn samples_after_next_pass(done: u32, total: u32, pixels: usize) -> u
 
 /// Returns the number of samples per pixel in the longest pass.
 fn max_pass_samples(pixels: usize) -> u32 {
-    const LONGEST: usize = 32;
+    const MAX_PASS_SAMPLES: usize = 32;
     const TILE: usize = (TILE_SIZE * TILE_SIZE) as usize;
-    (LONGEST * (TILE / pixels.clamp(1, TILE))) as u32
+    (MAX_PASS_SAMPLES * (TILE / pixels.clamp(1, TILE))) as u32
 }
 
 /// Estimates the number of jobs needed to take a pixel from `done` to `total` samples using

@@ -127,9 +127,9 @@ pub struct CommandSender {
 struct Mailbox {
     request: Option<Box<Request>>,
     write: bool,
-    /// Whether a write order is postponed until the pending request runs.
+    /// Whether a write command is postponed until the pending request runs.
     is_write_postponed: bool,
-    /// Whether a write order arrived after the pending request and therefore applies to it.
+    /// Whether a write command arrived after the pending request and therefore applies to it.
     is_write_of_waiting: bool,
     /// The current request's overrides that the user can change with keys.
     shown: KeyOverrides,
@@ -181,13 +181,13 @@ impl CommandSender {
                 mailbox.token.cancel();
                 mailbox.writing.cancel();
                 let dropped = mailbox.request.take();
-                self.report_cancelled(dropped);
+                self.report_canceled(dropped);
             }
             Command::Suspend => {
                 mailbox.suspended = true;
                 mailbox.token.cancel();
                 let dropped = mailbox.request.take();
-                self.report_cancelled(dropped);
+                self.report_canceled(dropped);
             }
             Command::Pause(paused) => {
                 mailbox.paused = paused;
@@ -206,7 +206,7 @@ impl CommandSender {
     /// Replaces the pending request unless the pending one is newer. Requests may arrive in any order.
     fn replace_older_pending_request(&self, mailbox: &mut Mailbox, request: Box<Request>) {
         if request.generation < mailbox.newest {
-            return self.report_cancelled(Some(request));
+            return self.report_canceled(Some(request));
         }
         mailbox.newest = request.generation;
         mailbox.token.cancel();
@@ -215,12 +215,12 @@ impl CommandSender {
         }
         (mailbox.paused, mailbox.preview) = (false, None);
         let replaced = mailbox.request.replace(request);
-        self.report_cancelled(replaced);
+        self.report_canceled(replaced);
     }
 
-    fn report_cancelled(&self, request: Option<Box<Request>>) {
+    fn report_canceled(&self, request: Option<Box<Request>>) {
         if let Some(request) = request {
-            (self.listener)(Event::Cancelled { generation: request.generation });
+            (self.listener)(Event::Canceled { generation: request.generation });
         }
     }
 
@@ -228,9 +228,9 @@ impl CommandSender {
         self.mailbox.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Postpones a write order until the pending request runs if the order was meant for that request, or if
-    /// the current image is incomplete and the pending request has the same settings. Returns whether the
-    /// order was postponed.
+    /// Postpones a write command until the pending request runs if the command was meant for that request, or
+    /// if the current image is incomplete and the pending request has the same settings. Returns whether the
+    /// command was postponed.
     fn try_postpone_write_to_pending(&self, can_write: bool) -> bool {
         let mut mailbox = self.lock();
         let is_meant = mailbox.is_write_of_waiting;
@@ -244,7 +244,7 @@ impl CommandSender {
     fn wait_for_next_task(&self) -> Task {
         let mut mailbox = self.lock();
         loop {
-            // Carry out a write order that arrived before the quit command.
+            // Carry out a write command that arrived before the quit command.
             if mailbox.write && !(mailbox.is_write_postponed && mailbox.request.is_some()) {
                 mailbox.write = false;
                 return Task::Write;
@@ -416,7 +416,7 @@ mod tests {
         remote.send(render(2));
         // The user presses the key while the first request is still ending.
         remote.send(Command::Pause(true));
-        assert!(ending.is_cancelled());
+        assert!(ending.is_canceled());
         let second = token(&remote);
         assert!(second.is_paused());
         remote.send(Command::Pause(false));
@@ -434,14 +434,14 @@ mod tests {
         remote.send(render(2));
         remote.send(Command::Write);
         remote.send(Command::Quit);
-        assert!(token.is_cancelled());
+        assert!(token.is_canceled());
         assert!(matches!(remote.wait_for_next_task(), Task::Write));
         assert!(!remote.try_postpone_write_to_pending(false), "no request should be pending");
         assert!(matches!(remote.wait_for_next_task(), Task::Quit));
     }
 
     #[test]
-    fn write_stage_is_cancelled_only_by_newer_image() {
+    fn write_stage_is_canceled_only_by_newer_image() {
         let remote = silent_sender();
         let begin = |number| {
             remote.send(render(number));
@@ -455,19 +455,19 @@ mod tests {
         assert!(token.is_paused() && !writing.is_paused());
         remote.send(render(2));
         assert!(
-            token.is_cancelled() && !writing.is_cancelled(),
+            token.is_canceled() && !writing.is_canceled(),
             "a request without output should not cancel writing"
         );
         let Command::Render(request) = render(3) else { panic!("a request") };
         remote.send(Command::Render(Box::new(Request { write: WriteRequirement::Try, ..*request })));
-        assert!(writing.is_cancelled());
+        assert!(writing.is_canceled());
         let (token, writing) = begin(4);
         remote.send(Command::Quit);
-        assert!(token.is_cancelled() && !writing.is_cancelled());
+        assert!(token.is_canceled() && !writing.is_canceled());
     }
 
     #[test]
-    fn write_order_does_not_apply_to_another_view() {
+    fn write_command_does_not_apply_to_another_view() {
         let remote = silent_sender();
         remote.send(render(1));
         let _ = token(&remote);
@@ -478,32 +478,35 @@ mod tests {
         assert!(matches!(remote.wait_for_next_task(), Task::Write));
         assert!(
             !remote.try_postpone_write_to_pending(false),
-            "the order should not be postponed, so that an error is reported"
+            "the command should not be postponed, so that an error is reported"
         );
-        // An order sent after the view was requested applies to the view, even if the first image is
+        // A command sent after the view was requested applies to the view, even if the first image is
         // complete.
         remote.send(Command::Write);
-        assert!(!remote.wants_write() && !remote.take_write(), "the ending request should ignore the order");
+        assert!(
+            !remote.wants_write() && !remote.take_write(),
+            "the ending request should ignore the command"
+        );
         assert!(matches!(remote.wait_for_next_task(), Task::Write));
         assert!(remote.try_postpone_write_to_pending(true));
     }
 
     #[test]
-    fn pending_orders_are_handled_in_sequence() {
+    fn pending_commands_are_handled_in_sequence() {
         let remote = silent_sender();
         remote.send(render(1));
         remote.send(Command::Write);
         remote.send(Command::Preview(None));
         assert!(
             matches!(remote.wait_for_next_task(), Task::Write),
-            "the order should apply to the shown image first"
+            "the command should apply to the shown image first"
         );
         assert!(
             remote.try_postpone_write_to_pending(false),
-            "the order should be postponed while the image is incomplete"
+            "the command should be postponed while the image is incomplete"
         );
         assert!(matches!(remote.wait_for_next_task(), Task::Render(..)));
-        assert!(remote.take_write(), "the request should take the order");
+        assert!(remote.take_write(), "the request should take the command");
         assert!(!remote.take_write());
         assert!(matches!(remote.wait_for_next_task(), Task::Preview(None, _)));
         assert!(!remote.try_postpone_write_to_pending(false), "no request should be pending");

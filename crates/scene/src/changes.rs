@@ -6,7 +6,7 @@ mod keys;
 use super::sanitize::escape_and_truncate;
 
 /// Maximum size of scenes to compare, in bytes. Larger scenes are not edited by hand.
-pub const MOST_COMPARED_BYTES: usize = 4 << 20;
+pub const MAX_COMPARED_BYTES: usize = 4 << 20;
 
 /// Maximum number of characters shown per line.
 const MAX_LINE_CHARS: usize = 40;
@@ -15,7 +15,7 @@ const MAX_LINE_CHARS: usize = 40;
 /// the same syntax as in `--set`. If no key differs or a version is not valid TOML, lists the changed lines
 /// instead. Returns an empty list if the versions are equal or too large.
 pub fn list_changes(before: &str, after: &str) -> Vec<String> {
-    if before == after || before.len().max(after.len()) > MOST_COMPARED_BYTES {
+    if before == after || before.len().max(after.len()) > MAX_COMPARED_BYTES {
         return Vec::new();
     }
     match keys::key_changes(before, after) {

@@ -318,7 +318,7 @@ mod tests {
         let wider = Projection::Orthographic { view_height: 3.0 };
         let wider = ResolvedCamera { projection: wider, ..wanted };
         assert_eq!(written(&new, &wider), new.replace("2.5", "3"));
-        // `fov` would conflict with the projection.
+        // A `fov` left in the file would conflict with the projection.
         assert!(replace_camera(&format!("{text}fov = 30\n"), &wanted).is_err());
         let round =
             ResolvedCamera { projection: Projection::Fisheye { fov: 200.0 }, ..view([0.0, 1.0, 4.0]) };

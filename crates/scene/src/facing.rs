@@ -69,7 +69,7 @@ pub(super) fn lights_facing_away(
 /// read here.
 fn is_camera_in_front_of_light(camera: &Camera, corner: DVec3, front: DVec3) -> bool {
     match camera {
-        // Parallel rays see the front from any position.
+        // For parallel rays, only the view direction matters.
         Camera::LookAt { position, look_at, projection: Projection::Orthographic { .. }, .. } => {
             front.dot(*look_at - *position) < 0.0
         }
@@ -89,10 +89,10 @@ fn shape_projection_upper_bound(shape: &Shape, bounds: &[MeshBoundingBox], direc
 }
 
 /// Returns the transformed corners of a mesh's bounding box.
-fn transformed_box_corners(mesh: &MeshReference, [least, greatest]: [DVec3; 2]) -> [DVec3; 8] {
+fn transformed_box_corners(mesh: &MeshReference, [min, max]: [DVec3; 2]) -> [DVec3; 8] {
     let place = mesh.placed.to_transform();
     std::array::from_fn(|number| {
         let far = DVec3::new((number & 1) as f64, (number >> 1 & 1) as f64, (number >> 2) as f64);
-        place.point(least + (greatest - least) * far)
+        place.point(min + (max - min) * far)
     })
 }

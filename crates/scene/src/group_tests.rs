@@ -11,7 +11,7 @@ use crate::math::{DMat3, DVec3};
 
 const SPHERE: &str = "center = [1, 2, 3]\nradius = 2\nmaterial = 'm'\n";
 
-/// The errors in a scene, with the texts at their spans.
+/// Errors in a scene, with the text at each span.
 fn errors(text: &str) -> Vec<(String, String)> {
     let found = parse(format!("{text}\n{CAMERA}").into(), Path::new("scene.toml")).diagnostics;
     let errors = found.into_iter().filter(|one| one.severity == Severity::Error);
@@ -23,7 +23,7 @@ fn errors(text: &str) -> Vec<(String, String)> {
         .collect()
 }
 
-/// A mirroring and shearing matrix, whose products with small integers are exact.
+/// A matrix that mirrors and shears. Its products with small integers are exact.
 fn matrix(translate: [f64; 3]) -> String {
     let [x, y, z] = translate;
     format!("matrix = [0, -2, 0, {x:?}, 1, 0, 0.5, {y:?}, 0, 0, -3, {z:?}, 0, 0, 0, 1]\n")
@@ -148,7 +148,7 @@ fn cycles_are_reported_at_an_instance() {
     let itself = errors(&format!("{}[[instance]]\ngroup = 'a'\n", nested("a", "a")));
     assert_eq!(itself.len(), 1, "{itself:?}");
     assert_eq!(itself[0].0, "the group \"a\" contains itself; a → a");
-    // The cycle does not include the group that refers to it.
+    // The reported cycle does not include the group that leads to it.
     let three = [nested("outer", "a"), nested("a", "b"), nested("b", "c"), nested("c", "a")].concat();
     let found = errors(&three);
     let [(message, _)] = found.as_slice() else { panic!("{found:?}") };
@@ -222,7 +222,7 @@ fn composed_transforms_stay_in_range() {
         assert_eq!(found.len(), usize::from(!problem.is_empty()), "{scale} {own}: {found:?}");
         assert!(found.iter().all(|(message, place)| message.contains(problem) && place.contains("instance")));
     }
-    // Transforms that overflow on the way are rejected as well.
+    // Compositions that overflow midway are rejected as well.
     let chain: String =
         (0..40).map(|i| format!("[[groups.g{i}.instance]]\ngroup = 'g{}'\nscale = 1e18\n", i + 1)).collect();
     let text = format!("[materials.m]\n{chain}[[groups.g40.sphere]]\n{SPHERE}[[instance]]\ngroup = 'g0'\n");

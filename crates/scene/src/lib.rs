@@ -32,7 +32,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 pub use self::toml::{BuiltDocument, BuiltValue, quote_toml_string};
-pub use changes::{MOST_COMPARED_BYTES, list_changes};
+pub use changes::{MAX_COMPARED_BYTES, list_changes};
 use description::{Camera, ResolvedCamera, Scene};
 use diagnostic::{Diagnostic, Severity};
 pub use document::MORE_LIKE_THESE;
@@ -156,8 +156,8 @@ impl LoadedScene {
     /// Returns the span of a setting's value in the file or in a `--set` argument, or `None` if neither sets
     /// it.
     pub fn setting_span(&self, table: &str, key: &str) -> Option<Range<usize>> {
-        let is_it = |setting: &&SettingSpan| setting.table == table && setting.key == key;
-        self.settings.iter().find(is_it).map(|setting| setting.span.clone())
+        let is_setting = |setting: &&SettingSpan| setting.table == table && setting.key == key;
+        self.settings.iter().find(is_setting).map(|setting| setting.span.clone())
     }
 
     /// Creates a diagnostic at `span` for a problem found after parsing, such as a mesh without usable faces

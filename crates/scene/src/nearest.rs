@@ -5,15 +5,15 @@ use strsim::osa_distance;
 /// Returns the candidate with the smallest edit distance (optimal string alignment) to `written`, or `None`
 /// if more than one third of the characters differ. Ignores case and treats `-` as `_`.
 pub fn nearest_name<'a>(written: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
-    const LONGEST: usize = 64;
-    if written.len() > LONGEST {
+    const MAX_LENGTH: usize = 64;
+    if written.len() > MAX_LENGTH {
         return None;
     }
     let plain = |name: &str| name.to_lowercase().replace('-', "_");
     let written = plain(written);
     candidates
         .into_iter()
-        .filter(|candidate| candidate.len() <= LONGEST)
+        .filter(|candidate| candidate.len() <= MAX_LENGTH)
         .map(|candidate| (osa_distance(&written, &plain(candidate)), candidate))
         .filter(|(distance, candidate)| distance * 3 <= candidate.len().max(written.len()))
         .min_by_key(|(distance, _)| *distance)

@@ -6,7 +6,7 @@ use crate::math::decimal::{decimal_step_at_distance, round_to_step};
 use crate::scene::description::{Pose, Projection};
 
 /// Minimum angle in degrees between the orbit axis and the direction from `look_at` to the eye.
-const POLE: f64 = 1.0;
+const MIN_POLE_ANGLE: f64 = 1.0;
 /// Minimum field of view, in degrees.
 const MIN_FIELD: f64 = 1.0;
 /// Maximum field of view of a perspective, in degrees.
@@ -14,8 +14,8 @@ const MAX_FIELD: f64 = 160.0;
 /// Maximum field of view of a fisheye, in degrees.
 const MAX_FISHEYE_FIELD: f64 = 360.0;
 /// Limit on dollying: the distance to `look_at` stays within this factor of its value in the scene. The same
-/// limit applies to the height of an orthographic image.
-pub(super) const REACH: f64 = 1000.0;
+/// limit applies to the height of an orthographic view.
+pub(super) const MAX_DOLLY_FACTOR: f64 = 1000.0;
 
 /// Orbits the camera around `look_at` by `right` and `up` degrees.
 pub(super) fn orbited(pose: &Pose, right: f64, up: f64) -> Pose {
@@ -24,7 +24,7 @@ pub(super) fn orbited(pose: &Pose, right: f64, up: f64) -> Pose {
     let distance = arm.length();
     let polar = libm::acos((arm.dot(axis) / distance).clamp(-1.0, 1.0)).to_degrees();
     // If the camera starts closer to a pole, leave it there.
-    let (least, most) = (POLE.min(polar), (180.0 - POLE).max(polar));
+    let (least, most) = (MIN_POLE_ANGLE.min(polar), (180.0 - MIN_POLE_ANGLE).max(polar));
     let lifted = (polar - up).clamp(least, most);
     let level = (arm - axis * arm.dot(axis)).normalize_or(axis.any_orthonormal_vector());
     let (sine, cosine) = libm::sincos(right.to_radians());
@@ -33,12 +33,13 @@ pub(super) fn orbited(pose: &Pose, right: f64, up: f64) -> Pose {
     with_target_to_eye_vector(pose, (level * sine + axis * cosine) * distance)
 }
 
-/// Multiplies the distance to `look_at` by `factor`, limited to within a factor of [`REACH`] of `own`, the
-/// distance in the scene.
+/// Multiplies the distance to `look_at` by `factor`, limited to within a factor of [`MAX_DOLLY_FACTOR`] of
+/// `own`, the distance in the scene.
 pub(super) fn dollied(pose: &Pose, factor: f64, own: f64) -> Pose {
     let arm = pose.position - pose.look_at;
     let distance = arm.length();
-    let wanted = (distance * factor).clamp((own / REACH).min(distance), (own * REACH).max(distance));
+    let wanted = (distance * factor)
+        .clamp((own / MAX_DOLLY_FACTOR).min(distance), (own * MAX_DOLLY_FACTOR).max(distance));
     if wanted == distance { *pose } else { with_target_to_eye_vector(pose, arm * (wanted / distance)) }
 }
 
@@ -52,7 +53,8 @@ pub(super) fn zoomed(view: Projection, own: Projection, factor: f64) -> Projecti
         Projection::Fisheye { fov } => Projection::Fisheye { fov: zoomed_fov(fov, MAX_FISHEYE_FIELD) },
         Projection::Orthographic { view_height: now } => {
             let own = own.view_height().unwrap_or(now);
-            let wanted = (now * factor).clamp((own / REACH).min(now), (own * REACH).max(now));
+            let wanted =
+                (now * factor).clamp((own / MAX_DOLLY_FACTOR).min(now), (own * MAX_DOLLY_FACTOR).max(now));
             let view_height =
                 if wanted == now { now } else { round_to_step(wanted, decimal_step_at_distance(wanted)) };
             Projection::Orthographic { view_height }
@@ -95,7 +97,7 @@ mod tests {
             pose = orbited(&pose, 0.0, 5.0);
         }
         let arm = (pose.position - pose.look_at).normalize();
-        assert!((arm.dot(DVec3::Y).acos().to_degrees() - POLE).abs() < 0.01, "{arm}");
+        assert!((arm.dot(DVec3::Y).acos().to_degrees() - MIN_POLE_ANGLE).abs() < 0.01, "{arm}");
         assert!(arm.z > 0.0, "the camera should not cross the pole");
         let above = Pose { position: DVec3::new(0.0, 9.0, 0.0), up: DVec3::Y, look_at: DVec3::ZERO };
         assert!(orbited(&above, 10.0, -40.0).position.is_finite());

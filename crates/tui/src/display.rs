@@ -22,10 +22,10 @@ pub(super) const SYNCHRONIZED: &[u8] = b"\x1b[?2026$p";
 pub(super) const ATTRIBUTES: &[u8] = b"\x1b[c";
 /// Request for a status report (DSR).
 pub(super) const STATUS: &[u8] = b"\x1b[5n";
-const BEGIN: &[u8] = b"\x1b[?2026h";
-const END: &[u8] = b"\x1b[?2026l";
+const BEGIN_SYNCHRONIZED: &[u8] = b"\x1b[?2026h";
+const END_SYNCHRONIZED: &[u8] = b"\x1b[?2026l";
 /// Minimum size of a slice that needs synchronized output, in bytes. Smaller slices do not flicker.
-const LARGE: usize = 2_000;
+const MIN_SYNCHRONIZED_BYTES: usize = 2_000;
 
 /// Properties of the terminal and its connection, as detected from environment variables.
 #[derive(Clone, Copy, Debug, Default)]
@@ -73,7 +73,7 @@ pub(super) struct Display {
     /// Bytes sent since the newest preview's render began.
     sent: usize,
     /// Whether a preview is being sent.
-    is_picture_due: bool,
+    is_preview_due: bool,
     /// Bytes and round-trip time for sending the last preview.
     report: Option<PreviewSendReport>,
     /// Whether the last preview's report has been returned.
@@ -100,7 +100,7 @@ impl Display {
             window_titles: Default::default(),
             asides: Vec::new(),
             sent: 0,
-            is_picture_due: false,
+            is_preview_due: false,
             report: None,
             is_reported: true,
         };
@@ -160,7 +160,7 @@ impl Display {
         }
         self.painter.set_target_with_extras(wanted, picture, fidelity, extras);
         self.is_complete = false;
-        self.is_picture_due |= is_new;
+        self.is_preview_due |= is_new;
     }
 
     /// Starts counting bytes for a new render.
@@ -213,7 +213,7 @@ impl Display {
             self.flush_deferred_output(now);
             return false;
         }
-        let room = room.saturating_sub(BEGIN.len() + END.len());
+        let room = room.saturating_sub(BEGIN_SYNCHRONIZED.len() + END_SYNCHRONIZED.len());
         let cells = self.painter.next_slice_before_deadline(room, is_late);
         if !cells.is_empty() {
             self.send_slice(self.wrap_synchronized(cells), now);
@@ -232,16 +232,16 @@ impl Display {
 
     /// Wraps a slice in synchronized output if it is large enough to flicker and the terminal supports it.
     fn wrap_synchronized(&self, mut cells: Vec<u8>) -> Vec<u8> {
-        if self.is_synchronized && !self.link.is_multiplexed && cells.len() >= LARGE {
-            cells.splice(0..0, BEGIN.iter().copied());
-            cells.extend_from_slice(END);
+        if self.is_synchronized && !self.link.is_multiplexed && cells.len() >= MIN_SYNCHRONIZED_BYTES {
+            cells.splice(0..0, BEGIN_SYNCHRONIZED.iter().copied());
+            cells.extend_from_slice(END_SYNCHRONIZED);
         }
         cells
     }
 
     fn mark_target_complete(&mut self) {
         self.is_complete = true;
-        if std::mem::take(&mut self.is_picture_due) {
+        if std::mem::take(&mut self.is_preview_due) {
             self.report = Some(PreviewSendReport {
                 bytes: self.sent,
                 round_trip: self.connection.min_round_trip_time(),

@@ -14,7 +14,7 @@ use super::event::FilePosition;
 use super::signals;
 
 /// Editor used if the environment does not specify one.
-const DEFAULT: &str = "vi";
+const DEFAULT_EDITOR: &str = "vi";
 
 /// The editor from the environment, as a shell command.
 pub(super) fn editor_from_environment(variable: impl Fn(&str) -> Option<String>) -> String {
@@ -28,7 +28,7 @@ pub fn editor_and_variable(variable: impl Fn(&str) -> Option<String>) -> (String
         let editor = variable(name).filter(|value| !value.trim().is_empty())?;
         Some((editor, Some(name)))
     };
-    set("VISUAL").or_else(|| set("EDITOR")).unwrap_or_else(|| (DEFAULT.to_owned(), None))
+    set("VISUAL").or_else(|| set("EDITOR")).unwrap_or_else(|| (DEFAULT_EDITOR.to_owned(), None))
 }
 
 /// Opens a file in the editor at a position and waits for the editor to exit. If the editor is stopped, this

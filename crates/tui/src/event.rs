@@ -26,42 +26,42 @@ pub(super) enum Event {
     /// Writing to the terminal failed.
     Unwritable(ErrorKind),
     /// A preview has been sent.
-    Frame(PreviewSendReport),
+    PreviewSent(PreviewSendReport),
     /// The window size may have changed.
     Resize(WindowSize),
-    /// A message from the worker. Previews arrive as [`Event::Picture`].
+    /// A message from the worker. Previews arrive as [`Event::Preview`].
     Worker(protocol::Event),
     /// A new preview.
-    Picture(PreviewUpdate),
+    Preview(PreviewUpdate),
     /// A file that the scene depends on was written.
-    Changed(ContentChangeTime),
+    FileChanged(ContentChangeTime),
     /// The changed files have been fully written.
     Settled,
     /// An output file was modified or restored by another program.
-    Output(OutputChange),
+    OutputChanged(OutputChange),
     /// A signal was received, or the terminal was closed.
     Signal(Signal),
     /// The first bytes of a preview for this request have been sent.
-    Shown { generation: u64 },
+    FirstPreviewSent { generation: u64 },
     /// A timeout of the event loop has expired.
     Tick,
     /// Ctrl-z was pressed, but no shell could continue the process.
-    NoShell,
+    SuspendFailed,
     /// The editor has exited.
-    Back,
+    EditorExited,
     /// The editor could not be run, for this reason.
-    NoEditor(String),
+    EditorFailed(String),
     /// A source of events has ended.
-    Lost(RequiredEventSource),
+    SourceEnded(RequiredEventSource),
 }
 
 impl Event {
     /// Wraps a file watcher event.
     pub(super) fn from_watcher(news: WatchEvent) -> Self {
         match news {
-            WatchEvent::Changed(changed) => Self::Changed(changed),
+            WatchEvent::Changed(changed) => Self::FileChanged(changed),
             WatchEvent::Settled => Self::Settled,
-            WatchEvent::Output(change) => Self::Output(change),
+            WatchEvent::Output(change) => Self::OutputChanged(change),
         }
     }
 }

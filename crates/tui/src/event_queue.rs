@@ -48,7 +48,7 @@ impl<T> EventSender<T> {
 
 impl<T> Drop for EventSender<T> {
     fn drop(&mut self) {
-        let _ = self.queue.send(Event::Lost(self.source));
+        let _ = self.queue.send(Event::SourceEnded(self.source));
     }
 }
 
@@ -63,6 +63,6 @@ mod tests {
         sender.send(WatchEvent::Settled);
         drop(sender);
         assert!(matches!(queue.events.recv(), Ok(Event::Settled)));
-        assert!(matches!(queue.events.recv(), Ok(Event::Lost(RequiredEventSource::Watcher))));
+        assert!(matches!(queue.events.recv(), Ok(Event::SourceEnded(RequiredEventSource::Watcher))));
     }
 }

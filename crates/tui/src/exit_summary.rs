@@ -75,12 +75,12 @@ fn describe_events_since_writing(state: &State) -> String {
         return String::new();
     }
     if !state.request.has_no_keyboard_overrides() {
-        let is_by_hand = written.iter().any(|written| written.shows.is_some());
+        let is_user_written = written.iter().any(|written| written.shows.is_some());
         return match state.saving.own {
             SceneImageProgress { .. } if state.saving.are_images_outdated() => {
                 messages::OLDER_THAN_EDIT.to_owned()
             }
-            SceneImageProgress { .. } if is_by_hand => String::new(),
+            SceneImageProgress { .. } if is_user_written => String::new(),
             SceneImageProgress { fraction, .. } => {
                 format!("; {NEXT_RENDER} is not finished ({:.0} %)", (fraction * 100.0).floor())
             }
@@ -89,10 +89,10 @@ fn describe_events_since_writing(state: &State) -> String {
     let is_after = written.iter().any(|written| written.generation != state.request.generation);
     let next = if is_after { NEXT_RENDER } else { "the render" };
     match (state.work.activity, &state.work.progress) {
-        (RequestStatus::Running { .. } | RequestStatus::Cancelled, Some(progress)) => {
+        (RequestStatus::Running { .. } | RequestStatus::Canceled, Some(progress)) => {
             format!("; {next} was stopped at {:.0} %", (progress.fraction * 100.0).floor())
         }
-        (RequestStatus::Running { .. } | RequestStatus::Cancelled, None) => format!("; {next} was stopped"),
+        (RequestStatus::Running { .. } | RequestStatus::Canceled, None) => format!("; {next} was stopped"),
         (RequestStatus::Done | RequestStatus::Waiting | RequestStatus::Broken, _) => String::new(),
     }
 }
@@ -265,7 +265,7 @@ mod tests {
             ui.finish_render([200, 30, 30]);
             let before = summary_text(&ui.state);
             assert!(before.starts_with(made) && !before.contains("save"), "{key}: {before}");
-            ui.handle_event(crate::event::Event::Changed(ContentChangeTime { noticed: ui.now }));
+            ui.handle_event(crate::event::Event::FileChanged(ContentChangeTime { noticed: ui.now }));
             ui.finish_render([30, 30, 200]);
             let after = summary_text(&ui.state);
             assert_eq!(after, format!("{made}{}", messages::OLDER_THAN_EDIT), "{key}");
@@ -274,7 +274,7 @@ mod tests {
                 key == 'l'
             );
             // Saving the file without changing the image does not make the image newer.
-            ui.handle_event(crate::event::Event::Changed(ContentChangeTime { noticed: ui.now }));
+            ui.handle_event(crate::event::Event::FileChanged(ContentChangeTime { noticed: ui.now }));
             let generation = ui.state.request.generation;
             ui.worker_event(Event::Started { generation });
             ui.worker_event(done_event(generation, Vec::new(), true));
@@ -474,7 +474,7 @@ mod tests {
         ui.press_character('s');
         own(&mut ui, SavedSceneImageState::Written);
         assert_eq!(summary_text(&ui.state), "wrote cornell.png: 640×480, 64 samples, 1.93 s");
-        ui.handle_event(crate::event::Event::Changed(ContentChangeTime { noticed: ui.now }));
+        ui.handle_event(crate::event::Event::FileChanged(ContentChangeTime { noticed: ui.now }));
         assert!(summary_text(&ui.state).ends_with(messages::OLDER_THAN_EDIT), "{}", summary_text(&ui.state));
     }
 }

@@ -100,7 +100,7 @@ impl TestUi {
 
     /// Saves a scene with this text and lets the worker load it.
     pub(super) fn save_scene(&mut self, text: &str) {
-        self.handle_event(Event::Changed(ContentChangeTime { noticed: self.now }));
+        self.handle_event(Event::FileChanged(ContentChangeTime { noticed: self.now }));
         let generation = self.state.request.generation;
         self.worker_event(protocol::Event::Text { generation, text: text.into() });
     }
@@ -118,7 +118,7 @@ impl TestUi {
 
     /// Delivers a preview of the current request.
     pub(super) fn show_preview(&mut self, color: [u8; 3]) {
-        self.handle_event(Event::Picture(PreviewUpdate {
+        self.handle_event(Event::Preview(PreviewUpdate {
             generation: self.state.request.generation,
             picture: uniform_picture(50, 38, color),
             range: None,

@@ -146,11 +146,11 @@ impl RenderHistory {
         origin: ImageProvenance,
     ) {
         let Some(past) = self.past.get_mut(at) else { return };
-        let is_other_picture = past.shown.picture != shown.picture;
-        if is_other_picture {
+        let has_other_image = past.shown.picture != shown.picture;
+        if has_other_image {
             past.small = OnceCell::new();
         }
-        if past.origin.is_unfinished && (is_other_picture || !origin.is_unfinished) {
+        if past.origin.is_unfinished && (has_other_image || !origin.is_unfinished) {
             past.time = time;
         }
         let is_other = past.origin != origin;
@@ -196,8 +196,8 @@ impl RenderHistory {
 
     /// Drops the unfinished entry for a request.
     pub(super) fn drop_unfinished_of_request(&mut self, generation: u64) {
-        let is_it = |past: &HistoryEntry| past.shown.generation == generation && past.run.is_none();
-        if let Some(at) = self.past.iter().position(is_it) {
+        let is_displayed = |past: &HistoryEntry| past.shown.generation == generation && past.run.is_none();
+        if let Some(at) = self.past.iter().position(is_displayed) {
             self.remove(at);
         }
     }
@@ -300,7 +300,7 @@ impl RenderHistory {
     }
 
     /// Image of the newest entry.
-    pub(super) fn last_picture(&self) -> Option<&Arc<Srgb8Image>> {
+    pub(super) fn last_image(&self) -> Option<&Arc<Srgb8Image>> {
         self.past.back().map(|newest| &newest.shown.picture)
     }
 

@@ -1,9 +1,9 @@
 //! Noise as a function of render time.
 
 /// Maximum number of points. If there are more, every second point is dropped.
-const MAX: usize = 256;
+const MAX_POINTS: usize = 256;
 /// Minimum ratio between the times of successive points. It is a ratio because the time axis is logarithmic.
-const STEP: f64 = 1.02;
+const MIN_TIME_RATIO: f64 = 1.02;
 
 /// Render times in seconds and the noise measured at each time, in chronological order.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -12,12 +12,12 @@ pub(super) struct NoiseCurve(Vec<(f64, f64)>);
 impl NoiseCurve {
     /// Records the noise after `seconds`.
     pub(super) fn record(&mut self, seconds: f64, noise: f64) {
-        let is_later = self.0.last().is_none_or(|(last, _)| seconds > last * STEP);
+        let is_later = self.0.last().is_none_or(|(last, _)| seconds > last * MIN_TIME_RATIO);
         if !(seconds > 0.0 && seconds.is_finite() && noise > 0.0 && noise.is_finite() && is_later) {
             return;
         }
         self.0.push((seconds, noise));
-        if self.0.len() > MAX {
+        if self.0.len() > MAX_POINTS {
             let mut index = 0;
             self.0.retain(|_| {
                 index += 1;
@@ -28,7 +28,7 @@ impl NoiseCurve {
 
     /// Records the final noise, measured at the end of the render.
     pub(super) fn record_final(&mut self, seconds: f64, noise: f64) {
-        self.0.retain(|(time, _)| time * STEP < seconds);
+        self.0.retain(|(time, _)| time * MIN_TIME_RATIO < seconds);
         self.record(seconds, noise);
     }
 
@@ -55,7 +55,7 @@ mod tests {
         for step in 0..2000 {
             curve.record(2.01 * 1.03_f64.powi(step), 0.04);
         }
-        assert!(curve.points().len() <= MAX);
+        assert!(curve.points().len() <= MAX_POINTS);
         assert!(curve.points().windows(2).all(|pair| pair[0].0 < pair[1].0));
     }
 }

@@ -22,7 +22,7 @@ use crate::film::Srgb8Image;
 use crate::pipeline::protocol::PreviewSlot;
 
 /// Frame interval. Output is limited to 20 frames per second, except in response to keys.
-const FRAME: Duration = Duration::from_millis(50);
+const FRAME_INTERVAL: Duration = Duration::from_millis(50);
 
 /// Draws the state to the terminal.
 pub(super) struct FramePresenter {
@@ -89,7 +89,7 @@ impl FramePresenter {
     fn size_section_or_photons_differ(&self, state: &State) -> bool {
         let latest = self.previews.lock().unwrap_or_else(PoisonError::into_inner);
         let what = |picture: &Srgb8Image| (picture.width, picture.height);
-        latest.as_ref().zip(state.picture.shown.as_ref()).is_some_and(|(new, old)| {
+        latest.as_ref().zip(state.preview.shown.as_ref()).is_some_and(|(new, old)| {
             let is_same = what(&new.picture) == what(&old.picture) && new.section == old.section;
             !is_same || new.lacks_photons != old.lacks_photons
         })
@@ -133,13 +133,13 @@ impl FramePresenter {
 
     fn take_preview_event(&mut self) -> Option<Event> {
         self.drawn.is_old = false;
-        self.previews.lock().unwrap_or_else(PoisonError::into_inner).take().map(Event::Picture)
+        self.previews.lock().unwrap_or_else(PoisonError::into_inner).take().map(Event::Preview)
     }
 
     /// Delays the next frame, even an urgent one, until one frame interval after `now`.
     pub(super) fn postpone_next_frame(&mut self, state: &mut State, now: Instant) {
         state.urgent = false;
-        self.next_frame = now + FRAME;
+        self.next_frame = now + FRAME_INTERVAL;
     }
 
     /// Updates the display's target if a frame is due.
@@ -184,7 +184,7 @@ impl FramePresenter {
 
     /// Records the preview being drawn. Returns true if it is new.
     fn record_drawn_preview(&mut self, state: &State, now: Instant) -> bool {
-        let Some(shown) = &state.picture.shown else { return false };
+        let Some(shown) = &state.preview.shown else { return false };
         if self.drawn.picture.as_ref().is_some_and(|drawn| Arc::ptr_eq(drawn, &shown.picture)) {
             return false;
         }
@@ -218,13 +218,14 @@ impl FramePresenter {
         is_late: impl Fn() -> bool,
     ) -> Vec<Event> {
         let has_sent = self.display.send_next_slice(now, is_late);
-        let mut events: Vec<Event> = self.display.take_send_report().map(Event::Frame).into_iter().collect();
+        let mut events: Vec<Event> =
+            self.display.take_send_report().map(Event::PreviewSent).into_iter().collect();
         if self.drawn.is_old && self.pacing_advice(state, now) != PacingAdvice::Wait {
             events.extend(self.take_preview_event());
         }
         let is_new = |drawn: &mut DrawnPreview| !std::mem::replace(&mut drawn.is_shown, true);
         if self.drawn.picture.is_some() && has_sent && is_new(&mut self.drawn) {
-            events.push(Event::Shown { generation: self.drawn.generation });
+            events.push(Event::FirstPreviewSent { generation: self.drawn.generation });
         }
         events
     }

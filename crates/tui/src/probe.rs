@@ -69,7 +69,7 @@ impl TerminalProbeResult {
 }
 
 /// Timeout for the terminal's replies.
-const PATIENCE: Duration = Duration::from_secs(1);
+const REPLY_TIMEOUT: Duration = Duration::from_secs(1);
 
 /// Queries the terminal. Returns `None` if stdin or stdout is not a terminal.
 ///
@@ -123,15 +123,17 @@ fn query_in_raw_mode(questions: &[u8]) -> io::Result<Option<ReportedTerminalFeat
 }
 
 fn query_and_read_replies(questions: &[u8]) -> io::Result<Option<ReportedTerminalFeatures>> {
-    let (begin, mut heard) = (Instant::now(), ReceivedReplies::default());
+    let (begin, mut replies) = (Instant::now(), ReceivedReplies::default());
     send(STATUS)?;
-    if !read_replies_until(&mut heard, begin, |heard| heard.has_received(TerminalReply::Ready))? {
+    if !read_replies_until(&mut replies, begin, |replies| replies.has_received(TerminalReply::Ready))? {
         return Ok(None);
     }
     let round_trip = begin.elapsed();
     send(&[questions, ATTRIBUTES].concat())?;
-    read_replies_until(&mut heard, Instant::now(), |heard| heard.has_received(TerminalReply::Attributes))?;
-    Ok(Some(ReportedTerminalFeatures { round_trip, ..heard.to_reported_features() }))
+    read_replies_until(&mut replies, Instant::now(), |replies| {
+        replies.has_received(TerminalReply::Attributes)
+    })?;
+    Ok(Some(ReportedTerminalFeatures { round_trip, ..replies.to_reported_features() }))
 }
 
 fn send(bytes: &[u8]) -> io::Result<()> {
@@ -142,14 +144,14 @@ fn send(bytes: &[u8]) -> io::Result<()> {
 
 /// Reads replies until `is_all` returns true. Returns false on timeout.
 fn read_replies_until(
-    heard: &mut ReceivedReplies,
+    replies: &mut ReceivedReplies,
     begin: Instant,
     is_all: impl Fn(&ReceivedReplies) -> bool,
 ) -> io::Result<bool> {
     let stdin = io::stdin();
     let mut bytes = [0; 4096];
-    while !is_all(heard) {
-        let rest = PATIENCE.saturating_sub(begin.elapsed());
+    while !is_all(replies) {
+        let rest = REPLY_TIMEOUT.saturating_sub(begin.elapsed());
         let timeout = PollTimeout::try_from(rest).unwrap_or(PollTimeout::ZERO);
         let mut ends = [PollFd::new(stdin.as_fd(), PollFlags::POLLIN)];
         if rest.is_zero() || poll(&mut ends, timeout)? == 0 {
@@ -157,7 +159,7 @@ fn read_replies_until(
         }
         match nix::unistd::read(&stdin, &mut bytes)? {
             0 => return Ok(false),
-            count => heard.receive(&bytes[..count]),
+            count => replies.receive(&bytes[..count]),
         }
     }
     Ok(true)
@@ -230,21 +232,23 @@ mod tests {
     use super::*;
 
     fn replies_in(bytes: &[u8]) -> ReceivedReplies {
-        let mut heard = ReceivedReplies::default();
-        heard.receive(bytes);
-        heard
+        let mut replies = ReceivedReplies::default();
+        replies.receive(bytes);
+        replies
     }
 
     #[test]
     fn replies_are_found_in_any_order() {
-        let heard = replies_in(
+        let replies = replies_in(
             b"\x1b[0n\x1bP>|foot(1.20.2)\x1b\\\x1bP1+r524742=38\x1b\\\x1b[?2026;2$y\x1b]11;rgb:1c1c/1c1c/1c1c\x1b\\\x1b_Gi=4211;OK\x1b\\\x1b[?62;4;22c",
         );
-        let answers = heard.to_reported_features();
+        let answers = replies.to_reported_features();
         assert_eq!(answers.name.as_deref(), Some("foot(1.20.2)"));
         assert_eq!(answers.background, Some([0x1c; 3]));
         assert!(answers.has_true_color && answers.has_kitty && answers.has_sixel && answers.is_synchronized);
-        assert!(heard.has_received(TerminalReply::Ready) && heard.has_received(TerminalReply::Attributes));
+        assert!(
+            replies.has_received(TerminalReply::Ready) && replies.has_received(TerminalReply::Attributes)
+        );
     }
 
     #[test]

@@ -26,7 +26,7 @@ use super::writer;
 use crate::pipeline::protocol::{self, Command};
 
 /// Maximum time to plan a slice before sending it and handling keys.
-const TURN: Duration = Duration::from_millis(3);
+const MAX_PLANNING_TIME: Duration = Duration::from_millis(3);
 
 /// Runs the front end until a key or signal ends it, then restores the terminal and sends [`Command::Quit`]
 /// to the worker. `queue` receives the events of the worker and the file watcher. Must not be called more than
@@ -228,7 +228,7 @@ impl EventLoop {
             Effect::GiveUp => {
                 return Some(LoopEnd::Error(TuiError::WorkerGone { reason: terminal::last_panic() }));
             }
-            Effect::StopJob if !signals::has_shell() => return self.apply_event(Event::NoShell),
+            Effect::StopJob if !signals::has_shell() => return self.apply_event(Event::SuspendFailed),
             Effect::StopJob => {
                 return signals::stop_job()
                     .err()
@@ -267,9 +267,9 @@ impl EventLoop {
         let outcome = editor::run(&editor::editor_from_environment(|name| std::env::var(name).ok()), place);
         terminal::restore_modes();
         input::set_input_paused(false);
-        let end = self.apply_event(Event::Back).or_else(|| self.resume_and_redraw());
+        let end = self.apply_event(Event::EditorExited).or_else(|| self.resume_and_redraw());
         drop(child_signals);
-        end.or_else(|| outcome.err().and_then(|why| self.apply_event(Event::NoEditor(why))))
+        end.or_else(|| outcome.err().and_then(|why| self.apply_event(Event::EditorFailed(why))))
     }
 
     fn resume_and_redraw(&mut self) -> Option<LoopEnd> {
@@ -292,7 +292,7 @@ impl EventLoop {
         }
         self.presenter.draw_if_due(&mut self.state, Instant::now());
         let begin = Instant::now();
-        let events = self.presenter.send_pending(&self.state, begin, || begin.elapsed() >= TURN);
+        let events = self.presenter.send_pending(&self.state, begin, || begin.elapsed() >= MAX_PLANNING_TIME);
         events.into_iter().find_map(|event| self.apply_event(event))
     }
 }

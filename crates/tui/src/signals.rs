@@ -28,11 +28,11 @@ use super::terminal;
 use crate::system::threads::spawn;
 
 /// Grace period for the event loop to exit after a signal.
-const GRACE: Duration = Duration::from_millis(1500);
+const GRACE_PERIOD: Duration = Duration::from_millis(1500);
 /// Time allowed for a stalled terminal to accept the bytes that restore it.
-const RESCUE: Duration = Duration::from_millis(100);
+const RESTORE_TIME_LIMIT: Duration = Duration::from_millis(100);
 /// How often to check that the terminal still exists.
-const WATCH: Duration = Duration::from_millis(500);
+const TERMINAL_CHECK_INTERVAL: Duration = Duration::from_millis(500);
 
 /// Signals handled by the event loop.
 const HANDLED_SIGNALS: [i32; 7] = [SIGINT, SIGTERM, SIGQUIT, SIGHUP, SIGTSTP, SIGCONT, SIGWINCH];
@@ -52,7 +52,7 @@ fn linux_terminating_signals() -> impl Iterator<Item = i32> {
 }
 
 /// A signal used to wake the signal thread. No other program sends it, and it is ignored by default.
-const MARK: i32 = SIGURG;
+const WAKE_SIGNAL: i32 = SIGURG;
 
 /// Signal handler. Dropping it restores the default actions.
 pub(super) struct SignalListener {
@@ -64,14 +64,18 @@ impl SignalListener {
     pub(super) fn start(events: &Sender<Event>) -> io::Result<Self> {
         let over = Arc::new(AtomicBool::new(false));
         let mut signals = Signals::new(
-            HANDLED_SIGNALS.into_iter().chain(OTHER_SIGNALS).chain(linux_terminating_signals()).chain([MARK]),
+            HANDLED_SIGNALS
+                .into_iter()
+                .chain(OTHER_SIGNALS)
+                .chain(linux_terminating_signals())
+                .chain([WAKE_SIGNAL]),
         )?;
         let handler = SignalThread { over: Arc::clone(&over), events: events.clone() };
         spawn("signals", move || {
             loop {
                 signals.wait().for_each(|number| handler.handle_signal(number));
                 *lock_signal_round_count() += 1;
-                ROUNDS.1.notify_all();
+                HANDLED_ROUNDS.1.notify_all();
             }
         })?;
         let handler = SignalThread { over: Arc::clone(&over), events: events.clone() };
@@ -86,17 +90,17 @@ impl Drop for SignalListener {
     }
 }
 
-/// Whether the terminal has hung up. If so, the program ends within [`GRACE`].
+/// Whether the terminal has hung up. If so, the program ends within [`GRACE_PERIOD`].
 static HUNG_UP: AtomicBool = AtomicBool::new(false);
 
 /// Whether signals from the keyboard are handled by a child process.
 static CHILD_HANDLES_SIGNALS: AtomicBool = AtomicBool::new(false);
 
 /// Number of rounds in which the signal thread has handled all pending signals.
-static ROUNDS: (Mutex<u64>, Condvar) = (Mutex::new(0), Condvar::new());
+static HANDLED_ROUNDS: (Mutex<u64>, Condvar) = (Mutex::new(0), Condvar::new());
 
 fn lock_signal_round_count() -> MutexGuard<'static, u64> {
-    ROUNDS.0.lock().unwrap_or_else(PoisonError::into_inner)
+    HANDLED_ROUNDS.0.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// How long to wait for the signal thread. Handling takes microseconds, so the timeout expires only if the
@@ -109,8 +113,8 @@ fn wait_for_pending_signals() {
     for _ in 0..2 {
         let before = lock_signal_round_count();
         let last = *before;
-        if low_level::raise(MARK).is_ok() {
-            drop(ROUNDS.1.wait_timeout_while(before, SIGNAL_TIMEOUT, |now| *now == last));
+        if low_level::raise(WAKE_SIGNAL).is_ok() {
+            drop(HANDLED_ROUNDS.1.wait_timeout_while(before, SIGNAL_TIMEOUT, |now| *now == last));
         }
     }
 }
@@ -180,7 +184,7 @@ struct SignalThread {
 
 impl SignalThread {
     fn handle_signal(&self, number: i32) {
-        if number == MARK {
+        if number == WAKE_SIGNAL {
             return;
         }
         if self.over.load(Ordering::Acquire) {
@@ -219,7 +223,7 @@ impl SignalThread {
 
     fn watch_terminal(&self) {
         while !self.over.load(Ordering::Acquire) {
-            thread::sleep(WATCH);
+            thread::sleep(TERMINAL_CHECK_INTERVAL);
             if !terminal::terminal_exists() {
                 self.deliver_signal(Signal::Hangup);
                 return;
@@ -271,13 +275,13 @@ fn exit_status_for(signal: Signal) -> Option<ExitStatus> {
 /// Ends the process if the event loop has not ended. Restores the terminal first, except after a hangup, when
 /// it no longer exists. The saved modes are always restored, because a running child may have changed them.
 fn exit_after_grace_period(signal: Signal, status: ExitStatus, over: &AtomicBool) {
-    thread::sleep(GRACE);
+    thread::sleep(GRACE_PERIOD);
     if signal != Signal::Hangup {
         if over.load(Ordering::Acquire) {
             return;
         }
         terminal::restore_from_other_thread();
-        thread::sleep(RESCUE);
+        thread::sleep(RESTORE_TIME_LIMIT);
     }
     terminal::restore_modes();
     low_level::exit(i32::from(status.0));
@@ -311,8 +315,8 @@ mod tests {
     #[cfg(target_os = "linux")]
     #[test]
     fn real_time_signals_are_handled() {
-        let heard: Vec<i32> = linux_terminating_signals().collect();
-        assert!(heard.contains(&libc::SIGRTMIN()) && heard.contains(&libc::SIGRTMAX()));
+        let numbers: Vec<i32> = linux_terminating_signals().collect();
+        assert!(numbers.contains(&libc::SIGRTMIN()) && numbers.contains(&libc::SIGRTMAX()));
         assert_eq!(exit_status_for(Signal::Other(libc::SIGRTMAX())), Some(ExitStatus(128 + 64)));
     }
 

@@ -18,9 +18,9 @@ const MIN_COLUMNS: u16 = 30;
 /// Minimum width of images shown side by side.
 const MIN_BESIDE: u16 = 20;
 /// Number of columns between images.
-const GAP: u16 = 2;
+const IMAGE_GAP: u16 = 2;
 /// Terminal rows reserved for text.
-const WORDS: u16 = 17;
+const TEXT_ROWS: u16 = 17;
 /// Minimum height of an image.
 const MIN_ROWS: u16 = 7;
 
@@ -67,8 +67,8 @@ fn draw_images_beside_or_stacked(
     aspect: f32,
 ) -> Vec<Buffer> {
     let count = pictures.len().max(1) as u16;
-    let beside = columns.saturating_sub(GAP * (count - 1)) / count;
-    let rows = rows.saturating_sub(WORDS).max(MIN_ROWS);
+    let beside = columns.saturating_sub(IMAGE_GAP * (count - 1)) / count;
+    let rows = rows.saturating_sub(TEXT_ROWS).max(MIN_ROWS);
     if columns < MIN_COLUMNS {
         Vec::new()
     } else if beside >= MIN_BESIDE {
@@ -89,7 +89,7 @@ fn draw_images_side_by_side(
     let sizes = pictures.iter().map(|one| size_in_cells(&one.picture, inks.depth, columns, rows, aspect));
     let (width, height) = sizes.fold((0, 0), |most, size| (most.0.max(size.0), most.1.max(size.1)));
     let names = pictures.iter().map(|one| text_columns(&one.name).min(columns)).max().unwrap_or(0);
-    let stride = width.max(names) + GAP;
+    let stride = width.max(names) + IMAGE_GAP;
     let mut buffer = Buffer::empty(Rect::new(0, 0, stride * pictures.len() as u16, height + 1));
     for (x, one) in (0..).step_by(usize::from(stride)).zip(pictures) {
         buffer.set_string(x, 0, truncated_text(&one.name, columns), Style::new());

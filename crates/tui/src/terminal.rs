@@ -33,13 +33,13 @@ use super::writer;
 use crate::system::abort;
 
 /// Whether the alternate screen is active.
-static TAKEN: AtomicBool = AtomicBool::new(false);
+static ALTERNATE_SCREEN_ACTIVE: AtomicBool = AtomicBool::new(false);
 /// Whether mouse reporting is enabled.
-static MOUSE: AtomicBool = AtomicBool::new(true);
+static MOUSE_REPORTING_ENABLED: AtomicBool = AtomicBool::new(true);
 /// Whether the terminal is in raw mode.
-static RAW: AtomicBool = AtomicBool::new(false);
+static RAW_MODE_ACTIVE: AtomicBool = AtomicBool::new(false);
 /// Whether focus reporting is enabled.
-static FOCUS: AtomicBool = AtomicBool::new(false);
+static FOCUS_REPORTING_ENABLED: AtomicBool = AtomicBool::new(false);
 /// Whether the window title has been changed.
 static HAS_TITLE: AtomicBool = AtomicBool::new(false);
 /// Whether a progress bar may be shown.
@@ -68,7 +68,7 @@ static CHANGES: [(&AtomicBool, &[u8]); 4] = [
     (&HAS_LINKS, LINK_OFF),
     (&HAS_TITLE, TITLE_BACK),
     (&HAS_PROGRESS, PROGRESS_OFF),
-    (&FOCUS, FOCUS_OFF.as_bytes()),
+    (&FOCUS_REPORTING_ENABLED, FOCUS_OFF.as_bytes()),
 ];
 /// Terminates a control string that may have been cut off. Otherwise, the terminal would treat the following
 /// text as part of the string.
@@ -79,7 +79,7 @@ const DEFAULT_CELL_ASPECT: f32 = 2.0;
 /// Typical cell size in pixels.
 const DEFAULT_CELL_PIXELS: (u16, u16) = (8, 16);
 /// Timeout for each restoration step if the terminal does not accept output.
-const STUCK: Duration = Duration::from_millis(60);
+const RESTORATION_TIMEOUT: Duration = Duration::from_millis(60);
 
 /// The terminal while the front end is using it.
 pub(super) struct TerminalSession(());
@@ -95,7 +95,7 @@ impl TerminalSession {
 
     /// Whether the front end may draw on the screen.
     pub(super) fn is_screen_active(&self) -> bool {
-        TAKEN.load(Ordering::Acquire)
+        ALTERNATE_SCREEN_ACTIVE.load(Ordering::Acquire)
     }
 
     /// Restores the screen but keeps raw mode until [`TerminalSession::resume`] is called or the session
@@ -112,7 +112,7 @@ impl TerminalSession {
     /// Sets up the terminal again.
     pub(super) fn resume(&mut self) -> io::Result<()> {
         // A shell may have changed the modes while the process was stopped, so save the current ones.
-        if RAW.swap(false, Ordering::AcqRel) {
+        if RAW_MODE_ACTIVE.swap(false, Ordering::AcqRel) {
             disable_raw_mode()?;
         }
         set_up_terminal()
@@ -120,7 +120,7 @@ impl TerminalSession {
 
     /// Enables or disables mouse reporting.
     pub(super) fn set_mouse(&mut self, is_on: bool) {
-        MOUSE.store(is_on, Ordering::Release);
+        MOUSE_REPORTING_ENABLED.store(is_on, Ordering::Release);
         writer::queue_slice(if is_on { MOUSE_ON } else { MOUSE_OFF }.as_bytes().to_vec());
     }
 
@@ -132,8 +132,8 @@ impl TerminalSession {
 
     /// Stops writing to a terminal that no longer exists.
     pub(super) fn abandon(self) {
-        TAKEN.store(false, Ordering::Release);
-        RAW.store(false, Ordering::Release);
+        ALTERNATE_SCREEN_ACTIVE.store(false, Ordering::Release);
+        RAW_MODE_ACTIVE.store(false, Ordering::Release);
     }
 }
 
@@ -144,17 +144,17 @@ impl Drop for TerminalSession {
 }
 
 /// Terminal modes saved while another program uses the terminal, or `None` at other times.
-static LENT: Mutex<Option<Termios>> = Mutex::new(None);
+static LENT_TERMINAL_MODES: Mutex<Option<Termios>> = Mutex::new(None);
 
 /// Saves the terminal modes for [`restore_modes`] before another program uses the terminal.
 pub(super) fn save_modes() {
-    *LENT.lock().unwrap_or_else(PoisonError::into_inner) = tcgetattr(io::stdin()).ok();
+    *LENT_TERMINAL_MODES.lock().unwrap_or_else(PoisonError::into_inner) = tcgetattr(io::stdin()).ok();
 }
 
 /// Restores the modes saved by [`save_modes`], because a killed program may leave the terminal in a different
 /// mode. Errors are ignored because nothing can be done about them.
 pub(super) fn restore_modes() {
-    if let Some(modes) = LENT.lock().unwrap_or_else(PoisonError::into_inner).take() {
+    if let Some(modes) = LENT_TERMINAL_MODES.lock().unwrap_or_else(PoisonError::into_inner).take() {
         let _ = tcsetattr(io::stdin(), SetArg::TCSANOW, &modes);
     }
 }
@@ -170,8 +170,8 @@ fn set_up_terminal() -> io::Result<()> {
     let output = writer::open_output()?;
     *OUTPUT.lock().unwrap_or_else(PoisonError::into_inner) = Some(output);
     enable_raw_mode()?;
-    RAW.store(true, Ordering::Release);
-    TAKEN.store(true, Ordering::Release);
+    RAW_MODE_ACTIVE.store(true, Ordering::Release);
+    ALTERNATE_SCREEN_ACTIVE.store(true, Ordering::Release);
     *OWNER.lock().unwrap_or_else(PoisonError::into_inner) = Some(thread::current().id());
     write_setup(&mut io::stdout()).inspect_err(|_| restore_terminal())
 }
@@ -179,23 +179,23 @@ fn set_up_terminal() -> io::Result<()> {
 /// Restores the terminal if it is in use. Errors are ignored because they cannot be reported.
 fn restore_terminal() {
     leave_screen();
-    if RAW.swap(false, Ordering::AcqRel) {
+    if RAW_MODE_ACTIVE.swap(false, Ordering::AcqRel) {
         let _ = disable_raw_mode();
     }
 }
 
 /// Restores the screen if it is in use, dropping unsent output. If the terminal does not accept output, data
-/// buffered by the operating system is also dropped. Takes at most three times [`STUCK`].
+/// buffered by the operating system is also dropped. Takes at most three times [`RESTORATION_TIMEOUT`].
 fn leave_screen() {
-    if !TAKEN.swap(false, Ordering::AcqRel) {
+    if !ALTERNATE_SCREEN_ACTIVE.swap(false, Ordering::AcqRel) {
         return;
     }
     let drop_kept = || tcflush(io::stdout(), FlushArg::TCOFLUSH);
-    if !writer::discard_queued_and_wait(STUCK) {
+    if !writer::discard_queued_and_wait(RESTORATION_TIMEOUT) {
         let _ = drop_kept();
     }
     let mut bytes = Vec::new();
-    let (deadline, dropped) = (Instant::now() + STUCK, Cell::new(false));
+    let (deadline, dropped) = (Instant::now() + RESTORATION_TIMEOUT, Cell::new(false));
     // Nothing else is writing, so dropping the system's buffered output makes room.
     let is_late = || Instant::now() >= deadline && (dropped.replace(true) || drop_kept().is_err());
     let _ = write_restore(&mut bytes)
@@ -206,10 +206,10 @@ fn leave_screen() {
 /// Restores the terminal from another thread, since the thread that owns it may be blocked. Does not block:
 /// if the terminal does not accept output, a spawned thread waits for it.
 pub(super) fn restore_from_other_thread() {
-    if RAW.swap(false, Ordering::AcqRel) {
+    if RAW_MODE_ACTIVE.swap(false, Ordering::AcqRel) {
         let _ = disable_raw_mode();
     }
-    if TAKEN.swap(false, Ordering::AcqRel) {
+    if ALTERNATE_SCREEN_ACTIVE.swap(false, Ordering::AcqRel) {
         writer::discard_queued_and_wait(Duration::ZERO);
         thread::spawn(|| {
             let tty = File::options().write(true).open("/dev/tty");
@@ -242,14 +242,14 @@ fn prepare_restore_on_abort() {
 }
 
 /// Restores the terminal using only async-signal-safe calls, without locks or allocations. If the terminal
-/// does not accept output, waits no longer than [`STUCK`].
+/// does not accept output, waits no longer than [`RESTORATION_TIMEOUT`].
 fn restore_terminal_while_aborting() {
     let Some(words) = LAST_WORDS.get() else { return };
-    if TAKEN.swap(false, Ordering::AcqRel) {
+    if ALTERNATE_SCREEN_ACTIVE.swap(false, Ordering::AcqRel) {
         let out = io::stdout();
         let _ = tcflush(&out, FlushArg::TCOFLUSH);
         let mut room = [PollFd::new(out.as_fd(), PollFlags::POLLOUT)];
-        if poll(&mut room, PollTimeout::try_from(STUCK).unwrap_or(PollTimeout::ZERO))
+        if poll(&mut room, PollTimeout::try_from(RESTORATION_TIMEOUT).unwrap_or(PollTimeout::ZERO))
             .is_ok_and(|ready| ready > 0)
         {
             if HAS_IMAGES.load(Ordering::Acquire) {
@@ -262,7 +262,7 @@ fn restore_terminal_while_aborting() {
         }
     }
     if let Some(modes) = words.modes
-        && RAW.swap(false, Ordering::AcqRel)
+        && RAW_MODE_ACTIVE.swap(false, Ordering::AcqRel)
     {
         let _ = tcsetattr(io::stdin(), SetArg::TCSANOW, &modes.into());
     }
@@ -275,7 +275,7 @@ pub(super) fn mark_images_used() {
 
 /// Enables focus reporting each time the terminal is set up.
 pub(super) fn enable_focus_reports_on_setup() {
-    FOCUS.store(true, Ordering::Release);
+    FOCUS_REPORTING_ENABLED.store(true, Ordering::Release);
 }
 
 /// Bytes to send before setting a window title. The first call returns the sequence that saves the original
@@ -299,7 +299,7 @@ pub(super) fn mark_links_used() {
 fn take_undo_bytes() -> impl Iterator<Item = &'static [u8]> {
     let mut is_first = true;
     CHANGES.iter().flat_map(move |(flag, bytes)| {
-        let is_mode = std::ptr::eq(*flag, &FOCUS);
+        let is_mode = std::ptr::eq(*flag, &FOCUS_REPORTING_ENABLED);
         let is_due = if is_mode { flag.load(Ordering::Acquire) } else { flag.swap(false, Ordering::AcqRel) };
         let end = (is_due && std::mem::replace(&mut is_first, false)).then_some(STRING_END);
         end.into_iter().chain(is_due.then_some(*bytes))
@@ -308,8 +308,8 @@ fn take_undo_bytes() -> impl Iterator<Item = &'static [u8]> {
 
 /// Writes the bytes that set up the screen.
 fn write_setup(out: &mut impl Write) -> io::Result<()> {
-    let mouse = if MOUSE.load(Ordering::Acquire) { MOUSE_ON } else { MOUSE_OFF };
-    let focus = if FOCUS.load(Ordering::Acquire) { FOCUS_ON } else { "" };
+    let mouse = if MOUSE_REPORTING_ENABLED.load(Ordering::Acquire) { MOUSE_ON } else { MOUSE_OFF };
+    let focus = if FOCUS_REPORTING_ENABLED.load(Ordering::Acquire) { FOCUS_ON } else { "" };
     execute!(
         out,
         EnterAlternateScreen,
@@ -358,7 +358,7 @@ fn install_panic_hook() {
         let previous = std::panic::take_hook();
         std::panic::set_hook(Box::new(move |info| {
             let owner = *OWNER.lock().unwrap_or_else(PoisonError::into_inner);
-            if TAKEN.load(Ordering::Acquire) && owner != Some(std::thread::current().id()) {
+            if ALTERNATE_SCREEN_ACTIVE.load(Ordering::Acquire) && owner != Some(std::thread::current().id()) {
                 *PANIC.lock().unwrap_or_else(PoisonError::into_inner) = Some(info.to_string());
             } else {
                 restore_terminal();
@@ -421,8 +421,8 @@ const MAX_CELLS: u32 = 1 << 20;
 /// Limits a window to the maximum size.
 fn clamp_window_size(window: WindowSize) -> WindowSize {
     let columns = window.columns.min(MAX_COLUMNS);
-    let most_rows = MAX_CELLS / u32::from(columns.max(1));
-    let rows = u16::try_from(most_rows).map_or(window.rows, |most| window.rows.min(most));
+    let max_rows = MAX_CELLS / u32::from(columns.max(1));
+    let rows = u16::try_from(max_rows).map_or(window.rows, |most| window.rows.min(most));
     WindowSize { columns, rows, ..window }
 }
 
@@ -541,9 +541,9 @@ mod tests {
     #[test]
     fn restoring_unused_terminal_does_nothing() {
         let _alone = exclusive_access();
-        assert!(!TAKEN.load(Ordering::Acquire));
+        assert!(!ALTERNATE_SCREEN_ACTIVE.load(Ordering::Acquire));
         restore_terminal();
         restore_from_other_thread();
-        assert!(!TAKEN.load(Ordering::Acquire));
+        assert!(!ALTERNATE_SCREEN_ACTIVE.load(Ordering::Acquire));
     }
 }

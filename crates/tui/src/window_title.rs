@@ -12,9 +12,9 @@ use crate::scene::sanitize::escape_invisible_chars;
 
 /// How long a render must run before the title and progress bar show it. This delay prevents flicker while
 /// the camera moves.
-const SHORT: Duration = Duration::from_millis(500);
+const MIN_RENDER_TIME: Duration = Duration::from_millis(500);
 /// Percentage step on slow connections.
-const COARSE: u32 = 10;
+const SLOW_PERCENT_STEP: u32 = 10;
 
 /// Escape sequence that saves the window title for [`TITLE_BACK`].
 pub(super) const KEEP_TITLE: &[u8] = b"\x1b[22;2t";
@@ -60,11 +60,12 @@ impl TitleAndProgress {
     /// steps. Returns `None` if they should stay unchanged for now.
     pub(super) fn for_state(state: &State, is_slow: bool) -> Option<Self> {
         let capabilities = state.display.capabilities;
-        if state.work.running_time(state.now).is_some_and(|time| time < SHORT) && !state.work.paused {
+        if state.work.running_time(state.now).is_some_and(|time| time < MIN_RENDER_TIME) && !state.work.paused
+        {
             return None;
         }
         let progress = state.work.progress.as_ref().filter(|_| state.work.is_request_running());
-        let step = if is_slow { COARSE } else { 1 };
+        let step = if is_slow { SLOW_PERCENT_STEP } else { 1 };
         let percent = progress.map(|progress| view::text::floor_percent(progress.fraction) / step * step);
         Some(Self {
             title: capabilities.title.then(|| title_text(state, percent)),
@@ -103,7 +104,7 @@ fn progress_bar_state(state: &State, percent: Option<u32>) -> ProgressBar {
         RequestStatus::Running { .. } if state.work.paused => ProgressBar::Paused(percent.unwrap_or(0)),
         RequestStatus::Running { .. } => percent.map_or(ProgressBar::Busy, ProgressBar::Percent),
         RequestStatus::Broken => ProgressBar::Broken,
-        RequestStatus::Done | RequestStatus::Waiting | RequestStatus::Cancelled => ProgressBar::None,
+        RequestStatus::Done | RequestStatus::Waiting | RequestStatus::Canceled => ProgressBar::None,
     }
 }
 

@@ -97,7 +97,7 @@ fn triangle() -> Value {
 }
 
 /// The error from reading a file, with the folder stripped from its path. Empty if the file can be read.
-fn said(folder: &Path, name: &str, content: &[u8]) -> String {
+fn read_error(folder: &Path, name: &str, content: &[u8]) -> String {
     let (path, token) = (folder.join(name), CancelToken::new());
     fs::write(&path, content).expect("written");
     let read = match name.ends_with("gltf") || name.ends_with("glb") {
@@ -116,7 +116,7 @@ fn malformed_meshes_have_expected_errors() {
     for (name, cases) in [("a.obj", obj()), ("a.off", off()), ("a.ply", ply()), ("a.stl", stl())] {
         assert!(cases.len() >= 20, "{name}");
         for (what, content, expected) in cases {
-            assert_eq!(said(folder.path(), name, &content), expected, "{name}: {what}");
+            assert_eq!(read_error(folder.path(), name, &content), expected, "{name}: {what}");
         }
     }
 }
@@ -129,14 +129,14 @@ fn malformed_mtl_files_have_expected_errors() {
     assert!(cases.len() >= 16);
     for (what, content, expected) in cases {
         fs::write(folder.path().join("a.mtl"), content).expect("written");
-        assert_eq!(said(folder.path(), "a.obj", obj), expected, "{what}");
+        assert_eq!(read_error(folder.path(), "a.obj", obj), expected, "{what}");
     }
 }
 
 #[test]
 fn malformed_gltf_has_expected_errors() {
     let folder = tempfile::tempdir().expect("a folder");
-    assert_eq!(said(folder.path(), "a.gltf", triangle().to_string().as_bytes()), "");
+    assert_eq!(read_error(folder.path(), "a.gltf", triangle().to_string().as_bytes()), "");
     for &(place, value, expected) in EDITS {
         let mut json = triangle();
         let value: Value = serde_json::from_str(value).expect("JSON");
@@ -147,7 +147,7 @@ fn malformed_gltf_has_expected_errors() {
                 json.pointer_mut(list).expect("a list")[key] = value;
             }
         }
-        let message = said(folder.path(), "a.gltf", json.to_string().as_bytes());
+        let message = read_error(folder.path(), "a.gltf", json.to_string().as_bytes());
         let names_both = message.starts_with("a.gltf:") && message.contains(expected);
         assert!(
             names_both || expected.is_empty() && message.is_empty(),
@@ -163,7 +163,7 @@ fn malformed_gltf_has_expected_errors() {
         ("", "a.gltf: the file is empty"),
         ("{\"asset\": {\"version\": \"2.0\"}} x", "a.gltf:1: column 31: trailing characters"),
     ] {
-        assert_eq!(said(folder.path(), "a.gltf", text.as_bytes()), expected);
+        assert_eq!(read_error(folder.path(), "a.gltf", text.as_bytes()), expected);
     }
 }
 
@@ -262,6 +262,6 @@ fn malformed_glb_has_expected_errors() {
     ];
     assert!(cases.len() >= 20);
     for (what, content, expected) in cases {
-        assert_eq!(said(folder.path(), "a.glb", &content), expected, "{what}");
+        assert_eq!(read_error(folder.path(), "a.glb", &content), expected, "{what}");
     }
 }

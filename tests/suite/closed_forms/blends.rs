@@ -10,8 +10,8 @@ use glimt::scene::description::{
     TextureFilter, Wrap,
 };
 
-use super::global::by_paths;
-use super::photons::{assert_same_light, both};
+use super::global::path_traced;
+use super::photons::{assert_same_light, path_and_photon_means};
 use super::scenes::{Build, blend, emitter, glass, matte, metal, mirror, plain, principled, receiver, scene};
 use super::{assert_mean, assert_same_mean, lambert, mean_and_error, v};
 
@@ -20,10 +20,10 @@ const fn number(weight: f32) -> NumberSource {
 }
 
 /// The scene with each integrator, with its name.
-fn each(build: &Build, depth: u32) -> [(&'static str, Build); 3] {
+fn with_each_integrator(build: &Build, depth: u32) -> [(&'static str, Build); 3] {
     let whitted = build.clone().depth(depth);
     let photons = whitted.clone().photons(256, 0.1);
-    [("whitted", whitted), ("path", by_paths(build.clone(), depth)), ("photons", photons)]
+    [("whitted", whitted), ("path", path_traced(build.clone(), depth)), ("photons", photons)]
 }
 
 /// A ball under an environment of radiance 1, viewed near its edge.
@@ -47,7 +47,7 @@ fn constant_blends_are_weighted_means() {
         ),
     ];
     for (number, (material, exact)) in cases.into_iter().enumerate() {
-        for (integrator, build) in each(&in_furnace(material), 2) {
+        for (integrator, build) in with_each_integrator(&in_furnace(material), 2) {
             let values = build.values(2048, 16);
             assert_mean(&format!("{number} with {integrator}"), &values, exact, 5e-3);
         }
@@ -57,7 +57,7 @@ fn constant_blends_are_weighted_means() {
 #[test]
 fn blends_of_rough_materials_are_weighted_means() {
     let [first, second] = [metal(0.9, 0.4, 0.0), principled(0.5, 0.0, 0.6)];
-    let mean = |material: Material| mean_and_error(&by_paths(in_furnace(material), 1).values(512, 16));
+    let mean = |material: Material| mean_and_error(&path_traced(in_furnace(material), 1).values(512, 16));
     let (a, b) = (mean(first.clone()), mean(second.clone()));
     let weighted = (0.35 * a.0 + 0.65 * b.0, (0.35 * a.1).hypot(0.65 * b.1));
     assert_same_mean("blend", mean(blend(first, second, number(0.65))), weighted, 5e-3);
@@ -79,7 +79,7 @@ fn textured_weights_show_the_parts() {
                 blend(mirror(0.8), mirror(0.3), weight),
             )
             .seen(v(at, 1.0, 0.0), v(at, 0.0, 0.0));
-        for (integrator, build) in each(&build, 2) {
+        for (integrator, build) in with_each_integrator(&build, 2) {
             let values = build.values(4, 4);
             assert!(
                 values.iter().all(|value| (value - exact).abs() < 1e-5),
@@ -105,7 +105,7 @@ fn blends_emit_the_weighted_sum() {
         let lamp = blend(emitter(6.0), blend(emitter(1.0), emitter(1.0), number(0.5)), weight);
         let (corner, across) = (v(-0.5, 1.0, -0.5), v(1.0, 0.0, 0.0));
         let build = build.quad(corner, across, v(0.0, 0.0, 1.0), lamp);
-        for (integrator, build) in each(&build, 1) {
+        for (integrator, build) in with_each_integrator(&build, 1) {
             let values = build.values(256, 16);
             assert_mean(&format!("{name}, {integrator}"), &values, lit * 2.25, 1e-2);
         }
@@ -116,7 +116,7 @@ fn blends_emit_the_weighted_sum() {
 }
 
 #[test]
-fn emission_with_opacity_has_one_value_in_all_techniques() {
+fn techniques_agree_on_emission_with_opacity() {
     // One part is two-sided and half opaque, and the other emits nothing. The mean emission from the back is
     // 0.4·0.5·5 = 1. Behind glass without refraction, only BSDF samples and photons find it.
     let mut veil = emitter(5.0);
@@ -127,15 +127,15 @@ fn emission_with_opacity_has_one_value_in_all_techniques() {
     let exact = lambert(DVec3::ZERO, DVec3::Y, &corners) * 0.5 / PI;
     // The front faces up.
     let open = receiver(DVec3::ZERO, 0.5).quad(v(-0.5, 1.0, 0.5), v(1.0, 0.0, 0.0), v(0.0, 0.0, -1.0), lamp);
-    for (integrator, build) in each(&open, 1) {
+    for (integrator, build) in with_each_integrator(&open, 1) {
         assert_mean(integrator, &build.values(512, 16), exact, 1.5e-2);
     }
     let hidden = open.cuboid(v(0.0, 1.0, 0.0), v(1.5, 0.5, 1.5), DVec3::ZERO, glass(1.0));
-    assert_mean("BSDF samples", &by_paths(hidden, 3).values(4096, 16), exact, 2e-2);
+    assert_mean("BSDF samples", &path_traced(hidden, 3).values(4096, 16), exact, 2e-2);
 }
 
 #[test]
-fn shadow_rays_pass_blends_with_the_mean_transmittance() {
+fn shadow_rays_use_mean_transmittance_of_blends() {
     // A point light 2 above the receiver shines straight down through a pane with weight 0.4 and an opaque
     // part. The pane transmits (1 − R')·tint, with R = 0.04 and R' = 2R/(1 + R).
     let tint = ColorSource::Constant(Vec3::splat(0.5));
@@ -145,14 +145,14 @@ fn shadow_rays_pass_blends_with_the_mean_transmittance() {
         .quad(v(-1.0, 1.0, 1.0), v(2.0, 0.0, 0.0), v(0.0, 0.0, -2.0), blend(matte(0.0), pane, number(0.4)))
         .point_light(v(0.0, 2.0, 0.0), 8.0, Falloff::Square);
     let exact = 0.5 / PI * 8.0 / 4.0 * passed;
-    for (integrator, build) in each(&build, 1) {
+    for (integrator, build) in with_each_integrator(&build, 1) {
         let (mean, error) = mean_and_error(&build.values(16, 16));
         assert!((mean / exact - 1.0).abs() < 1e-4 + 4.0 * error / exact, "{integrator}: {mean}, {exact}");
     }
 }
 
 #[test]
-fn light_behind_blends_reaches_paths_and_light_samples_alike() {
+fn techniques_agree_on_light_behind_blends() {
     // A veil between a light and the receiver: half of it is absent, and half is a pane.
     let mut veil = matte(0.0);
     veil.opacity = OpacitySource { value: number(0.25), cutoff: 0.0 };
@@ -164,7 +164,7 @@ fn light_behind_blends_reaches_paths_and_light_samples_alike() {
     let build = receiver(DVec3::ZERO, 0.5)
         .quad(v(-0.5, 1.0, -0.5), v(1.0, 0.0, 0.0), v(0.0, 0.0, 1.0), emitter(3.0))
         .quad(v(-2.0, 0.5, 2.0), v(4.0, 0.0, 0.0), v(0.0, 0.0, -4.0), blend(veil, pane, number(0.5)));
-    for (integrator, build) in each(&build, 1) {
+    for (integrator, build) in with_each_integrator(&build, 1) {
         assert_mean(integrator, &build.values(512, 16), exact, 1e-2);
     }
 }
@@ -180,7 +180,7 @@ fn photons_match_path_on_blends() {
         .quad(v(-0.5, 1.9, -0.5), v(1.0, 0.0, 0.0), v(0.0, 0.0, 1.0), emitter(4.0))
         .pictured(v(0.0, 1.0, 3.5), v(0.2, 0.6, -0.9), 30.0, 12, 12);
     for depth in [2, 3] {
-        let means = both(&room.clone().depth(depth), depth, [256, 16], (20_000, 0.05));
+        let means = path_and_photon_means(&room.clone().depth(depth), depth, [256, 16], (20_000, 0.05));
         assert_same_light(&format!("depth {depth}"), means, 1.2e-2, 4e-3);
     }
 }

@@ -9,14 +9,14 @@ use glimt::math::{DVec3, Vec3};
 use glimt::scene::description::{Integrator, Material, Shape};
 use glimt::world::GlassSolids;
 
-use super::photons::{assert_same_light, both};
-use super::scenes::{AS_IT_IS, Build, emitter, glass, lat_long_sphere, matte, scene, tinted};
+use super::photons::{assert_same_light, path_and_photon_means};
+use super::scenes::{Build, IDENTITY_PLACEMENT, emitter, glass, lat_long_sphere, matte, scene, tinted};
 use super::v;
 
 /// The glass solids in a built scene.
 fn bodies(build: &Build) -> GlassSolids {
     let meshes: Vec<&LoadedMesh> = build.parts.meshes.iter().map(|mesh| mesh.loaded()).collect();
-    GlassSolids::find(&build.scene, &meshes, &CancelToken::new()).expect("the token is not cancelled")
+    GlassSolids::find(&build.scene, &meshes, &CancelToken::new()).expect("the token is not canceled")
 }
 
 /// A prism whose base is a polygon in the plane z = 0, specified counterclockwise as viewed from +z. Each
@@ -79,13 +79,13 @@ fn closed(round: usize) -> TriangleMesh {
 }
 
 /// A mesh's triangles that satisfy `holds`.
-fn part(mesh: &TriangleMesh, holds: impl Fn(usize) -> bool) -> TriangleMesh {
+fn submesh(mesh: &TriangleMesh, holds: impl Fn(usize) -> bool) -> TriangleMesh {
     let own = mesh.triangles.iter().enumerate().filter(|&(i, _)| holds(i));
     TriangleMesh { triangles: own.map(|(_, &own)| own).collect(), ..mesh.clone() }
 }
 
 /// Splits a mesh into parts by assigning each triangle to the nearest of several random points.
-fn cut(mesh: &TriangleMesh, count: usize, random: &mut TestRandom) -> Vec<TriangleMesh> {
+fn split_at_random(mesh: &TriangleMesh, count: usize, random: &mut TestRandom) -> Vec<TriangleMesh> {
     let middle = |i: usize| mesh.corners(i as u32).iter().sum::<Vec3>() / 3.0;
     let seeds: Vec<Vec3> =
         (0..count).map(|_| middle((random.unit() * mesh.triangles.len() as f64) as usize)).collect();
@@ -93,11 +93,11 @@ fn cut(mesh: &TriangleMesh, count: usize, random: &mut TestRandom) -> Vec<Triang
         let off = |seed: usize| seeds[seed].distance_squared(middle(i));
         (0..count).min_by(|&a, &b| off(a).total_cmp(&off(b))).expect("a seed")
     };
-    let parts = (0..count).map(|seed| part(mesh, |i| nearest(i) == seed));
+    let parts = (0..count).map(|seed| submesh(mesh, |i| nearest(i) == seed));
     parts.filter(|part| !part.triangles.is_empty()).collect()
 }
 
-fn turned(mesh: &TriangleMesh) -> TriangleMesh {
+fn inside_out(mesh: &TriangleMesh) -> TriangleMesh {
     TriangleMesh { triangles: mesh.triangles.iter().map(|&[a, b, c]| [a, c, b]).collect(), ..mesh.clone() }
 }
 
@@ -109,11 +109,13 @@ fn room(parts: &[TriangleMesh], material: &Material) -> Build {
         v(0.0, -6.0, 0.0),
         emitter(1.0),
     );
-    let build = parts.iter().fold(build, |build, part| build.mesh(part.clone(), AS_IT_IS, material.clone()));
+    let build = parts
+        .iter()
+        .fold(build, |build, part| build.mesh(part.clone(), IDENTITY_PLACEMENT, material.clone()));
     build.pictured(v(0.9, -4.2, 2.6), v(0.0, 0.0, 0.4), 30.0, 12, 12).depth(12)
 }
 
-fn by_path(build: Build) -> Build {
+fn path_traced(build: Build) -> Build {
     build.with(|scene| scene.render.integrator = Integrator::Path)
 }
 
@@ -123,7 +125,7 @@ fn solid_split_into_parts_renders_the_same() {
     for round in 0..12 {
         let whole = closed(round);
         let count = 2 + (random.unit() * 5.0) as usize;
-        let parts = cut(&whole, count, &mut random);
+        let parts = split_at_random(&whole, count, &mut random);
         let material = tinted(1.5, v(0.6, 0.9, 0.8));
         let (one, several) = (room(&[whole], &material), room(&parts, &material));
         let found = bodies(&several);
@@ -137,7 +139,7 @@ fn solid_split_into_parts_renders_the_same() {
             assert_eq!(found.solid_id(part), last, "round {round}");
             assert!(!found.is_inside_out(part), "round {round}");
         }
-        let [one_path, several_path] = [&one, &several].map(|build| by_path(build.clone()).picture(8, 5));
+        let [one_path, several_path] = [&one, &several].map(|build| path_traced(build.clone()).picture(8, 5));
         assert!(one_path == several_path, "round {round}: {} parts, path tracing", parts.len());
         // Photons are aimed at objects, so splitting an object changes the photons.
         if round < 4 {
@@ -152,12 +154,12 @@ fn reversed_part_is_flipped() {
     let mut random = TestRandom::new(5);
     for round in 0..8 {
         let whole = closed(round);
-        let mut parts = cut(&whole, 4, &mut random);
+        let mut parts = split_at_random(&whole, 4, &mut random);
         let material = glass(1.5);
-        let right = by_path(room(&parts, &material)).picture(8, 3);
+        let right = path_traced(room(&parts, &material)).picture(8, 3);
         let flips: Vec<bool> = parts.iter().map(|_| random.unit() < 0.5).collect();
         for (part, _) in parts.iter_mut().zip(&flips).filter(|(_, flip)| **flip) {
-            *part = turned(part);
+            *part = inside_out(part);
         }
         let build = room(&parts, &material);
         let found = bodies(&build);
@@ -167,7 +169,7 @@ fn reversed_part_is_flipped() {
         }
         // Reversed triangles round differently, which changes a few paths.
         let sum = |picture: &[DVec3]| picture.iter().map(|pixel| pixel.y).sum::<f64>();
-        let (own, right) = (sum(&by_path(build).picture(8, 3)), sum(&right));
+        let (own, right) = (sum(&path_traced(build).picture(8, 3)), sum(&right));
         assert!((own - right).abs() < 1e-3 * right, "round {round}: {flips:?}: {own}, expected {right}");
     }
 }
@@ -266,10 +268,15 @@ fn quads_and_disks_close_solids() {
 fn quads_of_glass_are_a_box() {
     let (low, high) = (v(-0.7, -0.6, 0.0), v(0.7, 0.6, 0.9));
     let material = tinted(1.5, v(0.6, 0.9, 0.8));
-    let whole =
-        by_path(room(&[], &material)).cuboid((low + high) * 0.5, high - low, DVec3::ZERO, material.clone());
+    let whole = path_traced(room(&[], &material)).cuboid(
+        (low + high) * 0.5,
+        high - low,
+        DVec3::ZERO,
+        material.clone(),
+    );
     let parts = quads(low, high, 0b10_0110).into_iter();
-    let parts = parts.fold(by_path(room(&[], &material)), |build, quad| build.shape(quad, material.clone()));
+    let parts =
+        parts.fold(path_traced(room(&[], &material)), |build, quad| build.shape(quad, material.clone()));
     assert_same("quads", &whole, &parts, 64, 3.5, 0.0);
 }
 
@@ -295,7 +302,7 @@ fn camera_inside_split_solid_is_in_glass() {
         2.0,
         3,
     );
-    let mesh = |mesh: &TriangleMesh| scene().mesh(mesh.clone(), AS_IT_IS, material.clone());
+    let mesh = |mesh: &TriangleMesh| scene().mesh(mesh.clone(), IDENTITY_PLACEMENT, material.clone());
     // The last quad is the top, which is the surface of the pool.
     let bodies = [
         ("a box", whole),
@@ -303,7 +310,7 @@ fn camera_inside_split_solid_is_in_glass() {
         ("inward-facing quads", of(&quads(low, high, 0b10_0110), &none)),
         ("a pool", of(&quads(low, high, 0), &|number| number != 5)),
         ("a mesh", mesh(&cube)),
-        ("an inward-facing mesh", mesh(&turned(&cube))),
+        ("an inward-facing mesh", mesh(&inside_out(&cube))),
     ];
     for (what, build) in bodies {
         for integrator in [Integrator::Whitted, Integrator::Path] {
@@ -337,8 +344,8 @@ fn light_inside_split_solid_emits_photons() {
     let walls = quads(v(-1.0, -1.0, 0.0), v(1.0, 1.0, 2.0), 0).into_iter().take(5);
     let hollow = walls
         .fold(scene(), |build, wall| build.shape(wall, matte(0.6)))
-        .mesh(cube(-0.5, 0.5, 0.5), AS_IT_IS, glass(1.45))
-        .mesh(cube(-0.35, 0.35, 0.65), AS_IT_IS, glass(1.0))
+        .mesh(cube(-0.5, 0.5, 0.5), IDENTITY_PLACEMENT, glass(1.45))
+        .mesh(cube(-0.35, 0.35, 0.65), IDENTITY_PLACEMENT, glass(1.0))
         .sphere(v(0.0, 0.0, 1.0), 0.2, emitter(5.0))
         .pictured(v(0.0, 0.0, 6.0), v(0.0, 0.0, 0.0), 24.0, 12, 12)
         .depth(5);
@@ -354,7 +361,7 @@ fn light_inside_split_solid_emits_photons() {
         .pictured(v(0.0, 0.0, 6.0), v(0.0, 0.0, 0.0), 16.0, 12, 12)
         .depth(4);
     for (what, build, depth, passes) in [("a hollow", hollow, 5, 6), ("a pool", pool, 4, 12)] {
-        let means = both(&build, depth, [384, passes], (4_000, 0.05));
+        let means = path_and_photon_means(&build, depth, [384, passes], (4_000, 0.05));
         assert_same_light(what, means, 1.2e-2, 4e-3);
     }
 }
@@ -399,11 +406,11 @@ fn texture_seams_are_not_holes() {
         whole.triangles.iter().flatten().map(|&i| whole.positions[i as usize]).collect();
     let triangles = (0..whole.triangles.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
     let loose = TriangleMesh { positions, triangles, ..TriangleMesh::default() };
-    let of = |mesh: TriangleMesh| bodies(&scene().mesh(mesh, AS_IT_IS, glass(1.5)));
+    let of = |mesh: TriangleMesh| bodies(&scene().mesh(mesh, IDENTITY_PLACEMENT, glass(1.5)));
     assert_eq!(of(loose), GlassSolids::default());
     assert_eq!(of(whole.clone()), GlassSolids::default());
     // An inside-out mesh.
-    assert!(of(turned(&whole)).is_inside_out(0) && of(turned(&whole)).open_objects().is_empty());
+    assert!(of(inside_out(&whole)).is_inside_out(0) && of(inside_out(&whole)).open_objects().is_empty());
     // A mirrored instance.
     let mirrored =
         scene().mesh(whole, [v(-1.0, 1.0, 2.0), v(10.0, 20.0, 30.0), v(5.0, 0.0, 1.0)], glass(1.5));
@@ -417,13 +424,13 @@ fn glass_with_a_hole_is_reported() {
         let whole = closed(round);
         // Remove a triangle.
         let lost = (random.unit() * whole.triangles.len() as f64) as usize;
-        let mut parts = cut(&part(&whole, |i| i != lost), 3, &mut random);
+        let mut parts = split_at_random(&submesh(&whole, |i| i != lost), 3, &mut random);
         let open = bodies(&room(&parts, &glass(1.5)));
         let area = |mesh: &TriangleMesh| {
             let area = |corners: [Vec3; 3]| (corners[1] - corners[0]).cross(corners[2] - corners[0]).length();
             (0..mesh.triangles.len() as u32).map(|i| area(mesh.corners(i))).sum::<f32>() * 0.5
         };
-        let missing = area(&part(&whole, |i| i == lost));
+        let missing = area(&submesh(&whole, |i| i == lost));
         let expected = f64::from(missing / (area(&whole) - missing));
         assert!(!open.open_objects().is_empty(), "round {round}");
         assert_eq!(open.open_objects().iter().map(|open| open.edges).sum::<usize>(), 3, "round {round}");
@@ -480,9 +487,9 @@ fn curved_opaque_surface_closes_open_glass() {
     let ball = lat_long_sphere(12, 20, 0.7, v(0.0, 0.0, 0.9));
     let middle = |i: usize| ball.corners(i as u32).iter().sum::<Vec3>() / 3.0;
     let is_label = |i: usize| middle(i).x > 0.4;
-    let (bare, label) = (part(&ball, |i| !is_label(i)), part(&ball, is_label));
+    let (bare, label) = (submesh(&ball, |i| !is_label(i)), submesh(&ball, is_label));
     let with = |label: TriangleMesh| {
-        scene().mesh(bare.clone(), AS_IT_IS, glass(1.5)).mesh(label, AS_IT_IS, matte(0.5))
+        scene().mesh(bare.clone(), IDENTITY_PLACEMENT, glass(1.5)).mesh(label, IDENTITY_PLACEMENT, matte(0.5))
     };
     let fits = bodies(&with(label.clone()));
     assert!(
@@ -511,8 +518,8 @@ fn curved_opaque_surface_closes_open_glass() {
     for (radius, is_open) in [(1.0, false), (0.95, true)] {
         let plug = scene()
             .shape(tube.clone(), matte(0.5))
-            .mesh(pane(radius, 0.4, true), AS_IT_IS, glass(1.5))
-            .mesh(pane(radius, -0.4, false), AS_IT_IS, glass(1.5));
+            .mesh(pane(radius, 0.4, true), IDENTITY_PLACEMENT, glass(1.5))
+            .mesh(pane(radius, -0.4, false), IDENTITY_PLACEMENT, glass(1.5));
         assert_eq!(bodies(&plug).has_open(), is_open, "{radius}");
     }
 }
@@ -549,8 +556,11 @@ fn each_hole_is_tested_separately() {
         five(x(2.0), top),
         five(x(3.0), bottom),
     ];
-    let build =
-        scene().quad(table, v(3.0, 0.0, 0.0), v(0.0, 3.0, 0.0), matte(0.5)).mesh(board, AS_IT_IS, matte(0.5));
+    let build = scene().quad(table, v(3.0, 0.0, 0.0), v(0.0, 3.0, 0.0), matte(0.5)).mesh(
+        board,
+        IDENTITY_PLACEMENT,
+        matte(0.5),
+    );
     let build = parts.into_iter().flatten().fold(build, |build, quad| build.shape(quad, glass(1.5)));
     let found = bodies(&build);
     let is_open = [0, 1, 2, 3].map(|part| found.is_open(found.solid_id(2 + 5 * part)));
@@ -564,7 +574,10 @@ fn inward_facing_mesh_in_glass_is_a_cavity() {
     let material = tinted(1.0, tint);
     let seen = |parts: &[TriangleMesh], x: f64| {
         let build = scene().background(1.0).depth(20).seen(v(x, 0.013, 5.0), v(x, 0.013, 0.0));
-        parts.iter().fold(build, |build, part| build.mesh(part.clone(), AS_IT_IS, material.clone())).color()
+        parts
+            .iter()
+            .fold(build, |build, part| build.mesh(part.clone(), IDENTITY_PLACEMENT, material.clone()))
+            .color()
     };
     let ball = |radius: f64| lat_long_sphere(96, 192, radius, DVec3::ZERO);
     let chord = |radius: f64, x: f64| 2.0 * (radius * radius - x * x - 0.013 * 0.013).max(0.0).sqrt();
@@ -578,24 +591,24 @@ fn inward_facing_mesh_in_glass_is_a_cavity() {
     let (outer, inner) = (ball(1.0), ball(0.8));
     for x in [0.0, 0.3, 0.7, 0.9] {
         let shell = chord(1.0, x) - chord(0.8, x);
-        check("hollow", &[outer.clone(), turned(&inner)], x, shell);
-        check("reverse order", &[turned(&inner), outer.clone()], x, shell);
+        check("hollow", &[outer.clone(), inside_out(&inner)], x, shell);
+        check("reverse order", &[inside_out(&inner), outer.clone()], x, shell);
         check("solid", &[outer.clone(), inner.clone()], x, chord(1.0, x));
-        check("alone", &[turned(&inner)], x, chord(0.8, x));
-        let onion = [outer.clone(), turned(&ball(0.2)), turned(&inner), ball(0.5)];
+        check("alone", &[inside_out(&inner)], x, chord(0.8, x));
+        let onion = [outer.clone(), inside_out(&ball(0.2)), inside_out(&inner), ball(0.5)];
         check("hollow ball inside", &onion, x, shell + chord(0.5, x) - chord(0.2, x));
-        let lost = [outer.clone(), turned(&inner), turned(&ball(0.5))];
+        let lost = [outer.clone(), inside_out(&inner), inside_out(&ball(0.5))];
         check("inside-out ball inside", &lost, x, shell + chord(0.5, x));
     }
     // Two separate cavities. A mesh that is partly outside or has a different material is not a cavity.
     let at = |radius: f64, x: f64| lat_long_sphere(24, 48, radius, v(x, 0.0, 0.0));
-    let two = scene().mesh(at(1.0, 0.0), AS_IT_IS, material.clone());
-    let two = two.mesh(turned(&at(0.3, -0.5)), AS_IT_IS, material.clone());
-    let two = bodies(&two.mesh(turned(&at(0.3, 0.5)), AS_IT_IS, material.clone()));
+    let two = scene().mesh(at(1.0, 0.0), IDENTITY_PLACEMENT, material.clone());
+    let two = two.mesh(inside_out(&at(0.3, -0.5)), IDENTITY_PLACEMENT, material.clone());
+    let two = bodies(&two.mesh(inside_out(&at(0.3, 0.5)), IDENTITY_PLACEMENT, material.clone()));
     assert_eq!([0, 1, 2].map(|object| (two.solid_id(object), two.is_inside_out(object))), [(2, false); 3]);
     for (other, x) in [(material.clone(), 0.9), (tinted(1.0, v(0.4, 0.9, 0.25)), 0.5)] {
-        let build = scene().mesh(at(1.0, 0.0), AS_IT_IS, material.clone());
-        let own = bodies(&build.mesh(turned(&at(0.3, x)), AS_IT_IS, other));
+        let build = scene().mesh(at(1.0, 0.0), IDENTITY_PLACEMENT, material.clone());
+        let own = bodies(&build.mesh(inside_out(&at(0.3, x)), IDENTITY_PLACEMENT, other));
         assert_eq!(
             [0, 1].map(|object| (own.solid_id(object), own.is_inside_out(object))),
             [(0, false), (1, true)]
@@ -608,14 +621,14 @@ fn open_glass_matches_with_path_and_photons() {
     let material = tinted(1.8, v(0.5, 0.9, 0.7));
     let sphere = lat_long_sphere(12, 20, 0.7, v(0.0, 0.0, 0.9));
     let middle = |i: usize| sphere.corners(i as u32).iter().sum::<Vec3>() / 3.0;
-    let (bowl, dome) = (part(&sphere, |i| middle(i).z < 0.9), part(&sphere, |i| middle(i).z > 0.95));
+    let (bowl, dome) = (submesh(&sphere, |i| middle(i).z < 0.9), submesh(&sphere, |i| middle(i).z > 0.95));
     // Two parts of a solid that do not touch. Both are open.
     let block = closed(2);
     let height = |i: usize| block.corners(i as u32).iter().map(|corner| corner.z).sum::<f32>() / 3.0;
-    let apart = [part(&block, |i| height(i) > 0.89), part(&block, |i| height(i) < 0.6)];
+    let apart = [submesh(&block, |i| height(i) > 0.89), submesh(&block, |i| height(i) < 0.6)];
     for (what, parts) in [("bowl", vec![bowl]), ("dome", vec![dome]), ("apart", apart.to_vec())] {
         let build = room(&parts, &material);
         assert!(bodies(&build).has_open(), "{what}");
-        assert_same(what, &by_path(build.clone()), &build.photons(8_000, 0.05), 16, 3.5, 0.006);
+        assert_same(what, &path_traced(build.clone()), &build.photons(8_000, 0.05), 16, 3.5, 0.006);
     }
 }

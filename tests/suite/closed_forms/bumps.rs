@@ -9,8 +9,8 @@ use glimt::scene::description::light::Falloff;
 use glimt::scene::description::{Bump, Integrator, Material, NormalMap, ShadowMode, TextureFilter, Wrap};
 
 use super::scenes::{
-    AS_IT_IS, Build, frosted, glass, lat_long_sphere, matte, metal, mirror, phong, plastic, principled,
-    scene, translucent,
+    Build, IDENTITY_PLACEMENT, frosted, glass, lat_long_sphere, matte, metal, mirror, phong, plastic,
+    principled, scene, translucent,
 };
 use super::v;
 
@@ -243,7 +243,7 @@ fn bumpy_balls_have_no_black_edge() {
         let mesh = TriangleMesh { uvs: ball.positions.iter().map(uvs).collect(), ..ball };
         let material = bumped(texture, 0.02, material);
         let build = build
-            .mesh(mesh, AS_IT_IS, material.clone())
+            .mesh(mesh, IDENTITY_PLACEMENT, material.clone())
             .smooth()
             .sphere(v(2.5, 0.0, 0.0), 1.0, material)
             .pictured(v(1.25, 0.0, 5.0), v(1.25, 0.0, 0.0), 42.0, 48, 24);

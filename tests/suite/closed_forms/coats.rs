@@ -5,8 +5,8 @@ use glimt::scene::description::{
     ColorSource, EmissionSource, Integrator, Material, NumberSource, TextureFilter, Wrap,
 };
 
-use super::global::by_paths;
-use super::photons::{assert_same_light, both};
+use super::global::path_traced;
+use super::photons::{assert_same_light, path_and_photon_means};
 use super::scenes::{Build, coated, emitter, matte, metal, mirror, phong, plastic, principled, scene};
 use super::{assert_same_mean, mean_and_error, v};
 
@@ -38,7 +38,7 @@ fn coats_never_gain_energy() {
     for (name, base, least) in bases {
         for (roughness, is_central) in [(0.0, true), (0.3, false), (1.0, false)] {
             let build = in_furnace(coated(1.0, roughness, base.clone()), is_central);
-            for (integrator, build) in [("whitted", build.clone()), ("path", by_paths(build, 1))] {
+            for (integrator, build) in [("whitted", build.clone()), ("path", path_traced(build, 1))] {
                 let (mean, error) = mean_and_error(&build.values(1024, 16));
                 let what = format!("{name} under roughness {roughness}, {integrator}: {mean} ± {error}");
                 assert!(error < 3e-3, "{what}: too noisy");
@@ -65,7 +65,7 @@ fn coated_mirrors_match_the_closed_form() {
         let refracted = (1.0 - (1.0 - cosine * cosine) / 2.25).sqrt();
         let r = f64::from(reflectance);
         let below = (1.0 - fresnel).powi(2) * r / (1.0 - r * fresnel) * tint.powf(1.0 / refracted);
-        for (name, build) in [("whitted", build.clone()), ("path", by_paths(build, 1))] {
+        for (name, build) in [("whitted", build.clone()), ("path", path_traced(build, 1))] {
             let (mean, error) = mean_and_error(&build.values(1024, 16));
             assert!(error < 2e-3, "{name}: too noisy: ± {error}");
             let off = (mean - fresnel - below).abs();
@@ -82,7 +82,7 @@ fn coats_attenuate_and_tint_emission() {
     let build = scene()
         .quad(v(-1.0, 0.0, 1.0), v(2.0, 0.0, 0.0), v(0.0, 0.0, -2.0), lamp)
         .seen(v(0.0, 1.0, 0.0), DVec3::ZERO);
-    for build in [build.clone(), by_paths(build, 1)] {
+    for build in [build.clone(), path_traced(build, 1)] {
         let value = build.value();
         assert!((value - 3.0 * 0.96 * 0.5).abs() < 3e-3, "{value}");
     }
@@ -103,7 +103,7 @@ fn photons_match_path_on_coated_surfaces() {
         .quad(v(-0.5, 1.9, -0.5), v(1.0, 0.0, 0.0), v(0.0, 0.0, 1.0), emitter(4.0))
         .pictured(v(0.0, 1.0, 3.5), v(0.2, 0.6, -0.9), 30.0, 12, 12);
     for depth in [2, 3] {
-        let means = both(&room.clone().depth(depth), depth, [256, 16], (20_000, 0.05));
+        let means = path_and_photon_means(&room.clone().depth(depth), depth, [256, 16], (20_000, 0.05));
         assert_same_light(&format!("depth {depth}"), means, 1e-2, 4e-3);
     }
 }

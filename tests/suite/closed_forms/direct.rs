@@ -8,7 +8,7 @@ use glimt::math::DVec3;
 use glimt::scene::description::ShadowMode;
 use glimt::scene::description::light::Falloff;
 
-use super::scenes::{AS_IT_IS, Build, emitter, lat_long_sphere, matte, receiver};
+use super::scenes::{Build, IDENTITY_PLACEMENT, emitter, lat_long_sphere, matte, receiver};
 use super::{assert_close, assert_mean, lambert, v};
 
 /// Checks the irradiance E for radiance 1, with one and with several shadow rays at equal total cost. The
@@ -200,7 +200,7 @@ fn mesh_light_occludes_itself() {
         }
         mesh.triangles.extend([[first, first + 1, first + 2], [first, first + 2, first + 3]]);
     }
-    let lit = at_origin().mesh(mesh, AS_IT_IS, emitter(1.0));
+    let lit = at_origin().mesh(mesh, IDENTITY_PLACEMENT, emitter(1.0));
     assert_irradiance("two squares", &lit, 0.752_274_688_5, 1.5e-4);
 }
 

@@ -10,7 +10,7 @@ use glimt::scene::description::{
     CoatSource, EmissionSides, EmissionSource, Integrator, Material, NumberSource, OpacitySource, Shape,
 };
 
-use super::scenes::{AS_IT_IS, Build, beckmann, metal, plastic, principled, receiver, scene};
+use super::scenes::{Build, IDENTITY_PLACEMENT, beckmann, metal, plastic, principled, receiver, scene};
 use super::{assert_mean, v};
 
 /// Materials, each with a name for messages.
@@ -32,7 +32,7 @@ fn uncoated(material: Material) -> Material {
 }
 
 /// The scene once per integrator, with the integrator's name.
-fn each(build: &Build) -> [(&'static str, Build); 3] {
+fn with_each_integrator(build: &Build) -> [(&'static str, Build); 3] {
     let path = build.clone().with(|scene| scene.render.integrator = Integrator::Path);
     [("whitted", build.clone()), ("path", path), ("photons", build.clone().photons(256, 0.1))]
 }
@@ -48,7 +48,7 @@ fn square(material: Material, color: Option<[u8; 3]>) -> Build {
         colors: color.map_or(Vec::new(), |color| vec![color; 4]),
         ..TriangleMesh::default()
     };
-    let build = scene().mesh(mesh, AS_IT_IS, material).with(|scene| {
+    let build = scene().mesh(mesh, IDENTITY_PLACEMENT, material).with(|scene| {
         for object in &mut scene.objects {
             if let Shape::Mesh(mesh) = &mut object.shape {
                 mesh.vertex_colors = color.is_some();
@@ -67,10 +67,10 @@ fn half_opacity_halves_the_light() {
         };
         let whole = square(material.clone(), None).value();
         assert!(whole > 0.01, "{name}: {whole}");
-        for (integrator, build) in each(&veiled(0.5)) {
+        for (integrator, build) in with_each_integrator(&veiled(0.5)) {
             assert_mean(&format!("{name} with {integrator}"), &build.values(64, 64), whole * 0.5, 6e-3);
         }
-        for (integrator, build) in each(&veiled(0.0)) {
+        for (integrator, build) in with_each_integrator(&veiled(0.0)) {
             assert!(build.values(4, 4).iter().all(|value| *value == 0.0), "{name} with {integrator}");
         }
     }
@@ -89,7 +89,7 @@ fn half_opacity_halves_two_sided_emission() {
             for (normal, part) in [(DVec3::NEG_Y, 1.0), (DVec3::Y, of_back)] {
                 let lit = receiver(DVec3::ZERO, 0.7).shape(disk(normal), shining.clone()).depth(1);
                 let exact = 0.7 / PI * (PI / 5.0) * part;
-                for (integrator, build) in each(&lit) {
+                for (integrator, build) in with_each_integrator(&lit) {
                     let what = format!("{name} with {integrator}, {sides:?}");
                     let values = build.values(64, 64);
                     if part == 0.0 {
@@ -101,7 +101,7 @@ fn half_opacity_halves_two_sided_emission() {
                 // The camera sees half of the disk's radiance.
                 let seen =
                     scene().shape(disk(normal), shining.clone()).depth(0).seen(DVec3::ZERO, v(0.0, 2.0, 0.1));
-                for (integrator, build) in each(&seen) {
+                for (integrator, build) in with_each_integrator(&seen) {
                     let values = build.values(64, 64);
                     match part == 0.0 {
                         true => assert!(values.iter().all(|value| *value == 0.0), "{name} with {integrator}"),
@@ -130,7 +130,7 @@ fn vertex_colors_multiply_metal_and_base_color() {
             (square(colored.clone(), None).value() / exact - 1.0).abs() > 0.05,
             "{name}: the vertex color must have an effect"
         );
-        for (integrator, build) in each(&gray(colored)) {
+        for (integrator, build) in with_each_integrator(&gray(colored)) {
             assert_mean(&format!("{name} with {integrator}"), &build.values(16, 64), exact, 8e-3);
         }
     }

@@ -9,11 +9,11 @@ use glimt::math::{DVec3, Vec2, Vec3};
 use glimt::scene::description::light::Falloff;
 use glimt::scene::description::{Bump, NormalMap, ShadowMode, TextureFilter, Wrap};
 
-use super::scenes::{AS_IT_IS, Build, emitter, lat_long_sphere, matte, scene};
+use super::scenes::{Build, IDENTITY_PLACEMENT, emitter, lat_long_sphere, matte, scene};
 use super::v;
 
 /// Number of lit pixels in an image, and the largest pixel value.
-fn lit(build: &Build) -> (usize, f64) {
+fn lit_pixels_and_maximum(build: &Build) -> (usize, f64) {
     let picture = build.picture(1, 0);
     let most = picture.iter().map(|color| color.max_element()).fold(0.0, f64::max);
     (picture.iter().filter(|color| color.max_element() > 0.0).count(), most)
@@ -34,11 +34,16 @@ fn cube(least: DVec3, greatest: DVec3) -> TriangleMesh {
 fn smooth_cube_lit_from_outside_is_dark_inside() {
     for light in [v(3.0, 4.0, 2.0), v(-2.0, 0.1, 0.3), v(0.3, 1.2, -5.0)] {
         let build = scene()
-            .mesh(cube(DVec3::splat(-1.0), DVec3::ONE), AS_IT_IS, matte(0.8))
+            .mesh(cube(DVec3::splat(-1.0), DVec3::ONE), IDENTITY_PLACEMENT, matte(0.8))
             .smooth()
             .point_light(light, 100.0, Falloff::Square)
             .pictured(v(0.3, 0.2, 0.9), v(-0.4, -0.3, -1.0), 90.0, 64, 64);
-        assert_eq!(lit(&build).0, 0, "light at {light}, brightest pixel {}", lit(&build).1);
+        assert_eq!(
+            lit_pixels_and_maximum(&build).0,
+            0,
+            "light at {light}, brightest pixel {}",
+            lit_pixels_and_maximum(&build).1
+        );
     }
 }
 
@@ -49,12 +54,17 @@ fn smooth_ball_in_a_tight_shell_is_dark() {
         let ball = lat_long_sphere(7, 12, 1.0, DVec3::ZERO);
         let out = v((PI / 12.0).cos(), 0.0, (PI / 12.0).sin());
         let build = scene()
-            .mesh(ball, AS_IT_IS, matte(0.8))
+            .mesh(ball, IDENTITY_PLACEMENT, matte(0.8))
             .smooth()
             .sphere(DVec3::ZERO, 1.0 + gap, matte(0.8))
             .point_light(v(2.0, 3.0, 1.5), 100.0, Falloff::Square)
             .pictured(out * (1.0 + 0.9 * gap), out * 0.5 + v(0.0, 0.2, 0.0), 120.0, 64, 64);
-        assert_eq!(lit(&build).0, 0, "gap {gap}, brightest pixel {}", lit(&build).1);
+        assert_eq!(
+            lit_pixels_and_maximum(&build).0,
+            0,
+            "gap {gap}, brightest pixel {}",
+            lit_pixels_and_maximum(&build).1
+        );
     }
 }
 
@@ -76,7 +86,7 @@ fn coarse_smooth_ball_is_shaded_like_a_sphere() {
                 continue;
             }
             let value = scene()
-                .mesh(ball.clone(), AS_IT_IS, matte(1.0))
+                .mesh(ball.clone(), IDENTITY_PLACEMENT, matte(1.0))
                 .smooth()
                 .point_light(to_light * 1e4, 1.0, Falloff::None)
                 .seen(normal * 3.0, DVec3::ZERO)
@@ -113,7 +123,7 @@ fn layer(mesh: &TriangleMesh, size: f64, turned: bool) -> TriangleMesh {
     layer
 }
 
-fn joined(mut mesh: TriangleMesh, other: &TriangleMesh) -> TriangleMesh {
+fn merged(mut mesh: TriangleMesh, other: &TriangleMesh) -> TriangleMesh {
     let first = mesh.positions.len() as u32;
     mesh.positions.extend(&other.positions);
     mesh.triangles.extend(other.triangles.iter().map(|triangle| triangle.map(|corner| corner + first)));
@@ -122,7 +132,7 @@ fn joined(mut mesh: TriangleMesh, other: &TriangleMesh) -> TriangleMesh {
 
 /// Distance from the center to the nearest surface in the given direction.
 fn radius_of(mesh: &TriangleMesh, direction: DVec3) -> f64 {
-    let world = scene().mesh(mesh.clone(), AS_IT_IS, matte(0.5)).world();
+    let world = scene().mesh(mesh.clone(), IDENTITY_PLACEMENT, matte(0.5)).world();
     let hit = world.geometry.closest_hit(&Ray::new(Vec3::ZERO, direction.as_vec3()));
     f64::from(hit.expect("the mesh must surround the center").shape.t)
 }
@@ -137,7 +147,7 @@ fn closed(number: u32, random: &mut TestRandom) -> Build {
     let (walls, eye) = match number % 5 {
         0 => (vec![mesh], towards * 0.1 * random.unit()),
         1 => (
-            vec![joined(layer(&mesh, 1.0 + gap, false), &layer(&mesh, 1.0, true))],
+            vec![merged(layer(&mesh, 1.0 + gap, false), &layer(&mesh, 1.0, true))],
             towards * 0.1 * random.unit(),
         ),
         2 => (vec![layer(&mesh, 1.0, random.unit() < 0.5)], towards * 0.3 * radius_of(&mesh, towards)),
@@ -158,7 +168,7 @@ fn closed(number: u32, random: &mut TestRandom) -> Build {
     let placed = match number % 7 {
         0 => [v(1.0, 1.3, 0.8), v(10.0, 70.0, -20.0), v(3.0, -2.0, 5.0)],
         1 => [v(-1.0, 1.0, 1.0), DVec3::ZERO, v(0.0, 0.3, 0.0)],
-        _ => AS_IT_IS,
+        _ => IDENTITY_PLACEMENT,
     };
     let transform =
         glimt::math::transform::Transform::scale_rotate_translate(placed[0], placed[1], placed[2]);
@@ -199,7 +209,7 @@ fn no_light_enters_a_closed_opaque_mesh() {
     let mut leaky = Vec::new();
     for number in 0..1000 {
         let build = closed(number, &mut random);
-        let (count, most) = lit(&build);
+        let (count, most) = lit_pixels_and_maximum(&build);
         if count > 0 {
             leaky.push((number, count, most));
         }

@@ -11,7 +11,9 @@ use glimt::scene::description::{
     Accel, ColorSource, MaterialKind, PhongParameters, ShadowMode, Shape, TextureFilter, Wrap,
 };
 
-use super::scenes::{AS_IT_IS, Build, emitter, glass, lat_long_sphere, matte, mirror, phong, scene};
+use super::scenes::{
+    Build, IDENTITY_PLACEMENT, emitter, glass, lat_long_sphere, matte, mirror, phong, scene,
+};
 use super::v;
 
 /// √(Σ(a − b)²/Σb²) over all pixels and channels.
@@ -23,7 +25,7 @@ fn difference(a: &[DVec3], b: &[DVec3]) -> f64 {
 
 /// A scene of size 8, moved to `at`. It contains a mesh, a point light, and every shape, some of them
 /// emissive. All coordinates are multiples of 1/1024, so that sums are exact.
-fn everything_at(at: DVec3, accel: Accel) -> Build {
+fn all_objects_at(at: DVec3, accel: Accel) -> Build {
     let p = |x: f64, y: f64, z: f64| at + (v(x, y, z) * 1024.0).round() / 1024.0;
     let d = |x: f64, y: f64, z: f64| (v(x, y, z) * 1024.0).round() / 1024.0;
     let shiny = phong(0.5, 0.3, 20.0, 0.0);
@@ -85,9 +87,9 @@ fn everything_at(at: DVec3, accel: Accel) -> Build {
 #[test]
 fn scene_far_from_the_origin_looks_the_same() {
     for accel in [Accel::Bvh, Accel::KdTree] {
-        let near = everything_at(DVec3::ZERO, accel).picture(4, 3);
+        let near = all_objects_at(DVec3::ZERO, accel).picture(4, 3);
         for far in [1e4, 1e6, 1e8] {
-            let moved = everything_at(v(far, -0.5 * far, 0.25 * far), accel).picture(4, 3);
+            let moved = all_objects_at(v(far, -0.5 * far, 0.25 * far), accel).picture(4, 3);
             let off = difference(&moved, &near);
             assert!(off <= 1e-3, "moved by {far}, {accel:?}: {off}");
         }
@@ -97,10 +99,10 @@ fn scene_far_from_the_origin_looks_the_same() {
 #[test]
 fn distant_object_does_not_reduce_precision() {
     for accel in [Accel::Bvh, Accel::KdTree] {
-        let near = everything_at(DVec3::ZERO, accel).picture(4, 3);
+        let near = all_objects_at(DVec3::ZERO, accel).picture(4, 3);
         let far = v(1e8, 2e7, 3e7);
-        let with_ball = everything_at(DVec3::ZERO, accel).sphere(far, 0.5, matte(0.5));
-        let with_mesh = everything_at(DVec3::ZERO, accel).mesh(
+        let with_ball = all_objects_at(DVec3::ZERO, accel).sphere(far, 0.5, matte(0.5));
+        let with_mesh = all_objects_at(DVec3::ZERO, accel).mesh(
             lat_long_sphere(3, 4, 0.5, DVec3::ZERO),
             [DVec3::ONE, DVec3::ZERO, far],
             matte(0.5),
@@ -143,7 +145,7 @@ fn plane_texture_is_stable_far_from_origin() {
 }
 
 /// A text-format mesh file, moved by adding `at` to its coordinates in double precision.
-fn text_of(mesh: &TriangleMesh, at: DVec3, ending: &str) -> String {
+fn mesh_file_text(mesh: &TriangleMesh, at: DVec3, ending: &str) -> String {
     let points = mesh.positions.iter().map(|p| p.as_dvec3() + at);
     let (vertices, faces) = (mesh.positions.len(), mesh.triangles.len());
     let prefix = if ending == "obj" { "v " } else { "" };
@@ -176,16 +178,17 @@ fn mesh_files_keep_distant_vertices() {
             // With seed 1, a sample lies exactly on a facet's edge, where the result depends on rounding.
             .picture(2, 2)
     };
-    let near = seen(scene().mesh(ball.clone(), AS_IT_IS, matte(0.8)), DVec3::ZERO);
+    let near = seen(scene().mesh(ball.clone(), IDENTITY_PLACEMENT, matte(0.8)), DVec3::ZERO);
     let folder = tempfile::tempdir().expect("a folder");
     for far in [v(1e6, 0.0, 0.0), v(1e8, -5e7, 3e7)] {
         for ending in ["obj", "off", "ply"] {
             let path = folder.path().join(format!("ball.{ending}"));
-            std::fs::write(&path, text_of(&ball, far, ending)).expect("written");
+            std::fs::write(&path, mesh_file_text(&ball, far, ending)).expect("written");
             let loaded = load(Path::new(&path), &ignore_progress, &CancelToken::new()).expect("a mesh");
             assert_eq!(loaded.mesh.triangles.len(), ball.triangles.len(), "{ending}");
             // Render the mesh at its position in the file, and moved back by the scene.
-            let off = difference(&seen(scene().loaded(loaded.clone(), AS_IT_IS, matte(0.8)), far), &near);
+            let off =
+                difference(&seen(scene().loaded(loaded.clone(), IDENTITY_PLACEMENT, matte(0.8)), far), &near);
             assert!(off <= 1e-3, "{ending} at {far}: {off}");
             let back = [DVec3::ONE, DVec3::ZERO, -far];
             let off = difference(&seen(scene().loaded(loaded, back, matte(0.8)), DVec3::ZERO), &near);

@@ -12,11 +12,11 @@ use super::scenes::{Build, emitter, matte, scene};
 use super::v;
 
 /// Adds samples `from..to` of every pixel to a film.
-fn go_on(film: &Film, world: &World, build: &Build, seed: u32, from: u32, to: u32) {
+fn add_samples(film: &Film, world: &World, build: &Build, seed: u32, from: u32, to: u32) {
     for tile in 0..film.tile_count() {
         let rect = film.tile_rect(tile).expect("a tile");
         let done = render_tile(world, &build.settings(seed), rect, from..to, &CancelToken::new());
-        film.add_samples(tile, done.expect("the token is not cancelled").0);
+        film.add_samples(tile, done.expect("the token is not canceled").0);
     }
 }
 
@@ -32,7 +32,7 @@ fn filters_preserve_a_constant_image() {
             let build = scene().background(0.7).pictured(v(0.0, 0.0, 0.0), v(0.0, 0.0, -1.0), 40.0, 40, 33);
             let build = build.with(|scene| scene.render.filter = filter);
             let film = film(&build);
-            go_on(&film, &build.world(), &build, 3, 0, samples);
+            add_samples(&film, &build.world(), &build, 3, 0, samples);
             for pixel in film.radiance_image().pixels {
                 let off = (pixel - 0.7).abs().max_element();
                 assert!(off <= 0.7e-5, "{filter:?}, {samples} samples: {pixel}");
@@ -77,7 +77,7 @@ fn error_estimate_matches_spread_over_seeds() {
         let mut done = 0;
         for samples in [16, 64, 256, 1024] {
             for (film, seed) in films.iter().zip(1..) {
-                go_on(film, &world, &build, seed, done, samples);
+                add_samples(film, &world, &build, seed, done, samples);
             }
             done = samples;
             // The variance of a pixel over seeds requires no reference image.

@@ -175,7 +175,7 @@ fn mirror_ball_matches_its_smooth_mesh() {
     };
     let ball = off(seen(build.clone().sphere(v(0.0, 0.0, -5.0), 0.5, mirror(1.0))));
     let mesh = lat_long_sphere(40, 80, 0.5, v(0.0, 0.0, -5.0));
-    let facets = off(seen(build.clone().mesh(mesh, super::scenes::AS_IT_IS, mirror(1.0)).smooth()));
+    let facets = off(seen(build.clone().mesh(mesh, super::scenes::IDENTITY_PLACEMENT, mirror(1.0)).smooth()));
     let flat = off(seen(build.quad(v(-1.0, -1.0, -5.0), v(2.0, 0.0, 0.0), v(0.0, 2.0, 0.0), mirror(1.0))));
     assert!(ball < 0.2 && flat > 0.35, "{ball} {flat}");
     assert!((ball - facets).abs() < 0.05, "{ball} {facets}");

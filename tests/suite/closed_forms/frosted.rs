@@ -7,8 +7,8 @@ use glimt::scene::description::{
     EmissionSource, Integrator, Material, MaterialKind, NumberSource, ShadowMode, Shape,
 };
 
-use super::global::by_paths;
-use super::photons::{assert_same_light, both};
+use super::global::path_traced;
+use super::photons::{assert_same_light, path_and_photon_means};
 use super::scenes::{
     Build, beckmann, coated, emitter, frosted, glass, matte, metal, mirror, plastic, scene, tinted,
     translucent,
@@ -55,13 +55,13 @@ fn boundaries() -> Vec<(String, Build, DVec3)> {
 fn techniques_agree_on_transmitted_light() {
     for (what, build, at) in boundaries() {
         let lit = build.clone().sphere(at, 0.5, emitter(2.0));
-        let path = mean_and_error(&by_paths(lit.clone(), 1).values(1024, 16));
+        let path = mean_and_error(&path_traced(lit.clone(), 1).values(1024, 16));
         let whitted = lit.clone().depth(1);
         let sampled = whitted.clone().shadows(ShadowMode::Off, 1);
         // Light samples cannot find a light inside a glass shell without refraction, but lobe samples can.
         let inside = what.contains("from outside");
         let shell = glass(if inside { 1.5 } else { 1.0 });
-        let hidden = by_paths(lit.clone().sphere(at, 0.55, shell), 2);
+        let hidden = path_traced(lit.clone().sphere(at, 0.55, shell), 2);
         for (technique, build, samples) in
             [("whitted", &whitted, 1024), ("light samples", &sampled, 4096), ("lobes", &hidden, 4096)]
         {
@@ -85,7 +85,7 @@ fn every_light_shines_through_rough_glass() {
         };
         let point = |build: Build| build.point_light(at, 1.0, Falloff::Square);
         for (lit, build) in [("twelve", lamps(build.clone())), ("a point", point(build.clone()))] {
-            let path = mean_and_error(&by_paths(build.clone(), 1).values(2048, 16));
+            let path = mean_and_error(&path_traced(build.clone(), 1).values(2048, 16));
             let whitted = mean_and_error(&build.depth(1).values(2048, 16));
             assert_same_mean(&format!("{what}, {lit}"), whitted, path, 0.01);
         }
@@ -104,7 +104,7 @@ fn whitted_follows_rough_glass_like_path() {
             .seen(v(-1.0, 1.0, 0.2), v(0.0, 0.15, 0.0));
         for depth in [1, 2, 4] {
             let whitted = mean_and_error(&build.clone().depth(depth).values(1024, 16));
-            let path = mean_and_error(&by_paths(build.clone(), depth).values(1024, 16));
+            let path = mean_and_error(&path_traced(build.clone(), depth).values(1024, 16));
             assert_same_mean(&format!("roughness {roughness}, depth {depth}"), whitted, path, 0.02);
         }
     }
@@ -123,7 +123,9 @@ fn rough_glass_adds_no_light_in_a_furnace() {
                 .environment(1.0)
                 .sphere(v(0.0, 0.0, -5.0), 1.0, material)
                 .seen(DVec3::ZERO, v(0.3, 0.1, -4.0));
-            for (integrator, build) in [("whitted", build.clone().depth(64)), ("path", by_paths(build, 64))] {
+            for (integrator, build) in
+                [("whitted", build.clone().depth(64)), ("path", path_traced(build, 64))]
+            {
                 let (mean, error) = mean_and_error(&build.values(512, 16));
                 let told = format!("{what}, roughness {roughness}, {integrator}: {mean} ± {error}");
                 assert!(error < 5e-3, "too noisy: {told}");
@@ -143,7 +145,7 @@ fn rough_glass_with_ior_1_is_invisible() {
         .sphere(v(0.0, 0.0, -5.0), 1.0, frosted(1.0, 0.5))
         .seen(DVec3::ZERO, v(0.3, 0.0, -5.0));
     assert_close("alone", build.value(), 0.7);
-    assert_close("path", by_paths(build, 4).value(), 0.7);
+    assert_close("path", path_traced(build, 4).value(), 0.7);
 }
 
 #[test]
@@ -196,7 +198,7 @@ fn room() -> Build {
 #[test]
 fn photons_match_path_through_rough_glass() {
     for depth in [1, 2, 3, 5] {
-        let means = both(&room().depth(depth), depth, [128, 16], (8_000, 0.05));
+        let means = path_and_photon_means(&room().depth(depth), depth, [128, 16], (8_000, 0.05));
         assert_same_light(&format!("depth {depth}"), means, 1.2e-2, 4e-3);
     }
 }
@@ -219,12 +221,12 @@ fn photons_scatter_to_both_sides_of_rough_glass() {
             .depth(depth)
     };
     for depth in [2, 6] {
-        let means = both(&room(depth), depth, [1024, 28], (20_000, 0.03));
+        let means = path_and_photon_means(&room(depth), depth, [1024, 28], (20_000, 0.03));
         assert_same_light(&format!("depth {depth}"), means, 1.2e-2, 4e-3);
     }
     // The matte box, seen from inside the frosted one.
     let inside = room(6).pictured(v(-0.2, 0.38, 0.2), v(-0.4, 0.29, 0.0), 60.0, 8, 8);
-    let means = both(&inside, 6, [256, 14], (20_000, 0.03));
+    let means = path_and_photon_means(&inside, 6, [256, 14], (20_000, 0.03));
     assert_same_light("inside", means, 4e-2, 4e-3);
 }
 
@@ -277,7 +279,7 @@ fn clear_coat_attenuates_emission() {
         let from = v((1.0 - cosine * cosine).sqrt(), cosine, 0.0) * 3.0;
         let lamp = scene().quad(v(-1.0, 0.0, 1.0), v(2.0, 0.0, 0.0), v(0.0, 0.0, -2.0), coated_lamp(3.0));
         let seen = lamp.seen(from, DVec3::ZERO);
-        for build in [seen.clone(), by_paths(seen, 2)] {
+        for build in [seen.clone(), path_traced(seen, 2)] {
             let value = build.value();
             assert!((value / (3.0 * left(cosine)) - 1.0).abs() < 4e-3, "{cosine}: {value}");
         }
@@ -301,10 +303,10 @@ fn clear_coat_attenuates_emission() {
         // Light samples cannot find a light inside a glass shell.
         let hidden = lit.clone().sphere(v(0.0, 1.0, 0.0), 0.75, glass(1.0));
         let photons = hidden.clone().depth(3).photons(5_000, 0.2);
-        let mut found = vec![("path", means(&by_paths(lit, 1), 64)), ("photons", means(&photons, 16))];
+        let mut found = vec![("path", means(&path_traced(lit, 1), 64)), ("photons", means(&photons, 16))];
         // Test lobe samples, the most expensive technique, only with one shape.
         if number == 0 {
-            found.push(("lobes", means(&by_paths(hidden, 3), 512)));
+            found.push(("lobes", means(&path_traced(hidden, 3), 512)));
         }
         for (technique, found) in found {
             let error = found.1.hypot(samples.1);
@@ -369,7 +371,7 @@ fn light_in_rough_glass_matches_path() {
         .sphere(v(0.0, 0.2, -5.0), 0.4, emitter(1.0))
         .seen(DVec3::ZERO, v(0.5, 0.3, -4.2));
     let whitted = mean_and_error(&build.clone().depth(1).values(1024, 16));
-    let path = mean_and_error(&by_paths(build, 1).values(1024, 16));
+    let path = mean_and_error(&path_traced(build, 1).values(1024, 16));
     assert_same_mean("whitted", whitted, path, 6e-3);
 }
 
@@ -387,7 +389,7 @@ fn sheet_on_glass_transmits_into_the_glass() {
     let block =
         |material: Material| scene().cuboid(v(0.0, -0.3, 0.0), v(1.0, 0.6, 1.0), DVec3::ZERO, material);
     let black = seen(label(block(matte(0.0)), 0.01));
-    let (exact, _) = mean_and_error(&by_paths(black, 8).values(256, 16));
+    let (exact, _) = mean_and_error(&path_traced(black, 8).values(256, 16));
     for (what, build) in [
         ("after", seen(label(block(tinted(1.5, DVec3::ZERO)), 0.0))),
         (
@@ -400,7 +402,7 @@ fn sheet_on_glass_transmits_into_the_glass() {
             )),
         ),
     ] {
-        let means = both(&build, 8, [256, 64], (2_000, 0.05));
+        let means = path_and_photon_means(&build, 8, [256, 64], (2_000, 0.05));
         assert!(
             means.iter().all(|(mean, _)| (mean - exact).abs() < 0.02 * exact),
             "{what}: {means:?}, {exact}"
@@ -411,7 +413,7 @@ fn sheet_on_glass_transmits_into_the_glass() {
     for from in [v(0.0, 2.4, 1.5), v(0.2, -2.4, 1.0)] {
         let clear = label(block(glass(1.5)), 0.0).environment(1.0).depth(8);
         let clear = clear.pictured(from, DVec3::ZERO, 8.0, 4, 4);
-        let means = both(&clear, 8, [128, 14], (20_000, 0.03));
+        let means = path_and_photon_means(&clear, 8, [128, 14], (20_000, 0.03));
         assert_same_light(&format!("from {from}"), means, 1e-2, 6e-3);
         assert!(means.iter().all(|(mean, error)| *mean < 1.0 + 4.0 * error), "{means:?}");
     }
@@ -430,7 +432,7 @@ fn photons_pass_rough_glass_with_ior_1() {
     let two = two.sphere(v(-0.5, 1.0, 0.0), 0.2, matte(0.8)).sphere(v(0.5, 1.0, 0.0), 0.2, emitter(6.0));
     for (what, build) in [("IOR of air", air), ("two blocks", two)] {
         let build = build.pictured(v(0.0, 1.6, 4.0), v(0.0, 0.5, 0.0), 24.0, 8, 8).depth(6);
-        let means = both(&build, 6, [512, 16], (20_000, 0.05));
+        let means = path_and_photon_means(&build, 6, [512, 16], (20_000, 0.05));
         assert_same_light(what, means, 1.5e-2, 4e-3);
     }
 }
@@ -452,7 +454,7 @@ fn sheet_on_glass_adds_no_light() {
         ("before", sheet(scene()).shape(half_space, glass(1.5))),
     ] {
         let means = |build: Build| {
-            let values: Vec<f64> = by_paths(build, 4).values(1024, 32);
+            let values: Vec<f64> = path_traced(build, 4).values(1024, 32);
             mean_and_error(&values)
         };
         let (air, inside) = (means(sheet(scene())), means(build));

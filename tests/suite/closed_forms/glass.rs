@@ -9,7 +9,9 @@ use glimt::math::{DVec3, Vec3};
 use glimt::scene::description::{Material, MeshReference, Shape};
 use glimt::world::Geometry;
 
-use super::scenes::{AS_IT_IS, Build, emitter, file_material, glass, lat_long_sphere, scene, tinted};
+use super::scenes::{
+    Build, IDENTITY_PLACEMENT, emitter, file_material, glass, lat_long_sphere, scene, tinted,
+};
 use super::{assert_close, assert_mean, v};
 
 /// Direction of a downward ray at an angle to the vertical.
@@ -92,7 +94,7 @@ fn slab_shifts_rays_laterally() {
 }
 
 /// Traces a ray through glass with n = 1.5 until it leaves. `None` for total internal reflection.
-fn through(geometry: &Geometry, mut ray: Ray) -> Option<Ray> {
+fn exit_ray(geometry: &Geometry, mut ray: Ray) -> Option<Ray> {
     while let Some(hit) = geometry.closest_hit(&ray) {
         let surface = geometry.surface(&ray, &hit);
         let entering = surface.normal.dot(ray.direction) < 0.0;
@@ -117,13 +119,13 @@ fn prism_has_analytic_minimum_deviation() {
     for [a, b] in [[0, 1], [1, 2], [2, 0]] {
         mesh.triangles.extend([[a, b, b + 3], [a, b + 3, a + 3]]);
     }
-    let world = scene().mesh(mesh, AS_IT_IS, glass(1.5)).world();
+    let world = scene().mesh(mesh, IDENTITY_PLACEMENT, glass(1.5)).world();
     // Toward the left face, whose normal is 150° from +x.
     let deviation = |incidence: f64| {
         let heading = (incidence - 30.0).to_radians();
         let direction = v(heading.cos(), heading.sin(), 0.0);
         let target = v(-3.0_f64.sqrt() / 4.0, 0.25, 0.1);
-        let out = through(&world.geometry, Ray::new((target - direction).as_vec3(), direction.as_vec3()));
+        let out = exit_ray(&world.geometry, Ray::new((target - direction).as_vec3(), direction.as_vec3()));
         out.map_or(f64::INFINITY, |ray| {
             let out = ray.direction.as_dvec3();
             out.cross(direction).length().atan2(out.dot(direction)).to_degrees()
@@ -144,7 +146,7 @@ fn ball_lens_focuses_paraxial_rays() {
         assert_close("the formula", formula, exact);
         let start = Vec3::new(h as f32, 0.0, 3.0);
         let out =
-            through(&world.geometry, Ray::new(start, Vec3::NEG_Z)).expect("no total internal reflection");
+            exit_ray(&world.geometry, Ray::new(start, Vec3::NEG_Z)).expect("no total internal reflection");
         let (o, d) = (out.origin.as_dvec3(), out.direction.as_dvec3());
         assert_close(&format!("h = {h}"), -(o.z - d.z * o.x / d.x), formula);
     }
@@ -160,7 +162,7 @@ fn lossless_glass_under_a_sky_is_invisible() {
         .sphere(v(1.2, 0.0, -5.0), 1.0, glass(2.4))
         .sphere(v(1.2, 0.0, -5.0), 0.6, glass(1.0))
         .cuboid(v(0.0, 2.0, -5.0), v(1.5, 1.0, 1.0), v(10.0, 20.0, 30.0), glass(1.33))
-        .mesh(ball, AS_IT_IS, glass(1.5))
+        .mesh(ball, IDENTITY_PLACEMENT, glass(1.5))
         .background(1.0)
         .depth(2000);
     for target in [
@@ -332,7 +334,7 @@ fn shading_normals_create_no_light() {
     // not count as outside.
     let mut ball = lat_long_sphere(8, 10, 1.0, DVec3::ZERO);
     ball.normals = ball.positions.iter().map(|p| p.normalize()).collect();
-    let seen = scene().mesh(ball, AS_IT_IS, glass(1.5)).background(1.0).depth(50).with(|scene| {
+    let seen = scene().mesh(ball, IDENTITY_PLACEMENT, glass(1.5)).background(1.0).depth(50).with(|scene| {
         if let Shape::Mesh(MeshReference { smooth, .. }) = &mut scene.objects[0].shape {
             *smooth = true;
         }

@@ -14,7 +14,7 @@ use super::scenes::{Build, emitter, glass, lat_long_sphere, matte, mirror, phong
 use super::{assert_close, assert_mean, assert_same_mean, lambert, mean_and_error, v};
 
 /// A path-traced scene.
-pub fn by_paths(build: Build, max_depth: u32) -> Build {
+pub fn path_traced(build: Build, max_depth: u32) -> Build {
     build.with(|scene| scene.render.integrator = Integrator::Path).depth(max_depth)
 }
 
@@ -41,7 +41,7 @@ fn furnace_sums_bounces_up_to_the_depth() {
     // L = E·(1 + ρ + … + ρᵏ), as every path vertex receives the same light.
     for (reflectance, seeds) in [(0.5_f64, 16), (0.8, 32)] {
         for depth in [0, 1, 2, 3, 8, 60] {
-            let values = by_paths(room(1.0, reflectance as f32, 0.0), depth).values(512, seeds);
+            let values = path_traced(room(1.0, reflectance as f32, 0.0), depth).values(512, seeds);
             let exact = (1.0 - reflectance.powi(depth as i32 + 1)) / (1.0 - reflectance);
             assert_mean(&format!("ρ {reflectance}, depth {depth}"), &values, exact, 5e-3);
         }
@@ -53,7 +53,7 @@ fn integrating_sphere_has_uniform_indirect_light() {
     // R = 1, ρ = 0.5, and I = 1 W/sr at x = 0.5. The indirect irradiance is 1, so L = ρ/π·(1 + I·cos/d²).
     let sphere = |to: DVec3| {
         let walls = scene().sphere(DVec3::ZERO, 1.0, matte(0.5)).seen(v(0.0, 0.1, 0.0), to);
-        by_paths(walls.point_light(v(0.5, 0.0, 0.0), 1.0, Falloff::Square), 60)
+        path_traced(walls.point_light(v(0.5, 0.0, 0.0), 1.0, Falloff::Square), 60)
     };
     for (to, exact) in [(v(1.0, 0.0, 0.0), 0.795_774_715_5), (v(-1.0, 0.0, 0.0), 0.229_890_473_4)] {
         // The direct component is 4 at the near wall and 4/9 at the far wall.
@@ -68,8 +68,8 @@ fn concentric_spheres_exchange_light() {
     // 2/3, or 0.2 with direct light only.
     let spheres =
         || scene().sphere(DVec3::ZERO, 1.0, phong(0.5, 0.0, 1.0, 1.0)).sphere(DVec3::ZERO, 2.0, matte(0.8));
-    let inner = by_paths(spheres().seen(v(1.5, 0.2, 0.0), DVec3::ZERO), 80);
-    let outer = |depth| by_paths(spheres().seen(v(1.5, 0.2, 0.0), v(2.0, 0.0, 0.3)), depth);
+    let inner = path_traced(spheres().seen(v(1.5, 0.2, 0.0), DVec3::ZERO), 80);
+    let outer = |depth| path_traced(spheres().seen(v(1.5, 0.2, 0.0), v(2.0, 0.0, 0.3)), depth);
     assert_mean("inner", &inner.values(1024, 32), 4.0 / 3.0, 1e-3);
     assert_mean("outer", &outer(80).values(1024, 32), 2.0 / 3.0, 3e-3);
     assert_mean("outer, direct", &outer(1).values(256, 16), 0.2, 5e-6);
@@ -84,7 +84,7 @@ fn emissive_ball_in_a_mirror_sees_itself() {
     let inside = ball.sphere(DVec3::ZERO, 2.0, mirror(0.6)).seen(v(1.5, 0.2, 0.0), DVec3::ZERO);
     for (depth, turns) in [(2, 1), (5, 2), (9, 4), (40, 20)] {
         let exact = (1.0 - 0.48_f64.powi(turns + 1)) / (1.0 - 0.48);
-        let values = by_paths(inside.clone(), depth).values(1024, 32);
+        let values = path_traced(inside.clone(), depth).values(1024, 32);
         assert_mean(&format!("depth {depth}"), &values, exact, 2e-3);
     }
 }
@@ -107,7 +107,7 @@ fn two_plates_exchange_light() {
     };
     for (at, exact) in [(0.0, 5.0 / 3.0), (1.0, 4.0 / 3.0)] {
         // Four standard errors are at most 0.1 %.
-        let values = by_paths(plates(at), 100).values(16384, 96);
+        let values = path_traced(plates(at), 100).values(16384, 96);
         assert_mean("plates", &values, exact, 2.5e-4);
         assert!((mean_and_error(&values).0 - exact).abs() <= 1e-3 * exact);
     }
@@ -120,7 +120,7 @@ fn lossless_mirrors_and_glass_conserve_light() {
     for (what, material) in [("mirror", mirror(1.0)), ("glass", glass(1.5)), ("diamond", glass(2.4))] {
         let ball =
             scene().sphere(DVec3::ZERO, 1.0, material).pictured(v(0.0, 0.0, 4.0), DVec3::ZERO, 30.0, 16, 16);
-        let picture = by_paths(ball.background(1.0), 200).picture(4, 0);
+        let picture = path_traced(ball.background(1.0), 200).picture(4, 0);
         for pixel in picture {
             assert!((pixel.x - 1.0).abs() < 1e-5, "{what}: {pixel}");
         }
@@ -130,13 +130,13 @@ fn lossless_mirrors_and_glass_conserve_light() {
 #[test]
 fn background_is_visible_only_in_mirrors() {
     let floor = || scene().quad(v(-5.0, 0.0, 5.0), v(10.0, 0.0, 0.0), v(0.0, 0.0, -10.0), matte(0.9));
-    let lit = by_paths(floor().background(1.0).seen(v(0.0, 1.0, 0.0), DVec3::ZERO), 8);
+    let lit = path_traced(floor().background(1.0).seen(v(0.0, 1.0, 0.0), DVec3::ZERO), 8);
     assert_eq!(lit.values(64, 1), [0.0]);
     let behind = floor().quad(v(-5.0, 4.0, 5.0), v(0.0, 0.0, -10.0), v(10.0, 0.0, 0.0), mirror(0.5));
-    let seen = by_paths(behind.background(1.0).seen(v(0.0, 1.0, 0.0), v(3.0, 4.0, 8.0)), 8);
+    let seen = path_traced(behind.background(1.0).seen(v(0.0, 1.0, 0.0), v(3.0, 4.0, 8.0)), 8);
     let one = seen.values(4, 1)[0];
     assert!(one == 0.5 || one == 1.0, "{one}");
-    let indirect = by_paths(seen.seen(v(0.0, 1.0, 0.0), DVec3::ZERO), 8);
+    let indirect = path_traced(seen.seen(v(0.0, 1.0, 0.0), DVec3::ZERO), 8);
     assert_eq!(indirect.values(64, 1), [0.0], "the mirror must not transmit the background");
 }
 
@@ -147,7 +147,7 @@ fn paths_find_emission_through_glass() {
         if with_glass {
             build = build.sphere(v(0.2, -0.3, 0.1), 0.4, glass(1.5));
         }
-        by_paths(build, 60).values(512, 16)
+        path_traced(build, 60).values(512, 16)
     };
     // A closed furnace in equilibrium has radiance 2 in every direction, with or without lossless glass in
     // it.
@@ -165,7 +165,7 @@ fn path_components_add_up() {
             .sphere(v(-0.5, -0.5, 0.0), 0.4, mirror(0.8))
             .point_light(v(0.0, 0.5, 0.8), 0.5, Falloff::Square)
             .pictured(v(0.0, 0.0, 0.9), v(0.0, -0.3, 0.0), 80.0, 24, 16);
-        by_paths(room, 6).viewed(view).picture(8, 3)
+        path_traced(room, 6).viewed(view).picture(8, 3)
     };
     let beauty = build(ViewMode::Beauty);
     let parts = [ViewMode::Ambient, ViewMode::Diffuse, ViewMode::Specular, ViewMode::Emission].map(build);
@@ -184,7 +184,7 @@ fn path_components_add_up() {
 }
 
 /// Every kind of light, large and close to a floor with the specified material.
-pub fn lamps_over_a_floor(material: &Material) -> Vec<(&'static str, Build)> {
+pub fn lights_over_a_floor(material: &Material) -> Vec<(&'static str, Build)> {
     let floor = || {
         let corner = v(-0.05, 0.0, 0.05);
         let floor = scene().quad(corner, v(0.1, 0.0, 0.0), v(0.0, 0.0, -0.1), material.clone());
@@ -230,8 +230,8 @@ pub fn lamps_over_a_floor(material: &Material) -> Vec<(&'static str, Build)> {
 fn direct_light_of_path_matches_whitted() {
     // MIS of light and lobe samples. Lobe samples matter more for narrow lobes.
     for (diffuse, specular, shininess) in [(0.7, 0.0, 1.0), (0.3, 0.6, 10.0), (0.1, 0.8, 90.0)] {
-        for (what, build) in lamps_over_a_floor(&phong(diffuse, specular, shininess, 0.0)) {
-            let path = by_paths(build.clone(), 1).values(512, 16);
+        for (what, build) in lights_over_a_floor(&phong(diffuse, specular, shininess, 0.0)) {
+            let path = path_traced(build.clone(), 1).values(512, 16);
             let whitted = build.depth(1).values(2048, 16);
             let [path, whitted] = [path, whitted].map(|values| mean_and_error(&values));
             assert_same_mean(&format!("{what}, α {shininess}"), path, whitted, 0.01);
@@ -260,12 +260,12 @@ fn sharp_highlight_has_low_variance() {
         let sunny = sun(floor, v(-1.0, -1.0, 0.0), (3.0 * disc) as f32, 40.0);
         let sunny = sunny.seen(v(-0.1, 0.1, 0.0), DVec3::ZERO);
         let exact_sunny = 3.0 * (0.2 / std::f64::consts::PI * disc + 0.5) * 0.5_f64.sqrt();
-        for (what, build) in [("whitted", sunny.clone()), ("path", by_paths(sunny, 1))] {
+        for (what, build) in [("whitted", sunny.clone()), ("path", path_traced(sunny, 1))] {
             let values = build.values(256, 16);
             let worst = values.iter().map(|value| (value / exact_sunny - 1.0).abs()).fold(0.0, f64::max);
             assert!(worst < 0.02, "sun, {what}, α {shininess}: {worst}");
         }
-        for (what, build) in [("whitted", lit.clone()), ("path", by_paths(lit.clone(), 1))] {
+        for (what, build) in [("whitted", lit.clone()), ("path", path_traced(lit.clone(), 1))] {
             for value in build.values(256, 16) {
                 assert!(
                     (value / exact - 1.0).abs() < 0.02,
@@ -309,7 +309,7 @@ fn no_rays_for_unreachable_sharp_highlights() {
         let rect = glimt::film::Rect { x: 0, y: 0, width: 1, height: 1 };
         let token = glimt::control::CancelToken::new();
         let tile = glimt::integrators::render_tile(&lit.world(), &lit.settings(0), rect, 0..32, &token);
-        tile.expect("the token is not cancelled").1.scattered_rays
+        tile.expect("the token is not canceled").1.scattered_rays
     };
     assert_eq!((scattered(99.0, true, 4), scattered(1e4, false, 4), scattered(1e4, true, 0)), (0, 0, 0));
     assert!(scattered(1e4, true, 1) > 24);
@@ -331,7 +331,7 @@ fn path_follows_mirrors_and_glass_like_whitted() {
     };
     for depth in [0, 1, 2, 3, 8] {
         let mean = |build: Build| mean_and_error(&build.mean_reds(64));
-        let (path, whitted) = (mean(by_paths(build(), depth)), mean(build().depth(depth)));
+        let (path, whitted) = (mean(path_traced(build(), depth)), mean(build().depth(depth)));
         assert_same_mean(&format!("depth {depth}"), path, whitted, 1.5e-3);
     }
 }
@@ -349,7 +349,7 @@ fn paths_find_light_behind_glass() {
             Some(ior) => floor.cuboid(v(0.0, 0.75, 0.0), v(4.0, 0.5, 4.0), DVec3::ZERO, glass(ior)),
             None => floor,
         };
-        mean_and_error(&by_paths(floor.seen(v(-0.1, 0.1, 0.02), DVec3::ZERO), 6).values(1024, 32))
+        mean_and_error(&path_traced(floor.seen(v(-0.1, 0.1, 0.02), DVec3::ZERO), 6).values(1024, 32))
     };
     assert_same_mean("with glass", lit(Some(1.0)), lit(None), 8e-3);
 }
@@ -360,7 +360,7 @@ fn clamp_darkens_and_is_off_by_default() {
         let lamp = emitter(200.0);
         let room = room(0.0, 0.7, 0.0).quad(v(-0.05, 0.9, -0.05), v(0.1, 0.0, 0.0), v(0.0, 0.0, 0.1), lamp);
         let room = room.with(|scene| scene.render.clamp = clamp);
-        mean_and_error(&by_paths(room, 20).values(512, 16)).0
+        mean_and_error(&path_traced(room, 20).values(512, 16)).0
     };
     let (free, loose, tight) = (dark(0.0), dark(1e9), dark(0.05));
     assert_eq!(free, loose);
@@ -378,7 +378,7 @@ fn reflectances_multiply_per_color_channel() {
             }
         }
     });
-    let build = by_paths(room, 60);
+    let build = path_traced(room, 60);
     let pixels: Vec<DVec3> = build.pictures(512, 0..32).iter().map(|picture| picture[0]).collect();
     for axis in 0..3 {
         let values: Vec<f64> = pixels.iter().map(|pixel| pixel[axis]).collect();
@@ -401,7 +401,7 @@ fn light_samples_inside_glass_are_tinted() {
     let lit = inside().point_light(v(0.5, 1.0, 0.0), 1.0, Falloff::Square);
     let distance = 1.25_f64.sqrt();
     let exact = 0.6 / PI * (1.0 / distance) / 1.25 * tint.powf(distance) * to_eye;
-    for (what, build) in [("whitted", lit.clone()), ("path", by_paths(lit, 1))] {
+    for (what, build) in [("whitted", lit.clone()), ("path", path_traced(lit, 1))] {
         for shadows in [ShadowMode::Soft, ShadowMode::Hard, ShadowMode::Off] {
             assert_close(what, build.clone().shadows(shadows, 1).value(), exact);
         }
@@ -419,7 +419,7 @@ fn light_samples_inside_glass_are_tinted() {
     let exact = 0.6 / PI * sum * to_eye;
     let lit = inside().quad(v(-3.0, height, -3.0), v(side, 0.0, 0.0), v(0.0, 0.0, side), emitter(1.0));
     let lit = lit.seen(v(0.0, 1.5, 0.0), DVec3::ZERO);
-    for (what, build) in [("whitted", lit.clone()), ("path", by_paths(lit, 1))] {
+    for (what, build) in [("whitted", lit.clone()), ("path", path_traced(lit, 1))] {
         assert_mean(what, &build.values(256, 64), exact, 2e-4);
     }
     // The same light in a sharp highlight.
@@ -429,7 +429,7 @@ fn light_samples_inside_glass_are_tinted() {
     let reach = height * 2.0_f64.sqrt() + 0.5_f64.sqrt();
     let (diffuse, gloss) =
         (0.1 / PI * sum * tint.powf(0.5_f64.sqrt()), 0.8 * 0.5_f64.sqrt() * tint.powf(reach));
-    for (what, build) in [("whitted", lit.clone()), ("path", by_paths(lit, 1))] {
+    for (what, build) in [("whitted", lit.clone()), ("path", path_traced(lit, 1))] {
         let ((mean, error), exact) = (mean_and_error(&build.values(256, 64)), diffuse + gloss);
         assert!(error < 6e-4 * exact, "{what}: too noisy: {mean} ± {error}");
         assert!((mean - exact).abs() < 4.0 * error + 2e-3 * gloss, "{what}: {mean}, expected {exact}");

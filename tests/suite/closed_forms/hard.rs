@@ -7,7 +7,7 @@ use glimt::scene::description::light::Falloff;
 use glimt::scene::description::{ShadowMode, Shape};
 
 use super::glass::boxes;
-use super::scenes::{AS_IT_IS, Build, emitter, matte, metal, receiver, scene};
+use super::scenes::{Build, IDENTITY_PLACEMENT, emitter, matte, metal, receiver, scene};
 use super::{assert_mean, assert_same_mean, mean_and_error, v};
 
 /// Every kind of light, with the specified size and height above a receiver.
@@ -29,7 +29,7 @@ fn lights(height: f64, size: f64) -> Vec<(&'static str, Build)> {
         ("cone", lit(Shape::Cone { base: at, tip: at - v(0.0, size, 0.0), radius: size, cap: true })),
         ("torus", lit(Shape::Torus { center: at, axis: DVec3::Y, radius: size, tube: 0.3 * size })),
     ];
-    let cube = receiver(DVec3::ZERO, 0.8).mesh(boxes(&[(at, size, 0)]), AS_IT_IS, emitter(3.0));
+    let cube = receiver(DVec3::ZERO, 0.8).mesh(boxes(&[(at, size, 0)]), IDENTITY_PLACEMENT, emitter(3.0));
     all.push(("mesh", cube));
     all
 }
@@ -112,11 +112,11 @@ fn center_ray_determines_visibility() {
 }
 
 /// Shadow rays per sample.
-fn rays(build: &Build) -> u64 {
+fn shadow_rays_per_sample(build: &Build) -> u64 {
     let whole = glimt::film::Rect { x: 0, y: 0, width: 1, height: 1 };
     let token = glimt::control::CancelToken::new();
     render_tile(&build.world(), &build.settings(1), whole, 0..1, &token)
-        .expect("the token is not cancelled")
+        .expect("the token is not canceled")
         .1
         .shadow_rays
 }
@@ -128,7 +128,7 @@ fn box_and_mesh_use_a_single_shadow_ray() {
     let cube = |build: Build| {
         build.shape(Shape::Box { center, size: v(0.8, 0.8, 0.8), rotate: DVec3::ZERO }, emitter(1.0))
     };
-    let mesh = |build: Build| build.mesh(boxes(&[(center, 0.8, 0)]), AS_IT_IS, emitter(1.0));
+    let mesh = |build: Build| build.mesh(boxes(&[(center, 0.8, 0)]), IDENTITY_PLACEMENT, emitter(1.0));
     let screen = |at: DVec3| {
         let half = v(0.05, 0.0, 0.05);
         let sides = [v(0.1, 0.0, 0.0), v(0.0, 0.0, 0.1)];
@@ -137,7 +137,7 @@ fn box_and_mesh_use_a_single_shadow_ray() {
     for (name, lamp) in [("box", &cube as &dyn Fn(Build) -> Build), ("mesh", &mesh)] {
         let hard = |build: Build| lamp(build).shadows(ShadowMode::Hard, 16);
         let free = hard(receiver(DVec3::ZERO, 0.8));
-        assert_eq!(rays(&free), 1, "{name}");
+        assert_eq!(shadow_rays_per_sample(&free), 1, "{name}");
         let value = |build: Build| {
             let (mean, _) = mean_and_error(&build.values(64, 16));
             mean

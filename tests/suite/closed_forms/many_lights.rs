@@ -8,8 +8,10 @@ use glimt::math::{DVec3, Vec3};
 use glimt::scene::description::light::{DirectionalLight, Falloff, PointLight, SpotLight};
 use glimt::scene::description::{Light, ShadowMode, Shape};
 
-use super::global::by_paths;
-use super::scenes::{AS_IT_IS, Build, emitter, glass, lat_long_sphere, matte, mirror, phong, scene};
+use super::global::path_traced;
+use super::scenes::{
+    Build, IDENTITY_PLACEMENT, emitter, glass, lat_long_sphere, matte, mirror, phong, scene,
+};
 use super::{assert_mean, assert_same_mean, mean_and_error, v};
 
 /// Adds so many nearly black lights that each vertex samples only a subset of the lights. Black lights would
@@ -49,8 +51,8 @@ fn every_kind(build: Build) -> Build {
         .cuboid(v(-2.0, 1.0, 0.8), v(0.3, 0.5, 0.3), v(0.0, 30.0, 10.0), emitter(3.0))
         .triangle([v(0.0, 2.6, 0.0), v(0.2, 2.6, 0.6), v(0.7, 2.5, 0.0)], emitter(8.0))
         .shape(Shape::Disk { center: at, normal: v(-1.0, -1.0, -0.6), radius: 0.3 }, emitter(4.0))
-        .mesh(lat_long_sphere(6, 8, 0.3, v(0.3, 1.6, -1.2)), AS_IT_IS, emitter(3.0))
-        .mesh(lat_long_sphere(3, 4, 0.2, v(-0.4, 1.8, 1.2)), AS_IT_IS, emitter(3.0))
+        .mesh(lat_long_sphere(6, 8, 0.3, v(0.3, 1.6, -1.2)), IDENTITY_PLACEMENT, emitter(3.0))
+        .mesh(lat_long_sphere(3, 4, 0.2, v(-0.4, 1.8, 1.2)), IDENTITY_PLACEMENT, emitter(3.0))
         .environment(0.1)
         .point_light(v(0.5, 2.2, 1.5), 1.0, Falloff::Square)
         .point_light(v(-1.5, 2.2, 1.5), 0.2, Falloff::None);
@@ -90,7 +92,7 @@ fn every_light_kind_matches_the_full_sum() {
         assert_same(&format!("whitted, {shadows:?}"), &some, &all, (16, 16), 4e-3);
     }
     for depth in [1, 3] {
-        let [all, some] = [&build, &picked].map(|build| by_paths(build.clone(), depth));
+        let [all, some] = [&build, &picked].map(|build| path_traced(build.clone(), depth));
         assert_same(&format!("path, depth {depth}"), &some, &all, (64, 24), 6e-3);
     }
     for view in [ViewMode::Specular, ViewMode::Diffuse] {
@@ -109,7 +111,7 @@ fn lights_in_glass_match_the_full_sum() {
     );
     let picked = with_dark_lights(build.clone());
     assert_same("whitted", &picked, &build, (32, 16), 2e-3);
-    assert_same("path", &by_paths(picked, 4), &by_paths(build, 4), (32, 24), 6e-3);
+    assert_same("path", &path_traced(picked, 4), &path_traced(build, 4), (32, 24), 6e-3);
 }
 
 /// A 2 × 2 area light above the floor, divided into `parts` × `parts` quads.
@@ -126,7 +128,13 @@ fn divided_light_matches_whole_light() {
     for (what, floor, noise) in [("matte", matte(0.7), 1.0), ("sharp", phong(0.2, 0.6, 300.0, 0.0), 2.5)] {
         let [whole, cut] = [1, 32].map(|parts| divided_light(room(floor.clone()), parts));
         assert_same(&format!("whitted, {what}"), &cut, &whole, (64, 16), 3e-3 * noise);
-        assert_same(&format!("path, {what}"), &by_paths(cut, 3), &by_paths(whole, 3), (64, 24), 6e-3 * noise);
+        assert_same(
+            &format!("path, {what}"),
+            &path_traced(cut, 3),
+            &path_traced(whole, 3),
+            (64, 24),
+            6e-3 * noise,
+        );
     }
 }
 
@@ -140,7 +148,7 @@ fn divided_light_keeps_sharp_highlight() {
         .seen(v(0.0, 1.5, 1.0), v(0.0, 0.0, 0.4));
     let [whole, cut] = [1, 32].map(|parts| divided_light(seen.clone(), parts));
     assert_same("whitted", &cut, &whole, (64, 16), 4e-3);
-    assert_same("path", &by_paths(cut, 1), &by_paths(whole, 1), (64, 16), 4e-3);
+    assert_same("path", &path_traced(cut, 1), &path_traced(whole, 1), (64, 16), 4e-3);
 }
 
 /// Triangles above the floor whose sizes vary by a factor of 100. Most of them face down.
@@ -168,13 +176,13 @@ fn mesh_light_matches_separate_triangles() {
         triangles: (0..triangles.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect(),
         ..TriangleMesh::default()
     };
-    let mesh = room(matte(0.7)).mesh(mesh, AS_IT_IS, emitter(20.0));
+    let mesh = room(matte(0.7)).mesh(mesh, IDENTITY_PLACEMENT, emitter(20.0));
     assert!(
         mesh.world().lights.sampler_for_purpose(LightSamplingPurpose::Eye).is_none(),
         "a mesh must be a single light"
     );
     assert_same("whitted", &mesh.clone().shadows(ShadowMode::Soft, 8), &alone, (64, 16), 3e-3);
-    assert_same("path", &by_paths(mesh, 2), &by_paths(alone, 2), (64, 24), 6e-3);
+    assert_same("path", &path_traced(mesh, 2), &path_traced(alone, 2), (64, 24), 6e-3);
 }
 
 #[test]
@@ -188,7 +196,7 @@ fn hundred_point_lights_match_their_sum() {
     let lit = places.iter().fold(floor, |build, &place| build.point_light(place, 0.5, Falloff::Square));
     let exact: f64 =
         places.iter().map(|d| 0.5 * d.y / d.length().powi(3)).sum::<f64>() * 0.7 / std::f64::consts::PI;
-    for (what, build) in [("whitted", lit.clone()), ("path", by_paths(lit, 1))] {
+    for (what, build) in [("whitted", lit.clone()), ("path", path_traced(lit, 1))] {
         // Where the tree examines every light, the selection probability is proportional to irradiance, which
         // leaves hardly any noise.
         assert_mean(what, &build.values(4, 64), exact, 1e-3 / 8.0);

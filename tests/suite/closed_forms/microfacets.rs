@@ -8,8 +8,8 @@ use glimt::scene::description::{
     EmissionSource, Integrator, Material, MaterialKind, NumberSource, ShadowMode, TextureFilter, Wrap,
 };
 
-use super::global::{by_paths, lamps_over_a_floor};
-use super::photons::{assert_same_light, both};
+use super::global::{lights_over_a_floor, path_traced};
+use super::photons::{assert_same_light, path_and_photon_means};
 use super::scenes::{
     Build, beckmann, coated, emitter, frosted, glass, lat_long_sphere, matte, metal, mirror, phong, plastic,
     principled, scene, translucent,
@@ -37,7 +37,7 @@ fn materials() -> Vec<(&'static str, Material)> {
 }
 
 /// A ball in a furnace with radiance 1, viewed at its edge.
-fn in_the_open(material: Material, depth: u32) -> Build {
+fn in_furnace(material: Material, depth: u32) -> Build {
     scene()
         .environment(1.0)
         .sphere(v(0.0, 0.0, -5.0), 1.0, material)
@@ -49,8 +49,8 @@ fn in_the_open(material: Material, depth: u32) -> Build {
 fn white_plastic_is_invisible_in_a_furnace() {
     for roughness in [0.0, 0.05, 0.2, 0.5, 0.8, 1.0] {
         for at in [v(0.0, 0.0, -4.0), v(0.7, 0.0, -4.0), v(0.97, 0.0, -4.2)] {
-            let build = in_the_open(plastic(1.0, roughness), 1).seen(DVec3::ZERO, at);
-            for (what, build) in [("whitted", build.clone()), ("path", by_paths(build, 1))] {
+            let build = in_furnace(plastic(1.0, roughness), 1).seen(DVec3::ZERO, at);
+            for (what, build) in [("whitted", build.clone()), ("path", path_traced(build, 1))] {
                 let (mean, error) = mean_and_error(&build.values(2048, 16));
                 assert!(error < 5e-4, "{what}, roughness {roughness} at {at}: too noisy: ± {error}");
                 assert!(
@@ -69,7 +69,7 @@ fn smooth_metal_follows_schlick() {
         .environment(1.0)
         .quad(v(-1.0, -1.0, 1.0), v(2.0, 0.0, 0.0), v(0.0, 0.0, -2.0), metal(0.5, 0.0, 0.0))
         .seen(v(-(3.0_f64.sqrt()), 0.0, 0.0), v(0.0, -1.0, 0.0));
-    for build in [build.clone(), by_paths(build, 4)] {
+    for build in [build.clone(), path_traced(build, 4)] {
         assert_close("at 60°", build.value(), 0.5 + 0.5 * 0.5_f64.powi(5));
     }
 }
@@ -77,12 +77,12 @@ fn smooth_metal_follows_schlick() {
 #[test]
 fn techniques_agree_on_area_lights() {
     for (material, kind) in materials() {
-        for (what, build) in lamps_over_a_floor(&kind) {
+        for (what, build) in lights_over_a_floor(&kind) {
             let whitted = build.clone().depth(1);
             // Without occluders, the shadow mode has no effect.
             let [off, hard] =
                 [ShadowMode::Off, ShadowMode::Hard].map(|kind| whitted.clone().shadows(kind, 1));
-            let path = mean_and_error(&by_paths(build, 1).values(512, 16));
+            let path = mean_and_error(&path_traced(build, 1).values(512, 16));
             let others = [("whitted", &whitted, 512), ("unshadowed", &off, 512), ("hard", &hard, 512)];
             // In these two cases, a ball occludes part of a light.
             let others = if ["two", "half a sun"].contains(&what) { &others[..1] } else { &others[..] };
@@ -102,8 +102,8 @@ fn lobe_samples_find_area_lights() {
             .quad(v(-0.05, 0.0, 0.05), v(0.1, 0.0, 0.0), v(0.0, 0.0, -0.1), kind)
             .seen(v(-0.1, 0.1, 0.02), DVec3::ZERO);
         let at = v(0.8, 0.9, 0.1);
-        let lit = by_paths(floor.clone().sphere(at, 0.6, emitter(2.0)), 2);
-        let hidden = by_paths(floor.sphere(at, 0.6, emitter(2.0)).sphere(at, 0.65, glass(1.0)), 3);
+        let lit = path_traced(floor.clone().sphere(at, 0.6, emitter(2.0)), 2);
+        let hidden = path_traced(floor.sphere(at, 0.6, emitter(2.0)).sphere(at, 0.65, glass(1.0)), 3);
         let (both, lobes) = (mean_and_error(&lit.values(1024, 16)), mean_and_error(&hidden.values(4096, 16)));
         assert_same_mean(material, lobes, both, 0.02);
     }
@@ -120,7 +120,7 @@ fn whitted_shows_reflections_in_rough_lobes() {
             .seen(v(-0.1, 0.1, 0.02), DVec3::ZERO);
         // Whitted excludes indirect light from the diffuse lobe, so compare only the specular components.
         let part = |build: Build| mean_and_error(&build.viewed(ViewMode::Specular).values(1024, 16));
-        let (whitted, path) = (part(build.clone().depth(2)), part(by_paths(build, 2)));
+        let (whitted, path) = (part(build.clone().depth(2)), part(path_traced(build, 2)));
         if ["smooth plastic", "coated mirror"].contains(&material) {
             continue;
         }
@@ -141,7 +141,7 @@ fn photons_match_path_on_coats_and_metals() {
             .depth(depth)
     };
     for depth in [1, 2, 4] {
-        let means = both(&room(depth), depth, [256, 16], (20_000, 0.05));
+        let means = path_and_photon_means(&room(depth), depth, [256, 16], (20_000, 0.05));
         assert_same_light(&format!("depth {depth}"), means, 8e-3, 3e-3);
     }
 }
@@ -214,7 +214,7 @@ fn coarse_smooth_meshes_conserve_energy() {
             .mesh(ball.clone(), [DVec3::ONE, DVec3::ZERO, v(0.0, 0.0, -5.0)], material)
             .smooth()
             .pictured(DVec3::ZERO, v(0.0, 0.0, -5.0), 24.0, 32, 32);
-        for (what, build) in [("whitted", build.clone()), ("path", by_paths(build, 8))] {
+        for (what, build) in [("whitted", build.clone()), ("path", path_traced(build, 8))] {
             let picture = build.picture(64, 0);
             let brightest = picture.iter().map(|color| color.max_element()).fold(0.0, f64::max);
             assert!(brightest < 1.15, "{name} with {what}: {brightest}");
@@ -228,8 +228,8 @@ fn coarse_smooth_meshes_conserve_energy() {
 #[test]
 fn metal_emission_adds_to_its_reflection() {
     let mut lamp = metal(0.9, 0.5, 0.0);
-    let dark = mean_and_error(&in_the_open(lamp.clone(), 1).values(256, 16));
+    let dark = mean_and_error(&in_furnace(lamp.clone(), 1).values(256, 16));
     lamp.emission = EmissionSource::from_constant(Vec3::splat(2.0));
-    let lit = mean_and_error(&in_the_open(lamp, 1).values(256, 16));
+    let lit = mean_and_error(&in_furnace(lamp, 1).values(256, 16));
     assert_same_mean("without emission", (lit.0 - 2.0, lit.1), dark, 8e-4);
 }

@@ -8,7 +8,7 @@ use glimt::math::{DVec3, Vec3};
 use glimt::scene::description::light::Falloff;
 use glimt::scene::description::{EmissionSides, EmissionSource, Integrator, Material, ReflectingSides};
 
-use super::photons::{assert_same_light, both};
+use super::photons::{assert_same_light, path_and_photon_means};
 use super::scenes::{
     Build, emitter, glass, matte, metal, mirror, phong, plastic, principled, receiver, scene,
 };
@@ -44,7 +44,7 @@ fn square(material: Material, side: f64) -> Build {
 }
 
 /// The scene once per integrator, with the integrator's name.
-fn each(build: &Build) -> [(&'static str, Build); 3] {
+fn with_each_integrator(build: &Build) -> [(&'static str, Build); 3] {
     let path = build.clone().with(|scene| scene.render.integrator = Integrator::Path);
     [("whitted", build.clone()), ("path", path), ("photons", build.clone().photons(256, 0.1))]
 }
@@ -52,9 +52,9 @@ fn each(build: &Build) -> [(&'static str, Build); 3] {
 #[test]
 fn only_the_front_reflects() {
     for (name, material) in materials() {
-        let whole = each(&square(material.clone(), 1.0));
-        let front = each(&square(front_only(material.clone()), 1.0));
-        let back = each(&square(front_only(material), -1.0));
+        let whole = with_each_integrator(&square(material.clone(), 1.0));
+        let front = with_each_integrator(&square(front_only(material.clone()), 1.0));
+        let back = with_each_integrator(&square(front_only(material), -1.0));
         for (((integrator, whole), (_, front)), (_, back)) in whole.into_iter().zip(front).zip(back) {
             assert_eq!(front.values(16, 4), whole.values(16, 4), "{name} with {integrator}");
             assert!(back.values(16, 4).iter().all(|value| *value == 0.0), "{name} with {integrator}");
@@ -79,7 +79,7 @@ fn winding_order_determines_the_front() {
         // L = kd/π · I/d².
         let intensity = (9.0 * PI) as f32;
         let build = build.point_light(v(0.0, 3.0, 0.0), intensity, Falloff::Square);
-        for (integrator, build) in each(&build.seen(v(0.0, 2.0, 0.1), DVec3::ZERO)) {
+        for (integrator, build) in with_each_integrator(&build.seen(v(0.0, 2.0, 0.1), DVec3::ZERO)) {
             assert_close(integrator, build.value(), if is_lit { 0.7 } else { 0.0 });
         }
     }
@@ -90,7 +90,7 @@ fn black_backs_cast_shadows_and_emit() {
     for (u, w) in [(DVec3::X, DVec3::Z), (DVec3::Z, DVec3::X)] {
         let lid = receiver(DVec3::ZERO, 0.7).quad(v(-0.5, 1.0, -0.5), u, w, front_only(matte(0.7)));
         let lit = lid.point_light(v(0.0, 2.0, 0.0), 5.0, Falloff::Square).depth(1);
-        for (integrator, build) in each(&lit) {
+        for (integrator, build) in with_each_integrator(&lit) {
             assert_eq!(build.value(), 0.0, "{integrator}");
         }
         for (sides, of_back) in [(EmissionSides::Both, 2.0), (EmissionSides::Front, 0.0)] {
@@ -99,7 +99,7 @@ fn black_backs_cast_shadows_and_emit() {
             let seen = scene().quad(v(-0.5, 1.0, -0.5), u, w, lamp).seen(DVec3::ZERO, v(0.1, 1.0, 0.1));
             // The normal u × v faces up if u is z.
             let exact = if u == DVec3::X { 2.0 } else { of_back };
-            for (integrator, build) in each(&seen) {
+            for (integrator, build) in with_each_integrator(&seen) {
                 assert_eq!(build.value(), exact, "{integrator}, {sides:?}");
             }
         }
@@ -107,7 +107,7 @@ fn black_backs_cast_shadows_and_emit() {
 }
 
 #[test]
-fn black_backs_have_no_albedo_and_no_ambient_light() {
+fn black_backs_have_no_albedo_or_ambient_light() {
     for (name, material) in materials() {
         for (side, is_black) in [(1.0, false), (-1.0, true)] {
             let dark = scene().quad(
@@ -148,7 +148,7 @@ fn photons_match_path_with_black_backs() {
         .quad(v(-0.5, 1.4, -0.5), v(1.0, 0.0, 0.0), v(0.0, 0.0, 1.0), emitter(4.0))
         .pictured(v(0.0, 0.9, 3.0), v(0.0, 0.4, 0.0), 36.0, 12, 12);
     for depth in [2, 4] {
-        let means = both(&room.clone().depth(depth), depth, [128, 16], (10_000, 0.04));
+        let means = path_and_photon_means(&room.clone().depth(depth), depth, [128, 16], (10_000, 0.04));
         assert_same_light(&format!("depth {depth}"), means, 1.2e-2, 4e-3);
     }
 }

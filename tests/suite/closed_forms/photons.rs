@@ -15,8 +15,8 @@ use glimt::scene::description::light::Falloff;
 
 use super::distant::sun;
 use super::glass::boxes;
-use super::global::by_paths;
-use super::scenes::{AS_IT_IS, Build, emitter, file_material, glass, matte, mirror, phong, scene};
+use super::global::path_traced;
+use super::scenes::{Build, IDENTITY_PLACEMENT, emitter, file_material, glass, matte, mirror, phong, scene};
 use super::{assert_mean, mean_and_error, v};
 
 /// A box of inward-facing quads.
@@ -51,7 +51,7 @@ fn stored_photons_carry_emitted_power() {
         let settings = build.photons(count.into(), 0.1).settings(3);
         let (_, pass) =
             PhotonMapper::new_with_first_pass(&world, &settings, of_photons, &ignore_progress, &token)
-                .expect("the token is not cancelled");
+                .expect("the token is not canceled");
         let (power, n) = (4.0 * PI, f64::from(count));
         let flux = |map: &PhotonMap| map.iter_photons().map(|photon| f64::from(photon.flux.x)).sum::<f64>();
         let error = (reflectance * (1.0 - reflectance) / n).sqrt();
@@ -73,7 +73,7 @@ fn no_photons_without_mirrors_or_glass() {
     let of_photons = settings.photons.expect("photons are on");
     let (photons, pass) =
         PhotonMapper::new_with_first_pass(&world, &settings, of_photons, &ignore_progress, &token)
-            .expect("the token is not cancelled");
+            .expect("the token is not canceled");
     assert!(!photons.emits_photons());
     assert_eq!((pass.emitted, pass.stored_photon_count()), (0, 0));
 }
@@ -116,7 +116,7 @@ fn furnace_with_emitter_in_glass_is_uniform() {
         .sphere(v(0.0, 0.0, -0.4), 0.35, glass(1.5))
         .pictured(v(0.1, 0.2, 0.6), v(0.3, -1.0, 0.4), 20.0, 8, 8)
         .depth(400);
-    for build in [furnace.clone().photons(10_000, 0.03), by_paths(furnace, 400)] {
+    for build in [furnace.clone().photons(10_000, 0.03), path_traced(furnace, 400)] {
         let (mean, error) = mean_and_error(&build.mean_reds(10));
         assert!(error < 1e-2, "{mean} ± {error}");
         assert!((mean - 1.0).abs() < 4.0 * error + 2e-3, "{mean} ± {error}");
@@ -141,7 +141,7 @@ fn mean(picture: &[DVec3]) -> f64 {
 }
 
 /// A room with a glossy floor and a mirror ball, lit only by a light inside glass.
-fn caustics_alone(depth: u32) -> Build {
+fn only_caustics(depth: u32) -> Build {
     let mut build = room(|| matte(0.7));
     build.scene.objects.remove(3);
     build
@@ -154,10 +154,15 @@ fn caustics_alone(depth: u32) -> Build {
 }
 
 /// Means and standard errors of path-traced and photon-mapped images.
-pub fn both(build: &Build, depth: u32, samples: [u32; 2], (count, radius): (u64, f64)) -> [(f64, f64); 2] {
+pub fn path_and_photon_means(
+    build: &Build,
+    depth: u32,
+    samples: [u32; 2],
+    (count, radius): (u64, f64),
+) -> [(f64, f64); 2] {
     let means = |build: &Build, samples| mean_and_error(&build.mean_reds(samples));
     let by_photons = build.clone().photons(count, radius);
-    [means(&by_paths(build.clone(), depth), samples[0]), means(&by_photons, samples[1])]
+    [means(&path_traced(build.clone(), depth), samples[0]), means(&by_photons, samples[1])]
 }
 
 /// Checks that both methods agree within 4 standard errors plus some slack for kernels at edges, and limits
@@ -172,7 +177,7 @@ pub fn assert_same_light(what: &str, [(a, da), (b, db)]: [(f64, f64); 2], most_e
 #[test]
 fn photons_match_path_at_every_depth() {
     for (depth, passes) in [(1, 16), (2, 12), (3, 11), (6, 8)] {
-        let means = both(&caustics(depth), depth, [128, passes], (10_000, 0.04));
+        let means = path_and_photon_means(&caustics(depth), depth, [128, passes], (10_000, 0.04));
         assert_same_light(&format!("depth {depth}"), means, 1.2e-2, 4e-3);
     }
 }
@@ -180,7 +185,7 @@ fn photons_match_path_at_every_depth() {
 #[test]
 fn photons_match_path_with_light_in_glass() {
     for depth in [2, 3, 6] {
-        let means = both(&caustics_alone(depth), depth, [128, 16], (10_000, 0.01));
+        let means = path_and_photon_means(&only_caustics(depth), depth, [128, 16], (10_000, 0.01));
         assert_same_light(&format!("depth {depth}"), means, 1e-2, 3e-3);
     }
 }
@@ -201,14 +206,14 @@ fn photons_match_path_on_smooth_meshes() {
         ..TriangleMesh::default()
     };
     let build = scene()
-        .mesh(wall, AS_IT_IS, matte(0.9))
+        .mesh(wall, IDENTITY_PLACEMENT, matte(0.9))
         .smooth()
         .quad(v(-1.0, 0.0, 1.5), v(2.0, 0.0, 0.0), v(0.0, 0.0, -2.0), matte(0.8))
         .sphere(v(0.0, 1.6, 0.9), 0.4, emitter(3.0))
         .sphere(v(0.0, 1.6, 0.9), 0.5, glass(1.5))
         .pictured(v(0.0, 1.0, 3.0), v(0.0, 0.0, 0.6), 8.0, 16, 16)
         .viewed(ViewMode::Indirect);
-    let means = both(&build.depth(3), 3, [512, 16], (10_000, 0.2));
+    let means = path_and_photon_means(&build.depth(3), 3, [512, 16], (10_000, 0.2));
     assert_same_light("a bent wall", means, 2.5e-2, 0.0);
 }
 
@@ -286,8 +291,8 @@ fn photons_do_not_depend_on_threads_or_tiles() {
         pool.install(|| {
             let (photons, _) =
                 PhotonMapper::new_with_first_pass(&world, &settings, of_photons, &ignore_progress, &token)
-                    .expect("the token is not cancelled");
-            photons.trace_passes(&world, &settings, 0..4, &token).expect("the token is not cancelled")
+                    .expect("the token is not canceled");
+            photons.trace_passes(&world, &settings, 0..4, &token).expect("the token is not canceled")
         })
     };
     let all = maps(1);
@@ -303,7 +308,7 @@ fn photons_do_not_depend_on_threads_or_tiles() {
     }
     let render = |maps: &PhotonMaps, rect: Rect, samples: Range<u32>| {
         let tile = render_tile_with_photons(Some(maps), &world, &settings, rect, samples, &token);
-        tile.expect("the token is not cancelled").0.radiance
+        tile.expect("the token is not canceled").0.radiance
     };
     let whole = Rect { x: 0, y: 0, width: 16, height: 16 };
     let at_once = render(&all, whole, 0..4);
@@ -313,10 +318,10 @@ fn photons_do_not_depend_on_threads_or_tiles() {
             let samples = part[0]..part[1];
             let (photons, _) =
                 PhotonMapper::new_with_first_pass(&world, &settings, of_photons, &ignore_progress, &token)
-                    .expect("the token is not cancelled");
+                    .expect("the token is not canceled");
             let maps = photons
                 .trace_passes(&world, &settings, samples.clone(), &token)
-                .expect("the token is not cancelled");
+                .expect("the token is not canceled");
             let own: Vec<_> = at_once
                 .chunks(4)
                 .flat_map(|pixel| &pixel[samples.start as usize..samples.end as usize])
@@ -344,6 +349,6 @@ fn photons_are_aimed_at_glass_from_mesh_file() {
     let of_photons = settings.photons.expect("photons are on");
     let (_, pass) =
         PhotonMapper::new_with_first_pass(&world, &settings, of_photons, &ignore_progress, &token)
-            .expect("the token is not cancelled");
+            .expect("the token is not canceled");
     assert!(pass.caustic.len() > 500, "{} of 1000", pass.caustic.len());
 }

@@ -133,7 +133,7 @@ fn fisheye_angles_are_linear_in_the_radius() {
 }
 
 #[test]
-fn panorama_directions_are_those_of_the_environment() {
+fn panorama_directions_match_environment_maps() {
     let panorama = unshifted(Spherical);
     let mut random = TestRandom::new(3);
     for _ in 0..500 {
@@ -149,7 +149,7 @@ fn panorama_directions_are_those_of_the_environment() {
 /// A panorama of an environment map is the map, filtered: pixels average the bilinear interpolation with
 /// weights 1, 6 and 1 along both axes.
 #[test]
-fn panorama_of_an_environment_map_shows_the_map() {
+fn panorama_reproduces_an_environment_map() {
     let (width, height) = (12_usize, 6_usize);
     let mut random = TestRandom::new(5);
     let texels: Vec<f64> = (0..width * height).map(|_| (random.unit() as f32).into()).collect();
@@ -228,7 +228,7 @@ fn mirrored_images_are_flipped_exactly() {
 
 /// A shifted image is a crop of a larger image, in which a pixel has the same size.
 #[test]
-fn shifted_rays_are_those_of_a_larger_image() {
+fn shifted_image_is_a_crop_of_a_larger_one() {
     let (shift, scale) = (DVec2::new(0.4, -0.25), 3.0);
     let tangent = |fov: f64| (0.5_f64 * fov.to_radians()).tan();
     for (projection, larger) in [
@@ -294,7 +294,7 @@ fn clicks_hit_the_object_shown_at_the_pixel() {
 }
 
 #[test]
-fn panorama_depth_is_the_distance_from_the_camera() {
+fn panorama_depth_is_distance_from_camera() {
     let room = scene().sphere(DVec3::ZERO, 3.0, matte(0.5)).viewed(ViewMode::Depth);
     for (projection, expected) in [
         (Spherical, 3.0..3.0),
@@ -312,7 +312,7 @@ fn panorama_depth_is_the_distance_from_the_camera() {
 
 /// The footprint of a pixel, and with it the mip level, does not depend on the distance.
 #[test]
-fn orthographic_textures_are_equally_sharp_at_any_distance() {
+fn orthographic_footprints_ignore_distance() {
     let mut build = scene().with(|scene| scene.render.ambient = Vec3::ONE);
     let rows: Vec<Vec<Vec3>> =
         (0..32).map(|y| (0..32).map(|x| Vec3::splat(((x / 16 + y / 16) % 2) as f32)).collect()).collect();
@@ -398,7 +398,7 @@ fn gain_scales_light_but_not_data() {
 
 /// A ray through a lens point passes through the pinhole ray's point on the plane of focus.
 #[test]
-fn orthographic_blur_grows_linearly_with_the_distance_from_focus() {
+fn orthographic_defocus_is_linear_in_depth() {
     let mut orthographic = unshifted(Orthographic { view_height: 4.0 });
     if let Camera::LookAt { aperture, focus, .. } = &mut orthographic {
         (*aperture, *focus) = (0.2, 5.0);

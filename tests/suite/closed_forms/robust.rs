@@ -16,18 +16,25 @@ use glimt::scene::description::light::Falloff;
 use glimt::scene::description::{Integrator, Shape};
 use glimt::world::{Geometry, Hit};
 
-use super::scenes::{AS_IT_IS, Build, emitter, glass, lat_long_sphere, matte, mirror, phong, scene};
+use super::scenes::{
+    Build, IDENTITY_PLACEMENT, emitter, glass, lat_long_sphere, matte, mirror, phong, scene,
+};
 use super::v;
 
 /// The surface hit by a ray from outside toward a point.
-fn aimed(geometry: &Geometry, random: &mut TestRandom, at: DVec3, far: f64) -> Option<SurfacePoint> {
+fn surface_hit_toward(
+    geometry: &Geometry,
+    random: &mut TestRandom,
+    at: DVec3,
+    far: f64,
+) -> Option<SurfacePoint> {
     let origin = (at + random.direction() * far).as_vec3();
     let ray = Ray::new(origin, (at - origin.as_dvec3()).as_vec3().normalize());
     geometry.closest_hit(&ray).map(|hit| geometry.surface(&ray, &hit))
 }
 
 /// A ray from a surface into the hemisphere around `side`, often at a grazing angle.
-pub fn leaving(random: &mut TestRandom, surface: &SurfacePoint, side: Vec3) -> Ray {
+pub fn ray_leaving(random: &mut TestRandom, surface: &SurfacePoint, side: Vec3) -> Ray {
     let across = random.direction();
     let n = side.as_dvec3();
     let flat = across - n * n.dot(across);
@@ -41,8 +48,8 @@ pub fn self_hits(build: &Build, random: &mut TestRandom, center: DVec3, size: f6
     let (mut hits, mut tried) = (0, 0);
     for _ in 0..tries {
         let at = center + random.direction() * size * random.unit();
-        let Some(surface) = aimed(&world.geometry, random, at, size * 4.0) else { continue };
-        let ray = leaving(random, &surface, surface.normal);
+        let Some(surface) = surface_hit_toward(&world.geometry, random, at, size * 4.0) else { continue };
+        let ray = ray_leaving(random, &surface, surface.normal);
         tried += 1;
         hits += u32::from(world.geometry.closest_hit(&ray).is_some());
     }
@@ -83,7 +90,7 @@ fn convex_shapes_do_not_self_hit() {
                         matte(0.5),
                     ),
                 ),
-                ("mesh", scene().mesh(octahedron, AS_IT_IS, matte(0.5))),
+                ("mesh", scene().mesh(octahedron, IDENTITY_PLACEMENT, matte(0.5))),
                 ("instance", scene().mesh(unit, [v(size, size * 0.7, -size), angles, center], matte(0.5))),
             ];
             for (what, build) in shapes {
@@ -152,7 +159,7 @@ fn no_ray_escapes_through_room_edges() {
                     };
                     let surface = world.geometry.surface(&ray, &hit);
                     let inwards = if surface.normal.dot(ray.direction) < 0.0 { 1.0 } else { -1.0 };
-                    let next = leaving(&mut random, &surface, surface.normal * inwards);
+                    let next = ray_leaving(&mut random, &surface, surface.normal * inwards);
                     tried += 1;
                     lost += u32::from(world.geometry.closest_hit(&next).is_none());
                 }
@@ -167,7 +174,7 @@ fn no_ray_escapes_through_room_edges() {
 
 /// A cylinder centered at `middle`, with its surface through the origin. Its axis is perpendicular to
 /// `middle` if possible, and otherwise parallel.
-fn bar(middle: DVec3, towards: DVec3, radius: f64) -> Shape {
+fn cylinder_through_origin(middle: DVec3, towards: DVec3, radius: f64) -> Shape {
     let flat = towards - middle * (middle.dot(towards) / middle.length_squared());
     let half = if flat.length() > 1e-6 * towards.length() { flat } else { middle };
     Shape::Cylinder { a: middle - half, b: middle + half, radius, caps: true }
@@ -200,8 +207,11 @@ fn shapes_through_the_origin_do_not_self_hit() {
             ("box", scene().cuboid(-u, DVec3::splat(2e4), v(0.0, u.z.atan2(u.x), 0.0), matte(0.5))),
             ("sphere", scene().sphere(n * radius, radius, matte(0.5))),
             ("disk", scene().shape(Shape::Disk { center: n.cross(u), normal: n, radius: 1e5 }, matte(0.5))),
-            ("cylinder", scene().shape(bar(n * radius, u, radius), matte(0.5))),
-            ("cylinder's cap", scene().shape(bar(n * radius, n * radius, radius), matte(0.5))),
+            ("cylinder", scene().shape(cylinder_through_origin(n * radius, u, radius), matte(0.5))),
+            (
+                "cylinder's cap",
+                scene().shape(cylinder_through_origin(n * radius, n * radius, radius), matte(0.5)),
+            ),
             ("cone", scene().shape(cone_through_origin(n, u, radius), matte(0.5))),
             ("plane", scene().shape(plane, matte(0.5))),
         ] {
@@ -223,13 +233,15 @@ fn ray_into_a_ball_hits_its_back_and_exits() {
             let world = scene().sphere(center, radius, glass(1.5)).world();
             for _ in 0..500 {
                 let at = center + random.direction() * radius * 0.9;
-                let Some(surface) = aimed(&world.geometry, &mut random, at, radius * 4.0) else { continue };
-                let inner = leaving(&mut random, &surface, -surface.normal);
+                let Some(surface) = surface_hit_toward(&world.geometry, &mut random, at, radius * 4.0) else {
+                    continue;
+                };
+                let inner = ray_leaving(&mut random, &surface, -surface.normal);
                 let hit = world.geometry.closest_hit(&inner);
                 let Some(hit) = hit else { panic!("no exit hit: ball {radius} at {center}") };
                 let back = world.geometry.surface(&inner, &hit);
                 assert!(back.normal.dot(inner.direction) > 0.0, "ball {radius} at {center}");
-                let outer = leaving(&mut random, &back, back.normal);
+                let outer = ray_leaving(&mut random, &back, back.normal);
                 assert_eq!(world.geometry.closest_hit(&outer), None, "ball {radius} at {center}");
             }
         }
@@ -244,8 +256,8 @@ fn closed_mesh_has_no_leaks() {
     let at_origin = lat_long_sphere(16, 16, 2.0, DVec3::ZERO);
     let baked = lat_long_sphere(16, 16, 2.0, far);
     for (mesh, placed, center) in [
-        (&at_origin, AS_IT_IS, DVec3::ZERO),
-        (&baked, AS_IT_IS, far),
+        (&at_origin, IDENTITY_PLACEMENT, DVec3::ZERO),
+        (&baked, IDENTITY_PLACEMENT, far),
         (&at_origin, [DVec3::ONE, DVec3::ZERO, far], far),
         (&at_origin, [v(1.0, 1.2, -0.9), v(10.0, 20.0, 30.0), v(3.0, -7.0, 1.0)], v(3.0, -7.0, 1.0)),
     ] {
@@ -272,7 +284,7 @@ fn closed_mesh_has_no_leaks() {
 }
 
 /// A scene of size 2ᵏ with every kind of object.
-fn of_everything(k: i32) -> Build {
+fn all_objects(k: i32) -> Build {
     let s = 2.0_f64.powi(k);
     let intensity = (8.0 * 4.0_f64.powi(k)) as f32;
     let ball = lat_long_sphere(6, 9, 0.5 * s, DVec3::ZERO);
@@ -331,9 +343,9 @@ fn of_everything(k: i32) -> Build {
 #[test]
 fn power_of_two_scale_keeps_pixels_identical() {
     // Scaling by powers of two does not round, and no result may depend on the unit of length.
-    let picture = of_everything(0).picture(4, 9);
+    let picture = all_objects(0).picture(4, 9);
     for k in [-30, -7, 1, 12, 30] {
-        let scaled = of_everything(k).picture(4, 9);
+        let scaled = all_objects(k).picture(4, 9);
         let different = picture.iter().zip(&scaled).filter(|(a, b)| a != b).count();
         assert_eq!(different, 0, "differing pixels at 2^{k}");
     }
@@ -343,7 +355,7 @@ fn power_of_two_scale_keeps_pixels_identical() {
 fn splitting_the_work_keeps_pixels_identical() {
     // A sample depends only on the scene, pixel, sample index and seed.
     for integrator in Integrator::ALL {
-        assert_no_split(&of_everything(0).with(|scene| scene.render.integrator = *integrator));
+        assert_no_split(&all_objects(0).with(|scene| scene.render.integrator = *integrator));
     }
 }
 
@@ -351,7 +363,7 @@ fn assert_no_split(build: &Build) {
     let (world, settings, token) = (build.world(), build.settings(4), CancelToken::new());
     let render = |x, y, width, height, samples| {
         let rect = Rect { x, y, width, height };
-        let tile = render_tile(&world, &settings, rect, samples, &token).expect("the token is not cancelled");
+        let tile = render_tile(&world, &settings, rect, samples, &token).expect("the token is not canceled");
         tile.0.radiance
     };
     let whole = render(0, 0, 24, 20, 0..6);
@@ -369,13 +381,13 @@ fn assert_no_split(build: &Build) {
     other.render.seed = 5;
     let rect = Rect { x: 0, y: 0, width: 24, height: 20 };
     let reseeded =
-        render_tile(&world, &other, rect, 0..6, &token).expect("the token is not cancelled").0.radiance;
+        render_tile(&world, &other, rect, 0..6, &token).expect("the token is not canceled").0.radiance;
     assert_ne!(whole, reseeded);
 }
 
 #[test]
 fn invalid_rays_hit_nothing() {
-    let world = of_everything(0).with(|_| ()).world();
+    let world = all_objects(0).with(|_| ()).world();
     let good = Ray::new(Vec3::new(0.1, 0.3, 0.5), Vec3::NEG_Z);
     assert!(world.geometry.closest_hit(&good).is_some());
     for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {

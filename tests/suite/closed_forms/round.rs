@@ -8,7 +8,7 @@ use glimt::math::{DVec2, DVec3};
 use glimt::scene::description::Shape;
 use glimt::world::Geometry;
 
-use super::robust::{leaving, places, self_hits};
+use super::robust::{places, ray_leaving, self_hits};
 use super::scenes::{matte, scene};
 use super::v;
 
@@ -206,7 +206,7 @@ fn ray_from_torus_finds_next_intersection() {
                     met += 1;
                     let surface = geometry.surface(&ray, &hit);
                     for side in [1.0_f32, -1.0] {
-                        let ray = leaving(&mut random, &surface, surface.normal * side);
+                        let ray = ray_leaving(&mut random, &surface, surface.normal * side);
                         assert!(f64::from(side) * distance(&shape, ray.origin.as_dvec3()) > 0.0);
                         let again = check(&shape, &geometry, &ray, f64::from(side));
                         assert!(again || side > 0.0, "no exit hit: {shape:?} {ray:?}");
@@ -342,7 +342,7 @@ fn ray_into_closed_round_shape_hits_its_back() {
                     let ray = Ray::new(from, (to - from.as_dvec3()).as_vec3());
                     let Some(hit) = geometry.closest_hit(&ray) else { continue };
                     let surface = geometry.surface(&ray, &hit);
-                    let inner = leaving(&mut random, &surface, -surface.normal);
+                    let inner = ray_leaving(&mut random, &surface, -surface.normal);
                     // Near an edge, the offset for the point's error may leave the shape.
                     if distance(&shape, inner.origin.as_dvec3()) < 0.0 {
                         let back = geometry.closest_hit(&inner);

@@ -12,7 +12,7 @@ use super::{assert_close, v};
 
 /// Irradiance E at the origin, facing up, from a shape with L = 1: π times the fraction of a cosine-weighted
 /// hemisphere that hits a front face.
-fn by_directions(shape: &Shape) -> f64 {
+fn hemisphere_irradiance(shape: &Shape) -> f64 {
     const RINGS: u32 = 1500;
     let geometry = scene().shape(shape.clone(), matte(0.5)).world().geometry;
     let mut fronts = 0_u32;
@@ -64,13 +64,13 @@ fn disk_light_is_exact_off_its_axis() {
     let exact = PI * 0.5 * (1.0 - (z - 2.0 * r * r) / (z * z - 4.0 * r * r).sqrt());
     let shape = disk(v(beside, height, 0.0), DVec3::NEG_Y, radius);
     assert_irradiance("parallel disk", &lit(&shape), exact, 2e-5);
-    assert_close("the reference", (by_directions(&shape) / exact - 1.0).abs().max(1e-3), 1e-3);
+    assert_close("the reference", (hemisphere_irradiance(&shape) / exact - 1.0).abs().max(1e-3), 1e-3);
 }
 
-/// Compares the rendered irradiance, from area samples, with [`by_directions`].
+/// Compares the rendered irradiance, from area samples, with [`hemisphere_irradiance`].
 #[track_caller]
 pub fn assert_same(shape: &Shape) {
-    let exact = by_directions(shape);
+    let exact = hemisphere_irradiance(shape);
     if exact == 0.0 {
         assert_eq!(lit(shape).value(), 0.0, "only the back of {shape:?} is visible");
         return;

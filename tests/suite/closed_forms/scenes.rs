@@ -174,7 +174,7 @@ impl Build {
     pub fn loaded(mut self, loaded: LoadedMesh, placed: [DVec3; 3], material: Material) -> Self {
         let loaded = distinct_lights(loaded, material.emits());
         let tree = MeshTree::build(Arc::new(loaded), self.scene.render.accel, &CancelToken::new())
-            .expect("not cancelled");
+            .expect("not canceled");
         self.parts.meshes.push(Arc::new(tree));
         self.scene.mesh_files.push(MeshFile { value: PathBuf::new(), span: 0..0, part: None });
         let [scale, rotate, translate] = placed;
@@ -194,11 +194,11 @@ impl Build {
 
     /// Adds a flat-shaded instance of a mesh with the materials from its file.
     pub fn own_mesh(self, mesh: TriangleMesh, materials: Vec<FileMaterial>) -> Self {
-        let mut build = self.mesh(mesh, AS_IT_IS, matte(0.5));
+        let mut build = self.mesh(mesh, IDENTITY_PLACEMENT, matte(0.5));
         let file = build.parts.meshes.len() - 1;
         let loaded = LoadedMesh { materials, ..build.parts.meshes[file].loaded().clone() };
         let loaded = distinct_lights(loaded, false);
-        let tree = MeshTree::build(Arc::new(loaded), Accel::Bvh, &CancelToken::new()).expect("not cancelled");
+        let tree = MeshTree::build(Arc::new(loaded), Accel::Bvh, &CancelToken::new()).expect("not canceled");
         build.parts.meshes[file] = Arc::new(tree);
         build.with(|scene| scene.objects.last_mut().expect("the mesh").material = None)
     }
@@ -270,18 +270,18 @@ impl Build {
                 Some(number) => &self.texels[number],
                 None => self.sky.as_ref().expect("an environment map"),
             };
-            let levels = || Arc::new(mipmaps(texels, &CancelToken::new()).expect("not cancelled"));
+            let levels = || Arc::new(mipmaps(texels, &CancelToken::new()).expect("not canceled"));
             let image = Image { texels: Arc::clone(texels), mipmaps: needed.has_mipmaps.then(levels) };
             parts.images.insert(needed.source, image);
         }
         let origin = choose_origin_near_camera_target(&self.scene.camera, None);
         let geometry = Geometry::from_scene(&self.scene, &parts.meshes, origin, &CancelToken::new());
-        let geometry = Arc::new(geometry.expect("not cancelled"));
+        let geometry = Arc::new(geometry.expect("not canceled"));
         let sky = self.scene.environment.as_ref().and_then(|environment| environment.sky.as_ref());
         let map = || self.sky.as_ref().and_then(build_environment_map).map(EnvironmentSource::Map);
         let sky = sky.map(|sky| EnvironmentSource::Sky(build_sky(sky))).or_else(map);
         let lights = build_lights(&self.scene, &geometry, &parts.images, sky, &CancelToken::new())
-            .expect("not cancelled");
+            .expect("not canceled");
         World::new(&self.scene, &parts, geometry, lights)
     }
 
@@ -338,7 +338,7 @@ impl Build {
 
 /// Renders a tile. Returns the mean of each pixel's samples.
 pub fn tile(world: &World, settings: &RenderSettings, rect: Rect, samples: u32) -> Vec<DVec3> {
-    tile_by(maps(world, settings, samples).as_ref(), world, settings, rect, samples)
+    tile_with_photons(maps(world, settings, samples).as_ref(), world, settings, rect, samples)
 }
 
 /// Photon maps for `samples` samples. `None` if no photons are gathered.
@@ -352,13 +352,13 @@ pub fn maps(world: &World, settings: &RenderSettings, samples: u32) -> Option<Ph
             &ignore_progress,
             &token,
         );
-        let (photons, _) = photons.expect("not cancelled");
-        photons.trace_passes(world, settings, 0..samples, &token).expect("not cancelled")
+        let (photons, _) = photons.expect("not canceled");
+        photons.trace_passes(world, settings, 0..samples, &token).expect("not canceled")
     })
 }
 
 /// Renders a tile like [`tile`], with existing photon maps.
-pub fn tile_by(
+pub fn tile_with_photons(
     maps: Option<&PhotonMaps>,
     world: &World,
     settings: &RenderSettings,
@@ -367,7 +367,7 @@ pub fn tile_by(
 ) -> Vec<DVec3> {
     let token = CancelToken::new();
     let (tile, _) =
-        render_tile_with_photons(maps, world, settings, rect, 0..samples, &token).expect("not cancelled");
+        render_tile_with_photons(maps, world, settings, rect, 0..samples, &token).expect("not canceled");
     let sums = tile.radiance.chunks(samples as usize);
     sums.map(|pixel| pixel.iter().map(|c| c.as_dvec3()).sum::<DVec3>() / f64::from(samples)).collect()
 }
@@ -566,7 +566,7 @@ pub fn lat_long_sphere(rings: u32, steps: u32, radius: f64, center: DVec3) -> Tr
 }
 
 /// The identity transform.
-pub const AS_IT_IS: [DVec3; 3] = [DVec3::ONE, DVec3::ZERO, DVec3::ZERO];
+pub const IDENTITY_PLACEMENT: [DVec3; 3] = [DVec3::ONE, DVec3::ZERO, DVec3::ZERO];
 
 /// The mesh as the pipeline prepares it for its tree.
 fn distinct_lights(loaded: LoadedMesh, all_emit: bool) -> LoadedMesh {

@@ -103,7 +103,7 @@ const BLUE: Vec3 = Vec3::new(0.0, 0.0, 1.0);
 const GRAY: Vec3 = Vec3::new(0.5, 0.5, 0.5);
 
 /// A material with a 2 × 2 diffuse texture in red, green, blue and gray, under ambient light 1.
-fn pictured(filter: TextureFilter, wrap: Wrap, repeat: Vec2) -> (Build, Material) {
+fn textured_material(filter: TextureFilter, wrap: Wrap, repeat: Vec2) -> (Build, Material) {
     let mut build = scene().with(|scene| scene.render.ambient = Vec3::ONE);
     let texture = build.texture(&[&[RED, GREEN], &[BLUE, GRAY]], filter, wrap, repeat);
     let mut kind = phong(0.0, 0.0, 1.0, 0.0);
@@ -116,7 +116,7 @@ fn pictured(filter: TextureFilter, wrap: Wrap, repeat: Vec2) -> (Build, Material
 #[test]
 fn texture_on_a_quad_is_upright_along_v() {
     let at = |filter, wrap, repeat, (s, t): (f64, f64)| {
-        let (build, kind) = pictured(filter, wrap, repeat);
+        let (build, kind) = textured_material(filter, wrap, repeat);
         let (corner, u, w) = (v(-1.0, -2.0, -5.0), v(3.0, 0.5, 0.0), v(-0.5, 4.0, 1.0));
         let point = corner + u * s + w * t;
         build.quad(corner, u, w, kind).seen(v(0.2, 0.1, 1.0), point).color().as_vec3()
@@ -147,7 +147,7 @@ fn texture_on_a_quad_is_upright_along_v() {
 #[test]
 fn texels_are_half_open_intervals() {
     // Texels are half-open intervals starting at 0. u = 0 is in the left column, v = 0 in the bottom row.
-    let (build, kind) = pictured(TextureFilter::Nearest, Wrap::Repeat, Vec2::ONE);
+    let (build, kind) = textured_material(TextureFilter::Nearest, Wrap::Repeat, Vec2::ONE);
     let square = build.quad(v(0.0, 0.0, -1.0), DVec3::X, DVec3::Y, kind);
     let world = square.world();
     let bsdf = &world.materials[0].bsdf;
@@ -158,7 +158,7 @@ fn texels_are_half_open_intervals() {
 #[test]
 fn sphere_uv_is_longitude_and_latitude() {
     // u = ½ + atan2(z, x)/2π, v = ½ + asin(y)/π, so (1, 1, 1)/√3 is at (0.625, 0.6959133).
-    let (build, kind) = pictured(TextureFilter::Nearest, Wrap::Repeat, Vec2::ONE);
+    let (build, kind) = textured_material(TextureFilter::Nearest, Wrap::Repeat, Vec2::ONE);
     let center = v(3.0, -1.0, 2.0);
     let ball = build.sphere(center, 2.0, kind);
     let from = |direction: DVec3| ball.clone().seen(center + direction * 6.0, center);

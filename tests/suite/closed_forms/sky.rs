@@ -9,7 +9,7 @@ use glimt::scene::description::light::DirectionalLight;
 use glimt::scene::description::{Integrator, Light, ShadowMode, Sky};
 
 use super::direct::at_origin;
-use super::photons::{assert_same_light, both as both_methods};
+use super::photons::{assert_same_light, path_and_photon_means};
 use super::scenes::{Build, glass, matte, mirror, phong, receiver, scene};
 use super::{assert_close, assert_mean, assert_same_mean, mean_and_error, v};
 
@@ -17,7 +17,7 @@ fn path(build: Build) -> Build {
     build.with(|scene| scene.render.integrator = Integrator::Path)
 }
 
-fn both(build: &Build) -> [Build; 2] {
+fn whitted_and_path(build: &Build) -> [Build; 2] {
     [build.clone(), path(build.clone())]
 }
 
@@ -34,7 +34,7 @@ fn lit(build: Build, (width, texels): (u32, Vec<Vec3>), rotate: f64) -> Build {
 #[test]
 fn plane_under_constant_sky_shows_its_albedo() {
     for shadows in [ShadowMode::Soft, ShadowMode::Hard, ShadowMode::Off] {
-        for build in both(&at_origin().environment(1.0).shadows(shadows, 1)) {
+        for build in whitted_and_path(&at_origin().environment(1.0).shadows(shadows, 1)) {
             assert_mean(&format!("{shadows:?}"), &build.values(64, 64), 0.7, 2.5e-4);
         }
         let white = lit(at_origin(), map(16, 8, |_, _| 1.0), 0.0).shadows(shadows, 4);
@@ -63,17 +63,17 @@ fn half_sky_irradiance_is_exact() {
     let left = map(rows, height, |column, _| f32::from(u8::from(column < rows / 2)));
     // Between rows 31 and 32, the radiance falls from 1 to 0 over one texel, which loses little light above
     // the horizon.
-    for build in both(&lit(at_origin(), upper, 0.0)) {
+    for build in whitted_and_path(&lit(at_origin(), upper, 0.0)) {
         let values = build.values(64, 64);
         let lost = PI / f64::from(height);
         let mean = values.iter().sum::<f64>() / values.len() as f64;
         assert!((0.7 * (1.0 - lost * lost)..0.7002).contains(&mean), "{mean}");
     }
-    for build in both(&lit(at_origin(), lower, 0.0)) {
+    for build in whitted_and_path(&lit(at_origin(), lower, 0.0)) {
         let mean = build.values(64, 16).iter().sum::<f64>() / 16.0;
         assert!(mean < 1e-3, "{mean}");
     }
-    for build in both(&lit(at_origin(), left.clone(), 0.0)) {
+    for build in whitted_and_path(&lit(at_origin(), left.clone(), 0.0)) {
         assert_mean("left", &build.values(64, 64), 0.35, 2e-3);
     }
     // A wall in the dark half blocks no light, and a wall in the bright half blocks all of it.
@@ -130,7 +130,7 @@ fn sky_in_mirrors_and_glass_is_emission() {
     let pane = |material| {
         scene().quad(v(-1.0, -1.0, -2.0), v(2.0, 0.0, 0.0), v(0.0, 2.0, 0.0), material).environment(2.0)
     };
-    for build in both(&pane(mirror(0.5))) {
+    for build in whitted_and_path(&pane(mirror(0.5))) {
         assert_close("mirror", build.value(), 1.0);
         assert_close("its emission", build.clone().viewed(ViewMode::Emission).value(), 1.0);
         assert_eq!(build.depth(0).value(), 0.0);
@@ -149,9 +149,9 @@ fn phong_ball_in_a_furnace_shows_its_albedo() {
     for (shininess, albedo) in [(10.0, 0.5047), (100.0, 0.5000)] {
         let normal = v(60.0_f64.to_radians().sin(), 0.0, 60.0_f64.to_radians().cos());
         let center = v(0.0, 0.0, -5.0) - normal;
-        for build in
-            both(&scene().sphere(center, 1.0, phong(0.0, 1.0, shininess, 0.0)).environment(1.0).depth(1))
-        {
+        for build in whitted_and_path(
+            &scene().sphere(center, 1.0, phong(0.0, 1.0, shininess, 0.0)).environment(1.0).depth(1),
+        ) {
             let values = build.values(256, 64);
             let mean = values.iter().sum::<f64>() / 64.0;
             assert!((mean - albedo).abs() < 2e-3, "{shininess}: {mean} {albedo}");
@@ -161,7 +161,7 @@ fn phong_ball_in_a_furnace_shows_its_albedo() {
             map(8, 4, |_, _| 1.0),
             0.0,
         );
-        for build in both(&as_map) {
+        for build in whitted_and_path(&as_map) {
             let mean = build.values(256, 64).iter().sum::<f64>() / 64.0;
             assert!((mean - albedo).abs() < 4e-3, "{shininess}, map: {mean} {albedo}");
         }
@@ -169,7 +169,7 @@ fn phong_ball_in_a_furnace_shows_its_albedo() {
 }
 
 /// Solid angle of a texel under bilinear interpolation: the integral of its tent function.
-fn weight_of(width: u32, height: u32, row: u32) -> f64 {
+fn texel_solid_angle(width: u32, height: u32, row: u32) -> f64 {
     let (steps, texel) = (4096, PI / f64::from(height));
     let tent = |step: i32| {
         let offset = (f64::from(step) + 0.5) / f64::from(steps) * 2.0 - 1.0;
@@ -189,11 +189,11 @@ fn towards(width: u32, height: u32, column: u32, row: u32) -> DVec3 {
 fn single_bright_texel_matches_a_sun() {
     let (width, height, column, row) = (1024, 512, 700, 120);
     let sky = map(width, height, |x, y| if (x, y) == (column, row) { 1e5 } else { 0.0 });
-    let irradiance = 1e5 * weight_of(width, height, row);
+    let irradiance = 1e5 * texel_solid_angle(width, height, row);
     let to_light = towards(width, height, column, row);
     let blocked = |at: DVec3| at_origin().sphere(at, 0.5, matte(0.5));
     let exact = 0.7 / PI * irradiance * to_light.y;
-    for build in both(&lit(at_origin(), sky.clone(), 0.0).depth(1)) {
+    for build in whitted_and_path(&lit(at_origin(), sky.clone(), 0.0).depth(1)) {
         let values = build.values(256, 64);
         let mean = values.iter().sum::<f64>() / 64.0;
         assert!((mean / exact - 1.0).abs() < 2e-3, "{mean} {exact}");
@@ -262,7 +262,7 @@ fn whitted_and_path_agree_on_sky_light() {
 }
 
 /// A black map with a few equally bright texels, and the equivalent directional lights.
-fn dotted(width: u32, height: u32, count: u32) -> [Build; 2] {
+fn map_and_equivalent_lights(width: u32, height: u32, count: u32) -> [Build; 2] {
     let mut bright = std::collections::BTreeSet::new();
     let mut random = TestRandom::new(12_345);
     let mut next = |below: u32| random.below(below as usize) as u32;
@@ -274,7 +274,7 @@ fn dotted(width: u32, height: u32, count: u32) -> [Build; 2] {
     let suns = bright.iter().map(|&(x, y)| {
         Light::Directional(DirectionalLight {
             direction: -towards(width, height, x, y),
-            irradiance: Vec3::splat((radiance * weight_of(width, height, y)) as f32),
+            irradiance: Vec3::splat((radiance * texel_solid_angle(width, height, y)) as f32),
             angle: 0.0,
         })
     });
@@ -283,7 +283,7 @@ fn dotted(width: u32, height: u32, count: u32) -> [Build; 2] {
 
 #[test]
 fn bright_texels_match_directional_lights() {
-    let [map, suns] = dotted(512, 256, 40);
+    let [map, suns] = map_and_equivalent_lights(512, 256, 40);
     assert_same_picture("40 of 512 × 256", &map, &suns, [64, 4], 16);
     assert_same_picture("path, 40 of 512 × 256", &path(map), &suns, [64, 4], 16);
 }
@@ -293,14 +293,15 @@ fn bright_texels_match_directional_lights() {
 #[test]
 #[ignore = "ten seconds: cargo test --release --test suite a_thousand_texels -- --ignored"]
 fn a_thousand_texels_match_directional_lights() {
-    let [map, suns] = dotted(4096, 2048, 1000);
+    let [map, suns] = map_and_equivalent_lights(4096, 2048, 1000);
     assert_same_picture("1000 of 4096 × 2048", &map, &suns, [64, 1], 16);
     assert_same_picture("path, 1000 of 4096 × 2048", &path(map), &suns, [64, 1], 16);
 }
 
 #[test]
 fn single_texel_map_is_a_constant_color() {
-    for build in both(&lit(receiver(DVec3::ZERO, 0.5), (1, vec![Vec3::new(1.0, 2.0, 4.0)]), 10.0)) {
+    for build in whitted_and_path(&lit(receiver(DVec3::ZERO, 0.5), (1, vec![Vec3::new(1.0, 2.0, 4.0)]), 10.0))
+    {
         let colors: Vec<DVec3> = build.pictures(64, 0..64).iter().map(|picture| picture[0]).collect();
         for (axis, expected) in [0.5, 1.0, 2.0].into_iter().enumerate() {
             let values: Vec<f64> = colors.iter().map(|color| color[axis]).collect();
@@ -367,5 +368,5 @@ fn photons_match_path_under_a_clear_sky() {
         .clear_sky(sky, 0.0)
         .pictured(v(0.0, 3.0, 2.0), v(-0.2, 0.0, 0.0), 30.0, 8, 8)
         .depth(3);
-    assert_same_light("clear sky", both_methods(&build, 3, [64, 8], (10_000, 0.05)), 8e-3, 4e-3);
+    assert_same_light("clear sky", path_and_photon_means(&build, 3, [64, 8], (10_000, 0.05)), 8e-3, 4e-3);
 }

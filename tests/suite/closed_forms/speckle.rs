@@ -6,7 +6,7 @@ use glimt::math::DVec3;
 use glimt::math::random::TestRandom;
 use glimt::scene::description::Accel;
 
-use super::scenes::{AS_IT_IS, Build, matte, scene};
+use super::scenes::{Build, IDENTITY_PLACEMENT, matte, scene};
 use super::v;
 
 /// Distance at which a ray enters the cube [−h, h]³. `None` if it misses the cube.
@@ -64,7 +64,7 @@ fn mesh(accel: Accel) -> Build {
             mesh.triangles.extend([[first, first + 1, first + 2], [first, first + 2, first + 3]]);
         }
     }
-    scene().accel(accel).mesh(mesh, AS_IT_IS, matte(0.5))
+    scene().accel(accel).mesh(mesh, IDENTITY_PLACEMENT, matte(0.5))
 }
 
 #[test]

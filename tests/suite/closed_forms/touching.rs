@@ -9,8 +9,8 @@ use glimt::math::{DMat3, DVec3, Vec3};
 use glimt::scene::description::Shape;
 
 use super::glass::boxes;
-use super::global::by_paths;
-use super::scenes::{self, AS_IT_IS, Build, emitter, file_material, glass, matte, mirror, scene};
+use super::global::path_traced;
+use super::scenes::{self, Build, IDENTITY_PLACEMENT, emitter, file_material, glass, matte, mirror, scene};
 use super::{assert_close, mean_and_error, v};
 
 /// Unpolarized reflectance between IORs `n` and `m` from the Fresnel equations. `sine` is the sine of the
@@ -52,18 +52,18 @@ fn layer_formula_matches_known_values() {
 
 /// Rotation of a whole scene.
 #[derive(Clone, Copy)]
-struct Turned {
+struct SceneRotation {
     degrees: DVec3,
     axes: DMat3,
 }
 
-impl Turned {
-    fn by(degrees: DVec3) -> Self {
+impl SceneRotation {
+    fn from_degrees(degrees: DVec3) -> Self {
         Self { degrees, axes: rotation_xyz(degrees) }
     }
 
-    fn any(random: &mut TestRandom) -> Self {
-        Self::by(v(random.signed(), random.signed(), random.signed()) * 180.0)
+    fn random(random: &mut TestRandom) -> Self {
+        Self::from_degrees(v(random.signed(), random.signed(), random.signed()) * 180.0)
     }
 
     /// A box between two corners.
@@ -92,7 +92,7 @@ fn assert_within(what: &str, build: &Build, samples: u32, exact: f64, part: f64)
 }
 
 /// Layers of glass below y = 0, starting with the top layer. `order` is their order in the scene.
-fn stack(turned: &Turned, layers: &[(f64, f64)], order: &[usize], half: f64) -> Build {
+fn stack(turned: &SceneRotation, layers: &[(f64, f64)], order: &[usize], half: f64) -> Build {
     let mut tops = vec![0.0];
     for (_, thickness) in layers {
         tops.push(tops[tops.len() - 1] - thickness);
@@ -105,7 +105,7 @@ fn stack(turned: &Turned, layers: &[(f64, f64)], order: &[usize], half: f64) -> 
 
 #[test]
 fn boxes_sharing_a_face_match_layers() {
-    let level = Turned::by(DVec3::ZERO);
+    let level = SceneRotation::from_degrees(DVec3::ZERO);
     let exact = layers(&[1.5, 2.0], 0.0).1;
     for order in [[0, 1], [1, 0]] {
         let both = stack(&level, &[(1.5, 1.0), (2.0, 1.0)], &order, 500.0).depth(200);
@@ -119,7 +119,7 @@ fn boxes_sharing_a_face_match_layers() {
 
 #[test]
 fn no_boundary_between_equal_iors() {
-    let level = Turned::by(DVec3::ZERO);
+    let level = SceneRotation::from_degrees(DVec3::ZERO);
     let lamp_under = |index: f64, depth: u32| {
         stack(&level, &[(index, 1.0); 3], &[0, 1, 2], 500.0)
             .shape(level.square(-9.0, 5000.0), emitter(1.0))
@@ -128,8 +128,8 @@ fn no_boundary_between_equal_iors() {
     };
     // Passing through three boxes with the same IOR takes two bounces. Boxes of air take none.
     assert_within("boxes with equal IORs", &lamp_under(1.5, 2), 512, 0.96 * 0.96, 2e-3);
-    assert_within("path", &by_paths(lamp_under(1.5, 2), 2), 2048, 0.96 * 0.96, 5e-3);
-    for air in [lamp_under(1.0, 0), by_paths(lamp_under(1.0, 0), 0)] {
+    assert_within("path", &path_traced(lamp_under(1.5, 2), 2), 2048, 0.96 * 0.96, 5e-3);
+    for air in [lamp_under(1.0, 0), path_traced(lamp_under(1.0, 0), 0)] {
         assert_eq!(air.value(), 1.0);
     }
 }
@@ -137,7 +137,7 @@ fn no_boundary_between_equal_iors() {
 #[test]
 fn gaps_and_overlaps_match_layers() {
     // A gap adds two surfaces between glass and air. An overlap belongs to the later solid.
-    let level = Turned::by(DVec3::ZERO);
+    let level = SceneRotation::from_degrees(DVec3::ZERO);
     let touching = layers(&[1.5, 2.0], 0.0).1;
     let apart = layers(&[1.5, 1.0, 2.0], 0.0).1;
     for gap in [1e-3, 1e-5, 1e-6, 0.0, -1e-8, -1e-7, -1e-6, -1e-3] {
@@ -169,7 +169,11 @@ fn gaps_and_overlaps_match_layers() {
 fn random_box_stacks_match_layers() {
     let mut random = TestRandom::new(2026);
     for round in 0..40 {
-        let turned = if round % 8 == 0 { Turned::by(DVec3::ZERO) } else { Turned::any(&mut random) };
+        let turned = if round % 8 == 0 {
+            SceneRotation::from_degrees(DVec3::ZERO)
+        } else {
+            SceneRotation::random(&mut random)
+        };
         let count = 2 + (random.unit() * 5.0) as usize;
         let own: Vec<(f64, f64)> =
             (0..count).map(|_| (1.0 + 1.5 * random.unit(), 0.1 + random.unit())).collect();
@@ -195,7 +199,11 @@ fn random_box_stacks_match_layers() {
 fn drink_in_a_glass_matches_layers() {
     let mut random = TestRandom::new(7);
     for round in 0..6 {
-        let turned = if round == 0 { Turned::by(DVec3::ZERO) } else { Turned::any(&mut random) };
+        let turned = if round == 0 {
+            SceneRotation::from_degrees(DVec3::ZERO)
+        } else {
+            SceneRotation::random(&mut random)
+        };
         let bar = |low: f64, high: f64, radius: f64| Shape::Cylinder {
             a: turned.axes * v(0.0, low, 0.0),
             b: turned.axes * v(0.0, high, 0.0),
@@ -259,7 +267,11 @@ fn coincident_and_inscribed_balls_match_layers() {
 fn touching_meshes_match_layers() {
     let mut random = TestRandom::new(11);
     for round in 0..12 {
-        let turned = if round == 0 { Turned::by(DVec3::ZERO) } else { Turned::any(&mut random) };
+        let turned = if round == 0 {
+            SceneRotation::from_degrees(DVec3::ZERO)
+        } else {
+            SceneRotation::random(&mut random)
+        };
         // Aim close to the faces' diagonal.
         let eye = v(0.13, 3.0, -0.08) + v(0.1, 0.0, 0.05) * random.signed();
         let at = eye - v(0.0, 3.0, 0.0);
@@ -288,7 +300,7 @@ fn touching_meshes_match_layers() {
         assert_within(&format!("parts, round {round}"), &seen, 512, layers(&[1.5, 2.0], 0.0).1, 2e-3);
         // There is no surface between parts with the same glass.
         let same = boxes(&[(v(0.0, -0.5, 0.0), 1.0, 0), (v(0.2, -1.75, 0.1), 1.5, 0)]);
-        let same = scene().mesh(turn(same), AS_IT_IS, glass(1.5));
+        let same = scene().mesh(turn(same), IDENTITY_PLACEMENT, glass(1.5));
         let seen = turned.seen(lamp(same), eye, at);
         assert_within(&format!("same glass, round {round}"), &seen, 512, layers(&[1.5], 0.0).1, 2e-3);
     }
@@ -299,7 +311,11 @@ fn glass_on_an_opaque_surface_is_exact() {
     let mut random = TestRandom::new(5);
     let r = fresnel(1.0, 1.5, 0.0);
     for round in 0..12 {
-        let turned = if round < 2 { Turned::by(DVec3::ZERO) } else { Turned::any(&mut random) };
+        let turned = if round < 2 {
+            SceneRotation::from_degrees(DVec3::ZERO)
+        } else {
+            SceneRotation::random(&mut random)
+        };
         let block = (turned.cuboid(v(-1.0, 0.0, -1.0), v(1.0, 1.0, 1.0)), glass(1.5));
         let stood = |floor: glimt::scene::description::Material, first: bool| {
             let floor = (turned.square(0.0, 50.0), floor);
@@ -329,7 +345,7 @@ fn tints_apply_within_their_glass() {
     // Straight down through thickness 1 of one tint and 2 of another. Their IORs are equal, so the surface
     // between them does not reflect.
     let tinted = |tint: f64| scenes::tinted(1.5, DVec3::splat(tint));
-    let level = Turned::by(DVec3::ZERO);
+    let level = SceneRotation::from_degrees(DVec3::ZERO);
     let r = fresnel(1.0, 1.5, 0.0);
     for first in [false, true] {
         let top = (level.cuboid(v(-9.0, 0.0, -9.0), v(9.0, 1.0, 9.0)), tinted(0.5));
@@ -346,7 +362,7 @@ fn tints_apply_within_their_glass() {
 #[test]
 fn later_glass_determines_overlaps() {
     // One solid extends from y = 0 to 2, the other from −1 to 1. Between 0 and 1, the later solid counts.
-    let level = Turned::by(DVec3::ZERO);
+    let level = SceneRotation::from_degrees(DVec3::ZERO);
     let tinted = |ior: f32, tint: f64| scenes::tinted(ior, DVec3::splat(tint));
     for (order, exact) in [([0, 1], 0.5 * 0.8 * 0.8), ([1, 0], 0.5 * 0.5 * 0.8)] {
         let own = [
@@ -360,7 +376,7 @@ fn later_glass_determines_overlaps() {
     }
     let mut random = TestRandom::new(3);
     for round in 0..10 {
-        let turned = Turned::any(&mut random);
+        let turned = SceneRotation::random(&mut random);
         let boxes = [
             (turned.cuboid(v(-90.0, 0.0, -90.0), v(90.0, 2.0, 90.0)), 1.4),
             (turned.cuboid(v(-90.0, -1.0, -90.0), v(90.0, 1.0, 90.0)), 1.9),
@@ -379,7 +395,7 @@ fn later_glass_determines_overlaps() {
 
 #[test]
 fn camera_inside_glass_finds_its_medium() {
-    let level = Turned::by(DVec3::ZERO);
+    let level = SceneRotation::from_degrees(DVec3::ZERO);
     let r = fresnel(1.5, 2.0, 0.0);
     for first in [false, true] {
         let top = (level.cuboid(v(-500.0, 0.0, -500.0), v(500.0, 1.0, 500.0)), glass(1.5));
@@ -396,7 +412,11 @@ fn camera_inside_glass_finds_its_medium() {
 fn nested_glass_is_invisible_in_a_furnace() {
     let mut random = TestRandom::new(99);
     for round in 0..6 {
-        let turned = if round == 0 { Turned::by(DVec3::ZERO) } else { Turned::any(&mut random) };
+        let turned = if round == 0 {
+            SceneRotation::from_degrees(DVec3::ZERO)
+        } else {
+            SceneRotation::random(&mut random)
+        };
         let mut things = vec![
             turned.cuboid(v(-1.0, -1.0, -1.0), v(1.0, 0.0, 1.0)),
             turned.cuboid(v(-1.0, 0.0, -1.0), v(0.0, 1.0, 1.0)),
@@ -437,7 +457,11 @@ fn ambient_light_is_uniform_in_and_under_glass() {
     // everywhere, inside and outside the glass.
     let mut random = TestRandom::new(17);
     for round in 0..6 {
-        let turned = if round == 0 { Turned::by(DVec3::ZERO) } else { Turned::any(&mut random) };
+        let turned = if round == 0 {
+            SceneRotation::from_degrees(DVec3::ZERO)
+        } else {
+            SceneRotation::random(&mut random)
+        };
         let build = scene()
             .shape(turned.square(0.0, 50.0), matte(1.0))
             .shape(turned.cuboid(v(-1.0, 0.0, -1.0), v(1.0, 1.0, 1.0)), glass(1.5))
@@ -491,7 +515,7 @@ fn mesh_faces_touch_in_coordinate_planes() {
             size: high - low,
             rotate: DVec3::ZERO,
         };
-        let mesh = |build: Build, (low, high), own| build.mesh(block(low, high), AS_IT_IS, own);
+        let mesh = |build: Build, (low, high), own| build.mesh(block(low, high), IDENTITY_PLACEMENT, own);
         let what = |of: &str| format!("{of}, normal {axis}");
         let through = (
             v(-0.45, -0.25, 0.25) * (one - axis) - axis * 0.3,
@@ -507,7 +531,7 @@ fn mesh_faces_touch_in_coordinate_planes() {
     // Eight solids meet at the origin, where rays that self-intersect would never terminate.
     let eight = (0..8_u32).fold(scene(), |build, i| {
         let low = v(f64::from(i & 1), f64::from(i >> 1 & 1), f64::from(i >> 2)) - one;
-        build.mesh(block(low, low + one), AS_IT_IS, glass([1.5, 1.33, 2.4][i as usize % 3]))
+        build.mesh(block(low, low + one), IDENTITY_PLACEMENT, glass([1.5, 1.33, 2.4][i as usize % 3]))
     });
     assert_white("eight meshes", eight);
 }

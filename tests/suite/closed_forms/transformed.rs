@@ -10,7 +10,9 @@ use glimt::scene::description::{AffineMap, EmissionSides, Integrator, Material, 
 
 use super::direct::{assert_irradiance, at_origin};
 use super::round_lights::assert_same;
-use super::scenes::{AS_IT_IS, Build, emitter, glass, lat_long_sphere, matte, phong, scene, tinted};
+use super::scenes::{
+    Build, IDENTITY_PLACEMENT, emitter, glass, lat_long_sphere, matte, phong, scene, tinted,
+};
 use super::touching::{assert_white, block};
 use super::{assert_close, lambert, mean_and_error, v};
 
@@ -51,7 +53,7 @@ fn is_closed(shape: &Shape) -> bool {
 /// The scene with a mesh under a map.
 fn mesh_under(build: Build, mesh: TriangleMesh, matrix: AffineMap, material: Material) -> Build {
     let loaded = LoadedMesh { mesh, ..LoadedMesh::default() };
-    build.loaded(loaded, AS_IT_IS, material).with(|scene| {
+    build.loaded(loaded, IDENTITY_PLACEMENT, material).with(|scene| {
         if let Some(Shape::Mesh(mesh)) = scene.objects.last_mut().map(|object| &mut object.shape) {
             mesh.placed = ObjectTransform::Matrix(matrix);
         }
@@ -227,7 +229,7 @@ fn translation_and_uniform_scale_need_no_matrix() {
 }
 
 #[test]
-fn transformed_planes_keep_their_texture_coordinates() {
+fn transformed_planes_keep_their_uvs() {
     let plane = Shape::Plane { point: v(0.0, 1.0, 0.0), normal: DVec3::Y };
     for mirror in [1.0, -1.0] {
         let matrix = map(v(2.0, 0.3, 0.0), v(0.2, 0.5, 0.0), v(0.0, 0.4, 3.0) * mirror, v(0.0, 1.0, 0.0));

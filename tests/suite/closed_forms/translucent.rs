@@ -9,8 +9,8 @@ use glimt::scene::description::{
     ColorSource, Integrator, Material, MaterialKind, PhongParameters, ShadowMode, TextureFilter, Wrap,
 };
 
-use super::global::by_paths;
-use super::photons::{assert_same_light, both};
+use super::global::path_traced;
+use super::photons::{assert_same_light, path_and_photon_means};
 use super::scenes::{Build, emitter, glass, matte, mirror, phong, principled, scene};
 use super::{assert_close, assert_same_mean, mean_and_error, v};
 
@@ -60,7 +60,7 @@ fn light_from_behind_is_exact() {
         let exact = 0.5 / PI * 10.0 * 2.0 / squared.sqrt() / squared;
         for (name, material) in materials().into_iter().take(2) {
             let build = lit(material);
-            for (integrator, build) in [("whitted", build.clone()), ("path", by_paths(build, 1))] {
+            for (integrator, build) in [("whitted", build.clone()), ("path", path_traced(build, 1))] {
                 assert_close(&format!("{name} with {integrator}"), build.value(), exact);
             }
         }
@@ -98,7 +98,7 @@ fn furnace_returns_the_sum_of_the_albedos() {
             (leaf(matte(0.4), gray(0.6)), 1.0),
         ] {
             let build = sheet(material, side).environment(1.0);
-            for (what, build) in [("whitted", build.clone().depth(1)), ("path", by_paths(build, 1))] {
+            for (what, build) in [("whitted", build.clone().depth(1)), ("path", path_traced(build, 1))] {
                 let (mean, error) = mean_and_error(&build.values(256, 16));
                 assert!(error < 2e-3, "{what}: too noisy: ± {error}");
                 assert!((mean - exact).abs() < 4.0 * error + 1e-5, "{what}: {mean}, expected {exact}");
@@ -106,7 +106,8 @@ fn furnace_returns_the_sum_of_the_albedos() {
         }
         // Principled surfaces never return more light than they receive.
         let white = leaf(principled(0.5, 0.0, 0.5), gray(1.0));
-        let (mean, error) = mean_and_error(&by_paths(sheet(white, side).environment(1.0), 1).values(256, 16));
+        let (mean, error) =
+            mean_and_error(&path_traced(sheet(white, side).environment(1.0), 1).values(256, 16));
         assert!(error < 5e-3 && mean < 1.0 + 4.0 * error && mean > 0.9, "{mean} ± {error}");
     }
 }
@@ -116,11 +117,11 @@ fn techniques_agree_on_light_from_behind() {
     let at = v(0.6, -0.9, -0.2);
     for (name, material) in materials() {
         let lit = sheet(material.clone(), 1.0).sphere(at, 0.5, emitter(2.0));
-        let path = mean_and_error(&by_paths(lit.clone(), 1).values(512, 16));
+        let path = mean_and_error(&path_traced(lit.clone(), 1).values(512, 16));
         let whitted = lit.clone().depth(1);
         let unshadowed = whitted.clone().shadows(ShadowMode::Off, 1);
         // Light samples cannot find a light inside a glass shell without refraction, but BSDF samples can.
-        let hidden = by_paths(lit.sphere(at, 0.55, glass(1.0)), 2);
+        let hidden = path_traced(lit.sphere(at, 0.55, glass(1.0)), 2);
         for (technique, build, samples) in
             [("whitted", &whitted, 512), ("light samples", &unshadowed, 512), ("lobes", &hidden, 2048)]
         {
@@ -146,9 +147,9 @@ fn room() -> Build {
 }
 
 #[test]
-fn photons_match_path_through_translucent_surfaces() {
+fn photons_match_path_on_translucent_surfaces() {
     for depth in [2, 3, 5] {
-        let means = both(&room().depth(depth), depth, [256, 24], (10_000, 0.05));
+        let means = path_and_photon_means(&room().depth(depth), depth, [256, 24], (10_000, 0.05));
         assert_same_light(&format!("depth {depth}"), means, 1.2e-2, 4e-3);
     }
 }
@@ -165,7 +166,7 @@ fn photons_scatter_to_both_sides() {
             .sphere(at, 0.75, glass(1.0))
             .pictured(v(0.0, 0.3, 3.5), v(0.0, 0.25, 0.0), 26.0, 8, 8)
             .depth(4);
-        let means = both(&lit, 4, [1024, 28], (10_000, 0.04));
+        let means = path_and_photon_means(&lit, 4, [1024, 28], (10_000, 0.04));
         assert_same_light(name, means, 2e-2, 4e-3);
     }
 }

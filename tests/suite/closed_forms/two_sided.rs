@@ -7,11 +7,11 @@ use glimt::math::DVec3;
 use glimt::scene::description::{EmissionSides, Integrator, Material, Shape};
 
 use super::direct::{assert_hard, assert_irradiance};
-use super::scenes::{AS_IT_IS, Build, emitter, lat_long_sphere, mirror, receiver, scene};
+use super::scenes::{Build, IDENTITY_PLACEMENT, emitter, lat_long_sphere, mirror, receiver, scene};
 use super::{assert_close, assert_mean, assert_same_mean, lambert, mean_and_error, v};
 
 /// A light with radiance 1 on both sides.
-pub fn both() -> Material {
+pub fn two_sided_emitter() -> Material {
     let mut material = emitter(1.0);
     material.emission.sides = EmissionSides::Both;
     material
@@ -38,17 +38,17 @@ fn flat_two_sided_lights_are_symmetric() {
     let half = lambert(DVec3::ZERO, DVec3::Y, &polygon[..3]);
     // Test both orientations.
     for (u, w) in [(x, z), (z, x)] {
-        let quad = at_origin().quad(corner, u, w, both());
+        let quad = at_origin().quad(corner, u, w, two_sided_emitter());
         assert_lit("quad", &quad, whole, 2e-4);
         assert_hard("quad", &quad, whole, 4e-5);
         let ends =
             if u == x { [polygon[0], polygon[1], polygon[2]] } else { [polygon[0], polygon[2], polygon[1]] };
-        assert_lit("triangle", &at_origin().triangle(ends, both()), half, 6e-5);
+        assert_lit("triangle", &at_origin().triangle(ends, two_sided_emitter()), half, 6e-5);
     }
     for normal in [DVec3::Y, DVec3::NEG_Y] {
         // E = π·r²/(r² + h²) on the axis.
         let disk = Shape::Disk { center: v(0.0, 2.0, 0.0), normal, radius: 1.0 };
-        assert_lit("disk", &at_origin().shape(disk, both()), PI / 5.0, 3e-5);
+        assert_lit("disk", &at_origin().shape(disk, two_sided_emitter()), PI / 5.0, 3e-5);
     }
 }
 
@@ -67,9 +67,14 @@ fn two_sided_mesh_lights_are_symmetric() {
         ("up", of(&[[0, 2, 1], [0, 3, 2]])),
         ("askew", of(&[[0, 1, 2], [0, 3, 2]])),
     ] {
-        assert_lit(name, &at_origin().mesh(mesh.clone(), AS_IT_IS, both()), exact, 2.5e-4);
+        assert_lit(
+            name,
+            &at_origin().mesh(mesh.clone(), IDENTITY_PLACEMENT, two_sided_emitter()),
+            exact,
+            2.5e-4,
+        );
         let mirrored = [v(-1.0, 1.0, 1.0), DVec3::ZERO, DVec3::ZERO];
-        assert_lit(name, &at_origin().mesh(mesh, mirrored, both()), exact, 2.5e-4);
+        assert_lit(name, &at_origin().mesh(mesh, mirrored, two_sided_emitter()), exact, 2.5e-4);
     }
 }
 
@@ -77,7 +82,7 @@ fn two_sided_mesh_lights_are_symmetric() {
 fn enclosing_light_fills_hemisphere() {
     // The radiance is 1 over the whole hemisphere, so E = π.
     let at = v(2.0, 0.0, 0.0);
-    let around = |shape: Shape| receiver(at, 0.7).shape(shape, both());
+    let around = |shape: Shape| receiver(at, 0.7).shape(shape, two_sided_emitter());
     for shape in [
         Shape::Sphere { center: at + v(0.2, 0.1, 0.0), radius: 0.7 },
         Shape::Box { center: at, size: v(1.0, 0.6, 2.0), rotate: v(10.0, 20.0, 30.0) },
@@ -88,7 +93,7 @@ fn enclosing_light_fills_hemisphere() {
         assert_lit(shape.kind(), &around(shape.clone()), PI, 4e-4);
     }
     let ball = lat_long_sphere(12, 24, 0.8, at);
-    assert_lit("mesh", &receiver(at, 0.7).mesh(ball, AS_IT_IS, both()), PI, 1.5e-3);
+    assert_lit("mesh", &receiver(at, 0.7).mesh(ball, IDENTITY_PLACEMENT, two_sided_emitter()), PI, 1.5e-3);
 }
 
 #[test]
@@ -98,7 +103,7 @@ fn open_tube_light_emits_inward() {
     let tube = |from: f64, to: f64| {
         at_origin().shape(
             Shape::Cylinder { a: v(0.0, from, 0.0), b: v(0.0, to, 0.0), radius: 1.0, caps: false },
-            both(),
+            two_sided_emitter(),
         )
     };
     assert_lit("from inside", &tube(-0.5, 1.5), PI - disk(1.5), 8e-5);
@@ -109,7 +114,8 @@ fn open_tube_light_emits_inward() {
         let shape = Shape::Cylinder { a: v(0.0, 0.0, 0.0), b: v(0.0, 1.0, 0.0), radius: 1.0, caps: true };
         outside.clone().shape(shape, material)
     };
-    let [one, two] = [emitter(1.0), both()].map(|material| mean_and_error(&of(material).values(64, 256)));
+    let [one, two] =
+        [emitter(1.0), two_sided_emitter()].map(|material| mean_and_error(&of(material).values(64, 256)));
     assert_same_mean("from the side", two, one, 2.5e-4);
 }
 
@@ -117,7 +123,7 @@ fn open_tube_light_emits_inward() {
 fn both_sides_are_visible() {
     let lamp = |u: DVec3, w: DVec3, material| scene().quad(v(-1.0, -1.0, -2.0), u, w, material);
     for (u, w) in [(v(2.0, 0.0, 0.0), v(0.0, 2.0, 0.0)), (v(0.0, 2.0, 0.0), v(2.0, 0.0, 0.0))] {
-        assert_close("seen", lamp(u, w, both()).value(), 1.0);
+        assert_close("seen", lamp(u, w, two_sided_emitter()).value(), 1.0);
     }
     assert_eq!(lamp(v(0.0, 2.0, 0.0), v(2.0, 0.0, 0.0), emitter(1.0)).value(), 0.0);
 }
@@ -125,12 +131,9 @@ fn both_sides_are_visible() {
 #[test]
 fn two_sided_lights_emit_photons_both_ways() {
     // A mirror reflects light from the back of the light to the receiver.
-    let lit = receiver(DVec3::ZERO, 0.7).quad(v(-0.5, 1.0, -0.5), v(0.0, 0.0, 1.0), DVec3::X, both()).quad(
-        v(-3.0, 2.0, -3.0),
-        v(6.0, 0.0, 0.0),
-        v(0.0, 0.0, 6.0),
-        mirror(0.8),
-    );
+    let lit = receiver(DVec3::ZERO, 0.7)
+        .quad(v(-0.5, 1.0, -0.5), v(0.0, 0.0, 1.0), DVec3::X, two_sided_emitter())
+        .quad(v(-3.0, 2.0, -3.0), v(6.0, 0.0, 0.0), v(0.0, 0.0, 6.0), mirror(0.8));
     let paths = lit.clone().with(|scene| scene.render.integrator = Integrator::Path).values(256, 64);
     let photons = lit.photons(4_000, 0.05).values(16, 32);
     assert_same_mean("photons", mean_and_error(&photons), mean_and_error(&paths), 2.5e-3);

@@ -137,7 +137,7 @@ fn one_material_can_use_both_uv_sets() {
             normal_map: has_relief.then_some(NormalMap { texture: flat, strength: 1.0 }),
             ..matte(0.5)
         };
-        let build = build.mesh(wall(&first, &second), super::scenes::AS_IT_IS, material);
+        let build = build.mesh(wall(&first, &second), super::scenes::IDENTITY_PLACEMENT, material);
         for (column, row) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
             let at = v(f64::from(column) - 0.5, f64::from(row) - 0.5, 0.0);
             let seen = build.clone().seen(at + v(0.1, 0.2, 2.0), at);

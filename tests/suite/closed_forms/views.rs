@@ -6,7 +6,7 @@ use glimt::math::{DVec3, Vec3};
 use glimt::scene::description::light::Falloff;
 use glimt::scene::description::{Accel, Integrator, ShadowMode};
 
-use super::scenes::{AS_IT_IS, Build, matte, scene};
+use super::scenes::{Build, IDENTITY_PLACEMENT, matte, scene};
 use super::v;
 
 /// A 64 × 64 image along −z. Pixels are 1/64 wide at a distance of 1.
@@ -68,8 +68,9 @@ fn bvh_and_kd_tree_show_their_boxes() {
         triangles: (0..40).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect(),
         ..TriangleMesh::default()
     };
-    let picture =
-        |accel: Accel| framed(scene().accel(accel).mesh(mesh(), AS_IT_IS, matte(0.5)), ViewMode::Bounds);
+    let picture = |accel: Accel| {
+        framed(scene().accel(accel).mesh(mesh(), IDENTITY_PLACEMENT, matte(0.5)), ViewMode::Bounds)
+    };
     let (boxes, planes) = (picture(Accel::Bvh), picture(Accel::KdTree));
     for picture in [&boxes, &planes] {
         // The root extends 24 pixels to each side, and 30.4 up and down.

@@ -13,7 +13,7 @@ use glimt::scene::{parse, starter_scene};
 use serde_json::Value;
 
 use super::{codes, page, root};
-use crate::contract::placeless;
+use crate::contract::without_positions;
 use crate::test_dir::{TestDir, mentions};
 
 /// A defined table with its header in a scene.
@@ -134,7 +134,7 @@ impl DefinedTable {
         let said: Vec<String> = errors
             .map(|one| format!("{}: {}", one.message, one.help.as_deref().unwrap_or_default()))
             .collect();
-        (said.join("\n"), outcome.scene.map(placeless))
+        (said.join("\n"), outcome.scene.map(without_positions))
     }
 
     fn takes(&self, key: &KeyInfo, value: &str) -> bool {

@@ -5,7 +5,7 @@ use std::ops::Range;
 use glimt::math::random::TestRandom;
 
 /// Maximum length of the result. Longer files only take more time.
-const MOST_BYTES: usize = 1 << 20;
+const MAX_BYTES: usize = 1 << 20;
 
 /// Words that may break careless parsers.
 const WORDS: &[&str] = &[
@@ -124,7 +124,7 @@ pub(super) fn changed(bytes: &[u8], other: &[u8], random: &mut TestRandom) -> Ve
     let mut bytes = bytes.to_vec();
     for _ in 0..=random.below(5) {
         change(&mut bytes, other, random);
-        bytes.truncate(MOST_BYTES);
+        bytes.truncate(MAX_BYTES);
     }
     bytes
 }
@@ -231,7 +231,7 @@ fn repeat_line(bytes: &mut Vec<u8>, _: &[u8], random: &mut TestRandom) {
     let line = random.pick(&lines(bytes)).clone();
     let text = [b"\n", &bytes[line.clone()]].concat();
     // Do not repeat long lines beyond the limit, because the worker's memory use is measured.
-    let times = (1 << random.below(12)).min(MOST_BYTES / text.len() + 1);
+    let times = (1 << random.below(12)).min(MAX_BYTES / text.len() + 1);
     bytes.splice(line.end..line.end, text.repeat(times));
 }
 

@@ -84,7 +84,7 @@ fn seed() -> u64 {
 }
 
 /// Writes the files from failed cases to a folder and panics with its path.
-fn settle(failures: &[(Case, String)]) {
+fn save_failures_and_panic(failures: &[(Case, String)]) {
     if failures.is_empty() {
         return;
     }
@@ -103,18 +103,18 @@ fn settle(failures: &[(Case, String)]) {
 
 #[test]
 fn fuzzed_scenes_are_accepted_or_rejected() {
-    settle(&worker::check_all(FuzzInput::Scene, seed(), counts()[0]));
+    save_failures_and_panic(&worker::check_all(FuzzInput::Scene, seed(), counts()[0]));
 }
 
 #[test]
 fn fuzzed_assets_are_accepted_or_rejected() {
-    settle(&worker::check_all(FuzzInput::Asset, seed(), counts()[1]));
+    save_failures_and_panic(&worker::check_all(FuzzInput::Asset, seed(), counts()[1]));
 }
 
 #[test]
 fn check_exits_with_0_or_2() {
     let [_, _, count] = counts();
-    settle(
+    save_failures_and_panic(
         &[
             program::check_all(FuzzInput::Scene, seed(), count),
             program::check_all(FuzzInput::Asset, seed(), count),

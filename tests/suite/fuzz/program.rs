@@ -3,7 +3,7 @@
 use std::process::{Command, Output, Stdio};
 use std::sync::mpsc::channel;
 
-use super::worker::{AT_MOST, CaseDir, TRIES, harmful};
+use super::worker::{CASE_TIME_LIMIT, CaseDir, MAX_ATTEMPTS, first_terminal_control};
 use super::{Case, Corpus, FuzzInput};
 use crate::test_dir::PROGRAM;
 
@@ -15,10 +15,10 @@ pub(super) fn check_all(kind: FuzzInput, seed: u64, count: u64) -> Vec<(Case, St
     let check = |case: Case| {
         let scene = dir.place_case(case, &material.make(case));
         let run = || run(Command::new(PROGRAM).arg("check").arg(&scene));
-        let Some(output) = (0..TRIES).find_map(|_| run()) else {
+        let Some(output) = (0..MAX_ATTEMPTS).find_map(|_| run()) else {
             return Some((case, "took more than 2 s".to_owned()));
         };
-        judge(&output).err().map(|reason| (case, reason))
+        check_output(&output).err().map(|reason| (case, reason))
     };
     cases.filter_map(check).collect()
 }
@@ -30,7 +30,7 @@ fn run(command: &mut Command) -> Option<Output> {
     let process = nix::unistd::Pid::from_raw(child.id() as i32);
     let (send, output) = channel();
     let waiting = std::thread::spawn(move || send.send(child.wait_with_output()));
-    let output = output.recv_timeout(AT_MOST).ok().map(|output| output.expect("its output"));
+    let output = output.recv_timeout(CASE_TIME_LIMIT).ok().map(|output| output.expect("its output"));
     if output.is_none() {
         // The child has not been reaped, so its process ID cannot have been reused.
         let _ = nix::sys::signal::kill(process, nix::sys::signal::Signal::SIGKILL);
@@ -39,7 +39,7 @@ fn run(command: &mut Command) -> Option<Output> {
     output
 }
 
-fn judge(output: &Output) -> Result<(), String> {
+fn check_output(output: &Output) -> Result<(), String> {
     let code = output.status.code();
     let stderr = String::from_utf8(output.stderr.clone()).map_err(|_| "stderr is not UTF-8".to_owned())?;
     if code != Some(0) && code != Some(2) {
@@ -49,5 +49,5 @@ fn judge(output: &Output) -> Result<(), String> {
         return Err(format!("rejected without a reason: {stderr}"));
     }
     let said = String::from_utf8_lossy(&output.stdout).into_owned() + &stderr;
-    harmful(&said).map_or(Ok(()), |harmful| Err(format!("the message contains {harmful:?}")))
+    first_terminal_control(&said).map_or(Ok(()), |harmful| Err(format!("the message contains {harmful:?}")))
 }

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use image::{DynamicImage, ExtendedColorType, ImageFormat, save_buffer};
 
 /// Size limit for assets in bytes. Larger assets are slow and find nothing new.
-const MOST_BYTES: u64 = 150_000;
+const MAX_BYTES: u64 = 150_000;
 
 /// A scene file, or a file that a scene refers to.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -27,7 +27,7 @@ fn files(folder: &str, endings: &[&str]) -> Vec<PathBuf> {
     let mut files: Vec<PathBuf> = entries.map(|entry| entry.expect("an entry").path()).collect();
     files.retain(|file| {
         let ending = file.extension().and_then(|ending| ending.to_str()).unwrap_or_default();
-        endings.contains(&ending) && fs::metadata(file).is_ok_and(|found| found.len() <= MOST_BYTES)
+        endings.contains(&ending) && fs::metadata(file).is_ok_and(|found| found.len() <= MAX_BYTES)
     });
     files.sort();
     files

@@ -17,13 +17,13 @@ use super::seeds::{Seed, root};
 use super::{Case, Corpus, FuzzInput};
 
 /// Time limit per case.
-pub(super) const AT_MOST: Duration = Duration::from_secs(2);
+pub(super) const CASE_TIME_LIMIT: Duration = Duration::from_secs(2);
 
 /// Time limit for generating a case, which only a stalled machine exceeds.
-const TO_BEGIN: Duration = Duration::from_secs(120);
+const GENERATION_TIME_LIMIT: Duration = Duration::from_secs(120);
 
 /// Maximum number of attempts at a slow case. A case may be slow only because the machine is busy.
-pub(super) const TRIES: usize = 3;
+pub(super) const MAX_ATTEMPTS: usize = 3;
 
 /// Limit on resident memory, including the worker's own memory. The worst small file is an image whose pixels
 /// are allocated before the file turns out to be too short.
@@ -36,7 +36,7 @@ const ADDRESS_BYTES: u64 = 16 << 30;
 const WORKERS: u64 = 2;
 
 /// Environment variable that turns a test process into a worker and specifies its cases.
-const ORDER: &str = "GLIMT_FUZZ_WORKER";
+const WORKER_CASES: &str = "GLIMT_FUZZ_WORKER";
 
 /// The failed cases for a kind of file, each with the reason.
 pub(super) fn check_all(kind: FuzzInput, seed: u64, count: u64) -> Vec<(Case, String)> {
@@ -49,11 +49,14 @@ pub(super) fn check_all(kind: FuzzInput, seed: u64, count: u64) -> Vec<(Case, St
                 let mut next = numbers.start;
                 while next < numbers.end {
                     let first = Case { kind, seed, number: next };
-                    match follow(first, numbers.end) {
+                    match run_cases_in_worker(first, numbers.end) {
                         Ok(()) => return,
                         Err((case, reason)) => {
-                            let is_slow = reason == SLOW;
-                            if !is_slow || (1..TRIES).all(|_| follow(case, case.number + 1).is_err()) {
+                            let is_slow = reason == TIMED_OUT;
+                            if !is_slow
+                                || (1..MAX_ATTEMPTS)
+                                    .all(|_| run_cases_in_worker(case, case.number + 1).is_err())
+                            {
                                 failures.lock().expect("no panic").push((case, reason));
                             }
                             next = case.number + 1;
@@ -67,14 +70,14 @@ pub(super) fn check_all(kind: FuzzInput, seed: u64, count: u64) -> Vec<(Case, St
 }
 
 /// Message for a case that takes too long.
-const SLOW: &str = "took more than 2 s";
+const TIMED_OUT: &str = "took more than 2 s";
 
 /// Runs the cases from `first` up to number `end` in a worker process. Returns the first failure as an error.
-fn follow(first: Case, end: u64) -> Result<(), (Case, String)> {
+fn run_cases_in_worker(first: Case, end: u64) -> Result<(), (Case, String)> {
     let Case { kind, seed, number } = first;
     let mut worker = Command::new(std::env::current_exe().expect("this program"))
         .args(["fuzz::worker::worker", "--exact", "--nocapture"])
-        .env(ORDER, format!("{kind:?} {seed} {number} {end}"))
+        .env(WORKER_CASES, format!("{kind:?} {seed} {number} {end}"))
         .stdin(Stdio::null())
         .stdout(Stdio::piped())
         .stderr(Stdio::null())
@@ -92,13 +95,13 @@ fn follow(first: Case, end: u64) -> Result<(), (Case, String)> {
     // The worker may have already exited.
     let _ = worker.kill();
     let status = worker.wait().expect("its end");
-    result.map_err(
-        |(case, reason)| if reason == GONE { (case, format!("{reason}: {status}")) } else { (case, reason) },
-    )
+    result.map_err(|(case, reason)| {
+        if reason == WORKER_EXITED { (case, format!("{reason}: {status}")) } else { (case, reason) }
+    })
 }
 
 /// Message for a worker that exited during a case.
-const GONE: &str = "the process exited";
+const WORKER_EXITED: &str = "the process exited";
 
 fn lines_of(worker: &mut Child) -> Receiver<String> {
     let (send, lines) = channel();
@@ -120,45 +123,46 @@ fn lines_of(worker: &mut Child) -> Receiver<String> {
 fn next_result(lines: &Receiver<String>) -> Result<(), String> {
     let next = |at_most: Duration| match lines.recv_timeout(at_most) {
         Ok(line) => Ok(line),
-        Err(RecvTimeoutError::Timeout) => Err(SLOW.to_owned()),
-        Err(RecvTimeoutError::Disconnected) => Err(GONE.to_owned()),
+        Err(RecvTimeoutError::Timeout) => Err(TIMED_OUT.to_owned()),
+        Err(RecvTimeoutError::Disconnected) => Err(WORKER_EXITED.to_owned()),
     };
-    next(TO_BEGIN)?;
-    let said = next(AT_MOST)?;
+    next(GENERATION_TIME_LIMIT)?;
+    let said = next(CASE_TIME_LIMIT)?;
     if said == "right" { Ok(()) } else { Err(said) }
 }
 
 /// Runs the requested cases. Does nothing unless this process is a worker.
 #[test]
 fn worker() {
-    let Ok(order) = std::env::var(ORDER) else { return };
+    let Ok(order) = std::env::var(WORKER_CASES) else { return };
     let words: Vec<&str> = order.split(' ').collect();
     let kind = if words[0] == "Scene" { FuzzInput::Scene } else { FuzzInput::Asset };
     let [seed, from, to] = [1, 2, 3].map(|word| words[word].parse().expect("a number"));
     setrlimit(Resource::RLIMIT_AS, ADDRESS_BYTES, ADDRESS_BYTES).expect("a limit");
     let dir = CaseDir::new();
     let material = Corpus::new();
-    listen_to_panics(&dir);
+    record_panics(&dir);
     for number in from..to {
         let case = Case { kind, seed, number };
         let scene = dir.place_case(case, &material.make(case));
-        say("begin");
-        let said = one(&scene).map_or_else(|reason| reason.replace('\n', " "), |()| "right".to_owned());
-        say(&said);
+        send_line("begin");
+        let said =
+            check_case(&scene).map_or_else(|reason| reason.replace('\n', " "), |()| "right".to_owned());
+        send_line(&said);
     }
 }
 
 /// Sends a line to the process that started this worker.
-fn say(text: &str) {
+fn send_line(text: &str) {
     writeln!(std::io::stdout(), "\n@ {text}").expect("the parent process is listening");
 }
 
 /// The last panic, even if it was caught.
-static PANIC: Mutex<Option<String>> = Mutex::new(None);
+static LAST_PANIC: Mutex<Option<String>> = Mutex::new(None);
 
 /// Installs a hook that records all panics. Calls the library first, because it installs its own hook on
 /// first use.
-fn listen_to_panics(dir: &CaseDir) {
+fn record_panics(dir: &CaseDir) {
     let _ = check_scene(
         &dir.place_case(
             Case { kind: FuzzInput::Asset, seed: 0, number: 0 },
@@ -168,13 +172,13 @@ fn listen_to_panics(dir: &CaseDir) {
     );
     panic::set_hook(Box::new(|info| {
         let place = info.location().map_or(String::new(), ToString::to_string);
-        *PANIC.lock().expect("no panic") = Some(format!("{info} at {place}"));
+        *LAST_PANIC.lock().expect("no panic") = Some(format!("{info} at {place}"));
     }));
 }
 
-fn one(scene: &Path) -> Result<(), String> {
+fn check_case(scene: &Path) -> Result<(), String> {
     let checked = panic::catch_unwind(AssertUnwindSafe(|| check_scene(scene, &[])));
-    if let Some(panic) = PANIC.lock().expect("no panic").take() {
+    if let Some(panic) = LAST_PANIC.lock().expect("no panic").take() {
         // Decoders in other crates may panic. The library turns such panics into errors about the file.
         let is_foreign = panic.contains("/.cargo/registry/") || panic.contains("/registry/src/");
         if checked.is_err() || !is_foreign {
@@ -191,7 +195,7 @@ fn one(scene: &Path) -> Result<(), String> {
         Err(_) => return Err("panic without a message".to_owned()),
     };
     let text = render_report(&diagnostics, 60, ReportStyle::Plain);
-    if let Some(harmful) = harmful(&text) {
+    if let Some(harmful) = first_terminal_control(&text) {
         return Err(format!("the message contains {harmful:?}"));
     }
     let used = peak_memory_bytes();
@@ -206,7 +210,7 @@ fn peak_memory_bytes() -> u64 {
 }
 
 /// The first character that a terminal would interpret, if there is one.
-pub(super) fn harmful(text: &str) -> Option<char> {
+pub(super) fn first_terminal_control(text: &str) -> Option<char> {
     text.chars().find(|c| (c.is_control() && *c != '\n') || ('\u{202a}'..='\u{202e}').contains(c))
 }
 

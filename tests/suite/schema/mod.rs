@@ -12,7 +12,7 @@ use glimt::cli::commands::schema::{FILE, LINE, schema, schema_text};
 use glimt::scene::starter_scene;
 use serde_json::Value;
 
-use self::validator::faults;
+use self::validator::violations;
 use crate::test_dir::{TestDir, assert_mentions};
 
 fn root() -> &'static Path {
@@ -38,7 +38,7 @@ fn json(text: &str) -> Option<Value> {
 /// Errors that each draft finds in a scene.
 fn found(text: &str) -> Vec<Vec<(String, String)>> {
     let scene = json(text).expect("TOML");
-    SchemaDraft::ALL.iter().map(|draft| faults(&schema(*draft), &scene)).collect()
+    SchemaDraft::ALL.iter().map(|draft| violations(&schema(*draft), &scene)).collect()
 }
 
 fn files(folder: &str) -> Vec<PathBuf> {
@@ -186,7 +186,7 @@ fn schema_accepts_all_valid_scenes() {
         let has_errors = glimt::scene::parse(text.as_str().into(), &path).scene.is_none();
         let Some(scene) = json(&text).filter(|_| !has_errors) else { continue };
         for draft in SchemaDraft::ALL {
-            assert_eq!(faults(&schema(*draft), &scene), [], "{}", path.display());
+            assert_eq!(violations(&schema(*draft), &scene), [], "{}", path.display());
         }
         count += 1;
     }

@@ -4,7 +4,7 @@
 use serde_json::{Map, Value};
 
 /// Paths of invalid values, such as `sphere.0.radius`, each with the violated keyword.
-pub(super) fn faults(schema: &Value, value: &Value) -> Vec<(String, String)> {
+pub(super) fn violations(schema: &Value, value: &Value) -> Vec<(String, String)> {
     let mut found = Vec::new();
     check(schema, schema, value, "", &mut found);
     found
@@ -24,15 +24,15 @@ fn check(root: &Value, schema: &Value, value: &Value, path: &str, found: &mut Ve
         check(root, target, value, path, found);
     }
     for (keyword, condition) in keywords {
-        if !holds(root, keyword, condition, value, keywords) {
+        if !satisfies_keyword(root, keyword, condition, value, keywords) {
             found.push((path.to_owned(), keyword.clone()));
         }
-        inside(root, keyword, condition, value, keywords, path, found);
+        check_nested(root, keyword, condition, value, keywords, path, found);
     }
 }
 
 /// Whether a value satisfies a keyword, ignoring nested values.
-fn holds(
+fn satisfies_keyword(
     root: &Value,
     keyword: &str,
     condition: &Value,
@@ -99,7 +99,7 @@ fn holds(
     }
 }
 
-fn inside(
+fn check_nested(
     root: &Value,
     keyword: &str,
     condition: &Value,

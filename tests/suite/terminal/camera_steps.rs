@@ -21,12 +21,12 @@ fn numbers(folder: &TestDir, key: &str) -> Vec<f64> {
 
 /// Presses `keys` and `c`. Returns the value of `key` in the scene file, then restores the file and waits for
 /// its image.
-fn kept(folder: &TestDir, terminal: &mut Terminal, own: &[u8], keys: &str, key: &str) -> Vec<f64> {
+fn saved_numbers(folder: &TestDir, terminal: &mut Terminal, own: &[u8], keys: &str, key: &str) -> Vec<f64> {
     terminal.press(keys);
     terminal.wait_for_message(messages::CAMERA_MOVED);
     terminal.press("c");
     terminal.wait_for_message(&messages::camera_saved("scene.toml"));
-    let kept = numbers(folder, key);
+    let saved = numbers(folder, key);
     let expected = folder.once(&[]);
     assert_ne!(expected, own, "{keys:?} must change the image");
     let is = |bytes: &[u8]| fs::read(folder.path("scene.png")).is_ok_and(|there| there == bytes);
@@ -36,7 +36,7 @@ fn kept(folder: &TestDir, terminal: &mut Terminal, own: &[u8], keys: &str, key: 
     terminal.wait_for("done");
     // Wait for the change on the screen. Keys pressed earlier would move the previous camera.
     terminal.settled(|screen| screen.contents());
-    kept
+    saved
 }
 
 #[track_caller]
@@ -46,8 +46,8 @@ fn assert_near(numbers: &[f64], expected: &[f64], what: &str) {
 }
 
 /// Camera offset along one axis and along z after a 3° step at a distance of 4.
-const ASIDE: f64 = 0.2093;
-const AHEAD: f64 = 3.9945;
+const STEP_SIDEWAYS: f64 = 0.2093;
+const STEP_REMAINDER: f64 = 3.9945;
 
 #[test]
 fn camera_keys_move_by_documented_steps() {
@@ -56,19 +56,19 @@ fn camera_keys_move_by_documented_steps() {
     terminal.wait_for_render(1);
     let own = folder.bytes("scene.png");
     for (keys, position) in [
-        ([LEFT, "h"], [-ASIDE, 0.0, AHEAD]),
-        ([RIGHT, "l"], [ASIDE, 0.0, AHEAD]),
-        ([UP, "k"], [0.0, ASIDE, AHEAD]),
-        ([DOWN, "j"], [0.0, -ASIDE, AHEAD]),
+        ([LEFT, "h"], [-STEP_SIDEWAYS, 0.0, STEP_REMAINDER]),
+        ([RIGHT, "l"], [STEP_SIDEWAYS, 0.0, STEP_REMAINDER]),
+        ([UP, "k"], [0.0, STEP_SIDEWAYS, STEP_REMAINDER]),
+        ([DOWN, "j"], [0.0, -STEP_SIDEWAYS, STEP_REMAINDER]),
         (["+", "="], [0.0, 0.0, 4.0 * 0.95]),
         (["-", "--+"], [0.0, 0.0, 4.0 / 0.95]),
     ] {
         for keys in keys {
-            assert_near(&kept(&folder, &mut terminal, &own, keys, "position"), &position, keys);
+            assert_near(&saved_numbers(&folder, &mut terminal, &own, keys, "position"), &position, keys);
         }
     }
     for (keys, fov) in [("<", 40.0 / 1.05), (">", 40.0 * 1.05)] {
-        let written = kept(&folder, &mut terminal, &own, keys, "fov")[0];
+        let written = saved_numbers(&folder, &mut terminal, &own, keys, "fov")[0];
         assert!((written - fov).abs() < 0.006, "{keys}: {written}, expected {fov}");
     }
 }
@@ -88,7 +88,7 @@ fn drag_orbits_and_wheel_moves_the_camera() {
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
     let own = folder.bytes("scene.png");
-    let mut eye = |keys: String| kept(&folder, &mut terminal, &own, &keys, "position");
+    let mut eye = |keys: String| saved_numbers(&folder, &mut terminal, &own, &keys, "position");
     let (right, left) = (eye(dragged((20, 10), (24, 10))), eye(dragged((20, 10), (16, 10))));
     assert!(right[0] < -0.1 && right[1] == 0.0 && right[2] < 4.0, "{right:?}");
     assert_near(&left, &[-right[0], right[1], right[2]], "left");

@@ -63,7 +63,7 @@ fn abort_restores_the_terminal_and_is_reported() {
     let terminal = folder.terminal();
     terminal.wait_for_color("red");
     terminal.signal(Signal::SIGABRT);
-    assert_eq!(terminal.end_saying("(SIGABRT)"), 1);
+    assert_eq!(terminal.end_showing("(SIGABRT)"), 1);
 }
 
 #[test]
@@ -87,7 +87,7 @@ fn quit_after_save_writes_or_explains_why_not() {
     let mut terminal = folder.terminal();
     terminal.wait_for_coverage();
     terminal.press("wq");
-    assert_eq!(terminal.end_saying("scene.png"), 0);
+    assert_eq!(terminal.end_showing("scene.png"), 0);
     assert!(folder.path("scene.png").is_file());
 
     // Nothing can be written, because most pixels have no sample yet.

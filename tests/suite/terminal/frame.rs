@@ -5,26 +5,29 @@ use glimt::tui::messages;
 use nix::sys::signal::Signal;
 
 use super::pty::{SCENE, Terminal, cells, upper};
-use super::relay::Answers;
+use super::relay::Responder;
 use crate::test_dir::{PROGRAM, TestDir};
 
 /// Environment variables that identify terminals, with the terminals' features: title, progress, a
 /// notification protocol, links, clipboard.
-const KNOWN: [(&[(&str, &str)], Has); 5] = [
+const TERMINALS: [(&[(&str, &str)], TerminalFeatures); 5] = [
     (
         &[("TERM", "xterm-kitty")],
-        Has { progress: false, notice: b"\x1b]99;;glimt: scene.toml: done after ", ..ALL },
+        TerminalFeatures { progress: false, notice: b"\x1b]99;;glimt: scene.toml: done after ", ..ALL },
     ),
     (
         &[("TERM", "foot")],
-        Has { progress: false, notice: b"\x1b]777;notify;glimt;scene.toml: done after ", ..ALL },
+        TerminalFeatures { progress: false, notice: b"\x1b]777;notify;glimt;scene.toml: done after ", ..ALL },
     ),
     (
         &[("TERM_PROGRAM", "ghostty"), ("TERM_PROGRAM_VERSION", "1.2.3")],
-        Has { notice: b"\x1b]777;notify;glimt;scene.toml: done after ", ..ALL },
+        TerminalFeatures { notice: b"\x1b]777;notify;glimt;scene.toml: done after ", ..ALL },
     ),
-    (&[("WT_SESSION", "1-2-3")], Has { notice: b"\x07", ..ALL }),
-    (&[("VTE_VERSION", "7600")], Has { progress: false, notice: b"\x07", clipboard: false, ..ALL }),
+    (&[("WT_SESSION", "1-2-3")], TerminalFeatures { notice: b"\x07", ..ALL }),
+    (
+        &[("VTE_VERSION", "7600")],
+        TerminalFeatures { progress: false, notice: b"\x07", clipboard: false, ..ALL },
+    ),
 ];
 
 /// Terminals not known to support any of these features.
@@ -38,21 +41,21 @@ const OTHERS: [&[(&str, &str)]; 6] = [
 ];
 
 #[derive(Clone, Copy)]
-struct Has {
+struct TerminalFeatures {
     progress: bool,
     notice: &'static [u8],
     links: bool,
     clipboard: bool,
 }
 
-const ALL: Has = Has { progress: true, notice: b"", links: true, clipboard: true };
+const ALL: TerminalFeatures = TerminalFeatures { progress: true, notice: b"", links: true, clipboard: true };
 
 /// Whether a byte string contains another.
 fn has(bytes: &[u8], part: &[u8]) -> bool {
-    place(bytes, part).is_some()
+    find_bytes(bytes, part).is_some()
 }
 
-fn place(bytes: &[u8], part: &[u8]) -> Option<usize> {
+fn find_bytes(bytes: &[u8], part: &[u8]) -> Option<usize> {
     bytes.windows(part.len()).position(|window| window == part)
 }
 
@@ -74,7 +77,7 @@ fn open(folder: &TestDir, variables: &[(&str, &str)]) -> Terminal {
 
 /// Makes the program send every kind of sequence: a render with a title, the end of a render without focus, a
 /// click and a copy. Returns all output until the program exits.
-fn through(variables: &[(&str, &str)], has_title: bool) -> Vec<u8> {
+fn session_output(variables: &[(&str, &str)], has_title: bool) -> Vec<u8> {
     let folder = TestDir::with_board();
     folder.write("scene.toml", endless());
     let mut terminal = open(&folder, variables);
@@ -111,8 +114,8 @@ fn through(variables: &[(&str, &str)], has_title: bool) -> Vec<u8> {
 
 #[test]
 fn known_terminals_get_and_reset_features() {
-    for (variables, has_what) in KNOWN {
-        let bytes = through(variables, true);
+    for (variables, has_what) in TERMINALS {
+        let bytes = session_output(variables, true);
         let check = |part: &[u8], is_there: bool| {
             assert_eq!(has(&bytes, part), is_there, "{variables:?}: {}", String::from_utf8_lossy(part));
         };
@@ -125,7 +128,7 @@ fn known_terminals_get_and_reset_features() {
         check(b"\x1b]8;;file://", has_what.links);
         // The address, an optional color, and the name.
         let address = b"/scene.png\x1b\\";
-        let name = place(&bytes, address).map(|start| &bytes[start + address.len()..][..24]);
+        let name = find_bytes(&bytes, address).map(|start| &bytes[start + address.len()..][..24]);
         assert_eq!(name.is_some_and(|name| has(name, b"scene.png")), has_what.links, "{variables:?}: a link");
         check(b"\x1b]52;c;", has_what.clipboard);
         assert!(
@@ -148,7 +151,7 @@ fn known_terminals_get_and_reset_features() {
 #[test]
 fn unknown_terminals_get_no_extra_sequences() {
     for variables in OTHERS {
-        let bytes = through(variables, false);
+        let bytes = session_output(variables, false);
         for part in [
             &b"\x1b]2;"[..],
             b"\x1b]0;",
@@ -215,13 +218,13 @@ fn only_unfocused_long_renders_notify() {
 fn slow_connection_sends_the_preview_first() {
     let folder = TestDir::with_board();
     folder.write("scene.toml", endless());
-    let terminal = folder.thin_line_in(Answers::Terminal, &[("WT_SESSION", "1-2-3")]);
+    let terminal = folder.thin_line_in(Responder::Terminal, &[("WT_SESSION", "1-2-3")]);
     terminal.wait("a title", |_| has(&terminal.bytes(), b"\x1b]2;scene.toml: rendering"));
     folder.write("scene.toml", SCENE);
     terminal.wait_for_render(1);
     terminal.wait("a title", |_| has(&terminal.bytes(), b"\x1b]2;scene.toml: done"));
     let bytes = terminal.bytes();
-    let title = place(&bytes, b"\x1b]2;").expect("a title");
+    let title = find_bytes(&bytes, b"\x1b]2;").expect("a title");
     let side = |length| std::num::NonZero::new(length).expect("not zero");
     let mut before = vt100::Parser::new(side(40), side(120), 0);
     before.process(&bytes[..title]);
@@ -237,7 +240,7 @@ fn slow_connection_sends_the_preview_first() {
         image > 3000 && preview > image - image / 100,
         "{preview} of {image} cells of the preview before the first title"
     );
-    assert!(terminal.line(|seen| seen.most_unanswered) <= 24_000);
+    assert!(terminal.line(|seen| seen.max_unanswered) <= 24_000);
 }
 
 #[test]

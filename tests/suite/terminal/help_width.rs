@@ -6,17 +6,17 @@ use crate::test_dir::{PROGRAM, TestDir};
 const WIDE: u16 = 2000;
 
 /// Key descriptions: the list of tables, a table, a type and a key.
-const EXPLAINED: [&str; 4] = ["", "camera", "materials.metal", "render.integrator"];
+const EXPLAIN_ARGUMENTS: [&str; 4] = ["", "camera", "materials.metal", "render.integrator"];
 
 /// Arguments for each invocation under test: the short help of the program and of each command, and the key
 /// descriptions.
-fn calls(folder: &TestDir) -> Vec<String> {
+fn invocations(folder: &TestDir) -> Vec<String> {
     let program = lines(folder, "-h", WIDE);
     let list =
         program.split(|line| line == "Commands:").nth(1).and_then(|rest| rest.split(String::is_empty).next());
     let names = list.expect("a list of commands").iter().filter_map(|line| line.split_whitespace().next());
     let commands = names.filter(|name| *name != "help").map(|name| format!("{name} -h"));
-    let described = EXPLAINED.iter().map(|path| format!("explain {path}"));
+    let described = EXPLAIN_ARGUMENTS.iter().map(|path| format!("explain {path}"));
     ["-h".to_owned()].into_iter().chain(commands).chain(described).collect()
 }
 
@@ -74,7 +74,7 @@ fn words(lines: &[String]) -> Vec<(Separator, &str)> {
 #[test]
 fn help_is_not_wider_than_the_terminal() {
     let folder = TestDir::with_board();
-    for call in calls(&folder) {
+    for call in invocations(&folder) {
         for columns in [50, 100] {
             for line in lines(&folder, &call, columns) {
                 // The usage line is not wrapped.
@@ -89,7 +89,7 @@ fn help_is_not_wider_than_the_terminal() {
 fn help_breaks_lines_only_where_they_are_full() {
     let folder = TestDir::with_board();
     let mut wrapped_lines = 0;
-    for call in calls(&folder) {
+    for call in invocations(&folder) {
         let wide = lines(&folder, &call, WIDE);
         let paragraphs = words(&wide);
         for columns in [50, 100] {
@@ -124,7 +124,7 @@ fn text_columns(line: &str) -> [Option<usize>; 2] {
 #[test]
 fn paragraphs_are_single_lines_on_wide_terminals() {
     let folder = TestDir::with_board();
-    for call in calls(&folder) {
+    for call in invocations(&folder) {
         let wide = lines(&folder, &call, WIDE);
         for pair in wide.windows(2) {
             let [line, next] = [pair[0].as_str(), pair[1].as_str()];

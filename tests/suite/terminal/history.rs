@@ -5,7 +5,7 @@ use std::fs;
 use glimt::tui::messages;
 
 use super::pty::{BLUE, Colors, GREEN, RED, SCENE, Terminal, cells, upper};
-use super::relay::Answers;
+use super::relay::Responder;
 use crate::test_dir::{PROGRAM, TestDir};
 
 /// The text on the screen as a single line.
@@ -14,7 +14,7 @@ fn words(screen: &vt100::Screen) -> String {
 }
 
 /// The text to the right of `column` as a single line, without thumbnails.
-fn beside(screen: &vt100::Screen, column: usize) -> String {
+fn text_right_of(screen: &vt100::Screen, column: usize) -> String {
     let text = screen.contents();
     let is_word = |c: &char| !('▀'..='▟').contains(c);
     let rows = text.lines().map(|line| line.chars().skip(column).filter(is_word).collect::<String>());
@@ -45,7 +45,7 @@ fn edited(folder: &TestDir, terminal: &Terminal) {
     terminal.wait_for_render(1);
     for (render, (color, value)) in (2..).zip([("green", GREEN), ("blue", BLUE)]) {
         folder.write("scene.toml", SCENE.replace(RED, value));
-        terminal.wait(color, |screen| Colors::of(screen).is_most(color) || render == 3);
+        terminal.wait(color, |screen| Colors::of(screen).is_dominant(color) || render == 3);
         terminal.wait_for_render(render);
     }
 }
@@ -62,10 +62,10 @@ fn history_shows_images_and_their_changes() {
     edited(&folder, &terminal);
     let oldest_entry = format!("1 {}", messages::OPENED);
     terminal.wait("the history", |screen| {
-        let beside = beside(screen, PANEL.into());
-        beside.contains(&format!("{} (n / N)", messages::HISTORY))
-            && beside.contains("▸3 materials. board.diffuse → [0.02, 0.02, 0.8]")
-            && beside.contains(&oldest_entry)
+        let text = text_right_of(screen, PANEL.into());
+        text.contains(&format!("{} (n / N)", messages::HISTORY))
+            && text.contains("▸3 materials. board.diffuse → [0.02, 0.02, 0.8]")
+            && text.contains(&oldest_entry)
     });
     // A thumbnail for each color, newest at the top.
     let colors = terminal.settled(|screen| colors_from(screen, PANEL));
@@ -84,7 +84,7 @@ fn history_shows_images_and_their_changes() {
     terminal.press(&click(oldest));
     terminal.wait("the red image", |screen| colors_from(screen, 0)[0] > 500);
     terminal.wait_for(&messages::render_number_of_count(1, 3));
-    terminal.wait("its mark", |screen| beside(screen, PANEL.into()).contains("▸1"));
+    terminal.wait("its mark", |screen| text_right_of(screen, PANEL.into()).contains("▸1"));
     terminal.press("N");
     terminal.wait_for(&messages::render_number_of_count(2, 3));
     terminal.wait("its change", |screen| {
@@ -106,8 +106,8 @@ fn history_entry_shows_only_its_own_change() {
     terminal.wait_for_render(1);
     let is_told = |screen: &vt100::Screen, words: &str| {
         // The first line reports that a save did not change the image.
-        let beside = beside(screen, PANEL.into()).replace("unchanged · ", "");
-        beside.contains(words) && !beside.contains("changed") && !beside.contains(messages::AGAIN)
+        let text = text_right_of(screen, PANEL.into()).replace("unchanged · ", "");
+        text.contains(words) && !text.contains("changed") && !text.contains(messages::AGAIN)
     };
     terminal.press("+");
     terminal.wait("a moved camera", |screen| is_told(screen, "▸2 camera moved"));
@@ -128,10 +128,10 @@ fn history_entry_shows_only_its_own_change() {
 #[test]
 fn history_is_sent_over_slow_connections() {
     let folder = TestDir::with_board();
-    let terminal = folder.thin_line(Answers::Terminal);
+    let terminal = folder.thin_line(Responder::Terminal);
     edited(&folder, &terminal);
     terminal.wait_for(messages::HISTORY);
-    assert!(terminal.line(|seen| seen.most_unanswered) <= 24_000);
+    assert!(terminal.line(|seen| seen.max_unanswered) <= 24_000);
 }
 
 #[test]
@@ -146,9 +146,9 @@ fn noise_curve_shows_the_target() {
     let is_braille =
         |cell: &vt100::Cell| cell.contents().chars().any(|c| ('\u{2801}'..='\u{28ff}').contains(&c));
     terminal.wait("a curve", |screen| {
-        let beside = beside(screen, PANEL.into());
-        beside.contains(messages::NOISE_OVER_TIME)
-            && beside.contains(&messages::noise_target_line_label("0.01 %"))
+        let text = text_right_of(screen, PANEL.into());
+        text.contains(messages::NOISE_OVER_TIME)
+            && text.contains(&messages::noise_target_line_label("0.01 %"))
             && cells(screen).filter(|cell| is_braille(cell)).count() >= 10
     });
     // Changing the exposure does not start a new render.
@@ -180,7 +180,7 @@ fn undo_reverts_only_the_saved_camera() {
     // If the user has edited the file, undo does not change it.
     let edited = kept.replace(RED, GREEN);
     folder.write("scene.toml", &edited);
-    terminal.wait("the edit", |screen| Colors::of(screen).is_most("green"));
+    terminal.wait("the edit", |screen| Colors::of(screen).is_dominant("green"));
     terminal.wait_for("done");
     terminal.press("u");
     terminal.wait("a refusal", |screen| {
@@ -189,7 +189,7 @@ fn undo_reverts_only_the_saved_camera() {
     assert_eq!(text(), edited);
     // After the edit is reverted by hand, `u` works again.
     folder.write("scene.toml", &kept);
-    terminal.wait("the saved camera", |screen| Colors::of(screen).is_most("red"));
+    terminal.wait("the saved camera", |screen| Colors::of(screen).is_dominant("red"));
     terminal.wait_for("done");
     terminal.press("u");
     terminal.wait_for(&messages::camera_save_undone("scene.toml"));

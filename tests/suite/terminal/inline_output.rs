@@ -5,7 +5,7 @@ use nix::sys::signal::Signal;
 use super::pty::{GREEN, RED, SCENE, Terminal, cells};
 use crate::test_dir::{PROGRAM, TestDir};
 
-fn compared(options: &[&str], variables: &[(&str, &str)]) -> (TestDir, Terminal) {
+fn run_compare(options: &[&str], variables: &[(&str, &str)]) -> (TestDir, Terminal) {
     let folder = TestDir::with_board();
     folder.once(&[]);
     std::fs::rename(folder.path("once.png"), folder.path("red.png")).expect("renamed");
@@ -21,7 +21,7 @@ fn compared(options: &[&str], variables: &[(&str, &str)]) -> (TestDir, Terminal)
 
 #[test]
 fn compare_shows_both_images_and_flip() {
-    let (_folder, terminal) = compared(&[], &[]);
+    let (_folder, terminal) = run_compare(&[], &[]);
     terminal.look(|screen| {
         let text = screen.contents();
         let names = text.lines().find(|line| line.contains("once.png  ")).expect("names");
@@ -44,17 +44,17 @@ fn compare_shows_both_images_and_flip() {
 
 #[test]
 fn compare_uses_the_terminal_color_depth() {
-    let (_folder, terminal) = compared(&[], &[("COLORTERM", "")]);
+    let (_folder, terminal) = run_compare(&[], &[("COLORTERM", "")]);
     terminal.look(|screen| {
         assert!(cells(screen).any(|cell| matches!(cell.fgcolor(), vt100::Color::Idx(16..))));
         assert!(!cells(screen).any(|cell| matches!(cell.fgcolor(), vt100::Color::Rgb(..))));
     });
-    let (_folder, terminal) = compared(&[], &[("NO_COLOR", "1")]);
+    let (_folder, terminal) = run_compare(&[], &[("NO_COLOR", "1")]);
     terminal.look(|screen| {
         assert!(screen.contents().contains("red.png"), "{}", screen.contents());
         assert!(cells(screen).all(|cell| cell.contents() != "▀" && cell.fgcolor() == vt100::Color::Default));
     });
-    let (_folder, terminal) = compared(&["--pictures", "off"], &[]);
+    let (_folder, terminal) = run_compare(&["--pictures", "off"], &[]);
     terminal.look(|screen| {
         assert!(screen.contents().starts_with("once.png "), "{}", screen.contents());
         assert!(cells(screen).all(|cell| cell.contents() != "▀"));

@@ -30,14 +30,14 @@ fn terminal(folder: &TestDir, options: &[&str]) -> Terminal {
 }
 
 /// Start of the message about an ignored checkpoint.
-fn ignored() -> String {
+fn ignored_checkpoint_message() -> String {
     messages::checkpoint_ignored("scene.png.checkpoint", "")
 }
 
 #[test]
 fn ignored_checkpoint_is_reported() {
     let is_fine = |terminal: &Terminal, facts: &[&str]| {
-        terminal.wait_for_message(&ignored());
+        terminal.wait_for_message(&ignored_checkpoint_message());
         assert_mentions(&terminal.text().split_whitespace().collect::<Vec<_>>().join(" "), facts);
         terminal.wait_for_render(1);
         let text = terminal.text();
@@ -57,7 +57,7 @@ fn ignored_checkpoint_is_reported() {
     is_fine(&other, &["seed", "0", "5"]);
     folder.write("scene.toml", scene(9, "seed = 6"));
     other.wait_for_render(2);
-    assert!(!other.look(|screen| shows(screen, &ignored())), "{}", other.text());
+    assert!(!other.look(|screen| shows(screen, &ignored_checkpoint_message())), "{}", other.text());
     drop(other);
     // The checkpoint is damaged.
     let mut bytes = folder.bytes("scene.png.checkpoint");
@@ -78,12 +78,12 @@ fn quit_saves_and_reports_a_long_render() {
     long.wait_for("ETA");
     std::thread::sleep(std::time::Duration::from_millis(400));
     long.press("q");
-    assert_eq!(long.end_saying("continues"), 0);
+    assert_eq!(long.end_showing("continues"), 0);
     assert!(folder.path("scene.png.checkpoint").is_file());
     let mut again = terminal(&folder, &[]);
     again.wait_for(messages::RESUMING);
     again.press("q");
-    assert_eq!(again.end_saying("continues"), 0);
+    assert_eq!(again.end_showing("continues"), 0);
     // Short renders do not write a checkpoint.
     fs::remove_file(folder.path("scene.png.checkpoint")).expect("removed");
     let mut short = terminal(&folder, &["--checkpoint", "1000"]);

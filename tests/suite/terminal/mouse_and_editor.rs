@@ -187,7 +187,7 @@ fn signal_ends_editor_and_restores_modes() {
         kill(process(&folder, "parent"), signal).expect("sent");
         let editor = process(&folder, "id");
         terminal.wait("the editor to exit", |_| kill(editor, None) == Err(Errno::ESRCH));
-        assert_eq!(terminal.end_saying("as before"), code, "{signal}");
+        assert_eq!(terminal.end_showing("as before"), code, "{signal}");
     }
 }
 
@@ -199,7 +199,7 @@ fn raw_mode_ends_if_editor_ignores_signals() {
     let script = "trap '' TERM HUP\nstty raw -echo\nprintf at-work\nread -r line";
     let terminal = in_editor(&folder, &command, script, "");
     kill(process(&folder, "parent"), Signal::SIGTERM).expect("sent");
-    assert_eq!(terminal.end_saying("as before"), 143);
+    assert_eq!(terminal.end_showing("as before"), 143);
 }
 
 #[test]
@@ -213,7 +213,7 @@ fn signal_reaches_editor_through_a_shell() {
     kill(process(&folder, "parent"), Signal::SIGTERM).expect("sent");
     let editor = process(&folder, "id");
     terminal.wait("the editor to exit", |_| kill(editor, None) == Err(Errno::ESRCH));
-    assert_eq!(terminal.end_saying("as before"), 143);
+    assert_eq!(terminal.end_showing("as before"), 143);
 }
 
 #[test]

@@ -20,7 +20,7 @@ fn textured(file: &str) -> String {
 }
 
 /// Waits long enough to detect a render loop caused by the file watcher.
-fn wait_a_while() {
+fn wait_for_render_loop() {
     std::thread::sleep(Duration::from_millis(1500));
 }
 
@@ -35,7 +35,7 @@ fn texture_named_like_the_image_is_kept() {
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
     terminal.wait_for("`paint`");
-    wait_a_while();
+    wait_for_render_loop();
     terminal.wait_for_render(1);
     assert_eq!(folder.bytes("scene.png"), before);
     terminal.press("\x1b");
@@ -58,7 +58,7 @@ fn output_that_becomes_an_input_is_kept() {
     let (picture, report) = (folder.bytes("scene.png"), folder.bytes("r.json"));
     folder.write("scene.toml", textured("scene.png"));
     terminal.wait_for("`paint`");
-    wait_a_while();
+    wait_for_render_loop();
     assert_eq!(
         (folder.bytes("scene.png"), folder.bytes("r.json")),
         (picture, report),
@@ -176,12 +176,12 @@ fn own_writes_do_not_trigger_renders() {
             terminal.press("w");
             terminal.wait_for_message(&messages::files_written("a.png, b.ppm"));
         }
-        wait_a_while();
+        wait_for_render_loop();
         terminal.wait_for_render(1);
         let report = folder.bytes("r.json");
         terminal.press("r");
         terminal.wait_for_render(2);
-        wait_a_while();
+        wait_for_render_loop();
         terminal.wait_for_render(2);
         assert_ne!(folder.bytes("r.json"), report, "each render must have its report");
     }

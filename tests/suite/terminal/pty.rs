@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 
 use glimt::tui::messages;
 
-use super::relay::{Answers, Relay, Scanner, Seen};
+use super::relay::{Relay, Responder, Scanner, Traffic};
 use crate::test_dir::{PROGRAM, TestDir};
 use nix::sys::signal::{Signal, kill};
 use nix::sys::termios::LocalFlags;
@@ -21,7 +21,7 @@ use portable_pty::{Child, CommandBuilder, MasterPty, PtySize, SlavePty, native_p
 const LIMIT: Duration = Duration::from_secs(60);
 
 /// Environment variables that identify terminals.
-const OF_TERMINALS: [&str; 11] = [
+const TERMINAL_VARIABLES: [&str; 11] = [
     "TMUX",
     "STY",
     "TERM_PROGRAM",
@@ -101,8 +101,8 @@ impl TestDir {
     }
 
     /// The program rendering the scene over a slow connection, in a terminal with 120×40 cells.
-    pub fn thin_line(&self, answers: Answers) -> Terminal {
-        let tmux: &[_] = if answers == Answers::Multiplexer {
+    pub fn thin_line(&self, answers: Responder) -> Terminal {
+        let tmux: &[_] = if answers == Responder::Multiplexer {
             &[("TMUX", "/tmp/tmux-0/default,1,0"), ("SSH_CONNECTION", "192.0.2.1 5000 192.0.2.2 22")]
         } else {
             &[]
@@ -111,7 +111,7 @@ impl TestDir {
     }
 
     /// Like [`Self::thin_line`], with additional environment variables.
-    pub fn thin_line_in(&self, answers: Answers, variables: &[(&str, &str)]) -> Terminal {
+    pub fn thin_line_in(&self, answers: Responder, variables: &[(&str, &str)]) -> Terminal {
         Terminal::open(&[PROGRAM, "scene.toml"], variables, self.0.path(), size(120, 40), Some(answers))
     }
 
@@ -156,7 +156,7 @@ impl Terminal {
         variables: &[(&str, &str)],
         folder: &Path,
         size: PtySize,
-        line: Option<Answers>,
+        line: Option<Responder>,
     ) -> Self {
         let pair = native_pty_system().openpty(size).expect("a pseudo-terminal");
         let mut builder = CommandBuilder::new(command[0]);
@@ -164,7 +164,7 @@ impl Terminal {
         builder.cwd(folder);
         for name in ["NO_COLOR", "COLUMNS", "SSH_CONNECTION", "SSH_CLIENT", "SSH_TTY", "ENV"]
             .into_iter()
-            .chain(OF_TERMINALS)
+            .chain(TERMINAL_VARIABLES)
         {
             builder.env_remove(name);
         }
@@ -288,7 +288,7 @@ impl Terminal {
     }
 
     /// Traffic of the slow connection.
-    pub fn line<T>(&self, what: impl FnOnce(&Seen) -> T) -> T {
+    pub fn line<T>(&self, what: impl FnOnce(&Traffic) -> T) -> T {
         let relay = self.relay.as_ref().expect("a thin line");
         what(&relay.seen.lock().expect("no panic"))
     }
@@ -360,20 +360,20 @@ impl Terminal {
     pub fn wait_for_color(&self, name: &str) {
         self.wait(name, |screen| {
             let counts = Colors::of(screen);
-            counts.most().is_some_and(|most| most == name)
+            counts.dominant_color().is_some_and(|most| most == name)
         });
     }
 
     /// Waits for the program to exit, checks that the terminal is restored, and returns the exit code.
     #[track_caller]
     pub fn end(self) -> u32 {
-        self.end_saying("")
+        self.end_showing("")
     }
 
     /// Like [`Terminal::end`], but first waits until the final screen contains one of the given strings,
     /// separated by `|`.
     #[track_caller]
-    pub fn end_saying(mut self, words: &str) -> u32 {
+    pub fn end_showing(mut self, words: &str) -> u32 {
         let code = self.code();
         self.wait("the restored screen with a cursor", |screen| {
             !screen.alternate_screen() && !screen.hide_cursor() && !screen.bracketed_paste()
@@ -439,12 +439,12 @@ impl Colors {
         self.red + self.green + self.blue
     }
 
-    pub fn is_most(&self, name: &str) -> bool {
-        self.most() == Some(name)
+    pub fn is_dominant(&self, name: &str) -> bool {
+        self.dominant_color() == Some(name)
     }
 
     /// The color of nearly all cells, if there are enough cells for an image.
-    fn most(&self) -> Option<&'static str> {
+    fn dominant_color(&self) -> Option<&'static str> {
         let total = self.total();
         let all = [(self.red, "red"), (self.green, "green"), (self.blue, "blue")];
         all.into_iter().find(|(count, _)| total > 100 && count * 10 > total * 9).map(|(_, name)| name)

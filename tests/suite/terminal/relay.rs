@@ -14,12 +14,12 @@ use std::time::{Duration, Instant};
 const RATE: f64 = 125_000.0;
 /// One-way delay.
 const DELAY: Duration = Duration::from_millis(75);
-const QUESTIONS: [(&[u8], &[u8]); 3] =
+const QUERIES: [(&[u8], &[u8]); 3] =
     [(b"\x1b[5n", b"\x1b[0n"), (b"\x1b[c", b"\x1b[?62;22c"), (b"\x1b[?2026$p", b"\x1b[?2026;2$y")];
 
 /// The component that replies to the program's queries.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Answers {
+pub enum Responder {
     /// The terminal at the far end.
     Terminal,
     /// A multiplexer at the near end.
@@ -29,7 +29,7 @@ pub enum Answers {
 
 /// Traffic on the connection.
 #[derive(Debug, Default)]
-pub struct Seen {
+pub struct Traffic {
     /// Bytes sent by the program.
     pub sent: usize,
     /// Bytes that reached the user's screen.
@@ -37,19 +37,19 @@ pub struct Seen {
     /// Number of bytes sent up to the last query whose reply has reached the program.
     answered: usize,
     /// Largest number of unacknowledged bytes.
-    pub most_unanswered: usize,
+    pub max_unanswered: usize,
     /// Largest number of queued bytes.
-    pub most_waiting: usize,
+    pub max_waiting: usize,
 }
 
 /// Bytes in transit with their arrival time. A reply also has the number of bytes sent up to its query.
-struct Due {
+struct DelayedBytes {
     when: Instant,
     bytes: Vec<u8>,
     asked: Option<usize>,
 }
 
-impl Due {
+impl DelayedBytes {
     fn answer((bytes, asked): (&'static [u8], usize), when: Instant) -> Self {
         Self { when, bytes: bytes.to_vec(), asked: Some(asked) }
     }
@@ -57,8 +57,8 @@ impl Due {
 
 /// The two directions of a connection.
 pub struct Relay {
-    pub seen: Arc<Mutex<Seen>>,
-    up: Sender<Due>,
+    pub seen: Arc<Mutex<Traffic>>,
+    up: Sender<DelayedBytes>,
 }
 
 impl Relay {
@@ -67,11 +67,11 @@ impl Relay {
         mut output: Box<dyn Read + Send>,
         input: Arc<Mutex<Box<dyn Write + Send>>>,
         (screen, kept): (Arc<Mutex<vt100::Parser>>, Arc<Mutex<Vec<u8>>>),
-        answers: Answers,
+        answers: Responder,
     ) -> Self {
-        let seen = Arc::new(Mutex::new(Seen::default()));
-        let (down, arriving) = channel::<Due>();
-        let (up, rising) = channel::<Due>();
+        let seen = Arc::new(Mutex::new(Traffic::default()));
+        let (down, arriving) = channel::<DelayedBytes>();
+        let (up, rising) = channel::<DelayedBytes>();
         let (at_ends, to_answer) = (up.clone(), up.clone());
 
         let noted = seen.clone();
@@ -81,63 +81,63 @@ impl Relay {
                 let now = Instant::now();
                 let bytes = &bytes[..count];
                 kept.lock().expect("no panic").extend_from_slice(bytes);
-                note_sent(&noted, count);
-                if answers == Answers::Multiplexer {
+                record_sent(&noted, count);
+                if answers == Responder::Multiplexer {
                     for answer in tail.answers(bytes) {
-                        let _ = to_answer.send(Due::answer(answer, now));
+                        let _ = to_answer.send(DelayedBytes::answer(answer, now));
                     }
                 }
                 // Bytes arrive in order, so later bytes wait for earlier ones.
                 for part in bytes.chunks(250) {
                     free = free.max(now) + Duration::from_secs_f64(part.len() as f64 / RATE);
-                    let _ = down.send(Due { when: free + DELAY, bytes: part.to_vec(), asked: None });
+                    let _ = down.send(DelayedBytes { when: free + DELAY, bytes: part.to_vec(), asked: None });
                 }
             }
         });
         let noted = seen.clone();
         thread::spawn(move || show(&arriving, &screen, &noted, answers, &at_ends));
         let noted = seen.clone();
-        thread::spawn(move || raise(&rising, &input, &noted));
+        thread::spawn(move || deliver(&rising, &input, &noted));
         Self { seen, up }
     }
 
     /// Types keys at the user's end.
     pub fn press(&self, keys: &str) {
         let when = Instant::now() + DELAY;
-        let _ = self.up.send(Due { when, bytes: keys.as_bytes().to_vec(), asked: None });
+        let _ = self.up.send(DelayedBytes { when, bytes: keys.as_bytes().to_vec(), asked: None });
     }
 }
 
-fn note_sent(seen: &Mutex<Seen>, count: usize) {
+fn record_sent(seen: &Mutex<Traffic>, count: usize) {
     let mut seen = seen.lock().expect("no panic");
     seen.sent += count;
-    seen.most_unanswered = seen.most_unanswered.max(seen.sent - seen.answered);
-    seen.most_waiting = seen.most_waiting.max(seen.sent - seen.shown);
+    seen.max_unanswered = seen.max_unanswered.max(seen.sent - seen.answered);
+    seen.max_waiting = seen.max_waiting.max(seen.sent - seen.shown);
 }
 
 fn show(
-    arriving: &Receiver<Due>,
+    arriving: &Receiver<DelayedBytes>,
     screen: &Mutex<vt100::Parser>,
-    seen: &Mutex<Seen>,
-    answers: Answers,
-    up: &Sender<Due>,
+    seen: &Mutex<Traffic>,
+    answers: Responder,
+    up: &Sender<DelayedBytes>,
 ) {
     let mut tail = Scanner::default();
-    while let Ok(Due { when, bytes, .. }) = arriving.recv() {
+    while let Ok(DelayedBytes { when, bytes, .. }) = arriving.recv() {
         thread::sleep(when.saturating_duration_since(Instant::now()));
         screen.lock().expect("no panic").process(&bytes);
         seen.lock().expect("no panic").shown += bytes.len();
-        if answers == Answers::Terminal {
+        if answers == Responder::Terminal {
             for answer in tail.answers(&bytes) {
-                let _ = up.send(Due::answer(answer, Instant::now() + DELAY));
+                let _ = up.send(DelayedBytes::answer(answer, Instant::now() + DELAY));
             }
         }
     }
 }
 
 /// Delivers keys and replies when they are due.
-fn raise(rising: &Receiver<Due>, input: &Mutex<Box<dyn Write + Send>>, seen: &Mutex<Seen>) {
-    let mut waiting: VecDeque<Due> = VecDeque::new();
+fn deliver(rising: &Receiver<DelayedBytes>, input: &Mutex<Box<dyn Write + Send>>, seen: &Mutex<Traffic>) {
+    let mut waiting: VecDeque<DelayedBytes> = VecDeque::new();
     loop {
         let next = match waiting.front() {
             Some(next) => rising.recv_timeout(next.when.saturating_duration_since(Instant::now())),
@@ -150,7 +150,7 @@ fn raise(rising: &Receiver<Due>, input: &Mutex<Box<dyn Write + Send>>, seen: &Mu
             }
             Err(RecvTimeoutError::Disconnected) => return,
             Err(RecvTimeoutError::Timeout) => {
-                let Some(Due { bytes, asked, .. }) = waiting.pop_front() else { continue };
+                let Some(DelayedBytes { bytes, asked, .. }) = waiting.pop_front() else { continue };
                 if let Some(asked) = asked {
                     let mut seen = seen.lock().expect("no panic");
                     seen.answered = seen.answered.max(asked);
@@ -178,7 +178,7 @@ impl Scanner {
         for byte in bytes {
             self.last.push(*byte);
             self.count += 1;
-            if let Some((_, answer)) = QUESTIONS.iter().find(|(question, _)| self.last.ends_with(question)) {
+            if let Some((_, answer)) = QUERIES.iter().find(|(question, _)| self.last.ends_with(question)) {
                 found.push((*answer, self.count));
             }
         }

@@ -11,23 +11,23 @@ use crate::test_dir::{PROGRAM, TestDir};
 /// A way to save text to a file.
 type Save = fn(&Path, &str);
 
-const WAYS: [(&str, Save); 6] = [
+const SAVE_METHODS: [(&str, Save); 6] = [
     ("truncate and write", |path, text| fs::write(path, text).expect("written")),
     ("atomic rename", |path, text| {
-        fs::write(beside(path, ".new"), text).expect("written");
-        fs::rename(beside(path, ".new"), path).expect("renamed");
+        fs::write(sibling_path(path, ".new"), text).expect("written");
+        fs::rename(sibling_path(path, ".new"), path).expect("renamed");
     }),
     ("vim", |path, text| {
-        fs::write(beside(path, "4913"), "").expect("written");
-        fs::remove_file(beside(path, "4913")).expect("removed");
-        fs::rename(path, beside(path, "~")).expect("renamed");
+        fs::write(sibling_path(path, "4913"), "").expect("written");
+        fs::remove_file(sibling_path(path, "4913")).expect("removed");
+        fs::rename(path, sibling_path(path, "~")).expect("renamed");
         fs::write(path, text).expect("written");
-        let mode = fs::metadata(beside(path, "~")).expect("the backup").permissions();
+        let mode = fs::metadata(sibling_path(path, "~")).expect("the backup").permissions();
         fs::set_permissions(path, mode).expect("permitted");
-        fs::remove_file(beside(path, "~")).expect("removed");
+        fs::remove_file(sibling_path(path, "~")).expect("removed");
     }),
     ("Emacs", |path, text| {
-        fs::rename(path, beside(path, "~")).expect("renamed");
+        fs::rename(path, sibling_path(path, "~")).expect("renamed");
         fs::write(path, text).expect("written");
     }),
     ("unlink and write", |path, text| {
@@ -37,7 +37,7 @@ const WAYS: [(&str, Save); 6] = [
     ("replaced link target", |path, text| {
         // The first save turns the file into a link with the same contents. The watcher must then find the
         // target.
-        let folder = beside(path, ".d");
+        let folder = sibling_path(path, ".d");
         if !folder.is_dir() {
             fs::create_dir(&folder).expect("a folder");
             fs::rename(path, folder.join("real")).expect("renamed");
@@ -48,14 +48,14 @@ const WAYS: [(&str, Save); 6] = [
     }),
 ];
 
-fn beside(path: &Path, ending: &str) -> std::path::PathBuf {
+fn sibling_path(path: &Path, ending: &str) -> std::path::PathBuf {
     let mut name = path.as_os_str().to_owned();
     name.push(ending);
     name.into()
 }
 
 /// Two alternating colors that identify the saved versions.
-fn shades() -> impl Iterator<Item = (&'static str, &'static str)> {
+fn alternating_colors() -> impl Iterator<Item = (&'static str, &'static str)> {
     [("green", GREEN), ("blue", BLUE)].into_iter().cycle()
 }
 
@@ -65,7 +65,7 @@ fn every_way_of_saving_a_scene_renders_once() {
         let folder = TestDir::with_board();
         let terminal = folder.terminal_with(&[&[PROGRAM, "scene.toml"], options].concat(), &[]);
         terminal.wait_for_render(1);
-        for ((render, (way, save)), (color, value)) in (2..).zip(WAYS).zip(shades()) {
+        for ((render, (way, save)), (color, value)) in (2..).zip(SAVE_METHODS).zip(alternating_colors()) {
             save(&folder.path("scene.toml"), &SCENE.replace(RED, value));
             terminal.wait_for_color(color);
             terminal.wait_for_render(render);
@@ -74,7 +74,7 @@ fn every_way_of_saving_a_scene_renders_once() {
             save(&folder.path("scene.toml"), &SCENE.replace(RED, value));
             println!("{way} {options:?}");
         }
-        terminal.wait_for_render(WAYS.len() + 1);
+        terminal.wait_for_render(SAVE_METHODS.len() + 1);
     }
 }
 
@@ -88,7 +88,7 @@ fn every_way_of_saving_an_asset_renders_once() {
         folder.write("paint.ppm", "P3\n1 1\n255\n230 20 20\n");
         let terminal = folder.terminal_with(&[&[PROGRAM, "scene.toml"], options].concat(), &[]);
         terminal.wait_for_render(1);
-        for ((render, (way, save)), (color, _)) in (2..).zip(WAYS).zip(shades()) {
+        for ((render, (way, save)), (color, _)) in (2..).zip(SAVE_METHODS).zip(alternating_colors()) {
             let paint = if color == "green" { "20 230 20" } else { "20 20 230" };
             save(&folder.path("paint.ppm"), &format!("P3\n1 1\n255\n{paint}\n"));
             terminal.wait_for_color(color);
@@ -104,7 +104,7 @@ fn no_error_until(terminal: &Terminal, color: &'static str, render: usize) {
     terminal.wait(color, |screen| {
         let text = screen.contents();
         assert!(!text.contains("error") && !text.contains("broken"), "intermediate error\n{text}");
-        super::Colors::of(screen).is_most(color)
+        super::Colors::of(screen).is_dominant(color)
     });
     terminal.wait_for_render(render);
 }
@@ -123,7 +123,7 @@ fn slow_save_shows_no_error() {
     let terminal = folder.terminal();
     terminal.wait_for_render(1);
     let mut render = 1;
-    for (number, (color, value)) in (0..6).zip(shades()) {
+    for (number, (color, value)) in (0..6).zip(alternating_colors()) {
         let text = SCENE.replace(RED, value);
         let (first, second) = halves(&text);
         let begin;

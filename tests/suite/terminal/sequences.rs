@@ -20,7 +20,7 @@ const LONG: u64 = 300;
 /// Bundled scenes for the long test.
 const BUNDLED: [&str; 6] = ["dof", "path", "phong", "photons", "shadows", "textures"];
 /// Keys that change only the preview.
-const LOOKING: [&str; 12] = ["s", "s", "d", "p", "i", "[", "]", "v", "l", "<", "0", "0"];
+const PREVIEW_KEYS: [&str; 12] = ["s", "s", "d", "p", "i", "[", "]", "v", "l", "<", "0", "0"];
 
 /// A scene in a folder, the program rendering it, and all previous actions.
 struct RandomSession<'a> {
@@ -77,7 +77,7 @@ impl<'a> RandomSession<'a> {
             }
             5 => std::thread::sleep(Duration::from_millis(10 * random.below(20) as u64)),
             _ => {
-                let key = *random.pick(&LOOKING);
+                let key = *random.pick(&PREVIEW_KEYS);
                 self.log.push(key.to_owned());
                 self.terminal.press(key);
             }

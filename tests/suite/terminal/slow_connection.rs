@@ -5,18 +5,18 @@ use std::time::{Duration, Instant};
 use glimt::tui::messages;
 
 use super::pty::{GREEN, RED, SCENE, Terminal};
-use super::relay::Answers;
+use super::relay::Responder;
 use crate::test_dir::TestDir;
 
 /// Limit on bytes that the terminal has not acknowledged.
-const MOST: usize = 24_000;
+const MAX_UNACKNOWLEDGED: usize = 24_000;
 /// Time limit from a key press to the first changed cells, and from `q` to the shell.
-const SEEN: Duration = Duration::from_millis(400);
+const RESPONSE_LIMIT: Duration = Duration::from_millis(400);
 
-const ALL: [Answers; 3] = [Answers::Terminal, Answers::Multiplexer, Answers::Nothing];
+const ALL_RESPONDERS: [Responder; 3] = [Responder::Terminal, Responder::Multiplexer, Responder::Nothing];
 
 /// Starts a render that does not finish.
-fn endless(answers: Answers) -> (TestDir, Terminal) {
+fn endless(answers: Responder) -> (TestDir, Terminal) {
     let folder = TestDir::with_board();
     folder.write("scene.toml", SCENE.replace("samples = 4", "samples = 10000000"));
     let terminal = folder.thin_line(answers);
@@ -26,68 +26,74 @@ fn endless(answers: Answers) -> (TestDir, Terminal) {
 }
 
 /// Time until a key has a visible effect.
-fn time(terminal: &mut Terminal, key: &str, what: &str, holds: impl Fn(&vt100::Screen) -> bool) -> Duration {
+fn response_time(
+    terminal: &mut Terminal,
+    key: &str,
+    what: &str,
+    holds: impl Fn(&vt100::Screen) -> bool,
+) -> Duration {
     let begin = Instant::now();
     terminal.press(key);
     terminal.wait(what, holds);
     begin.elapsed()
 }
 
-/// Checks that the fastest of several attempts is within [`SEEN`]. Only the fastest attempt is meaningful,
-/// because other tests may occupy the processors.
+/// Checks that the fastest of several attempts is within [`RESPONSE_LIMIT`]. Only the fastest attempt is
+/// meaningful, because other tests may occupy the processors.
 #[track_caller]
 fn assert_at_once(what: &str, mut once: impl FnMut() -> Duration) {
-    const TRIES: u32 = 12;
+    const ATTEMPTS: u32 = 12;
     let mut least = Duration::MAX;
-    for _ in 0..TRIES {
+    for _ in 0..ATTEMPTS {
         least = least.min(once());
-        if least <= SEEN {
+        if least <= RESPONSE_LIMIT {
             break;
         }
     }
-    assert!(least <= SEEN, "{what} after {least:?}");
+    assert!(least <= RESPONSE_LIMIT, "{what} after {least:?}");
 }
 
 #[test]
 fn keys_respond_quickly_with_short_queue() {
     /// Number of attempts, because the simulated connection stalls while other tests occupy the processors.
-    const TRIES: u32 = 4;
-    for answers in ALL {
+    const ATTEMPTS: u32 = 4;
+    for answers in ALL_RESPONDERS {
         let mut least = usize::MAX;
-        for _ in 0..TRIES {
-            least = least.min(most_on_the_way(answers));
-            if least <= MOST {
+        for _ in 0..ATTEMPTS {
+            least = least.min(max_bytes_in_flight(answers));
+            if least <= MAX_UNACKNOWLEDGED {
                 break;
             }
         }
-        assert!(least <= MOST, "{answers:?}: {least} B queued or unacknowledged");
+        assert!(least <= MAX_UNACKNOWLEDGED, "{answers:?}: {least} B queued or unacknowledged");
     }
 }
 
 /// Maximum number of queued or unacknowledged bytes while keys are pressed and the scene is saved.
-fn most_on_the_way(answers: Answers) -> usize {
+fn max_bytes_in_flight(answers: Responder) -> usize {
     let (folder, mut terminal) = endless(answers);
     let mut words = ["shadows hard", "shadows off", "shadows soft"].into_iter().cycle();
     for _ in 0..3 {
         assert_at_once(&format!("{answers:?}: shadows"), || {
             std::thread::sleep(Duration::from_millis(700));
             let words = words.next().expect("without end");
-            time(&mut terminal, "s", words, |screen| screen.contents().contains(words))
+            response_time(&mut terminal, "s", words, |screen| screen.contents().contains(words))
         });
     }
     // After an edit while the connection is busy, only the newest image is sent.
     folder.write("scene.toml", SCENE.replace(RED, GREEN).replace("samples = 4", "samples = 10000000"));
     terminal.wait_for_color("green");
-    let (unanswered, waiting) = terminal.line(|seen| (seen.most_unanswered, seen.most_waiting));
-    if answers == Answers::Terminal { unanswered } else { waiting }
+    let (unanswered, waiting) = terminal.line(|seen| (seen.max_unanswered, seen.max_waiting));
+    if answers == Responder::Terminal { unanswered } else { waiting }
 }
 
 #[test]
 fn quit_returns_quickly() {
-    for answers in ALL {
+    for answers in ALL_RESPONDERS {
         assert_at_once(&format!("{answers:?}: the shell's screen"), || {
             let (_folder, mut terminal) = endless(answers);
-            let taken = time(&mut terminal, "q", "the shell's screen", |screen| !screen.alternate_screen());
+            let taken =
+                response_time(&mut terminal, "q", "the shell's screen", |screen| !screen.alternate_screen());
             assert_eq!(terminal.end(), 0);
             taken
         });
@@ -97,7 +103,7 @@ fn quit_returns_quickly() {
 #[test]
 fn idle_program_sends_nothing() {
     // Test all connections concurrently, because the test mostly waits.
-    let terminals = ALL.map(|answers| {
+    let terminals = ALL_RESPONDERS.map(|answers| {
         let folder = TestDir::with_board();
         let terminal = folder.thin_line(answers);
         terminal.wait_for_render(1);
@@ -108,7 +114,7 @@ fn idle_program_sends_nothing() {
     let sent = || terminals.each_ref().map(|(_, terminal)| terminal.line(|seen| seen.sent));
     let before = sent();
     std::thread::sleep(Duration::from_secs(1));
-    assert_eq!(sent(), before, "{ALL:?}");
+    assert_eq!(sent(), before, "{ALL_RESPONDERS:?}");
 }
 
 #[test]
@@ -126,7 +132,7 @@ fn connection_is_measured_and_shown() {
     // A busy machine can only delay replies.
     assert_at_once("the round trip on the screen", || {
         let folder = TestDir::with_board();
-        let mut terminal = folder.thin_line(Answers::Terminal);
+        let mut terminal = folder.thin_line(Responder::Terminal);
         terminal.wait_for_render(1);
         // If the machine stalls for a second, the first reply is too late to be measured, so request another
         // preview.

@@ -77,7 +77,7 @@ fn save_assets(folder: &TestDir, random: &mut TestRandom) {
 
 /// Metrics of a process.
 #[derive(Clone, Copy, Debug)]
-struct Figures {
+struct ProcessMetrics {
     minutes: f32,
     memory_kib: u64,
     handles: usize,
@@ -85,7 +85,7 @@ struct Figures {
     temporary: usize,
 }
 
-impl Figures {
+impl ProcessMetrics {
     fn of(terminal: &Terminal, folder: &TestDir, begin: Instant) -> Self {
         let process = format!("/proc/{}", terminal.id());
         let status = fs::read_to_string(format!("{process}/status")).expect("a process");
@@ -157,7 +157,7 @@ fn soak() {
     let begin_other = || other.terminal_with(&[&[PROGRAM, "scene.toml"], long.as_slice()].concat(), &[]);
     let (mut lives, mut falls) = (own.terminal(), begin_other());
     let (mut events, mut images, mut ends) = (0_u32, 0_u32, BTreeSet::new());
-    let mut figures: Vec<Figures> = Vec::new();
+    let mut figures: Vec<ProcessMetrics> = Vec::new();
     let mut next = begin + PAUSE;
     while Instant::now() < end {
         events += 1;
@@ -225,7 +225,7 @@ fn soak() {
         let text = scene(&mut random, 64, events % 5);
         assert_image(&mut falls, other, &text, &[]);
         images += 2;
-        figures.push(Figures::of(&lives, own, begin));
+        figures.push(ProcessMetrics::of(&lives, own, begin));
         if images % 20 == 2 {
             eprintln!("{}", figures[figures.len() - 1].words("now"));
         }

@@ -1,6 +1,6 @@
 //! Render threads have the nice value specified by the options.
 
-use super::super::niceness::{of_render_threads, raised};
+use super::super::niceness::{of_render_threads, raised_niceness};
 use crate::test_dir::{PROGRAM, TestDir};
 
 #[test]
@@ -12,6 +12,8 @@ fn nice_option_applies_to_render_threads() {
         let terminal = folder.terminal_with(&call, &[]);
         terminal.wait_for_render(1);
         // Each thread lowers its priority when it starts.
-        terminal.wait(&format!("nice {steps}"), |_| of_render_threads(terminal.id()) == [raised(steps); 2]);
+        terminal.wait(&format!("nice {steps}"), |_| {
+            of_render_threads(terminal.id()) == [raised_niceness(steps); 2]
+        });
     }
 }

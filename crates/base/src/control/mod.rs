@@ -6,8 +6,8 @@ use std::time::{Duration, Instant};
 
 /// Error returned by canceled work. Its partial results must not be used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("cancelled")]
-pub struct Cancelled;
+#[error("canceled")]
+pub struct Canceled;
 
 /// Progress callback. Receives the number of finished work units and the total number.
 pub type Progress<'a> = &'a (dyn Fn(u64, u64) + Sync);
@@ -22,7 +22,7 @@ pub struct CancelToken(Arc<TokenState>);
 
 #[derive(Debug, Default)]
 struct TokenState {
-    cancelled: AtomicBool,
+    canceled: AtomicBool,
     paused: AtomicBool,
     held: Mutex<PauseTime>,
     changed: Condvar,
@@ -43,7 +43,7 @@ impl CancelToken {
 
     /// Cancels the work permanently.
     pub fn cancel(&self) {
-        self.0.cancelled.store(true, Ordering::Release);
+        self.0.canceled.store(true, Ordering::Release);
         self.notify();
     }
 
@@ -71,20 +71,20 @@ impl CancelToken {
     }
 
     /// Whether [`CancelToken::cancel`] was called.
-    pub fn is_cancelled(&self) -> bool {
-        self.0.cancelled.load(Ordering::Acquire)
+    pub fn is_canceled(&self) -> bool {
+        self.0.canceled.load(Ordering::Acquire)
     }
 
     /// Blocks while the work is paused, and reports cancellation.
     ///
     /// # Errors
-    /// [`Cancelled`] if [`CancelToken::cancel`] was called.
+    /// [`Canceled`] if [`CancelToken::cancel`] was called.
     #[inline]
-    pub fn check_pause_and_cancel(&self) -> Result<(), Cancelled> {
+    pub fn check_pause_and_cancel(&self) -> Result<(), Canceled> {
         if self.is_paused() {
             self.wait_while_paused();
         }
-        if self.is_cancelled() { Err(Cancelled) } else { Ok(()) }
+        if self.is_canceled() { Err(Canceled) } else { Ok(()) }
     }
 
     fn notify(&self) {
@@ -98,7 +98,7 @@ impl CancelToken {
 
     fn wait_while_paused(&self) {
         let mut guard = self.lock();
-        while self.is_paused() && !self.is_cancelled() {
+        while self.is_paused() && !self.is_canceled() {
             guard = self.0.changed.wait(guard).unwrap_or_else(PoisonError::into_inner);
         }
     }
@@ -114,7 +114,7 @@ mod tests {
         let other = token.clone();
         assert_eq!(other.check_pause_and_cancel(), Ok(()));
         token.cancel();
-        assert_eq!(other.check_pause_and_cancel(), Err(Cancelled));
+        assert_eq!(other.check_pause_and_cancel(), Err(Canceled));
     }
 
     #[test]
@@ -144,6 +144,6 @@ mod tests {
         };
         assert!(!worker.is_finished());
         token.cancel();
-        assert_eq!(worker.join().expect("the worker should not panic"), Err(Cancelled));
+        assert_eq!(worker.join().expect("the worker should not panic"), Err(Canceled));
     }
 }

@@ -31,16 +31,16 @@ impl Film {
         let (crop, kept) = (self.crop_rect(), blocks.block_sums_per_pixel());
         let more = crop.area() as u64 * (kept * size_of::<DVec3>()) as u64;
         let (width, height, bytes) = (self.width(), self.height(), self.memory_bytes() + more);
-        let lacks = || FilmCreationError::Memory { width, height, bytes, crop_helps: true };
+        let out_of_memory = || FilmCreationError::Memory { width, height, bytes, crop_helps: true };
         if !can_allocate(more) {
-            return Err(lacks());
+            return Err(out_of_memory());
         }
         for tile in 0..self.tile_count() {
             let area = self.tile_rect(tile).map_or(0, |rect| rect.area());
             let mut earlier = Vec::with_capacity(kept);
             for _ in 0..kept {
                 let mut sums = Vec::new();
-                try_reserve_exact(&mut sums, area).map_err(|_| lacks())?;
+                try_reserve_exact(&mut sums, area).map_err(|_| out_of_memory())?;
                 earlier.push(sums);
             }
             self.lock_tile(tile).earlier = earlier;

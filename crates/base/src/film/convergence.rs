@@ -207,7 +207,7 @@ impl SquaredMeanChanges {
         let [last, before, third, fourth] = sums;
         // Compare the last step with the step at a quarter of the samples. For a more conservative estimate,
         // compare the sum of the last two steps with the sum of the previous two.
-        let fall = (third / last).max(CAREFUL * (third + fourth) / (last + before));
+        let fall = (third / last).max(TRUSTED_FRACTION * (third + fourth) / (last + before));
         Some(fall).filter(|fall| fall.is_finite() && *fall > 0.0)
     }
 
@@ -225,7 +225,7 @@ impl SquaredMeanChanges {
     /// Confidence in a measured variance reduction, from 0 to 1.
     fn reduction_confidence(&self, level: usize, halves: &[usize]) -> f64 {
         let spread = self.variance_uncertainty(level, halves);
-        1.0 / (1.0 + DOUBT * spread * spread)
+        1.0 / (1.0 + UNCERTAINTY_PENALTY * spread * spread)
     }
 
     /// Factor by which doubling the samples to 2^`level` reduced the variance in the specified halves of all
@@ -257,37 +257,37 @@ pub enum ConvergenceModel {
 }
 
 /// Factor by which doubling independent samples reduces the variance.
-const INDEPENDENT_RATE: f64 = 2.0;
+const INDEPENDENT_REDUCTION: f64 = 2.0;
 
 /// Maximum plausible variance reduction per doubling.
-const MOST_FALL: f64 = 12.0;
+const MAX_REDUCTION: f64 = 12.0;
 
 /// Variance reductions up to this value are attributed to independent samples, because a few bright pixels
 /// can cause them by chance.
-const CHANCE_FALL: f64 = 2.3;
+const CHANCE_REDUCTION: f64 = 2.3;
 
-/// Fraction of the variance reduction above [`CHANCE_FALL`] that is expected to continue. The smooth parts of
-/// a tile converge first, and the rest converges more slowly.
-const LASTING: f64 = 0.65;
+/// Fraction of the variance reduction above [`CHANCE_REDUCTION`] that is expected to continue. The smooth
+/// parts of a tile converge first, and the rest converges more slowly.
+const LASTING_FRACTION: f64 = 0.65;
 
 /// Penalty for a variance reduction measured from few pixels: the coefficient of the squared
 /// [`SquaredMeanChanges::variance_uncertainty`].
-const DOUBT: f64 = 2.0;
+const UNCERTAINTY_PENALTY: f64 = 2.0;
 
 /// Trusted fraction of a variance reduction measured over two steps.
-const CAREFUL: f64 = 0.8;
+const TRUSTED_FRACTION: f64 = 0.8;
 
 /// Factor by which quadrupling independent samples reduces the variance.
-const FOURFOLD_RATE: f64 = 4.0;
+const INDEPENDENT_QUADRUPLING_REDUCTION: f64 = 4.0;
 
-/// Like [`CHANCE_FALL`], for quadrupled sample counts.
-const FOURFOLD_CHANCE: f64 = 5.2;
+/// Like [`CHANCE_REDUCTION`], for quadrupled sample counts.
+const CHANCE_QUADRUPLING_REDUCTION: f64 = 5.2;
 
-/// Like [`LASTING`], for quadrupled sample counts.
-const FOURFOLD_LASTING: f64 = 1.2;
+/// Like [`LASTING_FRACTION`], for quadrupled sample counts.
+const LASTING_QUADRUPLING: f64 = 1.2;
 
 /// Maximum variance reduction expected from quadrupling the sample count.
-const FOURFOLD_MOST: f64 = 40.0;
+const MAX_QUADRUPLING_REDUCTION: f64 = 40.0;
 
 impl ConvergenceModel {
     /// Typical long-term exponent: the variance falls with this power of the sample count. Does not depend on
@@ -308,7 +308,7 @@ impl ConvergenceModel {
     ) -> f64 {
         steps
             .measured_variance_reduction(level, halves)
-            .map_or(INDEPENDENT_RATE, |fall| fall.clamp(INDEPENDENT_RATE, MOST_FALL))
+            .map_or(INDEPENDENT_REDUCTION, |fall| fall.clamp(INDEPENDENT_REDUCTION, MAX_REDUCTION))
     }
 
     /// Factor by which doubling the samples beyond 2^`level` is expected to reduce the variance in the
@@ -360,10 +360,12 @@ impl ConvergenceModel {
         is_relative: bool,
     ) -> Option<f64> {
         let [last, before, ..] = steps.last_four_steps(level, at, is_relative)?;
-        let fall = steps.measured_quadrupling_reduction(level, at.1).unwrap_or(FOURFOLD_RATE);
-        let lasting =
-            FOURFOLD_LASTING * (fall - FOURFOLD_CHANCE).max(0.0) * steps.reduction_confidence(level, &[at.1]);
-        let rate = (FOURFOLD_RATE + lasting).min(FOURFOLD_MOST);
+        let fall =
+            steps.measured_quadrupling_reduction(level, at.1).unwrap_or(INDEPENDENT_QUADRUPLING_REDUCTION);
+        let lasting = LASTING_QUADRUPLING
+            * (fall - CHANCE_QUADRUPLING_REDUCTION).max(0.0)
+            * steps.reduction_confidence(level, &[at.1]);
+        let rate = (INDEPENDENT_QUADRUPLING_REDUCTION + lasting).min(MAX_QUADRUPLING_REDUCTION);
         Some((last + before) / (rate - 1.0))
     }
 }
@@ -371,7 +373,7 @@ impl ConvergenceModel {
 /// Variance reduction expected from the next doubling. `fall` is the measured reduction, and `trust` is the
 /// confidence in this measurement.
 fn predict_doubling_variance_reduction(fall: f64, trust: f64) -> f64 {
-    INDEPENDENT_RATE + LASTING * (fall - CHANCE_FALL).max(0.0) * trust
+    INDEPENDENT_REDUCTION + LASTING_FRACTION * (fall - CHANCE_REDUCTION).max(0.0) * trust
 }
 
 /// Variance of the mean of `count` ≥ 2 samples, computed from the squared step at the last power of two and

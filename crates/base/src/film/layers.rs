@@ -49,14 +49,14 @@ impl Film {
     pub fn with_layers(mut self, count: usize) -> Result<Self, FilmCreationError> {
         let more = Self::layer_memory(self.crop_rect(), count);
         let (width, height, bytes) = (self.width(), self.height(), self.memory_bytes() + more);
-        let lacks = || FilmCreationError::Memory { width, height, bytes, crop_helps: true };
+        let out_of_memory = || FilmCreationError::Memory { width, height, bytes, crop_helps: true };
         if !can_allocate(more) {
-            return Err(lacks());
+            return Err(out_of_memory());
         }
         for tile in 0..self.tile_count() {
             let area = self.tile_rect(tile).map_or(0, |rect| rect.area());
             let mut sums = Vec::new();
-            try_reserve_exact(&mut sums, area * count).map_err(|_| lacks())?;
+            try_reserve_exact(&mut sums, area * count).map_err(|_| out_of_memory())?;
             self.lock_tile(tile).layers = LayerSums { count, sums, negative: Vec::new() };
         }
         self.layers = count;

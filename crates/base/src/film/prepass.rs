@@ -7,7 +7,7 @@ use super::{Film, FilmQuantity, Rect, TileSamples};
 use crate::math::random::hash;
 
 /// Number of prepass pixels, unless the image has fewer pixels.
-const PIXELS: u64 = 4096;
+const PREPASS_PIXELS: u64 = 4096;
 
 /// Samples per prepass pixel.
 pub const PREPASS_SAMPLES: u32 = 16;
@@ -26,7 +26,7 @@ impl BrightnessPrepassPixels {
 
     /// Number of prepass pixels.
     pub fn pixel_count(&self) -> u64 {
-        PIXELS.min(self.crop.area() as u64)
+        PREPASS_PIXELS.min(self.crop.area() as u64)
     }
 
     /// Column and row of a prepass pixel. The crop's pixels, in row-major order, are divided into as many

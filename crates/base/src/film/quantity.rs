@@ -19,7 +19,7 @@ pub enum FilmQuantity {
 
 /// Half-width, in pixels, of the window in which squared steps are averaged. A single pixel's step is very
 /// noisy.
-const REACH: usize = 2;
+const WINDOW_RADIUS: usize = 2;
 
 impl Film {
     /// Current image: the mean of every pixel's samples, black outside the crop and in pixels without
@@ -82,7 +82,8 @@ impl Tile {
     fn standard_error(&self, index: usize, columns: usize) -> Option<f64> {
         let count = self.sample_count(index);
         let rows = self.counts.len() / columns.max(1);
-        let around = |at: usize, end: usize| at.saturating_sub(REACH)..(at + REACH + 1).min(end);
+        let around =
+            |at: usize, end: usize| at.saturating_sub(WINDOW_RADIUS)..(at + WINDOW_RADIUS + 1).min(end);
         let (mut sum, mut pixels) = (0.0, 0_u32);
         for y in around(index / columns, rows) {
             for x in around(index % columns, columns) {

@@ -30,21 +30,21 @@ pub enum DataKind {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DataRange {
     /// Smallest distance in view, or 0 for amounts.
-    pub least: f32,
+    pub min: f32,
     /// Largest value in view.
-    pub greatest: f32,
-    /// Bias b of the curve between `least` and `greatest`; see [`DataRange::position_in_range`].
+    pub max: f32,
+    /// Bias b of the curve between `min` and `max`; see [`DataRange::position_in_range`].
     bias: f32,
 }
 
 /// Brightness of the largest distance.
-const DARKEST: f32 = 0.1;
+const FARTHEST_BRIGHTNESS: f32 = 0.1;
 
 /// Minimum brightness of the median value.
-const QUARTER: f32 = 0.25;
+const MIN_MEDIAN_BRIGHTNESS: f32 = 0.25;
 
 /// Minimum bias, which limits the steepness of the curve.
-const LEAST_BIAS: f32 = 1e-3;
+const MIN_BIAS: f32 = 1e-3;
 
 impl RangeMap {
     /// Sets the range from the values in an image.
@@ -59,7 +59,7 @@ impl RangeMap {
     pub fn range(&self) -> Option<DataRange> {
         match self {
             Self::None | Self::Unresolved(_) => None,
-            Self::Resolved(_, range) => Some(*range).filter(|range| range.least <= range.greatest),
+            Self::Resolved(_, range) => Some(*range).filter(|range| range.min <= range.max),
         }
     }
 
@@ -81,25 +81,26 @@ impl DataRange {
             DataKind::Distances => depths_excluding_edges(image),
             DataKind::Amounts => image.pixels.iter().map(|pixel| pixel.x).filter(|x| *x > 0.0).collect(),
         };
-        let greatest = seen.iter().copied().fold(0.0, f32::max);
-        let least = match kind {
+        let max = seen.iter().copied().fold(0.0, f32::max);
+        let min = match kind {
             DataKind::Distances => seen.iter().copied().fold(f32::INFINITY, f32::min),
             DataKind::Amounts => 0.0,
         };
-        let linear = Self { least, greatest, bias: 1.0 };
+        let linear = Self { min, max, bias: 1.0 };
         if seen.is_empty() {
             return linear;
         }
         let middle = seen.len() / 2;
         let (_, &mut median, _) = seen.select_nth_unstable_by(middle, f32::total_cmp);
         let place = linear.position_in_range(median);
-        let bias = (1.0 - QUARTER) / QUARTER * place / (1.0 - place).max(f32::MIN_POSITIVE);
-        Self { bias: bias.clamp(LEAST_BIAS, 1.0), ..linear }
+        let bias = (1.0 - MIN_MEDIAN_BRIGHTNESS) / MIN_MEDIAN_BRIGHTNESS * place
+            / (1.0 - place).max(f32::MIN_POSITIVE);
+        Self { bias: bias.clamp(MIN_BIAS, 1.0), ..linear }
     }
 
     /// Minimum and maximum of the range.
     pub fn limits(&self) -> [f32; 2] {
-        [self.least, self.greatest]
+        [self.min, self.max]
     }
 
     /// Position of a value in the range, from 0 to 1. The mapping is linear if the median value in view is
@@ -107,17 +108,17 @@ impl DataRange {
     /// median to ¼ (Schlick, *Fast Alternatives to Perlin's Bias and Gain Functions*, Graphics Gems IV,
     /// 1994). Objects therefore keep distinct shades in front of a plane that extends to the horizon.
     fn position_in_range(&self, number: f32) -> f32 {
-        let range = self.greatest - self.least;
-        let x = if range > 0.0 { ((number - self.least) / range).clamp(0.0, 1.0) } else { 0.0 };
+        let range = self.max - self.min;
+        let x = if range > 0.0 { ((number - self.min) / range).clamp(0.0, 1.0) } else { 0.0 };
         if self.bias < 1.0 { x / (x + self.bias * (1.0 - x)) } else { x }
     }
 
     /// Brightness of a distance. Distances below the range occur in partly empty pixels.
     fn distance_brightness(&self, distance: f32) -> f32 {
-        if distance < self.least {
-            return if self.least.is_finite() { distance / self.least } else { distance.min(1.0) };
+        if distance < self.min {
+            return if self.min.is_finite() { distance / self.min } else { distance.min(1.0) };
         }
-        1.0 - (1.0 - DARKEST) * self.position_in_range(distance)
+        1.0 - (1.0 - FARTHEST_BRIGHTNESS) * self.position_in_range(distance)
     }
 }
 
@@ -161,7 +162,7 @@ mod tests {
         assert_near(&shown(DataKind::Distances, &[0.0; 4]), &[0.0; 4]);
         let range =
             RangeMap::Unresolved(DataKind::Distances).with_image_range(&picture(&[2.0, 4.0, 6.0])).range();
-        assert_eq!(range.map(|range| (range.least, range.greatest)), Some((2.0, 6.0)));
+        assert_eq!(range.map(|range| (range.min, range.max)), Some((2.0, 6.0)));
         let nothing = RangeMap::Unresolved(DataKind::Distances).with_image_range(&picture(&[0.0; 4]));
         assert_eq!(nothing.range(), None);
     }

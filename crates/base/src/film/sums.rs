@@ -256,12 +256,12 @@ impl Film {
         Self::with_memory_limit(u64::MAX, width, height, crop)
     }
 
-    /// Like [`Film::new`], but uses at most `most_bytes` bytes of memory.
+    /// Like [`Film::new`], but uses at most `max_bytes` bytes of memory.
     ///
     /// # Errors
     /// [`FilmCreationError`] as in [`Film::new`].
     pub fn with_memory_limit(
-        most_bytes: u64,
+        max_bytes: u64,
         width: u32,
         height: u32,
         crop: Option<Rect>,
@@ -270,10 +270,10 @@ impl Film {
         let crop =
             crop.unwrap_or(whole).intersection(&whole).ok_or(FilmCreationError::Empty { width, height })?;
         let bytes = film_and_image_bytes(width, height, crop);
-        let tiles = if bytes <= most_bytes { allocate_tiles(width, height, crop) } else { None };
+        let tiles = if bytes <= max_bytes { allocate_tiles(width, height, crop) } else { None };
         let tiles = tiles.ok_or_else(|| {
             let least = film_and_image_bytes(width, height, Rect { width: 0, height: 0, ..crop });
-            let crop_helps = crop == whole && least <= most_bytes && can_allocate(least);
+            let crop_helps = crop == whole && least <= max_bytes && can_allocate(least);
             FilmCreationError::Memory { width, height, bytes, crop_helps }
         })?;
         static IDS: AtomicU64 = AtomicU64::new(0);

@@ -270,7 +270,7 @@ fn oversized_film_errors_suggest_a_remedy() {
         "{error}"
     );
     let cropped =
-        |most_bytes, crop| Film::with_memory_limit(most_bytes, 100, 100, crop).expect_err("too little");
+        |max_bytes, crop| Film::with_memory_limit(max_bytes, 100, 100, crop).expect_err("too little");
     let part = Rect { x: 0, y: 0, width: 50, height: 100 };
     let remedy = ", or render only part of it with a crop";
     assert!(cropped(200_000, None).to_string().ends_with(remedy));

@@ -54,7 +54,7 @@ pub struct ToneMapping {
 }
 
 /// Maximum radiance, far above the saturation point of every curve and far below overflow.
-const BRIGHTEST: f32 = 1e10;
+const MAX_RADIANCE: f32 = 1e10;
 /// Minimum number of pixels at which parallel processing pays off.
 const PARALLEL_PIXELS: usize = 1 << 18;
 
@@ -79,7 +79,7 @@ impl ToneMapping {
 
     fn linear_display_light_with_exposure(&self, radiance: Vec3, factor: f32) -> Vec3 {
         let radiance = self.range_map.map_to_brightness(radiance);
-        let bounded = |x: f32| if x.is_nan() { 0.0 } else { x.clamp(0.0, BRIGHTEST) };
+        let bounded = |x: f32| if x.is_nan() { 0.0 } else { x.clamp(0.0, MAX_RADIANCE) };
         let color = Vec3::from_array((radiance * factor).to_array().map(bounded));
         match self.curve {
             Tonemap::None => color.min(Vec3::ONE),

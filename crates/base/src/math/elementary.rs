@@ -45,8 +45,8 @@ pub fn erf_and_gaussian(x: f32) -> (f32, f32) {
     ((1.0 - series * gaussian).copysign(x), gaussian)
 }
 
-/// The number x for which (1 + erf(x))/2 is `p` in (0, 1), with a relative error of 1e-6 (Giles, *Approximating
-/// the erfinv Function*, GPU Computing Gems Jade Edition, 2011).
+/// Returns the x at which (1 + erf(x))/2 equals `p`, which is in (0, 1), with a relative error of 1e-6
+/// (Giles, *Approximating the erfinv Function*, GPU Computing Gems Jade Edition, 2011).
 #[inline(always)]
 pub fn gaussian_quantile(p: f32) -> f32 {
     let w = -LN_2 as f32 * log2(4.0 * p * (1.0 - p));

@@ -3,10 +3,10 @@
 use super::DVec3;
 
 /// Largest allowed magnitude. Products of larger numbers may overflow 32-bit floats.
-pub const LARGEST: f64 = 1e18;
+pub const MAX_MAGNITUDE: f64 = 1e18;
 
 /// Shortest allowed nonzero length. Products of shorter lengths may underflow 32-bit floats.
-pub const SHORTEST: f64 = 1e-18;
+pub const MIN_LENGTH: f64 = 1e-18;
 
 /// Length of a vector, correct even if the squared length underflows or overflows.
 pub fn robust_length(vector: DVec3) -> f64 {
@@ -16,7 +16,7 @@ pub fn robust_length(vector: DVec3) -> f64 {
 
 /// Whether a length is nonzero but too short to compute with.
 pub fn is_nonzero_but_too_short(length: f64) -> bool {
-    length != 0.0 && length.abs() < SHORTEST
+    length != 0.0 && length.abs() < MIN_LENGTH
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@ use super::float::floor_to_power_of_two;
 
 /// Spacing of the origin grid, in units of the scene size. At this distance, the rounding error of single
 /// precision is a few millionths of the scene size.
-const STEP: f64 = 64.0;
+const GRID_SPACING: f64 = 64.0;
 
 /// Factor that keeps typical sizes such as 1, 2 and 5 away from the powers of two at which the grid spacing
 /// changes.
@@ -15,7 +15,7 @@ const OFF_POWERS: f64 = 1.37;
 /// point on a grid whose spacing is a power of two. Subtracting the origin is therefore exact, and small
 /// changes to `place` do not move the origin.
 pub fn local_coordinate_origin(place: DVec3, size: f64) -> DVec3 {
-    let step = STEP * floor_to_power_of_two(size * OFF_POWERS);
+    let step = GRID_SPACING * floor_to_power_of_two(size * OFF_POWERS);
     // Adding 0 converts −0 to 0.
     let origin = (place / step).round() * step + DVec3::ZERO;
     if step > 0.0 && origin.is_finite() { origin } else { DVec3::ZERO }
@@ -31,7 +31,10 @@ mod tests {
         let far = DVec3::new(1e8, -3e5, 7.0);
         for size in [0.1, 1.0, 5.0, 1e3] {
             let origin = local_coordinate_origin(far, size);
-            assert!((far - origin).abs().max_element() <= 0.5 * STEP * OFF_POWERS * size, "{size}: {origin}");
+            assert!(
+                (far - origin).abs().max_element() <= 0.5 * GRID_SPACING * OFF_POWERS * size,
+                "{size}: {origin}"
+            );
             // Doubling all numbers doubles the origin.
             assert_eq!(local_coordinate_origin(far * 2.0, size * 2.0), origin * 2.0);
         }

@@ -27,7 +27,7 @@ pub struct GridSample {
 }
 
 /// Minimum probability of a cell or row with a nonzero weight, relative to the mean probability.
-const LEAST: f64 = 1.0 / 64.0;
+const MIN_RELATIVE_PROBABILITY: f64 = 1.0 / 64.0;
 
 impl PiecewiseConstant2D {
     /// Creates a distribution from rows of weights ≥ 0, all of the same length. Returns `None` if their sum
@@ -80,7 +80,7 @@ impl PiecewiseConstant2D {
 /// weight.
 fn append_normalized_cdf(weights: &[f64], sums: &mut Vec<f32>) -> f64 {
     let total: f64 = weights.iter().sum();
-    let least = total / weights.len().max(1) as f64 * LEAST;
+    let least = total / weights.len().max(1) as f64 * MIN_RELATIVE_PROBABILITY;
     let weight = |weight: f64| if weight > 0.0 { weight.max(least) } else { 0.0 };
     let raised: f64 = weights.iter().map(|&one| weight(one)).sum();
     let mut sum = 0.0;

@@ -304,7 +304,7 @@ mod tests {
     }
 
     #[test]
-    fn decisions_are_independent() {
+    fn dimensions_are_independent() {
         // Mean correlation of the first coordinates over each pixel's samples, for 64 pixels. It would be 1
         // with a shared scramble.
         let others = [
@@ -316,7 +316,7 @@ mod tests {
         let (mut products, samples, pixels) = ([0.0; 4], 1024, 64);
         for (pixel, sample) in (0..pixels).flat_map(|pixel| (0..samples).map(move |sample| (pixel, sample))) {
             let sampler = PixelSampler::new(1, pixel % 8, pixel / 8, sample);
-            let first = |path, decision| f64::from(sampler.pair(path, decision).x) - 0.5;
+            let first = |path, dimension| f64::from(sampler.pair(path, dimension).x) - 0.5;
             for (sum, other) in products.iter_mut().zip(others) {
                 *sum += first(0, Dimension::Light(0)) * first(other.0, other.1) * 12.0;
             }

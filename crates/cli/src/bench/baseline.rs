@@ -20,9 +20,9 @@ pub struct MethodQuantityChange {
     /// 95 % confidence interval for the factor.
     pub interval: [f64; 2],
     /// Two-sided p-value for the change.
-    pub by_chance: f64,
+    pub p_value: f64,
     /// Whether the change is significant, after a Bonferroni correction for all comparisons.
-    pub is_real: bool,
+    pub is_significant: bool,
 }
 
 /// Quantities to compare.
@@ -51,7 +51,7 @@ pub fn compare_runs(then: &Results, now: &Results) -> Vec<MethodQuantityChange> 
         }
     }
     let threshold = FALSE_POSITIVE_RATE / changes.len().max(1) as f64;
-    changes.iter_mut().for_each(|change| change.is_real = change.by_chance < threshold);
+    changes.iter_mut().for_each(|change| change.is_significant = change.p_value < threshold);
     changes
 }
 
@@ -71,7 +71,7 @@ fn method_change(
     let weights: f64 = variances().map(|(square, freedom)| square * square / freedom).sum();
     let error = variance.sqrt() / count;
     let freedom = if weights > 0.0 { variance * variance / weights } else { 1.0 };
-    let by_chance = match (error > 0.0, mean == 0.0) {
+    let p_value = match (error > 0.0, mean == 0.0) {
         (true, _) => 2.0 * student_t_tail(mean.abs() / error, freedom),
         (false, true) => 1.0,
         (false, false) => 0.0,
@@ -83,8 +83,8 @@ fn method_change(
         quantity,
         factor: libm::exp(mean),
         interval: [libm::exp(mean - reach), libm::exp(mean + reach)],
-        by_chance,
-        is_real: false,
+        p_value,
+        is_significant: false,
     })
 }
 
@@ -138,13 +138,13 @@ fn format_change(change: &MethodQuantityChange) -> String {
         Quantity::Seconds => "time",
         Quantity::Error => "error",
     };
-    let said = match (change.is_real, change.quantity, *factor > 1.0) {
-        (false, _, _) if change.by_chance >= 1.0 => "unchanged".to_owned(),
+    let said = match (change.is_significant, change.quantity, *factor > 1.0) {
+        (false, _, _) if change.p_value >= 1.0 => "unchanged".to_owned(),
         (false, _, _) => "noise".to_owned(),
-        (true, Quantity::Seconds, true) => format!("SLOWER {}", format_p_value(change.by_chance)),
-        (true, Quantity::Seconds, false) => format!("faster {}", format_p_value(change.by_chance)),
-        (true, Quantity::Error, true) => format!("WORSE {}", format_p_value(change.by_chance)),
-        (true, Quantity::Error, false) => format!("better {}", format_p_value(change.by_chance)),
+        (true, Quantity::Seconds, true) => format!("SLOWER {}", format_p_value(change.p_value)),
+        (true, Quantity::Seconds, false) => format!("faster {}", format_p_value(change.p_value)),
+        (true, Quantity::Error, true) => format!("WORSE {}", format_p_value(change.p_value)),
+        (true, Quantity::Error, false) => format!("better {}", format_p_value(change.p_value)),
     };
     format!("  {scene}, {method}: {quantity} × {factor:.3} ({low:.3} to {high:.3}): {said}")
 }
@@ -173,7 +173,9 @@ mod tests {
         let found = compare_runs(&results(), &results());
         assert_eq!(found.len(), 2 * 2 * 2);
         assert!(
-            found.iter().all(|change| !change.is_real && change.factor == 1.0 && change.by_chance == 1.0)
+            found
+                .iter()
+                .all(|change| !change.is_significant && change.factor == 1.0 && change.p_value == 1.0)
         );
         assert!(format_changes(&found, "old.json")[1].ends_with("time × 1.000 (1.000 to 1.000): unchanged"));
     }
@@ -184,18 +186,18 @@ mod tests {
         let found = compare_runs(&results(), &slower);
         let of = |quantity| found.iter().filter(move |change| change.quantity == quantity);
         assert!(
-            of(Quantity::Seconds).all(|change| change.is_real && (change.factor - 1.5).abs() < 1e-9),
+            of(Quantity::Seconds).all(|change| change.is_significant && (change.factor - 1.5).abs() < 1e-9),
             "{found:?}"
         );
         assert!(
             of(Quantity::Seconds).all(|change| change.interval[0] > 1.3 && change.interval[1] < 1.7),
             "{found:?}"
         );
-        assert!(of(Quantity::Error).all(|change| !change.is_real));
+        assert!(of(Quantity::Error).all(|change| !change.is_significant));
         let said = format_changes(&found, "old.json").join("\n");
         assert!(said.contains("a.toml, path: time × 1.500 (1.3") && said.contains("SLOWER (p "), "{said}");
         let noise = with(|picture, number| picture.seconds *= [1.05, 0.97, 0.99][number]);
-        assert!(compare_runs(&results(), &noise).iter().all(|change| !change.is_real));
+        assert!(compare_runs(&results(), &noise).iter().all(|change| !change.is_significant));
     }
 
     #[test]

@@ -23,7 +23,8 @@ pub struct SquaredBias {
     /// Standard error of `size`.
     pub error: f64,
     /// One-sided p-value for the null hypothesis of no bias.
-    pub by_chance: f64,
+    #[serde(rename = "by_chance")]
+    pub p_value: f64,
     /// Upper confidence bound on `size`.
     pub bound: f64,
 }
@@ -31,7 +32,7 @@ pub struct SquaredBias {
 impl SquaredBias {
     /// Whether the bias is significant.
     pub fn is_significant(&self) -> bool {
-        self.by_chance < FALSE_POSITIVE_RATE
+        self.p_value < FALSE_POSITIVE_RATE
     }
 }
 
@@ -46,12 +47,12 @@ pub fn estimate_bias(references: &IndependentReferences, pictures: &[RadianceIma
     let by_seeds = pairs.variance_without_bias().max(pairs.jackknife_variance_of_mean());
     let (size, error) = (pairs.mean(), (by_seeds + by_references * by_references).sqrt());
     let freedom = pictures.len() as f64 - 1.0;
-    let by_chance =
+    let p_value =
         if error > 0.0 { student_t_tail(size / error, freedom) } else { f64::from(u8::from(size <= 0.0)) };
     Some(SquaredBias {
         size,
         error,
-        by_chance,
+        p_value,
         bound: size.max(0.0) + student_t_upper_quantile(FALSE_POSITIVE_RATE, freedom) * error,
     })
 }
@@ -115,7 +116,7 @@ mod tests {
     use std::path::Path;
 
     use super::*;
-    use crate::compare::Pair;
+    use crate::compare::ImagePair;
     use crate::math::Vec3;
     use crate::math::random::TestRandom;
 
@@ -145,7 +146,7 @@ mod tests {
 
         fn found(&mut self, seeds: usize, offset: f32, block: u32) -> SquaredBias {
             let names = [Path::new("r1"), Path::new("r2")];
-            let pair = Pair::new(names, self.picture(0.02, 0.0, 1), self.picture(0.02, 0.0, 1));
+            let pair = ImagePair::new(names, self.picture(0.02, 0.0, 1), self.picture(0.02, 0.0, 1));
             let references = IndependentReferences::new(pair.expect("a pair"));
             let pictures: Vec<_> = (0..seeds).map(|_| self.picture(0.2, offset, block)).collect();
             estimate_bias(&references, &pictures).expect("enough seeds")
@@ -198,7 +199,7 @@ mod tests {
     #[test]
     fn noise_free_images_have_exact_bias() {
         let mut noise = NoisyImages::new(1);
-        let pair = Pair::new(
+        let pair = ImagePair::new(
             [Path::new("a"), Path::new("b")],
             noise.picture(0.0, 0.0, 1),
             noise.picture(0.0, 0.0, 1),

@@ -18,13 +18,14 @@ pub struct BrightnessDifference {
     /// Standard error of `value`.
     pub error: f64,
     /// Two-sided p-value for the null hypothesis of no bias.
-    pub by_chance: f64,
+    #[serde(rename = "by_chance")]
+    pub p_value: f64,
 }
 
 impl BrightnessDifference {
     /// Whether the bias is significant.
     pub fn is_biased(&self) -> bool {
-        self.by_chance < FALSE_POSITIVE_RATE
+        self.p_value < FALSE_POSITIVE_RATE
     }
 }
 
@@ -53,11 +54,11 @@ pub fn compare_brightness(
     };
     let of_references = references.relative_bias_standard_error();
     let error = (of_pictures * of_pictures + of_references * of_references).sqrt();
-    let by_chance = match error > 0.0 {
+    let p_value = match error > 0.0 {
         true => 2.0 * student_t_tail(value.abs() / error, freedom),
         false => f64::from(u8::from(value == 0.0)),
     };
-    Some(BrightnessDifference { value, error, by_chance })
+    Some(BrightnessDifference { value, error, p_value })
 }
 
 /// Standard error of the images' mean luminance, from the variance of each pixel.
@@ -79,7 +80,7 @@ mod tests {
 
     use super::*;
     use crate::bench::bias::estimate_bias;
-    use crate::compare::Pair;
+    use crate::compare::ImagePair;
     use crate::math::Vec3;
     use crate::math::random::unit_generator;
 
@@ -97,7 +98,7 @@ mod tests {
     fn references(next: &mut impl FnMut() -> f32) -> IndependentReferences {
         let pair = [Path::new("r1"), Path::new("r2")];
         let [a, b] = [picture(next, 0.0, 0.02, 0.0), picture(next, 0.0, 0.02, 0.0)];
-        IndependentReferences::new(Pair::new(pair, a, b).expect("a pair"))
+        IndependentReferences::new(ImagePair::new(pair, a, b).expect("a pair"))
     }
 
     #[test]
@@ -147,7 +148,7 @@ mod tests {
         let pictures: Vec<_> = (0..2).map(|_| picture(&mut next, 0.0, 0.1, 0.0)).collect();
         assert_eq!(compare_brightness(&references, &pictures, true), None);
         let black = || RadianceImage::black(2, 2);
-        let dark = Pair::new([Path::new("a"), Path::new("b")], black(), black()).expect("a pair");
+        let dark = ImagePair::new([Path::new("a"), Path::new("b")], black(), black()).expect("a pair");
         assert_eq!(
             compare_brightness(&IndependentReferences::new(dark), &[black(), black(), black()], true),
             None

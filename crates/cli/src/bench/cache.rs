@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use crate::compare::Pair;
+use crate::compare::ImagePair;
 use crate::control::CancelToken;
 use crate::film::RadianceImage;
 use crate::math::Vec3;
@@ -40,13 +40,13 @@ pub fn write_starter_scene(folder: &Path) -> Result<PathBuf, OutputError> {
     ));
     create_folder(&folder)?;
     let path = folder.join("starter.toml");
-    let is_there = || fs::read(&path).is_ok_and(|found| found == text);
-    if is_there() {
+    let exists_unchanged = || fs::read(&path).is_ok_and(|found| found == text);
+    if exists_unchanged() {
         return Ok(path);
     }
     match staged::create_files_atomically(&folder, &[("starter.toml".into(), text)], &CancelToken::new()) {
         // Another process may have written the file in the meantime.
-        Err(_) if is_there() => Ok(path),
+        Err(_) if exists_unchanged() => Ok(path),
         Err(_) if path.symlink_metadata().is_ok() => Err(foreign_file_error(&path, "the starter scene")),
         written => written.map(|()| path),
     }
@@ -68,7 +68,7 @@ fn create_folder(folder: &Path) -> Result<(), OutputError> {
 /// Two references and their cost.
 #[derive(Clone, Debug)]
 pub(super) struct ReferencesWithCost {
-    pub(super) pair: Pair,
+    pub(super) pair: ImagePair,
     pub(super) cost: ReferenceCost,
 }
 
@@ -109,7 +109,7 @@ pub(super) fn load(folder: &Path, key: &Fingerprint) -> Option<ReferencesWithCos
         return None;
     }
     let image = |pixels: &[Vec3]| RadianceImage { width, height, pixels: pixels.to_vec() };
-    let pair = Pair::new([folder, folder], image(&pixels[..count]), image(&pixels[count..])).ok()?;
+    let pair = ImagePair::new([folder, folder], image(&pixels[..count]), image(&pixels[count..])).ok()?;
     Some(ReferencesWithCost { pair, cost })
 }
 
@@ -171,7 +171,7 @@ mod tests {
     fn stored() -> ReferencesWithCost {
         let image =
             |value| RadianceImage { width: 3, height: 2, pixels: vec![Vec3::new(value, -0.5, 1e-30); 6] };
-        let pair = Pair::new([Path::new("a"), Path::new("b")], image(1.0), image(2.0)).expect("a pair");
+        let pair = ImagePair::new([Path::new("a"), Path::new("b")], image(1.0), image(2.0)).expect("a pair");
         ReferencesWithCost { pair, cost: ReferenceCost { samples: 12.5, seconds: 3.25 } }
     }
 

@@ -3,12 +3,12 @@
 use super::results::Results;
 
 /// The CSV header line, including the line ending.
-pub const HEAD: &str =
+pub const HEADER_LINE: &str =
     "scene,width,height,method,step,seed,samples,seconds,setup_seconds,relmse,reference_noise\r\n";
 
 /// Formats the results as CSV.
 pub fn format_csv(results: &Results) -> String {
-    let mut text = HEAD.to_owned();
+    let mut text = HEADER_LINE.to_owned();
     for scene in &results.scenes {
         let size = format!("{},{}", scene.width, scene.height);
         let noise = scene.reference.noise;
@@ -48,7 +48,7 @@ mod tests {
         let text = format_csv(&results);
         let lines: Vec<&str> = text.split_terminator("\r\n").collect();
         assert_eq!(lines.len(), 1 + 2 * 2 * 4 * 3);
-        let columns = HEAD.split(',').count();
+        let columns = HEADER_LINE.split(',').count();
         assert!(lines[..25].iter().all(|line| line.split(',').count() == columns), "{text}");
         assert!(lines[1].starts_with("a.toml,128,96,path,1,1,1,0.009"), "{}", lines[1]);
         assert!(lines[25].starts_with("\"odd, \"\"name\"\".toml\",128,96,path,1,1,"), "{}", lines[25]);

@@ -38,7 +38,7 @@ pub(super) struct MethodRun<'a> {
     pub(super) keys: &'a ReferenceFingerprints,
     pub(super) two: &'a IndependentReferences,
     /// Default maximum number of samples per step.
-    pub(super) most_samples: f64,
+    pub(super) max_samples: f64,
 }
 
 impl MethodRun<'_> {
@@ -78,7 +78,7 @@ impl MethodRun<'_> {
         budget: &TimeBudget,
     ) -> Option<StepTarget> {
         let index = steps.len() as u32;
-        match &self.run.order.steps {
+        match &self.run.request.steps {
             StepSchedule::Samples(list) => {
                 list.get(steps.len()).map(|&samples| StepTarget { index, samples, budget: None })
             }
@@ -89,7 +89,7 @@ impl MethodRun<'_> {
             StepSchedule::Climb => {
                 let samples = SAMPLE_RATIO
                     .checked_pow(index)
-                    .filter(|samples| f64::from(*samples) <= self.most_samples)?;
+                    .filter(|samples| f64::from(*samples) <= self.max_samples)?;
                 let expected = took.last().map_or(0.0, |seconds| seconds * f64::from(SAMPLE_RATIO));
                 let has_time = budget.method_elapsed_seconds() + expected <= budget.method_allowance();
                 (index == 0 || has_time).then_some(StepTarget { index, samples, budget: None })
@@ -104,11 +104,11 @@ impl MethodRun<'_> {
         budget: &TimeBudget,
         took: &[f64],
     ) -> Result<StepResult, BenchError> {
-        let seeds = self.run.order.seeds;
+        let seeds = self.run.request.seeds;
         let (mut pictures, mut images): (Vec<ImageMeasurement>, Vec<RadianceImage>) = Default::default();
         let mut are_pixels_independent = true;
         for number in 0..seeds {
-            let seed = self.run.order.seed + aim.index * seeds + number;
+            let seed = self.run.request.seed + aim.index * seeds + number;
             self.report_image_start(aim, number, budget, took, &pictures);
             let RenderedImage { image, report, .. } = self.render_step_image(session, seed, aim)?;
             let relmse = self.two.unbiased_relmse(&image);
@@ -147,22 +147,22 @@ impl MethodRun<'_> {
         took: &[f64],
         pictures: &[ImageMeasurement],
     ) {
-        let order = self.run.order;
+        let request = self.run.request;
         let amount = match aim.budget {
             Some(seconds) => words::format_seconds(seconds),
             None => format_samples_with_unit(aim.samples.into()),
         };
-        let what = format!("{}, {amount}, seed {} of {}", self.method.name, number + 1, order.seeds);
+        let what = format!("{}, {amount}, seed {} of {}", self.method.name, number + 1, request.seeds);
         // Estimate the time per image from the previous image or step.
         let each = match (pictures, took.last()) {
             ([.., last], _) => Some(last.seconds),
-            ([], Some(step)) => Some(self.expected_step_time_ratio(aim) * step / f64::from(order.seeds)),
+            ([], Some(step)) => Some(self.expected_step_time_ratio(aim) * step / f64::from(request.seeds)),
             ([], None) => None,
         };
-        let remaining = f64::from(order.seeds - number);
+        let remaining = f64::from(request.seeds - number);
         let left = each.map(|each| {
             budget.estimate_seconds_to_end(
-                each * (remaining + f64::from(order.seeds) * self.later_steps_time_ratio(aim)),
+                each * (remaining + f64::from(request.seeds) * self.later_steps_time_ratio(aim)),
                 false,
             )
         });
@@ -172,7 +172,7 @@ impl MethodRun<'_> {
     /// Returns the expected ratio of this step's time to the previous step's time.
     fn expected_step_time_ratio(&self, aim: StepTarget) -> f64 {
         let index = aim.index as usize;
-        match &self.run.order.steps {
+        match &self.run.request.steps {
             StepSchedule::Climb => f64::from(SAMPLE_RATIO),
             StepSchedule::Samples(list) => f64::from(list[index]) / f64::from(list[index - 1]),
             StepSchedule::Seconds(list) => list[index] / list[index - 1],
@@ -182,7 +182,7 @@ impl MethodRun<'_> {
     /// Returns the expected total time of all later steps, as a multiple of this step's time.
     fn later_steps_time_ratio(&self, aim: StepTarget) -> f64 {
         let index = aim.index as usize;
-        match &self.run.order.steps {
+        match &self.run.request.steps {
             StepSchedule::Climb => 0.0,
             StepSchedule::Samples(list) => {
                 let sum: f64 = list[index + 1..].iter().map(|samples| f64::from(*samples)).sum();

@@ -86,8 +86,8 @@ fn requested_settings(scene: &Scene, toggles: &MethodSweep) -> Vec<MethodDedupKe
     ways
 }
 
-fn requested_or_scene_values<T: Copy>(asked: &[T], own: T) -> Vec<T> {
-    if asked.is_empty() { vec![own] } else { asked.to_vec() }
+fn requested_or_scene_values<T: Copy>(requested: &[T], own: T) -> Vec<T> {
+    if requested.is_empty() { vec![own] } else { requested.to_vec() }
 }
 
 fn normalize_method_settings(

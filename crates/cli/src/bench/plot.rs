@@ -13,15 +13,15 @@ pub const AXES: [&str; 2] = ["seconds of rendering", "relMSE"];
 /// Size of a panel in SVG pixels.
 const PANEL: (u32, u32) = (640, 480);
 /// Panels per row.
-const ACROSS: usize = 2;
+const PANELS_PER_ROW: usize = 2;
 
 /// Draws the plots for all scenes as one SVG document.
 ///
 /// # Errors
 /// Returns errors from the plotting library.
 pub fn draw_svg(results: &Results) -> Result<String, String> {
-    let across = results.scenes.len().clamp(1, ACROSS);
-    let down = results.scenes.len().div_ceil(ACROSS).max(1);
+    let across = results.scenes.len().clamp(1, PANELS_PER_ROW);
+    let down = results.scenes.len().div_ceil(PANELS_PER_ROW).max(1);
     let size = (PANEL.0 * across as u32, PANEL.1 * down as u32);
     let mut text = String::new();
     {

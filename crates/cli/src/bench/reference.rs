@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use super::cache::{self, ReferenceCost, ReferencesWithCost};
 use super::request::BenchError;
 use super::results::ReferenceResult;
-use crate::compare::{IndependentReferences, Pair};
+use crate::compare::{ImagePair, IndependentReferences};
 use crate::control::CancelToken;
 use crate::pipeline::BUILD;
 use crate::pipeline::headless::{HeadlessSession, RenderedImage};
@@ -81,7 +81,7 @@ pub(super) struct UncachedReferences {
 
 /// Loads references from files.
 pub(super) fn load_reference_files(files: &[PathBuf; 2]) -> Result<SceneReferences, BenchError> {
-    let pair = Pair::load(&files[0], &files[1]).map_err(|errors| {
+    let pair = ImagePair::load(&files[0], &files[1]).map_err(|errors| {
         BenchError::Call(errors.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))
     })?;
     let mut names: Vec<String> = files.iter().map(|file| file.to_string_lossy().into_owned()).collect();
@@ -100,12 +100,12 @@ pub(super) struct ReferenceRenderer<'a> {
     pub(super) token: &'a CancelToken,
     pub(super) cache: Option<&'a Path>,
     /// Requested samples per pixel of each reference.
-    pub(super) asked: Option<u32>,
+    pub(super) requested_samples: Option<u32>,
 }
 
 impl ReferenceRenderer<'_> {
     fn reference_cache_key(&self, keys: &ReferenceFingerprints) -> Fingerprint {
-        cache_key(BUILD, self.asked, keys)
+        cache_key(BUILD, self.requested_samples, keys)
     }
 
     /// Renders one sample per pixel to get the fingerprints of the references and to check that all files can
@@ -148,7 +148,7 @@ impl ReferenceRenderer<'_> {
             seconds: first.report.seconds + second.report.seconds,
         };
         let names = ["the first reference", "the second reference"].map(Path::new);
-        let pair = Pair::new(names, first.image, second.image).map_err(|errors| {
+        let pair = ImagePair::new(names, first.image, second.image).map_err(|errors| {
             BenchError::Call(errors.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))
         })?;
         let keys = ReferenceFingerprints([first.key, second.key]);
@@ -187,11 +187,11 @@ impl ReferenceRenderer<'_> {
 /// the requested sample count, which is 0 if time limits the references.
 fn cache_key(
     build: &str,
-    asked: Option<u32>,
+    requested_samples: Option<u32>,
     ReferenceFingerprints(keys): &ReferenceFingerprints,
 ) -> Fingerprint {
     let mut key = FingerprintHasher::new("references");
-    key.add_str(build).add_u64(asked.unwrap_or(0).into());
+    key.add_str(build).add_u64(requested_samples.unwrap_or(0).into());
     keys.iter().for_each(|one| {
         key.add_fingerprint(one);
     });
@@ -229,15 +229,21 @@ mod tests {
             common: &common,
             token: &token,
             cache: None,
-            asked: Some(2),
+            requested_samples: Some(2),
         };
         let other = BUILD.replace("(build ", "(build 0");
-        assert_ne!(renderer.reference_cache_key(&keys()), cache_key(&other, renderer.asked, &keys()));
         assert_ne!(
             renderer.reference_cache_key(&keys()),
-            cache_key(env!("CARGO_PKG_VERSION"), renderer.asked, &keys())
+            cache_key(&other, renderer.requested_samples, &keys())
         );
-        assert_eq!(renderer.reference_cache_key(&keys()), cache_key(BUILD, renderer.asked, &keys()));
+        assert_ne!(
+            renderer.reference_cache_key(&keys()),
+            cache_key(env!("CARGO_PKG_VERSION"), renderer.requested_samples, &keys())
+        );
+        assert_eq!(
+            renderer.reference_cache_key(&keys()),
+            cache_key(BUILD, renderer.requested_samples, &keys())
+        );
     }
 
     #[test]

@@ -107,14 +107,14 @@ pub enum BenchError {
     /// The arguments are invalid. Contains a message with a hint.
     Call(String),
     /// The benchmark was canceled.
-    Cancelled,
+    Canceled,
 }
 
 impl From<AbortReason> for BenchError {
     fn from(why: AbortReason) -> Self {
         match why {
             AbortReason::Failed(failure) => Self::Failed(failure),
-            AbortReason::Cancelled => Self::Cancelled,
+            AbortReason::Canceled => Self::Canceled,
         }
     }
 }

@@ -206,7 +206,7 @@ pub(super) mod tests {
             seconds: seconds * factor,
             relmse: relmse * factor,
         };
-        let by_chance = if bias > 0.0 { 1e-9 } else { 0.4 };
+        let p_value = if bias > 0.0 { 1e-9 } else { 0.4 };
         StepResult {
             samples,
             budget: None,
@@ -214,11 +214,11 @@ pub(super) mod tests {
             relmse,
             spread: [relmse * 0.9, relmse * 1.1],
             uncertainty: 1e-9,
-            bias: Some(SquaredBias { size: bias, error: bias * 0.01 + 1e-9, by_chance, bound: bias + 1e-8 }),
+            bias: Some(SquaredBias { size: bias, error: bias * 0.01 + 1e-9, p_value, bound: bias + 1e-8 }),
             brightness: Some(BrightnessDifference {
                 value: -0.01,
                 error: 0.001,
-                by_chance: if bias > 0.0 { 1e-9 } else { 0.4 },
+                p_value: if bias > 0.0 { 1e-9 } else { 0.4 },
             }),
             pictures: [(1, 0.9), (2, 1.0), (3, 1.1)].map(of).to_vec(),
         }

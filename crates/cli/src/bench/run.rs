@@ -32,17 +32,17 @@ const LONG_SIDE: u32 = 96;
 /// Returns an error if a scene or an argument is invalid, or if the benchmark fails or is canceled. The error
 /// contains the results of the completed scenes.
 pub fn run(
-    order: &BenchRequest,
+    request: &BenchRequest,
     token: &CancelToken,
-    tell: &dyn Fn(BenchEvent),
+    emit: &dyn Fn(BenchEvent),
 ) -> Result<Results, Box<PartialResultsError>> {
-    let mut budget = TimeBudget::new(order.within, order.scenes.len());
+    let mut budget = TimeBudget::new(request.within, request.scenes.len());
     let mut results =
         Results { glimt: env!("CARGO_PKG_VERSION").to_owned(), threads: 0, seconds: 0.0, scenes: Vec::new() };
     let runs: Vec<SceneRun<'_>> =
-        order.scenes.iter().map(|path| SceneRun { order, path, token, tell }).collect();
+        request.scenes.iter().map(|path| SceneRun { request, path, token, emit }).collect();
     let mut measure = || {
-        check_seed_overlap(order)?;
+        check_seed_overlap(request)?;
         check_scenes(&runs)?;
         for run in &runs {
             results.scenes.push(run.measure(&mut budget, &mut results.threads)?);
@@ -66,7 +66,7 @@ fn check_scenes(runs: &[SceneRun<'_>]) -> Result<(), BenchError> {
             Ok(_) => {}
             Err(BenchError::Failed(Failure::Scene(diagnostics))) => wrong.extend(diagnostics),
             Err(
-                error @ (BenchError::Failed(Failure::Work(_)) | BenchError::Call(_) | BenchError::Cancelled),
+                error @ (BenchError::Failed(Failure::Work(_)) | BenchError::Call(_) | BenchError::Canceled),
             ) => {
                 return Err(error);
             }
@@ -75,15 +75,15 @@ fn check_scenes(runs: &[SceneRun<'_>]) -> Result<(), BenchError> {
     if wrong.is_empty() { Ok(()) } else { Err(BenchError::Failed(Failure::Scene(wrong))) }
 }
 
-/// Returns the size of a scene's benchmark images: `asked`, with missing dimensions computed from the scene's
-/// aspect ratio and a default size.
-pub fn image_size(scene: &Scene, asked: (Option<u32>, Option<u32>)) -> (u32, u32) {
+/// Returns the size of a scene's benchmark images. Computes dimensions missing from `requested` with the
+/// scene's aspect ratio and a default size.
+pub fn image_size(scene: &Scene, requested: (Option<u32>, Option<u32>)) -> (u32, u32) {
     let (width, height) = (f64::from(scene.render.width), f64::from(scene.render.height));
     let side = |length: f64| length.round().clamp(1.0, 65536.0) as u32;
-    match asked {
+    match requested {
         (Some(width), Some(height)) => (width, height),
-        (Some(asked), None) => (asked, side(height * f64::from(asked) / width)),
-        (None, Some(asked)) => (side(width * f64::from(asked) / height), asked),
+        (Some(requested), None) => (requested, side(height * f64::from(requested) / width)),
+        (None, Some(requested)) => (side(width * f64::from(requested) / height), requested),
         (None, None) => {
             let scale = (f64::from(LONG_SIDE) / width.max(height)).min(1.0);
             (side(width * scale), side(height * scale))
@@ -92,28 +92,28 @@ pub fn image_size(scene: &Scene, asked: (Option<u32>, Option<u32>)) -> (u32, u32
 }
 
 /// Checks that the seeds of images and references do not overlap.
-fn check_seed_overlap(order: &BenchRequest) -> Result<(), BenchError> {
+fn check_seed_overlap(request: &BenchRequest) -> Result<(), BenchError> {
     /// Maximum number of steps in the default schedule.
     const MAX_STEPS: u32 = 64;
-    let steps = match &order.steps {
+    let steps = match &request.steps {
         StepSchedule::Climb => MAX_STEPS,
         StepSchedule::Samples(list) => list.len() as u32,
         StepSchedule::Seconds(list) => list.len() as u32,
     };
-    let last = u64::from(order.seed) + u64::from(steps) * u64::from(order.seeds);
+    let last = u64::from(request.seed) + u64::from(steps) * u64::from(request.seeds);
     if last < u64::from(SEEDS[0]) {
         return Ok(());
     }
-    let way_out = "the references use the same seeds; choose a smaller --seed";
-    Err(BenchError::Call(format!("--seed {} is too large: {way_out}", order.seed)))
+    let advice = "the references use the same seeds; choose a smaller --seed";
+    Err(BenchError::Call(format!("--seed {} is too large: {advice}", request.seed)))
 }
 
 /// A benchmark of one scene.
 pub(super) struct SceneRun<'a> {
-    pub(super) order: &'a BenchRequest,
+    pub(super) request: &'a BenchRequest,
     pub(super) path: &'a Path,
     pub(super) token: &'a CancelToken,
-    tell: &'a dyn Fn(BenchEvent),
+    emit: &'a dyn Fn(BenchEvent),
 }
 
 /// Error message for a scene that was saved while it was being measured.
@@ -134,13 +134,13 @@ struct ValidatedScene {
 impl SceneRun<'_> {
     /// Reads and validates the scene and its files.
     fn load_and_validate(&self, session: &mut HeadlessSession) -> Result<ValidatedScene, BenchError> {
-        let order = self.order;
+        let request = self.request;
         self.report_task_begin("reading", None);
         let foreign = foreign_file_error(self.path).map_or(Ok(()), |error| Err(vec![error]));
         let loaded = foreign
-            .and_then(|()| scene::load(self.path, &order.common.sets))
+            .and_then(|()| scene::load(self.path, &request.common.sets))
             .map_err(|diagnostics| BenchError::Failed(Failure::Scene(diagnostics)))?;
-        let given = match &order.reference {
+        let given = match &request.reference {
             ReferenceSource::Files(files) => Some(load_reference_files(files)?),
             ReferenceSource::InTime | ReferenceSource::Samples(_) => None,
         };
@@ -149,17 +149,21 @@ impl SceneRun<'_> {
                 reference.two.reference_pair().measured_image().width,
                 reference.two.reference_pair().measured_image().height,
             ),
-            None => image_size(&loaded.scene, (order.width, order.height)),
+            None => image_size(&loaded.scene, (request.width, request.height)),
         };
-        let common =
-            Overrides { width: Some(width), height: Some(height), error: Some(0.0), ..order.common.clone() };
+        let common = Overrides {
+            width: Some(width),
+            height: Some(height),
+            error: Some(0.0),
+            ..request.common.clone()
+        };
         let keys = self.reference_renderer(&common).fingerprints_from_test_renders(session)?;
         self.check_output_input_overlap(session)?;
         Ok(ValidatedScene { scene: Arc::clone(&loaded.scene), given, common, keys })
     }
 
     pub(super) fn reference_renderer<'a>(&'a self, common: &'a Overrides) -> ReferenceRenderer<'a> {
-        let asked = match &self.order.reference {
+        let requested_samples = match &self.request.reference {
             ReferenceSource::Samples(samples) => Some(*samples),
             ReferenceSource::InTime | ReferenceSource::Files(_) => None,
         };
@@ -167,8 +171,8 @@ impl SceneRun<'_> {
             scene: self.path,
             common,
             token: self.token,
-            cache: self.order.cache.as_deref(),
-            asked,
+            cache: self.request.cache.as_deref(),
+            requested_samples,
         }
     }
 
@@ -176,7 +180,7 @@ impl SceneRun<'_> {
     fn measure(&self, budget: &mut TimeBudget, threads: &mut usize) -> Result<SceneResult, BenchError> {
         let mut session = HeadlessSession::default();
         let ValidatedScene { scene, given, common, keys } = self.load_and_validate(&mut session)?;
-        let methods = methods_to_measure(&scene, &self.order.toggles);
+        let methods = methods_to_measure(&scene, &self.request.toggles);
         budget.begin_scene(methods.len());
         let reference = match given {
             Some(reference) => reference,
@@ -188,7 +192,7 @@ impl SceneRun<'_> {
             reference.two.reference_pair().measured_image().height,
         );
         self.report_references(&reference, width, height);
-        let most_samples = max_measurable_samples(reference.result.samples);
+        let max_samples = max_measurable_samples(reference.result.samples);
         let mut measured = Vec::new();
         for method in &methods {
             budget.begin_method();
@@ -198,7 +202,7 @@ impl SceneRun<'_> {
                 method,
                 keys: &keys,
                 two: &reference.two,
-                most_samples,
+                max_samples,
             };
             measured.push(method.measure(budget, threads)?);
             budget.end_method();
@@ -215,11 +219,12 @@ impl SceneRun<'_> {
         keys: &ReferenceFingerprints,
         budget: &TimeBudget,
     ) -> Result<SceneReferences, BenchError> {
-        let amount = match &self.order.reference {
+        let amount = match &self.request.reference {
             ReferenceSource::Samples(samples) => ReferenceBudget { samples: *samples, seconds: None },
-            ReferenceSource::InTime | ReferenceSource::Files(_) => {
-                ReferenceBudget::from_time_limit(budget.reference_allowance(), self.order.steps.max_samples())
-            }
+            ReferenceSource::InTime | ReferenceSource::Files(_) => ReferenceBudget::from_time_limit(
+                budget.reference_allowance(),
+                self.request.steps.max_samples(),
+            ),
         };
         let maker = self.reference_renderer(common);
         if let Some(kept) = maker.load_cached(keys, amount) {
@@ -242,7 +247,7 @@ impl SceneRun<'_> {
 
     /// Checks that no output file is an input of the scene.
     fn check_output_input_overlap(&self, session: &HeadlessSession) -> Result<(), BenchError> {
-        match self.order.targets.iter().find(|target| session.depends_on_file(target)) {
+        match self.request.targets.iter().find(|target| session.depends_on_file(target)) {
             Some(target) => Err(BenchError::Call(format!(
                 "cannot write {}: {} depends on it; choose another file",
                 target.display(),
@@ -254,7 +259,7 @@ impl SceneRun<'_> {
 
     fn report_references(&self, reference: &SceneReferences, width: u32, height: u32) {
         if !reference.warnings.is_empty() {
-            (self.tell)(BenchEvent::Warnings(reference.warnings.clone()));
+            (self.emit)(BenchEvent::Warnings(reference.warnings.clone()));
         }
         if let Some(why) = &reference.cache_error {
             self.report_task_done(&format!("could not cache the references: {why}"));
@@ -273,16 +278,16 @@ impl SceneRun<'_> {
 
     pub(super) fn report_task_begin(&self, what: &str, left: Option<f64>) {
         let what = format!("{}: {what}", self.path.display());
-        (self.tell)(BenchEvent::Begins { what, left });
+        (self.emit)(BenchEvent::Begins { what, left });
     }
 
     pub(super) fn report_step(&self, method: &str, step: &StepResult) {
         let (scene, method) = (self.path.to_string_lossy().into_owned(), method.to_owned());
-        (self.tell)(BenchEvent::Point { scene, method, seconds: step.seconds, relmse: step.relmse });
+        (self.emit)(BenchEvent::Point { scene, method, seconds: step.seconds, relmse: step.relmse });
     }
 
     pub(super) fn report_task_done(&self, what: &str) {
-        (self.tell)(BenchEvent::Done(format!("{}: {what}", self.path.display())));
+        (self.emit)(BenchEvent::Done(format!("{}: {what}", self.path.display())));
     }
 }
 
@@ -303,10 +308,10 @@ mod tests {
     #[test]
     fn images_keep_the_aspect_ratio() {
         let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../../scenes/cornell.toml");
-        let of = |width, height, asked| {
+        let of = |width, height, requested| {
             let mut scene = Scene::clone(&scene::load(Path::new(file), &[]).expect("a scene").scene);
             (scene.render.width, scene.render.height) = (width, height);
-            image_size(&scene, asked)
+            image_size(&scene, requested)
         };
         assert_eq!(of(640, 480, (None, None)), (96, 72));
         assert_eq!(of(480, 640, (None, None)), (72, 96));
@@ -320,13 +325,13 @@ mod tests {
     #[test]
     fn errors_keep_results_of_earlier_scenes() {
         let folder = tempfile::tempdir().expect("a folder");
-        let order = two_scenes(folder.path());
+        let request = two_scenes(folder.path());
         // Remove the second scene while measuring the first.
-        let tell = |news| match news {
-            BenchEvent::Point { .. } => std::fs::remove_file(&order.scenes[1]).unwrap_or_default(),
+        let emit = |news| match news {
+            BenchEvent::Point { .. } => std::fs::remove_file(&request.scenes[1]).unwrap_or_default(),
             BenchEvent::Begins { .. } | BenchEvent::Done(_) | BenchEvent::Warnings(_) => {}
         };
-        let Err(unfinished) = run(&order, &CancelToken::new(), &tell) else {
+        let Err(unfinished) = run(&request, &CancelToken::new(), &emit) else {
             panic!("expected an error because the scene was removed")
         };
         assert!(matches!(unfinished.error, BenchError::Failed(_)), "{:?}", unfinished.error);
@@ -364,22 +369,22 @@ mod tests {
     #[test]
     fn scenes_saved_before_measurement_are_reloaded() {
         let folder = tempfile::tempdir().expect("a folder");
-        let order = two_scenes(folder.path());
+        let request = two_scenes(folder.path());
         let save = |news| match news {
-            BenchEvent::Point { scene, .. } if scene.ends_with("a.toml") => write(&order.scenes[1], "3"),
+            BenchEvent::Point { scene, .. } if scene.ends_with("a.toml") => write(&request.scenes[1], "3"),
             BenchEvent::Point { .. }
             | BenchEvent::Begins { .. }
             | BenchEvent::Done(_)
             | BenchEvent::Warnings(_) => {}
         };
-        let measured = run(&order, &CancelToken::new(), &save).expect("results of both scenes");
+        let measured = run(&request, &CancelToken::new(), &save).expect("results of both scenes");
         for method in measured.scenes.iter().flat_map(|scene| &scene.methods) {
             assert_eq!(method.steps[0].relmse, 0.0, "{}: the old version was measured", method.name);
         }
         // Only the second version of the scene has cached references.
         let again = |color| {
-            write(&order.scenes[1], color);
-            let again = run(&order, &CancelToken::new(), &|_| {}).expect("results of both scenes");
+            write(&request.scenes[1], color);
+            let again = run(&request, &CancelToken::new(), &|_| {}).expect("results of both scenes");
             again.scenes[1].reference.is_cached
         };
         assert!(again("3"));
@@ -390,25 +395,25 @@ mod tests {
     fn saving_a_scene_during_measurement_fails() {
         for moment in ["reference 2 of 2", "path, 1 sample, seed 2 of 2"] {
             let folder = tempfile::tempdir().expect("a folder");
-            let order = two_scenes(folder.path());
+            let request = two_scenes(folder.path());
             let save = |news| match news {
                 BenchEvent::Begins { what, .. } if what.ends_with(&format!("b.toml: {moment}")) => {
-                    write(&order.scenes[1], "3");
+                    write(&request.scenes[1], "3");
                 }
                 BenchEvent::Point { .. }
                 | BenchEvent::Begins { .. }
                 | BenchEvent::Done(_)
                 | BenchEvent::Warnings(_) => {}
             };
-            let Err(unfinished) = run(&order, &CancelToken::new(), &save) else {
+            let Err(unfinished) = run(&request, &CancelToken::new(), &save) else {
                 panic!("expected an error: saved at {moment}")
             };
             let BenchError::Failed(Failure::Work(message)) = &unfinished.error else { panic!("{moment}") };
-            assert_eq!(*message, scene_changed_message(&order.scenes[1]));
+            assert_eq!(*message, scene_changed_message(&request.scenes[1]));
             assert_eq!(unfinished.done.scenes.len(), 1);
             // References rendered from different versions are not cached.
-            write(&order.scenes[1], "3");
-            let again = run(&order, &CancelToken::new(), &|_| {}).expect("results of both scenes");
+            write(&request.scenes[1], "3");
+            let again = run(&request, &CancelToken::new(), &|_| {}).expect("results of both scenes");
             assert!(!again.scenes[1].reference.is_cached, "{moment}");
             assert_eq!(again.scenes[1].methods[0].steps[0].relmse, 0.0, "{moment}");
         }
@@ -417,33 +422,33 @@ mod tests {
     #[test]
     fn saving_a_scene_during_a_later_method_fails() {
         let folder = tempfile::tempdir().expect("a folder");
-        let order = two_scenes(folder.path());
+        let request = two_scenes(folder.path());
         let text =
-            std::fs::read_to_string(&order.scenes[0]).expect("text") + "[render]\nambient = [1, 1, 1]\n";
+            std::fs::read_to_string(&request.scenes[0]).expect("text") + "[render]\nambient = [1, 1, 1]\n";
         let save = |news| match news {
             BenchEvent::Begins { what, .. } if what.ends_with("a.toml: whitted, 1 sample, seed 2 of 2") => {
-                std::fs::write(&order.scenes[0], &text).expect("written");
+                std::fs::write(&request.scenes[0], &text).expect("written");
             }
             BenchEvent::Point { .. }
             | BenchEvent::Begins { .. }
             | BenchEvent::Done(_)
             | BenchEvent::Warnings(_) => {}
         };
-        let Err(unfinished) = run(&order, &CancelToken::new(), &save) else {
+        let Err(unfinished) = run(&request, &CancelToken::new(), &save) else {
             panic!("expected an error because the scene was saved")
         };
         let BenchError::Failed(Failure::Work(message)) = &unfinished.error else {
             panic!("expected a work error")
         };
-        assert_eq!(*message, scene_changed_message(&order.scenes[0]));
+        assert_eq!(*message, scene_changed_message(&request.scenes[0]));
     }
 
     #[test]
     fn image_and_reference_seeds_never_overlap() {
-        let order = |seed| BenchRequest { seed, seeds: 6, ..BenchRequest::default() };
-        assert!(check_seed_overlap(&order(1)).is_ok());
-        assert!(check_seed_overlap(&order(u32::MAX - 6 * 64 - 2)).is_ok());
-        let Err(BenchError::Call(message)) = check_seed_overlap(&order(u32::MAX - 6 * 64)) else {
+        let request = |seed| BenchRequest { seed, seeds: 6, ..BenchRequest::default() };
+        assert!(check_seed_overlap(&request(1)).is_ok());
+        assert!(check_seed_overlap(&request(u32::MAX - 6 * 64 - 2)).is_ok());
+        let Err(BenchError::Call(message)) = check_seed_overlap(&request(u32::MAX - 6 * 64)) else {
             panic!("expected an error")
         };
         assert!(message.contains("--seed"), "{message}");

@@ -38,17 +38,17 @@ pub(crate) fn run(args: &BenchArgs, console: &Console) -> Exit {
 /// Runs the benchmark and reports errors. `Err` contains the exit code.
 fn run_and_print_errors(args: &BenchArgs, console: &Console) -> Result<Exit, Exit> {
     priority::lower_priority_including_spawned_threads(args.nice);
-    let order = bench_request(args, console)?;
-    let scenes = order.scenes.len();
-    let outputs = BenchOutputs::try_from_args(args, &order.scenes, console)?;
+    let request = bench_request(args, console)?;
+    let scenes = request.scenes.len();
+    let outputs = BenchOutputs::try_from_args(args, &request.scenes, console)?;
     let baseline = outputs.read_baseline(console)?;
     // The first signal stops measuring. The second stops writing results.
     let (token, writing) = (CancelToken::new(), CancelToken::new());
     let stop = [token.clone(), writing.clone()];
-    let ended = signals::install_signal_handlers(move || stop[usize::from(stop[0].is_cancelled())].cancel())
+    let ended = signals::install_signal_handlers(move || stop[usize::from(stop[0].is_canceled())].cancel())
         .map_err(|message| console.print_error(Exit::FAILED, &message))?;
     let mut progress = BenchProgress::new(args.progress, console);
-    let (news, work) = spawn_benchmark(order, token.clone())
+    let (news, work) = spawn_benchmark(request, token.clone())
         .map_err(|error| console.print_error(Exit::FAILED, &describe_start_failure(1, false, &error)))?;
     report_events(&news, &mut progress);
     let results = work.join().unwrap_or_else(|_| Err(Box::new(unfinished_after_panic())));
@@ -60,7 +60,7 @@ fn run_and_print_errors(args: &BenchArgs, console: &Console) -> Result<Exit, Exi
                 &results,
                 &progress,
                 console,
-                if token.is_cancelled() { &writing } else { &token },
+                if token.is_canceled() { &writing } else { &token },
             )?;
             progress.report_done(&results);
             Ok(ended.signal_number().map_or(Exit::DONE, Exit::from_signal))
@@ -92,15 +92,15 @@ type BenchThread = JoinHandle<Result<Results, Box<PartialResultsError>>>;
 
 /// Starts the benchmark on a thread. Returns the thread and a receiver for its events.
 fn spawn_benchmark(
-    order: BenchRequest,
+    request: BenchRequest,
     token: CancelToken,
 ) -> std::io::Result<(Receiver<BenchEvent>, BenchThread)> {
     let (sender, news) = mpsc::channel();
-    let tell = move |one: BenchEvent| {
+    let emit = move |one: BenchEvent| {
         // Ignore a front end that has exited.
         let _ = sender.send(one);
     };
-    let work = move || bench::run(&order, &token, &tell);
+    let work = move || bench::run(&request, &token, &emit);
     Ok((news, spawn("glimt-bench", work)?))
 }
 
@@ -133,7 +133,7 @@ fn report_unfinished(
     if let Some(number) = ended.signal_number() {
         if let Some(signal) = signals::signal_name(number) {
             let (done, all) = scenes;
-            progress.report_cancelled(&format!(
+            progress.report_canceled(&format!(
                 "terminated by {signal} after {done} of {all} scenes; finished references are cached"
             ));
         }
@@ -158,7 +158,7 @@ fn report_unfinished(
             progress.report_failure("call", &format!("error: {message}"));
             Exit::WRONG
         }
-        BenchError::Cancelled => Exit::FAILED,
+        BenchError::Canceled => Exit::FAILED,
     }
 }
 

@@ -9,7 +9,7 @@ use rayon::ThreadPool;
 use serde::Serialize;
 
 use crate::args::CompareArgs;
-use crate::compare::{self, Bias, ErrorMetrics, PIXELS_PER_DEGREE, Pair, PairMeasurements};
+use crate::compare::{self, Bias, ErrorMetrics, ImagePair, PIXELS_PER_DEGREE, PairMeasurements};
 use crate::console::Console;
 use crate::control::CancelToken;
 use crate::exit::Exit;
@@ -33,7 +33,7 @@ pub(crate) fn run(args: &CompareArgs, console: &Console) -> Exit {
 fn run_in_pool(pool: &ThreadPool, args: &CompareArgs, console: &Console) -> Result<Exit, Exit> {
     let diff =
         args.diff.as_deref().map(|path| ErrorImageOutput::try_from_args(path, args, console)).transpose()?;
-    let pair = Pair::load(&args.a, &args.b).map_err(|errors| {
+    let pair = ImagePair::load(&args.a, &args.b).map_err(|errors| {
         errors.iter().for_each(|error| console.print_line_to_stderr(&format!("error: {error}")));
         Exit::WRONG
     })?;
@@ -121,7 +121,7 @@ impl<'a> ErrorImageOutput<'a> {
     fn write(
         &self,
         args: &CompareArgs,
-        pair: &Pair,
+        pair: &ImagePair,
         measured: &PairMeasurements,
     ) -> Result<Vec<WriteWarning>, OutputError> {
         let image: RadianceImage = if self.is_float() {
@@ -192,7 +192,7 @@ struct Summary<'a> {
 }
 
 impl<'a> Summary<'a> {
-    fn new(args: &CompareArgs, pair: &Pair, errors: &'a ErrorMetrics, bias: Bias) -> Self {
+    fn new(args: &CompareArgs, pair: &ImagePair, errors: &'a ErrorMetrics, bias: Bias) -> Self {
         let &ErrorMetrics { rmse, relmse, relmse_trimmed, dropped_pixels, max, psnr_db, ssim, flip, .. } =
             errors;
         Self {
@@ -249,10 +249,10 @@ fn format_row(figures: &str, note: &str, columns: Option<usize>) -> Vec<String> 
     const INDENT: usize = 4;
     let start = figures.chars().count();
     let Some(columns) = columns else { return vec![format!("{figures}{note}").trim_end().to_owned()] };
-    let is_beside = columns >= start + MIN_NOTE_COLUMNS;
-    let indent = if is_beside { start } else { INDENT };
+    let fits_beside = columns >= start + MIN_NOTE_COLUMNS;
+    let indent = if fits_beside { start } else { INDENT };
     let mut note = wrap_text(note, columns.saturating_sub(indent).max(1));
-    let first = if is_beside && !note.is_empty() { note.remove(0) } else { String::new() };
+    let first = if fits_beside && !note.is_empty() { note.remove(0) } else { String::new() };
     let first = format!("{figures}{first}").trim_end().to_owned();
     let rest = note.into_iter().map(|line| format!("{:indent$}{line}", ""));
     std::iter::once(first).chain(rest).collect()

@@ -40,7 +40,7 @@ fn convert_and_write(args: &ImportArgs, console: &Console, token: &CancelToken) 
     }
     let imported = match import_scene(&args.file, &folder, token) {
         Ok(imported) => imported,
-        Err(_) if token.is_cancelled() => return Exit::FAILED,
+        Err(_) if token.is_canceled() => return Exit::FAILED,
         Err(ImportError::File(message)) => return console.print_error(Exit::WRONG, &message),
         Err(ImportError::Work(message)) => return console.print_error(Exit::FAILED, &message),
     };
@@ -59,7 +59,7 @@ fn convert_and_write(args: &ImportArgs, console: &Console, token: &CancelToken) 
             ));
             Exit::DONE
         }
-        Err(OutputError::Cancelled(_)) => Exit::FAILED,
+        Err(OutputError::Canceled(_)) => Exit::FAILED,
         Err(error) => console.print_error(Exit::FAILED, &error.to_string()),
     }
 }

@@ -13,7 +13,7 @@ use serde_json::json;
 use self::inputs::{RenderInputFiles, possible_scene_paths};
 use crate::args::{MergeArgs, ProgressMode};
 use crate::console::{Console, stdout_columns_or_default};
-use crate::control::{CancelToken, Cancelled};
+use crate::control::{CancelToken, Canceled};
 use crate::exit::Exit;
 use crate::film::Film;
 use crate::film::tone::tone_map_to_8_bits;
@@ -91,7 +91,7 @@ impl MergeCommand<'_> {
         match self.message_if_render_input(inputs, &self.args.out) {
             Ok(None) => Ok(()),
             Ok(Some(message)) => Err(self.console.print_error(Exit::WRONG, &message)),
-            Err(Cancelled) => Err(Exit::FAILED),
+            Err(Canceled) => Err(Exit::FAILED),
         }
     }
 
@@ -100,7 +100,7 @@ impl MergeCommand<'_> {
         &self,
         inputs: &RenderInputFiles<'_>,
         path: &Path,
-    ) -> Result<Option<String>, Cancelled> {
+    ) -> Result<Option<String>, Canceled> {
         let why = inputs.reason_not_to_overwrite(path)?;
         Ok(why.map(|why| format!("cannot write {}: {why}; choose another output", self.args.out.display())))
     }
@@ -118,7 +118,7 @@ impl MergeCommand<'_> {
                 }
                 Err(PartError::Unreadable { source, .. })
                     if self.args.partial && source.kind() == std::io::ErrorKind::NotFound => {}
-                Err(PartError::Cancelled(_)) => return Err(Exit::FAILED),
+                Err(PartError::Canceled(_)) => return Err(Exit::FAILED),
                 Err(error) => wrong.push(error),
             }
             bar.update(index + 1, self.args.parts.len());
@@ -145,7 +145,7 @@ impl MergeCommand<'_> {
     fn wait_for_parts(&self) -> Result<Vec<PartFile>, Exit> {
         let mut parts: Vec<PartFile> = Vec::new();
         let mut waiting: Vec<AwaitedPart> = self.args.parts.iter().cloned().map(AwaitedPart::new).collect();
-        let mut said = None;
+        let mut reported = None;
         let mut block = InPlaceTerminalBlock::default();
         loop {
             let mut rest = Vec::new();
@@ -165,8 +165,8 @@ impl MergeCommand<'_> {
             let unfinished: Vec<&Path> =
                 waiting.iter().filter_map(AwaitedPart::existing_path_if_incomplete).collect();
             let state = (parts.len(), unfinished.iter().map(|path| path.to_path_buf()).collect::<Vec<_>>());
-            if said.as_ref() != Some(&state) {
-                let is_new = said.is_none_or(|(count, _)| count != parts.len());
+            if reported.as_ref() != Some(&state) {
+                let is_new = reported.is_none_or(|(count, _)| count != parts.len());
                 let words = self.describe_completed_parts(parts.len(), &unfinished);
                 if self.redraws_in_place() {
                     self.redraw_image(&parts, &words, &mut block)?;
@@ -175,7 +175,7 @@ impl MergeCommand<'_> {
                     part::check_and_list_missing(&parts).map_err(|error| self.report_part_error(&error))?;
                 }
                 self.report_parts(parts.len(), &unfinished, &words);
-                said = Some(state);
+                reported = Some(state);
             }
             if waiting.is_empty() {
                 return Ok(parts);
@@ -187,7 +187,7 @@ impl MergeCommand<'_> {
     fn pause(&self) -> Result<(), Exit> {
         let end = Instant::now() + POLL_INTERVAL;
         while Instant::now() < end {
-            if self.token.is_cancelled() {
+            if self.token.is_canceled() {
                 return Err(Exit::FAILED);
             }
             std::thread::sleep(Duration::from_millis(20));
@@ -276,7 +276,7 @@ impl MergeCommand<'_> {
 
     fn report_part_error(&self, error: &PartError) -> Exit {
         match error {
-            PartError::Cancelled(_) => Exit::FAILED,
+            PartError::Canceled(_) => Exit::FAILED,
             PartError::Film(_) => self.console.print_error(Exit::FAILED, &error.to_string()),
             PartError::Unreadable { .. }
             | PartError::NotRegular { .. }
@@ -322,7 +322,7 @@ impl MergeCommand<'_> {
         });
         let written = bytes.and_then(|bytes| atomic_with_policy(out, &bytes, &guard, token));
         written.map_err(|error| match error {
-            OutputError::Cancelled(_) => Exit::FAILED,
+            OutputError::Canceled(_) => Exit::FAILED,
             other => self.console.print_error(Exit::FAILED, &other.to_string()),
         })?;
         if self.args.progress != ProgressMode::None {
@@ -396,7 +396,7 @@ struct StepProgressBar {
     what: &'static str,
     bar: Option<ProgressBar>,
     is_json: bool,
-    said: usize,
+    reported: usize,
 }
 
 impl StepProgressBar {
@@ -405,17 +405,17 @@ impl StepProgressBar {
         let has_bar = progress == ProgressMode::Auto && console.is_terminal;
         let bar = has_bar
             .then(|| ProgressBar::new(1).with_style(bar_style_from_template(template)).with_message(what));
-        Self { what, bar, is_json: progress == ProgressMode::Json, said: 0 }
+        Self { what, bar, is_json: progress == ProgressMode::Json, reported: 0 }
     }
 
     fn update(&mut self, done: usize, total: usize) {
         /// Maximum number of progress reports per step.
         const STEPS: usize = 100;
         let step = done * STEPS / total.max(1);
-        if step == self.said {
+        if step == self.reported {
             return;
         }
-        self.said = step;
+        self.reported = step;
         if let Some(bar) = &self.bar {
             bar.set_length(total as u64);
             bar.set_position(done as u64);

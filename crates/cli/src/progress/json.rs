@@ -91,7 +91,7 @@ fn event_to_json(event: &Event) -> Option<Value> {
         Event::Checkpoint { news, .. } => checkpoint_to_json(news),
         Event::WriteFailed { message, .. } => json!({ "event": "write_failed", "message": message }),
         Event::Failed { failure, .. } => failure_to_json(failure),
-        Event::Cancelled { .. } => json!({ "event": "cancelled" }),
+        Event::Canceled { .. } => json!({ "event": "cancelled" }),
         Event::Started { .. }
         | Event::Files { .. }
         | Event::Warnings { .. }

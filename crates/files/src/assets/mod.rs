@@ -11,7 +11,7 @@ mod read;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use crate::control::{CancelToken, Cancelled};
+use crate::control::{CancelToken, Canceled};
 use crate::geometry::mesh::TriangleMesh;
 use crate::system::file::FileStamp;
 use crate::system::{RAISE_FILE_LIMIT, describe_error, is_too_many_open_files};
@@ -22,8 +22,8 @@ pub use file_material::{FileLine, FileMaterial, FileMaterialKind, FileTexture, P
 /// formats and unreadable files.
 ///
 /// # Errors
-/// Returns [`Cancelled`] if the token is canceled.
-pub fn referenced_files(path: &Path, token: &CancelToken) -> Result<Vec<PathBuf>, Cancelled> {
+/// Returns [`Canceled`] if the token is canceled.
+pub fn referenced_files(path: &Path, token: &CancelToken) -> Result<Vec<PathBuf>, Canceled> {
     if gltf::is_gltf(path) {
         gltf::referenced_files(path, token)
     } else {
@@ -67,8 +67,8 @@ pub enum AssetError {
         path: PathBuf,
     },
     /// The work was canceled.
-    #[error("cancelled")]
-    Cancelled(#[from] Cancelled),
+    #[error("canceled")]
+    Canceled(#[from] Canceled),
 }
 
 impl AssetError {

@@ -20,10 +20,10 @@ use std::path::Path;
 
 use super::{AssetError, FileHash, GkitOrbiterCamera, read};
 use crate::control::{CancelToken, ignore_progress};
-use crate::math::limits::{LARGEST, SHORTEST, is_nonzero_but_too_short};
+use crate::math::limits::{MAX_MAGNITUDE, MIN_LENGTH, is_nonzero_but_too_short};
 
 /// Maximum size of an orbiter file.
-const LIMIT: u64 = 1 << 20;
+const MAX_FILE_BYTES: u64 = 1 << 20;
 
 /// gKit's default field of view and image size, for old files without an `f` line.
 const DEFAULT_FIELD: [f64; 3] = [45.0, 1024.0, 640.0];
@@ -36,7 +36,8 @@ const DEFAULT_FIELD: [f64; 3] = [45.0, 1024.0, 640.0];
 /// of values is wrong, or a value is not finite or out of range.
 pub fn load(path: &Path) -> Result<(GkitOrbiterCamera, FileHash), AssetError> {
     let token = CancelToken::new();
-    let bytes = read::read_text(path, LIMIT, read::Monitor { progress: &ignore_progress, token: &token })?;
+    let bytes =
+        read::read_text(path, MAX_FILE_BYTES, read::Monitor { progress: &ignore_progress, token: &token })?;
     Ok((parse_orbiter_camera(path, &String::from_utf8_lossy(&bytes))?, read::hash_bytes(&bytes)))
 }
 
@@ -87,11 +88,11 @@ fn wrong_number_count_message(letter: &str, count: usize) -> String {
 }
 
 fn number_too_large_message(letter: &str, number: f64) -> String {
-    format!("numbers after `{letter}` must be below {LARGEST:e} in magnitude, not {number:e}")
+    format!("numbers after `{letter}` must be below {MAX_MAGNITUDE:e} in magnitude, not {number:e}")
 }
 
 fn distance_below_minimum_message(size: f64) -> String {
-    format!("the distance in `s` must be above {SHORTEST:e}, not {size:e}")
+    format!("the distance in `s` must be above {MIN_LENGTH:e}, not {size:e}")
 }
 
 fn distance_not_positive_message(size: f64) -> String {
@@ -114,7 +115,7 @@ fn parse_numbers<'a, const N: usize>(
         words.map(|word| word.parse().ok().filter(|n: &f64| n.is_finite())).collect();
     let exact: Option<[f64; N]> = found.and_then(|found| found.try_into().ok());
     let numbers = exact.ok_or_else(|| wrong_number_count_message(letter, N))?;
-    match numbers.iter().find(|number| number.abs() > LARGEST) {
+    match numbers.iter().find(|number| number.abs() > MAX_MAGNITUDE) {
         Some(number) => Err(number_too_large_message(letter, *number)),
         None => Ok(numbers),
     }

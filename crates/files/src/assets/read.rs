@@ -5,12 +5,12 @@ use std::io::{Read, Seek};
 use std::path::Path;
 
 use super::{AssetError, FileHash};
-use crate::control::{CancelToken, Cancelled, Progress};
+use crate::control::{CancelToken, Canceled, Progress};
 use crate::system::file::{self, FileKind};
 use crate::system::memory::try_reserve_exact;
 
 /// Number of bytes between polls of the cancel token.
-const CHUNK: usize = 1 << 20;
+const BYTES_PER_POLL: usize = 1 << 20;
 
 /// Error message for Git LFS pointers.
 const LFS_POINTER: &str = "it is a Git LFS pointer, not the file's content; run `git lfs pull`";
@@ -33,7 +33,7 @@ pub(crate) struct Monitor<'a> {
 
 impl Monitor<'_> {
     /// Reports progress, then polls the token.
-    pub(crate) fn report_and_check_cancel(&self, done: usize, total: usize) -> Result<(), Cancelled> {
+    pub(crate) fn report_and_check_cancel(&self, done: usize, total: usize) -> Result<(), Canceled> {
         (self.progress)(done as u64, total as u64);
         self.token.check_pause_and_cancel()
     }
@@ -66,9 +66,9 @@ pub(crate) fn open_regular_with_limit(path: &Path, limit: u64) -> Result<(File, 
 }
 
 /// Number of bytes to check for binary data at the start of a file.
-const START: usize = 1 << 12;
+const CHECKED_BYTES: usize = 1 << 12;
 
-/// Reads a text file. Rejects binary files based on their first [`START`] bytes.
+/// Reads a text file. Rejects binary files based on their first [`CHECKED_BYTES`] bytes.
 pub(crate) fn read_text(path: &Path, limit: u64, monitor: Monitor<'_>) -> Result<Vec<u8>, AssetError> {
     read_if_start_accepted(path, limit, monitor, |start| {
         reject_utf16(path, start)?;
@@ -89,7 +89,7 @@ pub(crate) fn read_unless_zeros_in_magic(
     })
 }
 
-/// Reads a text or binary file. Rejects files whose first [`START`] bytes are all zero.
+/// Reads a text or binary file. Rejects files whose first [`CHECKED_BYTES`] bytes are all zero.
 pub(crate) fn read_unless_zeros_at_start(
     path: &Path,
     limit: u64,
@@ -128,8 +128,8 @@ fn is_utf16(start: &[u8]) -> bool {
     }
 }
 
-/// Reads a regular file unless `accept` rejects its first [`START`] bytes. Reports progress in bytes out of
-/// `2·length`; the second half is reserved for parsing.
+/// Reads a regular file unless `accept` rejects its first [`CHECKED_BYTES`] bytes. Reports progress in bytes
+/// out of `2·length`; the second half is reserved for parsing.
 fn read_if_start_accepted(
     path: &Path,
     limit: u64,
@@ -139,7 +139,7 @@ fn read_if_start_accepted(
     let (mut file, length) = open_regular_with_limit(path, limit)?;
     let unreadable = |error: std::io::Error| AssetError::from_io(path, &error);
     let mut start = Vec::new();
-    (&mut file).take(START as u64).read_to_end(&mut start).map_err(unreadable)?;
+    (&mut file).take(CHECKED_BYTES as u64).read_to_end(&mut start).map_err(unreadable)?;
     accept(&start)?;
     file.rewind().map_err(unreadable)?;
     read_rest(path, file, length, limit, monitor)
@@ -161,7 +161,7 @@ pub(crate) fn read_rest(
     try_reserve_exact(&mut bytes, length + 1).map_err(out_of_memory)?;
     loop {
         monitor.report_and_check_cancel(bytes.len().min(length), 2 * length)?;
-        let got = (&mut file).take(CHUNK as u64).read_to_end(&mut bytes).map_err(unreadable)?;
+        let got = (&mut file).take(BYTES_PER_POLL as u64).read_to_end(&mut bytes).map_err(unreadable)?;
         if got == 0 {
             return Ok(bytes);
         }
@@ -279,22 +279,22 @@ mod tests {
     }
 
     #[test]
-    fn reading_reports_progress_and_can_be_cancelled() {
+    fn reading_reports_progress_and_can_be_canceled() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("some");
-        fs::write(&path, vec![7; 3 * CHUNK]).expect("written");
+        fs::write(&path, vec![7; 3 * BYTES_PER_POLL]).expect("written");
         let seen = Mutex::new(Vec::new());
         let token = CancelToken::new();
         let note = |done, total| {
             seen.lock().expect("no panic").push((done, total));
-            if done >= 2 * CHUNK as u64 {
+            if done >= 2 * BYTES_PER_POLL as u64 {
                 token.cancel();
             }
         };
         let result = read_bytes(&path, u64::MAX, Monitor { progress: &note, token: &token });
-        assert!(matches!(result, Err(AssetError::Cancelled(_))));
-        let total = 6 * CHUNK as u64;
-        let expected: Vec<_> = (0..3).map(|chunk| (chunk * CHUNK as u64, total)).collect();
+        assert!(matches!(result, Err(AssetError::Canceled(_))));
+        let total = 6 * BYTES_PER_POLL as u64;
+        let expected: Vec<_> = (0..3).map(|chunk| (chunk * BYTES_PER_POLL as u64, total)).collect();
         assert_eq!(*seen.lock().expect("no panic"), expected);
     }
 }

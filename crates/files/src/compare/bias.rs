@@ -37,14 +37,14 @@ mod tests {
     use std::path::Path;
 
     use super::*;
-    use crate::compare::{Pair, measure};
+    use crate::compare::{ImagePair, measure};
     use crate::film::RadianceImage;
     use crate::math::Vec3;
 
     fn errors(a: f32, b: f32) -> ErrorMetrics {
         let image =
             |value| RadianceImage { width: 2, height: 1, pixels: vec![Vec3::ZERO, Vec3::splat(value)] };
-        measure(&Pair::new([Path::new("a"), Path::new("b")], image(a), image(b)).expect("a pair")).errors
+        measure(&ImagePair::new([Path::new("a"), Path::new("b")], image(a), image(b)).expect("a pair")).errors
     }
 
     #[test]

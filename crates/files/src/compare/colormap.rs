@@ -7,14 +7,14 @@ use crate::math::Vec3;
 /// Returns the linear Rec. 709 color for a value in [0, 1]. CIE lightness is proportional to the value, the
 /// Oklab hue (B. Ottosson, 2020) makes half a turn, and chroma peaks in the middle.
 pub(super) fn error_color(value: f64) -> Vec3 {
-    const LIGHTEST: f64 = 95.0;
+    const MAX_LIGHTNESS: f64 = 95.0;
     const CHROMA: f64 = 0.19;
-    const PALEST: f64 = 0.07;
+    const MIN_CHROMA: f64 = 0.07;
     let value = value.clamp(0.0, 1.0);
     let turn = 0.79 + 0.5 * value;
-    let chroma = CHROMA * 4.0 * value * (1.0 - value) + PALEST * value * value;
+    let chroma = CHROMA * 4.0 * value * (1.0 - value) + MIN_CHROMA * value * value;
     let (a, b) = (chroma * libm::cos(TAU * turn), chroma * libm::sin(TAU * turn));
-    from_oklab(libm::cbrt(luminance_from_cie_lightness(LIGHTEST * value)), a, b)
+    from_oklab(libm::cbrt(luminance_from_cie_lightness(MAX_LIGHTNESS * value)), a, b)
 }
 
 /// Converts a CIE lightness in [0, 100] to relative luminance.

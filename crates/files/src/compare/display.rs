@@ -8,7 +8,7 @@
 use rayon::prelude::*;
 
 use super::plane::{Plane, normalized_taps, unnormalized_gaussian_taps};
-use super::{Pair, tiles};
+use super::{ImagePair, tiles};
 use crate::film::Rect;
 use crate::math::Vec3;
 use crate::math::color::linear_to_srgb_f64;
@@ -42,7 +42,7 @@ impl DisplayErrorSums {
     }
 }
 
-pub(super) fn measure(pair: &Pair) -> DisplayErrors {
+pub(super) fn measure(pair: &ImagePair) -> DisplayErrors {
     let (width, height) = (pair.width(), pair.height());
     let window = normalized_taps(&unnormalized_gaussian_taps(SIGMA, RADIUS));
     let band_sums = |band| {
@@ -55,7 +55,7 @@ pub(super) fn measure(pair: &Pair) -> DisplayErrors {
     DisplayErrors { psnr_db: -10.0 * libm::log10(mean_square), ssim: sums.ssim / sums.windows as f64 }
 }
 
-fn tile_sums(pair: &Pair, tile: Rect, window: &[f64]) -> DisplayErrorSums {
+fn tile_sums(pair: &ImagePair, tile: Rect, window: &[f64]) -> DisplayErrorSums {
     let (square, [a, b]) = tile_lumas_and_squared_error(pair, tile);
     let mean = |plane: &Plane| plane.filtered(window, window);
     let (mean_a, mean_b) = (mean(&a), mean(&b));
@@ -83,7 +83,7 @@ fn ssim_from_moments([a, b]: [f64; 2], [aa, bb]: [f64; 2], ab: f64) -> f64 {
 
 /// Returns the tile's sum of squared differences over all channels, and the luma plane of each image. The
 /// planes cover the tile and a margin of [`RADIUS`] pixels on each side. Outside the image, luma is 0.
-fn tile_lumas_and_squared_error(pair: &Pair, tile: Rect) -> (f64, [Plane; 2]) {
+fn tile_lumas_and_squared_error(pair: &ImagePair, tile: Rect) -> (f64, [Plane; 2]) {
     let side = |length: u32| length as usize + 2 * RADIUS;
     let mut lumas =
         [Plane::zero(side(tile.width), side(tile.height)), Plane::zero(side(tile.width), side(tile.height))];

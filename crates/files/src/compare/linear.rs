@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::Pair;
+use super::ImagePair;
 use crate::math::color::{LUMINANCE_WEIGHTS, RELMSE_EPSILON};
 use crate::math::{DVec2, Vec3};
 
@@ -31,7 +31,7 @@ struct LinearErrorSums {
     luminances: DVec2,
 }
 
-pub(super) fn measure(pair: &Pair) -> LinearErrors {
+pub(super) fn measure(pair: &ImagePair) -> LinearErrors {
     let pixels = pair.measured_image().pixels.len();
     let rows = map_rows(pair, row_error_sums);
     let sums = rows.into_iter().enumerate().fold(LinearErrorSums::default(), |sums, (y, row)| {
@@ -59,7 +59,7 @@ pub(super) fn measure(pair: &Pair) -> LinearErrors {
 }
 
 /// Applies `row` to each row and returns the results in order.
-fn map_rows<T: Send>(pair: &Pair, row: impl Fn(&[Vec3], &[Vec3]) -> T + Sync) -> Vec<T> {
+fn map_rows<T: Send>(pair: &ImagePair, row: impl Fn(&[Vec3], &[Vec3]) -> T + Sync) -> Vec<T> {
     let a = pair.measured_image().pixels.par_chunks(pair.width());
     a.zip(pair.reference().pixels.par_chunks(pair.width())).map(|(a, b)| row(a, b)).collect()
 }
@@ -87,20 +87,20 @@ fn relative_squared_error(a: Vec3, b: Vec3) -> f64 {
 }
 
 /// Mean of [`relative_squared_error`], excluding the largest values.
-fn trimmed_relmse(pair: &Pair, dropped: usize) -> f64 {
+fn trimmed_relmse(pair: &ImagePair, dropped: usize) -> f64 {
     let pixels = pair.measured_image().pixels.par_iter().zip(&pair.reference().pixels);
     let mut errors: Vec<f64> = pixels.map(|(&a, &b)| relative_squared_error(a, b)).collect();
     let kept = errors.len() - dropped;
-    let (_, &mut least_dropped, _) = errors.select_nth_unstable_by(kept, f64::total_cmp);
+    let (_, &mut min_dropped, _) = errors.select_nth_unstable_by(kept, f64::total_cmp);
     drop(errors);
     let rows = map_rows(pair, |a, b| {
         let errors = a.iter().zip(b).map(|(&a, &b)| relative_squared_error(a, b));
         errors
-            .filter(|error| *error < least_dropped)
+            .filter(|error| *error < min_dropped)
             .fold((0.0, 0), |(sum, count), error| (sum + error, count + 1))
     });
     let (sum, count) =
         rows.into_iter().fold((0.0, 0_usize), |all, row: (f64, usize)| (all.0 + row.0, all.1 + row.1));
     // Several values may equal the smallest dropped value. Count as many of them as are kept.
-    (sum + (kept - count) as f64 * least_dropped) / kept as f64
+    (sum + (kept - count) as f64 * min_dropped) / kept as f64
 }

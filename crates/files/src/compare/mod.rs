@@ -18,7 +18,7 @@ mod two_references;
 pub use bias::Bias;
 pub use diff::{absolute_difference, flip_heat_map};
 pub use flip::PIXELS_PER_DEGREE;
-pub use pair::{CompareError, Pair};
+pub use pair::{CompareError, ImagePair};
 pub use two_references::IndependentReferences;
 
 /// Errors of the first image in a pair, measured against the second. Means are over pixels and channels.
@@ -56,7 +56,7 @@ pub struct PairMeasurements {
 }
 
 /// Computes all error metrics of a pair.
-pub fn measure(pair: &Pair) -> PairMeasurements {
+pub fn measure(pair: &ImagePair) -> PairMeasurements {
     let linear = linear::measure(pair);
     let display = display::measure(pair);
     let flip = flip::error_map(pair);

@@ -47,13 +47,13 @@ pub enum CompareError {
 
 /// Two nonempty images of the same size with only finite values.
 #[derive(Clone, Debug)]
-pub struct Pair {
+pub struct ImagePair {
     a: RadianceImage,
     b: RadianceImage,
     warnings: Vec<String>,
 }
 
-impl Pair {
+impl ImagePair {
     /// Checks an image and its reference, and creates a pair. The names are used in messages.
     ///
     /// # Errors

@@ -11,8 +11,8 @@ fn image(width: u32, height: u32, value: impl Fn(u32, u32, u32) -> f32) -> Radia
     RadianceImage { width, height, pixels }
 }
 
-fn pair(a: RadianceImage, b: RadianceImage) -> Pair {
-    Pair::new([Path::new("a"), Path::new("b")], a, b).expect("a pair")
+fn pair(a: RadianceImage, b: RadianceImage) -> ImagePair {
+    ImagePair::new([Path::new("a"), Path::new("b")], a, b).expect("a pair")
 }
 
 fn errors(a: &RadianceImage, b: &RadianceImage) -> ErrorMetrics {
@@ -32,7 +32,7 @@ fn warnings_about_the_files_are_returned() {
         let mut writer = encoder.write_header().expect("a header");
         (0..frames).for_each(|_| writer.write_image_data(&[9]).expect("written"));
     }
-    let warnings = |a: &Path, b: &Path| Pair::load(a, b).expect("a pair").warnings().to_vec();
+    let warnings = |a: &Path, b: &Path| ImagePair::load(a, b).expect("a pair").warnings().to_vec();
     assert!(warnings(&plain, &plain).is_empty());
     for (a, b) in [(&plain, &animated), (&animated, &plain), (&animated, &animated)] {
         let found = warnings(a, b);
@@ -260,7 +260,7 @@ fn results_do_not_depend_on_thread_count() {
 #[test]
 fn incomparable_images_are_rejected() {
     let rejected = |a: RadianceImage, b: RadianceImage| {
-        Pair::new([Path::new("a.exr"), Path::new("b.exr")], a, b).expect_err("no pair")
+        ImagePair::new([Path::new("a.exr"), Path::new("b.exr")], a, b).expect_err("no pair")
     };
     let gray = |width, height| image(width, height, |_, _, _| 0.5);
     let errors = rejected(gray(4, 3), gray(3, 4));

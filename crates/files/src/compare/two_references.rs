@@ -2,7 +2,7 @@
 //! the two references is independent, (x − r₁)(x − r₂) and (x − truth)² have the same expected value, so the
 //! references' noise does not bias the error.
 
-use super::Pair;
+use super::ImagePair;
 use crate::film::RadianceImage;
 use crate::math::color::{LUMINANCE_WEIGHTS, RELMSE_EPSILON};
 use crate::math::{DVec3, Vec3};
@@ -14,14 +14,14 @@ fn luminance(color: DVec3) -> f64 {
 /// Two independently rendered references for the same image.
 #[derive(Clone, Debug)]
 pub struct IndependentReferences {
-    pair: Pair,
+    pair: ImagePair,
     /// 1/(r² + 0.01), divided by the number of channels and pixels, where r is the mean of the references.
     weights: Vec<DVec3>,
 }
 
 impl IndependentReferences {
     /// Creates references from a pair of images.
-    pub fn new(pair: Pair) -> Self {
+    pub fn new(pair: ImagePair) -> Self {
         let values = 3.0 * pair.measured_image().pixels.len() as f64;
         let weight = |(a, b): (&Vec3, &Vec3)| {
             let mean = (a.as_dvec3() + b.as_dvec3()) / 2.0;
@@ -32,7 +32,7 @@ impl IndependentReferences {
     }
 
     /// The two references.
-    pub fn reference_pair(&self) -> &Pair {
+    pub fn reference_pair(&self) -> &ImagePair {
         &self.pair
     }
 
@@ -127,7 +127,7 @@ mod tests {
     fn references(noise: f32) -> IndependentReferences {
         let names = [Path::new("r1"), Path::new("r2")];
         IndependentReferences::new(
-            Pair::new(names, test_image(1, noise, 0.0), test_image(2, noise, 0.0)).expect("a pair"),
+            ImagePair::new(names, test_image(1, noise, 0.0), test_image(2, noise, 0.0)).expect("a pair"),
         )
     }
 
@@ -159,7 +159,8 @@ mod tests {
         assert!((error - truth).abs() < 4.0 * uncertainty, "got {error} ± {uncertainty}, expected {truth}");
         assert!(uncertainty < 0.05 * noise, "{uncertainty}");
         let plain = super::super::linear::measure(
-            &Pair::new([Path::new("x"), Path::new("r")], tested, test_image(1, 0.05, 0.0)).expect("a pair"),
+            &ImagePair::new([Path::new("x"), Path::new("r")], tested, test_image(1, 0.05, 0.0))
+                .expect("a pair"),
         );
         assert!(plain.relmse > 20.0 * truth, "error with a single reference: {}", plain.relmse);
     }

@@ -15,7 +15,8 @@ use super::flags::Flags;
 /// POSIX.1e access control list, as stored by Linux (acl(5)).
 const ACCESS_LIST: &str = "system.posix_acl_access";
 /// Attributes that describe the old content or are managed by the system.
-const EXCLUDED: [&str; 4] = ["security.capability", "security.evm", "security.ima", "com.apple.provenance"];
+const EXCLUDED_ATTRIBUTES: [&str; 4] =
+    ["security.capability", "security.evm", "security.ima", "com.apple.provenance"];
 
 /// Permission bits for the owner.
 const OWNER_BITS: u32 = 0o700;
@@ -175,7 +176,7 @@ impl UncopiedAttributes {
 
 /// Reads a file's extended attributes. Returns an empty list if the file system does not support them.
 fn extended_attributes(path: &Path) -> Vec<(OsString, io::Result<Vec<u8>>)> {
-    let is_carried = |name: &OsString| !EXCLUDED.iter().any(|known| name == known);
+    let is_carried = |name: &OsString| !EXCLUDED_ATTRIBUTES.iter().any(|known| name == known);
     let value = |name: OsString| match xattr::get_deref(path, &name) {
         Ok(None) => None,
         Ok(Some(value)) => Some((name, Ok(value))),

@@ -54,7 +54,7 @@ impl FilmEncodingSettings {
         // Add the metadata derived from the film: the number of samples and, at the end, the range.
         let mut metadata = self.metadata_with_samples(film.sample_count_stats());
         let range = tone.range_map.range();
-        let range = range.map(|range| format!("{} to {}", range.least, range.greatest));
+        let range = range.map(|range| format!("{} to {}", range.min, range.max));
         metadata.extend(range.map(|range| ("glimt:range".to_owned(), range)));
         let mean_luminance_error = if self.is_light { film.mean_luminance_error() } else { None };
         let options = EncodeOptions { tone, bit_depth: self.bit_depth, metadata, mean_luminance_error };

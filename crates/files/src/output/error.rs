@@ -54,14 +54,14 @@ pub enum OutputError {
         why: String,
     },
     /// The target cannot be written.
-    #[error("cannot write {}: {why}; {way_out}", path.display())]
+    #[error("cannot write {}: {why}; {advice}", path.display())]
     Target {
         /// The path as specified by the user.
         path: PathBuf,
         /// The reason.
         why: String,
         /// Advice for the user.
-        way_out: &'static str,
+        advice: &'static str,
     },
     /// Replacing the existing file is not allowed.
     #[error("{reason}")]
@@ -70,8 +70,8 @@ pub enum OutputError {
         reason: String,
     },
     /// The work was canceled.
-    #[error("cancelled")]
-    Cancelled(#[from] crate::control::Cancelled),
+    #[error("canceled")]
+    Canceled(#[from] crate::control::Canceled),
     /// The operating system reported an error.
     #[error("cannot write {}: {}; {}", path.display(), describe_error(source), write_error_advice(source))]
     File {

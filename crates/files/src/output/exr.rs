@@ -20,7 +20,7 @@ use flate2::Compression;
 use flate2::write::ZlibEncoder;
 use rayon::prelude::*;
 
-use super::cancellable::CancellableBuffer;
+use super::cancelable::CancelableBuffer;
 use super::{EncodeOptions, Format, LayerImage, OutputError, SOFTWARE, one_line, replace_non_finite};
 use crate::control::CancelToken;
 use crate::film::RadianceImage;
@@ -55,7 +55,7 @@ pub(super) fn encode(
         .with_encoding(Encoding::ZIP16, BlockDescription::ScanLines, LineOrder::Increasing)
         .with_attributes(attributes(options))
         .with_shared_attributes(shared);
-    let mut bytes = CancellableBuffer::new(token);
+    let mut bytes = CancelableBuffer::new(token);
     ::exr::block::write(&mut bytes, [header].into_iter().collect(), true, |meta, file| {
         write_blocks(meta.enumerate_ordered_header_block_indices(), &channels, file)
     })

@@ -8,10 +8,10 @@ use crate::math::Vec3;
 
 /// Widths of scanlines that may be compressed. Scanlines of other widths must not be compressed.
 const COMPRESSED_WIDTHS: std::ops::Range<usize> = 8..32768;
-const LONGEST_RUN: usize = 127;
-const LONGEST_LITERAL: usize = 128;
+const MAX_RUN: usize = 127;
+const MAX_LITERAL: usize = 128;
 /// Minimum length of a run. Shorter runs would not save space compared with literals.
-const SHORTEST_RUN: usize = 4;
+const MIN_RUN: usize = 4;
 
 pub(super) fn encode(
     image: &RadianceImage,
@@ -67,16 +67,16 @@ fn rgbe(color: Vec3) -> [u8; 4] {
 fn run_length_encode(mut plane: &[u8], bytes: &mut Vec<u8>) {
     let run_length = |plane: &[u8]| {
         let same = plane.iter().take_while(|&&byte| byte == plane[0]).count();
-        same.min(LONGEST_RUN)
+        same.min(MAX_RUN)
     };
     while !plane.is_empty() {
         let run = run_length(plane);
-        let taken = if run >= SHORTEST_RUN {
+        let taken = if run >= MIN_RUN {
             bytes.extend([128 + run as u8, plane[0]]);
             run
         } else {
-            let longest = plane.len().min(LONGEST_LITERAL);
-            let literal = (1..longest).find(|&i| run_length(&plane[i..]) >= SHORTEST_RUN).unwrap_or(longest);
+            let longest = plane.len().min(MAX_LITERAL);
+            let literal = (1..longest).find(|&i| run_length(&plane[i..]) >= MIN_RUN).unwrap_or(longest);
             bytes.push(literal as u8);
             bytes.extend_from_slice(&plane[..literal]);
             literal

@@ -3,7 +3,7 @@
 use image::ExtendedColorType;
 use image::codecs::jpeg::JpegEncoder;
 
-use super::cancellable::{self, CancellableBuffer};
+use super::cancelable::{self, CancelableBuffer};
 use super::{EncodeOptions, Format, OutputError, SOFTWARE, one_line};
 use crate::control::CancelToken;
 use crate::film::RadianceImage;
@@ -17,8 +17,8 @@ pub(super) fn encode(
     options: &EncodeOptions,
     token: &CancelToken,
 ) -> Result<Vec<u8>, OutputError> {
-    let pixels = cancellable::tone_map_all(image, options, Format::Jpeg, token)?;
-    let mut bytes = CancellableBuffer::new(token);
+    let pixels = cancelable::tone_map_all(image, options, Format::Jpeg, token)?;
+    let mut bytes = CancelableBuffer::new(token);
     JpegEncoder::new_with_quality(&mut bytes, QUALITY)
         .encode(&pixels, image.width, image.height, ExtendedColorType::Rgb8)
         .map_err(|error| OutputError::encoder(Format::Jpeg, &error))?;

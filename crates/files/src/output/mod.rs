@@ -6,7 +6,7 @@
 
 pub mod animation;
 mod attributes;
-mod cancellable;
+mod cancelable;
 mod develop;
 mod error;
 mod exr;
@@ -83,7 +83,7 @@ pub struct EncodeOptions {
 ///
 /// # Errors
 /// The format does not support this size or bit depth, the encoder fails, or the work is canceled
-/// ([`OutputError::Cancelled`]).
+/// ([`OutputError::Canceled`]).
 pub fn encode(
     image: &RadianceImage,
     options: &EncodeOptions,

@@ -4,7 +4,7 @@ use std::io::Write;
 
 use ::png::{ColorType, Encoder, EncodingError, SrgbRenderingIntent};
 
-use super::{BitDepth, EncodeOptions, Format, OutputError, SOFTWARE, cancellable};
+use super::{BitDepth, EncodeOptions, Format, OutputError, SOFTWARE, cancelable};
 use crate::control::CancelToken;
 use crate::film::RadianceImage;
 
@@ -40,7 +40,7 @@ fn try_encode(
     }
     let mut writer = encoder.write_header()?;
     let mut data = writer.stream_writer_with_size(CHUNK_BYTES)?;
-    cancellable::for_each_tone_mapped_part(image, options, token, |part| data.write_all(part))?;
+    cancelable::for_each_tone_mapped_part(image, options, token, |part| data.write_all(part))?;
     data.finish()?;
     writer.finish()?;
     Ok(bytes)

@@ -1,6 +1,6 @@
 //! Binary PPM (P6): 8-bit or 16-bit sRGB.
 
-use super::{BitDepth, EncodeOptions, Format, OutputError, SOFTWARE, cancellable, one_line};
+use super::{BitDepth, EncodeOptions, Format, OutputError, SOFTWARE, cancelable, one_line};
 use crate::control::CancelToken;
 use crate::film::RadianceImage;
 
@@ -23,7 +23,7 @@ pub(super) fn encode(
         bytes.extend_from_slice(part);
         Ok(())
     };
-    let written = cancellable::for_each_tone_mapped_part(image, options, token, take);
+    let written = cancelable::for_each_tone_mapped_part(image, options, token, take);
     written.map_err(|error| OutputError::encoder(Format::Ppm, &error))?;
     Ok(bytes)
 }

@@ -131,7 +131,7 @@ mod tests {
         fs::write(&old, "old").expect("written");
         symlink(&old, &link).expect("a link");
         let of_directory = format!("the directory {}", directory.display());
-        for (flagged, called, flag, words, way_out) in [
+        for (flagged, called, flag, words, advice) in [
             (&old, "it", IFlags::APPEND, "append-only (chattr +a)", "(chattr -a)"),
             (&old, "it", IFlags::IMMUTABLE, "immutable (chattr +i)", "(chattr -i)"),
             (&directory, &*of_directory, IFlags::APPEND, "append-only (chattr +a)", "(chattr -a)"),
@@ -141,7 +141,7 @@ mod tests {
             let targets = if flagged == &old { vec![&old, &link] } else { vec![&old, &link, &new] };
             for path in targets {
                 let expected = format!(
-                    "cannot write {}: {called} is {words}; remove the flag {way_out} or choose another location",
+                    "cannot write {}: {called} is {words}; remove the flag {advice} or choose another location",
                     path.display()
                 );
                 assert_eq!(refused(path), expected);

@@ -14,7 +14,7 @@ use super::protection::{self, ProtectionFlag};
 use super::{OutputError, temporary};
 
 /// Maximum number of links to follow, as in Linux.
-const LINKS: usize = 40;
+const MAX_LINKS: usize = 40;
 
 /// Destination for the bytes written to a path.
 #[derive(Debug)]
@@ -62,7 +62,7 @@ pub(super) fn check_writable(path: &Path) -> Result<(), OutputError> {
                 ErrorKind::NotFound if directory.is_dir() => OutputError::Target {
                     path: path.to_owned(),
                     why: format!("files cannot be created in the directory {}", directory.display()),
-                    way_out: "choose another location",
+                    advice: "choose another location",
                 },
                 _ => OutputError::file(path, error),
             })
@@ -75,7 +75,7 @@ pub(super) fn check_writable(path: &Path) -> Result<(), OutputError> {
 /// /dev/stdout) are not followed, because an open descriptor may have no path.
 pub(super) fn follow_links(path: &Path) -> io::Result<(PathBuf, Option<Metadata>)> {
     let mut target = path.to_owned();
-    for _ in 0..LINKS {
+    for _ in 0..MAX_LINKS {
         let metadata = match fs::symlink_metadata(&target) {
             Ok(metadata) => metadata,
             Err(error) if error.kind() == ErrorKind::NotFound => return Ok((target, None)),
@@ -106,7 +106,7 @@ fn checked_target_for_existing(
     if kind.is_block_device() || kind.is_socket() {
         let what = if kind.is_socket() { "a socket" } else { "a block device" };
         let why = format!("it is {what}");
-        return Err(OutputError::Target { path: path.to_owned(), why, way_out: "name a file" });
+        return Err(OutputError::Target { path: path.to_owned(), why, advice: "name a file" });
     }
     if !kind.is_file() {
         check_access(path, &target, AccessFlags::W_OK)?;
@@ -124,7 +124,7 @@ fn checked_target_for_existing(
             why: format!(
                 "it belongs to another user, and in the sticky directory {directory} only its owner may replace it"
             ),
-            way_out: "choose another name or location",
+            advice: "choose another name or location",
         });
     }
     Ok(WriteTarget::File(TargetFile { path: target, existing: Some(metadata) }))
@@ -141,7 +141,7 @@ fn check_directory_is_writable(path: &Path, directory: &Path) -> Result<Metadata
         Err(error) if error.kind() == ErrorKind::NotFound => Err(OutputError::Target {
             path: path.to_owned(),
             why: format!("the directory {} does not exist", directory.display()),
-            way_out: "create it or choose another location",
+            advice: "create it or choose another location",
         }),
         Err(error) => Err(OutputError::file(path, error)),
     }
@@ -152,7 +152,7 @@ fn check_directory_is_writable(path: &Path, directory: &Path) -> Result<Metadata
 fn check_flags(path: &Path, name: &str, what: &Path) -> Result<(), OutputError> {
     let Some(flag) = ProtectionFlag::from_path(what) else { return Ok(()) };
     let why = format!("{name} is {}", flag.description());
-    Err(OutputError::Target { path: path.to_owned(), why, way_out: flag.removal_advice() })
+    Err(OutputError::Target { path: path.to_owned(), why, advice: flag.removal_advice() })
 }
 
 fn check_access(path: &Path, what: &Path, how: AccessFlags) -> Result<(), OutputError> {
@@ -161,7 +161,7 @@ fn check_access(path: &Path, what: &Path, how: AccessFlags) -> Result<(), Output
 
 fn target_is_directory_error(path: &Path) -> OutputError {
     let why = "it is a directory".to_owned();
-    OutputError::Target { path: path.to_owned(), why, way_out: "specify a file in it" }
+    OutputError::Target { path: path.to_owned(), why, advice: "specify a file in it" }
 }
 
 /// Directory of a path, or the working directory for a bare file name.

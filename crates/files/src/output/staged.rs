@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use super::move_new::rename_no_replace;
 use super::temporary::{ATTEMPTS, next_temporary_name, remove_stale_folders};
-use super::{OutputError, cancellable};
+use super::{OutputError, cancelable};
 use crate::control::CancelToken;
 use crate::system::folder::remove_folder_and_contents;
 
@@ -35,7 +35,7 @@ pub fn create_files_atomically(
     remove_stale_folders(here);
     let hidden = StagingFolder::create(here, last.as_os_str()).map_err(at(last))?;
     for (name, bytes) in files {
-        cancellable::write_error_or_cancelled(hidden.write(name, bytes, token), at(name))?;
+        cancelable::write_error_or_canceled(hidden.write(name, bytes, token), at(name))?;
     }
     // Move the files to their destinations. If a destination exists, undo all moves.
     let mut placed: Vec<&OsStr> = Vec::new();
@@ -93,7 +93,7 @@ impl StagingFolder {
             fs::create_dir_all(parent)?;
         }
         let file = File::create_new(&path)?;
-        cancellable::write_all(&file, bytes, token)?;
+        cancelable::write_all(&file, bytes, token)?;
         file.sync_all()
     }
 }
@@ -147,7 +147,7 @@ mod tests {
         fs::remove_dir(at.join("a_files")).expect("removed");
         let token = CancelToken::new();
         token.cancel();
-        assert!(matches!(create_files_atomically(at, &files, &token), Err(OutputError::Cancelled(_))));
+        assert!(matches!(create_files_atomically(at, &files, &token), Err(OutputError::Canceled(_))));
         assert_eq!(names(at), [""; 0]);
     }
 

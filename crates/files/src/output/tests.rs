@@ -323,18 +323,18 @@ const NOTHING_KEPT: write::ExistingFilePolicy<'_> = write::ExistingFilePolicy {
 };
 
 #[test]
-fn cancelled_images_are_not_encoded_or_written() {
+fn canceled_images_are_not_encoded_or_written() {
     let token = CancelToken::new();
     token.cancel();
     for format in [Format::Png, Format::Exr, Format::Hdr, Format::Jpeg, Format::Ppm, Format::WebP] {
         let stopped = super::encode(&test_image(30, 20), &options(BitDepth::Eight), format, &token);
-        assert!(matches!(stopped, Err(OutputError::Cancelled(_))), "{format}");
+        assert!(matches!(stopped, Err(OutputError::Canceled(_))), "{format}");
     }
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("a.png");
     std::fs::write(&path, "old").expect("written");
     let stopped = write::atomic_with_policy(&path, b"new", &NOTHING_KEPT, &token);
-    assert!(matches!(stopped, Err(OutputError::Cancelled(_))));
+    assert!(matches!(stopped, Err(OutputError::Canceled(_))));
     assert_eq!(std::fs::read(&path).expect("read"), b"old");
     assert_eq!(std::fs::read_dir(folder.path()).expect("a folder").count(), 1);
 }

@@ -2,7 +2,7 @@
 
 use image_webp::{ColorType, WebPEncoder};
 
-use super::cancellable::{self, CancellableBuffer};
+use super::cancelable::{self, CancelableBuffer};
 use super::{EncodeOptions, Format, OutputError, SOFTWARE, one_line};
 use crate::control::CancelToken;
 use crate::film::RadianceImage;
@@ -12,8 +12,8 @@ pub(super) fn encode(
     options: &EncodeOptions,
     token: &CancelToken,
 ) -> Result<Vec<u8>, OutputError> {
-    let pixels = cancellable::tone_map_all(image, options, Format::WebP, token)?;
-    let mut bytes = CancellableBuffer::new(token);
+    let pixels = cancelable::tone_map_all(image, options, Format::WebP, token)?;
+    let mut bytes = CancelableBuffer::new(token);
     let mut encoder = WebPEncoder::new(&mut bytes);
     encoder.set_xmp_metadata(xmp_packet(options).into_bytes());
     encoder

@@ -17,7 +17,7 @@ use nix::fcntl::{FcntlArg, OFlag, fcntl};
 use super::attributes::{FileAttributes, UncopiedAttributes};
 use super::resolve_path::{self, TargetFile, WriteTarget};
 use super::temporary::{self, TemporaryFile};
-use super::{AttributeLossPolicy, FileIdentity, OutputError, WriteWarning, cancellable, held};
+use super::{AttributeLossPolicy, FileIdentity, OutputError, WriteWarning, cancelable, held};
 use crate::control::CancelToken;
 use crate::system::describe_error;
 
@@ -86,14 +86,14 @@ impl SweptFolders {
 /// Like [`atomic`], but with a policy. Can be canceled until the new file is complete.
 ///
 /// # Errors
-/// Any error from [`atomic`] or `guard`, or [`OutputError::Cancelled`].
+/// Any error from [`atomic`] or `guard`, or [`OutputError::Canceled`].
 pub fn atomic_with_policy(
     path: &Path,
     bytes: &[u8],
     guard: &ExistingFilePolicy<'_>,
     token: &CancelToken,
 ) -> Result<(), OutputError> {
-    let content = |file: &mut dyn Write| cancellable::write_all(file, bytes, token);
+    let content = |file: &mut dyn Write| cancelable::write_all(file, bytes, token);
     atomic_generated(path, &content, guard, token, Durability::Power).map(drop)
 }
 
@@ -109,7 +109,7 @@ pub fn atomic_if_unchanged(
     guard: &ExistingFilePolicy<'_>,
     token: &CancelToken,
 ) -> Result<(), OutputError> {
-    let content = |file: &mut dyn Write| cancellable::write_all(file, bytes, token);
+    let content = |file: &mut dyn Write| cancelable::write_all(file, bytes, token);
     let (durability, expected) = (Durability::Power, Some(expected));
     write_atomically_or_in_place(path, &content, guard, token, durability, expected, &sync_directory)
         .map(drop)
@@ -162,10 +162,10 @@ pub(super) fn write_atomically_or_in_place(
                 return Err(OutputError::Target {
                     path: path.to_owned(),
                     why,
-                    way_out: "edit a copy instead",
+                    advice: "edit a copy instead",
                 });
             }
-            cancellable::write_error_or_cancelled(fill(&new, content, carried.as_ref(), durability), named)?;
+            cancelable::write_error_or_canceled(fill(&new, content, carried.as_ref(), durability), named)?;
             (guard.may_replace)(&target.path)?;
             let file = match expected {
                 None => new.rename_to(&target.path).map_err(named)?,
@@ -196,8 +196,8 @@ pub(super) fn write_atomically_or_in_place(
         WriteTarget::InPlace(device) => {
             (guard.may_replace)(&device)?;
             let mut bytes = Vec::new();
-            cancellable::write_error_or_cancelled(content(&mut bytes), named)?;
-            cancellable::write_error_or_cancelled(append_in_place(&device, &bytes, token), named)?;
+            cancelable::write_error_or_canceled(content(&mut bytes), named)?;
+            cancelable::write_error_or_canceled(append_in_place(&device, &bytes, token), named)?;
             Ok(None)
         }
     }
@@ -266,7 +266,7 @@ fn append_in_place(path: &Path, bytes: &[u8], token: &CancelToken) -> io::Result
         // Flush earlier output first. Do not hold the lock, because the reader may block.
         io::stdout().flush()?;
         let stdout = File::from(io::stdout().as_fd().try_clone_to_owned()?);
-        return cancellable::write_to_pipe(&stdout, bytes, token);
+        return cancelable::write_to_pipe(&stdout, bytes, token);
     }
     let mut options = OpenOptions::new();
     options.append(true);
@@ -284,5 +284,5 @@ fn append_in_place(path: &Path, bytes: &[u8], token: &CancelToken) -> io::Result
     if is_pipe {
         fcntl(&file, FcntlArg::F_SETFL(OFlag::O_APPEND))?;
     }
-    cancellable::write_to_pipe(&file, bytes, token)
+    cancelable::write_to_pipe(&file, bytes, token)
 }

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use crate::control::{CancelToken, Cancelled};
+use crate::control::{CancelToken, Canceled};
 use crate::geometry::Aabb;
 use crate::geometry::mesh::TriangleMesh;
 use crate::math::{DVec3, Vec3, Vec4};
@@ -78,7 +78,7 @@ impl SimdBounds {
 /// slow on some processors.
 const NORMAL: u32 = 1 << 29;
 
-const _: () = assert!(TriangleMesh::MOST_TRIANGLES < 1 << 29);
+const _: () = assert!(TriangleMesh::MAX_TRIANGLES < 1 << 29);
 
 /// A triangle id and the bounding box of the triangle clipped to a cell.
 #[derive(Clone, Copy, Debug)]
@@ -92,12 +92,12 @@ impl TriangleReference {
     /// boxes.
     ///
     /// # Errors
-    /// [`Cancelled`] if the build was canceled.
+    /// [`Canceled`] if the build was canceled.
     pub fn collect_finite(
         count: u32,
         corners: &(impl Fn(u32) -> [Vec3; 3] + Sync),
         token: &CancelToken,
-    ) -> Result<Vec<Self>, Cancelled> {
+    ) -> Result<Vec<Self>, Canceled> {
         let mut references: Vec<Self> =
             (0..count).into_par_iter().map(|id| Self::new(id, corners(id))).collect();
         token.check_pause_and_cancel()?;

@@ -24,9 +24,10 @@ impl SimdKernel for TriangleListQueryKernel<'_> {
     #[inline(always)]
     fn run(self, simd: impl Simd) -> Self::Output {
         let (rows, ends) = RayPacket::new(self.rays);
-        let (met, mut found) = (((1_u64 << self.rays.len()) - 1) as u32, HitPacket::without_hits());
-        let open = self.facets.update_decided_closest_hits(&rows, (met, &ends), &mut found, simd);
-        let [any, open_any] = self.facets.any_hit_and_undecided_masks(&rows, (met, &ends), self.except, simd);
+        let (active, mut found) = (((1_u64 << self.rays.len()) - 1) as u32, HitPacket::without_hits());
+        let open = self.facets.update_decided_closest_hits(&rows, (active, &ends), &mut found, simd);
+        let [any, open_any] =
+            self.facets.any_hit_and_undecided_masks(&rows, (active, &ends), self.except, simd);
         (found, [open, any, open_any])
     }
 }

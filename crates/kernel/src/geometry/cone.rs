@@ -280,7 +280,7 @@ fn mirror_y(p: DVec2) -> DVec2 {
 mod tests {
     use super::*;
     use crate::geometry::Ray;
-    use crate::geometry::surface_of_revolution::tests::{Thin, hits_from_afar};
+    use crate::geometry::surface_of_revolution::tests::{ThinShape, hits_from_afar};
     use crate::math::Vec3;
 
     /// A cone with its tip at y = 2 and a base of radius 1 at y = 0.
@@ -288,7 +288,7 @@ mod tests {
         Cone::new(DVec3::ZERO, DVec3::Y * 2.0, 1.0, capped)
     }
 
-    fn met(cone: &Cone, origin: [f32; 3], direction: Vec3) -> Option<(f32, u32, Vec3)> {
+    fn first_hit(cone: &Cone, origin: [f32; 3], direction: Vec3) -> Option<(f32, u32, Vec3)> {
         let ray = Ray::new(Vec3::from_array(origin), direction).to_f64();
         let hit = cone.intersect(&ray)?;
         Some((hit.t, hit.primitive, cone.surface_point_at_hit(&ray, &hit).normal))
@@ -298,14 +298,14 @@ mod tests {
     fn side_and_base_are_hit_from_both_sides() {
         let right = Vec3::new(2.0, 1.0, 0.0).normalize();
         let closed = hat(true);
-        assert_eq!(met(&closed, [9.0, 1.0, 0.0], Vec3::NEG_X), Some((8.5, 0, right)));
-        assert_eq!(met(&closed, [0.0, 1.0, 0.0], Vec3::X), Some((0.5, 0, right)));
-        assert_eq!(met(&closed, [0.5, -3.0, 0.0], Vec3::Y), Some((3.0, 1, Vec3::NEG_Y)));
-        assert_eq!(met(&closed, [0.5, 0.5, 0.0], Vec3::NEG_Y), Some((0.5, 1, Vec3::NEG_Y)));
-        assert_eq!(met(&closed, [0.5, 5.0, 0.0], Vec3::NEG_Y), Some((4.0, 0, right)));
+        assert_eq!(first_hit(&closed, [9.0, 1.0, 0.0], Vec3::NEG_X), Some((8.5, 0, right)));
+        assert_eq!(first_hit(&closed, [0.0, 1.0, 0.0], Vec3::X), Some((0.5, 0, right)));
+        assert_eq!(first_hit(&closed, [0.5, -3.0, 0.0], Vec3::Y), Some((3.0, 1, Vec3::NEG_Y)));
+        assert_eq!(first_hit(&closed, [0.5, 0.5, 0.0], Vec3::NEG_Y), Some((0.5, 1, Vec3::NEG_Y)));
+        assert_eq!(first_hit(&closed, [0.5, 5.0, 0.0], Vec3::NEG_Y), Some((4.0, 0, right)));
         // The mirrored cone beyond the tip must not be hit.
-        assert_eq!(met(&closed, [-9.0, 3.0, 0.0], Vec3::X), None);
-        assert_eq!(met(&closed, [0.5, 2.5, 0.0], Vec3::Y), None);
+        assert_eq!(first_hit(&closed, [-9.0, 3.0, 0.0], Vec3::X), None);
+        assert_eq!(first_hit(&closed, [0.5, 2.5, 0.0], Vec3::Y), None);
     }
 
     #[test]
@@ -315,12 +315,12 @@ mod tests {
         let slope = Vec3::new(-1.0, -2.0, 0.0);
         let right = Vec3::new(2.0, 1.0, 0.0).normalize();
         for capped in [true, false] {
-            let into = met(&hat(capped), [2.5, 5.0, 0.0], slope);
+            let into = first_hit(&hat(capped), [2.5, 5.0, 0.0], slope);
             assert_eq!(into, Some((2.0, 0, right)), "{capped}");
         }
-        assert_eq!(met(&hat(false), [-0.5, -1.0, 0.0], -slope), Some((1.0, 0, right)));
-        assert_eq!(met(&hat(false), [-1.5, 1.0, 0.0], slope), None);
-        assert_eq!(met(&hat(true), [-1.5, 1.0, 0.0], slope), None);
+        assert_eq!(first_hit(&hat(false), [-0.5, -1.0, 0.0], -slope), Some((1.0, 0, right)));
+        assert_eq!(first_hit(&hat(false), [-1.5, 1.0, 0.0], slope), None);
+        assert_eq!(first_hit(&hat(true), [-1.5, 1.0, 0.0], slope), None);
     }
 
     #[test]
@@ -356,7 +356,7 @@ mod tests {
         assert!((slanting.max - Vec3::new(3.0, 4.0, 1.0)).abs().max_element() < 1e-6);
     }
 
-    impl Thin for Cone {
+    impl ThinShape for Cone {
         fn thin(radius: f64, capped: bool) -> Self {
             Self::new(DVec3::NEG_Z, DVec3::Z, radius, capped)
         }

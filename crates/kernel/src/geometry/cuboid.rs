@@ -65,11 +65,11 @@ impl OrientedBox {
             let from_center = ray.origin - self.center;
             let (mut near, mut far) = (f64::NEG_INFINITY, f64::INFINITY);
             let (mut near_face, mut far_face) = (0, 0);
-            let mut is_beside = false;
+            let mut misses_slab = false;
             for axis in 0..3 {
                 let (o, d, h) = (axes[axis].dot(from_center), axes[axis].dot(ray.direction), half[axis]);
                 let is_parallel = d == 0.0;
-                is_beside |= is_parallel & (o.abs() > h);
+                misses_slab |= is_parallel & (o.abs() > h);
                 let (enter, leave) = ((-h.copysign(d) - o) / d, (h.copysign(d) - o) / d);
                 let positive = u32::from(d > 0.0);
                 let face = 2 * axis as u32;
@@ -80,11 +80,11 @@ impl OrientedBox {
                 far = if is_sooner { leave } else { far };
                 far_face = if is_sooner { face + positive } else { far_face };
             }
-            let is_met = !is_beside & (near <= far);
+            let is_hit = !misses_slab & (near <= far);
             let (enter, leave) = (round_in_range_or_nan(near, end), round_in_range_or_nan(far, end));
             let is_inside = enter.is_nan();
             let t = if is_inside { leave } else { enter };
-            hits.t[lane] = if is_met { t } else { f32::NAN };
+            hits.t[lane] = if is_hit { t } else { f32::NAN };
             hits.primitive[lane] = if is_inside { far_face } else { near_face };
         }
     }

@@ -240,7 +240,7 @@ impl Cylinder {
 mod tests {
     use super::*;
     use crate::geometry::Ray;
-    use crate::geometry::surface_of_revolution::tests::{Thin, hits_from_afar};
+    use crate::geometry::surface_of_revolution::tests::{ThinShape, hits_from_afar};
     use crate::math::Vec3;
 
     /// A cylinder around the axis x = 1, z = 0, from y = 0 to y = 4.
@@ -248,7 +248,7 @@ mod tests {
         Cylinder::new(DVec3::X, DVec3::new(1.0, 4.0, 0.0), 0.5, capped)
     }
 
-    fn met(cylinder: &Cylinder, origin: [f32; 3], direction: Vec3) -> Option<(f32, u32, Vec3)> {
+    fn first_hit(cylinder: &Cylinder, origin: [f32; 3], direction: Vec3) -> Option<(f32, u32, Vec3)> {
         let ray = Ray::new(Vec3::from_array(origin), direction).to_f64();
         let hit = cylinder.intersect(&ray)?;
         Some((hit.t, hit.primitive, cylinder.surface_point_at_hit(&ray, &hit).normal))
@@ -258,23 +258,23 @@ mod tests {
     fn side_and_caps_are_hit_from_both_sides() {
         let closed = bar(true);
         let (down, up) = (Vec3::NEG_Y, Vec3::Y);
-        assert_eq!(met(&closed, [-3.0, 1.0, 0.0], Vec3::X), Some((3.5, 0, Vec3::NEG_X)));
-        assert_eq!(met(&closed, [1.0, 1.0, 0.0], Vec3::X), Some((0.5, 0, Vec3::X)));
-        assert_eq!(met(&closed, [1.25, 9.0, 0.25], down), Some((5.0, 2, up)));
-        assert_eq!(met(&closed, [1.25, 3.0, 0.25], down), Some((3.0, 1, down)));
-        assert_eq!(met(&closed, [1.25, -3.0, 0.25], up), Some((3.0, 1, down)));
-        assert_eq!(met(&closed, [1.25, 5.0, 0.25], up), None);
-        assert_eq!(met(&closed, [1.6, -3.0, 0.0], up), None);
-        assert_eq!(met(&closed, [-3.0, 4.5, 0.0], Vec3::X), None);
+        assert_eq!(first_hit(&closed, [-3.0, 1.0, 0.0], Vec3::X), Some((3.5, 0, Vec3::NEG_X)));
+        assert_eq!(first_hit(&closed, [1.0, 1.0, 0.0], Vec3::X), Some((0.5, 0, Vec3::X)));
+        assert_eq!(first_hit(&closed, [1.25, 9.0, 0.25], down), Some((5.0, 2, up)));
+        assert_eq!(first_hit(&closed, [1.25, 3.0, 0.25], down), Some((3.0, 1, down)));
+        assert_eq!(first_hit(&closed, [1.25, -3.0, 0.25], up), Some((3.0, 1, down)));
+        assert_eq!(first_hit(&closed, [1.25, 5.0, 0.25], up), None);
+        assert_eq!(first_hit(&closed, [1.6, -3.0, 0.0], up), None);
+        assert_eq!(first_hit(&closed, [-3.0, 4.5, 0.0], Vec3::X), None);
     }
 
     #[test]
     fn rays_pass_through_open_tubes() {
         let tube = bar(false);
-        assert_eq!(met(&tube, [1.25, 9.0, 0.25], Vec3::NEG_Y), None);
+        assert_eq!(first_hit(&tube, [1.25, 9.0, 0.25], Vec3::NEG_Y), None);
         // The ray enters through the open upper end and hits the side from inside at x = 1.5. The front is
         // still outside.
-        let slanting = met(&tube, [0.5, 5.0, 0.0], Vec3::new(1.0, -2.0, 0.0));
+        let slanting = first_hit(&tube, [0.5, 5.0, 0.0], Vec3::new(1.0, -2.0, 0.0));
         assert_eq!(slanting, Some((1.0, 0, Vec3::X)));
     }
 
@@ -298,7 +298,7 @@ mod tests {
         assert!((slanting.max - Vec3::new(3.8, 4.6, 1.0)).abs().max_element() < 1e-6);
     }
 
-    impl Thin for Cylinder {
+    impl ThinShape for Cylinder {
         fn thin(radius: f64, capped: bool) -> Self {
             Self::new(DVec3::NEG_Z, DVec3::Z, radius, capped)
         }

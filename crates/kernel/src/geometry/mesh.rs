@@ -48,7 +48,7 @@ impl VertexNormalGroup {
 impl TriangleMesh {
     /// Maximum number of triangles. Triangle indices must fit in the nodes of every tree type, even after
     /// triangle splitting.
-    pub const MOST_TRIANGLES: u32 = 1 << 27;
+    pub const MAX_TRIANGLES: u32 = 1 << 27;
 
     /// Corners of a triangle.
     #[inline]
@@ -59,7 +59,7 @@ impl TriangleMesh {
     /// Bounding box in file coordinates, or `None` if there are no vertices.
     pub fn bounds_in_file_coordinates(&self) -> Option<[DVec3; 2]> {
         let first = *self.positions.first()?;
-        let grow = |[least, greatest]: [Vec3; 2], at: &Vec3| [least.min(*at), greatest.max(*at)];
+        let grow = |[min, max]: [Vec3; 2], at: &Vec3| [min.min(*at), max.max(*at)];
         Some(self.positions.iter().fold([first; 2], grow).map(|at| at.as_dvec3() + self.origin))
     }
 

@@ -73,18 +73,18 @@ pub enum Shape {
 
 /// Evaluates an expression with `$it` bound to the concrete shape.
 macro_rules! for_shape {
-    ($shape:expr, $it:ident => $asked:expr) => {
+    ($shape:expr, $it:ident => $body:expr) => {
         match $shape {
-            Shape::Sphere($it) => $asked,
-            Shape::Quad($it) => $asked,
-            Shape::Plane($it) => $asked,
-            Shape::Box($it) => $asked,
-            Shape::Triangle($it) => $asked,
-            Shape::Disk($it) => $asked,
-            Shape::Cylinder($it) => $asked,
-            Shape::Cone($it) => $asked,
-            Shape::Torus($it) => $asked,
-            Shape::Transformed($it) => $asked,
+            Shape::Sphere($it) => $body,
+            Shape::Quad($it) => $body,
+            Shape::Plane($it) => $body,
+            Shape::Box($it) => $body,
+            Shape::Triangle($it) => $body,
+            Shape::Disk($it) => $body,
+            Shape::Cylinder($it) => $body,
+            Shape::Cone($it) => $body,
+            Shape::Torus($it) => $body,
+            Shape::Transformed($it) => $body,
         }
     };
 }
@@ -96,13 +96,13 @@ impl Shape {
         for_shape!(self, it => it.intersect(ray))
     }
 
-    /// Finds the nearest hits of the rays in `met`, with SIMD if the shape supports it. All other rays must
-    /// have negative ends, and `found` must not contain hits.
+    /// Finds the nearest hits of the rays in `active`, with SIMD if the shape supports it. All other rays
+    /// must have negative ends, and `found` must not contain hits.
     #[inline(always)]
     pub fn intersect_packet(
         &self,
         rows: &RayPacket,
-        met: u32,
+        active: u32,
         ends: &F32x16,
         found: &mut HitPacket,
         simd: impl Simd,
@@ -115,14 +115,14 @@ impl Shape {
             Self::Triangle(triangle) => triangle.intersect_packet(rows, ends, found),
             Self::Disk(disk) => disk.intersect_packet(rows, ends, found),
             Self::Cylinder(_) | Self::Cone(_) | Self::Torus(_) | Self::Transformed(_) => {
-                self.intersect_each_lane(rows, met, ends, found);
+                self.intersect_each_lane(rows, active, ends, found);
             }
         }
     }
 
     #[inline(never)]
-    fn intersect_each_lane(&self, rays: &RayPacket, met: u32, ends: &F32x16, found: &mut HitPacket) {
-        for lane in packet::set_bit_lanes(met) {
+    fn intersect_each_lane(&self, rays: &RayPacket, active: u32, ends: &F32x16, found: &mut HitPacket) {
+        for lane in packet::set_bit_lanes(active) {
             if let Some(hit) = self.intersect(&Ray { t_max: ends[lane], ..rays.ray(lane) }.to_f64()) {
                 found.set(lane, &hit);
             }
@@ -181,9 +181,9 @@ impl Shape {
         &self,
         ray: &RayF64,
         hit: &ShapeHit,
-        asked: SurfaceRequest,
+        request: SurfaceRequest,
     ) -> SurfacePoint {
-        if asked.uv {
+        if request.uv {
             self.surface_point_at_hit(ray, hit)
         } else {
             self.surface_point_f64(ray, hit).to_surface_point_without_uv()
@@ -445,11 +445,11 @@ mod tests {
     const SIDE: u32 = 400;
 
     /// Integrates a function over the surface.
-    fn integral(shape: &Shape, asked: impl Fn(&SurfaceSample) -> f64) -> f64 {
+    fn integral(shape: &Shape, function: impl Fn(&SurfaceSample) -> f64) -> f64 {
         let grid = |i: u32| Vec2::new((i % SIDE) as f32 + 0.5, (i / SIDE) as f32 + 0.5) / SIDE as f32;
         let over_part = |(part, area): (u32, f64)| {
             let value =
-                |place: SurfaceSample| asked(&place) * shape.area_scale_for_world_normal(place.normal);
+                |place: SurfaceSample| function(&place) * shape.area_scale_for_world_normal(place.normal);
             let sum: f64 = (0..SIDE * SIDE).map(|i| value(shape.sample_point_on_part(part, grid(i)))).sum();
             sum * area / f64::from(SIDE * SIDE)
         };
@@ -557,13 +557,13 @@ mod tests {
             for i in 0..12_u32 {
                 let u = |factor: f64| (f64::from(i) + 0.5) * factor % 1.0 * 3.0 - 1.5;
                 let point = shape.centroid() + DVec3::new(u(0.618_034), u(0.754_878), u(0.569_84));
-                let Some(told) = distance(&shape, point).filter(|_| !places.is_empty()) else { continue };
+                let Some(found) = distance(&shape, point).filter(|_| !places.is_empty()) else { continue };
                 let nearest = places.iter().map(|place| (*place - point).length()).fold(f64::MAX, f64::min);
                 // For a transformed shape, the distance is a lower bound, within the transform's condition
                 // number.
                 let range = if untransformed(&shape).1 { 0.3 } else { 1.0 };
-                let is_near = nearest >= told - 1e-9 && told + 0.03 > range * nearest;
-                assert!(is_near, "{shape:?}: {told}, {nearest}");
+                let is_near = nearest >= found - 1e-9 && found + 0.03 > range * nearest;
+                assert!(is_near, "{shape:?}: {found}, {nearest}");
             }
         }
     }

@@ -51,8 +51,8 @@ impl Triangle {
             let sum = wa + wb + wc;
             let normal = (b - a).cross(c - a);
             let t = round_in_range_or_nan(normal.dot(a) / normal.dot(d), end);
-            let is_met = !(is_left & is_right) & (sum != 0.0);
-            hits.t[lane] = if is_met { t } else { f32::NAN };
+            let is_hit = !(is_left & is_right) & (sum != 0.0);
+            hits.t[lane] = if is_hit { t } else { f32::NAN };
             hits.u[lane] = (wb / sum) as f32;
             hits.v[lane] = (wc / sum) as f32;
         }

@@ -33,22 +33,22 @@ use crate::math::lanes::{Mask, Simd, TRUE, select, select_u32, set_lane};
 use crate::math::{DVec3, Vec3};
 
 /// Maximum number of triangles in a [`TriangleList`].
-pub const MOST: usize = 64;
+pub const MAX_TRIANGLES: usize = 64;
 
 /// Error of the intersection with a plane, relative to the largest coordinate.
-const PLANE: f32 = 128.0 * UNIT_ROUNDOFF;
+const PLANE_ERROR: f32 = 128.0 * UNIT_ROUNDOFF;
 
 /// Error terms of t in the watertight test, relative to R² D/(2A) and R D²/(2A).
-const ALONG: [f32; 2] = [256.0 * UNIT_ROUNDOFF, 2048.0 * UNIT_ROUNDOFF];
+const T_ERRORS: [f32; 2] = [256.0 * UNIT_ROUNDOFF, 2048.0 * UNIT_ROUNDOFF];
 
 /// Error of barycentric coordinates in the watertight test, relative to R D/(2A).
-const ACROSS: f32 = 1024.0 * UNIT_ROUNDOFF;
+const BARYCENTRIC_ERROR: f32 = 1024.0 * UNIT_ROUNDOFF;
 
 /// Maximum coordinate error at which a miss is still certain.
-const BLUNT: f32 = 0.125;
+const MAX_CERTAIN_ERROR: f32 = 0.125;
 
 /// Maximum product of a triangle's D/(2A) and the extent of all triangles.
-const MOST_SLENDER: f64 = 1e3;
+const MAX_SLENDERNESS: f64 = 1e3;
 
 /// Placeholder index that excludes no triangle.
 const NONE: u32 = u32::MAX;
@@ -79,7 +79,7 @@ struct TriangleOrQuad {
     numbers: [u32; 2],
     /// D/(2A), which is at least the length of both vectors in `across`.
     slender: f32,
-    /// [`ALONG`] times D/(2A), and [`ALONG`] times D.
+    /// [`T_ERRORS`] times D/(2A), and [`T_ERRORS`] times D.
     along: [f32; 2],
 }
 
@@ -107,12 +107,12 @@ struct NearestCandidates {
 
 /// Error terms for the rays in a packet.
 struct ErrorTerms {
-    /// Error term with the factor [`PLANE`] for each ray.
+    /// Error term with the factor [`PLANE_ERROR`] for each ray.
     plane: F32x16,
     /// R: largest distance along an axis from the ray's origin to a corner.
     far: F32x16,
-    /// Error term with the factors [`PLANE`] and [`ACROSS`] for each ray, without the ray's length and
-    /// D/(2A).
+    /// Error term with the factors [`PLANE_ERROR`] and [`BARYCENTRIC_ERROR`] for each ray, without the ray's
+    /// length and D/(2A).
     across: F32x16,
     /// Upper bound on the length of the direction.
     length: F32x16,
@@ -127,9 +127,9 @@ impl TriangleList {
         let points = || corners.iter().flatten().copied();
         let (low, high) = (points().reduce(Vec3::min)?, points().reduce(Vec3::max)?);
         let size = (high - low).max_element();
-        let is_fit = |of: &[Vec3; 3]| slenderness(of)[0] * f64::from(size) <= MOST_SLENDER;
+        let is_fit = |of: &[Vec3; 3]| slenderness(of)[0] * f64::from(size) <= MAX_SLENDERNESS;
         let is_finite = size.is_finite() && size > 1e-9 && low.abs().max(high.abs()).max_element() < 1e9;
-        if corners.len() > MOST || !is_finite || !corners.iter().all(is_fit) {
+        if corners.len() > MAX_TRIANGLES || !is_finite || !corners.iter().all(is_fit) {
             return None;
         }
         let reach = low.abs().max(high.abs()).max_element();
@@ -159,19 +159,19 @@ impl TriangleList {
         Some(Self { facets, corners, low, high })
     }
 
-    /// Updates `found` with the nearest hits of the rays in `met`. All other rays must have negative ends.
+    /// Updates `found` with the nearest hits of the rays in `active`. All other rays must have negative ends.
     /// Returns the mask of undecided rays, whose hits are left unchanged.
     #[inline(always)]
     pub fn update_decided_closest_hits(
         &self,
         rays: &RayPacket,
-        (met, ends): (u32, &F32x16),
+        (active, ends): (u32, &F32x16),
         found: &mut HitPacket,
         simd: impl Simd,
     ) -> u32 {
         let candidates = self.find_nearest_candidates(rays, ends, &[NONE; PACKET_SIZE], simd);
         let CandidateTestResults { hit, undecided, hits } =
-            self.test_candidates(rays, &candidates, (met, ends), simd);
+            self.test_candidates(rays, &candidates, (active, ends), simd);
         select(&hit, &hits.t, &mut found.t);
         select(&hit, &hits.u, &mut found.u);
         select(&hit, &hits.v, &mut found.v);
@@ -179,27 +179,27 @@ impl TriangleList {
         undecided
     }
 
-    /// Returns the mask of the rays in `met` that hit any triangle other than the ray's entry in `except`,
+    /// Returns the mask of the rays in `active` that hit any triangle other than the ray's entry in `except`,
     /// and the mask of undecided rays. All other rays must have negative ends.
     #[inline(always)]
     pub fn any_hit_and_undecided_masks(
         &self,
         rays: &RayPacket,
-        (met, ends): (u32, &F32x16),
+        (active, ends): (u32, &F32x16),
         except: &[u32; PACKET_SIZE],
         simd: impl Simd,
     ) -> [u32; 2] {
         let candidates = self.find_nearest_candidates(rays, ends, except, simd);
-        let mut is_met = candidates.doubtful;
+        let mut may_hit = candidates.doubtful;
         for i in 0..PACKET_SIZE {
-            is_met[i] |= if candidates.near[i] < f32::INFINITY { TRUE } else { 0 };
+            may_hit[i] |= if candidates.near[i] < f32::INFINITY { TRUE } else { 0 };
         }
-        if simd.movemask(&is_met) & met == 0 {
+        if simd.movemask(&may_hit) & active == 0 {
             return [0; 2];
         }
         let CandidateTestResults { hit, undecided, .. } =
-            self.test_candidates(rays, &candidates, (met, ends), simd);
-        [simd.movemask(&hit) & met, undecided]
+            self.test_candidates(rays, &candidates, (active, ends), simd);
+        [simd.movemask(&hit) & active, undecided]
     }
 
     /// Finds the nearest candidates. Excludes each ray's start triangle and its triangle in `except`.
@@ -269,7 +269,7 @@ impl TriangleList {
                     | (t + error < 0.0)
                     | (least > ends[i]);
                 let is_far = above.abs() > simd.mul_add_relaxed(falls.abs(), end[i], distance);
-                let is_sharp = margin < BLUNT;
+                let is_sharp = margin < MAX_CERTAIN_ERROR;
                 // Decide which of the facet's triangles is hit.
                 let number = other ^ (between & if over < 0.0 { TRUE } else { 0 });
                 let is_sure = is_sharp & (over.abs() > split * margin);
@@ -295,7 +295,7 @@ impl TriangleList {
         &self,
         rays: &RayPacket,
         candidates: &NearestCandidates,
-        (met, ends): (u32, &F32x16),
+        (active, ends): (u32, &F32x16),
         simd: impl Simd,
     ) -> CandidateTestResults {
         let mut corners = [[[0.0; PACKET_SIZE]; 3]; 3];
@@ -318,7 +318,7 @@ impl TriangleList {
             hit[i] = if is_nearest { TRUE } else { 0 };
             undecided[i] = if is_open | (candidates.doubtful[i] != 0) { TRUE } else { 0 };
         }
-        CandidateTestResults { hit, undecided: simd.movemask(&undecided) & met, hits }
+        CandidateTestResults { hit, undecided: simd.movemask(&undecided) & active, hits }
     }
 
     /// Computes the error terms for the rays.
@@ -340,9 +340,9 @@ impl TriangleList {
             // Set the bound to NaN for NaN origins. Comparisons with NaN would leave `most` unchanged.
             let sum = rays.origin[0][i] + rays.origin[1][i] + rays.origin[2][i];
             let most = if sum.is_nan() { f32::NAN } else { most };
-            errors.plane[i] = PLANE * most;
+            errors.plane[i] = PLANE_ERROR * most;
             errors.far[i] = far;
-            errors.across[i] = PLANE * most + ACROSS * far;
+            errors.across[i] = PLANE_ERROR * most + BARYCENTRIC_ERROR * far;
             errors.length[i] = length;
             // Distances are at most 2√3 R, and `length` is at most √3 times the direction's length.
             errors.end[i] = 6.0 * far / length;
@@ -400,7 +400,7 @@ impl TriangleOrQuad {
             split: if apex.is_some() { 2.0 } else { -1.0 },
             numbers,
             slender: slender as f32,
-            along: [ALONG[0] * slender as f32, ALONG[1] * wide as f32],
+            along: [T_ERRORS[0] * slender as f32, T_ERRORS[1] * wide as f32],
         }
     }
 }
@@ -421,17 +421,17 @@ fn reorder_corners_into_quad(one: &[Vec3; 3], other: &[Vec3; 3], reach: f32) -> 
     let normal = u.cross(v);
     let squared = normal.length_squared();
     let at = [v.cross(normal), normal.cross(u)].map(|across| across.dot(way) / squared);
-    let is_flat = normal.dot(way).abs() <= f64::from(FLAT * reach) * squared.sqrt();
-    let is_near = at.iter().all(|along| (along - 1.0).abs() <= ASKEW);
+    let is_flat = normal.dot(way).abs() <= f64::from(MAX_PLANE_DISTANCE * reach) * squared.sqrt();
+    let is_near = at.iter().all(|along| (along - 1.0).abs() <= MAX_CORNER_DEVIATION);
     (is_flat && is_near).then_some([[a, b, c], [b, c, d]])
 }
 
 /// Maximum distance of the fourth corner of a flat quadrilateral from the plane of the other three, relative
 /// to the largest coordinate.
-const FLAT: f32 = 4.0 * UNIT_ROUNDOFF;
+const MAX_PLANE_DISTANCE: f32 = 4.0 * UNIT_ROUNDOFF;
 
 /// Maximum deviation of the fourth corner from a parallelogram, relative to the edges.
-const ASKEW: f64 = 0.25;
+const MAX_CORNER_DEVIATION: f64 = 0.25;
 
 /// D/(2A) and D²/(2A) of a triangle.
 fn slenderness([a, b, c]: &[Vec3; 3]) -> [f64; 2] {

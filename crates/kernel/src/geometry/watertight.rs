@@ -60,7 +60,7 @@ impl ShearedRay {
         let mut wa = cx * by - cy * bx;
         let mut wb = ax * cy - ay * cx;
         let mut wc = bx * ay - by * ax;
-        let is_outside = |[least, greatest]: [f32; 2]| least < 0.0 && greatest > 0.0;
+        let is_outside = |[min, max]: [f32; 2]| min < 0.0 && max > 0.0;
         let ends = [
             min_or_second_if_nan(wa, min_or_second_if_nan(wb, wc)),
             max_or_second_if_nan(wa, max_or_second_if_nan(wb, wc)),
@@ -152,10 +152,10 @@ impl ShearedRay {
     /// are lengths, while the error of z is in units of t. The units differ unless the direction has unit
     /// length.
     fn distance_error(&self, corners: &[(f32, f32, f32); 3], inverse_determinant: f32) -> (f32, f32) {
-        let greatest = |of: fn(&(f32, f32, f32)) -> f32| corners.iter().map(of).fold(0.0, f32::max);
-        let x = greatest(|corner| corner.0.abs());
-        let y = greatest(|corner| corner.1.abs());
-        let depth = greatest(|corner| corner.2.abs());
+        let max = |of: fn(&(f32, f32, f32)) -> f32| corners.iter().map(of).fold(0.0, f32::max);
+        let x = max(|corner| corner.0.abs());
+        let y = max(|corner| corner.1.abs());
+        let depth = max(|corner| corner.2.abs());
         let z = depth * self.shear.z.abs();
         let error_z = gamma(3) * z;
         let (error_x, error_y) = (gamma(5) * (x + depth), gamma(5) * (y + depth));

@@ -61,9 +61,9 @@ impl Light {
         }
     }
 
-    /// [`Light::sample`] for the points in the mask `used`, without an emission texture.
+    /// [`Light::sample`] for the points in the mask `used`, without emission modulation.
     #[inline(always)]
-    pub fn sample_untextured_packet(
+    pub fn sample_unmodulated_packet(
         &self,
         points: &Vec3x16,
         normals: &Vec3x16,
@@ -75,7 +75,7 @@ impl Light {
             Self::Spot(light) => light.sample_packet(points),
             Self::Directional(light) => light.sample_packet(u),
             Self::Environment(light) => light.sample_packet(normals, u),
-            Self::Area(light) => light.sample_untextured_packet(points, normals, used, u),
+            Self::Area(light) => light.sample_unmodulated_packet(points, normals, used, u),
         }
     }
 
@@ -111,11 +111,11 @@ impl Light {
 }
 
 impl Light {
-    /// [`Light::sample`] without an emission texture.
+    /// [`Light::sample`] without emission modulation.
     #[inline]
-    pub fn sample_untextured(&self, point: Vec3, normal: Vec3, u: [f32; 2]) -> Option<LightSample> {
+    pub fn sample_unmodulated(&self, point: Vec3, normal: Vec3, u: [f32; 2]) -> Option<LightSample> {
         match self.as_area() {
-            Some(light) => light.sample_without_texture_factor(point, normal, u),
+            Some(light) => light.sample_unmodulated(point, normal, u),
             None => self.sample(point, normal, u),
         }
     }
@@ -123,8 +123,8 @@ impl Light {
     /// Light-sampling pdf of a hit's direction in sr⁻¹, for the surface point `from` with the given normal.
     /// It is 0 if light sampling never generates the direction, or if rays cannot hit the light.
     #[inline]
-    pub fn pdf(&self, from: Vec3, normal: Vec3, met: &LightHit) -> f32 {
-        self.as_area().map_or(0.0, |light| light.pdf(from, normal, met))
+    pub fn pdf(&self, from: Vec3, normal: Vec3, hit: &LightHit) -> f32 {
+        self.as_area().map_or(0.0, |light| light.pdf(from, normal, hit))
     }
 
     /// Bounds on the light's position and emission for a [`LightTree`](super::LightTree), or `None` if the
@@ -138,10 +138,10 @@ impl Light {
         Some(bounds).filter(|bounds| bounds.power > 0.0)
     }
 
-    /// The emission texture that modulates the light's radiance, or `None` for an untextured light.
+    /// The factor that modulates the radiance of an area light, or `None` if the radiance is constant.
     #[inline(always)]
-    pub fn emission_texture(&self) -> Option<&EmissionModulation> {
-        self.as_area().and_then(|light| light.texture.as_deref())
+    pub fn emission_modulation(&self) -> Option<&EmissionModulation> {
+        self.as_area().and_then(|light| light.modulation.as_deref())
     }
 
     /// Whether the light is at infinity.

@@ -77,7 +77,7 @@ impl Lights {
             } else {
                 of = 1 << first;
                 let sample = |i: usize, point| {
-                    lights[i].sample_untextured(point, lane(normals, i), [u[0][i], u[1][i]])
+                    lights[i].sample_unmodulated(point, lane(normals, i), [u[0][i], u[1][i]])
                 };
                 LightSamplePacket::sample_one_by_one(points, of, sample)
             };
@@ -93,13 +93,13 @@ impl Lights {
         for i in 0..PACKET_SIZE {
             inverse[i] = lights[i].inverse_pdf_of_sample(lane(&row.directions, i), lane(&row.weights, i));
         }
-        // Apply the emission textures. They do not affect the pdfs.
+        // Apply the emission modulations. They do not affect the pdfs.
         let mut lookups = 0;
         for i in set_bit_lanes(used) {
             let weight = lane(&row.weights, i);
-            if let Some(texture) = lights[i].emission_texture().filter(|_| weight != Vec3::ZERO) {
+            if let Some(modulation) = lights[i].emission_modulation().filter(|_| weight != Vec3::ZERO) {
                 let (target, direction) = (lane(&row.targets, i), lane(&row.directions, i));
-                let weight = weight * texture.radiance_factor(target, row.sources.part[i], direction);
+                let weight = weight * modulation.radiance_factor(target, row.sources.part[i], direction);
                 set_lane(&mut row.weights, i, weight);
                 lookups += 1;
             }

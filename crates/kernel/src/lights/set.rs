@@ -7,7 +7,7 @@ use super::area::{AreaLight, EmittingTriangleSelection, MeshEmitter, Side};
 use super::infinite::{DirectionalLight, Environment, InfiniteLight};
 use super::light::Light;
 use super::tree::{AdaptiveLightTreeCut, LightTree, MAX_WITHOUT_TREE, Receiver};
-use crate::control::{CancelToken, Cancelled};
+use crate::control::{CancelToken, Canceled};
 use crate::math::Vec3;
 
 /// The lights of a scene.
@@ -46,7 +46,7 @@ pub struct LightSampler<'a> {
     pub picks: LightSamplingEffort,
     /// Whether lights at infinity are sampled at every vertex instead of being in the tree, because their
     /// bounds ignore occlusion.
-    pub leaves_beyond: bool,
+    pub samples_infinite: bool,
 }
 
 /// Effort to spend on picking lights at a vertex.
@@ -60,7 +60,7 @@ pub struct LightSamplingEffort {
 
 impl LightSamplingEffort {
     /// Effort for direct lighting. The results are as good as if each of a thousand lights were examined.
-    pub const DIRECT: Self = Self { count: MAX_WITHOUT_TREE as u32, nodes: AdaptiveLightTreeCut::MOST };
+    pub const DIRECT: Self = Self { count: MAX_WITHOUT_TREE as u32, nodes: AdaptiveLightTreeCut::MAX_NODES };
 
     /// Effort for path vertices. Additional shadow rays are not worthwhile because the image also has other
     /// noise.
@@ -81,7 +81,7 @@ impl ExpectedSamplesPerLight<'_> {
     #[inline]
     pub fn for_light(&self, number: u32) -> f32 {
         self.0.as_ref().map_or(1.0, |(sampler, cut)| {
-            if sampler.leaves_beyond && !sampler.tree.contains(number) {
+            if sampler.samples_infinite && !sampler.tree.contains(number) {
                 1.0
             } else {
                 sampler.picks.count as f32 * cut.probability(number)
@@ -103,8 +103,8 @@ impl Lights {
     /// Indexes the lights and builds the trees over them.
     ///
     /// # Errors
-    /// [`Cancelled`] if the token is canceled.
-    pub fn new(all: Vec<Light>, token: &CancelToken) -> Result<Self, Cancelled> {
+    /// [`Canceled`] if the token is canceled.
+    pub fn new(all: Vec<Light>, token: &CancelToken) -> Result<Self, Canceled> {
         let mut lights = Self::default();
         for (number, light) in (0_u32..).zip(&all) {
             if let Some(light) = light.as_area() {
@@ -115,7 +115,7 @@ impl Lights {
                 lights.environment = Some((number, light.clone()));
             }
         }
-        let tree_over = |taken: &dyn Fn(&&Light) -> bool, most| -> Result<_, Cancelled> {
+        let tree_over = |taken: &dyn Fn(&&Light) -> bool, most| -> Result<_, Canceled> {
             if count_lights_once_per_object(all.iter().filter(taken)) <= most {
                 return Ok(None);
             }
@@ -140,12 +140,12 @@ impl Lights {
         match receivers {
             LightSamplingPurpose::Eye => {
                 let sampler =
-                    |tree| LightSampler { tree, picks: LightSamplingEffort::DIRECT, leaves_beyond: false };
+                    |tree| LightSampler { tree, picks: LightSamplingEffort::DIRECT, samples_infinite: false };
                 self.tree.as_deref().map(sampler)
             }
             LightSamplingPurpose::Paths => {
                 let sampler =
-                    |tree| LightSampler { tree, picks: LightSamplingEffort::PATHS, leaves_beyond: true };
+                    |tree| LightSampler { tree, picks: LightSamplingEffort::PATHS, samples_infinite: true };
                 self.local_tree.as_deref().map(sampler)
             }
         }
@@ -254,11 +254,11 @@ impl Lights {
         }
     }
 
-    /// Radiance from infinity in a unit direction. `share` returns the weight of a light, given its index and
+    /// Radiance from infinity in a unit direction. `weight` returns the weight of a light, given its index and
     /// its light-sampling pdf in sr⁻¹.
-    pub fn radiance_from_infinity(&self, direction: Vec3, share: impl Fn(u32, f32) -> f32) -> Vec3 {
+    pub fn radiance_from_infinity(&self, direction: Vec3, weight: impl Fn(u32, f32) -> f32) -> Vec3 {
         let sky = self.environment().map(|environment| environment.radiance_and_pdf(direction));
-        self.radiance_from_infinity_with_precomputed_sky(sky, direction, share)
+        self.radiance_from_infinity_with_precomputed_sky(sky, direction, weight)
     }
 
     /// [`Lights::radiance_from_infinity`] with a precomputed result of [`Environment::radiance_and_pdf`].
@@ -266,13 +266,13 @@ impl Lights {
         &self,
         sky: Option<(Vec3, f32)>,
         direction: Vec3,
-        share: impl Fn(u32, f32) -> f32,
+        weight: impl Fn(u32, f32) -> f32,
     ) -> Vec3 {
         let suns =
             self.suns.iter().map(|(number, sun)| (*number, (sun.radiance(direction), sun.pdf(direction))));
         let number = self.environment.iter().map(|(number, _)| *number);
         let seen = suns.chain(number.zip(sky)).filter(|(_, (radiance, _))| *radiance != Vec3::ZERO);
-        seen.map(|(number, (radiance, density))| radiance * share(number, density)).sum()
+        seen.map(|(number, (radiance, density))| radiance * weight(number, density)).sum()
     }
 
     /// The light with the given index.

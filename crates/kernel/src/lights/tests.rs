@@ -82,7 +82,7 @@ fn packet_samples_match_single_samples() {
             let points: Vec3x16 = std::array::from_fn(|_| std::array::from_fn(|_| next() * 6.0 - 3.0));
             let normals: Vec3x16 = [[0.0; PACKET_SIZE], [1.0; PACKET_SIZE], [0.0; PACKET_SIZE]];
             let u: [F32x16; 2] = std::array::from_fn(|_| std::array::from_fn(|_| next()));
-            let row = light.sample_untextured_packet(&points, &normals, u32::MAX, &u);
+            let row = light.sample_unmodulated_packet(&points, &normals, u32::MAX, &u);
             for i in 0..PACKET_SIZE {
                 let alone = light.sample(lane(&points, i), lane(&normals, i), [u[0][i], u[1][i]]);
                 let weight = lane(&row.weights, i);
@@ -337,7 +337,7 @@ fn mesh_triangles_map_to_their_lights() {
             bounds,
             shape: Emitter::Mesh(mesh),
             radiance: Vec3::splat(radiance),
-            texture: None,
+            modulation: None,
             object: 3,
             part: EmittingTriangleSelection::Listed,
             side: Side::Front,
@@ -373,7 +373,7 @@ fn mesh_light(triangles: &[[DVec3; 3]]) -> AreaLight {
     let bounds = mesh.light_bounds();
     let (shape, radiance) = (Emitter::Mesh(mesh), Vec3::ONE);
     let (side, part) = (Side::Front, EmittingTriangleSelection::Listed);
-    AreaLight { shape, side, radiance, bounds, texture: None, object: OBJECT, part }
+    AreaLight { shape, side, radiance, bounds, modulation: None, object: OBJECT, part }
 }
 
 #[test]

@@ -114,7 +114,7 @@ fn sphere_cosine_deviations(shape: &Shape, from: Vec3) -> (f64, f64) {
     for i in 0..n {
         let u = [(i as f32 + 0.5) / n as f32, (f64::from(i) * 0.618_033_988_75).fract() as f32];
         let direction = frame.to_world(crate::sampling::warp::cone(u, one_minus_cos));
-        if light_hit(shape, from, direction).is_some_and(|(met, _)| met.normal.dot(direction) < 0.0) {
+        if light_hit(shape, from, direction).is_some_and(|(hit, _)| hit.normal.dot(direction) < 0.0) {
             solid_angle += std::f64::consts::TAU * f64::from(one_minus_cos) / f64::from(n);
             sum += direction;
             cosines.push(f64::from(direction.y.max(0.0)));
@@ -159,7 +159,7 @@ fn textured_quad_samples_follow_their_pdf() {
         // If the quad were closer, the edges of bright areas would be too slanted relative to the squares.
         for (name, shape, light) in textured_quads(gap + 0.3) {
             let name = format!("{name} at {gap}");
-            // The texels' edges need finer squares.
+            // Use finer squares to resolve the edges between texels.
             assert!(follows_its_pdf(&name, &shape, &light, from, 30), "{name}");
         }
     }
@@ -207,8 +207,8 @@ fn textured_quad_pdf_matches_its_samples() {
             let Some(sample) = light.sample(from, Vec3::Y, [random.unit_f32(), random.unit_f32()]) else {
                 continue;
             };
-            let Some((met, _)) = light_hit(&shape, from, sample.direction) else { continue };
-            let product = light.pdf(from, Vec3::Y, &met) * sample.weight.x;
+            let Some((hit, _)) = light_hit(&shape, from, sample.direction) else { continue };
+            let product = light.pdf(from, Vec3::Y, &hit) * sample.weight.x;
             compared += 1;
             // A sample on the border between two texels may belong to either.
             apart += u32::from((product - 1.0).abs() > 2e-3);
@@ -273,8 +273,8 @@ fn expected_counts(
         let mut before = 0.0;
         for j in 0..SIDE * fine {
             let place = [i, j].map(|k| (k as f32 + random.unit_f32()) / (SIDE * fine) as f32);
-            let met = light_hit(shape, from, directions.direction(place));
-            let share = met.map_or(0.0, |(met, _)| f64::from(light.pdf(from, Vec3::Y, &met)) * square);
+            let hit = light_hit(shape, from, directions.direction(place));
+            let share = hit.map_or(0.0, |(hit, _)| f64::from(light.pdf(from, Vec3::Y, &hit)) * square);
             let (wanted, variance) = &mut bins[i / fine * SIDE + j / fine];
             *wanted += share;
             // A square on a border is counted either entirely or not at all.

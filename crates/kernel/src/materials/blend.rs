@@ -1,7 +1,7 @@
-//! Blends of two materials. Each interaction chooses one of the materials at random, in proportion to its
-//! weight, and then treats the surface as an ordinary material. Estimates are unbiased because the choice is
-//! independent of all other random numbers, and each chosen material has consistent values and pdfs. Shadow
-//! rays and light samples, which have no such choice, use weighted means.
+//! Blends of two materials. Each interaction chooses one of the materials with the probability of its weight,
+//! and then shades the surface as if it had only that material. Estimates are unbiased because the choice is
+//! independent of all other random numbers, and each material has consistent values and pdfs. Shadow rays and
+//! light samples do not choose; they use weighted means.
 
 use super::Material;
 use super::footprint::TexturePoint;
@@ -18,8 +18,8 @@ pub struct Blend {
 }
 
 impl Blend {
-    /// Chooses a part with a random number in [0, 1), which is scaled to the remaining range for nested
-    /// blends. Counts texture lookups in `lookups`.
+    /// Chooses a part with the random number `u` in [0, 1), and remaps `u` to [0, 1) so that nested blends
+    /// can reuse it. Counts texture lookups in `lookups`.
     pub fn choose(&self, at: &TexturePoint, u: &mut f32, lookups: &mut u64) -> &Material {
         let weight = self.second_weight(at, lookups);
         if *u < weight {
@@ -31,8 +31,8 @@ impl Blend {
         }
     }
 
-    /// Weighted mean of a value of the parts. Does not evaluate parts without weight. Counts texture lookups
-    /// in `lookups`.
+    /// Weighted mean of `value` over the parts. Skips parts with weight 0. Counts texture lookups in
+    /// `lookups`.
     pub fn mean(
         &self,
         at: &TexturePoint,

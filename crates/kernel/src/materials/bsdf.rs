@@ -194,8 +194,8 @@ pub trait BxdfParameters {
     /// The material with its color multiplied by `color`.
     fn tinted(self, color: Vec3) -> Self;
 
-    /// Reflectances of the wide and the narrow lobes for light that a coat above them reflects back down. 0
-    /// ignores this light.
+    /// Reflectances of the wide and the narrow lobes for light that a coat reflects back down. 0 neglects
+    /// this light.
     #[inline(always)]
     fn reflectances_under_coat(&self) -> [Vec3; 2] {
         [Vec3::ZERO; 2]

@@ -166,13 +166,13 @@ pub trait Bxdf: Soa + Default {
     /// select the direction within it. All are in [0, 1).
     fn sample(&self, view: &Self::View, from: SampledLobes, random: [f32; 3], any: BxdfFlags) -> Vec3;
 
-    /// Probability that a direction sampled from all lobes is sampled from a narrow lobe.
+    /// Probability that sampling all lobes chooses a narrow lobe.
     #[inline(always)]
-    fn narrow_share(&self, _view: &Self::View) -> f32 {
+    fn narrow_lobe_probability(&self, _view: &Self::View) -> f32 {
         1.0
     }
 
-    /// Estimate of the directional albedo, which determines how often a coat over the lobes is sampled. Must
+    /// Estimate of the directional albedo, which determines how often a coat over the lobes is sampled. May
     /// be 0 only for black surfaces.
     #[inline(always)]
     fn albedo_estimate(&self, _view: &Self::View) -> f32 {

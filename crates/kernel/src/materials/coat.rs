@@ -1,18 +1,18 @@
 //! The dielectric layer of coats: clear coats over any opaque material, and the coat of plastic.
 //!
-//! A coat of weight c has a GGX lobe c·F·D·G/(4 cosθᵢ cosθₒ), whose directional albedo is c·E(μ). Light in
-//! either direction passes the coat with the transmittance t(μ) = (1 − c·E(μ))·T^(1/(2 cosθₜ)), so that the
-//! layer below is multiplied by t(μᵢ)·t(μₒ). The first factor scales by albedo (Kulla and Conty, *Revisiting
-//! Physically Based Shading at Imageworks*, SIGGRAPH 2017 course): the layers are reciprocal and never gain
-//! energy. The second factor is absorption along the refracted path (Jakob et al., *A Comprehensive Framework
-//! for Rendering Layered Materials*, SIGGRAPH 2014, section 5.1). T is the transmittance in and out together
-//! at normal incidence.
+//! A coat of weight c has a GGX lobe c·F·D·G/(4 cosθᵢ cosθₒ), whose directional albedo is c·E(μ). The coat
+//! transmits t(μ) = (1 − c·E(μ))·T^(1/(2 cosθₜ)) of the light in either direction, so the lobes of the layer
+//! below are multiplied by t(μᵢ)·t(μₒ). The first factor of t is albedo scaling (Kulla and Conty, *Revisiting
+//! Physically Based Shading at Imageworks*, SIGGRAPH 2017 course): the layered BSDF is reciprocal and never
+//! gains energy. The second factor is absorption along the refracted path (Jakob et al., *A Comprehensive
+//! Framework for Rendering Layered Materials*, SIGGRAPH 2014, section 5.1). T is the transmittance for a
+//! round trip through the layer at normal incidence.
 //!
 //! The coat also reflects light back down. Under a diffuse lobe of reflectance ρ, the returned fraction is
 //! c·Ē, with Ē = 2∫E μ dμ, and the geometric series of all reflections multiplies the lobe by 1/(1 − ρ·c·Ē).
-//! A white diffuse base therefore reflects all light. For a narrow lobe, which keeps the angle, the fraction
-//! is the smaller one of c·E(μᵢ) and c·E(μₒ), so that the lobe stays reciprocal and below 1. The absorption
-//! of the returned light is ignored. Principled materials ignore all of it.
+//! A white diffuse base therefore reflects all light. A narrow lobe preserves the angle, so its fraction is
+//! the smaller of c·E(μᵢ) and c·E(μₒ), which keeps the lobe reciprocal and its albedo at most 1. Absorption
+//! of the returned light is neglected, and principled materials neglect the returned light altogether.
 
 use super::footprint::TexturePoint;
 use super::fresnel::{dielectric_from_outside, schlick_weight};
@@ -46,7 +46,7 @@ pub struct CoatInputs {
     pub roughness: ScalarParameter,
     /// Index of refraction, at least 1.
     pub ior: f32,
-    /// Transmittance T of the layer, in and out together, at normal incidence.
+    /// Transmittance T for a round trip through the layer at normal incidence.
     pub tint: ColorOrTexture,
 }
 
@@ -61,14 +61,14 @@ pub struct CoatPoint {
     pub reflectance: f32,
     /// Index of refraction.
     pub ior: f32,
-    /// Extinction on the way in or out at normal incidence, −½·log₂ T.
+    /// Extinction for one pass through the layer at normal incidence, −½·log₂ T.
     pub extinction: Vec3,
     /// Albedo E of the lobe for a weight of 1.
     pub albedo: LobeAlbedoPolynomial,
 }
 
 impl Coat {
-    /// Creates a coat, or returns `None` if its weight is 0.
+    /// Creates a coat. Returns `None` if its weight is 0.
     pub fn new(inputs: CoatInputs) -> Option<Self> {
         if inputs.weight.as_untextured() == Some(0.0) {
             return None;
@@ -99,15 +99,15 @@ impl Coat {
         }
     }
 
-    /// The transmittance t for light that leaves the layer below at the given cosine. Counts texture lookups
-    /// in `lookups`.
+    /// Transmittance t for light that leaves the layer below at the given cosine. Counts texture lookups in
+    /// `lookups`.
     pub fn transmittance(&self, at: &TexturePoint, cosine: f32, lookups: &mut u64) -> Vec3 {
         let layer = ClearCoatLayer::from(&self.look_up_parameters(&mut PointLookup { point: at, lookups }));
         let cosine = cosine.abs();
         layer.absorption_transmittance(layer.path_length(cosine)) * (1.0 - layer.albedo(cosine))
     }
 
-    /// The transmittance t² in and out at the given cosine, including the light that the coat returns to a
+    /// Transmittance t² in and out at the given cosine, including interreflection between the coat and a
     /// mirror with the reflectance `base`. Counts texture lookups in `lookups`.
     pub fn two_way_transmittance(
         &self,
@@ -143,8 +143,8 @@ soa! {
     }
 }
 
-/// The sum 1/(1 − x) of all reflections between a coat and its base, where x is the product of their
-/// reflectances. The base's reflectance is limited to 1.
+/// Sum 1/(1 − x) of the geometric series of reflections between a coat and its base, where x is the product
+/// of their reflectances. Clamps the base's reflectance to 1.
 #[inline(always)]
 pub fn interreflection_gain(base: Vec3, coat: f32) -> Vec3 {
     let least = Vec3::splat(f32::MIN_POSITIVE);
@@ -169,7 +169,7 @@ pub(super) fn nonnegative_cosine(cosine: f32) -> f32 {
 }
 
 impl<const EXACT: bool, const BECKMANN: bool> CoatLayer<EXACT, BECKMANN> {
-    const DISTRIBUTION: MicrofacetDistribution = MicrofacetDistribution::beckmann_if(BECKMANN);
+    const DISTRIBUTION: MicrofacetDistribution = MicrofacetDistribution::ggx_or_beckmann(BECKMANN);
 
     /// Directional albedo c·E at a cosine ≥ 0.
     #[inline(always)]
@@ -228,7 +228,7 @@ impl<const EXACT: bool, const BECKMANN: bool> CoatLayer<EXACT, BECKMANN> {
         self.ior / squared.sqrt().max(f32::MIN_POSITIVE)
     }
 
-    /// Fraction of the light that is not absorbed along a path of this length through the layer.
+    /// Transmittance along a path of this length through the layer.
     #[inline(always)]
     pub fn absorption_transmittance(&self, length: f32) -> Vec3 {
         let Vec3 { x, y, z } = self.extinction * -length;

@@ -1,4 +1,4 @@
-//! Microfacets with single scattering: the GGX and Beckmann distributions (Walter et al., *Microfacet Models
+//! Single-scattering microfacet models: the GGX and Beckmann distributions (Walter et al., *Microfacet Models
 //! for Refraction through Rough Surfaces*, 2007) with height-correlated Smith masking and shadowing (Heitz,
 //! *Understanding the Masking-Shadowing Function in Microfacet-Based BRDFs*, JCGT 3(2), 2014).
 //!
@@ -28,9 +28,9 @@ choice! {
 }
 
 impl MicrofacetDistribution {
-    /// Beckmann if the condition holds, or else GGX.
-    pub const fn beckmann_if(condition: bool) -> Self {
-        if condition { Self::Beckmann } else { Self::Ggx }
+    /// Returns Beckmann if `is_beckmann` is true, and GGX otherwise.
+    pub const fn ggx_or_beckmann(is_beckmann: bool) -> Self {
+        if is_beckmann { Self::Beckmann } else { Self::Ggx }
     }
 }
 
@@ -153,7 +153,7 @@ impl UnnormalizedHalfVector {
     /// exp(−tan²θ/α²)/(π α² cos⁴θ).
     #[inline(always)]
     fn beckmann_ndf_from_stretched(&self, stretched: f32, product: f32) -> f32 {
-        // Beyond this slope, D is negligible, and its terms may overflow.
+        // Beyond this slope, D is negligible and its terms may overflow.
         const MAX_SQUARED_SLOPE: f32 = 80.0;
         let along = self.along * self.along;
         let slope = stretched / along;

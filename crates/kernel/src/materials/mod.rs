@@ -6,7 +6,6 @@ pub mod bxdf;
 pub mod bxdf_packet;
 pub mod bxdfs;
 pub mod coat;
-pub mod coated;
 pub mod dielectric;
 pub mod emission;
 pub mod footprint;
@@ -21,6 +20,7 @@ pub mod normal_perturbation;
 pub mod opacity;
 pub mod scalar;
 pub mod schlick_albedo;
+pub mod specular_over_base;
 pub mod texels;
 pub mod texture;
 pub mod thin_dielectric;
@@ -28,7 +28,6 @@ pub mod thin_dielectric;
 pub use blend::Blend;
 pub use bxdfs::*;
 pub use coat::{Coat, CoatInputs};
-pub use coated::{Coated, SpecularPart};
 pub use dielectric::Dielectric;
 pub use emission::{Emission, EmissionSides};
 pub use footprint::{Footprint, SecondUvPoint, TexturePoint, UvSet};
@@ -38,6 +37,7 @@ pub use normal_map::NormalMap;
 pub use normal_perturbation::{Bump, NormalPerturbation};
 pub use opacity::Opacity;
 pub use scalar::{Channel, ChannelSelector, ScalarParameter};
+pub use specular_over_base::{SpecularOverBase, SpecularPart};
 pub use thin_dielectric::ThinDielectric;
 
 use std::sync::Arc;
@@ -47,7 +47,7 @@ use crate::math::Vec3;
 use texture::Texture;
 
 choice! {
-    /// Which sides of an opaque surface reflect light.
+    /// The sides of an opaque surface that reflect light.
     pub enum ReflectingSides {
         /// Both sides.
         Both = "both",
@@ -61,7 +61,7 @@ choice! {
 pub struct Material {
     /// How the surface scatters light.
     pub bsdf: Bsdf,
-    /// Which sides scatter light.
+    /// The sides that scatter light.
     pub sides: ReflectingSides,
     /// Emitted radiance.
     pub emission: Emission,
@@ -72,7 +72,8 @@ pub struct Material {
 }
 
 impl Material {
-    /// Whether a side of the surface scatters light. The parts of a blend have their own sides.
+    /// Whether the front or the back scatters light. Always true for blends, whose parts have their own
+    /// `sides`.
     #[inline]
     pub fn scatters_on_side(&self, is_front: bool) -> bool {
         match self.sides {
@@ -103,7 +104,7 @@ impl Material {
             | Bsdf::Mirror(_)
             | Bsdf::Dielectric(_)
             | Bsdf::ThinDielectric(_)
-            | Bsdf::Coated(_) => None,
+            | Bsdf::SpecularOverBase(_) => None,
         }
     }
 
@@ -112,8 +113,8 @@ impl Material {
         self.blend().is_some_and(|blend| blend.parts.iter().any(property))
     }
 
-    /// Chooses one of the materials of a blend with a random number in [0, 1). Other materials are their own
-    /// only choice. Counts texture lookups in `lookups`.
+    /// Chooses a part of a blend, or of blends nested in it, with a random number in [0, 1). Returns other
+    /// materials unchanged. Counts texture lookups in `lookups`.
     #[inline]
     pub fn choose_part(&self, at: &TexturePoint, u: impl FnOnce() -> f32, lookups: &mut u64) -> &Self {
         let Some(mut blend) = self.blend() else { return self };
@@ -132,8 +133,9 @@ impl Material {
         self.emission.is_emissive() || self.is_any_part(Self::is_emissive)
     }
 
-    /// Expected radiance that a side emits, in a direction at the given cosine to the normal: the radiance
-    /// times the opacity, averaged over the parts of a blend. Counts texture lookups in `lookups`.
+    /// Expected radiance emitted from one side, at the given cosine to the normal: the radiance times the
+    /// opacity, or for a blend, the weighted mean of this over its parts. Counts texture lookups in
+    /// `lookups`.
     pub fn expected_emission(
         &self,
         at: &TexturePoint,
@@ -155,16 +157,16 @@ impl Material {
         }
     }
 
-    /// Probability that the surface exists at a point with a material for which `is_meant` is true. Counts
+    /// Probability that the surface exists at a point with a material for which `accepts` is true. Counts
     /// texture lookups in `lookups`.
-    pub fn presence(&self, at: &TexturePoint, is_meant: &dyn Fn(&Self) -> bool, lookups: &mut u64) -> f32 {
+    pub fn presence(&self, at: &TexturePoint, accepts: &dyn Fn(&Self) -> bool, lookups: &mut u64) -> f32 {
         match self.blend() {
             Some(blend) => {
-                let of_part =
-                    |part: &Self, lookups: &mut u64| Vec3::splat(part.presence(at, is_meant, lookups));
-                blend.mean(at, lookups, of_part).x
+                let for_part =
+                    |part: &Self, lookups: &mut u64| Vec3::splat(part.presence(at, accepts, lookups));
+                blend.mean(at, lookups, for_part).x
             }
-            None if !is_meant(self) => 0.0,
+            None if !accepts(self) => 0.0,
             None => self.opacity.as_ref().map_or(1.0, |opacity| opacity.evaluate(at, lookups)),
         }
     }
@@ -198,12 +200,14 @@ impl Material {
         self.textures().iter().any(|texture| texture.mipmaps.is_some())
     }
 
-    /// All textures. The emission's coat is omitted because it has the same textures as the BSDF's coat.
+    /// All textures. Skips the coat of the emission, which has the same textures as the coat of the BSDF.
     fn textures(&self) -> Vec<&Arc<Texture>> {
         let mut textures: Vec<_> = match &self.bsdf {
             Bsdf::NonSpecular(rough) => rough.textures().collect(),
             Bsdf::Mirror(mirror) => mirror.textures().collect(),
-            Bsdf::Coated(coated) => coated.specular_textures().chain(coated.base.textures()).collect(),
+            Bsdf::SpecularOverBase(layers) => {
+                layers.specular_textures().chain(layers.base.textures()).collect()
+            }
             Bsdf::Dielectric(glass) => glass.roughness.texture().into_iter().collect(),
             Bsdf::ThinDielectric(pane) => pane.tint.texture().into_iter().collect(),
             Bsdf::Blend(blend) => blend
@@ -232,7 +236,7 @@ pub enum Bsdf {
     /// A thin dielectric pane.
     ThinDielectric(ThinDielectric),
     /// A surface with a δ lobe and non-specular lobes.
-    Coated(Coated),
+    SpecularOverBase(SpecularOverBase),
     /// A blend of two materials.
     Blend(Box<Blend>),
 }
@@ -244,7 +248,7 @@ impl Bsdf {
         match self {
             Self::NonSpecular(_) => false,
             Self::Dielectric(glass) => glass.is_smooth(),
-            Self::Mirror(_) | Self::ThinDielectric(_) | Self::Coated(_) => true,
+            Self::Mirror(_) | Self::ThinDielectric(_) | Self::SpecularOverBase(_) => true,
             Self::Blend(blend) => blend.parts.iter().any(|part| part.bsdf.has_delta()),
         }
     }
@@ -258,7 +262,7 @@ impl Bsdf {
             | Self::Mirror(_)
             | Self::Dielectric(_)
             | Self::ThinDielectric(_)
-            | Self::Coated(_) => self.non_specular_part().is_some(),
+            | Self::SpecularOverBase(_) => self.non_specular_part().is_some(),
         }
     }
 
@@ -272,7 +276,9 @@ impl Bsdf {
     #[inline]
     pub fn non_specular_part(&self) -> Option<&NonSpecular> {
         match self {
-            Self::NonSpecular(rough) | Self::Coated(Coated { base: rough, .. }) => Some(rough),
+            Self::NonSpecular(rough) | Self::SpecularOverBase(SpecularOverBase { base: rough, .. }) => {
+                Some(rough)
+            }
             Self::Mirror(_) | Self::Dielectric(_) | Self::ThinDielectric(_) | Self::Blend(_) => None,
         }
     }
@@ -285,7 +291,7 @@ impl Bsdf {
             Self::Mirror(_)
             | Self::Dielectric(_)
             | Self::ThinDielectric(_)
-            | Self::Coated(_)
+            | Self::SpecularOverBase(_)
             | Self::Blend(_) => None,
         }
     }
@@ -298,7 +304,7 @@ impl Bsdf {
             Self::NonSpecular(_)
             | Self::Mirror(_)
             | Self::Dielectric(_)
-            | Self::Coated(_)
+            | Self::SpecularOverBase(_)
             | Self::Blend(_) => None,
         }
     }
@@ -309,7 +315,7 @@ impl Bsdf {
             Self::Dielectric(glass) => Some(glass),
             Self::NonSpecular(_)
             | Self::Mirror(_)
-            | Self::Coated(_)
+            | Self::SpecularOverBase(_)
             | Self::ThinDielectric(_)
             | Self::Blend(_) => None,
         }
@@ -328,7 +334,7 @@ impl Bsdf {
             | Self::Mirror(_)
             | Self::Dielectric(_)
             | Self::ThinDielectric(_)
-            | Self::Coated(_) => self.non_specular_part().is_some_and(property),
+            | Self::SpecularOverBase(_) => self.non_specular_part().is_some_and(property),
         }
     }
 
@@ -340,7 +346,7 @@ impl Bsdf {
             Self::Mirror(mirror) => mirror.reflectance(1.0, None, at, lookups),
             Self::Dielectric(glass) => glass.tint,
             Self::ThinDielectric(pane) => pane.tint.evaluate(at, lookups),
-            Self::Coated(coated) => coated.albedo(at, lookups),
+            Self::SpecularOverBase(layers) => layers.albedo(at, lookups),
             Self::Blend(blend) => blend.mean(at, lookups, |part, lookups| part.bsdf.albedo(at, lookups)),
         }
     }

@@ -6,9 +6,8 @@ use std::sync::LazyLock;
 use super::lobe_albedo::{AlbedoTable, LobeAlbedoPolynomial};
 use super::microfacet::{self, MicrofacetDistribution};
 
-/// Albedos of two lobes that use Schlick's approximation. One lobe's facets have a reflectance of 1 at normal
-/// incidence and 0 at grazing angles, and the other lobe's facets 0 at normal incidence and 1 at grazing
-/// angles.
+/// Albedos of two lobes that use Schlick's approximation. The facets of one lobe have a reflectance of 1 at
+/// normal incidence and 0 at grazing angles; the facets of the other lobe have the reverse.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SchlickAlbedoPair {
     /// Albedo per unit of reflectance at normal incidence.

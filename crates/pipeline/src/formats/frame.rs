@@ -8,10 +8,10 @@ use crate::turntable::TurntableFrame;
 /// Vertical field of view in degrees.
 pub(super) const FOV: f64 = 30.0;
 /// Fraction of the image's width and height that the model may occupy.
-const FILLED: f64 = 0.88;
+const MAX_FILL: f64 = 0.88;
 
 /// Minimum model size.
-const LEAST: f64 = 1e-30;
+const MIN_SIZE: f64 = 1e-30;
 
 /// Maximum number of turntable frames for which to measure the model. More would not change the result
 /// noticeably.
@@ -41,19 +41,19 @@ impl ViewSide {
 }
 
 /// Returns the closest camera that keeps all `points` inside the image in each of the `turns` turntable
-/// frames. `least` and `greatest` are opposite corners of the model's bounding box.
+/// frames. `min` and `max` are opposite corners of the model's bounding box.
 pub(super) fn frame_model(
-    [least, greatest]: [DVec3; 2],
+    [min, max]: [DVec3; 2],
     points: &[DVec3],
     from: ViewSide,
     turns: u32,
     aspect: f64,
 ) -> CameraPose {
     let (back, up) = from.to_camera_and_up_axes();
-    let middle = (least + greatest) * 0.5;
-    let tangent = libm::tan((FOV * 0.5).to_radians()) * FILLED;
+    let middle = (min + max) * 0.5;
+    let tangent = libm::tan((FOV * 0.5).to_radians()) * MAX_FILL;
     // Move the camera back until every point is inside the frame.
-    let half = (greatest - least) * 0.5;
+    let half = (max - min) * 0.5;
     let mut distance = 0.0_f64;
     for back in TurntableFrame::target_to_camera_vectors(turns.min(MAX_MEASURED), back, up) {
         let right = up.cross(back).normalize_or(DVec3::X);
@@ -64,9 +64,9 @@ pub(super) fn frame_model(
             distance = distance.max(near + (across / (tangent * aspect)).max(upwards / tangent));
         }
     }
-    let distance = distance.max(LEAST);
+    let distance = distance.max(MIN_SIZE);
     // Drop digits that make no visible difference.
-    let size = half.length().max(LEAST);
+    let size = half.length().max(MIN_SIZE);
     let step = size * 1e-4;
     let tidy = |at: DVec3| DVec3::from(at.to_array().map(|part| round_to_decimals_of_step(part, step)));
     CameraPose { position: tidy(middle + back * distance), look_at: tidy(middle), up }
@@ -81,9 +81,9 @@ pub(super) fn round_to_decimals_of_step(value: f64, step: f64) -> f64 {
 }
 
 /// Elevation of the key light in degrees.
-const ELEVATION: f64 = 50.0;
+const KEY_LIGHT_ELEVATION: f64 = 50.0;
 /// Azimuth of the key light in degrees, to the left of the camera.
-const ASIDE: f64 = 40.0;
+const KEY_LIGHT_AZIMUTH: f64 = 40.0;
 
 /// Direction in which the key light travels. The light comes from above the viewer's left shoulder.
 pub(super) fn key_light_travel_direction(eye: &CameraPose) -> DVec3 {
@@ -91,23 +91,24 @@ pub(super) fn key_light_travel_direction(eye: &CameraPose) -> DVec3 {
     // For views from directly above or below, use the front direction instead.
     let flat = DVec3::new(back.x, 0.0, back.z);
     let flat = if flat.length() > 1e-3 * back.length() { flat.normalize() } else { DVec3::Z };
-    let (sin, cos) = (libm::sin(ASIDE.to_radians()), libm::cos(ASIDE.to_radians()));
+    let (sin, cos) = (libm::sin(KEY_LIGHT_AZIMUTH.to_radians()), libm::cos(KEY_LIGHT_AZIMUTH.to_radians()));
     let aside = DVec3::new(flat.x * cos - flat.z * sin, 0.0, flat.x * sin + flat.z * cos);
-    let (rise, run) = (libm::sin(ELEVATION.to_radians()), libm::cos(ELEVATION.to_radians()));
+    let (rise, run) =
+        (libm::sin(KEY_LIGHT_ELEVATION.to_radians()), libm::cos(KEY_LIGHT_ELEVATION.to_radians()));
     let towards = aside * run + DVec3::Y * rise;
     DVec3::from((-towards).to_array().map(|part| round_significant(part, 2)))
 }
 
 /// Radiance of the sky.
-pub(super) const SKY: f64 = 0.5;
+pub(super) const SKY_RADIANCE: f64 = 0.5;
 /// Irradiance of the key light at normal incidence.
-pub(super) const KEY: f64 = 1.5;
+pub(super) const KEY_LIGHT_IRRADIANCE: f64 = 1.5;
 
 /// Ground reflectance that makes level ground as bright as the sky, which hides the horizon. The ground's
-/// irradiance is π·`SKY` plus the key light's contribution.
+/// irradiance is π·`SKY_RADIANCE` plus the key light's contribution.
 pub(super) fn ground_reflectance_matching_sky() -> f64 {
-    let key = KEY * libm::sin(ELEVATION.to_radians()) / std::f64::consts::PI;
-    round_significant(SKY / (SKY + key), 3)
+    let key = KEY_LIGHT_IRRADIANCE * libm::sin(KEY_LIGHT_ELEVATION.to_radians()) / std::f64::consts::PI;
+    round_significant(SKY_RADIANCE / (SKY_RADIANCE + key), 3)
 }
 
 #[cfg(test)]
@@ -174,9 +175,9 @@ mod tests {
     fn ground_is_as_bright_as_the_sky() {
         let eye = frame_model([DVec3::ZERO, DVec3::ONE], &[DVec3::ZERO, DVec3::ONE], ViewSide::Iso, 1, 1.0);
         let direction = key_light_travel_direction(&eye).normalize();
-        let irradiance = std::f64::consts::PI * SKY - direction.y * KEY;
+        let irradiance = std::f64::consts::PI * SKY_RADIANCE - direction.y * KEY_LIGHT_IRRADIANCE;
         let radiance = ground_reflectance_matching_sky() * irradiance / std::f64::consts::PI;
-        assert!((radiance / SKY - 1.0).abs() < 0.02, "{radiance}");
+        assert!((radiance / SKY_RADIANCE - 1.0).abs() < 0.02, "{radiance}");
         let to_eye = (eye.position - eye.look_at).normalize();
         assert!((-direction).dot(to_eye) > 0.3, "the key light and the camera should be on the same side");
     }

@@ -40,7 +40,7 @@ pub fn import_scene(path: &Path, folder: &str, token: &CancelToken) -> Result<Im
         AssetError::OutOfMemory { .. } | AssetError::TooManyOpenFiles { .. } => {
             ImportError::Work(error.to_string())
         }
-        AssetError::Unreadable { .. } | AssetError::Malformed { .. } | AssetError::Cancelled(_) => {
+        AssetError::Unreadable { .. } | AssetError::Malformed { .. } | AssetError::Canceled(_) => {
             ImportError::File(error.to_string())
         }
     })

@@ -6,15 +6,15 @@ use std::path::Path;
 
 use super::frame::{FOV, frame_model};
 use super::model::{
-    Lighting, NARROW, ROUGH, SIZE, UsedNames, add_camera, add_ground, add_render_settings,
-    add_sky_and_key_light, file_name, warning,
+    DEFAULT_SIZE, Lighting, POLISHED_EXPONENT, POLISHED_ROUGHNESS, UsedNames, add_camera, add_ground,
+    add_render_settings, add_sky_and_key_light, file_name, warning,
 };
 use super::{ForeignReadContext, ForeignScene};
 use crate::assets::gltf::ModelProjection;
 use crate::assets::{AssetError, FileMaterial, LoadedMesh};
 use crate::control::ignore_progress;
 use crate::math::DVec3;
-use crate::math::limits::LARGEST;
+use crate::math::limits::MAX_MAGNITUDE;
 use crate::messages::INVISIBLE_MODEL;
 use crate::scene::{BuiltDocument, BuiltValue, MORE_LIKE_THESE};
 use crate::settings::{UpAxis, ViewSide};
@@ -56,13 +56,13 @@ fn material_may_cast_caustics(material: &FileMaterial) -> bool {
     let is_mirror_or_glass = matches!(material.illumination_model, Some(3..=9));
     match &material.physical {
         Some(own) => {
-            let is_smooth = own.roughness_texture.is_some() || f64::from(own.roughness) < ROUGH;
-            let is_coated = own.clearcoat > 0.0 && f64::from(own.clearcoat_roughness) < ROUGH;
+            let is_smooth = own.roughness_texture.is_some() || f64::from(own.roughness) < POLISHED_ROUGHNESS;
+            let is_coated = own.clearcoat > 0.0 && f64::from(own.clearcoat_roughness) < POLISHED_ROUGHNESS;
             is_mirror_or_glass || is_smooth || is_coated
         }
         None => {
             let reflects = material.specular_texture.is_some() || material.specular.max_element() > 0.0;
-            is_mirror_or_glass || reflects && material.shininess > NARROW
+            is_mirror_or_glass || reflects && material.shininess > POLISHED_EXPONENT
         }
     }
 }
@@ -100,12 +100,12 @@ fn scene_of_mesh(
     &ForeignReadContext { view, containers, token }: &ForeignReadContext<'_>,
 ) -> Result<ForeignScene, AssetError> {
     let loaded = containers.load_any_mesh(path, None, &ignore_progress, token)?;
-    let Some([least, greatest]) = loaded.mesh.bounds_in_file_coordinates() else {
+    let Some([min, max]) = loaded.mesh.bounds_in_file_coordinates() else {
         return Err(AssetError::malformed(path, None, "no usable face"));
     };
     let up = view.up.unwrap_or(up);
     let upright = |at: DVec3| up.rotate_point_upright(at);
-    let (a, b) = (upright(least), upright(greatest));
+    let (a, b) = (upright(min), upright(max));
     let bounds = [a.min(b), a.max(b)];
     let points: Vec<DVec3> = loaded.mesh.extreme_vertices().into_iter().map(upright).collect();
     let eye = frame_model(
@@ -113,14 +113,14 @@ fn scene_of_mesh(
         &points,
         view.from.unwrap_or(ViewSide::Iso),
         view.turns,
-        view.aspect.unwrap_or(SIZE[0] / SIZE[1]),
+        view.aspect.unwrap_or(DEFAULT_SIZE[0] / DEFAULT_SIZE[1]),
     );
     // Report the file's coordinates as the cause, because the user did not choose the camera position.
     let eye_reach = eye.position.abs().max(eye.look_at.abs()).max_element();
-    if eye_reach >= LARGEST {
-        let farthest = least.abs().max(greatest.abs()).max_element() as f32;
+    if eye_reach >= MAX_MAGNITUDE {
+        let farthest = min.abs().max(max.abs()).max_element() as f32;
         let reason = format!(
-            "its coordinates extend to {farthest:e}, which places the camera at {eye_reach:.0e}; coordinates must be below {LARGEST:e}"
+            "its coordinates extend to {farthest:e}, which places the camera at {eye_reach:.0e}; coordinates must be below {MAX_MAGNITUDE:e}"
         );
         return Err(AssetError::malformed(path, None, reason));
     }

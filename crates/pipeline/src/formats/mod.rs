@@ -45,7 +45,7 @@ const FORMATS: [ForeignFormat; 4] = [
 ];
 
 /// Extensions of unsupported model formats.
-const UNSUPPORTED: [&str; 22] = [
+const UNSUPPORTED_EXTENSIONS: [&str; 22] = [
     "3dm", "3ds", "3mf", "abc", "blend", "c4d", "dae", "fbx", "iges", "igs", "lwo", "ma", "max", "mb",
     "step", "stp", "usd", "usda", "usdc", "usdz", "wrl", "x3d",
 ];
@@ -143,7 +143,7 @@ pub fn foreign_file_error(path: &Path) -> Option<Diagnostic> {
         Some(Diagnostic { help, ..Diagnostic::about_file(path, Severity::Error, message) })
     };
     let extension = lowercase_extension(path);
-    if UNSUPPORTED.contains(&extension.as_str()) && lacks_camera_header(path) {
+    if UNSUPPORTED_EXTENSIONS.contains(&extension.as_str()) && lacks_camera_header(path) {
         let models = FORMATS.iter().filter(|format| format.is_model).flat_map(|format| format.extensions);
         let models: Vec<_> = models.map(|one| format!(".{one}")).collect();
         let help = format!("export it in one of these formats: {}", models.join(", "));

@@ -4,8 +4,8 @@ use std::collections::HashSet;
 use std::path::Path;
 
 use super::frame::{
-    CameraPose, KEY, SKY, ground_reflectance_matching_sky, key_light_travel_direction,
-    round_to_decimals_of_step,
+    CameraPose, KEY_LIGHT_IRRADIANCE, SKY_RADIANCE, ground_reflectance_matching_sky,
+    key_light_travel_direction, round_to_decimals_of_step,
 };
 use super::rounding::{round_significant, shorten, shorten_vector};
 use crate::assets::gltf::ModelProjection;
@@ -30,7 +30,7 @@ pub(crate) struct ModelViewOptions {
 }
 
 /// Default width and height of the image.
-pub(super) const SIZE: [f64; 2] = [640.0, 480.0];
+pub(super) const DEFAULT_SIZE: [f64; 2] = [640.0, 480.0];
 
 impl Default for ModelViewOptions {
     fn default() -> Self {
@@ -45,7 +45,7 @@ impl ModelViewOptions {
             (None, None) => None,
             (width, height) => {
                 let or = |given: Option<u32>, usual: f64| given.map_or(usual, f64::from);
-                Some(or(width, SIZE[0]) / or(height, SIZE[1]))
+                Some(or(width, DEFAULT_SIZE[0]) / or(height, DEFAULT_SIZE[1]))
             }
         };
         Self {
@@ -82,13 +82,13 @@ pub(super) fn file_name(path: &Path) -> String {
 
 /// Limit on indirect radiance per bounce: four times the sky's radiance. It is used for scenes with polished
 /// surfaces, in which caustics from the key light would appear as fireflies at low sample counts.
-const CLAMP: f64 = 2.0;
+const POLISHED_CLAMP: f64 = 2.0;
 /// Roughness above which surfaces do not cause fireflies. At 64 samples, clamping changes the error by a
 /// quarter at roughness 0.4, but by a factor of ten at roughness 0.2.
-pub(super) const ROUGH: f64 = 0.3;
-/// Phong exponent with a highlight as narrow as a GGX lobe of roughness [`ROUGH`]: 2/α² − 2 with α =
-/// roughness².
-pub(super) const NARROW: f32 = 245.0;
+pub(super) const POLISHED_ROUGHNESS: f64 = 0.3;
+/// Phong exponent with a highlight as narrow as a GGX lobe of roughness [`POLISHED_ROUGHNESS`]: 2/α² − 2 with
+/// α = roughness².
+pub(super) const POLISHED_EXPONENT: f32 = 245.0;
 
 /// Lighting for a model.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -109,8 +109,8 @@ impl Lighting {
     /// Creates lighting that uses the file's lights. `irradiance` is their irradiance on the model.
     pub(super) fn from_file_light_irradiance(irradiance: f64) -> Self {
         // At this irradiance, a white surface is as bright as under the default lights.
-        const USUAL: f64 = 3.0;
-        let over = (irradiance / USUAL).max(1.0);
+        const USUAL_IRRADIANCE: f64 = 3.0;
+        let over = (irradiance / USUAL_IRRADIANCE).max(1.0);
         // Keep the sky's radiance in the valid range even if a light is very close.
         const MAX_STOPS: f64 = 40.0;
         Self::FromFile { exposure: -(libm::log2(over).min(MAX_STOPS) * 10.0).round() / 10.0 }
@@ -119,8 +119,8 @@ impl Lighting {
     /// Radiance of the sky.
     fn sky_radiance(self) -> f64 {
         match self {
-            Self::Default { .. } => SKY,
-            Self::FromFile { exposure } => round_significant(SKY * libm::exp2(-exposure), 3),
+            Self::Default { .. } => SKY_RADIANCE,
+            Self::FromFile { exposure } => round_significant(SKY_RADIANCE * libm::exp2(-exposure), 3),
         }
     }
 }
@@ -136,7 +136,7 @@ pub(super) fn add_render_settings(document: &mut BuiltDocument, size: Option<[f6
     document.set("error", 0.05);
     document.set("integrator", "path");
     match light {
-        Lighting::Default { is_polished: true } => document.set("clamp", CLAMP),
+        Lighting::Default { is_polished: true } => document.set("clamp", POLISHED_CLAMP),
         Lighting::Default { is_polished: false } => {}
         Lighting::FromFile { exposure } if exposure != 0.0 => document.set("exposure", exposure),
         Lighting::FromFile { .. } => {}
@@ -170,7 +170,7 @@ pub(super) fn add_sky_and_key_light(document: &mut BuiltDocument, eye: &CameraPo
         document.list_table("light");
         document.set("type", "directional");
         document.set("direction", shorten_vector(key_light_travel_direction(eye)));
-        document.set("irradiance", KEY);
+        document.set("irradiance", KEY_LIGHT_IRRADIANCE);
         document.set("angle", 6.0);
     }
 }
@@ -179,11 +179,11 @@ pub(super) fn add_sky_and_key_light(document: &mut BuiltDocument, eye: &CameraPo
 pub(super) fn add_ground(
     document: &mut BuiltDocument,
     names: &mut UsedNames,
-    [least, greatest]: [DVec3; 2],
+    [min, max]: [DVec3; 2],
     eye: &CameraPose,
 ) {
-    let size = (greatest - least).length();
-    let height = least.y - size * 1e-4;
+    let size = (max - min).length();
+    let height = min.y - size * 1e-4;
     if eye.position.y <= height {
         return;
     }

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use crate::control::Cancelled;
+use crate::control::Canceled;
 use crate::scene::fingerprint::Fingerprint;
 use crate::stages::FileReadContext;
 use crate::stages::meshes::MeshesByFileIndex;
@@ -32,7 +32,7 @@ impl SceneAssets {
     }
 
     /// Whether a file other than the scene file has changed since it was read.
-    pub(super) fn have_files_changed(&self, reading: &FileReadContext<'_>) -> Result<bool, Cancelled> {
+    pub(super) fn have_files_changed(&self, reading: &FileReadContext<'_>) -> Result<bool, Canceled> {
         let loaded = &self.parsed.loaded;
         let is_mesh = |path: &PathBuf| loaded.scene.mesh_files.iter().any(|file| file.value == *path);
         for FilePathAndContentId { path, content } in &self.files {

@@ -22,7 +22,7 @@ pub(crate) struct ReadyScene {
     pub(crate) assets: Arc<SceneAssets>,
     pub(crate) plan: RenderPlan,
     pub(crate) world: Arc<World>,
-    /// Key for everything that affects the world's images.
+    /// Key for everything in the world that affects images.
     pub(crate) world_key: Fingerprint,
     /// Key for all surfaces, lights and textures. It does not depend on `origin`.
     pub(crate) surfaces: Fingerprint,
@@ -31,10 +31,10 @@ pub(crate) struct ReadyScene {
 }
 
 impl SceneCache {
-    /// Builds the trees, lights and world for a scene. `change` contains the request's camera changes.
+    /// Builds the trees, lights and world for a scene. `change` contains the camera changes of the request.
     ///
     /// # Errors
-    /// Returns [`AbortReason::Cancelled`] if the token is canceled.
+    /// Returns [`AbortReason::Canceled`] if the token is canceled.
     pub(crate) fn build(
         &mut self,
         assets: Arc<SceneAssets>,

@@ -16,7 +16,7 @@ use crate::watch::content::{FileHashCache, FilesSeenByRequest};
 const MAX_READS: usize = 16;
 
 /// One attempt to read a scene's files.
-pub(crate) struct Reading<'a, 't> {
+pub(crate) struct SceneReadAttempt<'a, 't> {
     pub(crate) files: FileReadContext<'a>,
     pub(crate) table: &'a mut StageTable<'t>,
     pub(crate) findings: &'a mut Findings,
@@ -41,17 +41,17 @@ impl FileReader<'_> {
         &self,
         table: &mut StageTable<'_>,
         findings: &mut Findings,
-        mut read: impl FnMut(&mut Reading<'_, '_>) -> Result<T, AbortReason>,
+        mut read: impl FnMut(&mut SceneReadAttempt<'_, '_>) -> Result<T, AbortReason>,
     ) -> Result<T, AbortReason> {
         for _ in 0..MAX_READS {
             let contents = FilesSeenByRequest::new(Arc::clone(self.contents));
             let containers = GltfContainers::default();
             let files = self.context(&contents, &containers);
-            let result = read(&mut Reading { files, table, findings });
-            if result.is_err() && !self.token.is_cancelled() {
+            let result = read(&mut SceneReadAttempt { files, table, findings });
+            if result.is_err() && !self.token.is_canceled() {
                 contents.recheck_seen_files(self.token)?;
             }
-            if self.token.is_cancelled() || contents.changed_file().is_none() {
+            if self.token.is_canceled() || contents.changed_file().is_none() {
                 return result;
             }
             findings.reset();
@@ -85,7 +85,7 @@ impl FileReader<'_> {
     }
 }
 
-impl Reading<'_, '_> {
+impl SceneReadAttempt<'_, '_> {
     /// Checks that no file has changed since the request first saw it.
     ///
     /// # Errors

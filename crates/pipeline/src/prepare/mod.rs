@@ -16,7 +16,7 @@ use std::sync::Arc;
 pub(crate) use self::assets::SceneAssets;
 pub(crate) use self::build::ReadyScene;
 pub(crate) use self::camera::RequestCamera;
-pub(crate) use self::consistent::{FileReader, Reading};
+pub(crate) use self::consistent::{FileReader, SceneReadAttempt};
 use crate::cache::{CacheOfNamedValues, Memo, RequestCache, oldest_request_to_keep};
 use crate::protocol::Stage;
 use crate::stages::accel::AccelCache;
@@ -55,9 +55,9 @@ impl SceneCache {
     pub(crate) fn parse(
         &mut self,
         scene: SceneParseRequest<'_>,
-        reading: &mut Reading<'_, '_>,
+        reading: &mut SceneReadAttempt<'_, '_>,
     ) -> Result<Arc<ParsedScene>, AbortReason> {
-        let Reading { files, table, findings } = reading;
+        let SceneReadAttempt { files, table, findings } = reading;
         let stage = table.start(Stage::Parse);
         // Reading a model uses all threads.
         let parsed = files.pool.install(|| parse(scene, &mut self.parsed, findings, files))?;
@@ -72,9 +72,9 @@ impl SceneCache {
         &mut self,
         parsed: &Arc<ParsedScene>,
         selection: TextureSelection,
-        reading: &mut Reading<'_, '_>,
+        reading: &mut SceneReadAttempt<'_, '_>,
     ) -> Result<SceneAssets, AbortReason> {
-        let (Reading { files, table, findings }, loaded) = (reading, &parsed.loaded);
+        let (SceneReadAttempt { files, table, findings }, loaded) = (reading, &parsed.loaded);
         let stage = table.start(Stage::Meshes);
         let meshes = stage.finish(load_meshes(loaded, &mut self.meshes, findings, files)?);
         let needed = find_needed_textures(loaded, &meshes, selection, &self.textures);

@@ -15,14 +15,14 @@ pub(crate) struct FilmCache {
     kept: Vec<FilmState>,
     /// Key of the pinned film, which is kept regardless of its size.
     pinned: Option<Fingerprint>,
-    most_kept_bytes: u64,
+    max_kept_bytes: u64,
     /// Number of films created so far.
     made: u64,
 }
 
 impl Default for FilmCache {
     fn default() -> Self {
-        Self { current: None, kept: Vec::new(), pinned: None, most_kept_bytes: MAX_KEPT_BYTES, made: 0 }
+        Self { current: None, kept: Vec::new(), pinned: None, max_kept_bytes: MAX_KEPT_BYTES, made: 0 }
     }
 }
 
@@ -61,7 +61,7 @@ impl FilmCache {
     /// Limits the total size of the cached films, not counting the current and the pinned film. Evicts films
     /// to stay within the limit.
     pub(crate) fn set_byte_limit(&mut self, bytes: u64) {
-        self.most_kept_bytes = bytes.min(MAX_KEPT_BYTES);
+        self.max_kept_bytes = bytes.min(MAX_KEPT_BYTES);
         self.make_room(0);
     }
 
@@ -119,7 +119,7 @@ impl FilmCache {
             return;
         }
         if !self.is_pinned(&state) {
-            if size > self.most_kept_bytes || is_left_behind {
+            if size > self.max_kept_bytes || is_left_behind {
                 return;
             }
             self.make_room(size);
@@ -135,7 +135,7 @@ impl FilmCache {
     fn make_room(&mut self, size: u64) {
         let is_counted = |state: &&FilmState| !self.is_pinned(state);
         let mut used: u64 = self.kept.iter().filter(is_counted).map(FilmState::memory_bytes).sum();
-        let (pinned, most) = (self.pinned, self.most_kept_bytes);
+        let (pinned, most) = (self.pinned, self.max_kept_bytes);
         self.kept.retain(|state| {
             let is_dropped = used + size > most && pinned != Some(state.key);
             used -= if is_dropped { state.memory_bytes() } else { 0 };
@@ -168,8 +168,8 @@ mod tests {
         state
     }
 
-    fn films(names: &[&str], most_kept_bytes: u64) -> FilmCache {
-        let mut films = FilmCache { most_kept_bytes, ..FilmCache::default() };
+    fn films(names: &[&str], max_kept_bytes: u64) -> FilmCache {
+        let mut films = FilmCache { max_kept_bytes, ..FilmCache::default() };
         for name in names {
             films.switch_to_cached(key(name), |_| true);
             films.replace_current_with_retry(|| Ok::<_, ()>(state(name))).expect("a film");
@@ -212,7 +212,7 @@ mod tests {
     fn pinned_film_is_kept_regardless_of_size() {
         let mut films = films(&["own"], state("a").memory_bytes());
         films.pin(key("own"));
-        films.most_kept_bytes -= 1;
+        films.max_kept_bytes -= 1;
         for name in ["a", "b", "c"] {
             films.switch_to_cached(key(name), |_| true);
             films.replace_current_with_retry(|| Ok::<_, ()>(state(name))).expect("a film");

@@ -76,14 +76,14 @@ pub(crate) struct EarlierProcessWork {
 }
 
 impl FilmState {
-    /// Creates a state without samples. The film may use at most `most_bytes`.
+    /// Creates a state without samples. The film may use at most `max_bytes`.
     ///
     /// # Errors
     /// There is not enough memory for the film.
     pub(crate) fn new(
         key: Fingerprint,
         plan: &RenderPlan,
-        most_bytes: u64,
+        max_bytes: u64,
         convergence: ConvergenceModel,
         share: Option<Shard>,
     ) -> Result<Self, FilmCreationError> {
@@ -93,7 +93,7 @@ impl FilmState {
             (None, ConvergenceModel::Stratified) => SumOrder::Sequential,
         };
         let film = Film::with_memory_limit(
-            most_bytes,
+            max_bytes,
             plan.settings.render.width,
             plan.settings.render.height,
             plan.crop,
@@ -328,19 +328,19 @@ impl FilmState {
         let is_there =
             |cell: &usize| self.is_tile_in_shard(cell / CELLS) && self.film.cell_rect(*cell).is_some();
         for cell in (0..self.done.len()).filter(is_there) {
-            let lacks = |half: usize| {
+            let remaining_samples = |half: usize| {
                 let (done, end) = (self.done[cell][half], self.expected_samples(cell, half, most));
                 let pixels = self.film.cell_half_pixel_count(cell, half) as f64;
                 let samples = pixels * f64::from(end.saturating_sub(done));
                 self.pixel_share.samples_including_overhead(samples, pixels * f64::from(jobs(done, end)))
             };
-            let (lacking, cost) = (lacks(0) + lacks(1), &self.costs[cell]);
+            let (remaining, cost) = (remaining_samples(0) + remaining_samples(1), &self.costs[cell]);
             if cost.is_unknown() {
-                others += lacking;
+                others += remaining;
                 continue;
             }
             let of_cell = cost.cost_in_samples_with_overhead(self.pixel_share);
-            seconds += lacking * cost.decayed_seconds_sum() / of_cell;
+            seconds += remaining * cost.decayed_seconds_sum() / of_cell;
             known += cost.decayed_seconds_sum();
             worth += of_cell;
         }
@@ -351,12 +351,12 @@ impl FilmState {
     /// Returns two sample counts: the highest current count and the highest expected final count of any
     /// pixel. These are also the current and final numbers of photon passes.
     pub(crate) fn current_and_final_photon_passes(&self, most: u32) -> [u32; 2] {
-        let most_of = |samples: &dyn Fn(usize, usize) -> u32| {
+        let max_of = |samples: &dyn Fn(usize, usize) -> u32| {
             self.shard_cell_halves().map(|(cell, half)| samples(cell, half)).max().unwrap_or(0)
         };
         [
-            most_of(&|cell, half| self.done[cell][half]),
-            most_of(&|cell, half| self.expected_samples(cell, half, most)),
+            max_of(&|cell, half| self.done[cell][half]),
+            max_of(&|cell, half| self.expected_samples(cell, half, most)),
         ]
     }
 

@@ -9,13 +9,13 @@
 //! | [`share`], [`checkpointer`] | one process's share of an image, and checkpoints |
 //! | [`layers`] | additional channels of EXR files |
 //! | [`forecast`] | progress, remaining time and final noise |
-//! | [`first_picture`], [`preview`] | images for the screen |
+//! | [`coarse_image`], [`preview`] | images for the screen |
 
 pub(super) mod checkpointer;
+pub(super) mod coarse_image;
 pub(super) mod commands;
 pub(super) mod film_cache;
 pub(super) mod film_state;
-pub(super) mod first_picture;
 mod forecast;
 pub(super) mod layers;
 mod noise_goals;

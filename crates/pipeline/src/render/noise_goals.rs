@@ -12,7 +12,7 @@ use crate::film::{
 };
 
 /// Minimum number of samples for noise estimates.
-pub(crate) const LEAST: u32 = PREPASS_SAMPLES;
+pub(crate) const MIN_SAMPLES: u32 = PREPASS_SAMPLES;
 
 /// Fraction of the noise target to aim for. It is less than 1 because parts whose noise is underestimated
 /// stop early.
@@ -23,10 +23,10 @@ pub(crate) const AIM: f64 = 0.85;
 const TOO_MUCH: f64 = 1.5;
 
 /// Upper limit for the expected number of samples. [`u32::MAX`] means unknown.
-pub(crate) const MOST: u32 = u32::MAX - 1;
+pub(crate) const MAX_SAMPLES: u32 = u32::MAX - 1;
 
 /// Minimum reference brightness for relative noise, as a fraction of the image's mean luminance.
-const LEAST_BRIGHTNESS: f64 = 0.01;
+const MIN_BRIGHTNESS: f64 = 0.01;
 
 /// Maximum number of samples for each half of each cell.
 #[derive(Debug)]
@@ -70,7 +70,7 @@ impl CellSampleGoals {
         samples: u32,
         error: f64,
     ) -> Option<NoiseMeasurements> {
-        let is_time = samples >= LEAST && !self.needs_min_samples(done);
+        let is_time = samples >= MIN_SAMPLES && !self.needs_min_samples(done);
         if is_time && self.brightness.is_none() {
             self.brightness = BrightnessPrepassPixels::new(film.crop_rect()).film_mean_luminance(film);
         }
@@ -115,10 +115,10 @@ impl CellSampleGoals {
             .any(|(goal, done)| *goal == u32::MAX && *done == samples)
     }
 
-    /// Whether any half that needs more samples has fewer than [`LEAST`].
+    /// Whether any half that needs more samples has fewer than [`MIN_SAMPLES`].
     fn needs_min_samples(&self, done: &[[u32; 2]]) -> bool {
         let mut halves = self.decided.as_flattened().iter().zip(done.as_flattened());
-        halves.any(|(goal, done)| goal > done && *done < LEAST)
+        halves.any(|(goal, done)| goal > done && *done < MIN_SAMPLES)
     }
 
     fn decide_goals_within_next_doubling(
@@ -206,12 +206,14 @@ impl NoiseTarget {
             return total_samples_to_reduce_error(1.0, part, noise.samples).min(doubled);
         }
         let power = noise.power.min(self.convergence.typical_variance_exponent());
-        total_samples_to_reduce_error(power, part, noise.samples).max(doubled.saturating_add(1)).min(MOST)
+        total_samples_to_reduce_error(power, part, noise.samples)
+            .max(doubled.saturating_add(1))
+            .min(MAX_SAMPLES)
     }
 
     /// Returns the noise relative to the reference brightness.
     pub(crate) fn noise_relative_to_brightness(&self, noise: &CellHalfNoise) -> f64 {
-        noise.variance.sqrt() / noise.mean.max(LEAST_BRIGHTNESS * self.brightness)
+        noise.variance.sqrt() / noise.mean.max(MIN_BRIGHTNESS * self.brightness)
     }
 }
 
@@ -315,10 +317,10 @@ pub(crate) mod tests {
     /// Returns the mean over a tile with rare bright samples and an expected value of 1. Each half stops
     /// based on the noise of the other half, or on its own noise if `by_own`.
     fn stopped(next: &mut impl FnMut() -> f32, by_own: bool) -> f64 {
-        const MOST: u32 = 256;
+        const MAX_SAMPLES: u32 = 256;
         let film = Film::new(4, 4, None).expect("a film");
         let (mut goals, mut done) = (CellSampleGoals::new_undecided(1), [[0; 2]]);
-        for target in [16, 32, 64, 128, MOST] {
+        for target in [16, 32, 64, 128, MAX_SAMPLES] {
             for half in 0..2 {
                 let goal = goals.get(0, if by_own { 1 - half } else { half }).min(target);
                 let samples = goal.saturating_sub(done[0][half]);

@@ -15,7 +15,7 @@ use crate::protocol::{ImagePosition, MaxPreviewSize, NormalizedRect, PreviewedIm
 use crate::sink::EventSink;
 
 /// Maximum time spent on updating a preview before checking for commands.
-const PATIENCE: Duration = Duration::from_millis(4);
+const UPDATE_TIME_LIMIT: Duration = Duration::from_millis(4);
 
 /// Sender of previews to the front end.
 #[derive(Clone, Copy)]
@@ -42,7 +42,7 @@ impl PreviewSender<'_> {
             return;
         }
         while !pool.install(|| update_previewer_briefly(state, quantity, width, height)) {
-            if token.is_cancelled() {
+            if token.is_canceled() {
                 return;
             }
         }
@@ -115,9 +115,10 @@ impl PreviewSender<'_> {
     /// use the preview's range instead.
     fn choose_tone_mapping(&self, state: &FilmState, image: &RadianceImage, has_time: bool) -> ToneMapping {
         /// Number of pixels that can be scanned in a few milliseconds.
-        const QUICK: usize = 1 << 18;
+        const MAX_SCANNED_PIXELS: usize = 1 << 18;
         let tone = self.plan.tone();
-        let is_known = state.has_sampled_all_pixels() && (has_time || state.film.crop_rect().area() <= QUICK);
+        let is_known = state.has_sampled_all_pixels()
+            && (has_time || state.film.crop_rect().area() <= MAX_SCANNED_PIXELS);
         if tone.range_map == RangeMap::None || !is_known {
             return tone.with_image_range(image);
         }
@@ -144,7 +145,7 @@ impl PreviewSender<'_> {
 fn update_previewer_briefly(state: &mut FilmState, quantity: FilmQuantity, width: u32, height: u32) -> bool {
     state.previewer.take_if(|it| it.size() != (width, height) || it.quantity() != quantity);
     let previewer = state.previewer.get_or_insert_with(|| Previewer::for_quantity(quantity, width, height));
-    previewer.refresh_changed_tiles(&state.film, Some(Instant::now() + PATIENCE))
+    previewer.refresh_changed_tiles(&state.film, Some(Instant::now() + UPDATE_TIME_LIMIT))
 }
 
 /// Returns the largest size that fits into the bounds and keeps the aspect ratio.

@@ -6,11 +6,11 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use super::checkpointer::Checkpointer;
+use super::coarse_image::CoarseImageRenderer;
 use super::commands::RenderCommands;
 use super::film_state::{EarlierProcessWork, FilmState};
-use super::first_picture::CoarseImageRenderer;
 use super::forecast::{Forecast, RenderSnapshot};
-use super::noise_goals::LEAST;
+use super::noise_goals::MIN_SAMPLES;
 use super::preview::PreviewSender;
 use super::share::Shard;
 use super::time_budget::next_round_goals;
@@ -53,7 +53,7 @@ pub(crate) struct FilmRequest {
     /// Whether to start with an empty film even if a film is cached.
     pub(crate) force: bool,
     /// Maximum size of the film in bytes.
-    pub(crate) most_bytes: u64,
+    pub(crate) max_bytes: u64,
 }
 
 /// How a render is displayed.
@@ -117,14 +117,14 @@ impl<'s, 'a> Scheduler<'s, 'a> {
     /// Renders the film until it reaches the requested number of samples or the noise target.
     ///
     /// # Errors
-    /// Returns [`AbortReason::Cancelled`] if the token is canceled. The film keeps its samples.
+    /// Returns [`AbortReason::Canceled`] if the token is canceled. The film keeps its samples.
     pub(crate) fn run(&mut self) -> Result<(), AbortReason> {
         self.state.is_kept = false;
         let ran = self.run_passes_to_end();
         let (traced, seconds) = (self.rays_of_all_requests(), self.seconds_across_requests());
-        if let (Some(checkpointer), Err(AbortReason::Cancelled)) = (self.rendering.checkpointer, &ran) {
+        if let (Some(checkpointer), Err(AbortReason::Canceled)) = (self.rendering.checkpointer, &ran) {
             let interruption = self.rendering.commands.pending.interruption();
-            self.state.is_kept = checkpointer.save_if_cancelled(self.state, traced, seconds, interruption);
+            self.state.is_kept = checkpointer.save_if_canceled(self.state, traced, seconds, interruption);
         }
         self.state.traced = traced;
         ran
@@ -165,12 +165,12 @@ impl<'s, 'a> Scheduler<'s, 'a> {
             self.run_due_tasks();
         }
         let RenderOptions { samples, error, .. } = self.rendering.plan.settings.render;
-        if error > 0.0 && samples >= LEAST && self.state.share.is_some() {
+        if error > 0.0 && samples >= MIN_SAMPLES && self.state.share.is_some() {
             self.estimate_reference_brightness()?;
         }
         if let Some(first) = self.priority_rect() {
             // Noise is relative to the brightness of the whole image, so sample the whole image first.
-            let of_all = if error > 0.0 { LEAST.min(samples) } else { 1 };
+            let of_all = if error > 0.0 { MIN_SAMPLES.min(samples) } else { 1 };
             self.run_passes(None, of_all)?;
             self.run_passes(Some(first), samples)?;
         }
@@ -218,7 +218,7 @@ impl<'s, 'a> Scheduler<'s, 'a> {
         let RenderOptions { samples, error, .. } = self.rendering.plan.settings.render;
         let done = self.state.min_unfinished_samples_in(part, samples);
         // With fewer samples, no goals are decided.
-        if error > 0.0 && (LEAST..samples).contains(&done) && done.is_power_of_two() {
+        if error > 0.0 && (MIN_SAMPLES..samples).contains(&done) && done.is_power_of_two() {
             self.rendering.tracer.pool.install(|| self.state.decide_goals(done, error.into()));
         }
     }

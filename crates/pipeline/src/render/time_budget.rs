@@ -12,16 +12,16 @@
 use crate::film::Film;
 
 /// Minimum number of samples for noise estimates.
-const LEAST: u32 = 16;
+const MIN_SAMPLES: u32 = 16;
 
 /// Minimum number of samples per pixel, as a fraction of the mean. Noise is estimated from these samples.
-const SHARE: f64 = 1.0 / 8.0;
+const MIN_SAMPLES_FRACTION: f64 = 1.0 / 8.0;
 
 /// Work done in a round, relative to all earlier work. Noise is measured again before the next round.
-const ROUND: f64 = 0.4;
+const ROUND_WORK_FRACTION: f64 = 0.4;
 
 /// Overhead per sample beyond tracing its rays, expressed as a number of rays.
-const BESIDE: f64 = 1.0;
+const SAMPLE_OVERHEAD: f64 = 1.0;
 
 /// Returns the next sample counts for both halves of each cell, based on their current samples and rays. The
 /// counts are at most `most`. Returns `None` if it is too early to decide.
@@ -31,7 +31,7 @@ pub(crate) fn next_round_goals(
     rays: &[u64],
     most: u32,
 ) -> Option<Vec<[u32; 2]>> {
-    let least = done.as_flattened().iter().copied().min().filter(|least| *least >= LEAST.min(most))?;
+    let least = done.as_flattened().iter().copied().min().filter(|least| *least >= MIN_SAMPLES.min(most))?;
     // Every half has at least this many samples, regardless of earlier goals.
     let known = 1 << least.ilog2();
     let halves = half_cells_with_costs(film, done, rays, known, most)?;
@@ -43,7 +43,7 @@ pub(crate) fn next_round_goals(
     order.sort_by(|(a, _), (b, _)| b.total_cmp(a));
     let (mut goals, mut to_do) = (done.to_vec(), 0.0);
     for (_, half) in order.into_iter().filter(|(_, half)| half.goal > half.samples) {
-        if to_do >= ROUND * work {
+        if to_do >= ROUND_WORK_FRACTION * work {
             break;
         }
         goals[half.cell][half.half] = half.goal;
@@ -75,7 +75,7 @@ impl HalfCell {
 
     /// Returns the decrease in squared error per unit of cost. `mean` is the average number of samples.
     fn error_reduction_per_cost(&self, mean: f64) -> f64 {
-        if f64::from(self.samples) < SHARE * mean {
+        if f64::from(self.samples) < MIN_SAMPLES_FRACTION * mean {
             return f64::INFINITY;
         }
         let left = |samples: u32| libm::pow(f64::from(samples), -self.power);
@@ -98,7 +98,7 @@ fn half_cells_with_costs(
             .map(|half| film.cell_half_pixel_count(cell, half) as f64 * f64::from(done[half]))
             .iter()
             .sum();
-        let cost = BESIDE + rays[cell] as f64 / units;
+        let cost = SAMPLE_OVERHEAD + rays[cell] as f64 / units;
         for half in 0..2 {
             // A one-pixel cell has no second half.
             let (error, power) = errors[1 - half].or(errors[half])?;

@@ -107,7 +107,7 @@ impl Session {
         };
         if let Some(checkpointer) = self.own.checkpointer(state.key, &self.files.protected, sink) {
             checkpointer.detect_own_checkpoint(state);
-            checkpointer.save_if_cancelled(state, state.traced, state.render_seconds, interruption);
+            checkpointer.save_if_canceled(state, state.traced, state.render_seconds, interruption);
         }
     }
 }

@@ -69,7 +69,7 @@ impl SceneFiles {
         match outcome {
             Ok(_) => self.is_broken = false,
             Err(AbortReason::Failed(Failure::Scene(_))) => self.is_broken = true,
-            Err(AbortReason::Failed(Failure::Work(_)) | AbortReason::Cancelled) => {}
+            Err(AbortReason::Failed(Failure::Work(_)) | AbortReason::Canceled) => {}
         }
         self.report_read(findings, sink);
     }

@@ -47,14 +47,14 @@ use crate::watch::content::FileHashCache;
 pub(super) struct SessionConfig {
     pub(super) kernel: TileKernel,
     /// Maximum film size in bytes.
-    pub(super) most_film_bytes: u64,
+    pub(super) max_film_bytes: u64,
     /// Niceness of the render threads relative to the thread that starts them.
     pub(super) nice: u8,
 }
 
 impl Default for SessionConfig {
     fn default() -> Self {
-        Self { kernel: crate::integrators::render_tile_with_photons, most_film_bytes: u64::MAX, nice: 0 }
+        Self { kernel: crate::integrators::render_tile_with_photons, max_film_bytes: u64::MAX, nice: 0 }
     }
 }
 

@@ -99,7 +99,7 @@ impl Session {
     /// Writes the scene's own image if the request shows another view of its finished film.
     ///
     /// # Errors
-    /// Returns [`AbortReason::Cancelled`] if writing is canceled.
+    /// Returns [`AbortReason::Canceled`] if writing is canceled.
     fn write_own_image_if_shown(
         &mut self,
         context: &RequestContext<'_>,
@@ -136,9 +136,9 @@ impl Session {
     pub(super) fn write_report(&self, report: &Report, sink: &EventSink, token: &CancelToken) {
         let Some(current) = &self.current else { return };
         if let Err(error) = write_report(&current.plan, &self.files.protected, report, sink, token) {
-            let is_cancelled = matches!(error, OutputError::Cancelled(_));
+            let is_canceled = matches!(error, OutputError::Canceled(_));
             let message =
-                if is_cancelled { format!("report not written: {error}") } else { error.to_string() };
+                if is_canceled { format!("report not written: {error}") } else { error.to_string() };
             sink.send_write_failed(None, message);
         }
     }

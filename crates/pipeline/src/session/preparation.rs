@@ -10,7 +10,7 @@ use crate::inputs::ProtectedInputs;
 use crate::keys;
 use crate::memory::MemoryEstimate;
 use crate::plan::{RenderPlan, RequestPlans};
-use crate::prepare::{FileReader, Reading, ReadyScene, RequestCamera, SceneAssets};
+use crate::prepare::{FileReader, ReadyScene, RequestCamera, SceneAssets, SceneReadAttempt};
 use crate::protocol::{Event, Request};
 use crate::render::film_state::FilmState;
 use crate::scene::description::CameraOverrides;
@@ -36,7 +36,7 @@ impl Session {
         let RequestContext { request, sink, token, .. } = *context;
         let contents = Arc::clone(&self.contents);
         let reader = FileReader { contents: &contents, pool, sink, token };
-        let read = |reading: &mut Reading<'_, '_>| self.read_scene(request, reading);
+        let read = |reading: &mut SceneReadAttempt<'_, '_>| self.read_scene(request, reading);
         let (assets, plans) = reader.read_consistently(table, findings, read)?;
         let ready = self.build_world(request, Arc::new(assets), plans, table, pool)?;
         self.written.record_saves(request.saves);
@@ -49,7 +49,7 @@ impl Session {
     fn read_scene(
         &mut self,
         request: &Request,
-        reading: &mut Reading<'_, '_>,
+        reading: &mut SceneReadAttempt<'_, '_>,
     ) -> Result<(SceneAssets, RequestPlans), AbortReason> {
         let (Request { overrides, write, .. }, sink) = (request, reading.files.sink);
         let show = ModelViewOptions::from_overrides(overrides);

@@ -11,8 +11,8 @@ use crate::keys;
 use crate::prepare::ReadyScene;
 use crate::protocol::{Request, Stage, Status};
 use crate::queries::QueryContext;
+use crate::render::coarse_image::CoarseImageRenderer;
 use crate::render::commands::RenderCommands;
-use crate::render::first_picture::CoarseImageRenderer;
 use crate::render::preview::PreviewSender;
 use crate::render::scheduler::{DisplayOptions, FilmRequest, RenderStageInputs};
 use crate::render::share::Shard;
@@ -124,7 +124,7 @@ impl Session {
                 key: image.film,
                 share: image.share.clone(),
                 force: request.force,
-                most_bytes: self.config.most_film_bytes,
+                max_bytes: self.config.max_film_bytes,
             },
             tracer: create_tracer(self.config.kernel, pool, &image.scene, token),
             plan,

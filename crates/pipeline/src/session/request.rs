@@ -35,7 +35,7 @@ impl Session {
                 let warnings = [conflicts, warnings].concat();
                 Event::Done { generation, report: Box::new(report), warnings, unchanged }
             }
-            Err(AbortReason::Cancelled) => Event::Cancelled { generation },
+            Err(AbortReason::Canceled) => Event::Canceled { generation },
             Err(AbortReason::Failed(failure)) => Event::Failed { generation, failure },
         });
         if is_broken {
@@ -58,8 +58,8 @@ impl Session {
         }
         if let (Ok(report), Some(current)) = (&outcome, &mut self.current) {
             current.report = Some(report.clone());
-            let is_by_hand = self.written.has_user_written_image_on_disk(&self.contents);
-            if request.own.is_none() && findings.conflicts.is_empty() && !is_by_hand {
+            let is_user_written = self.written.has_user_written_image_on_disk(&self.contents);
+            if request.own.is_none() && findings.conflicts.is_empty() && !is_user_written {
                 self.write_report(report, sink, context.writing);
             }
         }

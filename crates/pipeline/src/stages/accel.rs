@@ -54,7 +54,7 @@ pub(crate) struct AccelResult {
 /// Builds all missing trees, using coordinates relative to `origin`. `scene` includes the overrides.
 ///
 /// # Errors
-/// Returns [`AbortReason::Cancelled`] if the token is canceled.
+/// Returns [`AbortReason::Canceled`] if the token is canceled.
 pub(crate) fn build_accel_structures(
     scene: &Scene,
     of: &FingerprintContext<'_>,

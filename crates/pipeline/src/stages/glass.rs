@@ -21,7 +21,7 @@ const LACKS: &str = "glass refracts where a ray enters and leaves it; rays throu
 /// Finds the glass solids, or reuses them if shapes and materials are unchanged. Warns about open solids.
 ///
 /// # Errors
-/// Returns [`AbortReason::Cancelled`] if the token is canceled.
+/// Returns [`AbortReason::Canceled`] if the token is canceled.
 pub(crate) fn find_glass_solids(
     loaded: &LoadedScene,
     meshes: &MeshesByFileIndex,

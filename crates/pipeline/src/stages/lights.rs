@@ -7,7 +7,7 @@ use super::super::keys;
 use super::super::protocol::reasons;
 use super::StageResult;
 use super::textures::Textures;
-use crate::control::{CancelToken, Cancelled};
+use crate::control::{CancelToken, Canceled};
 use crate::lights::infinite::EnvironmentMap;
 use crate::lights::infinite::sky::Sky;
 use crate::lights::{LightSamplingPurpose, Lights};
@@ -21,7 +21,7 @@ pub(crate) struct LightCache {
     lights: Memo<Arc<Lights>>,
     /// The environment map's importance distribution, which does not depend on the map's rotation.
     environment: Memo<Option<Arc<EnvironmentMap>>>,
-    /// The sky, which depends on the rotation only through its frame.
+    /// The evaluated sky. It does not depend on the rotation, which affects only the sky's frame.
     sky: Memo<Sky>,
 }
 
@@ -33,7 +33,7 @@ pub(crate) fn collect_lights(
     textures: &Textures,
     cache: &mut LightCache,
     token: &CancelToken,
-) -> Result<StageResult<Arc<Lights>>, Cancelled> {
+) -> Result<StageResult<Arc<Lights>>, Canceled> {
     let map = textures.environment.as_ref().map(|(key, _)| key);
     let declared = emissive_material_textures(scene).filter_map(|source| textures.key_of.get(&source));
     let patterns: Vec<&Fingerprint> = declared.chain(&textures.of_files).collect();
@@ -93,7 +93,7 @@ fn emissive_material_textures(scene: &Scene) -> impl Iterator<Item = TextureSour
     })
 }
 
-/// Returns the environment's sky or map, which are reused if they are unchanged.
+/// Returns the environment's sky or map. Reuses it if it is unchanged.
 fn environment_source(
     scene: &Scene,
     of: &FingerprintContext<'_>,

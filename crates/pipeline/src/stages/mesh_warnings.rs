@@ -73,14 +73,14 @@ pub(super) fn add_limited_mesh_warnings(
     warnings: Vec<(&MeshFile, String)>,
     findings: &mut Findings,
 ) {
-    let unsaid = warnings.len().saturating_sub(MAX_WARNINGS);
+    let omitted = warnings.len().saturating_sub(MAX_WARNINGS);
     let last = warnings.last().map(|(file, _)| file.span.clone());
     for (file, message) in warnings.into_iter().take(MAX_WARNINGS) {
         findings.add_warning(loaded, file.span.clone(), message);
     }
-    if let Some(span) = last.filter(|_| unsaid > 0) {
-        let s = if unsaid == 1 { "" } else { "s" };
-        findings.add_warning(loaded, span, format!("{unsaid} more warning{s} about mesh files"));
+    if let Some(span) = last.filter(|_| omitted > 0) {
+        let s = if omitted == 1 { "" } else { "s" };
+        findings.add_warning(loaded, span, format!("{omitted} more warning{s} about mesh files"));
     }
 }
 

@@ -12,7 +12,7 @@ use super::containers::canonical;
 use super::mesh_warnings::{MeshWarnings, add_limited_mesh_warnings, warn_about_missing_mesh_data};
 use super::{AbortReason, FileCounts, FileReadContext, Findings, LoadedAsset, StageResult, loading_result};
 use crate::assets::{AssetError, Companion, LoadedMesh};
-use crate::control::{CancelToken, Cancelled, Progress};
+use crate::control::{CancelToken, Canceled, Progress};
 use crate::scene::description::{MeshFile, Scene};
 use crate::scene::fingerprint::{Fingerprint, FingerprintHasher};
 use crate::scene::{LoadedScene, MeshBoundingBox};
@@ -70,7 +70,7 @@ pub(crate) fn load_meshes(
             }
             Ok((content, cache.get(&name, mesh_key_without_companions(file, content))))
         })
-        .collect::<Result<_, Cancelled>>()?;
+        .collect::<Result<_, Canceled>>()?;
     let assets: Vec<LoadedAsset<CachedMesh>> = reading.pool.install(|| {
         files
             .par_iter()
@@ -145,7 +145,7 @@ fn load_or_reuse_mesh(
     kept: Option<Arc<CachedMesh>>,
     reading: &FileReadContext<'_>,
     load: impl Fn(&Path, Progress<'_>, &CancelToken) -> Result<LoadedMesh, AssetError>,
-) -> Result<LoadedAsset<CachedMesh>, Cancelled> {
+) -> Result<LoadedAsset<CachedMesh>, Canceled> {
     let path = &file.value;
     let mut files = vec![FilePathAndContentId { path: path.to_owned(), content }];
     if let Some(mesh) = kept
@@ -184,10 +184,7 @@ fn load_or_reuse_mesh(
 
 /// Whether a file that was missing when the mesh was loaded now exists without having been seen by this
 /// request.
-fn has_companion_appeared(
-    companions: &[Companion],
-    reading: &FileReadContext<'_>,
-) -> Result<bool, Cancelled> {
+fn has_companion_appeared(companions: &[Companion], reading: &FileReadContext<'_>) -> Result<bool, Canceled> {
     for companion in companions.iter().filter(|companion| companion.hash.is_none()) {
         let is_new = reading.contents.content_id_if_seen(&companion.path).is_none();
         let content = reading.contents.first_seen_content_id(&companion.path, reading.token)?;
@@ -202,7 +199,7 @@ fn has_companion_appeared(
 fn contents_as_seen_by_request(
     files: &[FilePathAndContentId],
     reading: &FileReadContext<'_>,
-) -> Result<Vec<FilePathAndContentId>, Cancelled> {
+) -> Result<Vec<FilePathAndContentId>, Canceled> {
     let now = |file: &FilePathAndContentId| {
         let content = reading.contents.first_seen_content_id(&file.path, reading.token)?;
         Ok(FilePathAndContentId { path: file.path.clone(), content })
@@ -267,7 +264,7 @@ mod tests {
 
         fn hash(&self, name: &str) -> FileContentId {
             let path = self.folder.path().join(name);
-            FileHashCache::default().read_content_id(&path, &CancelToken::new()).expect("not cancelled")
+            FileHashCache::default().read_content_id(&path, &CancelToken::new()).expect("not canceled")
         }
 
         /// Loads `a.obj` from a snapshot. Returns the mesh and the contents of its files.
@@ -292,7 +289,7 @@ mod tests {
             };
             let mut findings = Findings::default();
             let meshes =
-                load_meshes(&loaded, &mut self.cache, &mut findings, &reading).expect("not cancelled");
+                load_meshes(&loaded, &mut self.cache, &mut findings, &reading).expect("not canceled");
             (meshes.value, findings)
         }
     }
@@ -367,7 +364,7 @@ mod tests {
         let snapshot = fixture.snapshot();
         snapshot
             .first_seen_content_id(&fixture.folder.path().join("a.obj"), &CancelToken::new())
-            .expect("not cancelled");
+            .expect("not canceled");
         fixture.write("a.obj", &format!("{OBJ}f 1 3 2\n"));
         let (mesh, files) = fixture.read(&snapshot);
         assert_eq!((mesh.mesh.mesh.triangles.len(), files[0].content), (1, old), "cached");
@@ -406,7 +403,7 @@ mod tests {
         };
         let old = fixture.hash("a.mtl");
         let asset = load_or_reuse_mesh(&file, fixture.hash("a.obj"), None, &reading, load_and_change)
-            .expect("not cancelled");
+            .expect("not canceled");
         let mesh = asset.result.expect("a mesh").0;
         assert_eq!((asset.files[1].content, mesh.mesh.materials[0].diffuse.x), (old, 1.0));
     }
@@ -432,7 +429,7 @@ mod tests {
             mesh
         };
         let asset = load_or_reuse_mesh(&file, fixture.hash("a.obj"), None, &reading, load_and_appear)
-            .expect("not cancelled");
+            .expect("not canceled");
         let mesh = asset.result.expect("a mesh").0;
         assert_eq!(asset.files[1].content, fixture.hash("a.mtl"));
         assert_eq!(mesh.mesh.materials[0].diffuse.y, 1.0);

@@ -31,7 +31,7 @@ use super::protocol::{Failure, Status, WriteRequirement, reasons};
 use super::sink::EventSink;
 use super::watch::content::{FileHashCache, FilePathAndContentId, FilesSeenByRequest};
 use crate::assets::AssetError;
-use crate::control::{CancelToken, Cancelled};
+use crate::control::{CancelToken, Canceled};
 use crate::scene::LoadedScene;
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::report::{ReportStyle, render_report};
@@ -43,7 +43,7 @@ const COLUMNS: usize = 120;
 #[derive(Clone, Debug)]
 pub enum AbortReason {
     /// A cancel token stopped the work.
-    Cancelled,
+    Canceled,
     /// The scene is invalid, or the work failed.
     Failed(Failure),
 }
@@ -55,16 +55,16 @@ impl fmt::Display for AbortReason {
                 f.write_str(render_report(diagnostics, COLUMNS, ReportStyle::Plain).trim_end())
             }
             Self::Failed(Failure::Work(message)) => f.write_str(message),
-            Self::Cancelled => f.write_str("the render was cancelled"),
+            Self::Canceled => f.write_str("the render was canceled"),
         }
     }
 }
 
 impl Error for AbortReason {}
 
-impl From<Cancelled> for AbortReason {
-    fn from(_: Cancelled) -> Self {
-        Self::Cancelled
+impl From<Canceled> for AbortReason {
+    fn from(_: Canceled) -> Self {
+        Self::Canceled
     }
 }
 
@@ -80,10 +80,10 @@ impl AbortReason {
         Self::Failed(Failure::Work(message.to_string()))
     }
 
-    /// Passes on errors about an asset, except for those that end the request.
+    /// Returns the error as `Ok` unless it must end the request.
     pub(super) fn unless_fatal(error: AssetError) -> Result<AssetError, Self> {
         match error {
-            AssetError::Cancelled(_) => Err(Self::Cancelled),
+            AssetError::Canceled(_) => Err(Self::Canceled),
             AssetError::OutOfMemory { .. } | AssetError::TooManyOpenFiles { .. } => {
                 Err(Self::work_failure(error))
             }

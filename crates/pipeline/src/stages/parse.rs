@@ -12,7 +12,7 @@ use super::super::watch::content::{FileContentId, FilePathAndContentId};
 use super::{AbortReason, FileReadContext, Findings, StageResult};
 use crate::assets::orbiter::load as load_orbiter;
 use crate::assets::{self, AssetError, GkitOrbiterCamera};
-use crate::control::{CancelToken, Cancelled};
+use crate::control::{CancelToken, Canceled};
 use crate::output::held::{self, BackupRecovery};
 use crate::scene;
 use crate::scene::description::Camera;
@@ -48,7 +48,7 @@ pub(crate) struct SceneParseRequest<'a> {
 /// Converts an importer's error. Watches missing files to detect when they are created.
 fn abort_reason(error: AssetError, findings: &mut Findings, reading: &FileReadContext<'_>) -> AbortReason {
     match error {
-        AssetError::Cancelled(_) => AbortReason::Cancelled,
+        AssetError::Canceled(_) => AbortReason::Canceled,
         AssetError::OutOfMemory { .. } | AssetError::TooManyOpenFiles { .. } => {
             AbortReason::work_failure(error)
         }
@@ -165,7 +165,7 @@ fn read_scene(
     let loaded = lower(document, path, sets).map_err(|errors| AbortReason::Failed(Failure::Scene(errors)))?;
     let content = contents.record_decoded(path, hash);
     let companions = companions.iter().map(|companion| contents.record_companion(companion, token));
-    let companions = companions.collect::<Result<_, Cancelled>>()?;
+    let companions = companions.collect::<Result<_, Canceled>>()?;
     Ok((Arc::new(loaded), content, companions, [substitutions, notes].concat()))
 }
 
@@ -207,7 +207,7 @@ fn add_renamed_file_hint(
 
 /// Returns the files that the scene references without the overrides. Includes files referenced by meshes
 /// that have not been read.
-fn referenced_files(loaded: &scene::LoadedScene, token: &CancelToken) -> Result<Vec<PathBuf>, Cancelled> {
+fn referenced_files(loaded: &scene::LoadedScene, token: &CancelToken) -> Result<Vec<PathBuf>, Canceled> {
     let is_read = |path: &&PathBuf| loaded.scene.mesh_files.iter().any(|file| file.value == **path);
     let named = loaded.named.iter().filter(|path| !is_read(path));
     let containers = loaded.scene.textures.iter().filter(|texture| texture.image.is_some());
@@ -220,11 +220,11 @@ fn referenced_files(loaded: &scene::LoadedScene, token: &CancelToken) -> Result<
 /// files and any errors in the files.
 ///
 /// # Errors
-/// Returns [`Cancelled`] if the token is canceled.
+/// Returns [`Canceled`] if the token is canceled.
 pub fn files_referenced_by_assets<'a>(
     files: impl Iterator<Item = &'a PathBuf>,
     token: &CancelToken,
-) -> Result<BTreeSet<PathBuf>, Cancelled> {
+) -> Result<BTreeSet<PathBuf>, Canceled> {
     let mut companions = BTreeSet::new();
     for path in files.collect::<BTreeSet<_>>() {
         companions.extend(assets::referenced_files(path, token)?);

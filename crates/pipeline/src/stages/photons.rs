@@ -19,7 +19,7 @@ use super::super::sink::EventSink;
 use super::super::stopwatch::PausableStopwatch;
 use super::super::trace::TICK;
 use super::StageResult;
-use crate::control::{CancelToken, Cancelled, Progress};
+use crate::control::{CancelToken, Canceled, Progress};
 use crate::integrators::{PhotonMapper, PhotonMaps, PhotonPass, PhotonSettings, RenderSettings};
 use crate::scene::description::RenderOptions;
 use crate::scene::fingerprint::Fingerprint;
@@ -66,7 +66,7 @@ struct PhotonCounts {
     stored: u64,
     lookups: u64,
     seconds: f64,
-    most_alive_bytes: usize,
+    max_alive_bytes: usize,
 }
 
 impl PhotonStore {
@@ -93,19 +93,19 @@ impl PhotonStore {
     /// Returns the maps for the given samples. Calls `tick` regularly.
     ///
     /// # Errors
-    /// Returns [`Cancelled`] if the token is canceled.
+    /// Returns [`Canceled`] if the token is canceled.
     pub(crate) fn get_or_trace_maps(
         &self,
         samples: Range<u32>,
         sending: PhotonContext<'_>,
         mut tick: impl FnMut(),
-    ) -> Result<PhotonMaps, Cancelled> {
+    ) -> Result<PhotonMaps, Canceled> {
         let first = samples.start;
         let pass = |number| self.get_or_trace_pass(number, sending, &mut tick);
         let passes = samples.map(pass).collect::<Result<Vec<_>, _>>()?;
         let bytes = passes.iter().map(|pass| pass.memory_bytes()).sum();
         let sent = self.sent.get();
-        self.sent.set(PhotonCounts { most_alive_bytes: sent.most_alive_bytes.max(bytes), ..sent });
+        self.sent.set(PhotonCounts { max_alive_bytes: sent.max_alive_bytes.max(bytes), ..sent });
         Ok(PhotonMaps { first, passes })
     }
 
@@ -114,7 +114,7 @@ impl PhotonStore {
         number: u32,
         sending: PhotonContext<'_>,
         tick: &mut impl FnMut(),
-    ) -> Result<Arc<PhotonPass>, Cancelled> {
+    ) -> Result<Arc<PhotonPass>, Canceled> {
         let number_kept = if self.has_lit_caustic_casters() { number } else { 0 };
         if let Some(pass) = self.kept.borrow().get(number_kept as usize) {
             return Ok(Arc::clone(pass));
@@ -148,7 +148,7 @@ impl PhotonStore {
 
     /// Reports the photons traced since the stage started, and the cached maps.
     pub(crate) fn report(&self) -> PhotonsReport {
-        let PhotonCounts { passes, emitted, stored, lookups, seconds, most_alive_bytes } = self.sent.get();
+        let PhotonCounts { passes, emitted, stored, lookups, seconds, max_alive_bytes } = self.sent.get();
         let [caustic, bounced] = self.photons.initial_radii();
         PhotonsReport {
             count: self.photons.photons_per_pass(),
@@ -161,7 +161,7 @@ impl PhotonStore {
             caustic_radius: caustic,
             bounced_radius: bounced,
             kept_memory_bytes: self.cached_bytes() as u64,
-            used_memory_bytes: most_alive_bytes as u64,
+            used_memory_bytes: max_alive_bytes as u64,
         }
     }
 }
@@ -170,8 +170,8 @@ impl PhotonStore {
 fn run_with_ticks<T: Send>(
     pool: &ThreadPool,
     tick: &mut impl FnMut(),
-    work: impl FnOnce() -> Result<T, Cancelled> + Send,
-) -> Result<T, Cancelled> {
+    work: impl FnOnce() -> Result<T, Canceled> + Send,
+) -> Result<T, Canceled> {
     let (sender, result) = mpsc::sync_channel(1);
     pool.in_place_scope(|scope| {
         // The receiver is not dropped before the result arrives.
@@ -180,7 +180,7 @@ fn run_with_ticks<T: Send>(
             match result.recv_timeout(TICK) {
                 Ok(result) => return result,
                 Err(RecvTimeoutError::Timeout) => tick(),
-                Err(RecvTimeoutError::Disconnected) => return Err(Cancelled),
+                Err(RecvTimeoutError::Disconnected) => return Err(Canceled),
             }
         }
     })
@@ -225,13 +225,13 @@ impl PhotonTask {
 /// image's photons, if it uses them.
 ///
 /// # Errors
-/// Returns [`Cancelled`] if the token is canceled.
+/// Returns [`Canceled`] if the token is canceled.
 pub(crate) fn trace_first_photons(
     task: PhotonTask,
     cache: &mut PhotonCache,
     sending: PhotonContext<'_>,
     mut tick: impl FnMut(),
-) -> Result<StageResult<Option<Fingerprint>>, Cancelled> {
+) -> Result<StageResult<Option<Fingerprint>>, Canceled> {
     let (key, of_photons) = match task {
         PhotonTask::Skip(why) => return Ok(StageResult::skipped(None, why)),
         PhotonTask::Reuse(key) => {
@@ -254,7 +254,7 @@ pub(crate) fn trace_first_photons(
     let (photons, first) = sending.sink.load_asset_with_progress("photons", send)?;
     let seconds = watch.seconds();
     let (passes, emitted, stored, lookups) = (1, first.emitted, first.stored_photon_count(), first.lookups);
-    let sent = PhotonCounts { passes, emitted, stored, lookups, seconds, most_alive_bytes: 0 };
+    let sent = PhotonCounts { passes, emitted, stored, lookups, seconds, max_alive_bytes: 0 };
     let kept = RefCell::new(vec![Arc::new(first)]);
     let emits_photons = photons.emits_photons();
     let store = PhotonStore { photons, kept, sent: Cell::new(sent) };

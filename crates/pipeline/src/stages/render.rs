@@ -23,21 +23,21 @@ pub(crate) fn render(
     rendering: &RenderStageInputs<'_>,
 ) -> Result<StageResult<RayCounters>, AbortReason> {
     let RenderOptions { samples: wanted, error, .. } = rendering.plan.settings.render;
-    let FilmRequest { key, ref share, force, most_bytes } = rendering.film;
-    let is_other = films.current().is_some_and(|current| current.key != key);
+    let FilmRequest { key, ref share, force, max_bytes } = rendering.film;
+    let is_other_image = films.current().is_some_and(|current| current.key != key);
     films.switch_to_cached(key, |kept| !force && kept.has_at_most_samples(wanted));
     if films.current().is_none() {
         let convergence = match rendering.photons.is_some_and(PhotonStore::has_lit_caustic_casters) {
             true => ConvergenceModel::Photons,
             false => ConvergenceModel::Stratified,
         };
-        let state = || FilmState::new(key, rendering.plan, most_bytes, convergence, share.clone());
+        let state = || FilmState::new(key, rendering.plan, max_bytes, convergence, share.clone());
         let empty = films.replace_current_with_retry(state).map_err(AbortReason::work_failure)?;
-        let is_of_use = match rendering.checkpointer.filter(|_| !force) {
+        let is_usable = match rendering.checkpointer.filter(|_| !force) {
             Some(checkpointer) => checkpointer.resume(empty, wanted)?,
             None => true,
         };
-        if !is_of_use {
+        if !is_usable {
             films.replace_current_with_retry(state).map_err(AbortReason::work_failure)?;
         }
     }
@@ -53,7 +53,7 @@ pub(crate) fn render(
     if finished {
         scheduler.show();
         scheduler.state.traced = scheduler.rays_of_all_requests();
-        let why = match (is_part, is_resumed, is_other) {
+        let why = match (is_part, is_resumed, is_other_image) {
             (true, ..) => reasons::PART_COMPLETE,
             (false, true, _) => reasons::CHECKPOINT_COMPLETE,
             (false, false, true) => reasons::CACHED,

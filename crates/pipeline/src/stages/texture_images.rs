@@ -77,10 +77,10 @@ impl ImageWithTextures<'_> {
     }
 }
 
-/// Loads all images. Returns an error for each image that would raise the total size above `most_bytes`.
+/// Loads all images. Returns an error for each image that would raise the total size above `max_bytes`.
 pub(super) fn load_images_within_limit(
     images: &[ImageWithTextures<'_>],
-    most_bytes: u64,
+    max_bytes: u64,
     reading: &FileReadContext<'_>,
 ) -> Vec<(TextureFileContentIds, Result<DecodedTextureWithMipmaps, AssetError>)> {
     let size = |image: &ImageWithTextures<'_>| {
@@ -100,7 +100,7 @@ pub(super) fn load_images_within_limit(
             }
     };
     let sizes: Vec<u64> = reading.pool.install(|| images.par_iter().map(size).collect());
-    let over = memory_limit_errors(&sizes, most_bytes);
+    let over = memory_limit_errors(&sizes, max_bytes);
     let load = |(image, over): (&ImageWithTextures<'_>, Option<String>)| {
         let mut contents = (image.content, image.linked.clone());
         let result = match over {
@@ -113,11 +113,11 @@ pub(super) fn load_images_within_limit(
 }
 
 /// Returns an error message for each image that would exceed the total limit.
-fn memory_limit_errors(sizes: &[u64], most_bytes: u64) -> Vec<Option<String>> {
+fn memory_limit_errors(sizes: &[u64], max_bytes: u64) -> Vec<Option<String>> {
     let mib = |bytes: u64| bytes.div_ceil(1 << 20);
     let mut before = 0;
     let check = |&size: &u64| {
-        if before + size <= most_bytes {
+        if before + size <= max_bytes {
             before += size;
             return None;
         }
@@ -126,7 +126,7 @@ fn memory_limit_errors(sizes: &[u64], most_bytes: u64) -> Vec<Option<String>> {
              in total; use smaller or fewer images",
             mib(size),
             mib(before),
-            mib(most_bytes)
+            mib(max_bytes)
         ))
     };
     sizes.iter().map(check).collect()

@@ -18,7 +18,7 @@ use super::texture_warnings::{
 };
 use super::{AbortReason, FileCounts, FileReadContext, Findings, StageResult, loading_result};
 use crate::assets::image::ImageEncoding;
-use crate::control::Cancelled;
+use crate::control::Canceled;
 use crate::materials::Mipmaps;
 use crate::materials::texels::Texels;
 use crate::scene::LoadedScene;
@@ -208,7 +208,7 @@ fn group_by_image<'a>(
     needed: &'a [NeededTexture],
     cache: &mut TextureCache,
     reading: &FileReadContext<'_>,
-) -> Result<Vec<ImageWithTextures<'a>>, Cancelled> {
+) -> Result<Vec<ImageWithTextures<'a>>, Canceled> {
     let mut images: Vec<ImageWithTextures<'a>> = Vec::new();
     let mut known = HashMap::new();
     for one in needed {

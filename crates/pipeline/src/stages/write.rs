@@ -149,7 +149,7 @@ pub(crate) fn write_if_wanted(
 /// events. Returns whether all files are now up to date.
 ///
 /// # Errors
-/// Returns [`AbortReason::Cancelled`] if the token is canceled. If `is_must`, returns the last failure to
+/// Returns [`AbortReason::Canceled`] if the token is canceled. If `is_must`, returns the last failure to
 /// write a file.
 fn write_outdated_outputs(
     state: &FilmState,
@@ -197,8 +197,8 @@ fn write_outdated_outputs(
             }
             Err(error) => {
                 contents.outputs.end_write(path, None);
-                if matches!(error, OutputError::Cancelled(_)) {
-                    return Err(AbortReason::Cancelled);
+                if matches!(error, OutputError::Canceled(_)) {
+                    return Err(AbortReason::Canceled);
                 }
                 errors.push((path, error.to_string()));
             }
@@ -286,7 +286,7 @@ pub(crate) fn add_frame_and_write_if_last(
         };
         match write() {
             Ok(bytes) => sink.send_image_written(path, bytes, true, None),
-            Err(OutputError::Cancelled(_)) => return Err(AbortReason::Cancelled),
+            Err(OutputError::Canceled(_)) => return Err(AbortReason::Canceled),
             Err(error) => return Err(AbortReason::work_failure(error)),
         }
     }

@@ -289,22 +289,22 @@ fn pick_identifies_object_and_material() {
     let mut bench = Bench::new(&SCENE.replace("center = [0, 1, 0]", "name = \"globe\"\ncenter = [0, 1, 0]"));
     bench.done();
     let middle = pick(&mut bench, 0.5, 0.5);
-    let thing = middle.thing.expect("the ball");
+    let object = middle.object.expect("the ball");
     assert_eq!(
-        (thing.shape, thing.name.as_deref(), thing.material.as_str()),
+        (object.shape, object.name.as_deref(), object.material.as_str()),
         ("sphere", Some("globe"), "phong ball")
     );
     let line = SCENE.lines().position(|line| line == "[[sphere]]").expect("a sphere") + 1;
-    assert_eq!((thing.path, thing.line), (bench.path("scene.toml"), Some(line)));
+    assert_eq!((object.path, object.line), (bench.path("scene.toml"), Some(line)));
     assert!(
-        (thing.position[2] - 0.5).abs() < 0.01 && (thing.distance - 3.5).abs() < 0.01,
+        (object.position[2] - 0.5).abs() < 0.01 && (object.distance - 3.5).abs() < 0.01,
         "{:?}",
-        thing.position
+        object.position
     );
-    assert!(thing.normal[2] > 0.99 && thing.is_front && (thing.depth - 3.5).abs() < 0.01);
+    assert!(object.normal[2] > 0.99 && object.is_front && (object.depth - 3.5).abs() < 0.01);
     assert_eq!(middle.pixel, [20, 15]);
     assert!(middle.color.expect("a sample").iter().all(|channel| channel.is_finite()));
-    assert_eq!(pick(&mut bench, 0.0, 0.0).thing, None);
+    assert_eq!(pick(&mut bench, 0.0, 0.0).object, None);
     assert_eq!(
         pick(&mut bench, 7.0, -1.0).pixel,
         [39, 0],
@@ -317,7 +317,7 @@ fn queries_do_not_interrupt_a_render() {
     let mut bench = Bench::new(&SCENE.replace("samples = 4", "samples = 1000000"));
     let of = bench.send();
     while !matches!(bench.next(), Event::Progress { progress, .. } if progress.samples > 0) {}
-    assert!(pick(&mut bench, 0.5, 0.5).thing.is_some());
+    assert!(pick(&mut bench, 0.5, 0.5).object.is_some());
     let camera = ResolvedCamera {
         pose: moved().pose.expect("a pose"),
         projection: Projection::Perspective { fov: 40.0 },
@@ -345,7 +345,7 @@ fn clicks_follow_the_image_as_shown() {
     ] {
         let mut bench = Bench::new(&SCENE.replace("[camera]\n", &format!("[camera]\n{keys}\n")));
         bench.done();
-        let mut shape = |[x, y]: [f64; 2]| pick(&mut bench, x, y).thing.map(|thing| thing.shape);
+        let mut shape = |[x, y]: [f64; 2]| pick(&mut bench, x, y).object.map(|object| object.shape);
         assert_eq!(shape(ball), Some("sphere"), "{keys}");
         assert_ne!(shape(other), Some("sphere"), "{keys}");
     }
@@ -359,7 +359,7 @@ fn pick_reports_materials_from_mesh_files() {
     let half = |x: i32, own: &str| format!("v {x} -1 0\nv 0 -1 0\nv 0 1 0\n{own}\nf -3 -2 -1\n");
     bench.write("two.obj", &format!("mtllib two.mtl\n{}{}", half(1, ""), half(-1, "usemtl chalk")));
     bench.done();
-    let mut material = |x| pick(&mut bench, x, 0.6).thing.expect("a half").material;
+    let mut material = |x| pick(&mut bench, x, 0.6).object.expect("a half").material;
     assert_eq!(material(0.45), "chalk (in the file)");
     assert_eq!(material(0.55), "no material in the file");
 }

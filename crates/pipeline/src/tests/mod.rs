@@ -2,7 +2,7 @@
 
 mod adaptive;
 mod camera;
-mod orders;
+mod commands;
 mod own;
 mod photons;
 mod previews;
@@ -197,7 +197,7 @@ impl Bench {
         loop {
             let event = self.next();
             let ends = matches!(&event,
-                Event::Done { generation, .. } | Event::Failed { generation, .. } | Event::Cancelled { generation }
+                Event::Done { generation, .. } | Event::Failed { generation, .. } | Event::Canceled { generation }
                 if *generation == of);
             events.push(event);
             if ends {

@@ -146,7 +146,7 @@ fn own_render_keeps_an_image_written_on_request() {
         no_shadows,
     ];
     for change in changes {
-        let mut keys = ToggledBench::with(slow);
+        let mut keys = ToggledBench::with(render_slowly);
         begin(&mut keys);
         let of = keys.show(change);
         keys.0.worker.send(Command::Write);
@@ -169,7 +169,7 @@ fn own_render_keeps_an_image_written_on_request() {
 
 #[test]
 fn save_replaces_an_image_written_on_request() {
-    let mut keys = ToggledBench::with(slow);
+    let mut keys = ToggledBench::with(render_slowly);
     let (of, written) = write_brighter(&mut keys);
     keys.0.until_end(of);
     // A scene that cannot be read does not count as a new version.
@@ -197,7 +197,7 @@ fn save_replaces_an_image_written_on_request() {
 
 #[test]
 fn requested_image_is_not_kept_once_removed() {
-    let mut keys = ToggledBench::with(slow);
+    let mut keys = ToggledBench::with(render_slowly);
     let (of, written) = write_brighter(&mut keys);
     fs::rename(keys.0.path("out.ppm"), keys.0.path("bright.ppm")).expect("moved");
     let events = keys.0.until_end(of);
@@ -207,7 +207,7 @@ fn requested_image_is_not_kept_once_removed() {
 
 #[test]
 fn failed_write_keeps_the_earlier_image() {
-    let mut keys = ToggledBench::with(slow);
+    let mut keys = ToggledBench::with(render_slowly);
     let image = keys.0.path("images/out.ppm");
     fs::create_dir(keys.0.path("images")).expect("a folder");
     keys.0.overrides.outputs = vec![image.clone()];
@@ -225,7 +225,7 @@ fn failed_write_keeps_the_earlier_image() {
 
 #[test]
 fn checkpoint_remains_until_own_image_is_written() {
-    let mut keys = ToggledBench::with(slow);
+    let mut keys = ToggledBench::with(render_slowly);
     keys.0.overrides.checkpoints =
         CheckpointSettings { seconds: 0.01, resume: ResumeMode::IfSame, are_kept: false };
     let (of, _) = write_brighter(&mut keys);
@@ -271,14 +271,14 @@ fn other_view_is_not_written_if_scene_is_broken() {
 }
 
 /// Renders later samples so slowly that another request can be sent in the meantime.
-fn slow(
+fn render_slowly(
     photons: Option<&crate::integrators::PhotonMaps>,
     world: &crate::world::World,
     settings: &crate::integrators::RenderSettings,
     pixels: crate::film::SelectedPixels,
     samples: std::ops::Range<u32>,
     token: &crate::control::CancelToken,
-) -> Result<(crate::film::TileSamples, crate::integrators::RayCounters), crate::control::Cancelled> {
+) -> Result<(crate::film::TileSamples, crate::integrators::RayCounters), crate::control::Canceled> {
     if samples.start > 1 && settings.render.shadows == ShadowMode::Soft {
         std::thread::sleep(Duration::from_millis(20));
     }
@@ -306,7 +306,7 @@ fn interrupted_own_render_resumes() {
         keys.0.done();
         keys.0.picture()
     };
-    let mut keys = ToggledBench::with(slow);
+    let mut keys = ToggledBench::with(render_slowly);
     begin(&mut keys);
     let events = keys.shown(no_shadows);
     assert_eq!(states(&events), [SavedSceneImageState::Begun { is_rendering: false }; 2]);
@@ -318,7 +318,7 @@ fn interrupted_own_render_resumes() {
 
 #[test]
 fn own_image_is_written_despite_exposure_change() {
-    let mut keys = ToggledBench::with(slow);
+    let mut keys = ToggledBench::with(render_slowly);
     begin(&mut keys);
     let events = keys.shown(|overrides| overrides.exposure = Some(2.0));
     assert_eq!(
@@ -335,7 +335,7 @@ fn own_image_is_written_despite_exposure_change() {
 fn own_checkpoint_is_saved_during_another_view() {
     let checkpoints = CheckpointSettings { seconds: 60.0, resume: ResumeMode::IfSame, are_kept: false };
     for (end, is_kept) in [(Command::Suspend, true), (Command::Quit, false)] {
-        let mut keys = ToggledBench::with(slow);
+        let mut keys = ToggledBench::with(render_slowly);
         keys.0.overrides.checkpoints = checkpoints;
         begin(&mut keys);
         keys.shown(no_shadows);
@@ -351,7 +351,7 @@ fn own_checkpoint_is_saved_during_another_view() {
         }
     }
     // An edit makes the earlier render useless.
-    let mut keys = ToggledBench::with(slow);
+    let mut keys = ToggledBench::with(render_slowly);
     keys.0.overrides.checkpoints = checkpoints;
     begin(&mut keys);
     keys.0.edit("intensity = [10, 10, 10]", "intensity = [5, 5, 5]");
@@ -363,7 +363,7 @@ fn own_checkpoint_is_saved_during_another_view() {
 
 #[test]
 fn unfinished_image_removes_outdated_report() {
-    let mut keys = ToggledBench::with(slow);
+    let mut keys = ToggledBench::with(render_slowly);
     let report = keys.0.path("r.json");
     keys.0.overrides.report = Some(report.clone());
     keys.0.done();
@@ -392,7 +392,7 @@ fn unfinished_image_removes_outdated_report() {
 
 #[test]
 fn last_valid_image_removes_outdated_report() {
-    let mut bench = Bench::with(SCENE, slow);
+    let mut bench = Bench::with(SCENE, render_slowly);
     bench.writing = WriteRequirement::Try;
     let report = bench.path("r.json");
     bench.overrides.report = Some(report.clone());
@@ -418,7 +418,7 @@ fn estimate_memory(keys: &ToggledBench, overrides: &Overrides) -> u64 {
 fn memory_check_includes_unfinished_own_film() {
     let film = 40 * 30 * 40;
     for (more, fits) in [(film / 2, false), (2 * film, true)] {
-        let mut keys = ToggledBench::with(slow);
+        let mut keys = ToggledBench::with(render_slowly);
         keys.0.overrides.samples = Some(64);
         keys.0.overrides.memory = Some(estimate_memory(&keys, &keys.0.overrides) + more);
         begin(&mut keys);

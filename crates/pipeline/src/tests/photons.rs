@@ -4,7 +4,7 @@ use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::*;
-use crate::control::{CancelToken, Cancelled};
+use crate::control::{CancelToken, Canceled};
 use crate::film::{SelectedPixels, TileSamples};
 use crate::integrators::{PhotonMaps, RayCounters, RenderSettings};
 use crate::world::World;
@@ -25,7 +25,7 @@ fn until_first_are_sent(bench: &Bench) {
 }
 
 #[test]
-fn orders_are_handled_during_first_photon_pass() {
+fn commands_are_handled_during_first_photon_pass() {
     let mut bench = Bench::new(&wrapped(1_500_000));
     let of = bench.send();
     until_first_are_sent(&bench);
@@ -34,7 +34,7 @@ fn orders_are_handled_during_first_photon_pass() {
     bench.worker.send(Command::Write);
     while !matches!(bench.next(), Event::WritePostponed { generation } if generation == of) {}
     bench.worker.send(Command::Pick(ImagePosition { x: 0.5, y: 0.5 }));
-    while !matches!(bench.next(), Event::Picked { picked, .. } if picked.thing.is_some()) {}
+    while !matches!(bench.next(), Event::Picked { picked, .. } if picked.object.is_some()) {}
     bench.worker.send(Command::Pause(false));
     let events = bench.until_end(of);
     assert!(
@@ -81,7 +81,7 @@ fn without(
     pixels: SelectedPixels,
     samples: Range<u32>,
     token: &CancelToken,
-) -> Result<(TileSamples, RayCounters), Cancelled> {
+) -> Result<(TileSamples, RayCounters), Canceled> {
     WITHOUT.fetch_or(photons.is_none(), Ordering::SeqCst);
     KERNEL(photons, world, settings, pixels, samples, token)
 }
@@ -155,7 +155,7 @@ fn black(
     pixels: SelectedPixels,
     samples: Range<u32>,
     token: &CancelToken,
-) -> Result<(TileSamples, RayCounters), Cancelled> {
+) -> Result<(TileSamples, RayCounters), Canceled> {
     WITH.fetch_or(photons.is_some(), Ordering::SeqCst);
     let (mut samples, rays) = KERNEL(photons, world, settings, pixels, samples, token)?;
     samples.radiance.fill(crate::math::Vec3::ZERO);

@@ -1,6 +1,6 @@
 //! Tests for previews: size, section and range.
 
-use super::orders::slow;
+use super::commands::render_slowly;
 use super::*;
 use crate::settings::ViewMode;
 
@@ -86,7 +86,7 @@ fn previews_identify_their_image() {
 
 #[test]
 fn time_limited_renders_are_distinct_images() {
-    let mut bench = Bench::with(&SCENE.replace("samples = 4", "samples = 1000000"), slow);
+    let mut bench = Bench::with(&SCENE.replace("samples = 4", "samples = 1000000"), render_slowly);
     bench.preview = Some(MaxPreviewSize { width: 12, height: 12, around: None });
     bench.overrides.time_seconds = Some(0.2);
     let mut images = Vec::new();
@@ -106,7 +106,7 @@ fn time_limited_renders_are_distinct_images() {
 
 #[test]
 fn preview_size_change_does_not_interrupt() {
-    let mut bench = Bench::with(&SCENE.replace("samples = 4", "samples = 1000000"), slow);
+    let mut bench = Bench::with(&SCENE.replace("samples = 4", "samples = 1000000"), render_slowly);
     bench.preview = Some(MaxPreviewSize { width: 12, height: 12, around: None });
     let of = bench.send();
     while !matches!(bench.next(), Event::Progress { progress, .. } if progress.samples > 0) {}

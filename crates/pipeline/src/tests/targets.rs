@@ -5,7 +5,7 @@ use std::os::unix::fs::symlink;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::*;
-use crate::control::{CancelToken, Cancelled};
+use crate::control::{CancelToken, Canceled};
 use crate::film::{SelectedPixels, TileSamples};
 use crate::integrators::{PhotonMaps, RayCounters, RenderSettings};
 use crate::output::FileIdentity;
@@ -126,7 +126,7 @@ fn relinks(
     pixels: SelectedPixels,
     samples: Range<u32>,
     token: &CancelToken,
-) -> Result<(TileSamples, RayCounters), Cancelled> {
+) -> Result<(TileSamples, RayCounters), Canceled> {
     if let Some(link) = LINK.lock().expect("not poisoned").as_ref()
         && !IS_LINKED.swap(true, Ordering::SeqCst)
     {
@@ -221,6 +221,6 @@ fn unused(
     _: SelectedPixels,
     _: Range<u32>,
     _: &CancelToken,
-) -> Result<(TileSamples, RayCounters), Cancelled> {
+) -> Result<(TileSamples, RayCounters), Canceled> {
     panic!("rendering should not start");
 }

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant, SystemTime};
 
 use super::outputs::WrittenOutputs;
 use crate::assets::{Companion, FileHash};
-use crate::control::{CancelToken, Cancelled};
+use crate::control::{CancelToken, Canceled};
 use crate::scene::fingerprint::FingerprintHasher;
 use crate::system::file::{self, FileKind, FileStamp};
 
@@ -62,7 +62,7 @@ const STAMP_RESOLUTION: Duration = Duration::from_secs(2);
 /// metadata to avoid reading sparse files of several terabytes.
 const MAX_HASHED: u64 = 4 << 30;
 /// Number of bytes to read between checks of the token.
-const CHUNK: usize = 1 << 20;
+const BYTES_PER_POLL: usize = 1 << 20;
 
 /// Cache of file hashes.
 #[derive(Debug, Default)]
@@ -106,12 +106,12 @@ impl FilesSeenByRequest {
     /// Returns a file's content as first seen by this request.
     ///
     /// # Errors
-    /// Returns [`Cancelled`] if the token is canceled.
+    /// Returns [`Canceled`] if the token is canceled.
     pub(crate) fn first_seen_content_id(
         &self,
         path: &Path,
         token: &CancelToken,
-    ) -> Result<FileContentId, Cancelled> {
+    ) -> Result<FileContentId, Canceled> {
         if let Some(content) = self.content_id_if_seen(path) {
             return Ok(content);
         }
@@ -145,12 +145,12 @@ impl FilesSeenByRequest {
     /// Returns a file referenced by another file, along with its decoded content.
     ///
     /// # Errors
-    /// Returns [`Cancelled`] if the token is canceled.
+    /// Returns [`Canceled`] if the token is canceled.
     pub(crate) fn record_companion(
         &self,
         Companion { path, hash, stamp }: &Companion,
         token: &CancelToken,
-    ) -> Result<FilePathAndContentId, Cancelled> {
+    ) -> Result<FilePathAndContentId, Canceled> {
         let content = match hash {
             Some(hash) => self.record_decoded_with_stamp(path, *hash, *stamp),
             None => self.first_seen_content_id(path, token)?,
@@ -163,8 +163,8 @@ impl FilesSeenByRequest {
     /// A removed file does not count as changed.
     ///
     /// # Errors
-    /// Returns [`Cancelled`] if the token is canceled.
-    pub(crate) fn recheck_seen_files(&self, token: &CancelToken) -> Result<(), Cancelled> {
+    /// Returns [`Canceled`] if the token is canceled.
+    pub(crate) fn recheck_seen_files(&self, token: &CancelToken) -> Result<(), Canceled> {
         let seen: Vec<_> = self.lock_seen_files().iter().map(|(path, seen)| (path.clone(), *seen)).collect();
         for (path, SeenFile { content, stamp }) in seen {
             let Some(now) = FileStamp::from_path(&path) else { continue };
@@ -183,8 +183,8 @@ impl FilesSeenByRequest {
     /// result, [`Self::recheck_seen_files`] also detects a program that is still writing.
     ///
     /// # Errors
-    /// Returns [`Cancelled`] if the token is canceled.
-    pub(crate) fn wait_for_writers(&self, token: &CancelToken) -> Result<(), Cancelled> {
+    /// Returns [`Canceled`] if the token is canceled.
+    pub(crate) fn wait_for_writers(&self, token: &CancelToken) -> Result<(), Canceled> {
         let begun = Instant::now();
         loop {
             let now = SystemTime::now();
@@ -240,8 +240,8 @@ impl FileHashCache {
     /// Returns the current content of a file.
     ///
     /// # Errors
-    /// Returns [`Cancelled`] if the token is canceled. The token is checked once per mebibyte.
-    pub fn read_content_id(&self, path: &Path, token: &CancelToken) -> Result<FileContentId, Cancelled> {
+    /// Returns [`Canceled`] if the token is canceled. The token is checked once per mebibyte.
+    pub fn read_content_id(&self, path: &Path, token: &CancelToken) -> Result<FileContentId, Canceled> {
         token.check_pause_and_cancel()?;
         let now = SystemTime::now();
         let metadata = match file::file_kind(path) {
@@ -276,7 +276,7 @@ impl FileHashCache {
         self.lock_entries().retain(|path, _| keep(path));
     }
 
-    fn hash_uncached(&self, path: &Path, token: &CancelToken) -> Result<FileContentId, Cancelled> {
+    fn hash_uncached(&self, path: &Path, token: &CancelToken) -> Result<FileContentId, Canceled> {
         #[cfg(test)]
         self.hashed.lock().unwrap_or_else(PoisonError::into_inner).push(path.to_owned());
         let content = hash_file_contents(path, token);
@@ -298,7 +298,7 @@ fn unreadable_content_id(error: &io::Error) -> FileContentId {
     FileContentId::Unusable(UnreadableReason::Error(error.kind()))
 }
 
-fn hash_file_contents(path: &Path, token: &CancelToken) -> Result<FileContentId, Cancelled> {
+fn hash_file_contents(path: &Path, token: &CancelToken) -> Result<FileContentId, Canceled> {
     let mut file = match file::open_regular_file(path) {
         Ok(Ok((file, _))) => file,
         // In these cases, the file has been replaced since its metadata was read.
@@ -310,7 +310,7 @@ fn hash_file_contents(path: &Path, token: &CancelToken) -> Result<FileContentId,
         Err(error) => return Ok(unreadable_content_id(&error)),
     };
     let mut hasher = blake3::Hasher::new();
-    let mut buffer = vec![0; CHUNK];
+    let mut buffer = vec![0; BYTES_PER_POLL];
     loop {
         token.check_pause_and_cancel()?;
         match file.read(&mut buffer) {
@@ -335,9 +335,9 @@ mod tests {
         let contents = FileHashCache::default();
         assert_eq!(contents.read_content_id(&path, &token), Ok(FileContentId::Missing));
         fs::write(&path, "a").expect("written");
-        let first = contents.read_content_id(&path, &token).expect("not cancelled");
+        let first = contents.read_content_id(&path, &token).expect("not canceled");
         fs::write(&path, "b").expect("written");
-        let second = contents.read_content_id(&path, &token).expect("not cancelled");
+        let second = contents.read_content_id(&path, &token).expect("not canceled");
         assert_ne!(first, second, "a change should be detected at equal length and timestamp");
         fs::write(&path, "a").expect("written");
         assert_eq!(contents.read_content_id(&path, &token), Ok(first));
@@ -361,7 +361,7 @@ mod tests {
         let contents = FileHashCache::default();
         let read = |len| {
             file.set_len(len).expect("a sparse file");
-            contents.read_content_id(&path, &token).expect("not cancelled")
+            contents.read_content_id(&path, &token).expect("not canceled")
         };
         let first = read(3 << 40);
         assert!(matches!(first, FileContentId::Hash(_)));
@@ -376,7 +376,7 @@ mod tests {
         let contents = Arc::new(FileHashCache::default());
         let snapshot = FilesSeenByRequest::new(contents.clone());
         fs::write(&path, "a").expect("written");
-        let first = snapshot.first_seen_content_id(&path, &token).expect("not cancelled");
+        let first = snapshot.first_seen_content_id(&path, &token).expect("not canceled");
         fs::write(&path, "b").expect("written");
         assert_eq!(snapshot.first_seen_content_id(&path, &token), Ok(first));
         assert_ne!(
@@ -407,30 +407,30 @@ mod tests {
             ["mesh", "texture", "library", "same"].map(|name| current.join(name));
         let hash_of = |path: &Path| *blake3::hash(&fs::read(path).expect("read")).as_bytes();
         let verified = |snapshot: &FilesSeenByRequest| {
-            snapshot.recheck_seen_files(&token).expect("not cancelled");
+            snapshot.recheck_seen_files(&token).expect("not canceled");
             snapshot.changed_file()
         };
         for is_decoded in [false, true] {
             show("old");
             let snapshot = FilesSeenByRequest::new(Arc::default());
-            snapshot.first_seen_content_id(&same, &token).expect("not cancelled");
+            snapshot.first_seen_content_id(&same, &token).expect("not canceled");
             if is_decoded {
                 let (hash, stamp) = (Some(hash_of(&library)), FileStamp::from_path(&library));
                 let companion = Companion { path: library.clone(), hash, stamp };
                 show("new");
-                snapshot.record_companion(&companion, &token).expect("not cancelled");
+                snapshot.record_companion(&companion, &token).expect("not canceled");
             } else {
-                snapshot.first_seen_content_id(&mesh, &token).expect("not cancelled");
+                snapshot.first_seen_content_id(&mesh, &token).expect("not canceled");
                 assert_eq!(verified(&snapshot), None);
                 show("new");
             }
-            snapshot.first_seen_content_id(&texture, &token).expect("not cancelled");
+            snapshot.first_seen_content_id(&texture, &token).expect("not canceled");
             assert_eq!(verified(&snapshot), Some(if is_decoded { library.clone() } else { mesh.clone() }));
         }
         // Neither replacement with the same content nor removal is a change.
         show("old");
         let snapshot = FilesSeenByRequest::new(Arc::default());
-        snapshot.first_seen_content_id(&same, &token).expect("not cancelled");
+        snapshot.first_seen_content_id(&same, &token).expect("not canceled");
         show("new");
         assert_eq!(verified(&snapshot), None);
         fs::remove_file(&current).expect("removed");
@@ -450,7 +450,7 @@ mod tests {
                 snapshot.begun += Duration::from_secs(4);
             }
             snapshot.record_decoded_with_stamp(&path, old, stamp);
-            snapshot.recheck_seen_files(&token).expect("not cancelled");
+            snapshot.recheck_seen_files(&token).expect("not canceled");
             // A file with a settled stamp is not read again.
             assert_eq!(snapshot.changed_file(), (!is_settled).then(|| path.clone()));
         }
@@ -462,8 +462,8 @@ mod tests {
         let path = folder.path().join("file");
         fs::write(&path, "half").expect("written");
         let (snapshot, token) = (FilesSeenByRequest::new(Arc::default()), CancelToken::new());
-        snapshot.first_seen_content_id(&path, &token).expect("not cancelled");
-        snapshot.wait_for_writers(&token).expect("not cancelled");
+        snapshot.first_seen_content_id(&path, &token).expect("not canceled");
+        snapshot.wait_for_writers(&token).expect("not canceled");
         let modified = fs::metadata(&path).and_then(|found| found.modified()).expect("metadata");
         assert!(modified.elapsed().is_ok_and(|age| age >= SETTLE_TIME));
     }

@@ -199,9 +199,9 @@ mod tests {
     use super::*;
 
     /// A watcher whose thread failed to start.
-    struct Dead;
+    struct FailedWatcher;
 
-    impl Drop for Dead {
+    impl Drop for FailedWatcher {
         fn drop(&mut self) {
             panic!("dropped");
         }
@@ -210,7 +210,7 @@ mod tests {
     #[test]
     fn watcher_without_thread_is_not_used() {
         let names: Arc<Mutex<HashSet<OsString>>> = Arc::default();
-        assert!(watcher_if_alive(Dead, &names).is_none());
+        assert!(watcher_if_alive(FailedWatcher, &names).is_none());
         let _handler = names.clone();
         assert_eq!(watcher_if_alive(1, &names), Some(1));
     }

@@ -226,14 +226,14 @@ impl<F: FnMut(WatchEvent)> WatchThread<F> {
     ) {
         let before = std::mem::take(&mut self.files);
         for FilePathAndContentId { path, content } in known {
-            let said = before.get(&path).copied();
-            self.files.insert(path, said.unwrap_or((content, since)));
+            let known_content = before.get(&path).copied();
+            self.files.insert(path, known_content.unwrap_or((content, since)));
         }
         for FilePathAndContentId { path, content } in read {
             // A change reported after `since` is newer than the content that was read. Ignore earlier
             // reports, because the file may have been restored.
-            let said = before.get(&path).copied().filter(|(_, when)| *when > since);
-            self.files.insert(path, said.unwrap_or((content, since)));
+            let known_content = before.get(&path).copied().filter(|(_, when)| *when > since);
+            self.files.insert(path, known_content.unwrap_or((content, since)));
         }
         self.update_watched_folders();
         let was = |path: &PathBuf| before.get(path).map(|(content, _)| content);

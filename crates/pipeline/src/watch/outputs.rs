@@ -269,7 +269,7 @@ mod tests {
     fn write(contents: &FileHashCache, path: &Path, text: &str) {
         contents.outputs.begin_write(path, OverwriteProtection::Parts);
         fs::write(path, text).expect("written");
-        let content = contents.read_content_id(path, &CancelToken::new()).expect("not cancelled");
+        let content = contents.read_content_id(path, &CancelToken::new()).expect("not canceled");
         contents.outputs.end_write(path, Some(content));
     }
 

@@ -44,7 +44,7 @@ impl Scratch {
         let contents = FileHashCache::default();
         let read = |path: &&Path| FilePathAndContentId {
             path: path.to_path_buf(),
-            content: contents.read_content_id(path, &CancelToken::new()).expect("not cancelled"),
+            content: contents.read_content_id(path, &CancelToken::new()).expect("not canceled"),
         };
         let since = Instant::now();
         self.watcher.set_files(paths.iter().map(read).collect(), Vec::new(), since);

@@ -8,7 +8,7 @@ use crate::toml::{self, Elements, Entries, TomlValue, Value, quote_key_part};
 
 /// Maximum size of documents to parse, in bytes. Parsing a document of this size delays the new render by a
 /// few milliseconds.
-const MOST_BYTES: usize = 256 << 10;
+const MAX_BYTES: usize = 256 << 10;
 /// Maximum number of changes listed individually. The others are only counted.
 const MAX_LISTED: usize = 3;
 /// Maximum number of characters shown per value.
@@ -19,7 +19,7 @@ const MAX_KEY_COLUMNS: usize = 48;
 /// Lists the keys whose values differ, with both values. Returns an empty list if no key differs or if a
 /// document is not valid TOML.
 pub(super) fn key_changes(before: &str, after: &str) -> Vec<String> {
-    if before.len().max(after.len()) > MOST_BYTES {
+    if before.len().max(after.len()) > MAX_BYTES {
         return Vec::new();
     }
     let ((old, errors), (new, more)) = (toml::parse(before), toml::parse(after));

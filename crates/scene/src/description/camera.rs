@@ -14,7 +14,7 @@ choice! {
         Perspective = "perspective",
         /// Parallel rays: the size of an object in the image does not depend on its distance.
         Orthographic = "orthographic",
-        /// All directions, as in an environment map; the center is towards `look_at`.
+        /// All directions, as in an environment map; `look_at` is at the center.
         Panorama = "panorama",
         /// A circle in which the distance from the center is proportional to the angle from the view axis.
         Fisheye = "fisheye",

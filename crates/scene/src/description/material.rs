@@ -131,7 +131,7 @@ pub struct CoatSource {
     pub roughness: NumberSource,
     /// Index of refraction, in [1, 10].
     pub ior: f32,
-    /// Transmittance of the layer, in and out together, at normal incidence, in [0, 1].
+    /// Transmittance for a round trip through the layer at normal incidence, in [0, 1].
     pub tint: ColorSource,
 }
 
@@ -144,12 +144,12 @@ impl CoatSource {
         tint: ColorSource::Constant(Vec3::ONE),
     };
 
-    /// Whether there is a coat.
+    /// Whether the coat may have a weight above 0.
     pub fn exists(&self) -> bool {
         self.weight != NumberSource::Constant(0.0)
     }
 
-    /// The coat, or [`CoatSource::NONE`] if its weight is 0, so that its other keys do not matter.
+    /// Returns [`CoatSource::NONE`] if the weight is 0, so that the other keys do not affect fingerprints.
     #[must_use]
     pub fn or_none(self) -> Self {
         if self.exists() { self } else { Self::NONE }
@@ -300,7 +300,7 @@ impl MaterialKind {
         }
     }
 
-    /// Whether some light passes through the surface where its opacity is 1.
+    /// Whether light passes through the surface even where its opacity is 1.
     pub fn transmits(&self) -> bool {
         match self {
             Self::Glass { .. } | Self::Pane { .. } => true,
@@ -586,7 +586,7 @@ impl Material {
         if self.kind.is_any_part(is_both) { EmissionSides::Both } else { self.emission.sides }
     }
 
-    /// The material and, for a blend, all of its parts.
+    /// The material itself and, for a blend, all of its parts.
     pub fn with_parts(&self) -> Vec<&Self> {
         let parts = self.kind.parts().iter().flat_map(Self::with_parts);
         std::iter::once(self).chain(parts).collect()

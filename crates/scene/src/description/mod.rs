@@ -56,7 +56,7 @@ pub struct Scene {
     pub environment: Option<Environment>,
 }
 
-/// A copy of a group, including the groups nested in it.
+/// A copy of a group, including all groups nested in it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Instance {
     /// Indices of the copied objects in [`Scene::objects`].
@@ -74,8 +74,8 @@ impl Scene {
         self.instances.get(index).filter(|instance| instance.objects.contains(&object))
     }
 
-    /// Returns a filter that accepts an object only if it is the first copy that is passed to the filter, so
-    /// that a problem in a group is reported once. Accepts all objects that are not in a group.
+    /// Returns a filter that accepts only the first copy of each object in a group, so that a problem in a
+    /// group is reported once. Accepts all objects outside of groups.
     pub fn first_copy_filter(&self) -> impl FnMut(usize) -> bool {
         let mut known = HashSet::new();
         move |object| self.instances.is_empty() || known.insert(self.objects[object].span.start)

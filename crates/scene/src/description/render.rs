@@ -47,7 +47,7 @@ macro_rules! __render_keys {
             background: Vec3 = Vec3::ZERO, color, "radiance", scene;
             /// Pixel reconstruction filter.
             filter: PixelFilter = PixelFilter::Box, choice, "", scene;
-            /// Factor on the image, including float files.
+            /// Scale factor for the light in the image, including float files.
             gain: f32 = 1.0, at_least(0.0), "", scene;
             /// Image exposure: each stop doubles the brightness.
             exposure: f32 = 0.0, between(-100.0, 100.0), "stops", live;

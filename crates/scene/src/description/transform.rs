@@ -36,8 +36,8 @@ impl AffineMap {
         Transform::from_mat3_translation(DMat3::from_cols(x, y, z), self.translate)
     }
 
-    /// Returns the scale of a map that consists of a uniform scale > 0 and a translation, or `None` for other
-    /// maps.
+    /// Returns the scale factor of a map that only scales uniformly, by a factor > 0, and translates. Returns
+    /// `None` for other maps.
     pub(super) fn unrotated_uniform_scale(&self) -> Option<f64> {
         let scale = self.linear[0].x;
         (scale > 0.0 && self.linear == DVec3::AXES.map(|axis| axis * scale)).then_some(scale)
@@ -64,8 +64,8 @@ impl ObjectTransform {
         AffineMap { linear: [linear.x_axis, linear.y_axis, linear.z_axis], translate: translation }
     }
 
-    /// Returns the transform that applies `self` and then `outer`. Keeps the steps if one of the transforms is
-    /// the identity or if `outer` only translates: composed matrices would be rounded differently.
+    /// Returns the transform that applies `self` and then `outer`. Keeps the steps if one of the transforms
+    /// is the identity or if `outer` only translates, because a composed matrix would be rounded differently.
     #[must_use]
     pub fn then(&self, outer: &Self) -> Self {
         match (*self, *outer) {

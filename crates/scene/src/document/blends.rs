@@ -13,13 +13,13 @@ const MAX_PARTS: usize = 64;
 
 /// A material whose table has been read.
 pub(super) enum ReadMaterial {
-    /// Any material but a blend.
+    /// Any material except a blend.
     Complete(Box<Material>),
     /// A blend.
     Blend(UnresolvedBlend),
 }
 
-/// A blend whose materials are known only by their indices.
+/// A blend that refers to its materials by index.
 pub(super) struct UnresolvedBlend {
     /// Name of the blend.
     pub(super) name: String,
@@ -41,7 +41,7 @@ enum Progress {
     Done(Option<Box<Material>>),
 }
 
-/// Replaces indices with materials. Invalid materials are `None`.
+/// Replaces indices by materials. Invalid materials are `None`.
 pub(super) fn resolve_blends(
     context: &FileContext<'_>,
     read: Vec<Option<ReadMaterial>>,
@@ -60,7 +60,7 @@ struct Resolver<'a> {
 }
 
 impl Resolver<'_> {
-    /// Resolves a material at this nesting depth.
+    /// Resolves a material at the nesting depth `depth`.
     fn resolve(&mut self, index: usize, depth: usize) -> Result<Option<Box<Material>>, Cycle> {
         let material = match std::mem::replace(&mut self.materials[index], Progress::Active) {
             Progress::Active => return Err(Cycle),
@@ -83,7 +83,7 @@ impl Resolver<'_> {
         };
         let too_many = format!("the blend \"{shown}\" combines more than {MAX_PARTS} materials");
         let remove = "blend fewer materials";
-        // A blend at this depth is part of blends with at least as many materials.
+        // The blends around a blend at this depth combine at least as many materials.
         if depth == MAX_PARTS {
             error(too_many, remove);
             return None;

@@ -24,11 +24,12 @@ pub(crate) static CAMERA: TableInfo = TableInfo::new(
         up: DIRECTION, Is("[0, 1, 0]");
         /// How the camera maps the scene to the image.
         projection: Words(choice_values::<ProjectionKind>), Is("\"perspective\"");
-        /// Vertical field of view of a perspective, less than 180, or of a fisheye.
+        /// Vertical field of view of a perspective camera, less than 180, or of a fisheye.
         fov: Number(UpTo(0.0, 360.0)), Is("40.0"), "degrees";
-        /// Height of an orthographic image; required there instead of `fov`.
+        /// Height of the view of an orthographic camera, which requires this key instead of `fov`.
         view_height: Number(Length), Alternative("4.0"), "length";
-        /// Offset of the image to the right and up, such as for architecture without converging verticals.
+        /// Offset of the view to the right and up, as with a shift lens; keeps the verticals of buildings
+        /// parallel.
         shift: Numbers(2, "two numbers", Between(-1000.0, 1000.0)), Is("[0, 0]"), "image heights";
         /// Flips the image horizontally.
         mirror: Flag, Is("false");
@@ -111,7 +112,7 @@ fn read_look_at_camera(table: &TableReader<'_>) -> Option<Camera> {
     })
 }
 
-/// Reads the projection and the key for its size.
+/// Reads the projection and its field of view or height.
 fn read_projection(table: &TableReader<'_>) -> Option<Projection> {
     let [projection, fov, view_height] = ["projection", "fov", "view_height"].map(|name| table.key(name));
     let kind = projection.choice()?;
@@ -172,7 +173,7 @@ fn read_window(table: &TableReader<'_>) -> Option<ImageWindow> {
     Some(ImageWindow { shift: shift?, mirror: mirror? })
 }
 
-/// Reads aperture and focus. Projections without a lens have the default values.
+/// Reads aperture and focus. Returns the defaults for projections without a lens.
 fn read_lens(table: &TableReader<'_>, kind: Option<ProjectionKind>) -> [Option<f64>; 2] {
     let [aperture, focus] = ["aperture", "focus"].map(|name| table.key(name));
     match kind {

@@ -18,14 +18,15 @@ pub(crate) static ENVIRONMENT: TableInfo = TableInfo::new(
     keys! {
         /// Radiance; with a `file`, a scale factor for the map.
         color: COLOR, By("black; `[1, 1, 1]` with a `file`"), "radiance";
-        /// An equirectangular map. Its center is seen towards −z, its right quarter towards +x, and its top
-        /// row at +y.
+        /// An equirectangular map. Its center is toward −z, the middle of its right half toward +x, and its
+        /// top row toward +y.
         file: File(MAPS), Absent;
         /// A clear sky with a sun.
         sky: InlineTable(SKY), Absent;
         /// Rotation of the map or the sky about +y, counterclockwise seen from above.
         rotate: Number(Any), Is("0.0"), "degrees";
-        /// Rotation from its own axes to the world's, instead of `rotate`: 9 or 16 numbers, row by row.
+        /// Rotation from the environment's axes to the world's, instead of `rotate`: 9 or 16 numbers in
+        /// row-major order.
         matrix: Rotation, Absent;
     },
 );
@@ -34,9 +35,9 @@ pub(crate) static ENVIRONMENT: TableInfo = TableInfo::new(
 const SKY: &[KeyInfo] = keys! {
     /// Direction toward the sun, above the horizon; rotated by `rotate`.
     sun: DIRECTION, Required("[0.3, 0.6, 0.2]");
-    /// Haze: 2 is a very clear sky, 3 a clear one, 6 a warm and moist day, 10 a slightly hazy one.
+    /// Haze: 2 is a very clear sky, 3 a clear sky, 6 a warm and humid day, and 10 a slightly hazy day.
     turbidity: Number(Between(1.0, 10.0)), Is("3");
-    /// Albedo of the ground, which brightens the sky; below the horizon, a diffuse ground lit by the sky and the
+    /// Albedo of the ground, which brightens the sky and is visible below the horizon, lit by the sky and the
     /// sun.
     ground: Color(Between(0.0, 1.0)), Is("0.3");
     /// Apparent diameter of the sun; does not change its irradiance.

@@ -42,7 +42,7 @@ pub(crate) static INSTANCE: TableInfo = TableInfo::new(
         rotate: ANGLES, Is("[0, 0, 0]"), "degrees";
         /// Translation, applied last.
         translate: Numbers(3, "three numbers", Any), Is("[0, 0, 0]"), "length";
-        /// Name used for clicks and by `--set`.
+        /// Name shown after a click and used by `--set`.
         name: Text, Absent;
         /// An affine transform in row-major order, with 0, 0, 0, 1 as the last row; instead of `scale`,
         /// `rotate` and `translate`.
@@ -50,7 +50,7 @@ pub(crate) static INSTANCE: TableInfo = TableInfo::new(
     },
 );
 
-/// Returns the tables of objects, which a scene and a group can contain.
+/// Returns the tables of objects, which can be in a scene or in a group.
 pub(crate) fn object_tables() -> &'static [TableInfo] {
     static TABLES: LazyLock<Vec<TableInfo>> =
         LazyLock::new(|| SHAPES.iter().map(|shape| &shape.info).chain([&INSTANCE]).cloned().collect());
@@ -75,7 +75,7 @@ pub(super) struct ObjectGroup {
 
 /// A member of a group.
 enum Member {
-    /// An object, whose matrix is not yet applied to its shape.
+    /// An object whose transform has not been applied to its shape yet.
     Object(Object),
     /// A copy of another group.
     Instance(InstanceTable),
@@ -92,7 +92,7 @@ pub(super) struct InstanceTable {
     pub(super) span: Range<usize>,
 }
 
-/// Reads all groups. Reports groups that contain themselves.
+/// Reads all groups. Reports an error if a group contains itself.
 pub(super) fn read_groups(
     root: &TableReader<'_>,
     materials: &MaterialList,
@@ -154,7 +154,7 @@ fn expanded_sizes(
     names: &DefinedNames,
     groups: &[Vec<Member>],
 ) -> Option<Vec<u64>> {
-    // Visit groups after their nested groups (Kahn's algorithm), because recursion could overflow the stack.
+    // Visit nested groups first. Use Kahn's algorithm, because recursion could overflow the stack.
     let mut sizes = vec![0_u64; groups.len()];
     let mut parents: Vec<Vec<usize>> = vec![Vec::new(); groups.len()];
     let mut pending: Vec<usize> = groups.iter().map(|group| nested_instances(group).count()).collect();
@@ -172,7 +172,7 @@ fn expanded_sizes(
             }
         }
     }
-    // The remaining groups contain a cycle, directly or in nested groups.
+    // The remaining groups are part of a cycle or lead to one.
     let Some(start) = pending.iter().position(|&count| count > 0) else { return Some(sizes) };
     let is_pending = |instance: &&InstanceTable| pending[instance.group] > 0;
     let next: Vec<Option<&InstanceTable>> =
@@ -189,8 +189,7 @@ fn nested_instances(group: &[Member]) -> impl Iterator<Item = &InstanceTable> {
     })
 }
 
-/// Reports the cycle that is reached from the group `start`. `next` contains the instance to follow from each
-/// group.
+/// Reports the cycle reached from the group `start`. `next` contains the instance to follow from each group.
 fn report_cycle(
     context: &FileContext<'_>,
     names: &DefinedNames,
@@ -198,7 +197,7 @@ fn report_cycle(
     start: usize,
 ) -> Option<()> {
     const MAX_LISTED: usize = 6;
-    // After this many steps, the group is part of the cycle.
+    // After as many steps as there are groups, the current group is on the cycle.
     let first = (0..next.len()).try_fold(start, |group, _| Some(next[group]?.group))?;
     let follow = |instance: &&'_ InstanceTable| next[instance.group].filter(|_| instance.group != first);
     let cycle: Vec<&InstanceTable> = std::iter::successors(next[first], follow).collect();
@@ -258,7 +257,7 @@ impl DefinedGroups {
         objects: &mut Vec<Object>,
     ) -> Option<()> {
         let members = |instance: &InstanceTable| self.list()[instance.group].members.iter();
-        // The groups being expanded, from the outermost to the innermost, with their transforms.
+        // Groups being expanded, from the outermost to the innermost, with their transforms.
         let mut open = vec![(members(instance), instance.transform)];
         while let Some((rest, outer)) = open.last_mut() {
             match rest.next() {

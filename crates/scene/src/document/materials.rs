@@ -38,7 +38,7 @@ table_types! {
         shininess: Number(Between(0.0, 1000000.0)), Is("32.0");
         /// Reflectance for `[render] ambient`.
         ambient: ColorOrTexture(AtLeast(0.0)), By("as `diffuse`");
-        /// Diffuse transmittance through the surface, kt, as of leaves and paper.
+        /// Diffuse transmittance, kt, for thin surfaces such as leaves and paper.
         diffuse_transmission: ColorOrTexture(AtLeast(0.0)), Is("[0, 0, 0]"), "reflectance";
     }
     /// A perfect mirror.
@@ -104,9 +104,9 @@ table_types! {
         specular: FRACTION, Is("1.0");
         /// Scale factor for the dielectric part's specular reflectance at normal incidence.
         specular_color: ColorOrTexture(AtLeast(0.0)), Is("[1, 1, 1]");
-        /// Fraction of light that is transmitted straight through, as by a thin sheet, instead of scattered.
+        /// Fraction of the diffuse light that is transmitted instead, as through a thin sheet.
         transmission: FRACTION, Is("0.0");
-        /// Diffuse transmittance through the surface, as of leaves and paper; at most 1 − `color`.
+        /// Diffuse transmittance, for thin surfaces such as leaves and paper; at most 1 − `color`.
         diffuse_transmission: REFLECTANCE, Is("[0, 0, 0]"), "reflectance";
         /// Weight of the clear coat on top; another name for `coat`.
         clearcoat: FRACTION, Is("0.0");
@@ -129,7 +129,7 @@ pub(crate) static MATERIALS: TableInfo = TableInfo {
         TableSyntax::Named,
         "A material, which shapes refer to by name",
         keys! {
-            /// The sides of an opaque surface that reflect light; the back is otherwise black.
+            /// The sides of an opaque surface that reflect light; with `front`, the back is black.
             sides: Words(choice_values::<ReflectingSides>), Is("\"both\"");
             /// Emitted radiance; if not black, every shape with this material is an area light.
             emission: Emission(AtLeast(0.0)), Is("[0, 0, 0]"), "radiance";
@@ -143,13 +143,13 @@ pub(crate) static MATERIALS: TableInfo = TableInfo {
             bump: Heights, Absent;
             /// Displacement of white; negative values invert the relief.
             bump_scale: Number(Any), Is("0.01"), "length";
-            /// Weight of a dielectric layer over everything below it, emission included.
+            /// Weight of a clear dielectric layer on top of the material, which also attenuates its emission.
             coat: FRACTION, Is("0.0");
             /// Square root of the layer's GGX α.
             coat_roughness: FRACTION, Is("0.05");
             /// The layer's index of refraction.
             coat_ior: Number(Between(1.0, 10.0)), Is("1.5");
-            /// Transmittance of the layer, in and out together, at normal incidence.
+            /// Transmittance for a round trip through the layer at normal incidence.
             coat_tint: REFLECTANCE, Is("[1, 1, 1]");
             /// Probability that a ray hits the surface instead of passing through.
             opacity: FRACTION, Is("1.0");
@@ -300,7 +300,7 @@ impl<'a> MaterialReader<'a> {
         Some(MaterialKind::Metal { roughness, anisotropy, distribution, fresnel: fresnel? })
     }
 
-    /// Reads the distribution of the facets. Smooth surfaces ignore it.
+    /// Reads the distribution of the facets. Warns if the surface is smooth.
     fn read_distribution(&self, roughness: NumberSource) -> MicrofacetDistribution {
         let key = self.key("distribution");
         if roughness == NumberSource::Constant(0.0)
@@ -370,7 +370,7 @@ impl<'a> MaterialReader<'a> {
         }
     }
 
-    /// Reads a blend, which takes everything else from its materials.
+    /// Reads a blend, which has no keys of its own except `materials` and `weight`.
     fn read_blend(&self, name: String, materials: &DefinedNames) -> Option<UnresolvedBlend> {
         for key in MATERIALS.keys {
             let help = format!("set `{}` on the materials of the blend", key.name);
@@ -382,7 +382,7 @@ impl<'a> MaterialReader<'a> {
         Some(UnresolvedBlend { name, weight, parts: parts?, span: pair.value_span()? })
     }
 
-    /// Reads the sides that reflect light. Surfaces that transmit light scatter it on both sides.
+    /// Reads the sides that reflect light. Transmissive surfaces always scatter light on both sides.
     fn read_sides(&self, kind: Option<&MaterialKind>) -> ReflectingSides {
         let key = self.key("sides");
         let sides = key.or_default(KeyInTable::choice);
@@ -436,7 +436,7 @@ impl<'a> MaterialReader<'a> {
         coat.or_none()
     }
 
-    /// Reads the coat of a principled material, which has two names for some keys.
+    /// Reads the coat of a principled material, where some keys have two names.
     fn read_coat_or_clearcoat(&self) -> CoatSource {
         self.warn_if_ineffective_without("clearcoat_roughness", "clearcoat");
         let (coat, clearcoat) = (self.read_coat(), ["clearcoat", "clearcoat_roughness"]);
@@ -488,7 +488,7 @@ const COAT_KEYS: [&str; 4] = ["coat", "coat_roughness", "coat_ior", "coat_tint"]
 /// Warning message for materials that violate energy conservation.
 pub(crate) const ENERGY_GAIN: &str = "this material reflects more light than it receives";
 
-/// Warns if these albedos, which have these keys, add up to more than 1.
+/// Warns if the sum of `albedos`, the values of `keys`, exceeds 1.
 fn warn_about_albedo_above_one(message: &str, keys: &[KeyInTable<'_>], albedos: &[&ColorSource]) {
     let constant = |source: &&ColorSource| match source {
         ColorSource::Constant(color) => *color,

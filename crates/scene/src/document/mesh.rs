@@ -6,7 +6,7 @@ use super::super::description::{MeshReference, Shape, Spanned};
 use super::super::keys::endings::{GLTF, MESHES};
 use super::super::keys::key::DefaultValue::{Absent, By, Is, Required};
 use super::super::keys::key::ValueKind::{File, Flag, Numbers, Scale, Whole};
-use super::super::keys::key::{ANGLES, MOST_WHOLE};
+use super::super::keys::key::{ANGLES, MAX_INTEGER};
 use super::context::Issue;
 use super::limits::Limits::{Any, NotZero};
 use super::shape_table::{MeshFileRegistry, shape_table};
@@ -21,7 +21,7 @@ shape_table! {
     file: File(MESHES), Required("\"mesh.obj\"");
     /// Index of a primitive in a glTF file, counted across all meshes. Without this key, the mesh is
     /// the file's whole scene.
-    part: Whole(0, MOST_WHOLE), Absent;
+    part: Whole(0, MAX_INTEGER), Absent;
     /// Scale, applied first.
     scale: Scale(NotZero), Is("1.0");
     /// Rotation about x, then y, then z.

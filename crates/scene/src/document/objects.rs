@@ -48,7 +48,8 @@ pub(super) fn read_objects(root: &TableReader<'_>, materials: &MaterialList) -> 
 }
 
 impl ObjectList {
-    /// Inserts the objects of all instances in file order. `order` contains the tables of the other objects.
+    /// Inserts the objects of all instances in file order. `order` contains the table IDs of the other
+    /// objects.
     fn insert_instances(
         &mut self,
         context: &FileContext<'_>,

@@ -3,7 +3,7 @@
 use super::super::description::PhotonOptions;
 use super::super::keys::key::DefaultValue::Is;
 use super::super::keys::key::ValueKind::{Flag, Number, Whole};
-use super::super::keys::key::{MOST_WHOLE, TableInfo, TableSyntax, keys};
+use super::super::keys::key::{MAX_INTEGER, TableInfo, TableSyntax, keys};
 use super::limits::Limits::LengthOrZero;
 use super::table::TableReader;
 
@@ -20,7 +20,7 @@ pub(crate) static PHOTONS: TableInfo = TableInfo::new(
         /// Kernel radius of the first pass; 0 chooses a radius based on the photon density.
         radius: Number(LengthOrZero), Is("0.0"), "length";
         /// Maximum number of bounces per photon.
-        bounces: Whole(0, MOST_WHOLE), Is("16"), "bounces";
+        bounces: Whole(0, MAX_INTEGER), Is("16"), "bounces";
     },
 );
 

@@ -187,9 +187,9 @@ fn split_values(text: &str) -> Vec<&str> {
 
 /// Formats at least two values as a list. Returns `None` for fewer values or if the list would be long.
 fn format_array_if_short(values: &[&str]) -> Option<String> {
-    const LONGEST: usize = 60;
+    const MAX_LENGTH: usize = 60;
     let list = format!("[{}]", values.join(", "));
-    (values.len() > 1 && list.len() <= LONGEST).then_some(list)
+    (values.len() > 1 && list.len() <= MAX_LENGTH).then_some(list)
 }
 
 /// Returns the first line not affected by an error in `line`: the next header if `line` is a broken header,

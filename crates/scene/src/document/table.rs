@@ -28,7 +28,7 @@ pub(super) enum TableTitle<'a> {
     Named(&'static TableInfo, &'a str),
     /// A table in a list of a named table, such as `[[groups.chair.box]]`.
     Inner(&'static TableInfo, &'a str, &'static TableInfo),
-    /// An inline table, identified by its key, and the keys that it may have.
+    /// An inline table, identified by its key, and its allowed keys.
     Key(&'static str, &'static [KeyInfo]),
 }
 

@@ -9,7 +9,7 @@ use super::super::description::{
 use super::super::keys::endings::{self, GLTF, MAPS};
 use super::super::keys::key::DefaultValue::{Absent, Is, Required};
 use super::super::keys::key::ValueKind::{File, Number, Numbers, Whole, Words};
-use super::super::keys::key::{COLOR, MOST_WHOLE, TableInfo, TableSyntax, choice_values, keys};
+use super::super::keys::key::{COLOR, MAX_INTEGER, TableInfo, TableSyntax, choice_values, keys};
 use super::super::sanitize::escape_and_truncate;
 use super::context::{FileContext, Issue};
 use super::key::KeyInTable;
@@ -26,7 +26,7 @@ pub(crate) static TEXTURES: TableInfo = TableInfo::new(
         /// gray; up to 65,536 pixels per side and 2 GiB in memory.
         file: File(endings::TEXTURES), Required("\"picture.png\"");
         /// Index into the `images` of a glTF file.
-        image: Whole(0, MOST_WHOLE), Absent;
+        image: Whole(0, MAX_INTEGER), Absent;
         /// Interpolation; `"mipmap"` also avoids flicker in the distance by choosing the mip level from the
         /// pixel footprint.
         filter: Words(choice_values::<TextureFilter>), Is("\"bilinear\"");

@@ -5,7 +5,7 @@ use super::context::Issue;
 use super::key::KeyInTable;
 use super::table::TableReader;
 use crate::math::DVec3;
-use crate::math::limits::{LARGEST, SHORTEST, is_nonzero_but_too_short, robust_length};
+use crate::math::limits::{MAX_MAGNITUDE, MIN_LENGTH, is_nonzero_but_too_short, robust_length};
 
 /// Reads either `matrix`, or `scale`, `rotate` and `translate`.
 pub(super) fn read_transform(table: &TableReader<'_>) -> Option<ObjectTransform> {
@@ -42,20 +42,20 @@ pub(super) fn read_affine_matrix(key: &KeyInTable<'_>) -> Option<AffineMap> {
     None
 }
 
-/// Returns the reason why the composition of several transforms cannot be used and its details, or `None` if
-/// it can.
+/// Returns the reason why a composed transform cannot be used, and its details. Returns `None` if it can be
+/// used.
 pub(super) fn composed_transform_problem(transform: &ObjectTransform) -> Option<(&'static str, String)> {
     let map = transform.to_affine_map();
     let [x, y, z] = map.linear;
     let largest = [x, y, z, map.translate].map(|column| column.abs().max_element());
-    if largest.iter().any(|number| *number > LARGEST) {
-        return Some(("makes the shape too large", format!("its numbers must be at most {LARGEST:e}")));
+    if largest.iter().any(|number| *number > MAX_MAGNITUDE) {
+        return Some(("makes the shape too large", format!("its numbers must be at most {MAX_MAGNITUDE:e}")));
     }
     affine_map_problem(&map)
 }
 
 /// Minimum ratio of a matrix's determinant to the product of its column lengths. A matrix with a smaller
-/// ratio is singular up to rounding.
+/// ratio counts as singular.
 const MIN_VOLUME_RATIO: f64 = 1e-12;
 
 fn affine_map_problem(map: &AffineMap) -> Option<(&'static str, String)> {
@@ -68,5 +68,5 @@ fn affine_map_problem(map: &AffineMap) -> Option<(&'static str, String)> {
     map.linear
         .iter()
         .any(is_short)
-        .then(|| ("makes the shape too small", format!("its columns must be more than {SHORTEST:e} long")))
+        .then(|| ("makes the shape too small", format!("its columns must be more than {MIN_LENGTH:e} long")))
 }

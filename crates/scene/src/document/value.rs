@@ -8,10 +8,10 @@ use super::context::FileContext;
 /// Describes a value for use in messages, as in `found the string "a"`. Quotes the text, or formats the value
 /// if it is not in a text.
 pub(super) fn describe_value(context: &FileContext<'_>, value: Value<'_>) -> String {
-    const LONGEST: usize = 32;
+    const MAX_LENGTH: usize = 32;
     let written = || match context.span_text(&value.span()) {
-        "" => escape_and_truncate(&format_value(value), LONGEST),
-        text => escape_and_truncate(text, LONGEST),
+        "" => escape_and_truncate(&format_value(value), MAX_LENGTH),
+        text => escape_and_truncate(text, MAX_LENGTH),
     };
     match value.decode() {
         TomlValue::String(_) => format!("the string {}", written()),

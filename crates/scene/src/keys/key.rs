@@ -127,7 +127,7 @@ impl ValueKind {
         }
     }
 
-    /// Returns the keys of a table, or nothing for other values.
+    /// Returns the keys of an inline table, or an empty slice for other kinds.
     pub fn inner_keys(self) -> &'static [KeyInfo] {
         if let Self::InlineTable(keys) = self { keys } else { &[] }
     }
@@ -198,7 +198,7 @@ impl DefaultValue {
 }
 
 /// Upper bound for integer keys without a specific limit.
-pub(crate) const MOST_WHOLE: u64 = u32::MAX as u64;
+pub(crate) const MAX_INTEGER: u64 = u32::MAX as u64;
 
 /// Three coordinates.
 pub(crate) const POINT: ValueKind = ValueKind::Numbers(3, "point", Limits::Any);

@@ -1,8 +1,9 @@
 //! Ranges of numbers, with descriptions.
 
-use crate::math::limits::{LARGEST, is_nonzero_but_too_short};
+use crate::math::limits::{MAX_MAGNITUDE, is_nonzero_but_too_short};
 
-/// A range of accepted numbers. In addition, numbers must be finite and at most [`LARGEST`] in magnitude.
+/// A range of accepted numbers. In addition, numbers must be finite and at most [`MAX_MAGNITUDE`] in
+/// magnitude.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Limits {
     /// Any number.
@@ -30,7 +31,7 @@ impl Limits {
         if number.is_nan() || number.is_infinite() {
             return Some("must be a finite number".to_owned());
         }
-        if number.abs() > LARGEST {
+        if number.abs() > MAX_MAGNITUDE {
             return Some("must be less than 1e18 in magnitude".to_owned());
         }
         match self {

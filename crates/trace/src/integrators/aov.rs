@@ -8,7 +8,7 @@ use super::transport::scratch::TraceBuffers;
 use super::transport::tile::TileContext;
 use super::transport::vertex::SurfaceVertex;
 use super::{FirstHitQuantity, RayCounters};
-use crate::control::Cancelled;
+use crate::control::Canceled;
 use crate::geometry::packet::set_bit_lanes;
 use crate::geometry::surface_packet::SurfacePacket;
 use crate::materials::TexturePoint;
@@ -24,7 +24,7 @@ pub fn shade_aov(
     scratch: &mut TraceBuffers,
     radiance: &mut [Vec3],
     counters: &mut RayCounters,
-) -> Result<(), Cancelled> {
+) -> Result<(), Canceled> {
     tile.closest_hits(&scratch.rays, &mut scratch.hits)?;
     for (path, hit) in scratch.rays.iter().zip(&scratch.hits) {
         let Some(hit) = hit else { continue };
@@ -73,7 +73,7 @@ pub fn record_first_hits_on_plain_surfaces(
 }
 
 /// Returns the albedo of a material if its albedo and shading normals are constant over each surface and the
-/// same on both sides, and none of its surfaces is a null interaction.
+/// same on both sides, and if it has no null interactions.
 fn constant_albedo(tile: &TileContext<'_>, index: usize) -> Option<Vec3> {
     let material = &tile.world.materials[index];
     let is_constant = !tile.world.material_needs_uvs_or_tangents(index)
@@ -143,7 +143,7 @@ fn count_nearby_photons(
     slot: u32,
     vertex: &SurfaceVertex<'_>,
 ) -> f32 {
-    let look = GatherPoint { point: vertex.surface.point, normal: vertex.normal, most_depth: u32::MAX };
+    let look = GatherPoint { point: vertex.surface.point, normal: vertex.normal, max_depth: u32::MAX };
     let (_, _, sample) = tile.block.pixel_and_sample(slot);
     let pass = maps.pass_for_sample(sample);
     [&pass.caustic, &pass.bounced].map(|map| map.count_near(&look, PortableSimd) as f32).iter().sum()

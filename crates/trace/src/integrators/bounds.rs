@@ -2,7 +2,7 @@
 
 use super::transport::scratch::TraceBuffers;
 use super::transport::tile::TileContext;
-use crate::control::Cancelled;
+use crate::control::Canceled;
 use crate::geometry::{Aabb, Ray};
 use crate::math::Vec3;
 use crate::math::elementary::exp2;
@@ -39,7 +39,7 @@ pub fn draw_box_edges(
     tile: &TileContext<'_>,
     scratch: &mut TraceBuffers,
     radiance: &mut [Vec3],
-) -> Result<(), Cancelled> {
+) -> Result<(), Canceled> {
     let render = &tile.settings.render;
     let footprint = tile.world.camera.pixel_footprint(render.height);
     let brightness = exp2(-render.exposure);

@@ -35,7 +35,7 @@ mod view;
 use std::mem::take;
 use std::ops::Range;
 
-use crate::control::{CancelToken, Cancelled};
+use crate::control::{CancelToken, Canceled};
 use crate::film::{LayerSums, NegativeLobeMask, SelectedPixels, TileSamples};
 use crate::math::Vec3;
 use crate::world::{PACKET_SIZE, World};
@@ -57,21 +57,21 @@ const BATCH_SIZE: usize = 1024;
 /// arguments, so it does not matter how an image is divided into tiles or its samples into ranges.
 ///
 /// # Errors
-/// [`Cancelled`] if the token is canceled. The token is checked every few hundred rays.
+/// [`Canceled`] if the token is canceled. The token is checked every few hundred rays.
 pub fn render_tile(
     world: &World,
     settings: &RenderSettings,
     pixels: impl Into<SelectedPixels>,
     samples: Range<u32>,
     token: &CancelToken,
-) -> Result<(TileSamples, RayCounters), Cancelled> {
+) -> Result<(TileSamples, RayCounters), Canceled> {
     render_tile_with_photons(None, world, settings, pixels, samples, token)
 }
 
 /// Like [`render_tile`], but also gathers photons if the samples have photon maps.
 ///
 /// # Errors
-/// [`Cancelled`] if the token is canceled.
+/// [`Canceled`] if the token is canceled.
 pub fn render_tile_with_photons(
     photons: Option<&PhotonMaps>,
     world: &World,
@@ -79,7 +79,7 @@ pub fn render_tile_with_photons(
     pixels: impl Into<SelectedPixels>,
     samples: Range<u32>,
     token: &CancelToken,
-) -> Result<(TileSamples, RayCounters), Cancelled> {
+) -> Result<(TileSamples, RayCounters), Canceled> {
     let pixels = pixels.into();
     let layers = LayerSums::zero(settings.layers.len(), pixels.count());
     render_tile_with_layers(photons, world, settings, (pixels, samples), layers, token)
@@ -88,7 +88,7 @@ pub fn render_tile_with_photons(
 /// Like [`render_tile_with_photons`], but adds the values of the layers to the sums `layers` of the pixels.
 ///
 /// # Errors
-/// [`Cancelled`] if the token is canceled.
+/// [`Canceled`] if the token is canceled.
 pub fn render_tile_with_layers(
     photons: Option<&PhotonMaps>,
     world: &World,
@@ -96,7 +96,7 @@ pub fn render_tile_with_layers(
     (pixels, samples): (SelectedPixels, Range<u32>),
     mut layers: LayerSums,
     token: &CancelToken,
-) -> Result<(TileSamples, RayCounters), Cancelled> {
+) -> Result<(TileSamples, RayCounters), Canceled> {
     // Allocate the samples.
     let mirrored_width = world.camera.is_mirrored().then_some(settings.render.width);
     let block = SampleBlock { pixels, samples, mirrored_width };

@@ -33,7 +33,7 @@ use super::transport::scatter::{BounceContinuation, BsdfSampler};
 use super::transport::scratch::TraceBuffers;
 use super::transport::tile::TileContext;
 use super::view::LightAov;
-use crate::control::Cancelled;
+use crate::control::Canceled;
 use crate::geometry::packet::set_bit_lanes;
 use crate::geometry::surface_packet::SurfacePacket;
 use crate::materials::bsdf::LobesToSample;
@@ -49,7 +49,7 @@ pub fn trace_camera_paths(
     accumulator: Accumulator<'_>,
     counters: &mut RayCounters,
     mut negative: impl FnMut(u32, u32),
-) -> Result<(), Cancelled> {
+) -> Result<(), Canceled> {
     let ThreadMemory { scratch, direct, .. } = memory;
     let TraceBuffers { rays, next, surfaces, crossing, camera, hits, object_order } = scratch;
     let mut paths = CameraWavefront {
@@ -132,7 +132,7 @@ struct CameraWavefront<'a, 's> {
 impl CameraWavefront<'_, '_> {
     /// Intersects a packet of rays, adds the emission they find, and queues the vertices at which the paths
     /// may scatter.
-    fn trace_packet(&mut self, rays: PacketSource<'_>) -> Result<(), Cancelled> {
+    fn trace_packet(&mut self, rays: PacketSource<'_>) -> Result<(), Canceled> {
         let tile = self.tile;
         if (rays.queue_index(0) as usize).is_multiple_of(POLL_INTERVAL) {
             tile.token.check_pause_and_cancel()?;
@@ -175,7 +175,7 @@ impl CameraWavefront<'_, '_> {
     }
 
     /// Adds the light reflected at the queued vertices, continues their paths, and empties the queue.
-    fn shade_queued_vertices(&mut self) -> Result<(), Cancelled> {
+    fn shade_queued_vertices(&mut self) -> Result<(), Canceled> {
         let (tile, aov, depth) = (self.tile, self.accumulator.aov, self.depth);
         let shares_with_paths = self.paths_find_lights();
         for vertices in self.direct.light_sampling_groups(tile) {

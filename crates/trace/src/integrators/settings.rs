@@ -113,8 +113,8 @@ impl RenderSettings {
         FilmPosition { offset, half_width: half_width * scale }
     }
 
-    /// Returns the ray for the pixel in column `x` and row `y` of the image as shown: the ray
-    /// through the pixel's center and the center of the lens, or `None` if the camera has no ray there.
+    /// Returns the ray through the center of the pixel in column `x` and row `y` of the image as shown, and
+    /// through the center of the lens. Returns `None` if the camera has no ray there.
     pub fn ray_through_pixel(&self, camera: &Camera, [x, y]: [u32; 2]) -> Option<Ray> {
         let x = if camera.is_mirrored() { self.render.width - 1 - x } else { x };
         let center = DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5);

@@ -12,10 +12,10 @@ use crate::math::transform::rotation_xyz;
 use crate::math::{DMat3, DVec2, DVec3, Vec2, Vec3};
 use crate::scene::description::{self, ImageWindow, Pose, ResolvedCamera};
 
-/// A camera. All projections have the same axes: `look_at` is at the center of an image that is not shifted.
+/// A camera. All projections use the same axes. Without `shift`, `look_at` is at the center of the image.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
-    /// Center of the lens. For an orthographic camera, a point on the plane on which the rays start.
+    /// Center of the lens, or for an orthographic camera, a point on the plane where rays start.
     pub position: DVec3,
     /// Orthonormal axes: image right, image up, and view direction.
     right: DVec3,
@@ -30,17 +30,17 @@ pub struct Camera {
     pub focus: f64,
 }
 
-/// Mapping from image positions to rays, with the constants that it needs. Names as in pbrt.
+/// Mapping from film positions to rays, with precomputed constants. The variants are named as in pbrt.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Projection {
     /// Rays through one point, onto a flat image.
     Perspective {
-        /// Direction towards the image center. Its component along the view axis is 1.
+        /// Unnormalized direction through the image center. Its component along the view axis is 1.
         center: DVec3,
         /// Tangent of half the vertical field of view.
         tan_half_fov: f64,
     },
-    /// Parallel rays that start on the plane through the camera's position.
+    /// Parallel rays that start on the plane through the camera's position, perpendicular to the view axis.
     Orthographic {
         /// Offset of the image center from the camera's position.
         center: DVec3,
@@ -56,7 +56,7 @@ enum Projection {
     Fisheye {
         /// Offset of the image center in units of half the image height.
         shift: DVec2,
-        /// Angle from the view axis at the top of the circle, in radians.
+        /// Half the angle across the circle, in radians.
         half_fov: f64,
     },
 }
@@ -64,7 +64,7 @@ enum Projection {
 /// A position on the film.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FilmPosition {
-    /// Offset to the right of and above the image center, in units of half the image height.
+    /// Offset from the image center, to the right and up, in units of half the image height.
     pub offset: DVec2,
     /// Half the image width in the same units.
     pub half_width: f64,
@@ -73,16 +73,16 @@ pub struct FilmPosition {
 /// The film positions of a packet of rays.
 #[derive(Clone, Copy, Debug)]
 pub struct FilmPositionPacket {
-    /// Offsets to the right of and above the image center, in units of half the image height.
+    /// Offsets from the image center, to the right and up, in units of half the image height.
     pub offset: [[f64; PACKET_SIZE]; 2],
     /// Half the image width in the same units.
     pub half_width: f64,
 }
 
-/// Width of a pixel's footprint at the center of the image, as a function of distance.
+/// Width of a pixel's footprint at the center of the image, as a linear function of distance.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PixelFootprint {
-    /// Width at the start of the rays.
+    /// Width at the ray origin.
     pub width: f32,
     /// Increase of the width per unit of distance.
     pub spread: f32,
@@ -211,8 +211,8 @@ impl Camera {
         (valid & 1 != 0).then(|| rays.ray(0))
     }
 
-    /// Returns the camera rays through film positions and points on the unit lens disk, `None` for the lens
-    /// center, and the mask of the lanes with a ray.
+    /// Returns camera rays through film positions and points on the unit lens disk, and the mask of the lanes
+    /// that have a ray. `lens` is `None` for rays through the center of the lens.
     #[inline(always)]
     pub fn ray_packet(&self, film: &FilmPositionPacket, lens: Option<&[F32x16; 2]>) -> (RayPacket, u32) {
         let place = |lane: usize| DVec2::new(film.offset[0][lane], film.offset[1][lane]);
@@ -244,7 +244,7 @@ impl Camera {
             Projection::Spherical { shift } => {
                 let rays = fill(|lane| {
                     let place = place(lane) + shift;
-                    // Reduce the azimuth to one turn, because narrow images can be shifted by many.
+                    // Reduce the azimuth to one turn: `shift` can move a narrow image by many turns.
                     let turns = 0.5 * place.x / film.half_width;
                     let (sin, cos) = sin_cos_f64(2.0 * PI * (turns - turns.floor()));
                     let (height, across) = sin_cos_f64(FRAC_PI_2 * place.y);
@@ -317,8 +317,8 @@ impl Camera {
         }
     }
 
-    /// Whether rays can start in a box. For an orthographic camera, whether the box touches the plane on
-    /// which the rays start.
+    /// Whether rays can start in a box. For an orthographic camera, returns whether the box touches the plane
+    /// where rays start.
     pub fn may_start_rays_in(&self, bounds: &Aabb) -> bool {
         let eye = self.position.as_vec3();
         // Origins are rounded to `f32`.
@@ -357,8 +357,8 @@ fn orbiter_position_and_axes(orbiter: &GkitOrbiterCamera) -> (DVec3, [DVec3; 3])
     (DVec3::from_array(orbiter.center) + axes * eye, [axes.x_axis, axes.y_axis, -axes.z_axis])
 }
 
-/// Minimum y component of the up axis for a camera that is neither upside down nor looking straight up or
-/// down.
+/// Minimum y component of the up axis at which a camera counts as upright: neither upside down nor looking
+/// straight up or down.
 const UPRIGHT: f64 = 1e-3;
 
 /// Orbiter used if the orbiter file is missing. The pipeline reports the missing file as an error first.

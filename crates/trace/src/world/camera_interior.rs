@@ -33,8 +33,8 @@ pub struct CompoundSolid {
 }
 
 impl World {
-    /// Glass around the origin of a camera ray, with its materials: closed shapes that contain the origin, and
-    /// other solids that contain the camera or, if rays are parallel, the origin.
+    /// Glass around the origin of a camera ray, with its materials: closed shapes that contain the origin,
+    /// and other solids that contain the camera or, for parallel rays, the origin.
     pub fn glass_around_lens_point(&self, point: Vec3) -> impl Iterator<Item = (u32, u32)> {
         let is_inside = move |&(object, _): &(u32, u32)| match &self.geometry.objects()[object as usize] {
             Object::Shape(shape) => shape.encloses_point_if_closed(point.as_dvec3()) == Some(true),
@@ -65,8 +65,7 @@ impl World {
         near.collect()
     }
 
-    /// Other glass solids that parallel rays may start in. For each ray, the solids around its origin must be
-    /// found.
+    /// Other glass solids in which parallel rays may start. Each ray must then be tested against them.
     pub(super) fn find_solids_near_ray_origins(&self) -> Vec<CompoundSolid> {
         if !self.camera.has_parallel_rays() {
             return Vec::new();

@@ -61,7 +61,7 @@ fn boxes_contain_ray_origins_where_rays_start() {
 }
 
 #[test]
-fn footprints_equal_the_distance_between_neighboring_rays() {
+fn footprints_equal_ray_spacing() {
     for projection in
         [Perspective { fov: 90.0 }, Orthographic { view_height: 3.0 }, Spherical, Fisheye { fov: 200.0 }]
     {
@@ -86,7 +86,7 @@ fn orbiter_looks_at_its_center() {
     let camera = Camera::from_description(&scene, Some(&orbiter));
     let to_center = DVec3::new(1.0, 2.0, 3.0) - camera.position;
     assert!((to_center - camera.forward * 5.0).length() < 1e-12);
-    // A rotation by 90° about y places the camera on the scene's −x axis, and 30° about x raises it.
+    // A rotation by 90° about y moves the camera to the −x axis, and a rotation by 30° about x raises it.
     let expected = DVec3::new(-30.0_f64.to_radians().cos(), 30.0_f64.to_radians().sin(), 0.0) * 5.0;
     assert!((-to_center - expected).length() < 1e-12, "{to_center}");
     assert!(camera.up.y > 0.8);

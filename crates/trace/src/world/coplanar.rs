@@ -78,12 +78,12 @@ impl FlatFace {
     /// Bounding box of the corners, or `None` for an infinite plane.
     fn bounds(&self) -> Option<[DVec3; 2]> {
         let first = *self.corners.first()?;
-        let grow = |[least, greatest]: [DVec3; 2], at: &DVec3| [least.min(*at), greatest.max(*at)];
+        let grow = |[min, max]: [DVec3; 2], at: &DVec3| [min.min(*at), max.max(*at)];
         Some(self.corners.iter().fold([first; 2], grow))
     }
 
     pub(super) fn size(&self) -> f64 {
-        self.bounds().map_or(f64::INFINITY, |[least, greatest]| (greatest - least).max_element())
+        self.bounds().map_or(f64::INFINITY, |[min, max]| (max - min).max_element())
     }
 
     /// Whether two faces are the same face or duplicates within one mesh. Duplicate faces emit only once; see
@@ -124,15 +124,15 @@ pub(super) struct SortedEmissiveFaces {
 impl SortedEmissiveFaces {
     /// Sorts the faces. Returns `None` if there are no faces.
     pub(super) fn new(mut faces: Vec<FlatFace>) -> Option<Self> {
-        let least_x = |face: &FlatFace| face.bounds().map_or(f64::NEG_INFINITY, |[least, _]| least.x);
-        faces.sort_by(|a, b| least_x(a).total_cmp(&least_x(b)));
+        let min_x = |face: &FlatFace| face.bounds().map_or(f64::NEG_INFINITY, |[min, _]| min.x);
+        faces.sort_by(|a, b| min_x(a).total_cmp(&min_x(b)));
         let bounds: Vec<[DVec3; 2]> = faces.iter().filter_map(FlatFace::bounds).collect();
         let joined = |a: [DVec3; 2], b: &[DVec3; 2]| [a[0].min(b[0]), a[1].max(b[1])];
-        let [least, greatest] = bounds.iter().fold(*bounds.first()?, joined);
+        let [min, max] = bounds.iter().fold(*bounds.first()?, joined);
         let rounding = faces.iter().map(|face| face.rounding).fold(0.0, f64::max);
-        let margin = (greatest - least).max_element() * COINCIDENT + rounding;
-        let widest = bounds.iter().map(|[least, greatest]| greatest.x - least.x).fold(0.0, f64::max);
-        Some(Self { faces, bounds, widest, region: [least - margin, greatest + margin], margin })
+        let margin = (max - min).max_element() * COINCIDENT + rounding;
+        let widest = bounds.iter().map(|[min, max]| max.x - min.x).fold(0.0, f64::max);
+        Some(Self { faces, bounds, widest, region: [min - margin, max + margin], margin })
     }
 
     /// Whether no light can be near a box.
@@ -147,9 +147,9 @@ impl SortedEmissiveFaces {
         face: &FlatFace,
         pairs: &mut usize,
     ) -> impl Iterator<Item = &'a FlatFace> {
-        let [least, greatest] = face.bounds().unwrap_or(self.region);
+        let [min, max] = face.bounds().unwrap_or(self.region);
         let margin = self.margin + face.rounding;
-        let bounds = [least - margin, greatest + margin];
+        let bounds = [min - margin, max + margin];
         let start = self.bounds.partition_point(|light| light[0].x < bounds[0].x - self.widest);
         let end = self.bounds.partition_point(|light| light[0].x <= bounds[1].x);
         *pairs += end - start;
@@ -363,9 +363,9 @@ fn visit_flat_faces(
                 let local = corners.iter().fold(Vec3::ZERO, |most, at| most.max(at.abs()));
                 let local = transform.transform_abs_bound(local.as_dvec3()).max_element();
                 let [a, b, c] = corners.map(|at| transform.point(at.as_dvec3() + loaded.mesh.origin));
-                let [least, greatest] = [a.min(b).min(c) - origin, a.max(b).max(c) - origin];
-                let rounding = ROUNDING * local.max(least.abs().max(greatest.abs()).max_element());
-                let bounds = [least - rounding, greatest + rounding];
+                let [min, max] = [a.min(b).min(c) - origin, a.max(b).max(c) - origin];
+                let rounding = ROUNDING * local.max(min.abs().max(max.abs()).max_element());
+                let bounds = [min - rounding, max + rounding];
                 if near.is_some_and(|lights| lights.are_apart_from_box(bounds)) {
                     continue;
                 }

@@ -11,7 +11,7 @@ use super::coplanar::{
     FlatFace, LIFT, MAX_PAIRS, ROUNDING, SURROUNDINGS, SortedEmissiveFaces, are_coplanar_and_overlap,
 };
 use crate::assets::{FileMaterial, LoadedMesh};
-use crate::control::{CancelToken, Cancelled};
+use crate::control::{CancelToken, Canceled};
 use crate::geometry::mesh::TriangleMesh;
 use crate::math::{DVec3, Vec3};
 use crate::scene::description::Scene;
@@ -32,12 +32,12 @@ pub fn emissive_override_flags_by_mesh_file(scene: &Scene) -> Vec<bool> {
 /// materials determine the emissive triangles.
 ///
 /// # Errors
-/// [`Cancelled`].
+/// [`Canceled`].
 pub fn separate_coincident_emitters(
     loaded: &LoadedMesh,
     all_emit: bool,
     token: &CancelToken,
-) -> Result<Option<LoadedMesh>, Cancelled> {
+) -> Result<Option<LoadedMesh>, Canceled> {
     if !all_emit && !loaded.materials.iter().any(FileMaterial::emits) {
         return Ok(None);
     }
@@ -86,7 +86,7 @@ fn find_triangle_lifts(
     emits: impl Fn(u32) -> bool,
     emits_in_file: impl Fn(u32) -> bool,
     token: &CancelToken,
-) -> Result<(BTreeMap<usize, DVec3>, f64), Cancelled> {
+) -> Result<(BTreeMap<usize, DVec3>, f64), Canceled> {
     let reach =
         |face: &FlatFace| face.corners.iter().fold(0.0, |most: f64, at| most.max(at.abs().max_element()));
     let face = |triangle: u32| {
@@ -115,8 +115,8 @@ fn find_triangle_lifts(
             }
         }
     }
-    let greatest = lights.faces.iter().map(|face| reach(face).max(sizes * face.size())).fold(0.0, f64::max);
-    Ok((found, LIFT * greatest))
+    let largest = lights.faces.iter().map(|face| reach(face).max(sizes * face.size())).fold(0.0, f64::max);
+    Ok((found, LIFT * largest))
 }
 
 /// Moves triangles by `height` along their normals in `lifts`. The moved triangles no longer share vertices

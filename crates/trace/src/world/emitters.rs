@@ -7,7 +7,7 @@ use super::distinct_lights::duplicate_emissive_triangles;
 use super::lower::{file_emission, file_opacity, lower_blend_weight, lower_emission, lower_opacity};
 use super::{Geometry, Images, MeshInstance, Object};
 use crate::assets::FileMaterial;
-use crate::control::{CancelToken, Cancelled};
+use crate::control::{CancelToken, Canceled};
 use crate::geometry::Shape;
 use crate::lights::MeshEmitter;
 use crate::lights::infinite::sky::sun::OrientedSunDisk;
@@ -43,19 +43,19 @@ pub enum EnvironmentSource {
     Sky(Sky),
 }
 
-/// Builds all lights: delta and directional lights first, then the environment and its sun, then emitting
-/// objects. A mesh becomes one light per emitting material. Two-sided emission becomes two lights. `sky` is the
-/// environment map or the sky, if there is one that is not black.
+/// Builds all lights: delta and directional lights first, then the environment and its sun, then emissive
+/// objects. A mesh becomes one light per emissive material, and two-sided emission becomes two lights. `sky`
+/// is the environment map or the sky, or `None` if there is none or it is black.
 ///
 /// # Errors
-/// [`Cancelled`] if the token is canceled.
+/// [`Canceled`] if the token is canceled.
 pub fn build_lights(
     scene: &Scene,
     geometry: &Geometry,
     images: &Images,
     sky: Option<EnvironmentSource>,
     token: &CancelToken,
-) -> Result<Arc<Lights>, Cancelled> {
+) -> Result<Arc<Lights>, Canceled> {
     let points = scene.lights.iter().filter(|light| light.has_emission());
     let points = points.map(|light| light.to_traced_light(geometry.coordinate_origin()));
     let objects = (0_u32..).zip(geometry.objects()).zip(&scene.objects);
@@ -175,7 +175,7 @@ impl SurfaceEmission {
         }
     }
 
-    /// Adds the emission of a single material. Constant factors become part of the radiance.
+    /// Adds the emission of a material that is not a blend. Constant factors become part of the radiance.
     fn add_term(&mut self, emission: Emission, opacity: Option<Opacity>, weights: &[BlendWeight]) {
         self.is_sheer |= opacity.is_some();
         let Emission { mut scale, texture, sides, coat } = emission;
@@ -184,14 +184,14 @@ impl SurfaceEmission {
         let (constant, weights): (Vec<BlendWeight>, Vec<_>) =
             weights.iter().cloned().partition(|weight| weight.second.as_untextured().is_some());
         for weight in constant {
-            scale *= weight.of_part(weight.second.as_untextured().unwrap_or(1.0));
+            scale *= weight.for_part(weight.second.as_untextured().unwrap_or(1.0));
         }
         if scale != Vec3::ZERO {
             self.terms.push((EmissionTerm { scale, texture, opacity, coat, weights }, sides));
         }
     }
 
-    /// The emitting sides.
+    /// The sides that emit light.
     fn sides(&self) -> &'static [Side] {
         if self.terms.is_empty() {
             &[]
@@ -202,8 +202,7 @@ impl SurfaceEmission {
         }
     }
 
-    /// Radiance of a side if nothing modulates it, and the terms that do. Their scales are relative to the
-    /// radiance.
+    /// Unmodulated radiance of a side, and the terms that modulate it, with scales relative to this radiance.
     fn radiance_and_terms(&self, side: Side) -> (Vec3, Vec<EmissionTerm>) {
         let of_side = |sides: EmissionSides| side == Side::Front || sides == EmissionSides::Both;
         let terms = self.terms.iter().filter(|(_, sides)| of_side(*sides)).map(|(term, _)| term);
@@ -239,7 +238,7 @@ fn area_lights_of_shape(
         };
         let light = AreaLight { bounds: scale_light_bounds_by_term_means(light.bounds, &terms), ..light };
         Some(match EmissionModulation::from_terms(terms, UvMapping::Shape(shape.clone())) {
-            Some(texture) => light.with_texture(texture),
+            Some(modulation) => light.with_modulation(modulation),
             None => light,
         })
     };
@@ -253,7 +252,7 @@ fn mesh_lights_by_material_and_side(
     emissive: Option<&SurfaceEmission>,
     images: &Images,
     token: &CancelToken,
-) -> Result<Vec<AreaLight>, Cancelled> {
+) -> Result<Vec<AreaLight>, Canceled> {
     let loaded = mesh.tree.loaded();
     let all: Vec<(Option<u32>, SurfaceEmission)> = match emissive {
         Some(emissive) => vec![(None, emissive.clone())],
@@ -279,7 +278,7 @@ fn mesh_lights_by_material_and_side(
         HashSet::new()
     };
     let light =
-        |(own, emissive, side): (Option<u32>, &SurfaceEmission, Side)| -> Result<Option<AreaLight>, Cancelled> {
+        |(own, emissive, side): (Option<u32>, &SurfaceEmission, Side)| -> Result<Option<AreaLight>, Canceled> {
             let corners = |id| match (mesh.world_corners(id), side) {
                 (corners, Side::Front) => corners,
                 ([a, b, c], Side::Back) => [a, c, b],
@@ -299,10 +298,10 @@ fn mesh_lights_by_material_and_side(
                 UvMapping::Triangles(triangles_with_material(mesh, own).map(patch).collect())
             };
             let is_varying = terms.iter().any(EmissionTerm::varies);
-            let texture = is_varying.then(|| EmissionModulation::from_terms(terms, patches())).flatten();
-            let texture = texture.map(Box::new);
+            let modulation = is_varying.then(|| EmissionModulation::from_terms(terms, patches())).flatten();
+            let modulation = modulation.map(Box::new);
             let (shape, part) = (Emitter::Mesh(emitter), EmittingTriangleSelection::Listed);
-            Ok(Some(AreaLight { shape, side, radiance, texture, object, part, bounds }))
+            Ok(Some(AreaLight { shape, side, radiance, modulation, object, part, bounds }))
         };
     let of_sides = all
         .iter()
@@ -313,8 +312,8 @@ fn mesh_lights_by_material_and_side(
 /// Triangles with one of the mesh file's materials, or all triangles if `own` is `None`.
 fn triangles_with_material(mesh: &MeshInstance, own: Option<u32>) -> impl Iterator<Item = u32> {
     let mesh = &mesh.tree.loaded().mesh;
-    let is_meant = move |id: &u32| own.is_none() || mesh.materials.get(*id as usize).copied() == own;
-    (0..mesh.triangles.len() as u32).filter(is_meant)
+    let has_material = move |id: &u32| own.is_none() || mesh.materials.get(*id as usize).copied() == own;
+    (0..mesh.triangles.len() as u32).filter(has_material)
 }
 
 #[cfg(test)]

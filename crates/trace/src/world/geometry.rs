@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use crate::accel::{Bvh, InstructionSet, SphericalShell};
-use crate::control::{CancelToken, Cancelled};
+use crate::control::{CancelToken, Canceled};
 use crate::geometry::{Aabb, Ray, Shape, ShapeHit, SurfacePoint, SurfaceRequest};
 use crate::lights::LightGeometry;
 use crate::math::color::srgb8_color_to_linear;
@@ -58,26 +58,26 @@ impl Geometry {
     /// Builds the geometry of a scene from its objects and mesh trees, in coordinates relative to `origin`.
     ///
     /// # Errors
-    /// [`Cancelled`] if the token is canceled.
+    /// [`Canceled`] if the token is canceled.
     pub fn from_scene(
         scene: &Scene,
         meshes: &[Arc<MeshTree>],
         origin: DVec3,
         token: &CancelToken,
-    ) -> Result<Self, Cancelled> {
+    ) -> Result<Self, Canceled> {
         Self::from_scene_with_light_lifts(scene, meshes, (origin, light_lifts(scene, meshes, origin)), token)
     }
 
     /// Like [`Self::from_scene`], but also applies translations from [`light_lifts`].
     ///
     /// # Errors
-    /// [`Cancelled`] if the token is canceled.
+    /// [`Canceled`] if the token is canceled.
     pub fn from_scene_with_light_lifts(
         scene: &Scene,
         meshes: &[Arc<MeshTree>],
         (origin, lifts): (DVec3, Vec<DVec3>),
         token: &CancelToken,
-    ) -> Result<Self, Cancelled> {
+    ) -> Result<Self, Canceled> {
         let lift = |object: usize| lifts.get(object).copied().unwrap_or(DVec3::ZERO);
         let objects = scene.objects.iter().enumerate();
         let built = objects.map(|(id, object)| lower_shape(&object.shape, meshes, origin - lift(id), token));
@@ -93,8 +93,8 @@ impl Geometry {
     /// Builds the acceleration structures over objects.
     ///
     /// # Errors
-    /// [`Cancelled`] if the token is canceled.
-    pub fn build(mut objects: Vec<Object>, token: &CancelToken) -> Result<Self, Cancelled> {
+    /// [`Canceled`] if the token is canceled.
+    pub fn build(mut objects: Vec<Object>, token: &CancelToken) -> Result<Self, Canceled> {
         let merged = MergedMeshes::merge_small_meshes(&mut objects, token)?;
         number_triangles(&mut objects);
         let bounds: Vec<Option<Aabb>> = objects.iter().map(Object::bounds).collect();
@@ -104,7 +104,7 @@ impl Geometry {
         let shell = |id: u32| bounding_spherical_shell(&objects[id as usize], &boxes[id as usize]);
         let (tree, instructions) =
             (Bvh::build(&boxes, token)?.with_shells_if_nested(shell), InstructionSet::best());
-        let merged = merged.map(|meshes| -> Result<_, Cancelled> {
+        let merged = merged.map(|meshes| -> Result<_, Canceled> {
             let each = (0..).zip(&boxes).map(|(id, own)| if meshes.has(id) { Aabb::EMPTY } else { *own });
             let with_all: Vec<Aabb> = each.chain([meshes.bounds()]).collect();
             let of_merged = meshes.bounds();
@@ -314,8 +314,8 @@ impl Geometry {
     }
 
     /// Returns the requested surface attributes at a hit.
-    pub fn requested_surface(&self, ray: &Ray, hit: &Hit, asked: SurfaceRequest) -> SurfacePoint {
-        self.objects[hit.object as usize].surface(ray, &hit.shape, asked)
+    pub fn requested_surface(&self, ray: &Ray, hit: &Hit, request: SurfaceRequest) -> SurfacePoint {
+        self.objects[hit.object as usize].surface(ray, &hit.shape, request)
     }
 
     /// Mean curvature at a hit, positive if the surface is convex on its front side.
@@ -399,7 +399,7 @@ fn lower_shape(
     meshes: &[Arc<MeshTree>],
     origin: DVec3,
     token: &CancelToken,
-) -> Result<Object, Cancelled> {
+) -> Result<Object, Canceled> {
     let mesh = match shape.to_traced_shape_relative_to(origin) {
         LoweredShape::Shape(shape) => return Ok(Object::Shape(shape)),
         LoweredShape::Mesh(mesh) => mesh,

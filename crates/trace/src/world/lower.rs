@@ -14,9 +14,9 @@ use crate::materials::texture::{
     ColorOrTexture, Texture, TextureFilter, UvTransform, ValueScaleAndOffset, Wrap,
 };
 use crate::materials::{
-    Blend, Bsdf, Bump, Coat, CoatInputs, Coated, CoatedMaterial, Conductor, ConductorFresnel, Dielectric,
-    Emission, Material, Mirror, NonSpecular, NormalMap, NormalPerturbation, Opacity, Phong, Plastic,
-    Principled, PrincipledInputs, ReflectingSides, ScalarParameter, SpecularPart, ThinDielectric,
+    Blend, Bsdf, Bump, Coat, CoatInputs, CoatedMaterial, Conductor, ConductorFresnel, Dielectric, Emission,
+    Material, Mirror, NonSpecular, NormalMap, NormalPerturbation, Opacity, Phong, Plastic, Principled,
+    PrincipledInputs, ReflectingSides, ScalarParameter, SpecularOverBase, SpecularPart, ThinDielectric,
     TranslucentPhong, UvSet,
 };
 use crate::math::{DVec3, Vec3};
@@ -154,7 +154,11 @@ fn plastic(
     let base = Plastic::new(diffuse, specular.clone(), roughness, ior, distribution);
     if is_smooth {
         let specular = SpecularPart::SmoothCoat { tint: specular, ior };
-        return Bsdf::Coated(Coated { specular, coat: None, base: NonSpecular::Plastic(base) });
+        return Bsdf::SpecularOverBase(SpecularOverBase {
+            specular,
+            coat: None,
+            base: NonSpecular::Plastic(base),
+        });
     }
     Bsdf::NonSpecular(match distribution {
         MicrofacetDistribution::Ggx => NonSpecular::Plastic(base),
@@ -172,24 +176,32 @@ pub fn lower_blend_weight(
     MaterialParameterConverter { scene, images, material }.lower_number(weight, TextureRole::BlendWeight)
 }
 
-/// A BSDF under a clear coat. Transparent materials and blends have none.
+/// Adds a clear coat to a BSDF. Glass, panes and blends are returned unchanged.
 fn coated(coat: Coat, bsdf: Bsdf) -> Bsdf {
     match bsdf {
         Bsdf::NonSpecular(base) => Bsdf::NonSpecular(coated_lobes(coat, base)),
-        Bsdf::Coated(Coated { specular, coat: _, base }) => {
-            Bsdf::Coated(Coated { specular, base: coated_lobes(coat.clone(), base), coat: Some(coat) })
+        Bsdf::SpecularOverBase(SpecularOverBase { specular, coat: _, base }) => {
+            Bsdf::SpecularOverBase(SpecularOverBase {
+                specular,
+                base: coated_lobes(coat.clone(), base),
+                coat: Some(coat),
+            })
         }
         Bsdf::Mirror(mirror) => {
             let black = ColorOrTexture::Constant(Vec3::ZERO);
             let none = Phong { diffuse: black.clone(), specular: black, shininess: 1.0, ambient: None };
             let base = coated_lobes(coat.clone(), NonSpecular::Phong(none));
-            Bsdf::Coated(Coated { specular: SpecularPart::Mirror(mirror), coat: Some(coat), base })
+            Bsdf::SpecularOverBase(SpecularOverBase {
+                specular: SpecularPart::Mirror(mirror),
+                coat: Some(coat),
+                base,
+            })
         }
         Bsdf::Dielectric(_) | Bsdf::ThinDielectric(_) | Bsdf::Blend(_) => bsdf,
     }
 }
 
-/// Non-specular lobes under a clear coat. Lobes that already have one keep it.
+/// Adds a clear coat to non-specular lobes. Lobes that already have one are returned unchanged.
 fn coated_lobes(coat: Coat, base: NonSpecular) -> NonSpecular {
     match base {
         NonSpecular::Phong(base) => NonSpecular::CoatedPhong(Box::new(CoatedMaterial { coat, base })),
@@ -431,7 +443,7 @@ impl MaterialParameterConverter<'_> {
         }
     }
 
-    /// Converts a coat, or returns `None` if there is none. `role` is the role of its numbers.
+    /// Converts a coat. Returns `None` if its weight is 0. `role` is the role of its textured numbers.
     fn lower_coat(self, source: &CoatSource, role: fn(ChannelSelector) -> TextureRole) -> Option<Coat> {
         let CoatSource { weight, roughness, ior, tint } = source;
         source

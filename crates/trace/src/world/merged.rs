@@ -8,7 +8,7 @@
 use super::triangle_tree::TriangleTree;
 use super::{MeshInstance, Object};
 use crate::accel::{F32x16, InstructionSet, PACKET_SIZE, SimdKernel};
-use crate::control::{CancelToken, Cancelled};
+use crate::control::{CancelToken, Canceled};
 use crate::geometry::packet::{HitPacket, RayPacket, set_bit_lanes};
 use crate::geometry::triangle_list::{self, TriangleList};
 use crate::geometry::{Aabb, Ray, ShapeHit};
@@ -23,7 +23,7 @@ const MAX_PER_MESH: usize = 1 << 14;
 const MAX_TOTAL: usize = 1 << 17;
 
 /// Maximum triangle count at which packets test all triangles without a tree.
-const MAX_FACETS: usize = triangle_list::MOST;
+const MAX_FACETS: usize = triangle_list::MAX_TRIANGLES;
 
 /// Maximum coordinate of a merged mesh, relative to its size. Beyond this, rounding would distort the mesh.
 const MAX_RELATIVE_COORDINATE: f32 = 1024.0;
@@ -60,16 +60,13 @@ impl MergedMeshes {
     /// Merges the small meshes among `objects`. Returns `None` if merging is not worthwhile.
     ///
     /// # Errors
-    /// [`Cancelled`] if the token is canceled.
-    pub fn merge_small_meshes(
-        objects: &mut [Object],
-        token: &CancelToken,
-    ) -> Result<Option<Self>, Cancelled> {
+    /// [`Canceled`] if the token is canceled.
+    pub fn merge_small_meshes(objects: &mut [Object], token: &CancelToken) -> Result<Option<Self>, Canceled> {
         // Choose the smallest meshes first, up to the maximum number of triangles to rebuild after each edit.
         let count = |object: &Object| object.mesh().map_or(0, MeshInstance::triangle_count);
-        let least = smallest_object_size(objects);
+        let smallest = smallest_object_size(objects);
         let mut chosen: Vec<usize> =
-            (0..objects.len()).filter(|&id| may_be_merged(&objects[id], least)).collect();
+            (0..objects.len()).filter(|&id| may_be_merged(&objects[id], smallest)).collect();
         chosen.sort_by_key(|&id| (count(&objects[id]), id));
         let mut total = 0;
         chosen.retain(|&id| {
@@ -166,22 +163,22 @@ impl MergedMeshes {
     /// Invalid triangle number.
     pub const NO_TRIANGLE: u32 = u32::MAX;
 
-    /// Finds the nearest hits of the rays in `met`. The hits' primitives are triangle indices into the tree.
-    /// Other lanes have negative `ends`.
+    /// Finds the nearest hits of the rays in `active`. The hits' primitives are triangle indices into the
+    /// tree. Other lanes have negative `ends`.
     #[inline(never)]
     pub fn closest_hit_packet(
         &self,
         by: InstructionSet,
         rows: &RayPacket,
-        (met, ends): (u32, &F32x16),
+        (active, ends): (u32, &F32x16),
         found: &mut HitPacket,
     ) {
-        let Some(facets) = &self.facets else { return self.closest_hit_by_tree(rows, met, ends, found) };
+        let Some(facets) = &self.facets else { return self.closest_hit_by_tree(rows, active, ends, found) };
         let size = self.bounds().extent();
-        match by.run(TriangleListClosestHitKernel { facets, size, rows, met, ends, found }) {
+        match by.run(TriangleListClosestHitKernel { facets, size, rows, active, ends, found }) {
             Some(0) => {}
             Some(undecided) => self.closest_hit_per_ray(rows, undecided, ends, found),
-            None => self.closest_hit_by_tree(rows, met, ends, found),
+            None => self.closest_hit_by_tree(rows, active, ends, found),
         }
     }
 
@@ -197,9 +194,9 @@ impl MergedMeshes {
     }
 
     #[inline(never)]
-    fn closest_hit_by_tree(&self, rows: &RayPacket, met: u32, ends: &F32x16, found: &mut HitPacket) {
+    fn closest_hit_by_tree(&self, rows: &RayPacket, active: u32, ends: &F32x16, found: &mut HitPacket) {
         let mut hits = [None; PACKET_SIZE];
-        self.tree.closest_hit_packet(&unpack_rays(rows, met), ends, &mut hits);
+        self.tree.closest_hit_packet(&unpack_rays(rows, active), ends, &mut hits);
         for (lane, hit) in hits.iter().enumerate() {
             if let Some(hit) = hit {
                 found.set(lane, hit);
@@ -207,23 +204,23 @@ impl MergedMeshes {
         }
     }
 
-    /// Returns the mask of rays in `met` that hit any triangle other than the lane's entry in `except`, which
-    /// may be [`MergedMeshes::NO_TRIANGLE`].
+    /// Returns the mask of rays in `active` that hit any triangle other than the lane's entry in `except`,
+    /// which may be [`MergedMeshes::NO_TRIANGLE`].
     #[inline(never)]
     pub fn any_hit_packet(
         &self,
         by: InstructionSet,
         rows: &RayPacket,
-        (met, ends): (u32, &F32x16),
+        (active, ends): (u32, &F32x16),
         except: Option<&[u32; PACKET_SIZE]>,
     ) -> u32 {
-        let Some(facets) = &self.facets else { return self.any_hit_by_tree(rows, met, ends, except) };
+        let Some(facets) = &self.facets else { return self.any_hit_by_tree(rows, active, ends, except) };
         let own = except.unwrap_or(&[Self::NO_TRIANGLE; PACKET_SIZE]);
         let size = self.bounds().extent();
-        match by.run(TriangleListAnyHitKernel { facets, size, rows, met, ends, except: own }) {
+        match by.run(TriangleListAnyHitKernel { facets, size, rows, active, ends, except: own }) {
             Some([hit, 0]) => hit,
             Some([hit, undecided]) => hit | self.any_hit_one_by_one(rows, undecided, ends, own),
-            None => self.any_hit_by_tree(rows, met, ends, except),
+            None => self.any_hit_by_tree(rows, active, ends, except),
         }
     }
 
@@ -248,11 +245,11 @@ impl MergedMeshes {
     fn any_hit_by_tree(
         &self,
         rows: &RayPacket,
-        met: u32,
+        active: u32,
         ends: &F32x16,
         except: Option<&[u32; PACKET_SIZE]>,
     ) -> u32 {
-        let rays = unpack_rays(rows, met);
+        let rays = unpack_rays(rows, active);
         let Some(numbers) = except else { return self.tree.any_hit_packet(&rays, ends, &[]) };
         let own = numbers.map(|number| (number != Self::NO_TRIANGLE).then_some(number));
         self.tree.any_hit_packet(&rays, ends, &own)
@@ -265,11 +262,11 @@ impl MergedMeshes {
     }
 }
 
-/// Whether the rays in `met` start close together, relative to `size`, and have similar directions. Such rays
-/// are faster with the tree than without it.
+/// Whether the rays in `active` start close together, relative to `size`, and have similar directions. Such
+/// rays are faster with the tree than without it.
 #[inline(always)]
-fn are_coherent(rows: &RayPacket, met: u32, size: Vec3, simd: impl Simd) -> bool {
-    let first = met.trailing_zeros() as usize % PACKET_SIZE;
+fn are_coherent(rows: &RayPacket, active: u32, size: Vec3, simd: impl Simd) -> bool {
+    let first = active.trailing_zeros() as usize % PACKET_SIZE;
     let near = size.element_sum() * COHERENCE;
     let along = (0..3).map(|axis| rows.direction[axis][first].abs()).sum::<f32>() * COHERENCE;
     let from = [0, 1, 2].map(|axis| rows.origin[axis][first]);
@@ -281,7 +278,7 @@ fn are_coherent(rows: &RayPacket, met: u32, size: Vec3, simd: impl Simd) -> bool
         let aside = (dx[lane] - way[0]).abs() + (dy[lane] - way[1]).abs() + (dz[lane] - way[2]).abs();
         differs[lane] = if (apart <= near) & (aside <= along) { 0 } else { TRUE };
     }
-    simd.movemask(&differs) & met == 0
+    simd.movemask(&differs) & active == 0
 }
 
 /// Coherence threshold: maximum difference between ray origins relative to the size of all triangles, and
@@ -294,7 +291,7 @@ struct TriangleListClosestHitKernel<'a> {
     facets: &'a TriangleList,
     size: Vec3,
     rows: &'a RayPacket,
-    met: u32,
+    active: u32,
     ends: &'a F32x16,
     found: &'a mut HitPacket,
 }
@@ -304,11 +301,11 @@ impl SimdKernel for TriangleListClosestHitKernel<'_> {
 
     #[inline(always)]
     fn run(self, simd: impl Simd) -> Option<u32> {
-        let Self { facets, size, rows, met, ends, found } = self;
-        if are_coherent(rows, met, size, simd) {
+        let Self { facets, size, rows, active, ends, found } = self;
+        if are_coherent(rows, active, size, simd) {
             return None;
         }
-        Some(facets.update_decided_closest_hits(rows, (met, ends), found, simd))
+        Some(facets.update_decided_closest_hits(rows, (active, ends), found, simd))
     }
 }
 
@@ -318,7 +315,7 @@ struct TriangleListAnyHitKernel<'a> {
     facets: &'a TriangleList,
     size: Vec3,
     rows: &'a RayPacket,
-    met: u32,
+    active: u32,
     ends: &'a F32x16,
     except: &'a [u32; PACKET_SIZE],
 }
@@ -328,20 +325,20 @@ impl SimdKernel for TriangleListAnyHitKernel<'_> {
 
     #[inline(always)]
     fn run(self, simd: impl Simd) -> Option<[u32; 2]> {
-        let Self { facets, size, rows, met, ends, except } = self;
-        if are_coherent(rows, met, size, simd) {
+        let Self { facets, size, rows, active, ends, except } = self;
+        if are_coherent(rows, active, size, simd) {
             return None;
         }
-        Some(facets.any_hit_and_undecided_masks(rows, (met, ends), except, simd))
+        Some(facets.any_hit_and_undecided_masks(rows, (active, ends), except, simd))
     }
 }
 
-/// Returns the rays of a packet. Lanes outside `met` contain a copy of the first ray in `met`, whose
+/// Returns the rays of a packet. Lanes outside `active` contain a copy of the first ray in `active`, whose
 /// direction is likely similar.
 #[inline]
-fn unpack_rays(rows: &RayPacket, met: u32) -> [Ray; PACKET_SIZE] {
-    let mut rays = [rows.ray(met.trailing_zeros() as usize % PACKET_SIZE); PACKET_SIZE];
-    for lane in set_bit_lanes(met & met.wrapping_sub(1)) {
+fn unpack_rays(rows: &RayPacket, active: u32) -> [Ray; PACKET_SIZE] {
+    let mut rays = [rows.ray(active.trailing_zeros() as usize % PACKET_SIZE); PACKET_SIZE];
+    for lane in set_bit_lanes(active & active.wrapping_sub(1)) {
         rays[lane] = rows.ray(lane);
     }
     rays
@@ -355,17 +352,17 @@ fn smallest_object_size(objects: &[Object]) -> f32 {
 }
 
 /// Whether an object is a mesh that is small enough to merge and whose world coordinates are accurate enough
-/// in `f32`. `least` is the size of the scene's smallest object.
-fn may_be_merged(object: &Object, least: f32) -> bool {
+/// in `f32`. `smallest` is the size of the scene's smallest object.
+fn may_be_merged(object: &Object, smallest: f32) -> bool {
     let Some(mesh) = object.mesh() else { return false };
     let Some(bounds) = object.bounds().filter(|bounds| !bounds.is_empty()) else { return false };
-    let greatest = bounds.min.abs().max(bounds.max.abs()).max_element();
+    let largest = bounds.min.abs().max(bounds.max.abs()).max_element();
     let size = bounds.extent().max_element();
-    if mesh.is_transformed() && size > MAX_RELATIVE_SIZE * least {
+    if mesh.is_transformed() && size > MAX_RELATIVE_SIZE * smallest {
         return false;
     }
     let count = mesh.triangle_count();
-    (1..=MAX_PER_MESH).contains(&count) && greatest.is_finite() && greatest <= MAX_RELATIVE_COORDINATE * size
+    (1..=MAX_PER_MESH).contains(&count) && largest.is_finite() && largest <= MAX_RELATIVE_COORDINATE * size
 }
 
 #[cfg(test)]
@@ -537,10 +534,11 @@ pub(super) mod tests {
                 let direction =
                     direction * if direction.dot(surface.normal) * side < 0.0 { -1.0 } else { 1.0 };
                 let origin = offset_origin(surface.point, surface.error, surface.normal, direction);
-                let met = geometry.closest_hit(&Ray::new(origin, direction));
-                let is_own =
-                    |met: Hit| (met.object, met.shape.primitive) == (hit.object, hit.shape.primitive);
-                (started, again) = (started + 1, again + u32::from(met.is_some_and(is_own)));
+                let second = geometry.closest_hit(&Ray::new(origin, direction));
+                let is_own = |second: Hit| {
+                    (second.object, second.shape.primitive) == (hit.object, hit.shape.primitive)
+                };
+                (started, again) = (started + 1, again + u32::from(second.is_some_and(is_own)));
             }
         }
         assert!(started > 5000, "{started} rays");

@@ -203,10 +203,10 @@ impl MeshInstance {
     }
 
     /// Computes the requested surface attributes at a hit.
-    pub(super) fn surface(&self, ray: &RayF64, hit: &ShapeHit, asked: SurfaceRequest) -> SurfacePoint {
+    pub(super) fn surface(&self, ray: &RayF64, hit: &ShapeHit, request: SurfaceRequest) -> SurfacePoint {
         match self.is_transformed {
-            true => self.surface_using_placement(self.to_placed_mesh(&self.transform), ray, hit, asked),
-            false => self.surface_using_placement(self.to_placed_mesh(IdentityPlacement), ray, hit, asked),
+            true => self.surface_using_placement(self.to_placed_mesh(&self.transform), ray, hit, request),
+            false => self.surface_using_placement(self.to_placed_mesh(IdentityPlacement), ray, hit, request),
         }
     }
 
@@ -215,7 +215,7 @@ impl MeshInstance {
         placed: PlacedMesh<impl MeshPlacement>,
         ray: &RayF64,
         hit: &ShapeHit,
-        asked: SurfaceRequest,
+        request: SurfaceRequest,
     ) -> SurfacePoint {
         let mesh = &self.tree.loaded().mesh;
         let vertices = mesh.triangles[hit.primitive as usize].map(|vertex| vertex as usize);
@@ -225,7 +225,7 @@ impl MeshInstance {
             true => placed.corrected_point_and_error(&facet, ray, [hit.u, hit.v]),
             false => [facet.point, facet.error],
         };
-        let (uv, dpdu, dpdv) = if asked.uv {
+        let (uv, dpdu, dpdv) = if request.uv {
             self.uv_and_tangents(&mesh.uvs, vertices, barycentric, [b - a, c - a])
         } else {
             (Vec2::ZERO, Vec3::ZERO, Vec3::ZERO)
@@ -235,7 +235,7 @@ impl MeshInstance {
             let normals = self.tree.file_or_computed_normals();
             let normals = vertices.map(|vertex| normals[vertex]);
             shading_normal = placed.shading_normal(&facet, &normals);
-            if asked.shadow_point && !placed.uses_point_from_ray(&facet, ray) {
+            if request.shadow_point && !placed.uses_point_from_ray(&facet, ray) {
                 shadow_point = placed.lifted_shadow_origin(&facet, &normals, ray.direction);
             }
         }
@@ -276,17 +276,17 @@ impl MeshInstance {
         (uv, world(dpdu), world(dpdv))
     }
 
-    /// Finds the nearest hits of the rays in `met`. Other lanes have negative `ends`.
+    /// Finds the nearest hits of the rays in `active`. Other lanes have negative `ends`.
     #[inline(never)]
     pub(super) fn closest_hit_packet(
         &self,
         rows: &RayPacket,
-        met: u32,
+        active: u32,
         ends: &F32x16,
         found: &mut HitPacket,
     ) {
         let mut hits = [None; PACKET_SIZE];
-        self.tree.triangle_tree().closest_hit_packet(&self.local_rays(rows, met), ends, &mut hits);
+        self.tree.triangle_tree().closest_hit_packet(&self.local_rays(rows, active), ends, &mut hits);
         for (lane, hit) in hits.iter().enumerate() {
             if let Some(hit) = hit {
                 found.set(lane, hit);
@@ -294,17 +294,17 @@ impl MeshInstance {
         }
     }
 
-    /// Returns the mask of rays in `met` that hit any triangle other than the ignored triangle (see `except`
-    /// in [`Object::any_hit_packet`](super::Object::any_hit_packet)).
+    /// Returns the mask of rays in `active` that hit any triangle other than the ignored triangle (see
+    /// `except` in [`Object::any_hit_packet`](super::Object::any_hit_packet)).
     #[inline(never)]
     pub(super) fn any_hit_packet(
         &self,
         rows: &RayPacket,
-        met: u32,
+        active: u32,
         ends: &F32x16,
         except: Option<(u32, &[u32; PACKET_SIZE])>,
     ) -> u32 {
-        let local = self.local_rays(rows, met);
+        let local = self.local_rays(rows, active);
         let Some((own, numbers)) = except else {
             return self.tree.triangle_tree().any_hit_packet(&local, ends, &[]);
         };
@@ -313,17 +313,17 @@ impl MeshInstance {
         self.tree.triangle_tree().any_hit_packet(&local, ends, &parts)
     }
 
-    /// Transforms the rays in `met` to mesh coordinates. Other lanes contain a copy of the first ray in
-    /// `met`, whose direction is likely similar.
+    /// Transforms the rays in `active` to mesh coordinates. Other lanes contain a copy of the first ray in
+    /// `active`, whose direction is likely similar.
     #[inline]
-    fn local_rays(&self, rows: &RayPacket, met: u32) -> [Ray; PACKET_SIZE] {
+    fn local_rays(&self, rows: &RayPacket, active: u32) -> [Ray; PACKET_SIZE] {
         let local = |lane: usize| {
             let ray = rows.ray(lane % PACKET_SIZE);
             let ray = ray.with_start_triangle(self.mesh_triangle_number_unchecked(ray.start));
             if self.is_transformed { self.transform_ray_to_mesh(&ray) } else { ray }
         };
-        let mut rays = [local(met.trailing_zeros() as usize); PACKET_SIZE];
-        for lane in set_bit_lanes(met & met.wrapping_sub(1)) {
+        let mut rays = [local(active.trailing_zeros() as usize); PACKET_SIZE];
+        for lane in set_bit_lanes(active & active.wrapping_sub(1)) {
             rays[lane] = local(lane);
         }
         rays

@@ -5,7 +5,7 @@ use std::sync::{Arc, OnceLock};
 use super::triangle_tree::TriangleTree;
 use crate::assets::LoadedMesh;
 use crate::assets::mesh::vertex_normals;
-use crate::control::{CancelToken, Cancelled};
+use crate::control::{CancelToken, Canceled};
 use crate::geometry::Aabb;
 use crate::math::Vec3;
 use crate::scene::description::Accel;
@@ -22,7 +22,7 @@ pub struct MeshTree {
 
 impl MeshTree {
     /// Builds a tree of this type over the mesh.
-    pub fn build(loaded: Arc<LoadedMesh>, accel: Accel, token: &CancelToken) -> Result<Self, Cancelled> {
+    pub fn build(loaded: Arc<LoadedMesh>, accel: Accel, token: &CancelToken) -> Result<Self, Canceled> {
         let mesh = &loaded.mesh;
         let (count, corners) = (mesh.triangles.len() as u32, |id| mesh.corners(id));
         let tree = TriangleTree::build(accel, count, corners, token)?;
@@ -61,7 +61,7 @@ impl MeshTree {
     }
 
     /// Computes vertex normals if the file has none.
-    pub fn prepare_normals(&self, token: &CancelToken) -> Result<(), Cancelled> {
+    pub fn prepare_normals(&self, token: &CancelToken) -> Result<(), Canceled> {
         if self.loaded.mesh.normals.is_empty() && self.computed_normals.get().is_none() {
             // If another thread finishes first, its result is identical.
             let _ = self.computed_normals.set(vertex_normals(&self.loaded.mesh, token)?);

@@ -124,8 +124,8 @@ impl World {
     pub fn transmittance_and_continued_ray(&self, ray: &Ray, hit: &Hit, lookups: &mut u64) -> (Vec3, Ray) {
         let index = self.material_index(hit);
         let material = &self.materials[index];
-        let asked = SurfaceRequest { uv: self.material_needs_uvs_or_tangents(index), shadow_point: false };
-        let surface = self.geometry.requested_surface(ray, hit, asked);
+        let request = SurfaceRequest { uv: self.material_needs_uvs_or_tangents(index), shadow_point: false };
+        let surface = self.geometry.requested_surface(ray, hit, request);
         let cosine = surface.shading_normal.dot(ray.direction.normalize_or_zero());
         let color = self.vertex_color(hit).unwrap_or(Vec3::ONE);
         let at = self.texture_point(hit, &surface, |_| Footprint::POINT);
@@ -233,11 +233,11 @@ struct OpaqueOcclusionTest<'a, F> {
 
 impl<F: Simd> AnyHitCallback for OpaqueOcclusionTest<'_, F> {
     #[inline(always)]
-    fn test(&mut self, id: u32, met: u32, ends: &F32x16) -> u32 {
+    fn test(&mut self, id: u32, active: u32, ends: &F32x16) -> u32 {
         if self.see_through.has(id) {
-            self.near |= met;
+            self.near |= active;
             return 0;
         }
-        self.occluders.test(id, met, ends)
+        self.occluders.test(id, active, ends)
     }
 }

@@ -34,40 +34,40 @@ impl Object {
         }
     }
 
-    /// Finds the nearest hits of the rays in `met` and writes them to `found`, which must be empty. Lanes
-    /// outside `met` have negative `ends`.
+    /// Finds the nearest hits of the rays in `active` and writes them to `found`, which must be empty. Lanes
+    /// outside `active` have negative `ends`.
     #[inline(always)]
     pub fn closest_hit_packet(
         &self,
         rows: &RayPacket,
-        met: u32,
+        active: u32,
         ends: &F32x16,
         found: &mut HitPacket,
         simd: impl Simd,
     ) {
         match self {
-            Self::Shape(shape) => shape.intersect_packet(rows, met, ends, found, simd),
-            Self::Mesh(mesh) => mesh.closest_hit_packet(rows, met, ends, found),
+            Self::Shape(shape) => shape.intersect_packet(rows, active, ends, found, simd),
+            Self::Mesh(mesh) => mesh.closest_hit_packet(rows, active, ends, found),
         }
     }
 
-    /// Returns the mask of rays in `met` that hit the object. Lanes outside `met` have negative `ends`.
+    /// Returns the mask of rays in `active` that hit the object. Lanes outside `active` have negative `ends`.
     /// `except` contains a lane mask and the primitive to ignore in each selected lane.
     #[inline(always)]
     pub fn any_hit_packet(
         &self,
         rows: &RayPacket,
-        met: u32,
+        active: u32,
         ends: &F32x16,
         except: Option<(u32, &[u32; PACKET_SIZE])>,
         simd: impl Simd,
     ) -> u32 {
         let shape = match self {
             Self::Shape(shape) => shape,
-            Self::Mesh(mesh) => return mesh.any_hit_packet(rows, met, ends, except),
+            Self::Mesh(mesh) => return mesh.any_hit_packet(rows, active, ends, except),
         };
         let mut found = HitPacket::without_hits();
-        shape.intersect_packet(rows, met, ends, &mut found, simd);
+        shape.intersect_packet(rows, active, ends, &mut found, simd);
         let mut hit = found.hit_mask(simd);
         if let Some((own, parts)) = except {
             for (lane, &part) in parts.iter().enumerate() {
@@ -79,11 +79,11 @@ impl Object {
     }
 
     /// Computes the requested surface attributes at a hit.
-    pub fn surface(&self, ray: &Ray, hit: &ShapeHit, asked: SurfaceRequest) -> SurfacePoint {
+    pub fn surface(&self, ray: &Ray, hit: &ShapeHit, request: SurfaceRequest) -> SurfacePoint {
         let ray = ray.to_f64();
         match self {
-            Self::Shape(shape) => shape.requested_surface_point(&ray, hit, asked),
-            Self::Mesh(mesh) => mesh.surface(&ray, hit, asked),
+            Self::Shape(shape) => shape.requested_surface_point(&ray, hit, request),
+            Self::Mesh(mesh) => mesh.surface(&ray, hit, request),
         }
     }
 

@@ -168,18 +168,18 @@ struct ClosestHitTest<'a, F> {
 
 impl<F: Simd> ClosestHitCallback for ClosestHitTest<'_, F> {
     #[inline(always)]
-    fn test(&mut self, id: u32, met: u32, ends: &mut F32x16) {
+    fn test(&mut self, id: u32, active: u32, ends: &mut F32x16) {
         let mut found = HitPacket::without_hits();
-        let (these, mut objects) = (masked_ends(met, ends), [id; PACKET_SIZE]);
+        let (these, mut objects) = (masked_ends(active, ends), [id; PACKET_SIZE]);
         match self.geometry.merged_meshes_if_represented_by(id) {
             Some(merged) => {
                 let by = self.geometry.instruction_set();
-                merged.closest_hit_packet(by, self.rows, (met, &these), &mut found);
+                merged.closest_hit_packet(by, self.rows, (active, &these), &mut found);
                 objects = resolve_merged_hits(merged, &mut found);
             }
             None => {
                 let object = &self.geometry.objects()[id as usize];
-                object.closest_hit_packet(self.rows, met, &these, &mut found, self.simd);
+                object.closest_hit_packet(self.rows, active, &these, &mut found, self.simd);
             }
         }
         let mut nearer = [0; PACKET_SIZE];
@@ -235,38 +235,38 @@ impl<'a, F: Simd> OcclusionCallback<'a, F> {
 
 impl<F: Simd> AnyHitCallback for OcclusionCallback<'_, F> {
     #[inline(always)]
-    fn test(&mut self, id: u32, met: u32, ends: &F32x16) -> u32 {
+    fn test(&mut self, id: u32, active: u32, ends: &F32x16) -> u32 {
         if let Some(merged) = self.geometry.merged_meshes_if_represented_by(id) {
-            let these = masked_ends(met, ends);
-            if self.in_part & met == 0 {
+            let these = masked_ends(active, ends);
+            if self.in_part & active == 0 {
                 return merged.any_hit_packet(
                     self.geometry.instruction_set(),
                     self.rows,
-                    (met, &these),
+                    (active, &these),
                     None,
                 );
             }
             let mut own = [MergedMeshes::NO_TRIANGLE; PACKET_SIZE];
-            for lane in set_bit_lanes(self.in_part & met) {
+            for lane in set_bit_lanes(self.in_part & active) {
                 let number = merged.merged_triangle_index(self.sources.object[lane], self.sources.part[lane]);
                 own[lane] = number.unwrap_or(MergedMeshes::NO_TRIANGLE);
             }
             return merged.any_hit_packet(
                 self.geometry.instruction_set(),
                 self.rows,
-                (met, &these),
+                (active, &these),
                 Some(&own),
             );
         }
         let own = object_light_ray_mask(self.sources, id, self.simd);
         let (whole, in_part) = (own & !self.in_part, own & self.in_part);
-        let met = met & !whole;
-        if met == 0 {
+        let active = active & !whole;
+        if active == 0 {
             return 0;
         }
         let object = &self.geometry.objects()[id as usize];
         let except = if in_part == 0 { None } else { Some((in_part, &self.sources.part)) };
-        object.any_hit_packet(self.rows, met, &masked_ends(met, ends), except, self.simd)
+        object.any_hit_packet(self.rows, active, &masked_ends(active, ends), except, self.simd)
     }
 }
 
@@ -296,12 +296,12 @@ fn object_light_ray_mask(sources: &LightGeometryPacket, id: u32, simd: impl Simd
     simd.movemask(&own)
 }
 
-/// Copies the ends of the rays in `met`, and sets other lanes to negative values.
+/// Copies the ends of the rays in `active`, and sets other lanes to negative values.
 #[inline(always)]
-fn masked_ends(met: u32, ends: &F32x16) -> F32x16 {
+fn masked_ends(active: u32, ends: &F32x16) -> F32x16 {
     let mut own = [-1.0; PACKET_SIZE];
     for lane in 0..PACKET_SIZE {
-        own[lane] = if met & 1 << lane != 0 { ends[lane] } else { -1.0 };
+        own[lane] = if active & 1 << lane != 0 { ends[lane] } else { -1.0 };
     }
     own
 }

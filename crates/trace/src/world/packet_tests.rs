@@ -83,7 +83,7 @@ fn test_shapes(scale: f64) -> Vec<Object> {
 struct PacketTestKernel<'a> {
     object: &'a Object,
     rays: &'a [Ray],
-    met: u32,
+    active: u32,
     except: (u32, &'a [u32; PACKET_SIZE]),
 }
 
@@ -92,15 +92,15 @@ impl SimdKernel for PacketTestKernel<'_> {
 
     #[inline(always)]
     fn run(self, simd: impl Simd) -> Self::Output {
-        let Self { object, rays, met, except } = self;
+        let Self { object, rays, active, except } = self;
         let (rows, mut ends) = RayPacket::new(rays);
         for (lane, end) in ends.iter_mut().enumerate() {
-            *end = if met & 1 << lane != 0 { *end } else { -1.0 };
+            *end = if active & 1 << lane != 0 { *end } else { -1.0 };
         }
         let mut found = HitPacket::without_hits();
-        object.closest_hit_packet(&rows, met, &ends, &mut found, simd);
-        let any_part = object.any_hit_packet(&rows, met, &ends, None, simd);
-        (found, any_part, object.any_hit_packet(&rows, met, &ends, Some(except), simd))
+        object.closest_hit_packet(&rows, active, &ends, &mut found, simd);
+        let any_part = object.any_hit_packet(&rows, active, &ends, None, simd);
+        (found, any_part, object.any_hit_packet(&rows, active, &ends, Some(except), simd))
     }
 }
 
@@ -113,17 +113,18 @@ fn hit_bits(hit: ShapeHit) -> [u32; 4] {
 fn assert_packet_matches_rays(
     object: &Object,
     rays: &[Ray],
-    met: u32,
+    active: u32,
     except: (u32, &[u32; PACKET_SIZE]),
 ) -> usize {
-    let met = met & ((1 << rays.len()) - 1);
+    let active = active & ((1 << rays.len()) - 1);
     let alone = |lane: usize| {
-        let is_traced = rays.get(lane).is_some() && met & 1 << lane != 0;
+        let is_traced = rays.get(lane).is_some() && active & 1 << lane != 0;
         is_traced.then(|| object.closest_hit(&rays[lane], &rays[lane].to_f64())).flatten()
     };
     let mut hits = 0;
     for instructions in InstructionSet::ALL {
-        let (found, any_part, other_part) = instructions.run(PacketTestKernel { object, rays, met, except });
+        let (found, any_part, other_part) =
+            instructions.run(PacketTestKernel { object, rays, active, except });
         hits = 0;
         for lane in 0..PACKET_SIZE {
             let alone = alone(lane);
@@ -149,10 +150,10 @@ fn packet_and_single_hits_are_bit_identical() {
                 let kind = random.below(6);
                 let mut rays: Vec<_> =
                     (0..=i % PACKET_SIZE).map(|lane| random.ray(kind.min(lane + kind / 2), scale)).collect();
-                let met = [0xffff, random.below(1 << 16) as u32][random.below(2)];
+                let active = [0xffff, random.below(1 << 16) as u32][random.below(2)];
                 let parts = std::array::from_fn(|_| random.below(6) as u32);
                 let except = (random.below(1 << 16) as u32, &parts);
-                hits += assert_packet_matches_rays(&object, &rays, met, except);
+                hits += assert_packet_matches_rays(&object, &rays, active, except);
                 // End rays exactly at the hit, next to it, and well before it.
                 let [before, at] = [f32::next_down as fn(f32) -> f32, |end| end];
                 let nudge = [before, at, f32::next_up, |end| end * 0.999_999, |end| end * 0.5][i % 5];
@@ -161,7 +162,7 @@ fn packet_and_single_hits_are_bit_identical() {
                         ray.t_max = nudge(hit.t);
                     }
                 }
-                assert_packet_matches_rays(&object, &rays, met, except);
+                assert_packet_matches_rays(&object, &rays, active, except);
                 rays_in_all += rays.len();
             }
             assert!(

@@ -73,11 +73,11 @@ impl<P: MeshPlacement> PlacedMesh<P> {
     pub(super) fn point_error_bound(&self, point: Vec3, local: DVec3, [a, b, c]: [DVec3; 3]) -> Vec3 {
         let reach = self.placement.vector_abs_bound_to_world(local.abs());
         let parts = point.abs() + reach.as_vec3() + self.placement.mesh_origin().abs().as_vec3();
-        let greatest = self.placement.vector_abs_bound_to_world(a.abs().max(b.abs()).max(c.abs()));
-        let of_double = f64_arithmetic_error_bound(greatest.max_element());
+        let largest = self.placement.vector_abs_bound_to_world(a.abs().max(b.abs()).max(c.abs()));
+        let of_double = f64_arithmetic_error_bound(largest.max_element());
         let error = parts * (2.0 * f32::EPSILON) + Vec3::splat(of_double + f32::MIN_POSITIVE);
         if self.has_rounded_corners {
-            error + (greatest + self.placement.mesh_origin().abs()).as_vec3() * f32::EPSILON
+            error + (largest + self.placement.mesh_origin().abs()).as_vec3() * f32::EPSILON
         } else {
             error
         }
@@ -95,8 +95,8 @@ impl<P: MeshPlacement> PlacedMesh<P> {
         let error = self.point_error_bound(point, local, corners);
         let across = ab.cross(ac);
         // Compare squared distances from the edges with the squared minimum.
-        let least = self.required_edge_distance(error, corners);
-        let bound = least * least / across.length_squared();
+        let min_distance = self.required_edge_distance(error, corners);
+        let bound = min_distance * min_distance / across.length_squared();
         let (u, v) = (f64::from(u), f64::from(v));
         let w = 1.0 - u - v;
         let is_near_edge = is_within_edge_margin(u, ac, bound)
@@ -118,8 +118,8 @@ impl<P: MeshPlacement> PlacedMesh<P> {
     /// Upper bound on the world coordinates of a triangle's corners.
     #[inline(always)]
     fn triangle_world_coordinate_bound(&self, [a, b, c]: [DVec3; 3]) -> f64 {
-        let greatest = self.placement.vector_abs_bound_to_world(a.abs().max(b.abs()).max(c.abs()));
-        (greatest + self.placement.mesh_origin().abs()).max_element()
+        let largest = self.placement.vector_abs_bound_to_world(a.abs().max(b.abs()).max(c.abs()));
+        (largest + self.placement.mesh_origin().abs()).max_element()
     }
 
     /// Corrects an imprecise point by computing it from the ray or pulling it inside the triangle. Returns
@@ -153,13 +153,13 @@ impl<P: MeshPlacement> PlacedMesh<P> {
             return None;
         }
         let [a, b, c] = facet.corners;
-        let greatest = self.triangle_world_coordinate_bound(facet.corners);
+        let largest = self.triangle_world_coordinate_bound(facet.corners);
         let normal = self.placement.normal_to_world((b - a).cross(c - a));
         let t = (self.placement.mesh_point_to_world(a) - ray.origin).dot(normal) / ray.direction.dot(normal);
         let point = ray.at(t);
         let reach = ray.origin.abs().max(point.abs()).max_element();
         let apart = (point - facet.point.as_dvec3()).abs().max_element();
-        let is_better = reach * COARSE < greatest && apart <= greatest * f64::from(32.0 * f32::EPSILON);
+        let is_better = reach * COARSE < largest && apart <= largest * f64::from(32.0 * f32::EPSILON);
         let rounded = point.as_vec3();
         is_better.then(|| [rounded, self.point_error_bound(rounded, facet.local, facet.corners)])
     }
@@ -168,8 +168,8 @@ impl<P: MeshPlacement> PlacedMesh<P> {
     /// error of testing a neighbor of the same size.
     #[inline(always)]
     fn required_edge_distance(&self, error: Vec3, [a, b, c]: [DVec3; 3]) -> f64 {
-        let greatest = a.abs().max(b.abs()).max(c.abs()).max_element();
-        self.edge_margin * f64::from(error.max_element()) + EDGE_MARGIN * f64::from(f32::EPSILON) * greatest
+        let largest = a.abs().max(b.abs()).max(c.abs()).max_element();
+        self.edge_margin * f64::from(error.max_element()) + EDGE_MARGIN * f64::from(f32::EPSILON) * largest
     }
 
     /// Moves a point near an edge into the triangle, to at least the minimum distance from the edge. Without

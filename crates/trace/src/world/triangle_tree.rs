@@ -2,7 +2,7 @@
 
 use crate::accel::wide_bvh::Quality;
 use crate::accel::{F32x16, KdTree, RayBoxInterval, TreeNodeInfo, WideBvh};
-use crate::control::{CancelToken, Cancelled};
+use crate::control::{CancelToken, Canceled};
 use crate::geometry::{Aabb, Ray, ShapeHit};
 use crate::math::Vec3;
 use crate::scene::description::Accel;
@@ -23,7 +23,7 @@ impl TriangleTree {
         count: u32,
         corners: impl Fn(u32) -> [Vec3; 3] + Sync,
         token: &CancelToken,
-    ) -> Result<Self, Cancelled> {
+    ) -> Result<Self, Canceled> {
         Ok(match accel {
             Accel::Bvh => Self::Boxes(WideBvh::build(count, corners, token)?),
             Accel::BvhHigh => Self::Boxes(WideBvh::build_with_quality(Quality::High, count, corners, token)?),

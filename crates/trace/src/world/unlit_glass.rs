@@ -43,7 +43,7 @@ impl World {
         if !self.has_rough_glass() {
             return Box::default();
         }
-        let (objects, lamps) = (self.geometry.objects(), self.finite_light_boxes());
+        let (objects, light_boxes) = (self.geometry.objects(), self.finite_light_boxes());
         let everywhere = Aabb::from_points([Vec3::NEG_INFINITY, Vec3::INFINITY]);
         // Compute the bounding box of each solid.
         let mut boxes: Vec<Option<Aabb>> = vec![None; objects.len()];
@@ -55,11 +55,12 @@ impl World {
             }
         }
         // Keep the closed solids that cannot be touched by a light.
-        let holds_lamp = |bounds: &Aabb| lamps.iter().any(|lamp| lamp.may_light_intersect_box(bounds));
+        let may_contain_light =
+            |bounds: &Aabb| light_boxes.iter().any(|light| light.may_light_intersect_box(bounds));
         let is_dark = |(body, bounds): (u32, &Option<Aabb>)| {
             let closed =
                 bounds.as_ref().filter(|bounds| bounds.extent().is_finite() && !self.is_open_solid(body));
-            closed.is_some_and(|bounds| !holds_lamp(bounds))
+            closed.is_some_and(|bounds| !may_contain_light(bounds))
         };
         (0..).zip(&boxes).map(is_dark).collect()
     }

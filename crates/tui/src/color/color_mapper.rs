@@ -6,21 +6,21 @@ use super::bayer::bayer_threshold;
 use super::oklab::linear_to_oklab;
 use super::palette::{self, AnsiColors};
 use super::recipes::{DitherRecipeCache, SolidOrPatternColor};
-use super::{ColorDepth, NAMES};
+use super::{ANSI_COLORS, ColorDepth};
 use crate::math::color::srgb8_color_to_linear;
 use crate::mosaic::{FittedCell, TwoPartBlockPattern};
 use ratatui::style::Color;
 
 /// How strongly dithering favors inks close to the target color on 256-color and 16-color terminals.
-const CALM_256: f32 = 3.0;
-const CALM_16: f32 = 3.0;
+const CLOSENESS_256: f32 = 3.0;
+const CLOSENESS_16: f32 = 3.0;
 /// How strongly dithering favors inks close to the target color in cells whose halves are drawn separately.
-const CALM_EDGES: f32 = 200.0;
+const CLOSENESS_EDGES: f32 = 200.0;
 /// Squared Oklab distance above which the two halves of a cell are drawn separately. Below it, a shade
 /// character approximates their mean color.
 const EDGE: f32 = 0.01;
 /// Fraction of the cell that each shade character fills with the foreground color.
-const LEVELS: [f32; 3] = [0.25, 0.5, 0.75];
+const SHADE_COVERAGES: [f32; 3] = [0.25, 0.5, 0.75];
 
 /// A tile and the colors of its two parts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -58,7 +58,7 @@ impl ColorMapper {
                 let inks = (palette::FIRST_FIXED..=u8::MAX)
                     .filter_map(palette::fixed_palette_color)
                     .map(SolidOrPatternColor::solid);
-                shades.plain = RefCell::new(DitherRecipeCache::new(inks.collect(), CALM_256));
+                shades.plain = RefCell::new(DitherRecipeCache::new(inks.collect(), CLOSENESS_256));
             }
             ColorDepth::Ansi16 => {
                 let inks: Vec<SolidOrPatternColor> =
@@ -67,11 +67,11 @@ impl ColorMapper {
                 let mixed = shades.pairs.iter().map(|pair| {
                     let [front, back] = pair.colors.map(|color| &inks[color]);
                     pair.level.map_or(*front, |level| {
-                        SolidOrPatternColor::from_two_color_pattern(front, back, LEVELS[level])
+                        SolidOrPatternColor::from_two_color_pattern(front, back, SHADE_COVERAGES[level])
                     })
                 });
-                shades.mixed = RefCell::new(DitherRecipeCache::new(mixed.collect(), CALM_16));
-                shades.plain = RefCell::new(DitherRecipeCache::new(inks, CALM_EDGES));
+                shades.mixed = RefCell::new(DitherRecipeCache::new(mixed.collect(), CLOSENESS_16));
+                shades.plain = RefCell::new(DitherRecipeCache::new(inks, CLOSENESS_EDGES));
             }
         }
         shades
@@ -83,7 +83,7 @@ impl ColorMapper {
         match self.depth {
             ColorDepth::TrueColor => Color::Rgb(rgb[0], rgb[1], rgb[2]),
             ColorDepth::Indexed256 => Color::Indexed(palette::FIRST_FIXED.saturating_add(index() as u8)),
-            ColorDepth::Ansi16 => NAMES[index() % NAMES.len()],
+            ColorDepth::Ansi16 => ANSI_COLORS[index() % ANSI_COLORS.len()],
             ColorDepth::None => Color::Reset,
         }
     }
@@ -105,7 +105,7 @@ impl ColorMapper {
         let index = self.mixed.borrow_mut().select_color_index(rgb, bayer_threshold(x, y));
         let AnsiColorMix { level, colors } =
             self.pairs.get(index).copied().unwrap_or(AnsiColorMix { level: None, colors: [0; 2] });
-        let [front, back] = colors.map(|color| NAMES[color]);
+        let [front, back] = colors.map(|color| ANSI_COLORS[color]);
         match level {
             None => MappedCell { tile: TwoPartBlockPattern::HALVES, pair: [front; 2] },
             Some(0) => MappedCell { tile: TwoPartBlockPattern::LIGHT, pair: [front, back] },
@@ -119,8 +119,9 @@ impl ColorMapper {
 fn ansi_color_mixes(inks: &[SolidOrPatternColor]) -> Vec<AnsiColorMix> {
     let alone = (0..inks.len()).map(|color| AnsiColorMix { level: None, colors: [color; 2] });
     let both = (0..inks.len()).flat_map(|a| (0..a).map(move |b| [a, b]));
-    let shaded = both
-        .flat_map(|colors| (0..LEVELS.len()).map(move |level| AnsiColorMix { level: Some(level), colors }));
+    let shaded = both.flat_map(|colors| {
+        (0..SHADE_COVERAGES.len()).map(move |level| AnsiColorMix { level: Some(level), colors })
+    });
     alone.chain(shaded).collect()
 }
 
@@ -156,7 +157,7 @@ mod tests {
     #[test]
     fn exact_ansi_colors_are_not_dithered() {
         let shades = ColorMapper::new(ColorDepth::Ansi16, &XTERM);
-        for (rgb, name) in XTERM.into_iter().zip(NAMES) {
+        for (rgb, name) in XTERM.into_iter().zip(ANSI_COLORS) {
             for place in 0..64 {
                 assert_eq!(cell(&shades, rgb, place % 8, place / 8).pair, [name; 2], "{rgb:?}");
             }

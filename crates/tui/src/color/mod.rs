@@ -102,7 +102,7 @@ pub(super) fn colorfgbg_indicates_light_background(variable: impl Fn(&str) -> Op
 }
 
 /// The 16 ANSI colors in palette order.
-const NAMES: [Color; 16] = [
+const ANSI_COLORS: [Color; 16] = [
     Color::Black,
     Color::Red,
     Color::Green,

@@ -5,7 +5,7 @@ use super::recipes::{DitherRecipeCache, SolidOrPatternColor};
 
 /// How strongly dithering favors palette colors close to the target color, for palettes computed from an
 /// image.
-const CALM: f32 = 1.0;
+const CLOSENESS: f32 = 1.0;
 
 /// A ditherer for one palette.
 #[derive(Debug)]
@@ -14,7 +14,10 @@ pub(crate) struct PaletteDither(DitherRecipeCache);
 impl PaletteDither {
     /// Creates a ditherer for these colors.
     pub(crate) fn new(colors: &[[u8; 3]]) -> Self {
-        Self(DitherRecipeCache::new(colors.iter().copied().map(SolidOrPatternColor::solid).collect(), CALM))
+        Self(DitherRecipeCache::new(
+            colors.iter().copied().map(SolidOrPatternColor::solid).collect(),
+            CLOSENESS,
+        ))
     }
 
     /// Returns the index of the palette color to use for `rgb` at this pixel.

@@ -3,9 +3,9 @@
 use std::time::{Duration, Instant};
 
 /// Slightly less than 1 Mbit/s (125 kB/s), so the queue of a 1 Mbit/s connection drains.
-pub(super) const RATE: f64 = 100_000.0;
+pub(super) const BYTES_PER_SECOND: f64 = 100_000.0;
 /// Capacity in bytes: about 100 ms at 1 Mbit/s.
-const FULL: f64 = 12_000.0;
+const CAPACITY: f64 = 12_000.0;
 
 /// A token bucket in which each token is one byte.
 #[derive(Debug)]
@@ -16,7 +16,7 @@ pub(super) struct TokenBucket {
 
 impl TokenBucket {
     pub(super) fn full(now: Instant) -> Self {
-        Self { tokens: FULL, at: now }
+        Self { tokens: CAPACITY, at: now }
     }
 
     /// Current number of tokens.
@@ -35,11 +35,11 @@ impl TokenBucket {
         }
         // One extra byte to compensate for rounding.
         let missing = (bytes + 1) as f64 - self.tokens_at(now);
-        now + Duration::from_secs_f64(missing / RATE)
+        now + Duration::from_secs_f64(missing / BYTES_PER_SECOND)
     }
 
     fn tokens_at(&self, now: Instant) -> f64 {
-        let filled = now.saturating_duration_since(self.at).as_secs_f64() * RATE;
-        (self.tokens + filled).min(FULL)
+        let filled = now.saturating_duration_since(self.at).as_secs_f64() * BYTES_PER_SECOND;
+        (self.tokens + filled).min(CAPACITY)
     }
 }

@@ -32,10 +32,10 @@ const MIN_WINDOW: f64 = 1_500.0;
 const MAX_QUEUE: Duration = Duration::from_millis(60);
 /// Timeout for the terminal's first reply.
 const REPLY_TIMEOUT: Duration = Duration::from_secs(1);
-/// Outstanding replies are considered lost after this time or `SILENCE_ROUND_TRIPS` round trips, whichever is
-/// longer.
-const SILENCE: Duration = Duration::from_secs(1);
-const SILENCE_ROUND_TRIPS: u32 = 4;
+/// Outstanding replies are considered lost after this time or `LOST_REPLY_ROUND_TRIPS` round trips, whichever
+/// is longer.
+const LOST_REPLY_TIMEOUT: Duration = Duration::from_secs(1);
+const LOST_REPLY_ROUND_TRIPS: u32 = 4;
 /// A terminal is fast if it replied to most of the last `RECENT_SLICES` slices within this time.
 const FAST_REPLY: Duration = Duration::from_millis(20);
 const RECENT_SLICES: usize = 8;
@@ -92,7 +92,7 @@ pub(super) struct TerminalFlowControl {
     /// sent, so only their replies can show that the connection has recovered.
     recent: VecDeque<Duration>,
     /// Time when the last reply arrived or the oldest pending query was sent, whichever is later.
-    heard: Instant,
+    waiting_since: Instant,
     bucket: TokenBucket,
     /// Bytes that the operating system has not accepted yet.
     unwritten: usize,
@@ -111,7 +111,7 @@ impl TerminalFlowControl {
             shrunk: None,
             round_trips: MinRoundTripTracker::default(),
             recent: VecDeque::with_capacity(RECENT_SLICES),
-            heard: now,
+            waiting_since: now,
             bucket: TokenBucket::full(now),
             unwritten: 0,
         }
@@ -146,7 +146,7 @@ impl TerminalFlowControl {
         self.bucket.take(bytes, now);
         let Some(question) = question else { return };
         if self.flight.is_empty() {
-            self.heard = now;
+            self.waiting_since = now;
         }
         self.in_flight += bytes;
         let is_limited =
@@ -162,7 +162,7 @@ impl TerminalFlowControl {
     /// Records a reply from the terminal.
     pub(super) fn handle_reply(&mut self, question: QueryKind, now: Instant) {
         self.replies = ReplySupport::Answering;
-        self.heard = now;
+        self.waiting_since = now;
         let Some(place) = self.flight.iter().position(|slice| slice.question == question) else { return };
         // Replies arrive in order, so replies to earlier slices have been lost.
         let passed: Vec<SentSlice> = self.flight.drain(..=place).collect();
@@ -184,7 +184,8 @@ impl TerminalFlowControl {
         let filled = self.bucket.available_at(MIN_SLICE + QUERY_BYTES, now);
         match self.replies {
             ReplySupport::Answering => {
-                let lost = (!self.flight.is_empty()).then_some(self.heard + self.lost_reply_timeout());
+                let lost =
+                    (!self.flight.is_empty()).then_some(self.waiting_since + self.lost_reply_timeout());
                 let filled = self.is_multiplexed.then_some(filled).filter(|filled| *filled > now);
                 [lost, filled].into_iter().flatten().min()
             }
@@ -214,7 +215,7 @@ impl TerminalFlowControl {
         };
         let rate = match self.replies {
             ReplySupport::Answering if !self.is_multiplexed => window_rate(),
-            ReplySupport::Answering | ReplySupport::Silent => Some(bucket::RATE),
+            ReplySupport::Answering | ReplySupport::Silent => Some(bucket::BYTES_PER_SECOND),
             ReplySupport::Asked { .. } => None,
         };
         rate.filter(|rate| *rate < FAST)
@@ -245,7 +246,7 @@ impl TerminalFlowControl {
                 self.clear_in_flight();
             }
             ReplySupport::Answering
-                if self.awaits_reply() && now >= self.heard + self.lost_reply_timeout() =>
+                if self.awaits_reply() && now >= self.waiting_since + self.lost_reply_timeout() =>
             {
                 // The connection is stalled or a reply was lost. Send little until the next reply.
                 self.clear_in_flight();
@@ -257,7 +258,7 @@ impl TerminalFlowControl {
 
     /// How long to wait before considering missing replies lost.
     fn lost_reply_timeout(&self) -> Duration {
-        SILENCE.max(self.round_trips.minimum().unwrap_or_default() * SILENCE_ROUND_TRIPS)
+        LOST_REPLY_TIMEOUT.max(self.round_trips.minimum().unwrap_or_default() * LOST_REPLY_ROUND_TRIPS)
     }
 
     fn clear_in_flight(&mut self) {

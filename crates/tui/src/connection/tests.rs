@@ -14,7 +14,7 @@ struct SimulatedTerminal {
     due: VecDeque<(Instant, QueryKind)>,
     carried: usize,
     /// Maximum number of bytes in flight so far.
-    most_in_flight: usize,
+    max_in_flight: usize,
     /// Longest queueing delay in the last run.
     longest: Duration,
 }
@@ -32,7 +32,7 @@ impl SimulatedTerminal {
             busy: now,
             due: VecDeque::new(),
             carried: 0,
-            most_in_flight: 0,
+            max_in_flight: 0,
             longest: Duration::ZERO,
         };
         terminal.send(12, Some(QueryKind::Attributes));
@@ -45,7 +45,7 @@ impl SimulatedTerminal {
         self.busy = self.busy.max(self.now) + Duration::from_secs_f64(bytes as f64 / self.bytes_a_second);
         self.carried += bytes;
         self.longest = self.longest.max(self.busy - self.now);
-        self.most_in_flight = self.most_in_flight.max(self.connection.in_flight);
+        self.max_in_flight = self.max_in_flight.max(self.connection.in_flight);
         if let Some(question) = question.filter(|_| self.answers) {
             let multiplexed = self.connection.is_multiplexed;
             // A local multiplexer replies immediately.
@@ -92,7 +92,7 @@ fn bandwidth_is_used_without_long_queues() {
         terminal.run(10_000);
         terminal.run(10_000);
         let name = format!("{bytes_a_second} B/s, {milliseconds} ms");
-        assert!(terminal.most_in_flight <= MAX_WINDOW, "{name}: {}", terminal.most_in_flight);
+        assert!(terminal.max_in_flight <= MAX_WINDOW, "{name}: {}", terminal.max_in_flight);
         // The slowest connections take longer than `MAX_QUEUE` to carry the minimum window.
         let longest = MAX_QUEUE.as_secs_f64() * 2.0 + MIN_WINDOW / bytes_a_second;
         assert!(terminal.longest.as_secs_f64() <= longest, "{name}: {:?}", terminal.longest);
@@ -111,7 +111,7 @@ fn bandwidth_is_used_without_long_queues() {
 fn output_is_paced_by_time_without_replies() {
     let mut terminal = SimulatedTerminal::new(125e3, 150, false, false);
     terminal.run(900);
-    assert!(terminal.most_in_flight <= MAX_WINDOW && terminal.connection.awaits_reply());
+    assert!(terminal.max_in_flight <= MAX_WINDOW && terminal.connection.awaits_reply());
     terminal.run(10_000);
     assert!(
         !terminal.connection.awaits_reply()
@@ -162,8 +162,8 @@ fn lost_reply_delays_output_by_a_second() {
     let sent = now + Duration::from_millis(100);
     connection.record_sent(connection.window_bytes(), Some(QueryKind::Status), sent);
     assert_eq!(connection.max_sendable_bytes(sent + Duration::from_millis(900)), 0);
-    assert_eq!(connection.next_send_time(sent), Some(sent + SILENCE));
-    assert!(connection.max_sendable_bytes(sent + SILENCE) > 0);
+    assert_eq!(connection.next_send_time(sent), Some(sent + LOST_REPLY_TIMEOUT));
+    assert!(connection.max_sendable_bytes(sent + LOST_REPLY_TIMEOUT) > 0);
     // The timeout grows with the round-trip time.
     let mut slow = TerminalFlowControl::new(false, now);
     slow.record_sent(100, Some(QueryKind::Attributes), now);

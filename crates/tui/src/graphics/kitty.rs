@@ -7,18 +7,18 @@ use super::png::encode_png;
 use crate::film::Srgb8Image;
 
 /// IDs of the two alternating images, chosen to be unlikely to clash with other programs.
-const IDS: [u32; 2] = [0x67_6c_69, 0x6d_74_01];
+const IMAGE_IDS: [u32; 2] = [0x67_6c_69, 0x6d_74_01];
 /// Maximum length of a chunk of base64 data.
-const CHUNK: usize = 4096;
+const MAX_CHUNK_LENGTH: usize = 4096;
 
 /// Returns the commands that draw an image at the cursor, scaled to cover these cells, and then delete the
 /// previous image.
 pub(super) fn encode(picture: &Srgb8Image, cells: Rect, turn: bool) -> Vec<Vec<u8>> {
-    let [id, other] = if turn { IDS } else { [IDS[1], IDS[0]] };
+    let [id, other] = if turn { IMAGE_IDS } else { [IMAGE_IDS[1], IMAGE_IDS[0]] };
     let data = encode_base64(&encode_png(picture));
-    let count = data.len().div_ceil(CHUNK);
+    let count = data.len().div_ceil(MAX_CHUNK_LENGTH);
     let mut commands = Vec::with_capacity(count);
-    for (i, chunk) in data.chunks(CHUNK).enumerate() {
+    for (i, chunk) in data.chunks(MAX_CHUNK_LENGTH).enumerate() {
         let more = u8::from(i + 1 < count);
         // Do not move the cursor or request a reply.
         let keys = if i == 0 {
@@ -41,5 +41,5 @@ fn delete_command(id: u32) -> Vec<u8> {
 
 /// The commands that delete both images.
 pub(crate) fn delete_all_commands() -> Vec<u8> {
-    IDS.map(delete_command).concat()
+    IMAGE_IDS.map(delete_command).concat()
 }

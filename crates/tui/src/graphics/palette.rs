@@ -11,12 +11,12 @@ use crate::color::{PaletteDither, dither_color_to_6_bits};
 use crate::film::Srgb8Image;
 
 /// Maximum number of colors. Registers below 16 are reserved for the terminal.
-const MAX: usize = 240;
+const MAX_COLORS: usize = 240;
 /// Histogram bits per channel.
-const BITS: u32 = 6;
-/// An existing palette is reused while its RMS error is at most `WORSE` times a new palette's error, plus
-/// `ALLOWED` code values.
-const WORSE: f64 = 1.2;
+const HISTOGRAM_BITS: u32 = 6;
+/// An existing palette is reused while its RMS error is at most `MAX_ERROR_RATIO` times a new palette's
+/// error, plus `ALLOWED` code values.
+const MAX_ERROR_RATIO: f64 = 1.2;
 const ALLOWED: f64 = 1.5;
 
 /// Palette colors for an image.
@@ -28,11 +28,11 @@ pub(super) struct Palette {
 
 impl Palette {
     /// Returns the palette for an image, reusing the previous one if it still fits.
-    pub(super) fn reused_or_new_for_picture(picture: &Srgb8Image, before: Option<Self>) -> Self {
+    pub(super) fn reused_or_new(picture: &Srgb8Image, before: Option<Self>) -> Self {
         let mut bins = histogram(picture);
         let colors = choose_palette_colors(&mut bins);
         let fits = |palette: &Self| {
-            palette_error(&bins, &palette.colors) <= WORSE * palette_error(&bins, &colors) + ALLOWED
+            palette_error(&bins, &palette.colors) <= MAX_ERROR_RATIO * palette_error(&bins, &colors) + ALLOWED
         };
         before.filter(fits).unwrap_or_else(|| Self { dither: PaletteDither::new(&colors), colors })
     }
@@ -67,9 +67,11 @@ impl HistogramBin {
 
 /// Histogram of an image's colors, without empty bins.
 fn histogram(picture: &Srgb8Image) -> Vec<HistogramBin> {
-    let mut bins = vec![HistogramBin::default(); 1 << (3 * BITS)];
+    let mut bins = vec![HistogramBin::default(); 1 << (3 * HISTOGRAM_BITS)];
     for rgb in &picture.pixels {
-        let place = rgb.iter().fold(0, |place, channel| place << BITS | usize::from(channel >> (8 - BITS)));
+        let place = rgb
+            .iter()
+            .fold(0, |place, channel| place << HISTOGRAM_BITS | usize::from(channel >> (8 - HISTOGRAM_BITS)));
         let bin = &mut bins[place];
         bin.count += 1.0;
         for (sum, channel) in bin.sum.iter_mut().zip(rgb) {
@@ -106,11 +108,11 @@ impl ColorBox {
     }
 }
 
-/// Repeatedly splits the box with the largest error until there are `MAX` boxes or all are exact. Returns the
-/// mean color of each box.
+/// Repeatedly splits the box with the largest error until there are `MAX_COLORS` boxes or all are exact.
+/// Returns the mean color of each box.
 fn choose_palette_colors(bins: &mut [HistogramBin]) -> Vec<[u8; 3]> {
     let mut boxes = vec![ColorBox::for_bins(bins, 0..bins.len())];
-    while boxes.len() < MAX {
+    while boxes.len() < MAX_COLORS {
         let worst = (0..boxes.len()).max_by(|a, b| boxes[*a].error.total_cmp(&boxes[*b].error));
         let Some(worst) = worst.filter(|worst| boxes[*worst].error > 0.0) else { break };
         let ColorBox { bins: range, mean, axis, .. } = boxes.swap_remove(worst);
@@ -165,17 +167,17 @@ mod tests {
         let (red, blue) = ([255, 0, 0], [0, 0, 255]);
         let pixels = (0..4096).map(|i| if i == 77 { red } else { blue }).collect();
         let picture = Srgb8Image { width: 64, height: 64, pixels };
-        let mut palette = Palette::reused_or_new_for_picture(&picture, None);
+        let mut palette = Palette::reused_or_new(&picture, None);
         assert_eq!(palette.colors().len(), 2);
         assert_eq!(mean_error(&picture, &mut palette), 0.0);
         let spot = ramp(255.0);
-        assert!(Palette::reused_or_new_for_picture(&spot, None).colors().contains(&[200, 10, 10]));
+        assert!(Palette::reused_or_new(&spot, None).colors().contains(&[200, 10, 10]));
     }
 
     #[test]
     fn ramp_has_no_visible_banding() {
         let picture = ramp(255.0);
-        let mut palette = Palette::reused_or_new_for_picture(&picture, None);
+        let mut palette = Palette::reused_or_new(&picture, None);
         let error = mean_error(&picture, &mut palette);
         // For comparison: xterm's cube has steps of 40 code values.
         assert!(error < 4.0, "{error}");
@@ -191,12 +193,12 @@ mod tests {
 
     #[test]
     fn palette_is_reused_while_it_fits() {
-        let first = Palette::reused_or_new_for_picture(&ramp(255.0), None);
+        let first = Palette::reused_or_new(&ramp(255.0), None);
         let colors = first.colors().to_vec();
-        let same = Palette::reused_or_new_for_picture(&ramp(253.0), Some(first));
+        let same = Palette::reused_or_new(&ramp(253.0), Some(first));
         assert_eq!(same.colors(), colors, "the palette should be reused for a nearly identical image");
         let mut other = ramp(255.0);
         other.pixels.iter_mut().for_each(|rgb| rgb.swap(0, 2));
-        assert_ne!(Palette::reused_or_new_for_picture(&other, Some(same)).colors(), colors);
+        assert_ne!(Palette::reused_or_new(&other, Some(same)).colors(), colors);
     }
 }

@@ -8,9 +8,9 @@ use crate::film::Srgb8Image;
 use crate::rescale::resized;
 
 /// Register of the first palette color. Lower registers are reserved for the terminal.
-const FIRST: u8 = 16;
+const FIRST_REGISTER: u8 = 16;
 /// Number of color registers.
-const REGISTERS: usize = 256;
+const REGISTER_COUNT: usize = 256;
 
 /// Encodes an image to be drawn at the cursor, scaled to cover these cells. `cell` is the size of a cell in
 /// pixels. The palette is reused if it still fits the image and recomputed otherwise. Small images are
@@ -26,12 +26,12 @@ pub(super) fn encode(
     let smaller = (picture.width > width || picture.height > height)
         .then(|| resized(picture, picture.width.min(width), picture.height.min(height)));
     let picture = smaller.as_ref().unwrap_or(picture);
-    let fitting = Palette::reused_or_new_for_picture(picture, palette.take());
+    let fitting = Palette::reused_or_new(picture, palette.take());
     let palette = palette.insert(fitting);
     let registers: Vec<u8> =
-        palette.indices(picture).into_iter().map(|index| FIRST.saturating_add(index)).collect();
+        palette.indices(picture).into_iter().map(|index| FIRST_REGISTER.saturating_add(index)).collect();
     let mut bytes = format!("\x1bP0;1;0q\"1;1;{width};{height}").into_bytes();
-    for (register, color) in (FIRST..=u8::MAX).zip(palette.colors()) {
+    for (register, color) in (FIRST_REGISTER..=u8::MAX).zip(palette.colors()) {
         let [r, g, b] = color.map(|level| (u32::from(level) * 100 + 127) / 255);
         bytes.extend(format!("#{register};2;{r};{g};{b}").into_bytes());
     }
@@ -57,12 +57,12 @@ struct SixelBand {
     width: usize,
     /// Sixels of all registers, concatenated.
     sixels: Vec<u8>,
-    is_used: [bool; REGISTERS],
+    is_used: [bool; REGISTER_COUNT],
 }
 
 impl SixelBand {
     fn new(width: usize) -> Self {
-        Self { width, sixels: vec![0; REGISTERS * width], is_used: [false; REGISTERS] }
+        Self { width, sixels: vec![0; REGISTER_COUNT * width], is_used: [false; REGISTER_COUNT] }
     }
 
     /// Sets one of the band's pixel rows.
@@ -76,7 +76,7 @@ impl SixelBand {
     /// Appends each color's sixels followed by a carriage return, then appends a line feed and clears the
     /// band.
     fn drain_to_sixels(&mut self, bytes: &mut Vec<u8>) {
-        for register in (0..REGISTERS).filter(|register| std::mem::take(&mut self.is_used[*register])) {
+        for register in (0..REGISTER_COUNT).filter(|register| std::mem::take(&mut self.is_used[*register])) {
             bytes.extend(format!("#{register}").into_bytes());
             let own = &mut self.sixels[register * self.width..][..self.width];
             push_runs(own.iter().map(|bits| b'?' + bits), bytes);

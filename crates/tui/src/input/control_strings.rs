@@ -23,7 +23,7 @@ enum DcsReplyKind {
 }
 
 /// Maximum number of bytes stored. Useful control strings are shorter.
-const LONGEST: usize = 256;
+const MAX_BYTES: usize = 256;
 
 impl DeviceControlString {
     /// Starts a control string with these parameters.
@@ -37,7 +37,7 @@ impl DeviceControlString {
     }
 
     pub(super) fn push_byte(&mut self, byte: u8) {
-        if self.text.len() < LONGEST {
+        if self.text.len() < MAX_BYTES {
             self.text.push(byte);
         }
     }

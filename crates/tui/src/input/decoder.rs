@@ -19,10 +19,10 @@ const INTRODUCERS: &[u8] = b"[]OPX^_\\";
 /// An escape character followed by silence for this long is a key press.
 const LONE_ESCAPE: Duration = Duration::from_millis(50);
 /// Timeout between bytes of a sequence, for connections that lose packets.
-const SEQUENCE: Duration = Duration::from_secs(1);
+const SEQUENCE_TIMEOUT: Duration = Duration::from_secs(1);
 /// Maximum duration and length of a sequence. Without these limits, a key press such as alt-`]`, which looks
 /// like the start of a sequence, would block all further input.
-const LONGEST: Duration = Duration::from_secs(2);
+const MAX_DURATION: Duration = Duration::from_secs(2);
 const MAX_BYTES: usize = 4096;
 /// Maximum delay of a `[` after its escape character, which has already been treated as a key press.
 const LATE_SEQUENCE: Duration = Duration::from_secs(2);
@@ -87,8 +87,10 @@ impl Decoder {
         match &self.held {
             PendingSequence::Nothing => None,
             PendingSequence::Escape => after(LONE_ESCAPE),
-            PendingSequence::StringEnd => after(SEQUENCE),
-            PendingSequence::Sequence { begin, .. } => after(SEQUENCE).map(|end| end.min(*begin + LONGEST)),
+            PendingSequence::StringEnd => after(SEQUENCE_TIMEOUT),
+            PendingSequence::Sequence { begin, .. } => {
+                after(SEQUENCE_TIMEOUT).map(|end| end.min(*begin + MAX_DURATION))
+            }
             PendingSequence::Doubtful(_) => after(DOUBT_TIMEOUT),
             PendingSequence::Paste(paste) => Some(paste.deadline()),
         }

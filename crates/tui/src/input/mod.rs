@@ -40,7 +40,7 @@ pub(super) fn start_reader(events: &Sender<Event>) -> io::Result<()> {
                 }
             }
         }
-        let _ = events.send(Event::Lost(RequiredEventSource::Keys));
+        let _ = events.send(Event::SourceEnded(RequiredEventSource::Keys));
     };
     spawn("keys", read)?;
     Ok(())

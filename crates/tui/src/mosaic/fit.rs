@@ -16,7 +16,7 @@ pub(crate) struct FittedCell {
 /// A tile other than [`TwoPartBlockPattern::HALVES`] is chosen only if it reduces the mean squared Oklab
 /// distance by at least this much. Smaller improvements are invisible, make the tiles flicker with the noise,
 /// and take more bytes.
-const WORTH: f32 = 1e-4;
+const MIN_IMPROVEMENT: f32 = 1e-4;
 
 /// Finds the tile and the two colors that best match a cell's `pixels` (sRGB colors in row order). The tile
 /// minimizes the Oklab variance within its two parts.
@@ -27,9 +27,9 @@ pub(crate) fn fit_cell(grid: CellGrid, pixels: &[[u8; 3]]) -> FittedCell {
     let pixels: Vec<Vec3> = pixels.iter().map(|pixel| srgb8_color_to_linear(*pixel)).collect();
     let CellDivision { first, tile } = best_division(grid, &pixels);
     let mean = |is_first: bool| {
-        let of_part = (0..pixels.len()).filter(|i| (first >> i & 1 == 1) == is_first);
-        let count = of_part.clone().count().max(1);
-        to_srgb_bytes(of_part.map(|i| pixels[i]).sum::<Vec3>() / count as f32)
+        let for_part = (0..pixels.len()).filter(|i| (first >> i & 1 == 1) == is_first);
+        let count = for_part.clone().count().max(1);
+        to_srgb_bytes(for_part.map(|i| pixels[i]).sum::<Vec3>() / count as f32)
     };
     FittedCell { tile, pair: [mean(true), mean(false)] }
 }
@@ -54,7 +54,7 @@ fn best_division(grid: CellGrid, pixels: &[Vec3]) -> CellDivision {
         mask = division.first;
         // Reduction in variance, up to a constant.
         let gain = sum.length_squared() / size + (all - sum).length_squared() / (count - size).max(1.0);
-        let worth = if division.tile == TwoPartBlockPattern::HALVES { WORTH * count } else { 0.0 };
+        let worth = if division.tile == TwoPartBlockPattern::HALVES { MIN_IMPROVEMENT * count } else { 0.0 };
         if gain + worth > most {
             (best, most) = (*division, gain + worth);
         }

@@ -6,9 +6,9 @@ use super::terminal_color::{TerminalColor, decimal_digit_count};
 use crate::color::nearest_256;
 
 /// Maximum number of candidates for each part, and for filling both parts with one color.
-const MAX: usize = 6;
+const MAX_CANDIDATES: usize = 6;
 /// Maximum number of cells that a candidate may cover.
-const LONGEST: usize = 8;
+const MAX_CELLS: usize = 8;
 
 /// First palette entry used as a candidate. Base16 themes with 22 colors overwrite the first six entries of
 /// the color cube, so only the remaining entries are used.
@@ -42,10 +42,10 @@ fn candidate_colors_for_run(
     wanted: &(impl Iterator<Item = TerminalColor> + Clone),
     model: RateDistortion,
 ) -> Vec<TerminalColor> {
-    let mut shades = Vec::with_capacity(MAX);
+    let mut shades = Vec::with_capacity(MAX_CANDIDATES);
     let Some(first) = wanted.clone().next() else { return shades };
     let mut add = |shade| {
-        if shades.len() < MAX && !shades.contains(&shade) {
+        if shades.len() < MAX_CANDIDATES && !shades.contains(&shade) {
             shades.push(shade);
         }
     };
@@ -77,7 +77,7 @@ struct RunColorRange {
 /// becomes empty.
 fn shared_color_range(wanted: impl Iterator<Item = TerminalColor>, span: u8) -> RunColorRange {
     let mut common = RunColorRange { low: [0; 3], high: [255; 3], sum: [0; 3], count: 0 };
-    for shade in wanted.take(LONGEST) {
+    for shade in wanted.take(MAX_CELLS) {
         let TerminalColor::Rgb(rgb) = shade else { break };
         let low = std::array::from_fn(|i| common.low[i].max(rgb[i].saturating_sub(span)));
         let high = std::array::from_fn(|i| common.high[i].min(rgb[i].saturating_add(span)));

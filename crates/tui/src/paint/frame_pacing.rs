@@ -49,13 +49,13 @@ const MANY_MORE_SAMPLES: f64 = 4.0;
 /// added.
 const FIRST_PASS: f64 = 0.25;
 /// Minimum time between previews, except before the first and last.
-const SHORTEST: Duration = Duration::from_millis(100);
+const MIN_INTERVAL: Duration = Duration::from_millis(100);
 /// Minimum time between previews drawn as pixels, which take longer to encode and decode.
-const SHORTEST_IN_PIXELS: Duration = Duration::from_millis(180);
+const MIN_PIXEL_INTERVAL: Duration = Duration::from_millis(180);
 /// Time after which any improvement is drawn.
-const LONGEST: Duration = Duration::from_secs(2);
+const MAX_INTERVAL: Duration = Duration::from_secs(2);
 /// Fraction of the bandwidth available for intermediate previews.
-const SHARE: f64 = 0.5;
+const PREVIEW_BANDWIDTH: f64 = 0.5;
 
 /// Decides whether a preview is worth its cost. The first and last previews always are. A fast terminal gets
 /// 5 to 10 previews per second. A slow connection gets few intermediate previews, and none that would delay
@@ -71,7 +71,7 @@ pub fn pace_preview(moment: &PacingInputs) -> PacingAdvice {
     }
     let frame = moment.estimate_send_duration();
     let is_too_late = moment.final_in.is_some_and(|left| left < frame);
-    let is_too_soon = moment.since_aim < SHORTEST.max(frame.div_f64(SHARE));
+    let is_too_soon = moment.since_aim < MIN_INTERVAL.max(frame.div_f64(PREVIEW_BANDWIDTH));
     if is_too_late || is_too_soon {
         return PacingAdvice::Wait;
     }
@@ -79,7 +79,7 @@ pub fn pace_preview(moment: &PacingInputs) -> PacingAdvice {
     let is_worth_it = if moment.is_shown {
         is_better(MORE_SAMPLES)
             || (moment.samples < 1.0 && moment.samples >= aimed + FIRST_PASS)
-            || (moment.samples > aimed && moment.since_aim >= LONGEST)
+            || (moment.samples > aimed && moment.since_aim >= MAX_INTERVAL)
     } else {
         is_better(MANY_MORE_SAMPLES)
     };
@@ -89,7 +89,7 @@ pub fn pace_preview(moment: &PacingInputs) -> PacingAdvice {
 impl PacingInputs {
     /// Minimum time between previews on a fast terminal.
     fn shortest_preview_interval(&self) -> Duration {
-        if self.is_in_pixels { SHORTEST_IN_PIXELS } else { SHORTEST }
+        if self.is_in_pixels { MIN_PIXEL_INTERVAL } else { MIN_INTERVAL }
     }
 
     /// Time when a fast terminal should get the next preview, if one is pending.

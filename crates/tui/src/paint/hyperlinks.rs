@@ -5,7 +5,7 @@ use ratatui::layout::Rect;
 /// Escape sequence that ends a hyperlink.
 pub const LINK_OFF: &[u8] = b"\x1b]8;;\x1b\\";
 /// Maximum number of hyperlinks per screen.
-const MAX: usize = 1000;
+const MAX_HYPERLINKS: usize = 1000;
 
 /// Adjacent cells in a row, and the URL that they link to.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -31,7 +31,7 @@ impl UrlTable {
         }
         let known = self.addresses.iter().position(|known| known == address);
         let index = known.unwrap_or_else(|| {
-            if self.addresses.len() < MAX {
+            if self.addresses.len() < MAX_HYPERLINKS {
                 self.addresses.push(address.to_owned());
             }
             self.addresses.len() - 1

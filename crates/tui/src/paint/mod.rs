@@ -19,7 +19,7 @@ mod frame_pacing;
 mod hyperlinks;
 mod lines;
 mod pen;
-mod picture;
+mod preview_rows;
 mod rep_support;
 mod row_optimizer;
 mod screen;
@@ -40,7 +40,7 @@ pub use self::frame_pacing::{PacingAdvice, PacingInputs, pace_preview};
 use self::hyperlinks::UrlTable;
 pub use self::hyperlinks::{Hyperlink, LINK_OFF};
 pub use self::lines::buffer_to_text_lines;
-use self::picture::FirstPreviewByteBudget;
+use self::preview_rows::FirstPreviewByteBudget;
 pub use self::rep_support::terminal_supports_rep;
 use self::screen::{CellRun, LimitedOutputSlice, ScreenModel};
 use self::stable_cells::FirstPreviewCells;
@@ -73,11 +73,11 @@ pub struct Painter {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum RowDrawStep {
     /// Draw a row's text.
-    Words(u16),
+    Text(u16),
     /// Draw a row of the preview.
-    Picture(u16),
+    Preview(u16),
     /// Draw the part of a row's text that was delayed until after the preview.
-    Later(u16),
+    DelayedText(u16),
 }
 
 /// Hyperlinks and drawing hints for a frame.
@@ -167,27 +167,27 @@ impl Painter {
     fn queue_all_draw_steps(&mut self) {
         let mut rows: Vec<u16> = self.wanted.rows_center_outward().collect();
         rows.sort_by_key(|y| self.rows[usize::from(*y)].aim);
-        let words = (0..self.wanted.rows).map(RowDrawStep::Words);
+        let words = (0..self.wanted.rows).map(RowDrawStep::Text);
         let later = (self.wanted.later.top()..self.wanted.later.bottom().min(self.wanted.rows))
-            .map(RowDrawStep::Later);
-        let picture = rows.into_iter().map(RowDrawStep::Picture);
+            .map(RowDrawStep::DelayedText);
+        let picture = rows.into_iter().map(RowDrawStep::Preview);
         self.parts = words.chain(picture).chain(later).collect::<Vec<_>>().into_iter();
         self.part = None;
         self.strokes = Vec::new().into_iter();
         self.budget = FirstPreviewByteBudget::default();
     }
 
-    /// Returns the next bytes to output, at most `most_bytes` unless a single cell needs more, or no bytes
+    /// Returns the next bytes to output, at most `max_bytes` unless a single cell needs more, or no bytes
     /// once the screen matches the target. The caller must write the bytes because later slices build on
     /// them. No other output may move the cursor or change colors between slices.
-    pub fn next_slice(&mut self, most_bytes: usize) -> Vec<u8> {
-        self.next_slice_before_deadline(most_bytes, || false)
+    pub fn next_slice(&mut self, max_bytes: usize) -> Vec<u8> {
+        self.next_slice_before_deadline(max_bytes, || false)
     }
 
     /// Like [`Painter::next_slice`], but stops early once `is_late` returns true. `is_late` is called before
     /// each row because planning a whole preview would delay the response to a key press too much.
-    pub fn next_slice_before_deadline(&mut self, most_bytes: usize, is_late: impl Fn() -> bool) -> Vec<u8> {
-        let mut slice = LimitedOutputSlice { bytes: Vec::new(), most: most_bytes };
+    pub fn next_slice_before_deadline(&mut self, max_bytes: usize, is_late: impl Fn() -> bool) -> Vec<u8> {
+        let mut slice = LimitedOutputSlice { bytes: Vec::new(), most: max_bytes };
         if self.wanted.is_empty() {
             return slice.bytes;
         }
@@ -201,14 +201,14 @@ impl Painter {
                 if !screen.draw_stroke_if_output_fits(stroke, &self.links, &mut slice) {
                     return slice.bytes;
                 }
-                if let (Some(RowDrawStep::Picture(_)), CellRun::Mosaic { at, count, .. }) =
+                if let (Some(RowDrawStep::Preview(_)), CellRun::Mosaic { at, count, .. }) =
                     (self.part, stroke)
                 {
                     self.memory.record_drawn_cells(*at, *count);
                 }
                 self.strokes.next();
             }
-            if let Some(RowDrawStep::Picture(y)) = self.part {
+            if let Some(RowDrawStep::Preview(y)) = self.part {
                 self.memory.mark_row_as_drawn(y);
                 self.rows[usize::from(y)] = PreviewRowProgress { aim: self.aim, is_done: true };
             }
@@ -218,21 +218,21 @@ impl Painter {
             }
             self.part = self.parts.next();
             let strokes = match self.part {
-                Some(RowDrawStep::Words(y)) => {
-                    words::plan_text_row(screen, &self.wanted, y, ScreenRegion::Words)
+                Some(RowDrawStep::Text(y)) => {
+                    words::plan_text_row(screen, &self.wanted, y, ScreenRegion::Text)
                 }
-                Some(RowDrawStep::Later(y)) => {
-                    words::plan_text_row(screen, &self.wanted, y, ScreenRegion::Later)
+                Some(RowDrawStep::DelayedText(y)) => {
+                    words::plan_text_row(screen, &self.wanted, y, ScreenRegion::DelayedText)
                 }
-                Some(RowDrawStep::Picture(y))
+                Some(RowDrawStep::Preview(y))
                     if self.rows[usize::from(y)].is_done && !screen.is_row_damaged(y) =>
                 {
                     Vec::new()
                 }
-                Some(RowDrawStep::Picture(y)) if self.wanted.uses_ascii_ramp() => {
-                    words::plan_text_row(screen, &self.wanted, y, ScreenRegion::Picture)
+                Some(RowDrawStep::Preview(y)) if self.wanted.uses_ascii_ramp() => {
+                    words::plan_text_row(screen, &self.wanted, y, ScreenRegion::Preview)
                 }
-                Some(RowDrawStep::Picture(y)) => picture::plan_preview_row(
+                Some(RowDrawStep::Preview(y)) => preview_rows::plan_preview_row(
                     screen,
                     &self.wanted,
                     &self.memory,

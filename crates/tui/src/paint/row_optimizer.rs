@@ -11,7 +11,7 @@ use super::terminal_color::{ColorLayer, TerminalColor, decimal_digit_count};
 use crate::mosaic::{PLACES, TwoPartBlockPattern};
 
 /// Number of paths kept per cell.
-const BEAM: usize = 5;
+const BEAM_WIDTH: usize = 5;
 /// Upper bound on the bytes needed to reach any pen and cursor position from any other. A path that costs
 /// this much more than the best path cannot win.
 const MAX_BYTES: f32 = 46.0;
@@ -120,7 +120,7 @@ fn extend_plans(
     wanted: &[Option<TwoPartColorCell>],
     model: RateDistortion,
 ) -> Vec<RowPrefixPlan> {
-    let mut beam = SearchBeam { paths: Vec::with_capacity(BEAM), limit: MAX_BYTES * model.byte };
+    let mut beam = SearchBeam { paths: Vec::with_capacity(BEAM_WIDTH), limit: MAX_BYTES * model.byte };
     let leave = match (target.wanted, target.shown) {
         (None, _) => 0.0,
         (Some(wanted), Some(shown)) => shown
@@ -175,7 +175,7 @@ impl SearchBeam {
             if path.cost < other.cost {
                 *other = path;
             }
-        } else if self.paths.len() < BEAM {
+        } else if self.paths.len() < BEAM_WIDTH {
             self.paths.push(path);
         } else if let Some(worst) = self.paths.iter_mut().max_by(|a, b| a.cost.total_cmp(&b.cost))
             && path.cost < worst.cost
@@ -190,7 +190,7 @@ impl SearchBeam {
         for path in &self.paths {
             (best, worst) = (best.min(path.cost), worst.max(path.cost));
         }
-        if self.paths.len() < BEAM { best + self.limit } else { worst.min(best + self.limit) }
+        if self.paths.len() < BEAM_WIDTH { best + self.limit } else { worst.min(best + self.limit) }
     }
 }
 

@@ -14,7 +14,7 @@ use super::target_screen::TargetScreen;
 use super::terminal_color::TerminalColor;
 
 /// Maximum channel difference between first previews that are considered equal.
-const ALIKE: u8 = 2;
+const MAX_EQUAL_DIFFERENCE: u8 = 2;
 /// Upper limit for the noise threshold. Differences up to the threshold do not cause a redraw.
 const MAX_NOISE: u8 = 12;
 
@@ -72,8 +72,9 @@ impl FirstPreviewCells {
         self.newest = places.map(|(x, y)| wanted.preview_cell(x, y)).collect();
         self.noise = u8::MAX;
         for (steady, (first, newest)) in self.steady.iter_mut().zip(self.firsts.iter().zip(&self.newest)) {
-            *steady =
-                first.zip(*newest).is_some_and(|(a, b)| max_channel_difference_between_cells(a, b) <= ALIKE);
+            *steady = first
+                .zip(*newest)
+                .is_some_and(|(a, b)| max_channel_difference_between_cells(a, b) <= MAX_EQUAL_DIFFERENCE);
         }
     }
 

@@ -23,10 +23,10 @@ pub(super) struct TargetScreen {
 /// Regions of the screen, in drawing order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum ScreenRegion {
-    Words,
-    Picture,
+    Text,
+    Preview,
     /// Text drawn after the preview.
-    Later,
+    DelayedText,
 }
 
 impl TargetScreen {
@@ -98,10 +98,10 @@ impl TargetScreen {
     /// The region that a cell belongs to.
     pub(super) fn region_at(&self, x: u16, y: u16) -> ScreenRegion {
         match () {
-            () if self.is_preview(x, y) => ScreenRegion::Picture,
-            () if !self.later.contains((x, y).into()) => ScreenRegion::Words,
-            () if self.row(y)[usize::from(x)] == CellContent::BLANK => ScreenRegion::Words,
-            () => ScreenRegion::Later,
+            () if self.is_preview(x, y) => ScreenRegion::Preview,
+            () if !self.later.contains((x, y).into()) => ScreenRegion::Text,
+            () if self.row(y)[usize::from(x)] == CellContent::BLANK => ScreenRegion::Text,
+            () => ScreenRegion::DelayedText,
         }
     }
 

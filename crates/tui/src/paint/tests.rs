@@ -10,7 +10,7 @@ use super::target_screen::cell_contents;
 use super::terminal_color::TerminalColor;
 use super::*;
 
-mod pictures;
+mod previews;
 
 /// A painter and the terminal it draws on.
 struct TestTerminal {
@@ -31,19 +31,19 @@ impl TestTerminal {
     }
 
     /// Sends one slice. Returns false if there was nothing to send.
-    fn slice(&mut self, most_bytes: usize) -> bool {
-        let bytes = self.painter.next_slice(most_bytes);
+    fn slice(&mut self, max_bytes: usize) -> bool {
+        let bytes = self.painter.next_slice(max_bytes);
         // A single cell may need a cursor move, a pen with all modifiers, and a symbol.
-        assert!(bytes.len() <= most_bytes.max(96), "{} bytes sent, limit {most_bytes}", bytes.len());
+        assert!(bytes.len() <= max_bytes.max(96), "{} bytes sent, limit {max_bytes}", bytes.len());
         self.terminal.process(&bytes);
         self.sent += bytes.len();
         !bytes.is_empty()
     }
 
     /// Sends all remaining bytes and returns their number.
-    fn finish(&mut self, most_bytes: usize) -> usize {
+    fn finish(&mut self, max_bytes: usize) -> usize {
         let before = self.sent;
-        while self.slice(most_bytes) {}
+        while self.slice(max_bytes) {}
         self.sent - before
     }
 
@@ -204,7 +204,7 @@ proptest! {
     fn final_preview_is_exact_after_any_history(
         steps in proptest::collection::vec(step(), 0..12),
         last in buffer(),
-        most_bytes in 1..400_usize,
+        max_bytes in 1..400_usize,
         depth in depth(),
         can_repeat in any::<bool>(),
     ) {
@@ -212,8 +212,8 @@ proptest! {
         for step in steps {
             match step {
                 PainterStep::Aim(buffer, fidelity) => test.painter.set_target(&buffer, PICTURE, fidelity),
-                PainterStep::Slice(most_bytes) => {
-                    test.slice(most_bytes);
+                PainterStep::Slice(max_bytes) => {
+                    test.slice(max_bytes);
                 }
                 PainterStep::Forget => test.painter.invalidate(),
                 PainterStep::Litter => {
@@ -223,11 +223,11 @@ proptest! {
             }
         }
         test.painter.set_target(&last, PICTURE, Fidelity::Still);
-        test.finish(most_bytes);
+        test.finish(max_bytes);
         let largest = test.difference(&last, depth);
         prop_assert!(largest <= 1, "{largest}");
         test.painter.set_target(&last, PICTURE, Fidelity::Still);
-        prop_assert_eq!(test.finish(most_bytes), 0, "an up-to-date screen should need no bytes");
+        prop_assert_eq!(test.finish(max_bytes), 0, "an up-to-date screen should need no bytes");
     }
 
     #[test]

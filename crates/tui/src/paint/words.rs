@@ -6,7 +6,7 @@ use super::screen::{CellRun, ScreenModel};
 use super::target_screen::{ScreenRegion, TargetScreen};
 
 /// Minimum length of a run of blanks that is erased with one sequence.
-const ERASED: usize = 9;
+const MIN_ERASED_RUN: usize = 9;
 /// Minimum length of a run of blanks that is erased to the end of the row.
 const ERASED_TO_END: usize = 4;
 
@@ -94,7 +94,7 @@ fn replace_blanks_with_erase(wanted: &TargetScreen, y: u16, strokes: &[CellRun])
                 .all(|look| *look == CellContent::BLANK);
         if draws_single_blank(&run[0]) && is_last && run.len() >= ERASED_TO_END {
             shorter.push(CellRun::Erase { at, count: None });
-        } else if draws_single_blank(&run[0]) && run.len() >= ERASED {
+        } else if draws_single_blank(&run[0]) && run.len() >= MIN_ERASED_RUN {
             shorter.push(CellRun::Erase { at, count: Some(run.len() as u16) });
         } else {
             shorter.extend_from_slice(run);

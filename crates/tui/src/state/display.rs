@@ -61,7 +61,7 @@ impl TerminalDisplayState {
     /// Preview pixels per cell, horizontally.
     pub(crate) fn horizontal_pixels_per_cell(&self) -> u32 {
         /// Maximum horizontal preview pixels per cell. A higher resolution is not worth the bytes.
-        const MAX: u32 = 10;
+        const MAX_PIXELS_PER_CELL: u32 = 10;
         /// Maximum number of pixels in the window. Accumulating, developing and encoding a preview takes
         /// about 45 bytes of memory per pixel.
         const MAX_PIXELS: f32 = 2_400_000.0;
@@ -76,7 +76,7 @@ impl TerminalDisplayState {
                 let window = &self.window;
                 let squares = f32::from(window.columns) * f32::from(window.rows) * window.cell_aspect;
                 let affordable = (most / squares.max(1.0)).sqrt() as u32;
-                u32::from(window.cell_pixels.0).min(affordable).clamp(1, MAX)
+                u32::from(window.cell_pixels.0).min(affordable).clamp(1, MAX_PIXELS_PER_CELL)
             }
             kind => kind.grid().map_or(1, CellGrid::columns_per_cell),
         }

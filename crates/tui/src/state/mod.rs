@@ -2,7 +2,7 @@
 
 mod display;
 mod overlays;
-mod picture;
+mod preview;
 mod request;
 mod saving;
 mod selection;
@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 
 pub(super) use self::display::TerminalDisplayState;
 pub(super) use self::overlays::{BlockingErrors, Message, OverlayState, PaneState, ViewList};
-pub(super) use self::picture::PictureState;
+pub(super) use self::preview::PreviewState;
 pub(super) use self::request::{CameraStepStatus, ImageProvenance, RequestState};
 pub(super) use self::saving::{SavedFilesState, SceneImageProgress, UndisplayedChange, WrittenFile};
 pub(super) use self::selection::{MousePress, PickPurpose, PointerState};
@@ -52,7 +52,7 @@ pub(super) struct State {
     pub request: RequestState,
     pub work: WorkState,
     pub display: TerminalDisplayState,
-    pub picture: PictureState,
+    pub preview: PreviewState,
     pub saving: SavedFilesState,
     pub selection: PointerState,
     pub overlays: OverlayState,
@@ -72,7 +72,7 @@ impl State {
             display: TerminalDisplayState::new(&setup, now),
             request: RequestState::new(setup.scene, setup.overrides),
             work: WorkState::new(now),
-            picture: PictureState::default(),
+            preview: PreviewState::default(),
             saving: SavedFilesState::new(),
             selection: PointerState::new(),
             overlays: OverlayState::default(),
@@ -84,15 +84,15 @@ impl State {
 
     /// Whether the last camera step has no preview yet.
     pub(super) fn awaits_camera_step_preview(&self) -> bool {
-        let Self { request, work, picture, .. } = self;
-        let is_shown = picture.shown.as_ref().is_some_and(|shown| shown.generation == request.generation);
+        let Self { request, work, preview, .. } = self;
+        let is_shown = preview.shown.as_ref().is_some_and(|shown| shown.generation == request.generation);
         // While the scene is broken, the last valid one is being rendered.
         let is_at_work = match work.activity {
             RequestStatus::Running { .. } => true,
             RequestStatus::Waiting | RequestStatus::Broken => {
                 request.own.is_some() && self.is_failure_in_scene()
             }
-            RequestStatus::Done | RequestStatus::Cancelled => false,
+            RequestStatus::Done | RequestStatus::Canceled => false,
         };
         let is_newest = request.camera_step.generation == Some(request.generation);
         is_newest && is_at_work && request.preview_size.is_some() && !is_shown
@@ -145,7 +145,7 @@ impl State {
         let views = self.overlays.views.as_ref().map(|views| views.until);
         let notice = self.overlays.message.as_ref().and_then(|message| message.until);
         // The displayed age of an older render changes.
-        let age = self.picture.history.is_viewing_older().then(|| self.now + AGE);
+        let age = self.preview.history.is_viewing_older().then(|| self.now + AGE);
         let pixels = self.display.pixels_until;
         [clock, age, self.request.resize_due, bars, views, notice, pixels].into_iter().flatten().min()
     }

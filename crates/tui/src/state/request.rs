@@ -300,10 +300,10 @@ impl RequestState {
 
     /// The image's aspect ratio, or a typical value until it is known.
     pub(crate) fn aspect(&self) -> f32 {
-        const USUAL: f32 = 4.0 / 3.0;
+        const TYPICAL: f32 = 4.0 / 3.0;
         self.effective
             .as_ref()
-            .map_or(USUAL, |it| it.width as f32 / it.height.max(1) as f32)
+            .map_or(TYPICAL, |it| it.width as f32 / it.height.max(1) as f32)
             .clamp(0.02, 50.0)
     }
 }

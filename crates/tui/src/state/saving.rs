@@ -115,9 +115,9 @@ impl SavedFilesState {
     /// The file, if any, to which the user wrote an image that includes changes made with keys. The scene's
     /// own image does not replace it until the scene is saved or the user writes another image.
     pub(crate) fn written_image_with_key_changes(&self) -> Option<&WrittenFile> {
-        let is_there = |written: &&WrittenFile| !written.is_stale && written.lost.is_none();
+        let is_current = |written: &&WrittenFile| !written.is_stale && written.lost.is_none();
         let is_newer = |written: &&WrittenFile| written.generation >= self.saved_at;
-        self.written.iter().filter(is_there).filter(is_newer).find(|written| written.shows.is_some())
+        self.written.iter().filter(is_current).filter(is_newer).find(|written| written.shows.is_some())
     }
 
     /// Whether all files were written before the scene was last saved.

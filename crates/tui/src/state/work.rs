@@ -18,7 +18,7 @@ pub(crate) enum RequestStatus {
     /// The request failed.
     Broken,
     /// The request was stopped.
-    Cancelled,
+    Canceled,
 }
 
 /// State of the newest request's render. While the scene is broken, this is a render of the last valid scene.
@@ -129,7 +129,7 @@ impl WorkState {
             RequestStatus::Done
             | RequestStatus::Waiting
             | RequestStatus::Broken
-            | RequestStatus::Cancelled => None,
+            | RequestStatus::Canceled => None,
         }
     }
 

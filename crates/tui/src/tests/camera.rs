@@ -14,7 +14,7 @@ use crossterm::event::KeyCode;
 
 fn show(ui: &mut TestUi) -> Vec<crate::event::Effect> {
     let generation = ui.state.request.generation;
-    ui.handle_event(Event::Picture(PreviewUpdate {
+    ui.handle_event(Event::Preview(PreviewUpdate {
         generation,
         picture: uniform_picture(50, 38, BLUE),
         range: None,
@@ -35,7 +35,7 @@ fn moved_camera_is_shown_but_not_written() {
     assert!(text.contains(messages::CAMERA_MOVED), "{text}");
     assert!(text.lines().last().is_some_and(|line| line.contains("reset camera")), "{text}");
     show(&mut ui);
-    let effects = ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
+    let effects = ui.handle_event(Event::FileChanged(ContentChangeTime { noticed: ui.now }));
     let edited = find_render_request(&effects).expect("a request");
     assert_eq!(edited.overrides.camera, moved.overrides.camera, "saving should not reset the camera");
     assert_eq!(edited.write, WriteRequirement::No);
@@ -280,7 +280,7 @@ fn model_scene_is_written_once() {
 
 /// Simulates saving a scene with this camera.
 fn save(ui: &mut TestUi, camera: ResolvedCamera) {
-    ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
+    ui.handle_event(Event::FileChanged(ContentChangeTime { noticed: ui.now }));
     let generation = ui.state.request.generation;
     ui.worker_event(protocol::Event::Started { generation });
     ui.worker_event(protocol::Event::Settings {

@@ -16,7 +16,7 @@ const GREEN: [u8; 3] = [10, 200, 20];
 
 /// Saves a scene that contains an error.
 fn save_broken_scene(ui: &mut TestUi) {
-    ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
+    ui.handle_event(Event::FileChanged(ContentChangeTime { noticed: ui.now }));
     ui.report_scene_errors(vec![diagnostic(Severity::Error, "unknown key `radus`")]);
     ui.handle_event(Event::Settled);
 }
@@ -27,7 +27,7 @@ fn preview(ui: &mut TestUi, name: &str, color: [u8; 3], is_finished: bool) {
     let source = Some(PreviewedImageState { image: FingerprintHasher::new(name).finish(), is_finished });
     let picture = uniform_picture(50, 38, color);
     let (range, section, lacks_photons) = (None, None, false);
-    ui.handle_event(Event::Picture(PreviewUpdate {
+    ui.handle_event(Event::Preview(PreviewUpdate {
         generation,
         picture,
         range,
@@ -90,7 +90,7 @@ fn editing_a_comment_adds_no_entry() {
     ui.report_scene_read();
     preview(&mut ui, "first", BLUE, true);
     end(&mut ui, true, 0.0, 1.0);
-    assert_eq!((ui.state.picture.history.len(), ui.state.work.renders), (1, 1));
+    assert_eq!((ui.state.preview.history.len(), ui.state.work.renders), (1, 1));
     ui.press_character('b');
     assert!(ui.screen_text().contains(messages::NO_EARLIER_RENDER), "{}", ui.screen_text());
 }
@@ -119,7 +119,7 @@ fn editing_the_output_path_adds_no_entry() {
     // Another render wrote the image, but it results from the same edit.
     assert!(text.contains("· render 3") && text.contains("▸3 camera.fov"), "{text}");
     assert!(!text.contains("render.output"), "{text}");
-    assert_eq!(ui.state.picture.history.len(), 2);
+    assert_eq!(ui.state.preview.history.len(), 2);
     ui.press_character('b');
     assert!(
         ui.screen_text().contains(&format!("{}, camera.fov 40 → 44  ", messages::BEFORE_EDIT)),
@@ -156,14 +156,14 @@ fn resumed_render_time_is_cumulative() {
     let text = ui.screen_text();
     assert!(text.contains("render 8.73 s +2.9 s"), "{text}");
     assert!(text.contains("8.73 s · render 2"), "{text}");
-    assert_eq!(ui.state.picture.history.len(), 1, "{text}");
+    assert_eq!(ui.state.preview.history.len(), 1, "{text}");
 }
 
 /// Shows a preview on the terminal.
 fn show_preview(ui: &mut TestUi, name: &str, color: [u8; 3], is_finished: bool) {
     preview(ui, name, color, is_finished);
     let generation = ui.state.request.generation;
-    ui.handle_event(Event::Shown { generation });
+    ui.handle_event(Event::FirstPreviewSent { generation });
 }
 
 /// Reports that the render of the last valid scene has ended.
@@ -244,7 +244,7 @@ fn render_of_last_valid_scene_is_numbered() {
     save_broken_scene(&mut ui);
     show_preview(&mut ui, "bright", RED, true);
     last_good(&mut ui, LastValidSceneRenderOutcome::Finished { unchanged: true });
-    assert_eq!((ui.state.picture.history.len(), ui.state.work.renders), (1, 1));
+    assert_eq!((ui.state.preview.history.len(), ui.state.work.renders), (1, 1));
     for (run, name, words) in [(2, "hard", "shadows"), (3, "off", "shadows off")] {
         ui.press_character('s');
         ui.report_scene_errors(vec![diagnostic(Severity::Error, "unknown key `radus`")]);

@@ -27,7 +27,7 @@ fn images_of_older_requests_are_dropped() {
     let old = ui.state.request.generation;
     ui.press_character('r');
     ui.draw_screen();
-    ui.handle_event(Event::Picture(PreviewUpdate {
+    ui.handle_event(Event::Preview(PreviewUpdate {
         generation: old,
         picture: uniform_picture(50, 38, BLUE),
         range: None,
@@ -49,11 +49,11 @@ fn first_change_is_timed_from_the_save() {
     ui.finish_render(RED);
     let noticed = ui.now;
     ui.now += Duration::from_millis(3);
-    let effects = ui.handle_event(Event::Changed(ContentChangeTime { noticed }));
+    let effects = ui.handle_event(Event::FileChanged(ContentChangeTime { noticed }));
     assert_eq!(find_render_request(&effects).map(|it| it.generation), Some(2));
-    ui.handle_event(Event::Shown { generation: 1 });
+    ui.handle_event(Event::FirstPreviewSent { generation: 1 });
     assert_eq!(ui.state.saving.first_change, None, "the old preview should not count");
-    ui.handle_event(Event::Picture(PreviewUpdate {
+    ui.handle_event(Event::Preview(PreviewUpdate {
         generation: 2,
         picture: uniform_picture(50, 38, BLUE),
         range: None,
@@ -62,11 +62,11 @@ fn first_change_is_timed_from_the_save() {
         source: None,
     }));
     ui.now += Duration::from_millis(20);
-    ui.handle_event(Event::Shown { generation: 2 });
+    ui.handle_event(Event::FirstPreviewSent { generation: 2 });
     ui.worker_event(done_event(2, Vec::new(), false));
     assert!(ui.screen_text().contains(&messages::save_to_screen_time("23 ms")), "{}", ui.screen_text());
     ui.now += Duration::from_millis(20);
-    ui.handle_event(Event::Shown { generation: 2 });
+    ui.handle_event(Event::FirstPreviewSent { generation: 2 });
     assert!(
         !ui.state.dirty && ui.screen_text().contains(&messages::save_to_screen_time("23 ms")),
         "measured once"
@@ -78,7 +78,7 @@ fn only_the_first_preview_is_urgent() {
     let mut ui = TestUi::new();
     let picture = |ui: &mut TestUi, generation| {
         ui.state.urgent = false;
-        ui.handle_event(Event::Picture(PreviewUpdate {
+        ui.handle_event(Event::Preview(PreviewUpdate {
             generation,
             picture: uniform_picture(50, 38, RED),
             range: None,
@@ -90,7 +90,7 @@ fn only_the_first_preview_is_urgent() {
     };
     assert!(picture(&mut ui, 1));
     assert!(!picture(&mut ui, 1));
-    ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
+    ui.handle_event(Event::FileChanged(ContentChangeTime { noticed: ui.now }));
     assert!(!picture(&mut ui, 1), "an outdated preview is not urgent");
     assert!(picture(&mut ui, 2));
     assert!(!picture(&mut ui, 2));
@@ -103,7 +103,7 @@ fn unchanged_state_is_not_redrawn() {
     ui.draw_screen();
     ui.press_character('g');
     ui.advance_clock(10_000);
-    ui.handle_event(Event::Shown { generation: 1 });
+    ui.handle_event(Event::FirstPreviewSent { generation: 1 });
     ui.worker_event(protocol::Event::Preview { generation: 1 });
     ui.press_key(KeyPress::special(crossterm::event::KeyCode::PageUp));
     assert!(!ui.state.dirty);
@@ -136,7 +136,7 @@ fn preview_is_resized_after_a_delay() {
         effects[..],
         [Effect::Send(Command::Preview(Some(MaxPreviewSize { width: 152, height: 114, around: None })))]
     ));
-    ui.handle_event(Event::Picture(PreviewUpdate {
+    ui.handle_event(Event::Preview(PreviewUpdate {
         generation: 1,
         picture: uniform_picture(149, 112, BLUE),
         range: None,
@@ -170,7 +170,7 @@ fn resize_does_not_restart_the_render() {
 fn editing_a_comment_reports_unchanged() {
     let mut ui = TestUi::new();
     ui.finish_render(RED);
-    ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
+    ui.handle_event(Event::FileChanged(ContentChangeTime { noticed: ui.now }));
     ui.worker_event(protocol::Event::Started { generation: 2 });
     ui.worker_event(done_event(2, Vec::new(), true));
     assert!(ui.screen_text().contains("unchanged"));
@@ -193,20 +193,20 @@ fn signals_quit_suspend_or_redraw() {
 #[test]
 fn lost_event_sources_are_handled() {
     let mut ui = TestUi::new();
-    assert!(matches!(ui.handle_event(Event::Lost(RequiredEventSource::Worker))[..], [Effect::GiveUp]));
+    assert!(matches!(ui.handle_event(Event::SourceEnded(RequiredEventSource::Worker))[..], [Effect::GiveUp]));
     assert!(matches!(
-        ui.handle_event(Event::Lost(RequiredEventSource::Keys))[..],
+        ui.handle_event(Event::SourceEnded(RequiredEventSource::Keys))[..],
         [Effect::Quit(ExitStatus::HANGUP)]
     ));
-    assert!(ui.handle_event(Event::Lost(RequiredEventSource::Watcher)).is_empty());
+    assert!(ui.handle_event(Event::SourceEnded(RequiredEventSource::Watcher)).is_empty());
     assert!(ui.screen_text().contains(messages::NOT_WATCHING));
 }
 
 #[test]
-fn cancelled_render_is_reported() {
+fn canceled_render_is_reported() {
     let mut ui = TestUi::new();
-    ui.worker_event(protocol::Event::Cancelled { generation: 1 });
-    assert_eq!(ui.state.work.activity, RequestStatus::Cancelled);
+    ui.worker_event(protocol::Event::Canceled { generation: 1 });
+    assert_eq!(ui.state.work.activity, RequestStatus::Canceled);
     assert!(ui.screen_text().contains("stopped"));
 }
 
@@ -244,12 +244,12 @@ fn error_with(message: &str) -> Vec<Diagnostic> {
 fn errors_in_incomplete_files_are_deferred() {
     let mut ui = TestUi::new();
     ui.finish_render(RED);
-    ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
+    ui.handle_event(Event::FileChanged(ContentChangeTime { noticed: ui.now }));
     ui.report_scene_errors(error_with("half"));
     let text = ui.screen_text();
     assert!(!text.contains("half") && !text.contains("broken"), "{text}");
     assert!(text.contains("… waiting") && text.contains(messages::INCOMPLETE_FILE), "{text}");
-    ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
+    ui.handle_event(Event::FileChanged(ContentChangeTime { noticed: ui.now }));
     ui.report_scene_errors(error_with("more"));
     assert!(!ui.screen_text().contains("more") && !ui.screen_text().contains("broken"));
     assert!(ui.handle_event(Event::Settled).is_empty());
@@ -262,9 +262,9 @@ fn errors_in_incomplete_files_are_deferred() {
 fn file_saved_in_steps_shows_no_error() {
     let mut ui = TestUi::new();
     ui.finish_render(RED);
-    ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
+    ui.handle_event(Event::FileChanged(ContentChangeTime { noticed: ui.now }));
     ui.report_scene_errors(error_with("half"));
-    ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
+    ui.handle_event(Event::FileChanged(ContentChangeTime { noticed: ui.now }));
     ui.finish_render(BLUE);
     ui.handle_event(Event::Settled);
     ui.advance_clock(5000);
@@ -278,7 +278,7 @@ fn errors_in_stable_files_are_shown_immediately() {
     let mut ui = TestUi::new();
     ui.report_scene_errors(error_with("first"));
     assert!(ui.screen_text().contains("error: first"), "without a save, errors should not be deferred");
-    ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
+    ui.handle_event(Event::FileChanged(ContentChangeTime { noticed: ui.now }));
     ui.handle_event(Event::Settled);
     ui.report_scene_errors(error_with("late"));
     assert!(ui.screen_text().contains("error: late"));
@@ -290,9 +290,9 @@ fn errors_in_stable_files_are_shown_immediately() {
 #[test]
 fn errors_are_shown_if_the_watcher_is_lost() {
     let mut ui = TestUi::new();
-    ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
+    ui.handle_event(Event::FileChanged(ContentChangeTime { noticed: ui.now }));
     ui.report_scene_errors(error_with("half"));
-    ui.handle_event(Event::Lost(RequiredEventSource::Watcher));
+    ui.handle_event(Event::SourceEnded(RequiredEventSource::Watcher));
     assert!(ui.screen_text().contains("error: half"), "{}", ui.screen_text());
     ui.press_character('r');
     ui.report_scene_errors(error_with("again"));
@@ -302,7 +302,7 @@ fn errors_are_shown_if_the_watcher_is_lost() {
 #[test]
 fn render_failures_are_shown_immediately() {
     let mut ui = TestUi::new();
-    ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
+    ui.handle_event(Event::FileChanged(ContentChangeTime { noticed: ui.now }));
     let failure = Failure::Work("no memory".to_owned());
     ui.worker_event(protocol::Event::Failed { generation: ui.state.request.generation, failure });
     assert!(ui.screen_text().contains("no memory"), "{}", ui.screen_text());
@@ -314,15 +314,15 @@ fn time_spent_in_the_editor_is_not_counted() {
     ui.finish_render(RED);
     let noticed = ui.now;
     ui.now += Duration::from_secs(9);
-    ui.handle_event(Event::Back);
+    ui.handle_event(Event::EditorExited);
     ui.now += Duration::from_millis(2);
-    ui.handle_event(Event::Changed(ContentChangeTime { noticed }));
+    ui.handle_event(Event::FileChanged(ContentChangeTime { noticed }));
     ui.now += Duration::from_millis(20);
-    ui.handle_event(Event::Shown { generation: 2 });
+    ui.handle_event(Event::FirstPreviewSent { generation: 2 });
     assert_eq!(ui.state.saving.first_change, Some(Duration::from_millis(22)));
     let noticed = ui.now;
-    ui.handle_event(Event::Changed(ContentChangeTime { noticed }));
+    ui.handle_event(Event::FileChanged(ContentChangeTime { noticed }));
     ui.now += Duration::from_millis(30);
-    ui.handle_event(Event::Shown { generation: 3 });
+    ui.handle_event(Event::FirstPreviewSent { generation: 3 });
     assert_eq!(ui.state.saving.first_change, Some(Duration::from_millis(30)));
 }

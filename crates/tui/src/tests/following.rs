@@ -55,7 +55,7 @@ struct SimulatedTerminal {
     sent: usize,
     /// Each unacknowledged slice's reply time and size, and the peak number of unacknowledged bytes.
     unanswered: VecDeque<(Instant, usize)>,
-    most_unanswered: usize,
+    max_unanswered: usize,
 }
 
 impl SimulatedTerminal {
@@ -71,7 +71,7 @@ impl SimulatedTerminal {
             bytes: Vec::new(),
             sent: 0,
             unanswered: VecDeque::new(),
-            most_unanswered: 0,
+            max_unanswered: 0,
         }
     }
 
@@ -85,7 +85,7 @@ impl SimulatedTerminal {
         self.sent += bytes.len();
         self.unanswered.push_back((self.free + round_trip, bytes.len()));
         let unanswered = self.unanswered.iter().map(|(_, bytes)| bytes).sum();
-        self.most_unanswered = self.most_unanswered.max(unanswered);
+        self.max_unanswered = self.max_unanswered.max(unanswered);
         self.arriving.push_back((self.free + round_trip / 2, bytes));
     }
 
@@ -203,7 +203,7 @@ impl WatchedRender {
             if asked.is_some_and(|asked| self.ui.now >= asked + FIRST) {
                 asked = None;
                 self.turn += 1;
-                self.put_picture(1.0);
+                self.send_preview(1.0);
             }
             if self.ui.now >= key {
                 key += REPEAT;
@@ -219,7 +219,7 @@ impl WatchedRender {
     /// Finishes drawing the final preview.
     fn finish(&mut self) {
         let generation = self.ui.state.request.generation;
-        self.put_picture(SAMPLES);
+        self.send_preview(SAMPLES);
         self.ui.worker_event(done_event(generation, Vec::new(), false));
         self.advance(self.ui.now + Duration::from_secs(5), false);
     }
@@ -270,12 +270,12 @@ impl WatchedRender {
         }
         if is_at_work && now >= self.next[1] {
             self.next[1] = now + PICTURE;
-            self.put_picture((done * SAMPLES).max(1.0));
+            self.send_preview((done * SAMPLES).max(1.0));
         }
         self.ui.handle_event(Event::Tick);
     }
 
-    fn put_picture(&mut self, samples: f64) {
+    fn send_preview(&mut self, samples: f64) {
         let generation = self.ui.state.request.generation;
         let picture = Arc::new(picture(self.size, samples, self.turn));
         *self.slot.lock().expect("a slot") = Some(PreviewUpdate {
@@ -293,7 +293,7 @@ impl WatchedRender {
     }
 
     fn send_event(&mut self, event: Event) {
-        self.shown += usize::from(matches!(event, Event::Shown { .. }));
+        self.shown += usize::from(matches!(event, Event::FirstPreviewSent { .. }));
         self.ui.handle_event(event);
     }
 }
@@ -373,7 +373,7 @@ fn slow_connection_gets_few_previews() {
     assert!(watch.shown <= 12, "{} previews in 10 s", watch.shown);
     let sent = watch.terminal.sent;
     assert!(sent <= 300_000, "{sent} bytes");
-    assert!(watch.terminal.most_unanswered <= 24_000, "{} bytes", watch.terminal.most_unanswered);
+    assert!(watch.terminal.max_unanswered <= 24_000, "{} bytes", watch.terminal.max_unanswered);
     let before = watch.terminal.visible_colors();
     watch.finish();
     let apart = mean_difference(&before, &watch.terminal.visible_colors());
@@ -389,7 +389,7 @@ fn held_key_uses_most_of_the_bandwidth() {
     watch.orbit(Duration::from_secs(6));
     let used = (watch.terminal.sent - before) as f64 / (6.0 * SLOW.bytes_per_second);
     assert!(used >= 0.7, "{used} of the bandwidth used");
-    assert!(watch.terminal.most_unanswered <= 24_000, "{} bytes", watch.terminal.most_unanswered);
+    assert!(watch.terminal.max_unanswered <= 24_000, "{} bytes", watch.terminal.max_unanswered);
 }
 
 /// kitty 0.26 does not show images that are sent within synchronized output.

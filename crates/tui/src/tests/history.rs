@@ -47,7 +47,7 @@ fn older_render_cannot_be_inspected() {
     assert!(!asks(&ui.handle_event(mouse(MouseEventKind::Release))));
     assert!(ui.screen_text().contains(messages::OLDER_RENDER), "{}", ui.screen_text());
     // A late reply is not shown for the older render.
-    let picked = PickedPixel { pixel: [3, 4], thing: None, color: None };
+    let picked = PickedPixel { pixel: [3, 4], object: None, color: None };
     ui.worker_event(WorkerEvent::Picked { generation: 1, picked: Box::new(picked) });
     assert!(!ui.screen_text().contains("pixel 3, 4"), "{}", ui.screen_text());
     ui.press_character('b');
@@ -92,7 +92,7 @@ fn c_saves_the_newest_camera() {
         ui.press_character('n');
         assert!(!ui.press_character('c').is_empty());
         if is_noticed {
-            ui.handle_event(Event::Changed(crate::ContentChangeTime { noticed: ui.now }));
+            ui.handle_event(Event::FileChanged(crate::ContentChangeTime { noticed: ui.now }));
         }
         let kept =
             CameraSaveResult { path: "a.toml".into(), is_new: true, is_own, of_model: false, edit: None };
@@ -111,7 +111,7 @@ fn newest_render_progress_is_shown() {
     let generation = ui.state.request.generation;
     ui.worker_event(WorkerEvent::Started { generation });
     let picture = uniform_picture(50, 38, RED);
-    ui.handle_event(Event::Picture(PreviewUpdate {
+    ui.handle_event(Event::Preview(PreviewUpdate {
         generation,
         picture,
         range: None,
@@ -154,10 +154,10 @@ fn age_is_shown_once_and_updated() {
 fn save_time_is_cleared_by_the_next_render() {
     let mut ui = TestUi::new();
     ui.finish_render(RED);
-    ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
+    ui.handle_event(Event::FileChanged(ContentChangeTime { noticed: ui.now }));
     ui.finish_render(BLUE);
     let generation = ui.state.request.generation;
-    ui.handle_event(Event::Shown { generation });
+    ui.handle_event(Event::FirstPreviewSent { generation });
     assert!(ui.state.saving.first_change.is_some(), "{}", ui.screen_text());
     ui.press_character('s');
     ui.finish_render(RED);

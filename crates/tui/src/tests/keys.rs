@@ -184,7 +184,7 @@ fn check(action: Action, key: KeyPress, ui: &mut TestUi) {
         }
         Action::Edit => assert!(matches!(ui.press_key(key)[..], [Effect::Edit(_)])),
         Action::CompareLastEdit => {
-            ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
+            ui.handle_event(Event::FileChanged(ContentChangeTime { noticed: ui.now }));
             ui.finish_render(BLUE);
             for (color, other) in [(RED, BLUE), (BLUE, RED)] {
                 ui.press_key(key);
@@ -360,7 +360,7 @@ fn pinhole_has_no_depth_of_field() {
 fn new_request_ends_a_pause() {
     let mut ui = TestUi::new();
     ui.press_character(' ');
-    let effects = ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
+    let effects = ui.handle_event(Event::FileChanged(ContentChangeTime { noticed: ui.now }));
     assert!(matches!(effects[..], [Effect::Send(Command::Pause(false)), Effect::Send(Command::Render(_))]));
     assert!(!ui.state.work.paused);
     assert!(ui.screen_text().contains(messages::RESUMED), "{}", ui.screen_text());
@@ -421,10 +421,10 @@ fn postponed_write_is_reported_again_when_done() {
 }
 
 #[test]
-fn cancelled_render_is_not_paused() {
+fn canceled_render_is_not_paused() {
     let mut ui = TestUi::new();
     ui.press_character(' ');
-    ui.worker_event(protocol::Event::Cancelled { generation: 1 });
+    ui.worker_event(protocol::Event::Canceled { generation: 1 });
     assert!(!ui.state.work.paused && !ui.screen_text().contains("paused"), "{}", ui.screen_text());
 }
 
@@ -472,7 +472,7 @@ fn saved_settings_are_the_base_for_toggles() {
     ui.press_character('s');
     ui.finish_render(BLUE);
     // The saved scene has hard shadows, as set with the key.
-    ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
+    ui.handle_event(Event::FileChanged(ContentChangeTime { noticed: ui.now }));
     let generation = ui.state.request.generation;
     let own = SceneSettings { shadows: ShadowMode::Hard, ..scene_settings() };
     let settings = Box::new(EffectiveSettingsSummary { shadows: ShadowMode::Hard, ..effective_settings() });

@@ -36,7 +36,7 @@ fn show(ui: &mut TestUi, size: (u32, u32)) {
     let generation = ui.state.request.generation;
     let (width, height) = fitted_preview_size(size, ui.state.request.preview_size.expect("a preview"));
     let picture = uniform_picture(width, height, RED);
-    ui.handle_event(Event::Picture(PreviewUpdate {
+    ui.handle_event(Event::Preview(PreviewUpdate {
         generation,
         picture,
         range: None,
@@ -105,7 +105,7 @@ fn layout_is_stable_during_a_render() {
                     vec![diagnostic(Severity::Warning, "unused")],
                     false,
                 )),
-                7 => ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now })),
+                7 => ui.handle_event(Event::FileChanged(ContentChangeTime { noticed: ui.now })),
                 8 => {
                     ui.report_scene_errors(vec![diagnostic(Severity::Error, "wrong")]);
                     Vec::new()
@@ -200,7 +200,7 @@ fn stage_times_are_compared_with_last_render() {
     };
     render(&mut ui, 1.42);
     assert!(!ui.screen_text().contains("1.42 s −") && !ui.screen_text().contains("1.42 s +"));
-    ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
+    ui.handle_event(Event::FileChanged(ContentChangeTime { noticed: ui.now }));
     render(&mut ui, 1.12);
     assert!(ui.screen_text().contains("render   1.12 s −.3 s"), "{}", ui.screen_text());
     ui.press_character('r');
@@ -209,7 +209,7 @@ fn stage_times_are_compared_with_last_render() {
     render(&mut ui, 2.24);
     assert!(
         ui.screen_text().contains("render  2.24 s +1.1 s"),
-        "cancelled renders should not count: {}",
+        "canceled renders should not count: {}",
         ui.screen_text()
     );
 }
@@ -228,7 +228,7 @@ fn save_hint_is_shown_until_the_first_save() {
                 "{}",
                 ui.screen_text()
             );
-            ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
+            ui.handle_event(Event::FileChanged(ContentChangeTime { noticed: ui.now }));
             ui.worker_event(done_event(2, Vec::new(), false));
             assert!(
                 !ui.screen_words().contains(&messages::save_to_render_hint("cornell.toml", false)),

@@ -121,7 +121,7 @@ fn errors_and_prompts_stay_until_a_key_press() {
     ui.advance_clock(60_000);
     assert!(ui.screen_text().contains(messages::CLICK_TO_FOCUS), "{}", ui.screen_text());
     ui.press_character('f');
-    ui.handle_event(Event::Lost(crate::event::RequiredEventSource::Watcher));
+    ui.handle_event(Event::SourceEnded(crate::event::RequiredEventSource::Watcher));
     ui.advance_clock(60_000);
     assert!(ui.screen_text().contains(messages::NOT_WATCHING), "{}", ui.screen_text());
 }

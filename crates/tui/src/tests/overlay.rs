@@ -359,7 +359,7 @@ fn camera_steps_wait_while_the_scene_is_broken() {
     );
     let generation = ui.state.request.generation;
     let picture = uniform_picture(50, 38, RED);
-    let effects = ui.handle_event(Event::Picture(PreviewUpdate {
+    let effects = ui.handle_event(Event::Preview(PreviewUpdate {
         generation,
         picture,
         range: None,

@@ -33,14 +33,14 @@ fn click(ui: &mut TestUi, column: u16, row: u16) -> Vec<Effect> {
     mouse(ui, MouseEventKind::Release, column, row)
 }
 
-fn asked(effects: &[Effect]) -> ImagePosition {
+fn queried_position(effects: &[Effect]) -> ImagePosition {
     match effects {
         [Effect::Send(Command::Pick(spot))] => *spot,
         other => panic!("{other:?}"),
     }
 }
 
-fn thing() -> PickedObject {
+fn picked_object() -> PickedObject {
     PickedObject {
         shape: "sphere",
         name: Some("ball".to_owned()),
@@ -56,8 +56,8 @@ fn thing() -> PickedObject {
     }
 }
 
-fn answer(ui: &mut TestUi, thing: Option<PickedObject>) -> Vec<Effect> {
-    let picked = Box::new(PickedPixel { pixel: [1, 2], thing, color: Some([0.5; 3]) });
+fn answer(ui: &mut TestUi, object: Option<PickedObject>) -> Vec<Effect> {
+    let picked = Box::new(PickedPixel { pixel: [1, 2], object, color: Some([0.5; 3]) });
     ui.worker_event(protocol::Event::Picked { generation: 0, picked })
 }
 
@@ -72,7 +72,7 @@ fn drag_orbits_and_click_inspects() {
         mouse(&mut ui, MouseEventKind::Release, 30, 10).is_empty(),
         "a drag should not be treated as a click"
     );
-    let spot = asked(&click(&mut ui, 12, 10));
+    let spot = queried_position(&click(&mut ui, 12, 10));
     assert!((spot.x - 12.5 / 55.0).abs() < 1e-9 && (spot.y - 9.5 / 21.0).abs() < 1e-9, "{spot:?}");
     for (column, row) in [(70, 10), (20, 0), (20, 23)] {
         assert!(click(&mut ui, column, row).is_empty(), "clicks outside the image should be ignored");
@@ -102,7 +102,7 @@ fn wheel_zooms_and_scrolls_diagnostics() {
 fn clicked_object_is_shown_and_can_be_edited() {
     let mut ui = ui();
     click(&mut ui, 12, 10);
-    assert!(answer(&mut ui, Some(thing())).is_empty());
+    assert!(answer(&mut ui, Some(picked_object())).is_empty());
     let text = ui.screen_words();
     for words in
         ["sphere \"ball\"", "cornell.toml:47", "glass crystal", "distance 3.9", "position (0.2, 0.5, -0.3)"]
@@ -124,7 +124,7 @@ fn clicked_object_is_shown_and_can_be_edited() {
     );
     let mut fresh = self::ui();
     assert_eq!(place(&fresh.press_character('o')).1, 1, "without errors, the scene file should be opened");
-    fresh.handle_event(Event::NoEditor("no editor `x`".to_owned()));
+    fresh.handle_event(Event::EditorFailed("no editor `x`".to_owned()));
     assert!(fresh.screen_text().contains("no editor `x`"));
 }
 
@@ -134,7 +134,7 @@ fn click_after_f_sets_the_focus() {
     assert!(ui.press_character('f').is_empty());
     assert!(ui.screen_text().contains(messages::CLICK_TO_FOCUS), "{}", ui.screen_text());
     click(&mut ui, 12, 10);
-    let effects = answer(&mut ui, Some(thing()));
+    let effects = answer(&mut ui, Some(picked_object()));
     let focused = find_render_request(&effects).expect("a request");
     assert_eq!((focused.overrides.camera.focus, focused.write), (Some(3.8167), WriteRequirement::No));
     assert!(ui.screen_text().contains(&messages::focus_moved(3.8167)[..40]), "{}", ui.screen_text());
@@ -142,16 +142,16 @@ fn click_after_f_sets_the_focus() {
     ui.press_character('f');
     ui.press_character('e');
     click(&mut ui, 12, 10);
-    assert!(answer(&mut ui, Some(thing())).is_empty());
+    assert!(answer(&mut ui, Some(picked_object())).is_empty());
     // If the mouse is off, `f` focuses at the crosshair immediately.
     ui.press_character('m');
-    let spot = asked(&ui.press_character('f'));
+    let spot = queried_position(&ui.press_character('f'));
     assert!((spot.x - 12.5 / 55.0).abs() < 1e-9, "expected the last click: {spot:?}");
     assert!(answer(&mut ui, None).is_empty());
     assert!(ui.screen_text().contains(messages::NOTHING_TO_FOCUS));
     ui.state.request.own.as_mut().expect("a scene").camera.aperture = 0.0;
     ui.press_character('f');
-    assert!(answer(&mut ui, Some(thing())).is_empty());
+    assert!(answer(&mut ui, Some(picked_object())).is_empty());
     assert!(ui.screen_text().contains(messages::PINHOLE));
 }
 
@@ -181,13 +181,13 @@ fn saved_camera_becomes_the_scene_camera() {
         "{text}"
     );
     // The watcher also reports this save.
-    ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
+    ui.handle_event(Event::FileChanged(ContentChangeTime { noticed: ui.now }));
     assert!(
         ui.screen_text().contains(&messages::camera_saved("scenes/cornell.toml")),
         "{}",
         ui.screen_text()
     );
-    ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
+    ui.handle_event(Event::FileChanged(ContentChangeTime { noticed: ui.now }));
     assert!(
         !ui.screen_text().contains(&messages::camera_saved("scenes/cornell.toml")),
         "{}",
@@ -201,9 +201,9 @@ fn saved_camera_becomes_the_scene_camera() {
     let text = ui.screen_text();
     assert!(text.contains("error: outdated") && text.contains("reset camera"), "{text}");
     // The watcher reports this save slightly later.
-    ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
+    ui.handle_event(Event::FileChanged(ContentChangeTime { noticed: ui.now }));
     assert!(ui.screen_text().contains("error: outdated"), "{}", ui.screen_text());
-    ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
+    ui.handle_event(Event::FileChanged(ContentChangeTime { noticed: ui.now }));
     assert!(!ui.screen_text().contains("error: outdated"), "{}", ui.screen_text());
 }
 
@@ -248,7 +248,7 @@ fn y_copies_if_the_terminal_supports_it() {
     assert!(ui.press_character('y').is_empty());
     assert!(ui.screen_text().contains(messages::NOTHING_TO_COPY), "{}", ui.screen_text());
     click(&mut ui, 12, 10);
-    answer(&mut ui, Some(thing()));
+    answer(&mut ui, Some(picked_object()));
     assert!(ui.press_character('y').is_empty());
     let text: String = ui.screen_text().split_whitespace().collect::<Vec<_>>().join(" ");
     assert!(text.contains(&format!("{} sphere", messages::SELECT_TO_COPY)), "{text}");
@@ -306,7 +306,7 @@ fn older_render_is_shown_until_the_next_render() {
         ui.screen_text()
     );
     let generation = ui.state.request.generation;
-    ui.handle_event(Event::Picture(PreviewUpdate {
+    ui.handle_event(Event::Preview(PreviewUpdate {
         generation,
         picture: uniform_picture(50, 38, [10, 200, 10]),
         range: None,
@@ -317,7 +317,7 @@ fn older_render_is_shown_until_the_next_render() {
     assert!(super::cells_of(&mut ui, RED) > 0, "the older render should stay visible");
     ui.press_character('N');
     assert!(
-        !ui.state.picture.history.is_viewing_older() && ui.screen_text().contains(messages::NEWEST_RENDER),
+        !ui.state.preview.history.is_viewing_older() && ui.screen_text().contains(messages::NEWEST_RENDER),
         "{}",
         ui.screen_text()
     );
@@ -333,7 +333,7 @@ fn small_windows_show_all_inspected_values() {
         let mut ui = TestUi::from_state(state(columns, rows));
         ui.finish_render(RED);
         ui.press_key(crate::event::KeyPress::special(crossterm::event::KeyCode::Enter));
-        answer(&mut ui, Some(thing()));
+        answer(&mut ui, Some(picked_object()));
         let text = ui.screen_text().replace('\n', " ");
         let text = text.split_whitespace().collect::<Vec<_>>().join(" ");
         for words in
@@ -358,7 +358,7 @@ fn small_windows_show_how_to_copy() {
         let mut ui = TestUi::from_state(state(columns, rows));
         ui.finish_render(RED);
         ui.press_key(crate::event::KeyPress::special(crossterm::event::KeyCode::Enter));
-        answer(&mut ui, Some(thing()));
+        answer(&mut ui, Some(picked_object()));
         ui.press_character('y');
         let text = ui.screen_text();
         assert!(
@@ -399,7 +399,7 @@ fn drag_after_z_selects_the_region_to_render() {
 #[test]
 fn clicks_in_a_close_up_select_the_right_pixel() {
     let mut ui = ui();
-    let spot = asked(&click(&mut ui, 12, 10));
+    let spot = queried_position(&click(&mut ui, 12, 10));
     ui.press_character('x');
     let around = ui.state.request.preview_size.expect("a size").around;
     assert_eq!(around, Some(spot));
@@ -407,7 +407,7 @@ fn clicks_in_a_close_up_select_the_right_pixel() {
     let section = Some(NormalizedRect { left: 0.2, top: 0.4, width: 0.1, height: 0.2 });
     let generation = ui.state.request.generation;
     let picture = uniform_picture(20, 10, BLUE);
-    ui.handle_event(Event::Picture(PreviewUpdate {
+    ui.handle_event(Event::Preview(PreviewUpdate {
         generation,
         picture,
         range: None,
@@ -418,7 +418,7 @@ fn clicks_in_a_close_up_select_the_right_pixel() {
     assert_eq!(super::cells_of(&mut ui, BLUE), 20 * 5, "{}", ui.screen_text());
     assert!(ui.screen_text().contains("cornell.toml  1:1"), "{}", ui.screen_text());
     // The area has 56 × 21 cells at (0, 1), so the image starts at (18, 9).
-    let spot = asked(&click(&mut ui, 18, 9));
+    let spot = queried_position(&click(&mut ui, 18, 9));
     assert!((spot.x - (0.2 + 0.1 * 0.5 / 20.0)).abs() < 1e-9, "{spot:?}");
     assert!((spot.y - (0.4 + 0.2 * 0.5 / 5.0)).abs() < 1e-9, "{spot:?}");
 }
@@ -426,7 +426,7 @@ fn clicks_in_a_close_up_select_the_right_pixel() {
 #[test]
 fn header_marks_an_older_render() {
     let mut ui = ui();
-    ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
+    ui.handle_event(Event::FileChanged(ContentChangeTime { noticed: ui.now }));
     ui.finish_render(BLUE);
     ui.press_character('b');
     let first = |ui: &mut TestUi| ui.screen_text().lines().next().map(str::to_owned).unwrap_or_default();
@@ -460,7 +460,7 @@ fn saved_camera_can_be_compared_with_the_old_one() {
     ui.finish_render(BLUE);
     ui.press_character('c');
     kept(&mut ui, true, true);
-    ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
+    ui.handle_event(Event::FileChanged(ContentChangeTime { noticed: ui.now }));
     ui.finish_render(BLUE);
     ui.press_character('b');
     assert!(super::cells_of(&mut ui, RED) > 0, "expected the previous camera: {}", ui.screen_text());
@@ -480,20 +480,20 @@ fn escape_cancels_gestures_and_closes_history() {
     ui.state.selection.facts = Some(vec!["sphere".to_owned()]);
     escape(&mut ui);
     assert_eq!(ui.state.selection.facts, None);
-    ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
+    ui.handle_event(Event::FileChanged(ContentChangeTime { noticed: ui.now }));
     ui.finish_render(BLUE);
     ui.press_character('b');
-    assert!(ui.state.picture.history.is_viewing_older());
+    assert!(ui.state.preview.history.is_viewing_older());
     escape(&mut ui);
     assert!(
-        !ui.state.picture.history.is_viewing_older() && ui.screen_text().contains(messages::NEWEST_RENDER),
+        !ui.state.preview.history.is_viewing_older() && ui.screen_text().contains(messages::NEWEST_RENDER),
         "{}",
         ui.screen_text()
     );
 }
 
 #[test]
-fn cancelled_region_drag_has_no_effect() {
+fn canceled_region_drag_has_no_effect() {
     for key in [KeyCode::Esc, KeyCode::Char('v'), KeyCode::Char('z')] {
         let mut ui = ui();
         ui.press_character('z');
@@ -530,7 +530,7 @@ fn focusing_requires_an_aperture() {
 #[test]
 fn exposure_changes_add_no_history_entry() {
     let mut ui = ui();
-    ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
+    ui.handle_event(Event::FileChanged(ContentChangeTime { noticed: ui.now }));
     ui.finish_render(BLUE);
     for color in [[1, 2, 3], [4, 5, 6], [7, 8, 9]] {
         ui.press_character(']');
@@ -552,7 +552,7 @@ fn older_render_is_shown_with_its_changes() {
     use crate::pipeline::protocol;
     let mut ui = TestUi::from_state(state(120, 40));
     for (color, text) in [(RED, "r = 1\nfov = 40"), (BLUE, "r = 2\nfov = 40"), (RED, "r = 2\nfov = 30")] {
-        ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
+        ui.handle_event(Event::FileChanged(ContentChangeTime { noticed: ui.now }));
         let generation = ui.state.request.generation;
         ui.worker_event(protocol::Event::Text { generation, text: text.into() });
         ui.finish_render(color);

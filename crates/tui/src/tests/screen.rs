@@ -41,7 +41,7 @@ fn half_blocks_show_two_pixels() {
             *pixel = BLUE;
         }
     }
-    ui.handle_event(Event::Picture(PreviewUpdate {
+    ui.handle_event(Event::Preview(PreviewUpdate {
         generation,
         picture: picture.into(),
         range: None,
@@ -78,7 +78,7 @@ fn value_range_is_shown_after_the_view_name() {
         (None, "view depth  "),
     ] {
         let generation = ui.state.request.generation;
-        ui.handle_event(Event::Picture(PreviewUpdate {
+        ui.handle_event(Event::Preview(PreviewUpdate {
             generation,
             picture: uniform_picture(51, 40, RED),
             range,
@@ -95,7 +95,7 @@ fn wrongly_sized_image_is_not_shown() {
     let mut ui = TestUi::new();
     let mut picture = (*uniform_picture(4, 4, RED)).clone();
     picture.pixels.truncate(3);
-    ui.handle_event(Event::Picture(PreviewUpdate {
+    ui.handle_event(Event::Preview(PreviewUpdate {
         generation: 1,
         picture: picture.into(),
         range: None,
@@ -103,7 +103,7 @@ fn wrongly_sized_image_is_not_shown() {
         lacks_photons: false,
         source: None,
     }));
-    assert!(ui.state.picture.shown.is_none());
+    assert!(ui.state.preview.shown.is_none());
 }
 
 #[test]
@@ -293,7 +293,7 @@ fn only_renders_with_changes_are_counted() {
     ui.finish_render(RED);
     assert!(ui.screen_text().contains("· render 1"), "{}", ui.screen_text());
     ui.press_character('0');
-    ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
+    ui.handle_event(Event::FileChanged(ContentChangeTime { noticed: ui.now }));
     ui.worker_event(done_event(2, Vec::new(), true));
     assert!(ui.screen_text().contains("unchanged · render 1"), "{}", ui.screen_text());
     ui.press_character('r');
@@ -307,7 +307,7 @@ fn deleted_file_is_reported_as_missing() {
     ui.finish_render(RED);
     let absent =
         *crate::scene::read_current_text("no-such-folder/cornell.toml".as_ref()).expect_err("an error");
-    ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
+    ui.handle_event(Event::FileChanged(ContentChangeTime { noticed: ui.now }));
     ui.report_scene_errors(vec![absent]);
     ui.handle_event(Event::Settled);
     let text = ui.screen_text();
@@ -322,7 +322,7 @@ fn broken_file_keeps_the_image() {
     let mut ui = TestUi::new();
     ui.finish_render(RED);
     let before = cells_of(&mut ui, RED);
-    ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
+    ui.handle_event(Event::FileChanged(ContentChangeTime { noticed: ui.now }));
     ui.report_scene_errors(vec![diagnostic(Severity::Error, "unknown `heigth`")]);
     ui.handle_event(Event::Settled);
     let text = ui.screen_text();
@@ -340,7 +340,7 @@ fn broken_file_keeps_the_image() {
     let after = cells_of(&mut ui, RED);
     assert!(after >= before / 2, "{after} of {before} cells");
 
-    ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
+    ui.handle_event(Event::FileChanged(ContentChangeTime { noticed: ui.now }));
     assert!(ui.screen_text().contains("heigth"), "the pane should stay open until the file is read");
     ui.finish_render(BLUE);
     assert!(!ui.screen_text().contains("heigth"));
@@ -465,7 +465,7 @@ proptest! {
                 3 => { ui.worker_event(protocol::Event::Progress { generation, progress: render_progress(0.3, Some(9.0)) }); }
                 4 => {
                     let picture = uniform_picture(picture.0, picture.1, BLUE);
-                    ui.handle_event(Event::Picture(PreviewUpdate { generation, picture, range: None, section: None, lacks_photons: false, source: None }));
+                    ui.handle_event(Event::Preview(PreviewUpdate { generation, picture, range: None, section: None, lacks_photons: false, source: None }));
                 }
                 5 => { ui.handle_event(Event::Resize(window(rows, columns.min(80)))); }
                 6 => { ui.advance_clock(300); }
@@ -529,7 +529,7 @@ fn files_of_other_images_are_not_listed() {
         ui.finish_render(super::RED);
         assert!(text_below_header(&mut ui).contains("→ a.png"), "{}", ui.screen_text());
         // The next image could not be written, so the file still contains the previous one.
-        ui.handle_event(Event::Changed(crate::ContentChangeTime { noticed: ui.now }));
+        ui.handle_event(Event::FileChanged(crate::ContentChangeTime { noticed: ui.now }));
         ui.worker_event(protocol::Event::Started { generation: 2 });
         ui.worker_event(failed(2, "a.png: denied"));
         ui.worker_event(done_event(2, Vec::new(), false));
@@ -652,7 +652,7 @@ fn preview_without_photons_is_marked() {
     });
     assert!(!ui.screen_text().contains(messages::WITHOUT_PHOTONS), "no preview yet");
     let picture = |lacks_photons| {
-        Event::Picture(PreviewUpdate {
+        Event::Preview(PreviewUpdate {
             generation: 1,
             picture: uniform_picture(50, 38, RED),
             range: None,

@@ -28,7 +28,7 @@ fn rendered(ui: &mut TestUi, error: f32) {
         own: scene_settings(),
     });
     let picture = uniform_picture(90, 68, RED);
-    ui.handle_event(Event::Picture(PreviewUpdate {
+    ui.handle_event(Event::Preview(PreviewUpdate {
         generation,
         picture,
         range: None,
@@ -159,7 +159,7 @@ fn start_render(ui: &mut TestUi, text: &str, color: Option<[u8; 3]>) {
 fn show(ui: &mut TestUi, color: [u8; 3]) {
     ui.show_preview(color);
     // The preview's first bytes have been sent.
-    ui.handle_event(Event::Shown { generation: ui.state.request.generation });
+    ui.handle_event(Event::FirstPreviewSent { generation: ui.state.request.generation });
 }
 
 #[test]
@@ -167,19 +167,19 @@ fn preview_does_not_wait_for_the_history() {
     let mut ui = TestUi::from_state(state(120, 40));
     edited(&mut ui, &[("camera.fov = 40", RED)]);
     start_render(&mut ui, "camera.fov = 30", None);
-    let (generation, before) = (ui.state.request.generation, ui.state.picture.history.len());
+    let (generation, before) = (ui.state.request.generation, ui.state.preview.history.len());
     ui.show_preview(BLUE);
     assert!(ui.state.dirty && ui.state.urgent);
-    assert_eq!(ui.state.picture.history.len(), before);
+    assert_eq!(ui.state.preview.history.len(), before);
     ui.state.dirty = false;
-    ui.handle_event(Event::Shown { generation });
-    assert_eq!(ui.state.picture.history.len(), before + 1);
+    ui.handle_event(Event::FirstPreviewSent { generation });
+    assert_eq!(ui.state.preview.history.len(), before + 1);
     assert!(ui.state.dirty, "the history should have a new entry");
 }
 
 /// Color of the newest thumbnail.
 fn small_color(ui: &TestUi) -> [u8; 3] {
-    let history = &ui.state.picture.history;
+    let history = &ui.state.preview.history;
     history.thumbnail(history.len() - 1).expect("a thumbnail").pixels[0]
 }
 
@@ -196,9 +196,9 @@ fn entry_shows_preview_drawn_after_render_ends() {
     assert_eq!(small_color(&ui), BLUE);
     assert!(ui.state.dirty, "the history should be redrawn");
     assert!(panel(&mut ui).contains("▸2 camera.fov 40 → 30"), "{}", ui.screen_text());
-    assert_eq!(ui.state.picture.history.len(), 2);
+    assert_eq!(ui.state.preview.history.len(), 2);
     // A preview that is already shown is not redrawn.
-    ui.handle_event(Event::Shown { generation });
+    ui.handle_event(Event::FirstPreviewSent { generation });
     assert!(!ui.state.dirty);
 }
 
@@ -223,7 +223,7 @@ fn actual_pixels_are_not_used_as_a_thumbnail() {
     let (generation, picture) = (ui.state.request.generation, uniform_picture(50, 38, RED));
     let section = Some(protocol::NormalizedRect { left: 0.4, top: 0.4, width: 0.2, height: 0.2 });
     let (range, lacks_photons, source) = (None, false, None);
-    ui.handle_event(Event::Picture(PreviewUpdate {
+    ui.handle_event(Event::Preview(PreviewUpdate {
         generation,
         picture,
         range,
@@ -231,7 +231,7 @@ fn actual_pixels_are_not_used_as_a_thumbnail() {
         lacks_photons,
         source,
     }));
-    ui.handle_event(Event::Shown { generation });
+    ui.handle_event(Event::FirstPreviewSent { generation });
     assert_eq!(small_color(&ui), BLUE);
 }
 
@@ -268,12 +268,12 @@ fn running_render_is_the_newest_entry() {
     let generation = ui.state.request.generation;
     ui.worker_event(done_event(generation, Vec::new(), false));
     ui.press_character('n');
-    let before = ui.state.picture.history.len();
+    let before = ui.state.preview.history.len();
     start_render(&mut ui, "camera.fov = 10", None);
     ui.press_character('n');
     ui.press_character('n');
     show(&mut ui, [90, 90, 20]);
-    assert_eq!(ui.state.picture.history.len(), before + 1);
+    assert_eq!(ui.state.preview.history.len(), before + 1);
     assert!(panel(&mut ui).contains(" 3 camera.fov 20 → 10"), "{}", ui.screen_text());
 }
 
@@ -289,7 +289,7 @@ fn moving_the_camera_adds_a_single_entry() {
             text.contains("▸2 camera moved") && text.contains(&format!(" 1 {}", messages::OPENED)),
             "{text}"
         );
-        assert_eq!(ui.state.picture.history.len(), 2, "{text}");
+        assert_eq!(ui.state.preview.history.len(), 2, "{text}");
     }
 }
 
@@ -298,10 +298,10 @@ fn unchanged_image_keeps_its_curve() {
     let mut ui = TestUi::from_state(state(120, 40));
     rendered(&mut ui, 0.01);
     // Make and fix a typo, which leaves the image unchanged.
-    ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
+    ui.handle_event(Event::FileChanged(ContentChangeTime { noticed: ui.now }));
     ui.report_scene_errors(vec![diagnostic(crate::scene::diagnostic::Severity::Error, "wrong")]);
     ui.handle_event(Event::Settled);
-    ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
+    ui.handle_event(Event::FileChanged(ContentChangeTime { noticed: ui.now }));
     let generation = ui.state.request.generation;
     ui.worker_event(protocol::Event::Started { generation });
     let mut event = done_event(generation, Vec::new(), true);
@@ -339,7 +339,7 @@ fn history_heading_is_not_shown_without_entries() {
         ui.state.request.effective = Some(EffectiveSettingsSummary { width, height, ..effective_settings() });
         ui.handle_event(Event::Resize(window(200, 60)));
         for (number, color) in [RED, BLUE, [1, 2, 3]].into_iter().enumerate() {
-            ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
+            ui.handle_event(Event::FileChanged(ContentChangeTime { noticed: ui.now }));
             let generation = ui.state.request.generation;
             ui.worker_event(protocol::Event::Started { generation });
             ui.worker_event(protocol::Event::Text { generation, text: format!("seed = {number}").into() });
@@ -396,7 +396,7 @@ fn side_panel_fits_every_window_size() {
             (1_u8..).zip(edits).map(|(index, what)| (what, [40 * (index % 5), 10 * index, 7])).collect();
         ui.finish_render(RED);
         edited(&mut ui, &all);
-        ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
+        ui.handle_event(Event::FileChanged(ContentChangeTime { noticed: ui.now }));
         rendered(&mut ui, 0.01);
         for columns in [100, 119, 120, 140, 200] {
             for rows in [1, 5, 12, 24, 40, 60, 90] {

@@ -41,7 +41,7 @@ fn warnings_are_shown_during_the_render() {
     assert!(ui.screen_text().contains("1 warning"), "{}", ui.screen_text());
     ui.press_character('e');
     assert!(ui.screen_text().contains("warning: unused `b`"), "{}", ui.screen_text());
-    ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
+    ui.handle_event(Event::FileChanged(ContentChangeTime { noticed: ui.now }));
     ui.worker_event(protocol::Event::Warnings { generation: 2, warnings: Vec::new() });
     assert!(!ui.screen_text().contains("unused"), "expected no more warnings: {}", ui.screen_text());
     ui.press_character('e');

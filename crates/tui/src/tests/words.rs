@@ -23,7 +23,7 @@ fn click_result_is_shown_with_warnings_open() {
     ui.finish_render(RED);
     ui.worker_event(done_event(1, vec![diagnostic(Severity::Warning, "a warning")], false));
     ui.press_character('e');
-    let picked = PickedPixel { pixel: [3, 4], thing: None, color: None };
+    let picked = PickedPixel { pixel: [3, 4], object: None, color: None };
     ui.worker_event(protocol::Event::Picked { generation: 1, picked: Box::new(picked) });
     assert!(ui.screen_text().contains("pixel 3, 4"), "{}", ui.screen_text());
 }

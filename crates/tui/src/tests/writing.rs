@@ -11,7 +11,7 @@ use crate::pipeline::protocol::{self, Command, SampleCounts, SavedSceneImageStat
 use crate::scene::diagnostic::Severity;
 
 /// Creates a UI that has started to render the scene's own image.
-fn begun(columns: u16, rows: u16) -> TestUi {
+fn ui_with_begun_render(columns: u16, rows: u16) -> TestUi {
     let mut ui = TestUi::from_state(state(columns, rows));
     ui.report_scene_read();
     ui.worker_event(protocol::Event::Progress { generation: 1, progress: render_progress(0.1, None) });
@@ -57,7 +57,7 @@ fn assert_shows(ui: &mut TestUi, words: &str) {
 
 #[test]
 fn w_writes_the_newest_step() {
-    let mut ui = begun(80, 24);
+    let mut ui = ui_with_begun_render(80, 24);
     ui.press_character(']');
     assert!(ui.press_character(']').is_empty(), "the step should wait for the first step's preview");
     let effects = ui.press_character('w');
@@ -74,7 +74,7 @@ const PART: SampleCounts = SampleCounts { min: 16, mean: 20.0, max: 32 };
 fn image_written_on_request_is_named_until_replaced() {
     let with = "written with exposure +0.25";
     for (columns, rows) in [(80, 24), (120, 40), (100, 20)] {
-        let mut ui = begun(columns, rows);
+        let mut ui = ui_with_begun_render(columns, rows);
         ui.press_character(']');
         own_image(&mut ui, SavedSceneImageState::Begun { is_rendering: true });
         write(&mut ui, false, Some(PART));
@@ -112,7 +112,7 @@ fn image_written_on_request_is_named_until_replaced() {
 
 #[test]
 fn complete_image_written_early_is_described() {
-    let mut ui = begun(80, 24);
+    let mut ui = ui_with_begun_render(80, 24);
     ui.press_character('v');
     write(&mut ui, false, None);
     finish_unwritten(&mut ui, BLUE);
@@ -122,7 +122,7 @@ fn complete_image_written_early_is_described() {
 
 #[test]
 fn written_image_is_outdated_only_after_a_save() {
-    let mut ui = begun(80, 24);
+    let mut ui = ui_with_begun_render(80, 24);
     ui.press_character('s');
     own_image(&mut ui, SavedSceneImageState::NotBegun);
     finish_unwritten(&mut ui, BLUE);
@@ -132,7 +132,7 @@ fn written_image_is_outdated_only_after_a_save() {
     finish_unwritten(&mut ui, BLUE);
     assert_shows(&mut ui, &messages::image_written_with_changes("cornell.png", "shadows hard"));
     assert!(!ui.screen_words().contains("older than your last"), "{}", ui.screen_text());
-    ui.handle_event(Event::Changed(ContentChangeTime { noticed: ui.now }));
+    ui.handle_event(Event::FileChanged(ContentChangeTime { noticed: ui.now }));
     own_image(&mut ui, SavedSceneImageState::NotBegun);
     finish_unwritten(&mut ui, RED);
     assert_shows(&mut ui, &messages::scene_image_outdated("cornell.png"));
@@ -141,7 +141,7 @@ fn written_image_is_outdated_only_after_a_save() {
 }
 
 /// Reports a conflict with an existing file.
-fn refuse(ui: &mut TestUi) {
+fn report_conflict(ui: &mut TestUi) {
     let conflicts = vec![diagnostic(Severity::Error, "cannot write cornell.png: it is another image")];
     ui.worker_event(protocol::Event::Refused { generation: ui.state.request.generation, conflicts });
 }
@@ -157,7 +157,7 @@ fn w_is_offered_only_if_it_replaces_the_file() {
         let mut ui = TestUi::from_state(state(120, 40));
         ui.worker_event(written_event(1, "cornell.png", true));
         ui.finish_render(RED);
-        ui.handle_event(Event::Output(OutputChange { path: "cornell.png".into(), lost: Some(lost) }));
+        ui.handle_event(Event::OutputChanged(OutputChange { path: "cornell.png".into(), lost: Some(lost) }));
         let words =
             if is_kept { messages::output_not_overwritten } else { messages::output_modified_externally };
         assert_shows(&mut ui, &words("cornell.png", lost.describe()));
@@ -176,7 +176,7 @@ fn w_is_offered_only_if_it_replaces_the_file() {
 #[test]
 fn conflict_hides_hints_about_saving_with_w() {
     let mut ui = TestUi::from_state(state(120, 40));
-    refuse(&mut ui);
+    report_conflict(&mut ui);
     finish_unwritten(&mut ui, RED);
     for key in ['l', 'v'] {
         ui.press_character(key);
@@ -187,7 +187,7 @@ fn conflict_hides_hints_about_saving_with_w() {
         );
         own_image(&mut ui, SavedSceneImageState::Begun { is_rendering: false });
         ui.worker_event(protocol::Event::Started { generation: ui.state.request.generation });
-        refuse(&mut ui);
+        report_conflict(&mut ui);
         finish_unwritten(&mut ui, BLUE);
         assert_shows(&mut ui, messages::NOT_SAVED_WITH_CONFLICT);
         for words in [messages::NOT_SAVED, "continues it", "renders it"] {

@@ -17,22 +17,22 @@ use crate::scene::sanitize::escape_invisible_chars;
 use crate::state::{State, format_stops};
 
 /// Orbit step in degrees.
-const TURN: f64 = 3.0;
+const ORBIT_STEP: f64 = 3.0;
 /// Factor by which a dolly step changes the distance.
-const NEARER: f64 = 0.95;
+const DOLLY_FACTOR: f64 = 0.95;
 /// Factor by which a zoom step changes the field of view.
-const WIDER: f64 = 1.05;
+const ZOOM_FACTOR: f64 = 1.05;
 /// Maximum difference between two fields of view that are considered equal. Steps are rounded but always
 /// larger than this.
 const ROUNDING: f64 = 0.015;
 /// Exposure step in stops.
-const STOPS: f32 = 0.25;
+const EXPOSURE_STEP: f32 = 0.25;
 /// Maximum exposure change in either direction, in stops.
 const MAX_STOPS: f32 = 20.0;
 
 /// Orbits the camera by `right` steps to the right and `up` steps upward.
 pub(super) fn orbit(state: &mut State, right: f64, up: f64) -> Vec<Effect> {
-    orbit_by(state, right * TURN, up * TURN)
+    orbit_by(state, right * ORBIT_STEP, up * ORBIT_STEP)
 }
 
 /// Orbits the camera by `right` degrees to the right, as seen in the image, and `up` degrees upward.
@@ -41,13 +41,13 @@ pub(super) fn orbit_by(state: &mut State, right: f64, up: f64) -> Vec<Effect> {
     move_camera(state, |pose| orbited(pose, if is_mirrored { -right } else { right }, up))
 }
 
-/// Moves the camera closer by a number of steps. The height of an orthographic image, in which the distance has
-/// no effect, changes by the same factor.
+/// Moves the camera closer by a number of steps. Scales the height of an orthographic view by the same
+/// factor, because the distance has no effect there.
 pub(super) fn dolly(state: &mut State, steps: f64) -> Vec<Effect> {
     let Some((view, own)) = state.request.viewpoint().zip(state.request.camera()) else {
         return show_no_scene_notice(state);
     };
-    let pose = dollied(&view.pose, libm::pow(NEARER, steps), own.pose.distance());
+    let pose = dollied(&view.pose, libm::pow(DOLLY_FACTOR, steps), own.pose.distance());
     if pose == view.pose {
         return show_notice_without_effects(
             state,
@@ -61,12 +61,12 @@ pub(super) fn dolly(state: &mut State, steps: f64) -> Vec<Effect> {
     move_camera(state, |_| pose)
 }
 
-/// Widens the field of view, or the view of an orthographic camera, by a number of steps.
+/// Widens the field of view, or the height of an orthographic view, by a number of steps.
 pub(super) fn widen_field_of_view(state: &mut State, steps: f64) -> Vec<Effect> {
     let Some((view, own)) = state.request.viewpoint().zip(state.request.camera()) else {
         return show_no_scene_notice(state);
     };
-    let projection = zoomed(view.projection, own.projection, libm::pow(WIDER, steps));
+    let projection = zoomed(view.projection, own.projection, libm::pow(ZOOM_FACTOR, steps));
     if projection == view.projection {
         let limit = match projection {
             Projection::Perspective { fov } | Projection::Fisheye { fov } => messages::fov_limit(fov),
@@ -85,7 +85,7 @@ pub(super) fn change_exposure(state: &mut State, steps: f32) -> Vec<Effect> {
     let Some(scene) = state.request.own.map(|own| own.exposure) else { return show_no_scene_notice(state) };
     let own = state.request.command_line.exposure.unwrap_or(scene);
     let before = state.request.toggles.exposure.unwrap_or(own);
-    let stops = (before + steps * STOPS).clamp((-MAX_STOPS).min(before), MAX_STOPS.max(before));
+    let stops = (before + steps * EXPOSURE_STEP).clamp((-MAX_STOPS).min(before), MAX_STOPS.max(before));
     if stops == before {
         return show_notice_without_effects(state, &messages::exposure_limit(&format_stops(stops)));
     }
@@ -153,7 +153,7 @@ pub(super) fn save_camera(state: &mut State) -> Vec<Effect> {
             &format!("error: {saved} {}", messages::CAMERA_CONFLICT),
         );
     }
-    state.saving.is_camera_of_newest = state.picture.history.is_viewing_older();
+    state.saving.is_camera_of_newest = state.preview.history.is_viewing_older();
     vec![Effect::Send(Command::KeepCamera(Box::new(MovedCamera { camera, own })))]
 }
 
@@ -188,7 +188,7 @@ pub(super) fn handle_saved_camera(
     state.saving.camera_edits.extend(edit);
     let mut effects = Vec::new();
     if let Some(since) = state.request.moved_since.filter(|_| is_new) {
-        state.picture.history.record_camera_save_as_edit(since);
+        state.preview.history.record_camera_save_as_edit(since);
     }
     if is_own && state.request.toggles.camera.has_changes() {
         state.request.toggles.camera = CameraOverrides::default();
@@ -223,7 +223,7 @@ pub(super) fn handle_undone_camera(state: &mut State, outcome: Result<PathBuf, S
         }
     };
     state.saving.camera_edits.pop();
-    state.picture.history.record_scene_edit();
+    state.preview.history.record_scene_edit();
     let effects = request_render(state, false);
     state.saving.camera_kept = Some(state.now);
     let name = escape_invisible_chars(&path.to_string_lossy()).into_owned();

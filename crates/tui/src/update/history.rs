@@ -13,7 +13,7 @@ pub(super) fn record_current_image(state: &mut State) {
     if let Some(shown) = newest_image(state).filter(|shown| shown.generation == state.request.generation) {
         let is_finished = state.work.rendering == RenderState::Finished || shown.is_finished();
         let origin = state.request.image_provenance(!is_finished);
-        state.picture.history.record_shown_image(shown, state.now, origin);
+        state.preview.history.record_shown_image(shown, state.now, origin);
     }
 }
 
@@ -24,11 +24,11 @@ pub(super) fn record_newly_arrived_image(state: &mut State) {
     if is_over && newest_image(state).is_some_and(|shown| shown.section.is_some()) {
         return;
     }
-    let (count, last) = (state.picture.history.len(), state.picture.history.last_picture().cloned());
+    let (count, last) = (state.preview.history.len(), state.preview.history.last_image().cloned());
     record_current_image(state);
-    let history = &state.picture.history;
+    let history = &state.preview.history;
     let is_new = history.len() != count;
-    let is_other = history.last_picture().zip(last).is_some_and(|(now, before)| !Arc::ptr_eq(now, &before));
+    let is_other = history.last_image().zip(last).is_some_and(|(now, before)| !Arc::ptr_eq(now, &before));
     state.dirty |= is_new || is_over && is_other;
 }
 
@@ -36,10 +36,10 @@ pub(super) fn record_newly_arrived_image(state: &mut State) {
 pub(super) fn browse(state: &mut State, steps: isize) -> Vec<Effect> {
     record_current_image(state);
     let Some(newest) = newest_image(state) else { return report_no_image(state) };
-    if state.picture.history.returns_to_newest(steps) {
+    if state.preview.history.returns_to_newest(steps) {
         return return_to_newest(state, messages::NEWEST_RENDER);
     }
-    match state.picture.history.step_back_by(steps, newest) {
+    match state.preview.history.step_back_by(steps, newest) {
         Some(shown) => show_history_render(state, shown),
         None => show_notice_without_effects(
             state,
@@ -52,10 +52,10 @@ pub(super) fn browse(state: &mut State, steps: isize) -> Vec<Effect> {
 pub(super) fn open_entry_at_index(state: &mut State, at: usize) -> Vec<Effect> {
     record_current_image(state);
     let Some(newest) = newest_image(state) else { return Vec::new() };
-    if at + 1 >= state.picture.history.len() {
+    if at + 1 >= state.preview.history.len() {
         return return_to_newest(state, messages::NEWEST_RENDER);
     }
-    match state.picture.history.open_entry(at, newest) {
+    match state.preview.history.open_entry(at, newest) {
         Some(shown) => show_history_render(state, shown),
         None => Vec::new(),
     }
@@ -63,15 +63,15 @@ pub(super) fn open_entry_at_index(state: &mut State, at: usize) -> Vec<Effect> {
 
 /// Toggles between the render before the last edit and the newest one.
 pub(super) fn toggle_render_before_edit(state: &mut State) -> Vec<Effect> {
-    if state.picture.history.is_viewing_older() {
+    if state.preview.history.is_viewing_older() {
         return return_to_newest(state, messages::AFTER_EDIT);
     }
     record_current_image(state);
     let Some(newest) = newest_image(state) else { return report_no_image(state) };
-    match state.picture.history.open_before_edit(newest) {
+    match state.preview.history.open_before_edit(newest) {
         Some(shown) => {
             let effects = show_history_render(state, shown);
-            let edits = state.picture.history.describe_edits_since_viewed();
+            let edits = state.preview.history.describe_edits_since_viewed();
             let edits = if edits.is_empty() { edits } else { format!(", {edits}") };
             show_until_key(state, format!("{}{edits}", messages::BEFORE_EDIT));
             effects
@@ -82,8 +82,8 @@ pub(super) fn toggle_render_before_edit(state: &mut State) -> Vec<Effect> {
 
 /// Returns to the newest render.
 pub(super) fn return_to_newest(state: &mut State, words: &str) -> Vec<Effect> {
-    if let Some(newest) = state.picture.history.return_to_newest() {
-        state.picture.shown = Some(newest);
+    if let Some(newest) = state.preview.history.return_to_newest() {
+        state.preview.shown = Some(newest);
         show_notice(state, words);
     }
     Vec::new()
@@ -96,18 +96,18 @@ fn report_no_image(state: &mut State) -> Vec<Effect> {
 }
 
 fn newest_image(state: &State) -> Option<PreviewUpdate> {
-    if state.picture.history.is_viewing_older() {
-        state.picture.history.newest_while_viewing_older()
+    if state.preview.history.is_viewing_older() {
+        state.preview.history.newest_while_viewing_older()
     } else {
-        state.picture.shown.clone()
+        state.preview.shown.clone()
     }
 }
 
 fn show_history_render(state: &mut State, shown: PreviewUpdate) -> Vec<Effect> {
-    state.picture.shown = Some(shown);
+    state.preview.shown = Some(shown);
     // The header already shows the render's number and age.
-    let keys = &messages::HISTORY_KEYS[usize::from(state.picture.history.is_viewing_oldest())..];
-    let words = [&[&*state.picture.history.viewed_changes_text()], keys].concat().join(" · ");
+    let keys = &messages::HISTORY_KEYS[usize::from(state.preview.history.is_viewing_oldest())..];
+    let words = [&[&*state.preview.history.viewed_changes_text()], keys].concat().join(" · ");
     show_until_key(state, words);
     Vec::new()
 }

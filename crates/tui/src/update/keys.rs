@@ -172,7 +172,7 @@ fn toggle_image_only(state: &mut State) -> Vec<Effect> {
         | PreviewStyle::Ascii
         | PreviewStyle::Pixels(_) => {}
     }
-    state.picture.is_alone = !state.picture.is_alone;
+    state.preview.is_image_only = !state.preview.is_image_only;
     state.dirty = true;
     request_resized_preview(state)
 }
@@ -183,9 +183,9 @@ fn toggle_actual_pixels(state: &mut State) -> Vec<Effect> {
         return show_notice_without_effects(state, messages::NO_PREVIEW);
     }
     history::return_to_newest(state, "");
-    state.picture.close_up =
-        if state.picture.close_up.is_some() { None } else { Some(state.selection.crosshair) };
-    match state.picture.close_up {
+    state.preview.close_up =
+        if state.preview.close_up.is_some() { None } else { Some(state.selection.crosshair) };
+    match state.preview.close_up {
         Some(_) => show_notice(state, messages::ACTUAL_PIXELS),
         None => state.overlays.message = None,
     }
@@ -203,7 +203,7 @@ fn toggle_pause(state: &mut State) -> Vec<Effect> {
 }
 
 fn write_image_now(state: &mut State) -> Vec<Effect> {
-    let is_open = state.picture.history.is_viewing_older();
+    let is_open = state.preview.history.is_viewing_older();
     let mut effects = camera::render_waiting_step_now(state);
     show_notice(state, if is_open { messages::WRITING_NEWEST } else { messages::WRITING });
     (state.saving.is_write_requested, state.saving.write_shows) = (true, state.request.sent_toggles);

@@ -58,15 +58,15 @@ fn handle_event(state: &mut State, event: Event) -> Vec<Effect> {
         // Pasted text is ignored. The other events are handled by the event loop.
         Event::Paste | Event::Written { .. } | Event::Unwritable(_) => Vec::new(),
         Event::TerminalReply(answer) => replies::handle_reply(state, answer),
-        Event::Frame(report) => {
+        Event::PreviewSent(report) => {
             state.dirty |= state.display.frame != Some(report);
             state.display.frame = Some(report);
             Vec::new()
         }
         Event::Resize(window) => handle_resize(state, window),
         Event::Worker(event) => worker::handle_worker_event(state, event),
-        Event::Picture(shown) => show_image(state, shown),
-        Event::Changed(ContentChangeTime { noticed }) => {
+        Event::Preview(shown) => show_image(state, shown),
+        Event::FileChanged(ContentChangeTime { noticed }) => {
             // Keep the message if glimt made the change by writing the camera, or if glimt refused to write
             // the camera because of the change.
             const OWN: Duration = Duration::from_secs(1);
@@ -79,7 +79,7 @@ fn handle_event(state: &mut State, event: Event) -> Vec<Effect> {
                 (state.overlays.message, state.selection.facts) = (None, None);
             }
             if !is_own {
-                state.picture.history.record_scene_edit();
+                state.preview.history.record_scene_edit();
             }
             state.saving.edits += 1;
             let effects = request_render(state, false);
@@ -95,24 +95,24 @@ fn handle_event(state: &mut State, event: Event) -> Vec<Effect> {
             worker::show_withheld_errors(state);
             Vec::new()
         }
-        Event::Output(change) => worker::handle_external_output_change(state, &change),
+        Event::OutputChanged(change) => worker::handle_external_output_change(state, &change),
         Event::Signal(signal) => vec![signal_effect(signal)],
-        Event::Shown { generation } => {
+        Event::FirstPreviewSent { generation } => {
             // The preview has been sent, so the history can be updated now.
             history::record_newly_arrived_image(state);
             record_save_to_screen_time(state, generation)
         }
         Event::Tick => tick(state),
-        Event::Lost(source) => handle_lost_source(state, source),
-        Event::Back => {
+        Event::SourceEnded(source) => handle_lost_source(state, source),
+        Event::EditorExited => {
             state.saving.editor_closed = Some(state.now);
             Vec::new()
         }
-        Event::NoEditor(why) => {
+        Event::EditorFailed(why) => {
             show_until_key(state, why);
             Vec::new()
         }
-        Event::NoShell => {
+        Event::SuspendFailed => {
             show_notice(state, messages::NO_SHELL);
             Vec::new()
         }
@@ -124,15 +124,15 @@ fn show_image(state: &mut State, shown: PreviewUpdate) -> Vec<Effect> {
         && has_consistent_pixel_count(&shown.picture)
         && state.display.kind != PreviewStyle::None
     {
-        if state.picture.history.store_newest_if_viewing_older(&shown) {
+        if state.preview.history.store_newest_if_viewing_older(&shown) {
             history::record_newly_arrived_image(state);
             return Vec::new();
         }
-        state.urgent |= state.picture.shown.as_ref().is_none_or(|last| last.generation != shown.generation);
-        let is_its =
+        state.urgent |= state.preview.shown.as_ref().is_none_or(|last| last.generation != shown.generation);
+        let is_same_image =
             |last: &PreviewUpdate| last.generation == shown.generation || last.shows_same_image(&shown);
-        let last = state.picture.shown.take().filter(is_its);
-        state.picture.shown = Some(match last {
+        let last = state.preview.shown.take().filter(is_same_image);
+        state.preview.shown = Some(match last {
             Some(last) if state.display.dithers_colors() => keep_nearly_unchanged_pixels(shown, &last),
             Some(_) | None => shown,
         });
@@ -183,7 +183,7 @@ fn handle_resize(state: &mut State, window: WindowSize) -> Vec<Effect> {
 
 fn tick(state: &mut State) -> Vec<Effect> {
     state.dirty |=
-        state.work.is_request_running() && !state.work.paused || state.picture.history.is_viewing_older();
+        state.work.is_request_running() && !state.work.paused || state.preview.history.is_viewing_older();
     let (now, bars) = (state.now, state.work.assets.len());
     state.work.assets.retain(|asset| asset.disappears_at().is_none_or(|end| now < end));
     state.dirty |= state.work.assets.len() != bars;

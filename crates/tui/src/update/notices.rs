@@ -7,11 +7,11 @@ use crate::messages;
 use crate::state::{Message, State};
 
 /// How long a notice is shown.
-const NOTICE: Duration = Duration::from_secs(4);
+const NOTICE_DURATION: Duration = Duration::from_secs(4);
 
 /// Shows a notice for four seconds or until a key is pressed.
 pub(crate) fn show_notice(state: &mut State, words: impl Into<String>) {
-    let until = Some(state.now + NOTICE);
+    let until = Some(state.now + NOTICE_DURATION);
     set_message(state, Message { words: words.into(), until });
 }
 

@@ -68,7 +68,7 @@ fn close_or_cancel_topmost(state: &mut State) -> bool {
         true
     } else if state.selection.facts.take().is_some() {
         true
-    } else if state.picture.history.is_viewing_older() {
+    } else if state.preview.history.is_viewing_older() {
         history::return_to_newest(state, messages::NEWEST_RENDER);
         true
     } else {

@@ -24,14 +24,14 @@ const TURN_ACROSS: f64 = 180.0;
 pub(super) fn handle_mouse(state: &mut State, mouse: MouseEvent) -> Vec<Effect> {
     match mouse.kind {
         MouseEventKind::Press => {
-            let is_on_picture = Layout::for_state(state).preview.contains((mouse.column, mouse.row).into());
+            let is_on_preview = Layout::for_state(state).preview.contains((mouse.column, mouse.row).into());
             let MouseEvent { column, row, .. } = mouse;
             if let Some(at) = view::history_index_at(state, column, row) {
                 return history::open_entry_at_index(state, at);
             }
             let from = image_position_at(state, column, row);
             state.selection.press =
-                is_on_picture.then_some(MousePress { column, row, has_moved: false, from });
+                is_on_preview.then_some(MousePress { column, row, has_moved: false, from });
             Vec::new()
         }
         MouseEventKind::Drag => drag_region_or_orbit(state, mouse),
@@ -83,7 +83,7 @@ fn drag_region_or_orbit(state: &mut State, mouse: MouseEvent) -> Vec<Effect> {
 }
 
 fn pick_object_at_click(state: &mut State, mouse: MouseEvent) -> Vec<Effect> {
-    if state.picture.history.is_viewing_older() {
+    if state.preview.history.is_viewing_older() {
         return show_notice_without_effects(state, messages::OLDER_RENDER);
     }
     let Some(spot) = image_position_at(state, mouse.column, mouse.row) else { return Vec::new() };
@@ -103,7 +103,7 @@ pub(super) fn inspect_at_crosshair(state: &mut State) -> Vec<Effect> {
 
 /// Waits for a click that sets the focus. If already waiting, focuses on the object at the crosshair.
 pub(super) fn start_or_confirm_focus_pick(state: &mut State) -> Vec<Effect> {
-    if state.picture.history.is_viewing_older() {
+    if state.preview.history.is_viewing_older() {
         return show_notice_without_effects(state, messages::OLDER_RENDER);
     }
     if state.request.viewpoint().is_some_and(|view| view.aperture == 0.0) {
@@ -119,7 +119,7 @@ pub(super) fn start_or_confirm_focus_pick(state: &mut State) -> Vec<Effect> {
 }
 
 fn send_pick_query(state: &mut State, purpose: PickPurpose) -> Vec<Effect> {
-    if state.picture.history.is_viewing_older() {
+    if state.preview.history.is_viewing_older() {
         return show_notice_without_effects(state, messages::OLDER_RENDER);
     }
     if state.request.own.is_none() {
@@ -140,14 +140,14 @@ pub(super) fn toggle_mouse(state: &mut State) -> Vec<Effect> {
 /// Handles the reply to a pick query.
 pub(super) fn handle_pick(state: &mut State, picked: &PickedPixel) -> Vec<Effect> {
     // Ignore the reply if an older render was opened after the click.
-    if state.picture.history.is_viewing_older() {
+    if state.preview.history.is_viewing_older() {
         return Vec::new();
     }
     state.selection.picked = picked
-        .thing
+        .object
         .as_ref()
-        .and_then(|thing| Some(FilePosition { path: thing.path.clone(), line: thing.line?, column: 1 }));
-    match (state.selection.purpose, &picked.thing) {
+        .and_then(|object| Some(FilePosition { path: object.path.clone(), line: object.line?, column: 1 }));
+    match (state.selection.purpose, &picked.object) {
         (PickPurpose::Inspect, _) => {
             state.overlays.message = None;
             let facts = inspected_values(picked);
@@ -157,7 +157,7 @@ pub(super) fn handle_pick(state: &mut State, picked: &PickedPixel) -> Vec<Effect
             Vec::new()
         }
         (PickPurpose::Focus, None) => show_notice_without_effects(state, messages::NOTHING_TO_FOCUS),
-        (PickPurpose::Focus, Some(thing)) => focus_at_depth(state, thing.depth),
+        (PickPurpose::Focus, Some(object)) => focus_at_depth(state, object.depth),
     }
 }
 
@@ -180,16 +180,16 @@ fn focus_at_depth(state: &mut State, depth: f64) -> Vec<Effect> {
 
 /// Formats the inspected values and the pixel position on one line.
 fn join_values_with_pixel_position(
-    PickedPixel { thing, pixel: [x, y], .. }: &PickedPixel,
+    PickedPixel { object, pixel: [x, y], .. }: &PickedPixel,
     facts: &[String],
 ) -> String {
-    let pixel = thing.as_ref().map_or(String::new(), |_| format!(" · pixel {x}, {y}"));
+    let pixel = object.as_ref().map_or(String::new(), |_| format!(" · pixel {x}, {y}"));
     facts.join(" · ") + &pixel
 }
 
 /// Copies the inspected values if the terminal supports it.
 pub(super) fn copy_values(state: &mut State) -> Vec<Effect> {
-    if state.picture.history.is_viewing_older() {
+    if state.preview.history.is_viewing_older() {
         return show_notice_without_effects(state, messages::OLDER_RENDER);
     }
     let Some(clicked) = state.selection.clicked.clone() else {
@@ -204,12 +204,12 @@ pub(super) fn copy_values(state: &mut State) -> Vec<Effect> {
 }
 
 /// Formats the inspected values: shape and name, line, material, distance, position, radiance and normal.
-fn inspected_values(PickedPixel { thing, color, pixel: [x, y] }: &PickedPixel) -> Vec<String> {
+fn inspected_values(PickedPixel { object, color, pixel: [x, y] }: &PickedPixel) -> Vec<String> {
     let light = color.map(|color| format!("radiance {}", format_vector(color.map(f64::from))));
-    let Some(thing) = thing else {
+    let Some(object) = object else {
         return [format!("nothing at pixel {x}, {y}")].into_iter().chain(light).collect();
     };
-    let PickedObject { shape, name, path, line, instance, material, position, normal, is_front, .. } = thing;
+    let PickedObject { shape, name, path, line, instance, material, position, normal, is_front, .. } = object;
     let quoted = |name: &Option<String>| {
         name.as_ref().map_or(String::new(), |name| format!(" \"{}\"", escape_invisible_chars(name)))
     };
@@ -223,7 +223,7 @@ fn inspected_values(PickedPixel { thing, color, pixel: [x, y] }: &PickedPixel) -
     }));
     facts.extend([
         escape_invisible_chars(material).into_owned(),
-        format!("distance {}", format_three_significant_digits(thing.distance)),
+        format!("distance {}", format_three_significant_digits(object.distance)),
         format!("position {}", format_vector(*position)),
     ]);
     facts.extend(light);
@@ -247,7 +247,7 @@ mod tests {
 
     #[test]
     fn inspected_values_are_formatted_concisely() {
-        let thing = PickedObject {
+        let object = PickedObject {
             shape: "sphere",
             name: Some("ball".to_owned()),
             path: "scenes/still.toml".into(),
@@ -260,7 +260,7 @@ mod tests {
             distance: 3.8167,
             depth: 3.5,
         };
-        let picked = PickedPixel { pixel: [3, 4], thing: Some(thing), color: Some([0.61, 1234.56, 1e-6]) };
+        let picked = PickedPixel { pixel: [3, 4], object: Some(object), color: Some([0.61, 1234.56, 1e-6]) };
         assert_eq!(
             inspected_values(&picked),
             [
@@ -274,14 +274,14 @@ mod tests {
             ]
         );
         let instance = Some(PickedInstance { name: Some("left".to_owned()), line: Some(52) });
-        let in_group = picked.thing.clone().map(|thing| PickedObject { instance, ..thing });
-        let in_group = inspected_values(&PickedPixel { thing: in_group, ..picked });
+        let in_group = picked.object.clone().map(|object| PickedObject { instance, ..object });
+        let in_group = inspected_values(&PickedPixel { object: in_group, ..picked });
         assert_eq!(in_group[1..3], ["still.toml:47", "instance \"left\" on line 52"]);
-        let of_model = picked.thing.clone().map(|thing| PickedObject { line: None, ..thing });
-        let of_model = inspected_values(&PickedPixel { thing: of_model, ..picked });
+        let of_model = picked.object.clone().map(|object| PickedObject { line: None, ..object });
+        let of_model = inspected_values(&PickedPixel { object: of_model, ..picked });
         assert_eq!(of_model[..2], ["sphere \"ball\"", "glass crystal"], "models should have no line numbers");
         assert_eq!(
-            inspected_values(&PickedPixel { thing: None, color: None, ..picked }),
+            inspected_values(&PickedPixel { object: None, color: None, ..picked }),
             ["nothing at pixel 3, 4"]
         );
     }

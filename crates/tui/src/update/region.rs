@@ -8,7 +8,7 @@ use crate::pipeline::protocol::{ImagePosition, NormalizedRect};
 use crate::state::State;
 
 /// Width and height of a region around a position, as fractions of the image.
-const SIDE: f64 = 1.0 / 3.0;
+const REGION_FRACTION: f64 = 1.0 / 3.0;
 
 /// Handles the key that selects a region. The first press waits for a drag, the second selects the region
 /// around the crosshair, and the third clears the region.
@@ -49,8 +49,13 @@ pub(super) fn end_drag(state: &mut State, spot: Option<ImagePosition>) -> Vec<Ef
 }
 
 fn section_around_point(spot: ImagePosition) -> NormalizedRect {
-    let start = |middle: f64| (middle - SIDE / 2.0).clamp(0.0, 1.0 - SIDE);
-    NormalizedRect { left: start(spot.x), top: start(spot.y), width: SIDE, height: SIDE }
+    let start = |middle: f64| (middle - REGION_FRACTION / 2.0).clamp(0.0, 1.0 - REGION_FRACTION);
+    NormalizedRect {
+        left: start(spot.x),
+        top: start(spot.y),
+        width: REGION_FRACTION,
+        height: REGION_FRACTION,
+    }
 }
 
 fn render_section_first(state: &mut State, section: NormalizedRect) -> Vec<Effect> {

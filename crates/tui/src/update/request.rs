@@ -11,17 +11,17 @@ use crate::view::layout::Layout;
 pub(super) fn request_render(state: &mut State, force: bool) -> Vec<Effect> {
     // Do not fill up the history while the camera is moving.
     if state.request.camera_step.generation == Some(state.request.generation) {
-        state.picture.history.drop_unfinished_of_request(state.request.generation);
+        state.preview.history.drop_unfinished_of_request(state.request.generation);
     } else {
         history::record_current_image(state);
     }
-    state.picture.shown = state.picture.history.return_to_newest().or_else(|| state.picture.shown.take());
+    state.preview.shown = state.preview.history.return_to_newest().or_else(|| state.preview.shown.take());
     let before = std::mem::replace(&mut state.request.sent_toggles, state.request.toggles);
     let now = KeyOverrides { exposure: before.exposure, ..state.request.toggles };
     state.request.is_exposure_only = before == now && before != state.request.toggles;
     if state.request.is_exposure_only {
         // Exposure only affects how the image is displayed.
-        state.picture.history.reassign_entry_to_next_request(state.request.generation);
+        state.preview.history.reassign_entry_to_next_request(state.request.generation);
     }
     state.work.is_counted &= state.request.is_exposure_only;
     state.request.generation += 1;

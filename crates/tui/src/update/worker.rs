@@ -16,7 +16,7 @@ use crate::pipeline::protocol::{
     AssetProgress, CheckpointUpdate, Event, Failure, LastValidSceneRenderOutcome, Report, SampleCounts,
     SavedSceneImageState, Stage, StageReport, Status,
 };
-use crate::scene::MOST_COMPARED_BYTES;
+use crate::scene::MAX_COMPARED_BYTES;
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::sanitize::escape_invisible_chars;
 use crate::state::{
@@ -65,7 +65,7 @@ pub(super) fn handle_worker_event(state: &mut State, event: Event) -> Vec<Effect
             let pinhole = state.request.combined_overrides().dof == Some(true) && !settings.dof;
             state.request.effective = Some(*settings);
             clear_blocking_errors(state);
-            state.picture.history.record_scene_read();
+            state.preview.history.record_scene_read();
             if pinhole {
                 show_notice(state, messages::PINHOLE);
             }
@@ -97,13 +97,18 @@ pub(super) fn handle_worker_event(state: &mut State, event: Event) -> Vec<Effect
         }
         Event::OwnImage { state: own, .. } => state.saving.own.state = own,
         Event::WriteFailed { path, message, .. } => {
-            let is_by_hand = std::mem::take(&mut state.saving.is_write_requested);
+            let was_requested_by_user = std::mem::take(&mut state.saving.is_write_requested);
             // A failed write requested during the render does not affect the final image.
-            if !is_by_hand || state.work.activity == RequestStatus::Done {
+            if !was_requested_by_user || state.work.activity == RequestStatus::Done {
                 state.saving.unwritten = Some(messages::NOT_WRITTEN.to_owned());
             }
-            let is_it = |written: &&mut WrittenFile| Some(&written.path) == path.as_ref();
-            state.saving.written.iter_mut().filter(is_it).for_each(|written| written.is_stale = true);
+            let is_failed_file = |written: &&mut WrittenFile| Some(&written.path) == path.as_ref();
+            state
+                .saving
+                .written
+                .iter_mut()
+                .filter(is_failed_file)
+                .for_each(|written| written.is_stale = true);
             show_until_key(state, format!("error: {}", escape_invisible_chars(&message)));
             state.saving.write_failed =
                 Some(WriteFailure { why: message, generation: state.request.generation, is_refused: false });
@@ -145,7 +150,7 @@ pub(super) fn handle_worker_event(state: &mut State, event: Event) -> Vec<Effect
             | CheckpointUpdate::Ignored { .. } => {}
         },
         Event::Refused { conflicts, .. } => show_write_conflicts(state, conflicts),
-        Event::Text { text, .. } => state.request.text = (text.len() <= MOST_COMPARED_BYTES).then_some(text),
+        Event::Text { text, .. } => state.request.text = (text.len() <= MAX_COMPARED_BYTES).then_some(text),
         Event::WritePostponed { .. } => {
             show_notice(state, messages::WRITE_POSTPONED);
         }
@@ -160,8 +165,8 @@ pub(super) fn handle_worker_event(state: &mut State, event: Event) -> Vec<Effect
             return notify_long_render_ended(state, time);
         }
         Event::LastGoodEnded { end, .. } => handle_last_valid_render_end(state, end),
-        Event::Cancelled { .. } => {
-            (state.work.activity, state.work.rendering) = (RequestStatus::Cancelled, RenderState::Stopped);
+        Event::Canceled { .. } => {
+            (state.work.activity, state.work.rendering) = (RequestStatus::Canceled, RenderState::Stopped);
             state.set_clock_paused(false);
             state.work.assets.clear();
         }
@@ -207,7 +212,7 @@ fn event_generation(event: &Event) -> u64 {
         | Event::Picked { generation, .. }
         | Event::Done { generation, .. }
         | Event::Failed { generation, .. }
-        | Event::Cancelled { generation } => *generation,
+        | Event::Canceled { generation } => *generation,
     }
 }
 
@@ -254,7 +259,7 @@ fn update_asset_bar(state: &mut State, progress: AssetProgress) {
 /// Reports the files written at the user's request.
 fn report_written_files(state: &mut State, paths: &[PathBuf]) {
     state.saving.is_write_requested = false;
-    let is_open = state.picture.history.is_viewing_older();
+    let is_open = state.preview.history.is_viewing_older();
     let which = if is_open { messages::WROTE_NEWEST } else { "" };
     let names: Vec<String> =
         paths.iter().map(|path| escape_invisible_chars(&path.to_string_lossy()).into_owned()).collect();
@@ -410,11 +415,11 @@ fn add_seconds_of_earlier_requests(report: &mut Report) {
 fn count_finished_render(state: &mut State, unchanged: bool) {
     let is_counted = std::mem::replace(&mut state.work.is_counted, true);
     let is_new = !unchanged && !is_counted || state.work.renders == 0;
-    let is_shown = state.picture.history.is_newest_from_request(state.request.generation);
-    if is_new || is_shown && state.picture.history.is_newest_unfinished() {
+    let is_shown = state.preview.history.is_newest_from_request(state.request.generation);
+    if is_new || is_shown && state.preview.history.is_newest_unfinished() {
         state.work.renders += 1;
         if is_shown {
-            state.picture.history.finish_newest(state.work.renders);
+            state.preview.history.finish_newest(state.work.renders);
         }
     }
 }
@@ -460,7 +465,7 @@ fn handle_failure(state: &mut State, failure: Failure) {
     state.saving.change = None;
     match failure {
         // The last valid scene is being rendered.
-        Failure::Scene(_) => state.picture.history.discard_edits_of_invalid_scene(),
+        Failure::Scene(_) => state.preview.history.discard_edits_of_invalid_scene(),
         Failure::Work(_) => state.work.rendering = RenderState::Stopped,
     }
     match failure {

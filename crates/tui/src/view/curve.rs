@@ -60,12 +60,12 @@ fn requested_noise(state: &State) -> Option<f64> {
 }
 
 /// A no-break space, which keeps a number and its unit on one line.
-const UNBROKEN: &str = "\u{a0}";
+const NO_BREAK_SPACE: &str = "\u{a0}";
 
 /// Wraps the caption into lines without separating numbers from their units.
 fn caption(state: &State, points: &[(f64, f64)], width: u16) -> Vec<String> {
     let ([(first, from), ..], [.., (last, to)]) = (points, points) else { return Vec::new() };
-    let whole = |amount: String| amount.replace(' ', UNBROKEN);
+    let whole = |amount: String| amount.replace(' ', NO_BREAK_SPACE);
     let (from, first) = (whole(format_two_digit_percent(*from)), whole(format_seconds(*first)));
     let (to, last) = (whole(format_two_digit_percent(*to)), whole(format_seconds(*last)));
     let fell = format!("{from} after {first}, {to} after {last}");
@@ -76,7 +76,10 @@ fn caption(state: &State, points: &[(f64, f64)], width: u16) -> Vec<String> {
         }
         None => String::new(),
     };
-    wrap_text(&(fell + &line), usize::from(width)).iter().map(|line| line.replace(UNBROKEN, " ")).collect()
+    wrap_text(&(fell + &line), usize::from(width))
+        .iter()
+        .map(|line| line.replace(NO_BREAK_SPACE, " "))
+        .collect()
 }
 
 fn plot(state: &State, points: &[(f64, f64)], area: Rect, buffer: &mut Buffer) {

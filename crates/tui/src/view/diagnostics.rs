@@ -15,7 +15,7 @@ use crate::scene::sanitize::escape_invisible_chars;
 use crate::state::State;
 
 /// Maximum number of distinct diagnostics shown. The rest appear once the first ones are fixed.
-const MAX: usize = 100;
+const MAX_DIAGNOSTICS: usize = 100;
 
 /// Maximum number of positions shown per diagnostic.
 const MAX_PLACES: usize = 10;
@@ -125,10 +125,13 @@ fn format_diagnostics(diagnostics: &[Diagnostic], width: usize) -> Vec<StyledLin
         fault.sort_by_key(|one| start(one));
     }
     faults.sort_by_key(|fault| (fault[0].severity != Severity::Error, &fault[0].path, start(fault[0])));
-    let mut lines: Vec<StyledLine> =
-        faults.iter().take(MAX).flat_map(|fault| format_diagnostic_with_positions(fault, width)).collect();
+    let mut lines: Vec<StyledLine> = faults
+        .iter()
+        .take(MAX_DIAGNOSTICS)
+        .flat_map(|fault| format_diagnostic_with_positions(fault, width))
+        .collect();
     lines.pop();
-    if let Some(more @ 1..) = faults.len().checked_sub(MAX) {
+    if let Some(more @ 1..) = faults.len().checked_sub(MAX_DIAGNOSTICS) {
         lines.push(StyledLine::new());
         lines.push(vec![(
             format!("… {} not shown", format_count_with_noun(more, "more diagnostic")),

@@ -31,9 +31,9 @@ impl FileLinksAndDelayedText {
         for (text, tone) in line {
             let end = x.saturating_add(text_columns(text)).min(area.right());
             let cells = Rect { x, width: end.saturating_sub(x), ..area };
-            let is_its = |path: &&PathBuf| escape_invisible_chars(&path.to_string_lossy()) == *text;
+            let is_shown_path = |path: &&PathBuf| escape_invisible_chars(&path.to_string_lossy()) == *text;
             let written = state.saving.written.iter().map(|written| &written.path);
-            let path = (*tone == TextRole::File).then(|| written.clone().find(is_its)).flatten();
+            let path = (*tone == TextRole::File).then(|| written.clone().find(is_shown_path)).flatten();
             self.files.extend(path.map(|path| (Rect { height: 1, ..cells }, path.clone())));
             x = end;
         }

@@ -5,7 +5,7 @@ use std::time::Duration;
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
-use super::layout::{BLOCK, Layout};
+use super::layout::{Layout, STATE_BLOCK_WIDTH};
 use super::message;
 use super::stages::running_stage_name;
 use super::text::{
@@ -26,7 +26,7 @@ use crate::scene::sanitize::escape_invisible_chars;
 use crate::state::{RequestStatus, State};
 
 /// Minimum header width at which the state block has a fixed width.
-const WIDE: u16 = 60;
+const MIN_FIXED_BLOCK_WIDTH: u16 = 60;
 /// Minimum width of a shortened scene name.
 const MIN_NAME: u16 = 6;
 
@@ -38,7 +38,7 @@ pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
     if layout.keys.is_empty() && message::has_message_to_show(state, layout) {
         return;
     }
-    if state.picture.is_alone {
+    if state.preview.is_image_only {
         let back = keymap::binding_for_action(Action::ShowImageOnly)
             .map_or(String::new(), |it| format!("  {} back", it.label));
         room.width -= put_text_right(buffer, room, &back, TextRole::Faint, state.display.depth);
@@ -65,8 +65,8 @@ pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
 fn draw_activity_block(state: &State, area: Rect, buffer: &mut Buffer) -> u16 {
     let (sign, word, tone) = state_symbol_word_and_role(state);
     let mut text = format!(" {sign} {word} ");
-    if area.width >= WIDE {
-        text = format!("{text:<BLOCK$}");
+    if area.width >= MIN_FIXED_BLOCK_WIDTH {
+        text = format!("{text:<STATE_BLOCK_WIDTH$}");
     }
     let area = area.intersection(buffer.area);
     if area.is_empty() {
@@ -79,7 +79,7 @@ fn draw_activity_block(state: &State, area: Rect, buffer: &mut Buffer) -> u16 {
 
 /// Symbol, word and color for the state. Each identifies the state on its own.
 pub(super) fn state_symbol_word_and_role(state: &State) -> (&'static str, &'static str, TextRole) {
-    if state.picture.history.is_viewing_older() {
+    if state.preview.history.is_viewing_older() {
         ("◂", "older", TextRole::Warning)
     } else {
         worker_symbol_word_and_role(state)
@@ -95,7 +95,7 @@ fn worker_symbol_word_and_role(state: &State) -> (&'static str, &'static str, Te
         RequestStatus::Waiting => ("…", "waiting", TextRole::Warning),
         RequestStatus::Broken if state.overlays.is_scene_missing() => ("✗", "missing", TextRole::Error),
         RequestStatus::Broken => ("✗", "broken", TextRole::Error),
-        RequestStatus::Cancelled => ("■", "stopped", TextRole::Warning),
+        RequestStatus::Canceled => ("■", "stopped", TextRole::Warning),
     }
 }
 
@@ -110,7 +110,7 @@ fn draw_scene_info(state: &State, area: Rect, buffer: &mut Buffer) {
     let (folder, file) = path.rsplit_once('/').map_or(("", &*path), |(folder, file)| (folder, file));
     let (folder, file) = (escape_invisible_chars(folder), escape_invisible_chars(file));
     // The image size of older renders is unknown.
-    let effective = state.request.effective.as_ref().filter(|_| !state.picture.history.is_viewing_older());
+    let effective = state.request.effective.as_ref().filter(|_| !state.preview.history.is_viewing_older());
     let size = effective.map_or(String::new(), |it| format!("  {}×{}", it.width, it.height));
     let folder = if folder.is_empty() { String::new() } else { format!("{folder}/") };
     let view = actual_pixels_label(state) + &view_label(state);
@@ -130,14 +130,14 @@ fn draw_scene_info(state: &State, area: Rect, buffer: &mut Buffer) {
 
 /// The view and its range of values, or an empty string for the beauty view.
 fn view_label(state: &State) -> String {
-    let open = state.picture.history.viewed_older_scene_and_settings();
+    let open = state.preview.history.viewed_older_scene_and_settings();
     let of_open = open.map(|origin| origin.toggles.view.unwrap_or_else(|| state.request.base_view_mode()));
     let view = of_open.unwrap_or_else(|| state.request.view_mode());
     if view == ViewMode::Beauty {
         return String::new();
     }
     let is_at_hand = |generation: u64| open.is_some() || generation == state.request.generation;
-    let shown = state.picture.shown.as_ref().filter(|shown| is_at_hand(shown.generation));
+    let shown = state.preview.shown.as_ref().filter(|shown| is_at_hand(shown.generation));
     let range = shown.and_then(|shown| shown.range);
     let range = range.map_or(String::new(), |[least, most]| {
         format!(" {} to {}", format_number_to_three_digits(least), format_number_to_three_digits(most))
@@ -148,7 +148,7 @@ fn view_label(state: &State) -> String {
 /// Whether light from photons is missing from the current preview.
 fn lacks_photons(state: &State) -> bool {
     state
-        .picture
+        .preview
         .shown
         .as_ref()
         .is_some_and(|shown| shown.lacks_photons && shown.generation == state.request.generation)
@@ -156,15 +156,15 @@ fn lacks_photons(state: &State) -> bool {
 
 /// Label for a preview that shows actual pixels.
 fn actual_pixels_label(state: &State) -> String {
-    let is_close = state.picture.shown.as_ref().is_some_and(|shown| shown.section.is_some());
+    let is_close = state.preview.shown.as_ref().is_some_and(|shown| shown.section.is_some());
     if is_close { "  1:1".to_owned() } else { String::new() }
 }
 
 /// Progress or result in several variants, from longest to shortest.
 fn progress_or_result_variants(state: &State) -> Vec<String> {
-    if let Some((run, time)) = state.picture.history.viewed_render_number_and_time() {
+    if let Some((run, time)) = state.preview.history.viewed_render_number_and_time() {
         let is_unfinished = state
-            .picture
+            .preview
             .history
             .viewed_older_scene_and_settings()
             .is_some_and(|origin| origin.is_unfinished);
@@ -220,13 +220,13 @@ fn progress_or_result_variants(state: &State) -> Vec<String> {
             vec![messages::WAITING_FOR_FILE.to_owned()]
         }
         (RequestStatus::Broken, _, _) => vec![format_problem_count(state)],
-        (RequestStatus::Done | RequestStatus::Cancelled, _, _) => Vec::new(),
+        (RequestStatus::Done | RequestStatus::Canceled, _, _) => Vec::new(),
     }
 }
 
 /// Number of the newest render. A running render counts if it has an image.
 fn newest_render_number(state: &State) -> u64 {
-    let history = &state.picture.history;
+    let history = &state.preview.history;
     let is_under_way = state.work.is_rendering()
         && history.is_newest_from_request(state.request.generation)
         && history.is_newest_unfinished();
@@ -236,11 +236,11 @@ fn newest_render_number(state: &State) -> u64 {
 /// Formats the remaining time, or returns an empty string if the render is paused.
 fn format_eta(state: &State, progress: &RenderProgress) -> String {
     /// Minimum time shown, in seconds. Shorter times would round to zero.
-    const MIN: f64 = 0.05;
+    const MIN_SHOWN_SECONDS: f64 = 0.05;
     let eta = match Eta::from_progress(progress) {
         None => "…".to_owned(),
         Some(Eta::OverADay) => Eta::OverADay.format(),
-        Some(Eta::Seconds(eta)) if eta < MIN => "under 1 s".to_owned(),
+        Some(Eta::Seconds(eta)) if eta < MIN_SHOWN_SECONDS => "under 1 s".to_owned(),
         Some(Eta::Seconds(eta)) => {
             format_running_time_with_tenths(Duration::try_from_secs_f64(eta).unwrap_or_default())
         }

@@ -51,7 +51,7 @@ pub(super) fn draw(state: &State, buffer: &mut Buffer) {
         put_text(buffer, place, &[(label, TextRole::Strong)], state.display.depth);
         put_text(
             buffer,
-            super::text::remaining_row_area(line, labels + BESIDE),
+            super::text::remaining_row_area(line, labels + LABEL_GAP),
             &[(help, TextRole::Plain)],
             state.display.depth,
         );
@@ -59,7 +59,7 @@ pub(super) fn draw(state: &State, buffer: &mut Buffer) {
 }
 
 /// Number of columns between labels and descriptions.
-const BESIDE: u16 = 3;
+const LABEL_GAP: u16 = 3;
 
 /// Width of the label column if the help is `width` columns wide.
 fn label_column_width(width: u16) -> u16 {
@@ -72,7 +72,7 @@ fn help_lines(width: u16) -> Vec<(String, String)> {
     let labels = label_column_width(width);
     let both = |(label, help)| {
         let label = wrap_text(label, usize::from(labels));
-        let help = wrap_text(help, usize::from(width.saturating_sub(labels + BESIDE)));
+        let help = wrap_text(help, usize::from(width.saturating_sub(labels + LABEL_GAP)));
         let line = |of: &[String], index: usize| of.get(index).cloned().unwrap_or_default();
         let count = label.len().max(help.len());
         (0..count).map(|index| (line(&label, index), line(&help, index))).collect::<Vec<_>>()
@@ -102,7 +102,7 @@ fn help_area(state: &State) -> Rect {
     // Leave the key line visible, because it shows how to scroll and close the help.
     let above = Rect { height: window.height.saturating_sub(u16::from(window.height > 3)), ..window };
     let width =
-        max_entry_part_width(|(label, _)| label) + max_entry_part_width(|(_, help)| help) + BESIDE + 3;
+        max_entry_part_width(|(label, _)| label) + max_entry_part_width(|(_, help)| help) + LABEL_GAP + 3;
     let wide = centered_area(above, width, above.height);
     let height =
         u16::try_from(help_lines(inside_border(wide).width).len()).unwrap_or(u16::MAX).saturating_add(2);

@@ -33,7 +33,7 @@ impl KeyHint {
     }
 
     fn width(&self, is_long: bool) -> u16 {
-        text_columns(self.key) + 1 + text_columns(self.description(is_long)) + GAP
+        text_columns(self.key) + 1 + text_columns(self.description(is_long)) + HINT_GAP
     }
 
     fn description(&self, is_long: bool) -> &str {
@@ -42,7 +42,7 @@ impl KeyHint {
 }
 
 /// Number of columns between hints.
-const GAP: u16 = 2;
+const HINT_GAP: u16 = 2;
 /// Columns reserved for currently useful keys when deciding whether to show toggles in their long form.
 const OF_USE: u16 = 26;
 
@@ -58,7 +58,7 @@ pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
     let skipped = usize::from(area.width < 44 && ways.len() > 1);
     let ways = &ways[skipped..];
     let toggles = if state.overlays.help.open { Vec::new() } else { hints_for_toggles(state) };
-    let room = area.width.saturating_sub(width(ways, true).saturating_sub(GAP));
+    let room = area.width.saturating_sub(width(ways, true).saturating_sub(HINT_GAP));
     let is_long = width(&toggles, true) + OF_USE <= room;
     let mut left = Rect { width: room, ..area };
     let (urgent, useful) = urgent_and_other_hints(state);
@@ -104,7 +104,7 @@ fn draw_hint(hint: &KeyHint, area: Rect, is_long: bool, state: &State, buffer: &
 /// Hints for the toggles and their values. Toggles that were changed with keys are bold.
 fn hints_for_toggles(state: &State) -> Vec<KeyHint> {
     // The values belong to the newest render, not to the one being viewed.
-    if state.picture.history.is_viewing_older() {
+    if state.preview.history.is_viewing_older() {
         return Vec::new();
     }
     let honors_shadows = state.request.integrator().properties().honors_shadows;
@@ -169,9 +169,9 @@ fn urgent_and_other_hints(state: &State) -> (Vec<KeyHint>, Vec<KeyHint>) {
     if has_place && !state.request.is_model() {
         urgent.extend(named(Action::Edit, "edit"));
     }
-    if state.picture.history.is_viewing_older() {
+    if state.preview.history.is_viewing_older() {
         urgent.extend(named(Action::CompareLastEdit, "newest"));
-        let both = if state.picture.history.is_viewing_oldest() {
+        let both = if state.preview.history.is_viewing_oldest() {
             named(Action::NewerRender, "newer")
         } else {
             named(Action::OlderRender, "older, newer")
@@ -183,7 +183,7 @@ fn urgent_and_other_hints(state: &State) -> (Vec<KeyHint>, Vec<KeyHint>) {
     if state.request.toggles.camera.has_changes() && !state.saving.has_scene_of_model {
         urgent.extend(named(Action::KeepCamera, "keep"));
     }
-    if state.picture.close_up.is_some() {
+    if state.preview.close_up.is_some() {
         urgent.extend(named(Action::ActualPixels, "back"));
     }
     if state.request.first_section.is_some() {
@@ -197,9 +197,7 @@ fn urgent_and_other_hints(state: &State) -> (Vec<KeyHint>, Vec<KeyHint>) {
     let now: &[Action] = match state.work.activity {
         _ if state.work.paused => &[Action::TogglePause, Action::WriteImage],
         RequestStatus::Running { .. } => &[Action::TogglePause],
-        RequestStatus::Done | RequestStatus::Waiting | RequestStatus::Broken | RequestStatus::Cancelled => {
-            &[]
-        }
+        RequestStatus::Done | RequestStatus::Waiting | RequestStatus::Broken | RequestStatus::Canceled => &[],
     };
     let first = now
         .iter()
@@ -210,19 +208,19 @@ fn urgent_and_other_hints(state: &State) -> (Vec<KeyHint>, Vec<KeyHint>) {
     let is_other = |it: &&KeyBinding| {
         !it.hint.is_empty() && !now.contains(&it.action) && !ELSEWHERE.contains(&it.action)
     };
-    let has_picture = state.display.kind != PreviewStyle::None;
-    let is_shown = |it: &&KeyBinding| it.action != Action::ShowImageOnly || has_picture;
+    let has_preview = state.display.kind != PreviewStyle::None;
+    let is_shown = |it: &&KeyBinding| it.action != Action::ShowImageOnly || has_preview;
     let is_idle = |it: &&KeyBinding| it.action != Action::TogglePause || state.work.is_request_running();
     // If there are changes to list, a hint added above already shows them next to this key.
-    let is_of_use = state.request.toggles != KeyOverrides::default()
+    let has_unlisted_changes = state.request.toggles != KeyOverrides::default()
         && state.request.describe_camera_and_exposure_changes().is_empty();
-    let is_back = |it: &&KeyBinding| it.action != Action::ResetSettings || is_of_use;
+    let is_useful = |it: &&KeyBinding| it.action != Action::ResetSettings || has_unlisted_changes;
     let others = KEYMAP
         .iter()
         .filter(is_other)
         .filter(is_shown)
         .filter(is_idle)
-        .filter(is_back)
+        .filter(is_useful)
         .map(|it| KeyHint::new(it.label, it.hint));
     (urgent, first.into_iter().chain(others).collect())
 }

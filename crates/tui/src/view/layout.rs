@@ -27,7 +27,7 @@ pub(crate) struct Layout {
 }
 
 /// Width of the state block, which is fixed so that the name following it does not move.
-pub(super) const BLOCK: usize = 13;
+pub(super) const STATE_BLOCK_WIDTH: usize = 13;
 /// Windows with fewer rows than this have only one line of text.
 const TWO_LINES: u16 = 6;
 /// Windows with fewer rows than this have two lines of text.
@@ -51,7 +51,7 @@ impl Layout {
     pub(crate) fn for_state(state: &State) -> Self {
         let shape = state.request.aspect() * state.display.window.cell_aspect;
         let shape = (state.display.kind != PreviewStyle::None).then_some(shape);
-        Self::new(state.display.window.columns, state.display.window.rows, shape, state.picture.is_alone)
+        Self::new(state.display.window.columns, state.display.window.rows, shape, state.preview.is_image_only)
     }
 
     /// Size of the largest preview that fits into the window, assuming square pixels.
@@ -63,17 +63,17 @@ impl Layout {
         (area.width > 0 && height > 0).then_some(MaxPreviewSize {
             width: u32::from(area.width) * across,
             height,
-            around: state.picture.close_up,
+            around: state.preview.close_up,
         })
     }
 
     /// Computes the layout for a window. `shape` is the image's aspect ratio in cells, or `None` if no image
     /// is shown.
-    fn new(columns: u16, rows: u16, shape: Option<f32>, is_alone: bool) -> Self {
+    fn new(columns: u16, rows: u16, shape: Option<f32>, is_image_only: bool) -> Self {
         let mut layout = Self::default();
         let mut rest = Rect::new(0, 0, columns, rows);
-        let is_alone = is_alone && shape.is_some();
-        if is_alone || rows < TWO_LINES {
+        let is_image_only = is_image_only && shape.is_some();
+        if is_image_only || rows < TWO_LINES {
             layout.header = take_bottom(&mut rest, 1);
         } else {
             layout.header = take_top(&mut rest, 1);
@@ -82,7 +82,7 @@ impl Layout {
         }
         (layout.preview, layout.panel) = match shape {
             None => (Rect::ZERO, rest),
-            Some(_) if is_alone => (rest, Rect::ZERO),
+            Some(_) if is_image_only => (rest, Rect::ZERO),
             Some(shape) => divide_image_and_panel(rest, shape),
         };
         let holds = |(width, height)| layout.panel.width >= width && layout.panel.height >= height;
@@ -207,8 +207,9 @@ mod tests {
     fn areas_are_disjoint_and_inside_the_window() {
         let shapes = [None, Some(0.1), Some(1.0), Some(2.7), Some(3.6), Some(40.0)];
         for (columns, rows) in (0..130).flat_map(|columns| (0..60).map(move |rows| (columns, rows))) {
-            for (shape, is_alone) in shapes.into_iter().flat_map(|shape| [(shape, false), (shape, true)]) {
-                let layout = Layout::new(columns, rows, shape, is_alone);
+            for (shape, is_image_only) in shapes.into_iter().flat_map(|shape| [(shape, false), (shape, true)])
+            {
+                let layout = Layout::new(columns, rows, shape, is_image_only);
                 let window = Rect::new(0, 0, columns, rows);
                 let areas = [layout.header, layout.preview, layout.panel, layout.under, layout.keys];
                 for (i, area) in areas.iter().enumerate() {

@@ -43,7 +43,7 @@ fn are_region_marks_visible(state: &State) -> bool {
 
 /// The cell at a position in the image, if visible.
 fn cell_for_position(state: &State, spot: ImagePosition, cells: Rect) -> Option<(u16, u16)> {
-    let section = state.picture.shown.as_ref().and_then(|shown| shown.section);
+    let section = state.preview.shown.as_ref().and_then(|shown| shown.section);
     let NormalizedRect { left, top, width, height } =
         section.unwrap_or(NormalizedRect { left: 0.0, top: 0.0, width: 1.0, height: 1.0 });
     let along = |at: f64, start: f64, length: f64, cells: u16| {

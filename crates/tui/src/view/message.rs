@@ -13,9 +13,9 @@ use crate::scene::sanitize::escape_invisible_chars;
 use crate::state::State;
 
 /// Panel height needed for the inspected values.
-const FACTS: u16 = 10;
+const INSPECTOR_HEIGHT: u16 = 10;
 /// Number of columns between a message and the rest of the status line.
-const GAP: u16 = 2;
+const MESSAGE_GAP: u16 = 2;
 
 /// Where a message is shown.
 enum MessagePosition {
@@ -56,7 +56,7 @@ pub(super) fn has_message_to_show(state: &State, layout: &Layout) -> bool {
 pub(super) fn status_line_area_beside_message(state: &State, layout: &Layout) -> Rect {
     let spot = message_text(state, layout).map(|(words, _)| message_position(state, layout, &words));
     let used = match spot {
-        Some(MessagePosition::Line(line)) if line.y == layout.under.y => line.width + GAP,
+        Some(MessagePosition::Line(line)) if line.y == layout.under.y => line.width + MESSAGE_GAP,
         Some(MessagePosition::Over(room)) if room.bottom() > layout.under.y => layout.under.width,
         Some(MessagePosition::Line(_) | MessagePosition::Over(_)) | None => 0,
     };
@@ -74,7 +74,7 @@ pub(super) fn covers_preview(state: &State) -> bool {
 /// Whether the panel has space for the inspected values.
 pub(super) fn inspected_values_fit_panel(state: &State, layout: &Layout) -> bool {
     let is_covered = state.overlays.diagnostics.open && layout.pane == layout.panel;
-    layout.panel.height >= FACTS && !is_covered
+    layout.panel.height >= INSPECTOR_HEIGHT && !is_covered
 }
 
 fn message_text(state: &State, layout: &Layout) -> Option<(String, TextRole)> {
@@ -99,7 +99,7 @@ fn message_position(state: &State, layout: &Layout, words: &str) -> MessagePosit
     let under = layout.under;
     if under.is_empty() {
         // Do not cover the state block.
-        let beside = remaining_row_area(layout.header, super::layout::BLOCK as u16 + 1);
+        let beside = remaining_row_area(layout.header, super::layout::STATE_BLOCK_WIDTH as u16 + 1);
         let line = if layout.keys.is_empty() { beside } else { layout.keys };
         let fits = width <= line.width && !line.is_empty();
         return if fits {
@@ -110,7 +110,7 @@ fn message_position(state: &State, layout: &Layout, words: &str) -> MessagePosit
     }
     let needed = match status_line::reserved_columns(state, layout) {
         0 => 0,
-        needed => needed + GAP,
+        needed => needed + MESSAGE_GAP,
     };
     if width.saturating_add(needed) <= under.width {
         return MessagePosition::Line(Rect { width, ..under });

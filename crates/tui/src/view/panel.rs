@@ -20,9 +20,9 @@ use crate::scene::sanitize::escape_invisible_chars;
 use crate::state::{AssetProgressBar, RequestStatus, State};
 
 /// Width of an asset's progress bar.
-const BAR: u16 = 8;
+const BAR_WIDTH: u16 = 8;
 /// Width of a result's label.
-const LABEL: usize = 8;
+const LABEL_WIDTH: usize = 8;
 
 /// Draws the panel, using several columns if necessary and possible. Lines that do not fit are omitted.
 pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) -> FileLinksAndDelayedText {
@@ -87,7 +87,7 @@ fn panel_lines(state: &State, width: u16, column: u16, is_in_full: bool) -> Vec<
     let is_done = matches!(state.work.activity, RequestStatus::Done);
     let mut lines = inspected_lines(state, width);
     // Stages and results describe the newest render.
-    if state.picture.history.is_viewing_older() {
+    if state.preview.history.is_viewing_older() {
         return lines;
     }
     // If the scene is broken, its stages have no visible result.
@@ -124,7 +124,7 @@ fn inspected_lines(state: &State, width: u16) -> Vec<StyledLine> {
 fn is_scene_broken(state: &State) -> bool {
     let is_at_rest = match state.work.activity {
         RequestStatus::Waiting | RequestStatus::Broken => true,
-        RequestStatus::Running { .. } | RequestStatus::Done | RequestStatus::Cancelled => false,
+        RequestStatus::Running { .. } | RequestStatus::Done | RequestStatus::Canceled => false,
     };
     is_at_rest && state.overlays.problems.as_ref().is_none_or(|problems| problems.work.is_none())
 }
@@ -132,9 +132,9 @@ fn is_scene_broken(state: &State) -> bool {
 fn asset_progress_line(state: &State, asset: &AssetProgressBar, width: u16) -> StyledLine {
     let fraction = stages::asset_loaded_fraction(asset);
     let (filled_squares, empty) =
-        progress_bar_parts(fraction, BAR, state.display.kind == PreviewStyle::Ascii);
+        progress_bar_parts(fraction, BAR_WIDTH, state.display.kind == PreviewStyle::Ascii);
     let percent = format!(" {:3} %", floor_percent(fraction));
-    let room = width.min(2 * ENTRY_WIDTH).saturating_sub(BAR + text_columns(&percent) + 1);
+    let room = width.min(2 * ENTRY_WIDTH).saturating_sub(BAR_WIDTH + text_columns(&percent) + 1);
     let name = truncated_text(&escape_invisible_chars(&asset.progress.name), room);
     let pad = usize::from(room - text_columns(&name).min(room)) + 1;
     let name = name + &" ".repeat(pad);
@@ -149,7 +149,7 @@ fn asset_progress_line(state: &State, asset: &AssetProgressBar, width: u16) -> S
 /// The results as lines, each with a label and a value.
 fn result_lines(state: &State, width: u16) -> Vec<StyledLine> {
     let fact = |label: &str, value: String| {
-        vec![(format!("{label:<LABEL$} "), TextRole::Faint), (value, TextRole::Plain)]
+        vec![(format!("{label:<LABEL_WIDTH$} "), TextRole::Faint), (value, TextRole::Plain)]
     };
     let mut lines = Vec::new();
     lines.extend(state.saving.unwritten.iter().map(|why| vec![(why.clone(), TextRole::Error)]));
@@ -217,7 +217,7 @@ fn reached_limit(state: &State) -> Option<RenderLimit> {
 /// A wrapped hint for users who have not saved yet. If the scene is broken and there is no image, the status
 /// line shows the hint instead.
 fn wrapped_save_scene_hint(state: &State, width: u16) -> Vec<StyledLine> {
-    if is_scene_broken(state) && state.picture.shown.is_none() {
+    if is_scene_broken(state) && state.preview.shown.is_none() {
         return Vec::new();
     }
     let mut lines: Vec<String> = Vec::new();

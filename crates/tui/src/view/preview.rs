@@ -24,7 +24,7 @@ use crate::state::State;
 /// Draws the preview, or a message if there is none.
 pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) {
     let area = area.intersection(buffer.area);
-    match &state.picture.shown {
+    match &state.preview.shown {
         Some(_) if is_drawn_as_pixels(state) => {}
         Some(shown) => {
             let kind = cell_based_kind(state.display.kind, state.display.depth);
@@ -56,7 +56,7 @@ pub(super) fn draw_history_thumbnail(state: &State, picture: &Srgb8Image, area: 
 
 /// The image position shown by a cell of the preview.
 pub(crate) fn image_position_at(state: &State, column: u16, row: u16) -> Option<ImagePosition> {
-    let shown = state.picture.shown.as_ref()?;
+    let shown = state.preview.shown.as_ref()?;
     let area = Layout::for_state(state).preview;
     let cells = PreviewPlacement::for_preview(
         state,
@@ -93,7 +93,7 @@ fn is_drawn_as_pixels(state: &State) -> bool {
 
 /// Placement of a preview drawn as pixels, or `None` if the preview is drawn as cells.
 pub(crate) fn terminal_image(state: &State, area: Rect) -> Option<PlacedImage> {
-    let shown = state.picture.shown.as_ref().filter(|_| is_drawn_as_pixels(state))?;
+    let shown = state.preview.shown.as_ref().filter(|_| is_drawn_as_pixels(state))?;
     let placed = PreviewPlacement::for_preview(state, shown, area, state.display.kind);
     let (picture, cells) = (shown.picture.clone(), placed.cells);
     (!cells.is_empty()).then_some(PlacedImage { picture, cells, cell: state.display.window.cell_pixels })
@@ -217,7 +217,7 @@ impl PreviewPlacement {
             Some(grid) => each(&|x, y, cell| draw_two_color_cell(&scaled, grid, inks.shades, x, y, cell)),
             None if kind == PreviewStyle::None => {}
             None => {
-                let ramp = AsciiRamp::for_picture(picture, inks.is_light);
+                let ramp = AsciiRamp::for_image(picture, inks.is_light);
                 each(&|x, y, cell| draw_ascii_cell(&scaled, ramp, inks, x, y, cell));
             }
         }

@@ -39,7 +39,7 @@ impl AsciiRamp {
     /// Creates a ramp from an image's darkest to its brightest values, ignoring a thirtieth of the pixels at
     /// each end. The limits are quantized to keep most characters stable under noise. Contrast is increased
     /// by no more than a factor of four.
-    pub(super) fn for_picture(picture: &Srgb8Image, is_light: bool) -> Self {
+    pub(super) fn for_image(picture: &Srgb8Image, is_light: bool) -> Self {
         const STEPS: f32 = 16.0;
         const MIN: f32 = 0.25;
         let mut counts = [0_usize; 256];
@@ -151,11 +151,11 @@ mod tests {
             let pixels = (0..1000).map(|i| [80 + (i % 60) as u8 + noise * (i % 2) as u8; 3]).collect();
             Srgb8Image { width: 100, height: 10, pixels }
         };
-        let ramp = AsciiRamp::for_picture(&dull(0), false);
+        let ramp = AsciiRamp::for_image(&dull(0), false);
         assert!(rank(ramp.glyph([80; 3])) < 3 && rank(ramp.glyph([139; 3])) > 11, "{ramp:?}");
-        assert_eq!(ramp, AsciiRamp::for_picture(&dull(2), false));
+        assert_eq!(ramp, AsciiRamp::for_image(&dull(2), false));
         let flat =
-            AsciiRamp::for_picture(&Srgb8Image { width: 10, height: 1, pixels: vec![[128; 3]; 10] }, false);
+            AsciiRamp::for_image(&Srgb8Image { width: 10, height: 1, pixels: vec![[128; 3]; 10] }, false);
         assert!((flat.high - flat.low - 0.25).abs() < 1e-6);
     }
 

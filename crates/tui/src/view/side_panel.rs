@@ -8,21 +8,21 @@ use super::{curve, diagnostics, strip};
 use crate::state::{RequestStatus, State};
 
 /// Minimum window width for the curve and the history.
-const WIDE: u16 = 120;
+const MIN_CURVE_WINDOW_WIDTH: u16 = 120;
 /// Width of the lines in a divided panel, enough for a stage and its reason.
-const COLUMN: u16 = 44;
+const COLUMN_WIDTH: u16 = 44;
 /// Minimum panel width at which the lines are next to the curve and the history.
-const DIVIDED: u16 = 3 * ENTRY_WIDTH;
+const MIN_DIVIDED_WIDTH: u16 = 3 * ENTRY_WIDTH;
 
 /// Number of columns available for the panel's lines. The remaining columns are used for the curve and the
 /// history.
 pub(super) fn available_line_width(state: &State, panel: Rect) -> u16 {
-    let is_divided = is_window_wide(state) && panel.width >= DIVIDED;
-    if is_divided { COLUMN } else { panel.width }
+    let is_divided = is_window_wide(state) && panel.width >= MIN_DIVIDED_WIDTH;
+    if is_divided { COLUMN_WIDTH } else { panel.width }
 }
 
 fn is_window_wide(state: &State) -> bool {
-    state.display.window.columns >= WIDE
+    state.display.window.columns >= MIN_CURVE_WINDOW_WIDTH
 }
 
 /// Returns the area left for the curve and the history, next to or below the lines.
@@ -76,9 +76,9 @@ pub(super) fn history_index_at(
 /// move when the results change.
 fn divide_chart_and_history_strip(state: &State, panel: Rect, lines: u16) -> (Rect, Rect) {
     let area = curve_and_history_area(state, panel, lines);
-    let is_over = state.work.activity == RequestStatus::Done && !state.picture.history.is_viewing_older();
+    let is_over = state.work.activity == RequestStatus::Done && !state.preview.history.is_viewing_older();
     let wants_curve = |area| is_over && curve::chart_height(state, area).is_some();
-    if area.width >= DIVIDED {
+    if area.width >= MIN_DIVIDED_WIDTH {
         // Place them side by side.
         let half = if wants_curve(area) { area.width / 3 } else { 0 };
         let gap = if half > 0 { 2 } else { 0 };

@@ -94,8 +94,8 @@ fn stage_line(state: &State, stage: Stage, room: u16) -> StyledLine {
 
 /// Role of a stage's text: strong if an edit caused the stage to run again, otherwise plain.
 fn stage_role_marking_reruns(state: &State, report: Option<&StageReport>) -> TextRole {
-    let is_again = report.is_some_and(|it| it.status == Status::Done && state.work.renders > 0);
-    if is_again && state.saving.edits > 0 { TextRole::Strong } else { TextRole::Plain }
+    let has_run_again = report.is_some_and(|it| it.status == Status::Done && state.work.renders > 0);
+    if has_run_again && state.saving.edits > 0 { TextRole::Strong } else { TextRole::Plain }
 }
 
 /// Difference between the stage's time and its previous time.

@@ -54,13 +54,13 @@ enum StatusContent {
 
 fn status_content(state: &State) -> StatusContent {
     // The results belong to the newest render.
-    if state.picture.history.is_viewing_older() && !state.work.is_request_running() {
+    if state.preview.history.is_viewing_older() && !state.work.is_request_running() {
         return StatusContent::Nothing;
     }
     match state.work.activity {
         RequestStatus::Running { .. } => StatusContent::ProgressBar,
         RequestStatus::Done => StatusContent::Summary,
-        RequestStatus::Waiting | RequestStatus::Cancelled => StatusContent::Nothing,
+        RequestStatus::Waiting | RequestStatus::Canceled => StatusContent::Nothing,
         RequestStatus::Broken if let Some(progress) = last_valid_scene_progress(state) => {
             StatusContent::Words(format!(
                 "{}: {} %",
@@ -68,7 +68,7 @@ fn status_content(state: &State) -> StatusContent {
                 floor_percent(progress.fraction)
             ))
         }
-        RequestStatus::Broken if state.picture.shown.is_some() => {
+        RequestStatus::Broken if state.preview.shown.is_some() => {
             StatusContent::Words(messages::LAST_GOOD_RENDER.to_owned())
         }
         RequestStatus::Broken => StatusContent::Words(save_scene_hint(state)),
@@ -294,7 +294,7 @@ pub(super) fn save_scene_hint(state: &State) -> String {
     if state.request.is_model() {
         return messages::renders_on_changes(&name);
     }
-    messages::save_to_render_hint(&name, state.picture.shown.is_some() || state.work.renders > 0)
+    messages::save_to_render_hint(&name, state.preview.shown.is_some() || state.work.renders > 0)
 }
 
 /// Whether the scene cannot be read at all, for example because the file does not exist.

@@ -25,11 +25,11 @@ struct EntryRowCounts {
 const NARROW_ROWS: EntryRowCounts = EntryRowCounts { picture: 3, entry: 4, pitch: 4 };
 const WIDE_ROWS: EntryRowCounts = EntryRowCounts { picture: 5, entry: 5, pitch: 6 };
 /// Minimum width of a wide strip.
-const WIDE: u16 = 40;
+const MIN_WIDE_STRIP: u16 = 40;
 /// Minimum width of the text next to a thumbnail.
 const MIN_WORDS: u16 = 10;
 /// Column width in a strip with several columns.
-const COLUMN: u16 = 44;
+const COLUMN_WIDTH: u16 = 44;
 
 /// A history entry and its position in the strip.
 struct StripEntryLayout {
@@ -69,7 +69,7 @@ fn draw_entry(
     StripEntryLayout { index, cells, rows }: &StripEntryLayout,
     buffer: &mut Buffer,
 ) {
-    let history = &state.picture.history;
+    let history = &state.preview.history;
     let Some(picture) = history.thumbnail(*index) else { return };
     let place = Rect { height: rows.picture, ..*cells };
     let place = Rect { width: thumbnail_width(state, picture, place), ..place };
@@ -93,7 +93,7 @@ fn draw_entry(
 fn render_number_label(state: &State, index: usize) -> String {
     let under_way = is_entry_rendering(state, index).then_some(state.work.renders + 1);
     state
-        .picture
+        .preview
         .history
         .render_number_at(index)
         .or(under_way)
@@ -103,7 +103,7 @@ fn render_number_label(state: &State, index: usize) -> String {
 /// Whether an entry's render is still running.
 fn is_entry_rendering(state: &State, index: usize) -> bool {
     state.work.is_rendering()
-        && state.picture.history.entry_belongs_to_request(index, state.request.generation)
+        && state.preview.history.entry_belongs_to_request(index, state.request.generation)
 }
 
 /// Computes a thumbnail's width from its height, leaving space for text.
@@ -123,9 +123,9 @@ pub(super) fn rows_used_by_strip(state: &State, area: Rect) -> u16 {
 
 /// The entries that fit at the bottom of an area, newest first. The entry being viewed is always included.
 fn visible_entries(state: &State, area: Rect) -> Vec<StripEntryLayout> {
-    let count = state.picture.history.len();
-    let rows = if area.width >= WIDE { WIDE_ROWS } else { NARROW_ROWS };
-    let columns = (area.width / COLUMN).max(1);
+    let count = state.preview.history.len();
+    let rows = if area.width >= MIN_WIDE_STRIP { WIDE_ROWS } else { NARROW_ROWS };
+    let columns = (area.width / COLUMN_WIDTH).max(1);
     let gap = rows.pitch - rows.entry;
     // The title uses one row.
     let most = (area.height + gap).saturating_sub(1) / rows.pitch;
@@ -134,7 +134,7 @@ fn visible_entries(state: &State, area: Rect) -> Vec<StripEntryLayout> {
         return Vec::new();
     }
     let shown = count.min(room);
-    let looked_at = state.picture.history.shown_index().unwrap_or(count - 1);
+    let looked_at = state.preview.history.shown_index().unwrap_or(count - 1);
     let first = (count - shown).min(looked_at);
     // Use as few rows as possible.
     let high = shown.div_ceil(usize::from(columns)) as u16;

@@ -61,16 +61,16 @@ fn split_changes_into_pieces(
     width: usize,
 ) -> Vec<UnbreakablePiece> {
     let changes = &words.changes;
-    let told = match form {
+    let listed = match form {
         ChangeDetail::Full | ChangeDetail::New | ChangeDetail::Short => changes.len(),
-        ChangeDetail::First(told) => told,
+        ChangeDetail::First(listed) => listed,
         ChangeDetail::Cut => 1,
     };
     let mut pieces = Vec::new();
-    for (number, change) in (1..).zip(changes.iter().take(told)) {
+    for (number, change) in (1..).zip(changes.iter().take(listed)) {
         pieces.extend(change_pieces(change, form, width.saturating_sub(words.head.width())));
         let end = match () {
-            () if number == told => "",
+            () if number == listed => "",
             () if change == messages::STOPPED => ":",
             () => ";",
         };
@@ -78,7 +78,7 @@ fn split_changes_into_pieces(
             *text += end;
         }
     }
-    if told < changes.len() {
+    if listed < changes.len() {
         pieces.push(UnbreakablePiece::from_text("…"));
     }
     pieces

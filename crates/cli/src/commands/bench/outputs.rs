@@ -87,7 +87,7 @@ impl BenchOutputs {
         if FileIdentity::from_existing_or_new_path(real).is_none() {
             return Ok(());
         }
-        let is_it = |path: &Path| is_same_file(real, path);
+        let is_target = |path: &Path| is_same_file(real, path);
         let (option, path, _) = &self.files[index];
         let refused = |what: &str| {
             let reason = format!(
@@ -96,10 +96,10 @@ impl BenchOutputs {
             );
             Err(OutputError::Refused { reason })
         };
-        if let Some((what, _)) = self.inputs.iter().find(|(_, input)| is_it(input)) {
+        if let Some((what, _)) = self.inputs.iter().find(|(_, input)| is_target(input)) {
             return refused(what);
         }
-        if let Some((other, ..)) = self.files[..index].iter().find(|(_, other, _)| is_it(other)) {
+        if let Some((other, ..)) = self.files[..index].iter().find(|(_, other, _)| is_target(other)) {
             return refused(&format!("the output of {other}"));
         }
         if self.replaces_foreign { Ok(()) } else { self.check_written_by_glimt(index, real) }
@@ -110,7 +110,7 @@ impl BenchOutputs {
     fn check_written_by_glimt(&self, index: usize, real: &Path) -> Result<(), OutputError> {
         let (option, path, kind) = &self.files[index];
         let replaced = match kind {
-            OutputKind::Csv => table_replace_check(real, csv::HEAD),
+            OutputKind::Csv => table_replace_check(real, csv::HEADER_LINE),
             // Replace only valid baselines, which contain at least one scene.
             OutputKind::Json => {
                 json_replace_check(real, "a results file", |found: &Results| !found.scenes.is_empty())
@@ -118,8 +118,8 @@ impl BenchOutputs {
             OutputKind::Plot => plot_replace_check(real, &plot::AXES),
         };
         let Some(why) = replaced.reason_to_keep() else { return Ok(()) };
-        let way_out = format!("choose another file with {option} FILE, or use --force");
-        Err(OutputError::Refused { reason: format!("cannot write {}: {why}; {way_out}", path.display()) })
+        let advice = format!("choose another file with {option} FILE, or use --force");
+        Err(OutputError::Refused { reason: format!("cannot write {}: {why}; {advice}", path.display()) })
     }
 
     /// Reads the baseline and returns its name and results.
@@ -129,8 +129,8 @@ impl BenchOutputs {
         let read = read_baseline_bytes(path)
             .map_err(|why| console.print_error(Exit::WRONG, &format!("cannot read {name}: {why}")))?;
         let results = serde_json::from_slice(&read).map_err(|error| {
-            let way_out = "pass a file written by `glimt bench --json FILE`";
-            console.print_error(Exit::WRONG, &format!("{name} is not a baseline: {error}; {way_out}"))
+            let advice = "pass a file written by `glimt bench --json FILE`";
+            console.print_error(Exit::WRONG, &format!("{name} is not a baseline: {error}; {advice}"))
         })?;
         Ok(Some((name, results)))
     }

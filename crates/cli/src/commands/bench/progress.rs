@@ -150,7 +150,7 @@ impl BenchProgress {
         }
     }
 
-    pub(super) fn report_cancelled(&self, message: &str) {
+    pub(super) fn report_canceled(&self, message: &str) {
         if self.is_text() {
             self.console.print_line_to_stderr(message);
         } else {

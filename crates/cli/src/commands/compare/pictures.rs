@@ -5,7 +5,7 @@ use std::path::Path;
 
 use super::format_six_significant_digits;
 use crate::args::{CompareArgs, CompareImageVisibility};
-use crate::compare::{self, Pair, PairMeasurements};
+use crate::compare::{self, ImagePair, PairMeasurements};
 use crate::console::Console;
 use crate::film::RadianceImage;
 use crate::film::tone::{ToneMapping, tone_map_to_8_bits};
@@ -16,7 +16,7 @@ use crate::tui::{NamedImage, images_as_text};
 const MIN_VISIBLE_FLIP: f32 = 0.1;
 
 /// Renders the images as text. Returns an empty string if no images are wanted or the terminal is too small.
-pub(super) fn render_images(args: &CompareArgs, pair: &Pair, measured: &PairMeasurements) -> String {
+pub(super) fn render_images(args: &CompareArgs, pair: &ImagePair, measured: &PairMeasurements) -> String {
     let is_terminal = std::io::stdout().is_terminal();
     let is_wanted = match args.pictures {
         CompareImageVisibility::Auto => is_terminal,
@@ -54,7 +54,10 @@ fn tone_mapped(name: &str, image: &RadianceImage) -> NamedImage {
 }
 
 /// Returns FLIP in false color, or |a - b| scaled to its maximum if FLIP is too small to see.
-fn flip_or_difference_image_and_label(pair: &Pair, measured: &PairMeasurements) -> (RadianceImage, String) {
+fn flip_or_difference_image_and_label(
+    pair: &ImagePair,
+    measured: &PairMeasurements,
+) -> (RadianceImage, String) {
     let errors = &measured.errors;
     if errors.max == 0.0 || measured.flip.iter().any(|error| *error >= MIN_VISIBLE_FLIP) {
         return (compare::flip_heat_map(pair, &measured.flip), "FLIP".to_owned());
@@ -73,7 +76,7 @@ mod tests {
     fn shown(b: f32) -> (RadianceImage, String) {
         let image =
             |value| RadianceImage { width: 2, height: 1, pixels: vec![Vec3::splat(0.5), Vec3::splat(value)] };
-        let pair = Pair::new([Path::new("a"), Path::new("b")], image(0.5), image(b)).expect("a pair");
+        let pair = ImagePair::new([Path::new("a"), Path::new("b")], image(0.5), image(b)).expect("a pair");
         flip_or_difference_image_and_label(&pair, &compare::measure(&pair))
     }
 

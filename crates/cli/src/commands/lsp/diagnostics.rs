@@ -36,13 +36,16 @@ pub(super) fn file_diagnostics(
 }
 
 fn to_lsp_diagnostic(document: &OpenDocument, one: &diagnostic::Diagnostic) -> Diagnostic {
-    let is_here = one.path == document.path;
+    let is_in_document = one.path == document.path;
     let place = one.place.as_ref();
     let range =
-        place.filter(|_| is_here).map_or(Range::default(), |place| document.to_lsp_range(&place.span));
+        place.filter(|_| is_in_document).map_or(Range::default(), |place| document.to_lsp_range(&place.span));
     let label = place.map(|place| place.label.as_str()).filter(|label| !label.is_empty());
-    let mut message =
-        if is_here { one.message.clone() } else { format!("{}: {}", file_name(&one.path), one.message) };
+    let mut message = if is_in_document {
+        one.message.clone()
+    } else {
+        format!("{}: {}", file_name(&one.path), one.message)
+    };
     for (more, between) in [(label, ": "), (one.help.as_deref(), "\n")] {
         if let Some(more) = more {
             message.push_str(between);

@@ -127,7 +127,7 @@ mod tests {
         for (name, version) in [("file:///b", 1), ("file:///a", 2), ("file:///a", 3)] {
             requests.enqueue_latest(uri(name), document(version));
         }
-        assert!(first.is_cancelled(), "a newer request replaces it");
+        assert!(first.is_canceled(), "a newer request replaces it");
         let mut next = || requests.start_next().map(|(uri, document, _)| (uri.to_string(), document.version));
         assert_eq!(next(), Some(("file:///b".to_owned(), 1)));
         assert_eq!(next(), Some(("file:///a".to_owned(), 3)));
@@ -135,8 +135,8 @@ mod tests {
         requests.enqueue_latest(uri("file:///b"), document(2));
         let (_, _, last) = requests.start_next().expect("a request");
         requests.enqueue_latest(uri("file:///c"), document(1));
-        assert!(!last.is_cancelled());
+        assert!(!last.is_canceled());
         requests.shut_down();
-        assert!(last.is_cancelled() && requests.start_next().is_none());
+        assert!(last.is_canceled() && requests.start_next().is_none());
     }
 }

@@ -4,7 +4,7 @@ use std::cell::OnceCell;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-use crate::control::{CancelToken, Cancelled};
+use crate::control::{CancelToken, Canceled};
 use crate::output::part::{self, PartFile};
 use crate::output::{is_same_file, scene_path};
 use crate::pipeline::{files_referenced_by_assets, foreign_file_error};
@@ -37,8 +37,8 @@ impl<'a> RenderInputFiles<'a> {
     /// meshes reference last, because listing them requires reading the meshes.
     ///
     /// # Errors
-    /// Returns [`Cancelled`] if the token is canceled.
-    pub(super) fn reason_not_to_overwrite(&self, path: &Path) -> Result<Option<String>, Cancelled> {
+    /// Returns [`Canceled`] if the token is canceled.
+    pub(super) fn reason_not_to_overwrite(&self, path: &Path) -> Result<Option<String>, Canceled> {
         let find = |files: &BTreeSet<PathBuf>| {
             let input = files.iter().find(|input| is_same_file(input, path))?;
             // Show the path relative to the working directory.
@@ -60,7 +60,7 @@ impl<'a> RenderInputFiles<'a> {
         }
     }
 
-    fn files_referenced_by_inputs(&self) -> Result<&BTreeSet<PathBuf>, Cancelled> {
+    fn files_referenced_by_inputs(&self) -> Result<&BTreeSet<PathBuf>, Canceled> {
         match self.companions.get() {
             Some(companions) => Ok(companions),
             None => {

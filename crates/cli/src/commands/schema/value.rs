@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 use super::{key_schema, object_schema};
 use crate::args::SchemaDraft;
 use crate::choice::Choice;
-use crate::math::limits::{LARGEST, SHORTEST};
+use crate::math::limits::{MAX_MAGNITUDE, MIN_LENGTH};
 use crate::scene::description::Channel;
 use crate::scene::keys::color_names;
 use crate::scene::keys::key::ValueKind;
@@ -73,15 +73,15 @@ fn any_of(mut values: Vec<Value>, more: Value) -> Value {
 fn number_schema(limits: Limits, draft: SchemaDraft) -> Value {
     let between = |least: f64, most: f64| json!({ "type": "number", "minimum": least, "maximum": most });
     match limits {
-        Limits::Any => between(-LARGEST, LARGEST),
+        Limits::Any => between(-MAX_MAGNITUDE, MAX_MAGNITUDE),
         Limits::NotZero => {
-            let mut schema = between(-LARGEST, LARGEST);
+            let mut schema = between(-MAX_MAGNITUDE, MAX_MAGNITUDE);
             schema["not"] = json!({ "enum": [0] });
             schema
         }
-        Limits::AtLeast(least) => between(least, LARGEST),
-        Limits::Length => between(SHORTEST, LARGEST),
-        Limits::LengthOrZero => between(0.0, LARGEST),
+        Limits::AtLeast(least) => between(least, MAX_MAGNITUDE),
+        Limits::Length => between(MIN_LENGTH, MAX_MAGNITUDE),
+        Limits::LengthOrZero => between(0.0, MAX_MAGNITUDE),
         Limits::Between(least, most) => between(least, most),
         Limits::Inside(low, high) => match draft {
             SchemaDraft::Four => {

@@ -264,12 +264,12 @@ pub(super) struct ImportNotes(pub(super) Vec<String>);
 
 impl ImportNotes {
     /// Maximum number of notes per file.
-    const LIMIT: usize = 200;
+    const MAX_NOTES: usize = 200;
 
     /// Adds a note about an element in the file.
     pub(super) fn add(&mut self, place: &str, what: &str) {
         let note = format!("{place}: {what}");
-        if !self.0.contains(&note) && self.0.len() < Self::LIMIT {
+        if !self.0.contains(&note) && self.0.len() < Self::MAX_NOTES {
             self.0.push(note);
         }
     }

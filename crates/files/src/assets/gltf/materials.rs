@@ -51,7 +51,7 @@ impl TextureInfo {
 }
 
 /// Known but unsupported extensions, each with its note.
-const UNSUPPORTED: [(&str, &str); 6] = [
+const UNSUPPORTED_EXTENSIONS: [(&str, &str); 6] = [
     ("KHR_materials_sheen", "sheen is ignored"),
     ("KHR_materials_iridescence", "iridescence is ignored"),
     ("KHR_materials_anisotropy", "anisotropy is ignored"),
@@ -161,7 +161,7 @@ impl MaterialReader<'_> {
             (material.clearcoat, material.transmission, material.glass) = (black(), black(), None);
         }
         for name in &extensions.others {
-            match UNSUPPORTED.iter().find(|(known, _)| known == name) {
+            match UNSUPPORTED_EXTENSIONS.iter().find(|(known, _)| known == name) {
                 Some((_, what)) => self.note(what),
                 None => self.note(&extension_ignored_note(name)),
             }

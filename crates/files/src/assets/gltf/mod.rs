@@ -281,14 +281,14 @@ impl GltfFile {
             }
             other @ (AssetError::OutOfMemory { .. }
             | AssetError::TooManyOpenFiles { .. }
-            | AssetError::Cancelled(_)) => other,
+            | AssetError::Canceled(_)) => other,
         }
     }
 
     /// Checks that an image exists and has a valid header.
     ///
     /// # Errors
-    /// [`AssetError::Malformed`] with the image's index, or [`AssetError::Cancelled`].
+    /// [`AssetError::Malformed`] with the image's index, or [`AssetError::Canceled`].
     pub fn check_image_header(&self, number: usize, token: &CancelToken) -> Result<(), AssetError> {
         let (limits, encoding) = (ImageLimits::default(), ImageEncoding::Color);
         let size = match self.locate_image(number)? {
@@ -473,7 +473,7 @@ fn check_version(root: &Root) -> Result<(), GltfError> {
 
 /// Unsupported extensions that change how meshes or images are stored, each with advice on exporting the
 /// file without it.
-const MISSING: [(&str, &str); 5] = [
+const UNSUPPORTED_EXTENSIONS: [(&str, &str); 5] = [
     (DRACO, "export it without Draco compression"),
     ("EXT_meshopt_compression", "export it without meshopt compression"),
     ("KHR_meshopt_compression", "export it without meshopt compression"),
@@ -482,7 +482,7 @@ const MISSING: [(&str, &str); 5] = [
 ];
 
 /// Extensions that are either supported or ignored with a note.
-const KNOWN: [&str; 21] = [
+const KNOWN_EXTENSIONS: [&str; 21] = [
     "EXT_texture_webp",
     "KHR_lights_punctual",
     "KHR_materials_anisotropy",
@@ -510,10 +510,10 @@ const KNOWN: [&str; 21] = [
 /// Rejects files that require unsupported extensions (3.12).
 fn check_required_extensions(root: &Root) -> Result<(), GltfError> {
     for name in &root.extensions_required {
-        if let Some((_, help)) = MISSING.iter().find(|(known, _)| known == name) {
+        if let Some((_, help)) = UNSUPPORTED_EXTENSIONS.iter().find(|(known, _)| known == name) {
             return Err(GltfError::new(unsupported_extension_message(name, help)));
         }
-        if !KNOWN.contains(&name.as_str()) {
+        if !KNOWN_EXTENSIONS.contains(&name.as_str()) {
             return Err(GltfError::new(unknown_extension_message(name)));
         }
     }

@@ -20,7 +20,7 @@ use crate::math::{DMat3, DVec3};
 const MAX_MEASURED: usize = 20_000_000;
 /// Limit on coordinates, transform entries and light intensities. It is lower than the limit of 10¹⁸ for
 /// scenes because cameras are placed several model sizes away.
-const LIMIT: f64 = 1e15;
+const MAX_MAGNITUDE: f64 = 1e15;
 /// Maximum number of instances per file.
 const MAX_INSTANCES: usize = 1 << 20;
 
@@ -58,7 +58,7 @@ impl GltfFile {
             let (mesh, extremes) = match parts.entry(instance.part) {
                 Entry::Occupied(known) => &*known.into_mut(),
                 Entry::Vacant(new) => match self.build_part(instance.part, &ignore_progress, token) {
-                    Err(AssetError::Cancelled(cancelled)) => return Err(cancelled.into()),
+                    Err(AssetError::Canceled(canceled)) => return Err(canceled.into()),
                     loaded => {
                         let mesh = loaded.map(|loaded| loaded.mesh).unwrap_or_else(|wrong| {
                             first_wrong.get_or_insert(wrong);
@@ -82,11 +82,11 @@ impl GltfFile {
                 scene.bounds = Some([min.min(at), max.max(at)]);
             }
             if let Some([min, max]) = scene.bounds
-                && !(min.abs().max(max.abs()).max_element() < LIMIT)
+                && !(min.abs().max(max.abs()).max_element() < MAX_MAGNITUDE)
             {
                 let farthest = min.abs().max(max.abs()).max_element();
                 let wrong = GltfError::new(format!(
-                    "its mesh extends to {farthest:e}, but must stay below {LIMIT:e}"
+                    "its mesh extends to {farthest:e}, but must stay below {MAX_MAGNITUDE:e}"
                 ));
                 return Err(self.malformed_error(wrong.add_location(format!("nodes[{}]", instance.node))));
             }
@@ -376,7 +376,7 @@ impl SceneWalk<'_> {
             }
             (None, Some(lens)) => {
                 let view_height = 2.0 * lens.ymag.abs();
-                let is_in_range = view_height > 1.0 / LIMIT && view_height < LIMIT;
+                let is_in_range = view_height > 1.0 / MAX_MAGNITUDE && view_height < MAX_MAGNITUDE;
                 let aspect = lens.xmag.map(|xmag| (xmag / lens.ymag).abs());
                 (ModelProjection::Orthographic { view_height }, is_in_range, aspect)
             }
@@ -384,7 +384,7 @@ impl SceneWalk<'_> {
                 return self.notes.add(place, UNKNOWN_CAMERA);
             }
         };
-        if position.abs().max_element() < LIMIT && is_in_range {
+        if position.abs().max_element() < MAX_MAGNITUDE && is_in_range {
             let name = if json.name.is_empty() { node } else { &json.name };
             let aspect = aspect.filter(|aspect| *aspect > 0.05 && *aspect < 20.0);
             self.scene.cameras.push(ModelCamera {
@@ -416,7 +416,7 @@ fn check_transform_magnitude(node: &JsonNode, placed: &AffineMap) -> Result<(), 
     let all = |placed: &AffineMap| {
         largest(&placed.linear.to_cols_array()).max(largest(&placed.translate.to_array()))
     };
-    if all(placed) < LIMIT {
+    if all(placed) < MAX_MAGNITUDE {
         return Ok(());
     }
     let own = [
@@ -426,10 +426,12 @@ fn check_transform_magnitude(node: &JsonNode, placed: &AffineMap) -> Result<(), 
     ];
     let of_own = own.into_iter().filter_map(|(name, numbers)| Some((name, largest(numbers?))));
     Err(GltfError::new(
-        match of_own.max_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, value)| *value >= LIMIT) {
-            Some((name, value)) => format!("its {name} contains {value:e}, but must stay below {LIMIT:e}"),
+        match of_own.max_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, value)| *value >= MAX_MAGNITUDE) {
+            Some((name, value)) => {
+                format!("its {name} contains {value:e}, but must stay below {MAX_MAGNITUDE:e}")
+            }
             None => format!(
-                "its transform, including its ancestors', contains {:e}, but must stay below {LIMIT:e}",
+                "its transform, including its ancestors', contains {:e}, but must stay below {MAX_MAGNITUDE:e}",
                 all(placed)
             ),
         },
@@ -439,7 +441,7 @@ fn check_transform_magnitude(node: &JsonNode, placed: &AffineMap) -> Result<(), 
 /// Rejects lights with an intensity above the limit.
 fn check_intensity_limit(json: &JsonLight, number: usize) -> Result<(), GltfError> {
     let brightest = json.color.iter().fold(0.0_f64, |max, part| max.max(*part)) * json.intensity;
-    if brightest < LIMIT || !(json.intensity > 0.0) {
+    if brightest < MAX_MAGNITUDE || !(json.intensity > 0.0) {
         return Ok(());
     }
     let name = if json.name.is_empty() {
@@ -449,7 +451,7 @@ fn check_intensity_limit(json: &JsonLight, number: usize) -> Result<(), GltfErro
     };
     let intensity = json.intensity;
     Err(GltfError::new(format!(
-        "its light lights[{number}]{name} has intensity {intensity:e}, but must stay below {LIMIT:e}"
+        "its light lights[{number}]{name} has intensity {intensity:e}, but must stay below {MAX_MAGNITUDE:e}"
     )))
 }
 

@@ -54,7 +54,7 @@ impl GltfFile {
     ///
     /// # Errors
     /// Returns [`AssetError::Malformed`] with the location in the JSON if the part is invalid or unsupported,
-    /// or [`AssetError::Cancelled`] if the token is canceled.
+    /// or [`AssetError::Canceled`] if the token is canceled.
     pub fn build_part(
         &self,
         part: usize,

@@ -9,7 +9,7 @@ use serde::de::{Deserializer, Error, Visitor};
 
 use super::{BOM, JSON_LIMIT, resolve_relative_uri};
 use crate::assets::read;
-use crate::control::{CancelToken, Cancelled};
+use crate::control::{CancelToken, Canceled};
 
 /// The URIs in a glTF file. Everything else in the file is ignored, valid or not.
 #[derive(Debug, Default, Deserialize)]
@@ -48,12 +48,12 @@ impl<'de> Deserialize<'de> for FileUri {
 }
 
 /// A reader that fails once the token is canceled.
-struct CancellableReader<'a, R> {
+struct CancelableReader<'a, R> {
     reader: R,
     token: &'a CancelToken,
 }
 
-impl<R: Read> Read for CancellableReader<'_, R> {
+impl<R: Read> Read for CancelableReader<'_, R> {
     fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
         self.token.check_pause_and_cancel().map_err(io::Error::other)?;
         self.reader.read(bytes)
@@ -64,8 +64,8 @@ impl<R: Read> Read for CancellableReader<'_, R> {
 /// without keeping it in memory. Returns an empty list if the file is unreadable or its JSON is invalid.
 ///
 /// # Errors
-/// Returns [`Cancelled`] if the token is canceled.
-pub fn referenced_files(path: &Path, token: &CancelToken) -> Result<Vec<PathBuf>, Cancelled> {
+/// Returns [`Canceled`] if the token is canceled.
+pub fn referenced_files(path: &Path, token: &CancelToken) -> Result<Vec<PathBuf>, Canceled> {
     let references = json_reader(path, token).ok().and_then(|json| serde_json::from_reader(json).ok());
     token.check_pause_and_cancel()?;
     let UriReferences { buffers, images } = references.unwrap_or_default();
@@ -89,7 +89,7 @@ fn json_reader<'a>(path: &Path, token: &'a CancelToken) -> io::Result<impl Read 
         _ => (0, JSON_LIMIT),
     };
     file.seek(SeekFrom::Start(before))?;
-    let json = CancellableReader { reader: file.take(length.min(JSON_LIMIT) as u64), token };
+    let json = CancelableReader { reader: file.take(length.min(JSON_LIMIT) as u64), token };
     let mut json = BufReader::with_capacity(BUFFER, json);
     if json.fill_buf()?.starts_with(BOM) {
         json.consume(BOM.len());

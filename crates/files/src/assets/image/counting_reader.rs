@@ -6,7 +6,7 @@ use super::decode_thread::ProgressReporter;
 
 /// Maximum number of bytes per read. Without this limit, a decoder that reads the whole file in one call
 /// would not report progress.
-const CHUNK: usize = 1 << 16;
+const MAX_READ_BYTES: usize = 1 << 16;
 
 pub(super) struct ProgressReader<R> {
     inner: R,
@@ -25,7 +25,7 @@ impl<R> ProgressReader<R> {
 
 impl<R: Read> Read for ProgressReader<R> {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-        let most = buffer.len().min(CHUNK);
+        let most = buffer.len().min(MAX_READ_BYTES);
         let got = self.inner.read(&mut buffer[..most])?;
         self.at += got as u64;
         self.reached = self.reached.max(self.at.min(self.length));

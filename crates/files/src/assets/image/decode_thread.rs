@@ -8,7 +8,7 @@ use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
 use crate::assets::read::Monitor;
-use crate::control::{CancelToken, Cancelled};
+use crate::control::{CancelToken, Canceled};
 use crate::system::threads::spawn;
 
 /// Polling interval for the cancel token.
@@ -29,7 +29,7 @@ impl ProgressReporter {
     /// can stop early.
     pub(super) fn report_bytes_read(&self, done: u64) -> io::Result<()> {
         match &self.0 {
-            Some(receiver) => receiver.send(done).map_err(|_| io::Error::other(Cancelled)),
+            Some(receiver) => receiver.send(done).map_err(|_| io::Error::other(Canceled)),
             None => Ok(()),
         }
     }
@@ -44,7 +44,7 @@ pub(super) fn run_on_thread<T: Send + 'static>(
     monitor: Monitor<'_>,
     total: u64,
     work: impl FnOnce(ProgressReporter) -> T + Send + 'static,
-) -> Result<Option<T>, Cancelled> {
+) -> Result<Option<T>, Canceled> {
     wait_for_abandoned_threads(monitor.token)?;
     let (report, reports) = mpsc::sync_channel(QUEUE_LENGTH);
     let (send, result) = mpsc::channel();
@@ -72,7 +72,7 @@ fn wait_for_result<T>(
     result: &Receiver<T>,
     monitor: Monitor<'_>,
     total: u64,
-) -> Result<Option<T>, Cancelled> {
+) -> Result<Option<T>, Canceled> {
     loop {
         match reports.recv_timeout(POLL) {
             Ok(done) => monitor.report_and_check_cancel(done as usize, total as usize)?,
@@ -90,7 +90,7 @@ fn wait_for_result<T>(
     }
 }
 
-fn wait_for_abandoned_threads(token: &CancelToken) -> Result<(), Cancelled> {
+fn wait_for_abandoned_threads(token: &CancelToken) -> Result<(), Canceled> {
     loop {
         token.check_pause_and_cancel()?;
         let mut threads = lock_abandoned_threads();
@@ -113,7 +113,7 @@ mod tests {
     use crate::control::ignore_progress;
 
     #[test]
-    fn new_work_waits_for_cancelled_work() {
+    fn new_work_waits_for_canceled_work() {
         let token = CancelToken::new();
         let (release, released) = mpsc::channel::<()>();
         let (send, ended) = mpsc::channel();
@@ -126,12 +126,12 @@ mod tests {
             let _ = send.send((in_time, report.report_bytes_read(1).is_err()));
         };
         let monitor = Monitor { progress: &ignore_progress, token: &token };
-        assert_eq!(run_on_thread(monitor, 1, stuck).err(), Some(Cancelled));
+        assert_eq!(run_on_thread(monitor, 1, stuck).err(), Some(Canceled));
         release.send(()).expect("the work is still running");
         let fresh = CancelToken::new();
         let next = move |_| ended.try_recv();
         let ended = run_on_thread(Monitor { progress: &ignore_progress, token: &fresh }, 1, next)
-            .expect("not cancelled");
+            .expect("not canceled");
         assert_eq!(ended, Some(Ok((true, true))));
     }
 

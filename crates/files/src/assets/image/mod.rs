@@ -26,7 +26,7 @@ use ::image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader};
 use super::catch_panic::catch_panic;
 use super::read::{self, Monitor};
 use super::{AssetError, FileHash};
-use crate::control::{CancelToken, Cancelled, Progress, ignore_progress};
+use crate::control::{CancelToken, Canceled, Progress, ignore_progress};
 use crate::materials::mipmaps::ImageHalver;
 use crate::materials::texels::Texels;
 use crate::materials::{ChannelSelector, Mipmaps};
@@ -160,7 +160,7 @@ impl Default for ImageLimits {
 ///
 /// # Errors
 /// [`AssetError::Unreadable`], [`AssetError::Malformed`] if the content contradicts the header or exceeds the
-/// limits, or [`AssetError::Cancelled`].
+/// limits, or [`AssetError::Canceled`].
 pub fn load(
     path: &Path,
     encoding: ImageEncoding,
@@ -280,8 +280,8 @@ pub fn embedded_dimensions_and_decoded_bytes(
 /// Computes mip levels for an image.
 ///
 /// # Errors
-/// [`Cancelled`].
-pub fn mipmaps(texels: &Texels, token: &CancelToken) -> Result<Mipmaps, Cancelled> {
+/// [`Canceled`].
+pub fn mipmaps(texels: &Texels, token: &CancelToken) -> Result<Mipmaps, Canceled> {
     Mipmaps::build(texels, |level| {
         let halving = ImageHalver::new(level);
         let mut rows = halving.allocate_halved_rows();
@@ -296,12 +296,12 @@ pub fn mipmaps(texels: &Texels, token: &CancelToken) -> Result<Mipmaps, Cancelle
 /// Computes mip levels for an image's coverage: the fraction of texels whose value is at least `cutoff`.
 ///
 /// # Errors
-/// [`Cancelled`].
+/// [`Canceled`].
 pub fn mipmaps_of_thresholded_texels(
     texels: &Texels,
     cutoff: f32,
     token: &CancelToken,
-) -> Result<Mipmaps, Cancelled> {
+) -> Result<Mipmaps, Canceled> {
     mipmaps(&texels.threshold_red_channel(cutoff), token)
 }
 

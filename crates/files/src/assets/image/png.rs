@@ -53,7 +53,7 @@ pub(super) fn read_without_text_chunks(
         kept.truncate(start);
         let (mut skipped, mut left) = (vec![0; SKIPPED_BYTES], length);
         while left > 0 {
-            token.check_pause_and_cancel().map_err(|cancelled| io::Error::other(cancelled.to_string()))?;
+            token.check_pause_and_cancel().map_err(|canceled| io::Error::other(canceled.to_string()))?;
             let most = skipped.len().min(left as usize);
             let got = file.read(&mut skipped[..most])?;
             if got == 0 {

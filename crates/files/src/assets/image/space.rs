@@ -95,14 +95,14 @@ fn pow_or_zero(x: f64, exponent: f64) -> f64 {
 
 /// Decodes a PQ signal relative to the reference white (ITU-R BT.2408, 2.2).
 fn decode_pq(x: f64) -> f64 {
-    const MOST: f64 = 10_000.0 / 203.0;
+    const MAX_RELATIVE_LUMINANCE: f64 = 10_000.0 / 203.0;
     const M1: f64 = 2610.0 / 16384.0;
     const M2: f64 = 2523.0 / 32.0;
     const C1: f64 = 3424.0 / 4096.0;
     const C2: f64 = 2413.0 / 128.0;
     const C3: f64 = 2392.0 / 128.0;
     let root = pow_or_zero(x, 1.0 / M2);
-    MOST * pow_or_zero((root - C1) / (C2 - C3 * root), 1.0 / M1)
+    MAX_RELATIVE_LUMINANCE * pow_or_zero((root - C1) / (C2 - C3 * root), 1.0 / M1)
 }
 
 /// Decodes an HLG signal to [0, 1].

@@ -322,7 +322,7 @@ fn progress_ends_at_the_file_length() {
         }
     };
     let result = load(&path, ImageEncoding::Color, ImageLimits::default(), &stop, &token);
-    assert!(matches!(result, Err(AssetError::Cancelled(_))));
+    assert!(matches!(result, Err(AssetError::Canceled(_))));
 }
 
 proptest::proptest! {

@@ -9,7 +9,7 @@ use super::parsed::{Faces, ParsedMesh};
 use super::polygon::triangulate;
 use super::{MeshFileBytes, corners};
 use crate::assets::{AssetError, DroppedFaces, FileHash, LoadedMesh};
-use crate::control::{CancelToken, Cancelled};
+use crate::control::{CancelToken, Canceled};
 use crate::geometry::mesh::TriangleMesh;
 use crate::math::origin::local_coordinate_origin;
 use crate::math::{DVec3, Vec2, Vec3};
@@ -52,8 +52,8 @@ pub(super) fn assemble_text_mesh(
     if has_separate_corners {
         faces.merge_coincident_vertices(&positions, source.monitor.token)?;
     }
-    let most_triangles = TriangleMesh::MOST_TRIANGLES as usize;
-    let mut cutter = FaceTriangulator::new(&positions, &face_materials, most_triangles);
+    let max_triangles = TriangleMesh::MAX_TRIANGLES as usize;
+    let mut cutter = FaceTriangulator::new(&positions, &face_materials, max_triangles);
     cutter.add_all_faces(source, &faces)?;
     let FaceTriangulator { triangles, triangle_materials, dropped, crossing, .. } = cutter;
     let line_of = |face: usize| start_of(face).map(|start| source.line_number(start));
@@ -172,7 +172,7 @@ fn self_intersection_warning(
 struct FaceTriangulator<'a> {
     positions: &'a [Vec3],
     materials: &'a [u32],
-    most_triangles: usize,
+    max_triangles: usize,
     triangles: Vec<[u32; 3]>,
     triangle_materials: Vec<u32>,
     dropped: DroppedFaces,
@@ -181,12 +181,12 @@ struct FaceTriangulator<'a> {
 }
 
 impl<'a> FaceTriangulator<'a> {
-    fn new(positions: &'a [Vec3], materials: &'a [u32], most_triangles: usize) -> Self {
+    fn new(positions: &'a [Vec3], materials: &'a [u32], max_triangles: usize) -> Self {
         let (triangles, triangle_materials) = Default::default();
         Self {
             positions,
             materials,
-            most_triangles,
+            max_triangles,
             triangles,
             triangle_materials,
             dropped: DroppedFaces::default(),
@@ -211,9 +211,9 @@ impl<'a> FaceTriangulator<'a> {
                 return Err(source.malformed_error_without_line(index_out_of_range_message(face + 1)));
             }
             self.add_face(corners, face);
-            if self.triangles.len() > self.most_triangles {
+            if self.triangles.len() > self.max_triangles {
                 return Err(
-                    source.malformed_error_without_line(too_many_triangles_message(self.most_triangles))
+                    source.malformed_error_without_line(too_many_triangles_message(self.max_triangles))
                 );
             }
             if let Some(&material) = self.materials.get(face) {
@@ -235,7 +235,7 @@ impl<'a> FaceTriangulator<'a> {
                 && has_area(points())
         };
         let all = faces.arities.is_empty()
-            && triangles.len() <= self.most_triangles
+            && triangles.len() <= self.max_triangles
             && triangles.par_iter().all(good);
         if all {
             self.triangles = triangles.to_vec();
@@ -323,7 +323,7 @@ fn retain_used<T>(values: &mut Vec<T>, new_index: &[u32]) {
     values.retain(|_| indices.next().is_some_and(|index| *index != u32::MAX));
 }
 
-fn complete_normals(mesh: &mut TriangleMesh, token: &CancelToken) -> Result<(), Cancelled> {
+fn complete_normals(mesh: &mut TriangleMesh, token: &CancelToken) -> Result<(), Canceled> {
     for normal in &mut mesh.normals {
         *normal = normal.as_dvec3().try_normalize().map_or(Vec3::ZERO, |unit| unit.as_vec3());
     }

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use crate::control::{CancelToken, Cancelled};
+use crate::control::{CancelToken, Canceled};
 use crate::math::Vec3;
 
 /// Average number of vertices per bucket. Buckets are sorted in parallel, and the cancel token is polled once
@@ -20,7 +20,7 @@ type HashedVertex = (u32, u32);
 pub(super) fn find_coincident_vertex_sets(
     positions: &[Vec3],
     token: &CancelToken,
-) -> Result<Vec<Vec<u32>>, Cancelled> {
+) -> Result<Vec<Vec<u32>>, Canceled> {
     let bits = positions.len().div_ceil(BUCKET).next_power_of_two().ilog2();
     let mut hashes = vec![0; positions.len()];
     for (hashes, positions) in hashes.chunks_mut(BATCH).zip(positions.chunks(BATCH)) {
@@ -30,7 +30,7 @@ pub(super) fn find_coincident_vertex_sets(
     let (entries, ends) = sort_into_buckets(&hashes, bits, token)?;
     let starts = std::iter::once(0).chain(ends.iter().copied());
     let buckets: Vec<_> = starts.zip(&ends).map(|(start, end)| &entries[start..*end]).collect();
-    let found: Result<Vec<_>, Cancelled> =
+    let found: Result<Vec<_>, Canceled> =
         buckets.par_iter().map(|bucket| group_coincident_in_bucket(bucket, positions, token)).collect();
     Ok(found?.into_iter().flatten().collect())
 }
@@ -54,7 +54,7 @@ fn sort_into_buckets(
     hashes: &[u32],
     bits: u32,
     token: &CancelToken,
-) -> Result<(Vec<HashedVertex>, Vec<usize>), Cancelled> {
+) -> Result<(Vec<HashedVertex>, Vec<usize>), Canceled> {
     let bucket = |hash: u32| (u64::from(hash) >> (32 - bits)) as usize;
     let mut ends = vec![0; 1 << bits];
     for hashes in hashes.chunks(BATCH) {
@@ -82,7 +82,7 @@ fn group_coincident_in_bucket(
     bucket: &[HashedVertex],
     positions: &[Vec3],
     token: &CancelToken,
-) -> Result<Vec<Vec<u32>>, Cancelled> {
+) -> Result<Vec<Vec<u32>>, Canceled> {
     token.check_pause_and_cancel()?;
     let mut entries = bucket.to_vec();
     entries.sort_unstable();
@@ -108,7 +108,7 @@ mod tests {
         // Positions repeat after 5000 vertices; −0 equals 0.
         let at = |i: u32| Vec3::new((i % 5000) as f32, 0.25, if i < 5000 { 0.0 } else { -0.0 });
         let positions: Vec<_> = (0..20_000).map(at).chain([Vec3::splat(9.0), Vec3::splat(8.0)]).collect();
-        let mut found = find_coincident_vertex_sets(&positions, &CancelToken::new()).expect("not cancelled");
+        let mut found = find_coincident_vertex_sets(&positions, &CancelToken::new()).expect("not canceled");
         found.sort_unstable();
         let expected: Vec<Vec<u32>> =
             (0..5000).map(|i| (0..4).map(|turn| i + 5000 * turn).collect()).collect();

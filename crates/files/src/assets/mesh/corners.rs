@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use super::parsed::ParsedMesh;
-use crate::control::{CancelToken, Cancelled};
+use crate::control::{CancelToken, Canceled};
 use crate::geometry::mesh::VertexNormalGroup;
 use crate::math::Vec2;
 
@@ -15,7 +15,7 @@ type VertexUvColorKey = (u32, [u32; 2], [u8; 3]);
 
 /// Creates one vertex for each combination of vertex, texture coordinates and color that occurs at a corner.
 /// New vertices keep the normal of the original vertex.
-pub(super) fn split_vertices_at_seams(parsed: &mut ParsedMesh, token: &CancelToken) -> Result<(), Cancelled> {
+pub(super) fn split_vertices_at_seams(parsed: &mut ParsedMesh, token: &CancelToken) -> Result<(), Canceled> {
     let (uvs, colors) = (std::mem::take(&mut parsed.corner_uvs), std::mem::take(&mut parsed.corner_colors));
     let vertices = parsed.positions.len();
     let is_in_range = |corner: &u32| (*corner as usize) < vertices;

@@ -20,7 +20,7 @@ use std::path::{Path, PathBuf};
 
 use super::read::{self, Monitor};
 use super::{AssetError, LoadedMesh};
-use crate::control::{CancelToken, Cancelled, Progress};
+use crate::control::{CancelToken, Canceled, Progress};
 
 pub use normals::vertex_normals;
 
@@ -41,7 +41,7 @@ pub const EXTENSIONS: [&str; 4] = ["obj", "off", "ply", "stl"];
 /// - [`AssetError::Unreadable`] if the file is not a regular file of at most 4 GiB with a known extension.
 /// - [`AssetError::Malformed`] with the line (text) or the face (binary) if the file is invalid or has no
 ///   usable face.
-/// - [`AssetError::Cancelled`].
+/// - [`AssetError::Canceled`].
 pub fn load(path: &Path, progress: Progress<'_>, token: &CancelToken) -> Result<LoadedMesh, AssetError> {
     let extension =
         path.extension().map(|extension| extension.to_string_lossy().to_lowercase()).unwrap_or_default();
@@ -68,8 +68,8 @@ pub fn load(path: &Path, progress: Progress<'_>, token: &CancelToken) -> Result<
 /// matter. Memory use is bounded. Returns an empty list for other formats and unreadable files.
 ///
 /// # Errors
-/// Returns [`Cancelled`] if the token is canceled.
-pub fn referenced_files(path: &Path, token: &CancelToken) -> Result<Vec<PathBuf>, Cancelled> {
+/// Returns [`Canceled`] if the token is canceled.
+pub fn referenced_files(path: &Path, token: &CancelToken) -> Result<Vec<PathBuf>, Canceled> {
     let is_obj = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("obj"));
     if is_obj { obj::referenced_files(path, token) } else { Ok(Vec::new()) }
 }
@@ -173,14 +173,14 @@ mod tests {
     }
 
     #[test]
-    fn a_cancelled_load_returns_cancelled() {
+    fn a_canceled_load_returns_canceled() {
         let folder = tempfile::tempdir().expect("a folder");
         for (name, text) in [("a.off", "OFF 3 1 0"), ("a.ply", "ply\n"), ("a.obj", "v 0 0 0\n")] {
             let path = folder.path().join(name);
             fs::write(&path, text).expect("written");
             let token = CancelToken::new();
             token.cancel();
-            assert!(matches!(load(&path, &ignore_progress, &token), Err(AssetError::Cancelled(_))), "{name}");
+            assert!(matches!(load(&path, &ignore_progress, &token), Err(AssetError::Canceled(_))), "{name}");
         }
     }
 

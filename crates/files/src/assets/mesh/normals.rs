@@ -7,7 +7,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 use rayon::prelude::*;
 
 use super::coincident;
-use crate::control::{CancelToken, Cancelled};
+use crate::control::{CancelToken, Canceled};
 use crate::geometry::mesh::{TriangleMesh, VertexNormalGroup};
 use crate::math::{DVec3, Vec3};
 
@@ -18,7 +18,7 @@ const SEAM_COSINE: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
 /// Maximum number of coincident vertices whose normals are compared pairwise, which takes quadratic time.
 /// Larger sets are merged without comparing normals.
-const COMPARED: usize = 64;
+const MAX_COMPARED: usize = 64;
 
 /// Number of triangles or vertices between polls of the cancel token.
 const BATCH: usize = 1 << 16;
@@ -29,8 +29,8 @@ const BATCH: usize = 1 << 16;
 /// out, the normal of one face is used. The result does not depend on the number of threads.
 ///
 /// # Errors
-/// [`Cancelled`].
-pub fn vertex_normals(mesh: &TriangleMesh, token: &CancelToken) -> Result<Vec<Vec3>, Cancelled> {
+/// [`Canceled`].
+pub fn vertex_normals(mesh: &TriangleMesh, token: &CancelToken) -> Result<Vec<Vec3>, Canceled> {
     let mut sums = sum_weighted_face_normals(mesh, token)?;
     let groups = &mesh.normal_groups;
     let firsts = first_vertex_with_same_normal(groups);
@@ -88,7 +88,7 @@ fn first_vertex_with_same_normal(groups: &[VertexNormalGroup]) -> Vec<usize> {
 pub(crate) fn is_polyhedral_without_normals(mesh: &TriangleMesh) -> bool {
     /// Minimum length of the mean unit normal around a vertex on a smooth surface. It corresponds to normals
     /// that form a cone with a half-angle of 32 degrees.
-    const LEAST: f32 = 0.85;
+    const MIN_MEAN_LENGTH: f32 = 0.85;
     let groups = &mesh.normal_groups;
     if !mesh.normals.is_empty() || groups.iter().any(|group| group.group != VertexNormalGroup::BY_ANGLE) {
         return false;
@@ -108,11 +108,11 @@ pub(crate) fn is_polyhedral_without_normals(mesh: &TriangleMesh) -> bool {
     let means = sums.iter().filter(|(_, count)| *count > 0).map(|(sum, count)| sum.length() / *count as f32);
     let (total, vertices) =
         means.fold((0.0, 0), |(total, vertices), mean| (total + f64::from(mean), vertices + 1));
-    total < f64::from(LEAST) * f64::from(vertices)
+    total < f64::from(MIN_MEAN_LENGTH) * f64::from(vertices)
 }
 
 /// Replaces zero normals with computed vertex normals.
-pub(super) fn fill_missing_normals(mesh: &mut TriangleMesh, token: &CancelToken) -> Result<(), Cancelled> {
+pub(super) fn fill_missing_normals(mesh: &mut TriangleMesh, token: &CancelToken) -> Result<(), Canceled> {
     let made = vertex_normals(mesh, token)?;
     for (normal, made) in mesh.normals.iter_mut().zip(made) {
         if *normal == Vec3::ZERO {
@@ -124,7 +124,7 @@ pub(super) fn fill_missing_normals(mesh: &mut TriangleMesh, token: &CancelToken)
 
 /// Sums the unit face normals around each vertex in face order, weighted by the faces' angles at the vertex.
 /// Each thread owns a range of vertices, so the order does not depend on the number of threads.
-fn sum_weighted_face_normals(mesh: &TriangleMesh, token: &CancelToken) -> Result<Vec<DVec3>, Cancelled> {
+fn sum_weighted_face_normals(mesh: &TriangleMesh, token: &CancelToken) -> Result<Vec<DVec3>, Canceled> {
     let mut sums = vec![DVec3::ZERO; mesh.positions.len()];
     let share = sums.len().div_ceil(rayon::current_num_threads()).max(1);
     let mut weighted = Vec::with_capacity(BATCH.min(mesh.triangles.len()));
@@ -182,7 +182,7 @@ fn fast_atan2_upper_half(x: f64, y: f64) -> f64 {
 
 fn merge_normals_within_seam_angle(group: &[u32], sums: &[DVec3], joined: &mut [DVec3]) {
     let own = |vertex: u32| sums[vertex as usize];
-    if group.len() > COMPARED {
+    if group.len() > MAX_COMPARED {
         let sum: DVec3 = group.iter().map(|&vertex| own(vertex)).sum();
         group.iter().for_each(|&vertex| joined[vertex as usize] = sum);
         return;
@@ -201,7 +201,7 @@ fn replace_canceled_normals(
     mesh: &TriangleMesh,
     normals: &mut [Vec3],
     token: &CancelToken,
-) -> Result<(), Cancelled> {
+) -> Result<(), Canceled> {
     for triangles in mesh.triangles.chunks(BATCH) {
         token.check_pause_and_cancel()?;
         for triangle in triangles {
@@ -224,7 +224,7 @@ mod tests {
     use super::*;
 
     fn vertex_normals(mesh: &TriangleMesh) -> Vec<Vec3> {
-        super::vertex_normals(mesh, &CancelToken::new()).expect("not cancelled")
+        super::vertex_normals(mesh, &CancelToken::new()).expect("not canceled")
     }
 
     fn mesh(positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> TriangleMesh {
@@ -314,7 +314,7 @@ mod tests {
         assert_eq!(with(1), with(3));
         let token = CancelToken::new();
         token.cancel();
-        assert_eq!(super::vertex_normals(&mesh, &token), Err(Cancelled));
+        assert_eq!(super::vertex_normals(&mesh, &token), Err(Canceled));
     }
 
     #[test]

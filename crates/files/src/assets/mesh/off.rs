@@ -121,7 +121,7 @@ struct ParsedOffColors {
     all: Vec<Option<[f64; 3]>>,
     range: ColorRange,
     /// Minimum alpha and a byte offset on its line.
-    least_alpha: Option<(f64, usize)>,
+    min_alpha: Option<(f64, usize)>,
 }
 
 impl ParsedOffColors {
@@ -133,8 +133,8 @@ impl ParsedOffColors {
     }
 
     fn track_lowest_alpha(&mut self, alpha: f64, at: usize) {
-        if self.least_alpha.is_none_or(|(least, _)| alpha < least) {
-            self.least_alpha = Some((alpha, at));
+        if self.min_alpha.is_none_or(|(least, _)| alpha < least) {
+            self.min_alpha = Some((alpha, at));
         }
     }
 
@@ -144,7 +144,7 @@ impl ParsedOffColors {
         if self.all.iter().all(Option::is_none) {
             return Vec::new();
         }
-        if let Some((_, at)) = self.least_alpha.filter(|(least, _)| *least < self.range.full_intensity()) {
+        if let Some((_, at)) = self.min_alpha.filter(|(least, _)| *least < self.range.full_intensity()) {
             warnings.push(alpha_ignored_warning(source.line_number(at)));
         }
         let outside = self.range.out_of_range_warning();

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::coincident;
 use crate::assets::{Companion, FileMaterial};
-use crate::control::{CancelToken, Cancelled};
+use crate::control::{CancelToken, Canceled};
 use crate::geometry::mesh::VertexNormalGroup;
 use crate::math::{DVec3, Vec2, Vec3};
 
@@ -55,7 +55,7 @@ impl Faces {
         &mut self,
         positions: &[Vec3],
         token: &CancelToken,
-    ) -> Result<(), Cancelled> {
+    ) -> Result<(), Canceled> {
         let mut first: Vec<u32> = (0..positions.len() as u32).collect();
         for place in coincident::find_coincident_vertex_sets(positions, token)? {
             place.iter().for_each(|&vertex| first[vertex as usize] = place[0]);
@@ -65,7 +65,7 @@ impl Faces {
     }
 
     /// Maximum number of corners, limited by 32-bit vertex indices.
-    pub(crate) const MOST_CORNERS: usize = u32::MAX as usize;
+    pub(crate) const MAX_CORNERS: usize = u32::MAX as usize;
 
     /// Index of the face that contains a corner.
     pub(super) fn face_of_corner(&self, corner: usize) -> usize {

@@ -13,11 +13,11 @@ use crate::assets::read;
 use crate::math::DVec3;
 
 /// Size of a binary file's header, which precedes the number of facets.
-const HEADER: usize = 80;
+const HEADER_BYTES: usize = 80;
 /// Offset of the first facet in a binary file.
-const START: usize = HEADER + 4;
+const FACETS_OFFSET: usize = HEADER_BYTES + 4;
 /// Size of a facet: a normal and three corners (three floats each), followed by a two-byte attribute.
-const FACET: usize = 50;
+const FACET_BYTES: usize = 50;
 /// Number of facets (binary) or words (text) between polls of the cancel token.
 const BATCH: usize = 1 << 13;
 
@@ -59,12 +59,13 @@ fn detect_encoding(bytes: &[u8]) -> StlEncoding {
 
 /// Whether the file size matches the number of facets if the file is read as binary.
 fn has_binary_size(bytes: &[u8]) -> bool {
-    declared_facet_count(bytes).is_some_and(|count| bytes.len() as u64 == START as u64 + FACET as u64 * count)
+    declared_facet_count(bytes)
+        .is_some_and(|count| bytes.len() as u64 == FACETS_OFFSET as u64 + FACET_BYTES as u64 * count)
 }
 
 /// Number of facets according to a binary header, or `None` if the file is too short.
 fn declared_facet_count(bytes: &[u8]) -> Option<u64> {
-    let count = bytes.get(HEADER..START)?.first_chunk()?;
+    let count = bytes.get(HEADER_BYTES..FACETS_OFFSET)?.first_chunk()?;
     Some(u64::from(u32::from_le_bytes(*count)))
 }
 
@@ -73,7 +74,7 @@ fn read_binary(source: &MeshFileBytes<'_>) -> Result<ParsedMesh, AssetError> {
     let Some(claimed) = declared_facet_count(source.bytes) else {
         return Err(source.malformed_error_without_line(not_stl_message(source.bytes.trim_ascii_start())));
     };
-    let facets = source.bytes[START..].chunks_exact(FACET);
+    let facets = source.bytes[FACETS_OFFSET..].chunks_exact(FACET_BYTES);
     let excess = facets.remainder().len();
     let found = facets.len() as u64;
     if found < claimed {
@@ -81,20 +82,20 @@ fn read_binary(source: &MeshFileBytes<'_>) -> Result<ParsedMesh, AssetError> {
     }
     if found == 0 {
         return Err(source.malformed_error_without_line(format!(
-            "the header claims 0 facets, and the {excess} bytes that follow are too few for a facet ({FACET} bytes)"
+            "the header claims 0 facets, and the {excess} bytes that follow are too few for a facet ({FACET_BYTES} bytes)"
         )));
     }
     // Accept a count of 0, because some programs write the header before they know the number of facets.
     let (count, mut warnings) = (if claimed == 0 { found } else { claimed }, Vec::new());
     if claimed != 0 && (found > claimed || excess > 0) {
-        let bytes = (found - claimed) * FACET as u64 + excess as u64;
+        let bytes = (found - claimed) * FACET_BYTES as u64 + excess as u64;
         warnings.push(excess_bytes_warning(bytes, claimed));
     }
     let mut parsed = ParsedMesh { warnings, ..ParsedMesh::default() };
     parsed.positions.reserve(3 * count as usize);
     for (index, facet) in facets.take(count as usize).enumerate() {
         if index % BATCH == 0 {
-            source.report_progress(START + index * FACET)?;
+            source.report_progress(FACETS_OFFSET + index * FACET_BYTES)?;
         }
         let (floats, _) = facet.as_chunks::<4>();
         let float = |place: usize| f64::from(f32::from_le_bytes(floats[place]));
@@ -111,7 +112,7 @@ fn read_binary(source: &MeshFileBytes<'_>) -> Result<ParsedMesh, AssetError> {
 }
 
 fn not_stl_message(found: &[u8]) -> String {
-    let wanted = format!("text STL starting with solid, or binary STL of at least {START} bytes");
+    let wanted = format!("text STL starting with solid, or binary STL of at least {FACETS_OFFSET} bytes");
     expected_message(&wanted, found)
 }
 
@@ -197,7 +198,7 @@ impl TextReader<'_> {
             } else if !(is("facet") || is("outer") || is("endfacet")) {
                 return self.fail_with_line(start, expected_message(KEYWORD, word));
             }
-            if parsed.positions.len() > Faces::MOST_CORNERS {
+            if parsed.positions.len() > Faces::MAX_CORNERS {
                 return self
                     .fail_with_line(start, "too many corners for one mesh; split it into several files");
             }
@@ -285,7 +286,7 @@ mod tests {
 
     fn binary_of(header: &[u8], claimed: u32, facets: &[[[f32; 3]; 3]]) -> Vec<u8> {
         let mut bytes = header.to_vec();
-        bytes.resize(HEADER, b' ');
+        bytes.resize(HEADER_BYTES, b' ');
         bytes.extend(claimed.to_le_bytes());
         for facet in facets {
             bytes.extend([0; 12]);

@@ -10,7 +10,7 @@ use fast_float2::parse_partial;
 
 use crate::assets::AssetError;
 use crate::assets::read;
-use crate::control::{CancelToken, Cancelled};
+use crate::control::{CancelToken, Canceled};
 
 /// Replaces carriage returns with line feeds in files without line feeds (classic Mac OS).
 pub(super) fn convert_mac_line_ends(bytes: &[u8]) -> Cow<'_, [u8]> {
@@ -61,7 +61,7 @@ impl Lines {
     }
 
     /// Reads the next line, including its line end.
-    pub(super) fn read_next_line(&mut self, token: &CancelToken) -> Result<Option<&[u8]>, Cancelled> {
+    pub(super) fn read_next_line(&mut self, token: &CancelToken) -> Result<Option<&[u8]>, Canceled> {
         self.line.clear();
         Ok(self.append_next_line(token)?.then_some(&self.line))
     }
@@ -77,7 +77,7 @@ impl Lines {
     }
 
     /// Appends further lines for as long as the last one ends with a backslash. Returns the joined lines.
-    pub(super) fn append_continuation_lines(&mut self, token: &CancelToken) -> Result<&[u8], Cancelled> {
+    pub(super) fn append_continuation_lines(&mut self, token: &CancelToken) -> Result<&[u8], Canceled> {
         let is_continued = |line: &[u8]| line.trim_ascii_end().ends_with(b"\\");
         while is_continued(&self.line)
             && self.line.len() < Self::MAX_LENGTH
@@ -86,7 +86,7 @@ impl Lines {
         Ok(&self.line)
     }
 
-    fn append_next_line(&mut self, token: &CancelToken) -> Result<bool, Cancelled> {
+    fn append_next_line(&mut self, token: &CancelToken) -> Result<bool, Canceled> {
         token.check_pause_and_cancel()?;
         let mut rest = (&mut self.reader).take(Self::MAX_LENGTH as u64);
         Ok(rest.read_until(self.end, &mut self.line).is_ok_and(|length| length > 0))

@@ -20,11 +20,11 @@ const SENSITIVITY: [&[SensitivityTerm]; 3] = [
     &[SensitivityTerm { a: 34.1, b: 0.04 }, SensitivityTerm { a: 13.5, b: 0.025 }],
 ];
 /// Width of the widest Gaussian in square degrees.
-const WIDEST: f64 = 0.04;
+const MAX_WIDTH: f64 = 0.04;
 /// Size of the features that the eye detects best, in degrees.
 const FEATURE_DEGREES: f64 = 0.082;
 /// Filter radius in standard deviations.
-const REACH: f64 = 3.0;
+const RADIUS_IN_SIGMAS: f64 = 3.0;
 
 /// A separable blur with a weight.
 struct WeightedGaussian {
@@ -43,9 +43,10 @@ pub(super) struct Filters {
 
 impl Filters {
     pub(super) fn new(pixels_per_degree: f64) -> Self {
-        let blur_radius = (REACH * (WIDEST / (2.0 * PI * PI)).sqrt() * pixels_per_degree).ceil() as usize;
+        let blur_radius =
+            (RADIUS_IN_SIGMAS * (MAX_WIDTH / (2.0 * PI * PI)).sqrt() * pixels_per_degree).ceil() as usize;
         let sigma = 0.5 * FEATURE_DEGREES * pixels_per_degree;
-        let feature_radius = (REACH * sigma).ceil() as usize;
+        let feature_radius = (RADIUS_IN_SIGMAS * sigma).ceil() as usize;
         let radius = blur_radius.max(feature_radius);
         let padded = |taps: &[f64], from: usize| {
             let zeros = vec![0.0; radius - from];

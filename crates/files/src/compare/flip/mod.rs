@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use self::color::{OpponentColor, PerceivedColor};
 use self::filters::{Features, Filters};
 use super::plane::Plane;
-use super::{Pair, tiles};
+use super::{ImagePair, tiles};
 use crate::film::Rect;
 use crate::math::Vec3;
 
@@ -25,7 +25,7 @@ const PC: f64 = 0.4;
 const PT: f64 = 0.95;
 
 /// Computes the error of each pixel, in [0, 1].
-pub(super) fn error_map(pair: &Pair) -> Vec<f32> {
+pub(super) fn error_map(pair: &ImagePair) -> Vec<f32> {
     let (width, height) = (pair.width(), pair.height());
     let filters = Filters::new(PIXELS_PER_DEGREE);
     let max = libm::pow(color::max_display_hyab_distance(), QC);
@@ -42,7 +42,7 @@ pub(super) fn error_map(pair: &Pair) -> Vec<f32> {
     map
 }
 
-fn tile_pixel_errors(pair: &Pair, tile: Rect, filters: &Filters, max: f64) -> Vec<f32> {
+fn tile_pixel_errors(pair: &ImagePair, tile: Rect, filters: &Filters, max: f64) -> Vec<f32> {
     let [a, b] = [0, 1].map(|which| perceived_colors_and_features(pair, which, tile, filters));
     let colors = a.0.iter().zip(&b.0).map(|(a, b)| error_from_color_distance(a.distance(b), max));
     let features = a.1.differences(&b.1);
@@ -51,7 +51,7 @@ fn tile_pixel_errors(pair: &Pair, tile: Rect, filters: &Filters, max: f64) -> Ve
 
 /// Computes the perceived colors and the features of one image within a tile.
 fn perceived_colors_and_features(
-    pair: &Pair,
+    pair: &ImagePair,
     which: usize,
     tile: Rect,
     filters: &Filters,
@@ -66,7 +66,7 @@ fn perceived_colors_and_features(
 }
 
 /// YCxCz of a tile and its margin.
-fn opponent_planes(pair: &Pair, which: usize, tile: Rect, margin: usize) -> [Plane; 3] {
+fn opponent_planes(pair: &ImagePair, which: usize, tile: Rect, margin: usize) -> [Plane; 3] {
     let (width, height) = (tile.width as usize + 2 * margin, tile.height as usize + 2 * margin);
     let mut planes = [0; 3].map(|_| Plane::zero(width, height));
     let position = |start: u32, offset: usize, length: usize| {

@@ -3,16 +3,16 @@
 
 use std::collections::HashMap;
 
-use crate::control::{CancelToken, Cancelled};
+use crate::control::{CancelToken, Canceled};
 use crate::film::Srgb8Image;
 
 /// Width and height of the pattern.
 const SIDE: usize = 4;
 /// Number of colors mixed in a pattern.
-const MIXED: usize = SIDE * SIDE;
+const COLORS_PER_PATTERN: usize = SIDE * SIDE;
 
 /// Thresholds of the pattern (B. Bayer, 1973).
-const RANKS: [usize; MIXED] = [0, 8, 2, 10, 12, 4, 14, 6, 3, 11, 1, 9, 15, 7, 13, 5];
+const RANKS: [usize; COLORS_PER_PATTERN] = [0, 8, 2, 10, 12, 4, 14, 6, 3, 11, 1, 9, 15, 7, 13, 5];
 
 /// Ordered ditherer for a palette.
 pub(super) struct Dither {
@@ -30,8 +30,8 @@ impl Dither {
         &self,
         picture: &Srgb8Image,
         token: &CancelToken,
-    ) -> Result<Vec<u8>, Cancelled> {
-        let mut known: HashMap<[u8; 3], [u8; MIXED]> = HashMap::new();
+    ) -> Result<Vec<u8>, Canceled> {
+        let mut known: HashMap<[u8; 3], [u8; COLORS_PER_PATTERN]> = HashMap::new();
         let mut indices = Vec::with_capacity(picture.pixels.len());
         for (y, row) in picture.pixels.chunks(picture.width.max(1) as usize).enumerate() {
             token.check_pause_and_cancel()?;
@@ -44,9 +44,9 @@ impl Dither {
     }
 
     /// Returns the palette indices of colors whose mean approximates a color, sorted by brightness.
-    fn mixed_colors(&self, color: [u8; 3]) -> [u8; MIXED] {
+    fn mixed_colors(&self, color: [u8; 3]) -> [u8; COLORS_PER_PATTERN] {
         let color = color.map(i32::from);
-        let (mut mixed, mut error) = ([0; MIXED], [0; 3]);
+        let (mut mixed, mut error) = ([0; COLORS_PER_PATTERN], [0; 3]);
         for entry in &mut mixed {
             // Compensate for the accumulated error.
             let aim = [0, 1, 2].map(|channel: usize| color[channel] + error[channel]);

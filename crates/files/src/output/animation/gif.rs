@@ -13,7 +13,7 @@ use crate::film::Srgb8Image;
 /// Size of the palette.
 const COLORS: usize = 256;
 /// Approximate number of pixels used to compute the palette.
-const SAMPLES: usize = 1 << 20;
+const PALETTE_SAMPLES: usize = 1 << 20;
 /// Quantizer setting: 1 uses every sample.
 const EVERY_SAMPLE: i32 = 1;
 
@@ -22,11 +22,11 @@ pub(super) fn encode(
     metadata: &[(String, String)],
     token: &CancelToken,
 ) -> Result<Vec<u8>, EncodingError> {
-    let cancelled = |cancelled| EncodingError::from(std::io::Error::other(cancelled));
+    let canceled = |canceled| EncodingError::from(std::io::Error::other(canceled));
     let (width, height) = frames.first().map_or((0, 0), |first| (first.width as u16, first.height as u16));
     // Choose the palette from pixels in all frames.
     let palette = palette(frames);
-    token.check_pause_and_cancel().map_err(cancelled)?;
+    token.check_pause_and_cancel().map_err(canceled)?;
     // Write the header: the palette, an infinite loop, and the metadata as comments.
     let mut encoder = Encoder::new(Vec::new(), width, height, &palette)?;
     encoder.set_repeat(Repeat::Infinite)?;
@@ -52,7 +52,7 @@ pub(super) fn encode(
             true => batch.par_iter().map(compress).collect(),
             false => batch.iter().map(compress).collect(),
         };
-        for frame in compressed.map_err(cancelled)? {
+        for frame in compressed.map_err(canceled)? {
             encoder.write_lzw_pre_encoded_frame(&frame)?;
         }
     }
@@ -63,7 +63,7 @@ pub(super) fn encode(
 fn palette(frames: &[Srgb8Image]) -> Vec<u8> {
     let pixels: usize = frames.iter().map(|frame| frame.pixels.len()).sum();
     // An odd step avoids sampling the same columns in every row.
-    let step = (pixels / SAMPLES) | 1;
+    let step = (pixels / PALETTE_SAMPLES) | 1;
     let all = frames.iter().flat_map(|frame| &frame.pixels);
     let samples: Vec<[u8; 4]> =
         all.step_by(step).map(|&[red, green, blue]| [red, green, blue, 255]).collect();

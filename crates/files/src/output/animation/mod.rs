@@ -11,13 +11,13 @@ use crate::film::Srgb8Image;
 /// Duration of an animation (a full turn of the camera) in seconds.
 const TURN_SECONDS: f64 = 4.0;
 /// Minimum duration of a frame in seconds. Players show shorter frames for a tenth of a second.
-const SHORTEST_FRAME: f64 = 0.02;
+const MIN_FRAME_SECONDS: f64 = 0.02;
 
 /// Encodes frames of the same size as an animation that loops forever. Encoding is deterministic.
 ///
 /// # Errors
 /// The format does not support the frames, the encoder fails, or the work is canceled
-/// ([`OutputError::Cancelled`]).
+/// ([`OutputError::Canceled`]).
 pub fn encode(
     frames: &[Srgb8Image],
     metadata: &[(String, String)],
@@ -45,7 +45,7 @@ pub fn encode(
 
 /// Returns the duration of a frame in units of 1/`per_second` seconds.
 fn turn_frame_duration_in_ticks(frames: usize, per_second: f64) -> f64 {
-    (TURN_SECONDS / frames as f64).max(SHORTEST_FRAME) * per_second
+    (TURN_SECONDS / frames as f64).max(MIN_FRAME_SECONDS) * per_second
 }
 
 #[cfg(test)]

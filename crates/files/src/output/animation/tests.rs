@@ -139,7 +139,7 @@ fn invalid_frames_and_cancellation_are_errors() {
     assert!(encode(&[frame(0), odd], &[], AnimationFormat::Apng, &token).is_err());
     token.cancel();
     for format in [AnimationFormat::Gif, AnimationFormat::Apng] {
-        assert!(matches!(encode(&frames(), &[], format, &token), Err(OutputError::Cancelled(_))));
+        assert!(matches!(encode(&frames(), &[], format, &token), Err(OutputError::Canceled(_))));
     }
 }
 

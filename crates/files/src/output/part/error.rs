@@ -110,8 +110,8 @@ pub enum PartError {
     #[error("{0}")]
     Film(#[from] crate::film::FilmCreationError),
     /// The operation was canceled.
-    #[error("cancelled")]
-    Cancelled(#[from] crate::control::Cancelled),
+    #[error("canceled")]
+    Canceled(#[from] crate::control::Canceled),
 }
 
 impl PartError {

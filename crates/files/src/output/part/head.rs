@@ -166,7 +166,8 @@ const QUANTITIES: [(FilmQuantity, &str); 3] = [
 ];
 
 /// Names of the range mappings in part files.
-const STRETCHES: [(DataKind, &str); 2] = [(DataKind::Distances, "distances"), (DataKind::Amounts, "amounts")];
+const RANGE_MAPPING_NAMES: [(DataKind, &str); 2] =
+    [(DataKind::Distances, "distances"), (DataKind::Amounts, "amounts")];
 
 impl ImageHeader {
     /// Describes the image that these settings produce from a film.
@@ -177,8 +178,9 @@ impl ImageHeader {
             RangeMap::None => None,
             RangeMap::Unresolved(kind) | RangeMap::Resolved(kind, _) => Some(kind),
         };
-        let word =
-            |wanted: DataKind| STRETCHES.iter().find(|(kind, _)| *kind == wanted).map(|(_, word)| *word);
+        let word = |wanted: DataKind| {
+            RANGE_MAPPING_NAMES.iter().find(|(kind, _)| *kind == wanted).map(|(_, word)| *word)
+        };
         let quantity = QUANTITIES.iter().find(|(quantity, _)| *quantity == finish.quantity);
         Self {
             width: film.width(),
@@ -205,7 +207,9 @@ impl ImageHeader {
     pub fn develop_settings(&self) -> Option<FilmEncodingSettings> {
         let range_map = match self.tone.stretch.as_deref() {
             None => RangeMap::None,
-            Some(word) => RangeMap::Unresolved(STRETCHES.iter().find(|(_, known)| *known == word)?.0),
+            Some(word) => {
+                RangeMap::Unresolved(RANGE_MAPPING_NAMES.iter().find(|(_, known)| *known == word)?.0)
+            }
         };
         Some(FilmEncodingSettings {
             quantity: QUANTITIES.iter().find(|(_, word)| *word == self.quantity)?.0,

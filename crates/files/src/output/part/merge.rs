@@ -74,7 +74,7 @@ fn metadata_differences(a: &[(String, String)], b: &[(String, String)]) -> Vec<S
 }
 
 /// Merges parts in any order. Parts may be missing only if `is_partial` is true; their tiles are then black
-/// or have fewer samples. `tell` is called with the number of finished tiles and the film.
+/// or have fewer samples. `on_tile_finished` is called with the number of finished tiles and the film.
 ///
 /// # Errors
 /// Same as [`check_and_list_missing`]. Also fails if parts are missing, a part is inconsistent, or the work
@@ -83,7 +83,7 @@ pub fn merge_into_film(
     parts: &[PartFile],
     is_partial: bool,
     token: &CancelToken,
-    mut tell: impl FnMut(usize, &Film),
+    mut on_tile_finished: impl FnMut(usize, &Film),
 ) -> Result<MergedParts, PartError> {
     let missing = check_and_list_missing(parts)?;
     let Some(first) = parts.first() else { return Err(PartError::Missing { missing, count: 0 }) };
@@ -109,7 +109,7 @@ pub fn merge_into_film(
             let damaged = |_| PartError::Damaged { path: first.path.clone(), why };
             film.restore_tile(tile, stored).map_err(damaged)?;
         }
-        tell(tile + 1, &film);
+        on_tile_finished(tile + 1, &film);
     }
     film.add_non_finite(parts.iter().map(|part| part.non_finite).sum());
     Ok(MergedParts { film, missing, count })

@@ -30,7 +30,7 @@ pub use save::save;
 
 /// Magic number. Like PNG's signature, it is corrupted if a program converts the file as if it were text, so
 /// such damage is detected.
-const MARK: [u8; 12] = crate::system::file::PART_MAGIC;
+const MAGIC: [u8; 12] = crate::system::file::PART_MAGIC;
 
 /// Version of the part file format.
 const VERSION: u32 = 2;

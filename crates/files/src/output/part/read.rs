@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use nix::sys::resource::{Resource, getrlimit, setrlimit};
 
 use super::head::{PartHeader, PartOrCheckpoint};
-use super::{Digest, FOOTER, Footer, MARK, PartError, VERSION, digest};
+use super::{Digest, FOOTER, Footer, MAGIC, PartError, VERSION, digest};
 use crate::control::CancelToken;
 use crate::film::{Film, StoredTile};
 use crate::system::file;
@@ -35,8 +35,8 @@ pub(super) const IMPOSSIBLE_HEADER: &str = "the header has invalid values";
 
 /// Whether a file has the magic number of parts and checkpoints.
 pub fn is_part(path: &Path) -> bool {
-    let mut mark = [0; MARK.len()];
-    open_raising_file_limit(path).is_ok_and(|mut file| file.read_exact(&mut mark).is_ok()) && mark == MARK
+    let mut mark = [0; MAGIC.len()];
+    open_raising_file_limit(path).is_ok_and(|mut file| file.read_exact(&mut mark).is_ok()) && mark == MAGIC
 }
 
 /// Returns the name of the input file that has the same content as the file at `path`, or `None` if there is
@@ -232,10 +232,10 @@ impl PartReader<'_> {
 
     fn read_header(&mut self) -> Result<(PartHeader, Digest), PartError> {
         let mut mark = Vec::new();
-        self.read_bytes(self.size.min(MARK.len() as u64) as u32, &mut mark)?;
-        match mark.len() < MARK.len() {
-            true if MARK.starts_with(&mark) => return Err(self.unfinished_error()),
-            false if mark == MARK => {}
+        self.read_bytes(self.size.min(MAGIC.len() as u64) as u32, &mut mark)?;
+        match mark.len() < MAGIC.len() {
+            true if MAGIC.starts_with(&mark) => return Err(self.unfinished_error()),
+            false if mark == MAGIC => {}
             true | false => return Err(PartError::Foreign { path: self.path.to_owned() }),
         }
         let version = self.read_u32()?;
@@ -245,7 +245,7 @@ impl PartReader<'_> {
         let length = self.read_u32()?;
         let mut text = Vec::new();
         self.read_bytes(length, &mut text)?;
-        let start = [&MARK[..], &version.to_le_bytes(), &length.to_le_bytes(), &text].concat();
+        let start = [&MAGIC[..], &version.to_le_bytes(), &length.to_le_bytes(), &text].concat();
         let mut found = Digest::default();
         self.read_exact(&mut found)?;
         if digest(&Digest::default(), &[&start]) != found {

@@ -9,7 +9,7 @@ use serde_json::Value;
 
 use super::super::OutputError;
 use super::super::write::{Durability, ExistingFilePolicy, atomic_generated};
-use super::{Digest, FOOTER, Footer, MARK, PartHeader, VERSION, digest};
+use super::{Digest, FOOTER, Footer, MAGIC, PartHeader, VERSION, digest};
 use crate::control::CancelToken;
 use crate::film::Film;
 
@@ -97,7 +97,7 @@ fn encode_part(
     // Write the header and its digest.
     let text = serde_json::to_vec(head)?;
     let length = (text.len() as u32).to_le_bytes();
-    let start = [&MARK[..], &VERSION.to_le_bytes(), &length, &text].concat();
+    let start = [&MAGIC[..], &VERSION.to_le_bytes(), &length, &text].concat();
     let header_digest = digest(&Digest::default(), &[&start]);
     file.write_all(&start)?;
     file.write_all(&header_digest)?;

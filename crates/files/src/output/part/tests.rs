@@ -32,7 +32,7 @@ fn film(index: u32, count: u32) -> Film {
     film
 }
 
-fn finish() -> FilmEncodingSettings {
+fn encoding_settings() -> FilmEncodingSettings {
     FilmEncodingSettings {
         quantity: FilmQuantity::Radiance,
         tone: ToneMapping { exposure_stops: 0.3, ..ToneMapping::default() },
@@ -51,7 +51,7 @@ fn head(index: u32, count: u32, film: &Film) -> PartHeader {
             NamedRenderInput::from_combined_hash("ff"),
         ],
         share: PartShare { index, count, block_count: 0, blocks: Vec::new() },
-        picture: ImageHeader::from_film(film, &finish()),
+        picture: ImageHeader::from_film(film, &encoding_settings()),
         scene: String::new(),
         references: Vec::new(),
     }
@@ -100,7 +100,7 @@ fn parts_merge_in_any_order() {
         assert_eq!(film.radiance_image().pixels, whole.radiance_image().pixels, "{count} parts");
         assert_eq!(film.mean_luminance_error(), whole.mean_luminance_error());
         let part = opened(&paths[0]).expect("a part");
-        assert_eq!(part.head.picture.develop_settings(), Some(finish()));
+        assert_eq!(part.head.picture.develop_settings(), Some(encoding_settings()));
         assert_eq!(part.state, json!({ "a": 1 }));
     }
 }

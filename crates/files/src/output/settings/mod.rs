@@ -18,7 +18,7 @@ use crate::system::file::{self, PART_MAGIC};
 /// Number of bytes to search for settings at the start of a file.
 const START_BYTES: u64 = 4 << 20;
 /// Maximum number of settings.
-const LIMIT: usize = 200;
+const MAX_SETTINGS: usize = 200;
 /// Name prefix for glimt's own settings.
 const PREFIX: &str = "glimt:";
 
@@ -49,7 +49,7 @@ impl ImageInfo {
     fn add(&mut self, name: &str, value: &str) {
         match name {
             "Software" | "SOFTWARE" => self.program = Some(value.to_owned()),
-            _ if self.settings.len() < LIMIT => {
+            _ if self.settings.len() < MAX_SETTINGS => {
                 let name = name.strip_prefix(PREFIX).unwrap_or(name);
                 self.settings.push((name.to_owned(), value.to_owned()));
             }

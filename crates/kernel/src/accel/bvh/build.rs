@@ -4,7 +4,7 @@
 
 use super::top_node::WideTopNode;
 use super::{BinaryNode, Bvh, ChildRef, LEAF_SIZE, SURFACE_AREA_LEVELS};
-use crate::control::{CancelToken, Cancelled};
+use crate::control::{CancelToken, Canceled};
 use crate::geometry::Aabb;
 use crate::math::Vec3;
 
@@ -54,8 +54,8 @@ impl Bvh {
     /// Builds a tree over boxes. Skips empty boxes and boxes with NaN coordinates.
     ///
     /// # Errors
-    /// [`Cancelled`] if the build was canceled.
-    pub fn build(boxes: &[Aabb], token: &CancelToken) -> Result<Self, Cancelled> {
+    /// [`Canceled`] if the build was canceled.
+    pub fn build(boxes: &[Aabb], token: &CancelToken) -> Result<Self, Canceled> {
         let mut references: Vec<PrimitiveReference> = boxes
             .iter()
             .enumerate()
@@ -110,7 +110,7 @@ fn build_subtree(
     nodes: &mut [BinaryNode],
     start: OutputPosition,
     token: &CancelToken,
-) -> Result<SubtreeSummary, Cancelled> {
+) -> Result<SubtreeSummary, Canceled> {
     let bounds = references.iter().fold(Aabb::EMPTY, |all, reference| all.union(reference.bounds));
     let Some((middle, by_size)) = partition_unless_leaf_is_cheaper(references, bounds, &start) else {
         let leaf = ChildRef { first: start.place as u32, count: references.len() as u32 };

@@ -17,15 +17,15 @@ use crate::math::lanes::{Simd, TRUE};
 
 /// Callback that finds the nearest hits for a packet.
 pub trait ClosestHitCallback {
-    /// Tests a primitive against the rays in `met`. If a ray hits the primitive, the ray's end is moved to
+    /// Tests a primitive against the rays in `active`. If a ray hits the primitive, the ray's end is moved to
     /// the hit. Primitives exactly at a ray's end are still tested because ties are broken by id.
-    fn test(&mut self, id: u32, met: u32, ends: &mut F32x16);
+    fn test(&mut self, id: u32, active: u32, ends: &mut F32x16);
 }
 
 /// Callback that tests a packet for any hit.
 pub trait AnyHitCallback {
-    /// Returns the mask of the rays in `met` that hit a primitive.
-    fn test(&mut self, id: u32, met: u32, ends: &F32x16) -> u32;
+    /// Returns the mask of the rays in `active` that hit a primitive.
+    fn test(&mut self, id: u32, active: u32, ends: &F32x16) -> u32;
 }
 
 /// A packet preprocessed for the slab test.
@@ -88,11 +88,11 @@ impl SlabIntervals {
 /// Mask of the rays that hit a box before their end.
 #[inline(always)]
 fn hit_mask(stretches: &SlabIntervals, simd: impl Simd) -> u32 {
-    let mut met = [0; PACKET_SIZE];
+    let mut hits = [0; PACKET_SIZE];
     for lane in 0..PACKET_SIZE {
-        met[lane] = if stretches.near[lane] <= stretches.far[lane] { TRUE } else { 0 };
+        hits[lane] = if stretches.near[lane] <= stretches.far[lane] { TRUE } else { 0 };
     }
-    simd.movemask(&met)
+    simd.movemask(&hits)
 }
 
 /// The largest ray end, or a negative number if no ray is traced. Compares bits as in
@@ -119,9 +119,9 @@ struct PendingSubtrees {
 
 impl PendingSubtrees {
     #[inline(always)]
-    fn sorted_by_entry((met, entry): (u32, F32x16)) -> Self {
+    fn sorted_by_entry((hits, entry): (u32, F32x16)) -> Self {
         let mut near = Self { entry, order: [0; PACKET_SIZE], count: 0 };
-        for i in set_bit_lanes(met) {
+        for i in set_bit_lanes(hits) {
             let mut place = near.count;
             while place > 0 && entry[usize::from(near.order[place - 1])] < entry[i] {
                 near.order[place] = near.order[place - 1];
@@ -245,9 +245,9 @@ impl Bvh {
         let mut stack = PacketStack::new();
         loop {
             for &id in leaf {
-                let met = in_leaf & free;
-                if met != 0 {
-                    free &= !any.test(id, met, ends);
+                let active = in_leaf & free;
+                if active != 0 {
+                    free &= !any.test(id, active, ends);
                 }
             }
             loop {
@@ -275,9 +275,9 @@ impl Bvh {
                 }
                 let node = &self.nodes[child.first as usize];
                 for (bounds, child) in node.bounds.iter().zip(node.child) {
-                    let met = hit_mask(&slabs.entry_intervals(bounds, ends), simd);
-                    if met & free != 0 {
-                        stack.push((0.0, met, child));
+                    let hits = hit_mask(&slabs.entry_intervals(bounds, ends), simd);
+                    if hits & free != 0 {
+                        stack.push((0.0, hits, child));
                     }
                 }
             }

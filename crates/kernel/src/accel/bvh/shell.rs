@@ -13,7 +13,7 @@ use crate::math::DVec3;
 const ROUNDING: f64 = 1e-6;
 
 /// Ratio of squared distance to squared outer radius beyond which rounding errors make shells useless.
-const FAR: f64 = 1e12;
+const MAX_SQUARED_DISTANCE_RATIO: f64 = 1e12;
 
 /// A region between two concentric spheres that contains the surfaces of some primitives.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -72,7 +72,7 @@ impl SphericalShell {
         let distance = to_origin.length_squared();
         let is_inside = self.inner > 0.0 && distance < self.inner * self.inner;
         let is_outside = distance > self.outer * self.outer;
-        if !(is_inside || is_outside) || distance > FAR * self.outer * self.outer {
+        if !(is_inside || is_outside) || distance > MAX_SQUARED_DISTANCE_RATIO * self.outer * self.outer {
             return Some(0.0);
         }
         let a = ray.direction.length_squared();
@@ -263,9 +263,9 @@ impl Bvh {
                 continue;
             }
             let (node, shells) = (&self.nodes[first as usize], &shells[first as usize]);
-            let is_met =
+            let is_hit =
                 |side: &usize| enter.entry_distance(&node.bounds[*side], &shells[*side], ray.t_max).is_some();
-            stack.extend((0..2).filter(is_met).map(|side| node.child[side]));
+            stack.extend((0..2).filter(is_hit).map(|side| node.child[side]));
         }
         false
     }

@@ -82,8 +82,8 @@ fn nested_box_queries_match_brute_force() {
             let at = Vec3::X + Vec3::new(next(), next(), next()) * 2.0;
             let near = Aabb { min: at, max: at }.expanded(Vec3::splat([1e-5, 0.1][i % 2]));
             let (mut visited, mut enclosing) = (Vec::new(), Vec::new());
-            tree.visit_surfaces_overlapping_box(&near, |met| {
-                match met {
+            tree.visit_surfaces_overlapping_box(&near, |surface| {
+                match surface {
                     PrimitiveOrEnclosingSubtree::Primitive(id) => visited.push(id),
                     PrimitiveOrEnclosingSubtree::Enclosing(subtree) => enclosing.extend(&last[subtree]),
                 }
@@ -115,21 +115,21 @@ fn nested_sphere_traversal_is_logarithmic() {
         let tree = tree(&spheres[..count as usize]);
         let most =
             rays(600).iter().map(|ray| closest_hit_and_test_count(&tree, &spheres, ray).1).max().unwrap_or(0);
-        let mut most_met = 0;
+        let mut max_visited = 0;
         for ray in rays(600) {
             let near = Aabb { min: ray.origin, max: ray.origin };
-            let mut met = 0;
+            let mut visited = 0;
             tree.visit_surfaces_overlapping_box(&near, |_| {
-                met += 1;
+                visited += 1;
                 true
             });
-            most_met = most_met.max(met);
+            max_visited = max_visited.max(visited);
         }
-        (most, most_met)
+        (most, max_visited)
     };
     for count in [500, 1000, 2000, 4000, 8000] {
-        let (tests, met) = work(count);
+        let (tests, visited) = work(count);
         let bound = 3 * count.ilog2() as usize;
-        assert!(tests <= bound && met <= bound, "{tests} tests, {met} overlaps for {count} spheres");
+        assert!(tests <= bound && visited <= bound, "{tests} tests, {visited} overlaps for {count} spheres");
     }
 }

@@ -74,15 +74,15 @@ impl WideTopNode {
     /// Mask of the subtrees whose boxes overlap `other`.
     #[inline]
     pub(super) fn overlap_mask(&self, other: &Aabb) -> u32 {
-        let mut met = [TRUE; PACKET_SIZE];
+        let mut hits = [TRUE; PACKET_SIZE];
         for axis in 0..3 {
             let (least, greatest) = (other.min[axis], other.max[axis]);
             for i in 0..PACKET_SIZE {
-                let meets = (self.min[axis][i] <= greatest) & (least <= self.max[axis][i]);
-                met[i] = if meets { met[i] } else { 0 };
+                let overlaps = (self.min[axis][i] <= greatest) & (least <= self.max[axis][i]);
+                hits[i] = if overlaps { hits[i] } else { 0 };
             }
         }
-        PortableSimd.movemask(&met) & self.used
+        PortableSimd.movemask(&hits) & self.used
     }
 
     /// Mask of the subtrees that the rays in a beam may hit, and lower bounds on the entry distances.
@@ -110,11 +110,11 @@ impl WideTopNode {
                 far[i] = if exit < far[i] { exit } else { far[i] };
             }
         }
-        let mut met = [0; PACKET_SIZE];
+        let mut hits = [0; PACKET_SIZE];
         for i in 0..PACKET_SIZE {
-            met[i] = if near[i] <= far[i] { TRUE } else { 0 };
+            hits[i] = if near[i] <= far[i] { TRUE } else { 0 };
         }
-        (simd.movemask(&met) & self.used, near)
+        (simd.movemask(&hits) & self.used, near)
     }
 }
 
@@ -178,14 +178,14 @@ mod tests {
     struct TestLog(Vec<u32>);
 
     impl ClosestHitCallback for TestLog {
-        fn test(&mut self, id: u32, met: u32, _: &mut F32x16) {
-            self.0[id as usize] |= met;
+        fn test(&mut self, id: u32, active: u32, _: &mut F32x16) {
+            self.0[id as usize] |= active;
         }
     }
 
     impl AnyHitCallback for TestLog {
-        fn test(&mut self, id: u32, met: u32, _: &F32x16) -> u32 {
-            self.0[id as usize] |= met;
+        fn test(&mut self, id: u32, active: u32, _: &F32x16) -> u32 {
+            self.0[id as usize] |= active;
             0
         }
     }
@@ -204,7 +204,7 @@ mod tests {
             let boxes: Vec<Aabb> = (0..count).map(|_| cell(&mut next)).collect();
             let tree = Bvh::build(&boxes, &CancelToken::new()).expect("never canceled");
             assert_eq!(tree.is_flat(), count <= PACKET_SIZE, "{count}");
-            let (mut tested, mut met) = (0, 0);
+            let (mut tested, mut hits) = (0, 0);
             for round in 0..600 {
                 let (from, to) = (Vec3::new(next(), next(), next()) * 6.0, Vec3::new(next(), next(), next()));
                 let spread = [0.001, 0.1, 4.0][round % 3];
@@ -230,18 +230,18 @@ mod tests {
                 for (id, bounds) in boxes.iter().enumerate() {
                     for lane in set_bit_lanes((1 << rays.len()) - 1).filter(|&lane| ends[lane] >= 0.0) {
                         let slabs = SlabRay::new(rays[lane].origin, rays[lane].direction);
-                        let is_met = slabs.entry_distance(bounds.min, bounds.max, ends[lane]).is_some();
+                        let is_hit = slabs.entry_distance(bounds.min, bounds.max, ends[lane]).is_some();
                         let seen = [closest.0[id], any.0[id]].map(|seen| seen & 1 << lane != 0);
-                        assert!(!is_met || seen == [true; 2], "{lane} of {rays:?}: {bounds:?} {seen:?}");
-                        met += u32::from(is_met);
+                        assert!(!is_hit || seen == [true; 2], "{lane} of {rays:?}: {bounds:?} {seen:?}");
+                        hits += u32::from(is_hit);
                     }
                     tested += closest.0[id].count_ones();
                 }
             }
-            assert!(met > 0 || count == 0, "{count}: no ray hit anything");
+            assert!(hits > 0 || count == 0, "{count}: no ray hit anything");
             assert!(
-                count > PACKET_SIZE || tested == met,
-                "{count}: {tested} tests for {met} hits; a flat tree needs exactly one test per hit box"
+                count > PACKET_SIZE || tested == hits,
+                "{count}: {tested} tests for {hits} hits; a flat tree needs exactly one test per hit box"
             );
         }
     }

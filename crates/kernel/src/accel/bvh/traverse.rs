@@ -208,7 +208,7 @@ mod tests {
             let mut best: Option<(f32, u32)> = None;
             tree.visit_leaves_front_to_back(&ray, |id, t_max| {
                 let t = slabs.entry_distance(boxes[id as usize].min, boxes[id as usize].max, t_max)?;
-                let better = best.is_none_or(|(least, least_id)| (t, id) < (least, least_id));
+                let better = best.is_none_or(|(least, min_id)| (t, id) < (least, min_id));
                 better.then(|| best = Some((t, id)))?;
                 Some(t)
             });

@@ -11,7 +11,7 @@ mod traverse;
 mod validate;
 
 use crate::accel::{RayBoxInterval, TreeNodeInfo};
-use crate::control::{CancelToken, Cancelled};
+use crate::control::{CancelToken, Canceled};
 use crate::geometry::{Aabb, Ray};
 use crate::math::Vec3;
 
@@ -34,12 +34,12 @@ impl KdTree {
     /// Builds a tree over `count` indexed triangles. Triangles with NaN coordinates are never hit.
     ///
     /// # Errors
-    /// [`Cancelled`] if the build was canceled.
+    /// [`Canceled`] if the build was canceled.
     pub fn from_triangles(
         count: u32,
         corners: impl Fn(u32) -> [Vec3; 3] + Sync,
         token: &CancelToken,
-    ) -> Result<Self, Cancelled> {
+    ) -> Result<Self, Canceled> {
         let build::BuiltKdTree { nodes, references, triangles, bounds } =
             build::build(count, corners, token)?;
         Ok(Self { nodes, references, triangles, bounds })

@@ -6,7 +6,7 @@ use crate::math::Vec3;
 const LEAF: u32 = 3;
 
 /// Largest child index or reference count that fits into `PackedKdNode::tag`.
-pub const MOST: u32 = u32::MAX >> 2;
+pub const MAX_PAYLOAD: u32 = u32::MAX >> 2;
 
 /// An encoded node. The left child of an inner node is the next node.
 #[derive(Clone, Copy, Debug)]
@@ -44,11 +44,11 @@ impl PackedKdNode {
     pub fn new(kind: DecodedNode) -> Self {
         match kind {
             DecodedNode::Inner { axis, at, right } => {
-                debug_assert!(axis < 3 && right <= MOST);
+                debug_assert!(axis < 3 && right <= MAX_PAYLOAD);
                 Self { payload: at.to_bits(), tag: right << 2 | axis as u32 }
             }
             DecodedNode::Leaf { first, count } => {
-                debug_assert!(count <= MOST);
+                debug_assert!(count <= MAX_PAYLOAD);
                 Self { payload: first, tag: count << 2 | LEAF }
             }
         }

@@ -10,7 +10,7 @@ use crate::geometry::watertight::ShearedRay;
 use crate::geometry::{Aabb, Ray, ShapeHit};
 
 /// Displacement of a ray due to rounding, relative to the largest length.
-const PAD: f32 = 32.0 * f32::EPSILON;
+const RAY_DISPLACEMENT: f32 = 32.0 * f32::EPSILON;
 
 /// Stack size. The depth limit is lower even for the largest possible number of triangles.
 pub(super) const STACK_SIZE: usize = 64;
@@ -29,17 +29,17 @@ struct PlaneRay {
 
 impl PlaneRay {
     fn new(ray: &Ray, bounds: &Aabb) -> Self {
-        let greatest = ray.direction.abs().max_element();
+        let largest = ray.direction.abs().max_element();
         // Compute the next lower power of two from the exponent bits. Scaling by a power of two is exact.
-        let steps = f32::from_bits(greatest.to_bits() & 0x7f80_0000)
-            .clamp(f32::MIN_POSITIVE, 1.0 / f32::MIN_POSITIVE);
+        let steps =
+            f32::from_bits(largest.to_bits() & 0x7f80_0000).clamp(f32::MIN_POSITIVE, 1.0 / f32::MIN_POSITIVE);
         let inverse = (ray.direction * (1.0 / steps)).recip();
         let reach = (bounds.min - ray.origin).abs().max((bounds.max - ray.origin).abs()).max_element();
         Self {
             origin: ray.origin.to_array(),
             inverse: inverse.to_array(),
             backward: inverse.to_array().map(|inverse| inverse.is_sign_negative()),
-            pad: reach * PAD,
+            pad: reach * RAY_DISPLACEMENT,
             steps,
         }
     }

@@ -7,7 +7,7 @@ mod build;
 mod node;
 mod simd;
 
-use crate::control::{CancelToken, Cancelled};
+use crate::control::{CancelToken, Canceled};
 use crate::geometry::packet::set_bit_lanes;
 use crate::geometry::{Aabb, Ray, ShapeHit};
 use crate::math::Vec3;
@@ -43,25 +43,25 @@ impl WideBvh {
     /// Builds a tree over `count` indexed triangles. Triangles with NaN coordinates are never hit.
     ///
     /// # Errors
-    /// [`Cancelled`] if the build was canceled.
+    /// [`Canceled`] if the build was canceled.
     pub fn build(
         count: u32,
         corners: impl Fn(u32) -> [Vec3; 3] + Sync,
         token: &CancelToken,
-    ) -> Result<Self, Cancelled> {
+    ) -> Result<Self, Canceled> {
         Self::build_with_quality(Quality::default(), count, corners, token)
     }
 
     /// Builds a tree with the given quality, which does not affect the hits.
     ///
     /// # Errors
-    /// [`Cancelled`] if the build was canceled.
+    /// [`Canceled`] if the build was canceled.
     pub fn build_with_quality(
         quality: Quality,
         count: u32,
         corners: impl Fn(u32) -> [Vec3; 3] + Sync,
         token: &CancelToken,
-    ) -> Result<Self, Cancelled> {
+    ) -> Result<Self, Canceled> {
         let build::BuiltWideBvh { nodes, packs, bounds } = build::build(count, corners, quality, token)?;
         Ok(Self { nodes, packs, bounds, instructions: InstructionSet::best(), quality })
     }

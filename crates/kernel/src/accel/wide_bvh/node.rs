@@ -11,7 +11,7 @@ pub const WIDTH: usize = 8;
 pub const PACK: usize = 4;
 
 /// Maximum number of packs per leaf.
-pub const MOST_PACKS: u32 = 8;
+pub const MAX_PACKS: u32 = 8;
 
 /// Bit that marks a leaf in [`WideNode::children`]. The next three bits contain the number of packs minus
 /// one. The remaining bits contain the index of the first pack.
@@ -24,7 +24,7 @@ pub const LEAF_BITS: u32 = !((1 << FIRST_BITS) - 1);
 
 /// A mesh has at most 1.3 references per triangle after splitting. Every pack and every node needs at least
 /// one reference.
-const _: () = assert!(TriangleMesh::MOST_TRIANGLES as u64 * 13 / 10 < 1 << FIRST_BITS);
+const _: () = assert!(TriangleMesh::MAX_TRIANGLES as u64 * 13 / 10 < 1 << FIRST_BITS);
 
 /// Eight children and their boxes, stored as arrays of minimum and maximum coordinates.
 #[derive(Clone, Copy, Debug)]
@@ -66,7 +66,7 @@ impl Child {
         match self {
             Self::Inner(node) => node,
             Self::Leaf { first, count } => {
-                debug_assert!(count <= MOST_PACKS && first < 1 << FIRST_BITS);
+                debug_assert!(count <= MAX_PACKS && first < 1 << FIRST_BITS);
                 LEAF | (count - 1) << FIRST_BITS | first
             }
         }
@@ -106,14 +106,14 @@ impl WideNode {
     /// Mask of the slots whose boxes overlap `other`.
     #[inline]
     pub fn overlap_mask(&self, other: &Aabb) -> u32 {
-        let mut met = [true; WIDTH];
+        let mut overlaps = [true; WIDTH];
         for axis in 0..3 {
             let (least, greatest) = (&self.rows[2 * axis], &self.rows[2 * axis + 1]);
             for slot in 0..WIDTH {
-                met[slot] &= (least[slot] <= other.max[axis]) & (other.min[axis] <= greatest[slot]);
+                overlaps[slot] &= (least[slot] <= other.max[axis]) & (other.min[axis] <= greatest[slot]);
             }
         }
-        (0..WIDTH).fold(0, |bits, slot| bits | u32::from(met[slot]) << slot)
+        (0..WIDTH).fold(0, |bits, slot| bits | u32::from(overlaps[slot]) << slot)
     }
 
     /// Child of a slot.

@@ -18,7 +18,7 @@ use crate::math::DVec3;
 
 /// Maximum number of Newton and bisection steps. Even bisecting the entire line down to the last digit takes
 /// fewer steps.
-const MOST_STEPS: u32 = 200;
+const MAX_STEPS: u32 = 200;
 
 /// Half-width of the neighborhood around the axis in which the slope of g changes sign.
 const KINK: f64 = 1e-9;
@@ -106,7 +106,7 @@ impl UnitTorusLine {
     pub(super) fn surface_entry_parameters(&self, from: f64, to: f64) -> [Option<f64>; 2] {
         /// Step past a crossing, long enough to reach the other side of the surface despite rounding unless
         /// the line grazes the surface.
-        const BEYOND: f64 = 1e-10;
+        const STEP_PAST_CROSSING: f64 = 1e-10;
         let mut found = [None; 2];
         let mut start = from;
         for crossing in 0..4 {
@@ -114,7 +114,7 @@ impl UnitTorusLine {
             if crossing % 2 == 0 {
                 found[crossing / 2] = Some(s);
             }
-            start = s + BEYOND;
+            start = s + STEP_PAST_CROSSING;
         }
         found
     }
@@ -168,7 +168,7 @@ impl UnitTorusLine {
     /// the interval.
     fn refine_crossing(&self, mut low: f64, mut high: f64, start: LineSample, is_inside: bool) -> f64 {
         let mut x = start;
-        for _ in 0..MOST_STEPS {
+        for _ in 0..MAX_STEPS {
             let newton = x.s - x.value / x.slope;
             if newton == x.s {
                 break;
@@ -190,7 +190,7 @@ impl UnitTorusLine {
             return None;
         }
         let mut x = low;
-        for _ in 0..MOST_STEPS {
+        for _ in 0..MAX_STEPS {
             if !(x.slope * sign < 0.0) {
                 return None;
             }

@@ -15,7 +15,7 @@ use crossing::UnitTorusLine;
 
 /// Margin around a torus, relative to the tube radius. It ensures that the searched interval of a line starts
 /// outside the torus.
-const ROOM: f64 = 0.01;
+const MARGIN: f64 = 0.01;
 
 /// All points whose distance from a circle around an axis equals the tube radius. The front is outside.
 ///
@@ -50,7 +50,7 @@ impl Torus {
 
     fn intersect_f64(&self, ray: &RayF64) -> Option<(f64, u32)> {
         let (line, unit_line, unit) = self.unit_line(ray);
-        let (enter, leave) = unit_line.nearby_interval(ROOM)?;
+        let (enter, leave) = unit_line.nearby_interval(MARGIN)?;
         let from = enter.max(-line.start / unit);
         if !(line.start + from * unit <= ray.t_max) {
             return None;
@@ -75,7 +75,7 @@ impl Torus {
     /// Values of t (at most two) at which a ray that starts outside enters the torus.
     pub fn entry_parameters(&self, ray: &RayF64) -> [Option<f64>; 2] {
         let (line, unit_line, unit) = self.unit_line(ray);
-        let Some((enter, leave)) = unit_line.nearby_interval(ROOM) else { return [None; 2] };
+        let Some((enter, leave)) = unit_line.nearby_interval(MARGIN) else { return [None; 2] };
         let from = enter.max(-line.start / unit);
         unit_line.surface_entry_parameters(from, leave).map(|entry| entry.map(|s| line.start + s * unit))
     }
@@ -235,7 +235,7 @@ mod tests {
         Torus::new(DVec3::ZERO, DVec3::Y * 7.0, 2.0, 0.5)
     }
 
-    fn met(origin: [f32; 3], direction: Vec3) -> Option<(f32, Vec3)> {
+    fn first_hit(origin: [f32; 3], direction: Vec3) -> Option<(f32, Vec3)> {
         let ray = Ray::new(Vec3::from_array(origin), direction).to_f64();
         let hit = ring().intersect(&ray)?;
         Some((hit.t, ring().surface_point_at_hit(&ray, &hit).normal))
@@ -250,7 +250,7 @@ mod tests {
             (2.25, Some((0.25, Vec3::X))),
             (2.75, None),
         ] {
-            assert_eq!(met([x, 0.0, 0.0], Vec3::X), expected, "from {x}");
+            assert_eq!(first_hit([x, 0.0, 0.0], Vec3::X), expected, "from {x}");
         }
     }
 
@@ -276,18 +276,18 @@ mod tests {
 
     #[test]
     fn lines_along_the_axis_hit_only_the_tube() {
-        assert_eq!(met([0.0, 9.0, 0.0], Vec3::NEG_Y), None);
-        assert_eq!(met([1.499, 9.0, 0.0], Vec3::NEG_Y), None);
-        assert_eq!(met([2.0, 9.0, 0.0], Vec3::NEG_Y), Some((8.5, Vec3::Y)));
-        assert_eq!(met([2.0, 0.25, 0.0], Vec3::NEG_Y), Some((0.75, Vec3::NEG_Y)));
-        assert_eq!(met([2.501, 9.0, 0.0], Vec3::NEG_Y), None);
+        assert_eq!(first_hit([0.0, 9.0, 0.0], Vec3::NEG_Y), None);
+        assert_eq!(first_hit([1.499, 9.0, 0.0], Vec3::NEG_Y), None);
+        assert_eq!(first_hit([2.0, 9.0, 0.0], Vec3::NEG_Y), Some((8.5, Vec3::Y)));
+        assert_eq!(first_hit([2.0, 0.25, 0.0], Vec3::NEG_Y), Some((0.75, Vec3::NEG_Y)));
+        assert_eq!(first_hit([2.501, 9.0, 0.0], Vec3::NEG_Y), None);
     }
 
     #[test]
     fn rays_do_not_rehit_their_origin() {
-        assert_eq!(met([2.5, 0.0, 0.0], Vec3::X), None);
-        assert_eq!(met([2.5, 0.0, 0.0], Vec3::NEG_X).map(|hit| hit.0), Some(1.0));
-        assert_eq!(met([1.5, 0.0, 0.0], Vec3::NEG_X).map(|hit| hit.0), Some(3.0));
+        assert_eq!(first_hit([2.5, 0.0, 0.0], Vec3::X), None);
+        assert_eq!(first_hit([2.5, 0.0, 0.0], Vec3::NEG_X).map(|hit| hit.0), Some(1.0));
+        assert_eq!(first_hit([1.5, 0.0, 0.0], Vec3::NEG_X).map(|hit| hit.0), Some(3.0));
     }
 
     #[test]

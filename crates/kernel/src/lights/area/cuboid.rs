@@ -66,17 +66,17 @@ impl ShapeEmitter for BoxEmitter {
         }
     }
 
-    fn pdf(&self, from: Vec3, met: &LightHit) -> f32 {
+    fn pdf(&self, from: Vec3, hit: &LightHit) -> f32 {
         let BoxView { faces, .. } = self.seen_from(from);
         let total: f32 = faces.iter().map(|face| face.solid_angle).sum();
         let own = faces.iter().zip(self.axes).enumerate();
-        let own = own.into_iter().find(|(_, (_, axis))| axis.dot(met.normal).abs() > 0.9);
+        let own = own.into_iter().find(|(_, (_, axis))| axis.dot(hit.normal).abs() > 0.9);
         match own {
             Some((_, (face, _))) if !(face.solid_angle > 0.0) => 0.0,
             Some((_, (face, _))) if face.rectangle.has_accurate_solid_angle() => 1.0 / total,
             Some((k, (face, _))) => {
                 let area = 4.0 * self.half[(k + 1) % 3] * self.half[(k + 2) % 3];
-                met.uniform_area_pdf(f64::from(area)) * (face.solid_angle / total)
+                hit.uniform_area_pdf(f64::from(area)) * (face.solid_angle / total)
             }
             None => 0.0,
         }

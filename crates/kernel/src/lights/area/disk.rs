@@ -47,9 +47,9 @@ impl ShapeEmitter for DiskEmitter {
         }
     }
 
-    fn pdf(&self, from: Vec3, met: &LightHit) -> f32 {
+    fn pdf(&self, from: Vec3, hit: &LightHit) -> f32 {
         let view = self.view_from(from);
-        if view.is_front() { view.pdf(met.direction) as f32 } else { 0.0 }
+        if view.is_front() { view.pdf(hit.direction) as f32 } else { 0.0 }
     }
 
     fn area_centroid(&self) -> DVec3 {

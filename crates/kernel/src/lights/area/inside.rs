@@ -26,12 +26,12 @@ impl ShapeEmitter for InwardEmitter {
         }
     }
 
-    fn pdf(&self, from: Vec3, met: &LightHit) -> f32 {
+    fn pdf(&self, from: Vec3, hit: &LightHit) -> f32 {
         match self.shape.encloses_point_if_closed(from.as_dvec3()) {
             Some(true) => 1.0 / ALL_AROUND,
             Some(false) => 0.0,
-            None if self.is_nearest_hit_at(from, met.direction, met.distance) => met.uniform_area_pdf(
-                self.by_area.total() * self.shape.area_scale_for_world_normal(met.normal.as_dvec3()),
+            None if self.is_nearest_hit_at(from, hit.direction, hit.distance) => hit.uniform_area_pdf(
+                self.by_area.total() * self.shape.area_scale_for_world_normal(hit.normal.as_dvec3()),
             ),
             None => 0.0,
         }

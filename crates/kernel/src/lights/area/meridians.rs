@@ -12,7 +12,7 @@ const NODES: usize = 9;
 pub struct AzimuthDistribution {
     /// Largest angle at which the light is visible.
     reach: f64,
-    share: PiecewiseLinear<NODES>,
+    scaled_angle: PiecewiseLinear<NODES>,
 }
 
 /// Sine and cosine of an angle.
@@ -58,24 +58,24 @@ impl AzimuthDistribution {
             turn = turn.plus_angle(step);
             own
         });
-        Self { reach: libm::atan2(reach.sin, reach.cos), share: PiecewiseLinear(weights) }
+        Self { reach: libm::atan2(reach.sin, reach.cos), scaled_angle: PiecewiseLinear(weights) }
     }
 
     /// Integral of the weight over all angles.
     pub fn total(&self) -> f64 {
-        2.0 * self.reach * self.share.mean()
+        2.0 * self.reach * self.scaled_angle.mean()
     }
 
     /// Samples an angle. Returns the angle and its density per radian.
     pub fn sample(&self, u: f32) -> (f64, f64) {
         let side = 2.0 * f64::from(u) - 1.0;
-        let (share, density) = self.share.sample(side.abs());
-        ((share * self.reach).copysign(side), density / (2.0 * self.reach))
+        let (scaled_angle, density) = self.scaled_angle.sample(side.abs());
+        ((scaled_angle * self.reach).copysign(side), density / (2.0 * self.reach))
     }
 
     /// Density per radian at an angle.
     pub fn pdf(&self, angle: f64) -> f64 {
-        self.share.pdf(angle.abs() / self.reach) / (2.0 * self.reach)
+        self.scaled_angle.pdf(angle.abs() / self.reach) / (2.0 * self.reach)
     }
 }
 

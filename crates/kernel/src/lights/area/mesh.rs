@@ -5,7 +5,7 @@ use super::quad::QuadEmitter;
 use super::sample_point::LightSamplePoint;
 use super::triangle::TriangleEmitter;
 use super::{LightHit, ShapeEmitter};
-use crate::control::{CancelToken, Cancelled};
+use crate::control::{CancelToken, Canceled};
 use crate::geometry::SurfaceSample;
 use crate::geometry::triangle::Triangle;
 use crate::lights::sample::{LightGeometry, LightSample, ShadowRayEnd};
@@ -74,8 +74,8 @@ impl MeshEmitter {
     /// have no area.
     ///
     /// # Errors
-    /// [`Cancelled`] if the token is canceled.
-    pub fn new(triangles: Vec<([DVec3; 3], u32)>, token: &CancelToken) -> Result<Option<Self>, Cancelled> {
+    /// [`Canceled`] if the token is canceled.
+    pub fn new(triangles: Vec<([DVec3; 3], u32)>, token: &CancelToken) -> Result<Option<Self>, Canceled> {
         let vector_area_of = |[a, b, c]: &[DVec3; 3]| (*b - *a).cross(*c - *a) * 0.5;
         let areas = triangles.iter().map(|(corners, _)| vector_area_of(corners).length());
         let Some(by_area) = DiscreteDistribution::new(areas) else { return Ok(None) };
@@ -174,16 +174,16 @@ impl MeshEmitter {
     }
 
     /// Implements [`Light::pdf`](crate::lights::Light::pdf).
-    pub fn pdf(&self, from: Vec3, normal: Vec3, met: &LightHit) -> f32 {
+    pub fn pdf(&self, from: Vec3, normal: Vec3, hit: &LightHit) -> f32 {
         let tree = match &self.sampling {
-            MeshSampling::Quad(quad) => return quad.quad.pdf(from, met),
-            MeshSampling::Area(_) => return met.uniform_area_pdf(self.by_area.total()),
+            MeshSampling::Quad(quad) => return quad.quad.pdf(from, hit),
+            MeshSampling::Area(_) => return hit.uniform_area_pdf(self.by_area.total()),
             MeshSampling::Tree(tree) => tree,
         };
-        let index = self.triangles.binary_search_by_key(&met.primitive, |(_, primitive)| *primitive);
+        let index = self.triangles.binary_search_by_key(&hit.primitive, |(_, primitive)| *primitive);
         let own = index.ok().and_then(|index| Some((index, triangle_emitter(&self.triangles[index].0)?)));
         own.map_or(0.0, |(index, own)| {
-            tree.probability(&Receiver::with_unknown_lobe(from, normal), index as u32) * own.pdf(from, met)
+            tree.probability(&Receiver::with_unknown_lobe(from, normal), index as u32) * own.pdf(from, hit)
         })
     }
 
@@ -201,7 +201,7 @@ impl MeshEmitter {
 
 impl TrianglePairQuad {
     /// Maximum deviation of the fourth corner from a parallelogram, relative to its size.
-    const FLATNESS: f64 = 1e-5;
+    const MAX_CORNER_DEVIATION: f64 = 1e-5;
 
     /// The parallelogram formed by two triangles that share an edge, or `None` if they do not form one.
     fn from_triangles(triangles: &[([DVec3; 3], u32)]) -> Option<Self> {
@@ -216,7 +216,7 @@ impl TrianglePairQuad {
         let far = second.iter().find(|other| !first.contains(other))?;
         let (u, v) = (x - p, y - p);
         let is_shared = second.contains(&x) && second.contains(&y);
-        let is_flat = (p + u + v - far).length() <= Self::FLATNESS * (u.length() + v.length());
+        let is_flat = (p + u + v - far).length() <= Self::MAX_CORNER_DEVIATION * (u.length() + v.length());
         if !(is_shared && is_flat) {
             return None;
         }

@@ -6,7 +6,7 @@
 
 pub mod cuboid;
 pub mod disk;
-pub mod emission_texture;
+pub mod emission_modulation;
 pub mod inside;
 mod meridians;
 pub mod mesh;
@@ -22,7 +22,7 @@ pub mod torus;
 pub mod transformed;
 pub mod triangle;
 
-pub use emission_texture::{BlendWeight, EmissionModulation, EmissionTerm, TriangleWithUvs, UvMapping};
+pub use emission_modulation::{BlendWeight, EmissionModulation, EmissionTerm, TriangleWithUvs, UvMapping};
 pub use mesh::MeshEmitter;
 pub use sample_point::LightSamplePoint;
 
@@ -53,8 +53,8 @@ pub trait ShapeEmitter {
     /// Samples a point on the front that is visible from `point`. `u` is in [0, 1)².
     fn sample(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint;
 
-    /// Pdf of [`ShapeEmitter::sample`] in sr⁻¹. `met` is the point on the front that a ray from `from` hits.
-    fn pdf(&self, from: Vec3, met: &LightHit) -> f32;
+    /// Pdf of [`ShapeEmitter::sample`] in sr⁻¹. `hit` is the point on the front that a ray from `from` hits.
+    fn pdf(&self, from: Vec3, hit: &LightHit) -> f32;
 
     /// Centroid of the area.
     fn area_centroid(&self) -> DVec3;
@@ -67,10 +67,10 @@ pub struct AreaLight {
     pub shape: Emitter,
     /// The side of the object that emits.
     pub side: Side,
-    /// Radiance, or a factor applied to the texture if there is one.
+    /// Radiance, or a factor applied to the modulation if there is one.
     pub radiance: Vec3,
-    /// Texture that modulates the radiance.
-    pub texture: Option<Box<EmissionModulation>>,
+    /// Factor that varies over the light, or `None` for constant radiance.
+    pub modulation: Option<Box<EmissionModulation>>,
     /// Index of the object.
     pub object: u32,
     /// The part of the object that emits.
@@ -131,20 +131,20 @@ pub enum Emitter {
 /// Evaluates an expression with `$it` bound to the concrete emitter. Meshes have a separate arm because their
 /// triangles are separate primitives.
 macro_rules! of_any {
-    ($emitter:expr, $it:ident => $asked:expr, $mesh:ident => $of_mesh:expr) => {
+    ($emitter:expr, $it:ident => $body:expr, $mesh:ident => $of_mesh:expr) => {
         match $emitter {
-            Emitter::Sphere($it) => $asked,
-            Emitter::Quad($it) => $asked,
-            Emitter::TexturedQuad($it) => $asked,
-            Emitter::Box($it) => $asked,
-            Emitter::Triangle($it) => $asked,
-            Emitter::Disk($it) => $asked,
-            Emitter::Cylinder($it) => $asked,
-            Emitter::Cone($it) => $asked,
-            Emitter::Torus($it) => $asked,
-            Emitter::Transformed($it) => $asked,
-            Emitter::Inside($it) => $asked,
-            Emitter::SeeThrough($it) => $asked,
+            Emitter::Sphere($it) => $body,
+            Emitter::Quad($it) => $body,
+            Emitter::TexturedQuad($it) => $body,
+            Emitter::Box($it) => $body,
+            Emitter::Triangle($it) => $body,
+            Emitter::Disk($it) => $body,
+            Emitter::Cylinder($it) => $body,
+            Emitter::Cone($it) => $body,
+            Emitter::Torus($it) => $body,
+            Emitter::Transformed($it) => $body,
+            Emitter::Inside($it) => $body,
+            Emitter::SeeThrough($it) => $body,
             Emitter::Mesh($mesh) => $of_mesh,
         }
     };
@@ -156,8 +156,8 @@ impl ShapeEmitter for Emitter {
         of_any!(self, it => it.sample(point, u), _mesh => LightSamplePoint::NOTHING)
     }
 
-    fn pdf(&self, from: Vec3, met: &LightHit) -> f32 {
-        of_any!(self, it => it.pdf(from, met), _mesh => 0.0)
+    fn pdf(&self, from: Vec3, hit: &LightHit) -> f32 {
+        of_any!(self, it => it.pdf(from, hit), _mesh => 0.0)
     }
 
     fn area_centroid(&self) -> DVec3 {
@@ -192,8 +192,8 @@ impl Emitter {
 /// Creates the light on the front of a shape, or returns `None` if the shape is infinite or has no area.
 pub fn front_area_light(shape: &Shape, radiance: Vec3, object: u32) -> Option<AreaLight> {
     let (emitter, bounds) = (front_emitter(shape)?, emission_bounds(shape, radiance)?);
-    let (side, texture, part) = (Side::Front, None, EmittingTriangleSelection::Whole);
-    Some(AreaLight { shape: emitter, side, radiance, texture, object, part, bounds })
+    let (side, modulation, part) = (Side::Front, None, EmittingTriangleSelection::Whole);
+    Some(AreaLight { shape: emitter, side, radiance, modulation, object, part, bounds })
 }
 
 /// Creates the emitter for the front of a shape.
@@ -316,28 +316,28 @@ fn emission_bounds(shape: &Shape, radiance: Vec3) -> Option<LightBounds> {
 }
 
 impl AreaLight {
-    /// Adds an emission texture. Quads are then importance sampled according to the texture.
-    pub fn with_texture(mut self, texture: EmissionModulation) -> Self {
-        if let (Emitter::Quad(quad), true) = (&self.shape, texture.varies_with_position()) {
+    /// Adds an emission modulation. If it varies with position, quads are importance sampled accordingly.
+    pub fn with_modulation(mut self, modulation: EmissionModulation) -> Self {
+        if let (Emitter::Quad(quad), true) = (&self.shape, modulation.varies_with_position()) {
             // The two edges are swapped on the back.
             let ordered = |[u, v]: [f64; 2]| match self.side {
                 Side::Front => [u, v],
                 Side::Back => [v, u],
             };
-            let color = |at: [f64; 2]| texture.factor_at_uv(DVec2::from_array(ordered(at)));
-            let across = ordered(texture.texels_per_uv_unit());
-            let picture = TexturedQuadEmitter::new(*quad, across, color);
-            if let Some(picture) = picture {
-                self.shape = Emitter::TexturedQuad(Box::new(picture));
+            let color = |at: [f64; 2]| modulation.factor_at_uv(DVec2::from_array(ordered(at)));
+            let across = ordered(modulation.texels_per_uv_unit());
+            let textured = TexturedQuadEmitter::new(*quad, across, color);
+            if let Some(textured) = textured {
+                self.shape = Emitter::TexturedQuad(Box::new(textured));
             }
         }
-        Self { texture: Some(Box::new(texture)), ..self }
+        Self { modulation: Some(Box::new(modulation)), ..self }
     }
 
     /// Implements [`Light::sample`](super::Light::sample).
     pub fn sample(&self, point: Vec3, normal: Vec3, u: [f32; 2]) -> Option<LightSample> {
-        let sample = self.sample_without_texture_factor(point, normal, u)?;
-        let (Some(texture), ShadowRayEnd::At(target)) = (&self.texture, sample.end) else {
+        let sample = self.sample_unmodulated(point, normal, u)?;
+        let (Some(modulation), ShadowRayEnd::At(target)) = (&self.modulation, sample.end) else {
             return Some(sample);
         };
         let primitive = match sample.source {
@@ -345,19 +345,14 @@ impl AreaLight {
             LightGeometry::Object(_) | LightGeometry::SeeThrough(_) | LightGeometry::Nothing => 0,
         };
         Some(LightSample {
-            weight: sample.weight * texture.radiance_factor(target, primitive, sample.direction),
+            weight: sample.weight * modulation.radiance_factor(target, primitive, sample.direction),
             ..sample
         })
     }
 
-    /// [`AreaLight::sample`] without the emission texture.
+    /// [`AreaLight::sample`] without the emission modulation.
     #[inline]
-    pub fn sample_without_texture_factor(
-        &self,
-        point: Vec3,
-        normal: Vec3,
-        u: [f32; 2],
-    ) -> Option<LightSample> {
+    pub fn sample_unmodulated(&self, point: Vec3, normal: Vec3, u: [f32; 2]) -> Option<LightSample> {
         let own = |sample: LightSamplePoint| {
             let LightSamplePoint { direction, target, factor } = sample;
             let (end, source) = (ShadowRayEnd::At(target), self.light_geometry());
@@ -375,15 +370,15 @@ impl AreaLight {
     }
 
     /// Implements [`Light::pdf`](super::Light::pdf).
-    pub fn pdf(&self, from: Vec3, normal: Vec3, met: &LightHit) -> f32 {
-        let met = &match self.side {
-            Side::Front => *met,
-            Side::Back => LightHit { normal: -met.normal, ..*met },
+    pub fn pdf(&self, from: Vec3, normal: Vec3, hit: &LightHit) -> f32 {
+        let hit = &match self.side {
+            Side::Front => *hit,
+            Side::Back => LightHit { normal: -hit.normal, ..*hit },
         };
-        if !(met.normal.dot(met.direction) < 0.0) {
+        if !(hit.normal.dot(hit.direction) < 0.0) {
             return 0.0;
         }
-        of_any!(&self.shape, it => it.pdf(from, met), mesh => mesh.pdf(from, normal, met))
+        of_any!(&self.shape, it => it.pdf(from, hit), mesh => mesh.pdf(from, normal, hit))
     }
 
     /// Centroid of the area.

@@ -24,9 +24,9 @@ macro_rules! triangle_packet_of {
 pub(crate) use triangle_packet_of;
 
 impl AreaLight {
-    /// [`AreaLight::sample_without_texture_factor`] for the points in the mask `used`.
+    /// [`AreaLight::sample_unmodulated`] for the points in the mask `used`.
     #[inline(always)]
-    pub fn sample_untextured_packet(
+    pub fn sample_unmodulated_packet(
         &self,
         points: &Vec3x16,
         normals: &Vec3x16,
@@ -78,7 +78,7 @@ impl AreaLight {
         }
         // Other shapes do not have a vectorized loop.
         LightSamplePacket::sample_one_by_one(points, used, |i, point| {
-            self.sample_without_texture_factor(point, lane(normals, i), [u[0][i], u[1][i]])
+            self.sample_unmodulated(point, lane(normals, i), [u[0][i], u[1][i]])
         })
     }
 }

@@ -14,10 +14,10 @@ impl<const NODES: usize> PiecewiseLinear<NODES> {
         (inner + 0.5 * (self.0[0] + self.0[NODES - 1])) / Self::PIECES
     }
 
-    /// Inverts the cumulative distribution at `share` in [0, 1). Returns the position and its density.
-    pub fn sample(&self, share: f64) -> (f64, f64) {
+    /// Inverts the cumulative distribution at `u` in [0, 1). Returns the position and its density.
+    pub fn sample(&self, u: f64) -> (f64, f64) {
         let mean = self.mean();
-        let (mut rest, mut piece) = (share * mean * Self::PIECES, 0);
+        let (mut rest, mut piece) = (u * mean * Self::PIECES, 0);
         while piece < NODES - 2 {
             let own = 0.5 * (self.0[piece] + self.0[piece + 1]);
             if rest < own {
@@ -46,7 +46,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn samples_follow_the_density() {
+    fn samples_follow_the_pdf() {
         for linear in [
             PiecewiseLinear([1.0, 3.0, 0.0, 2.0]),
             PiecewiseLinear([0.0, 0.0, 1.0, 1.0]),
@@ -55,8 +55,8 @@ mod tests {
             let n = 100_000;
             let (mut before, mut integral) = (-1e-9, 0.0);
             for i in 0..n {
-                let share = (f64::from(i) + 0.5) / f64::from(n);
-                let (place, density) = linear.sample(share);
+                let u = (f64::from(i) + 0.5) / f64::from(n);
+                let (place, density) = linear.sample(u);
                 assert!((density - linear.pdf(place)).abs() < 1e-9, "{place}");
                 assert!(place >= before && place <= 1.0);
                 // Check that the density times each step in position equals the step in the random number.
@@ -65,7 +65,7 @@ mod tests {
                     assert!((middle * (place - before) * f64::from(n) - 1.0).abs() < 0.01, "{place}");
                 }
                 before = place;
-                integral += linear.pdf(share) / f64::from(n);
+                integral += linear.pdf(u) / f64::from(n);
             }
             assert!((integral - 1.0).abs() < 1e-6, "{integral}");
         }

@@ -40,12 +40,12 @@ impl ShapeEmitter for QuadEmitter {
         self.sample_given_corner_offset(point, self.offset_to_corner(point), u)
     }
 
-    fn pdf(&self, from: Vec3, met: &LightHit) -> f32 {
+    fn pdf(&self, from: Vec3, hit: &LightHit) -> f32 {
         let to_corner = self.offset_to_corner(from);
         if !(to_corner.dot(self.normal) < 0.0) {
             return 0.0;
         }
-        self.pdf_by_solid_angle(to_corner).unwrap_or_else(|| met.uniform_area_pdf(f64::from(self.area)))
+        self.pdf_by_solid_angle(to_corner).unwrap_or_else(|| hit.uniform_area_pdf(f64::from(self.area)))
     }
 
     fn area_centroid(&self) -> DVec3 {

@@ -47,9 +47,9 @@ impl ShapeEmitter for SeeThroughShapeEmitter {
         LightSamplePoint { direction, target: point + direction * distance as f32, factor: factor as f32 }
     }
 
-    fn pdf(&self, _: Vec3, met: &LightHit) -> f32 {
-        met.uniform_area_pdf(
-            self.by_area.total() * self.shape.area_scale_for_world_normal(met.normal.as_dvec3()),
+    fn pdf(&self, _: Vec3, hit: &LightHit) -> f32 {
+        hit.uniform_area_pdf(
+            self.by_area.total() * self.shape.area_scale_for_world_normal(hit.normal.as_dvec3()),
         )
     }
 

@@ -37,16 +37,16 @@ pub trait RevolutionSideView {
     fn visible_cosine_extent_at_azimuth(&self, around: SinCos) -> f64;
 
     /// Angle from the pole and distance of the point on the side whose angle around the pole is `around`, and
-    /// whose polar cosine is at the fraction `share` of the visible interval.
-    fn polar_angle_and_distance_at_fraction(&self, around: SinCos, share: f64) -> (SinCos, f64);
+    /// whose polar cosine is at `fraction` of the visible interval.
+    fn polar_angle_and_distance_at_fraction(&self, around: SinCos, fraction: f64) -> (SinCos, f64);
 }
 
 /// The visible part of a light.
 struct RevolutionView<V> {
     side: Option<(V, AzimuthDistribution)>,
     cap: Option<(super::disk::DiskView, DVec3)>,
-    /// Fraction of the samples that are on the side.
-    share: f64,
+    /// Probability of sampling the side rather than the cap.
+    side_probability: f64,
 }
 
 impl<S: RevolutionSide> ShapeEmitter for CappedRevolutionEmitter<S> {
@@ -54,20 +54,21 @@ impl<S: RevolutionSide> ShapeEmitter for CappedRevolutionEmitter<S> {
     /// up to 20 % on a cap.
     fn sample(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
         let view = self.view_from(point);
-        let share = view.share as f32;
+        let side_probability = view.side_probability as f32;
         let (direction, distance, factor) = match (view.side, view.cap) {
-            (Some((side, meridians)), _) if u[0] < share => {
+            (Some((side, meridians)), _) if u[0] < side_probability => {
                 let (angle, density) = meridians.sample(u[1]);
                 let around = SinCos::from_radians(angle);
                 let (from_pole, distance) =
-                    side.polar_angle_and_distance_at_fraction(around, f64::from(u[0] / share));
-                let factor = side.visible_cosine_extent_at_azimuth(around) / (density * f64::from(share));
+                    side.polar_angle_and_distance_at_fraction(around, f64::from(u[0] / side_probability));
+                let factor =
+                    side.visible_cosine_extent_at_azimuth(around) / (density * f64::from(side_probability));
                 (side.polar_frame().direction(from_pole, around), distance, factor)
             }
             (_, Some((cap, normal))) => {
-                let rest = (u[0] - share) / (1.0 - share);
+                let rest = (u[0] - side_probability) / (1.0 - side_probability);
                 let (direction, distance, factor) = cap.sample(normal, [rest.min(1.0_f32.next_down()), u[1]]);
-                (direction, distance, factor / f64::from(1.0 - share))
+                (direction, distance, factor / f64::from(1.0 - side_probability))
             }
             (_, None) => return LightSamplePoint::NOTHING,
         };
@@ -75,15 +76,15 @@ impl<S: RevolutionSide> ShapeEmitter for CappedRevolutionEmitter<S> {
         LightSamplePoint { direction, target: point + direction * distance as f32, factor: factor as f32 }
     }
 
-    fn pdf(&self, from: Vec3, met: &LightHit) -> f32 {
+    fn pdf(&self, from: Vec3, hit: &LightHit) -> f32 {
         let view = self.view_from(from);
-        let share = f64::from(view.share as f32);
-        let is_cap = |normal: DVec3| met.normal.as_dvec3().dot(normal) > 1.0 - 1e-5;
+        let side_probability = f64::from(view.side_probability as f32);
+        let is_cap = |normal: DVec3| hit.normal.as_dvec3().dot(normal) > 1.0 - 1e-5;
         let density = match (view.side, view.cap) {
-            (_, Some((cap, normal))) if is_cap(normal) => (1.0 - share) * cap.pdf(met.direction),
+            (_, Some((cap, normal))) if is_cap(normal) => (1.0 - side_probability) * cap.pdf(hit.direction),
             (Some((side, meridians)), _) => {
-                let angle = side.polar_frame().azimuth(met.direction);
-                share * meridians.pdf(angle)
+                let angle = side.polar_frame().azimuth(hit.direction);
+                side_probability * meridians.pdf(angle)
                     / side.visible_cosine_extent_at_azimuth(SinCos::from_radians(angle.abs()))
             }
             (None, _) => 0.0,
@@ -109,8 +110,8 @@ impl<S: RevolutionSide> CappedRevolutionEmitter<S> {
         let cap = caps.into_iter().find(|(cap, _)| cap.is_front());
         let solid_angle = side.as_ref().map_or(0.0, |(_, meridians)| meridians.total());
         let of_cap = cap.as_ref().map_or(0.0, |(cap, _)| cap.solid_angle_bound());
-        let share = if side.is_none() { 0.0 } else { solid_angle / (solid_angle + of_cap) };
-        RevolutionView { side, cap, share }
+        let side_probability = if side.is_none() { 0.0 } else { solid_angle / (solid_angle + of_cap) };
+        RevolutionView { side, cap, side_probability }
     }
 }
 
@@ -202,10 +203,10 @@ impl RevolutionSideView for CylinderView {
         high - low
     }
 
-    fn polar_angle_and_distance_at_fraction(&self, around: SinCos, share: f64) -> (SinCos, f64) {
+    fn polar_angle_and_distance_at_fraction(&self, around: SinCos, fraction: f64) -> (SinCos, f64) {
         let to_circle = self.distance_to_cross_section(SinCos { sin: around.sin.abs(), ..around });
         let [low, high] = self.end_cosines(to_circle);
-        let cos = low + (high - low) * share;
+        let cos = low + (high - low) * fraction;
         let height = to_circle * cos / ((1.0 - cos) * (1.0 + cos)).max(f64::MIN_POSITIVE).sqrt();
         let height = height.clamp(self.ends[0], self.ends[1]);
         let distance = (to_circle * to_circle + height * height).sqrt();
@@ -311,9 +312,9 @@ impl RevolutionSideView for ConeView {
         if along > 0.0 { across * across / (length * (length + along)) } else { 1.0 - along / length }
     }
 
-    fn polar_angle_and_distance_at_fraction(&self, around: SinCos, share: f64) -> (SinCos, f64) {
+    fn polar_angle_and_distance_at_fraction(&self, around: SinCos, fraction: f64) -> (SinCos, f64) {
         let at_tip = self.generatrix_angle_at_tip(around);
-        let versine = share * self.visible_cosine_extent_at_azimuth(around);
+        let versine = fraction * self.visible_cosine_extent_at_azimuth(around);
         let from_pole = SinCos { sin: (versine * (2.0 - versine)).max(0.0).sqrt(), cos: 1.0 - versine };
         let sin = at_tip.sin * from_pole.cos + at_tip.cos * from_pole.sin;
         let farthest = self.distance + self.slant;

@@ -18,8 +18,8 @@ pub struct TexturedQuadEmitter {
     size: [usize; 2],
     /// Distribution of the cells' brightness.
     cells: PiecewiseConstant2D,
-    /// Fraction of the samples distributed according to the texture.
-    share: f32,
+    /// Probability of sampling according to the texture.
+    texture_probability: f32,
     /// Vectors whose dot products with a point's offset from the corner are the point's coordinates along the
     /// edges.
     along: [Vec3; 2],
@@ -33,15 +33,19 @@ const LOOKUPS: (usize, usize) = (2, 4);
 
 /// Maximum fraction of texture samples. It is below 1 because texture sampling does not account for
 /// distances.
-const MAX_TEXTURE_SHARE: f64 = 0.9;
+const MAX_TEXTURE_PROBABILITY: f64 = 0.9;
 
 impl ShapeEmitter for TexturedQuadEmitter {
     /// Samples according to the texture or by solid angle.
     #[inline(always)]
     fn sample(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
-        let by_texture = u[0] < self.share;
-        let (before, share) = if by_texture { (0.0, self.share) } else { (self.share, 1.0 - self.share) };
-        let rest = (u[0] - before) / share;
+        let by_texture = u[0] < self.texture_probability;
+        let (before, probability) = if by_texture {
+            (0.0, self.texture_probability)
+        } else {
+            (self.texture_probability, 1.0 - self.texture_probability)
+        };
+        let rest = (u[0] - before) / probability;
         const LAST: f32 = 1.0_f32.next_down();
         let u = [if rest < LAST { rest } else { LAST }, u[1]];
         let to_corner = self.quad.offset_to_corner(point);
@@ -54,7 +58,8 @@ impl ShapeEmitter for TexturedQuadEmitter {
         if by_texture {
             let direction = offset * (1.0 / offset.length_squared().sqrt());
             let quad_pdf = self.quad.pdf_by_solid_angle(to_corner).unwrap_or(1.0 / by_area);
-            let density = self.share * cell_factor / by_area + (1.0 - self.share) * quad_pdf;
+            let density = self.texture_probability * cell_factor / by_area
+                + (1.0 - self.texture_probability) * quad_pdf;
             let factor = if by_area > 0.0 { 1.0 / density } else { 0.0 };
             return LightSamplePoint { direction, target: point + offset, factor };
         }
@@ -65,10 +70,10 @@ impl ShapeEmitter for TexturedQuadEmitter {
         LightSamplePoint { factor: 1.0 / density, ..own }
     }
 
-    fn pdf(&self, from: Vec3, met: &LightHit) -> f32 {
+    fn pdf(&self, from: Vec3, hit: &LightHit) -> f32 {
         let to_corner = self.quad.offset_to_corner(from);
-        let quad_pdf = self.quad.pdf(from, met);
-        if quad_pdf > 0.0 { self.mixture_pdf(met.direction * met.distance, to_corner, quad_pdf) } else { 0.0 }
+        let quad_pdf = self.quad.pdf(from, hit);
+        if quad_pdf > 0.0 { self.mixture_pdf(hit.direction * hit.distance, to_corner, quad_pdf) } else { 0.0 }
     }
 
     fn area_centroid(&self) -> DVec3 {
@@ -101,10 +106,10 @@ impl TexturedQuadEmitter {
         // Variance of the brightness divided by the mean of its square. It is 0 if the brightness is
         // constant.
         let contrast = 1.0 - sum * sum / (squares * (size[0] * size[1]) as f64);
-        let share = (MAX_TEXTURE_SHARE * contrast) as f32;
-        let cells =
-            PiecewiseConstant2D::new(size[0], rows.into_iter()).filter(|_| share > MIN_TEXTURE_SHARE)?;
-        Some(Self { along: quad.dual_basis(), quad, size, cells, share })
+        let texture_probability = (MAX_TEXTURE_PROBABILITY * contrast) as f32;
+        let cells = PiecewiseConstant2D::new(size[0], rows.into_iter())
+            .filter(|_| texture_probability > MIN_TEXTURE_PROBABILITY)?;
+        Some(Self { along: quad.dual_basis(), quad, size, cells, texture_probability })
     }
 
     /// Pdf in sr⁻¹ at an offset from the point, given the untextured quad's pdf.
@@ -116,7 +121,8 @@ impl TexturedQuadEmitter {
             (if place > 0.0 { place as usize } else { 0 }).min(self.size[axis] - 1)
         };
         let cell_factor = self.cell_pdf_ratio(cell(0), cell(1));
-        self.share * cell_factor / self.quad.inverse_pdf_by_area(offset) + (1.0 - self.share) * quad_pdf
+        self.texture_probability * cell_factor / self.quad.inverse_pdf_by_area(offset)
+            + (1.0 - self.texture_probability) * quad_pdf
     }
 
     /// Area density of a cell, relative to a constant texture.
@@ -129,4 +135,4 @@ impl TexturedQuadEmitter {
 
 /// Minimum fraction of texture samples. If the texture has less contrast, texture samples are not worth the
 /// lookups.
-const MIN_TEXTURE_SHARE: f32 = 0.05;
+const MIN_TEXTURE_PROBABILITY: f32 = 0.05;

@@ -23,7 +23,7 @@ pub struct TorusEmitter {
 const SLICES: usize = 7;
 
 /// Number of points on a slice's circle at which the density is evaluated.
-const PLACES: usize = 5;
+const SLICE_POINTS: usize = 5;
 
 /// Minimum closeness. Without it, closeness would be 0 on the axis, where all slices look the same.
 const MIN_CLOSENESS: f64 = 0.01;
@@ -115,12 +115,12 @@ impl ShapeEmitter for TorusEmitter {
         }
     }
 
-    fn pdf(&self, from: Vec3, met: &LightHit) -> f32 {
+    fn pdf(&self, from: Vec3, hit: &LightHit) -> f32 {
         TorusView::new(&self.torus, from).map_or(0.0, |view| {
             let slices = view.slice_distribution();
-            let (density, first) = view.sum_entry_pdfs(&self.torus, &slices, met.direction.as_dvec3());
+            let (density, first) = view.sum_entry_pdfs(&self.torus, &slices, hit.direction.as_dvec3());
             // A ray may continue through the first surface and hit another one, which is never sampled.
-            let is_later = first.is_some_and(|first| f64::from(met.distance) > first * (1.0 + SAME_DISTANCE));
+            let is_later = first.is_some_and(|first| f64::from(hit.distance) > first * (1.0 + SAME_DISTANCE));
             if is_later { 0.0 } else { density as f32 }
         })
     }
@@ -278,8 +278,8 @@ impl TorusSlice {
     }
 
     /// Distribution of the relative sine of the elevation, mapped from [−1, 1] to [0, 1].
-    fn elevation_distribution(&self, view: &TorusView) -> PiecewiseLinear<PLACES> {
-        let sine = |i: usize| 2.0 * i as f64 / (PLACES - 1) as f64 - 1.0;
+    fn elevation_distribution(&self, view: &TorusView) -> PiecewiseLinear<SLICE_POINTS> {
+        let sine = |i: usize| 2.0 * i as f64 / (SLICE_POINTS - 1) as f64 - 1.0;
         PiecewiseLinear(std::array::from_fn(|i| {
             self.near_intersection(view, self.slice_tangent_from_elevation_sine(sine(i))).factor
         }))

@@ -33,17 +33,17 @@ impl ShapeEmitter for TransformedEmitter {
         }
     }
 
-    fn pdf(&self, from: Vec3, met: &LightHit) -> f32 {
+    fn pdf(&self, from: Vec3, hit: &LightHit) -> f32 {
         let Some(from) = self.local_point_if_in_front(from) else { return 0.0 };
         let to_world = &self.transformed.to_world;
-        let direction = to_world.inverse_vector(met.direction.as_dvec3());
+        let direction = to_world.inverse_vector(hit.direction.as_dvec3());
         let length = direction.length();
-        let normal = to_world.linear.transpose() * met.normal.as_dvec3();
+        let normal = to_world.linear.transpose() * hit.normal.as_dvec3();
         let local = LightHit {
             direction: (direction / length).as_vec3(),
-            distance: (f64::from(met.distance) * length) as f32,
+            distance: (f64::from(hit.distance) * length) as f32,
             normal: normal.normalize().as_vec3(),
-            primitive: met.primitive,
+            primitive: hit.primitive,
         };
         let pdf = f64::from(self.emitter.pdf(from, &local));
         (pdf / self.solid_angle_scale(1.0 / length)) as f32

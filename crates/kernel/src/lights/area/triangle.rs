@@ -13,7 +13,7 @@ const MIN_SOLID_ANGLE: f64 = 1e-3;
 
 /// The corners are considered to be on a great circle if the solid angle is within this many sr of a
 /// hemisphere's.
-const ALMOST_HALF: f64 = 1e-4;
+const HEMISPHERE_TOLERANCE: f64 = 1e-4;
 
 /// A triangle that emits toward (b − a) × (c − a).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -54,12 +54,12 @@ impl ShapeEmitter for TriangleEmitter {
         LightSamplePoint { direction, target: point + direction * distance as f32, factor: factor as f32 }
     }
 
-    fn pdf(&self, from: Vec3, met: &LightHit) -> f32 {
+    fn pdf(&self, from: Vec3, hit: &LightHit) -> f32 {
         match self.spherical_triangle(from.as_dvec3()) {
             Some((_, spherical)) if spherical.has_accurate_solid_angle() => {
                 (1.0 / spherical.solid_angle) as f32
             }
-            Some(_) => met.uniform_area_pdf(self.area),
+            Some(_) => hit.uniform_area_pdf(self.area),
             None => 0.0,
         }
     }
@@ -99,7 +99,7 @@ impl TriangleEmitter {
 
 impl SphericalTriangle {
     fn has_accurate_solid_angle(&self) -> bool {
-        (MIN_SOLID_ANGLE..TAU - ALMOST_HALF).contains(&self.solid_angle)
+        (MIN_SOLID_ANGLE..TAU - HEMISPHERE_TOLERANCE).contains(&self.solid_angle)
     }
 
     /// Samples uniformly over the solid angle (Arvo, *Stratified Sampling of Spherical Triangles*, 1995).

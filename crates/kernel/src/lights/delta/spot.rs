@@ -35,8 +35,8 @@ impl DeltaLight for SpotLight {
         let angle = 2.0 * (FRAC_PI_2 - acos(half_sine));
         let inside = self.half_angle - angle;
         let fade = self.blend * self.half_angle;
-        let share = if inside < fade { inside / fade } else { 1.0 };
-        if inside > 0.0 || self.half_angle >= PI { share } else { 0.0 }
+        let falloff = if inside < fade { inside / fade } else { 1.0 };
+        if inside > 0.0 || self.half_angle >= PI { falloff } else { 0.0 }
     }
 
     /// The solid angle of the inner cone, whose half angle is (1 − blend)·H, plus the integral of (H −
@@ -116,9 +116,9 @@ fn invert_edge_integral(half: f64, width: f64, part: f64) -> f64 {
         (low, high) = if off > 0.0 { (low, delta) } else { (delta, high) };
         let next = delta - off / (delta * libm::sin(half - delta));
         let next = if next > low && next < high { next } else { 0.5 * (low + high) };
-        let is_there = (next - delta).abs() <= 1e-6 * delta;
+        let has_converged = (next - delta).abs() <= 1e-6 * delta;
         delta = next;
-        if is_there {
+        if has_converged {
             break;
         }
     }
@@ -132,7 +132,7 @@ mod tests {
     use crate::math::DVec3;
 
     /// Relative intensity of a spotlight, at an angle in degrees from the axis.
-    fn share(half_angle: f64, blend: f32, angle: f64) -> f32 {
+    fn falloff(half_angle: f64, blend: f32, angle: f64) -> f32 {
         let position = DVec3::new(1.0, 2.0, 3.0);
         let point = PointLight { position, intensity: Vec3::ONE, falloff: Falloff::None };
         let spot = SpotLight { point, axis: Vec3::NEG_Y, half_angle: half_angle.to_radians() as f32, blend };
@@ -146,7 +146,7 @@ mod tests {
             for blend in [0.1_f32, 0.2, 1.0] {
                 for part in [0.0, 0.3, 0.85, 0.91, 0.97, 1.02, 1.19] {
                     let expected = ((1.0 - part) / f64::from(blend)).clamp(0.0, 1.0);
-                    let found = f64::from(share(half_angle, blend, part * half_angle));
+                    let found = f64::from(falloff(half_angle, blend, part * half_angle));
                     assert!(
                         (found - expected).abs() < 2e-3,
                         "{half_angle} {blend} {part}: {found} {expected}"
@@ -158,7 +158,7 @@ mod tests {
 
     #[test]
     fn zero_blend_gives_a_sharp_edge() {
-        assert_eq!((share(30.0, 0.0, 29.99), share(30.0, 0.0, 30.01)), (1.0, 0.0));
-        assert_eq!((share(30.0, 0.0, 0.0), share(180.0, 0.0, 179.99)), (1.0, 1.0));
+        assert_eq!((falloff(30.0, 0.0, 29.99), falloff(30.0, 0.0, 30.01)), (1.0, 0.0));
+        assert_eq!((falloff(30.0, 0.0, 0.0), falloff(180.0, 0.0, 179.99)), (1.0, 1.0));
     }
 }

@@ -12,8 +12,8 @@ use crate::math::frame::Frame;
 use crate::math::lanes::F32x16;
 use crate::sampling::warp;
 
-/// Light from one direction, or from a disk of directions, whose radiance is uniform unless the light is the sun
-/// of a sky.
+/// Light from one direction or from a disk of directions. The radiance is uniform over the disk, except for
+/// the sun of a sky.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DirectionalLight {
     /// Unit direction toward the light's center.
@@ -22,7 +22,7 @@ pub struct DirectionalLight {
     pub irradiance: Vec3,
     /// 1 − cos of half the angular diameter, or 0 for a light without extent.
     one_minus_cos: f32,
-    /// Mean radiance of the disk, or 0 for a light without extent.
+    /// Mean radiance of the disk, or 0 for light from a single direction.
     radiance: Vec3,
     /// The disk, if its radiance is not uniform.
     sun: Option<OrientedSunDisk>,
@@ -86,7 +86,7 @@ impl DirectionalLight {
         }
     }
 
-    /// Samples a unit direction to the light as if the radiance of the disk were uniform.
+    /// Samples a unit direction to the light, assuming a disk of uniform radiance.
     #[inline(always)]
     fn sample_uniform_disk(&self, u: [f32; 2]) -> (Vec3, Vec3) {
         if self.is_single_direction() {

@@ -52,7 +52,7 @@ impl MapOrientation {
         Self::Turn((degrees / 360.0).rem_euclid(1.0) as f32)
     }
 
-    /// Converts a direction in the world to a direction and a turn, for lookups in the map.
+    /// Converts a world direction to the direction and the turn for a lookup in the map.
     #[inline(always)]
     fn to_map(self, direction: Vec3) -> (Vec3, f32) {
         match self {
@@ -61,7 +61,7 @@ impl MapOrientation {
         }
     }
 
-    /// The turn to use for samples of the map, whose directions are then passed to [`Self::to_world`].
+    /// The turn for sampling the map. Pass sampled directions to [`Self::to_world`].
     #[inline(always)]
     fn turn(self) -> f32 {
         match self {
@@ -70,7 +70,7 @@ impl MapOrientation {
         }
     }
 
-    /// Converts the direction of a sample to a direction in the world.
+    /// Converts a sampled direction to a world direction.
     #[inline(always)]
     fn to_world(self, direction: Vec3) -> Vec3 {
         match self {
@@ -79,7 +79,7 @@ impl MapOrientation {
         }
     }
 
-    /// Converts a packet of directions with `convert`, unless the map is only turned.
+    /// Applies `convert` to a packet of directions if the orientation is a general rotation.
     #[inline(always)]
     fn convert_packet(self, directions: &mut Vec3x16, convert: impl Fn(Self, Vec3) -> Vec3) {
         match self {
@@ -98,7 +98,7 @@ impl MapOrientation {
 const HEMISPHERE_PDF: f32 = 1.0 / (2.0 * PI);
 
 impl Environment {
-    /// A map that is scaled by `factor`.
+    /// An environment map, scaled by `factor`.
     pub fn from_map(sky: Arc<EnvironmentMap>, factor: Vec3, orientation: MapOrientation) -> Self {
         Self::Map { sky, factor, orientation }
     }

@@ -22,7 +22,7 @@ pub struct EnvironmentMap {
     cells: PiecewiseConstant2D,
     /// Cosines of the polar angles at the tops of the rows of cells, followed by −1.
     heights: Vec<f64>,
-    /// Pdf in sr⁻¹ of each row, if it were constant within the row.
+    /// Probability of each row divided by the solid angle of one of its cells, in sr⁻¹.
     pdfs: Vec<f32>,
     /// Mean luminance over all directions.
     mean_luminance: f64,
@@ -305,6 +305,6 @@ fn relative_pdf_in_cell(luminances: &[f32; 4], along: [f32; 2]) -> f32 {
     let upper = a + (b - a) * along[0];
     let lower = c + (d - c) * along[0];
     let sum = (a + b) + (c + d);
-    let share = 4.0 * (upper + (lower - upper) * along[1]) / sum;
-    if sum > 0.0 { share.max(0.0) } else { 0.0 }
+    let relative_pdf = 4.0 * (upper + (lower - upper) * along[1]) / sum;
+    if sum > 0.0 { relative_pdf.max(0.0) } else { 0.0 }
 }

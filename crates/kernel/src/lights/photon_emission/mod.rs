@@ -153,7 +153,7 @@ struct LightEmissionInfo {
 struct PhotonAim {
     targets: PhotonTargets,
     /// Fraction of the photons that are aimed.
-    share: f32,
+    aimed_fraction: f32,
     /// Distribution of the lights, weighted by their estimated power toward the targets.
     by_light: DiscreteDistribution,
 }
@@ -177,11 +177,11 @@ impl PhotonEmitter {
         Some(Self { lights: Arc::clone(lights), sources, around, by_power, aim: None })
     }
 
-    /// Aims a fraction `share` in [0, 1] of the photons at targets. If `share` is 1, all photons hit a
+    /// Aims the fraction `aimed_fraction` of the photons at targets. If the fraction is 1, all photons hit a
     /// target, and their mean flux is the power that reaches the targets.
     #[must_use]
-    pub fn with_targets(self, targets: &[BoundingSphere], share: f32) -> Self {
-        let targets = PhotonTargets::new(targets).filter(|_| share > 0.0);
+    pub fn with_targets(self, targets: &[BoundingSphere], aimed_fraction: f32) -> Self {
+        let targets = PhotonTargets::new(targets).filter(|_| aimed_fraction > 0.0);
         let aim = targets.and_then(|targets| {
             let power_toward = |(number, light)| self.estimate_power_toward_targets(number, light, &targets);
             let power_toward: Vec<f64> = self.lights.iter().map(power_toward).collect();
@@ -191,7 +191,7 @@ impl PhotonEmitter {
                 estimate + BY_POWER * mean_channel(self.sources[number].power) / total
             };
             let by_light = DiscreteDistribution::new(power_toward.iter().enumerate().map(weight))?;
-            Some(PhotonAim { targets, share: share.min(1.0), by_light })
+            Some(PhotonAim { targets, aimed_fraction: aimed_fraction.min(1.0), by_light })
         });
         Self { aim, ..self }
     }
@@ -212,13 +212,13 @@ impl PhotonEmitter {
     }
 
     /// Fraction of the photons that are aimed at targets.
-    pub fn aimed_share(&self) -> f32 {
-        self.aim.as_ref().map_or(0.0, |aim| aim.share)
+    pub fn aimed_probability(&self) -> f32 {
+        self.aim.as_ref().map_or(0.0, |aim| aim.aimed_fraction)
     }
 
     /// Emits a photon, or returns `None` if the sample carries no flux.
     pub fn emit(&self, u: &PhotonRandomNumbers) -> Option<EmittedPhoton> {
-        let aim = self.aim.as_ref().filter(|aim| u.aim[0] < aim.share);
+        let aim = self.aim.as_ref().filter(|aim| u.aim[0] < aim.aimed_fraction);
         let by_light = aim.map_or(&self.by_power, |aim| &aim.by_light);
         let (number, _) = by_light.sample(u.light[0]);
         let targets = aim.map(|aim| &aim.targets);
@@ -226,7 +226,7 @@ impl PhotonEmitter {
             .sample_photon_from_light(number, targets, u)
             .filter(|sample_photon| sample_photon.flux != Vec3::ZERO)?;
         let (all, of_light) =
-            (f64::from(self.aimed_share()), |by: &DiscreteDistribution| by.probability(number));
+            (f64::from(self.aimed_probability()), |by: &DiscreteDistribution| by.probability(number));
         let aimed = self.aim.as_ref().map_or(0.0, |aim| all * of_light(&aim.by_light) * sample_photon.ratio);
         let density = (1.0 - all) * of_light(&self.by_power) + aimed;
         let flux = (sample_photon.flux.as_dvec3() / density).as_vec3();
@@ -272,10 +272,10 @@ impl PhotonEmitter {
                 );
                 let start = PhotonOrigin::Surface { point: place.point, error: place.error, normal };
                 // Apply the clear coat's transmittance in the photon's direction.
-                let left = |texture: &EmissionModulation| {
-                    texture.coat_transmittance(place.point, place.primitive, -direction)
+                let left = |modulation: &EmissionModulation| {
+                    modulation.coat_transmittance(place.point, place.primitive, -direction)
                 };
-                let flux = place.flux * light.texture.as_deref().map_or(Vec3::ONE, left);
+                let flux = place.flux * light.modulation.as_deref().map_or(Vec3::ONE, left);
                 Some(PhotonSample { start, direction, flux, ratio })
             }
         }
@@ -367,7 +367,8 @@ impl PhotonEmitter {
             LightFamily::Infinite(_) => targets.total_disk_area() / disk,
             LightFamily::Area(light) => source.surface.as_ref().map_or(0.0, |surface| {
                 let of = |i: u32| {
-                    let (u, piece) = (low_discrepancy_point(i), (i as f32 + 0.5) / PLACES as f32);
+                    let (u, piece) =
+                        (low_discrepancy_point(i), (i as f32 + 0.5) / POWER_SAMPLE_POINTS as f32);
                     let place = surface.sample_point(light, piece, u);
                     let part = targets
                         .view_from(place.from, &EmissionProfile::Front(place.normal))
@@ -375,7 +376,7 @@ impl PhotonEmitter {
                         / PI;
                     part.min(1.0) * mean_channel(place.flux)
                 };
-                (0..PLACES).map(of).sum::<f64>() / f64::from(PLACES) / power
+                (0..POWER_SAMPLE_POINTS).map(of).sum::<f64>() / f64::from(POWER_SAMPLE_POINTS) / power
             }),
         };
         power * part.min(1.0)
@@ -383,7 +384,7 @@ impl PhotonEmitter {
 }
 
 /// Number of points on an area light that are used to estimate the power toward the targets.
-const PLACES: u32 = 16;
+const POWER_SAMPLE_POINTS: u32 = 16;
 
 /// A low-discrepancy sequence in the unit square (Roberts, *The Unreasonable Effectiveness of Quasirandom
 /// Sequences*, 2018).

@@ -63,7 +63,7 @@ struct PiecePoint {
 }
 
 /// Maximum number of pieces for a textured or transformed light.
-const PIECES: usize = 1024;
+const MAX_PIECES: usize = 1024;
 
 /// Number of texture lookups per side of a piece.
 const LOOKUPS_PER_SIDE: u32 = 4;
@@ -77,8 +77,8 @@ impl DividedEmissiveSurface {
         let (on, count) = match emitter_geometry {
             EmissiveObjectGeometry::Shape(shape) => {
                 let areas = shape.local_part_areas();
-                let is_uneven = light.texture.is_some() || matches!(shape, Shape::Transformed(_));
-                let most = if is_uneven { PIECES / areas.len().max(1) } else { 1 };
+                let is_uneven = light.modulation.is_some() || matches!(shape, Shape::Transformed(_));
+                let most = if is_uneven { MAX_PIECES / areas.len().max(1) } else { 1 };
                 let side = most.isqrt().max(1);
                 let count = areas.len() * side * side;
                 (
@@ -96,7 +96,7 @@ impl DividedEmissiveSurface {
                 (DividedSurfaceGeometry::Mesh { rounding: *rounding }, mesh.primitive_indices().count())
             }
         };
-        let per_side = if light.texture.is_some() { LOOKUPS_PER_SIDE } else { 1 };
+        let per_side = if light.modulation.is_some() { LOOKUPS_PER_SIDE } else { 1 };
         let of = |index: usize| {
             let mut sum = DVec3::ZERO;
             let mut area = 0.0;
@@ -172,10 +172,10 @@ impl DividedSurfaceGeometry {
 
 /// Radiance at a point in W·sr⁻¹·m⁻², without a clear coat.
 fn radiance_without_coat(light: &AreaLight, place: &PiecePoint) -> Vec3 {
-    let texture = light.texture.as_ref();
+    let modulation = light.modulation.as_ref();
     light.radiance
-        * texture.map_or(Vec3::ONE, |texture| {
-            texture.radiance_factor_without_coat(place.point.as_vec3(), place.primitive)
+        * modulation.map_or(Vec3::ONE, |modulation| {
+            modulation.radiance_factor_without_coat(place.point.as_vec3(), place.primitive)
         })
 }
 
@@ -186,6 +186,6 @@ fn coordinate_bound(shape: &Shape) -> Option<f64> {
         return Some(own.length_bound_to_world(coordinate_bound(&own.shape)?));
     }
     let bounds = shape.bounds()?;
-    let greatest = bounds.min.abs().max(bounds.max.abs()).as_dvec3().max_element();
-    Some(greatest + 2.0 * bounds.extent().as_dvec3().length())
+    let largest = bounds.min.abs().max(bounds.max.abs()).as_dvec3().max_element();
+    Some(largest + 2.0 * bounds.extent().as_dvec3().length())
 }

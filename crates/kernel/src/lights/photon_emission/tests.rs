@@ -205,7 +205,7 @@ fn mean_flux_equals_power_for_any_aimed_fraction() {
         let plain = source_of(light.clone(), shape.as_ref());
         for (targets, share) in [(&targets()[..], 0.5), (&targets()[..3], 0.9), (&targets()[..1], 0.3)] {
             let source = plain.clone().with_targets(targets, share);
-            assert_eq!(source.aimed_share(), share);
+            assert_eq!(source.aimed_probability(), share);
             let found = mean(&source, 1 << 14, |photon| f64::from(photon.flux.y));
             let exact = power;
             let greatest_error = if share > 0.5 { 3e-3 } else { 1e-3 };
@@ -255,7 +255,7 @@ fn sampled(light: &Light, count: u32) -> MeanEstimate {
 #[track_caller]
 fn assert_same_irradiance(name: &str, light: &Light, source: &PhotonEmitter, shape: Option<&Shape>) {
     let expected = sampled(light, 1 << 12);
-    let greatest_error = if light.emission_texture().is_some() { 5e-3 } else { 3e-3 };
+    let greatest_error = if light.emission_modulation().is_some() { 5e-3 } else { 3e-3 };
     assert!(expected.mean > 0.0, "{name}");
     let around = BoundingSphere { radius: DISK.radius * 1.001, ..DISK };
     let beside = BoundingSphere { center: DISK.center + DVec3::new(0.1, 0.0, 0.05), radius: 0.15 };
@@ -334,7 +334,7 @@ fn photons_leave_convex_lights() {
 
 /// χ² test of counts in cells with equal expected counts.
 #[track_caller]
-fn assert_even(name: &str, counts: &[u32]) {
+fn assert_uniform(name: &str, counts: &[u32]) {
     let freedom = (counts.len() - 1) as f64;
     let expected = f64::from(counts.iter().sum::<u32>()) / counts.len() as f64;
     let chi2: f64 = counts.iter().map(|&count| (f64::from(count) - expected).powi(2) / expected).sum();
@@ -364,7 +364,7 @@ fn photon_directions_follow_the_intensity() {
             // sin² is uniformly distributed.
             counts[cell(1.0 - z * z, 16) * 16 + cell(turn, 16)] += 1;
         }
-        assert_even(&format!("{shape:?}"), &counts);
+        assert_uniform(&format!("{shape:?}"), &counts);
     }
     for (degrees, blend) in [(40.0, 0.0), (40.0, 0.2), (90.0, 1.0), (1.0, 0.5), (300.0, 0.7), (360.0, 1.0)] {
         let spot = spot(degrees, blend);
@@ -392,7 +392,7 @@ fn photon_directions_follow_the_intensity() {
             let turn = f64::from(y.atan2(x)) / TAU + 0.5;
             counts[cell(sum / sums[sums.len() - 1], 16) * 16 + cell(turn, 16)] += 1;
         }
-        assert_even(&format!("spotlight with {degrees}°, blend {blend}"), &counts);
+        assert_uniform(&format!("spotlight with {degrees}°, blend {blend}"), &counts);
     }
 }
 
@@ -413,7 +413,7 @@ fn photons_from_infinity_fill_the_disk() {
             let share = flat.length_squared() / (SCENE.radius * SCENE.radius);
             counts[cell(share, 8) * 8 + cell(turn, 8)] += 1;
         }
-        assert_even("disk", &counts);
+        assert_uniform("disk", &counts);
     }
 }
 
@@ -463,13 +463,14 @@ fn aimed_pdfs_integrate_to_one() {
 
 #[test]
 fn lights_are_chosen_by_power() {
-    let lamp = |i: u32| {
+    let light_at = |i: u32| {
         let intensity = Vec3::new(0.5 + (i % 7) as f32, 1.0, 0.0);
         let position = DVec3::new(f64::from(i % 100), f64::from(i / 100), 0.0);
         Light::Point(PointLight { position, intensity, falloff: Falloff::Square })
     };
-    let lights =
-        Arc::new(Lights::new((0..10_000).map(lamp).collect(), &CancelToken::new()).expect("never canceled"));
+    let lights = Arc::new(
+        Lights::new((0..10_000).map(light_at).collect(), &CancelToken::new()).expect("never canceled"),
+    );
     let source = PhotonEmitter::new(&lights, |_| None, SCENE).expect("power");
     let (mut next, mut counts) = (numbers(random::unit_generator(8)), [0.0; 7]);
     let power = source.total_light_power();

@@ -4,7 +4,7 @@
 use super::bounds::{EmissionCone, LightBounds};
 use super::node::{LightTreeNode, NodeChild};
 use super::{LightTree, NOT_IN_TREE};
-use crate::control::{CancelToken, Cancelled};
+use crate::control::{CancelToken, Canceled};
 use crate::math::DVec3;
 use crate::math::float::floor_to_power_of_two;
 use crate::math::lanes::PACKET_SIZE;
@@ -14,8 +14,8 @@ impl LightTree {
     /// emits.
     ///
     /// # Errors
-    /// [`Cancelled`] if the token is canceled.
-    pub fn new(lights: &[Option<LightBounds>], token: &CancelToken) -> Result<Option<Self>, Cancelled> {
+    /// [`Canceled`] if the token is canceled.
+    pub fn new(lights: &[Option<LightBounds>], token: &CancelToken) -> Result<Option<Self>, Canceled> {
         let mut leaves: Vec<LightLeaf> = (0..).zip(lights).filter_map(LightLeaf::new).collect();
         // Group the lights by distance falloff.
         leaves.sort_by_key(|leaf| leaf.bounds.space);
@@ -62,7 +62,7 @@ struct LightTreeBuilder<'a> {
 
 impl LightTreeBuilder<'_> {
     /// Builds the node over `leaves` and returns its index. `before` is the number of preceding leaves.
-    fn build_node(&mut self, leaves: &mut [LightLeaf], before: u32) -> Result<u32, Cancelled> {
+    fn build_node(&mut self, leaves: &mut [LightLeaf], before: u32) -> Result<u32, Canceled> {
         let number = self.nodes.len() as u32;
         self.nodes.push(LightTreeNode::empty(self.leaves));
         let is_over_lights = leaves.len() <= PACKET_SIZE;
@@ -91,7 +91,7 @@ impl LightTreeBuilder<'_> {
 
 /// Partitions the leaves into at most one group per child, and returns the group sizes. Uses as few groups as
 /// possible, so that the nodes are full.
-fn partition_into_groups(leaves: &mut [LightLeaf], token: &CancelToken) -> Result<Vec<usize>, Cancelled> {
+fn partition_into_groups(leaves: &mut [LightLeaf], token: &CancelToken) -> Result<Vec<usize>, Canceled> {
     token.check_pause_and_cancel()?;
     if leaves.len() <= PACKET_SIZE {
         return Ok(vec![1; leaves.len()]);

@@ -20,11 +20,11 @@ pub struct AdaptiveLightTreeCut<'a> {
     room: usize,
     receiver: Receiver,
     /// Indices of the cut's nodes.
-    nodes: ArrayVec<u32, { AdaptiveLightTreeCut::MOST }>,
+    nodes: ArrayVec<u32, { AdaptiveLightTreeCut::MAX_NODES }>,
     /// Importance of each node's children, which is 0 for children that are also in the cut.
-    importance: ArrayVec<F32x16, { AdaptiveLightTreeCut::MOST }>,
+    importance: ArrayVec<F32x16, { AdaptiveLightTreeCut::MAX_NODES }>,
     /// Sum of the importance up to and including each node.
-    sums: ArrayVec<f64, { AdaptiveLightTreeCut::MOST }>,
+    sums: ArrayVec<f64, { AdaptiveLightTreeCut::MAX_NODES }>,
 }
 
 /// Minimum nearness at which a node is replaced by its children. Nearness is the squared sine of half the
@@ -33,14 +33,14 @@ const NEAR: f32 = 0.05;
 
 impl<'a> AdaptiveLightTreeCut<'a> {
     /// Maximum number of nodes in any cut.
-    pub const MOST: usize = 64;
+    pub const MAX_NODES: usize = 64;
 
     /// Creates a cut with at most `room` nodes. [`AdaptiveLightTreeCut::adapt_to_receiver`] must be called
     /// before picking.
     #[inline(always)]
     pub fn new(tree: &'a LightTree, room: usize) -> Self {
         let receiver = Receiver::with_unknown_lobe(Vec3::ZERO, Vec3::ZERO);
-        let room = room.clamp(1, Self::MOST);
+        let room = room.clamp(1, Self::MAX_NODES);
         Self {
             tree,
             room,

@@ -2,7 +2,7 @@ use proptest::prelude::*;
 
 use super::bounds::{ConeFalloff, DistanceFalloff};
 use super::*;
-use crate::control::{CancelToken, Cancelled};
+use crate::control::{CancelToken, Canceled};
 use crate::geometry::Shape;
 use crate::geometry::cuboid::OrientedBox;
 use crate::geometry::cylinder::Cylinder;
@@ -366,8 +366,8 @@ fn canceled_builds_return_an_error() {
     let token = CancelToken::new();
     assert!(LightTree::new(&bounds, &token).is_ok_and(|tree| tree.is_some()));
     token.cancel();
-    assert_eq!(LightTree::new(&bounds, &token), Err(Cancelled));
-    assert_eq!(Lights::new(lights_of(100, &mut next), &token), Err(Cancelled));
+    assert_eq!(LightTree::new(&bounds, &token), Err(Canceled));
+    assert_eq!(Lights::new(lights_of(100, &mut next), &token), Err(Canceled));
 }
 
 #[test]
@@ -449,7 +449,7 @@ fn mesh_pdf_matches_its_samples() {
             object: 4,
             part: EmittingTriangleSelection::Listed,
             bounds,
-            texture: None,
+            modulation: None,
         };
         let (mut next, mut compared) = (random::unit_generator(5), 0);
         for _ in 0..2000 {
@@ -461,7 +461,7 @@ fn mesh_pdf_matches_its_samples() {
             };
             let Emitter::Mesh(mesh) = &light.shape else { panic!("a mesh") };
             let front = mesh.normal_of(primitive).expect("expected one of the light's triangles").as_vec3();
-            let met = crate::lights::LightHit {
+            let hit = crate::lights::LightHit {
                 direction: sample.direction,
                 distance: (target - point).length(),
                 normal: front,
@@ -470,7 +470,7 @@ fn mesh_pdf_matches_its_samples() {
             if front.dot(sample.direction) > -0.01 {
                 continue;
             }
-            let product = light.pdf(point, normal, &met) * sample.weight.x;
+            let product = light.pdf(point, normal, &hit) * sample.weight.x;
             assert!((product - 1.0).abs() < 5e-3, "{count}: {product}");
             compared += 1;
         }

@@ -380,7 +380,7 @@ pub fn check_values<B: Bxdf>(
     check_values_within::<B>(what, point, alphas, |_, _| 1.0, reference);
 }
 
-/// [`check_values`] for the Beckmann distribution, which amplifies rounding errors of steep slopes.
+/// [`check_values`] for the Beckmann distribution, which amplifies rounding errors at steep slopes.
 pub fn check_beckmann_values<B: Bxdf>(
     what: &str,
     point: &B::Point,
@@ -391,7 +391,7 @@ pub fn check_beckmann_values<B: Bxdf>(
     check_values_within::<B>(what, point, alphas, room, reference);
 }
 
-/// [`check_values`] with a factor for the relative error.
+/// [`check_values`] with a factor on the tolerated relative error.
 fn check_values_within<B: Bxdf>(
     what: &str,
     point: &B::Point,

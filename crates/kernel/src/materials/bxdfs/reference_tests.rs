@@ -1,10 +1,10 @@
-//! Microfacet lobes in `f64`, computed with the formulas from the papers.
+//! Reference microfacet lobes: the formulas from the papers, in `f64`.
 
 use crate::math::DVec3;
 
 use std::f64::consts::PI;
 
-/// D·G/(4 cosθᵢ cosθₒ) around the z axis, computed with the formulas from the papers.
+/// D·G/(4 cosθᵢ cosθₒ) of GGX around the z axis.
 pub fn reference_microfacet_brdf(one: DVec3, other: DVec3, [u, v]: [f64; 2]) -> f64 {
     let half = (one + other).normalize();
     let stretched = (half.x / u).powi(2) + (half.y / v).powi(2) + half.z * half.z;

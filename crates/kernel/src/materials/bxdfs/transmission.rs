@@ -1,11 +1,11 @@
-//! Kinds that transmit light: the BSDF for transmitted light, and samples on either side of a surface.
+//! Transmissive kinds: their BSDFs for transmitted light, and samples on either side of a surface.
 
 use super::{BsdfPacket, BxdfPoint};
 use crate::materials::bsdf::DielectricSamplePacket;
 use crate::math::lanes::{F32x16, Simd};
 
 impl BxdfPoint {
-    /// The BSDF for transmitted light, which is of a different kind, or `None` if no light is transmitted.
+    /// BSDF for transmitted light, which has a different kind, or `None` if no light is transmitted.
     #[inline(always)]
     pub fn bsdf_for_transmitted_light(&self) -> Option<Self> {
         match self {

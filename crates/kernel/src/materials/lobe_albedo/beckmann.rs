@@ -1,18 +1,19 @@
-//! Directional albedos of lobes with the Beckmann distribution.
+//! Directional albedos of Beckmann lobes.
 
 use std::f64::consts::FRAC_2_SQRT_PI;
 
 use super::gauss_legendre;
 
-/// Limit of the slopes x and y, in units of α. Steeper slopes have a probability of 1e-8.
+/// Maximum of the slopes x and y, in units of α. The probability of steeper slopes is 1e-8.
 const MAX_SLOPE: f64 = 4.0;
 
 /// Number of quadrature nodes along the view direction and across it.
 const NODES: [usize; 2] = [24, 16];
 
-/// E(μ) = ∬ P(x, y) (cosθ − αx sinθ)/cosθ · F/(1 + Λᵢ + Λₒ) dx dy, the mean over the slopes of all visible
-/// facets. Slopes are normally distributed: P(x, y) = exp(−x² − y²)/π. A facet reflects light above the
-/// surface if α²x² cosθ + 2αx sinθ < (1 − α²y²) cosθ, so the quadrature covers only an interval of x.
+/// Directional albedo E(μ) = ∬ P(x, y) (cosθ − αx sinθ)/cosθ · F/(1 + Λᵢ + Λₒ) dx dy, a mean over the slopes
+/// of all visible facets. Slopes are normally distributed: P(x, y) = exp(−x² − y²)/π. A facet reflects light
+/// above the surface if α²x² cosθ + 2αx sinθ < (1 − α²y²) cosθ, so the quadrature covers only an interval of
+/// x.
 pub(super) fn integrate_albedo(cosine: f64, alpha: f64, reflectance: &impl Fn(f64) -> f64) -> f64 {
     let sine = (1.0 - cosine * cosine).max(0.0).sqrt();
     let masked = smith_lambda(cosine, sine, alpha);

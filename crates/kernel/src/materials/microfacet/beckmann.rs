@@ -1,25 +1,27 @@
-//! Masking and visible normals of the Beckmann distribution.
+//! Smith masking and visible normal sampling for the Beckmann distribution.
 //!
 //! Let a = 1/(α tanθ). Then Λ = (erf(a) − 1)/2 + exp(−a²)/(2a√π) (Heitz, *Understanding the Masking-Shadowing
 //! Function in Microfacet-Based BRDFs*, JCGT 3(2), 2014, equation 72). Walter et al. approximate this with a
-//! rational function, with a relative error of 0.35 %. The exact form keeps values and pdfs consistent.
+//! rational function, whose relative error is 0.35 %. We use the exact form, so that sampling with visible
+//! normals matches the pdf.
 //!
 //! Visible normals are sampled as pairs of slopes (Heitz and d'Eon, *Importance Sampling Microfacet-Based
 //! BSDFs using the Distribution of Visible Normals*, EGSR 2014). For α = 1 and a view direction (sinθ, 0,
 //! cosθ), the slope along y is normally distributed, and the density of the slope x along the view direction
-//! is proportional to (cosθ − x sinθ)·exp(−x²) for x < cotθ. With v = (1 + erf(x))/2, its integral is H(v) =
-//! v cosθ + exp(−x²) sinθ/(2√π), and H'(v) = cosθ − x sinθ. H is concave, so Newton's method converges.
+//! is proportional to (cosθ − x sinθ)·exp(−x²) for x < cotθ. With v = (1 + erf(x))/2, the integral of this
+//! density is H(v) = v cosθ + exp(−x²) sinθ/(2√π), and H'(v) = cosθ − x sinθ. H is concave, so Newton's
+//! method converges.
 
 use std::f32::consts::{FRAC_2_SQRT_PI, LN_2};
 
 use crate::math::Vec3;
 use crate::math::elementary::{erf_and_gaussian, gaussian, gaussian_quantile, log2};
 
-/// Number of iterations of Newton's method. The error of H is then below 1e-6.
-const STEPS: u32 = 3;
+/// Number of Newton iterations, which reduce the error of H to less than 1e-6.
+const NEWTON_STEPS: u32 = 3;
 
-/// The range of v. Slopes outside of it are as unlikely as the rounding error of a random number.
-const RANGE: [f32; 2] = [6e-8, 1.0 - 6e-8];
+/// Range of v. The probability of slopes outside of it is below the resolution of a random number.
+const V_RANGE: [f32; 2] = [6e-8, 1.0 - 6e-8];
 
 /// cosθ (1 + 2Λ). `sine` is α sinθ.
 #[inline(always)]
@@ -38,27 +40,27 @@ pub fn sample_visible_normal(view: Vec3, u: [f32; 2]) -> Vec3 {
     let inverse = 1.0 / if is_upright { 1.0 } else { sine };
     let (x, y) = (if is_upright { 1.0 } else { view.x * inverse }, view.y * inverse);
     let along = sample_slope_along_view(view.z, sine, u[0]);
-    let across = gaussian_quantile(u[1].max(RANGE[0]).min(RANGE[1]));
+    let across = gaussian_quantile(u[1].max(V_RANGE[0]).min(V_RANGE[1]));
     Vec3::new(across * y - along * x, -along * y - across * x, 1.0)
 }
 
 /// Samples the slope along the view direction.
 #[inline(always)]
 fn sample_slope_along_view(cosine: f32, sine: f32, u: f32) -> f32 {
-    let u = u.max(RANGE[0]);
+    let u = u.max(V_RANGE[0]);
     let (erf, at_end) = erf_and_gaussian(cosine / sine);
     let weight = sine * (0.25 * FRAC_2_SQRT_PI);
-    // v and H for the steepest visible slope.
-    let end = (0.5 + 0.5 * erf).min(RANGE[1]);
+    // v and H at the steepest visible slope.
+    let end = (0.5 + 0.5 * erf).min(V_RANGE[1]);
     let wanted = u * (cosine * end + weight * at_end);
-    // Start with a mix of the solutions for normal and for grazing incidence.
+    // Start from a blend of the solutions for normal and grazing incidence.
     let (erf, _) = erf_and_gaussian((-LN_2 * log2(u)).sqrt());
     let upright = cosine / (cosine + 2.0 * weight);
-    let mut v = (end * (upright * u + (1.0 - upright) * (1.0 - erf))).max(RANGE[0]).min(end);
+    let mut v = (end * (upright * u + (1.0 - upright) * (1.0 - erf))).max(V_RANGE[0]).min(end);
     let mut slope = gaussian_quantile(v);
-    for _ in 0..STEPS {
+    for _ in 0..NEWTON_STEPS {
         let missing = wanted - (cosine * v + weight * gaussian(slope));
-        v = (v + missing / (cosine - slope * sine).max(1e-6)).max(RANGE[0]).min(end);
+        v = (v + missing / (cosine - slope * sine).max(1e-6)).max(V_RANGE[0]).min(end);
         slope = gaussian_quantile(v);
     }
     slope

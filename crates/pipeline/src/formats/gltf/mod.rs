@@ -9,8 +9,8 @@ use std::path::{Path, PathBuf};
 use self::materials::{MaterialBuilder, TextureFileReference};
 use super::frame::{CameraPose, FOV, frame_model, round_to_decimals_of_step};
 use super::model::{
-    Lighting, ModelViewOptions, ROUGH, SIZE, UsedNames, add_camera, add_ground, add_render_settings,
-    add_sky_and_key_light, file_name, warning,
+    DEFAULT_SIZE, Lighting, ModelViewOptions, POLISHED_ROUGHNESS, UsedNames, add_camera, add_ground,
+    add_render_settings, add_sky_and_key_light, file_name, warning,
 };
 use super::rounding::{shorten, shorten_color, shorten_vector};
 use super::{ForeignReadContext, ForeignScene, ImportedScene, lower};
@@ -161,7 +161,9 @@ impl SceneBuilder<'_> {
         // Add the render settings, the camera and the lights.
         let own = scene.cameras.first().filter(|_| view.from.is_none());
         let aspect = view.aspect.or(own.and_then(|camera| camera.aspect));
-        let size = own.and_then(|camera| camera.aspect).map(|aspect| [(SIZE[1] * aspect).round(), SIZE[1]]);
+        let size = own
+            .and_then(|camera| camera.aspect)
+            .map(|aspect| [(DEFAULT_SIZE[1] * aspect).round(), DEFAULT_SIZE[1]]);
         let lighting = match scene.lights.is_empty() {
             true => Lighting::Default { is_polished: scene.materials.iter().any(material_may_cast_caustics) },
             false => Lighting::from_file_light_irradiance(max_irradiance(&scene.lights, bounds)),
@@ -179,7 +181,7 @@ impl SceneBuilder<'_> {
                     &scene.outline,
                     view.from.unwrap_or(ViewSide::Iso),
                     view.turns,
-                    aspect.unwrap_or(SIZE[0] / SIZE[1]),
+                    aspect.unwrap_or(DEFAULT_SIZE[0] / DEFAULT_SIZE[1]),
                 );
                 add_camera(&mut self.document, &eye, ModelProjection::Perspective { fov: FOV });
                 eye
@@ -356,7 +358,8 @@ fn is_fully_transparent(material: &ModelMaterial) -> bool {
 
 /// Whether a material may cast caustics. Assumes that a texture may contain any value up to its factor.
 fn material_may_cast_caustics(material: &ModelMaterial) -> bool {
-    let is_smooth = |roughness: &TexturedValue| roughness.texture.is_some() || roughness.factor.x < ROUGH;
+    let is_smooth =
+        |roughness: &TexturedValue| roughness.texture.is_some() || roughness.factor.x < POLISHED_ROUGHNESS;
     let reflects = material.metallic.factor.x > 0.0 || material.specular.factor.x > 0.0;
     let is_coated = material.clearcoat.factor.x > 0.0 && is_smooth(&material.clearcoat_roughness);
     is_coated || is_smooth(&material.roughness) && (reflects || material.transmission.factor.x > 0.0)
@@ -364,8 +367,8 @@ fn material_may_cast_caustics(material: &ModelMaterial) -> bool {
 
 /// Upper bound on the total irradiance at the center of a bounding box, assuming normal incidence from all
 /// lights. Distances to lights are clamped to at least a quarter of the box's diagonal.
-fn max_irradiance(lights: &[ModelLight], [least, greatest]: [DVec3; 2]) -> f64 {
-    let (middle, size) = ((least + greatest) * 0.5, (greatest - least).length());
+fn max_irradiance(lights: &[ModelLight], [min, max]: [DVec3; 2]) -> f64 {
+    let (middle, size) = ((min + max) * 0.5, (max - min).length());
     let of_light = |light: &ModelLight| {
         let luminance = f64::from(luminance(light.intensity.as_vec3()));
         match light.kind {
@@ -403,9 +406,9 @@ fn zero_if_tiny(value: f64) -> f64 {
 }
 
 /// Converts a camera from the file. Places `look_at` on its view axis, at the depth of the model's center.
-fn camera_pose(camera: &ModelCamera, [least, greatest]: [DVec3; 2]) -> CameraPose {
-    let size = (greatest - least).length().max(1e-12);
-    let depth = ((least + greatest) * 0.5 - camera.position).dot(camera.direction).max(size * 0.05);
+fn camera_pose(camera: &ModelCamera, [min, max]: [DVec3; 2]) -> CameraPose {
+    let size = (max - min).length().max(1e-12);
+    let depth = ((min + max) * 0.5 - camera.position).dot(camera.direction).max(size * 0.05);
     let look_at = camera.position + camera.direction * depth;
     let step = size.min(depth) * 1e-6;
     let tidy = |at: DVec3| DVec3::from(at.to_array().map(|part| round_to_decimals_of_step(part, step)));

@@ -12,7 +12,7 @@ pub(crate) struct CheckpointLock {
     /// processes can detect the lock and the file's identity cannot be reused.
     held: Option<File>,
     /// The checkpoint that was last written or reported as unused.
-    told: Option<FileIdentity>,
+    last_reported: Option<FileIdentity>,
     /// The last request for which a failure was reported. Later failures in the same request have the same
     /// cause and are not reported.
     failed: Option<u64>,
@@ -21,7 +21,7 @@ pub(crate) struct CheckpointLock {
 impl CheckpointLock {
     /// Keeps a file open after this process has written and locked it.
     pub(super) fn keep_open(&mut self, path: &Path, file: Option<File>) {
-        (self.held, self.told) = (file, FileIdentity::from_existing_or_new_path(path));
+        (self.held, self.last_reported) = (file, FileIdentity::from_existing_or_new_path(path));
     }
 
     /// Locks a file left behind by a process that has ended. Does nothing if another process has locked the
@@ -61,8 +61,8 @@ impl CheckpointLock {
     /// Records a file as reported and returns whether it had not been reported before.
     pub(super) fn record_first_report_of_file(&mut self, path: &Path) -> bool {
         let identity = FileIdentity::from_existing_or_new_path(path);
-        let is_news = self.told != identity;
-        self.told = identity;
+        let is_news = self.last_reported != identity;
+        self.last_reported = identity;
         is_news
     }
 }

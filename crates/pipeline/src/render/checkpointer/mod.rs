@@ -34,7 +34,7 @@ use crate::system::file::open_regular_file;
 const TIME_SHARE: u32 = 100;
 
 /// Extension appended to the output file name.
-const ENDING: &str = ".checkpoint";
+const CHECKPOINT_EXTENSION: &str = ".checkpoint";
 
 /// Creates the header of a part or checkpoint file.
 pub(crate) fn create_header(
@@ -61,12 +61,12 @@ fn part_index_and_blocks(share: Option<&Shard>) -> PartShare {
 }
 
 /// Extension appended to another render's checkpoint when it is moved aside.
-const ASIDE: &str = ".before";
+const BACKUP_EXTENSION: &str = ".before";
 
 /// Returns the checkpoint path for an output file.
 pub(crate) fn checkpoint_path(output: &Path) -> PathBuf {
     let mut name = output.as_os_str().to_owned();
-    name.push(ENDING);
+    name.push(CHECKPOINT_EXTENSION);
     name.into()
 }
 
@@ -250,7 +250,7 @@ impl<'a> Checkpointer<'a> {
                     | PartError::Doubled { .. }
                     | PartError::Missing { .. }
                     | PartError::Film(_)
-                    | PartError::Cancelled(_),
+                    | PartError::Canceled(_),
                 ) => Ok(()),
             };
         };
@@ -269,7 +269,7 @@ impl<'a> Checkpointer<'a> {
     /// Returns why it cannot be moved.
     fn move_aside_unless_shorter(&self, is_longer: impl Fn(&Path) -> bool) -> Result<(), String> {
         let mut aside = self.path.as_os_str().to_owned();
-        aside.push(ASIDE);
+        aside.push(BACKUP_EXTENSION);
         let aside = PathBuf::from(aside);
         if is_longer(&aside) {
             return Ok(());
@@ -358,7 +358,7 @@ impl<'a> Checkpointer<'a> {
 
     /// When a render is canceled, saves a checkpoint if it will be resumed later. Returns whether one was
     /// saved.
-    pub(crate) fn save_if_cancelled(
+    pub(crate) fn save_if_canceled(
         &self,
         state: &FilmState,
         rays: RayCounters,
@@ -529,7 +529,7 @@ fn rejection_message(error: &PartError) -> String {
         | PartError::Doubled { .. }
         | PartError::Missing { .. }
         | PartError::Film(_)
-        | PartError::Cancelled(_) => error.to_string(),
+        | PartError::Canceled(_) => error.to_string(),
     }
 }
 

@@ -61,7 +61,7 @@ pub(crate) struct PixelOverhead {
 
 impl PixelOverhead {
     /// Maximum overhead per pixel, in samples.
-    const MOST: f64 = 4.0;
+    const MAX_OVERHEAD: f64 = 4.0;
 
     fn record_job_pair(&mut self, before: Option<MeasuredJobCost>, now: MeasuredJobCost) {
         if let Some(before) =
@@ -76,7 +76,7 @@ impl PixelOverhead {
     /// samples.
     pub(crate) fn samples_including_overhead(self, units: f64, pixels: f64) -> f64 {
         let share = if self.of_samples > 0.0 { self.of_pixels / self.of_samples } else { 0.0 };
-        units + share.clamp(0.0, Self::MOST) * pixels
+        units + share.clamp(0.0, Self::MAX_OVERHEAD) * pixels
     }
 }
 
@@ -114,7 +114,7 @@ mod tests {
         assert_eq!(of([1.0, 2.0]), 0.0);
         assert_eq!(of([1.0, 4.0]), 0.0, "the overhead should not be negative");
         assert_eq!(of([1.0, 0.5]), 0.0, "more samples in less time should be ignored");
-        assert_eq!(of([1.0, 1.001]), PixelOverhead::MOST);
+        assert_eq!(of([1.0, 1.001]), PixelOverhead::MAX_OVERHEAD);
     }
 
     #[test]

@@ -5,19 +5,19 @@ use std::time::{Duration, Instant};
 use super::work_rate::WorkAmount;
 use crate::film::{Film, ImageNoiseAndConvergence};
 use crate::protocol::NoisePrediction;
-use crate::render::noise_goals::LEAST;
+use crate::render::noise_goals::MIN_SAMPLES;
 
 /// Minimum time before the first measurement and between measurements, each of which requires a sum over all
 /// pixels.
 const INTERVAL: Duration = Duration::from_millis(500);
 /// Minimum ratio of the current noise to the next reported level.
-const STEP: f64 = 1.5;
+const MIN_LEVEL_RATIO: f64 = 1.5;
 
 /// The last noise measurement and the time when the next one is due.
 #[derive(Debug)]
 pub(crate) struct NoiseTracker {
     due: Instant,
-    told: Option<NoiseMeasurement>,
+    last_measurement: Option<NoiseMeasurement>,
 }
 
 /// A noise measurement.
@@ -32,15 +32,15 @@ struct NoiseMeasurement {
 
 impl NoiseTracker {
     pub(crate) fn new() -> Self {
-        Self { due: Instant::now() + INTERVAL, told: None }
+        Self { due: Instant::now() + INTERVAL, last_measurement: None }
     }
 
     /// Measures the noise if a measurement is due. `samples` is the minimum number of samples per pixel.
     pub(crate) fn measure_if_due(&mut self, film: &Film, samples: u32, done: f64, seconds: f64) {
-        if samples < LEAST || Instant::now() < self.due {
+        if samples < MIN_SAMPLES || Instant::now() < self.due {
             return;
         }
-        self.told = film.image_noise().map(|noise| NoiseMeasurement { noise, done, seconds });
+        self.last_measurement = film.image_noise().map(|noise| NoiseMeasurement { noise, done, seconds });
         self.due = Instant::now() + INTERVAL;
     }
 
@@ -53,7 +53,7 @@ impl NoiseTracker {
         left: Option<f64>,
     ) -> Option<NoisePrediction> {
         let NoiseMeasurement { noise: ImageNoiseAndConvergence { relative_error, power }, done, seconds } =
-            self.told?;
+            self.last_measurement?;
         // Returns the fraction of the noise that remains with `times` times as many samples.
         let fall = |times: f64| libm::pow(times, -0.5 * power);
         let by_now = if done > 0.0 { relative_error * fall(work.done / done) } else { relative_error };
@@ -74,7 +74,7 @@ fn predict_next_noise_milestone(
     left: f64,
 ) -> Option<(f64, f64)> {
     let WorkAmount { done, aside: [aside, _], .. } = work;
-    let level = round_down_to_1_2_5_series(by_now / STEP);
+    let level = round_down_to_1_2_5_series(by_now / MIN_LEVEL_RATIO);
     let more = done * (libm::pow(by_now / level, 2.0 / power) - 1.0);
     // Assume that other activities keep taking the same fraction of the time.
     let seconds = more / rate * (1.0 + aside * rate / done);
@@ -111,7 +111,7 @@ mod tests {
         let noise = ImageNoiseAndConvergence { relative_error: 0.021, power: 1.0 };
         NoiseTracker {
             due: Instant::now(),
-            told: Some(NoiseMeasurement { noise, done: 100.0, seconds: 9.0 }),
+            last_measurement: Some(NoiseMeasurement { noise, done: 100.0, seconds: 9.0 }),
         }
     }
 
@@ -119,10 +119,11 @@ mod tests {
     fn next_level_is_predicted_from_sample_count() {
         // Reaching 1 % takes 4.41 times as many samples. The rate is 10 units per second.
         let work = WorkAmount { done: 100.0, total: Some(10_000.0), aside: [0.0; 2] };
-        let told = measured().current_and_predicted_noise(work, Some(10.0), Some(100.0)).expect("noise");
-        let (level, seconds) = told.next.expect("a level");
+        let last_measurement =
+            measured().current_and_predicted_noise(work, Some(10.0), Some(100.0)).expect("noise");
+        let (level, seconds) = last_measurement.next.expect("a level");
         assert!((level - 0.01).abs() < 1e-12 && (seconds - 34.1).abs() < 1e-6, "{level} {seconds}");
-        assert_eq!((told.now, told.seconds), (0.021, 9.0));
+        assert_eq!((last_measurement.now, last_measurement.seconds), (0.021, 9.0));
         // Half of the time is spent on other activities.
         let half = WorkAmount { aside: [10.0, 10.0], ..work };
         let (_, seconds) = measured()
@@ -136,10 +137,11 @@ mod tests {
     #[test]
     fn prediction_accounts_for_work_since_measurement() {
         let work = WorkAmount { done: 400.0, total: Some(10_000.0), aside: [0.0; 2] };
-        let told = measured().current_and_predicted_noise(work, Some(10.0), Some(1000.0)).expect("noise");
-        assert_eq!(told.now, 0.021);
+        let last_measurement =
+            measured().current_and_predicted_noise(work, Some(10.0), Some(1000.0)).expect("noise");
+        assert_eq!(last_measurement.now, 0.021);
         // The expected current noise is 1.05 %, so reaching 0.5 % takes 4.41 times as many samples.
-        let (level, seconds) = told.next.expect("a level");
+        let (level, seconds) = last_measurement.next.expect("a level");
         assert!((level - 0.005).abs() < 1e-12 && (seconds - 136.4).abs() < 1e-6, "{level} {seconds}");
     }
 

@@ -2,13 +2,15 @@
 //! needed only until the part's goal is decided.
 
 use crate::film::{CELLS, ConvergenceModel, total_samples_to_reduce_error};
-use crate::render::noise_goals::{AIM, CellSampleGoals, LEAST, MOST, NoiseMeasurements, TileNoise};
+use crate::render::noise_goals::{
+    AIM, CellSampleGoals, MAX_SAMPLES, MIN_SAMPLES, NoiseMeasurements, TileNoise,
+};
 
 /// Assumed factor by which the variance decreases from two to four samples and again from four to eight. This
 /// is the median over all tiles in the bundled scenes.
-const EARLY_FALL: f64 = 4.0;
+const EARLY_REDUCTION: f64 = 4.0;
 /// Range to which measured decreases in variance are clamped.
-const FALLS: [f64; 2] = [2.0, 8.0];
+const REDUCTION_RANGE: [f64; 2] = [2.0, 8.0];
 
 /// Expected number of samples for each half of each cell.
 #[derive(Debug)]
@@ -64,7 +66,7 @@ impl ExpectedSamples {
             let cells = self.0.iter_mut().zip(done).enumerate().skip(CELLS * tile).take(CELLS);
             for (cell, (expected, done)) in cells {
                 for half in (0..2).filter(|half| goals.get(cell, *half) == u32::MAX) {
-                    expected[half] = wanted.max(done[half]).max(LEAST);
+                    expected[half] = wanted.max(done[half]).max(MIN_SAMPLES);
                 }
             }
         }
@@ -81,7 +83,7 @@ struct NoiseDecay {
     /// `power` applies.
     doublings: u32,
     /// Ratio of the variances before and after the last doubling of samples, for all tiles, or `None` below
-    /// [`LEAST`] samples, where each tile uses its own ratio.
+    /// [`MIN_SAMPLES`] samples, where each tile uses its own ratio.
     fall: Option<f64>,
     /// Exponent p. After the doublings, the variance is proportional to the number of samples to the power
     /// −p.
@@ -92,7 +94,7 @@ impl NoiseDecay {
     /// Fits the model to `falls`: for each tile, the variance before the last doubling of samples divided by
     /// the variance after it.
     fn fit(convergence: ConvergenceModel, mut falls: Vec<f64>, samples: u32) -> Self {
-        let doublings = (LEAST.ilog2().saturating_sub(samples.ilog2())).max(1);
+        let doublings = (MIN_SAMPLES.ilog2().saturating_sub(samples.ilog2())).max(1);
         if convergence == ConvergenceModel::Photons {
             return Self {
                 samples,
@@ -101,12 +103,14 @@ impl NoiseDecay {
                 power: convergence.typical_variance_exponent(),
             };
         }
-        if samples < LEAST {
+        if samples < MIN_SAMPLES {
             return Self { samples, doublings, fall: None, power: convergence.typical_variance_exponent() };
         }
         falls.sort_by(f64::total_cmp);
         let usual = libm::exp2(convergence.typical_variance_exponent());
-        let fall = falls.get(falls.len() / 2).map_or(usual, |fall| fall.clamp(FALLS[0], FALLS[1]));
+        let fall = falls
+            .get(falls.len() / 2)
+            .map_or(usual, |fall| fall.clamp(REDUCTION_RANGE[0], REDUCTION_RANGE[1]));
         Self {
             samples,
             doublings,
@@ -121,14 +125,15 @@ impl NoiseDecay {
         let of_tile = || {
             // Each doubling beyond two samples provides another ratio for the tile.
             let known = fall.map_or(0.0, |_| 1.0 - 1.0 / f64::from(self.samples.ilog2()));
-            let fall = fall.map_or(EARLY_FALL, |fall| fall.clamp(FALLS[0], FALLS[1]));
-            libm::pow(fall, known) * libm::pow(EARLY_FALL, 1.0 - known)
+            let fall =
+                fall.map_or(EARLY_REDUCTION, |fall| fall.clamp(REDUCTION_RANGE[0], REDUCTION_RANGE[1]));
+            libm::pow(fall, known) * libm::pow(EARLY_REDUCTION, 1.0 - known)
         };
         let fall = self.fall.unwrap_or_else(of_tile);
         let noise = noise * libm::pow(fall, -0.5 * f64::from(self.doublings));
         let samples = self.samples.saturating_mul(1 << self.doublings);
         if noise > 0.0 {
-            total_samples_to_reduce_error(self.power, bound / noise, samples).min(MOST)
+            total_samples_to_reduce_error(self.power, bound / noise, samples).min(MAX_SAMPLES)
         } else {
             self.samples
         }
@@ -203,7 +208,7 @@ mod tests {
     fn huge_predictions_differ_from_unknown() {
         for samples in [2, 16, 64] {
             let (goals, expected) = judged([(1.0, 1.0); 2], samples, 1e-12);
-            assert_eq!((goals.get(0, 0), expected.get(0, 0)), (u32::MAX, MOST), "{samples}");
+            assert_eq!((goals.get(0, 0), expected.get(0, 0)), (u32::MAX, MAX_SAMPLES), "{samples}");
         }
     }
 

@@ -3,7 +3,7 @@
 /// Time constant for averaging the rate, in seconds.
 const MEMORY_SECONDS: f64 = 3.0;
 /// Minimum time between two measurements of the rate.
-const SHORTEST_SECONDS: f64 = 0.05;
+const MIN_INTERVAL: f64 = 0.05;
 
 /// Exponentially decaying average of the work rate.
 #[derive(Clone, Debug)]
@@ -44,7 +44,7 @@ impl WorkRate {
         let seconds = seconds - aside;
         let (since, before) = self.measured;
         let span = seconds - since;
-        if span >= SHORTEST_SECONDS && done > before {
+        if span >= MIN_INTERVAL && done > before {
             let rate = (done - before) / span;
             let weight = 1.0 - (-span / MEMORY_SECONDS).exp();
             // Give recent work more weight at the beginning, because the first passes are slower.

@@ -2,11 +2,11 @@
 
 use super::super::context::Issue;
 use super::KeyInTable;
-use crate::math::limits::{SHORTEST, is_nonzero_but_too_short, robust_length};
+use crate::math::limits::{MIN_LENGTH, is_nonzero_but_too_short, robust_length};
 use crate::math::{DMat3, DVec3, Vec2};
 
-/// Maximum deviation of the product of a rotation and its transpose from the identity. Files contain rotations
-/// with as few as four decimals.
+/// Maximum deviation of the product of a rotation and its transpose from the identity. Some files write
+/// rotations with only four decimals.
 const ROTATION_TOLERANCE: f64 = 1e-3;
 
 impl KeyInTable<'_> {
@@ -36,7 +36,7 @@ impl KeyInTable<'_> {
     pub(in super::super) fn check_vector_zero_or_long_enough(&self, vector: DVec3) -> bool {
         let length = robust_length(vector);
         let Some(span) = self.value_span().filter(|_| is_nonzero_but_too_short(length)) else { return true };
-        let issue = Issue::error(span, format!("`{}` must be more than {SHORTEST:e} long", self.info.name));
+        let issue = Issue::error(span, format!("`{}` must be more than {MIN_LENGTH:e} long", self.info.name));
         self.context.report(issue.with_label(format!("its length is {length:e}")));
         false
     }
@@ -53,12 +53,13 @@ impl KeyInTable<'_> {
         let span = other.value_span().or(self.value_span());
         let Some(span) = span.filter(|_| is_nonzero_but_too_short(distance)) else { return true };
         let (first, second) = (self.info.name, other.info.name);
-        let message = format!("`{first}` and `{second}` must be more than {SHORTEST:e} apart");
+        let message = format!("`{first}` and `{second}` must be more than {MIN_LENGTH:e} apart");
         self.context.report(Issue::error(span, message).with_label(format!("they are {distance:e} apart")));
         false
     }
 
-    /// Reads a rotation matrix of 9 or 16 numbers, row by row. Removes rounding errors.
+    /// Reads a rotation matrix of 9 or 16 numbers in row-major order, and orthonormalizes it to remove
+    /// rounding errors.
     pub(in super::super) fn rotation(&self) -> Option<DMat3> {
         let is_4x4 = self.value?.as_array().is_some_and(|array| array.len() == 16);
         let expected = "9 or 16 numbers, row by row";
@@ -81,7 +82,7 @@ impl KeyInTable<'_> {
             return None;
         }
         if matrix.determinant() < 0.0 {
-            self.report_not_a_rotation("it mirrors: its determinant is -1");
+            self.report_not_a_rotation("it is a reflection: its determinant is -1");
             return None;
         }
         let x = matrix.x_axis.normalize();

@@ -143,9 +143,9 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
     #[inline(always)]
     fn sample_all(&self, sums: &mut LightSums, simd: impl Simd) {
         let render = &self.tile.settings.render;
-        let takes = |light: &Light| !self.only_infinite || light.is_infinite();
+        let is_sampled = |light: &Light| !self.only_infinite || light.is_infinite();
         let mut sampler = None;
-        for (number, light) in self.tile.world.lights.iter().filter(|(_, light)| takes(light)) {
+        for (number, light) in self.tile.world.lights.iter().filter(|(_, light)| is_sampled(light)) {
             if MIS && self.tile.paths_find_sky && light.is_environment() {
                 continue;
             }
@@ -171,12 +171,13 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
                     }
                     Some(_) | None => [[0.0; PACKET_SIZE]; 2],
                 };
-                let samples = light.sample_untextured_packet(&self.row.from, &self.row.normal, self.used, &u);
+                let samples =
+                    light.sample_unmodulated_packet(&self.row.from, &self.row.normal, self.used, &u);
                 let (mut values, active, response) =
                     self.unoccluded_contributions(&samples, 1.0 / count as f32, simd);
                 // Multiply by the emission texture.
-                if let Some(pattern) = light.emission_texture() {
-                    values = self.apply_emission_texture(pattern, &samples, active, values);
+                if let Some(pattern) = light.emission_modulation() {
+                    values = self.apply_emission_modulation(pattern, &samples, active, values);
                     sums.rays.lookups += u64::from(active.count_ones());
                 }
                 let mut fraction = self.splits_lobes.then(|| response.bsdf.wide_fraction());
@@ -239,10 +240,10 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         values
     }
 
-    /// Multiplies values by the emission texture at the sampled points.
+    /// Multiplies values by the emission modulation at the sampled points.
     #[cold]
     #[inline(never)]
-    fn apply_emission_texture(
+    fn apply_emission_modulation(
         &self,
         pattern: &EmissionModulation,
         samples: &LightSamplePacket,
@@ -414,8 +415,8 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         for i in 0..PACKET_SIZE {
             let value = lane(&f, i) * lane(&arriving, i) * (cosines[i] * share);
             set_lane(&mut values, i, value);
-            let brings = (cosines[i] > 0.0) & ((value.x != 0.0) | (value.y != 0.0) | (value.z != 0.0));
-            active[i] = if brings { TRUE } else { 0 };
+            let contributes = (cosines[i] > 0.0) & ((value.x != 0.0) | (value.y != 0.0) | (value.z != 0.0));
+            active[i] = if contributes { TRUE } else { 0 };
         }
         if let Some(interior_lists) = self.interior_lists.filter(|_| self.aov != LightAov::LitFraction) {
             values = self.attenuate_by_glass(interior_lists, samples, values);

@@ -53,7 +53,7 @@ impl<const MIS: bool> SimdKernel for SampleLightTree<'_, MIS> {
         let sampler = lighting.row.sampler_packet(lighting.tile);
         let mut sums = LightSums::ZERO;
         // Sample all infinite lights, if the tree excludes them.
-        if selection.leaves_beyond {
+        if selection.samples_infinite {
             sums = simd.call_out_of_line(SampleAllLights { only_infinite: true, ..lighting });
         }
         let samples = lighting.tile.settings.render.shadow_samples;

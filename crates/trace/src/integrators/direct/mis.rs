@@ -165,8 +165,8 @@ impl TileContext<'_> {
         }
         // If light samples skip the environment, its light-sampling pdf is 0.
         let sky = sky.map(|(radiance, of_sky)| (radiance, if self.paths_find_sky { 0.0 } else { of_sky }));
-        let share = |of_light: f32| power_heuristic_from_ratio(of_light * samples / pdf);
-        self.weighted_infinite_light((None, sky), &path.ray, path.state.normal, share)
+        let weight = |of_light: f32| power_heuristic_from_ratio(of_light * samples / pdf);
+        self.weighted_infinite_light((None, sky), &path.ray, path.state.normal, weight)
     }
 
     /// Like [`TileContext::lobe_ray_emitter_radiance`], for a lobe ray that leaves the scene.
@@ -194,13 +194,13 @@ impl TileContext<'_> {
 
     /// Weighted radiance of infinite lights along a ray that leaves the scene from a surface with this
     /// normal. `only` restricts the result to one light. `sky` contains the environment's radiance and
-    /// light-sampling pdf. `share` maps each light's sampling pdf to its weight.
+    /// light-sampling pdf. `weight` maps each light's sampling pdf to its weight.
     fn weighted_infinite_light(
         &self,
         (only, sky): (Option<u32>, Option<(Vec3, f32)>),
         ray: &Ray,
         normal: Vec3,
-        share: impl Fn(f32) -> f32,
+        weight: impl Fn(f32) -> f32,
     ) -> Vec3 {
         let lights = &self.world.lights;
         if !lights.has_visible_infinite_lights() {
@@ -208,7 +208,7 @@ impl TileContext<'_> {
         }
         let samples = lights.expected_sample_counts(self.behavior.receivers, ray.origin, normal);
         lights.radiance_from_infinity_with_precomputed_sky(sky, ray.direction, |number, pdf| {
-            if only.is_none_or(|only| only == number) { share(pdf * samples.for_light(number)) } else { 0.0 }
+            if only.is_none_or(|only| only == number) { weight(pdf * samples.for_light(number)) } else { 0.0 }
         })
     }
 

@@ -8,7 +8,7 @@ use super::lobe_rays::LobeRayTracingKernel;
 use super::mis::CompetingTechnique;
 use super::shadow_lift::ShadowOriginLiftKernel;
 use super::shadow_rays::ShadowRayQueue;
-use crate::control::Cancelled;
+use crate::control::Canceled;
 use crate::geometry::packet::set_bit_lanes;
 use crate::integrators::transport::accumulator::Accumulator;
 use crate::integrators::transport::batch::{ALL, VertexBatch};
@@ -246,7 +246,7 @@ impl DirectLightVertexQueue {
         tile: &TileContext<'_>,
         aov: LightAov,
         shares_with_paths: bool,
-    ) -> Result<(), Cancelled> {
+    ) -> Result<(), Canceled> {
         // The sums of a group are large, so their buffer is reused.
         let mut sums = std::mem::take(&mut self.sums);
         sums.clear();

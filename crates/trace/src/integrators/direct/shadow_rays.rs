@@ -98,8 +98,8 @@ impl ShadowRayQueue {
     /// Groups rays by ranges of tree positions with a counting sort. Rays within a group keep their order.
     fn group_by_light_tree_position(&mut self) {
         let Self { order, sorted, .. } = self;
-        let greatest = order.iter().map(|&(place, _)| place).max().unwrap_or(0);
-        let shift = (u32::BITS - greatest.leading_zeros()).saturating_sub(GROUP_BITS);
+        let largest = order.iter().map(|&(place, _)| place).max().unwrap_or(0);
+        let shift = (u32::BITS - largest.leading_zeros()).saturating_sub(GROUP_BITS);
         let mut starts = [0; MAX_GROUPS + 1];
         for (place, _) in &*order {
             starts[(place >> shift) as usize + 1] += 1;

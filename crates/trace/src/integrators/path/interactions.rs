@@ -17,7 +17,7 @@ use crate::integrators::transport::walk::{
     DirectOrCoincidentHit, Interaction, Interface, NullInteraction, PathStepper, walk_to_interaction,
 };
 use crate::integrators::view::LightAov;
-use crate::materials::{Bsdf, Coated, Mirror, ThinDielectric};
+use crate::materials::{Bsdf, Mirror, SpecularOverBase, ThinDielectric};
 use crate::math::Vec3;
 use crate::world::Hit;
 
@@ -52,8 +52,10 @@ impl<'a> PathStepper<'a> for CameraWavefront<'a, '_> {
                     match &vertex.material.bsdf {
                         Bsdf::NonSpecular(rough) => self.shade_rough(path, vertex, rough, far),
                         Bsdf::Mirror(mirror) => self.shade_mirror(path, vertex, mirror),
-                        Bsdf::Coated(coated) => self.shade_coated(path, vertex, coated, far),
-                        // Vertices at blends have the material of one part.
+                        Bsdf::SpecularOverBase(layers) => {
+                            self.shade_specular_over_base(path, vertex, layers, far);
+                        }
+                        // At a blend, each vertex has the material of the chosen part.
                         Bsdf::Dielectric(_) | Bsdf::ThinDielectric(_) | Bsdf::Blend(_) => {}
                     }
                 }
@@ -178,18 +180,17 @@ impl CameraWavefront<'_, '_> {
         self.roulette_and_push_reflected(reflected_path(path, vertex, &shading, reflectance));
     }
 
-    /// Splits a path at a surface with a δ lobe and non-specular lobes, or randomly chooses the δ lobe or the
-    /// others.
-    pub(super) fn shade_coated(
+    /// Splits a path at a surface with a δ lobe and non-specular lobes, or randomly chooses one of the two.
+    pub(super) fn shade_specular_over_base(
         &mut self,
         path: &PathRay,
         vertex: &SurfaceVertex<'_>,
-        coated: &Coated,
+        layers: &SpecularOverBase,
         far: &InteriorList,
     ) {
         let shading = vertex.perturbed_and_smooth_normals(self.counters);
         let is_colored = self.accumulator.aov.applies_surface_colors();
-        let lobe = vertex.specular_lobe(coated, &shading, is_colored, self.counters);
+        let lobe = vertex.specular_lobe(layers, &shading, is_colored, self.counters);
         let SpecularLobe { probability, .. } = lobe;
         let weaker = probability.min(1.0 - probability) * path.throughput.abs().max_element();
         let splits = self.tile.behavior.splits && path.state.only_specular_before;
@@ -197,18 +198,18 @@ impl CameraWavefront<'_, '_> {
         let is_specular = !both && self.tile.chooses_reflection(path, probability);
         if both || is_specular {
             let specular =
-                vertex.specular_weight(coated, &lobe, self.counters) * if both { probability } else { 1.0 };
+                vertex.specular_weight(layers, &lobe, self.counters) * if both { probability } else { 1.0 };
             if specular != Vec3::ZERO {
                 self.roulette_and_push_reflected(reflected_path(path, vertex, &shading, specular));
             }
         }
         if !is_specular {
             // Divide by the probability of choosing the base.
-            let by_chance = if both { 1.0 } else { 1.0 / (1.0 - probability) };
+            let base_factor = if both { 1.0 } else { 1.0 / (1.0 - probability) };
             let mut state = path.state;
-            state.roulette_throughput *= by_chance;
-            let path = PathRay { throughput: path.throughput * by_chance, state, ..*path };
-            self.shade_rough(&path, vertex, &coated.base, far);
+            state.roulette_throughput *= base_factor;
+            let path = PathRay { throughput: path.throughput * base_factor, state, ..*path };
+            self.shade_rough(&path, vertex, &layers.base, far);
         }
     }
 

@@ -6,7 +6,7 @@
 use arrayvec::ArrayVec;
 
 use super::kernel::kernel_integral_over_polygon;
-use super::map::{GatherPoint, MIN_COSINE, REACH};
+use super::map::{GatherPoint, MAX_PLANE_DISTANCE, MIN_COSINE};
 use crate::geometry::local_geometry::{FlatOrRoundExtent, FlatPolygon, NearestSurface};
 use crate::geometry::{Aabb, LocalGeometry, Shape, ShapeHit};
 use crate::materials::{Bsdf, Material, NonSpecular};
@@ -26,7 +26,7 @@ pub enum KernelCoverage {
 }
 
 /// Distance above which two planes are considered different, in kernel radii.
-const FLAT: f64 = 4e-3;
+const MIN_PLANE_SEPARATION: f64 = 4e-3;
 
 /// Pieces whose normals have at least this cosine may be in the same plane.
 const SAME_PLANE: f64 = 1.0 - 1e-6;
@@ -37,8 +37,8 @@ const BORDER: f64 = 2e-3;
 /// Maximum cosine between the normals of a wall and the piece it stands on.
 const UPRIGHT: f64 = 0.3;
 
-/// Distance beyond which surfaces are ignored, in kernel radii: √(1 + REACH²) plus a margin.
-const FAR: f64 = 1.05;
+/// Distance beyond which surfaces are ignored, in kernel radii: √(1 + MAX_PLANE_DISTANCE²) plus a margin.
+const SEARCH_RADIUS: f64 = 1.05;
 
 /// Minimum radius of a sphere that is treated as flat around the kernel's center, in kernel radii.
 const WIDE: f64 = 2.0;
@@ -79,7 +79,7 @@ pub fn primitive_material(world: &World, object: u32, primitive: u32) -> &Materi
     &world.materials[world.material_index(&Hit { shape, object })]
 }
 
-/// Whether photons are stored on a side of a material, or of any part of a blend.
+/// Whether photons are stored on one side of a material, or of any part of a blend.
 pub fn can_store_photons(material: &Material, is_front: bool) -> bool {
     if let Bsdf::Blend(blend) = &material.bsdf {
         return blend.parts.iter().any(|part| can_store_photons(part, is_front));
@@ -161,18 +161,18 @@ impl KernelNeighborhood {
             }
             part += kernel_integral_over_polygon(&corners);
         }
-        (MIN_COVERAGE..=1.0 + FLAT).contains(&part).then_some(part.min(1.0))
+        (MIN_COVERAGE..=1.0 + MIN_PLANE_SEPARATION).contains(&part).then_some(part.min(1.0))
     }
 
     /// Adds a shape and returns whether the coverage still has a closed form. `receives` returns whether
-    /// photons are stored on the front or on the back.
+    /// photons are stored on the front (`true`) or the back.
     fn add_shape(&mut self, shape: &Shape, receives: impl Fn(bool) -> bool) -> bool {
         match shape.geometry_near(self.point) {
             LocalGeometry::Polygons(count) => (0..count)
                 .filter_map(|number| shape.polygon_face(number))
                 .all(|piece| self.add_polygon_piece_or_wall(piece, &receives)),
             LocalGeometry::Surface { distance, ground } => {
-                distance > FAR * self.radius
+                distance > SEARCH_RADIUS * self.radius
                     || ground.is_some_and(|ground| self.try_add_covering_surface(&ground, receives))
             }
         }
@@ -182,11 +182,11 @@ impl KernelNeighborhood {
     /// false.
     fn try_add_covering_surface(&mut self, ground: &NearestSurface, receives: impl Fn(bool) -> bool) -> bool {
         let is_wide = match ground.extent {
-            FlatOrRoundExtent::Flat(reach) => reach > FAR * self.radius,
+            FlatOrRoundExtent::Flat(reach) => reach > SEARCH_RADIUS * self.radius,
             FlatOrRoundExtent::Round(radius) => radius > WIDE * self.radius,
         };
         let cosine = ground.normal.dot(self.normal);
-        let is_same = cosine.abs() > SAME_PLANE && ground.height < FLAT * self.radius;
+        let is_same = cosine.abs() > SAME_PLANE && ground.height < MIN_PLANE_SEPARATION * self.radius;
         self.whole += u32::from(is_wide && is_same && receives(cosine > 0.0));
         is_wide && is_same
     }
@@ -229,15 +229,16 @@ impl KernelNeighborhood {
         let is_within =
             |radii: f64| distance * distance < (radii * self.radius) * (radii * self.radius) * size;
         // Ignore pieces that are too far away or have no area.
-        if !(size > 0.0 && is_within(FAR)) {
+        if !(size > 0.0 && is_within(SEARCH_RADIUS)) {
             return true;
         }
-        if cosine * cosine > SAME_PLANE * SAME_PLANE * size && is_within(FLAT) {
+        if cosine * cosine > SAME_PLANE * SAME_PLANE * size && is_within(MIN_PLANE_SEPARATION) {
             return !receives(cosine > 0.0) || self.pieces.try_push(piece).is_ok();
         }
         let heights = piece.iter().map(|&corner| self.normal.dot(corner - self.point));
         let (low, high) = heights.fold((f64::MAX, f64::MIN), |(low, high), z| (low.min(z), high.max(z)));
-        let (reach, rises) = (f64::from(REACH) * self.radius, high > FLAT * self.radius);
+        let (reach, rises) =
+            (f64::from(MAX_PLANE_DISTANCE) * self.radius, high > MIN_PLANE_SEPARATION * self.radius);
         let is_steep = cosine * cosine <= f64::from(MIN_COSINE * MIN_COSINE) * size;
         if high < -reach
             || low > reach
@@ -254,7 +255,9 @@ impl KernelNeighborhood {
         let along = self.project_vector(normal) * (self.radius * distance.signum());
         let length = along.length();
         let wall = Wall { normal: along / length, distance: distance.abs() / (length * self.radius) };
-        normal.dot(self.normal).abs() < UPRIGHT && wall.distance > FLAT && self.walls.try_push(wall).is_ok()
+        normal.dot(self.normal).abs() < UPRIGHT
+            && wall.distance > MIN_PLANE_SEPARATION
+            && self.walls.try_push(wall).is_ok()
     }
 }
 
@@ -280,7 +283,7 @@ mod tests {
 
     /// Coverage of an upward-facing kernel of radius 0.1 at (x, 0, z) among shapes.
     fn coverage_at(x: f32, z: f32, shapes: &[&Shape]) -> Option<f64> {
-        let look = GatherPoint { point: Vec3::new(x, 0.0, z), normal: Vec3::Y, most_depth: 1 };
+        let look = GatherPoint { point: Vec3::new(x, 0.0, z), normal: Vec3::Y, max_depth: 1 };
         let mut around = KernelNeighborhood::new(&look, 0.1);
         let is_exact = shapes.iter().all(|shape| around.add_shape(shape, |_| true));
         around.coverage().filter(|_| is_exact)

@@ -8,7 +8,7 @@
 
 use super::coverage::can_store_photons;
 use super::map::Photon;
-use crate::control::Cancelled;
+use crate::control::Canceled;
 use crate::geometry::packet::set_bit_lanes;
 use crate::geometry::ray::offset_origin;
 use crate::geometry::surface_packet::SurfacePacket;
@@ -33,7 +33,7 @@ use crate::integrators::view::LightAov;
 use crate::integrators::{PACKET_SIZE, RayCounters};
 use crate::lights::{EmittedPhoton, PhotonEmitter, PhotonOrigin, PhotonRandomNumbers};
 use crate::materials::bsdf::LobesToSample;
-use crate::materials::{Bsdf, BxdfPoint, Coated, Material, NonSpecular, ThinDielectric};
+use crate::materials::{Bsdf, BxdfPoint, Material, NonSpecular, SpecularOverBase, ThinDielectric};
 use crate::math::Vec3;
 use crate::math::lanes::{Simd, lane, set_lane};
 use crate::sampling::{CAMERA_PATH, Dimension, SamplerPacket};
@@ -53,9 +53,9 @@ pub struct PhotonTracer<'a> {
     /// Other glass solids that may contain lights.
     pub bodies: &'a [CompoundSolid],
     /// Reciprocal of the number of photons.
-    pub share: f32,
+    pub flux_scale: f32,
     /// Maximum number of bounces per photon.
-    pub most_depth: u32,
+    pub max_depth: u32,
 }
 
 /// Photons stored by one chunk of a pass.
@@ -73,8 +73,8 @@ impl PhotonTracer<'_> {
     /// Traces this chunk's photons.
     ///
     /// # Errors
-    /// [`Cancelled`] if the token is canceled.
-    pub fn trace_photons(&self) -> Result<PhotonChunk, Cancelled> {
+    /// [`Canceled`] if the token is canceled.
+    pub fn trace_photons(&self) -> Result<PhotonChunk, Canceled> {
         let count = self.tile.block.len() as u32;
         let mut wavefront = PhotonWavefront {
             tracing: self,
@@ -246,7 +246,7 @@ impl PhotonWavefront<'_> {
                 let offset = begin as usize + i;
                 let path = PathRay {
                     ray,
-                    throughput: emitted.flux * tracing.share,
+                    throughput: emitted.flux * tracing.flux_scale,
                     slot: offset as u32,
                     path: CAMERA_PATH + 1,
                     interiors: tracing.interiors_at(ray.origin, &emitted),
@@ -261,7 +261,7 @@ impl PhotonWavefront<'_> {
 
     /// Whether photons may scatter at the current hits.
     fn may_scatter(&self) -> bool {
-        self.depth < self.tracing.most_depth
+        self.depth < self.tracing.max_depth
     }
 
     /// Traces a packet of photons to their hits, where they are stored and scattered.
@@ -324,8 +324,8 @@ impl PhotonWavefront<'_> {
             Bsdf::NonSpecular(rough) => {
                 self.store_and_scatter_at_rough(path, vertex, rough, (far, Some(1.0)));
             }
-            Bsdf::Coated(coated) => {
-                self.store_and_reflect_at_coated(path, vertex, coated, (far, lacks_photons));
+            Bsdf::SpecularOverBase(layers) => {
+                self.store_and_reflect_at_specular_over_base(path, vertex, layers, (far, lacks_photons));
             }
             Bsdf::Mirror(mirror) if self.may_scatter() => {
                 let shading = vertex.perturbed_and_smooth_normals(&mut self.counters);
@@ -337,27 +337,27 @@ impl PhotonWavefront<'_> {
         }
     }
 
-    /// Stores a photon at a surface with a δ lobe and non-specular lobes, and reflects it in the δ lobe.
-    /// Caustic photons are randomly reflected or scattered by the other lobes. Other photons never scatter in
-    /// those lobes, so all of them are reflected.
-    fn store_and_reflect_at_coated(
+    /// Stores a photon at a surface with a δ lobe and non-specular lobes, and reflects it from the δ lobe.
+    /// Caustic photons are randomly reflected by the δ lobe or scattered by the others. All other photons are
+    /// reflected, because they never scatter from the other lobes.
+    fn store_and_reflect_at_specular_over_base(
         &mut self,
         path: &PathRay,
         vertex: &SurfaceVertex<'_>,
-        coated: &Coated,
+        layers: &SpecularOverBase,
         (far, lacks_photons): (&InteriorList, bool),
     ) {
         let shading = vertex.perturbed_and_smooth_normals(&mut self.counters);
-        let lobe = vertex.specular_lobe(coated, &shading, true, &mut self.counters);
+        let lobe = vertex.specular_lobe(layers, &shading, true, &mut self.counters);
         let SpecularLobe { probability, .. } = lobe;
         let chooses = path.state.only_specular_before && !lacks_photons;
         let is_reflected = !chooses || self.tracing.tile.chooses_reflection(path, probability);
         if !lacks_photons {
-            let by_chance = (!is_reflected).then(|| 1.0 / (1.0 - probability));
-            self.store_and_scatter_at_rough(path, vertex, &coated.base, (far, by_chance));
+            let factor = (!is_reflected).then(|| 1.0 / (1.0 - probability));
+            self.store_and_scatter_at_rough(path, vertex, &layers.base, (far, factor));
         }
         if is_reflected && self.may_scatter() {
-            let specular = vertex.specular_weight(coated, &lobe, &mut self.counters);
+            let specular = vertex.specular_weight(layers, &lobe, &mut self.counters);
             let part = if chooses { 1.0 } else { probability };
             let ray = reflected_path(path, vertex, &shading, specular * part);
             self.queue_specular_photon(path, vertex, (shading.normal, 1.0), ray);
@@ -378,13 +378,13 @@ impl PhotonWavefront<'_> {
         if !bsdf.is_black() {
             self.store_and_scatter(path, vertex, bsdf, (far, scattered));
         } else if vertex.is_blended() {
-            // Other parts of the blend may reflect the photon.
+            // The photon may be reflected by another part of the blend.
             self.store_at_vertex(path, vertex);
         }
     }
 
-    /// Stores a photon at a vertex. It also represents photons that passed through the surface as a null
-    /// interaction, or chose a part of a blend on which no photons are stored.
+    /// Stores a photon at a vertex. The stored photon also stands for photons that passed through the surface
+    /// as a null interaction, or chose a part of a blend on which no photons are stored.
     fn store_at_vertex(&mut self, path: &PathRay, vertex: &SurfaceVertex<'_>) {
         let chance = storage_probability(path, vertex, &mut self.counters.texture_lookups);
         let all = PathRay { throughput: path.throughput / chance, ..*path };
@@ -401,8 +401,7 @@ impl PhotonWavefront<'_> {
     ) {
         let tile = self.tracing.tile;
         self.store_at_vertex(path, vertex);
-        let Some(by_chance) = scattered.filter(|_| path.state.only_specular_before && self.may_scatter())
-        else {
+        let Some(factor) = scattered.filter(|_| path.state.only_specular_before && self.may_scatter()) else {
             return;
         };
         // Queue the photon for scattering.
@@ -416,7 +415,7 @@ impl PhotonWavefront<'_> {
         let i = self.open.used.trailing_ones() as usize;
         let lit = ShadingVertex { path, interiors: &path.interiors, place: 0, vertex, shading, bsdf: &bsdf };
         self.open.set_vertex(i, tile, &lit, LightAov::ALL, interiors);
-        let counts = self.open.adjoint_photon_weight(i, vertex.wo) * by_chance;
+        let counts = self.open.adjoint_photon_weight(i, vertex.wo) * factor;
         set_lane(&mut self.open.throughput, i, path.throughput * counts);
         // Queue the transmitted photon. The medium behind the surface changes its basic flux.
         let Some((bsdf, shading)) = behind else { return };

@@ -59,7 +59,7 @@ impl<const SPLIT: bool> SimdKernel for GatherPhotonsKernel<'_, SPLIT> {
         let Self { tile, row, maps, depth, aov } = self;
         let mut sums = [[[0.0; PACKET_SIZE]; 3]; 2];
         let [looks, choices] = row.sampler_packet(tile).pairs(&row.path, Dimension::Gather, 0, 1);
-        let Some(most_depth) = tile.settings.render.max_depth.checked_sub(depth + 1) else { return sums };
+        let Some(max_depth) = tile.settings.render.max_depth.checked_sub(depth + 1) else { return sums };
         let PathClasses { caustic, indirect, .. } = aov.path_classes();
         let narrow = row.bsdf.narrow_lobe_mask();
         for i in set_bit_lanes(row.used) {
@@ -68,7 +68,7 @@ impl<const SPLIT: bool> SimdKernel for GatherPhotonsKernel<'_, SPLIT> {
             let only_specular_before = row.only_specular_before & 1 << i != 0;
             let (point, normal) = row.surface_point_and_normal(i);
             // Select the maps that contribute at the vertex.
-            let look = GatherPoint { point, normal, most_depth };
+            let look = GatherPoint { point, normal, max_depth };
             // Without a glossy lobe, bounced photons account for light from caustics, and continuing paths
             // ignore it.
             let gathers_bounced = indirect && narrow & 1 << i == 0;

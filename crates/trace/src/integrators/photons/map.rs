@@ -3,7 +3,7 @@
 
 use super::packed::{self, PackedDirectionPacket};
 use super::reservoir::{PhotonPositionAndNormal, ReservoirPacket};
-use crate::control::{CancelToken, Cancelled};
+use crate::control::{CancelToken, Canceled};
 use crate::geometry::Aabb;
 use crate::geometry::packet::set_bit_lanes;
 use crate::math::Vec3;
@@ -59,17 +59,17 @@ pub struct PhotonMap {
     blocks: Vec<PhotonBlock>,
     depths: Vec<[u32; PACKET_SIZE]>,
     /// Maximum number of bounces of any stored photon.
-    most_depth: u32,
+    max_depth: u32,
 }
 
 /// Minimum cosine between the normals of surfaces within one kernel.
 pub(super) const MIN_COSINE: f32 = 0.7;
 
 /// Maximum distance of photons from the tangent plane, in radii.
-pub(super) const REACH: f32 = 0.3;
+pub(super) const MAX_PLANE_DISTANCE: f32 = 0.3;
 
-/// Cell size in radii: larger than the bounding box of any kernel, 2·√(1 + REACH²), so that a kernel overlaps
-/// at most two cells along each axis.
+/// Cell size in radii: larger than the bounding box of any kernel, 2·√(1 + MAX_PLANE_DISTANCE²), so that a
+/// kernel overlaps at most two cells along each axis.
 const CELL: f32 = 2.1;
 
 /// A query for photons near a surface point.
@@ -80,7 +80,7 @@ pub struct GatherPoint {
     /// Geometric normal on the queried side.
     pub normal: Vec3,
     /// Maximum number of bounces per photon.
-    pub most_depth: u32,
+    pub max_depth: u32,
 }
 
 impl GatherPoint {
@@ -95,7 +95,7 @@ impl GatherPoint {
     fn unit_kernel_half_extents(&self) -> Vec3 {
         let own = self.normal.abs();
         let along = (Vec3::ONE - own * own).max(Vec3::ZERO);
-        Vec3::new(along.x.sqrt(), along.y.sqrt(), along.z.sqrt()) + own * REACH
+        Vec3::new(along.x.sqrt(), along.y.sqrt(), along.z.sqrt()) + own * MAX_PLANE_DISTANCE
     }
 }
 
@@ -134,8 +134,8 @@ impl PhotonMap {
     /// Builds a map for kernels of this radius. Photons in one cell keep their order.
     ///
     /// # Errors
-    /// [`Cancelled`] if the token is canceled.
-    pub fn new(photons: &[Photon], radius: f32, token: &CancelToken) -> Result<Self, Cancelled> {
+    /// [`Canceled`] if the token is canceled.
+    pub fn new(photons: &[Photon], radius: f32, token: &CancelToken) -> Result<Self, Canceled> {
         // Count the photons in each bucket.
         let cells = 1.0 / (CELL * radius);
         let mask = (photons.len().max(1).next_power_of_two() - 1) as u32;
@@ -179,8 +179,8 @@ impl PhotonMap {
                 depths.push(depth);
             }
         }
-        let most_depth = depths.as_flattened().iter().copied().max().unwrap_or(0);
-        Ok(Self { radius, cells, mask, starts, count: photons.len(), blocks, depths, most_depth })
+        let max_depth = depths.as_flattened().iter().copied().max().unwrap_or(0);
+        Ok(Self { radius, cells, mask, starts, count: photons.len(), blocks, depths, max_depth })
     }
 
     /// All photons, in bucket order.
@@ -342,10 +342,10 @@ impl PhotonMap {
         simd: impl Simd,
     ) -> Option<F32x16> {
         // Weight the photons within the kernel by their distance.
-        let GatherPoint { point, normal, most_depth } = *look;
+        let GatherPoint { point, normal, max_depth } = *look;
         let block = &self.blocks[number];
         let radius_squared = self.radius * self.radius;
-        let (reach, share) = (REACH * self.radius, 1.0 / radius_squared);
+        let (reach, share) = (MAX_PLANE_DISTANCE * self.radius, 1.0 / radius_squared);
         let [xs, ys, zs] = &block.point;
         let (mut near, mut weights) = ([0; PACKET_SIZE], [0.0; PACKET_SIZE]);
         let first = (number * PACKET_SIZE) as u32;
@@ -379,10 +379,10 @@ impl PhotonMap {
             weights[i] *= cosine / squared.sqrt();
         }
         // Reject photons with too many bounces.
-        if most_depth < self.most_depth {
+        if max_depth < self.max_depth {
             let depths = &self.depths[number];
             for i in 0..PACKET_SIZE {
-                near[i] &= if depths[i] <= most_depth { TRUE } else { 0 };
+                near[i] &= if depths[i] <= max_depth { TRUE } else { 0 };
             }
         }
         for i in 0..PACKET_SIZE {
@@ -485,7 +485,7 @@ mod tests {
                     };
                     let mut found = Vec::new();
                     map.visit_weighted_photons(
-                        &GatherPoint { point, normal, most_depth: 1 },
+                        &GatherPoint { point, normal, max_depth: 1 },
                         PortableSimd,
                         |photon, density| {
                             found.push((photon.point.to_array(), density));
@@ -495,7 +495,7 @@ mod tests {
                         let way = photon.point - point;
                         let above = way.dot(normal);
                         let is_near = way.length_squared() - above * above < radius * radius;
-                        let is_flat = above.abs() < REACH * radius;
+                        let is_flat = above.abs() < MAX_PLANE_DISTANCE * radius;
                         is_near && is_flat && photon.normal.dot(normal) > MIN_COSINE
                     };
                     let mut expected: Vec<_> =
@@ -524,9 +524,9 @@ mod tests {
         let place = |i: i32| photon(Vec3::new(at(i % 200 - 100), 0.5, at(i / 200 - 100)), Vec3::Y);
         let photons: Vec<Photon> = (0..40_000).map(place).collect();
         let map = PhotonMap::new(&photons, 0.4, &CancelToken::new()).expect("never canceled");
-        let sum = |most_depth: u32, normal: Vec3| {
+        let sum = |max_depth: u32, normal: Vec3| {
             let mut sum = 0.0;
-            let look = GatherPoint { point: Vec3::new(0.1, 0.5, -0.2), normal, most_depth };
+            let look = GatherPoint { point: Vec3::new(0.1, 0.5, -0.2), normal, max_depth };
             map.visit_weighted_photons(&look, PortableSimd, |_, density| sum += density * step * step);
             let flux =
                 f64::from(map.irradiance_and_chosen_photon(&look, [0.5; 2], PortableSimd).0.x * step * step);

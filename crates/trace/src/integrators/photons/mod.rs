@@ -48,7 +48,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use rayon::prelude::*;
 
-use crate::control::{CancelToken, Cancelled, Progress, ignore_progress};
+use crate::control::{CancelToken, Canceled, Progress, ignore_progress};
 use crate::film::Rect;
 use crate::geometry::{Aabb, ShapeHit};
 use crate::integrators::behavior::PathBehavior;
@@ -64,24 +64,24 @@ pub(super) use map::GatherPoint;
 pub use map::{Photon, PhotonMap};
 
 /// Number of photons that a thread emits at a time.
-const CHUNK: u32 = 2048;
+const PHOTONS_PER_JOB: u32 = 2048;
 
 /// α, the fraction of a pass's photons kept by the shrinking kernel.
 const ALPHA: f64 = 2.0 / 3.0;
 
 /// Target median photon count in the first pass's kernels, for caustic and bounced photons.
-const WANTED: [f32; 2] = [12.0, 8.0];
+const TARGET_KERNEL_PHOTONS: [f32; 2] = [12.0, 8.0];
 
 /// Fractions of photons aimed at mirrors and glass: the first if all of these objects are bounded, the second
 /// if some are unbounded.
-const AIMED: [f32; 2] = [0.9, 0.5];
+const AIMED_FRACTIONS: [f32; 2] = [0.9, 0.5];
 
 /// Photon emission for an image, shared by all passes.
 #[derive(Debug)]
 pub struct PhotonMapper {
     settings: PhotonSettings,
     /// Maximum number of bounces per photon before it is gathered.
-    most_depth: u32,
+    max_depth: u32,
     /// Source of the photons, or `None` if the scene has no mirrors or glass.
     emission: Option<PhotonEmitter>,
     /// Closed glass shapes that may contain lights.
@@ -138,30 +138,30 @@ impl PhotonMapper {
     /// receives the number of photons traced so far and the total number.
     ///
     /// # Errors
-    /// [`Cancelled`] if the token is canceled.
+    /// [`Canceled`] if the token is canceled.
     pub fn new_with_first_pass(
         world: &World,
         settings: &RenderSettings,
         photons: PhotonSettings,
         progress: Progress<'_>,
         token: &CancelToken,
-    ) -> Result<(Self, PhotonPass), Cancelled> {
+    ) -> Result<(Self, PhotonPass), Canceled> {
         // Aim photons at the mirrors and glass.
         let specular = SpecularObjects::from_world(world);
         let emission = scene_photon_emitter(&world.geometry, &world.lights).filter(|_| specular.has_any());
-        let aimed = AIMED[usize::from(specular.is_unbounded)];
+        let aimed = AIMED_FRACTIONS[usize::from(specular.is_unbounded)];
         let emission = emission.map(|emission| emission.with_targets(&specular.balls, aimed));
         let (glasses, bodies) = light_enclosing_glass_candidates(world);
-        let most_depth = photons.bounces.min(settings.render.max_depth.saturating_sub(1));
+        let max_depth = photons.bounces.min(settings.render.max_depth.saturating_sub(1));
         let radii = [photons.radius; 2];
-        let mut own = Self { settings: photons, most_depth, emission, glasses, bodies, radii };
+        let mut own = Self { settings: photons, max_depth, emission, glasses, bodies, radii };
         // Trace pass 0, and choose the radii from its photons.
         let sent = own.trace_photons((world, settings), 0, progress, token)?;
         if photons.radius == 0.0 {
             let kinds = [&sent.caustic, &sent.bounced];
             let size =
                 own.emission.as_ref().map_or(1.0, |emission| emission.finite_scene_bounds().radius as f32);
-            let radii = kinds.into_par_iter().zip(WANTED);
+            let radii = kinds.into_par_iter().zip(TARGET_KERNEL_PHOTONS);
             let radii = radii.map(|(of, wanted)| radius_for_neighbor_count(of, wanted, size, token));
             let radii = radii.collect::<Result<Vec<_>, _>>()?;
             own.radii.iter_mut().zip(radii).for_each(|(own, radius)| *own = radius);
@@ -182,20 +182,20 @@ impl PhotonMapper {
 
     /// Whether photons are emitted, which requires mirrors or glass and a light that illuminates them.
     pub fn emits_photons(&self) -> bool {
-        self.emission.is_some() && self.most_depth > 0
+        self.emission.is_some() && self.max_depth > 0
     }
 
     /// Traces a pass. The result depends on the pass number but not on the number of threads.
     ///
     /// # Errors
-    /// [`Cancelled`] if the token is canceled.
+    /// [`Canceled`] if the token is canceled.
     pub fn trace_pass(
         &self,
         world: &World,
         settings: &RenderSettings,
         number: u32,
         token: &CancelToken,
-    ) -> Result<PhotonPass, Cancelled> {
+    ) -> Result<PhotonPass, Canceled> {
         let sent = self.trace_photons((world, settings), number, &ignore_progress, token)?;
         self.build_maps(&sent, number, token)
     }
@@ -206,7 +206,7 @@ impl PhotonMapper {
         sent: &StoredPhotons,
         number: u32,
         token: &CancelToken,
-    ) -> Result<PhotonPass, Cancelled> {
+    ) -> Result<PhotonPass, Canceled> {
         let shrunk = radius_factor(number);
         let [of_caustic, of_bounced] = self.radii.map(|radius| (f64::from(radius) * shrunk) as f32);
         let map = |of: &[Photon], radius: f32| PhotonMap::new(of, radius, token);
@@ -223,14 +223,14 @@ impl PhotonMapper {
     /// Traces the photon passes for a range of samples.
     ///
     /// # Errors
-    /// [`Cancelled`] if the token is canceled.
+    /// [`Canceled`] if the token is canceled.
     pub fn trace_passes(
         &self,
         world: &World,
         settings: &RenderSettings,
         samples: Range<u32>,
         token: &CancelToken,
-    ) -> Result<PhotonMaps, Cancelled> {
+    ) -> Result<PhotonMaps, Canceled> {
         let first = samples.start;
         let pass = |number| self.trace_pass(world, settings, number, token).map(Arc::new);
         Ok(PhotonMaps { first, passes: samples.map(pass).collect::<Result<_, _>>()? })
@@ -243,7 +243,7 @@ impl PhotonMapper {
         number: u32,
         progress: Progress<'_>,
         token: &CancelToken,
-    ) -> Result<StoredPhotons, Cancelled> {
+    ) -> Result<StoredPhotons, Canceled> {
         let Some(emission) = self.emission.as_ref().filter(|_| self.emits_photons()) else {
             return Ok(StoredPhotons::default());
         };
@@ -262,27 +262,27 @@ impl PhotonMapper {
             let count = self.settings.count;
             let at_once = u32::MAX / count;
             let start = number % at_once * count;
-            let samples = start + first..start + (first + CHUNK).min(count);
+            let samples = start + first..start + (first + PHOTONS_PER_JOB).min(count);
             let place = Rect { x: number / at_once, y: u32::MAX, width: 1, height: 1 };
             let block = SampleBlock { pixels: place.into(), samples, mirrored_width: None };
             let tile = TileContext {
                 camera_cone: None,
                 ..TileContext::new(world, &settings, &block, token, behavior)
             };
-            let (share, most_depth) = (1.0 / count as f32, self.most_depth);
+            let (flux_scale, max_depth) = (1.0 / count as f32, self.max_depth);
             let stored =
-                PhotonTracer { tile: &tile, emission, glasses, bodies: &self.bodies, share, most_depth }
+                PhotonTracer { tile: &tile, emission, glasses, bodies: &self.bodies, flux_scale, max_depth }
                     .trace_photons()?;
             let done = done.fetch_add(block.len() as u64, Ordering::Relaxed) + block.len() as u64;
             progress(done, count.into());
             Ok(stored)
         };
-        let chunks: Vec<PhotonChunk> = (0..self.settings.count.div_ceil(CHUNK))
+        let chunks: Vec<PhotonChunk> = (0..self.settings.count.div_ceil(PHOTONS_PER_JOB))
             .into_par_iter()
-            .map(|number| chunk(number * CHUNK))
+            .map(|number| chunk(number * PHOTONS_PER_JOB))
             .collect::<Result<_, _>>()?;
         let lookups = chunks.iter().map(|chunk| chunk.lookups).sum();
-        let joined = |of: fn(&PhotonChunk) -> &[Photon]| -> Result<Vec<Photon>, Cancelled> {
+        let joined = |of: fn(&PhotonChunk) -> &[Photon]| -> Result<Vec<Photon>, Canceled> {
             let mut all = Vec::with_capacity(chunks.iter().map(|chunk| of(chunk).len()).sum());
             for chunk in &chunks {
                 token.check_pause_and_cancel()?;
@@ -319,16 +319,16 @@ fn radius_for_neighbor_count(
     wanted: f32,
     size: f32,
     token: &CancelToken,
-) -> Result<f32, Cancelled> {
+) -> Result<f32, Canceled> {
     /// Maximum number of photons examined.
-    const MOST: usize = 1 << 14;
+    const MAX_EXAMINED: usize = 1 << 14;
     const LOOKS: usize = 256;
     /// Number of neighbors to find among the examined photons.
     const NEAR: f32 = 12.0;
     /// Maximum radius, and default radius for too few photons, both relative to the scene's radius.
     const LARGEST: f32 = 0.05;
     const BY_DEFAULT: f32 = 0.02;
-    let step = photons.len().div_ceil(MOST).max(1);
+    let step = photons.len().div_ceil(MAX_EXAMINED).max(1);
     let some: Vec<Photon> = photons.iter().step_by(step).copied().collect();
     let bounds = some.iter().fold(Aabb::EMPTY, |all, one| all.union(Aabb { min: one.point, max: one.point }));
     let extent = (bounds.max - bounds.min).length();
@@ -341,7 +341,7 @@ fn radius_for_neighbor_count(
         let map = PhotonMap::new(&some, radius, token)?;
         // Do not count the photon itself.
         let count = |&Photon { point, normal, .. }: &Photon| {
-            map.count_near(&GatherPoint { point, normal, most_depth: u32::MAX }, PortableSimd)
+            map.count_near(&GatherPoint { point, normal, max_depth: u32::MAX }, PortableSimd)
                 .saturating_sub(1)
         };
         let mut counts: Vec<u32> = some.iter().step_by(some.len().div_ceil(LOOKS)).map(count).collect();
@@ -358,22 +358,23 @@ fn radius_for_neighbor_count(
 
 /// Closed glass shapes and other glass solids that may contain lights.
 fn light_enclosing_glass_candidates(world: &World) -> (Vec<u32>, Vec<CompoundSolid>) {
-    let lamps = world.finite_light_boxes();
-    let may_hold_light = |object: &u32| {
+    let light_boxes = world.finite_light_boxes();
+    let may_contain_light = |object: &u32| {
         let bounds = world.geometry.objects()[*object as usize].bounds();
-        bounds.is_none_or(|bounds| lamps.iter().any(|lamp| lamp.may_light_intersect_box(&bounds)))
+        bounds.is_none_or(|bounds| light_boxes.iter().any(|light| light.may_light_intersect_box(&bounds)))
     };
-    let closed = world.closed_glass_shapes().map(|(object, _)| object).filter(may_hold_light).collect();
+    let closed = world.closed_glass_shapes().map(|(object, _)| object).filter(may_contain_light).collect();
     // A solid closed by opaque surfaces may extend beyond its bounding box, so test the center and corners of
     // each light.
-    let is_around = |body: &CompoundSolid, lamp: &LightBoundingBoxes| {
-        lamp.smaller_box_center_and_corners()
-            .any(|point| world.enclosing_glass_material(body, point, lamp.object).is_some())
+    let encloses_light = |body: &CompoundSolid, light: &LightBoundingBoxes| {
+        light
+            .smaller_box_center_and_corners()
+            .any(|point| world.enclosing_glass_material(body, point, light.object).is_some())
     };
     let mut bodies = world.compound_solids();
     bodies.retain(|body| {
-        lamps.iter().any(|lamp| {
-            lamp.may_light_intersect_box(&body.bounds) || body.is_covered && is_around(body, lamp)
+        light_boxes.iter().any(|light| {
+            light.may_light_intersect_box(&body.bounds) || body.is_covered && encloses_light(body, light)
         })
     });
     (closed, bodies)
@@ -395,11 +396,12 @@ impl GlassObjectBoundsList {
     /// refraction is 1 or the object may touch or overlap glass with the same index.
     fn may_be_index_matched(&self, id: u32, ior: f32) -> bool {
         let own = self.0.iter().find(|(other, ..)| *other == id).and_then(|(_, bounds, _)| *bounds);
-        let meets = |other: &Aabb| own.is_none_or(|own| own.expanded(own.extent() * NEAR).overlaps(other));
-        let is_met = |(other, bounds, index): &(u32, Option<Aabb>, f32)| {
-            *other != id && *index == ior && bounds.as_ref().is_none_or(meets)
+        let may_touch =
+            |other: &Aabb| own.is_none_or(|own| own.expanded(own.extent() * NEAR).overlaps(other));
+        let matches_other_glass = |(other, bounds, index): &(u32, Option<Aabb>, f32)| {
+            *other != id && *index == ior && bounds.as_ref().is_none_or(may_touch)
         };
-        ior == 1.0 || self.0.iter().any(is_met)
+        ior == 1.0 || self.0.iter().any(matches_other_glass)
     }
 }
 

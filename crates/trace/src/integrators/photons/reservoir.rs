@@ -45,13 +45,13 @@ impl ReservoirPacket {
         for i in 0..PACKET_SIZE {
             self.totals[i] += weights[i];
             let part = if weights[i] > 0.0 { weights[i] / self.totals[i] } else { 0.0 };
-            let takes = self.random[i] < part;
-            let left = if takes { self.random[i] } else { self.random[i] - part };
-            let of = if takes { part } else { 1.0 - part };
+            let is_chosen = self.random[i] < part;
+            let left = if is_chosen { self.random[i] } else { self.random[i] - part };
+            let of = if is_chosen { part } else { 1.0 - part };
             let random = left / of;
             // If `of` is close to 1, the rescaled number may round to 1.
             self.random[i] = if random < BELOW_ONE { random } else { BELOW_ONE };
-            self.chosen[i] = if takes { number } else { self.chosen[i] };
+            self.chosen[i] = if is_chosen { number } else { self.chosen[i] };
         }
     }
 

@@ -2,7 +2,7 @@
 
 use super::coverage::{KernelCoverage, can_store_photons, primitive_material};
 use super::kernel::sample;
-use super::map::{GatherPoint, MIN_COSINE, REACH};
+use super::map::{GatherPoint, MAX_PLANE_DISTANCE, MIN_COSINE};
 use super::occlusion::is_occluded;
 use super::reservoir::PhotonPositionAndNormal;
 use crate::geometry::ray::offset_origin;
@@ -70,7 +70,7 @@ fn mean_trials_per_success(mut succeeds: impl FnMut(u32) -> bool) -> f32 {
 /// Whether an unoccluded surface above or below a position in the tangent plane can receive the kernel's
 /// photons.
 fn receives_photons(world: &World, look: &GatherPoint, place: Vec3, radius: f32) -> bool {
-    let above = REACH * radius * look.normal;
+    let above = MAX_PLANE_DISTANCE * radius * look.normal;
     let end = place - above;
     let mut start = place + above;
     let may_receive = |id: u32| {

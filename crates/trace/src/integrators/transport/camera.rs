@@ -23,7 +23,7 @@ pub struct CameraRayPacket {
     pub rays: RayPacket,
     /// Mask of rays whose filter weight is negative.
     pub negative: u32,
-    /// Mask of lanes with a ray. The other lanes are outside the circle of a fisheye and remain black.
+    /// Mask of the lanes with a ray. Lanes outside the circle of a fisheye have none and remain black.
     pub valid: u32,
 }
 

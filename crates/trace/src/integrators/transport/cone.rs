@@ -75,7 +75,7 @@ mod tests {
     }
 
     #[test]
-    fn flat_surfaces_refract_beams_as_snells_law_predicts() {
+    fn flat_surfaces_refract_beams_by_snells_law() {
         let spreading = RayCone { width: 0.1, spread: 0.3 };
         assert_eq!(spreading.after_specular(SpecularEvent::Reflected, 0.0, 0.3), spreading);
         assert!(

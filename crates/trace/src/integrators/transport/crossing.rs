@@ -68,23 +68,23 @@ impl TileContext<'_> {
         known: &InteriorList,
         found: &[CoincidentOrEnclosingSurface],
     ) -> (Option<[InteriorList; 2]>, InteriorList) {
-        let is_told_by_record = |glass: Interior| !self.world.is_closed_shape(glass.body);
+        let is_only_recorded = |glass: Interior| !self.world.is_closed_shape(glass.body);
         // With only closed shapes, most rays enter at most one shape.
         if !self.world.has_open_glass() {
             match *found {
-                [] => return (None, known.retained(is_told_by_record)),
+                [] => return (None, known.retained(is_only_recorded)),
                 [CoincidentOrEnclosingSurface::Around { object, material }] => {
                     let entered = Interior { body: object, material };
-                    return (None, known.retained(is_told_by_record).entered(entered));
+                    return (None, known.retained(is_only_recorded).entered(entered));
                 }
                 [CoincidentOrEnclosingSurface::Surface { .. }] | [_, _, ..] => {}
             }
         }
         // Start with the recorded media, without open solids.
         let (mut arrived, mut near) = (*known, self.interiors_without_open_solids(*known));
-        let mut far = near.retained(is_told_by_record);
+        let mut far = near.retained(is_only_recorded);
         let crossed = |as_front: bool| {
-            found.iter().filter_map(move |thing| match *thing {
+            found.iter().filter_map(move |surface_or_solid| match *surface_or_solid {
                 CoincidentOrEnclosingSurface::Surface { hit, material, is_front } if is_front == as_front => {
                     let glass = Interior { body: self.world.solid_id(hit.object), material };
                     self.world.is_glass_material(material).then_some(glass)
@@ -93,7 +93,7 @@ impl TileContext<'_> {
                 | CoincidentOrEnclosingSurface::Around { .. } => None,
             })
         };
-        let around = found.iter().filter_map(|thing| match *thing {
+        let around = found.iter().filter_map(|surface_or_solid| match *surface_or_solid {
             CoincidentOrEnclosingSurface::Around { object, material } => {
                 Some(Interior { body: object, material })
             }
@@ -130,7 +130,7 @@ impl TileContext<'_> {
             return Some(SeparatingGlassSurface { material: own, hit: None });
         }
         // The path hits a different coincident surface.
-        let of_body = memory.near.iter().find_map(|thing| match *thing {
+        let of_body = memory.near.iter().find_map(|surface_or_solid| match *surface_or_solid {
             CoincidentOrEnclosingSurface::Surface { hit, material, .. } => {
                 let is_later =
                     self.world.solid_id(hit.object) == later.body && self.world.is_glass_material(material);
@@ -149,8 +149,8 @@ impl TileContext<'_> {
         interiors
     }
 
-    fn hit_if_opaque(&self, thing: &CoincidentOrEnclosingSurface) -> Option<Hit> {
-        match *thing {
+    fn hit_if_opaque(&self, surface_or_solid: &CoincidentOrEnclosingSurface) -> Option<Hit> {
+        match *surface_or_solid {
             CoincidentOrEnclosingSurface::Around { .. } => None,
             CoincidentOrEnclosingSurface::Surface { hit, material, .. } => {
                 (!self.world.is_glass_material(material)).then_some(hit)

@@ -8,7 +8,7 @@ use super::packet_source::PacketSource;
 use super::plain_vertices::ShadowLiftSelection;
 use super::ray::PathRay;
 use super::tile::TileContext;
-use crate::control::Cancelled;
+use crate::control::Canceled;
 use crate::geometry::packet::{self, HitPacket, RayPacket};
 use crate::geometry::surface_packet::SurfacePacket;
 use crate::geometry::{Ray, SurfacePoint};
@@ -94,8 +94,8 @@ impl TileContext<'_> {
     /// Finds the closest hit of every ray in a queue, replacing the content of `hits`.
     ///
     /// # Errors
-    /// [`Cancelled`] if the token is canceled.
-    pub fn closest_hits(&self, rays: &[PathRay], hits: &mut Vec<Option<Hit>>) -> Result<(), Cancelled> {
+    /// [`Canceled`] if the token is canceled.
+    pub fn closest_hits(&self, rays: &[PathRay], hits: &mut Vec<Option<Hit>>) -> Result<(), Canceled> {
         hits.clear();
         hits.resize(rays.len(), None);
         for (paths, hits) in rays.chunks(POLL_INTERVAL).zip(hits.chunks_mut(POLL_INTERVAL)) {
@@ -381,9 +381,9 @@ impl TileContext<'_> {
         while left != 0 {
             let (id, of_object) = first_index_and_matching_lanes(object, left, simd);
             left &= !of_object;
-            let thing = &self.world.geometry.objects()[id as usize];
+            let shown_object = &self.world.geometry.objects()[id as usize];
             // A single hit on a shape is cheaper to evaluate separately.
-            if matches!(thing, Object::Shape(_)) && of_object.is_power_of_two() {
+            if matches!(shown_object, Object::Shape(_)) && of_object.is_power_of_two() {
                 continue;
             }
             let materials = self.world.packet_material_indices(id, of_object, &hits.primitive);
@@ -396,7 +396,7 @@ impl TileContext<'_> {
             if of == 0 {
                 continue;
             }
-            let is_filled = match thing {
+            let is_filled = match shown_object {
                 Object::Shape(shape) => surface.try_fill_points_of_shape_lanes(shape, rows, hits, of),
                 Object::Mesh(mesh) => {
                     mesh.fill_surfaces(surface, rows, hits, of, None, simd);

@@ -214,13 +214,13 @@ impl BsdfSampler<'_> {
         let mut factors = f;
         let mut alive = 0_u32;
         for i in 0..PACKET_SIZE {
-            let share = cosines[i] / pdfs[i];
-            roulette_throughput[i] = row.roulette_throughput[i] * bsdf.max[i] * share;
-            let factor = lane(&f, i) * share;
+            let cosine_over_pdf = cosines[i] / pdfs[i];
+            roulette_throughput[i] = row.roulette_throughput[i] * bsdf.max[i] * cosine_over_pdf;
+            let factor = lane(&f, i) * cosine_over_pdf;
             set_lane(&mut factors, i, factor);
-            let brings = (factor.x > 0.0) | (factor.y > 0.0) | (factor.z > 0.0);
+            let contributes = (factor.x > 0.0) | (factor.y > 0.0) | (factor.z > 0.0);
             let bit = 1 << i;
-            alive |= if (cosines[i] > 0.0) & (pdfs[i] > 0.0) & brings { bit } else { 0 };
+            alive |= if (cosines[i] > 0.0) & (pdfs[i] > 0.0) & contributes { bit } else { 0 };
         }
         let diffuse = match continuation.lobes {
             LobesToSample::All if self.has_fractions => bsdf.wide_fraction(),

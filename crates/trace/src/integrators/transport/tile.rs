@@ -77,7 +77,7 @@ pub struct SampleBlock {
     pub pixels: SelectedPixels,
     /// Range of sample indices for each pixel.
     pub samples: Range<u32>,
-    /// Width of the image if it is mirrored. Each pixel then takes the samples of the pixel that it mirrors.
+    /// Width of the image if it is mirrored. Each pixel then shows the samples of its mirror image.
     pub mirrored_width: Option<u32>,
 }
 
@@ -101,8 +101,8 @@ impl SampleBlock {
         (x, y, self.samples.start + sample)
     }
 
-    /// Columns, rows and sample indices of slots in the image before mirroring, with arbitrary values for
-    /// slots without a sample.
+    /// Columns, rows and sample indices of slots in the image before mirroring. Slots without a sample have
+    /// arbitrary values.
     #[inline(always)]
     pub fn pixels_and_samples_of_slots(
         &self,

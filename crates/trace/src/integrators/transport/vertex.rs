@@ -10,7 +10,7 @@ use crate::geometry::ray::offset_origin;
 use crate::geometry::{Ray, SurfacePoint, SurfaceRequest};
 use crate::integrators::RayCounters;
 use crate::materials::{
-    BxdfPoint, Coated, Footprint, Material, Mirror, SpecularPart, TexturePoint, ThinDielectric,
+    BxdfPoint, Footprint, Material, Mirror, SpecularOverBase, SpecularPart, TexturePoint, ThinDielectric,
 };
 use crate::math::Vec3;
 use crate::sampling::Dimension;
@@ -23,7 +23,7 @@ pub struct SurfaceVertex<'a> {
     pub surface: SurfacePoint,
     /// Material of the surface. At a blend, this is the chosen part.
     pub material: &'a Material,
-    /// The blend to which [`SurfaceVertex::material`] belongs, or the same material.
+    /// Material of the surface before choosing a part of a blend.
     pub surface_material: &'a Material,
     /// [`Ray::start`] for rays that leave the vertex.
     start: u32,
@@ -88,9 +88,9 @@ impl<'a> SurfaceVertex<'a> {
     fn from_ray_hit(tile: &TileContext<'a>, path: &PathRay, (by, hit): (&Ray, &Hit), distance: f32) -> Self {
         let index = tile.world.material_index(hit);
         let is_lit = tile.world.materials[index].bsdf.has_non_delta_lobes();
-        let asked =
+        let request =
             SurfaceRequest { uv: tile.world.material_needs_uvs_or_tangents(index), shadow_point: is_lit };
-        let surface = tile.world.geometry.requested_surface(by, hit, asked);
+        let surface = tile.world.geometry.requested_surface(by, hit, request);
         Self::at_surface(tile, path, index, surface, hit, distance)
     }
 
@@ -144,7 +144,7 @@ impl<'a> SurfaceVertex<'a> {
         !std::ptr::eq(self.material, self.surface_material)
     }
 
-    /// Whether the surface scatters light on the path's side.
+    /// Whether the surface scatters light on the side of the path.
     pub fn scatters(&self) -> bool {
         self.material.scatters_on_side(self.is_front)
     }
@@ -166,7 +166,8 @@ impl<'a> SurfaceVertex<'a> {
         )
     }
 
-    /// Point for texture lookups, without the footprint if light samples compete with the path.
+    /// Point for texture lookups. Has no footprint if `is_shared`, which means that light samples compete
+    /// with the path.
     pub fn lookup_point(&self, is_shared: bool) -> Cow<'_, TexturePoint> {
         match is_shared {
             true => Cow::Owned(self.texture_point.without_footprint()),
@@ -258,25 +259,30 @@ impl<'a> SurfaceVertex<'a> {
     /// treated as white unless `is_colored` is true.
     pub fn specular_lobe(
         &self,
-        coated: &Coated,
+        layers: &SpecularOverBase,
         shading: &PerturbedAndSmoothNormals,
         is_colored: bool,
         counters: &mut RayCounters,
     ) -> SpecularLobe {
         let cosine = shading.normal.dot(self.wo).abs().min(1.0);
-        let mirror = match &coated.specular {
+        let mirror = match &layers.specular {
             SpecularPart::Mirror(mirror) => self.mirror_reflectance(mirror, shading, is_colored, counters),
             SpecularPart::SmoothCoat { .. } => Vec3::ONE,
         };
         let lookups = &mut counters.texture_lookups;
-        let probability = coated.specular_probability(cosine, mirror, &self.texture_point, lookups);
+        let probability = layers.specular_probability(cosine, mirror, &self.texture_point, lookups);
         SpecularLobe { cosine, mirror, probability }
     }
 
-    /// Reflectance of the δ lobe, divided by its probability.
-    pub fn specular_weight(&self, coated: &Coated, lobe: &SpecularLobe, counters: &mut RayCounters) -> Vec3 {
+    /// Reflectance of the δ lobe, divided by the probability of choosing it.
+    pub fn specular_weight(
+        &self,
+        layers: &SpecularOverBase,
+        lobe: &SpecularLobe,
+        counters: &mut RayCounters,
+    ) -> Vec3 {
         let &SpecularLobe { cosine, mirror, probability: _ } = lobe;
-        coated.specular_weight(cosine, mirror, &self.texture_point, &mut counters.texture_lookups)
+        layers.specular_weight(cosine, mirror, &self.texture_point, &mut counters.texture_lookups)
     }
 
     /// ∂p/∂u, or zero on a mesh without texture coordinates, where u is not defined.
@@ -342,9 +348,9 @@ impl<'a> SurfaceVertex<'a> {
     }
 }
 
-/// Chooses a material of a blend. All vertices of one interaction make the same choice, because the random
-/// number depends only on the path. If light samples compete with the path, the texture of the weight is
-/// looked up without filtering, as for light samples and shadow rays.
+/// Chooses a part of a blend. All vertices of one interaction choose the same part, because the random number
+/// depends only on the path. If light samples compete with the path, the weight's texture is looked up
+/// without filtering, as for light samples and shadow rays.
 #[inline]
 fn chosen_material<'a>(
     tile: &TileContext<'_>,

@@ -3,7 +3,7 @@
 use super::parts::{GlassParts, GlassTriangleCoverage, RimEdge, glass_triangle_coverage};
 use crate::accel::Bvh;
 use crate::assets::LoadedMesh;
-use crate::control::{CancelToken, Cancelled};
+use crate::control::{CancelToken, Canceled};
 use crate::geometry::{Aabb, RayF64, Shape};
 use crate::math::DVec3;
 use crate::scene::description::{LoweredShape, MeshReference, Scene};
@@ -12,7 +12,7 @@ use crate::scene::description::{LoweredShape, MeshReference, Scene};
 const MAX_RIM_EDGES: usize = 64;
 
 /// Search distance beyond a rim, relative to the length of the ray toward the rim.
-const REACH: f64 = 1e-3;
+const SEARCH_DISTANCE: f64 = 1e-3;
 
 /// Queries per edge: two rays and two points.
 const QUERIES: usize = 4;
@@ -37,7 +37,7 @@ pub(super) fn covered_rim_fractions(
     parts: &GlassParts,
     holes: &[&[RimEdge]],
     token: &CancelToken,
-) -> Result<Vec<f64>, Cancelled> {
+) -> Result<Vec<f64>, Canceled> {
     let examined: Vec<Vec<&RimEdge>> = holes.iter().map(|rims| subsample_rim_edges(rims)).collect();
     let queries: Vec<OpaqueQuery> = examined.iter().flat_map(|rims| rim_edge_queries(parts, rims)).collect();
     if queries.is_empty() {
@@ -77,11 +77,12 @@ fn rim_edge_queries<'a>(
             OpaqueQuery::Way(RayF64 {
                 origin,
                 direction,
-                t_max: 1.0 + REACH + tolerance / direction.length(),
+                t_max: 1.0 + SEARCH_DISTANCE + tolerance / direction.length(),
             })
         });
-        let [from, to] =
-            rim.ends.map(|end| OpaqueQuery::Point(end, REACH * end.distance(rim.inner) + tolerance));
+        let [from, to] = rim
+            .ends
+            .map(|end| OpaqueQuery::Point(end, SEARCH_DISTANCE * end.distance(rim.inner) + tolerance));
         [inner, middle, from, to]
     })
 }
@@ -123,7 +124,7 @@ fn evaluate_queries(
     origin: DVec3,
     queries: &[OpaqueQuery],
     token: &CancelToken,
-) -> Result<Vec<bool>, Cancelled> {
+) -> Result<Vec<bool>, Canceled> {
     let bounds: Vec<Aabb> = queries.iter().map(OpaqueQuery::search_box).collect();
     let all = bounds.iter().fold(Aabb::EMPTY, |all, own| all.union(*own));
     // Use a tree over the queries because there are many queries and many surfaces.

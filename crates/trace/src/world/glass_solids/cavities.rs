@@ -3,7 +3,7 @@
 use super::caps::triangles_relative_to;
 use super::parts::GlassMediumKey;
 use crate::assets::LoadedMesh;
-use crate::control::{CancelToken, Cancelled};
+use crate::control::{CancelToken, Canceled};
 use crate::math::DVec3;
 use crate::scene::description::Scene;
 
@@ -35,7 +35,7 @@ pub(super) fn cavities(
     origin: DVec3,
     closed: &[ClosedSolid],
     token: &CancelToken,
-) -> Result<Vec<(usize, usize)>, Cancelled> {
+) -> Result<Vec<(usize, usize)>, Canceled> {
     let corners_of = |object: u32| {
         let mesh = scene.objects[object as usize].shape.as_mesh();
         mesh.into_iter().flat_map(|mesh| triangles_relative_to(mesh, meshes[mesh.file], origin))

@@ -27,7 +27,7 @@ use parts::{GlassParts, GlassSolidPart, RimEdge};
 use shared_edges::{MatchedAndOpenEdges, RimEdgeWithEndpointIds, SharedEdge, find_set_root};
 
 use crate::assets::LoadedMesh;
-use crate::control::{CancelToken, Cancelled};
+use crate::control::{CancelToken, Canceled};
 use crate::math::DVec3;
 use crate::scene::description::Scene;
 
@@ -42,7 +42,7 @@ const NO_HOLE: f64 = 1e-7;
 const NO_VOLUME: f64 = 1e-9;
 
 /// A rim is closed if opaque surfaces cover at least this fraction of it.
-const COVERED: f64 = 0.95;
+const MIN_COVERED_FRACTION: f64 = 0.95;
 
 /// Glass solids of a scene.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -82,8 +82,8 @@ impl GlassSolids {
     /// Finds the glass solids in a scene.
     ///
     /// # Errors
-    /// [`Cancelled`] if the token is canceled.
-    pub fn find(scene: &Scene, meshes: &[&LoadedMesh], token: &CancelToken) -> Result<Self, Cancelled> {
+    /// [`Canceled`] if the token is canceled.
+    pub fn find(scene: &Scene, meshes: &[&LoadedMesh], token: &CancelToken) -> Result<Self, Canceled> {
         let parts = GlassParts::find_in_scene(scene, meshes, token)?;
         if parts.list.is_empty() {
             return Ok(Self::default());
@@ -186,11 +186,12 @@ fn hole_covered_flags(
     parts: &GlassParts,
     holes: &[SolidHole],
     token: &CancelToken,
-) -> Result<Vec<bool>, Cancelled> {
+) -> Result<Vec<bool>, Canceled> {
     let is_large = |hole: &&SolidHole| hole.part > SMALL_HOLE;
     let rims: Vec<&[RimEdge]> = holes.iter().filter(is_large).map(|hole| &*hole.rims).collect();
     let mut parts = caps::covered_rim_fractions(scene, meshes, parts, &rims, token)?.into_iter();
-    let is_covered = |hole: &SolidHole| is_large(&hole) && parts.next().is_some_and(|part| part >= COVERED);
+    let is_covered =
+        |hole: &SolidHole| is_large(&hole) && parts.next().is_some_and(|part| part >= MIN_COVERED_FRACTION);
     Ok(holes.iter().map(is_covered).collect())
 }
 

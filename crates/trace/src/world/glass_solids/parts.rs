@@ -5,7 +5,7 @@ use std::collections::HashMap;
 
 use super::super::lower::file_glass_properties;
 use crate::assets::{FileMaterial, LoadedMesh};
-use crate::control::{CancelToken, Cancelled};
+use crate::control::{CancelToken, Canceled};
 use crate::geometry::mesh::TriangleMesh;
 use crate::math::DVec3;
 use crate::math::transform::Transform;
@@ -65,7 +65,7 @@ impl GlassParts {
         scene: &Scene,
         meshes: &[&LoadedMesh],
         token: &CancelToken,
-    ) -> Result<Self, Cancelled> {
+    ) -> Result<Self, Canceled> {
         let mut parts = Self::default();
         let mut open_of_file: HashMap<usize, Vec<[u32; 2]>> = HashMap::new();
         for (number, object) in (0_u32..).zip(&scene.objects) {

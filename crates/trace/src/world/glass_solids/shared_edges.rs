@@ -3,7 +3,7 @@
 
 use super::parts::{GlassMediumKey, GlassSolidPart, RimEdge};
 use crate::accel::Bvh;
-use crate::control::{CancelToken, Cancelled};
+use crate::control::{CancelToken, Canceled};
 use crate::geometry::Aabb;
 use crate::math::DVec3;
 
@@ -62,7 +62,7 @@ impl MatchedAndOpenEdges {
         parts: &[GlassSolidPart],
         rims: &[RimEdge],
         token: &CancelToken,
-    ) -> Result<Self, Cancelled> {
+    ) -> Result<Self, Canceled> {
         let mut edges = Self::default();
         let sites = MergedEdgeEndpoints::from_rims(parts, rims, token)?;
         // Match edges that have both endpoints in common.
@@ -160,7 +160,7 @@ struct MergedEdgeEndpoints {
 }
 
 impl MergedEdgeEndpoints {
-    fn from_rims(parts: &[GlassSolidPart], rims: &[RimEdge], token: &CancelToken) -> Result<Self, Cancelled> {
+    fn from_rims(parts: &[GlassSolidPart], rims: &[RimEdge], token: &CancelToken) -> Result<Self, Canceled> {
         // Merge identical points first.
         let point = |end: usize| rims[end / 2].ends[end % 2];
         let mut order: Vec<usize> = (0..2 * rims.len()).collect();
@@ -209,7 +209,7 @@ impl MergedEdgeEndpoints {
         parts: &[GlassSolidPart],
         rims: &[RimEdgeWithEndpointIds],
         token: &CancelToken,
-    ) -> Result<Vec<RimEdgeWithEndpointIds>, Cancelled> {
+    ) -> Result<Vec<RimEdgeWithEndpointIds>, Canceled> {
         let mut ends: Vec<u32> = rims.iter().flat_map(|&(_, ends)| ends).collect();
         ends.sort_unstable();
         ends.dedup();

@@ -12,7 +12,7 @@ use crate::materials::ChannelSelector;
 use crate::materials::texels::{TexelData, Texels};
 use crate::math::Vec3;
 use crate::math::color::srgb_to_linear;
-use crate::math::limits::LARGEST;
+use crate::math::limits::MAX_MAGNITUDE;
 
 /// Evaluates an expression on an image's samples, whatever their type.
 macro_rules! with_samples {
@@ -232,7 +232,7 @@ fn texels_from_floats(
     encoding: ImageEncoding,
     unusable: &mut u64,
 ) -> TexelData {
-    let clean = |value: f32| if value <= LARGEST as f32 { value.max(0.0) } else { 0.0 };
+    let clean = |value: f32| if value <= MAX_MAGNITUDE as f32 { value.max(0.0) } else { 0.0 };
     let decode = |value: f32| match encoding {
         ImageEncoding::Srgb => clean(srgb_to_linear(clean(value))),
         ImageEncoding::Color
@@ -244,7 +244,7 @@ fn texels_from_floats(
     let mut texel = |pixel| {
         let rgb = pixel_rgb(pixel);
         if encoding != ImageEncoding::Raw {
-            *unusable += u64::from(!rgb.iter().all(|value| (0.0..=LARGEST as f32).contains(value)));
+            *unusable += u64::from(!rgb.iter().all(|value| (0.0..=MAX_MAGNITUDE as f32).contains(value)));
         }
         Vec3::from_array(rgb.map(decode))
     };
@@ -273,7 +273,7 @@ fn convert_color_space(
             if is_raw {
                 return Vec3::from_array(color);
             }
-            *unusable += u64::from(!linear.iter().all(|value| value.abs() <= LARGEST as f32));
+            *unusable += u64::from(!linear.iter().all(|value| value.abs() <= MAX_MAGNITUDE as f32));
             Vec3::from_array(color.map(sanitize))
         };
         TexelData::Float(samples.chunks_exact(channels).map(&mut texel).collect())
@@ -296,5 +296,5 @@ fn apply_transfer_curves_to_pixel<T: Sample>(pixel: &[T], tables: Option<&[Vec<f
 
 /// Replaces negative, excessively large and non-finite values with 0.
 fn sanitize(value: f32) -> f32 {
-    if (0.0..=LARGEST as f32).contains(&value) { value } else { 0.0 }
+    if (0.0..=MAX_MAGNITUDE as f32).contains(&value) { value } else { 0.0 }
 }

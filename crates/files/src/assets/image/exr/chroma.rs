@@ -178,8 +178,8 @@ fn limit_saturation([above, row, below]: [&[[f32; 3]]; 3], x: usize, weights: DV
     if found <= mean || found <= most {
         return color;
     }
-    let greatest = color.into_iter().fold(f32::MIN, f32::max);
-    let reduced = color.map(|part| (greatest - (greatest - part) * (most / found)).max(0.0));
+    let max = color.into_iter().fold(f32::MIN, f32::max);
+    let reduced = color.map(|part| (max - (max - part) * (most / found)).max(0.0));
     let luminance = |color: [f32; 3]| DVec3::from_array(color.map(f64::from)).dot(weights);
     let (wanted, got) = (luminance(color), luminance(reduced));
     if got > 0.0 { reduced.map(|part| (f64::from(part) * wanted / got) as f32) } else { reduced }
@@ -187,7 +187,7 @@ fn limit_saturation([above, row, below]: [&[[f32; 3]]; 3], x: usize, weights: DV
 
 /// 1 − min/max of the components, or 0 if no component is positive.
 fn saturation(color: [f32; 3]) -> f32 {
-    let greatest = color.into_iter().fold(f32::MIN, f32::max);
-    let least = color.into_iter().fold(f32::MAX, f32::min);
-    if greatest > 0.0 { 1.0 - least / greatest } else { 0.0 }
+    let max = color.into_iter().fold(f32::MIN, f32::max);
+    let min = color.into_iter().fold(f32::MAX, f32::min);
+    if max > 0.0 { 1.0 - min / max } else { 0.0 }
 }

@@ -14,7 +14,7 @@ use ::exr::prelude::Vec2;
 /// Maximum size of the EXR headers in bytes.
 const HEADER_BYTES: u64 = 1 << 20;
 /// Offset of the first header, after the magic number and version.
-const START: usize = 8;
+const FIRST_HEADER_OFFSET: usize = 8;
 
 /// A channel's subsampling factors, and the file offset of the two integers that store them.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,7 +31,7 @@ pub(super) fn read_samplings_if_subsampled(
     let mut bytes = Vec::new();
     file.by_ref().take(HEADER_BYTES).read_to_end(&mut bytes)?;
     file.seek(SeekFrom::Start(0))?;
-    let found = HeaderParser { bytes: &bytes, at: START }.samplings().unwrap_or_default();
+    let found = HeaderParser { bytes: &bytes, at: FIRST_HEADER_OFFSET }.samplings().unwrap_or_default();
     let is_full = found.iter().flatten().all(|sampling| sampling.step == Vec2(1, 1));
     Ok(if is_full { Vec::new() } else { found })
 }

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use crate::assets::{FileLine, FileTexture};
 use crate::materials::{Channel, ChannelSelector};
-use crate::math::limits::{LARGEST, is_nonzero_but_too_short};
+use crate::math::limits::{MAX_MAGNITUDE, is_nonzero_but_too_short};
 use crate::math::{DVec2, Vec2};
 
 /// Material parameter that a map controls.
@@ -323,7 +323,7 @@ impl<'a> MapArguments<'a> {
             };
             self.next_unless_last();
             *number = f64::from(value);
-            are_usable = (index == 0 || are_usable) && number.abs() <= LARGEST;
+            are_usable = (index == 0 || are_usable) && number.abs() <= MAX_MAGNITUDE;
         }
         are_usable.then_some(numbers)
     }

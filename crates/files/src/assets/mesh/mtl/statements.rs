@@ -1,7 +1,7 @@
 //! Parses lines from an MTL file. Keywords are case-insensitive.
 
 use super::map::{Map, MapKind, ignored_option_warning};
-use crate::math::limits::LARGEST;
+use crate::math::limits::MAX_MAGNITUDE;
 
 /// A color statement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -66,7 +66,7 @@ impl MtlNumber {
     /// material.
     fn range(self) -> Option<[f64; 2]> {
         match self {
-            Self::Shininess => Some([0.0, LARGEST]),
+            Self::Shininess => Some([0.0, MAX_MAGNITUDE]),
             Self::Dissolve
             | Self::Transparency
             | Self::Roughness
@@ -174,7 +174,7 @@ fn clamp_with_warning(
 }
 
 pub(super) fn clamped_value_warning(word: &str, keyword: &str, limit: f64) -> String {
-    let limit = if limit == LARGEST { "1e18".to_owned() } else { limit.to_string() };
+    let limit = if limit == MAX_MAGNITUDE { "1e18".to_owned() } else { limit.to_string() };
     format!("{word} in `{keyword}` is clamped to {limit}")
 }
 
@@ -226,14 +226,14 @@ fn parse_color(
             if rgb.iter().any(|part| *part < -TINY) {
                 warnings.push(outside_gamut_warning(keyword));
             }
-            rgb.map(|part| part.clamp(0.0, LARGEST))
+            rgb.map(|part| part.clamp(0.0, MAX_MAGNITUDE))
         }
         (MtlColorKind::Diffuse | MtlColorKind::Specular | MtlColorKind::Emission, false) => {
             // Report only the first component.
             let mut reported = Vec::new();
             let part = |part: usize| {
                 let word = words.get(part).or(words.first()).copied().unwrap_or_default();
-                clamp_with_warning(word, values[part], [0.0, LARGEST], keyword, &mut reported)
+                clamp_with_warning(word, values[part], [0.0, MAX_MAGNITUDE], keyword, &mut reported)
             };
             let clamped = [0, 1, 2].map(part);
             warnings.extend(reported.into_iter().next());

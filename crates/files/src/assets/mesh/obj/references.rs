@@ -7,13 +7,13 @@ use super::super::text::{Lines, convert_mac_line_ends};
 use super::super::{FILE_LIMIT, mtl};
 use super::libraries::library_paths;
 use super::words::ObjTextCursor;
-use crate::control::{CancelToken, Cancelled};
+use crate::control::{CancelToken, Canceled};
 
 /// Lists an OBJ file's material libraries and their images. See [`super::super::referenced_files`].
 pub(in crate::assets::mesh) fn referenced_files(
     path: &Path,
     token: &CancelToken,
-) -> Result<Vec<PathBuf>, Cancelled> {
+) -> Result<Vec<PathBuf>, Canceled> {
     let mut files = BTreeSet::new();
     for library in libraries(path, token)? {
         if let Ok(mut lines) = Lines::open(&library, mtl::FILE_LIMIT) {
@@ -26,7 +26,7 @@ pub(in crate::assets::mesh) fn referenced_files(
     Ok(files.into_iter().collect())
 }
 
-fn libraries(path: &Path, token: &CancelToken) -> Result<BTreeSet<PathBuf>, Cancelled> {
+fn libraries(path: &Path, token: &CancelToken) -> Result<BTreeSet<PathBuf>, Canceled> {
     let mut libraries = BTreeSet::new();
     let Ok(mut lines) = Lines::open(path, FILE_LIMIT) else { return Ok(libraries) };
     loop {
@@ -61,7 +61,7 @@ mod tests {
         "newmtl a\nKd 1 0 0\nmap_Kd -s 2 2 skin.png\n\trefl  sky #1.png\nnewmtl b\nbump \"b c.png\"\n";
 
     fn listed(path: &Path) -> BTreeSet<PathBuf> {
-        let files = referenced_files(path, &CancelToken::new()).expect("not cancelled");
+        let files = referenced_files(path, &CancelToken::new()).expect("not canceled");
         assert!(files.is_sorted_by(|a, b| a < b), "without duplicates");
         files.into_iter().collect()
     }
@@ -114,7 +114,7 @@ mod tests {
         let text = format!("f {}\nmtllib a.mtl\n", "1 ".repeat(3 << 20));
         fs::write(&path, text).expect("written");
         let mut lines = Lines::open(&path, FILE_LIMIT).expect("opened");
-        while let Some(line) = lines.read_next_line(&CancelToken::new()).expect("not cancelled") {
+        while let Some(line) = lines.read_next_line(&CancelToken::new()).expect("not canceled") {
             assert!(line.len() <= 1 << 20);
         }
         assert_eq!(listed(&path), [folder.path().join("a.mtl")].into());
@@ -138,7 +138,7 @@ mod tests {
     }
 
     #[test]
-    fn cancelled_listing_stops() {
+    fn canceled_listing_stops() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("mesh.obj");
         fs::write(&path, format!("mtllib a.mtl\n{FACE}")).expect("written");

@@ -37,10 +37,10 @@ pub(super) enum StateChange {
 }
 
 /// Length of the longest keyword.
-const LONGEST_KEYWORD: usize = 6;
+const MAX_KEYWORD_LENGTH: usize = 6;
 
 /// Converts a keyword to lowercase. Words longer than any keyword are returned unchanged.
-fn lower_case<'a>(word: &'a [u8], lower: &'a mut [u8; LONGEST_KEYWORD]) -> &'a [u8] {
+fn lower_case<'a>(word: &'a [u8], lower: &'a mut [u8; MAX_KEYWORD_LENGTH]) -> &'a [u8] {
     let Some(lower) = lower.get_mut(..word.len()) else { return word };
     lower.copy_from_slice(word);
     lower.make_ascii_lowercase();
@@ -98,7 +98,7 @@ impl ParsedObj {
             }
             return Ok(());
         };
-        let mut lower = [0; LONGEST_KEYWORD];
+        let mut lower = [0; MAX_KEYWORD_LENGTH];
         match lower_case(keyword, &mut lower) {
             b"v" => self.vertices.parse_vertex(words)?,
             b"vt" => {

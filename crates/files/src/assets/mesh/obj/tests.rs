@@ -267,7 +267,7 @@ const CORNER: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 1 0 -1\nv 1 1 -1\n";
 /// Returns the normals at the corners of two faces.
 fn shaded(text: &str) -> Vec<Vec3> {
     let mesh = read(text).unwrap_or_else(|error| panic!("{error}: {text}")).mesh;
-    let normals = crate::assets::mesh::vertex_normals(&mesh, &CancelToken::new()).expect("not cancelled");
+    let normals = crate::assets::mesh::vertex_normals(&mesh, &CancelToken::new()).expect("not canceled");
     let normals = if mesh.normals.is_empty() { normals } else { mesh.normals.clone() };
     mesh.triangles.as_flattened().iter().map(|vertex| normals[*vertex as usize]).collect()
 }

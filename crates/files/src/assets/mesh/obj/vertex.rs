@@ -15,7 +15,7 @@ pub(super) struct Vertices {
     /// Colors from ZBrush's `#MRGB` comments, in the order of the positions.
     painted: Vec<[u8; 3]>,
     /// Minimum alpha and the byte offset of its statement.
-    least_alpha: Option<(f64, usize)>,
+    min_alpha: Option<(f64, usize)>,
     /// Byte offset of the first statement with extra words.
     pub(super) first_excess: Option<usize>,
 }
@@ -65,9 +65,9 @@ impl Vertices {
             self.add_color_of_next_position(color, start)?;
         }
         if let Some(alpha) = alpha
-            && self.least_alpha.is_none_or(|(least, _)| alpha < least)
+            && self.min_alpha.is_none_or(|(least, _)| alpha < least)
         {
-            self.least_alpha = Some((alpha, start));
+            self.min_alpha = Some((alpha, start));
         }
         self.positions.push(DVec3::new(x, y, z) / weight);
         Ok(())
@@ -103,7 +103,7 @@ impl Vertices {
     /// Byte offset of the vertex with the minimum alpha, or `None` if every alpha is at its maximum. Alpha
     /// has the same range as the colors.
     pub(super) fn most_transparent_vertex_offset(&self) -> Option<usize> {
-        self.least_alpha.filter(|(least, _)| *least < self.range.full_intensity()).map(|(_, start)| start)
+        self.min_alpha.filter(|(least, _)| *least < self.range.full_intensity()).map(|(_, start)| start)
     }
 
     /// Returns the byte offset of a vertex with an out-of-range color, and a warning about it.

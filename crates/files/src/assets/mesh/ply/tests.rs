@@ -361,7 +361,7 @@ fn texture_seams_do_not_change_vertex_normals() {
     let text = square(PLAIN, list, &["3 0 1 2 6 0 0 1 0 1 1", "3 0 2 3 6 0.5 0.5 1 0 0 1"])
         .replace("1 1 0 \n", "1 1 5 \n");
     let mesh = loaded(&text).mesh;
-    let normals = crate::assets::mesh::vertex_normals(&mesh, &CancelToken::new()).expect("not cancelled");
+    let normals = crate::assets::mesh::vertex_normals(&mesh, &CancelToken::new()).expect("not canceled");
     assert_eq!(mesh.positions.len(), 6);
     for (a, b) in [(0, 3), (2, 4)] {
         let [a, b] = [(0, a), (1, b - 3)].map(|(face, corner)| mesh.triangles[face][corner] as usize);

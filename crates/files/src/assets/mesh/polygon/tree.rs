@@ -3,7 +3,7 @@
 use crate::math::DVec2;
 
 /// Maximum number of corners per leaf.
-const LEAF: usize = 8;
+const MAX_LEAF_CORNERS: usize = 8;
 
 /// Polygon corners in the plane, ordered so that each tree node is a contiguous range.
 pub(super) struct CornerTree {
@@ -24,7 +24,7 @@ struct BoxNode {
 
 impl CornerTree {
     pub(super) fn new(points: &[DVec2]) -> Self {
-        let leaves = points.len().div_ceil(LEAF).next_power_of_two();
+        let leaves = points.len().div_ceil(MAX_LEAF_CORNERS).next_power_of_two();
         let empty = BoxNode { min: DVec2::INFINITY, max: DVec2::NEG_INFINITY, remaining: 0 };
         let mut tree = Self {
             order: (0..points.len() as u32).collect(),
@@ -45,7 +45,7 @@ impl CornerTree {
         let min = range.iter().map(at).fold(DVec2::INFINITY, DVec2::min);
         let max = range.iter().map(at).fold(DVec2::NEG_INFINITY, DVec2::max);
         self.nodes[node] = BoxNode { min, max, remaining: (end - start) as u32 };
-        if end - start <= LEAF {
+        if end - start <= MAX_LEAF_CORNERS {
             return;
         }
         let size = max - min;
@@ -63,7 +63,7 @@ impl CornerTree {
         let (mut node, mut start, mut end) = (0, 0, self.order.len());
         loop {
             self.nodes[node].remaining -= 1;
-            if end - start <= LEAF {
+            if end - start <= MAX_LEAF_CORNERS {
                 return;
             }
             let middle = start + (end - start) / 2;
@@ -90,7 +90,7 @@ impl CornerTree {
             if remaining == 0 || is_apart || is_box_beyond_edge(triangle, low, high) {
                 continue;
             }
-            if end - start <= LEAF {
+            if end - start <= MAX_LEAF_CORNERS {
                 *visits += (end - start) as u64;
                 if let Some(found) = self.order[start..end].iter().find(|corner| is_wanted(**corner)) {
                     return Some(*found);

@@ -27,7 +27,7 @@ struct Histogram {
 }
 
 /// Adding this to a number between −½ and 2²² puts the nearest integer into the low bits of the sum.
-const ROUND: f32 = 12_582_912.0;
+const ROUNDING_OFFSET: f32 = 12_582_912.0;
 
 impl Histogram {
     fn from_references(references: &[TriangleReference], start: Vec4, per_length: Vec4) -> Self {
@@ -35,7 +35,7 @@ impl Histogram {
         // Subtract ½ to turn rounding to nearest into rounding down.
         let bins = |at: Vec4| {
             let place = (at - start) * per_length - Vec4::splat(0.5);
-            place.clamp(Vec4::ZERO, Vec4::splat((BINS - 1) as f32)) + Vec4::splat(ROUND)
+            place.clamp(Vec4::ZERO, Vec4::splat((BINS - 1) as f32)) + Vec4::splat(ROUNDING_OFFSET)
         };
         for reference in references {
             let low = bins(reference.bounds.min).to_array().map(f32::to_bits);

@@ -14,7 +14,7 @@ mod sweep;
 use rayon::prelude::*;
 
 use super::node::{self, LeafTriangle, PackedKdNode};
-use crate::control::{CancelToken, Cancelled};
+use crate::control::{CancelToken, Canceled};
 use crate::geometry::Aabb;
 use crate::geometry::mesh::TriangleMesh;
 use crate::math::Vec3;
@@ -32,20 +32,20 @@ const TASK_SIZE: usize = 4096;
 
 /// Maximum total number of leaves and references. A tree has fewer than two nodes per leaf, and node indices
 /// must fit into a [`PackedKdNode`].
-const MOST_ROOM: u64 = node::MOST as u64 / 2;
+const MAX_ROOM: u64 = node::MAX_PAYLOAD as u64 / 2;
 
 /// All triangles must fit into a single leaf.
-const _: () = assert!((TriangleMesh::MOST_TRIANGLES as u64) < MOST_ROOM);
+const _: () = assert!((TriangleMesh::MAX_TRIANGLES as u64) < MAX_ROOM);
 
 /// Maximum total number of leaves and references per triangle. Typical meshes need only a fraction of this.
 /// Many triangles around a single vertex could produce far more references.
-const MOST_PER_TRIANGLE: u64 = 24;
+const MAX_PER_TRIANGLE: u64 = 24;
 
 /// Number added to the triangle count, so that small meshes have enough room.
 const FEW: u64 = 64;
 
 /// Marks a triangle without an assigned position.
-const NOWHERE: u32 = u32::MAX;
+const UNASSIGNED: u32 = u32::MAX;
 
 /// A finished kd-tree.
 pub struct BuiltKdTree {
@@ -64,13 +64,13 @@ pub fn depth_limit(count: usize) -> u32 {
 /// Builds a tree over `count` triangles. Triangles without a finite bounding box are skipped.
 ///
 /// # Errors
-/// [`Cancelled`] if the build was canceled.
+/// [`Canceled`] if the build was canceled.
 pub fn build(
     count: u32,
     corners: impl Fn(u32) -> [Vec3; 3] + Sync,
     token: &CancelToken,
-) -> Result<BuiltKdTree, Cancelled> {
-    let room = MOST_ROOM.min(MOST_PER_TRIANGLE * (u64::from(count) + FEW));
+) -> Result<BuiltKdTree, Canceled> {
+    let room = MAX_ROOM.min(MAX_PER_TRIANGLE * (u64::from(count) + FEW));
     build_with_budget(room, count, corners, token)
 }
 
@@ -80,7 +80,7 @@ fn build_with_budget(
     count: u32,
     corners: impl Fn(u32) -> [Vec3; 3] + Sync,
     token: &CancelToken,
-) -> Result<BuiltKdTree, Cancelled> {
+) -> Result<BuiltKdTree, Canceled> {
     let references = TriangleReference::collect_finite(count, &corners, token)?;
     if references.is_empty() {
         let (nodes, references, triangles) = Default::default();
@@ -98,11 +98,11 @@ fn build_with_budget(
 
 /// Sorts the triangles by their first use in a leaf and rewrites `ids` as indices into that order.
 fn order_by_first_use(mut ids: Vec<u32>, count: u32) -> (Vec<u32>, Vec<u32>) {
-    let mut places = vec![NOWHERE; count as usize];
+    let mut places = vec![UNASSIGNED; count as usize];
     let mut order = Vec::with_capacity(count as usize);
     for id in &mut ids {
         let place = &mut places[*id as usize];
-        if *place == NOWHERE {
+        if *place == UNASSIGNED {
             *place = order.len() as u32;
             order.push(*id);
         }
@@ -128,7 +128,7 @@ impl Cell {
         let has_room = 2 * room_needed_by_leaf(references.len()) <= self.room;
         if self.levels == 0 || references.is_empty() || !has_room {
             None
-        } else if references.len() <= sweep::SWEPT {
+        } else if references.len() <= sweep::MAX_SWEPT_REFERENCES {
             sweep::cheapest_plane(references, &self.bounds)
         } else {
             bins::cheapest_plane(references, &self.bounds)
@@ -158,7 +158,7 @@ fn build_part(
     mut references: Vec<TriangleReference>,
     corners: &(impl Fn(u32) -> [Vec3; 3] + Sync),
     token: &CancelToken,
-) -> Result<TreePart, Cancelled> {
+) -> Result<TreePart, Canceled> {
     token.check_pause_and_cancel()?;
     let plane = if references.len() > TASK_SIZE { cell.choose_split(&references) } else { None };
     let Some(plane) = plane else {
@@ -195,7 +195,7 @@ mod tests {
         for count in [500, 20_000] {
             let built = build(count, fan(count), &CancelToken::new()).expect("never canceled");
             let size = (built.nodes.len() / 2 + built.references.len()) as u64;
-            assert!(size <= MOST_PER_TRIANGLE * (u64::from(count) + FEW), "{size} for {count}");
+            assert!(size <= MAX_PER_TRIANGLE * (u64::from(count) + FEW), "{size} for {count}");
             assert!(size > 4 * u64::from(count), "{size} for {count}: most of the room was left unused");
         }
     }
@@ -214,7 +214,7 @@ mod tests {
             assert_eq!(built.triangles.len() as u64, COUNT);
             (built.nodes.iter().filter(leaf).count() + built.references.len()) as u64
         };
-        let whole = size(MOST_ROOM);
+        let whole = size(MAX_ROOM);
         assert!(whole > 3 * COUNT, "{whole}");
         for room in [COUNT + 1, 2 * COUNT + 1, 2 * COUNT + 2, 2 * COUNT + 700, 3 * COUNT] {
             assert!(size(room) <= room, "{} in {room}", size(room));

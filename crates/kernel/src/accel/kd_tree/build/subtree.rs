@@ -4,7 +4,7 @@ use super::Cell;
 use super::partition::PartitionBuffers;
 use crate::accel::kd_tree::node::{DecodedNode, PackedKdNode};
 use crate::accel::reference::TriangleReference;
-use crate::control::{CancelToken, Cancelled};
+use crate::control::{CancelToken, Canceled};
 use crate::math::Vec3;
 
 /// Nodes and references, with indices relative to the subtree.
@@ -18,13 +18,13 @@ impl KdSubtree {
     /// Builds the subtree for a cell and its references.
     ///
     /// # Errors
-    /// [`Cancelled`] if the build was canceled.
+    /// [`Canceled`] if the build was canceled.
     pub fn build(
         cell: &Cell,
         references: Vec<TriangleReference>,
         corners: &impl Fn(u32) -> [Vec3; 3],
         token: &CancelToken,
-    ) -> Result<Self, Cancelled> {
+    ) -> Result<Self, Canceled> {
         let mut builder = KdSubtreeBuilder {
             built: Self::default(),
             references,
@@ -50,7 +50,7 @@ struct KdSubtreeBuilder<'a, C> {
 impl<C: Fn(u32) -> [Vec3; 3]> KdSubtreeBuilder<'_, C> {
     /// Builds the nodes for a cell and removes the cell's references, which begin at `first`. The recursion
     /// depth is limited by the tree depth.
-    fn build_cell(&mut self, first: usize, cell: &Cell) -> Result<(), Cancelled> {
+    fn build_cell(&mut self, first: usize, cell: &Cell) -> Result<(), Canceled> {
         let place = self.built.nodes.len();
         let own = &self.references[first..];
         let leaf = DecodedNode::Leaf { first: self.built.ids.len() as u32, count: own.len() as u32 };
@@ -60,7 +60,7 @@ impl<C: Fn(u32) -> [Vec3; 3]> KdSubtreeBuilder<'_, C> {
             self.references.truncate(first);
             return Ok(());
         };
-        if own.len() > POLLED {
+        if own.len() > MIN_POLLED_REFERENCES {
             self.token.check_pause_and_cancel()?;
         }
         let left = self.scratch.partition_references(&mut self.references, first, &plane, self.corners);
@@ -76,4 +76,4 @@ impl<C: Fn(u32) -> [Vec3; 3]> KdSubtreeBuilder<'_, C> {
 }
 
 /// Number of references above which splitting a cell polls the cancellation token.
-const POLLED: usize = 256;
+const MIN_POLLED_REFERENCES: usize = 256;

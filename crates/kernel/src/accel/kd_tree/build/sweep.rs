@@ -7,7 +7,7 @@ use crate::accel::reference::{SimdBounds, TriangleReference};
 use crate::math::Vec4;
 
 /// Cells with at most this many references are swept.
-pub const SWEPT: usize = 24;
+pub const MAX_SWEPT_REFERENCES: usize = 24;
 
 /// Finds the cheapest plane. Returns `None` if a leaf costs no more.
 pub fn cheapest_plane(references: &[TriangleReference], cell: &SimdBounds) -> Option<SplitPlane> {
@@ -15,7 +15,7 @@ pub fn cheapest_plane(references: &[TriangleReference], cell: &SimdBounds) -> Op
         0..=4 => cheapest_plane_simd::<1>(references, cell),
         5..=8 => cheapest_plane_simd::<2>(references, cell),
         9..=16 => cheapest_plane_simd::<4>(references, cell),
-        _ => cheapest_plane_simd::<{ SWEPT / 4 }>(references, cell),
+        _ => cheapest_plane_simd::<{ MAX_SWEPT_REFERENCES / 4 }>(references, cell),
     }
 }
 
@@ -97,12 +97,12 @@ mod tests {
         if !(at > cell.min[axis] && at < cell.max_corner()[axis]) {
             return f32::INFINITY;
         }
-        let goes = |reference: &TriangleReference, right: bool| {
+        let belongs = |reference: &TriangleReference, right: bool| {
             let (min, max) = (reference.bounds.min[axis], reference.bounds.max_corner()[axis]);
             let is_planar = min == at && max == at;
             if is_planar { right == planar_right } else { if right { max > at } else { min < at } }
         };
-        let count = |right| references.iter().filter(|reference| goes(reference, right)).count() as f32;
+        let count = |right| references.iter().filter(|reference| belongs(reference, right)).count() as f32;
         let share = cell.split_at_plane(axis, at).map(|half| half.half_area() / cell.half_area());
         let cost = 1.0 + share[0] * count(false) + share[1] * count(true);
         if count(false) == 0.0 || count(true) == 0.0 { 0.8 * cost } else { cost }
@@ -113,7 +113,7 @@ mod tests {
         let mut next = random(23);
         let (mut planes, mut leaves) = (0, 0);
         for round in 0..3000 {
-            let count = 1 + round % SWEPT;
+            let count = 1 + round % MAX_SWEPT_REFERENCES;
             // Put the boxes on a grid so that they touch and share planes. Some reach the cell's faces.
             let mut step = |size: f32| Vec3::new(next(), next(), next()).map(|x| (x * size).round() / 8.0);
             let references: Vec<TriangleReference> = (0..count as u32)

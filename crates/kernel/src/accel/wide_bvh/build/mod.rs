@@ -13,7 +13,7 @@ use rayon::prelude::*;
 use super::Quality;
 use super::node::{TrianglePack, WideNode};
 use crate::accel::reference::{SimdBounds, TriangleReference};
-use crate::control::{CancelToken, Cancelled};
+use crate::control::{CancelToken, Canceled};
 use crate::geometry::Aabb;
 use crate::math::Vec3;
 
@@ -34,13 +34,13 @@ pub struct BuiltWideBvh {
 /// Builds a tree over `count` triangles. Triangles without a finite bounding box are skipped.
 ///
 /// # Errors
-/// [`Cancelled`] if the build was canceled.
+/// [`Canceled`] if the build was canceled.
 pub fn build(
     count: u32,
     corners: impl Fn(u32) -> [Vec3; 3] + Sync,
     quality: Quality,
     token: &CancelToken,
-) -> Result<BuiltWideBvh, Cancelled> {
+) -> Result<BuiltWideBvh, Canceled> {
     let mut references = TriangleReference::collect_finite(count, &corners, token)?;
     if references.is_empty() {
         return Ok(BuiltWideBvh { nodes: Vec::new(), packs: Vec::new(), bounds: Aabb::EMPTY });
@@ -78,7 +78,7 @@ fn build_part(
     start: usize,
     segment: ReferenceRangeWithSplit,
     token: &CancelToken,
-) -> Result<TreePart, Cancelled> {
+) -> Result<TreePart, Canceled> {
     token.check_pause_and_cancel()?;
     let Some(split) = segment.split.as_ref().filter(|_| segment.count > TASK_SIZE) else {
         return Ok(TreePart::Built(WideSubtree::build(references, start, segment)));

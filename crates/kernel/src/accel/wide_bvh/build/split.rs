@@ -4,7 +4,7 @@
 use rayon::prelude::*;
 
 use crate::accel::reference::{SimdBounds, TriangleReference};
-use crate::accel::wide_bvh::node::{MOST_PACKS, PACK};
+use crate::accel::wide_bvh::node::{MAX_PACKS, PACK};
 use crate::accel::wide_bvh::simd;
 use crate::math::Vec4;
 
@@ -102,7 +102,7 @@ fn choose_split(
     level: u32,
 ) -> (Option<Split>, bool) {
     let count = references.len();
-    let must = count > PACK * MOST_PACKS as usize;
+    let must = count > PACK * MAX_PACKS as usize;
     let ReferenceBounds { bounds, centroids } = boxes;
     let bins = BinMapping::new(centroids, count);
     let best = if level >= SURFACE_AREA_LEVELS {
@@ -142,7 +142,7 @@ pub struct BinMapping {
 }
 
 /// Adding this to a number between −½ and 2²² puts the nearest integer into the low bits.
-pub const ROUND: f32 = 12_582_912.0;
+pub const ROUNDING_OFFSET: f32 = 12_582_912.0;
 
 impl BinMapping {
     fn new(centroids: &SimdBounds, references: usize) -> Self {
@@ -157,10 +157,10 @@ impl BinMapping {
         Self { start: centroids.min, per_length, count }
     }
 
-    /// Bin numbers plus [`ROUND`].
+    /// Bin numbers plus [`ROUNDING_OFFSET`].
     #[inline(always)]
     fn bin_numbers_plus_round(&self, centroid: Vec4) -> Vec4 {
-        (centroid - self.start) * self.per_length - Vec4::splat(0.5) + Vec4::splat(ROUND)
+        (centroid - self.start) * self.per_length - Vec4::splat(0.5) + Vec4::splat(ROUNDING_OFFSET)
     }
 
     #[inline(always)]
@@ -311,7 +311,7 @@ fn partition_by_plane<const AXIS: usize>(
     bins: &BinMapping,
 ) -> (usize, [SimdBounds; 2]) {
     let (start, per_length) = (Vec4::splat(bins.start[AXIS]), Vec4::splat(bins.per_length[AXIS]));
-    let first_right = Vec4::splat(ROUND + bin as f32);
+    let first_right = Vec4::splat(ROUNDING_OFFSET + bin as f32);
     let (mut left, mut right) = (SimdBounds::EMPTY, SimdBounds::EMPTY);
     let mut middle = 0;
     for i in 0..references.len() {
@@ -319,8 +319,8 @@ fn partition_by_plane<const AXIS: usize>(
         references[i] = references[middle];
         references[middle] = reference;
         let centroid = reference.centroid();
-        let place =
-            (Vec4::splat(centroid[AXIS]) - start) * per_length - Vec4::splat(0.5) + Vec4::splat(ROUND);
+        let place = (Vec4::splat(centroid[AXIS]) - start) * per_length - Vec4::splat(0.5)
+            + Vec4::splat(ROUNDING_OFFSET);
         let is_left = place.cmplt(first_right);
         let on = |mask, centroid| Vec4::select(mask, centroid, Vec4::INFINITY);
         left.grow(&SimdBounds { min: on(is_left, centroid), minus_max: on(is_left, -centroid) });

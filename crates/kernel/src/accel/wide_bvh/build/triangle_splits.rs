@@ -5,32 +5,32 @@
 use rayon::prelude::*;
 
 use crate::accel::reference::{SimdBounds, TriangleReference};
-use crate::control::{CancelToken, Cancelled};
+use crate::control::{CancelToken, Canceled};
 use crate::math::Vec3;
 use crate::math::elementary::exp2;
 
 /// Maximum number of additional references as a fraction of the number of triangles.
-const MOST_MORE: f64 = 0.3;
+const MAX_ADDITIONAL: f64 = 0.3;
 
 /// Number of levels in the grid of planes. The grid has 2^`LEVELS` cells along each axis.
 const LEVELS: u32 = 20;
 
 /// Number of references processed between polls of the cancellation token.
-const CHUNK: usize = 4096;
+const REFERENCES_PER_POLL: usize = 4096;
 
 /// Splits the references of large triangles. The result depends only on the triangles.
 ///
 /// # Errors
-/// [`Cancelled`] if the build was canceled.
+/// [`Canceled`] if the build was canceled.
 pub fn split_large_triangles(
     references: &[TriangleReference],
     corners: &(impl Fn(u32) -> [Vec3; 3] + Sync),
     token: &CancelToken,
-) -> Result<Vec<TriangleReference>, Cancelled> {
+) -> Result<Vec<TriangleReference>, Canceled> {
     let grid = BisectionGrid::around(references);
     let priority = |reference: &TriangleReference| grid.priority(reference, corners(reference.id()));
     let priorities: Vec<f32> = references.par_iter().map(priority).collect();
-    let factor = find_priority_scale(&priorities, (references.len() as f64 * MOST_MORE) as u64);
+    let factor = find_priority_scale(&priorities, (references.len() as f64 * MAX_ADDITIONAL) as u64);
     let of_chunk = |(references, priorities): (&[TriangleReference], &[f32])| {
         token.check_pause_and_cancel()?;
         let mut pieces = Vec::new();
@@ -44,7 +44,7 @@ pub fn split_large_triangles(
         }
         Ok(pieces)
     };
-    let chunks = references.par_chunks(CHUNK).zip(priorities.par_chunks(CHUNK));
+    let chunks = references.par_chunks(REFERENCES_PER_POLL).zip(priorities.par_chunks(REFERENCES_PER_POLL));
     Ok(chunks.map(of_chunk).collect::<Result<Vec<_>, _>>()?.concat())
 }
 

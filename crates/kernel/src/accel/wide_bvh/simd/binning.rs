@@ -42,7 +42,7 @@ mod avx2 {
     use std::arch::x86_64::*;
 
     use crate::accel::reference::{SimdBounds, TriangleReference};
-    use crate::accel::wide_bvh::build::split::{BINS, BinMapping, Histogram, ROUND};
+    use crate::accel::wide_bvh::build::split::{BINS, BinMapping, Histogram, ROUNDING_OFFSET};
     use crate::math::Vec4;
 
     /// Loads both corners of a box into one register.
@@ -73,7 +73,7 @@ mod avx2 {
     #[inline]
     fn bin_numbers_plus_round(centroid: __m128, start: __m128, per_length: __m128) -> __m128 {
         let place = _mm_mul_ps(_mm_sub_ps(centroid, start), per_length);
-        _mm_add_ps(_mm_sub_ps(place, _mm_set1_ps(0.5)), _mm_set1_ps(ROUND))
+        _mm_add_ps(_mm_sub_ps(place, _mm_set1_ps(0.5)), _mm_set1_ps(ROUNDING_OFFSET))
     }
 
     #[target_feature(enable = "avx2")]
@@ -111,7 +111,7 @@ mod avx2 {
     ) -> (usize, [SimdBounds; 2]) {
         let start = _mm_set1_ps(bins.start[AXIS]);
         let per_length = _mm_set1_ps(bins.per_length[AXIS]);
-        let first_right = _mm_set1_ps(ROUND + bin as f32);
+        let first_right = _mm_set1_ps(ROUNDING_OFFSET + bin as f32);
         let nothing = _mm256_set1_ps(f32::INFINITY);
         let minus_high = _mm256_setr_ps(0.0, 0.0, 0.0, 0.0, -0.0, -0.0, -0.0, -0.0);
         let (mut left, mut right) = (nothing, nothing);

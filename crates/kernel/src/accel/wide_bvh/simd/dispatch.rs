@@ -141,15 +141,15 @@ fn avx512_movemask(mask: &Mask) -> u32 {
 #[inline]
 #[target_feature(enable = "avx2")]
 fn horizontal_min_max(low: __m256, high: __m256) -> [f32; 2] {
-    let (least, greatest) = (_mm256_min_ps(high, low), _mm256_max_ps(high, low));
+    let (min, max) = (_mm256_min_ps(high, low), _mm256_max_ps(high, low));
     let halves = |row: __m256| (_mm256_castps256_ps128(row), _mm256_extractf128_ps::<1>(row));
-    let ((low, high), (below, above)) = (halves(least), halves(greatest));
-    let (least, greatest) = (_mm_min_ps(high, low), _mm_max_ps(above, below));
-    let least = _mm_min_ps(_mm_movehl_ps(least, least), least);
-    let greatest = _mm_max_ps(_mm_movehl_ps(greatest, greatest), greatest);
-    let least = _mm_min_ss(_mm_movehdup_ps(least), least);
-    let greatest = _mm_max_ss(_mm_movehdup_ps(greatest), greatest);
-    [_mm_cvtss_f32(least), _mm_cvtss_f32(greatest)]
+    let ((low, high), (below, above)) = (halves(min), halves(max));
+    let (min, max) = (_mm_min_ps(high, low), _mm_max_ps(above, below));
+    let min = _mm_min_ps(_mm_movehl_ps(min, min), min);
+    let max = _mm_max_ps(_mm_movehl_ps(max, max), max);
+    let min = _mm_min_ss(_mm_movehdup_ps(min), min);
+    let max = _mm_max_ss(_mm_movehdup_ps(max), max);
+    [_mm_cvtss_f32(min), _mm_cvtss_f32(max)]
 }
 
 #[cfg(target_arch = "x86_64")]
@@ -212,9 +212,9 @@ mod tests {
     use crate::math::lanes::{Simd, mask_from_bits};
     use crate::math::random::signed_generator;
 
-    struct Folding(u32);
+    struct MovemaskKernel(u32);
 
-    impl SimdKernel for Folding {
+    impl SimdKernel for MovemaskKernel {
         type Output = u32;
 
         #[inline(always)]
@@ -227,14 +227,14 @@ mod tests {
     fn movemask_is_equal_on_all_instruction_sets() {
         for instructions in InstructionSet::ALL {
             for bits in 0..1 << 16 {
-                assert_eq!(instructions.run(Folding(bits)), bits, "{instructions:?}");
+                assert_eq!(instructions.run(MovemaskKernel(bits)), bits, "{instructions:?}");
             }
         }
     }
 
-    struct Spanning<'a>(&'a F32x16, u32);
+    struct ReductionKernel<'a>(&'a F32x16, u32);
 
-    impl SimdKernel for Spanning<'_> {
+    impl SimdKernel for ReductionKernel<'_> {
         type Output = ([f32; 2], F32x16);
 
         #[inline(always)]
@@ -253,16 +253,16 @@ mod tests {
                 row[(round as usize * 7 + i * 5) % PACKET_SIZE] = odd[(round as usize / 4 + i) % odd.len()];
             }
             let of = (next().to_bits() >> 3 & 0xffff) | 1 << (round % 16);
-            let each = InstructionSet::ALL.map(|instructions| instructions.run(Spanning(&row, of)));
+            let each = InstructionSet::ALL.map(|instructions| instructions.run(ReductionKernel(&row, of)));
             let bits =
                 |(span, inverse): ([f32; 2], F32x16)| (span.map(f32::to_bits), inverse.map(f32::to_bits));
             assert!(each.iter().all(|one| bits(*one) == bits(each[0])), "{row:?} {of:b} {each:?}");
             // Without NaN, these are the minimum and the maximum.
             let lanes = || (0..PACKET_SIZE).filter(|i| of >> i & 1 == 1).map(|i| row[i]);
             if !lanes().any(f32::is_nan) {
-                let ([least, greatest], inverse) = each[0];
-                assert_eq!(lanes().fold(f32::INFINITY, f32::min), least, "{row:?} {of:b}");
-                assert_eq!(lanes().fold(f32::NEG_INFINITY, f32::max), greatest, "{row:?} {of:b}");
+                let ([min, max], inverse) = each[0];
+                assert_eq!(lanes().fold(f32::INFINITY, f32::min), min, "{row:?} {of:b}");
+                assert_eq!(lanes().fold(f32::NEG_INFINITY, f32::max), max, "{row:?} {of:b}");
                 assert_eq!(inverse[3].to_bits(), (1.0 / row[3]).to_bits());
             }
         }

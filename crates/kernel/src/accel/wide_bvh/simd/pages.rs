@@ -1,13 +1,13 @@
 //! Huge pages for large, randomly accessed arrays, if the system supports them.
 
 /// Minimum allocation size in bytes for using huge pages.
-const LARGE: usize = 1 << 21;
+const MIN_HUGE_PAGE_BYTES: usize = 1 << 21;
 
 /// Allocates an empty vector with capacity for `count` items, using huge pages if it is large.
 pub fn allocate_vec_in_huge_pages<T>(count: usize) -> Vec<T> {
     let items = Vec::with_capacity(count);
     let bytes = count * size_of::<T>();
-    if bytes >= LARGE {
+    if bytes >= MIN_HUGE_PAGE_BYTES {
         request_huge_pages(items.as_ptr() as usize, bytes);
     }
     items

@@ -10,7 +10,7 @@ use crate::geometry::aabb::{FAR_PAD, TRIANGLE_ERROR};
 use crate::geometry::{Aabb, Ray};
 
 /// Minimum absolute direction component, as a fraction of the largest component.
-const LEAST_PART: f32 = 1.0 / (1_u64 << 40) as f32;
+const MIN_RELATIVE_COMPONENT: f32 = 1.0 / (1_u64 << 40) as f32;
 
 /// A ray preprocessed for testing the boxes in nodes and the triangles in packs.
 pub struct SimdRay {
@@ -146,7 +146,7 @@ impl SimdRay {
         // by less than the margin inside the boxes. This keeps the inverse finite unless the direction is
         // extremely short.
         let size = _mm_and_ps(direction, unsigned);
-        let least = _mm_mul_ps(broadcast_max_of_xyz(size), _mm_set1_ps(LEAST_PART));
+        let least = _mm_mul_ps(broadcast_max_of_xyz(size), _mm_set1_ps(MIN_RELATIVE_COMPONENT));
         let moving = _mm_or_ps(_mm_max_ps(size, least), _mm_andnot_ps(unsigned, direction));
         let inverse = _mm_div_ps(_mm_set1_ps(1.0), moving);
         let is_down = _mm_cmplt_ps(inverse, _mm_setzero_ps());

@@ -31,8 +31,8 @@ pub fn closest_hit(tree: &WideBvh, ray: &Ray) -> Option<ShapeHit> {
         match Child::decode(code) {
             Child::Inner(index) => {
                 let node = &tree.nodes[index as usize];
-                let (near, met) = lines.box_entries(node, end);
-                if let Some(next) = push_farther_and_return_nearest(tree, node, near, met, &mut stack) {
+                let (near, hit_boxes) = lines.box_entries(node, end);
+                if let Some(next) = push_farther_and_return_nearest(tree, node, near, hit_boxes, &mut stack) {
                     code = next;
                     continue;
                 }
@@ -110,14 +110,14 @@ fn push_farther_and_return_nearest(
     tree: &WideBvh,
     node: &WideNode,
     near: SimdF32x8,
-    met: u32,
+    hit_boxes: u32,
     stack: &mut Stack<u64>,
 ) -> Option<u32> {
-    if met == 0 {
+    if hit_boxes == 0 {
         return None;
     }
-    let first = met.trailing_zeros() as usize % 8;
-    let mut rest = met & (met - 1);
+    let first = hit_boxes.trailing_zeros() as usize % 8;
+    let mut rest = hit_boxes & (hit_boxes - 1);
     if rest == 0 {
         return Some(node.children[first]);
     }
@@ -176,12 +176,12 @@ pub fn any_hit(tree: &WideBvh, ray: &Ray, except: Option<u32>) -> bool {
         match Child::decode(code) {
             Child::Inner(index) => {
                 let node = &tree.nodes[index as usize];
-                let (_, mut met) = lines.box_entries(node, end);
-                while met != 0 {
-                    let child = node.children[met.trailing_zeros() as usize % 8];
+                let (_, mut hit_boxes) = lines.box_entries(node, end);
+                while hit_boxes != 0 {
+                    let child = node.children[hit_boxes.trailing_zeros() as usize % 8];
                     prefetch_child_start(tree, child);
                     stack.push(child);
-                    met &= met - 1;
+                    hit_boxes &= hit_boxes - 1;
                 }
             }
             Child::Leaf { first, count } => {

@@ -33,9 +33,9 @@ pub fn intersect<V: SimdVector>(
     let [[ax, ay, az], [bx, by, bz], [cx, cy, cz]] = *corners;
     let (wa, wb, wc) = (cx * by - cy * bx, ax * cy - ay * cx, bx * ay - by * ax);
     let zero = ax.splat_like(0.0);
-    let (least, greatest) = (wa.min(wb.min(wc)), wa.max(wb.max(wc)));
-    let outside = least.lt(zero) & zero.lt(greatest);
-    let on_edge = least.eq(zero) | greatest.eq(zero);
+    let (min, max) = (wa.min(wb.min(wc)), wa.max(wb.max(wc)));
+    let outside = min.lt(zero) & zero.lt(max);
+    let on_edge = min.eq(zero) | max.eq(zero);
     let determinant = wa + wb + wc;
     let along = (wa * az + wb * bz + wc * cz) * shear_z;
     let none = Hits { hit: 0, doubtful: 0, t: zero, u: zero, v: zero };

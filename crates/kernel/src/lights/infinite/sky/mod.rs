@@ -1,5 +1,5 @@
-//! The Hosek–Wilkie sky and its sun. Radiances are in linear Rec. 709 per nanometer of wavelength: a
-//! spectrally constant radiance of 1 W·m⁻²·sr⁻¹·nm⁻¹ has the luminance 1.
+//! The Hosek–Wilkie sky and its sun. Radiances are spectral radiances in linear Rec. 709: a spectrally
+//! constant radiance of 1 W·m⁻²·sr⁻¹·nm⁻¹ has the luminance 1.
 //!
 //! | files | contents |
 //! | --- | --- |
@@ -40,7 +40,7 @@ impl Sky {
     }
 }
 
-/// Angle in radians of a direction above the horizontal plane.
+/// Elevation of a direction above the horizontal plane, in radians.
 pub fn elevation(direction: DVec3) -> f64 {
     libm::atan2(direction.y, (direction.x * direction.x + direction.z * direction.z).sqrt())
 }
@@ -50,27 +50,27 @@ pub fn elevation(direction: DVec3) -> f64 {
 pub struct SkyFrame {
     /// Horizontal direction 90° from the sun's azimuth.
     side: Vec3,
-    /// Direction to the zenith.
+    /// Direction toward the zenith.
     up: Vec3,
-    /// Horizontal direction below the sun.
+    /// Horizontal direction toward the sun's azimuth.
     toward: Vec3,
-    /// Direction to the sun's center.
+    /// Direction toward the sun's center.
     sun: Vec3,
 }
 
 impl SkyFrame {
-    /// Creates the frame from unit directions to the sun and to the zenith.
+    /// Creates the frame from unit directions toward the sun and the zenith.
     pub fn new(sun: DVec3, up: DVec3) -> Self {
         let side = up.cross(sun).try_normalize().unwrap_or_else(|| up.any_orthonormal_vector());
         Self { side: side.as_vec3(), up: up.as_vec3(), toward: side.cross(up).as_vec3(), sun: sun.as_vec3() }
     }
 
-    /// Unit direction to the sun's center.
+    /// Unit direction toward the sun's center.
     pub fn sun(&self) -> Vec3 {
         self.sun
     }
 
-    /// Unit direction to the zenith.
+    /// Unit direction toward the zenith.
     pub fn up(&self) -> Vec3 {
         self.up
     }
@@ -83,7 +83,7 @@ pub struct SkyDome {
     channels: [SkyChannel; 3],
     ground: Vec3,
     cells: PiecewiseConstant2D,
-    /// Pdf in sr⁻¹ of each row, if it were constant within the row.
+    /// Probability of each row, divided by the solid angle of one of its cells, in sr⁻¹.
     pdfs: Vec<f32>,
     /// Mean radiance over all directions.
     mean: Vec3,
@@ -116,7 +116,7 @@ impl SkyDome {
         let solid_angle = 2.0 * std::f64::consts::PI / (COLUMNS * ROWS) as f64;
         let lit = (irradiance * solid_angle + sun_irradiance) / std::f64::consts::PI;
         let ground = (parameters.ground.as_dvec3() * lit).as_vec3();
-        // Every cell of a sky that is not black may contain light, even if its Gauss points do not.
+        // Unless the sky is black, any cell may contain light, even if its Gauss points are black.
         let least = luminances.iter().sum::<f64>() / luminances.len() as f64 * 1e-3;
         let dome = luminances.chunks(COLUMNS).map(|row| row.iter().map(|one| one.max(least)).collect());
         let of_ground = vec![f64::from(luminance(ground)) * ROWS as f64; COLUMNS];
@@ -152,8 +152,8 @@ impl SkyDome {
         (direction, self.radiance(frame, direction), self.cell_pdf(column, row))
     }
 
-    /// [`SkyDome::radiance_and_pdf`] for a packet. It is not inlined because it would be compiled into every
-    /// kernel that samples lights.
+    /// [`SkyDome::radiance_and_pdf`] for a packet. Not inlined, to avoid a copy in every kernel that samples
+    /// lights.
     #[inline(never)]
     pub fn radiance_and_pdf_packet(&self, frame: &SkyFrame, directions: &Vec3x16) -> (Vec3x16, F32x16) {
         let (mut radiances, mut pdfs) = ([[0.0; PACKET_SIZE]; 3], [0.0; PACKET_SIZE]);
@@ -192,7 +192,7 @@ impl SkyDome {
     }
 }
 
-/// Positions for Gauss–Legendre quadrature with two points.
+/// Nodes of two-point Gauss–Legendre quadrature on [0, 1].
 const GAUSS_POINTS: [f32; 2] = [0.211_324_87, 0.788_675_1];
 
 /// Unit direction at a position in a cell, given as fractions of the cell's azimuth and height.
@@ -205,7 +205,7 @@ fn direction_in_cell(frame: &SkyFrame, column: usize, row: usize, [along, down]:
 
 /// Radiance of the sky from a unit direction above the horizon.
 fn sky_radiance(channels: &[SkyChannel; 3], frame: &SkyFrame, direction: Vec3) -> Vec3 {
-    // Compute the angle from the sun from the chord, which is accurate even for small angles.
+    // Compute the angle to the sun from the chord, which is accurate even for small angles.
     let squared_chord = (direction - frame.sun).length_squared().min(4.0);
     let point = SkyPoint {
         height: direction.dot(frame.up).max(0.0),
@@ -216,13 +216,13 @@ fn sky_radiance(channels: &[SkyChannel; 3], frame: &SkyFrame, direction: Vec3) -
     Vec3::new(red.radiance(&point), green.radiance(&point), blue.radiance(&point))
 }
 
-/// A point of the sky, relative to the horizon and to the sun.
+/// A point of the sky, described relative to the horizon and the sun.
 struct SkyPoint {
     /// Sine of the elevation.
     height: f32,
-    /// Squared length of the chord from the sun: 2 − 2·cos γ.
+    /// Squared length of the chord to the sun: 2 − 2·cos γ.
     squared_chord: f32,
-    /// Angle γ from the sun.
+    /// Angle γ to the sun.
     angle: f32,
 }
 
@@ -242,7 +242,7 @@ impl SkyChannel {
         Self(all.map(|one| one as f32))
     }
 
-    /// Radiance, eq. 8 of the 2012 paper. The fit is slightly negative in places, where the result is 0.
+    /// Radiance, equation 8 of the 2012 paper. The fit is slightly negative in places; clamps it to 0.
     fn radiance(&self, point: &SkyPoint) -> f32 {
         let [a, b, c, d, e, f, g, i, h, mean] = self.0;
         let SkyPoint { height, squared_chord, angle } = *point;

@@ -45,9 +45,9 @@ const SUN_TABLE: usize = TURBIDITIES * ALBEDOS * CONTROL_POINTS * CHANNELS * PAR
 
 /// Limb darkening of the sun's disk in each channel: coefficients of a polynomial in the cosine μ between the
 /// sun's surface normal and the ray. The mean over the disk is 1. The spectral polynomials (Hosek and Wilkie,
-/// *Adding a Solar-Radiance Function to the Hošek–Wilkie Skylight Model*, 2013) are averaged over the spectrum
-/// of a sun at 40° and turbidity 3. For other suns above 10°, this changes red and green by at most 1 %, and blue
-/// by at most 6 %.
+/// *Adding a Solar-Radiance Function to the Hošek–Wilkie Skylight Model*, 2013) are averaged over the
+/// spectrum of a sun at 40° and turbidity 3. For other suns above 10°, the resulting error is at most 1 % in
+/// red and green, and at most 6 % in blue.
 pub(super) const LIMB_DARKENING: [[f32; 6]; CHANNELS] = [
     [0.399_946, 1.627_701, -2.291_01, 3.041_141, -2.242_908, 0.670_615],
     [0.317_416, 1.662_939, -1.839_017, 2.136_627, -1.415_792, 0.387_611],
@@ -58,7 +58,7 @@ fn table_entry(index: usize) -> f64 {
     f64::from(f32::from_le_bytes(TABLES.as_chunks::<4>().0[index]))
 }
 
-/// The table index of the next lower turbidity, and the fraction toward the next higher one.
+/// Index of the table at or below a turbidity, and the fraction for interpolation with the next table.
 fn turbidity_index_and_fraction(turbidity: f64) -> (usize, f64) {
     let index = (turbidity as usize).clamp(1, TURBIDITIES - 1) - 1;
     (index, turbidity - (index + 1) as f64)
@@ -100,6 +100,6 @@ pub(super) fn sun_radiance(turbidity: f64, elevation: f64) -> DVec3 {
             (0..ORDER).rev().fold(0.0, |sum, power| sum * x + table_entry(place + power))
         }))
     };
-    // Blue is slightly negative at the horizon, where the color is outside of Rec. 709.
+    // Near the horizon, the color is outside the Rec. 709 gamut, and blue is slightly negative.
     of_turbidity(first).lerp(of_turbidity(first + 1), fraction).max(DVec3::ZERO)
 }

@@ -6,11 +6,11 @@ use std::sync::Arc;
 use super::model::{LIMB_DARKENING, SkyParameters, sun_radiance};
 use crate::math::{DVec3, Vec3};
 
-/// Angular diameter of the sun in degrees, with which the disk has the radiance of the model. Disks of other
-/// diameters have the same irradiance.
+/// The model's angular diameter of the sun, in degrees. Disks of other diameters are scaled to the same
+/// irradiance.
 pub const SUN_ANGLE_DEGREES: f64 = 0.5338;
 
-/// Number of heights at which the radiance is stored.
+/// Number of heights at which the radiance is tabulated.
 const HEIGHTS: usize = 16;
 
 /// Radiance of the sun's disk, which decreases toward the limb and toward the horizon. The horizon hides the
@@ -57,7 +57,7 @@ impl SunDisk {
         disk
     }
 
-    /// Sets the mean radiance and the irradiance, with the midpoint rule.
+    /// Computes the mean radiance and the irradiance with the midpoint rule.
     fn integrate(&mut self, elevation: f64) {
         const RINGS: usize = 64;
         const SECTORS: usize = 64;
@@ -79,7 +79,7 @@ impl SunDisk {
         self.horizontal_irradiance = horizontal * TAU * self.one_minus_cos;
     }
 
-    /// Radiance at a point inside the disk, given the sine of its elevation and its squared chord from the
+    /// Radiance at a point inside the disk, given the sine of its elevation and the squared chord to the
     /// disk's center.
     fn radiance(&self, height: f32, squared_chord: f32) -> Vec3 {
         if height < 0.0 {
@@ -110,7 +110,7 @@ impl SunDisk {
     }
 }
 
-/// A sun's disk with the vertical axis of its sky.
+/// A sun disk, oriented by the vertical axis of its sky.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OrientedSunDisk {
     /// The disk.

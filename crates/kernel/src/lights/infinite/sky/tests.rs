@@ -17,7 +17,7 @@ fn parameters(turbidity: f64, degrees: f64, ground: [f32; 3]) -> SkyParameters {
     }
 }
 
-/// Unit direction at an elevation and at an azimuth from the sun, which is toward +x.
+/// Unit direction at an elevation and at an azimuth relative to the sun, which is toward +x.
 fn direction(elevation: f64, azimuth: f64) -> DVec3 {
     DVec3::new(elevation.cos() * azimuth.cos(), elevation.sin(), elevation.cos() * azimuth.sin())
 }
@@ -32,7 +32,8 @@ fn assert_near(what: &str, found: Vec3, expected: [f64; 3], tolerance: f64) {
     assert!(off <= tolerance * expected.max_element(), "{what}: {found}, not {expected}");
 }
 
-/// The radiances are the authors' tables and formula, evaluated in double precision by another program.
+/// The expected radiances are the authors' tables and formula, evaluated in double precision with another
+/// program.
 #[test]
 fn radiances_match_the_published_model() {
     for (turbidity, ground, sun, elevation, azimuth, expected) in [
@@ -51,8 +52,8 @@ fn radiances_match_the_published_model() {
     }
 }
 
-/// The means are the authors' spectral tables of the sun, integrated in double precision with the CIE color
-/// matching functions. The limb darkening belongs to the spectrum at 60° and turbidity 2.
+/// The expected means are the authors' spectral tables of the sun, integrated in double precision with the
+/// CIE color matching functions. The expected limb darkening is for the spectrum at 60° and turbidity 2.
 #[test]
 fn sun_matches_the_published_model() {
     for (turbidity, degrees, expected) in [
@@ -66,7 +67,7 @@ fn sun_matches_the_published_model() {
     }
     let parameters = parameters(2.0, 60.0, [0.3; 3]);
     let (light, to_sun) = sun_light(&parameters);
-    // At μ = ½, the sine of the angle is √¾ of the edge's.
+    // At μ = ½, the sine of the angle is √¾ of its value at the edge.
     let edge = parameters.sun_angle / 2.0 * 0.75_f64.sqrt();
     let [center, half] = [0.0, edge].map(|angle| light.radiance(turned(to_sun, angle).as_vec3()));
     assert_near("center", center, [25_503.58, 21_688.71, 17_490.31], 2e-3);
@@ -110,7 +111,8 @@ fn sun_irradiance_is_radiance_times_solid_angle() {
                 / f64::from(rings * sectors);
             (sum, horizontal) = (sum + part, horizontal + part * at.y);
         }
-        // The irradiance of a disk of any size is the same, except that the radiance changes with the height.
+        // The irradiance does not depend on the size of the disk, except that the radiance varies with
+        // height.
         let tolerance = if degrees > 1.0 { 4e-3 } else { 1e-4 };
         assert_near(&format!("{degrees}"), (sum * 2.0).as_vec3(), model.to_array(), tolerance);
         assert_near("irradiance", light.irradiance, sum.to_array(), 1e-3);
@@ -143,8 +145,8 @@ fn horizon_hides_the_lower_part_of_the_sun() {
     assert!((f64::from(hidden) / f64::from(count) - expected).abs() < 4.0 * error, "{hidden} of {count}");
 }
 
-/// Integrates a function of direction over the sky with the midpoint rule. The square root in the height makes
-/// the radiance smooth at the horizon.
+/// Integrates a function of direction over the sky with the midpoint rule. The substitution for the height
+/// makes the integrand smooth at the horizon.
 fn over_sky(function: impl Fn(Vec3) -> DVec3) -> DVec3 {
     let [columns, rows] = [200, 400];
     let mut sum = DVec3::ZERO;

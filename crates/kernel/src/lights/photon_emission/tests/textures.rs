@@ -26,7 +26,7 @@ fn texture(width: u32, height: u32, filter: TextureFilter) -> Arc<Texture> {
 /// A light with a texture.
 fn textured(light: AreaLight, texture: &Arc<Texture>, chart: UvMapping) -> Light {
     Light::Area(AreaLight {
-        texture: EmissionModulation::new(Some(texture), None, chart).map(Box::new),
+        modulation: EmissionModulation::new(Some(texture), None, chart).map(Box::new),
         ..light
     })
 }
@@ -105,7 +105,7 @@ fn mesh_emission_matches_light_sampling() {
             side: Side::Front,
             shape: Emitter::Mesh(mesh),
             radiance: COLOR,
-            texture: None,
+            modulation: None,
             object: OBJECT,
             part: EmittingTriangleSelection::Listed,
             bounds,

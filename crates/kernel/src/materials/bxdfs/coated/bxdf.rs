@@ -11,7 +11,7 @@ use crate::math::lanes::Mask;
 use crate::math::soa::Soa;
 use glimt_base::soa;
 
-/// A layer and its base: a coat over the lobes of a material, or their values for a view direction.
+/// A layer over a base: a coat over the lobes of a material, or the view terms of both.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct LayerOver<L, B> {
     layer: L,
@@ -55,7 +55,7 @@ impl<L: Soa, B: Soa> Soa for LayerOver<L, B> {
 pub type CoatedBxdf<B> = LayerOver<ClearCoat, B>;
 
 soa! {
-    /// A clear coat, and the light that it reflects back to its base.
+    /// A clear coat, and the interreflection with its base.
     pub struct ClearCoat in ClearCoatPacket {
         /// The coat.
         coat: ClearCoatLayer = ClearCoatLayer::default(),
@@ -73,21 +73,21 @@ soa! {
         normal: Vec3 = Vec3::Z,
         /// Unit direction to the viewer, mirrored to the lit side for transmitted light.
         wo: Vec3 = Vec3::Z,
-        /// Fraction of the light that the coat transmits toward the viewer, without absorption.
+        /// Fraction of light that the coat transmits toward the viewer, excluding absorption.
         transmittance: f32 = 1.0,
         /// Length of the path through the layer toward the viewer.
         path_length: f32 = 1.0,
         /// Probability of choosing the coat's lobe.
-        share: f32 = 0.0,
+        coat_probability: f32 = 0.0,
         /// Probability of choosing a narrow lobe if the base is chosen.
-        base_narrow_share: f32 = 1.0,
+        base_narrow_lobe_probability: f32 = 1.0,
     }
 }
 
 /// Set if a coat absorbs light.
 const ABSORBS: BxdfFlags = BxdfFlags(1 << 31);
 
-/// How a random number chooses between the coat and the base.
+/// Probabilities for the choice between the coat and the base.
 struct LobeChoice {
     /// Probability of choosing the coat.
     coat: f32,
@@ -96,16 +96,16 @@ struct LobeChoice {
 }
 
 impl LobeChoice {
-    /// The probabilities for these lobes.
+    /// The probabilities if `lobes` are sampled.
     #[inline(always)]
     fn new(view: &CoatViewTerms, lobes: LobesToSample) -> Self {
-        let base = 1.0 - view.share;
+        let base = 1.0 - view.coat_probability;
         match lobes {
-            LobesToSample::All => Self { coat: view.share, base },
+            LobesToSample::All => Self { coat: view.coat_probability, base },
             LobesToSample::Narrow => {
-                let narrow = base * view.base_narrow_share;
-                let all = (view.share + narrow).max(f32::MIN_POSITIVE);
-                Self { coat: view.share / all, base: narrow / all }
+                let narrow = base * view.base_narrow_lobe_probability;
+                let all = (view.coat_probability + narrow).max(f32::MIN_POSITIVE);
+                Self { coat: view.coat_probability / all, base: narrow / all }
             }
         }
     }
@@ -119,7 +119,7 @@ impl<B: Bxdf> CoatedBxdf<B> {
         (cosine, self.layer.coat.albedo(nonnegative_cosine(cosine)))
     }
 
-    /// The coat's transmittance in both directions, or 0 for light from behind.
+    /// Transmittance of the coat, in and out together, or 0 for light from behind.
     #[inline(always)]
     fn two_way_transmittance(&self, view: &CoatViewTerms, wi: Vec3, any: BxdfFlags) -> Vec3 {
         let (cosine, albedo) = self.light_cosine_and_albedo(view, wi);
@@ -175,8 +175,8 @@ impl<B: Bxdf> Bxdf for CoatedBxdf<B> {
             wo,
             transmittance: 1.0 - albedo,
             path_length: self.layer.coat.path_length(cosine),
-            share: albedo / (albedo + below).max(f32::MIN_POSITIVE),
-            base_narrow_share: self.base.narrow_share(&base),
+            coat_probability: albedo / (albedo + below).max(f32::MIN_POSITIVE),
+            base_narrow_lobe_probability: self.base.narrow_lobe_probability(&base),
         };
         LayerOver { layer, base }
     }
@@ -221,11 +221,11 @@ impl<B: Bxdf> Bxdf for CoatedBxdf<B> {
     ) -> Vec3 {
         let CoatViewTerms { normal, wo, .. } = view.layer;
         let LobeChoice { coat, base } = LobeChoice::new(&view.layer, from.lobes);
-        // Reuse the random number for the choice among the base's lobes.
+        // Remap the random number to choose among the base's lobes.
         let rest = (choice - coat) / base.max(f32::MIN_POSITIVE);
         let rest = nonnegative_cosine(rest).min(1.0 - f32::EPSILON);
         let below = self.base.sample(&view.base, from, [rest, u[0], u[1]], any);
-        // If the path continues on the other side, this direction is not used.
+        // This direction is unused if the path continues on the other side.
         let coated = if B::IS_TRANSMISSION { -normal } else { self.layer.coat.sample(normal, wo, u) };
         choose_vec3_by_bool(choice < coat, coated, below)
     }

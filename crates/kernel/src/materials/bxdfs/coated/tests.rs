@@ -88,8 +88,8 @@ fn reference_albedo(alpha: f32, cosine: f64) -> f64 {
     light.sum::<f64>() / f64::from(SIDE * SIDE)
 }
 
-/// Checks values against the formula of the coat applied to the values of the base without coat. `returned`
-/// are the reflectances of the wide and narrow lobes for light that the coat reflects back down.
+/// Compares values with the coat's formula applied to the values of the bare base. `returned` contains the
+/// reflectances of the wide and narrow lobes for light that the coat reflects back down.
 fn check_coat_formula<B: Bxdf>(what: &str, base: &B::Point, returned: [Vec3; 2])
 where
     B::Point: Copy,
@@ -148,7 +148,7 @@ fn values_match_the_formulas_and_are_reciprocal() {
 }
 
 #[test]
-fn tint_is_the_transmittance_in_and_out_at_normal_incidence() {
+fn tint_is_round_trip_transmittance() {
     let [bare, tinted] = [Vec3::ONE, TINT].map(|tint| {
         let point = coated(phong(Vec3::ONE, 0.0, 1.0), 1.0, 0.3, 1.5, tint);
         let surface = TestSurface::<CoatedBxdf<PhongBxdf>>::new(&point, [0.3; 2], DVec3::Z);
@@ -198,8 +198,7 @@ fn albedos_over_white_match_quadrature() {
 fn check_sampling<B: Bxdf>(what: &str, base: impl Fn(f32) -> B::Point) {
     for (alpha, cosine) in [0.02, 0.3].into_iter().flat_map(|alpha| [0.15, 0.8].map(|cosine| (alpha, cosine)))
     {
-        // The base has a different roughness, so samples from different lobes cannot be mistaken for each
-        // other.
+        // Give the base a different roughness, so that mixing up samples of the two lobes fails the test.
         let point = coated(base(0.7 * alpha), 0.8, alpha, 1.6, TINT);
         let at = spherical_direction(cosine, 0.7);
         let subject = TestSurface::<CoatedBxdf<B>>::new(&point, [alpha; 2], at);

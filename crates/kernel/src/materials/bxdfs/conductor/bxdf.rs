@@ -36,10 +36,10 @@ soa! {
 }
 
 /// Set if the conductor has an index of refraction instead of a color.
-const INDEX: BxdfFlags = BxdfFlags(1 << BxdfFlags::FIRST_OWN);
+const HAS_INDEX: BxdfFlags = BxdfFlags(1 << BxdfFlags::FIRST_OWN);
 
 impl<const BRUSHED: bool, const BECKMANN: bool> ConductorBxdf<BRUSHED, BECKMANN> {
-    const DISTRIBUTION: MicrofacetDistribution = MicrofacetDistribution::beckmann_if(BECKMANN);
+    const DISTRIBUTION: MicrofacetDistribution = MicrofacetDistribution::ggx_or_beckmann(BECKMANN);
 
     #[inline(always)]
     fn frame(view: &ConductorViewTerms) -> Frame {
@@ -70,7 +70,7 @@ impl<const BRUSHED: bool, const BECKMANN: bool> Bxdf for ConductorBxdf<BRUSHED, 
     type View = ConductorViewTerms;
 
     const ALWAYS: BxdfFlags = BxdfFlags::NARROW;
-    const SPLITS_NARROW: BxdfFlags = INDEX;
+    const SPLITS_NARROW: BxdfFlags = HAS_INDEX;
 
     #[inline(always)]
     fn new(point: &ConductorPoint, tangent: Vec3) -> Self {
@@ -85,7 +85,7 @@ impl<const BRUSHED: bool, const BECKMANN: bool> Bxdf for ConductorBxdf<BRUSHED, 
 
     #[inline(always)]
     fn flags(&self) -> BxdfFlags {
-        INDEX.when(self.second.x >= 0.0)
+        HAS_INDEX.when(self.second.x >= 0.0)
     }
 
     #[inline(always)]
@@ -106,7 +106,7 @@ impl<const BRUSHED: bool, const BECKMANN: bool> Bxdf for ConductorBxdf<BRUSHED, 
         let white = eye.torrance_sparrow_without_fresnel(&light, distribution);
         let cosine = half.cosine_to_either_direction();
         let weight = schlick_weight(cosine);
-        let f = if any.contains(INDEX) {
+        let f = if any.contains(HAS_INDEX) {
             let (first, second) = (self.first, self.second);
             Vec3::new(
                 white * reflectance(first.x, second.x, cosine, weight),

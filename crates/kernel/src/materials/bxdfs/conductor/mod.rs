@@ -75,8 +75,8 @@ impl FresnelPoint {
     /// Uses the exact equations, with a complex index of refraction. The index is limited to 1e8, where
     /// metals reflect all light, because the fourth power of a larger value would overflow.
     pub fn from_complex_ior(eta: Vec3, k: Vec3) -> Self {
-        const MOST: Vec3 = Vec3::splat(1e8);
-        Self { first: eta.min(MOST), second: k.min(MOST) }
+        const MAX_INDEX: Vec3 = Vec3::splat(1e8);
+        Self { first: eta.min(MAX_INDEX), second: k.min(MAX_INDEX) }
     }
 
     /// Multiplies the color by `color`. Indices of refraction are not colors and stay unchanged.

@@ -121,7 +121,7 @@ impl Bxdf for PhongBxdf {
     }
 
     #[inline(always)]
-    fn narrow_share(&self, _: &PhongViewTerms) -> f32 {
+    fn narrow_lobe_probability(&self, _: &PhongViewTerms) -> f32 {
         self.albedos[1] / (self.albedos[0] + self.albedos[1]).max(f32::MIN_POSITIVE)
     }
 

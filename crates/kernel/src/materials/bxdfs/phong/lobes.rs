@@ -29,7 +29,7 @@ impl PhongLobes {
     /// are in [0, 1).
     #[inline(always)]
     pub fn sample(&self, lobe: f32, u: [f32; 2]) -> Vec3 {
-        let is_diffuse = lobe < self.diffuse_share();
+        let is_diffuse = lobe < self.diffuse_probability();
         let rest = 1.0 - u[0];
         // For the glossy lobe, the cosine is (1 − u)^(1/(α + 1)). It is computed in `f64` because the sine
         // would otherwise be inaccurate for narrow lobes.
@@ -55,7 +55,7 @@ impl PhongLobes {
         let cosine = self.normal.dot(direction);
         let diffuse = if cosine > 0.0 { cosine * FRAC_1_PI } else { 0.0 };
         let glossy = (self.shininess + 1.0) * (0.5 * FRAC_1_PI) * gloss;
-        let share = self.diffuse_share();
+        let share = self.diffuse_probability();
         share * diffuse + (1.0 - share) * glossy
     }
 
@@ -67,7 +67,7 @@ impl PhongLobes {
 
     /// Probability of choosing the diffuse lobe.
     #[inline(always)]
-    fn diffuse_share(&self) -> f32 {
+    fn diffuse_probability(&self) -> f32 {
         self.diffuse / (self.diffuse + self.specular)
     }
 }

@@ -38,19 +38,19 @@ soa! {
         /// Fraction of the light that the coat transmits toward the viewer.
         transmittance: f32 = 1.0,
         /// Probability of choosing the coat's lobe.
-        coat_share: f32 = 0.0,
+        coat_probability: f32 = 0.0,
     }
 }
 
 /// Set if the coat is smooth.
-const SMOOTH: BxdfFlags = BxdfFlags(1 << BxdfFlags::FIRST_OWN);
+const HAS_SMOOTH_COAT: BxdfFlags = BxdfFlags(1 << BxdfFlags::FIRST_OWN);
 
 impl<const BECKMANN: bool> PlasticBxdf<BECKMANN> {
     /// Albedo of the coat at a cosine ≥ 0.
     #[inline(always)]
     fn coat_albedo(&self, cosine: f32, any: BxdfFlags) -> f32 {
         let rough = self.coat.albedo(cosine);
-        if any.contains(SMOOTH) {
+        if any.contains(HAS_SMOOTH_COAT) {
             let smooth = self.coat.fresnel(cosine);
             if self.alpha == 0.0 { smooth } else { rough }
         } else {
@@ -88,7 +88,7 @@ impl<const BECKMANN: bool> Bxdf for PlasticBxdf<BECKMANN> {
 
     #[inline(always)]
     fn flags(&self) -> BxdfFlags {
-        BxdfFlags::NARROW.when(self.alpha > 0.0).union(SMOOTH.when(self.alpha == 0.0))
+        BxdfFlags::NARROW.when(self.alpha > 0.0).union(HAS_SMOOTH_COAT.when(self.alpha == 0.0))
     }
 
     #[inline(always)]
@@ -102,8 +102,8 @@ impl<const BECKMANN: bool> Bxdf for PlasticBxdf<BECKMANN> {
         let albedo = self.coat_albedo(nonnegative_cosine(normal.dot(wo)), any);
         let diffuse = (1.0 - albedo) * (1.0 - self.mean) * PI * self.base.max_element();
         let coat = albedo * self.specular.max_element();
-        let coat_share = coat / (coat + diffuse).max(f32::MIN_POSITIVE);
-        PlasticViewTerms { normal, wo, transmittance: 1.0 - albedo, coat_share }
+        let coat_probability = coat / (coat + diffuse).max(f32::MIN_POSITIVE);
+        PlasticViewTerms { normal, wo, transmittance: 1.0 - albedo, coat_probability }
     }
 
     #[inline(always)]
@@ -135,7 +135,7 @@ impl<const BECKMANN: bool> Bxdf for PlasticBxdf<BECKMANN> {
         }
         let diffuse = nonnegative_cosine(normal.dot(wi)) * FRAC_1_PI;
         match lobes {
-            LobesToSample::All => view.coat_share * coat + (1.0 - view.coat_share) * diffuse,
+            LobesToSample::All => view.coat_probability * coat + (1.0 - view.coat_probability) * diffuse,
             LobesToSample::Narrow => coat,
         }
     }
@@ -154,15 +154,15 @@ impl<const BECKMANN: bool> Bxdf for PlasticBxdf<BECKMANN> {
         }
         let coat = self.coat.sample(view.normal, view.wo, u);
         let is_coat = match lobes {
-            LobesToSample::All => choice < view.coat_share,
+            LobesToSample::All => choice < view.coat_probability,
             LobesToSample::Narrow => self.alpha > 0.0,
         };
         choose_vec3_by_bool(is_coat, coat, diffuse)
     }
 
     #[inline(always)]
-    fn narrow_share(&self, view: &PlasticViewTerms) -> f32 {
-        view.coat_share
+    fn narrow_lobe_probability(&self, view: &PlasticViewTerms) -> f32 {
+        view.coat_probability
     }
 
     #[inline(always)]

@@ -20,7 +20,7 @@ use crate::math::Vec3;
 pub use bxdf::PlasticBxdf;
 
 /// A diffuse base under a coat. If the coat is smooth, this type contains only the base. See
-/// [`crate::materials::Coated`].
+/// [`crate::materials::SpecularOverBase`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plastic {
     diffuse: ColorOrTexture,

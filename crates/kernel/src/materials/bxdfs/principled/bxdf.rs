@@ -56,11 +56,11 @@ soa! {
         /// viewer.
         transmittance: Vec3 = Vec3::ONE,
         /// Probability of choosing the specular lobe.
-        specular_share: f32 = 1.0,
+        specular_probability: f32 = 1.0,
         /// Probability of choosing specular transmission.
-        transmission_share: f32 = 0.0,
+        transmission_probability: f32 = 0.0,
         /// Probability of choosing diffuse transmission.
-        diffuse_transmission_share: f32 = 0.0,
+        diffuse_transmission_probability: f32 = 0.0,
     }
 }
 
@@ -154,9 +154,9 @@ impl<const THROUGH: bool> Bxdf for PrincipledBxdf<THROUGH> {
             normal,
             wo,
             transmittance,
-            specular_share: by_albedo * specular,
-            transmission_share: by_albedo * transmission,
-            diffuse_transmission_share: by_albedo * through,
+            specular_probability: by_albedo * specular,
+            transmission_probability: by_albedo * transmission,
+            diffuse_transmission_probability: by_albedo * through,
         }
     }
 
@@ -193,20 +193,23 @@ impl<const THROUGH: bool> Bxdf for PrincipledBxdf<THROUGH> {
         _: f32,
         _: BxdfFlags,
     ) -> f32 {
-        let PrincipledViewTerms { specular_share, transmission_share, .. } = *view;
+        let PrincipledViewTerms { specular_probability, transmission_probability, .. } = *view;
         let half = UnnormalizedHalfVector::from_reflection(view.normal, view.wo, wi);
         let [eye, light] = self.view_and_light_smith_terms(view, wi);
         let pdf = eye.reflection_pdf(half.isotropic_d(GGX, self.alpha));
         let specular = if light.is_direction_above_surface() { pdf } else { 0.0 };
-        let narrow = if THROUGH { transmission_share * specular } else { specular_share * specular };
+        let narrow =
+            if THROUGH { transmission_probability * specular } else { specular_probability * specular };
         match lobes {
             LobesToSample::All => {
-                let through = view.diffuse_transmission_share;
-                let reflected = 1.0 - specular_share - transmission_share - through;
-                let diffuse_share = if THROUGH { through } else { reflected };
-                narrow + diffuse_share * nonnegative_cosine(normal.dot(wi)) * FRAC_1_PI
+                let through = view.diffuse_transmission_probability;
+                let reflected = 1.0 - specular_probability - transmission_probability - through;
+                let diffuse_probability = if THROUGH { through } else { reflected };
+                narrow + diffuse_probability * nonnegative_cosine(normal.dot(wi)) * FRAC_1_PI
             }
-            LobesToSample::Narrow => narrow / (specular_share + transmission_share).max(f32::MIN_POSITIVE),
+            LobesToSample::Narrow => {
+                narrow / (specular_probability + transmission_probability).max(f32::MIN_POSITIVE)
+            }
         }
     }
 
@@ -218,20 +221,21 @@ impl<const THROUGH: bool> Bxdf for PrincipledBxdf<THROUGH> {
         [choice, u @ ..]: [f32; 3],
         _: BxdfFlags,
     ) -> Vec3 {
-        let PrincipledViewTerms { specular_share, transmission_share, .. } = *view;
+        let PrincipledViewTerms { specular_probability, transmission_probability, .. } = *view;
         let choice = match lobes {
             LobesToSample::All => choice,
-            LobesToSample::Narrow => choice * (specular_share + transmission_share),
+            LobesToSample::Narrow => choice * (specular_probability + transmission_probability),
         };
         // The lobes are in this order: specular, diffuse, diffuse transmission, specular transmission.
         let (last, diffuse_through) = match lobes {
-            LobesToSample::All => (1.0 - transmission_share, view.diffuse_transmission_share),
-            LobesToSample::Narrow => (specular_share, 0.0),
+            LobesToSample::All => (1.0 - transmission_probability, view.diffuse_transmission_probability),
+            LobesToSample::Narrow => (specular_probability, 0.0),
         };
-        let is_through = (transmission_share + diffuse_through > 0.0) & (choice >= last - diffuse_through);
+        let is_through =
+            (transmission_probability + diffuse_through > 0.0) & (choice >= last - diffuse_through);
         let is_wide = match lobes {
             LobesToSample::All if THROUGH => choice < last,
-            LobesToSample::All => choice >= specular_share,
+            LobesToSample::All => choice >= specular_probability,
             LobesToSample::Narrow => false,
         };
         let narrow = sample_reflection(GGX, &Frame::from_normal(view.normal), view.wo, [self.alpha; 2], u);
@@ -241,8 +245,8 @@ impl<const THROUGH: bool> Bxdf for PrincipledBxdf<THROUGH> {
     }
 
     #[inline(always)]
-    fn narrow_share(&self, view: &PrincipledViewTerms) -> f32 {
-        view.specular_share + view.transmission_share
+    fn narrow_lobe_probability(&self, view: &PrincipledViewTerms) -> f32 {
+        view.specular_probability + view.transmission_probability
     }
 
     #[inline(always)]

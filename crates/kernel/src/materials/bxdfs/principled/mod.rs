@@ -61,7 +61,7 @@ pub struct PrincipledPoint {
     pub base: Vec3,
     /// [`PrincipledPoint::base`] for light from the other side.
     pub transmitted_base: Vec3,
-    /// The largest components of the albedos of these two lobes, not including the lobes above them.
+    /// Largest components of the albedos of these two lobes, without attenuation by the lobes above them.
     pub diffuse_albedos: [f32; 2],
     /// Reflectance of the specular lobe at normal incidence.
     pub facets: Vec3,

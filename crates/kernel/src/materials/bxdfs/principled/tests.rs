@@ -198,7 +198,7 @@ fn transmission_is_the_mirrored_specular_lobe() {
 }
 
 #[test]
-fn diffuse_transmission_is_coupled_like_the_diffuse_lobe() {
+fn diffuse_lobes_are_attenuated_alike() {
     for (alpha, metallic) in subjects().filter(|one| one.1 < 1.0) {
         let point = point(&leaf(RED, metallic, 0.3, alpha));
         let at = spherical_direction(0.6, 0.7);
@@ -277,7 +277,7 @@ fn two_sided_albedos_match_quadrature() {
         let leaf = leaf(RED, metallic, 0.3, alpha);
         [(one, "clear", clear(0.6)), (one, "clear", clear(1.0)), (one, "leaf", leaf)]
     });
-    // Leaves need many samples, because they have four lobes.
+    // Leaves have four lobes, so they need many samples.
     let is_tested = |alpha: f32, name: &str| name != "leaf" || [0.02, 0.2, 1.0].contains(&alpha);
     for ((alpha, metallic), transmission, material) in
         materials.filter(|((alpha, ..), name, _)| is_tested(*alpha, name))

@@ -52,7 +52,7 @@ pub struct DielectricSample {
 }
 
 impl<const THROUGH: bool, const BECKMANN: bool> DielectricBxdf<THROUGH, BECKMANN> {
-    const DISTRIBUTION: MicrofacetDistribution = MicrofacetDistribution::beckmann_if(BECKMANN);
+    const DISTRIBUTION: MicrofacetDistribution = MicrofacetDistribution::ggx_or_beckmann(BECKMANN);
 
     /// Smith terms for the directions to the viewer and to the light. Each direction uses the normal on its
     /// side.

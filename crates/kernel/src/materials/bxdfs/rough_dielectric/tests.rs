@@ -76,7 +76,7 @@ fn exact_reflectance(cosine: f64, eta: f64) -> f64 {
 }
 
 /// Returns a pair of directions. The second one is either near the lobe's peak or arbitrary.
-fn ways(
+fn random_directions(
     next: &mut impl FnMut() -> f32,
     point: &RoughDielectricPoint,
     is_near: bool,
@@ -114,7 +114,9 @@ fn check_transmission<const BECKMANN: bool>() {
         let least = f64::from((1.5 - 1.0_f32).min((indices[0] - indices[1]).abs()));
         let (reciprocity, error) = if alpha >= 0.05 { (1e-5, 3e-5) } else { (1e-3, 4e-3) };
         for trial in 0..400 {
-            let (to_eye, Some(light)) = ways(&mut next, &point, trial % 2 == 0) else { continue };
+            let (to_eye, Some(light)) = random_directions(&mut next, &point, trial % 2 == 0) else {
+                continue;
+            };
             if light.z > -0.02 {
                 continue;
             }

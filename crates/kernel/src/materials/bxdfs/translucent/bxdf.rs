@@ -20,7 +20,7 @@ soa! {
         /// f of transmitted light in sr⁻¹.
         transmission: Vec3 = Vec3::ZERO,
         /// Probability that a path continues on the other side.
-        transmission_share: f32 = 0.0,
+        transmission_probability: f32 = 0.0,
     }
 }
 
@@ -40,7 +40,7 @@ impl<const THROUGH: bool> Bxdf for TranslucentBxdf<THROUGH> {
         Self {
             reflection: PhongBxdf::new(&point.reflection, tangent),
             transmission: point.transmission_f(),
-            transmission_share: point.transmission_share(),
+            transmission_probability: point.transmission_probability(),
         }
     }
 
@@ -77,11 +77,11 @@ impl<const THROUGH: bool> Bxdf for TranslucentBxdf<THROUGH> {
     fn pdf(&self, view: &PhongViewTerms, from: SampledLobes, wi: Vec3, shape: f32, any: BxdfFlags) -> f32 {
         if THROUGH {
             let cosine = from.normal.dot(wi);
-            return self.transmission_share * if cosine > 0.0 { cosine * FRAC_1_PI } else { 0.0 };
+            return self.transmission_probability * if cosine > 0.0 { cosine * FRAC_1_PI } else { 0.0 };
         }
         let reflected = self.reflection.pdf(view, from, wi, shape, any);
         match from.lobes {
-            LobesToSample::All => (1.0 - self.transmission_share) * reflected,
+            LobesToSample::All => (1.0 - self.transmission_probability) * reflected,
             LobesToSample::Narrow => reflected,
         }
     }
@@ -95,7 +95,7 @@ impl<const THROUGH: bool> Bxdf for TranslucentBxdf<THROUGH> {
         any: BxdfFlags,
     ) -> Vec3 {
         let reflected_share = match from.lobes {
-            LobesToSample::All => 1.0 - self.transmission_share,
+            LobesToSample::All => 1.0 - self.transmission_probability,
             LobesToSample::Narrow => 1.0,
         };
         let wi = if THROUGH {
@@ -103,13 +103,13 @@ impl<const THROUGH: bool> Bxdf for TranslucentBxdf<THROUGH> {
         } else {
             self.reflection.sample(view, from, [choice / reflected_share, u[0], u[1]], any)
         };
-        // If the path continues on the other side, this direction is not used.
+        // This direction is unused if the path continues on the other side.
         choose_vec3_by_bool((choice >= reflected_share) == THROUGH, wi, -from.normal)
     }
 
     #[inline(always)]
-    fn narrow_share(&self, view: &PhongViewTerms) -> f32 {
-        (1.0 - self.transmission_share) * self.reflection.narrow_share(view)
+    fn narrow_lobe_probability(&self, view: &PhongViewTerms) -> f32 {
+        (1.0 - self.transmission_probability) * self.reflection.narrow_lobe_probability(view)
     }
 
     #[inline(always)]

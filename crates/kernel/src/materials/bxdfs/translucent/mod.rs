@@ -1,6 +1,6 @@
-//! Phong surfaces that also transmit light diffusely, like leaves and paper: f = kt/π for light from the other
-//! side. A surface is represented by two vertices, see [`bsdf`](crate::materials::bsdf). The side on which a
-//! path continues is chosen by albedo.
+//! Phong surfaces that also transmit light diffusely, such as leaves and paper: f = kt/π for light from the
+//! other side. Each interaction has two vertices, one per side; see [`bsdf`](crate::materials::bsdf). The
+//! side on which a path continues is chosen in proportion to the albedos.
 
 mod bxdf;
 
@@ -44,7 +44,7 @@ impl TranslucentPoint {
     }
 
     /// Probability that a path continues on the other side.
-    fn transmission_share(&self) -> f32 {
+    fn transmission_probability(&self) -> f32 {
         let PhongBsdf { diffuse, specular, .. } = self.reflection;
         let through = self.transmission.max_element();
         let all = diffuse.max_element() + specular.max_element() + through;

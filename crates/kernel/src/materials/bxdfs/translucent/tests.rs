@@ -27,12 +27,12 @@ fn points() -> Vec<TranslucentPoint> {
     vec![point(0.0, 1.0, 0.4), glossy(1.0), glossy(40.0), glossy(1e4), point(0.3, 40.0, 0.0)]
 }
 
-/// The reflection and the transmission of a surface that is seen from a direction.
+/// Reflection and transmission of a surface seen from a direction.
 fn sides(
     point: &TranslucentPoint,
     to_eye: DVec3,
 ) -> (TestSurface<TranslucentBxdf<false>>, TestSurface<TranslucentBxdf<true>>) {
-    // The width of the lobe matters only for placing directions.
+    // The width of the lobe affects only the placement of directions.
     let alphas = [(2.0 / (point.reflection.shininess + 2.0)).sqrt(); 2];
     let reflection = TestSurface::new(point, alphas, to_eye);
     (reflection, TestSurface::with_light_path(point, [1.0; 2], to_eye, NarrowLightPath::Through))
@@ -94,7 +94,7 @@ fn paths_continue_on_exactly_one_side() {
         let (reflection, transmission) = sides(&point, spherical_direction(0.5, 0.3));
         let up = reflection.sample_directions(LobesToSample::All, 32);
         let down = transmission.sample_directions(LobesToSample::All, 32);
-        // The unused side returns a direction into the surface.
+        // On the unused side, the direction points into the surface.
         for (up, down) in up.into_iter().zip(down) {
             assert!((up == DVec3::NEG_Z) != (down == DVec3::Z), "{point:?}: {up} {down}");
         }

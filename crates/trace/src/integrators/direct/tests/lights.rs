@@ -153,8 +153,8 @@ fn map_radiance(wi: DVec3) -> f64 {
     mix(row(j), row(j + 1.0), y - j)
 }
 
-/// Red radiance of a clear sky for turbidity 4.5, a ground of 0.3 and a sun at `to_sun`, 49.64° above the horizon:
-/// the formula of the model in double precision, with coefficients interpolated by another program.
+/// Red radiance of a clear sky with turbidity 4.5, ground albedo 0.3 and a sun at `to_sun`, 49.64° above the
+/// horizon: the model's formula in double precision, with coefficients interpolated with another program.
 fn sky_radiance(wi: DVec3, to_sun: DVec3) -> f64 {
     let [a, b, c, d] = [-1.068_645_616, -0.174_808_747_3, 1.224_898_61, 0.849_509_240_3];
     let [e, f, g] = [-1.565_644_306, 0.680_961_037_5, 0.303_281_047_9];
@@ -166,15 +166,15 @@ fn sky_radiance(wi: DVec3, to_sun: DVec3) -> f64 {
     (1.0 + a * (b / (wi.y + 0.01)).exp()) * glow * mean
 }
 
-/// Red radiance of the sun in [`sky_radiance`], widened to 40°: the mean radiance of the model at the lowest and
-/// highest point of the disk, and its limb darkening.
+/// Red radiance of the sun in [`sky_radiance`], widened to 40°: the model's mean radiance at the lowest and
+/// highest points of the disk, and its limb darkening.
 fn sun_radiance(wi: DVec3, to_sun: DVec3) -> f64 {
     let half = |degrees: f64| (degrees / 2.0).to_radians();
     let [from, to] = [19_452.294_1, 19_478.470_2];
     let elevation = to_sun.normalize().y.asin();
     let [bottom, top] = [elevation - half(40.0), elevation + half(40.0)].map(f64::sin);
     let widened = ((half(0.5338) / 2.0).sin() / (half(40.0) / 2.0).sin()).powi(2);
-    // The distance from the center of the disk in radii, as a ratio of chords.
+    // Distance from the center of the disk, in radii, as a ratio of chords.
     let distance = (wi.angle_between(to_sun) / 2.0).sin() / (half(40.0) / 2.0).sin();
     let mu = (1.0 - distance * distance).max(0.0).sqrt();
     let limb = [0.670_615, -2.242_908, 3.041_141, -2.291_01, 1.627_701, 0.399_946];

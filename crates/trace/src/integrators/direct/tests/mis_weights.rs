@@ -34,7 +34,7 @@ fn assert_complementary_weights(what: &str, scene: &LitScene, shadow_samples: u3
         // In this case, only BSDF samples account for the environment.
         let is_skipped = tile.paths_find_sky && light.is_environment();
         let u: [[f32; PACKET_SIZE]; 2] = [(); 2].map(|()| [(); PACKET_SIZE].map(|()| random.unit_f32()));
-        let samples = light.sample_untextured_packet(&row.from, &row.normal, row.used, &u);
+        let samples = light.sample_unmodulated_packet(&row.from, &row.normal, row.used, &u);
         let response = row.evaluate_bsdf_and_cosines(&samples.directions, PortableSimd);
         let pdfs =
             row.bsdf.pdf(LobesToSample::All, &row.normal, &samples.directions, &response.bsdf, PortableSimd);

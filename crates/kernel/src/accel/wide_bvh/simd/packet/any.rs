@@ -37,10 +37,10 @@ pub fn any_hit_if_coherent<V: SimdVector>(
         match Child::decode(code) {
             Child::Inner(index) => {
                 let node = &tree.nodes[index as usize];
-                let (_, mut met) = frustum.box_entries(node, like8.splat_like(end));
-                while met != 0 {
-                    let slot = met.trailing_zeros() as usize % 8;
-                    met &= met - 1;
+                let (_, mut hit_boxes) = frustum.box_entries(node, like8.splat_like(end));
+                while hit_boxes != 0 {
+                    let slot = hit_boxes.trailing_zeros() as usize % 8;
+                    hit_boxes &= hit_boxes - 1;
                     prefetch_child_start(tree, node.children[slot]);
                     stack.push_if(node.children[slot], packet.any_ray_hits_box(node, slot, t_max * pad));
                 }

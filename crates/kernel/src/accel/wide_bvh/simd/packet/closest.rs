@@ -39,8 +39,8 @@ pub fn closest_hit_if_coherent<V: SimdVector>(
         match Child::decode(key as u32) {
             Child::Inner(index) => {
                 let node = &tree.nodes[index as usize];
-                let (near, met) = frustum.box_entries(node, like8.splat_like(end));
-                push_children_ordered(tree, node, near, met, &mut stack, &packet, best.t * pad);
+                let (near, hit_boxes) = frustum.box_entries(node, like8.splat_like(end));
+                push_children_ordered(tree, node, near, hit_boxes, &mut stack, &packet, best.t * pad);
             }
             Child::Leaf { first, count } => {
                 let mut any = 0;
@@ -68,14 +68,14 @@ fn push_children_ordered<V: SimdVector>(
     tree: &WideBvh,
     node: &WideNode,
     near: SimdF32x8,
-    met: u32,
+    hit_boxes: u32,
     stack: &mut Stack<u64>,
     packet: &SimdRayPacket<V>,
     end: V,
 ) {
     let mut entries = [0.0_f32; 8];
     near.store(&mut entries);
-    let (mut rest, mut pushed) = (met, 0);
+    let (mut rest, mut pushed) = (hit_boxes, 0);
     while rest != 0 {
         let slot = rest.trailing_zeros() as usize % 8;
         rest &= rest - 1;

@@ -40,11 +40,11 @@ impl Frustum {
         let pad = end.splat_like(SLAB_PAD);
         let (mut near, mut far) = (end.splat_like(0.0), end);
         for axis in 0..3 {
-            let [least, greatest] = self.inverse[axis];
+            let [min, max] = self.inverse[axis];
             let to_near = end.load_slice(&node.rows[self.near[axis]]) - self.near_origin[axis];
             let to_far = end.load_slice(&node.rows[self.near[axis] ^ 1]) - self.far_origin[axis];
-            near = (to_near * least).min(to_near * greatest).max(near);
-            far = ((to_far * least).max(to_far * greatest) * pad).min(far);
+            near = (to_near * min).min(to_near * max).max(near);
+            far = ((to_far * min).max(to_far * max) * pad).min(far);
         }
         (near, SimdF32x8::movemask(near.le(far)))
     }

@@ -5,11 +5,11 @@ use crate::pipeline::protocol::{ImagePosition, PreviewUpdate};
 
 /// The displayed image, and how it is shown.
 #[derive(Default)]
-pub(crate) struct PictureState {
+pub(crate) struct PreviewState {
     pub shown: Option<PreviewUpdate>,
     pub history: RenderHistory,
     /// Center of the section shown at 1:1 scale, or `None` if the whole image is shown.
     pub close_up: Option<ImagePosition>,
     /// Whether everything but the image is hidden.
-    pub is_alone: bool,
+    pub is_image_only: bool,
 }

@@ -11,14 +11,14 @@ use glimt::scene::description::{
     ShadowMode, Shape, TextureFilter, Wrap,
 };
 
-use super::scenes::{AS_IT_IS, Build, emitter, matte, mirror, phong, plain, receiver, scene};
+use super::scenes::{Build, IDENTITY_PLACEMENT, emitter, matte, mirror, phong, plain, receiver, scene};
 use super::{assert_close, assert_mean, assert_same_mean, mean_and_error, v};
 
 fn pane(tint: f32) -> Material {
     plain(MaterialKind::Pane { ior: 1.5, tint: ColorSource::Constant(Vec3::splat(tint)) })
 }
 
-fn veiled(mut material: Material, opacity: f32) -> Material {
+fn with_opacity(mut material: Material, opacity: f32) -> Material {
     material.opacity = OpacitySource { value: NumberSource::Constant(opacity), cutoff: 0.0 };
     material
 }
@@ -46,7 +46,7 @@ fn sheet(build: Build, z: f64, degrees: f64, material: Material) -> Build {
 }
 
 /// A light that fills the background.
-fn lamp_at(build: Build, z: f64) -> Build {
+fn with_background_light(build: Build, z: f64) -> Build {
     sheet(build, z, 0.0, emitter(1.0))
 }
 
@@ -75,7 +75,9 @@ fn textured_tint_colors_transmitted_light() {
         [DVec3::new(0.9, 0.2, 0.1), DVec3::new(0.1, 0.3, 1.0)].map(|tint| tint * (1.0 - 0.08 / 1.04));
     // The light through both halves of the window.
     let window = build.quad(v(-1.0, -1.0, -2.0), v(2.0, 0.0, 0.0), v(0.0, 2.0, 0.0), stained);
-    for build in [lamp_at(window.clone(), -4.0), path(lamp_at(window.clone(), -4.0))] {
+    for build in
+        [with_background_light(window.clone(), -4.0), path(with_background_light(window.clone(), -4.0))]
+    {
         for (x, exact) in [(-0.5, left), (0.5, right)] {
             let seen = build.clone().seen(v(x, 0.0, 0.0), v(x, 0.0, -1.0)).depth(0).color();
             assert!((seen - exact).length() < 1e-5, "{seen}, expected {exact}");
@@ -112,12 +114,12 @@ fn pane_reflectance_is_exact() {
 }
 
 /// A receiver on the axis of a disk light with radius 1 at height 2. `between` adds objects between the two.
-fn under_lamp(between: impl Fn(Build) -> Build) -> Build {
+fn under_disk_light(between: impl Fn(Build) -> Build) -> Build {
     let disk = Shape::Disk { center: v(0.0, 2.0, 0.0), normal: DVec3::NEG_Y, radius: 1.0 };
     between(receiver(DVec3::ZERO, 0.7)).shape(disk, emitter(1.0))
 }
 
-fn level(build: Build, y: f64, material: Material) -> Build {
+fn with_horizontal_quad(build: Build, y: f64, material: Material) -> Build {
     build.quad(v(-9.0, y, 9.0), v(18.0, 0.0, 0.0), v(0.0, 0.0, -18.0), material)
 }
 
@@ -134,10 +136,11 @@ fn light_passes_through_panes() {
     };
     for count in [1, 3] {
         let panes = |build: Build| {
-            (0..count).fold(build, |build, i| level(build, 0.5 + 0.3 * f64::from(i), pane(0.8)))
+            (0..count)
+                .fold(build, |build, i| with_horizontal_quad(build, 0.5 + 0.3 * f64::from(i), pane(0.8)))
         };
         let exact = 0.7 * irradiance(count, 0.8) / PI;
-        let lit = under_lamp(panes).depth(1);
+        let lit = under_disk_light(panes).depth(1);
         for samples in [1, 16] {
             let values = lit.clone().shadows(ShadowMode::Soft, samples).values(256 / samples, 256);
             assert_mean(&format!("{count} panes, {samples} shadow rays"), &values, exact, 1e-6);
@@ -156,14 +159,11 @@ fn light_passes_through_panes() {
 #[test]
 fn whitted_with_photons_matches_path() {
     // Light reflected by a pane and a half-transparent mirror, including interreflections.
-    let lit = under_lamp(|build| {
-        let build = level(build, 0.5, pane(0.9));
-        build.quad(v(-1.0, 0.2, -1.0), v(2.0, 0.0, 0.0), v(0.0, 2.5, 0.0), veiled(mirror(0.9), 0.5)).quad(
-            v(-2.0, -0.1, 2.0),
-            v(4.0, 0.0, 0.0),
-            v(0.0, 0.0, -4.0),
-            veiled(matte(0.8), 0.5),
-        )
+    let lit = under_disk_light(|build| {
+        let build = with_horizontal_quad(build, 0.5, pane(0.9));
+        build
+            .quad(v(-1.0, 0.2, -1.0), v(2.0, 0.0, 0.0), v(0.0, 2.5, 0.0), with_opacity(mirror(0.9), 0.5))
+            .quad(v(-2.0, -0.1, 2.0), v(4.0, 0.0, 0.0), v(0.0, 0.0, -4.0), with_opacity(matte(0.8), 0.5))
     });
     let lit = lit.depth(4);
     let photons = mean_and_error(&lit.clone().photons(6_000, 0.04).values(16, 48));
@@ -173,15 +173,15 @@ fn whitted_with_photons_matches_path() {
 #[test]
 fn opacity_blends_surface_and_background() {
     // Radiance 4 with opacity 0.25 in front of radiance 1.
-    let seen = lamp_at(sheet(scene(), -2.0, 20.0, veiled(emitter(4.0), 0.25)), -9.0);
+    let seen = with_background_light(sheet(scene(), -2.0, 20.0, with_opacity(emitter(4.0), 0.25)), -9.0);
     for build in [seen.clone(), path(seen)] {
         assert_mean("both", &build.values(256, 64), 0.25 * 4.0 + 0.75, 1e-6);
     }
     // Black mirrors with different opacities and cutoffs.
     let cut = |opacity, cutoff| {
-        let mut material = veiled(mirror(0.0), opacity);
+        let mut material = with_opacity(mirror(0.0), opacity);
         material.opacity.cutoff = cutoff;
-        lamp_at(sheet(scene(), -2.0, 0.0, material), -9.0).value()
+        with_background_light(sheet(scene(), -2.0, 0.0, material), -9.0).value()
     };
     assert_eq!([cut(0.0, 0.0), cut(0.4, 0.5), cut(0.6, 0.5), cut(1.0, 0.0)], [1.0, 1.0, 0.0, 0.0]);
 }
@@ -191,7 +191,7 @@ fn shadows_multiply_transmittances() {
     let lit = |opacities: &[f32]| {
         let build = receiver(DVec3::ZERO, 0.7).point_light(v(0.0, 20.0, 0.0), 10.0, Falloff::None);
         let layer = |build: Build, (i, opacity): (usize, &f32)| {
-            level(build, 0.5 + 0.1 * i as f64, veiled(matte(0.5), *opacity))
+            with_horizontal_quad(build, 0.5 + 0.1 * i as f64, with_opacity(matte(0.5), *opacity))
         };
         opacities.iter().enumerate().fold(build, layer)
     };
@@ -211,7 +211,7 @@ fn shadows_multiply_transmittances() {
     }
     // A single ray to the light's center is also attenuated. Without shadows, light is not attenuated.
     let under = |shadows| {
-        let lit = under_lamp(|build| level(build, 1.0, veiled(matte(0.5), 0.3)));
+        let lit = under_disk_light(|build| with_horizontal_quad(build, 1.0, with_opacity(matte(0.5), 0.3)));
         mean_and_error(&lit.shadows(shadows, 1).values(256, 64)).0
     };
     assert!((under(ShadowMode::Hard) / under(ShadowMode::Off) - 0.7).abs() < 0.01);
@@ -221,8 +221,8 @@ fn shadows_multiply_transmittances() {
 fn camera_ray_passes_up_to_64_surfaces() {
     let seen = |count: u32| {
         let build = (0..count)
-            .fold(scene(), |build, i| sheet(build, -1.0 - f64::from(i), 0.0, veiled(matte(0.5), 0.0)));
-        lamp_at(build, -200.0)
+            .fold(scene(), |build, i| sheet(build, -1.0 - f64::from(i), 0.0, with_opacity(matte(0.5), 0.0)));
+        with_background_light(build, -200.0)
     };
     for build in [seen(64), path(seen(64))] {
         assert_eq!(build.depth(0).value(), 1.0);
@@ -230,7 +230,7 @@ fn camera_ray_passes_up_to_64_surfaces() {
     assert_eq!(seen(65).value(), 0.0);
     let through = |count: i32| {
         let build = (0..count).fold(scene(), |build, i| sheet(build, -1.0 - f64::from(i), 0.0, pane(1.0)));
-        lamp_at(build, -200.0).depth(0).value()
+        with_background_light(build, -200.0).depth(0).value()
     };
     assert_close("64 panes", through(64), (1.0 - 0.08 / 1.04_f64).powi(64));
     assert_eq!(through(65), 0.0);
@@ -238,10 +238,10 @@ fn camera_ray_passes_up_to_64_surfaces() {
 
 #[test]
 fn light_emission_is_scaled_by_opacity() {
-    let full = mean_and_error(&under_lamp(|build| build).values(256, 64)).0;
+    let full = mean_and_error(&under_disk_light(|build| build).values(256, 64)).0;
     assert_close("the formula", full, 0.7 / 5.0);
     let disk = Shape::Disk { center: v(0.0, 2.0, 0.0), normal: DVec3::NEG_Y, radius: 1.0 };
-    let lit = receiver(DVec3::ZERO, 0.7).shape(disk, veiled(emitter(1.0), 0.25));
+    let lit = receiver(DVec3::ZERO, 0.7).shape(disk, with_opacity(emitter(1.0), 0.25));
     for build in [lit.clone(), path(lit)] {
         assert_mean("a quarter", &build.values(256, 128), 0.25 * 0.7 / 5.0, 1.5e-3);
     }
@@ -254,7 +254,7 @@ fn half_opaque_lights_transmit_their_own_light() {
     let outside = receiver(v(3.0, 0.0, 0.0), 0.7);
     let (center, o) = (v(3.0, 2.0, 0.0), 0.4);
     let lit = |shape: &Shape, opacity: f32, sides: EmissionSides| {
-        let mut material = veiled(emitter(1.0), opacity);
+        let mut material = with_opacity(emitter(1.0), opacity);
         material.emission.sides = sides;
         outside.clone().shape(shape.clone(), material)
     };
@@ -328,8 +328,9 @@ fn furnace_with_panes_has_radiance_one() {
         .environment(1.0)
         .sphere(v(0.0, 0.0, -6.0), 1.0, matte(1.0))
         .sphere(v(0.0, 0.0, -6.0), 1.5, pane(1.0))
-        .sphere(v(0.5, 0.5, -6.0), 2.5, veiled(mirror(1.0), 0.4));
-    let build = sheet(sheet(build, -2.0, 30.0, pane(1.0)), -2.5, -50.0, veiled(pane(1.0), 0.5)).depth(10_000);
+        .sphere(v(0.5, 0.5, -6.0), 2.5, with_opacity(mirror(1.0), 0.4));
+    let build =
+        sheet(sheet(build, -2.0, 30.0, pane(1.0)), -2.5, -50.0, with_opacity(pane(1.0), 0.5)).depth(10_000);
     assert_mean("path", &path(build).values(256, 64), 1.0, 1e-6);
     // Without diffuse surfaces, whitted includes all light.
     let clear =
@@ -345,12 +346,12 @@ fn highlights_pass_partial_opacity() {
         scene()
             .quad(v(-9.0, 0.0, 9.0), v(18.0, 0.0, 0.0), v(0.0, 0.0, -18.0), phong(0.2, 0.7, 3000.0, 0.0))
             .quad(v(-0.5, 2.0, -2.5), v(1.0, 0.0, 0.0), v(0.0, 0.0, 1.0), material)
-            .quad(v(-2.0, 1.2, -3.0), v(4.0, 0.0, 0.0), v(0.0, 0.0, 4.0), veiled(matte(0.0), 0.4))
+            .quad(v(-2.0, 1.2, -3.0), v(4.0, 0.0, 0.0), v(0.0, 0.0, 4.0), with_opacity(matte(0.0), 0.4))
             .quad(v(-2.0, 1.5, -3.0), v(4.0, 0.0, 0.0), v(0.0, 0.0, 4.0), pane(0.9))
             .seen(v(0.0, 1.0, 1.0), DVec3::ZERO)
             .depth(1)
     };
-    for material in [emitter(1.0), veiled(emitter(2.0), 0.5)] {
+    for material in [emitter(1.0), with_opacity(emitter(2.0), 0.5)] {
         let build = lit(material);
         let [whitted, path] = [build.values(256, 64), path(build).values(1024, 64)];
         assert_same_mean("highlight", mean_and_error(&whitted), mean_and_error(&path), 8e-3);
@@ -379,9 +380,9 @@ fn merged_small_meshes_attenuate_separately() {
     let lit = |shift: f64| {
         receiver(DVec3::ZERO, 0.7)
             .point_light(v(0.0, 20.0, 0.0), 10.0, Falloff::None)
-            .mesh(grid(1.0, 0.0), AS_IT_IS, veiled(matte(0.5), 0.3))
-            .mesh(grid(2.0, 0.0), AS_IT_IS, veiled(matte(0.5), 0.5))
-            .mesh(grid(3.0, shift), AS_IT_IS, matte(0.5))
+            .mesh(grid(1.0, 0.0), IDENTITY_PLACEMENT, with_opacity(matte(0.5), 0.3))
+            .mesh(grid(2.0, 0.0), IDENTITY_PLACEMENT, with_opacity(matte(0.5), 0.5))
+            .mesh(grid(3.0, shift), IDENTITY_PLACEMENT, matte(0.5))
     };
     assert!(lit(20.0).world().geometry.objects().len() == 4);
     assert_close("beside", lit(20.0).value(), 0.35 * 0.7 * 10.0 / PI);
@@ -391,13 +392,14 @@ fn merged_small_meshes_attenuate_separately() {
 #[test]
 fn first_hit_views_pass_transparent_surfaces() {
     let build = |opacity: f32| {
-        let near = sheet(scene(), -2.0, 45.0, veiled(matte(0.5), opacity));
+        let near = sheet(scene(), -2.0, 45.0, with_opacity(matte(0.5), opacity));
         sheet(near, -7.0, 0.0, matte(0.25))
     };
     for (opacity, depth, albedo) in [(0.0, 7.0, 0.25), (1.0, 2.0, 0.5)] {
         assert_close("depth", build(opacity).viewed(ViewMode::Depth).value(), depth);
         assert_close("albedo", build(opacity).viewed(ViewMode::Albedo).value(), albedo);
     }
-    let shadow = under_lamp(|build| level(build, 1.0, veiled(matte(0.5), 0.25))).viewed(ViewMode::Shadow);
+    let shadow = under_disk_light(|build| with_horizontal_quad(build, 1.0, with_opacity(matte(0.5), 0.25)))
+        .viewed(ViewMode::Shadow);
     assert_mean("shadow", &shadow.values(64, 16), 0.75, 1e-6);
 }

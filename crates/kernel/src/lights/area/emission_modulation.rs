@@ -1,5 +1,5 @@
-//! Emission textures: radiance that varies with position because of textures, opacity or the weight of a
-//! blend, or with direction because of a clear coat.
+//! Modulated emission: radiance that varies with position because of textures, opacity or blend weights, or
+//! with direction because of a clear coat.
 //!
 //! The texture is importance sampled on quads, but not on other shapes. Each sample is multiplied by the
 //! texture value at its point. Pdfs depend only on the emitter.
@@ -12,14 +12,14 @@ use crate::materials::texture::Texture;
 use crate::materials::{Coat, Footprint, Opacity, ScalarParameter, SecondUvPoint, TexturePoint};
 use crate::math::{DVec2, DVec3, Vec2, Vec3};
 
-/// A factor on a light's radiance that varies with position and direction: the sum of its terms.
+/// A factor on a light's radiance that varies with position or direction. It is the sum of its terms.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EmissionModulation {
     terms: Vec<EmissionTerm>,
     chart: UvMapping,
 }
 
-/// A part of a light's radiance. Blends have one term for each of their parts.
+/// A part of a light's radiance. A blend has one term per emissive part.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EmissionTerm {
     /// Constant factor.
@@ -30,11 +30,11 @@ pub struct EmissionTerm {
     pub opacity: Option<Opacity>,
     /// Clear coat.
     pub coat: Option<Arc<Coat>>,
-    /// Weights in the blends that contain the term, if they vary.
+    /// Varying weights of the blends that contain the term.
     pub weights: Vec<BlendWeight>,
 }
 
-/// Weight of a part of a blend.
+/// Weight of one part of a blend.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BlendWeight {
     /// Weight of the second part.
@@ -44,8 +44,8 @@ pub struct BlendWeight {
 }
 
 impl BlendWeight {
-    /// The weight of the part if the weight of the second part is `second`.
-    pub fn of_part(&self, second: f32) -> f32 {
+    /// Weight of this part, given the weight `second` of the second part.
+    pub fn for_part(&self, second: f32) -> f32 {
         let second = second.clamp(0.0, 1.0);
         if self.is_second { second } else { 1.0 - second }
     }
@@ -75,7 +75,7 @@ impl EmissionTerm {
             color *= opacity.evaluate(at, &mut 0);
         }
         for weight in &self.weights {
-            color *= weight.of_part(weight.second.evaluate(at, &mut 0));
+            color *= weight.for_part(weight.second.evaluate(at, &mut 0));
         }
         color
     }
@@ -86,7 +86,7 @@ impl EmissionTerm {
         let mut mean = color * self.scale * self.opacity.as_ref().map_or(1.0, Opacity::mean);
         for weight in &self.weights {
             let second = weight.second.texture().map_or(1.0, |texture| texture.mean().x);
-            mean *= weight.of_part(weight.second.as_untextured().unwrap_or(second));
+            mean *= weight.for_part(weight.second.as_untextured().unwrap_or(second));
         }
         mean
     }
@@ -169,7 +169,8 @@ impl EmissionModulation {
         self.sum_without_coat(&self.chart.texture_point(point.as_dvec3(), primitive))
     }
 
-    /// The clear coats' transmittance for a ray in a given direction, averaged over the emission.
+    /// Transmittance of the clear coats for a ray in a given direction, averaged with the emission as
+    /// weights.
     pub fn coat_transmittance(&self, point: Vec3, primitive: u32, direction: Vec3) -> Vec3 {
         if self.terms.iter().all(|term| term.coat.is_none()) {
             return Vec3::ONE;

@@ -16,7 +16,7 @@ use super::v;
 
 /// Shapes of each kind between mirrors and glass, under lights. `paint` sets the colors of the Phong
 /// materials.
-fn pictured(paint: impl Fn(&mut Build, Vec3) -> ColorSource) -> Build {
+fn mixed_scene(paint: impl Fn(&mut Build, Vec3) -> ColorSource) -> Build {
     let mut build = scene();
     let phong = |build: &mut Build, r: f32, ks: f32| -> Material {
         let (diffuse, specular) = (paint(build, Vec3::new(r, 0.5, 0.3)), paint(build, Vec3::splat(ks)));
@@ -53,8 +53,8 @@ fn pictured(paint: impl Fn(&mut Build, Vec3) -> ColorSource) -> Build {
 
 #[test]
 fn constant_texture_is_bit_identical_to_color() {
-    let by_rows = pictured(|_, color| ColorSource::Constant(color));
-    let one_by_one = pictured(|build, color| {
+    let by_rows = mixed_scene(|_, color| ColorSource::Constant(color));
+    let one_by_one = mixed_scene(|build, color| {
         ColorSource::Texture(build.texture(&[&[color]], TextureFilter::Nearest, Wrap::Repeat, Vec2::ONE))
     });
     for (shadows, count) in
@@ -69,11 +69,11 @@ fn constant_texture_is_bit_identical_to_color() {
 
 #[test]
 fn sample_bits_do_not_depend_on_tiling() {
-    let build = pictured(|_, color| ColorSource::Constant(color)).shadows(ShadowMode::Soft, 2);
+    let build = mixed_scene(|_, color| ColorSource::Constant(color)).shadows(ShadowMode::Soft, 2);
     let (world, settings) = (build.world(), build.settings(4));
     let samples = |rect: Rect, samples: Range<u32>| {
         let done = render_tile(&world, &settings, rect, samples, &CancelToken::new());
-        done.expect("the token is not cancelled").0.radiance
+        done.expect("the token is not canceled").0.radiance
     };
     let whole = Rect { x: 0, y: 0, width: 37, height: 23 };
     let all = samples(whole, 0..7);

@@ -10,7 +10,7 @@ use glimt::math::{DVec3, Vec2, Vec3};
 use glimt::scene::description::{EmissionSource, Integrator, Material, Shape, TextureFilter, Wrap};
 
 use super::direct::{assert_hard, assert_irradiance, at_origin};
-use super::scenes::{AS_IT_IS, Build, emitter, phong};
+use super::scenes::{Build, IDENTITY_PLACEMENT, emitter, phong};
 use super::{assert_close, lambert, mean_and_error, v};
 
 /// Adds a gray texture from its values, top row first.
@@ -20,13 +20,13 @@ fn grays(build: &mut Build, rows: &[&[f32]], filter: TextureFilter, repeat: Vec2
     build.texture(&rows, filter, Wrap::Repeat, repeat)
 }
 
-fn shining(texture: usize, scale: f32) -> Material {
+fn textured_emitter(texture: usize, scale: f32) -> Material {
     let emission =
         EmissionSource { texture: Some(texture), ..EmissionSource::from_constant(Vec3::splat(scale)) };
     Material { emission, ..phong(0.0, 0.0, 1.0, 0.0) }
 }
 
-fn by_paths(build: &Build) -> Build {
+fn path_traced(build: &Build) -> Build {
     build.clone().with(|scene| scene.render.integrator = Integrator::Path)
 }
 
@@ -38,7 +38,7 @@ const U: DVec3 = v(1.5, 0.2, 0.0);
 const V: DVec3 = v(0.0, 0.1, 1.2);
 
 /// Irradiance E from the checkered light, using Lambert's formula for each square.
-fn by_squares(scale: f64) -> f64 {
+fn lambert_irradiance(scale: f64) -> f64 {
     let mut irradiance = 0.0;
     for (row, values) in CHECKER.iter().enumerate() {
         for (column, value) in values.iter().enumerate() {
@@ -56,15 +56,15 @@ fn by_squares(scale: f64) -> f64 {
 fn checkered_quad_light_matches_its_squares() {
     let mut lit = at_origin();
     let texture = grays(&mut lit, &CHECKER, TextureFilter::Nearest, Vec2::ONE);
-    let lit = lit.quad(CORNER, U, V, shining(texture, 2.0));
-    assert_irradiance("whitted", &lit, by_squares(2.0), 5e-4);
-    assert_irradiance("path", &by_paths(&lit), by_squares(2.0), 5e-4);
-    assert_hard("hard shadows", &lit, by_squares(2.0), 1e-3);
+    let lit = lit.quad(CORNER, U, V, textured_emitter(texture, 2.0));
+    assert_irradiance("whitted", &lit, lambert_irradiance(2.0), 5e-4);
+    assert_irradiance("path", &path_traced(&lit), lambert_irradiance(2.0), 5e-4);
+    assert_hard("hard shadows", &lit, lambert_irradiance(2.0), 1e-3);
     // A mirrored texture must change the result.
     let half = lit.with(|scene| scene.textures[0].repeat = Vec2::new(-1.0, 1.0));
     let turned = half.values(256, 64);
     let (mean, error) = mean_and_error(&turned);
-    assert!((mean - 0.7 * by_squares(2.0) / PI).abs() > 20.0 * error, "{mean} ± {error}");
+    assert!((mean - 0.7 * lambert_irradiance(2.0) / PI).abs() > 20.0 * error, "{mean} ± {error}");
 }
 
 #[test]
@@ -80,15 +80,15 @@ fn checkered_mesh_light_matches_its_squares() {
         };
         let mut lit = at_origin();
         let texture = grays(&mut lit, &CHECKER, TextureFilter::Nearest, Vec2::ONE);
-        let placed = [v(mirror, 1.0, 1.0), AS_IT_IS[1], AS_IT_IS[2]];
-        let lit = lit.mesh(mesh, placed, shining(texture, 1.0));
-        assert_irradiance("whitted", &lit, by_squares(1.0), 5e-5);
-        assert_irradiance("path", &by_paths(&lit), by_squares(1.0), 4e-4);
+        let placed = [v(mirror, 1.0, 1.0), IDENTITY_PLACEMENT[1], IDENTITY_PLACEMENT[2]];
+        let lit = lit.mesh(mesh, placed, textured_emitter(texture, 1.0));
+        assert_irradiance("whitted", &lit, lambert_irradiance(1.0), 5e-5);
+        assert_irradiance("path", &path_traced(&lit), lambert_irradiance(1.0), 4e-4);
     }
 }
 
 /// Irradiance E at the origin, facing up, integrated over a cosine-weighted hemisphere.
-fn by_directions(build: &Build) -> f64 {
+fn hemisphere_irradiance(build: &Build) -> f64 {
     const RINGS: u32 = 1500;
     let world = build.world();
     let mut sum = 0.0;
@@ -129,10 +129,10 @@ fn every_shape_maps_its_emission_texture() {
         let mut lit = at_origin();
         let rows: [&[f32]; 3] = [&[4.0, 0.0, 1.0], &[0.0, 2.0, 0.5], &[3.0, 0.2, 0.0]];
         let texture = grays(&mut lit, &rows, TextureFilter::Bilinear, Vec2::new(2.0, 3.0));
-        let lit = lit.shape(shape, shining(texture, 1.0));
-        let exact = 0.7 * by_directions(&lit) / PI;
+        let lit = lit.shape(shape, textured_emitter(texture, 1.0));
+        let exact = 0.7 * hemisphere_irradiance(&lit) / PI;
         assert!(exact > 0.01, "{name} too dim");
-        for (how, lit) in [("whitted", lit.clone()), ("path", by_paths(&lit))] {
+        for (how, lit) in [("whitted", lit.clone()), ("path", path_traced(&lit))] {
             let (mean, error) = mean_and_error(&lit.values(256, 64));
             assert!(error < 3e-3 * exact, "{name}, {how}: too noisy: ± {error} of {exact}");
             let allowed = 4.9 * error + 1e-3 * exact;
@@ -147,8 +147,8 @@ fn constant_emission_texture_matches_color() {
     for filter in [TextureFilter::Nearest, TextureFilter::Bilinear, TextureFilter::Mipmap] {
         let mut lit = at_origin();
         let texture = grays(&mut lit, &[&[0.75, 0.75, 0.75][..]; 3], filter, Vec2::new(7.0, 0.3));
-        let lit = lit.quad(CORNER, U, V, shining(texture, 4.0));
-        for (lit, plain) in [(lit.clone(), plain.clone()), (by_paths(&lit), by_paths(&plain))] {
+        let lit = lit.quad(CORNER, U, V, textured_emitter(texture, 4.0));
+        for (lit, plain) in [(lit.clone(), plain.clone()), (path_traced(&lit), path_traced(&plain))] {
             for (value, exact) in lit.values(16, 8).into_iter().zip(plain.values(16, 8)) {
                 assert_close("same as the color", value, exact);
             }
@@ -163,7 +163,7 @@ fn constant_emission_texture_matches_color() {
 fn black_emission_texture_emits_nothing() {
     let mut lit = at_origin();
     let texture = grays(&mut lit, &[&[0.0]], TextureFilter::Nearest, Vec2::ONE);
-    assert!(lit.quad(CORNER, U, V, shining(texture, 4.0)).world().lights.is_empty());
+    assert!(lit.quad(CORNER, U, V, textured_emitter(texture, 4.0)).world().lights.is_empty());
 }
 
 #[test]
@@ -175,7 +175,7 @@ fn light_power_follows_mean_of_texture() {
     };
     let mut patterned = at_origin();
     let texture = grays(&mut patterned, &CHECKER, TextureFilter::Nearest, Vec2::ONE);
-    let patterned = patterned.quad(CORNER, U, V, shining(texture, 2.0));
+    let patterned = patterned.quad(CORNER, U, V, textured_emitter(texture, 2.0));
     let plain = at_origin().quad(CORNER, U, V, emitter(2.0 * 2.25));
     assert_close("power", strength(&patterned), strength(&plain));
 }
@@ -190,7 +190,7 @@ fn sampled_lights_keep_their_textures() {
     for cell in 0..cells * cells {
         let (x, z) = (f64::from(cell % cells) - 3.0, f64::from(cell / cells) - 3.0);
         let (corner, u, w) = (v(x - 0.2, 2.0, z - 0.2), v(0.4, 0.0, 0.0), v(0.0, 0.0, 0.4));
-        build = build.quad(corner, u, w, shining(texture, 1.0));
+        build = build.quad(corner, u, w, textured_emitter(texture, 1.0));
         for (row, values) in CHECKER.iter().enumerate() {
             for (column, value) in values.iter().enumerate() {
                 let at = corner + u * (0.5 * column as f64) + w * (0.5 - 0.5 * row as f64);
@@ -201,7 +201,7 @@ fn sampled_lights_keep_their_textures() {
         }
     }
     assert!(build.world().lights.sampler_for_purpose(LightSamplingPurpose::Eye).is_some());
-    for (name, build) in [("whitted", build.clone()), ("path", by_paths(&build))] {
+    for (name, build) in [("whitted", build.clone()), ("path", path_traced(&build))] {
         assert_irradiance(name, &build, expected, 1e-3);
     }
 }

@@ -41,10 +41,14 @@ impl<'a> CoarseImageRenderer<'a> {
     /// caches, because tracing rays is then slow.
     fn reduce_size_for_large_scenes(&self, width: u32, height: u32) -> (u32, u32) {
         /// Trees with this many triangles take up tens of megabytes.
-        const LARGE: u64 = 250_000;
+        const MIN_LARGE_TRIANGLES: u64 = 250_000;
         let side =
             |length: u32| ((f64::from(length) * std::f64::consts::FRAC_1_SQRT_2).round() as u32).max(1);
-        if self.tracer.world.triangle_count() < LARGE { (width, height) } else { (side(width), side(height)) }
+        if self.tracer.world.triangle_count() < MIN_LARGE_TRIANGLES {
+            (width, height)
+        } else {
+            (side(width), side(height))
+        }
     }
 
     fn is_less_work(&self, width: u32, height: u32) -> bool {
@@ -90,7 +94,7 @@ impl<'a> CoarseImageRenderer<'a> {
     /// would take almost as long as a full pass. Does not change the film. Calls `tick` regularly.
     ///
     /// # Errors
-    /// Returns [`AbortReason::Cancelled`] if the token is canceled.
+    /// Returns [`AbortReason::Canceled`] if the token is canceled.
     pub(crate) fn show_without_photons(
         &self,
         screen: PreviewSender<'_>,
@@ -118,10 +122,10 @@ impl<'a> CoarseImageRenderer<'a> {
 /// if rendering at the usual size is about as fast.
 fn size_for_time_budget(width: u32, height: u32, rate: f64) -> Option<(u32, u32)> {
     /// Minimum width in pixels.
-    const LEAST: f64 = 16.0;
+    const MIN_WIDTH: f64 = 16.0;
     let share = (rate * MOVING_TIME_BUDGET.as_secs_f64() / (f64::from(width) * f64::from(height))).sqrt();
     let side =
-        |length: u32| ((f64::from(length) * share.max(LEAST / f64::from(width))).round() as u32).max(1);
+        |length: u32| ((f64::from(length) * share.max(MIN_WIDTH / f64::from(width))).round() as u32).max(1);
     (share < 0.8).then(|| (side(width).min(width), side(height).min(height)))
 }
 

@@ -15,9 +15,9 @@ const FIRST_BYTES: u32 = 12;
 /// count them.
 const ROW_BYTES: u32 = 4;
 /// Factor by which the cost per byte changes between attempts.
-const STEP: f32 = 1.6;
+const COST_STEP: f32 = 1.6;
 /// Cost per byte above which no further bytes can be saved.
-const DEAREST: f32 = 4000.0;
+const MAX_BYTE_COST: f32 = 4000.0;
 
 /// Byte budget for a first preview.
 #[derive(Clone, Copy, Debug)]
@@ -39,16 +39,16 @@ impl FirstPreviewByteBudget {
         let share = FIRST_BYTES * targets.len() as u32;
         self.bytes += share;
         if self.bytes > 2 * share {
-            self.model = self.model.with_cost_per_byte(self.model.byte / STEP);
+            self.model = self.model.with_cost_per_byte(self.model.byte / COST_STEP);
         }
         loop {
             let found = plan_row(targets, start, self.model);
             let bytes = found.bytes + ROW_BYTES;
-            if bytes <= self.bytes || self.model.byte > DEAREST {
+            if bytes <= self.bytes || self.model.byte > MAX_BYTE_COST {
                 self.bytes = self.bytes.saturating_sub(bytes);
                 return found;
             }
-            self.model = self.model.with_cost_per_byte(self.model.byte * STEP);
+            self.model = self.model.with_cost_per_byte(self.model.byte * COST_STEP);
         }
     }
 }

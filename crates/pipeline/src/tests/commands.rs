@@ -1,11 +1,11 @@
-//! Tests for failures, and for orders that arrive during a render: cancel, pause and write.
+//! Tests for failures, and for commands that arrive during a render: cancel, pause and write.
 
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::Instant;
 
 use super::*;
-use crate::control::{CancelToken, Cancelled};
+use crate::control::{CancelToken, Canceled};
 use crate::film::{Rect, SelectedPixels, TileSamples};
 use crate::integrators::{PhotonMaps, RayCounters, RenderSettings};
 use crate::messages::{INCOMPLETE_IMAGE, NEWEST_IMAGE_NOT_WRITTEN};
@@ -16,14 +16,14 @@ use crate::settings::ViewMode;
 use crate::world::World;
 
 /// Blocks until its token is canceled.
-fn endless(
+fn block_until_canceled(
     _: Option<&PhotonMaps>,
     _: &World,
     _: &RenderSettings,
     _: SelectedPixels,
     _: Range<u32>,
     token: &CancelToken,
-) -> Result<(TileSamples, RayCounters), Cancelled> {
+) -> Result<(TileSamples, RayCounters), Canceled> {
     loop {
         token.check_pause_and_cancel()?;
         std::thread::sleep(Duration::from_millis(1));
@@ -32,37 +32,37 @@ fn endless(
 
 #[test]
 fn cancel_stops_a_render() {
-    let mut bench = Bench::with(SCENE, endless);
+    let mut bench = Bench::with(SCENE, block_until_canceled);
     let of = bench.send();
     while !matches!(bench.next(), Event::Progress { .. }) {}
     bench.worker.send(Command::Cancel);
-    assert!(matches!(bench.until_end(of).last(), Some(Event::Cancelled { .. })));
+    assert!(matches!(bench.until_end(of).last(), Some(Event::Canceled { .. })));
     assert!(!bench.path("out.ppm").exists());
 }
 
 #[test]
-fn paused_render_can_be_cancelled() {
-    let mut bench = Bench::with(SCENE, endless);
+fn paused_render_can_be_canceled() {
+    let mut bench = Bench::with(SCENE, block_until_canceled);
     let of = bench.send();
     while !matches!(bench.next(), Event::Progress { .. }) {}
     bench.worker.send(Command::Pause(true));
     bench.worker.send(Command::Cancel);
-    assert!(matches!(bench.until_end(of).last(), Some(Event::Cancelled { .. })));
+    assert!(matches!(bench.until_end(of).last(), Some(Event::Canceled { .. })));
 }
 
 #[test]
-fn replaced_requests_are_cancelled() {
-    let mut bench = Bench::with(SCENE, endless);
+fn replaced_requests_are_canceled() {
+    let mut bench = Bench::with(SCENE, block_until_canceled);
     let ends: Vec<u64> = (0..4).map(|_| bench.send()).collect();
     bench.worker.send(Command::Cancel);
-    let mut cancelled = Vec::new();
-    while cancelled.len() < ends.len() {
-        if let Event::Cancelled { generation } = bench.next() {
-            cancelled.push(generation);
+    let mut canceled = Vec::new();
+    while canceled.len() < ends.len() {
+        if let Event::Canceled { generation } = bench.next() {
+            canceled.push(generation);
         }
     }
-    cancelled.sort_unstable();
-    assert_eq!(cancelled, ends);
+    canceled.sort_unstable();
+    assert_eq!(canceled, ends);
 }
 
 #[test]
@@ -72,7 +72,7 @@ fn older_request_arriving_late_is_dropped() {
     bench.done();
     bench.generation = 3;
     let of = bench.send();
-    assert!(matches!(bench.until_end(of).last(), Some(Event::Cancelled { generation: 4 })));
+    assert!(matches!(bench.until_end(of).last(), Some(Event::Canceled { generation: 4 })));
 }
 
 static BREAKS: AtomicBool = AtomicBool::new(true);
@@ -84,7 +84,7 @@ fn breaks_once(
     pixels: SelectedPixels,
     samples: Range<u32>,
     token: &CancelToken,
-) -> Result<(TileSamples, RayCounters), Cancelled> {
+) -> Result<(TileSamples, RayCounters), Canceled> {
     assert!(!BREAKS.swap(false, Ordering::SeqCst), "a tile failed");
     KERNEL(photons, world, settings, pixels, samples, token)
 }
@@ -115,7 +115,7 @@ fn panics_on_drop(
     pixels: SelectedPixels,
     samples: Range<u32>,
     token: &CancelToken,
-) -> Result<(TileSamples, RayCounters), Cancelled> {
+) -> Result<(TileSamples, RayCounters), Canceled> {
     if !HAS_PANICKED.swap(true, Ordering::SeqCst) {
         std::panic::panic_any(PanicsOnDrop);
     }
@@ -141,9 +141,9 @@ fn breaks_first(
     pixels: SelectedPixels,
     samples: Range<u32>,
     token: &CancelToken,
-) -> Result<(TileSamples, RayCounters), Cancelled> {
+) -> Result<(TileSamples, RayCounters), Canceled> {
     assert!(TILES.fetch_add(1, Ordering::SeqCst) != 0, "the first tile failed");
-    slow(photons, world, settings, pixels, samples, token)
+    render_slowly(photons, world, settings, pixels, samples, token)
 }
 
 #[test]
@@ -157,7 +157,7 @@ fn panic_stops_the_current_pass() {
 
 #[test]
 fn oversized_film_is_an_error() {
-    let config = SessionConfig { most_film_bytes: 100_000, ..SessionConfig::default() };
+    let config = SessionConfig { max_film_bytes: 100_000, ..SessionConfig::default() };
     let mut bench = Bench::with_config(&SCENE.replace("width = 40", "width = 400"), config);
     assert!(matches!(bench.failed(), Failure::Work(message) if message.contains("400×30")));
     assert!(!bench.path("out.ppm").exists());
@@ -165,21 +165,21 @@ fn oversized_film_is_an_error() {
     bench.done();
 }
 
-/// Renders so slowly that orders arrive during the render.
-pub(super) fn slow(
+/// Renders so slowly that commands arrive during the render.
+pub(super) fn render_slowly(
     photons: Option<&PhotonMaps>,
     world: &World,
     settings: &RenderSettings,
     pixels: SelectedPixels,
     samples: Range<u32>,
     token: &CancelToken,
-) -> Result<(TileSamples, RayCounters), Cancelled> {
+) -> Result<(TileSamples, RayCounters), Canceled> {
     std::thread::sleep(Duration::from_millis(2));
     KERNEL(photons, world, settings, pixels, samples, token)
 }
 
 /// For a request with an invalid scene, waits until the render of the last valid scene ends.
-fn last_good_end(bench: &Bench, of: u64) -> LastValidSceneRenderOutcome {
+fn last_valid_scene_outcome(bench: &Bench, of: u64) -> LastValidSceneRenderOutcome {
     loop {
         match bench.next() {
             Event::LastGoodEnded { generation, end } if generation == of => return end,
@@ -194,19 +194,19 @@ fn nothing_is_rendered_without_a_valid_scene() {
     let mut bench = Bench::new(&SCENE.replace("width = 40", "width = = 40"));
     bench.writing = WriteRequirement::Try;
     assert!(matches!(bench.failed(), Failure::Scene(_)));
-    assert_eq!(last_good_end(&bench, 1), LastValidSceneRenderOutcome::Stopped);
+    assert_eq!(last_valid_scene_outcome(&bench, 1), LastValidSceneRenderOutcome::Stopped);
 }
 
 #[test]
 fn broken_scene_file_does_not_stop_a_render() {
-    let mut bench = Bench::with(&SCENE.replace("samples = 4", "samples = 10000"), slow);
+    let mut bench = Bench::with(&SCENE.replace("samples = 4", "samples = 10000"), render_slowly);
     (bench.writing, bench.preview) =
         (WriteRequirement::Try, Some(MaxPreviewSize { width: 12, height: 12, around: None }));
     let first = bench.send();
     while !matches!(bench.next(), Event::Progress { progress, .. } if progress.samples > 0) {}
     bench.edit("width = 40", "width = = 40");
     let broken = bench.send();
-    assert!(matches!(bench.until_end(first).last(), Some(Event::Cancelled { .. })));
+    assert!(matches!(bench.until_end(first).last(), Some(Event::Canceled { .. })));
     assert!(matches!(bench.until_end(broken).last(), Some(Event::Failed { failure: Failure::Scene(_), .. })));
     // The render continues under the newest generation until the image is finished and written.
     let mut is_seen = false;
@@ -223,11 +223,11 @@ fn broken_scene_file_does_not_stop_a_render() {
     }
     assert!(is_seen && samples_on_disk(&bench).starts_with("10000"), "{}", samples_on_disk(&bench));
     let finished = |unchanged| LastValidSceneRenderOutcome::Finished { unchanged };
-    assert_eq!(last_good_end(&bench, broken), finished(false));
+    assert_eq!(last_valid_scene_outcome(&bench, broken), finished(false));
     // A second typo does not keep the image from being finished.
     bench.edit("width = = 40", "width = = = 40");
     assert!(matches!(bench.failed(), Failure::Scene(_)));
-    assert_eq!(last_good_end(&bench, bench.generation), finished(true));
+    assert_eq!(last_valid_scene_outcome(&bench, bench.generation), finished(true));
     bench.edit("width = = = 40", "width = = 40");
     bench.edit("width = = 40", "width = 40");
     let report = bench.done().0;
@@ -235,7 +235,7 @@ fn broken_scene_file_does_not_stop_a_render() {
 }
 
 /// Applies a change to a valid scene and returns its image.
-fn picture_by(scene: &str, change: impl Fn(&mut Bench)) -> Vec<u8> {
+fn image_after(scene: &str, change: impl Fn(&mut Bench)) -> Vec<u8> {
     let mut bench = Bench::new(scene);
     change(&mut bench);
     bench.done();
@@ -287,7 +287,7 @@ fn last_valid_scene_applies_new_overrides() {
                 }
             }
             assert!(is_seen);
-            assert_eq!(bench.picture(), picture_by(SCENE, |bench| change(bench, moved)));
+            assert_eq!(bench.picture(), image_after(SCENE, |bench| change(bench, moved)));
             // The fixed scene reuses this image.
             fix(&bench);
             assert_eq!(bench.done().0.stages[Stage::Render as usize].status, Status::Reused);
@@ -320,13 +320,13 @@ fn last_valid_scene_never_mixes_file_versions() {
             assert_eq!(end, LastValidSceneRenderOutcome::Stopped);
             assert_eq!(bench.picture(), depth);
         } else {
-            let expected = picture_by(SCENE, |bench| bench.write("skin.ppm", "P6\n1 1\n255\nxyz"));
+            let expected = image_after(SCENE, |bench| bench.write("skin.ppm", "P6\n1 1\n255\nxyz"));
             assert_eq!(bench.picture(), expected);
         }
     }
 }
 
-/// Returns a scene with enough tiles for orders to arrive during the first pass.
+/// Returns a scene with enough tiles for commands to arrive during the first pass.
 fn wide() -> String {
     SCENE.replace("width = 40", "width = 640").replace("height = 30", "height = 640")
 }
@@ -342,7 +342,7 @@ fn samples_on_disk(bench: &Bench) -> String {
 fn priority_region_is_rendered_first() {
     let text = wide().replace("width = 640", "width = 256").replace("height = 640", "height = 256");
     let text = text.replace("samples = 4", "samples = 32");
-    let mut bench = Bench::with(&text, slow);
+    let mut bench = Bench::with(&text, render_slowly);
     bench.overrides.view = Some(ViewMode::Samples);
     bench.preview = Some(MaxPreviewSize { width: 256, height: 256, around: None });
     bench.first = Some(NormalizedRect { left: 0.0, top: 0.0, width: 0.1, height: 0.1 });
@@ -365,7 +365,7 @@ fn priority_region_is_rendered_first() {
 
 #[test]
 fn time_limit_waits_for_the_first_pass() {
-    let mut bench = Bench::with(&wide(), slow);
+    let mut bench = Bench::with(&wide(), render_slowly);
     bench.overrides.time_seconds = Some(0.001);
     let report = bench.done().0;
     assert!(report.image.samples.min >= 1, "{:?}", report.image.samples);
@@ -375,7 +375,7 @@ fn time_limit_waits_for_the_first_pass() {
 
 #[test]
 fn write_waits_for_the_first_pass() {
-    let mut bench = Bench::with(&wide(), slow);
+    let mut bench = Bench::with(&wide(), render_slowly);
     let of = bench.send();
     while !matches!(bench.next(), Event::Progress { .. }) {}
     bench.worker.send(Command::Write);
@@ -389,7 +389,7 @@ fn write_waits_for_the_first_pass() {
 
 #[test]
 fn incomplete_images_are_not_written() {
-    let mut bench = Bench::with(&wide(), slow);
+    let mut bench = Bench::with(&wide(), render_slowly);
     bench.write("out.ppm", "the old one");
     let of = bench.send();
     while !matches!(bench.next(), Event::Progress { .. }) {}
@@ -401,15 +401,15 @@ fn incomplete_images_are_not_written() {
         Event::WriteFailed { message, .. } => message.contains(INCOMPLETE_IMAGE),
         _ => false,
     };
-    assert!(is_refusal(bench.next()), "the postponed order should be refused");
+    assert!(is_refusal(bench.next()), "the postponed command should be refused");
     bench.worker.send(Command::Write);
-    assert!(is_refusal(bench.next()), "a later order should be refused");
+    assert!(is_refusal(bench.next()), "a later command should be refused");
     assert_eq!(bench.picture(), b"the old one");
 }
 
 #[test]
 fn refusal_mentions_the_newest_image() {
-    let mut bench = Bench::with(SCENE, slow);
+    let mut bench = Bench::with(SCENE, render_slowly);
     bench.done();
     bench.write("scene.toml", &wide());
     let of = bench.send();
@@ -424,7 +424,7 @@ fn refusal_mentions_the_newest_image() {
 
 #[test]
 fn next_request_carries_out_postponed_write() {
-    let mut bench = Bench::with(&wide(), slow);
+    let mut bench = Bench::with(&wide(), render_slowly);
     bench.send();
     while !matches!(bench.next(), Event::Progress { .. }) {}
     bench.worker.send(Command::Write);
@@ -441,7 +441,7 @@ fn next_request_carries_out_postponed_write() {
 
 #[test]
 fn write_during_a_render_saves_current_samples() {
-    let mut bench = Bench::with(&SCENE.replace("samples = 4", "samples = 1000000"), slow);
+    let mut bench = Bench::with(&SCENE.replace("samples = 4", "samples = 1000000"), render_slowly);
     let of = bench.send();
     while !matches!(bench.next(), Event::Progress { progress, .. } if progress.samples > 0) {}
     bench.worker.send(Command::Write);
@@ -465,7 +465,7 @@ fn held_between_passes(
     pixels: SelectedPixels,
     samples: Range<u32>,
     token: &CancelToken,
-) -> Result<(TileSamples, RayCounters), Cancelled> {
+) -> Result<(TileSamples, RayCounters), Canceled> {
     token.check_pause_and_cancel()?;
     let first = samples.start == 0;
     let done = KERNEL(photons, world, settings, pixels, samples, &CancelToken::new());
@@ -494,7 +494,7 @@ fn write_is_handled_during_pause_between_passes() {
 }
 
 #[test]
-fn write_order_rewrites_an_unchanged_image() {
+fn write_command_rewrites_an_unchanged_image() {
     let mut bench = Bench::new(SCENE);
     bench.done();
     bench.worker.send(Command::Write);
@@ -510,7 +510,7 @@ fn write_without_an_image_fails() {
 
 #[test]
 fn time_limit_ends_a_render() {
-    let mut bench = Bench::with(&SCENE.replace("samples = 4", "samples = 1000000"), slow);
+    let mut bench = Bench::with(&SCENE.replace("samples = 4", "samples = 1000000"), render_slowly);
     bench.overrides.time_seconds = Some(0.3);
     let begin = Instant::now();
     let (report, _) = bench.done();
@@ -525,7 +525,7 @@ fn time_limit_ends_a_render() {
 
 #[test]
 fn unwritable_output_fails_before_rendering() {
-    let mut bench = Bench::with(SCENE, endless);
+    let mut bench = Bench::with(SCENE, block_until_canceled);
     bench.overrides.outputs = vec![bench.path("nowhere/out.png")];
     assert!(matches!(bench.failed(), Failure::Work(message) if message.contains("nowhere")));
 }
@@ -607,14 +607,14 @@ fn anisotropy_without_uvs_causes_a_warning() {
 }
 
 /// Renders slightly more slowly than usual.
-fn leisurely(
+fn render_slightly_slowly(
     photons: Option<&PhotonMaps>,
     world: &World,
     settings: &RenderSettings,
     pixels: SelectedPixels,
     samples: Range<u32>,
     token: &CancelToken,
-) -> Result<(TileSamples, RayCounters), Cancelled> {
+) -> Result<(TileSamples, RayCounters), Canceled> {
     token.check_pause_and_cancel()?;
     std::thread::sleep(Duration::from_millis(5));
     KERNEL(photons, world, settings, pixels, samples, token)
@@ -623,7 +623,7 @@ fn leisurely(
 #[test]
 fn paused_time_is_not_counted() {
     const HOLD: f64 = 0.6;
-    let mut bench = Bench::with(&SCENE.replace("samples = 4", "samples = 32"), leisurely);
+    let mut bench = Bench::with(&SCENE.replace("samples = 4", "samples = 32"), render_slightly_slowly);
     let begin = Instant::now();
     let of = bench.send();
     while !matches!(bench.next(), Event::Progress { .. }) {}
@@ -641,7 +641,7 @@ fn paused_time_is_not_counted() {
 
 #[test]
 fn reused_image_reports_original_render_time() {
-    let mut bench = Bench::with(SCENE, leisurely);
+    let mut bench = Bench::with(SCENE, render_slightly_slowly);
     let (first, _) = bench.done();
     bench.overrides.shadows = Some(crate::scene::description::ShadowMode::Off);
     bench.done();
@@ -657,7 +657,7 @@ fn continued_render_reports_total_time() {
     // Rendering about a hundred tiles takes seconds.
     let large =
         SCENE.replace("width = 40\nheight = 30\nsamples = 4", "width = 400\nheight = 300\nsamples = 64");
-    let mut bench = Bench::with(&large, leisurely);
+    let mut bench = Bench::with(&large, render_slightly_slowly);
     bench.send();
     let is_on_its_way = |event: &Event, of: u64| {
         matches!(event, Event::Progress { progress, generation }

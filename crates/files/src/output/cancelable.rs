@@ -8,26 +8,26 @@ use nix::errno::Errno;
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 
 use super::{BitDepth, EncodeOptions, Format, OutputError};
-use crate::control::{CancelToken, Cancelled};
+use crate::control::{CancelToken, Canceled};
 use crate::film::RadianceImage;
 use crate::film::tone::{tone_map_to_8_bits, tone_map_to_16_bits};
 
 /// Number of pixels between polls of the cancel token. Processing them takes a few milliseconds and keeps
 /// all threads busy.
-const PIXELS: usize = 1 << 18;
+const PIXELS_PER_POLL: usize = 1 << 18;
 
 /// Number of bytes to compress or write between polls of the cancel token.
-pub(super) const BYTES: usize = 1 << 15;
+pub(super) const BYTES_PER_POLL: usize = 1 << 15;
 
-/// Tone maps an image from top to bottom and passes the bytes to `take` in order, at most [`BYTES`] at a
-/// time. Each component is one byte, or two bytes in big-endian order as in PNG and PPM.
+/// Tone maps an image from top to bottom and passes the bytes to `take` in order, at most [`BYTES_PER_POLL`]
+/// at a time. Each component is one byte, or two bytes in big-endian order as in PNG and PPM.
 pub(super) fn for_each_tone_mapped_part(
     image: &RadianceImage,
     options: &EncodeOptions,
     token: &CancelToken,
     mut take: impl FnMut(&[u8]) -> io::Result<()>,
 ) -> io::Result<()> {
-    for pixels in image.pixels.chunks(PIXELS) {
+    for pixels in image.pixels.chunks(PIXELS_PER_POLL) {
         token.check_pause_and_cancel().map_err(io::Error::other)?;
         let part = RadianceImage { width: pixels.len() as u32, height: 1, pixels: pixels.to_vec() };
         let bytes = match options.bit_depth {
@@ -37,7 +37,7 @@ pub(super) fn for_each_tone_mapped_part(
                 components.iter().flat_map(|component| component.to_be_bytes()).collect()
             }
         };
-        for bytes in bytes.chunks(BYTES) {
+        for bytes in bytes.chunks(BYTES_PER_POLL) {
             token.check_pause_and_cancel().map_err(io::Error::other)?;
             take(bytes)?;
         }
@@ -64,12 +64,12 @@ pub(super) fn tone_map_all(
 
 /// An in-memory writer that fails after cancellation. This also stops encoders that do not poll the cancel
 /// token.
-pub(super) struct CancellableBuffer<'a> {
+pub(super) struct CancelableBuffer<'a> {
     bytes: Cursor<Vec<u8>>,
     token: &'a CancelToken,
 }
 
-impl<'a> CancellableBuffer<'a> {
+impl<'a> CancelableBuffer<'a> {
     pub(super) fn new(token: &'a CancelToken) -> Self {
         Self { bytes: Cursor::new(Vec::new()), token }
     }
@@ -79,7 +79,7 @@ impl<'a> CancellableBuffer<'a> {
     }
 }
 
-impl Write for CancellableBuffer<'_> {
+impl Write for CancelableBuffer<'_> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         self.token.check_pause_and_cancel().map_err(io::Error::other)?;
         self.bytes.write(bytes)
@@ -90,7 +90,7 @@ impl Write for CancellableBuffer<'_> {
     }
 }
 
-impl Seek for CancellableBuffer<'_> {
+impl Seek for CancelableBuffer<'_> {
     fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
         self.bytes.seek(to)
     }
@@ -140,13 +140,13 @@ fn wait_until_writable(to: &File, token: &CancelToken) -> io::Result<()> {
 
 /// Distinguishes canceled writes from I/O errors. Checks the error instead of the token, because the token
 /// may have been canceled after the write.
-pub(super) fn write_error_or_cancelled<T>(
+pub(super) fn write_error_or_canceled<T>(
     result: io::Result<T>,
     error: impl FnOnce(io::Error) -> OutputError,
 ) -> Result<T, OutputError> {
     result.map_err(|failed| {
-        let stopped = failed.get_ref().is_some_and(|cause| cause.is::<Cancelled>());
-        if stopped { OutputError::Cancelled(Cancelled) } else { error(failed) }
+        let stopped = failed.get_ref().is_some_and(|cause| cause.is::<Canceled>());
+        if stopped { OutputError::Canceled(Canceled) } else { error(failed) }
     })
 }
 
@@ -155,19 +155,19 @@ mod tests {
     use super::*;
 
     #[test]
-    fn parts_form_the_image_and_can_be_cancelled() {
-        let count = PIXELS + 70_000;
+    fn parts_form_the_image_and_can_be_canceled() {
+        let count = PIXELS_PER_POLL + 70_000;
         let pixels = (0..count).map(|i| crate::math::Vec3::splat((i % 256) as f32 / 255.0)).collect();
         let image = RadianceImage { width: count as u32, height: 1, pixels };
         let options = EncodeOptions { bit_depth: BitDepth::Sixteen, ..Default::default() };
         let token = CancelToken::new();
         let mut all = Vec::new();
         let take = |bytes: &[u8]| {
-            assert!(bytes.len() <= BYTES);
+            assert!(bytes.len() <= BYTES_PER_POLL);
             all.extend_from_slice(bytes);
             Ok(())
         };
-        for_each_tone_mapped_part(&image, &options, &token, take).expect("not cancelled");
+        for_each_tone_mapped_part(&image, &options, &token, take).expect("not canceled");
         let expected = tone_map_to_16_bits(&image, &options.tone).pixels.into_flattened();
         assert!(all.as_chunks().0.iter().map(|two| u16::from_be_bytes(*two)).eq(expected));
         let mut parts = 0;
@@ -181,13 +181,13 @@ mod tests {
     }
 
     #[test]
-    fn only_stopped_writes_count_as_cancelled() {
+    fn only_stopped_writes_count_as_canceled() {
         let token = CancelToken::new();
         token.cancel();
         let classify =
-            |result| write_error_or_cancelled(result, |error| OutputError::file("a.png".as_ref(), error));
+            |result| write_error_or_canceled(result, |error| OutputError::file("a.png".as_ref(), error));
         let stopped = write_all(Vec::new(), b"abc", &token);
-        assert!(matches!(classify(stopped), Err(OutputError::Cancelled(_))));
+        assert!(matches!(classify(stopped), Err(OutputError::Canceled(_))));
         let full = io::Error::from(io::ErrorKind::StorageFull);
         assert!(matches!(classify(Err(full)), Err(OutputError::File { .. })));
         assert!(classify(Ok(())).is_ok());
@@ -206,15 +206,15 @@ mod tests {
             assert_eq!(taken, bytes[..taken.len()]);
             token.cancel();
             let stopped = writing.join().expect("no panic");
-            assert!(stopped.is_err_and(|error| error.get_ref().is_some_and(|cause| cause.is::<Cancelled>())));
+            assert!(stopped.is_err_and(|error| error.get_ref().is_some_and(|cause| cause.is::<Canceled>())));
         });
     }
 
     #[test]
-    fn a_cancelled_memory_writer_fails() {
+    fn a_canceled_memory_writer_fails() {
         let token = CancelToken::new();
-        let mut bytes = CancellableBuffer::new(&token);
-        bytes.write_all(b"abc").expect("not cancelled yet");
+        let mut bytes = CancelableBuffer::new(&token);
+        bytes.write_all(b"abc").expect("not canceled yet");
         token.cancel();
         assert!(bytes.write_all(b"def").is_err());
         assert_eq!(bytes.into_bytes(), b"abc");

@@ -14,7 +14,7 @@ use crate::math::Vec3;
 /// A surface with a δ lobe and non-specular lobes. The non-specular lobes already account for the
 /// transmittance of all layers above them.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Coated {
+pub struct SpecularOverBase {
     /// The surface with the δ lobe.
     pub specular: SpecularPart,
     /// A clear coat over the δ lobe, if there is one.
@@ -37,7 +37,7 @@ pub enum SpecularPart {
     Mirror(Mirror),
 }
 
-impl Coated {
+impl SpecularOverBase {
     /// The probability of choosing the δ lobe at an incident angle with the given cosine. `mirror` is the
     /// reflectance of [`SpecularPart::Mirror`]. Counts texture lookups in `lookups`.
     #[inline]
@@ -59,7 +59,8 @@ impl Coated {
         }
     }
 
-    /// Reflectance of the δ lobe divided by [`Coated::specular_probability`], with the same parameters.
+    /// Reflectance of the δ lobe divided by [`SpecularOverBase::specular_probability`], with the same
+    /// parameters.
     #[inline]
     pub fn specular_weight(&self, cosine: f32, mirror: Vec3, at: &TexturePoint, lookups: &mut u64) -> Vec3 {
         let relative = |color: Vec3| color / color.max_element().max(f32::MIN_POSITIVE);
@@ -74,8 +75,8 @@ impl Coated {
         }
     }
 
-    /// The clear coat's transmittance in and out at the same angle, including the light that it returns to a
-    /// base with the given reflectance.
+    /// Transmittance of the clear coat in and out at the same angle, including interreflection with a base of
+    /// the given reflectance.
     #[inline]
     fn coat_transmittance(&self, cosine: f32, base: Vec3, at: &TexturePoint, lookups: &mut u64) -> Vec3 {
         self.coat.as_ref().map_or(Vec3::ONE, |coat| coat.two_way_transmittance(at, cosine, base, lookups))
