@@ -344,9 +344,12 @@ fn photon_irradiance_is_uniform_up_to_rims() {
 fn photon_light_is_uniform_up_to_black_backs() {
     // Next to the floor is another that faces down. Its black back stores no photons.
     let front_only = || Material { sides: ReflectingSides::Front, ..matte(0.7) };
-    let build = scene()
-        .quad(v(-2.0, 0.0, 0.5), v(1.0, 0.0, 0.0), v(0.0, 0.0, -1.0), front_only())
-        .quad(v(-1.0, 0.0, 0.5), v(0.0, 0.0, -1.0), v(1.0, 0.0, 0.0), front_only());
+    let build = scene().quad(v(-2.0, 0.0, 0.5), v(1.0, 0.0, 0.0), v(0.0, 0.0, -1.0), front_only()).quad(
+        v(-1.0, 0.0, 0.5),
+        v(0.0, 0.0, -1.0),
+        v(1.0, 0.0, 0.0),
+        front_only(),
+    );
     let edge = strip(mirrored(build, (-1.25, -0.95), (0.0, 0.6)), v(-1.05, 0.0, 0.0), (0.099, 0.3));
     assert_even("a strip next to a black back", &edge, (3500, 0.1), even());
 }
