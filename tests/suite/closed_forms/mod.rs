@@ -23,6 +23,7 @@ mod mirror;
 mod one_sided;
 mod patterns;
 mod photons;
+mod procedural;
 mod projections;
 mod repeated_faces;
 mod robust;

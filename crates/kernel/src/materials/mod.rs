@@ -31,7 +31,7 @@ pub use coat::{Coat, CoatInputs};
 pub use coated::{Coated, SpecularPart};
 pub use dielectric::Dielectric;
 pub use emission::{Emission, EmissionSides};
-pub use footprint::{Footprint, SecondUvPoint, TexturePoint, UvSet};
+pub use footprint::{ExtraCoordinates, Footprint, ObjectPoint, SecondUvPoint, TexturePoint, UvSet};
 pub use mipmaps::Mipmaps;
 pub use mirror::Mirror;
 pub use normal_map::NormalMap;
@@ -193,9 +193,14 @@ impl Material {
         through * there + Vec3::splat(1.0 - there)
     }
 
-    /// Whether any of the textures has mip levels.
+    /// Whether any texture filters its lookups by the footprint.
     pub fn is_mipmapped(&self) -> bool {
-        self.textures().iter().any(|texture| texture.mipmaps.is_some())
+        self.textures().iter().any(|texture| texture.uses_footprint())
+    }
+
+    /// Whether any texture uses the shape's own coordinates.
+    pub fn uses_object_point(&self) -> bool {
+        self.textures().iter().any(|texture| texture.uses_object_point())
     }
 
     /// All textures. The emission's coat is omitted because it has the same textures as the BSDF's coat.

@@ -11,7 +11,8 @@ use crate::assets::{FileMaterial, FileMaterialKind, FileTexture, PhysicalMateria
 use crate::materials::microfacet::MicrofacetDistribution;
 use crate::materials::texels::{TexelData, Texels};
 use crate::materials::texture::{
-    ColorOrTexture, Texture, TextureFilter, UvTransform, ValueScaleAndOffset, Wrap,
+    ColorOrTexture, ImageTexture, Pattern, PatternTexture, Texture, TextureFilter, TextureMapping,
+    UvTransform, ValueScaleAndOffset, Wrap,
 };
 use crate::materials::{
     Blend, Bsdf, Bump, Coat, CoatInputs, Coated, CoatedMaterial, Conductor, ConductorFresnel, Dielectric,
@@ -21,8 +22,8 @@ use crate::materials::{
 };
 use crate::math::{DVec3, Vec3};
 use crate::scene::description::{
-    self, ChannelSelector, CoatSource, ColorSource, FresnelSource, MaterialKind, NumberSource,
-    PhongParameters, PixelInterpretation, Scene, TextureRole,
+    self, ChannelSelector, CoatSource, ColorSource, FresnelSource, ImageSource, MaterialKind, NumberSource,
+    PhongParameters, PixelInterpretation, Scene, TextureContent, TextureRole,
 };
 
 /// Converts a material from the scene file.
@@ -101,8 +102,8 @@ pub fn lower_opacity(scene: &Scene, images: &Images, material: &description::Mat
             let texture = of.texture(index, TextureRole::Opacity(number));
             // If mip levels preserve coverage, the cutoff already includes the factor.
             let coverage = coverage_cutoff(scene, index, source.cutoff);
-            let factor = texture.factor.filter(|_| coverage.is_none());
-            let texture = Arc::new(Texture { factor, ..(*texture).clone() });
+            let texture = Arc::unwrap_or_clone(texture);
+            let texture = Arc::new(texture.with_factor(|factor| factor.filter(|_| coverage.is_none())));
             (ScalarParameter::Texture(texture), coverage.map_or(source.cutoff, AlphaCutoffKey::value))
         }
     };
@@ -308,7 +309,8 @@ fn file_material_from_non_specular(images: &Images, own: &FileMaterial, rough: N
         Some(NormalMap { texture, strength: own.normal_strength })
     });
     // Gray images are height maps. Ignore them because the file does not specify the scale.
-    let normals = normals.filter(|map| !map.texture.texels.are_all_gray());
+    let is_gray = |map: &NormalMap| map.texture.as_image().is_some_and(|image| image.texels.are_all_gray());
+    let normals = normals.filter(|map| !is_gray(map));
     Material {
         bsdf: Bsdf::NonSpecular(rough),
         sides: ReflectingSides::Both,
@@ -348,10 +350,10 @@ fn file_phong(images: &Images, own: &FileMaterial) -> NonSpecular {
         {
             ColorOrTexture::Constant(specular) => ColorOrTexture::Constant(specular * scale),
             ColorOrTexture::Texture(texture) => {
-                let mut texture = Arc::unwrap_or_clone(texture);
-                texture.factor =
-                    Some(texture.factor.unwrap_or(ValueScaleAndOffset::IDENTITY).scaled_by(scale));
-                ColorOrTexture::Texture(Arc::new(texture))
+                let scaled = |factor: Option<ValueScaleAndOffset>| {
+                    Some(factor.unwrap_or(ValueScaleAndOffset::IDENTITY).scaled_by(scale))
+                };
+                ColorOrTexture::Texture(Arc::new(Arc::unwrap_or_clone(texture).with_factor(scaled)))
             }
         },
         false => ColorOrTexture::Constant(Vec3::ZERO),
@@ -462,10 +464,17 @@ impl MaterialParameterConverter<'_> {
     fn texture(self, index: usize, role: TextureRole) -> Arc<Texture> {
         let Self { scene, images, material } = self;
         let declared = &scene.textures[index];
-        let &description::Texture { filter, wrap, repeat, rotate, offset, uv, factor, .. } = declared;
+        let image = match &declared.content {
+            TextureContent::Image(image) => image,
+            TextureContent::Pattern { colors, pattern } => {
+                return Arc::new(Texture::Pattern(lower_pattern(declared, *colors, pattern, role)));
+            }
+        };
+        let &ImageSource { wrap, repeat, rotate, offset, uv, .. } = image;
+        let &description::Texture { filter, factor, .. } = declared;
         let Image { texels, mipmaps } = loaded_image_or_placeholder(
             images,
-            &scene_material_texture_source(scene, material, (index, role)),
+            &scene_material_texture_source(scene, material, (index, role), image),
         );
         let mipmaps = match filter {
             TextureFilter::Nearest | TextureFilter::Bilinear => None,
@@ -478,8 +487,33 @@ impl MaterialParameterConverter<'_> {
             }
             PixelInterpretation::Normal => None,
         };
-        Arc::new(Texture { texels, mipmaps, filter, wrap, repeat, moved, factor })
+        let mapping = TextureMapping { repeat, moved };
+        Arc::new(Texture::Image(ImageTexture { texels, mipmaps, filter, wrap, mapping, factor }))
     }
+}
+
+/// A pattern in this role. Numbers use the same value in every channel.
+fn lower_pattern(
+    declared: &description::Texture,
+    colors: [Vec3; 2],
+    pattern: &Pattern,
+    role: TextureRole,
+) -> PatternTexture {
+    let is_filtered = match declared.filter {
+        TextureFilter::Nearest | TextureFilter::Bilinear => false,
+        TextureFilter::Mipmap => true,
+    };
+    let colors = match role.pixel_interpretation() {
+        PixelInterpretation::Color | PixelInterpretation::CutOut => {
+            colors.map(|color| color * declared.factor)
+        }
+        PixelInterpretation::Number(number) => {
+            let factor = if matches!(role, TextureRole::Bump(_)) { 1.0 } else { declared.factor.x };
+            colors.map(|color| Vec3::splat(number.of_opaque_color(color) * factor))
+        }
+        PixelInterpretation::Normal => colors,
+    };
+    PatternTexture { pattern: pattern.clone(), colors, is_filtered }
 }
 
 /// Texture from a mesh file, or `None` if the image was not loaded, either because it is not needed or
@@ -493,15 +527,15 @@ fn file_texture(images: &Images, texture: &FileTexture, used: PixelInterpretatio
         }
         PixelInterpretation::Normal => None,
     };
-    Some(Arc::new(Texture {
+    let moved = UvTransform::new(UvSet::First, 0.0, texture.offset).map(Box::new);
+    Some(Arc::new(Texture::Image(ImageTexture {
         texels,
         mipmaps: None,
         filter: TextureFilter::Bilinear,
         wrap: if texture.is_clamped { Wrap::Clamp } else { Wrap::Repeat },
-        repeat: texture.repeat,
-        moved: UvTransform::new(UvSet::First, 0.0, texture.offset).map(Box::new),
+        mapping: TextureMapping { repeat: texture.repeat, moved },
         factor,
-    }))
+    })))
 }
 
 /// Returns a loaded image, or a placeholder if the image was not loaded. Images that are not loaded are used
