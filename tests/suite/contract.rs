@@ -132,6 +132,7 @@ fn ranges_include_their_limits() {
         "[textures.b]\ntype = \"noise\"\nsize = 1e-6\noctaves = 16\nseed = 4294967295",
         "[materials.a]\nbump = \"b\"\n[textures.b]\ntype = \"bands\"\nfilter = \"mipmap\"\nfactor = 2",
         "[materials.a]\ntype = \"metal\"\ncolor = { texture = \"b\" }\nroughness = { texture = \"b\", channel = \"g\" }\n[textures.b]\ntype = \"noise\"",
+        "[materials.a]\ntype = \"metal\"\nelement = \"Cu2O\"",
         "[materials.a]\ntype = \"metal\"\neta = [0, 0, 0]\nk = [9, 9, 9]\nroughness = 0\nanisotropy = -1",
         "[materials.a]\ntype = \"metal\"\ncolor = 1\nroughness = { texture = \"b\" }\n[textures.b]\nfile = \"textures/bumps.png\"",
         "[materials.a]\ntype = \"plastic\"\nior = 1\nroughness = 1\ndistribution = \"beckmann\"",
@@ -174,6 +175,7 @@ fn ranges_include_their_limits() {
         "[textures.b]\ntype = \"checker\"\ncolors = [1, 0, 0]",
         "[textures.b]\ntype = \"bands\"\ncolors = [1, -1]",
         "[materials.a]\nnormal_map = \"b\"\n[textures.b]\ntype = \"noise\"",
+        "[materials.a]\ntype = \"metal\"\nelement = \"Xx\"",
     ] {
         assert_eq!(said(wrong), 1, "{wrong}");
     }

@@ -182,7 +182,7 @@ filter = "mipmap"
 [materials]
 tiled = { type = "plastic", diffuse = { texture = "tiles" }, roughness = { texture = "stripes" } }
 striped = { diffuse = { texture = "stripes" }, emission = { texture = "stone", scale = 0.5 } }
-rock = { type = "metal", element = "copper", roughness = { texture = "stone" }, bump = "stone" }
+rock = { type = "metal", element = "CuZn", roughness = { texture = "stone" }, bump = "stone" }
 floor = { type = "plastic", diffuse = 0.5, roughness = 0.3, bump = "waves", bump_scale = 0.05 }
 gold = { type = "metal", element = "gold", roughness = 0.3, anisotropy = 0.5 }
 steel = { type = "metal", color = 0.8, roughness = { texture = "waves" }, bump = "waves", bump_scale = 0.1 }

@@ -17,7 +17,7 @@ use super::limits::Limits::{Any, AtLeast, Between};
 use super::names::DefinedNames;
 use super::table::TableReader;
 use super::textures::DefinedTextures;
-use crate::materials::conductor::elements::MetalElement;
+use crate::materials::conductor::elements::NamedConductor;
 use crate::math::Vec3;
 
 /// A color with components from 0 to 1, or a texture.
@@ -70,8 +70,8 @@ table_types! {
         eta: ColorOrTexture(AtLeast(0.0)), Alternative("[0.2, 0.9, 1.1]");
         /// Extinction coefficient for red, green and blue.
         k: ColorOrTexture(AtLeast(0.0)), Alternative("[0.2, 0.9, 1.1]");
-        /// Measured `eta` and `k` of a metal.
-        element: Words(choice_values::<MetalElement>), Absent;
+        /// Measured `eta` and `k` of a metal or a compound.
+        element: Words(choice_values::<NamedConductor>), Absent;
         /// Square root of α; 0 is a mirror.
         roughness: FRACTION, Is("0.2");
         /// Distribution of the facets.
@@ -351,7 +351,7 @@ impl<'a> MaterialReader<'a> {
             return None;
         }
         if element.is_present() {
-            let [eta, k] = element.choice::<MetalElement>()?.complex_ior().map(ColorSource::Constant);
+            let [eta, k] = element.choice::<NamedConductor>()?.complex_ior().map(ColorSource::Constant);
             return Some(FresnelSource::Index { eta, k });
         }
         let required = |name| self.table.required_alternative(name).color_or_texture(self.textures);
