@@ -12,6 +12,7 @@ pub mod geometry;
 mod glass_solids;
 mod isolated;
 mod lower;
+mod lower_texture;
 mod merged;
 mod mesh_instance;
 mod mesh_packet;
