@@ -1,43 +1,112 @@
-"""Prints the table of crates/kernel/src/materials/elements.rs: eta and k of metals for linear red, green and blue.
+"""Prints crates/kernel/src/materials/bxdfs/conductor/elements.rs: eta and k of conductors for linear red, green and blue.
 
-Each component is the mean of the measured spectrum, weighted by the matching function of that primary of sRGB (from the colour matching
+Each component is the mean of a measured spectrum, weighted by the matching function of that primary of sRGB (from the color matching
 functions of CIE 1931 in the form of Wyman, Sloan and Shirley, Simple Analytic Approximations to the CIE XYZ Color Matching
-Functions, JCGT 2(2), 2013). Rows are wavelength in nm, n, k.
+Functions, JCGT 2(2), 2013). metals.csv contains the spectra: name, wavelength in nm, n, k. Beyond the first and the last row of a
+conductor, the values stay constant.
 
-Sources: Johnson and Christy, Optical constants of the noble metals, Phys. Rev. B 6, 1972 (gold, silver, copper); Johnson and
-Christy, Optical constants of transition metals, Phys. Rev. B 9, 1974 (iron, chromium, titanium); Rakic, Algorithm for the
-determination of intrinsic optical constants of metal films, Appl. Opt. 34, 1995 (aluminium); as refractiveindex.info has them.
+Sources of the conductors with English names, as refractiveindex.info has them: Johnson and Christy, Optical constants of the noble
+metals, Phys. Rev. B 6, 1972 (gold, silver, copper); Johnson and Christy, Optical constants of transition metals, Phys. Rev. B 9,
+1974 (iron, chromium, titanium); Rakic, Algorithm for the determination of intrinsic optical constants of metal films, Appl. Opt.
+34, 1995 (aluminium).
+
+The conductors with chemical symbols are those that pbrt-v4 and Mitsuba 3 name. Their figures are from the files data/ior/NAME.eta.spd
+and NAME.k.spd of the Python package mitsuba 3 (Na, Ni and V: NAME_palik), which come from the database of luxpop.com; pbrt-v4 has the
+same figures for Ag, Al, Au, Cu, MgO and TiO2. CuZn is from pbrt-v4's src/pbrt/util/spectrum.cpp. The headers of the files state the
+measurement, which CONDUCTORS repeats. Rows without n (AlAs, 394 to 435 nm) are omitted. SnTe has no k.
 """
 
+import csv
 import math
+import sys
+from pathlib import Path
 
-NOBLE = [381.5, 397.4, 413.3, 430.5, 450.9, 471.4, 495.9, 520.9, 548.6, 582.1, 616.8, 659.5, 704.5, 756.0, 821.1]
-OTHER = [381, 397, 413, 431, 451, 471, 496, 521, 549, 582, 617, 659, 704, 756, 821]
-RAKIC = [364.66, 413.28, 442.8, 476.87, 516.6, 563.57, 619.93, 652.25, 688.81, 729.32, 774.91, 815.69]
+PALIK_1 = "Palik 1985"
+PALIK_2 = "Palik 1991"
+# The volume is not stated.
+PALIK = "Palik"
 
-METALS = {
-    "gold": (NOBLE,
-             [1.46, 1.47, 1.46, 1.45, 1.38, 1.31, 1.04, 0.62, 0.43, 0.29, 0.21, 0.14, 0.13, 0.14, 0.16],
-             [1.933, 1.952, 1.958, 1.948, 1.914, 1.849, 1.833, 2.081, 2.455, 2.863, 3.272, 3.697, 4.103, 4.542, 5.083]),
-    "silver": (NOBLE,
-               [0.05, 0.05, 0.05, 0.04, 0.04, 0.05, 0.05, 0.05, 0.06, 0.05, 0.06, 0.05, 0.04, 0.03, 0.04],
-               [1.864, 2.070, 2.275, 2.462, 2.657, 2.869, 3.093, 3.324, 3.586, 3.858, 4.152, 4.483, 4.838, 5.242, 5.727]),
-    "copper": (NOBLE,
-               [1.33, 1.32, 1.28, 1.25, 1.24, 1.25, 1.22, 1.18, 1.02, 0.70, 0.30, 0.22, 0.21, 0.24, 0.26],
-               [2.045, 2.116, 2.207, 2.305, 2.397, 2.483, 2.564, 2.608, 2.577, 2.704, 3.205, 3.747, 4.205, 4.665, 5.180]),
-    "aluminium": (RAKIC,
-                  [0.39877, 0.52135, 0.6079, 0.7278, 0.8734, 1.0728, 1.3660, 1.5724, 1.8301, 2.1606, 2.6154, 2.7668],
-                  [4.3957, 5.0008, 5.3676, 5.7781, 6.2418, 6.7839, 7.4052, 7.7354, 8.0601, 8.3565, 8.4914, 8.2573]),
-    "iron": (OTHER,
-             [2.12, 2.24, 2.35, 2.48, 2.59, 2.67, 2.74, 2.86, 2.95, 2.94, 2.88, 2.92, 2.86, 2.87, 2.94],
-             [2.50, 2.58, 2.65, 2.71, 2.77, 2.82, 2.88, 2.91, 2.93, 2.99, 3.05, 3.10, 3.19, 3.28, 3.39]),
-    "chromium": (OTHER,
-                 [1.92, 2.00, 2.08, 2.19, 2.33, 2.51, 2.75, 2.94, 3.18, 3.22, 3.17, 3.09, 3.05, 3.08, 3.20],
-                 [2.74, 2.83, 2.93, 3.04, 3.14, 3.24, 3.30, 3.33, 3.33, 3.30, 3.30, 3.34, 3.39, 3.42, 3.48]),
-    "titanium": (OTHER,
-                 [1.99, 2.08, 2.14, 2.21, 2.27, 2.32, 2.36, 2.44, 2.54, 2.60, 2.67, 2.76, 2.86, 3.00, 3.21],
-                 [2.93, 2.95, 2.98, 3.01, 3.04, 3.10, 3.19, 3.30, 3.43, 3.58, 3.72, 3.84, 3.96, 4.01, 4.01]),
+# Name, variant, substance, source of the visible part.
+CONDUCTORS = [
+    ("gold", "Gold", "Au", "Johnson and Christy 1972"),
+    ("silver", "Silver", "Ag", "Johnson and Christy 1972"),
+    ("copper", "Copper", "Cu", "Johnson and Christy 1972"),
+    ("aluminium", "Aluminium", "Al", "Rakić 1995"),
+    ("iron", "Iron", "Fe", "Johnson and Christy 1974"),
+    ("chromium", "Chromium", "Cr", "Johnson and Christy 1974"),
+    ("titanium", "Titanium", "Ti", "Johnson and Christy 1974"),
+    ("a-C", "AmorphousCarbon", "Amorphous carbon", PALIK),
+    ("Ag", "Ag", "Silver", "luxpop.com"),
+    ("Al", "Al", "Aluminum", "luxpop.com"),
+    ("AlAs", "AlAs", "Aluminum arsenide", PALIK_2),
+    ("AlSb", "AlSb", "Aluminum antimonide", PALIK_2),
+    ("Au", "Au", "Gold", "luxpop.com"),
+    ("Be", "Be", "Beryllium", PALIK),
+    ("Cr", "Cr", "Chromium", PALIK),
+    ("CsI", "CsI", "Cesium iodide", PALIK_2),
+    ("Cu", "Cu", "Copper", "luxpop.com"),
+    ("Cu2O", "Cu2O", "Copper(I) oxide", PALIK_2),
+    ("CuO", "CuO", "Copper(II) oxide", PALIK_2),
+    ("CuZn", "CuZn", "Brass", "pbrt-v4"),
+    ("d-C", "Diamond", "Diamond", PALIK_1),
+    ("Hg", "Hg", "Mercury", PALIK_2),
+    ("HgTe", "HgTe", "Mercury telluride", PALIK_2),
+    ("Ir", "Ir", "Iridium", PALIK_1),
+    ("K", "K", "Potassium", PALIK_2),
+    ("Li", "Li", "Lithium", PALIK_2),
+    ("MgO", "MgO", "Magnesium oxide", PALIK_2),
+    ("Mo", "Mo", "Molybdenum", PALIK_1),
+    ("Na", "Na", "Sodium", PALIK_2),
+    ("Nb", "Nb", "Niobium", PALIK_2),
+    ("Ni", "Ni", "Nickel", PALIK_1),
+    ("Rh", "Rh", "Rhodium", PALIK_1),
+    ("Se", "Se", "Selenium, ordinary ray", PALIK_2),
+    ("SiC", "SiC", "Silicon carbide", PALIK_2),
+    ("SnTe", "SnTe", "Tin telluride", PALIK_2),
+    ("Ta", "Ta", "Tantalum", PALIK_2),
+    ("Te", "Te", "Tellurium, ordinary ray", PALIK_2),
+    ("ThF4", "ThF4", "Thorium fluoride", PALIK_2),
+    ("TiC", "TiC", "Titanium carbide", PALIK_2),
+    ("TiN", "TiN", "Titanium nitride", PALIK_2),
+    ("TiO2", "TiO2", "Rutile, ordinary ray", PALIK_1),
+    ("V", "V", "Vanadium", PALIK_2),
+    ("VC", "VC", "Vanadium carbide", PALIK_2),
+    ("VN", "VN", "Vanadium nitride", PALIK_2),
+    ("W", "W", "Tungsten", PALIK),
+]
+
+HEAD = '''//! Complex indices of refraction of conductors for linear red, green, and blue.
+//!
+//! The values are measured spectra weighted by the color matching functions of the sRGB primaries.
+//! `assets/metals.py` generates this file from the spectra in `assets/metals.csv`. Conductors with English names:
+//! Johnson and Christy, *Optical constants of the noble metals*, Phys. Rev. B 6, 1972, and *Optical constants of
+//! transition metals*, Phys. Rev. B 9, 1974; Rakić, *Algorithm for the determination of intrinsic optical
+//! constants of metal films*, Appl. Opt. 34, 1995. Conductors with chemical symbols have the figures that pbrt-v4
+//! and Mitsuba 3 use, most of them from Palik, *Handbook of Optical Constants of Solids*, 1985, and its second
+//! volume, 1991.
+
+use crate::choice;
+use crate::math::Vec3;
+
+choice! {
+    /// A metal or compound whose index of refraction is built in.
+    pub enum NamedConductor {
+'''
+
+MIDDLE = '''    }
 }
+
+impl NamedConductor {
+    /// Real and imaginary parts of the index of refraction.
+    pub fn complex_ior(self) -> [Vec3; 2] {
+        let [eta, k] = match self {
+'''
+
+TAIL = '''        };
+        [eta, k].map(Vec3::from_array)
+    }
+}
+'''
 
 
 def bell(x, middle, left, right):
@@ -57,22 +126,39 @@ def at(xs, ys, x):
     for (x0, y0), (x1, y1) in zip(zip(xs, ys), zip(xs[1:], ys[1:])):
         if x0 <= x <= x1:
             return y0 + (y1 - y0) * (x - x0) / (x1 - x0)
-    raise ValueError(x)
+    return ys[0] if x < xs[0] else ys[-1]
+
+
+def spectra():
+    """Wavelengths, n and k of each conductor."""
+    found = {}
+    for row in csv.DictReader(open(Path(__file__).parent / "metals.csv")):
+        for column, key in zip(found.setdefault(row["name"], ([], [], [])), ["nm", "n", "k"]):
+            column.append(float(row[key]))
+    return found
 
 
 def main():
     wavelengths = range(382, 781)
     weights = [matching(x) for x in wavelengths]
-    for name, (xs, *spectra) in METALS.items():
+    total = [sum(w[c] for w in weights) for c in range(3)]
+    known = spectra()
+    print(HEAD, end="")
+    for name, variant, substance, source in CONDUCTORS:
+        print(f"        /// {substance}: {source}.\n        {variant} = \"{name}\",")
+    print(MIDDLE, end="")
+    for name, variant, _, _ in CONDUCTORS:
+        xs, *parts = known[name]
         means = []
-        for spectrum in spectra:
+        for spectrum in parts:
             values = [at(xs, spectrum, x) for x in wavelengths]
-            total = [sum(w[c] for w in weights) for c in range(3)]
             mean = [sum(w[c] * v for w, v in zip(weights, values)) / total[c] for c in range(3)]
-            means.append(", ".join(f"{m:.3f}" for m in mean))
-        print(f"{name}: eta [{means[0]}], k [{means[1]}]")
-        pairs = zip(*([float(m) for m in one.split(",")] for one in means))
-        print("   reflects", [round(((n - 1) ** 2 + k * k) / ((n + 1) ** 2 + k * k), 3) for n, k in pairs])
+            means.append([max(m, 0.0) for m in mean])
+        texts = ", ".join("[" + ", ".join(f"{m:.3f}" for m in mean) + "]" for mean in means)
+        print(f"            Self::{variant} => [{texts}],")
+        reflected = [round(((n - 1) ** 2 + k * k) / ((n + 1) ** 2 + k * k), 3) for n, k in zip(*means)]
+        print(f"{name} reflects {reflected}", file=sys.stderr)
+    print(TAIL, end="")
 
 
 main()

@@ -15,7 +15,7 @@
 //! | [`geometry`] | rays, boxes, shapes, hits with error bounds |
 //! | [`accel`] | bounding volume hierarchies over any shapes and, with vector instructions, over triangles; a k-d tree over triangles |
 //! | [`sampling`] | sample streams, warps, distributions |
-//! | [`materials`] | BSDFs in packets (Phong, metal, plastic, principled, frosted glass), coats over them, blends, mirrors, glass, panes; opacity; texture lookup, normal maps, height maps, Fresnel |
+//! | [`materials`] | BSDFs in packets (Phong, metal, plastic, principled, frosted glass), coats over them, blends, mirrors, glass, panes; opacity; image and procedural textures, normal maps, height maps, Fresnel |
 //! | [`lights`] | point lights (`delta`), lights beyond the scene (`infinite`) and emitting shapes (`area`); the light tree; photon emission |
 //! | [`scene`] | the scene file: definitions of its keys, parsing, writing, validation, diagnostics, the lowered description |
 //! | [`assets`] | readers for meshes, images, glTF and orbiter cameras |

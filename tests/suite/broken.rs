@@ -399,6 +399,32 @@ const BROKEN: &[(&str, &[ExpectedDiagnostic])] = &[
             ),
         ],
     ),
+    ("pattern_normals", &[(12, 14, "a normal map must be an image; this texture is a pattern")]),
+    (
+        "patterns",
+        &[
+            (8, 1, "unknown key `file` in [textures.tiles]; did you mean `filter`?"),
+            (9, 1, "unknown key `size` in [textures.tiles]"),
+            (13, 8, "`size` must be greater than 0; found 0"),
+            (14, 11, "`octaves` must be a whole number between 1 and 16; found 17"),
+            (15, 10, "`colors` must be an array of two colors; found an array of 1 value"),
+            (16, 1, "unknown key `repeat` in [textures.grain]"),
+            (
+                20,
+                20,
+                r##"`colors` must be a color: [r, g, b], a number, "#rrggbb" or a name; did you mean "black"?"##,
+            ),
+            (21, 11, "`repeat` must not be 0; found 0"),
+            (24, 1, "unknown key `colors` in [textures.forgotten]"),
+            (28, 8, r#"`type` cannot be "chequer"; did you mean "checker"?"#),
+            (32, 18, "`colors` must be at least 0; found -1"),
+            (
+                32,
+                23,
+                r##"`colors` must be a color: [r, g, b], a number, "#rrggbb" or a name; found a table"##,
+            ),
+        ],
+    ),
     (
         "photons",
         &[
@@ -659,6 +685,19 @@ fn non_text_files_are_rejected() {
             position_and_message(&diagnostic_for_bytes(nothing.as_bytes())),
             (1, 1, "the scene file is empty".to_owned())
         );
+    }
+}
+
+#[test]
+fn keys_of_other_types_are_named() {
+    let said = diagnostics(&folder().join("patterns.toml"));
+    let helps: Vec<&str> = said.iter().filter_map(|one| one.help.as_deref()).collect();
+    for start in [
+        "`file` is for type \"image\"; expected one of `type`, `colors`, `repeat`",
+        "`size` is for type \"noise\"; expected",
+        "`colors` is for type \"checker\" or \"noise\" or \"bands\"; expected one of `type`, `file`",
+    ] {
+        assert!(helps.iter().any(|help| help.starts_with(start)), "{start}: {helps:#?}");
     }
 }
 

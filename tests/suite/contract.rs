@@ -4,7 +4,7 @@ use std::fs;
 use std::path::PathBuf;
 
 use glimt::math::DVec3;
-use glimt::scene::description::{AffineMap, Camera, Scene};
+use glimt::scene::description::{AffineMap, Camera, Scene, Texture};
 use glimt::scene::diagnostic::{Diagnostic, Severity};
 use glimt::scene::{parse, starter_scene};
 
@@ -37,7 +37,8 @@ pub(crate) fn errors(diagnostics: &[Diagnostic]) -> Vec<&str> {
 pub(crate) fn without_positions(mut scene: Scene) -> Scene {
     scene.objects.iter_mut().for_each(|object| object.span = 0..0);
     scene.instances.iter_mut().for_each(|instance| instance.span = 0..0);
-    scene.textures.iter_mut().for_each(|texture| texture.file.span = 0..0);
+    let images = scene.textures.iter_mut().filter_map(Texture::as_image_mut);
+    images.for_each(|image| image.file.span = 0..0);
     scene.mesh_files.iter_mut().for_each(|file| file.span = 0..0);
     let maps = scene.environment.iter_mut().filter_map(|environment| environment.file.as_mut());
     maps.for_each(|file| file.span = 0..0);
@@ -127,6 +128,11 @@ fn ranges_include_their_limits() {
         "[materials.a]\nopacity = 0\nopacity_cutoff = 1",
         "[materials.a]\nopacity = { texture = \"b\", channel = \"a\" }\n[textures.b]\nfile = \"textures/bumps.png\"",
         "[textures.b]\nfile = \"textures/bumps.png\"\noffset = [-0.5, 7]\nrotate = -720\nuv = 1",
+        "[textures.b]\ntype = \"checker\"\ncolors = [0, [1, 7, 0]]\nrepeat = [-1, 0.5]\nuv = 1",
+        "[textures.b]\ntype = \"noise\"\nsize = 1e-6\noctaves = 16\nseed = 4294967295",
+        "[materials.a]\nbump = \"b\"\n[textures.b]\ntype = \"bands\"\nfilter = \"mipmap\"\nfactor = 2",
+        "[materials.a]\ntype = \"metal\"\ncolor = { texture = \"b\" }\nroughness = { texture = \"b\", channel = \"g\" }\n[textures.b]\ntype = \"noise\"",
+        "[materials.a]\ntype = \"metal\"\nelement = \"Cu2O\"",
         "[materials.a]\ntype = \"metal\"\neta = [0, 0, 0]\nk = [9, 9, 9]\nroughness = 0\nanisotropy = -1",
         "[materials.a]\ntype = \"metal\"\ncolor = 1\nroughness = { texture = \"b\" }\n[textures.b]\nfile = \"textures/bumps.png\"",
         "[materials.a]\ntype = \"plastic\"\nior = 1\nroughness = 1\ndistribution = \"beckmann\"",
@@ -165,6 +171,11 @@ fn ranges_include_their_limits() {
         "[materials.a]\nopacity_cutoff = -0.1",
         "[materials.a]\ntype = \"glass\"\nopacity = 0.5",
         "[textures.b]\nfile = \"textures/bumps.png\"\nuv = 2",
+        "[textures.b]\ntype = \"noise\"\nrepeat = [2, 2]",
+        "[textures.b]\ntype = \"checker\"\ncolors = [1, 0, 0]",
+        "[textures.b]\ntype = \"bands\"\ncolors = [1, -1]",
+        "[materials.a]\nnormal_map = \"b\"\n[textures.b]\ntype = \"noise\"",
+        "[materials.a]\ntype = \"metal\"\nelement = \"Xx\"",
     ] {
         assert_eq!(said(wrong), 1, "{wrong}");
     }
@@ -178,7 +189,8 @@ fn paths_are_relative_to_the_scene() {
     let scene = parse(text.into(), &path).scene.expect("a scene");
     assert_eq!(scene.output, Some(folder.path().join("scenes/cornell.png")));
     assert_eq!(scene.mesh_files[0].value, folder.path().join("scenes/../assets/knot.obj"));
-    assert_eq!(scene.textures[0].file.value, folder.path().join("scenes/textures/bricks.png"));
+    let image = scene.textures[0].as_image().expect("an image");
+    assert_eq!(image.file.value, folder.path().join("scenes/textures/bricks.png"));
 }
 
 #[test]

@@ -167,7 +167,22 @@ rotate = 25
 filter = "mipmap"
 [textures.dapples]
 file = "waves.ppm"
+[textures.tiles]
+type = "checker"
+repeat = [5, 7]
+rotate = 10
+filter = "mipmap"
+[textures.stripes]
+type = "bands"
+repeat = [9, 1]
+[textures.stone]
+type = "noise"
+size = 0.2
+filter = "mipmap"
 [materials]
+tiled = { type = "plastic", diffuse = { texture = "tiles" }, roughness = { texture = "stripes" } }
+striped = { diffuse = { texture = "stripes" }, emission = { texture = "stone", scale = 0.5 } }
+rock = { type = "metal", element = "CuZn", roughness = { texture = "stone" }, bump = "stone" }
 floor = { type = "plastic", diffuse = 0.5, roughness = 0.3, bump = "waves", bump_scale = 0.05 }
 gold = { type = "metal", element = "gold", roughness = 0.3, anisotropy = 0.5 }
 steel = { type = "metal", color = 0.8, roughness = { texture = "waves" }, bump = "waves", bump_scale = 0.1 }
@@ -200,6 +215,21 @@ material = "rubber"
 center = [1, 1.4, -0.5]
 radius = 0.4
 material = "frosted"
+[[quad]]
+corner = [-3, 0, -3]
+u = [2, 0, 0]
+v = [0, 2, 0]
+material = "tiled"
+[[quad]]
+corner = [-1, 0.5, -3]
+u = [2, 0, 0]
+v = [0, 2, 0]
+material = "striped"
+[[sphere]]
+center = [2.2, 0.6, -1.5]
+radius = 0.6
+material = "rock"
+matrix = [1, 0, 0, 0, 0, 1.5, 0, 0, 0, 0.2, 1, 0, 0, 0, 0, 1]
 [[quad]]
 corner = [-2.2, 0, 0.5]
 u = [0.4, 0, 0.3]
@@ -272,8 +302,10 @@ fn material_images_match_known_hashes() {
         let sets = [InstructionSet::Portable, InstructionSet::Avx2, InstructionSet::Avx512];
         let names = ["portable", "avx2", "avx512"];
         let pictures = sets.into_iter().zip(names).filter(|(set, _)| set.or_best_supported() == *set).map(
-            |(_, name)| {
-                let mut process = dir.glimt("materials.toml --once -o materials.exr");
+            |(set, name)| {
+                let threads = set as usize + 1;
+                let mut process =
+                    dir.glimt(&format!("materials.toml --once -o materials.exr --threads {threads}"));
                 let output = process.env("GLIMT_SIMD", name).output().expect("it runs");
                 assert!(output.status.success(), "{name}: {}", String::from_utf8_lossy(&output.stderr));
                 (name, hash(&dir, "materials.exr"))

@@ -103,3 +103,30 @@ fn huge_triangles_shade_like_planes() {
         assert!(differ <= 3, "{size}: {differ} values differ");
     }
 }
+
+#[test]
+fn noise_moves_with_instances() {
+    let dir = TestDir::new();
+    let scene = |shape: &str, x: i32| {
+        format!(
+            "[render]\nwidth = 24\nheight = 24\nsamples = 4\nambient = 1\n\
+             [camera]\nposition = [{x}, 0, 3]\nlook_at = [{x}, 0, 0]\n\
+             [textures.grain]\ntype = \"noise\"\nsize = 0.3\n\
+             [textures.tiles]\ntype = \"checker\"\n\
+             [materials.rock]\ndiffuse = {{ texture = \"grain\" }}\nspecular = {{ texture = \"tiles\" }}\n{shape}"
+        )
+    };
+    let ball = "sphere]]\ncenter = [0, 0, 0]\nradius = 1\nmaterial = \"rock\"\n";
+    let here = render(&dir, &scene(&format!("[[{ball}"), 0));
+    // The camera moves along, so that the world has another origin.
+    let instance = "[[instance]]\ngroup = \"g\"\ntranslate = [100, 0, 0]\n";
+    let there = render(&dir, &scene(&format!("[[groups.g.{ball}{instance}"), 100));
+    let most = here.iter().zip(&there).map(|(a, b)| a.abs_diff(*b)).max();
+    assert!(most.is_some_and(|most| most <= 3), "{most:?}");
+    let (least, most) = (here.iter().filter(|byte| **byte > 0).min(), here.iter().max());
+    assert!(least < Some(&150) && most > Some(&200), "{least:?} {most:?}");
+    let checked = dir.run("check scene.toml");
+    let said =
+        String::from_utf8_lossy(&checked.stdout).into_owned() + &String::from_utf8_lossy(&checked.stderr);
+    assert!(said.contains("1 object, 0 triangles, 2 textures"), "{said}");
+}

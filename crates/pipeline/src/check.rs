@@ -33,7 +33,7 @@ pub struct SceneSummary {
     pub objects: u64,
     /// Triangles in all mesh instances, plus standalone triangles.
     pub triangles: u64,
-    /// Image files, counted once per encoding.
+    /// Image files, counted once per encoding, and procedural textures.
     pub textures: u64,
     /// Non-black point lights, directional lights, environments and emissive objects.
     pub lights: u64,
@@ -159,10 +159,11 @@ fn summarize(assets: &SceneAssets, mut warnings: Vec<Diagnostic>) -> SceneSummar
         let help = "the mesh's own materials emit no light; add a [[light]] or an [environment]".to_owned();
         warnings.push(parsed.loaded.diagnostic_at(0..0, severity, message, Some(help)));
     }
+    let patterns = scene.textures.iter().filter(|texture| texture.as_image().is_none());
     SceneSummary {
         objects: scene.objects.len() as u64,
         triangles: scene.objects.iter().map(|object| triangles(&object.shape)).sum(),
-        textures: textures.images.len() as u64,
+        textures: (textures.images.len() + patterns.count()) as u64,
         lights: count as u64,
         warnings,
     }

@@ -13,7 +13,7 @@ use super::watch::content::{FileContentId, FilePathAndContentId};
 use crate::choice::Choice;
 use crate::integrators::{PhotonSettings, RenderSettings};
 use crate::output::part::NamedRenderInput;
-use crate::scene::description::{CameraOverrides, Scene};
+use crate::scene::description::{CameraOverrides, Scene, Texture};
 use crate::scene::fingerprint::{Fingerprint, FingerprintHasher};
 
 /// Everything that affects an image.
@@ -110,8 +110,8 @@ impl ImageDependencies<'_> {
     /// Returns the scene with each path replaced by a description of the file's content.
     fn copy_scene_with_content_hashes(&self) -> Scene {
         let mut scene = Scene::clone(&self.plan.scene);
-        for texture in &mut scene.textures {
-            texture.file.value = self.describe_file_content(&texture.file.value).into();
+        for image in scene.textures.iter_mut().filter_map(Texture::as_image_mut) {
+            image.file.value = self.describe_file_content(&image.file.value).into();
         }
         if let Some(file) = scene.environment.as_mut().and_then(|environment| environment.file.as_mut()) {
             file.value = self.describe_file_content(&file.value).into();

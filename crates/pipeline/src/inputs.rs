@@ -48,7 +48,10 @@ impl ProtectedInputs {
             Camera::LookAt { .. } => {}
         }
         for texture in &scene.textures {
-            add(&texture.file.value, &texture.file.span, format!("the file for texture `{}`", texture.name));
+            if let Some(image) = texture.as_image() {
+                let role = format!("the file for texture `{}`", texture.name);
+                add(&image.file.value, &image.file.span, role);
+            }
         }
         if let Some(file) = scene.environment.as_ref().and_then(|environment| environment.file.as_ref()) {
             add(&file.value, &file.span, "the environment map".to_owned());

@@ -142,7 +142,7 @@ fn light_descriptions_key(scene: &Scene, of: &FingerprintContext<'_>) -> Fingerp
                     .add(&object.shape, of)
                     .add(&material.emission, of)
                     .add(&material.opacity, of);
-                key.add(&material.emitter_coat().cloned(), of);
+                key.add(&material.emitter_coat().cloned(), of).add(&object.placement.as_deref().copied(), of);
                 // Blends emit through their parts, so add the whole material.
                 if !material.kind.parts().is_empty() {
                     key.add(material, of);
@@ -210,6 +210,7 @@ pub(crate) fn surfaces_and_lights_key(
             None => key.add_usize(0),
         };
         key.add_bool(object.shape.as_mesh().is_some_and(|mesh| mesh.vertex_colors));
+        key.add(&object.placement.as_deref().copied(), of);
     }
     for texture in textures {
         key.add_fingerprint(texture);

@@ -51,6 +51,39 @@ fn with_files(text: &str) -> Scene {
 }
 
 #[test]
+fn placements_start_after_the_shapes_own_keys() {
+    let text = format!(
+        "[textures.grain]\ntype = 'noise'\n[materials.m]\n[materials.rock]\nbump = 'grain'\n\
+         [materials.mix]\ntype = 'blend'\nmaterials = ['m', 'rock']\n\
+         [[sphere]]\ncenter = [1, 2, 3]\nradius = 2\nmaterial = 'rock'\n{scaled}\
+         [[sphere]]\nradius = 1\ncenter = [0, 0, 0]\nmaterial = 'm'\n{scaled}\
+         [[mesh]]\nfile = 'files/knot.obj'\nmaterial = 'mix'\nscale = 3\ntranslate = [0, 9, 0]\n\
+         [[groups.g.mesh]]\nfile = 'files/knot.obj'\nmaterial = 'mix'\nscale = 3\n\
+         [[groups.g.sphere]]\ncenter = [1, 2, 3]\nradius = 1\nmaterial = 'rock'\n{scaled}\
+         [[instance]]\ngroup = 'g'\ntranslate = [10, 20, 30]\n",
+        scaled = "matrix = [2, 0, 0, 4, 0, 2, 0, 5, 0, 0, 2, 6, 0, 0, 0, 1]\n",
+    );
+    let scene = with_files(&text);
+    let map = |scale: f64, translate: [f64; 3]| {
+        let linear = DVec3::AXES.map(|axis| axis * scale);
+        Some(AffineMap { linear, translate: DVec3::from_array(translate) })
+    };
+    let placements: Vec<_> =
+        scene.objects.iter().map(|object| object.placement.as_deref().copied()).collect();
+    let expected = [
+        map(2.0, [4.0, 5.0, 6.0]),
+        None,
+        map(1.0, [0.0; 3]),
+        map(1.0, [10.0, 20.0, 30.0]),
+        map(2.0, [14.0, 25.0, 36.0]),
+    ];
+    assert_eq!(placements, expected);
+    // World coordinates (4, 5, 6) + 2·(1, 2, 3) are (1, 2, 3) in the first sphere's own coordinates.
+    let frame = scene.objects[0].object_frame(DVec3::ONE);
+    assert_eq!(frame.inverse_point(DVec3::new(5.0, 8.0, 11.0)), DVec3::new(1.0, 2.0, 3.0));
+}
+
+#[test]
 fn instances_equal_written_shapes() {
     let product = |translate: [f64; 3]| {
         // The linear part of `matrix`, applied twice.

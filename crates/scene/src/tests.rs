@@ -162,8 +162,9 @@ fn mesh_files_are_listed_once() {
         [(0, DVec3::splat(2.0), true, Some(0)), (1, DVec3::ONE, false, None), (0, flipped, true, None)];
     assert_eq!(meshes, expected);
     let texture = &scene.textures[0];
+    let image = texture.as_image().expect("an image");
     assert_eq!(
-        (texture.repeat, texture.wrap, texture.filter),
+        (image.repeat, image.wrap, texture.filter),
         (Vec2::new(2.0, -1.0), Wrap::Mirror, TextureFilter::Nearest)
     );
     let MaterialKind::Phong(PhongParameters { diffuse, .. }) = &scene.materials[0].kind else {

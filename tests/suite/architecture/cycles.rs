@@ -25,7 +25,7 @@ const PAIRS: [(&str, &str, &str); 9] = [
         "an error lists the valid formats, and parsing a format may return this error",
     ),
     (
-        "scene/description/material",
+        "scene/description/texture",
         "scene/fingerprint",
         "a fingerprint includes the textures that materials refer to",
     ),

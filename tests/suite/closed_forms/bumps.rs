@@ -87,7 +87,7 @@ fn ramp_equals_constant_normal_map() {
             let cube = |build: Build, material| build.cuboid(DVec3::ZERO, DVec3::ONE, DVec3::ZERO, material);
             let (mut relief, mut mapped) = (lit.clone(), lit);
             let texture = heights(&mut relief, 8, |at| 2.0 * at.x);
-            let shown = &mut relief.scene.textures[texture];
+            let shown = relief.image_mut(texture);
             (shown.repeat, shown.offset) = (Vec2::splat(0.5), Vec2::splat(0.25));
             let relief = cube(relief, bumped(texture, slope, material.clone()));
             let normal = v(-slope, 0.0, 1.0).normalize().as_vec3() * 0.5 + 0.5;
@@ -132,7 +132,7 @@ fn tiled_waves_have_analytic_normals() {
     ] {
         let mut build = scene();
         let texture = heights(&mut build, COLUMNS, |at| waves(at).0);
-        let tiled = &mut build.scene.textures[texture];
+        let tiled = build.image_mut(texture);
         (tiled.repeat, tiled.rotate, tiled.offset) = (repeat.as_vec2(), degrees, offset.as_vec2());
         let build = build.quad(DVec3::ZERO, u, w, bumped(texture, 0.05, matte(0.5)));
         for at in [DVec2::new(0.21, 0.34), DVec2::new(0.7, 0.55), DVec2::new(0.43, 0.9)] {
@@ -163,7 +163,7 @@ fn waves_on_a_sphere_have_displaced_normals() {
     };
     let mut build = scene();
     let texture = heights(&mut build, COLUMNS, |at| waves(at).0);
-    build.scene.textures[texture].repeat = Vec2::new(4.0, 2.0);
+    build.image_mut(texture).repeat = Vec2::new(4.0, 2.0);
     let ball = build.sphere(DVec3::ZERO, radius, bumped(texture, scale, matte(0.5)));
     for uv in [DVec2::new(0.3, 0.4), DVec2::new(0.61, 0.77), DVec2::new(0.93, 0.15)] {
         let repeat = DVec2::new(4.0, 2.0);
@@ -214,7 +214,7 @@ fn distant_mipmapped_waves_are_flat() {
     // At a distance of 400 units, a 1° pixel is 7 units wide. A wave is 1 unit wide.
     let mut build = scene();
     let texture = heights(&mut build, 32, |at| waves(at).0);
-    build.scene.textures[texture].repeat = Vec2::splat(200.0);
+    build.image_mut(texture).repeat = Vec2::splat(200.0);
     let (u, w) = (v(200.0, 0.0, 0.0), v(0.0, 0.0, -200.0));
     let seen = |filter, distance: f64| {
         let mut build = build.clone();
@@ -237,7 +237,7 @@ fn bumpy_balls_have_no_black_edge() {
     for (name, material) in materials().into_iter().filter(|(name, _)| *name != "glass") {
         let mut build = scene().environment(1.0);
         let texture = heights(&mut build, 16, |at| (TAU * at.y).cos());
-        build.scene.textures[texture].repeat = Vec2::new(1.0, 4.0);
+        build.image_mut(texture).repeat = Vec2::new(1.0, 4.0);
         let ball = lat_long_sphere(12, 16, 1.0, DVec3::ZERO);
         let uvs = |p: &Vec3| Vec2::new(0.5 + p.z.atan2(p.x) / TAU as f32, 0.5 + p.y.asin() / PI as f32);
         let mesh = TriangleMesh { uvs: ball.positions.iter().map(uvs).collect(), ..ball };

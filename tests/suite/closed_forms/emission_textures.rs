@@ -56,13 +56,13 @@ fn lambert_irradiance(scale: f64) -> f64 {
 fn checkered_quad_light_matches_its_squares() {
     let mut lit = at_origin();
     let texture = grays(&mut lit, &CHECKER, TextureFilter::Nearest, Vec2::ONE);
-    let lit = lit.quad(CORNER, U, V, textured_emitter(texture, 2.0));
+    let mut lit = lit.quad(CORNER, U, V, textured_emitter(texture, 2.0));
     assert_irradiance("whitted", &lit, lambert_irradiance(2.0), 5e-4);
     assert_irradiance("path", &path_traced(&lit), lambert_irradiance(2.0), 5e-4);
     assert_hard("hard shadows", &lit, lambert_irradiance(2.0), 1e-3);
     // A mirrored texture must change the result.
-    let half = lit.with(|scene| scene.textures[0].repeat = Vec2::new(-1.0, 1.0));
-    let turned = half.values(256, 64);
+    lit.image_mut(0).repeat = Vec2::new(-1.0, 1.0);
+    let turned = lit.values(256, 64);
     let (mean, error) = mean_and_error(&turned);
     assert!((mean - 0.7 * lambert_irradiance(2.0) / PI).abs() > 20.0 * error, "{mean} ± {error}");
 }

@@ -25,6 +25,7 @@ mod null_interactions;
 mod one_sided;
 mod packets;
 mod photons;
+mod procedural;
 mod projections;
 mod repeated_faces;
 mod robust;

@@ -15,11 +15,12 @@ use glimt::materials::texels::{TexelData, Texels};
 use glimt::math::{DVec3, Vec2, Vec3};
 use glimt::scene::description::light::{Falloff, PointLight};
 use glimt::scene::description::{
-    Accel, Camera, CoatSource, ColorSource, EmissionSource, Environment, FresnelSource, ImageWindow,
-    Integrator, Light, MapOrientation, Material, MaterialKind, MeshFile, MeshReference,
-    MicrofacetDistribution, NumberSource, Object, ObjectTransform, OpacitySource, PhongParameters,
-    PhotonOptions, PixelFilter, Projection, ReflectingSides, RenderOptions, Scene, ShadowMode, Shape, Sky,
-    Spanned, Texture, TextureEncoding, TextureFilter, Tonemap, UvSet, Wrap,
+    Accel, AffineMap, Camera, CoatSource, ColorSource, EmissionSource, Environment, FresnelSource,
+    ImageSource, ImageWindow, Integrator, Light, MapOrientation, Material, MaterialKind, MeshFile,
+    MeshReference, MicrofacetDistribution, NumberSource, Object, ObjectTransform, OpacitySource, Pattern,
+    PhongParameters, PhotonOptions, PixelFilter, Projection, ReflectingSides, RenderOptions, Scene,
+    ShadowMode, Shape, Sky, Spanned, Texture, TextureContent, TextureEncoding, TextureFilter, Tonemap, UvSet,
+    Wrap,
 };
 use glimt::world::{
     EnvironmentSource, Geometry, Image, MeshTree, TextureRolesNeededByRender, World, WorldInputs,
@@ -145,8 +146,37 @@ impl Build {
     pub fn shape(mut self, shape: Shape, material: Material) -> Self {
         self.scene.materials.push(material);
         let material = Some(self.scene.materials.len() - 1);
-        self.scene.objects.push(Object { shape, material, name: None, span: 0..0 });
+        self.scene.objects.push(Object { shape, material, placement: None, name: None, span: 0..0 });
         self
+    }
+
+    /// Adds a shape with a texture in its own coordinates, and a matrix.
+    pub fn shape_with_matrix(self, shape: Shape, matrix: AffineMap, material: Material) -> Self {
+        let mut build = self.shape(shape, material).with_placements();
+        let object = build.scene.objects.pop().expect("the shape");
+        build.scene.objects.push(object.placed(&ObjectTransform::Matrix(matrix)));
+        build
+    }
+
+    /// Prepares all objects for textures in their own coordinates.
+    pub fn with_placements(self) -> Self {
+        let identity = Box::new(ObjectTransform::IDENTITY.to_affine_map());
+        self.with(|scene| {
+            scene.objects.iter_mut().for_each(|object| object.placement = Some(identity.clone()));
+        })
+    }
+
+    /// The image of a texture.
+    pub fn image_mut(&mut self, texture: usize) -> &mut ImageSource {
+        self.scene.textures[texture].as_image_mut().expect("an image")
+    }
+
+    /// Adds a pattern. Returns its index.
+    pub fn pattern(&mut self, pattern: Pattern, colors: [Vec3; 2], filter: TextureFilter) -> usize {
+        let content = TextureContent::Pattern { colors, pattern };
+        let name = format!("pattern {}", self.scene.textures.len());
+        self.scene.textures.push(Texture { name, filter, factor: Vec3::ONE, content });
+        self.scene.textures.len() - 1
     }
 
     pub fn sphere(self, center: DVec3, radius: f64, material: Material) -> Self {
@@ -212,10 +242,8 @@ impl Build {
             data: TexelData::Float(rows.concat()),
             unusable: 0,
         }));
-        self.scene.textures.push(Texture {
-            name: format!("{number}"),
+        let image = ImageSource {
             file: Spanned { value: PathBuf::from(format!("{number}.exr")), span: 0..0 },
-            filter,
             wrap,
             repeat,
             rotate: 0.0,
@@ -223,8 +251,9 @@ impl Build {
             uv: UvSet::First,
             encoding: TextureEncoding::Linear,
             image: None,
-            factor: Vec3::ONE,
-        });
+        };
+        let (name, content) = (format!("{number}"), TextureContent::Image(image));
+        self.scene.textures.push(Texture { name, filter, factor: Vec3::ONE, content });
         number
     }
 

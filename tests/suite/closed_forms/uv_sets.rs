@@ -84,7 +84,8 @@ fn second_uv_set_is_bit_identical_to_first() {
         for integrator in [Integrator::Whitted, Integrator::Path] {
             let mut build = scene().with(|scene| scene.render.integrator = integrator);
             let image = texture(&mut build, filter);
-            let second = build.clone().with(|scene| scene.textures[image].uv = UvSet::Second);
+            let mut second = build.clone();
+            second.image_mut(image).uv = UvSet::Second;
             for (name, material) in materials(image) {
                 for mirrored in [1.0, -1.0] {
                     let seen = |build: &Build, mesh| picture(build, mesh, material.clone(), mirrored);
@@ -119,7 +120,7 @@ fn one_material_can_use_both_uv_sets() {
         let mut of = |values: [f32; 2], uv| {
             let row = values.map(Vec3::splat);
             let number = build.texture(&[&row], TextureFilter::Nearest, Wrap::Repeat, Vec2::ONE);
-            build.scene.textures[number].uv = uv;
+            build.image_mut(number).uv = uv;
             number
         };
         let [color, light] = [of(colors, UvSet::First), of(lights, UvSet::Second)];

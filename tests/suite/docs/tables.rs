@@ -66,7 +66,7 @@ fn of_definition(info: &'static TableInfo) -> Vec<DefinedTable> {
         };
         let keys = info.keys_for_type(Some(kind)).filter(|key| !is_refused(key)).collect();
         let own = (heading(code.clone()), kind.keys.len());
-        let common = ("Every material".to_owned(), info.keys.len());
+        let common = (format!("Every {}", info.name.trim_end_matches('s')), info.keys.len());
         let headings = [own, common].into_iter().filter(|(_, count)| *count > 0).collect();
         DefinedTable { info, kind: Some(kind), head: format!("{head}\n{code}\n"), headings, keys }
     };
@@ -210,6 +210,7 @@ fn accepted_and_rejected(key: &KeyInfo) -> (Vec<String>, Vec<String>) {
     };
     let written = |number: f64| match key.kind {
         ValueKind::Numbers(count, ..) => format!("[{}]", vec![number.to_string(); count].join(", ")),
+        ValueKind::ColorPair(_) => format!("[{number}, {number}]"),
         _ => number.to_string(),
     };
     (inside.into_iter().map(written).collect(), outside.into_iter().map(written).collect())
@@ -325,7 +326,7 @@ fn reader_schema_and_explain_follow_definitions() {
 #[test]
 fn definition_has_every_key() {
     let tables = tables();
-    assert_eq!(tables.len(), 28);
+    assert_eq!(tables.len(), 31);
     for table in tables {
         let text = table.scene("", "zzz = 1");
         let outcome = parse(text.into(), &root().join("scenes/page.toml"));

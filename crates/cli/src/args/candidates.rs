@@ -136,6 +136,7 @@ fn key_value_completions(kind: ValueKind, outline: &[OutlineTable]) -> Vec<Descr
         | ValueKind::Number(_)
         | ValueKind::Text
         | ValueKind::File(_)
+        | ValueKind::ColorPair(_)
         | ValueKind::NumberOrTexture(_)
         | ValueKind::Numbers(..)
         | ValueKind::Scale(_)

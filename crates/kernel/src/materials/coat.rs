@@ -17,7 +17,7 @@
 use super::footprint::TexturePoint;
 use super::fresnel::{dielectric_from_outside, schlick_weight};
 use super::lobe_albedo::{LobeAlbedoPolynomial, TERMS, evaluate_albedo_fit};
-use super::lookup::{ParameterLookup, PointLookup};
+use super::lookup::{MaterialTextureCollector, ParameterLookup, PointLookup};
 use super::microfacet::{
     self, MicrofacetDistribution, SmithTerms, UnnormalizedHalfVector, sample_reflection,
 };
@@ -97,6 +97,13 @@ impl Coat {
             extinction: Vec3::new(log2(tint.x), log2(tint.y), log2(tint.z)) * -0.5,
             albedo: albedo.dielectric_albedo(reflectance),
         }
+    }
+
+    /// Whether any texture uses the shape's own coordinates.
+    pub fn uses_object_point(&self) -> bool {
+        let mut textures = MaterialTextureCollector::default();
+        self.look_up_parameters(&mut textures);
+        textures.scattering.iter().any(|texture| texture.uses_object_point())
     }
 
     /// Transmittance t for light that leaves the layer below at the given cosine. Counts texture lookups in

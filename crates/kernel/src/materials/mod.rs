@@ -30,7 +30,7 @@ pub use bxdfs::*;
 pub use coat::{Coat, CoatInputs};
 pub use dielectric::Dielectric;
 pub use emission::{Emission, EmissionSides};
-pub use footprint::{Footprint, SecondUvPoint, TexturePoint, UvSet};
+pub use footprint::{ExtraCoordinates, Footprint, ObjectPoint, SecondUvPoint, TexturePoint, UvSet};
 pub use mipmaps::Mipmaps;
 pub use mirror::Mirror;
 pub use normal_map::NormalMap;
@@ -195,9 +195,14 @@ impl Material {
         through * there + Vec3::splat(1.0 - there)
     }
 
-    /// Whether any of the textures has mip levels.
+    /// Whether any texture filters its lookups by the footprint.
     pub fn is_mipmapped(&self) -> bool {
-        self.textures().iter().any(|texture| texture.mipmaps.is_some())
+        self.textures().iter().any(|texture| texture.uses_footprint())
+    }
+
+    /// Whether any texture uses the shape's own coordinates.
+    pub fn uses_object_point(&self) -> bool {
+        self.textures().iter().any(|texture| texture.uses_object_point())
     }
 
     /// All textures. Skips the coat of the emission, which has the same textures as the coat of the BSDF.

@@ -22,9 +22,12 @@ impl NormalMap {
     /// vectors or perpendicular. If they are 0, an arbitrary frame is used.
     #[inline]
     pub fn perturb(&self, at: &TexturePoint, normal: Vec3, dpdu: Vec3, dpdv: Vec3) -> Vec3 {
-        let mapped = self.texture.lookup(at) * 2.0 - Vec3::ONE;
-        let slope = self.texture.flip_slopes_in_mirrored_tiles(at, mapped.truncate() * self.strength);
-        let [dpdu, dpdv] = self.texture.transformed_tangents(self.texture.uv_set_tangents(at, [dpdu, dpdv]));
+        // Scenes use only images as normal maps.
+        let Texture::Image(image) = &*self.texture else { return normal };
+        let mapped = image.lookup(at) * 2.0 - Vec3::ONE;
+        let slope = image.flip_slopes_in_mirrored_tiles(at, mapped.truncate() * self.strength);
+        let mapping = &image.mapping;
+        let [dpdu, dpdv] = mapping.transformed_tangents(mapping.uv_set_tangents(at, [dpdu, dpdv]));
         let (tangent, bitangent) = orthogonalize_tangents(normal, dpdu, dpdv);
         let bent = tangent * slope.x + bitangent * slope.y + normal * mapped.z.abs();
         bent.try_normalize().unwrap_or(normal)
@@ -48,7 +51,7 @@ mod tests {
     use super::*;
     use crate::materials::footprint::UvSet;
     use crate::materials::texels::{TexelData, Texels};
-    use crate::materials::texture::{TextureFilter, UvTransform, Wrap};
+    use crate::materials::texture::{ImageTexture, TextureFilter, TextureMapping, UvTransform, Wrap};
     use crate::math::{DVec2, Vec2};
 
     fn middle() -> TexturePoint {
@@ -58,23 +61,27 @@ mod tests {
     fn map(normal: Vec3) -> NormalMap {
         let data = TexelData::Float(vec![(normal + Vec3::ONE) * 0.5]);
         let texels = Arc::new(Texels { width: 1, height: 1, data, unusable: 0 });
-        let texture = Texture {
+        let image = ImageTexture {
             texels,
             filter: TextureFilter::Nearest,
             wrap: Wrap::Repeat,
-            repeat: Vec2::ONE,
+            mapping: TextureMapping::IDENTITY,
             mipmaps: None,
-            moved: None,
             factor: None,
         };
-        NormalMap { texture: Arc::new(texture), strength: 1.0 }
+        NormalMap { texture: Arc::new(Texture::Image(image)), strength: 1.0 }
+    }
+
+    fn image_mut(map: &mut NormalMap) -> &mut ImageTexture {
+        let Texture::Image(image) = Arc::make_mut(&mut map.texture) else { panic!("an image") };
+        image
     }
 
     #[test]
     fn slopes_rotate_with_the_texture() {
         let mut turned = map(Vec3::new(0.6, 0.0, 0.8));
-        let texture = Arc::make_mut(&mut turned.texture);
-        texture.moved = UvTransform::new(UvSet::First, 90.0, DVec2::ZERO).map(Box::new);
+        let mapping = &mut image_mut(&mut turned).mapping;
+        mapping.moved = UvTransform::new(UvSet::First, 90.0, DVec2::ZERO).map(Box::new);
         // The texture's first coordinate equals −v.
         let bent = turned.perturb(&middle(), Vec3::Z, Vec3::X, Vec3::Y);
         assert!((bent - Vec3::new(0.0, -0.6, 0.8)).length() < 1e-6, "{bent}");
@@ -82,8 +89,8 @@ mod tests {
         // v' = 3 v cos − 2 u sin with an angle of −30°. The tangent along u' is the direction in which v' is
         // constant.
         let mut turned = map(Vec3::new(0.6, 0.0, 0.8));
-        let texture = Arc::make_mut(&mut turned.texture);
-        (texture.moved, texture.repeat) =
+        let mapping = &mut image_mut(&mut turned).mapping;
+        (mapping.moved, mapping.repeat) =
             (UvTransform::new(UvSet::First, -30.0, DVec2::ZERO).map(Box::new), Vec2::new(2.0, 3.0));
         let (dpdu, dpdv) = (Vec3::new(2.0, 0.5, 0.0), Vec3::new(-0.3, 0.7, 0.0));
         let (sine, cosine) = 30.0_f32.to_radians().sin_cos();
@@ -109,8 +116,8 @@ mod tests {
         ];
         for (repeat, wrap, uv, sides) in cases {
             let mut map = map(leaning);
-            let texture = Arc::make_mut(&mut map.texture);
-            (texture.repeat, texture.wrap) = (repeat, wrap);
+            let image = image_mut(&mut map);
+            (image.mapping.repeat, image.wrap) = (repeat, wrap);
             let bent = map.perturb(&TexturePoint::from_uv(uv), Vec3::Z, Vec3::X, Vec3::Y);
             let expected = Vec3::new(0.48 * sides[0], 0.36 * sides[1], 0.8);
             assert!((bent - expected).length() < 1e-6, "{repeat} {wrap:?} {uv}: {bent}");

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::footprint::TexturePoint;
 use super::normal_map::NormalMap;
-use super::texture::Texture;
+use super::texture::{HeightSlopes, Texture};
 use crate::math::Vec3;
 
 /// A normal map, a bump map, or both.
@@ -73,10 +73,15 @@ impl Bump {
     /// add up: if m is the normal from the normal map, the perturbed normal has the direction m / (m · n) −
     /// ∇h.
     fn perturb(&self, at: &TexturePoint, normal: Vec3, bent: Vec3, tangents: [Vec3; 2]) -> Vec3 {
-        let [dpdu, dpdv] = self.texture.uv_set_tangents(at, tangents);
-        let slopes = self.texture.slopes(at) * self.scale;
-        let volume = normal.dot(dpdu.cross(dpdv));
-        let gradient = (dpdv.cross(normal) * slopes.x + normal.cross(dpdu) * slopes.y) / volume;
+        let gradient = match self.texture.slopes(at) {
+            HeightSlopes::AlongUv(slopes) => {
+                let [dpdu, dpdv] = self.texture.uv_set_tangents(at, tangents);
+                let slopes = slopes * self.scale;
+                let volume = normal.dot(dpdu.cross(dpdv));
+                (dpdv.cross(normal) * slopes.x + normal.cross(dpdu) * slopes.y) / volume
+            }
+            HeightSlopes::World(gradient) => (gradient - normal * gradient.dot(normal)) * self.scale,
+        };
         (bent - gradient * bent.dot(normal)).try_normalize().unwrap_or(bent)
     }
 }
@@ -85,23 +90,45 @@ impl Bump {
 mod tests {
     use super::*;
     use crate::materials::texels::{TexelData, Texels};
-    use crate::materials::texture::{TextureFilter, Wrap};
-    use crate::math::{DVec2, Vec2};
+    use crate::materials::texture::{ImageTexture, TextureFilter, TextureMapping, Wrap};
+    use crate::math::DVec2;
 
     /// A texture with a single row of values.
     fn texture(numbers: &[Vec3]) -> Arc<Texture> {
         let data = TexelData::Float(numbers.to_vec());
         let texels = Arc::new(Texels { width: numbers.len() as u32, height: 1, data, unusable: 0 });
         let (filter, wrap) = (TextureFilter::Bilinear, Wrap::Repeat);
-        Arc::new(Texture {
-            texels,
-            filter,
-            wrap,
-            repeat: Vec2::ONE,
-            mipmaps: None,
-            moved: None,
-            factor: None,
-        })
+        let mapping = TextureMapping::IDENTITY;
+        Arc::new(Texture::Image(ImageTexture { texels, filter, wrap, mapping, mipmaps: None, factor: None }))
+    }
+
+    #[test]
+    fn noise_bumps_need_no_tangents() {
+        use crate::materials::footprint::{ExtraCoordinates, ObjectPoint};
+        use crate::materials::texture::{Noise, Pattern, PatternTexture};
+        use crate::math::DMat3;
+
+        let pattern = Pattern::Noise(Noise { size: 1.0, octaves: 2, seed: 1 });
+        let texture = PatternTexture { pattern, colors: [Vec3::ZERO, Vec3::ONE], is_filtered: false };
+        let at = |point: Vec3| {
+            let object = ObjectPoint { position: point.as_dvec3(), width: 0.0, from_world: DMat3::IDENTITY };
+            let extra = Some(Box::new(ExtraCoordinates { second: None, object: Some(object) }));
+            TexturePoint { extra, ..TexturePoint::from_uv(DVec2::ZERO) }
+        };
+        let height = |point: Vec3| texture.lookup(&at(point)).x;
+        let normal = Vec3::new(2.0, -1.0, 2.0) / 3.0;
+        let bump = Bump { texture: Arc::new(Texture::Pattern(texture.clone())), scale: 0.1 };
+        let point = Vec3::new(0.3, 0.6, -0.8);
+        let bent = bump.perturb(&at(point), normal, normal, [Vec3::ZERO; 2]);
+        // The displaced surface has the slopes of the height along two tangents.
+        let tangents = [Vec3::new(1.0, 2.0, 0.0), Vec3::new(0.0, 2.0, 1.0)];
+        let step = 1e-3;
+        for tangent in tangents {
+            let rise = height(point + tangent * step) - height(point - tangent * step);
+            let displaced = tangent + normal * (0.1 * rise / (2.0 * step));
+            assert!(bent.dot(displaced).abs() < 1e-3, "{bent}: {displaced}");
+        }
+        assert!((bent - normal).length() > 1e-2, "{bent}");
     }
 
     /// A bump map whose heights increase by 1 per unit of u near the center.

@@ -5,6 +5,8 @@ use std::sync::Arc;
 use super::footprint::TexturePoint;
 use super::texture::Texture;
 use crate::choice;
+use crate::math::Vec3;
+use crate::math::color::luminance;
 
 choice! {
     /// A channel of an image.
@@ -35,6 +37,19 @@ pub enum ChannelSelector {
         /// Whether the luminance is also used if some pixels are not gray.
         of_any_color: bool,
     },
+}
+
+impl ChannelSelector {
+    /// The value of an opaque linear color.
+    pub fn of_opaque_color(self, color: Vec3) -> f32 {
+        match self {
+            Self::Luminance | Self::Opacity | Self::Mask { of_any_color: _ } => luminance(color),
+            Self::Channel(Channel::Red) => color.x,
+            Self::Channel(Channel::Green) => color.y,
+            Self::Channel(Channel::Blue) => color.z,
+            Self::Channel(Channel::Alpha) => 1.0,
+        }
+    }
 }
 
 /// A scalar parameter, constant or textured.

@@ -89,7 +89,10 @@ fn emissive_material_textures(scene: &Scene) -> impl Iterator<Item = TextureSour
             | TextureRole::NormalMap
             | TextureRole::Bump(_) => false,
         });
-        textures.map(|texture| world::scene_material_texture_source(scene, material, texture))
+        textures.filter_map(|texture| {
+            let image = scene.textures[texture.0].as_image()?;
+            Some(world::scene_material_texture_source(scene, material, texture, image))
+        })
     })
 }
 

@@ -124,7 +124,7 @@ pub(super) fn warn_about_missing_mesh_data<'a>(
         let Some(material) = material else { continue };
         let name = &material.name;
         let textures = &loaded.scene.textures;
-        let is_second = |(texture, _): &(usize, _)| textures[*texture].uv == UvSet::Second;
+        let is_second = |(texture, _): &(usize, _)| textures[*texture].uv_set() == Some(UvSet::Second);
         let all: Vec<_> = material.with_parts().into_iter().flat_map(Material::textures).collect();
         if let Some((texture, _)) = all.iter().find(|texture| is_second(texture))
             && read.second_uvs.is_empty()
@@ -142,7 +142,7 @@ pub(super) fn warn_about_missing_mesh_data<'a>(
                 "{file} has no texture coordinates, which the `anisotropy` of \"{name}\" needs to determine its direction"
             ));
         }
-        if !all.is_empty() {
+        if all.iter().any(|(texture, _)| textures[*texture].uv_set().is_some()) {
             warn(format!(
                 "{file} has no texture coordinates: each triangle shows half of every texture of \"{name}\""
             ));

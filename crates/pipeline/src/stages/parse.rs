@@ -15,7 +15,7 @@ use crate::assets::{self, AssetError, GkitOrbiterCamera};
 use crate::control::{CancelToken, Canceled};
 use crate::output::held::{self, BackupRecovery};
 use crate::scene;
-use crate::scene::description::Camera;
+use crate::scene::description::{Camera, Texture};
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::fingerprint::{Fingerprint, FingerprintHasher};
 use crate::scene::sanitize::escape_invisible_chars;
@@ -210,8 +210,9 @@ fn add_renamed_file_hint(
 fn referenced_files(loaded: &scene::LoadedScene, token: &CancelToken) -> Result<Vec<PathBuf>, Canceled> {
     let is_read = |path: &&PathBuf| loaded.scene.mesh_files.iter().any(|file| file.value == **path);
     let named = loaded.named.iter().filter(|path| !is_read(path));
-    let containers = loaded.scene.textures.iter().filter(|texture| texture.image.is_some());
-    let containers = containers.map(|texture| &texture.file.value).filter(|path| !is_read(path));
+    let images = loaded.scene.textures.iter().filter_map(Texture::as_image);
+    let containers = images.filter(|image| image.image.is_some());
+    let containers = containers.map(|image| &image.file.value).filter(|path| !is_read(path));
     let referenced = files_referenced_by_assets(named.chain(containers), token)?;
     Ok(loaded.named.iter().cloned().chain(referenced).collect())
 }

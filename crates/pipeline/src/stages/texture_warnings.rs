@@ -156,7 +156,7 @@ pub(super) fn environment_span(scene: &Scene) -> Option<Range<usize>> {
 /// Returns the span that references a texture: its own table, or the mesh whose materials use it.
 fn reference_span(loaded: &LoadedScene, one: &NeededTexture) -> Range<usize> {
     let scene = &loaded.scene;
-    let declared = one.declared.map(|index| scene.textures[index].file.span.clone());
+    let declared = one.declared.and_then(|index| Some(scene.textures[index].as_image()?.file.span.clone()));
     let mesh = || one.mesh_file.map(|index| scene.mesh_files[index].span.clone());
     let environment = || environment_span(scene).filter(|_| one.is_environment);
     declared.or_else(mesh).or_else(environment).unwrap_or(0..0)

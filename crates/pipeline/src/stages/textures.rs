@@ -241,15 +241,16 @@ fn add_check_only_textures(loaded: &LoadedScene, wanted: &mut Vec<NeededTexture>
     let name = |path: &Path, image: Option<u32>| (path.to_owned(), image);
     let mut known: HashSet<_> = wanted.iter().map(|one| name(&one.source.path, one.source.image)).collect();
     for (index, texture) in loaded.scene.textures.iter().enumerate() {
-        if !known.insert(name(&texture.file.value, texture.image)) {
+        let Some(image) = texture.as_image() else { continue };
+        if !known.insert(name(&image.file.value, image.image)) {
             continue;
         }
-        let encoding = match texture.encoding {
+        let encoding = match image.encoding {
             TextureEncoding::Auto => ImageEncoding::Color,
             TextureEncoding::Srgb => ImageEncoding::Srgb,
             TextureEncoding::Linear => ImageEncoding::Linear,
         };
-        let (path, image) = (texture.file.value.clone(), texture.image);
+        let (path, image) = (image.file.value.clone(), image.image);
         let source = TextureSource { path, image, encoding, coverage: None };
         wanted.push(NeededTexture {
             source,

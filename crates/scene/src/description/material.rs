@@ -1,54 +1,9 @@
-//! Textures and materials: the `[textures.*]` and `[materials.*]` tables.
-
-use std::path::PathBuf;
+//! Materials: the `[materials.*]` tables.
 
 use super::super::fingerprint::{FingerprintContext, FingerprintHasher, Fingerprinted};
-use super::Spanned;
-use crate::choice;
-pub use crate::materials::UvSet;
 pub use crate::materials::microfacet::MicrofacetDistribution;
-pub use crate::materials::texture::{TextureFilter, Wrap};
 pub use crate::materials::{Channel, ChannelSelector, EmissionSides, ReflectingSides};
-use crate::math::{DVec3, Vec2, Vec3};
-
-/// An image used by materials.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Texture {
-    /// Name of the texture in the scene file.
-    pub name: String,
-    /// Path to the image or glTF file, resolved against the scene's folder.
-    pub file: Spanned<PathBuf>,
-    /// Index of the image within a glTF file. `None` if the file is itself an image.
-    pub image: Option<u32>,
-    /// Interpolation between texels.
-    pub filter: TextureFilter,
-    /// Addressing mode for coordinates outside [0, 1].
-    pub wrap: Wrap,
-    /// Tiling factors for u and v. Neither is 0.
-    pub repeat: Vec2,
-    /// Rotation of the repeated coordinates, in degrees from u to v.
-    pub rotate: f64,
-    /// Offset of the texture coordinates, added last.
-    pub offset: Vec2,
-    /// Texture coordinate set.
-    pub uv: UvSet,
-    /// Encoding of the pixels.
-    pub encoding: TextureEncoding,
-    /// Scale factor for linear colors and numbers. Normals and heights ignore it.
-    pub factor: Vec3,
-}
-
-choice! {
-    /// Texture encodings.
-    pub enum TextureEncoding {
-        /// sRGB for 8- and 16-bit colors, linear for numbers, normal maps and floating-point files.
-        Auto = "auto",
-        /// sRGB, decoded.
-        Srgb = "srgb",
-        /// Linear, used unchanged.
-        Linear = "linear",
-    }
-}
+use crate::math::{DVec3, Vec3};
 
 /// A color or a texture.
 #[derive(Clone, Debug, PartialEq)]
@@ -640,25 +595,6 @@ impl Material {
         let weight = weight.map(|(texture, number)| (texture, TextureRole::BlendWeight(number)));
         let surface = shown.into_iter().chain(normals).chain(heights).chain(opacity).chain(coat);
         colors.chain(numbers).chain(surface).chain(weight).collect()
-    }
-}
-
-/// Covers only the lookup parameters. The texels have separate fingerprints.
-impl Fingerprinted for Texture {
-    fn add_to(&self, key: &mut FingerprintHasher, _: &FingerprintContext<'_>) {
-        let Self { name: _, file, image, filter, wrap, repeat, rotate, offset, uv, encoding, factor } = self;
-        key.add_path_bytes(&file.value)
-            .add_choice(*filter)
-            .add_choice(*wrap)
-            .add_choice(*encoding)
-            .add_f32(repeat.x)
-            .add_f32(repeat.y);
-        key.add_f64(*rotate)
-            .add_f32(offset.x)
-            .add_f32(offset.y)
-            .add_vec3(*factor)
-            .add_bool(*uv == UvSet::Second);
-        key.add_usize(image.map_or(0, |image| image as usize + 1));
     }
 }
 

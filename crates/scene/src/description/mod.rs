@@ -9,6 +9,7 @@ mod material;
 mod method;
 mod render;
 mod shape;
+mod texture;
 mod transform;
 
 use std::collections::HashSet;
@@ -22,11 +23,14 @@ pub use light::{Environment, Light, MapOrientation, Sky};
 pub use material::{
     Bump, Channel, ChannelSelector, CoatSource, ColorSource, EmissionSides, EmissionSource, FresnelSource,
     Material, MaterialKind, MicrofacetDistribution, NormalMap, NumberSource, OpacitySource, PhongParameters,
-    PixelInterpretation, ReflectingSides, Texture, TextureEncoding, TextureFilter, TextureRole, UvSet, Wrap,
+    PixelInterpretation, ReflectingSides, TextureRole,
 };
 pub use method::{Integrator, IntegratorProperties};
 pub use render::{Accel, MAX_BOUNCES, PixelFilter, RenderOptions, ShadowMode, Tonemap, render_keys};
 pub use shape::{LoweredShape, MeshReference, Object, OpenSurface, Shape, max_projection};
+pub use texture::{
+    ImageSource, Pattern, Texture, TextureContent, TextureEncoding, TextureFilter, UvSet, Wrap,
+};
 pub use transform::{AffineMap, ObjectTransform};
 
 /// A validated scene.

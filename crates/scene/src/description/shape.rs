@@ -16,6 +16,7 @@ use crate::geometry::torus::Torus;
 use crate::geometry::transformed::TransformedShape;
 use crate::geometry::triangle::Triangle;
 use crate::math::DVec3;
+use crate::math::transform::Transform;
 
 /// A shape and its material.
 #[derive(Clone, Debug, PartialEq)]
@@ -24,10 +25,40 @@ pub struct Object {
     pub shape: Shape,
     /// Index into [`Scene::materials`](super::Scene::materials). `None` for the mesh file's own materials.
     pub material: Option<usize>,
+    /// The map from the shape's own coordinates, before its matrix and the transforms of groups, to scene
+    /// coordinates. `None` unless the material has a texture that uses these coordinates. [`Object::shape`]
+    /// already includes the map.
+    pub placement: Option<Box<AffineMap>>,
     /// Value of the key `name`, if any.
     pub name: Option<Box<str>>,
     /// Byte range of the table header in the file.
     pub span: Range<usize>,
+}
+
+impl Object {
+    /// Applies a transform after the matrix of a shape or the transform of a mesh.
+    #[must_use]
+    pub fn placed(self, outer: &ObjectTransform) -> Self {
+        let own = self.shape.transform();
+        let transform = own.then(outer);
+        // The keys `scale`, `rotate` and `translate` are a mesh's own.
+        let has_own_steps = match own {
+            ObjectTransform::Steps { .. } => self.shape.as_mesh().is_some(),
+            ObjectTransform::Matrix(_) => false,
+        };
+        let placement = if has_own_steps { outer } else { &transform };
+        Self {
+            placement: self.placement.map(|_| Box::new(placement.to_affine_map())),
+            shape: self.shape.with_transform(transform),
+            ..self
+        }
+    }
+
+    /// Returns the map from the shape's own coordinates to world coordinates relative to `origin`.
+    pub fn object_frame(&self, origin: DVec3) -> Transform {
+        let placed = self.placement.as_ref().map_or(Transform::IDENTITY, |placed| placed.to_transform());
+        placed.relative_to_origins(DVec3::ZERO, origin)
+    }
 }
 
 /// The geometry of an object.

@@ -269,9 +269,7 @@ impl DefinedGroups {
                         context.report(Issue::error(instance.span.clone(), message).with_label(label));
                         return None;
                     }
-                    let mut copy = object.clone();
-                    copy.shape = copy.shape.with_transform(transform);
-                    objects.push(copy);
+                    objects.push(object.clone().placed(outer));
                 }
                 Some(Member::Instance(inner)) => {
                     let transform = inner.transform.then(outer);

@@ -1,8 +1,9 @@
 //! The `[materials.NAME]` tables.
 
 use super::super::description::{
-    Bump, CoatSource, ColorSource, EmissionSides, EmissionSource, FresnelSource, Material, MaterialKind,
-    MicrofacetDistribution, NormalMap, NumberSource, OpacitySource, PhongParameters, ReflectingSides,
+    self, Bump, CoatSource, ColorSource, EmissionSides, EmissionSource, FresnelSource, Material,
+    MaterialKind, MicrofacetDistribution, NormalMap, NumberSource, OpacitySource, PhongParameters,
+    ReflectingSides,
 };
 use super::super::keys::key::DefaultValue::{Absent, Alternative, By, Is, Required};
 use super::super::keys::key::ValueKind::{
@@ -15,7 +16,8 @@ use super::key::KeyInTable;
 use super::limits::Limits::{Any, AtLeast, Between};
 use super::names::DefinedNames;
 use super::table::TableReader;
-use crate::materials::conductor::elements::MetalElement;
+use super::textures::DefinedTextures;
+use crate::materials::conductor::elements::NamedConductor;
 use crate::math::Vec3;
 
 /// A color with components from 0 to 1, or a texture.
@@ -68,8 +70,8 @@ table_types! {
         eta: ColorOrTexture(AtLeast(0.0)), Alternative("[0.2, 0.9, 1.1]");
         /// Extinction coefficient for red, green and blue.
         k: ColorOrTexture(AtLeast(0.0)), Alternative("[0.2, 0.9, 1.1]");
-        /// Measured `eta` and `k` of a metal.
-        element: Words(choice_values::<MetalElement>), Absent;
+        /// Measured `eta` and `k` of a metal or a compound.
+        element: Words(choice_values::<NamedConductor>), Absent;
         /// Square root of α; 0 is a mirror.
         roughness: FRACTION, Is("0.2");
         /// Distribution of the facets.
@@ -168,6 +170,8 @@ pub(super) struct MaterialList {
     pub(super) list: Option<Vec<Material>>,
     /// Whether each material emits light.
     emissive: Vec<bool>,
+    /// Whether each material has a texture in the shape's own coordinates.
+    use_object_point: Vec<bool>,
 }
 
 impl MaterialList {
@@ -175,28 +179,43 @@ impl MaterialList {
     pub(super) fn is_emissive(&self, index: usize) -> bool {
         self.emissive.get(index).copied().unwrap_or(false)
     }
+
+    /// Whether a material has a texture in the shape's own coordinates.
+    pub(super) fn uses_object_point(&self, index: usize) -> bool {
+        self.use_object_point.get(index).copied().unwrap_or(false)
+    }
 }
 
-pub(super) fn read_materials(root: &TableReader<'_>, textures: &DefinedNames) -> MaterialList {
+pub(super) fn read_materials(root: &TableReader<'_>, textures: &DefinedTextures) -> MaterialList {
     let tables = root.named_tables(&MATERIALS);
     let names =
         DefinedNames::new("material", tables.iter().map(|(name, span, _)| (name.clone(), span.clone())));
     let read = tables.into_iter().map(|(name, _, table)| read_material(name, table?, textures, &names));
     let read = resolve_blends(root.context, read.collect());
-    let emits = |material: &Material| material.emits();
-    let emissive = read.iter().map(|material| material.as_ref().is_some_and(emits)).collect();
-    MaterialList { names, list: read.into_iter().collect(), emissive }
+    let all = |property: &dyn Fn(&Material) -> bool| -> Vec<bool> {
+        read.iter().map(|material| material.as_ref().is_some_and(property)).collect()
+    };
+    let emissive = all(&Material::emits);
+    let is_of_object = |texture: usize| {
+        let texture = textures.list.as_ref().and_then(|list| list.get(texture));
+        texture.is_some_and(|texture| texture.uv_set().is_none())
+    };
+    let use_object_point = all(&|material: &Material| {
+        let mut textures = material.with_parts().into_iter().flat_map(Material::textures);
+        textures.any(|(texture, _)| is_of_object(texture))
+    });
+    MaterialList { names, list: read.into_iter().collect(), emissive, use_object_point }
 }
 
 fn read_material(
     name: String,
     mut table: TableReader<'_>,
-    textures: &DefinedNames,
+    textures: &DefinedTextures,
     materials: &DefinedNames,
 ) -> Option<ReadMaterial> {
     // Without a valid type, keys cannot be checked.
     let kind = table.read_type()?;
-    let table = &MaterialReader { table, textures };
+    let table = &MaterialReader { table, textures: &textures.names, defined_textures: &textures.list };
     let (kind, coat) = match kind {
         MaterialType::Phong => (Some(MaterialKind::Phong(table.read_phong())), table.read_coat()),
         MaterialType::Mirror => {
@@ -228,6 +247,8 @@ fn read_material(
 struct MaterialReader<'a> {
     table: TableReader<'a>,
     textures: &'a DefinedNames,
+    /// The textures with these names, or `None` if any is invalid.
+    defined_textures: &'a Option<Vec<description::Texture>>,
 }
 
 impl<'a> MaterialReader<'a> {
@@ -330,7 +351,7 @@ impl<'a> MaterialReader<'a> {
             return None;
         }
         if element.is_present() {
-            let [eta, k] = element.choice::<MetalElement>()?.complex_ior().map(ColorSource::Constant);
+            let [eta, k] = element.choice::<NamedConductor>()?.complex_ior().map(ColorSource::Constant);
             return Some(FresnelSource::Index { eta, k });
         }
         let required = |name| self.table.required_alternative(name).color_or_texture(self.textures);
@@ -404,10 +425,20 @@ impl<'a> MaterialReader<'a> {
     }
 
     fn read_normal_map(&self) -> Option<NormalMap> {
-        let texture = self.key("normal_map").index_by_name(self.textures);
+        let key = self.key("normal_map");
+        let texture = key.index_by_name(self.textures);
         let strength = self.constant("normal_strength");
         self.warn_if_ineffective_without("normal_strength", "normal_map");
-        texture.map(|texture| NormalMap { texture, strength })
+        let texture = texture?;
+        let defined = self.defined_textures.as_ref().and_then(|list| list.get(texture));
+        if defined.is_some_and(|texture| texture.as_image().is_none()) {
+            let issue = Issue::error(key.value_span()?, "a normal map must be an image")
+                .with_label("this texture is a pattern")
+                .with_help("write `bump` instead of `normal_map` to use the pattern as heights");
+            self.table.context.report(issue);
+            return None;
+        }
+        Some(NormalMap { texture, strength })
     }
 
     fn read_bump(&self) -> Option<Bump> {

@@ -142,7 +142,7 @@ fn read_scene(root: &TableReader<'_>) -> Option<Scene> {
     let camera = camera::read_camera(root);
     let photons = photons::read_photons(root);
     let textures = textures::read_textures(root);
-    let materials = materials::read_materials(root, &textures.names);
+    let materials = materials::read_materials(root, &textures);
     if let Some(list) = &materials.list {
         textures::report_ambiguous_encodings(root.context, &textures, list);
     }

@@ -1,6 +1,6 @@
 //! Collects the objects of a scene: its shapes and the contents of its instances.
 
-use super::super::description::{Instance, MeshFile, Object, Shape};
+use super::super::description::{Instance, MeshFile, Object, ObjectTransform, Shape};
 use super::super::toml::TableId;
 use super::context::FileContext;
 use super::groups::{DefinedGroups, InstanceTable, read_groups, read_instances};
@@ -24,11 +24,9 @@ pub(super) struct ObjectList {
 pub(super) fn read_objects(root: &TableReader<'_>, materials: &MaterialList) -> Option<ObjectList> {
     let mut files = MeshFileRegistry::default();
     let (mut order, mut objects) = (Vec::new(), Vec::new());
-    let are_shapes_valid = read_shapes(root, materials, &mut files, |id, mut object| {
-        let transform = object.shape.transform();
-        object.shape = object.shape.with_transform(transform);
+    let are_shapes_valid = read_shapes(root, materials, &mut files, |id, object| {
         order.push(id);
-        objects.push(object);
+        objects.push(object.placed(&ObjectTransform::IDENTITY));
     });
     let groups = read_groups(root, materials, &mut files);
     let tables = read_instances(root, &groups.names);

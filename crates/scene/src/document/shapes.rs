@@ -1,6 +1,6 @@
 //! The tables of shapes, such as `[[sphere]]`, except meshes.
 
-use super::super::description::{Object, Shape};
+use super::super::description::{Object, ObjectTransform, Shape};
 use super::super::keys::key::DefaultValue::{By, Is, Required};
 use super::super::keys::key::ValueKind::{Flag, Number, Numbers};
 use super::super::keys::key::{ANGLES, DIRECTION, POINT};
@@ -240,7 +240,7 @@ pub(super) fn read_shapes(
     is_valid
 }
 
-/// Reads an object. Its matrix is not yet applied to its shape; see [`Shape::with_transform`].
+/// Reads an object. Its matrix is not yet applied to its shape; see [`Object::placed`].
 fn read_object(
     kind: &ShapeTable,
     table: &TableReader<'_>,
@@ -270,7 +270,9 @@ fn read_object(
         Some(matrix) => Shape::Transformed { shape: Box::new(shape?), matrix: matrix? },
         None => shape?,
     };
-    Some(Object { shape, material, name: name?, span: table.span.clone() })
+    let uses_object_point = material.is_some_and(|index| materials.uses_object_point(index));
+    let placement = uses_object_point.then(|| Box::new(ObjectTransform::IDENTITY.to_affine_map()));
+    Some(Object { shape, material, placement, name: name?, span: table.span.clone() })
 }
 
 /// Reads both ends of an axis.

@@ -6,7 +6,8 @@ use std::ops::Range;
 
 use super::super::description::Channel;
 use super::super::keys::key::{
-    COLOR, DefaultValue, KeyInfo, TableInfo, TableSyntax, ValueKind, choice_values, keys, parsed_default,
+    COLOR, DefaultValue, KeyInfo, TableInfo, TableSyntax, TableTypeInfo, ValueKind, choice_values, keys,
+    parsed_default,
 };
 use super::super::nearest::{foreign_or_nearest_name, nearest_name};
 use super::super::sanitize::escape_and_truncate;
@@ -301,7 +302,19 @@ impl<'a> TableReader<'a> {
         if let Some(near) = near {
             issue = issue.with_label(format!("did you mean `{near}`?"));
         }
-        issue.with_help(format!("expected one of {}", self.format_known_keys()))
+        let expected = format!("expected one of {}", self.format_known_keys());
+        let others = self.types_with_key(key);
+        issue.with_help(match others.is_empty() {
+            true => expected,
+            false => format!("`{shown}` is for type {}; {expected}", others.join(" or ")),
+        })
+    }
+
+    /// Returns the other types of the table that have the key `name`, in quotes.
+    fn types_with_key(&self, name: &str) -> Vec<String> {
+        let types = self.title.definition().map_or(&[][..], |info| info.types);
+        let has_key = |kind: &&TableTypeInfo| kind.keys.iter().any(|key| key.name == name);
+        types.iter().filter(has_key).map(|kind| format!("\"{}\"", kind.name)).collect()
     }
 
     fn format_known_keys(&self) -> String {

@@ -77,6 +77,8 @@ pub enum ValueKind {
     File(&'static [&'static str]),
     /// A color. The limits apply to each component.
     Color(Limits),
+    /// An array of two colors. The limits apply to each component.
+    ColorPair(Limits),
     /// A color or a texture.
     ColorOrTexture(Limits),
     /// A color, or a texture with a scale factor.
@@ -117,6 +119,7 @@ impl ValueKind {
             | Self::Text
             | Self::File(_)
             | Self::Color(_)
+            | Self::ColorPair(_)
             | Self::ColorOrTexture(_)
             | Self::Emission(_)
             | Self::NumberOrTexture(_)
@@ -137,6 +140,7 @@ impl ValueKind {
         match self {
             Self::Number(limits)
             | Self::Color(limits)
+            | Self::ColorPair(limits)
             | Self::ColorOrTexture(limits)
             | Self::Emission(limits)
             | Self::NumberOrTexture(limits)
@@ -208,6 +212,9 @@ pub(crate) const DIRECTION: ValueKind = ValueKind::Numbers(3, "direction", Limit
 
 /// Angles about the three axes.
 pub(crate) const ANGLES: ValueKind = ValueKind::Numbers(3, "three numbers", Limits::Any);
+
+/// Two non-negative colors.
+pub(crate) const COLOR_PAIR: ValueKind = ValueKind::ColorPair(Limits::AtLeast(0.0));
 
 /// A non-negative color.
 pub(crate) const COLOR: ValueKind = ValueKind::Color(Limits::AtLeast(0.0));
@@ -378,6 +385,7 @@ impl ValueKind {
             Self::MaterialPair => "[\"name\", \"other\"]".to_owned(),
             Self::File(endings) => format!("\"file.{}\"", endings.first().copied().unwrap_or("txt")),
             Self::Color(_) | Self::ColorOrTexture(_) | Self::Emission(_) => "[0.5, 0.5, 0.5]".to_owned(),
+            Self::ColorPair(_) => "[\"white\", \"black\"]".to_owned(),
             Self::Rotation => "[1, 0, 0, 0, 1, 0, 0, 0, 1]".to_owned(),
             // The identity matrix.
             Self::Numbers(16, ..) => {
@@ -403,6 +411,7 @@ impl ValueKind {
             Self::Text => "text".to_owned(),
             Self::File(_) => "file".to_owned(),
             Self::Color(_) => "color".to_owned(),
+            Self::ColorPair(_) => "two colors".to_owned(),
             Self::ColorOrTexture(_) => "color or texture".to_owned(),
             Self::Emission(_) => "color or `{ texture = \"NAME\", scale = 1.0 }`".to_owned(),
             Self::NumberOrTexture(_) => "number or texture".to_owned(),

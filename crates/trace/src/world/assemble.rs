@@ -9,6 +9,8 @@ use crate::assets::LoadedMesh;
 use crate::control::CancelToken;
 use crate::lights::Lights;
 use crate::materials::{Material, UvSet};
+use crate::math::DVec3;
+use crate::math::transform::Transform;
 use crate::scene::description::{self, Scene};
 
 impl World {
@@ -24,6 +26,8 @@ impl World {
         let has_glass = materials.iter().any(|material| material.bsdf.as_dielectric().is_some());
         let solids =
             inputs.glass_solids.clone().unwrap_or_else(|| Arc::new(find_glass_solids(scene, inputs)));
+        let has_second_uvs = scene_uses_second_uvs(scene, inputs);
+        let object_frames = find_object_frames(scene, geometry.coordinate_origin());
         let world = Self {
             camera,
             geometry,
@@ -43,7 +47,9 @@ impl World {
             enclosing_glass: Box::default(),
             camera_solids: Vec::new(),
             solids_near_ray_origins: Vec::new(),
-            has_second_uvs: scene_uses_second_uvs(scene, inputs),
+            has_second_uvs,
+            has_extra_coordinates: has_second_uvs || object_frames.is_some(),
+            object_frames,
             colored: vertex_color_usage_by_object(scene),
             see_through: None,
         };
@@ -61,8 +67,17 @@ impl World {
 
 /// Whether any texture uses the second UV set and any mesh has a second UV set.
 fn scene_uses_second_uvs(scene: &Scene, inputs: &WorldInputs) -> bool {
-    let asks = scene.textures.iter().any(|texture| texture.uv == UvSet::Second);
+    let asks = scene.textures.iter().any(|texture| texture.uv_set() == Some(UvSet::Second));
     asks && inputs.meshes.iter().any(|mesh| !mesh.loaded().mesh.second_uvs.is_empty())
+}
+
+/// For each object whose textures use the shape's own coordinates, the map from these coordinates to world
+/// coordinates. `None` if there is no such object.
+fn find_object_frames(scene: &Scene, origin: DVec3) -> Option<Box<[Option<Transform>]>> {
+    let frame =
+        |object: &description::Object| object.placement.is_some().then(|| object.object_frame(origin));
+    let frames = scene.objects.iter().any(|object| object.placement.is_some());
+    frames.then(|| scene.objects.iter().map(frame).collect())
 }
 
 fn find_glass_solids(scene: &Scene, inputs: &WorldInputs) -> GlassSolids {

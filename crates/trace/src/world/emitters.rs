@@ -22,6 +22,7 @@ use crate::lights::{Emitter, EmittingTriangleSelection};
 use crate::materials::texels::Texels;
 use crate::materials::{Emission, EmissionSides, Opacity};
 use crate::math::Vec3;
+use crate::math::transform::Transform;
 use crate::scene::description::{self, MaterialKind, Scene};
 
 /// Sampling tables for the environment map, or `None` if the image is black.
@@ -71,16 +72,16 @@ pub fn build_lights(
         let emissive = described.material.map(|index| &emissive[index]);
         match object {
             Object::Shape(shape) => {
-                let lights =
-                    emissive.into_iter().flat_map(|emissive| area_lights_of_shape(shape, emissive, id));
+                let frame = described.object_frame(geometry.coordinate_origin());
+                let lights = emissive
+                    .into_iter()
+                    .flat_map(|emissive| area_lights_of_shape(shape, emissive, id, frame));
                 all.extend(lights.map(Light::Area));
             }
             Object::Mesh(mesh) => {
-                all.extend(
-                    mesh_lights_by_material_and_side(id, mesh, emissive, images, token)?
-                        .into_iter()
-                        .map(Light::Area),
-                );
+                let frame = described.object_frame(geometry.coordinate_origin());
+                let lights = mesh_lights_by_material_and_side((id, mesh, &frame), emissive, images, token)?;
+                all.extend(lights.into_iter().map(Light::Area));
             }
         }
     }
@@ -223,11 +224,13 @@ fn scale_light_bounds_by_term_means(bounds: LightBounds, terms: &[EmissionTerm])
     }
 }
 
-/// Creates the lights for an emitting shape, one per emitting side.
+/// Creates the lights for an emitting shape, one per emitting side. `frame` maps the shape's own coordinates to
+/// world coordinates.
 fn area_lights_of_shape(
     shape: &Shape,
     emissive: &SurfaceEmission,
     object: u32,
+    frame: Transform,
 ) -> impl Iterator<Item = AreaLight> {
     let of_side = move |side: &Side| {
         let (radiance, terms) = emissive.radiance_and_terms(*side);
@@ -238,17 +241,17 @@ fn area_lights_of_shape(
         };
         let light = AreaLight { bounds: scale_light_bounds_by_term_means(light.bounds, &terms), ..light };
         Some(match EmissionModulation::from_terms(terms, UvMapping::Shape(shape.clone())) {
-            Some(modulation) => light.with_modulation(modulation),
+            Some(modulation) => light.with_modulation(modulation.with_object_frame(&frame)),
             None => light,
         })
     };
     emissive.sides().iter().filter_map(of_side)
 }
 
-/// Creates the lights for a mesh. If `emissive` is `None`, the triangles use the mesh file's materials.
+/// Creates the lights for a mesh, given its object number, and the map from its own coordinates to world
+/// coordinates. If `emissive` is `None`, the triangles use the mesh file's materials.
 fn mesh_lights_by_material_and_side(
-    object: u32,
-    mesh: &MeshInstance,
+    (object, mesh, frame): (u32, &MeshInstance, &Transform),
     emissive: Option<&SurfaceEmission>,
     images: &Images,
     token: &CancelToken,
@@ -299,7 +302,7 @@ fn mesh_lights_by_material_and_side(
             };
             let is_varying = terms.iter().any(EmissionTerm::varies);
             let modulation = is_varying.then(|| EmissionModulation::from_terms(terms, patches())).flatten();
-            let modulation = modulation.map(Box::new);
+            let modulation = modulation.map(|modulation| Box::new(modulation.with_object_frame(frame)));
             let (shape, part) = (Emitter::Mesh(emitter), EmittingTriangleSelection::Listed);
             Ok(Some(AreaLight { shape, side, radiance, modulation, object, part, bounds }))
         };
@@ -323,7 +326,6 @@ mod tests {
     use crate::control::CancelToken;
     use crate::geometry::mesh::TriangleMesh;
     use crate::lights::{PhotonOrigin, PhotonRandomNumbers};
-    use crate::math::transform::Transform;
     use crate::math::{DVec3, Vec3, random};
     use crate::scene::description::Accel;
     use crate::world::MeshTree;
@@ -347,8 +349,7 @@ mod tests {
             let mesh = MeshInstance::new(Arc::clone(&tree), transform, false);
             let emissive = SurfaceEmission::new(Emission::from_constant(Vec3::ONE), None);
             let lights = mesh_lights_by_material_and_side(
-                0,
-                &mesh,
+                (0, &mesh, &Transform::IDENTITY),
                 Some(&emissive),
                 &Images::default(),
                 &CancelToken::new(),

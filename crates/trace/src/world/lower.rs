@@ -2,17 +2,15 @@
 
 use std::sync::Arc;
 
+use super::Images;
+use super::lower_texture::{lower_file_texture, lower_texture};
 use super::textures::{
-    AlphaCutoffKey, FILE_NUMBER, TextureSource, color_or_cutout_interpretation, coverage_cutoff,
-    image_file_and_encoding, opacity_pixel_interpretation, scene_material_texture_source,
+    AlphaCutoffKey, FILE_NUMBER, color_or_cutout_interpretation, coverage_cutoff,
+    opacity_pixel_interpretation,
 };
-use super::{Image, Images};
 use crate::assets::{FileMaterial, FileMaterialKind, FileTexture, PhysicalMaterial};
 use crate::materials::microfacet::MicrofacetDistribution;
-use crate::materials::texels::{TexelData, Texels};
-use crate::materials::texture::{
-    ColorOrTexture, Texture, TextureFilter, UvTransform, ValueScaleAndOffset, Wrap,
-};
+use crate::materials::texture::{ColorOrTexture, Texture, ValueScaleAndOffset};
 use crate::materials::{
     Blend, Bsdf, Bump, Coat, CoatInputs, CoatedMaterial, Conductor, ConductorFresnel, Dielectric, Emission,
     Material, Mirror, NonSpecular, NormalMap, NormalPerturbation, Opacity, Phong, Plastic, Principled,
@@ -101,8 +99,8 @@ pub fn lower_opacity(scene: &Scene, images: &Images, material: &description::Mat
             let texture = of.texture(index, TextureRole::Opacity(number));
             // If mip levels preserve coverage, the cutoff already includes the factor.
             let coverage = coverage_cutoff(scene, index, source.cutoff);
-            let factor = texture.factor.filter(|_| coverage.is_none());
-            let texture = Arc::new(Texture { factor, ..(*texture).clone() });
+            let texture = Arc::unwrap_or_clone(texture);
+            let texture = Arc::new(texture.with_factor(|factor| factor.filter(|_| coverage.is_none())));
             (ScalarParameter::Texture(texture), coverage.map_or(source.cutoff, AlphaCutoffKey::value))
         }
     };
@@ -260,10 +258,12 @@ pub fn file_emission(images: &Images, own: &FileMaterial) -> Emission {
     match &own.emission_texture {
         None => Emission::from_constant(own.emission),
         // If the emission map could not be read, emit nothing rather than from the whole surface.
-        Some(texture) => match file_texture(images, texture, color_or_cutout_interpretation(own, texture)) {
-            None => Emission::NONE,
-            texture => Emission { texture, ..Emission::from_constant(own.emission) },
-        },
+        Some(texture) => {
+            match lower_file_texture(images, texture, color_or_cutout_interpretation(own, texture)) {
+                None => Emission::NONE,
+                texture => Emission { texture, ..Emission::from_constant(own.emission) },
+            }
+        }
     }
 }
 
@@ -274,7 +274,7 @@ pub fn file_opacity(images: &Images, own: &FileMaterial) -> Option<Opacity> {
     }
     let texture = own.opacity_texture.as_ref();
     let value = match texture
-        .and_then(|texture| file_texture(images, texture, opacity_pixel_interpretation(own, texture)))
+        .and_then(|texture| lower_file_texture(images, texture, opacity_pixel_interpretation(own, texture)))
     {
         Some(texture) => ScalarParameter::Texture(texture),
         None if own.opacity < 1.0 => ScalarParameter::Constant(own.opacity),
@@ -316,11 +316,12 @@ pub fn lower_file_material(images: &Images, own: &FileMaterial) -> Material {
 /// Non-specular material from a mesh file, including its emission and normal map.
 fn file_material_from_non_specular(images: &Images, own: &FileMaterial, rough: NonSpecular) -> Material {
     let normals = own.normal_texture.as_ref().and_then(|texture| {
-        let texture = file_texture(images, texture, PixelInterpretation::Normal)?;
+        let texture = lower_file_texture(images, texture, PixelInterpretation::Normal)?;
         Some(NormalMap { texture, strength: own.normal_strength })
     });
     // Gray images are height maps. Ignore them because the file does not specify the scale.
-    let normals = normals.filter(|map| !map.texture.texels.are_all_gray());
+    let is_gray = |map: &NormalMap| map.texture.as_image().is_some_and(|image| image.texels.are_all_gray());
+    let normals = normals.filter(|map| !is_gray(map));
     Material {
         bsdf: Bsdf::NonSpecular(rough),
         sides: ReflectingSides::Both,
@@ -336,8 +337,9 @@ fn file_material_color_parameter(
     texture: Option<&FileTexture>,
     constant: Vec3,
 ) -> ColorOrTexture {
-    let texture = texture
-        .and_then(|texture| file_texture(images, texture, color_or_cutout_interpretation(own, texture)));
+    let texture = texture.and_then(|texture| {
+        lower_file_texture(images, texture, color_or_cutout_interpretation(own, texture))
+    });
     texture.map_or(ColorOrTexture::Constant(constant), ColorOrTexture::Texture)
 }
 
@@ -360,10 +362,10 @@ fn file_phong(images: &Images, own: &FileMaterial) -> NonSpecular {
         {
             ColorOrTexture::Constant(specular) => ColorOrTexture::Constant(specular * scale),
             ColorOrTexture::Texture(texture) => {
-                let mut texture = Arc::unwrap_or_clone(texture);
-                texture.factor =
-                    Some(texture.factor.unwrap_or(ValueScaleAndOffset::IDENTITY).scaled_by(scale));
-                ColorOrTexture::Texture(Arc::new(texture))
+                let scaled = |factor: Option<ValueScaleAndOffset>| {
+                    Some(factor.unwrap_or(ValueScaleAndOffset::IDENTITY).scaled_by(scale))
+                };
+                ColorOrTexture::Texture(Arc::new(Arc::unwrap_or_clone(texture).with_factor(scaled)))
             }
         },
         false => ColorOrTexture::Constant(Vec3::ZERO),
@@ -379,7 +381,7 @@ fn file_phong(images: &Images, own: &FileMaterial) -> NonSpecular {
 /// Principled material from a mesh file. An index of refraction of 1 or less means "unspecified".
 fn file_principled(images: &Images, own: &FileMaterial, physical: &PhysicalMaterial) -> NonSpecular {
     let number = |texture: &Option<FileTexture>, constant: f32| {
-        let texture = texture.as_ref().and_then(|texture| file_texture(images, texture, FILE_NUMBER));
+        let texture = texture.as_ref().and_then(|texture| lower_file_texture(images, texture, FILE_NUMBER));
         texture.map_or(ScalarParameter::Constant(constant), ScalarParameter::Texture)
     };
     let base = NonSpecular::Principled(Box::new(Principled::new(PrincipledInputs {
@@ -472,55 +474,6 @@ impl MaterialParameterConverter<'_> {
     }
 
     fn texture(self, index: usize, role: TextureRole) -> Arc<Texture> {
-        let Self { scene, images, material } = self;
-        let declared = &scene.textures[index];
-        let &description::Texture { filter, wrap, repeat, rotate, offset, uv, factor, .. } = declared;
-        let Image { texels, mipmaps } = loaded_image_or_placeholder(
-            images,
-            &scene_material_texture_source(scene, material, (index, role)),
-        );
-        let mipmaps = match filter {
-            TextureFilter::Nearest | TextureFilter::Bilinear => None,
-            TextureFilter::Mipmap => mipmaps,
-        };
-        let moved = UvTransform::new(uv, rotate, offset.as_dvec2()).map(Box::new);
-        let factor = match role.pixel_interpretation() {
-            PixelInterpretation::Color | PixelInterpretation::CutOut | PixelInterpretation::Number(_) => {
-                ValueScaleAndOffset::from_scale(factor)
-            }
-            PixelInterpretation::Normal => None,
-        };
-        Arc::new(Texture { texels, mipmaps, filter, wrap, repeat, moved, factor })
+        Arc::new(lower_texture(self.scene, self.images, self.material, (index, role)))
     }
-}
-
-/// Texture from a mesh file, or `None` if the image was not loaded, either because it is not needed or
-/// because it could not be read.
-fn file_texture(images: &Images, texture: &FileTexture, used: PixelInterpretation) -> Option<Arc<Texture>> {
-    let texels = images.get(&image_file_and_encoding(texture, used))?.texels.clone();
-    let (base, gain) = texture.range;
-    let factor = match used {
-        PixelInterpretation::Color | PixelInterpretation::CutOut | PixelInterpretation::Number(_) => {
-            ValueScaleAndOffset::from_scale_and_offset(Vec3::splat(gain), Vec3::splat(base))
-        }
-        PixelInterpretation::Normal => None,
-    };
-    Some(Arc::new(Texture {
-        texels,
-        mipmaps: None,
-        filter: TextureFilter::Bilinear,
-        wrap: if texture.is_clamped { Wrap::Clamp } else { Wrap::Repeat },
-        repeat: texture.repeat,
-        moved: UvTransform::new(UvSet::First, 0.0, texture.offset).map(Box::new),
-        factor,
-    }))
-}
-
-/// Returns a loaded image, or a placeholder if the image was not loaded. Images that are not loaded are used
-/// only by materials without objects, whose textures are never looked up.
-fn loaded_image_or_placeholder(images: &Images, source: &TextureSource) -> Image {
-    images.get(source).cloned().unwrap_or_else(|| {
-        let data = TexelData::Linear8(vec![[128, 128, 255]]);
-        Image { texels: Arc::new(Texels { width: 1, height: 1, data, unusable: 0 }), mipmaps: None }
-    })
 }

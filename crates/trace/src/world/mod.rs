@@ -12,6 +12,7 @@ pub mod geometry;
 mod glass_solids;
 mod isolated;
 mod lower;
+mod lower_texture;
 mod merged;
 mod mesh_instance;
 mod mesh_packet;
@@ -62,8 +63,11 @@ use crate::geometry::SurfacePoint;
 use crate::geometry::packet::set_bit_lanes;
 use crate::lights::Lights;
 use crate::materials::texels::Texels;
-use crate::materials::{Footprint, Material, Mipmaps, SecondUvPoint, TexturePoint};
+use crate::materials::{
+    ExtraCoordinates, Footprint, Material, Mipmaps, ObjectPoint, SecondUvPoint, TexturePoint,
+};
 use crate::math::Vec3;
+use crate::math::transform::Transform;
 use crate::scene::description;
 
 /// A scene's decoded images, indexed by source.
@@ -133,8 +137,12 @@ pub struct World {
     solids_near_ray_origins: Vec<CompoundSolid>,
     /// Whether each material is mipmapped; see [`Material::is_mipmapped`].
     mipmapped: Box<[bool]>,
+    /// Whether any texture uses a mesh's second UV set or the shape's own coordinates.
+    has_extra_coordinates: bool,
     /// Whether any texture uses a mesh's second UV set.
     has_second_uvs: bool,
+    /// For each object, the map from the shape's own coordinates to world coordinates, if textures use them.
+    object_frames: Option<Box<[Option<Transform>]>>,
     /// Whether each object's vertex colors are used, or `None` if no object uses them.
     colored: Option<Box<[bool]>>,
     /// Objects that light may pass through without changing direction, if there are any.
@@ -241,20 +249,33 @@ impl World {
         surface: &SurfacePoint,
         footprint: impl Fn([Vec3; 2]) -> Footprint,
     ) -> TexturePoint {
-        let second = if self.has_second_uvs { self.second_uv_point(hit, &footprint) } else { None };
-        TexturePoint { uv: surface.uv, footprint: footprint([surface.dpdu, surface.dpdv]), second }
+        let extra = match self.has_extra_coordinates {
+            true => self.extra_coordinates(hit, surface, &footprint),
+            false => None,
+        };
+        TexturePoint { uv: surface.uv, footprint: footprint([surface.dpdu, surface.dpdv]), extra }
     }
 
-    /// The second UV set's part of [`World::texture_point`], or `None` if the mesh has no second set.
+    /// The rarely used part of [`World::texture_point`], or `None` if the object has none.
     #[cold]
     #[inline(never)]
-    fn second_uv_point(
+    fn extra_coordinates(
         &self,
         hit: &Hit,
+        surface: &SurfacePoint,
         footprint: impl Fn([Vec3; 2]) -> Footprint,
-    ) -> Option<Box<SecondUvPoint>> {
-        let (uv, tangents) = self.geometry.second_uv_and_tangents(hit)?;
-        Some(Box::new(SecondUvPoint { uv: uv.as_dvec2(), footprint: footprint(tangents), tangents }))
+    ) -> Option<Box<ExtraCoordinates>> {
+        let second = if self.has_second_uvs { self.geometry.second_uv_and_tangents(hit) } else { None };
+        let second = second.map(|(uv, tangents)| SecondUvPoint {
+            uv: uv.as_dvec2(),
+            footprint: footprint(tangents),
+            tangents,
+        });
+        let frame = self.object_frames.as_ref().and_then(|frames| frames[hit.object as usize].as_ref());
+        let object = frame.map(|frame| {
+            ObjectPoint::new(frame, surface.point.as_dvec3()).with_footprint(surface.normal, &footprint)
+        });
+        (second.is_some() || object.is_some()).then(|| Box::new(ExtraCoordinates { second, object }))
     }
 
     /// Whether an object's texture axes are well defined or irrelevant: the object has UVs, or no lobes

@@ -39,7 +39,8 @@ impl TestWorldBuilder {
 
     /// Adds a shape with the material at this index.
     pub fn shape(mut self, shape: Shape, material: usize) -> Self {
-        self.scene.objects.push(Object { shape, material: Some(material), name: None, span: 0..0 });
+        let material = Some(material);
+        self.scene.objects.push(Object { shape, material, placement: None, name: None, span: 0..0 });
         self
     }
 

@@ -9,8 +9,8 @@ use crate::assets::image::{ColorCurve, ImageEncoding};
 use crate::assets::{FileLine, FileMaterial, FileTexture, LoadedMesh};
 use crate::math::Vec3;
 use crate::scene::description::{
-    Channel, ChannelSelector, Material, PixelInterpretation, Scene, TextureEncoding, TextureFilter,
-    TextureRole,
+    Channel, ChannelSelector, ImageSource, Material, PixelInterpretation, Scene, TextureEncoding,
+    TextureFilter, TextureRole,
 };
 
 /// An image file and its encoding.
@@ -168,8 +168,9 @@ pub fn textures_needed(
     for material in used.flat_map(|(material, _)| material.with_parts()) {
         let (textures, is_delta) = (material.textures().into_iter(), material.kind.has_delta_lobe());
         for (texture, role) in textures.filter(|(_, role)| lookups.includes_role(*role, is_delta)) {
+            let Some(image) = scene.textures[texture].as_image() else { continue };
             add(NeededTexture {
-                source: scene_material_texture_source(scene, material, (texture, role)),
+                source: scene_material_texture_source(scene, material, (texture, role), image),
                 name: scene.textures[texture].name.clone(),
                 declared: Some(texture),
                 mesh_file: None,
@@ -243,14 +244,14 @@ fn used_material_and_mesh_file_flags(scene: &Scene) -> (Vec<bool>, Vec<bool>) {
     (materials, files)
 }
 
-/// Image file and encoding for a scene material's texture in this role.
+/// Image file and encoding for a scene material's texture in this role. `image` is the texture's image.
 pub fn scene_material_texture_source(
     scene: &Scene,
     material: &Material,
     (texture, role): (usize, TextureRole),
+    image: &ImageSource,
 ) -> TextureSource {
-    let source =
-        scene_texture_source(scene, texture, texture_pixel_interpretation(scene, material, (texture, role)));
+    let source = scene_texture_source(image, texture_pixel_interpretation(scene, material, (texture, role)));
     match role {
         TextureRole::Opacity(_) => {
             TextureSource { coverage: coverage_cutoff(scene, texture, material.opacity.cutoff), ..source }
@@ -269,9 +270,10 @@ pub fn scene_material_texture_source(
 }
 
 /// Cutoff at which an opacity texture's mip levels preserve coverage, or `None` without a cutoff or mip
-/// levels.
+/// levels, and for patterns.
 pub fn coverage_cutoff(scene: &Scene, texture: usize, cutoff: f32) -> Option<AlphaCutoffKey> {
-    let is_covered = cutoff > 0.0 && has_mipmaps(scene, texture);
+    let is_image = scene.textures[texture].as_image().is_some();
+    let is_covered = cutoff > 0.0 && has_mipmaps(scene, texture) && is_image;
     is_covered.then(|| AlphaCutoffKey::from_opacity_cutoff(cutoff, scene.textures[texture].factor.x))
 }
 
@@ -306,7 +308,8 @@ pub fn texture_pixel_interpretation(
 
 /// Whether the material also uses the texture's image for a color.
 fn uses_image_as_color(scene: &Scene, material: &Material, texture: usize) -> bool {
-    let image = |texture: usize| (&scene.textures[texture].file.value, scene.textures[texture].image);
+    let image =
+        |texture: usize| scene.textures[texture].as_image().map(|image| (&image.file.value, image.image));
     material.textures().into_iter().any(|(other, role)| {
         role.pixel_interpretation() == PixelInterpretation::Color && image(other) == image(texture)
     })
@@ -314,17 +317,16 @@ fn uses_image_as_color(scene: &Scene, material: &Material, texture: usize) -> bo
 
 /// Whether two textures use the same image with the same texture coordinates.
 fn have_same_image_and_mapping(scene: &Scene, a: usize, b: usize) -> bool {
-    let [a, b] = [a, b].map(|texture| &scene.textures[texture]);
-    let at = |texture: &crate::scene::description::Texture| {
-        (texture.image, texture.wrap, texture.repeat, texture.rotate, texture.offset, texture.uv)
-    };
+    let [a, b] = [a, b].map(|texture| scene.textures[texture].as_image());
+    let (Some(a), Some(b)) = (a, b) else { return false };
+    let at =
+        |image: &ImageSource| (image.image, image.wrap, image.repeat, image.rotate, image.offset, image.uv);
     a.file.value == b.file.value && at(a) == at(b)
 }
 
 /// Image file and encoding for a scene texture with this pixel interpretation.
-pub fn scene_texture_source(scene: &Scene, texture: usize, used: PixelInterpretation) -> TextureSource {
-    let texture = &scene.textures[texture];
-    let encoding = match (texture.encoding, used) {
+pub fn scene_texture_source(image: &ImageSource, used: PixelInterpretation) -> TextureSource {
+    let encoding = match (image.encoding, used) {
         (TextureEncoding::Srgb, PixelInterpretation::Color | PixelInterpretation::Normal) => {
             ImageEncoding::Srgb
         }
@@ -341,7 +343,7 @@ pub fn scene_texture_source(scene: &Scene, texture: usize, used: PixelInterpreta
             ImageEncoding::Number { of, is_srgb: false }
         }
     };
-    TextureSource { path: texture.file.value.clone(), image: texture.image, encoding, coverage: None }
+    TextureSource { path: image.file.value.clone(), image: image.image, encoding, coverage: None }
 }
 
 /// Image file and encoding for a mesh file's texture with this pixel interpretation.

@@ -144,7 +144,7 @@ fn value_items(document: &OpenDocument, kind: ValueKind, is_quoted: bool) -> Vec
         | ValueKind::Group => kind
             .defining_table()
             .map_or_else(Vec::new, |table| defined_name_items(document, table, is_quoted)),
-        ValueKind::Color(_) => colors(),
+        ValueKind::Color(_) | ValueKind::ColorPair(_) => colors(),
         ValueKind::ColorOrTexture(_) | ValueKind::Emission(_) if is_quoted => colors(),
         ValueKind::ColorOrTexture(_) | ValueKind::Emission(_) => {
             colors().into_iter().chain([texture("")]).collect()

@@ -148,8 +148,11 @@ fn table_schema_with_type_conditions(info: &'static TableInfo) -> Value {
 /// Returns the condition that a table has this type. The key `type` is optional for the default type.
 fn type_condition(info: &TableInfo, kind: &TableTypeInfo) -> Value {
     let is_default = info.types.first().is_some_and(|first| first.name == kind.name);
-    let required: &[&str] = if is_default { &[] } else { &["type"] };
-    json!({ "properties": { "type": { "enum": [kind.name] } }, "required": required })
+    let mut condition = json!({ "properties": { "type": { "enum": [kind.name] } } });
+    if !is_default {
+        condition["required"] = json!(["type"]);
+    }
+    condition
 }
 
 /// Returns the schema for the key `type`.
@@ -160,7 +163,7 @@ fn type_key_schema(info: &TableInfo) -> Value {
 }
 
 /// Returns the schema for a table that accepts the keys of all types. Dependencies restrict each key to its
-/// types.
+/// types, and conditions require the keys that a type needs.
 fn all_types_table_schema(info: &'static TableInfo) -> Value {
     let draft = SchemaDraft::Four;
     let (mut properties, mut dependencies) = (Map::new(), Map::new());
@@ -178,7 +181,19 @@ fn all_types_table_schema(info: &'static TableInfo) -> Value {
     }
     let mut table = json!({ "type": "object", "properties": properties, "additionalProperties": false });
     table["dependencies"] = dependencies.into();
+    let required: Vec<Value> = info.types.iter().filter_map(|kind| type_requirement(info, kind)).collect();
+    if !required.is_empty() {
+        table["allOf"] = required.into();
+    }
     table
+}
+
+/// Returns the condition that a table of this type has the type's required keys, or `None` if there are none.
+fn type_requirement(info: &TableInfo, kind: &TableTypeInfo) -> Option<Value> {
+    let is_required = |key: &&KeyInfo| matches!(key.default, DefaultValue::Required(_));
+    let required: Vec<&str> = kind.keys.iter().filter(is_required).map(|key| key.name).collect();
+    let is_other = json!({ "not": type_condition(info, kind) });
+    (!required.is_empty()).then(|| json!({ "anyOf": [is_other, { "required": required }] }))
 }
 
 /// Returns the schema for a key shared by several types. It accepts every value that any of the types

@@ -31,6 +31,10 @@ pub(super) fn value_schema(kind: ValueKind, draft: SchemaDraft) -> Value {
         ValueKind::Text => json!({ "type": "string", "pattern": "[^0-9]" }),
         ValueKind::File(endings) => path_schema(endings),
         ValueKind::Color(limits) => json!({ "anyOf": color_schemas(limits, draft) }),
+        ValueKind::ColorPair(limits) => {
+            let color = json!({ "anyOf": color_schemas(limits, draft) });
+            json!({ "type": "array", "items": color, "minItems": 2, "maxItems": 2 })
+        }
         ValueKind::ColorOrTexture(limits) => {
             any_of(color_schemas(limits, draft), texture_reference_schema(json!({})))
         }

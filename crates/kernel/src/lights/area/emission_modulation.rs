@@ -9,7 +9,10 @@ use std::sync::Arc;
 use crate::geometry::triangle::barycentric_weights_at_point;
 use crate::geometry::{RayF64, Shape};
 use crate::materials::texture::Texture;
-use crate::materials::{Coat, Footprint, Opacity, ScalarParameter, SecondUvPoint, TexturePoint};
+use crate::materials::{
+    Coat, ExtraCoordinates, Footprint, ObjectPoint, Opacity, ScalarParameter, SecondUvPoint, TexturePoint,
+};
+use crate::math::transform::Transform;
 use crate::math::{DVec2, DVec3, Vec2, Vec3};
 
 /// A factor on a light's radiance that varies with position or direction. It is the sum of its terms.
@@ -17,6 +20,8 @@ use crate::math::{DVec2, DVec3, Vec2, Vec3};
 pub struct EmissionModulation {
     terms: Vec<EmissionTerm>,
     chart: UvMapping,
+    /// The map from the shape's own coordinates to world coordinates, if a texture uses them.
+    object_frame: Option<Box<Transform>>,
 }
 
 /// A part of a light's radiance. A blend has one term per emissive part.
@@ -130,7 +135,18 @@ impl EmissionModulation {
 
     /// Creates the factor from its terms. Returns `None` if none of them varies.
     pub fn from_terms(terms: Vec<EmissionTerm>, chart: UvMapping) -> Option<Self> {
-        terms.iter().any(EmissionTerm::varies).then_some(Self { terms, chart })
+        terms.iter().any(EmissionTerm::varies).then_some(Self { terms, chart, object_frame: None })
+    }
+
+    /// Sets the map from the shape's own coordinates to world coordinates, for textures that use them.
+    #[must_use]
+    pub fn with_object_frame(self, frame: &Transform) -> Self {
+        let is_used = |term: &EmissionTerm| {
+            let of_coat = term.coat.as_ref().is_some_and(|coat| coat.uses_object_point());
+            of_coat || term.textures().any(|texture| texture.uses_object_point())
+        };
+        let object_frame = self.terms.iter().any(is_used).then(|| Box::new(*frame));
+        Self { object_frame, ..self }
     }
 
     /// Whether the factor varies with position.
@@ -138,10 +154,24 @@ impl EmissionModulation {
         self.terms.iter().any(EmissionTerm::varies_with_position)
     }
 
-    /// The factor at the given texture coordinates, without coats.
+    /// The factor at a point with the given texture coordinates, without coats.
     #[inline]
-    pub fn factor_at_uv(&self, uv: DVec2) -> Vec3 {
-        self.sum_without_coat(&TexturePoint::from_uv(uv))
+    pub fn factor_at_uv(&self, uv: DVec2, point: impl FnOnce() -> DVec3) -> Vec3 {
+        let extra = self.object_frame.as_ref().map(|frame| {
+            let object = Some(ObjectPoint::new(frame, point()));
+            Box::new(ExtraCoordinates { second: None, object })
+        });
+        self.sum_without_coat(&TexturePoint { extra, ..TexturePoint::from_uv(uv) })
+    }
+
+    /// The point for texture lookups.
+    fn texture_point(&self, point: DVec3, primitive: u32) -> TexturePoint {
+        let mut at = self.chart.texture_point(point, primitive);
+        if let Some(frame) = &self.object_frame {
+            let (second, object) = (at.second().copied(), Some(ObjectPoint::new(frame, point)));
+            at.extra = Some(Box::new(ExtraCoordinates { second, object }));
+        }
+        at
     }
 
     #[inline]
@@ -166,7 +196,7 @@ impl EmissionModulation {
 
     /// [`EmissionModulation::radiance_factor`] without coats.
     pub fn radiance_factor_without_coat(&self, point: Vec3, primitive: u32) -> Vec3 {
-        self.sum_without_coat(&self.chart.texture_point(point.as_dvec3(), primitive))
+        self.sum_without_coat(&self.texture_point(point.as_dvec3(), primitive))
     }
 
     /// Transmittance of the clear coats for a ray in a given direction, averaged with the emission as
@@ -176,7 +206,7 @@ impl EmissionModulation {
             return Vec3::ONE;
         }
         let (point, direction) = (point.as_dvec3(), direction.as_dvec3());
-        let at = self.chart.texture_point(point, primitive);
+        let at = self.texture_point(point, primitive);
         // At a shape's edge, the probe ray may miss the shape because of rounding.
         let normal = self.chart.geometric_normal_at_point(point, primitive, direction);
         let cosine = normal.map_or(1.0, |normal| normal.dot(direction)) as f32;
@@ -234,8 +264,9 @@ impl UvMapping {
         // Colors and scalars do not need tangents.
         let second = |uvs| {
             let (footprint, tangents) = (Footprint::POINT, [Vec3::ZERO; 2]);
-            Box::new(SecondUvPoint { uv: between(uvs), footprint, tangents })
+            let second = Some(SecondUvPoint { uv: between(uvs), footprint, tangents });
+            Box::new(ExtraCoordinates { second, object: None })
         };
-        TexturePoint { second: second_uvs.map(second), ..TexturePoint::from_uv(between(uvs)) }
+        TexturePoint { extra: second_uvs.map(second), ..TexturePoint::from_uv(between(uvs)) }
     }
 }

@@ -324,7 +324,8 @@ impl AreaLight {
                 Side::Front => [u, v],
                 Side::Back => [v, u],
             };
-            let color = |at: [f64; 2]| modulation.factor_at_uv(DVec2::from_array(ordered(at)));
+            let color =
+                |at: [f64; 2]| modulation.factor_at_uv(DVec2::from_array(ordered(at)), || quad.point_at(at));
             let across = ordered(modulation.texels_per_uv_unit());
             let textured = TexturedQuadEmitter::new(*quad, across, color);
             if let Some(textured) = textured {

@@ -54,6 +54,11 @@ impl ShapeEmitter for QuadEmitter {
 }
 
 impl QuadEmitter {
+    /// The point at these fractions of the edges.
+    pub(super) fn point_at(&self, [s, t]: [f64; 2]) -> DVec3 {
+        self.corner + self.u.as_dvec3() * s + self.v.as_dvec3() * t
+    }
+
     /// [`ShapeEmitter::sample`] with a precomputed offset from the point to the corner.
     #[inline(always)]
     pub(super) fn sample_given_corner_offset(

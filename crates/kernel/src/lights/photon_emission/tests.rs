@@ -22,7 +22,7 @@ use crate::lights::{
     UvMapping, front_area_light,
 };
 use crate::materials::texels::{TexelData, Texels};
-use crate::materials::texture::{Texture, TextureFilter, Wrap};
+use crate::materials::texture::{ImageTexture, Texture, TextureFilter, TextureMapping, Wrap};
 use crate::math::random;
 use crate::math::transform::Transform;
 use crate::sampling::{Dimension, PixelSampler};

@@ -462,7 +462,7 @@ impl NonSpecular {
         // Packets are lit from only one side.
         !self.is_anisotropic()
             && !self.is_transmissive()
-            && color.is_none_or(|color| color.mipmaps.is_none())
+            && color.is_none_or(Texture::supports_packets)
             && self.collect_textures().scattering.len() == usize::from(color.is_some())
     }
 

@@ -17,6 +17,7 @@ const COLOR: &str = "a color: [r, g, b], a number, \"#rrggbb\" or a name";
 /// Integers of at least this value are assumed to be components in 0–255, because no reflectance is this
 /// large.
 const MIN_BYTE: u8 = 10;
+const COLOR_PAIR: &str = "an array of two colors";
 const COLOR_OR_TEXTURE: &str =
     "a color, [r, g, b], a number, \"#rrggbb\" or a name, or { texture = \"name\" }";
 const EMISSION: &str =
@@ -31,6 +32,23 @@ impl KeyInTable<'_> {
     /// Reads a color in double precision, because `f32` would round some values to 0 or 1.
     pub(in super::super) fn color_f64(&self) -> Option<DVec3> {
         self.color_described_as(COLOR)
+    }
+
+    /// Reads an array of two colors and converts them to linear.
+    pub(in super::super) fn color_pair(&self) -> Option<[Vec3; 2]> {
+        let value = self.value?;
+        let Some(array) = value.as_array().filter(|array| array.len() == 2) else {
+            self.report_wrong_type(value, COLOR_PAIR);
+            return None;
+        };
+        let color = |element: Value<'_>| {
+            let spans = self.spans.clone().map(|[key, _]| [key, element.span()]);
+            KeyInTable { context: self.context, info: self.info, value: Some(element), spans }.color()
+        };
+        let mut colors = array.iter().map(color);
+        // Read both, to report all errors.
+        let (first, second) = (colors.next()?, colors.next()?);
+        Some([first?, second?])
     }
 
     /// Reads a color or a texture.

@@ -20,7 +20,8 @@ fn patchy(width: u32, height: u32) -> Arc<Texels> {
 fn texture(width: u32, height: u32, filter: TextureFilter) -> Arc<Texture> {
     let texels = patchy(width, height);
     let (wrap, repeat) = (Wrap::Repeat, Vec2::new(1.0, 2.0));
-    Arc::new(Texture { texels, mipmaps: None, filter, wrap, repeat, moved: None, factor: None })
+    let mapping = TextureMapping { repeat, moved: None };
+    Arc::new(Texture::Image(ImageTexture { texels, mipmaps: None, filter, wrap, mapping, factor: None }))
 }
 
 /// A light with a texture.
