@@ -38,6 +38,7 @@ mod schema;
 mod shell;
 mod show_model;
 mod stress;
+mod subdivision;
 mod surfaces;
 mod terminal;
 mod test_dir;

@@ -280,6 +280,7 @@ impl GltfFile {
                 self.malformed_error(GltfError::new(error.to_string()).add_location(place))
             }
             other @ (AssetError::OutOfMemory { .. }
+            | AssetError::MemoryLimit { .. }
             | AssetError::TooManyOpenFiles { .. }
             | AssetError::Cancelled(_)) => other,
         }
