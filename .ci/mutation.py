@@ -46,6 +46,9 @@ PICKS = "integrators::direct::light_tree::tests::"
 SKY = "lights::infinite::sky::tests::"
 SUBDIVISION = "assets::mesh::subdivide::tests::"
 
+# Modules of tests/suite.
+SUITE = ["closed_forms", "gltf_materials", "models"]
+
 # Fault, file, the code around the expression in ⟦⟧, its replacement, and the test that must fail.
 FAULTS = [
     ("panoramas of half the sky", "world/camera.rs", "sin_cos_f64(⟦FRAC_PI_2⟧ * place.y);", "0.5 * FRAC_PI_2",
@@ -448,6 +451,14 @@ FAULTS = [
      SUBDIVISION + "results_do_not_depend_on_thread_count"),
     ("meshes cached without their level", "stages/meshes.rs", "key.add_usize(⟦file.subdivide as usize⟧);", "0",
      "stages::meshes::tests::subdivision_levels_are_cached_separately"),
+    ("translucent glTF materials that keep their color", "formats/gltf/materials.rs", "let color = scaled(&material.color, ⟦1.0 - weight⟧);", "1.0",
+     "gltf_materials::diffuse_transmission_equals_hand_written_one"),
+    ("glTF blends with the wrong channel", "formats/gltf/materials.rs", 'self.add_blend(&base, parts, &through.weight, ⟦"a"⟧);', '"r"',
+     "gltf_materials::diffuse_transmission_equals_hand_written_one"),
+    ("coats of mesh files that do not cover emission", "world/file_materials.rs", "let coat = ⟦own.physical.as_ref()⟧.and_then(", "None",
+     "models::physical_mtl_matches_principled_material"),
+    ("metals in MTL files that are isotropic", "assets/mesh/mtl/material.rs", "let anisotropy = if ⟦physical.is_metal()⟧ {", "false",
+     "assets::mesh::mtl::tests::pbr_statements_are_converted"),
 ]
 
 
@@ -505,7 +516,7 @@ def executables(profile):
 
 def passes(programs, test, fault=None):
     module = test.split("::")[0]
-    crate = None if module == "closed_forms" else crate_of(module).name
+    crate = None if module in SUITE else crate_of(module).name
     program = programs[f"glimt_{crate}" if crate else "suite"]
     test = test.removeprefix(f"{crate}::") if crate == module else test
     env = {**os.environ, "GLIMT_FAULT": "" if fault is None else str(fault)}

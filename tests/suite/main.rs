@@ -15,6 +15,7 @@ mod extremes;
 mod file_protection;
 mod fuzz;
 mod gltf;
+mod gltf_materials;
 mod hostile;
 mod info;
 mod inputs;

@@ -25,8 +25,8 @@ use std::path::{Path, PathBuf};
 
 use self::container::DRACO;
 pub use self::description::{
-    AffineMap, Alpha, ModelCamera, ModelInstance, ModelLight, ModelLightKind, ModelMaterial, ModelProjection,
-    ModelScene, TextureRef, TextureWrap, TexturedValue, TintedGlass,
+    AffineMap, Alpha, DiffuseTransmission, ModelCamera, ModelInstance, ModelLight, ModelLightKind,
+    ModelMaterial, ModelProjection, ModelScene, TextureRef, TextureWrap, TexturedValue, TintedGlass,
 };
 use self::json::{JsonImage, Root, Uri};
 pub use self::references::referenced_files;

@@ -104,6 +104,7 @@ pub(in crate::assets::gltf) struct MaterialExtensions {
     pub(in crate::assets::gltf) transmission: Option<Transmission>,
     pub(in crate::assets::gltf) volume: Option<Volume>,
     pub(in crate::assets::gltf) clearcoat: Option<Clearcoat>,
+    pub(in crate::assets::gltf) diffuse_transmission: Option<DiffuseTransmission>,
     pub(in crate::assets::gltf) specular: Option<Specular>,
     pub(in crate::assets::gltf) emissive_strength: Option<EmissiveStrength>,
     pub(in crate::assets::gltf) glossiness: Option<Glossiness>,
@@ -130,6 +131,9 @@ fn deserialize_material_extensions<'de, D: Deserializer<'de>>(
                     "KHR_materials_transmission" => all.transmission = Some(map.next_value()?),
                     "KHR_materials_volume" => all.volume = Some(map.next_value()?),
                     "KHR_materials_clearcoat" => all.clearcoat = Some(map.next_value()?),
+                    "KHR_materials_diffuse_transmission" => {
+                        all.diffuse_transmission = Some(map.next_value()?);
+                    }
                     "KHR_materials_specular" => all.specular = Some(map.next_value()?),
                     "KHR_materials_emissive_strength" => all.emissive_strength = Some(map.next_value()?),
                     "KHR_materials_pbrSpecularGlossiness" => all.glossiness = Some(map.next_value()?),
@@ -188,6 +192,27 @@ pub(in crate::assets::gltf) struct Clearcoat {
     pub(in crate::assets::gltf) clearcoat_roughness_factor: f64,
     pub(in crate::assets::gltf) clearcoat_roughness_texture: Option<TextureInfo>,
     pub(in crate::assets::gltf) clearcoat_normal_texture: Option<IgnoredAny>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(rename_all = "camelCase", default)]
+pub(in crate::assets::gltf) struct DiffuseTransmission {
+    pub(in crate::assets::gltf) diffuse_transmission_factor: f64,
+    pub(in crate::assets::gltf) diffuse_transmission_texture: Option<TextureInfo>,
+    pub(in crate::assets::gltf) diffuse_transmission_color_factor: [f64; 3],
+    pub(in crate::assets::gltf) diffuse_transmission_color_texture: Option<TextureInfo>,
+}
+
+impl Default for DiffuseTransmission {
+    fn default() -> Self {
+        let (diffuse_transmission_texture, diffuse_transmission_color_texture) = (None, None);
+        Self {
+            diffuse_transmission_factor: 0.0,
+            diffuse_transmission_texture,
+            diffuse_transmission_color_factor: [1.0; 3],
+            diffuse_transmission_color_texture,
+        }
+    }
 }
 
 #[derive(Debug, Deserialize)]
