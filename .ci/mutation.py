@@ -46,6 +46,10 @@ TWO_SIDED = "closed_forms::two_sided::"
 DIRECT = "integrators::direct::tests::"
 PICKS = "integrators::direct::light_tree::tests::"
 SKY = "lights::infinite::sky::tests::"
+SUBDIVISION = "assets::mesh::subdivide::tests::"
+
+# Modules of tests/suite.
+SUITE = ["closed_forms", "gltf_materials", "models"]
 
 # Fault, file, the code around the expression in ⟦⟧, its replacement, and the test that must fail.
 FAULTS = [
@@ -455,6 +459,38 @@ FAULTS = [
      "sky.sun", "closed_forms::sky::rotating_a_sky_equals_rotating_its_sun"),
     ("rough lobe rays counted on top of light samples", "integrators/direct/mis.rs",
      "Self::Paths | Self::NarrowPaths => ⟦1.0 / count as f32⟧,", "0.0", MICROFACETS + "techniques_agree_on_area_lights"),
+    ("smooth vertices with a constant weight", "assets/mesh/subdivide/masks.rs", "(0.625 - ⟦center * center⟧) / n", "0.25",
+     SUBDIVISION + "limits::cube_limits_match_powers_of_the_matrix"),
+    ("control points that are not moved to the limit", "assets/mesh/subdivide/masks.rs", "let own = ⟦3.0 / (8.0 * neighbor_weight(count))⟧;", "1e9",
+     SUBDIVISION + "limits::cube_limits_match_powers_of_the_matrix"),
+    ("boundaries that are not splines", "assets/mesh/subdivide/masks.rs", "value * ⟦0.75⟧ + ends * 0.125", "0.8",
+     SUBDIVISION + "boundaries::flat_grids_stay_flat_within_a_spline"),
+    ("boundaries that are not moved to the limit", "assets/mesh/subdivide/masks.rs", "value * (2.0 / 3.0) + ends * (⟦1.0 / 6.0⟧)", "1.0 / 5.0",
+     SUBDIVISION + "boundaries::flat_grids_stay_flat_within_a_spline"),
+    ("single faces that shrink", "assets/mesh/subdivide/topology.rs", "vertex.is_corner || ⟦is_lone⟧ || is_fixed", "false",
+     SUBDIVISION + "boundaries::vertices_of_a_single_face_stay"),
+    ("normals from one tangent", "assets/mesh/subdivide/normals.rs", "along += *arm * ⟦sin⟧;", "sin.abs()",
+     SUBDIVISION + "limits::normals_match_a_much_finer_mesh"),
+    ("boundary normals without the ends", "assets/mesh/subdivide/normals.rs", "inner.fold(⟦ends * end_weight⟧, ", "DVec3::ZERO",
+     SUBDIVISION + "boundaries::boundary_normals_match_many_refinements"),
+    ("wide fans with ordinary edges", "assets/mesh/subdivide/masks.rs", "⟦0.5 - 0.25 * libm::cos(PI / f64::from(faces))⟧", "0.375",
+     SUBDIVISION + "boundaries::boundary_normals_match_many_refinements"),
+    ("seams that move at junctions", "assets/mesh/subdivide/weld.rs", "shape.is_corner(point) || ⟦seams[point as usize] >= 3⟧", "false",
+     SUBDIVISION + "seams::a_box_of_six_charts_has_smooth_normals"),
+    ("seams that split the surface", "assets/mesh/subdivide/weld.rs", "let number = &mut numbers[⟦first[vertex as usize]⟧ as usize];", "vertex",
+     SUBDIVISION + "seams::seams_change_only_the_coordinates"),
+    ("materials of the wrong faces", "assets/mesh/subdivide/mod.rs", "|triangle| materials[⟦triangle / copies⟧])", "triangle % materials.len()",
+     SUBDIVISION + "results_do_not_depend_on_thread_count"),
+    ("meshes cached without their level", "stages/meshes.rs", "key.add_usize(⟦file.subdivide as usize⟧);", "0",
+     "stages::meshes::tests::subdivision_levels_are_cached_separately"),
+    ("translucent glTF materials that keep their color", "formats/gltf/materials.rs", "let color = scaled(&material.color, ⟦1.0 - weight⟧);", "1.0",
+     "gltf_materials::diffuse_transmission_equals_hand_written_one"),
+    ("glTF blends with the wrong channel", "formats/gltf/materials.rs", 'self.add_blend(&base, parts, &through.weight, ⟦"a"⟧);', '"r"',
+     "gltf_materials::diffuse_transmission_equals_hand_written_one"),
+    ("coats of mesh files that do not cover emission", "world/file_materials.rs", "let coat = ⟦own.physical.as_ref()⟧.and_then(", "None",
+     "models::physical_mtl_matches_principled_material"),
+    ("metals in MTL files that are isotropic", "assets/mesh/mtl/material.rs", "let anisotropy = if ⟦physical.is_metal()⟧ {", "false",
+     "assets::mesh::mtl::tests::pbr_statements_are_converted"),
 ]
 
 
@@ -512,7 +548,7 @@ def executables(profile):
 
 def passes(programs, test, fault=None):
     module = test.split("::")[0]
-    crate = None if module == "closed_forms" else crate_of(module).name
+    crate = None if module in SUITE else crate_of(module).name
     program = programs[f"glimt_{crate}" if crate else "suite"]
     test = test.removeprefix(f"{crate}::") if crate == module else test
     env = {**os.environ, "GLIMT_FAULT": "" if fault is None else str(fault)}

@@ -522,6 +522,7 @@ const BROKEN: &[(&str, &[ExpectedDiagnostic])] = &[
             (83, 9, "warning: `sides` has no effect on a material that transmits light"),
             (88, 16, r#"`distribution` cannot be "gauss""#),
             (89, 9, "warning: `sides` has no effect on a material that transmits light"),
+            (94, 13, "`subdivide` must be a whole number between 0 and 6; found 7"),
         ],
     ),
     (

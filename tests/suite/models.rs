@@ -99,10 +99,24 @@ fn physical_mtl_matches_principled_material() {
             "map_Kd skin.ppm\nmap_Pr dull.ppm\nmap_Pm dull.ppm\n",
             "color = { texture = \"skin\" }\nroughness = { texture = \"dull\" }\nmetallic = { texture = \"dull\" }\n",
         ),
+        // A coat also covers emission.
+        (
+            "Kd 0.8 0.4 0.2\nKe 2 1 0.5\nPc 0.75\nPcr 0.25\n",
+            "color = [0.8, 0.4, 0.2]\nemission = [2, 1, 0.5]\nclearcoat = 0.75\nclearcoat_roughness = 0.25\n",
+        ),
+        (
+            "Kd 0.8 0.4 0.2\nKe 2 1 0.5\nmap_Pc dull.ppm\nmap_Pcr dull.ppm\n",
+            "color = [0.8, 0.4, 0.2]\nemission = [2, 1, 0.5]\ncoat = { texture = \"dull\" }\ncoat_roughness = { texture = \"dull\" }\n",
+        ),
+        (
+            "Kd 0.8 0.4 0.2\nPr 0.5\nPm 1\naniso 0.75\nPc 0.5\nPcr 0.25\n",
+            "type = \"metal\"\ncolor = [0.8, 0.4, 0.2]\nroughness = 0.5\nanisotropy = 0.75\ncoat = 0.5\ncoat_roughness = 0.25\n",
+        ),
     ] {
         dir.write("a.mtl", format!("newmtl m\n{mtl}"));
         let textures = "[textures.skin]\nfile = \"skin.ppm\"\n[textures.dull]\nfile = \"dull.ppm\"\n";
-        let declared = format!("[materials.m]\ntype = \"principled\"\n{keys}{textures}");
+        let kind = if keys.starts_with("type") { "" } else { "type = \"principled\"\n" };
+        let declared = format!("[materials.m]\n{kind}{keys}{textures}");
         let own = picture(&dir, "[[mesh]]\nfile = \"a.obj\"\n");
         let expected = picture(&dir, &format!("[[mesh]]\nfile = \"a.obj\"\nmaterial = \"m\"\n{declared}"));
         assert!(own == expected, "{mtl}");

@@ -13,7 +13,7 @@ use super::watch::content::{FileContentId, FilePathAndContentId};
 use crate::choice::Choice;
 use crate::integrators::{PhotonSettings, RenderSettings};
 use crate::output::part::NamedRenderInput;
-use crate::scene::description::{CameraOverrides, Scene, Texture};
+use crate::scene::description::{CameraOverrides, MeshFile, Scene, Texture};
 use crate::scene::fingerprint::{Fingerprint, FingerprintHasher};
 
 /// Everything that affects an image.
@@ -100,7 +100,7 @@ impl ImageDependencies<'_> {
         let meshes: Vec<Fingerprint> = scene
             .mesh_files
             .iter()
-            .map(|file| file_content_and_part_key(&self.describe_file_content(&file.value), file.part))
+            .map(|file| mesh_file_key(&self.describe_file_content(&file.value), file))
             .collect();
         let of = keys::scene_references_for_fingerprint(&scene, &meshes, orbiter.as_deref());
         let world = keys::world_key(&keys::surfaces_and_lights_key(&scene, &of, &[]), &eye.camera, &of);
@@ -129,11 +129,15 @@ impl ImageDependencies<'_> {
     }
 }
 
-fn file_content_and_part_key(content: &str, part: Option<u32>) -> Fingerprint {
+/// Returns the key for a mesh file with this content.
+fn mesh_file_key(content: &str, file: &MeshFile) -> Fingerprint {
     let mut key = FingerprintHasher::new("content");
     key.add_str(content);
-    if let Some(part) = part {
+    if let Some(part) = file.part {
         key.add_usize(part as usize);
+    }
+    if file.subdivide > 0 {
+        key.add_str("subdivide").add_usize(file.subdivide as usize);
     }
     key.finish()
 }

@@ -8,6 +8,7 @@ use super::plan::RenderPlan;
 use super::prepare::SceneAssets;
 use super::render::share::Shard;
 use super::stages::AbortReason;
+use super::words::format_bytes;
 use crate::film::{Film, Rect, SumOrder};
 use crate::integrators::PhotonSettings;
 use crate::scene::description::Accel;
@@ -194,18 +195,6 @@ fn sample_summation_order(plan: &RenderPlan) -> SumOrder {
 /// Formats a byte count as a `--memory` value, rounded up.
 fn format_memory_arg(bytes: u64) -> String {
     format!("{}GiB", bytes.div_ceil(1 << 30))
-}
-
-/// Formats a size: `1.25 GiB`, `300 MiB`, `12 KiB`, `1 byte`.
-fn format_bytes(bytes: u64) -> String {
-    match bytes {
-        1 => return "1 byte".to_owned(),
-        0..1024 => return format!("{bytes} bytes"),
-        1024..0x10_0000 => return format!("{} KiB", bytes / 1024),
-        0x10_0000.. => {}
-    }
-    let mib = bytes as f64 / f64::from(1 << 20);
-    if mib < 1024.0 { format!("{:.0} MiB", mib.ceil()) } else { format!("{:.2} GiB", mib / 1024.0) }
 }
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! Formats durations and sample counts for all front ends.
+//! Formats durations, sizes and sample counts for all front ends.
 
 use super::protocol::RenderProgress;
 
@@ -59,6 +59,18 @@ fn format_long_duration(seconds: u64) -> String {
         (0, minutes, seconds) => format!("{minutes} min {seconds:02} s"),
         (hours, minutes, _) => format!("{hours} h {minutes:02} min"),
     }
+}
+
+/// Formats a size: `1.25 GiB`, `300 MiB`, `12 KiB`, `1 byte`.
+pub(crate) fn format_bytes(bytes: u64) -> String {
+    match bytes {
+        1 => return "1 byte".to_owned(),
+        0..1024 => return format!("{bytes} bytes"),
+        1024..0x10_0000 => return format!("{} KiB", bytes / 1024),
+        0x10_0000.. => {}
+    }
+    let mib = bytes as f64 / f64::from(1 << 20);
+    if mib < 1024.0 { format!("{:.0} MiB", mib.ceil()) } else { format!("{:.2} GiB", mib / 1024.0) }
 }
 
 #[cfg(test)]

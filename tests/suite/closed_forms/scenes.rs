@@ -206,7 +206,7 @@ impl Build {
         let tree = MeshTree::build(Arc::new(loaded), self.scene.render.accel, &CancelToken::new())
             .expect("not canceled");
         self.parts.meshes.push(Arc::new(tree));
-        self.scene.mesh_files.push(MeshFile { value: PathBuf::new(), span: 0..0, part: None });
+        self.scene.mesh_files.push(MeshFile { value: PathBuf::new(), span: 0..0, part: None, subdivide: 0 });
         let [scale, rotate, translate] = placed;
         let file = self.parts.meshes.len() - 1;
         let placed = ObjectTransform::Steps { scale, rotate, translate };

@@ -92,7 +92,7 @@ impl FileMaterial {
             &self.emission_texture,
             &self.normal_texture,
         ];
-        let physical = self.physical.iter().flat_map(|own| [&own.roughness_texture, &own.metallic_texture]);
+        let physical = self.physical.iter().flat_map(PhysicalMaterial::textures);
         textures.into_iter().chain(physical).any(Option::is_some)
     }
 
@@ -113,6 +113,8 @@ impl FileMaterial {
         if let Some(own) = &mut self.physical {
             keep(&mut own.roughness_texture, keeps_surface);
             keep(&mut own.metallic_texture, keeps_surface);
+            keep(&mut own.clearcoat_texture, keeps_surface);
+            keep(&mut own.clearcoat_roughness_texture, keeps_surface);
         }
     }
 
@@ -193,19 +195,66 @@ impl FileTexture {
     }
 }
 
-/// Parameters of MTL's PBR extension, all in [0, 1].
+/// Parameters of MTL's PBR extension, and of glTF materials.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PhysicalMaterial {
-    /// Roughness, `Pr`.
+    /// Roughness in [0, 1], `Pr`.
     pub roughness: f32,
-    /// Metallic weight, `Pm`.
+    /// Metallic weight in [0, 1], `Pm`.
     pub metallic: f32,
-    /// Clear coat weight, `Pc`.
+    /// Stretch of the highlight along u in [−1, 1], `aniso`. 0 unless the surface is a metal.
+    pub anisotropy: f32,
+    /// Diffuse transmittance, from glTF.
+    pub diffuse_transmission: Vec3,
+    /// Clear coat weight in [0, 1], `Pc`.
     pub clearcoat: f32,
-    /// Clear coat roughness, `Pcr`.
+    /// Clear coat roughness in [0, 1], `Pcr`.
     pub clearcoat_roughness: f32,
     /// Roughness texture, `map_Pr`.
     pub roughness_texture: Option<FileTexture>,
     /// Metallic texture, `map_Pm`.
     pub metallic_texture: Option<FileTexture>,
+    /// Clear coat weight texture, `map_Pc`.
+    pub clearcoat_texture: Option<FileTexture>,
+    /// Clear coat roughness texture, `map_Pcr`.
+    pub clearcoat_roughness_texture: Option<FileTexture>,
+}
+
+impl Default for PhysicalMaterial {
+    fn default() -> Self {
+        Self {
+            roughness: 0.5,
+            metallic: 0.0,
+            anisotropy: 0.0,
+            diffuse_transmission: Vec3::ZERO,
+            clearcoat: 0.0,
+            clearcoat_roughness: 0.0,
+            roughness_texture: None,
+            metallic_texture: None,
+            clearcoat_texture: None,
+            clearcoat_roughness_texture: None,
+        }
+    }
+}
+
+impl PhysicalMaterial {
+    /// The textures, all of which are numbers.
+    pub fn textures(&self) -> [&Option<FileTexture>; 4] {
+        [
+            &self.roughness_texture,
+            &self.metallic_texture,
+            &self.clearcoat_texture,
+            &self.clearcoat_roughness_texture,
+        ]
+    }
+
+    /// Whether the surface is a metal everywhere.
+    pub fn is_metal(&self) -> bool {
+        self.metallic == 1.0 && self.metallic_texture.is_none()
+    }
+
+    /// Whether there is a clear coat.
+    pub fn has_clearcoat(&self) -> bool {
+        self.clearcoat > 0.0 || self.clearcoat_texture.is_some()
+    }
 }

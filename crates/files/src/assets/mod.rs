@@ -60,6 +60,14 @@ pub enum AssetError {
         /// Size of the failed allocation.
         bytes: usize,
     },
+    /// A computation on the file's content would exceed the memory limit.
+    #[error("{}: {message}", path.display())]
+    MemoryLimit {
+        /// The file.
+        path: PathBuf,
+        /// The reason, as shown to the user.
+        message: String,
+    },
     /// Too many files are open in the process or the system. Other files would have the same problem.
     #[error("cannot read {}: too many open files; {RAISE_FILE_LIMIT}", path.display())]
     TooManyOpenFiles {

@@ -37,9 +37,9 @@ pub fn import_scene(path: &Path, folder: &str, token: &CancelToken) -> Result<Im
     let (view, containers) = (ModelViewOptions::default(), GltfContainers::default());
     let context = ForeignReadContext { view, containers: &containers, token };
     pool.install(|| convert(path, folder, &context)).map_err(|error| match error {
-        AssetError::OutOfMemory { .. } | AssetError::TooManyOpenFiles { .. } => {
-            ImportError::Work(error.to_string())
-        }
+        AssetError::OutOfMemory { .. }
+        | AssetError::MemoryLimit { .. }
+        | AssetError::TooManyOpenFiles { .. } => ImportError::Work(error.to_string()),
         AssetError::Unreadable { .. } | AssetError::Malformed { .. } | AssetError::Canceled(_) => {
             ImportError::File(error.to_string())
         }

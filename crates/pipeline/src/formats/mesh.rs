@@ -57,7 +57,9 @@ fn material_may_cast_caustics(material: &FileMaterial) -> bool {
     match &material.physical {
         Some(own) => {
             let is_smooth = own.roughness_texture.is_some() || f64::from(own.roughness) < POLISHED_ROUGHNESS;
-            let is_coated = own.clearcoat > 0.0 && f64::from(own.clearcoat_roughness) < POLISHED_ROUGHNESS;
+            let is_coat_smooth = own.clearcoat_roughness_texture.is_some()
+                || f64::from(own.clearcoat_roughness) < POLISHED_ROUGHNESS;
+            let is_coated = own.has_clearcoat() && is_coat_smooth;
             is_mirror_or_glass || is_smooth || is_coated
         }
         None => {

@@ -81,7 +81,8 @@ impl FileReader<'_> {
         contents: &'a FilesSeenByRequest,
         containers: &'a GltfContainers,
     ) -> FileReadContext<'a> {
-        FileReadContext { sink: self.sink, token: self.token, contents, pool: self.pool, containers }
+        let FileReader { sink, token, pool, .. } = *self;
+        FileReadContext { sink, token, contents, pool, containers, available_memory: u64::MAX }
     }
 }
 

@@ -61,7 +61,8 @@ impl Session {
         }
         let plans = RequestPlans::resolve(&parsed.loaded.scene, request)?;
         let plan = &plans.shown;
-        self.check_memory(&MemoryEstimate::for_image(plan), request, &plans)?;
+        reading.files.available_memory =
+            self.check_memory(&MemoryEstimate::for_image(plan), request, &plans)?;
         let findings = &mut *reading.findings;
         findings.warnings.extend(settings_warnings(&parsed.loaded, &plan.scene, &plan.settings, overrides));
         send_settings(&parsed, plan, sink);
@@ -86,6 +87,7 @@ impl Session {
     /// Checks whether a request fits in memory, and limits the cached films to the remaining memory. If the
     /// request shows another image, the film of the scene's own image also counts. If the two films do not fit
     /// together, the film of the scene's own image may be dropped, but only if that image has been written.
+    /// Returns the number of bytes left.
     ///
     /// # Errors
     /// The request needs more memory than is available.
@@ -94,7 +96,7 @@ impl Session {
         estimate: &MemoryEstimate,
         request: &Request,
         plans: &RequestPlans,
-    ) -> Result<(), AbortReason> {
+    ) -> Result<u64, AbortReason> {
         let bytes = self.additional_film_bytes(request, plans);
         let all = estimate.clone().with_saved_scene_film(bytes).check(&plans.shown);
         let is_expendable = all.is_err() && self.is_own_image_written();
@@ -104,7 +106,7 @@ impl Session {
             self.films.unpin();
         }
         self.films.set_byte_limit(room);
-        Ok(())
+        Ok(room)
     }
 
     /// Returns the size of the own image's film in bytes if it is kept in addition to the request's film.

@@ -15,6 +15,8 @@ pub(super) struct MeshWarnings<'a> {
     all: Vec<(&'a MeshFile, MeshWarning)>,
     /// Index of each file's warning about dropped faces.
     dropped: HashMap<&'a Path, usize>,
+    /// Files and parts whose dropped faces are counted. The same part may occur at several subdivision levels.
+    counted: HashSet<(&'a Path, Option<u32>)>,
     known: HashSet<String>,
 }
 
@@ -28,7 +30,7 @@ impl<'a> MeshWarnings<'a> {
     /// Adds a file's warnings. Warnings about its materials are included only if an object uses these
     /// materials.
     pub(super) fn add_file_warnings(&mut self, file: &'a MeshFile, mesh: &LoadedMesh, uses_own: bool) {
-        if mesh.dropped != DroppedFaces::default() {
+        if mesh.dropped != DroppedFaces::default() && self.counted.insert((&file.value, file.part)) {
             let place = *self.dropped.entry(&file.value).or_insert(self.all.len());
             match self.all.get_mut(place) {
                 Some((_, MeshWarning::Dropped(all, parts))) => {
@@ -158,9 +160,12 @@ mod tests {
 
     #[test]
     fn warnings_about_parts_are_combined() {
-        let part = |part| MeshFile { value: PathBuf::from("a.glb"), part: Some(part), span: 0..0 };
-        let (files, other) =
-            ([part(0), part(1), part(2)], MeshFile { value: "b.ply".into(), part: None, span: 0..0 });
+        let part =
+            |part| MeshFile { value: PathBuf::from("a.glb"), part: Some(part), subdivide: 0, span: 0..0 };
+        let (files, other) = (
+            [part(0), part(1), part(2)],
+            MeshFile { value: "b.ply".into(), part: None, subdivide: 0, span: 0..0 },
+        );
         let mesh = |degenerate, warning: &str| LoadedMesh {
             dropped: DroppedFaces { non_finite: 0, degenerate },
             warnings: vec![warning.to_owned()],

@@ -8,9 +8,11 @@ use rayon::prelude::*;
 use super::super::cache::CacheOfNamedValues;
 use super::super::protocol::reasons;
 use super::super::watch::content::{FileContentId, FilePathAndContentId};
+use super::super::words::format_bytes;
 use super::containers::canonical;
 use super::mesh_warnings::{MeshWarnings, add_limited_mesh_warnings, warn_about_missing_mesh_data};
 use super::{AbortReason, FileCounts, FileReadContext, Findings, LoadedAsset, StageResult, loading_result};
+use crate::assets::mesh::subdivide::{subdivide, subdivision_memory_bytes};
 use crate::assets::{AssetError, Companion, LoadedMesh};
 use crate::control::{CancelToken, Canceled, Progress};
 use crate::scene::description::{MeshFile, Scene};
@@ -51,7 +53,7 @@ pub(crate) type MeshesByFileIndex = Vec<Arc<CachedMesh>>;
 /// The token is canceled, or there is not enough memory.
 pub(crate) fn load_meshes(
     loaded: &LoadedScene,
-    cache: &mut CacheOfNamedValues<MeshPathAndPart, CachedMesh>,
+    cache: &mut CacheOfNamedValues<MeshIdentity, CachedMesh>,
     findings: &mut Findings,
     reading: &FileReadContext<'_>,
 ) -> Result<StageResult<MeshesByFileIndex>, AbortReason> {
@@ -76,8 +78,8 @@ pub(crate) fn load_meshes(
             .par_iter()
             .zip(before)
             .map(|(file, (content, kept))| {
-                let load = |_: &Path, progress: Progress<'_>, token: &CancelToken| {
-                    reading.containers.load_any_mesh(&file.value, file.part, progress, token)
+                let load = |_: &Path, progress: Progress<'_>, _: &CancelToken| {
+                    load_subdivided(file, reading, progress)
                 };
                 load_or_reuse_mesh(file, content, kept, reading, load)
             })
@@ -131,11 +133,31 @@ pub(crate) fn load_meshes(
     Ok(loading_result(meshes, counts))
 }
 
-/// Canonical path of a mesh file, and a part number.
-pub(crate) type MeshPathAndPart = (PathBuf, Option<u32>);
+/// Canonical path of a mesh file, a part number, and the number of subdivision levels.
+pub(crate) type MeshIdentity = (PathBuf, Option<u32>, u32);
 
-fn mesh_identity(file: &MeshFile) -> MeshPathAndPart {
-    (canonical(&file.value), file.part)
+fn mesh_identity(file: &MeshFile) -> MeshIdentity {
+    (canonical(&file.value), file.part, file.subdivide)
+}
+
+/// Reads a mesh file and subdivides it.
+fn load_subdivided(
+    file: &MeshFile,
+    reading: &FileReadContext<'_>,
+    progress: Progress<'_>,
+) -> Result<LoadedMesh, AssetError> {
+    let MeshFile { value: path, part, subdivide: levels, .. } = file;
+    let loaded = reading.containers.load_any_mesh(path, *part, progress, reading.token)?;
+    let needed = subdivision_memory_bytes(loaded.mesh.triangles.len(), *levels);
+    if *levels > 0 && needed > reading.available_memory {
+        let [needed, available] = [needed, reading.available_memory].map(format_bytes);
+        let message = format!(
+            "`subdivide = {levels}` needs about {needed} of memory, but only {available} are left; use a lower level or \
+             raise the limit"
+        );
+        return Err(AssetError::MemoryLimit { path: path.clone(), message });
+    }
+    subdivide(loaded, *levels, path, reading.token)
 }
 
 /// Loads one file, or returns the cached mesh if the file and all files it references are unchanged.
@@ -212,6 +234,7 @@ fn mesh_key_without_companions(file: &MeshFile, content: FileContentId) -> Finge
     content.add_to_fingerprint(
         key.add_path_bytes(&file.value).add_usize(file.part.map_or(0, |part| part as usize + 1)),
     );
+    key.add_usize(file.subdivide as usize);
     key.finish()
 }
 
@@ -238,7 +261,7 @@ mod tests {
         folder: tempfile::TempDir,
         sink: EventSink,
         pool: rayon::ThreadPool,
-        cache: CacheOfNamedValues<MeshPathAndPart, CachedMesh>,
+        cache: CacheOfNamedValues<MeshIdentity, CachedMesh>,
         contents: Arc<FileHashCache>,
     }
 
@@ -286,6 +309,7 @@ mod tests {
                 contents,
                 pool: &self.pool,
                 containers: &GltfContainers::default(),
+                available_memory: u64::MAX,
             };
             let mut findings = Findings::default();
             let meshes =
@@ -345,6 +369,24 @@ mod tests {
     }
 
     #[test]
+    fn subdivision_levels_are_cached_separately() {
+        let mut fixture = MeshFixture::new();
+        let mut load = |levels: &[u32]| {
+            let table = |level: &u32| format!("[[mesh]]\nfile = \"a.obj\"\nsubdivide = {level}\n");
+            let tables: String = levels.iter().map(table).collect();
+            let snapshot = fixture.snapshot();
+            let (meshes, findings) = fixture.find(&tables, &snapshot);
+            assert!(findings.errors.is_empty(), "{:?}", findings.errors);
+            let summary = |mesh: &Arc<CachedMesh>| (mesh.mesh.mesh.triangles.len(), mesh.key);
+            meshes.iter().map(summary).collect::<Vec<_>>()
+        };
+        let (all, last) = (load(&[0, 1, 3, 1]), load(&[3]));
+        assert_eq!(all.iter().map(|(triangles, _)| *triangles).collect::<Vec<_>>(), [1, 4, 64]);
+        assert!(all[0].1 != all[1].1 && all[1].1 != all[2].1);
+        assert_eq!(last, all[2..]);
+    }
+
+    #[test]
     fn warning_count_is_limited() {
         let mut fixture = MeshFixture::new();
         let names: String = (0..102).map(|name| format!("usemtl x{name}\nf 1 2 3\n")).collect();
@@ -386,7 +428,7 @@ mod tests {
     fn material_file_change_after_loading_is_detected() {
         let fixture = MeshFixture::new();
         let path = fixture.folder.path().join("a.obj");
-        let file = MeshFile { value: path, span: 0..0, part: None };
+        let file = MeshFile { value: path, span: 0..0, part: None, subdivide: 0 };
         let snapshot = fixture.snapshot();
         let token = CancelToken::new();
         let reading = FileReadContext {
@@ -395,6 +437,7 @@ mod tests {
             contents: &snapshot,
             pool: &fixture.pool,
             containers: &GltfContainers::default(),
+            available_memory: u64::MAX,
         };
         let load_and_change = |path: &Path, progress: Progress<'_>, token: &CancelToken| {
             let mesh = crate::assets::mesh::load(path, progress, token);
@@ -413,7 +456,7 @@ mod tests {
         let fixture = MeshFixture::new();
         std::fs::remove_file(fixture.folder.path().join("a.mtl")).expect("removed");
         let path = fixture.folder.path().join("a.obj");
-        let file = MeshFile { value: path, span: 0..0, part: None };
+        let file = MeshFile { value: path, span: 0..0, part: None, subdivide: 0 };
         let snapshot = fixture.snapshot();
         let token = CancelToken::new();
         let reading = FileReadContext {
@@ -422,6 +465,7 @@ mod tests {
             contents: &snapshot,
             pool: &fixture.pool,
             containers: &GltfContainers::default(),
+            available_memory: u64::MAX,
         };
         let load_and_appear = |path: &Path, progress: Progress<'_>, token: &CancelToken| {
             let mesh = crate::assets::mesh::load(path, progress, token);

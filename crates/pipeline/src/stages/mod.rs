@@ -84,9 +84,9 @@ impl AbortReason {
     pub(super) fn unless_fatal(error: AssetError) -> Result<AssetError, Self> {
         match error {
             AssetError::Canceled(_) => Err(Self::Canceled),
-            AssetError::OutOfMemory { .. } | AssetError::TooManyOpenFiles { .. } => {
-                Err(Self::work_failure(error))
-            }
+            AssetError::OutOfMemory { .. }
+            | AssetError::MemoryLimit { .. }
+            | AssetError::TooManyOpenFiles { .. } => Err(Self::work_failure(error)),
             AssetError::Unreadable { .. } | AssetError::Malformed { .. } => Ok(error),
         }
     }
@@ -126,6 +126,8 @@ pub(super) struct FileReadContext<'a> {
     pub(super) contents: &'a FilesSeenByRequest,
     pub(super) pool: &'a ThreadPool,
     pub(super) containers: &'a GltfContainers,
+    /// Bytes left for meshes and textures, or [`u64::MAX`] without a limit.
+    pub(super) available_memory: u64,
 }
 
 /// Files, errors and warnings found by a request.

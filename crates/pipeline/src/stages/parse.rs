@@ -49,9 +49,9 @@ pub(crate) struct SceneParseRequest<'a> {
 fn abort_reason(error: AssetError, findings: &mut Findings, reading: &FileReadContext<'_>) -> AbortReason {
     match error {
         AssetError::Canceled(_) => AbortReason::Canceled,
-        AssetError::OutOfMemory { .. } | AssetError::TooManyOpenFiles { .. } => {
-            AbortReason::work_failure(error)
-        }
+        AssetError::OutOfMemory { .. }
+        | AssetError::MemoryLimit { .. }
+        | AssetError::TooManyOpenFiles { .. } => AbortReason::work_failure(error),
         AssetError::Unreadable { path, reason } => {
             if let Ok(content) = reading.contents.first_seen_content_id(&path, reading.token) {
                 findings.add_file(FilePathAndContentId { path: path.clone(), content });

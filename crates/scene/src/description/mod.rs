@@ -95,7 +95,7 @@ pub struct Spanned<T> {
     pub span: Range<usize>,
 }
 
-/// A mesh file, or one part of a glTF file.
+/// A mesh file, or one part of a glTF file, after subdivision.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct MeshFile {
     /// Path of the file.
@@ -104,6 +104,8 @@ pub struct MeshFile {
     pub span: Range<usize>,
     /// Index of the glTF part. `None` means the whole file.
     pub part: Option<u32>,
+    /// Number of subdivision levels.
+    pub subdivide: u32,
 }
 
 /// The `[photons]` table.

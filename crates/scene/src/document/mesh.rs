@@ -22,6 +22,9 @@ shape_table! {
     /// Index of a primitive in a glTF file, counted across all meshes. Without this key, the mesh is
     /// the file's whole scene.
     part: Whole(0, MAX_INTEGER), Absent;
+    /// Number of levels of Loop subdivision. Each level splits every triangle into four; vertices are moved
+    /// to the smooth limit surface.
+    subdivide: Whole(0, 6), Is("0");
     /// Scale, applied first.
     scale: Scale(NotZero), Is("1.0");
     /// Rotation about x, then y, then z.
@@ -37,9 +40,10 @@ shape_table! {
 fn read_mesh(table: &TableReader<'_>, files: &mut MeshFileRegistry) -> Option<Shape> {
     let file = table.key("file").existing_file();
     let part = read_part_index(table, file.as_ref());
+    let subdivide = table.key("subdivide").integer();
     let placed = read_transform(table);
     let (smooth, vertex_colors) = (table.key("smooth").boolean(), table.key("vertex_colors").boolean());
-    let (file, placed) = (files.add_file(file?, part?), placed?);
+    let (file, placed) = (files.add_file(file?, part?, subdivide?), placed?);
     Some(Shape::Mesh(MeshReference { file, placed, smooth: smooth?, vertex_colors: vertex_colors? }))
 }
 

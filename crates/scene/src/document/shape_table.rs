@@ -49,19 +49,20 @@ macro_rules! shape_table {
 }
 pub(super) use shape_table;
 
-/// The mesh files referenced so far. A file referenced through different paths is listed once.
+/// The mesh files referenced so far. A file referenced through different paths is listed once per part and
+/// subdivision level.
 #[derive(Default)]
 pub(super) struct MeshFileRegistry {
     list: Vec<MeshFile>,
-    indices: HashMap<(PathBuf, Option<u32>), usize>,
+    indices: HashMap<(PathBuf, Option<u32>, u32), usize>,
 }
 
 impl MeshFileRegistry {
-    pub(super) fn add_file(&mut self, file: Spanned<PathBuf>, part: Option<u32>) -> usize {
+    pub(super) fn add_file(&mut self, file: Spanned<PathBuf>, part: Option<u32>, subdivide: u32) -> usize {
         let identity = file.value.canonicalize().unwrap_or_else(|_| file.value.clone());
-        *self.indices.entry((identity, part)).or_insert_with(|| {
+        *self.indices.entry((identity, part, subdivide)).or_insert_with(|| {
             let Spanned { value, span } = file;
-            self.list.push(MeshFile { value, span, part });
+            self.list.push(MeshFile { value, span, part, subdivide });
             self.list.len() - 1
         })
     }

@@ -67,7 +67,7 @@ table_types! {
         /// Number of octaves; each has half the size and half the weight of the previous one.
         octaves: Whole(1, 16), Is("4");
         /// Selects the pattern.
-        seed: Whole(0, MOST_WHOLE), Is("0");
+        seed: Whole(0, MAX_INTEGER), Is("0");
     }
     /// Equal stripes, two per repetition along u.
     Bands = "bands" {

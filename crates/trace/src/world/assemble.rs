@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::null_interaction::SeeThroughObjects;
 use super::packet_material::PacketMaterial;
-use super::{Camera, Geometry, GlassSolids, ObjectMaterial, World, WorldInputs, lower};
+use super::{Camera, Geometry, GlassSolids, ObjectMaterial, World, WorldInputs, file_materials, lower};
 use crate::assets::LoadedMesh;
 use crate::control::CancelToken;
 use crate::lights::Lights;
@@ -106,11 +106,14 @@ fn lower_materials(scene: &Scene, inputs: &WorldInputs) -> (Vec<Material>, Vec<O
     for mesh in &inputs.meshes {
         first_of_file.push(materials.len() as u32);
         materials.extend(
-            mesh.loaded().materials.iter().map(|own| lower::lower_file_material(&inputs.images, own)),
+            mesh.loaded()
+                .materials
+                .iter()
+                .map(|own| file_materials::lower_file_material(&inputs.images, own)),
         );
     }
     let fallback = materials.len() as u32;
-    materials.push(lower::fallback_material());
+    materials.push(file_materials::fallback_material());
     let of_object = |object: &description::Object| match (object.material, object.shape.as_mesh()) {
         (Some(index), _) => ObjectMaterial::One(index as u32),
         (None, Some(mesh)) => ObjectMaterial::OfFile { first: first_of_file[mesh.file], fallback },

@@ -4,7 +4,8 @@ use std::collections::HashSet;
 use std::sync::Arc;
 
 use super::distinct_lights::duplicate_emissive_triangles;
-use super::lower::{file_emission, file_opacity, lower_blend_weight, lower_emission, lower_opacity};
+use super::file_materials::{file_emission, file_opacity};
+use super::lower::{lower_blend_weight, lower_emission, lower_opacity};
 use super::{Geometry, Images, MeshInstance, Object};
 use crate::assets::FileMaterial;
 use crate::control::{CancelToken, Canceled};

@@ -8,6 +8,7 @@ pub mod contact;
 mod coplanar;
 mod distinct_lights;
 mod emitters;
+mod file_materials;
 pub mod geometry;
 mod glass_solids;
 mod isolated;

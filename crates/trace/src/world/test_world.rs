@@ -54,7 +54,7 @@ impl TestWorldBuilder {
         let loaded = Arc::new(LoadedMesh { mesh, ..LoadedMesh::default() });
         let tree = MeshTree::build(loaded, Accel::Bvh, &CancelToken::new()).expect("never canceled");
         self.meshes.push(Arc::new(tree));
-        self.scene.mesh_files.push(MeshFile { value: PathBuf::new(), span: 0..0, part: None });
+        self.scene.mesh_files.push(MeshFile { value: PathBuf::new(), span: 0..0, part: None, subdivide: 0 });
         let file = self.meshes.len() - 1;
         let placed = ObjectTransform::Steps { scale, rotate, translate };
         self.shape(Shape::Mesh(MeshReference { file, placed, smooth: false, vertex_colors: false }), material)

@@ -402,11 +402,15 @@ fn needed_textures_of_file_material(
                 TextureRole::Specular,
             ),
         ],
-        Some(physical) => vec![
-            (&own.diffuse_texture, TextureRole::Facets),
-            (&physical.roughness_texture, TextureRole::Roughness(ChannelSelector::Luminance)),
-            (&physical.metallic_texture, TextureRole::Roughness(ChannelSelector::Luminance)),
-        ],
+        Some(physical) => {
+            let role = TextureRole::Roughness(ChannelSelector::Luminance);
+            let numbers = physical.textures().map(|texture| (texture, role));
+            let coat = [&physical.clearcoat_texture, &physical.clearcoat_roughness_texture];
+            let coat = coat.into_iter().filter(|_| own.emits());
+            let coat = coat.map(|texture| (texture, TextureRole::EmissionCoat(ChannelSelector::Luminance)));
+            let color = (&own.diffuse_texture, TextureRole::Facets);
+            std::iter::once(color).chain(numbers).chain(coat).collect()
+        }
     };
     let looked_up =
         of_kind.into_iter().chain(shared).filter(move |(_, role)| lookups.includes_role(*role, false));

@@ -134,6 +134,15 @@ pub struct TintedGlass {
     pub tint: DVec3,
 }
 
+/// Diffuse transmission, which replaces part of the diffuse reflection.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DiffuseTransmission {
+    /// Fraction t of the diffuse light that is transmitted, from the texture's alpha.
+    pub weight: TexturedValue,
+    /// Color of the transmitted light, which replaces the base color.
+    pub color: TexturedValue,
+}
+
 /// A glTF material, converted to `principled` parameters.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ModelMaterial {
@@ -153,6 +162,8 @@ pub struct ModelMaterial {
     pub specular_color: TexturedValue,
     /// Transmission, from the texture's red channel.
     pub transmission: TexturedValue,
+    /// Diffuse transmission, or `None` if there is none.
+    pub diffuse_transmission: Option<DiffuseTransmission>,
     /// Clear coat weight, from the texture's red channel.
     pub clearcoat: TexturedValue,
     /// Clear coat roughness, from the texture's green channel.
@@ -167,7 +178,7 @@ pub struct ModelMaterial {
     pub alpha: Alpha,
     /// Whether both sides are visible and emit light.
     pub is_two_sided: bool,
-    /// Solid glass. If set, all other parameters except the roughness are ignored.
+    /// Solid glass. If set, all other parameters except the roughness and the emission are ignored.
     pub glass: Option<TintedGlass>,
 }
 
@@ -183,6 +194,7 @@ impl ModelMaterial {
             specular: TexturedValue::from_scalar(1.0),
             specular_color: TexturedValue::from_scalar(1.0),
             transmission: TexturedValue::from_scalar(0.0),
+            diffuse_transmission: None,
             clearcoat: TexturedValue::from_scalar(0.0),
             clearcoat_roughness: TexturedValue::from_scalar(0.0),
             emission: TexturedValue::from_scalar(0.0),

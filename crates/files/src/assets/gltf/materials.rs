@@ -2,7 +2,8 @@
 //! `KHR_materials_*`).
 
 use super::description::{
-    Alpha, ImportNotes, ModelMaterial, TextureRef, TextureWrap, TexturedValue, TintedGlass,
+    Alpha, DiffuseTransmission, ImportNotes, ModelMaterial, TextureRef, TextureWrap, TexturedValue,
+    TintedGlass,
 };
 use super::json::{
     CLAMP, JsonMaterial, MIRROR, NEAREST, REPEAT, TextureInfo, TextureInfoExtensions, TextureTransform,
@@ -31,8 +32,11 @@ impl JsonMaterial {
             .specular
             .as_ref()
             .map(|specular| [&specular.specular_texture, &specular.specular_color_texture]);
-        let extended =
-            glossy.into_iter().chain(transmission).chain(coat.into_iter().chain(specular).flatten());
+        let diffuse = extensions.diffuse_transmission.as_ref().map(|through| {
+            [&through.diffuse_transmission_texture, &through.diffuse_transmission_color_texture]
+        });
+        let pairs = coat.into_iter().chain(specular).chain(diffuse).flatten();
+        let extended = glossy.into_iter().chain(transmission).chain(pairs);
         base.into_iter().chain(extended).flatten().collect()
     }
 
@@ -51,12 +55,11 @@ impl TextureInfo {
 }
 
 /// Known but unsupported extensions, each with its note.
-const UNSUPPORTED_EXTENSIONS: [(&str, &str); 6] = [
+const UNSUPPORTED_EXTENSIONS: [(&str, &str); 5] = [
     ("KHR_materials_sheen", "sheen is ignored"),
     ("KHR_materials_iridescence", "iridescence is ignored"),
     ("KHR_materials_anisotropy", "anisotropy is ignored"),
     ("KHR_materials_dispersion", "dispersion is ignored"),
-    ("KHR_materials_diffuse_transmission", "diffuse transmission is ignored"),
     ("KHR_materials_variants", "material variants are ignored"),
 ];
 
@@ -146,12 +149,14 @@ impl MaterialReader<'_> {
             let texture = &transmission.transmission_texture;
             material.transmission = self.convert_scalar(transmission.transmission_factor, texture)?;
         }
+        material.diffuse_transmission = self.convert_diffuse_transmission(json, &material)?;
         if let Some(volume) = extensions.volume.as_ref().filter(|volume| volume.thickness_factor > 0.0)
             && material.transmission.factor.x > 0.0
         {
             material.glass =
                 self.solid_glass(&material, volume.attenuation_color, volume.attenuation_distance);
         }
+        self.note_parameters_that_glass_lacks(&mut material);
         if extensions.unlit {
             self.note("the material is unlit, so its color is emitted and also lights other surfaces");
             material.emission = std::mem::replace(&mut material.color, TexturedValue::from_scalar(0.0));
@@ -159,6 +164,7 @@ impl MaterialReader<'_> {
             let black = || TexturedValue::from_scalar(0.0);
             (material.metallic, material.specular) = (black(), black());
             (material.clearcoat, material.transmission, material.glass) = (black(), black(), None);
+            material.diffuse_transmission = None;
         }
         for name in &extensions.others {
             match UNSUPPORTED_EXTENSIONS.iter().find(|(known, _)| known == name) {
@@ -167,6 +173,45 @@ impl MaterialReader<'_> {
             }
         }
         Ok(material)
+    }
+
+    /// Converts diffuse transmission, unless it has no effect.
+    fn convert_diffuse_transmission(
+        &mut self,
+        json: &JsonMaterial,
+        material: &ModelMaterial,
+    ) -> Result<Option<DiffuseTransmission>, GltfError> {
+        let Some(through) = &json.extensions.diffuse_transmission else { return Ok(None) };
+        let weight =
+            self.convert_scalar(through.diffuse_transmission_factor, &through.diffuse_transmission_texture)?;
+        let factor = DVec3::from(through.diffuse_transmission_color_factor.map(clamp_to_unit));
+        let color = self.convert_textured_color(factor, &through.diffuse_transmission_color_texture)?;
+        let is_metal = material.metallic.texture.is_none() && material.metallic.factor == DVec3::ONE;
+        if weight.factor == DVec3::ZERO || is_metal {
+            return Ok(None);
+        }
+        if material.transmission.factor != DVec3::ZERO {
+            self.note("diffuse transmission also reduces the light that passes straight through");
+        }
+        let volume = json.extensions.volume.as_ref().filter(|volume| volume.thickness_factor > 0.0);
+        if volume.is_some() && material.transmission.factor == DVec3::ZERO {
+            self.note("the volume below a diffusely transmitting surface is ignored; the surface is thin");
+        }
+        Ok(Some(DiffuseTransmission { weight, color }))
+    }
+
+    /// Removes the layers that solid glass cannot have, with notes.
+    fn note_parameters_that_glass_lacks(&mut self, material: &mut ModelMaterial) {
+        if material.glass.is_none() {
+            return;
+        }
+        if material.clearcoat.factor != DVec3::ZERO {
+            self.note("the clear coat of solid glass is ignored");
+            material.clearcoat = TexturedValue::from_scalar(0.0);
+        }
+        if material.diffuse_transmission.take().is_some() {
+            self.note("the diffuse transmission of solid glass is ignored");
+        }
     }
 
     /// Converts a volume to solid glass. The attenuation color becomes the transmittance per unit of

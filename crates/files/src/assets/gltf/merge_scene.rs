@@ -8,8 +8,8 @@ use super::{GltfError, GltfFile, ModelScene};
 use crate::assets::{AssetError, FileMaterial, LoadedMesh, PhysicalMaterial};
 use crate::control::{CancelToken, ignore_progress};
 use crate::geometry::mesh::TriangleMesh;
-use crate::math::Vec3;
 use crate::math::origin::local_coordinate_origin;
+use crate::math::{DVec3, Vec3};
 
 /// Maximum number of triangles in a merged scene, counting every instance.
 const MAX_TRIANGLES: usize = 1 << 25;
@@ -124,9 +124,16 @@ fn append_attribute<T: Copy>(
 /// Converts the material properties that mesh files support.
 fn to_file_material(material: &ModelMaterial) -> FileMaterial {
     let number = |slot: &super::TexturedValue| slot.factor.x as f32;
+    let (reflected, transmitted) = match &material.diffuse_transmission {
+        None => (material.color.factor, DVec3::ZERO),
+        Some(through) => {
+            let weight = through.weight.factor.x;
+            (material.color.factor * (1.0 - weight), through.color.factor * weight)
+        }
+    };
     FileMaterial {
         name: material.name.clone(),
-        diffuse: material.color.factor.as_vec3(),
+        diffuse: reflected.as_vec3(),
         specular: Vec3::ZERO,
         shininess: 1.0,
         emission: material.emission.factor.as_vec3(),
@@ -149,8 +156,8 @@ fn to_file_material(material: &ModelMaterial) -> FileMaterial {
             metallic: number(&material.metallic),
             clearcoat: number(&material.clearcoat),
             clearcoat_roughness: number(&material.clearcoat_roughness),
-            roughness_texture: None,
-            metallic_texture: None,
+            diffuse_transmission: transmitted.as_vec3(),
+            ..PhysicalMaterial::default()
         }),
     }
 }

@@ -7,7 +7,8 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 use serde::de::{Deserializer, Error, Visitor};
 
-use super::{BOM, JSON_LIMIT, resolve_relative_uri};
+use super::container::{BOM, JSON_LIMIT};
+use super::resolve_relative_uri;
 use crate::assets::read;
 use crate::control::{CancelToken, Canceled};
 

@@ -290,13 +290,13 @@ impl<'a> FaceTriangulator<'a> {
 
 /// Whether three finite points form a triangle with nonzero area. Computes in `f64`, where products of `f32`
 /// coordinates neither overflow nor underflow, and are exact for nearby points.
-fn has_area([a, b, c]: [Vec3; 3]) -> bool {
+pub(super) fn has_area([a, b, c]: [Vec3; 3]) -> bool {
     let [a, b, c] = [a, b, c].map(|point| point.as_dvec3());
     (b - a).cross(c - a) != DVec3::ZERO
 }
 
 /// Removes unused vertices, whose coordinates may be arbitrary and would enlarge the bounds.
-fn drop_unused_vertices(mesh: &mut TriangleMesh) {
+pub(super) fn drop_unused_vertices(mesh: &mut TriangleMesh) {
     let mut new_index = vec![u32::MAX; mesh.positions.len()];
     for &corner in mesh.triangles.as_flattened() {
         new_index[corner as usize] = 0;

@@ -14,6 +14,7 @@ mod polygon;
 #[cfg(test)]
 mod polygon_tests;
 mod stl;
+pub mod subdivide;
 mod text;
 
 use std::path::{Path, PathBuf};

@@ -5,7 +5,9 @@ use std::collections::HashMap;
 use super::super::model::UsedNames;
 use super::super::rounding::{shorten, shorten_color, shorten_pair};
 use super::SceneBuilder;
-use crate::assets::gltf::{Alpha, ModelMaterial, TextureRef, TextureWrap, TexturedValue};
+use crate::assets::gltf::{
+    Alpha, DiffuseTransmission, ModelMaterial, TextureRef, TextureWrap, TexturedValue,
+};
 use crate::math::{DVec3, Vec2};
 use crate::scene::BuiltValue;
 
@@ -51,13 +53,74 @@ impl MaterialBuilder<'_, '_> {
             .iter()
             .map(|material| {
                 let name = names.make_unique(&material.name, "material");
-                all.add_material(material, &name);
+                match &material.diffuse_transmission {
+                    Some(through) => all.add_translucent_material(material, through, &name, names),
+                    None => all.add_material(material, &name, None),
+                }
                 name
             })
             .collect()
     }
 
-    fn add_material(&mut self, material: &ModelMaterial, name: &str) {
+    /// Adds a material with diffuse transmission.
+    ///
+    /// glTF mixes reflection and transmission with the weight t, and the result with the metal. If t is constant
+    /// and there is no metal, (1 − t) times the base color is reflected and t times the transmission color
+    /// is transmitted. Otherwise, both mixes are blends.
+    fn add_translucent_material(
+        &mut self,
+        material: &ModelMaterial,
+        through: &DiffuseTransmission,
+        name: &str,
+        names: &mut UsedNames,
+    ) {
+        let is_dielectric = material.metallic.factor == DVec3::ZERO;
+        let base = match is_dielectric {
+            true => name.to_owned(),
+            false => names.make_unique(&format!("{name} dielectric"), "dielectric"),
+        };
+        let dielectric = ModelMaterial { metallic: TexturedValue::from_scalar(0.0), ..material.clone() };
+        if through.weight.texture.is_none() {
+            let weight = through.weight.factor.x;
+            let scaled = |value: &TexturedValue, factor: f64| TexturedValue {
+                factor: value.factor * factor,
+                texture: value.texture.clone().filter(|_| factor > 0.0),
+            };
+            let color = scaled(&material.color, 1.0 - weight);
+            self.add_material(
+                &ModelMaterial { color, ..dielectric },
+                &base,
+                Some(&scaled(&through.color, weight)),
+            );
+        } else {
+            let parts =
+                ["reflection", "transmission"].map(|part| names.make_unique(&format!("{name} {part}"), part));
+            self.add_material(&dielectric, &parts[0], None);
+            let black = ModelMaterial { color: TexturedValue::from_scalar(0.0), ..dielectric };
+            self.add_material(&black, &parts[1], Some(&through.color));
+            self.add_blend(&base, parts, &through.weight, "a");
+        }
+        if !is_dielectric {
+            let metal = names.make_unique(&format!("{name} metal"), "metal");
+            let metallic = TexturedValue::from_scalar(1.0);
+            self.add_material(&ModelMaterial { metallic, ..material.clone() }, &metal, None);
+            self.add_blend(name, [base, metal], &material.metallic, "b");
+        }
+    }
+
+    /// Adds a blend of two materials.
+    fn add_blend(&mut self, name: &str, parts: [String; 2], weight: &TexturedValue, channel: &'static str) {
+        let mut keys = Entries::new();
+        self.push_number_or_texture(&mut keys, "weight", 0.5, weight, channel);
+        let document = &mut self.scene.document;
+        document.named_table("materials", name);
+        document.set("type", "blend");
+        document.set("materials", BuiltValue::Array(parts.map(BuiltValue::from).to_vec()));
+        keys.into_iter().for_each(|(key, value)| document.set(key, value));
+    }
+
+    /// Adds a material, which transmits diffuse light of the color `transmitted`.
+    fn add_material(&mut self, material: &ModelMaterial, name: &str, transmitted: Option<&TexturedValue>) {
         // Collect the keys first, because texture tables must precede the material's table.
         let mut keys = Entries::new();
         match material.glass {
@@ -68,7 +131,12 @@ impl MaterialBuilder<'_, '_> {
                     keys.push(("tint", shorten_color(glass.tint)));
                 }
             }
-            None => self.add_principled_keys(&mut keys, material),
+            None => {
+                self.add_principled_keys(&mut keys, material);
+                if let Some(color) = transmitted {
+                    self.push_color_or_texture(&mut keys, "diffuse_transmission", 0.0, color);
+                }
+            }
         }
         if material.ior != 1.5 {
             keys.push(("ior", shorten(material.ior).into()));

@@ -3,7 +3,7 @@
 
 use std::collections::HashMap;
 
-use super::super::lower::file_glass_properties;
+use super::super::file_materials::file_glass_properties;
 use crate::assets::{FileMaterial, LoadedMesh};
 use crate::control::{CancelToken, Canceled};
 use crate::geometry::mesh::TriangleMesh;

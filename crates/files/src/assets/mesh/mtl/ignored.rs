@@ -7,7 +7,7 @@ use super::map::{Map, MapKind};
 use super::material::{is_opaque_despite_tr, to_file_material};
 use super::statements::{MtlColorKind, MtlNumber};
 use super::{MtlMaterial, WithLine};
-use crate::assets::{FileMaterial, FileMaterialKind};
+use crate::assets::{FileMaterial, FileMaterialKind, PhysicalMaterial};
 use crate::math::Vec3;
 
 /// An MTL statement that is ignored or approximated.
@@ -80,6 +80,7 @@ pub(super) const BRIGHT_MIRROR: &str = "`Ks` is clamped to 1 for a mirror";
 pub(super) const DIFFUSE_UNDER_MIRROR: &str =
     "`Kd` is ignored because the mirror reflection `Ks` is stronger";
 const LOW_IOR: &str = "`Ni` is ignored because it is not above 1; 1.5 is used";
+pub(super) const ANISOTROPY_OF_METALS: &str = "`aniso` has no effect unless `Pm` is 1";
 const SECOND_NORMAL_MAP: &str = "`bump` has no effect because the material has a normal map";
 pub(super) const AMBIENT_MAP: &str = "`map_Ka` is not supported; ambient light uses the diffuse color";
 
@@ -238,10 +239,14 @@ fn warn_about_ineffective_pbr(
     add: &mut impl FnMut(Option<usize>, &str),
 ) {
     let nonzero = |number: MtlNumber| found.number_with_line(number).filter(|at| at.value != 0.0);
-    for number in [MtlNumber::Sheen, MtlNumber::Anisotropy, MtlNumber::AnisotropyRotation] {
+    for number in [MtlNumber::Sheen, MtlNumber::AnisotropyRotation] {
         if let Some(at) = nonzero(number) {
             add(Some(at.line), &ignored_statement_warning(number.keyword()));
         }
+    }
+    let is_metal = converted.physical.as_ref().is_some_and(PhysicalMaterial::is_metal);
+    if let Some(at) = nonzero(MtlNumber::Anisotropy).filter(|_| !is_metal || converted.is_glass()) {
+        add(Some(at.line), ANISOTROPY_OF_METALS);
     }
     for number in [MtlNumber::Metallic, MtlNumber::Coat] {
         if let Some(at) = nonzero(number).filter(|_| converted.is_glass()) {
@@ -284,6 +289,8 @@ fn warn_about_map(
         MapKind::Normal | MapKind::Bump => converted.normal_texture.as_ref(),
         MapKind::Roughness => physical.and_then(|own| own.roughness_texture.as_ref()),
         MapKind::Metallic => physical.and_then(|own| own.metallic_texture.as_ref()),
+        MapKind::Coat => physical.and_then(|own| own.clearcoat_texture.as_ref()),
+        MapKind::CoatRoughness => physical.and_then(|own| own.clearcoat_roughness_texture.as_ref()),
     };
     if texture.is_none() {
         match converted.kind() {

@@ -22,6 +22,8 @@ pub(super) enum MapKind {
     Bump,
     Roughness,
     Metallic,
+    Coat,
+    CoatRoughness,
     Ambient,
     /// Unsupported.
     Other(&'static str),
@@ -30,7 +32,7 @@ pub(super) enum MapKind {
 impl MapKind {
     /// Map kind for a keyword, ignoring case.
     pub(super) fn from_keyword(keyword: &str) -> Option<Self> {
-        const OTHERS: [&str; 13] = [
+        const OTHERS: [&str; 11] = [
             "map_Ns",
             "disp",
             "map_Disp",
@@ -40,8 +42,6 @@ impl MapKind {
             "map_Tr",
             "map_Tf",
             "map_Ps",
-            "map_Pc",
-            "map_Pcr",
             "map_aniso",
             "map_aat",
         ];
@@ -54,6 +54,8 @@ impl MapKind {
             "bump" | "map_bump" => Self::Bump,
             "map_pr" => Self::Roughness,
             "map_pm" => Self::Metallic,
+            "map_pc" => Self::Coat,
+            "map_pcr" => Self::CoatRoughness,
             "map_ka" => Self::Ambient,
             other => Self::Other(OTHERS.into_iter().find(|name| name.eq_ignore_ascii_case(other))?),
         })
@@ -70,6 +72,8 @@ impl MapKind {
             Self::Bump => "bump",
             Self::Roughness => "map_Pr",
             Self::Metallic => "map_Pm",
+            Self::Coat => "map_Pc",
+            Self::CoatRoughness => "map_Pcr",
             Self::Ambient => "map_Ka",
             Self::Other(name) => name,
         }
@@ -79,9 +83,14 @@ impl MapKind {
     fn is_color(self) -> bool {
         match self {
             Self::Diffuse | Self::Specular | Self::Emission | Self::Ambient => true,
-            Self::Opacity | Self::Normal | Self::Bump | Self::Roughness | Self::Metallic | Self::Other(_) => {
-                false
-            }
+            Self::Opacity
+            | Self::Normal
+            | Self::Bump
+            | Self::Roughness
+            | Self::Metallic
+            | Self::Coat
+            | Self::CoatRoughness
+            | Self::Other(_) => false,
         }
     }
 
@@ -94,6 +103,8 @@ impl MapKind {
             | Self::Opacity
             | Self::Roughness
             | Self::Metallic
+            | Self::Coat
+            | Self::CoatRoughness
             | Self::Ambient
             | Self::Other(_) => false,
         }

@@ -74,16 +74,26 @@ fn pbr_extension(found: &MtlMaterial, path: &Path) -> Option<PhysicalMaterial> {
         MtlNumber::Anisotropy,
         MtlNumber::AnisotropyRotation,
     ];
-    let [roughness_map, metallic_map] = [MapKind::Roughness, MapKind::Metallic].map(|kind| found.map(kind));
+    const MAPS: [MapKind; 4] = [MapKind::Roughness, MapKind::Metallic, MapKind::Coat, MapKind::CoatRoughness];
     let is_physical = NUMBERS.iter().any(|number| found.number(*number).is_some());
-    let has_maps = roughness_map.is_some() || metallic_map.is_some();
+    if !is_physical && MAPS.iter().all(|kind| found.map(*kind).is_none()) {
+        return None;
+    }
+    let usual = PhysicalMaterial::default();
     let number = |number, default| found.number(number).map_or(default, |value| value as f32);
-    (is_physical || has_maps).then(|| PhysicalMaterial {
-        roughness: number(MtlNumber::Roughness, 0.5),
-        metallic: number(MtlNumber::Metallic, 0.0),
-        clearcoat: number(MtlNumber::Coat, 0.0),
-        clearcoat_roughness: number(MtlNumber::CoatRoughness, 0.0),
-        roughness_texture: roughness_map.and_then(|map| map.texture(path)),
-        metallic_texture: metallic_map.and_then(|map| map.texture(path)),
-    })
+    let [roughness_texture, metallic_texture, clearcoat_texture, clearcoat_roughness_texture] =
+        MAPS.map(|kind| found.map(kind)?.texture(path));
+    let physical = PhysicalMaterial {
+        roughness: number(MtlNumber::Roughness, usual.roughness),
+        metallic: number(MtlNumber::Metallic, usual.metallic),
+        clearcoat: number(MtlNumber::Coat, usual.clearcoat),
+        clearcoat_roughness: number(MtlNumber::CoatRoughness, usual.clearcoat_roughness),
+        roughness_texture,
+        metallic_texture,
+        clearcoat_texture,
+        clearcoat_roughness_texture,
+        ..usual
+    };
+    let anisotropy = if physical.is_metal() { number(MtlNumber::Anisotropy, 0.0) } else { 0.0 };
+    Some(PhysicalMaterial { anisotropy, ..physical })
 }

@@ -73,7 +73,8 @@ impl MtlNumber {
             | Self::Metallic
             | Self::Coat
             | Self::CoatRoughness => Some([0.0, 1.0]),
-            Self::Ior | Self::Sheen | Self::Anisotropy | Self::AnisotropyRotation => None,
+            Self::Anisotropy => Some([-1.0, 1.0]),
+            Self::Ior | Self::Sheen | Self::AnisotropyRotation => None,
         }
     }
 }

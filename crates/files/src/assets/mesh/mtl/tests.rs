@@ -144,25 +144,27 @@ fn opacity_prefers_d_to_tr() {
 fn pbr_statements_are_converted() {
     let physical = |text: &str| read(&format!("newmtl a\n{text}")).expect("whole")[0].physical.clone();
     assert_eq!(physical("Kd 1 0 0\n"), None);
-    let plain = PhysicalMaterial {
-        roughness: 0.5,
-        metallic: 0.0,
-        clearcoat: 0.0,
-        clearcoat_roughness: 0.0,
-        roughness_texture: None,
-        metallic_texture: None,
-    };
+    let plain = PhysicalMaterial::default();
+    assert_eq!(plain.roughness, 0.5);
     assert_eq!(physical("Ps 0.25\n"), Some(plain.clone()));
     assert_eq!(physical("aniso 0.5\n"), Some(plain.clone()));
-    let all = "Pr 0.3 # dull\nPm 1.5\nPc -1\nPcr 0.1\nmap_Pr -s 1 1 1 dull.png\nmap_Pm metal.png\n";
+    // Only metals are anisotropic.
+    let brushed = PhysicalMaterial { metallic: 1.0, anisotropy: -0.5, ..plain.clone() };
+    assert_eq!(physical("Pm 1\naniso -0.5\n"), Some(brushed));
+    assert_eq!(physical("Pm 1\naniso 2\n").map(|own| own.anisotropy), Some(1.0));
+    assert_eq!(physical("Pm 1\naniso 1\nmap_Pm metal.png\n").map(|own| own.anisotropy), Some(0.0));
+    let all = "Pr 0.3 # dull\nPm 1.5\nPc -1\nPcr 0.1\nmap_Pr -s 1 1 1 dull.png\nmap_Pm metal.png\n\
+               map_Pc coat.png\nMAP_PCR rough.png\n";
     let file = |name: &str, line: usize| Some(texture_of(name, line));
     let expected = PhysicalMaterial {
         roughness: 0.3,
         metallic: 1.0,
-        clearcoat: 0.0,
         clearcoat_roughness: 0.1,
         roughness_texture: file("dull.png", 6),
         metallic_texture: file("metal.png", 7),
+        clearcoat_texture: file("coat.png", 8),
+        clearcoat_roughness_texture: file("rough.png", 9),
+        ..PhysicalMaterial::default()
     };
     assert_eq!(physical(all), Some(expected));
     assert_eq!(
