@@ -156,7 +156,7 @@ fn listing_references_reads_only_the_json() {
         assert!(folder.open(name, bytes).is_err());
         let path = folder.0.path().join(name);
         let folder = path.parent().expect("a folder").to_owned();
-        let files = super::referenced_files(&path, &CancelToken::new()).expect("not cancelled").into_iter();
+        let files = super::referenced_files(&path, &CancelToken::new()).expect("not canceled").into_iter();
         files.map(|file| file.strip_prefix(&folder).expect("in the folder").to_owned()).collect::<Vec<_>>()
     };
     let expected = [std::path::PathBuf::from("deep/a.bin"), "a b.png".into()];
@@ -173,7 +173,7 @@ fn listing_references_reads_only_the_json() {
     assert_eq!(files("d.gltf", b"{"), Vec::<PathBuf>::new());
     let none = folder.0.path().join("none.glb");
     assert_eq!(
-        super::referenced_files(&none, &CancelToken::new()).expect("not cancelled"),
+        super::referenced_files(&none, &CancelToken::new()).expect("not canceled"),
         Vec::<PathBuf>::new()
     );
     let token = CancelToken::new();

@@ -53,7 +53,7 @@ pub fn subdivision_memory_bytes(triangles: usize, levels: u32) -> u64 {
 ///
 /// # Errors
 /// - [`AssetError::Malformed`] if the result would have more than [`TriangleMesh::MOST_TRIANGLES`] triangles.
-/// - [`AssetError::OutOfMemory`] or [`AssetError::Cancelled`].
+/// - [`AssetError::OutOfMemory`] or [`AssetError::Canceled`].
 pub fn subdivide(
     mut loaded: LoadedMesh,
     levels: u32,

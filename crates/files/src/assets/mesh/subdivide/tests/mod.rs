@@ -147,7 +147,7 @@ fn results_do_not_depend_on_thread_count() {
     assert!(fine.materials.iter().enumerate().all(|(triangle, of)| *of == triangle as u32 / 64));
     let (token, loaded) = (CancelToken::new(), LoadedMesh { mesh: bumps, ..LoadedMesh::default() });
     token.cancel();
-    assert!(matches!(subdivide(loaded, 1, Path::new("a.obj"), &token), Err(AssetError::Cancelled(_))));
+    assert!(matches!(subdivide(loaded, 1, Path::new("a.obj"), &token), Err(AssetError::Canceled(_))));
 }
 
 #[test]
