@@ -50,7 +50,9 @@ fn noise_color(noise: &Noise, position: DVec3) -> DVec3 {
 
 #[test]
 fn cells_and_bands_show_their_colors() {
-    let patterns: [(Pattern, fn(i32, i32) -> bool); 2] = [
+    // Whether a cell in a column and a row has the second color.
+    type IsSecond = fn(i32, i32) -> bool;
+    let patterns: [(Pattern, IsSecond); 2] = [
         (checker(Vec2::new(2.0, 3.0)), |column, row| (column + row) % 2 != 0),
         (
             Pattern::Bands(Bands { mapping: TextureMapping { repeat: Vec2::new(2.0, 3.0), moved: None } }),

@@ -20,11 +20,11 @@ pub struct Texture {
     pub filter: TextureFilter,
     /// Scale factor for linear colors and numbers. Normals and heights ignore it.
     pub factor: Vec3,
-    /// What the texture shows.
+    /// The image or the pattern.
     pub content: TextureContent,
 }
 
-/// What a texture shows.
+/// The source of a texture's values.
 #[derive(Clone, Debug, PartialEq)]
 pub enum TextureContent {
     /// An image.

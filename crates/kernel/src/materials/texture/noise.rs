@@ -175,7 +175,7 @@ impl Cell {
     }
 }
 
-/// Interpolates between the corners of a cell. The weights are those of the upper corners along each axis.
+/// Interpolates between the corners of a cell. The weights apply to the upper corners along each axis.
 fn blend(corners: [f32; 8], [x, y, z]: [f32; 3]) -> f32 {
     let mix = |a: f32, b: f32, t: f32| a + (b - a) * t;
     let along_x: [f32; 4] = std::array::from_fn(|i| mix(corners[2 * i], corners[2 * i + 1], x));
