@@ -24,6 +24,7 @@ soa! {
         pub start: u32 = Ray::NO_TRIANGLE,
         /// Horizon normal, if `has_horizon`. Light from behind it is occluded.
         pub horizon: Vec3 = Vec3::ZERO,
+        /// Whether the surface has a horizon normal.
         pub has_horizon: bool = false,
         /// Origin lifted above the facet, from which lights in all directions are visible. Only valid if
         /// `may_lift` and if the ray from the facet to this point is unoccluded.
