@@ -43,13 +43,10 @@ FROSTED = "closed_forms::frosted::"
 ROUGH_GLASS = "materials::bxdfs::rough_dielectric::tests::"
 NULL_INTERACTIONS = "closed_forms::null_interactions::"
 TWO_SIDED = "closed_forms::two_sided::"
-DIRECT = "integrators::direct::tests::"
-PICKS = "integrators::direct::light_tree::tests::"
+DIRECT = "direct::"
+PICKS = "direct::light_tree::"
 SKY = "lights::infinite::sky::tests::"
 SUBDIVISION = "assets::mesh::subdivide::tests::"
-
-# Modules of tests/suite.
-SUITE = ["closed_forms", "gltf_materials", "models"]
 
 # Fault, file, the code around the expression in ⟦⟧, its replacement, and the test that must fail.
 FAULTS = [
@@ -411,7 +408,7 @@ FAULTS = [
     ("a masking ratio with the wrong Λ", "materials/bxdfs/rough_dielectric/bxdf.rs", "light.cosine * ⟦(eye.cosine + eye.slope)⟧",
      "(eye.cosine + light.slope)", ROUGH_GLASS + "two_sided_samples_match_one_sided_samples"),
     ("box edges treated as faces", "geometry/cuboid.rs", "⟦are_far.into_iter().filter(|&is_far| is_far).count() == 2⟧",
-     "true", "world::isolated::tests::isolated_regions_match_the_full_search"),
+     "true", "isolated::isolated_regions_match_the_full_search"),
     ("paths that continue on both sides of glass", "materials/bxdfs/rough_dielectric/bxdf.rs", "choose_vec3_by_bool(⟦is_reflected == THROUGH⟧, unused, wi)", "false",
      ROUGH_GLASS + "paths_continue_on_exactly_one_side"),
     ("missing Fresnel reflectance of glass", "materials/bxdfs/rough_dielectric/bxdf.rs",
@@ -537,8 +534,7 @@ def copy_with_faults(selected):
 
 
 def executables(profile):
-    command = ["cargo", "test", "--profile", profile, "--workspace", "--lib", "--test", "suite", "--no-run",
-               "--message-format=json"]
+    command = ["cargo", "test", "--profile", profile, "--workspace", "--tests", "--no-run", "--message-format=json"]
     # The copy needs its own target folder, as cargo would confuse its packages with the original ones.
     env = {**os.environ, "CARGO_TARGET_DIR": str(COPY / "target"), "RUSTFLAGS": os.environ.get("RUSTFLAGS", "")}
     built = subprocess.run(command, cwd=COPY, env=env, stdout=subprocess.PIPE, check=True)
@@ -546,13 +542,20 @@ def executables(profile):
     return {m["target"]["name"]: m["executable"] for m in messages if m.get("executable") and m["profile"]["test"]}
 
 
-def passes(programs, test, fault=None):
+def program_and_name(test):
+    """The program that contains a test, and the test's name in it. Integration tests are named like their folder."""
     module = test.split("::")[0]
-    crate = None if module in SUITE else crate_of(module).name
-    program = programs[f"glimt_{crate}" if crate else "suite"]
-    test = test.removeprefix(f"{crate}::") if crate == module else test
+    for folder in [*COPY.glob("tests/*/"), *COPY.glob("crates/*/tests/*/")]:
+        if (folder / module).is_dir() or (folder / f"{module}.rs").is_file():
+            return folder.name, test
+    crate = crate_of(module).name
+    return f"glimt_{crate}", test.removeprefix(f"{crate}::") if crate == module else test
+
+
+def passes(programs, test, fault=None):
+    program, test = program_and_name(test)
     env = {**os.environ, "GLIMT_FAULT": "" if fault is None else str(fault)}
-    run = subprocess.run([program, "--exact", test], cwd=COPY, env=env, capture_output=True, text=True)
+    run = subprocess.run([programs[program], "--exact", test], cwd=COPY, env=env, capture_output=True, text=True)
     if "1 passed" not in run.stdout and "1 failed" not in run.stdout:
         sys.exit(f"no such test: {test}\n{run.stdout}{run.stderr}")
     return run.returncode == 0

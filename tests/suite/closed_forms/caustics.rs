@@ -410,6 +410,6 @@ fn caustic_under_a_resting_ball_matches_path() {
     let ball = floor().sphere(v(0.0, 0.5, 0.0), 0.5, glass(1.5));
     let foot = viewed_from_above(ball, v(0.06, 0.0, 0.0), 0.16, 0.15).depth(6);
     let lit = sun(foot, v(0.2, -1.0, 0.0).normalize(), 1.0, 25.0);
-    let effort = Effort { path_samples: 256, passes: 6, photons: 20_000, radius: 0.01 };
+    let effort = Effort { path_samples: 160, passes: 4, photons: 20_000, radius: 0.01 };
     assert_same_caustic("a resting ball", &lit, &effort);
 }

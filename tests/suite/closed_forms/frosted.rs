@@ -198,7 +198,7 @@ fn room() -> Build {
 #[test]
 fn photons_match_path_through_rough_glass() {
     for depth in [1, 2, 3, 5] {
-        let means = path_and_photon_means(&room().depth(depth), depth, [128, 16], (8_000, 0.05));
+        let means = path_and_photon_means(&room().depth(depth), depth, [72, 9], (8_000, 0.05));
         assert_same_light(&format!("depth {depth}"), means, 1.2e-2, 4e-3);
     }
 }

@@ -3,8 +3,8 @@
 use glimt::geometry::Ray;
 use glimt::geometry::ray::offset_origin;
 use glimt::lights::LightGeometry;
+use glimt::math::DVec3;
 use glimt::math::random::TestRandom;
-use glimt::math::{DVec2, DVec3};
 use glimt::scene::description::Shape;
 use glimt::world::Geometry;
 
@@ -16,30 +16,79 @@ pub fn geometry(shape: &Shape) -> std::sync::Arc<Geometry> {
     scene().shape(shape.clone(), matte(0.5)).world().geometry
 }
 
-/// Position along an axis vector of any length, and distance from the axis.
-fn axial(p: DVec3, origin: DVec3, axis: DVec3) -> DVec2 {
-    let (n, p) = (axis.normalize(), p - origin);
-    DVec2::new(p.dot(n), p.cross(n).length())
+/// The dimensions of a closed shape around an axis.
+#[derive(Clone, Copy)]
+enum Profile {
+    Cylinder { half: f64, radius: f64 },
+    Cone { height: f64, radius: f64 },
+    Torus { radius: f64, tube: f64 },
+}
+
+impl Profile {
+    /// Returns a point on the shape's axis, the axis as a unit vector, and the dimensions relative to them.
+    fn of(shape: &Shape) -> (DVec3, DVec3, Self) {
+        match *shape {
+            Shape::Cylinder { a, b, radius, .. } => {
+                let half = (b - a).length() * 0.5;
+                ((a + b) * 0.5, (b - a).normalize(), Self::Cylinder { half, radius })
+            }
+            Shape::Cone { base, tip, radius, .. } => {
+                let height = (base - tip).length();
+                (tip, (base - tip).normalize(), Self::Cone { height, radius })
+            }
+            Shape::Torus { center, axis, radius, tube } => {
+                (center, axis.normalize(), Self::Torus { radius, tube })
+            }
+            _ => unreachable!("not a closed shape"),
+        }
+    }
+
+    /// Signed distance bound at a position along the axis and a distance from it.
+    fn distance(self, along: f64, across: f64) -> f64 {
+        match self {
+            Self::Cylinder { half, radius } => (across - radius).max(along.abs() - half),
+            Self::Cone { height, radius } => {
+                ((across * height - along * radius) / height.hypot(radius)).max(along - height)
+            }
+            Self::Torus { radius, tube } => (across - radius).hypot(along) - tube,
+        }
+    }
 }
 
 /// Signed distance bound: a lower bound on the distance to the surface, negative inside the closed shape and
 /// 0 on its surface.
 fn distance(shape: &Shape, p: DVec3) -> f64 {
-    match *shape {
-        Shape::Cylinder { a, b, radius, .. } => {
-            let q = axial(p, (a + b) * 0.5, b - a);
-            (q.y - radius).max(q.x.abs() - (b - a).length() * 0.5)
-        }
-        Shape::Cone { base, tip, radius, .. } => {
-            let (q, height) = (axial(p, tip, base - tip), (base - tip).length());
-            let slant = height.hypot(radius);
-            ((q.y * height - q.x * radius) / slant).max(q.x - height)
-        }
-        Shape::Torus { center, axis, radius, tube } => {
-            let q = axial(p, center, axis);
-            (q.y - radius).hypot(q.x) - tube
-        }
-        _ => unreachable!("not a closed shape"),
+    let (origin, axis, profile) = Profile::of(shape);
+    profile.distance((p - origin).dot(axis), (p - origin).cross(axis).length())
+}
+
+/// A line relative to a shape's axis. Its coordinates are plain numbers, which are fast without optimization.
+struct AxialLine {
+    profile: Profile,
+    /// Size of the shape's smallest feature.
+    size: f64,
+    /// Coordinates along the axis and across it, and their change per unit of t.
+    start: [f64; 3],
+    step: [f64; 3],
+    /// Length per unit of t.
+    length: f64,
+}
+
+impl AxialLine {
+    fn new(shape: &Shape, ray: &Ray) -> Self {
+        let (origin, axis, profile) = Profile::of(shape);
+        let (x, y) = axis.any_orthonormal_pair();
+        let coordinates = |vector: DVec3| [axis, x, y].map(|axis| vector.dot(axis));
+        let (start, step) = (ray.origin.as_dvec3() - origin, ray.direction.as_dvec3());
+        let (start, step, length) = (coordinates(start), coordinates(step), step.length());
+        Self { profile, size: size(shape), start, step, length }
+    }
+
+    /// The distance bound at t.
+    fn distance(&self, t: f64) -> f64 {
+        let along = self.start[0] + self.step[0] * t;
+        let (x, y) = (self.start[1] + self.step[1] * t, self.start[2] + self.step[2] * t);
+        self.profile.distance(along, (x * x + y * y).sqrt())
     }
 }
 
@@ -68,17 +117,16 @@ fn size(shape: &Shape) -> f64 {
 /// distance bound at the center of an interval excludes a crossing. Intervals smaller than 10⁻⁵ of the
 /// shape's size are tested only at their center, as bisection would not terminate for a line within the
 /// surface.
-fn crosses(shape: &Shape, ray: &Ray, from: f64, to: f64, sign: f64, allowed: f64) -> bool {
-    let (middle, half) = (0.5 * (from + to), 0.5 * (to - from));
-    let length = ray.direction.as_dvec3().length();
-    let here = sign * distance(shape, ray.origin.as_dvec3() + ray.direction.as_dvec3() * middle);
+fn crosses(line: &AxialLine, from: f64, to: f64, sign: f64, allowed: f64) -> bool {
+    let (middle, half) = (0.5 * (from + to), 0.5 * (to - from) * line.length);
+    let here = sign * line.distance(middle);
     if here < -allowed {
         return true;
     }
-    if here > half * length || half * length < 1e-5 * size(shape) + allowed {
+    if here > half || half < 1e-5 * line.size + allowed {
         return false;
     }
-    crosses(shape, ray, from, middle, sign, allowed) || crosses(shape, ray, middle, to, sign, allowed)
+    crosses(line, from, middle, sign, allowed) || crosses(line, middle, to, sign, allowed)
 }
 
 /// Checks that the hit is on the surface and that the ray does not cross the surface before it, or at all if
@@ -88,14 +136,14 @@ fn check(shape: &Shape, geometry: &Geometry, ray: &Ray, sign: f64) -> bool {
     let far = reach(shape) + ray.origin.as_dvec3().length();
     let allowed = 64.0 * f64::EPSILON * far;
     let length = ray.direction.as_dvec3().length();
-    let hit = geometry.closest_hit(ray);
+    let (hit, line) = (geometry.closest_hit(ray), AxialLine::new(shape, ray));
     assert_eq!(
         geometry.is_occluded_except_by_light(ray, LightGeometry::Nothing),
         hit.is_some(),
         "{shape:?} {ray:?}"
     );
     let Some(hit) = hit else {
-        assert!(!crosses(shape, ray, 0.0, 2.0 * far / length, sign, allowed), "missed {shape:?} {ray:?}");
+        assert!(!crosses(&line, 0.0, 2.0 * far / length, sign, allowed), "missed {shape:?} {ray:?}");
         return false;
     };
     let t = f64::from(hit.shape.t);
@@ -103,7 +151,7 @@ fn check(shape: &Shape, geometry: &Geometry, ray: &Ray, sign: f64) -> bool {
     let off = distance(shape, ray.origin.as_dvec3() + ray.direction.as_dvec3() * t);
     assert!(off.abs() <= rounding + allowed, "hit is {off} away from {shape:?} {ray:?} {hit:?}");
     let before = t * (1.0 - f64::from(f32::EPSILON));
-    assert!(!crosses(shape, ray, 0.0, before, sign, allowed), "passed through {shape:?} {ray:?} {hit:?}");
+    assert!(!crosses(&line, 0.0, before, sign, allowed), "passed through {shape:?} {ray:?} {hit:?}");
     let surface = geometry.surface(ray, &hit);
     let off = distance(shape, surface.point.as_dvec3());
     let error = f64::from(surface.error.length());

@@ -20,16 +20,16 @@
 //! ```
 
 mod aov;
-mod behavior;
+pub mod behavior;
 mod bounds;
 mod counters;
-mod direct;
+pub mod direct;
 mod layers;
 mod memory;
 mod path;
 mod photons;
 mod settings;
-mod transport;
+pub mod transport;
 mod view;
 
 use std::mem::take;

@@ -112,9 +112,19 @@ impl World {
             }
             self.geometry.set_hit_as_only_candidate(at, memory)
         } else {
-            self.geometry.find_coincident_candidates(at, memory, &self.enclosing_glass)
+            self.find_coincident_candidates(at, memory)
         };
         self.visit_coincident_candidates(at, (memory, error), visit)
+    }
+
+    /// Collects surfaces that may coincide with the hit point or enclose it, and returns their error bound per
+    /// axis.
+    pub fn find_coincident_candidates(
+        &self,
+        at: &CoincidenceQuery<'_>,
+        memory: &mut CoincidenceScratch,
+    ) -> Vec3 {
+        self.geometry.find_coincident_candidates(at, memory, &self.enclosing_glass)
     }
 
     /// Whether the hit is on a glass shape whose far side is not close to the hit point.
@@ -150,7 +160,7 @@ impl World {
 
     /// Computes the offset points and visits the coincident surfaces among the candidates in `memory`, whose
     /// error is at most `error`.
-    pub(super) fn visit_coincident_candidates(
+    pub fn visit_coincident_candidates(
         &self,
         at: &CoincidenceQuery<'_>,
         (memory, error): (&CoincidenceScratch, Vec3),
@@ -287,12 +297,12 @@ impl Geometry {
     const REACH: f32 = 16.0;
 
     /// Search distance for coincident surfaces along each axis.
-    pub(super) fn coincidence_margin(&self, at: &CoincidenceQuery<'_>) -> Vec3 {
+    pub fn coincidence_margin(&self, at: &CoincidenceQuery<'_>) -> Vec3 {
         (at.surface.error * Self::REACH).max(Vec3::splat(self.max_mesh_rounding_error() + 2.0 * at.lead))
     }
 
     /// Makes the hit itself the only candidate. Returns its error bound per axis.
-    pub(super) fn set_hit_as_only_candidate(
+    pub fn set_hit_as_only_candidate(
         &self,
         at: &CoincidenceQuery<'_>,
         memory: &mut CoincidenceScratch,

@@ -114,7 +114,7 @@ enum SurfaceRegion {
 impl Geometry {
     /// Whether there is nothing within `margin` of the point other than the hit object or, for a mesh, the
     /// hit triangle.
-    pub(super) fn is_hit_isolated(&self, hit: &Hit, surface: &SurfacePoint, margin: Vec3) -> bool {
+    pub fn is_hit_isolated(&self, hit: &Hit, surface: &SurfacePoint, margin: Vec3) -> bool {
         let object = &self.objects()[hit.object as usize];
         let table = self.isolation_cache().tables[hit.object as usize]
             .get_or_init(|| self.new_isolation_states_for_object(object));
@@ -340,7 +340,3 @@ fn are_triangles_apart(one: [DVec3; 3], other: [DVec3; 3], distance: f64) -> boo
         || others.into_iter().any(|edge| parts(edge.cross(normal)))
         || own.into_iter().any(|edge| others.into_iter().any(|other| parts(edge.cross(other))))
 }
-
-#[cfg(test)]
-#[path = "isolated_tests.rs"]
-mod tests;

@@ -25,8 +25,6 @@ mod packet;
 mod packet_material;
 mod placement;
 mod ray_nodes;
-#[cfg(test)]
-pub(crate) mod test_world;
 pub mod textures;
 mod triangle_point;
 mod triangle_tree;

@@ -228,7 +228,7 @@ fn check_version(root: &Root) -> Result<(), GltfError> {
 
 /// Unsupported extensions that change how meshes or images are stored, each with advice on exporting the
 /// file without it.
-pub(super) const MISSING: [(&str, &str); 5] = [
+pub(super) const UNSUPPORTED_EXTENSIONS: [(&str, &str); 5] = [
     (DRACO, "export it without Draco compression"),
     ("EXT_meshopt_compression", "export it without meshopt compression"),
     ("KHR_meshopt_compression", "export it without meshopt compression"),
@@ -237,7 +237,7 @@ pub(super) const MISSING: [(&str, &str); 5] = [
 ];
 
 /// Extensions that are either supported or ignored with a note.
-pub(super) const KNOWN: [&str; 21] = [
+pub(super) const KNOWN_EXTENSIONS: [&str; 21] = [
     "EXT_texture_webp",
     "KHR_lights_punctual",
     "KHR_materials_anisotropy",
@@ -265,10 +265,10 @@ pub(super) const KNOWN: [&str; 21] = [
 /// Rejects files that require unsupported extensions (3.12).
 fn check_required_extensions(root: &Root) -> Result<(), GltfError> {
     for name in &root.extensions_required {
-        if let Some((_, help)) = MISSING.iter().find(|(known, _)| known == name) {
+        if let Some((_, help)) = UNSUPPORTED_EXTENSIONS.iter().find(|(known, _)| known == name) {
             return Err(GltfError::new(unsupported_extension_message(name, help)));
         }
-        if !KNOWN.contains(&name.as_str()) {
+        if !KNOWN_EXTENSIONS.contains(&name.as_str()) {
             return Err(GltfError::new(unknown_extension_message(name)));
         }
     }

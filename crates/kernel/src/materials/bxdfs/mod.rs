@@ -3,6 +3,8 @@
 pub mod coated;
 pub mod conductor;
 #[cfg(test)]
+mod lane_tests;
+#[cfg(test)]
 mod lobe_tests;
 pub mod phong;
 pub mod plastic;
@@ -10,6 +12,8 @@ pub mod principled;
 #[cfg(test)]
 mod reference_tests;
 pub mod rough_dielectric;
+#[cfg(test)]
+mod test_packet;
 pub mod translucent;
 mod transmission;
 

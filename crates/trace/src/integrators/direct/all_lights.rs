@@ -22,9 +22,13 @@ use crate::world::SimdKernel;
 /// Samples all lights at the vertices in `used`. `MIS` is false if lights are found only by light samples, in
 /// which case no weights are computed.
 pub struct SampleAllLights<'a, const MIS: bool> {
+    /// The tile being rendered.
     pub tile: &'a TileContext<'a>,
+    /// The packet of vertices.
     pub row: &'a VertexBatch,
+    /// Mask of vertices to light.
     pub used: u32,
+    /// The AOV to compute.
     pub aov: LightAov,
     /// Technique that competes with light samples. Unused if `MIS` is false.
     pub competing: CompetingTechnique,
@@ -71,6 +75,7 @@ pub struct ReflectedDirectLightPacket {
     pub light: Vec3x16,
     /// The part of `light` from wide lobes, if it was requested.
     pub diffuse: Vec3x16,
+    /// Rays and texture lookups so far.
     pub rays: DirectLightCounters,
 }
 
@@ -93,10 +98,12 @@ pub struct LightSums {
     pub diffuse: Vec3x16,
     /// Reflected light, ignoring occlusion.
     pub total: F32x16,
+    /// Rays and texture lookups so far.
     pub rays: DirectLightCounters,
 }
 
 impl LightSums {
+    /// No light, from no samples.
     pub const ZERO: Self = Self {
         light: [[0.0; PACKET_SIZE]; 3],
         diffuse: [[0.0; PACKET_SIZE]; 3],

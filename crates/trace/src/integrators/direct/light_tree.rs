@@ -4,6 +4,7 @@
 use std::ops::Range;
 
 use super::all_lights::{LightSums, SampleAllLights, add_masked_lane_products, add_masked_lanes};
+use super::mis::CompetingTechnique;
 use super::shadow_rays::ShadowRayQueue;
 use crate::geometry::packet::set_bit_lanes;
 use crate::integrators::view::LightAov;
@@ -20,25 +21,58 @@ use crate::world::SimdKernel;
 
 /// Samples lights picked from a tree at a packet of vertices.
 pub struct SampleLightTree<'a, const MIS: bool> {
+    /// The vertices, and how to sample light at them.
     pub lighting: SampleAllLights<'a, MIS>,
+    /// The tree, and how to pick from it.
     pub selection: LightSampler<'a>,
     /// Index of the packet, which identifies the packet's shadow rays in the pool.
     pub number: u32,
+    /// Receives the shadow rays.
     pub pool: &'a mut ShadowRayQueue,
+}
+
+impl SampleAllLights<'_, true> {
+    /// Samples the lights, or lights picked from the tree if there is one. Without a competing technique, no
+    /// weights are computed. Shadow rays to picked lights are pooled under index `number`.
+    pub fn sample_lights(self, number: u32, pool: &mut ShadowRayQueue) -> LightSums {
+        use CompetingTechnique::{Lobes, NarrowPaths, Nothing, Paths};
+        let Self { tile, row, used, aov, competing, interior_lists, only_infinite, splits_lobes } = self;
+        let plain = SampleAllLights::<false> {
+            tile,
+            row,
+            used,
+            aov,
+            competing,
+            interior_lists,
+            only_infinite,
+            splits_lobes,
+        };
+        let instructions = tile.world.geometry.instruction_set();
+        match (competing, tile.world.lights.sampler_for_purpose(tile.behavior.receivers)) {
+            (Nothing, None) => instructions.run(plain),
+            (Nothing, Some(selection)) => {
+                instructions.run(SampleLightTree { lighting: plain, selection, number, pool })
+            }
+            (Paths | NarrowPaths | Lobes(_), None) => instructions.run(self),
+            (Paths | NarrowPaths | Lobes(_), Some(selection)) => {
+                instructions.run(SampleLightTree { lighting: self, selection, number, pool })
+            }
+        }
+    }
 }
 
 /// One picked light per vertex in a packet. The picks for one sample are in tree order so that the shadow
 /// rays in a packet are aimed at nearby lights.
 #[derive(Clone)]
 #[repr(align(64))]
-struct LightPicks {
+pub struct LightPicks {
     /// Indices of the lights.
-    lights: [u32; PACKET_SIZE],
+    pub lights: [u32; PACKET_SIZE],
     /// Reciprocal of the expected sample count for each vertex's light, or 0 if no light was picked.
-    shares: F32x16,
+    pub shares: F32x16,
     /// Like `shares`, but without glossy lobes. Used for MIS weights, because the vertex's lobe is unknown
     /// when a ray hits the light.
-    weighed: F32x16,
+    pub weighed: F32x16,
 }
 
 /// Number of samples for which lights are picked together.
@@ -121,7 +155,7 @@ const LOW_DIGITS: f64 = 1.0 / (1 << 24) as f64;
 impl<const MIS: bool> SampleAllLights<'_, MIS> {
     /// Picks lights at each vertex for a range of samples.
     #[inline(always)]
-    fn pick_lights(
+    pub fn pick_lights(
         &self,
         LightSampler { tree, picks: way, .. }: LightSampler<'_>,
         sampler: &SamplerPacket<PACKET_SIZE>,
@@ -360,7 +394,3 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         }
     }
 }
-
-#[cfg(test)]
-#[path = "light_tree_tests.rs"]
-mod tests;

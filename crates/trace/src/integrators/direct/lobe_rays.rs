@@ -17,14 +17,25 @@ use crate::world::{Hit, SimdKernel};
 /// Traces rays in the glossy lobes of the vertices in `sharp`, one per light sample, because samples on a
 /// large light rarely fall into a narrow lobe.
 pub struct LobeRayTracingKernel<'a> {
+    /// The tile being rendered.
     pub tile: &'a TileContext<'a>,
+    /// The vertices.
     pub row: &'a VertexBatch,
+    /// Mask of vertices with narrow lobes.
     pub sharp: u32,
+    /// The AOV to compute.
     pub aov: LightAov,
     /// Media at the vertices, or `None` if all vertices are in air.
     pub interior_lists: Option<&'a InteriorListPool>,
     /// The reflected light to which the results are added.
     pub arrived: ReflectedDirectLightPacket,
+}
+
+impl LobeRayTracingKernel<'_> {
+    /// Traces the rays. Returns the reflected light, including the light that the rays find.
+    pub fn trace(self) -> ReflectedDirectLightPacket {
+        self.tile.world.geometry.instruction_set().run(self)
+    }
 }
 
 impl SimdKernel for LobeRayTracingKernel<'_> {

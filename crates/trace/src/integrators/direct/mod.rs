@@ -15,6 +15,4 @@ pub mod mis;
 pub mod queue;
 mod shadow_lift;
 pub mod shadow_rays;
-#[cfg(test)]
-mod tests;
 pub mod unshadowed;

@@ -3,7 +3,6 @@
 use std::ops::Range;
 
 use super::all_lights::{LightSums, ReflectedDirectLightPacket, SampleAllLights};
-use super::light_tree::SampleLightTree;
 use super::lobe_rays::LobeRayTracingKernel;
 use super::mis::CompetingTechnique;
 use super::shadow_lift::ShadowOriginLiftKernel;
@@ -287,8 +286,7 @@ impl DirectLightVertexQueue {
         match self.competing_technique(request, tile, aov) {
             CompetingTechnique::Lobes(sharp) => {
                 let interior_lists = self.interiors_of_batch(row);
-                let lobes = LobeRayTracingKernel { tile, row, sharp, aov, interior_lists, arrived };
-                tile.world.geometry.instruction_set().run(lobes)
+                LobeRayTracingKernel { tile, row, sharp, aov, interior_lists, arrived }.trace()
             }
             CompetingTechnique::Nothing | CompetingTechnique::Paths | CompetingTechnique::NarrowPaths => {
                 arrived
@@ -337,39 +335,17 @@ impl DirectLightVertexQueue {
         let row = &self.rows[request.number];
         let (competing, interior_lists) =
             (self.competing_technique(request, tile, aov), self.interiors_of_batch(row));
-        let (instructions, used) = (tile.world.geometry.instruction_set(), request.used);
-        let (only_infinite, splits_lobes) = (false, self.splits_lobes(row));
-        let plain = SampleAllLights::<false> {
+        let lighting = SampleAllLights::<true> {
             tile,
             row,
-            used,
+            used: request.used,
             aov,
             competing,
             interior_lists,
-            only_infinite,
-            splits_lobes,
+            only_infinite: false,
+            splits_lobes: self.splits_lobes(row),
         };
-        let weighed = SampleAllLights::<true> {
-            tile,
-            row,
-            used,
-            aov,
-            competing,
-            interior_lists,
-            only_infinite,
-            splits_lobes,
-        };
-        use CompetingTechnique::{Lobes, NarrowPaths, Nothing, Paths};
-        let sums = match (competing, tile.world.lights.sampler_for_purpose(tile.behavior.receivers)) {
-            (Nothing, None) => instructions.run(plain),
-            (Nothing, Some(selection)) => {
-                instructions.run(SampleLightTree { lighting: plain, selection, number, pool: &mut pool })
-            }
-            (Paths | NarrowPaths | Lobes(_), None) => instructions.run(weighed),
-            (Paths | NarrowPaths | Lobes(_), Some(selection)) => {
-                instructions.run(SampleLightTree { lighting: weighed, selection, number, pool: &mut pool })
-            }
-        };
+        let sums = lighting.sample_lights(number, &mut pool);
         self.pool = pool;
         sums
     }

@@ -15,11 +15,15 @@ use super::all_lights::DirectLightCounters;
 
 /// A ray in a vertex's narrow lobe, and the pdf of its direction.
 pub struct LobeRayWithoutSoftShadows<'a> {
+    /// The tile being rendered.
     pub tile: &'a TileContext<'a>,
+    /// The packet that contains the vertex.
     pub row: &'a VertexBatch,
     /// Lane of the vertex in the packet.
     pub lane: usize,
+    /// The ray.
     pub ray: Ray,
+    /// Pdf of the ray's direction in sr⁻¹.
     pub pdf: f32,
 }
 

@@ -24,17 +24,20 @@ soa! {
         pub start: u32 = Ray::NO_TRIANGLE,
         /// Horizon normal, if `has_horizon`. Light from behind it is occluded.
         pub horizon: Vec3 = Vec3::ZERO,
+        /// Whether the surface has a horizon normal.
         pub has_horizon: bool = false,
         /// Origin lifted above the facet, from which lights in all directions are visible. Only valid if
         /// `may_lift` and if the ray from the facet to this point is unoccluded.
         pub lifted: Vec3 = Vec3::ZERO,
         /// `t_max` of the ray from the facet to `lifted`.
         pub lift_end: f32 = 0.0,
+        /// Whether the origin may be lifted to `lifted`.
         pub may_lift: bool = false,
-        /// The surface point, and the geometric normal oriented toward the viewer, if `has_facet`. Otherwise,
-        /// `from` and `normal` are used.
+        /// The surface point, if `has_facet`. Otherwise, `from` is used.
         pub point: Vec3 = Vec3::ZERO,
+        /// The geometric normal oriented toward the viewer, if `has_facet`. Otherwise, `normal` is used.
         pub facet: Vec3 = Vec3::ZERO,
+        /// Whether `point` and `facet` are set.
         pub has_facet: bool = false,
         /// Whether the camera sees the vertex, directly or through mirrors and glass.
         pub only_specular_before: bool = false,
@@ -42,9 +45,9 @@ soa! {
         pub after_gloss: bool = false,
         /// Shading normal.
         pub normal: Vec3 = Vec3::ZERO,
-        /// Interpolated normal before perturbation, and its cosine with the perturbed normal, or
-        /// [`UNPERTURBED`] if the two normals are equal.
+        /// Interpolated normal before perturbation.
         pub smooth_normal: Vec3 = Vec3::ZERO,
+        /// Cosine between `smooth_normal` and the perturbed normal, or [`UNPERTURBED`] if they are equal.
         pub shading_normal_cosine: f32 = UNPERTURBED,
         /// Path throughput.
         pub throughput: Vec3 = Vec3::ZERO,

@@ -5,9 +5,9 @@ use super::elements::NamedConductor;
 use super::*;
 use crate::choice::Choice;
 use crate::materials::bsdf::LobesToSample;
+use crate::materials::bxdfs::lane_tests::check_lane_independence;
 use crate::materials::bxdfs::lobe_tests::{
-    ALPHAS, COSINES, TestSurface, check_beckmann_values, check_lane_independence, check_values,
-    spherical_direction,
+    ALPHAS, COSINES, TestSurface, check_beckmann_values, check_values, spherical_direction,
 };
 use crate::materials::bxdfs::reference_tests::{reference_beckmann_brdf, reference_microfacet_brdf};
 use crate::math::DVec3;

@@ -126,7 +126,8 @@ impl PhongBsdf {
 
 #[cfg(test)]
 mod tests {
-    use super::super::lobe_tests::{NarrowLightPath, check_lane_independence, check_shown_lobes};
+    use super::super::lane_tests::{check_lane_independence, check_shown_lobes};
+    use super::super::lobe_tests::NarrowLightPath;
     use super::*;
 
     fn glossy(shininess: f32) -> PhongBsdf {

@@ -3,9 +3,9 @@
 
 use super::*;
 use crate::materials::bsdf::LobesToSample;
+use crate::materials::bxdfs::lane_tests::{check_lane_independence, check_lane_independence_with};
 use crate::materials::bxdfs::lobe_tests::{
-    ALPHAS, COSINES, NarrowLightPath, TestSurface, check_lane_independence, check_lane_independence_with,
-    check_values, spherical_direction,
+    ALPHAS, COSINES, NarrowLightPath, TestSurface, check_values, spherical_direction,
 };
 use crate::materials::bxdfs::reference_tests::reference_microfacet_brdf;
 use crate::materials::lookup::WhiteLookup;

@@ -4,9 +4,9 @@ use super::*;
 use crate::materials::bsdf::LobesToSample;
 use crate::materials::bxdf::Bxdf;
 use crate::materials::bxdf_packet::BxdfPacket;
+use crate::materials::bxdfs::lane_tests::{check_lane_independence, check_lane_independence_with};
 use crate::materials::bxdfs::lobe_tests::{
-    ALPHAS, COSINES, NarrowLightPath, TestSurface, TwoSidedSample, check_lane_independence,
-    check_lane_independence_with, spherical_direction,
+    ALPHAS, COSINES, NarrowLightPath, TestSurface, TwoSidedSample, spherical_direction,
 };
 use crate::materials::bxdfs::reference_tests::{
     beckmann_d, beckmann_lambda, reference_beckmann_brdf, reference_microfacet_brdf, squared_slope,

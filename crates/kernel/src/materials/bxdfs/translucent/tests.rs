@@ -3,10 +3,8 @@
 
 use super::*;
 use crate::materials::bsdf::LobesToSample;
-use crate::materials::bxdfs::lobe_tests::{
-    COSINES, NarrowLightPath, TestSurface, check_lane_independence, check_lane_independence_with,
-    spherical_direction,
-};
+use crate::materials::bxdfs::lane_tests::{check_lane_independence, check_lane_independence_with};
+use crate::materials::bxdfs::lobe_tests::{COSINES, NarrowLightPath, TestSurface, spherical_direction};
 use crate::math::DVec3;
 
 use std::f64::consts::PI;

@@ -53,14 +53,15 @@ fn assert_counts(what: &str, counts: &[u32], expected: &[f64]) {
 #[test]
 fn glossy_samples_follow_the_pdf() {
     let mut next = random(7);
-    for normal in normals() {
-        for shininess in [0.0_f32, 1.0, 4.5, 30.0, 1e3, 1e4, 1e5] {
-            for degrees in [0.0, 45.0, 80.0, 89.9] {
+    for (i, normal) in normals().into_iter().enumerate() {
+        for (j, shininess) in [0.0_f32, 1.0, 4.5, 30.0, 1e3, 1e4, 1e5].into_iter().enumerate() {
+            // Two angles per pair, such that each angle occurs with every normal and every shininess.
+            for degrees in [0.0, 45.0, 80.0, 89.9].into_iter().skip((i + j) % 2).step_by(2) {
                 let lobes = bsdf(0.0, 0.5, shininess).lobes(normal, at_angle(normal, degrees));
                 let frame = Frame::from_normal(lobes.mirrored_eye.normalize());
                 let n = f64::from(shininess) + 1.0;
                 let mut counts = vec![0; 256];
-                for _ in 0..2 * SAMPLES {
+                for number in 0..2 * SAMPLES {
                     let direction = sample(&lobes, &mut next);
                     let offset = (direction - lobes.mirrored_eye).as_dvec3();
                     let cosine = 1.0 - 0.5 * offset.length_squared();
@@ -69,6 +70,10 @@ fn glossy_samples_follow_the_pdf() {
                     let ring = (power * cosine * 16.0) as usize;
                     let phi = frame.t.dot(direction).atan2(frame.s.dot(direction)) / (2.0 * PI) + 0.5;
                     counts[ring.min(15) * 16 + ((phi * 16.0) as usize).min(15)] += 1;
+                    // The value of the pdf is slow to compute, so check it only for some of the samples.
+                    if number % 8 != 0 {
+                        continue;
+                    }
                     let density =
                         lobes.pdf(direction, phong_cosine_power(lobes.mirrored_eye, direction, shininess));
                     let exact = n / std::f64::consts::TAU * power;

@@ -1,13 +1,13 @@
-use super::super::contact::{
-    CoincidenceQuery, CoincidenceScratch, CoincidentOrEnclosingSurface, OffsetPoints,
-};
-use super::super::test_world::TestWorldBuilder;
-use super::super::{Hit, MAX_INTERIORS, World};
 use crate::geometry::mesh::TriangleMesh;
 use crate::geometry::{Ray, SurfaceRequest};
 use crate::math::random::TestRandom;
 use crate::math::{DVec3, Vec3};
 use crate::scene::description::Shape;
+use crate::test_world::TestWorldBuilder;
+use crate::world::{
+    CoincidenceQuery, CoincidenceScratch, CoincidentOrEnclosingSurface, Hit, MAX_INTERIORS, OffsetPoints,
+    World,
+};
 
 fn v(x: f64, y: f64, z: f64) -> DVec3 {
     DVec3::new(x, y, z)
@@ -217,7 +217,7 @@ fn isolated_regions_match_the_full_search() {
                 let error = if only_hit {
                     world.geometry.set_hit_as_only_candidate(&at, &mut memory)
                 } else {
-                    world.geometry.find_coincident_candidates(&at, &mut memory, &world.enclosing_glass)
+                    world.find_coincident_candidates(&at, &mut memory)
                 };
                 (world.visit_coincident_candidates(&at, (&memory, error), |one| near.push(one)), near)
             };

@@ -1,27 +1,25 @@
 //! Next-event estimation and MIS at a single vertex, without a camera or a receiving surface.
 
 mod estimators;
+mod light_tree;
 mod lights;
 mod mis_weights;
 mod occlusion;
 
-use super::all_lights::{LightSums, SampleAllLights};
-use super::light_tree::SampleLightTree;
-use super::lobe_rays::LobeRayTracingKernel;
-use super::mis::CompetingTechnique;
-use super::shadow_rays::ShadowRayQueue;
 use crate::control::CancelToken;
 use crate::film::Rect;
 use crate::geometry::Ray;
 use crate::integrators::behavior::PathBehavior;
-use crate::integrators::layers::LayerSet;
-use crate::integrators::settings::RenderSettings;
+use crate::integrators::direct::all_lights::{LightSums, SampleAllLights};
+use crate::integrators::direct::lobe_rays::LobeRayTracingKernel;
+use crate::integrators::direct::mis::CompetingTechnique;
+use crate::integrators::direct::shadow_rays::ShadowRayQueue;
 use crate::integrators::transport::batch::{ALL, BatchVertex, VertexBatch};
 use crate::integrators::transport::interiors::InteriorListPool;
 use crate::integrators::transport::ray::PathRay;
 use crate::integrators::transport::scatter::{BounceContinuation, BsdfSampler};
 use crate::integrators::transport::tile::{SampleBlock, TileContext};
-use crate::integrators::view::{LightAov, ViewMode};
+use crate::integrators::{LayerSet, LightAov, RenderSettings, ViewMode};
 use crate::materials::bsdf::{LobesToSample, ShownLobes};
 use crate::materials::bxdf::ShadingGeometry;
 use crate::materials::microfacet::MicrofacetDistribution;
@@ -29,17 +27,17 @@ use crate::materials::{BxdfPoint, Footprint, RoughDielectricPoint};
 use crate::math::lanes::PACKET_SIZE;
 use crate::math::soa::Soa;
 use crate::math::{DVec3, Vec3};
+use crate::test_world::TestWorldBuilder;
 use crate::world::World;
-use crate::world::test_world::TestWorldBuilder;
-pub(super) use lights::{ReferenceLight, emitter_shapes, reference_lights};
+use lights::{ReferenceLight, emitter_shapes, reference_lights};
 
 /// Normal of the vertices, which are at the origin.
-pub(super) const NORMAL: Vec3 = Vec3::Y;
+pub const NORMAL: Vec3 = Vec3::Y;
 /// Direction to the viewer.
-pub(super) const WO: Vec3 = Vec3::new(-0.6, 0.8, 0.0);
+pub const WO: Vec3 = Vec3::new(-0.6, 0.8, 0.0);
 
 /// Materials with every kind of reflective BSDF.
-pub(super) const MATERIALS: [(&str, &str); 8] = [
+pub const MATERIALS: [(&str, &str); 8] = [
     ("diffuse", "diffuse = 0.7"),
     ("phong", PHONG),
     ("metal", "type = 'metal'\ncolor = 0.8\nroughness = 0.6"),
@@ -57,11 +55,11 @@ pub(super) const MATERIALS: [(&str, &str); 8] = [
 ];
 
 /// The Phong material whose values [`lights::phong_f`] computes.
-pub(super) const PHONG: &str = "diffuse = 0.3\nspecular = 0.5\nshininess = 20";
+pub const PHONG: &str = "diffuse = 0.3\nspecular = 0.5\nshininess = 20";
 
 /// Mean over the lanes of a packet, which have independent scrambles, and its standard error.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Estimate {
+pub struct Estimate {
     pub mean: f64,
     pub error: f64,
 }
@@ -92,7 +90,7 @@ impl Estimate {
 }
 
 /// A scene that contains only lights and occluders, and the samples to take at vertices in it.
-pub(super) struct LitScene {
+pub struct LitScene {
     pub world: World,
     settings: RenderSettings,
     block: SampleBlock,
@@ -180,21 +178,8 @@ impl LitScene {
 
     /// Light from light samples at a packet of vertices.
     pub fn sample_lights(&self, row: &VertexBatch, competing: CompetingTechnique) -> LightSums {
-        match competing {
-            CompetingTechnique::Nothing => self.sample_lights_with::<false>(row, competing),
-            CompetingTechnique::Paths | CompetingTechnique::NarrowPaths | CompetingTechnique::Lobes(_) => {
-                self.sample_lights_with::<true>(row, competing)
-            }
-        }
-    }
-
-    fn sample_lights_with<const MIS: bool>(
-        &self,
-        row: &VertexBatch,
-        competing: CompetingTechnique,
-    ) -> LightSums {
-        let (tile, instructions) = (&self.tile(), self.world.geometry.instruction_set());
-        let lighting = SampleAllLights::<MIS> {
+        let tile = &self.tile();
+        let lighting = SampleAllLights::<true> {
             tile,
             row,
             used: row.used,
@@ -204,12 +189,8 @@ impl LitScene {
             only_infinite: false,
             splits_lobes: false,
         };
-        let Some(selection) = self.world.lights.sampler_for_purpose(tile.behavior.receivers) else {
-            return instructions.run(lighting);
-        };
         let mut pool = ShadowRayQueue::default();
-        let tree = SampleLightTree { lighting, selection, number: 0, pool: &mut pool };
-        let mut sums = [instructions.run(tree)];
+        let mut sums = [lighting.sample_lights(0, &mut pool)];
         pool.trace(tile, LightAov::ALL, &mut sums);
         let [sums] = sums;
         sums
@@ -226,7 +207,7 @@ impl LitScene {
             interior_lists: None,
             arrived,
         };
-        self.world.geometry.instruction_set().run(kernel).light[0]
+        kernel.trace().light[0]
     }
 
     /// Rays in BSDF-sampled directions.
@@ -310,7 +291,7 @@ impl LitScene {
 
 /// A combination of sampling techniques that accounts for all light.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Technique {
+pub enum Technique {
     /// Only light samples.
     Lights,
     /// Only BSDF samples.

@@ -1,10 +1,14 @@
 //! Tests of picking lights from a tree.
 
-use super::super::mis::CompetingTechnique;
-use super::super::tests::{Estimate, LitScene, ReferenceLight};
-use super::*;
+use super::{Estimate, LitScene, ReferenceLight};
+use crate::integrators::LightAov;
+use crate::integrators::direct::all_lights::SampleAllLights;
+use crate::integrators::direct::light_tree::LightPicks;
+use crate::integrators::direct::mis::CompetingTechnique;
 use crate::integrators::transport::batch::VertexBatch;
-use crate::math::lanes::PortableSimd;
+use crate::lights::LightCenter;
+use crate::math::Vec3;
+use crate::math::lanes::{PACKET_SIZE, PortableSimd, lane};
 
 const GLOSSY: &str = "diffuse = 0.2\nspecular = 0.6\nshininess = 80";
 

@@ -3,10 +3,6 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::{
-    EnvironmentSource, Geometry, Images, MeshTree, World, WorldInputs, build_environment_map, build_lights,
-    build_sky,
-};
 use crate::assets::LoadedMesh;
 use crate::control::CancelToken;
 use crate::geometry::mesh::TriangleMesh;
@@ -15,6 +11,10 @@ use crate::math::{DVec3, Vec3};
 use crate::scene::description::{
     Accel, Environment, MapOrientation, MeshFile, MeshReference, Object, ObjectTransform, Scene, Shape,
     Spanned,
+};
+use crate::world::{
+    EnvironmentSource, Geometry, Images, MeshTree, World, WorldInputs, build_environment_map, build_lights,
+    build_sky,
 };
 
 /// A world under construction.

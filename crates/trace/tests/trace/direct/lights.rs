@@ -10,7 +10,7 @@ use crate::materials::texels::{TexelData, Texels};
 use crate::math::{DVec3, Vec3};
 
 /// A light, and a quadrature rule for its light at the origin.
-pub(crate) struct ReferenceLight {
+pub struct ReferenceLight {
     pub name: &'static str,
     /// Tables of the scene file.
     pub text: String,
@@ -56,7 +56,7 @@ impl ReferenceLight {
 }
 
 /// The BSDF of [`super::PHONG`]: kd/π + ks·(n + 2)/2π·cosⁿα, where α is the angle to the mirror direction.
-pub(crate) fn phong_f(wi: DVec3) -> f64 {
+pub fn phong_f(wi: DVec3) -> f64 {
     let (normal, wo) = (NORMAL.as_dvec3(), WO.as_dvec3());
     let mirrored = normal * (2.0 * normal.dot(wo)) - wo;
     0.3 / PI + 0.5 * 22.0 / TAU * mirrored.dot(wi).max(0.0).powi(20)
@@ -183,7 +183,7 @@ fn sun_radiance(wi: DVec3, to_sun: DVec3) -> f64 {
 }
 
 /// Every kind of light, with a quadrature rule.
-pub(crate) fn reference_lights() -> Vec<ReferenceLight> {
+pub fn reference_lights() -> Vec<ReferenceLight> {
     let light = ReferenceLight::from_text;
     let (corner, u, w) = (v(0.2, 1.2, -0.5), v(0.9, -0.5, 0.0), v(0.0, 0.0, 1.0));
     let skew = v(0.3, 0.2, 1.0);
@@ -289,7 +289,7 @@ fn spot_term(position: DVec3, axis: DVec3, half_angle: f64, blend: f64) -> (DVec
 }
 
 /// Emitting shapes without a quadrature rule.
-pub(crate) fn emitter_shapes() -> Vec<ReferenceLight> {
+pub fn emitter_shapes() -> Vec<ReferenceLight> {
     let light = ReferenceLight::from_text;
     vec![
         light(

@@ -1,8 +1,8 @@
 //! MIS weights of light samples and BSDF samples for the same directions.
 
-use super::super::mis::CompetingTechnique;
 use super::{LitScene, MATERIALS, ReferenceLight, emitter_shapes, reference_lights};
 use crate::geometry::Ray;
+use crate::integrators::direct::mis::CompetingTechnique;
 use crate::integrators::transport::cone::RayCone;
 use crate::integrators::transport::interiors::InteriorList;
 use crate::integrators::transport::ray::{PathHistory, PathRay};

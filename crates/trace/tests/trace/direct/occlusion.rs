@@ -1,8 +1,8 @@
 //! Lights that contribute nothing: occluded, behind the surface, facing away or black.
 
-use super::super::mis::CompetingTechnique;
 use super::lights::phong_f;
 use super::{LitScene, PHONG, ReferenceLight, Technique, emitter_shapes, reference_lights};
+use crate::integrators::direct::mis::CompetingTechnique;
 use crate::math::lanes::PACKET_SIZE;
 
 #[test]
