@@ -146,7 +146,7 @@ FAULTS = [
      "let normal = ⟦bsdf.lobe_shading_normal(shading.normal, wo)⟧;", "shading.normal",
      MICROFACETS + "coarse_smooth_meshes_conserve_energy"),
     ("a boundary between equal indices", "integrators/transport/walk.rs",
-     "near.glass() != far.glass() && ⟦medium_ior(tile.world, near) != medium_ior(tile.world, &far)⟧ {", "true",
+     "let refracts = ⟦medium_ior(tile.world, near) != medium_ior(tile.world, &far)⟧;", "true",
      "closed_forms::touching::no_boundary_between_equal_iors"),
     ("a see-through emitter whose near side does not attenuate", "world/null_interaction.rs",
      "if ⟦source == LightGeometry::SeeThrough(hit.object) && hit.shape.t >= ray.t_max - end⟧ {",

@@ -218,7 +218,7 @@ fn too_many_copies_are_rejected() {
         let placed = |group: &str| errors(&format!("{text}[[instance]]\ngroup = '{group}'\n"));
         let found = placed("g0");
         let [(message, _)] = found.as_slice() else { panic!("{found:?}") };
-        assert!(message.contains("2 million objects") && message.contains("\"g0\""), "{message}");
+        assert!(message.contains("2 million copies") && message.contains("\"g0\""), "{message}");
         assert_eq!(placed("g5"), []);
     }
     // The sum saturates instead of overflowing.

@@ -8,6 +8,7 @@ mod furniture;
 mod noise;
 mod parts;
 mod pictures;
+mod racer;
 mod room;
 mod shapes;
 mod sky;
@@ -61,6 +62,7 @@ fn stored_assets() -> Vec<AssetPathAndBytes> {
         ("knot.obj", shapes::knot().to_obj("A trefoil knot with texture coordinates and normals")),
         ("vase.obj", shapes::vase().to_obj("A vase, turned about y, with texture coordinates and normals")),
         ("gem.off", shapes::dodecahedron().to_off("A dodecahedron: twelve pentagons")),
+        ("racer.off", racer::body().to_off("The body of a toy racing car, to be subdivided")),
         ("room.obj", room::obj()),
         ("room.mtl", room::mtl()),
         ("room_orbiter.txt", room::camera_in_orbiter_format()),

@@ -350,8 +350,12 @@ fn photon_light_is_uniform_up_to_black_backs() {
         v(1.0, 0.0, 0.0),
         front_only(),
     );
-    let edge = strip(mirrored(build, (-1.25, -0.95), (0.0, 0.6)), v(-1.05, 0.0, 0.0), (0.099, 0.3));
-    assert_even("a strip next to a black back", &edge, (3500, 0.1), even());
+    let edge = view_rectangle(
+        lit_by_mirrored_sun(build, (-1.25, -0.95), (0.0, 0.6)),
+        v(-1.05, 0.0, 0.0),
+        (0.099, 0.3),
+    );
+    assert_uniform("a strip next to a black back", &edge, (3500, 0.1), reflected_radiance());
 }
 
 #[test]
@@ -359,8 +363,9 @@ fn photons_on_blends_represent_all_that_arrive() {
     // No photons are stored on the mirror. The camera sees the black sky in it.
     let floor = blend(matte(0.7), mirror(1.0), NumberSource::Constant(0.4));
     let build = scene().quad(v(-2.0, 0.0, 0.5), v(1.0, 0.0, 0.0), v(0.0, 0.0, -1.0), floor);
-    let middle = strip(mirrored(build, (-1.7, -1.3), (0.0, 0.4)), v(-1.5, 0.0, 0.0), (0.1, 0.1));
-    assert_mean("floor", &middle.photons(6000, 0.1).mean_reds(16), 0.6 * even(), 1.5e-2);
+    let middle =
+        view_rectangle(lit_by_mirrored_sun(build, (-1.7, -1.3), (0.0, 0.4)), v(-1.5, 0.0, 0.0), (0.1, 0.1));
+    assert_mean("floor", &middle.photons(6000, 0.1).mean_reds(16), 0.6 * reflected_radiance(), 1.5e-2);
 }
 
 #[test]

@@ -2,7 +2,8 @@
 
 use glimt::math::{DVec3, Vec2, Vec3};
 use glimt::scene::description::{
-    ColorSource, EmissionSource, Integrator, Material, NumberSource, TextureFilter, Wrap,
+    ColorSource, EmissionSource, Integrator, Material, MaterialKind, NumberSource, PhongParameters,
+    TextureFilter, Wrap,
 };
 
 use super::global::path_traced;
@@ -130,4 +131,29 @@ fn textured_coats_equal_constant_coats() {
     };
     let (one, other) = (seen(textured, varying), seen(scene(), constant));
     assert_same_mean("textured", one, other, 4e-3);
+}
+
+/// A surface that only transmits reflects light in its coat.
+#[test]
+fn coats_reflect_over_surfaces_that_only_transmit() {
+    let mut sheet = matte(0.0);
+    if let MaterialKind::Phong(PhongParameters { diffuse_transmission, .. }) = &mut sheet.kind {
+        *diffuse_transmission = ColorSource::Constant(Vec3::ONE);
+    }
+    for roughness in [0.3, 1.0] {
+        let build = scene()
+            .quad(
+                v(-0.1, 0.0, 0.1),
+                v(0.2, 0.0, 0.0),
+                v(0.0, 0.0, -0.2),
+                coated(1.0, roughness, sheet.clone()),
+            )
+            .sphere(v(1.0, 1.0, 0.0), 0.4, emitter(3.0))
+            .seen(v(-1.0, 1.0, 0.0), DVec3::ZERO)
+            .depth(1);
+        let by_lights = mean_and_error(&build.values(256, 16));
+        let by_paths = mean_and_error(&path_traced(build, 1).values(256, 16));
+        assert!(by_lights.0 > 0.01, "{by_lights:?}");
+        assert_same_mean(&format!("roughness {roughness}"), by_paths, by_lights, 2e-2);
+    }
 }

@@ -6,11 +6,12 @@ use glimt::geometry::ray::offset_origin;
 use glimt::materials::fresnel::{dielectric, refract_given_transmitted_cosine};
 use glimt::math::random::TestRandom;
 use glimt::math::{DVec3, Vec3};
-use glimt::scene::description::{Material, MeshReference, Shape};
+use glimt::scene::description::{EmissionSource, Material, MeshReference, Shape};
 use glimt::world::Geometry;
 
+use super::global::path_traced;
 use super::scenes::{
-    Build, IDENTITY_PLACEMENT, emitter, file_material, glass, lat_long_sphere, scene, tinted,
+    Build, IDENTITY_PLACEMENT, emitter, file_material, glass, lat_long_sphere, receiver, scene, tinted,
 };
 use super::{assert_close, assert_mean, v};
 
@@ -359,4 +360,21 @@ fn shading_normals_create_no_light() {
         assert!(value <= 1.0 + 1e-5, "from {eye} in direction {direction}: {value}");
     }
     assert!(along > 50, "{along}");
+}
+
+/// Glass that does not refract still shows its emission, and lights a floor alike in all techniques.
+#[test]
+fn glass_without_refraction_emits() {
+    let lamp = || Material { emission: EmissionSource::from_constant(Vec3::splat(2.0)), ..glass(1.0) };
+    let ball = scene().sphere(v(0.0, 0.0, -4.0), 1.0, lamp());
+    for build in [ball.clone(), path_traced(ball, 3)] {
+        assert_close("a ball", build.value(), 2.0);
+    }
+    let (at, radius) = (v(0.0, 2.0, 0.0), 0.5);
+    let lit = receiver(DVec3::ZERO, 0.5).sphere(at, radius, lamp()).depth(2);
+    // The irradiance from a sphere of radiance L straight above is πL·(r/d)².
+    let exact = 0.5 * 2.0 * (radius / at.y).powi(2);
+    for (what, build) in [("whitted", lit.clone()), ("path", path_traced(lit, 2))] {
+        assert_mean(what, &build.values(1024, 16), exact, 5e-3);
+    }
 }

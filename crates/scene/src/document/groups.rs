@@ -236,7 +236,7 @@ impl DefinedGroups {
                 let name = escape_and_truncate(self.names.name(instance.group), 40);
                 let issue = Issue::error(
                     instance.span.clone(),
-                    format!("the instances contain more than {} million objects", MAX_COPIES / 1_000_000),
+                    format!("the instances contain more than {} million copies", MAX_COPIES / 1_000_000),
                 );
                 context.report(
                     issue
@@ -264,9 +264,12 @@ impl DefinedGroups {
                 Some(Member::Object(object)) => {
                     let transform = object.shape.transform().then(outer);
                     if let Some((problem, label)) = composed_transform_problem(&transform) {
+                        let kind = object.shape.kind();
                         let message =
-                            format!("the combined transform of an object in this instance {problem}");
-                        context.report(Issue::error(instance.span.clone(), message).with_label(label));
+                            format!("the combined transform of a {kind} in this instance {problem}");
+                        let help = "change the transforms of the instance, its groups or the shape";
+                        let issue = Issue::error(instance.span.clone(), message);
+                        context.report(issue.with_label(label).with_help(help));
                         return None;
                     }
                     objects.push(object.clone().placed(outer));

@@ -14,7 +14,7 @@ pub(super) fn read_transform(table: &TableReader<'_>) -> Option<ObjectTransform>
         for key in &steps {
             if let Some(span) = key.key_span() {
                 let message = format!("`{}` conflicts with `matrix`", key.info.name);
-                key.context.report(Issue::error(span, message));
+                key.context.report(Issue::error(span, message).with_help("remove one of the two"));
             }
         }
         return read_affine_matrix(&matrix).map(ObjectTransform::Matrix);
@@ -62,7 +62,11 @@ fn affine_map_problem(map: &AffineMap) -> Option<(&'static str, String)> {
     let [x, y, z] = map.linear;
     let (volume, edges) = (x.cross(y).dot(z), x.length() * y.length() * z.length());
     if !(volume.abs() > MIN_VOLUME_RATIO * edges) {
-        return Some(("is not invertible", format!("its determinant is {volume:e}")));
+        let label = match volume {
+            0.0 => "its determinant is 0".to_owned(),
+            _ => format!("its determinant is {volume:e}"),
+        };
+        return Some(("is not invertible", label));
     }
     let is_short = |axis: &DVec3| is_nonzero_but_too_short(robust_length(*axis));
     map.linear

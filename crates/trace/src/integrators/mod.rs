@@ -101,8 +101,8 @@ pub fn render_tile_with_layers(
     let mirrored_width = world.camera.is_mirrored().then_some(settings.render.width);
     let block = SampleBlock { pixels, samples, mirrored_width };
     let weight = settings.render.filter.negative_weight();
-    let mut is_negative = vec![false; if weight.is_some() { block.len() } else { 0 }];
-    let mut radiance = vec![Vec3::ZERO; block.len()];
+    let mut is_negative = vec![false; if weight.is_some() { block.sample_count() } else { 0 }];
+    let mut radiance = vec![Vec3::ZERO; block.sample_count()];
     let mut counters = RayCounters::default();
     // Prepare the context shared by all rays.
     let settings = &settings.without_ineffective_settings();
@@ -122,8 +122,8 @@ pub fn render_tile_with_layers(
     let mut memory = ThreadMemory::take_from_thread();
     let (mut fractions, mut values) = (take(&mut memory.fractions), take(&mut memory.layers));
     values.clear_cached_albedos();
-    for start in (0..block.len()).step_by(BATCH_SIZE) {
-        let slots = start as u32..(start + BATCH_SIZE).min(block.len()) as u32;
+    for start in (0..block.sample_count()).step_by(BATCH_SIZE) {
+        let slots = start as u32..(start + BATCH_SIZE).min(block.sample_count()) as u32;
         counters.camera_rays += slots.len() as u64;
         let negative = |first: u32, bits: u32| write_mask_bits(&mut is_negative, first, bits);
         match settings.view.aov_source() {

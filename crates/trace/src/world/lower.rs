@@ -6,7 +6,7 @@ use super::Images;
 use super::lower_texture::lower_texture;
 use super::textures::{AlphaCutoffKey, coverage_cutoff};
 use crate::materials::microfacet::MicrofacetDistribution;
-use crate::materials::texture::{ColorOrTexture, Texture, ValueScaleAndOffset};
+use crate::materials::texture::{ColorOrTexture, Texture};
 use crate::materials::{
     Blend, Bsdf, Bump, Coat, CoatInputs, CoatedMaterial, Conductor, ConductorFresnel, Dielectric, Emission,
     Material, Mirror, NonSpecular, NormalMap, NormalPerturbation, Opacity, Phong, Plastic, Principled,
@@ -15,7 +15,7 @@ use crate::materials::{
 use crate::math::Vec3;
 use crate::scene::description::{
     self, ChannelSelector, CoatSource, ColorSource, FresnelSource, MaterialKind, NumberSource,
-    PhongParameters, PixelInterpretation, Scene, TextureRole,
+    PhongParameters, Scene, TextureRole,
 };
 
 /// Converts a material from the scene file.

@@ -28,7 +28,7 @@ impl TestWorldBuilder {
     /// Parses a scene file, which must not refer to other files.
     pub fn from_text(text: &str) -> Self {
         let outcome = crate::scene::parse(Arc::from(text), Path::new("scene.toml"));
-        let scene = outcome.scene.unwrap_or_else(|| panic!("{:?}", outcome.diagnostics));
+        let scene = outcome.scene.expect("a valid scene");
         Self { scene, meshes: Vec::new(), sky: None }
     }
 

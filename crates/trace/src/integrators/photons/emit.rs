@@ -75,7 +75,7 @@ impl PhotonTracer<'_> {
     /// # Errors
     /// [`Canceled`] if the token is canceled.
     pub fn trace_photons(&self) -> Result<PhotonChunk, Canceled> {
-        let count = self.tile.block.len() as u32;
+        let count = self.tile.block.sample_count() as u32;
         let mut wavefront = PhotonWavefront {
             tracing: self,
             depth: 0,

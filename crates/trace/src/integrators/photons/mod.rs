@@ -273,7 +273,8 @@ impl PhotonMapper {
             let stored =
                 PhotonTracer { tile: &tile, emission, glasses, bodies: &self.bodies, flux_scale, max_depth }
                     .trace_photons()?;
-            let done = done.fetch_add(block.len() as u64, Ordering::Relaxed) + block.len() as u64;
+            let done =
+                done.fetch_add(block.sample_count() as u64, Ordering::Relaxed) + block.sample_count() as u64;
             progress(done, count.into());
             Ok(stored)
         };

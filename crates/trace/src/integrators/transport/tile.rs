@@ -83,7 +83,7 @@ pub struct SampleBlock {
 
 impl SampleBlock {
     /// Number of samples.
-    pub fn len(&self) -> usize {
+    pub fn sample_count(&self) -> usize {
         self.pixels.count() * self.samples.len()
     }
 

@@ -212,11 +212,12 @@ pub fn walk_to_interaction<'a, W: PathStepper<'a>>(
             }
             path.path = path.continuation_path_number(PASSED);
         }
-        // Stop at a boundary between media with different indices of refraction.
+        // Stop at a boundary between media with different indices of refraction, and at glass that emits.
         let near = &path.interiors;
-        if near.glass() != far.glass() && medium_ior(tile.world, near) != medium_ior(tile.world, &far) {
+        let refracts = medium_ior(tile.world, near) != medium_ior(tile.world, &far);
+        if near.glass() != far.glass() && (refracts || vertex.emits()) {
             vertex.set_offset_points(sides);
-            let rough = if tile.world.has_rough_glass() {
+            let rough = if refracts && tile.world.has_rough_glass() {
                 rough_dielectric_point(stepper, path, (&vertex, &hit), (sides, &far))
             } else {
                 None

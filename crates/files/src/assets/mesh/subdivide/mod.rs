@@ -52,7 +52,7 @@ pub fn subdivision_memory_bytes(triangles: usize, levels: u32) -> u64 {
 /// becomes the triangles 4ⁿ·t to 4ⁿ·(t + 1) − 1 for n levels, unless triangles without area are dropped.
 ///
 /// # Errors
-/// - [`AssetError::Malformed`] if the result would have more than [`TriangleMesh::MOST_TRIANGLES`] triangles.
+/// - [`AssetError::Malformed`] if the result would have more than [`TriangleMesh::MAX_TRIANGLES`] triangles.
 /// - [`AssetError::OutOfMemory`] or [`AssetError::Canceled`].
 pub fn subdivide(
     mut loaded: LoadedMesh,
@@ -88,7 +88,7 @@ fn check_has_triangles(mesh: &TriangleMesh, path: &Path) -> Result<(), AssetErro
 
 /// Rejects a subdivision with too many triangles.
 fn check_triangle_count(triangles: usize, levels: u32, path: &Path) -> Result<(), AssetError> {
-    let most = u64::from(TriangleMesh::MOST_TRIANGLES);
+    let most = u64::from(TriangleMesh::MAX_TRIANGLES);
     if subdivided_triangle_count(triangles, levels) <= most {
         return Ok(());
     }
@@ -102,7 +102,7 @@ fn check_triangle_count(triangles: usize, levels: u32, path: &Path) -> Result<()
 
 /// Error message for a subdivision with too many triangles. `possible` is the highest level without an error.
 fn too_many_triangles_message(triangles: usize, levels: u32, possible: u32) -> String {
-    let (count, most) = (subdivided_triangle_count(triangles, levels), TriangleMesh::MOST_TRIANGLES);
+    let (count, most) = (subdivided_triangle_count(triangles, levels), TriangleMesh::MAX_TRIANGLES);
     format!(
         "`subdivide = {levels}` turns {triangles} triangles into {count}; the limit is {most}; use `subdivide = {possible}`"
     )

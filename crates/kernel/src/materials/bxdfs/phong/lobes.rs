@@ -65,10 +65,10 @@ impl PhongLobes {
         self.diffuse * FRAC_1_PI + self.specular * ((self.shininess + 2.0) * (0.5 * FRAC_1_PI)) * gloss
     }
 
-    /// Probability of choosing the diffuse lobe.
+    /// Probability of choosing the diffuse lobe. 0 for a black surface, which may still transmit light.
     #[inline(always)]
     fn diffuse_probability(&self) -> f32 {
-        self.diffuse / (self.diffuse + self.specular)
+        self.diffuse / (self.diffuse + self.specular).max(f32::MIN_POSITIVE)
     }
 }
 
