@@ -119,7 +119,7 @@ fn wait_for_pending_signals() {
     }
 }
 
-/// The foreground child process, and the signal that is terminating this process.
+/// The foreground child process, and the signal by which glimt itself is being terminated.
 struct ForegroundChildRecord {
     id: Option<Pid>,
     ending: Option<Number>,

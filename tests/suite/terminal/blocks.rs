@@ -55,7 +55,7 @@ fn pixel_preview_does_not_cover_text() {
         terminal.wait_for_render(1);
         terminal.press(answer);
         terminal.resize(120, 24);
-        // The first column of the preview, which the help does not cover.
+        // The help overlay leaves the first column of the preview visible.
         let has_blocks = |screen: &vt100::Screen| {
             let own = vt100::Color::Default;
             screen.cell(10, 0).is_some_and(|cell| cell.fgcolor() != own || cell.bgcolor() != own)

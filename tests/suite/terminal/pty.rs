@@ -443,7 +443,7 @@ impl Colors {
         self.dominant_color() == Some(name)
     }
 
-    /// The color of nearly all cells, if there are enough cells for an image.
+    /// Returns the color of more than 90 % of the cells, or `None` if there is none or the image is too small.
     fn dominant_color(&self) -> Option<&'static str> {
         let total = self.total();
         let all = [(self.red, "red"), (self.green, "green"), (self.blue, "blue")];

@@ -101,7 +101,7 @@ impl Relay {
         Self { seen, up }
     }
 
-    /// Types keys at the user's end.
+    /// Sends keys from the user to the program.
     pub fn press(&self, keys: &str) {
         let when = Instant::now() + DELAY;
         let _ = self.up.send(DelayedBytes { when, bytes: keys.as_bytes().to_vec(), asked: None });

@@ -118,9 +118,9 @@ pub fn atomic_if_unchanged(
 /// Events that a renamed file is guaranteed to survive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Durability {
-    /// Termination of the process. The system writes the bytes to disk later.
+    /// Termination of the process. The operating system may not have written the data to disk yet.
     Process,
-    /// A power failure. The bytes are on disk.
+    /// A power failure, because the data has been flushed to disk.
     Power,
 }
 
@@ -158,7 +158,7 @@ pub(super) fn write_atomically_or_in_place(
             let (new, carried) = create_temporary(&target, guard).map_err(named)?;
             let lost = carried.as_ref().map_or(&[][..], |carried| &carried.lost);
             if let (AttributeLossPolicy::Refuse, false) = (guard.losses, lost.is_empty()) {
-                let why = format!("{} cannot be kept", lost.join(" and "));
+                let why = format!("the new file would lose {}", lost.join(" and "));
                 return Err(OutputError::Target {
                     path: path.to_owned(),
                     why,

@@ -85,7 +85,7 @@ impl Parallelogram {
         SurfacePoint::from_f64(point, normal, self.uv_at_hit(ray, hit).as_vec2(), self.u, self.v, reach)
     }
 
-    /// Coordinates of a hit along the edges, in [0, 1].
+    /// Coordinates of a hit in terms of the two edges, each in [0, 1].
     #[inline(always)]
     fn hit_coordinates(&self, ray: &RayF64, hit: &ShapeHit) -> [f64; 2] {
         self.coordinates_of(ray.at(f64::from(hit.t)))

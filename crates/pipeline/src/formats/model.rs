@@ -1,4 +1,4 @@
-//! The scenes that glimt generates for models: a view, lights and a ground.
+//! The scenes that glimt generates for models: a camera, lights and a ground plane.
 
 use std::collections::HashSet;
 use std::path::Path;

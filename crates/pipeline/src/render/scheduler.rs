@@ -65,7 +65,7 @@ pub(crate) struct DisplayOptions<'a> {
     pub(crate) first: Option<NormalizedRect>,
     /// Whether the camera is being moved. If so, the first image must appear quickly, even if it is small.
     pub(crate) is_moved: bool,
-    /// Speed at which the most recent first image was rendered, in pixels per second.
+    /// Speed of the first, coarse image of the most recent render, in pixels per second.
     pub(crate) coarse_rate: &'a Cell<Option<f64>>,
 }
 

@@ -42,7 +42,7 @@ use crate::threads::RenderThreads;
 use crate::trace::TileKernel;
 use crate::watch::content::FileHashCache;
 
-/// Configuration of a session, which tests override.
+/// Configuration of a session. Only tests change the defaults.
 #[derive(Clone, Copy)]
 pub(super) struct SessionConfig {
     pub(super) kernel: TileKernel,

@@ -34,7 +34,7 @@ const SCENE: &str = "glimt:scene";
 /// State of the write stage between requests.
 #[derive(Debug, Default)]
 pub(crate) struct WriteState {
-    /// Save count of the newest request with a valid scene.
+    /// Number of times the scene had been saved at the newest request with a valid scene.
     saves: u64,
     /// Whether the files contain an image with keyboard changes.
     is_by_hand: bool,

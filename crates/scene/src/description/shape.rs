@@ -349,8 +349,8 @@ impl Shape {
         if let Self::Transformed { shape, matrix } = self { (shape, Some(matrix)) } else { (self, None) }
     }
 
-    /// Returns the shape without its matrix as an open surface, or `None` for closed shapes, planes and
-    /// meshes.
+    /// Returns the untransformed shape if it is a bounded open surface, or `None` for closed shapes, planes
+    /// and meshes.
     pub fn untransformed_open_surface(&self) -> Option<OpenSurface> {
         match *self.shape_and_matrix().0 {
             Self::Quad { corner, u, v } => {

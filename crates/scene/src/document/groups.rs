@@ -236,11 +236,14 @@ impl DefinedGroups {
                 let name = escape_and_truncate(self.names.name(instance.group), 40);
                 let issue = Issue::error(
                     instance.span.clone(),
-                    format!("the instances contain more than {} million copies", MAX_COPIES / 1_000_000),
+                    format!(
+                        "the instances add more than {} million copies of shapes",
+                        MAX_COPIES / 1_000_000
+                    ),
                 );
                 context.report(
                     issue
-                        .with_label(format!("this copy of \"{name}\" contains {size}"))
+                        .with_label(format!("this instance of \"{name}\" adds {size}"))
                         .with_help("use fewer instances, or combine the objects of a group in a mesh file"),
                 );
                 return None;

@@ -96,8 +96,8 @@ pub struct TextureRolesNeededByRender {
     pub lights: bool,
     /// Normal maps and height maps.
     pub normals: bool,
-    /// All textures of specular materials (mirrors, thin panes, glass, smooth coats), because other surfaces
-    /// are visible through them.
+    /// All textures of specular materials (mirrors, thin panes, glass, smooth coats). They affect how other
+    /// surfaces appear in reflections and behind glass.
     pub by_delta: bool,
 }
 
@@ -346,7 +346,7 @@ pub fn scene_texture_source(image: &ImageSource, used: PixelInterpretation) -> T
     TextureSource { path: image.file.value.clone(), image: image.image, encoding, coverage: None }
 }
 
-/// Image file and encoding for a mesh file's texture with this pixel interpretation.
+/// Returns the image file to load for a texture of a mesh file, and how to decode it for this use.
 pub fn image_file_and_encoding(texture: &FileTexture, used: PixelInterpretation) -> TextureSource {
     let encoding = match used {
         PixelInterpretation::Color => ImageEncoding::Color,

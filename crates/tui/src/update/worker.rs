@@ -310,7 +310,7 @@ fn record_written_file(
     }
 }
 
-/// Whether all output files contain the scene's own finished image from this request.
+/// Whether this request has written the finished image, without keyboard changes, to all output files.
 fn is_scene_image_written(state: &State, generation: u64) -> bool {
     let is_complete = |written: &WrittenFile| {
         written.generation == generation && written.shows.is_none() && !written.is_unfinished

@@ -85,8 +85,8 @@ pub(super) fn convert(
     Ok(ImportedScene { document, files, substitutions })
 }
 
-/// Rejects a file that `glimt check` would reject. Checks the scene that `glimt MODEL` would render, because
-/// the files referenced by that scene already exist.
+/// Rejects a file that `glimt check` would reject. Checks the scene that `glimt MODEL` would render instead of
+/// the imported one, whose texture files have not been written yet.
 fn check_rendered_scene(path: &Path, context: &ForeignReadContext<'_>) -> Result<(), AssetError> {
     let errors = lower(read(path, context)?.document, path, &[]).err();
     // Ignore errors about file names, because the imported scene uses different file names.

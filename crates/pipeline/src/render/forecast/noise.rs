@@ -10,7 +10,7 @@ use crate::render::noise_goals::MIN_SAMPLES;
 /// Minimum time before the first measurement and between measurements, each of which requires a sum over all
 /// pixels.
 const INTERVAL: Duration = Duration::from_millis(500);
-/// Minimum ratio of the current noise to the next reported level.
+/// Minimum factor between the current noise and the noise level for which a time is predicted.
 const MIN_LEVEL_RATIO: f64 = 1.5;
 
 /// The last noise measurement and the time when the next one is due.

@@ -19,8 +19,8 @@ pub struct InterfaceCrossing {
     pub opaque: Option<Hit>,
 }
 
-/// The glass whose surface separates two media. It is the glass with the higher priority, which is later in
-/// the scene file.
+/// The glass whose surface separates two media. Where two glass objects overlap, the one defined later in the
+/// scene file takes priority.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SeparatingGlassSurface {
     /// Material of the glass at this point.

@@ -9,7 +9,7 @@ use crate::geometry::mesh::TriangleMesh;
 use crate::materials::texels::{TexelData, Texels};
 use crate::math::{DVec3, Vec3};
 
-/// A light, and a quadrature rule for its light at the origin.
+/// A light source, and a quadrature rule for its irradiance at the origin.
 pub struct ReferenceLight {
     pub name: &'static str,
     /// Tables of the scene file.

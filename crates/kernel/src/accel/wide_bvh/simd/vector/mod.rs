@@ -27,13 +27,13 @@ pub trait SimdVector: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Outpu
     /// Broadcasts a number to all lanes.
     ///
     /// # Safety
-    /// The processor must have the instructions of this type.
+    /// The CPU must support the instruction set of this type.
     unsafe fn splat(x: f32) -> Self;
 
     /// Loads floats from memory.
     ///
     /// # Safety
-    /// The processor must have the instructions of this type, and `from` must point to [`SimdVector::COUNT`]
+    /// The CPU must support the instruction set of this type, and `from` must point to [`SimdVector::COUNT`]
     /// floats.
     unsafe fn load(from: *const f32) -> Self;
 
