@@ -34,7 +34,9 @@ fn main() -> ExitCode {
     let words: Vec<&String> = asked.iter().filter(|word| !word.starts_with("rounds=")).collect();
     let is_asked =
         |pair: &FeaturePair| words.is_empty() || words.iter().any(|word| pair.name.contains(word.as_str()));
-    println!("| unused feature | s without, minimum | s, ratio with | ± | instructions | bits | report |");
+    println!(
+        "| unused feature | minimum without it (s) | time ratio with it | ± | instructions | bits | report |"
+    );
     println!("| --- | --- | --- | --- | --- | --- | --- |");
     let mut faulty = false;
     for pair in pairs::pairs(SIZE).iter().filter(|pair| is_asked(pair)) {

@@ -199,7 +199,7 @@ fn all_scenes_are_checked_before_measuring() {
 }
 
 #[test]
-fn references_set_image_size_and_lone_one_warns() {
+fn references_set_the_size_and_a_single_one_warns() {
     let dir = box_dir();
     for seed in [8, 9] {
         let line =

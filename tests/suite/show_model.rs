@@ -246,7 +246,7 @@ fn failed_import_leaves_no_files() {
     dir.expect("import cubes.glb -o full.toml", 0);
 }
 
-/// No scene with invalid numbers is written, and the message locates the number in the glTF file.
+/// A scene with invalid numbers is not written, and the error says where the number is in the glTF file.
 #[test]
 fn out_of_range_number_errors_name_the_node() {
     let dir = TestDir::new();

@@ -201,6 +201,6 @@ pub(super) struct WriteFailure {
     pub why: String,
     /// Generation of the request that failed.
     pub generation: u64,
-    /// Whether glimt refused to write the image. The errors and warnings list the reason.
+    /// Whether glimt refused to write the image. The errors and warnings give the reason.
     pub is_refused: bool,
 }

@@ -43,7 +43,7 @@ pub(super) fn obj() -> Vec<Case> {
         (
             "no vertices",
             b"f 1 2 3\n".to_vec(),
-            "a.obj:1: vertex 1 is out of range: there are 0, numbered from 1",
+            "a.obj:1: vertex 1 is out of range: none are defined before this line",
         ),
         ("no faces", b"v 0 0 0\nv 1 0 0\nv 0 1 0\n".to_vec(), "a.obj: no usable face: the file has no faces"),
         (

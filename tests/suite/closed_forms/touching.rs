@@ -210,7 +210,8 @@ fn drink_in_a_glass_matches_layers() {
             radius,
             caps: true,
         };
-        // A full glass whose drink shares its upper face. From above: air to 1.33, 1.33 to 1.5, 1.5 to air.
+        // A glass filled to the brim: liquid (IOR 1.33) and glass (IOR 1.5) share the top face. From above, rays go
+        // from air into the liquid, the glass, and air.
         let full = scene().shape(bar(0.0, 2.0, 1.0), glass(1.5)).shape(bar(0.2, 2.0, 0.9), glass(1.33));
         let full = full.shape(turned.square(-1.0, 5000.0), emitter(1.0)).depth(200);
         let n = f64::from(1.33_f32);

@@ -122,8 +122,8 @@ impl DataRange {
     }
 }
 
-/// Distances in view. Pixels at the border of empty space average distances with zeros, so they are used only
-/// if there are no other pixels.
+/// Depths of the visible surfaces. Pixels at the edge of empty space mix depths with zeros, so they are used
+/// only if there are no other pixels.
 fn depths_excluding_edges(image: &RadianceImage) -> Vec<f32> {
     let (width, height) = (image.width as usize, image.height as usize);
     let at = |x: usize, y: usize| image.pixels[y * width + x].x;

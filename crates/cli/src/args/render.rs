@@ -59,7 +59,7 @@ pub struct RenderArgs {
 
     /// Render part I of N, with --once
     ///
-    /// -o names the file for this part. `glimt merge` merges the parts.
+    /// Use -o to name the file for this part. `glimt merge` merges the parts.
     #[arg(long, value_name = "I/N", allow_hyphen_values = true, value_parser = parse_shard, help_heading = "Long renders")]
     pub shard: Option<(u32, u32)>,
     /// Interval between checkpoints; 0 disables them

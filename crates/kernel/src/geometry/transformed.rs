@@ -113,7 +113,7 @@ impl TransformedShape {
         self.volume_scale / (self.to_world.linear.transpose() * normal).length()
     }
 
-    /// The centroid of the untransformed shape, transformed to the world.
+    /// The centroid of the untransformed shape, in world space.
     pub fn centroid(&self) -> DVec3 {
         self.to_world.point(self.shape.centroid())
     }

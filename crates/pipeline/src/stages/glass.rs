@@ -75,7 +75,7 @@ fn open_glass_warnings(loaded: &LoadedScene, open: &[OpenGlass]) -> Vec<Diagnost
     groups.iter().map(|(flaw, members)| warning(loaded, *flaw, members)).collect()
 }
 
-/// Returns the flaw in an object that is not closed.
+/// Returns the reason why an open object does not enclose a volume, or `None` if there is no advice for it.
 fn flaw(loaded: &LoadedScene, open: &OpenGlass) -> Option<GlassFlaw> {
     let shape = &loaded.scene.objects[open.object as usize].shape;
     if shape.as_mesh().is_some() {

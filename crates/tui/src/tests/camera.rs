@@ -65,7 +65,7 @@ fn newest_camera_step_waits_for_a_preview() {
         find_render_request(&ui.press_character('l')).is_some(),
         "the next step should be requested immediately"
     );
-    // Other keys take effect immediately and include all previous steps.
+    // Other keys take effect immediately. Their request has the camera after all previous steps.
     ui.press_character('l');
     let effects = ui.press_character('s');
     assert!(find_render_request(&effects).expect("a request").overrides.camera != newest);

@@ -214,7 +214,7 @@ fn shared_key_schema(keys: &[(&'static TableTypeInfo, &'static KeyInfo)]) -> Val
     schema
 }
 
-/// Returns the dependency that restricts a key to its types.
+/// Returns the schema that allows a key only in tables of the types that have this key.
 fn key_type_restriction_schema(
     info: &TableInfo,
     keys: &[(&'static TableTypeInfo, &'static KeyInfo)],

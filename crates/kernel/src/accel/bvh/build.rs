@@ -46,7 +46,7 @@ struct SubtreeSummary {
     bounds: Aabb,
     /// Number of node levels.
     depth: usize,
-    /// Whether many boxes contain other boxes.
+    /// Whether so many boxes contain other boxes that splitting them by position is inefficient.
     is_nested: bool,
 }
 

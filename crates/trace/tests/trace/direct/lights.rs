@@ -166,8 +166,8 @@ fn sky_radiance(wi: DVec3, to_sun: DVec3) -> f64 {
     (1.0 + a * (b / (wi.y + 0.01)).exp()) * glow * mean
 }
 
-/// Red radiance of the sun in [`sky_radiance`], widened to 40°: the model's mean radiance at the lowest and
-/// highest points of the disk, and its limb darkening.
+/// Radiance in the red channel of the sun that belongs to [`sky_radiance`], with an angular diameter of 40°. It
+/// is the mean of the model's radiances at the lowest and highest points of the disk, with limb darkening.
 fn sun_radiance(wi: DVec3, to_sun: DVec3) -> f64 {
     let half = |degrees: f64| (degrees / 2.0).to_radians();
     let [from, to] = [19_452.294_1, 19_478.470_2];

@@ -306,5 +306,8 @@ fn absolute_index(index: i64, count: usize) -> Option<u32> {
 
 pub(super) fn out_of_range_message(attribute: usize, index: i64, count: usize) -> String {
     let what = ["vertex", "texture coordinate", "normal"][attribute];
-    format!("{what} {index} is out of range: there are {count}, numbered from 1")
+    match count {
+        0 => format!("{what} {index} is out of range: none are defined before this line"),
+        _ => format!("{what} {index} is out of range: there are {count}, numbered from 1"),
+    }
 }
