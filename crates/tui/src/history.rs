@@ -53,7 +53,7 @@ impl RenderHistory {
     }
 
     /// Records that the scene has been read. New entries include the last edit.
-    pub(super) fn record_scene_read(&mut self) {
+    pub(super) fn mark_scene_edits_read(&mut self) {
         self.read_edits = self.edits;
     }
 

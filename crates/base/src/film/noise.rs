@@ -44,7 +44,7 @@ struct NoiseSums {
 
 impl NoiseSums {
     /// Expected exponent for the next doubling, or the exponent for independent samples if there is no noise.
-    fn convergence_exponent(self) -> f64 {
+    fn squared_error_exponent(self) -> f64 {
         if self.left > 0.0 { libm::log2(self.variance / self.left) } else { 1.0 }
     }
 
@@ -73,7 +73,7 @@ impl Film {
         let error = (variance / pixels).sqrt();
         // A black image without error has a relative error of 0.
         let relative_error = if error == 0.0 { 0.0 } else { error / (mean / pixels) };
-        Some(ImageNoiseAndConvergence { relative_error, power: sums.convergence_exponent() })
+        Some(ImageNoiseAndConvergence { relative_error, power: sums.squared_error_exponent() })
             .filter(|noise| noise.relative_error.is_finite())
     }
 
@@ -173,7 +173,7 @@ impl Film {
             }
         }
         let (variance, mean, power) =
-            (sums.variance / pixels, sums.mean / pixels, sums.convergence_exponent());
+            (sums.variance / pixels, sums.mean / pixels, sums.squared_error_exponent());
         (pixels > 0.0).then_some(CellHalfNoise { variance, mean, samples, power })
     }
 

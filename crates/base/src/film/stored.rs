@@ -59,7 +59,7 @@ impl StoredTile {
     ///
     /// # Errors
     /// [`MalformedTile`] if the tiles differ in size or the block does not exist.
-    pub fn add_block_from(&mut self, of: &Self, block: usize) -> Result<(), MalformedTile> {
+    pub fn add_block_sum_from(&mut self, of: &Self, block: usize) -> Result<(), MalformedTile> {
         let area = of.tile.sums.len();
         if self.tile.sums.is_empty() {
             self.tile.resize(area);
@@ -313,7 +313,7 @@ mod tests {
                     [&outer, &inner].map(|of| StoredTile::read(&stored(of, tile), area).expect("a tile"));
                 let mut sum = StoredTile::default();
                 for (of, block) in [(&outer, 0), (&inner, 0), (&outer, 1)] {
-                    sum.add_block_from(of, block).expect("a block");
+                    sum.add_block_sum_from(of, block).expect("a block");
                 }
                 [&outer, &inner].into_iter().for_each(|of| sum.add_counts_from(of));
                 merged.restore_tile(tile, sum).expect("a tile");

@@ -100,7 +100,7 @@ pub fn unit_generator(seed: u64) -> impl FnMut() -> f32 {
 }
 
 /// [`TestRandom::signed_f32`] as a closure.
-pub fn signed_generator(seed: u64) -> impl FnMut() -> f32 {
+pub fn signed_number_generator(seed: u64) -> impl FnMut() -> f32 {
     let mut random = TestRandom::new(seed);
     move || random.signed_f32()
 }

@@ -3,7 +3,7 @@
 use crate::geometry::watertight::ShearedRay;
 use crate::geometry::{Ray, ShapeHit};
 use crate::math::Vec3;
-use crate::math::random::signed_generator as random;
+use crate::math::random::signed_number_generator as random;
 
 /// Difficult meshes: noise, slivers, grids with coplanar and duplicate faces, identical triangles, a single
 /// triangle, an empty mesh, and a mesh with NaN coordinates.

@@ -192,12 +192,12 @@ fn outward_rounded_point_bounds(exact: DVec3) -> SimdBounds {
 /// A triangle clipped by up to six planes in double precision (Sutherland, Hodgman, *Reentrant Polygon
 /// Clipping*, 1974).
 #[derive(Clone, Copy)]
-pub struct ClippedTriangle {
+pub struct ClippedPolygon {
     points: [DVec3; 9],
     count: usize,
 }
 
-impl ClippedTriangle {
+impl ClippedPolygon {
     const NOTHING: Self = Self { points: [DVec3::ZERO; 9], count: 0 };
 
     /// Clips a triangle to a box, keeping the parts in the box's faces.

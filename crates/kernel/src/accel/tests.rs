@@ -8,7 +8,7 @@ use crate::control::CancelToken;
 use crate::geometry::watertight::ShearedRay;
 use crate::geometry::{Aabb, Ray};
 use crate::math::Vec3;
-use crate::math::random::signed_generator as random;
+use crate::math::random::signed_number_generator as random;
 
 type TriangleSoup = Vec<[Vec3; 3]>;
 

@@ -8,7 +8,7 @@ use crate::geometry::watertight::ShearedRay;
 use crate::geometry::{Ray, ShapeHit};
 use crate::math::Vec3;
 use crate::math::lanes::Simd;
-use crate::math::random::signed_generator;
+use crate::math::random::signed_number_generator;
 
 /// Runs closest-hit and any-hit queries. Returns the nearest hits and three masks: undecided closest-hit
 /// rays, rays that hit any triangle other than `except`, and undecided any-hit rays.
@@ -85,7 +85,7 @@ fn single_ray_hit(triangles: &[[Vec3; 3]], ray: &Ray, except: u32) -> Option<Sha
 
 #[test]
 fn decided_packets_match_single_rays() {
-    let mut next = signed_generator(11);
+    let mut next = signed_number_generator(11);
     // For each kind of ray, count all rays, hits, and undecided rays. Also count rays from surfaces near the
     // origin, and the undecided ones among them.
     let (mut bounces, mut left) = (0, 0);

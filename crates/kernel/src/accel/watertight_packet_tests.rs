@@ -7,7 +7,7 @@ use crate::geometry::watertight::ShearedRay;
 use crate::geometry::watertight_packet::{ShearedPacket, TriangleTestResults};
 use crate::math::Vec3;
 use crate::math::lanes::Simd;
-use crate::math::random::signed_generator;
+use crate::math::random::signed_number_generator;
 
 struct TriangleTestKernel<'a> {
     rays: &'a [Ray],
@@ -30,7 +30,7 @@ impl SimdKernel for TriangleTestKernel<'_> {
 
 #[test]
 fn packets_match_single_rays_bit_for_bit() {
-    let mut next = signed_generator(7);
+    let mut next = signed_number_generator(7);
     let (mut hits, mut doubtful) = (0, 0);
     for round in 0..20_000 {
         // Triangles share corners and may be degenerate. Rays are parallel to an axis, toward corners, or

@@ -131,7 +131,7 @@ pub fn triangle_margin(origin: Vec3, whole: &Aabb) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::random::signed_generator;
+    use crate::math::random::signed_number_generator;
 
     fn enters(origin: Vec3, direction: Vec3, min: Vec3, max: Vec3) -> Option<f32> {
         SlabRay::new(origin, direction).entry_distance(min, max, f32::INFINITY)
@@ -151,7 +151,7 @@ mod tests {
 
     #[test]
     fn corners_of_flat_boxes_are_never_missed() {
-        let mut next = signed_generator(7);
+        let mut next = signed_number_generator(7);
         let mut misses = 0;
         for _ in 0..400_000 {
             let origin = Vec3::new(next(), next(), next()) * 10.0;

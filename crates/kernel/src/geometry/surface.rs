@@ -97,13 +97,13 @@ impl SurfacePoint {
 /// all lengths in these computations.
 #[inline(always)]
 pub fn point_error_bound(point: Vec3, reach: f64) -> Vec3 {
-    doubled_point_rounding_error(point) + Vec3::splat(f64_arithmetic_error_bound(reach))
+    doubled_point_rounding_error(point) + Vec3::splat(absolute_f64_error_bound(reach))
 }
 
 /// Bound on the error of `f64` arithmetic for a hit, its surface point, and the next intersection test from
 /// that point. `reach` is the largest absolute value of all lengths in these computations.
 #[inline(always)]
-pub fn f64_arithmetic_error_bound(reach: f64) -> f32 {
+pub fn absolute_f64_error_bound(reach: f64) -> f32 {
     (reach * (32.0 * f64::EPSILON)) as f32
 }
 

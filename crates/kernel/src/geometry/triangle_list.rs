@@ -139,8 +139,9 @@ impl TriangleList {
                 continue;
             }
             let other = (number + 1..corners.len()).find_map(|other| {
-                let pair = is_left[other]
-                    .then(|| reorder_corners_into_quad(&corners[number], &corners[other], reach))??;
+                let pair = is_left[other].then(|| {
+                    reorder_corners_into_triangle_pair(&corners[number], &corners[other], reach)
+                })??;
                 Some((other, pair))
             });
             facets.push(match other {
@@ -408,7 +409,11 @@ impl TriangleOrQuad {
 /// Reorders the corners of two triangles that form a flat quadrilateral close to a parallelogram. The first
 /// triangle's outer corner becomes its first corner, and the second triangle's outer corner becomes its last.
 /// Returns `None` for other triangles.
-fn reorder_corners_into_quad(one: &[Vec3; 3], other: &[Vec3; 3], reach: f32) -> Option<[[Vec3; 3]; 2]> {
+fn reorder_corners_into_triangle_pair(
+    one: &[Vec3; 3],
+    other: &[Vec3; 3],
+    reach: f32,
+) -> Option<[[Vec3; 3]; 2]> {
     let apart = |of: &[Vec3; 3], from: &[Vec3; 3]| {
         let mut own = (0..3).filter(|&i| !from.contains(&of[i]));
         own.next().filter(|_| own.next().is_none())

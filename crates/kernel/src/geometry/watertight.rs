@@ -189,7 +189,7 @@ fn segment_point_nearest_to_ray(p: DVec3, q: DVec3) -> (f64, f64, f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::random::signed_generator;
+    use crate::math::random::signed_number_generator;
 
     #[test]
     fn axis_aligned_and_oblique_rays_hit_the_plane() {
@@ -205,7 +205,7 @@ mod tests {
 
     #[test]
     fn surfaces_with_needles_have_no_holes() {
-        let mut random = signed_generator(3);
+        let mut random = signed_number_generator(3);
         for (width, distance) in
             [(3e-4_f32, 200.0_f32), (1e-4, 200.0), (1e-4, 50.0), (1e-6, 3.0), (2e-7, 1e3)]
         {

@@ -75,7 +75,7 @@ impl Session {
             self.write_or_remove_report(current, sink);
         }
         if self.is_own_image_written() {
-            self.remove_own_checkpoint(sink);
+            self.remove_scene_image_checkpoint(sink);
         }
     }
 
@@ -91,7 +91,7 @@ impl Session {
     }
 
     /// Removes the checkpoint of the scene's own image after that image has been written.
-    fn remove_own_checkpoint(&self, sink: &EventSink) {
+    fn remove_scene_image_checkpoint(&self, sink: &EventSink) {
         let Some(state) = self.own.current.as_ref().and_then(|own| self.films.get(own.film)) else { return };
         if let Some(checkpointer) = self.own.checkpointer(state.key, &self.files.protected, sink) {
             checkpointer.detect_own_checkpoint(state);

@@ -41,7 +41,7 @@ pub(crate) fn collect_lights(
         scene,
         of,
         geometry.coordinate_origin(),
-        geometry.coplanar_light_offsets(),
+        geometry.object_offsets_from_coplanar_lights(),
         map,
         &patterns,
     );

@@ -81,7 +81,7 @@ pub struct FileHashCache {
 
 /// A file as first seen by a request.
 #[derive(Clone, Copy, Debug)]
-struct SeenFile {
+struct FirstSeenFile {
     content: FileContentId,
     /// The file's stamp before its content was read.
     stamp: Option<FileStamp>,
@@ -94,7 +94,7 @@ pub(crate) struct FilesSeenByRequest {
     contents: Arc<FileHashCache>,
     /// Time before the first read.
     begun: SystemTime,
-    seen: Mutex<HashMap<PathBuf, SeenFile>>,
+    seen: Mutex<HashMap<PathBuf, FirstSeenFile>>,
     changed: Mutex<Option<PathBuf>>,
 }
 
@@ -117,7 +117,7 @@ impl FilesSeenByRequest {
         }
         let stamp = FileStamp::from_path(path);
         let content = self.contents.read_content_id(path, token)?;
-        Ok(self.lock_seen_files().entry(path.to_owned()).or_insert(SeenFile { content, stamp }).content)
+        Ok(self.lock_seen_files().entry(path.to_owned()).or_insert(FirstSeenFile { content, stamp }).content)
     }
 
     /// Returns the content of a file whose decoded bytes have this hash. Records a change if the content
@@ -134,7 +134,7 @@ impl FilesSeenByRequest {
         stamp: Option<FileStamp>,
     ) -> FileContentId {
         let content = FileContentId::Hash(hash);
-        if self.lock_seen_files().entry(path.to_owned()).or_insert(SeenFile { content, stamp }).content
+        if self.lock_seen_files().entry(path.to_owned()).or_insert(FirstSeenFile { content, stamp }).content
             != content
         {
             self.record_change(path);
@@ -166,7 +166,7 @@ impl FilesSeenByRequest {
     /// Returns [`Canceled`] if the token is canceled.
     pub(crate) fn recheck_seen_files(&self, token: &CancelToken) -> Result<(), Canceled> {
         let seen: Vec<_> = self.lock_seen_files().iter().map(|(path, seen)| (path.clone(), *seen)).collect();
-        for (path, SeenFile { content, stamp }) in seen {
+        for (path, FirstSeenFile { content, stamp }) in seen {
             let Some(now) = FileStamp::from_path(&path) else { continue };
             if Some(now) == stamp && is_stamp_reliable(&now, self.begun) {
                 continue;
@@ -216,7 +216,7 @@ impl FilesSeenByRequest {
         self.lock_seen_files().get(path).map(|seen| seen.content)
     }
 
-    fn lock_seen_files(&self) -> MutexGuard<'_, HashMap<PathBuf, SeenFile>> {
+    fn lock_seen_files(&self) -> MutexGuard<'_, HashMap<PathBuf, FirstSeenFile>> {
         self.seen.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }

@@ -10,7 +10,7 @@
 //! A program may write a file in several steps. [`WatchEvent::Settled`] follows a change when no further
 //! changes are expected. Errors in a file are not reported earlier.
 
-mod change_tracker;
+mod change_debouncer;
 pub mod content;
 mod folders;
 
@@ -23,7 +23,7 @@ use std::sync::Arc;
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender};
 use std::time::{Duration, Instant};
 
-use self::change_tracker::ChangeTracker;
+use self::change_debouncer::ChangeDebouncer;
 use self::content::FileContentId;
 pub use self::content::{FileHashCache, FilePathAndContentId};
 use self::folders::{ChangeHint, WatchedFolders};
@@ -133,7 +133,7 @@ impl Watcher {
             // Sending only fails after the watcher has ended.
             let _ = hints.send(Message::Hint(hint));
         });
-        let change_tracker = ChangeTracker::new(delays);
+        let change_debouncer = ChangeDebouncer::new(delays);
         let (files, pending, suspects) = Default::default();
         let quiet = delays.quiet_missing;
         let watch = WatchThread {
@@ -141,7 +141,7 @@ impl Watcher {
             has_working_folder: true,
             contents,
             files,
-            change_tracker,
+            change_debouncer,
             pending,
             suspects,
             quiet,
@@ -183,7 +183,7 @@ struct WatchThread<F> {
     /// Each file's content when the file was last read or a change was last reported, and the time of that
     /// event.
     files: HashMap<PathBuf, (FileContentId, Instant)>,
-    change_tracker: ChangeTracker,
+    change_debouncer: ChangeDebouncer,
     /// Changes that the last check found but did not report.
     pending: Vec<FilePathAndContentId>,
     /// Output changes that may be temporary.
@@ -198,7 +198,7 @@ impl<F: FnMut(WatchEvent)> WatchThread<F> {
         loop {
             let pause = self.next_check().saturating_duration_since(Instant::now());
             match orders.recv_timeout(pause) {
-                Ok(Message::Hint(hint)) => self.change_tracker.hint(hint, Instant::now()),
+                Ok(Message::Hint(hint)) => self.change_debouncer.hint(hint, Instant::now()),
                 Ok(Message::Files(read, before, since)) => self.set_files(read, before, since),
                 Ok(Message::Outputs) => self.update_watched_folders(),
                 Err(RecvTimeoutError::Timeout) => self.check(Instant::now()),
@@ -211,7 +211,7 @@ impl<F: FnMut(WatchEvent)> WatchThread<F> {
         let pause =
             if self.has_working_folder && self.folders.covers_all_folders() { HEARTBEAT } else { POLL };
         let unhinted = Instant::now() + pause;
-        let due = [self.change_tracker.next_check_time(), self.suspects.next_check_time(self.quiet)]
+        let due = [self.change_debouncer.next_check_time(), self.suspects.next_check_time(self.quiet)]
             .into_iter()
             .flatten()
             .min();
@@ -238,7 +238,7 @@ impl<F: FnMut(WatchEvent)> WatchThread<F> {
         self.update_watched_folders();
         let was = |path: &PathBuf| before.get(path).map(|(content, _)| content);
         if self.files.iter().any(|(path, (content, _))| was(path) != Some(content)) {
-            self.change_tracker.hint(ChangeHint::Touched, Instant::now());
+            self.change_debouncer.hint(ChangeHint::Touched, Instant::now());
         }
     }
 
@@ -263,10 +263,10 @@ impl<F: FnMut(WatchEvent)> WatchThread<F> {
             for FilePathAndContentId { path, content } in found {
                 self.files.insert(path, (content, now));
             }
-            let noticed = self.change_tracker.mark_reported(now);
+            let noticed = self.change_debouncer.mark_reported(now);
             (self.say)(WatchEvent::Changed(ContentChangeTime { noticed }));
         }
-        if self.change_tracker.take_reported_change_settled(now) {
+        if self.change_debouncer.take_reported_change_settled(now) {
             (self.say)(WatchEvent::Settled);
         }
     }
@@ -275,17 +275,17 @@ impl<F: FnMut(WatchEvent)> WatchThread<F> {
     fn postpone_report(&mut self, found: &[FilePathAndContentId], now: Instant) -> bool {
         let before = std::mem::take(&mut self.pending);
         if found.is_empty() {
-            self.change_tracker.discard_hints();
+            self.change_debouncer.discard_hints();
             return true;
         }
-        let is_early = if self.change_tracker.has_hints() {
+        let is_early = if self.change_debouncer.has_hints() {
             let moves = !before.is_empty() && before != found;
-            self.change_tracker.should_delay_report(has_missing_or_empty_file(found), moves, now)
+            self.change_debouncer.should_delay_report(has_missing_or_empty_file(found), moves, now)
         } else {
             // A notification was missed or is unavailable. The file may be incomplete, so wait for the next
             // check.
             self.folders.renew_all();
-            self.change_tracker.hint(ChangeHint::Touched, now);
+            self.change_debouncer.hint(ChangeHint::Touched, now);
             true
         };
         if is_early {

@@ -5,12 +5,12 @@ use super::super::keys::key::TableSyntax;
 use super::super::nearest::nearest_name;
 use super::super::sanitize::escape_and_truncate;
 use super::super::source::SceneText;
-use super::super::toml::{Document, KeyError, KeyErrorKind, TableLayout, apply_assignment};
+use super::super::toml::{Document, KeyError, KeyErrorKind, KnownTableKinds, apply_assignment};
 use super::context::{FileContext, Issue};
 
 /// The scene keys that are groups of named tables or lists of tables.
-const LAYOUT: TableLayout =
-    TableLayout { is_group: |name| has_form(name, TableSyntax::Named), is_list: is_list_of_tables };
+const LAYOUT: KnownTableKinds =
+    KnownTableKinds { is_group: |name| has_form(name, TableSyntax::Named), is_list: is_list_of_tables };
 
 fn is_list_of_tables(path: &[&str]) -> bool {
     match path {

@@ -86,7 +86,7 @@ impl Geometry {
     }
 
     /// One translation per object, or empty if no objects are moved; see [`super::coplanar_lights`].
-    pub fn coplanar_light_offsets(&self) -> &[DVec3] {
+    pub fn object_offsets_from_coplanar_lights(&self) -> &[DVec3] {
         &self.lifts
     }
 
@@ -417,7 +417,7 @@ fn lower_shape(
 mod tests {
     use super::*;
     use crate::geometry::ray::offset_origin;
-    use crate::math::random::signed_generator as random;
+    use crate::math::random::signed_number_generator as random;
     use crate::math::transform::Transform;
     use crate::world::merged::tests::mesh;
 

@@ -375,7 +375,7 @@ pub(super) mod tests {
     use crate::geometry::ray::offset_origin;
     use crate::lights::LightGeometry;
     use crate::math::DVec3;
-    use crate::math::random::signed_generator as random;
+    use crate::math::random::signed_number_generator as random;
     use crate::math::transform::Transform;
     use crate::scene::description::Accel;
     use crate::world::{Geometry, Hit, MeshTree};

@@ -336,7 +336,7 @@ mod tests {
     use crate::assets::LoadedMesh;
     use crate::control::CancelToken;
     use crate::geometry::mesh::TriangleMesh;
-    use crate::math::random::signed_generator as random;
+    use crate::math::random::signed_number_generator as random;
     use crate::scene::description::Accel;
 
     #[test]

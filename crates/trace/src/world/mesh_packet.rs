@@ -189,7 +189,7 @@ mod tests {
     use crate::geometry::mesh::TriangleMesh;
     use crate::geometry::{Ray, ShapeHit, SurfaceRequest};
     use crate::math::DVec3;
-    use crate::math::random::signed_generator as random;
+    use crate::math::random::signed_number_generator as random;
     use crate::math::transform::Transform;
     use crate::scene::description::Accel;
     use crate::world::MeshTree;

@@ -321,7 +321,7 @@ pub(super) mod tests {
     use crate::geometry::plane::Plane;
     use crate::geometry::sphere::Sphere;
     use crate::lights::LightGeometry;
-    use crate::math::random::signed_generator as random;
+    use crate::math::random::signed_number_generator as random;
     use crate::math::transform::Transform;
     use crate::math::{DVec3, Vec3};
     use crate::scene::description::Accel;

@@ -2,7 +2,7 @@
 
 use super::placement::MeshPlacement;
 use crate::geometry::RayF64;
-use crate::geometry::surface::f64_arithmetic_error_bound;
+use crate::geometry::surface::absolute_f64_error_bound;
 use crate::math::{DVec3, Vec3};
 
 /// A point on a triangle in a mesh instance.
@@ -74,7 +74,7 @@ impl<P: MeshPlacement> PlacedMesh<P> {
         let reach = self.placement.vector_abs_bound_to_world(local.abs());
         let parts = point.abs() + reach.as_vec3() + self.placement.mesh_origin().abs().as_vec3();
         let largest = self.placement.vector_abs_bound_to_world(a.abs().max(b.abs()).max(c.abs()));
-        let of_double = f64_arithmetic_error_bound(largest.max_element());
+        let of_double = absolute_f64_error_bound(largest.max_element());
         let error = parts * (2.0 * f32::EPSILON) + Vec3::splat(of_double + f32::MIN_POSITIVE);
         if self.has_rounded_corners {
             error + (largest + self.placement.mesh_origin().abs()).as_vec3() * f32::EPSILON
@@ -237,7 +237,7 @@ impl<P: MeshPlacement> PlacedMesh<P> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::random::signed_generator as random;
+    use crate::math::random::signed_number_generator as random;
     use crate::math::transform::Transform;
     use crate::world::placement::IdentityPlacement;
 

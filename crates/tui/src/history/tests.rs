@@ -172,7 +172,7 @@ fn entries_have_their_render_numbers() {
 
 fn edit(history: &mut RenderHistory) {
     history.record_scene_edit();
-    history.record_scene_read();
+    history.mark_scene_edits_read();
 }
 
 #[test]

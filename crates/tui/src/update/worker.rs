@@ -65,7 +65,7 @@ pub(super) fn handle_worker_event(state: &mut State, event: Event) -> Vec<Effect
             let pinhole = state.request.combined_overrides().dof == Some(true) && !settings.dof;
             state.request.effective = Some(*settings);
             clear_blocking_errors(state);
-            state.preview.history.record_scene_read();
+            state.preview.history.mark_scene_edits_read();
             if pinhole {
                 show_notice(state, messages::PINHOLE);
             }

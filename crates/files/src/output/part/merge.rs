@@ -173,7 +173,7 @@ fn sum_blocks(
     let mut sum = StoredTile::default();
     for (index, position) in order.values() {
         let (part, stored) = &tiles[*index];
-        let added = sum.add_block_from(stored, *position);
+        let added = sum.add_block_sum_from(stored, *position);
         added.map_err(|_| damaged(part, format!("a block of tile {tile} is missing")))?;
     }
     tiles.iter().for_each(|(_, stored)| sum.add_counts_from(stored));

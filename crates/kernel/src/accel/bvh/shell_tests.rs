@@ -2,7 +2,7 @@ use super::*;
 use crate::control::CancelToken;
 use crate::geometry::sphere::Sphere;
 use crate::math::Vec3;
-use crate::math::random::signed_generator as random;
+use crate::math::random::signed_number_generator as random;
 
 /// `count` nested spheres in shuffled order, surrounded by the same number of small spheres. The centers of
 /// the nested spheres are up to `spread` apart.

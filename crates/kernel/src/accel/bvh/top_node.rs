@@ -172,7 +172,7 @@ mod tests {
     use crate::geometry::Ray;
     use crate::geometry::aabb::SlabRay;
     use crate::geometry::packet::{RayPacket, nonnegative_end_mask, set_bit_lanes};
-    use crate::math::random::signed_generator as random;
+    use crate::math::random::signed_number_generator as random;
 
     /// Records which primitives are tested against which rays.
     struct TestLog(Vec<u32>);

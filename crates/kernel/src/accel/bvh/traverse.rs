@@ -178,7 +178,7 @@ mod tests {
     use super::*;
     use crate::control::CancelToken;
     use crate::math::Vec3;
-    use crate::math::random::signed_generator;
+    use crate::math::random::signed_number_generator;
 
     /// Finds the nearest hit by brute force, treating each box as a solid.
     fn closest_box_by_brute_force(boxes: &[Aabb], ray: &Ray) -> Option<(f32, u32)> {
@@ -192,7 +192,7 @@ mod tests {
 
     #[test]
     fn hits_match_brute_force() {
-        let mut next = signed_generator(1);
+        let mut next = signed_number_generator(1);
         // Integer positions produce coplanar faces and exact ties.
         let boxes: Vec<_> = (0..500)
             .map(|_| {

@@ -300,7 +300,7 @@ mod tests {
     use crate::accel::packet_ray_ends;
     use crate::accel::pathological::{closest_by_brute_force, difficult_meshes, difficult_rays, hit_bits};
     use crate::geometry::watertight::ShearedRay;
-    use crate::math::random::signed_generator as random;
+    use crate::math::random::signed_number_generator as random;
 
     fn built(mesh: &[[Vec3; 3]]) -> WideBvh {
         built_with(Quality::Medium, mesh)

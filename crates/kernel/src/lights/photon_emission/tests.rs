@@ -528,7 +528,7 @@ fn fully_aimed_photons_carry_the_target_power() {
 
 #[test]
 fn many_targets_are_merged() {
-    let mut next = random::signed_generator(10);
+    let mut next = random::signed_number_generator(10);
     let balls: Vec<BoundingSphere> = (0..500)
         .map(|_| BoundingSphere {
             center: DVec3::from_array([next(), next(), next()].map(|x| f64::from(x) * 3.0)),

@@ -427,7 +427,7 @@ fn packet_picks_match_single_picks() {
 
 /// A mesh of triangles with very different sizes, some near and some far.
 fn uneven_mesh(count: u32) -> MeshEmitter {
-    let mut next = random::signed_generator(8);
+    let mut next = random::signed_number_generator(8);
     let mut corner = |scale: f64| DVec3::new(f64::from(next()), f64::from(next()), f64::from(next())) * scale;
     let triangles = (0..count).map(|i| {
         let (place, size) = (corner(2.0), 0.02 * 1.5_f64.powi((i % 12) as i32));

@@ -191,7 +191,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
                 // Apply the MIS weight, unless the light has no extent and is found only by light samples.
                 if MIS && !is_single {
                     let leaves_gloss = self.tile.lobes_find_sky && light.is_environment();
-                    let of_light = if leaves_gloss && self.competing.uses_lobe_rays() {
+                    let of_light = if leaves_gloss && self.competing.uses_glossy_lobe_rays() {
                         // Use a light-sampling pdf close to 0 so that lobe rays account for all of the light.
                         [f32::MAX; PACKET_SIZE]
                     } else {

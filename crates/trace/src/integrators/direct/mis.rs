@@ -32,7 +32,7 @@ impl CompetingTechnique {
     }
 
     /// Whether the technique consists of rays in glossy lobes.
-    pub fn uses_lobe_rays(self) -> bool {
+    pub fn uses_glossy_lobe_rays(self) -> bool {
         match self {
             Self::Nothing | Self::Paths | Self::NarrowPaths => false,
             Self::Lobes(_) => true,

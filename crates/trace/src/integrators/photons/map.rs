@@ -453,7 +453,7 @@ fn bucket(x: i32, y: i32, z: i32, mask: u32) -> u32 {
 mod tests {
     use super::*;
     use crate::math::lanes::PortableSimd;
-    use crate::math::random::signed_generator as random;
+    use crate::math::random::signed_number_generator as random;
 
     fn photon(point: Vec3, normal: Vec3) -> Photon {
         Photon { point, direction: normal, flux: Vec3::ONE, normal, depth: 1 }

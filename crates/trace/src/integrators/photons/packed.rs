@@ -48,7 +48,7 @@ fn unpack_unnormalized_vector(packed: u32) -> [f32; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::random::signed_generator as random;
+    use crate::math::random::signed_number_generator as random;
 
     #[test]
     fn round_trip_error_is_below_7e_5() {

@@ -83,7 +83,7 @@ pub enum NullInteraction {
 
 /// The straight segment from a path's last vertex, across any null interactions.
 #[derive(Clone, Copy)]
-struct Segment {
+struct CrossedSegment {
     /// Position of the last vertex. Only valid if `count` > 0.
     origin: Vec3,
     /// Distance from the last vertex to the origin of the path's current ray.
@@ -92,7 +92,7 @@ struct Segment {
     count: u32,
 }
 
-impl Segment {
+impl CrossedSegment {
     /// The initial segment, before the path has crossed any surface.
     const DIRECT: Self = Self { origin: Vec3::ZERO, distance: 0.0, count: 0 };
 
@@ -140,7 +140,7 @@ pub fn walk_to_interaction<'a, W: PathStepper<'a>>(
     (hit, mut surface): (Hit, Option<SurfacePoint>),
 ) {
     let tile = stepper.tile();
-    let (mut way, mut hidden, mut next) = (Segment::DIRECT, 0, Some(hit));
+    let (mut way, mut hidden, mut next) = (CrossedSegment::DIRECT, 0, Some(hit));
     loop {
         let has_passed = hidden > 0;
         let Some(hit) = next else {
@@ -233,7 +233,7 @@ pub fn walk_to_interaction<'a, W: PathStepper<'a>>(
         (path.interiors, path.ray) = (far, Ray::new(sides.beyond, path.ray.direction));
         path.state = path.state.after_crossing_inside_glass();
         path.cone = path.cone.propagated_by(hit.shape.t);
-        (way, hidden) = (Segment::DIRECT, hidden + 1);
+        (way, hidden) = (CrossedSegment::DIRECT, hidden + 1);
         next = tile.world.geometry.closest_hit(&path.ray);
         stepper.record_surface_crossing(path, next);
     }
@@ -270,7 +270,7 @@ fn null_interaction_outcome<'a, W: PathStepper<'a>>(
     stepper: &mut W,
     path: &PathRay,
     vertex: &SurfaceVertex<'a>,
-    (way, hit): (Segment, Hit),
+    (way, hit): (CrossedSegment, Hit),
 ) -> NullInteraction {
     if !stochastic_opacity_test(stepper.tile(), path, vertex, stepper.texture_lookup_counter()) {
         return NullInteraction::Passed(Vec3::ONE);

@@ -38,7 +38,7 @@ impl<'a> NormalMasks<'a> {
         let is_smooth = !is_corner && topology.twin(usual) != NONE;
         let start = if is_smooth { usual } else { topology.fan_start(half) };
         let center = self.points[vertex as usize];
-        let arm = |half: u32| self.middle(half) - center;
+        let arm = |half: u32| self.edge_midpoint(half) - center;
         arms.clear();
         let last = topology.walk_fan(start, |half| arms.push(arm(half)));
         arms.extend(last.map(arm));
@@ -54,11 +54,11 @@ impl<'a> NormalMasks<'a> {
     pub(super) fn at_edge(&self, half: u32) -> Vec3 {
         let topology = self.topology;
         let edge = topology.edge(half);
-        let center = self.middle(half);
+        let center = self.edge_midpoint(half);
         if topology.twin(half) == NONE {
             let [start, end] =
                 [topology.start(half), topology.end(half)].map(|end| self.points[end as usize]);
-            let arms = [end, self.middle(next(half)), self.middle(previous(half)), start];
+            let arms = [end, self.edge_midpoint(next(half)), self.edge_midpoint(previous(half)), start];
             let arms = arms.map(|point| point - center);
             return unit_or_substitute(of_open_fan(&arms, false), &arms, true);
         }
@@ -68,7 +68,7 @@ impl<'a> NormalMasks<'a> {
     }
 
     /// Point at the middle of a half-edge's edge.
-    fn middle(&self, half: u32) -> DVec3 {
+    fn edge_midpoint(&self, half: u32) -> DVec3 {
         self.points[self.topology.vertices() + self.topology.edge(half) as usize]
     }
 

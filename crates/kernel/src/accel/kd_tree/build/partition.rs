@@ -73,7 +73,7 @@ impl PartitionBuffers {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::random::signed_generator as random;
+    use crate::math::random::signed_number_generator as random;
 
     #[test]
     fn partition_keeps_order_and_straddlers() {

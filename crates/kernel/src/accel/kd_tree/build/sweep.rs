@@ -88,7 +88,7 @@ fn add_axis_planes<const N: usize>(
 mod tests {
     use super::*;
     use crate::math::Vec3;
-    use crate::math::random::signed_generator as random;
+    use crate::math::random::signed_number_generator as random;
 
     /// Cost of a plane, computed directly from the definition. Infinite if the plane does not intersect the
     /// cell.

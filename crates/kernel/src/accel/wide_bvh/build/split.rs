@@ -334,7 +334,7 @@ fn partition_by_plane<const AXIS: usize>(
 mod tests {
     use super::*;
     use crate::math::Vec3;
-    use crate::math::random::signed_generator as random;
+    use crate::math::random::signed_number_generator as random;
 
     fn references(count: u32) -> Vec<TriangleReference> {
         let mut next = random(5);

@@ -210,7 +210,7 @@ fn avx512_reciprocals(row: &F32x16) -> F32x16 {
 mod tests {
     use super::*;
     use crate::math::lanes::{Simd, mask_from_bits};
-    use crate::math::random::signed_generator;
+    use crate::math::random::signed_number_generator;
 
     struct MovemaskKernel(u32);
 
@@ -245,7 +245,7 @@ mod tests {
 
     #[test]
     fn reductions_are_equal_on_all_instruction_sets() {
-        let mut next = signed_generator(21);
+        let mut next = signed_number_generator(21);
         let odd = [0.0, -0.0, f32::INFINITY, f32::NEG_INFINITY, f32::NAN, 1e-45, f32::MAX];
         for round in 0..20_000_u32 {
             let mut row: F32x16 = std::array::from_fn(|_| next());

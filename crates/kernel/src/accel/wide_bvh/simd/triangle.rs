@@ -111,7 +111,7 @@ fn max_abs_corner<V: SimdVector>(corners: &ShearedCorners<V>, axis: usize) -> V 
 mod tests {
     use super::*;
     use crate::accel::wide_bvh::simd::vector::SimdF32x4;
-    use crate::math::random::signed_generator as random;
+    use crate::math::random::signed_number_generator as random;
 
     /// Tests triangles slightly inside and slightly outside the filter's limits on thinness and on distance
     /// from the origin.

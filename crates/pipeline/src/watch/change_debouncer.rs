@@ -9,7 +9,7 @@ use super::{BETWEEN_CHANGES, WatchDelays};
 
 /// Tracks files that may be changing.
 #[derive(Debug)]
-pub(super) struct ChangeTracker {
+pub(super) struct ChangeDebouncer {
     delays: WatchDelays,
     pending: Option<PendingHints>,
     /// Files that were written to but have not been closed.
@@ -37,7 +37,7 @@ struct UnsettledChange {
     latest: Instant,
 }
 
-impl ChangeTracker {
+impl ChangeDebouncer {
     pub(super) fn new(delays: WatchDelays) -> Self {
         Self { delays, pending: None, open: HashSet::new(), unsettled: None, not_before: None }
     }
