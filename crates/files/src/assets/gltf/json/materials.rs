@@ -7,31 +7,31 @@ use serde::de::{self, Deserializer, IgnoredAny, Visitor};
 
 #[derive(Debug, Deserialize)]
 #[serde(rename_all = "camelCase")]
-pub(in crate::assets::gltf) struct TextureInfo {
-    pub(in crate::assets::gltf) index: usize,
+pub(crate) struct TextureInfo {
+    pub(crate) index: usize,
     #[serde(default)]
-    pub(in crate::assets::gltf) tex_coord: usize,
+    pub(crate) tex_coord: usize,
     /// Scale factor for a normal map's slopes.
     #[serde(default = "default_one")]
-    pub(in crate::assets::gltf) scale: f64,
+    pub(crate) scale: f64,
     #[serde(default)]
-    pub(in crate::assets::gltf) extensions: TextureInfoExtensions,
+    pub(crate) extensions: TextureInfoExtensions,
 }
 
 #[derive(Debug, Default, Deserialize)]
 #[serde(default)]
-pub(in crate::assets::gltf) struct TextureInfoExtensions {
+pub(crate) struct TextureInfoExtensions {
     #[serde(rename = "KHR_texture_transform")]
-    pub(in crate::assets::gltf) transform: Option<TextureTransform>,
+    pub(crate) transform: Option<TextureTransform>,
 }
 
 #[derive(Debug, Deserialize)]
 #[serde(rename_all = "camelCase", default)]
-pub(in crate::assets::gltf) struct TextureTransform {
-    pub(in crate::assets::gltf) offset: [f64; 2],
-    pub(in crate::assets::gltf) rotation: f64,
-    pub(in crate::assets::gltf) scale: [f64; 2],
-    pub(in crate::assets::gltf) tex_coord: Option<usize>,
+pub(crate) struct TextureTransform {
+    pub(crate) offset: [f64; 2],
+    pub(crate) rotation: f64,
+    pub(crate) scale: [f64; 2],
+    pub(crate) tex_coord: Option<usize>,
 }
 
 impl Default for TextureTransform {
@@ -46,17 +46,17 @@ fn default_one() -> f64 {
 
 #[derive(Debug, Deserialize)]
 #[serde(rename_all = "camelCase", default)]
-pub(in crate::assets::gltf) struct JsonMaterial {
-    pub(in crate::assets::gltf) name: String,
-    pub(in crate::assets::gltf) pbr_metallic_roughness: Pbr,
-    pub(in crate::assets::gltf) normal_texture: Option<TextureInfo>,
-    pub(in crate::assets::gltf) emissive_texture: Option<TextureInfo>,
-    pub(in crate::assets::gltf) emissive_factor: [f64; 3],
-    pub(in crate::assets::gltf) alpha_mode: String,
-    pub(in crate::assets::gltf) alpha_cutoff: f64,
-    pub(in crate::assets::gltf) double_sided: bool,
+pub(crate) struct JsonMaterial {
+    pub(crate) name: String,
+    pub(crate) pbr_metallic_roughness: Pbr,
+    pub(crate) normal_texture: Option<TextureInfo>,
+    pub(crate) emissive_texture: Option<TextureInfo>,
+    pub(crate) emissive_factor: [f64; 3],
+    pub(crate) alpha_mode: String,
+    pub(crate) alpha_cutoff: f64,
+    pub(crate) double_sided: bool,
     #[serde(deserialize_with = "deserialize_material_extensions")]
-    pub(in crate::assets::gltf) extensions: MaterialExtensions,
+    pub(crate) extensions: MaterialExtensions,
 }
 
 impl Default for JsonMaterial {
@@ -77,12 +77,12 @@ impl Default for JsonMaterial {
 
 #[derive(Debug, Deserialize)]
 #[serde(rename_all = "camelCase", default)]
-pub(in crate::assets::gltf) struct Pbr {
-    pub(in crate::assets::gltf) base_color_factor: [f64; 4],
-    pub(in crate::assets::gltf) base_color_texture: Option<TextureInfo>,
-    pub(in crate::assets::gltf) metallic_factor: f64,
-    pub(in crate::assets::gltf) roughness_factor: f64,
-    pub(in crate::assets::gltf) metallic_roughness_texture: Option<TextureInfo>,
+pub(crate) struct Pbr {
+    pub(crate) base_color_factor: [f64; 4],
+    pub(crate) base_color_texture: Option<TextureInfo>,
+    pub(crate) metallic_factor: f64,
+    pub(crate) roughness_factor: f64,
+    pub(crate) metallic_roughness_texture: Option<TextureInfo>,
 }
 
 impl Default for Pbr {
@@ -99,17 +99,17 @@ impl Default for Pbr {
 
 /// Supported material extensions, and the names of all others.
 #[derive(Debug, Default)]
-pub(in crate::assets::gltf) struct MaterialExtensions {
-    pub(in crate::assets::gltf) ior: Option<Ior>,
-    pub(in crate::assets::gltf) transmission: Option<Transmission>,
-    pub(in crate::assets::gltf) volume: Option<Volume>,
-    pub(in crate::assets::gltf) clearcoat: Option<Clearcoat>,
-    pub(in crate::assets::gltf) diffuse_transmission: Option<DiffuseTransmission>,
-    pub(in crate::assets::gltf) specular: Option<Specular>,
-    pub(in crate::assets::gltf) emissive_strength: Option<EmissiveStrength>,
-    pub(in crate::assets::gltf) glossiness: Option<Glossiness>,
-    pub(in crate::assets::gltf) unlit: bool,
-    pub(in crate::assets::gltf) others: Vec<String>,
+pub(crate) struct MaterialExtensions {
+    pub(crate) ior: Option<Ior>,
+    pub(crate) transmission: Option<Transmission>,
+    pub(crate) volume: Option<Volume>,
+    pub(crate) clearcoat: Option<Clearcoat>,
+    pub(crate) diffuse_transmission: Option<DiffuseTransmission>,
+    pub(crate) specular: Option<Specular>,
+    pub(crate) emissive_strength: Option<EmissiveStrength>,
+    pub(crate) glossiness: Option<Glossiness>,
+    pub(crate) unlit: bool,
+    pub(crate) others: Vec<String>,
 }
 
 fn deserialize_material_extensions<'de, D: Deserializer<'de>>(
@@ -154,9 +154,9 @@ fn deserialize_material_extensions<'de, D: Deserializer<'de>>(
 }
 
 #[derive(Debug, Deserialize)]
-pub(in crate::assets::gltf) struct Ior {
+pub(crate) struct Ior {
     #[serde(default = "default_ior")]
-    pub(in crate::assets::gltf) ior: f64,
+    pub(crate) ior: f64,
 }
 
 fn default_ior() -> f64 {
@@ -165,17 +165,17 @@ fn default_ior() -> f64 {
 
 #[derive(Debug, Default, Deserialize)]
 #[serde(rename_all = "camelCase", default)]
-pub(in crate::assets::gltf) struct Transmission {
-    pub(in crate::assets::gltf) transmission_factor: f64,
-    pub(in crate::assets::gltf) transmission_texture: Option<TextureInfo>,
+pub(crate) struct Transmission {
+    pub(crate) transmission_factor: f64,
+    pub(crate) transmission_texture: Option<TextureInfo>,
 }
 
 #[derive(Debug, Deserialize)]
 #[serde(rename_all = "camelCase", default)]
-pub(in crate::assets::gltf) struct Volume {
-    pub(in crate::assets::gltf) thickness_factor: f64,
-    pub(in crate::assets::gltf) attenuation_color: [f64; 3],
-    pub(in crate::assets::gltf) attenuation_distance: Option<f64>,
+pub(crate) struct Volume {
+    pub(crate) thickness_factor: f64,
+    pub(crate) attenuation_color: [f64; 3],
+    pub(crate) attenuation_distance: Option<f64>,
 }
 
 impl Default for Volume {
@@ -186,21 +186,21 @@ impl Default for Volume {
 
 #[derive(Debug, Default, Deserialize)]
 #[serde(rename_all = "camelCase", default)]
-pub(in crate::assets::gltf) struct Clearcoat {
-    pub(in crate::assets::gltf) clearcoat_factor: f64,
-    pub(in crate::assets::gltf) clearcoat_texture: Option<TextureInfo>,
-    pub(in crate::assets::gltf) clearcoat_roughness_factor: f64,
-    pub(in crate::assets::gltf) clearcoat_roughness_texture: Option<TextureInfo>,
-    pub(in crate::assets::gltf) clearcoat_normal_texture: Option<IgnoredAny>,
+pub(crate) struct Clearcoat {
+    pub(crate) clearcoat_factor: f64,
+    pub(crate) clearcoat_texture: Option<TextureInfo>,
+    pub(crate) clearcoat_roughness_factor: f64,
+    pub(crate) clearcoat_roughness_texture: Option<TextureInfo>,
+    pub(crate) clearcoat_normal_texture: Option<IgnoredAny>,
 }
 
 #[derive(Debug, Deserialize)]
 #[serde(rename_all = "camelCase", default)]
-pub(in crate::assets::gltf) struct DiffuseTransmission {
-    pub(in crate::assets::gltf) diffuse_transmission_factor: f64,
-    pub(in crate::assets::gltf) diffuse_transmission_texture: Option<TextureInfo>,
-    pub(in crate::assets::gltf) diffuse_transmission_color_factor: [f64; 3],
-    pub(in crate::assets::gltf) diffuse_transmission_color_texture: Option<TextureInfo>,
+pub(crate) struct DiffuseTransmission {
+    pub(crate) diffuse_transmission_factor: f64,
+    pub(crate) diffuse_transmission_texture: Option<TextureInfo>,
+    pub(crate) diffuse_transmission_color_factor: [f64; 3],
+    pub(crate) diffuse_transmission_color_texture: Option<TextureInfo>,
 }
 
 impl Default for DiffuseTransmission {
@@ -217,11 +217,11 @@ impl Default for DiffuseTransmission {
 
 #[derive(Debug, Deserialize)]
 #[serde(rename_all = "camelCase", default)]
-pub(in crate::assets::gltf) struct Specular {
-    pub(in crate::assets::gltf) specular_factor: f64,
-    pub(in crate::assets::gltf) specular_texture: Option<TextureInfo>,
-    pub(in crate::assets::gltf) specular_color_factor: [f64; 3],
-    pub(in crate::assets::gltf) specular_color_texture: Option<TextureInfo>,
+pub(crate) struct Specular {
+    pub(crate) specular_factor: f64,
+    pub(crate) specular_texture: Option<TextureInfo>,
+    pub(crate) specular_color_factor: [f64; 3],
+    pub(crate) specular_color_texture: Option<TextureInfo>,
 }
 
 impl Default for Specular {
@@ -238,17 +238,17 @@ impl Default for Specular {
 
 #[derive(Debug, Deserialize)]
 #[serde(rename_all = "camelCase")]
-pub(in crate::assets::gltf) struct EmissiveStrength {
+pub(crate) struct EmissiveStrength {
     #[serde(default = "default_one")]
-    pub(in crate::assets::gltf) emissive_strength: f64,
+    pub(crate) emissive_strength: f64,
 }
 
 #[derive(Debug, Deserialize)]
 #[serde(rename_all = "camelCase", default)]
-pub(in crate::assets::gltf) struct Glossiness {
-    pub(in crate::assets::gltf) diffuse_factor: [f64; 4],
-    pub(in crate::assets::gltf) diffuse_texture: Option<TextureInfo>,
-    pub(in crate::assets::gltf) glossiness_factor: f64,
+pub(crate) struct Glossiness {
+    pub(crate) diffuse_factor: [f64; 4],
+    pub(crate) diffuse_texture: Option<TextureInfo>,
+    pub(crate) glossiness_factor: f64,
 }
 
 impl Default for Glossiness {

@@ -9,7 +9,7 @@ use serde::de::{Deserialize, Deserializer, Error, Visitor};
 
 /// URI of a buffer or image.
 #[derive(Debug)]
-pub(in crate::assets::gltf) enum Uri {
+pub(crate) enum Uri {
     /// Decoded bytes of a data URI.
     Data(Vec<u8>),
     /// URI of a file, as written in the JSON.
@@ -54,6 +54,6 @@ fn decode_base64(coded: &str) -> Result<Vec<u8>, String> {
     })
 }
 
-pub(in crate::assets::gltf) fn invalid_base64_message(byte: u8, at: usize) -> String {
+pub(crate) fn invalid_base64_message(byte: u8, at: usize) -> String {
     format!("invalid base64 byte {byte:#04x} at {at}")
 }
