@@ -28,7 +28,7 @@ choice! {
 }
 
 impl MicrofacetDistribution {
-    /// Returns Beckmann if `is_beckmann` is true, and GGX otherwise.
+    /// Returns Beckmann if `is_beckmann` is true, or GGX if it is false.
     pub const fn ggx_or_beckmann(is_beckmann: bool) -> Self {
         if is_beckmann { Self::Beckmann } else { Self::Ggx }
     }

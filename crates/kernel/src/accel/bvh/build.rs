@@ -46,7 +46,7 @@ struct SubtreeSummary {
     bounds: Aabb,
     /// Number of node levels.
     depth: usize,
-    /// Whether so many boxes contain other boxes that splitting them by position is inefficient.
+    /// Whether any large node was split by the size of its boxes, because large boxes contain small ones.
     is_nested: bool,
 }
 

@@ -39,7 +39,7 @@ pub struct Bvh {
     depth: usize,
     /// The upper levels of the tree, flattened for packet traversal.
     top: WideTopNode,
-    /// Whether many boxes contain other boxes.
+    /// Whether any large node was split by the size of its boxes, because large boxes contain small ones.
     is_nested: bool,
     /// The shells of each node's children. `None` if few boxes are nested.
     shells: Option<Box<[[SphericalShell; 2]]>>,

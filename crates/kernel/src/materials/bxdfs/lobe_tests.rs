@@ -148,7 +148,7 @@ impl<B: Bxdf> TestSurface<B> {
         all
     }
 
-    /// Compares the values of a single lane with those of its packet, f and its part from the wide lobes.
+    /// Compares f, and the contribution of the wide lobes to it, between a single lane and its packet.
     fn check_single_lane(&self, i: usize, direction: DVec3, f: DVec3, wide: DVec3) {
         let [alone, of_wide_lobes, of_all_lobes] = self.row.lane_f_by_lobe_set(i, direction.as_vec3());
         assert_eq!(alone, of_all_lobes);

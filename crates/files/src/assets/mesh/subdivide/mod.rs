@@ -197,7 +197,7 @@ enum Place {
     Edge(u32),
 }
 
-/// Drops triangles whose corners coincide after rounding or lie on a line. Returns their number.
+/// Drops triangles that have no area after rounding. Returns how many were dropped.
 fn drop_triangles_without_area(mesh: &mut TriangleMesh) -> u64 {
     let corners = |triangle: &[u32; 3]| triangle.map(|vertex| mesh.positions[vertex as usize]);
     let is_kept = |triangle: &[u32; 3]| has_area(corners(triangle));

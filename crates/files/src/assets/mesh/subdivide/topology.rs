@@ -239,8 +239,7 @@ impl Topology {
         self.corners.get(vertex as usize).copied().unwrap_or(false)
     }
 
-    /// Whether a vertex on a boundary or crease has a fan with so many faces that the edges in it need special
-    /// masks.
+    /// Whether a vertex on a boundary or crease has a large fan of faces, whose inner edges need special masks.
     pub(super) fn is_wide(&self, vertex: u32) -> bool {
         self.wide.get(vertex as usize).copied().unwrap_or(false)
     }

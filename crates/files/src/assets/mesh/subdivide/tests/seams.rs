@@ -45,7 +45,7 @@ fn seams_change_only_the_coordinates() {
     let split = split_grid(flat);
     let fine = subdivided(&split, 3);
     let whole = subdivided(&grid(4, 3, flat), 3);
-    // Positions and normals of each triangle are those of the mesh without a seam, bit for bit.
+    // Positions and normals of each triangle are bit-identical to the mesh without a seam.
     for (split, whole_corners) in fine.triangles.iter().zip(&whole.triangles) {
         for (a, b) in split.iter().zip(whole_corners) {
             let (a, b) = (*a as usize, *b as usize);
