@@ -23,7 +23,7 @@ STAGES = [
     ("lights: picks", ["pick_flat", "pick_by_cuts", "picks", "single_node_importance", "move_to", "samples_at"]),
     ("lights: samples", ["sample_packet", "sample_per_lane", "light_pdf", "inverse_pdf"]),
     ("shadow rays", ["occluded", "any_packet", "any_rows", "any_avx", "any_in_small", "single::any", "packet::any", "pool", "is_hit", "doubtful_hit", "add_unoccluded"]),
-    ("closest hits", ["facets", "closest", "single::nearest", "packet::nearest", "intersect_near_origin", "edge_functions_f64", "alone", "update_nearest", "packet::Closest", "merged::rays"]),
+    ("closest hits", ["facets", "closest", "single::nearest", "packet::nearest", "intersect_near_origin", "corners_and_edge_functions_f64", "alone", "update_nearest", "packet::Closest", "merged::rays"]),
     ("surfaces", ["fill_surfaces", "fill_other_surfaces", "surface", "facet", "set_positions", "set_smooth_normals", "PacketIntersection"]),
     ("textures", ["lookup", "texture"]),
     ("direct light", ["sample_all", "sample_pick", "SampleAllLights", "SampleLightTree", "contributions", "response"]),

@@ -24,7 +24,7 @@ use std::time::{Duration, Instant};
 use glimt::film::Srgb8Image;
 use glimt::pipeline::protocol::MaxPreviewSize;
 use glimt::tui::ColorDepth;
-use glimt::tui::paint::{Fidelity, PacingAdvice, PacingInputs, Painter, pace_preview};
+use glimt::tui::paint::{PacingAdvice, PacingInputs, Painter, PreviewFidelity, pace_preview};
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use ratatui::style::Color;
@@ -156,7 +156,7 @@ impl Window {
         let cells = changed(None, &last.picture);
         let changed = changed(self.last.as_ref(), &last.picture);
         let begin = Instant::now();
-        let first_bytes = self.aim(&first.picture, Fidelity::First);
+        let first_bytes = self.aim(&first.picture, PreviewFidelity::First);
         let milliseconds = begin.elapsed().as_secs_f64() * 1e3;
         let (mut bytes, mut pictures) = (first_bytes, 1);
         let (mut aimed, mut at) = (first.samples, first.seconds);
@@ -209,14 +209,14 @@ impl Window {
                 *pixel = [pixel[2], 255 - pixel[1], pixel[0]];
             }
         }
-        let rectangle = (self.aim(&other, Fidelity::Still), self.plain.draw(&self.cells(&other).0));
+        let rectangle = (self.aim(&other, PreviewFidelity::Still), self.plain.draw(&self.cells(&other).0));
         let mut noisy = other.clone();
         for (i, channel) in noisy.pixels.as_flattened_mut().iter_mut().enumerate() {
             let step = ((i as u32).wrapping_mul(2_654_435_761) >> 16) % 5;
             *channel = (*channel).saturating_add(step as u8).saturating_sub(2);
         }
-        let noise = (self.aim(&noisy, Fidelity::Moving), self.plain.draw(&self.cells(&noisy).0));
-        let idle = (self.aim(&noisy, Fidelity::Moving), self.plain.draw(&self.cells(&noisy).0));
+        let noise = (self.aim(&noisy, PreviewFidelity::Moving), self.plain.draw(&self.cells(&noisy).0));
+        let idle = (self.aim(&noisy, PreviewFidelity::Moving), self.plain.draw(&self.cells(&noisy).0));
         println!(
             "{:<18} 5 % in a rectangle {} B ({}), noise of ±2 {} B ({}), idle {} B ({})",
             "  then", rectangle.0, rectangle.1, noise.0, noise.1, idle.0, idle.1
@@ -227,7 +227,7 @@ impl Window {
     fn exact(&self, picture: &Srgb8Image) -> usize {
         let mut painter = Painter::new(ColorDepth::TrueColor);
         let (buffer, place) = self.cells(picture);
-        painter.set_target(&buffer, place, Fidelity::Still);
+        painter.set_target(&buffer, place, PreviewFidelity::Still);
         drain(&mut painter)
     }
 
@@ -238,7 +238,7 @@ impl Window {
         Ok((PlainRatatui::new(self.area).draw(&self.cells(picture).0), chafa(picture)?))
     }
 
-    fn aim(&mut self, picture: &Srgb8Image, fidelity: Fidelity) -> usize {
+    fn aim(&mut self, picture: &Srgb8Image, fidelity: PreviewFidelity) -> usize {
         let (buffer, place) = self.cells(picture);
         self.painter.set_target(&buffer, place, fidelity);
         drain(&mut self.painter)

@@ -9,7 +9,7 @@ use glimt::pipeline::Handle;
 use glimt::pipeline::protocol::{Command, Event, MaxPreviewSize, Request};
 use glimt::pipeline::settings::Overrides;
 use glimt::tui::ColorDepth;
-use glimt::tui::paint::{Fidelity, Painter};
+use glimt::tui::paint::{Painter, PreviewFidelity};
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use ratatui::style::Color;
@@ -66,14 +66,14 @@ impl PreviewRenderer {
     }
 
     /// All previews of a render.
-    fn pictures(&mut self, scene: &str) -> Vec<(Srgb8Image, Fidelity)> {
+    fn pictures(&mut self, scene: &str) -> Vec<(Srgb8Image, PreviewFidelity)> {
         let steps = [
-            (None, Fidelity::First),
-            (Some(1), Fidelity::Moving),
-            (Some(2), Fidelity::Moving),
-            (Some(4), Fidelity::Moving),
-            (Some(16), Fidelity::Moving),
-            (Some(32), Fidelity::Still),
+            (None, PreviewFidelity::First),
+            (Some(1), PreviewFidelity::Moving),
+            (Some(2), PreviewFidelity::Moving),
+            (Some(4), PreviewFidelity::Moving),
+            (Some(16), PreviewFidelity::Moving),
+            (Some(32), PreviewFidelity::Still),
         ];
         steps.map(|(samples, fidelity)| (self.preview(scene, samples), fidelity)).into()
     }
@@ -94,7 +94,7 @@ impl PaintedScreen {
     }
 
     /// Shows an image. Returns the number of bytes sent.
-    fn show(&mut self, picture: &Srgb8Image, fidelity: Fidelity) -> usize {
+    fn show(&mut self, picture: &Srgb8Image, fidelity: PreviewFidelity) -> usize {
         let mut buffer = Buffer::empty(self.window);
         let place = Rect::new(2, 1, picture.width as u16, picture.height.div_ceil(2) as u16);
         for y in 0..place.height {
@@ -168,13 +168,13 @@ fn count_changed_cells(a: &Srgb8Image, b: &Srgb8Image) -> usize {
 
 /// Shows all previews of a render. Returns the number of bytes for the first preview and for all
 /// previews.
-fn show_all(screen: &mut PaintedScreen, pictures: &[(Srgb8Image, Fidelity)]) -> (usize, usize) {
+fn show_all(screen: &mut PaintedScreen, pictures: &[(Srgb8Image, PreviewFidelity)]) -> (usize, usize) {
     let sent: Vec<usize> =
         pictures.iter().map(|(picture, fidelity)| screen.show(picture, *fidelity)).collect();
     let (last, _) = pictures.last().expect("pictures");
     let off = screen.difference(last);
     assert!(off <= 1, "the screen differs from the last image by {off}");
-    assert_eq!(screen.show(last, Fidelity::Still), 0, "an unchanged image must send nothing");
+    assert_eq!(screen.show(last, PreviewFidelity::Still), 0, "an unchanged image must send nothing");
     (sent[0], sent.iter().sum())
 }
 

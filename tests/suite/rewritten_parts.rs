@@ -16,9 +16,9 @@ use crate::test_dir::{TestDir, assert_mentions};
 /// Rewrites a part or checkpoint with a changed header or render state.
 fn rewrite(path: &Path, change: impl FnOnce(&mut PartHeader, &mut Value)) {
     let token = CancelToken::new();
-    let file = PartFile::open(path, &token).expect("a part or checkpoint");
+    let file = PartFile::open_and_validate(path, &token).expect("a part or checkpoint");
     let film = file.head.picture.create_film().expect("memory");
-    file.restore(&film).expect("valid tiles");
+    file.restore_into_film(&film).expect("valid tiles");
     let (mut head, mut state) = (file.head, file.state);
     change(&mut head, &mut state);
     let guard = ExistingFilePolicy {

@@ -54,7 +54,7 @@ impl Console {
     }
 
     /// Prints lines to stderr.
-    pub(super) fn print_message_lines(&self, text: &str) {
+    pub(super) fn print_lines_to_stderr(&self, text: &str) {
         text.trim_end().lines().for_each(|line| self.print_line_to_stderr(line));
     }
 

@@ -115,7 +115,7 @@ Run `glimt -h` for all commands and options.";
 
 /// Handles an invocation without arguments.
 fn print_getting_started() -> Exit {
-    Console::new(crate::tui::ColorDepthChoice::Auto).print_message_lines(GETTING_STARTED);
+    Console::new(crate::tui::ColorDepthChoice::Auto).print_lines_to_stderr(GETTING_STARTED);
     Exit::WRONG
 }
 
@@ -143,7 +143,7 @@ fn report_parse_error(error: &clap::Error, arguments: &[OsString]) -> Exit {
         Err(error) if error.use_stderr() => {
             let _ = error.print();
         }
-        _ => console.print_message_lines(&error.render().to_string()),
+        _ => console.print_lines_to_stderr(&error.render().to_string()),
     }
     Exit::WRONG
 }

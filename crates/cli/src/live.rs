@@ -18,8 +18,8 @@ use crate::pipeline::watch::{
 use crate::pipeline::{foreign_file_error, start};
 use crate::scene::diagnostic::Diagnostic;
 use crate::scene::sanitize::escape_invisible_chars;
-use crate::scene::{SAME_TEXT, is_file_not_found, read_current_text};
-use crate::system::threads::describe_start_failure;
+use crate::scene::{SAME_TEXT, is_file_not_found_diagnostic, read_scene_file_text};
+use crate::system::threads::describe_thread_start_failure;
 use crate::tui::messages::{OLDER_THAN_EDIT, WAITING_FOR_FILE};
 use crate::tui::{self, EventQueue, EventSender, ExitStatus, Options, TuiError, TuiOutcome};
 
@@ -45,7 +45,7 @@ pub(super) fn run(request: RenderRequest, console: &Console) -> Exit {
 }
 
 fn run_terminal_ui(request: RenderRequest, console: &Console) -> Result<Exit, (Exit, String)> {
-    let no_thread = |error: std::io::Error| (Exit::FAILED, describe_start_failure(1, false, &error));
+    let no_thread = |error: std::io::Error| (Exit::FAILED, describe_thread_start_failure(1, false, &error));
     let (contents, events) = (Arc::<FileHashCache>::default(), EventQueue::default());
     let changes = events.watcher_sender();
     let watcher = Watcher::start(request.poll, Arc::clone(&contents), move |change| changes.send(change))
@@ -160,8 +160,8 @@ fn scene_not_found_error(scene: &Path) -> Option<Diagnostic> {
         return None;
     }
     let problem =
-        foreign_file_error(scene).or_else(|| read_current_text(scene).err().map(|problem| *problem));
-    problem.filter(is_file_not_found)
+        foreign_file_error(scene).or_else(|| read_scene_file_text(scene).err().map(|problem| *problem));
+    problem.filter(is_file_not_found_diagnostic)
 }
 
 /// A log of written images, shared between threads.
@@ -322,15 +322,15 @@ impl WorkerListener {
             self.watcher.set_files(read.to_vec(), before.to_vec(), *since);
         }
         if let Event::Failed { failure: Failure::Scene(all), .. } = &mut event {
-            all.iter_mut().for_each(add_waiting_help);
+            all.iter_mut().for_each(add_waiting_for_scene_help);
         }
         self.ui.send(event);
     }
 }
 
 /// Changes the help text for a missing scene to say that the UI waits for the scene to appear.
-fn add_waiting_help(problem: &mut Diagnostic) {
-    if is_file_not_found(problem) {
+fn add_waiting_for_scene_help(problem: &mut Diagnostic) {
+    if is_file_not_found_diagnostic(problem) {
         // Keep a suggestion for a typo or a renamed scene.
         let is_file = |help: &String| help.starts_with("did you mean") || help.contains(SAME_TEXT);
         let file = problem.help.take().filter(is_file);
@@ -480,14 +480,14 @@ mod tests {
                 .expect_err("the scene is missing")
                 .try_into()
                 .expect("one problem");
-            add_waiting_help(&mut problem);
+            add_waiting_for_scene_help(&mut problem);
             problem.help.expect("a help text")
         };
         assert_eq!(said("room.toml"), WAITING_FOR_FILE);
         let mut renamed =
-            *crate::scene::read_current_text(Path::new("none.toml")).expect_err("the scene is missing");
+            *crate::scene::read_scene_file_text(Path::new("none.toml")).expect_err("the scene is missing");
         renamed.help = Some(format!("third.toml {SAME_TEXT}"));
-        add_waiting_help(&mut renamed);
+        add_waiting_for_scene_help(&mut renamed);
         assert!(renamed.help.is_some_and(|help| help.contains("third.toml")));
         let name = "gone/room.toml";
         assert!(said(name).contains("/gone ") && said(name).starts_with("waiting"), "{}", said(name));

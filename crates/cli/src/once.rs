@@ -20,7 +20,7 @@ use crate::progress::{self, Reporter};
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::signals;
 use crate::system::priority;
-use crate::system::threads::describe_start_failure;
+use crate::system::threads::describe_thread_start_failure;
 
 /// Time limit for exiting after a signal.
 const EXIT_TIMEOUT: Duration = Duration::from_secs(2);
@@ -35,7 +35,9 @@ pub(super) fn run(render_request: &RenderRequest, console: &Console) -> Exit {
     priority::lower_priority_including_spawned_threads(render_request.nice);
     let (worker, events) = match start_with_channel(0) {
         Ok(started) => started,
-        Err(error) => return console.print_error(Exit::FAILED, &describe_start_failure(1, false, &error)),
+        Err(error) => {
+            return console.print_error(Exit::FAILED, &describe_thread_start_failure(1, false, &error));
+        }
     };
     let remote = worker.command_sender();
     let was_signaled = AtomicBool::new(false);

@@ -10,7 +10,7 @@ use crate::console::Console;
 use crate::control::CancelToken;
 use crate::exit::Exit;
 use crate::system::describe_error;
-use crate::system::threads::{describe_start_failure, spawn};
+use crate::system::threads::{describe_thread_start_failure, spawn};
 
 /// The first signal received, or 0.
 #[derive(Clone, Debug, Default)]
@@ -32,7 +32,10 @@ pub(super) fn signal_name(number: i32) -> Option<&'static str> {
 }
 
 /// Runs a command whose token a signal cancels. The command must not write anything once it is canceled.
-pub(super) fn run_until_signal(console: &Console, command: impl FnOnce(&CancelToken) -> Exit) -> Exit {
+pub(super) fn run_cancelable_by_signals(
+    console: &Console,
+    command: impl FnOnce(&CancelToken) -> Exit,
+) -> Exit {
     let token = CancelToken::new();
     let cancel = token.clone();
     let ended = match install_signal_handlers(move || cancel.cancel()) {
@@ -67,6 +70,6 @@ pub(super) fn install_signal_handlers(
             on_signal();
         }
     };
-    spawn("glimt-signals", listen).map_err(|error| describe_start_failure(1, false, &error))?;
+    spawn("glimt-signals", listen).map_err(|error| describe_thread_start_failure(1, false, &error))?;
     Ok(received)
 }

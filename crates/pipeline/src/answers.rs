@@ -8,7 +8,7 @@ use crate::scene::description::ResolvedCamera;
 
 /// Position in an image, as fractions of its width and height.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ImagePosition {
+pub struct NormalizedPosition {
     /// Distance from the left edge.
     pub x: f64,
     /// Distance from the top edge.
@@ -30,7 +30,7 @@ pub struct NormalizedRect {
 
 impl NormalizedRect {
     /// Returns the smallest rectangle that contains both positions.
-    pub fn between(a: ImagePosition, b: ImagePosition) -> Self {
+    pub fn between(a: NormalizedPosition, b: NormalizedPosition) -> Self {
         let (left, top) = (a.x.min(b.x), a.y.min(b.y));
         Self { left, top, width: (a.x - b.x).abs(), height: (a.y - b.y).abs() }
     }
@@ -47,7 +47,7 @@ impl NormalizedRect {
     }
 
     /// Returns the pixels that overlap the rectangle in an image with `columns` × `rows` pixels.
-    pub(super) fn pixels(self, columns: u32, rows: u32) -> Rect {
+    pub(super) fn to_pixel_rect(self, columns: u32, rows: u32) -> Rect {
         let along = |start: f64, length: f64, side: u32| {
             let at = |share: f64| share.clamp(0.0, 1.0) * f64::from(side);
             let first = (at(start) as u32).min(side.saturating_sub(1));
@@ -59,8 +59,8 @@ impl NormalizedRect {
     }
 
     /// Maps a position relative to this rectangle to a position in the image.
-    pub fn section_to_image(self, position: ImagePosition) -> ImagePosition {
-        ImagePosition { x: self.left + position.x * self.width, y: self.top + position.y * self.height }
+    pub fn to_image_position(self, position: NormalizedPosition) -> NormalizedPosition {
+        NormalizedPosition { x: self.left + position.x * self.width, y: self.top + position.y * self.height }
     }
 }
 
@@ -167,13 +167,17 @@ mod tests {
                 width: width - 2e-9,
                 height: height - 2e-9,
             };
-            assert_eq!(inside.pixels(columns, rows), rect);
+            assert_eq!(inside.to_pixel_rect(columns, rows), rect);
         }
-        let one =
-            NormalizedRect::between(ImagePosition { x: 0.99, y: 0.5 }, ImagePosition { x: 0.99, y: 0.5 });
-        assert_eq!(one.pixels(columns, rows), Rect { x: 39, y: 15, width: 1, height: 1 });
-        let wide =
-            NormalizedRect::between(ImagePosition { x: 1.5, y: -0.2 }, ImagePosition { x: 0.5, y: 2.0 });
-        assert_eq!(wide.pixels(columns, rows), Rect { x: 20, y: 0, width: 20, height: 30 });
+        let one = NormalizedRect::between(
+            NormalizedPosition { x: 0.99, y: 0.5 },
+            NormalizedPosition { x: 0.99, y: 0.5 },
+        );
+        assert_eq!(one.to_pixel_rect(columns, rows), Rect { x: 39, y: 15, width: 1, height: 1 });
+        let wide = NormalizedRect::between(
+            NormalizedPosition { x: 1.5, y: -0.2 },
+            NormalizedPosition { x: 0.5, y: 2.0 },
+        );
+        assert_eq!(wide.to_pixel_rect(columns, rows), Rect { x: 20, y: 0, width: 20, height: 30 });
     }
 }

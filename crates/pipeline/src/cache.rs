@@ -65,7 +65,7 @@ impl<N, T> Default for CacheOfNamedValues<N, T> {
 }
 
 /// A cache that evicts the values that recent requests did not use.
-pub(super) trait RequestCache {
+pub(super) trait EvictableCache {
     /// Ends a request. If it failed, the values used by the last successful request stay protected, so that
     /// fixing a typo does not reload anything.
     fn record_request_usage(&mut self, success: bool, request: u64);
@@ -94,7 +94,7 @@ impl<N: Hash + Eq, T> CacheOfNamedValues<N, T> {
     }
 }
 
-impl<N: Hash + Eq, T> RequestCache for CacheOfNamedValues<N, T> {
+impl<N: Hash + Eq, T> EvictableCache for CacheOfNamedValues<N, T> {
     fn record_request_usage(&mut self, success: bool, request: u64) {
         for entry in self.entries.values_mut() {
             entry.request = if entry.used { request } else { entry.request };

@@ -117,8 +117,8 @@ impl IncrementalSceneChecker {
         let (scenes, mut table) = (&mut self.scenes, StageTable::new(None, token));
         reader.read_consistently(&mut table, findings, |reading| {
             let scene = SceneParseRequest { path, sets, show: ModelViewOptions::default() };
-            let parsed = scenes.parse(scene, reading)?;
-            let assets = scenes.load(&parsed, TextureSelection::ForCheck, reading)?;
+            let parsed = scenes.parse_scene(scene, reading)?;
+            let assets = scenes.load_assets(&parsed, TextureSelection::ForCheck, reading)?;
             reading.verify_files_unchanged()?;
             check_settings(path, &assets, reading.findings)?;
             Ok(assets)
@@ -157,7 +157,7 @@ fn summarize(assets: &SceneAssets, mut warnings: Vec<Diagnostic>) -> SceneSummar
     if count == 0 && has_own && scene.render.ambient == Vec3::ZERO {
         let (severity, message) = (Severity::Warning, "nothing lights this scene".to_owned());
         let help = "the mesh's own materials emit no light; add a [[light]] or an [environment]".to_owned();
-        warnings.push(parsed.loaded.diagnostic_at(0..0, severity, message, Some(help)));
+        warnings.push(parsed.loaded.create_diagnostic_at(0..0, severity, message, Some(help)));
     }
     let patterns = scene.textures.iter().filter(|texture| texture.as_image().is_none());
     SceneSummary {

@@ -85,7 +85,7 @@ impl ImageDependencies<'_> {
         }
         if let Some(samples) = self.divided {
             add("samples", samples.to_string());
-            let tone = self.plan.tone();
+            let tone = self.plan.tone_mapping();
             add("exposure", tone.exposure_stops.to_string());
             add("tonemap", tone.curve.name().to_owned());
             add("bits per channel", self.plan.bit_depth.to_string());
@@ -102,7 +102,7 @@ impl ImageDependencies<'_> {
             .iter()
             .map(|file| mesh_file_key(&self.describe_file_content(&file.value), file))
             .collect();
-        let of = keys::scene_references_for_fingerprint(&scene, &meshes, orbiter.as_deref());
+        let of = keys::scene_fingerprint_context(&scene, &meshes, orbiter.as_deref());
         let world = keys::world_key(&keys::surfaces_and_lights_key(&scene, &of, &[]), &eye.camera, &of);
         keys::film_sums_key(world, &self.plan.settings, self.plan.crop)
     }

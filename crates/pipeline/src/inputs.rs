@@ -10,7 +10,7 @@ use super::prepare::SceneAssets;
 use super::stages::meshes::MeshesByFileIndex;
 use super::stages::parse::ParsedScene;
 use super::watch::content::FilePathAndContentId;
-use crate::assets::gltf::is_gltf;
+use crate::assets::gltf::has_gltf_extension;
 use crate::output::{FallbackFileIdentity, FileIdentity};
 use crate::scene::LoadedScene;
 use crate::scene::description::Camera;
@@ -70,7 +70,7 @@ impl ProtectedInputs {
     pub(super) fn from_assets(assets: &SceneAssets) -> Self {
         let mut inputs = Self::from_scene(&assets.parsed);
         inputs.add_mesh_dependencies(&assets.parsed.loaded, &assets.meshes);
-        inputs.add_read(&assets.files);
+        inputs.add_other_read_files(&assets.files);
         inputs
     }
 
@@ -82,7 +82,7 @@ impl ProtectedInputs {
                 let place = Some((Arc::clone(loaded), file.span.clone()));
                 self.0.push(ProtectedInput { path: path.clone(), role, place });
             };
-            let kind = if is_gltf(&file.value) { "buffer" } else { "material file" };
+            let kind = if has_gltf_extension(&file.value) { "buffer" } else { "material file" };
             for companion in &kept.mesh.companions {
                 add(&companion.path, format!("a {kind} used by {name}"));
             }
@@ -93,7 +93,7 @@ impl ProtectedInputs {
     }
 
     /// Adds all other files that were read.
-    pub(super) fn add_read(&mut self, files: &[FilePathAndContentId]) {
+    pub(super) fn add_other_read_files(&mut self, files: &[FilePathAndContentId]) {
         let known: HashSet<PathBuf> = self.0.iter().map(|input| input.path.clone()).collect();
         for file in files.iter().filter(|file| !known.contains(&file.path)) {
             let role = "a file read by the scene".to_owned();

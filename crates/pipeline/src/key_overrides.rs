@@ -7,7 +7,7 @@ use crate::scene::description::{CameraOverrides, Integrator, Pose, ResolvedCamer
 
 /// Settings changed with keys while an image is shown. They override the command line.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct KeyOverrides {
+pub struct KeyboardOverrides {
     /// Shadow type.
     pub shadows: Option<ShadowMode>,
     /// Integrator.
@@ -24,15 +24,15 @@ pub struct KeyOverrides {
     pub exposure: Option<f32>,
 }
 
-impl KeyOverrides {
+impl KeyboardOverrides {
     /// Returns the overrides of a request that keys can change.
-    pub(super) fn of(overrides: &Overrides) -> Self {
+    pub(super) fn from_overrides(overrides: &Overrides) -> Self {
         let Overrides { shadows, integrator, dof, photons, view, camera, exposure, .. } = *overrides;
         Self { shadows, integrator, dof, photons, view, camera, exposure }
     }
 
     /// Adds the changes to overrides from the command line.
-    pub fn apply_to(&self, command_line: &Overrides) -> Overrides {
+    pub fn apply_to_command_line(&self, command_line: &Overrides) -> Overrides {
         Overrides {
             shadows: self.shadows.or(command_line.shadows),
             integrator: self.integrator.or(command_line.integrator),

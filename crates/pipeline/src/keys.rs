@@ -10,7 +10,7 @@ use crate::scene::fingerprint::{Fingerprint, FingerprintContext, FingerprintHash
 
 /// Returns the context for fingerprinting scene descriptions: the textures, meshes and orbiter that they
 /// refer to.
-pub(crate) fn scene_references_for_fingerprint<'a>(
+pub(crate) fn scene_fingerprint_context<'a>(
     scene: &'a Scene,
     meshes: &'a [Fingerprint],
     orbiter: Option<&'a str>,
@@ -27,7 +27,7 @@ pub(crate) fn mesh_with_separate_emitters_key(mesh: &Fingerprint, is_emissive: b
 /// Returns the key for a mesh's tree. `distinct` is the key of the mesh with separated emitters if that mesh
 /// differs from the mesh in the file.
 pub(crate) fn mesh_accel_key(mesh: &Fingerprint, accel: Accel, distinct: Option<Fingerprint>) -> Fingerprint {
-    FingerprintHasher::new("tree").add_fingerprint(&distinct.unwrap_or(*mesh)).add_choice(accel).finish()
+    FingerprintHasher::new("tree").add_fingerprint(&distinct.unwrap_or(*mesh)).add_choice_name(accel).finish()
 }
 
 /// Returns the key for all trees and the offset of each object. `lifts` is empty if no object is offset.
@@ -50,7 +50,7 @@ pub(crate) fn geometry_key(
             key.add_fingerprint(&distinct);
         }
     }
-    with_tree_kind(&key.finish(), scene.render.accel)
+    key_with_tree_kind(&key.finish(), scene.render.accel)
 }
 
 /// Returns the key for the shapes and their emitting sides, which determine the lights to be moved off
@@ -65,7 +65,7 @@ pub(crate) fn coplanar_lights_key(scene: &Scene, of: &FingerprintContext<'_>) ->
         let is_glass = material.is_some_and(|material| material.kind.is_solid_glass());
         key.add_bool(object.material.is_some()).add_bool(is_glass).add_bool(emission.is_some());
         if let Some(sides) = emission {
-            key.add_choice(sides);
+            key.add_choice_name(sides);
         }
     }
     key.finish()
@@ -77,8 +77,8 @@ pub(crate) fn key_with_coordinate_origin(of: &Fingerprint, origin: DVec3) -> Fin
 }
 
 /// Combines a geometry key with the tree type.
-pub(crate) fn with_tree_kind(of: &Fingerprint, accel: Accel) -> Fingerprint {
-    FingerprintHasher::new("in trees").add_fingerprint(of).add_choice(accel).finish()
+pub(crate) fn key_with_tree_kind(of: &Fingerprint, accel: Accel) -> Fingerprint {
+    FingerprintHasher::new("in trees").add_fingerprint(of).add_choice_name(accel).finish()
 }
 
 fn all_object_shapes_key(scene: &Scene, of: &FingerprintContext<'_>) -> Fingerprint {
@@ -144,7 +144,7 @@ fn light_descriptions_key(scene: &Scene, of: &FingerprintContext<'_>) -> Fingerp
                     .add(&material.opacity, of);
                 key.add(&material.emitter_coat().cloned(), of).add(&object.placement.as_deref().copied(), of);
                 // Blends emit through their parts, so add the whole material.
-                if !material.kind.parts().is_empty() {
+                if !material.kind.blend_parts().is_empty() {
                     key.add(material, of);
                 }
             }
@@ -239,10 +239,10 @@ pub(crate) fn film_sums_key(
 /// key includes `film_number`.
 pub(crate) fn developed_image_key(film: Fingerprint, plan: &RenderPlan, film_number: u64) -> Fingerprint {
     let RenderOptions { samples, error, .. } = plan.settings.render;
-    let tone = plan.tone();
+    let tone = plan.tone_mapping();
     let mut key = FingerprintHasher::new("image");
     key.add_fingerprint(&film).add_u64(samples.into()).add_f32(error);
-    key.add_choice(plan.settings.view).add_f32(tone.exposure_stops).add_choice(tone.curve);
+    key.add_choice_name(plan.settings.view).add_f32(tone.exposure_stops).add_choice_name(tone.curve);
     if let Some(seconds) = plan.limits.seconds {
         key.add_f64(seconds).add_u64(film_number);
     }
@@ -261,7 +261,7 @@ mod tests {
 
     fn keys(text: &str) -> (Fingerprint, Fingerprint, Fingerprint) {
         let scene = loaded_of(text).scene;
-        let of = scene_references_for_fingerprint(&scene, &[], None);
+        let of = scene_fingerprint_context(&scene, &[], None);
         (
             geometry_key(&scene, &of, DVec3::ZERO, &[], std::iter::empty()),
             lights_key(&scene, &of, DVec3::ZERO, &[], None, &[]),
@@ -298,7 +298,7 @@ mod tests {
             let scene = loaded_of(BALL).scene;
             geometry_key(
                 &scene,
-                &scene_references_for_fingerprint(&scene, &[], None),
+                &scene_fingerprint_context(&scene, &[], None),
                 DVec3::ZERO,
                 &[lift],
                 std::iter::empty(),
@@ -447,7 +447,7 @@ mod tests {
         let quad = "[[quad]]\ncorner = [0, 0, 0]\nu = [1, 0, 0]\nv = [0, 1, 0]\nmaterial = \"m\"\n";
         let key = |kind: &str| {
             let scene = loaded_of(&format!("{quad}[materials.m]\ntype = \"{kind}\"\n")).scene;
-            coplanar_lights_key(&scene, &scene_references_for_fingerprint(&scene, &[], None))
+            coplanar_lights_key(&scene, &scene_fingerprint_context(&scene, &[], None))
         };
         assert_ne!(key("phong"), key("glass"));
     }

@@ -65,7 +65,7 @@ impl MemoryEstimate {
         ];
         if !plan.layers.is_empty() {
             let recorded = plan.settings.layers.len();
-            let sums = Film::layer_memory(plan.crop.unwrap_or(whole), recorded);
+            let sums = Film::layer_bytes_for_crop(plan.crop.unwrap_or(whole), recorded);
             items.push(("the layers", sums + picture * plan.layers.len() as u64));
         }
         if let Some(turn) = plan.turn.filter(|_| !plan.outputs.animations.is_empty()) {

@@ -44,12 +44,12 @@ pub(super) struct RenderPlan {
     pub(super) bit_depth: u8,
     pub(super) outputs: OutputFiles,
     pub(super) checkpoints: CheckpointSettings,
-    pub(super) limits: RenderLimits,
+    pub(super) limits: ResourceLimits,
 }
 
 /// Limits on the resources that a render uses.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct RenderLimits {
+pub(super) struct ResourceLimits {
     /// Number of render threads.
     pub(super) threads: usize,
     /// Time limit in seconds.
@@ -78,12 +78,12 @@ pub(super) struct OutputFiles {
 
 impl RenderPlan {
     /// Returns the file name of the scene, which is stored in part files.
-    pub(super) fn name(&self) -> String {
+    pub(super) fn scene_file_name(&self) -> String {
         self.path.file_name().unwrap_or_default().to_string_lossy().into_owned()
     }
 
     /// Returns the tone mapping for the view. Exposure and tone curve apply only to light, not to data.
-    pub(super) fn tone(&self) -> ToneMapping {
+    pub(super) fn tone_mapping(&self) -> ToneMapping {
         let RenderOptions { exposure, tonemap: curve, .. } = self.settings.render;
         match self.settings.view.aov_source() {
             AovSource::Light(LightAov::Radiance(_))
@@ -205,7 +205,7 @@ pub(super) fn resolve_plan(
         bit_depth: overrides.bit_depth.unwrap_or(8),
         outputs: OutputFiles::resolve(scene.output.as_ref(), path, overrides),
         checkpoints: overrides.checkpoints,
-        limits: RenderLimits {
+        limits: ResourceLimits {
             threads: thread_count(overrides),
             seconds: overrides.time_seconds,
             memory: overrides.memory,
@@ -547,9 +547,9 @@ mod tests {
     #[test]
     fn exposure_applies_only_to_light() {
         let text = "[render]\nexposure = 2.0\n";
-        assert_eq!(planned(text, &Overrides::default()).tone().exposure_stops, 2.0);
+        assert_eq!(planned(text, &Overrides::default()).tone_mapping().exposure_stops, 2.0);
         let normals = Overrides { view: Some(ViewMode::Normal), ..Default::default() };
-        assert_eq!(planned(text, &normals).tone().exposure_stops, 0.0);
+        assert_eq!(planned(text, &normals).tone_mapping().exposure_stops, 0.0);
     }
 
     #[test]
@@ -557,7 +557,7 @@ mod tests {
         use crate::film::tone::Transfer;
         for &view in ViewMode::ALL {
             let overrides = Overrides { view: Some(view), ..Default::default() };
-            let transfer = planned("", &overrides).tone().transfer;
+            let transfer = planned("", &overrides).tone_mapping().transfer;
             let is_display_value = match view.aov_source() {
                 AovSource::FirstHit(_) | AovSource::Light(LightAov::TraversalCost) => true,
                 AovSource::Film(quantity) => quantity != FilmQuantity::Radiance,

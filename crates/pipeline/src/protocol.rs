@@ -14,13 +14,13 @@ use std::time::Instant;
 
 pub use self::stage::{Stage, StageReport, Status};
 pub use super::answers::{
-    CameraSaveResult, ImagePosition, MovedCamera, NormalizedRect, PickedInstance, PickedObject, PickedPixel,
-    SavedCameraEdit,
+    CameraSaveResult, MovedCamera, NormalizedPosition, NormalizedRect, PickedInstance, PickedObject,
+    PickedPixel, SavedCameraEdit,
 };
 pub use super::report::{
     ImageReport, LightSamplingReport, PhotonsReport, Report, SampleCounts, SampledLightSet, WorkCounters,
 };
-use super::settings::{EffectiveSettingsSummary, Overrides, SceneSettings};
+use super::settings::{AdjustableSceneSettings, EffectiveSettingsSummary, Overrides};
 use super::watch::content::FilePathAndContentId;
 use crate::film::Srgb8Image;
 pub use crate::output::WriteWarning;
@@ -43,7 +43,7 @@ pub enum Command {
     /// reports the result. Rendering continues.
     UndoCamera(SavedCameraEdit),
     /// Identify the object at an image position. [`Event::Picked`] reports the result. Rendering continues.
-    Pick(ImagePosition),
+    Pick(NormalizedPosition),
     /// Stop the current render.
     Cancel,
     /// Stop the current render and save a checkpoint. If an image is being written, finish writing it
@@ -119,7 +119,7 @@ pub struct MaxPreviewSize {
     pub height: u32,
     /// Center of the section to show at 1:1. The section is as large as the maximum size allows. `None` shows
     /// the whole image.
-    pub around: Option<ImagePosition>,
+    pub around: Option<NormalizedPosition>,
 }
 
 /// An event from the worker to a front end.
@@ -171,7 +171,7 @@ pub enum Event {
         /// Effective settings of the request.
         settings: Box<EffectiveSettingsSummary>,
         /// The scene's values for the settings that keys can change.
-        own: SceneSettings,
+        own: AdjustableSceneSettings,
     },
     /// The scene file was read.
     Text {

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use super::inputs::ProtectedInputs;
 use super::prepare::{ReadyScene, RequestCamera};
 use super::protocol::{
-    CameraSaveResult, Event, ImagePosition, MovedCamera, PickedInstance, PickedObject, PickedPixel,
+    CameraSaveResult, Event, MovedCamera, NormalizedPosition, PickedInstance, PickedObject, PickedPixel,
     ResolvedCamera, SavedCameraEdit,
 };
 use super::render::film_state::FilmState;
@@ -21,7 +21,7 @@ use crate::messages::{
 };
 use crate::output::{AttributeLossPolicy, OutputError, write};
 use crate::scene::description::CameraOverrides;
-use crate::scene::{LoadedScene, read_current_text};
+use crate::scene::{LoadedScene, read_scene_file_text};
 use crate::system::{describe_error, file};
 use crate::world::World;
 
@@ -30,7 +30,7 @@ use crate::world::World;
 pub(super) enum QueryOrEdit {
     KeepCamera(Box<MovedCamera>),
     UndoCamera(SavedCameraEdit),
-    Pick(ImagePosition),
+    Pick(NormalizedPosition),
 }
 
 impl QueryOrEdit {
@@ -96,7 +96,7 @@ impl QueryContext {
     }
 
     /// Finds the first object hit by the ray through a pixel's center.
-    fn pick(&self, spot: ImagePosition, state: Option<&FilmState>) -> PickedPixel {
+    fn pick(&self, spot: NormalizedPosition, state: Option<&FilmState>) -> PickedPixel {
         let (width, height) = (self.settings.render.width, self.settings.render.height);
         let pixel = |at: f64, side: u32| ((at * f64::from(side)).max(0.0) as u32).min(side - 1);
         let (x, y) = (pixel(spot.x, width), pixel(spot.y, height));
@@ -174,7 +174,7 @@ impl QueryContext {
             Some(SavedCameraEdit { path: path.clone(), before: read.into(), after: text.as_str().into() })
         };
         let is_own = LoadedScene::parse_camera_from_text(&text, &self.sets)
-            .is_some_and(|own| own.is_look_at_matching_view(camera));
+            .is_some_and(|own| own.is_nearly_equal_to_view(camera));
         Ok(CameraSaveResult { path, is_new: edit.is_some(), is_own, of_model: false, edit })
     }
 }
@@ -200,7 +200,7 @@ fn is_file_missing(path: &Path) -> bool {
 
 /// Whether a file's text is exactly `text`.
 fn file_text_equals(path: &Path, text: &str) -> bool {
-    read_current_text(path).is_ok_and(|now| *now == *text)
+    read_scene_file_text(path).is_ok_and(|now| *now == *text)
 }
 
 /// Replaces the text of a scene file. If the file's text is not `old`, fails with the message `changed`. If
@@ -251,7 +251,7 @@ fn save_model_scene_with_camera(
 mod tests {
     use super::*;
     use crate::math::DVec3;
-    use crate::scene::description::{ImageWindow, Pose, Projection};
+    use crate::scene::description::{ImageShiftAndMirror, Pose, Projection};
     use crate::tests::loaded_of;
 
     #[test]
@@ -261,7 +261,7 @@ mod tests {
         let camera = ResolvedCamera {
             pose,
             projection: Projection::Perspective { fov: 40.0 },
-            window: ImageWindow::default(),
+            window: ImageShiftAndMirror::default(),
             aperture: 0.0,
             focus: 1.0,
         };

@@ -187,7 +187,7 @@ pub enum ResumeMode {
 
 /// The scene's values for the settings that keys can change.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SceneSettings {
+pub struct AdjustableSceneSettings {
     /// Camera.
     pub camera: ResolvedCamera,
     /// Exposure in stops.

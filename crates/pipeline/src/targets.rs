@@ -15,7 +15,7 @@ use super::sink::EventSink;
 use crate::output::part::{self, PartFile};
 use crate::output::write::{ExistingFilePolicy, SweptFolders};
 use crate::output::{
-    AttributeLossPolicy, FileIdentity, OutputError, ReplaceCheck, check_image_replaceable, json_replace_check,
+    AttributeLossPolicy, FileIdentity, OutputError, ReplaceCheck, image_replace_check, json_replace_check,
 };
 use crate::scene::diagnostic::{Diagnostic, Severity};
 
@@ -28,12 +28,12 @@ pub(super) struct OutputTarget<'a> {
 
 impl<'a> OutputTarget<'a> {
     /// Creates the target for one of the plan's images.
-    pub(super) fn for_image(plan: &RenderPlan, path: &'a Path) -> Self {
+    pub(super) fn from_image_path(plan: &RenderPlan, path: &'a Path) -> Self {
         Self { path, kind: TargetKind::Image(plan.outputs.named_by) }
     }
 
     /// Creates the target for a report.
-    pub(super) fn for_report(path: &'a Path) -> Self {
+    pub(super) fn from_report_path(path: &'a Path) -> Self {
         Self { path, kind: TargetKind::Report }
     }
 }
@@ -137,15 +137,15 @@ fn format_conflict_line(conflict: &Diagnostic) -> String {
 
 /// Returns the files of this request, then the files of later turntable frames.
 fn targets_of_all_frames(plan: &RenderPlan) -> impl Iterator<Item = OutputTarget<'_>> {
-    let picture = |path| OutputTarget::for_image(plan, path);
+    let picture = |path| OutputTarget::from_image_path(plan, path);
     current_targets(plan).chain(plan.outputs.later_images.iter().map(PathBuf::as_path).map(picture))
 }
 
 /// Returns the files of this request: the images, then the report.
 fn current_targets(plan: &RenderPlan) -> impl Iterator<Item = OutputTarget<'_>> {
-    let picture = |path| OutputTarget::for_image(plan, path);
+    let picture = |path| OutputTarget::from_image_path(plan, path);
     let OutputFiles { images, animations, report, .. } = &plan.outputs;
-    let report = report.iter().map(|path| OutputTarget::for_report(path));
+    let report = report.iter().map(|path| OutputTarget::from_report_path(path));
     let pictures = images.iter().chain(animations);
     pictures.map(PathBuf::as_path).map(picture).chain(report)
 }
@@ -161,7 +161,7 @@ fn find_conflict<'a>(
 ) -> Option<Diagnostic> {
     if let Some(identity) = FileIdentity::from_existing_or_new_path(at) {
         if let Some(input) = inputs.find(at) {
-            return Some(input_error(plan, target, input));
+            return Some(overwrites_input_error(plan, target, input));
         }
         if let Some(twin) = twin(target, &identity) {
             return Some(same_file_error(plan, target, twin.path));
@@ -174,7 +174,7 @@ fn find_conflict<'a>(
             return Some(command_line_error(message, Some(conflict_help(plan, target.kind).to_owned())));
         }
     }
-    if plan.outputs.replaces_foreign { None } else { foreign_file_error(plan, target, at) }
+    if plan.outputs.replaces_foreign { None } else { overwrites_foreign_file_error(plan, target, at) }
 }
 
 /// Whether a file is the checkpoint for an output.
@@ -182,13 +182,13 @@ fn is_checkpoint_for(output: &Path, identity: &FileIdentity) -> bool {
     FileIdentity::from_existing_or_new_path(&checkpoint_path(output)).as_ref() == Some(identity)
 }
 
-fn input_error(plan: &RenderPlan, target: OutputTarget<'_>, input: &ProtectedInput) -> Diagnostic {
+fn overwrites_input_error(plan: &RenderPlan, target: OutputTarget<'_>, input: &ProtectedInput) -> Diagnostic {
     let is_same_name = target.path == input.path;
     let other = if is_same_name { String::new() } else { format!("{}, ", input.path.display()) };
     let message = format!("cannot write {}: it is {other}{}", target.path.display(), input.role);
     let help = Some(conflict_help(plan, target.kind).to_owned());
     match &input.place {
-        Some((loaded, span)) => loaded.diagnostic_at(span.clone(), Severity::Error, message, help),
+        Some((loaded, span)) => loaded.create_diagnostic_at(span.clone(), Severity::Error, message, help),
         None => command_line_error(message, help),
     }
 }
@@ -203,7 +203,11 @@ fn same_file_error(plan: &RenderPlan, target: OutputTarget<'_>, twin: &Path) -> 
 }
 
 /// Returns an error if the target is an existing file not written by glimt.
-fn foreign_file_error(plan: &RenderPlan, target: OutputTarget<'_>, at: &Path) -> Option<Diagnostic> {
+fn overwrites_foreign_file_error(
+    plan: &RenderPlan,
+    target: OutputTarget<'_>,
+    at: &Path,
+) -> Option<Diagnostic> {
     let (name, remedy) = (target.path.display(), conflict_help(plan, target.kind));
     let (replaced, help) = match target.kind {
         TargetKind::Image(OutputNameSource::Default) => {
@@ -212,7 +216,7 @@ fn foreign_file_error(plan: &RenderPlan, target: OutputTarget<'_>, at: &Path) ->
                 None => name.to_string(),
             };
             let help = format!("{remedy}; -o {own} or --force replaces it");
-            let replaced = check_image_replaceable(at);
+            let replaced = image_replace_check(at);
             if let (ReplaceCheck::Own, Some(other)) = (&replaced, recorded_scene_if_different(&plan.path, at))
             {
                 let message = format!("cannot write {name}: it is the image of another scene, {other}");
@@ -225,7 +229,7 @@ fn foreign_file_error(plan: &RenderPlan, target: OutputTarget<'_>, at: &Path) ->
             (replaced, format!("{remedy}; --force replaces it"))
         }
         TargetKind::Image(OutputNameSource::CommandLine | OutputNameSource::Scene) => {
-            return other_part_error(plan, target, at);
+            return overwrites_part_or_checkpoint_error(plan, target, at);
         }
     };
     Some(command_line_error(format!("cannot write {name}: {}", replaced.reason_to_keep()?), Some(help)))
@@ -233,8 +237,12 @@ fn foreign_file_error(plan: &RenderPlan, target: OutputTarget<'_>, at: &Path) ->
 
 /// Returns an error if the file is a checkpoint or another part of the same render, which may contain hours
 /// of work. Parts with a different total belong to an earlier render and may be replaced.
-fn other_part_error(plan: &RenderPlan, target: OutputTarget<'_>, at: &Path) -> Option<Diagnostic> {
-    if !part::is_part(at) {
+fn overwrites_part_or_checkpoint_error(
+    plan: &RenderPlan,
+    target: OutputTarget<'_>,
+    at: &Path,
+) -> Option<Diagnostic> {
+    if !part::is_part_or_checkpoint(at) {
         return None;
     }
     let head = PartFile::read_header(at).ok();

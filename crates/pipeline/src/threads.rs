@@ -7,7 +7,7 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use super::stages::AbortReason;
 use crate::system::priority;
-use crate::system::threads::{check_thread_stack_memory, describe_start_failure};
+use crate::system::threads::{check_thread_stack_memory, describe_thread_start_failure};
 
 /// The worker's thread pool.
 #[derive(Default)]
@@ -23,7 +23,7 @@ impl RenderThreads {
     }
 
     /// Returns the current pool, or `None` before the first request.
-    pub(super) fn current(&self) -> Option<&Arc<ThreadPool>> {
+    pub(super) fn current_pool(&self) -> Option<&Arc<ThreadPool>> {
         self.pool.as_ref()
     }
 
@@ -45,7 +45,7 @@ impl RenderThreads {
         let nice = self.nice;
         let begin = move |_| priority::lower_thread_priority(nice);
         let failed = |error: &dyn Display| {
-            AbortReason::work_failure(describe_start_failure(count, has_threads_option, &error))
+            AbortReason::work_failure(describe_thread_start_failure(count, has_threads_option, &error))
         };
         check_thread_stack_memory(count).map_err(|error| failed(&error))?;
         let builder = ThreadPoolBuilder::new().num_threads(count).thread_name(name).start_handler(begin);

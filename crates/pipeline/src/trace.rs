@@ -10,13 +10,13 @@ use rayon::ThreadPool;
 
 use crate::control::{CancelToken, Canceled};
 use crate::film::{Film, SelectedPixels, TILE_SIZE, TileSamples};
-use crate::integrators::{PhotonMaps, RayCounters, RenderSettings, render_tile_with_layers};
+use crate::integrators::{PhotonPassesBySample, RayCounters, RenderSettings, render_tile_with_layers};
 use crate::system::cpu_time::thread_cpu_seconds;
 use crate::world::World;
 
 /// Renders a tile, with or without photon maps. See [`crate::integrators::render_tile_with_photons`].
 pub(super) type TileKernel = fn(
-    Option<&PhotonMaps>,
+    Option<&PhotonPassesBySample>,
     &World,
     &RenderSettings,
     SelectedPixels,
@@ -40,7 +40,7 @@ pub(super) struct Tracer<'a> {
     pub(super) settings: &'a RenderSettings,
     pub(super) token: &'a CancelToken,
     /// Photon maps for all jobs' samples, if photons are gathered.
-    pub(super) photons: Option<&'a PhotonMaps>,
+    pub(super) photons: Option<&'a PhotonPassesBySample>,
     /// Index of the jobs' first sample in the entire image.
     pub(super) first: u32,
     /// Film whose layer sums the samples are added to, if there are layers.
@@ -77,7 +77,7 @@ impl Tracer<'_> {
         let begin = thread_cpu_seconds();
         let (samples, rays) = match layers {
             Some(film) => {
-                let sums = film.layer_sums(job.tile, job.pixels);
+                let sums = film.copy_layer_sums(job.tile, job.pixels);
                 render_tile_with_layers(photons, world, settings, (job.pixels, samples), sums, token)?
             }
             None => kernel(photons, world, settings, job.pixels, samples, token)?,

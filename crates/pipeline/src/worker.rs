@@ -12,7 +12,7 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use super::key_overrides::KeyOverrides;
+use super::key_overrides::KeyboardOverrides;
 use super::protocol::{Command, Event, Failure, MaxPreviewSize, PreviewSlot, Request, WriteRequirement};
 use super::queries::QueryOrEdit;
 use super::render::checkpointer::Interruption;
@@ -132,7 +132,7 @@ struct Mailbox {
     /// Whether a write command arrived after the pending request and therefore applies to it.
     is_write_of_waiting: bool,
     /// The current request's overrides that the user can change with keys.
-    shown: KeyOverrides,
+    shown: KeyboardOverrides,
     /// Pending preview size change.
     preview: Option<Option<MaxPreviewSize>>,
     queries: VecDeque<QueryOrEdit>,
@@ -235,7 +235,7 @@ impl CommandSender {
         let mut mailbox = self.lock();
         let is_meant = mailbox.is_write_of_waiting;
         let postponed = mailbox.request.as_ref().is_some_and(|request| {
-            is_meant || !can_write && KeyOverrides::of(&request.overrides) == mailbox.shown
+            is_meant || !can_write && KeyboardOverrides::from_overrides(&request.overrides) == mailbox.shown
         });
         (mailbox.write, mailbox.is_write_postponed) = (postponed, postponed);
         postponed
@@ -259,7 +259,7 @@ impl CommandSender {
             if let Some(request) = mailbox.request.take() {
                 (mailbox.token, mailbox.writing) = (CancelToken::new(), CancelToken::new());
                 mailbox.is_write_of_waiting = false;
-                mailbox.shown = KeyOverrides::of(&request.overrides);
+                mailbox.shown = KeyboardOverrides::from_overrides(&request.overrides);
                 mailbox.token.set_paused(mailbox.paused);
                 return Task::Render(request, mailbox.token.clone(), mailbox.writing.clone());
             }
@@ -327,7 +327,7 @@ impl Worker {
                 {
                     continue;
                 }
-                Task::Write => catch_unwind(AssertUnwindSafe(|| session.write_now(&sink))),
+                Task::Write => catch_unwind(AssertUnwindSafe(|| session.write_current_image(&sink))),
                 Task::Preview(size, token) => {
                     catch_unwind(AssertUnwindSafe(|| session.send_resized_preview(size, &sink, &token)))
                 }

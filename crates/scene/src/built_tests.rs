@@ -13,26 +13,26 @@ const SOURCE: &str = "camera; ball 1; brick; ball -2";
 /// Builds a scene with two spheres and, between them, a box.
 fn built(radius: f64, source: &str) -> BuiltDocument {
     let mut built = BuiltDocument::new(source.into());
-    built.table("camera");
+    built.start_table("camera");
     built.set("position", DVec3::new(0.0, 1.0, 4.0));
     built.set("look_at", [0.0, 0.1, 1.0 / 3.0]);
-    built.table("render");
+    built.start_table("render");
     built.set("width", 64.0);
     for name in ["wall", "big brick"] {
-        built.named_table("materials", name);
+        built.start_named_table("materials", name);
         built.set("type", "principled");
         built.set("emission", 0.1);
     }
-    built.list_table("sphere");
+    built.start_list_table("sphere");
     built.set("center", [1.0, 2.0, 3.0]);
     built.set("radius", 1.0);
     built.set("material", "wall");
-    built.list_table("box");
+    built.start_list_table("box");
     built.set("material", "big brick");
-    built.list_table("sphere");
+    built.start_list_table("sphere");
     built.set("center", BuiltValue::Array(vec![4.0.into(), 5.0.into(), 6e-7.into()]));
     if !source.is_empty() {
-        built.at(SOURCE.len() - 2..SOURCE.len());
+        built.set_source_span(SOURCE.len() - 2..SOURCE.len());
     }
     built.set("radius", radius);
     built.set("material", "wall");
@@ -94,7 +94,7 @@ fn errors_underline_the_foreign_text() {
     assert_eq!((without.place, without.path), (None, with_text.path));
     let mut wrong = built(2.0, "");
     wrong.set("name", "7");
-    wrong.table("camera");
+    wrong.start_table("camera");
     wrong.set("fov", "wide");
     wrong.set("aperture", 1e300);
     let messages: Vec<_> = load(wrong, &[]).expect_err("errors").into_iter().map(|one| one.message).collect();

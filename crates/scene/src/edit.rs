@@ -23,7 +23,7 @@ pub(super) fn replace_camera(text: &str, wanted: &ResolvedCamera) -> Result<Stri
     edits.set_camera(wanted);
     let new = edits.apply();
     let is_right = parse_camera(&SceneText::from_file_text(new.as_str().into()))
-        .is_some_and(|new| new.is_look_at_matching_view(wanted));
+        .is_some_and(|new| new.is_nearly_equal_to_view(wanted));
     is_right.then_some(new).ok_or_else(|| "glimt cannot edit the [camera] table in this form".to_owned())
 }
 
@@ -74,7 +74,8 @@ impl CameraEdits<'_> {
         self.set_number("aperture", aperture, Some(default.3));
         match self.table.get("focus") {
             // Ignore rounding errors in the distance while orbiting.
-            Some(given) if wanted.is_focused_on_look_at() && is_nearly_equal(&given.value, focus) => {}
+            Some(given)
+                if wanted.is_focused_on_look_at() && is_nearly_equal_distance(&given.value, focus) => {}
             Some(_) | None => self.set_number("focus", focus, Some(wanted.pose.distance())),
         }
     }
@@ -193,7 +194,7 @@ impl CameraEdits<'_> {
 }
 
 /// Whether a value equals `distance` up to rounding.
-fn is_nearly_equal(value: &Value<'_>, distance: f64) -> bool {
+fn is_nearly_equal_distance(value: &Value<'_>, distance: f64) -> bool {
     value.as_number().and_then(Number::to_f64).is_some_and(|given| is_same_distance(given, distance))
 }
 
@@ -209,7 +210,7 @@ fn format_number(number: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::description::{ImageWindow, Projection};
+    use crate::description::{ImageShiftAndMirror, Projection};
     use crate::math::DVec2;
 
     fn view(position: [f64; 3]) -> ResolvedCamera {
@@ -217,7 +218,7 @@ mod tests {
         ResolvedCamera {
             pose,
             projection: Projection::Perspective { fov: 40.0 },
-            window: ImageWindow::default(),
+            window: ImageShiftAndMirror::default(),
             aperture: 0.0,
             focus: pose.distance(),
         }
@@ -308,7 +309,7 @@ mod tests {
 
     #[test]
     fn projections_are_written() {
-        let window = ImageWindow { shift: DVec2::new(0.25, 0.0), mirror: true };
+        let window = ImageShiftAndMirror { shift: DVec2::new(0.25, 0.0), mirror: true };
         let projection = Projection::Orthographic { view_height: 2.5 };
         let wanted = ResolvedCamera { projection, window, ..view([0.0, 1.0, 4.0]) };
         let text = "[camera]\nposition = [0, 1, 4]\nlook_at = [0, 1, 0]\n";

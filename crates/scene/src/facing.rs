@@ -23,7 +23,7 @@ const MIN_FRONT_RATIO: f64 = 0.02;
 /// Returns the spans of one-sided quad lights that have shapes behind them and nothing in front of them. Checks
 /// only the first copy of a light in a group, because each check visits all objects.
 /// Calls `bounds` only if the scene has one-sided quad lights.
-pub(super) fn lights_facing_away(
+pub(super) fn spans_of_lights_facing_nothing(
     scene: &Scene,
     bounds: impl FnOnce() -> Vec<MeshBoundingBox>,
 ) -> Vec<Range<usize>> {

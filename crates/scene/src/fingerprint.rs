@@ -8,7 +8,7 @@ use crate::math::{DVec3, Vec3};
 /// compile error until it is added to the fingerprint or explicitly ignored.
 pub trait Fingerprinted {
     /// Adds all values that later stages read to the fingerprint.
-    fn add_to(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>);
+    fn add_to_fingerprint(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>);
 }
 
 /// The data that scene items refer to: textures and meshes (by index), and the orbiter file.
@@ -23,10 +23,10 @@ pub struct FingerprintContext<'a> {
 }
 
 impl<T: Fingerprinted> Fingerprinted for Option<T> {
-    fn add_to(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
+    fn add_to_fingerprint(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
         key.add_bool(self.is_some());
         if let Some(some) = self {
-            some.add_to(key, of);
+            some.add_to_fingerprint(key, of);
         }
     }
 }
@@ -79,12 +79,12 @@ impl FingerprintHasher {
 
     /// Adds a value and everything it refers to.
     pub fn add(&mut self, part: &impl Fingerprinted, of: &FingerprintContext<'_>) -> &mut Self {
-        part.add_to(self, of);
+        part.add_to_fingerprint(self, of);
         self
     }
 
     /// Adds the name of a choice.
-    pub fn add_choice(&mut self, choice: impl Choice) -> &mut Self {
+    pub fn add_choice_name(&mut self, choice: impl Choice) -> &mut Self {
         self.add_str(choice.name())
     }
 

@@ -5,7 +5,7 @@ use unicode_width::UnicodeWidthStr;
 use super::sanitize::{escape_and_truncate, escape_invisible_chars};
 
 /// Splits a dotted key into its parts, which keep their quotes. Ignores dots inside quotes.
-pub fn key_parts(key: &str) -> Vec<&str> {
+pub fn split_dotted_key(key: &str) -> Vec<&str> {
     let mut rest = key;
     let mut parts = Vec::new();
     while let Some(end) = find_unquoted(rest, '.') {
@@ -28,7 +28,7 @@ pub fn shortened_key(key: &str, columns: usize) -> String {
     if key.width() <= columns {
         return key.into_owned();
     }
-    let parts = key_parts(&key);
+    let parts = split_dotted_key(&key);
     let last = parts.len() - 1;
     // Do not start with an index, because it is meaningless without the list's name.
     let begins_with_number = |skipped: &usize| parts[*skipped].parse::<u64>().is_ok();
@@ -60,9 +60,9 @@ mod tests {
     #[test]
     fn quoted_parts_keep_dots_and_spaces() {
         let key = r#"materials."copper \" ball v1.2".roughness"#;
-        assert_eq!(key_parts(key), ["materials", r#""copper \" ball v1.2""#, "roughness"]);
-        assert_eq!(key_parts("light.1.direction"), ["light", "1", "direction"]);
-        assert_eq!(key_parts("camera"), ["camera"]);
+        assert_eq!(split_dotted_key(key), ["materials", r#""copper \" ball v1.2""#, "roughness"]);
+        assert_eq!(split_dotted_key("light.1.direction"), ["light", "1", "direction"]);
+        assert_eq!(split_dotted_key("camera"), ["camera"]);
         assert_eq!(split_at_unquoted_space(&format!("{key} 0.1 → 0.4")), Some((key, "0.1 → 0.4")));
         assert_eq!(split_at_unquoted_space("camera"), None);
     }

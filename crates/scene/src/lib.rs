@@ -37,9 +37,9 @@ use description::{Camera, ResolvedCamera, Scene};
 use diagnostic::{Diagnostic, Severity};
 pub use document::MORE_LIKE_THESE;
 pub use facing::MeshBoundingBox;
-pub use key_path::{key_parts, shortened_key, split_at_unquoted_space};
-pub use other_content::{NEW_SCENE_HELP, detect_image_or_part, has_scene_extension};
-pub use read::{find_renamed_scene, lacks_camera_header, missing_file_help};
+pub use key_path::{shortened_key, split_at_unquoted_space, split_dotted_key};
+pub use other_content::{NEW_SCENE_HELP, detect_image_or_part_file, has_scene_extension};
+pub use read::{find_renamed_scene_by_text, lacks_camera_header, missing_file_help};
 pub use source::SceneText;
 
 /// Maximum size of a scene file in bytes.
@@ -54,7 +54,7 @@ pub const MODEL_NOT_FOUND: &str = "file not found";
 pub const SAME_TEXT: &str = "has the same text";
 
 /// Whether a diagnostic reports that the scene or model file does not exist.
-pub fn is_file_not_found(diagnostic: &Diagnostic) -> bool {
+pub fn is_file_not_found_diagnostic(diagnostic: &Diagnostic) -> bool {
     [SCENE_NOT_FOUND, MODEL_NOT_FOUND].contains(&diagnostic.message.as_str())
 }
 
@@ -97,7 +97,7 @@ pub struct SettingSpan {
 ///
 /// # Errors
 /// Returns the reason why the file cannot be read.
-pub fn read_current_text(path: &Path) -> Result<Arc<str>, Box<Diagnostic>> {
+pub fn read_scene_file_text(path: &Path) -> Result<Arc<str>, Box<Diagnostic>> {
     read::read_scene_text(path)
 }
 
@@ -136,13 +136,13 @@ impl LoadedScene {
         }
         let warning = |span| {
             let help = Some(facing::HELP.to_owned());
-            let mut warning = self.diagnostic_at(span, Severity::Warning, facing::MESSAGE, help);
+            let mut warning = self.create_diagnostic_at(span, Severity::Warning, facing::MESSAGE, help);
             if let Some(place) = &mut warning.place {
                 place.label = facing::LABEL.to_owned();
             }
             warning
         };
-        facing::lights_facing_away(&self.scene, bounds).into_iter().map(warning).collect()
+        facing::spans_of_lights_facing_nothing(&self.scene, bounds).into_iter().map(warning).collect()
     }
 
     /// Returns the 1-based line number in the file where `span` starts, or `None` if the file has no text for
@@ -162,7 +162,7 @@ impl LoadedScene {
 
     /// Creates a diagnostic at `span` for a problem found after parsing, such as a mesh without usable faces
     /// or a texture that cannot be decoded.
-    pub fn diagnostic_at(
+    pub fn create_diagnostic_at(
         &self,
         span: Range<usize>,
         severity: Severity,
@@ -196,7 +196,7 @@ pub fn load(path: &Path, sets: &[String]) -> Result<LoadedScene, Vec<Diagnostic>
     let outcome = document::parse_and_lower(&source, path);
     let named = || document::files_referenced_by_text(source.file_text(), path);
     let named = if sets.is_empty() { Vec::new() } else { named() };
-    loaded_scene(outcome, source, None, path, named)
+    loaded_scene_from_parse_outcome(outcome, source, None, path, named)
 }
 
 /// Like [`load`], for a document built from the foreign file at `path`. Diagnostics have no position if the
@@ -212,10 +212,10 @@ pub fn load_built(
     let source = SceneText::with_set_args(Arc::clone(&built.source), sets)?.mark_foreign();
     let outcome = document::lower_built(&source, &built.document, path);
     let named = if sets.is_empty() { Vec::new() } else { document::referenced_files(&built.document, path) };
-    loaded_scene(outcome, source, Some(Arc::new(built)), path, named)
+    loaded_scene_from_parse_outcome(outcome, source, Some(Arc::new(built)), path, named)
 }
 
-fn loaded_scene(
+fn loaded_scene_from_parse_outcome(
     ParseOutcome { scene, diagnostics, settings }: ParseOutcome,
     source: SceneText,
     built: Option<Arc<BuiltDocument>>,

@@ -29,7 +29,7 @@ pub(super) enum NonSceneContent {
 
 /// Checks whether a file is an image, an image part or a checkpoint, regardless of its name. Returns its
 /// format and an error, or `None` for other or unreadable files.
-pub fn detect_image_or_part(path: &Path) -> Option<(&'static str, Box<Diagnostic>)> {
+pub fn detect_image_or_part_file(path: &Path) -> Option<(&'static str, Box<Diagnostic>)> {
     const START: u64 = 1 << 10;
     let (opened, _) = file::open_regular_file(path).ok()?.ok()?;
     let mut bytes = Vec::new();
@@ -94,7 +94,9 @@ fn image_format(bytes: &[u8]) -> Option<&'static str> {
         _ if known.is_some() => known,
         [b'R', b'I', b'F', b'F', _, _, _, _, b'W', b'E', b'B', b'P', ..] => Some("WebP"),
         // If `=` follows, this is not a PPM file: `P6` is a TOML key.
-        [b'P', b'1'..=b'7', b' ' | b'\t' | b'\r' | b'\n', rest @ ..] if !trimmed_starts_with(rest, b'=') => {
+        [b'P', b'1'..=b'7', b' ' | b'\t' | b'\r' | b'\n', rest @ ..]
+            if !starts_with_byte_after_whitespace(rest, b'=') =>
+        {
             Some("PPM")
         }
         // The reserved bytes of a BMP header are 0, which does not occur in text.
@@ -104,7 +106,7 @@ fn image_format(bytes: &[u8]) -> Option<&'static str> {
 }
 
 /// Whether the first byte after leading whitespace is `byte`.
-fn trimmed_starts_with(bytes: &[u8], byte: u8) -> bool {
+fn starts_with_byte_after_whitespace(bytes: &[u8], byte: u8) -> bool {
     bytes.trim_ascii_start().first() == Some(&byte)
 }
 
@@ -183,16 +185,16 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("a.toml");
         std::fs::write(&path, PART_MAGIC).expect("written");
-        let part = super::super::read_current_text(&path).expect_err("an error");
+        let part = super::super::read_scene_file_text(&path).expect_err("an error");
         assert_eq!(part, NonSceneContent::Part.to_diagnostic(&path));
-        assert_eq!(detect_image_or_part(&path), Some(("part", part)));
+        assert_eq!(detect_image_or_part_file(&path), Some(("part", part)));
         std::fs::write(&path, b"\x76\x2f\x31\x01").expect("written");
         let file = std::fs::File::options().write(true).open(&path).expect("opened");
         file.set_len(super::super::MAX_FILE_BYTES + 1).expect("made longer");
-        let large = super::super::read_current_text(&path).expect_err("an error");
+        let large = super::super::read_scene_file_text(&path).expect_err("an error");
         assert_eq!(large, NonSceneContent::Image("EXR").to_diagnostic(&path));
         std::fs::write(&path, b"v 0 0 0\n").expect("written");
-        assert_eq!(detect_image_or_part(&path), None, "models are rendered");
+        assert_eq!(detect_image_or_part_file(&path), None, "models are rendered");
     }
 
     #[test]
@@ -226,7 +228,7 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("model");
         std::fs::write(&path, "v 0 0 0\n").expect("written");
-        let error = super::super::read_current_text(&path).expect_err("an error");
+        let error = super::super::read_scene_file_text(&path).expect_err("an error");
         assert_eq!(error, NonSceneContent::Model { format: "OBJ", ending: "obj" }.to_diagnostic(&path));
         assert!(error.help.expect("a help text").contains("model.obj"));
     }

@@ -104,7 +104,7 @@ fn outline_table(
         None => info.find_type_or_default(None),
     };
     let mut keys = outline_keys(all);
-    keys.retain(|key| info.find_inner(&key.name.text).is_none());
+    keys.retain(|key| info.find_inner_table(&key.name.text).is_none());
     Some(OutlineTable { info, path: path.to_owned(), kind, name, number, span: value.span(), keys })
 }
 

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use super::diagnostic::{Diagnostic, SourceSpan};
 use super::nearest::nearest_name;
-use super::other_content::{NEW_SCENE_HELP, NonSceneContent, detect_image_or_part, has_scene_extension};
+use super::other_content::{NEW_SCENE_HELP, NonSceneContent, detect_image_or_part_file, has_scene_extension};
 use super::sanitize::escape_invisible_chars;
 use super::{MAX_FILE_BYTES, MAX_PARTS, SCENE_NOT_FOUND};
 use crate::system::file::{self, FileKind};
@@ -24,7 +24,7 @@ const LFS_HELP: &str = "run `git lfs pull`";
 pub(super) fn read_scene_text(path: &Path) -> Result<Arc<str>, Box<Diagnostic>> {
     let bytes = read_bytes(path).map_err(|(message, help)| {
         // Report a large image as an image rather than as a large scene.
-        detect_image_or_part(path)
+        detect_image_or_part_file(path)
             .map_or_else(|| Diagnostic::error_in_file(path, message, help, None), |(_, problem)| problem)
     })?;
     if file::is_lfs_pointer(&bytes) {
@@ -165,7 +165,7 @@ pub(super) fn similar_file(path: &Path, may_be_meant: impl Fn(&Path) -> bool) ->
 
 /// Finds the new path of a missing scene file that was probably renamed: a file with the same text in the
 /// same folder.
-pub fn find_renamed_scene(path: &Path, text: &str) -> Option<PathBuf> {
+pub fn find_renamed_scene_by_text(path: &Path, text: &str) -> Option<PathBuf> {
     let parent = path.parent()?;
     let listed = if parent.as_os_str().is_empty() { Path::new(".") } else { parent };
     let length = u64::try_from(text.len()).ok()?;
@@ -204,7 +204,7 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let file = |name: &str| folder.path().join(name);
         let write = |name: &str, text: &str| std::fs::write(file(name), text).expect("written");
-        let found = || find_renamed_scene(&file("first.toml"), "a = 1\n");
+        let found = || find_renamed_scene_by_text(&file("first.toml"), "a = 1\n");
         assert_eq!(found(), None);
         write("other.toml", "a = 2\n");
         write("longer.toml", "a = 1\n\n");

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::diagnostic::{Diagnostic, Severity, SourceSpan};
-use super::toml::{is_dotted_key_value, quote_toml_string};
+use super::toml::{is_one_dotted_key_assignment, quote_toml_string};
 
 /// File name shown in diagnostics about `--set` values.
 const SET_OPTION: &str = "--set";
@@ -127,7 +127,8 @@ fn set_arg_to_toml(set: &str) -> Option<String> {
     const MAX_EQUALS_SIGNS: usize = 8;
     set.match_indices('=').take(MAX_EQUALS_SIGNS).find_map(|(at, _)| {
         let (key, value) = (set[..at].trim(), set[at + 1..].trim());
-        let with = |value: &str| Some(format!("{key} = {value}")).filter(|text| is_dotted_key_value(text));
+        let with =
+            |value: &str| Some(format!("{key} = {value}")).filter(|text| is_one_dotted_key_assignment(text));
         with("0")?;
         with(value).or_else(|| with(&decimal_to_toml(value)?)).or_else(|| with(&quote_toml_string(value)))
     })

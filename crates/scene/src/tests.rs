@@ -44,7 +44,7 @@ fn empty_scene_has_the_documented_defaults() {
         look_at: DVec3::Y,
         up: DVec3::Y,
         projection: Projection::Perspective { fov: 40.0 },
-        window: ImageWindow::default(),
+        window: ImageShiftAndMirror::default(),
         aperture: 0.0,
         focus: 4.0,
     };
@@ -173,8 +173,12 @@ fn mesh_files_are_listed_once() {
     let map = NormalMap { texture: 0, strength: 0.5 };
     assert_eq!((diffuse, scene.materials[0].normal_map), (&ColorSource::Texture(0), Some(map)));
 
-    let late =
-        loaded.diagnostic_at(scene.mesh_files[1].span.clone(), Severity::Error, "no usable face", None);
+    let late = loaded.create_diagnostic_at(
+        scene.mesh_files[1].span.clone(),
+        Severity::Error,
+        "no usable face",
+        None,
+    );
     let shown = report::render_report(&[late], 300, report::ReportStyle::Plain);
     assert!(shown.contains("scene.toml:16:6\n") && shown.contains("^^^^^^^"), "{shown}");
 }
@@ -186,7 +190,7 @@ fn orbiter_replaces_position_and_look_at() {
     let camera = parse(text.into(), &path).scene.expect("a scene").camera;
     let Camera::Orbiter { file, projection, window, aperture, focus } = camera else { panic!("no orbiter") };
     assert_eq!(file.value, path.with_file_name("files/view.txt"));
-    let expected = (Some(Projection::Perspective { fov: 30.0 }), ImageWindow::default(), 0.5, None);
+    let expected = (Some(Projection::Perspective { fov: 30.0 }), ImageShiftAndMirror::default(), 0.5, None);
     assert_eq!((projection, window, aperture, focus), expected);
 }
 
@@ -462,7 +466,8 @@ fn blends_may_precede_their_parts() {
          [materials.inner]\ntype = 'blend'\nmaterials = ['a', 'b']\nweight = 0.25\n\
          [materials.a]\n[materials.b]\nemission = 1\nemission_sides = 'both'\n[materials.c]",
     );
-    let names: Vec<_> = scene.materials[0].with_parts().iter().map(|part| part.name.clone()).collect();
+    let names: Vec<_> =
+        scene.materials[0].self_and_blend_parts().iter().map(|part| part.name.clone()).collect();
     assert_eq!(names, ["outer", "inner", "a", "b", "c"]);
     let emitting: Vec<_> = scene.materials.iter().map(|material| material.emits()).collect();
     assert_eq!(emitting, [true, true, false, true, false]);

@@ -9,7 +9,7 @@ use super::color::ColorDepth;
 use super::connection::{QueryKind, TerminalFlowControl};
 use super::event::PreviewSendReport;
 use super::graphics::{PlacedImage, TerminalImages};
-use super::paint::{Fidelity, LinksAndDelayedText, Painter};
+use super::paint::{LinksAndDelayedText, Painter, PreviewFidelity};
 use super::preview_style::PreviewStyle;
 use super::terminal;
 use super::terminal_replies::TerminalQueries;
@@ -45,7 +45,7 @@ pub(super) struct TerminalEnvironment {
 impl TerminalEnvironment {
     /// Creates a connection whose speed is unknown. A local multiplexer's replies do not reflect the network
     /// behind it.
-    fn new_connection(self, now: Instant) -> TerminalFlowControl {
+    fn new_flow_control(self, now: Instant) -> TerminalFlowControl {
         TerminalFlowControl::new(self.is_multiplexed && self.is_remote, now)
     }
 }
@@ -92,7 +92,7 @@ impl Display {
         let mut display = Self {
             painter: Painter::new(depth).with_repeat_support(link.can_repeat),
             images,
-            connection: link.new_connection(now),
+            connection: link.new_flow_control(now),
             link,
             out,
             is_synchronized: false,
@@ -112,7 +112,7 @@ impl Display {
     pub(super) fn restart(&mut self, now: Instant) {
         self.invalidate();
         self.window_titles[1] = TitleAndProgress::default();
-        self.connection = self.link.new_connection(now);
+        self.connection = self.link.new_flow_control(now);
         let questions = [SYNCHRONIZED, &self.link.ask.optional_query_bytes(), ATTRIBUTES].concat();
         self.send(questions, Some(QueryKind::Attributes), now);
     }
@@ -140,7 +140,7 @@ impl Display {
     }
 
     /// Sets the preview to draw as pixels, or `None` if it is drawn as cells.
-    pub(super) fn place_pixels(&mut self, wanted: Option<PlacedImage>, is_still: bool) {
+    pub(super) fn set_pixel_preview(&mut self, wanted: Option<PlacedImage>, is_still: bool) {
         if let Some(uncovered) = self.images.as_mut().and_then(|images| images.set_target(wanted, is_still)) {
             self.painter.damage(uncovered);
         }
@@ -151,7 +151,7 @@ impl Display {
         &mut self,
         wanted: &Buffer,
         picture: Rect,
-        fidelity: Fidelity,
+        fidelity: PreviewFidelity,
         is_new: bool,
         extras: &LinksAndDelayedText,
     ) {
@@ -286,7 +286,7 @@ impl Display {
     }
 
     /// Whether the target has been sent completely.
-    pub(super) fn is_complete(&self) -> bool {
+    pub(super) fn is_target_sent(&self) -> bool {
         self.is_complete
     }
 
@@ -360,7 +360,7 @@ mod tests {
         }
         let show = |display: &mut Display, buffer: &Buffer| {
             let before = all.get();
-            display.set_target(buffer, area, Fidelity::Still, true, &LinksAndDelayedText::default());
+            display.set_target(buffer, area, PreviewFidelity::Still, true, &LinksAndDelayedText::default());
             for second in 1..100 {
                 let (now, sent) = (now + Duration::from_millis(second), all.get());
                 display.send_next_slice(now, || false);
@@ -368,7 +368,7 @@ mod tests {
                 display.handle_reply(TerminalReply::Attributes, now);
                 display.handle_reply(TerminalReply::Ready, now);
             }
-            assert!(display.is_complete());
+            assert!(display.is_target_sent());
             (display.take_send_report().expect("a report").bytes, all.get() - before)
         };
         display.reset_byte_count();

@@ -67,7 +67,7 @@ pub(super) fn run(editor: &str, place: &FilePosition) -> Result<(), String> {
 fn wait_for_child(id: Pid) -> Result<WaitStatus, Errno> {
     loop {
         match waitpid(id, Some(WaitPidFlag::WUNTRACED)) {
-            Ok(WaitStatus::Stopped(..)) => signals::stop_process(),
+            Ok(WaitStatus::Stopped(..)) => signals::suspend_process(),
             Ok(end @ (WaitStatus::Exited(..) | WaitStatus::Signaled(..))) => return Ok(end),
             Ok(_) | Err(Errno::EINTR) => {}
             Err(error) => return Err(error),

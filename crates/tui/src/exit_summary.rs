@@ -2,7 +2,7 @@
 
 use super::event::WriteFailure;
 use super::messages;
-use super::state::{KeyOverrides, RequestStatus, SceneImageProgress, State, WrittenFile};
+use super::state::{KeyboardOverrides, RequestStatus, SceneImageProgress, State, WrittenFile};
 use super::view::text::format_count_with_noun;
 use crate::choice::Choice;
 use crate::pipeline::protocol::{Report, SampleCounts, SavedSceneImageState};
@@ -30,12 +30,12 @@ pub(super) fn is_saved_scene_image_current(state: &State) -> bool {
 pub(super) fn unsaved_changes_as_options(state: &State) -> Option<String> {
     let shown = state.request.toggles;
     let is_in_file = state.saving.written.iter().any(|written| written.shows == Some(shown));
-    let is_in_scene =
-        state.saving.camera_of_model.is_some() && state.saving.camera_of_model == state.request.viewpoint();
+    let is_in_scene = state.saving.camera_of_model.is_some()
+        && state.saving.camera_of_model == state.request.current_camera();
     let camera = if is_in_scene { CameraOverrides::default() } else { shown.camera };
     let has_orbiter = state.request.text.as_ref().is_some_and(|text| text.contains("orbiter"));
-    let options = KeyOverrides { camera, ..shown }
-        .as_command_line_options(state.request.viewpoint().filter(|_| has_orbiter));
+    let options = KeyboardOverrides { camera, ..shown }
+        .as_command_line_options(state.request.current_camera().filter(|_| has_orbiter));
     (!options.is_empty() && !is_in_file).then(|| format!("not kept: {}", options.join(" ")))
 }
 
@@ -115,8 +115,8 @@ fn describe_files(written: &[WrittenFile]) -> String {
             let made = files.first().map_or("", |it| &it.made);
             let colon = if made.is_empty() { "" } else { ": " };
             let shows = files.first().and_then(|it| it.shows).unwrap_or_default();
-            let changes = KeyOverrides { view: None, ..shows }
-                .describe_changes_since(&KeyOverrides::default(), false)
+            let changes = KeyboardOverrides { view: None, ..shows }
+                .describe_changes_since(&KeyboardOverrides::default(), false)
                 .join(", ");
             let with = if changes.is_empty() { String::new() } else { format!(", with {changes}") };
             format!("wrote {}{colon}{made}{with}", names.join(", "))
@@ -400,7 +400,7 @@ mod tests {
         ui.state.request.text = Some(text.into());
         ui.state.request.own.as_mut().expect("a scene").camera.aperture = 0.1;
         ui.press_character('l');
-        let moved = ui.state.request.viewpoint().expect("a camera");
+        let moved = ui.state.request.current_camera().expect("a camera");
         let words = unsaved_changes_as_options(&ui.state).expect("moved");
         let sets = words.split("--set ").skip(1).map(|set| set.trim().replace('\'', ""));
         let sets: Vec<String> = sets.collect();

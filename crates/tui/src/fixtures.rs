@@ -22,8 +22,8 @@ use crate::pipeline::protocol::{
     self, AssetProgress, Command, Failure, ImageReport, PreviewUpdate, RenderProgress, Report, Request,
     ResolvedCamera, SampleCounts, Stage, StageReport, Status, WorkCounters,
 };
-use crate::pipeline::settings::{EffectiveSettingsSummary, Overrides, SceneSettings, ViewMode};
-use crate::scene::description::{Accel, ImageWindow, Integrator, Pose, Projection, ShadowMode};
+use crate::pipeline::settings::{AdjustableSceneSettings, EffectiveSettingsSummary, Overrides, ViewMode};
+use crate::scene::description::{Accel, ImageShiftAndMirror, Integrator, Pose, Projection, ShadowMode};
 use crate::scene::diagnostic::{Diagnostic, Severity, SourceSpan};
 
 pub(super) fn window(columns: u16, rows: u16) -> WindowSize {
@@ -200,9 +200,9 @@ pub(super) fn effective_settings() -> EffectiveSettingsSummary {
 }
 
 /// Settings from the scene file, before any overrides.
-pub(super) fn scene_settings() -> SceneSettings {
+pub(super) fn scene_settings() -> AdjustableSceneSettings {
     let (integrator, shadows) = (Integrator::Whitted, ShadowMode::Soft);
-    SceneSettings { camera: camera(), exposure: 0.0, integrator, shadows, photons: false }
+    AdjustableSceneSettings { camera: camera(), exposure: 0.0, integrator, shadows, photons: false }
 }
 
 /// A camera at (0, 1, 4) that looks along −z at a point 4 units away.
@@ -211,7 +211,7 @@ pub(super) fn camera() -> ResolvedCamera {
     ResolvedCamera {
         pose,
         projection: Projection::Perspective { fov: 40.0 },
-        window: ImageWindow::default(),
+        window: ImageShiftAndMirror::default(),
         aperture: 0.1,
         focus: 4.0,
     }

@@ -282,13 +282,13 @@ impl RenderHistory {
     }
 
     /// Whether moving `back` entries back (forward if negative) reaches the newest one.
-    pub(super) fn returns_to_newest(&self, back: isize) -> bool {
+    pub(super) fn step_reaches_newest(&self, back: isize) -> bool {
         let place = self.open.as_ref().and_then(|(at, _)| at.checked_add_signed(-back));
         place.is_some_and(|place| place + 1 >= self.past.len())
     }
 
     /// Opens the last render made before the last edit that changed the image.
-    pub(super) fn open_before_edit(&mut self, newest: PreviewUpdate) -> Option<PreviewUpdate> {
+    pub(super) fn open_render_before_edit(&mut self, newest: PreviewUpdate) -> Option<PreviewUpdate> {
         let last = self.past.back()?.edits;
         let at = self.past.iter().rposition(|past| past.edits < last)?;
         self.open_entry(at, newest)

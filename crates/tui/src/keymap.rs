@@ -232,13 +232,13 @@ pub(super) const OVERLAY: &[KeyBinding<OverlayAction>] = &[
 ];
 
 /// The overlay action for a key.
-pub(super) fn overlay_action_for(key: KeyPress) -> Option<OverlayAction> {
+pub(super) fn overlay_action_for_key(key: KeyPress) -> Option<OverlayAction> {
     OVERLAY.iter().find(|binding| binding.keys.contains(&key)).map(|binding| binding.action)
 }
 
 /// Returns the action for a key. Shift is ignored for characters, because not all terminals report it with a
 /// capital letter or `?`.
-pub(super) fn action_for(key: KeyPress) -> Option<Action> {
+pub(super) fn action_for_key(key: KeyPress) -> Option<Action> {
     let modifiers = match key.code {
         KeyCode::Char(_) => key.modifiers - KeyModifiers::SHIFT,
         _ => key.modifiers,
@@ -270,16 +270,16 @@ mod tests {
     #[test]
     fn shift_is_ignored_for_characters() {
         let shifted = KeyPress { code: KeyCode::Char('?'), modifiers: KeyModifiers::SHIFT };
-        assert_eq!(action_for(shifted), Some(Action::ToggleHelp));
-        assert_eq!(action_for(KeyPress::plain('V')), Some(Action::PreviousView));
-        assert_eq!(action_for(KeyPress::ctrl('q')), None);
-        assert_eq!(action_for(KeyPress::plain('g')), None);
+        assert_eq!(action_for_key(shifted), Some(Action::ToggleHelp));
+        assert_eq!(action_for_key(KeyPress::plain('V')), Some(Action::PreviousView));
+        assert_eq!(action_for_key(KeyPress::ctrl('q')), None);
+        assert_eq!(action_for_key(KeyPress::plain('g')), None);
     }
 
     #[test]
     fn documented_keys_are_bound() {
         for key in "?qsdpiv rw0hjkl+-<>[]fcombnNxzeuy".chars() {
-            assert!(action_for(KeyPress::plain(key)).is_some(), "{key:?}");
+            assert!(action_for_key(KeyPress::plain(key)).is_some(), "{key:?}");
         }
     }
 }

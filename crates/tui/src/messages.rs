@@ -290,7 +290,7 @@ pub fn save_to_render_hint(file: &str, is_again: bool) -> String {
 }
 
 /// A hint that changing the model file starts a render.
-pub fn renders_on_changes(file: &str) -> String {
+pub fn renders_on_changes_hint(file: &str) -> String {
     format!("re-renders when {file} changes")
 }
 

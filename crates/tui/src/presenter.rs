@@ -12,7 +12,9 @@ use ratatui::layout::Rect;
 use super::display::Display;
 use super::event::Event;
 use super::file_urls::FileUrlBuilder;
-use super::paint::{Fidelity, Hyperlink, LinksAndDelayedText, PacingAdvice, PacingInputs, pace_preview};
+use super::paint::{
+    Hyperlink, LinksAndDelayedText, PacingAdvice, PacingInputs, PreviewFidelity, pace_preview,
+};
 use super::state::State;
 use super::view;
 use super::view::FileLinksAndDelayedText;
@@ -77,7 +79,7 @@ impl FramePresenter {
         now: Instant,
     ) -> Option<Event> {
         let is_same_request =
-            generation == self.drawn.generation && !self.size_section_or_photons_differ(state);
+            generation == self.drawn.generation && !self.newest_differs_from_drawn_preview(state);
         if is_same_request && self.pacing_advice(state, now) == PacingAdvice::Wait {
             self.drawn.is_old = true;
             return None;
@@ -86,7 +88,7 @@ impl FramePresenter {
     }
 
     /// Whether the newest preview differs from the drawn one in size, section or missing photons.
-    fn size_section_or_photons_differ(&self, state: &State) -> bool {
+    fn newest_differs_from_drawn_preview(&self, state: &State) -> bool {
         let latest = self.previews.lock().unwrap_or_else(PoisonError::into_inner);
         let what = |picture: &Srgb8Image| (picture.width, picture.height);
         latest.as_ref().zip(state.preview.shown.as_ref()).is_some_and(|(new, old)| {
@@ -104,11 +106,11 @@ impl FramePresenter {
         let progress = state.work.progress.as_ref();
         let picture = self.drawn.picture.as_ref();
         let is_fast = self.display.is_fast();
-        let is_shown = if is_fast { self.display.is_acknowledged() } else { self.display.is_complete() };
+        let is_shown = if is_fast { self.display.is_acknowledged() } else { self.display.is_target_sent() };
         PacingInputs {
             bytes_per_second: self.display.bytes_per_second(),
             cells: picture.map_or(0, |picture| self.preview_cell_count(state, picture)),
-            samples: samples_per_pixel(state),
+            samples: mean_samples_so_far(state),
             aimed_samples: picture.map(|_| self.drawn.samples),
             since_aim: self.drawn.at.map_or(Duration::MAX, |at| now.saturating_duration_since(at)),
             is_shown,
@@ -145,7 +147,7 @@ impl FramePresenter {
     /// Updates the display's target if a frame is due.
     pub(super) fn draw_if_due(&mut self, state: &mut State, now: Instant) {
         let is_due = state.dirty && (state.urgent || now >= self.next_frame);
-        let is_refined = self.can_refine_preview(state);
+        let is_refined = self.should_redraw_in_exact_colors(state);
         if !is_due && !is_refined {
             return;
         }
@@ -161,11 +163,12 @@ impl FramePresenter {
         }
         let is_new = self.record_drawn_preview(state, now);
         // A preview counts as the first until it is complete on the screen or a newer one is drawn.
-        self.drawn.is_first &= is_new || !self.display.is_complete();
+        self.drawn.is_first &= is_new || !self.display.is_target_sent();
         let area = Layout::for_state(state).preview;
-        self.display.place_pixels(view::preview::terminal_image(state, area), is_final_preview(state));
+        self.display
+            .set_pixel_preview(view::preview::placed_pixel_preview(state, area), is_final_preview(state));
         let extras = self.links_and_delayed_text(state, drawn);
-        self.display.set_target(&buffer, area, self.fidelity(state), is_new, &extras);
+        self.display.set_target(&buffer, area, self.preview_fidelity(state), is_new, &extras);
     }
 
     /// The frame's hyperlinks, if the terminal supports them, and the text to draw after the preview.
@@ -177,9 +180,9 @@ impl FramePresenter {
 
     /// Whether to redraw the preview with exact colors because the connection is idle while a key moves the
     /// camera: the last preview is on the screen at reduced precision, and the next one has not arrived.
-    fn can_refine_preview(&self, state: &State) -> bool {
+    fn should_redraw_in_exact_colors(&self, state: &State) -> bool {
         let is_step = state.request.camera_step.generation == Some(self.drawn.generation);
-        is_step && self.drawn.is_first && !self.drawn.is_refined && self.display.is_complete()
+        is_step && self.drawn.is_first && !self.drawn.is_refined && self.display.is_target_sent()
     }
 
     /// Records the preview being drawn. Returns true if it is new.
@@ -189,7 +192,7 @@ impl FramePresenter {
             return false;
         }
         let is_first = self.drawn.generation != shown.generation;
-        let (picture, samples, at) = (Some(shown.picture.clone()), samples_per_pixel(state), Some(now));
+        let (picture, samples, at) = (Some(shown.picture.clone()), mean_samples_so_far(state), Some(now));
         let generation = shown.generation;
         if generation > self.newest {
             self.newest = generation;
@@ -199,13 +202,13 @@ impl FramePresenter {
         true
     }
 
-    fn fidelity(&self, state: &State) -> Fidelity {
+    fn preview_fidelity(&self, state: &State) -> PreviewFidelity {
         match () {
-            () if is_final_preview(state) => Fidelity::Still,
-            () if self.drawn.is_refined => Fidelity::Following,
-            () if self.drawn.is_first => Fidelity::First,
-            () if self.display.is_fast() => Fidelity::Following,
-            () => Fidelity::Moving,
+            () if is_final_preview(state) => PreviewFidelity::Still,
+            () if self.drawn.is_refined => PreviewFidelity::Following,
+            () if self.drawn.is_first => PreviewFidelity::First,
+            () if self.display.is_fast() => PreviewFidelity::Following,
+            () => PreviewFidelity::Moving,
         }
     }
 
@@ -237,7 +240,7 @@ impl FramePresenter {
             .at
             .filter(|_| self.drawn.is_old)
             .and_then(|at| self.pacing_inputs(state, now).next_due_time(at));
-        let refine = self.can_refine_preview(state).then_some(now);
+        let refine = self.should_redraw_in_exact_colors(state).then_some(now);
         let due = due.into_iter().chain(refine);
         next_frame_or_tick_time(state, self.next_frame)
             .into_iter()
@@ -248,7 +251,7 @@ impl FramePresenter {
 }
 
 /// Mean samples per pixel rendered so far.
-fn samples_per_pixel(state: &State) -> f64 {
+fn mean_samples_so_far(state: &State) -> f64 {
     state.work.progress.as_ref().map_or(0.0, |progress| progress.fraction * f64::from(progress.total_samples))
 }
 

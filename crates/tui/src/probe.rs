@@ -80,7 +80,7 @@ pub fn probe_terminal() -> Option<TerminalProbeResult> {
         return None;
     }
     let variable = |name: &str| std::env::var(name).ok();
-    let (window, link) = (terminal::query_window(None), terminal_environment_from_variables(variable));
+    let (window, link) = (terminal::query_window_size(None), terminal_environment_from_variables(variable));
     let questions = if may_print_unknown_escapes(variable) || link.is_multiplexed {
         Vec::new()
     } else {
@@ -100,7 +100,7 @@ pub fn probe_terminal() -> Option<TerminalProbeResult> {
     Some(TerminalProbeResult {
         cells: (window.columns, window.rows),
         cell_pixels: window.cell_pixels,
-        depth: color::resolve_depth(ColorDepthChoice::Auto, variable),
+        depth: color::resolve_color_depth(ColorDepthChoice::Auto, variable),
         is_multiplexed: link.is_multiplexed,
         is_remote: link.is_remote,
         has_iterm: brand.is_some_and(TerminalBrand::has_iterm_images),

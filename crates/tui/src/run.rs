@@ -36,12 +36,12 @@ const MAX_PLANNING_TIME: Duration = Duration::from_millis(3);
 /// Returns a [`TuiError`] if there is no terminal, if writing to it fails, or if the worker has ended.
 pub fn run(options: Options, queue: EventQueue) -> Result<TuiOutcome, TuiError> {
     terminal::require_terminal()?;
-    let depth = color::resolve_depth(options.color, |name| std::env::var(name).ok());
+    let depth = color::resolve_color_depth(options.color, |name| std::env::var(name).ok());
     // Prevent crossterm from dropping named colors when NO_COLOR is set.
     crossterm::style::force_color_output(depth != ColorDepth::None);
 
     let EventQueue { sender, events } = queue;
-    let listener = SignalListener::start(&sender).map_err(terminal_error_mapper("handle signals for"))?;
+    let listener = SignalListener::start(&sender).map_err(io_error_to_tui_error("handle signals for"))?;
     let variable = |name: &str| std::env::var(name).ok();
     let capabilities =
         TerminalId::from_environment(variable).map(TerminalId::capabilities).unwrap_or_default();
@@ -56,7 +56,7 @@ pub fn run(options: Options, queue: EventQueue) -> Result<TuiOutcome, TuiError> 
     let setup = InitialState {
         scene: options.scene,
         overrides: options.overrides,
-        window: terminal::query_window(options.cell_aspect),
+        window: terminal::query_window_size(options.cell_aspect),
         preview: PreviewStyle::initial(options.preview, depth, link.ask.pixels),
         depth,
         is_light: color::colorfgbg_indicates_light_background(variable),
@@ -65,8 +65,8 @@ pub fn run(options: Options, queue: EventQueue) -> Result<TuiOutcome, TuiError> 
         capabilities,
         notify_after: options.notify_after,
     };
-    input::start_reader(&sender).map_err(terminal_error_mapper("read keys from"))?;
-    writer::start_writer(&sender).map_err(terminal_error_mapper("write to"))?;
+    input::start_reader(&sender).map_err(io_error_to_tui_error("read keys from"))?;
+    writer::start_writer(&sender).map_err(io_error_to_tui_error("write to"))?;
 
     let now = Instant::now();
     let display = Display::new(depth, link, None, Box::new(writer::queue_slice), now);
@@ -84,7 +84,7 @@ pub fn run(options: Options, queue: EventQueue) -> Result<TuiOutcome, TuiError> 
     outcome
 }
 
-fn terminal_error_mapper(action: &'static str) -> impl Fn(io::Error) -> TuiError {
+fn io_error_to_tui_error(action: &'static str) -> impl Fn(io::Error) -> TuiError {
     move |source| TuiError::Terminal { action, source }
 }
 
@@ -199,7 +199,7 @@ impl EventLoop {
                 return self.apply_event(event);
             }
             Event::Written { bytes } => self.presenter.display.record_written(bytes),
-            Event::Unwritable(kind) => return Some(end_for_write_error(kind.into())),
+            Event::Unwritable(kind) => return Some(loop_end_for_write_error(kind.into())),
             Event::Key(_) | Event::Mouse(_) => {
                 let end = self.apply_event(event);
                 // A camera step is drawn together with its first preview, which arrives immediately and needs
@@ -226,23 +226,25 @@ impl EventLoop {
             Effect::Send(command) => (self.commands)(command),
             Effect::Quit(status) => return Some(LoopEnd::Quit(status)),
             Effect::GiveUp => {
-                return Some(LoopEnd::Error(TuiError::WorkerGone { reason: terminal::last_panic() }));
+                return Some(LoopEnd::Error(TuiError::WorkerGone { reason: terminal::last_panic_message() }));
             }
-            Effect::StopJob if !signals::has_shell() => return self.apply_event(Event::SuspendFailed),
+            Effect::StopJob if !signals::can_shell_resume_process() => {
+                return self.apply_event(Event::SuspendFailed);
+            }
             Effect::StopJob => {
-                return signals::stop_job()
+                return signals::suspend_job()
                     .err()
-                    .map(terminal_error_mapper("stop the job of"))
+                    .map(io_error_to_tui_error("stop the job of"))
                     .map(LoopEnd::Error);
             }
-            Effect::Suspend if signals::has_shell() => {
+            Effect::Suspend if signals::can_shell_resume_process() => {
                 self.leave_screen_and_await_replies();
                 self.screen.restore_terminal_temporarily();
                 // The process stops here. After it continues, SIGCONT requests a redraw.
-                signals::stop_process();
+                signals::suspend_process();
             }
             Effect::Suspend => {}
-            Effect::Mouse(is_on) => self.screen.set_mouse(is_on),
+            Effect::Mouse(is_on) => self.screen.set_mouse_reporting(is_on),
             Effect::Edit(place) => return self.run_editor(&place),
             Effect::Aside(bytes) => self.presenter.display.queue_after_preview(bytes),
             Effect::ReportFocus => self.screen.request_focus_reports(),
@@ -263,9 +265,9 @@ impl EventLoop {
         self.screen.restore_terminal_temporarily();
         // Outside raw mode, keys send signals.
         let child_signals = signals::leave_signals_to_child();
-        terminal::save_modes();
+        terminal::save_terminal_modes();
         let outcome = editor::run(&editor::editor_from_environment(|name| std::env::var(name).ok()), place);
-        terminal::restore_modes();
+        terminal::restore_terminal_modes();
         input::set_input_paused(false);
         let end = self.apply_event(Event::EditorExited).or_else(|| self.resume_and_redraw());
         drop(child_signals);
@@ -274,14 +276,14 @@ impl EventLoop {
 
     fn resume_and_redraw(&mut self) -> Option<LoopEnd> {
         if let Err(error) = self.screen.resume() {
-            return Some(end_for_write_error(error));
+            return Some(loop_end_for_write_error(error));
         }
         self.presenter.display.restart(Instant::now());
         self.update_window_size()
     }
 
     fn update_window_size(&mut self) -> Option<LoopEnd> {
-        self.apply_event(Event::Resize(terminal::query_window(self.cell_aspect)))
+        self.apply_event(Event::Resize(terminal::query_window_size(self.cell_aspect)))
     }
 
     /// Draws a frame if one is due and sends as much as the connection allows.
@@ -299,7 +301,7 @@ impl EventLoop {
 
 /// How the event loop ends after a write error. If the terminal no longer exists, this is a hangup, even if
 /// SIGHUP has not arrived.
-fn end_for_write_error(error: io::Error) -> LoopEnd {
+fn loop_end_for_write_error(error: io::Error) -> LoopEnd {
     if terminal::terminal_exists() {
         LoopEnd::Error(TuiError::Terminal { action: "write to", source: error })
     } else {

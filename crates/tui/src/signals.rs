@@ -283,13 +283,13 @@ fn exit_after_grace_period(signal: Signal, status: ExitStatus, over: &AtomicBool
         terminal::restore_from_other_thread();
         thread::sleep(RESTORE_TIME_LIMIT);
     }
-    terminal::restore_modes();
+    terminal::restore_terminal_modes();
     low_level::exit(i32::from(status.0));
 }
 
 /// Whether a shell could continue this process after it stops. The shell must be in the same session, so a
 /// session leader has no such shell.
-pub(super) fn has_shell() -> bool {
+pub(super) fn can_shell_resume_process() -> bool {
     match (getsid(None), getsid(Some(getppid()))) {
         (Ok(own), Ok(parents)) => own == parents && own != getpid(),
         _ => false,
@@ -298,12 +298,12 @@ pub(super) fn has_shell() -> bool {
 
 /// Stops the whole job with SIGTSTP, including any wrapper process. This is what ctrl-z does outside raw
 /// mode.
-pub(super) fn stop_job() -> io::Result<()> {
+pub(super) fn suspend_job() -> io::Result<()> {
     kill(Pid::from_raw(0), Number::SIGTSTP).map_err(io::Error::from)
 }
 
 /// Performs the default action of SIGTSTP, which stops this process. Returns when it is continued.
-pub(super) fn stop_process() {
+pub(super) fn suspend_process() {
     // If the process cannot be stopped, it keeps running.
     let _ = low_level::emulate_default_handler(SIGTSTP);
 }

@@ -7,7 +7,7 @@ use ratatui::style::Style;
 use super::color::{self, ColorDepth, ColorDepthChoice, ColorMapper};
 use super::event::WindowSize;
 use super::options::PreviewChoice;
-use super::paint::buffer_to_text_lines;
+use super::paint::buffer_to_ansi_text;
 use super::terminal;
 use super::view::preview::{PreviewColors, draw_image, size_in_cells};
 use super::view::text::{text_columns, truncated_text};
@@ -38,17 +38,20 @@ pub struct NamedImage {
 /// columns. If the output is not a terminal, its size is assumed to be 80×24.
 pub fn images_as_text(pictures: &[NamedImage], color: ColorDepthChoice, is_terminal: bool) -> String {
     let variable = |name: &str| std::env::var(name).ok();
-    let depth = color::resolve_depth(color, variable);
+    let depth = color::resolve_color_depth(color, variable);
     let shades = ColorMapper::new(depth, color::assumed_ansi_colors(&variable("TERM").unwrap_or_default()));
     let inks = PreviewColors {
         depth,
         shades: &shades,
         is_light: color::colorfgbg_indicates_light_background(variable),
     };
-    let ((columns, rows), aspect) =
-        if is_terminal { window_size_and_aspect(&terminal::query_window(None)) } else { ((80, 24), 2.0) };
+    let ((columns, rows), aspect) = if is_terminal {
+        window_size_and_aspect(&terminal::query_window_size(None))
+    } else {
+        ((80, 24), 2.0)
+    };
     let buffers = draw_images_beside_or_stacked(pictures, inks, columns, rows, aspect);
-    buffers.iter().map(|buffer| buffer_to_text_lines(buffer, depth != ColorDepth::None)).collect()
+    buffers.iter().map(|buffer| buffer_to_ansi_text(buffer, depth != ColorDepth::None)).collect()
 }
 
 /// Returns the window size and cell aspect ratio, with defaults for terminals that report a size of 0.
@@ -116,7 +119,7 @@ mod tests {
             size.1,
             2.0,
         );
-        let text: String = buffers.iter().map(|buffer| buffer_to_text_lines(buffer, false)).collect();
+        let text: String = buffers.iter().map(|buffer| buffer_to_ansi_text(buffer, false)).collect();
         text.lines().map(str::to_owned).collect()
     }
 

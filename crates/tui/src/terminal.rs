@@ -119,7 +119,7 @@ impl TerminalSession {
     }
 
     /// Enables or disables mouse reporting.
-    pub(super) fn set_mouse(&mut self, is_on: bool) {
+    pub(super) fn set_mouse_reporting(&mut self, is_on: bool) {
         MOUSE_REPORTING_ENABLED.store(is_on, Ordering::Release);
         writer::queue_slice(if is_on { MOUSE_ON } else { MOUSE_OFF }.as_bytes().to_vec());
     }
@@ -146,14 +146,14 @@ impl Drop for TerminalSession {
 /// Terminal modes saved while another program uses the terminal, or `None` at other times.
 static LENT_TERMINAL_MODES: Mutex<Option<Termios>> = Mutex::new(None);
 
-/// Saves the terminal modes for [`restore_modes`] before another program uses the terminal.
-pub(super) fn save_modes() {
+/// Saves the terminal modes for [`restore_terminal_modes`] before another program uses the terminal.
+pub(super) fn save_terminal_modes() {
     *LENT_TERMINAL_MODES.lock().unwrap_or_else(PoisonError::into_inner) = tcgetattr(io::stdin()).ok();
 }
 
-/// Restores the modes saved by [`save_modes`], because a killed program may leave the terminal in a different
-/// mode. Errors are ignored because nothing can be done about them.
-pub(super) fn restore_modes() {
+/// Restores the modes saved by [`save_terminal_modes`], because a killed program may leave the terminal in a
+/// different mode. Errors are ignored because nothing can be done about them.
+pub(super) fn restore_terminal_modes() {
     if let Some(modes) = LENT_TERMINAL_MODES.lock().unwrap_or_else(PoisonError::into_inner).take() {
         let _ = tcsetattr(io::stdin(), SetArg::TCSANOW, &modes);
     }
@@ -162,12 +162,12 @@ pub(super) fn restore_modes() {
 /// The terminal, opened during setup, so that restoring it does not need another file descriptor.
 static OUTPUT: Mutex<Option<File>> = Mutex::new(None);
 
-fn take_output_file() -> Option<File> {
+fn take_terminal_output() -> Option<File> {
     OUTPUT.lock().unwrap_or_else(PoisonError::into_inner).take()
 }
 
 fn set_up_terminal() -> io::Result<()> {
-    let output = writer::open_output()?;
+    let output = writer::open_terminal_output()?;
     *OUTPUT.lock().unwrap_or_else(PoisonError::into_inner) = Some(output);
     enable_raw_mode()?;
     RAW_MODE_ACTIVE.store(true, Ordering::Release);
@@ -199,7 +199,7 @@ fn leave_screen() {
     // Nothing else is writing, so dropping the system's buffered output makes room.
     let is_late = || Instant::now() >= deadline && (dropped.replace(true) || drop_kept().is_err());
     let _ = write_restore(&mut bytes)
-        .and_then(|()| take_output_file().map_or_else(writer::open_output, Ok))
+        .and_then(|()| take_terminal_output().map_or_else(writer::open_terminal_output, Ok))
         .and_then(|mut out| writer::write_all_unless_canceled(&mut out, &bytes, is_late));
 }
 
@@ -213,7 +213,8 @@ pub(super) fn restore_from_other_thread() {
         writer::discard_queued_and_wait(Duration::ZERO);
         thread::spawn(|| {
             let tty = File::options().write(true).open("/dev/tty");
-            tty.or_else(|error| take_output_file().ok_or(error)).and_then(|mut tty| write_restore(&mut tty))
+            tty.or_else(|error| take_terminal_output().ok_or(error))
+                .and_then(|mut tty| write_restore(&mut tty))
         });
     }
 }
@@ -351,7 +352,7 @@ fn write_frame_end_and_leave(out: &mut impl Write) -> io::Result<()> {
 
 /// Installs the panic hook. If the terminal's owner panics while using it, the terminal is restored before
 /// the panic is reported. A panic message from another thread would be lost on the alternate screen, so it is
-/// stored for [`last_panic`].
+/// stored for [`last_panic_message`].
 fn install_panic_hook() {
     static HOOK: Once = Once::new();
     HOOK.call_once(|| {
@@ -369,7 +370,7 @@ fn install_panic_hook() {
 }
 
 /// Message from the last panic in a thread that does not own the terminal.
-pub(super) fn last_panic() -> Option<String> {
+pub(super) fn last_panic_message() -> Option<String> {
     PANIC.lock().unwrap_or_else(PoisonError::into_inner).clone()
 }
 
@@ -391,7 +392,7 @@ pub(super) fn terminal_exists() -> bool {
 
 /// Window size and cell aspect ratio. If `cell_aspect` is `None`, the aspect ratio is derived from the window
 /// size in pixels, or is 2 if that size is unknown.
-pub(super) fn query_window(cell_aspect: Option<f32>) -> WindowSize {
+pub(super) fn query_window_size(cell_aspect: Option<f32>) -> WindowSize {
     match terminal::window_size() {
         Ok(size) => clamp_window_size(WindowSize {
             columns: size.columns,

@@ -63,7 +63,7 @@ impl WriteQueue {
 /// The thread or file descriptor could not be created.
 pub(super) fn start_writer(events: &Sender<Event>) -> io::Result<()> {
     let events = events.clone();
-    let mut out = open_output()?;
+    let mut out = open_terminal_output()?;
     let write = move || {
         loop {
             let slice = QUEUE.wait_and_pop_slice();
@@ -85,7 +85,7 @@ pub(super) fn start_writer(events: &Sender<Event>) -> io::Result<()> {
 /// Opens the terminal connected to standard output. This bypasses the buffer and lock of `stdout`, because a
 /// stalled writer could hold the lock. The terminal is opened in nonblocking mode, which does not affect
 /// other users of the terminal.
-pub(super) fn open_output() -> io::Result<File> {
+pub(super) fn open_terminal_output() -> io::Result<File> {
     let stdout = io::stdout();
     let terminal = ttyname(stdout.as_fd()).map_err(io::Error::from).and_then(|name| {
         let flags = OFlag::O_NONBLOCK | OFlag::O_NOCTTY;

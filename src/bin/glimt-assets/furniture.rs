@@ -11,7 +11,7 @@ pub(crate) fn furniture_meshes() -> Vec<(&'static str, PolygonMesh)> {
         ("furniture/cushion.ply", cushion()),
         ("furniture/armrest.ply", beveled_box([-0.1, 0.1, -0.42], [0.1, 0.62, 0.42], 0.045)),
         ("furniture/base.ply", beveled_box([-0.5, 0.1, -0.42], [0.5, 0.3, 0.4], 0.02)),
-        ("furniture/foot.ply", foot()),
+        ("furniture/foot.ply", furniture_foot()),
         ("furniture/leg.ply", table_leg()),
         ("furniture/board.ply", beveled_box([-0.5, 0.0, -0.5], [0.5, 0.03, 0.5], 0.006)),
         ("furniture/plate.ply", glass_plate()),
@@ -22,7 +22,7 @@ pub(crate) fn furniture_meshes() -> Vec<(&'static str, PolygonMesh)> {
         ("furniture/stand.ply", floor_lamp_stand()),
         ("furniture/shade.ply", lampshade()),
         ("furniture/decanter.ply", decanter()),
-        ("furniture/tumbler.ply", tumbler()),
+        ("furniture/tumbler.ply", drinking_glass()),
         ("furniture/bowl.ply", bowl()),
         ("furniture/pot.ply", flower_pot()),
         ("furniture/leaf.ply", plant_leaf()),
@@ -30,7 +30,7 @@ pub(crate) fn furniture_meshes() -> Vec<(&'static str, PolygonMesh)> {
         ("furniture/window.ply", window_frame()),
         ("furniture/frame.ply", picture_frame()),
         ("furniture/door.ply", door()),
-        ("furniture/jamb.ply", jamb()),
+        ("furniture/jamb.ply", door_frame()),
         ("furniture/bed.ply", bed()),
     ]
 }
@@ -74,7 +74,7 @@ fn cushion() -> PolygonMesh {
     surface
 }
 
-fn foot() -> PolygonMesh {
+fn furniture_foot() -> PolygonMesh {
     solid_of_revolution(&[[0.0, 0.0], [0.018, 0.0], [0.018, 0.0], [0.03, 0.1], [0.0, 0.1]], 10)
 }
 
@@ -202,7 +202,7 @@ fn decanter() -> PolygonMesh {
 }
 
 /// A drinking glass, 0.095 high.
-fn tumbler() -> PolygonMesh {
+fn drinking_glass() -> PolygonMesh {
     let outside = [[0.0, 0.0], [0.03, 0.0], [0.034, 0.004], [0.036, 0.02], [0.04, 0.092], [0.039, 0.095]];
     let inside = [[0.0375, 0.092], [0.0335, 0.024], [0.03, 0.016], [0.0, 0.014]];
     solid_of_revolution(&[&outside[..], &inside[..]].concat(), 32)
@@ -318,7 +318,7 @@ fn door() -> PolygonMesh {
 }
 
 /// The door frame, for a wall 0.12 thick behind the origin.
-fn jamb() -> PolygonMesh {
+fn door_frame() -> PolygonMesh {
     join([
         beveled_box([-0.09, 0.0, -0.14], [0.0, 2.06, 0.02], 0.006),
         beveled_box([0.9, 0.0, -0.14], [0.99, 2.06, 0.02], 0.006),

@@ -40,7 +40,7 @@ fn main() -> ExitCode {
     };
     for (name, bytes) in files {
         let path = Path::new("assets").join(name);
-        if let Err(error) = write(&path, &bytes) {
+        if let Err(error) = write_asset_file(&path, &bytes) {
             let _ = writeln!(io::stderr(), "cannot write {}: {error}", path.display());
             return ExitCode::FAILURE;
         }
@@ -49,7 +49,7 @@ fn main() -> ExitCode {
     ExitCode::SUCCESS
 }
 
-fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
+fn write_asset_file(path: &Path, bytes: &[u8]) -> io::Result<()> {
     fs::create_dir_all(path.parent().unwrap_or(Path::new("")))?;
     fs::write(path, bytes)
 }
@@ -59,12 +59,15 @@ fn stored_assets() -> Vec<AssetPathAndBytes> {
     let single = vec![
         ("coral.ply", shapes::coral().to_ply()),
         ("rope.ply", shapes::trefoil_knot_rope().to_ply()),
-        ("knot.obj", shapes::knot().to_obj("A trefoil knot with texture coordinates and normals")),
+        (
+            "knot.obj",
+            shapes::trefoil_knot_tube().to_obj("A trefoil knot with texture coordinates and normals"),
+        ),
         ("vase.obj", shapes::vase().to_obj("A vase, turned about y, with texture coordinates and normals")),
         ("gem.off", shapes::dodecahedron().to_off("A dodecahedron: twelve pentagons")),
-        ("racer.off", racer::body().to_off("The body of a toy racing car, to be subdivided")),
-        ("room.obj", room::obj()),
-        ("room.mtl", room::mtl()),
+        ("racer.off", racer::car_body().to_off("The body of a toy racing car, to be subdivided")),
+        ("room.obj", room::room_obj()),
+        ("room.mtl", room::room_mtl()),
         ("room_orbiter.txt", room::camera_in_orbiter_format()),
         (
             "shrub.obj",
@@ -76,7 +79,7 @@ fn stored_assets() -> Vec<AssetPathAndBytes> {
         ("textures/checker.png", pictures::checker()),
         ("textures/planks.png", pictures::planks()),
         ("textures/marble.png", pictures::marble()),
-        ("textures/tiles.ppm", pictures::tiles()),
+        ("textures/tiles.ppm", pictures::tiles_ppm()),
         ("textures/evening.hdr", sky::evening_sky_hdr()),
     ];
     let parts = stairs::stair_meshes().into_iter().chain(furniture::furniture_meshes());

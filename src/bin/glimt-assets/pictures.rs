@@ -126,7 +126,7 @@ pub(crate) fn marble() -> Vec<u8> {
 
 /// Four by four glazed tiles as a PPM file. The file contains a comment, like files written by paint
 /// programs.
-pub(crate) fn tiles() -> Vec<u8> {
+pub(crate) fn tiles_ppm() -> Vec<u8> {
     let side = 64;
     let mut file = format!("P6\n# made by glimt-assets\n{side} {side}\n255\n").into_bytes();
     file.extend(render_srgb(side, |u, v| {

@@ -7,7 +7,7 @@ use super::vector::{Vector, sin_cos_turns};
 const RING: u32 = 12;
 
 /// A cross section of the body: an ellipse with a flat bottom.
-struct Section {
+struct CrossSection {
     /// Position along the car, from the tail to the nose.
     x: f64,
     half_width: f64,
@@ -18,25 +18,25 @@ struct Section {
     is_cockpit: bool,
 }
 
-const fn section(x: f64, half_width: f64, height: f64, half_height: f64) -> Section {
-    Section { x, half_width, height, half_height, is_cockpit: false }
+const fn new_cross_section(x: f64, half_width: f64, height: f64, half_height: f64) -> CrossSection {
+    CrossSection { x, half_width, height, half_height, is_cockpit: false }
 }
 
-const SECTIONS: [Section; 11] = [
-    section(-1.02, 0.05, 0.47, 0.06),
-    section(-0.95, 0.13, 0.47, 0.13),
-    section(-0.70, 0.25, 0.46, 0.23),
-    section(-0.36, 0.335, 0.46, 0.31),
-    Section { is_cockpit: true, ..section(-0.30, 0.34, 0.46, 0.30) },
-    Section { is_cockpit: true, ..section(0.02, 0.35, 0.45, 0.27) },
-    section(0.08, 0.35, 0.45, 0.26),
-    section(0.50, 0.31, 0.42, 0.22),
-    section(0.85, 0.22, 0.39, 0.16),
-    section(1.00, 0.14, 0.38, 0.11),
-    section(1.04, 0.08, 0.38, 0.06),
+const SECTIONS: [CrossSection; 11] = [
+    new_cross_section(-1.02, 0.05, 0.47, 0.06),
+    new_cross_section(-0.95, 0.13, 0.47, 0.13),
+    new_cross_section(-0.70, 0.25, 0.46, 0.23),
+    new_cross_section(-0.36, 0.335, 0.46, 0.31),
+    CrossSection { is_cockpit: true, ..new_cross_section(-0.30, 0.34, 0.46, 0.30) },
+    CrossSection { is_cockpit: true, ..new_cross_section(0.02, 0.35, 0.45, 0.27) },
+    new_cross_section(0.08, 0.35, 0.45, 0.26),
+    new_cross_section(0.50, 0.31, 0.42, 0.22),
+    new_cross_section(0.85, 0.22, 0.39, 0.16),
+    new_cross_section(1.00, 0.14, 0.38, 0.11),
+    new_cross_section(1.04, 0.08, 0.38, 0.06),
 ];
 
-impl Section {
+impl CrossSection {
     /// A vertex of the section, counted from the top toward +z.
     fn vertex(&self, number: u32) -> Vector {
         let (sin, cos) = sin_cos_turns(f64::from(number) / f64::from(RING));
@@ -50,7 +50,7 @@ impl Section {
 }
 
 /// The body, a closed triangle mesh that is symmetric about the plane z = 0.
-pub(crate) fn body() -> PolygonMesh {
+pub(crate) fn car_body() -> PolygonMesh {
     let mut surface = PolygonMesh::default();
     for section in &SECTIONS {
         surface.positions.extend((0..RING).map(|number| section.vertex(number)));

@@ -56,7 +56,7 @@ impl ObjWriter {
 }
 
 /// Floor, ceiling, three walls, three blocks, and a light.
-pub(crate) fn obj() -> Vec<u8> {
+pub(crate) fn room_obj() -> Vec<u8> {
     let [x, height, z] = ROOM;
     let (width, depth) = (2.0 * x, 2.0 * z);
     let text = "# A room that is open to the front. Made by glimt-assets.\nmtllib room.mtl\n".to_owned();
@@ -83,7 +83,7 @@ pub(crate) fn obj() -> Vec<u8> {
 }
 
 /// The room's materials.
-pub(crate) fn mtl() -> Vec<u8> {
+pub(crate) fn room_mtl() -> Vec<u8> {
     let text = "\
 # Materials of room.obj. Made by glimt-assets.
 newmtl plaster

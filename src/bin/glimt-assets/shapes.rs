@@ -46,7 +46,7 @@ pub(crate) fn trefoil_knot_rope() -> PolygonMesh {
 }
 
 /// A tube along a trefoil knot. The texture repeats 24 times along the tube and twice around it.
-pub(crate) fn knot() -> PolygonMesh {
+pub(crate) fn trefoil_knot_tube() -> PolygonMesh {
     PolygonMesh::grid(224, 24, [24.0, 2.0], |s, t| tube_point(s, t, 0.24, trefoil_point))
 }
 

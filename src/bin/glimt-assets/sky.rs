@@ -12,7 +12,7 @@ pub(crate) fn evening_sky_hdr() -> Vec<u8> {
         format!("#?RADIANCE\nSOFTWARE=glimt-assets\nFORMAT=32-bit_rle_rgbe\n\n-Y {HEIGHT} +X {WIDTH}\n")
             .into_bytes();
     for (row, column) in (0..HEIGHT).flat_map(|row| (0..WIDTH).map(move |column| (row, column))) {
-        file.extend(rgbe(radiance(pixel_direction(column, row))));
+        file.extend(encode_rgbe(sky_radiance(pixel_direction(column, row))));
     }
     file
 }
@@ -25,7 +25,7 @@ fn pixel_direction(column: u32, row: u32) -> Vector {
     [across * sin, y, -across * cos]
 }
 
-fn radiance(d: Vector) -> Vector {
+fn sky_radiance(d: Vector) -> Vector {
     let sun = unit([0.62, 0.36, -0.70]);
     let to_sun = dot(d, sun).max(0.0);
     let haze = to_sun.powi(6);
@@ -48,7 +48,7 @@ fn radiance(d: Vector) -> Vector {
 }
 
 /// RGBE encoding: three mantissas and a shared exponent (Ward, *Real Pixels*, Graphics Gems II, 1991).
-fn rgbe(color: Vector) -> [u8; 4] {
+fn encode_rgbe(color: Vector) -> [u8; 4] {
     let brightest = color[0].max(color[1]).max(color[2]);
     let (_, exponent) = libm::frexp(brightest);
     let mantissa = |component: f64| (libm::ldexp(component, 8 - exponent)).floor().min(255.0) as u8;

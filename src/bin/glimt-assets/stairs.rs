@@ -30,10 +30,10 @@ pub(crate) fn stair_meshes() -> Vec<(&'static str, PolygonMesh)> {
         ("stairs/flight2.ply", second_flight()),
         ("stairs/gallery.ply", gallery_floor()),
         ("stairs/baluster.ply", baluster()),
-        ("stairs/newel.ply", newel()),
-        ("stairs/rail1.ply", rail(FOOT, LANDING)),
-        ("stairs/rail2.ply", rail(LANDING, GALLERY)),
-        ("stairs/rail3.ply", rail(GALLERY, [RIGHT_WALL, GALLERY[1], GALLERY[2]])),
+        ("stairs/newel.ply", newel_post()),
+        ("stairs/rail1.ply", handrail(FOOT, LANDING)),
+        ("stairs/rail2.ply", handrail(LANDING, GALLERY)),
+        ("stairs/rail3.ply", handrail(GALLERY, [RIGHT_WALL, GALLERY[1], GALLERY[2]])),
         ("stairs/candle.ply", candle_bulb()),
         ("stairs/bowl.ply", wall_lamp()),
         ("stairs/shade.ply", lampshade()),
@@ -123,7 +123,7 @@ fn baluster() -> PolygonMesh {
 }
 
 /// A square newel post topped with a ball.
-fn newel() -> PolygonMesh {
+fn newel_post() -> PolygonMesh {
     join([
         beveled_box([-0.05, 0.0, -0.05], [0.05, 1.12, 0.05], 0.008),
         beveled_box([-0.065, 1.12, -0.065], [0.065, 1.16, 0.065], 0.012),
@@ -132,7 +132,7 @@ fn newel() -> PolygonMesh {
 }
 
 /// The handrail along the open side of a flight, above the nosings and slightly inside.
-fn rail(from: Vector, to: Vector) -> PolygonMesh {
+fn handrail(from: Vector, to: Vector) -> PolygonMesh {
     let above = if from[0] == to[0] { [-0.05, 1.0, 0.0] } else { [0.0, 1.0, -0.05] };
     round_bar_along_path(&[add(from, above), add(to, above)], 0.032, 12)
 }

@@ -15,7 +15,7 @@ use super::v;
 
 /// The glass solids in a built scene.
 fn bodies(build: &Build) -> GlassSolids {
-    let meshes: Vec<&LoadedMesh> = build.parts.meshes.iter().map(|mesh| mesh.loaded()).collect();
+    let meshes: Vec<&LoadedMesh> = build.parts.meshes.iter().map(|mesh| mesh.loaded_mesh()).collect();
     GlassSolids::find(&build.scene, &meshes, &CancelToken::new()).expect("the token is not canceled")
 }
 

@@ -4,7 +4,7 @@ use glimt::film::Rect;
 use glimt::integrators::RenderSettings;
 use glimt::math::random::TestRandom;
 use glimt::math::{DVec2, DVec3, Vec2};
-use glimt::scene::description::{Camera, ImageWindow, Projection, RenderOptions};
+use glimt::scene::description::{Camera, ImageShiftAndMirror, Projection, RenderOptions};
 use glimt::world::FilmPosition;
 
 use super::scenes::{emitter, scene, tile};
@@ -18,7 +18,7 @@ fn lens() -> Camera {
         look_at: v(0.0, 0.0, -5.0),
         up: DVec3::Y,
         projection: Projection::Perspective { fov: 40.0 },
-        window: ImageWindow::default(),
+        window: ImageShiftAndMirror::default(),
         aperture: 0.1,
         focus: 5.0,
     }
@@ -38,7 +38,7 @@ fn rays_pass_through_projected_points() {
         let (position, target) = (random.direction() * 7.0, random.direction() * 2.0);
         let (up, fov) = (random.direction(), 20.0 + 80.0 * random.unit());
         let build = scene().with(|scene| {
-            let (projection, window) = (Projection::Perspective { fov }, ImageWindow::default());
+            let (projection, window) = (Projection::Perspective { fov }, ImageShiftAndMirror::default());
             scene.camera = Camera::LookAt {
                 position,
                 look_at: target,
@@ -62,7 +62,7 @@ fn rays_pass_through_projected_points() {
         let render = RenderOptions { width: 333, height: 200, ..settings.render };
         let settings = RenderSettings { render, ..settings };
         let pixel = DVec2::new((ndc.x + 1.0) / 2.0 * 333.0, (1.0 - ndc.y) / 2.0 * 200.0);
-        let ray = camera.ray(settings.film_position(pixel), Vec2::ZERO).expect("a ray");
+        let ray = camera.ray(settings.film_position_from_pixel(pixel), Vec2::ZERO).expect("a ray");
         let along = (point - ray.origin.as_dvec3()).normalize();
         assert!((along - ray.direction.as_dvec3()).length() < 1e-6, "{point} is not on its ray");
         assert_close("depth", camera.depth_of(point), eye.z);

@@ -7,7 +7,7 @@ use glimt::control::{CancelToken, ignore_progress};
 use glimt::film::Rect;
 use glimt::geometry::mesh::TriangleMesh;
 use glimt::integrators::{
-    PhotonMap, PhotonMapper, PhotonMaps, PhotonSettings, ViewMode, render_tile_with_photons,
+    PhotonMap, PhotonMapper, PhotonPassesBySample, PhotonSettings, ViewMode, render_tile_with_photons,
 };
 use glimt::math::{DVec3, Vec3};
 use glimt::scene::description::Shape;
@@ -306,7 +306,7 @@ fn photons_do_not_depend_on_threads_or_tiles() {
             }
         }
     }
-    let render = |maps: &PhotonMaps, rect: Rect, samples: Range<u32>| {
+    let render = |maps: &PhotonPassesBySample, rect: Rect, samples: Range<u32>| {
         let tile = render_tile_with_photons(Some(maps), &world, &settings, rect, samples, &token);
         tile.expect("the token is not canceled").0.radiance
     };

@@ -7,8 +7,8 @@ use glimt::math::random::TestRandom;
 use glimt::math::{DMat3, DVec2, DVec3, Vec2, Vec3};
 use glimt::scene::description::Projection::{Fisheye, Orthographic, Perspective, Spherical};
 use glimt::scene::description::{
-    Camera, ColorSource, ImageWindow, Integrator, MapOrientation, MaterialKind, PhongParameters, Projection,
-    RenderOptions, TextureFilter, Wrap,
+    Camera, ColorSource, ImageShiftAndMirror, Integrator, MapOrientation, MaterialKind, PhongParameters,
+    Projection, RenderOptions, TextureFilter, Wrap,
 };
 use glimt::world::{self, FilmPosition};
 
@@ -20,13 +20,13 @@ const ALL: [Projection; 4] =
     [Perspective { fov: 60.0 }, Orthographic { view_height: 6.0 }, Spherical, Fisheye { fov: 250.0 }];
 
 /// A camera at the origin that looks along −z.
-fn camera(projection: Projection, window: ImageWindow) -> Camera {
+fn camera(projection: Projection, window: ImageShiftAndMirror) -> Camera {
     let (position, look_at, up) = (DVec3::ZERO, DVec3::NEG_Z, DVec3::Y);
     Camera::LookAt { position, look_at, up, projection, window, aperture: 0.0, focus: 1.0 }
 }
 
 fn unshifted(projection: Projection) -> Camera {
-    camera(projection, ImageWindow::default())
+    camera(projection, ImageShiftAndMirror::default())
 }
 
 fn with_camera(build: Build, camera: Camera, (width, height): (u32, u32)) -> Build {
@@ -167,7 +167,7 @@ fn panorama_reproduces_an_environment_map() {
             look_at: position + axes * DVec3::NEG_Z,
             up: axes * DVec3::Y,
             projection: Spherical,
-            window: ImageWindow::default(),
+            window: ImageShiftAndMirror::default(),
             aperture: 0.0,
             focus: 1.0,
         };
@@ -209,7 +209,7 @@ fn mirrored_images_are_flipped_exactly() {
     for projection in ALL {
         let shown = |mirror| {
             let shift = DVec2::new(0.3, -0.1);
-            let mut camera = camera(projection, ImageWindow { shift, mirror });
+            let mut camera = camera(projection, ImageShiftAndMirror { shift, mirror });
             if let Camera::LookAt { aperture, focus, .. } = &mut camera {
                 (*aperture, *focus) = (if projection.has_lens() { 0.1 } else { 0.0 }, 3.0);
             }
@@ -236,8 +236,9 @@ fn shifted_image_is_a_crop_of_a_larger_one() {
         (Orthographic { view_height: 2.0 }, Orthographic { view_height: 2.0 * scale }),
         (Fisheye { fov: 60.0 }, Fisheye { fov: 60.0 * scale }),
     ] {
-        let [small, large] = [camera(projection, ImageWindow { shift, mirror: false }), unshifted(larger)]
-            .map(|it| world_camera(&it));
+        let [small, large] =
+            [camera(projection, ImageShiftAndMirror { shift, mirror: false }), unshifted(larger)]
+                .map(|it| world_camera(&it));
         // All of these are in the circle of the shifted fisheye.
         for (x, y) in [(0.0, 0.0), (-0.4, 0.9), (0.05, 0.1), (0.15, 0.4)] {
             let place = DVec2::new(x, y);
@@ -252,7 +253,7 @@ fn shifted_image_is_a_crop_of_a_larger_one() {
     // A panorama that is shifted by its width looks the same, and by a quarter of it, it is turned.
     let film = |x: f64| FilmPosition { offset: DVec2::new(x, 0.3), half_width: 1.5 };
     let shifted = |x: f64| {
-        let window = ImageWindow { shift: DVec2::new(x, 0.0), mirror: false };
+        let window = ImageShiftAndMirror { shift: DVec2::new(x, 0.0), mirror: false };
         world_camera(&camera(Spherical, window)).ray(film(0.2), Vec2::ZERO).expect("a ray").direction
     };
     assert!((shifted(1.5) - shifted(0.0)).length() < 1e-6);
@@ -275,7 +276,7 @@ fn clicks_hit_the_object_shown_at_the_pixel() {
     let (width, height) = (40_u32, 20_u32);
     for projection in ALL {
         for (shift, mirror) in [(DVec2::ZERO, false), (DVec2::new(0.2, 0.1), true)] {
-            let camera = camera(projection, ImageWindow { shift, mirror });
+            let camera = camera(projection, ImageShiftAndMirror { shift, mirror });
             let build = with_camera(balls.clone(), camera, (width, height));
             let (world, settings) = (build.world(), build.settings(0));
             let mut checked = 0;
@@ -330,7 +331,7 @@ fn orthographic_footprints_ignore_distance() {
                 look_at: v(0.25, 0.0, -50.25),
                 up: DVec3::X,
                 projection: Orthographic { view_height },
-                window: ImageWindow::default(),
+                window: ImageShiftAndMirror::default(),
                 aperture: 0.0,
                 focus: distance,
             };
@@ -357,7 +358,8 @@ fn parallel_rays_can_start_in_glass() {
             build.clone().quad(v(0.6, -0.05, -0.25), 1.8 * DVec3::X, 0.1 * DVec3::Y, emitter(1.0));
         let seen = |build: &Build, x: f64| {
             let shift = DVec2::new(x * 1000.0, 0.0);
-            let camera = camera(Orthographic { view_height: 1e-3 }, ImageWindow { shift, mirror: false });
+            let camera =
+                camera(Orthographic { view_height: 1e-3 }, ImageShiftAndMirror { shift, mirror: false });
             with_camera(build.clone(), camera, (1, 1)).value()
         };
         for x in [1.2, 1.5, 2.1_f64] {
@@ -424,7 +426,7 @@ fn pixel_positions_scale_with_the_image() {
     let position = |width, height, x, y| {
         let settings = scene().settings(0);
         let render = RenderOptions { width, height, ..settings.render };
-        RenderSettings { render, ..settings }.film_position(DVec2::new(x, y))
+        RenderSettings { render, ..settings }.film_position_from_pixel(DVec2::new(x, y))
     };
     assert_eq!(position(60, 40, 15.0, 30.0), position(30, 20, 7.5, 15.0));
     assert_eq!(position(60, 40, 60.0, 0.0).offset, DVec2::new(1.5, 1.0));

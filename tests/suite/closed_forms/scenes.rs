@@ -9,21 +9,21 @@ use glimt::control::{CancelToken, ignore_progress};
 use glimt::film::Rect;
 use glimt::geometry::mesh::TriangleMesh;
 use glimt::integrators::{
-    self, LayerSet, PhotonMaps, PhotonSettings, RenderSettings, ViewMode, render_tile_with_photons,
+    self, LayerSet, PhotonPassesBySample, PhotonSettings, RenderSettings, ViewMode, render_tile_with_photons,
 };
 use glimt::materials::texels::{TexelData, Texels};
 use glimt::math::{DVec3, Vec2, Vec3};
 use glimt::scene::description::light::{Falloff, PointLight};
 use glimt::scene::description::{
-    Accel, AffineMap, Camera, CoatSource, ColorSource, EmissionSource, Environment, FresnelSource,
-    ImageSource, ImageWindow, Integrator, Light, MapOrientation, Material, MaterialKind, MeshFile,
+    Accel, AffineMap, Camera, CoatSource, ColorSource, ConductorFresnelSource, EmissionSource, Environment,
+    ImageShiftAndMirror, ImageSource, Integrator, Light, MapOrientation, Material, MaterialKind, MeshFile,
     MeshReference, MicrofacetDistribution, NumberSource, Object, ObjectTransform, OpacitySource, Pattern,
     PhongParameters, PhotonOptions, PixelFilter, Projection, ReflectingSides, RenderOptions, Scene,
     ShadowMode, Shape, Sky, Spanned, Texture, TextureContent, TextureEncoding, TextureFilter, Tonemap, UvSet,
     Wrap,
 };
 use glimt::world::{
-    EnvironmentSource, Geometry, Image, MeshTree, TextureRolesNeededByRender, World, WorldInputs,
+    EnvironmentSource, Geometry, MeshTree, TexelsAndMipmaps, TextureRolesNeededByRender, World, WorldInputs,
     build_environment_map, build_lights, build_sky, choose_origin_near_camera_target,
     separate_coincident_emitters, textures_needed,
 };
@@ -88,7 +88,7 @@ fn look_at(position: DVec3, look_at: DVec3, fov: f64) -> Camera {
         look_at,
         up,
         projection: Projection::Perspective { fov },
-        window: ImageWindow::default(),
+        window: ImageShiftAndMirror::default(),
         aperture: 0.0,
         focus: (look_at - position).length(),
     }
@@ -154,7 +154,7 @@ impl Build {
     pub fn shape_with_matrix(self, shape: Shape, matrix: AffineMap, material: Material) -> Self {
         let mut build = self.shape(shape, material).with_placements();
         let object = build.scene.objects.pop().expect("the shape");
-        build.scene.objects.push(object.placed(&ObjectTransform::Matrix(matrix)));
+        build.scene.objects.push(object.with_outer_transform(&ObjectTransform::Matrix(matrix)));
         build
     }
 
@@ -226,7 +226,7 @@ impl Build {
     pub fn own_mesh(self, mesh: TriangleMesh, materials: Vec<FileMaterial>) -> Self {
         let mut build = self.mesh(mesh, IDENTITY_PLACEMENT, matte(0.5));
         let file = build.parts.meshes.len() - 1;
-        let loaded = LoadedMesh { materials, ..build.parts.meshes[file].loaded().clone() };
+        let loaded = LoadedMesh { materials, ..build.parts.meshes[file].loaded_mesh().clone() };
         let loaded = distinct_lights(loaded, false);
         let tree = MeshTree::build(Arc::new(loaded), Accel::Bvh, &CancelToken::new()).expect("not canceled");
         build.parts.meshes[file] = Arc::new(tree);
@@ -300,7 +300,8 @@ impl Build {
                 None => self.sky.as_ref().expect("an environment map"),
             };
             let levels = || Arc::new(mipmaps(texels, &CancelToken::new()).expect("not canceled"));
-            let image = Image { texels: Arc::clone(texels), mipmaps: needed.has_mipmaps.then(levels) };
+            let image =
+                TexelsAndMipmaps { texels: Arc::clone(texels), mipmaps: needed.has_mipmaps.then(levels) };
             parts.images.insert(needed.source, image);
         }
         let origin = choose_origin_near_camera_target(&self.scene.camera, None);
@@ -371,7 +372,7 @@ pub fn tile(world: &World, settings: &RenderSettings, rect: Rect, samples: u32) 
 }
 
 /// Photon maps for `samples` samples. `None` if no photons are gathered.
-pub fn maps(world: &World, settings: &RenderSettings, samples: u32) -> Option<PhotonMaps> {
+pub fn maps(world: &World, settings: &RenderSettings, samples: u32) -> Option<PhotonPassesBySample> {
     let token = CancelToken::new();
     settings.without_ineffective_settings().photons.filter(|_| settings.gathers_photons()).map(|of_photons| {
         let photons = integrators::PhotonMapper::new_with_first_pass(
@@ -388,7 +389,7 @@ pub fn maps(world: &World, settings: &RenderSettings, samples: u32) -> Option<Ph
 
 /// Renders a tile like [`tile`], with existing photon maps.
 pub fn tile_with_photons(
-    maps: Option<&PhotonMaps>,
+    maps: Option<&PhotonPassesBySample>,
     world: &World,
     settings: &RenderSettings,
     rect: Rect,
@@ -453,7 +454,7 @@ pub fn mirror(reflectance: f32) -> Material {
 /// Metal with a gray reflectance at normal incidence.
 pub fn metal(reflectance: f32, roughness: f32, anisotropy: f32) -> Material {
     plain(MaterialKind::Metal {
-        fresnel: FresnelSource::Schlick(ColorSource::Constant(Vec3::splat(reflectance))),
+        fresnel: ConductorFresnelSource::Schlick(ColorSource::Constant(Vec3::splat(reflectance))),
         roughness: NumberSource::Constant(roughness),
         anisotropy: NumberSource::Constant(anisotropy),
         distribution: MicrofacetDistribution::Ggx,

@@ -30,14 +30,14 @@ pub(super) struct SquaredMeanChanges {
     /// Luminance of each pixel at the sample count halfway to the next power of two.
     half_way: Vec<f32>,
     /// Squared steps at 2, 4, 8, … samples, for each half of each cell.
-    levels: Vec<[[LevelSums; 2]; CELLS]>,
+    levels: Vec<[[SquaredStepSums; 2]; CELLS]>,
     /// Change of each pixel's luminance when its sample count last doubled.
     recent: Vec<f32>,
 }
 
 /// Sums of squared steps over pixels, at one power-of-two sample count.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct LevelSums {
+struct SquaredStepSums {
     /// Sum of the squared steps in the mean of all samples.
     outer: f64,
     /// Sum of the squared steps in the mean of the second half of the samples.
@@ -52,7 +52,7 @@ struct LevelSums {
 
 /// Squared steps at a power-of-two sample count and one doubling earlier.
 #[derive(Clone, Copy, Debug, Default)]
-struct StepPair {
+struct SquaredStepPair {
     last: f64,
     /// Mean squared step within the two halves of the samples, or `None` if there are only two samples.
     before: Option<f64>,
@@ -81,13 +81,13 @@ impl SquaredMeanChanges {
         self.levels.len()
     }
 
-    /// Serializes all numbers as 32-bit words in the order that [`SquaredMeanChanges::read`] expects.
+    /// Serializes all numbers as 32-bit words in the order that [`SquaredMeanChanges::read_words`] expects.
     pub(super) fn write_words(&self, put: &mut impl FnMut(u32)) {
         for values in [&self.last, &self.half_way, &self.recent] {
             values.iter().for_each(|value| put(value.to_bits()));
         }
         for sums in self.levels.iter().flatten().flatten() {
-            let LevelSums { outer, inner, outer_squares, relative, relative_inner } = *sums;
+            let SquaredStepSums { outer, inner, outer_squares, relative, relative_inner } = *sums;
             for bits in [outer, inner, outer_squares, relative, relative_inner].map(f64::to_bits) {
                 put(bits as u32);
                 put((bits >> 32) as u32);
@@ -96,7 +96,7 @@ impl SquaredMeanChanges {
     }
 
     /// Deserializes steps for `area` pixels and `levels` doublings.
-    pub(super) fn read<E>(
+    pub(super) fn read_words<E>(
         area: usize,
         levels: usize,
         word: &mut impl FnMut() -> Result<u32, E>,
@@ -105,7 +105,7 @@ impl SquaredMeanChanges {
         for values in [&mut steps.last, &mut steps.half_way, &mut steps.recent] {
             *values = (0..area).map(|_| word().map(f32::from_bits)).collect::<Result<_, _>>()?;
         }
-        steps.levels = vec![[[LevelSums::default(); 2]; CELLS]; levels];
+        steps.levels = vec![[[SquaredStepSums::default(); 2]; CELLS]; levels];
         for sums in steps.levels.iter_mut().flatten().flatten() {
             let mut number = || {
                 let low = u64::from(word()?);
@@ -150,7 +150,7 @@ impl SquaredMeanChanges {
         }
         let level = count.trailing_zeros() as usize;
         if level > 0 {
-            self.levels.resize(self.levels.len().max(level), [[LevelSums::default(); 2]; CELLS]);
+            self.levels.resize(self.levels.len().max(level), [[SquaredStepSums::default(); 2]; CELLS]);
             let (mean, last, half_way) =
                 (f64::from(rounded), f64::from(self.last[pixel]), f64::from(self.half_way[pixel]));
             let outer = (mean - last) * (mean - last);
@@ -175,20 +175,25 @@ impl SquaredMeanChanges {
         level: usize,
         (cell, half): (usize, usize),
         is_relative: bool,
-    ) -> Option<StepPair> {
+    ) -> Option<SquaredStepPair> {
         let of = |level: usize| self.levels.get(level.checked_sub(1)?).map(|cells| cells[cell][half]);
-        let parts = |sums: LevelSums| match is_relative {
+        let parts = |sums: SquaredStepSums| match is_relative {
             false => (sums.outer, sums.inner),
             true => (sums.relative, sums.relative_inner),
         };
         let (last, inner) = parts(of(level)?);
         let before = of(level - 1).map(|before| 0.5 * (parts(before).0 + inner));
-        Some(StepPair { last, before })
+        Some(SquaredStepPair { last, before })
     }
 
     /// Squared steps in a half-cell at 2^`level` samples and one, two and three doublings earlier.
-    fn last_four_steps(&self, level: usize, at: (usize, usize), is_relative: bool) -> Option<[f64; 4]> {
-        let StepPair { last, before } = self.squared_step_pair_at_level(level, at, is_relative)?;
+    fn last_four_squared_steps(
+        &self,
+        level: usize,
+        at: (usize, usize),
+        is_relative: bool,
+    ) -> Option<[f64; 4]> {
+        let SquaredStepPair { last, before } = self.squared_step_pair_at_level(level, at, is_relative)?;
         let earlier =
             |back: usize| self.squared_step_pair_at_level(level.checked_sub(back)?, at, is_relative)?.before;
         Some([last, before?, earlier(1)?, earlier(2)?])
@@ -199,7 +204,7 @@ impl SquaredMeanChanges {
     fn measured_quadrupling_reduction(&self, level: usize, half: usize) -> Option<f64> {
         let mut sums = [0.0; 4];
         for cell in 0..CELLS {
-            let steps = self.last_four_steps(level, (cell, half), false)?;
+            let steps = self.last_four_squared_steps(level, (cell, half), false)?;
             if steps[0] > 0.0 {
                 sums.iter_mut().zip(steps).for_each(|(sum, step)| *sum += step);
             }
@@ -338,7 +343,8 @@ impl ConvergenceModel {
         is_relative: bool,
     ) -> Option<(f64, f64)> {
         let level = count.checked_ilog2()? as usize;
-        let StepPair { last, before } = steps.squared_step_pair_at_level(level, (cell, half), is_relative)?;
+        let SquaredStepPair { last, before } =
+            steps.squared_step_pair_at_level(level, (cell, half), is_relative)?;
         let fall = Self::clamped_doubling_variance_reduction(steps, level, &[half]);
         let step = before.map_or(last, |before| (last + 2.0 * before / fall) / 3.0);
         let rate = predict_doubling_variance_reduction(fall, steps.reduction_confidence(level, &[half]));
@@ -359,7 +365,7 @@ impl ConvergenceModel {
         at: (usize, usize),
         is_relative: bool,
     ) -> Option<f64> {
-        let [last, before, ..] = steps.last_four_steps(level, at, is_relative)?;
+        let [last, before, ..] = steps.last_four_squared_steps(level, at, is_relative)?;
         let fall =
             steps.measured_quadrupling_reduction(level, at.1).unwrap_or(INDEPENDENT_QUADRUPLING_REDUCTION);
         let lasting = LASTING_QUADRUPLING

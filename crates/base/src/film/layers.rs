@@ -21,7 +21,7 @@ impl Tile {
 
 impl Film {
     /// Layer sums of the selected pixels of a tile, to which more samples can be added.
-    pub fn layer_sums(&self, tile: usize, pixels: SelectedPixels) -> LayerSums {
+    pub fn copy_layer_sums(&self, tile: usize, pixels: SelectedPixels) -> LayerSums {
         let mut sums = lock(&self.spare_layers).pop().unwrap_or_default();
         let Some(rect) = self.tile_rect(tile) else {
             sums.reset(self.layers, pixels.count());
@@ -46,8 +46,8 @@ impl Film {
     ///
     /// # Errors
     /// [`FilmCreationError::Memory`] if there is not enough memory for the layers.
-    pub fn with_layers(mut self, count: usize) -> Result<Self, FilmCreationError> {
-        let more = Self::layer_memory(self.crop_rect(), count);
+    pub fn with_layer_count(mut self, count: usize) -> Result<Self, FilmCreationError> {
+        let more = Self::layer_bytes_for_crop(self.crop_rect(), count);
         let (width, height, bytes) = (self.width(), self.height(), self.memory_bytes() + more);
         let out_of_memory = || FilmCreationError::Memory { width, height, bytes, crop_helps: true };
         if !can_allocate(more) {
@@ -64,7 +64,7 @@ impl Film {
     }
 
     /// Memory in bytes for the sums of `count` layers of a crop.
-    pub fn layer_memory(crop: Rect, count: usize) -> u64 {
+    pub fn layer_bytes_for_crop(crop: Rect, count: usize) -> u64 {
         crop.area() as u64 * (count * size_of::<DVec3>()) as u64
     }
 
@@ -100,7 +100,7 @@ mod tests {
         let radiance: Vec<Vec3> =
             (0..5 * pixels.count()).map(|_| Vec3::new(next(), next(), next())).collect();
         let is_negative: Vec<bool> = radiance.iter().map(|value| value.x > 0.7).collect();
-        let mut layers = film.layer_sums(tile, pixels);
+        let mut layers = film.copy_layer_sums(tile, pixels);
         for (pixel, (values, signs)) in radiance.chunks(5).zip(is_negative.chunks(5)).enumerate() {
             let sample = |value: &Vec3| {
                 let Vec3 { x, y, z } = *value;
@@ -114,7 +114,7 @@ mod tests {
     }
 
     fn film() -> Film {
-        Film::new(40, 3, None).and_then(|film| film.with_layers(2)).expect("a film")
+        Film::new(40, 3, None).and_then(|film| film.with_layer_count(2)).expect("a film")
     }
 
     #[test]
@@ -142,7 +142,7 @@ mod tests {
                 let mut bytes = Vec::new();
                 assert!(whole.serialize_tile(tile, &mut bytes));
                 let area = whole.tile_rect(tile).expect("a tile").area();
-                let read = || StoredTile::read(&bytes, area).expect("a tile");
+                let read = || StoredTile::deserialize(&bytes, area).expect("a tile");
                 restored.restore_tile(tile, read()).expect("the tile should fit the film");
                 // A film with different layers rejects the tile.
                 assert!(Film::new(40, 3, None).expect("a film").restore_tile(tile, read()).is_err());

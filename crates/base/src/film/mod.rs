@@ -104,7 +104,8 @@ pub struct TileSamples {
     pub radiance: Vec<Vec3>,
     /// Samples in the pixel filter's negative lobes, or `None` if the filter has no negative lobes.
     pub negative: Option<NegativeLobeMask>,
-    /// Sums of the layers in these pixels, including the film's earlier samples; see [`Film::layer_sums`].
+    /// Sums of the layers in these pixels, including the film's earlier samples; see
+    /// [`Film::copy_layer_sums`].
     pub layers: LayerSums,
 }
 

@@ -24,7 +24,7 @@ impl StoredTile {
     ///
     /// # Errors
     /// [`MalformedTile`] if there are too few or too many bytes, or invalid counts.
-    pub fn read(bytes: &[u8], area: usize) -> Result<Self, MalformedTile> {
+    pub fn deserialize(bytes: &[u8], area: usize) -> Result<Self, MalformedTile> {
         let mut from = ByteReader(bytes);
         let (blocks, is_signed, levels) =
             (from.u32_as_usize()?, from.u32_as_usize()? == 1, from.u32_as_usize()?);
@@ -43,7 +43,7 @@ impl StoredTile {
             let earlier = (0..blocks).map(|_| from.vectors(area)).collect::<Result<_, _>>()?;
             tile.negative = Some(NegativeLobeSums { weight, sums, counts: from.counts(area)?, earlier });
         }
-        tile.steps = SquaredMeanChanges::read(area, levels, &mut || from.u32())?;
+        tile.steps = SquaredMeanChanges::read_words(area, levels, &mut || from.u32())?;
         let sums = from.vectors(area * layers)?;
         let negative = if is_signed { from.vectors(area * layers)? } else { Vec::new() };
         tile.layers = LayerSums { count: layers, sums, negative };
@@ -67,7 +67,7 @@ impl StoredTile {
         if self.tile.sums.len() != area {
             return Err(MalformedTile);
         }
-        let sums = block_sums(&of.tile.earlier, &of.tile.sums, block).ok_or(MalformedTile)?;
+        let sums = pixel_sums_of_block(&of.tile.earlier, &of.tile.sums, block).ok_or(MalformedTile)?;
         let is_first = self.tile.earlier.is_empty();
         if is_first {
             self.tile.earlier = vec![sums.to_vec()];
@@ -75,7 +75,7 @@ impl StoredTile {
             add_block_sums(&mut self.tile.earlier[0], sums);
         }
         if let Some(negative) = &of.tile.negative {
-            let sums = block_sums(&negative.earlier, &negative.sums, block).ok_or(MalformedTile)?;
+            let sums = pixel_sums_of_block(&negative.earlier, &negative.sums, block).ok_or(MalformedTile)?;
             let own =
                 self.tile.negative.get_or_insert_with(|| NegativeLobeSums::new(negative.weight, area, 1));
             add_block_sums(&mut own.earlier[0], sums);
@@ -93,7 +93,11 @@ impl StoredTile {
 }
 
 /// Pixel sums for a single block, which may be the block in progress.
-fn block_sums<'a>(earlier: &'a [Vec<DVec3>], sums: &'a [DVec3], block: usize) -> Option<&'a [DVec3]> {
+fn pixel_sums_of_block<'a>(
+    earlier: &'a [Vec<DVec3>],
+    sums: &'a [DVec3],
+    block: usize,
+) -> Option<&'a [DVec3]> {
     match block.cmp(&earlier.len()) {
         std::cmp::Ordering::Less => Some(&earlier[block]),
         std::cmp::Ordering::Equal => Some(sums),
@@ -158,7 +162,7 @@ impl Film {
     }
 
     /// Adds the number of non-finite samples in restored tiles to [`Film::non_finite_samples`].
-    pub fn add_non_finite(&self, samples: u64) {
+    pub fn add_non_finite_count(&self, samples: u64) {
         self.non_finite_samples.fetch_add(samples, Ordering::Relaxed);
     }
 }
@@ -280,7 +284,7 @@ mod tests {
             add(&first, 0..21, is_signed);
             for tile in 0..first.tile_count() {
                 let area = first.tile_rect(tile).expect("a tile").area();
-                let read = StoredTile::read(&stored(&first, tile), area).expect("a tile");
+                let read = StoredTile::deserialize(&stored(&first, tile), area).expect("a tile");
                 second.restore_tile(tile, read).expect("the tile should fit the film");
             }
             assert_eq!(
@@ -309,8 +313,8 @@ mod tests {
             let merged = film(SumOrder::Blocked);
             for tile in 0..whole.tile_count() {
                 let area = whole.tile_rect(tile).expect("a tile").area();
-                let [outer, inner] =
-                    [&outer, &inner].map(|of| StoredTile::read(&stored(of, tile), area).expect("a tile"));
+                let [outer, inner] = [&outer, &inner]
+                    .map(|of| StoredTile::deserialize(&stored(of, tile), area).expect("a tile"));
                 let mut sum = StoredTile::default();
                 for (of, block) in [(&outer, 0), (&inner, 0), (&outer, 1)] {
                     sum.add_block_sum_from(of, block).expect("a block");
@@ -329,12 +333,16 @@ mod tests {
         add(&film, 0..9, true);
         let (bytes, area) = (stored(&film, 0), film.tile_rect(0).expect("a tile").area());
         for length in (0..bytes.len()).step_by(997).chain([bytes.len() - 1]) {
-            assert_eq!(StoredTile::read(&bytes[..length], area).err(), Some(MalformedTile), "{length}");
+            assert_eq!(
+                StoredTile::deserialize(&bytes[..length], area).err(),
+                Some(MalformedTile),
+                "{length}"
+            );
         }
-        assert!(StoredTile::read(&[&bytes[..], &[0]].concat(), area).is_err());
-        assert!(StoredTile::read(&bytes, area + 1).is_err());
+        assert!(StoredTile::deserialize(&[&bytes[..], &[0]].concat(), area).is_err());
+        assert!(StoredTile::deserialize(&bytes, area + 1).is_err());
         let mut huge = bytes;
         huge[..4].fill(255);
-        assert!(StoredTile::read(&huge, area).is_err());
+        assert!(StoredTile::deserialize(&huge, area).is_err());
     }
 }

@@ -83,7 +83,7 @@ pub struct Film {
     pub(super) blocks: SumOrder,
     /// Number of layers.
     pub(super) layers: usize,
-    /// Memory of replaced layer sums, for reuse by [`Film::layer_sums`].
+    /// Memory of replaced layer sums, for reuse by [`Film::copy_layer_sums`].
     pub(super) spare_layers: Mutex<Vec<LayerSums>>,
 }
 
@@ -370,7 +370,7 @@ impl Film {
                 tile.layers.replace_pixel(index, &samples.layers, i);
             }
         }
-        let replaced = is_whole.then(|| tile.layers.replace_all(samples.layers));
+        let replaced = is_whole.then(|| tile.layers.swap_if_same_size(samples.layers));
         tile.revision += 1;
         drop(guard);
         if let Some(replaced) = replaced.filter(|_| self.layers > 0) {

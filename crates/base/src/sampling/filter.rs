@@ -39,8 +39,8 @@ impl PixelFilter {
             Self::Tent => {
                 FilterSample { offset: Vec2::new(sample_tent(u.x), sample_tent(u.y)), is_negative: false }
             }
-            Self::Gaussian => GAUSSIAN.sample2(u),
-            Self::Mitchell => MITCHELL.sample2(u),
+            Self::Gaussian => GAUSSIAN.sample_2d(u),
+            Self::Mitchell => MITCHELL.sample_2d(u),
         }
     }
 
@@ -134,7 +134,7 @@ impl TabulatedFilter {
         (x as f32, self.is_negative[cell])
     }
 
-    fn sample2(&self, u: Vec2) -> FilterSample {
+    fn sample_2d(&self, u: Vec2) -> FilterSample {
         let ((x, is_x_negative), (y, is_y_negative)) = (self.sample(u.x), self.sample(u.y));
         FilterSample { offset: Vec2::new(x, y), is_negative: is_x_negative != is_y_negative }
     }

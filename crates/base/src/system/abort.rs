@@ -16,7 +16,7 @@ use nix::unistd::{pause, write};
 use signal_hook::consts::SIGABRT;
 use signal_hook::low_level;
 
-use super::memory::caller_handles_allocation_failure;
+use super::memory::is_allocation_failure_handled;
 
 /// Function that restores the terminal and makes only async-signal-safe calls.
 static RESTORE_TERMINAL: OnceLock<fn()> = OnceLock::new();
@@ -32,7 +32,7 @@ pub struct AbortingAllocator;
 /// Ends the process if the allocation failed and its caller does not handle the failure.
 #[inline(always)]
 fn check_allocation(memory: *mut u8, bytes: usize) -> *mut u8 {
-    if memory.is_null() && !caller_handles_allocation_failure() {
+    if memory.is_null() && !is_allocation_failure_handled() {
         abort_out_of_memory(bytes);
     }
     memory
@@ -48,7 +48,7 @@ fn abort_out_of_memory(bytes: usize) -> ! {
     };
     let is_limited = getrlimit(Resource::RLIMIT_AS).is_ok_and(|(limit, _)| limit < RLIM_INFINITY);
     let limit = if is_limited { ", or raise the limit (`ulimit -v`)" } else { "" };
-    end_with_message(format_args!(
+    exit_with_message(format_args!(
         "error: out of memory: cannot allocate {number} {unit}; use a smaller image or scene{limit}"
     ))
 }
@@ -100,12 +100,12 @@ pub fn set_terminal_restore_hook(restore: fn()) {
 static IS_ENDING: AtomicBool = AtomicBool::new(false);
 
 fn handle_abort_signal() {
-    end_with_message(format_args!("error: glimt was aborted (SIGABRT)"));
+    exit_with_message(format_args!("error: glimt was aborted (SIGABRT)"));
 }
 
 /// Restores the terminal, prints the message and exits. If several threads run out of memory at once, the
 /// first thread prints and the others wait for the process to end.
-fn end_with_message(words: Arguments<'_>) -> ! {
+fn exit_with_message(words: Arguments<'_>) -> ! {
     while IS_ENDING.swap(true, Ordering::AcqRel) {
         pause();
     }

@@ -13,7 +13,7 @@ thread_local! {
 }
 
 /// Whether the caller of the current allocation handles its failure.
-pub(super) fn caller_handles_allocation_failure() -> bool {
+pub(super) fn is_allocation_failure_handled() -> bool {
     MAY_FAIL.get()
 }
 
@@ -50,10 +50,10 @@ pub fn set_rlimit_from_cgroup(stacks: u64) {
 pub fn limit_preventing_mapping(bytes: u64) -> Option<&'static str> {
     let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
     let limits = [
-        (Resource::RLIMIT_AS, status_bytes(&status, "VmSize"), "`ulimit -v`"),
+        (Resource::RLIMIT_AS, proc_status_bytes(&status, "VmSize"), "`ulimit -v`"),
         (
             Resource::RLIMIT_DATA,
-            status_bytes(&status, "VmData") + status_bytes(&status, "VmStk"),
+            proc_status_bytes(&status, "VmData") + proc_status_bytes(&status, "VmStk"),
             APPLIED_LIMIT.get().map_or("`ulimit -d`", |limit| &limit.setting),
         ),
     ];
@@ -63,7 +63,7 @@ pub fn limit_preventing_mapping(bytes: u64) -> Option<&'static str> {
 }
 
 /// Returns a size listed in `/proc/self/status`, such as `VmSize:  1024 kB`. Returns 0 if it is not listed.
-fn status_bytes(status: &str, name: &str) -> u64 {
+fn proc_status_bytes(status: &str, name: &str) -> u64 {
     let line = status.lines().find_map(|line| line.strip_prefix(name)?.strip_prefix(':'));
     let kilobytes = line.and_then(|line| line.split_whitespace().next()?.parse::<u64>().ok());
     kilobytes.unwrap_or(0).saturating_mul(1024)
@@ -90,11 +90,11 @@ pub fn ulimit_or_cgroup_limit() -> Option<MemoryLimit> {
 #[cold]
 fn current_cgroup_limit() -> Option<MemoryLimit> {
     let groups = fs::read_to_string("/proc/self/cgroup").unwrap_or_default();
-    cgroup_limit(Path::new("/sys/fs/cgroup"), &groups)
+    lowest_limit_of_cgroups(Path::new("/sys/fs/cgroup"), &groups)
 }
 
 /// Lowest limit among the control groups (version 1 or 2) listed in `/proc/self/cgroup` and their ancestors.
-fn cgroup_limit(root: &Path, groups: &str) -> Option<MemoryLimit> {
+fn lowest_limit_of_cgroups(root: &Path, groups: &str) -> Option<MemoryLimit> {
     let of_line = |line: &str| {
         let [_, controllers, path] = <[&str; 3]>::try_from(line.splitn(3, ':').collect::<Vec<_>>()).ok()?;
         let (root, file) = match controllers {
@@ -138,15 +138,15 @@ mod tests {
     #[test]
     fn process_status_sizes_are_converted_to_bytes() {
         let status = "Name:\tglimt\nVmPeak:\t   9000 kB\nVmSize:\t   8192 kB\nThreads:\t1\n";
-        assert_eq!(status_bytes(status, "VmSize"), 8192 * 1024);
-        assert_eq!(status_bytes(status, "VmData"), 0);
+        assert_eq!(proc_status_bytes(status, "VmSize"), 8192 * 1024);
+        assert_eq!(proc_status_bytes(status, "VmData"), 0);
     }
 
     #[test]
     fn only_fallible_reservations_may_fail() {
         let mut bytes = Vec::<u8>::new();
         assert!(try_reserve_exact(&mut bytes, isize::MAX as usize).is_err());
-        assert!(!caller_handles_allocation_failure());
+        assert!(!is_allocation_failure_handled());
         assert!(try_reserve_exact(&mut bytes, 100).is_ok() && bytes.capacity() >= 100);
     }
 
@@ -154,7 +154,7 @@ mod tests {
     fn lowest_limit_among_ancestors_applies() {
         let root = tempfile::tempdir().expect("a folder");
         let root = root.path();
-        let bytes = |groups: &str| cgroup_limit(root, groups).map(|limit| limit.bytes);
+        let bytes = |groups: &str| lowest_limit_of_cgroups(root, groups).map(|limit| limit.bytes);
         assert_eq!(bytes("0::/a/b\n"), None);
         write(root, "a/b/memory.max", "max\n");
         assert_eq!(bytes("0::/a/b\n"), None);
@@ -164,7 +164,7 @@ mod tests {
         assert_eq!(bytes("0::/a/b\n"), Some(4_096_000), "the parent group's limit is lower");
         write(root, "a/b/memory.max", "1024000\n");
         assert_eq!(bytes("0::/a/b\n"), Some(1_024_000));
-        let said = cgroup_limit(root, "0::/a/b\n").expect("a limit").setting;
+        let said = lowest_limit_of_cgroups(root, "0::/a/b\n").expect("a limit").setting;
         assert!(said.ends_with("/a/b/memory.max)"), "{said}");
         // In a container, the root is the container's own group, but the listed path may be the host's.
         write(root, "memory.max", "512000\n");
@@ -179,8 +179,8 @@ mod tests {
         let root = root.path();
         let groups = "12:cpu,cpuacct:/job\n7:memory:/job\n0::/job\n";
         write(root, "memory/memory.limit_in_bytes", "9223372036854771712\n");
-        assert_eq!(cgroup_limit(root, groups), None);
+        assert_eq!(lowest_limit_of_cgroups(root, groups), None);
         write(root, "memory/job/memory.limit_in_bytes", "2048000\n");
-        assert_eq!(cgroup_limit(root, groups).map(|limit| limit.bytes), Some(2_048_000));
+        assert_eq!(lowest_limit_of_cgroups(root, groups).map(|limit| limit.bytes), Some(2_048_000));
     }
 }

@@ -36,10 +36,10 @@ pub fn logical_cpu_count() -> usize {
 /// Starts a pool with one thread per logical CPU.
 ///
 /// # Errors
-/// Returns the message from [`describe_start_failure`].
+/// Returns the message from [`describe_thread_start_failure`].
 pub fn logical_cpu_pool() -> std::result::Result<ThreadPool, String> {
     let threads = logical_cpu_count();
-    let failed = |error: &dyn Display| describe_start_failure(threads, false, &error);
+    let failed = |error: &dyn Display| describe_thread_start_failure(threads, false, &error);
     check_thread_stack_memory(threads).map_err(|error| failed(&error))?;
     ThreadPoolBuilder::new().num_threads(threads).build().map_err(|error| failed(&error))
 }
@@ -63,7 +63,11 @@ fn limit_exhausted_by_thread_stacks(threads: usize) -> Option<&'static str> {
 
 /// Explains why `threads` threads could not be started and how to fix it. The system reports the same error
 /// whether memory or threads run out.
-pub fn describe_start_failure(threads: usize, has_threads_option: bool, error: &impl Display) -> String {
+pub fn describe_thread_start_failure(
+    threads: usize,
+    has_threads_option: bool,
+    error: &impl Display,
+) -> String {
     let what = if threads == 1 { "a thread".to_owned() } else { format!("{threads} threads") };
     let fewer = if has_threads_option && threads > 1 { "use fewer (--threads 1), or " } else { "" };
     match limit_exhausted_by_thread_stacks(threads) {
@@ -86,14 +90,14 @@ mod tests {
         let error = Error::from_raw_os_error(nix::libc::EAGAIN);
         let limit = "raise the limit on processes (`ulimit -u`)";
         assert_eq!(
-            describe_start_failure(2, true, &error),
+            describe_thread_start_failure(2, true, &error),
             format!(
                 "cannot start 2 threads: resource temporarily unavailable; use fewer (--threads 1), or {limit}"
             )
         );
         for has_threads_option in [true, false] {
             let alone = format!("cannot start a thread: resource temporarily unavailable; {limit}");
-            assert_eq!(describe_start_failure(1, has_threads_option, &error), alone);
+            assert_eq!(describe_thread_start_failure(1, has_threads_option, &error), alone);
         }
     }
 

@@ -10,7 +10,7 @@ use crate::pipeline::{has_foreign_extension, has_importable_extension};
 use crate::scene::keys::key::{KeyInfo, TableSyntax, ValueKind};
 use crate::scene::keys::{all_paths_with_descriptions, all_tables, color_names};
 use crate::scene::outline::{OutlineTable, document_outline};
-use crate::scene::{has_scene_extension, read_current_text};
+use crate::scene::{has_scene_extension, read_scene_file_text};
 
 /// The command line being completed, split into words, if the shell script does not pass it as arguments.
 static WORDS: OnceLock<Vec<OsString>> = OnceLock::new();
@@ -48,8 +48,8 @@ pub(crate) fn key_assignment_completer() -> ArgValueCompleter {
     ArgValueCompleter::new(|current: &OsStr| {
         let Some(current) = current.to_str() else { return Vec::new() };
         let scene = command_line().into_iter().map(PathBuf::from).find(|word| has_scene_extension(word));
-        let text = scene.and_then(|scene| read_current_text(&scene).ok());
-        set_arg_candidates(text.as_deref().unwrap_or_default(), current)
+        let text = scene.and_then(|scene| read_scene_file_text(&scene).ok());
+        key_assignment_candidates(text.as_deref().unwrap_or_default(), current)
     })
 }
 
@@ -64,7 +64,7 @@ pub(crate) fn explain_path_completer() -> ArgValueCompleter {
 }
 
 /// Returns candidates that start with `typed`, for a scene whose source is `text`.
-fn set_arg_candidates(text: &str, typed: &str) -> Vec<CompletionCandidate> {
+fn key_assignment_candidates(text: &str, typed: &str) -> Vec<CompletionCandidate> {
     /// Maximum number of candidates.
     const MAX_CANDIDATES: usize = 2000;
     let outline = document_outline(text);
@@ -84,7 +84,7 @@ fn set_arg_candidates(text: &str, typed: &str) -> Vec<CompletionCandidate> {
     let keys = outline.iter().flat_map(of).chain(of_absent).flat_map(with_inner_keys);
     let of_key = |(path, key): (String, &'static KeyInfo)| {
         key_or_value_candidates(&format!("{path}.{}=", key.name), key.doc, typed, || {
-            key_value_completions(key.kind, &outline)
+            named_values_for_key(key.kind, &outline)
         })
     };
     let of_type = |table: &OutlineTable| {
@@ -120,7 +120,7 @@ fn key_or_value_candidates(
 }
 
 /// Returns the named values for a key of type `kind`: keywords, colors, or names of tables in `outline`.
-fn key_value_completions(kind: ValueKind, outline: &[OutlineTable]) -> Vec<DescribedValue> {
+fn named_values_for_key(kind: ValueKind, outline: &[OutlineTable]) -> Vec<DescribedValue> {
     let plain = |value: &str| (value.to_owned(), "");
     match kind {
         ValueKind::Words(list) => list().iter().map(|word| (word.name.to_owned(), word.meaning)).collect(),
@@ -151,7 +151,7 @@ mod tests {
     use super::*;
 
     fn offered(text: &str, typed: &str) -> Vec<String> {
-        let all = set_arg_candidates(text, typed);
+        let all = key_assignment_candidates(text, typed);
         all.iter().map(|one| one.get_value().to_string_lossy().into_owned()).collect()
     }
 

@@ -8,7 +8,7 @@ use crate::choice::Choice;
 use crate::film::Rect;
 use crate::pipeline::settings::OutputLayer;
 use crate::pipeline::turntable;
-use crate::scene::keys::{ValueKind, find_key};
+use crate::scene::keys::{ValueKind, find_key_in_table};
 
 /// Maximum number of parts per image.
 pub(super) const MAX_PARTS: u32 = 1 << 20;
@@ -48,7 +48,7 @@ pub(super) fn integer_override_parser(
     key: &'static str,
 ) -> impl Fn(&str) -> Result<u32, String> + Clone + Send + Sync + 'static {
     move |text| {
-        let Some(ValueKind::Whole(least, most)) = find_key("render", key).map(|key| key.kind) else {
+        let Some(ValueKind::Whole(least, most)) = find_key_in_table("render", key).map(|key| key.kind) else {
             return Err(format!("`{key}` is not an integer key of [render]"));
         };
         parse_integer_in_range(text, least as u32..=most as u32)
@@ -62,7 +62,7 @@ pub(super) fn number_override_parser(
     expected: &'static str,
 ) -> impl Fn(&str) -> Result<f32, String> + Clone + Send + Sync + 'static {
     move |text| {
-        let limits = find_key("render", key).and_then(|key| key.kind.limits());
+        let limits = find_key_in_table("render", key).and_then(|key| key.kind.limits());
         let limits = limits.ok_or_else(|| format!("`{key}` is not a number key of [render]"))?;
         let number = text.parse::<f32>().ok();
         let number = number.filter(|number| limits.violation(f64::from(*number)).is_none());

@@ -14,7 +14,7 @@ pub struct MethodQuantityChange {
     /// Name of the method.
     pub method: String,
     /// The compared quantity.
-    pub quantity: Quantity,
+    pub quantity: ComparedQuantity,
     /// Ratio of the new value to the old value, as the geometric mean over all steps.
     pub factor: f64,
     /// 95 % confidence interval for the factor.
@@ -27,7 +27,7 @@ pub struct MethodQuantityChange {
 
 /// Quantities to compare.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Quantity {
+pub enum ComparedQuantity {
     /// Rendering time in seconds.
     Seconds,
     /// relMSE.
@@ -45,7 +45,7 @@ pub fn compare_runs(then: &Results, now: &Results) -> Vec<MethodQuantityChange> 
         let Some(before) = then.scenes.iter().find(is_same) else { continue };
         for method in &scene.methods {
             let Some(old) = before.methods.iter().find(|old| old.name == method.name) else { continue };
-            for quantity in [Quantity::Seconds, Quantity::Error] {
+            for quantity in [ComparedQuantity::Seconds, ComparedQuantity::Error] {
                 changes.extend(method_change(&scene.scene, old, method, quantity));
             }
         }
@@ -59,9 +59,9 @@ fn method_change(
     scene: &str,
     then: &MethodAnalysis,
     now: &MethodAnalysis,
-    quantity: Quantity,
+    quantity: ComparedQuantity,
 ) -> Option<MethodQuantityChange> {
-    let pairs = now.steps.iter().filter_map(|step| Some((matching_step(step, &then.steps)?, step)));
+    let pairs = now.steps.iter().filter_map(|step| Some((find_matching_step(step, &then.steps)?, step)));
     let differences: Vec<(f64, f64, f64)> =
         pairs.filter_map(|(old, new)| log_difference_and_standard_error(old, new, quantity)).collect();
     let count = differences.len() as f64;
@@ -89,7 +89,7 @@ fn method_change(
 }
 
 /// The baseline's step with the same sample count or time budget.
-fn matching_step<'a>(step: &StepResult, then: &'a [StepResult]) -> Option<&'a StepResult> {
+fn find_matching_step<'a>(step: &StepResult, then: &'a [StepResult]) -> Option<&'a StepResult> {
     then.iter().find(|old| match (step.budget, old.budget) {
         (None, None) => old.samples == step.samples,
         (now, then) => now == then,
@@ -101,12 +101,12 @@ fn matching_step<'a>(step: &StepResult, then: &'a [StepResult]) -> Option<&'a St
 fn log_difference_and_standard_error(
     then: &StepResult,
     now: &StepResult,
-    quantity: Quantity,
+    quantity: ComparedQuantity,
 ) -> Option<(f64, f64, f64)> {
     let of = |step: &StepResult| -> Vec<f64> {
         let values = step.pictures.iter().map(|picture| match quantity {
-            Quantity::Seconds => picture.seconds,
-            Quantity::Error => picture.relmse,
+            ComparedQuantity::Seconds => picture.seconds,
+            ComparedQuantity::Error => picture.relmse,
         });
         values.filter(|value| *value > 0.0).map(libm::log).collect()
     };
@@ -135,16 +135,16 @@ pub fn format_changes(changes: &[MethodQuantityChange], name: &str) -> Vec<Strin
 fn format_change(change: &MethodQuantityChange) -> String {
     let MethodQuantityChange { scene, method, factor, interval: [low, high], .. } = change;
     let quantity = match change.quantity {
-        Quantity::Seconds => "time",
-        Quantity::Error => "error",
+        ComparedQuantity::Seconds => "time",
+        ComparedQuantity::Error => "error",
     };
     let said = match (change.is_significant, change.quantity, *factor > 1.0) {
         (false, _, _) if change.p_value >= 1.0 => "unchanged".to_owned(),
         (false, _, _) => "noise".to_owned(),
-        (true, Quantity::Seconds, true) => format!("SLOWER {}", format_p_value(change.p_value)),
-        (true, Quantity::Seconds, false) => format!("faster {}", format_p_value(change.p_value)),
-        (true, Quantity::Error, true) => format!("WORSE {}", format_p_value(change.p_value)),
-        (true, Quantity::Error, false) => format!("better {}", format_p_value(change.p_value)),
+        (true, ComparedQuantity::Seconds, true) => format!("SLOWER {}", format_p_value(change.p_value)),
+        (true, ComparedQuantity::Seconds, false) => format!("faster {}", format_p_value(change.p_value)),
+        (true, ComparedQuantity::Error, true) => format!("WORSE {}", format_p_value(change.p_value)),
+        (true, ComparedQuantity::Error, false) => format!("better {}", format_p_value(change.p_value)),
     };
     format!("  {scene}, {method}: {quantity} × {factor:.3} ({low:.3} to {high:.3}): {said}")
 }
@@ -186,14 +186,15 @@ mod tests {
         let found = compare_runs(&results(), &slower);
         let of = |quantity| found.iter().filter(move |change| change.quantity == quantity);
         assert!(
-            of(Quantity::Seconds).all(|change| change.is_significant && (change.factor - 1.5).abs() < 1e-9),
+            of(ComparedQuantity::Seconds)
+                .all(|change| change.is_significant && (change.factor - 1.5).abs() < 1e-9),
             "{found:?}"
         );
         assert!(
-            of(Quantity::Seconds).all(|change| change.interval[0] > 1.3 && change.interval[1] < 1.7),
+            of(ComparedQuantity::Seconds).all(|change| change.interval[0] > 1.3 && change.interval[1] < 1.7),
             "{found:?}"
         );
-        assert!(of(Quantity::Error).all(|change| !change.is_significant));
+        assert!(of(ComparedQuantity::Error).all(|change| !change.is_significant));
         let said = format_changes(&found, "old.json").join("\n");
         assert!(said.contains("a.toml, path: time × 1.500 (1.3") && said.contains("SLOWER (p "), "{said}");
         let noise = with(|picture, number| picture.seconds *= [1.05, 0.97, 0.99][number]);

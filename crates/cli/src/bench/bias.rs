@@ -75,10 +75,10 @@ impl PairwiseErrorProducts {
     }
 
     fn mean(&self) -> f64 {
-        self.mean_without(usize::MAX)
+        self.mean_without_image(usize::MAX)
     }
 
-    fn mean_without(&self, seed: usize) -> f64 {
+    fn mean_without_image(&self, seed: usize) -> f64 {
         let kept = self.products.iter().filter(|(i, j, _)| *i != seed && *j != seed);
         let (sum, count) =
             kept.fold((0.0, 0.0), |(sum, count), (_, _, product)| (sum + product, count + 1.0));
@@ -97,7 +97,7 @@ impl PairwiseErrorProducts {
     /// Jackknife estimate of the variance of the mean.
     fn jackknife_variance_of_mean(&self) -> f64 {
         let (mean, count) = (self.mean(), self.count as f64);
-        let squares = (0..self.count).map(|seed| self.mean_without(seed) - mean);
+        let squares = (0..self.count).map(|seed| self.mean_without_image(seed) - mean);
         squares.map(|difference| difference * difference).sum::<f64>() * (count - 1.0) / count
     }
 }

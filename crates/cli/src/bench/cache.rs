@@ -47,13 +47,13 @@ pub fn write_starter_scene(folder: &Path) -> Result<PathBuf, OutputError> {
     match staged::create_files_atomically(&folder, &[("starter.toml".into(), text)], &CancelToken::new()) {
         // Another process may have written the file in the meantime.
         Err(_) if exists_unchanged() => Ok(path),
-        Err(_) if path.symlink_metadata().is_ok() => Err(foreign_file_error(&path, "the starter scene")),
+        Err(_) if path.symlink_metadata().is_ok() => Err(unrecognized_file_error(&path, "the starter scene")),
         written => written.map(|()| path),
     }
 }
 
 /// Error for an existing file that glimt did not write.
-fn foreign_file_error(path: &Path, what: &str) -> OutputError {
+fn unrecognized_file_error(path: &Path, what: &str) -> OutputError {
     let reason = format!(
         "cannot write {}: the existing file is not {what}; move it or choose another folder with --cache",
         path.display()
@@ -135,7 +135,7 @@ pub(super) fn store(
     let seal = integrity_checksum(&bytes);
     bytes.extend(seal.as_bytes());
     let may_replace = |real: &Path| {
-        if is_replaceable(real) { Ok(()) } else { Err(foreign_file_error(&path, "a reference")) }
+        if is_replaceable(real) { Ok(()) } else { Err(unrecognized_file_error(&path, "a reference")) }
     };
     let guard = ExistingFilePolicy {
         is_kept: &|_| false,

@@ -44,7 +44,7 @@ pub fn methods_to_measure(scene: &Scene, toggles: &MethodSweep) -> Vec<Method> {
     let all = if *toggles == MethodSweep::default() {
         default_benchmark_methods(scene)
     } else {
-        requested_settings(scene, toggles)
+        sweep_combinations(scene, toggles)
     };
     let mut distinct: Vec<MethodDedupKey> = Vec::new();
     for settings in all {
@@ -70,7 +70,7 @@ fn default_benchmark_methods(scene: &Scene) -> Vec<MethodDedupKey> {
     ways.into_iter().map(of).collect()
 }
 
-fn requested_settings(scene: &Scene, toggles: &MethodSweep) -> Vec<MethodDedupKey> {
+fn sweep_combinations(scene: &Scene, toggles: &MethodSweep) -> Vec<MethodDedupKey> {
     let mut ways = Vec::new();
     for integrator in requested_or_scene_values(&toggles.integrators, scene.render.integrator) {
         for photons in requested_or_scene_values(&toggles.photons, scene.photons.enabled) {

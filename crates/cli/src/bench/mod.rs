@@ -28,5 +28,5 @@ pub use request::{BenchError, BenchEvent, BenchRequest, PartialResultsError, Ref
 pub use results::{
     BiasVerdict, ImageMeasurement, MethodAnalysis, ReferenceResult, Results, SceneResult, StepResult,
 };
-pub use run::{image_size, run};
+pub use run::{benchmark_image_size, run};
 pub use slope::{ErrorOverTimeSlope, TimeToError};

@@ -115,7 +115,8 @@ impl ReferenceRenderer<'_> {
         session: &mut HeadlessSession,
     ) -> Result<ReferenceFingerprints, BenchError> {
         let [one, two] = SEEDS.map(|seed| {
-            self.render(session, seed, ReferenceBudget { samples: 1, seconds: None }).map(|it| it.key)
+            self.render_reference(session, seed, ReferenceBudget { samples: 1, seconds: None })
+                .map(|it| it.key)
         });
         Ok(ReferenceFingerprints([one?, two?]))
     }
@@ -140,9 +141,9 @@ impl ReferenceRenderer<'_> {
     ) -> Result<UncachedReferences, BenchError> {
         let half = ReferenceBudget { seconds: amount.seconds.map(|seconds| seconds / 2.0), ..amount };
         begin(2);
-        let first = self.render(session, SEEDS[0], half)?;
+        let first = self.render_reference(session, SEEDS[0], half)?;
         begin(1);
-        let second = self.render(session, SEEDS[1], half)?;
+        let second = self.render_reference(session, SEEDS[1], half)?;
         let cost = ReferenceCost {
             samples: (first.report.image.samples.mean + second.report.image.samples.mean) / 2.0,
             seconds: first.report.seconds + second.report.seconds,
@@ -164,7 +165,7 @@ impl ReferenceRenderer<'_> {
         assemble_scene_references(stored, false, warnings, cache_error.map(|error| error.to_string()))
     }
 
-    fn render(
+    fn render_reference(
         &self,
         session: &mut HeadlessSession,
         seed: u32,

@@ -77,7 +77,7 @@ fn check_scenes(runs: &[SceneRun<'_>]) -> Result<(), BenchError> {
 
 /// Returns the size of a scene's benchmark images. Computes dimensions missing from `requested` with the
 /// scene's aspect ratio and a default size.
-pub fn image_size(scene: &Scene, requested: (Option<u32>, Option<u32>)) -> (u32, u32) {
+pub fn benchmark_image_size(scene: &Scene, requested: (Option<u32>, Option<u32>)) -> (u32, u32) {
     let (width, height) = (f64::from(scene.render.width), f64::from(scene.render.height));
     let side = |length: f64| length.round().clamp(1.0, 65536.0) as u32;
     match requested {
@@ -149,7 +149,7 @@ impl SceneRun<'_> {
                 reference.two.reference_pair().measured_image().width,
                 reference.two.reference_pair().measured_image().height,
             ),
-            None => image_size(&loaded.scene, (request.width, request.height)),
+            None => benchmark_image_size(&loaded.scene, (request.width, request.height)),
         };
         let common = Overrides {
             width: Some(width),
@@ -311,7 +311,7 @@ mod tests {
         let of = |width, height, requested| {
             let mut scene = Scene::clone(&scene::load(Path::new(file), &[]).expect("a scene").scene);
             (scene.render.width, scene.render.height) = (width, height);
-            image_size(&scene, requested)
+            benchmark_image_size(&scene, requested)
         };
         assert_eq!(of(640, 480, (None, None)), (96, 72));
         assert_eq!(of(480, 640, (None, None)), (72, 96));

@@ -26,7 +26,7 @@ use crate::pipeline::settings::Overrides;
 use crate::scene::diagnostic::Diagnostic;
 use crate::signals::{self, ReceivedSignal};
 use crate::system::priority;
-use crate::system::threads::{describe_start_failure, spawn};
+use crate::system::threads::{describe_thread_start_failure, spawn};
 
 /// Interval for checking signals.
 const TICK: Duration = Duration::from_millis(50);
@@ -48,8 +48,9 @@ fn run_and_print_errors(args: &BenchArgs, console: &Console) -> Result<Exit, Exi
     let ended = signals::install_signal_handlers(move || stop[usize::from(stop[0].is_canceled())].cancel())
         .map_err(|message| console.print_error(Exit::FAILED, &message))?;
     let mut progress = BenchProgress::new(args.progress, console);
-    let (news, work) = spawn_benchmark(request, token.clone())
-        .map_err(|error| console.print_error(Exit::FAILED, &describe_start_failure(1, false, &error)))?;
+    let (news, work) = spawn_benchmark(request, token.clone()).map_err(|error| {
+        console.print_error(Exit::FAILED, &describe_thread_start_failure(1, false, &error))
+    })?;
     report_events(&news, &mut progress);
     let results = work.join().unwrap_or_else(|_| Err(Box::new(unfinished_after_panic())));
     progress.clear();

@@ -15,7 +15,7 @@ use crate::scene::report::LineColumnLocator;
 
 pub(crate) fn run(scene: &Path, sets: &[String], is_json: bool, console: &Console) -> Exit {
     if is_json {
-        return check_as_json(scene, sets, console);
+        return check_and_print_json(scene, sets, console);
     }
     if let Some(exit) = report_image_instead_of_scene(scene, false, console) {
         return exit;
@@ -35,7 +35,7 @@ pub(crate) fn run(scene: &Path, sets: &[String], is_json: bool, console: &Consol
 }
 
 /// Reports the result as one JSON object on stdout.
-fn check_as_json(scene: &Path, sets: &[String], console: &Console) -> Exit {
+fn check_and_print_json(scene: &Path, sets: &[String], console: &Console) -> Exit {
     let (exit, diagnostics) = match check_scene(scene, sets) {
         Ok(checked) => (Exit::DONE, checked.warnings),
         Err(Failure::Scene(diagnostics)) => (Exit::WRONG, diagnostics),

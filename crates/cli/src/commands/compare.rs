@@ -14,7 +14,7 @@ use crate::console::Console;
 use crate::control::CancelToken;
 use crate::exit::Exit;
 use crate::film::RadianceImage;
-use crate::output::part::is_part;
+use crate::output::part::is_part_or_checkpoint;
 use crate::output::write::{self, ExistingFilePolicy};
 use crate::output::{
     self, AttributeLossPolicy, EncodeOptions, FileIdentity, Format, OutputError, WriteWarning, is_same_file,
@@ -24,13 +24,13 @@ use crate::tui::wrap_text;
 
 pub(crate) fn run(args: &CompareArgs, console: &Console) -> Exit {
     match logical_cpu_pool() {
-        Ok(pool) => run_in_pool(&pool, args, console).unwrap_or_else(|exit| exit),
+        Ok(pool) => run_comparison_in_pool(&pool, args, console).unwrap_or_else(|exit| exit),
         Err(message) => console.print_error(Exit::FAILED, &message),
     }
 }
 
 /// Runs the comparison and reports errors. `Err` contains the exit code.
-fn run_in_pool(pool: &ThreadPool, args: &CompareArgs, console: &Console) -> Result<Exit, Exit> {
+fn run_comparison_in_pool(pool: &ThreadPool, args: &CompareArgs, console: &Console) -> Result<Exit, Exit> {
     let diff =
         args.diff.as_deref().map(|path| ErrorImageOutput::try_from_args(path, args, console)).transpose()?;
     let pair = ImagePair::load(&args.a, &args.b).map_err(|errors| {
@@ -42,7 +42,7 @@ fn run_in_pool(pool: &ThreadPool, args: &CompareArgs, console: &Console) -> Resu
     let measured = pool.install(|| compare::measure(&pair));
     let errors = &measured.errors;
     let bias = Bias::new(errors, [&args.a, &args.b].map(|path| output::read_mean_luminance_error(path)));
-    let summary = Summary::new(args, &pair, errors, bias);
+    let summary = ComparisonSummary::new(args, &pair, errors, bias);
     if args.json {
         print_json(&summary, console);
     } else {
@@ -56,10 +56,10 @@ fn run_in_pool(pool: &ThreadPool, args: &CompareArgs, console: &Console) -> Resu
         warnings.iter().for_each(|warning| console.print_line_to_stderr(&format!("warning: {warning}")));
         console.print_line_to_stderr(&format!("wrote {} ({})", diff.path.display(), diff.description()));
     }
-    Ok(compare_to_thresholds(&summary, console))
+    Ok(check_relmse_threshold(&summary, console))
 }
 
-fn compare_to_thresholds(summary: &Summary<'_>, console: &Console) -> Exit {
+fn check_relmse_threshold(summary: &ComparisonSummary<'_>, console: &Console) -> Exit {
     match summary.max_relmse {
         Some(most) if !summary.is_within => {
             let relmse = format_six_significant_digits(summary.relmse);
@@ -147,7 +147,7 @@ impl<'a> ErrorImageOutput<'a> {
 /// Checks that the target, whose resolved path is `real`, is not one of the compared images, a part or a
 /// checkpoint.
 fn check_not_input(path: &Path, real: &Path, args: &CompareArgs) -> Result<(), OutputError> {
-    if is_part(real) {
+    if is_part_or_checkpoint(real) {
         let reason = format!(
             "cannot write {}: it is a part or checkpoint; choose another file with --diff FILE",
             path.display()
@@ -169,7 +169,7 @@ fn check_not_input(path: &Path, real: &Path, args: &CompareArgs) -> Result<(), O
 
 /// Measured values, as shown in the table and the JSON object.
 #[derive(Serialize)]
-struct Summary<'a> {
+struct ComparisonSummary<'a> {
     a: String,
     b: String,
     width: u32,
@@ -191,7 +191,7 @@ struct Summary<'a> {
     is_within: bool,
 }
 
-impl<'a> Summary<'a> {
+impl<'a> ComparisonSummary<'a> {
     fn new(args: &CompareArgs, pair: &ImagePair, errors: &'a ErrorMetrics, bias: Bias) -> Self {
         let &ErrorMetrics { rmse, relmse, relmse_trimmed, dropped_pixels, max, psnr_db, ssim, flip, .. } =
             errors;
@@ -219,7 +219,7 @@ impl<'a> Summary<'a> {
 }
 
 /// Prints the JSON object. Values that are not finite become null.
-fn print_json(summary: &Summary<'_>, console: &Console) {
+fn print_json(summary: &ComparisonSummary<'_>, console: &Console) {
     match output::json::to_line_without_newline(summary) {
         Ok(text) => console.print_line(&text),
         Err(error) => console.print_line_to_stderr(&format!("error: {error}")),
@@ -227,8 +227,8 @@ fn print_json(summary: &Summary<'_>, console: &Console) {
 }
 
 /// Formats the table as lines, wrapped to `columns`.
-fn format_table(summary: &Summary<'_>, columns: Option<usize>) -> Vec<String> {
-    let Summary { a, b, width, height, .. } = summary;
+fn format_table(summary: &ComparisonSummary<'_>, columns: Option<usize>) -> Vec<String> {
+    let ComparisonSummary { a, b, width, height, .. } = summary;
     let title = format!("{a} compared with reference {b}, {width}×{height} pixels");
     let rows = table_rows(summary).into_iter().flat_map(|(name, value, unit, note)| {
         format_row(&format!("{name:<16}{value:>12} {unit:<4}"), &note, columns)
@@ -270,7 +270,7 @@ const SIGNIFICANT_Z: f64 = 5.0;
 const SIGNIFICANT: &str = ": significant, not explained by noise";
 
 /// Name, value, unit and description of each row.
-fn table_rows(summary: &Summary<'_>) -> Vec<(&'static str, String, &'static str, String)> {
+fn table_rows(summary: &ComparisonSummary<'_>) -> Vec<(&'static str, String, &'static str, String)> {
     let pixels = u64::from(summary.width) * u64::from(summary.height);
     let [x, y] = summary.max_at;
     let trimmed = format!("without the worst 0.1 %: {} of {pixels} pixels", summary.dropped_pixels);
@@ -333,8 +333,8 @@ fn format_decibels(value: f64) -> String {
 mod tests {
     use super::*;
 
-    fn summary() -> Summary<'static> {
-        Summary {
+    fn summary() -> ComparisonSummary<'static> {
+        ComparisonSummary {
             a: "a/long/name/of/a/folder/picture.png".to_owned(),
             b: "a/long/name/of/a/folder/reference.png".to_owned(),
             width: 256,
@@ -374,7 +374,7 @@ mod tests {
     #[test]
     fn only_large_z_scores_are_significant() {
         for (z, is_far) in [(0.5, false), (-3.5, false), (5.5, true), (-40.0, true)] {
-            let lines = format_table(&Summary { bias_z: Some(z), ..summary() }, None);
+            let lines = format_table(&ComparisonSummary { bias_z: Some(z), ..summary() }, None);
             let line = lines.iter().find(|line| line.contains("bias, z")).expect("a line");
             assert_eq!(line.contains(SIGNIFICANT), is_far, "{line}");
         }

@@ -11,7 +11,7 @@ use crate::tui::wrap_text;
 /// Prints the description of a key, a type or a table, or a list of all tables.
 pub(crate) fn run(path: Option<&str>, console: &Console) -> Exit {
     let text = match path {
-        None => Some(overview()),
+        None => Some(format_table_list()),
         Some(path) => explain_path(path.trim_matches(['[', ']'])),
     };
     match text {
@@ -48,7 +48,7 @@ fn defines_type_named(table: &TableInfo, name: &str) -> bool {
     table.types.iter().any(|kind| kind.name == name)
 }
 
-fn overview() -> String {
+fn format_table_list() -> String {
     let line = |table: &TableInfo| format!("{:<20}{}\n", table.header(), without_backticks(table.doc));
     all_tables().iter().map(line).collect()
 }
@@ -65,7 +65,7 @@ fn explain_path(path: &str) -> Option<String> {
         }
     };
     match parts.as_slice() {
-        [group, _, inner, rest @ ..] if find_table(group)?.find_inner(inner).is_some() => {
+        [group, _, inner, rest @ ..] if find_table(group)?.find_inner_table(inner).is_some() => {
             explain_path(&[&[*inner], rest].concat().join("."))
         }
         [name] => match find_table(name) {
@@ -127,7 +127,7 @@ fn table_keys_with_paths(table: &'static TableInfo) -> impl Iterator<Item = (Str
 
 /// Describes a key: description, type, unit, range, default and an example.
 fn key_details(path: &str, key: &KeyInfo) -> String {
-    let mut text = format!("{path}\n    {}\n\n", sentence_without_backticks(key.doc));
+    let mut text = format!("{path}\n    {}\n\n", without_backticks_with_period(key.doc));
     let mut row = |name: &str, value: String| {
         if !value.is_empty() {
             text.push_str(&format!("    {name:<9}{value}\n"));
@@ -171,12 +171,12 @@ fn key_summary(path: &str, key: &KeyInfo) -> String {
     };
     let facts = [without_backticks(&key.kind_text()), key.unit.to_owned(), key.range_text(), default];
     let facts: Vec<String> = facts.into_iter().filter(|fact| !fact.is_empty()).collect();
-    format!("{path}: {}\n    {}\n", facts.join("; "), sentence_without_backticks(key.doc))
+    format!("{path}: {}\n    {}\n", facts.join("; "), without_backticks_with_period(key.doc))
 }
 
 /// Describes a table, with one line per type and key.
 fn table_details(table: &'static TableInfo) -> String {
-    let head = format!("{}\n    {}\n\n", table.header(), sentence_without_backticks(table.doc));
+    let head = format!("{}\n    {}\n\n", table.header(), without_backticks_with_period(table.doc));
     let types = if table.types.is_empty() { String::new() } else { format!("{}\n", format_type_list(table)) };
     let inner =
         |(header, inner): (String, &TableInfo)| format!("    {header:<26}{}\n", without_backticks(inner.doc));
@@ -199,7 +199,7 @@ fn type_details(table: &'static TableInfo, kind: &'static TableTypeInfo) -> Stri
         "{}, type = \"{}\"\n    {}\n\n",
         table.header(),
         kind.name,
-        sentence_without_backticks(kind.doc)
+        without_backticks_with_period(kind.doc)
     );
     format!("{head}{}", format_key_list(table.keys_for_type(Some(kind))))
 }
@@ -213,7 +213,7 @@ fn without_backticks(text: &str) -> String {
     text.replace('`', "")
 }
 
-fn sentence_without_backticks(text: &str) -> String {
+fn without_backticks_with_period(text: &str) -> String {
     format!("{}.", without_backticks(text))
 }
 

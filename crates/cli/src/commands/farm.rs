@@ -118,7 +118,7 @@ fn disambiguate_path_argument(path: &Path) -> String {
 }
 
 /// Returns the command that renders one part. `index` is a shell expression for the part's number.
-fn render_command(args: &FarmArgs, index: &str) -> String {
+fn part_render_command(args: &FarmArgs, index: &str) -> String {
     let (scene, part) = (quote_word(&disambiguate_path_argument(&args.scene)), part_file_name(args, index));
     let options: String = args.options.iter().map(|option| format!(" {}", quote_word(option))).collect();
     format!("glimt {scene} --once -o {part} --shard {index}/{} --resume{options}", args.shards)
@@ -130,7 +130,7 @@ fn part_file_name(args: &FarmArgs, index: &str) -> String {
 }
 
 /// Returns the command that merges the parts. It lists the parts with `seq`.
-fn merge_command(args: &FarmArgs, options: &str) -> String {
+fn parts_merge_command(args: &FarmArgs, options: &str) -> String {
     let (out, count) = (quote_word(&disambiguate_path_argument(&args.output)), args.shards);
     format!(
         "seq -f {}.%.0f.part {count} | xargs -d '\\n' glimt merge {options}{out}",
@@ -145,7 +145,7 @@ fn escape_output_for_seq(args: &FarmArgs) -> String {
 
 fn slurm_script(args: &FarmArgs) -> String {
     let (count, render, merge) =
-        (args.shards, render_command(args, "$SLURM_ARRAY_TASK_ID"), merge_command(args, ""));
+        (args.shards, part_render_command(args, "$SLURM_ARRAY_TASK_ID"), parts_merge_command(args, ""));
     format!(
         "\
 #!/bin/sh
@@ -171,11 +171,11 @@ echo \"parts: job $parts; merge: job $merge\"
 }
 
 fn parallel_script(args: &FarmArgs) -> String {
-    let (count, merge) = (args.shards, merge_command(args, ""));
+    let (count, merge) = (args.shards, parts_merge_command(args, ""));
     // Pass one command per line, because parallel would expand braces in file names inside a command
     // template.
     let index = "\u{0}";
-    let render: Vec<String> = render_command(args, index).split(index).map(quote_word).collect();
+    let render: Vec<String> = part_render_command(args, index).split(index).map(quote_word).collect();
     let (format, render) = ("%s".repeat(2 * render.len() - 1), render.join(" \"$index\" "));
     let hosts: String = args.hosts.iter().map(|host| format!(" --sshlogin {}", quote_word(host))).collect();
     let way = if args.hosts.is_empty() { "" } else { " --workdir \"$PWD\"" };
@@ -193,8 +193,11 @@ seq {count} | while read -r index; do printf '{format}\\n' {render}; done |
 }
 
 fn kubernetes_manifest(args: &FarmArgs, mebibytes: Option<u64>) -> String {
-    let (count, render, merge) =
-        (args.shards, render_command(args, "$index"), merge_command(args, "--watch --progress plain "));
+    let (count, render, merge) = (
+        args.shards,
+        part_render_command(args, "$index"),
+        parts_merge_command(args, "--watch --progress plain "),
+    );
     let (image, claim) = (quote_yaml(&args.image), quote_yaml(&args.claim));
     let render = quote_container_command(&format!("index=$((JOB_COMPLETION_INDEX + 1)); exec {render}"));
     let resources = mebibytes.map_or(String::new(), |size| {
@@ -275,11 +278,11 @@ mod tests {
     #[test]
     fn names_are_quoted_for_the_shell() {
         let args = args("'my scene.toml' -o \"it's 5% $HOME.exr\" --shards 3 --engine slurm -- --samples 8");
-        let call = render_command(&args, "1");
+        let call = part_render_command(&args, "1");
         let words = shlex::split(&call).expect("words");
         assert_eq!(&words[..5], ["glimt", "my scene.toml", "--once", "-o", "it's 5% $HOME.exr.1.part"]);
         assert_eq!(&words[words.len() - 2..], ["--samples", "8"]);
-        let joined = shlex::split(&merge_command(&args, "")).expect("words");
+        let joined = shlex::split(&parts_merge_command(&args, "")).expect("words");
         assert!(joined.contains(&"it's 5%% $HOME.exr.%.0f.part".to_owned()), "{joined:?}");
     }
 

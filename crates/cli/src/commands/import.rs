@@ -15,7 +15,7 @@ use crate::scene::has_scene_extension;
 use crate::signals;
 
 pub(crate) fn run(args: &ImportArgs, console: &Console) -> Exit {
-    signals::run_until_signal(console, |token| convert_and_write(args, console, token))
+    signals::run_cancelable_by_signals(console, |token| convert_and_write(args, console, token))
 }
 
 /// Converts the file. Does not report an error if the token is canceled.

@@ -11,11 +11,11 @@ use crate::output::json::to_pretty_text;
 use crate::output::settings::{ImageInfo, ImageInfoReadError, read_image_info};
 use crate::pipeline::protocol::Failure;
 use crate::progress::{failure_to_json, json_line};
-use crate::scene::detect_image_or_part;
+use crate::scene::detect_image_or_part_file;
 use crate::scene::sanitize::escape_invisible_chars;
 
 pub(crate) fn run(args: &InfoArgs, console: &Console) -> Exit {
-    let info = match read_info_or_format(&args.image) {
+    let info = match read_image_info_or_format(&args.image) {
         Ok(info) => info,
         Err(error) => return console.print_error(Exit::WRONG, &error.to_string()),
     };
@@ -34,8 +34,8 @@ pub(crate) fn run(args: &InfoArgs, console: &Console) -> Exit {
 ///
 /// # Errors
 /// Returns the same errors as [`read_image_info`].
-fn read_info_or_format(path: &Path) -> Result<ImageInfo, ImageInfoReadError> {
-    read_image_info(path).or_else(|error| match (&error, detect_image_or_part(path)) {
+fn read_image_info_or_format(path: &Path) -> Result<ImageInfo, ImageInfoReadError> {
+    read_image_info(path).or_else(|error| match (&error, detect_image_or_part_file(path)) {
         (ImageInfoReadError::NotAnImage { .. }, Some((format, _))) => {
             Ok(ImageInfo { format: format.to_owned(), ..ImageInfo::default() })
         }
@@ -46,15 +46,15 @@ fn read_info_or_format(path: &Path) -> Result<ImageInfo, ImageInfoReadError> {
 /// If the file is an image, part or checkpoint instead of a scene, reports this along with how the file was
 /// rendered, as one JSON line or as text. Returns `None` for other files.
 pub(crate) fn report_image_instead_of_scene(path: &Path, is_json: bool, console: &Console) -> Option<Exit> {
-    let (_, problem) = detect_image_or_part(path)?;
-    let info = read_info_or_format(path);
+    let (_, problem) = detect_image_or_part_file(path)?;
+    let info = read_image_info_or_format(path);
     if is_json {
         let mut value = failure_to_json(&Failure::Scene(vec![*problem]));
         value["image"] = info.map_or(Value::Null, |info| as_json(path, &info));
         json_line(&value);
     } else {
         console.print_diagnostics(&[*problem]);
-        console.print_message_lines(
+        console.print_lines_to_stderr(
             &info.map_or_else(|error| format!("{error}\n"), |info| as_text(path, &info)),
         );
     }

@@ -37,7 +37,9 @@ pub(crate) fn run(args: &MergeArgs, console: &Console) -> Exit {
         Ok(pool) => pool,
         Err(message) => return console.print_error(Exit::FAILED, &message),
     };
-    signals::run_until_signal(console, |token| MergeCommand { args, console, token, pool: &pool }.run())
+    signals::run_cancelable_by_signals(console, |token| {
+        MergeCommand { args, console, token, pool: &pool }.run()
+    })
 }
 
 /// The context of a running `merge` command.
@@ -59,7 +61,7 @@ impl MergeCommand<'_> {
         let inputs = RenderInputFiles::new(&parts, &self.args.out, self.token);
         self.check_output_is_not_render_input(&inputs)?;
         let merged = self.merge_parts(&parts, self.args.partial, "merge")?;
-        let Some(finish) = parts.first().and_then(|part| part.head.picture.develop_settings()) else {
+        let Some(finish) = parts.first().and_then(|part| part.head.picture.film_encoding_settings()) else {
             return Err(self.console.print_error(Exit::WRONG, "the parts contain no output settings"));
         };
         self.write_image(format, finish, &merged, &parts, &inputs)?;
@@ -71,7 +73,7 @@ impl MergeCommand<'_> {
     fn check_output(&self) -> Result<Format, Exit> {
         let out = &self.args.out;
         let name = out.display();
-        if part::is_part(out) {
+        if part::is_part_or_checkpoint(out) {
             let message = format!("cannot write {name}: it is a part; name the output before the parts");
             return Err(self.console.print_error(Exit::WRONG, &message));
         }
@@ -110,7 +112,7 @@ impl MergeCommand<'_> {
         let mut bar = StepProgressBar::new(self.args.progress, self.console, "read");
         let (mut parts, mut wrong) = (Vec::new(), Vec::new());
         for (index, path) in self.args.parts.iter().enumerate() {
-            match PartFile::open(path, self.token) {
+            match PartFile::open_and_validate(path, self.token) {
                 Ok(part) => parts.push(part),
                 Err(error) if error.is_too_many_open_files() => {
                     bar.end();
@@ -239,7 +241,7 @@ impl MergeCommand<'_> {
     ) -> Result<(), Exit> {
         let words = escape_invisible_chars(words);
         let columns = stdout_columns_or_default();
-        let finish = parts.first().and_then(|part| part.head.picture.develop_settings());
+        let finish = parts.first().and_then(|part| part.head.picture.film_encoding_settings());
         let lines = match finish {
             None => {
                 part::check_and_list_missing(parts).map_err(|error| self.report_part_error(&error))?;
@@ -304,7 +306,7 @@ impl MergeCommand<'_> {
         let film = &merged.film;
         let may_replace = |real: &Path| {
             let is_given = self.args.parts.iter().any(|part| is_same_file(part, real));
-            let is_part = is_given || part::is_part(real);
+            let is_part = is_given || part::is_part_or_checkpoint(real);
             let why = is_part.then(|| format!("cannot write {}: it is a part", out.display()));
             let why = why.map_or_else(|| self.message_if_render_input(inputs, real), |why| Ok(Some(why)))?;
             why.map_or(Ok(()), |reason| Err(OutputError::Refused { reason }))
@@ -371,7 +373,7 @@ impl AwaitedPart {
             self.unfinished = now;
             return Ok(None);
         }
-        match PartFile::open(&self.path, token) {
+        match PartFile::open_and_validate(&self.path, token) {
             Ok(part) => Ok(Some(part)),
             Err(PartError::Unfinished { .. }) => {
                 self.unfinished = now;

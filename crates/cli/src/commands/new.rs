@@ -43,7 +43,7 @@ pub(crate) fn run(file: &Path, with_schema: bool, console: &Console) -> Exit {
     match write::create_new(file, text.as_bytes()) {
         Ok(()) => {
             console.print_line_to_stderr(&format!("wrote {name}"));
-            if let Some(file) = quote_file_name(file) {
+            if let Some(file) = quote_file_name_for_shell(file) {
                 console.print_line_to_stderr(&format!(
                     "now: glimt {file}    (edit and save it to update the image; ? for help)"
                 ));
@@ -96,7 +96,8 @@ fn message_if_image_or_mesh_extension(file: &Path) -> Option<String> {
     } else {
         return None;
     };
-    let command = quote_file_name(&file.with_extension("toml")).map(|scene| format!(": glimt new {scene}"));
+    let command =
+        quote_file_name_for_shell(&file.with_extension("toml")).map(|scene| format!(": glimt new {scene}"));
     Some(format!(
         "{} has the extension of {what}; use .toml for scenes{}",
         file.display(),
@@ -106,7 +107,7 @@ fn message_if_image_or_mesh_extension(file: &Path) -> Option<String> {
 
 /// Quotes a file name for a shell and ensures that glimt does not mistake it for an option or a command.
 /// Returns `None` if the name is not safe to print.
-fn quote_file_name(file: &Path) -> Option<String> {
+fn quote_file_name_for_shell(file: &Path) -> Option<String> {
     let name = file.to_str().filter(|name| escape_invisible_chars(name) == *name)?;
     let is_bare = !name.contains(['/', '.']) || name.starts_with('-');
     let name = if is_bare { format!("./{name}") } else { name.to_owned() };
@@ -122,7 +123,7 @@ mod tests {
         for name in
             ["ball.toml", "my scene.toml", "it's.toml", "a \"b\" $HOME `c`.toml", "a;b.toml", "tilde~.toml"]
         {
-            let words = quote_file_name(Path::new(name)).and_then(|word| shlex::split(&word));
+            let words = quote_file_name_for_shell(Path::new(name)).and_then(|word| shlex::split(&word));
             assert_eq!(words, Some(vec![name.to_owned()]), "{name}");
         }
         for (name, word) in [
@@ -131,7 +132,7 @@ mod tests {
             ("check", Some("./check")),
             ("new\nline.toml", None),
         ] {
-            assert_eq!(quote_file_name(Path::new(name)).as_deref(), word);
+            assert_eq!(quote_file_name_for_shell(Path::new(name)).as_deref(), word);
         }
     }
 }

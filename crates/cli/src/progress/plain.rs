@@ -36,7 +36,7 @@ impl PlainReporter {
 
     /// Returns true the first time an asset is fully loaded. A file with several meshes is loaded once per
     /// mesh.
-    fn mark_newly_loaded(&mut self, progress: &AssetProgress) -> bool {
+    fn record_if_newly_loaded(&mut self, progress: &AssetProgress) -> bool {
         progress.done == progress.total && self.loaded.insert(progress.name.clone())
     }
 
@@ -69,7 +69,7 @@ impl Reporter for PlainReporter {
         {
             self.console.print_line_to_stderr(&stage_status_line(stage));
         } else if let Event::Asset { progress, .. } = event
-            && self.mark_newly_loaded(progress)
+            && self.record_if_newly_loaded(progress)
         {
             self.console.print_line_to_stderr(&format!("{:<8} {} 100%", "loaded", progress.name));
         } else if let Event::Progress { progress, .. } = event {
@@ -142,7 +142,7 @@ mod tests {
         let mut plain = PlainReporter::new(Console::new(crate::tui::ColorDepthChoice::None));
         let asset = |name: &str, done| AssetProgress { name: name.to_owned(), done, total: 10 };
         let said = [asset("toy.glb", 5), asset("toy.glb", 10), asset("toy.glb", 10), asset("b.png", 10)];
-        assert_eq!(said.map(|progress| plain.mark_newly_loaded(&progress)), [false, true, false, true]);
+        assert_eq!(said.map(|progress| plain.record_if_newly_loaded(&progress)), [false, true, false, true]);
     }
 
     #[test]

@@ -24,7 +24,7 @@ pub use file_material::{FileLine, FileMaterial, FileMaterialKind, FileTexture, P
 /// # Errors
 /// Returns [`Canceled`] if the token is canceled.
 pub fn referenced_files(path: &Path, token: &CancelToken) -> Result<Vec<PathBuf>, Canceled> {
-    if gltf::is_gltf(path) {
+    if gltf::has_gltf_extension(path) {
         gltf::referenced_files(path, token)
     } else {
         mesh::referenced_files(path, token)

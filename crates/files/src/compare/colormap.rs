@@ -14,7 +14,7 @@ pub(super) fn error_color(value: f64) -> Vec3 {
     let turn = 0.79 + 0.5 * value;
     let chroma = CHROMA * 4.0 * value * (1.0 - value) + MIN_CHROMA * value * value;
     let (a, b) = (chroma * libm::cos(TAU * turn), chroma * libm::sin(TAU * turn));
-    from_oklab(libm::cbrt(luminance_from_cie_lightness(MAX_LIGHTNESS * value)), a, b)
+    linear_rgb_from_oklab(libm::cbrt(luminance_from_cie_lightness(MAX_LIGHTNESS * value)), a, b)
 }
 
 /// Converts a CIE lightness in [0, 100] to relative luminance.
@@ -24,7 +24,7 @@ fn luminance_from_cie_lightness(lightness: f64) -> f64 {
     if lightness > 8.0 { root * root * root } else { lightness / KAPPA }
 }
 
-fn from_oklab(lightness: f64, a: f64, b: f64) -> Vec3 {
+fn linear_rgb_from_oklab(lightness: f64, a: f64, b: f64) -> Vec3 {
     let cube = |x: f64| x * x * x;
     let long = cube(lightness + 0.396_337_777_4 * a + 0.215_803_757_3 * b);
     let middle = cube(lightness - 0.105_561_345_8 * a - 0.063_854_172_8 * b);

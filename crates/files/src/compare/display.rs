@@ -20,19 +20,19 @@ const C2: f64 = 0.03 * 0.03;
 /// Luma weights of red, green and blue (ITU-R BT.709).
 const LUMA: [f64; 3] = [0.2126, 0.7152, 0.0722];
 
-pub(super) struct DisplayErrors {
+pub(super) struct DisplayReferredErrors {
     pub(super) psnr_db: f64,
     pub(super) ssim: f64,
 }
 
 #[derive(Clone, Copy, Default)]
-struct DisplayErrorSums {
+struct DisplayReferredErrorSums {
     square: f64,
     ssim: f64,
     windows: u64,
 }
 
-impl DisplayErrorSums {
+impl DisplayReferredErrorSums {
     fn plus(self, other: Self) -> Self {
         Self {
             square: self.square + other.square,
@@ -42,27 +42,31 @@ impl DisplayErrorSums {
     }
 }
 
-pub(super) fn measure(pair: &ImagePair) -> DisplayErrors {
+pub(super) fn measure(pair: &ImagePair) -> DisplayReferredErrors {
     let (width, height) = (pair.width(), pair.height());
     let window = normalized_taps(&unnormalized_gaussian_taps(SIGMA, RADIUS));
     let band_sums = |band| {
-        let sums = tiles::tiles_in_band(band, width, height).map(|tile| tile_sums(pair, tile, &window));
-        sums.fold(DisplayErrorSums::default(), DisplayErrorSums::plus)
+        let sums = tiles::tiles_in_band(band, width, height).map(|tile| tile_error_sums(pair, tile, &window));
+        sums.fold(DisplayReferredErrorSums::default(), DisplayReferredErrorSums::plus)
     };
     let bands: Vec<_> = (0..tiles::band_count(height)).into_par_iter().map(band_sums).collect();
-    let sums = bands.into_iter().fold(DisplayErrorSums::default(), DisplayErrorSums::plus);
+    let sums = bands.into_iter().fold(DisplayReferredErrorSums::default(), DisplayReferredErrorSums::plus);
     let mean_square = sums.square / (3 * width * height) as f64;
-    DisplayErrors { psnr_db: -10.0 * libm::log10(mean_square), ssim: sums.ssim / sums.windows as f64 }
+    DisplayReferredErrors { psnr_db: -10.0 * libm::log10(mean_square), ssim: sums.ssim / sums.windows as f64 }
 }
 
-fn tile_sums(pair: &ImagePair, tile: Rect, window: &[f64]) -> DisplayErrorSums {
+fn tile_error_sums(pair: &ImagePair, tile: Rect, window: &[f64]) -> DisplayReferredErrorSums {
     let (square, [a, b]) = tile_lumas_and_squared_error(pair, tile);
     let mean = |plane: &Plane| plane.filtered(window, window);
     let (mean_a, mean_b) = (mean(&a), mean(&b));
-    let (mean_aa, mean_bb, mean_ab) = (mean(&a.times(&a)), mean(&b.times(&b)), mean(&a.times(&b)));
+    let (mean_aa, mean_bb, mean_ab) = (
+        mean(&a.elementwise_product(&a)),
+        mean(&b.elementwise_product(&b)),
+        mean(&a.elementwise_product(&b)),
+    );
     let columns = window_weight_sums(tile.x, tile.width, pair.width(), window);
     let rows = window_weight_sums(tile.y, tile.height, pair.height(), window);
-    let mut sums = DisplayErrorSums { square, ..DisplayErrorSums::default() };
+    let mut sums = DisplayReferredErrorSums { square, ..DisplayReferredErrorSums::default() };
     for (y, row) in rows.iter().enumerate() {
         for (x, column) in columns.iter().enumerate() {
             let (Some(row), Some(column)) = (row, column) else { continue };

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use crate::assets::AssetError;
-use crate::assets::image::{ImageEncoding, ImageLimits, load};
+use crate::assets::image::{ColorEncoding, ImageLimits, load};
 use crate::control::{CancelToken, ignore_progress};
 use crate::film::RadianceImage;
 use crate::math::Vec3;
@@ -117,7 +117,7 @@ impl ImagePair {
 /// Reads an image and returns it with the warnings about its file.
 fn read_radiance_image(path: &Path) -> Result<(RadianceImage, Vec<String>), AssetError> {
     let image =
-        load(path, ImageEncoding::Raw, ImageLimits::default(), &ignore_progress, &CancelToken::new())?;
+        load(path, ColorEncoding::Raw, ImageLimits::default(), &ignore_progress, &CancelToken::new())?;
     let texels = image.texels;
     let (width, height) = (texels.width, texels.height);
     Ok((RadianceImage { width, height, pixels: texels.into_linear_colors() }, image.warnings))

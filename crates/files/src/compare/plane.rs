@@ -14,7 +14,7 @@ impl Plane {
     }
 
     /// Elementwise product of two planes.
-    pub(super) fn times(&self, other: &Self) -> Self {
+    pub(super) fn elementwise_product(&self, other: &Self) -> Self {
         let values = self.values.iter().zip(&other.values).map(|(a, b)| a * b).collect();
         Self { values, ..*self }
     }
@@ -65,11 +65,11 @@ fn add_weighted_rows(sums: &mut [f64], rows: &[&[f64]], taps: &[f64]) {
 
 /// exp(−x²/2σ²) at integer pixel offsets from −radius to radius.
 pub(super) fn unnormalized_gaussian_taps(sigma: f64, radius: usize) -> Vec<f64> {
-    offsets(radius).map(|x| libm::exp(-x * x / (2.0 * sigma * sigma))).collect()
+    tap_offsets(radius).map(|x| libm::exp(-x * x / (2.0 * sigma * sigma))).collect()
 }
 
 /// −radius … radius.
-pub(super) fn offsets(radius: usize) -> impl Iterator<Item = f64> {
+pub(super) fn tap_offsets(radius: usize) -> impl Iterator<Item = f64> {
     let radius = radius as i32;
     (-radius..=radius).map(f64::from)
 }

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use xattr::FileExt;
 
 #[cfg(target_os = "linux")]
-use super::flags::Flags;
+use super::flags::InodeFlags;
 
 /// POSIX.1e access control list, as stored by Linux (acl(5)).
 const ACCESS_LIST: &str = "system.posix_acl_access";
@@ -75,7 +75,7 @@ pub(super) struct FileAttributes {
     gid: u32,
     mode: u32,
     #[cfg(target_os = "linux")]
-    flags: Flags,
+    flags: InodeFlags,
     /// Names and values of extended attributes. The access list is last because setting it may remove
     /// permissions.
     named: Vec<(OsString, io::Result<Vec<u8>>)>,
@@ -99,7 +99,7 @@ impl FileAttributes {
             gid: metadata.gid(),
             mode: metadata.mode() & 0o7777,
             #[cfg(target_os = "linux")]
-            flags: Flags::read(path),
+            flags: InodeFlags::read(path),
             named,
         }
     }
@@ -113,12 +113,12 @@ impl FileAttributes {
         if !self.flags.try_apply_to_file(new) {
             carried.lost.push("its flags (chattr)".to_owned());
         }
-        self.carry_owner(new, &mut carried);
-        self.carry_extended_attributes(new, &mut carried);
+        self.copy_owner(new, &mut carried);
+        self.copy_extended_attributes(new, &mut carried);
         carried
     }
 
-    fn carry_owner(&self, new: &File, carried: &mut UncopiedAttributes) {
+    fn copy_owner(&self, new: &File, carried: &mut UncopiedAttributes) {
         let ids = || new.metadata().map(|found| (found.uid(), found.gid()));
         let is_same = |found: io::Result<(u32, u32)>| found.is_ok_and(|found| found == (self.uid, self.gid));
         if is_same(ids()) || fchown(new, Some(self.uid), Some(self.gid)).is_ok() {
@@ -140,7 +140,7 @@ impl FileAttributes {
         }
     }
 
-    fn carry_extended_attributes(&self, new: &File, carried: &mut UncopiedAttributes) {
+    fn copy_extended_attributes(&self, new: &File, carried: &mut UncopiedAttributes) {
         for (name, value) in &self.named {
             let is_kept = value.as_ref().is_ok_and(|value| set_attribute(new, name, value).is_ok());
             if !is_kept {
@@ -206,7 +206,7 @@ mod tests {
         let found = new.metadata().expect("a file");
         let named = vec![(OsString::from(name), Ok(b"value".to_vec()))];
         #[cfg(target_os = "linux")]
-        let flags = Flags::read(Path::new("/nowhere"));
+        let flags = InodeFlags::read(Path::new("/nowhere"));
         let (uid, gid) = (found.uid(), found.gid());
         let attributes = FileAttributes {
             uid,

@@ -34,7 +34,7 @@ pub fn read_mean_luminance_error(path: &Path) -> Option<f64> {
     let is_regular = path.metadata().is_ok_and(|found| found.is_file());
     let file = if is_regular { File::open(path).ok()? } else { return None };
     let meta = MetaData::read_from_buffered(BufReader::new(file), false).ok()?;
-    match meta.headers.first()?.own_attributes.other.get(&text(MEAN_LUMINANCE_ERROR)) {
+    match meta.headers.first()?.own_attributes.other.get(&to_exr_text(MEAN_LUMINANCE_ERROR)) {
         Some(AttributeValue::F64(error)) => Some(*error).filter(|error| error.is_finite() && *error >= 0.0),
         _ => None,
     }
@@ -170,13 +170,13 @@ const REC_709: Chromaticities = Chromaticities {
 fn attributes(options: &EncodeOptions) -> LayerAttributes {
     let line = |(name, value): &(String, String)| format!("{}: {}", one_line(name), one_line(value));
     let lines: Vec<_> = options.metadata.iter().map(line).collect();
-    let comments = (!lines.is_empty()).then(|| text(&lines.join("\n")));
+    let comments = (!lines.is_empty()).then(|| to_exr_text(&lines.join("\n")));
     let error = options.mean_luminance_error.map(AttributeValue::F64);
-    let other = error.map(|error| (text(MEAN_LUMINANCE_ERROR), error)).into_iter().collect();
-    LayerAttributes { software_name: Some(text(SOFTWARE)), comments, other, ..Default::default() }
+    let other = error.map(|error| (to_exr_text(MEAN_LUMINANCE_ERROR), error)).into_iter().collect();
+    LayerAttributes { software_name: Some(to_exr_text(SOFTWARE)), comments, other, ..Default::default() }
 }
 
 /// Encodes text as UTF-8, as other programs do.
-fn text(value: &str) -> Text {
+fn to_exr_text(value: &str) -> Text {
     Text::from_slice_unchecked(value.as_bytes())
 }

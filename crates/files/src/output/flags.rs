@@ -18,9 +18,9 @@ const USER_FLAGS: IFlags = IFlags::NODUMP
 
 /// Flags of a file. `None` if they cannot be read or the file system does not support them.
 #[derive(Debug)]
-pub(super) struct Flags(Option<IFlags>);
+pub(super) struct InodeFlags(Option<IFlags>);
 
-impl Flags {
+impl InodeFlags {
     /// Reads the flags of a file.
     pub(super) fn read(path: &Path) -> Self {
         Self(File::open(path).ok().and_then(|file| ioctl_getflags(file).ok()))

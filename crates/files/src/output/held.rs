@@ -49,14 +49,14 @@ fn backup_path(target: &Path) -> PathBuf {
 
 /// A replacement in progress. The steps are [`Self::stage_at_backup_path`], [`Self::swap`] and
 /// [`Self::finish_if_old_text_matches`].
-pub(super) struct Replacement<'a> {
+pub(super) struct FileReplacement<'a> {
     target: &'a Path,
     held: PathBuf,
     expected: &'a [u8],
     new: TemporaryFile,
 }
 
-impl<'a> Replacement<'a> {
+impl<'a> FileReplacement<'a> {
     /// Moves the new text to the backup name.
     ///
     /// # Errors
@@ -183,7 +183,7 @@ pub(super) fn replace_if_unchanged(
     target: &Path,
     expected: &[u8],
 ) -> io::Result<Option<File>> {
-    match Replacement::stage_at_backup_path(new, target, expected)?.swap() {
+    match FileReplacement::stage_at_backup_path(new, target, expected)?.swap() {
         Ok(replacement) => replacement.finish_if_old_text_matches(),
         // The file system cannot exchange names, or the file no longer exists.
         Err((error, Some(new))) if error.kind() != ErrorKind::PermissionDenied => {
@@ -338,7 +338,7 @@ mod tests {
                     std::mem::forget(new);
                 } else {
                     let mut replacement =
-                        Replacement::stage_at_backup_path(new, &scene, OLD.as_bytes()).expect("begun");
+                        FileReplacement::stage_at_backup_path(new, &scene, OLD.as_bytes()).expect("begun");
                     save(1);
                     if steps == 2 {
                         replacement = replacement.swap().map_err(|(error, _)| error).expect("swapped");
@@ -370,7 +370,7 @@ mod tests {
         let scene = folder.scene();
         folder.save("first");
         let replacement =
-            Replacement::stage_at_backup_path(folder.new_text(), &scene, OLD.as_bytes()).expect("begun");
+            FileReplacement::stage_at_backup_path(folder.new_text(), &scene, OLD.as_bytes()).expect("begun");
         let replacement = replacement.swap().map_err(|(error, _)| error).expect("swapped");
         folder.save("second");
         assert!(replacement.finish_if_old_text_matches().expect("no error").is_none());

@@ -41,8 +41,8 @@ pub use exr::read_mean_luminance_error;
 pub use format::{AnimationFormat, BitDepth, Format};
 pub use identity::{FallbackFileIdentity, FileIdentity, is_same_file};
 pub use origin::{
-    ReplaceCheck, check_image_replaceable, json_replace_check, plot_replace_check, scene_name_in_png,
-    sign_plot, table_replace_check,
+    ReplaceCheck, image_replace_check, json_replace_check, plot_replace_check, scene_name_in_png, sign_plot,
+    table_replace_check,
 };
 
 use crate::control::CancelToken;
@@ -142,7 +142,7 @@ pub fn check_image_path(path: &Path) -> Result<Format, OutputError> {
 /// permissions.
 pub fn check_image_target_without_writing(path: &Path) -> Result<Format, OutputError> {
     let format = Format::from_path(path)?;
-    check_file_target_read_only(path)?;
+    check_file_target_without_writing(path)?;
     Ok(format)
 }
 
@@ -150,7 +150,7 @@ pub fn check_image_target_without_writing(path: &Path) -> Result<Format, OutputE
 ///
 /// # Errors
 /// Same as [`check_image_target_without_writing`], but the extension is not checked.
-pub fn check_file_target_read_only(path: &Path) -> Result<(), OutputError> {
+pub fn check_file_target_without_writing(path: &Path) -> Result<(), OutputError> {
     resolve_path::resolve_writable(path).map(drop)
 }
 

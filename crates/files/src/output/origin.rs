@@ -61,14 +61,14 @@ impl ReplaceCheck {
 }
 
 /// Checks whether an image may be replaced. It must be a PNG with a text chunk that names glimt.
-pub fn check_image_replaceable(path: &Path) -> ReplaceCheck {
-    ReplaceCheck::from_file(open_existing(path), "an image", is_glimt_image)
+pub fn image_replace_check(path: &Path) -> ReplaceCheck {
+    ReplaceCheck::from_file(open_existing(path), "an image", is_glimt_png)
 }
 
 /// Returns the scene named in a PNG file's metadata, or `None` if there is no such file or scene name.
 pub fn scene_name_in_png(path: &Path) -> Option<String> {
     const KEY: &str = "glimt:scene";
-    let reader = png_header(open_existing(path)?.ok()?)?;
+    let reader = open_png_reader(open_existing(path)?.ok()?)?;
     let info = reader.info();
     let latin = info.uncompressed_latin1_text.iter().find(|text| text.keyword == KEY);
     let utf8 = || info.utf8_text.iter().find(|text| text.keyword == KEY)?.get_text().ok();
@@ -126,15 +126,15 @@ fn open_existing(path: &Path) -> Option<io::Result<File>> {
 }
 
 /// Reads a PNG up to its first pixel.
-fn png_header(file: File) -> Option<png::Reader<BufReader<File>>> {
+fn open_png_reader(file: File) -> Option<png::Reader<BufReader<File>>> {
     let limits = png::Limits { bytes: HEADER_BYTES };
     let mut decoder = png::Decoder::new_with_limits(BufReader::new(file), limits);
     decoder.set_ignore_iccp_chunk(true);
     decoder.read_info().ok()
 }
 
-fn is_glimt_image(file: File) -> bool {
-    let Some(reader) = png_header(file) else { return false };
+fn is_glimt_png(file: File) -> bool {
+    let Some(reader) = open_png_reader(file) else { return false };
     let texts = &reader.info().uncompressed_latin1_text;
     texts.iter().any(|text| text.keyword == "Software" && is_glimt_software(&text.text))
 }
@@ -163,9 +163,9 @@ mod tests {
     fn unreadable_files_are_not_foreign() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("a.png");
-        assert!(matches!(check_image_replaceable(&path), ReplaceCheck::Own), "no file");
+        assert!(matches!(image_replace_check(&path), ReplaceCheck::Own), "no file");
         std::fs::write(&path, "an image").expect("written");
-        assert!(matches!(check_image_replaceable(&path), ReplaceCheck::Foreign("an image")));
+        assert!(matches!(image_replace_check(&path), ReplaceCheck::Foreign("an image")));
         let denied = || Some(Err(io::Error::from(io::ErrorKind::PermissionDenied)));
         let replaced = ReplaceCheck::from_file(denied(), "an image", |_| true);
         assert!(

@@ -112,7 +112,7 @@ fn checked_target_for_existing(
         check_access(path, &target, AccessFlags::W_OK)?;
         return Ok(WriteTarget::InPlace(target));
     }
-    check_flags(path, "it", &target)?;
+    check_no_protection_flag(path, "it", &target)?;
     // Replacing the file requires only write permission for the directory. Check the file itself anyway,
     // because it may be read-only on purpose.
     check_access(path, &target, AccessFlags::W_OK)?;
@@ -133,7 +133,7 @@ fn checked_target_for_existing(
 fn check_directory_is_writable(path: &Path, directory: &Path) -> Result<Metadata, OutputError> {
     match fs::metadata(directory) {
         Ok(metadata) if metadata.is_dir() => {
-            check_flags(path, &format!("the directory {}", directory.display()), directory)?;
+            check_no_protection_flag(path, &format!("the directory {}", directory.display()), directory)?;
             check_access(path, directory, AccessFlags::W_OK | AccessFlags::X_OK)?;
             Ok(metadata)
         }
@@ -149,7 +149,7 @@ fn check_directory_is_writable(path: &Path, directory: &Path) -> Result<Metadata
 
 /// Checks that the file or directory has no flag that protects it from changes, which would prevent the new
 /// file from being renamed or removed.
-fn check_flags(path: &Path, name: &str, what: &Path) -> Result<(), OutputError> {
+fn check_no_protection_flag(path: &Path, name: &str, what: &Path) -> Result<(), OutputError> {
     let Some(flag) = ProtectionFlag::from_path(what) else { return Ok(()) };
     let why = format!("{name} is {}", flag.description());
     Err(OutputError::Target { path: path.to_owned(), why, advice: flag.removal_advice() })

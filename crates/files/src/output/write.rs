@@ -94,7 +94,7 @@ pub fn atomic_with_policy(
     token: &CancelToken,
 ) -> Result<(), OutputError> {
     let content = |file: &mut dyn Write| cancelable::write_all(file, bytes, token);
-    atomic_generated(path, &content, guard, token, Durability::Power).map(drop)
+    atomic_from_callback(path, &content, guard, token, Durability::Power).map(drop)
 }
 
 /// Like [`atomic_with_policy`], but replaces the file only if it has the expected content. If the content has
@@ -130,7 +130,7 @@ pub enum Durability {
 ///
 /// # Errors
 /// Any error from [`atomic_with_policy`] or `content`.
-pub fn atomic_generated(
+pub fn atomic_from_callback(
     path: &Path,
     content: &dyn Fn(&mut dyn Write) -> io::Result<()>,
     guard: &ExistingFilePolicy<'_>,
@@ -140,7 +140,7 @@ pub fn atomic_generated(
     write_atomically_or_in_place(path, content, guard, token, durability, None, &sync_directory)
 }
 
-/// Like [`atomic_generated`], but if `expected` is set, replaces only a file with this content. `sync`
+/// Like [`atomic_from_callback`], but if `expected` is set, replaces only a file with this content. `sync`
 /// synchronizes a directory.
 pub(super) fn write_atomically_or_in_place(
     path: &Path,
@@ -165,7 +165,8 @@ pub(super) fn write_atomically_or_in_place(
                     advice: "edit a copy instead",
                 });
             }
-            cancelable::write_error_or_canceled(fill(&new, content, carried.as_ref(), durability), named)?;
+            let written = write_content_and_mode(&new, content, carried.as_ref(), durability);
+            cancelable::write_error_or_canceled(written, named)?;
             (guard.may_replace)(&target.path)?;
             let file = match expected {
                 None => new.rename_to(&target.path).map_err(named)?,
@@ -233,7 +234,7 @@ fn create_temporary(
     Ok((new, carried))
 }
 
-fn fill(
+fn write_content_and_mode(
     new: &TemporaryFile,
     content: &dyn Fn(&mut dyn Write) -> io::Result<()>,
     carried: Option<&UncopiedAttributes>,

@@ -29,9 +29,9 @@ pub struct Cone {
 
 impl SurfaceF64 for Cone {
     fn surface_point_f64(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePointF64 {
-        let point = self.exact_hit_point(ray, hit);
+        let point = self.unrounded_hit_point(ray, hit);
         if hit.primitive > 0 {
-            return self.base().closest_point_f64(point, self.coordinate_bound());
+            return self.base_disk().closest_point_f64(point, self.coordinate_bound());
         }
         let local = self.frame.point_to_local(point);
         self.side_point_from_slant_f64(
@@ -59,7 +59,7 @@ impl Cone {
         let line = self.frame.line_to_local(ray);
         let base = if self.capped { self.height } else { self.height * (1.0 + BORDER) };
         let ends = LineInterval::between_heights(&line, (0.0, 0), (base, 1))?;
-        let starts_on = |part| self.starts_on(ray, part);
+        let starts_on = |part| self.starts_on_part(ray, part);
         surface_of_revolution::first_hit(
             ray,
             &line,
@@ -71,7 +71,7 @@ impl Cone {
     }
 
     /// Whether a ray starts on a part, within rounding error.
-    fn starts_on(&self, ray: &RayF64, part: u32) -> bool {
+    fn starts_on_part(&self, ray: &RayF64, part: u32) -> bool {
         let local = self.frame.point_to_local(ray.origin);
         let distance = match part {
             0 => (local.truncate().length() * self.height - local.z * self.radius) / self.slant,
@@ -111,7 +111,7 @@ impl Cone {
     }
 
     /// Hit point before rounding.
-    fn exact_hit_point(&self, ray: &RayF64, hit: &ShapeHit) -> DVec3 {
+    fn unrounded_hit_point(&self, ray: &RayF64, hit: &ShapeHit) -> DVec3 {
         let line = self.frame.line_to_local(ray);
         let crossings = match hit.primitive {
             0 => self.double_cone_interval(&line),
@@ -122,9 +122,9 @@ impl Cone {
 
     /// Surface point at a hit.
     pub fn surface_point_at_hit(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
-        let point = self.exact_hit_point(ray, hit);
+        let point = self.unrounded_hit_point(ray, hit);
         if hit.primitive > 0 {
-            return self.base().closest_surface_point(point, self.coordinate_bound());
+            return self.base_disk().closest_surface_point(point, self.coordinate_bound());
         }
         let local = self.frame.point_to_local(point);
         let out = radial_direction_toward(local.truncate());
@@ -164,7 +164,7 @@ impl Cone {
         let (across, below) = (local.truncate().length(), self.height - local.z);
         let off_side = (across * self.height - local.z * self.radius) / self.slant;
         if self.capped && below.abs() < off_side.abs() {
-            return self.base().uv_at_point(point);
+            return self.base_disk().uv_at_point(point);
         }
         let (_, along) = self.slant_direction_and_distance(local);
         DVec2::new(
@@ -199,7 +199,7 @@ impl Cone {
     }
 
     /// The cap, facing outward.
-    pub fn base(&self) -> Disk {
+    pub fn base_disk(&self) -> Disk {
         Disk::new(self.frame.point_to_world(DVec3::Z * self.height), self.frame.axis(), self.radius)
     }
 
@@ -217,7 +217,7 @@ impl Cone {
                     self.side_point_and_normal_from_uv(f64::from(u.x), 1.0 - (1.0 - f64::from(u.y)).sqrt());
                 SurfaceSample { point, normal }
             }
-            _ => self.base().sample_point_on_part(0, u),
+            _ => self.base_disk().sample_point_on_part(0, u),
         }
     }
 
@@ -370,7 +370,7 @@ mod tests {
         }
 
         fn unrounded_point(&self, ray: &RayF64, hit: &ShapeHit) -> DVec3 {
-            self.exact_hit_point(ray, hit)
+            self.unrounded_hit_point(ray, hit)
         }
     }
 

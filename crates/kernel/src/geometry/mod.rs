@@ -139,11 +139,11 @@ impl Shape {
         of: u32,
     ) -> bool {
         match self {
-            Self::Sphere(sphere) => row.fill_from_shape(sphere, rays, hits, of),
-            Self::Quad(quad) => row.fill_from_shape(quad, rays, hits, of),
-            Self::Plane(plane) => row.fill_from_shape(plane, rays, hits, of),
-            Self::Box(cuboid) => row.fill_from_shape(cuboid, rays, hits, of),
-            Self::Triangle(triangle) => row.fill_from_shape(triangle, rays, hits, of),
+            Self::Sphere(sphere) => row.fill_point_lanes_with_simd(sphere, rays, hits, of),
+            Self::Quad(quad) => row.fill_point_lanes_with_simd(quad, rays, hits, of),
+            Self::Plane(plane) => row.fill_point_lanes_with_simd(plane, rays, hits, of),
+            Self::Box(cuboid) => row.fill_point_lanes_with_simd(cuboid, rays, hits, of),
+            Self::Triangle(triangle) => row.fill_point_lanes_with_simd(triangle, rays, hits, of),
             Self::Disk(_) | Self::Cylinder(_) | Self::Cone(_) | Self::Torus(_) | Self::Transformed(_) => {
                 return false;
             }
@@ -155,8 +155,8 @@ impl Shape {
     #[inline(always)]
     fn try_fill_uvs(&self, row: &mut SurfacePacket, rays: &RayPacket, hits: &HitPacket, of: u32) -> bool {
         match self {
-            Self::Quad(quad) => row.fill_uv_from_shape(quad, rays, hits, of),
-            Self::Plane(plane) => row.fill_uv_from_shape(plane, rays, hits, of),
+            Self::Quad(quad) => row.fill_uv_lanes_with_simd(quad, rays, hits, of),
+            Self::Plane(plane) => row.fill_uv_lanes_with_simd(plane, rays, hits, of),
             Self::Sphere(_)
             | Self::Box(_)
             | Self::Triangle(_)
@@ -332,7 +332,9 @@ impl Shape {
             }
             Self::Cylinder(cylinder) => Some((0.0, cylinder.meridian_and_azimuth_tangents(point))),
             Self::Cone(cone) => Some((0.0, cone.meridian_and_azimuth_tangents(point))),
-            Self::Torus(torus) => Some((1.0 / torus.tube(), torus.meridian_and_azimuth_tangents(point))),
+            Self::Torus(torus) => {
+                Some((1.0 / torus.tube_radius(), torus.meridian_and_azimuth_tangents(point)))
+            }
             Self::Quad(_)
             | Self::Plane(_)
             | Self::Box(_)

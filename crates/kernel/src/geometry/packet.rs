@@ -48,7 +48,7 @@ impl RayPacket {
 
     /// Sets the rays' start triangles.
     #[inline(always)]
-    pub fn with_start_triangle(self, start: [u32; PACKET_SIZE]) -> Self {
+    pub fn with_start_triangles(self, start: [u32; PACKET_SIZE]) -> Self {
         Self { start, ..self }
     }
 
@@ -66,14 +66,14 @@ impl RayPacket {
         let mut ends = [-1.0; PACKET_SIZE];
         // Compile full packets separately because a constant length makes their loop faster.
         match <&[Ray; PACKET_SIZE]>::try_from(rays) {
-            Ok(full) => rows.fill(&mut ends, full),
-            Err(_) => rows.fill(&mut ends, rays),
+            Ok(full) => rows.fill_from_rays(&mut ends, full),
+            Err(_) => rows.fill_from_rays(&mut ends, rays),
         }
         (rows, ends)
     }
 
     #[inline(always)]
-    fn fill(&mut self, ends: &mut F32x16, rays: &[Ray]) {
+    fn fill_from_rays(&mut self, ends: &mut F32x16, rays: &[Ray]) {
         for (lane, ray) in rays.iter().enumerate().take(PACKET_SIZE) {
             for axis in 0..3 {
                 self.origin[axis][lane] = ray.origin[axis];

@@ -101,7 +101,7 @@ impl SurfacePacket {
 
     /// [`SurfacePacket::fill_uv_of_shape_lanes`] for a shape with a SIMD loop.
     #[inline(always)]
-    pub(super) fn fill_uv_from_shape(
+    pub(super) fn fill_uv_lanes_with_simd(
         &mut self,
         shape: &impl UvMapped,
         rays: &RayPacket,
@@ -118,7 +118,7 @@ impl SurfacePacket {
 
     /// [`SurfacePacket::try_fill_points_of_shape_lanes`] for a shape with a SIMD loop.
     #[inline(always)]
-    pub(super) fn fill_from_shape(
+    pub(super) fn fill_point_lanes_with_simd(
         &mut self,
         shape: &impl SurfaceF64,
         rays: &RayPacket,
@@ -155,7 +155,7 @@ impl SurfacePacket {
 
     /// Copies the selected shading normals and shadow points from another packet.
     #[inline(always)]
-    pub fn copy_shading_normals_from(&mut self, of: u32, found: &Self) {
+    pub fn copy_shading_lanes_from(&mut self, of: u32, found: &Self) {
         self.smooth |= of;
         let of = mask_from_bits(of);
         for axis in 0..3 {

@@ -79,16 +79,18 @@ impl TransformedShape {
         if let Shape::Sphere(sphere) = &self.shape {
             let rows = self.to_world.linear.transpose();
             let extent = DVec3::from_array(std::array::from_fn(|axis| rows.col(axis).length()));
-            return Some(self.rounded_bounds(self.to_world.point(sphere.center), extent * sphere.radius));
+            let center = self.to_world.point(sphere.center);
+            return Some(self.box_enlarged_for_rounding(center, extent * sphere.radius));
         }
         let bounds = self.shape.bounds()?;
         let half = bounds.extent().as_dvec3() * 0.5;
         let center = (bounds.min.as_dvec3() + bounds.max.as_dvec3()) * 0.5;
-        Some(self.rounded_bounds(self.to_world.point(center), self.to_world.transform_abs_bound(half)))
+        let extent = self.to_world.transform_abs_bound(half);
+        Some(self.box_enlarged_for_rounding(self.to_world.point(center), extent))
     }
 
     /// The box with this center and half extent, enlarged to account for rounding errors.
-    fn rounded_bounds(&self, center: DVec3, extent: DVec3) -> Aabb {
+    fn box_enlarged_for_rounding(&self, center: DVec3, extent: DVec3) -> Aabb {
         let size = self.condition * (center - self.to_world.translation).abs() + extent + center.abs();
         let extent = extent + size * (16.0 * f64::EPSILON);
         Aabb::from_points_f64([center - extent, center + extent])

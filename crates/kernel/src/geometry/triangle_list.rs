@@ -139,9 +139,8 @@ impl TriangleList {
                 continue;
             }
             let other = (number + 1..corners.len()).find_map(|other| {
-                let pair = is_left[other].then(|| {
-                    reorder_corners_into_triangle_pair(&corners[number], &corners[other], reach)
-                })??;
+                let pair = is_left[other]
+                    .then(|| reorder_triangle_pair_as_quad(&corners[number], &corners[other], reach))??;
                 Some((other, pair))
             });
             facets.push(match other {
@@ -149,11 +148,12 @@ impl TriangleList {
                     is_left[other] = false;
                     let [one, two] = [slenderness(&corners[number]), slenderness(&corners[other])];
                     let most = [one[0].max(two[0]), one[1].max(two[1])];
-                    TriangleOrQuad::from_triangle(&first, Some(apex), [number as u32, other as u32], most)
+                    let numbers = [number as u32, other as u32];
+                    TriangleOrQuad::from_triangle_and_apex(&first, Some(apex), numbers, most)
                 }
                 None => {
                     let own = &corners[number];
-                    TriangleOrQuad::from_triangle(own, None, [number as u32; 2], slenderness(own))
+                    TriangleOrQuad::from_triangle_and_apex(own, None, [number as u32; 2], slenderness(own))
                 }
             });
         }
@@ -367,7 +367,7 @@ struct CandidateTestResults {
 }
 
 impl TriangleOrQuad {
-    fn from_triangle(
+    fn from_triangle_and_apex(
         [a, b, c]: &[Vec3; 3],
         apex: Option<Vec3>,
         numbers: [u32; 2],
@@ -409,11 +409,7 @@ impl TriangleOrQuad {
 /// Reorders the corners of two triangles that form a flat quadrilateral close to a parallelogram. The first
 /// triangle's outer corner becomes its first corner, and the second triangle's outer corner becomes its last.
 /// Returns `None` for other triangles.
-fn reorder_corners_into_triangle_pair(
-    one: &[Vec3; 3],
-    other: &[Vec3; 3],
-    reach: f32,
-) -> Option<[[Vec3; 3]; 2]> {
+fn reorder_triangle_pair_as_quad(one: &[Vec3; 3], other: &[Vec3; 3], reach: f32) -> Option<[[Vec3; 3]; 2]> {
     let apart = |of: &[Vec3; 3], from: &[Vec3; 3]| {
         let mut own = (0..3).filter(|&i| !from.contains(&of[i]));
         own.next().filter(|_| own.next().is_none())

@@ -88,7 +88,7 @@ impl ShearedRay {
         }
         let inverse = 1.0 / determinant;
         let t = (wa * az + wb * bz + wc * cz) * self.shear.z * inverse;
-        let (error, reach) = self.distance_error(&sheared, inverse);
+        let (error, reach) = self.distance_error_and_max_t(&sheared, inverse);
         if error > reach * ILL_CONDITIONED {
             return self.intersect_needle(corners, t_max);
         }
@@ -103,7 +103,7 @@ impl ShearedRay {
     /// the triangle in double precision, the nearest point on an edge is used.
     #[cold]
     fn intersect_needle(&self, corners: &[Vec3; 3], t_max: f32) -> Option<ShapeHit> {
-        let ([a, b, c], [wa, wb, wc]) = self.edge_functions_f64(corners);
+        let ([a, b, c], [wa, wb, wc]) = self.corners_and_edge_functions_f64(corners);
         let sum = wa + wb + wc;
         let is_inside = wa * sum >= 0.0 && wb * sum >= 0.0 && wc * sum >= 0.0 && sum != 0.0;
         let (t, u, v) = if is_inside {
@@ -127,7 +127,7 @@ impl ShearedRay {
     /// single precision. The ray's line is already known to pass through the triangle.
     #[cold]
     fn intersect_near_origin(&self, corners: &[Vec3; 3], t_max: f32) -> Option<ShapeHit> {
-        let ([a, b, c], [wa, wb, wc]) = self.edge_functions_f64(corners);
+        let ([a, b, c], [wa, wb, wc]) = self.corners_and_edge_functions_f64(corners);
         let sum = wa + wb + wc;
         let t = ((wa * a.z + wb * b.z + wc * c.z) / sum) as f32;
         let [u, v] = [wb, wc].map(|weight| (weight / sum).clamp(0.0, 1.0) as f32);
@@ -136,7 +136,7 @@ impl ShearedRay {
 
     /// Edge functions and sheared corners in double precision. The z coordinate of a corner is its t along
     /// the ray.
-    fn edge_functions_f64(&self, corners: &[Vec3; 3]) -> ([DVec3; 3], [f64; 3]) {
+    fn corners_and_edge_functions_f64(&self, corners: &[Vec3; 3]) -> ([DVec3; 3], [f64; 3]) {
         let [x, y, z] = self.axes;
         let direction = self.direction.as_dvec3();
         let shear = direction / direction[z];
@@ -151,7 +151,11 @@ impl ShearedRay {
     /// Bound on the absolute error of t, and the largest t among the corners. The errors of sheared x and y
     /// are lengths, while the error of z is in units of t. The units differ unless the direction has unit
     /// length.
-    fn distance_error(&self, corners: &[(f32, f32, f32); 3], inverse_determinant: f32) -> (f32, f32) {
+    fn distance_error_and_max_t(
+        &self,
+        corners: &[(f32, f32, f32); 3],
+        inverse_determinant: f32,
+    ) -> (f32, f32) {
         let max = |of: fn(&(f32, f32, f32)) -> f32| corners.iter().map(of).fold(0.0, f32::max);
         let x = max(|corner| corner.0.abs());
         let y = max(|corner| corner.1.abs());

@@ -139,10 +139,10 @@ impl<'a> ShearedPacket<'a> {
             let inverse = 1.0 / (wa + wb + wc);
             let shear_z = self.shear[2][i];
             let t = (wa * az + wb * bz + wc * cz) * shear_z * inverse;
-            // Compute the error bound as in `ShearedRay::distance_error`.
-            let first = max_abs_scalar([ax, bx, cx]);
-            let second = max_abs_scalar([ay, by, cy]);
-            let depth = max_abs_scalar([az, bz, cz]);
+            // Compute the error bound as in `ShearedRay::distance_error_and_max_t`.
+            let first = max_abs_of_three([ax, bx, cx]);
+            let second = max_abs_of_three([ay, by, cy]);
+            let depth = max_abs_of_three([az, bz, cz]);
             let is_down = self.is_down[i] != 0;
             let (x, y) = (if is_down { second } else { first }, if is_down { first } else { second });
             let z = depth * shear_z.abs();
@@ -166,7 +166,7 @@ impl<'a> ShearedPacket<'a> {
 
 /// Maximum of the absolute values of three numbers.
 #[inline(always)]
-fn max_abs_scalar([a, b, c]: [f32; 3]) -> f32 {
+fn max_abs_of_three([a, b, c]: [f32; 3]) -> f32 {
     let (a, b, c) = (a.abs(), b.abs(), c.abs());
     let most = if a > b { a } else { b };
     if most > c { most } else { c }

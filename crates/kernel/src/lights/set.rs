@@ -226,7 +226,7 @@ impl Lights {
     }
 
     /// Whether any part of an object emits.
-    pub fn has_object(&self, object: u32) -> bool {
+    pub fn has_light_on_object(&self, object: u32) -> bool {
         self.by_object.contains_key(&object) || self.by_back.contains_key(&object)
     }
 

@@ -33,7 +33,7 @@ impl Blend {
 
     /// Weighted mean of `value` over the parts. Skips parts with weight 0. Counts texture lookups in
     /// `lookups`.
-    pub fn mean(
+    pub fn mean_over_parts(
         &self,
         at: &TexturePoint,
         lookups: &mut u64,

@@ -95,13 +95,13 @@ impl TexturePoint {
 
     /// The point in the second UV set, if it is known.
     #[inline]
-    pub fn second(&self) -> Option<&SecondUvPoint> {
+    pub fn second_uv_point(&self) -> Option<&SecondUvPoint> {
         self.extra.as_ref()?.second.as_ref()
     }
 
     /// The point in the shape's own coordinates, if it is known.
     #[inline]
-    pub fn object(&self) -> Option<&ObjectPoint> {
+    pub fn object_point(&self) -> Option<&ObjectPoint> {
         self.extra.as_ref()?.object.as_ref()
     }
 }

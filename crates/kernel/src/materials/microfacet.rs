@@ -186,7 +186,9 @@ impl SmithTerms {
         let stretched = alpha * alpha * (1.0 - squared).max(0.0);
         let slope = match distribution {
             MicrofacetDistribution::Ggx => (squared + stretched).sqrt(),
-            MicrofacetDistribution::Beckmann => beckmann::smith_slope(cosine, stretched.sqrt()),
+            MicrofacetDistribution::Beckmann => {
+                beckmann::cosine_times_one_plus_two_lambda(cosine, stretched.sqrt())
+            }
         };
         Self { cosine, slope }
     }
@@ -203,7 +205,9 @@ impl SmithTerms {
         let (x, y) = (frame.s.dot(direction) * u, frame.t.dot(direction) * v);
         let slope = match distribution {
             MicrofacetDistribution::Ggx => (cosine * cosine + x * x + y * y).sqrt(),
-            MicrofacetDistribution::Beckmann => beckmann::smith_slope(cosine, (x * x + y * y).sqrt()),
+            MicrofacetDistribution::Beckmann => {
+                beckmann::cosine_times_one_plus_two_lambda(cosine, (x * x + y * y).sqrt())
+            }
         };
         Self { cosine, slope }
     }

@@ -32,7 +32,7 @@ impl Mirror {
     }
 
     /// [`Mirror::reflectance`] with white textures.
-    pub fn untextured_reflectance(&self, cosine: f32) -> Vec3 {
+    pub fn reflectance_with_white_textures(&self, cosine: f32) -> Vec3 {
         match self {
             Self::Constant(color) => color.as_untextured().unwrap_or(Vec3::ONE),
             Self::Conductor(fresnel) => fresnel.look_up_parameters(&mut WhiteLookup).reflectance(cosine),

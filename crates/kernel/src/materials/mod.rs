@@ -144,8 +144,9 @@ impl Material {
         lookups: &mut u64,
     ) -> Vec3 {
         if let Some(blend) = self.blend() {
-            return blend
-                .mean(at, lookups, |part, lookups| part.expected_emission(at, is_front, cosine, lookups));
+            return blend.mean_over_parts(at, lookups, |part, lookups| {
+                part.expected_emission(at, is_front, cosine, lookups)
+            });
         }
         if !self.emission.emits_on_side(is_front) {
             return Vec3::ZERO;
@@ -159,12 +160,18 @@ impl Material {
 
     /// Probability that the surface exists at a point with a material for which `accepts` is true. Counts
     /// texture lookups in `lookups`.
-    pub fn presence(&self, at: &TexturePoint, accepts: &dyn Fn(&Self) -> bool, lookups: &mut u64) -> f32 {
+    pub fn presence_probability(
+        &self,
+        at: &TexturePoint,
+        accepts: &dyn Fn(&Self) -> bool,
+        lookups: &mut u64,
+    ) -> f32 {
         match self.blend() {
             Some(blend) => {
-                let for_part =
-                    |part: &Self, lookups: &mut u64| Vec3::splat(part.presence(at, accepts, lookups));
-                blend.mean(at, lookups, for_part).x
+                let for_part = |part: &Self, lookups: &mut u64| {
+                    Vec3::splat(part.presence_probability(at, accepts, lookups))
+                };
+                blend.mean_over_parts(at, lookups, for_part).x
             }
             None if !accepts(self) => 0.0,
             None => self.opacity.as_ref().map_or(1.0, |opacity| opacity.evaluate(at, lookups)),
@@ -184,8 +191,9 @@ impl Material {
     /// `color` multiplies a pane's transmittance. Counts texture lookups in `lookups`.
     pub fn null_transmittance(&self, at: &TexturePoint, color: Vec3, cosine: f32, lookups: &mut u64) -> Vec3 {
         if let Some(blend) = self.blend() {
-            return blend
-                .mean(at, lookups, |part, lookups| part.null_transmittance(at, color, cosine, lookups));
+            return blend.mean_over_parts(at, lookups, |part, lookups| {
+                part.null_transmittance(at, color, cosine, lookups)
+            });
         }
         let there = self.opacity.as_ref().map_or(1.0, |opacity| opacity.evaluate(at, lookups));
         let through = self.bsdf.as_thin_dielectric().map_or(Vec3::ZERO, |pane| {
@@ -352,7 +360,9 @@ impl Bsdf {
             Self::Dielectric(glass) => glass.tint,
             Self::ThinDielectric(pane) => pane.tint.evaluate(at, lookups),
             Self::SpecularOverBase(layers) => layers.albedo(at, lookups),
-            Self::Blend(blend) => blend.mean(at, lookups, |part, lookups| part.bsdf.albedo(at, lookups)),
+            Self::Blend(blend) => {
+                blend.mean_over_parts(at, lookups, |part, lookups| part.bsdf.albedo(at, lookups))
+            }
         }
     }
 }

@@ -50,11 +50,11 @@ impl SpecularOverBase {
     ) -> f32 {
         match &self.specular {
             SpecularPart::SmoothCoat { tint: _, ior } => {
-                let left = self.coat_transmittance(cosine, Vec3::ZERO, at, lookups);
+                let left = self.two_way_coat_transmittance(cosine, Vec3::ZERO, at, lookups);
                 left.max_element() * dielectric(cosine, *ior).0
             }
             SpecularPart::Mirror(_) => {
-                (self.coat_transmittance(cosine, mirror, at, lookups) * mirror).max_element()
+                (self.two_way_coat_transmittance(cosine, mirror, at, lookups) * mirror).max_element()
             }
         }
     }
@@ -66,11 +66,11 @@ impl SpecularOverBase {
         let relative = |color: Vec3| color / color.max_element().max(f32::MIN_POSITIVE);
         match &self.specular {
             SpecularPart::SmoothCoat { tint, ior: _ } => {
-                relative(self.coat_transmittance(cosine, Vec3::ZERO, at, lookups))
+                relative(self.two_way_coat_transmittance(cosine, Vec3::ZERO, at, lookups))
                     * tint.evaluate(at, lookups)
             }
             SpecularPart::Mirror(_) => {
-                relative(self.coat_transmittance(cosine, mirror, at, lookups) * mirror)
+                relative(self.two_way_coat_transmittance(cosine, mirror, at, lookups) * mirror)
             }
         }
     }
@@ -78,7 +78,13 @@ impl SpecularOverBase {
     /// Transmittance of the clear coat in and out at the same angle, including interreflection with a base of
     /// the given reflectance.
     #[inline]
-    fn coat_transmittance(&self, cosine: f32, base: Vec3, at: &TexturePoint, lookups: &mut u64) -> Vec3 {
+    fn two_way_coat_transmittance(
+        &self,
+        cosine: f32,
+        base: Vec3,
+        at: &TexturePoint,
+        lookups: &mut u64,
+    ) -> Vec3 {
         self.coat.as_ref().map_or(Vec3::ONE, |coat| coat.two_way_transmittance(at, cosine, base, lookups))
     }
 

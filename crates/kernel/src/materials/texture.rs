@@ -64,7 +64,7 @@ impl Texture {
         }
     }
 
-    /// Whether lookups depend on [`TexturePoint::object`].
+    /// Whether lookups depend on [`TexturePoint::object_point`].
     pub fn uses_object_point(&self) -> bool {
         match self {
             Self::Image(_) => false,
@@ -103,7 +103,7 @@ impl Texture {
 
     /// Whether [`Texture::coverage_above_cutoff`] is known for any footprint.
     #[inline]
-    pub fn keeps_coverage(&self) -> bool {
+    pub fn has_footprint_coverage(&self) -> bool {
         match self {
             Self::Image(image) => image.mipmaps.is_some(),
             Self::Pattern(_) => true,
@@ -139,7 +139,7 @@ impl Texture {
     pub fn texels_per_unit(&self) -> [f64; 2] {
         match self {
             Self::Image(image) => image.texels_per_unit(),
-            Self::Pattern(pattern) => pattern.cells_per_unit(),
+            Self::Pattern(pattern) => pattern.cells_per_uv_unit(),
         }
     }
 
@@ -154,7 +154,7 @@ impl Texture {
 
     /// The texture with other settings for its values, if it is an image. Patterns have their colors instead.
     #[must_use]
-    pub fn with_factor(
+    pub fn map_image_factor(
         mut self,
         factor: impl FnOnce(Option<ValueScaleAndOffset>) -> Option<ValueScaleAndOffset>,
     ) -> Self {

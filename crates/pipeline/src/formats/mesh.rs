@@ -7,7 +7,7 @@ use std::path::Path;
 use super::frame::{FOV, frame_model};
 use super::model::{
     DEFAULT_SIZE, Lighting, POLISHED_EXPONENT, POLISHED_ROUGHNESS, UsedNames, add_camera, add_ground,
-    add_render_settings, add_sky_and_key_light, file_name, warning,
+    add_render_settings, add_sky_and_key_light, file_name, model_warning,
 };
 use super::{ForeignReadContext, ForeignScene};
 use crate::assets::gltf::ModelProjection;
@@ -33,7 +33,7 @@ fn is_from_blender(path: &Path) -> bool {
 
 impl UpAxis {
     /// Euler angles in degrees that rotate this axis to y, or `None` for y itself.
-    fn rotation(self) -> Option<[f64; 3]> {
+    fn upright_rotation_degrees(self) -> Option<[f64; 3]> {
         match self {
             Self::X => Some([0.0, 0.0, 90.0]),
             Self::Y => None,
@@ -41,7 +41,7 @@ impl UpAxis {
         }
     }
 
-    /// Applies [`rotation`](Self::rotation) to a point.
+    /// Applies [`upright_rotation_degrees`](Self::upright_rotation_degrees) to a point.
     fn rotate_point_upright(self, at: DVec3) -> DVec3 {
         match self {
             Self::X => DVec3::new(-at.y, at.x, at.z),
@@ -78,7 +78,10 @@ fn is_mesh_fully_transparent(loaded: &LoadedMesh) -> bool {
 }
 
 /// Reads an OBJ or OFF file.
-pub(super) fn read(path: &Path, context: &ForeignReadContext<'_>) -> Result<ForeignScene, AssetError> {
+pub(super) fn read_obj_or_off(
+    path: &Path,
+    context: &ForeignReadContext<'_>,
+) -> Result<ForeignScene, AssetError> {
     scene_of_mesh(path, UpAxis::Y, false, context)
 }
 
@@ -127,7 +130,7 @@ fn scene_of_mesh(
         return Err(AssetError::malformed(path, None, reason));
     }
     let (mut document, mut names) = (BuiltDocument::default(), UsedNames::default());
-    document.comment(format!("{}, as glimt shows it.", file_name(path)));
+    document.add_comment(format!("{}, as glimt shows it.", file_name(path)));
     let lighting = Lighting::Default { is_polished: loaded.materials.iter().any(material_may_cast_caustics) };
     add_render_settings(&mut document, None, lighting);
     add_camera(&mut document, &eye, ModelProjection::Perspective { fov: FOV });
@@ -136,13 +139,13 @@ fn scene_of_mesh(
     let needs_material = loaded.lacks_materials();
     let name = names.make_unique("model", "model");
     if needs_material {
-        document.named_table("materials", &name);
+        document.start_named_table("materials", &name);
         document.set("type", "principled");
         document.set("color", if is_colored { 1.0.into() } else { BuiltValue::from([0.7, 0.68, 0.64]) });
     }
-    document.list_table("mesh");
+    document.start_list_table("mesh");
     document.set("file", file_name(path));
-    if let Some(angles) = up.rotation() {
+    if let Some(angles) = up.upright_rotation_degrees() {
         document.set("rotate", angles);
     }
     if is_faceted || loaded.has_flat_faces_and_no_normals() {
@@ -158,7 +161,7 @@ fn scene_of_mesh(
     // The generated material hides the fact that the file has no materials, so report it here.
     let mut notes = if needs_material { first_warnings(&loaded.material_warnings) } else { Vec::new() };
     notes.extend(is_mesh_fully_transparent(&loaded).then(|| INVISIBLE_MODEL.to_owned()));
-    let notes = notes.into_iter().map(|note| warning(path, note)).collect();
+    let notes = notes.into_iter().map(|note| model_warning(path, note)).collect();
     let (hash, companions) = (loaded.hash, loaded.companions.clone());
     containers.store_mesh_for_next_load(path, loaded);
     Ok(ForeignScene { document, hash, companions, notes, substitutions: Vec::new() })
@@ -188,7 +191,7 @@ mod tests {
     #[test]
     fn up_axis_matches_scene_rotation() {
         for (up, axis) in [(UpAxis::X, DVec3::X), (UpAxis::Y, DVec3::Y), (UpAxis::Z, DVec3::Z)] {
-            let rotation = rotation_xyz(DVec3::from(up.rotation().unwrap_or_default()));
+            let rotation = rotation_xyz(DVec3::from(up.upright_rotation_degrees().unwrap_or_default()));
             assert_eq!(up.rotate_point_upright(axis), DVec3::Y, "{up:?}");
             for at in [axis, DVec3::new(1.0, 2.0, 3.0)] {
                 assert_eq!(rotation * at, up.rotate_point_upright(at), "{up:?}");

@@ -2,10 +2,10 @@
 //!
 //! [`FORMATS`] lists the formats, each with its extensions and its importer. For a file on the command line,
 //! only this table decides which format it has. An importer reads the file into a [`ForeignScene`], whose
-//! document consists of the same tables and keys as a scene file. [`lower`] validates it like a scene file,
-//! and `glimt import` writes it as one; the rest of the pipeline does not know the format. `model` generates
-//! the view and the lights for models, which `glimt MODEL` and `glimt import` share so that they produce the
-//! same image.
+//! document consists of the same tables and keys as a scene file. [`scene_from_document`] validates it like a
+//! scene file, and `glimt import` writes it as one; the rest of the pipeline does not know the format.
+//! `model` generates the view and the lights for models, which `glimt MODEL` and `glimt import` share so that
+//! they produce the same image.
 
 mod frame;
 mod gltf;
@@ -33,7 +33,7 @@ pub use import::{ImportError, import_scene};
 
 /// All foreign formats.
 const FORMATS: [ForeignFormat; 4] = [
-    ForeignFormat { extensions: &["obj", "off"], is_model: true, read: mesh::read, convert: None },
+    ForeignFormat { extensions: &["obj", "off"], is_model: true, read: mesh::read_obj_or_off, convert: None },
     ForeignFormat { extensions: &["ply"], is_model: true, read: mesh::read_ply, convert: None },
     ForeignFormat { extensions: &["stl"], is_model: true, read: mesh::read_stl, convert: None },
     ForeignFormat {
@@ -109,7 +109,7 @@ pub struct ImportedScene {
 ///
 /// # Errors
 /// Returns all errors and warnings.
-pub(crate) fn lower(
+pub(crate) fn scene_from_document(
     document: BuiltDocument,
     path: &Path,
     sets: &[String],
@@ -131,7 +131,7 @@ impl ForeignFormat {
 
     /// Returns the format of a readable file, or `None` if the file must be read as a scene file. A scene file
     /// may have any extension.
-    pub(crate) fn of_file(path: &Path) -> Option<&'static Self> {
+    pub(crate) fn from_file_unless_scene(path: &Path) -> Option<&'static Self> {
         Self::from_extension(path).filter(|_| lacks_camera_header(path))
     }
 }
@@ -212,11 +212,11 @@ mod tests {
     fn scene_files_may_have_any_extension() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("a.obj");
-        assert!(ForeignFormat::of_file(&path).is_none(), "missing files have no format");
+        assert!(ForeignFormat::from_file_unless_scene(&path).is_none(), "missing files have no format");
         std::fs::write(&path, "v 0 0 0\n").expect("written");
-        assert!(ForeignFormat::of_file(&path).is_some());
+        assert!(ForeignFormat::from_file_unless_scene(&path).is_some());
         std::fs::write(&path, "[camera]\n").expect("written");
-        assert!(ForeignFormat::of_file(&path).is_none());
+        assert!(ForeignFormat::from_file_unless_scene(&path).is_none());
     }
 
     fn message(path: &Path) -> Diagnostic {

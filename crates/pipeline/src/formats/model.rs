@@ -60,18 +60,18 @@ impl ModelViewOptions {
     pub(crate) fn add_to_fingerprint(self, key: &mut FingerprintHasher) {
         key.add_bool(self.from.is_some());
         if let Some(from) = self.from {
-            key.add_choice(from);
+            key.add_choice_name(from);
         }
         key.add_bool(self.up.is_some());
         if let Some(up) = self.up {
-            key.add_choice(up);
+            key.add_choice_name(up);
         }
         key.add_f64(self.aspect.unwrap_or_default()).add_u64(self.turns.into());
     }
 }
 
 /// Creates a warning about a model.
-pub(super) fn warning(path: &Path, message: impl Into<String>) -> Diagnostic {
+pub(super) fn model_warning(path: &Path, message: impl Into<String>) -> Diagnostic {
     Diagnostic::about_file(path, Severity::Warning, message.into())
 }
 
@@ -127,7 +127,7 @@ impl Lighting {
 
 /// Adds the `[render]` table.
 pub(super) fn add_render_settings(document: &mut BuiltDocument, size: Option<[f64; 2]>, light: Lighting) {
-    document.table("render");
+    document.start_table("render");
     if let Some([width, height]) = size {
         document.set("width", width);
         document.set("height", height);
@@ -146,7 +146,7 @@ pub(super) fn add_render_settings(document: &mut BuiltDocument, size: Option<[f6
 /// Adds the `[camera]` table. Keeps all digits of the points, because a small model may be far from the
 /// origin.
 pub(super) fn add_camera(document: &mut BuiltDocument, eye: &CameraPose, projection: ModelProjection) {
-    document.table("camera");
+    document.start_table("camera");
     document.set("position", eye.position);
     document.set("look_at", eye.look_at);
     if eye.up != DVec3::Y {
@@ -164,10 +164,10 @@ pub(super) fn add_camera(document: &mut BuiltDocument, eye: &CameraPose, project
 
 /// Adds a sky, plus a key light if the model has no lights.
 pub(super) fn add_sky_and_key_light(document: &mut BuiltDocument, eye: &CameraPose, light: Lighting) {
-    document.table("environment");
+    document.start_table("environment");
     document.set("color", shorten(light.sky_radiance()));
     if matches!(light, Lighting::Default { .. }) {
-        document.list_table("light");
+        document.start_list_table("light");
         document.set("type", "directional");
         document.set("direction", shorten_vector(key_light_travel_direction(eye)));
         document.set("irradiance", KEY_LIGHT_IRRADIANCE);
@@ -188,9 +188,9 @@ pub(super) fn add_ground(
         return;
     }
     let name = names.make_unique("ground", "ground");
-    document.named_table("materials", &name);
+    document.start_named_table("materials", &name);
     document.set("diffuse", shorten(ground_reflectance_matching_sky()));
-    document.list_table("plane");
+    document.start_list_table("plane");
     document.set("point", [0.0, round_to_decimals_of_step(height, size * 1e-5), 0.0]);
     document.set("material", name);
 }

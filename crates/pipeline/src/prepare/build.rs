@@ -35,7 +35,7 @@ impl SceneCache {
     ///
     /// # Errors
     /// Returns [`AbortReason::Canceled`] if the token is canceled.
-    pub(crate) fn build(
+    pub(crate) fn build_ready_scene(
         &mut self,
         assets: Arc<SceneAssets>,
         plan: RenderPlan,
@@ -47,7 +47,7 @@ impl SceneCache {
         let camera =
             RequestCamera::new(scene, assets.parsed.orbiter, change).rotated_for_turntable(plan.turn);
         let (mesh_keys, orbiter) = (assets.mesh_keys(), camera.orbiter_text());
-        let of = keys::scene_references_for_fingerprint(scene, &mesh_keys, orbiter.as_deref());
+        let of = keys::scene_fingerprint_context(scene, &mesh_keys, orbiter.as_deref());
         let origin = camera.origin_near_camera();
         let stage = table.start(Stage::Accel);
         let (meshes, cache) = (&assets.meshes, &mut self.accel);
@@ -58,7 +58,7 @@ impl SceneCache {
         let surfaces = keys::surfaces_and_lights_key(scene, &of, &assets.textures.keys);
         let world_key = keys::world_key(&surfaces, &camera.camera, &of);
         // Assemble the world, unless its key is unchanged.
-        let key = keys::with_tree_kind(&world_key, scene.render.accel);
+        let key = keys::key_with_tree_kind(&world_key, scene.render.accel);
         let world = self.world.get(key).cloned().unwrap_or_else(|| {
             let parts = WorldInputs {
                 meshes: trees.meshes,

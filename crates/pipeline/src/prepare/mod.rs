@@ -1,10 +1,10 @@
 //! Prepares scenes for rendering: from files to the world that rays are traced against.
 //!
-//! Preparation has three steps. [`SceneCache::parse`] reads the scene file, [`SceneCache::load`] loads meshes
-//! and textures, and [`SceneCache::build`] builds trees, lights and the world. Each step is a function of the
-//! files and the settings, and reuses earlier results if their keys are unchanged. Between the steps, the
-//! session checks whether the image fits in memory and may be written. Preparation itself knows nothing about
-//! films, previews, output files and checkpoints.
+//! Preparation has three steps. [`SceneCache::parse_scene`] reads the scene file, [`SceneCache::load_assets`]
+//! loads meshes and textures, and [`SceneCache::build_ready_scene`] builds trees, lights and the world. Each
+//! step is a function of the files and the settings, and reuses earlier results if their keys are unchanged.
+//! Between the steps, the session checks whether the image fits in memory and may be written. Preparation
+//! itself knows nothing about films, previews, output files and checkpoints.
 
 mod assets;
 mod build;
@@ -17,7 +17,7 @@ pub(crate) use self::assets::SceneAssets;
 pub(crate) use self::build::ReadyScene;
 pub(crate) use self::camera::RequestCamera;
 pub(crate) use self::consistent::{FileReader, SceneReadAttempt};
-use crate::cache::{CacheOfNamedValues, Memo, RequestCache, oldest_request_to_keep};
+use crate::cache::{CacheOfNamedValues, EvictableCache, Memo, oldest_request_to_keep};
 use crate::protocol::Stage;
 use crate::stages::accel::AccelCache;
 use crate::stages::coplanar::warn_about_coplanar_lights;
@@ -52,7 +52,7 @@ impl SceneCache {
     ///
     /// # Errors
     /// Returns all errors in the scene file.
-    pub(crate) fn parse(
+    pub(crate) fn parse_scene(
         &mut self,
         scene: SceneParseRequest<'_>,
         reading: &mut SceneReadAttempt<'_, '_>,
@@ -68,7 +68,7 @@ impl SceneCache {
     ///
     /// # Errors
     /// The token is canceled, or there is not enough memory.
-    pub(crate) fn load(
+    pub(crate) fn load_assets(
         &mut self,
         parsed: &Arc<ParsedScene>,
         selection: TextureSelection,
@@ -118,8 +118,9 @@ impl SceneCache {
     /// Ends a request. If it succeeded, values that it did not use become eviction candidates.
     pub(crate) fn end_request(&mut self, success: bool) {
         self.requests += 1;
-        let meshes: [&mut dyn RequestCache; 1] = [&mut self.meshes];
-        let caches = meshes.into_iter().chain(self.textures.caches()).chain(self.accel.caches());
+        let meshes: [&mut dyn EvictableCache; 1] = [&mut self.meshes];
+        let caches =
+            meshes.into_iter().chain(self.textures.evictable_caches()).chain(self.accel.evictable_caches());
         let mut caches: Vec<_> = caches.collect();
         caches.iter_mut().for_each(|cache| cache.record_request_usage(success, self.requests));
         let candidates = caches.iter().flat_map(|cache| cache.eviction_candidates());

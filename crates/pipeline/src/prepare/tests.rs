@@ -59,9 +59,9 @@ impl SceneFixture {
         let scenes = &mut self.scenes;
         let assets = reader.read_consistently(&mut table, &mut findings, |reading| {
             let scene = SceneParseRequest { path: &path, sets: &[], show: ModelViewOptions::default() };
-            let parsed = scenes.parse(scene, reading)?;
+            let parsed = scenes.parse_scene(scene, reading)?;
             let all = TextureSelection::ForImage(TextureRolesNeededByRender::ALL);
-            let assets = scenes.load(&parsed, all, reading)?;
+            let assets = scenes.load_assets(&parsed, all, reading)?;
             match reading.findings.errors.is_empty() {
                 true => Ok(Arc::new(assets)),
                 false => Err(AbortReason::Failed(reading.findings.take_diagnostics_as_failure())),
@@ -69,7 +69,7 @@ impl SceneFixture {
         });
         let ready = assets.and_then(|assets| {
             let plan = resolve_plan(&assets.parsed.loaded.scene, &path, &Overrides::default())?;
-            scenes.build(assets, plan, &CameraOverrides::default(), &mut table, &self.pool)
+            scenes.build_ready_scene(assets, plan, &CameraOverrides::default(), &mut table, &self.pool)
         });
         self.scenes.end_request(ready.is_ok());
         ready

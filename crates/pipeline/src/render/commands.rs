@@ -34,7 +34,7 @@ pub(crate) trait PendingCommands {
 }
 
 /// Carries out the commands that arrive while an image is rendered.
-pub(crate) struct RenderCommands<'a> {
+pub(crate) struct PendingCommandRunner<'a> {
     pub(crate) pending: &'a dyn PendingCommands,
     pub(crate) queries: &'a QueryContext,
     pub(crate) to: ImageWriteContext<'a>,
@@ -43,7 +43,7 @@ pub(crate) struct RenderCommands<'a> {
     pub(crate) is_postponed: &'a Cell<bool>,
 }
 
-impl RenderCommands<'_> {
+impl PendingCommandRunner<'_> {
     /// Carries out pending commands about the current film, if there is one. `is_covered` states whether every
     /// pixel has a sample. Until then, a write command is postponed, which is reported once.
     pub(crate) fn run_pending(&self, film: Option<&FilmState>, is_covered: bool) {

@@ -35,7 +35,7 @@ impl FilmCache {
     ///
     /// # Errors
     /// There is no film.
-    pub(crate) fn existing(&self) -> Result<&FilmState, AbortReason> {
+    pub(crate) fn current_or_error(&self) -> Result<&FilmState, AbortReason> {
         self.current().ok_or_else(|| AbortReason::work_failure("the film is missing"))
     }
 

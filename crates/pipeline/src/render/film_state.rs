@@ -100,7 +100,7 @@ impl FilmState {
         )?
         .with_convergence_model(convergence)
         .with_sum_order(blocks)?
-        .with_layers(plan.settings.layers.len())?;
+        .with_layer_count(plan.settings.layers.len())?;
         let film_cells = film.noise_cell_count();
         let goals = CellSampleGoals::new_undecided(film_cells);
         let own = share.as_ref().map(|share| share.tile_mask(film.tile_count()));

@@ -11,7 +11,7 @@ use crate::film::tone::{ToneMapping, tone_map_to_8_bits};
 use crate::film::{FilmQuantity, Previewer, RadianceImage, Rect};
 use crate::keys;
 use crate::plan::RenderPlan;
-use crate::protocol::{ImagePosition, MaxPreviewSize, NormalizedRect, PreviewedImageState};
+use crate::protocol::{MaxPreviewSize, NormalizedPosition, NormalizedRect, PreviewedImageState};
 use crate::sink::EventSink;
 
 /// Maximum time spent on updating a preview before checking for commands.
@@ -91,7 +91,7 @@ impl PreviewSender<'_> {
     pub(crate) fn show_without_photons(&self, image: &RadianceImage) {
         self.sink.send_preview_without_photons(tone_map_to_8_bits(
             image,
-            &self.plan.tone().with_image_range(image),
+            &self.plan.tone_mapping().with_image_range(image),
         ));
     }
 
@@ -116,7 +116,7 @@ impl PreviewSender<'_> {
     fn choose_tone_mapping(&self, state: &FilmState, image: &RadianceImage, has_time: bool) -> ToneMapping {
         /// Number of pixels that can be scanned in a few milliseconds.
         const MAX_SCANNED_PIXELS: usize = 1 << 18;
-        let tone = self.plan.tone();
+        let tone = self.plan.tone_mapping();
         let is_known = state.has_sampled_all_pixels()
             && (has_time || state.film.crop_rect().area() <= MAX_SCANNED_PIXELS);
         if tone.range_map == RangeMap::None || !is_known {
@@ -129,7 +129,7 @@ impl PreviewSender<'_> {
     fn requested_section(&self) -> Option<Rect> {
         let render = &self.plan.settings.render;
         let MaxPreviewSize { width, height, around } = self.bounds?;
-        let ImagePosition { x, y } = around?;
+        let NormalizedPosition { x, y } = around?;
         let along = |middle: f64, length: u32, side: u32| {
             let length = length.min(side);
             let start = (middle * f64::from(side)).max(0.0) as u32;

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use super::checkpointer::Checkpointer;
 use super::coarse_image::CoarseImageRenderer;
-use super::commands::RenderCommands;
+use super::commands::PendingCommandRunner;
 use super::film_state::{EarlierProcessWork, FilmState};
 use super::forecast::{Forecast, RenderSnapshot};
 use super::noise_goals::MIN_SAMPLES;
@@ -15,7 +15,7 @@ use super::preview::PreviewSender;
 use super::share::Shard;
 use super::time_budget::next_round_goals;
 use crate::film::{BrightnessPrepassPixels, PREPASS_SAMPLES, Rect, TILE_SIZE, TileSamples};
-use crate::integrators::{PhotonMaps, RayCounters};
+use crate::integrators::{PhotonPassesBySample, RayCounters};
 use crate::plan::RenderPlan;
 use crate::protocol::{Event, NormalizedRect};
 use crate::scene::description::RenderOptions;
@@ -40,7 +40,7 @@ pub(crate) struct RenderStageInputs<'a> {
     /// The scene's photons, if the image uses them.
     pub(crate) photons: Option<&'a PhotonStore>,
     pub(crate) display: DisplayOptions<'a>,
-    pub(crate) commands: &'a RenderCommands<'a>,
+    pub(crate) commands: &'a PendingCommandRunner<'a>,
     /// Checkpointer, if the render uses checkpoints.
     pub(crate) checkpointer: Option<&'a Checkpointer<'a>>,
 }
@@ -183,7 +183,7 @@ impl<'s, 'a> Scheduler<'s, 'a> {
     /// Returns the pixels to render first.
     fn priority_rect(&self) -> Option<Rect> {
         let RenderOptions { width, height, .. } = self.rendering.plan.settings.render;
-        self.rendering.display.first.map(|section| section.pixels(width, height))
+        self.rendering.display.first.map(|section| section.to_pixel_rect(width, height))
     }
 
     /// Renders a prepass over the whole image, even if this process renders only a share of it.
@@ -284,7 +284,7 @@ impl<'s, 'a> Scheduler<'s, 'a> {
         &mut self,
         photons: &PhotonStore,
         samples: Range<u32>,
-    ) -> Result<PhotonMaps, AbortReason> {
+    ) -> Result<PhotonPassesBySample, AbortReason> {
         let RenderStageInputs { plan, tracer, .. } = *self.rendering;
         let Tracer { pool, world, token, .. } = tracer;
         let sink = self.screen.sink;
@@ -338,7 +338,7 @@ impl<'s, 'a> Scheduler<'s, 'a> {
         &mut self,
         part: Option<Rect>,
         target: impl Fn(usize, usize) -> u32,
-        photons: Option<&PhotonMaps>,
+        photons: Option<&PhotonPassesBySample>,
         first: u32,
     ) -> Result<(), AbortReason> {
         let jobs = self.state.jobs(part, target);

@@ -64,7 +64,7 @@ pub(crate) fn write_report(
     let unwritable =
         |error: serde_json::Error| OutputError::File { path: path.clone(), source: error.into() };
     let text = json::to_pretty_text(report).map_err(unwritable)?;
-    write_guarded(plan, inputs, OutputTarget::for_report(path), None, sink, |guard| {
+    write_guarded(plan, inputs, OutputTarget::from_report_path(path), None, sink, |guard| {
         atomic_with_policy(path, text.as_bytes(), guard, token)
     })
 }
@@ -85,7 +85,7 @@ fn remove_report(plan: &RenderPlan, inputs: &ProtectedInputs, sink: &EventSink) 
         (guard.may_replace)(&real)?;
         std::fs::remove_file(&real).map_err(failed)
     };
-    write_guarded(plan, inputs, OutputTarget::for_report(path), None, sink, remove)
+    write_guarded(plan, inputs, OutputTarget::from_report_path(path), None, sink, remove)
 }
 
 fn image_report(finished: &RequestResults<'_>) -> ImageReport {
@@ -128,7 +128,7 @@ fn light_sampling_report(finished: &RequestResults<'_>) -> LightSamplingReport {
 
 fn data_view_value_range(finished: &RequestResults<'_>) -> Option<[f32; 2]> {
     let RequestResults { plan, state, .. } = finished;
-    let tone = plan.tone();
+    let tone = plan.tone_mapping();
     if tone.range_map == RangeMap::None {
         return None;
     }

@@ -26,7 +26,7 @@ impl Session {
         token: &CancelToken,
     ) {
         if let (Some(state), Some(current), Some(pool)) =
-            (self.films.current_mut(), &self.current, self.threads.current())
+            (self.films.current_mut(), &self.current, self.threads.current_pool())
         {
             PreviewSender { bounds, plan: &current.plan, sink }.send_film_preview(state, pool, token);
         }
@@ -41,9 +41,9 @@ impl Session {
     }
 
     /// Writes the current image.
-    pub(crate) fn write_now(&mut self, sink: &EventSink) {
+    pub(crate) fn write_current_image(&mut self, sink: &EventSink) {
         let (Some(state), Some(current), Some(pool)) =
-            (self.films.current(), &self.current, self.threads.current())
+            (self.films.current(), &self.current, self.threads.current_pool())
         else {
             return sink.send_write_failed(None, NO_IMAGE.to_owned());
         };

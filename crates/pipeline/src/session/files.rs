@@ -31,7 +31,11 @@ impl SceneFiles {
     /// Protects the files that a parsed scene references, and returns the output files that conflict with
     /// them. The previous scene's files remain protected, because its image is still shown and may have to be
     /// written.
-    pub(super) fn protect_parsed(&mut self, parsed: &ParsedScene, plan: &RenderPlan) -> Vec<Diagnostic> {
+    pub(super) fn protect_inputs_and_find_conflicts(
+        &mut self,
+        parsed: &ParsedScene,
+        plan: &RenderPlan,
+    ) -> Vec<Diagnostic> {
         let before = std::mem::replace(&mut self.protected, ProtectedInputs::from_scene(parsed));
         let conflicts = output_conflicts(plan, &self.protected);
         self.protected.merge(before);
@@ -42,7 +46,7 @@ impl SceneFiles {
     ///
     /// # Errors
     /// Returns all errors in the files.
-    pub(super) fn record_loaded(
+    pub(super) fn record_and_report_loaded(
         &mut self,
         findings: &mut Findings,
         sink: &EventSink,
@@ -51,7 +55,7 @@ impl SceneFiles {
         if !findings.errors.is_empty() {
             return Err(AbortReason::Failed(findings.take_diagnostics_as_failure()));
         }
-        self.report_read(findings, sink);
+        self.report_read_files(findings, sink);
         let warnings = [findings.conflicts.as_slice(), &findings.warnings].concat();
         sink.send(Event::Warnings { generation: sink.generation, warnings });
         Ok(())
@@ -65,17 +69,17 @@ impl SceneFiles {
         sink: &EventSink,
     ) {
         // Watched files must not be written.
-        self.protected.add_read(&findings.files);
+        self.protected.add_other_read_files(&findings.files);
         match outcome {
             Ok(_) => self.is_broken = false,
             Err(AbortReason::Failed(Failure::Scene(_))) => self.is_broken = true,
             Err(AbortReason::Failed(Failure::Work(_)) | AbortReason::Canceled) => {}
         }
-        self.report_read(findings, sink);
+        self.report_read_files(findings, sink);
     }
 
     /// Reports the files that a request read, followed by other files of the last loaded scene.
-    fn report_read(&self, findings: &Findings, sink: &EventSink) {
+    fn report_read_files(&self, findings: &Findings, sink: &EventSink) {
         let mut files = findings.files.clone();
         let known: HashSet<&Path> = findings.files.iter().map(|file| file.path.as_path()).collect();
         files.extend(self.loaded.iter().filter(|file| !known.contains(file.path.as_path())).cloned());

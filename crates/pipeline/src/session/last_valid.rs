@@ -55,7 +55,7 @@ impl Session {
         // Prepare the scene, reusing unchanged values, and render it.
         let mut table = StageTable::new(None, token);
         let scene = self.build_world(request, assets, plans, &mut table, &pool)?;
-        let image = self.trace_photons(context, scene, &mut table, &pool)?;
+        let image = self.make_current_and_trace_photons(context, scene, &mut table, &pool)?;
         let rendered = self.render(context, &image, &pool)?;
         // Write the image. The write stage reports files that cannot be written.
         let plan = &image.scene.plan;

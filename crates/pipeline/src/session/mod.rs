@@ -110,6 +110,6 @@ impl Session {
 
     /// Returns the current film.
     pub(super) fn film(&self) -> Result<&FilmState, AbortReason> {
-        self.films.existing()
+        self.films.current_or_error()
     }
 }

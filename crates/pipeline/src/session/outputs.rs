@@ -77,13 +77,13 @@ impl Session {
             return Ok(StageResult::skipped(false, conflict.message.clone()));
         }
         if request.own.is_some() {
-            self.write_own_image_if_shown(context, pool)?;
+            self.write_own_image_if_film_is_shared(context, pool)?;
             return Ok(StageResult::skipped(false, reasons::PREVIEW_ONLY));
         }
         if self.written.has_user_written_image_on_disk(&self.contents) {
             return Ok(StageResult::skipped(false, reasons::OTHER_IMAGE_WRITTEN));
         }
-        let state = self.films.existing()?;
+        let state = self.films.current_or_error()?;
         let (inputs, contents) = (&self.files.protected, &*self.contents);
         let to = ImageWriteContext { plan, inputs, contents, is_own: true, sink };
         let written = &mut self.written;
@@ -100,7 +100,7 @@ impl Session {
     ///
     /// # Errors
     /// Returns [`AbortReason::Canceled`] if writing is canceled.
-    fn write_own_image_if_shown(
+    fn write_own_image_if_film_is_shared(
         &mut self,
         context: &RequestContext<'_>,
         pool: &ThreadPool,

@@ -39,7 +39,7 @@ impl SavedSceneImage {
         let eye =
             RequestCamera::new(&plan.scene, assets.parsed.orbiter, &camera).rotated_for_turntable(plan.turn);
         let (meshes, orbiter) = (assets.mesh_keys(), eye.orbiter_text());
-        let of = keys::scene_references_for_fingerprint(&plan.scene, &meshes, orbiter.as_deref());
+        let of = keys::scene_fingerprint_context(&plan.scene, &meshes, orbiter.as_deref());
         let world = keys::world_key(&scene.surfaces, &eye.camera, &of);
         let film = keys::film_sums_key(world, &plan.settings, plan.crop);
         let image = image_with_outputs_key(film, &plan);
@@ -59,7 +59,7 @@ fn image_with_outputs_key(film: Fingerprint, plan: &RenderPlan) -> Fingerprint {
     let mut key = FingerprintHasher::new("own image");
     key.add_fingerprint(&keys::developed_image_key(film, plan, 0)).add_u64(plan.bit_depth.into());
     plan.layers.iter().for_each(|layer| {
-        key.add_choice(*layer);
+        key.add_choice_name(*layer);
     });
     plan.outputs.images.iter().for_each(|path| {
         key.add_path_bytes(path);

@@ -14,11 +14,11 @@ use crate::prepare::{FileReader, ReadyScene, RequestCamera, SceneAssets, SceneRe
 use crate::protocol::{Event, Request};
 use crate::render::film_state::FilmState;
 use crate::scene::description::CameraOverrides;
-use crate::settings::SceneSettings;
+use crate::settings::AdjustableSceneSettings;
 use crate::sink::EventSink;
 use crate::stages::parse::{ParsedScene, SceneParseRequest};
 use crate::stages::textures::TextureSelection;
-use crate::stages::write::check_targets;
+use crate::stages::write::check_outputs_are_writable;
 use crate::stages::{AbortReason, Findings};
 use crate::table::StageTable;
 use crate::targets::output_conflicts;
@@ -39,7 +39,7 @@ impl Session {
         let read = |reading: &mut SceneReadAttempt<'_, '_>| self.read_scene(request, reading);
         let (assets, plans) = reader.read_consistently(table, findings, read)?;
         let ready = self.build_world(request, Arc::new(assets), plans, table, pool)?;
-        self.written.record_saves(request.saves);
+        self.written.record_scene_save_count(request.saves);
         self.files.last_valid = Some(Arc::clone(&ready.assets));
         Ok(ready)
     }
@@ -54,7 +54,7 @@ impl Session {
         let (Request { overrides, write, .. }, sink) = (request, reading.files.sink);
         let show = ModelViewOptions::from_overrides(overrides);
         let scene = SceneParseRequest { path: &request.scene, sets: &overrides.sets, show };
-        let parsed = self.scenes.parse(scene, reading)?;
+        let parsed = self.scenes.parse_scene(scene, reading)?;
         if !parsed.loaded.is_foreign() {
             let text = parsed.loaded.source.file_text_as_arc();
             sink.send(Event::Text { generation: request.generation, text });
@@ -66,13 +66,17 @@ impl Session {
         let findings = &mut *reading.findings;
         findings.warnings.extend(settings_warnings(&parsed.loaded, &plan.scene, &plan.settings, overrides));
         send_settings(&parsed, plan, sink);
-        findings.record_conflicts(self.files.protect_parsed(&parsed, plan), *write, sink)?;
+        findings.record_conflicts(
+            self.files.protect_inputs_and_find_conflicts(&parsed, plan),
+            *write,
+            sink,
+        )?;
         if findings.conflicts.is_empty() {
-            check_targets(*write, plan, sink)?;
+            check_outputs_are_writable(*write, plan, sink)?;
         }
         let textures = TextureSelection::ForImage(plans.texture_needs());
-        let assets = self.scenes.load(&parsed, textures, reading)?;
-        self.files.record_loaded(reading.findings, sink)?;
+        let assets = self.scenes.load_assets(&parsed, textures, reading)?;
+        self.files.record_and_report_loaded(reading.findings, sink)?;
         // Otherwise, parts rendered from a half-written file could be merged.
         if plan.shard.is_some() {
             reading.files.contents.wait_for_writers(reading.files.token)?;
@@ -129,7 +133,7 @@ impl Session {
         pool: &ThreadPool,
     ) -> Result<ReadyScene, AbortReason> {
         let RequestPlans { shown, own } = plans;
-        let ready = self.scenes.build(assets, shown, &request.overrides.camera, table, pool)?;
+        let ready = self.scenes.build_ready_scene(assets, shown, &request.overrides.camera, table, pool)?;
         let own = own.unwrap_or_else(|| ready.plan.clone());
         self.own.set(&ready, own, request.own_overrides().camera, &mut self.films);
         Ok(ready)
@@ -143,7 +147,7 @@ fn send_settings(parsed: &ParsedScene, plan: &RenderPlan, sink: &EventSink) {
     sink.send(Event::Settings {
         generation: sink.generation,
         settings: Box::new(plan.effective_settings()),
-        own: SceneSettings {
+        own: AdjustableSceneSettings {
             camera: camera.resolved_camera(),
             exposure: scene.render.exposure,
             integrator: scene.render.integrator,

@@ -12,12 +12,12 @@ use crate::prepare::ReadyScene;
 use crate::protocol::{Request, Stage, Status};
 use crate::queries::QueryContext;
 use crate::render::coarse_image::CoarseImageRenderer;
-use crate::render::commands::RenderCommands;
+use crate::render::commands::PendingCommandRunner;
 use crate::render::preview::PreviewSender;
 use crate::render::scheduler::{DisplayOptions, FilmRequest, RenderStageInputs};
 use crate::render::share::Shard;
 use crate::scene::fingerprint::Fingerprint;
-use crate::stages::photons::{PhotonContext, PhotonStore, PhotonTask, trace_first_photons};
+use crate::stages::photons::{PhotonContext, PhotonStore, SkipReuseOrTracePhotons, trace_first_photons};
 use crate::stages::render::render;
 use crate::stages::write::ImageWriteContext;
 use crate::stages::{AbortReason, StageResult};
@@ -38,7 +38,7 @@ pub(super) struct RequestImage {
 
 impl Session {
     /// Makes a prepared scene the current image and traces its first photons.
-    pub(super) fn trace_photons(
+    pub(super) fn make_current_and_trace_photons(
         &mut self,
         context: &RequestContext<'_>,
         scene: ReadyScene,
@@ -51,7 +51,7 @@ impl Session {
         let queries = QueryContext::new(&scene, &request.overrides.sets);
         let is_own = request.own.is_none();
         let (photons, inputs, contents) = (&mut self.photons, &self.files.protected, &*self.contents);
-        let commands = RenderCommands {
+        let commands = PendingCommandRunner {
             pending: context.commands,
             queries: &queries,
             to: ImageWriteContext { plan, inputs, contents, is_own, sink },
@@ -68,9 +68,9 @@ impl Session {
             rate: &self.coarse_rate,
         };
         let stage = table.start(Stage::Photons);
-        let task = PhotonTask::new(&scene, request.overrides.photons, photons);
+        let task = SkipReuseOrTracePhotons::new(&scene, request.overrides.photons, photons);
         // Show the scene while the first photons are traced.
-        if is_new && matches!(task, PhotonTask::Trace(..)) {
+        if is_new && matches!(task, SkipReuseOrTracePhotons::Trace(..)) {
             coarse.show_without_photons(screen, tick)?;
         }
         let sending = PhotonContext { world: &scene.world, plan, pool, token, sink };
@@ -110,7 +110,7 @@ impl Session {
             return Err(AbortReason::work_failure("the image is missing"));
         };
         let (inputs, contents) = (&self.files.protected, &*self.contents);
-        let commands = RenderCommands {
+        let commands = PendingCommandRunner {
             pending: context.commands,
             queries: &current.queries,
             to: ImageWriteContext { plan, inputs, contents, is_own: current.is_own, sink },

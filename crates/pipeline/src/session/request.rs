@@ -91,7 +91,7 @@ impl Session {
         // Even if the render is stopped, keep the files for later requests.
         self.scenes.end_request(scene.is_ok());
         // Trace photons and render the film.
-        let mut image = self.trace_photons(context, scene?, &mut table, &pool)?;
+        let mut image = self.make_current_and_trace_photons(context, scene?, &mut table, &pool)?;
         self.assign_share(context, &mut image);
         self.report_own_image_state(context, &image);
         let stage = table.start(Stage::Render);
@@ -103,7 +103,7 @@ impl Session {
             scene: &image.scene,
             plan: &image.scene.plan,
             is_written: wrote.is_written,
-            state: self.films.existing()?,
+            state: self.films.current_or_error()?,
             films: &self.films,
             rays,
             photons: image.photons.and_then(|key| self.photons.get(key)).map(PhotonStore::report),

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use rayon::ThreadPool;
 
-use super::super::cache::{CacheOfNamedValues, Memo, RequestCache};
+use super::super::cache::{CacheOfNamedValues, EvictableCache, Memo};
 use super::super::keys;
 use super::super::protocol::reasons;
 use super::meshes::{CachedMesh, MeshesByFileIndex};
@@ -37,7 +37,7 @@ pub(crate) struct AccelCache {
 }
 
 impl AccelCache {
-    pub(crate) fn caches(&mut self) -> [&mut dyn RequestCache; 3] {
+    pub(crate) fn evictable_caches(&mut self) -> [&mut dyn EvictableCache; 3] {
         [&mut self.trees, &mut self.distinct, &mut self.geometry]
     }
 }

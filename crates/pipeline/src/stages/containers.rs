@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use crate::assets::gltf::{GltfFile, ImageLocation, is_gltf};
+use crate::assets::gltf::{GltfFile, ImageLocation, has_gltf_extension};
 use crate::assets::mesh::load;
 use crate::assets::{AssetError, FileHash, LoadedMesh};
 use crate::control::{CancelToken, Progress, ignore_progress};
@@ -53,14 +53,14 @@ impl GltfContainers {
         progress: Progress<'_>,
         token: &CancelToken,
     ) -> Result<LoadedMesh, AssetError> {
-        if !is_gltf(path) {
+        if !has_gltf_extension(path) {
             let ahead = self.ahead.lock().unwrap_or_else(PoisonError::into_inner).remove(&canonical(path));
             return ahead.map_or_else(|| load(path, progress, token), Ok);
         }
         let container = self.open(path, progress, token)?;
         match part {
             Some(part) => container.build_part(part as usize, &ignore_progress, token),
-            None => container.merged_scene(token),
+            None => container.merge_scene_into_mesh(token),
         }
     }
 

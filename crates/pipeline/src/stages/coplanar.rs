@@ -9,7 +9,7 @@ use crate::assets::LoadedMesh;
 use crate::scene::description::Object;
 use crate::scene::diagnostic::Severity;
 use crate::scene::fingerprint::Fingerprint;
-use crate::world::{self, CoplanarLight, coplanar_lights};
+use crate::world::{self, CoplanarLight, find_coplanar_lights};
 
 /// Maximum number of lights to warn about for each kind of overlap.
 const MAX_WARNINGS: usize = 10;
@@ -27,12 +27,12 @@ pub(crate) fn warn_about_coplanar_lights(
     let origin = world::choose_origin_near_camera_target(&scene.camera, parsed.orbiter.as_ref());
     let mesh_keys: Vec<Fingerprint> = meshes.iter().map(|mesh| mesh.key).collect();
     let key = keys::key_with_coordinate_origin(
-        &keys::coplanar_lights_key(scene, &keys::scene_references_for_fingerprint(scene, &mesh_keys, None)),
+        &keys::coplanar_lights_key(scene, &keys::scene_fingerprint_context(scene, &mesh_keys, None)),
         origin,
     );
     let found = memo.get(key).cloned().unwrap_or_else(|| {
         let files: Vec<&LoadedMesh> = meshes.iter().map(|mesh| &*mesh.mesh).collect();
-        coplanar_lights(scene, &files, origin)
+        find_coplanar_lights(scene, &files, origin)
     });
     let named = |number: usize| {
         let Object { shape, name, span, .. } = &scene.objects[number];
@@ -49,7 +49,8 @@ pub(crate) fn warn_about_coplanar_lights(
             let more = if others.is_empty() { String::new() } else { format!(" and {} more", others.len()) };
             let message = describe(*light, *surface, &more);
             let span = scene.objects[*light].span.clone();
-            let warning = loaded.diagnostic_at(span, Severity::Warning, message, Some(help.to_owned()));
+            let warning =
+                loaded.create_diagnostic_at(span, Severity::Warning, message, Some(help.to_owned()));
             findings.warnings.push(warning);
         }
     };

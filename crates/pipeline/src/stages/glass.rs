@@ -31,7 +31,7 @@ pub(crate) fn find_glass_solids(
 ) -> Result<Arc<GlassSolids>, AbortReason> {
     let scene = &loaded.scene;
     let mesh_keys: Vec<Fingerprint> = meshes.iter().map(|mesh| mesh.key).collect();
-    let key = keys::glass_key(scene, &keys::scene_references_for_fingerprint(scene, &mesh_keys, None));
+    let key = keys::glass_key(scene, &keys::scene_fingerprint_context(scene, &mesh_keys, None));
     let bodies = if let Some(bodies) = memo.get(key) {
         Arc::clone(bodies)
     } else {
@@ -66,17 +66,17 @@ fn open_glass_warnings(loaded: &LoadedScene, open: &[OpenGlass]) -> Vec<Diagnost
     let mut groups: Vec<(GlassFlaw, Vec<&OpenGlass>)> = Vec::new();
     let mut is_first_copy = loaded.scene.first_copy_filter();
     for open in open.iter().filter(|open| !open.is_covered && is_first_copy(open.object as usize)) {
-        let Some(flaw) = flaw(loaded, open) else { continue };
+        let Some(flaw) = glass_flaw(loaded, open) else { continue };
         match groups.iter_mut().find(|(other, _)| *other == flaw) {
             Some((_, members)) => members.push(open),
             None => groups.push((flaw, vec![open])),
         }
     }
-    groups.iter().map(|(flaw, members)| warning(loaded, *flaw, members)).collect()
+    groups.iter().map(|(flaw, members)| glass_flaw_warning(loaded, *flaw, members)).collect()
 }
 
 /// Returns the reason why an open object does not enclose a volume, or `None` if there is no advice for it.
-fn flaw(loaded: &LoadedScene, open: &OpenGlass) -> Option<GlassFlaw> {
+fn glass_flaw(loaded: &LoadedScene, open: &OpenGlass) -> Option<GlassFlaw> {
     let shape = &loaded.scene.objects[open.object as usize].shape;
     if shape.as_mesh().is_some() {
         return Some(if open.disagrees { GlassFlaw::Fronts } else { GlassFlaw::Hole });
@@ -104,11 +104,11 @@ fn flaw(loaded: &LoadedScene, open: &OpenGlass) -> Option<GlassFlaw> {
 }
 
 /// Returns a single warning about all objects that have a flaw. `members` must not be empty.
-fn warning(loaded: &LoadedScene, flaw: GlassFlaw, members: &[&OpenGlass]) -> Diagnostic {
+fn glass_flaw_warning(loaded: &LoadedScene, flaw: GlassFlaw, members: &[&OpenGlass]) -> Diagnostic {
     let first = &loaded.scene.objects[members[0].object as usize];
     let edges: usize = members.iter().map(|open| open.edges).sum();
     let edges = if edges == 1 { "1 edge".to_owned() } else { format!("{edges} edges") };
-    let part = percent(members.iter().map(|open| open.missing).fold(0.0, f64::max));
+    let part = format_percent(members.iter().map(|open| open.missing).fold(0.0, f64::max));
     let (count, names) = (members.len(), list_object_names(loaded, members));
     let mesh = match (count, &first.name) {
         (1, Some(name)) => format!("glass mesh \"{name}\" is"),
@@ -134,7 +134,7 @@ fn warning(loaded: &LoadedScene, flaw: GlassFlaw, members: &[&OpenGlass]) -> Dia
         }
     };
     let mut diagnostic =
-        loaded.diagnostic_at(first.span.clone(), Severity::Warning, message, Some(help.to_owned()));
+        loaded.create_diagnostic_at(first.span.clone(), Severity::Warning, message, Some(help.to_owned()));
     if let Some(place) = &mut diagnostic.place {
         place.label = LACKS.to_owned();
     }
@@ -167,14 +167,15 @@ fn duplicate_faces_glass_warning(loaded: &LoadedScene, object: u32) -> Diagnosti
     let message =
         format!("glass{name} encloses no volume: every face is duplicated with the opposite orientation");
     let help = "export each face once, facing outwards (not double-sided)".to_owned();
-    let mut diagnostic = loaded.diagnostic_at(object.span.clone(), Severity::Warning, message, Some(help));
+    let mut diagnostic =
+        loaded.create_diagnostic_at(object.span.clone(), Severity::Warning, message, Some(help));
     if let Some(place) = &mut diagnostic.place {
         place.label = "rays enter it but never leave, so everything behind it is tinted".to_owned();
     }
     diagnostic
 }
 
-fn percent(part: f64) -> String {
+fn format_percent(part: f64) -> String {
     match 100.0 * part {
         percent if percent < 0.1 => "less than 0.1 %".to_owned(),
         percent if percent < 9.95 => format!("{percent:.1} %"),

@@ -41,7 +41,7 @@ pub(crate) fn collect_lights(
         scene,
         of,
         geometry.coordinate_origin(),
-        geometry.object_offsets_from_coplanar_lights(),
+        geometry.light_lifts_by_object(),
         map,
         &patterns,
     );
@@ -75,7 +75,7 @@ fn describe_light_tree(which: &str, lights: &Lights) -> String {
 /// Returns the textures used by the scene file's emissive materials.
 fn emissive_material_textures(scene: &Scene) -> impl Iterator<Item = TextureSource> {
     let shining = scene.materials.iter().filter(|material| material.emits());
-    shining.flat_map(Material::with_parts).flat_map(move |material| {
+    shining.flat_map(Material::self_and_blend_parts).flat_map(move |material| {
         let textures = material.textures().into_iter().filter(|(_, role)| match role {
             TextureRole::Emission
             | TextureRole::EmissionCoat(_)

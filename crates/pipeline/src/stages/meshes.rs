@@ -102,7 +102,7 @@ pub(crate) fn load_meshes(
                 mesh
             }
             Err(error) => {
-                let error = AbortReason::unless_fatal(error)?;
+                let error = AbortReason::asset_error_unless_fatal(error)?;
                 counts.failed += 1;
                 findings.add_asset_error(loaded, file.span.clone(), &error);
                 let key = mesh_key_without_companions(file, content);

@@ -81,7 +81,7 @@ impl AbortReason {
     }
 
     /// Returns the error as `Ok` unless it must end the request.
-    pub(super) fn unless_fatal(error: AssetError) -> Result<AssetError, Self> {
+    pub(super) fn asset_error_unless_fatal(error: AssetError) -> Result<AssetError, Self> {
         match error {
             AssetError::Canceled(_) => Err(Self::Canceled),
             AssetError::OutOfMemory { .. }
@@ -211,7 +211,7 @@ impl Findings {
         message: String,
         help: &str,
     ) {
-        self.errors.push(loaded.diagnostic_at(span, Severity::Error, message, Some(help.to_owned())));
+        self.errors.push(loaded.create_diagnostic_at(span, Severity::Error, message, Some(help.to_owned())));
     }
 
     pub(super) fn add_warning(&mut self, loaded: &LoadedScene, span: Range<usize>, message: String) {
@@ -254,7 +254,7 @@ fn diagnostic_at_span(
     severity: Severity,
     message: String,
 ) -> Diagnostic {
-    loaded.diagnostic_at(span, severity, message, None)
+    loaded.create_diagnostic_at(span, severity, message, None)
 }
 
 /// Result of loading an asset.

@@ -6,7 +6,9 @@ use std::sync::Arc;
 
 use super::super::cache::Memo;
 use super::super::formats::model::ModelViewOptions;
-use super::super::formats::{ForeignFormat, ForeignReadContext, ForeignScene, foreign_file_error, lower};
+use super::super::formats::{
+    ForeignFormat, ForeignReadContext, ForeignScene, foreign_file_error, scene_from_document,
+};
 use super::super::protocol::{Failure, reasons};
 use super::super::watch::content::{FileContentId, FilePathAndContentId};
 use super::{AbortReason, FileReadContext, Findings, StageResult};
@@ -46,7 +48,11 @@ pub(crate) struct SceneParseRequest<'a> {
 }
 
 /// Converts an importer's error. Watches missing files to detect when they are created.
-fn abort_reason(error: AssetError, findings: &mut Findings, reading: &FileReadContext<'_>) -> AbortReason {
+fn abort_reason_from_import_error(
+    error: AssetError,
+    findings: &mut Findings,
+    reading: &FileReadContext<'_>,
+) -> AbortReason {
     match error {
         AssetError::Canceled(_) => AbortReason::Canceled,
         AssetError::OutOfMemory { .. }
@@ -90,7 +96,7 @@ pub(crate) fn parse(
         });
     }
     let content = contents.first_seen_content_id(path, token)?;
-    let format = ForeignFormat::of_file(path);
+    let format = ForeignFormat::from_file_unless_scene(path);
     if !format.is_some_and(|format| format.is_model) && (show.from.is_some() || show.up.is_some()) {
         findings.add_file(FilePathAndContentId { path: path.to_owned(), content });
         let message = match show.from {
@@ -160,9 +166,10 @@ fn read_scene(
         return Ok((Arc::new(loaded), content, Vec::new(), Vec::new()));
     };
     let context = ForeignReadContext { view: show, containers, token };
-    let ForeignScene { document, hash, companions, notes, substitutions } =
-        (format.read)(path, &context).map_err(|error| abort_reason(error, findings, reading))?;
-    let loaded = lower(document, path, sets).map_err(|errors| AbortReason::Failed(Failure::Scene(errors)))?;
+    let ForeignScene { document, hash, companions, notes, substitutions } = (format.read)(path, &context)
+        .map_err(|error| abort_reason_from_import_error(error, findings, reading))?;
+    let loaded = scene_from_document(document, path, sets)
+        .map_err(|errors| AbortReason::Failed(Failure::Scene(errors)))?;
     let content = contents.record_decoded(path, hash);
     let companions = companions.iter().map(|companion| contents.record_companion(companion, token));
     let companions = companions.collect::<Result<_, Canceled>>()?;
@@ -195,9 +202,9 @@ fn add_renamed_file_hint(
 ) -> Vec<Diagnostic> {
     let last = last.filter(|last| last.loaded.path == path && !last.loaded.is_foreign());
     if let [error] = &mut errors[..]
-        && scene::is_file_not_found(error)
+        && scene::is_file_not_found_diagnostic(error)
         && let Some(last) = last
-        && let Some(file) = scene::find_renamed_scene(path, &last.loaded.source.file_text_as_arc())
+        && let Some(file) = scene::find_renamed_scene_by_text(path, &last.loaded.source.file_text_as_arc())
     {
         let name = escape_invisible_chars(&file.to_string_lossy()).into_owned();
         error.help = Some(format!("{name} {}; run `glimt {name}` to watch it", scene::SAME_TEXT));

@@ -20,7 +20,7 @@ use super::super::stopwatch::PausableStopwatch;
 use super::super::trace::TICK;
 use super::StageResult;
 use crate::control::{CancelToken, Canceled, Progress};
-use crate::integrators::{PhotonMapper, PhotonMaps, PhotonPass, PhotonSettings, RenderSettings};
+use crate::integrators::{PhotonMapper, PhotonPass, PhotonPassesBySample, PhotonSettings, RenderSettings};
 use crate::scene::description::RenderOptions;
 use crate::scene::fingerprint::Fingerprint;
 use crate::world::World;
@@ -99,14 +99,14 @@ impl PhotonStore {
         samples: Range<u32>,
         sending: PhotonContext<'_>,
         mut tick: impl FnMut(),
-    ) -> Result<PhotonMaps, Canceled> {
+    ) -> Result<PhotonPassesBySample, Canceled> {
         let first = samples.start;
         let pass = |number| self.get_or_trace_pass(number, sending, &mut tick);
         let passes = samples.map(pass).collect::<Result<Vec<_>, _>>()?;
         let bytes = passes.iter().map(|pass| pass.memory_bytes()).sum();
         let sent = self.sent.get();
         self.sent.set(PhotonCounts { max_alive_bytes: sent.max_alive_bytes.max(bytes), ..sent });
-        Ok(PhotonMaps { first, passes })
+        Ok(PhotonPassesBySample { first, passes })
     }
 
     fn get_or_trace_pass(
@@ -188,7 +188,7 @@ fn run_with_ticks<T: Send>(
 
 /// The photons that an image needs, each with the key of the image's photons.
 #[derive(Clone, Copy)]
-pub(crate) enum PhotonTask {
+pub(crate) enum SkipReuseOrTracePhotons {
     /// None, for this reason.
     Skip(&'static str),
     /// The cached photons.
@@ -197,7 +197,7 @@ pub(crate) enum PhotonTask {
     Trace(Fingerprint, PhotonSettings),
 }
 
-impl PhotonTask {
+impl SkipReuseOrTracePhotons {
     /// Determines the photons for a scene's image. `wanted` comes from the command line.
     pub(crate) fn new(scene: &ReadyScene, wanted: Option<bool>, cache: &PhotonCache) -> Self {
         let ReadyScene { plan, surfaces, origin, .. } = scene;
@@ -227,21 +227,21 @@ impl PhotonTask {
 /// # Errors
 /// Returns [`Canceled`] if the token is canceled.
 pub(crate) fn trace_first_photons(
-    task: PhotonTask,
+    task: SkipReuseOrTracePhotons,
     cache: &mut PhotonCache,
     sending: PhotonContext<'_>,
     mut tick: impl FnMut(),
 ) -> Result<StageResult<Option<Fingerprint>>, Canceled> {
     let (key, of_photons) = match task {
-        PhotonTask::Skip(why) => return Ok(StageResult::skipped(None, why)),
-        PhotonTask::Reuse(key) => {
+        SkipReuseOrTracePhotons::Skip(why) => return Ok(StageResult::skipped(None, why)),
+        SkipReuseOrTracePhotons::Reuse(key) => {
             let store = cache.get(key).inspect(|store| store.sent.set(PhotonCounts::default()));
             return Ok(match store.is_some_and(PhotonStore::has_lit_caustic_casters) {
                 true => StageResult::reused(Some(key), reasons::UNCHANGED),
                 false => StageResult::skipped(Some(key), reasons::NO_SPECULAR_SURFACES),
             });
         }
-        PhotonTask::Trace(key, of_photons) => (key, of_photons),
+        SkipReuseOrTracePhotons::Trace(key, of_photons) => (key, of_photons),
     };
     let PhotonContext { world, plan, pool, token, .. } = sending;
     let settings = plan.settings.without_ineffective_settings();

@@ -10,8 +10,8 @@ use super::FileReadContext;
 use super::containers::{ImageInput, canonical};
 use crate::assets::AssetError;
 use crate::assets::image::{
-    DecodedImage, EmbeddedImage, ImageEncoding, ImageLimits, embedded_dimensions_and_decoded_bytes,
-    load_embedded, load_hashed, mipmaps, mipmaps_of_thresholded_texels, read_dimensions_and_decoded_bytes,
+    ColorEncoding, DecodedImage, EmbeddedImage, ImageLimits, embedded_dimensions_and_memory_size,
+    load_and_hash, load_embedded, mipmaps, mipmaps_of_thresholded_texels, read_dimensions_and_memory_size,
 };
 use crate::control::Progress;
 use crate::materials::Mipmaps;
@@ -20,7 +20,7 @@ use crate::scene::fingerprint::{Fingerprint, FingerprintHasher};
 use crate::world::{AlphaCutoffKey, NeededTexture, TextureSource};
 
 /// Canonical path of an image, and how to interpret its values.
-pub(super) type TextureKey = (PathBuf, Option<u32>, ImageEncoding, Option<AlphaCutoffKey>);
+pub(super) type TextureKey = (PathBuf, Option<u32>, ColorEncoding, Option<AlphaCutoffKey>);
 
 pub(super) fn texture_key(source: &TextureSource) -> TextureKey {
     (canonical(&source.path), source.image, source.encoding, source.coverage)
@@ -91,7 +91,7 @@ pub(super) fn load_images_within_limit(
             // Unreadable images are reported during loading.
             None => image_dimensions_and_memory(&image.asked_by[0].source, reading).unwrap_or_default(),
         };
-        let is_weighted = matches!(image.asked_by[0].source.encoding, ImageEncoding::CutOut(_));
+        let is_weighted = matches!(image.asked_by[0].source.encoding, ColorEncoding::CutOut(_));
         bytes
             + if image.needs_mipmaps() {
                 Mipmaps::estimate_memory_bytes(width, height, is_weighted)
@@ -105,7 +105,7 @@ pub(super) fn load_images_within_limit(
         let mut contents = (image.content, image.linked.clone());
         let result = match over {
             Some(reason) => Err(AssetError::Malformed { path: image.path().to_owned(), line: None, reason }),
-            None => load_one(image, &mut contents, reading),
+            None => load_image_and_mipmaps(image, &mut contents, reading),
         };
         (contents, result)
     };
@@ -139,7 +139,7 @@ pub(super) type TextureFileContentIds = (FileContentId, Option<FilePathAndConten
 pub(super) type DecodedTextureWithMipmaps = (Arc<DecodedTexture>, Option<Arc<Mipmaps>>, bool);
 
 /// Loads an image and its mipmaps. Sets `contents` to the contents that were decoded.
-fn load_one(
+fn load_image_and_mipmaps(
     image: &ImageWithTextures<'_>,
     contents: &mut TextureFileContentIds,
     reading: &FileReadContext<'_>,
@@ -149,7 +149,7 @@ fn load_one(
         Some(decoded) => decoded.clone(),
         None => {
             was_kept = false;
-            let DecodedImage { texels, warnings } = decode(image, contents, reading)?;
+            let DecodedImage { texels, warnings } = decode_image(image, contents, reading)?;
             Arc::new(DecodedTexture { texels: Arc::new(texels), warnings })
         }
     };
@@ -170,7 +170,7 @@ fn load_one(
 }
 
 /// Decodes an image. Sets `contents` to the contents that were decoded.
-fn decode(
+fn decode_image(
     image: &ImageWithTextures<'_>,
     contents: &mut TextureFileContentIds,
     reading: &FileReadContext<'_>,
@@ -198,7 +198,7 @@ fn decode(
             }
         }
     };
-    let load = |progress: Progress<'_>| load_hashed(&file, encoding, limits, progress, token);
+    let load = |progress: Progress<'_>| load_and_hash(&file, encoding, limits, progress, token);
     let (texels, hash) = reading.sink.load_asset_with_progress(&one.name, load)?;
     let content = reading.contents.record_decoded(&file, hash);
     match &mut contents.1 {
@@ -228,8 +228,8 @@ fn image_dimensions_and_memory(
 ) -> Result<(u32, u32, u64), AssetError> {
     let (limits, encoding) = (ImageLimits::default(), source.encoding);
     match locate_image_bytes(source, reading)? {
-        ImageInput::File(path) => read_dimensions_and_decoded_bytes(&path, encoding, limits, reading.token),
-        ImageInput::Bytes(bytes) => embedded_dimensions_and_decoded_bytes(
+        ImageInput::File(path) => read_dimensions_and_memory_size(&path, encoding, limits, reading.token),
+        ImageInput::Bytes(bytes) => embedded_dimensions_and_memory_size(
             EmbeddedImage { path: &source.path, bytes },
             encoding,
             limits,

@@ -7,13 +7,13 @@ use std::sync::Arc;
 use super::Findings;
 use super::texture_images::{DecodedTexture, ImageWithTextures};
 use crate::assets::AssetError;
-use crate::assets::image::{ColorCurve, ImageEncoding};
+use crate::assets::image::{ColorEncoding, ColorTransferFunction};
 use crate::materials::texels::{TexelData, Texels};
 use crate::math::Vec3;
 use crate::scene::LoadedScene;
 use crate::scene::description::{Channel, ChannelSelector, Scene, TextureRole};
 use crate::scene::diagnostic::Severity;
-use crate::world::{Image, Images, NeededTexture};
+use crate::world::{Images, NeededTexture, TexelsAndMipmaps};
 
 /// Warns about an unreadable image in a model and replaces it with a constant. Preserves the material's
 /// factors, except that emission is dropped. Materials from mesh files provide their own values for use
@@ -28,7 +28,7 @@ pub(super) fn replace_unreadable_image(
     let file = loaded.path.display();
     let mut warn = |material: &str| {
         let help = format!("glimt shows the material \"{material}\" in {file} without it");
-        let warning = loaded.diagnostic_at(
+        let warning = loaded.create_diagnostic_at(
             reference_span(loaded, one),
             Severity::Warning,
             prefix_mtl_line(one, error),
@@ -50,16 +50,16 @@ pub(super) fn replace_unreadable_image(
         is_light &= roles.all(|(_, role)| role == TextureRole::Emission);
     }
     let texel = match one.source.encoding {
-        ImageEncoding::Linear => Vec3::new(0.5, 0.5, 1.0),
-        ImageEncoding::Color | ImageEncoding::CutOut(ColorCurve::Auto) if is_light => Vec3::ZERO,
-        ImageEncoding::Color
-        | ImageEncoding::Srgb
-        | ImageEncoding::Raw
-        | ImageEncoding::CutOut(_)
-        | ImageEncoding::Number { .. } => Vec3::ONE,
+        ColorEncoding::Linear => Vec3::new(0.5, 0.5, 1.0),
+        ColorEncoding::Color | ColorEncoding::CutOut(ColorTransferFunction::Auto) if is_light => Vec3::ZERO,
+        ColorEncoding::Color
+        | ColorEncoding::Srgb
+        | ColorEncoding::Raw
+        | ColorEncoding::CutOut(_)
+        | ColorEncoding::Number { .. } => Vec3::ONE,
     };
     let texels = Texels { width: 1, height: 1, data: TexelData::Float(vec![texel]), unusable: 0 };
-    images.insert(one.source.clone(), Image { texels: Arc::new(texels), mipmaps: None });
+    images.insert(one.source.clone(), TexelsAndMipmaps { texels: Arc::new(texels), mipmaps: None });
 }
 
 /// Prefixes a message about an image with the MTL line that references the image.
@@ -142,7 +142,7 @@ fn opaque_alpha_warning<'a>(
 ) -> Option<(&'a NeededTexture, String)> {
     const ALPHA: ChannelSelector = ChannelSelector::Channel(Channel::Alpha);
     let is_alpha =
-        |one: &&&NeededTexture| matches!(one.source.encoding, ImageEncoding::Number { of: ALPHA, .. });
+        |one: &&&NeededTexture| matches!(one.source.encoding, ColorEncoding::Number { of: ALPHA, .. });
     let one = image.asked_by.iter().find(is_alpha).filter(|_| texels.is_white())?;
     let path = image.path().display();
     Some((*one, format!("{path} has no alpha below 1: `channel = \"a\"` is 1 everywhere")))

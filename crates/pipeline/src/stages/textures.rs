@@ -5,7 +5,7 @@ use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::super::cache::{CacheOfNamedValues, RequestCache};
+use super::super::cache::{CacheOfNamedValues, EvictableCache};
 use super::super::protocol::reasons;
 use super::super::watch::content::FilePathAndContentId;
 use super::meshes::MeshesByFileIndex;
@@ -17,7 +17,7 @@ use super::texture_warnings::{
     add_unreadable_image_errors, environment_span, replace_unreadable_image, warn_about_image,
 };
 use super::{AbortReason, FileCounts, FileReadContext, Findings, StageResult, loading_result};
-use crate::assets::image::ImageEncoding;
+use crate::assets::image::ColorEncoding;
 use crate::control::Canceled;
 use crate::materials::Mipmaps;
 use crate::materials::texels::Texels;
@@ -25,8 +25,8 @@ use crate::scene::LoadedScene;
 use crate::scene::description::TextureEncoding;
 use crate::scene::fingerprint::Fingerprint;
 use crate::world::{
-    Image, Images, NeededTexture, TextureRolesNeededByRender, TextureSource, environment_source,
-    textures_needed,
+    Images, NeededTexture, TexelsAndMipmaps, TextureRolesNeededByRender, TextureSource,
+    environment_map_source, textures_needed,
 };
 
 /// Maximum total size of a scene's texels, in bytes.
@@ -47,7 +47,7 @@ impl TextureCache {
         needed.iter().all(|one| self.texels.get_by_name(&texture_key(&one.source)).is_some())
     }
 
-    pub(crate) fn caches(&mut self) -> [&mut dyn RequestCache; 2] {
+    pub(crate) fn evictable_caches(&mut self) -> [&mut dyn EvictableCache; 2] {
         [&mut self.texels, &mut self.mipmaps]
     }
 
@@ -140,7 +140,7 @@ pub(crate) fn load_textures(
         };
         return Ok(StageResult::skipped(textures, why));
     }
-    let environment = environment_source(&loaded.scene);
+    let environment = environment_map_source(&loaded.scene);
     let images = group_by_image(needed, cache, reading)?;
     let assets = load_images_within_limit(&images, MAX_BYTES, reading);
     let mut counts = FileCounts::default();
@@ -157,7 +157,7 @@ pub(crate) fn load_textures(
         match asset {
             Ok((decoded, mipmaps, was_kept)) => {
                 let texels = &decoded.texels;
-                let loaded_image = Image { texels: texels.clone(), mipmaps: mipmaps.clone() };
+                let loaded_image = TexelsAndMipmaps { texels: texels.clone(), mipmaps: mipmaps.clone() };
                 counts.kept += usize::from(was_kept);
                 counts.loaded += usize::from(!was_kept);
                 textures.texels_loaded += if image.kept.texels.is_some() { 0 } else { texels.len() as u64 };
@@ -183,7 +183,7 @@ pub(crate) fn load_textures(
                 cache.texels.insert(image.name, key, decoded, bytes);
             }
             Err(error) => {
-                let error = AbortReason::unless_fatal(error)?;
+                let error = AbortReason::asset_error_unless_fatal(error)?;
                 counts.failed += 1;
                 if !are_required && loaded.is_foreign() {
                     for one in &image.asked_by {
@@ -246,9 +246,9 @@ fn add_check_only_textures(loaded: &LoadedScene, wanted: &mut Vec<NeededTexture>
             continue;
         }
         let encoding = match image.encoding {
-            TextureEncoding::Auto => ImageEncoding::Color,
-            TextureEncoding::Srgb => ImageEncoding::Srgb,
-            TextureEncoding::Linear => ImageEncoding::Linear,
+            TextureEncoding::Auto => ColorEncoding::Color,
+            TextureEncoding::Srgb => ColorEncoding::Srgb,
+            TextureEncoding::Linear => ColorEncoding::Linear,
         };
         let (path, image) = (image.file.value.clone(), image.image);
         let source = TextureSource { path, image, encoding, coverage: None };

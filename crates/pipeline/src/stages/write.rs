@@ -51,12 +51,12 @@ impl WriteState {
     /// Whether a file on disk contains an image that the user wrote and that includes keyboard changes. Such
     /// a file is replaced only after the scene is saved, or when the user writes another image.
     pub(crate) fn has_user_written_image_on_disk(&self, contents: &FileHashCache) -> bool {
-        self.is_by_hand && contents.outputs.has_unchanged_file(contents)
+        self.is_by_hand && contents.outputs.has_any_unchanged_file(contents)
     }
 
     /// Allows the scene's own image to replace any other image if the scene has been saved since the last
     /// call.
-    pub(crate) fn record_saves(&mut self, saves: u64) {
+    pub(crate) fn record_scene_save_count(&mut self, saves: u64) {
         if std::mem::replace(&mut self.saves, saves) != saves {
             self.is_by_hand = false;
         }
@@ -79,7 +79,7 @@ pub(crate) struct ImageWriteContext<'a> {
 /// # Errors
 /// With [`WriteRequirement::Must`], returns an error for the first file that cannot be written. Otherwise,
 /// reports failures as events.
-pub(crate) fn check_targets(
+pub(crate) fn check_outputs_are_writable(
     writing: WriteRequirement,
     plan: &RenderPlan,
     sink: &EventSink,
@@ -94,7 +94,7 @@ pub(crate) fn check_targets(
             if let Err(error) = check_each_target_is_writable(
                 plan,
                 output::check_image_target_without_writing,
-                output::check_file_target_read_only,
+                output::check_file_target_without_writing,
             ) {
                 sink.send_write_failed(None, error.to_string());
             }
@@ -167,7 +167,7 @@ fn write_outdated_outputs(
     let (mut count, mut errors) = (0, Vec::new());
     for path in &plan.outputs.images {
         let key = image_file_key(state, plan, path);
-        if let Some(content) = contents.outputs.content_of_image(path, key)
+        if let Some(content) = contents.outputs.content_if_image_matches(path, key)
             && contents.read_content_id(path, token)? == content
         {
             continue;
@@ -181,7 +181,7 @@ fn write_outdated_outputs(
                 token
                     .check_pause_and_cancel()
                     .map_err(OutputError::from)
-                    .and_then(|()| write_one(image, state, to, path, &written.sweep, token))
+                    .and_then(|()| write_image_file(image, state, to, path, &written.sweep, token))
             }
         };
         match wrote {
@@ -281,7 +281,7 @@ pub(crate) fn add_frame_and_write_if_last(
             let write = |guard: &ExistingFilePolicy<'_>| {
                 output::write::atomic_with_policy(path, &bytes, guard, token)
             };
-            write_guarded(plan, inputs, OutputTarget::for_image(plan, path), None, sink, write)?;
+            write_guarded(plan, inputs, OutputTarget::from_image_path(plan, path), None, sink, write)?;
             Ok(bytes.len() as u64)
         };
         match write() {
@@ -293,7 +293,7 @@ pub(crate) fn add_frame_and_write_if_last(
     Ok(StageResult::done(true, format!("{} frames", frames.len())))
 }
 
-fn write_one(
+fn write_image_file(
     image: &RadianceImage,
     state: &FilmState,
     ImageWriteContext { plan, inputs, sink, .. }: ImageWriteContext<'_>,
@@ -309,7 +309,7 @@ fn write_one(
     let layers = layer_images(state, plan);
     let bytes =
         finish.encode_with_film_metadata(&state.film, image, &layers, Format::from_path(path)?, token)?;
-    write_guarded(plan, inputs, OutputTarget::for_image(plan, path), Some(sweep), sink, |guard| {
+    write_guarded(plan, inputs, OutputTarget::from_image_path(plan, path), Some(sweep), sink, |guard| {
         output::write::atomic_with_policy(path, &bytes, guard, token)
     })?;
     Ok(bytes.len() as u64)
@@ -331,7 +331,7 @@ fn write_part(
     let save = |guard: &ExistingFilePolicy<'_>| {
         part::save(path, &head, &state.film, &Value::Null, guard, token, Durability::Power).map(drop)
     };
-    write_guarded(plan, inputs, OutputTarget::for_image(plan, path), Some(sweep), sink, save)?;
+    write_guarded(plan, inputs, OutputTarget::from_image_path(plan, path), Some(sweep), sink, save)?;
     Ok(path.metadata().map_or(0, |found| found.len()))
 }
 
@@ -339,9 +339,9 @@ fn write_part(
 pub(crate) fn image_encoding_settings(plan: &RenderPlan) -> FilmEncodingSettings {
     FilmEncodingSettings {
         quantity: plan.settings.view.displayed_film_quantity(),
-        tone: plan.tone(),
+        tone: plan.tone_mapping(),
         bit_depth: BitDepth::try_from(plan.bit_depth).unwrap_or_default(),
-        metadata: metadata(plan),
+        metadata: image_metadata(plan),
         is_light: matches!(plan.settings.view.aov_source(), AovSource::Light(LightAov::Radiance(_))),
     }
 }
@@ -357,12 +357,12 @@ fn encoding_settings_with_relative_scene(plan: &RenderPlan, path: &Path) -> Film
 }
 
 /// Returns the metadata needed to reproduce an image, except for metadata stored in the film.
-fn metadata(plan: &RenderPlan) -> Vec<(String, String)> {
+fn image_metadata(plan: &RenderPlan) -> Vec<(String, String)> {
     let RenderSettings { render, dof, view, photons, layers: _ } =
         plan.settings.without_ineffective_settings();
     let RenderOptions { shadows, max_depth, .. } = plan.settings.render;
     let pairs = [
-        (SCENE, plan.name()),
+        (SCENE, plan.scene_file_name()),
         ("glimt:integrator", render.integrator.name().to_owned()),
         ("glimt:shadows", shadows.name().to_owned()),
         ("glimt:max_depth", max_depth.to_string()),
@@ -371,7 +371,7 @@ fn metadata(plan: &RenderPlan) -> Vec<(String, String)> {
         ("glimt:photons", photons.is_some().to_string()),
         ("glimt:error", render.error.to_string()),
         ("glimt:seed", render.seed.to_string()),
-        ("glimt:exposure", plan.tone().exposure_stops.to_string()),
+        ("glimt:exposure", plan.tone_mapping().exposure_stops.to_string()),
     ];
     let mut pairs = pairs.map(|(key, value)| (key.to_owned(), value)).to_vec();
     let mut add = |name: &str, value: String| pairs.push((format!("glimt:{name}"), value));
@@ -407,13 +407,13 @@ fn metadata(plan: &RenderPlan) -> Vec<(String, String)> {
 
 fn image_file_key(state: &FilmState, plan: &RenderPlan, path: &Path) -> Fingerprint {
     let SampleCountStats { min, mean, max } = state.film.sample_count_stats();
-    let tone = plan.tone();
+    let tone = plan.tone_mapping();
     let mut key = FingerprintHasher::new("write");
     key.add_fingerprint(&state.key).add_u64(min.into()).add_f64(mean).add_u64(max.into());
-    key.add_choice(plan.settings.view).add_f32(tone.exposure_stops).add_usize(tone.curve as usize);
+    key.add_choice_name(plan.settings.view).add_f32(tone.exposure_stops).add_usize(tone.curve as usize);
     key.add_usize(tone.transfer as usize).add_u64(plan.bit_depth.into());
     plan.layers.iter().for_each(|layer| {
-        key.add_choice(*layer);
+        key.add_choice_name(*layer);
     });
     key.add_path_bytes(path).finish()
 }

@@ -3,8 +3,8 @@
 use super::*;
 use crate::math::DVec3;
 use crate::messages;
-use crate::protocol::{CameraSaveResult, ImagePosition, MovedCamera, PickedPixel, SavedCameraEdit};
-use crate::scene::description::{CameraOverrides, ImageWindow, Pose, Projection, ResolvedCamera};
+use crate::protocol::{CameraSaveResult, MovedCamera, NormalizedPosition, PickedPixel, SavedCameraEdit};
+use crate::scene::description::{CameraOverrides, ImageShiftAndMirror, Pose, Projection, ResolvedCamera};
 
 /// Tables that add a mirror and photons to a scene.
 const PHOTONS: &str = "[[quad]]\ncorner = [-2, 0, -2]\nu = [4, 0, 0]\nv = [0, 4, 0]\nmaterial = \"steel\"\n\
@@ -125,7 +125,7 @@ fn undo(bench: &mut Bench, edit: SavedCameraEdit) -> Result<std::path::PathBuf, 
 }
 
 fn pick(bench: &mut Bench, x: f64, y: f64) -> PickedPixel {
-    match answer(bench, Command::Pick(ImagePosition { x, y })) {
+    match answer(bench, Command::Pick(NormalizedPosition { x, y })) {
         Event::Picked { picked, .. } => *picked,
         other => panic!("{other:?}"),
     }
@@ -321,7 +321,7 @@ fn queries_do_not_interrupt_a_render() {
     let camera = ResolvedCamera {
         pose: moved().pose.expect("a pose"),
         projection: Projection::Perspective { fov: 40.0 },
-        window: ImageWindow::default(),
+        window: ImageShiftAndMirror::default(),
         aperture: 0.0,
         focus: 1.0,
     };

@@ -7,7 +7,7 @@ use std::time::Instant;
 use super::*;
 use crate::control::{CancelToken, Canceled};
 use crate::film::{Rect, SelectedPixels, TileSamples};
-use crate::integrators::{PhotonMaps, RayCounters, RenderSettings};
+use crate::integrators::{PhotonPassesBySample, RayCounters, RenderSettings};
 use crate::messages::{INCOMPLETE_IMAGE, NEWEST_IMAGE_NOT_WRITTEN};
 use crate::protocol::LastValidSceneRenderOutcome;
 use crate::scene::description::{Integrator, ShadowMode};
@@ -17,7 +17,7 @@ use crate::world::World;
 
 /// Blocks until its token is canceled.
 fn block_until_canceled(
-    _: Option<&PhotonMaps>,
+    _: Option<&PhotonPassesBySample>,
     _: &World,
     _: &RenderSettings,
     _: SelectedPixels,
@@ -78,7 +78,7 @@ fn older_request_arriving_late_is_dropped() {
 static BREAKS: AtomicBool = AtomicBool::new(true);
 
 fn breaks_once(
-    photons: Option<&PhotonMaps>,
+    photons: Option<&PhotonPassesBySample>,
     world: &World,
     settings: &RenderSettings,
     pixels: SelectedPixels,
@@ -109,7 +109,7 @@ impl Drop for PanicsOnDrop {
 static HAS_PANICKED: AtomicBool = AtomicBool::new(false);
 
 fn panics_on_drop(
-    photons: Option<&PhotonMaps>,
+    photons: Option<&PhotonPassesBySample>,
     world: &World,
     settings: &RenderSettings,
     pixels: SelectedPixels,
@@ -135,7 +135,7 @@ fn panics_outside_of_requests_are_reported() {
 static TILES: AtomicUsize = AtomicUsize::new(0);
 
 fn breaks_first(
-    photons: Option<&PhotonMaps>,
+    photons: Option<&PhotonPassesBySample>,
     world: &World,
     settings: &RenderSettings,
     pixels: SelectedPixels,
@@ -167,7 +167,7 @@ fn oversized_film_is_an_error() {
 
 /// Renders so slowly that commands arrive during the render.
 pub(super) fn render_slowly(
-    photons: Option<&PhotonMaps>,
+    photons: Option<&PhotonPassesBySample>,
     world: &World,
     settings: &RenderSettings,
     pixels: SelectedPixels,
@@ -459,7 +459,7 @@ static HELD: AtomicBool = AtomicBool::new(false);
 
 /// Pauses the work between two passes.
 fn held_between_passes(
-    photons: Option<&PhotonMaps>,
+    photons: Option<&PhotonPassesBySample>,
     world: &World,
     settings: &RenderSettings,
     pixels: SelectedPixels,
@@ -608,7 +608,7 @@ fn anisotropy_without_uvs_causes_a_warning() {
 
 /// Renders slightly more slowly than usual.
 fn render_slightly_slowly(
-    photons: Option<&PhotonMaps>,
+    photons: Option<&PhotonPassesBySample>,
     world: &World,
     settings: &RenderSettings,
     pixels: SelectedPixels,

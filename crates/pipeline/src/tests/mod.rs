@@ -19,7 +19,7 @@ use std::sync::mpsc::{self, Receiver};
 use std::time::Duration;
 
 use crate::protocol::{
-    Command, Event, Failure, ImagePosition, MaxPreviewSize, NormalizedRect, PreviewSlot, PreviewUpdate,
+    Command, Event, Failure, MaxPreviewSize, NormalizedPosition, NormalizedRect, PreviewSlot, PreviewUpdate,
     Report, Request, Stage, Status, WriteRequirement, reasons,
 };
 use crate::scene::LoadedScene;

@@ -272,7 +272,7 @@ fn other_view_is_not_written_if_scene_is_broken() {
 
 /// Renders later samples so slowly that another request can be sent in the meantime.
 fn render_slowly(
-    photons: Option<&crate::integrators::PhotonMaps>,
+    photons: Option<&crate::integrators::PhotonPassesBySample>,
     world: &crate::world::World,
     settings: &crate::integrators::RenderSettings,
     pixels: crate::film::SelectedPixels,

@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use super::*;
 use crate::control::{CancelToken, Canceled};
 use crate::film::{SelectedPixels, TileSamples};
-use crate::integrators::{PhotonMaps, RayCounters, RenderSettings};
+use crate::integrators::{PhotonPassesBySample, RayCounters, RenderSettings};
 use crate::world::World;
 
 /// Returns a scene with a light enclosed in glass and `count` photons per pass.
@@ -33,7 +33,7 @@ fn commands_are_handled_during_first_photon_pass() {
     bench.worker.send(Command::Pause(true));
     bench.worker.send(Command::Write);
     while !matches!(bench.next(), Event::WritePostponed { generation } if generation == of) {}
-    bench.worker.send(Command::Pick(ImagePosition { x: 0.5, y: 0.5 }));
+    bench.worker.send(Command::Pick(NormalizedPosition { x: 0.5, y: 0.5 }));
     while !matches!(bench.next(), Event::Picked { picked, .. } if picked.object.is_some()) {}
     bench.worker.send(Command::Pause(false));
     let events = bench.until_end(of);
@@ -75,7 +75,7 @@ static WITHOUT: AtomicBool = AtomicBool::new(false);
 
 /// Renders normally and records whether any call was without photons.
 fn without(
-    photons: Option<&PhotonMaps>,
+    photons: Option<&PhotonPassesBySample>,
     world: &World,
     settings: &RenderSettings,
     pixels: SelectedPixels,
@@ -149,7 +149,7 @@ static WITH: AtomicBool = AtomicBool::new(false);
 
 /// Renders all samples black, with or without photons.
 fn black(
-    photons: Option<&PhotonMaps>,
+    photons: Option<&PhotonPassesBySample>,
     world: &World,
     settings: &RenderSettings,
     pixels: SelectedPixels,

@@ -28,7 +28,7 @@ fn close_up_shows_image_pixels() {
     let whole = latest(&bench);
     assert_eq!((whole.picture.width, whole.section), (40, None));
     for (spot, left, top) in [((0.5, 0.5), 14, 11), ((0.0, 1.0), 0, 22), ((2.0, -1.0), 28, 0)] {
-        let around = Some(ImagePosition { x: spot.0, y: spot.1 });
+        let around = Some(NormalizedPosition { x: spot.0, y: spot.1 });
         bench.preview = Some(MaxPreviewSize { width: 12, height: 8, around });
         assert_statuses(&bench.done().0, "rrrrrsrr");
         let PreviewUpdate { picture, section, .. } = latest(&bench);
@@ -41,7 +41,7 @@ fn close_up_shows_image_pixels() {
         }
     }
     bench.preview =
-        Some(MaxPreviewSize { width: 200, height: 200, around: Some(ImagePosition { x: 0.3, y: 0.3 }) });
+        Some(MaxPreviewSize { width: 200, height: 200, around: Some(NormalizedPosition { x: 0.3, y: 0.3 }) });
     bench.done();
     assert_eq!(
         latest(&bench).picture,
@@ -137,7 +137,7 @@ fn preview_size_change_does_not_interrupt() {
 fn preview_and_image_share_the_depth_range() {
     let mut bench = Bench::new(SCENE);
     bench.overrides.view = Some(ViewMode::Depth);
-    for (width, around) in [(7, None), (40, None), (6, Some(ImagePosition { x: 0.5, y: 0.5 }))] {
+    for (width, around) in [(7, None), (40, None), (6, Some(NormalizedPosition { x: 0.5, y: 0.5 }))] {
         bench.preview = Some(MaxPreviewSize { width, height: 30, around });
         let (report, _) = bench.done();
         let shown = bench.worker.previews.lock().expect("not poisoned").take().expect("an image");

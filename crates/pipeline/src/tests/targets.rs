@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use super::*;
 use crate::control::{CancelToken, Canceled};
 use crate::film::{SelectedPixels, TileSamples};
-use crate::integrators::{PhotonMaps, RayCounters, RenderSettings};
+use crate::integrators::{PhotonPassesBySample, RayCounters, RenderSettings};
 use crate::output::FileIdentity;
 use crate::protocol::CheckpointUpdate;
 use crate::settings::CheckpointSettings;
@@ -120,7 +120,7 @@ static IS_LINKED: AtomicBool = AtomicBool::new(false);
 
 /// Replaces the link with a link to the texture during the first tile.
 fn relinks(
-    photons: Option<&PhotonMaps>,
+    photons: Option<&PhotonPassesBySample>,
     world: &World,
     settings: &RenderSettings,
     pixels: SelectedPixels,
@@ -215,7 +215,7 @@ fn unwritable_later_frame_fails_before_rendering() {
 
 /// Panics when called. For tests that must not start rendering.
 fn unused(
-    _: Option<&PhotonMaps>,
+    _: Option<&PhotonPassesBySample>,
     _: &World,
     _: &RenderSettings,
     _: SelectedPixels,

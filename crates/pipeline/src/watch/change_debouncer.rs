@@ -14,7 +14,7 @@ pub(super) struct ChangeDebouncer {
     pending: Option<PendingHints>,
     /// Files that were written to but have not been closed.
     open: HashSet<OsString>,
-    unsettled: Option<UnsettledChange>,
+    unsettled: Option<ReportedUnsettledChange>,
     /// Earliest time at which to report the next change.
     not_before: Option<Instant>,
 }
@@ -31,7 +31,7 @@ struct PendingHints {
 
 /// A reported change that further changes may follow.
 #[derive(Clone, Copy, Debug)]
-struct UnsettledChange {
+struct ReportedUnsettledChange {
     since: Instant,
     /// Time of the last hint.
     latest: Instant,
@@ -43,7 +43,7 @@ impl ChangeDebouncer {
     }
 
     /// Adds a hint about a watched file.
-    pub(super) fn hint(&mut self, hint: ChangeHint, now: Instant) {
+    pub(super) fn add_hint(&mut self, hint: ChangeHint, now: Instant) {
         let first = self.pending.map_or(now, |pending| pending.first);
         let was_complete = self.pending.is_some_and(|pending| pending.is_complete);
         let is_complete = match hint {
@@ -109,7 +109,7 @@ impl ChangeDebouncer {
         let noticed = self.pending.take().map_or(now, |pending| pending.first);
         self.not_before = Some(now + BETWEEN_CHANGES);
         let since = self.unsettled.map_or(now, |unsettled| unsettled.since);
-        self.unsettled = Some(UnsettledChange { since, latest: now });
+        self.unsettled = Some(ReportedUnsettledChange { since, latest: now });
         noticed
     }
 
@@ -120,7 +120,7 @@ impl ChangeDebouncer {
         settles
     }
 
-    fn settled_at(&self, unsettled: UnsettledChange) -> Instant {
+    fn settled_at(&self, unsettled: ReportedUnsettledChange) -> Instant {
         let wait = if self.open.is_empty() { self.delays.settle } else { self.delays.settle_open };
         (unsettled.latest + wait).min(unsettled.since + self.delays.settle_longest)
     }

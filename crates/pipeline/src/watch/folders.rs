@@ -38,7 +38,7 @@ pub(super) struct WatchedFolders {
 /// A folder's device and inode, which differ if another folder takes its name.
 type Identity = (u64, u64);
 
-fn identity(folder: &Path) -> Option<Identity> {
+fn folder_identity(folder: &Path) -> Option<Identity> {
     fs::metadata(folder).ok().map(|metadata| (metadata.dev(), metadata.ino()))
 }
 
@@ -106,7 +106,7 @@ impl WatchedFolders {
         let lost: HashSet<PathBuf> = self
             .watched
             .iter()
-            .filter(|(folder, known)| identity(folder) != Some(**known))
+            .filter(|(folder, known)| folder_identity(folder) != Some(**known))
             .map(|(folder, _)| folder.clone())
             .collect();
         self.unwatch_matching(|folder| lost.contains(folder));
@@ -138,7 +138,7 @@ impl WatchedFolders {
                 continue;
             }
             // Read the identity first, so that a replacement between the two steps is detected later.
-            if let Some(identity) = identity(folder)
+            if let Some(identity) = folder_identity(folder)
                 && watcher.watch(folder, RecursiveMode::NonRecursive).is_ok()
             {
                 self.watched.insert(folder.clone(), identity);

@@ -117,10 +117,10 @@ impl Watcher {
         contents: Arc<FileHashCache>,
         say: impl FnMut(WatchEvent) + Send + 'static,
     ) -> std::io::Result<Self> {
-        Self::start_with(poll, contents, WatchDelays::default(), say)
+        Self::start_with_delays(poll, contents, WatchDelays::default(), say)
     }
 
-    fn start_with(
+    fn start_with_delays(
         poll: bool,
         contents: Arc<FileHashCache>,
         delays: WatchDelays,
@@ -196,9 +196,9 @@ struct WatchThread<F> {
 impl<F: FnMut(WatchEvent)> WatchThread<F> {
     fn run(mut self, orders: &Receiver<Message>) {
         loop {
-            let pause = self.next_check().saturating_duration_since(Instant::now());
+            let pause = self.next_check_time().saturating_duration_since(Instant::now());
             match orders.recv_timeout(pause) {
-                Ok(Message::Hint(hint)) => self.change_debouncer.hint(hint, Instant::now()),
+                Ok(Message::Hint(hint)) => self.change_debouncer.add_hint(hint, Instant::now()),
                 Ok(Message::Files(read, before, since)) => self.set_files(read, before, since),
                 Ok(Message::Outputs) => self.update_watched_folders(),
                 Err(RecvTimeoutError::Timeout) => self.check(Instant::now()),
@@ -207,7 +207,7 @@ impl<F: FnMut(WatchEvent)> WatchThread<F> {
         }
     }
 
-    fn next_check(&self) -> Instant {
+    fn next_check_time(&self) -> Instant {
         let pause =
             if self.has_working_folder && self.folders.covers_all_folders() { HEARTBEAT } else { POLL };
         let unhinted = Instant::now() + pause;
@@ -238,13 +238,13 @@ impl<F: FnMut(WatchEvent)> WatchThread<F> {
         self.update_watched_folders();
         let was = |path: &PathBuf| before.get(path).map(|(content, _)| content);
         if self.files.iter().any(|(path, (content, _))| was(path) != Some(content)) {
-            self.change_debouncer.hint(ChangeHint::Touched, Instant::now());
+            self.change_debouncer.add_hint(ChangeHint::Touched, Instant::now());
         }
     }
 
     /// Watches the folders of all files and outputs.
     fn update_watched_folders(&mut self) {
-        let outputs = self.contents.outputs.paths();
+        let outputs = self.contents.outputs.paths_to_watch();
         let is_watched = |path: &Path| self.files.contains_key(path) || outputs.iter().any(|it| it == path);
         self.contents.retain(is_watched);
         self.folders.watch_folders_of_files(self.files.keys().chain(&outputs));
@@ -257,8 +257,8 @@ impl<F: FnMut(WatchEvent)> WatchThread<F> {
         for change in self.suspects.take_confirmed(&self.contents, self.quiet, now) {
             (self.say)(WatchEvent::Output(change));
         }
-        let found = self.differences();
-        let is_said = !self.postpone_report(&found, now);
+        let found = self.find_changed_files();
+        let is_said = !self.postpone_report_if_early(&found, now);
         if is_said {
             for FilePathAndContentId { path, content } in found {
                 self.files.insert(path, (content, now));
@@ -272,7 +272,7 @@ impl<F: FnMut(WatchEvent)> WatchThread<F> {
     }
 
     /// Keeps changes that are too early to report. Returns true if there is nothing to report now.
-    fn postpone_report(&mut self, found: &[FilePathAndContentId], now: Instant) -> bool {
+    fn postpone_report_if_early(&mut self, found: &[FilePathAndContentId], now: Instant) -> bool {
         let before = std::mem::take(&mut self.pending);
         if found.is_empty() {
             self.change_debouncer.discard_hints();
@@ -285,7 +285,7 @@ impl<F: FnMut(WatchEvent)> WatchThread<F> {
             // A notification was missed or is unavailable. The file may be incomplete, so wait for the next
             // check.
             self.folders.renew_all();
-            self.change_debouncer.hint(ChangeHint::Touched, now);
+            self.change_debouncer.add_hint(ChangeHint::Touched, now);
             true
         };
         if is_early {
@@ -295,7 +295,7 @@ impl<F: FnMut(WatchEvent)> WatchThread<F> {
     }
 
     /// Returns the files whose content differs from the last reported content.
-    fn differences(&self) -> Vec<FilePathAndContentId> {
+    fn find_changed_files(&self) -> Vec<FilePathAndContentId> {
         let token = CancelToken::new();
         // Use a token that is never canceled.
         let now =

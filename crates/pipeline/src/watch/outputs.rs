@@ -120,7 +120,7 @@ impl WrittenOutputs {
     }
 
     /// Returns the content of a file when glimt wrote this image to it.
-    pub(crate) fn content_of_image(&self, path: &Path, key: Fingerprint) -> Option<FileContentId> {
+    pub(crate) fn content_if_image_matches(&self, path: &Path, key: Fingerprint) -> Option<FileContentId> {
         self.lock().get(path).filter(|output| output.image == Some(key)).map(|output| output.content)
     }
 
@@ -135,7 +135,7 @@ impl WrittenOutputs {
     }
 
     /// Whether a file still has the content written by glimt.
-    pub(crate) fn has_unchanged_file(&self, contents: &FileHashCache) -> bool {
+    pub(crate) fn has_any_unchanged_file(&self, contents: &FileHashCache) -> bool {
         let known = self.lock().clone();
         known.iter().any(|(path, output)| output.is_unchanged(path, contents))
     }
@@ -160,7 +160,7 @@ impl WrittenOutputs {
     }
 
     /// Returns the paths of all files to watch.
-    pub(super) fn paths(&self) -> Vec<PathBuf> {
+    pub(super) fn paths_to_watch(&self) -> Vec<PathBuf> {
         let known = self.lock();
         let watched = known.iter().filter(|(_, output)| output.is_being_written || output.is_regular());
         watched.map(|(path, _)| path.clone()).collect()
@@ -336,7 +336,7 @@ mod tests {
         let other = folder.path().join("b.png");
         contents.outputs.begin_write(&other, OverwriteProtection::Parts);
         contents.outputs.end_write(&other, None);
-        assert_eq!(contents.outputs.paths().len(), 1);
+        assert_eq!(contents.outputs.paths_to_watch().len(), 1);
     }
 
     #[test]

@@ -27,7 +27,7 @@ impl Scratch {
         let folder = tempfile::tempdir().expect("a scratch folder");
         fs::write(folder.path().join("a.toml"), "0").expect("written");
         let (sender, news) = channel();
-        let watcher = Watcher::start_with(poll, Arc::default(), delays, move |news| {
+        let watcher = Watcher::start_with_delays(poll, Arc::default(), delays, move |news| {
             let _ = sender.send(news);
         });
         let watcher = watcher.expect("a thread");

@@ -76,7 +76,7 @@ impl KeyDifferences<'_> {
             (TomlValue::Array(old), TomlValue::Array(new))
                 if old.starts_with_table() && new.starts_with_table() =>
             {
-                self.compare_lists(name, old, new);
+                self.compare_table_lists(name, old, new);
             }
             _ if is_equal_value(old, new) => {}
             _ => {
@@ -87,7 +87,7 @@ impl KeyDifferences<'_> {
     }
 
     /// Compares two lists of `[[name]]` tables after skipping their common prefix and suffix.
-    fn compare_lists(&mut self, name: &str, old: Elements<'_>, new: Elements<'_>) {
+    fn compare_table_lists(&mut self, name: &str, old: Elements<'_>, new: Elements<'_>) {
         let (old, new): (Vec<Value<'_>>, Vec<Value<'_>>) = (old.iter().collect(), new.iter().collect());
         let least = old.len().min(new.len());
         let is_same = |(a, b): &(&Value<'_>, &Value<'_>)| is_equal_value(a, b);

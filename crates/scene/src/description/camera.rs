@@ -94,7 +94,7 @@ impl Projection {
 
 /// Part of the image plane that the image shows.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct ImageWindow {
+pub struct ImageShiftAndMirror {
     /// Offset of the window to the right and up, in units of the image height.
     pub shift: DVec2,
     /// Whether the image is flipped horizontally, after the shift.
@@ -115,7 +115,7 @@ pub enum Camera {
         /// Mapping from image positions to rays.
         projection: Projection,
         /// Part of the image plane that the image shows.
-        window: ImageWindow,
+        window: ImageShiftAndMirror,
         /// Lens radius, ≥ 0.
         aperture: f64,
         /// Focus distance along the view axis, > 0.
@@ -128,7 +128,7 @@ pub enum Camera {
         /// Mapping from image positions to rays. `None` is a perspective with the field of view in the file.
         projection: Option<Projection>,
         /// Part of the image plane that the image shows.
-        window: ImageWindow,
+        window: ImageShiftAndMirror,
         /// Lens radius, ≥ 0.
         aperture: f64,
         /// Focus distance. `None` focuses on the orbiter's center.
@@ -145,7 +145,7 @@ pub struct ResolvedCamera {
     /// Mapping from image positions to rays.
     pub projection: Projection,
     /// Part of the image plane that the image shows.
-    pub window: ImageWindow,
+    pub window: ImageShiftAndMirror,
     /// Lens radius.
     pub aperture: f64,
     /// Focus distance along the view axis.
@@ -227,7 +227,7 @@ pub fn is_same_distance(a: f64, b: f64) -> bool {
 
 impl Camera {
     /// Whether the camera has this viewpoint, up to rounding of the focus distance.
-    pub fn is_look_at_matching_view(&self, view: &ResolvedCamera) -> bool {
+    pub fn is_nearly_equal_to_view(&self, view: &ResolvedCamera) -> bool {
         match self {
             Self::LookAt { focus, .. } if is_same_distance(*focus, view.focus) => {
                 *self == ResolvedCamera { focus: *focus, ..*view }.into()
@@ -245,14 +245,14 @@ impl Camera {
 }
 
 impl Fingerprinted for Projection {
-    fn add_to(&self, key: &mut FingerprintHasher, _: &FingerprintContext<'_>) {
+    fn add_to_fingerprint(&self, key: &mut FingerprintHasher, _: &FingerprintContext<'_>) {
         let size = self.fov().or(self.view_height());
-        key.add_choice(self.kind()).add_f64(size.unwrap_or(0.0));
+        key.add_choice_name(self.kind()).add_f64(size.unwrap_or(0.0));
     }
 }
 
 impl Fingerprinted for Camera {
-    fn add_to(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
+    fn add_to_fingerprint(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
         let window = match self {
             Self::LookAt { position, look_at, up, projection, window, aperture, focus } => {
                 key.add_usize(0)

@@ -188,11 +188,11 @@ impl Sky {
 }
 
 impl Fingerprinted for Light {
-    fn add_to(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
+    fn add_to_fingerprint(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
         match self {
-            Self::Point(light) => light.add_to(key.add_str("point"), of),
+            Self::Point(light) => light.add_to_fingerprint(key.add_str("point"), of),
             Self::Spot(SpotLight { point, look_at, angle, blend }) => {
-                point.add_to(key.add_str("spot"), of);
+                point.add_to_fingerprint(key.add_str("spot"), of);
                 key.add_dvec3(*look_at).add_f64(*angle).add_f32(*blend);
             }
             Self::Directional(DirectionalLight { direction, irradiance, angle }) => {
@@ -203,14 +203,14 @@ impl Fingerprinted for Light {
 }
 
 impl Fingerprinted for PointLight {
-    fn add_to(&self, key: &mut FingerprintHasher, _: &FingerprintContext<'_>) {
+    fn add_to_fingerprint(&self, key: &mut FingerprintHasher, _: &FingerprintContext<'_>) {
         let Self { position, intensity, falloff } = *self;
-        key.add_dvec3(position).add_vec3(intensity).add_choice(falloff);
+        key.add_dvec3(position).add_vec3(intensity).add_choice_name(falloff);
     }
 }
 
 impl Fingerprinted for Sky {
-    fn add_to(&self, key: &mut FingerprintHasher, _: &FingerprintContext<'_>) {
+    fn add_to_fingerprint(&self, key: &mut FingerprintHasher, _: &FingerprintContext<'_>) {
         let Self { sun, turbidity, ground, sun_angle, sun_scale, sky_scale } = *self;
         key.add_dvec3(sun).add_f64(turbidity).add_vec3(ground).add_f64(sun_angle);
         key.add_f32(sun_scale).add_f32(sky_scale);
@@ -219,7 +219,7 @@ impl Fingerprinted for Sky {
 
 /// Covers only the lookup parameters. The texels have a separate fingerprint.
 impl Fingerprinted for Environment {
-    fn add_to(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
+    fn add_to_fingerprint(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
         let Self { color, file, sky, orientation } = self;
         key.add_vec3(*color).add_bool(file.is_some());
         match orientation {

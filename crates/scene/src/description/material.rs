@@ -106,14 +106,14 @@ impl CoatSource {
 
     /// Returns [`CoatSource::NONE`] if the weight is 0, so that the other keys do not affect fingerprints.
     #[must_use]
-    pub fn or_none(self) -> Self {
+    pub fn none_if_zero_weight(self) -> Self {
         if self.exists() { self } else { Self::NONE }
     }
 }
 
 /// Reflectance of a smooth conductor.
 #[derive(Clone, Debug, PartialEq)]
-pub enum FresnelSource {
+pub enum ConductorFresnelSource {
     /// Schlick's approximation with the reflectance at normal incidence.
     Schlick(ColorSource),
     /// Fresnel equations with the complex index of refraction.
@@ -194,7 +194,7 @@ impl MaterialKind {
     }
 
     /// The materials of a blend, or an empty slice for other materials.
-    pub fn parts(&self) -> &[Material] {
+    pub fn blend_parts(&self) -> &[Material] {
         match self {
             Self::Blend { weight: _, parts } => &**parts,
             Self::Phong(_)
@@ -209,7 +209,7 @@ impl MaterialKind {
 
     /// Whether a property holds for any part of a blend.
     fn is_any_part(&self, property: impl Fn(&Material) -> bool) -> bool {
-        self.parts().iter().any(property)
+        self.blend_parts().iter().any(property)
     }
 
     /// Whether the material is solid glass with index of refraction 1, which does not refract in air.
@@ -244,8 +244,8 @@ impl MaterialKind {
     /// Whether the material has a color that can be multiplied by vertex colors.
     pub fn accepts_vertex_colors(&self) -> bool {
         match self {
-            Self::Metal { fresnel: FresnelSource::Index { .. }, .. } | Self::Glass { .. } => false,
-            Self::Metal { fresnel: FresnelSource::Schlick(_), .. }
+            Self::Metal { fresnel: ConductorFresnelSource::Index { .. }, .. } | Self::Glass { .. } => false,
+            Self::Metal { fresnel: ConductorFresnelSource::Schlick(_), .. }
             | Self::Phong(_)
             | Self::Mirror { .. }
             | Self::Pane { .. }
@@ -422,7 +422,7 @@ pub enum MaterialKind {
     /// A conductor with a microfacet surface.
     Metal {
         /// Fresnel reflectance of the facets.
-        fresnel: FresnelSource,
+        fresnel: ConductorFresnelSource,
         /// Square root of α, in [0, 1]; 0 is a mirror.
         roughness: NumberSource,
         /// Stretch of the highlight along u, in [−1, 1].
@@ -494,8 +494,10 @@ impl MaterialKind {
                 (specular, TextureRole::Specular),
                 (ambient.as_ref().unwrap_or(diffuse), TextureRole::Ambient),
             ],
-            Self::Metal { fresnel: FresnelSource::Schlick(color), .. } => vec![(color, TextureRole::Facets)],
-            Self::Metal { fresnel: FresnelSource::Index { eta, k }, .. } => {
+            Self::Metal { fresnel: ConductorFresnelSource::Schlick(color), .. } => {
+                vec![(color, TextureRole::Facets)]
+            }
+            Self::Metal { fresnel: ConductorFresnelSource::Index { eta, k }, .. } => {
                 vec![(eta, TextureRole::Facets), (k, TextureRole::Facets)]
             }
             Self::Plastic { diffuse, specular, .. } => vec![
@@ -542,8 +544,8 @@ impl Material {
     }
 
     /// The material itself and, for a blend, all of its parts.
-    pub fn with_parts(&self) -> Vec<&Self> {
-        let parts = self.kind.parts().iter().flat_map(Self::with_parts);
+    pub fn self_and_blend_parts(&self) -> Vec<&Self> {
+        let parts = self.kind.blend_parts().iter().flat_map(Self::self_and_blend_parts);
         std::iter::once(self).chain(parts).collect()
     }
 
@@ -599,34 +601,34 @@ impl Material {
 }
 
 impl Fingerprinted for ColorSource {
-    fn add_to(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
+    fn add_to_fingerprint(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
         match self {
             Self::Constant(color) => {
                 key.add_usize(0).add_vec3(*color);
             }
             Self::Texture(index) => {
-                of.textures[*index].add_to(key.add_usize(1), of);
+                of.textures[*index].add_to_fingerprint(key.add_usize(1), of);
             }
         }
     }
 }
 
 impl Fingerprinted for OpacitySource {
-    fn add_to(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
+    fn add_to_fingerprint(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
         let Self { value, cutoff } = self;
         key.add_f32(*cutoff).add(value, of);
     }
 }
 
 impl Fingerprinted for CoatSource {
-    fn add_to(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
+    fn add_to_fingerprint(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
         let Self { weight, roughness, ior, tint } = self;
         key.add(weight, of).add(roughness, of).add_f32(*ior).add(tint, of);
     }
 }
 
 impl Fingerprinted for NumberSource {
-    fn add_to(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
+    fn add_to_fingerprint(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
         match *self {
             Self::Constant(value) => {
                 key.add_usize(0).add_f32(value);
@@ -634,16 +636,16 @@ impl Fingerprinted for NumberSource {
             Self::Texture { texture, channel } => {
                 key.add_usize(1).add_bool(channel.is_some());
                 if let Some(channel) = channel {
-                    key.add_choice(channel);
+                    key.add_choice_name(channel);
                 }
-                of.textures[texture].add_to(key, of);
+                of.textures[texture].add_to_fingerprint(key, of);
             }
         }
     }
 }
 
-impl Fingerprinted for FresnelSource {
-    fn add_to(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
+impl Fingerprinted for ConductorFresnelSource {
+    fn add_to_fingerprint(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
         match self {
             Self::Schlick(color) => {
                 key.add_usize(0).add(color, of);
@@ -656,31 +658,31 @@ impl Fingerprinted for FresnelSource {
 }
 
 impl Fingerprinted for EmissionSource {
-    fn add_to(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
+    fn add_to_fingerprint(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
         let Self { scale, texture, sides } = *self;
-        key.add_vec3(scale).add_choice(sides).add_bool(texture.is_some());
+        key.add_vec3(scale).add_choice_name(sides).add_bool(texture.is_some());
         if let Some(texture) = texture {
-            of.textures[texture].add_to(key, of);
+            of.textures[texture].add_to_fingerprint(key, of);
         }
     }
 }
 
 impl Fingerprinted for NormalMap {
-    fn add_to(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
+    fn add_to_fingerprint(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
         let Self { texture, strength } = *self;
-        of.textures[texture].add_to(key.add_f32(strength), of);
+        of.textures[texture].add_to_fingerprint(key.add_f32(strength), of);
     }
 }
 
 impl Fingerprinted for Bump {
-    fn add_to(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
+    fn add_to_fingerprint(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
         let Self { texture, channel, scale } = *self;
         key.add_f32(scale).add(&NumberSource::Texture { texture, channel }, of);
     }
 }
 
 impl Fingerprinted for MaterialKind {
-    fn add_to(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
+    fn add_to_fingerprint(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
         match self {
             Self::Phong(PhongParameters { diffuse, specular, shininess, ambient, diffuse_transmission }) => {
                 key.add_usize(0).add_f32(*shininess).add(diffuse, of).add(specular, of).add(ambient, of);
@@ -690,18 +692,22 @@ impl Fingerprinted for MaterialKind {
                 key.add_usize(1).add(reflectance, of);
             }
             Self::Glass { ior, tint, roughness, distribution } => {
-                key.add_usize(2).add_f32(*ior).add_dvec3(*tint).add(roughness, of).add_choice(*distribution);
+                key.add_usize(2)
+                    .add_f32(*ior)
+                    .add_dvec3(*tint)
+                    .add(roughness, of)
+                    .add_choice_name(*distribution);
             }
             Self::Pane { ior, tint } => {
                 key.add_usize(3).add_f32(*ior).add(tint, of);
             }
             Self::Metal { fresnel, roughness, anisotropy, distribution } => {
                 key.add_usize(6).add(fresnel, of).add(roughness, of).add(anisotropy, of);
-                key.add_choice(*distribution);
+                key.add_choice_name(*distribution);
             }
             Self::Plastic { diffuse, specular, ior, roughness, distribution } => {
                 key.add_usize(4).add(diffuse, of).add(specular, of).add_f32(*ior).add(roughness, of);
-                key.add_choice(*distribution);
+                key.add_choice_name(*distribution);
             }
             Self::Principled {
                 color,
@@ -726,9 +732,9 @@ impl Fingerprinted for MaterialKind {
 }
 
 impl Fingerprinted for Material {
-    fn add_to(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
+    fn add_to_fingerprint(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
         let Self { name: _, kind, sides, emission, normal_map, bump, opacity, coat } = self;
         key.add(kind, of).add(emission, of).add(normal_map, of).add(bump, of).add(opacity, of).add(coat, of);
-        key.add_choice(*sides);
+        key.add_choice_name(*sides);
     }
 }

@@ -17,13 +17,14 @@ use std::ops::Range;
 use std::path::PathBuf;
 
 pub use camera::{
-    Camera, CameraOverrides, ImageWindow, Pose, Projection, ProjectionKind, ResolvedCamera, is_same_distance,
+    Camera, CameraOverrides, ImageShiftAndMirror, Pose, Projection, ProjectionKind, ResolvedCamera,
+    is_same_distance,
 };
 pub use light::{Environment, Light, MapOrientation, Sky};
 pub use material::{
-    Bump, Channel, ChannelSelector, CoatSource, ColorSource, EmissionSides, EmissionSource, FresnelSource,
-    Material, MaterialKind, MicrofacetDistribution, NormalMap, NumberSource, OpacitySource, PhongParameters,
-    PixelInterpretation, ReflectingSides, TextureRole,
+    Bump, Channel, ChannelSelector, CoatSource, ColorSource, ConductorFresnelSource, EmissionSides,
+    EmissionSource, Material, MaterialKind, MicrofacetDistribution, NormalMap, NumberSource, OpacitySource,
+    PhongParameters, PixelInterpretation, ReflectingSides, TextureRole,
 };
 pub use method::{Integrator, IntegratorProperties};
 pub use render::{Accel, MAX_BOUNCES, PixelFilter, RenderOptions, ShadowMode, Tonemap, render_keys};

@@ -105,7 +105,7 @@ macro_rules! __render_keys {
 /// `render_keys!(callback)` passes all keys, `render_keys!(callback, changed)` passes keys with `option` or
 /// `live`, and `render_keys!(callback, option)` passes keys with `option`.
 ///
-/// To add a key, add it here, to [`RenderOptions::add_to`](Fingerprinted::add_to) if images depend on it, to
+/// To add a key, add it here, to [`RenderOptions::add_to_fingerprint`](Fingerprinted::add_to_fingerprint) if images depend on it, to
 /// the starter scene, and to the command-line arguments if it has an option. Tests check that these agree.
 #[doc(inline)]
 pub use __render_keys as render_keys;
@@ -155,7 +155,7 @@ macro_rules! settings {
             pub const DEFAULT: Self = Self { $($name: $default),* };
 
             /// Returns the definitions of the keys in `[render]`, except `output`.
-            pub(crate) fn keys() -> Vec<KeyInfo> {
+            pub(crate) fn key_definitions() -> Vec<KeyInfo> {
                 vec![$(KeyInfo {
                     name: stringify!($name),
                     kind: kind!($range $(($($limit),*))?, $type),
@@ -213,7 +213,7 @@ impl RenderOptions {
 
 /// Fingerprint of all settings that affect the samples.
 impl Fingerprinted for RenderOptions {
-    fn add_to(&self, key: &mut FingerprintHasher, _: &FingerprintContext<'_>) {
+    fn add_to_fingerprint(&self, key: &mut FingerprintHasher, _: &FingerprintContext<'_>) {
         let Self {
             width,
             height,
@@ -242,12 +242,12 @@ impl Fingerprinted for RenderOptions {
             .add_u64(height.into())
             .add_u64(shadow_samples.into())
             .add_u64(max_depth.into());
-        key.add_choice(integrator)
-            .add_choice(shadows)
+        key.add_choice_name(integrator)
+            .add_choice_name(shadows)
             .add_f32(clamp)
             .add_vec3(ambient)
             .add_vec3(background)
-            .add_choice(filter)
+            .add_choice_name(filter)
             .add_f32(gain)
             .add_u64(seed.into());
     }

@@ -38,7 +38,7 @@ pub struct Object {
 impl Object {
     /// Applies a transform after the matrix of a shape or the transform of a mesh.
     #[must_use]
-    pub fn placed(self, outer: &ObjectTransform) -> Self {
+    pub fn with_outer_transform(self, outer: &ObjectTransform) -> Self {
         let own = self.shape.transform();
         let transform = own.then(outer);
         // The keys `scale`, `rotate` and `translate` are a mesh's own.
@@ -437,7 +437,7 @@ pub fn max_projection(direction: DVec3, points: &[DVec3]) -> f64 {
 }
 
 impl Fingerprinted for Shape {
-    fn add_to(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
+    fn add_to_fingerprint(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
         match self {
             Self::Sphere { center, radius } => key.add_usize(0).add_dvec3(*center).add_f64(*radius),
             Self::Quad { corner, u, v } => key.add_usize(1).add_dvec3(*corner).add_dvec3(*u).add_dvec3(*v),
@@ -465,7 +465,7 @@ impl Fingerprinted for Shape {
 }
 
 impl Fingerprinted for MeshReference {
-    fn add_to(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
+    fn add_to_fingerprint(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
         // Vertex colors do not affect the geometry.
         let Self { file, placed, smooth, vertex_colors: _ } = *self;
         key.add_fingerprint(&of.meshes[file]).add_bool(smooth).add(&placed, of);

@@ -100,9 +100,9 @@ impl Texture {
 
 /// Covers only the lookup parameters. The texels have separate fingerprints.
 impl Fingerprinted for Texture {
-    fn add_to(&self, key: &mut FingerprintHasher, _: &FingerprintContext<'_>) {
+    fn add_to_fingerprint(&self, key: &mut FingerprintHasher, _: &FingerprintContext<'_>) {
         let Self { name: _, filter, factor, content } = self;
-        key.add_choice(*filter).add_vec3(*factor);
+        key.add_choice_name(*filter).add_vec3(*factor);
         match content {
             TextureContent::Image(ImageSource {
                 file,
@@ -115,8 +115,8 @@ impl Fingerprinted for Texture {
                 encoding,
             }) => {
                 key.add_path_bytes(&file.value)
-                    .add_choice(*wrap)
-                    .add_choice(*encoding)
+                    .add_choice_name(*wrap)
+                    .add_choice_name(*encoding)
                     .add_f32(repeat.x)
                     .add_f32(repeat.y);
                 key.add_f64(*rotate).add_f32(offset.x).add_f32(offset.y).add_bool(*uv == UvSet::Second);

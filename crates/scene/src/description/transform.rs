@@ -87,14 +87,14 @@ impl ObjectTransform {
 }
 
 impl Fingerprinted for AffineMap {
-    fn add_to(&self, key: &mut FingerprintHasher, _: &FingerprintContext<'_>) {
+    fn add_to_fingerprint(&self, key: &mut FingerprintHasher, _: &FingerprintContext<'_>) {
         let [x, y, z] = self.linear;
         key.add_dvec3(x).add_dvec3(y).add_dvec3(z).add_dvec3(self.translate);
     }
 }
 
 impl Fingerprinted for ObjectTransform {
-    fn add_to(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
+    fn add_to_fingerprint(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
         match *self {
             Self::Steps { scale, rotate, translate } => {
                 key.add_usize(0).add_dvec3(scale).add_dvec3(rotate).add_dvec3(translate)

@@ -32,7 +32,7 @@ pub(super) struct UnresolvedBlend {
 }
 
 /// Progress of the resolution of one material.
-enum Progress {
+enum ResolutionProgress {
     /// Not yet visited. Contains `None` for an invalid material.
     Pending(Option<ReadMaterial>),
     /// A blend whose parts are being resolved.
@@ -47,29 +47,30 @@ pub(super) fn resolve_blends(
     read: Vec<Option<ReadMaterial>>,
 ) -> Vec<Option<Material>> {
     let count = read.len();
-    let mut resolver = Resolver { context, materials: read.into_iter().map(Progress::Pending).collect() };
+    let mut resolver =
+        BlendResolver { context, materials: read.into_iter().map(ResolutionProgress::Pending).collect() };
     (0..count).map(|index| resolver.resolve(index, 0).ok().flatten().map(|material| *material)).collect()
 }
 
 /// A blend that contains itself.
-struct Cycle;
+struct BlendCycle;
 
-struct Resolver<'a> {
+struct BlendResolver<'a> {
     context: &'a FileContext<'a>,
-    materials: Vec<Progress>,
+    materials: Vec<ResolutionProgress>,
 }
 
-impl Resolver<'_> {
+impl BlendResolver<'_> {
     /// Resolves a material at the nesting depth `depth`.
-    fn resolve(&mut self, index: usize, depth: usize) -> Result<Option<Box<Material>>, Cycle> {
-        let material = match std::mem::replace(&mut self.materials[index], Progress::Active) {
-            Progress::Active => return Err(Cycle),
-            Progress::Done(material) => material,
-            Progress::Pending(None) => None,
-            Progress::Pending(Some(ReadMaterial::Complete(material))) => Some(material),
-            Progress::Pending(Some(ReadMaterial::Blend(blend))) => self.resolve_blend(blend, depth),
+    fn resolve(&mut self, index: usize, depth: usize) -> Result<Option<Box<Material>>, BlendCycle> {
+        let material = match std::mem::replace(&mut self.materials[index], ResolutionProgress::Active) {
+            ResolutionProgress::Active => return Err(BlendCycle),
+            ResolutionProgress::Done(material) => material,
+            ResolutionProgress::Pending(None) => None,
+            ResolutionProgress::Pending(Some(ReadMaterial::Complete(material))) => Some(material),
+            ResolutionProgress::Pending(Some(ReadMaterial::Blend(blend))) => self.resolve_blend(blend, depth),
         };
-        self.materials[index] = Progress::Done(material.clone());
+        self.materials[index] = ResolutionProgress::Done(material.clone());
         Ok(material)
     }
 
@@ -90,7 +91,7 @@ impl Resolver<'_> {
         }
         let [first, second] = match parts.map(|part| self.resolve(part, depth + 1)) {
             [Ok(first), Ok(second)] => [first?, second?],
-            [Err(Cycle), _] | [_, Err(Cycle)] => {
+            [Err(BlendCycle), _] | [_, Err(BlendCycle)] => {
                 error(format!("the blend \"{shown}\" contains itself"), "blend other materials");
                 return None;
             }
@@ -112,7 +113,7 @@ impl Resolver<'_> {
 
 /// Number of materials in a blend that are not blends.
 fn leaf_count(kind: &MaterialKind) -> usize {
-    match kind.parts() {
+    match kind.blend_parts() {
         [] => 1,
         parts => parts.iter().map(|part| leaf_count(&part.kind)).sum(),
     }

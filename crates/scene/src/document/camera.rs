@@ -1,6 +1,6 @@
 //! The `[camera]` table.
 
-use super::super::description::{Camera, ImageWindow, Projection, ProjectionKind};
+use super::super::description::{Camera, ImageShiftAndMirror, Projection, ProjectionKind};
 use super::super::keys::key::DefaultValue::{Absent, Alternative, By, Is, Required};
 use super::super::keys::key::ValueKind::{File, Flag, Number, Numbers, Words};
 use super::super::keys::key::{DIRECTION, POINT, TableInfo, TableSyntax, choice_values, keys};
@@ -83,7 +83,7 @@ fn read_look_at_camera(table: &TableReader<'_>) -> Option<Camera> {
     let (position_key, look_at_key) = (table.key("position"), table.key("look_at"));
     let (position, look_at) = (position_key.vector(), look_at_key.vector());
     let up_vector = table.key("up").vector();
-    let (projection, window) = (read_projection(table), read_window(table));
+    let (projection, window) = (read_projection(table), read_shift_and_mirror(table));
     let [aperture, focus] = read_lens(table, projection.map(Projection::kind));
 
     let (position, look_at) = (position?, look_at?);
@@ -130,7 +130,7 @@ fn read_projection(table: &TableReader<'_>) -> Option<Projection> {
             Some(Projection::Perspective { fov: degrees })
         }
         ProjectionKind::Orthographic => {
-            table.required_alternative(view_height.info.name);
+            table.key_required_without_alternative(view_height.info.name);
             Some(Projection::Orthographic { view_height: view_height.number()? })
         }
         ProjectionKind::Panorama => Some(Projection::Spherical),
@@ -167,10 +167,10 @@ fn reject_unused_keys(table: &TableReader<'_>, kind: ProjectionKind) {
     }
 }
 
-fn read_window(table: &TableReader<'_>) -> Option<ImageWindow> {
+fn read_shift_and_mirror(table: &TableReader<'_>) -> Option<ImageShiftAndMirror> {
     let shift = table.key("shift").numbers("two numbers, [right, up]").map(DVec2::from_array);
     let mirror = table.key("mirror").boolean();
-    Some(ImageWindow { shift: shift?, mirror: mirror? })
+    Some(ImageShiftAndMirror { shift: shift?, mirror: mirror? })
 }
 
 /// Reads aperture and focus. Returns the defaults for projections without a lens.
@@ -216,7 +216,7 @@ fn check_up_vector(table: &TableReader<'_>, view: DVec3, up: DVec3) -> Option<DV
 
 fn read_orbiter_camera(table: &TableReader<'_>) -> Option<Camera> {
     let file = table.key("orbiter").existing_file();
-    let (projection, window) = (read_projection(table), read_window(table));
+    let (projection, window) = (read_projection(table), read_shift_and_mirror(table));
     let [aperture, focus] = read_lens(table, projection.map(Projection::kind));
     // Without `fov`, the file's field of view applies.
     let is_of_file = |projection: &Projection| {

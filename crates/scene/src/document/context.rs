@@ -88,7 +88,7 @@ impl Issue {
     }
 
     /// Marks the issue as a syntax error.
-    pub(super) fn mark_syntax_error(self) -> Self {
+    pub(super) fn with_syntax_error_cause(self) -> Self {
         Self { cause: IssueCause::Syntax, ..self }
     }
 }
@@ -153,7 +153,7 @@ impl<'a> FileContext<'a> {
 
     /// Number of names compared.
     #[cfg(test)]
-    pub(super) fn comparisons(&self) -> usize {
+    pub(super) fn compared_name_count(&self) -> usize {
         self.searches.get().comparisons
     }
 

@@ -93,7 +93,7 @@ fn read_sky(key: &KeyInTable<'_>, replaced: [&KeyInTable<'_>; 2]) -> Option<Sky>
     }
     let table = key.inline_table()?;
     let sun_key = table.key("sun");
-    let sun = sun_key.direction("sun").map(DVec3::normalize);
+    let sun = sun_key.nonzero_direction("sun").map(DVec3::normalize);
     let [turbidity, sun_angle] = ["turbidity", "sun_angle"].map(|name| table.key(name).number());
     let [sun_scale, sky_scale] = ["sun_scale", "sky_scale"].map(|name| table.key(name).number_f32());
     let ground = table.key("ground").color();

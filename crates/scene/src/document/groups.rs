@@ -15,12 +15,12 @@ use super::limits::Limits::{Any, NotZero};
 use super::materials::MaterialList;
 use super::names::DefinedNames;
 use super::shape_table::MeshFileRegistry;
-use super::shapes::{SHAPES, read_shapes};
+use super::shapes::{SHAPES, read_shape_objects};
 use super::table::TableReader;
 use super::transform::{composed_transform_problem, read_transform};
 
 pub(crate) static GROUPS: TableInfo = TableInfo {
-    tables: object_tables,
+    tables: object_table_definitions,
     ..TableInfo::new(
         "groups",
         TableSyntax::Named,
@@ -51,7 +51,7 @@ pub(crate) static INSTANCE: TableInfo = TableInfo::new(
 );
 
 /// Returns the tables of objects, which can be in a scene or in a group.
-pub(crate) fn object_tables() -> &'static [TableInfo] {
+pub(crate) fn object_table_definitions() -> &'static [TableInfo] {
     static TABLES: LazyLock<Vec<TableInfo>> =
         LazyLock::new(|| SHAPES.iter().map(|shape| &shape.info).chain([&INSTANCE]).cloned().collect());
     &TABLES
@@ -68,13 +68,13 @@ pub(super) struct DefinedGroups {
 /// A group.
 pub(super) struct ObjectGroup {
     /// Objects and instances, in file order.
-    members: Vec<Member>,
+    members: Vec<GroupMember>,
     /// Number of members, including the members of nested groups.
     size: u64,
 }
 
 /// A member of a group.
-enum Member {
+enum GroupMember {
     /// An object whose transform has not been applied to its shape yet.
     Object(Object),
     /// A copy of another group.
@@ -100,9 +100,9 @@ pub(super) fn read_groups(
 ) -> DefinedGroups {
     let tables = root.named_tables(&GROUPS);
     let names = DefinedNames::new("group", tables.iter().map(|(name, span, _)| (name.clone(), span.clone())));
-    let read: Vec<Option<Vec<Member>>> =
+    let read: Vec<Option<Vec<GroupMember>>> =
         tables.into_iter().map(|(_, _, table)| read_members(&table?, &names, materials, files)).collect();
-    let members: Option<Vec<Vec<Member>>> = read.into_iter().collect();
+    let members: Option<Vec<Vec<GroupMember>>> = read.into_iter().collect();
     let list = members.and_then(|members| {
         let sizes = expanded_sizes(root.context, &names, &members)?;
         let groups = members.into_iter().zip(sizes);
@@ -116,10 +116,11 @@ fn read_members(
     names: &DefinedNames,
     materials: &MaterialList,
     files: &mut MeshFileRegistry,
-) -> Option<Vec<Member>> {
+) -> Option<Vec<GroupMember>> {
     let mut members = Vec::new();
-    let are_shapes_valid =
-        read_shapes(table, materials, files, |id, object| members.push((id, Member::Object(object))));
+    let are_shapes_valid = read_shape_objects(table, materials, files, |id, object| {
+        members.push((id, GroupMember::Object(object)))
+    });
     let instances = read_instances(table, names);
     table.reject_key(
         "light",
@@ -127,7 +128,7 @@ fn read_members(
         Some("write [[light]] outside of the group, or give a shape in the group a material with `emission`"),
     );
     table.report_unknown_and_missing_keys();
-    members.extend(instances?.into_iter().map(|instance| (instance.id, Member::Instance(instance))));
+    members.extend(instances?.into_iter().map(|instance| (instance.id, GroupMember::Instance(instance))));
     members.sort_by_key(|(id, _)| *id);
     are_shapes_valid.then(|| members.into_iter().map(|(_, member)| member).collect())
 }
@@ -152,7 +153,7 @@ fn read_instance(table: &TableReader<'_>, names: &DefinedNames) -> Option<Instan
 fn expanded_sizes(
     context: &FileContext<'_>,
     names: &DefinedNames,
-    groups: &[Vec<Member>],
+    groups: &[Vec<GroupMember>],
 ) -> Option<Vec<u64>> {
     // Visit nested groups first. Use Kahn's algorithm, because recursion could overflow the stack.
     let mut sizes = vec![0_u64; groups.len()];
@@ -182,10 +183,10 @@ fn expanded_sizes(
 }
 
 /// Returns the instances in a group.
-fn nested_instances(group: &[Member]) -> impl Iterator<Item = &InstanceTable> {
+fn nested_instances(group: &[GroupMember]) -> impl Iterator<Item = &InstanceTable> {
     group.iter().filter_map(|member| match member {
-        Member::Object(_) => None,
-        Member::Instance(instance) => Some(instance),
+        GroupMember::Object(_) => None,
+        GroupMember::Instance(instance) => Some(instance),
     })
 }
 
@@ -223,7 +224,7 @@ impl DefinedGroups {
 
     /// Returns the number of objects and nested instances that instances add to the scene. Reports an error if
     /// there are too many.
-    pub(super) fn count_copies(
+    pub(super) fn count_objects_from_instances(
         &self,
         context: &FileContext<'_>,
         instances: &[InstanceTable],
@@ -253,7 +254,7 @@ impl DefinedGroups {
     }
 
     /// Adds the objects of an instance to a list. Reports an error if a transform cannot be applied.
-    pub(super) fn expand(
+    pub(super) fn expand_instance(
         &self,
         context: &FileContext<'_>,
         instance: &InstanceTable,
@@ -264,7 +265,7 @@ impl DefinedGroups {
         let mut open = vec![(members(instance), instance.transform)];
         while let Some((rest, outer)) = open.last_mut() {
             match rest.next() {
-                Some(Member::Object(object)) => {
+                Some(GroupMember::Object(object)) => {
                     let transform = object.shape.transform().then(outer);
                     if let Some((problem, label)) = composed_transform_problem(&transform) {
                         let kind = object.shape.kind();
@@ -275,9 +276,9 @@ impl DefinedGroups {
                         context.report(issue.with_label(label).with_help(help));
                         return None;
                     }
-                    objects.push(object.clone().placed(outer));
+                    objects.push(object.clone().with_outer_transform(outer));
                 }
-                Some(Member::Instance(inner)) => {
+                Some(GroupMember::Instance(inner)) => {
                     let transform = inner.transform.then(outer);
                     open.push((members(inner), transform));
                 }

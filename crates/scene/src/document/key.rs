@@ -60,7 +60,7 @@ impl<'a> KeyInTable<'a> {
 
     /// Returns the result of `read`. If the value is invalid, returns the default, so that the reader can
     /// continue and find more errors.
-    pub(super) fn or_default<T>(&self, read: impl Fn(&Self) -> Option<T>) -> T {
+    pub(super) fn read_or_default<T>(&self, read: impl Fn(&Self) -> Option<T>) -> T {
         read(self).unwrap_or_else(|| self.default(read))
     }
 
@@ -71,7 +71,7 @@ impl<'a> KeyInTable<'a> {
 
     /// Reads a number, which may be an integer.
     pub(super) fn number(&self) -> Option<f64> {
-        self.number_in(self.value?, "a number")
+        self.number_from_value(self.value?, "a number")
     }
 
     /// Reads a number in single precision.
@@ -80,7 +80,7 @@ impl<'a> KeyInTable<'a> {
     }
 
     /// Reads a number, which may be part of the key's value. Error messages call the value's type `expected`.
-    fn number_in(&self, value: Value<'_>, expected: &str) -> Option<f64> {
+    fn number_from_value(&self, value: Value<'_>, expected: &str) -> Option<f64> {
         let Some(number) = value.as_number().and_then(Number::to_f64) else {
             self.report_wrong_type(value, expected);
             return None;
@@ -206,7 +206,7 @@ impl<'a> KeyInTable<'a> {
         };
         let mut numbers = [Some(0.0); N];
         for (number, one) in numbers.iter_mut().zip(array.iter()) {
-            *number = self.number_in(one, expected);
+            *number = self.number_from_value(one, expected);
         }
         let is_whole = numbers.iter().all(Option::is_some);
         is_whole.then(|| numbers.map(Option::unwrap_or_default))

@@ -71,8 +71,8 @@ fn read_light(mut table: TableReader<'_>) -> Option<Light> {
 
 fn read_point_light(table: &TableReader<'_>) -> Option<PointLight> {
     let position = table.key("position").vector();
-    let intensity = table.key("intensity").or_default(KeyInTable::color);
-    let falloff = table.key("falloff").or_default(KeyInTable::choice);
+    let intensity = table.key("intensity").read_or_default(KeyInTable::color);
+    let falloff = table.key("falloff").read_or_default(KeyInTable::choice);
     Some(PointLight { position: position?, intensity, falloff })
 }
 
@@ -104,7 +104,7 @@ fn read_spot_light(table: &TableReader<'_>) -> Option<SpotLight> {
 const MIN_ANGLE_DEGREES: f64 = 1e-3;
 
 fn read_directional_light(table: &TableReader<'_>) -> Option<DirectionalLight> {
-    let direction = table.key("direction").direction("light");
+    let direction = table.key("direction").nonzero_direction("light");
     let irradiance = table.key("irradiance").color();
     let key = table.key("angle");
     let angle = key.number();

@@ -1,7 +1,7 @@
 //! The `[materials.NAME]` tables.
 
 use super::super::description::{
-    self, Bump, CoatSource, ColorSource, EmissionSides, EmissionSource, FresnelSource, Material,
+    self, Bump, CoatSource, ColorSource, ConductorFresnelSource, EmissionSides, EmissionSource, Material,
     MaterialKind, MicrofacetDistribution, NormalMap, NumberSource, OpacitySource, PhongParameters,
     ReflectingSides,
 };
@@ -201,7 +201,7 @@ pub(super) fn read_materials(root: &TableReader<'_>, textures: &DefinedTextures)
         texture.is_some_and(|texture| texture.uv_set().is_none())
     };
     let use_object_point = all(&|material: &Material| {
-        let mut textures = material.with_parts().into_iter().flat_map(Material::textures);
+        let mut textures = material.self_and_blend_parts().into_iter().flat_map(Material::textures);
         textures.any(|(texture, _)| is_of_object(texture))
     });
     MaterialList { names, list: read.into_iter().collect(), emissive, use_object_point }
@@ -237,7 +237,7 @@ fn read_material(
     } else {
         table.read_opacity_and_cutoff()
     };
-    let sides = table.read_sides(kind.as_ref());
+    let sides = table.read_reflecting_sides(kind.as_ref());
     table.table.report_unknown_and_missing_keys();
     let material = Material { name, kind: kind?, sides, emission, normal_map, bump, opacity, coat };
     Some(ReadMaterial::Complete(Box::new(material)))
@@ -258,17 +258,17 @@ impl<'a> MaterialReader<'a> {
 
     /// Reads a color or a texture.
     fn color(&self, name: &str) -> ColorSource {
-        self.key(name).or_default(|key| key.color_or_texture(self.textures))
+        self.key(name).read_or_default(|key| key.color_or_texture(self.textures))
     }
 
     /// Reads a number or a texture.
     fn number(&self, name: &str) -> NumberSource {
-        self.key(name).or_default(|key| key.number_or_texture(self.textures))
+        self.key(name).read_or_default(|key| key.number_or_texture(self.textures))
     }
 
     /// Reads a number that cannot be a texture.
     fn constant(&self, name: &str) -> f32 {
-        self.key(name).or_default(KeyInTable::number_f32)
+        self.key(name).read_or_default(KeyInTable::number_f32)
     }
 
     fn read_phong(&self) -> PhongParameters {
@@ -300,7 +300,7 @@ impl<'a> MaterialReader<'a> {
         if !thin.boolean().unwrap_or(thin.is_present()) {
             return Some(MaterialKind::Glass {
                 ior,
-                tint: tint.or_default(KeyInTable::color_f64),
+                tint: tint.read_or_default(KeyInTable::color_f64),
                 roughness,
                 distribution,
             });
@@ -331,11 +331,11 @@ impl<'a> MaterialReader<'a> {
             let issue = Issue::warning(span, message).with_help("set `roughness` above 0");
             self.table.context.report(issue);
         }
-        key.or_default(KeyInTable::choice)
+        key.read_or_default(KeyInTable::choice)
     }
 
     /// Reads a metal's reflectance. Exactly one of three groups of keys must specify it.
-    fn read_metal_reflectance(&self) -> Option<FresnelSource> {
+    fn read_metal_reflectance(&self) -> Option<ConductorFresnelSource> {
         let [color, eta, k, element] = ["color", "eta", "k", "element"].map(|name| self.key(name));
         let is_index = eta.is_present() || k.is_present();
         let count =
@@ -352,14 +352,15 @@ impl<'a> MaterialReader<'a> {
         }
         if element.is_present() {
             let [eta, k] = element.choice::<NamedConductor>()?.complex_ior().map(ColorSource::Constant);
-            return Some(FresnelSource::Index { eta, k });
+            return Some(ConductorFresnelSource::Index { eta, k });
         }
-        let required = |name| self.table.required_alternative(name).color_or_texture(self.textures);
+        let required =
+            |name| self.table.key_required_without_alternative(name).color_or_texture(self.textures);
         if is_index {
             let (eta, k) = (required("eta"), required("k"));
-            return Some(FresnelSource::Index { eta: eta?, k: k? });
+            return Some(ConductorFresnelSource::Index { eta: eta?, k: k? });
         }
-        required("color").map(FresnelSource::Schlick)
+        required("color").map(ConductorFresnelSource::Schlick)
     }
 
     fn read_plastic(&self) -> MaterialKind {
@@ -404,9 +405,9 @@ impl<'a> MaterialReader<'a> {
     }
 
     /// Reads the sides that reflect light. Transmissive surfaces always scatter light on both sides.
-    fn read_sides(&self, kind: Option<&MaterialKind>) -> ReflectingSides {
+    fn read_reflecting_sides(&self, kind: Option<&MaterialKind>) -> ReflectingSides {
         let key = self.key("sides");
-        let sides = key.or_default(KeyInTable::choice);
+        let sides = key.read_or_default(KeyInTable::choice);
         if sides == ReflectingSides::Both || !kind.is_some_and(MaterialKind::transmits) {
             return sides;
         }
@@ -418,8 +419,8 @@ impl<'a> MaterialReader<'a> {
     }
 
     fn read_emission(&self) -> EmissionSource {
-        let source = self.key("emission").or_default(|key| key.emission_source(self.textures));
-        let sides = self.key("emission_sides").or_default(KeyInTable::choice);
+        let source = self.key("emission").read_or_default(|key| key.emission_source(self.textures));
+        let sides = self.key("emission_sides").read_or_default(KeyInTable::choice);
         self.warn_if_ineffective_without("emission_sides", "emission");
         EmissionSource { sides, ..source }
     }
@@ -464,7 +465,7 @@ impl<'a> MaterialReader<'a> {
             ior: self.constant("coat_ior"),
             tint: self.color("coat_tint"),
         };
-        coat.or_none()
+        coat.none_if_zero_weight()
     }
 
     /// Reads the coat of a principled material, where some keys have two names.
@@ -477,7 +478,7 @@ impl<'a> MaterialReader<'a> {
             ..CoatSource::NONE
         };
         if !COAT_KEYS.iter().any(|name| self.key(name).is_present()) {
-            return clear.or_none();
+            return clear.none_if_zero_weight();
         }
         if let Some(span) = clearcoat.iter().find_map(|name| self.key(name).key_span()) {
             let issue = Issue::error(span, "the coat of this material is specified twice")

@@ -172,7 +172,7 @@ fn read_scene(root: &TableReader<'_>) -> Option<Scene> {
         warn_if_empty_or_unlit(root.context, &scene);
         // If there are meshes, wait until their bounds are known.
         if scene.mesh_files.is_empty() {
-            for span in facing::lights_facing_away(&scene, Vec::new) {
+            for span in facing::spans_of_lights_facing_nothing(&scene, Vec::new) {
                 root.context.report(
                     Issue::warning(span, facing::MESSAGE).with_label(facing::LABEL).with_help(facing::HELP),
                 );

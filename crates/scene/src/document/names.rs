@@ -93,7 +93,7 @@ mod tests {
         for number in 0..count {
             names.add_name_suggestions(&context, Issue::error(0..0, "wrong"), &format!("nome{number}"));
         }
-        context.comparisons()
+        context.compared_name_count()
     }
 
     #[test]

@@ -6,7 +6,7 @@ use super::context::FileContext;
 use super::groups::{DefinedGroups, InstanceTable, read_groups, read_instances};
 use super::materials::MaterialList;
 use super::shape_table::MeshFileRegistry;
-use super::shapes::read_shapes;
+use super::shapes::read_shape_objects;
 use super::table::TableReader;
 
 /// The objects of a scene.
@@ -24,9 +24,9 @@ pub(super) struct ObjectList {
 pub(super) fn read_objects(root: &TableReader<'_>, materials: &MaterialList) -> Option<ObjectList> {
     let mut files = MeshFileRegistry::default();
     let (mut order, mut objects) = (Vec::new(), Vec::new());
-    let are_shapes_valid = read_shapes(root, materials, &mut files, |id, object| {
+    let are_shapes_valid = read_shape_objects(root, materials, &mut files, |id, object| {
         order.push(id);
-        objects.push(object.placed(&ObjectTransform::IDENTITY));
+        objects.push(object.with_outer_transform(&ObjectTransform::IDENTITY));
     });
     let groups = read_groups(root, materials, &mut files);
     let tables = read_instances(root, &groups.names);
@@ -57,7 +57,7 @@ impl ObjectList {
         if tables.is_empty() {
             return Some(());
         }
-        let copied = self.groups.count_copies(context, &tables)?;
+        let copied = self.groups.count_objects_from_instances(context, &tables)?;
         let mut objects = Vec::with_capacity(order.len() + copied);
         let mut shapes = order.into_iter().zip(std::mem::take(&mut self.objects)).peekable();
         for table in tables {
@@ -65,7 +65,7 @@ impl ObjectList {
                 objects.push(shape);
             }
             let start = objects.len();
-            self.groups.expand(context, &table, &mut objects)?;
+            self.groups.expand_instance(context, &table, &mut objects)?;
             let InstanceTable { name, span, .. } = table;
             self.instances.push(Instance { objects: start..objects.len(), name, span });
         }

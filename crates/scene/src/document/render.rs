@@ -18,7 +18,7 @@ pub(crate) static RENDER: LazyLock<TableInfo> = LazyLock::new(|| {
         output: File(IMAGES), By("the scene's name with `.png`");
     };
     // The table is created once and never freed.
-    let keys = [RenderOptions::keys(), OUTPUT.to_vec()].concat().leak();
+    let keys = [RenderOptions::key_definitions(), OUTPUT.to_vec()].concat().leak();
     TableInfo::new("render", TableSyntax::Single, "Image and render settings", keys)
 });
 
@@ -48,7 +48,7 @@ macro_rules! reader {
     )*) => {
         fn read_render_options(table: &TableReader<'_>) -> RenderOptions {
             RenderOptions {
-                $($name: table.key(stringify!($name)).or_default(read!($range)),)*
+                $($name: table.key(stringify!($name)).read_or_default(read!($range)),)*
             }
         }
     };

@@ -9,18 +9,20 @@ use super::super::toml::{Document, KeyError, KeyErrorKind, KnownTableKinds, appl
 use super::context::{FileContext, Issue};
 
 /// The scene keys that are groups of named tables or lists of tables.
-const LAYOUT: KnownTableKinds =
-    KnownTableKinds { is_group: |name| has_form(name, TableSyntax::Named), is_list: is_list_of_tables };
+const LAYOUT: KnownTableKinds = KnownTableKinds {
+    is_group: |name| is_table_with_syntax(name, TableSyntax::Named),
+    is_list: is_table_list_path,
+};
 
-fn is_list_of_tables(path: &[&str]) -> bool {
+fn is_table_list_path(path: &[&str]) -> bool {
     match path {
-        [name] => has_form(name, TableSyntax::List),
-        [group, _, name] => find_table(group).is_some_and(|info| info.find_inner(name).is_some()),
+        [name] => is_table_with_syntax(name, TableSyntax::List),
+        [group, _, name] => find_table(group).is_some_and(|info| info.find_inner_table(name).is_some()),
         _ => false,
     }
 }
 
-fn has_form(name: &str, form: TableSyntax) -> bool {
+fn is_table_with_syntax(name: &str, form: TableSyntax) -> bool {
     find_table(name).is_some_and(|info| info.form == form)
 }
 

@@ -8,7 +8,7 @@ use super::super::keys::key::TableInfo;
 use super::table::TableReader;
 
 /// The definition and the reader of a shape's table. Only meshes use the list of mesh files.
-pub(crate) struct ShapeTable {
+pub(crate) struct ShapeTableDefinition {
     pub(crate) info: TableInfo,
     pub(super) read: fn(&TableReader<'_>, &mut MeshFileRegistry) -> Option<Shape>,
 }
@@ -27,8 +27,8 @@ macro_rules! shape_table {
         $visibility:vis const $const:ident = $name:literal, $read:expr $(, material: $material:expr)?;
         $($keys:tt)*
     ) => {
-        $visibility const $const: $crate::document::shape_table::ShapeTable = {
-            use $crate::document::shape_table::{ShapeTable, shape_table};
+        $visibility const $const: $crate::document::shape_table::ShapeTableDefinition = {
+            use $crate::document::shape_table::{ShapeTableDefinition, shape_table};
             use $crate::keys::key::{DefaultValue, TableInfo, TableSyntax, ValueKind, doc_text, keys};
             use $crate::keys::limits::Limits;
 
@@ -43,7 +43,7 @@ macro_rules! shape_table {
                 /// other keys of the shape, instead of a mesh's `scale`, `rotate` and `translate`.
                 matrix: ValueKind::Numbers(16, "16 numbers", Limits::Any), DefaultValue::Absent;
             });
-            ShapeTable { info, read: $read }
+            ShapeTableDefinition { info, read: $read }
         };
     };
 }

@@ -11,13 +11,13 @@ use super::key::KeyInTable;
 use super::limits::Limits::{Any, Length};
 use super::materials::MaterialList;
 use super::mesh::MESH;
-use super::shape_table::{MeshFileRegistry, ShapeTable, shape_table};
+use super::shape_table::{MeshFileRegistry, ShapeTableDefinition, shape_table};
 use super::table::TableReader;
 use super::transform::read_affine_matrix;
 use crate::math::DVec3;
 
 /// All shapes.
-pub(crate) static SHAPES: [ShapeTable; 10] =
+pub(crate) static SHAPES: [ShapeTableDefinition; 10] =
     [SPHERE, QUAD, PLANE, BOX, TRIANGLE, DISK, CYLINDER, CONE, TORUS, MESH];
 
 shape_table! {
@@ -76,7 +76,7 @@ shape_table! {
 }
 
 fn read_plane(table: &TableReader<'_>) -> Option<Shape> {
-    let (point, normal) = (table.key("point").vector(), table.key("normal").direction("plane"));
+    let (point, normal) = (table.key("point").vector(), table.key("normal").nonzero_direction("plane"));
     Some(Shape::Plane { point: point?, normal: normal? })
 }
 
@@ -142,7 +142,7 @@ shape_table! {
 
 fn read_disk(table: &TableReader<'_>) -> Option<Shape> {
     let center = table.key("center").vector();
-    let normal = table.key("normal").direction("disk");
+    let normal = table.key("normal").nonzero_direction("disk");
     let radius = table.key("radius").number();
     Some(Shape::Disk { center: center?, normal: normal?, radius: radius? })
 }
@@ -203,7 +203,7 @@ shape_table! {
 /// Reads a torus. Rejects self-intersecting tori, whose surface has no consistent front side.
 fn read_torus(table: &TableReader<'_>) -> Option<Shape> {
     let center = table.key("center").vector();
-    let axis = table.key("axis").direction("torus");
+    let axis = table.key("axis").nonzero_direction("torus");
     let radius = table.key("radius").number();
     let tube_key = table.key("tube");
     let tube = if tube_key.is_present() { tube_key.number() } else { radius.map(|radius| radius / 4.0) };
@@ -222,7 +222,7 @@ fn read_torus(table: &TableReader<'_>) -> Option<Shape> {
 
 /// Reads the shapes of a scene or a group, and passes them to `add` with the IDs of their tables. Returns
 /// whether all are valid.
-pub(super) fn read_shapes(
+pub(super) fn read_shape_objects(
     parent: &TableReader<'_>,
     materials: &MaterialList,
     files: &mut MeshFileRegistry,
@@ -240,9 +240,9 @@ pub(super) fn read_shapes(
     is_valid
 }
 
-/// Reads an object. Its matrix is not yet applied to its shape; see [`Object::placed`].
+/// Reads an object. Its matrix is not yet applied to its shape; see [`Object::with_outer_transform`].
 fn read_object(
-    kind: &ShapeTable,
+    kind: &ShapeTableDefinition,
     table: &TableReader<'_>,
     materials: &MaterialList,
     files: &mut MeshFileRegistry,

@@ -51,12 +51,12 @@ pub(super) fn report_errors_and_collect_broken_lines(
         // Ignore errors after an unclosed bracket on the same line.
         let open = opened.get(&context.line_number_at_offset(error.span.start));
         if open.is_none_or(|open| error.span.start < *open) {
-            context.report(syntax_issue(context, &lists, error).mark_syntax_error());
+            context.report(syntax_issue(context, &lists, error).with_syntax_error_cause());
         }
     }
     for open in opened.into_values() {
         let issue = Issue::error(open..open + 1, "`[` opened here is not closed");
-        context.report(issue.with_help(unclosed_list_help(context, open)).mark_syntax_error());
+        context.report(issue.with_help(unclosed_list_help(context, open)).with_syntax_error_cause());
     }
     lines.into_iter().map(|line| line..first_line_unaffected_by_error(context, line)).collect()
 }

@@ -35,7 +35,7 @@ pub(super) enum TableTitle<'a> {
 
 impl TableTitle<'_> {
     /// Returns the title of the tables in a list of this table.
-    fn list(self, info: &'static TableInfo) -> Self {
+    fn list_element_title(self, info: &'static TableInfo) -> Self {
         match self {
             Self::Named(group, name) => Self::Inner(group, name, info),
             Self::Root | Self::Table(_) | Self::Inner(..) | Self::Key(..) => Self::Table(info),
@@ -164,7 +164,7 @@ impl<'a> TableReader<'a> {
     }
 
     /// Finds a key that is required because no alternative key is present.
-    pub(super) fn required_alternative(&self, name: &str) -> KeyInTable<'a> {
+    pub(super) fn key_required_without_alternative(&self, name: &str) -> KeyInTable<'a> {
         let key = self.key(name);
         if let DefaultValue::Alternative(example) = key.info.default {
             self.require(&key, example);
@@ -228,7 +228,7 @@ impl<'a> TableReader<'a> {
 
     /// Reads a list of tables.
     pub(super) fn tables(&self, info: &'static TableInfo) -> impl Iterator<Item = Self> + use<'a> {
-        let (context, name, title) = (self.context, info.name, self.title.list(info));
+        let (context, name, title) = (self.context, info.name, self.title.list_element_title(info));
         let list = self.entry(name).and_then(|entry| {
             if let Some(array) = entry.value.as_array() {
                 return Some(array);

@@ -138,7 +138,7 @@ fn read_texture(name: String, mut table: TableReader<'_>) -> Option<Texture> {
             read_pattern(table, || Some(Pattern::Bands(Bands { mapping: read_mapping(table) })))
         }
     };
-    let filter = table.key("filter").or_default(KeyInTable::choice);
+    let filter = table.key("filter").read_or_default(KeyInTable::choice);
     let factor = table.key("factor").color();
     table.report_unknown_and_missing_keys();
     Some(Texture { name, filter, factor: factor?, content: content? })
@@ -146,9 +146,9 @@ fn read_texture(name: String, mut table: TableReader<'_>) -> Option<Texture> {
 
 fn read_image(table: &TableReader<'_>) -> Option<ImageSource> {
     let (file, image) = read_file_and_image_index(table);
-    let wrap = table.key("wrap").or_default(KeyInTable::choice);
+    let wrap = table.key("wrap").read_or_default(KeyInTable::choice);
     let (repeat, rotate, offset, uv) = read_mapping_keys(table);
-    let encoding = table.key("encoding").or_default(KeyInTable::choice);
+    let encoding = table.key("encoding").read_or_default(KeyInTable::choice);
     Some(ImageSource { file: file?, image: image?, wrap, repeat, rotate, offset, uv, encoding })
 }
 
@@ -172,9 +172,9 @@ fn read_mapping(table: &TableReader<'_>) -> TextureMapping {
 
 /// Reads `repeat`, `rotate`, `offset` and `uv`.
 fn read_mapping_keys(table: &TableReader<'_>) -> (Vec2, f64, Vec2, UvSet) {
-    let repeat = table.key("repeat").or_default(KeyInTable::pair);
-    let rotate = table.key("rotate").or_default(KeyInTable::number);
-    let offset = table.key("offset").or_default(KeyInTable::pair);
+    let repeat = table.key("repeat").read_or_default(KeyInTable::pair);
+    let rotate = table.key("rotate").read_or_default(KeyInTable::number);
+    let offset = table.key("offset").read_or_default(KeyInTable::pair);
     let uv = table.key("uv").integer();
     (repeat, rotate, offset, if uv == Some(1) { UvSet::Second } else { UvSet::First })
 }

@@ -14,14 +14,14 @@ pub fn parse_hex_or_named_srgb8(text: &str) -> Option<[u8; 3]> {
 
 /// Parses `#rrggbb`.
 fn parse_six_digit_hex_color(text: &str) -> Option<[u8; 3]> {
-    let digits = hex_digits(text).filter(|digits| digits.len() == 6)?;
+    let digits = hex_digits_after_hash(text).filter(|digits| digits.len() == 6)?;
     let number = u32::from_str_radix(digits, 16).ok()?;
     let [_, red, green, blue] = number.to_be_bytes();
     Some([red, green, blue])
 }
 
 /// Returns the hexadecimal digits after a `#`.
-pub(crate) fn hex_digits(text: &str) -> Option<&str> {
+pub(crate) fn hex_digits_after_hash(text: &str) -> Option<&str> {
     text.strip_prefix('#').filter(|digits| digits.bytes().all(|digit| digit.is_ascii_hexdigit()))
 }
 

@@ -197,7 +197,7 @@ pub enum DefaultValue {
 impl DefaultValue {
     /// Parses a constant default.
     pub(crate) fn parse(self) -> Option<Value<'static>> {
-        if let Self::Is(text) = self { toml::parse_constant(text) } else { None }
+        if let Self::Is(text) = self { toml::parse_leaked_constant(text) } else { None }
     }
 }
 
@@ -223,12 +223,12 @@ pub(crate) const COLOR: ValueKind = ValueKind::Color(Limits::AtLeast(0.0));
 /// later calls must be fast.
 macro_rules! parsed_default {
     ($default:expr) => {{
-        fn value() -> Option<$crate::toml::Value<'static>> {
+        fn parse_default_once() -> Option<$crate::toml::Value<'static>> {
             static PARSED: std::sync::OnceLock<Option<$crate::toml::Value<'static>>> =
                 std::sync::OnceLock::new();
             *PARSED.get_or_init(|| $default.parse())
         }
-        value
+        parse_default_once
     }};
 }
 pub(crate) use parsed_default;
@@ -328,7 +328,7 @@ impl TableInfo {
     }
 
     /// Returns the table `name` inside each named table.
-    pub fn find_inner(&self, name: &str) -> Option<&'static Self> {
+    pub fn find_inner_table(&self, name: &str) -> Option<&'static Self> {
         (self.tables)().iter().find(|inner| inner.name == name)
     }
 }

@@ -95,34 +95,34 @@ impl BuiltDocument {
     }
 
     /// Sets the span in the foreign text of all tables and values added from now on. Errors underline it.
-    pub fn at(&mut self, span: Range<usize>) {
+    pub fn set_source_span(&mut self, span: Range<usize>) {
         self.span = Span::new(span.start, span.end);
     }
 
     /// Adds a comment above the next table.
-    pub fn comment(&mut self, text: impl Into<String>) {
-        let table = self.document.next_table();
+    pub fn add_comment(&mut self, text: impl Into<String>) {
+        let table = self.document.next_table_id();
         self.comments.push(Comment { table, is_below_header: false, text: text.into() });
     }
 
     /// Adds a comment below the header of the current table.
-    pub fn table_comment(&mut self, text: impl Into<String>) {
+    pub fn add_table_comment(&mut self, text: impl Into<String>) {
         self.comments.push(Comment { table: self.table, is_below_header: true, text: text.into() });
     }
 
     /// Starts or continues the table `[name]`.
-    pub fn table(&mut self, name: &'static str) {
+    pub fn start_table(&mut self, name: &'static str) {
         self.table = self.find_or_add_table(Document::ROOT, name.into(), false);
     }
 
     /// Starts or continues the table `[group.name]`.
-    pub fn named_table(&mut self, group: &'static str, name: &str) {
+    pub fn start_named_table(&mut self, group: &'static str, name: &str) {
         let group = self.find_or_add_table(Document::ROOT, group.into(), true);
         self.table = self.find_or_add_table(group, name.to_owned().into(), false);
     }
 
     /// Starts a table `[[list]]`.
-    pub fn list_table(&mut self, list: &'static str) {
+    pub fn start_list_table(&mut self, list: &'static str) {
         let found = self.document.find_in_table(Document::ROOT, list).map(|found| found.kind);
         let kind = found.unwrap_or_else(|| {
             let kind = self.document.add_table_list();
@@ -148,7 +148,7 @@ impl BuiltDocument {
     }
 
     fn find_or_add_table(&mut self, parent: TableId, name: Cow<'static, str>, is_implicit: bool) -> TableId {
-        let found = self.document.find_in_table(parent, &name).and_then(|found| found.kind.table());
+        let found = self.document.find_in_table(parent, &name).and_then(|found| found.kind.as_table_id());
         found.unwrap_or_else(|| {
             let table = self.document.add_table(TableOrigin { is_implicit, ..TableOrigin::default() });
             self.add_entry(parent, name, NodeKind::Table(table));
@@ -195,30 +195,30 @@ mod tests {
     #[test]
     fn built_document_is_written_in_order() {
         let mut built = BuiltDocument::default();
-        built.comment("cube.glb");
-        built.comment("Approximated.");
-        built.table("render");
+        built.add_comment("cube.glb");
+        built.add_comment("Approximated.");
+        built.start_table("render");
         built.set("samples", 256.0);
-        built.comment("All lights.");
-        built.list_table("light");
-        built.table_comment("sun");
+        built.add_comment("All lights.");
+        built.start_list_table("light");
+        built.add_table_comment("sun");
         built.set("type", "directional");
         built.set("direction", DVec3::new(0.0, -1.0, -0.0));
         for (texture, material) in [("a", "wall"), ("b", "old floor")] {
-            built.named_table("textures", texture);
+            built.start_named_table("textures", texture);
             built.set("file", format!("{texture}.png"));
-            built.named_table("materials", material);
+            built.start_named_table("materials", material);
             built
                 .set("emission", BuiltValue::Table(vec![("texture", texture.into()), ("scale", 0.5.into())]));
         }
-        built.list_table("mesh");
+        built.start_list_table("mesh");
         built.set("smooth", false);
         built.set(
             "matrix",
             [1.0, 0.0, 0.0, 1e-7, 0.0, 1.0, 0.0, 2e15, 0.0, 0.0, 1.0, -3.25, 0.0, 0.0, 0.0, 1.0],
         );
-        built.list_table("light");
-        built.table("render");
+        built.start_list_table("light");
+        built.start_table("render");
         built.set("width", 64.0);
         let expected = "# cube.glb
 # Approximated.

@@ -51,14 +51,14 @@ const MAX_DEPTH: u32 = 80;
 const MARK: &str = "\u{feff}";
 
 /// Whether `text` is exactly one dotted key and its value.
-pub(super) fn is_dotted_key_value(text: &str) -> bool {
+pub(super) fn is_one_dotted_key_assignment(text: &str) -> bool {
     let (document, errors) = parse(text);
     errors.is_empty()
         && document.sole_assignment_in_table(tree::Document::ROOT).is_some_and(|(keys, _)| keys.len() >= 2)
 }
 
 /// Parses a value that is read often. Its memory is never freed.
-pub(super) fn parse_constant(text: &str) -> Option<Value<'static>> {
+pub(super) fn parse_leaked_constant(text: &str) -> Option<Value<'static>> {
     let (mut document, _) = parse(format!("constant = {text}").leak());
     document.decode_numbers();
     let document: &Document<'_> = Box::leak(Box::new(document));

@@ -69,7 +69,7 @@ impl<'s> Document<'s> {
                     return Ok(());
                 }
                 KeyPartTarget::Element(list, index) => {
-                    let element = self.elements_of(list).get(index).and_then(|node| node.kind.table());
+                    let element = self.elements_of(list).get(index).and_then(|node| node.kind.as_table_id());
                     table = element.ok_or_else(|| key_error(keys, next, KeyErrorKind::Element))?;
                     depth = next;
                 }
@@ -98,11 +98,11 @@ impl<'s> Document<'s> {
         };
         self.check_group_member_exists(keys, depth, table, layout)?;
         let found = self.find_in_table(table, &name.text).map(|node| node.kind);
-        if let Some(inner) = found.and_then(NodeKind::table) {
+        if let Some(inner) = found.and_then(NodeKind::as_table_id) {
             return Ok(KeyPartTarget::Table(inner));
         }
         let elements = found.map_or_else(Vec::new, |kind| self.elements_of(kind));
-        let has_tables = elements.iter().any(|node| node.kind.table().is_some());
+        let has_tables = elements.iter().any(|node| node.kind.as_table_id().is_some());
         match found {
             Some(list) if has_tables => {
                 let index = self.find_element_by_number_or_name(&elements, &next.text);
@@ -156,7 +156,7 @@ impl<'s> Document<'s> {
         if let Some(index) = number.filter(|index| *index < elements.len()) {
             return Ok(index);
         }
-        let name_of = |node: &ValueNode| self.find_string(node.kind.table()?, "name");
+        let name_of = |node: &ValueNode| self.find_string(node.kind.as_table_id()?, "name");
         let mut named = elements.iter().enumerate().filter(|(_, node)| name_of(node) == Some(part));
         match (named.next(), named.count()) {
             (Some((index, _)), 0) => Ok(index),

@@ -304,7 +304,7 @@ fn spheres_take_at_most_200_bytes() {
     let text = sphere.repeat(1_000);
     let (document, errors) = parse(&text);
     assert_eq!(errors, []);
-    assert!(document.bytes() <= 200 * 1_000, "{} bytes", document.bytes());
+    assert!(document.memory_bytes() <= 200 * 1_000, "{} bytes", document.memory_bytes());
 }
 
 proptest! {

@@ -68,7 +68,7 @@ pub(super) enum NodeKind {
 
 impl NodeKind {
     /// The table's ID, or `None` if the value is not a table.
-    pub(super) fn table(self) -> Option<TableId> {
+    pub(super) fn as_table_id(self) -> Option<TableId> {
         if let Self::Table(table) = self { Some(table) } else { None }
     }
 }
@@ -178,7 +178,7 @@ impl<'s> Document<'s> {
     }
 
     /// ID of the table that is added next.
-    pub(super) fn next_table(&self) -> TableId {
+    pub(super) fn next_table_id(&self) -> TableId {
         TableId(index_to_u32_or_sentinel(self.tables.len()))
     }
 
@@ -249,14 +249,14 @@ impl<'s> Document<'s> {
             _ => self.entries[before as usize].next = entry,
         }
         if *length == MAX_LINEAR + 1 {
-            self.index_entries(table);
+            self.add_entries_to_index(table);
         } else if *length > MAX_LINEAR {
             self.index.insert((table, name.text), entry);
         }
     }
 
     /// Adds all entries of a table to the hash index.
-    fn index_entries(&mut self, table: TableId) {
+    fn add_entries_to_index(&mut self, table: TableId) {
         let mut next = self.tables[table.0 as usize].first;
         while let Some(entry) = self.entries.get(next as usize).copied() {
             if !entry.is_removed {
@@ -313,11 +313,11 @@ impl<'s> Document<'s> {
             let TableEntry { key, text, node, .. } =
                 *self.entries.get(first as usize).filter(|_| length == 1)?;
             keys.push(Name { span: key, text: Cow::Owned(self.resolve_string(key, text).to_owned()) });
-            table = node.kind.table().filter(|table| self.table_origin(*table).is_dotted);
+            table = node.kind.as_table_id().filter(|table| self.table_origin(*table).is_dotted);
             value = Some(node);
         }
         value
-            .filter(|node| node.kind.table().is_none_or(|table| self.table_origin(table).is_inline))
+            .filter(|node| node.kind.as_table_id().is_none_or(|table| self.table_origin(table).is_inline))
             .map(|node| (keys, node))
     }
 
@@ -388,7 +388,7 @@ impl<'s> Document<'s> {
 
     /// Size of the tree in bytes.
     #[cfg(test)]
-    pub(super) fn bytes(&self) -> usize {
+    pub(super) fn memory_bytes(&self) -> usize {
         let lists: usize = self.lists.iter().map(|list| size_of_val(list.as_slice())).sum();
         size_of_val(self.tables.as_slice())
             + size_of_val(self.entries.as_slice())

@@ -1,7 +1,7 @@
 //! First-hit AOVs. All except depth are display values in [0, 1], not radiance.
 
 use super::layers::{SampleLayer, SampleLayerValues};
-use super::photons::{GatherPoint, PhotonMaps};
+use super::photons::{GatherPoint, PhotonPassesBySample};
 use super::transport::packet::PacketHits;
 use super::transport::ray::PathRay;
 use super::transport::scratch::TraceBuffers;
@@ -18,8 +18,8 @@ use crate::world::Hit;
 
 /// Evaluates `quantity` at the first hit of each camera ray in the queue and writes the result, or black if
 /// there is no hit.
-pub fn shade_aov(
-    (tile, maps): (&TileContext<'_>, Option<&PhotonMaps>),
+pub fn shade_first_hit_aov(
+    (tile, maps): (&TileContext<'_>, Option<&PhotonPassesBySample>),
     quantity: FirstHitQuantity,
     scratch: &mut TraceBuffers,
     radiance: &mut [Vec3],
@@ -138,7 +138,7 @@ fn vertex_albedo(vertex: &SurfaceVertex<'_>, counters: &mut RayCounters) -> Vec3
 
 /// Counts the photons within the kernels around a vertex, using the sample's photon pass.
 fn count_nearby_photons(
-    maps: &PhotonMaps,
+    maps: &PhotonPassesBySample,
     tile: &TileContext<'_>,
     slot: u32,
     vertex: &SurfaceVertex<'_>,

@@ -177,7 +177,12 @@ impl SampleLayerValues {
 
     /// Adds one value to each sample from a slot onward. Does nothing if the set does not contain the layer.
     #[inline]
-    pub fn add_consecutive(&mut self, layer: SampleLayer, slot: u32, values: impl Iterator<Item = Vec3>) {
+    pub fn add_to_consecutive_samples(
+        &mut self,
+        layer: SampleLayer,
+        slot: u32,
+        values: impl Iterator<Item = Vec3>,
+    ) {
         let Some(place) = self.places[layer as usize] else { return };
         let start = (slot - self.first) as usize * self.size + place;
         let samples = self.values.get_mut(start..).unwrap_or_default().chunks_mut(self.size);

@@ -44,7 +44,7 @@ pub use behavior::light_sampling_purpose;
 pub use counters::RayCounters;
 pub use layers::{LayerSet, SampleLayer};
 use memory::ThreadMemory;
-pub use photons::{Photon, PhotonMap, PhotonMapper, PhotonMaps, PhotonPass};
+pub use photons::{Photon, PhotonMap, PhotonMapper, PhotonPass, PhotonPassesBySample};
 pub use settings::{PhotonSettings, RenderSettings};
 use transport::accumulator::{Accumulator, LayerAccumulator};
 use transport::tile::{SampleBlock, TileContext};
@@ -73,7 +73,7 @@ pub fn render_tile(
 /// # Errors
 /// [`Canceled`] if the token is canceled.
 pub fn render_tile_with_photons(
-    photons: Option<&PhotonMaps>,
+    photons: Option<&PhotonPassesBySample>,
     world: &World,
     settings: &RenderSettings,
     pixels: impl Into<SelectedPixels>,
@@ -90,7 +90,7 @@ pub fn render_tile_with_photons(
 /// # Errors
 /// [`Canceled`] if the token is canceled.
 pub fn render_tile_with_layers(
-    photons: Option<&PhotonMaps>,
+    photons: Option<&PhotonPassesBySample>,
     world: &World,
     settings: &RenderSettings,
     (pixels, samples): (SelectedPixels, Range<u32>),
@@ -125,11 +125,17 @@ pub fn render_tile_with_layers(
     for start in (0..block.sample_count()).step_by(BATCH_SIZE) {
         let slots = start as u32..(start + BATCH_SIZE).min(block.sample_count()) as u32;
         counters.camera_rays += slots.len() as u64;
-        let negative = |first: u32, bits: u32| write_mask_bits(&mut is_negative, first, bits);
+        let negative = |first: u32, bits: u32| unpack_mask_bits(&mut is_negative, first, bits);
         match settings.view.aov_source() {
             AovSource::FirstHit(number) => {
                 tile.replace_queue_with_camera_rays(slots, &mut memory.scratch.rays, negative);
-                aov::shade_aov((&tile, photons), number, &mut memory.scratch, &mut radiance, &mut counters)?;
+                aov::shade_first_hit_aov(
+                    (&tile, photons),
+                    number,
+                    &mut memory.scratch,
+                    &mut radiance,
+                    &mut counters,
+                )?;
             }
             shown @ (AovSource::Light(_) | AovSource::Film(_) | AovSource::Bounds) => {
                 values.begin_batch(settings.layers, &slots);
@@ -174,7 +180,7 @@ pub fn render_tile_with_layers(
 }
 
 /// Copies the bits of a mask to `marked`, starting at slot `first`.
-fn write_mask_bits(marked: &mut [bool], first: u32, bits: u32) {
+fn unpack_mask_bits(marked: &mut [bool], first: u32, bits: u32) {
     for (lane, marked) in marked.iter_mut().skip(first as usize).take(PACKET_SIZE).enumerate() {
         *marked = bits & 1 << lane != 0;
     }

@@ -20,7 +20,7 @@ use std::ops::Range;
 use super::RayCounters;
 use super::direct::queue::DirectLightVertexQueue;
 use super::memory::ThreadMemory;
-use super::photons::PhotonMaps;
+use super::photons::PhotonPassesBySample;
 use super::photons::gather::gather_photons;
 use super::transport::accumulator::Accumulator;
 use super::transport::batch::VertexBatch;
@@ -43,7 +43,7 @@ use crate::world::PACKET_SIZE;
 /// Traces the camera paths for a range of slots and adds their radiance to the accumulator. `negative`
 /// receives the first slot of each packet and the mask of samples with a negative filter weight.
 pub fn trace_camera_paths(
-    (tile, maps): (&TileContext<'_>, Option<&PhotonMaps>),
+    (tile, maps): (&TileContext<'_>, Option<&PhotonPassesBySample>),
     slots: Range<u32>,
     memory: &mut ThreadMemory,
     accumulator: Accumulator<'_>,
@@ -52,7 +52,7 @@ pub fn trace_camera_paths(
 ) -> Result<(), Canceled> {
     let ThreadMemory { scratch, direct, .. } = memory;
     let TraceBuffers { rays, next, surfaces, crossing, camera, hits, object_order } = scratch;
-    let mut paths = CameraWavefront {
+    let mut paths = CameraPathWavefront {
         depth: 0,
         continuation: None,
         tile,
@@ -68,8 +68,8 @@ pub fn trace_camera_paths(
     };
     // Trace the camera rays.
     paths.next.clear();
-    if let Some(fractions) = paths.accumulator.fractions() {
-        fractions.begin(slots.len());
+    if let Some(fractions) = paths.accumulator.diffuse_fractions() {
+        fractions.begin_camera_paths(slots.len());
     }
     paths.begin_bounce(slots.len());
     for start in slots.clone().step_by(CAMERA_ROWS * PACKET_SIZE) {
@@ -81,7 +81,7 @@ pub fn trace_camera_paths(
         }
     }
     paths.shade_queued_vertices()?;
-    paths.direct.accumulate_consecutive_arrived_light(slots.start, &mut paths.accumulator);
+    paths.direct.accumulate_light_of_consecutive_slots(slots.start, &mut paths.accumulator);
     paths.next_bounce(rays);
     // Trace the remaining bounces.
     while !rays.is_empty() {
@@ -106,14 +106,14 @@ pub fn trace_camera_paths(
 }
 
 /// One bounce of all paths in a batch.
-struct CameraWavefront<'a, 's> {
+struct CameraPathWavefront<'a, 's> {
     /// Number of bounces before the current hits.
     depth: u32,
     /// How paths continue at diffuse and glossy surfaces, or `None` if they end there.
     continuation: Option<BounceContinuation>,
     tile: &'a TileContext<'a>,
     /// Photon maps for the samples, or `None` if no photons are gathered.
-    maps: Option<&'a PhotonMaps>,
+    maps: Option<&'a PhotonPassesBySample>,
     /// This bounce's diffuse and glossy vertices.
     direct: &'a mut DirectLightVertexQueue,
     /// Surfaces at the hits of the current packet.
@@ -129,7 +129,7 @@ struct CameraWavefront<'a, 's> {
     counters: &'a mut RayCounters,
 }
 
-impl CameraWavefront<'_, '_> {
+impl CameraPathWavefront<'_, '_> {
     /// Intersects a packet of rays, adds the emission they find, and queues the vertices at which the paths
     /// may scatter.
     fn trace_packet(&mut self, rays: PacketSource<'_>) -> Result<(), Canceled> {
@@ -177,7 +177,7 @@ impl CameraWavefront<'_, '_> {
     /// Adds the light reflected at the queued vertices, continues their paths, and empties the queue.
     fn shade_queued_vertices(&mut self) -> Result<(), Canceled> {
         let (tile, aov, depth) = (self.tile, self.accumulator.aov, self.depth);
-        let shares_with_paths = self.paths_find_lights();
+        let shares_with_paths = self.paths_compete_with_light_samples();
         for vertices in self.direct.light_sampling_groups(tile) {
             // Sample lights.
             self.direct.sample_group_lights(vertices.clone(), tile, aov, shares_with_paths)?;
@@ -197,7 +197,7 @@ impl CameraWavefront<'_, '_> {
             for number in vertices {
                 let row = self.direct.batch(number);
                 let Some(continuation) = self.continuation_at(row) else { continue };
-                let fractions = self.accumulator.fractions();
+                let fractions = self.accumulator.diffuse_fractions();
                 let has_fractions = fractions.is_some() && row.only_specular_before != 0;
                 let before = self.next.len();
                 BsdfSampler { tile, row, used: row.used, continuation, has_fractions }.queue_scattered_paths(
@@ -223,7 +223,7 @@ impl CameraWavefront<'_, '_> {
 
     /// Whether continuing paths compete with light samples. Hard shadows are computed only with light
     /// samples.
-    fn paths_find_lights(&self) -> bool {
+    fn paths_compete_with_light_samples(&self) -> bool {
         let is_soft = self.tile.settings.render.shadows == ShadowMode::Soft;
         self.continuation.is_some() && (!self.tile.behavior.gathers || is_soft)
     }
@@ -232,7 +232,7 @@ impl CameraWavefront<'_, '_> {
     fn begin_bounce(&mut self, paths: usize) {
         let policy = || BounceContinuation::new(self.tile, self.depth, LobesToSample::All);
         self.continuation = self.tile.behavior.scatters.then(policy);
-        let has_fractions = self.accumulator.fractions().is_some();
+        let has_fractions = self.accumulator.diffuse_fractions().is_some();
         self.direct.begin_bounce(paths, self.tile.camera_cone.is_some(), has_fractions);
     }
 
@@ -240,7 +240,7 @@ impl CameraWavefront<'_, '_> {
     fn next_bounce(&mut self, rays: &mut Vec<PathRay>) {
         std::mem::swap(rays, self.next);
         self.next.clear();
-        if let Some(fractions) = self.accumulator.fractions() {
+        if let Some(fractions) = self.accumulator.diffuse_fractions() {
             fractions.next_bounce();
         }
         self.depth += 1;

@@ -105,7 +105,7 @@ impl RenderSettings {
 
     /// Converts a position in pixels, measured from the image's top left corner, to a film position.
     #[inline(always)]
-    pub fn film_position(&self, from_corner: DVec2) -> FilmPosition {
+    pub fn film_position_from_pixel(&self, from_corner: DVec2) -> FilmPosition {
         let RenderOptions { width, height, .. } = self.render;
         let (half_width, half_height) = (0.5 * f64::from(width), 0.5 * f64::from(height));
         let scale = 1.0 / half_height;
@@ -118,20 +118,20 @@ impl RenderSettings {
     pub fn ray_through_pixel(&self, camera: &Camera, [x, y]: [u32; 2]) -> Option<Ray> {
         let x = if camera.is_mirrored() { self.render.width - 1 - x } else { x };
         let center = DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5);
-        camera.ray(self.film_position(center), Vec2::ZERO)
+        camera.ray(self.film_position_from_pixel(center), Vec2::ZERO)
     }
 }
 
 impl Fingerprinted for RenderSettings {
-    fn add_to(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
+    fn add_to_fingerprint(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
         let Self { render, dof, view, photons, layers } = self.without_ineffective_settings();
-        key.add(&render, of).add_bool(dof).add_choice(view.sampled_view());
+        key.add(&render, of).add_bool(dof).add_choice_name(view.sampled_view());
         // All acceleration structures return the same hits, but these two views show the structures
         // themselves.
         match view.aov_source() {
             // The brightness of the lines depends on the exposure.
-            AovSource::Bounds => key.add_choice(render.accel).add_f32(render.exposure),
-            AovSource::Light(LightAov::TraversalCost) => key.add_choice(render.accel),
+            AovSource::Bounds => key.add_choice_name(render.accel).add_f32(render.exposure),
+            AovSource::Light(LightAov::TraversalCost) => key.add_choice_name(render.accel),
             AovSource::Light(_) | AovSource::FirstHit(_) | AovSource::Film(_) => &mut *key,
         };
         key.add_bool(photons.is_some());

@@ -68,7 +68,7 @@ impl World {
 /// Whether any texture uses the second UV set and any mesh has a second UV set.
 fn scene_uses_second_uvs(scene: &Scene, inputs: &WorldInputs) -> bool {
     let asks = scene.textures.iter().any(|texture| texture.uv_set() == Some(UvSet::Second));
-    asks && inputs.meshes.iter().any(|mesh| !mesh.loaded().mesh.second_uvs.is_empty())
+    asks && inputs.meshes.iter().any(|mesh| !mesh.loaded_mesh().mesh.second_uvs.is_empty())
 }
 
 /// For each object whose textures use the shape's own coordinates, the map from these coordinates to world
@@ -81,7 +81,7 @@ fn find_object_frames(scene: &Scene, origin: DVec3) -> Option<Box<[Option<Transf
 }
 
 fn find_glass_solids(scene: &Scene, inputs: &WorldInputs) -> GlassSolids {
-    let meshes: Vec<&LoadedMesh> = inputs.meshes.iter().map(|mesh| mesh.loaded()).collect();
+    let meshes: Vec<&LoadedMesh> = inputs.meshes.iter().map(|mesh| mesh.loaded_mesh()).collect();
     // This token is never canceled.
     GlassSolids::find(scene, &meshes, &CancelToken::new()).unwrap_or_default()
 }
@@ -106,7 +106,7 @@ fn lower_materials(scene: &Scene, inputs: &WorldInputs) -> (Vec<Material>, Vec<O
     for mesh in &inputs.meshes {
         first_of_file.push(materials.len() as u32);
         materials.extend(
-            mesh.loaded()
+            mesh.loaded_mesh()
                 .materials
                 .iter()
                 .map(|own| file_materials::lower_file_material(&inputs.images, own)),

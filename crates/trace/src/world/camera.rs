@@ -10,7 +10,7 @@ use crate::math::elementary::sin_cos_f64;
 use crate::math::lanes::{F32x16, PACKET_SIZE, set_lane};
 use crate::math::transform::rotation_xyz;
 use crate::math::{DMat3, DVec2, DVec3, Vec2, Vec3};
-use crate::scene::description::{self, ImageWindow, Pose, ResolvedCamera};
+use crate::scene::description::{self, ImageShiftAndMirror, Pose, ResolvedCamera};
 
 /// A camera. All projections use the same axes. Without `shift`, `look_at` is at the center of the image.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -113,7 +113,7 @@ impl Camera {
         position: DVec3,
         [right, up, forward]: [DVec3; 3],
         projection: description::Projection,
-        window: &ImageWindow,
+        window: &ImageShiftAndMirror,
         [aperture, focus]: [f64; 2],
     ) -> Self {
         let shift = 2.0 * window.shift;
@@ -136,7 +136,7 @@ impl Camera {
     }
 
     /// Returns the point that the camera orbits, and the distance to it.
-    pub fn target_and_distance(
+    pub fn orbit_target_and_distance(
         camera: &description::Camera,
         orbiter: Option<&GkitOrbiterCamera>,
     ) -> (DVec3, f64) {
@@ -224,8 +224,10 @@ impl Camera {
                     center + self.right * place.x + self.up * place.y
                 };
                 let rays = match lens {
-                    Some(lens) => fill(|lane| self.lens_ray(self.position, direction(lane), lens, lane)),
-                    None => fill(|lane| (eye, direction(lane).normalize().as_vec3())),
+                    Some(lens) => {
+                        fill_ray_packet(|lane| self.lens_ray(self.position, direction(lane), lens, lane))
+                    }
+                    None => fill_ray_packet(|lane| (eye, direction(lane).normalize().as_vec3())),
                 };
                 (rays, u32::MAX)
             }
@@ -236,13 +238,15 @@ impl Camera {
                 };
                 let forward = self.forward.as_vec3();
                 let rays = match lens {
-                    Some(lens) => fill(|lane| self.lens_ray(origin(lane), self.forward, lens, lane)),
-                    None => fill(|lane| (origin(lane).as_vec3(), forward)),
+                    Some(lens) => {
+                        fill_ray_packet(|lane| self.lens_ray(origin(lane), self.forward, lens, lane))
+                    }
+                    None => fill_ray_packet(|lane| (origin(lane).as_vec3(), forward)),
                 };
                 (rays, u32::MAX)
             }
             Projection::Spherical { shift } => {
-                let rays = fill(|lane| {
+                let rays = fill_ray_packet(|lane| {
                     let place = place(lane) + shift;
                     // Reduce the azimuth to one turn: `shift` can move a narrow image by many turns.
                     let turns = 0.5 * place.x / film.half_width;
@@ -255,7 +259,7 @@ impl Camera {
             }
             Projection::Fisheye { shift, half_fov } => {
                 let mut valid = 0;
-                let rays = fill(|lane| {
+                let rays = fill_ray_packet(|lane| {
                     let place = place(lane) + shift;
                     let radius = place.length();
                     valid |= u32::from(radius <= 1.0) << lane;
@@ -336,7 +340,7 @@ impl Camera {
 
 /// Fills a packet with origins and directions.
 #[inline(always)]
-fn fill(mut ray: impl FnMut(usize) -> (Vec3, Vec3)) -> RayPacket {
+fn fill_ray_packet(mut ray: impl FnMut(usize) -> (Vec3, Vec3)) -> RayPacket {
     let (mut origins, mut directions) = ([[0.0; PACKET_SIZE]; 3], [[0.0; PACKET_SIZE]; 3]);
     for lane in 0..PACKET_SIZE {
         let (origin, direction) = ray(lane);

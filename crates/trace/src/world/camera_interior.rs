@@ -70,7 +70,7 @@ impl World {
         if !self.camera.has_parallel_rays() {
             return Vec::new();
         }
-        let mut solids = self.compound_solids();
+        let mut solids = self.find_compound_solids();
         solids.retain(|body| body.is_covered || self.camera.may_start_rays_in(&body.bounds));
         solids
     }
@@ -83,13 +83,15 @@ impl World {
         }
         let eye = self.camera.position.as_vec3();
         let at = Aabb { min: eye, max: eye };
-        let near =
-            self.compound_solids().into_iter().filter(|body| body.is_covered || body.bounds.overlaps(&at));
+        let near = self
+            .find_compound_solids()
+            .into_iter()
+            .filter(|body| body.is_covered || body.bounds.overlaps(&at));
         near.filter_map(|body| Some((body.body, self.enclosing_glass_material(&body, eye, None)?))).collect()
     }
 
     /// Closed glass solids that consist of meshes or several objects.
-    pub fn compound_solids(&self) -> Vec<CompoundSolid> {
+    pub fn find_compound_solids(&self) -> Vec<CompoundSolid> {
         if !self.has_glass {
             return Vec::new();
         }

@@ -7,7 +7,7 @@ fn look_at(projection: description::Projection, aperture: f64) -> Camera {
         look_at: DVec3::new(0.0, 1.0, 0.0),
         up: DVec3::Y,
         projection,
-        window: ImageWindow::default(),
+        window: ImageShiftAndMirror::default(),
         aperture,
         focus: 4.0,
     };
@@ -81,7 +81,7 @@ fn orbiter_looks_at_its_center() {
     let orbiter =
         GkitOrbiterCamera { center: [1.0, 2.0, 3.0], rotation: [30.0, 90.0], size: 5.0, ..DEFAULT_ORBITER };
     let file = description::Spanned { value: "camera.txt".into(), span: 0..0 };
-    let window = ImageWindow::default();
+    let window = ImageShiftAndMirror::default();
     let scene = description::Camera::Orbiter { file, projection: None, window, aperture: 0.0, focus: None };
     let camera = Camera::from_description(&scene, Some(&orbiter));
     let to_center = DVec3::new(1.0, 2.0, 3.0) - camera.position;
@@ -106,7 +106,7 @@ fn orbiter_viewpoint_matches_the_camera() {
         let scene = description::Camera::Orbiter {
             file: file.clone(),
             projection: None,
-            window: ImageWindow::default(),
+            window: ImageShiftAndMirror::default(),
             aperture: 0.1,
             focus: None,
         };

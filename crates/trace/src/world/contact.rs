@@ -201,7 +201,7 @@ impl World {
                 mesh.and_then(|mesh| mesh.intersect_segment_with_triangle(triangle, ends))
             {
                 let hit = Hit { shape, object };
-                found(self.coincident_surface_from_hit(hit, self.material_index(&hit) as u32, is_front));
+                found(self.build_coincident_surface(hit, self.material_index(&hit) as u32, is_front));
             }
         }
         if is_led || closed_lead { sides } else { OffsetPoints { before: probe.close, ..sides } }
@@ -224,10 +224,10 @@ impl World {
         let own = shape.intersect(&ray)?;
         let is_front =
             shape.requested_surface_point(&ray, &own, bare).normal.as_dvec3().dot(ray.direction) < 0.0;
-        Some(self.coincident_surface_from_hit(Hit { shape: own, object }, material, is_front))
+        Some(self.build_coincident_surface(Hit { shape: own, object }, material, is_front))
     }
 
-    fn coincident_surface_from_hit(
+    fn build_coincident_surface(
         &self,
         hit: Hit,
         material: u32,
@@ -376,7 +376,7 @@ impl MeshInstance {
     /// Position error of a triangle near a point, caused by rounding its corners in the file and in the ray
     /// test.
     fn triangle_position_error(&self, triangle: u32, point: Vec3) -> Vec3 {
-        let corners = self.tree.loaded().mesh.corners(triangle).map(|corner| corner.as_dvec3());
+        let corners = self.tree.loaded_mesh().mesh.corners(triangle).map(|corner| corner.as_dvec3());
         let reach = corners.iter().fold(DVec3::ZERO, |reach, corner| reach.max(corner.abs()));
         let local = self.transform.inverse_point(point.as_dvec3());
         let of_tests = self.to_placed_mesh(&self.transform).point_error_bound(point, local, corners);
@@ -400,7 +400,8 @@ impl MeshInstance {
         triangle: u32,
         [from, to]: [DVec3; 2],
     ) -> Option<(ShapeHit, bool)> {
-        let [a, b, c] = self.tree.loaded().mesh.corners(triangle).map(|p| self.transform.point(p.as_dvec3()));
+        let [a, b, c] =
+            self.tree.loaded_mesh().mesh.corners(triangle).map(|p| self.transform.point(p.as_dvec3()));
         let normal = (b - a).cross(c - a);
         let (start, end) = (normal.dot(from - a), normal.dot(to - a));
         if (start > 0.0) == (end > 0.0) {

@@ -82,7 +82,7 @@ impl FlatFace {
         Some(self.corners.iter().fold([first; 2], grow))
     }
 
-    pub(super) fn size(&self) -> f64 {
+    pub(super) fn max_extent(&self) -> f64 {
         self.bounds().map_or(f64::INFINITY, |[min, max]| (max - min).max_element())
     }
 
@@ -162,7 +162,7 @@ impl SortedEmissiveFaces {
 
 /// Finds lights that overlap a coplanar surface or another light. Coordinates are relative to `origin`.
 /// `meshes` contains the scene's loaded mesh files.
-pub fn coplanar_lights(scene: &Scene, meshes: &[&LoadedMesh], origin: DVec3) -> Vec<CoplanarLight> {
+pub fn find_coplanar_lights(scene: &Scene, meshes: &[&LoadedMesh], origin: DVec3) -> Vec<CoplanarLight> {
     let mut faces = Vec::new();
     for object in (0..scene.objects.len()).filter(|object| can_object_emit(scene, meshes, *object)) {
         visit_flat_faces(scene, meshes, (object, origin), None, |face| {
@@ -208,8 +208,8 @@ fn are_boxes_disjoint(a: [DVec3; 2], b: [DVec3; 2]) -> bool {
 /// Translations that move lights off coplanar surfaces, one per object, or an empty list if no lights need to
 /// be moved.
 pub fn light_lifts(scene: &Scene, meshes: &[Arc<MeshTree>], origin: DVec3) -> Vec<DVec3> {
-    let loaded: Vec<_> = meshes.iter().map(|mesh| mesh.loaded()).collect();
-    let found = coplanar_lights(scene, &loaded, origin).into_iter();
+    let loaded: Vec<_> = meshes.iter().map(|mesh| mesh.loaded_mesh()).collect();
+    let found = find_coplanar_lights(scene, &loaded, origin).into_iter();
     let lifted = found.filter(|pair| pair.light != pair.surface);
     let lifted: Vec<_> = lifted.filter_map(|pair| Some((pair.light, pair.lift?))).collect();
     if lifted.is_empty() {
@@ -236,8 +236,8 @@ fn record_coplanar_light_with_max_lift(
     (light, face): (&FlatFace, &FlatFace),
     is_lifted: bool,
 ) {
-    let size = light.size();
-    let around = face.size().max(light.point.abs().max_element()).min(SURROUNDINGS * size);
+    let size = light.max_extent();
+    let around = face.max_extent().max(light.point.abs().max_element()).min(SURROUNDINGS * size);
     let height = (LIFT * size.max(around)).max(2.0 * (light.rounding + face.rounding));
     let lift = is_lifted.then(|| light.normal * height);
     let is_same = |known: &&mut CoplanarLight| match (known.lift, lift) {
@@ -262,9 +262,9 @@ fn must_lift_light(light: &FlatFace, face: &FlatFace) -> bool {
 
 /// Whether two faces are coplanar and overlap.
 pub(super) fn are_coplanar_and_overlap(light: &FlatFace, face: &FlatFace) -> bool {
-    let apart = light.size().min(face.size()) * COINCIDENT + light.rounding + face.rounding;
+    let apart = light.max_extent().min(face.max_extent()) * COINCIDENT + light.rounding + face.rounding;
     // The larger face determines the plane because rounding tilts it less.
-    let (small, large) = if light.size() <= face.size() { (light, face) } else { (face, light) };
+    let (small, large) = if light.max_extent() <= face.max_extent() { (light, face) } else { (face, light) };
     let is_on_plane = |corner: &DVec3| (*corner - large.point).dot(large.normal).abs() <= apart;
     if !small.corners.iter().all(is_on_plane) {
         return false;

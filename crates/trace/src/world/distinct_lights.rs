@@ -47,7 +47,7 @@ pub fn separate_coincident_emitters(
     };
     let emits = |triangle: u32| all_emit || emits_in_file(triangle);
     let mut mesh = Cow::Borrowed(&loaded.mesh);
-    let repeated = duplicate_emissive_triangles(&loaded.mesh, emits);
+    let repeated = find_duplicate_emissive_triangles(&loaded.mesh, emits);
     for (triangle, rotation) in repeated.filter(|(_, rotation)| *rotation != 0) {
         mesh.to_mut().triangles[triangle as usize].rotate_left(rotation);
     }
@@ -63,7 +63,7 @@ pub fn separate_coincident_emitters(
 
 /// Emissive triangles with the same corners and orientation as an earlier triangle, and the rotation that
 /// gives their corners the same order.
-pub(super) fn duplicate_emissive_triangles(
+pub(super) fn find_duplicate_emissive_triangles(
     mesh: &TriangleMesh,
     emits: impl Fn(u32) -> bool,
 ) -> impl Iterator<Item = (u32, usize)> {
@@ -115,7 +115,8 @@ fn find_triangle_lifts(
             }
         }
     }
-    let largest = lights.faces.iter().map(|face| reach(face).max(sizes * face.size())).fold(0.0, f64::max);
+    let largest =
+        lights.faces.iter().map(|face| reach(face).max(sizes * face.max_extent())).fold(0.0, f64::max);
     Ok((found, LIFT * largest))
 }
 

@@ -3,8 +3,8 @@
 use std::collections::HashSet;
 use std::sync::Arc;
 
-use super::distinct_lights::duplicate_emissive_triangles;
-use super::file_materials::{file_emission, file_opacity};
+use super::distinct_lights::find_duplicate_emissive_triangles;
+use super::file_materials::{file_material_emission, file_material_opacity};
 use super::lower::{lower_blend_weight, lower_emission, lower_opacity};
 use super::{Geometry, Images, MeshInstance, Object};
 use crate::assets::FileMaterial;
@@ -186,7 +186,7 @@ impl SurfaceEmission {
         let (constant, weights): (Vec<BlendWeight>, Vec<_>) =
             weights.iter().cloned().partition(|weight| weight.second.as_untextured().is_some());
         for weight in constant {
-            scale *= weight.for_part(weight.second.as_untextured().unwrap_or(1.0));
+            scale *= weight.part_weight_from_second(weight.second.as_untextured().unwrap_or(1.0));
         }
         if scale != Vec3::ZERO {
             self.terms.push((EmissionTerm { scale, texture, opacity, coat, weights }, sides));
@@ -257,14 +257,14 @@ fn mesh_lights_by_material_and_side(
     images: &Images,
     token: &CancelToken,
 ) -> Result<Vec<AreaLight>, Canceled> {
-    let loaded = mesh.tree.loaded();
+    let loaded = mesh.tree.loaded_mesh();
     let all: Vec<(Option<u32>, SurfaceEmission)> = match emissive {
         Some(emissive) => vec![(None, emissive.clone())],
         None => {
             let of_file = |material| {
                 SurfaceEmission::new(
-                    emission_unless_texture_black(file_emission(images, material)),
-                    file_opacity(images, material),
+                    emission_unless_texture_black(file_material_emission(images, material)),
+                    file_material_opacity(images, material),
                 )
             };
             (0..).zip(&loaded.materials).map(|(own, material)| (Some(own), of_file(material))).collect()
@@ -277,7 +277,7 @@ fn mesh_lights_by_material_and_side(
     };
     let is_lit = all.iter().any(|(_, emissive)| !emissive.sides().is_empty());
     let repeated: HashSet<u32> = if is_lit {
-        duplicate_emissive_triangles(&loaded.mesh, emits).map(|(id, _)| id).collect()
+        find_duplicate_emissive_triangles(&loaded.mesh, emits).map(|(id, _)| id).collect()
     } else {
         HashSet::new()
     };
@@ -315,7 +315,7 @@ fn mesh_lights_by_material_and_side(
 
 /// Triangles with one of the mesh file's materials, or all triangles if `own` is `None`.
 fn triangles_with_material(mesh: &MeshInstance, own: Option<u32>) -> impl Iterator<Item = u32> {
-    let mesh = &mesh.tree.loaded().mesh;
+    let mesh = &mesh.tree.loaded_mesh().mesh;
     let has_material = move |id: &u32| own.is_none() || mesh.materials.get(*id as usize).copied() == own;
     (0..mesh.triangles.len() as u32).filter(has_material)
 }

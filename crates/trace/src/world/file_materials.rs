@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::Images;
-use super::lower::{coated_lobes, plastic};
+use super::lower::{add_coat_to_lobes, lower_plastic};
 use super::lower_texture::lower_file_texture;
 use super::textures::{FILE_NUMBER, color_or_cutout_interpretation, opacity_pixel_interpretation};
 use crate::assets::{FileMaterial, FileMaterialKind, FileTexture, PhysicalMaterial};
@@ -19,16 +19,16 @@ use crate::scene::description::PixelInterpretation;
 
 /// Index of refraction and transmittance per unit length of a mesh file's glass, or `None` for other
 /// materials.
-pub fn file_glass_properties(own: &FileMaterial) -> Option<(f32, DVec3)> {
+pub fn file_material_glass_properties(own: &FileMaterial) -> Option<(f32, DVec3)> {
     own.is_glass().then(|| (own.ior.clamp(1.0, FileMaterial::MAX_IOR), DVec3::ONE))
 }
 
 /// Emission of a mesh file's material, which is one-sided.
-pub fn file_emission(images: &Images, own: &FileMaterial) -> Emission {
+pub fn file_material_emission(images: &Images, own: &FileMaterial) -> Emission {
     if !own.emits() {
         return Emission::NONE;
     }
-    let coat = own.physical.as_ref().and_then(|own| file_coat(images, own)).map(Arc::new);
+    let coat = own.physical.as_ref().and_then(|own| file_material_coat(images, own)).map(Arc::new);
     let constant = Emission { coat, ..Emission::from_constant(own.emission) };
     match &own.emission_texture {
         None => constant,
@@ -43,7 +43,7 @@ pub fn file_emission(images: &Images, own: &FileMaterial) -> Emission {
 }
 
 /// Opacity of a mesh file's material, or `None` if it is fully opaque or glass.
-pub fn file_opacity(images: &Images, own: &FileMaterial) -> Option<Opacity> {
+pub fn file_material_opacity(images: &Images, own: &FileMaterial) -> Option<Opacity> {
     if own.is_glass() {
         return None;
     }
@@ -60,11 +60,11 @@ pub fn file_opacity(images: &Images, own: &FileMaterial) -> Option<Opacity> {
 
 /// Converts a material from a mesh file. A highlight of strength k becomes ks = 2k/(α + 2).
 pub fn lower_file_material(images: &Images, own: &FileMaterial) -> Material {
-    let bsdf = match (own.kind(), file_glass_properties(own)) {
+    let bsdf = match (own.kind(), file_material_glass_properties(own)) {
         (FileMaterialKind::Mirror, _) => {
             Bsdf::Mirror(Mirror::Constant(ColorOrTexture::Constant(own.specular.min(Vec3::ONE))))
         }
-        (FileMaterialKind::Coated, _) => file_mirror_over_diffuse(images, own),
+        (FileMaterialKind::Coated, _) => file_material_mirror_over_diffuse(images, own),
         (FileMaterialKind::Glass, Some((ior, tint))) => {
             let roughness = own.physical.as_ref().map_or(0.0, |physical| physical.roughness);
             let roughness = ScalarParameter::Constant(roughness);
@@ -73,10 +73,14 @@ pub fn lower_file_material(images: &Images, own: &FileMaterial) -> Material {
             )
         }
         (FileMaterialKind::Principled(physical), _) => {
-            return file_material_from_non_specular(images, own, file_principled(images, own, physical));
+            return file_material_with_non_specular(
+                images,
+                own,
+                file_material_principled(images, own, physical),
+            );
         }
         (FileMaterialKind::Phong | FileMaterialKind::Glass, _) => {
-            return file_material_from_non_specular(images, own, file_phong(images, own));
+            return file_material_with_non_specular(images, own, file_material_phong(images, own));
         }
     };
     Material {
@@ -84,12 +88,12 @@ pub fn lower_file_material(images: &Images, own: &FileMaterial) -> Material {
         sides: ReflectingSides::Both,
         emission: Emission::NONE,
         normal_perturbation: None,
-        opacity: file_opacity(images, own),
+        opacity: file_material_opacity(images, own),
     }
 }
 
 /// Non-specular material from a mesh file, including its emission and normal map.
-fn file_material_from_non_specular(images: &Images, own: &FileMaterial, rough: NonSpecular) -> Material {
+fn file_material_with_non_specular(images: &Images, own: &FileMaterial, rough: NonSpecular) -> Material {
     let normals = own.normal_texture.as_ref().and_then(|texture| {
         let texture = lower_file_texture(images, texture, PixelInterpretation::Normal)?;
         Some(NormalMap { texture, strength: own.normal_strength })
@@ -100,9 +104,9 @@ fn file_material_from_non_specular(images: &Images, own: &FileMaterial, rough: N
     Material {
         bsdf: Bsdf::NonSpecular(rough),
         sides: ReflectingSides::Both,
-        emission: file_emission(images, own),
+        emission: file_material_emission(images, own),
         normal_perturbation: NormalPerturbation::new(normals, None),
-        opacity: file_opacity(images, own),
+        opacity: file_material_opacity(images, own),
     }
 }
 
@@ -120,17 +124,17 @@ fn file_material_color_parameter(
 
 /// A mirror over a diffuse color, represented as a coat that reflects the fraction `Ks` of light at normal
 /// incidence.
-fn file_mirror_over_diffuse(images: &Images, own: &FileMaterial) -> Bsdf {
+fn file_material_mirror_over_diffuse(images: &Images, own: &FileMaterial) -> Bsdf {
     let specular = own.specular.min(Vec3::ONE);
     let root = specular.max_element().min(FileMaterial::MAX_COAT).sqrt();
     let diffuse =
         file_material_color_parameter(images, own, own.diffuse_texture.as_ref(), own.diffuse.min(Vec3::ONE));
     let tint = ColorOrTexture::Constant(specular / specular.max_element());
     let (roughness, ior) = (ScalarParameter::Constant(0.0), (1.0 + root) / (1.0 - root));
-    plastic(diffuse, tint, roughness, ior, MicrofacetDistribution::Ggx)
+    lower_plastic(diffuse, tint, roughness, ior, MicrofacetDistribution::Ggx)
 }
 
-fn file_phong(images: &Images, own: &FileMaterial) -> NonSpecular {
+fn file_material_phong(images: &Images, own: &FileMaterial) -> NonSpecular {
     let scale = 2.0 / (own.shininess + 2.0);
     let specular = match own.allows_specular_highlight() {
         true => match file_material_color_parameter(images, own, own.specular_texture.as_ref(), own.specular)
@@ -140,7 +144,7 @@ fn file_phong(images: &Images, own: &FileMaterial) -> NonSpecular {
                 let scaled = |factor: Option<ValueScaleAndOffset>| {
                     Some(factor.unwrap_or(ValueScaleAndOffset::IDENTITY).scaled_by(scale))
                 };
-                ColorOrTexture::Texture(Arc::new(Arc::unwrap_or_clone(texture).with_factor(scaled)))
+                ColorOrTexture::Texture(Arc::new(Arc::unwrap_or_clone(texture).map_image_factor(scaled)))
             }
         },
         false => ColorOrTexture::Constant(Vec3::ZERO),
@@ -154,37 +158,46 @@ fn file_phong(images: &Images, own: &FileMaterial) -> NonSpecular {
 }
 
 /// Number from a mesh file, with the value to use if there is no texture.
-fn file_number(images: &Images, texture: Option<&FileTexture>, constant: f32) -> ScalarParameter {
+fn file_material_number_parameter(
+    images: &Images,
+    texture: Option<&FileTexture>,
+    constant: f32,
+) -> ScalarParameter {
     let texture = texture.and_then(|texture| lower_file_texture(images, texture, FILE_NUMBER));
     texture.map_or(ScalarParameter::Constant(constant), ScalarParameter::Texture)
 }
 
 /// Clear coat of a principled material from a mesh file.
-fn file_coat(images: &Images, physical: &PhysicalMaterial) -> Option<Coat> {
+fn file_material_coat(images: &Images, physical: &PhysicalMaterial) -> Option<Coat> {
     let PhysicalMaterial { clearcoat, clearcoat_roughness, .. } = *physical;
     let roughness = physical.clearcoat_roughness_texture.as_ref();
     Coat::new(CoatInputs {
-        weight: file_number(images, physical.clearcoat_texture.as_ref(), clearcoat),
-        roughness: file_number(images, roughness, clearcoat_roughness),
+        weight: file_material_number_parameter(images, physical.clearcoat_texture.as_ref(), clearcoat),
+        roughness: file_material_number_parameter(images, roughness, clearcoat_roughness),
         ior: FileMaterial::DEFAULT_IOR,
         tint: ColorOrTexture::Constant(Vec3::ONE),
     })
 }
 
 /// Principled material from a mesh file. An index of refraction of 1 or less means "unspecified".
-fn file_principled(images: &Images, own: &FileMaterial, physical: &PhysicalMaterial) -> NonSpecular {
-    let base = file_principled_base(images, own, physical);
-    match file_coat(images, physical) {
-        Some(coat) => coated_lobes(coat, base),
+fn file_material_principled(images: &Images, own: &FileMaterial, physical: &PhysicalMaterial) -> NonSpecular {
+    let base = file_material_principled_base(images, own, physical);
+    match file_material_coat(images, physical) {
+        Some(coat) => add_coat_to_lobes(coat, base),
         None => base,
     }
 }
 
 /// Principled material without its coat. An anisotropic metal is a brushed conductor instead.
-fn file_principled_base(images: &Images, own: &FileMaterial, physical: &PhysicalMaterial) -> NonSpecular {
+fn file_material_principled_base(
+    images: &Images,
+    own: &FileMaterial,
+    physical: &PhysicalMaterial,
+) -> NonSpecular {
     let constant = own.diffuse.min(Vec3::ONE);
     let color = file_material_color_parameter(images, own, own.diffuse_texture.as_ref(), constant);
-    let roughness = file_number(images, physical.roughness_texture.as_ref(), physical.roughness);
+    let roughness =
+        file_material_number_parameter(images, physical.roughness_texture.as_ref(), physical.roughness);
     if physical.anisotropy != 0.0 && roughness.as_untextured() != Some(0.0) {
         let (fresnel, anisotropy) =
             (ConductorFresnel::Schlick(color), ScalarParameter::Constant(physical.anisotropy));
@@ -192,7 +205,11 @@ fn file_principled_base(images: &Images, own: &FileMaterial, physical: &Physical
     }
     NonSpecular::Principled(Box::new(Principled::new(PrincipledInputs {
         color,
-        metallic: file_number(images, physical.metallic_texture.as_ref(), physical.metallic),
+        metallic: file_material_number_parameter(
+            images,
+            physical.metallic_texture.as_ref(),
+            physical.metallic,
+        ),
         roughness,
         ior: if own.ior > 1.0 { own.ior.min(FileMaterial::MAX_IOR) } else { FileMaterial::DEFAULT_IOR },
         specular: ScalarParameter::Constant(1.0),

@@ -85,8 +85,8 @@ impl Geometry {
         Ok(Self { origin, lifts, ..Self::build(built, token)? })
     }
 
-    /// One translation per object, or empty if no objects are moved; see [`super::coplanar_lights`].
-    pub fn object_offsets_from_coplanar_lights(&self) -> &[DVec3] {
+    /// One translation per object, or empty if no objects are moved; see [`super::find_coplanar_lights`].
+    pub fn light_lifts_by_object(&self) -> &[DVec3] {
         &self.lifts
     }
 
@@ -105,7 +105,9 @@ impl Geometry {
         let (tree, instructions) =
             (Bvh::build(&boxes, token)?.with_shells_if_nested(shell), InstructionSet::best());
         let merged = merged.map(|meshes| -> Result<_, Canceled> {
-            let each = (0..).zip(&boxes).map(|(id, own)| if meshes.has(id) { Aabb::EMPTY } else { *own });
+            let each = (0..)
+                .zip(&boxes)
+                .map(|(id, own)| if meshes.contains_object(id) { Aabb::EMPTY } else { *own });
             let with_all: Vec<Aabb> = each.chain([meshes.bounds()]).collect();
             let of_merged = meshes.bounds();
             let shell = |id: u32| {
@@ -168,14 +170,14 @@ impl Geometry {
 
     /// Whether an object is one of the merged meshes.
     pub(super) fn is_merged(&self, object: u32) -> bool {
-        self.merged.as_ref().is_some_and(|merged| merged.meshes.has(object))
+        self.merged.as_ref().is_some_and(|merged| merged.meshes.contains_object(object))
     }
 
     /// Whether a light is an entire merged mesh. Shadow rays to such lights use the per-mesh trees instead.
     #[inline(always)]
     pub(super) fn is_light_entire_merged_mesh(&self, source: LightGeometry) -> bool {
         match (source, &self.merged) {
-            (LightGeometry::Object(object), Some(merged)) => merged.meshes.has(object),
+            (LightGeometry::Object(object), Some(merged)) => merged.meshes.contains_object(object),
             (
                 LightGeometry::Nothing
                 | LightGeometry::Object(_)
@@ -202,13 +204,13 @@ impl Geometry {
     }
 
     /// Cache of isolated surface regions.
-    pub(super) fn isolation_cache(&self) -> &IsolatedRegionCache {
+    pub(super) fn isolated_region_cache(&self) -> &IsolatedRegionCache {
         &self.isolated
     }
 
     /// Sets the instruction set used to trace packets.
     #[cfg(test)]
-    pub(super) fn with(mut self, instructions: InstructionSet) -> Self {
+    pub(super) fn with_instruction_set(mut self, instructions: InstructionSet) -> Self {
         self.instructions = instructions;
         self
     }
@@ -262,7 +264,7 @@ impl Geometry {
         for &id in &self.unbounded {
             end = test(id, end).unwrap_or(end);
         }
-        tree.visit_leaves_front_to_back(&Ray { t_max: end, ..*ray }, test);
+        tree.visit_primitives_front_to_back(&Ray { t_max: end, ..*ray }, test);
         best
     }
 
@@ -331,13 +333,13 @@ impl Geometry {
     /// Index of a triangle's material in its mesh file, or `None` if the file does not assign a material.
     pub fn file_material_index(&self, object: u32, triangle: u32) -> Option<u32> {
         let mesh = self.objects[object as usize].mesh()?;
-        let materials = &mesh.tree.loaded().mesh.materials;
+        let materials = &mesh.tree.loaded_mesh().mesh.materials;
         materials.get(triangle as usize).copied().filter(|&own| own != u32::MAX)
     }
 
     /// Vertex color at a hit, interpolated in linear space, or `None` if the mesh has no vertex colors.
     pub fn vertex_color(&self, hit: &Hit) -> Option<Vec3> {
-        let mesh = &self.objects[hit.object as usize].mesh()?.tree.loaded().mesh;
+        let mesh = &self.objects[hit.object as usize].mesh()?.tree.loaded_mesh().mesh;
         let corners = mesh.triangles.get(hit.shape.primitive as usize)?;
         let color = |vertex: u32| mesh.colors.get(vertex as usize).map(|color| srgb8_color_to_linear(*color));
         let [a, b, c] = corners.map(color);
@@ -405,7 +407,7 @@ fn lower_shape(
         LoweredShape::Mesh(mesh) => mesh,
     };
     let tree = &meshes[mesh.file];
-    let transform = mesh.placed.to_transform().relative_to_origins(tree.loaded().mesh.origin, origin);
+    let transform = mesh.placed.to_transform().relative_to_origins(tree.loaded_mesh().mesh.origin, origin);
     let instance = MeshInstance::new(Arc::clone(tree), transform, mesh.smooth);
     if instance.smooth {
         instance.tree.prepare_normals(token)?;

@@ -116,7 +116,7 @@ impl Geometry {
     /// hit triangle.
     pub fn is_hit_isolated(&self, hit: &Hit, surface: &SurfacePoint, margin: Vec3) -> bool {
         let object = &self.objects()[hit.object as usize];
-        let table = self.isolation_cache().tables[hit.object as usize]
+        let table = self.isolated_region_cache().tables[hit.object as usize]
             .get_or_init(|| self.new_isolation_states_for_object(object));
         if !(margin.max_element() <= table.margin) {
             return false;
@@ -139,7 +139,7 @@ impl Geometry {
                         NEVER
                     }
                 };
-                table.get_or_compute_state(cell.index(), find) != NEVER
+                table.get_or_compute_state(cell.linear_index(), find) != NEVER
             }
         }
     }
@@ -147,14 +147,15 @@ impl Geometry {
     /// Creates an object's table. The margin covers rays from up to four scene sizes away. Longer rays have
     /// larger margins and do not use the table.
     fn new_isolation_states_for_object(&self, object: &Object) -> ObjectRegionIsolationStates {
-        let of_rays = self.max_mesh_rounding_error() + 8.0 * f32::EPSILON * self.isolation_cache().reach;
+        let of_rays =
+            self.max_mesh_rounding_error() + 8.0 * f32::EPSILON * self.isolated_region_cache().reach;
         match object {
             Object::Mesh(mesh) => {
                 let margin = of_rays.max(4.0 * mesh.max_rounding_error());
                 ObjectRegionIsolationStates::new(
                     margin,
                     [Vec3::ZERO; 2],
-                    mesh.tree.loaded().mesh.triangles.len(),
+                    mesh.tree.loaded_mesh().mesh.triangles.len(),
                 )
             }
             Object::Shape(shape) => match shape.bounds() {
@@ -191,7 +192,7 @@ impl Geometry {
         // neighbor.
         for parts in [least, 4.0 * least].into_iter().filter(|&parts| parts <= MAX_STATE) {
             let inner = smaller(own_corners, parts);
-            if !is_apart_from_own_mesh(mesh, triangle, inner, apart * growth) {
+            if !is_triangle_apart_from_rest_of_mesh(mesh, triangle, inner, apart * growth) {
                 continue;
             }
             let inner = smaller(corners, parts);
@@ -231,7 +232,12 @@ impl Geometry {
 
 /// Whether all other triangles of the mesh are at least `apart` from a part of one triangle, in mesh
 /// coordinates. This is checked first because most nearby triangles are neighbors in the same mesh.
-fn is_apart_from_own_mesh(mesh: &MeshInstance, triangle: u32, part: [DVec3; 3], apart: f64) -> bool {
+fn is_triangle_apart_from_rest_of_mesh(
+    mesh: &MeshInstance,
+    triangle: u32,
+    part: [DVec3; 3],
+    apart: f64,
+) -> bool {
     let around = Aabb::from_points_f64(part).expanded(Vec3::splat((1.1 * apart) as f32));
     mesh.tree.triangle_tree().all_triangles_in_box_satisfy(&around, |other| {
         other == triangle || are_triangles_apart(part, mesh.local_corners(other), apart)
@@ -282,7 +288,7 @@ impl SurfaceRegion {
 struct GridCellIndex([usize; 3]);
 
 impl GridCellIndex {
-    fn index(&self) -> usize {
+    fn linear_index(&self) -> usize {
         let Self([x, y, z]) = *self;
         (z * CELLS + y) * CELLS + x
     }

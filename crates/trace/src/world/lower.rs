@@ -14,7 +14,7 @@ use crate::materials::{
 };
 use crate::math::Vec3;
 use crate::scene::description::{
-    self, ChannelSelector, CoatSource, ColorSource, FresnelSource, MaterialKind, NumberSource,
+    self, ChannelSelector, CoatSource, ColorSource, ConductorFresnelSource, MaterialKind, NumberSource,
     PhongParameters, Scene, TextureRole,
 };
 
@@ -24,13 +24,13 @@ pub fn lower_material(scene: &Scene, images: &Images, material: &description::Ma
     let color = |source: &ColorSource| of.lower_color(source);
     let number = |source: &NumberSource| of.lower_number(source, TextureRole::Roughness);
     let bsdf = match &material.kind {
-        MaterialKind::Phong(parameters) => Bsdf::NonSpecular(phong(parameters, color)),
+        MaterialKind::Phong(parameters) => Bsdf::NonSpecular(lower_phong(parameters, color)),
         MaterialKind::Mirror { reflectance } => Bsdf::Mirror(Mirror::Constant(color(reflectance))),
         MaterialKind::Metal { fresnel, roughness, anisotropy, distribution } => {
-            metal(lower_fresnel(fresnel, color), number(roughness), number(anisotropy), *distribution)
+            lower_metal(lower_fresnel(fresnel, color), number(roughness), number(anisotropy), *distribution)
         }
         MaterialKind::Plastic { diffuse, specular, ior, roughness, distribution } => {
-            plastic(color(diffuse), color(specular), number(roughness), *ior, *distribution)
+            lower_plastic(color(diffuse), color(specular), number(roughness), *ior, *distribution)
         }
         MaterialKind::Principled {
             color: base,
@@ -64,16 +64,16 @@ pub fn lower_material(scene: &Scene, images: &Images, material: &description::Ma
     };
     let coat = of.lower_coat(&material.coat, TextureRole::Roughness);
     let bsdf = match coat {
-        Some(coat) => coated(coat, bsdf),
+        Some(coat) => add_coat_to_bsdf(coat, bsdf),
         None => bsdf,
     };
     let emission = lower_emission(scene, images, material);
     let normal_map = material.normal_map.map(|map| NormalMap {
-        texture: of.texture(map.texture, TextureRole::NormalMap),
+        texture: of.lower_texture(map.texture, TextureRole::NormalMap),
         strength: map.strength,
     });
     let bump = material.bump.map(|bump| Bump {
-        texture: of.texture(bump.texture, TextureRole::Bump(bump.height_channel_selector())),
+        texture: of.lower_texture(bump.texture, TextureRole::Bump(bump.height_channel_selector())),
         scale: bump.scale,
     });
     let normal_perturbation = NormalPerturbation::new(normal_map, bump);
@@ -91,18 +91,18 @@ pub fn lower_opacity(scene: &Scene, images: &Images, material: &description::Mat
         None => (ScalarParameter::Constant(source.value.as_constant()?), source.cutoff),
         Some((index, number)) => {
             let of = MaterialParameterConverter { scene, images, material };
-            let texture = of.texture(index, TextureRole::Opacity(number));
+            let texture = of.lower_texture(index, TextureRole::Opacity(number));
             // If mip levels preserve coverage, the cutoff already includes the factor.
             let coverage = coverage_cutoff(scene, index, source.cutoff);
             let texture = Arc::unwrap_or_clone(texture);
-            let texture = Arc::new(texture.with_factor(|factor| factor.filter(|_| coverage.is_none())));
+            let texture = Arc::new(texture.map_image_factor(|factor| factor.filter(|_| coverage.is_none())));
             (ScalarParameter::Texture(texture), coverage.map_or(source.cutoff, AlphaCutoffKey::value))
         }
     };
     Some(Opacity { value, cutoff })
 }
 
-fn phong(parameters: &PhongParameters, color: impl Fn(&ColorSource) -> ColorOrTexture) -> NonSpecular {
+fn lower_phong(parameters: &PhongParameters, color: impl Fn(&ColorSource) -> ColorOrTexture) -> NonSpecular {
     let PhongParameters { diffuse, specular, shininess, ambient, diffuse_transmission } = parameters;
     let reflection = Phong {
         diffuse: color(diffuse),
@@ -117,7 +117,7 @@ fn phong(parameters: &PhongParameters, color: impl Fn(&ColorSource) -> ColorOrTe
 }
 
 /// BSDF of a metal: a mirror if its roughness is 0, and otherwise a microfacet conductor.
-fn metal(
+fn lower_metal(
     fresnel: ConductorFresnel,
     roughness: ScalarParameter,
     anisotropy: ScalarParameter,
@@ -136,7 +136,7 @@ fn metal(
 }
 
 /// Converts plastic. With roughness 0, the coat becomes a δ lobe over the diffuse base.
-pub(super) fn plastic(
+pub(super) fn lower_plastic(
     diffuse: ColorOrTexture,
     specular: ColorOrTexture,
     roughness: ScalarParameter,
@@ -170,20 +170,20 @@ pub fn lower_blend_weight(
 }
 
 /// Adds a clear coat to a BSDF. Glass, panes and blends are returned unchanged.
-fn coated(coat: Coat, bsdf: Bsdf) -> Bsdf {
+fn add_coat_to_bsdf(coat: Coat, bsdf: Bsdf) -> Bsdf {
     match bsdf {
-        Bsdf::NonSpecular(base) => Bsdf::NonSpecular(coated_lobes(coat, base)),
+        Bsdf::NonSpecular(base) => Bsdf::NonSpecular(add_coat_to_lobes(coat, base)),
         Bsdf::SpecularOverBase(SpecularOverBase { specular, coat: _, base }) => {
             Bsdf::SpecularOverBase(SpecularOverBase {
                 specular,
-                base: coated_lobes(coat.clone(), base),
+                base: add_coat_to_lobes(coat.clone(), base),
                 coat: Some(coat),
             })
         }
         Bsdf::Mirror(mirror) => {
             let black = ColorOrTexture::Constant(Vec3::ZERO);
             let none = Phong { diffuse: black.clone(), specular: black, shininess: 1.0, ambient: None };
-            let base = coated_lobes(coat.clone(), NonSpecular::Phong(none));
+            let base = add_coat_to_lobes(coat.clone(), NonSpecular::Phong(none));
             Bsdf::SpecularOverBase(SpecularOverBase {
                 specular: SpecularPart::Mirror(mirror),
                 coat: Some(coat),
@@ -195,7 +195,7 @@ fn coated(coat: Coat, bsdf: Bsdf) -> Bsdf {
 }
 
 /// Adds a clear coat to non-specular lobes. Lobes that already have one are returned unchanged.
-pub(super) fn coated_lobes(coat: Coat, base: NonSpecular) -> NonSpecular {
+pub(super) fn add_coat_to_lobes(coat: Coat, base: NonSpecular) -> NonSpecular {
     match base {
         NonSpecular::Phong(base) => NonSpecular::CoatedPhong(Box::new(CoatedMaterial { coat, base })),
         NonSpecular::TranslucentPhong(base) => {
@@ -224,10 +224,13 @@ pub(super) fn coated_lobes(coat: Coat, base: NonSpecular) -> NonSpecular {
     }
 }
 
-fn lower_fresnel(source: &FresnelSource, color: impl Fn(&ColorSource) -> ColorOrTexture) -> ConductorFresnel {
+fn lower_fresnel(
+    source: &ConductorFresnelSource,
+    color: impl Fn(&ColorSource) -> ColorOrTexture,
+) -> ConductorFresnel {
     match source {
-        FresnelSource::Schlick(reflectance) => ConductorFresnel::Schlick(color(reflectance)),
-        FresnelSource::Index { eta, k } => ConductorFresnel::Index { eta: color(eta), k: color(k) },
+        ConductorFresnelSource::Schlick(reflectance) => ConductorFresnel::Schlick(color(reflectance)),
+        ConductorFresnelSource::Index { eta, k } => ConductorFresnel::Index { eta: color(eta), k: color(k) },
     }
 }
 
@@ -235,7 +238,7 @@ fn lower_fresnel(source: &FresnelSource, color: impl Fn(&ColorSource) -> ColorOr
 pub fn lower_emission(scene: &Scene, images: &Images, material: &description::Material) -> Emission {
     let (emission, of) = (&material.emission, MaterialParameterConverter { scene, images, material });
     let coat = material.emitter_coat().and_then(|coat| of.lower_coat(coat, TextureRole::EmissionCoat));
-    let texture = emission.texture.map(|index| of.texture(index, TextureRole::Emission));
+    let texture = emission.texture.map(|index| of.lower_texture(index, TextureRole::Emission));
     Emission { scale: emission.scale, texture, sides: emission.sides, coat: coat.map(Arc::new) }
 }
 
@@ -252,7 +255,9 @@ impl MaterialParameterConverter<'_> {
         match source {
             ColorSource::Constant(color) => ColorOrTexture::Constant(*color),
             // The choice of color role does not matter because all of them use textures in the same way.
-            ColorSource::Texture(index) => ColorOrTexture::Texture(self.texture(*index, TextureRole::Facets)),
+            ColorSource::Texture(index) => {
+                ColorOrTexture::Texture(self.lower_texture(*index, TextureRole::Facets))
+            }
         }
     }
 
@@ -279,12 +284,14 @@ impl MaterialParameterConverter<'_> {
     ) -> ScalarParameter {
         match (source.as_constant(), source.texture_index_and_channel(ChannelSelector::Luminance)) {
             (Some(number), _) => ScalarParameter::Constant(number),
-            (None, Some((texture, number))) => ScalarParameter::Texture(self.texture(texture, role(number))),
+            (None, Some((texture, number))) => {
+                ScalarParameter::Texture(self.lower_texture(texture, role(number)))
+            }
             (None, None) => ScalarParameter::Constant(1.0),
         }
     }
 
-    fn texture(self, index: usize, role: TextureRole) -> Arc<Texture> {
+    fn lower_texture(self, index: usize, role: TextureRole) -> Arc<Texture> {
         Arc::new(lower_texture(self.scene, self.images, self.material, (index, role)))
     }
 }

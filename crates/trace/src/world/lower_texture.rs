@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use super::textures::{TextureSource, image_file_and_encoding, scene_material_texture_source};
-use super::{Image, Images};
+use super::textures::{TextureSource, file_texture_source, scene_material_texture_source};
+use super::{Images, TexelsAndMipmaps};
 use crate::assets::FileTexture;
 use crate::materials::UvSet;
 use crate::materials::texels::{TexelData, Texels};
@@ -36,12 +36,12 @@ pub(super) fn lower_texture(
 fn lower_image(
     declared: &description::Texture,
     image: &ImageSource,
-    loaded: Image,
+    loaded: TexelsAndMipmaps,
     role: TextureRole,
 ) -> ImageTexture {
     let &description::Texture { filter, factor, .. } = declared;
     let &ImageSource { wrap, repeat, rotate, offset, uv, .. } = image;
-    let Image { texels, mipmaps } = loaded;
+    let TexelsAndMipmaps { texels, mipmaps } = loaded;
     let mipmaps = match filter {
         TextureFilter::Nearest | TextureFilter::Bilinear => None,
         TextureFilter::Mipmap => mipmaps,
@@ -87,7 +87,7 @@ pub(super) fn lower_file_texture(
     texture: &FileTexture,
     used: PixelInterpretation,
 ) -> Option<Arc<Texture>> {
-    let texels = images.get(&image_file_and_encoding(texture, used))?.texels.clone();
+    let texels = images.get(&file_texture_source(texture, used))?.texels.clone();
     let (base, gain) = texture.range;
     let factor = match used {
         PixelInterpretation::Color | PixelInterpretation::CutOut | PixelInterpretation::Number(_) => {
@@ -108,9 +108,12 @@ pub(super) fn lower_file_texture(
 
 /// Returns a loaded image, or a placeholder if the image was not loaded. Images that are not loaded are used
 /// only by materials without objects, whose textures are never looked up.
-fn loaded_image_or_placeholder(images: &Images, source: &TextureSource) -> Image {
+fn loaded_image_or_placeholder(images: &Images, source: &TextureSource) -> TexelsAndMipmaps {
     images.get(source).cloned().unwrap_or_else(|| {
         let data = TexelData::Linear8(vec![[128, 128, 255]]);
-        Image { texels: Arc::new(Texels { width: 1, height: 1, data, unusable: 0 }), mipmaps: None }
+        TexelsAndMipmaps {
+            texels: Arc::new(Texels { width: 1, height: 1, data, unusable: 0 }),
+            mipmaps: None,
+        }
     })
 }

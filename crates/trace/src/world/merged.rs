@@ -133,7 +133,7 @@ impl MergedMeshes {
     }
 
     /// Whether an object is merged.
-    pub fn has(&self, object: u32) -> bool {
+    pub fn contains_object(&self, object: u32) -> bool {
         self.first.get(object as usize).is_some_and(|&first| first != Self::NOT_HERE)
     }
 
@@ -265,7 +265,7 @@ impl MergedMeshes {
 /// Whether the rays in `active` start close together, relative to `size`, and have similar directions. Such
 /// rays are faster with the tree than without it.
 #[inline(always)]
-fn are_coherent(rows: &RayPacket, active: u32, size: Vec3, simd: impl Simd) -> bool {
+fn are_rays_coherent(rows: &RayPacket, active: u32, size: Vec3, simd: impl Simd) -> bool {
     let first = active.trailing_zeros() as usize % PACKET_SIZE;
     let near = size.element_sum() * COHERENCE;
     let along = (0..3).map(|axis| rows.direction[axis][first].abs()).sum::<f32>() * COHERENCE;
@@ -302,7 +302,7 @@ impl SimdKernel for TriangleListClosestHitKernel<'_> {
     #[inline(always)]
     fn run(self, simd: impl Simd) -> Option<u32> {
         let Self { facets, size, rows, active, ends, found } = self;
-        if are_coherent(rows, active, size, simd) {
+        if are_rays_coherent(rows, active, size, simd) {
             return None;
         }
         Some(facets.update_decided_closest_hits(rows, (active, ends), found, simd))
@@ -326,7 +326,7 @@ impl SimdKernel for TriangleListAnyHitKernel<'_> {
     #[inline(always)]
     fn run(self, simd: impl Simd) -> Option<[u32; 2]> {
         let Self { facets, size, rows, active, ends, except } = self;
-        if are_coherent(rows, active, size, simd) {
+        if are_rays_coherent(rows, active, size, simd) {
             return None;
         }
         Some(facets.any_hit_and_undecided_masks(rows, (active, ends), except, simd))
@@ -554,7 +554,9 @@ pub(super) mod tests {
             let mut objects = objects(of);
             let merged =
                 MergedMeshes::merge_small_meshes(&mut objects, &CancelToken::new()).expect("never canceled");
-            merged.map(|merged| (0..of.len() as u32).filter(|&id| merged.has(id)).collect::<Vec<_>>())
+            merged.map(|merged| {
+                (0..of.len() as u32).filter(|&id| merged.contains_object(id)).collect::<Vec<_>>()
+            })
         };
         assert_eq!(members(&[(&small, here), (&few, here)]), Some(vec![0, 1]));
         assert_eq!(members(&[(&small, here), (&few, far), (&few, here)]), Some(vec![0, 2]));

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::mesh_packet::interpolate_single_triangle_uv;
+use super::mesh_packet::interpolate_corner_uvs;
 use super::mesh_tree::MeshTree;
 use super::placement::{IdentityPlacement, MeshPlacement};
 use super::triangle_point::{EDGE_MARGIN, PlacedMesh, TrianglePoint};
@@ -98,18 +98,19 @@ impl MeshInstance {
     /// Corners of a triangle in world coordinates, ordered so that the front side faces along (b − a) × (c −
     /// a).
     pub fn world_corners(&self, triangle: u32) -> [DVec3; 3] {
-        let [a, b, c] = self.tree.loaded().mesh.corners(triangle).map(|p| self.transform.point(p.as_dvec3()));
+        let [a, b, c] =
+            self.tree.loaded_mesh().mesh.corners(triangle).map(|p| self.transform.point(p.as_dvec3()));
         if self.transform.flips_handedness() { [a, c, b] } else { [a, b, c] }
     }
 
     /// Corners of a triangle in mesh coordinates and file order.
     pub(super) fn local_corners(&self, triangle: u32) -> [DVec3; 3] {
-        self.tree.loaded().mesh.corners(triangle).map(|corner| corner.as_dvec3())
+        self.tree.loaded_mesh().mesh.corners(triangle).map(|corner| corner.as_dvec3())
     }
 
     /// Number of triangles in the mesh.
     pub(super) fn triangle_count(&self) -> usize {
-        self.tree.loaded().mesh.triangles.len()
+        self.tree.loaded_mesh().mesh.triangles.len()
     }
 
     /// Whether world coordinates differ from mesh coordinates.
@@ -119,7 +120,7 @@ impl MeshInstance {
 
     /// Corners of a triangle in world coordinates, rounded to `f32`, in file order.
     pub(super) fn world_corners_rounded_to_f32(&self, triangle: u32) -> [Vec3; 3] {
-        let corners = self.tree.loaded().mesh.corners(triangle);
+        let corners = self.tree.loaded_mesh().mesh.corners(triangle);
         if !self.is_transformed {
             return corners;
         }
@@ -129,7 +130,7 @@ impl MeshInstance {
     /// Vertex UVs in one of the UV sets. Falls back to the first set if there is no second set.
     #[inline(always)]
     pub(super) fn all_vertex_uvs_in_set(&self, set: UvSet) -> &[Vec2] {
-        let mesh = &self.tree.loaded().mesh;
+        let mesh = &self.tree.loaded_mesh().mesh;
         match set {
             UvSet::Second if !mesh.second_uvs.is_empty() => &mesh.second_uvs,
             UvSet::Second | UvSet::First => &mesh.uvs,
@@ -147,13 +148,13 @@ impl MeshInstance {
 
     /// UVs of a triangle's corners in the second UV set, if there is one.
     pub fn second_set_corner_uvs(&self, triangle: u32) -> Option<[Vec2; 3]> {
-        self.values_in_corner_order(triangle, &self.tree.loaded().mesh.second_uvs)
+        self.values_in_corner_order(triangle, &self.tree.loaded_mesh().mesh.second_uvs)
     }
 
     /// Vertex values at a triangle's corners, in the order of [`MeshInstance::world_corners`], or `None` if
     /// `values` is empty.
     fn values_in_corner_order(&self, triangle: u32, values: &[Vec2]) -> Option<[Vec2; 3]> {
-        let corners = self.tree.loaded().mesh.triangles[triangle as usize];
+        let corners = self.tree.loaded_mesh().mesh.triangles[triangle as usize];
         let [a, b, c] = corners.map(|vertex| values.get(vertex as usize).copied());
         let (a, b, c) = (a?, b?, c?);
         Some(if self.transform.flips_handedness() { [a, c, b] } else { [a, b, c] })
@@ -161,7 +162,7 @@ impl MeshInstance {
 
     /// UV and tangents at a hit in the second UV set, if there is one.
     pub(super) fn second_uv_and_tangents(&self, hit: &ShapeHit) -> Option<(Vec2, [Vec3; 2])> {
-        let mesh = &self.tree.loaded().mesh;
+        let mesh = &self.tree.loaded_mesh().mesh;
         if mesh.second_uvs.is_empty() {
             return None;
         }
@@ -178,7 +179,7 @@ impl MeshInstance {
         if !self.smooth {
             return 0.0;
         }
-        let (mesh, normals) = (&self.tree.loaded().mesh, self.tree.file_or_computed_normals());
+        let (mesh, normals) = (&self.tree.loaded_mesh().mesh, self.tree.file_or_computed_normals());
         let vertices = mesh.triangles[triangle as usize].map(|vertex| {
             let own = self.transform.normal(normals[vertex as usize].as_dvec3()).normalize_or_zero();
             let own = if own.dot(normal.as_dvec3()) < 0.0 { -own } else { own };
@@ -217,7 +218,7 @@ impl MeshInstance {
         hit: &ShapeHit,
         request: SurfaceRequest,
     ) -> SurfacePoint {
-        let mesh = &self.tree.loaded().mesh;
+        let mesh = &self.tree.loaded_mesh().mesh;
         let vertices = mesh.triangles[hit.primitive as usize].map(|vertex| vertex as usize);
         let facet = placed.triangle_point(vertices.map(|vertex| mesh.positions[vertex]), [hit.u, hit.v]);
         let TrianglePoint { corners: [a, b, c], normal, barycentric, .. } = facet;
@@ -265,7 +266,7 @@ impl MeshInstance {
             return (Vec2::new(barycentric.y, barycentric.z), world(ab), world(ac));
         }
         let [a, b, c] = vertices.map(|vertex| uvs[vertex]);
-        let uv = interpolate_single_triangle_uv([a, b, c], barycentric);
+        let uv = interpolate_corner_uvs([a, b, c], barycentric);
         let (duv_b, duv_c) = ((b - a).as_dvec2(), (c - a).as_dvec2());
         let determinant = duv_b.perp_dot(duv_c);
         if determinant == 0.0 || !determinant.is_finite() {
@@ -358,7 +359,7 @@ mod tests {
                 let hit = ShapeHit { primitive, u: 0.5, v: 0.25, t: 1.0 };
                 let surface =
                     mesh.surface(&Ray::new(Vec3::ZERO, Vec3::Z).to_f64(), &hit, SurfaceRequest::ALL);
-                let [a, b, c] = mesh.tree.loaded().mesh.corners(primitive);
+                let [a, b, c] = mesh.tree.loaded_mesh().mesh.corners(primitive);
                 let [a, b, c] = [a, b, c].map(|corner| transform.point(corner.as_dvec3()));
                 let off = surface.point.as_dvec3() - (a * 0.25 + b * 0.5 + c * 0.25);
                 assert!(off.abs().cmple(surface.error.as_dvec3()).all(), "{off} {}", surface.error);

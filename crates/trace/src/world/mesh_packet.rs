@@ -36,7 +36,7 @@ impl MeshInstance {
         asked_uvs: Option<UvSet>,
         simd: impl Simd,
     ) {
-        let mesh = &self.tree.loaded().mesh;
+        let mesh = &self.tree.loaded_mesh().mesh;
         // Other lanes contain a copy of an arbitrary triangle, and their results are discarded.
         let filler = hits.primitive[of.trailing_zeros() as usize % PACKET_SIZE];
         let mut vertices = [[0; 3]; PACKET_SIZE];
@@ -77,7 +77,7 @@ impl MeshInstance {
             for i in set_bit_lanes(on_ray) {
                 set_lane(&mut found.shadow_point, i, lane(&found.point, i));
             }
-            surface.copy_shading_normals_from(of, &found);
+            surface.copy_shading_lanes_from(of, &found);
         }
         if let Some(set) = asked_uvs {
             let all = self.all_vertex_uvs_in_set(set);
@@ -86,10 +86,8 @@ impl MeshInstance {
                     [] => [Vec2::ZERO, Vec2::X, Vec2::Y],
                     uvs => vertices[i].map(|vertex| uvs[vertex as usize]),
                 };
-                let uv = interpolate_single_triangle_uv(
-                    uvs,
-                    Vec3::new(1.0 - hits.u[i] - hits.v[i], hits.u[i], hits.v[i]),
-                );
+                let uv =
+                    interpolate_corner_uvs(uvs, Vec3::new(1.0 - hits.u[i] - hits.v[i], hits.u[i], hits.v[i]));
                 let is_own = of & 1 << i != 0;
                 surface.uv[0][i] = if is_own { f64::from(uv.x) } else { surface.uv[0][i] };
                 surface.uv[1][i] = if is_own { f64::from(uv.y) } else { surface.uv[1][i] };
@@ -162,7 +160,7 @@ fn correct_doubtful_points(
 
 /// Interpolates the UVs of a triangle's corners.
 #[inline(always)]
-pub(super) fn interpolate_single_triangle_uv([a, b, c]: [Vec2; 3], barycentric: Vec3) -> Vec2 {
+pub(super) fn interpolate_corner_uvs([a, b, c]: [Vec2; 3], barycentric: Vec3) -> Vec2 {
     a * barycentric.x + b * barycentric.y + c * barycentric.z
 }
 

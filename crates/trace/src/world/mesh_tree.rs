@@ -30,7 +30,7 @@ impl MeshTree {
     }
 
     /// The mesh file's contents.
-    pub fn loaded(&self) -> &LoadedMesh {
+    pub fn loaded_mesh(&self) -> &LoadedMesh {
         &self.loaded
     }
 

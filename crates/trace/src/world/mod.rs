@@ -39,7 +39,7 @@ pub use camera_interior::CompoundSolid;
 pub use contact::{
     CoincidenceQuery, CoincidenceScratch, CoincidentOrEnclosingSurface, MAX_INTERIORS, OffsetPoints,
 };
-pub use coplanar::{CoplanarLight, coplanar_lights, light_lifts};
+pub use coplanar::{CoplanarLight, find_coplanar_lights, light_lifts};
 pub use distinct_lights::{emissive_override_flags_by_mesh_file, separate_coincident_emitters};
 pub use emitters::{EnvironmentSource, build_environment_map, build_lights, build_sky, scene_photon_emitter};
 pub use geometry::{Geometry, Hit};
@@ -52,10 +52,10 @@ pub use object::Object;
 pub use origin::choose_origin_near_camera_target;
 pub use packet_material::PacketMaterial;
 pub use textures::{
-    AlphaCutoffKey, NeededTexture, TextureRolesNeededByRender, TextureSource, environment_source,
+    AlphaCutoffKey, NeededTexture, TextureRolesNeededByRender, TextureSource, environment_map_source,
     scene_material_texture_source, textures_needed,
 };
-pub use unlit_glass::LightBoundingBoxes;
+pub use unlit_glass::LightBoundingBoxPair;
 
 use crate::assets::GkitOrbiterCamera;
 use crate::geometry::SurfacePoint;
@@ -70,11 +70,11 @@ use crate::math::transform::Transform;
 use crate::scene::description;
 
 /// A scene's decoded images, indexed by source.
-pub type Images = HashMap<TextureSource, Image>;
+pub type Images = HashMap<TextureSource, TexelsAndMipmaps>;
 
 /// A decoded image.
 #[derive(Clone, Debug)]
-pub struct Image {
+pub struct TexelsAndMipmaps {
     /// The full-resolution pixels.
     pub texels: Arc<Texels>,
     /// Mip levels, if any texture needs them.
@@ -179,7 +179,7 @@ impl World {
     pub fn file_material_name(&self, hit: &Hit) -> Option<&str> {
         let own = self.geometry.file_material_index(hit.object, hit.shape.primitive)?;
         let mesh = self.geometry.objects()[hit.object as usize].mesh()?;
-        mesh.tree.loaded().materials.get(own as usize).map(|material| material.name.as_str())
+        mesh.tree.loaded_mesh().materials.get(own as usize).map(|material| material.name.as_str())
     }
 
     /// All materials that parts of an object may have.
@@ -188,7 +188,7 @@ impl World {
             ObjectMaterial::One(index) => (0, 0, index),
             ObjectMaterial::OfFile { first, fallback } => {
                 let mesh = self.geometry.objects()[object as usize].mesh();
-                (first, mesh.map_or(0, |mesh| mesh.tree.loaded().materials.len()), fallback)
+                (first, mesh.map_or(0, |mesh| mesh.tree.loaded_mesh().materials.len()), fallback)
             }
         };
         self.materials[first as usize..][..count].iter().chain(self.materials.get(one as usize))
@@ -249,7 +249,7 @@ impl World {
         footprint: impl Fn([Vec3; 2]) -> Footprint,
     ) -> TexturePoint {
         let extra = match self.has_extra_coordinates {
-            true => self.extra_coordinates(hit, surface, &footprint),
+            true => self.extra_texture_coordinates(hit, surface, &footprint),
             false => None,
         };
         TexturePoint { uv: surface.uv, footprint: footprint([surface.dpdu, surface.dpdv]), extra }
@@ -258,7 +258,7 @@ impl World {
     /// The rarely used part of [`World::texture_point`], or `None` if the object has none.
     #[cold]
     #[inline(never)]
-    fn extra_coordinates(
+    fn extra_texture_coordinates(
         &self,
         hit: &Hit,
         surface: &SurfacePoint,
@@ -285,7 +285,7 @@ impl World {
             return true;
         }
         let mesh = self.geometry.objects()[object as usize].mesh();
-        mesh.is_none_or(|mesh| !mesh.tree.loaded().mesh.uvs.is_empty())
+        mesh.is_none_or(|mesh| !mesh.tree.loaded_mesh().mesh.uvs.is_empty())
     }
 
     /// Whether any material is glass.

@@ -5,7 +5,7 @@
 //! unoccluded rays that enter the bounding box of a see-through object are then traced from surface to
 //! surface.
 
-use super::packet::OcclusionCallback;
+use super::packet::OcclusionTest;
 use super::{Geometry, Hit, PACKET_SIZE, SimdKernel, World};
 use crate::accel::{AnyHitCallback, F32x16};
 use crate::geometry::packet::{RayPacket, set_bit_lanes};
@@ -47,7 +47,7 @@ impl SeeThroughObjects {
     /// Whether light may pass through an object without changing direction. Returns false for the id of the
     /// merged meshes, which is out of range.
     #[inline(always)]
-    fn has(&self, object: u32) -> bool {
+    fn contains_object(&self, object: u32) -> bool {
         self.objects.get(object as usize).copied().unwrap_or(false)
     }
 }
@@ -113,7 +113,7 @@ impl World {
             };
         };
         let is_own = |object: u32| source == LightGeometry::Object(object);
-        let stops = |object: u32| !see_through.has(object) && !is_own(object);
+        let stops = |object: u32| !see_through.contains_object(object) && !is_own(object);
         if self.geometry.closest_hit_on_objects_where(ray, stops).is_some() {
             return Vec3::ZERO;
         }
@@ -148,10 +148,9 @@ impl World {
         let is_own = |object: u32| source == LightGeometry::Object(object);
         // The sampled point may be at the end of the ray, up to rounding.
         let end = SAME_DISTANCE * ray.t_max;
-        while let Some(hit) = self
-            .geometry
-            .closest_hit_on_objects_where(&ray, |object| see_through.has(object) && !is_own(object))
-        {
+        while let Some(hit) = self.geometry.closest_hit_on_objects_where(&ray, |object| {
+            see_through.contains_object(object) && !is_own(object)
+        }) {
             if source == LightGeometry::SeeThrough(hit.object) && hit.shape.t >= ray.t_max - end {
                 break;
             }
@@ -204,7 +203,7 @@ impl SimdKernel for ShadowTransmittanceKernel<'_> {
             }
             return transmittance;
         }
-        let occluders = OcclusionCallback::new(geometry, rows, sources, simd);
+        let occluders = OcclusionTest::new(geometry, rows, sources, simd);
         let mut solid = OpaqueOcclusionTest { occluders, see_through, near: 0 };
         transmittance.occluded =
             tree.any_hit_packet(rows, ends, traced, geometry.unbounded(), &mut solid, simd);
@@ -225,7 +224,7 @@ impl SimdKernel for ShadowTransmittanceKernel<'_> {
 
 /// Any-hit test for opaque occluders.
 struct OpaqueOcclusionTest<'a, F> {
-    occluders: OcclusionCallback<'a, F>,
+    occluders: OcclusionTest<'a, F>,
     see_through: &'a SeeThroughObjects,
     /// Mask of rays that enter the bounding box of a see-through object.
     near: u32,
@@ -233,11 +232,11 @@ struct OpaqueOcclusionTest<'a, F> {
 
 impl<F: Simd> AnyHitCallback for OpaqueOcclusionTest<'_, F> {
     #[inline(always)]
-    fn test(&mut self, id: u32, active: u32, ends: &F32x16) -> u32 {
-        if self.see_through.has(id) {
+    fn primitive_hit_mask(&mut self, id: u32, active: u32, ends: &F32x16) -> u32 {
+        if self.see_through.contains_object(id) {
             self.near |= active;
             return 0;
         }
-        self.occluders.test(id, active, ends)
+        self.occluders.primitive_hit_mask(id, active, ends)
     }
 }

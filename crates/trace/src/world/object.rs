@@ -133,7 +133,7 @@ impl Object {
     pub fn triangle_count(&self) -> u64 {
         match self {
             Self::Shape(shape) => shape.triangle_count(),
-            Self::Mesh(mesh) => mesh.tree.loaded().mesh.triangles.len() as u64,
+            Self::Mesh(mesh) => mesh.tree.loaded_mesh().mesh.triangles.len() as u64,
         }
     }
 }

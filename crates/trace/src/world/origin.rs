@@ -14,6 +14,6 @@ pub fn choose_origin_near_camera_target(
     camera: &description::Camera,
     orbiter: Option<&GkitOrbiterCamera>,
 ) -> DVec3 {
-    let (aim, distance) = Camera::target_and_distance(camera, orbiter);
+    let (aim, distance) = Camera::orbit_target_and_distance(camera, orbiter);
     local_coordinate_origin(aim, distance)
 }

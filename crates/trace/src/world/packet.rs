@@ -13,7 +13,7 @@ impl Geometry {
     /// `rays`.
     pub fn closest_hit_packet(&self, rays: &[Ray], hits: &mut [Option<Hit>]) {
         debug_assert!(rays.len() <= PACKET_SIZE && rays.len() == hits.len());
-        self.instruction_set().run(ClosestKernel { geometry: self, rays, hits });
+        self.instruction_set().run(ClosestHitKernel { geometry: self, rays, hits });
     }
 
     /// Like [`Geometry::closest_hit_packet`], for callers inside a SIMD kernel. Returns the hits and their
@@ -43,7 +43,7 @@ impl Geometry {
     /// Like [`Geometry::is_occluded_except_by_light`], for a packet of shadow rays. Returns the mask of
     /// occluded rays. `traced` is the mask of rays to trace. Must be called inside a SIMD kernel.
     #[inline(always)]
-    pub fn occluded_ray_packet(
+    pub fn occluded_ray_mask(
         &self,
         rows: &RayPacket,
         ends: &F32x16,
@@ -108,7 +108,7 @@ impl Geometry {
     }
 }
 
-/// Kernel of [`Geometry::occluded_ray_packet`].
+/// Kernel of [`Geometry::occluded_ray_mask`].
 struct OcclusionKernel<'a> {
     geometry: &'a Geometry,
     rows: &'a RayPacket,
@@ -128,19 +128,19 @@ impl SimdKernel for OcclusionKernel<'_> {
         {
             return geometry.occluded_one_by_one(rows, ends, traced, sources);
         }
-        let mut occluders = OcclusionCallback::new(geometry, rows, sources, simd);
+        let mut occluders = OcclusionTest::new(geometry, rows, sources, simd);
         geometry.traced_tree().any_hit_packet(rows, ends, traced, geometry.unbounded(), &mut occluders, simd)
     }
 }
 
 /// Kernel of [`Geometry::closest_hit_packet`].
-struct ClosestKernel<'a> {
+struct ClosestHitKernel<'a> {
     geometry: &'a Geometry,
     rays: &'a [Ray],
     hits: &'a mut [Option<Hit>],
 }
 
-impl SimdKernel for ClosestKernel<'_> {
+impl SimdKernel for ClosestHitKernel<'_> {
     type Output = ();
 
     #[inline(always)]
@@ -168,7 +168,7 @@ struct ClosestHitTest<'a, F> {
 
 impl<F: Simd> ClosestHitCallback for ClosestHitTest<'_, F> {
     #[inline(always)]
-    fn test(&mut self, id: u32, active: u32, ends: &mut F32x16) {
+    fn intersect_primitive(&mut self, id: u32, active: u32, ends: &mut F32x16) {
         let mut found = HitPacket::without_hits();
         let (these, mut objects) = (masked_ends(active, ends), [id; PACKET_SIZE]);
         match self.geometry.merged_meshes_if_represented_by(id) {
@@ -211,7 +211,7 @@ fn resolve_merged_hits(merged: &MergedMeshes, found: &mut HitPacket) -> [u32; PA
 }
 
 /// Any-hit test for shadow rays.
-pub(super) struct OcclusionCallback<'a, F> {
+pub(super) struct OcclusionTest<'a, F> {
     geometry: &'a Geometry,
     rows: &'a RayPacket,
     sources: &'a LightGeometryPacket,
@@ -220,7 +220,7 @@ pub(super) struct OcclusionCallback<'a, F> {
     simd: F,
 }
 
-impl<'a, F: Simd> OcclusionCallback<'a, F> {
+impl<'a, F: Simd> OcclusionTest<'a, F> {
     /// Creates the test for a packet of shadow rays to these lights.
     #[inline(always)]
     pub(super) fn new(
@@ -233,9 +233,9 @@ impl<'a, F: Simd> OcclusionCallback<'a, F> {
     }
 }
 
-impl<F: Simd> AnyHitCallback for OcclusionCallback<'_, F> {
+impl<F: Simd> AnyHitCallback for OcclusionTest<'_, F> {
     #[inline(always)]
-    fn test(&mut self, id: u32, active: u32, ends: &F32x16) -> u32 {
+    fn primitive_hit_mask(&mut self, id: u32, active: u32, ends: &F32x16) -> u32 {
         if let Some(merged) = self.geometry.merged_meshes_if_represented_by(id) {
             let these = masked_ends(active, ends);
             if self.in_part & active == 0 {
@@ -364,7 +364,7 @@ pub(super) mod tests {
     fn packet_hits_match_single_ray_hits() {
         for accel in [Accel::Bvh, Accel::BvhHigh, Accel::KdTree] {
             for instructions in InstructionSet::ALL {
-                assert_packets(&geometry(accel).with(instructions));
+                assert_packets(&geometry(accel).with_instruction_set(instructions));
             }
         }
     }
@@ -390,7 +390,7 @@ pub(super) mod tests {
         #[inline(always)]
         fn run(self, simd: impl Simd) -> u32 {
             let (rows, ends) = RayPacket::new(self.rays);
-            self.geometry.occluded_ray_packet(
+            self.geometry.occluded_ray_mask(
                 &rows,
                 &ends,
                 nonnegative_end_mask(&ends, simd),

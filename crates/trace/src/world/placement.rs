@@ -17,7 +17,7 @@ pub trait MeshPlacement: Copy {
     fn normal_to_world(self, local: DVec3) -> DVec3;
 
     /// The mesh's origin in world coordinates.
-    fn mesh_origin(self) -> DVec3;
+    fn mesh_origin_in_world(self) -> DVec3;
 }
 
 impl MeshPlacement for &Transform {
@@ -37,7 +37,7 @@ impl MeshPlacement for &Transform {
     }
 
     #[inline(always)]
-    fn mesh_origin(self) -> DVec3 {
+    fn mesh_origin_in_world(self) -> DVec3 {
         self.translation
     }
 }
@@ -66,7 +66,7 @@ impl MeshPlacement for IdentityPlacement {
     }
 
     #[inline(always)]
-    fn mesh_origin(self) -> DVec3 {
+    fn mesh_origin_in_world(self) -> DVec3 {
         DVec3::ZERO
     }
 }

@@ -5,7 +5,7 @@ use std::collections::hash_map::Entry;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use crate::assets::image::{ColorCurve, ImageEncoding};
+use crate::assets::image::{ColorEncoding, ColorTransferFunction};
 use crate::assets::{FileLine, FileMaterial, FileTexture, LoadedMesh};
 use crate::math::Vec3;
 use crate::scene::description::{
@@ -21,7 +21,7 @@ pub struct TextureSource {
     /// Index of the image in a glTF file, or `None` for a separate image file.
     pub image: Option<u32>,
     /// Encoding of the pixel values.
-    pub encoding: ImageEncoding,
+    pub encoding: ColorEncoding,
     /// Alpha cutoff at which mip levels preserve coverage, or `None` for ordinary mip levels.
     pub coverage: Option<AlphaCutoffKey>,
 }
@@ -33,7 +33,7 @@ pub struct AlphaCutoffKey(u32);
 impl AlphaCutoffKey {
     /// Converts a cutoff for opacity to a cutoff for pixel values. `factor` is the factor applied to the
     /// image.
-    pub fn from_opacity_cutoff(cutoff: f32, factor: f32) -> Self {
+    pub fn from_opacity_cutoff_and_factor(cutoff: f32, factor: f32) -> Self {
         Self(if factor > 0.0 { cutoff / factor } else { f32::INFINITY }.to_bits())
     }
 
@@ -165,7 +165,7 @@ pub fn textures_needed(
     };
     let (used_materials, own_materials) = used_material_and_mesh_file_flags(scene);
     let used = scene.materials.iter().zip(used_materials).filter(|(_, used)| *used);
-    for material in used.flat_map(|(material, _)| material.with_parts()) {
+    for material in used.flat_map(|(material, _)| material.self_and_blend_parts()) {
         let (textures, is_delta) = (material.textures().into_iter(), material.kind.has_delta_lobe());
         for (texture, role) in textures.filter(|(_, role)| lookups.includes_role(*role, is_delta)) {
             let Some(image) = scene.textures[texture].as_image() else { continue };
@@ -178,7 +178,7 @@ pub fn textures_needed(
                 statement: None,
                 normals_of: (role == TextureRole::NormalMap).then(|| material.name.clone()),
                 is_environment: false,
-                has_mipmaps: has_mipmaps(scene, texture),
+                has_mipmaps: texture_uses_mipmaps(scene, texture),
             });
         }
     }
@@ -189,7 +189,7 @@ pub fn textures_needed(
             let path = &texture.path;
             let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
             add(NeededTexture {
-                source: image_file_and_encoding(texture, used),
+                source: file_texture_source(texture, used),
                 name,
                 declared: None,
                 mesh_file: Some(file),
@@ -208,7 +208,7 @@ pub fn textures_needed(
 }
 
 /// Whether a texture's filter uses mip levels.
-fn has_mipmaps(scene: &Scene, texture: usize) -> bool {
+fn texture_uses_mipmaps(scene: &Scene, texture: usize) -> bool {
     match scene.textures[texture].filter {
         TextureFilter::Nearest | TextureFilter::Bilinear => false,
         TextureFilter::Mipmap => true,
@@ -216,7 +216,7 @@ fn has_mipmaps(scene: &Scene, texture: usize) -> bool {
 }
 
 /// The environment map's file, or `None` if there is no map or the map's color factor is black.
-pub fn environment_source(scene: &Scene) -> Option<TextureSource> {
+pub fn environment_map_source(scene: &Scene) -> Option<TextureSource> {
     environment_file(scene).map(environment_texture_source)
 }
 
@@ -226,7 +226,7 @@ fn environment_file(scene: &Scene) -> Option<&Path> {
 }
 
 fn environment_texture_source(file: &Path) -> TextureSource {
-    TextureSource { path: file.to_owned(), image: None, encoding: ImageEncoding::Color, coverage: None }
+    TextureSource { path: file.to_owned(), image: None, encoding: ColorEncoding::Color, coverage: None }
 }
 
 /// Which of the scene's materials are used by objects, and which mesh files' materials are used by mesh
@@ -273,8 +273,9 @@ pub fn scene_material_texture_source(
 /// levels, and for patterns.
 pub fn coverage_cutoff(scene: &Scene, texture: usize, cutoff: f32) -> Option<AlphaCutoffKey> {
     let is_image = scene.textures[texture].as_image().is_some();
-    let is_covered = cutoff > 0.0 && has_mipmaps(scene, texture) && is_image;
-    is_covered.then(|| AlphaCutoffKey::from_opacity_cutoff(cutoff, scene.textures[texture].factor.x))
+    let is_covered = cutoff > 0.0 && texture_uses_mipmaps(scene, texture) && is_image;
+    is_covered
+        .then(|| AlphaCutoffKey::from_opacity_cutoff_and_factor(cutoff, scene.textures[texture].factor.x))
 }
 
 /// How a scene material's texture is used in this role.
@@ -328,32 +329,38 @@ fn have_same_image_and_mapping(scene: &Scene, a: usize, b: usize) -> bool {
 pub fn scene_texture_source(image: &ImageSource, used: PixelInterpretation) -> TextureSource {
     let encoding = match (image.encoding, used) {
         (TextureEncoding::Srgb, PixelInterpretation::Color | PixelInterpretation::Normal) => {
-            ImageEncoding::Srgb
+            ColorEncoding::Srgb
         }
         (TextureEncoding::Linear, PixelInterpretation::Color | PixelInterpretation::Normal)
-        | (TextureEncoding::Auto, PixelInterpretation::Normal) => ImageEncoding::Linear,
-        (TextureEncoding::Auto, PixelInterpretation::Color) => ImageEncoding::Color,
-        (TextureEncoding::Auto, PixelInterpretation::CutOut) => ImageEncoding::CutOut(ColorCurve::Auto),
-        (TextureEncoding::Srgb, PixelInterpretation::CutOut) => ImageEncoding::CutOut(ColorCurve::Srgb),
-        (TextureEncoding::Linear, PixelInterpretation::CutOut) => ImageEncoding::CutOut(ColorCurve::Linear),
+        | (TextureEncoding::Auto, PixelInterpretation::Normal) => ColorEncoding::Linear,
+        (TextureEncoding::Auto, PixelInterpretation::Color) => ColorEncoding::Color,
+        (TextureEncoding::Auto, PixelInterpretation::CutOut) => {
+            ColorEncoding::CutOut(ColorTransferFunction::Auto)
+        }
+        (TextureEncoding::Srgb, PixelInterpretation::CutOut) => {
+            ColorEncoding::CutOut(ColorTransferFunction::Srgb)
+        }
+        (TextureEncoding::Linear, PixelInterpretation::CutOut) => {
+            ColorEncoding::CutOut(ColorTransferFunction::Linear)
+        }
         (TextureEncoding::Srgb, PixelInterpretation::Number(of)) => {
-            ImageEncoding::Number { of, is_srgb: true }
+            ColorEncoding::Number { of, is_srgb: true }
         }
         (TextureEncoding::Auto | TextureEncoding::Linear, PixelInterpretation::Number(of)) => {
-            ImageEncoding::Number { of, is_srgb: false }
+            ColorEncoding::Number { of, is_srgb: false }
         }
     };
     TextureSource { path: image.file.value.clone(), image: image.image, encoding, coverage: None }
 }
 
 /// Returns the image file to load for a texture of a mesh file, and how to decode it for this use.
-pub fn image_file_and_encoding(texture: &FileTexture, used: PixelInterpretation) -> TextureSource {
+pub fn file_texture_source(texture: &FileTexture, used: PixelInterpretation) -> TextureSource {
     let encoding = match used {
-        PixelInterpretation::Color => ImageEncoding::Color,
-        PixelInterpretation::CutOut => ImageEncoding::CutOut(ColorCurve::Auto),
-        PixelInterpretation::Normal => ImageEncoding::Linear,
+        PixelInterpretation::Color => ColorEncoding::Color,
+        PixelInterpretation::CutOut => ColorEncoding::CutOut(ColorTransferFunction::Auto),
+        PixelInterpretation::Normal => ColorEncoding::Linear,
         PixelInterpretation::Number(of) => {
-            ImageEncoding::Number { of: texture.number.unwrap_or(of), is_srgb: false }
+            ColorEncoding::Number { of: texture.number.unwrap_or(of), is_srgb: false }
         }
     };
     TextureSource { path: texture.path.clone(), image: None, encoding, coverage: None }

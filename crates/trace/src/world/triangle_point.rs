@@ -20,7 +20,7 @@ pub(super) struct TrianglePoint {
     /// Barycentric coordinates.
     pub(super) barycentric: Vec3,
     /// Whether the point is so close to an edge that a ray from the point could start beyond a neighboring
-    /// surface; see [`PlacedMesh::pulled_inside`].
+    /// surface; see [`PlacedMesh::point_pulled_inside_triangle`].
     pub(super) is_near_edge: bool,
     /// Whether the barycentric coordinates may be too imprecise; see
     /// [`PlacedMesh::plane_intersection_if_more_precise`].
@@ -72,12 +72,12 @@ impl<P: MeshPlacement> PlacedMesh<P> {
     #[inline(always)]
     pub(super) fn point_error_bound(&self, point: Vec3, local: DVec3, [a, b, c]: [DVec3; 3]) -> Vec3 {
         let reach = self.placement.vector_abs_bound_to_world(local.abs());
-        let parts = point.abs() + reach.as_vec3() + self.placement.mesh_origin().abs().as_vec3();
+        let parts = point.abs() + reach.as_vec3() + self.placement.mesh_origin_in_world().abs().as_vec3();
         let largest = self.placement.vector_abs_bound_to_world(a.abs().max(b.abs()).max(c.abs()));
         let of_double = absolute_f64_error_bound(largest.max_element());
         let error = parts * (2.0 * f32::EPSILON) + Vec3::splat(of_double + f32::MIN_POSITIVE);
         if self.has_rounded_corners {
-            error + (largest + self.placement.mesh_origin().abs()).as_vec3() * f32::EPSILON
+            error + (largest + self.placement.mesh_origin_in_world().abs()).as_vec3() * f32::EPSILON
         } else {
             error
         }
@@ -119,7 +119,7 @@ impl<P: MeshPlacement> PlacedMesh<P> {
     #[inline(always)]
     fn triangle_world_coordinate_bound(&self, [a, b, c]: [DVec3; 3]) -> f64 {
         let largest = self.placement.vector_abs_bound_to_world(a.abs().max(b.abs()).max(c.abs()));
-        (largest + self.placement.mesh_origin().abs()).max_element()
+        (largest + self.placement.mesh_origin_in_world().abs()).max_element()
     }
 
     /// Corrects an imprecise point by computing it from the ray or pulling it inside the triangle. Returns
@@ -134,7 +134,7 @@ impl<P: MeshPlacement> PlacedMesh<P> {
     ) -> [Vec3; 2] {
         match self.plane_intersection_if_more_precise(facet, ray) {
             Some(corrected) => corrected,
-            None if facet.is_near_edge => self.pulled_inside(facet, weights),
+            None if facet.is_near_edge => self.point_pulled_inside_triangle(facet, weights),
             None => [facet.point, facet.error],
         }
     }
@@ -175,7 +175,7 @@ impl<P: MeshPlacement> PlacedMesh<P> {
     /// Moves a point near an edge into the triangle, to at least the minimum distance from the edge. Without
     /// this, a ray could start behind an adjacent wall and escape from a closed room. Returns the point and
     /// its error.
-    fn pulled_inside(&self, facet: &TrianglePoint, [u, v]: [f32; 2]) -> [Vec3; 2] {
+    fn point_pulled_inside_triangle(&self, facet: &TrianglePoint, [u, v]: [f32; 2]) -> [Vec3; 2] {
         let [a, b, c] = facet.corners;
         let (ab, ac) = (b - a, c - a);
         let least = self.required_edge_distance(facet.error, facet.corners) / ab.cross(ac).length();
@@ -259,7 +259,7 @@ mod tests {
                 here.vector_abs_bound_to_world(at.abs())
             );
             assert_eq!(bits(MeshPlacement::normal_to_world(map, at)), bits(here.normal_to_world(at)));
-            assert_eq!(map.mesh_origin(), here.mesh_origin());
+            assert_eq!(map.mesh_origin_in_world(), here.mesh_origin_in_world());
         }
     }
 }

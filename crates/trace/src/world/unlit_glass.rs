@@ -10,7 +10,7 @@ const ROUNDING: f32 = 1e-5;
 
 /// Two bounding boxes of the same light, which is inside both of them.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LightBoundingBoxes {
+pub struct LightBoundingBoxPair {
     /// Bounding box of the light's bounding sphere.
     of_ball: Aabb,
     /// Bounding box of the emitting object.
@@ -19,7 +19,7 @@ pub struct LightBoundingBoxes {
     pub object: Option<u32>,
 }
 
-impl LightBoundingBoxes {
+impl LightBoundingBoxPair {
     /// Whether the light may intersect a box.
     pub fn may_light_intersect_box(&self, bounds: &Aabb) -> bool {
         self.of_ball.overlaps(bounds) && self.of_object.is_none_or(|own| own.overlaps(bounds))
@@ -66,7 +66,7 @@ impl World {
     }
 
     /// Bounding boxes of all finite lights, with a margin for rounding.
-    pub fn finite_light_boxes(&self) -> Vec<LightBoundingBoxes> {
+    pub fn finite_light_boxes(&self) -> Vec<LightBoundingBoxPair> {
         let boxes = self.lights.iter().filter_map(|(_, light)| {
             let bounds = light.bounds_if_emissive().filter(|_| !light.is_infinite())?;
             let (center, radius) = (bounds.center.as_vec3(), bounds.radius as f32);
@@ -75,7 +75,7 @@ impl World {
             let of_ball = Aabb::from_points([center - around, center + around]);
             let object = light.as_area().map(|area| area.object);
             let bounds = object.and_then(|object| self.geometry.objects()[object as usize].bounds());
-            Some(LightBoundingBoxes {
+            Some(LightBoundingBoxPair {
                 of_ball,
                 of_object: bounds.map(|own| own.expanded(Vec3::splat(room))),
                 object,

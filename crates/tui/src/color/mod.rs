@@ -13,7 +13,9 @@ pub(super) use self::bayer::dither_color_to_6_bits;
 pub(super) use self::color_mapper::ColorMapper;
 pub(super) use self::oklab::linear_to_oklab;
 pub use self::palette::xterm_rgb;
-pub(super) use self::palette::{AnsiColors, XTERM, assumed_ansi_colors, fixed_palette_color, nearest_256};
+pub(super) use self::palette::{
+    AnsiColors, XTERM, assumed_ansi_colors, fixed_palette_color, nearest_256_color_index,
+};
 pub(super) use self::palette_dither::PaletteDither;
 use super::terminals::TerminalBrand;
 use crate::choice;
@@ -48,7 +50,7 @@ pub enum ColorDepth {
 }
 
 /// Resolves the user's choice, consulting environment variables for `Auto`.
-pub(super) fn resolve_depth(
+pub(super) fn resolve_color_depth(
     choice: ColorDepthChoice,
     variable: impl Fn(&str) -> Option<String>,
 ) -> ColorDepth {
@@ -57,13 +59,13 @@ pub(super) fn resolve_depth(
         ColorDepthChoice::Indexed256 => ColorDepth::Indexed256,
         ColorDepthChoice::Ansi16 => ColorDepth::Ansi16,
         ColorDepthChoice::None => ColorDepth::None,
-        ColorDepthChoice::Auto => detect_depth(variable),
+        ColorDepthChoice::Auto => detect_color_depth(variable),
     }
 }
 
 /// Detects the color depth from `NO_COLOR` (no-color.org), `COLORTERM`, `TERM` and `TERM_PROGRAM`, in this
 /// order. SSH often forwards only `TERM`.
-fn detect_depth(variable: impl Fn(&str) -> Option<String>) -> ColorDepth {
+fn detect_color_depth(variable: impl Fn(&str) -> Option<String>) -> ColorDepth {
     let get = |name: &str| variable(name).unwrap_or_default();
     let term = get("TERM");
     if !get("NO_COLOR").is_empty() || is_terminal_without_colors(&term) {
@@ -126,7 +128,7 @@ mod tests {
     use super::*;
 
     fn auto(pairs: &[(&str, &str)]) -> ColorDepth {
-        resolve_depth(ColorDepthChoice::Auto, |name| {
+        resolve_color_depth(ColorDepthChoice::Auto, |name| {
             pairs.iter().find(|(key, _)| *key == name).map(|(_, value)| (*value).to_owned())
         })
     }
@@ -158,6 +160,9 @@ mod tests {
     fn no_color_is_honored_unless_overridden() {
         assert_eq!(auto(&[("NO_COLOR", "1"), ("COLORTERM", "truecolor")]), ColorDepth::None);
         assert_eq!(auto(&[("NO_COLOR", ""), ("COLORTERM", "truecolor")]), ColorDepth::TrueColor);
-        assert_eq!(resolve_depth(ColorDepthChoice::Ansi16, |_| Some("1".to_owned())), ColorDepth::Ansi16);
+        assert_eq!(
+            resolve_color_depth(ColorDepthChoice::Ansi16, |_| Some("1".to_owned())),
+            ColorDepth::Ansi16
+        );
     }
 }

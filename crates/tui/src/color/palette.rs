@@ -100,7 +100,7 @@ pub fn xterm_rgb(color: Color) -> Option<[u8; 3]> {
 }
 
 /// Index of the nearest palette color in the cube (16 to 231) or the grays (232 to 255).
-pub(crate) fn nearest_256(rgb: [u8; 3]) -> u8 {
+pub(crate) fn nearest_256_color_index(rgb: [u8; 3]) -> u8 {
     let steps = rgb.map(nearest_cube_level_index);
     let cube = steps.map(|step| CUBE_LEVELS[step]);
     let mean = rgb.iter().map(|&channel| u32::from(channel)).sum::<u32>() / 3;
@@ -147,7 +147,7 @@ mod tests {
             ([238, 238, 238], 255),
             ([118, 118, 118], 243),
         ] {
-            assert_eq!(nearest_256(rgb), index, "{rgb:?}");
+            assert_eq!(nearest_256_color_index(rgb), index, "{rgb:?}");
             assert!(
                 fixed_palette_color(index)
                     .is_some_and(|fixed_color| redmean_distance_squared(fixed_color, rgb) <= 36),
@@ -165,8 +165,10 @@ mod tests {
         assert_eq!(palette.len(), 240);
         for i in 0..4096_u32 {
             let rgb = [0, 8, 16].map(|shift| (i.wrapping_mul(2_654_435_761) >> shift) as u8);
-            let got =
-                redmean_distance_squared(rgb, fixed_palette_color(nearest_256(rgb)).expect("a fixed color"));
+            let got = redmean_distance_squared(
+                rgb,
+                fixed_palette_color(nearest_256_color_index(rgb)).expect("a fixed color"),
+            );
             let best =
                 palette.iter().map(|&other| redmean_distance_squared(rgb, other)).min().expect("240 colors");
             assert!(f64::from(got).sqrt() <= f64::from(best).sqrt() + 12.0, "{rgb:?}: {got} {best}");

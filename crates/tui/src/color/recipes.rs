@@ -69,21 +69,21 @@ impl DitherRecipeCache {
         let part = ((threshold * PARTS as f32) as usize).min(PARTS - 1);
         let recipe = match self.recipes.get(&rgb) {
             Some(recipe) => *recipe,
-            None => self.compute_and_cache_pattern(rgb),
+            None => self.compute_and_cache_recipe(rgb),
         };
         usize::from(recipe[part])
     }
 
-    fn compute_and_cache_pattern(&mut self, rgb: [u8; 3]) -> [u16; PARTS] {
+    fn compute_and_cache_recipe(&mut self, rgb: [u8; 3]) -> [u16; PARTS] {
         if self.recipes.len() >= MAX_RECIPES {
             self.recipes.clear();
         }
-        let recipe = self.compute_pattern(rgb);
+        let recipe = self.compute_recipe(rgb);
         self.recipes.insert(rgb, recipe);
         recipe
     }
 
-    fn compute_pattern(&self, rgb: [u8; 3]) -> [u16; PARTS] {
+    fn compute_recipe(&self, rgb: [u8; 3]) -> [u16; PARTS] {
         let linear = srgb8_color_to_linear(rgb);
         let lab = linear_to_oklab(linear);
         let slope = OklabDerivative::at(linear);

@@ -15,7 +15,7 @@ pub(super) struct TokenBucket {
 }
 
 impl TokenBucket {
-    pub(super) fn full(now: Instant) -> Self {
+    pub(super) fn new_full(now: Instant) -> Self {
         Self { tokens: CAPACITY, at: now }
     }
 

@@ -112,7 +112,7 @@ impl TerminalFlowControl {
             round_trips: MinRoundTripTracker::default(),
             recent: VecDeque::with_capacity(RECENT_SLICES),
             waiting_since: now,
-            bucket: TokenBucket::full(now),
+            bucket: TokenBucket::new_full(now),
             unwritten: 0,
         }
     }

@@ -18,7 +18,7 @@ pub(crate) fn encode_base64(bytes: &[u8]) -> Vec<u8> {
 }
 
 /// Decodes base64, ignoring invalid digits.
-pub(super) fn decoded(text: &[u8]) -> Vec<u8> {
+pub(super) fn decode_base64(text: &[u8]) -> Vec<u8> {
     let values = text.iter().filter_map(|digit| DIGITS.iter().position(|known| known == digit));
     let (mut bytes, mut bits, mut count) = (Vec::with_capacity(text.len() / 4 * 3), 0_u32, 0);
     for value in values {
@@ -46,7 +46,7 @@ mod tests {
             ("foobar", "Zm9vYmFy"),
         ] {
             assert_eq!(encode_base64(bytes.as_bytes()), text.as_bytes());
-            assert_eq!(decoded(text.as_bytes()), bytes.as_bytes());
+            assert_eq!(decode_base64(text.as_bytes()), bytes.as_bytes());
         }
     }
 }

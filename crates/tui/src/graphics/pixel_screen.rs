@@ -1,6 +1,6 @@
 //! A minimal terminal that displays images, for tests and benchmarks.
 
-use super::base64::decoded;
+use super::base64::decode_base64;
 use crate::film::Srgb8Image;
 
 /// A terminal that understands only kitty graphics and Sixel, and shows the last complete image.
@@ -58,7 +58,7 @@ impl TestImageTerminal {
         if keys.split(',').any(|key| key == "m=1") {
             return None;
         }
-        decode_png(&decoded(&std::mem::take(&mut self.chunks)))
+        decode_png(&decode_base64(&std::mem::take(&mut self.chunks)))
     }
 }
 

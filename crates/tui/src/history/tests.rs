@@ -6,7 +6,7 @@ use crate::pipeline::protocol::PreviewedImageState;
 use crate::pipeline::settings::{CameraOverrides, ViewMode};
 use crate::pipeline::{FileContentId, FilePathAndContentId};
 use crate::scene::fingerprint::FingerprintHasher;
-use crate::state::KeyOverrides;
+use crate::state::KeyboardOverrides;
 
 fn shown_image(generation: u64, side: u32) -> PreviewUpdate {
     PreviewUpdate {
@@ -95,12 +95,12 @@ fn edits_without_visible_effect_are_skipped() {
     history.discard_edits_of_invalid_scene();
     edit(&mut history);
     history.record_shown_image(shown_image(4, 20), Instant::now(), ImageProvenance::default());
-    let before = history.open_before_edit(shown_image(4, 20)).expect("a picture");
+    let before = history.open_render_before_edit(shown_image(4, 20)).expect("a picture");
     assert_eq!(before.generation, 1);
     // Images rendered after a key press include the last edit.
     history.return_to_newest();
     history.record_shown_image(shown_image(5, 30), Instant::now(), ImageProvenance::default());
-    let before = history.open_before_edit(shown_image(5, 30)).expect("a picture");
+    let before = history.open_render_before_edit(shown_image(5, 30)).expect("a picture");
     assert_eq!(before.generation, 1);
 }
 
@@ -113,7 +113,7 @@ fn before_edit_ignores_broken_edits() {
     history.record_scene_edit();
     history.discard_edits_of_invalid_scene();
     history.record_shown_image(shown_image(3, 30), Instant::now(), ImageProvenance::default());
-    assert_eq!(history.open_before_edit(shown_image(3, 30)).expect("a picture").generation, 1);
+    assert_eq!(history.open_render_before_edit(shown_image(3, 30)).expect("a picture").generation, 1);
 }
 
 /// A preview of a finished or unfinished image, and the image's origin.
@@ -182,7 +182,7 @@ fn saving_the_camera_counts_as_an_edit() {
     history.record_shown_image(shown_image(2, 20), Instant::now(), ImageProvenance::default());
     history.record_shown_image(shown_image(3, 30), Instant::now(), ImageProvenance::default());
     history.record_camera_save_as_edit(2);
-    let before = history.open_before_edit(shown_image(3, 30)).expect("a picture");
+    let before = history.open_render_before_edit(shown_image(3, 30)).expect("a picture");
     assert_eq!(before.generation, 1, "expected the image before the camera moved");
 }
 
@@ -196,7 +196,7 @@ fn each_request_has_one_entry() {
 
 /// Creates an image's origin from its scene text and view.
 fn origin(text: &str, view: Option<ViewMode>) -> ImageProvenance {
-    let toggles = KeyOverrides { view, ..KeyOverrides::default() };
+    let toggles = KeyboardOverrides { view, ..KeyboardOverrides::default() };
     ImageProvenance { toggles, text: Some(text.into()), ..ImageProvenance::default() }
 }
 
@@ -229,7 +229,7 @@ fn entries_list_changes_since_the_previous_one() {
 fn saved_camera_is_listed_once() {
     let mut history = RenderHistory::default();
     let camera = CameraOverrides { fov: Some(30.0), ..CameraOverrides::default() };
-    let moved = KeyOverrides { camera, ..KeyOverrides::default() };
+    let moved = KeyboardOverrides { camera, ..KeyboardOverrides::default() };
     history.record_shown_image(shown_image(1, 10), Instant::now(), origin("camera.fov = 40", None));
     let before = ImageProvenance { toggles: moved, ..origin("camera.fov = 40", None) };
     history.record_shown_image(shown_image(2, 20), Instant::now(), before.clone());
@@ -251,7 +251,7 @@ fn ineffective_saves_are_not_listed() {
     let mut history = RenderHistory::default();
     let record = |history: &mut RenderHistory, generation, name, is_finished, text: &str, photons| {
         let (shown, origin) = of_image(generation, name, is_finished);
-        let toggles = KeyOverrides { photons, ..KeyOverrides::default() };
+        let toggles = KeyboardOverrides { photons, ..KeyboardOverrides::default() };
         history.record_shown_image(
             shown,
             Instant::now(),
@@ -279,7 +279,7 @@ fn ineffective_saves_are_not_listed() {
     let camera = CameraOverrides { fov: Some(30.0), ..CameraOverrides::default() };
     let text = "render.samples = 8\nradius = 1\ncamera.fov = 30";
     let (shown, origin) = of_image(7, "fov", true);
-    let moved = KeyOverrides { camera, photons: Some(true), ..KeyOverrides::default() };
+    let moved = KeyboardOverrides { camera, photons: Some(true), ..KeyboardOverrides::default() };
     let before = "render.samples = 8\nradius = 1";
     history.record_shown_image(
         shown,
@@ -295,7 +295,7 @@ fn ineffective_saves_are_not_listed() {
 fn entry_keeps_its_original_changes() {
     let mut history = RenderHistory::default();
     let mut generation = 0;
-    let mut record = |history: &mut RenderHistory, name: &str, toggles: KeyOverrides, text: &str| {
+    let mut record = |history: &mut RenderHistory, name: &str, toggles: KeyboardOverrides, text: &str| {
         generation += 1;
         // Record the image while it is in progress, when it is finished, and once more.
         for _ in 0..3 {
@@ -309,7 +309,7 @@ fn entry_keeps_its_original_changes() {
         edit(history);
         changes(history)
     };
-    let keys = KeyOverrides::default();
+    let keys = KeyboardOverrides::default();
     record(&mut history, "narrow", keys, "camera.fov = 40");
     record(&mut history, "wide", keys, "camera.fov = 44");
     let words = [messages::OPENED, "camera.fov 40 → 44"];
@@ -320,7 +320,7 @@ fn entry_keeps_its_original_changes() {
     // A camera moved with keys is listed as such unless it has been saved to the scene.
     let mut history = RenderHistory::default();
     let camera = CameraOverrides { fov: Some(30.0), ..CameraOverrides::default() };
-    let moved = KeyOverrides { camera, ..KeyOverrides::default() };
+    let moved = KeyboardOverrides { camera, ..KeyboardOverrides::default() };
     record(&mut history, "own", keys, "camera.fov = 44");
     for (toggles, text, words) in [
         (moved, "camera.fov = 44", "camera moved"),

@@ -154,7 +154,7 @@ impl Perform for DecodedInputCollector {
             ([], '~') if first == 201 => {}
             ([], '~') => {
                 if let Some(code) = key_from_csi_number(first) {
-                    self.push_decoded_key(code, modifiers(second));
+                    self.push_decoded_key(code, decode_modifiers(second));
                 }
             }
             ([], 'Z') => self.push_decoded_key(KeyCode::BackTab, KeyModifiers::SHIFT),
@@ -173,7 +173,7 @@ impl Perform for DecodedInputCollector {
             ([], 't') => self.push_decoded_reply(TerminalReply::Other),
             ([], letter) => {
                 if let Some(code) = key_for_final_byte(letter) {
-                    self.push_decoded_key(code, modifiers(second));
+                    self.push_decoded_key(code, decode_modifiers(second));
                 }
             }
             _ => self.push_decoded_reply(TerminalReply::Other),
@@ -236,7 +236,7 @@ fn key_from_csi_number(number: u16) -> Option<KeyCode> {
 }
 
 /// Decodes xterm's modifier parameter: 1, plus 1 for shift, 2 for alt, 4 for ctrl, 8 for super.
-fn modifiers(number: u16) -> KeyModifiers {
+fn decode_modifiers(number: u16) -> KeyModifiers {
     let bits = number.saturating_sub(1);
     [(1, KeyModifiers::SHIFT), (2, KeyModifiers::ALT), (4, KeyModifiers::CONTROL), (8, KeyModifiers::SUPER)]
         .into_iter()

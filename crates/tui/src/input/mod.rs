@@ -56,7 +56,7 @@ pub(super) fn set_input_paused(is_held: bool) {
 }
 
 /// Waits while another program is reading the input. Returns true if it had to wait.
-fn wait_while_input_released() -> bool {
+fn wait_while_input_paused() -> bool {
     let held = HELD.0.lock().unwrap_or_else(PoisonError::into_inner);
     let was_held = *held;
     drop(HELD.1.wait_while(held, |held| *held));
@@ -67,7 +67,7 @@ fn wait_while_input_released() -> bool {
 fn read_next_input_batch(decoder: &mut Decoder) -> Option<Vec<DecodedInput>> {
     let mut bytes = [0; 4096];
     let waited = wait_for_input(decoder.deadline());
-    if wait_while_input_released() {
+    if wait_while_input_paused() {
         return Some(Vec::new());
     }
     match waited.and_then(|is_readable| if is_readable { read_stdin(&mut bytes) } else { Ok(None) }) {

@@ -42,7 +42,7 @@ fn best_division(grid: CellGrid, pixels: &[Vec3]) -> CellDivision {
     let (mut best, mut most) =
         (CellDivision { first: 1, tile: TwoPartBlockPattern::HALVES }, f32::NEG_INFINITY);
     let (mut mask, mut sum, mut size) = (0_u32, Vec3::ZERO, 0.0_f32);
-    for division in grid.two_color_patterns() {
+    for division in grid.all_divisions() {
         let mut changed = mask ^ division.first;
         while changed != 0 {
             let pixel = changed.trailing_zeros();
@@ -74,7 +74,7 @@ mod tests {
     fn two_color_patterns_are_reproduced() {
         let colors = [[200, 20, 20], [20, 40, 180]];
         for grid in [CellGrid::Quadrants, CellGrid::Sextants, CellGrid::Octants] {
-            for CellDivision { first, tile } in grid.two_color_patterns() {
+            for CellDivision { first, tile } in grid.all_divisions() {
                 let pixels: Vec<[u8; 3]> =
                     (0..2 * grid.rows_per_cell()).map(|i| colors[usize::from(first >> i & 1 == 0)]).collect();
                 assert_eq!(fit_cell(grid, &pixels), FittedCell { tile: *tile, pair: colors });

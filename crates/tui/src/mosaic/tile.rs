@@ -212,7 +212,7 @@ impl CellGrid {
 
     /// Lists all divisions of a two-column cell, starting with halves. Successive divisions usually differ in
     /// only one part of the grid.
-    pub(super) fn two_color_patterns(self) -> &'static [CellDivision] {
+    pub(super) fn all_divisions(self) -> &'static [CellDivision] {
         static QUADRANTS: LazyLock<Vec<CellDivision>> = LazyLock::new(|| all_cell_divisions(2, &[2]));
         static SEXTANTS: LazyLock<Vec<CellDivision>> = LazyLock::new(|| all_cell_divisions(6, &[2, 3]));
         static OCTANTS: LazyLock<Vec<CellDivision>> = LazyLock::new(|| all_cell_divisions(4, &[4]));
@@ -256,7 +256,7 @@ mod tests {
         for (grid, count) in
             [(CellGrid::Quadrants, 7), (CellGrid::Sextants, 31 + 6), (CellGrid::Octants, 127)]
         {
-            let divisions = grid.two_color_patterns();
+            let divisions = grid.all_divisions();
             let mut seen = std::collections::HashSet::new();
             for CellDivision { first, tile } in divisions {
                 assert_eq!(

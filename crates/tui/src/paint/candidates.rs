@@ -3,7 +3,7 @@
 use super::cell::TwoPartColorCell;
 use super::cost_model::RateDistortion;
 use super::terminal_color::{TerminalColor, decimal_digit_count};
-use crate::color::nearest_256;
+use crate::color::nearest_256_color_index;
 
 /// Maximum number of candidates for each part, and for filling both parts with one color.
 const MAX_CANDIDATES: usize = 6;
@@ -56,7 +56,7 @@ fn candidate_colors_for_run(
     for span in model.spans {
         let box_ = shared_color_range(wanted.clone(), *span);
         add(TerminalColor::Rgb(box_.color_with_fewest_digits()));
-        let index = nearest_256(box_.clamped_mean_color());
+        let index = nearest_256_color_index(box_.clamped_mean_color());
         let fixed = TerminalColor::Palette(index);
         if index >= FIRST_UNTOUCHED && fixed.to_rgb().is_some_and(|rgb| box_.contains(rgb)) {
             add(fixed);

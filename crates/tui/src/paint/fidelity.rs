@@ -2,7 +2,7 @@
 
 /// Precision with which the preview is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Fidelity {
+pub enum PreviewFidelity {
     /// A request's first preview, which will be refined soon. Uses at most 12 bytes per cell.
     First,
     /// A later preview that will still be refined.

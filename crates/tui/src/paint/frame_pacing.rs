@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use super::fidelity::Fidelity;
+use super::fidelity::PreviewFidelity;
 
 /// Inputs for deciding whether to draw a new preview.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -33,7 +33,7 @@ pub struct PacingInputs {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PacingAdvice {
     /// Draw the preview with this precision.
-    Aim(Fidelity),
+    Aim(PreviewFidelity),
     /// Wait for a better preview.
     Wait,
 }
@@ -62,12 +62,12 @@ const PREVIEW_BANDWIDTH: f64 = 0.5;
 /// the last one.
 pub fn pace_preview(moment: &PacingInputs) -> PacingAdvice {
     if moment.is_final {
-        return PacingAdvice::Aim(Fidelity::Still);
+        return PacingAdvice::Aim(PreviewFidelity::Still);
     }
-    let Some(aimed) = moment.aimed_samples else { return PacingAdvice::Aim(Fidelity::First) };
+    let Some(aimed) = moment.aimed_samples else { return PacingAdvice::Aim(PreviewFidelity::First) };
     if moment.is_fast {
         let is_due = moment.is_shown && moment.since_aim >= moment.shortest_preview_interval();
-        return if is_due { PacingAdvice::Aim(Fidelity::Following) } else { PacingAdvice::Wait };
+        return if is_due { PacingAdvice::Aim(PreviewFidelity::Following) } else { PacingAdvice::Wait };
     }
     let frame = moment.estimate_send_duration();
     let is_too_late = moment.final_in.is_some_and(|left| left < frame);
@@ -83,7 +83,7 @@ pub fn pace_preview(moment: &PacingInputs) -> PacingAdvice {
     } else {
         is_better(MANY_MORE_SAMPLES)
     };
-    if is_worth_it { PacingAdvice::Aim(Fidelity::Moving) } else { PacingAdvice::Wait }
+    if is_worth_it { PacingAdvice::Aim(PreviewFidelity::Moving) } else { PacingAdvice::Wait }
 }
 
 impl PacingInputs {
@@ -126,7 +126,7 @@ mod tests {
         final_in: None,
     };
 
-    const MOVING: PacingAdvice = PacingAdvice::Aim(Fidelity::Moving);
+    const MOVING: PacingAdvice = PacingAdvice::Aim(PreviewFidelity::Moving);
 
     #[test]
     fn first_and_last_previews_are_always_drawn() {
@@ -135,11 +135,11 @@ mod tests {
                 PacingInputs { bytes_per_second, since_aim: Duration::ZERO, is_shown: false, ..MOMENT };
             assert_eq!(
                 pace_preview(&PacingInputs { aimed_samples: None, ..slow }),
-                PacingAdvice::Aim(Fidelity::First)
+                PacingAdvice::Aim(PreviewFidelity::First)
             );
             assert_eq!(
                 pace_preview(&PacingInputs { is_final: true, ..slow }),
-                PacingAdvice::Aim(Fidelity::Still)
+                PacingAdvice::Aim(PreviewFidelity::Still)
             );
         }
     }
@@ -159,7 +159,7 @@ mod tests {
 
     #[test]
     fn fast_terminals_get_5_to_10_previews_per_second() {
-        let following = PacingAdvice::Aim(Fidelity::Following);
+        let following = PacingAdvice::Aim(PreviewFidelity::Following);
         let quick = PacingInputs { is_fast: true, since_aim: Duration::from_millis(100), ..MOMENT };
         assert_eq!(pace_preview(&quick), following, "drawn regardless of the number of new samples");
         assert_eq!(

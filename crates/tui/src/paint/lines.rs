@@ -8,7 +8,7 @@ use super::terminal_color::{ColorLayer, TerminalColor};
 
 /// Converts a buffer's rows to lines without trailing blanks. Each line starts and ends with the terminal's
 /// default colors. If `is_colored` is false, the output contains no escape sequences.
-pub fn buffer_to_text_lines(buffer: &Buffer, is_colored: bool) -> String {
+pub fn buffer_to_ansi_text(buffer: &Buffer, is_colored: bool) -> String {
     let mut bytes = Vec::new();
     for row in buffer.content.chunks(usize::from(buffer.area.width.max(1))) {
         let length = row.iter().rposition(is_visible_cell).map_or(0, |last| last + 1);
@@ -51,7 +51,7 @@ mod tests {
         buffer.set_string(0, 0, "ab", Style::new().fg(Color::Red));
         buffer.set_string(2, 2, "▀", Style::new().fg(Color::Rgb(1, 2, 3)).bg(Color::Indexed(9)));
         let colored = "\u{1b}[31mab\u{1b}[0m\n\n  \u{1b}[38;2;1;2;3;101m▀\u{1b}[0m\n";
-        assert_eq!(buffer_to_text_lines(&buffer, true), colored);
-        assert_eq!(buffer_to_text_lines(&buffer, false), "ab\n\n  ▀\n");
+        assert_eq!(buffer_to_ansi_text(&buffer, true), colored);
+        assert_eq!(buffer_to_ansi_text(&buffer, false), "ab\n\n  ▀\n");
     }
 }

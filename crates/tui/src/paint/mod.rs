@@ -35,11 +35,11 @@ use std::vec;
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
-pub use self::fidelity::Fidelity;
+pub use self::fidelity::PreviewFidelity;
 pub use self::frame_pacing::{PacingAdvice, PacingInputs, pace_preview};
 use self::hyperlinks::UrlTable;
 pub use self::hyperlinks::{Hyperlink, LINK_OFF};
-pub use self::lines::buffer_to_text_lines;
+pub use self::lines::buffer_to_ansi_text;
 use self::preview_rows::FirstPreviewByteBudget;
 pub use self::rep_support::terminal_supports_rep;
 use self::screen::{CellRun, LimitedOutputSlice, ScreenModel};
@@ -128,7 +128,7 @@ impl Painter {
     ///
     /// Drawing of the preview starts with the rows that have waited longest, so every row gets drawn even if
     /// targets change faster than they can be drawn.
-    pub fn set_target(&mut self, wanted: &Buffer, picture: Rect, fidelity: Fidelity) {
+    pub fn set_target(&mut self, wanted: &Buffer, picture: Rect, fidelity: PreviewFidelity) {
         self.set_target_with_extras(wanted, picture, fidelity, &LinksAndDelayedText::default());
     }
 
@@ -137,7 +137,7 @@ impl Painter {
         &mut self,
         wanted: &Buffer,
         picture: Rect,
-        fidelity: Fidelity,
+        fidelity: PreviewFidelity,
         extras: &LinksAndDelayedText,
     ) {
         let mut wanted =
@@ -154,7 +154,7 @@ impl Painter {
         }
         for (y, row) in (0..wanted.rows).zip(&mut self.rows) {
             row.is_done = row.is_done && self.wanted.row_also_satisfies_other(&wanted, y);
-            if fidelity == Fidelity::First && !row.is_done {
+            if fidelity == PreviewFidelity::First && !row.is_done {
                 row.aim = 0;
             }
         }
@@ -194,7 +194,7 @@ impl Painter {
         let (columns, rows) = (self.wanted.columns, self.wanted.rows);
         let screen = self.screen.get_or_insert_with(|| {
             ScreenModel::push_clear_sequence(&self.links, &mut slice);
-            ScreenModel::cleared(columns, rows)
+            ScreenModel::new_cleared(columns, rows)
         });
         loop {
             while let Some(stroke) = self.strokes.as_slice().first() {
@@ -244,7 +244,7 @@ impl Painter {
             };
             self.strokes = strokes.into_iter();
         }
-        if self.wanted.fidelity == Fidelity::Still {
+        if self.wanted.fidelity == PreviewFidelity::Still {
             self.memory.finish_request();
         }
         slice.bytes

@@ -3,7 +3,7 @@
 use super::cell::CellContent;
 use super::cost_model::RateDistortion;
 use super::cursor_moves::CellPosition;
-use super::fidelity::Fidelity;
+use super::fidelity::PreviewFidelity;
 use super::row_optimizer::{DrawOp, PlannedRow, RowStart, TargetCell, plan_row};
 use super::screen::{CellRun, ScreenModel};
 use super::stable_cells::FirstPreviewCells;
@@ -71,10 +71,10 @@ pub(super) fn plan_preview_row(
         is_at_start: screen.cursor == Some(CellPosition { x: columns.start, y }),
     };
     let row = match wanted.fidelity {
-        Fidelity::Still => plan_row(&targets, start, RateDistortion::EXACT),
-        Fidelity::Following => plan_row(&targets, start, RateDistortion::ALL),
-        Fidelity::Moving => plan_row(&targets, start, RateDistortion::MOVING),
-        Fidelity::First => budget.plan_row_in_budget(&targets, start),
+        PreviewFidelity::Still => plan_row(&targets, start, RateDistortion::EXACT),
+        PreviewFidelity::Following => plan_row(&targets, start, RateDistortion::ALL),
+        PreviewFidelity::Moving => plan_row(&targets, start, RateDistortion::MOVING),
+        PreviewFidelity::First => budget.plan_row_in_budget(&targets, start),
     };
     let stroke = |op: DrawOp| CellRun::Mosaic {
         at: CellPosition { x: columns.start + op.column as u16, y },

@@ -110,7 +110,7 @@ pub(super) fn plan_row(targets: &[TargetCell], start: RowStart, model: RateDisto
         let last = &paths[column];
         paths.push(extend_plans(last, *target, &wanted[column..], model));
     }
-    trace_back(&paths, &wanted)
+    trace_back_cheapest_plan(&paths, &wanted)
 }
 
 /// Extends the paths by one cell.
@@ -368,7 +368,7 @@ impl PenWithErrors {
 }
 
 /// Traces the cheapest path back from the last cell.
-fn trace_back(paths: &[Vec<RowPrefixPlan>], wanted: &[Option<TwoPartColorCell>]) -> PlannedRow {
+fn trace_back_cheapest_plan(paths: &[Vec<RowPrefixPlan>], wanted: &[Option<TwoPartColorCell>]) -> PlannedRow {
     let last = paths.last().into_iter().flatten().enumerate();
     let best = last.min_by(|a, b| a.1.cost.total_cmp(&b.1.cost));
     let (mut index, bytes) = best.map_or((0, 0), |(index, path)| (index, path.bytes));

@@ -80,7 +80,7 @@ pub(super) struct ScreenModel {
 
 impl ScreenModel {
     /// The state of the screen after [`ScreenModel::push_clear_sequence`].
-    pub(super) fn cleared(columns: u16, rows: u16) -> Self {
+    pub(super) fn new_cleared(columns: u16, rows: u16) -> Self {
         Self {
             columns,
             rows,
@@ -90,7 +90,7 @@ impl ScreenModel {
         }
     }
 
-    /// Appends the bytes that clear the screen. The resulting state is [`ScreenModel::cleared`].
+    /// Appends the bytes that clear the screen. The resulting state is [`ScreenModel::new_cleared`].
     pub(super) fn push_clear_sequence(links: &UrlTable, slice: &mut LimitedOutputSlice) {
         if !links.is_empty() {
             slice.bytes.extend_from_slice(LINK_OFF);

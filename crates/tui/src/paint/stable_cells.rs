@@ -8,7 +8,7 @@ use ratatui::layout::Rect;
 
 use super::cell::{CellContent, TwoPartColorCell};
 use super::cursor_moves::CellPosition;
-use super::fidelity::Fidelity;
+use super::fidelity::PreviewFidelity;
 use super::screen::ScreenModel;
 use super::target_screen::TargetScreen;
 use super::terminal_color::TerminalColor;
@@ -53,16 +53,16 @@ impl FirstPreviewCells {
             };
         }
         match wanted.fidelity {
-            Fidelity::First => self.compare_first_previews(wanted),
-            Fidelity::Moving => {
-                self.noise = noise_threshold(self.median_stable_cell_difference(wanted, screen));
+            PreviewFidelity::First => self.compare_first_previews(wanted),
+            PreviewFidelity::Moving => {
+                self.noise = noise_threshold_from_median(self.median_stable_cell_difference(wanted, screen));
             }
-            Fidelity::Following => match self.median_stable_cell_difference(wanted, screen) {
+            PreviewFidelity::Following => match self.median_stable_cell_difference(wanted, screen) {
                 // There is hardly any noise left to hide, so redraw everything.
                 ..=1 => self.steady.fill(false),
-                median => self.noise = noise_threshold(median),
+                median => self.noise = noise_threshold_from_median(median),
             },
-            Fidelity::Still => self.steady.fill(false),
+            PreviewFidelity::Still => self.steady.fill(false),
         }
     }
 
@@ -157,7 +157,7 @@ impl FirstPreviewCells {
 }
 
 /// Noise threshold for a median difference.
-fn noise_threshold(median: usize) -> u8 {
+fn noise_threshold_from_median(median: usize) -> u8 {
     u8::try_from(4 * median + 2).unwrap_or(u8::MAX).min(MAX_NOISE)
 }
 

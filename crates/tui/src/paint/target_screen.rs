@@ -4,7 +4,7 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
 use super::cell::{CellContent, TwoPartColorCell};
-use super::fidelity::Fidelity;
+use super::fidelity::PreviewFidelity;
 use crate::color::ColorDepth;
 
 /// The cells to be shown on the screen.
@@ -16,7 +16,7 @@ pub(super) struct TargetScreen {
     pub(super) picture: Rect,
     /// Cells whose text is drawn after the preview.
     pub(super) later: Rect,
-    pub(super) fidelity: Fidelity,
+    pub(super) fidelity: PreviewFidelity,
     depth: ColorDepth,
 }
 
@@ -32,10 +32,10 @@ pub(super) enum ScreenRegion {
 impl TargetScreen {
     /// A target screen without cells.
     pub(super) fn without_cells(depth: ColorDepth) -> Self {
-        Self::new(&Buffer::empty(Rect::ZERO), Rect::ZERO, Fidelity::Still, depth)
+        Self::new(&Buffer::empty(Rect::ZERO), Rect::ZERO, PreviewFidelity::Still, depth)
     }
 
-    pub(super) fn new(buffer: &Buffer, picture: Rect, fidelity: Fidelity, depth: ColorDepth) -> Self {
+    pub(super) fn new(buffer: &Buffer, picture: Rect, fidelity: PreviewFidelity, depth: ColorDepth) -> Self {
         let (columns, rows) = (buffer.area.width, buffer.area.height);
         let picture = picture.intersection(Rect::new(0, 0, columns, rows));
         Self {
@@ -61,8 +61,8 @@ impl TargetScreen {
     /// Whether a row drawn for this target would also satisfy `other`.
     pub(super) fn row_also_satisfies_other(&self, other: &Self, y: u16) -> bool {
         let is_as_near = self.fidelity == other.fidelity
-            || (matches!(self.fidelity, Fidelity::Still | Fidelity::Following)
-                && other.fidelity == Fidelity::Moving);
+            || (matches!(self.fidelity, PreviewFidelity::Still | PreviewFidelity::Following)
+                && other.fidelity == PreviewFidelity::Moving);
         let columns = usize::from(self.picture.left())..usize::from(self.picture.right());
         is_as_near
             && (self.columns, self.picture) == (other.columns, other.picture)
@@ -98,7 +98,7 @@ impl TargetScreen {
     /// The region that a cell belongs to.
     pub(super) fn region_at(&self, x: u16, y: u16) -> ScreenRegion {
         match () {
-            () if self.is_preview(x, y) => ScreenRegion::Preview,
+            () if self.is_preview_cell(x, y) => ScreenRegion::Preview,
             () if !self.later.contains((x, y).into()) => ScreenRegion::Text,
             () if self.row(y)[usize::from(x)] == CellContent::BLANK => ScreenRegion::Text,
             () => ScreenRegion::DelayedText,
@@ -106,7 +106,7 @@ impl TargetScreen {
     }
 
     /// Whether a cell belongs to the preview. Preview cells are mosaics or, without colors, ramp characters.
-    pub(super) fn is_preview(&self, x: u16, y: u16) -> bool {
+    pub(super) fn is_preview_cell(&self, x: u16, y: u16) -> bool {
         let is_tone = |symbol: &str| matches!(symbol.as_bytes(), [byte] if byte.is_ascii_punctuation());
         self.picture.contains((x, y).into())
             && match &self.row(y)[usize::from(x)] {

@@ -176,14 +176,14 @@ fn depth() -> impl Strategy<Value = ColorDepth> {
     ])
 }
 
-fn fidelity() -> impl Strategy<Value = Fidelity> {
-    proptest::sample::select(vec![Fidelity::First, Fidelity::Moving, Fidelity::Still])
+fn fidelity() -> impl Strategy<Value = PreviewFidelity> {
+    proptest::sample::select(vec![PreviewFidelity::First, PreviewFidelity::Moving, PreviewFidelity::Still])
 }
 
 /// A step of a painter test.
 #[derive(Clone, Debug)]
 enum PainterStep {
-    Aim(Buffer, Fidelity),
+    Aim(Buffer, PreviewFidelity),
     Slice(usize),
     Forget,
     /// Another program writes to the screen, and the painter discards its model of the screen.
@@ -222,11 +222,11 @@ proptest! {
                 }
             }
         }
-        test.painter.set_target(&last, PICTURE, Fidelity::Still);
+        test.painter.set_target(&last, PICTURE, PreviewFidelity::Still);
         test.finish(max_bytes);
         let largest = test.difference(&last, depth);
         prop_assert!(largest <= 1, "{largest}");
-        test.painter.set_target(&last, PICTURE, Fidelity::Still);
+        test.painter.set_target(&last, PICTURE, PreviewFidelity::Still);
         prop_assert_eq!(test.finish(max_bytes), 0, "an up-to-date screen should need no bytes");
     }
 
@@ -248,7 +248,7 @@ fn resize_redraws_the_screen() {
         let area = Rect::new(0, 0, columns, rows);
         let mut buffer = Buffer::empty(area);
         buffer.set_string(0, 0, "words", ratatui::style::Style::new());
-        test.painter.set_target(&buffer, area, Fidelity::Still);
+        test.painter.set_target(&buffer, area, PreviewFidelity::Still);
         test.finish(1000);
         assert_eq!(test.difference(&buffer, ColorDepth::TrueColor), 0);
     }
@@ -270,7 +270,7 @@ fn text_is_drawn_first_then_middle_rows() {
     buffer.set_string(0, 8, "words", ratatui::style::Style::new());
     buffer.set_string(5, 3, "over_it", ratatui::style::Style::reset());
     let mut test = TestTerminal::new(30, 9, ColorDepth::TrueColor);
-    test.painter.set_target(&buffer, picture, Fidelity::Still);
+    test.painter.set_target(&buffer, picture, PreviewFidelity::Still);
     test.slice(100);
     let row =
         |test: &TestTerminal, y: u16| test.terminal.screen().rows(0, 30).nth(usize::from(y)).expect("a row");
@@ -301,7 +301,7 @@ fn character_preview_is_drawn_after_text() {
     }
     buffer.set_string(0, 5, "words", ratatui::style::Style::new());
     let mut test = TestTerminal::new(20, 6, ColorDepth::None);
-    test.painter.set_target(&buffer, picture, Fidelity::Moving);
+    test.painter.set_target(&buffer, picture, PreviewFidelity::Moving);
     let mut order = Vec::new();
     while test.slice(24) {
         let rows: Vec<String> = test.terminal.screen().rows(0, 20).collect();
@@ -321,11 +321,11 @@ fn long_blanks_are_erased() {
     full.set_string(0, 0, "x".repeat(60), ratatui::style::Style::new());
     let mut test = TestTerminal::new(60, 1, ColorDepth::TrueColor);
     for (text, most) in [("x".repeat(20), 12), (format!("{}{}x", "x".repeat(20), " ".repeat(39)), 16)] {
-        test.painter.set_target(&full, Rect::ZERO, Fidelity::Still);
+        test.painter.set_target(&full, Rect::ZERO, PreviewFidelity::Still);
         test.finish(100);
         let mut buffer = Buffer::empty(area);
         buffer.set_string(0, 0, &text, ratatui::style::Style::new());
-        test.painter.set_target(&buffer, Rect::ZERO, Fidelity::Still);
+        test.painter.set_target(&buffer, Rect::ZERO, PreviewFidelity::Still);
         let sent = test.finish(100);
         assert!(sent <= most, "{sent} bytes for {text:?}");
         assert_eq!(test.difference(&buffer, ColorDepth::TrueColor), 0);
@@ -352,7 +352,7 @@ fn delayed_text_is_drawn_after_the_preview() {
         [LinksAndDelayedText { later, ..LinksAndDelayedText::default() }, LinksAndDelayedText::default()]
     {
         let mut test = TestTerminal::new(COLUMNS, ROWS, ColorDepth::TrueColor);
-        test.painter.set_target_with_extras(&buffer, PICTURE, Fidelity::Still, &extras);
+        test.painter.set_target_with_extras(&buffer, PICTURE, PreviewFidelity::Still, &extras);
         let mut cells_before = None;
         while test.slice(60) {
             let text = test.terminal.screen().contents();
@@ -382,7 +382,7 @@ fn hyperlink_covers_only_its_cells() {
     };
     let mut painter = Painter::new(ColorDepth::TrueColor);
     let mut sent = |extras: &LinksAndDelayedText| {
-        painter.set_target_with_extras(&buffer, PICTURE, Fidelity::Still, extras);
+        painter.set_target_with_extras(&buffer, PICTURE, PreviewFidelity::Still, extras);
         let mut bytes = Vec::new();
         loop {
             let slice = painter.next_slice(100);

@@ -88,7 +88,7 @@ fn replace_blanks_with_erase(wanted: &TargetScreen, y: u16, strokes: &[CellRun])
         let at = run[0].position();
         let end = usize::from(at.x) + run.len();
         let rest = end as u16..wanted.columns;
-        let is_last = rest.clone().all(|x| !wanted.is_preview(x, y))
+        let is_last = rest.clone().all(|x| !wanted.is_preview_cell(x, y))
             && wanted.row(y)[end.min(usize::from(wanted.columns))..]
                 .iter()
                 .all(|look| *look == CellContent::BLANK);

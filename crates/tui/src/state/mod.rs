@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 
 pub(super) use self::display::TerminalDisplayState;
 pub(super) use self::overlays::{BlockingErrors, Message, OverlayState, PaneState, ViewList};
-pub(super) use self::preview::PreviewState;
+pub(super) use self::preview::ImageViewState;
 pub(super) use self::request::{CameraStepStatus, ImageProvenance, RequestState};
 pub(super) use self::saving::{SavedFilesState, SceneImageProgress, UndisplayedChange, WrittenFile};
 pub(super) use self::selection::{MousePress, PickPurpose, PointerState};
@@ -24,7 +24,7 @@ use super::options::ExternalChange;
 use super::preview_style::PreviewStyle;
 use super::terminal_replies::TerminalQueries;
 use super::terminals::DesktopCapabilities;
-pub(super) use crate::pipeline::key_overrides::{KeyOverrides, format_stops};
+pub(super) use crate::pipeline::key_overrides::{KeyboardOverrides, format_stops};
 use crate::pipeline::settings::Overrides;
 use crate::scene::diagnostic::{Diagnostic, Severity};
 
@@ -52,7 +52,7 @@ pub(super) struct State {
     pub request: RequestState,
     pub work: WorkState,
     pub display: TerminalDisplayState,
-    pub preview: PreviewState,
+    pub preview: ImageViewState,
     pub saving: SavedFilesState,
     pub selection: PointerState,
     pub overlays: OverlayState,
@@ -72,7 +72,7 @@ impl State {
             display: TerminalDisplayState::new(&setup, now),
             request: RequestState::new(setup.scene, setup.overrides),
             work: WorkState::new(now),
-            preview: PreviewState::default(),
+            preview: ImageViewState::default(),
             saving: SavedFilesState::new(),
             selection: PointerState::new(),
             overlays: OverlayState::default(),

@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use crate::scene::diagnostic::Diagnostic;
-use crate::scene::is_file_not_found;
+use crate::scene::is_file_not_found_diagnostic;
 
 /// Errors that prevent the preview from showing the current file.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -60,7 +60,9 @@ pub(crate) struct OverlayState {
 impl OverlayState {
     /// Whether the scene file does not exist.
     pub(crate) fn is_scene_missing(&self) -> bool {
-        self.problems.as_ref().is_some_and(|problems| problems.diagnostics.iter().any(is_file_not_found))
+        self.problems
+            .as_ref()
+            .is_some_and(|problems| problems.diagnostics.iter().any(is_file_not_found_diagnostic))
     }
 
     /// Opens the view list, or restarts its timeout if it is already open.

@@ -4,13 +4,13 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
 
-use super::{KeyOverrides, format_stops};
+use super::{KeyboardOverrides, format_stops};
 use crate::math::DVec3;
 use crate::pipeline::FilePathAndContentId;
 use crate::pipeline::has_model_extension;
 use crate::pipeline::protocol::{MaxPreviewSize, NormalizedRect, ResolvedCamera};
 use crate::pipeline::settings::{
-    CameraOverrides, EffectiveSettingsSummary, Overrides, SceneSettings, ViewMode,
+    AdjustableSceneSettings, CameraOverrides, EffectiveSettingsSummary, Overrides, ViewMode,
 };
 use crate::scene::description::{Integrator, Pose, ShadowMode};
 use crate::scene::list_changes;
@@ -20,7 +20,7 @@ use crate::scene::sanitize::escape_invisible_chars;
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct ImageProvenance {
     /// Settings changed with keys.
-    pub toggles: KeyOverrides,
+    pub toggles: KeyboardOverrides,
     /// Text of the scene file, or `None` for a model.
     pub text: Option<Arc<str>>,
     /// Other files used by the scene.
@@ -32,7 +32,7 @@ pub(crate) struct ImageProvenance {
 impl ImageProvenance {
     /// The origin without the exposure, which does not affect rendering.
     pub(crate) fn without_exposure(self) -> Self {
-        Self { toggles: KeyOverrides { exposure: None, ..self.toggles }, ..self }
+        Self { toggles: KeyboardOverrides { exposure: None, ..self.toggles }, ..self }
     }
 
     /// Determines the origin of an image that a later request reproduced. Usually keeps `self`, because the
@@ -79,12 +79,12 @@ pub(crate) struct RequestState {
     pub scene: PathBuf,
     /// Overrides from the command line.
     pub command_line: Overrides,
-    pub toggles: KeyOverrides,
+    pub toggles: KeyboardOverrides,
 
     /// Generation of the newest request.
     pub generation: u64,
     /// Overrides sent with the newest request.
-    pub sent_toggles: KeyOverrides,
+    pub sent_toggles: KeyboardOverrides,
     /// Whether the newest request differs from the previous one only in exposure.
     pub is_exposure_only: bool,
     /// Preview size in the newest request.
@@ -106,7 +106,7 @@ pub(crate) struct RequestState {
     /// Effective settings, as reported by the worker.
     pub effective: Option<EffectiveSettingsSummary>,
     /// The scene's own settings for the newest valid request.
-    pub own: Option<SceneSettings>,
+    pub own: Option<AdjustableSceneSettings>,
 }
 
 impl RequestState {
@@ -114,9 +114,9 @@ impl RequestState {
         Self {
             scene,
             command_line,
-            toggles: KeyOverrides::default(),
+            toggles: KeyboardOverrides::default(),
             generation: 0,
-            sent_toggles: KeyOverrides::default(),
+            sent_toggles: KeyboardOverrides::default(),
             is_exposure_only: false,
             preview_size: None,
             resize_due: None,
@@ -155,7 +155,7 @@ impl RequestState {
 
     /// Overrides from the command line combined with changes made with keys.
     pub(crate) fn combined_overrides(&self) -> Overrides {
-        self.toggles.apply_to(&self.command_line)
+        self.toggles.apply_to_command_line(&self.command_line)
     }
 
     /// Overrides for the scene's own image, or `None` unless keys have changed the displayed image.
@@ -167,9 +167,9 @@ impl RequestState {
     pub(crate) fn drop_overrides_saved_to_scene(&mut self) {
         let (shadows, integrator, photons) =
             (self.shadows_without_toggles(), self.integrator_without_toggles(), self.base_photons_enabled());
-        let own = self.camera();
+        let own = self.scene_camera();
         let exposure = self.command_line.exposure.or(self.own.map(|own| own.exposure));
-        let KeyOverrides { camera, .. } = &mut self.toggles;
+        let KeyboardOverrides { camera, .. } = &mut self.toggles;
         camera.pose.take_if(|pose| own.is_some_and(|own| own.pose == *pose));
         camera.fov.take_if(|fov| own.is_some_and(|own| own.projection.fov() == Some(*fov)));
         camera
@@ -182,19 +182,19 @@ impl RequestState {
     }
 
     /// The camera, including changes made with keys, or `None` until a valid scene has been read.
-    pub(crate) fn viewpoint(&self) -> Option<ResolvedCamera> {
-        self.camera().map(|camera| camera.with_change(&self.toggles.camera))
+    pub(crate) fn current_camera(&self) -> Option<ResolvedCamera> {
+        self.scene_camera().map(|camera| camera.with_change(&self.toggles.camera))
     }
 
     /// The scene's own camera, or `None` until a valid scene has been read.
-    pub(crate) fn camera(&self) -> Option<ResolvedCamera> {
+    pub(crate) fn scene_camera(&self) -> Option<ResolvedCamera> {
         self.own.map(|own| own.camera)
     }
 
     /// Records the original values of camera parts that were moved with keys. Does not overwrite values
     /// recorded earlier.
     pub(crate) fn record_original_camera(&mut self) {
-        let Some(own) = self.camera() else { return };
+        let Some(own) = self.scene_camera() else { return };
         let (moved, from) = (&self.toggles.camera, self.moved_from);
         self.moved_from = CameraOverrides {
             pose: moved.pose.and(from.pose.or(Some(own.pose))),
@@ -213,7 +213,7 @@ impl RequestState {
     /// Lists camera settings that changed in the scene file after the camera was moved with keys, with their
     /// current values.
     pub(crate) fn scene_camera_edits_since_move(&self) -> Vec<String> {
-        let Some((own, moved)) = self.camera().zip(self.viewpoint()) else { return Vec::new() };
+        let Some((own, moved)) = self.scene_camera().zip(self.current_camera()) else { return Vec::new() };
         let from = &self.moved_from;
         let of_pose = |key: &str, of: fn(&Pose) -> DVec3| {
             let (before, now) = (of(&from.pose?), of(&own.pose));
@@ -255,7 +255,7 @@ impl RequestState {
     /// Whether no setting has been changed with keys, so the render is the scene's own image. Only that image
     /// is written automatically.
     pub(crate) fn has_no_keyboard_overrides(&self) -> bool {
-        self.toggles == KeyOverrides::default()
+        self.toggles == KeyboardOverrides::default()
     }
 
     /// The initial view, before any key changes it.

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-use super::KeyOverrides;
+use super::KeyboardOverrides;
 use crate::event::WriteFailure;
 use crate::messages;
 use crate::options::ExternalChange;
@@ -35,7 +35,7 @@ pub(crate) struct WrittenFile {
     /// Description of the written image, or empty if not known yet.
     pub made: String,
     /// Changes made with keys that the file includes, or `None` for the scene's own image.
-    pub shows: Option<KeyOverrides>,
+    pub shows: Option<KeyboardOverrides>,
     /// Whether the image was written before its render finished.
     pub is_unfinished: bool,
     /// Whether writing a later image to this file failed, so its content is unknown.
@@ -64,7 +64,7 @@ impl WrittenFile {
 
     /// Describes which changes made with keys are included in the written image.
     pub(crate) fn describe_included_keyboard_changes(&self) -> Vec<String> {
-        self.shows.unwrap_or_default().describe_changes_since(&KeyOverrides::default(), false)
+        self.shows.unwrap_or_default().describe_changes_since(&KeyboardOverrides::default(), false)
     }
 }
 
@@ -101,7 +101,7 @@ pub(crate) struct SavedFilesState {
     /// Whether the next image to be written was requested with a key.
     pub is_write_requested: bool,
     /// Key changes that were in effect when a write was last requested.
-    pub write_shows: KeyOverrides,
+    pub write_shows: KeyboardOverrides,
     /// Why the current image was not written even though it should have been.
     pub unwritten: Option<String>,
     /// The last write failure, until a later image is written.
@@ -142,7 +142,7 @@ impl SavedFilesState {
             camera_of_model: None,
             camera_refused: None,
             is_write_requested: false,
-            write_shows: KeyOverrides::default(),
+            write_shows: KeyboardOverrides::default(),
             unwritten: None,
             write_failed: None,
             written: Vec::new(),

@@ -1,7 +1,7 @@
 //! State of the mouse, the crosshair and the inspected object.
 
 use crate::event::FilePosition;
-use crate::pipeline::protocol::ImagePosition;
+use crate::pipeline::protocol::NormalizedPosition;
 
 /// A left button press on the image.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -12,7 +12,7 @@ pub(crate) struct MousePress {
     pub row: u16,
     pub has_moved: bool,
     /// Image position where the press started.
-    pub from: Option<ImagePosition>,
+    pub from: Option<NormalizedPosition>,
 }
 
 /// Purpose of a pick query.
@@ -32,7 +32,7 @@ pub(crate) struct PointerState {
     /// Whether the next drag selects the region to render first.
     pub is_marking: bool,
     /// Position of the last click. Initially the image center.
-    pub crosshair: ImagePosition,
+    pub crosshair: NormalizedPosition,
     /// Purpose of the last pick query.
     pub purpose: PickPurpose,
     /// Information about the inspected object, until a key is pressed.
@@ -50,7 +50,7 @@ impl PointerState {
             press: None,
             is_focusing: false,
             is_marking: false,
-            crosshair: ImagePosition { x: 0.5, y: 0.5 },
+            crosshair: NormalizedPosition { x: 0.5, y: 0.5 },
             purpose: PickPurpose::Inspect,
             facts: None,
             clicked: None,

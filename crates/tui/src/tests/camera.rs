@@ -5,7 +5,7 @@ use crate::event::{Effect, Event, KeyPress};
 use crate::fixtures::*;
 use crate::messages;
 use crate::pipeline::protocol::{self, Command, PreviewUpdate, ResolvedCamera, WriteRequirement};
-use crate::pipeline::settings::{Overrides, SceneSettings};
+use crate::pipeline::settings::{AdjustableSceneSettings, Overrides};
 use crate::preview_style::PreviewStyle;
 use crate::scene::description::{Pose, Projection};
 use crate::scene::diagnostic::Severity;
@@ -201,7 +201,7 @@ fn held_keys_stop_at_their_limits() {
             ui.press_character(key).is_empty() && ui.state.request.generation == generation,
             "{key}: a request"
         );
-        let view = ui.state.request.viewpoint().expect("a camera");
+        let view = ui.state.request.current_camera().expect("a camera");
         assert!((0.0039..4001.0).contains(&view.pose.distance()), "{key}: {view:?}");
     }
 }
@@ -286,7 +286,7 @@ fn save(ui: &mut TestUi, camera: ResolvedCamera) {
     ui.worker_event(protocol::Event::Settings {
         generation,
         settings: effective_settings().into(),
-        own: SceneSettings { camera, ..scene_settings() },
+        own: AdjustableSceneSettings { camera, ..scene_settings() },
     });
     show(ui);
 }

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::fs;
 
 use crate::event::KeyPress;
-use crate::keymap::{KEYMAP, OVERLAY, action_for, overlay_action_for};
+use crate::keymap::{KEYMAP, OVERLAY, action_for_key, overlay_action_for_key};
 
 /// Returns the keys in the first column of the documentation's key tables.
 fn documented() -> BTreeSet<String> {
@@ -33,7 +33,7 @@ fn documented_keys_match_key_bindings() {
     for key in documented.difference(&written) {
         let press = key.chars().next().filter(|_| key.chars().count() == 1).map(KeyPress::plain);
         let is_bound =
-            press.is_some_and(|key| action_for(key).is_some() || overlay_action_for(key).is_some());
+            press.is_some_and(|key| action_for_key(key).is_some() || overlay_action_for_key(key).is_some());
         assert!(is_bound, "not bound: {key}");
     }
 }

@@ -9,8 +9,8 @@ use crate::fixtures::*;
 use crate::keymap::{self, KEYMAP};
 use crate::math::DVec3;
 use crate::messages;
-use crate::pipeline::protocol::{self, Command, ImagePosition, SavedCameraEdit, WriteRequirement};
-use crate::pipeline::settings::{EffectiveSettingsSummary, Overrides, SceneSettings, ViewMode};
+use crate::pipeline::protocol::{self, Command, NormalizedPosition, SavedCameraEdit, WriteRequirement};
+use crate::pipeline::settings::{AdjustableSceneSettings, EffectiveSettingsSummary, Overrides, ViewMode};
 use crate::preview_style::PreviewStyle;
 use crate::scene::description::{Integrator, Pose, ShadowMode};
 use crate::scene::diagnostic::Severity;
@@ -127,7 +127,7 @@ fn check(action: Action, key: KeyPress, ui: &mut TestUi) {
         Action::KeepCamera => {
             assert!(ui.press_key(key).is_empty(), "an unchanged camera should not be saved");
             ui.press_character('l');
-            let wanted = ui.state.request.viewpoint().expect("a camera");
+            let wanted = ui.state.request.current_camera().expect("a camera");
             assert!(
                 matches!(&ui.press_key(key)[..], [Effect::Send(Command::KeepCamera(moved))] if moved.camera == wanted && moved.own == camera())
             );
@@ -165,7 +165,7 @@ fn check(action: Action, key: KeyPress, ui: &mut TestUi) {
                 [Effect::Send(Command::Preview(Some(size)))] => size.around,
                 other => panic!("{other:?}"),
             };
-            assert_eq!(around(&ui.press_key(key)), Some(ImagePosition { x: 0.5, y: 0.5 }));
+            assert_eq!(around(&ui.press_key(key)), Some(NormalizedPosition { x: 0.5, y: 0.5 }));
             assert!(ui.screen_text().contains("x back"), "{}", ui.screen_text());
             assert_eq!(around(&ui.press_key(key)), None);
         }
@@ -474,7 +474,7 @@ fn saved_settings_are_the_base_for_toggles() {
     // The saved scene has hard shadows, as set with the key.
     ui.handle_event(Event::FileChanged(ContentChangeTime { noticed: ui.now }));
     let generation = ui.state.request.generation;
-    let own = SceneSettings { shadows: ShadowMode::Hard, ..scene_settings() };
+    let own = AdjustableSceneSettings { shadows: ShadowMode::Hard, ..scene_settings() };
     let settings = Box::new(EffectiveSettingsSummary { shadows: ShadowMode::Hard, ..effective_settings() });
     ui.worker_event(protocol::Event::Settings { generation, settings, own });
     let shadows: Vec<Option<ShadowMode>> = "sss"

@@ -9,8 +9,8 @@ use crate::event::{Effect, Event, KeyPress, MouseEvent, MouseEventKind};
 use crate::fixtures::*;
 use crate::messages;
 use crate::pipeline::protocol::{
-    self, CameraSaveResult, Command, ImagePosition, NormalizedRect, PickedObject, PickedPixel, PreviewUpdate,
-    SavedCameraEdit, WriteRequirement,
+    self, CameraSaveResult, Command, NormalizedPosition, NormalizedRect, PickedObject, PickedPixel,
+    PreviewUpdate, SavedCameraEdit, WriteRequirement,
 };
 use crate::pipeline::settings::Overrides;
 use crate::preview_style::PreviewStyle;
@@ -33,7 +33,7 @@ fn click(ui: &mut TestUi, column: u16, row: u16) -> Vec<Effect> {
     mouse(ui, MouseEventKind::Release, column, row)
 }
 
-fn queried_position(effects: &[Effect]) -> ImagePosition {
+fn queried_position(effects: &[Effect]) -> NormalizedPosition {
     match effects {
         [Effect::Send(Command::Pick(spot))] => *spot,
         other => panic!("{other:?}"),

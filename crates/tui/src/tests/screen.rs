@@ -306,7 +306,7 @@ fn deleted_file_is_reported_as_missing() {
     let mut ui = TestUi::from_state(state(120, 30));
     ui.finish_render(RED);
     let absent =
-        *crate::scene::read_current_text("no-such-folder/cornell.toml".as_ref()).expect_err("an error");
+        *crate::scene::read_scene_file_text("no-such-folder/cornell.toml".as_ref()).expect_err("an error");
     ui.handle_event(Event::FileChanged(ContentChangeTime { noticed: ui.now }));
     ui.report_scene_errors(vec![absent]);
     ui.handle_event(Event::Settled);

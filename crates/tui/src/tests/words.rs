@@ -133,5 +133,5 @@ fn models_have_no_save_hint() {
     let text = ui.screen_text();
     assert!(text.contains("toy.glb") && !text.contains("save "), "{text}");
     let words: Vec<&str> = text.split_whitespace().filter(|word| !word.contains('▀')).collect();
-    assert!(words.join(" ").contains(&messages::renders_on_changes("toy.glb")), "{text}");
+    assert!(words.join(" ").contains(&messages::renders_on_changes_hint("toy.glb")), "{text}");
 }

@@ -4,7 +4,7 @@
 use std::path::PathBuf;
 
 use super::notices::{
-    show_key_change, show_notice, show_notice_without_effects, show_until_key_without_effects,
+    show_keyboard_change_notice, show_notice, show_notice_without_effects, show_until_key_without_effects,
 };
 use super::request::request_render;
 use crate::camera::{dollied, orbited, zoomed};
@@ -31,20 +31,20 @@ const EXPOSURE_STEP: f32 = 0.25;
 const MAX_STOPS: f32 = 20.0;
 
 /// Orbits the camera by `right` steps to the right and `up` steps upward.
-pub(super) fn orbit(state: &mut State, right: f64, up: f64) -> Vec<Effect> {
-    orbit_by(state, right * ORBIT_STEP, up * ORBIT_STEP)
+pub(super) fn orbit_by_steps(state: &mut State, right: f64, up: f64) -> Vec<Effect> {
+    orbit_by_degrees(state, right * ORBIT_STEP, up * ORBIT_STEP)
 }
 
 /// Orbits the camera by `right` degrees to the right, as seen in the image, and `up` degrees upward.
-pub(super) fn orbit_by(state: &mut State, right: f64, up: f64) -> Vec<Effect> {
-    let is_mirrored = state.request.viewpoint().is_some_and(|view| view.window.mirror);
+pub(super) fn orbit_by_degrees(state: &mut State, right: f64, up: f64) -> Vec<Effect> {
+    let is_mirrored = state.request.current_camera().is_some_and(|view| view.window.mirror);
     move_camera(state, |pose| orbited(pose, if is_mirrored { -right } else { right }, up))
 }
 
 /// Moves the camera closer by a number of steps. Scales the height of an orthographic view by the same
 /// factor, because the distance has no effect there.
 pub(super) fn dolly(state: &mut State, steps: f64) -> Vec<Effect> {
-    let Some((view, own)) = state.request.viewpoint().zip(state.request.camera()) else {
+    let Some((view, own)) = state.request.current_camera().zip(state.request.scene_camera()) else {
         return show_no_scene_notice(state);
     };
     let pose = dollied(&view.pose, libm::pow(DOLLY_FACTOR, steps), own.pose.distance());
@@ -63,7 +63,7 @@ pub(super) fn dolly(state: &mut State, steps: f64) -> Vec<Effect> {
 
 /// Widens the field of view, or the height of an orthographic view, by a number of steps.
 pub(super) fn widen_field_of_view(state: &mut State, steps: f64) -> Vec<Effect> {
-    let Some((view, own)) = state.request.viewpoint().zip(state.request.camera()) else {
+    let Some((view, own)) = state.request.current_camera().zip(state.request.scene_camera()) else {
         return show_no_scene_notice(state);
     };
     let projection = zoomed(view.projection, own.projection, libm::pow(ZOOM_FACTOR, steps));
@@ -96,7 +96,7 @@ pub(super) fn change_exposure(state: &mut State, steps: f32) -> Vec<Effect> {
 }
 
 fn move_camera(state: &mut State, how: impl FnOnce(&Pose) -> Pose) -> Vec<Effect> {
-    let Some(view) = state.request.viewpoint() else { return show_no_scene_notice(state) };
+    let Some(view) = state.request.current_camera() else { return show_no_scene_notice(state) };
     state.request.toggles.camera.pose = Some(how(&view.pose));
     render_camera_step(state)
 }
@@ -108,7 +108,7 @@ fn show_no_scene_notice(state: &mut State) -> Vec<Effect> {
 pub(super) fn render_camera_step(state: &mut State) -> Vec<Effect> {
     drop_noop_camera_changes(state);
     let effects = render_step_or_await_preview(state);
-    show_key_change(
+    show_keyboard_change_notice(
         state,
         if state.request.toggles.camera.has_changes() {
             messages::CAMERA_MOVED
@@ -121,7 +121,7 @@ pub(super) fn render_camera_step(state: &mut State) -> Vec<Effect> {
 
 /// Drops camera changes that are equal to the scene's own values.
 fn drop_noop_camera_changes(state: &mut State) {
-    let Some(own) = state.request.camera() else { return };
+    let Some(own) = state.request.scene_camera() else { return };
     let camera = &mut state.request.toggles.camera;
     camera.pose = camera.pose.filter(|pose| *pose != own.pose);
     let (fov, height) = (own.projection.fov(), own.projection.view_height());
@@ -134,7 +134,7 @@ fn drop_noop_camera_changes(state: &mut State) {
 
 /// Asks the worker to write the current camera into the scene file.
 pub(super) fn save_camera(state: &mut State) -> Vec<Effect> {
-    let Some((camera, own)) = state.request.viewpoint().zip(state.request.camera()) else {
+    let Some((camera, own)) = state.request.current_camera().zip(state.request.scene_camera()) else {
         return show_no_scene_notice(state);
     };
     let is_set = state.request.command_line.sets.iter().any(|set| set.trim_start().starts_with("camera"));
@@ -159,7 +159,7 @@ pub(super) fn save_camera(state: &mut State) -> Vec<Effect> {
 
 /// Handles the result of writing the camera. If the scene now uses this camera, the camera no longer counts
 /// as moved.
-pub(super) fn handle_saved_camera(
+pub(super) fn handle_camera_save_result(
     state: &mut State,
     outcome: Result<CameraSaveResult, String>,
 ) -> Vec<Effect> {
@@ -175,7 +175,8 @@ pub(super) fn handle_saved_camera(
         }
     };
     if of_model {
-        (state.saving.has_scene_of_model, state.saving.camera_of_model) = (true, state.request.viewpoint());
+        (state.saving.has_scene_of_model, state.saving.camera_of_model) =
+            (true, state.request.current_camera());
     }
     let name = escape_invisible_chars(&path.to_string_lossy()).into_owned();
     let words = match (is_new, is_own) {
@@ -200,7 +201,7 @@ pub(super) fn handle_saved_camera(
 }
 
 /// Asks the worker to undo the last camera edit in the scene file.
-pub(super) fn undo_saved_camera(state: &mut State) -> Vec<Effect> {
+pub(super) fn undo_camera_save(state: &mut State) -> Vec<Effect> {
     match state.saving.camera_edits.last() {
         Some(edit) => vec![Effect::Send(Command::UndoCamera(edit.clone()))],
         None if state.saving.camera_of_model.is_some() => {
@@ -211,7 +212,7 @@ pub(super) fn undo_saved_camera(state: &mut State) -> Vec<Effect> {
 }
 
 /// Handles the result of undoing a camera edit.
-pub(super) fn handle_undone_camera(state: &mut State, outcome: Result<PathBuf, String>) -> Vec<Effect> {
+pub(super) fn handle_camera_save_undone(state: &mut State, outcome: Result<PathBuf, String>) -> Vec<Effect> {
     let path = match outcome {
         Ok(path) => path,
         Err(why) => {

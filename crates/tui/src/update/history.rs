@@ -33,10 +33,10 @@ pub(super) fn record_newly_arrived_image(state: &mut State) {
 }
 
 /// Moves back by `steps` renders, or forward if `steps` is negative.
-pub(super) fn browse(state: &mut State, steps: isize) -> Vec<Effect> {
+pub(super) fn browse_history(state: &mut State, steps: isize) -> Vec<Effect> {
     record_current_image(state);
     let Some(newest) = newest_image(state) else { return report_no_image(state) };
-    if state.preview.history.returns_to_newest(steps) {
+    if state.preview.history.step_reaches_newest(steps) {
         return return_to_newest(state, messages::NEWEST_RENDER);
     }
     match state.preview.history.step_back_by(steps, newest) {
@@ -68,7 +68,7 @@ pub(super) fn toggle_render_before_edit(state: &mut State) -> Vec<Effect> {
     }
     record_current_image(state);
     let Some(newest) = newest_image(state) else { return report_no_image(state) };
-    match state.preview.history.open_before_edit(newest) {
+    match state.preview.history.open_render_before_edit(newest) {
         Some(shown) => {
             let effects = show_history_render(state, shown);
             let edits = state.preview.history.describe_edits_since_viewed();

@@ -16,13 +16,13 @@ use crate::pipeline::protocol::Command;
 use crate::pipeline::settings::ViewMode;
 use crate::preview_style::PreviewStyle;
 use crate::scene::description::{Integrator, IntegratorProperties, ShadowMode};
-use crate::state::{KeyOverrides, PaneState, State};
+use crate::state::{KeyboardOverrides, PaneState, State};
 
 pub(super) fn handle_key(state: &mut State, key: KeyPress) -> Vec<Effect> {
     if let Some(effects) = overlay::handle_key(state, key) {
         return effects;
     }
-    let Some(action) = keymap::action_for(key) else {
+    let Some(action) = keymap::action_for_key(key) else {
         let is_digit = key == KeyPress { code: key.code, modifiers: KeyModifiers::NONE }
             && matches!(key.code, KeyCode::Char('1'..='9'));
         return if is_digit { show_notice_without_effects(state, messages::VIEWS_FIRST) } else { Vec::new() };
@@ -46,10 +46,10 @@ pub(super) fn perform_action(state: &mut State, action: Action) -> Vec<Effect> {
         Action::TogglePause => toggle_pause(state),
         Action::RenderAgain => request_render(state, true),
         Action::WriteImage => write_image_now(state),
-        Action::OrbitLeft => camera::orbit(state, -1.0, 0.0),
-        Action::OrbitRight => camera::orbit(state, 1.0, 0.0),
-        Action::OrbitUp => camera::orbit(state, 0.0, 1.0),
-        Action::OrbitDown => camera::orbit(state, 0.0, -1.0),
+        Action::OrbitLeft => camera::orbit_by_steps(state, -1.0, 0.0),
+        Action::OrbitRight => camera::orbit_by_steps(state, 1.0, 0.0),
+        Action::OrbitUp => camera::orbit_by_steps(state, 0.0, 1.0),
+        Action::OrbitDown => camera::orbit_by_steps(state, 0.0, -1.0),
         Action::DollyIn => camera::dolly(state, 1.0),
         Action::DollyOut => camera::dolly(state, -1.0),
         Action::NarrowField => camera::widen_field_of_view(state, -1.0),
@@ -57,7 +57,7 @@ pub(super) fn perform_action(state: &mut State, action: Action) -> Vec<Effect> {
         Action::Darken => camera::change_exposure(state, -1.0),
         Action::Brighten => camera::change_exposure(state, 1.0),
         Action::KeepCamera => camera::save_camera(state),
-        Action::UndoCamera => camera::undo_saved_camera(state),
+        Action::UndoCamera => camera::undo_camera_save(state),
         Action::Inspect => pointer::inspect_at_crosshair(state),
         Action::Copy => pointer::copy_values(state),
         Action::Focus => pointer::start_or_confirm_focus_pick(state),
@@ -69,8 +69,8 @@ pub(super) fn perform_action(state: &mut State, action: Action) -> Vec<Effect> {
         }
         Action::Edit => vec![Effect::Edit(edit_position::position_to_edit(state))],
         Action::CompareLastEdit => history::toggle_render_before_edit(state),
-        Action::OlderRender => history::browse(state, 1),
-        Action::NewerRender => history::browse(state, -1),
+        Action::OlderRender => history::browse_history(state, 1),
+        Action::NewerRender => history::browse_history(state, -1),
         Action::ResetSettings => reset_to_scene_settings(state),
         Action::ToggleDiagnostics => toggle_diagnostics(state),
         Action::ToggleHelp => change_and_mark_screen_dirty(state, |state| {
@@ -212,10 +212,10 @@ fn write_image_now(state: &mut State) -> Vec<Effect> {
 }
 
 fn reset_to_scene_settings(state: &mut State) -> Vec<Effect> {
-    if state.request.toggles == KeyOverrides::default() {
+    if state.request.toggles == KeyboardOverrides::default() {
         return show_notice_without_effects(state, messages::NOTHING_TO_RESET);
     }
-    state.request.toggles = KeyOverrides::default();
+    state.request.toggles = KeyboardOverrides::default();
     let effects = request_render(state, false);
     show_notice(state, messages::RESET);
     effects

@@ -102,7 +102,7 @@ fn handle_event(state: &mut State, event: Event) -> Vec<Effect> {
             history::record_newly_arrived_image(state);
             record_save_to_screen_time(state, generation)
         }
-        Event::Tick => tick(state),
+        Event::Tick => handle_tick(state),
         Event::SourceEnded(source) => handle_lost_source(state, source),
         Event::EditorExited => {
             state.saving.editor_closed = Some(state.now);
@@ -181,7 +181,7 @@ fn handle_resize(state: &mut State, window: WindowSize) -> Vec<Effect> {
     Vec::new()
 }
 
-fn tick(state: &mut State) -> Vec<Effect> {
+fn handle_tick(state: &mut State) -> Vec<Effect> {
     state.dirty |=
         state.work.is_request_running() && !state.work.paused || state.preview.history.is_viewing_older();
     let (now, bars) = (state.now, state.work.assets.len());

@@ -16,7 +16,7 @@ pub(crate) fn show_notice(state: &mut State, words: impl Into<String>) {
 }
 
 /// Shows a notice about a change made with keys, without offering to write the image if that would fail.
-pub(super) fn show_key_change(state: &mut State, words: impl Into<String>) {
+pub(super) fn show_keyboard_change_notice(state: &mut State, words: impl Into<String>) {
     let words = words.into();
     let words = if state.can_overwrite_outputs() { words } else { words.replace(messages::WRITE_HINT, "") };
     show_notice(state, words);

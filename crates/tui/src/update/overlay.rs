@@ -21,7 +21,7 @@ pub(super) fn handle_key(state: &mut State, key: KeyPress) -> Option<Vec<Effect>
         state.overlays.message = None;
         return Some(select_view_and_open_list(state, view));
     }
-    let action = keymap::overlay_action_for(key)?;
+    let action = keymap::overlay_action_for_key(key)?;
     if let Some(effects) = views::handle_view_list_action(state, action) {
         return Some(effects);
     }
@@ -32,10 +32,10 @@ pub(super) fn handle_key(state: &mut State, key: KeyPress) -> Option<Vec<Effect>
 pub(super) fn perform_action(state: &mut State, action: OverlayAction) -> bool {
     match action {
         OverlayAction::Close => close_or_cancel_topmost(state),
-        OverlayAction::LineUp => scroll(state, |line, _| line.saturating_sub(1)),
-        OverlayAction::LineDown => scroll(state, |line, _| line + 1),
-        OverlayAction::PageUp => scroll(state, |line, page| line.saturating_sub(page)),
-        OverlayAction::PageDown => scroll(state, |line, page| line + page),
+        OverlayAction::LineUp => scroll_overlay(state, |line, _| line.saturating_sub(1)),
+        OverlayAction::LineDown => scroll_overlay(state, |line, _| line + 1),
+        OverlayAction::PageUp => scroll_overlay(state, |line, page| line.saturating_sub(page)),
+        OverlayAction::PageDown => scroll_overlay(state, |line, page| line + page),
         // These actions are used only by the view list.
         OverlayAction::ColumnLeft
         | OverlayAction::ColumnRight
@@ -80,7 +80,7 @@ fn close_or_cancel_topmost(state: &mut State) -> bool {
 
 /// Scrolls the help, or the diagnostics pane if its content does not fit. Returns false if there is nothing
 /// to scroll, in which case the key keeps its usual function.
-fn scroll(state: &mut State, step: impl FnOnce(usize, usize) -> usize) -> bool {
+fn scroll_overlay(state: &mut State, step: impl FnOnce(usize, usize) -> usize) -> bool {
     let (is_help, (page, last)) = match () {
         () if state.overlays.help.open => (true, help::page_height_and_max_scroll(state)),
         () if state.overlays.diagnostics.open => (false, diagnostics::page_height_and_max_scroll(state)),

@@ -1,7 +1,7 @@
 //! Handles the mouse and queries about image positions.
 
 use super::notices::{
-    show_key_change, show_notice, show_notice_without_effects, show_until_key_without_effects,
+    show_keyboard_change_notice, show_notice, show_notice_without_effects, show_until_key_without_effects,
 };
 use super::{camera, history, overlay, region};
 use crate::event::FilePosition;
@@ -37,7 +37,7 @@ pub(super) fn handle_mouse(state: &mut State, mouse: MouseEvent) -> Vec<Effect> 
         MouseEventKind::Drag => drag_region_or_orbit(state, mouse),
         MouseEventKind::Release if state.selection.is_marking && state.selection.press.take().is_some() => {
             let spot = image_position_at(state, mouse.column, mouse.row);
-            region::end_drag(state, spot)
+            region::end_region_drag(state, spot)
         }
         MouseEventKind::Release => match state.selection.press.take() {
             Some(press) if !press.has_moved => pick_object_at_click(state, mouse),
@@ -79,7 +79,11 @@ fn drag_region_or_orbit(state: &mut State, mouse: MouseEvent) -> Vec<Effect> {
     state.selection.press =
         Some(MousePress { column: mouse.column, row: mouse.row, has_moved: true, ..press });
     let degrees = TURN_ACROSS / f64::from(Layout::for_state(state).preview.width.max(1));
-    camera::orbit_by(state, -right * degrees, down * f64::from(state.display.window.cell_aspect) * degrees)
+    camera::orbit_by_degrees(
+        state,
+        -right * degrees,
+        down * f64::from(state.display.window.cell_aspect) * degrees,
+    )
 }
 
 fn pick_object_at_click(state: &mut State, mouse: MouseEvent) -> Vec<Effect> {
@@ -106,7 +110,7 @@ pub(super) fn start_or_confirm_focus_pick(state: &mut State) -> Vec<Effect> {
     if state.preview.history.is_viewing_older() {
         return show_notice_without_effects(state, messages::OLDER_RENDER);
     }
-    if state.request.viewpoint().is_some_and(|view| view.aperture == 0.0) {
+    if state.request.current_camera().is_some_and(|view| view.aperture == 0.0) {
         state.selection.is_focusing = false;
         return show_notice_without_effects(state, messages::PINHOLE);
     }
@@ -150,7 +154,7 @@ pub(super) fn handle_pick(state: &mut State, picked: &PickedPixel) -> Vec<Effect
     match (state.selection.purpose, &picked.object) {
         (PickPurpose::Inspect, _) => {
             state.overlays.message = None;
-            let facts = inspected_values(picked);
+            let facts = format_inspected_values(picked);
             state.selection.clicked = Some(join_values_with_pixel_position(picked, &facts));
             state.selection.facts = Some(facts);
             state.dirty = true;
@@ -167,13 +171,13 @@ fn focus_at_depth(state: &mut State, depth: f64) -> Vec<Effect> {
         return show_notice_without_effects(state, messages::NOTHING_TO_FOCUS);
     }
     // The scene may have been edited after the click.
-    if state.request.viewpoint().is_none_or(|view| view.aperture == 0.0) {
+    if state.request.current_camera().is_none_or(|view| view.aperture == 0.0) {
         return show_notice_without_effects(state, messages::PINHOLE);
     }
     state.request.toggles.camera.focus = Some(distance);
     let effects = camera::render_camera_step(state);
     if state.request.toggles.camera.focus.is_some() {
-        show_key_change(state, messages::focus_moved(distance));
+        show_keyboard_change_notice(state, messages::focus_moved(distance));
     }
     effects
 }
@@ -204,7 +208,7 @@ pub(super) fn copy_values(state: &mut State) -> Vec<Effect> {
 }
 
 /// Formats the inspected values: shape and name, line, material, distance, position, radiance and normal.
-fn inspected_values(PickedPixel { object, color, pixel: [x, y] }: &PickedPixel) -> Vec<String> {
+fn format_inspected_values(PickedPixel { object, color, pixel: [x, y] }: &PickedPixel) -> Vec<String> {
     let light = color.map(|color| format!("radiance {}", format_vector(color.map(f64::from))));
     let Some(object) = object else {
         return [format!("nothing at pixel {x}, {y}")].into_iter().chain(light).collect();
@@ -262,7 +266,7 @@ mod tests {
         };
         let picked = PickedPixel { pixel: [3, 4], object: Some(object), color: Some([0.61, 1234.56, 1e-6]) };
         assert_eq!(
-            inspected_values(&picked),
+            format_inspected_values(&picked),
             [
                 "sphere \"ball\"",
                 "still.toml:47",
@@ -275,13 +279,13 @@ mod tests {
         );
         let instance = Some(PickedInstance { name: Some("left".to_owned()), line: Some(52) });
         let in_group = picked.object.clone().map(|object| PickedObject { instance, ..object });
-        let in_group = inspected_values(&PickedPixel { object: in_group, ..picked });
+        let in_group = format_inspected_values(&PickedPixel { object: in_group, ..picked });
         assert_eq!(in_group[1..3], ["still.toml:47", "instance \"left\" on line 52"]);
         let of_model = picked.object.clone().map(|object| PickedObject { line: None, ..object });
-        let of_model = inspected_values(&PickedPixel { object: of_model, ..picked });
+        let of_model = format_inspected_values(&PickedPixel { object: of_model, ..picked });
         assert_eq!(of_model[..2], ["sphere \"ball\"", "glass crystal"], "models should have no line numbers");
         assert_eq!(
-            inspected_values(&PickedPixel { object: None, color: None, ..picked }),
+            format_inspected_values(&PickedPixel { object: None, color: None, ..picked }),
             ["nothing at pixel 3, 4"]
         );
     }

@@ -4,7 +4,7 @@ use super::notices::{show_notice, show_until_key_without_effects};
 use super::request::request_render;
 use crate::event::Effect;
 use crate::messages;
-use crate::pipeline::protocol::{ImagePosition, NormalizedRect};
+use crate::pipeline::protocol::{NormalizedPosition, NormalizedRect};
 use crate::state::State;
 
 /// Width and height of a region around a position, as fractions of the image.
@@ -34,13 +34,13 @@ pub(super) fn cancel_selection(state: &mut State) {
 }
 
 /// Updates the region during a drag.
-pub(super) fn update_dragged_region(state: &mut State, from: ImagePosition, to: ImagePosition) {
+pub(super) fn update_dragged_region(state: &mut State, from: NormalizedPosition, to: NormalizedPosition) {
     state.request.first_section = Some(NormalizedRect::between(from, to));
     state.dirty = true;
 }
 
 /// Ends the drag and uses the selected region, or a region around the position if there was no drag.
-pub(super) fn end_drag(state: &mut State, spot: Option<ImagePosition>) -> Vec<Effect> {
+pub(super) fn end_region_drag(state: &mut State, spot: Option<NormalizedPosition>) -> Vec<Effect> {
     match (state.request.first_section, spot) {
         (Some(marked), _) => render_section_first(state, marked),
         (None, Some(spot)) => render_section_first(state, section_around_point(spot)),
@@ -48,7 +48,7 @@ pub(super) fn end_drag(state: &mut State, spot: Option<ImagePosition>) -> Vec<Ef
     }
 }
 
-fn section_around_point(spot: ImagePosition) -> NormalizedRect {
+fn section_around_point(spot: NormalizedPosition) -> NormalizedRect {
     let start = |middle: f64| (middle - REGION_FRACTION / 2.0).clamp(0.0, 1.0 - REGION_FRACTION);
     NormalizedRect {
         left: start(spot.x),

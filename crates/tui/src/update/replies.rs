@@ -29,7 +29,7 @@ pub(super) fn handle_reply(state: &mut State, answer: TerminalReply) -> Vec<Effe
             }
         }
         TerminalReply::Background(rgb) if state.display.ask.background => {
-            let is_light = ramp::is_light(rgb);
+            let is_light = ramp::is_light_color(rgb);
             state.dirty |= std::mem::replace(&mut state.display.is_light, is_light) != is_light;
         }
         TerminalReply::Images(_)
@@ -117,12 +117,12 @@ fn handle_terminal_name(state: &mut State, terminal: TerminalId) -> Vec<Effect> 
         state.dirty = true;
     }
     if ask.blocks {
-        effects.extend(use_block_glyphs(state, FinestNativeBlocks::supported_by(terminal)));
+        effects.extend(switch_to_block_glyphs(state, FinestNativeBlocks::supported_by(terminal)));
     }
     effects
 }
 
-fn use_block_glyphs(state: &mut State, blocks: FinestNativeBlocks) -> Vec<Effect> {
+fn switch_to_block_glyphs(state: &mut State, blocks: FinestNativeBlocks) -> Vec<Effect> {
     let kind = match blocks {
         FinestNativeBlocks::Unknown => return Vec::new(),
         FinestNativeBlocks::Sextants => PreviewStyle::Sextant,

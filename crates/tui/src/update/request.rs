@@ -3,7 +3,7 @@
 use super::history;
 use crate::event::Effect;
 use crate::pipeline::protocol::{Command, Request, WriteRequirement};
-use crate::state::{CameraStepStatus, KeyOverrides, RenderState, RequestStatus, State};
+use crate::state::{CameraStepStatus, KeyboardOverrides, RenderState, RequestStatus, State};
 use crate::view::layout::Layout;
 
 /// Creates a request with the current settings. The stage table is unchanged until the worker starts on the
@@ -17,7 +17,7 @@ pub(super) fn request_render(state: &mut State, force: bool) -> Vec<Effect> {
     }
     state.preview.shown = state.preview.history.return_to_newest().or_else(|| state.preview.shown.take());
     let before = std::mem::replace(&mut state.request.sent_toggles, state.request.toggles);
-    let now = KeyOverrides { exposure: before.exposure, ..state.request.toggles };
+    let now = KeyboardOverrides { exposure: before.exposure, ..state.request.toggles };
     state.request.is_exposure_only = before == now && before != state.request.toggles;
     if state.request.is_exposure_only {
         // Exposure only affects how the image is displayed.

@@ -2,7 +2,7 @@
 
 use crossterm::event::{KeyCode, KeyModifiers};
 
-use super::notices::show_key_change;
+use super::notices::show_keyboard_change_notice;
 use super::request::request_render;
 use crate::choice::Choice;
 use crate::event::{Effect, KeyPress};
@@ -34,12 +34,12 @@ pub(super) fn handle_view_list_action(state: &mut State, action: OverlayAction) 
             return Some(Vec::new());
         }
         OverlayAction::Take => {
-            close_list(state);
+            close_view_list(state);
             return Some(Vec::new());
         }
         OverlayAction::Close => return None,
     };
-    Some(select_if_changed(state, ViewMode::ALL[chosen]))
+    Some(select_view_if_changed(state, ViewMode::ALL[chosen]))
 }
 
 /// Handles a key while the user is typing a search, or returns `None` if no search is active or it does not
@@ -51,14 +51,14 @@ pub(super) fn handle_search_key(state: &mut State, key: KeyPress) -> Option<Vec<
         KeyCode::Char(letter) if !is_held => name.extend(letter.to_lowercase()),
         KeyCode::Backspace => drop(name.pop()),
         KeyCode::Enter | KeyCode::Esc => {
-            close_list(state);
+            close_view_list(state);
             return Some(Vec::new());
         }
         _ => return None,
     }
     let found = find_view_by_partial_name(&name);
     open_list_with_search_text(state, name);
-    Some(found.map_or_else(Vec::new, |view| select_if_changed(state, view)))
+    Some(found.map_or_else(Vec::new, |view| select_view_if_changed(state, view)))
 }
 
 /// Selects a view and opens the list.
@@ -73,7 +73,7 @@ pub(super) fn select_view_and_open_list(state: &mut State, view: ViewMode) -> Ve
         } else {
             messages::view_chosen(view.name())
         };
-        show_key_change(state, words);
+        show_keyboard_change_notice(state, words);
     }
     effects
 }
@@ -93,13 +93,13 @@ fn open_list_with_search_text(state: &mut State, name: String) {
     }
 }
 
-fn close_list(state: &mut State) {
+fn close_view_list(state: &mut State) {
     state.overlays.views = None;
     state.dirty = true;
 }
 
 /// Selects a view unless it is already selected.
-fn select_if_changed(state: &mut State, view: ViewMode) -> Vec<Effect> {
+fn select_view_if_changed(state: &mut State, view: ViewMode) -> Vec<Effect> {
     state.open_view_list();
     if view == state.request.view_mode() {
         return Vec::new();

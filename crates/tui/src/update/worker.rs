@@ -29,8 +29,8 @@ pub(super) fn handle_worker_event(state: &mut State, event: Event) -> Vec<Effect
     state.saving.write_results += u64::from(event.is_write_result());
     let event = match event {
         // Replies to user actions are never outdated.
-        Event::CameraKept { outcome, .. } => return camera::handle_saved_camera(state, outcome),
-        Event::CameraUndone { outcome, .. } => return camera::handle_undone_camera(state, outcome),
+        Event::CameraKept { outcome, .. } => return camera::handle_camera_save_result(state, outcome),
+        Event::CameraUndone { outcome, .. } => return camera::handle_camera_save_undone(state, outcome),
         Event::Picked { picked, .. } => return pointer::handle_pick(state, &picked),
         Event::WriteDone { paths, .. } => {
             report_written_files(state, &paths);
@@ -49,7 +49,7 @@ pub(super) fn handle_worker_event(state: &mut State, event: Event) -> Vec<Effect
         }
         event => event,
     };
-    if event_generation(&event) != state.request.generation {
+    if generation_of_event(&event) != state.request.generation {
         return Vec::new();
     }
     // Previews come from their slot and file changes from the watcher.
@@ -187,7 +187,7 @@ fn notify_long_render_ended(state: &State, time: Option<Duration>) -> Vec<Effect
         .collect()
 }
 
-fn event_generation(event: &Event) -> u64 {
+fn generation_of_event(event: &Event) -> u64 {
     match event {
         Event::Started { generation }
         | Event::Stage { generation, .. }

@@ -26,14 +26,15 @@ const MIN_RATIO: f64 = 1.5;
 /// little space.
 pub(super) fn draw_noise_chart(state: &State, area: Rect, buffer: &mut Buffer) -> u16 {
     let area = Rect { width: area.width.min(MAX_COLUMNS), ..area }.intersection(buffer.area);
-    let (Some(rows), Some(points)) = (chart_height(state, area), curve_points_if_enough(state)) else {
+    let (Some(rows), Some(points)) = (chart_and_caption_height(state, area), curve_points_if_enough(state))
+    else {
         return 0;
     };
     let depth = state.display.depth;
     put_text(buffer, nth_row(area, 0), &[(messages::NOISE_OVER_TIME, TextRole::Strong)], depth);
-    let caption = caption(state, points, area.width);
+    let caption = wrapped_caption(state, points, area.width);
     let chart = Rect { y: area.y + 1, height: rows - 1 - caption.len() as u16, ..area };
-    plot(state, points, chart, buffer);
+    plot_noise_curve(state, points, chart, buffer);
     for (index, line) in (chart.bottom() - area.y..).zip(&caption) {
         put_text(buffer, nth_row(area, index), &[(line, TextRole::Faint)], depth);
     }
@@ -41,8 +42,9 @@ pub(super) fn draw_noise_chart(state: &State, area: Rect, buffer: &mut Buffer) -
 }
 
 /// Number of rows that the chart and its caption use, or `None` if they do not fit.
-pub(super) fn chart_height(state: &State, area: Rect) -> Option<u16> {
-    let words = 1 + caption(state, curve_points_if_enough(state)?, area.width.min(MAX_COLUMNS)).len() as u16;
+pub(super) fn chart_and_caption_height(state: &State, area: Rect) -> Option<u16> {
+    let words =
+        1 + wrapped_caption(state, curve_points_if_enough(state)?, area.width.min(MAX_COLUMNS)).len() as u16;
     let chart = area.height.checked_sub(words)?.min(MAX_ROWS);
     (chart >= MIN_ROWS && area.width >= 20).then_some(words + chart)
 }
@@ -63,7 +65,7 @@ fn requested_noise(state: &State) -> Option<f64> {
 const NO_BREAK_SPACE: &str = "\u{a0}";
 
 /// Wraps the caption into lines without separating numbers from their units.
-fn caption(state: &State, points: &[(f64, f64)], width: u16) -> Vec<String> {
+fn wrapped_caption(state: &State, points: &[(f64, f64)], width: u16) -> Vec<String> {
     let ([(first, from), ..], [.., (last, to)]) = (points, points) else { return Vec::new() };
     let whole = |amount: String| amount.replace(' ', NO_BREAK_SPACE);
     let (from, first) = (whole(format_two_digit_percent(*from)), whole(format_seconds(*first)));
@@ -82,7 +84,7 @@ fn caption(state: &State, points: &[(f64, f64)], width: u16) -> Vec<String> {
         .collect()
 }
 
-fn plot(state: &State, points: &[(f64, f64)], area: Rect, buffer: &mut Buffer) {
+fn plot_noise_curve(state: &State, points: &[(f64, f64)], area: Rect, buffer: &mut Buffer) {
     let depth = state.display.depth;
     let log = |(seconds, noise): &(f64, f64)| (seconds.log10(), noise.log10());
     let curve: Vec<(f64, f64)> = points.iter().map(log).collect();

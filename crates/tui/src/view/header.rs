@@ -146,7 +146,7 @@ fn view_label(state: &State) -> String {
 }
 
 /// Whether light from photons is missing from the current preview.
-fn lacks_photons(state: &State) -> bool {
+fn preview_lacks_photons(state: &State) -> bool {
     state
         .preview
         .shown
@@ -194,7 +194,7 @@ fn progress_or_result_variants(state: &State) -> Vec<String> {
         }
         return figures;
     }
-    if state.work.is_request_running() && lacks_photons(state) {
+    if state.work.is_request_running() && preview_lacks_photons(state) {
         return [messages::WITHOUT_PHOTONS, "no photons yet"].map(str::to_owned).to_vec();
     }
     match (state.work.activity, &state.work.report, &state.work.progress) {

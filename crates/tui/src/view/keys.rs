@@ -12,7 +12,7 @@ use crate::choice::Choice;
 use crate::keymap::{self, KEYMAP, KeyBinding, OVERLAY, OverlayAction};
 use crate::preview_style::PreviewStyle;
 use crate::scene::report::summarize_counts;
-use crate::state::{KeyOverrides, RequestStatus, State, ViewList};
+use crate::state::{KeyboardOverrides, RequestStatus, State, ViewList};
 
 /// A hint in the key line: a key with long and short descriptions.
 struct KeyHint {
@@ -212,7 +212,7 @@ fn urgent_and_other_hints(state: &State) -> (Vec<KeyHint>, Vec<KeyHint>) {
     let is_shown = |it: &&KeyBinding| it.action != Action::ShowImageOnly || has_preview;
     let is_idle = |it: &&KeyBinding| it.action != Action::TogglePause || state.work.is_request_running();
     // If there are changes to list, a hint added above already shows them next to this key.
-    let has_unlisted_changes = state.request.toggles != KeyOverrides::default()
+    let has_unlisted_changes = state.request.toggles != KeyboardOverrides::default()
         && state.request.describe_camera_and_exposure_changes().is_empty();
     let is_useful = |it: &&KeyBinding| it.action != Action::ResetSettings || has_unlisted_changes;
     let others = KEYMAP

@@ -96,7 +96,7 @@ impl Layout {
 /// if it would take too much space.
 fn divide_image_and_panel(rest: Rect, shape: f32) -> (Rect, Rect) {
     let cells = |area| {
-        let (width, height) = fit_image(area, shape);
+        let (width, height) = largest_image_size_in_area(area, shape);
         u32::from(width) * u32::from(height)
     };
     let panels = [panel_below_image(rest, shape), panel_next_to_image(rest, shape)].into_iter().flatten();
@@ -107,7 +107,7 @@ fn divide_image_and_panel(rest: Rect, shape: f32) -> (Rect, Rect) {
 
 fn panel_next_to_image(rest: Rect, shape: f32) -> Option<(Rect, Rect)> {
     let room = Rect { width: rest.width.checked_sub(SIDE_WIDTH + 1)?, ..rest };
-    let (width, _) = fit_image(room, shape);
+    let (width, _) = largest_image_size_in_area(room, shape);
     let panel = Rect { x: rest.x + width + 1, width: rest.width - width - 1, ..rest };
     (rest.height >= SIDE_HEIGHT).then_some((Rect { width, ..rest }, panel))
 }
@@ -117,13 +117,13 @@ fn panel_below_image(rest: Rect, shape: f32) -> Option<(Rect, Rect)> {
     // Rows for the stages and one line of results.
     let rows = u16::try_from(Stage::ALL.len().div_ceil(columns.max(1)) + 1).unwrap_or(u16::MAX);
     let room = Rect { height: rest.height.checked_sub(rows)?, ..rest };
-    let (_, height) = fit_image(room, shape);
+    let (_, height) = largest_image_size_in_area(room, shape);
     let panel = Rect { y: rest.y + height, height: rest.height - height, ..rest };
     (columns > 0).then_some((Rect { height, ..rest }, panel))
 }
 
 /// Returns the columns and rows of the largest image with this aspect ratio that fits into an area.
-fn fit_image(area: Rect, shape: f32) -> (u16, u16) {
+fn largest_image_size_in_area(area: Rect, shape: f32) -> (u16, u16) {
     let rows = (f32::from(area.width) / shape).ceil();
     if rows <= f32::from(area.height) {
         (area.width, rows as u16)

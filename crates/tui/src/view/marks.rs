@@ -4,13 +4,13 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
 use super::text::TextRole;
-use crate::pipeline::protocol::{ImagePosition, NormalizedRect};
+use crate::pipeline::protocol::{NormalizedPosition, NormalizedRect};
 use crate::preview_style::PreviewStyle;
 use crate::state::State;
 
 /// Draws the marks over an image that covers `cells`.
 pub(super) fn draw_marks(state: &State, cells: Rect, buffer: &mut Buffer) {
-    let mut mark = |spot: ImagePosition, symbols: [&str; 2]| {
+    let mut mark = |spot: NormalizedPosition, symbols: [&str; 2]| {
         let symbol = symbols[usize::from(state.display.kind == PreviewStyle::Ascii)];
         let cell = cell_for_position(state, spot, cells).and_then(|place| buffer.cell_mut(place));
         if let Some(cell) = cell {
@@ -23,10 +23,10 @@ pub(super) fn draw_marks(state: &State, cells: Rect, buffer: &mut Buffer) {
     {
         // Keep the marks inside the region.
         let (right, bottom) = (left + width * 0.999, top + height * 0.999);
-        mark(ImagePosition { x: left, y: top }, ["┌", "+"]);
-        mark(ImagePosition { x: right, y: top }, ["┐", "+"]);
-        mark(ImagePosition { x: left, y: bottom }, ["└", "+"]);
-        mark(ImagePosition { x: right, y: bottom }, ["┘", "+"]);
+        mark(NormalizedPosition { x: left, y: top }, ["┌", "+"]);
+        mark(NormalizedPosition { x: right, y: top }, ["┐", "+"]);
+        mark(NormalizedPosition { x: left, y: bottom }, ["└", "+"]);
+        mark(NormalizedPosition { x: right, y: bottom }, ["┘", "+"]);
     }
     if state.selection.is_focusing
         || state.selection.is_marking && state.request.first_section.is_none()
@@ -42,7 +42,7 @@ fn are_region_marks_visible(state: &State) -> bool {
 }
 
 /// The cell at a position in the image, if visible.
-fn cell_for_position(state: &State, spot: ImagePosition, cells: Rect) -> Option<(u16, u16)> {
+fn cell_for_position(state: &State, spot: NormalizedPosition, cells: Rect) -> Option<(u16, u16)> {
     let section = state.preview.shown.as_ref().and_then(|shown| shown.section);
     let NormalizedRect { left, top, width, height } =
         section.unwrap_or(NormalizedRect { left: 0.0, top: 0.0, width: 1.0, height: 1.0 });

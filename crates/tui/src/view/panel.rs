@@ -41,15 +41,19 @@ pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) -> FileLinksA
         let place = Rect { x: room.x + column * width, width: width - gap, ..room };
         drawn.put_line_with_links(state, nth_row(place, line_of), line, buffer);
     }
-    drawn.later =
-        side_panel::draw_chart_and_history_strip(state, area, rows_used(&lines, columns, room), buffer);
+    drawn.later = side_panel::draw_chart_and_history_strip(
+        state,
+        area,
+        rows_used_by_lines(&lines, columns, room),
+        buffer,
+    );
     drawn
 }
 
 /// Returns the index of the history entry shown at a cell in the history strip.
 pub(super) fn history_index_at(state: &State, area: Rect, column: u16, row: u16) -> Option<usize> {
     let PanelTextLayout { lines, columns, room } = lay_out_panel_text(state, area);
-    side_panel::history_index_at(state, area, rows_used(&lines, columns, room), column, row)
+    side_panel::history_index_at(state, area, rows_used_by_lines(&lines, columns, room), column, row)
 }
 
 /// The panel's lines, the number of columns, and the area available for them.
@@ -77,7 +81,7 @@ fn lay_out_panel_text(state: &State, area: Rect) -> PanelTextLayout {
 }
 
 /// Number of rows used by the lines. With several columns, all rows are used.
-fn rows_used(lines: &[StyledLine], columns: u16, room: Rect) -> u16 {
+fn rows_used_by_lines(lines: &[StyledLine], columns: u16, room: Rect) -> u16 {
     if columns > 1 { room.height } else { u16::try_from(lines.len()).unwrap_or(u16::MAX).min(room.height) }
 }
 

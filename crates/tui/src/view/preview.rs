@@ -15,7 +15,7 @@ use crate::graphics::PlacedImage;
 use crate::messages;
 use crate::mosaic::{CellGrid, fit_cell};
 use crate::options::PreviewChoice;
-use crate::pipeline::protocol::ImagePosition;
+use crate::pipeline::protocol::NormalizedPosition;
 use crate::pipeline::protocol::PreviewUpdate;
 use crate::preview_style::PreviewStyle;
 use crate::rescale::resized_pixels;
@@ -27,7 +27,7 @@ pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) {
     match &state.preview.shown {
         Some(_) if is_drawn_as_pixels(state) => {}
         Some(shown) => {
-            let kind = cell_based_kind(state.display.kind, state.display.depth);
+            let kind = cell_based_style(state.display.kind, state.display.depth);
             let placed = PreviewPlacement::for_preview(state, shown, area, kind);
             placed.draw(&shown.picture, kind, PreviewColors::for_state(state), buffer);
             marks::draw_marks(state, placed.cells, buffer);
@@ -47,7 +47,7 @@ pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) {
 pub(super) fn draw_history_thumbnail(state: &State, picture: &Srgb8Image, area: Rect, buffer: &mut Buffer) {
     let area = area.intersection(buffer.area);
     if !area.is_empty() {
-        let kind = cell_based_kind(state.display.kind, state.display.depth);
+        let kind = cell_based_style(state.display.kind, state.display.depth);
         let placed =
             PreviewPlacement::fit(picture, area, kind, state.display.window.cell_aspect, f32::INFINITY);
         placed.draw(picture, kind, PreviewColors::for_state(state), buffer);
@@ -55,27 +55,29 @@ pub(super) fn draw_history_thumbnail(state: &State, picture: &Srgb8Image, area: 
 }
 
 /// The image position shown by a cell of the preview.
-pub(crate) fn image_position_at(state: &State, column: u16, row: u16) -> Option<ImagePosition> {
+pub(crate) fn image_position_at(state: &State, column: u16, row: u16) -> Option<NormalizedPosition> {
     let shown = state.preview.shown.as_ref()?;
     let area = Layout::for_state(state).preview;
     let cells = PreviewPlacement::for_preview(
         state,
         shown,
         area,
-        cell_based_kind(state.display.kind, state.display.depth),
+        cell_based_style(state.display.kind, state.display.depth),
     )
     .cells;
     let share = |at: u16, start: u16, length: u16| (f64::from(at - start) + 0.5) / f64::from(length);
     let spot = || {
-        let spot =
-            ImagePosition { x: share(column, cells.x, cells.width), y: share(row, cells.y, cells.height) };
-        shown.section.map_or(spot, |section| section.section_to_image(spot))
+        let spot = NormalizedPosition {
+            x: share(column, cells.x, cells.width),
+            y: share(row, cells.y, cells.height),
+        };
+        shown.section.map_or(spot, |section| section.to_image_position(spot))
     };
     cells.contains((column, row).into()).then(spot)
 }
 
 /// Returns the preview style to use if the preview must be drawn as cells.
-fn cell_based_kind(kind: PreviewStyle, depth: ColorDepth) -> PreviewStyle {
+fn cell_based_style(kind: PreviewStyle, depth: ColorDepth) -> PreviewStyle {
     match kind {
         PreviewStyle::Pixels(_) => PreviewStyle::from_choice(PreviewChoice::Auto, depth),
         kind => kind,
@@ -92,7 +94,7 @@ fn is_drawn_as_pixels(state: &State) -> bool {
 }
 
 /// Placement of a preview drawn as pixels, or `None` if the preview is drawn as cells.
-pub(crate) fn terminal_image(state: &State, area: Rect) -> Option<PlacedImage> {
+pub(crate) fn placed_pixel_preview(state: &State, area: Rect) -> Option<PlacedImage> {
     let shown = state.preview.shown.as_ref().filter(|_| is_drawn_as_pixels(state))?;
     let placed = PreviewPlacement::for_preview(state, shown, area, state.display.kind);
     let (picture, cells) = (shown.picture.clone(), placed.cells);
@@ -136,7 +138,7 @@ pub(crate) fn draw_image(
     cell_aspect: f32,
 ) -> Buffer {
     let mut buffer = Buffer::empty(area);
-    let kind = cell_based_kind(PreviewStyle::from_choice(choice, inks.depth), inks.depth);
+    let kind = cell_based_style(PreviewStyle::from_choice(choice, inks.depth), inks.depth);
     PreviewPlacement::fit(picture, area, kind, cell_aspect, f32::INFINITY).draw(
         picture,
         kind,

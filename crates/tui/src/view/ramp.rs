@@ -55,15 +55,17 @@ impl AsciiRamp {
     }
 
     /// Maps an sRGB brightness from the ramp's range to [0, 1].
-    fn normalize_brightness_to_ramp_range(self, brightness: f32) -> f32 {
+    fn map_ramp_range_to_unit(self, brightness: f32) -> f32 {
         ((brightness - self.low) / (self.high - self.low).max(1e-3)).clamp(0.0, 1.0)
     }
 
     /// The character for a color on a monochrome terminal.
     pub(super) fn glyph(self, rgb: [u8; 3]) -> char {
-        self.nearest_glyph(self.normalize_brightness_to_ramp_range(linear_to_srgb(
-            luminance(srgb8_color_to_linear(rgb)).clamp(0.0, 1.0),
-        )))
+        self.nearest_glyph(
+            self.map_ramp_range_to_unit(linear_to_srgb(
+                luminance(srgb8_color_to_linear(rgb)).clamp(0.0, 1.0),
+            )),
+        )
     }
 
     /// Returns the character that shows a color, and its ink color. The ink is as saturated as possible,
@@ -72,7 +74,7 @@ impl AsciiRamp {
         let linear = srgb8_color_to_linear(rgb);
         if self.is_light {
             let ink = (1.0 - linear.min_element()).max(1e-3);
-            let brightness = self.normalize_brightness_to_ramp_range(linear_to_srgb(1.0 - ink));
+            let brightness = self.map_ramp_range_to_unit(linear_to_srgb(1.0 - ink));
             (
                 self.nearest_glyph(brightness),
                 linear_to_quantized_srgb8(Vec3::ONE - (Vec3::ONE - linear) / ink),
@@ -80,7 +82,7 @@ impl AsciiRamp {
         } else {
             let brightest = linear.max_element().max(1e-3);
             (
-                self.nearest_glyph(self.normalize_brightness_to_ramp_range(linear_to_srgb(brightest))),
+                self.nearest_glyph(self.map_ramp_range_to_unit(linear_to_srgb(brightest))),
                 linear_to_quantized_srgb8(linear / brightest),
             )
         }
@@ -118,7 +120,7 @@ fn linear_to_quantized_srgb8(linear: Vec3) -> [u8; 3] {
 }
 
 /// Whether a background is perceptually closer to white than to black.
-pub(crate) fn is_light(rgb: [u8; 3]) -> bool {
+pub(crate) fn is_light_color(rgb: [u8; 3]) -> bool {
     luminance(srgb8_color_to_linear(rgb)) > srgb_to_linear(0.5)
 }
 
@@ -172,6 +174,6 @@ mod tests {
 
     #[test]
     fn backgrounds_are_classified_as_light_or_dark() {
-        assert!(is_light([255; 3]) && is_light([253, 246, 227]) && !is_light([0, 43, 54]));
+        assert!(is_light_color([255; 3]) && is_light_color([253, 246, 227]) && !is_light_color([0, 43, 54]));
     }
 }

@@ -77,7 +77,7 @@ pub(super) fn history_index_at(
 fn divide_chart_and_history_strip(state: &State, panel: Rect, lines: u16) -> (Rect, Rect) {
     let area = curve_and_history_area(state, panel, lines);
     let is_over = state.work.activity == RequestStatus::Done && !state.preview.history.is_viewing_older();
-    let wants_curve = |area| is_over && curve::chart_height(state, area).is_some();
+    let wants_curve = |area| is_over && curve::chart_and_caption_height(state, area).is_some();
     if area.width >= MIN_DIVIDED_WIDTH {
         // Place them side by side.
         let half = if wants_curve(area) { area.width / 3 } else { 0 };
@@ -89,7 +89,7 @@ fn divide_chart_and_history_strip(state: &State, panel: Rect, lines: u16) -> (Re
     }
     // The curve is at the top and the strip gets the remaining space. If the strip would not fit, the curve
     // is omitted.
-    let rows = curve::chart_height(state, area).unwrap_or(0);
+    let rows = curve::chart_and_caption_height(state, area).unwrap_or(0);
     let rest = area.height.saturating_sub(rows + 1);
     let below = Rect { y: area.bottom() - rest, height: rest, ..area };
     if strip::rows_used_by_strip(state, below) > 0 || strip::rows_used_by_strip(state, area) == 0 {

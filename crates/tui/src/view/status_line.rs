@@ -292,7 +292,7 @@ pub(super) fn save_scene_hint(state: &State) -> String {
     let name = escape_invisible_chars(&name);
     // Models are usually exported by a program rather than saved by the user.
     if state.request.is_model() {
-        return messages::renders_on_changes(&name);
+        return messages::renders_on_changes_hint(&name);
     }
     messages::save_to_render_hint(&name, state.preview.shown.is_some() || state.work.renders > 0)
 }

@@ -3,7 +3,7 @@
 use unicode_width::UnicodeWidthStr;
 
 use crate::messages;
-use crate::scene::{key_parts, shortened_key, split_at_unquoted_space};
+use crate::scene::{shortened_key, split_at_unquoted_space, split_dotted_key};
 
 /// Text of a history entry.
 pub(super) struct EntryNumberAndChanges {
@@ -100,7 +100,8 @@ impl UnbreakablePiece {
         if !self.is_key {
             return self.text.split(' ').map(str::to_owned).collect();
         }
-        let mut parts: Vec<String> = key_parts(&self.text).iter().map(|part| format!("{part}.")).collect();
+        let mut parts: Vec<String> =
+            split_dotted_key(&self.text).iter().map(|part| format!("{part}.")).collect();
         if let Some(last) = parts.last_mut() {
             last.pop();
         }
@@ -144,7 +145,7 @@ fn format_key(key: &str, form: ChangeDetail, beside_head: usize) -> String {
 /// Returns the last parts of a key, which identify an object and its property: `lamp.emission` for
 /// `materials.lamp.emission`, but all of `light.1.direction`.
 fn last_key_parts(key: &str) -> String {
-    let parts = key_parts(key);
+    let parts = split_dotted_key(key);
     let first = parts.len().saturating_sub(2);
     let is_number = parts[first].parse::<u64>().is_ok();
     parts[first.saturating_sub(usize::from(is_number))..].join(".")

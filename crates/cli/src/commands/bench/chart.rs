@@ -12,7 +12,7 @@ use crate::bench::{Results, SceneResult};
 use crate::console::Console;
 use crate::progress::format_seconds;
 use crate::scene::sanitize::escape_invisible_chars;
-use crate::tui::paint::buffer_to_text_lines;
+use crate::tui::paint::buffer_to_ansi_text;
 
 /// Method colors, from the terminal's palette.
 const COLORS: [Color; 6] =
@@ -71,7 +71,7 @@ impl ConvergenceChart {
         if self.methods.is_empty() || columns < MIN_SIZE.0 || rows < MIN_SIZE.1 {
             return String::new();
         }
-        buffer_to_text_lines(&self.draw_to_buffer(columns, rows), is_colored)
+        buffer_to_ansi_text(&self.draw_to_buffer(columns, rows), is_colored)
     }
 
     fn draw_to_buffer(&self, columns: u16, rows: u16) -> Buffer {
@@ -127,7 +127,7 @@ pub(super) fn print_charts(results: &Results, console: &Console) {
         crossterm::terminal::size().map_or(80, |(columns, _)| columns.clamp(MIN_SIZE.0, MAX_COLUMNS));
     for scene in &results.scenes {
         console.print_line(&format!("{}: relMSE over seconds (log–log)", scene.scene));
-        console.print_trusted_text(&buffer_to_text_lines(
+        console.print_trusted_text(&buffer_to_ansi_text(
             &ConvergenceChart::from_scene(scene).draw_to_buffer(columns, ROWS),
             console.is_colored(),
         ));
@@ -180,12 +180,12 @@ mod tests {
     #[test]
     fn charts_have_lines_names_and_labels() {
         let buffer = ConvergenceChart::from_scene(&scene()).draw_to_buffer(60, ROWS);
-        let plain = buffer_to_text_lines(&buffer, false);
+        let plain = buffer_to_ansi_text(&buffer, false);
         assert!(plain.chars().any(|c| ('\u{2801}'..='\u{28ff}').contains(&c)), "{plain}");
         assert!(plain.contains("o path") && plain.contains("201 ms") && plain.contains("1e-1"), "{plain}");
         assert!(plain.lines().all(|line| line.chars().count() <= 60) && !plain.contains('\u{1b}'), "{plain}");
         assert_eq!(plain.matches('o').count(), 2 + 1, "expected two points and the legend: {plain}");
-        let colored = buffer_to_text_lines(&buffer, true);
+        let colored = buffer_to_ansi_text(&buffer, true);
         let ends = |line: &str| line.rfind('\u{1b}') == line.rfind("\u{1b}[0m");
         assert!(colored.contains("\u{1b}[34m") && colored.lines().all(ends), "{colored}");
     }
@@ -195,7 +195,7 @@ mod tests {
         let mut empty = scene();
         empty.methods.clear();
         assert!(
-            !buffer_to_text_lines(&ConvergenceChart::from_scene(&empty).draw_to_buffer(30, ROWS), true)
+            !buffer_to_ansi_text(&ConvergenceChart::from_scene(&empty).draw_to_buffer(30, ROWS), true)
                 .is_empty()
         );
     }

@@ -28,9 +28,9 @@ pub(super) fn render_images(args: &CompareArgs, pair: &ImagePair, measured: &Pai
     }
     let (difference, description) = flip_or_difference_image_and_label(pair, measured);
     let pictures = [
-        tone_mapped(&file_name_or_path(&args.a), pair.measured_image()),
-        tone_mapped(&format!("{}, the reference", file_name_or_path(&args.b)), pair.reference()),
-        tone_mapped(&description, &difference),
+        tone_map_named_image(&file_name_or_path(&args.a), pair.measured_image()),
+        tone_map_named_image(&format!("{}, the reference", file_name_or_path(&args.b)), pair.reference()),
+        tone_map_named_image(&description, &difference),
     ];
     images_as_text(&pictures, args.color, is_terminal)
 }
@@ -46,7 +46,7 @@ fn file_name_or_path(path: &Path) -> String {
 }
 
 /// Tone maps an image for display.
-fn tone_mapped(name: &str, image: &RadianceImage) -> NamedImage {
+fn tone_map_named_image(name: &str, image: &RadianceImage) -> NamedImage {
     NamedImage {
         name: escape_invisible_chars(name).into_owned(),
         picture: tone_map_to_8_bits(image, &ToneMapping::default()),

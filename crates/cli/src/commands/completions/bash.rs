@@ -72,12 +72,12 @@ impl EnvCompleter for BashCompletionAdapter {
         // Split the line and determine the quoting at the cursor.
         let words: Vec<OsString> = split_command_line(line).words.into_iter().map(OsString::from).collect();
         let kept = split_command_line(before);
-        let begun = if before.ends_with(is_blank) && kept.quote == Quote::None {
+        let begun = if before.ends_with(is_blank) && kept.quote == OpenQuote::None {
             ""
         } else {
             kept.words.last().map_or("", String::as_str)
         };
-        let keeps_home = kept.quote == Quote::None && replaced.starts_with("~/");
+        let keeps_home = kept.quote == OpenQuote::None && replaced.starts_with("~/");
         store_command_line(&words);
         let last = words.len().saturating_sub(1);
         for candidate in complete(command, words, last, folder)? {
@@ -92,7 +92,7 @@ impl EnvCompleter for BashCompletionAdapter {
 
 /// The quote that is still open at the end of a line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Quote {
+enum OpenQuote {
     None,
     Single,
     Double,
@@ -102,7 +102,7 @@ enum Quote {
 /// line ends with a space.
 struct CommandLine {
     words: Vec<String>,
-    quote: Quote,
+    quote: OpenQuote,
 }
 
 fn is_blank(character: char) -> bool {
@@ -112,24 +112,24 @@ fn is_blank(character: char) -> bool {
 /// Splits a line like bash, but without expansions.
 fn split_command_line(line: &str) -> CommandLine {
     let mut words = vec![String::new()];
-    let mut quote = Quote::None;
+    let mut quote = OpenQuote::None;
     let mut characters = line.trim_start_matches(is_blank).chars().peekable();
     while let Some(character) = characters.next() {
         let mut taken = Some(character);
         match (quote, character) {
-            (Quote::None, blank) if is_blank(blank) => {
+            (OpenQuote::None, blank) if is_blank(blank) => {
                 while characters.next_if(|next| is_blank(*next)).is_some() {}
                 words.push(String::new());
                 taken = None;
             }
-            (Quote::None, '\\') => taken = characters.next(),
-            (Quote::None, '\'') => (quote, taken) = (Quote::Single, None),
-            (Quote::None, '"') => (quote, taken) = (Quote::Double, None),
-            (Quote::Single, '\'') | (Quote::Double, '"') => (quote, taken) = (Quote::None, None),
-            (Quote::Double, '\\') => {
+            (OpenQuote::None, '\\') => taken = characters.next(),
+            (OpenQuote::None, '\'') => (quote, taken) = (OpenQuote::Single, None),
+            (OpenQuote::None, '"') => (quote, taken) = (OpenQuote::Double, None),
+            (OpenQuote::Single, '\'') | (OpenQuote::Double, '"') => (quote, taken) = (OpenQuote::None, None),
+            (OpenQuote::Double, '\\') => {
                 taken = Some(characters.next_if(|next| "$`\"\\".contains(*next)).unwrap_or('\\'));
             }
-            (Quote::None | Quote::Single | Quote::Double, _) => {}
+            (OpenQuote::None | OpenQuote::Single | OpenQuote::Double, _) => {}
         }
         if let (Some(word), Some(taken)) = (words.last_mut(), taken) {
             word.push(taken);
@@ -140,30 +140,30 @@ fn split_command_line(line: &str) -> CommandLine {
 
 /// Quotes a candidate that is inserted after the open quote `quote`, or returns `None` if it cannot be
 /// quoted.
-fn quote_text_for_bash(text: &str, quote: Quote, keeps_home: bool) -> Option<String> {
+fn quote_text_for_bash(text: &str, quote: OpenQuote, keeps_home: bool) -> Option<String> {
     let is_plain = |c: char| c.is_alphanumeric() || "_./,:=@%+-".contains(c);
     if text.chars().any(char::is_control) {
         // Control characters cannot be written inside quotes.
-        return (quote == Quote::None)
+        return (quote == OpenQuote::None)
             .then(|| format!("$'{}'", text.chars().map(escape_char_for_dollar_quotes).collect::<String>()));
     }
     let mut out = String::new();
     for (at, character) in text.chars().enumerate() {
         match quote {
-            Quote::None if is_plain(character) || (keeps_home && at == 0 && character == '~') => {}
-            Quote::None => out.push('\\'),
-            Quote::Single if character == '\'' => {
+            OpenQuote::None if is_plain(character) || (keeps_home && at == 0 && character == '~') => {}
+            OpenQuote::None => out.push('\\'),
+            OpenQuote::Single if character == '\'' => {
                 out.push_str(r"'\''");
                 continue;
             }
-            Quote::Single => {}
+            OpenQuote::Single => {}
             // Bash would keep a backslash before `!`.
-            Quote::Double if character == '!' => {
+            OpenQuote::Double if character == '!' => {
                 out.push_str(r#""\!""#);
                 continue;
             }
-            Quote::Double if "$`\"\\".contains(character) => out.push('\\'),
-            Quote::Double => {}
+            OpenQuote::Double if "$`\"\\".contains(character) => out.push('\\'),
+            OpenQuote::Double => {}
         }
         out.push(character);
     }
@@ -210,11 +210,11 @@ mod tests {
             "a=b:c",
         ];
         for (open, close, quote) in
-            [("", "", Quote::None), ("'", "'", Quote::Single), ("\"", "\"", Quote::Double)]
+            [("", "", OpenQuote::None), ("'", "'", OpenQuote::Single), ("\"", "\"", OpenQuote::Double)]
         {
             for name in names {
                 let Some(text) = quote_text_for_bash(name, quote, false) else {
-                    assert!(quote != Quote::None && name.chars().any(char::is_control), "{name:?}");
+                    assert!(quote != OpenQuote::None && name.chars().any(char::is_control), "{name:?}");
                     continue;
                 };
                 let line = format!("printf '%s\\0' {open}{text}{close}");
@@ -237,9 +237,9 @@ mod tests {
     fn lines_are_split_as_in_bash() {
         let line = split_command_line("glimt  --set a=\"b c\"\\ d 'e\\' \"f\\$\\g ");
         assert_eq!(line.words, ["glimt", "--set", "a=b c d", "e\\", "f$\\g "]);
-        assert_eq!(line.quote, Quote::Double);
+        assert_eq!(line.quote, OpenQuote::Double);
         assert_eq!(split_command_line("glimt ").words, ["glimt", ""]);
-        assert_eq!(split_command_line("glimt 'x").quote, Quote::Single);
-        assert_eq!(quote_text_for_bash("~/a b", Quote::None, true).as_deref(), Some("~/a\\ b"));
+        assert_eq!(split_command_line("glimt 'x").quote, OpenQuote::Single);
+        assert_eq!(quote_text_for_bash("~/a b", OpenQuote::None, true).as_deref(), Some("~/a\\ b"));
     }
 }

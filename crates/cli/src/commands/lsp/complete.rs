@@ -7,7 +7,7 @@ use lsp_types::{
 use serde_json::{Value, json};
 
 use super::document::OpenDocument;
-use super::look::{describe_key, inline_table_keys};
+use super::look::{allowed_inline_table_keys, describe_key};
 use super::place::{CursorContext, CursorTable, cursor_context};
 use crate::scene::keys::key::{ChoiceValue, KeyInfo, TableSyntax, ValueKind};
 use crate::scene::keys::{all_tables, color_names};
@@ -22,7 +22,7 @@ pub(super) fn complete(document: &OpenDocument, offset: usize) -> Option<Value> 
             of.find_allowed_key(&key).map(|key| value_items(document, key.kind, is_quoted))?
         }
         CursorContext::InnerKey { of, outer, given } => {
-            let keys = inline_table_keys(of.find_allowed_key(&outer))
+            let keys = allowed_inline_table_keys(of.find_allowed_key(&outer))
                 .into_iter()
                 .filter(|(name, _)| !given.iter().any(|one| one == name));
             keys.map(|(name, doc)| {

@@ -9,7 +9,7 @@ use crate::control::CancelToken;
 use crate::pipeline::IncrementalSceneChecker;
 use crate::pipeline::protocol::Failure;
 use crate::scene::diagnostic::{self, Severity};
-use crate::scene::{parse, read_current_text};
+use crate::scene::{parse, read_scene_file_text};
 
 /// Returns the diagnostics for a document's text.
 pub(super) fn text_diagnostics(document: &OpenDocument) -> Vec<Diagnostic> {
@@ -24,7 +24,7 @@ pub(super) fn file_diagnostics(
     checker: &mut IncrementalSceneChecker,
     token: &CancelToken,
 ) -> Option<Vec<Diagnostic>> {
-    if *read_current_text(&document.path).ok()? != *document.text {
+    if *read_scene_file_text(&document.path).ok()? != *document.text {
         return None;
     }
     let found = match checker.check(&document.path, &[], token) {

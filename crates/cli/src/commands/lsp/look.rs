@@ -18,7 +18,7 @@ struct KeyAtCursor<'d> {
 }
 
 /// Finds the key whose name or value contains a byte offset.
-fn key_at(document: &OpenDocument, offset: usize) -> Option<KeyAtCursor<'_>> {
+fn find_key_at_offset(document: &OpenDocument, offset: usize) -> Option<KeyAtCursor<'_>> {
     let holds = |key: &&OutlineKey| {
         let reach = |range: &Range<usize>| range.start <= offset && offset <= range.end;
         reach(&key.name.span) || reach(&key.value)
@@ -32,7 +32,7 @@ fn key_at(document: &OpenDocument, offset: usize) -> Option<KeyAtCursor<'_>> {
 
 /// Returns the hover text for the key under the cursor.
 pub(super) fn hover(document: &OpenDocument, offset: usize) -> Option<Value> {
-    let KeyAtCursor { table, outer, key } = key_at(document, offset)?;
+    let KeyAtCursor { table, outer, key } = find_key_at_offset(document, offset)?;
     let name = key.name.text.as_str();
     let text = if std::ptr::eq(key, outer) {
         match table.keys_allowed_for_type().into_iter().find(|one| one.name == name) {
@@ -46,7 +46,7 @@ pub(super) fn hover(document: &OpenDocument, offset: usize) -> Option<Value> {
         }
     } else {
         let outer = table.keys_allowed_for_type().into_iter().find(|one| one.name == outer.name.text);
-        inline_table_keys(outer).into_iter().find(|(known, _)| *known == name)?.1
+        allowed_inline_table_keys(outer).into_iter().find(|(known, _)| *known == name)?.1
     };
     let contents = HoverContents::Markup(MarkupContent { kind: MarkupKind::Markdown, value: text });
     Some(json!(Hover { contents, range: Some(document.to_lsp_range(&key.name.span)) }))
@@ -77,7 +77,7 @@ pub(super) fn describe_key(key: &KeyInfo) -> String {
 
 /// Returns the keys allowed in the inline table that is the value of `outer`, with their descriptions: the table's
 /// own keys, or those that refer to a texture.
-pub(super) fn inline_table_keys(outer: Option<&KeyInfo>) -> Vec<(&'static str, String)> {
+pub(super) fn allowed_inline_table_keys(outer: Option<&KeyInfo>) -> Vec<(&'static str, String)> {
     let own = outer.map_or(&[] as &[KeyInfo], |outer| outer.kind.inner_keys());
     if !own.is_empty() {
         return own.iter().map(|key| (key.name, describe_key(key))).collect();
@@ -92,7 +92,7 @@ pub(super) fn inline_table_keys(outer: Option<&KeyInfo>) -> Vec<(&'static str, S
 
 /// Returns the location of the definition of the name under the cursor.
 pub(super) fn definition(document: &OpenDocument, offset: usize) -> Option<Value> {
-    let KeyAtCursor { table, outer, key } = key_at(document, offset)?;
+    let KeyAtCursor { table, outer, key } = find_key_at_offset(document, offset)?;
     let group = if std::ptr::eq(key, outer) {
         table
             .keys_allowed_for_type()

@@ -1,9 +1,9 @@
 //! Determines what can be completed at the cursor. Works line by line, because incomplete text may have
 //! syntax errors.
 
-use crate::scene::key_parts;
 use crate::scene::keys::find_table;
 use crate::scene::keys::key::{KeyInfo, TableInfo, TableSyntax, TableTypeInfo};
+use crate::scene::split_dotted_key;
 
 /// The kind of text to complete at the cursor.
 #[derive(Debug)]
@@ -54,10 +54,10 @@ pub(super) fn cursor_context(text: &str, offset: usize) -> Option<CursorContext>
         return (!trimmed.contains('=')).then_some(CursorContext::Header);
     };
     let after = text[offset..].split('\n').next().unwrap_or_default();
-    let parts: Vec<&str> = key_parts(header).into_iter().map(str::trim).collect();
+    let parts: Vec<&str> = split_dotted_key(header).into_iter().map(str::trim).collect();
     let mut info = find_table(parts[0])?;
     if let Some(inner) = parts.get(2) {
-        info = info.find_inner(inner)?;
+        info = info.find_inner_table(inner)?;
     } else if parts.len() == 1 && info.form == TableSyntax::Named {
         // `[materials]` followed by `wall = { … }`.
         let (_, braces) = line.split_once('{')?;

@@ -51,7 +51,7 @@ impl<'a> RenderInputFiles<'a> {
             Some(format!("the parts' scene references a file with this name ({name})"))
         };
         let by_content = || {
-            let name = part::input_name_by_content(self.parts, path)?;
+            let name = part::find_input_with_same_content(self.parts, path)?;
             Some(format!("the parts were rendered from it ({name})"))
         };
         match by_name().or_else(|| find(&self.named)).or_else(by_content) {

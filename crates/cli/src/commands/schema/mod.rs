@@ -181,7 +181,8 @@ fn all_types_table_schema(info: &'static TableInfo) -> Value {
     }
     let mut table = json!({ "type": "object", "properties": properties, "additionalProperties": false });
     table["dependencies"] = dependencies.into();
-    let required: Vec<Value> = info.types.iter().filter_map(|kind| type_requirement(info, kind)).collect();
+    let required: Vec<Value> =
+        info.types.iter().filter_map(|kind| required_keys_condition(info, kind)).collect();
     if !required.is_empty() {
         table["allOf"] = required.into();
     }
@@ -189,7 +190,7 @@ fn all_types_table_schema(info: &'static TableInfo) -> Value {
 }
 
 /// Returns the condition that a table of this type has the type's required keys, or `None` if there are none.
-fn type_requirement(info: &TableInfo, kind: &TableTypeInfo) -> Option<Value> {
+fn required_keys_condition(info: &TableInfo, kind: &TableTypeInfo) -> Option<Value> {
     let is_required = |key: &&KeyInfo| matches!(key.default, DefaultValue::Required(_));
     let required: Vec<&str> = kind.keys.iter().filter(is_required).map(|key| key.name).collect();
     let is_other = json!({ "not": type_condition(info, kind) });

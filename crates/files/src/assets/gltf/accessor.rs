@@ -39,7 +39,7 @@ impl ComponentType {
     }
 
     /// Decodes a component as a float. Normalized integers map to [0, 1] or [-1, 1] (3.6.2.2).
-    fn decode_number(self, bytes: &[u8], normalized: bool) -> f32 {
+    fn decode_as_float(self, bytes: &[u8], normalized: bool) -> f32 {
         let word = || [bytes[0], bytes[1]];
         let long = || [bytes[0], bytes[1], bytes[2], bytes[3]];
         let (value, max) = match self {
@@ -123,7 +123,7 @@ impl<'a> AccessorReader<'a> {
             Some(view) => Some(locate_elements(container, view, accessor.byte_offset, size, count)?),
             None if accessor.count <= MAX_ZEROS => None,
             None => {
-                return Err(GltfError::new(too_many_zeros_message(accessor.count)));
+                return Err(GltfError::new(too_many_viewless_elements_message(accessor.count)));
             }
         };
         let sparse = match &accessor.sparse {
@@ -189,7 +189,7 @@ impl<'a> AccessorReader<'a> {
         let (size, element) = (self.component.size(), self.bytes_starting_at_element(index));
         std::array::from_fn(|component| match element {
             _ if component >= self.width => missing,
-            Some(bytes) => self.component.decode_number(&bytes[component * size..], self.normalized),
+            Some(bytes) => self.component.decode_as_float(&bytes[component * size..], self.normalized),
             None => 0.0,
         })
     }
@@ -219,7 +219,7 @@ fn locate_elements<'a>(
     let place = format!("bufferViews[{view}]");
     let json =
         views.get(view).ok_or_else(|| GltfError::index_out_of_range("bufferViews", view, views.len()))?;
-    let bytes = view_bytes(container, json).map_err(|wrong| wrong.add_location(place.clone()))?;
+    let bytes = buffer_view_bytes(container, json).map_err(|wrong| wrong.add_location(place.clone()))?;
     let stride = json.byte_stride.unwrap_or(size as u64);
     if stride < size as u64 || stride > 1 << 16 {
         return Err(GltfError::new(format!("invalid stride of {stride} bytes for {size}-byte elements"))
@@ -235,7 +235,10 @@ fn locate_elements<'a>(
 }
 
 /// Returns the bytes in a buffer view.
-pub(super) fn view_bytes<'a>(container: &'a GltfFile, view: &BufferView) -> Result<&'a [u8], GltfError> {
+pub(super) fn buffer_view_bytes<'a>(
+    container: &'a GltfFile,
+    view: &BufferView,
+) -> Result<&'a [u8], GltfError> {
     let buffers = &container.buffers;
     let buffer = buffers
         .get(view.buffer)
@@ -245,7 +248,7 @@ pub(super) fn view_bytes<'a>(container: &'a GltfFile, view: &BufferView) -> Resu
     Ok(&buffer[view.byte_offset as usize..end as usize])
 }
 
-pub(super) fn too_many_zeros_message(count: u64) -> String {
+pub(super) fn too_many_viewless_elements_message(count: u64) -> String {
     format!("{count} elements without a buffer view; the limit is {MAX_ZEROS}")
 }
 

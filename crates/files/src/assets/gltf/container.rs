@@ -26,8 +26,11 @@ impl GltfFile {
         read::reject_utf16(path, &bytes)?;
         let (length, hash) = (bytes.len(), read::hash_bytes(&bytes));
         let wrong = |wrong: GltfError| AssetError::malformed(path, None, wrong.0);
-        let (json, binary) =
-            if bytes.starts_with(b"glTF") { glb_chunks(&bytes).map_err(wrong)? } else { (0..length, None) };
+        let (json, binary) = if bytes.starts_with(b"glTF") {
+            glb_chunk_ranges(&bytes).map_err(wrong)?
+        } else {
+            (0..length, None)
+        };
         // Parse the JSON.
         let text = &bytes[json];
         if text.len() > JSON_LIMIT {
@@ -165,7 +168,7 @@ pub(super) fn truncate_parser_message(text: &str) -> String {
 type Range = std::ops::Range<usize>;
 
 /// Byte ranges of the JSON and binary chunks in a GLB file (4.4).
-fn glb_chunks(bytes: &[u8]) -> Result<(Range, Option<Range>), GltfError> {
+fn glb_chunk_ranges(bytes: &[u8]) -> Result<(Range, Option<Range>), GltfError> {
     const JSON: u32 = 0x4e4f_534a;
     const BINARY: u32 = 0x004e_4942;
     let word = |at: usize| bytes.get(at..at + 4)?.first_chunk().copied().map(u32::from_le_bytes);

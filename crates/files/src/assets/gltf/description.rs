@@ -113,7 +113,7 @@ pub struct TextureRef {
 
 /// Opacity of a surface.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Alpha {
+pub enum AlphaMode {
     /// Fully opaque.
     Opaque,
     /// Opaque where the opacity reaches the cutoff, invisible elsewhere.
@@ -175,7 +175,7 @@ pub struct ModelMaterial {
     /// Scale factor for the normal map's slopes.
     pub normal_strength: f64,
     /// Opacity.
-    pub alpha: Alpha,
+    pub alpha: AlphaMode,
     /// Whether both sides are visible and emit light.
     pub is_two_sided: bool,
     /// Solid glass. If set, all other parameters except the roughness and the emission are ignored.
@@ -200,7 +200,7 @@ impl ModelMaterial {
             emission: TexturedValue::from_scalar(0.0),
             normal: None,
             normal_strength: 1.0,
-            alpha: Alpha::Opaque,
+            alpha: AlphaMode::Opaque,
             is_two_sided: false,
             glass: None,
         }

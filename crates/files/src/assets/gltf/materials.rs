@@ -2,7 +2,7 @@
 //! `KHR_materials_*`).
 
 use super::description::{
-    Alpha, DiffuseTransmission, ImportNotes, ModelMaterial, TextureRef, TextureWrap, TexturedValue,
+    AlphaMode, DiffuseTransmission, ImportNotes, ModelMaterial, TextureRef, TextureWrap, TexturedValue,
     TintedGlass,
 };
 use super::json::{
@@ -76,11 +76,11 @@ pub(super) fn convert_material(
     notes: &mut ImportNotes,
 ) -> Result<ModelMaterial, GltfError> {
     let json = &container.root.materials[number];
-    let mut reader = MaterialReader { container, place: format!("materials[{number}]"), sets, notes };
+    let mut reader = MaterialConverter { container, place: format!("materials[{number}]"), sets, notes };
     reader.convert_material(json).map_err(|wrong| wrong.add_location(format!("materials[{number}]")))
 }
 
-struct MaterialReader<'a> {
+struct MaterialConverter<'a> {
     container: &'a GltfFile,
     place: String,
     /// The mesh's texture coordinate sets.
@@ -88,7 +88,7 @@ struct MaterialReader<'a> {
     notes: &'a mut ImportNotes,
 }
 
-impl MaterialReader<'_> {
+impl MaterialConverter<'_> {
     fn note(&mut self, what: &str) {
         self.notes.add(&self.place, what);
     }
@@ -99,8 +99,10 @@ impl MaterialReader<'_> {
         // Convert the core parameters.
         let [red, green, blue, alpha] = pbr.base_color_factor;
         let mut base = (DVec3::new(red, green, blue), alpha, &pbr.base_color_texture);
-        material.metallic = self.convert_scalar(pbr.metallic_factor, &pbr.metallic_roughness_texture)?;
-        material.roughness = self.convert_scalar(pbr.roughness_factor, &pbr.metallic_roughness_texture)?;
+        material.metallic =
+            self.convert_textured_scalar(pbr.metallic_factor, &pbr.metallic_roughness_texture)?;
+        material.roughness =
+            self.convert_textured_scalar(pbr.roughness_factor, &pbr.metallic_roughness_texture)?;
         if let Some(old) = &extensions.glossiness {
             self.note("the obsolete specular-glossiness model is converted to roughness");
             let [red, green, blue, alpha] = old.diffuse_factor;
@@ -132,31 +134,38 @@ impl MaterialReader<'_> {
             material.ior = if ior.ior == 0.0 { 10.0 } else { ior.ior.clamp(1.0, 10.0) };
         }
         if let Some(specular) = &extensions.specular {
-            material.specular = self.convert_scalar(specular.specular_factor, &specular.specular_texture)?;
+            material.specular =
+                self.convert_textured_scalar(specular.specular_factor, &specular.specular_texture)?;
             let factor = DVec3::from(specular.specular_color_factor);
             material.specular_color =
                 self.convert_textured_color(factor, &specular.specular_color_texture)?;
         }
         if let Some(coat) = &extensions.clearcoat {
-            material.clearcoat = self.convert_scalar(coat.clearcoat_factor, &coat.clearcoat_texture)?;
+            material.clearcoat =
+                self.convert_textured_scalar(coat.clearcoat_factor, &coat.clearcoat_texture)?;
             let texture = &coat.clearcoat_roughness_texture;
-            material.clearcoat_roughness = self.convert_scalar(coat.clearcoat_roughness_factor, texture)?;
+            material.clearcoat_roughness =
+                self.convert_textured_scalar(coat.clearcoat_roughness_factor, texture)?;
             if coat.clearcoat_normal_texture.is_some() {
                 self.note("the clear coat's normal map is ignored; the material's normal map is used");
             }
         }
         if let Some(transmission) = &extensions.transmission {
             let texture = &transmission.transmission_texture;
-            material.transmission = self.convert_scalar(transmission.transmission_factor, texture)?;
+            material.transmission =
+                self.convert_textured_scalar(transmission.transmission_factor, texture)?;
         }
         material.diffuse_transmission = self.convert_diffuse_transmission(json, &material)?;
         if let Some(volume) = extensions.volume.as_ref().filter(|volume| volume.thickness_factor > 0.0)
             && material.transmission.factor.x > 0.0
         {
-            material.glass =
-                self.solid_glass(&material, volume.attenuation_color, volume.attenuation_distance);
+            material.glass = self.convert_volume_to_solid_glass(
+                &material,
+                volume.attenuation_color,
+                volume.attenuation_distance,
+            );
         }
-        self.note_parameters_that_glass_lacks(&mut material);
+        self.drop_layers_unsupported_by_glass(&mut material);
         if extensions.unlit {
             self.note("the material is unlit, so its color is emitted and also lights other surfaces");
             material.emission = std::mem::replace(&mut material.color, TexturedValue::from_scalar(0.0));
@@ -182,8 +191,10 @@ impl MaterialReader<'_> {
         material: &ModelMaterial,
     ) -> Result<Option<DiffuseTransmission>, GltfError> {
         let Some(through) = &json.extensions.diffuse_transmission else { return Ok(None) };
-        let weight =
-            self.convert_scalar(through.diffuse_transmission_factor, &through.diffuse_transmission_texture)?;
+        let weight = self.convert_textured_scalar(
+            through.diffuse_transmission_factor,
+            &through.diffuse_transmission_texture,
+        )?;
         let factor = DVec3::from(through.diffuse_transmission_color_factor.map(clamp_to_unit));
         let color = self.convert_textured_color(factor, &through.diffuse_transmission_color_texture)?;
         let is_metal = material.metallic.texture.is_none() && material.metallic.factor == DVec3::ONE;
@@ -201,7 +212,7 @@ impl MaterialReader<'_> {
     }
 
     /// Removes the layers that solid glass cannot have, with notes.
-    fn note_parameters_that_glass_lacks(&mut self, material: &mut ModelMaterial) {
+    fn drop_layers_unsupported_by_glass(&mut self, material: &mut ModelMaterial) {
         if material.glass.is_none() {
             return;
         }
@@ -216,7 +227,7 @@ impl MaterialReader<'_> {
 
     /// Converts a volume to solid glass. The attenuation color becomes the transmittance per unit of
     /// distance.
-    fn solid_glass(
+    fn convert_volume_to_solid_glass(
         &mut self,
         material: &ModelMaterial,
         color: [f64; 3],
@@ -240,20 +251,20 @@ impl MaterialReader<'_> {
         json: &JsonMaterial,
         alpha: f64,
         color: &TexturedValue,
-    ) -> Result<Alpha, GltfError> {
+    ) -> Result<AlphaMode, GltfError> {
         let texture = match &color.texture {
             Some(texture) if self.can_image_have_alpha(texture.image) => color.texture.clone(),
             Some(_) | None => None,
         };
         let value = TexturedValue { factor: DVec3::splat(clamp_to_unit(alpha)), texture };
         match json.alpha_mode.as_str() {
-            "OPAQUE" => Ok(Alpha::Opaque),
+            "OPAQUE" => Ok(AlphaMode::Opaque),
             "MASK" if json.alpha_cutoff > 1.0 => {
                 self.note("an alpha cutoff above 1 makes the surface invisible");
-                Ok(Alpha::Blend(TexturedValue::from_scalar(0.0)))
+                Ok(AlphaMode::Blend(TexturedValue::from_scalar(0.0)))
             }
-            "MASK" => Ok(Alpha::Mask { value, cutoff: clamp_to_unit(json.alpha_cutoff) }),
-            "BLEND" => Ok(Alpha::Blend(value)),
+            "MASK" => Ok(AlphaMode::Mask { value, cutoff: clamp_to_unit(json.alpha_cutoff) }),
+            "BLEND" => Ok(AlphaMode::Blend(value)),
             other => {
                 Err(GltfError::new(format!("unknown alpha mode {:?}", super::truncate_for_message(other))))
             }
@@ -280,7 +291,7 @@ impl MaterialReader<'_> {
         }
     }
 
-    fn convert_scalar(
+    fn convert_textured_scalar(
         &mut self,
         factor: f64,
         texture: &Option<TextureInfo>,
@@ -339,7 +350,7 @@ impl MaterialReader<'_> {
         };
         let is_nearest = sampler.is_some_and(|sampler| sampler.mag_filter == Some(NEAREST));
         let plain = TextureTransform::default();
-        let transform = UvTransform::convert(info.extensions.transform.as_ref().unwrap_or(&plain));
+        let transform = UvTransform::from_gltf(info.extensions.transform.as_ref().unwrap_or(&plain));
         Ok(Some(TextureRef {
             image,
             is_nearest,
@@ -363,7 +374,7 @@ impl UvTransform {
     /// Converts `KHR_texture_transform`, which measures v from the top. Substituting (u, 1 − v) for (u, v) in
     /// u' = o.x + cos·s.x·u + sin·s.y·v and v' = o.y − sin·s.x·u + cos·s.y·v keeps the angle and changes the
     /// offset.
-    fn convert(json: &TextureTransform) -> Self {
+    fn from_gltf(json: &TextureTransform) -> Self {
         let finite = |number: f64| if number.is_finite() { number.clamp(-1e9, 1e9) } else { 0.0 };
         let ([x, y], [across, down], angle) =
             (json.offset.map(finite), json.scale.map(finite), finite(json.rotation));
@@ -395,7 +406,7 @@ mod tests {
     fn uv_transforms_match_the_extension() {
         let json =
             TextureTransform { offset: [0.25, -0.5], rotation: 0.7, scale: [2.0, -3.0], tex_coord: None };
-        let converted = UvTransform::convert(&json);
+        let converted = UvTransform::from_gltf(&json);
         let (sin, cos) = json.rotation.sin_cos();
         for (u, v) in [(0.0, 0.0), (0.3, 0.8), (-1.5, 2.0)] {
             let expected = [
@@ -413,7 +424,7 @@ mod tests {
                 "{found:?} {expected:?}"
             );
         }
-        let identity = UvTransform::convert(&TextureTransform::default());
+        let identity = UvTransform::from_gltf(&TextureTransform::default());
         assert_eq!((identity.repeat, identity.degrees, identity.offset), (Vec2::ONE, 0.0, Vec2::ZERO));
     }
 }

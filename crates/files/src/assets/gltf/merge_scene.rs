@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
 
-use super::description::{AffineMap, Alpha, ModelMaterial};
+use super::description::{AffineMap, AlphaMode, ModelMaterial};
 use super::{GltfError, GltfFile, ModelScene};
 use crate::assets::{AssetError, FileMaterial, LoadedMesh, PhysicalMaterial};
 use crate::control::{CancelToken, ignore_progress};
@@ -20,7 +20,7 @@ impl GltfFile {
     /// # Errors
     /// Same as [`GltfFile::convert_scene`] and [`GltfFile::build_part`]. Also fails if the scene has no faces
     /// or too many triangles.
-    pub fn merged_scene(&self, token: &CancelToken) -> Result<LoadedMesh, AssetError> {
+    pub fn merge_scene_into_mesh(&self, token: &CancelToken) -> Result<LoadedMesh, AssetError> {
         let scene = self.convert_scene(token)?;
         let Some([min, max]) = scene.bounds else {
             return Err(self.malformed_error(GltfError::new("its scene has no visible faces")));
@@ -140,10 +140,10 @@ fn to_file_material(material: &ModelMaterial) -> FileMaterial {
         ior: material.ior as f32,
         illumination_model: material.glass.map(|_| 7),
         opacity: match &material.alpha {
-            Alpha::Opaque => 1.0,
-            Alpha::Blend(value) => number(value),
-            Alpha::Mask { value, cutoff } if value.factor.x < *cutoff => 0.0,
-            Alpha::Mask { .. } => 1.0,
+            AlphaMode::Opaque => 1.0,
+            AlphaMode::Blend(value) => number(value),
+            AlphaMode::Mask { value, cutoff } if value.factor.x < *cutoff => 0.0,
+            AlphaMode::Mask { .. } => 1.0,
         },
         opacity_texture: None,
         diffuse_texture: None,

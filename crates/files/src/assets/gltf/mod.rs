@@ -25,12 +25,12 @@ use std::path::{Path, PathBuf};
 
 use self::container::DRACO;
 pub use self::description::{
-    AffineMap, Alpha, DiffuseTransmission, ModelCamera, ModelInstance, ModelLight, ModelLightKind,
+    AffineMap, AlphaMode, DiffuseTransmission, ModelCamera, ModelInstance, ModelLight, ModelLightKind,
     ModelMaterial, ModelProjection, ModelScene, TextureRef, TextureWrap, TexturedValue, TintedGlass,
 };
 use self::json::{JsonImage, Root, Uri};
 pub use self::references::referenced_files;
-use super::image::{self, EmbeddedImage, ImageEncoding, ImageLimits};
+use super::image::{self, ColorEncoding, EmbeddedImage, ImageLimits};
 use super::read::{self, Monitor};
 use super::{AssetError, Companion, FileHash};
 use crate::control::{CancelToken, ignore_progress};
@@ -39,7 +39,7 @@ use crate::control::{CancelToken, ignore_progress};
 const FILE_LIMIT: u64 = 4 << 30;
 
 /// Whether the file name has a glTF extension.
-pub fn is_gltf(path: &Path) -> bool {
+pub fn has_gltf_extension(path: &Path) -> bool {
     let extension = path.extension().unwrap_or_default();
     extension.eq_ignore_ascii_case("glb") || extension.eq_ignore_ascii_case("gltf")
 }
@@ -155,7 +155,7 @@ impl GltfFile {
                 let json = views
                     .get(view)
                     .ok_or_else(|| GltfError::index_out_of_range("bufferViews", view, views.len()))?;
-                accessor::view_bytes(self, json).map(ImageLocation::Inside)
+                accessor::buffer_view_bytes(self, json).map(ImageLocation::Inside)
             }
             (None, None) => Err(GltfError::new("it has neither a URI nor a buffer view")),
         }
@@ -221,14 +221,14 @@ impl GltfFile {
     /// # Errors
     /// [`AssetError::Malformed`] with the image's index, or [`AssetError::Canceled`].
     pub fn check_image_header(&self, number: usize, token: &CancelToken) -> Result<(), AssetError> {
-        let (limits, encoding) = (ImageLimits::default(), ImageEncoding::Color);
+        let (limits, encoding) = (ImageLimits::default(), ColorEncoding::Color);
         let size = match self.locate_image(number)? {
             ImageLocation::File(file) => {
-                image::read_dimensions_and_decoded_bytes(&file, encoding, limits, token)
+                image::read_dimensions_and_memory_size(&file, encoding, limits, token)
             }
             ImageLocation::Inside(bytes) => {
                 let image = EmbeddedImage { path: &self.path, bytes: bytes.into() };
-                image::embedded_dimensions_and_decoded_bytes(image, encoding, limits, token)
+                image::embedded_dimensions_and_memory_size(image, encoding, limits, token)
             }
         };
         size.map(drop).map_err(|error| self.add_image_context(number, error))
@@ -239,7 +239,7 @@ impl GltfFile {
     /// # Errors
     /// Same as [`GltfFile::check_image_header`].
     pub fn check_image_decodes(&self, number: usize, token: &CancelToken) -> Result<(), AssetError> {
-        let (limits, encoding) = (ImageLimits::default(), ImageEncoding::Color);
+        let (limits, encoding) = (ImageLimits::default(), ColorEncoding::Color);
         let texels = match self.locate_image(number)? {
             ImageLocation::File(file) => image::load(&file, encoding, limits, &ignore_progress, token),
             ImageLocation::Inside(bytes) => {

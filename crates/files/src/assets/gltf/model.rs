@@ -5,7 +5,7 @@ use std::collections::hash_map::Entry;
 
 use super::accessor::AccessorReader;
 use super::description::{
-    AffineMap, Alpha, ImportNotes, ModelCamera, ModelInstance, ModelLight, ModelLightKind, ModelMaterial,
+    AffineMap, AlphaMode, ImportNotes, ModelCamera, ModelInstance, ModelLight, ModelLightKind, ModelMaterial,
     ModelProjection, ModelScene,
 };
 use super::json::{JsonCamera, JsonLight, JsonNode, Primitive};
@@ -231,7 +231,7 @@ impl SceneWalk<'_> {
                 return Err(GltfError::new(format!("more than {MAX_INSTANCES} primitive instances")));
             }
             let material =
-                self.material_index(primitive.material, container.select_two_uv_sets(primitive))?;
+                self.find_or_convert_material(primitive.material, container.select_two_uv_sets(primitive))?;
             let colors = container.open_attribute_accessor(primitive, "COLOR_0")?;
             self.note_ignored_attributes(
                 &format!("meshes[{mesh}].primitives[{index}]"),
@@ -265,7 +265,7 @@ impl SceneWalk<'_> {
             colors.width == 4
                 && (0..colors.count).any(|vertex| colors.element_floats::<4>(vertex, 1.0)[3] < 1.0)
         };
-        if material.alpha != Alpha::Opaque && colors.as_ref().is_some_and(has_alpha) {
+        if material.alpha != AlphaMode::Opaque && colors.as_ref().is_some_and(has_alpha) {
             self.notes.add(place, "vertex color alpha is ignored");
         }
         if material.normal.is_some() && primitive.attributes.contains_key("TANGENT") {
@@ -274,7 +274,11 @@ impl SceneWalk<'_> {
     }
 
     /// Returns the index of a material, converting the material on first use.
-    fn material_index(&mut self, number: Option<usize>, sets: [usize; 2]) -> Result<usize, GltfError> {
+    fn find_or_convert_material(
+        &mut self,
+        number: Option<usize>,
+        sets: [usize; 2],
+    ) -> Result<usize, GltfError> {
         if let Some(known) = self.materials.get(&(number, sets)) {
             return Ok(*known);
         }

@@ -16,13 +16,13 @@ use crate::control::{CancelToken, Canceled};
 #[derive(Debug, Default, Deserialize)]
 #[serde(default)]
 struct UriReferences {
-    buffers: Vec<Reference>,
-    images: Vec<Reference>,
+    buffers: Vec<UriReference>,
+    images: Vec<UriReference>,
 }
 
 #[derive(Debug, Default, Deserialize)]
 #[serde(default)]
-struct Reference {
+struct UriReference {
     uri: Option<FileUri>,
 }
 
@@ -67,7 +67,7 @@ impl<R: Read> Read for CancelableReader<'_, R> {
 /// # Errors
 /// Returns [`Canceled`] if the token is canceled.
 pub fn referenced_files(path: &Path, token: &CancelToken) -> Result<Vec<PathBuf>, Canceled> {
-    let references = json_reader(path, token).ok().and_then(|json| serde_json::from_reader(json).ok());
+    let references = open_json_reader(path, token).ok().and_then(|json| serde_json::from_reader(json).ok());
     token.check_pause_and_cancel()?;
     let UriReferences { buffers, images } = references.unwrap_or_default();
     let uris = buffers.into_iter().chain(images).filter_map(|reference| reference.uri?.0);
@@ -75,7 +75,7 @@ pub fn referenced_files(path: &Path, token: &CancelToken) -> Result<Vec<PathBuf>
 }
 
 /// Opens the JSON in a glTF file.
-fn json_reader<'a>(path: &Path, token: &'a CancelToken) -> io::Result<impl Read + use<'a>> {
+fn open_json_reader<'a>(path: &Path, token: &'a CancelToken) -> io::Result<impl Read + use<'a>> {
     /// Number of bytes that precede the JSON in a GLB file (4.4.2): the file header and the first chunk's
     /// length and type.
     const BEFORE_JSON: u64 = 20;

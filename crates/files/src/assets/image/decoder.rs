@@ -14,7 +14,7 @@ use super::exr::ExrDecoder;
 use super::hdr::HdrDecoder;
 use super::metadata::{AlphaInterpretation, ImageMetadata};
 use super::png::PngDecoder;
-use super::{ImageEncoding, ImageLimits, tga};
+use super::{ColorEncoding, ImageLimits, tga};
 use super::{empty_image_message, implausible_size_message, memory_limit_message, side_too_long_message};
 
 /// A decoder, with metadata that the decoder itself does not apply.
@@ -29,7 +29,7 @@ pub(super) struct ImageDecoderWithMetadata {
 /// never used.
 pub(super) fn create_decoder<R: BufRead + Seek + 'static>(
     reader: ImageReader<R>,
-    encoding: ImageEncoding,
+    encoding: ColorEncoding,
     memory_bytes: u64,
 ) -> Result<(Box<dyn ImageDecoder>, ImageMetadata), ImageError> {
     match reader.format() {
@@ -84,7 +84,7 @@ pub(super) fn create_decoder<R: BufRead + Seek + 'static>(
 /// Sets a decoder's memory limit, and reads the color profile if the encoding uses it.
 fn limit_memory_and_read_profile(
     mut decoder: impl ImageDecoder + 'static,
-    encoding: ImageEncoding,
+    encoding: ColorEncoding,
     memory_bytes: u64,
 ) -> Result<(Box<dyn ImageDecoder>, ImageMetadata), ImageError> {
     // `check_size` checks the width and height, and reports errors more clearly.
@@ -102,7 +102,7 @@ fn limit_memory_and_read_profile(
 
 /// Returns an image's orientation from its Exif data. Accepts JPEG's Exif prefix in all formats, because some
 /// programs write it there, although `image` does not accept it.
-pub(super) fn orientation(decoder: &mut dyn ImageDecoder) -> Result<Orientation, ImageError> {
+pub(super) fn read_orientation(decoder: &mut dyn ImageDecoder) -> Result<Orientation, ImageError> {
     let orientation = decoder.orientation()?;
     let exif = if orientation == Orientation::NoTransforms { decoder.exif_metadata()? } else { None };
     let without_prefix = exif.as_ref().and_then(|exif| exif.strip_prefix(b"Exif\0\0"));
@@ -110,11 +110,11 @@ pub(super) fn orientation(decoder: &mut dyn ImageDecoder) -> Result<Orientation,
 }
 
 /// Size of a texel produced by [`texels`](super::convert::texels).
-pub(super) fn bytes_per_texel(color: ColorType, encoding: ImageEncoding, metadata: &ImageMetadata) -> u64 {
+pub(super) fn bytes_per_texel(color: ColorType, encoding: ColorEncoding, metadata: &ImageMetadata) -> u64 {
     let sample_bytes = color.bytes_per_pixel() / color.channel_count();
     let is_packed = sample_bytes == 1 && encoding.color_space(metadata).is_default();
     match encoding {
-        ImageEncoding::CutOut(_) if color.has_alpha() => {
+        ColorEncoding::CutOut(_) if color.has_alpha() => {
             if is_packed && metadata.alpha != AlphaInterpretation::Premultiplied { 4 } else { 16 }
         }
         _ if is_packed => 3,
@@ -141,7 +141,7 @@ pub(super) fn max_memory_to_file_ratio(format: Option<ImageFormat>) -> u64 {
 /// Checks an image's size before memory is allocated, and returns the size of its texels. `held_bytes` is the
 /// size of the file data kept by the decoder. `in_memory` is the size of the in-memory copy of the file,
 /// which is freed before the texels are complete.
-pub(super) fn texel_bytes_within_limits(
+pub(super) fn checked_texel_memory_size(
     decoder: &dyn ImageDecoder,
     texel_bytes: u64,
     [length, held_bytes, in_memory]: [u64; 3],

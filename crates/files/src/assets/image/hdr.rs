@@ -97,7 +97,7 @@ impl HdrHeader {
                 break scan;
             }
             if !line.trim().is_empty() {
-                variables.add(&line, number).map_err(decoding_error)?;
+                variables.parse_line(&line, number).map_err(decoding_error)?;
             }
         };
         Ok(variables.into_header(scan))
@@ -138,7 +138,7 @@ struct HeaderVariables {
 
 impl HeaderVariables {
     /// Parses a header line. Ignores indented lines, which are quoted from other headers.
-    fn add(&mut self, line: &str, number: usize) -> Result<(), String> {
+    fn parse_line(&mut self, line: &str, number: usize) -> Result<(), String> {
         let Some((name, value)) = line.split_once('=').filter(|_| !line.starts_with(['#', ' ', '\t'])) else {
             return Ok(());
         };
@@ -164,7 +164,7 @@ impl HeaderVariables {
             }),
             "PRIMARIES" => {
                 let primaries = parse_numbers(value).map(Primaries::from_numbers);
-                self.primaries = primaries.filter(|primaries| primaries.to_rec_709().is_some());
+                self.primaries = primaries.filter(|primaries| primaries.to_rec_709_matrix().is_some());
                 self.primaries.is_some()
             }
             "GAMMA" => parse_numbers(value) == Some([1.0]),
@@ -182,7 +182,7 @@ impl HeaderVariables {
         let unit = if self.is_xyz { WHITE_EFFICACY } else { 1.0 };
         let exposure = self.exposure.unwrap_or(1.0) * unit;
         let primaries = if self.is_xyz { Some(Primaries::XYZ) } else { self.primaries };
-        let matrix = primaries.and_then(Primaries::to_rec_709);
+        let matrix = primaries.and_then(Primaries::to_rec_709_matrix);
         HdrHeader {
             scan,
             scales: correction.map(|correction| 1.0 / (exposure * correction)),

@@ -1,7 +1,7 @@
 //! ICC profiles with a matrix and curves, or with a single gray curve (ICC.1:2022). Profiles with lookup
 //! tables are not supported.
 
-use super::primaries::colorants_to_rec_709;
+use super::primaries::colorants_to_rec_709_matrix;
 use super::space::{ColorSpace, TransferFunction};
 use crate::math::{DMat3, DVec3};
 
@@ -9,12 +9,12 @@ use crate::math::{DMat3, DVec3};
 const MAX_VALUES: usize = 1 << 16;
 
 /// Returns the color space from a profile for a gray or RGB image, or the reason for ignoring the profile.
-pub(super) fn profile_color_space(profile: &[u8], is_gray: bool) -> Result<ColorSpace, String> {
+pub(super) fn color_space_from_profile(profile: &[u8], is_gray: bool) -> Result<ColorSpace, String> {
     let profile = IccProfile::from_bytes(profile).ok_or(MALFORMED)?;
     match (profile.read_four_bytes(16), profile.read_four_bytes(20)) {
         (Some(b"RGB "), Some(b"XYZ ")) if !is_gray => profile.rgb_color_space(),
         (Some(b"GRAY"), Some(b"XYZ " | b"Lab ")) if is_gray => {
-            let curve = profile.curve(b"kTRC").ok_or(UNSUPPORTED_CURVES)?;
+            let curve = profile.read_curve_tag(b"kTRC").ok_or(UNSUPPORTED_CURVES)?;
             Ok(ColorSpace::from_curves_and_matrix(
                 Some([curve.clone(), curve.clone(), curve]),
                 DMat3::IDENTITY,
@@ -71,7 +71,7 @@ impl<'a> IccProfile<'a> {
         let (Some(red), Some(green), Some(blue)) = (red, green, blue) else {
             return Err(LOOKUP_TABLES.to_owned());
         };
-        let curves = [b"rTRC", b"gTRC", b"bTRC"].map(|name| self.curve(name));
+        let curves = [b"rTRC", b"gTRC", b"bTRC"].map(|name| self.read_curve_tag(name));
         let [Some(r), Some(g), Some(b)] = curves else {
             return Err(UNSUPPORTED_CURVES.to_owned());
         };
@@ -79,23 +79,23 @@ impl<'a> IccProfile<'a> {
         if colorants.determinant().abs() < 1e-6 {
             return Err(DEGENERATE_PRIMARIES.to_owned());
         }
-        let matrix = colorants_to_rec_709(colorants).ok_or(DEGENERATE_PRIMARIES)?;
+        let matrix = colorants_to_rec_709_matrix(colorants).ok_or(DEGENERATE_PRIMARIES)?;
         Ok(ColorSpace::from_curves_and_matrix(Some([r, g, b]), matrix))
     }
 
     fn read_xyz_tag(&self, name: &[u8; 4]) -> Option<DVec3> {
         let data = Self(self.tag(name)?);
         (data.read_four_bytes(0)? == b"XYZ ").then_some(())?;
-        let [x, y, z] = [8, 12, 16].map(|at| data.s15_fixed_16(at));
+        let [x, y, z] = [8, 12, 16].map(|at| data.read_s15_fixed_16(at));
         Some(DVec3::new(x?, y?, z?))
     }
 
     /// Reads an s15Fixed16 number.
-    fn s15_fixed_16(&self, at: usize) -> Option<f64> {
+    fn read_s15_fixed_16(&self, at: usize) -> Option<f64> {
         self.read_four_bytes(at).map(|bytes| f64::from(i32::from_be_bytes(*bytes)) / 65536.0)
     }
 
-    fn curve(&self, name: &[u8; 4]) -> Option<TransferFunction> {
+    fn read_curve_tag(&self, name: &[u8; 4]) -> Option<TransferFunction> {
         let data = Self(self.tag(name)?);
         match data.read_four_bytes(0)? {
             b"curv" => data.parse_sampled_curve(),
@@ -118,7 +118,7 @@ impl<'a> IccProfile<'a> {
 
     fn parse_parametric_curve(&self) -> Option<TransferFunction> {
         let kind = u16::from_be_bytes(*self.0.get(8..)?.first_chunk()?);
-        let number = |index: usize| self.s15_fixed_16(12 + 4 * index);
+        let number = |index: usize| self.read_s15_fixed_16(12 + 4 * index);
         let g = number(0)?;
         let (mut a, mut b, mut c, mut d, mut e, mut f) = (1.0, 0.0, 0.0, 0.0, 0.0, 0.0);
         if kind >= 1 {

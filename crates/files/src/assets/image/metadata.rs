@@ -54,7 +54,7 @@ impl ImageMetadata {
     /// Applies an ICC profile. `None` means that the profile could not be decompressed.
     pub(super) fn apply_icc_profile(&mut self, profile: Option<&[u8]>, is_gray: bool) {
         match profile
-            .map_or(Err(icc::MALFORMED.to_owned()), |profile| icc::profile_color_space(profile, is_gray))
+            .map_or(Err(icc::MALFORMED.to_owned()), |profile| icc::color_space_from_profile(profile, is_gray))
         {
             Ok(space) => self.space = space,
             Err(reason) => self.add_warning(profile_ignored_warning(&reason)),

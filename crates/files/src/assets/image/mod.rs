@@ -34,8 +34,8 @@ use crate::system::describe_error;
 use counting_reader::ProgressReader;
 use decode_thread::ProgressReporter;
 use decoder::{
-    ImageDecoderWithMetadata, bytes_per_texel, create_decoder, max_memory_to_file_ratio, orientation,
-    texel_bytes_within_limits,
+    ImageDecoderWithMetadata, bytes_per_texel, checked_texel_memory_size, create_decoder,
+    max_memory_to_file_ratio, read_orientation,
 };
 use metadata::{ImageMetadata, ImageWarning};
 use pfm::PfmDecoder;
@@ -48,7 +48,7 @@ const CHECKED_FIRST: u64 = 16 << 20;
 
 /// Interpretation of the samples in an image file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum ImageEncoding {
+pub enum ColorEncoding {
     /// As declared by the file. By default, integers are sRGB and floats are linear.
     Color,
     /// Always sRGB.
@@ -66,33 +66,33 @@ pub enum ImageEncoding {
     },
     /// Straight surface colors, with the surface's opacity in the alpha channel. Filtering weights the colors
     /// by alpha.
-    CutOut(ColorCurve),
+    CutOut(ColorTransferFunction),
 }
 
 /// Transfer function for colors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum ColorCurve {
-    /// As in [`ImageEncoding::Color`].
+pub enum ColorTransferFunction {
+    /// As in [`ColorEncoding::Color`].
     Auto,
-    /// As in [`ImageEncoding::Srgb`].
+    /// As in [`ColorEncoding::Srgb`].
     Srgb,
-    /// As in [`ImageEncoding::Linear`].
+    /// As in [`ColorEncoding::Linear`].
     Linear,
 }
 
-impl ColorCurve {
-    /// Encoding of an image that has this transfer function and no alpha.
-    pub fn encoding(self) -> ImageEncoding {
+impl ColorTransferFunction {
+    /// Interpretation of an image that has this transfer function and no alpha.
+    pub fn encoding_without_alpha(self) -> ColorEncoding {
         match self {
-            Self::Auto => ImageEncoding::Color,
-            Self::Srgb => ImageEncoding::Srgb,
-            Self::Linear => ImageEncoding::Linear,
+            Self::Auto => ColorEncoding::Color,
+            Self::Srgb => ColorEncoding::Srgb,
+            Self::Linear => ColorEncoding::Linear,
         }
     }
 }
 
-impl ImageEncoding {
-    /// Unique index of this encoding.
+impl ColorEncoding {
+    /// Unique index of this interpretation.
     pub fn index(self) -> usize {
         match self {
             Self::Color => 0,
@@ -120,7 +120,7 @@ impl ImageEncoding {
     /// Whether the file rather than the scene determines the color space.
     fn uses_file_color_space(self) -> bool {
         match self {
-            Self::Color | Self::Raw | Self::CutOut(ColorCurve::Auto) => true,
+            Self::Color | Self::Raw | Self::CutOut(ColorTransferFunction::Auto) => true,
             Self::Srgb | Self::Linear | Self::Number { .. } | Self::CutOut(_) => false,
         }
     }
@@ -155,7 +155,7 @@ impl Default for ImageLimits {
 /// bytes. Only TGA, which has no signature, is detected from the file extension.
 ///
 /// Gray becomes RGB, alpha is dropped except for scalars and cutouts, and the EXIF orientation is applied.
-/// Negative and nonfinite texels become 0 (except for [`ImageEncoding::Raw`]). A truncated JPEG is an error.
+/// Negative and nonfinite texels become 0 (except for [`ColorEncoding::Raw`]). A truncated JPEG is an error.
 /// 16-bit and float samples are converted to linear floats. Progress is measured in bytes of the file.
 ///
 /// # Errors
@@ -163,21 +163,21 @@ impl Default for ImageLimits {
 /// limits, or [`AssetError::Canceled`].
 pub fn load(
     path: &Path,
-    encoding: ImageEncoding,
+    encoding: ColorEncoding,
     limits: ImageLimits,
     progress: Progress<'_>,
     token: &CancelToken,
 ) -> Result<DecodedImage, AssetError> {
-    load_hashed(path, encoding, limits, progress, token).map(|(image, _)| image)
+    load_and_hash(path, encoding, limits, progress, token).map(|(image, _)| image)
 }
 
 /// Like [`load`], but also returns the hash of the decoded bytes.
 ///
 /// # Errors
 /// Same as [`load`].
-pub fn load_hashed(
+pub fn load_and_hash(
     path: &Path,
-    encoding: ImageEncoding,
+    encoding: ColorEncoding,
     limits: ImageLimits,
     progress: Progress<'_>,
     token: &CancelToken,
@@ -188,7 +188,7 @@ pub fn load_hashed(
 
 fn decode_source(
     file: OpenImage,
-    encoding: ImageEncoding,
+    encoding: ColorEncoding,
     monitor: Monitor<'_>,
 ) -> Result<DecodedImage, AssetError> {
     let (path, length) = (file.path.clone(), file.length as usize);
@@ -212,22 +212,22 @@ fn decode_source(
 ///
 /// # Errors
 /// Any error from [`load`] that can be detected at the start of the file.
-pub fn read_dimensions_and_decoded_bytes(
+pub fn read_dimensions_and_memory_size(
     path: &Path,
-    encoding: ImageEncoding,
+    encoding: ColorEncoding,
     limits: ImageLimits,
     token: &CancelToken,
 ) -> Result<(u32, u32, u64), AssetError> {
-    source_size_and_decoded_bytes(
+    source_dimensions_and_memory_size(
         OpenImage::open(path, limits, token)?,
         encoding,
         Monitor { progress: &ignore_progress, token },
     )
 }
 
-fn source_size_and_decoded_bytes(
+fn source_dimensions_and_memory_size(
     file: OpenImage,
-    encoding: ImageEncoding,
+    encoding: ColorEncoding,
     monitor: Monitor<'_>,
 ) -> Result<(u32, u32, u64), AssetError> {
     file.run_on_decode_thread(monitor, move |file, report| {
@@ -252,7 +252,7 @@ pub struct EmbeddedImage<'a> {
 /// Same as [`load`].
 pub fn load_embedded(
     image: EmbeddedImage<'_>,
-    encoding: ImageEncoding,
+    encoding: ColorEncoding,
     limits: ImageLimits,
     progress: Progress<'_>,
     token: &CancelToken,
@@ -260,17 +260,17 @@ pub fn load_embedded(
     decode_source(OpenImage::from_embedded(image, limits, token)?, encoding, Monitor { progress, token })
 }
 
-/// Like [`read_dimensions_and_decoded_bytes`], but for an embedded image.
+/// Like [`read_dimensions_and_memory_size`], but for an embedded image.
 ///
 /// # Errors
-/// Same as [`read_dimensions_and_decoded_bytes`].
-pub fn embedded_dimensions_and_decoded_bytes(
+/// Same as [`read_dimensions_and_memory_size`].
+pub fn embedded_dimensions_and_memory_size(
     image: EmbeddedImage<'_>,
-    encoding: ImageEncoding,
+    encoding: ColorEncoding,
     limits: ImageLimits,
     token: &CancelToken,
 ) -> Result<(u32, u32, u64), AssetError> {
-    source_size_and_decoded_bytes(
+    source_dimensions_and_memory_size(
         OpenImage::from_embedded(image, limits, token)?,
         encoding,
         Monitor { progress: &ignore_progress, token },
@@ -360,14 +360,14 @@ impl OpenImage {
     /// replaced in the meantime.
     fn open_in_memory_and_hash(
         path: &Path,
-        encoding: ImageEncoding,
+        encoding: ColorEncoding,
         limits: ImageLimits,
         token: &CancelToken,
     ) -> Result<(Self, FileHash), AssetError> {
         let (file, length) = read::open_regular_with_limit(path, FILE_LIMIT)?;
         if length > CHECKED_FIRST {
             // Avoid reading a large file that will be rejected.
-            read_dimensions_and_decoded_bytes(path, encoding, limits, token)?;
+            read_dimensions_and_memory_size(path, encoding, limits, token)?;
         }
         let unreadable = |error: io::Error| AssetError::from_io(path, &error);
         let without_text = match length > CHECKED_FIRST {
@@ -422,12 +422,12 @@ impl OpenImage {
 
     fn decode(
         self,
-        encoding: ImageEncoding,
+        encoding: ColorEncoding,
         report: ProgressReporter,
     ) -> Result<(DynamicImage, ImageMetadata), String> {
         let ImageDecoderWithMetadata { mut decoder, metadata, .. } = self.open_decoder(encoding, report)?;
         let (width, height) = decoder.dimensions();
-        let orientation = orientation(&mut *decoder).map_err(|error| shorten_decoder_error(&error))?;
+        let orientation = read_orientation(&mut *decoder).map_err(|error| shorten_decoder_error(&error))?;
         let image = DynamicImage::from_decoder(decoder);
         let mut image = image
             .map_err(|error| undecodable_image_message(width, height, &shorten_decoder_error(&error)))?;
@@ -438,7 +438,7 @@ impl OpenImage {
     /// Creates a decoder after checking the limits.
     fn open_decoder(
         mut self,
-        encoding: ImageEncoding,
+        encoding: ColorEncoding,
         report: ProgressReporter,
     ) -> Result<ImageDecoderWithMetadata, String> {
         let start = |bytes: &[u8]| ::image::guess_format(bytes).ok();
@@ -454,7 +454,7 @@ impl OpenImage {
             }
             ImageStream::Embedded(bytes) if start(bytes.get_ref()) == Some(ImageFormat::Jpeg) => {
                 jpeg::check_complete_bytes(bytes.get_ref())?;
-                if jpeg::wrong_adobe_transform_offset(bytes.get_ref()).is_some() {
+                if jpeg::find_wrong_adobe_transform(bytes.get_ref()).is_some() {
                     let mut copy = bytes.get_ref().to_vec();
                     jpeg::fix_adobe_color_transform(&mut copy);
                     self.file = ImageStream::InMemory(Cursor::new(copy));
@@ -492,7 +492,7 @@ impl OpenImage {
         let (decoder, metadata) = chosen.map_err(|error| shorten_decoder_error(&error))?;
         let held_bytes = if is_jpeg { self.length } else { 0 };
         let texel = bytes_per_texel(decoder.color_type(), encoding, &metadata);
-        let texel_bytes = texel_bytes_within_limits(
+        let texel_bytes = checked_texel_memory_size(
             &*decoder,
             texel,
             [self.length, held_bytes, in_memory],

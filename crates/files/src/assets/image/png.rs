@@ -85,7 +85,7 @@ impl<R: BufRead + Seek> PngDecoder<R> {
         decoder.set_ignore_iccp_chunk(true);
         // Expand palettes to colors and small integers to bytes. Keep 16-bit samples.
         decoder.set_transformations(png::Transformations::EXPAND);
-        let reader = decoder.read_info().map_err(image_error)?;
+        let reader = decoder.read_info().map_err(to_image_error)?;
         let (color_type, depth) = reader.output_color_type();
         let is_wide = depth == png::BitDepth::Sixteen;
         let color_type = match color_type {
@@ -129,7 +129,7 @@ impl<R: BufRead + Seek> PngDecoder<R> {
         let matrix = info.chrm_chunk.filter(|_| !is_gray).map_or(Some(DMat3::IDENTITY), |chunk| {
             let [red, green, blue, white] =
                 [chunk.red, chunk.green, chunk.blue, chunk.white].map(|(x, y)| [number(x), number(y)]);
-            Primaries { red, green, blue, white }.to_rec_709()
+            Primaries { red, green, blue, white }.to_rec_709_matrix()
         });
         if matrix.is_none() {
             metadata.add_warning("a degenerate cHRM chunk is ignored");
@@ -155,7 +155,7 @@ impl<R: BufRead + Seek> ImageDecoder for PngDecoder<R> {
     }
 
     fn read_image(mut self, samples: &mut [u8]) -> ImageResult<()> {
-        self.reader.next_frame(samples).map_err(image_error)?;
+        self.reader.next_frame(samples).map_err(to_image_error)?;
         if self.color_type.bytes_per_pixel() / self.color_type.channel_count() == 2 {
             for sample in samples.as_chunks_mut::<2>().0 {
                 *sample = u16::from_be_bytes(*sample).to_ne_bytes();
@@ -210,7 +210,8 @@ fn color_space_from_cicp(points: png::CodingIndependentCodePoints) -> Option<Col
     };
     let is_plain = points.matrix_coefficients == 0 && points.is_video_full_range_image;
     let curves = [curve.clone(), curve.clone(), curve];
-    is_plain.then(|| Some(ColorSpace::from_curves_and_matrix(Some(curves), primaries.to_rec_709()?)))?
+    is_plain
+        .then(|| Some(ColorSpace::from_curves_and_matrix(Some(curves), primaries.to_rec_709_matrix()?)))?
 }
 
 /// Warning about unsupported code points.
@@ -267,7 +268,7 @@ fn decompress_profile(chunk: &[u8]) -> Option<Vec<u8>> {
     fdeflate::decompress_to_vec_bounded(packed, PROFILE_BYTES as usize).ok()
 }
 
-fn image_error(error: png::DecodingError) -> ImageError {
+fn to_image_error(error: png::DecodingError) -> ImageError {
     match error {
         png::DecodingError::IoError(error) => ImageError::IoError(error),
         png::DecodingError::LimitsExceeded => {

@@ -43,7 +43,7 @@ impl Primaries {
     }
 
     /// Matrix to XYZ, scaled to map (1, 1, 1) to white, or `None` for degenerate primaries.
-    fn to_xyz(self) -> Option<DMat3> {
+    fn to_xyz_matrix(self) -> Option<DMat3> {
         let primaries = DMat3::from_cols(
             chromaticity_to_unit_sum_xyz(self.red),
             chromaticity_to_unit_sum_xyz(self.green),
@@ -56,17 +56,17 @@ impl Primaries {
 
     /// Luminance weights of red, green and blue, or `None` for degenerate primaries.
     pub(super) fn luminance_weights(self) -> Option<DVec3> {
-        Some(self.to_xyz()?.row(1))
+        Some(self.to_xyz_matrix()?.row(1))
     }
 
     /// Matrix to linear Rec. 709 with Bradford chromatic adaptation, or `None` for degenerate primaries.
-    pub(super) fn to_rec_709(self) -> Option<DMat3> {
-        Some(xyz_to_rec_709_matrix(self.white_xyz())? * self.to_xyz()?)
+    pub(super) fn to_rec_709_matrix(self) -> Option<DMat3> {
+        Some(xyz_to_rec_709_matrix(self.white_xyz())? * self.to_xyz_matrix()?)
     }
 }
 
 /// Matrix to linear Rec. 709 from an ICC profile's colorants, which are in XYZ relative to D50.
-pub(super) fn colorants_to_rec_709(colorants: DMat3) -> Option<DMat3> {
+pub(super) fn colorants_to_rec_709_matrix(colorants: DMat3) -> Option<DMat3> {
     Some(xyz_to_rec_709_matrix(D50)? * colorants)
 }
 
@@ -80,7 +80,7 @@ fn xyz_to_rec_709_matrix(white: DVec3) -> Option<DMat3> {
     let to_cones = bradford_cone_response_matrix();
     let [from, to] = [white, Primaries::REC_709.white_xyz()].map(|white| to_cones * white);
     let adapted = inverse(to_cones)? * DMat3::from_diagonal(to / from) * to_cones;
-    let matrix = inverse(Primaries::REC_709.to_xyz()?)? * adapted;
+    let matrix = inverse(Primaries::REC_709.to_xyz_matrix()?)? * adapted;
     matrix.is_finite().then_some(matrix)
 }
 
@@ -109,7 +109,7 @@ mod tests {
 
     #[test]
     fn conversions_to_rec_709_match_references() {
-        let matrix = |primaries: Primaries| primaries.to_rec_709().expect("colors");
+        let matrix = |primaries: Primaries| primaries.to_rec_709_matrix().expect("colors");
         assert!(is_identity(&matrix(Primaries::REC_709)));
         // ITU-R BT.2087, table 4, inverted.
         let rec_2020 = matrix(Primaries::REC_2020);
@@ -134,7 +134,7 @@ mod tests {
         let black = Primaries { white: [0.3, 0.0], ..Primaries::REC_709 };
         let nan = Primaries { blue: [f64::NAN, 0.1], ..Primaries::REC_709 };
         for primaries in [line, black, nan, Primaries::from_numbers([0.0; 8])] {
-            assert_eq!(primaries.to_rec_709(), None, "{primaries:?}");
+            assert_eq!(primaries.to_rec_709_matrix(), None, "{primaries:?}");
         }
     }
 
@@ -143,6 +143,6 @@ mod tests {
         let colorants = DMat3::from_cols_array(&[
             0.43607, 0.22249, 0.01392, 0.38515, 0.71687, 0.09708, 0.14307, 0.06061, 0.71410,
         ]);
-        assert!(is_identity(&colorants_to_rec_709(colorants).expect("colors")));
+        assert!(is_identity(&colorants_to_rec_709_matrix(colorants).expect("colors")));
     }
 }

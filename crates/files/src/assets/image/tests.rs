@@ -19,11 +19,11 @@ mod png;
 mod tga;
 mod webp;
 
-fn load_with(path: &Path, encoding: ImageEncoding) -> Result<Texels, AssetError> {
+fn load_with(path: &Path, encoding: ColorEncoding) -> Result<Texels, AssetError> {
     Ok(load(path, encoding, ImageLimits::default(), &ignore_progress, &CancelToken::new())?.texels)
 }
 
-fn load_bytes(name: &str, bytes: &[u8], encoding: ImageEncoding) -> Result<Texels, AssetError> {
+fn load_bytes(name: &str, bytes: &[u8], encoding: ColorEncoding) -> Result<Texels, AssetError> {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join(name);
     fs::write(&path, bytes).expect("written");
@@ -31,7 +31,7 @@ fn load_bytes(name: &str, bytes: &[u8], encoding: ImageEncoding) -> Result<Texel
 }
 
 /// Returns the warnings about a file, with the directory stripped from its path.
-fn warnings_of(name: &str, bytes: &[u8], encoding: ImageEncoding) -> Vec<String> {
+fn warnings_of(name: &str, bytes: &[u8], encoding: ColorEncoding) -> Vec<String> {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join(name);
     fs::write(&path, bytes).expect("written");
@@ -43,7 +43,7 @@ fn warnings_of(name: &str, bytes: &[u8], encoding: ImageEncoding) -> Vec<String>
 
 /// Returns the reason why an image is rejected.
 fn error(name: &str, bytes: &[u8]) -> String {
-    rejection(load_bytes(name, bytes, ImageEncoding::Color)).1
+    rejection(load_bytes(name, bytes, ColorEncoding::Color)).1
 }
 
 const PIXELS: [u8; 12] = [255, 0, 0, 0, 255, 0, 0, 0, 255, 10, 20, 30];
@@ -61,12 +61,12 @@ fn lossless_formats_decode_to_the_same_texels() {
     for extension in ["png", "ppm", "tga", "bmp", "webp"] {
         let path = folder.path().join(format!("a.{extension}"));
         save_buffer(&path, &PIXELS, 2, 2, ExtendedColorType::Rgb8).expect("written");
-        let texels = load_with(&path, ImageEncoding::Color).expect(extension);
+        let texels = load_with(&path, ColorEncoding::Color).expect(extension);
         assert_eq!((texels.width, texels.height), (2, 2));
         let expected = vec![[255, 0, 0], [0, 255, 0], [0, 0, 255], [10, 20, 30]];
         assert_eq!(texels.data, TexelData::Srgb8(expected.clone()), "{extension}");
         assert_eq!(
-            load_with(&path, ImageEncoding::Linear).expect(extension).data,
+            load_with(&path, ColorEncoding::Linear).expect(extension).data,
             TexelData::Linear8(expected)
         );
     }
@@ -74,8 +74,8 @@ fn lossless_formats_decode_to_the_same_texels() {
 
 #[test]
 fn content_takes_precedence_over_extension() {
-    assert!(load_bytes("a.jpg", &small_png(), ImageEncoding::Color).is_ok());
-    assert!(load_bytes("none", &small_png(), ImageEncoding::Color).is_ok());
+    assert!(load_bytes("a.jpg", &small_png(), ColorEncoding::Color).is_ok());
+    assert!(load_bytes("none", &small_png(), ColorEncoding::Color).is_ok());
     assert_eq!(error("a.txt", b"some words"), unknown_format_message());
     assert!(error("a.gif", b"GIF89a\x01\0\x01\0\0\0\0;").starts_with(&unknown_format_message()));
 }
@@ -83,7 +83,7 @@ fn content_takes_precedence_over_extension() {
 #[test]
 fn all_ppm_variants_are_read() {
     let srgb = |bytes: Vec<[u8; 3]>| TexelData::Srgb8(bytes);
-    let color = |bytes: &[u8]| load_bytes("a.ppm", bytes, ImageEncoding::Color).expect("a PPM").data;
+    let color = |bytes: &[u8]| load_bytes("a.ppm", bytes, ColorEncoding::Color).expect("a PPM").data;
     let both = vec![[1, 2, 3], [255, 254, 9]];
     let header = b"P6\n# a comment, 100%\n2 1\n255\n";
     assert_eq!(color(&[header.as_slice(), &[1, 2, 3, 255, 254, 9]].concat()), srgb(both.clone()));
@@ -103,17 +103,17 @@ fn pfm_supports_color_gray_and_both_endians() {
         let file: Vec<u8> = head.bytes().chain(bytes).collect();
         let expected = TexelData::Float(color.map(Vec3::from_array).to_vec());
         assert_eq!(
-            load_bytes("a.pfm", &file, ImageEncoding::Color).expect("a PFM").data,
+            load_bytes("a.pfm", &file, ColorEncoding::Color).expect("a PFM").data,
             expected,
             "{head:?}"
         );
         for length in 0..file.len() {
-            assert!(load_bytes("a.pfm", &file[..length], ImageEncoding::Color).is_err(), "{head:?} {length}");
+            assert!(load_bytes("a.pfm", &file[..length], ColorEncoding::Color).is_err(), "{head:?} {length}");
         }
     }
     let gray = [b"Pf 2 1 -1\n".as_slice(), &3.0_f32.to_le_bytes(), &(-1.0_f32).to_le_bytes()].concat();
     let expected = TexelData::Float(vec![Vec3::splat(3.0), Vec3::ZERO]);
-    assert_eq!(load_bytes("any", &gray, ImageEncoding::Color).expect("a PFM").data, expected);
+    assert_eq!(load_bytes("any", &gray, ColorEncoding::Color).expect("a PFM").data, expected);
     for wrong in [
         "PF 0 1 1 ",
         "PF 1 -1 1 ",
@@ -123,7 +123,7 @@ fn pfm_supports_color_gray_and_both_endians() {
         "PF 70000 1 1 ",
         "PF 60000 60000 1 ",
     ] {
-        assert!(load_bytes("a.pfm", wrong.as_bytes(), ImageEncoding::Color).is_err(), "{wrong}");
+        assert!(load_bytes("a.pfm", wrong.as_bytes(), ColorEncoding::Color).is_err(), "{wrong}");
     }
 }
 
@@ -133,8 +133,8 @@ fn sixteen_bit_samples_keep_their_precision() {
     let value = 32769.0 / 65535.0;
     let data = |encoding| load_bytes("a.ppm", file, encoding).expect("a PPM").data;
     let expected = Vec3::new(srgb_to_linear(value), 0.0, 1.0);
-    assert_eq!(data(ImageEncoding::Color), TexelData::Float(vec![expected]));
-    assert_eq!(data(ImageEncoding::Linear), TexelData::Float(vec![Vec3::new(value, 0.0, 1.0)]));
+    assert_eq!(data(ColorEncoding::Color), TexelData::Float(vec![expected]));
+    assert_eq!(data(ColorEncoding::Linear), TexelData::Float(vec![Vec3::new(value, 0.0, 1.0)]));
 }
 
 #[test]
@@ -145,8 +145,8 @@ fn floats_are_linear_and_invalid_floats_are_zero() {
     let raw: Vec<u8> = values.iter().flat_map(|value| value.to_ne_bytes()).collect();
     save_buffer(&path, &raw, 2, 1, ExtendedColorType::Rgb32F).expect("written");
     let expected = vec![Vec3::new(0.5, 7.0, 0.0), Vec3::new(0.0, 0.0, 0.25)];
-    assert_eq!(load_with(&path, ImageEncoding::Color).expect("an EXR").data, TexelData::Float(expected));
-    let decoded = load_with(&path, ImageEncoding::Srgb).expect("an EXR").get(0, 0);
+    assert_eq!(load_with(&path, ColorEncoding::Color).expect("an EXR").data, TexelData::Float(expected));
+    let decoded = load_with(&path, ColorEncoding::Srgb).expect("an EXR").get(0, 0);
     assert!((decoded.x - srgb_to_linear(0.5)).abs() < 1e-6);
 }
 
@@ -157,9 +157,9 @@ fn exr_alpha_is_read() {
     let values = [1.0_f32, 0.5, 0.25, 0.125, 0.0, 3.0, 2.0, 0.75];
     let raw: Vec<u8> = values.iter().flat_map(|value| value.to_ne_bytes()).collect();
     save_buffer(&path, &raw, 2, 1, ExtendedColorType::Rgba32F).expect("written");
-    let color = load_with(&path, ImageEncoding::Color).expect("an EXR").data;
+    let color = load_with(&path, ColorEncoding::Color).expect("an EXR").data;
     assert_eq!(color, TexelData::Float(vec![Vec3::new(1.0, 0.5, 0.25), Vec3::new(0.0, 3.0, 2.0)]));
-    let alpha = ImageEncoding::Number { of: ChannelSelector::Opacity, is_srgb: false };
+    let alpha = ColorEncoding::Number { of: ChannelSelector::Opacity, is_srgb: false };
     let opacity = load_with(&path, alpha).expect("an EXR");
     assert_eq!([opacity.get(0, 0).x, opacity.get(1, 0).x], [0.125, 0.75]);
 }
@@ -169,10 +169,10 @@ fn gray_is_expanded_and_alpha_is_dropped() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("a.png");
     save_buffer(&path, &[9, 0, 200, 128], 2, 1, ExtendedColorType::La8).expect("written");
-    let data = load_with(&path, ImageEncoding::Color).expect("a PNG").data;
+    let data = load_with(&path, ColorEncoding::Color).expect("a PNG").data;
     assert_eq!(data, TexelData::Srgb8(vec![[9; 3], [200; 3]]));
     save_buffer(&path, &[1, 2, 3, 0], 1, 1, ExtendedColorType::Rgba8).expect("written");
-    let data = load_with(&path, ImageEncoding::Color).expect("a PNG").data;
+    let data = load_with(&path, ColorEncoding::Color).expect("a PNG").data;
     assert_eq!(data, TexelData::Srgb8(vec![[1, 2, 3]]));
 }
 
@@ -209,7 +209,7 @@ fn empty_bmp(width: u32, height: u32) -> Vec<u8> {
 /// Short files must not use gigabytes of memory, regardless of their extension.
 #[test]
 fn short_files_take_little_memory() {
-    assert!(load_bytes("a.bmp", &empty_bmp(600, 400), ImageEncoding::Color).is_ok());
+    assert!(load_bytes("a.bmp", &empty_bmp(600, 400), ColorEncoding::Color).is_ok());
     for name in ["a.bmp", "a.tga"] {
         let length = empty_bmp(16_000, 16_000).len() as u64;
         let reason = error(name, &empty_bmp(16_000, 16_000));
@@ -220,22 +220,22 @@ fn short_files_take_little_memory() {
 
 #[test]
 fn false_sizes_are_rejected() {
-    assert!(load_bytes("a.png", &png_claiming(2, 2), ImageEncoding::Color).is_ok());
+    assert!(load_bytes("a.png", &png_claiming(2, 2), ColorEncoding::Color).is_ok());
     assert!(error("a.png", &png_claiming(16000, 16000)).contains("16000 × 16000"));
     assert!(error("a.png", &png_claiming(20000, 2)).contains("20000 × 2"));
     let truncated = error("a.ppm", b"P6 5000 5000 255\n123");
     assert_eq!(truncated, undecodable_image_message(5000, 5000, jpeg::TRUNCATED));
-    assert!(load_bytes("a.ppm", b"P6 4000000000 4000000000 255\n123", ImageEncoding::Color).is_err());
-    assert!(load_bytes("a.ppm", b"P6 0 0 255\n", ImageEncoding::Color).is_err());
+    assert!(load_bytes("a.ppm", b"P6 4000000000 4000000000 255\n123", ColorEncoding::Color).is_err());
+    assert!(load_bytes("a.ppm", b"P6 0 0 255\n", ColorEncoding::Color).is_err());
     assert_eq!(error("a.png", b""), EMPTY_FILE);
 }
 
 #[test]
 fn sides_are_limited_to_65536_pixels() {
     let wide = [b"P5 16385 1 255\n".as_slice(), &[7; 16385]].concat();
-    assert_eq!(load_bytes("a.ppm", &wide, ImageEncoding::Color).expect("read").width, 16385);
+    assert_eq!(load_bytes("a.ppm", &wide, ColorEncoding::Color).expect("read").width, 16385);
     let widest = [b"P5 1 65536 255\n".as_slice(), &[7; 65536]].concat();
-    assert_eq!(load_bytes("a.ppm", &widest, ImageEncoding::Color).expect("read").height, 65536);
+    assert_eq!(load_bytes("a.ppm", &widest, ColorEncoding::Color).expect("read").height, 65536);
     let bmp =
         [b"BM\0\0\0\0\0\0\0\0\x36\0\0\0\x28\0\0\0\x01\0\x01\0\x01\0\0\0\x01\0\x18\0".as_slice(), &[0; 24]]
             .concat();
@@ -273,7 +273,7 @@ fn truncated_and_fake_jpegs_are_rejected() {
     let path = folder.path().join("a.jpg");
     save_buffer(&path, &[90; 32 * 32 * 3], 32, 32, ExtendedColorType::Rgb8).expect("written");
     let whole = fs::read(&path).expect("read");
-    let texels = load_with(&path, ImageEncoding::Color).expect("whole");
+    let texels = load_with(&path, ColorEncoding::Color).expect("whole");
     assert_eq!((texels.width, texels.height), (32, 32));
     assert_eq!(error("a.jpg", &whole[..whole.len() - 2]), jpeg::TRUNCATED);
     // Height and width start 5 bytes after the start-of-frame marker.
@@ -289,7 +289,7 @@ fn the_memory_limit_is_enforced() {
     let path = folder.path().join("a.png");
     fs::write(&path, small_png()).expect("written");
     let limits = ImageLimits { side: 16384, memory_bytes: 23 };
-    let result = load(&path, ImageEncoding::Color, limits, &ignore_progress, &CancelToken::new());
+    let result = load(&path, ColorEncoding::Color, limits, &ignore_progress, &CancelToken::new());
     assert!(matches!(result, Err(AssetError::Malformed { .. })), "24 bytes: {result:?}");
 }
 
@@ -297,9 +297,9 @@ fn the_memory_limit_is_enforced() {
 fn truncated_pngs_do_not_panic() {
     let whole = small_png();
     for length in 0..whole.len() {
-        let _ = load_bytes("a.png", &whole[..length], ImageEncoding::Color);
+        let _ = load_bytes("a.png", &whole[..length], ColorEncoding::Color);
     }
-    assert!(load_bytes("a.png", &whole[..whole.len() / 2], ImageEncoding::Color).is_err());
+    assert!(load_bytes("a.png", &whole[..whole.len() / 2], ColorEncoding::Color).is_err());
 }
 
 #[test]
@@ -312,7 +312,7 @@ fn progress_ends_at_the_file_length() {
     let seen = Mutex::new(Vec::new());
     let note = |done, total| seen.lock().expect("no panic").push((done, total));
     let token = CancelToken::new();
-    load(&path, ImageEncoding::Color, ImageLimits::default(), &note, &token).expect("read");
+    load(&path, ColorEncoding::Color, ImageLimits::default(), &note, &token).expect("read");
     let seen = seen.into_inner().expect("no panic");
     assert!(seen.is_sorted() && seen.iter().any(|(done, total)| *done > total / 4 && *done < total * 3 / 4));
     assert_eq!(seen.last(), Some(&(file.len() as u64, file.len() as u64)));
@@ -321,7 +321,7 @@ fn progress_ends_at_the_file_length() {
             token.cancel();
         }
     };
-    let result = load(&path, ImageEncoding::Color, ImageLimits::default(), &stop, &token);
+    let result = load(&path, ColorEncoding::Color, ImageLimits::default(), &stop, &token);
     assert!(matches!(result, Err(AssetError::Canceled(_))));
 }
 
@@ -339,7 +339,7 @@ proptest::proptest! {
             ("a.webp", b"RIFF\x40\0\0\0WEBPVP8L"),
             ("a.jpg", b"\xff\xd8\xff\xe0"),
         ] {
-            let _ = load_bytes(name, &[start, &bytes].concat(), ImageEncoding::Color);
+            let _ = load_bytes(name, &[start, &bytes].concat(), ColorEncoding::Color);
         }
     }
 }
@@ -352,6 +352,6 @@ fn hdr_header_size_is_limited() {
     assert!(is_too_long(lines(1 << 18).as_bytes()));
     assert!(is_too_long(format!("#?RADIANCE\n\n{}", "x".repeat(1 << 20)).as_bytes()));
     let long = [lines(1 << 17).as_bytes(), &pixel].concat();
-    assert!(load_bytes("a.hdr", &long, ImageEncoding::Color).is_ok());
+    assert!(load_bytes("a.hdr", &long, ColorEncoding::Color).is_ok());
     assert!(!is_too_long(b"#?RADIANCE\nx=1\n"));
 }

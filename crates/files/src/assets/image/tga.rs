@@ -32,7 +32,7 @@ pub(super) fn open_with_alpha_usage<R: Read + Seek>(
     let mut header = [0; HEADER];
     file.read_exact(&mut header)?;
     let alpha_bits = header[DESCRIPTOR] & ALPHA_BITS;
-    let alpha = match attribute_type(&mut file) {
+    let alpha = match read_attribute_type(&mut file) {
         Ok(Some(0..=2)) => AlphaInterpretation::Unused,
         Ok(Some(4)) => AlphaInterpretation::Premultiplied,
         Ok(Some(3)) => AlphaInterpretation::Straight,
@@ -80,7 +80,7 @@ fn decoding_error(reason: String) -> ImageError {
 }
 
 /// Attribute type in the extension area, if the file has one.
-fn attribute_type(file: &mut (impl Read + Seek)) -> io::Result<Option<u8>> {
+fn read_attribute_type(file: &mut (impl Read + Seek)) -> io::Result<Option<u8>> {
     file.seek(SeekFrom::End(-FOOTER))?;
     let mut offset = [0; 4];
     file.read_exact(&mut offset)?;

@@ -166,9 +166,9 @@ pub(super) fn dropped_fractions_warning(value: f64) -> String {
 
 /// Guesses whether colors range from 0 to 1 or from 0 to 255, for formats that do not specify the range.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct ColorRange(ColorComponentExtremes);
+pub(crate) struct ColorRangeDetector(ColorComponentExtremes);
 
-impl ColorRange {
+impl ColorRangeDetector {
     /// Adds a color and its byte offset.
     pub(crate) fn add(&mut self, parts: [f64; 3], at: usize) {
         parts.into_iter().for_each(|part| self.0.add_component(part, at));

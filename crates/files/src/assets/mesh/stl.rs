@@ -165,14 +165,15 @@ impl TextReader<'_> {
             }
             words += 1;
             let start = self.cursor;
-            let word = self.cursor.word();
+            let word = self.cursor.take_word();
             let is = |name: &str| word.eq_ignore_ascii_case(name.as_bytes());
             if is("vertex") {
                 let Some(count) = &mut corners else {
                     return self.fail_with_line(start, VERTEX_OUTSIDE);
                 };
                 *count += 1;
-                let position = DVec3::new(self.float()?, self.float()?, self.float()?);
+                let position =
+                    DVec3::new(self.read_coordinate()?, self.read_coordinate()?, self.read_coordinate()?);
                 add_corner(&mut parsed, position);
             } else if is("loop") {
                 loop_start = start.offset();
@@ -214,14 +215,14 @@ impl TextReader<'_> {
         Err(self.source.malformed_error_with_line(at.offset().min(end), reason))
     }
 
-    fn float(&mut self) -> Result<f64, AssetError> {
+    fn read_coordinate(&mut self) -> Result<f64, AssetError> {
         if !self.cursor.skip_to_word_across_lines() {
             return self.fail_with_line(self.cursor, "the file ends inside a vertex");
         }
         let mut start = self.cursor;
-        match self.cursor.float() {
+        match self.cursor.take_float() {
             Some(value) => Ok(value),
-            None => self.fail_with_line(self.cursor, expected_message("a coordinate", start.word())),
+            None => self.fail_with_line(self.cursor, expected_message("a coordinate", start.take_word())),
         }
     }
 
@@ -235,7 +236,7 @@ impl TextReader<'_> {
             let word = bytes[at..].iter().position(is_blank).map_or(&bytes[at..], |end| &bytes[at..at + end]);
             if word.eq_ignore_ascii_case(b"facet") {
                 let mut ahead = Cursor::new(bytes, at + word.len());
-                if ahead.skip_to_word_across_lines() && ahead.word().eq_ignore_ascii_case(b"normal") {
+                if ahead.skip_to_word_across_lines() && ahead.take_word().eq_ignore_ascii_case(b"normal") {
                     break;
                 }
             }
@@ -248,7 +249,7 @@ impl TextReader<'_> {
     fn skip_normal(&mut self) {
         for _ in 0..3 {
             let mut ahead = self.cursor;
-            if ahead.skip_to_word_across_lines() && !ahead.word().eq_ignore_ascii_case(b"outer") {
+            if ahead.skip_to_word_across_lines() && !ahead.take_word().eq_ignore_ascii_case(b"outer") {
                 self.cursor = ahead;
             }
         }

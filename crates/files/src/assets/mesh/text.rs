@@ -144,7 +144,7 @@ impl<'a> Cursor<'a> {
     }
 
     /// Consumes the word at the cursor.
-    pub(super) fn word(&mut self) -> &'a [u8] {
+    pub(super) fn take_word(&mut self) -> &'a [u8] {
         let rest = &self.bytes[self.at..];
         let length = rest.iter().position(|&byte| byte.is_ascii_whitespace() || byte == b'#');
         let word = &rest[..length.unwrap_or(rest.len())];
@@ -153,13 +153,13 @@ impl<'a> Cursor<'a> {
     }
 
     /// Consumes the number at the cursor. `nan` and `inf` are accepted. Overflow results in infinity.
-    pub(super) fn float(&mut self) -> Option<f64> {
+    pub(super) fn take_float(&mut self) -> Option<f64> {
         let (value, length) = parse_partial::<f64, _>(&self.bytes[self.at..]).ok()?;
         self.skip_number_if_word_ends(length).then_some(value)
     }
 
     /// Consumes the integer at the cursor.
-    pub(super) fn integer(&mut self) -> Option<i64> {
+    pub(super) fn take_integer(&mut self) -> Option<i64> {
         let rest = &self.bytes[self.at..];
         let negative = rest.first() == Some(&b'-');
         let digits = &rest[usize::from(negative)..];
@@ -207,10 +207,10 @@ mod tests {
     fn blanks_and_comments_separate_words() {
         let mut cursor = Cursor::new(b" ab#c d\n\r\n # e\nf", 0);
         assert!(cursor.skip_to_word_across_lines());
-        assert_eq!(cursor.word(), b"ab");
+        assert_eq!(cursor.take_word(), b"ab");
         assert!(!cursor.skip_to_word_in_line());
         assert!(cursor.skip_to_word_across_lines());
-        assert_eq!(cursor.word(), b"f");
+        assert_eq!(cursor.take_word(), b"f");
         assert!(!cursor.skip_to_word_across_lines());
     }
 
@@ -224,7 +224,7 @@ mod tests {
 
     #[test]
     fn numbers_must_span_the_whole_word() {
-        let float = |text: &'static str| Cursor::new(text.as_bytes(), 0).float();
+        let float = |text: &'static str| Cursor::new(text.as_bytes(), 0).take_float();
         assert_eq!(float("1.5e-3 "), Some(1.5e-3));
         assert_eq!(float("-.5#"), Some(-0.5));
         assert_eq!(float("+2"), Some(2.0));
@@ -232,7 +232,7 @@ mod tests {
         assert!(float("nan").is_some_and(f64::is_nan));
         assert_eq!(float("1.5x"), None);
         assert_eq!(float(""), None);
-        let integer = |text: &'static str| Cursor::new(text.as_bytes(), 0).integer();
+        let integer = |text: &'static str| Cursor::new(text.as_bytes(), 0).take_integer();
         assert_eq!(integer("-12\n"), Some(-12));
         assert_eq!(integer("1.0"), None);
         assert_eq!(integer("-"), None);

@@ -57,7 +57,7 @@ pub(super) struct PerceivedColor {
 impl PerceivedColor {
     /// Converts from a linear color.
     pub(super) fn from_linear(rgb: DVec3) -> Self {
-        let [x, y, z] = (XYZ_OF_RGB * rgb / WHITE).to_array().map(lightness);
+        let [x, y, z] = (XYZ_OF_RGB * rgb / WHITE).to_array().map(cielab_nonlinearity);
         let hunt = 0.01 * (116.0 * y - 16.0);
         Self { lightness: 116.0 * y - 16.0, a: hunt * 500.0 * (x - y), b: hunt * 200.0 * (y - z) }
     }
@@ -70,7 +70,7 @@ impl PerceivedColor {
 }
 
 /// CIE 1976 lightness: a cube root with a linear part near 0.
-fn lightness(t: f64) -> f64 {
+fn cielab_nonlinearity(t: f64) -> f64 {
     const DELTA: f64 = 6.0 / 29.0;
     if t > DELTA * DELTA * DELTA { libm::cbrt(t) } else { t / (3.0 * DELTA * DELTA) + 4.0 / 29.0 }
 }

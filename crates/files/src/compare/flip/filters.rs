@@ -3,7 +3,7 @@
 
 use std::f64::consts::{FRAC_1_SQRT_2, PI};
 
-use super::super::plane::{Plane, normalized_taps, offsets, unnormalized_gaussian_taps};
+use super::super::plane::{Plane, normalized_taps, tap_offsets, unnormalized_gaussian_taps};
 
 /// A Gaussian term of a contrast sensitivity function: amplitude, and width in square degrees.
 #[derive(Clone, Copy)]
@@ -58,9 +58,11 @@ impl Filters {
             blurs
         });
         let bell = unnormalized_gaussian_taps(sigma, feature_radius);
-        let slope: Vec<_> = offsets(feature_radius).zip(&bell).map(|(x, g)| -x * g).collect();
-        let curvature: Vec<_> =
-            offsets(feature_radius).zip(&bell).map(|(x, g)| (x * x / (sigma * sigma) - 1.0) * g).collect();
+        let slope: Vec<_> = tap_offsets(feature_radius).zip(&bell).map(|(x, g)| -x * g).collect();
+        let curvature: Vec<_> = tap_offsets(feature_radius)
+            .zip(&bell)
+            .map(|(x, g)| (x * x / (sigma * sigma) - 1.0) * g)
+            .collect();
         Self {
             radius,
             blurs,

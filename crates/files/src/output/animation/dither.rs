@@ -36,7 +36,7 @@ impl Dither {
         for (y, row) in picture.pixels.chunks(picture.width.max(1) as usize).enumerate() {
             token.check_pause_and_cancel()?;
             for (x, color) in row.iter().enumerate() {
-                let mixed = known.entry(*color).or_insert_with(|| self.mixed_colors(*color));
+                let mixed = known.entry(*color).or_insert_with(|| self.indices_approximating_color(*color));
                 indices.push(mixed[RANKS[y % SIDE * SIDE + x % SIDE]]);
             }
         }
@@ -44,13 +44,13 @@ impl Dither {
     }
 
     /// Returns the palette indices of colors whose mean approximates a color, sorted by brightness.
-    fn mixed_colors(&self, color: [u8; 3]) -> [u8; COLORS_PER_PATTERN] {
+    fn indices_approximating_color(&self, color: [u8; 3]) -> [u8; COLORS_PER_PATTERN] {
         let color = color.map(i32::from);
         let (mut mixed, mut error) = ([0; COLORS_PER_PATTERN], [0; 3]);
         for entry in &mut mixed {
             // Compensate for the accumulated error.
             let aim = [0, 1, 2].map(|channel: usize| color[channel] + error[channel]);
-            let index = self.nearest(aim);
+            let index = self.nearest_index(aim);
             *entry = index as u8;
             error = [0, 1, 2].map(|channel: usize| aim[channel] - self.palette[index][channel]);
         }
@@ -62,7 +62,7 @@ impl Dither {
         mixed
     }
 
-    fn nearest(&self, aim: [i32; 3]) -> usize {
+    fn nearest_index(&self, aim: [i32; 3]) -> usize {
         let distance = |color: &[i32; 3]| {
             let squared = |channel: usize| (color[channel] - aim[channel]).pow(2);
             // Approximate the eye's sensitivity to each channel.

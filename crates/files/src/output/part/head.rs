@@ -204,7 +204,7 @@ impl ImageHeader {
     }
 
     /// Returns the settings for encoding the image file, or `None` if a name is unknown.
-    pub fn develop_settings(&self) -> Option<FilmEncodingSettings> {
+    pub fn film_encoding_settings(&self) -> Option<FilmEncodingSettings> {
         let range_map = match self.tone.stretch.as_deref() {
             None => RangeMap::None,
             Some(word) => {

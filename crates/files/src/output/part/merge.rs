@@ -97,7 +97,7 @@ pub fn merge_into_film(
         let area = film.tile_rect(tile).map_or(0, |rect| rect.area());
         let stored = match first.head.share.block_count {
             0 => find_tile_in_parts(parts, tile, area)?,
-            blocks => sum_blocks(parts, blocks, tile, area)?,
+            blocks => sum_sample_blocks_of_tile(parts, blocks, tile, area)?,
         };
         let is_complete = stored.as_ref().is_some_and(|(_, is_complete)| *is_complete);
         if missing.is_empty() && !is_complete {
@@ -111,7 +111,7 @@ pub fn merge_into_film(
         }
         on_tile_finished(tile + 1, &film);
     }
-    film.add_non_finite(parts.iter().map(|part| part.non_finite).sum());
+    film.add_non_finite_count(parts.iter().map(|part| part.non_finite).sum());
     Ok(MergedParts { film, missing, count })
 }
 
@@ -134,7 +134,7 @@ fn find_tile_in_parts(
 }
 
 /// Sums a tile's blocks in ascending order. Also returns whether all blocks are present.
-fn sum_blocks(
+fn sum_sample_blocks_of_tile(
     parts: &[PartFile],
     block_count: u32,
     tile: usize,

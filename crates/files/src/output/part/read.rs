@@ -34,7 +34,7 @@ pub struct PartFile {
 pub(super) const IMPOSSIBLE_HEADER: &str = "the header has invalid values";
 
 /// Whether a file has the magic number of parts and checkpoints.
-pub fn is_part(path: &Path) -> bool {
+pub fn is_part_or_checkpoint(path: &Path) -> bool {
     let mut mark = [0; MAGIC.len()];
     open_raising_file_limit(path).is_ok_and(|mut file| file.read_exact(&mut mark).is_ok()) && mark == MAGIC
 }
@@ -42,7 +42,7 @@ pub fn is_part(path: &Path) -> bool {
 /// Returns the name of the input file that has the same content as the file at `path`, or `None` if there is
 /// no such input or the file cannot be read. Input files must not be overwritten, even if the parts were
 /// rendered on another machine.
-pub fn input_name_by_content<'a>(parts: &'a [PartFile], path: &Path) -> Option<&'a str> {
+pub fn find_input_with_same_content<'a>(parts: &'a [PartFile], path: &Path) -> Option<&'a str> {
     let mut hasher = blake3::Hasher::new();
     hasher.update_reader(open_raising_file_limit(path).ok()?).ok()?;
     let hash = hasher.finalize().to_hex();
@@ -65,7 +65,7 @@ impl PartFile {
     /// # Errors
     /// The file is unreadable, not a part, from another version, truncated or damaged, or the work is
     /// canceled.
-    pub fn open(path: &Path, token: &CancelToken) -> Result<Self, PartError> {
+    pub fn open_and_validate(path: &Path, token: &CancelToken) -> Result<Self, PartError> {
         let unreadable = |source| PartError::Unreadable { path: path.to_owned(), source };
         let file = open_raising_file_limit(path)?;
         let size = file.metadata().map_err(unreadable)?.len();
@@ -102,7 +102,7 @@ impl PartFile {
     /// Reads only the header of a file, without validating the rest.
     ///
     /// # Errors
-    /// Same as [`Self::open`].
+    /// Same as [`Self::open_and_validate`].
     pub fn read_header(path: &Path) -> Result<PartHeader, PartError> {
         let unreadable = |source| PartError::Unreadable { path: path.to_owned(), source };
         let file = open_raising_file_limit(path)?;
@@ -145,7 +145,7 @@ impl PartFile {
         if digest(&self.header_digest, &[&start, bytes]) != found {
             return Err(damaged(&format!("tile {number} changed while it was read")));
         }
-        let read = StoredTile::read(bytes, area);
+        let read = StoredTile::deserialize(bytes, area);
         read.map(Some).map_err(|_| damaged(&format!("tile {number} does not belong to this image")))
     }
 
@@ -153,7 +153,7 @@ impl PartFile {
     ///
     /// # Errors
     /// The tiles do not belong to the film.
-    pub fn restore(&self, film: &Film) -> Result<(), PartError> {
+    pub fn restore_into_film(&self, film: &Film) -> Result<(), PartError> {
         for tile in self.tile_indices() {
             let why = || format!("tile {tile} does not belong to this image");
             let damaged = || PartError::Damaged { path: self.path.clone(), why: why() };
@@ -162,7 +162,7 @@ impl PartFile {
                 film.restore_tile(tile, stored).map_err(|_| damaged())?;
             }
         }
-        film.add_non_finite(self.non_finite);
+        film.add_non_finite_count(self.non_finite);
         Ok(())
     }
 }
@@ -222,7 +222,7 @@ impl PartReader<'_> {
     }
 
     /// Reads `length` bytes. Fails before allocating memory if the file is too short.
-    fn read_bytes(&mut self, length: u32, into: &mut Vec<u8>) -> Result<(), PartError> {
+    fn read_n_bytes(&mut self, length: u32, into: &mut Vec<u8>) -> Result<(), PartError> {
         if u64::from(length) > self.size - self.at {
             return Err(self.unfinished_error());
         }
@@ -232,7 +232,7 @@ impl PartReader<'_> {
 
     fn read_header(&mut self) -> Result<(PartHeader, Digest), PartError> {
         let mut mark = Vec::new();
-        self.read_bytes(self.size.min(MAGIC.len() as u64) as u32, &mut mark)?;
+        self.read_n_bytes(self.size.min(MAGIC.len() as u64) as u32, &mut mark)?;
         match mark.len() < MAGIC.len() {
             true if MAGIC.starts_with(&mark) => return Err(self.unfinished_error()),
             false if mark == MAGIC => {}
@@ -244,7 +244,7 @@ impl PartReader<'_> {
         }
         let length = self.read_u32()?;
         let mut text = Vec::new();
-        self.read_bytes(length, &mut text)?;
+        self.read_n_bytes(length, &mut text)?;
         let start = [&MAGIC[..], &version.to_le_bytes(), &length.to_le_bytes(), &text].concat();
         let mut found = Digest::default();
         self.read_exact(&mut found)?;
@@ -268,7 +268,7 @@ impl PartReader<'_> {
         let begin = self.at;
         let (number, length) = (self.read_u32()?, self.read_u32()?);
         let offset = self.at;
-        self.read_bytes(length, bytes)?;
+        self.read_n_bytes(length, bytes)?;
         let mut found = Digest::default();
         self.read_exact(&mut found)?;
         let start = [number.to_le_bytes(), length.to_le_bytes()].concat();

@@ -8,14 +8,14 @@ use std::sync::mpsc::{self, SyncSender};
 use serde_json::Value;
 
 use super::super::OutputError;
-use super::super::write::{Durability, ExistingFilePolicy, atomic_generated};
+use super::super::write::{Durability, ExistingFilePolicy, atomic_from_callback};
 use super::{Digest, FOOTER, Footer, MAGIC, PartHeader, VERSION, digest};
 use crate::control::CancelToken;
 use crate::film::Film;
 
 /// Writes a film with its header atomically. `state` is opaque data for resuming the render. Other threads
 /// may keep adding samples to the film. Each tile is written with the samples it has at that moment. Returns
-/// the file, like [`atomic_generated`].
+/// the file, like [`atomic_from_callback`].
 ///
 /// # Errors
 /// The file cannot be written.
@@ -28,14 +28,20 @@ pub fn save(
     token: &CancelToken,
     durability: Durability,
 ) -> Result<Option<File>, OutputError> {
-    atomic_generated(path, &|file| write(file, head, film, state, token), guard, token, durability)
+    atomic_from_callback(
+        path,
+        &|file| encode_and_write(file, head, film, state, token),
+        guard,
+        token,
+        durability,
+    )
 }
 
 /// Size of the chunks passed to the writing thread.
 const CHUNK_BYTES: usize = 1 << 20;
 
 /// Encodes on a separate thread and writes on the current thread.
-fn write(
+fn encode_and_write(
     file: &mut dyn Write,
     head: &PartHeader,
     film: &Film,

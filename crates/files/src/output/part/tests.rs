@@ -72,7 +72,7 @@ fn put(folder: &Path, name: &str, head: &PartHeader, film: &Film) -> PathBuf {
 }
 
 fn opened(path: &Path) -> Result<PartFile, PartError> {
-    PartFile::open(path, &CancelToken::new())
+    PartFile::open_and_validate(path, &CancelToken::new())
 }
 
 /// Writes all parts of an image to a folder.
@@ -100,7 +100,7 @@ fn parts_merge_in_any_order() {
         assert_eq!(film.radiance_image().pixels, whole.radiance_image().pixels, "{count} parts");
         assert_eq!(film.mean_luminance_error(), whole.mean_luminance_error());
         let part = opened(&paths[0]).expect("a part");
-        assert_eq!(part.head.picture.develop_settings(), Some(encoding_settings()));
+        assert_eq!(part.head.picture.film_encoding_settings(), Some(encoding_settings()));
         assert_eq!(part.state, json!({ "a": 1 }));
     }
 }
@@ -155,7 +155,7 @@ fn mismatched_parts_are_rejected() {
 fn foreign_and_damaged_files_are_rejected() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = parts(folder.path(), 1).remove(0);
-    assert!(is_part(&path));
+    assert!(is_part_or_checkpoint(&path));
     let bytes = fs::read(&path).expect("a part");
     let with = |change: &dyn Fn(&mut Vec<u8>)| {
         let mut bytes = bytes.clone();

@@ -46,7 +46,7 @@ impl ImageInfo {
     }
 
     /// Adds a metadata entry.
-    fn add(&mut self, name: &str, value: &str) {
+    fn add_entry(&mut self, name: &str, value: &str) {
         match name {
             "Software" | "SOFTWARE" => self.program = Some(value.to_owned()),
             _ if self.settings.len() < MAX_SETTINGS => {
@@ -60,7 +60,7 @@ impl ImageInfo {
     /// Adds a line of the form `name: value`. Ignores all other lines.
     fn add_line(&mut self, line: &str) {
         if let Some((name, value)) = line.split_once(": ") {
-            self.add(name.trim(), value.trim());
+            self.add_entry(name.trim(), value.trim());
         }
     }
 }
@@ -145,10 +145,10 @@ fn read_start(file: &File) -> std::io::Result<Vec<u8>> {
 fn read_info_from_start(bytes: &[u8]) -> Result<ImageInfo, Option<String>> {
     let wrong = |format: &str| Some(format!("the {format} header is damaged or truncated"));
     match bytes {
-        [0x89, b'P', b'N', b'G', ..] => read_png(bytes).ok_or_else(|| wrong("PNG")),
+        [0x89, b'P', b'N', b'G', ..] => read_png_info(bytes).ok_or_else(|| wrong("PNG")),
         [0x76, 0x2f, 0x31, 0x01, ..] => read_exr_info(bytes).ok_or_else(|| wrong("EXR")),
-        [b'#', b'?', ..] => text::read_hdr(bytes).ok_or_else(|| wrong("HDR")),
-        [b'P', b'6', ..] => text::read_ppm(bytes).ok_or_else(|| wrong("PPM")),
+        [b'#', b'?', ..] => text::read_hdr_info(bytes).ok_or_else(|| wrong("HDR")),
+        [b'P', b'6', ..] => text::read_ppm_info(bytes).ok_or_else(|| wrong("PPM")),
         [0xff, 0xd8, ..] => text::read_jpeg_info(bytes).ok_or_else(|| wrong("JPEG")),
         [b'R', b'I', b'F', b'F', ..] => webp::read_webp_info(Cursor::new(bytes)).ok_or_else(|| wrong("WebP")),
         [b'G', b'I', b'F', ..] => gif::read_gif_info(bytes).ok_or_else(|| wrong("GIF")),
@@ -156,7 +156,7 @@ fn read_info_from_start(bytes: &[u8]) -> Result<ImageInfo, Option<String>> {
     }
 }
 
-fn read_png(bytes: &[u8]) -> Option<ImageInfo> {
+fn read_png_info(bytes: &[u8]) -> Option<ImageInfo> {
     let limits = ::png::Limits { bytes: START_BYTES as usize };
     let mut decoder = ::png::Decoder::new_with_limits(Cursor::new(bytes), limits);
     decoder.set_ignore_iccp_chunk(true);
@@ -171,10 +171,10 @@ fn read_png(bytes: &[u8]) -> Option<ImageInfo> {
         None => format!("PNG, {bits} bits per channel"),
     };
     for text in &header.uncompressed_latin1_text {
-        info.add(&text.keyword, &text.text);
+        info.add_entry(&text.keyword, &text.text);
     }
     for text in &header.utf8_text {
-        info.add(&text.keyword, &text.get_text().unwrap_or_default());
+        info.add_entry(&text.keyword, &text.get_text().unwrap_or_default());
     }
     Some(info)
 }
@@ -206,7 +206,7 @@ fn read_part_file_info(path: &Path) -> Result<ImageInfo, String> {
     for input in &head.identity {
         match input.name.as_str() {
             PROGRAM => info.program = Some(format!("{PROGRAM} {}", input.value)),
-            name => info.add(name, &input.value),
+            name => info.add_entry(name, &input.value),
         }
     }
     // If the version is missing, assume this version, because files from other versions are rejected.

@@ -3,7 +3,7 @@
 use super::ImageInfo;
 
 /// Reads a Radiance HDR header. The settings end at an empty line, which is followed by the resolution.
-pub(super) fn read_hdr(bytes: &[u8]) -> Option<ImageInfo> {
+pub(super) fn read_hdr_info(bytes: &[u8]) -> Option<ImageInfo> {
     let mut info = ImageInfo { format: "HDR".to_owned(), ..ImageInfo::default() };
     let mut lines = bytes.split(|byte| *byte == b'\n').map(String::from_utf8_lossy);
     for line in lines.by_ref() {
@@ -12,7 +12,7 @@ pub(super) fn read_hdr(bytes: &[u8]) -> Option<ImageInfo> {
             None if line.is_empty() => break,
             None => {
                 if let Some((name, value)) = line.split_once('=').filter(|(name, _)| *name == "SOFTWARE") {
-                    info.add(name, value);
+                    info.add_entry(name, value);
                 }
             }
         }
@@ -26,7 +26,7 @@ pub(super) fn read_hdr(bytes: &[u8]) -> Option<ImageInfo> {
 }
 
 /// Reads a PPM header, which contains the settings as comments between the numbers.
-pub(super) fn read_ppm(bytes: &[u8]) -> Option<ImageInfo> {
+pub(super) fn read_ppm_info(bytes: &[u8]) -> Option<ImageInfo> {
     let mut info = ImageInfo::default();
     let mut numbers = Vec::new();
     for line in bytes.get(2..)?.split(|byte| *byte == b'\n').map(String::from_utf8_lossy) {

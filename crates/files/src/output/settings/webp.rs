@@ -27,7 +27,7 @@ pub(super) fn read_webp_info(mut file: impl Read + Seek) -> Option<ImageInfo> {
             b"VP8X" => {
                 info.size = Some((read_canvas_dimension(&content, 4)?, read_canvas_dimension(&content, 7)?));
             }
-            b"VP8L" if info.size.is_none() => info.size = Some(lossless_size(&content)?),
+            b"VP8L" if info.size.is_none() => info.size = Some(read_lossless_size(&content)?),
             b"XMP " => read_xmp_packet(&mut info, &String::from_utf8_lossy(&content)),
             _ => {}
         }
@@ -43,7 +43,7 @@ fn read_canvas_dimension(content: &[u8], at: usize) -> Option<u32> {
 }
 
 /// Reads the size of a lossless image. Width and height are stored as 14 bits each, minus one.
-fn lossless_size(content: &[u8]) -> Option<(u32, u32)> {
+fn read_lossless_size(content: &[u8]) -> Option<(u32, u32)> {
     let bits = u32::from_le_bytes(*content.get(1..)?.first_chunk()?);
     Some(((bits & 0x3fff) + 1, (bits >> 14 & 0x3fff) + 1))
 }
@@ -55,7 +55,7 @@ fn read_xmp_packet(info: &mut ImageInfo, packet: &str) {
         Some(unescape_xml(rest.split_once(end)?.0))
     };
     if let Some(program) = between("xmp:CreatorTool=\"", "\"") {
-        info.add("Software", &program);
+        info.add_entry("Software", &program);
     }
     if let Some(lines) = between("<rdf:li xml:lang=\"x-default\">", "</rdf:li>") {
         lines.lines().for_each(|line| info.add_line(line));

@@ -19,13 +19,13 @@ use crate::math::lanes::{Simd, TRUE};
 pub trait ClosestHitCallback {
     /// Tests a primitive against the rays in `active`. If a ray hits the primitive, the ray's end is moved to
     /// the hit. Primitives exactly at a ray's end are still tested because ties are broken by id.
-    fn test(&mut self, id: u32, active: u32, ends: &mut F32x16);
+    fn intersect_primitive(&mut self, id: u32, active: u32, ends: &mut F32x16);
 }
 
 /// Callback that tests a packet for any hit.
 pub trait AnyHitCallback {
     /// Returns the mask of the rays in `active` that hit a primitive.
-    fn test(&mut self, id: u32, active: u32, ends: &F32x16) -> u32;
+    fn primitive_hit_mask(&mut self, id: u32, active: u32, ends: &F32x16) -> u32;
 }
 
 /// A packet preprocessed for the slab test.
@@ -179,7 +179,7 @@ impl Bvh {
         let mut stack = PacketStack::new();
         loop {
             for &id in leaf {
-                closest.test(id, in_leaf, ends);
+                closest.intersect_primitive(id, in_leaf, ends);
             }
             if stack.is_empty() && near.count == 0 {
                 return;
@@ -247,7 +247,7 @@ impl Bvh {
             for &id in leaf {
                 let active = in_leaf & free;
                 if active != 0 {
-                    free &= !any.test(id, active, ends);
+                    free &= !any.primitive_hit_mask(id, active, ends);
                 }
             }
             loop {

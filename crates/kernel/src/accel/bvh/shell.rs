@@ -213,7 +213,7 @@ impl Bvh {
     /// separately for each caller would not make it faster.
     #[cold]
     #[inline(never)]
-    pub(super) fn closest_hit_with_shells(
+    pub(super) fn visit_front_to_back_with_shells(
         &self,
         shells: &[[SphericalShell; 2]],
         ray: &Ray,

@@ -42,7 +42,7 @@ fn rays(count: usize) -> Vec<Ray> {
 /// The nearest hit and the number of spheres tested.
 fn closest_hit_and_test_count(tree: &Bvh, spheres: &[Sphere], ray: &Ray) -> (Option<(f32, u32)>, usize) {
     let (mut best, mut tests) = (None, 0);
-    tree.visit_leaves_front_to_back(ray, |id, t_max| {
+    tree.visit_primitives_front_to_back(ray, |id, t_max| {
         tests += 1;
         let t = spheres[id as usize].intersect(&Ray { t_max, ..*ray }.to_f64())?.t;
         best = best.filter(|best| *best < (t, id)).or(Some((t, id)));

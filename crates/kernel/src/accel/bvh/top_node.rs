@@ -178,13 +178,13 @@ mod tests {
     struct TestLog(Vec<u32>);
 
     impl ClosestHitCallback for TestLog {
-        fn test(&mut self, id: u32, active: u32, _: &mut F32x16) {
+        fn intersect_primitive(&mut self, id: u32, active: u32, _: &mut F32x16) {
             self.0[id as usize] |= active;
         }
     }
 
     impl AnyHitCallback for TestLog {
-        fn test(&mut self, id: u32, active: u32, _: &F32x16) -> u32 {
+        fn primitive_hit_mask(&mut self, id: u32, active: u32, _: &F32x16) -> u32 {
             self.0[id as usize] |= active;
             0
         }

@@ -9,22 +9,22 @@ use crate::geometry::packet::set_bit_lanes;
 use crate::geometry::{Aabb, Ray};
 
 impl Bvh {
-    /// Visits the leaves that the ray may hit, roughly front to back. `test(id, t_max)` tests a primitive and
-    /// returns the ray's new end on a hit. Primitives exactly at the ray's end are still tested because the
-    /// caller may break ties by id.
+    /// Visits the primitives in the leaves that the ray may hit, roughly front to back. `test(id, t_max)`
+    /// tests a primitive and returns the ray's new end on a hit. Primitives exactly at the ray's end are still
+    /// tested because the caller may break ties by id.
     #[inline]
-    pub fn visit_leaves_front_to_back(&self, ray: &Ray, mut test: impl FnMut(u32, f32) -> Option<f32>) {
+    pub fn visit_primitives_front_to_back(&self, ray: &Ray, mut test: impl FnMut(u32, f32) -> Option<f32>) {
         if let Some(shells) = &self.shells {
-            self.closest_hit_with_shells(shells, ray, &mut test);
+            self.visit_front_to_back_with_shells(shells, ray, &mut test);
         } else if self.depth < SHALLOW_STACK {
-            self.closest_hit_with_stack_size::<SHALLOW_STACK>(ray, test);
+            self.visit_front_to_back_with_stack_size::<SHALLOW_STACK>(ray, test);
         } else {
-            self.closest_hit_with_stack_size::<DEEP_STACK>(ray, test);
+            self.visit_front_to_back_with_stack_size::<DEEP_STACK>(ray, test);
         }
     }
 
     #[inline]
-    fn closest_hit_with_stack_size<const STACK_SIZE: usize>(
+    fn visit_front_to_back_with_stack_size<const STACK_SIZE: usize>(
         &self,
         ray: &Ray,
         mut test: impl FnMut(u32, f32) -> Option<f32>,
@@ -206,7 +206,7 @@ mod tests {
             let ray = Ray::new(origin, Vec3::new(next(), next(), next()) * 8.0 - origin);
             let slabs = SlabRay::new(ray.origin, ray.direction);
             let mut best: Option<(f32, u32)> = None;
-            tree.visit_leaves_front_to_back(&ray, |id, t_max| {
+            tree.visit_primitives_front_to_back(&ray, |id, t_max| {
                 let t = slabs.entry_distance(boxes[id as usize].min, boxes[id as usize].max, t_max)?;
                 let better = best.is_none_or(|(least, min_id)| (t, id) < (least, min_id));
                 better.then(|| best = Some((t, id)))?;
@@ -241,7 +241,7 @@ mod tests {
             let nan = Ray { t_max: f32::NAN, ..Ray::new(Vec3::NAN, Vec3::NAN) };
             for ray in [nan, Ray { t_max: f32::INFINITY, ..nan }, Ray::new(Vec3::ZERO, Vec3::NAN)] {
                 let mut tests = 0;
-                tree.visit_leaves_front_to_back(&ray, |_, _| {
+                tree.visit_primitives_front_to_back(&ray, |_, _| {
                     tests += 1;
                     None
                 });

@@ -175,7 +175,7 @@ impl WideBvh {
             return (0..rays.len()).filter(|&lane| ends[lane] >= 0.0).map(alone).sum();
         }
         let mut bits = 0;
-        for_each_coherent_group_ends(rays, ends, |group, count| {
+        for_each_coherent_ray_group(rays, ends, |group, count| {
             let as_packet =
                 (count >= SMALL_GROUP).then(|| simd::try_any_hit_packet(self, rays, group, except)).flatten();
             let one_by_one = || (0..rays.len()).filter(|&lane| group[lane] >= 0.0).map(alone).sum();
@@ -267,7 +267,7 @@ const SMALL_GROUP: usize = 8;
 
 /// Groups rays whose directions have the same signs and longest axis. Calls `take` for each group with the
 /// maximum distances of all rays, which are negative for rays outside the group, and the group's size.
-fn for_each_coherent_group_ends(rays: &[Ray], ends: &F32x16, mut take: impl FnMut(&F32x16, usize)) {
+fn for_each_coherent_ray_group(rays: &[Ray], ends: &F32x16, mut take: impl FnMut(&F32x16, usize)) {
     let way = |ray: &Ray| {
         let [x, y, z] = ray.direction.to_array().map(f32::abs);
         let longest = if x > y && x > z {

@@ -77,7 +77,7 @@ impl UnitTorusLine {
             low.value = 0.0;
         }
         let is_inside = low.value < 0.0 || low.value == 0.0 && low.slope < 0.0;
-        if !is_inside && self.moves_away(from) {
+        if !is_inside && self.moves_away_from_circle(from) {
             return None;
         }
         for (end, is_convex) in [(inflections[0], true), (inflections[1], false), (to, true)] {
@@ -95,7 +95,7 @@ impl UnitTorusLine {
 
     /// Whether the line moves away from the circle on its outer side, so that both components of the distance
     /// increase after `from`.
-    fn moves_away(&self, from: f64) -> bool {
+    fn moves_away_from_circle(&self, from: f64) -> bool {
         let p = self.foot + self.direction * from;
         let (across, d) = (p.truncate(), self.direction.truncate());
         across.length_squared() >= 1.0 && across.dot(d) >= 0.0 && p.z * self.direction.z >= 0.0

@@ -114,7 +114,7 @@ impl Torus {
     }
 
     /// Radius of the tube.
-    pub(super) fn tube(&self) -> f64 {
+    pub(super) fn tube_radius(&self) -> f64 {
         self.tube
     }
 

@@ -50,7 +50,7 @@ pub struct BlendWeight {
 
 impl BlendWeight {
     /// Weight of this part, given the weight `second` of the second part.
-    pub fn for_part(&self, second: f32) -> f32 {
+    pub fn part_weight_from_second(&self, second: f32) -> f32 {
         let second = second.clamp(0.0, 1.0);
         if self.is_second { second } else { 1.0 - second }
     }
@@ -80,7 +80,7 @@ impl EmissionTerm {
             color *= opacity.evaluate(at, &mut 0);
         }
         for weight in &self.weights {
-            color *= weight.for_part(weight.second.evaluate(at, &mut 0));
+            color *= weight.part_weight_from_second(weight.second.evaluate(at, &mut 0));
         }
         color
     }
@@ -91,7 +91,7 @@ impl EmissionTerm {
         let mut mean = color * self.scale * self.opacity.as_ref().map_or(1.0, Opacity::mean);
         for weight in &self.weights {
             let second = weight.second.texture().map_or(1.0, |texture| texture.mean().x);
-            mean *= weight.for_part(weight.second.as_untextured().unwrap_or(second));
+            mean *= weight.part_weight_from_second(weight.second.as_untextured().unwrap_or(second));
         }
         mean
     }
@@ -168,7 +168,7 @@ impl EmissionModulation {
     fn texture_point(&self, point: DVec3, primitive: u32) -> TexturePoint {
         let mut at = self.chart.texture_point(point, primitive);
         if let Some(frame) = &self.object_frame {
-            let (second, object) = (at.second().copied(), Some(ObjectPoint::new(frame, point)));
+            let (second, object) = (at.second_uv_point().copied(), Some(ObjectPoint::new(frame, point)));
             at.extra = Some(Box::new(ExtraCoordinates { second, object }));
         }
         at

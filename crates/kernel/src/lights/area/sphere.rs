@@ -25,7 +25,7 @@ impl ShapeEmitter for SphereEmitter {
         let (axis, distance, sin2_max) = self.cone_unchecked(point);
         let is_outside = sin2_max < 1.0;
         let sin2_max = if is_outside { sin2_max } else { 0.0 };
-        let one_minus_cos_max = one_minus_cos(sin2_max);
+        let one_minus_cos_max = one_minus_cos_from_sin2(sin2_max);
         let local = warp::cone(u, one_minus_cos_max);
         // Nearest intersection in a direction at the angle θ from the axis: d·cos θ − √(R² − d²·sin²θ).
         let sin2 = local.x * local.x + local.y * local.y;
@@ -41,7 +41,7 @@ impl ShapeEmitter for SphereEmitter {
 
     /// The pdf is the same for all directions that hit the sphere.
     fn pdf(&self, from: Vec3, _: &LightHit) -> f32 {
-        self.cone(from).map_or(0.0, |(_, _, sin2_max)| 1.0 / (2.0 * PI * one_minus_cos(sin2_max)))
+        self.cone(from).map_or(0.0, |(_, _, sin2_max)| 1.0 / (2.0 * PI * one_minus_cos_from_sin2(sin2_max)))
     }
 
     fn area_centroid(&self) -> DVec3 {
@@ -68,6 +68,6 @@ impl SphereEmitter {
 
 /// Computes 1 − cos of an angle of up to 90° from its sin².
 #[inline(always)]
-pub(crate) fn one_minus_cos(sin2: f32) -> f32 {
+pub(crate) fn one_minus_cos_from_sin2(sin2: f32) -> f32 {
     sin2 / (1.0 + (1.0 - sin2).sqrt())
 }

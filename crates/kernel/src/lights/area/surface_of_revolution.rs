@@ -243,7 +243,7 @@ pub struct ConeView {
 impl CappedRevolutionEmitter<ConeSide> {
     /// Creates an emitter for an entire cone.
     pub fn from_entire_cone(cone: &Cone) -> Self {
-        let (base, tip) = (cone.base(), cone.tip());
+        let (base, tip) = (cone.base_disk(), cone.tip());
         let (height, radius) = ((base.centroid() - tip).length(), base.radius());
         let slant = (height * height + radius * radius).sqrt();
         let side = ConeSide { tip, axis: base.normal(), opening: (radius / slant, height / slant), slant };

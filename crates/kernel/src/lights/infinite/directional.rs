@@ -128,7 +128,7 @@ impl InfiniteLight for DirectionalLight {
         self.sample_direction_and_irradiance(u)
     }
 
-    fn power_through(&self, area: f64) -> Vec3 {
+    fn power_through_disk(&self, area: f64) -> Vec3 {
         (self.sample_uniform_disk([0.5; 2]).1.as_dvec3() * area).as_vec3()
     }
 

@@ -63,7 +63,7 @@ impl MapOrientation {
 
     /// The turn for sampling the map. Pass sampled directions to [`Self::to_world`].
     #[inline(always)]
-    fn turn(self) -> f32 {
+    fn turn_fraction(self) -> f32 {
         match self {
             Self::Turn(turn) => turn,
             Self::Rotation(_) => 0.0,
@@ -81,7 +81,7 @@ impl MapOrientation {
 
     /// Applies `convert` to a packet of directions if the orientation is a general rotation.
     #[inline(always)]
-    fn convert_packet(self, directions: &mut Vec3x16, convert: impl Fn(Self, Vec3) -> Vec3) {
+    fn convert_packet_if_rotated(self, directions: &mut Vec3x16, convert: impl Fn(Self, Vec3) -> Vec3) {
         match self {
             Self::Turn(_) => {}
             Self::Rotation(_) => {
@@ -127,8 +127,10 @@ impl Environment {
             }
             Self::Map { sky, factor, orientation } => {
                 let mut directions = *directions;
-                orientation.convert_packet(&mut directions, |own, direction| own.to_map(direction).0);
-                let (mut colors, pdfs) = sky.lookup_color_and_pdf_packet(&directions, orientation.turn());
+                orientation
+                    .convert_packet_if_rotated(&mut directions, |own, direction| own.to_map(direction).0);
+                let (mut colors, pdfs) =
+                    sky.lookup_color_and_pdf_packet(&directions, orientation.turn_fraction());
                 for i in 0..PACKET_SIZE {
                     let color = lane(&colors, i) * *factor;
                     set_lane(&mut colors, i, color);
@@ -153,8 +155,8 @@ impl Environment {
                 (directions, radiance, pdfs)
             }
             Self::Map { sky, factor, orientation } => {
-                let (mut directions, mut colors, pdfs) = sky.sample_packet(u, orientation.turn());
-                orientation.convert_packet(&mut directions, MapOrientation::to_world);
+                let (mut directions, mut colors, pdfs) = sky.sample_packet(u, orientation.turn_fraction());
+                orientation.convert_packet_if_rotated(&mut directions, MapOrientation::to_world);
                 for i in 0..PACKET_SIZE {
                     let color = lane(&colors, i) * *factor;
                     set_lane(&mut colors, i, color);
@@ -203,7 +205,7 @@ impl Environment {
                 (Frame::from_normal(normal).to_world(warp::cone(u, 1.0)), *radiance, HEMISPHERE_PDF)
             }
             Self::Map { sky, factor, orientation } => {
-                let (direction, color, pdf) = sky.sample(u, orientation.turn());
+                let (direction, color, pdf) = sky.sample(u, orientation.turn_fraction());
                 (orientation.to_world(direction), color * *factor, pdf)
             }
             Self::Sky { dome, frame } => dome.sample(frame, u),
@@ -224,7 +226,7 @@ impl InfiniteLight for Environment {
         match self {
             Self::Constant(radiance) => (warp::cone(u, 2.0), *radiance * (4.0 * PI)),
             Self::Map { sky, factor, orientation } => {
-                let (direction, color, pdf) = sky.sample(u, orientation.turn());
+                let (direction, color, pdf) = sky.sample(u, orientation.turn_fraction());
                 // The pdf is 0 at the centers of black texels.
                 (orientation.to_world(direction), color * *factor * if pdf > 0.0 { 1.0 / pdf } else { 0.0 })
             }
@@ -235,7 +237,7 @@ impl InfiniteLight for Environment {
         }
     }
 
-    fn power_through(&self, area: f64) -> Vec3 {
+    fn power_through_disk(&self, area: f64) -> Vec3 {
         (self.mean().as_dvec3() * (4.0 * std::f64::consts::PI * area)).as_vec3()
     }
 

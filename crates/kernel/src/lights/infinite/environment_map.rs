@@ -198,7 +198,7 @@ impl EnvironmentMap {
         let (mut heights, mut pdfs) = ([0.0; PACKET_SIZE], [0.0; PACKET_SIZE]);
         for i in 0..PACKET_SIZE {
             pdfs[i] = self.cell_pdf(columns[i], rows[i]);
-            heights[i] = self.row_fraction_above(rows[i], directions[1][i]);
+            heights[i] = self.row_fraction_above_direction(rows[i], directions[1][i]);
         }
         let mut colors = [[0.0; PACKET_SIZE]; 3];
         for i in 0..PACKET_SIZE {
@@ -214,7 +214,8 @@ impl EnvironmentMap {
         let (x, y) = self.cell_coordinates(direction, turn);
         let (column, row) = self.cell_at_coordinates(x, y);
         let between = [x - column as f32, y - row as f32];
-        TexelPosition { column, row, between, along: [between[0], self.row_fraction_above(row, direction.y)] }
+        let along = [between[0], self.row_fraction_above_direction(row, direction.y)];
+        TexelPosition { column, row, between, along }
     }
 
     /// Cell coordinates of a unit direction.
@@ -237,7 +238,7 @@ impl EnvironmentMap {
 
     /// Fraction of a row's height that is above a direction.
     #[inline(always)]
-    fn row_fraction_above(&self, row: u32, y: f32) -> f32 {
+    fn row_fraction_above_direction(&self, row: u32, y: f32) -> f32 {
         let (top, bottom) = (self.heights[row as usize], self.heights[row as usize + 1]);
         (((top - f64::from(y)) / (top - bottom)) as f32).max(0.0).min(1.0)
     }

@@ -23,7 +23,7 @@ pub trait InfiniteLight {
     /// Power in W through a disk of the given area, summed over all directions, where the disk is always
     /// perpendicular to the direction. Equals the mean weight of
     /// [`InfiniteLight::sample_direction_and_weight`] times the area.
-    fn power_through(&self, area: f64) -> Vec3;
+    fn power_through_disk(&self, area: f64) -> Vec3;
 
     /// Bounds on the light's directions and irradiance.
     fn direction_and_irradiance_bounds(&self) -> LightBounds;

@@ -5,7 +5,7 @@ use std::f64::consts::{PI, TAU};
 use arrayvec::ArrayVec;
 
 use super::BoundingSphere;
-use crate::lights::area::sphere::one_minus_cos;
+use crate::lights::area::sphere::one_minus_cos_from_sin2;
 use crate::lights::delta::DeltaLight;
 use crate::math::frame::Frame;
 use crate::math::{DVec3, Vec3};
@@ -212,7 +212,7 @@ impl TargetCone {
         (sin < 1.0).then(|| Self {
             axis: to_center / distance,
             sin,
-            one_minus_cos: one_minus_cos((sin * sin) as f32),
+            one_minus_cos: one_minus_cos_from_sin2((sin * sin) as f32),
         })
     }
 

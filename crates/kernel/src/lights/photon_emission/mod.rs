@@ -411,7 +411,7 @@ impl LightEmissionInfo {
                 Self { power, spread, surface: None }
             }
             LightFamily::Infinite(light) => {
-                Self { power: light.power_through(disk), spread: 0.0, surface: None }
+                Self { power: light.power_through_disk(disk), spread: 0.0, surface: None }
             }
             LightFamily::Area(light) => {
                 let surface = emitter_geometry(light.object)

@@ -25,7 +25,7 @@ const V_RANGE: [f32; 2] = [6e-8, 1.0 - 6e-8];
 
 /// cosθ (1 + 2Λ). `sine` is α sinθ.
 #[inline(always)]
-pub fn smith_slope(cosine: f32, sine: f32) -> f32 {
+pub fn cosine_times_one_plus_two_lambda(cosine: f32, sine: f32) -> f32 {
     let (erf, gaussian) = erf_and_gaussian(cosine / sine);
     cosine * erf + sine * (0.5 * FRAC_2_SQRT_PI) * gaussian
 }

@@ -128,7 +128,7 @@ impl ImageTexture {
 
     /// Number of texels per unit of u and v.
     pub fn texels_per_unit(&self) -> [f64; 2] {
-        self.mapping.cells_per_unit(float_size(&self.texels).as_dvec2())
+        self.mapping.cells_per_uv_unit(float_size(&self.texels).as_dvec2())
     }
 
     /// Packet version of [`ImageTexture::lookup`], for textures without mip levels.
@@ -159,15 +159,15 @@ impl ImageTexture {
     fn lookup_packet_at_scaled_uv(&self, uv: &[[f64; PACKET_SIZE]; 2], repeat: DVec2) -> Vec3x16 {
         let (texels, size) = (&*self.texels, float_size(&self.texels));
         let folded = [
-            self.wrap.scale_and_fold_packet(&uv[0], repeat.x),
-            self.wrap.scale_and_fold_packet(&uv[1], repeat.y),
+            self.wrap.repeat_and_fold_packet(&uv[0], repeat.x),
+            self.wrap.repeat_and_fold_packet(&uv[1], repeat.y),
         ];
         let extent = integer_size(texels);
         let (mut first, mut part) = ([[0; PACKET_SIZE]; 2], [[0.0; PACKET_SIZE]; 2]);
         let (shift, count) = match self.filter {
             TextureFilter::Nearest => (0.0, 1),
             TextureFilter::Bilinear | TextureFilter::Mipmap if texels.has_alpha() => {
-                return self.bilinear_packet_with_alpha(&folded);
+                return self.unpremultiplied_bilinear_packet(&folded);
             }
             TextureFilter::Bilinear | TextureFilter::Mipmap => (0.5, 4),
         };
@@ -283,7 +283,7 @@ impl ImageTexture {
     /// Bilinear lookups of texels with alpha, for a packet.
     #[cold]
     #[inline(never)]
-    fn bilinear_packet_with_alpha(&self, folded: &[F32x16; 2]) -> Vec3x16 {
+    fn unpremultiplied_bilinear_packet(&self, folded: &[F32x16; 2]) -> Vec3x16 {
         let mut colors = [[0.0; PACKET_SIZE]; 3];
         for i in 0..PACKET_SIZE {
             let color = self.bilinear(&self.texels, [folded[0][i], folded[1][i]]);
@@ -296,7 +296,7 @@ impl ImageTexture {
     #[cold]
     #[inline(never)]
     fn bilinear_premultiplied_rgba(&self, texels: &Texels, folded: [f32; 2]) -> Vec4 {
-        let (places, [fx, fy]) = self.bilinear_corners(texels, folded);
+        let (places, [fx, fy]) = self.bilinear_corner_indices(texels, folded);
         let corners = places.map(|place| texels.premultiplied_texel(place));
         corners[0].lerp(corners[1], fx).lerp(corners[2].lerp(corners[3], fx), fy)
     }
@@ -305,7 +305,7 @@ impl ImageTexture {
         if texels.has_alpha() {
             return unpremultiply(self.bilinear_premultiplied_rgba(texels, folded));
         }
-        let (places, [fx, fy]) = self.bilinear_corners(texels, folded);
+        let (places, [fx, fy]) = self.bilinear_corner_indices(texels, folded);
         let corners = texels.linear_colors_at_indices(&places);
         let (lower, upper) = (corners[0].lerp(corners[1], fx), corners[2].lerp(corners[3], fx));
         lower.lerp(upper, fy)
@@ -313,7 +313,7 @@ impl ImageTexture {
 
     /// Indices of the four nearest texels, and the interpolation weights.
     #[inline(always)]
-    fn bilinear_corners(&self, texels: &Texels, [u, v]: [f32; 2]) -> ([usize; 4], [f32; 2]) {
+    fn bilinear_corner_indices(&self, texels: &Texels, [u, v]: [f32; 2]) -> ([usize; 4], [f32; 2]) {
         let (size, extent) = (float_size(texels), integer_size(texels));
         let (x, y) = (u * size.x - 0.5, v * size.y - 0.5);
         let first = [floor_to_i32(x), floor_to_i32(y)];

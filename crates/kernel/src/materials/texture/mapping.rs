@@ -23,7 +23,7 @@ impl TextureMapping {
     pub fn point(&self, at: &TexturePoint) -> DVec2 {
         let repeat = self.repeat.as_dvec2();
         let Some(moved) = &self.moved else { return at.uv * repeat };
-        moved.transform_point(moved.second_uv_set_point(at).map_or(at.uv, |second| second.uv) * repeat)
+        moved.transform_point(moved.second_uv_point_if_used(at).map_or(at.uv, |second| second.uv) * repeat)
     }
 
     /// Packet version of [`TextureMapping::point`].
@@ -47,7 +47,7 @@ impl TextureMapping {
     /// set.
     #[inline]
     pub fn uv_set_tangents(&self, at: &TexturePoint, first: [Vec3; 2]) -> [Vec3; 2] {
-        let second = self.moved.as_ref().and_then(|moved| moved.second_uv_set_point(at));
+        let second = self.moved.as_ref().and_then(|moved| moved.second_uv_point_if_used(at));
         second.map_or(first, |second| second.tangents)
     }
 
@@ -68,7 +68,7 @@ impl TextureMapping {
     }
 
     /// Number of cells per unit of u and v if one repetition of the texture has `cells` cells.
-    pub fn cells_per_unit(&self, cells: DVec2) -> [f64; 2] {
+    pub fn cells_per_uv_unit(&self, cells: DVec2) -> [f64; 2] {
         let repeat = self.repeat.as_dvec2();
         let Some(moved) = &self.moved else { return (cells * repeat).abs().to_array() };
         let along = |axis: DVec2| (moved.transform_vector(axis * repeat) * cells).length();
@@ -81,7 +81,7 @@ impl TextureMapping {
         let Some(moved) = &self.moved else {
             return at.footprint.major_axis_texels(cells * self.repeat);
         };
-        let footprint = moved.second_uv_set_point(at).map_or(&at.footprint, |second| &second.footprint);
+        let footprint = moved.second_uv_point_if_used(at).map_or(&at.footprint, |second| &second.footprint);
         footprint.transformed_major_axis_length(|axis| {
             moved.transform_vector((axis * self.repeat).as_dvec2()).as_vec2() * cells
         })
@@ -90,7 +90,7 @@ impl TextureMapping {
     /// Extents of the footprint's bounding box, in repetitions.
     #[inline]
     pub fn footprint_extents(&self, at: &TexturePoint) -> DVec2 {
-        let second = self.moved.as_ref().and_then(|moved| moved.second_uv_set_point(at));
+        let second = self.moved.as_ref().and_then(|moved| moved.second_uv_point_if_used(at));
         let axes = second.map_or(&at.footprint, |second| &second.footprint).axes();
         let [a, b] = axes.map(|axis| {
             let axis = (axis * self.repeat).as_dvec2();
@@ -121,10 +121,10 @@ impl UvTransform {
 
     /// The point in the second UV set, if the transform applies to that set.
     #[inline]
-    fn second_uv_set_point<'a>(&self, at: &'a TexturePoint) -> Option<&'a SecondUvPoint> {
+    fn second_uv_point_if_used<'a>(&self, at: &'a TexturePoint) -> Option<&'a SecondUvPoint> {
         match self.of {
             UvSet::First => None,
-            UvSet::Second => at.second(),
+            UvSet::Second => at.second_uv_point(),
         }
     }
 

@@ -59,7 +59,7 @@ impl Noise {
     /// it is complete for s ≥ 2w, where it is sampled at least twice per lattice cell, and gone for s ≤ w. This
     /// clamps the number of octaves, as `FBm` of pbrt-v4 does, but also fades the first octave.
     pub fn filtered(&self, at: &TexturePoint, is_filtered: bool) -> FilteredNoise {
-        let (position, width) = position_and_width(at, is_filtered);
+        let (position, width) = object_position_and_width(at, is_filtered);
         let (mut value, mut removed_variance) = (0.0, 0.0);
         for octave in self.octaves(width) {
             removed_variance += octave.weight * octave.weight * (1.0 - octave.fade * octave.fade) * VARIANCE;
@@ -72,7 +72,7 @@ impl Noise {
 
     /// Gradient of the noise in the shape's own coordinates, filtered as the value is.
     pub fn gradient(&self, at: &TexturePoint, is_filtered: bool) -> Vec3 {
-        let (position, width) = position_and_width(at, is_filtered);
+        let (position, width) = object_position_and_width(at, is_filtered);
         let mut gradient = Vec3::ZERO;
         for octave in self.octaves(width).filter(|octave| octave.fade > 0.0) {
             let slope = octave.weight * octave.fade * (1.0 / octave.size) as f32;
@@ -98,8 +98,8 @@ impl Noise {
 }
 
 /// The point in the shape's own coordinates, and the width of the footprint, or 0 if it is ignored.
-fn position_and_width(at: &TexturePoint, is_filtered: bool) -> (DVec3, f64) {
-    match at.object() {
+fn object_position_and_width(at: &TexturePoint, is_filtered: bool) -> (DVec3, f64) {
+    match at.object_point() {
         Some(object) => (object.position, if is_filtered { f64::from(object.width) } else { 0.0 }),
         None => (DVec3::ZERO, 0.0),
     }

@@ -40,10 +40,10 @@ pub enum HeightSlopes {
 
 impl Pattern {
     /// The pattern at a point, or its mean over the footprint if `is_filtered` is true.
-    fn second_share(&self, at: &TexturePoint, is_filtered: bool) -> f32 {
+    fn second_color_share(&self, at: &TexturePoint, is_filtered: bool) -> f32 {
         match self {
-            Self::Checker(checker) => checker.second_share(at, is_filtered),
-            Self::Bands(bands) => bands.second_share(at, is_filtered),
+            Self::Checker(checker) => checker.second_color_share(at, is_filtered),
+            Self::Bands(bands) => bands.second_color_share(at, is_filtered),
             Self::Noise(noise) => share_from_noise(noise.filtered(at, is_filtered).value),
         }
     }
@@ -59,7 +59,7 @@ impl Pattern {
         let cut = |value: f32| f32::from(u8::from(value >= cutoff));
         match self {
             Self::Checker(_) | Self::Bands(_) => {
-                mix(cut(first), cut(second), self.second_share(at, is_filtered))
+                mix(cut(first), cut(second), self.second_color_share(at, is_filtered))
             }
             Self::Noise(noise) => {
                 let FilteredNoise { value, removed_variance } = noise.filtered(at, is_filtered);
@@ -85,7 +85,7 @@ impl Pattern {
             Self::Noise(noise) => {
                 let gradient = noise.gradient(at, is_filtered).as_dvec3() * 0.5;
                 let to_world = |object: &ObjectPoint| (object.from_world.transpose() * gradient).as_vec3();
-                HeightSlopes::World(at.object().map_or(Vec3::ZERO, to_world))
+                HeightSlopes::World(at.object_point().map_or(Vec3::ZERO, to_world))
             }
         }
     }
@@ -111,10 +111,10 @@ impl Pattern {
 
     /// Number of cells per unit of u and v for sampling the pattern as a light. The cells of noise do not
     /// follow u and v, so the number is arbitrary.
-    fn cells_per_unit(&self) -> [f64; 2] {
+    fn cells_per_uv_unit(&self) -> [f64; 2] {
         match self {
-            Self::Checker(checker) => checker.cells_per_unit(),
-            Self::Bands(bands) => bands.cells_per_unit(),
+            Self::Checker(checker) => checker.cells_per_uv_unit(),
+            Self::Bands(bands) => bands.cells_per_uv_unit(),
             Self::Noise(_) => [64.0; 2],
         }
     }
@@ -123,7 +123,7 @@ impl Pattern {
 impl PatternTexture {
     /// The color at a point.
     pub fn lookup(&self, at: &TexturePoint) -> Vec3 {
-        let share = self.pattern.second_share(at, self.is_filtered);
+        let share = self.pattern.second_color_share(at, self.is_filtered);
         self.colors[0] * (1.0 - share) + self.colors[1] * share
     }
 
@@ -163,8 +163,8 @@ impl PatternTexture {
     }
 
     /// Number of cells per unit of u and v.
-    pub fn cells_per_unit(&self) -> [f64; 2] {
-        self.pattern.cells_per_unit()
+    pub fn cells_per_uv_unit(&self) -> [f64; 2] {
+        self.pattern.cells_per_uv_unit()
     }
 }
 
@@ -238,7 +238,7 @@ mod tests {
         let footprint = Footprint::from_ray_cone(1.0, Vec3::NEG_Z, Vec3::Z, tangents);
         for u in [0.0, 0.05, 0.15, 0.16, 0.2] {
             let at = TexturePoint { footprint, ..TexturePoint::from_uv(DVec2::new(u, 0.1)) };
-            let share = texture.pattern.second_share(&at, true);
+            let share = texture.pattern.second_color_share(&at, true);
             assert_eq!(texture.coverage_above_cutoff(&at, 0.5), 1.0 - share, "{u}");
             let all = [0.05, 0.1, 0.8, 0.9].map(|cutoff| texture.coverage_above_cutoff(&at, cutoff));
             assert_eq!(all, [1.0, 1.0, 1.0 - share, 0.0], "{u}");

@@ -28,12 +28,12 @@ const SLOPE_STEP: f64 = 1.0 / 64.0;
 
 impl Checker {
     /// Fraction of the second tone in the footprint, or at the point if `is_filtered` is false.
-    pub fn second_share(&self, at: &TexturePoint, is_filtered: bool) -> f32 {
+    pub fn second_color_share(&self, at: &TexturePoint, is_filtered: bool) -> f32 {
         let (point, extents) = point_and_extents(&self.mapping, at, is_filtered);
         share_from_wave(square_wave(point.x, extents.x) * square_wave(point.y, extents.y))
     }
 
-    /// Slopes of [`Checker::second_share`] along u and v.
+    /// Slopes of [`Checker::second_color_share`] along u and v.
     pub fn slopes(&self, at: &TexturePoint, is_filtered: bool) -> Vec2 {
         let (point, extents) = point_and_extents(&self.mapping, at, is_filtered);
         let [x, y] = [square_wave(point.x, extents.x), square_wave(point.y, extents.y)];
@@ -42,27 +42,27 @@ impl Checker {
     }
 
     /// Number of cells per unit of u and v.
-    pub fn cells_per_unit(&self) -> [f64; 2] {
-        self.mapping.cells_per_unit(DVec2::splat(2.0))
+    pub fn cells_per_uv_unit(&self) -> [f64; 2] {
+        self.mapping.cells_per_uv_unit(DVec2::splat(2.0))
     }
 }
 
 impl Bands {
     /// Fraction of the second tone in the footprint, or at the point if `is_filtered` is false.
-    pub fn second_share(&self, at: &TexturePoint, is_filtered: bool) -> f32 {
+    pub fn second_color_share(&self, at: &TexturePoint, is_filtered: bool) -> f32 {
         let (point, extents) = point_and_extents(&self.mapping, at, is_filtered);
         share_from_wave(square_wave(point.x, extents.x))
     }
 
-    /// Slopes of [`Bands::second_share`] along u and v.
+    /// Slopes of [`Bands::second_color_share`] along u and v.
     pub fn slopes(&self, at: &TexturePoint, is_filtered: bool) -> Vec2 {
         let (point, extents) = point_and_extents(&self.mapping, at, is_filtered);
         self.mapping.slopes_along_uv(DVec2::new(wave_slope(point.x, extents.x) * -0.5, 0.0))
     }
 
     /// Number of bands per unit of u and v.
-    pub fn cells_per_unit(&self) -> [f64; 2] {
-        self.mapping.cells_per_unit(DVec2::new(2.0, 0.0)).map(|count| count.max(1.0))
+    pub fn cells_per_uv_unit(&self) -> [f64; 2] {
+        self.mapping.cells_per_uv_unit(DVec2::new(2.0, 0.0)).map(|count| count.max(1.0))
     }
 }
 
@@ -138,7 +138,8 @@ mod tests {
     #[test]
     fn first_tone_is_at_the_corner() {
         let checker = Checker { mapping: mapping(Vec2::new(2.0, 1.0), 0.0, DVec2::ZERO) };
-        let share = |u: f64, v: f64| checker.second_share(&TexturePoint::from_uv(DVec2::new(u, v)), false);
+        let share =
+            |u: f64, v: f64| checker.second_color_share(&TexturePoint::from_uv(DVec2::new(u, v)), false);
         // Cells are a quarter wide and half a unit high.
         for (u, v, expected) in [
             (0.0, 0.0, 0.0),
@@ -157,7 +158,8 @@ mod tests {
     #[test]
     fn bands_alternate_along_u() {
         let bands = Bands { mapping: mapping(Vec2::new(3.0, 5.0), 0.0, DVec2::ZERO) };
-        let share = |u: f64, v: f64| bands.second_share(&TexturePoint::from_uv(DVec2::new(u, v)), false);
+        let share =
+            |u: f64, v: f64| bands.second_color_share(&TexturePoint::from_uv(DVec2::new(u, v)), false);
         for i in 0..12 {
             let expected = (i % 2) as f32;
             // Just inside both edges of the band.
@@ -165,7 +167,7 @@ mod tests {
                 assert_eq!([share(u, 0.0), share(u, 0.37)], [expected; 2], "{u}");
             }
         }
-        assert_eq!(bands.cells_per_unit(), [6.0, 1.0]);
+        assert_eq!(bands.cells_per_uv_unit(), [6.0, 1.0]);
     }
 
     #[test]
@@ -179,13 +181,13 @@ mod tests {
                 let center = DVec2::new(f64::from(i), f64::from(j)) / 8.0;
                 let at = point(center.x, center.y, extents);
                 let extents = DVec2::new(f64::from(extents[0]), f64::from(extents[1]));
-                let sharp = |uv: DVec2| checker.second_share(&TexturePoint::from_uv(uv), true);
+                let sharp = |uv: DVec2| checker.second_color_share(&TexturePoint::from_uv(uv), true);
                 let expected = mean(sharp, center, extents, count);
-                let share = f64::from(checker.second_share(&at, true));
+                let share = f64::from(checker.second_color_share(&at, true));
                 assert!((share - expected).abs() < 1e-6, "{center} {extents}: {share} {expected}");
-                let sharp = |uv: DVec2| bands.second_share(&TexturePoint::from_uv(uv), true);
+                let sharp = |uv: DVec2| bands.second_color_share(&TexturePoint::from_uv(uv), true);
                 let expected = mean(sharp, center, DVec2::new(extents.x, 0.0), count);
-                let share = f64::from(bands.second_share(&at, true));
+                let share = f64::from(bands.second_color_share(&at, true));
                 assert!((share - expected).abs() < 1e-6, "{center} {extents}: {share} {expected}");
             }
         }
@@ -196,11 +198,11 @@ mod tests {
         let checker = Checker { mapping: mapping(Vec2::new(2.0, 3.0), 30.0, DVec2::new(0.3, 0.1)) };
         let bands = Bands { mapping: mapping(Vec2::new(2.0, 3.0), 0.0, DVec2::new(0.3, 0.0)) };
         for extents in [[1e-6, 1e-6], [0.01, 0.07], [0.2, 0.3], [3.0, 0.1]] {
-            let of_bands = |uv: DVec2| bands.second_share(&point(uv.x, uv.y, extents), true);
+            let of_bands = |uv: DVec2| bands.second_color_share(&point(uv.x, uv.y, extents), true);
             let found = mean(of_bands, DVec2::splat(0.5), DVec2::ONE, 600);
             assert!((found - 0.5).abs() < 1e-6, "{extents:?}: {found}");
             // The rotated board repeats only approximately, so average over many cells.
-            let of_checker = |uv: DVec2| checker.second_share(&point(uv.x, uv.y, extents), true);
+            let of_checker = |uv: DVec2| checker.second_color_share(&point(uv.x, uv.y, extents), true);
             let found = mean(of_checker, DVec2::splat(0.5), DVec2::splat(200.0), 700);
             assert!((found - 0.5).abs() < 3e-3, "{extents:?}: {found}");
         }
@@ -210,18 +212,18 @@ mod tests {
     fn filter_ignores_footprints_unless_asked() {
         let checker = Checker { mapping: TextureMapping::IDENTITY };
         let wide = point(0.3, 0.3, [5.0, 5.0]);
-        assert_eq!(checker.second_share(&wide, false), 0.0);
-        assert!((checker.second_share(&wide, true) - 0.5).abs() < 0.01);
+        assert_eq!(checker.second_color_share(&wide, false), 0.0);
+        assert!((checker.second_color_share(&wide, true) - 0.5).abs() < 0.01);
         let endless = TexturePoint { footprint: Footprint::POINT, ..wide };
-        assert_eq!(checker.second_share(&endless, true), 0.0);
+        assert_eq!(checker.second_color_share(&endless, true), 0.0);
     }
 
     #[test]
     fn rotated_footprints_filter_along_the_pattern() {
         // After a quarter turn, the bands run along u and the footprint along v blurs them.
         let turned = Bands { mapping: mapping(Vec2::ONE, 90.0, DVec2::ZERO) };
-        let along_u = turned.second_share(&point(0.2, 0.2, [9.0, 1e-4]), true);
-        let along_v = turned.second_share(&point(0.2, 0.2, [1e-4, 1.0]), true);
+        let along_u = turned.second_color_share(&point(0.2, 0.2, [9.0, 1e-4]), true);
+        let along_v = turned.second_color_share(&point(0.2, 0.2, [1e-4, 1.0]), true);
         // (u, v) is mapped to (−v, u), and −0.2 is in the second band.
         assert_eq!(along_u, 1.0);
         assert!((along_v - 0.5).abs() < 1e-6, "{along_v}");
@@ -237,9 +239,10 @@ mod tests {
             for (slopes, share) in [
                 (
                     checker.slopes(&at(0.0, 0.0), true),
-                    &(|at: &TexturePoint| checker.second_share(at, true)) as &dyn Fn(&TexturePoint) -> f32,
+                    &(|at: &TexturePoint| checker.second_color_share(at, true))
+                        as &dyn Fn(&TexturePoint) -> f32,
                 ),
-                (bands.slopes(&at(0.0, 0.0), true), &|at: &TexturePoint| bands.second_share(at, true)),
+                (bands.slopes(&at(0.0, 0.0), true), &|at: &TexturePoint| bands.second_color_share(at, true)),
             ] {
                 // A difference over a step averages the derivative, which is piecewise linear.
                 let change = |du: f64, dv: f64| {

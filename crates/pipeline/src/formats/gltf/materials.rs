@@ -6,7 +6,7 @@ use super::super::model::UsedNames;
 use super::super::rounding::{shorten, shorten_color, shorten_pair};
 use super::SceneBuilder;
 use crate::assets::gltf::{
-    Alpha, DiffuseTransmission, ModelMaterial, TextureRef, TextureWrap, TexturedValue,
+    AlphaMode, DiffuseTransmission, ModelMaterial, TextureRef, TextureWrap, TexturedValue,
 };
 use crate::math::{DVec3, Vec2};
 use crate::scene::BuiltValue;
@@ -113,7 +113,7 @@ impl MaterialBuilder<'_, '_> {
         let mut keys = Entries::new();
         self.push_number_or_texture(&mut keys, "weight", 0.5, weight, channel);
         let document = &mut self.scene.document;
-        document.named_table("materials", name);
+        document.start_named_table("materials", name);
         document.set("type", "blend");
         document.set("materials", BuiltValue::Array(parts.map(BuiltValue::from).to_vec()));
         keys.into_iter().for_each(|(key, value)| document.set(key, value));
@@ -143,7 +143,7 @@ impl MaterialBuilder<'_, '_> {
         }
         self.add_common_keys(&mut keys, material);
         let document = &mut self.scene.document;
-        document.named_table("materials", name);
+        document.start_named_table("materials", name);
         keys.into_iter().for_each(|(key, value)| document.set(key, value));
     }
 
@@ -190,15 +190,15 @@ impl MaterialBuilder<'_, '_> {
             return;
         }
         match &material.alpha {
-            Alpha::Opaque => {}
-            Alpha::Mask { value, cutoff } => {
+            AlphaMode::Opaque => {}
+            AlphaMode::Mask { value, cutoff } => {
                 self.add_opacity(keys, value, &material.color);
                 // A cutoff has no effect if it is 0 or if alpha is always 1.
                 if *cutoff > 0.0 && (value.texture.is_some() || value.factor != DVec3::ONE) {
                     keys.push(("opacity_cutoff", shorten(*cutoff).into()));
                 }
             }
-            Alpha::Blend(value) => self.add_opacity(keys, value, &material.color),
+            AlphaMode::Blend(value) => self.add_opacity(keys, value, &material.color),
         }
     }
 
@@ -214,7 +214,7 @@ impl MaterialBuilder<'_, '_> {
                     TextureUse::Numbers
                 };
                 let name = self.ensure_texture_table(texture, use_, value.factor);
-                keys.push(("opacity", texture_channel(name, "a")));
+                keys.push(("opacity", texture_channel_reference(name, "a")));
             }
             None if value.factor != DVec3::ONE => keys.push(("opacity", shorten(value.factor.x).into())),
             None => {}
@@ -252,7 +252,7 @@ impl MaterialBuilder<'_, '_> {
         match &slot.texture {
             Some(texture) => {
                 let name = self.ensure_texture_table(texture, TextureUse::Numbers, slot.factor);
-                keys.push((key, texture_channel(name, channel)));
+                keys.push((key, texture_channel_reference(name, channel)));
             }
             None if slot.factor.x != usual => keys.push((key, shorten(slot.factor.x).into())),
             None => {}
@@ -293,7 +293,7 @@ impl MaterialBuilder<'_, '_> {
         let name = self.names.make_unique(&wanted, "image");
         let TextureFileReference { file, image } = self.scene.image_file_reference(texture.image);
         let document = &mut self.scene.document;
-        document.named_table("textures", &name);
+        document.start_named_table("textures", &name);
         document.set("file", file);
         if let Some(image) = image {
             document.set("image", image as f64);
@@ -305,6 +305,6 @@ impl MaterialBuilder<'_, '_> {
 }
 
 /// Returns the value that reads a number from a texture's channel.
-fn texture_channel(texture: String, channel: &'static str) -> BuiltValue {
+fn texture_channel_reference(texture: String, channel: &'static str) -> BuiltValue {
     BuiltValue::Table(vec![("texture", texture.into()), ("channel", channel.into())])
 }

@@ -10,13 +10,13 @@ use self::materials::{MaterialBuilder, TextureFileReference};
 use super::frame::{CameraPose, FOV, frame_model, round_to_decimals_of_step};
 use super::model::{
     DEFAULT_SIZE, Lighting, ModelViewOptions, POLISHED_ROUGHNESS, UsedNames, add_camera, add_ground,
-    add_render_settings, add_sky_and_key_light, file_name, warning,
+    add_render_settings, add_sky_and_key_light, file_name, model_warning,
 };
 use super::rounding::{shorten, shorten_color, shorten_vector};
-use super::{ForeignReadContext, ForeignScene, ImportedScene, lower};
+use super::{ForeignReadContext, ForeignScene, ImportedScene, scene_from_document};
 use crate::assets::gltf::{
-    Alpha, GltfFile, ImageLocation, ModelCamera, ModelInstance, ModelLight, ModelLightKind, ModelMaterial,
-    ModelProjection, ModelScene, TexturedValue,
+    AlphaMode, GltfFile, ImageLocation, ModelCamera, ModelInstance, ModelLight, ModelLightKind,
+    ModelMaterial, ModelProjection, ModelScene, TexturedValue,
 };
 use crate::assets::mesh::ply::write;
 use crate::assets::{AssetError, Companion};
@@ -65,7 +65,7 @@ pub(super) fn convert(
     let &ForeignReadContext { containers, token, .. } = context;
     let (ForeignScene { document, substitutions, .. }, assets) =
         scene_of_file(path, &SceneAssetLocation::Folder(folder), context)?;
-    check_rendered_scene(path, context)?;
+    check_scene_before_import(path, context)?;
     let container = containers.open(path, &ignore_progress, token)?;
     let encode = |(name, content)| {
         let bytes = match content {
@@ -87,8 +87,8 @@ pub(super) fn convert(
 
 /// Rejects a file that `glimt check` would reject. Checks the scene that `glimt MODEL` would render instead of
 /// the imported one, whose texture files have not been written yet.
-fn check_rendered_scene(path: &Path, context: &ForeignReadContext<'_>) -> Result<(), AssetError> {
-    let errors = lower(read(path, context)?.document, path, &[]).err();
+fn check_scene_before_import(path: &Path, context: &ForeignReadContext<'_>) -> Result<(), AssetError> {
+    let errors = scene_from_document(read(path, context)?.document, path, &[]).err();
     // Ignore errors about file names, because the imported scene uses different file names.
     let is_relevant = |one: &Diagnostic| one.severity == Severity::Error && !one.message.contains("`file`");
     let first = errors.into_iter().flatten().find(is_relevant);
@@ -123,8 +123,8 @@ fn scene_of_file(
     let SceneBuilder { document, assets, images, companions, .. } = builder;
     let is_fully_transparent =
         scene.instances.iter().all(|one| is_fully_transparent(&scene.materials[one.material]));
-    let notes = is_fully_transparent.then(|| warning(path, INVISIBLE_MODEL)).into_iter().collect();
-    let substitutions = scene.notes.into_iter().map(|note| warning(path, note)).collect();
+    let notes = is_fully_transparent.then(|| model_warning(path, INVISIBLE_MODEL)).into_iter().collect();
+    let substitutions = scene.notes.into_iter().map(|note| model_warning(path, note)).collect();
     // Previews tolerate unreadable images, but imports do not.
     if let SceneAssetLocation::Folder(_) = asset_location {
         images.into_iter().try_for_each(|image| container.check_image_header(image, token))?;
@@ -154,9 +154,9 @@ struct SceneBuilder<'a> {
 impl SceneBuilder<'_> {
     fn add_all(&mut self, scene: &ModelScene, bounds: [DVec3; 2], view: ModelViewOptions) {
         // Describe the model and its approximations.
-        self.document.comment(format!("{}, as glimt shows it.", file_name(self.path)));
+        self.document.add_comment(format!("{}, as glimt shows it.", file_name(self.path)));
         for note in &scene.notes {
-            self.document.comment(note);
+            self.document.add_comment(note);
         }
         // Add the render settings, the camera and the lights.
         let own = scene.cameras.first().filter(|_| view.from.is_none());
@@ -189,7 +189,7 @@ impl SceneBuilder<'_> {
         };
         add_sky_and_key_light(&mut self.document, &eye, lighting);
         if !scene.lights.is_empty() {
-            self.document.comment("1 cd in the file is treated as 1 W/sr, and 1 lx as 1 W/m².");
+            self.document.add_comment("1 cd in the file is treated as 1 W/sr, and 1 lx as 1 W/m².");
         }
         scene.lights.iter().for_each(|light| self.add_light(light));
         // Add the materials, then the meshes that use them.
@@ -204,9 +204,9 @@ impl SceneBuilder<'_> {
 
     fn add_light(&mut self, light: &ModelLight) {
         let document = &mut self.document;
-        document.list_table("light");
+        document.start_list_table("light");
         if !light.name.is_empty() {
-            document.table_comment(&light.name);
+            document.add_table_comment(&light.name);
         }
         match light.kind {
             ModelLightKind::Point => {}
@@ -231,7 +231,7 @@ impl SceneBuilder<'_> {
     }
 
     fn add_mesh(&mut self, instance: &ModelInstance, material: &str, shapes: &mut UsedNames) {
-        self.document.list_table("mesh");
+        self.document.start_list_table("mesh");
         if !instance.name.is_empty() {
             self.document.set("name", shapes.make_unique(&instance.name, "mesh"));
         }
@@ -310,7 +310,7 @@ impl SceneBuilder<'_> {
         let bytes = self.container.locate_image(image);
         match (self.asset_location, bytes) {
             (SceneAssetLocation::Inside, Ok(ImageLocation::File(file)))
-                if image_extension(&file).is_some() && file.is_file() =>
+                if lowercase_image_extension(&file).is_some() && file.is_file() =>
             {
                 let folder = self.path.parent().unwrap_or(Path::new(""));
                 let name = file.strip_prefix(folder).unwrap_or(&file);
@@ -327,8 +327,8 @@ impl SceneBuilder<'_> {
             (SceneAssetLocation::Folder(_), bytes) => {
                 let ending = match &bytes {
                     Ok(ImageLocation::Inside(bytes)) => sniff_image_extension(bytes).to_owned(),
-                    Ok(ImageLocation::File(path)) => image_extension(path).unwrap_or_else(|| {
-                        sniff_image_extension(&first_bytes(path).unwrap_or_default()).to_owned()
+                    Ok(ImageLocation::File(path)) => lowercase_image_extension(path).unwrap_or_else(|| {
+                        sniff_image_extension(&read_first_four_bytes(path).unwrap_or_default()).to_owned()
                     }),
                     Err(_) => "png".to_owned(),
                 };
@@ -341,7 +341,7 @@ impl SceneBuilder<'_> {
 }
 
 /// Returns a file's extension in lowercase if it is an image extension.
-fn image_extension(file: &Path) -> Option<String> {
+fn lowercase_image_extension(file: &Path) -> Option<String> {
     let extension = file.extension()?.to_string_lossy().to_lowercase();
     MAPS.contains(&extension.as_str()).then_some(extension)
 }
@@ -349,9 +349,9 @@ fn image_extension(file: &Path) -> Option<String> {
 /// Whether a material is fully transparent everywhere.
 fn is_fully_transparent(material: &ModelMaterial) -> bool {
     let is_clear = match &material.alpha {
-        Alpha::Opaque => false,
-        Alpha::Mask { value, cutoff } => value.factor.x < *cutoff,
-        Alpha::Blend(value) => value.factor.x == 0.0,
+        AlphaMode::Opaque => false,
+        AlphaMode::Mask { value, cutoff } => value.factor.x < *cutoff,
+        AlphaMode::Blend(value) => value.factor.x == 0.0,
     };
     is_clear && material.glass.is_none()
 }
@@ -383,7 +383,7 @@ fn max_irradiance(lights: &[ModelLight], [min, max]: [DVec3; 2]) -> f64 {
 }
 
 /// Reads the first four bytes of a file, or returns `None` if this fails.
-fn first_bytes(path: &Path) -> Option<[u8; 4]> {
+fn read_first_four_bytes(path: &Path) -> Option<[u8; 4]> {
     let (mut file, _) = crate::system::file::open_regular_file(path).ok()?.ok()?;
     let mut start = [0; 4];
     file.read_exact(&mut start).ok().map(|()| start)

@@ -144,7 +144,7 @@ impl<'a> Checkpointer<'a> {
             }
             ResumeMode::No | ResumeMode::Asked | ResumeMode::IfSame => {}
         }
-        if resume != ResumeMode::Asked && !part::is_part(&self.path) {
+        if resume != ResumeMode::Asked && !part::is_part_or_checkpoint(&self.path) {
             self.report_failure(&format!("{} {}", self.path.display(), not_a_checkpoint_message(&self.path)));
             return Ok(true);
         }
@@ -184,11 +184,11 @@ impl<'a> Checkpointer<'a> {
     /// # Errors
     /// The output file is a part of another render.
     fn restore_from_finished_output(&self, state: &mut FilmState) -> Result<bool, AbortReason> {
-        if state.share.is_none() || !part::is_part(&self.output) {
+        if state.share.is_none() || !part::is_part_or_checkpoint(&self.output) {
             return Ok(false);
         }
         let path = self.output.clone();
-        let file = match PartFile::open(&self.output, &CancelToken::new()) {
+        let file = match PartFile::open_and_validate(&self.output, &CancelToken::new()) {
             Ok(file) if file.head.kind == PartOrCheckpoint::Part => file,
             // Earlier checks ensure that a part never replaces a checkpoint.
             Ok(_) => return Ok(false),
@@ -210,7 +210,7 @@ impl<'a> Checkpointer<'a> {
         if !differences.is_empty() {
             return refused(PartError::Other { path, other: "this call".to_owned(), differences });
         }
-        if let Err(error) = file.restore(&state.film) {
+        if let Err(error) = file.restore_into_film(&state.film) {
             return refused(error);
         }
         state.recount_samples();
@@ -305,7 +305,7 @@ impl<'a> Checkpointer<'a> {
         if !unlike.is_empty() {
             return Err(other(unlike));
         }
-        let file = PartFile::open(&self.path, &CancelToken::new())?;
+        let file = PartFile::open_and_validate(&self.path, &CancelToken::new())?;
         file.check_kind(PartOrCheckpoint::Checkpoint)?;
         // Validate the whole file before changing anything.
         let damaged = |why: &str| PartError::Damaged { path: path.clone(), why: why.to_owned() };
@@ -317,7 +317,7 @@ impl<'a> Checkpointer<'a> {
         if !read.matches_film_size(state) {
             return Err(damaged("its state does not match the film"));
         }
-        file.restore(&state.film)?;
+        file.restore_into_film(&state.film)?;
         read.restore_into(state).ok_or_else(|| damaged("its state does not match the film"))?;
         state.recount_samples();
         if !state.has_at_most_samples(samples) {
@@ -440,7 +440,7 @@ impl<'a> Checkpointer<'a> {
             return false;
         }
         let head = self.create_header(PartOrCheckpoint::Checkpoint, state);
-        let written = serde_json::to_value(NonFilmRenderState::from_film(state, rays, seconds))
+        let written = serde_json::to_value(NonFilmRenderState::from_film_state(state, rays, seconds))
             .map_err(|error| OutputError::File { path: self.path.clone(), source: error.into() })
             .and_then(|value| self.save_and_keep_locked(&head, &state.film, &value, durability));
         match &written {
@@ -465,7 +465,7 @@ impl<'a> Checkpointer<'a> {
         let may_replace = |at: &Path| {
             let refused = |reason| Err(OutputError::Refused { reason });
             match at.symlink_metadata() {
-                Ok(_) if !part::is_part(at) || inputs.contains_path(at) => refused(format!(
+                Ok(_) if !part::is_part_or_checkpoint(at) || inputs.contains_path(at) => refused(format!(
                     "cannot write {}: the existing file {}",
                     path.display(),
                     not_a_checkpoint_message(at)
@@ -535,7 +535,7 @@ fn rejection_message(error: &PartError) -> String {
 
 /// Reads the header and state of a valid checkpoint.
 fn read_checkpoint_header_and_state(path: &Path) -> Option<(PartHeader, NonFilmRenderState)> {
-    let file = PartFile::open(path, &CancelToken::new()).ok()?;
+    let file = PartFile::open_and_validate(path, &CancelToken::new()).ok()?;
     file.check_kind(PartOrCheckpoint::Checkpoint).ok()?;
     let state: NonFilmRenderState = serde_json::from_value(file.state).ok()?;
     state.is_plausible().then_some((file.head, state))

@@ -26,7 +26,7 @@ pub(super) struct NonFilmRenderState {
 }
 
 impl NonFilmRenderState {
-    pub(super) fn from_film(state: &FilmState, rays: RayCounters, seconds: f64) -> Self {
+    pub(super) fn from_film_state(state: &FilmState, rays: RayCounters, seconds: f64) -> Self {
         let RayCounters {
             camera_rays,
             shadow_rays,

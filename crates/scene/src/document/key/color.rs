@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::super::super::description::{ColorSource, EmissionSource};
-use super::super::super::keys::colors::{color_names, hex_digits, parse_hex_or_named_srgb8};
+use super::super::super::keys::colors::{color_names, hex_digits_after_hash, parse_hex_or_named_srgb8};
 use super::super::super::nearest::nearest_name;
 use super::super::context::Issue;
 use super::super::limits::Limits;
@@ -107,7 +107,7 @@ impl KeyInTable<'_> {
         }
         match value.decode() {
             TomlValue::String(text) => return self.parse_hex_or_named_color(text).map(Vec3::as_dvec3),
-            TomlValue::Number(_) => return self.number_in(value, expected).map(DVec3::splat),
+            TomlValue::Number(_) => return self.number_from_value(value, expected).map(DVec3::splat),
             TomlValue::Boolean(_) | TomlValue::Datetime | TomlValue::Array(_) | TomlValue::Table(_) => {}
         }
         if value.as_array().is_some_and(|array| array.len() == 3) {
@@ -164,12 +164,14 @@ impl KeyInTable<'_> {
 
 /// Converts `#rgb` and `rrggbb` to `#rrggbb`.
 fn normalize_hex_color(text: &str) -> Option<String> {
-    match hex_digits(text) {
+    match hex_digits_after_hash(text) {
         Some(digits) if digits.len() == 3 => {
             Some(digits.chars().fold("#".to_owned(), |long, digit| format!("{long}{digit}{digit}")))
         }
         Some(_) => None,
-        None => hex_digits(&format!("#{text}")).filter(|digits| digits.len() == 6).map(|d| format!("#{d}")),
+        None => hex_digits_after_hash(&format!("#{text}"))
+            .filter(|digits| digits.len() == 6)
+            .map(|d| format!("#{d}")),
     }
 }
 

@@ -12,7 +12,7 @@ impl KeyInTable<'_> {
     /// Reads a number, or a texture with an optional channel.
     pub(in super::super) fn number_or_texture(&self, textures: &DefinedNames) -> Option<NumberSource> {
         if self.is_table() {
-            let (texture, channel) = self.texture_channel_table(textures)?;
+            let (texture, channel) = self.inline_table_texture_and_channel(textures)?;
             return Some(NumberSource::Texture { texture, channel });
         }
         let value = self.value?;
@@ -26,7 +26,7 @@ impl KeyInTable<'_> {
             self.context.report(issue);
             return None;
         }
-        self.number_in(value, NUMBER_OR_TEXTURE).map(|number| NumberSource::Constant(number as f32))
+        self.number_from_value(value, NUMBER_OR_TEXTURE).map(|number| NumberSource::Constant(number as f32))
     }
 
     /// Reads the name of a texture, or `{ texture = "name", channel = "r" }`.
@@ -35,14 +35,14 @@ impl KeyInTable<'_> {
         textures: &DefinedNames,
     ) -> Option<(usize, Option<Channel>)> {
         if self.is_table() {
-            return self.texture_channel_table(textures);
+            return self.inline_table_texture_and_channel(textures);
         }
         let name = self.string_described_by(|| NAME_OR_TEXTURE.to_owned())?;
         Some((self.resolve_name_or_report(textures, name, self.value_span())?, None))
     }
 
     /// Reads the texture and the channel in `{ texture = "name", channel = "r" }`.
-    fn texture_channel_table(&self, textures: &DefinedNames) -> Option<(usize, Option<Channel>)> {
+    fn inline_table_texture_and_channel(&self, textures: &DefinedNames) -> Option<(usize, Option<Channel>)> {
         let table = self.inline_table()?;
         let texture = table.key("texture").index_by_name(textures);
         let key = table.key("channel");

@@ -16,7 +16,7 @@ impl KeyInTable<'_> {
     }
 
     /// Reads a direction of any nonzero length. Error messages call the shape or light `what`.
-    pub(in super::super) fn direction(&self, what: &str) -> Option<DVec3> {
+    pub(in super::super) fn nonzero_direction(&self, what: &str) -> Option<DVec3> {
         let direction = self.vector()?;
         if !self.check_vector_zero_or_long_enough(direction) {
             return None;

@@ -339,7 +339,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
             ends[i] = if traced & 1 << i != 0 { ends[i] } else { -1.0 };
         }
         let rays = RayPacket::from_soa(self.row.from, direction)
-            .with_start_triangle(self.row.ray_start_triangles(&direction));
+            .with_start_triangles(self.row.ray_start_triangles(&direction));
         self.add_light_along_shadow_rays(
             (&rays, &ends, traced),
             &LightGeometryPacket::splat(source),
@@ -367,7 +367,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         if self.tile.world.has_null_interaction_surfaces() {
             return self.add_attenuated_light((rays, ends, traced), sources, (values, fraction), sums);
         }
-        let occluded = self.tile.world.geometry.occluded_ray_packet(rays, ends, traced, sources, simd);
+        let occluded = self.tile.world.geometry.occluded_ray_mask(rays, ends, traced, sources, simd);
         add_masked_lanes(traced & !occluded, values, &mut sums.light);
         if let Some(fraction) = fraction {
             add_masked_lane_products(traced & !occluded, values, fraction, &mut sums.diffuse);
@@ -446,7 +446,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         }
         (
             RayPacket::from_soa(self.row.from, direction)
-                .with_start_triangle(self.row.ray_start_triangles(&direction)),
+                .with_start_triangles(self.row.ray_start_triangles(&direction)),
             ends,
         )
     }

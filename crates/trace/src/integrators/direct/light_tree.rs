@@ -34,7 +34,7 @@ pub struct SampleLightTree<'a, const MIS: bool> {
 impl SampleAllLights<'_, true> {
     /// Samples the lights, or lights picked from the tree if there is one. Without a competing technique, no
     /// weights are computed. Shadow rays to picked lights are pooled under index `number`.
-    pub fn sample_lights(self, number: u32, pool: &mut ShadowRayQueue) -> LightSums {
+    pub fn sample_all_or_picked_lights(self, number: u32, pool: &mut ShadowRayQueue) -> LightSums {
         use CompetingTechnique::{Lobes, NarrowPaths, Nothing, Paths};
         let Self { tile, row, used, aov, competing, interior_lists, only_infinite, splits_lobes } = self;
         let plain = SampleAllLights::<false> {

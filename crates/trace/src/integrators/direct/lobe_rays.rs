@@ -70,7 +70,7 @@ impl SimdKernel for LobeRayTracingKernel<'_> {
                 sent &= if (cosines[i] > 0.0) & (pdfs[i] > 0.0) { !0 } else { !bit };
                 ends[i] = if sent & bit != 0 { f32::INFINITY } else { -1.0 };
             }
-            let rays = RayPacket::from_soa(row.from, wi).with_start_triangle(row.ray_start_triangles(&wi));
+            let rays = RayPacket::from_soa(row.from, wi).with_start_triangles(row.ray_start_triangles(&wi));
             arrived.rays.scattered += u64::from(sent.count_ones());
             // Without soft shadows, add the light from every emitter along the rays, even if the emitter is
             // occluded.

@@ -134,7 +134,7 @@ pub fn power_heuristic_from_ratio(ratio: f32) -> f32 {
 
 impl TileContext<'_> {
     /// MIS weight of a path that hits an emitter, relative to light samples.
-    pub fn emitter_weight(&self, path: &PathRay, hit: &Hit) -> f32 {
+    pub fn emitter_mis_weight(&self, path: &PathRay, hit: &Hit) -> f32 {
         let pdf = path.state.pdf;
         if !(pdf > 0.0) {
             return 1.0;
@@ -289,15 +289,15 @@ impl TileContext<'_> {
         sum
     }
 
-    /// Like [`TileContext::emitter_weight`], for an emitter that coincides with glass. Returns 1 if shadow
+    /// Like [`TileContext::emitter_mis_weight`], for an emitter that coincides with glass. Returns 1 if shadow
     /// rays cannot reach the hit point.
-    pub fn coincident_glass_emitter_weight(&self, path: &PathRay, hit: &Hit) -> f32 {
+    pub fn coincident_glass_emitter_mis_weight(&self, path: &PathRay, hit: &Hit) -> f32 {
         let Ray { origin, direction, .. } = path.ray;
         let shadow = Ray::segment_ending_before_point(origin, origin + direction * hit.shape.t);
         if path.state.pdf > 0.0
             && !self.world.has_zero_transmittance_along(&shadow, LightGeometry::Object(hit.object))
         {
-            self.emitter_weight(path, hit)
+            self.emitter_mis_weight(path, hit)
         } else {
             1.0
         }

@@ -112,7 +112,7 @@ impl DirectLightVertexQueue {
     }
 
     /// Like [`DirectLightVertexQueue::accumulate_arrived_light`], for paths with consecutive slots.
-    pub fn accumulate_consecutive_arrived_light(&mut self, first: u32, accumulator: &mut Accumulator<'_>) {
+    pub fn accumulate_light_of_consecutive_slots(&mut self, first: u32, accumulator: &mut Accumulator<'_>) {
         accumulator.add_direct_to_consecutive_slots(first, &self.arrived, &self.arrived_diffuse);
     }
 
@@ -345,7 +345,7 @@ impl DirectLightVertexQueue {
             only_infinite: false,
             splits_lobes: self.splits_lobes(row),
         };
-        let sums = lighting.sample_lights(number, &mut pool);
+        let sums = lighting.sample_all_or_picked_lights(number, &mut pool);
         self.pool = pool;
         sums
     }

@@ -32,12 +32,12 @@ impl SimdKernel for ShadowOriginLiftKernel<'_> {
         for i in 0..PACKET_SIZE {
             ends[i] = if row.may_lift & 1 << i != 0 { row.lift_end[i] } else { -1.0 };
         }
-        let rays = RayPacket::from_soa(row.from, direction).with_start_triangle(row.start);
+        let rays = RayPacket::from_soa(row.from, direction).with_start_triangles(row.start);
         // Find the occluded rays.
         let blocked = {
             let (traced, nothing) =
                 (nonnegative_end_mask(&ends, simd), LightGeometryPacket::splat(LightGeometry::Nothing));
-            geometry.occluded_ray_packet(&rays, &ends, traced, &nothing, simd)
+            geometry.occluded_ray_mask(&rays, &ends, traced, &nothing, simd)
         };
         // Move the origins of the unoccluded rays.
         let lifted = row.may_lift & !blocked;

@@ -156,7 +156,7 @@ impl SimdKernel for ShadowRayKernel<'_> {
             let occluded = if world.has_null_interaction_surfaces() {
                 attenuate_queued_contributions(world, aov, (&packet, &ends, traced), &sources, (rows, rays))
             } else {
-                world.geometry.occluded_ray_packet(&packet, &ends, traced, &sources, simd)
+                world.geometry.occluded_ray_mask(&packet, &ends, traced, &sources, simd)
             };
             for to in set_bit_lanes(occluded) {
                 let ray = rays[to] as usize;

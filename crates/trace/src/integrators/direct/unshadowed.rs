@@ -38,8 +38,9 @@ impl LobeRayWithoutSoftShadows<'_> {
         let (mut sum, mut along, mut passed) = (Vec3::ZERO, *ray, 0.0);
         // Add the emitters along the ray, front to back.
         for _ in 0..=MAX_NULL_INTERACTIONS {
-            let Some(hit) =
-                world.geometry.closest_hit_on_objects_where(&along, |object| world.lights.has_object(object))
+            let Some(hit) = world
+                .geometry
+                .closest_hit_on_objects_where(&along, |object| world.lights.has_light_on_object(object))
             else {
                 break;
             };

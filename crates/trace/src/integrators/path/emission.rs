@@ -1,6 +1,6 @@
 //! Emission and ambient light found by camera paths.
 
-use super::CameraWavefront;
+use super::CameraPathWavefront;
 use crate::geometry::packet::{RayPacket, set_bit_lanes};
 use crate::integrators::behavior::PathBehavior;
 use crate::integrators::transport::accumulator::NonReflectedTerm;
@@ -14,7 +14,7 @@ use crate::math::lanes::lane as lane_of;
 use crate::scene::description::ShadowMode;
 use crate::world::Hit;
 
-impl CameraWavefront<'_, '_> {
+impl CameraPathWavefront<'_, '_> {
     /// Masks of a packet's plain surfaces that emit or reflect ambient light, and of the rays that escape to
     /// a background or an infinite light.
     pub(super) fn emitting_and_escaped_masks(
@@ -79,7 +79,7 @@ impl CameraWavefront<'_, '_> {
         let index = self.tile.world.material_index(hit);
         let Some((material, _)) = self.tile.plain_packet_material(index) else { return };
         if is_shining {
-            self.add_weighted_emission(path, material.emission, self.tile.emitter_weight(path, hit));
+            self.add_weighted_emission(path, material.emission, self.tile.emitter_mis_weight(path, hit));
         }
         let render = &self.tile.settings.render;
         if render.ambient != Vec3::ZERO && self.depth < render.max_depth {
@@ -97,8 +97,10 @@ impl CameraWavefront<'_, '_> {
     ) -> bool {
         if vertex.emits() {
             let weight = match hit {
-                DirectOrCoincidentHit::Direct(hit) => self.tile.emitter_weight(path, &hit),
-                DirectOrCoincidentHit::Touching(hit) => self.tile.coincident_glass_emitter_weight(path, &hit),
+                DirectOrCoincidentHit::Direct(hit) => self.tile.emitter_mis_weight(path, &hit),
+                DirectOrCoincidentHit::Touching(hit) => {
+                    self.tile.coincident_glass_emitter_mis_weight(path, &hit)
+                }
             };
             let radiance = vertex.emitted_radiance(path, self.counters);
             self.add_weighted_emission(path, radiance, weight);
@@ -132,7 +134,7 @@ impl CameraWavefront<'_, '_> {
         !path.state.only_specular_before && (gathers || mirrors && is_shared) && !(is_shared && is_soft)
     }
 
-    pub(super) fn add_escaped_light(&mut self, path: &PathRay) {
+    pub(super) fn add_mis_weighted_infinite_light(&mut self, path: &PathRay) {
         self.add_infinite_light(path, self.tile.mis_weighted_infinite_light(path));
     }
 

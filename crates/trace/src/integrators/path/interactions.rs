@@ -1,7 +1,7 @@
 //! Interactions of camera paths with surfaces that are shaded one by one. At specular surfaces (mirrors,
 //! smooth glass, panes and coats), paths either split or continue in a randomly chosen branch.
 
-use super::CameraWavefront;
+use super::CameraPathWavefront;
 use crate::geometry::Ray;
 use crate::geometry::packet::set_bit_lanes;
 use crate::integrators::aov::{record_first_hit_of_ray, record_first_hits_on_plain_surfaces, record_vertex};
@@ -14,7 +14,7 @@ use crate::integrators::transport::ray::PathRay;
 use crate::integrators::transport::tile::TileContext;
 use crate::integrators::transport::vertex::{SpecularLobe, SurfaceVertex};
 use crate::integrators::transport::walk::{
-    DirectOrCoincidentHit, Interaction, Interface, NullInteraction, PathStepper, walk_to_interaction,
+    DirectOrCoincidentHit, Interaction, Interface, NullInteractionOutcome, PathStepper, walk_to_interaction,
 };
 use crate::integrators::view::LightAov;
 use crate::materials::{Bsdf, Mirror, SpecularOverBase, ThinDielectric};
@@ -25,7 +25,7 @@ use crate::world::Hit;
 /// random.
 const MIN_SPLIT: f32 = 0.01;
 
-impl<'a> PathStepper<'a> for CameraWavefront<'a, '_> {
+impl<'a> PathStepper<'a> for CameraPathWavefront<'a, '_> {
     fn tile(&self) -> &'a TileContext<'a> {
         self.tile
     }
@@ -73,7 +73,7 @@ impl<'a> PathStepper<'a> for CameraWavefront<'a, '_> {
             }
             Interaction::Hidden if self.may_scatter() => self.push_specular(*path),
             Interaction::Hidden => {}
-            Interaction::Nothing => self.add_escaped_light(path),
+            Interaction::Nothing => self.add_mis_weighted_infinite_light(path),
         }
     }
 
@@ -87,13 +87,13 @@ impl<'a> PathStepper<'a> for CameraWavefront<'a, '_> {
         vertex: &SurfaceVertex<'a>,
         hit: DirectOrCoincidentHit,
         pane: &ThinDielectric,
-    ) -> NullInteraction {
+    ) -> NullInteractionOutcome {
         let reflectance = pane.reflectance(vertex.surface.shading_normal.dot(vertex.wo));
         let tint = vertex.pane_transmittance(path, pane, &mut self.counters.texture_lookups);
         let left = tint * (1.0 - reflectance);
         // After the last bounce, only light that passes straight through the pane is added.
         if !self.add_path_emission(path, vertex, hit) {
-            return NullInteraction::Passed(left);
+            return NullInteractionOutcome::Passed(left);
         }
         let shading = vertex.perturbed_and_smooth_normals(self.counters);
         let mirrored = |weight: f32| reflected_path(path, vertex, &shading, Vec3::splat(weight));
@@ -101,17 +101,17 @@ impl<'a> PathStepper<'a> for CameraWavefront<'a, '_> {
         let splits = self.tile.behavior.splits && path.state.only_specular_before;
         if weaker >= MIN_SPLIT && splits {
             self.roulette_and_push_reflected(mirrored(reflectance));
-            NullInteraction::Passed(left)
+            NullInteractionOutcome::Passed(left)
         } else if self.tile.chooses_reflection(path, reflectance) {
             self.roulette_and_push_reflected(mirrored(1.0));
-            NullInteraction::Ended
+            NullInteractionOutcome::Ended
         } else {
-            NullInteraction::Passed(tint)
+            NullInteractionOutcome::Passed(tint)
         }
     }
 }
 
-impl CameraWavefront<'_, '_> {
+impl CameraPathWavefront<'_, '_> {
     /// Adds the traversal costs of a packet's rays.
     pub(super) fn add_traversal_costs(&mut self, rays: &PacketSource<'_>, packet: &PacketHits) {
         for lane in 0..rays.count() {
@@ -251,8 +251,8 @@ impl CameraWavefront<'_, '_> {
     /// Queues a ray that continues the current path without a diffuse or glossy vertex.
     pub(super) fn push_specular(&mut self, ray: PathRay) {
         self.next.push(ray);
-        if let Some(fractions) = self.accumulator.fractions() {
-            fractions.inherit(self.place);
+        if let Some(fractions) = self.accumulator.diffuse_fractions() {
+            fractions.append_inherited(self.place);
         }
     }
 

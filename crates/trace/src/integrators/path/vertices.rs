@@ -1,6 +1,6 @@
 //! Vertices of camera paths at diffuse and glossy surfaces, queued for light and BSDF sampling.
 
-use super::CameraWavefront;
+use super::CameraPathWavefront;
 use crate::geometry::packet::set_bit_lanes;
 use crate::integrators::direct::queue::ShadingSides;
 use crate::integrators::transport::interface::diffuser_basic_radiance_transmittance;
@@ -14,7 +14,7 @@ use crate::materials::{BxdfPoint, NonSpecular, RoughDielectricPoint};
 use crate::math::Vec3;
 use crate::scene::description::ShadowMode;
 
-impl CameraWavefront<'_, '_> {
+impl CameraPathWavefront<'_, '_> {
     /// Whether paths may scatter at the current hits.
     pub(super) fn may_scatter(&self) -> bool {
         self.depth < self.tile.settings.render.max_depth
@@ -82,7 +82,7 @@ impl CameraWavefront<'_, '_> {
         let (tile, place) = (self.tile, self.place);
         let shading = vertex.perturbed_and_smooth_normals(self.counters);
         let behind = bsdf.bsdf_for_transmitted_light().map(|bsdf| (bsdf, shading.far_side()));
-        let aov = self.light_aov_at_vertex(path);
+        let aov = self.select_light_aov_for_path(path);
         let lit = ShadingVertex { path, interiors: &path.interiors, place, vertex, shading, bsdf };
         self.direct.push(tile, &lit, aov, ShadingSides::OneSide { is_dark: false });
         // Transmitted light has its own vertex, except for the lit fraction, which is measured on the
@@ -110,7 +110,7 @@ impl CameraWavefront<'_, '_> {
         }
         let (tile, place) = (self.tile, self.place);
         let shading = vertex.perturbed_and_smooth_normals(self.counters);
-        let aov = self.light_aov_at_vertex(path);
+        let aov = self.select_light_aov_for_path(path);
         let near = &path.interiors;
         let (reflection, transmission) = (rough.reflection(), rough.transmission());
         // The lit fraction is measured on the viewer's side. Blocked light is included, so a dark side is
@@ -122,7 +122,7 @@ impl CameraWavefront<'_, '_> {
         // Without shadows, lights also illuminate the inside of solids.
         let has_shadows = tile.settings.render.shadows != ShadowMode::Off;
         let is_dark = |interiors: &InteriorList| {
-            interiors.glass().is_some_and(|inside| tile.world.is_glass_interior_shadowed(inside.body))
+            interiors.medium_glass().is_some_and(|inside| tile.world.is_glass_interior_shadowed(inside.body))
         };
         let dark = [near, far].map(|interiors| has_shadows && is_dark(interiors));
         // Photons are stored on both sides, so each side needs a vertex.
@@ -147,7 +147,7 @@ impl CameraWavefront<'_, '_> {
     }
 
     /// The light AOV at a path's vertex. After the first non-specular surface, all light is included.
-    pub(super) fn light_aov_at_vertex(&self, path: &PathRay) -> LightAov {
+    pub(super) fn select_light_aov_for_path(&self, path: &PathRay) -> LightAov {
         if path.state.only_specular_before { self.accumulator.aov } else { LightAov::ALL }
     }
 }

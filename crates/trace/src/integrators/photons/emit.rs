@@ -26,7 +26,7 @@ use crate::integrators::transport::scatter::{BounceContinuation, BsdfSampler};
 use crate::integrators::transport::tile::TileContext;
 use crate::integrators::transport::vertex::{ShadingVertex, SpecularLobe, SurfaceVertex};
 use crate::integrators::transport::walk::{
-    DirectOrCoincidentHit, Interaction, Interface, MAX_PASSED_SURFACES, NullInteraction, PathStepper,
+    DirectOrCoincidentHit, Interaction, Interface, MAX_PASSED_SURFACES, NullInteractionOutcome, PathStepper,
     opacity_at, walk_to_interaction,
 };
 use crate::integrators::view::LightAov;
@@ -206,19 +206,19 @@ impl<'a> PathStepper<'a> for PhotonWavefront<'a> {
         vertex: &SurfaceVertex<'a>,
         _: DirectOrCoincidentHit,
         pane: &ThinDielectric,
-    ) -> NullInteraction {
+    ) -> NullInteractionOutcome {
         let reflectance = pane.reflectance(vertex.surface.shading_normal.dot(vertex.wo));
         let tint = vertex.pane_transmittance(path, pane, &mut self.counters.texture_lookups);
         if !self.may_scatter() {
-            return NullInteraction::Passed(tint * (1.0 - reflectance));
+            return NullInteractionOutcome::Passed(tint * (1.0 - reflectance));
         }
         if !self.tracing.tile.chooses_reflection(path, reflectance) {
-            return NullInteraction::Passed(tint);
+            return NullInteractionOutcome::Passed(tint);
         }
         let shading = vertex.perturbed_and_smooth_normals(&mut self.counters);
         let ray = reflected_path(path, vertex, &shading, Vec3::ONE);
         self.queue_specular_photon(path, vertex, (shading.normal, 1.0), ray);
-        NullInteraction::Ended
+        NullInteractionOutcome::Ended
     }
 }
 
@@ -554,9 +554,9 @@ fn storage_probability(path: &PathRay, vertex: &SurfaceVertex<'_>, lookups: &mut
     if !vertex.is_blended() {
         return opacity_at(path, vertex, lookups);
     }
-    let at = vertex.lookup_point(path.state.pdf > 0.0);
+    let at = vertex.texture_lookup_point(path.state.pdf > 0.0);
     let is_stored = |part: &Material| can_store_photons(part, vertex.is_front);
-    vertex.surface_material.presence(&at, &is_stored, lookups)
+    vertex.surface_material.presence_probability(&at, &is_stored, lookups)
 }
 
 /// Largest component of a photon's flux in W. Unlike basic flux, it does not depend on the medium.

@@ -1,9 +1,9 @@
 //! Density estimation: gathers photons at vertices.
 
-use super::PhotonMaps;
+use super::PhotonPassesBySample;
 use super::coverage::{KernelCoverage, kernel_coverage};
 use super::map::{GatherPoint, PhotonMap};
-use super::occlusion::is_occluded;
+use super::occlusion::is_photon_occluded;
 use super::reservoir::PhotonPositionAndNormal;
 use super::trials::inverse_coverage;
 use crate::geometry::packet::set_bit_lanes;
@@ -30,7 +30,7 @@ const BOUNCED_LOOKUP_PROBABILITY: f32 = 0.5;
 pub fn gather_photons(
     tile: &TileContext<'_>,
     row: &VertexBatch,
-    maps: &PhotonMaps,
+    maps: &PhotonPassesBySample,
     depth: u32,
     (aov, splits_lobes): (LightAov, bool),
 ) -> [Vec3x16; 2] {
@@ -46,7 +46,7 @@ pub fn gather_photons(
 struct GatherPhotonsKernel<'a, const SPLIT: bool> {
     tile: &'a TileContext<'a>,
     row: &'a VertexBatch,
-    maps: &'a PhotonMaps,
+    maps: &'a PhotonPassesBySample,
     depth: u32,
     aov: LightAov,
 }
@@ -122,7 +122,7 @@ fn coverage_factor(
     match kernel_coverage(tile.world, look, radius) {
         KernelCoverage::Fraction(part) => 1.0 / part,
         KernelCoverage::Clipped | KernelCoverage::Crowded
-            if is_occluded(&tile.world.geometry, look, &photon, radius) =>
+            if is_photon_occluded(&tile.world.geometry, look, &photon, radius) =>
         {
             0.0
         }

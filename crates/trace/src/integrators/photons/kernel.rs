@@ -58,7 +58,7 @@ fn signed_angle(from: DVec2, to: DVec2) -> f64 {
 
 /// Maps a uniform point on the unit disk to a point distributed according to the kernel. The disk of radius ρ
 /// contains 2ρ² − ρ⁴ of the kernel's weight and ρ² of the unit disk's area.
-pub fn sample(on_disk: Vec2) -> Vec2 {
+pub fn warp_disk_point(on_disk: Vec2) -> Vec2 {
     let squared = on_disk.length_squared().min(1.0);
     // ρ² = 1 − √(1 − u), where u is the squared radius on the disk, rewritten to avoid cancellation: ρ²/u =
     // 1/(1 + √(1 − u)).
@@ -119,7 +119,7 @@ mod tests {
         const DRAWS: u32 = 400_000;
         let mut inside = 0;
         for _ in 0..DRAWS {
-            let place = sample(warp::disk(Vec2::new(next(), next())));
+            let place = warp_disk_point(warp::disk(Vec2::new(next(), next())));
             assert!(place.length() <= 1.0);
             let from = (place.as_dvec2() - part[0]) / 0.8;
             inside += u32::from(from.min_element() > 0.0 && from.max_element() < 1.0);

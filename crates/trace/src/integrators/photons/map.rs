@@ -145,7 +145,7 @@ impl PhotonMap {
             token.check_pause_and_cancel()?;
             for photon in photons {
                 let [x, y, z] = cell_of(photon.point, cells);
-                let bucket = bucket(x, y, z, mask);
+                let bucket = bucket_of_cell(x, y, z, mask);
                 starts[bucket as usize + 1] += 1;
                 buckets.push(bucket);
             }
@@ -318,7 +318,7 @@ impl PhotonMap {
         for row in 0..rows {
             for column in 0..columns {
                 let (y, z) = (first[1].wrapping_add(column as i32), first[2].wrapping_add(row as i32));
-                let begin = bucket(first[0], y, z, self.mask);
+                let begin = bucket_of_cell(first[0], y, z, self.mask);
                 let end = begin + run;
                 if end <= self.mask {
                     ranges.merge_range([self.starts[begin as usize], self.starts[end as usize + 1]]);
@@ -444,7 +444,7 @@ fn cell_of(point: Vec3, cells: f32) -> [i32; 3] {
 
 /// The bucket that contains a cell. Cells in a column have consecutive buckets.
 #[inline(always)]
-fn bucket(x: i32, y: i32, z: i32, mask: u32) -> u32 {
+fn bucket_of_cell(x: i32, y: i32, z: i32, mask: u32) -> u32 {
     let hash = (y as u32).wrapping_mul(0x9e37_79b1) ^ (z as u32).wrapping_mul(0x85eb_ca77).rotate_left(16);
     (hash ^ hash >> 15).wrapping_mul(0x2c1b_3c6d).rotate_left(13).wrapping_add(x as u32) & mask
 }

@@ -58,7 +58,7 @@ use crate::integrators::transport::tile::{SampleBlock, TileContext};
 use crate::lights::{BoundingSphere, PhotonEmitter};
 use crate::materials::{Dielectric, Material};
 use crate::scene::description::{RenderOptions, ShadowMode};
-use crate::world::{CompoundSolid, Hit, LightBoundingBoxes, World, scene_photon_emitter};
+use crate::world::{CompoundSolid, Hit, LightBoundingBoxPair, World, scene_photon_emitter};
 use emit::{PhotonChunk, PhotonTracer};
 pub(super) use map::GatherPoint;
 pub use map::{Photon, PhotonMap};
@@ -119,14 +119,14 @@ impl PhotonPass {
 
 /// Photon passes for a range of samples.
 #[derive(Clone, Debug)]
-pub struct PhotonMaps {
+pub struct PhotonPassesBySample {
     /// Index of the first sample.
     pub first: u32,
     /// One pass per sample.
     pub passes: Vec<Arc<PhotonPass>>,
 }
 
-impl PhotonMaps {
+impl PhotonPassesBySample {
     /// Photon pass for a sample.
     pub fn pass_for_sample(&self, sample: u32) -> &PhotonPass {
         &self.passes[(sample - self.first) as usize]
@@ -147,7 +147,7 @@ impl PhotonMapper {
         token: &CancelToken,
     ) -> Result<(Self, PhotonPass), Canceled> {
         // Aim photons at the mirrors and glass.
-        let specular = SpecularObjects::from_world(world);
+        let specular = SpecularObjectBounds::from_world(world);
         let emission = scene_photon_emitter(&world.geometry, &world.lights).filter(|_| specular.has_any());
         let aimed = AIMED_FRACTIONS[usize::from(specular.is_unbounded)];
         let emission = emission.map(|emission| emission.with_targets(&specular.balls, aimed));
@@ -230,10 +230,10 @@ impl PhotonMapper {
         settings: &RenderSettings,
         samples: Range<u32>,
         token: &CancelToken,
-    ) -> Result<PhotonMaps, Canceled> {
+    ) -> Result<PhotonPassesBySample, Canceled> {
         let first = samples.start;
         let pass = |number| self.trace_pass(world, settings, number, token).map(Arc::new);
-        Ok(PhotonMaps { first, passes: samples.map(pass).collect::<Result<_, _>>()? })
+        Ok(PhotonPassesBySample { first, passes: samples.map(pass).collect::<Result<_, _>>()? })
     }
 
     /// Traces the photons of a pass and returns them in emission order.
@@ -367,12 +367,12 @@ fn light_enclosing_glass_candidates(world: &World) -> (Vec<u32>, Vec<CompoundSol
     let closed = world.closed_glass_shapes().map(|(object, _)| object).filter(may_contain_light).collect();
     // A solid closed by opaque surfaces may extend beyond its bounding box, so test the center and corners of
     // each light.
-    let encloses_light = |body: &CompoundSolid, light: &LightBoundingBoxes| {
+    let encloses_light = |body: &CompoundSolid, light: &LightBoundingBoxPair| {
         light
             .smaller_box_center_and_corners()
             .any(|point| world.enclosing_glass_material(body, point, light.object).is_some())
     };
-    let mut bodies = world.compound_solids();
+    let mut bodies = world.find_compound_solids();
     bodies.retain(|body| {
         light_boxes.iter().any(|light| {
             light.may_light_intersect_box(&body.bounds) || body.is_covered && encloses_light(body, light)
@@ -410,14 +410,14 @@ impl GlassObjectBoundsList {
 const NEAR: f32 = 1e-3;
 
 /// The mirrors and glass objects in a scene.
-struct SpecularObjects {
+struct SpecularObjectBounds {
     /// Bounding spheres of the bounded objects.
     balls: Vec<BoundingSphere>,
     /// Whether there are unbounded objects.
     is_unbounded: bool,
 }
 
-impl SpecularObjects {
+impl SpecularObjectBounds {
     fn from_world(world: &World) -> Self {
         let mut own = Self { balls: Vec::new(), is_unbounded: false };
         let glasses = GlassObjectBoundsList::from_world(world);

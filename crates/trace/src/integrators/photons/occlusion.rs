@@ -18,7 +18,7 @@ const NEAR: f32 = 1e-3;
 
 /// Whether a photon is occluded from the kernel's center. Tests a segment above the surface, or a segment
 /// close to the surface if there is not enough room above the center or the photon.
-pub fn is_occluded(
+pub fn is_photon_occluded(
     geometry: &Geometry,
     look: &GatherPoint,
     photon: &PhotonPositionAndNormal,

@@ -1,9 +1,9 @@
 //! Unbiased estimate of the reciprocal of a kernel's coverage, from random trials.
 
 use super::coverage::{KernelCoverage, can_store_photons, primitive_material};
-use super::kernel::sample;
+use super::kernel::warp_disk_point;
 use super::map::{GatherPoint, MAX_PLANE_DISTANCE, MIN_COSINE};
-use super::occlusion::is_occluded;
+use super::occlusion::is_photon_occluded;
 use super::reservoir::PhotonPositionAndNormal;
 use crate::geometry::ray::offset_origin;
 use crate::geometry::{Ray, SurfaceRequest};
@@ -34,8 +34,8 @@ pub fn inverse_coverage(
 ) -> f32 {
     let frame = Frame::from_normal(look.normal);
     let mut succeeds = |number: u32| {
-        let Vec2 { x, y } = sample(warp::disk(pair(number))) * radius;
-        receives_photons(world, look, look.point + frame.s * x + frame.t * y, radius)
+        let Vec2 { x, y } = warp_disk_point(warp::disk(pair(number))) * radius;
+        can_position_receive_photons(world, look, look.point + frame.s * x + frame.t * y, radius)
     };
     match clip {
         KernelCoverage::Fraction(part) => 1.0 / part,
@@ -69,7 +69,7 @@ fn mean_trials_per_success(mut succeeds: impl FnMut(u32) -> bool) -> f32 {
 
 /// Whether an unoccluded surface above or below a position in the tangent plane can receive the kernel's
 /// photons.
-fn receives_photons(world: &World, look: &GatherPoint, place: Vec3, radius: f32) -> bool {
+fn can_position_receive_photons(world: &World, look: &GatherPoint, place: Vec3, radius: f32) -> bool {
     let above = MAX_PLANE_DISTANCE * radius * look.normal;
     let end = place - above;
     let mut start = place + above;
@@ -88,7 +88,7 @@ fn receives_photons(world: &World, look: &GatherPoint, place: Vec3, radius: f32)
         let photon = PhotonPositionAndNormal { point: surface.point, normal };
         if cosine.abs() > MIN_COSINE
             && can_store_photons(primitive_material(world, hit.object, hit.shape.primitive), cosine > 0.0)
-            && !is_occluded(&world.geometry, look, &photon, radius)
+            && !is_photon_occluded(&world.geometry, look, &photon, radius)
         {
             return true;
         }

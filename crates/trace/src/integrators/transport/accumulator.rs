@@ -26,14 +26,14 @@ pub struct DiffuseFractions {
 
 impl DiffuseFractions {
     /// Begins with `count` camera paths.
-    pub fn begin(&mut self, count: usize) {
+    pub fn begin_camera_paths(&mut self, count: usize) {
         self.current.clear();
         self.current.resize(count, Vec3::ZERO);
         self.next.clear();
     }
 
     /// Appends a path that continues path `place` specularly.
-    pub fn inherit(&mut self, place: u32) {
+    pub fn append_inherited(&mut self, place: u32) {
         self.next.push(self.current[place as usize]);
     }
 
@@ -76,7 +76,7 @@ pub struct Accumulator<'a> {
 impl Accumulator<'_> {
     /// The paths' diffuse fractions, if they are needed for the layers.
     #[inline]
-    pub fn fractions(&mut self) -> Option<&mut DiffuseFractions> {
+    pub fn diffuse_fractions(&mut self) -> Option<&mut DiffuseFractions> {
         self.layers.as_mut()?.fractions.as_deref_mut()
     }
 
@@ -175,10 +175,10 @@ impl Accumulator<'_> {
             *sum += *contribution;
         }
         let Some(layers) = self.layers.as_mut().filter(|_| !diffuse.is_empty()) else { return };
-        layers.values.add_consecutive(SampleLayer::Diffuse, first, diffuse.iter().copied());
+        layers.values.add_to_consecutive_samples(SampleLayer::Diffuse, first, diffuse.iter().copied());
         if contributions != diffuse {
             let specular = contributions.iter().zip(diffuse).map(|(light, diffuse)| light - diffuse);
-            layers.values.add_consecutive(SampleLayer::Specular, first, specular);
+            layers.values.add_to_consecutive_samples(SampleLayer::Specular, first, specular);
         }
     }
 

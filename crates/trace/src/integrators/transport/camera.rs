@@ -102,7 +102,7 @@ impl TileContext<'_> {
         for lane in 0..PACKET_SIZE {
             let corner = DVec2::new(f64::from(xs[lane]), f64::from(ys[lane])) + DVec2::splat(0.5);
             let place = corner + DVec2::new(f64::from(in_pixel[0][lane]), f64::from(in_pixel[1][lane]));
-            let FilmPosition { offset, half_width } = settings.film_position(place);
+            let FilmPosition { offset, half_width } = settings.film_position_from_pixel(place);
             (film.offset[0][lane], film.offset[1][lane]) = (offset.x, offset.y);
             film.half_width = half_width;
         }

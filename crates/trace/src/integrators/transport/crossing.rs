@@ -124,7 +124,7 @@ impl TileContext<'_> {
         [near, far]: [&InteriorList; 2],
         memory: &CoincidentSurfaceBuffers,
     ) -> Option<SeparatingGlassSurface> {
-        let later = near.glass().max(far.glass())?;
+        let later = near.medium_glass().max(far.medium_glass())?;
         let own = self.world.material_index(hit) as u32;
         if self.world.solid_id(hit.object) == later.body && self.world.is_glass_material(own) {
             return Some(SeparatingGlassSurface { material: own, hit: None });

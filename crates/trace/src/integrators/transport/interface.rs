@@ -36,7 +36,7 @@ pub fn reflected_path(
         throughput: path.throughput * reflectance,
         path: path.continuation_path_number(REFLECTED),
         state: path.state.after_specular(reflectance.max_element()),
-        cone: vertex.cone_after(SpecularEvent::Reflected),
+        cone: vertex.cone_after_specular(SpecularEvent::Reflected),
         ..*path
     }
 }
@@ -74,7 +74,7 @@ pub fn fresnel_split(
         path: path.continuation_path_number(REFRACTED),
         interiors: *far,
         state: path.state.after_specular(1.0),
-        cone: vertex.cone_after(SpecularEvent::Refracted(eta)),
+        cone: vertex.cone_after_specular(SpecularEvent::Refracted(eta)),
         ..*path
     });
     FresnelSplit { reflectance, refracted }

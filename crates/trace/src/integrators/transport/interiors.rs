@@ -34,7 +34,7 @@ impl InteriorList {
     }
 
     /// The glass that determines the medium.
-    pub fn glass(&self) -> Option<Interior> {
+    pub fn medium_glass(&self) -> Option<Interior> {
         self.solids().last().copied()
     }
 
@@ -123,13 +123,16 @@ impl InteriorListPool {
 /// Transmittance of a ray's medium over a distance.
 #[inline]
 pub fn medium_transmittance(world: &World, interiors: &InteriorList, distance: f32) -> Vec3 {
-    let glass = interiors.glass().and_then(|inside| dielectric_of_interior(world, inside));
+    let glass = interiors.medium_glass().and_then(|inside| dielectric_of_interior(world, inside));
     glass.map_or(Vec3::ONE, |glass| glass.interior_transmittance(distance))
 }
 
 /// Index of refraction of a ray's medium.
 pub fn medium_ior(world: &World, interiors: &InteriorList) -> f32 {
-    interiors.glass().and_then(|inside| dielectric_of_interior(world, inside)).map_or(1.0, |glass| glass.ior)
+    interiors
+        .medium_glass()
+        .and_then(|inside| dielectric_of_interior(world, inside))
+        .map_or(1.0, |glass| glass.ior)
 }
 
 fn dielectric_of_interior(world: &World, inside: Interior) -> Option<&Dielectric> {
@@ -149,7 +152,7 @@ mod tests {
         let (seven, nine) = (part(7, 0), part(9, 1));
         let air = InteriorList::default();
         for in_both in [air.entered(seven).entered(nine), air.entered(nine).entered(seven)] {
-            assert_eq!(in_both.glass(), Some(nine));
+            assert_eq!(in_both.medium_glass(), Some(nine));
             assert_eq!(in_both.exited(seven), Some(air.entered(nine)));
             assert_eq!(in_both.exited(nine), Some(air.entered(seven)));
             assert_eq!(in_both.exited(nine).and_then(|one| one.exited(seven)), Some(air));
@@ -159,9 +162,12 @@ mod tests {
             (0..6).fold(air, |interiors, object| interiors.entered(part(object, 0))),
             (0..6).rev().fold(air, |interiors, object| interiors.entered(part(object, 0))),
         ] {
-            assert_eq!(deep.glass(), Some(part(5, 0)));
+            assert_eq!(deep.medium_glass(), Some(part(5, 0)));
             assert_eq!(deep.exited(part(0, 0)), None);
-            assert_eq!(deep.exited(part(5, 0)).and_then(|interiors| interiors.glass()), Some(part(4, 0)));
+            assert_eq!(
+                deep.exited(part(5, 0)).and_then(|interiors| interiors.medium_glass()),
+                Some(part(4, 0))
+            );
         }
     }
 

@@ -202,7 +202,7 @@ impl SimdKernel for PacketIntersector<'_> {
                     (start[lane], ends[lane]) = (path.ray.start, path.ray.t_max);
                 }
                 traced = packet::nonnegative_end_mask(&ends, simd);
-                of_paths = RayPacket::from_soa(origin, direction).with_start_triangle(start);
+                of_paths = RayPacket::from_soa(origin, direction).with_start_triangles(start);
                 &of_paths
             }
         };

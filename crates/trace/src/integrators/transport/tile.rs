@@ -130,12 +130,12 @@ impl SampleBlock {
             xs[lane] = rect.x.wrapping_add(index[lane].wrapping_sub(y.wrapping_mul(rect.width)));
             ys[lane] = rect.y.wrapping_add(y);
         }
-        (self.before_mirroring(xs), ys, samples)
+        (self.columns_before_mirroring(xs), ys, samples)
     }
 
     /// Converts columns of the image as shown to columns before mirroring.
     #[inline(always)]
-    fn before_mirroring(&self, mut xs: [u32; PACKET_SIZE]) -> [u32; PACKET_SIZE] {
+    fn columns_before_mirroring(&self, mut xs: [u32; PACKET_SIZE]) -> [u32; PACKET_SIZE] {
         if let Some(width) = self.mirrored_width {
             for x in &mut xs {
                 *x = (width - 1).wrapping_sub(*x);
@@ -157,7 +157,7 @@ impl SampleBlock {
             for lane in 0..PACKET_SIZE {
                 samples[lane] = sample + lane as u32;
             }
-            return (self.before_mirroring([x; PACKET_SIZE]), [y; PACKET_SIZE], samples);
+            return (self.columns_before_mirroring([x; PACKET_SIZE]), [y; PACKET_SIZE], samples);
         }
         if self.pixels.part != PixelSubset::All {
             return self.pixels_and_samples_of_slots(&array::from_fn(|lane| first + lane as u32));
@@ -173,7 +173,7 @@ impl SampleBlock {
                 }
             }
         }
-        (self.before_mirroring(xs), ys, samples)
+        (self.columns_before_mirroring(xs), ys, samples)
     }
 }
 

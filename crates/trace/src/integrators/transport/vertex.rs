@@ -116,7 +116,7 @@ impl<'a> SurfaceVertex<'a> {
             false => Footprint::POINT,
         };
         let texture_point = tile.world.texture_point(hit, &surface, footprint);
-        let material = chosen_material(tile, path, surface_material, &texture_point);
+        let material = choose_blend_part(tile, path, surface_material, &texture_point);
         let curvature = match has_beam && material.bsdf.has_delta() {
             true => side * tile.world.geometry.mean_curvature(hit, &surface),
             false => 0.0,
@@ -158,7 +158,7 @@ impl<'a> SurfaceVertex<'a> {
     /// unfiltered, as in light samples.
     pub fn emitted_radiance(&self, path: &PathRay, counters: &mut RayCounters) -> Vec3 {
         let is_shared = path.state.pdf > 0.0;
-        let at = self.lookup_point(is_shared);
+        let at = self.texture_lookup_point(is_shared);
         self.material.emission.radiance_of_emitting_side(
             &at,
             self.normal.dot(self.wo),
@@ -168,7 +168,7 @@ impl<'a> SurfaceVertex<'a> {
 
     /// Point for texture lookups. Has no footprint if `is_shared`, which means that light samples compete
     /// with the path.
-    pub fn lookup_point(&self, is_shared: bool) -> Cow<'_, TexturePoint> {
+    pub fn texture_lookup_point(&self, is_shared: bool) -> Cow<'_, TexturePoint> {
         match is_shared {
             true => Cow::Owned(self.texture_point.without_footprint()),
             false => Cow::Borrowed(&self.texture_point),
@@ -185,7 +185,7 @@ impl<'a> SurfaceVertex<'a> {
     /// looked up without filtering, as for shadow rays.
     pub fn pane_transmittance(&self, path: &PathRay, pane: &ThinDielectric, lookups: &mut u64) -> Vec3 {
         let is_shared = path.state.pdf > 0.0;
-        let at = self.lookup_point(is_shared);
+        let at = self.texture_lookup_point(is_shared);
         self.times_vertex_color(pane.tint.evaluate(&at, lookups).min(Vec3::ONE))
     }
 
@@ -234,7 +234,7 @@ impl<'a> SurfaceVertex<'a> {
     }
 
     /// Ray cone after specular reflection or refraction.
-    pub fn cone_after(&self, event: SpecularEvent) -> RayCone {
+    pub fn cone_after_specular(&self, event: SpecularEvent) -> RayCone {
         self.cone.after_specular(event, self.curvature, self.wo.dot(self.normal))
     }
 
@@ -251,7 +251,7 @@ impl<'a> SurfaceVertex<'a> {
         if is_colored {
             mirror.reflectance(cosine, self.color, &self.texture_point, &mut counters.texture_lookups)
         } else {
-            mirror.untextured_reflectance(cosine)
+            mirror.reflectance_with_white_textures(cosine)
         }
     }
 
@@ -352,7 +352,7 @@ impl<'a> SurfaceVertex<'a> {
 /// depends only on the path. If light samples compete with the path, the weight's texture is looked up
 /// without filtering, as for light samples and shadow rays.
 #[inline]
-fn chosen_material<'a>(
+fn choose_blend_part<'a>(
     tile: &TileContext<'_>,
     path: &PathRay,
     material: &'a Material,

@@ -67,12 +67,12 @@ pub trait PathStepper<'a> {
         vertex: &SurfaceVertex<'a>,
         hit: DirectOrCoincidentHit,
         pane: &ThinDielectric,
-    ) -> NullInteraction;
+    ) -> NullInteractionOutcome;
 }
 
 /// Outcome at a surface that light may pass through without changing direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum NullInteraction {
+pub enum NullInteractionOutcome {
     /// The path passes through, and its throughput is multiplied by this factor.
     Passed(Vec3),
     /// The surface is opaque at this point.
@@ -83,7 +83,7 @@ pub enum NullInteraction {
 
 /// The straight segment from a path's last vertex, across any null interactions.
 #[derive(Clone, Copy)]
-struct CrossedSegment {
+struct SegmentFromLastVertex {
     /// Position of the last vertex. Only valid if `count` > 0.
     origin: Vec3,
     /// Distance from the last vertex to the origin of the path's current ray.
@@ -92,7 +92,7 @@ struct CrossedSegment {
     count: u32,
 }
 
-impl CrossedSegment {
+impl SegmentFromLastVertex {
     /// The initial segment, before the path has crossed any surface.
     const DIRECT: Self = Self { origin: Vec3::ZERO, distance: 0.0, count: 0 };
 
@@ -140,7 +140,7 @@ pub fn walk_to_interaction<'a, W: PathStepper<'a>>(
     (hit, mut surface): (Hit, Option<SurfacePoint>),
 ) {
     let tile = stepper.tile();
-    let (mut way, mut hidden, mut next) = (CrossedSegment::DIRECT, 0, Some(hit));
+    let (mut way, mut hidden, mut next) = (SegmentFromLastVertex::DIRECT, 0, Some(hit));
     loop {
         let has_passed = hidden > 0;
         let Some(hit) = next else {
@@ -159,16 +159,16 @@ pub fn walk_to_interaction<'a, W: PathStepper<'a>>(
             path.throughput *= medium_transmittance(tile.world, &path.interiors, hit.shape.t);
             if vertex.material.has_null_interaction() {
                 match null_interaction_outcome(stepper, path, &vertex, (way, hit)) {
-                    NullInteraction::Passed(_) if way.count == MAX_NULL_INTERACTIONS => return,
-                    NullInteraction::Passed(part) => {
+                    NullInteractionOutcome::Passed(_) if way.count == MAX_NULL_INTERACTIONS => return,
+                    NullInteractionOutcome::Passed(part) => {
                         way = way.extended_past_surface(path, hit.shape.t);
                         *path = path_past_surface(*path, &vertex, part);
                         next = tile.world.geometry.closest_hit(&path.ray);
                         stepper.record_surface_crossing(path, next);
                         continue;
                     }
-                    NullInteraction::Ended => return,
-                    NullInteraction::Opaque => {}
+                    NullInteractionOutcome::Ended => return,
+                    NullInteractionOutcome::Opaque => {}
                 }
             }
             if tile.world.has_open_glass() {
@@ -215,7 +215,7 @@ pub fn walk_to_interaction<'a, W: PathStepper<'a>>(
         // Stop at a boundary between media with different indices of refraction, and at glass that emits.
         let near = &path.interiors;
         let refracts = medium_ior(tile.world, near) != medium_ior(tile.world, &far);
-        if near.glass() != far.glass() && (refracts || vertex.emits()) {
+        if near.medium_glass() != far.medium_glass() && (refracts || vertex.emits()) {
             vertex.set_offset_points(sides);
             let rough = if refracts && tile.world.has_rough_glass() {
                 rough_dielectric_point(stepper, path, (&vertex, &hit), (sides, &far))
@@ -233,7 +233,7 @@ pub fn walk_to_interaction<'a, W: PathStepper<'a>>(
         (path.interiors, path.ray) = (far, Ray::new(sides.beyond, path.ray.direction));
         path.state = path.state.after_crossing_inside_glass();
         path.cone = path.cone.propagated_by(hit.shape.t);
-        (way, hidden) = (CrossedSegment::DIRECT, hidden + 1);
+        (way, hidden) = (SegmentFromLastVertex::DIRECT, hidden + 1);
         next = tile.world.geometry.closest_hit(&path.ray);
         stepper.record_surface_crossing(path, next);
     }
@@ -270,12 +270,12 @@ fn null_interaction_outcome<'a, W: PathStepper<'a>>(
     stepper: &mut W,
     path: &PathRay,
     vertex: &SurfaceVertex<'a>,
-    (way, hit): (CrossedSegment, Hit),
-) -> NullInteraction {
+    (way, hit): (SegmentFromLastVertex, Hit),
+) -> NullInteractionOutcome {
     if !stochastic_opacity_test(stepper.tile(), path, vertex, stepper.texture_lookup_counter()) {
-        return NullInteraction::Passed(Vec3::ONE);
+        return NullInteractionOutcome::Passed(Vec3::ONE);
     }
-    let Some(pane) = vertex.material.bsdf.as_thin_dielectric() else { return NullInteraction::Opaque };
+    let Some(pane) = vertex.material.bsdf.as_thin_dielectric() else { return NullInteractionOutcome::Opaque };
     let mut whole = *path;
     let hit = way.rebase_ray_to_last_vertex(&mut whole, hit);
     whole.interiors = stepper.tile().interiors_without_open_solids(whole.interiors);
@@ -300,7 +300,7 @@ fn is_stopped_by_coincident_surface<'a, W: PathStepper<'a>>(
 pub fn opacity_at(path: &PathRay, vertex: &SurfaceVertex<'_>, lookups: &mut u64) -> f32 {
     let Some(opacity) = &vertex.material.opacity else { return 1.0 };
     let is_shared = path.state.pdf > 0.0;
-    let at = vertex.lookup_point(is_shared);
+    let at = vertex.texture_lookup_point(is_shared);
     opacity.evaluate(&at, lookups)
 }
 

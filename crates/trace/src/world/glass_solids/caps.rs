@@ -1,6 +1,6 @@
 //! Open rims that end at opaque surfaces, where light can reach the other side only through the glass.
 
-use super::parts::{GlassParts, GlassTriangleCoverage, RimEdge, glass_triangle_coverage};
+use super::parts::{GlassTriangleCoverage, OpenGlassParts, RimEdge, glass_triangle_coverage};
 use crate::accel::Bvh;
 use crate::assets::LoadedMesh;
 use crate::control::{CancelToken, Canceled};
@@ -19,7 +19,7 @@ const QUERIES: usize = 4;
 
 /// A query for opaque surfaces.
 #[derive(Clone, Copy)]
-enum OpaqueQuery {
+enum OpaqueSurfaceQuery {
     /// Whether this ray hits an opaque surface.
     Way(RayF64),
     /// Whether an opaque surface is within this distance of this point.
@@ -34,16 +34,17 @@ enum OpaqueQuery {
 pub(super) fn covered_rim_fractions(
     scene: &Scene,
     meshes: &[&LoadedMesh],
-    parts: &GlassParts,
+    parts: &OpenGlassParts,
     holes: &[&[RimEdge]],
     token: &CancelToken,
 ) -> Result<Vec<f64>, Canceled> {
     let examined: Vec<Vec<&RimEdge>> = holes.iter().map(|rims| subsample_rim_edges(rims)).collect();
-    let queries: Vec<OpaqueQuery> = examined.iter().flat_map(|rims| rim_edge_queries(parts, rims)).collect();
+    let queries: Vec<OpaqueSurfaceQuery> =
+        examined.iter().flat_map(|rims| rim_edge_queries(parts, rims)).collect();
     if queries.is_empty() {
         return Ok(vec![0.0; holes.len()]);
     }
-    let answers = evaluate_queries(scene, meshes, parts.origin, &queries, token)?;
+    let answers = evaluate_opaque_surface_queries(scene, meshes, parts.origin, &queries, token)?;
     let mut answers = answers.chunks(QUERIES);
     let part = |rims: Vec<&RimEdge>| {
         let (mut covered, mut total) = (0.0, 0.0);
@@ -65,16 +66,16 @@ fn subsample_rim_edges(rims: &[RimEdge]) -> Vec<&RimEdge> {
 
 /// Returns the queries for a hole's edges, [`QUERIES`] per edge.
 fn rim_edge_queries<'a>(
-    parts: &'a GlassParts,
+    parts: &'a OpenGlassParts,
     rims: &'a [&RimEdge],
-) -> impl Iterator<Item = OpaqueQuery> + 'a {
+) -> impl Iterator<Item = OpaqueSurfaceQuery> + 'a {
     let middle_of = |rim: &RimEdge| (rim.ends[0] + rim.ends[1]) * 0.5;
     let center = rims.iter().map(|rim| middle_of(rim)).sum::<DVec3>() / rims.len().max(1) as f64;
     rims.iter().flat_map(move |rim| {
         let (end, tolerance) = (middle_of(rim), parts.list[rim.part as usize].tolerance);
         let [inner, middle] = [rim.inner, center].map(|origin| {
             let direction = end - origin;
-            OpaqueQuery::Way(RayF64 {
+            OpaqueSurfaceQuery::Way(RayF64 {
                 origin,
                 direction,
                 t_max: 1.0 + SEARCH_DISTANCE + tolerance / direction.length(),
@@ -82,12 +83,12 @@ fn rim_edge_queries<'a>(
         });
         let [from, to] = rim
             .ends
-            .map(|end| OpaqueQuery::Point(end, SEARCH_DISTANCE * end.distance(rim.inner) + tolerance));
+            .map(|end| OpaqueSurfaceQuery::Point(end, SEARCH_DISTANCE * end.distance(rim.inner) + tolerance));
         [inner, middle, from, to]
     })
 }
 
-impl OpaqueQuery {
+impl OpaqueSurfaceQuery {
     fn search_box(&self) -> Aabb {
         match *self {
             Self::Way(way) => Aabb::from_points_f64([way.origin, way.at(way.t_max)]),
@@ -118,14 +119,14 @@ impl OpaqueQuery {
 }
 
 /// Evaluates each query against the scene's opaque surfaces.
-fn evaluate_queries(
+fn evaluate_opaque_surface_queries(
     scene: &Scene,
     meshes: &[&LoadedMesh],
     origin: DVec3,
-    queries: &[OpaqueQuery],
+    queries: &[OpaqueSurfaceQuery],
     token: &CancelToken,
 ) -> Result<Vec<bool>, Canceled> {
-    let bounds: Vec<Aabb> = queries.iter().map(OpaqueQuery::search_box).collect();
+    let bounds: Vec<Aabb> = queries.iter().map(OpaqueSurfaceQuery::search_box).collect();
     let all = bounds.iter().fold(Aabb::EMPTY, |all, own| all.union(*own));
     // Use a tree over the queries because there are many queries and many surfaces.
     let tree = Bvh::build(&bounds, token)?;

@@ -29,7 +29,7 @@ const VERTICES: usize = 16;
 ///
 /// A cavity belongs to the smallest solid around it. Large cavities are assigned first, so that a solid
 /// floating in a cavity is not considered to be inside the surrounding glass.
-pub(super) fn cavities(
+pub(super) fn find_cavities(
     scene: &Scene,
     meshes: &[&LoadedMesh],
     origin: DVec3,

@@ -22,8 +22,8 @@ mod shared_edges;
 
 use std::collections::{BTreeMap, HashMap};
 
-use cavities::{ClosedSolid, cavities};
-use parts::{GlassParts, GlassSolidPart, RimEdge};
+use cavities::{ClosedSolid, find_cavities};
+use parts::{OpenGlassPart, OpenGlassParts, RimEdge};
 use shared_edges::{MatchedAndOpenEdges, RimEdgeWithEndpointIds, SharedEdge, find_set_root};
 
 use crate::assets::LoadedMesh;
@@ -48,7 +48,7 @@ const MIN_COVERED_FRACTION: f64 = 0.95;
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct GlassSolids {
     /// Role of each object, or empty if every object is a separate solid and no solids are open.
-    parts: Vec<ObjectRole>,
+    parts: Vec<ObjectRoleInSolid>,
     /// Glass objects with open rims.
     open: Vec<OpenGlass>,
     /// One object from each closed solid that encloses no volume.
@@ -57,7 +57,7 @@ pub struct GlassSolids {
 
 /// An object's role in a solid.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct ObjectRole {
+struct ObjectRoleInSolid {
     place: u32,
     is_inside_out: bool,
     is_open: bool,
@@ -84,7 +84,7 @@ impl GlassSolids {
     /// # Errors
     /// [`Canceled`] if the token is canceled.
     pub fn find(scene: &Scene, meshes: &[&LoadedMesh], token: &CancelToken) -> Result<Self, Canceled> {
-        let parts = GlassParts::find_in_scene(scene, meshes, token)?;
+        let parts = OpenGlassParts::find_in_scene(scene, meshes, token)?;
         if parts.list.is_empty() {
             return Ok(Self::default());
         }
@@ -97,7 +97,7 @@ impl GlassSolids {
             shared_edges.joined.iter().filter(is_odd).flat_map(|seam| seam.rims).collect();
         shared_edges.open.extend(odd);
         let mut solids = Self::default();
-        let alone = |place| ObjectRole { place, is_inside_out: false, is_open: false };
+        let alone = |place| ObjectRoleInSolid { place, is_inside_out: false, is_open: false };
         solids.parts = (0..scene.objects.len() as u32).map(alone).collect();
         let all = groups.parts_by_solid();
         let holes = SolidHole::find_per_solid(&parts, &groups, &all, &shared_edges);
@@ -105,15 +105,15 @@ impl GlassSolids {
         let mut closed: Vec<ClosedSolid> = Vec::new();
         for ((members, hole), &is_covered) in all.iter().zip(&holes).zip(&covered) {
             let is_open = hole.part > SMALL_HOLE && !is_covered;
-            let is_first_part_flipped =
-                groups.is_first_part_flipped(&parts, members, hole.part <= SMALL_HOLE);
+            let is_first_part_inside_out =
+                groups.is_first_part_inside_out(&parts, members, hole.part <= SMALL_HOLE);
             let place = members.iter().map(|&part| parts.list[part as usize].object).max();
             for &part in members {
                 let object = parts.list[part as usize].object;
-                let is_inside_out = is_first_part_flipped != groups.flips[part as usize];
+                let is_inside_out = is_first_part_inside_out != groups.flips[part as usize];
                 solids.parts[object as usize] =
-                    ObjectRole { place: place.unwrap_or(object), is_inside_out, is_open };
-                solids.open.extend(hole.open_glass_at_part(part, object, is_covered));
+                    ObjectRoleInSolid { place: place.unwrap_or(object), is_inside_out, is_open };
+                solids.open.extend(hole.open_glass_from_hole_at_part(part, object, is_covered));
             }
             if hole.part <= NO_HOLE && groups.have_zero_volume(&parts, members) {
                 solids.flat.extend(members.first().map(|&part| parts.list[part as usize].object));
@@ -121,11 +121,11 @@ impl GlassSolids {
                 closed.extend(groups.closed_solid_if_cavity_candidate(scene, &parts, members));
             }
         }
-        for (cavity, around) in cavities(scene, meshes, parts.origin, &closed, token)? {
+        for (cavity, around) in find_cavities(scene, meshes, parts.origin, &closed, token)? {
             solids.merge_cavity(&closed[cavity].objects, &closed[around].objects);
         }
         solids.open.sort_by_key(|open| open.object);
-        let is_plain = |(object, part): (u32, &ObjectRole)| *part == alone(object);
+        let is_plain = |(object, part): (u32, &ObjectRoleInSolid)| *part == alone(object);
         if (0..).zip(&solids.parts).all(is_plain) {
             solids.parts.clear();
         }
@@ -143,7 +143,7 @@ impl GlassSolids {
             part.place = place;
         }
         for &object in cavity {
-            self.parts[object as usize] = ObjectRole { place, is_inside_out: false, is_open: false };
+            self.parts[object as usize] = ObjectRoleInSolid { place, is_inside_out: false, is_open: false };
         }
     }
 
@@ -183,7 +183,7 @@ impl GlassSolids {
 fn hole_covered_flags(
     scene: &Scene,
     meshes: &[&LoadedMesh],
-    parts: &GlassParts,
+    parts: &OpenGlassParts,
     holes: &[SolidHole],
     token: &CancelToken,
 ) -> Result<Vec<bool>, Canceled> {
@@ -204,7 +204,7 @@ struct PartGroups {
 }
 
 impl PartGroups {
-    fn from_shared_edges(parts: &GlassParts, shared_edges: &MatchedAndOpenEdges) -> Self {
+    fn from_shared_edges(parts: &OpenGlassParts, shared_edges: &MatchedAndOpenEdges) -> Self {
         let mut same: Vec<u32> = (0..parts.list.len() as u32).collect();
         for seam in &shared_edges.joined {
             let [one, other] = seam.parts().map(|part| find_set_root(&mut same, part));
@@ -251,10 +251,10 @@ impl PartGroups {
     }
 
     /// Volume and area of a solid, with all parts oriented like the first part.
-    fn volume_and_area(&self, parts: &GlassParts, members: &[u32]) -> (f64, f64) {
+    fn volume_and_area(&self, parts: &OpenGlassParts, members: &[u32]) -> (f64, f64) {
         let (mut volume, mut area) = (0.0, 0.0);
         for &part in members {
-            let GlassSolidPart { volume: own, area: surface, .. } = &parts.list[part as usize];
+            let OpenGlassPart { volume: own, area: surface, .. } = &parts.list[part as usize];
             volume += if self.flips[part as usize] { -own } else { *own };
             area += surface;
         }
@@ -262,7 +262,7 @@ impl PartGroups {
     }
 
     /// Whether the parts of a closed solid enclose no volume.
-    fn have_zero_volume(&self, parts: &GlassParts, members: &[u32]) -> bool {
+    fn have_zero_volume(&self, parts: &OpenGlassParts, members: &[u32]) -> bool {
         let (volume, area) = self.volume_and_area(parts, members);
         volume.abs() <= NO_VOLUME * area * area.sqrt()
     }
@@ -272,7 +272,7 @@ impl PartGroups {
     fn closed_solid_if_cavity_candidate(
         &self,
         scene: &Scene,
-        parts: &GlassParts,
+        parts: &OpenGlassParts,
         members: &[u32],
     ) -> Option<ClosedSolid> {
         let objects: Vec<u32> = members.iter().map(|&part| parts.list[part as usize].object).collect();
@@ -296,7 +296,7 @@ impl PartGroups {
 
     /// Whether the front of a solid's first part faces inward, as determined from the volume of a closed
     /// solid or from the majority of an open solid's surface.
-    fn is_first_part_flipped(&self, parts: &GlassParts, members: &[u32], is_closed: bool) -> bool {
+    fn is_first_part_inside_out(&self, parts: &OpenGlassParts, members: &[u32], is_closed: bool) -> bool {
         if is_closed {
             // Smaller volumes are attributed to rounding.
             let (volume, area) = self.volume_and_area(parts, members);
@@ -320,7 +320,7 @@ struct SolidHole {
 impl SolidHole {
     /// Returns the holes of all solids.
     fn find_per_solid(
-        parts: &GlassParts,
+        parts: &OpenGlassParts,
         groups: &PartGroups,
         all: &[Vec<u32>],
         shared_edges: &MatchedAndOpenEdges,
@@ -337,7 +337,7 @@ impl SolidHole {
 
     /// Returns the hole formed by a solid's open edges.
     fn from_open_edges(
-        parts: &GlassParts,
+        parts: &OpenGlassParts,
         groups: &PartGroups,
         members: &[u32],
         mut own: Vec<RimEdgeWithEndpointIds>,
@@ -379,7 +379,7 @@ impl SolidHole {
 
     /// Describes the hole where it borders one part. Returns `None` if the part does not border the hole or
     /// the hole is attributed to rounding.
-    fn open_glass_at_part(&self, part: u32, object: u32, is_covered: bool) -> Option<OpenGlass> {
+    fn open_glass_from_hole_at_part(&self, part: u32, object: u32, is_covered: bool) -> Option<OpenGlass> {
         let own = || self.rims.iter().zip(&self.disagree).filter(|(rim, _)| rim.part == part);
         let edges = own().count();
         let disagrees = own().all(|(_, disagrees)| *disagrees);

@@ -3,7 +3,7 @@
 
 use std::collections::HashMap;
 
-use super::super::file_materials::file_glass_properties;
+use super::super::file_materials::file_material_glass_properties;
 use crate::assets::{FileMaterial, LoadedMesh};
 use crate::control::{CancelToken, Canceled};
 use crate::geometry::mesh::TriangleMesh;
@@ -21,7 +21,7 @@ pub(super) const ROUNDING: f64 = 16.0 * f32::EPSILON as f64;
 
 /// A glass object that does not enclose a volume on its own.
 #[derive(Clone, Debug)]
-pub(super) struct GlassSolidPart {
+pub(super) struct OpenGlassPart {
     /// Object id.
     pub object: u32,
     /// Surface area.
@@ -52,14 +52,14 @@ pub(super) struct RimEdge {
 
 /// All glass parts in a scene, in coordinates relative to a point near them.
 #[derive(Debug, Default)]
-pub(super) struct GlassParts {
-    pub list: Vec<GlassSolidPart>,
+pub(super) struct OpenGlassParts {
+    pub list: Vec<OpenGlassPart>,
     pub rims: Vec<RimEdge>,
     /// Origin of the coordinates.
     pub origin: DVec3,
 }
 
-impl GlassParts {
+impl OpenGlassParts {
     /// Finds all parts in a scene.
     pub fn find_in_scene(
         scene: &Scene,
@@ -103,14 +103,14 @@ impl GlassParts {
                 let area = std::f64::consts::PI * radius * radius;
                 let volume = area * (center - self.origin).dot(normal) / 3.0;
                 self.begin_part(number, (area, volume), radius);
-                self.add_circle(center, normal, radius, center);
+                self.add_circular_rim(center, normal, radius, center);
             }
             OpenSurface::Cylinder { a, b, radius } => {
                 let axis = (b - a).normalize();
                 let area = std::f64::consts::TAU * radius * a.distance(b);
                 self.begin_part(number, (area, area * radius / 3.0), radius.max(a.distance(b)));
-                self.add_circle(b, -axis, radius, a);
-                self.add_circle(a, axis, radius, b);
+                self.add_circular_rim(b, -axis, radius, a);
+                self.add_circular_rim(a, axis, radius, b);
             }
             OpenSurface::Cone { base, tip, radius } => {
                 let axis = (tip - base).normalize();
@@ -119,7 +119,7 @@ impl GlassParts {
                 let shown = axis * (std::f64::consts::PI * radius * radius);
                 let volume = (tip - self.origin).dot(shown) / 3.0;
                 self.begin_part(number, (area, volume), radius.max(tip.distance(base)));
-                self.add_circle(base, axis, radius, tip);
+                self.add_circular_rim(base, axis, radius, tip);
             }
         }
     }
@@ -148,7 +148,7 @@ impl GlassParts {
     }
 
     fn begin_part(&mut self, object: u32, (area, volume): (f64, f64), reach: f64) -> u32 {
-        self.list.push(GlassSolidPart { object, area, volume, tolerance: ROUNDING * reach, substance: None });
+        self.list.push(OpenGlassPart { object, area, volume, tolerance: ROUNDING * reach, substance: None });
         self.list.len() as u32 - 1
     }
 
@@ -166,7 +166,7 @@ impl GlassParts {
     }
 
     /// Adds a circular rim to the last part, counterclockwise about a unit axis.
-    fn add_circle(&mut self, center: DVec3, axis: DVec3, radius: f64, inner: DVec3) {
+    fn add_circular_rim(&mut self, center: DVec3, axis: DVec3, radius: f64, inner: DVec3) {
         let part = self.list.len() as u32 - 1;
         // Rims on the same circle must have the same points in either direction.
         let lead = axis.to_array().into_iter().find(|part| part.abs() > 1e-9).unwrap_or(1.0);
@@ -282,7 +282,7 @@ fn glass_medium_key_of_object(scene: &Scene, meshes: &[&LoadedMesh], object: &Ob
                 MaterialKind::Glass { ior, tint, roughness, distribution }.glass_medium_identity()
             };
             let mut each =
-                meshes[mesh.file].materials.iter().filter_map(file_glass_properties).filter_map(of);
+                meshes[mesh.file].materials.iter().filter_map(file_material_glass_properties).filter_map(of);
             let first = each.next()?;
             each.all(|other| other == first).then_some(first)
         }

@@ -1,7 +1,7 @@
 //! Shared edges: pairs of rim edges that belong to the same glass and have the same endpoints but opposite
 //! directions.
 
-use super::parts::{GlassMediumKey, GlassSolidPart, RimEdge};
+use super::parts::{GlassMediumKey, OpenGlassPart, RimEdge};
 use crate::accel::Bvh;
 use crate::control::{CancelToken, Canceled};
 use crate::geometry::Aabb;
@@ -59,7 +59,7 @@ impl MatchedAndOpenEdges {
     /// Matches rim edges. If more than two surfaces share an edge, surfaces with glass between them are
     /// paired.
     pub fn match_rims(
-        parts: &[GlassSolidPart],
+        parts: &[OpenGlassPart],
         rims: &[RimEdge],
         token: &CancelToken,
     ) -> Result<Self, Canceled> {
@@ -78,7 +78,7 @@ impl MatchedAndOpenEdges {
     /// Matches edges of the same glass with the same endpoints, and returns the remaining edges.
     fn match_equal_edges(
         &mut self,
-        parts: &[GlassSolidPart],
+        parts: &[OpenGlassPart],
         rims: Vec<RimEdgeWithEndpointIds>,
     ) -> Vec<RimEdgeWithEndpointIds> {
         let half = |(rim, [from, to]): RimEdgeWithEndpointIds| NormalizedRimEdge {
@@ -160,7 +160,7 @@ struct MergedEdgeEndpoints {
 }
 
 impl MergedEdgeEndpoints {
-    fn from_rims(parts: &[GlassSolidPart], rims: &[RimEdge], token: &CancelToken) -> Result<Self, Canceled> {
+    fn from_rims(parts: &[OpenGlassPart], rims: &[RimEdge], token: &CancelToken) -> Result<Self, Canceled> {
         // Merge identical points first.
         let point = |end: usize| rims[end / 2].ends[end % 2];
         let mut order: Vec<usize> = (0..2 * rims.len()).collect();
@@ -206,7 +206,7 @@ impl MergedEdgeEndpoints {
     /// Splits edges at the endpoints of other edges.
     fn split_at_endpoints(
         &self,
-        parts: &[GlassSolidPart],
+        parts: &[OpenGlassPart],
         rims: &[RimEdgeWithEndpointIds],
         token: &CancelToken,
     ) -> Result<Vec<RimEdgeWithEndpointIds>, Canceled> {

@@ -190,7 +190,7 @@ impl LitScene {
             splits_lobes: false,
         };
         let mut pool = ShadowRayQueue::default();
-        let mut sums = [lighting.sample_lights(0, &mut pool)];
+        let mut sums = [lighting.sample_all_or_picked_lights(0, &mut pool)];
         pool.trace(tile, LightAov::ALL, &mut sums);
         let [sums] = sums;
         sums
@@ -237,7 +237,7 @@ impl LitScene {
             return Vec3::ZERO;
         }
         let at = world.texture_point(&hit, &surface, |_| Footprint::POINT);
-        emission.radiance_of_emitting_side(&at, cosine, &mut 0) * tile.emitter_weight(path, &hit)
+        emission.radiance_of_emitting_side(&at, cosine, &mut 0) * tile.emitter_mis_weight(path, &hit)
     }
 
     /// Reflected light, estimated from all samples of all lanes.

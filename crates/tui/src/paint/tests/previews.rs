@@ -43,7 +43,7 @@ fn noisy_pixel(x: u16, y: u16, seed: u32, grain: i32) -> [u8; 3] {
 const SIDE: (u16, u16) = (60, 24);
 const CELLS: usize = SIDE.0 as usize * SIDE.1 as usize;
 
-fn showing(buffer: &Buffer, picture: Rect, fidelity: Fidelity) -> TestTerminal {
+fn showing(buffer: &Buffer, picture: Rect, fidelity: PreviewFidelity) -> TestTerminal {
     let mut test = TestTerminal::new(buffer.area.width, buffer.area.height, ColorDepth::TrueColor);
     test.painter.set_target(buffer, picture, fidelity);
     test.finish(4096);
@@ -54,7 +54,7 @@ fn showing(buffer: &Buffer, picture: Rect, fidelity: Fidelity) -> TestTerminal {
 fn first_preview_fits_in_12_bytes_per_cell() {
     for (grain, most) in [(0, 16), (5, 30), (20, 120), (60, 255), (255, 255)] {
         let (buffer, picture) = preview_window(SIDE.0, SIDE.1, |x, y| noisy_pixel(x, y, 1, grain));
-        let test = showing(&buffer, picture, Fidelity::First);
+        let test = showing(&buffer, picture, PreviewFidelity::First);
         // Allow for clearing the screen and drawing the text.
         let others = 40;
         assert!(test.sent <= 12 * CELLS + others, "grain {grain}: {} bytes per cell", test.sent / CELLS);
@@ -66,13 +66,13 @@ fn first_preview_fits_in_12_bytes_per_cell() {
 #[test]
 fn noise_below_threshold_causes_no_output() {
     let (buffer, picture) = preview_window(SIDE.0, SIDE.1, |x, y| noisy_pixel(x, y, 1, 0));
-    let mut test = showing(&buffer, picture, Fidelity::Still);
+    let mut test = showing(&buffer, picture, PreviewFidelity::Still);
     for seed in 2..6 {
         let (noisy, _) = preview_window(SIDE.0, SIDE.1, |x, y| noisy_pixel(x, y, seed, 2));
-        test.painter.set_target(&noisy, picture, Fidelity::Moving);
+        test.painter.set_target(&noisy, picture, PreviewFidelity::Moving);
         assert_eq!(test.finish(4096), 0);
     }
-    test.painter.set_target(&buffer, picture, Fidelity::Still);
+    test.painter.set_target(&buffer, picture, PreviewFidelity::Still);
     assert_eq!(test.finish(4096), 0, "the cells should still be exact");
 }
 
@@ -89,18 +89,18 @@ fn unedited_cells_are_not_redrawn() {
     let picture_of =
         |seed, grain, is_edited| preview_window(SIDE.0, SIDE.1, |x, y| edited(x, y, seed, grain, is_edited));
     let (first, picture) = picture_of(1, 40, false);
-    let mut test = showing(&first, picture, Fidelity::First);
-    test.painter.set_target(&picture_of(9, 0, false).0, picture, Fidelity::Still);
+    let mut test = showing(&first, picture, PreviewFidelity::First);
+    test.painter.set_target(&picture_of(9, 0, false).0, picture, PreviewFidelity::Still);
     test.finish(4096);
     let before: Vec<CellContent> = on_screen(&test, picture);
 
     // The same noise at one sample, followed by decreasing amounts of different noise.
     let mut sent = 0;
     for (seed, grain, fidelity) in [
-        (1, 40, Fidelity::First),
-        (2, 8, Fidelity::Moving),
-        (3, 4, Fidelity::Moving),
-        (9, 0, Fidelity::Still),
+        (1, 40, PreviewFidelity::First),
+        (2, 8, PreviewFidelity::Moving),
+        (3, 4, PreviewFidelity::Moving),
+        (9, 0, PreviewFidelity::Still),
     ] {
         let (buffer, _) = picture_of(seed, grain, true);
         test.painter.set_target(&buffer, picture, fidelity);
@@ -115,14 +115,14 @@ fn unedited_cells_are_not_redrawn() {
     assert!(sent <= 100 * cells, "{} bytes per cell", sent / cells);
 
     // Undo the edit while its result is on the screen.
-    test.painter.set_target(&first, picture, Fidelity::First);
+    test.painter.set_target(&first, picture, PreviewFidelity::First);
     test.finish(4096);
     for (i, (old, new)) in before.iter().zip(on_screen(&test, picture)).enumerate() {
         let (x, y) = (i as u16 % picture.width + picture.x, i as u16 / picture.width + picture.y);
         assert!(CHANGED.contains((x, y).into()) || *old == new, "{x},{y} after undoing the edit");
     }
     let changed_back = on_screen(&test, CHANGED);
-    test.painter.set_target(&picture_of(9, 0, true).0, picture, Fidelity::Still);
+    test.painter.set_target(&picture_of(9, 0, true).0, picture, PreviewFidelity::Still);
     test.finish(4096);
     assert_ne!(changed_back, on_screen(&test, CHANGED), "the edit should be undone on the screen");
 }
@@ -138,7 +138,11 @@ fn all_rows_are_drawn_despite_frequent_targets() {
     let mut test = TestTerminal::new(SIDE.0 + 6, SIDE.1 + 1, ColorDepth::TrueColor);
     for seed in 0..16 {
         let (buffer, picture) = picture_of(seed);
-        test.painter.set_target(&buffer, picture, if seed == 0 { Fidelity::First } else { Fidelity::Moving });
+        test.painter.set_target(
+            &buffer,
+            picture,
+            if seed == 0 { PreviewFidelity::First } else { PreviewFidelity::Moving },
+        );
         // Enough bytes for about three rows at this noise level.
         test.slice(3 * 40 * usize::from(SIDE.0));
     }
@@ -150,11 +154,11 @@ fn all_rows_are_drawn_despite_frequent_targets() {
 #[test]
 fn changing_text_does_not_delay_the_preview() {
     let (mut buffer, picture) = preview_window(SIDE.0, SIDE.1, |x, y| noisy_pixel(x, y, 1, 5));
-    let whole = showing(&buffer, picture, Fidelity::First).sent;
+    let whole = showing(&buffer, picture, PreviewFidelity::First).sent;
     let mut test = TestTerminal::new(SIDE.0 + 6, SIDE.1 + 1, ColorDepth::TrueColor);
     for step in 0..40 {
         buffer.set_string(0, SIDE.1, format!("{step:02}"), ratatui::style::Style::new());
-        test.painter.set_target(&buffer, picture, Fidelity::First);
+        test.painter.set_target(&buffer, picture, PreviewFidelity::First);
         test.slice(whole / 20);
     }
     test.finish(4096);
@@ -166,11 +170,11 @@ fn changing_text_does_not_delay_the_preview() {
 #[test]
 fn preview_is_restored_when_text_disappears() {
     let (buffer, picture) = preview_window(SIDE.0, SIDE.1, |x, y| noisy_pixel(x, y, 1, 5));
-    let mut test = showing(&buffer, picture, Fidelity::Still);
+    let mut test = showing(&buffer, picture, PreviewFidelity::Still);
     let mut covered = buffer.clone();
     covered.set_string(8, 4, "日本 x", ratatui::style::Style::reset());
     for wanted in [&covered, &buffer] {
-        test.painter.set_target(wanted, picture, Fidelity::Still);
+        test.painter.set_target(wanted, picture, PreviewFidelity::Still);
         assert!(test.finish(4096) < 400);
         assert!(test.difference(wanted, ColorDepth::TrueColor) <= 1);
     }

@@ -107,7 +107,7 @@ pub(crate) struct MaterialExtensions {
     pub(crate) diffuse_transmission: Option<DiffuseTransmission>,
     pub(crate) specular: Option<Specular>,
     pub(crate) emissive_strength: Option<EmissiveStrength>,
-    pub(crate) glossiness: Option<Glossiness>,
+    pub(crate) glossiness: Option<SpecularGlossiness>,
     pub(crate) unlit: bool,
     pub(crate) others: Vec<String>,
 }
@@ -245,13 +245,13 @@ pub(crate) struct EmissiveStrength {
 
 #[derive(Debug, Deserialize)]
 #[serde(rename_all = "camelCase", default)]
-pub(crate) struct Glossiness {
+pub(crate) struct SpecularGlossiness {
     pub(crate) diffuse_factor: [f64; 4],
     pub(crate) diffuse_texture: Option<TextureInfo>,
     pub(crate) glossiness_factor: f64,
 }
 
-impl Default for Glossiness {
+impl Default for SpecularGlossiness {
     fn default() -> Self {
         Self { diffuse_factor: [1.0; 4], diffuse_texture: None, glossiness_factor: 1.0 }
     }

@@ -136,7 +136,7 @@ proptest! {
         }
         if let Ok(container) = GltfDir::new().open("a.glb", &file) {
             let _ = scene(&container);
-            let _ = container.merged_scene(&CancelToken::new());
+            let _ = container.merge_scene_into_mesh(&CancelToken::new());
             for number in 0..container.part_count() {
                 let _ = part(&container, number);
             }

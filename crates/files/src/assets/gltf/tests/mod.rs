@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use proptest::prelude::*;
 use serde_json::{Value, json};
 
-use super::accessor::{too_many_zeros_message, view_too_short_message};
+use super::accessor::{too_many_viewless_elements_message, view_too_short_message};
 use super::container::*;
 use super::model::UNKNOWN_CAMERA;
 use super::*;
@@ -285,7 +285,7 @@ fn material_extensions_are_converted() {
         (material.transmission.factor.x, material.normal_strength, material.is_two_sided),
         (0.25, 2.0, true)
     );
-    let Alpha::Mask { value, cutoff } = &material.alpha else { panic!("a mask") };
+    let AlphaMode::Mask { value, cutoff } = &material.alpha else { panic!("a mask") };
     assert_eq!((value.factor.x, *cutoff, value.texture.is_some()), (0.5, 0.25, true));
     let notes = ["sheen is ignored".to_owned(), materials::extension_ignored_note("MY_own")];
     assert_eq!(scene.notes, notes.map(|note| format!("materials[0]: {note}")));
@@ -342,7 +342,7 @@ fn two_used_texture_coordinate_sets_are_kept() {
 fn scenes_merge_into_one_mesh() {
     let mut json = square();
     json["nodes"] = json!([{"children": [1, 2]}, {"mesh": 0}, {"mesh": 0, "scale": [-1, 1, 1], "translation": [0, 5, 0]}]);
-    let merged = open_json(&json).expect("read").merged_scene(&CancelToken::new()).expect("a mesh");
+    let merged = open_json(&json).expect("read").merge_scene_into_mesh(&CancelToken::new()).expect("a mesh");
     assert_eq!((merged.mesh.triangles.len(), merged.mesh.materials.as_slice()), (4, &[0; 4][..]));
     assert_eq!(
         merged.mesh.bounds_in_file_coordinates(),
@@ -416,7 +416,7 @@ fn errors_include_their_location() {
     assert_eq!(rejection(open_json(&external)).1, unreadable_buffer_file_message(&missing, 0, "a.gltf"));
     let zeros = json!({"componentType": 5126, "count": 4_000_000_000_u32, "type": "VEC3"});
     let found = with(&|json| json["accessors"][0] = zeros.clone());
-    assert!(found.ends_with(&too_many_zeros_message(4_000_000_000)), "{found}");
+    assert!(found.ends_with(&too_many_viewless_elements_message(4_000_000_000)), "{found}");
 }
 
 /// Primitives that reuse the same buffer bytes could need far more memory than the file size suggests.

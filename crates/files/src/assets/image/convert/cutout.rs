@@ -8,20 +8,24 @@ use super::{
 };
 use crate::assets::image::metadata::{AlphaInterpretation, ImageMetadata};
 use crate::assets::image::space::ColorSpace;
-use crate::assets::image::{ColorCurve, ImageEncoding};
+use crate::assets::image::{ColorEncoding, ColorTransferFunction};
 use crate::materials::texels::{TexelData, Texels};
 use crate::math::Vec3;
 use crate::math::color::srgb_to_linear;
 
 /// Converts an image to alpha-weighted texels, or to plain texels if it is opaque.
-pub(super) fn cutout_texels(image: DynamicImage, curve: ColorCurve, metadata: &ImageMetadata) -> Texels {
+pub(super) fn alpha_weighted_texels(
+    image: DynamicImage,
+    curve: ColorTransferFunction,
+    metadata: &ImageMetadata,
+) -> Texels {
     let Some(alpha) =
         alpha_sample_index(&image, metadata).filter(|alpha| !is_channel_filled_with(&image, *alpha, 1.0))
     else {
-        return super::texels(image, curve.encoding(), metadata);
+        return super::texels(image, curve.encoding_without_alpha(), metadata);
     };
     let (width, height) = (image.width(), image.height());
-    let space = ImageEncoding::CutOut(curve).color_space(metadata);
+    let space = ColorEncoding::CutOut(curve).color_space(metadata);
     let is_direct = space.is_default() && metadata.alpha != AlphaInterpretation::Premultiplied;
     let mut unusable = 0;
     let data = match &image {
@@ -40,15 +44,15 @@ pub(super) fn cutout_texels(image: DynamicImage, curve: ColorCurve, metadata: &I
     Texels { width, height, data, unusable }
 }
 
-fn pack_straight_alpha_texels(samples: &[u8], alpha: usize, curve: ColorCurve) -> TexelData {
+fn pack_straight_alpha_texels(samples: &[u8], alpha: usize, curve: ColorTransferFunction) -> TexelData {
     let texel = |pixel: &[u8]| {
         let [red, green, blue] = pixel_rgb(pixel);
         [red, green, blue, pixel[alpha]]
     };
     let texels = samples.chunks_exact(alpha + 1).map(texel).collect();
     match curve {
-        ColorCurve::Auto | ColorCurve::Srgb => TexelData::SrgbAlpha8(texels),
-        ColorCurve::Linear => TexelData::LinearAlpha8(texels),
+        ColorTransferFunction::Auto | ColorTransferFunction::Srgb => TexelData::SrgbAlpha8(texels),
+        ColorTransferFunction::Linear => TexelData::LinearAlpha8(texels),
     }
 }
 
@@ -56,7 +60,7 @@ fn pack_straight_alpha_texels(samples: &[u8], alpha: usize, curve: ColorCurve) -
 struct AlphaWeightingOptions {
     /// Index of the alpha sample in a pixel.
     alpha: usize,
-    curve: ColorCurve,
+    curve: ColorTransferFunction,
     space: ColorSpace,
     is_premultiplied: bool,
 }
@@ -72,11 +76,14 @@ enum Linearization {
 impl AlphaWeightingOptions {
     fn linearization<T: Sample>(&self) -> Linearization {
         match (self.curve, T::linearization_tables(&self.space)) {
-            (ColorCurve::Linear, _) | (ColorCurve::Auto, None) => Linearization::Linear,
-            (ColorCurve::Auto | ColorCurve::Srgb, Some(tables)) if !self.is_premultiplied => {
+            (ColorTransferFunction::Linear, _) | (ColorTransferFunction::Auto, None) => Linearization::Linear,
+            (ColorTransferFunction::Auto | ColorTransferFunction::Srgb, Some(tables))
+                if !self.is_premultiplied =>
+            {
                 Linearization::Tables(tables)
             }
-            (ColorCurve::Srgb, None) | (ColorCurve::Auto | ColorCurve::Srgb, Some(_)) => Linearization::Srgb,
+            (ColorTransferFunction::Srgb, None)
+            | (ColorTransferFunction::Auto | ColorTransferFunction::Srgb, Some(_)) => Linearization::Srgb,
         }
     }
 }

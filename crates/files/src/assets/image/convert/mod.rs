@@ -5,7 +5,7 @@ mod scalars;
 
 use ::image::{ColorType, DynamicImage};
 
-use super::ImageEncoding;
+use super::ColorEncoding;
 use super::metadata::{AlphaInterpretation, ImageMetadata};
 use super::space::ColorSpace;
 use crate::materials::ChannelSelector;
@@ -123,10 +123,10 @@ fn is_channel_filled_with(image: &DynamicImage, index: usize, value: f32) -> boo
 /// Returns the warning, if any, about an opacity read from an alpha channel that is constant or not decoded.
 pub(super) fn constant_alpha_warning(
     image: &DynamicImage,
-    encoding: ImageEncoding,
+    encoding: ColorEncoding,
     metadata: &ImageMetadata,
 ) -> Option<&'static str> {
-    let ImageEncoding::Number { of: ChannelSelector::Opacity | ChannelSelector::Mask { .. }, .. } = encoding
+    let ColorEncoding::Number { of: ChannelSelector::Opacity | ChannelSelector::Mask { .. }, .. } = encoding
     else {
         return None;
     };
@@ -138,7 +138,7 @@ pub(super) fn constant_alpha_warning(
         return Some(INVISIBLE);
     }
     match encoding {
-        ImageEncoding::Number { of: ChannelSelector::Mask { of_any_color }, .. }
+        ColorEncoding::Number { of: ChannelSelector::Mask { of_any_color }, .. }
             if is_channel_filled_with(image, alpha, 1.0) =>
         {
             Some(if scalars::uses_luminance_opacity_if_opaque(image, of_any_color) {
@@ -160,7 +160,7 @@ pub(super) const OPAQUE: &str =
     "alpha is 1 everywhere, so the surface is opaque; set `channel` to use a color channel as the opacity";
 
 /// Converts an image to texels.
-pub(super) fn texels(image: DynamicImage, encoding: ImageEncoding, metadata: &ImageMetadata) -> Texels {
+pub(super) fn texels(image: DynamicImage, encoding: ColorEncoding, metadata: &ImageMetadata) -> Texels {
     // Convert formats added in later versions of `image`.
     let image = match image.color() {
         ColorType::L8 | ColorType::La8 | ColorType::Rgb8 | ColorType::Rgba8 => image,
@@ -169,11 +169,11 @@ pub(super) fn texels(image: DynamicImage, encoding: ImageEncoding, metadata: &Im
         _ => image.into_rgba32f().into(),
     };
     match encoding {
-        ImageEncoding::Number { of, is_srgb } => {
+        ColorEncoding::Number { of, is_srgb } => {
             return scalars::scalar_texels(&image, of, is_srgb, metadata);
         }
-        ImageEncoding::CutOut(curve) => return cutout::cutout_texels(image, curve, metadata),
-        ImageEncoding::Color | ImageEncoding::Srgb | ImageEncoding::Linear | ImageEncoding::Raw => {}
+        ColorEncoding::CutOut(curve) => return cutout::alpha_weighted_texels(image, curve, metadata),
+        ColorEncoding::Color | ColorEncoding::Srgb | ColorEncoding::Linear | ColorEncoding::Raw => {}
     }
     let (width, height) = (image.width(), image.height());
     let channels = channel_count(&image);
@@ -207,18 +207,18 @@ fn pixel_rgb<T: Copy>(pixel: &[T]) -> [T; 3] {
     }
 }
 
-fn texels_from_bytes(samples: &[u8], channels: usize, encoding: ImageEncoding) -> TexelData {
+fn texels_from_bytes(samples: &[u8], channels: usize, encoding: ColorEncoding) -> TexelData {
     let texels = samples.chunks_exact(channels).map(pixel_rgb).collect();
-    if encoding == ImageEncoding::Linear { TexelData::Linear8(texels) } else { TexelData::Srgb8(texels) }
+    if encoding == ColorEncoding::Linear { TexelData::Linear8(texels) } else { TexelData::Srgb8(texels) }
 }
 
-fn texels_from_u16(samples: &[u16], channels: usize, encoding: ImageEncoding) -> TexelData {
+fn texels_from_u16(samples: &[u16], channels: usize, encoding: ColorEncoding) -> TexelData {
     let value = |word: u16| f32::from(word) / f32::from(u16::MAX);
     let linear: Vec<f32> = match encoding {
-        ImageEncoding::Linear | ImageEncoding::Number { .. } | ImageEncoding::CutOut(_) => {
+        ColorEncoding::Linear | ColorEncoding::Number { .. } | ColorEncoding::CutOut(_) => {
             (0..=u16::MAX).map(value).collect()
         }
-        ImageEncoding::Color | ImageEncoding::Srgb | ImageEncoding::Raw => {
+        ColorEncoding::Color | ColorEncoding::Srgb | ColorEncoding::Raw => {
             (0..=u16::MAX).map(|word| srgb_to_linear(value(word))).collect()
         }
     };
@@ -229,21 +229,21 @@ fn texels_from_u16(samples: &[u16], channels: usize, encoding: ImageEncoding) ->
 fn texels_from_floats(
     samples: &[f32],
     channels: usize,
-    encoding: ImageEncoding,
+    encoding: ColorEncoding,
     unusable: &mut u64,
 ) -> TexelData {
     let clean = |value: f32| if value <= MAX_MAGNITUDE as f32 { value.max(0.0) } else { 0.0 };
     let decode = |value: f32| match encoding {
-        ImageEncoding::Srgb => clean(srgb_to_linear(clean(value))),
-        ImageEncoding::Color
-        | ImageEncoding::Linear
-        | ImageEncoding::Number { .. }
-        | ImageEncoding::CutOut(_) => clean(value),
-        ImageEncoding::Raw => value,
+        ColorEncoding::Srgb => clean(srgb_to_linear(clean(value))),
+        ColorEncoding::Color
+        | ColorEncoding::Linear
+        | ColorEncoding::Number { .. }
+        | ColorEncoding::CutOut(_) => clean(value),
+        ColorEncoding::Raw => value,
     };
     let mut texel = |pixel| {
         let rgb = pixel_rgb(pixel);
-        if encoding != ImageEncoding::Raw {
+        if encoding != ColorEncoding::Raw {
             *unusable += u64::from(!rgb.iter().all(|value| (0.0..=MAX_MAGNITUDE as f32).contains(value)));
         }
         Vec3::from_array(rgb.map(decode))
@@ -252,10 +252,10 @@ fn texels_from_floats(
 }
 
 /// Converts colors from a nonstandard color space. Colors outside Rec. 709 are clipped, except for
-/// [`ImageEncoding::Raw`].
+/// [`ColorEncoding::Raw`].
 fn convert_color_space(
     image: &DynamicImage,
-    encoding: ImageEncoding,
+    encoding: ColorEncoding,
     metadata: &ImageMetadata,
     unusable: &mut u64,
 ) -> TexelData {
@@ -279,7 +279,7 @@ fn convert_color_space(
         TexelData::Float(samples.chunks_exact(channels).map(&mut texel).collect())
     }
     let space = encoding.color_space(metadata);
-    let is_raw = encoding == ImageEncoding::Raw;
+    let is_raw = encoding == ColorEncoding::Raw;
     with_samples!(image, samples => {
         convert_samples_color_space(samples, channel_count(image), &space, is_raw, unusable)
     })

@@ -53,11 +53,11 @@ fn choose_scalar_source(
 
 /// Whether to use an opaque image's luminance as its opacity.
 pub(super) fn uses_luminance_opacity_if_opaque(image: &DynamicImage, of_any_color: bool) -> bool {
-    of_any_color || is_grayscale(image)
+    of_any_color || has_only_gray_pixels(image)
 }
 
 /// Whether red, green and blue are equal in all pixels.
-fn is_grayscale(image: &DynamicImage) -> bool {
+fn has_only_gray_pixels(image: &DynamicImage) -> bool {
     fn all_pixels_gray<T: Sample>(samples: &[T], channels: usize) -> bool {
         samples.chunks_exact(channels).map(pixel_rgb).all(|[r, g, b]| r == g && g == b)
     }
@@ -143,11 +143,11 @@ fn scalar_texels_from_samples<T: Sample>(
 mod tests {
     use super::super::texels;
     use super::*;
-    use crate::assets::image::ImageEncoding;
+    use crate::assets::image::ColorEncoding;
     use ::image::ImageBuffer;
 
     fn number(image: DynamicImage, of: ChannelSelector, is_srgb: bool) -> f32 {
-        let texels = texels(image, ImageEncoding::Number { of, is_srgb }, &ImageMetadata::default());
+        let texels = texels(image, ColorEncoding::Number { of, is_srgb }, &ImageMetadata::default());
         let value = texels.get(0, 0);
         assert!(value.x == value.y && value.y == value.z, "{value}");
         value.x
@@ -186,14 +186,14 @@ mod tests {
         assert_eq!(number(float(), of(Channel::Red), false), 2.0);
         let broken = texels(
             float(),
-            ImageEncoding::Number { of: of(Channel::Green), is_srgb: false },
+            ColorEncoding::Number { of: of(Channel::Green), is_srgb: false },
             &ImageMetadata::default(),
         );
         assert_eq!((broken.get(0, 0).x, broken.unusable), (0.0, 1));
         // A pixel with several unusable samples is counted once.
         let broken = texels(
             float(),
-            ImageEncoding::Number { of: ChannelSelector::Luminance, is_srgb: false },
+            ColorEncoding::Number { of: ChannelSelector::Luminance, is_srgb: false },
             &ImageMetadata::default(),
         );
         assert_eq!(broken.unusable, 1);

@@ -5,7 +5,7 @@ use ::exr::meta::header::Header;
 use ::exr::prelude::Vec2;
 
 use super::channels::ChannelIndex;
-use super::{ChannelRow, SAMPLE_BYTES, channel_header};
+use super::{ChannelRow, SAMPLE_BYTES, channel_description};
 use crate::math::DVec3;
 
 /// Interpolation weights for the samples on either side of a pixel, from nearest to farthest
@@ -27,7 +27,7 @@ pub(super) struct LuminanceChromaPlanes {
 impl LuminanceChromaPlanes {
     pub(super) fn new(headers: &[Header], channels: [ChannelIndex; 3]) -> Self {
         let [_, ry, _] = channels;
-        let (size, step) = (headers[ry.part].layer_size, channel_header(headers, ry).sampling);
+        let (size, step) = (headers[ry.part].layer_size, channel_description(headers, ry).sampling);
         let chroma = || vec![0.0; (size / step).area()];
         Self { channels, size, step, luminance: vec![0.0; size.area()], chroma: [chroma(), chroma()] }
     }
@@ -35,13 +35,13 @@ impl LuminanceChromaPlanes {
     /// Size in memory of the planes after chroma has been interpolated along rows.
     pub(super) fn memory_bytes(headers: &[Header], [_, ry, _]: [ChannelIndex; 3]) -> u64 {
         let size = headers[ry.part].layer_size;
-        let rows = size.height() / channel_header(headers, ry).sampling.y();
+        let rows = size.height() / channel_description(headers, ry).sampling.y();
         let samples = (size.width() as u64).saturating_mul((size.height() + 2 * rows) as u64);
         samples.saturating_mul(SAMPLE_BYTES as u64)
     }
 
     /// Stores a row of samples if its channel belongs to one of the planes.
-    pub(super) fn add(&mut self, channel: ChannelIndex, row: usize, line: ChannelRow<'_>) {
+    pub(super) fn store_channel_row(&mut self, channel: ChannelIndex, row: usize, line: ChannelRow<'_>) {
         let widths = [self.size, self.size / self.step, self.size / self.step].map(|size| size.width());
         let [ry, by] = &mut self.chroma;
         for ((plane, width), plane_channel) in
@@ -103,7 +103,7 @@ impl LuminanceChromaPlanes {
                 if y % 2 == 0 {
                     sample(inside as i64 / 2)
                 } else {
-                    filter_between((y - 1).div_euclid(2), sample)
+                    filtered_midpoint((y - 1).div_euclid(2), sample)
                 }
             });
             luminance_chroma_to_rgb(self.luminance[inside * width + x], chroma, weights)
@@ -134,12 +134,12 @@ fn interpolated_chroma_at_column(
     let last = count as i64 - 1;
     match x % 2 {
         0 => sample(x / 2),
-        _ => filter_between(x as i64 / 2, |at| sample(at.clamp(0, last) as usize)),
+        _ => filtered_midpoint(x as i64 / 2, |at| sample(at.clamp(0, last) as usize)),
     }
 }
 
 /// Filtered value between the samples `left` and `left + 1`.
-fn filter_between(left: i64, sample: impl Fn(i64) -> f32) -> f32 {
+fn filtered_midpoint(left: i64, sample: impl Fn(i64) -> f32) -> f32 {
     let pairs = (0..).zip(WEIGHTS);
     pairs.map(|(away, weight)| weight * (sample(left - away) + sample(left + 1 + away))).sum()
 }

@@ -40,7 +40,7 @@ impl<R: BufRead + Seek> ExrDecoder<R> {
     pub(super) fn new(mut file: R, memory_bytes: u64) -> ImageResult<Self> {
         let samplings = sampling::read_samplings_if_subsampled(&mut file).map_err(ImageError::IoError)?;
         let file = SubsamplingHidingReader::new(file, &samplings);
-        let reader = ::exr::block::read(file, false).map_err(image_error)?;
+        let reader = ::exr::block::read(file, false).map_err(to_image_error)?;
         let Some(channels) = choose_channels(reader.headers()) else {
             return Err(decoding_error(describe_unusable_channels(reader.headers())));
         };
@@ -62,7 +62,7 @@ impl<R: BufRead + Seek> ExrDecoder<R> {
         let mut metadata =
             ImageMetadata { alpha: AlphaInterpretation::Premultiplied, ..ImageMetadata::default() };
         if let Some(primaries) = primaries(self.header()) {
-            match primaries.to_rec_709() {
+            match primaries.to_rec_709_matrix() {
                 Some(matrix) => metadata.space = ColorSpace::from_matrix_with_default_curves(matrix),
                 None => metadata.add_warning(DEGENERATE_CHROMATICITIES),
             }
@@ -105,13 +105,13 @@ fn decompressed_block_size(header: &Header) -> u64 {
     pixels.saturating_mul(header.channels.bytes_per_pixel as u64)
 }
 
-fn channel_header(headers: &[Header], channel: ChannelIndex) -> &ChannelDescription {
+fn channel_description(headers: &[Header], channel: ChannelIndex) -> &ChannelDescription {
     &headers[channel.part].channels.list[channel.channel]
 }
 
 /// Checks that only the chroma channels are subsampled, and both by the same factors.
 fn check_samplings(headers: &[Header], channels: ChosenChannels) -> Result<(), String> {
-    let sampling = |channel: ChannelIndex| channel_header(headers, channel).sampling;
+    let sampling = |channel: ChannelIndex| channel_description(headers, channel).sampling;
     let is_divided = |channel: &ChannelIndex| {
         let (Vec2(x, y), size) = (sampling(*channel), headers[channel.part].layer_size);
         x > 0 && y > 0 && size.width().is_multiple_of(x) && size.height().is_multiple_of(y)
@@ -121,7 +121,9 @@ fn check_samplings(headers: &[Header], channels: ChosenChannels) -> Result<(), S
     }
     match channels.component_channels().into_iter().flatten().find(|channel| sampling(*channel) != Vec2(1, 1))
     {
-        Some(channel) => Err(subsampled_channel_message(&channel_header(headers, channel).name.to_string())),
+        Some(channel) => {
+            Err(subsampled_channel_message(&channel_description(headers, channel).name.to_string()))
+        }
         None => match channels.as_luminance_chroma() {
             Some([_, ry, by]) if sampling(ry) != sampling(by) => Err(CHROMA_DIFFERS.to_owned()),
             Some(_) | None => Ok(()),
@@ -154,8 +156,8 @@ impl<R: BufRead + Seek> ImageDecoder for ExrDecoder<R> {
         let chunks = self
             .reader
             .filter_chunks(false, |_, tile, block| is_read(block.layer) && tile.level_index == Vec2(0, 0));
-        for chunk in chunks.map_err(image_error)? {
-            let block = chunk.and_then(|chunk| decompressor.decompress(chunk)).map_err(image_error)?;
+        for chunk in chunks.map_err(to_image_error)? {
+            let block = chunk.and_then(|chunk| decompressor.decompress(chunk)).map_err(to_image_error)?;
             image.add_block(&block, samples);
         }
         image.convert_luminance_chroma(samples);
@@ -193,7 +195,7 @@ impl PartialImage<'_> {
                 let line = ChannelRow { sample_type: description.sample_type, bytes: line };
                 let channel = ChannelIndex { part, channel };
                 if let Some(planes) = &mut self.planes {
-                    planes.add(channel, row / down, line);
+                    planes.store_channel_row(channel, row / down, line);
                 }
                 self.copy_channel_row(channel, [left, row], line, samples);
             }
@@ -297,7 +299,7 @@ impl ChannelRow<'_> {
     }
 }
 
-fn image_error(error: Error) -> ImageError {
+fn to_image_error(error: Error) -> ImageError {
     match error {
         Error::Io(error) => ImageError::IoError(error),
         error => decoding_error(error.to_string()),

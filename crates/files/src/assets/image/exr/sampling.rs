@@ -31,7 +31,7 @@ pub(super) fn read_samplings_if_subsampled(
     let mut bytes = Vec::new();
     file.by_ref().take(HEADER_BYTES).read_to_end(&mut bytes)?;
     file.seek(SeekFrom::Start(0))?;
-    let found = HeaderParser { bytes: &bytes, at: FIRST_HEADER_OFFSET }.samplings().unwrap_or_default();
+    let found = HeaderParser { bytes: &bytes, at: FIRST_HEADER_OFFSET }.parse_samplings().unwrap_or_default();
     let is_full = found.iter().flatten().all(|sampling| sampling.step == Vec2(1, 1));
     Ok(if is_full { Vec::new() } else { found })
 }
@@ -43,7 +43,7 @@ struct HeaderParser<'a> {
 }
 
 impl<'a> HeaderParser<'a> {
-    fn samplings(mut self) -> Option<Vec<Vec<ChannelSampling>>> {
+    fn parse_samplings(mut self) -> Option<Vec<Vec<ChannelSampling>>> {
         const MULTIPART: u8 = 0x10;
         let is_multipart = self.bytes.get(5)? & MULTIPART != 0;
         let mut parts = Vec::new();
@@ -56,7 +56,7 @@ impl<'a> HeaderParser<'a> {
                 let size = self.read_nonnegative_i32()?;
                 let start = self.at;
                 if name == b"channels" && kind == b"chlist" {
-                    channels = Some(self.channels(start.checked_add(size)?)?);
+                    channels = Some(self.parse_channel_list(start.checked_add(size)?)?);
                 }
                 self.at = start.checked_add(size)?;
             }
@@ -68,7 +68,7 @@ impl<'a> HeaderParser<'a> {
         }
     }
 
-    fn channels(&mut self, end: usize) -> Option<Vec<ChannelSampling>> {
+    fn parse_channel_list(&mut self, end: usize) -> Option<Vec<ChannelSampling>> {
         const KIND_BYTES: usize = 8;
         let mut channels = Vec::new();
         while self.at < end && !self.read_c_string()?.is_empty() {

@@ -84,11 +84,11 @@ fn rgb_profile(colorants: [[f64; 3]; 3], curve: Vec<u8>) -> Vec<u8> {
 
 #[track_caller]
 fn color(file: &[u8]) -> Vec3 {
-    load_bytes("a.png", file, ImageEncoding::Color).expect("a PNG").get(0, 0)
+    load_bytes("a.png", file, ColorEncoding::Color).expect("a PNG").get(0, 0)
 }
 
 fn is_plain(file: &[u8]) -> bool {
-    load_bytes("a.png", file, ImageEncoding::Color).expect("a PNG").data
+    load_bytes("a.png", file, ColorEncoding::Color).expect("a PNG").data
         == TexelData::Srgb8(vec![[188, 128, 64]])
 }
 
@@ -186,9 +186,9 @@ fn unsupported_profiles_cause_warnings() {
     ] {
         let file = png(profile(bytes));
         assert!(is_plain(&file), "{reason}");
-        let warnings = warnings_of("a.png", &file, ImageEncoding::Color);
+        let warnings = warnings_of("a.png", &file, ColorEncoding::Color);
         assert_eq!(warnings, [format!("a.png: {}", profile_ignored_warning(&reason))]);
-        assert_eq!(warnings_of("a.png", &file, ImageEncoding::Srgb), warnings);
+        assert_eq!(warnings_of("a.png", &file, ColorEncoding::Srgb), warnings);
     }
     let whole = rgb_profile(SRGB, para(3, &SRGB_CURVE));
     for length in 0..whole.len() {
@@ -222,11 +222,11 @@ fn code_points_have_the_highest_precedence() {
     }
     for primaries in [1, 4, 5, 6, 7, 8, 9, 10, 11, 12, 22] {
         let file = points([primaries, 13, 0, 1]);
-        assert!(warnings_of("a.png", &file, ImageEncoding::Color).is_empty(), "{primaries}");
+        assert!(warnings_of("a.png", &file, ColorEncoding::Color).is_empty(), "{primaries}");
     }
     // Undefined codes, a logarithmic curve, and video range.
     for codes in [[3, 13, 0, 1], [2, 2, 0, 1], [1, 9, 0, 1], [9, 16, 0, 0]] {
-        let warnings = warnings_of("a.png", &points(codes), ImageEncoding::Color);
+        let warnings = warnings_of("a.png", &points(codes), ColorEncoding::Color);
         assert_eq!(warnings.len(), 1, "{codes:?}");
         assert!(codes[..2].iter().all(|code| warnings[0].contains(&format!(" {code}"))), "{warnings:?}");
         assert!(is_near(color(&points(codes)), color(&png(|_| {}))), "{codes:?}");
@@ -246,12 +246,12 @@ fn scene_encoding_overrides_the_file() {
         assert!(!is_plain(&file));
         // Normal maps are read as linear.
         for (encoding, data) in [
-            (ImageEncoding::Srgb, TexelData::Srgb8(vec![[188, 128, 64]])),
-            (ImageEncoding::Linear, TexelData::Linear8(vec![[188, 128, 64]])),
+            (ColorEncoding::Srgb, TexelData::Srgb8(vec![[188, 128, 64]])),
+            (ColorEncoding::Linear, TexelData::Linear8(vec![[188, 128, 64]])),
         ] {
             assert_eq!(load_bytes("a.png", &file, encoding).expect("a PNG").data, data);
         }
-        let number = ImageEncoding::Number { of: ChannelSelector::Luminance, is_srgb: false };
+        let number = ColorEncoding::Number { of: ChannelSelector::Luminance, is_srgb: false };
         let scalar = |file: &[u8]| load_bytes("a.png", file, number).expect("a PNG").data;
         assert_eq!(scalar(&file), scalar(&png(|_| {})));
     }
@@ -267,12 +267,12 @@ fn jpeg_and_webp_profiles_are_applied() {
     let content = [b"ICC_PROFILE\0\x01\x01".as_slice(), &linear].concat();
     let segment = [&[0xff, 0xe2], ((content.len() + 2) as u16).to_be_bytes().as_slice(), &content].concat();
     let with = [&jpeg[..2], &segment, &jpeg[2..]].concat();
-    let value = load_bytes("a.jpg", &with, ImageEncoding::Color).expect("a JPEG").get(3, 3).x;
+    let value = load_bytes("a.jpg", &with, ColorEncoding::Color).expect("a JPEG").get(3, 3).x;
     assert!((value - 128.0 / 255.0).abs() < 5e-3, "{value}");
     let mut webp = Vec::new();
     let mut encoder = image_webp::WebPEncoder::new(&mut webp);
     encoder.set_icc_profile(linear);
     encoder.encode(&[51, 102, 204], 1, 1, image_webp::ColorType::Rgb8).expect("written");
-    let value = load_bytes("a.webp", &webp, ImageEncoding::Color).expect("a WebP").get(0, 0);
+    let value = load_bytes("a.webp", &webp, ColorEncoding::Color).expect("a WebP").get(0, 0);
     assert!(is_near(value, Vec3::new(0.2, 0.4, 0.8)), "{value}");
 }

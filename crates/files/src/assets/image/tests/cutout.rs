@@ -13,7 +13,7 @@ fn bytes(pixels: &[[u8; 4]]) -> DynamicImage {
     ImageBuffer::from_raw(pixels.len() as u32, 1, samples).map(DynamicImage::ImageRgba8).expect("whole")
 }
 
-fn texels(image: DynamicImage, encoding: ImageEncoding, alpha: AlphaInterpretation) -> Texels {
+fn texels(image: DynamicImage, encoding: ColorEncoding, alpha: AlphaInterpretation) -> Texels {
     convert::texels(image, encoding, &ImageMetadata { alpha, ..ImageMetadata::default() })
 }
 
@@ -21,12 +21,12 @@ fn texels(image: DynamicImage, encoding: ImageEncoding, alpha: AlphaInterpretati
 fn colors_are_alpha_weighted_unless_opaque() {
     let cut = [[255, 0, 0, 51], [0, 255, 0, 255]];
     let data = |pixels: &[[u8; 4]], curve| {
-        texels(bytes(pixels), ImageEncoding::CutOut(curve), AlphaInterpretation::Straight).data
+        texels(bytes(pixels), ColorEncoding::CutOut(curve), AlphaInterpretation::Straight).data
     };
-    assert_eq!(data(&cut, ColorCurve::Auto), TexelData::SrgbAlpha8(cut.to_vec()));
-    assert_eq!(data(&cut, ColorCurve::Linear), TexelData::LinearAlpha8(cut.to_vec()));
-    assert_eq!(data(&[[1, 2, 3, 255]], ColorCurve::Srgb), TexelData::Srgb8(vec![[1, 2, 3]]));
-    let texels = Texels { width: 2, height: 1, data: data(&cut, ColorCurve::Auto), unusable: 0 };
+    assert_eq!(data(&cut, ColorTransferFunction::Auto), TexelData::SrgbAlpha8(cut.to_vec()));
+    assert_eq!(data(&cut, ColorTransferFunction::Linear), TexelData::LinearAlpha8(cut.to_vec()));
+    assert_eq!(data(&[[1, 2, 3, 255]], ColorTransferFunction::Srgb), TexelData::Srgb8(vec![[1, 2, 3]]));
+    let texels = Texels { width: 2, height: 1, data: data(&cut, ColorTransferFunction::Auto), unusable: 0 };
     assert_eq!([texels.get(0, 0), texels.get(1, 0)], [Vec3::X, Vec3::Y]);
     assert_eq!(texels.premultiplied_texel(0), Vec4::new(0.2, 0.0, 0.0, 0.2));
     assert!((texels.mean() - Vec3::new(1.0 / 6.0, 5.0 / 6.0, 0.0)).length() < 1e-6);
@@ -38,22 +38,22 @@ fn premultiplied_colors_are_unmultiplied_once() {
         let pixels = vec![0.5, 0.25, 0.0, 0.5, 3.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0];
         ImageBuffer::<Rgba<f32>, _>::from_raw(3, 1, pixels).map(DynamicImage::ImageRgba32F).expect("whole")
     };
-    let loaded = |curve| texels(image(), ImageEncoding::CutOut(curve), AlphaInterpretation::Premultiplied);
-    for curve in [ColorCurve::Auto, ColorCurve::Linear] {
+    let loaded = |curve| texels(image(), ColorEncoding::CutOut(curve), AlphaInterpretation::Premultiplied);
+    for curve in [ColorTransferFunction::Auto, ColorTransferFunction::Linear] {
         let texels = loaded(curve);
         assert_eq!([0, 2].map(|x| texels.get(x, 0)), [Vec3::new(1.0, 0.5, 0.0), Vec3::ONE]);
         assert_eq!(texels.premultiplied_texel(0), Vec4::new(0.5, 0.25, 0.0, 0.5));
     }
-    assert!((loaded(ColorCurve::Srgb).get(0, 0).y - srgb_to_linear(0.5)).abs() < 1e-6);
+    assert!((loaded(ColorTransferFunction::Srgb).get(0, 0).y - srgb_to_linear(0.5)).abs() < 1e-6);
     // Without a cutout, the color is composited over black.
-    let plain = texels(image(), ImageEncoding::Color, AlphaInterpretation::Premultiplied);
+    let plain = texels(image(), ColorEncoding::Color, AlphaInterpretation::Premultiplied);
     assert_eq!(plain.get(0, 0), Vec3::new(0.5, 0.25, 0.0));
 }
 
 #[test]
 fn masks_without_alpha_use_the_luminance() {
     let number = |image: DynamicImage, of| {
-        texels(image, ImageEncoding::Number { of, is_srgb: false }, AlphaInterpretation::Straight).get(0, 0).x
+        texels(image, ColorEncoding::Number { of, is_srgb: false }, AlphaInterpretation::Straight).get(0, 0).x
     };
     let mask = |of_any_color| ChannelSelector::Mask { of_any_color };
     let gray = || bytes(&[[51, 51, 51, 255], [0, 0, 0, 255]]);
@@ -70,7 +70,7 @@ fn masks_without_alpha_use_the_luminance() {
         assert!((number(image, of) - expected).abs() < 1e-6, "{of:?} {expected}");
     }
     let warning = |image: DynamicImage, of| {
-        let encoding = ImageEncoding::Number { of, is_srgb: false };
+        let encoding = ColorEncoding::Number { of, is_srgb: false };
         convert::constant_alpha_warning(&image, encoding, &ImageMetadata::default())
     };
     assert_eq!(warning(gray(), mask(false)), Some(convert::LUMINANCE_USED));

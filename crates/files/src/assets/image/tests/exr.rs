@@ -47,7 +47,7 @@ fn single_layer(channels: Vec<(&str, FlatSamples)>) -> Vec<u8> {
 
 #[track_caller]
 fn texels(file: &[u8]) -> Vec<Vec3> {
-    match load_bytes("a.exr", file, ImageEncoding::Color).expect("an EXR").data {
+    match load_bytes("a.exr", file, ColorEncoding::Color).expect("an EXR").data {
         TexelData::Float(texels) => texels,
         other => panic!("{other:?}"),
     }
@@ -140,7 +140,7 @@ fn the_display_window_defines_the_image() {
     let image = Image { attributes: ImageAttributes::new(bounds), layer_data: layer };
     let mut file = Cursor::new(Vec::new());
     image.write().to_buffered(&mut file).expect("written");
-    let texels = load_bytes("a.exr", file.get_ref(), ImageEncoding::Color).expect("an EXR");
+    let texels = load_bytes("a.exr", file.get_ref(), ColorEncoding::Color).expect("an EXR");
     assert_eq!((texels.width, texels.height), (2, 3));
     let expected: Vec<_> = [0.0, 0.0, RAMP[1], 0.0, RAMP[3], 0.0].map(Vec3::splat).to_vec();
     assert_eq!(texels.data, TexelData::Float(expected));
@@ -164,9 +164,9 @@ fn unusable_channels_are_rejected() {
     }
     let whole = single_layer(vec![("Y", floats(RAMP))]);
     for length in 0..whole.len() {
-        let _ = load_bytes("a.exr", &whole[..length], ImageEncoding::Color);
+        let _ = load_bytes("a.exr", &whole[..length], ColorEncoding::Color);
     }
-    assert!(load_bytes("a.exr", &whole[..whole.len() - 3], ImageEncoding::Color).is_err());
+    assert!(load_bytes("a.exr", &whole[..whole.len() - 3], ColorEncoding::Color).is_err());
     // Patch the header to sample the channel at every other pixel.
     let mut sampled = whole;
     let at = sampled.windows(8).position(|sampling| sampling == [1, 0, 0, 0, 1, 0, 0, 0]).expect("a channel");
@@ -220,7 +220,7 @@ fn chromaticities_are_converted() {
     assert_eq!(texels(&file(None))[0], plain);
     let converted = texels(&file(Some(rec_2020)))[0];
     assert!((converted - Vec3::new(1.3484, 0.4397, 0.2114)).length() < 1e-3, "{converted}");
-    let linear = load_bytes("a.exr", &file(Some(rec_2020)), ImageEncoding::Linear).expect("an EXR");
+    let linear = load_bytes("a.exr", &file(Some(rec_2020)), ColorEncoding::Linear).expect("an EXR");
     assert_eq!(linear.get(0, 0), plain);
     // Files written by glimt declare Rec. 709.
     let rec_709 = Chromaticities {
@@ -233,7 +233,7 @@ fn chromaticities_are_converted() {
     let broken = file(Some(Chromaticities { green: rec_709.red, ..rec_709 }));
     assert_eq!(texels(&broken)[0], plain);
     assert_eq!(
-        warnings_of("a.exr", &broken, ImageEncoding::Color),
+        warnings_of("a.exr", &broken, ColorEncoding::Color),
         [format!("a.exr: {DEGENERATE_CHROMATICITIES}")]
     );
 }
@@ -296,7 +296,7 @@ fn luminance_and_chroma_are_converted_to_rgb() {
     assert!((texels(&full)[3] - color(1.0, 0.5, 1.0)).length() < 1e-4);
     let whole = subsampled([0, 0, 3, 1]);
     for length in 0..whole.len() {
-        let _ = load_bytes("a.exr", &whole[..length], ImageEncoding::Color);
+        let _ = load_bytes("a.exr", &whole[..length], ColorEncoding::Color);
     }
 }
 
@@ -309,6 +309,7 @@ fn premultiplied_colors_of_cutouts_are_unmultiplied() {
         ("B", channel(0.0)),
         ("A", channel(0.5)),
     ]);
-    let cut_out = load_bytes("a.exr", &file, ImageEncoding::CutOut(ColorCurve::Linear)).expect("an EXR");
+    let cut_out =
+        load_bytes("a.exr", &file, ColorEncoding::CutOut(ColorTransferFunction::Linear)).expect("an EXR");
     assert!((cut_out.get(1, 1) - Vec3::new(1.0, 0.5, 0.0)).length() < 1e-3, "{}", cut_out.get(1, 1));
 }

@@ -13,7 +13,7 @@ fn file(header: &str, size: &str, pixels: &[u8]) -> Vec<u8> {
 }
 
 #[track_caller]
-fn texels(file: &[u8], encoding: ImageEncoding) -> Vec<Vec3> {
+fn texels(file: &[u8], encoding: ColorEncoding) -> Vec<Vec3> {
     match load_bytes("a.hdr", file, encoding).expect("an HDR").data {
         TexelData::Float(texels) => texels,
         other => panic!("{other:?}"),
@@ -21,7 +21,7 @@ fn texels(file: &[u8], encoding: ImageEncoding) -> Vec<Vec3> {
 }
 
 fn single_pixel(header: &str) -> Vec3 {
-    texels(&file(header, "-Y 1 +X 1", &PIXEL), ImageEncoding::Color)[0]
+    texels(&file(header, "-Y 1 +X 1", &PIXEL), ColorEncoding::Color)[0]
 }
 
 #[test]
@@ -35,14 +35,14 @@ fn header_variants_are_read() {
             "FORMAT=32-bit_rle_rgbe\n-Y 1 +X 1\n",
         ] {
             let file = [start.as_bytes(), rest.as_bytes(), &PIXEL].concat();
-            assert_eq!(texels(&file, ImageEncoding::Color), [Vec3::new(1.0, 0.5, 0.25)], "{start}{rest}");
+            assert_eq!(texels(&file, ColorEncoding::Color), [Vec3::new(1.0, 0.5, 0.25)], "{start}{rest}");
         }
     }
     assert_eq!(error("a.hdr", b"#RADIANCE\n\n-Y 1 +X 1\nabcd"), unknown_format_message());
     let unknown = error("a.hdr", &file("FORMAT=32-bit_rle_xyzw\n", "-Y 1 +X 1", &PIXEL));
     assert!(unknown.ends_with(&unsupported_format_message("32-bit_rle_xyzw")), "{unknown}");
     for size in ["-Y 1 +Y 1", "-Y 1", "X 1 Y 1", "-Y -1 +X 1", "-Y 1 +X 1 2"] {
-        assert!(load_bytes("a.hdr", &file("", size, &PIXEL), ImageEncoding::Color).is_err(), "{size}");
+        assert!(load_bytes("a.hdr", &file("", size, &PIXEL), ColorEncoding::Color).is_err(), "{size}");
     }
 }
 
@@ -60,7 +60,7 @@ fn all_orientations_decode_to_the_same_image() {
         ("-X 3 +Y 2", [5, 2, 4, 1, 3, 0]),
     ] {
         let pixels: Vec<u8> = order.iter().flat_map(|&number| [number, 0, 0, 136]).collect();
-        let image = load_bytes("a.hdr", &file("", size, &pixels), ImageEncoding::Color).expect(size);
+        let image = load_bytes("a.hdr", &file("", size, &pixels), ColorEncoding::Color).expect(size);
         assert_eq!((image.width, image.height), (3, 2), "{size}");
         let reds: Vec<f32> = (0..6).map(|index| image.linear_color_at_index(index).x).collect();
         assert_eq!(reds, [0.0, 1.0, 2.0, 3.0, 4.0, 5.0], "{size}");
@@ -77,16 +77,16 @@ fn values_are_divided_by_exposure_and_correction() {
     // Lines quoted from other headers are ignored.
     assert_eq!(single_pixel("\tEXPOSURE=2\n# EXPOSURE=2\n"), plain);
     // The exposure applies to all encodings.
-    let number = ImageEncoding::Number { of: ChannelSelector::Luminance, is_srgb: false };
-    for encoding in [ImageEncoding::Linear, ImageEncoding::Raw, number] {
+    let number = ColorEncoding::Number { of: ChannelSelector::Luminance, is_srgb: false };
+    for encoding in [ColorEncoding::Linear, ColorEncoding::Raw, number] {
         let [plain, divided] =
             ["", "EXPOSURE=2\n"].map(|header| texels(&file(header, "-Y 1 +X 1", &PIXEL), encoding)[0]);
         assert_eq!(divided, plain / 2.0, "{encoding:?}");
     }
     for line in ["EXPOSURE=0", "EXPOSURE=-1", "EXPOSURE=x", "EXPOSURE=1 2", "COLORCORR=1 1", "GAMMA=2.2"] {
         let file = file(&format!("# first\n{line}\n"), "-Y 1 +X 1", &PIXEL);
-        assert_eq!(texels(&file, ImageEncoding::Color), [plain], "{line}");
-        let warnings = warnings_of("a.hdr", &file, ImageEncoding::Color);
+        assert_eq!(texels(&file, ColorEncoding::Color), [plain], "{line}");
+        let warnings = warnings_of("a.hdr", &file, ColorEncoding::Color);
         assert_eq!(warnings, [format!("a.hdr:3: {}", line_ignored_warning(line))]);
     }
 }
@@ -96,13 +96,13 @@ fn primaries_are_converted() {
     let white = [64, 64, 64, 129];
     let rec_2020 = "PRIMARIES=.708 .292 .17 .797 .131 .046 .3127 .329\n";
     let color =
-        |header: &str, pixel: &[u8]| texels(&file(header, "-Y 1 +X 1", pixel), ImageEncoding::Color)[0];
+        |header: &str, pixel: &[u8]| texels(&file(header, "-Y 1 +X 1", pixel), ColorEncoding::Color)[0];
     let near = |a: Vec3, b: Vec3| (a - b).length() < 2e-3;
     assert!(near(color(rec_2020, &white), Vec3::splat(0.5)));
     assert!(near(color(rec_2020, &[64, 0, 0, 129]), Vec3::new(0.8302, 0.0, 0.0)));
     assert_eq!(color("PRIMARIES=.64 .33 .3 .6 .15 .06 .3127 .329\n", &PIXEL), Vec3::new(1.0, 0.5, 0.25));
     // Noncolor data is not converted.
-    for encoding in [ImageEncoding::Linear, ImageEncoding::Srgb] {
+    for encoding in [ColorEncoding::Linear, ColorEncoding::Srgb] {
         let [with, without] =
             [rec_2020, ""].map(|header| texels(&file(header, "-Y 1 +X 1", &PIXEL), encoding));
         assert_eq!(with, without);
@@ -112,7 +112,7 @@ fn primaries_are_converted() {
     assert!(near(color(xyz, &[179, 179, 179, 136]), Vec3::ONE));
     for broken in ["PRIMARIES=.64 .33 .3 .6 .15 .06", "PRIMARIES=0 0 0 0 0 0 0 0"] {
         let file = file(&format!("{broken}\n"), "-Y 1 +X 1", &PIXEL);
-        let warnings = warnings_of("a.hdr", &file, ImageEncoding::Color);
+        let warnings = warnings_of("a.hdr", &file, ColorEncoding::Color);
         assert_eq!(warnings, [format!("a.hdr:2: {}", line_ignored_warning(broken))]);
     }
 }
@@ -142,20 +142,20 @@ fn scanline_encodings_decode_to_the_same_pixels() {
     for count in [1, 7, 8, 200, 32767, 33000] {
         let flat: Vec<u8> = (0..count).flat_map(value).collect();
         let size = format!("-Y 1 +X {count}");
-        assert_eq!(texels(&file("", &size, &flat), ImageEncoding::Color), expected(count), "{count}");
+        assert_eq!(texels(&file("", &size, &flat), ColorEncoding::Color), expected(count), "{count}");
         if (8..32768).contains(&count) {
             let runs = runs(count, value);
-            assert_eq!(texels(&file("", &size, &runs), ImageEncoding::Color), expected(count), "{count}");
+            assert_eq!(texels(&file("", &size, &runs), ColorEncoding::Color), expected(count), "{count}");
         }
     }
     // (1, 1, 1, n) repeats the previous pixel n times. A second (1, 1, 1, n) repeats it 256 · n times.
     let old = [5, 6, 7, 136, 1, 1, 1, 3, 1, 1, 1, 2, 8, 0, 0, 136, 1, 1, 1, 1];
     let size = "-Y 1 +X 518";
-    let found = texels(&file("", size, &old), ImageEncoding::Color);
+    let found = texels(&file("", size, &old), ColorEncoding::Color);
     assert_eq!(found[..516], vec![Vec3::new(5.0, 6.0, 7.0); 516]);
     assert_eq!(found[516..], [Vec3::new(8.0, 0.0, 0.0); 2]);
     // This line starts like a run-length encoded line, but is too short for this encoding.
-    assert_eq!(texels(&file("", "-Y 1 +X 1", &[2, 2, 0, 1]), ImageEncoding::Color).len(), 1);
+    assert_eq!(texels(&file("", "-Y 1 +X 1", &[2, 2, 0, 1]), ColorEncoding::Color).len(), 1);
 }
 
 #[test]

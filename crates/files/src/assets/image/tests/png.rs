@@ -21,7 +21,7 @@ fn info(color_type: ColorType, bit_depth: BitDepth, width: u32, height: u32) -> 
 }
 
 fn texels(file: &[u8]) -> TexelData {
-    load_bytes("a.png", file, ImageEncoding::Linear).expect("a PNG").data
+    load_bytes("a.png", file, ColorEncoding::Linear).expect("a PNG").data
 }
 
 #[test]
@@ -54,7 +54,7 @@ fn exif_orientation_is_applied() {
     // One entry: Orientation (0x0112), type SHORT, value 6 (rotated clockwise by 90°).
     let exif = b"MM\0*\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x06\0\0\0\0\0\0";
     turned.exif_metadata = Some(Cow::Borrowed(exif));
-    let texels = load_bytes("a.png", &encoded(turned, &[1, 2, 3]), ImageEncoding::Linear).expect("a PNG");
+    let texels = load_bytes("a.png", &encoded(turned, &[1, 2, 3]), ColorEncoding::Linear).expect("a PNG");
     assert_eq!((texels.width, texels.height), (1, 3));
     assert_eq!(texels.data, TexelData::Linear8(vec![[1; 3], [2; 3], [3; 3]]));
 }

@@ -19,7 +19,7 @@ fn file(alpha_bits: u8, pixel: [u8; 4], kind: Option<u8>) -> Vec<u8> {
 }
 
 fn opacity(file: &[u8]) -> f32 {
-    let encoding = ImageEncoding::Number { of: ChannelSelector::Opacity, is_srgb: false };
+    let encoding = ColorEncoding::Number { of: ChannelSelector::Opacity, is_srgb: false };
     load_bytes("a.tga", file, encoding).expect("a TGA").get(0, 0).x
 }
 
@@ -40,7 +40,8 @@ fn tga_alpha_is_set_by_header_or_extension() {
     }
     // In cutouts, premultiplied colors are divided by alpha.
     let cut_out = |file: &[u8]| {
-        let texels = load_bytes("a.tga", file, ImageEncoding::CutOut(ColorCurve::Linear)).expect("a TGA");
+        let texels =
+            load_bytes("a.tga", file, ColorEncoding::CutOut(ColorTransferFunction::Linear)).expect("a TGA");
         texels.get(0, 0)
     };
     assert!((cut_out(&file(8, [51, 0, 102, 102], Some(4))) - Vec3::new(1.0, 0.0, 0.5)).length() < 1e-6);
@@ -69,7 +70,7 @@ fn sixteen_bit_gray_has_alpha() {
             file[12] = 2;
             file
         }] {
-            let texels = load_bytes("a.tga", &file, ImageEncoding::Linear).expect("a TGA");
+            let texels = load_bytes("a.tga", &file, ColorEncoding::Linear).expect("a TGA");
             assert_eq!(texels.data, TexelData::Linear8(vec![[51; 3], [255; 3]]));
             // If the header declares no alpha bits, the luminance is the opacity.
             let expected = if alpha_bits == 0 { 0.2 } else { 1.0 };
@@ -81,7 +82,7 @@ fn sixteen_bit_gray_has_alpha() {
 #[test]
 fn ignored_alpha_bit_causes_a_warning() {
     let warnings = |file: &[u8], of: ChannelSelector| {
-        warnings_of("a.tga", file, ImageEncoding::Number { of, is_srgb: false })
+        warnings_of("a.tga", file, ColorEncoding::Number { of, is_srgb: false })
     };
     let pixels = [0x1f, 0x80, 0x1f, 0x00];
     let warned = warnings(&row([2, 16, 1], &pixels), ChannelSelector::Opacity);
@@ -100,7 +101,7 @@ fn impossible_alpha_bits_are_ignored() {
     ] {
         for alpha_bits in [0, 1, 3, 8, 15] {
             let file = row([kind, bits, alpha_bits], &pixels);
-            let texels = load_bytes("a.tga", &file, ImageEncoding::Linear).expect("a TGA");
+            let texels = load_bytes("a.tga", &file, ColorEncoding::Linear).expect("a TGA");
             assert_eq!(texels.data, TexelData::Linear8(vec![expected]), "{kind} {bits} {alpha_bits}");
         }
     }
@@ -115,7 +116,7 @@ fn impossible_alpha_bits_are_ignored() {
 fn all_zero_bmp_alpha_is_ignored() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("a.bmp");
-    let number = ImageEncoding::Number { of: ChannelSelector::Opacity, is_srgb: false };
+    let number = ColorEncoding::Number { of: ChannelSelector::Opacity, is_srgb: false };
     for (alpha, expected) in [([0, 0], [1.0, 1.0]), ([0, 51], [0.0, 0.2])] {
         let pixels = [255, 255, 255, alpha[0], 255, 255, 255, alpha[1]];
         save_buffer(&path, &pixels, 2, 1, ExtendedColorType::Rgba8).expect("written");

@@ -40,7 +40,7 @@ fn exif_data_may_have_the_jpeg_prefix() {
         chunks.extend(&still[12..]);
         chunks.extend(chunk(b"EXIF", &exif));
         let file = chunk(b"RIFF", &[b"WEBP".as_slice(), &chunks].concat());
-        let texels = load_bytes("a.webp", &file, ImageEncoding::Color).expect("a WebP");
+        let texels = load_bytes("a.webp", &file, ColorEncoding::Color).expect("a WebP");
         assert_eq!(texels.data, TexelData::Srgb8(vec![blue, red]));
     }
 }
@@ -50,9 +50,9 @@ fn animations_cause_a_warning() {
     let (red, blue) = ([255, 0, 0], [0, 0, 255]);
     for (frames, warnings) in [(vec![red, blue, blue], 1), (vec![red], 0)] {
         let file = animation(&frames);
-        let texels = load_bytes("a.webp", &file, ImageEncoding::Color).expect("a WebP");
+        let texels = load_bytes("a.webp", &file, ColorEncoding::Color).expect("a WebP");
         assert_eq!(texels.data, TexelData::Srgb8(vec![red]));
-        let found = warnings_of("a.webp", &file, ImageEncoding::Color);
+        let found = warnings_of("a.webp", &file, ColorEncoding::Color);
         assert_eq!(found.len(), warnings, "{found:?}");
         assert!(found.iter().all(|warning| warning.contains(" 3 ")), "{found:?}");
     }

@@ -37,7 +37,7 @@ impl MtlLibraryLoader<'_> {
         statement: &str,
     ) -> Result<HashMap<String, usize>, AssetError> {
         let mut indices = HashMap::new();
-        for path in library_paths(self.source.path, statement) {
+        for path in resolve_library_paths(self.source.path, statement) {
             indices.extend(self.load_file_and_map_materials(&path)?);
         }
         self.found.resolved.extend(indices.keys().cloned());
@@ -98,7 +98,7 @@ impl MtlLibraryLoader<'_> {
 
 /// Returns the libraries named in an `mtllib` statement from the OBJ file at `obj`. The names may contain
 /// blanks and may be followed by a comment.
-pub(super) fn library_paths(obj: &Path, statement: &str) -> Vec<PathBuf> {
+pub(super) fn resolve_library_paths(obj: &Path, statement: &str) -> Vec<PathBuf> {
     let folder = obj.parent().unwrap_or(Path::new(""));
     let readings =
         with_and_without_comments(statement).flat_map(|name| [name.to_owned(), name.replace('\\', "/")]);

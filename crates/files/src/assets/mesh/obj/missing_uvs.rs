@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::super::MeshFileBytes;
 use super::super::parsed::ParsedMesh;
 use super::build::FaceRun;
-use super::statements::{CornerIndices, NONE, ParsedObj, face_lines, face_start};
+use super::statements::{CornerIndices, NONE, ParsedObj, byte_offset_of_face, line_numbers_of_faces};
 use crate::assets::FileMaterial;
 
 /// Faces that have corners without texture coordinates.
@@ -53,14 +53,14 @@ impl MissingUvs {
     /// Warning about objects in which only some corners have texture coordinates.
     pub(super) fn partial_uvs_warning(&self, source: &MeshFileBytes<'_>) -> Option<String> {
         let (first, count) = self.partial?;
-        Some(corners_without_uvs_warning(source.line_number(face_start(source, first)), count))
+        Some(corners_without_uvs_warning(source.line_number(byte_offset_of_face(source, first)), count))
     }
 
     /// Warnings about textured objects without texture coordinates, one for each material.
     pub(super) fn material_warnings(&self, source: &MeshFileBytes<'_>, parsed: &ParsedMesh) -> Vec<String> {
         let mut faces: Vec<usize> = self.textured.values().copied().collect();
         faces.sort_unstable();
-        let lines = face_lines(source, &faces);
+        let lines = line_numbers_of_faces(source, &faces);
         let warning = |(material, face): (&u32, &usize)| {
             let line = faces.binary_search(face).map_or(0, |index| lines[index]);
             let name = &parsed.materials[*material as usize].name;

@@ -20,7 +20,7 @@ use build::{FaceRun, build_faces};
 use libraries::{LoadedLibraries, MtlLibraryLoader};
 use missing_uvs::MissingUvs;
 pub(super) use references::referenced_files;
-use statements::{NONE, ParsedObj, Smoothing, StateChange, face_start};
+use statements::{NONE, ParsedObj, Smoothing, StateChange, byte_offset_of_face};
 
 pub(super) fn parse(source: &MeshFileBytes<'_>) -> Result<LoadedMesh, AssetError> {
     parse_normalized_text(&MeshFileBytes { bytes: &convert_mac_line_ends(source.bytes), ..*source })
@@ -43,7 +43,7 @@ fn parse_normalized_text(source: &MeshFileBytes<'_>) -> Result<LoadedMesh, Asset
     parsed.warnings.extend(missing.partial_uvs_warning(source));
     parsed.material_warnings.extend(missing.material_warnings(source, &parsed));
     drop(statements);
-    assemble_text_mesh(source, parsed, |face| Some(face_start(source, face)))
+    assemble_text_mesh(source, parsed, |face| Some(byte_offset_of_face(source, face)))
 }
 
 /// Materials for an OBJ file.

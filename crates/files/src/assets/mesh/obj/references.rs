@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::super::text::{Lines, convert_mac_line_ends};
 use super::super::{FILE_LIMIT, mtl};
-use super::libraries::library_paths;
+use super::libraries::resolve_library_paths;
 use super::words::ObjTextCursor;
 use crate::control::{CancelToken, Canceled};
 
@@ -15,7 +15,7 @@ pub(in crate::assets::mesh) fn referenced_files(
     token: &CancelToken,
 ) -> Result<Vec<PathBuf>, Canceled> {
     let mut files = BTreeSet::new();
-    for library in libraries(path, token)? {
+    for library in referenced_libraries(path, token)? {
         if let Ok(mut lines) = Lines::open(&library, mtl::FILE_LIMIT) {
             while let Some(line) = lines.read_next_line(token)? {
                 files.extend(mtl::map_statement_image_candidates(&library, line));
@@ -26,7 +26,7 @@ pub(in crate::assets::mesh) fn referenced_files(
     Ok(files.into_iter().collect())
 }
 
-fn libraries(path: &Path, token: &CancelToken) -> Result<BTreeSet<PathBuf>, Canceled> {
+fn referenced_libraries(path: &Path, token: &CancelToken) -> Result<BTreeSet<PathBuf>, Canceled> {
     let mut libraries = BTreeSet::new();
     let Ok(mut lines) = Lines::open(path, FILE_LIMIT) else { return Ok(libraries) };
     loop {
@@ -40,7 +40,7 @@ fn libraries(path: &Path, token: &CancelToken) -> Result<BTreeSet<PathBuf>, Canc
         let statement = convert_mac_line_ends(statement);
         let mut words = ObjTextCursor::new(&statement);
         words.next_word();
-        libraries.extend(library_paths(path, &words.name()));
+        libraries.extend(resolve_library_paths(path, &words.take_name()));
     }
 }
 

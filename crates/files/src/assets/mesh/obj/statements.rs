@@ -114,11 +114,11 @@ impl ParsedObj {
             b"o" | b"g" => self.push_state_change(StateChange::Object),
             b"s" => self.parse_smoothing(source, words, start),
             b"mtllib" => {
-                let name = words.name();
+                let name = words.take_name();
                 self.push_state_change(StateChange::Library(name));
             }
             b"usemtl" => {
-                let name = words.name();
+                let name = words.take_name();
                 self.push_state_change(StateChange::Material(name));
             }
             b"surf" | b"curv" | b"curv2" => {
@@ -167,8 +167,10 @@ impl ParsedObj {
         {
             let Some(first) = self.corners.iter().position(|corner| corner[part] != NONE) else { continue };
             if count == 0 {
-                let line =
-                    source.line_number(face_start(source, face_of_corner_from_arities(&self.arities, first)));
+                let line = source.line_number(byte_offset_of_face(
+                    source,
+                    face_of_corner_from_arities(&self.arities, first),
+                ));
                 self.warnings.push(missing_attribute_warning(line, name));
                 self.corners.iter_mut().for_each(|corner| corner[part] = NONE);
             }
@@ -189,7 +191,7 @@ impl ParsedObj {
         };
         let index = i64::from(self.corners[place][part]) + 1;
         Err(source.malformed_error_with_line(
-            face_start(source, face_of_corner_from_arities(&self.arities, place)),
+            byte_offset_of_face(source, face_of_corner_from_arities(&self.arities, place)),
             out_of_range_message(part, index, counts[part]),
         ))
     }
@@ -231,7 +233,7 @@ pub(super) fn free_form_warning(line: usize, keyword: &str) -> String {
 }
 
 /// Line numbers of faces, given their indices in ascending order. Reads the file once.
-pub(super) fn face_lines(source: &MeshFileBytes<'_>, faces: &[usize]) -> Vec<usize> {
+pub(super) fn line_numbers_of_faces(source: &MeshFileBytes<'_>, faces: &[usize]) -> Vec<usize> {
     let mut starts = face_byte_offsets(source);
     let (mut passed, mut at, mut line) = (0, 0, 1);
     let mut line_of = |face: usize| {
@@ -244,7 +246,7 @@ pub(super) fn face_lines(source: &MeshFileBytes<'_>, faces: &[usize]) -> Vec<usi
 }
 
 /// Byte offset of a face.
-pub(super) fn face_start(source: &MeshFileBytes<'_>, face: usize) -> usize {
+pub(super) fn byte_offset_of_face(source: &MeshFileBytes<'_>, face: usize) -> usize {
     face_byte_offsets(source).nth(face).unwrap_or(0)
 }
 

@@ -1,6 +1,6 @@
 //! Vertices in an OBJ file, including color extensions from several programs.
 
-use super::super::parsed::ColorRange;
+use super::super::parsed::ColorRangeDetector;
 use super::super::text::expected_message;
 use super::words::{ObjTextCursor, parse_number, too_few_numbers_message};
 use crate::math::DVec3;
@@ -11,7 +11,7 @@ pub(super) struct Vertices {
     pub(super) positions: Vec<DVec3>,
     /// Optional color of each position. May be shorter than `positions`.
     colors: Vec<Option<[f32; 3]>>,
-    range: ColorRange,
+    range: ColorRangeDetector,
     /// Colors from ZBrush's `#MRGB` comments, in the order of the positions.
     painted: Vec<[u8; 3]>,
     /// Minimum alpha and the byte offset of its statement.

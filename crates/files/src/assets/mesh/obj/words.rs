@@ -53,7 +53,7 @@ impl<'a> ObjTextCursor<'a> {
     }
 
     /// Consumes the rest of this statement as a name. Names may contain blanks and `#`.
-    pub(super) fn name(&mut self) -> String {
+    pub(super) fn take_name(&mut self) -> String {
         let mut name = String::new();
         loop {
             let line = self.take_raw_line_rest();
@@ -129,7 +129,7 @@ mod tests {
         let name = |text: &str| {
             let mut words = ObjTextCursor::new(text.as_bytes());
             words.next_word();
-            words.name()
+            words.take_name()
         };
         assert_eq!(name("usemtl\ta #2 \r\nf"), "a #2");
         assert_eq!(name("mtllib a.mtl \\\n b.mtl\nf"), "a.mtl   b.mtl");

@@ -4,7 +4,7 @@
 //! lines may be anywhere.
 
 use super::assemble::assemble_text_mesh;
-use super::parsed::{ColorRange, FACE_COLORS_IGNORED, ParsedMesh, alpha_ignored_warning};
+use super::parsed::{ColorRangeDetector, FACE_COLORS_IGNORED, ParsedMesh, alpha_ignored_warning};
 use super::text::{Cursor, expected_message, quote_word, unexpected_line_end_message};
 use super::{AssetError, EMPTY_FILE, LoadedMesh, MeshFileBytes, vertex_out_of_range_message};
 use crate::math::{DVec2, DVec3, Vec2};
@@ -119,7 +119,7 @@ fn incomplete_face_message(corner: usize, arity: usize) -> String {
 #[derive(Default)]
 struct ParsedOffColors {
     all: Vec<Option<[f64; 3]>>,
-    range: ColorRange,
+    range: ColorRangeDetector,
     /// Minimum alpha and a byte offset on its line.
     min_alpha: Option<(f64, usize)>,
 }
@@ -163,9 +163,9 @@ impl OffReader<'_> {
         self.skip_edge_count_and_line_end()?;
         self.check_plausible_counts(vertices, faces)?;
         let mut parsed = ParsedMesh::default();
-        self.vertices(header, vertices, &mut parsed)?;
+        self.read_vertices(header, vertices, &mut parsed)?;
         let before_faces = self;
-        let colors = self.faces(vertices, faces, &mut parsed)?;
+        let colors = self.read_faces(vertices, faces, &mut parsed)?;
         let face_colors = colors.finish(&self.source, &mut parsed.warnings);
         if parsed.colors.is_empty() {
             parsed.corner_colors = face_colors;
@@ -180,7 +180,7 @@ impl OffReader<'_> {
     /// Returns the byte offset of a face, given its index. The reader must be at the first face.
     fn start_of_face(&self, vertices: u64, face: usize) -> Option<usize> {
         let mut ahead = *self;
-        ahead.faces(vertices, face as u64, &mut ParsedMesh::default()).ok()?;
+        ahead.read_faces(vertices, face as u64, &mut ParsedMesh::default()).ok()?;
         ahead.cursor.skip_to_word_across_lines();
         Some(ahead.cursor.offset())
     }
@@ -191,7 +191,7 @@ impl OffReader<'_> {
 
     fn fail_with_unexpected_word<T>(&self, wanted: &str) -> Result<T, AssetError> {
         let mut ahead = self.cursor;
-        self.fail(expected_message(wanted, ahead.word()))
+        self.fail(expected_message(wanted, ahead.take_word()))
     }
 
     /// Reads the optional header keyword `[ST][C][N][4]OFF`. A count may follow without whitespace.
@@ -200,7 +200,7 @@ impl OffReader<'_> {
             return self.fail(EMPTY_FILE);
         }
         let start = self.cursor;
-        let word = self.cursor.word();
+        let word = self.cursor.take_word();
         if word[0].is_ascii_digit() && !word.ends_with(b"OFF") {
             self.cursor = start;
             return Ok(OffVertexColumns::default());
@@ -222,7 +222,7 @@ impl OffReader<'_> {
 
     fn reject_binary(&mut self) -> Result<(), AssetError> {
         let mut ahead = self.cursor;
-        if ahead.skip_to_word_in_line() && ahead.word() == b"BINARY" {
+        if ahead.skip_to_word_in_line() && ahead.take_word() == b"BINARY" {
             return self.fail(BINARY_OFF);
         }
         Ok(())
@@ -238,7 +238,7 @@ impl OffReader<'_> {
 
     /// Reads a nonnegative integer at the cursor.
     fn read_nonnegative_integer(&mut self, of: &str) -> Result<u64, AssetError> {
-        match self.cursor.integer() {
+        match self.cursor.take_integer() {
             Some(number) => match u64::try_from(number) {
                 Ok(number) => Ok(number),
                 Err(_) => self.fail(negative_count_message(of, number)),
@@ -254,7 +254,7 @@ impl OffReader<'_> {
         }
         if self.cursor.skip_to_word_in_line() {
             let mut ahead = self.cursor;
-            return self.fail(words_after_counts_message(ahead.word()));
+            return self.fail(words_after_counts_message(ahead.take_word()));
         }
         self.cursor.move_to_next_line();
         Ok(())
@@ -273,7 +273,7 @@ impl OffReader<'_> {
         Ok(())
     }
 
-    fn vertices(
+    fn read_vertices(
         &mut self,
         header: OffVertexColumns,
         count: u64,
@@ -289,7 +289,7 @@ impl OffReader<'_> {
                 return self.fail(truncated_message(index, count, "vertices"));
             }
             let position = self.read_vec3("a coordinate")?;
-            let divisor = if header.homogeneous { self.float("a coordinate")? } else { 1.0 };
+            let divisor = if header.homogeneous { self.read_float("a coordinate")? } else { 1.0 };
             parsed.positions.push(position / divisor);
             if header.normals {
                 parsed.normals.push(self.read_vec3("a normal")?.as_vec3());
@@ -327,14 +327,14 @@ impl OffReader<'_> {
     }
 
     fn read_vec3(&mut self, what: &str) -> Result<DVec3, AssetError> {
-        Ok(DVec3::new(self.float(what)?, self.float(what)?, self.float(what)?))
+        Ok(DVec3::new(self.read_float(what)?, self.read_float(what)?, self.read_float(what)?))
     }
 
-    fn float(&mut self, what: &str) -> Result<f64, AssetError> {
+    fn read_float(&mut self, what: &str) -> Result<f64, AssetError> {
         if !self.cursor.skip_to_word_in_line() {
             return self.fail(unexpected_line_end_message(what));
         }
-        match self.cursor.float() {
+        match self.cursor.take_float() {
             Some(value) => Ok(value),
             None => self.fail_with_unexpected_word(what),
         }
@@ -345,7 +345,7 @@ impl OffReader<'_> {
     fn read_numbers_to_line_end(&mut self) -> Result<Vec<f64>, AssetError> {
         let mut rest = Vec::new();
         while self.cursor.skip_to_word_in_line() {
-            rest.push(self.float("a number")?);
+            rest.push(self.read_float("a number")?);
         }
         Ok(rest)
     }
@@ -353,14 +353,14 @@ impl OffReader<'_> {
     /// Reads texture coordinates: the last two numbers on the line. A color with any number of components may
     /// precede them.
     fn read_uv_at_line_end(&mut self) -> Result<Vec2, AssetError> {
-        let mut last = DVec2::new(self.float("u")?, self.float("v")?);
+        let mut last = DVec2::new(self.read_float("u")?, self.read_float("v")?);
         while self.cursor.skip_to_word_in_line() {
-            last = DVec2::new(last.y, self.float("a number")?);
+            last = DVec2::new(last.y, self.read_float("a number")?);
         }
         Ok(last.as_vec2())
     }
 
-    fn faces(
+    fn read_faces(
         &mut self,
         vertices: u64,
         count: u64,
@@ -375,12 +375,12 @@ impl OffReader<'_> {
             if !self.cursor.skip_to_word_across_lines() {
                 return self.fail(truncated_message(index, count, "faces"));
             }
-            self.face(vertices, parsed, &mut colors)?;
+            self.read_face(vertices, parsed, &mut colors)?;
         }
         Ok(colors)
     }
 
-    fn face(
+    fn read_face(
         &mut self,
         vertices: u64,
         parsed: &mut ParsedMesh,
@@ -396,7 +396,7 @@ impl OffReader<'_> {
             {
                 return self.fail(incomplete_face_message(corner, arity));
             }
-            match self.cursor.integer() {
+            match self.cursor.take_integer() {
                 Some(vertex) if (0..vertices as i64).contains(&vertex) => {
                     parsed.faces.push_corner(vertex as u32);
                 }
@@ -407,7 +407,7 @@ impl OffReader<'_> {
         parsed.faces.end_face(arity);
         let (mut color, mut count) = ([0.0; 5], 0);
         while count < color.len() && self.cursor.skip_to_word_in_line() {
-            let Some(number) = self.cursor.float() else {
+            let Some(number) = self.cursor.take_float() else {
                 self.excess.add_line_at_offset(self.cursor.offset());
                 break;
             };

@@ -5,8 +5,8 @@ use super::header::ScalarType;
 
 /// Reads numbers in file order. Errors do not include the position in the file.
 pub(super) trait NumberReader: Clone {
-    fn float(&mut self, scalar: ScalarType) -> Result<f64, String>;
-    fn integer(&mut self, scalar: ScalarType) -> Result<i64, String>;
+    fn read_float(&mut self, scalar: ScalarType) -> Result<f64, String>;
+    fn read_integer(&mut self, scalar: ScalarType) -> Result<i64, String>;
     fn skip(&mut self, scalar: ScalarType, count: usize) -> Result<(), String>;
 
     /// Ends an item, such as a vertex or a face.
@@ -48,20 +48,20 @@ impl AsciiReader<'_> {
 }
 
 impl NumberReader for AsciiReader<'_> {
-    fn float(&mut self, _: ScalarType) -> Result<f64, String> {
+    fn read_float(&mut self, _: ScalarType) -> Result<f64, String> {
         self.seek_word_across_lines()?;
-        self.0.float().ok_or_else(|| expected_message("a number", self.0.word()))
+        self.0.take_float().ok_or_else(|| expected_message("a number", self.0.take_word()))
     }
 
-    fn integer(&mut self, _: ScalarType) -> Result<i64, String> {
+    fn read_integer(&mut self, _: ScalarType) -> Result<i64, String> {
         self.seek_word_across_lines()?;
-        self.0.integer().ok_or_else(|| expected_message("an integer", self.0.word()))
+        self.0.take_integer().ok_or_else(|| expected_message("an integer", self.0.take_word()))
     }
 
     fn skip(&mut self, _: ScalarType, count: usize) -> Result<(), String> {
         for _ in 0..count {
             self.seek_word_across_lines()?;
-            self.0.word();
+            self.0.take_word();
         }
         Ok(())
     }
@@ -114,7 +114,7 @@ impl<const BIG_ENDIAN: bool> BinaryReader<'_, BIG_ENDIAN> {
 
 impl<const BIG_ENDIAN: bool> NumberReader for BinaryReader<'_, BIG_ENDIAN> {
     #[inline]
-    fn float(&mut self, scalar: ScalarType) -> Result<f64, String> {
+    fn read_float(&mut self, scalar: ScalarType) -> Result<f64, String> {
         match scalar {
             ScalarType::F32 => Ok(f64::from(f32::from_le_bytes(self.take_as_little_endian()?))),
             ScalarType::F64 => Ok(f64::from_le_bytes(self.take_as_little_endian()?)),
@@ -123,12 +123,12 @@ impl<const BIG_ENDIAN: bool> NumberReader for BinaryReader<'_, BIG_ENDIAN> {
             | ScalarType::I16
             | ScalarType::U16
             | ScalarType::I32
-            | ScalarType::U32 => Ok(self.integer(scalar)? as f64),
+            | ScalarType::U32 => Ok(self.read_integer(scalar)? as f64),
         }
     }
 
     #[inline]
-    fn integer(&mut self, scalar: ScalarType) -> Result<i64, String> {
+    fn read_integer(&mut self, scalar: ScalarType) -> Result<i64, String> {
         Ok(match scalar {
             ScalarType::I8 => i64::from(i8::from_le_bytes(self.take_as_little_endian()?)),
             ScalarType::U8 => i64::from(u8::from_le_bytes(self.take_as_little_endian()?)),
@@ -136,7 +136,7 @@ impl<const BIG_ENDIAN: bool> NumberReader for BinaryReader<'_, BIG_ENDIAN> {
             ScalarType::U16 => i64::from(u16::from_le_bytes(self.take_as_little_endian()?)),
             ScalarType::I32 => i64::from(i32::from_le_bytes(self.take_as_little_endian()?)),
             ScalarType::U32 => i64::from(u32::from_le_bytes(self.take_as_little_endian()?)),
-            ScalarType::F32 | ScalarType::F64 => self.float(scalar)? as i64,
+            ScalarType::F32 | ScalarType::F64 => self.read_float(scalar)? as i64,
         })
     }
 

@@ -1,6 +1,6 @@
 //! Colors in a PLY file. Their range depends on their type and on the largest value.
 
-use super::super::parsed::{ALPHA_IGNORED, ColorComponentExtremes, ColorRange, unit_color_to_bytes};
+use super::super::parsed::{ALPHA_IGNORED, ColorComponentExtremes, ColorRangeDetector, unit_color_to_bytes};
 use super::header::ScalarType;
 
 /// Colors in file order.
@@ -11,7 +11,7 @@ pub(super) struct PlyColorCollector {
     bytes: Vec<[u8; 3]>,
     /// Colors stored as types other than bytes.
     numbers: Vec<[f64; 3]>,
-    range: ColorRange,
+    range: ColorRangeDetector,
     /// Extremes of red, green and blue.
     extremes: [ColorComponentExtremes; 3],
     /// Minimum alpha, its type, and a byte offset in its item.

@@ -75,7 +75,7 @@ pub(super) fn read_with_attributes(
     read_items(context, element, numbers, |numbers| {
         let start = numbers.offset();
         faces.read_face(&roles, numbers, vertices)?;
-        faces.add(parsed, start, numbers.offset());
+        faces.append_face_to_mesh(parsed, start, numbers.offset());
         Ok(())
     })?;
     faces.add_colors_and_warnings(context, parsed);
@@ -153,17 +153,17 @@ impl FaceReader {
             match (kind, role) {
                 (PropertyType::List { count, item }, PropertyRole::Corners) => {
                     for _ in 0..read_list_length(numbers, count, item)? {
-                        self.corners.push(checked_vertex_index(numbers.integer(item)?, vertices)?);
+                        self.corners.push(checked_vertex_index(numbers.read_integer(item)?, vertices)?);
                     }
                 }
                 (PropertyType::List { count, item }, PropertyRole::Uvs | PropertyRole::Colors) => {
                     let list = if role == PropertyRole::Uvs { &mut self.uvs } else { &mut self.parts };
                     for _ in 0..read_list_length(numbers, count, item)? {
-                        list.push(numbers.float(item)?);
+                        list.push(numbers.read_float(item)?);
                     }
                 }
                 (PropertyType::Scalar(scalar), PropertyRole::Value(index)) => {
-                    self.values[index] = numbers.float(scalar)?;
+                    self.values[index] = numbers.read_float(scalar)?;
                 }
                 (
                     _,
@@ -181,7 +181,7 @@ impl FaceReader {
     }
 
     /// Adds the current face to `parsed`. The face is stored between the byte offsets `start` and `end`.
-    fn add(&mut self, parsed: &mut ParsedMesh, start: usize, end: usize) {
+    fn append_face_to_mesh(&mut self, parsed: &mut ParsedMesh, start: usize, end: usize) {
         let arity = self.corners.len();
         let is_wrong = |list: &[f64], sizes| {
             !list.is_empty() && arity > 0 && components_of_corner(list, arity, 0, sizes).is_none()

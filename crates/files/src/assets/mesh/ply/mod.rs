@@ -219,7 +219,7 @@ fn read_list_length(
     count: ScalarType,
     item: ScalarType,
 ) -> Result<usize, String> {
-    let length = numbers.integer(count)?;
+    let length = numbers.read_integer(count)?;
     match u64::try_from(length) {
         Ok(fits) if numbers.has_bytes_for(item, fits) => Ok(fits as usize),
         Ok(_) => Err(list_too_long_message(length)),
@@ -290,7 +290,7 @@ fn read_vertices(
         let mut values = [0.0; 14];
         for &(kind, slot) in &layout {
             match (kind, slot) {
-                (PropertyType::Scalar(scalar), Some(slot)) => values[slot] = numbers.float(scalar)?,
+                (PropertyType::Scalar(scalar), Some(slot)) => values[slot] = numbers.read_float(scalar)?,
                 (PropertyType::Scalar(_), None) | (PropertyType::List { .. }, _) => {
                     skip_property(numbers, kind)?;
                 }
@@ -342,7 +342,7 @@ fn read_faces(
     faces.reserve(element.count as usize);
     read_items_with_list_property(context, element, corners, numbers, |numbers, item, length| {
         for _ in 0..length {
-            faces.push_corner(checked_vertex_index(numbers.integer(item)?, vertices)?);
+            faces.push_corner(checked_vertex_index(numbers.read_integer(item)?, vertices)?);
         }
         faces.end_face(length);
         Ok(())
@@ -367,7 +367,7 @@ fn read_strips(
     read_items_with_list_property(context, element, corners, numbers, |numbers, item, length| {
         let (mut before, mut count) = ([0; 2], 0_usize);
         for _ in 0..length {
-            let vertex = numbers.integer(item)?;
+            let vertex = numbers.read_integer(item)?;
             if vertex == -1 {
                 count = 0;
                 continue;

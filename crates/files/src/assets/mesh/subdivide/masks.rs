@@ -5,15 +5,15 @@
 use std::f64::consts::{PI, TAU};
 use std::ops::{Add, Mul};
 
-use super::topology::{NONE, Topology, next, previous};
+use super::topology::{NONE, Topology, next_half_edge, previous_half_edge};
 
 /// A value at a vertex that is subdivided: a point, texture coordinates or a color.
-pub(super) trait Value:
+pub(super) trait VertexValue:
     Copy + Default + Send + Sync + Add<Output = Self> + Mul<f64, Output = Self>
 {
 }
 
-impl<T: Copy + Default + Send + Sync + Add<Output = T> + Mul<f64, Output = T>> Value for T {}
+impl<T: Copy + Default + Send + Sync + Add<Output = T> + Mul<f64, Output = T>> VertexValue for T {}
 
 /// Weight of each of the `count` neighbors of a vertex in a closed fan, β (Loop, section 3.2).
 pub(super) fn neighbor_weight(count: u32) -> f64 {
@@ -28,20 +28,20 @@ pub(super) fn neighbor_weight(count: u32) -> f64 {
 /// Weight of the far end of an edge in a wide fan with this many faces around the near end, whose weight is 3/4
 /// minus this one. Across the boundary, the largest eigenvalue becomes 1/2, as along the boundary (Biermann,
 /// Levin and Zorin, *Piecewise Smooth Subdivision Surfaces with Normal Control*, SIGGRAPH 2000, section 3.2).
-fn wide_edge_weight(faces: u32) -> f64 {
+fn wide_fan_edge_weight(faces: u32) -> f64 {
     0.5 - 0.25 * libm::cos(PI / f64::from(faces))
 }
 
 /// Value after one refinement, at a vertex if `index` is below the number of vertices, and otherwise at the
 /// middle of an edge.
-pub(super) fn refined_value<T: Value>(topology: &Topology, values: &[T], index: usize) -> T {
-    match index.checked_sub(topology.vertices()) {
+pub(super) fn refined_value<T: VertexValue>(topology: &Topology, values: &[T], index: usize) -> T {
+    match index.checked_sub(topology.vertex_count()) {
         None => refined_vertex(topology, values, index as u32),
         Some(edge) => refined_edge(topology, values, topology.edge_halves[edge]),
     }
 }
 
-fn refined_vertex<T: Value>(topology: &Topology, values: &[T], vertex: u32) -> T {
+fn refined_vertex<T: VertexValue>(topology: &Topology, values: &[T], vertex: u32) -> T {
     let value = values[vertex as usize];
     if topology.is_corner(vertex) {
         return value;
@@ -64,24 +64,24 @@ fn refined_vertex<T: Value>(topology: &Topology, values: &[T], vertex: u32) -> T
     }
 }
 
-fn refined_edge<T: Value>(topology: &Topology, values: &[T], half: u32) -> T {
+fn refined_edge<T: VertexValue>(topology: &Topology, values: &[T], half: u32) -> T {
     let [a, b] = [topology.start(half), topology.end(half)];
     let at = |vertex: u32| values[vertex as usize];
     let twin = topology.twin(half);
     if twin == NONE {
         return (at(a) + at(b)) * 0.5;
     }
-    let wings = at(topology.start(previous(half))) + at(topology.start(previous(twin)));
-    let wide = match (topology.is_wide(a), topology.is_wide(b)) {
-        (true, false) => topology.wide_fan_faces(half).map(|faces| (a, b, faces)),
-        (false, true) => topology.wide_fan_faces(twin).map(|faces| (b, a, faces)),
+    let wings = at(topology.start(previous_half_edge(half))) + at(topology.start(previous_half_edge(twin)));
+    let wide = match (topology.has_wide_fan(a), topology.has_wide_fan(b)) {
+        (true, false) => topology.wide_fan_face_count(half).map(|faces| (a, b, faces)),
+        (false, true) => topology.wide_fan_face_count(twin).map(|faces| (b, a, faces)),
         // Only unrefined meshes have an edge between two such vertices. Use Loop's weights there.
         (false, false) | (true, true) => None,
     };
     let ends = match wide {
         None => (at(a) + at(b)) * 0.375,
         Some((near, far, faces)) => {
-            let weight = wide_edge_weight(faces);
+            let weight = wide_fan_edge_weight(faces);
             at(near) * (0.75 - weight) + at(far) * weight
         }
     };
@@ -90,9 +90,9 @@ fn refined_edge<T: Value>(topology: &Topology, values: &[T], half: u32) -> T {
 
 /// Value on the limit surface. `index` is as in [`refined_value`], and `refined` contains the values after the
 /// refinement.
-pub(super) fn limit_value<T: Value>(topology: &Topology, refined: &[T], index: usize) -> T {
+pub(super) fn limit_value<T: VertexValue>(topology: &Topology, refined: &[T], index: usize) -> T {
     let value = refined[index];
-    let Some(edge) = index.checked_sub(topology.vertices()) else {
+    let Some(edge) = index.checked_sub(topology.vertex_count()) else {
         return limit_at_vertex(topology, refined, index as u32);
     };
     let half = topology.edge_halves[edge];
@@ -105,12 +105,12 @@ pub(super) fn limit_value<T: Value>(topology: &Topology, refined: &[T], index: u
     value * 0.5 + sum * (1.0 / 12.0)
 }
 
-fn limit_at_vertex<T: Value>(topology: &Topology, refined: &[T], vertex: u32) -> T {
+fn limit_at_vertex<T: VertexValue>(topology: &Topology, refined: &[T], vertex: u32) -> T {
     let value = refined[vertex as usize];
     if topology.is_corner(vertex) {
         return value;
     }
-    let at_middle = |half: u32| refined[topology.vertices() + topology.edge(half) as usize];
+    let at_middle = |half: u32| refined[topology.vertex_count() + topology.edge(half) as usize];
     let (mut sum, mut count) = (T::default(), 0);
     let start = topology.vertex_halves[vertex as usize];
     let last = topology.walk_fan(start, |half| {
@@ -129,9 +129,9 @@ fn limit_at_vertex<T: Value>(topology: &Topology, refined: &[T], vertex: u32) ->
 /// The six vertices around the middle of an edge after one refinement, counterclockwise from the end of the
 /// half-edge, which has a twin.
 pub(super) fn edge_ring(topology: &Topology, half: u32) -> [u32; 6] {
-    let (first, twin) = (topology.vertices() as u32, topology.twin(half));
+    let (first, twin) = (topology.vertex_count() as u32, topology.twin(half));
     let middle = |half: u32| first + topology.edge(half);
-    let sides = |half: u32| [middle(next(half)), middle(previous(half))];
+    let sides = |half: u32| [middle(next_half_edge(half)), middle(previous_half_edge(half))];
     let ([b, c], [d, e]) = (sides(half), sides(twin));
     [topology.end(half), b, c, topology.start(half), d, e]
 }

@@ -15,8 +15,8 @@ use std::path::Path;
 
 use rayon::prelude::*;
 
-use self::masks::{Value, limit_value, refined_value};
-use self::normals::NormalMasks;
+use self::masks::{VertexValue, limit_value, refined_value};
+use self::normals::LimitNormals;
 use self::topology::Topology;
 use self::weld::ControlMesh;
 use super::assemble::{drop_unused_vertices, has_area};
@@ -64,7 +64,7 @@ pub fn subdivide(
         return Ok(loaded);
     }
     check_triangle_count(loaded.mesh.triangles.len(), levels, path)?;
-    let work = Work { path, token };
+    let work = ParallelListBuilder { path, token };
     let before = loaded.mesh.triangles.len();
     let control = ControlMesh::weld(&mut loaded.mesh, work)?;
     loaded.dropped.degenerate += (before - loaded.mesh.triangles.len()) as u64;
@@ -72,7 +72,7 @@ pub fn subdivide(
     loaded.warnings.extend(improper_edges_warning(control.improper_edges));
     let TriangleMesh { origin, materials, .. } = std::mem::take(&mut loaded.mesh);
     let copies = 1 << (2 * levels);
-    let materials = work.fill(materials.len() * copies, |triangle| materials[triangle / copies])?;
+    let materials = work.build(materials.len() * copies, |triangle| materials[triangle / copies])?;
     loaded.mesh = TriangleMesh { origin, materials, ..subdivided_mesh(control, levels, work)? };
     loaded.dropped.degenerate += drop_triangles_without_area(&mut loaded.mesh);
     check_has_triangles(&loaded.mesh, path)?;
@@ -120,14 +120,18 @@ fn improper_edges_warning(count: usize) -> Option<String> {
 }
 
 /// Subdivides a control mesh. The result has no materials.
-fn subdivided_mesh(control: ControlMesh, levels: u32, work: Work<'_>) -> Result<TriangleMesh, AssetError> {
+fn subdivided_mesh(
+    control: ControlMesh,
+    levels: u32,
+    work: ParallelListBuilder<'_>,
+) -> Result<TriangleMesh, AssetError> {
     let ControlMesh { mut shape, mut points, mut seamed, mut uvs, mut second_uvs, mut colors, .. } = control;
     for level in 1..=levels {
         let attributes = seamed.as_ref().unwrap_or(&shape);
-        points = refine(&shape, &points, work)?;
-        uvs = refine(attributes, &uvs, work)?;
-        second_uvs = refine(attributes, &second_uvs, work)?;
-        colors = refine(attributes, &colors, work)?;
+        points = refine_values(&shape, &points, work)?;
+        uvs = refine_values(attributes, &uvs, work)?;
+        second_uvs = refine_values(attributes, &second_uvs, work)?;
+        colors = refine_values(attributes, &colors, work)?;
         if level < levels {
             shape = shape.refined(work)?;
             seamed = seamed.map(|seamed| seamed.refined(work)).transpose()?;
@@ -145,21 +149,27 @@ fn subdivided_mesh(control: ControlMesh, levels: u32, work: Work<'_>) -> Result<
 }
 
 /// Values after one refinement. An empty list stays empty.
-fn refine<T: Value>(topology: &Topology, values: &[T], work: Work<'_>) -> Result<Vec<T>, AssetError> {
+fn refine_values<T: VertexValue>(
+    topology: &Topology,
+    values: &[T],
+    work: ParallelListBuilder<'_>,
+) -> Result<Vec<T>, AssetError> {
     if values.is_empty() {
         return Ok(Vec::new());
     }
-    work.fill(topology.vertices() + topology.edges(), |index| refined_value(topology, values, index))
+    work.build(topology.vertex_count() + topology.edge_count(), |index| {
+        refined_value(topology, values, index)
+    })
 }
 
 /// Converted values on the limit surface, from the values after the last refinement. An empty list stays empty.
-fn limit_values<T: Value, U: Send>(
+fn limit_values<T: VertexValue, U: Send>(
     topology: &Topology,
     refined: &[T],
     convert: impl Fn(T) -> U + Sync,
-    work: Work<'_>,
+    work: ParallelListBuilder<'_>,
 ) -> Result<Vec<U>, AssetError> {
-    work.fill(refined.len(), |index| convert(limit_value(topology, refined, index)))
+    work.build(refined.len(), |index| convert(limit_value(topology, refined, index)))
 }
 
 /// Positions and normals on the limit surface for each vertex of the attributes' connectivity.
@@ -167,30 +177,30 @@ fn limit_surface(
     shape: &Topology,
     points: &[DVec3],
     attributes: &Topology,
-    work: Work<'_>,
+    work: ParallelListBuilder<'_>,
 ) -> Result<(Vec<Vec3>, Vec<Vec3>), AssetError> {
-    let masks = NormalMasks::new(shape, points);
-    let place = |vertex: usize| match vertex.checked_sub(attributes.vertices()) {
-        None => Place::Vertex(attributes.vertex_halves[vertex]),
-        Some(edge) => Place::Edge(attributes.edge_halves[edge]),
+    let limit_normals = LimitNormals::new(shape, points);
+    let place = |vertex: usize| match vertex.checked_sub(attributes.vertex_count()) {
+        None => RefinedVertexLocation::Vertex(attributes.vertex_halves[vertex]),
+        Some(edge) => RefinedVertexLocation::Edge(attributes.edge_halves[edge]),
     };
-    let count = attributes.vertices() + attributes.edges();
-    let positions = work.fill(count, |vertex| {
+    let count = attributes.vertex_count() + attributes.edge_count();
+    let positions = work.build(count, |vertex| {
         let index = match place(vertex) {
-            Place::Vertex(half) => shape.start(half) as usize,
-            Place::Edge(half) => shape.vertices() + shape.edge(half) as usize,
+            RefinedVertexLocation::Vertex(half) => shape.start(half) as usize,
+            RefinedVertexLocation::Edge(half) => shape.vertex_count() + shape.edge(half) as usize,
         };
         limit_value(shape, points, index).as_vec3()
     })?;
-    let normals = work.fill_with_buffer(count, |vertex, arms| match place(vertex) {
-        Place::Vertex(half) => masks.at_vertex(half, arms),
-        Place::Edge(half) => masks.at_edge(half),
+    let normals = work.build_with_buffer(count, |vertex, arms| match place(vertex) {
+        RefinedVertexLocation::Vertex(half) => limit_normals.at_vertex(half, arms),
+        RefinedVertexLocation::Edge(half) => limit_normals.at_edge(half),
     })?;
     Ok((positions, normals))
 }
 
 /// Location of a vertex in the connectivity before the last refinement.
-enum Place {
+enum RefinedVertexLocation {
     /// At the start of this half-edge.
     Vertex(u32),
     /// At the middle of this half-edge's edge.
@@ -215,20 +225,20 @@ fn drop_triangles_without_area(mesh: &mut TriangleMesh) -> u64 {
 
 /// Computes long lists in parallel, in batches between which it can be canceled.
 #[derive(Clone, Copy)]
-struct Work<'a> {
+struct ParallelListBuilder<'a> {
     /// The mesh file, for error messages.
     path: &'a Path,
     token: &'a CancelToken,
 }
 
-impl Work<'_> {
+impl ParallelListBuilder<'_> {
     /// Returns a list of `count` values.
-    fn fill<T: Send>(self, count: usize, value: impl Fn(usize) -> T + Sync) -> Result<Vec<T>, AssetError> {
-        self.fill_with_buffer(count, |index, _: &mut Vec<()>| value(index))
+    fn build<T: Send>(self, count: usize, value: impl Fn(usize) -> T + Sync) -> Result<Vec<T>, AssetError> {
+        self.build_with_buffer(count, |index, _: &mut Vec<()>| value(index))
     }
 
     /// Returns a list of `count` values, whose computation uses a buffer.
-    fn fill_with_buffer<T: Send, B: Send>(
+    fn build_with_buffer<T: Send, B: Send>(
         self,
         count: usize,
         value: impl Fn(usize, &mut Vec<B>) -> T + Sync,

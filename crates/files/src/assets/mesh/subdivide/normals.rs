@@ -4,10 +4,10 @@
 use std::f64::consts::{PI, TAU};
 
 use super::masks::edge_ring;
-use super::topology::{NONE, Topology, WIDE, next, previous};
+use super::topology::{NONE, Topology, WIDE, next_half_edge, previous_half_edge};
 use crate::math::{DVec3, Vec3};
 
-/// Number of neighbors up to which [`NormalMasks`] contains precomputed cosines and sines.
+/// Number of neighbors up to which [`LimitNormals`] contains precomputed cosines and sines.
 const TABLED: u32 = 24;
 
 /// Length of a cross product of tangents, relative to the square of the ring's radius, below which it consists
@@ -15,16 +15,17 @@ const TABLED: u32 = 24;
 const TINY: f64 = 1e-12;
 
 /// Computes limit normals from the points after the last refinement, and the connectivity before it.
-pub(super) struct NormalMasks<'a> {
+pub(super) struct LimitNormals<'a> {
     topology: &'a Topology,
     points: &'a [DVec3],
     /// Cosines and sines of multiples of 2π/n, for each number of neighbors n.
     turns: Vec<Vec<[f64; 2]>>,
 }
 
-impl<'a> NormalMasks<'a> {
+impl<'a> LimitNormals<'a> {
     pub(super) fn new(topology: &'a Topology, points: &'a [DVec3]) -> Self {
-        let turns = (0..=TABLED).map(|count| (0..count).map(|index| cos_sin(index, count)).collect());
+        let turns = (0..=TABLED)
+            .map(|count| (0..count).map(|index| cos_sin_of_turn_fraction(index, count)).collect());
         Self { topology, points, turns: turns.collect() }
     }
 
@@ -38,14 +39,14 @@ impl<'a> NormalMasks<'a> {
         let is_smooth = !is_corner && topology.twin(usual) != NONE;
         let start = if is_smooth { usual } else { topology.fan_start(half) };
         let center = self.points[vertex as usize];
-        let arm = |half: u32| self.edge_midpoint(half) - center;
+        let arm = |half: u32| self.point_at_edge_middle(half) - center;
         arms.clear();
         let last = topology.walk_fan(start, |half| arms.push(arm(half)));
         arms.extend(last.map(arm));
         let normal = match (is_corner, last) {
             (true, _) => DVec3::ZERO,
-            (false, None) => self.of_closed_fan(arms),
-            (false, Some(_)) => of_open_fan(arms, topology.is_wide(vertex)),
+            (false, None) => self.closed_fan_normal(arms),
+            (false, Some(_)) => open_fan_normal(arms, topology.has_wide_fan(vertex)),
         };
         unit_or_substitute(normal, arms, last.is_some())
     }
@@ -54,26 +55,31 @@ impl<'a> NormalMasks<'a> {
     pub(super) fn at_edge(&self, half: u32) -> Vec3 {
         let topology = self.topology;
         let edge = topology.edge(half);
-        let center = self.edge_midpoint(half);
+        let center = self.point_at_edge_middle(half);
         if topology.twin(half) == NONE {
             let [start, end] =
                 [topology.start(half), topology.end(half)].map(|end| self.points[end as usize]);
-            let arms = [end, self.edge_midpoint(next(half)), self.edge_midpoint(previous(half)), start];
+            let arms = [
+                end,
+                self.point_at_edge_middle(next_half_edge(half)),
+                self.point_at_edge_middle(previous_half_edge(half)),
+                start,
+            ];
             let arms = arms.map(|point| point - center);
-            return unit_or_substitute(of_open_fan(&arms, false), &arms, true);
+            return unit_or_substitute(open_fan_normal(&arms, false), &arms, true);
         }
         let ring = edge_ring(topology, topology.edge_halves[edge as usize]);
         let arms = ring.map(|vertex| self.points[vertex as usize] - center);
-        unit_or_substitute(self.of_closed_fan(&arms), &arms, false)
+        unit_or_substitute(self.closed_fan_normal(&arms), &arms, false)
     }
 
     /// Point at the middle of a half-edge's edge.
-    fn edge_midpoint(&self, half: u32) -> DVec3 {
-        self.points[self.topology.vertices() + self.topology.edge(half) as usize]
+    fn point_at_edge_middle(&self, half: u32) -> DVec3 {
+        self.points[self.topology.vertex_count() + self.topology.edge(half) as usize]
     }
 
     /// Cross product of the tangents Σ cos(2πi/n) pᵢ and Σ sin(2πi/n) pᵢ (Loop 1987).
-    fn of_closed_fan(&self, arms: &[DVec3]) -> DVec3 {
+    fn closed_fan_normal(&self, arms: &[DVec3]) -> DVec3 {
         if arms.len() < 3 {
             return DVec3::ZERO;
         }
@@ -81,7 +87,8 @@ impl<'a> NormalMasks<'a> {
         let table = self.turns.get(arms.len());
         let (mut across, mut along) = (DVec3::ZERO, DVec3::ZERO);
         for (index, arm) in arms.iter().enumerate() {
-            let [cos, sin] = table.map_or_else(|| cos_sin(index as u32, count), |table| table[index]);
+            let [cos, sin] =
+                table.map_or_else(|| cos_sin_of_turn_fraction(index as u32, count), |table| table[index]);
             across += *arm * cos;
             along += *arm * sin;
         }
@@ -96,7 +103,7 @@ impl<'a> NormalMasks<'a> {
 /// cos(π/k)/4, or 1/2 if the fan is wide. The first and last neighbors have equal weights, which follow from
 /// the equations of the eigenvector. For k = 3, this is the mask (−2; −1, 2, 2, −1) of Hoppe et al. 1994. The
 /// weight of the center does not matter, because the arms start there.
-fn of_open_fan(arms: &[DVec3], is_wide: bool) -> DVec3 {
+fn open_fan_normal(arms: &[DVec3], is_wide: bool) -> DVec3 {
     let faces = arms.len() - 1;
     let (along, ends) = (arms[0] - arms[faces], arms[0] + arms[faces]);
     if faces == 1 {
@@ -124,7 +131,7 @@ fn unit_or_substitute(normal: DVec3, arms: &[DVec3], is_open: bool) -> Vec3 {
 }
 
 /// Cosine and sine of 2π·`index`/`count`.
-fn cos_sin(index: u32, count: u32) -> [f64; 2] {
+fn cos_sin_of_turn_fraction(index: u32, count: u32) -> [f64; 2] {
     let angle = TAU * f64::from(index) / f64::from(count);
     [libm::cos(angle), libm::sin(angle)]
 }

@@ -3,7 +3,7 @@
 
 use rayon::prelude::*;
 
-use super::Work;
+use super::ParallelListBuilder;
 use crate::assets::AssetError;
 
 /// Twin of half-edges at boundaries and creases.
@@ -42,16 +42,16 @@ pub(super) struct Topology {
 }
 
 /// Returns the next half-edge of the face.
-pub(super) fn next(half: u32) -> u32 {
+pub(super) fn next_half_edge(half: u32) -> u32 {
     if half % 3 == 2 { half - 2 } else { half + 1 }
 }
 
 /// Returns the previous half-edge of the face.
-pub(super) fn previous(half: u32) -> u32 {
+pub(super) fn previous_half_edge(half: u32) -> u32 {
     if half.is_multiple_of(3) { half + 2 } else { half - 1 }
 }
 
-fn get(of_faces: &[[u32; 3]], half: u32) -> u32 {
+fn value_at_half_edge(of_faces: &[[u32; 3]], half: u32) -> u32 {
     of_faces[half as usize / 3][half as usize % 3]
 }
 
@@ -80,10 +80,13 @@ impl Topology {
     pub(super) fn connect(
         triangles: Vec<[u32; 3]>,
         vertices: usize,
-        work: Work<'_>,
+        work: ParallelListBuilder<'_>,
     ) -> Result<(Self, usize), AssetError> {
-        let mut halves = work.fill(3 * triangles.len(), |half| {
-            let (start, end) = (get(&triangles, half as u32), get(&triangles, next(half as u32)));
+        let mut halves = work.build(3 * triangles.len(), |half| {
+            let (start, end) = (
+                value_at_half_edge(&triangles, half as u32),
+                value_at_half_edge(&triangles, next_half_edge(half as u32)),
+            );
             (u64::from(start.min(end)) << 32 | u64::from(start.max(end)), half as u32)
         })?;
         halves.par_sort_unstable();
@@ -118,7 +121,7 @@ impl Topology {
 
     /// Returns the connectivity of other vertices at the same corners. Faces remain connected across an edge if
     /// they have the same vertices there.
-    pub(super) fn with_vertices(&self, triangles: Vec<[u32; 3]>, vertices: usize) -> Self {
+    pub(super) fn with_replaced_vertices(&self, triangles: Vec<[u32; 3]>, vertices: usize) -> Self {
         let mut other = Self {
             twins: vec![[NONE; 3]; triangles.len()],
             edges: vec![[NONE; 3]; triangles.len()],
@@ -134,7 +137,7 @@ impl Topology {
                 other.twins[face][corner] = twin;
             }
             other.edges[face][corner] = if is_joined && twin < half {
-                get(&other.edges, twin) | REVERSED
+                value_at_half_edge(&other.edges, twin) | REVERSED
             } else {
                 other.edge_halves.push(half);
                 other.edge_halves.len() as u32 - 1
@@ -157,7 +160,7 @@ impl Topology {
                 faces += 1;
             });
             fans.list.push(Fan { start, faces, last });
-            let known = &mut self.vertex_halves[get(&self.triangles, half) as usize];
+            let known = &mut self.vertex_halves[value_at_half_edge(&self.triangles, half) as usize];
             *known = if *known == NONE { start } else { *known };
         }
         fans
@@ -168,16 +171,16 @@ impl Topology {
     /// A vertex moves smoothly if it has a single fan, which is closed. It moves along a boundary or a crease
     /// if each of its fans lies between the same two neighbors. All other vertices are corners, and so are
     /// vertices whose fans have only one face each.
-    pub(super) fn classify(&mut self, fans: &Fans, is_fixed: impl Fn(u32) -> bool) {
+    pub(super) fn classify_vertices(&mut self, fans: &Fans, is_fixed: impl Fn(u32) -> bool) {
         /// The fans of one vertex.
         #[derive(Clone, Copy)]
-        struct Seen {
+        struct VertexFans {
             ends: Option<[u32; 2]>,
             fans: u32,
             most_faces: u32,
             is_corner: bool,
         }
-        let none = Seen { ends: None, fans: 0, most_faces: 0, is_corner: false };
+        let none = VertexFans { ends: None, fans: 0, most_faces: 0, is_corner: false };
         let mut seen = vec![none; self.vertex_halves.len()];
         for fan in &fans.list {
             let ends = fan.last.map(|last| {
@@ -191,12 +194,12 @@ impl Topology {
             vertex.fans += 1;
             vertex.most_faces = vertex.most_faces.max(fan.faces);
         }
-        let corner = |(number, vertex): (usize, &Seen)| {
+        let corner = |(number, vertex): (usize, &VertexFans)| {
             let is_lone = vertex.ends.is_some() && vertex.most_faces == 1;
             vertex.is_corner || is_lone || is_fixed(number as u32)
         };
         let corners: Vec<bool> = seen.iter().enumerate().map(corner).collect();
-        let wide = |(vertex, is_corner): (&Seen, &bool)| {
+        let wide = |(vertex, is_corner): (&VertexFans, &bool)| {
             vertex.ends.is_some() && vertex.most_faces >= WIDE && !is_corner
         };
         let wide: Vec<bool> = seen.iter().zip(&corners).map(wide).collect();
@@ -205,33 +208,33 @@ impl Topology {
     }
 
     /// Number of vertices.
-    pub(super) fn vertices(&self) -> usize {
+    pub(super) fn vertex_count(&self) -> usize {
         self.vertex_halves.len()
     }
 
     /// Number of edges.
-    pub(super) fn edges(&self) -> usize {
+    pub(super) fn edge_count(&self) -> usize {
         self.edge_halves.len()
     }
 
     /// Start vertex of a half-edge.
     pub(super) fn start(&self, half: u32) -> u32 {
-        get(&self.triangles, half)
+        value_at_half_edge(&self.triangles, half)
     }
 
     /// End vertex of a half-edge.
     pub(super) fn end(&self, half: u32) -> u32 {
-        get(&self.triangles, next(half))
+        value_at_half_edge(&self.triangles, next_half_edge(half))
     }
 
     /// Twin of a half-edge, or [`NONE`].
     pub(super) fn twin(&self, half: u32) -> u32 {
-        get(&self.twins, half)
+        value_at_half_edge(&self.twins, half)
     }
 
     /// Edge of a half-edge.
     pub(super) fn edge(&self, half: u32) -> u32 {
-        get(&self.edges, half) & !REVERSED
+        value_at_half_edge(&self.edges, half) & !REVERSED
     }
 
     /// Whether a vertex stays in place.
@@ -240,7 +243,7 @@ impl Topology {
     }
 
     /// Whether a vertex on a boundary or crease has a large fan of faces, whose inner edges need special masks.
-    pub(super) fn is_wide(&self, vertex: u32) -> bool {
+    pub(super) fn has_wide_fan(&self, vertex: u32) -> bool {
         self.wide.get(vertex as usize).copied().unwrap_or(false)
     }
 
@@ -250,7 +253,7 @@ impl Topology {
         let mut half = start;
         loop {
             visit(half);
-            let last = previous(half);
+            let last = previous_half_edge(half);
             half = self.twin(last);
             if half == NONE {
                 return Some(last);
@@ -269,7 +272,7 @@ impl Topology {
             if twin == NONE {
                 return first;
             }
-            first = next(twin);
+            first = next_half_edge(twin);
             if first == half {
                 return half;
             }
@@ -277,7 +280,7 @@ impl Topology {
     }
 
     /// If the edge of `half` is in a wide fan at the start of `half`, returns the number of faces in the fan.
-    pub(super) fn wide_fan_faces(&self, half: u32) -> Option<u32> {
+    pub(super) fn wide_fan_face_count(&self, half: u32) -> Option<u32> {
         let mut faces = 0;
         let last = self.walk_fan(self.fan_start(half), |_| faces += 1);
         last.filter(|_| faces >= WIDE).map(|_| faces)
@@ -285,9 +288,12 @@ impl Topology {
 
     /// Triangles after splitting each face into four: one at each corner, then the one in the middle. The new
     /// vertices have the index of their edge plus the number of vertices.
-    pub(super) fn refined_triangles(&self, work: Work<'_>) -> Result<Vec<[u32; 3]>, AssetError> {
-        let first = self.vertices() as u32;
-        let split = work.fill(self.triangles.len(), |face| {
+    pub(super) fn refined_triangles(
+        &self,
+        work: ParallelListBuilder<'_>,
+    ) -> Result<Vec<[u32; 3]>, AssetError> {
+        let first = self.vertex_count() as u32;
+        let split = work.build(self.triangles.len(), |face| {
             let [a, b, c] = self.triangles[face];
             let [ab, bc, ca] = self.edges[face].map(|edge| first + (edge & !REVERSED));
             [[a, ab, ca], [b, bc, ab], [c, ca, bc], [ab, bc, ca]]
@@ -297,25 +303,27 @@ impl Topology {
 
     /// Splits each face into four. See [`Topology::refined_triangles`]. The halves of edge e become the edges
     /// 2e and 2e + 1; the edges within faces follow.
-    pub(super) fn refined(self, work: Work<'_>) -> Result<Self, AssetError> {
+    pub(super) fn refined(self, work: ParallelListBuilder<'_>) -> Result<Self, AssetError> {
         let triangles = self.refined_triangles(work)?;
-        let (faces, first) = (self.triangles.len(), 2 * self.edges() as u32);
-        let twins = work.fill(faces, |face| self.twins_of_children(face as u32))?.into_flattened();
-        let edges = work.fill(faces, |face| self.edges_of_children(face as u32, first))?.into_flattened();
+        let (faces, first) = (self.triangles.len(), 2 * self.edge_count() as u32);
+        let twins = work.build(faces, |face| self.twins_of_children(face as u32))?.into_flattened();
+        let edges = work.build(faces, |face| self.edges_of_children(face as u32, first))?.into_flattened();
         let edge_halves =
-            work.fill(first as usize + 3 * faces, |edge| match (edge as u32).checked_sub(first) {
-                Some(inner) => 3 * child(inner / 3, inner % 3) + 1,
+            work.build(first as usize + 3 * faces, |edge| match (edge as u32).checked_sub(first) {
+                Some(inner) => 3 * child_face(inner / 3, inner % 3) + 1,
                 None => {
                     let half = self.edge_halves[edge / 2];
-                    let is_at_start = edge as u32 % 2 == u32::from(get(&self.edges, half) & REVERSED != 0);
+                    let is_at_start =
+                        edge as u32 % 2 == u32::from(value_at_half_edge(&self.edges, half) & REVERSED != 0);
                     if is_at_start { outgoing_child(half) } else { incoming_child(half) }
                 }
             })?;
-        let vertex_halves =
-            work.fill(self.vertices() + self.edges(), |vertex| match self.vertex_halves.get(vertex) {
+        let vertex_halves = work.build(self.vertex_count() + self.edge_count(), |vertex| {
+            match self.vertex_halves.get(vertex) {
                 Some(half) => outgoing_child(*half),
-                None => incoming_child(self.edge_halves[vertex - self.vertices()]),
-            })?;
+                None => incoming_child(self.edge_halves[vertex - self.vertex_count()]),
+            }
+        })?;
         let Self { corners, wide, .. } = self;
         Ok(Self { triangles, twins, edges, edge_halves, vertex_halves, corners, wide })
     }
@@ -324,12 +332,12 @@ impl Topology {
         let twins = self.twins[face as usize];
         let of_outgoing = |twin| if twin == NONE { NONE } else { incoming_child(twin) };
         let of_incoming = |twin| if twin == NONE { NONE } else { outgoing_child(twin) };
-        let middle = 3 * child(face, 3);
+        let middle = 3 * child_face(face, 3);
         let at_corner = |corner: usize| {
             let before = (corner + 2) % 3;
             [of_outgoing(twins[corner]), middle + before as u32, of_incoming(twins[before])]
         };
-        let inner = |corner: u32| 3 * child(face, corner) + 1;
+        let inner = |corner: u32| 3 * child_face(face, corner) + 1;
         [at_corner(0), at_corner(1), at_corner(2), [inner(1), inner(2), inner(0)]]
     }
 
@@ -348,16 +356,16 @@ impl Topology {
 }
 
 /// Face that replaces a corner of a face, or its middle (3).
-fn child(face: u32, corner: u32) -> u32 {
+fn child_face(face: u32, corner: u32) -> u32 {
     4 * face + corner
 }
 
 /// First half of a half-edge after refinement, which starts at the same vertex.
 fn outgoing_child(half: u32) -> u32 {
-    3 * child(half / 3, half % 3)
+    3 * child_face(half / 3, half % 3)
 }
 
 /// Second half of a half-edge after refinement, which ends at the same vertex.
 fn incoming_child(half: u32) -> u32 {
-    3 * child(half / 3, next(half) % 3) + 2
+    3 * child_face(half / 3, next_half_edge(half) % 3) + 2
 }

@@ -1,7 +1,7 @@
 //! Converts a triangle mesh to control points, which determine the shape, and corner attributes such as
 //! texture coordinates.
 
-use super::Work;
+use super::ParallelListBuilder;
 use super::topology::{Fans, NONE, Topology};
 use crate::assets::AssetError;
 use crate::assets::mesh::coincident::find_coincident_vertex_sets;
@@ -34,22 +34,24 @@ pub(super) struct ControlMesh {
 impl ControlMesh {
     /// Welds the vertices of a mesh that coincide. Drops triangles with coincident corners and vertices without
     /// triangles.
-    pub(super) fn weld(mesh: &mut TriangleMesh, work: Work<'_>) -> Result<Self, AssetError> {
+    pub(super) fn weld(mesh: &mut TriangleMesh, work: ParallelListBuilder<'_>) -> Result<Self, AssetError> {
         let (triangles, sources) = welded_triangles(mesh, work)?;
         let points: Vec<DVec3> =
             sources.iter().map(|vertex| mesh.positions[*vertex as usize].as_dvec3()).collect();
         let (mut shape, improper_edges) = Topology::connect(triangles, points.len(), work)?;
         let fans = shape.find_fans();
-        shape.classify(&fans, |_| false);
+        shape.classify_vertices(&fans, |_| false);
         work.token.check_pause_and_cancel()?;
-        let (corners, sources) = attribute_vertices(mesh, &fans, &shape);
+        let (corners, sources) = split_vertices_by_attributes(mesh, &fans, &shape);
         let is_same = sources.len() == points.len() && improper_edges == 0;
         let seamed = (!is_same).then(|| seamed_topology(&shape, corners, sources.len()));
-        let uvs = |all: &[Vec2]| gather(all, &sources, |uv: Vec2| uv.as_dvec2());
+        let uvs = |all: &[Vec2]| gather_and_convert(all, &sources, |uv: Vec2| uv.as_dvec2());
         Ok(Self {
             uvs: uvs(&mesh.uvs),
             second_uvs: uvs(&mesh.second_uvs),
-            colors: gather(&mesh.colors, &sources, |color| srgb8_color_to_linear(color).as_dvec3()),
+            colors: gather_and_convert(&mesh.colors, &sources, |color| {
+                srgb8_color_to_linear(color).as_dvec3()
+            }),
             shape,
             points,
             seamed,
@@ -59,7 +61,7 @@ impl ControlMesh {
 }
 
 /// Converts the values of these vertices. An empty list stays empty.
-fn gather<T: Copy, U>(values: &[T], vertices: &[u32], convert: impl Fn(T) -> U) -> Vec<U> {
+fn gather_and_convert<T: Copy, U>(values: &[T], vertices: &[u32], convert: impl Fn(T) -> U) -> Vec<U> {
     if values.is_empty() {
         return Vec::new();
     }
@@ -71,7 +73,7 @@ fn gather<T: Copy, U>(values: &[T], vertices: &[u32], convert: impl Fn(T) -> U) 
 /// with coincident corners from the mesh.
 fn welded_triangles(
     mesh: &mut TriangleMesh,
-    work: Work<'_>,
+    work: ParallelListBuilder<'_>,
 ) -> Result<(Vec<[u32; 3]>, Vec<u32>), AssetError> {
     let mut first: Vec<u32> = (0..mesh.positions.len() as u32).collect();
     for set in find_coincident_vertex_sets(&mesh.positions, work.token)? {
@@ -103,7 +105,11 @@ fn welded_triangles(
 
 /// Returns triangles whose corners share a vertex if they are in the same fan and have the same attributes,
 /// and one of the mesh's vertices for each.
-fn attribute_vertices(mesh: &TriangleMesh, fans: &Fans, shape: &Topology) -> (Vec<[u32; 3]>, Vec<u32>) {
+fn split_vertices_by_attributes(
+    mesh: &TriangleMesh,
+    fans: &Fans,
+    shape: &Topology,
+) -> (Vec<[u32; 3]>, Vec<u32>) {
     let mut corners = vec![[NONE; 3]; mesh.triangles.len()];
     let mut sources: Vec<u32> = Vec::new();
     for fan in &fans.list {
@@ -135,15 +141,15 @@ fn has_same_attributes(mesh: &TriangleMesh, a: u32, b: u32) -> bool {
 /// Returns the connectivity of the attributes. Where three or more seams, boundaries or creases meet, the
 /// attributes stay in place.
 fn seamed_topology(shape: &Topology, corners: Vec<[u32; 3]>, vertices: usize) -> Topology {
-    let mut seamed = shape.with_vertices(corners, vertices);
-    let mut seams = vec![0_u32; shape.vertices()];
+    let mut seamed = shape.with_replaced_vertices(corners, vertices);
+    let mut seams = vec![0_u32; shape.vertex_count()];
     for &half in shape.edge_halves.iter().filter(|half| seamed.twin(**half) == NONE) {
         seams[shape.start(half) as usize] += 1;
         seams[shape.end(half) as usize] += 1;
     }
     let fans = seamed.find_fans();
     let starts = seamed.vertex_halves.clone();
-    seamed.classify(&fans, |vertex| {
+    seamed.classify_vertices(&fans, |vertex| {
         let point = shape.start(starts[vertex as usize]);
         shape.is_corner(point) || seams[point as usize] >= 3
     });

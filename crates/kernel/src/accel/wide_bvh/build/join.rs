@@ -20,7 +20,7 @@ pub fn flatten(root: TreePart) -> (Vec<WideNode>, Vec<PackReferenceRange>) {
             top.add_node_for_part(bounds, root);
         }
     }
-    top.finish()
+    top.into_nodes_and_packs()
 }
 
 impl TreePart {
@@ -39,7 +39,7 @@ impl TreePart {
 /// A child of a node above the subtrees.
 #[derive(Clone, Copy)]
 enum UpperChild {
-    UpperNodes(usize),
+    UpperNode(usize),
     Subtree(usize),
 }
 
@@ -71,16 +71,14 @@ impl UpperNodes {
                     self.subtrees.push(subtree);
                     UpperChild::Subtree(self.subtrees.len() - 1)
                 }
-                halves @ TreePart::Halves(_) => {
-                    UpperChild::UpperNodes(self.add_node_for_part(bounds, halves))
-                }
+                halves @ TreePart::Halves(_) => UpperChild::UpperNode(self.add_node_for_part(bounds, halves)),
             };
             self.nodes[place].push((bounds, below));
         }
         place
     }
 
-    fn finish(self) -> (Vec<WideNode>, Vec<PackReferenceRange>) {
+    fn into_nodes_and_packs(self) -> (Vec<WideNode>, Vec<PackReferenceRange>) {
         let starts = self.subtree_starts();
         let nodes_of_top: Vec<WideNode> =
             self.nodes.iter().map(|children| self.build_wide_node(children, &starts)).collect();
@@ -114,7 +112,7 @@ impl UpperNodes {
         let mut node = WideNode::EMPTY;
         for (slot, &(bounds, below)) in children.iter().enumerate() {
             let child = match below {
-                UpperChild::UpperNodes(place) => Child::Inner(place as u32),
+                UpperChild::UpperNode(place) => Child::Inner(place as u32),
                 UpperChild::Subtree(subtree) => starts[subtree].offset_child(self.subtrees[subtree].root),
             };
             node.set(slot, bounds.aabb(), child);

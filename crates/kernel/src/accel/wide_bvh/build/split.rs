@@ -159,13 +159,13 @@ impl BinMapping {
 
     /// Bin numbers plus [`ROUNDING_OFFSET`].
     #[inline(always)]
-    fn bin_numbers_plus_round(&self, centroid: Vec4) -> Vec4 {
+    fn bin_numbers_plus_rounding_offset(&self, centroid: Vec4) -> Vec4 {
         (centroid - self.start) * self.per_length - Vec4::splat(0.5) + Vec4::splat(ROUNDING_OFFSET)
     }
 
     #[inline(always)]
     fn bin_indices(&self, reference: &TriangleReference) -> [usize; 3] {
-        let [x, y, z, _] = self.bin_numbers_plus_round(reference.centroid()).to_array();
+        let [x, y, z, _] = self.bin_numbers_plus_rounding_offset(reference.centroid()).to_array();
         [x, y, z].map(|place| place.to_bits() as usize & (BINS - 1))
     }
 }
@@ -270,9 +270,9 @@ pub fn partition(
     let (middle, left, right) = match split {
         Split::Plane { axis, bin, bins, sides } => {
             let (middle, [left, right]) = match axis {
-                0 => partition_along_axis::<0>(references, *bin, bins),
-                1 => partition_along_axis::<1>(references, *bin, bins),
-                _ => partition_along_axis::<2>(references, *bin, bins),
+                0 => partition_at_bin::<0>(references, *bin, bins),
+                1 => partition_at_bin::<1>(references, *bin, bins),
+                _ => partition_at_bin::<2>(references, *bin, bins),
             };
             let boxes = |side: usize, centroids| ReferenceBounds { bounds: sides[side], centroids };
             (middle, boxes(0, left), boxes(1, right))
@@ -289,14 +289,14 @@ pub fn partition(
     (left, ReferenceRangeWithSplit::new(right_references, right, level))
 }
 
-fn partition_along_axis<const AXIS: usize>(
+fn partition_at_bin<const AXIS: usize>(
     references: &mut [TriangleReference],
     bin: usize,
     bins: &BinMapping,
 ) -> (usize, [SimdBounds; 2]) {
     match simd::binning::try_partition::<AXIS>(references, bin, bins) {
         Some(done) => done,
-        None => partition_by_plane::<AXIS>(references, bin, bins),
+        None => partition_at_bin_portable::<AXIS>(references, bin, bins),
     }
 }
 
@@ -305,7 +305,7 @@ fn partition_along_axis<const AXIS: usize>(
 /// reference is swapped with the first one on the right, and then the length of the left side is incremented
 /// by 0 or 1.
 #[allow(clippy::manual_swap)] // `swap` goes through memory, so the next iteration stalls, which halves the build speed
-fn partition_by_plane<const AXIS: usize>(
+fn partition_at_bin_portable<const AXIS: usize>(
     references: &mut [TriangleReference],
     bin: usize,
     bins: &BinMapping,
@@ -359,9 +359,9 @@ mod tests {
 
     /// SIMD and scalar partition functions for each axis.
     const PARTITIONS: [[Partition; 2]; 3] = [
-        [partition_along_axis::<0>, partition_by_plane::<0>],
-        [partition_along_axis::<1>, partition_by_plane::<1>],
-        [partition_along_axis::<2>, partition_by_plane::<2>],
+        [partition_at_bin::<0>, partition_at_bin_portable::<0>],
+        [partition_at_bin::<1>, partition_at_bin_portable::<1>],
+        [partition_at_bin::<2>, partition_at_bin_portable::<2>],
     ];
 
     #[test]

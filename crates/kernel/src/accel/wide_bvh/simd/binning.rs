@@ -68,10 +68,10 @@ mod avx2 {
         _mm_sub_ps(_mm256_castps256_ps128(halves), _mm256_extractf128_ps::<1>(halves))
     }
 
-    /// SIMD version of `BinMapping::bin_numbers_plus_round`.
+    /// SIMD version of `BinMapping::bin_numbers_plus_rounding_offset`.
     #[target_feature(enable = "avx2")]
     #[inline]
-    fn bin_numbers_plus_round(centroid: __m128, start: __m128, per_length: __m128) -> __m128 {
+    fn bin_numbers_plus_rounding_offset(centroid: __m128, start: __m128, per_length: __m128) -> __m128 {
         let place = _mm_mul_ps(_mm_sub_ps(centroid, start), per_length);
         _mm_add_ps(_mm_sub_ps(place, _mm_set1_ps(0.5)), _mm_set1_ps(ROUNDING_OFFSET))
     }
@@ -85,7 +85,8 @@ mod avx2 {
         let (start, per_length) = (__m128::from(bins.start), __m128::from(bins.per_length));
         for reference in references {
             let bounds = load_bounds(&reference.bounds);
-            let places = _mm_castps_si128(bin_numbers_plus_round(centroid(bounds), start, per_length));
+            let places =
+                _mm_castps_si128(bin_numbers_plus_rounding_offset(centroid(bounds), start, per_length));
             let places = [
                 _mm_extract_epi32::<0>(places),
                 _mm_extract_epi32::<1>(places),
@@ -127,7 +128,8 @@ mod avx2 {
                 1 => _mm_permute_ps::<0x55>(centroid),
                 _ => _mm_permute_ps::<0xaa>(centroid),
             };
-            let is_left = _mm_cmplt_ps(bin_numbers_plus_round(along, start, per_length), first_right);
+            let is_left =
+                _mm_cmplt_ps(bin_numbers_plus_rounding_offset(along, start, per_length), first_right);
             let on_left = _mm256_set_m128(is_left, is_left);
             let both = _mm256_xor_ps(_mm256_set_m128(centroid, centroid), minus_high);
             left = _mm256_min_ps(_mm256_blendv_ps(nothing, both, on_left), left);

@@ -124,10 +124,10 @@ pub fn try_closest_hit_packet(
     match tree.instructions {
         #[cfg(target_arch = "x86_64")]
         // SAFETY: as above.
-        InstructionSet::Avx2 => unsafe { packet::try_closest_hit_avx2(tree, rays, ends, hits) },
+        InstructionSet::Avx2 => unsafe { packet::closest_hit_if_coherent_avx2(tree, rays, ends, hits) },
         #[cfg(target_arch = "x86_64")]
         // SAFETY: as above.
-        InstructionSet::Avx512 => unsafe { packet::try_closest_hit_avx512(tree, rays, ends, hits) },
+        InstructionSet::Avx512 => unsafe { packet::closest_hit_if_coherent_avx512(tree, rays, ends, hits) },
         InstructionSet::Portable => false,
         #[cfg(not(target_arch = "x86_64"))]
         InstructionSet::Avx2 | InstructionSet::Avx512 => false,
@@ -149,7 +149,7 @@ pub fn try_any_hit_packet(
         InstructionSet::Avx2 => unsafe { packet::any_hit_if_coherent_avx2(tree, rays, ends, except) },
         #[cfg(target_arch = "x86_64")]
         // SAFETY: as above.
-        InstructionSet::Avx512 => unsafe { packet::try_any_hit_avx512(tree, rays, ends, except) },
+        InstructionSet::Avx512 => unsafe { packet::any_hit_if_coherent_avx512(tree, rays, ends, except) },
         InstructionSet::Portable => None,
         #[cfg(not(target_arch = "x86_64"))]
         InstructionSet::Avx2 | InstructionSet::Avx512 => None,

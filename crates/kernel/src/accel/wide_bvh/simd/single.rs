@@ -4,7 +4,7 @@ use std::arch::x86_64::*;
 
 use super::portable::update_nearest_with_triangle;
 use super::ray::{SimdRay, is_traceable};
-use super::stack::{Stack, entry_distance, sort_key};
+use super::stack::{Stack, entry_distance_from_key, sort_key};
 use super::triangle::Hits;
 use super::vector::{SimdF32x4, SimdF32x8, SimdVector};
 use crate::accel::wide_bvh::WideBvh;
@@ -50,7 +50,7 @@ pub fn closest_hit(tree: &WideBvh, ray: &Ray) -> Option<ShapeHit> {
         }
         loop {
             let Some(next) = stack.pop() else { return best };
-            if entry_distance(next) <= t_max * SLAB_PAD {
+            if entry_distance_from_key(next) <= t_max * SLAB_PAD {
                 code = next as u32;
                 break;
             }

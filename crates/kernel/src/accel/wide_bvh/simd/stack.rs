@@ -58,7 +58,7 @@ pub fn sort_key(entry: f32, code: u32) -> u64 {
 
 /// Entry distance stored in a key.
 #[inline(always)]
-pub fn entry_distance(key: u64) -> f32 {
+pub fn entry_distance_from_key(key: u64) -> f32 {
     f32::from_bits((key >> 32) as u32)
 }
 

@@ -50,7 +50,7 @@ pub fn intersect<V: SimdVector>(
     let inverse = ax.splat_like(1.0).div(determinant);
     let t = along * inverse;
     let ahead = zero.lt(t) & t.le(t_max);
-    let (error, reach) = distance_error(corners, shear_z, inverse);
+    let (error, reach) = distance_error_and_max_t(corners, shear_z, inverse);
     let needle = (reach * reach.splat_like(ILL_CONDITIONED)).lt(error);
     let at_start = t.abs().le(error);
     let doubtful = V::movemask(V::and_not(needle | at_start | on_edge, outside));
@@ -64,9 +64,10 @@ const UNITS: f32 = 1.05 * 0.5 * f32::EPSILON / ILL_CONDITIONED;
 
 /// Whether a triangle may need the full test. Returns false only if the triangle is not a needle and t is
 /// negative or past the ray's end by more than its error. Let s be the sum of the maxima of |x| and |y|, so
-/// the product of these maxima is at most s²/4, and let d be the maximum of |z|. Then [`distance_error`] is
-/// at most the reach times 30·s·(s + d) unit roundoffs, divided by the determinant. If the inverse of the
-/// determinant may be infinite, the triangle counts as a needle. `along` is t times the determinant.
+/// the product of these maxima is at most s²/4, and let d be the maximum of |z|. Then the error from
+/// [`distance_error_and_max_t`] is at most the reach times 30·s·(s + d) unit roundoffs, divided by the
+/// determinant. If the inverse of the determinant may be infinite, the triangle counts as a needle. `along`
+/// is t times the determinant.
 #[inline(always)]
 fn may_be_in_range_mask<V: SimdVector>(
     corners: &ShearedCorners<V>,
@@ -76,7 +77,7 @@ fn may_be_in_range_mask<V: SimdVector>(
     t_max: V,
 ) -> V::Mask {
     let (sum, deepest) =
-        (max_abs_corner(corners, 0) + max_abs_corner(corners, 1), max_abs_corner(corners, 2));
+        (max_abs_coordinate(corners, 0) + max_abs_coordinate(corners, 1), max_abs_coordinate(corners, 2));
     let bound = sum * ((sum + deepest) * sum.splat_like(30.0 * UNITS)) + sum.splat_like(1e-37);
     let (size, reach) = (determinant.abs(), deepest * (shear_z.abs() * sum.splat_like(ILL_CONDITIONED)));
     let (ahead, error) = (along.xor_sign(determinant), bound * reach);
@@ -85,10 +86,15 @@ fn may_be_in_range_mask<V: SimdVector>(
     size.le(bound) | is_ahead
 }
 
-/// SIMD version of `ShearedRay::distance_error`.
+/// SIMD version of `ShearedRay::distance_error_and_max_t`.
 #[inline(always)]
-fn distance_error<V: SimdVector>(corners: &ShearedCorners<V>, shear_z: V, inverse_determinant: V) -> (V, V) {
-    let (x, y, depth) = (max_abs_corner(corners, 0), max_abs_corner(corners, 1), max_abs_corner(corners, 2));
+fn distance_error_and_max_t<V: SimdVector>(
+    corners: &ShearedCorners<V>,
+    shear_z: V,
+    inverse_determinant: V,
+) -> (V, V) {
+    let (x, y, depth) =
+        (max_abs_coordinate(corners, 0), max_abs_coordinate(corners, 1), max_abs_coordinate(corners, 2));
     let z = depth * shear_z.abs();
     let error_z = shear_z.splat_like(gamma(3)) * z;
     let (error_x, error_y) =
@@ -102,7 +108,7 @@ fn distance_error<V: SimdVector>(corners: &ShearedCorners<V>, shear_z: V, invers
 
 /// Largest absolute coordinate of the corners along an axis.
 #[inline(always)]
-fn max_abs_corner<V: SimdVector>(corners: &ShearedCorners<V>, axis: usize) -> V {
+fn max_abs_coordinate<V: SimdVector>(corners: &ShearedCorners<V>, axis: usize) -> V {
     corners[0][axis].abs().max(corners[1][axis].abs()).max(corners[2][axis].abs())
 }
 
@@ -144,7 +150,7 @@ mod tests {
             let inverse = like.splat_like(1.0).div(determinant);
             let along = (wa * az + wb * bz + wc * cz) * shear_z;
             let t = along * inverse;
-            let (error, reach) = distance_error(&corners, shear_z, inverse);
+            let (error, reach) = distance_error_and_max_t(&corners, shear_z, inverse);
             let is_needle = SimdF32x4::movemask((reach * like.splat_like(ILL_CONDITIONED)).lt(error)) != 0;
             let is_at_start = SimdF32x4::movemask(t.abs().le(error)) != 0;
             // Place the ray's end in front of the triangle, on it, behind it, or at infinity.

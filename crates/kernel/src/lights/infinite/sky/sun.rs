@@ -53,12 +53,12 @@ impl SunDisk {
             mean: Vec3::ZERO,
             horizontal_irradiance: DVec3::ZERO,
         };
-        disk.integrate(sun_elevation);
+        disk.compute_mean_and_irradiance(sun_elevation);
         disk
     }
 
     /// Computes the mean radiance and the irradiance with the midpoint rule.
-    fn integrate(&mut self, elevation: f64) {
+    fn compute_mean_and_irradiance(&mut self, elevation: f64) {
         const RINGS: usize = 64;
         const SECTORS: usize = 64;
         let (sin, cos) = (libm::sin(elevation), libm::cos(elevation));

@@ -88,14 +88,14 @@ soa! {
 const ABSORBS: BxdfFlags = BxdfFlags(1 << 31);
 
 /// Probabilities for the choice between the coat and the base.
-struct LobeChoice {
+struct CoatOrBaseProbabilities {
     /// Probability of choosing the coat.
     coat: f32,
     /// Probability of choosing the base.
     base: f32,
 }
 
-impl LobeChoice {
+impl CoatOrBaseProbabilities {
     /// The probabilities if `lobes` are sampled.
     #[inline(always)]
     fn new(view: &CoatViewTerms, lobes: LobesToSample) -> Self {
@@ -204,7 +204,7 @@ impl<B: Bxdf> Bxdf for CoatedBxdf<B> {
     #[inline(always)]
     fn pdf(&self, view: &Self::View, from: SampledLobes, wi: Vec3, shape: f32, any: BxdfFlags) -> f32 {
         let CoatViewTerms { normal, wo, .. } = view.layer;
-        let choice = LobeChoice::new(&view.layer, from.lobes);
+        let choice = CoatOrBaseProbabilities::new(&view.layer, from.lobes);
         let base = choice.base * self.base.pdf(&view.base, from, wi, shape, any);
         // The pdf of a black base is undefined.
         let base = if choice.base > 0.0 { base } else { 0.0 };
@@ -220,7 +220,7 @@ impl<B: Bxdf> Bxdf for CoatedBxdf<B> {
         any: BxdfFlags,
     ) -> Vec3 {
         let CoatViewTerms { normal, wo, .. } = view.layer;
-        let LobeChoice { coat, base } = LobeChoice::new(&view.layer, from.lobes);
+        let CoatOrBaseProbabilities { coat, base } = CoatOrBaseProbabilities::new(&view.layer, from.lobes);
         // Remap the random number to choose among the base's lobes.
         let rest = (choice - coat) / base.max(f32::MIN_POSITIVE);
         let rest = nonnegative_cosine(rest).min(1.0 - f32::EPSILON);

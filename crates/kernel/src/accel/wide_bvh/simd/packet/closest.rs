@@ -8,7 +8,7 @@ use crate::accel::F32x16;
 use crate::accel::wide_bvh::WideBvh;
 use crate::accel::wide_bvh::node::{Child, PACK, WideNode};
 use crate::accel::wide_bvh::simd::single::prefetch_child_start;
-use crate::accel::wide_bvh::simd::stack::{Stack, entry_distance, sort_key};
+use crate::accel::wide_bvh::simd::stack::{Stack, entry_distance_from_key, sort_key};
 use crate::accel::wide_bvh::simd::vector::{SimdF32x8, SimdVector};
 use crate::geometry::aabb::SLAB_PAD;
 use crate::geometry::{Ray, ShapeHit};
@@ -33,7 +33,7 @@ pub fn closest_hit_if_coherent<V: SimdVector>(
     let mut stack: Stack<u64> = Stack::new();
     stack.push(sort_key(0.0, 0));
     while let Some(key) = stack.pop() {
-        if entry_distance(key) > end {
+        if entry_distance_from_key(key) > end {
             continue;
         }
         match Child::decode(key as u32) {

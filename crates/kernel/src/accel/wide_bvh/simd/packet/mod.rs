@@ -19,7 +19,7 @@ use closest::closest_hit_if_coherent;
 
 /// [`closest_hit_if_coherent()`] with AVX2.
 #[target_feature(enable = "avx2")]
-pub fn try_closest_hit_avx2(
+pub fn closest_hit_if_coherent_avx2(
     tree: &WideBvh,
     rays: &[Ray],
     ends: &F32x16,
@@ -45,7 +45,7 @@ pub fn any_hit_if_coherent_avx2(
 
 /// [`closest_hit_if_coherent()`] with AVX-512.
 #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw,avx2")]
-pub fn try_closest_hit_avx512(
+pub fn closest_hit_if_coherent_avx512(
     tree: &WideBvh,
     rays: &[Ray],
     ends: &F32x16,
@@ -58,7 +58,7 @@ pub fn try_closest_hit_avx512(
 
 /// [`any_hit_if_coherent()`] with AVX-512.
 #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw,avx2")]
-pub fn try_any_hit_avx512(
+pub fn any_hit_if_coherent_avx512(
     tree: &WideBvh,
     rays: &[Ray],
     ends: &F32x16,
