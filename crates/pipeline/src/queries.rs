@@ -90,7 +90,7 @@ impl QueryContext {
                 Event::CameraKept { generation, outcome: self.save_camera(camera, inputs) }
             }
             QueryOrEdit::UndoCamera(edit) => {
-                Event::CameraUndone { generation, outcome: undo_camera_edit(edit, inputs) }
+                Event::CameraUndone { generation, outcome: undo_saved_camera_edit(edit, inputs) }
             }
         });
     }
@@ -180,7 +180,7 @@ impl QueryContext {
 }
 
 /// Undoes a camera edit by restoring the previous text. Fails if the file has changed since the edit.
-fn undo_camera_edit(edit: &SavedCameraEdit, inputs: &ProtectedInputs) -> Result<PathBuf, String> {
+fn undo_saved_camera_edit(edit: &SavedCameraEdit, inputs: &ProtectedInputs) -> Result<PathBuf, String> {
     let SavedCameraEdit { path, before, after } = edit;
     let changed = format!("{} {NOT_UNDONE}", path.display());
     if is_file_missing(path) {

@@ -25,11 +25,11 @@ impl<'a> StageTable<'a> {
     pub(super) fn start(&mut self, name: Stage) -> RunningStage<'_, 'a> {
         let (watch, cpu_seconds) = (PausableStopwatch::start(self.token), process_cpu_seconds());
         let stage = RunningStage { table: self, name, watch, cpu_seconds };
-        stage.table.send_report(stage.report(Status::Running, String::new()));
+        stage.table.send_stage_report(stage.report(Status::Running, String::new()));
         stage
     }
 
-    fn send_report(&self, stage: StageReport) {
+    fn send_stage_report(&self, stage: StageReport) {
         if let Some(sink) = self.sink {
             sink.send(Event::Stage { generation: sink.generation, stage });
         }
@@ -50,7 +50,7 @@ impl RunningStage<'_, '_> {
     /// Records and reports the end of the stage, and returns its value.
     pub(super) fn finish<T>(self, result: StageResult<T>) -> T {
         let report = self.report(result.status, result.why);
-        self.table.send_report(report.clone());
+        self.table.send_stage_report(report.clone());
         self.table.stages.push(report);
         result.value
     }

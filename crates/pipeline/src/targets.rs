@@ -171,7 +171,7 @@ fn find_conflict<'a>(
         {
             let (name, output) = (target.path.display(), output.display());
             let message = format!("cannot write {name}: it is the checkpoint for {output}");
-            return Some(command_line_error(message, Some(conflict_help(plan, target.kind).to_owned())));
+            return Some(command_line_error(message, Some(choose_other_file_help(plan, target.kind).to_owned())));
         }
     }
     if plan.outputs.replaces_foreign { None } else { overwrites_foreign_file_error(plan, target, at) }
@@ -186,7 +186,7 @@ fn overwrites_input_error(plan: &RenderPlan, target: OutputTarget<'_>, input: &P
     let is_same_name = target.path == input.path;
     let other = if is_same_name { String::new() } else { format!("{}, ", input.path.display()) };
     let message = format!("cannot write {}: it is {other}{}", target.path.display(), input.role);
-    let help = Some(conflict_help(plan, target.kind).to_owned());
+    let help = Some(choose_other_file_help(plan, target.kind).to_owned());
     match &input.place {
         Some((loaded, span)) => loaded.create_diagnostic_at(span.clone(), Severity::Error, message, help),
         None => command_line_error(message, help),
@@ -199,7 +199,7 @@ fn same_file_error(plan: &RenderPlan, target: OutputTarget<'_>, twin: &Path) -> 
         TargetKind::Image(_) => format!("the outputs {twin} and {name} are the same file"),
         TargetKind::Report => format!("the image {twin} and the report {name} are the same file"),
     };
-    command_line_error(message, Some(format!("use separate files: {}", conflict_help(plan, target.kind))))
+    command_line_error(message, Some(format!("use separate files: {}", choose_other_file_help(plan, target.kind))))
 }
 
 /// Returns an error if the target is an existing file not written by glimt.
@@ -208,7 +208,7 @@ fn overwrites_foreign_file_error(
     target: OutputTarget<'_>,
     at: &Path,
 ) -> Option<Diagnostic> {
-    let (name, remedy) = (target.path.display(), conflict_help(plan, target.kind));
+    let (name, remedy) = (target.path.display(), choose_other_file_help(plan, target.kind));
     let (replaced, help) = match target.kind {
         TargetKind::Image(OutputNameSource::Default) => {
             let own = match &plan.outputs.default_names {
@@ -257,11 +257,11 @@ fn overwrites_part_or_checkpoint_error(
     let message = format!("cannot write {}: it is {what}", target.path.display());
     Some(command_line_error(
         message,
-        Some(format!("{}; --force replaces it", conflict_help(plan, target.kind))),
+        Some(format!("{}; --force replaces it", choose_other_file_help(plan, target.kind))),
     ))
 }
 
-fn conflict_help(plan: &RenderPlan, kind: TargetKind) -> &'static str {
+fn choose_other_file_help(plan: &RenderPlan, kind: TargetKind) -> &'static str {
     match kind {
         TargetKind::Image(OutputNameSource::Default) if plan.turn.is_some() => {
             "choose other names with -o 'NAME_####.png'"

@@ -135,7 +135,7 @@ impl Disk {
     }
 
     /// Local geometry of the disk near a point, for density estimation.
-    pub fn geometry_near(&self, point: DVec3) -> LocalGeometry {
+    pub fn local_geometry_near(&self, point: DVec3) -> LocalGeometry {
         let (normal, from) = (self.normal(), point - self.centroid());
         let extent = FlatOrRoundExtent::Flat(self.radius - from.length());
         let ground = NearestSurface { normal, height: from.dot(normal).abs(), extent };

@@ -346,13 +346,13 @@ impl Shape {
 
     /// Local geometry of the shape near a point, for density estimation.
     #[inline]
-    pub fn geometry_near(&self, point: DVec3) -> LocalGeometry {
+    pub fn local_geometry_near(&self, point: DVec3) -> LocalGeometry {
         match self {
             Self::Quad(_) | Self::Triangle(_) => LocalGeometry::Polygons(1),
             Self::Box(_) => LocalGeometry::Polygons(6),
-            Self::Sphere(sphere) => sphere.geometry_near(point),
-            Self::Plane(plane) => plane.geometry_near(point),
-            Self::Disk(disk) => disk.geometry_near(point),
+            Self::Sphere(sphere) => sphere.local_geometry_near(point),
+            Self::Plane(plane) => plane.local_geometry_near(point),
+            Self::Disk(disk) => disk.local_geometry_near(point),
             Self::Cylinder(cylinder) => {
                 LocalGeometry::from_distance_to_curved_surface(cylinder.distance_from_point(point))
             }
@@ -362,7 +362,7 @@ impl Shape {
             Self::Torus(torus) => {
                 LocalGeometry::from_distance_to_curved_surface(torus.distance_from_point(point))
             }
-            Self::Transformed(transformed) => transformed.geometry_near(point),
+            Self::Transformed(transformed) => transformed.local_geometry_near(point),
         }
     }
 
@@ -545,7 +545,7 @@ mod tests {
 
     #[test]
     fn distance_is_to_the_nearest_point() {
-        let distance = |shape: &Shape, point: DVec3| match shape.geometry_near(point) {
+        let distance = |shape: &Shape, point: DVec3| match shape.local_geometry_near(point) {
             LocalGeometry::Surface { distance, .. } => Some(distance),
             LocalGeometry::Polygons(_) => None,
         };

@@ -106,7 +106,7 @@ impl Plane {
     }
 
     /// Local geometry of the plane near a point, for density estimation.
-    pub fn geometry_near(&self, point: DVec3) -> LocalGeometry {
+    pub fn local_geometry_near(&self, point: DVec3) -> LocalGeometry {
         let distance = self.unsigned_distance(point);
         let ground = NearestSurface {
             normal: self.normal,

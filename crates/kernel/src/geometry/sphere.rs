@@ -118,7 +118,7 @@ impl Sphere {
     }
 
     /// Local geometry of the sphere near a point, for density estimation.
-    pub fn geometry_near(&self, point: DVec3) -> LocalGeometry {
+    pub fn local_geometry_near(&self, point: DVec3) -> LocalGeometry {
         let (distance, out) = (self.distance_from_point(point), (point - self.center).normalize_or_zero());
         let ground =
             NearestSurface { normal: out, height: distance, extent: FlatOrRoundExtent::Round(self.radius) };

@@ -157,7 +157,7 @@ impl TransformedShape {
     }
 
     /// Local geometry of the shape near a point, for density estimation. The distance is a lower bound.
-    pub fn geometry_near(&self, point: DVec3) -> LocalGeometry {
+    pub fn local_geometry_near(&self, point: DVec3) -> LocalGeometry {
         let ground_to_world = |ground: NearestSurface| match ground.extent {
             FlatOrRoundExtent::Flat(extent) => {
                 let normal = self.to_world.normal(ground.normal);
@@ -170,7 +170,7 @@ impl TransformedShape {
             }
             FlatOrRoundExtent::Round(_) => None,
         };
-        match self.shape.geometry_near(self.to_world.inverse_point(point)) {
+        match self.shape.local_geometry_near(self.to_world.inverse_point(point)) {
             LocalGeometry::Polygons(count) => LocalGeometry::Polygons(count),
             LocalGeometry::Surface { distance, ground } => LocalGeometry::Surface {
                 distance: distance / self.inverse_stretch,

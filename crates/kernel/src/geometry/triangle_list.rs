@@ -171,7 +171,7 @@ impl TriangleList {
         simd: impl Simd,
     ) -> u32 {
         let candidates = self.find_nearest_candidates(rays, ends, &[NONE; PACKET_SIZE], simd);
-        let CandidateTestResults { hit, undecided, hits } =
+        let NearestCandidateTestResults { hit, undecided, hits } =
             self.test_candidates(rays, &candidates, (active, ends), simd);
         select(&hit, &hits.t, &mut found.t);
         select(&hit, &hits.u, &mut found.u);
@@ -198,7 +198,7 @@ impl TriangleList {
         if simd.movemask(&may_hit) & active == 0 {
             return [0; 2];
         }
-        let CandidateTestResults { hit, undecided, .. } =
+        let NearestCandidateTestResults { hit, undecided, .. } =
             self.test_candidates(rays, &candidates, (active, ends), simd);
         [simd.movemask(&hit) & active, undecided]
     }
@@ -298,7 +298,7 @@ impl TriangleList {
         candidates: &NearestCandidates,
         (active, ends): (u32, &F32x16),
         simd: impl Simd,
-    ) -> CandidateTestResults {
+    ) -> NearestCandidateTestResults {
         let mut corners = [[[0.0; PACKET_SIZE]; 3]; 3];
         for i in 0..PACKET_SIZE {
             let own = &self.corners[candidates.number[i] as usize];
@@ -319,7 +319,7 @@ impl TriangleList {
             hit[i] = if is_nearest { TRUE } else { 0 };
             undecided[i] = if is_open | (candidates.doubtful[i] != 0) { TRUE } else { 0 };
         }
-        CandidateTestResults { hit, undecided: simd.movemask(&undecided) & active, hits }
+        NearestCandidateTestResults { hit, undecided: simd.movemask(&undecided) & active, hits }
     }
 
     /// Computes the error terms for the rays.
@@ -358,7 +358,7 @@ impl TriangleList {
 }
 
 /// Results of the watertight test on each ray's nearest candidate.
-struct CandidateTestResults {
+struct NearestCandidateTestResults {
     /// Rays that are certain to hit their candidate before any other candidate.
     hit: Mask,
     /// Mask of the undecided rays.

@@ -3,7 +3,7 @@
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
-use super::area::{AreaLight, EmittingTriangleSelection, MeshEmitter, Side};
+use super::area::{AreaLight, EmittingPart, MeshEmitter, Side};
 use super::infinite::{DirectionalLight, Environment, InfiniteLight};
 use super::light::Light;
 use super::tree::{AdaptiveLightTreeCut, LightTree, MAX_WITHOUT_TREE, Receiver};
@@ -196,10 +196,10 @@ impl Lights {
             }
         };
         match light.part {
-            EmittingTriangleSelection::Whole => {
+            EmittingPart::Whole => {
                 by_object.insert(light.object, ObjectLights::Whole(number));
             }
-            EmittingTriangleSelection::Listed => {
+            EmittingPart::Listed => {
                 light
                     .shape
                     .as_mesh()

@@ -339,7 +339,7 @@ fn mesh_triangles_map_to_their_lights() {
             radiance: Vec3::splat(radiance),
             modulation: None,
             object: 3,
-            part: EmittingTriangleSelection::Listed,
+            part: EmittingPart::Listed,
             side: Side::Front,
         })
     };
@@ -372,7 +372,7 @@ fn mesh_light(triangles: &[[DVec3; 3]]) -> AreaLight {
     let mesh = MeshEmitter::new(numbered, &CancelToken::new()).expect("never canceled").expect("an area");
     let bounds = mesh.light_bounds();
     let (shape, radiance) = (Emitter::Mesh(mesh), Vec3::ONE);
-    let (side, part) = (Side::Front, EmittingTriangleSelection::Listed);
+    let (side, part) = (Side::Front, EmittingPart::Listed);
     AreaLight { shape, side, radiance, bounds, modulation: None, object: OBJECT, part }
 }
 

@@ -117,7 +117,7 @@ impl Lighting {
     }
 
     /// Radiance of the sky.
-    fn sky_radiance(self) -> f64 {
+    fn uniform_sky_radiance(self) -> f64 {
         match self {
             Self::Default { .. } => SKY_RADIANCE,
             Self::FromFile { exposure } => round_significant(SKY_RADIANCE * libm::exp2(-exposure), 3),
@@ -165,7 +165,7 @@ pub(super) fn add_camera(document: &mut BuiltDocument, eye: &CameraPose, project
 /// Adds a sky, plus a key light if the model has no lights.
 pub(super) fn add_sky_and_key_light(document: &mut BuiltDocument, eye: &CameraPose, light: Lighting) {
     document.start_table("environment");
-    document.set("color", shorten(light.sky_radiance()));
+    document.set("color", shorten(light.uniform_sky_radiance()));
     if matches!(light, Lighting::Default { .. }) {
         document.start_list_table("light");
         document.set("type", "directional");

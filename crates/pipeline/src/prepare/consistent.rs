@@ -66,7 +66,7 @@ impl FileReader<'_> {
     ///
     /// # Errors
     /// Returns the error from `read`.
-    pub(crate) fn read_once<T>(
+    pub(crate) fn read_unless_files_change<T>(
         &self,
         read: impl FnOnce(&FileReadContext<'_>) -> Result<T, AbortReason>,
     ) -> Result<Option<T>, AbortReason> {

@@ -149,7 +149,7 @@ impl FilmState {
 
     /// Reads the sample counts from the film.
     pub(super) fn recount_samples(&mut self) {
-        let halves: Vec<_> = self.shard_cell_halves().collect();
+        let halves: Vec<_> = self.cell_half_indices_in_shard().collect();
         for (cell, half) in halves {
             self.done[cell][half] = self.film.cell_half_samples_per_pixel(cell, half);
         }
@@ -162,7 +162,7 @@ impl FilmState {
 
     /// Like [`Self::is_complete`], but only for tiles overlapping `part` (`None` for all tiles).
     pub(crate) fn is_complete_in_region(&self, part: Option<Rect>, samples: u32) -> bool {
-        self.shard_cell_halves()
+        self.cell_half_indices_in_shard()
             .filter(|(cell, _)| self.cell_tile_overlaps_rect(part, *cell))
             .all(|(tile, half)| self.done[tile][half] >= self.goals.get(tile, half).min(samples))
     }
@@ -175,7 +175,7 @@ impl FilmState {
 
     /// Whether no pixel has more than `samples` samples.
     pub(crate) fn has_at_most_samples(&self, samples: u32) -> bool {
-        self.shard_cell_halves().all(|(cell, half)| self.done[cell][half] <= samples)
+        self.cell_half_indices_in_shard().all(|(cell, half)| self.done[cell][half] <= samples)
     }
 
     /// Returns the lowest sample count among pixels that need more samples, limited to `most`.
@@ -189,7 +189,7 @@ impl FilmState {
             let done = self.done[tile][half];
             (done < self.goals.get(tile, half).min(most)).then_some(done)
         };
-        self.shard_cell_halves()
+        self.cell_half_indices_in_shard()
             .filter(|(cell, _)| self.cell_tile_overlaps_rect(part, *cell))
             .filter_map(of)
             .min()
@@ -205,15 +205,15 @@ impl FilmState {
 
     /// Whether any pixel has samples.
     pub(crate) fn has_samples(&self) -> bool {
-        self.shard_cell_halves().any(|(cell, half)| self.done[cell][half] > 0)
+        self.cell_half_indices_in_shard().any(|(cell, half)| self.done[cell][half] > 0)
     }
 
     /// Whether every pixel has a sample. Only then may the image replace another image.
     pub(crate) fn has_sampled_all_pixels(&self) -> bool {
-        self.shard_cell_halves().all(|(cell, half)| self.done[cell][half] > 0)
+        self.cell_half_indices_in_shard().all(|(cell, half)| self.done[cell][half] > 0)
     }
 
-    fn shard_cell_halves(&self) -> impl Iterator<Item = (usize, usize)> {
+    fn cell_half_indices_in_shard(&self) -> impl Iterator<Item = (usize, usize)> {
         let halves = (0..self.done.len()).flat_map(|cell| [(cell, 0), (cell, 1)]);
         halves.filter(|(cell, half)| {
             self.is_tile_in_shard(cell / CELLS) && self.film.cell_half_pixel_count(*cell, *half) > 0
@@ -352,7 +352,7 @@ impl FilmState {
     /// pixel. These are also the current and final numbers of photon passes.
     pub(crate) fn current_and_final_photon_passes(&self, most: u32) -> [u32; 2] {
         let max_of = |samples: &dyn Fn(usize, usize) -> u32| {
-            self.shard_cell_halves().map(|(cell, half)| samples(cell, half)).max().unwrap_or(0)
+            self.cell_half_indices_in_shard().map(|(cell, half)| samples(cell, half)).max().unwrap_or(0)
         };
         [
             max_of(&|cell, half| self.done[cell][half]),
@@ -362,7 +362,7 @@ impl FilmState {
 
     /// Whether the final number of samples can be estimated despite a noise target.
     pub(crate) fn can_predict_samples(&self) -> bool {
-        self.shard_cell_halves().all(|(cell, half)| self.expected_samples(cell, half, u32::MAX) < u32::MAX)
+        self.cell_half_indices_in_shard().all(|(cell, half)| self.expected_samples(cell, half, u32::MAX) < u32::MAX)
     }
 
     fn expected_samples(&self, cell: usize, half: usize, most: u32) -> u32 {
@@ -374,7 +374,7 @@ impl FilmState {
         let units = |(cell, half): (usize, usize)| {
             self.film.cell_half_pixel_count(cell, half) as u64 * u64::from(samples_of(cell, half))
         };
-        self.shard_cell_halves().map(units).sum()
+        self.cell_half_indices_in_shard().map(units).sum()
     }
 }
 

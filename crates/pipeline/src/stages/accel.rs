@@ -37,7 +37,7 @@ pub(crate) struct AccelCache {
 }
 
 impl AccelCache {
-    pub(crate) fn evictable_caches(&mut self) -> [&mut dyn EvictableCache; 3] {
+    pub(crate) fn caches_mut(&mut self) -> [&mut dyn EvictableCache; 3] {
         [&mut self.trees, &mut self.distinct, &mut self.geometry]
     }
 }

@@ -47,7 +47,7 @@ impl TextureCache {
         needed.iter().all(|one| self.texels.get_by_name(&texture_key(&one.source)).is_some())
     }
 
-    pub(crate) fn evictable_caches(&mut self) -> [&mut dyn EvictableCache; 2] {
+    pub(crate) fn caches_mut(&mut self) -> [&mut dyn EvictableCache; 2] {
         [&mut self.texels, &mut self.mipmaps]
     }
 

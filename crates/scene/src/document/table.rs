@@ -42,7 +42,7 @@ impl TableTitle<'_> {
         }
     }
 
-    fn definition(self) -> Option<&'static TableInfo> {
+    fn table_info(self) -> Option<&'static TableInfo> {
         match self {
             Self::Table(info) | Self::Named(info, _) | Self::Inner(.., info) => Some(info),
             Self::Root | Self::Key(..) => None,
@@ -189,7 +189,7 @@ impl<'a> TableReader<'a> {
         }[0];
         let key = KeyInTable::new(self.context, TYPE, self.entry(TYPE.name));
         let kind = if key.is_present() { key.choice()? } else { *C::ALL.first()? };
-        let info = self.title.definition()?.find_type_or_default(Some(kind.name()))?;
+        let info = self.title.table_info()?.find_type_or_default(Some(kind.name()))?;
         self.keys[0] = info.keys;
         Some(kind)
     }
@@ -312,7 +312,7 @@ impl<'a> TableReader<'a> {
 
     /// Returns the other types of the table that have the key `name`, in quotes.
     fn types_with_key(&self, name: &str) -> Vec<String> {
-        let types = self.title.definition().map_or(&[][..], |info| info.types);
+        let types = self.title.table_info().map_or(&[][..], |info| info.types);
         let has_key = |kind: &&TableTypeInfo| kind.keys.iter().any(|key| key.name == name);
         types.iter().filter(has_key).map(|kind| format!("\"{}\"", kind.name)).collect()
     }

@@ -19,7 +19,7 @@ use crate::lights::{
     PhotonEmitter, Side, TriangleWithUvs, UvMapping, back_area_light, front_area_light,
     see_through_shape_side_light,
 };
-use crate::lights::{Emitter, EmittingTriangleSelection};
+use crate::lights::{Emitter, EmittingPart};
 use crate::materials::texels::Texels;
 use crate::materials::{Emission, EmissionSides, Opacity};
 use crate::math::Vec3;
@@ -94,7 +94,7 @@ pub fn scene_photon_emitter(geometry: &Geometry, lights: &Arc<Lights>) -> Option
     let emitter_geometry =
         |object: u32| geometry.objects().get(object as usize).map(Object::emitter_geometry);
     let balls: Vec<BoundingSphere> = geometry.objects().iter().filter_map(Object::bounding_sphere).collect();
-    PhotonEmitter::new(lights, emitter_geometry, BoundingSphere::enclosing_spheres(&balls))
+    PhotonEmitter::new(lights, emitter_geometry, BoundingSphere::enclosing_all_spheres(&balls))
 }
 
 /// The environment light and its sun, unless they are black.
@@ -304,7 +304,7 @@ fn mesh_lights_by_material_and_side(
             let is_varying = terms.iter().any(EmissionTerm::varies);
             let modulation = is_varying.then(|| EmissionModulation::from_terms(terms, patches())).flatten();
             let modulation = modulation.map(|modulation| Box::new(modulation.with_object_frame(frame)));
-            let (shape, part) = (Emitter::Mesh(emitter), EmittingTriangleSelection::Listed);
+            let (shape, part) = (Emitter::Mesh(emitter), EmittingPart::Listed);
             Ok(Some(AreaLight { shape, side, radiance, modulation, object, part, bounds }))
         };
     let of_sides = all

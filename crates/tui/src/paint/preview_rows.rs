@@ -4,7 +4,7 @@ use super::cell::CellContent;
 use super::cost_model::RateDistortion;
 use super::cursor_moves::CellPosition;
 use super::fidelity::PreviewFidelity;
-use super::row_optimizer::{DrawOp, PlannedRow, RowStart, TargetCell, plan_row};
+use super::row_optimizer::{DrawOp, PlannedRow, RowStart, WantedAndShownCell, plan_row};
 use super::screen::{CellRun, ScreenModel};
 use super::stable_cells::FirstPreviewCells;
 use super::target_screen::TargetScreen;
@@ -35,7 +35,7 @@ impl Default for FirstPreviewByteBudget {
 impl FirstPreviewByteBudget {
     /// Plans a row with the smallest error that fits into the budget. If the unused bytes exceed one row's
     /// share, first lowers the cost per byte.
-    fn plan_row_in_budget(&mut self, targets: &[TargetCell], start: RowStart) -> PlannedRow {
+    fn plan_row_in_budget(&mut self, targets: &[WantedAndShownCell], start: RowStart) -> PlannedRow {
         let share = FIRST_BYTES * targets.len() as u32;
         self.bytes += share;
         if self.bytes > 2 * share {
@@ -63,7 +63,7 @@ pub(super) fn plan_preview_row(
     budget: &mut FirstPreviewByteBudget,
 ) -> Vec<CellRun> {
     let columns = wanted.picture.left()..wanted.picture.right();
-    let targets: Vec<TargetCell> =
+    let targets: Vec<WantedAndShownCell> =
         columns.clone().map(|x| target_cell(screen, wanted, memory, CellPosition { x, y })).collect();
     let start = RowStart {
         fg: screen.pen.fg,
@@ -91,11 +91,11 @@ fn target_cell(
     wanted: &TargetScreen,
     memory: &FirstPreviewCells,
     at: CellPosition,
-) -> TargetCell {
+) -> WantedAndShownCell {
     let shown = match screen.content(at) {
         CellContent::Mosaic(mosaic) => Some(*mosaic),
         CellContent::Unknown | CellContent::Text(_) | CellContent::Covered => None,
     };
     let wanted = wanted.preview_cell(at.x, at.y).map(|wanted| memory.stabilized_cell(at, wanted, shown));
-    TargetCell { wanted, shown }
+    WantedAndShownCell { wanted, shown }
 }

@@ -18,7 +18,7 @@ const MAX_BYTES: f32 = 46.0;
 
 /// A cell in the row, with its target and its current content.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct TargetCell {
+pub(super) struct WantedAndShownCell {
     /// Target content, or `None` if the cell is not part of the preview.
     pub(super) wanted: Option<TwoPartColorCell>,
     /// Content on the screen, or `None` if unknown, in which case the cell must be drawn.
@@ -99,7 +99,7 @@ pub(super) struct PlannedRow {
 }
 
 /// Finds the cheapest path through a row of cells.
-pub(super) fn plan_row(targets: &[TargetCell], start: RowStart, model: RateDistortion) -> PlannedRow {
+pub(super) fn plan_row(targets: &[WantedAndShownCell], start: RowStart, model: RateDistortion) -> PlannedRow {
     let gap = if start.is_at_start { CursorGap::Cells(0) } else { CursorGap::Far };
     let RowStart { fg, bg, .. } = start;
     let first =
@@ -116,7 +116,7 @@ pub(super) fn plan_row(targets: &[TargetCell], start: RowStart, model: RateDisto
 /// Extends the paths by one cell.
 fn extend_plans(
     last: &[RowPrefixPlan],
-    target: TargetCell,
+    target: WantedAndShownCell,
     wanted: &[Option<TwoPartColorCell>],
     model: RateDistortion,
 ) -> Vec<RowPrefixPlan> {
@@ -398,10 +398,10 @@ mod tests {
     const BLACK: TerminalColor = TerminalColor::Rgb([0, 0, 0]);
     const RED: TerminalColor = TerminalColor::Rgb([200, 0, 0]);
 
-    fn wanted(halves: &[[TerminalColor; 2]]) -> Vec<TargetCell> {
+    fn wanted(halves: &[[TerminalColor; 2]]) -> Vec<WantedAndShownCell> {
         halves
             .iter()
-            .map(|halves| TargetCell {
+            .map(|halves| WantedAndShownCell {
                 wanted: Some(TwoPartColorCell::from_halves(*halves)),
                 shown: Some(TwoPartColorCell::uniform(TerminalColor::DefaultBackground)),
             })
@@ -448,7 +448,7 @@ mod tests {
             [TerminalColor::DefaultForeground, TerminalColor::DefaultBackground],
             [TerminalColor::DefaultForeground; 2],
         ] {
-            let targets = [TargetCell { wanted: Some(TwoPartColorCell::from_halves(halves)), shown: None }];
+            let targets = [WantedAndShownCell { wanted: Some(TwoPartColorCell::from_halves(halves)), shown: None }];
             let found = plan_row(&targets, start(BLACK, BLACK), RateDistortion::MOVING);
             assert_eq!(found.ops.first().map(|op| op.mosaic.pair), Some(halves));
         }
@@ -485,7 +485,7 @@ mod tests {
             ),
             is_exact in any::<bool>(),
         ) {
-            let targets: Vec<TargetCell> = cells.iter().map(|(wanted, shown)| TargetCell { wanted: *wanted, shown: *shown }).collect();
+            let targets: Vec<WantedAndShownCell> = cells.iter().map(|(wanted, shown)| WantedAndShownCell { wanted: *wanted, shown: *shown }).collect();
             let model = if is_exact { RateDistortion::EXACT } else { RateDistortion::MOVING };
             let found = plan_row(&targets, start(TerminalColor::DefaultForeground, TerminalColor::DefaultBackground), model);
             let mut screen: Vec<Option<TwoPartColorCell>> = targets.iter().map(|target| target.shown).collect();

@@ -110,7 +110,7 @@ pub(super) fn read_orientation(decoder: &mut dyn ImageDecoder) -> Result<Orienta
 }
 
 /// Size of a texel produced by [`texels`](super::convert::texels).
-pub(super) fn bytes_per_texel(color: ColorType, encoding: ColorEncoding, metadata: &ImageMetadata) -> u64 {
+pub(super) fn stored_bytes_per_texel(color: ColorType, encoding: ColorEncoding, metadata: &ImageMetadata) -> u64 {
     let sample_bytes = color.bytes_per_pixel() / color.channel_count();
     let is_packed = sample_bytes == 1 && encoding.color_space(metadata).is_default();
     match encoding {

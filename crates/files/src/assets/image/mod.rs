@@ -34,7 +34,7 @@ use crate::system::describe_error;
 use counting_reader::ProgressReader;
 use decode_thread::ProgressReporter;
 use decoder::{
-    ImageDecoderWithMetadata, bytes_per_texel, checked_texel_memory_size, create_decoder,
+    ImageDecoderWithMetadata, stored_bytes_per_texel, checked_texel_memory_size, create_decoder,
     max_memory_to_file_ratio, read_orientation,
 };
 use metadata::{ImageMetadata, ImageWarning};
@@ -491,7 +491,7 @@ impl OpenImage {
         };
         let (decoder, metadata) = chosen.map_err(|error| shorten_decoder_error(&error))?;
         let held_bytes = if is_jpeg { self.length } else { 0 };
-        let texel = bytes_per_texel(decoder.color_type(), encoding, &metadata);
+        let texel = stored_bytes_per_texel(decoder.color_type(), encoding, &metadata);
         let texel_bytes = checked_texel_memory_size(
             &*decoder,
             texel,

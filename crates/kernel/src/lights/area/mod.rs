@@ -74,14 +74,14 @@ pub struct AreaLight {
     /// Index of the object.
     pub object: u32,
     /// The part of the object that emits.
-    pub part: EmittingTriangleSelection,
+    pub part: EmittingPart,
     /// Bounds on the light's position, directions, and power.
     pub bounds: LightBounds,
 }
 
 /// The part of an object to which a light belongs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum EmittingTriangleSelection {
+pub enum EmittingPart {
     /// The entire object.
     Whole,
     /// The triangles that the emitter lists.
@@ -192,7 +192,7 @@ impl Emitter {
 /// Creates the light on the front of a shape, or returns `None` if the shape is infinite or has no area.
 pub fn front_area_light(shape: &Shape, radiance: Vec3, object: u32) -> Option<AreaLight> {
     let (emitter, bounds) = (front_emitter(shape)?, emission_bounds(shape, radiance)?);
-    let (side, modulation, part) = (Side::Front, None, EmittingTriangleSelection::Whole);
+    let (side, modulation, part) = (Side::Front, None, EmittingPart::Whole);
     Some(AreaLight { shape: emitter, side, radiance, modulation, object, part, bounds })
 }
 

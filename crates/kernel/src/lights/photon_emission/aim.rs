@@ -235,7 +235,7 @@ fn cluster_spheres(balls: Vec<BoundingSphere>) -> Vec<BoundingSphere> {
     let mut groups = vec![balls];
     while groups.len() < MAX_TARGETS {
         let size = |group: &Vec<BoundingSphere>| {
-            if group.len() > 1 { BoundingSphere::enclosing_spheres(group).radius } else { 0.0 }
+            if group.len() > 1 { BoundingSphere::enclosing_all_spheres(group).radius } else { 0.0 }
         };
         let sizes = groups.iter().map(size).enumerate();
         let Some((largest, _)) = sizes.max_by(|a, b| a.1.total_cmp(&b.1)) else { break };
@@ -248,5 +248,5 @@ fn cluster_spheres(balls: Vec<BoundingSphere>) -> Vec<BoundingSphere> {
         let rest = group.split_off(group.len() / 2);
         groups.extend([group, rest]);
     }
-    groups.iter().map(|group| BoundingSphere::enclosing_spheres(group)).collect()
+    groups.iter().map(|group| BoundingSphere::enclosing_all_spheres(group)).collect()
 }

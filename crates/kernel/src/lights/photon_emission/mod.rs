@@ -43,7 +43,7 @@ pub struct BoundingSphere {
 
 impl BoundingSphere {
     /// A sphere that contains all spheres in `balls`. Its center is the center of their bounding box.
-    pub fn enclosing_spheres(balls: &[Self]) -> Self {
+    pub fn enclosing_all_spheres(balls: &[Self]) -> Self {
         let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         for Self { center, radius } in balls {
             (min, max) = (min.min(*center - *radius), max.max(*center + *radius));

@@ -18,7 +18,7 @@ use crate::lights::infinite::sky::sun::OrientedSunDisk;
 use crate::lights::infinite::sky::{Sky, SkyFrame, SkyParameters};
 use crate::lights::infinite::{DirectionalLight, Environment, EnvironmentMap};
 use crate::lights::{
-    AreaLight, EmissionModulation, Emitter, EmittingTriangleSelection, MeshEmitter, TriangleWithUvs,
+    AreaLight, EmissionModulation, Emitter, EmittingPart, MeshEmitter, TriangleWithUvs,
     UvMapping, front_area_light,
 };
 use crate::materials::texels::{TexelData, Texels};

@@ -13,7 +13,7 @@ use crate::geometry::triangle::Triangle;
 use crate::lights::delta::{Falloff, PointLight, SpotLight};
 use crate::lights::infinite::{DirectionalLight, Environment};
 use crate::lights::{
-    AreaLight, Emitter, EmittingTriangleSelection, Light, Lights, MeshEmitter, Side, front_area_light,
+    AreaLight, Emitter, EmittingPart, Light, Lights, MeshEmitter, Side, front_area_light,
 };
 use crate::math::lanes::PortableSimd;
 use crate::math::{DVec3, Vec3, random};
@@ -447,7 +447,7 @@ fn mesh_pdf_matches_its_samples() {
             shape: Emitter::Mesh(mesh),
             radiance: Vec3::ONE,
             object: 4,
-            part: EmittingTriangleSelection::Listed,
+            part: EmittingPart::Listed,
             bounds,
             modulation: None,
         };

@@ -167,7 +167,7 @@ impl KernelNeighborhood {
     /// Adds a shape and returns whether the coverage still has a closed form. `receives` returns whether
     /// photons are stored on the front (`true`) or the back.
     fn add_shape(&mut self, shape: &Shape, receives: impl Fn(bool) -> bool) -> bool {
-        match shape.geometry_near(self.point) {
+        match shape.local_geometry_near(self.point) {
             LocalGeometry::Polygons(count) => (0..count)
                 .filter_map(|number| shape.polygon_face(number))
                 .all(|piece| self.add_polygon_piece_or_wall(piece, &receives)),

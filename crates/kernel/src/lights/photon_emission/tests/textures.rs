@@ -108,7 +108,7 @@ fn mesh_emission_matches_light_sampling() {
             radiance: COLOR,
             modulation: None,
             object: OBJECT,
-            part: EmittingTriangleSelection::Listed,
+            part: EmittingPart::Listed,
             bounds,
         };
         let area_of = |TriangleWithUvs { corners: [a, b, c], .. }: &TriangleWithUvs| {
