@@ -196,7 +196,7 @@ pub enum DefaultValue {
 
 impl DefaultValue {
     /// Parses a constant default.
-    pub(crate) fn parse(self) -> Option<Value<'static>> {
+    pub(crate) fn to_toml_value(self) -> Option<Value<'static>> {
         if let Self::Is(text) = self { toml::parse_leaked_constant(text) } else { None }
     }
 }
@@ -226,7 +226,7 @@ macro_rules! parsed_default {
         fn parse_default_once() -> Option<$crate::toml::Value<'static>> {
             static PARSED: std::sync::OnceLock<Option<$crate::toml::Value<'static>>> =
                 std::sync::OnceLock::new();
-            *PARSED.get_or_init(|| $default.parse())
+            *PARSED.get_or_init(|| $default.to_toml_value())
         }
         parse_default_once
     }};
