@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use glimt::pipeline::protocol::{Command, Event, MaxPreviewSize, Request};
 use glimt::pipeline::settings::Overrides;
-use glimt::pipeline::{Handle, start_with_channel};
+use glimt::pipeline::{Handle, start_with_new_channel};
 
 use super::BenchResult;
 
@@ -18,12 +18,12 @@ const LIMIT: Duration = Duration::from_secs(20);
 pub fn times(scene: &Path) -> BenchResult<Vec<Duration>> {
     let mut times = Vec::new();
     for step in 0..12 {
-        let worker = start_with_channel(0)?;
+        let worker = start_with_new_channel(0)?;
         let mut generation = 0;
         send(&worker.0, scene, &mut generation);
         times.push(cancel(&worker, scene, &mut generation, Duration::from_millis(step * step * 4))?);
     }
-    let worker = start_with_channel(0)?;
+    let worker = start_with_new_channel(0)?;
     let mut generation = 0;
     send(&worker.0, scene, &mut generation);
     while !matches!(worker.1.recv_timeout(LIMIT)?, Event::Preview { .. }) {}

@@ -20,7 +20,7 @@ RATE = 2000  # profile samples per second
 # Substrings of function names, searched from the innermost frame outward; the first stage with a match counts.
 STAGES = [
     ("glass", ["crossing", "contact", "isolated", "touch_error", "specular", "near_shape", "encloses"]),
-    ("lights: picks", ["pick_flat", "pick_by_cuts", "picks", "single_node_importance", "move_to", "samples_at"]),
+    ("lights: picks", ["pick_flat", "pick_by_cuts", "picks", "importance_if_single_node", "move_to", "samples_at"]),
     ("lights: samples", ["sample_packet", "sample_per_lane", "light_pdf", "inverse_pdf"]),
     ("shadow rays", ["occluded", "any_packet", "any_rows", "any_avx", "any_in_small", "single::any", "packet::any", "pool", "is_hit", "doubtful_hit", "add_unoccluded"]),
     ("closest hits", ["facets", "closest", "single::nearest", "packet::nearest", "intersect_near_origin", "corners_and_edge_functions_f64", "alone", "update_nearest", "packet::Closest", "merged::rays"]),

@@ -11,7 +11,7 @@ use std::process::{Command, Stdio};
 use glimt::film::Srgb8Image;
 use glimt::math::Vec3;
 use glimt::math::color::srgb8_color_to_linear;
-use glimt::tui::{ColorDepth, PreviewChoice, draw_for_dark_xterm, filled_squares, xterm_rgb};
+use glimt::tui::{ColorDepth, PreviewChoice, draw_for_dark_xterm, squares_of_block_character, xterm_rgb};
 use ratatui::buffer::{Buffer, Cell};
 use ratatui::layout::Rect;
 use ratatui::style::Color;
@@ -203,7 +203,7 @@ impl LinearImage {
             let [ink, ground] =
                 [xterm_rgb(cell.fg).unwrap_or(FOREGROUND), xterm_rgb(cell.bg).unwrap_or(BACKGROUND)];
             let [ink, ground] = [ink, ground].map(srgb8_color_to_linear);
-            let part = match (filled_squares(symbol), (symbol as usize).checked_sub(0x20)) {
+            let part = match (squares_of_block_character(symbol), (symbol as usize).checked_sub(0x20)) {
                 (Some(filled_squares), _) => f32::from(u8::from(filled_squares[place])),
                 (None, Some(number)) => {
                     ASCII_INK_COVERAGE.get(number).map_or(0.0, |ink| f32::from(*ink) / 255.0)

@@ -24,7 +24,7 @@ use std::time::{Duration, Instant};
 use glimt::film::Srgb8Image;
 use glimt::pipeline::protocol::MaxPreviewSize;
 use glimt::tui::ColorDepth;
-use glimt::tui::paint::{PacingAdvice, PacingInputs, Painter, PreviewFidelity, pace_preview};
+use glimt::tui::paint::{PacingDecision, PacingInputs, Painter, PreviewFidelity, preview_pacing_decision};
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use ratatui::style::Color;
@@ -114,7 +114,7 @@ fn replay(edit: &Edit, columns: u16, rows: u16) -> Result<(), Box<dyn Error>> {
     }
     // Write the file next to the scenes so that relative paths work.
     let scene = tempfile::Builder::new().prefix("bench").suffix(".toml").tempfile_in(&scenes)?;
-    let worker = glimt::pipeline::start_with_channel(0)?;
+    let worker = glimt::pipeline::start_with_new_channel(0)?;
     let mut window = Window::new(columns, rows);
     for (generation, name, text) in
         [(1, "start", text.clone()), (2, edit.name, text.replace(edit.from, edit.to))]
@@ -173,7 +173,7 @@ impl Window {
                 is_final: shot.is_final,
                 final_in: None,
             };
-            if let PacingAdvice::Aim(fidelity) = pace_preview(&moment) {
+            if let PacingDecision::Aim(fidelity) = preview_pacing_decision(&moment) {
                 (aimed, at) = (shot.samples, shot.seconds);
                 bytes += self.aim(&shot.picture, fidelity);
                 pictures += 1;

@@ -9,7 +9,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use glimt::tui::{TestImageTerminal, filled_squares, xterm_rgb};
+use glimt::tui::{TestImageTerminal, squares_of_block_character, xterm_rgb};
 use portable_pty::{Child, CommandBuilder, MasterPty, PtySize, native_pty_system};
 use ratatui::style::Color;
 
@@ -84,7 +84,8 @@ fn parts(cell: &vt100::Cell) -> [[u8; 3]; 24] {
         vt100::Color::Rgb(r, g, b) => Some([r, g, b]),
     };
     let (fg, bg) = (color(cell.fgcolor()), color(cell.bgcolor()));
-    let filled_squares = filled_squares(cell.contents().chars().next().unwrap_or(' ')).unwrap_or([false; 24]);
+    let filled_squares =
+        squares_of_block_character(cell.contents().chars().next().unwrap_or(' ')).unwrap_or([false; 24]);
     filled_squares.map(|is_ink| if is_ink { fg } else { bg }.unwrap_or_default())
 }
 

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use glimt::scene::diagnostic::{Diagnostic, Severity};
-use glimt::scene::report::{ReportStyle, line_and_column, render_report, summarize_counts};
+use glimt::scene::report::{ReportStyle, line_and_column, render_diagnostics, summarize_diagnostic_counts};
 
 use super::test_dir::assert_mentions;
 
@@ -639,7 +639,7 @@ fn reports_show_positions_and_escape_controls() {
         let path = folder().join(name).with_extension("toml");
         let text = fs::read_to_string(&path).expect("text");
         let diagnostics = diagnostics(&path);
-        let report = render_report(&diagnostics, 100, ReportStyle::Plain);
+        let report = render_diagnostics(&diagnostics, 100, ReportStyle::Plain);
         for (line, column, _) in *expected {
             let place = format!("--> {}:{line}:{column}\n", path.display());
             assert!(report.contains(&place), "{place} not found in\n{report}");
@@ -647,7 +647,7 @@ fn reports_show_positions_and_escape_controls() {
             let start: String = source.trim().chars().take_while(|c| !c.is_control()).take(20).collect();
             assert!(report.contains(&start), "{start} not found in\n{report}");
         }
-        assert!(report.ends_with(&format!("\n{}\n", summarize_counts(&diagnostics))), "{report}");
+        assert!(report.ends_with(&format!("\n{}\n", summarize_diagnostic_counts(&diagnostics))), "{report}");
         let is_safe = |c: char| c == '\n' || !(c.is_control() || "\u{202e}\u{feff}".contains(c));
         assert!(report.chars().all(is_safe), "{report:?}");
         assert_eq!(report.matches("^").count() > 0, !diagnostics.is_empty());

@@ -34,7 +34,7 @@ struct PreviewRenderer {
 
 impl PreviewRenderer {
     fn new(preview: MaxPreviewSize) -> Self {
-        let (handle, events) = glimt::pipeline::start_with_channel(0).expect("a worker");
+        let (handle, events) = glimt::pipeline::start_with_new_channel(0).expect("a worker");
         let folder = tempfile::tempdir().expect("a temporary folder");
         Self { handle, events, preview, generation: 0, folder }
     }

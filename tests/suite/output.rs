@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 use std::time::Duration;
 
-use glimt::output::{OutputError, check_image_path, write::atomic};
+use glimt::output::{OutputError, check_image_target, write::atomic};
 use nix::errno::Errno;
 
 use super::test_dir::{assert_mentions, system_error};
@@ -46,7 +46,7 @@ fn names(directory: &Path) -> Vec<String> {
 }
 
 fn refusal(path: &Path) -> String {
-    let before = check_image_path(path).expect_err("rejection before rendering").to_string();
+    let before = check_image_target(path).expect_err("rejection before rendering").to_string();
     let after = atomic(path, b"new").expect_err("refused at the end").to_string();
     assert_eq!(before, after);
     after
@@ -85,7 +85,7 @@ fn link_is_kept_and_its_target_replaced() {
     symlink(&target, directory.path().join("middle.png")).expect("a link");
     let path = directory.path().join("out.png");
     for bytes in [b"one", b"two"] {
-        check_image_path(&path).expect("a valid target");
+        check_image_target(&path).expect("a valid target");
         atomic(&path, bytes).expect("written");
         assert_eq!(fs::read(&target).expect("a file"), bytes);
     }
@@ -108,7 +108,7 @@ fn full_disk_is_an_error() {
     let directory = scratch();
     let path = directory.path().join("x.png");
     symlink("/dev/full", &path).expect("a link");
-    check_image_path(&path).expect("only the write must fail");
+    check_image_target(&path).expect("only the write must fail");
     let message = atomic(&path, b"picture").expect_err("nothing fits").to_string();
     assert_mentions(&message, &[&path.display().to_string(), &system_error(Errno::ENOSPC)]);
     assert!(fs::symlink_metadata("/dev/full").is_ok(), "the device must still exist");

@@ -8,7 +8,7 @@ use std::rc::Rc;
 
 use crate::exit::Exit;
 use crate::scene::diagnostic::Diagnostic;
-use crate::scene::report::{ReportStyle, render_report};
+use crate::scene::report::{ReportStyle, render_diagnostics};
 use crate::scene::sanitize::escape_invisible_chars;
 use crate::system::describe_error;
 use crate::tui::ColorDepthChoice;
@@ -104,7 +104,7 @@ impl Console {
     /// Prints errors and warnings with their source lines to stderr.
     pub(super) fn print_diagnostics(&self, diagnostics: &[Diagnostic]) {
         if !diagnostics.is_empty() {
-            let text = render_report(diagnostics, stderr_columns(), self.style);
+            let text = render_diagnostics(diagnostics, stderr_columns(), self.style);
             let _ = writeln!(std::io::stderr().lock(), "{}", text.trim_end());
         }
     }

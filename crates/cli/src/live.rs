@@ -10,7 +10,7 @@ use crate::exit::Exit;
 use crate::lower::RenderRequest;
 use crate::output::held;
 use crate::pipeline::protocol::{
-    CheckpointUpdate, Command, Event, Failure, SavedSceneImageState, Stage, Status,
+    CheckpointUpdate, Command, Event, Failure, SavedSceneRenderStatus, Stage, Status,
 };
 use crate::pipeline::watch::{
     ExternalChange, FileHashCache, FilePathAndContentId, Watcher, find_missing_parent_or_working_folder,
@@ -271,7 +271,7 @@ impl SharedWriteLog {
             Event::Files { .. } | Event::OwnImage { .. } if has_left => {}
             Event::Files { generation, files, .. } => log.read = (*generation, files.clone()),
             Event::OwnImage { state, .. } => {
-                let is_written = *state == SavedSceneImageState::Written;
+                let is_written = *state == SavedSceneRenderStatus::Written;
                 log.image_files = is_written.then(|| log.read.1.clone());
             }
         }
@@ -426,13 +426,13 @@ mod tests {
         };
         let own = |state| writes.record_event(&Event::OwnImage { generation: 1, state });
         writes.record_event(&read());
-        own(SavedSceneImageState::Written);
+        own(SavedSceneRenderStatus::Written);
         assert!(!writes.is_image_older_than_inputs(&contents));
-        own(SavedSceneImageState::Written);
+        own(SavedSceneRenderStatus::Written);
         std::fs::write(&path, "22").expect("written");
         assert!(writes.is_image_older_than_inputs(&contents));
         // A request has read the new scene, but has not rendered its image.
-        own(SavedSceneImageState::NotBegun);
+        own(SavedSceneRenderStatus::NotBegun);
         assert!(writes.is_image_older_than_inputs(&contents));
         let ended = TuiOutcome {
             status: ExitStatus::QUIT,

@@ -15,7 +15,7 @@ use crate::pipeline::protocol::{
 };
 use crate::pipeline::settings::{EffectiveSettingsSummary, Overrides};
 use crate::pipeline::turntable::{TurntableFrame, leftover_frames};
-use crate::pipeline::{Handle, start_with_channel};
+use crate::pipeline::{Handle, start_with_new_channel};
 use crate::progress::{self, Reporter};
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::signals;
@@ -33,7 +33,7 @@ const TICK: Duration = Duration::from_millis(50);
 pub(super) fn run(render_request: &RenderRequest, console: &Console) -> Exit {
     // Lower the priority before starting threads, because threads inherit it.
     priority::lower_priority_including_spawned_threads(render_request.nice);
-    let (worker, events) = match start_with_channel(0) {
+    let (worker, events) = match start_with_new_channel(0) {
         Ok(started) => started,
         Err(error) => {
             return console.print_error(Exit::FAILED, &describe_thread_start_failure(1, false, &error));

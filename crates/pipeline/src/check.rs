@@ -14,7 +14,7 @@ use super::sink::EventSink;
 use super::stages::parse::SceneParseRequest;
 use super::stages::textures::TextureSelection;
 use super::stages::{AbortReason, Findings};
-use super::table::StageTable;
+use super::table::StageRecorder;
 use super::targets::output_conflicts;
 use super::threads::RenderThreads;
 use super::warnings::settings_warnings;
@@ -112,9 +112,9 @@ impl IncrementalSceneChecker {
         findings: &mut Findings,
     ) -> Result<SceneAssets, AbortReason> {
         let sink = EventSink::silent(0);
-        let pool = self.threads.pool(logical_cpu_count(), false)?;
+        let pool = self.threads.get_or_create_pool(logical_cpu_count(), false)?;
         let reader = FileReader { contents: &self.contents, pool: &pool, sink: &sink, token };
-        let (scenes, mut table) = (&mut self.scenes, StageTable::new(None, token));
+        let (scenes, mut table) = (&mut self.scenes, StageRecorder::new(None, token));
         reader.read_consistently(&mut table, findings, |reading| {
             let scene = SceneParseRequest { path, sets, show: ModelViewOptions::default() };
             let parsed = scenes.parse_scene(scene, reading)?;

@@ -96,7 +96,7 @@ impl ImageDependencies<'_> {
     fn fingerprint(&self) -> Fingerprint {
         let scene = self.copy_scene_with_content_hashes();
         let eye = RequestCamera::new(&scene, self.parsed.orbiter, self.camera);
-        let orbiter = eye.orbiter_text();
+        let orbiter = eye.orbiter_fingerprint_text();
         let meshes: Vec<Fingerprint> = scene
             .mesh_files
             .iter()

@@ -108,15 +108,15 @@ impl ProtectedInputs {
     }
 
     /// Returns the sorted paths of all files except the scene, relative to the scene's folder.
-    pub(super) fn relative_paths(&self, scene: &Path) -> Vec<String> {
+    pub(super) fn paths_relative_to_scene(&self, scene: &Path) -> Vec<String> {
         let others = self.0.iter().filter(|input| input.path != scene);
         let paths: BTreeSet<_> = others.map(|input| path_relative_to_scene(&input.path, scene)).collect();
         paths.into_iter().collect()
     }
 
     /// Indexes the files according to their current state on disk.
-    pub(super) fn build_identity_index(&self) -> InputIndex<'_> {
-        let mut on_disk = InputIndex { by_identity: HashMap::new(), alike: Vec::new() };
+    pub(super) fn build_identity_index(&self) -> InputsByIdentity<'_> {
+        let mut on_disk = InputsByIdentity { by_identity: HashMap::new(), alike: Vec::new() };
         for input in &self.0 {
             if let Some(identity) = FileIdentity::from_existing_or_new_path(&input.path) {
                 on_disk.by_identity.entry(identity).or_insert(input);
@@ -136,12 +136,12 @@ impl ProtectedInputs {
 }
 
 /// Inputs indexed by file identity, with fingerprints for finding similar files.
-pub(super) struct InputIndex<'a> {
+pub(super) struct InputsByIdentity<'a> {
     by_identity: HashMap<FileIdentity, &'a ProtectedInput>,
     alike: Vec<(FallbackFileIdentity, &'a ProtectedInput)>,
 }
 
-impl<'a> InputIndex<'a> {
+impl<'a> InputsByIdentity<'a> {
     /// Returns the input that a path refers to, or probably refers to.
     pub(super) fn find(&self, path: &Path) -> Option<&'a ProtectedInput> {
         if let Some(input) = self.by_identity.get(&FileIdentity::from_existing_or_new_path(path)?) {

@@ -32,7 +32,7 @@ impl KeyboardOverrides {
     }
 
     /// Adds the changes to overrides from the command line.
-    pub fn apply_to_command_line(&self, command_line: &Overrides) -> Overrides {
+    pub fn add_to_command_line_overrides(&self, command_line: &Overrides) -> Overrides {
         Overrides {
             shadows: self.shadows.or(command_line.shadows),
             integrator: self.integrator.or(command_line.integrator),
@@ -90,7 +90,7 @@ impl KeyboardOverrides {
             ("photons", self.photons != before.photons, self.photons.map(on_off)),
             ("view", self.view != before.view, self.view.map(|it| name(it.name()))),
             ("camera", self.camera != before.camera && !(is_camera_written && camera.is_none()), camera),
-            ("exposure", self.exposure != before.exposure, self.exposure.map(format_stops)),
+            ("exposure", self.exposure != before.exposure, self.exposure.map(format_exposure_stops)),
         ];
         let differing = || all.iter().filter(|(_, differs, _)| *differs);
         let now = differing().filter_map(|(name, _, now)| Some(format!("{name} {}", now.as_ref()?)));
@@ -110,7 +110,7 @@ fn join_names(names: &[&str]) -> String {
 }
 
 /// Formats exposure stops with a sign.
-pub fn format_stops(stops: f32) -> String {
+pub fn format_exposure_stops(stops: f32) -> String {
     match stops {
         0.0 => "0".to_owned(),
         stops if stops < 0.0 => format!("−{}", -stops),
@@ -124,6 +124,6 @@ mod tests {
 
     #[test]
     fn exposure_uses_a_minus_sign() {
-        assert_eq!([-0.25, 0.0, 1.5].map(format_stops), ["−0.25", "0", "+1.5"]);
+        assert_eq!([-0.25, 0.0, 1.5].map(format_exposure_stops), ["−0.25", "0", "+1.5"]);
     }
 }

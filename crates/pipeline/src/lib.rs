@@ -61,4 +61,4 @@ pub use formats::{
 };
 pub use stages::parse::files_referenced_by_assets;
 pub use watch::content::{FileContentId, FilePathAndContentId};
-pub use worker::{CommandSender, Handle, start, start_with_channel};
+pub use worker::{CommandSender, Handle, start, start_with_new_channel};

@@ -130,7 +130,7 @@ impl MemoryEstimate {
         let all = self.bytes();
         let frames = self.0.iter().find(|(name, bytes)| *name == FRAMES && *bytes > MAX_FRAMES);
         if let (Some((_, bytes)), None) = (frames, plan.limits.memory) {
-            return Err(AbortReason::work_failure(format!(
+            return Err(AbortReason::from_work_error(format!(
                 "the frames need {} of memory until the animation is written; render fewer or smaller frames, or \
                  numbered files such as a_####.png; --memory {} allows it",
                 format_bytes(*bytes),
@@ -169,7 +169,7 @@ impl MemoryEstimate {
             false => remedy,
         };
         let try_anyway = format!(", raise the limit, or try anyway with --memory {}", format_memory_arg(all));
-        Err(AbortReason::work_failure(format!(
+        Err(AbortReason::from_work_error(format!(
             "the render needs about {} of memory ({}), more than the {} allowed by {setting}; {remedy}{}",
             format_bytes(all),
             items.join(", "),

@@ -14,7 +14,7 @@ use crate::choice::Choice;
 use crate::film::range_map::{DataKind, RangeMap};
 use crate::film::tone::ToneMapping;
 use crate::film::{FilmQuantity, Rect};
-use crate::integrators::{AovSource, FirstHitQuantity, LightAov, PhotonSettings, RenderSettings};
+use crate::integrators::{AovSource, FirstHitQuantity, PathAov, PhotonSettings, RenderSettings};
 use crate::math::Vec3;
 use crate::output::AnimationFormat;
 use crate::output::{BitDepth, Format, OutputError};
@@ -86,7 +86,7 @@ impl RenderPlan {
     pub(super) fn tone_mapping(&self) -> ToneMapping {
         let RenderOptions { exposure, tonemap: curve, .. } = self.settings.render;
         match self.settings.view.aov_source() {
-            AovSource::Light(LightAov::Radiance(_))
+            AovSource::Light(PathAov::Radiance(_))
             | AovSource::Bounds
             | AovSource::Film(FilmQuantity::Radiance) => {
                 ToneMapping { exposure_stops: exposure, curve, ..Default::default() }
@@ -94,7 +94,7 @@ impl RenderPlan {
             AovSource::FirstHit(FirstHitQuantity::Depth) => {
                 ToneMapping { range_map: RangeMap::Unresolved(DataKind::Distances), ..ToneMapping::DATA }
             }
-            AovSource::Light(LightAov::TraversalCost)
+            AovSource::Light(PathAov::TraversalCost)
             | AovSource::FirstHit(FirstHitQuantity::Photons)
             | AovSource::Film(FilmQuantity::Samples | FilmQuantity::Error) => {
                 ToneMapping { range_map: RangeMap::Unresolved(DataKind::Amounts), ..ToneMapping::DATA }
@@ -106,7 +106,7 @@ impl RenderPlan {
                 | FirstHitQuantity::Albedo,
             ) => ToneMapping::DATA,
             // The values are linear, but exposure must not scale them.
-            AovSource::Light(LightAov::LitFraction) => ToneMapping::default(),
+            AovSource::Light(PathAov::LitFraction) => ToneMapping::default(),
         }
     }
 
@@ -215,7 +215,7 @@ pub(super) fn resolve_plan(
         // Part files do not use an image format.
         Some(_) => check_shardable(&plan.settings, overrides)?,
         None => {
-            plan.outputs.images.iter().try_for_each(|path| check_image_format(&plan, path))?;
+            plan.outputs.images.iter().try_for_each(|path| check_size_and_bit_depth(&plan, path))?;
             check_layers(&plan)?;
             plan.outputs.animations.iter().try_for_each(|path| check_animation_format(&plan, path))?;
         }
@@ -401,7 +401,7 @@ fn check_shardable(settings: &RenderSettings, overrides: &Overrides) -> Result<(
 }
 
 /// Checks that the file format supports the image size and bit depth.
-fn check_image_format(plan: &RenderPlan, path: &Path) -> Result<(), Box<Diagnostic>> {
+fn check_size_and_bit_depth(plan: &RenderPlan, path: &Path) -> Result<(), Box<Diagnostic>> {
     let RenderOptions { width, height, .. } = plan.settings.render;
     let check = || Format::from_path(path)?.check_image(width, height, BitDepth::try_from(plan.bit_depth)?);
     check().map_err(|error: OutputError| {
@@ -559,9 +559,9 @@ mod tests {
             let overrides = Overrides { view: Some(view), ..Default::default() };
             let transfer = planned("", &overrides).tone_mapping().transfer;
             let is_display_value = match view.aov_source() {
-                AovSource::FirstHit(_) | AovSource::Light(LightAov::TraversalCost) => true,
+                AovSource::FirstHit(_) | AovSource::Light(PathAov::TraversalCost) => true,
                 AovSource::Film(quantity) => quantity != FilmQuantity::Radiance,
-                AovSource::Light(LightAov::Radiance(_) | LightAov::LitFraction) | AovSource::Bounds => false,
+                AovSource::Light(PathAov::Radiance(_) | PathAov::LitFraction) | AovSource::Bounds => false,
             };
             assert_eq!(transfer == Transfer::Identity, is_display_value, "{}", view.name());
         }

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::output::{image_replace_check, part, scene_name_in_png, scene_path};
+use crate::output::{check_image_replacement, part, scene_name_in_png, scene_path};
 
 /// Which existing files an image must not replace.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -28,7 +28,7 @@ impl OverwriteProtection {
     /// Returns why an image must not replace the file at a path, or `None` if it may.
     pub(crate) fn reason_to_keep(&self, at: &Path) -> Option<OverwriteRefusalReason> {
         match self {
-            Self::OtherImages(_) if image_replace_check(at).reason_to_keep().is_some() => {
+            Self::OtherImages(_) if check_image_replacement(at).reason_to_keep().is_some() => {
                 Some(OverwriteRefusalReason::Foreign)
             }
             Self::OtherImages(scene) => {

@@ -88,7 +88,7 @@ impl Request {
     }
 
     /// Returns the overrides for the scene's own image.
-    pub(super) fn own_overrides(&self) -> &Overrides {
+    pub(super) fn saved_scene_overrides(&self) -> &Overrides {
         self.own.as_deref().unwrap_or(&self.overrides)
     }
 
@@ -211,7 +211,7 @@ pub enum Event {
         /// Request number.
         generation: u64,
         /// State of the scene's own image.
-        state: SavedSceneImageState,
+        state: SavedSceneRenderStatus,
     },
     /// An image or a report could not be written. Rendering continues.
     WriteFailed {
@@ -319,7 +319,7 @@ impl Event {
 
 /// State of the scene's own image, which is rendered from the saved scene with the command-line overrides.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum SavedSceneImageState {
+pub enum SavedSceneRenderStatus {
     /// The image has been written to all of its output files.
     Written,
     /// Some of the image's samples have been rendered.
@@ -476,7 +476,7 @@ impl PreviewUpdate {
     }
 
     /// Whether all samples are known to be included in the image.
-    pub fn is_finished(&self) -> bool {
+    pub fn shows_finished_image(&self) -> bool {
         self.source.is_some_and(|source| source.is_finished)
     }
 }

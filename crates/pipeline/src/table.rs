@@ -1,4 +1,4 @@
-//! The stage table, which times each stage and reports its start and end.
+//! Times each stage and reports its start and end.
 
 use super::protocol::{Event, Stage, StageReport, Status};
 use super::sink::EventSink;
@@ -8,7 +8,7 @@ use crate::control::CancelToken;
 use crate::system::cpu_time::process_cpu_seconds;
 
 /// Times the stages of one request and records their reports.
-pub(super) struct StageTable<'a> {
+pub(super) struct StageRecorder<'a> {
     /// Receives reports of the start and end of each stage.
     sink: Option<&'a EventSink>,
     /// Token for pausing work. Pauses do not count toward stage times.
@@ -16,7 +16,7 @@ pub(super) struct StageTable<'a> {
     pub(super) stages: Vec<StageReport>,
 }
 
-impl<'a> StageTable<'a> {
+impl<'a> StageRecorder<'a> {
     pub(super) fn new(sink: Option<&'a EventSink>, token: &'a CancelToken) -> Self {
         Self { sink, token, stages: Vec::new() }
     }
@@ -39,7 +39,7 @@ impl<'a> StageTable<'a> {
 /// A stage that has been started.
 #[must_use]
 pub(super) struct RunningStage<'r, 'a> {
-    table: &'r mut StageTable<'a>,
+    table: &'r mut StageRecorder<'a>,
     name: Stage,
     watch: PausableStopwatch<'a>,
     /// Processor time of the process at the start.

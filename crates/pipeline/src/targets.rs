@@ -5,7 +5,7 @@ use std::collections::hash_map::Entry;
 use std::path::{Path, PathBuf};
 
 use super::formats::has_model_extension;
-use super::inputs::{InputIndex, ProtectedInput, ProtectedInputs};
+use super::inputs::{InputsByIdentity, ProtectedInput, ProtectedInputs};
 use super::plan::{OutputFiles, OutputNameSource, RenderPlan};
 use super::protected::{OverwriteProtection, recorded_scene_if_different};
 use super::protocol::Event;
@@ -15,7 +15,8 @@ use super::sink::EventSink;
 use crate::output::part::{self, PartFile};
 use crate::output::write::{ExistingFilePolicy, SweptFolders};
 use crate::output::{
-    AttributeLossPolicy, FileIdentity, OutputError, ReplaceCheck, image_replace_check, json_replace_check,
+    AttributeLossPolicy, FileIdentity, OutputError, ReplaceCheckResult, check_image_replacement,
+    check_json_replacement,
 };
 use crate::scene::diagnostic::{Diagnostic, Severity};
 
@@ -67,7 +68,7 @@ pub(super) fn output_conflicts(plan: &RenderPlan, inputs: &ProtectedInputs) -> V
     let twin =
         |target: OutputTarget<'_>, at: &FileIdentity| first.get(at).copied().filter(|first| *first != target);
     let each = targets_of_all_frames(plan)
-        .filter_map(|target| find_conflict(plan, target, target.path, &inputs, twin));
+        .filter_map(|target| target_conflict(plan, target, target.path, &inputs, twin));
     each.chain(linked_frame_conflicts(plan)).collect()
 }
 
@@ -114,7 +115,7 @@ pub(super) fn write_guarded<'a, T>(
             let mut others = current_targets(plan).filter(|other| *other != target);
             others.find(|other| FileIdentity::from_existing_or_new_path(other.path).as_ref() == Some(at))
         };
-        match find_conflict(plan, target, real, &inputs, twin) {
+        match target_conflict(plan, target, real, &inputs, twin) {
             Some(conflict) => Err(OutputError::Refused { reason: format_conflict_line(&conflict) }),
             None => Ok(()),
         }
@@ -152,11 +153,11 @@ fn current_targets(plan: &RenderPlan) -> impl Iterator<Item = OutputTarget<'_>> 
 
 /// Returns the reason for not writing a target that resolves to `at`. `twin` finds another target that is the
 /// same file.
-fn find_conflict<'a>(
+fn target_conflict<'a>(
     plan: &'a RenderPlan,
     target: OutputTarget<'a>,
     at: &Path,
-    inputs: &InputIndex<'_>,
+    inputs: &InputsByIdentity<'_>,
     twin: impl Fn(OutputTarget<'a>, &FileIdentity) -> Option<OutputTarget<'a>>,
 ) -> Option<Diagnostic> {
     if let Some(identity) = FileIdentity::from_existing_or_new_path(at) {
@@ -171,7 +172,10 @@ fn find_conflict<'a>(
         {
             let (name, output) = (target.path.display(), output.display());
             let message = format!("cannot write {name}: it is the checkpoint for {output}");
-            return Some(command_line_error(message, Some(choose_other_file_help(plan, target.kind).to_owned())));
+            return Some(command_line_error(
+                message,
+                Some(choose_other_file_help(plan, target.kind).to_owned()),
+            ));
         }
     }
     if plan.outputs.replaces_foreign { None } else { overwrites_foreign_file_error(plan, target, at) }
@@ -199,7 +203,10 @@ fn same_file_error(plan: &RenderPlan, target: OutputTarget<'_>, twin: &Path) -> 
         TargetKind::Image(_) => format!("the outputs {twin} and {name} are the same file"),
         TargetKind::Report => format!("the image {twin} and the report {name} are the same file"),
     };
-    command_line_error(message, Some(format!("use separate files: {}", choose_other_file_help(plan, target.kind))))
+    command_line_error(
+        message,
+        Some(format!("use separate files: {}", choose_other_file_help(plan, target.kind))),
+    )
 }
 
 /// Returns an error if the target is an existing file not written by glimt.
@@ -216,8 +223,9 @@ fn overwrites_foreign_file_error(
                 None => name.to_string(),
             };
             let help = format!("{remedy}; -o {own} or --force replaces it");
-            let replaced = image_replace_check(at);
-            if let (ReplaceCheck::Own, Some(other)) = (&replaced, recorded_scene_if_different(&plan.path, at))
+            let replaced = check_image_replacement(at);
+            if let (ReplaceCheckResult::Own, Some(other)) =
+                (&replaced, recorded_scene_if_different(&plan.path, at))
             {
                 let message = format!("cannot write {name}: it is the image of another scene, {other}");
                 return Some(command_line_error(message, Some(help)));
@@ -225,7 +233,7 @@ fn overwrites_foreign_file_error(
             (replaced, help)
         }
         TargetKind::Report => {
-            let replaced = json_replace_check(at, "a report", ReportRecognitionFields::have_all_stages);
+            let replaced = check_json_replacement(at, "a report", ReportRecognitionFields::have_all_stages);
             (replaced, format!("{remedy}; --force replaces it"))
         }
         TargetKind::Image(OutputNameSource::CommandLine | OutputNameSource::Scene) => {

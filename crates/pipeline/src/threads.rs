@@ -32,7 +32,7 @@ impl RenderThreads {
     ///
     /// # Errors
     /// The system cannot start the threads.
-    pub(super) fn pool(
+    pub(super) fn get_or_create_pool(
         &mut self,
         count: usize,
         has_threads_option: bool,
@@ -45,7 +45,7 @@ impl RenderThreads {
         let nice = self.nice;
         let begin = move |_| priority::lower_thread_priority(nice);
         let failed = |error: &dyn Display| {
-            AbortReason::work_failure(describe_thread_start_failure(count, has_threads_option, &error))
+            AbortReason::from_work_error(describe_thread_start_failure(count, has_threads_option, &error))
         };
         check_thread_stack_memory(count).map_err(|error| failed(&error))?;
         let builder = ThreadPoolBuilder::new().num_threads(count).thread_name(name).start_handler(begin);

@@ -77,7 +77,7 @@ impl Tracer<'_> {
         let begin = thread_cpu_seconds();
         let (samples, rays) = match layers {
             Some(film) => {
-                let sums = film.copy_layer_sums(job.tile, job.pixels);
+                let sums = film.tile_layer_sums(job.tile, job.pixels);
                 render_tile_with_layers(photons, world, settings, (job.pixels, samples), sums, token)?
             }
             None => kernel(photons, world, settings, job.pixels, samples, token)?,

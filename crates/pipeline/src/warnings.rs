@@ -49,7 +49,7 @@ fn warning_at_setting(
         let help = Some("`--clamp 0` turns it off".to_owned());
         return Diagnostic { severity, message, path: loaded.path.clone(), place: None, help };
     }
-    match cause.scene_table_and_key().and_then(|(table, key)| loaded.setting_span(table, key)) {
+    match cause.scene_table_and_key().and_then(|(table, key)| loaded.setting_value_span(table, key)) {
         Some(span) => loaded.create_diagnostic_at(span, severity, message, None),
         None => Diagnostic::about_file(&loaded.path, severity, message),
     }

@@ -43,7 +43,7 @@ pub fn start(
 ///
 /// # Errors
 /// The system cannot start a thread.
-pub fn start_with_channel(nice: u8) -> std::io::Result<(Handle, Receiver<Event>)> {
+pub fn start_with_new_channel(nice: u8) -> std::io::Result<(Handle, Receiver<Event>)> {
     let (sender, events) = mpsc::channel();
     // Ignore a disconnected front end.
     Ok((start(nice, Arc::default(), move |event| drop(sender.send(event)))?, events))
@@ -181,13 +181,13 @@ impl CommandSender {
                 mailbox.token.cancel();
                 mailbox.writing.cancel();
                 let dropped = mailbox.request.take();
-                self.report_canceled(dropped);
+                self.report_request_canceled(dropped);
             }
             Command::Suspend => {
                 mailbox.suspended = true;
                 mailbox.token.cancel();
                 let dropped = mailbox.request.take();
-                self.report_canceled(dropped);
+                self.report_request_canceled(dropped);
             }
             Command::Pause(paused) => {
                 mailbox.paused = paused;
@@ -206,7 +206,7 @@ impl CommandSender {
     /// Replaces the pending request unless the pending one is newer. Requests may arrive in any order.
     fn replace_older_pending_request(&self, mailbox: &mut Mailbox, request: Box<Request>) {
         if request.generation < mailbox.newest {
-            return self.report_canceled(Some(request));
+            return self.report_request_canceled(Some(request));
         }
         mailbox.newest = request.generation;
         mailbox.token.cancel();
@@ -215,10 +215,10 @@ impl CommandSender {
         }
         (mailbox.paused, mailbox.preview) = (false, None);
         let replaced = mailbox.request.replace(request);
-        self.report_canceled(replaced);
+        self.report_request_canceled(replaced);
     }
 
-    fn report_canceled(&self, request: Option<Box<Request>>) {
+    fn report_request_canceled(&self, request: Option<Box<Request>>) {
         if let Some(request) = request {
             (self.listener)(Event::Canceled { generation: request.generation });
         }

@@ -32,7 +32,7 @@ fn built(radius: f64, source: &str) -> BuiltDocument {
     built.start_list_table("sphere");
     built.set("center", BuiltValue::Array(vec![4.0.into(), 5.0.into(), 6e-7.into()]));
     if !source.is_empty() {
-        built.set_source_span(SOURCE.len() - 2..SOURCE.len());
+        built.set_span_for_next_values(SOURCE.len() - 2..SOURCE.len());
     }
     built.set("radius", radius);
     built.set("material", "wall");

@@ -52,7 +52,7 @@ pub(super) fn spans_of_lights_facing_nothing(
         let others = scene.objects.iter().enumerate().filter(|(other, _)| *other != number);
         let reach = |direction: DVec3| {
             let of = |object: &Object| {
-                shape_projection_upper_bound(&object.shape, &bounds, direction) - direction.dot(corner)
+                shape_upper_bound_along(&object.shape, &bounds, direction) - direction.dot(corner)
             };
             others.clone().map(|(_, object)| of(object)).fold(0.0, f64::max)
         };
@@ -79,7 +79,7 @@ fn is_camera_in_front_of_light(camera: &Camera, corner: DVec3, front: DVec3) -> 
 }
 
 /// Returns an upper bound on the projection of a shape's points onto a unit direction.
-fn shape_projection_upper_bound(shape: &Shape, bounds: &[MeshBoundingBox], direction: DVec3) -> f64 {
+fn shape_upper_bound_along(shape: &Shape, bounds: &[MeshBoundingBox], direction: DVec3) -> f64 {
     shape.upper_bound_along(direction).unwrap_or_else(|| {
         let of = |mesh: &MeshReference| {
             Some(transformed_box_corners(mesh, bounds.get(mesh.file).copied().flatten()?))

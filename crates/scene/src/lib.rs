@@ -150,12 +150,12 @@ impl LoadedScene {
     pub fn line_number(&self, span: &Range<usize>) -> Option<usize> {
         let before = self.source.file_text().get(..span.start).unwrap_or_default();
         let line = before.bytes().filter(|byte| *byte == b'\n').count() + 1;
-        self.source.has_text_at(span).then_some(line)
+        self.source.is_span_in_text(span).then_some(line)
     }
 
     /// Returns the span of a setting's value in the file or in a `--set` argument, or `None` if neither sets
     /// it.
-    pub fn setting_span(&self, table: &str, key: &str) -> Option<Range<usize>> {
+    pub fn setting_value_span(&self, table: &str, key: &str) -> Option<Range<usize>> {
         let is_setting = |setting: &&SettingSpan| setting.table == table && setting.key == key;
         self.settings.iter().find(is_setting).map(|setting| setting.span.clone())
     }

@@ -52,7 +52,7 @@ const FOREIGN_NAMES: [(&[&str], &[&str]); 20] = [
 
 /// If `written` is another renderer's name for a candidate, returns this candidate. Otherwise, returns the
 /// nearest candidate.
-pub fn foreign_or_nearest_name<'a>(written: &str, candidates: &[&'a str]) -> Option<&'a str> {
+pub fn translated_or_nearest_name<'a>(written: &str, candidates: &[&'a str]) -> Option<&'a str> {
     let plain = written.to_lowercase().replace('-', "_");
     let named = FOREIGN_NAMES.iter().find(|(names, _)| names.contains(&plain.as_str()));
     let known = |name: &&str| candidates.iter().find(|candidate| *candidate == name).copied();
@@ -67,15 +67,15 @@ mod tests {
     #[test]
     fn names_from_other_renderers_are_known() {
         let phong = ["type", "diffuse", "specular", "shininess", "emission", "normal_strength"];
-        assert_eq!(foreign_or_nearest_name("color", &phong), Some("diffuse"));
-        assert_eq!(foreign_or_nearest_name("Roughness", &phong), Some("shininess"));
-        assert_eq!(foreign_or_nearest_name("color", &["reflectance"]), Some("reflectance"));
-        assert_eq!(foreign_or_nearest_name("strength", &["position", "intensity"]), Some("intensity"));
-        assert_eq!(foreign_or_nearest_name("strength", &["direction", "irradiance"]), Some("irradiance"));
-        assert_eq!(foreign_or_nearest_name("cube", &["box", "sphere"]), Some("box"));
-        assert_eq!(foreign_or_nearest_name("sun", &["point", "spot", "directional"]), Some("directional"));
-        assert_eq!(foreign_or_nearest_name("raduis", &["radius"]), Some("radius"));
-        assert_eq!(foreign_or_nearest_name("sun", &["point"]), None);
+        assert_eq!(translated_or_nearest_name("color", &phong), Some("diffuse"));
+        assert_eq!(translated_or_nearest_name("Roughness", &phong), Some("shininess"));
+        assert_eq!(translated_or_nearest_name("color", &["reflectance"]), Some("reflectance"));
+        assert_eq!(translated_or_nearest_name("strength", &["position", "intensity"]), Some("intensity"));
+        assert_eq!(translated_or_nearest_name("strength", &["direction", "irradiance"]), Some("irradiance"));
+        assert_eq!(translated_or_nearest_name("cube", &["box", "sphere"]), Some("box"));
+        assert_eq!(translated_or_nearest_name("sun", &["point", "spot", "directional"]), Some("directional"));
+        assert_eq!(translated_or_nearest_name("raduis", &["radius"]), Some("radius"));
+        assert_eq!(translated_or_nearest_name("sun", &["point"]), None);
     }
 
     #[test]

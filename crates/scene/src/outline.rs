@@ -142,7 +142,7 @@ impl OutlineTable {
     }
 
     /// Returns the key prefixes with which `--set` can refer to this table.
-    pub fn set_arg_prefixes(&self) -> Vec<String> {
+    pub fn override_key_prefixes(&self) -> Vec<String> {
         let of = |part: &str| format!("{}.{part}", self.path);
         let name = self.name.as_ref().map(|name| of(&toml::quote_key_part(&name.text)));
         match self.info.form {
@@ -163,7 +163,7 @@ mod tests {
     fn tables_have_names_types_and_paths() {
         let found: Vec<(Vec<String>, &str)> = document_outline(TEXT)
             .iter()
-            .map(|table| (table.set_arg_prefixes(), table.kind.map_or("", |kind| kind.name)))
+            .map(|table| (table.override_key_prefixes(), table.kind.map_or("", |kind| kind.name)))
             .collect();
         let expected: [(&[&str], &str); 8] = [
             (&["render"], ""),
@@ -189,7 +189,7 @@ mod tests {
         let tables = document_outline(TEXT);
         let wall = tables
             .iter()
-            .find(|table| table.set_arg_prefixes() == ["materials.\"back wall\""])
+            .find(|table| table.override_key_prefixes() == ["materials.\"back wall\""])
             .expect("a table");
         let [diffuse] = wall.keys.as_slice() else { panic!("{wall:?}") };
         assert_eq!(&TEXT[diffuse.name.span.clone()], "diffuse");
@@ -203,7 +203,7 @@ mod tests {
         let known = |path: &str| {
             let table = tables
                 .iter()
-                .find(|table| table.set_arg_prefixes().contains(&path.to_owned()))
+                .find(|table| table.override_key_prefixes().contains(&path.to_owned()))
                 .expect("a table");
             table.keys_allowed_for_type().iter().map(|key| key.name).collect::<Vec<_>>()
         };

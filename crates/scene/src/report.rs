@@ -29,16 +29,16 @@ pub enum ReportStyle {
 
 /// Formats diagnostics sorted by file and position, followed by a summary line. Wraps messages at `width`
 /// columns and truncates source lines. Returns an empty string if there are no diagnostics.
-pub fn render_report(diagnostics: &[Diagnostic], width: usize, style: ReportStyle) -> String {
+pub fn render_diagnostics(diagnostics: &[Diagnostic], width: usize, style: ReportStyle) -> String {
     let renderer = match style {
         ReportStyle::Plain => Renderer::plain(),
         ReportStyle::Ansi => Renderer::styled(),
     };
-    render_report_with_renderer(diagnostics, width, &renderer)
+    render_diagnostics_with_renderer(diagnostics, width, &renderer)
 }
 
 /// Counts the diagnostics, as in `2 errors, 1 warning`.
-pub fn summarize_counts(diagnostics: &[Diagnostic]) -> String {
+pub fn summarize_diagnostic_counts(diagnostics: &[Diagnostic]) -> String {
     let count = |severity| diagnostics.iter().filter(|one| one.severity == severity).count();
     let words = |count: usize, name: &str| match count {
         0 => None,
@@ -71,7 +71,7 @@ pub fn line_and_column(source: &str, offset: usize) -> (usize, usize) {
     LineIndex::new(source).locate(source, offset)
 }
 
-fn render_report_with_renderer(diagnostics: &[Diagnostic], width: usize, renderer: &Renderer) -> String {
+fn render_diagnostics_with_renderer(diagnostics: &[Diagnostic], width: usize, renderer: &Renderer) -> String {
     if diagnostics.is_empty() {
         return String::new();
     }
@@ -84,7 +84,7 @@ fn render_report_with_renderer(diagnostics: &[Diagnostic], width: usize, rendere
         text.push_str(&render_diagnostic(diagnostic, width.max(MIN_WIDTH), &renderer, &mut index));
         text.push_str("\n\n");
     }
-    text.push_str(&summarize_counts(diagnostics));
+    text.push_str(&summarize_diagnostic_counts(diagnostics));
     text.push('\n');
     text
 }

@@ -90,7 +90,7 @@ impl SceneText {
 
     /// Whether a span refers to text. In a scene from a foreign file, values without a span have an empty span
     /// at the start.
-    pub(super) fn has_text_at(&self, span: &Range<usize>) -> bool {
+    pub(super) fn is_span_in_text(&self, span: &Range<usize>) -> bool {
         !self.is_foreign || *span != (0..0)
     }
 
@@ -111,7 +111,7 @@ impl SceneText {
             Some(SetArg { span: own, text }) => {
                 (Path::new(SET_OPTION), text, span.start - own.start..span.end - own.start)
             }
-            None if !self.has_text_at(&span) => return (path.to_owned(), None),
+            None if !self.is_span_in_text(&span) => return (path.to_owned(), None),
             None => (path, &self.all, span),
         };
         let is_inside = source.get(span.clone()).is_some();
@@ -130,12 +130,14 @@ fn set_arg_to_toml(set: &str) -> Option<String> {
         let with =
             |value: &str| Some(format!("{key} = {value}")).filter(|text| is_one_dotted_key_assignment(text));
         with("0")?;
-        with(value).or_else(|| with(&decimal_to_toml(value)?)).or_else(|| with(&quote_toml_string(value)))
+        with(value)
+            .or_else(|| with(&normalize_decimal_for_toml(value)?))
+            .or_else(|| with(&quote_toml_string(value)))
     })
 }
 
 /// Completes numbers such as `.5` and `5.`, which are invalid in TOML.
-fn decimal_to_toml(text: &str) -> Option<String> {
+fn normalize_decimal_for_toml(text: &str) -> Option<String> {
     let number: f64 = text.parse().ok().filter(|number: &f64| number.is_finite())?;
     text.contains('.').then(|| format!("{number:?}"))
 }

@@ -179,7 +179,7 @@ fn mesh_files_are_listed_once() {
         "no usable face",
         None,
     );
-    let shown = report::render_report(&[late], 300, report::ReportStyle::Plain);
+    let shown = report::render_diagnostics(&[late], 300, report::ReportStyle::Plain);
     assert!(shown.contains("scene.toml:16:6\n") && shown.contains("^^^^^^^"), "{shown}");
 }
 
@@ -281,7 +281,7 @@ fn warnings_never_hide_errors() {
 
 mod properties {
     use super::super::diagnostic::Diagnostic;
-    use super::super::report::{ReportStyle, render_report, report_lines};
+    use super::super::report::{ReportStyle, render_diagnostics, report_lines};
     use super::*;
     use proptest::prelude::*;
 
@@ -290,7 +290,7 @@ mod properties {
         for place in diagnostics.iter().filter_map(|one| one.place.as_ref()) {
             assert!(place.source.get(place.span.clone()).is_some(), "{:?}", place.span);
         }
-        let text = render_report(diagnostics, 60, ReportStyle::Plain);
+        let text = render_diagnostics(diagnostics, 60, ReportStyle::Plain);
         assert!(text.chars().all(|c| c == '\n' || !c.is_control()), "{text:?}");
         let pieces = report_lines(diagnostics, 60);
         assert_eq!(pieces.len(), text.lines().count());

@@ -221,7 +221,7 @@ impl Display {
         }
         // Do not use synchronized output for images: kitty 0.26 loses chunks inside it. It is not needed,
         // because an image appears only once its last chunk has arrived.
-        let rate = self.connection.bytes_per_second();
+        let rate = self.connection.estimated_bytes_per_second();
         let pixels = self.images.as_mut().and_then(|images| images.next_slice(room, rate));
         match pixels {
             Some(pixels) => self.send_slice(pixels, now),
@@ -281,8 +281,8 @@ impl Display {
     }
 
     /// Records that the operating system has accepted bytes.
-    pub(super) fn record_written(&mut self, bytes: usize) {
-        self.connection.record_written(bytes);
+    pub(super) fn record_written_bytes(&mut self, bytes: usize) {
+        self.connection.record_written_bytes(bytes);
     }
 
     /// Whether the target has been sent completely.
@@ -301,8 +301,8 @@ impl Display {
     }
 
     /// Estimated bandwidth in bytes per second, or `None` if it is unknown or too high to matter.
-    pub(super) fn bytes_per_second(&self) -> Option<f64> {
-        self.connection.bytes_per_second()
+    pub(super) fn estimated_bytes_per_second(&self) -> Option<f64> {
+        self.connection.estimated_bytes_per_second()
     }
 
     /// Earliest time at which more can be sent if no reply arrives.
@@ -364,7 +364,7 @@ mod tests {
             for second in 1..100 {
                 let (now, sent) = (now + Duration::from_millis(second), all.get());
                 display.send_next_slice(now, || false);
-                display.record_written(all.get() - sent);
+                display.record_written_bytes(all.get() - sent);
                 display.handle_reply(TerminalReply::Attributes, now);
                 display.handle_reply(TerminalReply::Ready, now);
             }

@@ -35,7 +35,7 @@ pub(super) fn may_print_unknown_escapes(variable: impl Fn(&str) -> Option<String
 }
 
 /// Returns the image protocol for the user's preview choice.
-fn explicitly_chosen_image_protocol(preview: PreviewChoice) -> Option<ImageProtocol> {
+fn image_protocol_from_choice(preview: PreviewChoice) -> Option<ImageProtocol> {
     match preview {
         PreviewChoice::Kitty => Some(ImageProtocol::Kitty),
         PreviewChoice::Sixel => Some(ImageProtocol::Sixel),
@@ -70,7 +70,7 @@ pub(super) fn select_terminal_queries(
         true_color: color == ColorDepthChoice::Auto && has_palette && is_outermost && !is_plain,
         background: is_ramp && get("STY").is_empty() && !term.starts_with("linux") && term != "dumb",
         palette: depth == ColorDepth::Ansi16 && is_outermost && !is_plain,
-        pixels: explicitly_chosen_image_protocol(preview)
+        pixels: image_protocol_from_choice(preview)
             .map(|protocol| UnconfirmedImageProtocol::new(protocol, &variable, is_plain)),
     }
 }

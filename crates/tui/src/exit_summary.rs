@@ -5,7 +5,7 @@ use super::messages;
 use super::state::{KeyboardOverrides, RequestStatus, SceneImageProgress, State, WrittenFile};
 use super::view::text::format_count_with_noun;
 use crate::choice::Choice;
-use crate::pipeline::protocol::{Report, SampleCounts, SavedSceneImageState};
+use crate::pipeline::protocol::{Report, SampleCounts, SavedSceneRenderStatus};
 use crate::pipeline::settings::{CameraOverrides, ViewMode};
 use crate::pipeline::words::format_seconds;
 use crate::scene::sanitize::escape_invisible_chars;
@@ -21,7 +21,7 @@ pub(super) fn summary_text(state: &State) -> String {
 
 /// Whether the summary claims that the scene's own image is up to date.
 pub(super) fn is_saved_scene_image_current(state: &State) -> bool {
-    let is_written = state.saving.own.state == SavedSceneImageState::Written;
+    let is_written = state.saving.own.state == SavedSceneRenderStatus::Written;
     is_written && state.saving.write_failed.is_none() && !is_scene_broken(state)
 }
 
@@ -54,7 +54,7 @@ fn reason_for_no_image(state: &State) -> String {
     }
     let Some(name) = output_file_names(state) else { return "no image written".to_owned() };
     match state.saving.own {
-        SceneImageProgress { state: SavedSceneImageState::Written, .. } => format!("{name} is up to date"),
+        SceneImageProgress { state: SavedSceneRenderStatus::Written, .. } => format!("{name} is up to date"),
         SceneImageProgress { fraction, .. } if fraction > 0.0 => {
             format!("{name} not finished ({} %)", (fraction * 100.0).floor())
         }
@@ -71,7 +71,7 @@ fn describe_events_since_writing(state: &State) -> String {
         return format!("; {} has errors since", scene_name(state));
     }
     let written = &state.saving.written;
-    if state.saving.own.state == SavedSceneImageState::Written {
+    if state.saving.own.state == SavedSceneRenderStatus::Written {
         return String::new();
     }
     if !state.request.has_no_keyboard_overrides() {
@@ -447,13 +447,13 @@ mod tests {
         ui.report_scene_read();
         ui.worker_event(Event::Progress { generation: 1, progress: render_progress(0.108, None) });
         ui.press_character('s');
-        own(&mut ui, SavedSceneImageState::Begun { is_rendering: false });
+        own(&mut ui, SavedSceneRenderStatus::Begun { is_rendering: false });
         ui.finish_render([200, 30, 30]);
         assert_eq!(summary_text(&ui.state), "cornell.png not finished (10 %)");
         let said = crate::view::status_line::unsaved_image_messages(&ui.state);
         assert_eq!(
             said,
-            [messages::NOT_SAVED.to_owned(), messages::scene_image_interrupted("cornell.png", 10)]
+            [messages::NOT_SAVED.to_owned(), messages::saved_scene_render_interrupted("cornell.png", 10)]
         );
         assert!(ui.screen_text().contains(messages::NOT_SAVED), "{}", ui.screen_text());
         // `w` writes the displayed image.
@@ -472,7 +472,7 @@ mod tests {
         ui.finish_render([30, 200, 30]);
         assert_eq!(summary_text(&ui.state), "wrote cornell.png: 640×480, 64 samples, 1.93 s");
         ui.press_character('s');
-        own(&mut ui, SavedSceneImageState::Written);
+        own(&mut ui, SavedSceneRenderStatus::Written);
         assert_eq!(summary_text(&ui.state), "wrote cornell.png: 640×480, 64 samples, 1.93 s");
         ui.handle_event(crate::event::Event::FileChanged(ContentChangeTime { noticed: ui.now }));
         assert!(summary_text(&ui.state).ends_with(messages::OLDER_THAN_EDIT), "{}", summary_text(&ui.state));

@@ -14,7 +14,7 @@ pub(super) struct FileUrlBuilder {
 
 impl FileUrlBuilder {
     /// URLs of files on this machine.
-    pub(super) fn local() -> Self {
+    pub(super) fn for_this_machine() -> Self {
         // This file exists only on Linux. On other systems, the host name is omitted.
         let host = std::fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
         Self { folder: std::env::current_dir().unwrap_or_default(), host: host.trim().to_owned() }

@@ -168,7 +168,7 @@ pub(super) fn buffer_text(buffer: &Buffer) -> String {
 }
 
 /// The render request in a list of effects.
-pub(super) fn find_render_request(effects: &[Effect]) -> Option<&Request> {
+pub(super) fn sent_render_request(effects: &[Effect]) -> Option<&Request> {
     effects.iter().find_map(|effect| match effect {
         Effect::Send(Command::Render(request)) => Some(&**request),
         _ => None,

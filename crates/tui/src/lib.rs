@@ -58,7 +58,7 @@ pub use color::{ColorDepth, ColorDepthChoice, xterm_rgb};
 pub use editor::editor_and_variable;
 pub use event_queue::{EventQueue, EventSender};
 pub use graphics::TestImageTerminal;
-pub use mosaic::filled_squares;
+pub use mosaic::squares_of_block_character;
 pub use options::{ContentChangeTime, ExitStatus, Options, PreviewChoice, TuiError, TuiOutcome, WatchEvent};
 pub use probe::{ReportedTerminalFeatures, TerminalProbeResult, probe_terminal};
 pub use run::run;

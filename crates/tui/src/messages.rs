@@ -126,7 +126,7 @@ pub fn save_to_screen_time(time: &str) -> String {
 }
 
 /// Label for a finished render, with its number.
-pub fn render_number(number: impl Display) -> String {
+pub fn numbered_render(number: impl Display) -> String {
     format!("render {number}")
 }
 
@@ -272,7 +272,7 @@ pub const OLDER_THAN_EDIT: &str = " (older than your last edit)";
 pub const WAITING_FOR_FILE: &str = "waiting for it to appear";
 
 /// Shown when the render of the scene's own image is interrupted.
-pub fn scene_image_interrupted(file: &str, percent: u32) -> String {
+pub fn saved_scene_render_interrupted(file: &str, percent: u32) -> String {
     format!("{file} at {percent} %: press 0 to continue")
 }
 
@@ -285,7 +285,7 @@ pub fn scene_image_outdated(file: &str) -> String {
 pub const LAST_GOOD_SCENE: &str = "rendering the last good scene";
 
 /// A hint that saving the scene file starts a render.
-pub fn save_to_render_hint(file: &str, is_again: bool) -> String {
+pub fn saving_starts_render_hint(file: &str, is_again: bool) -> String {
     format!("save {file} to render{}", if is_again { " again" } else { "" })
 }
 

@@ -13,7 +13,7 @@ use super::display::Display;
 use super::event::Event;
 use super::file_urls::FileUrlBuilder;
 use super::paint::{
-    Hyperlink, LinksAndDelayedText, PacingAdvice, PacingInputs, PreviewFidelity, pace_preview,
+    Hyperlink, LinksAndDelayedText, PacingDecision, PacingInputs, PreviewFidelity, preview_pacing_decision,
 };
 use super::state::State;
 use super::view;
@@ -64,7 +64,7 @@ impl FramePresenter {
             display,
             drawn: DrawnPreview::default(),
             previews,
-            files: FileUrlBuilder::local(),
+            files: FileUrlBuilder::for_this_machine(),
             next_frame: now,
             newest: 0,
         }
@@ -80,7 +80,7 @@ impl FramePresenter {
     ) -> Option<Event> {
         let is_same_request =
             generation == self.drawn.generation && !self.newest_differs_from_drawn_preview(state);
-        if is_same_request && self.pacing_advice(state, now) == PacingAdvice::Wait {
+        if is_same_request && self.pacing_decision(state, now) == PacingDecision::Wait {
             self.drawn.is_old = true;
             return None;
         }
@@ -98,8 +98,8 @@ impl FramePresenter {
     }
 
     /// Whether to draw a newer preview of the same request.
-    fn pacing_advice(&self, state: &State, now: Instant) -> PacingAdvice {
-        pace_preview(&self.pacing_inputs(state, now))
+    fn pacing_decision(&self, state: &State, now: Instant) -> PacingDecision {
+        preview_pacing_decision(&self.pacing_inputs(state, now))
     }
 
     fn pacing_inputs(&self, state: &State, now: Instant) -> PacingInputs {
@@ -108,7 +108,7 @@ impl FramePresenter {
         let is_fast = self.display.is_fast();
         let is_shown = if is_fast { self.display.is_acknowledged() } else { self.display.is_target_sent() };
         PacingInputs {
-            bytes_per_second: self.display.bytes_per_second(),
+            bytes_per_second: self.display.estimated_bytes_per_second(),
             cells: picture.map_or(0, |picture| self.preview_cell_count(state, picture)),
             samples: mean_samples_so_far(state),
             aimed_samples: picture.map(|_| self.drawn.samples),
@@ -158,7 +158,9 @@ impl FramePresenter {
         let window = state.display.window;
         let mut buffer = Buffer::empty(Rect::new(0, 0, window.columns, window.rows));
         let drawn = view::draw(state, &mut buffer);
-        if let Some(title) = TitleAndProgress::for_state(state, self.display.bytes_per_second().is_some()) {
+        if let Some(title) =
+            TitleAndProgress::for_state(state, self.display.estimated_bytes_per_second().is_some())
+        {
             self.display.set_title_and_progress(title);
         }
         let is_new = self.record_drawn_preview(state, now);
@@ -223,7 +225,7 @@ impl FramePresenter {
         let has_sent = self.display.send_next_slice(now, is_late);
         let mut events: Vec<Event> =
             self.display.take_send_report().map(Event::PreviewSent).into_iter().collect();
-        if self.drawn.is_old && self.pacing_advice(state, now) != PacingAdvice::Wait {
+        if self.drawn.is_old && self.pacing_decision(state, now) != PacingDecision::Wait {
             events.extend(self.take_preview_event());
         }
         let is_new = |drawn: &mut DrawnPreview| !std::mem::replace(&mut drawn.is_shown, true);

@@ -56,7 +56,7 @@ pub struct ReportedTerminalFeatures {
 
 impl TerminalProbeResult {
     /// Name of the character set that `--preview auto` uses.
-    pub fn auto_preview_name(&self) -> &'static str {
+    pub fn auto_preview_style_name(&self) -> &'static str {
         let name = self.answers.as_ref().and_then(|answers| answers.name.as_deref());
         let terminal = name.filter(|_| !self.is_multiplexed).and_then(TerminalId::from_report);
         match (self.depth, terminal.map_or(FinestNativeBlocks::Unknown, FinestNativeBlocks::supported_by)) {
@@ -159,7 +159,7 @@ fn read_replies_until(
         }
         match nix::unistd::read(&stdin, &mut bytes)? {
             0 => return Ok(false),
-            count => replies.receive(&bytes[..count]),
+            count => replies.add_received_bytes(&bytes[..count]),
         }
     }
     Ok(true)
@@ -175,7 +175,7 @@ struct ReceivedReplies {
 }
 
 impl ReceivedReplies {
-    fn receive(&mut self, bytes: &[u8]) {
+    fn add_received_bytes(&mut self, bytes: &[u8]) {
         self.bytes.extend_from_slice(bytes);
         let answer = |input| match input {
             DecodedInput::TerminalReply(answer) => Some(answer),
@@ -233,7 +233,7 @@ mod tests {
 
     fn replies_in(bytes: &[u8]) -> ReceivedReplies {
         let mut replies = ReceivedReplies::default();
-        replies.receive(bytes);
+        replies.add_received_bytes(bytes);
         replies
     }
 

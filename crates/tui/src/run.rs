@@ -44,7 +44,7 @@ pub fn run(options: Options, queue: EventQueue) -> Result<TuiOutcome, TuiError> 
     let listener = SignalListener::start(&sender).map_err(io_error_to_tui_error("handle signals for"))?;
     let variable = |name: &str| std::env::var(name).ok();
     let capabilities =
-        TerminalId::from_environment(variable).map(TerminalId::capabilities).unwrap_or_default();
+        TerminalId::from_environment(variable).map(TerminalId::desktop_capabilities).unwrap_or_default();
     if capabilities.focus {
         terminal::enable_focus_reports_on_setup();
     }
@@ -198,7 +198,7 @@ impl EventLoop {
                 self.presenter.display.handle_reply(answer, Instant::now());
                 return self.apply_event(event);
             }
-            Event::Written { bytes } => self.presenter.display.record_written(bytes),
+            Event::Written { bytes } => self.presenter.display.record_written_bytes(bytes),
             Event::Unwritable(kind) => return Some(loop_end_for_write_error(kind.into())),
             Event::Key(_) | Event::Mouse(_) => {
                 let end = self.apply_event(event);

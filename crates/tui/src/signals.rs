@@ -42,12 +42,12 @@ const OTHER_SIGNALS: [i32; 9] =
 
 /// Linux-specific signals that terminate the program, including real-time signals.
 #[cfg(target_os = "linux")]
-fn linux_terminating_signals() -> impl Iterator<Item = i32> {
+fn linux_only_terminating_signals() -> impl Iterator<Item = i32> {
     [libc::SIGPWR, libc::SIGSTKFLT].into_iter().chain(libc::SIGRTMIN()..=libc::SIGRTMAX())
 }
 
 #[cfg(not(target_os = "linux"))]
-fn linux_terminating_signals() -> impl Iterator<Item = i32> {
+fn linux_only_terminating_signals() -> impl Iterator<Item = i32> {
     std::iter::empty()
 }
 
@@ -67,7 +67,7 @@ impl SignalListener {
             HANDLED_SIGNALS
                 .into_iter()
                 .chain(OTHER_SIGNALS)
-                .chain(linux_terminating_signals())
+                .chain(linux_only_terminating_signals())
                 .chain([WAKE_SIGNAL]),
         )?;
         let handler = SignalThread { over: Arc::clone(&over), events: events.clone() };
@@ -315,7 +315,7 @@ mod tests {
     #[cfg(target_os = "linux")]
     #[test]
     fn real_time_signals_are_handled() {
-        let numbers: Vec<i32> = linux_terminating_signals().collect();
+        let numbers: Vec<i32> = linux_only_terminating_signals().collect();
         assert!(numbers.contains(&libc::SIGRTMIN()) && numbers.contains(&libc::SIGRTMAX()));
         assert_eq!(exit_status_for(Signal::Other(libc::SIGRTMAX())), Some(ExitStatus(128 + 64)));
     }

@@ -174,7 +174,7 @@ impl TerminalId {
     }
 
     /// Capabilities according to the terminal's documentation.
-    pub(super) fn capabilities(self) -> DesktopCapabilities {
+    pub(super) fn desktop_capabilities(self) -> DesktopCapabilities {
         let Self { brand, version } = self;
         let all = DesktopCapabilities {
             title: true,
@@ -317,7 +317,7 @@ mod tests {
             ("XTerm(390)", false),
         ] {
             let terminal = TerminalId::from_report(report).expect(report);
-            assert_eq!(terminal.capabilities().progress, has_progress, "{report}");
+            assert_eq!(terminal.desktop_capabilities().progress, has_progress, "{report}");
         }
     }
 }

@@ -7,7 +7,7 @@ use glimt::control::{CancelToken, ignore_progress};
 use glimt::film::Rect;
 use glimt::geometry::mesh::TriangleMesh;
 use glimt::integrators::{
-    PhotonMap, PhotonMapper, PhotonPassesBySample, PhotonSettings, ViewMode, render_tile_with_photons,
+    PhotonMap, PhotonPassTracer, PhotonPassesBySample, PhotonSettings, ViewMode, render_tile_with_photons,
 };
 use glimt::math::{DVec3, Vec3};
 use glimt::scene::description::Shape;
@@ -50,7 +50,7 @@ fn stored_photons_carry_emitted_power() {
         let of_photons = PhotonSettings { count, radius: 0.1, bounces: 10_000 };
         let settings = build.photons(count.into(), 0.1).settings(3);
         let (_, pass) =
-            PhotonMapper::new_with_first_pass(&world, &settings, of_photons, &ignore_progress, &token)
+            PhotonPassTracer::new_with_first_pass(&world, &settings, of_photons, &ignore_progress, &token)
                 .expect("the token is not canceled");
         let (power, n) = (4.0 * PI, f64::from(count));
         let flux = |map: &PhotonMap| map.iter_photons().map(|photon| f64::from(photon.flux.x)).sum::<f64>();
@@ -72,7 +72,7 @@ fn no_photons_without_mirrors_or_glass() {
     let (world, settings, token) = (build.world(), build.settings(1), CancelToken::new());
     let of_photons = settings.photons.expect("photons are on");
     let (photons, pass) =
-        PhotonMapper::new_with_first_pass(&world, &settings, of_photons, &ignore_progress, &token)
+        PhotonPassTracer::new_with_first_pass(&world, &settings, of_photons, &ignore_progress, &token)
             .expect("the token is not canceled");
     assert!(!photons.emits_photons());
     assert_eq!((pass.emitted, pass.stored_photon_count()), (0, 0));
@@ -289,9 +289,14 @@ fn photons_do_not_depend_on_threads_or_tiles() {
     let maps = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
         pool.install(|| {
-            let (photons, _) =
-                PhotonMapper::new_with_first_pass(&world, &settings, of_photons, &ignore_progress, &token)
-                    .expect("the token is not canceled");
+            let (photons, _) = PhotonPassTracer::new_with_first_pass(
+                &world,
+                &settings,
+                of_photons,
+                &ignore_progress,
+                &token,
+            )
+            .expect("the token is not canceled");
             photons.trace_passes(&world, &settings, 0..4, &token).expect("the token is not canceled")
         })
     };
@@ -316,9 +321,14 @@ fn photons_do_not_depend_on_threads_or_tiles() {
     for cuts in [&[0, 1, 2, 3, 4][..], &[0, 1, 4], &[0, 3, 4]] {
         for part in cuts.windows(2) {
             let samples = part[0]..part[1];
-            let (photons, _) =
-                PhotonMapper::new_with_first_pass(&world, &settings, of_photons, &ignore_progress, &token)
-                    .expect("the token is not canceled");
+            let (photons, _) = PhotonPassTracer::new_with_first_pass(
+                &world,
+                &settings,
+                of_photons,
+                &ignore_progress,
+                &token,
+            )
+            .expect("the token is not canceled");
             let maps = photons
                 .trace_passes(&world, &settings, samples.clone(), &token)
                 .expect("the token is not canceled");
@@ -348,7 +358,7 @@ fn photons_are_aimed_at_glass_from_mesh_file() {
     let (world, settings, token) = (build.world(), build.settings(1), CancelToken::new());
     let of_photons = settings.photons.expect("photons are on");
     let (_, pass) =
-        PhotonMapper::new_with_first_pass(&world, &settings, of_photons, &ignore_progress, &token)
+        PhotonPassTracer::new_with_first_pass(&world, &settings, of_photons, &ignore_progress, &token)
             .expect("the token is not canceled");
     assert!(pass.caustic.len() > 500, "{} of 1000", pass.caustic.len());
 }

@@ -375,7 +375,7 @@ pub fn tile(world: &World, settings: &RenderSettings, rect: Rect, samples: u32) 
 pub fn maps(world: &World, settings: &RenderSettings, samples: u32) -> Option<PhotonPassesBySample> {
     let token = CancelToken::new();
     settings.without_ineffective_settings().photons.filter(|_| settings.gathers_photons()).map(|of_photons| {
-        let photons = integrators::PhotonMapper::new_with_first_pass(
+        let photons = integrators::PhotonPassTracer::new_with_first_pass(
             world,
             settings,
             of_photons,

@@ -151,7 +151,7 @@ fn texels_are_half_open_intervals() {
     let square = build.quad(v(0.0, 0.0, -1.0), DVec3::X, DVec3::Y, kind);
     let world = square.world();
     let bsdf = &world.materials[0].bsdf;
-    let at = |u, w| bsdf.albedo(&TexturePoint::from_uv(glimt::math::DVec2::new(u, w)), &mut 0);
+    let at = |u, w| bsdf.main_color(&TexturePoint::from_uv(glimt::math::DVec2::new(u, w)), &mut 0);
     assert_eq!([at(0.0, 0.0), at(0.5, 0.0), at(0.0, 0.5), at(0.5, 0.5)], [BLUE, GRAY, RED, GREEN]);
 }
 

@@ -10,7 +10,7 @@ use std::time::Duration;
 
 use glimt::pipeline::check_scene;
 use glimt::pipeline::protocol::Failure;
-use glimt::scene::report::{ReportStyle, render_report};
+use glimt::scene::report::{ReportStyle, render_diagnostics};
 use nix::sys::resource::{Resource, setrlimit};
 
 use super::seeds::{Seed, root};
@@ -194,7 +194,7 @@ fn check_case(scene: &Path) -> Result<(), String> {
         Ok(Err(Failure::Work(message))) => return Err(format!("exit code 1: {message}")),
         Err(_) => return Err("panic without a message".to_owned()),
     };
-    let text = render_report(&diagnostics, 60, ReportStyle::Plain);
+    let text = render_diagnostics(&diagnostics, 60, ReportStyle::Plain);
     if let Some(harmful) = first_terminal_control(&text) {
         return Err(format!("the message contains {harmful:?}"));
     }

@@ -61,7 +61,7 @@ fn edits_rerun_only_dependent_stages() {
     assert_eq!(stages(&folder, "photons"), ("dddddsdd".to_owned(), reasons::PHOTONS_OFF.to_owned()));
 
     folder.write("scene.toml", own.replace("[camera]", "# the eye\n\n[camera]"));
-    terminal.wait_for(&format!("unchanged · {}", messages::render_number(1)));
+    terminal.wait_for(&format!("unchanged · {}", messages::numbered_render(1)));
     terminal.wait_for(&messages::cached_stage_count("6 stages"));
     assert_eq!(stages(&folder, "render").0, "drrrrsrr");
 

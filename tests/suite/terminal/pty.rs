@@ -343,7 +343,7 @@ impl Terminal {
     /// Waits until render `number` is finished and no render is running.
     #[track_caller]
     pub fn wait_for_render(&self, number: usize) {
-        let words = format!("· {}", messages::render_number(number));
+        let words = format!("· {}", messages::numbered_render(number));
         self.wait(&words, |screen| {
             let text = screen.contents();
             // Frames arrive in pieces, from top to bottom. All text is complete when the bar below the image

@@ -31,7 +31,7 @@ fn comparison_ignores_a_typo() {
     terminal.wait_for_color("blue");
     terminal.wait_for_render(2);
     typo(&folder, &terminal, &blue, "radus");
-    terminal.wait_for(&format!("unchanged · {}", messages::render_number(2)));
+    terminal.wait_for(&format!("unchanged · {}", messages::numbered_render(2)));
     terminal.press("b");
     terminal.wait_for_color("red");
     terminal.wait_for(&messages::render_number_of_count(1, 2));
@@ -57,9 +57,9 @@ fn comment_and_typo_add_no_history_entry() {
     terminal.wait("a strip", |screen| words(screen).contains("▸2 materials."));
     let commented = blue.replace("[camera]", "# the eye\n[camera]");
     folder.write("scene.toml", &commented);
-    terminal.wait_for(&format!("unchanged · {}", messages::render_number(2)));
+    terminal.wait_for(&format!("unchanged · {}", messages::numbered_render(2)));
     typo(&folder, &terminal, &commented, "radus");
-    terminal.wait_for(&format!("unchanged · {}", messages::render_number(2)));
+    terminal.wait_for(&format!("unchanged · {}", messages::numbered_render(2)));
     terminal.press("n");
     terminal.wait_for(&messages::render_number_of_count(1, 2));
     terminal.wait("two images", |screen| {

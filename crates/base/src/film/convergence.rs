@@ -81,7 +81,7 @@ impl SquaredMeanChanges {
         self.levels.len()
     }
 
-    /// Serializes all numbers as 32-bit words in the order that [`SquaredMeanChanges::read_words`] expects.
+    /// Serializes all numbers as 32-bit words in the order that [`SquaredMeanChanges::from_words`] expects.
     pub(super) fn write_words(&self, put: &mut impl FnMut(u32)) {
         for values in [&self.last, &self.half_way, &self.recent] {
             values.iter().for_each(|value| put(value.to_bits()));
@@ -96,7 +96,7 @@ impl SquaredMeanChanges {
     }
 
     /// Deserializes steps for `area` pixels and `levels` doublings.
-    pub(super) fn read_words<E>(
+    pub(super) fn from_words<E>(
         area: usize,
         levels: usize,
         word: &mut impl FnMut() -> Result<u32, E>,
@@ -201,7 +201,7 @@ impl SquaredMeanChanges {
 
     /// Factor by which quadrupling the samples to 2^`level` reduced the variance, measured in one half of
     /// every cell, or `None` if it is unknown, as it always is for fewer than 16 samples.
-    fn measured_quadrupling_reduction(&self, level: usize, half: usize) -> Option<f64> {
+    fn quadrupling_variance_reduction(&self, level: usize, half: usize) -> Option<f64> {
         let mut sums = [0.0; 4];
         for cell in 0..CELLS {
             let steps = self.last_four_squared_steps(level, (cell, half), false)?;
@@ -318,7 +318,7 @@ impl ConvergenceModel {
 
     /// Factor by which doubling the samples beyond 2^`level` is expected to reduce the variance in the
     /// specified halves of a tile.
-    pub(super) fn predicted_next_reduction(
+    pub(super) fn predicted_variance_reduction(
         steps: &SquaredMeanChanges,
         level: usize,
         halves: &[usize],
@@ -367,7 +367,7 @@ impl ConvergenceModel {
     ) -> Option<f64> {
         let [last, before, ..] = steps.last_four_squared_steps(level, at, is_relative)?;
         let fall =
-            steps.measured_quadrupling_reduction(level, at.1).unwrap_or(INDEPENDENT_QUADRUPLING_REDUCTION);
+            steps.quadrupling_variance_reduction(level, at.1).unwrap_or(INDEPENDENT_QUADRUPLING_REDUCTION);
         let lasting = LASTING_QUADRUPLING
             * (fall - CHANCE_QUADRUPLING_REDUCTION).max(0.0)
             * steps.reduction_confidence(level, &[at.1]);

@@ -31,7 +31,7 @@ impl LayerSums {
         let (pixel, size) = (pixel * self.count..(pixel + 1) * self.count, 3 * self.count);
         let Some(is_negative) = is_negative else {
             let sums = &mut self.sums[pixel];
-            if !try_add_all_layers(bytemuck::cast_slice_mut(sums), values) {
+            if !try_add_all_layer_samples(bytemuck::cast_slice_mut(sums), values) {
                 values.chunks_exact(size).for_each(|sample| add_finite_layers(sums, sample));
             }
             return;
@@ -95,7 +95,7 @@ fn add_finite_layers(sums: &mut [DVec3], sample: &[f32]) {
 /// instructions. Does nothing and returns false if only some layers are recorded, or if a sum would not be
 /// finite.
 #[inline(always)]
-fn try_add_all_layers(sums: &mut [f64], values: &[f32]) -> bool {
+fn try_add_all_layer_samples(sums: &mut [f64], values: &[f32]) -> bool {
     let Some(sums) = sums.as_mut_array::<ALL_LAYER_VALUES>() else { return false };
     let mut totals = *sums;
     for sample in values.as_chunks::<ALL_LAYER_VALUES>().0 {

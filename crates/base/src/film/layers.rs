@@ -15,13 +15,13 @@ impl Tile {
         let LayerSums { count, sums, negative } = &self.layers;
         let place = index * count + layer;
         let below = |_: &NegativeLobeSums| negative.get(place).copied().unwrap_or_default();
-        if layer < *count { self.mean_from_lobe_sums(index, || sums[place], below) } else { None }
+        if layer < *count { self.mean_from_filter_lobe_sums(index, || sums[place], below) } else { None }
     }
 }
 
 impl Film {
     /// Layer sums of the selected pixels of a tile, to which more samples can be added.
-    pub fn copy_layer_sums(&self, tile: usize, pixels: SelectedPixels) -> LayerSums {
+    pub fn tile_layer_sums(&self, tile: usize, pixels: SelectedPixels) -> LayerSums {
         let mut sums = lock(&self.spare_layers).pop().unwrap_or_default();
         let Some(rect) = self.tile_rect(tile) else {
             sums.reset(self.layers, pixels.count());
@@ -89,7 +89,7 @@ impl Film {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::film::{NegativeLobeMask, StoredTile, TileSamples};
+    use crate::film::{NegativeLobeSamples, StoredTile, TileSamples};
     use crate::math::random::unit_generator;
 
     /// Five samples per pixel of a 40 × 3 film whose two layers are 1 and 2 times the radiance. The filter
@@ -100,7 +100,7 @@ mod tests {
         let radiance: Vec<Vec3> =
             (0..5 * pixels.count()).map(|_| Vec3::new(next(), next(), next())).collect();
         let is_negative: Vec<bool> = radiance.iter().map(|value| value.x > 0.7).collect();
-        let mut layers = film.copy_layer_sums(tile, pixels);
+        let mut layers = film.tile_layer_sums(tile, pixels);
         for (pixel, (values, signs)) in radiance.chunks(5).zip(is_negative.chunks(5)).enumerate() {
             let sample = |value: &Vec3| {
                 let Vec3 { x, y, z } = *value;
@@ -109,7 +109,7 @@ mod tests {
             let values: Vec<f32> = values.iter().flat_map(sample).collect();
             layers.add_pixel_samples(pixel, &values, is_signed.then_some(signs));
         }
-        let negative = is_signed.then_some(NegativeLobeMask { weight: 0.1, is_negative });
+        let negative = is_signed.then_some(NegativeLobeSamples { weight: 0.1, is_negative });
         TileSamples { pixels, samples: 5, radiance, negative, layers }
     }
 

@@ -103,9 +103,9 @@ pub struct TileSamples {
     /// value.
     pub radiance: Vec<Vec3>,
     /// Samples in the pixel filter's negative lobes, or `None` if the filter has no negative lobes.
-    pub negative: Option<NegativeLobeMask>,
+    pub negative: Option<NegativeLobeSamples>,
     /// Sums of the layers in these pixels, including the film's earlier samples; see
-    /// [`Film::copy_layer_sums`].
+    /// [`Film::tile_layer_sums`].
     pub layers: LayerSums,
 }
 
@@ -113,7 +113,7 @@ pub struct TileSamples {
 /// samples − `weight` · mean of the samples in negative lobes. A constant image therefore stays constant
 /// regardless of the sample positions.
 #[derive(Clone, Debug)]
-pub struct NegativeLobeMask {
+pub struct NegativeLobeSamples {
     /// Weight of the negative lobes: −∫min(f, 0)/∫f for the filter f.
     pub weight: f64,
     /// Whether each sample is in a negative lobe.

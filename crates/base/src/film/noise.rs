@@ -44,7 +44,7 @@ struct NoiseSums {
 
 impl NoiseSums {
     /// Expected exponent for the next doubling, or the exponent for independent samples if there is no noise.
-    fn squared_error_exponent(self) -> f64 {
+    fn squared_error_decay_exponent(self) -> f64 {
         if self.left > 0.0 { libm::log2(self.variance / self.left) } else { 1.0 }
     }
 
@@ -63,17 +63,17 @@ impl Film {
     /// The result is about 0 if all samples of each pixel are equal, and `None` if a pixel has fewer than two
     /// samples.
     pub fn relative_error(&self) -> Option<f64> {
-        self.image_noise().map(|noise| noise.relative_error)
+        self.noise_and_convergence().map(|noise| noise.relative_error)
     }
 
     /// Returns [`Film::relative_error`] and its convergence exponent.
-    pub fn image_noise(&self) -> Option<ImageNoiseAndConvergence> {
+    pub fn noise_and_convergence(&self) -> Option<ImageNoiseAndConvergence> {
         let sums @ NoiseSums { variance, mean, .. } = self.noise_sums()?;
         let pixels = self.crop_rect().area() as f64;
         let error = (variance / pixels).sqrt();
         // A black image without error has a relative error of 0.
         let relative_error = if error == 0.0 { 0.0 } else { error / (mean / pixels) };
-        Some(ImageNoiseAndConvergence { relative_error, power: sums.squared_error_exponent() })
+        Some(ImageNoiseAndConvergence { relative_error, power: sums.squared_error_decay_exponent() })
             .filter(|noise| noise.relative_error.is_finite())
     }
 
@@ -173,7 +173,7 @@ impl Film {
             }
         }
         let (variance, mean, power) =
-            (sums.variance / pixels, sums.mean / pixels, sums.squared_error_exponent());
+            (sums.variance / pixels, sums.mean / pixels, sums.squared_error_decay_exponent());
         (pixels > 0.0).then_some(CellHalfNoise { variance, mean, samples, power })
     }
 
@@ -394,7 +394,7 @@ mod tests {
     #[test]
     fn convergence_rate_is_estimated() {
         let power = |sample: &mut dyn FnMut(u32, u32) -> f32| {
-            square(64, 0.5, sample).0.image_noise().expect("noise").power
+            square(64, 0.5, sample).0.noise_and_convergence().expect("noise").power
         };
         let mut next = unit_generator(5);
         let independent = power(&mut |_, _| next());

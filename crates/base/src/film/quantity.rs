@@ -96,7 +96,7 @@ impl Tile {
         }
         let variance = if count > 1 && pixels > 0 {
             let rate =
-                ConvergenceModel::predicted_next_reduction(&self.steps, count.ilog2() as usize, &[0, 1]);
+                ConvergenceModel::predicted_variance_reduction(&self.steps, count.ilog2() as usize, &[0, 1]);
             variance_from_squared_step(sum / f64::from(pixels), count, rate)
         } else {
             0.0

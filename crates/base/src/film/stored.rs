@@ -43,7 +43,7 @@ impl StoredTile {
             let earlier = (0..blocks).map(|_| from.vectors(area)).collect::<Result<_, _>>()?;
             tile.negative = Some(NegativeLobeSums { weight, sums, counts: from.counts(area)?, earlier });
         }
-        tile.steps = SquaredMeanChanges::read_words(area, levels, &mut || from.u32())?;
+        tile.steps = SquaredMeanChanges::from_words(area, levels, &mut || from.u32())?;
         let sums = from.vectors(area * layers)?;
         let negative = if is_signed { from.vectors(area * layers)? } else { Vec::new() };
         tile.layers = LayerSums { count: layers, sums, negative };
@@ -232,7 +232,7 @@ impl ByteReader<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::film::{BLOCK_SIZE, NegativeLobeMask, Rect, SumOrder, TileSamples};
+    use crate::film::{BLOCK_SIZE, NegativeLobeSamples, Rect, SumOrder, TileSamples};
     use crate::math::Vec3;
     use crate::math::random::unit_generator;
 
@@ -251,7 +251,7 @@ mod tests {
                     }
                 }
             }
-            let negative = is_signed.then_some(NegativeLobeMask { weight: 0.1, is_negative });
+            let negative = is_signed.then_some(NegativeLobeSamples { weight: 0.1, is_negative });
             let samples = range.end - range.start;
             film.add_samples(
                 tile,
@@ -293,7 +293,7 @@ mod tests {
             );
             add(&second, 21..37, is_signed);
             assert_eq!(second.radiance_image().pixels, whole.radiance_image().pixels);
-            assert_eq!(second.image_noise(), whole.image_noise());
+            assert_eq!(second.noise_and_convergence(), whole.noise_and_convergence());
             for tile in 0..whole.tile_count() {
                 assert_eq!(stored(&second, tile), stored(&whole, tile), "{blocks:?}");
             }

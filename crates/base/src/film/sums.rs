@@ -83,7 +83,7 @@ pub struct Film {
     pub(super) blocks: SumOrder,
     /// Number of layers.
     pub(super) layers: usize,
-    /// Memory of replaced layer sums, for reuse by [`Film::copy_layer_sums`].
+    /// Memory of replaced layer sums, for reuse by [`Film::tile_layer_sums`].
     pub(super) spare_layers: Mutex<Vec<LayerSums>>,
 }
 
@@ -125,9 +125,9 @@ impl Tile {
     /// Mean of a pixel's samples, or `None` if the pixel has no samples.
     #[inline]
     pub(super) fn mean(&self, index: usize) -> Option<DVec3> {
-        self.mean_from_lobe_sums(
+        self.mean_from_filter_lobe_sums(
             index,
-            || self.positive_lobe_radiance_sum(index),
+            || self.positive_filter_lobe_sum(index),
             |negative| pixel_sum_over_sample_blocks(&negative.earlier, &negative.sums, index),
         )
     }
@@ -136,7 +136,7 @@ impl Tile {
     /// `negative_sum` over the samples inside them. Returns `None` if the pixel has no samples.
     /// Inlined because noise estimates call it for every pixel.
     #[inline(always)]
-    pub(super) fn mean_from_lobe_sums(
+    pub(super) fn mean_from_filter_lobe_sums(
         &self,
         index: usize,
         sum: impl Fn() -> DVec3,
@@ -162,7 +162,7 @@ impl Tile {
 
     /// Sum of a pixel's samples outside negative lobes.
     #[inline(always)]
-    fn positive_lobe_radiance_sum(&self, index: usize) -> DVec3 {
+    fn positive_filter_lobe_sum(&self, index: usize) -> DVec3 {
         if self.earlier.is_empty() {
             self.sums[index]
         } else {
@@ -333,7 +333,7 @@ impl Film {
     }
 
     /// Indices of all tiles, in rings from the crop's center outward. Computed on the first call.
-    pub fn tile_order(&self) -> &[usize] {
+    pub fn tiles_center_outward(&self) -> &[usize] {
         self.order.get_or_init(|| tiles_in_rings(self.crop))
     }
 
@@ -360,7 +360,7 @@ impl Film {
         for (i, pixel) in samples.radiance.chunks_exact(count).enumerate() {
             let (x, y) = samples.pixels.image_position(i as u32);
             let Some(index) = pixel_index_in_rect(rect, x, y) else { continue };
-            let (cell, inside) = cell_and_rect_at(rect, x, y);
+            let (cell, inside) = cell_and_rect_of_pixel(rect, x, y);
             let lobes = samples.negative.as_ref();
             let lobes = lobes.map(|lobes| (lobes.weight, &lobes.is_negative[i * count..][..count]));
             let half = pixel_index_in_rect(inside, x, y)
@@ -422,7 +422,7 @@ pub(super) fn pixel_index_in_rect(rect: Rect, x: u32, y: u32) -> Option<usize> {
 }
 
 /// Cell that contains a pixel in a tile, and the cell's rectangle.
-fn cell_and_rect_at(tile: Rect, x: u32, y: u32) -> (usize, Rect) {
+fn cell_and_rect_of_pixel(tile: Rect, x: u32, y: u32) -> (usize, Rect) {
     let (column, row) = ((x - tile.x) / CELL_SIZE, (y - tile.y) / CELL_SIZE);
     let cell = row as usize * CELLS_ACROSS + column as usize;
     (cell, cell_rect(tile, cell).unwrap_or(tile))

@@ -37,7 +37,7 @@ fn pixel_sample_count(film: &Film, x: u32, y: u32) -> u32 {
 
 fn film_after_passes(passes: &[u32]) -> Film {
     let film = Film::new(50, 41, None).expect("a film");
-    for &tile in film.tile_order() {
+    for &tile in film.tiles_center_outward() {
         let mut first = 0;
         for &count in passes {
             film.add_samples(tile, varied_samples(film.tile_rect(tile).expect("a tile"), first, count));
@@ -68,7 +68,7 @@ fn tiles_partition_the_crop() {
     let crop = Rect { x: 5, y: 7, width: 70, height: 1000 };
     let film = Film::new(100, 60, Some(crop)).expect("a film");
     assert_eq!(film.crop_rect(), Rect { height: 53, ..crop });
-    let order = film.tile_order();
+    let order = film.tiles_center_outward();
     assert_eq!(order.iter().copied().collect::<HashSet<_>>(), (0..film.tile_count()).collect());
     assert_eq!(order.len(), film.tile_count());
     let mut seen = HashSet::new();
@@ -86,7 +86,7 @@ fn tiles_partition_the_crop() {
 #[test]
 fn tiles_are_ordered_from_the_center_outward() {
     let film = Film::new(32 * 9, 32 * 6, None).expect("a film");
-    let rings: Vec<_> = film.tile_order().iter().map(|tile| (tile % 9).abs_diff(4)).collect();
+    let rings: Vec<_> = film.tiles_center_outward().iter().map(|tile| (tile % 9).abs_diff(4)).collect();
     assert!(rings[..2].iter().all(|&ring| ring == 0), "{rings:?}");
     assert!(rings[rings.len() - 12..].iter().all(|&ring| ring == 4), "{rings:?}");
 }
@@ -94,7 +94,7 @@ fn tiles_are_ordered_from_the_center_outward() {
 #[test]
 fn tile_order_is_computed_once() {
     let film = Film::new(32 * 9, 32 * 6, None).expect("a film");
-    assert!(std::ptr::eq(film.tile_order(), film.tile_order()));
+    assert!(std::ptr::eq(film.tiles_center_outward(), film.tiles_center_outward()));
 }
 
 #[test]

@@ -21,7 +21,7 @@ pub(crate) fn store_command_line(words: &[OsString]) {
 }
 
 /// Returns the words of the command line being completed.
-fn command_line() -> Vec<OsString> {
+fn command_line_words() -> Vec<OsString> {
     WORDS.get().cloned().unwrap_or_else(|| std::env::args_os().collect())
 }
 
@@ -47,7 +47,8 @@ pub(crate) fn import_completer() -> ArgValueCompleter {
 pub(crate) fn key_assignment_completer() -> ArgValueCompleter {
     ArgValueCompleter::new(|current: &OsStr| {
         let Some(current) = current.to_str() else { return Vec::new() };
-        let scene = command_line().into_iter().map(PathBuf::from).find(|word| has_scene_extension(word));
+        let scene =
+            command_line_words().into_iter().map(PathBuf::from).find(|word| has_scene_extension(word));
         let text = scene.and_then(|scene| read_scene_file_text(&scene).ok());
         key_assignment_candidates(text.as_deref().unwrap_or_default(), current)
     })
@@ -72,7 +73,7 @@ fn key_assignment_candidates(text: &str, typed: &str) -> Vec<CompletionCandidate
     let absent = singles.filter(|info| !outline.iter().any(|table| table.info.name == info.name));
     let of_absent = absent.flat_map(|info| info.keys.iter().map(|key| (info.name.to_owned(), key)));
     let of = |table: &OutlineTable| {
-        let paths = table.set_arg_prefixes();
+        let paths = table.override_key_prefixes();
         let known = table.keys_allowed_for_type();
         paths.into_iter().flat_map(move |path| known.clone().into_iter().map(move |key| (path.clone(), key)))
     };
@@ -90,7 +91,7 @@ fn key_assignment_candidates(text: &str, typed: &str) -> Vec<CompletionCandidate
     let of_type = |table: &OutlineTable| {
         let types = table.info.types.iter().map(|kind| (kind.name.to_owned(), kind.doc));
         let types: Vec<DescribedValue> = types.collect();
-        let paths = if types.is_empty() { Vec::new() } else { table.set_arg_prefixes() };
+        let paths = if types.is_empty() { Vec::new() } else { table.override_key_prefixes() };
         let of_path = |path: String| {
             key_or_value_candidates(&format!("{path}.type="), "The type", typed, || types.clone())
         };

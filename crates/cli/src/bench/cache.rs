@@ -93,7 +93,7 @@ const KEY_BYTES: usize = 64;
 
 /// Loads the references stored under a key, or returns `None` if the file is missing or damaged.
 pub(super) fn load(folder: &Path, key: &Fingerprint) -> Option<ReferencesWithCost> {
-    let bytes = fs::read(cache_file_path(folder, key)).ok()?;
+    let bytes = fs::read(cached_reference_path(folder, key)).ok()?;
     let (content, seal) = bytes.split_at_checked(bytes.len().checked_sub(KEY_BYTES)?)?;
     if integrity_checksum(content).as_bytes() != seal {
         return None;
@@ -122,7 +122,7 @@ pub(super) fn store(
     key: &Fingerprint,
     stored: &ReferencesWithCost,
 ) -> Result<(), OutputError> {
-    let path = cache_file_path(folder, key);
+    let path = cached_reference_path(folder, key);
     create_folder(folder)?;
     let (a, b) = (stored.pair.measured_image(), stored.pair.reference());
     let head = CachedReferenceHeader { width: a.width, height: a.height, cost: stored.cost };
@@ -160,7 +160,7 @@ fn integrity_checksum(content: &[u8]) -> String {
     FingerprintHasher::new("references").add_bytes(content).finish().to_string()
 }
 
-fn cache_file_path(folder: &Path, key: &Fingerprint) -> PathBuf {
+fn cached_reference_path(folder: &Path, key: &Fingerprint) -> PathBuf {
     folder.join(format!("{key}.pair"))
 }
 
@@ -190,7 +190,7 @@ mod tests {
         assert_eq!(fs::read_to_string(&scene).expect("a scene"), "edited");
         // References replace only empty files and other references.
         let key = FingerprintHasher::new("x").finish();
-        let path = cache_file_path(folder.path(), &key);
+        let path = cached_reference_path(folder.path(), &key);
         fs::write(&path, "notes").expect("written");
         assert!(store(folder.path(), &key, &stored()).is_err());
         assert_eq!(fs::read_to_string(&path).expect("notes"), "notes");
@@ -224,7 +224,7 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let key = FingerprintHasher::new("x").finish();
         store(folder.path(), &key, &stored()).expect("stored");
-        let path = cache_file_path(folder.path(), &key);
+        let path = cached_reference_path(folder.path(), &key);
         let whole = fs::read(&path).expect("bytes");
         for length in 0..whole.len() {
             fs::write(&path, &whole[..length]).expect("written");

@@ -73,7 +73,7 @@ pub(super) struct SceneReferences {
 pub(super) struct ReferenceFingerprints([Fingerprint; 2]);
 
 /// Rendered references that are not cached yet.
-pub(super) struct UncachedReferences {
+pub(super) struct UnsavedReferences {
     pub(super) keys: ReferenceFingerprints,
     stored: ReferencesWithCost,
     warnings: Vec<Diagnostic>,
@@ -129,7 +129,7 @@ impl ReferenceRenderer<'_> {
     ) -> Option<SceneReferences> {
         let stored = cache::load(self.cache?, &self.reference_cache_key(keys))
             .filter(|stored| amount.is_met_by_cached_references(stored.cost))?;
-        Some(assemble_scene_references(stored, true, Vec::new(), None))
+        Some(scene_references_from_stored(stored, true, Vec::new(), None))
     }
 
     /// Renders both references. Calls `begin` before each one and passes it the number of references left.
@@ -138,7 +138,7 @@ impl ReferenceRenderer<'_> {
         session: &mut HeadlessSession,
         amount: ReferenceBudget,
         mut begin: impl FnMut(usize),
-    ) -> Result<UncachedReferences, BenchError> {
+    ) -> Result<UnsavedReferences, BenchError> {
         let half = ReferenceBudget { seconds: amount.seconds.map(|seconds| seconds / 2.0), ..amount };
         begin(2);
         let first = self.render_reference(session, SEEDS[0], half)?;
@@ -153,16 +153,16 @@ impl ReferenceRenderer<'_> {
             BenchError::Call(errors.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))
         })?;
         let keys = ReferenceFingerprints([first.key, second.key]);
-        Ok(UncachedReferences { keys, stored: ReferencesWithCost { pair, cost }, warnings: first.warnings })
+        Ok(UnsavedReferences { keys, stored: ReferencesWithCost { pair, cost }, warnings: first.warnings })
     }
 
     /// Stores rendered references in the cache, if it is enabled.
-    pub(super) fn store_in_cache(&self, made: UncachedReferences) -> SceneReferences {
-        let UncachedReferences { keys, stored, warnings } = made;
+    pub(super) fn store_in_cache(&self, made: UnsavedReferences) -> SceneReferences {
+        let UnsavedReferences { keys, stored, warnings } = made;
         let cache_error = self
             .cache
             .and_then(|folder| cache::store(folder, &self.reference_cache_key(&keys), &stored).err());
-        assemble_scene_references(stored, false, warnings, cache_error.map(|error| error.to_string()))
+        scene_references_from_stored(stored, false, warnings, cache_error.map(|error| error.to_string()))
     }
 
     fn render_reference(
@@ -199,7 +199,7 @@ fn cache_key(
     key.finish()
 }
 
-fn assemble_scene_references(
+fn scene_references_from_stored(
     stored: ReferencesWithCost,
     is_cached: bool,
     warnings: Vec<Diagnostic>,

@@ -167,7 +167,7 @@ fn report_unfinished(
 fn bench_request(args: &BenchArgs, console: &Console) -> Result<BenchRequest, Exit> {
     let folder = if args.no_cache { None } else { args.cache.clone().or_else(cache::cache_folder) };
     let scenes = if args.scenes.is_empty() {
-        vec![write_starter(folder.as_deref(), console)?]
+        vec![write_starter_scene_to_cache(folder.as_deref(), console)?]
     } else {
         args.scenes.clone()
     };
@@ -231,7 +231,7 @@ fn reference_source(args: &BenchArgs, scenes: usize, console: &Console) -> Resul
 }
 
 /// Writes the `glimt new` starter scene to the reference cache and returns its path.
-fn write_starter(folder: Option<&Path>, console: &Console) -> Result<PathBuf, Exit> {
+fn write_starter_scene_to_cache(folder: Option<&Path>, console: &Console) -> Result<PathBuf, Exit> {
     match folder.map(cache::write_starter_scene) {
         Some(made) => made.map_err(|error| console.print_error(Exit::FAILED, &error.to_string())),
         None => Err(console.print_error(Exit::WRONG, "no scene given; see glimt bench --help")),

@@ -37,7 +37,9 @@ fn run_comparison_in_pool(pool: &ThreadPool, args: &CompareArgs, console: &Conso
         errors.iter().for_each(|error| console.print_line_to_stderr(&format!("error: {error}")));
         Exit::WRONG
     })?;
-    pair.warnings().iter().for_each(|warning| console.print_line_to_stderr(&format!("warning: {warning}")));
+    pair.file_warnings()
+        .iter()
+        .for_each(|warning| console.print_line_to_stderr(&format!("warning: {warning}")));
     warn_about_same_file(args, console);
     let measured = pool.install(|| compare::measure(&pair));
     let errors = &measured.errors;
@@ -46,7 +48,10 @@ fn run_comparison_in_pool(pool: &ThreadPool, args: &CompareArgs, console: &Conso
     if args.json {
         print_json(&summary, console);
     } else {
-        pictures::print_images(&pool.install(|| pictures::render_images(args, &pair, &measured)), console);
+        pictures::print_images(
+            &pool.install(|| pictures::render_images_as_text(args, &pair, &measured)),
+            console,
+        );
         let lines = format_table(&summary, console.stdout_columns());
         lines.iter().for_each(|line| console.print_line(line));
     }
@@ -97,7 +102,7 @@ impl<'a> ErrorImageOutput<'a> {
             Format::from_path(path).map_err(|error| console.print_error(Exit::WRONG, &error.to_string()))?;
         check_not_input(path, path, args)
             .map_err(|error| console.print_error(Exit::WRONG, &error.to_string()))?;
-        output::check_image_path(path)
+        output::check_image_target(path)
             .map_err(|error| console.print_error(Exit::FAILED, &error.to_string()))?;
         Ok(Self { path, format })
     }

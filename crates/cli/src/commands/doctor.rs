@@ -35,7 +35,8 @@ fn describe_simd_instructions() -> String {
         InstructionSet::Avx2 => "AVX2",
         InstructionSet::Avx512 => "AVX-512",
     };
-    let (used, best) = (InstructionSet::best(), InstructionSet::Avx512.or_best_supported());
+    let (used, best) =
+        (InstructionSet::from_environment_or_best(), InstructionSet::Avx512.or_best_supported());
     match nonempty_environment_variable("GLIMT_SIMD") {
         Some(asked) => format!("{} (GLIMT_SIMD={asked}); available: {}", words(used), words(best)),
         None => words(used).to_owned(),
@@ -103,7 +104,7 @@ fn describe_preview(probe: &TerminalProbeResult) -> String {
         [] => "no pixel protocol".to_owned(),
         some => format!("pixels with --preview {}", some.join(" or ")),
     };
-    format!("{}; {more}", probe.auto_preview_name())
+    format!("{}; {more}", probe.auto_preview_style_name())
 }
 
 fn describe_round_trip(answers: Option<&ReportedTerminalFeatures>) -> String {

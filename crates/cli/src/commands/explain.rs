@@ -4,7 +4,7 @@ use crate::console::{Console, stdout_columns_or_default};
 use crate::exit::Exit;
 use crate::scene::keys::key::{DefaultValue, KeyInfo, TableInfo, TableTypeInfo, ValueKind};
 use crate::scene::keys::{all_paths_with_descriptions, all_tables, find_table};
-use crate::scene::nearest::{foreign_or_nearest_name, nearest_name};
+use crate::scene::nearest::{nearest_name, translated_or_nearest_name};
 use crate::scene::sanitize::escape_and_truncate;
 use crate::tui::wrap_text;
 
@@ -230,13 +230,13 @@ fn unknown_path_message(path: &str) -> String {
         names.iter().copied().filter(|name| name.split('.').next() == Some(first)).collect();
     let ends: Vec<&str> = in_table.iter().filter_map(|name| name.rsplit('.').next()).collect();
     let near_end = || {
-        foreign_or_nearest_name(last, &ends)
+        translated_or_nearest_name(last, &ends)
             .and_then(|end| in_table.iter().copied().find(|name| name.ends_with(&format!(".{end}"))))
     };
     let keys: Vec<&str> = names.iter().filter_map(|name| name.rsplit('.').next()).collect();
     let near = nearest_name(path, names.iter().copied())
         .or_else(near_end)
-        .or_else(|| foreign_or_nearest_name(last, &keys));
+        .or_else(|| translated_or_nearest_name(last, &keys));
     match near {
         Some(near) => format!("unknown key {shown:?}; did you mean `{near}`?"),
         None => format!("unknown key {shown:?}; `glimt explain` lists all tables"),

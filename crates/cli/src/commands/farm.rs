@@ -199,7 +199,7 @@ fn kubernetes_manifest(args: &FarmArgs, mebibytes: Option<u64>) -> String {
         parts_merge_command(args, "--watch --progress plain "),
     );
     let (image, claim) = (quote_yaml(&args.image), quote_yaml(&args.claim));
-    let render = quote_container_command(&format!("index=$((JOB_COMPLETION_INDEX + 1)); exec {render}"));
+    let render = quote_yaml_container_command(&format!("index=$((JOB_COMPLETION_INDEX + 1)); exec {render}"));
     let resources = mebibytes.map_or(String::new(), |size| {
         format!(
             "        resources:\n          requests:\n            memory: {size}Mi\n          limits:\n            memory: {size}Mi\n"
@@ -236,12 +236,12 @@ spec:
     format!(
         "# Renders {count} parts and merges them: kubectl apply -f -\n{}---\n{}",
         job("glimt", &indexed, &render),
-        job("glimt-merge", "", &quote_container_command(&merge))
+        job("glimt-merge", "", &quote_yaml_container_command(&merge))
     )
 }
 
 /// Formats a container command. Escapes `$` because Kubernetes expands `$(NAME)` and `$$`.
-fn quote_container_command(text: &str) -> String {
+fn quote_yaml_container_command(text: &str) -> String {
     quote_yaml(&text.replace('$', "$$"))
 }
 

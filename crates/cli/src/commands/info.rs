@@ -8,7 +8,7 @@ use crate::args::InfoArgs;
 use crate::console::Console;
 use crate::exit::Exit;
 use crate::output::json::to_pretty_text;
-use crate::output::settings::{ImageInfo, ImageInfoReadError, read_image_info};
+use crate::output::settings::{ImageFileInfo, ImageInfoReadError, read_image_info};
 use crate::pipeline::protocol::Failure;
 use crate::progress::{failure_to_json, json_line};
 use crate::scene::detect_image_or_part_file;
@@ -34,10 +34,10 @@ pub(crate) fn run(args: &InfoArgs, console: &Console) -> Exit {
 ///
 /// # Errors
 /// Returns the same errors as [`read_image_info`].
-fn read_image_info_or_format(path: &Path) -> Result<ImageInfo, ImageInfoReadError> {
+fn read_image_info_or_format(path: &Path) -> Result<ImageFileInfo, ImageInfoReadError> {
     read_image_info(path).or_else(|error| match (&error, detect_image_or_part_file(path)) {
         (ImageInfoReadError::NotAnImage { .. }, Some((format, _))) => {
-            Ok(ImageInfo { format: format.to_owned(), ..ImageInfo::default() })
+            Ok(ImageFileInfo { format: format.to_owned(), ..ImageFileInfo::default() })
         }
         _ => Err(error),
     })
@@ -61,7 +61,7 @@ pub(crate) fn report_image_instead_of_scene(path: &Path, is_json: bool, console:
     Some(Exit::WRONG)
 }
 
-fn as_json(path: &Path, info: &ImageInfo) -> Value {
+fn as_json(path: &Path, info: &ImageFileInfo) -> Value {
     let settings: Map<String, Value> =
         info.settings.iter().map(|(name, value)| (name.clone(), Value::from(value.as_str()))).collect();
     json!({
@@ -81,7 +81,7 @@ fn as_json(path: &Path, info: &ImageInfo) -> Value {
 const MAX_NAME_COLUMNS: usize = 40;
 
 /// Formats one line about the file, followed by one line per setting.
-fn as_text(path: &Path, info: &ImageInfo) -> String {
+fn as_text(path: &Path, info: &ImageFileInfo) -> String {
     let name = path.to_string_lossy();
     let size = info.size.map_or(String::new(), |(width, height)| format!(", {width}×{height}"));
     let frames = info.frames.map_or(String::new(), |frames| format!(", {frames} frames"));
@@ -109,8 +109,10 @@ mod tests {
     fn very_long_names_are_shown() {
         for length in [39, 41, 65_535, 65_536, 200_000] {
             let name = "n".repeat(length);
-            let info =
-                ImageInfo { settings: vec![(name.clone(), "value".to_owned())], ..ImageInfo::default() };
+            let info = ImageFileInfo {
+                settings: vec![(name.clone(), "value".to_owned())],
+                ..ImageFileInfo::default()
+            };
             let text = as_text(Path::new("a.png"), &info);
             assert!(text.contains(&format!("{name}  value\n")) || length < 40, "{length}");
             assert!(text.contains("value"), "{length}");

@@ -83,7 +83,7 @@ impl MergeCommand<'_> {
         }
         let format = Format::from_path(out)
             .map_err(|error| self.console.print_error(Exit::WRONG, &error.to_string()))?;
-        output::check_image_path(out)
+        output::check_image_target(out)
             .map_err(|error| self.console.print_error(Exit::FAILED, &error.to_string()))?;
         Ok(format)
     }
@@ -170,7 +170,7 @@ impl MergeCommand<'_> {
             if reported.as_ref() != Some(&state) {
                 let is_new = reported.is_none_or(|(count, _)| count != parts.len());
                 let words = self.describe_completed_parts(parts.len(), &unfinished);
-                if self.redraws_in_place() {
+                if self.redraws_image_in_place() {
                     self.redraw_image(&parts, &words, &mut block)?;
                 } else if is_new {
                     // Report mismatched parts as soon as they appear.
@@ -182,11 +182,11 @@ impl MergeCommand<'_> {
             if waiting.is_empty() {
                 return Ok(parts);
             }
-            self.pause()?;
+            self.wait_poll_interval()?;
         }
     }
 
-    fn pause(&self) -> Result<(), Exit> {
+    fn wait_poll_interval(&self) -> Result<(), Exit> {
         let end = Instant::now() + POLL_INTERVAL;
         while Instant::now() < end {
             if self.token.is_canceled() {
@@ -217,14 +217,14 @@ impl MergeCommand<'_> {
                 let total = self.args.parts.len();
                 json_line(&json!({ "event": "parts", "parts": count, "total": total, "unfinished": names }));
             }
-            ProgressMode::Auto if self.redraws_in_place() && self.console.is_terminal => {}
+            ProgressMode::Auto if self.redraws_image_in_place() && self.console.is_terminal => {}
             ProgressMode::Auto | ProgressMode::Plain => self.console.print_line_to_stderr(words),
         }
     }
 
     /// Whether to redraw the image in place. This requires a terminal on which no progress lines are printed
     /// between redraws.
-    fn redraws_in_place(&self) -> bool {
+    fn redraws_image_in_place(&self) -> bool {
         let has_lines = match self.args.progress {
             ProgressMode::Plain | ProgressMode::Json => self.console.is_terminal,
             ProgressMode::Auto | ProgressMode::None => false,
@@ -250,7 +250,7 @@ impl MergeCommand<'_> {
             Some(finish) => {
                 let merged = self.merge_parts(parts, true, "show")?;
                 self.pool.install(|| {
-                    let image = finish.quantity_image(&merged.film);
+                    let image = finish.extract_quantity(&merged.film);
                     let picture = tone_map_to_8_bits(&image, &finish.tone.with_image_range(&image));
                     images_as_text(&[NamedImage { name: words.to_string(), picture }], self.args.color, true)
                 })
@@ -320,7 +320,7 @@ impl MergeCommand<'_> {
             losses: AttributeLossPolicy::Report(&tell),
         };
         let bytes = self.pool.install(|| {
-            finish.encode_with_film_metadata(film, &finish.quantity_image(film), &[], format, token)
+            finish.encode_with_film_metadata(film, &finish.extract_quantity(film), &[], format, token)
         });
         let written = bytes.and_then(|bytes| atomic_with_policy(out, &bytes, &guard, token));
         written.map_err(|error| match error {

@@ -33,7 +33,7 @@ struct LinearErrorSums {
 
 pub(super) fn measure(pair: &ImagePair) -> LinearErrors {
     let pixels = pair.measured_image().pixels.len();
-    let rows = map_rows(pair, row_error_sums);
+    let rows = map_row_pairs(pair, row_error_sums);
     let sums = rows.into_iter().enumerate().fold(LinearErrorSums::default(), |sums, (y, row)| {
         let (max, max_at) =
             if row.max > sums.max { (row.max, [row.max_at[0], y as u32]) } else { (sums.max, sums.max_at) };
@@ -59,7 +59,7 @@ pub(super) fn measure(pair: &ImagePair) -> LinearErrors {
 }
 
 /// Applies `row` to each row and returns the results in order.
-fn map_rows<T: Send>(pair: &ImagePair, row: impl Fn(&[Vec3], &[Vec3]) -> T + Sync) -> Vec<T> {
+fn map_row_pairs<T: Send>(pair: &ImagePair, row: impl Fn(&[Vec3], &[Vec3]) -> T + Sync) -> Vec<T> {
     let a = pair.measured_image().pixels.par_chunks(pair.width());
     a.zip(pair.reference().pixels.par_chunks(pair.width())).map(|(a, b)| row(a, b)).collect()
 }
@@ -69,7 +69,7 @@ fn row_error_sums(a: &[Vec3], b: &[Vec3]) -> LinearErrorSums {
     for (x, (&a, &b)) in a.iter().zip(b).enumerate() {
         let difference = a.as_dvec3() - b.as_dvec3();
         sums.square += difference.length_squared();
-        sums.relative += relative_squared_error(a, b);
+        sums.relative += pixel_relative_squared_error(a, b);
         sums.luminances +=
             DVec2::from([a, b].map(|color| color.as_dvec3().dot(LUMINANCE_WEIGHTS.as_dvec3())));
         let largest = difference.abs().max_element();
@@ -81,20 +81,20 @@ fn row_error_sums(a: &[Vec3], b: &[Vec3]) -> LinearErrorSums {
 }
 
 /// Returns the mean of (a − b)²/(b² + 0.01) over the channels.
-fn relative_squared_error(a: Vec3, b: Vec3) -> f64 {
+fn pixel_relative_squared_error(a: Vec3, b: Vec3) -> f64 {
     let (a, b) = (a.as_dvec3(), b.as_dvec3());
     ((a - b) * (a - b) / (b * b + RELMSE_EPSILON)).element_sum() / 3.0
 }
 
-/// Mean of [`relative_squared_error`], excluding the largest values.
+/// Mean of [`pixel_relative_squared_error`], excluding the largest values.
 fn trimmed_relmse(pair: &ImagePair, dropped: usize) -> f64 {
     let pixels = pair.measured_image().pixels.par_iter().zip(&pair.reference().pixels);
-    let mut errors: Vec<f64> = pixels.map(|(&a, &b)| relative_squared_error(a, b)).collect();
+    let mut errors: Vec<f64> = pixels.map(|(&a, &b)| pixel_relative_squared_error(a, b)).collect();
     let kept = errors.len() - dropped;
     let (_, &mut min_dropped, _) = errors.select_nth_unstable_by(kept, f64::total_cmp);
     drop(errors);
-    let rows = map_rows(pair, |a, b| {
-        let errors = a.iter().zip(b).map(|(&a, &b)| relative_squared_error(a, b));
+    let rows = map_row_pairs(pair, |a, b| {
+        let errors = a.iter().zip(b).map(|(&a, &b)| pixel_relative_squared_error(a, b));
         errors
             .filter(|error| *error < min_dropped)
             .fold((0.0, 0), |(sum, count), error| (sum + error, count + 1))

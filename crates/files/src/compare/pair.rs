@@ -93,7 +93,7 @@ impl ImagePair {
     }
 
     /// Warnings about ignored parts of the files.
-    pub fn warnings(&self) -> &[String] {
+    pub fn file_warnings(&self) -> &[String] {
         &self.warnings
     }
 

@@ -32,7 +32,7 @@ fn warnings_about_the_files_are_returned() {
         let mut writer = encoder.write_header().expect("a header");
         (0..frames).for_each(|_| writer.write_image_data(&[9]).expect("written"));
     }
-    let warnings = |a: &Path, b: &Path| ImagePair::load(a, b).expect("a pair").warnings().to_vec();
+    let warnings = |a: &Path, b: &Path| ImagePair::load(a, b).expect("a pair").file_warnings().to_vec();
     assert!(warnings(&plain, &plain).is_empty());
     for (a, b) in [(&plain, &animated), (&animated, &plain), (&animated, &animated)] {
         let found = warnings(a, b);

@@ -140,7 +140,7 @@ fn wait_until_writable(to: &File, token: &CancelToken) -> io::Result<()> {
 
 /// Distinguishes canceled writes from I/O errors. Checks the error instead of the token, because the token
 /// may have been canceled after the write.
-pub(super) fn write_error_or_canceled<T>(
+pub(super) fn map_write_error<T>(
     result: io::Result<T>,
     error: impl FnOnce(io::Error) -> OutputError,
 ) -> Result<T, OutputError> {
@@ -185,7 +185,7 @@ mod tests {
         let token = CancelToken::new();
         token.cancel();
         let classify =
-            |result| write_error_or_canceled(result, |error| OutputError::file("a.png".as_ref(), error));
+            |result| map_write_error(result, |error| OutputError::from_io("a.png".as_ref(), error));
         let stopped = write_all(Vec::new(), b"abc", &token);
         assert!(matches!(classify(stopped), Err(OutputError::Canceled(_))));
         let full = io::Error::from(io::ErrorKind::StorageFull);

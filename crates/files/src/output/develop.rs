@@ -22,7 +22,7 @@ pub struct FilmEncodingSettings {
 
 impl FilmEncodingSettings {
     /// Extracts the image from a film.
-    pub fn quantity_image(&self, film: &Film) -> RadianceImage {
+    pub fn extract_quantity(&self, film: &Film) -> RadianceImage {
         film.image(self.quantity)
     }
 

@@ -87,7 +87,7 @@ impl OutputError {
         Self::Encoder { format, why: why.to_string() }
     }
 
-    pub(super) fn file(path: &Path, source: impl Into<io::Error>) -> Self {
+    pub(super) fn from_io(path: &Path, source: impl Into<io::Error>) -> Self {
         Self::File { path: path.to_owned(), source: source.into() }
     }
 }

@@ -116,10 +116,11 @@ fn write_blocks(
 /// Compresses a block of scan lines as ZIP: applies the predictor and deflates the result. The encoder's own
 /// function uses a higher level, which takes several times as long.
 fn compress_scan_lines(index: BlockIndex, channels: &[Channel<'_>]) -> ::exr::error::Result<Chunk> {
-    let samples = scan_line_bytes(index, channels);
+    let samples = encode_block_scan_lines(index, channels);
     let deflated = Vec::with_capacity(samples.len());
     let mut encoder = ZlibEncoder::new(deflated, Compression::fast());
-    let deflated = encoder.write_all(&predicted_bytes(&samples)).and_then(|()| encoder.finish())?;
+    let deflated =
+        encoder.write_all(&deinterleave_and_delta_encode(&samples)).and_then(|()| encoder.finish())?;
     // A block that does not become smaller is stored uncompressed, which readers recognize by its length.
     let compressed_pixels_le = if deflated.len() < samples.len() { deflated } else { samples };
     let top = i32::try_from(index.pixel_position.y()).map_err(|_| Error::Invalid("image height".into()))?;
@@ -128,7 +129,7 @@ fn compress_scan_lines(index: BlockIndex, channels: &[Channel<'_>]) -> ::exr::er
 }
 
 /// The samples of a block, line by line and channel by channel, as little-endian bytes.
-fn scan_line_bytes(index: BlockIndex, channels: &[Channel<'_>]) -> Vec<u8> {
+fn encode_block_scan_lines(index: BlockIndex, channels: &[Channel<'_>]) -> Vec<u8> {
     let (top, Vec2(width, height)) = (index.pixel_position.y(), index.pixel_size);
     let mut bytes = vec![0; width * height * channels.len() * size_of::<f32>()];
     let lines = (top..top + height).flat_map(|line| channels.iter().map(move |channel| (line, channel)));
@@ -143,7 +144,7 @@ fn scan_line_bytes(index: BlockIndex, channels: &[Channel<'_>]) -> Vec<u8> {
 
 /// Separates the bytes at even positions from those at odd positions, and replaces each byte except the first
 /// with its difference from the previous byte, plus 128.
-fn predicted_bytes(samples: &[u8]) -> Vec<u8> {
+fn deinterleave_and_delta_encode(samples: &[u8]) -> Vec<u8> {
     let mut separated = vec![0; samples.len()];
     let (even, odd) = separated.split_at_mut(samples.len() / 2);
     for ((pair, even), odd) in samples.chunks_exact(2).zip(even).zip(odd) {

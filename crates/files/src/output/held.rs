@@ -129,13 +129,13 @@ impl<'a> FileReplacement<'a> {
 
 /// Fallback for file systems that cannot exchange two names. Moves the old text to the backup name, checks
 /// it, and moves the new text to the file's name if that name is still unused.
-pub(super) struct StepwiseReplacement<'a> {
+pub(super) struct ReplacementWithoutExchange<'a> {
     target: &'a Path,
     held: PathBuf,
     expected: &'a [u8],
 }
 
-impl<'a> StepwiseReplacement<'a> {
+impl<'a> ReplacementWithoutExchange<'a> {
     /// Moves the old text to the backup name.
     ///
     /// # Errors
@@ -187,7 +187,8 @@ pub(super) fn replace_if_unchanged(
         Ok(replacement) => replacement.finish_if_old_text_matches(),
         // The file system cannot exchange names, or the file no longer exists.
         Err((error, Some(new))) if error.kind() != ErrorKind::PermissionDenied => {
-            StepwiseReplacement::move_old_to_backup_path(target, expected)?.place_new_if_old_unchanged(new)
+            ReplacementWithoutExchange::move_old_to_backup_path(target, expected)?
+                .place_new_if_old_unchanged(new)
         }
         Err((error, _)) => Err(error),
     }
@@ -304,12 +305,14 @@ mod tests {
         assert_eq!(fs::read_dir(folder.folder.path()).expect("a folder").count(), 1, "no other files");
         // Repeat with stepwise replacement.
         let scene = folder.scene();
-        let steps = StepwiseReplacement::move_old_to_backup_path(&scene, OLD.as_bytes()).expect("taken");
+        let steps =
+            ReplacementWithoutExchange::move_old_to_backup_path(&scene, OLD.as_bytes()).expect("taken");
         assert!(
             steps.place_new_if_old_unchanged(folder.new_text()).expect("no error").is_none()
                 && folder.has(NEWER)
         );
-        let steps = StepwiseReplacement::move_old_to_backup_path(&scene, NEWER.as_bytes()).expect("taken");
+        let steps =
+            ReplacementWithoutExchange::move_old_to_backup_path(&scene, NEWER.as_bytes()).expect("taken");
         assert!(
             steps.place_new_if_old_unchanged(folder.new_text()).expect("no error").is_some()
                 && folder.has(NEW)
@@ -383,7 +386,7 @@ mod tests {
         let folder = SceneDir::new();
         let scene = folder.scene();
         std::mem::forget(
-            StepwiseReplacement::move_old_to_backup_path(&scene, OLD.as_bytes()).expect("taken"),
+            ReplacementWithoutExchange::move_old_to_backup_path(&scene, OLD.as_bytes()).expect("taken"),
         );
         assert!(!scene.exists());
         assert_eq!(recover_backup(&scene), BackupRecovery::Restored);
@@ -392,12 +395,13 @@ mod tests {
         let link = folder.folder.path().join("link.toml");
         std::os::unix::fs::symlink(&scene, &link).expect("a link");
         std::mem::forget(
-            StepwiseReplacement::move_old_to_backup_path(&scene, OLD.as_bytes()).expect("taken"),
+            ReplacementWithoutExchange::move_old_to_backup_path(&scene, OLD.as_bytes()).expect("taken"),
         );
         assert_eq!(recover_backup(&link), BackupRecovery::Restored);
         assert_eq!(recover_backup(&link), BackupRecovery::None);
         // An editor saves while the old text is at the backup path.
-        let steps = StepwiseReplacement::move_old_to_backup_path(&scene, OLD.as_bytes()).expect("taken");
+        let steps =
+            ReplacementWithoutExchange::move_old_to_backup_path(&scene, OLD.as_bytes()).expect("taken");
         folder.save(NEWER);
         assert!(
             steps.place_new_if_old_unchanged(folder.new_text()).expect("no error").is_none()

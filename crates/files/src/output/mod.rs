@@ -1,6 +1,6 @@
 //! Encodes images and writes files.
 //!
-//! [`check_image_path`] is called before rendering. [`encode`] encodes in memory. [`write::atomic`] writes to
+//! [`check_image_target`] is called before rendering. [`encode`] encodes in memory. [`write::atomic`] writes to
 //! disk and leaves the file either complete or unchanged. Two paths with the same [`FileIdentity`] refer to
 //! the same file.
 
@@ -41,8 +41,8 @@ pub use exr::read_mean_luminance_error;
 pub use format::{AnimationFormat, BitDepth, Format};
 pub use identity::{FallbackFileIdentity, FileIdentity, is_same_file};
 pub use origin::{
-    ReplaceCheck, image_replace_check, json_replace_check, plot_replace_check, scene_name_in_png, sign_plot,
-    table_replace_check,
+    ReplaceCheckResult, check_image_replacement, check_json_replacement, check_plot_replacement,
+    check_table_replacement, scene_name_in_png, sign_plot,
 };
 
 use crate::control::CancelToken;
@@ -129,16 +129,16 @@ pub(crate) fn encode_with_layers(
 /// # Errors
 /// The extension is unknown, the directory does not exist, files cannot be created there, or the target is a
 /// directory or not writable.
-pub fn check_image_path(path: &Path) -> Result<Format, OutputError> {
+pub fn check_image_target(path: &Path) -> Result<Format, OutputError> {
     let format = Format::from_path(path)?;
     resolve_path::check_writable(path)?;
     Ok(format)
 }
 
-/// Like [`check_image_path`], but does not create a file, so it can be called frequently.
+/// Like [`check_image_target`], but does not create a file, so it can be called frequently.
 ///
 /// # Errors
-/// Same as [`check_image_path`], but does not detect directories that reject new files despite their
+/// Same as [`check_image_target`], but does not detect directories that reject new files despite their
 /// permissions.
 pub fn check_image_target_without_writing(path: &Path) -> Result<Format, OutputError> {
     let format = Format::from_path(path)?;
@@ -157,8 +157,8 @@ pub fn check_file_target_without_writing(path: &Path) -> Result<(), OutputError>
 /// Checks in advance whether a file of any type can be written to this path.
 ///
 /// # Errors
-/// Same as [`check_image_path`], but the extension is not checked.
-pub fn check_file_target(path: &Path) -> Result<(), OutputError> {
+/// Same as [`check_image_target`], but the extension is not checked.
+pub fn check_output_path(path: &Path) -> Result<(), OutputError> {
     resolve_path::check_writable(path)
 }
 

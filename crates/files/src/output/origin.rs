@@ -18,7 +18,7 @@ const PLOT_BYTES: u64 = 64 << 20;
 
 /// Result of checking the file that would be replaced.
 #[derive(Debug)]
-pub enum ReplaceCheck {
+pub enum ReplaceCheckResult {
     /// No file, or a file that may be replaced.
     Own,
     /// A file not written by glimt. Contains the type of file that glimt would write, such as "a report".
@@ -27,7 +27,7 @@ pub enum ReplaceCheck {
     Unreadable(io::Error),
 }
 
-impl ReplaceCheck {
+impl ReplaceCheckResult {
     fn from_file(file: Option<io::Result<File>>, kind: &'static str, is_own: impl Fn(File) -> bool) -> Self {
         match file {
             None => Self::Own,
@@ -61,8 +61,8 @@ impl ReplaceCheck {
 }
 
 /// Checks whether an image may be replaced. It must be a PNG with a text chunk that names glimt.
-pub fn image_replace_check(path: &Path) -> ReplaceCheck {
-    ReplaceCheck::from_file(open_existing(path), "an image", is_glimt_png)
+pub fn check_image_replacement(path: &Path) -> ReplaceCheckResult {
+    ReplaceCheckResult::from_file(open_existing(path), "an image", is_glimt_png)
 }
 
 /// Returns the scene named in a PNG file's metadata, or `None` if there is no such file or scene name.
@@ -76,12 +76,12 @@ pub fn scene_name_in_png(path: &Path) -> Option<String> {
 }
 
 /// Checks whether a JSON file may be replaced. It must be empty, or parse as a `T` that `is_own` accepts.
-pub fn json_replace_check<T: DeserializeOwned>(
+pub fn check_json_replacement<T: DeserializeOwned>(
     path: &Path,
     kind: &'static str,
     is_own: impl Fn(&T) -> bool,
-) -> ReplaceCheck {
-    ReplaceCheck::from_text_file(path, kind, |file| {
+) -> ReplaceCheckResult {
+    ReplaceCheckResult::from_text_file(path, kind, |file| {
         let mut reader = BufReader::new(file);
         // Avoid reading a large file in another format completely.
         let is_object = reader.fill_buf().is_ok_and(|start| start.trim_ascii_start().starts_with(b"{"));
@@ -91,8 +91,8 @@ pub fn json_replace_check<T: DeserializeOwned>(
 
 /// Checks whether a table may be replaced. It must be empty, or start with `first_line`, including the line
 /// end.
-pub fn table_replace_check(path: &Path, first_line: &str) -> ReplaceCheck {
-    ReplaceCheck::from_text_file(path, "a table", |file| {
+pub fn check_table_replacement(path: &Path, first_line: &str) -> ReplaceCheckResult {
+    ReplaceCheckResult::from_text_file(path, "a table", |file| {
         let mut start = Vec::new();
         let is_read = file.take(first_line.len() as u64).read_to_end(&mut start).is_ok();
         is_read && start == first_line.as_bytes()
@@ -101,8 +101,8 @@ pub fn table_replace_check(path: &Path, first_line: &str) -> ReplaceCheck {
 
 /// Checks whether a plot may be replaced. It must be empty, or contain `texts` and the signature that
 /// [`sign_plot`] adds. Plots from older versions, which have no signature, are also accepted.
-pub fn plot_replace_check(path: &Path, texts: &[&str]) -> ReplaceCheck {
-    ReplaceCheck::from_text_file(path, "a plot", |file| is_glimt_plot(file, texts))
+pub fn check_plot_replacement(path: &Path, texts: &[&str]) -> ReplaceCheckResult {
+    ReplaceCheckResult::from_text_file(path, "a plot", |file| is_glimt_plot(file, texts))
 }
 
 /// Start of the signature, which follows the first tag in an SVG file.
@@ -163,13 +163,13 @@ mod tests {
     fn unreadable_files_are_not_foreign() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("a.png");
-        assert!(matches!(image_replace_check(&path), ReplaceCheck::Own), "no file");
+        assert!(matches!(check_image_replacement(&path), ReplaceCheckResult::Own), "no file");
         std::fs::write(&path, "an image").expect("written");
-        assert!(matches!(image_replace_check(&path), ReplaceCheck::Foreign("an image")));
+        assert!(matches!(check_image_replacement(&path), ReplaceCheckResult::Foreign("an image")));
         let denied = || Some(Err(io::Error::from(io::ErrorKind::PermissionDenied)));
-        let replaced = ReplaceCheck::from_file(denied(), "an image", |_| true);
+        let replaced = ReplaceCheckResult::from_file(denied(), "an image", |_| true);
         assert!(
-            matches!(replaced, ReplaceCheck::Unreadable(why) if why.kind() == io::ErrorKind::PermissionDenied)
+            matches!(replaced, ReplaceCheckResult::Unreadable(why) if why.kind() == io::ErrorKind::PermissionDenied)
         );
     }
 
@@ -177,10 +177,15 @@ mod tests {
     fn unreadable_files_are_reported_with_the_reason() {
         for errno in [nix::libc::EACCES, nix::libc::EMFILE] {
             let error = || io::Error::from_raw_os_error(errno);
-            let reason = ReplaceCheck::Unreadable(error()).reason_to_keep().expect("it is kept");
+            let reason = ReplaceCheckResult::Unreadable(error()).reason_to_keep().expect("it is kept");
             assert!(reason.ends_with(&crate::system::describe_error(&error())), "{reason}");
         }
-        assert!(ReplaceCheck::Foreign("a report").reason_to_keep().expect("it is kept").contains("a report"));
-        assert_eq!(ReplaceCheck::Own.reason_to_keep(), None);
+        assert!(
+            ReplaceCheckResult::Foreign("a report")
+                .reason_to_keep()
+                .expect("it is kept")
+                .contains("a report")
+        );
+        assert_eq!(ReplaceCheckResult::Own.reason_to_keep(), None);
     }
 }

@@ -85,7 +85,7 @@ mod tests {
 
     use rustix::fs::{IFlags, ioctl_getflags, ioctl_setflags};
 
-    use super::super::{check_image_path, write};
+    use super::super::{check_image_target, write};
 
     /// A file or directory with a flag. The flag is cleared when this value is dropped.
     struct Flagged(PathBuf);
@@ -115,7 +115,7 @@ mod tests {
     }
 
     fn refused(path: &std::path::Path) -> String {
-        let before = check_image_path(path).expect_err("refused before rendering").to_string();
+        let before = check_image_target(path).expect_err("refused before rendering").to_string();
         let after = write::atomic(path, b"new").expect_err("refused when writing").to_string();
         assert_eq!(before, after);
         after

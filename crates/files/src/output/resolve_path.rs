@@ -45,7 +45,7 @@ pub(super) fn resolve_writable(path: &Path) -> Result<WriteTarget, OutputError> 
     if path.file_name().is_none() || path.as_os_str().as_bytes().ends_with(b"/") {
         return Err(target_is_directory_error(path));
     }
-    match follow_links(path).map_err(|error| OutputError::file(path, error))? {
+    match follow_links(path).map_err(|error| OutputError::from_io(path, error))? {
         (target, None) => checked_target_for_new_file(path, target),
         (_, Some(metadata)) if metadata.is_symlink() => Ok(WriteTarget::InPlace(path.to_owned())),
         (target, Some(metadata)) => checked_target_for_existing(path, target, metadata),
@@ -64,7 +64,7 @@ pub(super) fn check_writable(path: &Path) -> Result<(), OutputError> {
                     why: format!("files cannot be created in the directory {}", directory.display()),
                     advice: "choose another location",
                 },
-                _ => OutputError::file(path, error),
+                _ => OutputError::from_io(path, error),
             })
         }
         WriteTarget::InPlace(_) => Ok(()),
@@ -137,13 +137,13 @@ fn check_directory_is_writable(path: &Path, directory: &Path) -> Result<Metadata
             check_access(path, directory, AccessFlags::W_OK | AccessFlags::X_OK)?;
             Ok(metadata)
         }
-        Ok(_) => Err(OutputError::file(path, io::Error::from(Errno::ENOTDIR))),
+        Ok(_) => Err(OutputError::from_io(path, io::Error::from(Errno::ENOTDIR))),
         Err(error) if error.kind() == ErrorKind::NotFound => Err(OutputError::Target {
             path: path.to_owned(),
             why: format!("the directory {} does not exist", directory.display()),
             advice: "create it or choose another location",
         }),
-        Err(error) => Err(OutputError::file(path, error)),
+        Err(error) => Err(OutputError::from_io(path, error)),
     }
 }
 
@@ -156,7 +156,7 @@ fn check_no_protection_flag(path: &Path, name: &str, what: &Path) -> Result<(), 
 }
 
 fn check_access(path: &Path, what: &Path, how: AccessFlags) -> Result<(), OutputError> {
-    access(what, how).map_err(|errno| OutputError::file(path, errno))
+    access(what, how).map_err(|errno| OutputError::from_io(path, errno))
 }
 
 fn target_is_directory_error(path: &Path) -> OutputError {

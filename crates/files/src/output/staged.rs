@@ -27,7 +27,7 @@ pub fn create_files_atomically(
     super::write::ignore_file_size_signal();
     let at = |name: &Path| {
         let path = folder.join(name);
-        move |error: io::Error| OutputError::file(&path, error)
+        move |error: io::Error| OutputError::from_io(&path, error)
     };
     let Some((last, _)) = files.last() else { return Ok(()) };
     // Write all files to the hidden folder.
@@ -35,7 +35,7 @@ pub fn create_files_atomically(
     remove_stale_folders(here);
     let hidden = StagingFolder::create(here, last.as_os_str()).map_err(at(last))?;
     for (name, bytes) in files {
-        cancelable::write_error_or_canceled(hidden.write(name, bytes, token), at(name))?;
+        cancelable::map_write_error(hidden.write(name, bytes, token), at(name))?;
     }
     // Move the files to their destinations. If a destination exists, undo all moves.
     let mut placed: Vec<&OsStr> = Vec::new();

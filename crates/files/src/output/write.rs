@@ -77,7 +77,7 @@ pub struct SweptFolders(RefCell<HashSet<PathBuf>>);
 
 impl SweptFolders {
     /// Returns true if the folder has not been searched yet, and marks it as searched.
-    fn mark_searched(&self, folder: &Path) -> bool {
+    fn mark_if_unsearched(&self, folder: &Path) -> bool {
         let mut searched = self.0.borrow_mut();
         !searched.contains(folder) && searched.insert(folder.to_owned())
     }
@@ -152,7 +152,7 @@ pub(super) fn write_atomically_or_in_place(
     sync: &dyn Fn(&Path) -> io::Result<()>,
 ) -> Result<Option<File>, OutputError> {
     ignore_file_size_signal();
-    let named = |error| OutputError::file(path, error);
+    let named = |error| OutputError::from_io(path, error);
     match resolve_path::resolve_writable(path)? {
         WriteTarget::File(target) => {
             let (new, carried) = create_temporary(&target, guard).map_err(named)?;
@@ -166,7 +166,7 @@ pub(super) fn write_atomically_or_in_place(
                 });
             }
             let written = write_content_and_mode(&new, content, carried.as_ref(), durability);
-            cancelable::write_error_or_canceled(written, named)?;
+            cancelable::map_write_error(written, named)?;
             (guard.may_replace)(&target.path)?;
             let file = match expected {
                 None => new.rename_to(&target.path).map_err(named)?,
@@ -197,8 +197,8 @@ pub(super) fn write_atomically_or_in_place(
         WriteTarget::InPlace(device) => {
             (guard.may_replace)(&device)?;
             let mut bytes = Vec::new();
-            cancelable::write_error_or_canceled(content(&mut bytes), named)?;
-            cancelable::write_error_or_canceled(append_in_place(&device, &bytes, token), named)?;
+            cancelable::map_write_error(content(&mut bytes), named)?;
+            cancelable::map_write_error(append_in_place(&device, &bytes, token), named)?;
             Ok(None)
         }
     }
@@ -223,7 +223,7 @@ fn create_temporary(
     guard: &ExistingFilePolicy<'_>,
 ) -> io::Result<(TemporaryFile, Option<UncopiedAttributes>)> {
     let directory = target.directory();
-    if guard.sweep.is_none_or(|sweep| sweep.mark_searched(directory)) {
+    if guard.sweep.is_none_or(|sweep| sweep.mark_if_unsearched(directory)) {
         temporary::remove_stale_files(directory, guard.is_kept);
     }
     let mode = if target.existing.is_some() { 0o600 } else { 0o666 };

@@ -1,6 +1,6 @@
 //! Oriented boxes in double precision.
 
-use super::packet::{F32x16, HitPacket, RayPacket, round_in_range_or_nan};
+use super::packet::{F32x16, HitPacket, RayPacket, round_t_to_f32_or_nan};
 use super::surface::tangents_from_normal;
 use super::surface_packet::{SurfaceF64, SurfacePointF64};
 use super::{Aabb, RayF64, ShapeHit, SurfacePoint, SurfaceSample};
@@ -81,7 +81,7 @@ impl OrientedBox {
                 far_face = if is_sooner { face + positive } else { far_face };
             }
             let is_hit = !misses_slab & (near <= far);
-            let (enter, leave) = (round_in_range_or_nan(near, end), round_in_range_or_nan(far, end));
+            let (enter, leave) = (round_t_to_f32_or_nan(near, end), round_t_to_f32_or_nan(far, end));
             let is_inside = enter.is_nan();
             let t = if is_inside { leave } else { enter };
             hits.t[lane] = if is_hit { t } else { f32::NAN };

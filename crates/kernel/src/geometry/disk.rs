@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use super::local_geometry::{FlatOrRoundExtent, LocalGeometry, NearestSurface};
-use super::packet::{F32x16, HitPacket, RayPacket, round_in_range_or_nan};
+use super::packet::{F32x16, HitPacket, RayPacket, round_t_to_f32_or_nan};
 use super::surface_of_revolution::{AxialFrame, to_shape_hit, unrounded_t};
 use super::surface_packet::{SurfaceF64, SurfacePointF64};
 use super::{Aabb, RayF64, ShapeHit, SurfacePoint, SurfaceSample};
@@ -48,7 +48,7 @@ impl Disk {
             let line = self.frame.line_to_local(&rays.ray_f64(lane));
             let along = -line.foot.z / line.direction.z;
             let across = (line.foot + line.direction * along).truncate().length();
-            let t = round_in_range_or_nan(line.start + along, end);
+            let t = round_t_to_f32_or_nan(line.start + along, end);
             hits.t[lane] = if across <= radius { t } else { f32::NAN };
         }
     }

@@ -324,7 +324,7 @@ impl Shape {
     /// Curvature of the meridian through a point on a curved part, and unit tangents along the meridian and
     /// around the axis, which are the principal directions. Returns `None` for all shapes except spheres,
     /// cylinders, cones and tori.
-    fn meridian_curvature_and_directions(&self, point: DVec3) -> Option<(f64, [DVec3; 2])> {
+    fn meridian_curvature_and_tangents(&self, point: DVec3) -> Option<(f64, [DVec3; 2])> {
         match self {
             Self::Sphere(sphere) => {
                 let (a, b) = (point - sphere.center).normalize_or(DVec3::Y).any_orthonormal_pair();

@@ -151,13 +151,13 @@ impl HitPacket {
 
 /// Branchless version of [`RayF64::round_t_if_in_range`] that returns NaN for `None`.
 #[inline(always)]
-pub(super) fn round_in_range_or_nan(t: f64, end: f32) -> f32 {
+pub(super) fn round_t_to_f32_or_nan(t: f64, end: f32) -> f32 {
     let single = t as f32;
     let is_on_it = (single > 0.0) & (single < f32::INFINITY) & (single <= end);
     if is_on_it { single } else { f32::NAN }
 }
 
-/// Whether [`round_in_range_or_nan`] may accept the quotient `above / along`. If not, the division can be
+/// Whether [`round_t_to_f32_or_nan`] may accept the quotient `above / along`. If not, the division can be
 /// skipped. The factor is larger than the relative error of rounding the quotient to `f32`. The added
 /// constants handle numbers that are too small for the factor.
 #[inline(always)]

@@ -1,7 +1,7 @@
 //! Quads (squares and other parallelograms) in double precision.
 
 use super::packet::{
-    F32x16, HitPacket, PACKET_SIZE, RayPacket, can_quotient_be_in_range, round_in_range_or_nan,
+    F32x16, HitPacket, PACKET_SIZE, RayPacket, can_quotient_be_in_range, round_t_to_f32_or_nan,
 };
 use super::surface_packet::{SurfaceF64, SurfacePointF64, UvMapped};
 use super::{Aabb, RayF64, ShapeHit, SurfacePoint, SurfaceSample};
@@ -74,7 +74,7 @@ impl Parallelogram {
             let from_corner = ray.direction * t - (self.corner - ray.origin);
             let (s, r) = (from_corner.dot(self.dual_u), from_corner.dot(self.dual_v));
             let is_inside = is_in_unit_interval_with_margin(s) & is_in_unit_interval_with_margin(r);
-            let accepted = round_in_range_or_nan(t, ends[lane]);
+            let accepted = round_t_to_f32_or_nan(t, ends[lane]);
             hits.t[lane] = if is_inside { accepted } else { f32::NAN };
         }
     }

@@ -2,7 +2,7 @@
 
 use super::local_geometry::{FlatOrRoundExtent, LocalGeometry, NearestSurface};
 use super::packet::{
-    F32x16, HitPacket, PACKET_SIZE, RayPacket, can_quotient_be_in_range, round_in_range_or_nan,
+    F32x16, HitPacket, PACKET_SIZE, RayPacket, can_quotient_be_in_range, round_t_to_f32_or_nan,
 };
 use super::surface::tangents_from_normal;
 use super::surface_packet::{SurfaceF64, SurfacePointF64, UvMapped};
@@ -51,7 +51,7 @@ impl Plane {
         }
         for lane in 0..PACKET_SIZE {
             let t = above[lane] / along[lane];
-            let accepted = round_in_range_or_nan(t, ends[lane]);
+            let accepted = round_t_to_f32_or_nan(t, ends[lane]);
             hits.t[lane] = if t < f64::from(f32::MAX) { accepted } else { f32::NAN };
         }
     }

@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use super::local_geometry::{FlatOrRoundExtent, LocalGeometry, NearestSurface};
-use super::packet::{F32x16, HitPacket, PACKET_SIZE, RayPacket, round_in_range_or_nan};
+use super::packet::{F32x16, HitPacket, PACKET_SIZE, RayPacket, round_t_to_f32_or_nan};
 use super::surface_packet::{SurfaceF64, SurfacePointF64};
 use super::{Aabb, RayF64, ShapeHit, SurfacePoint, SurfaceSample};
 use crate::math::lanes::{Simd, TRUE};
@@ -65,8 +65,8 @@ impl Sphere {
             let q = b + (a * discriminants[lane]).sqrt().copysign(b);
             let (t0, t1) = (c / q, q / a);
             let is_in_order = t0 < t1;
-            let near = round_in_range_or_nan(if is_in_order { t0 } else { t1 }, ends[lane]);
-            let far = round_in_range_or_nan(if is_in_order { t1 } else { t0 }, ends[lane]);
+            let near = round_t_to_f32_or_nan(if is_in_order { t0 } else { t1 }, ends[lane]);
+            let far = round_t_to_f32_or_nan(if is_in_order { t1 } else { t0 }, ends[lane]);
             let t = if near.is_nan() { far } else { near };
             hits.t[lane] = if discriminants[lane] >= 0.0 { t } else { f32::NAN };
         }

@@ -146,7 +146,7 @@ impl TransformedShape {
         let local = self.to_world.inverse_point(point);
         let mean = self.shape.mean_curvature(part, local);
         let Some((bend, tangents)) =
-            self.shape.meridian_curvature_and_directions(local).filter(|_| mean != 0.0)
+            self.shape.meridian_curvature_and_tangents(local).filter(|_| mean != 0.0)
         else {
             return 0.0;
         };

@@ -1,6 +1,6 @@
 //! Single triangles in double precision.
 
-use super::packet::{F32x16, HitPacket, RayPacket, round_in_range_or_nan};
+use super::packet::{F32x16, HitPacket, RayPacket, round_t_to_f32_or_nan};
 use super::surface_packet::{SurfaceF64, SurfacePointF64};
 use super::{Aabb, RayF64, ShapeHit, SurfacePoint, SurfaceSample};
 use crate::math::{DVec2, DVec3, Vec2};
@@ -50,7 +50,7 @@ impl Triangle {
             let is_right = (wa > 0.0) | (wb > 0.0) | (wc > 0.0);
             let sum = wa + wb + wc;
             let normal = (b - a).cross(c - a);
-            let t = round_in_range_or_nan(normal.dot(a) / normal.dot(d), end);
+            let t = round_t_to_f32_or_nan(normal.dot(a) / normal.dot(d), end);
             let is_hit = !(is_left & is_right) & (sum != 0.0);
             hits.t[lane] = if is_hit { t } else { f32::NAN };
             hits.u[lane] = (wb / sum) as f32;

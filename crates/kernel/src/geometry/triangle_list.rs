@@ -172,7 +172,7 @@ impl TriangleList {
     ) -> u32 {
         let candidates = self.find_nearest_candidates(rays, ends, &[NONE; PACKET_SIZE], simd);
         let NearestCandidateTestResults { hit, undecided, hits } =
-            self.test_candidates(rays, &candidates, (active, ends), simd);
+            self.test_nearest_candidates(rays, &candidates, (active, ends), simd);
         select(&hit, &hits.t, &mut found.t);
         select(&hit, &hits.u, &mut found.u);
         select(&hit, &hits.v, &mut found.v);
@@ -199,7 +199,7 @@ impl TriangleList {
             return [0; 2];
         }
         let NearestCandidateTestResults { hit, undecided, .. } =
-            self.test_candidates(rays, &candidates, (active, ends), simd);
+            self.test_nearest_candidates(rays, &candidates, (active, ends), simd);
         [simd.movemask(&hit) & active, undecided]
     }
 
@@ -292,7 +292,7 @@ impl TriangleList {
 
     /// Tests each ray against its nearest candidate.
     #[inline(always)]
-    fn test_candidates(
+    fn test_nearest_candidates(
         &self,
         rays: &RayPacket,
         candidates: &NearestCandidates,

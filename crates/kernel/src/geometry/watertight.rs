@@ -88,7 +88,7 @@ impl ShearedRay {
         }
         let inverse = 1.0 / determinant;
         let t = (wa * az + wb * bz + wc * cz) * self.shear.z * inverse;
-        let (error, reach) = self.distance_error_and_max_t(&sheared, inverse);
+        let (error, reach) = self.distance_error_and_corner_max_t(&sheared, inverse);
         if error > reach * ILL_CONDITIONED {
             return self.intersect_needle(corners, t_max);
         }
@@ -151,7 +151,7 @@ impl ShearedRay {
     /// Bound on the absolute error of t, and the largest t among the corners. The errors of sheared x and y
     /// are lengths, while the error of z is in units of t. The units differ unless the direction has unit
     /// length.
-    fn distance_error_and_max_t(
+    fn distance_error_and_corner_max_t(
         &self,
         corners: &[(f32, f32, f32); 3],
         inverse_determinant: f32,

@@ -139,7 +139,7 @@ impl<'a> ShearedPacket<'a> {
             let inverse = 1.0 / (wa + wb + wc);
             let shear_z = self.shear[2][i];
             let t = (wa * az + wb * bz + wc * cz) * shear_z * inverse;
-            // Compute the error bound as in `ShearedRay::distance_error_and_max_t`.
+            // Compute the error bound as in `ShearedRay::distance_error_and_corner_max_t`.
             let first = max_abs_of_three([ax, bx, cx]);
             let second = max_abs_of_three([ay, by, cy]);
             let depth = max_abs_of_three([az, bz, cz]);

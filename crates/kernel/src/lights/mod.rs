@@ -45,16 +45,15 @@ mod set;
 pub mod tree;
 
 pub use area::{
-    AreaLight, BlendWeight, EmissionModulation, EmissionTerm, Emitter, EmittingPart,
-    MeshEmitter, Side, TriangleWithUvs, UvMapping, back_area_light, front_area_light,
-    see_through_shape_side_light,
+    AreaLight, BlendWeight, EmissionModulation, EmissionTerm, Emitter, EmittingPart, MeshEmitter, Side,
+    TriangleWithUvs, UvMapping, back_area_light, front_area_light, see_through_shape_side_light,
 };
 pub use light::{Light, LightFamily};
-pub use packet::{LightGeometryPacket, LightSamplePacket};
+pub use packet::{LightSamplePacket, LightSceneGeometryPacket};
 pub use photon_emission::{
     BoundingSphere, EmissiveObjectGeometry, EmittedPhoton, PhotonEmitter, PhotonOrigin, PhotonRandomNumbers,
 };
-pub use sample::{LightCenter, LightGeometry, LightHit, LightSample, ShadowRayEnd};
+pub use sample::{LightCenter, LightHit, LightSample, LightSceneGeometry, ShadowRayEnd};
 pub use set::{ExpectedSamplesPerLight, LightSampler, LightSamplingEffort, LightSamplingPurpose, Lights};
 pub use tree::{
     AdaptiveLightTreeCut, LightBounds, LightPick, LightTree, Receiver, ReceiverLobe, ReceiverPacket,

@@ -1,6 +1,6 @@
 //! Samples one light for a packet of points.
 
-use super::sample::{LightGeometry, LightSample, ShadowRayEnd};
+use super::sample::{LightSample, LightSceneGeometry, ShadowRayEnd};
 use crate::math::Vec3;
 use crate::math::lanes::{F32x16, PACKET_SIZE, Vec3x16, lane, mask_from_bits, select, select_u32, set_lane};
 
@@ -15,35 +15,35 @@ pub struct LightSamplePacket {
     /// [`LightSample::weight`], or 0 for black samples.
     pub weights: Vec3x16,
     /// Geometry that the shadow rays ignore.
-    pub sources: LightGeometryPacket,
+    pub sources: LightSceneGeometryPacket,
     /// Mask of samples at infinity.
     pub beyond: u32,
     /// Inverse pdfs in sr, set only for environments. For other lights, they are computed on request.
     pub(super) environment_inverse_pdfs: F32x16,
 }
 
-/// A packet of [`LightGeometry`]s.
+/// A packet of [`LightSceneGeometry`]s.
 #[derive(Clone, Debug)]
 #[repr(align(64))]
-pub struct LightGeometryPacket {
-    /// Object index, or [`LightGeometryPacket::NONE`] if there is no geometry.
+pub struct LightSceneGeometryPacket {
+    /// Object index, or [`LightSceneGeometryPacket::NONE`] if there is no geometry.
     pub object: [u32; PACKET_SIZE],
-    /// Primitive index, or [`LightGeometryPacket::NONE`] for the entire object.
+    /// Primitive index, or [`LightSceneGeometryPacket::NONE`] for the entire object.
     pub part: [u32; PACKET_SIZE],
     /// Whether any lane has an object.
     pub is_any: bool,
 }
 
-impl LightGeometryPacket {
+impl LightSceneGeometryPacket {
     /// Marks a lane that has no object, or a lane that refers to an entire object.
     pub const NONE: u32 = u32::MAX;
 
-    /// Marks a [`LightGeometry::SeeThrough`] lane. No primitive has this index.
+    /// Marks a [`LightSceneGeometry::SeeThrough`] lane. No primitive has this index.
     const SEE_THROUGH: u32 = u32::MAX - 1;
 
     /// A packet with the same source in all lanes.
     #[inline(always)]
-    pub fn splat(source: LightGeometry) -> Self {
+    pub fn splat(source: LightSceneGeometry) -> Self {
         let (object, part) = object_and_part_codes(source);
         Self { object: [object; PACKET_SIZE], part: [part; PACKET_SIZE], is_any: object != Self::NONE }
     }
@@ -57,30 +57,30 @@ impl LightGeometryPacket {
 
     /// Returns a lane's light source geometry.
     #[inline]
-    pub fn geometry(&self, lane: usize) -> LightGeometry {
+    pub fn geometry(&self, lane: usize) -> LightSceneGeometry {
         match (self.object[lane], self.part[lane]) {
-            (Self::NONE, _) => LightGeometry::Nothing,
-            (object, Self::NONE) => LightGeometry::Object(object),
-            (object, Self::SEE_THROUGH) => LightGeometry::SeeThrough(object),
-            (object, part) => LightGeometry::Primitive(object, part),
+            (Self::NONE, _) => LightSceneGeometry::Nothing,
+            (object, Self::NONE) => LightSceneGeometry::Object(object),
+            (object, Self::SEE_THROUGH) => LightSceneGeometry::SeeThrough(object),
+            (object, part) => LightSceneGeometry::Primitive(object, part),
         }
     }
 
     /// Sets a lane's light source geometry.
     #[inline(always)]
-    pub fn set_geometry(&mut self, lane: usize, source: LightGeometry) {
+    pub fn set_geometry(&mut self, lane: usize, source: LightSceneGeometry) {
         (self.object[lane], self.part[lane]) = object_and_part_codes(source);
         self.is_any |= self.object[lane] != Self::NONE;
     }
 }
 
 #[inline(always)]
-fn object_and_part_codes(source: LightGeometry) -> (u32, u32) {
+fn object_and_part_codes(source: LightSceneGeometry) -> (u32, u32) {
     match source {
-        LightGeometry::Nothing => (LightGeometryPacket::NONE, LightGeometryPacket::NONE),
-        LightGeometry::Object(object) => (object, LightGeometryPacket::NONE),
-        LightGeometry::SeeThrough(object) => (object, LightGeometryPacket::SEE_THROUGH),
-        LightGeometry::Primitive(object, part) => (object, part),
+        LightSceneGeometry::Nothing => (LightSceneGeometryPacket::NONE, LightSceneGeometryPacket::NONE),
+        LightSceneGeometry::Object(object) => (object, LightSceneGeometryPacket::NONE),
+        LightSceneGeometry::SeeThrough(object) => (object, LightSceneGeometryPacket::SEE_THROUGH),
+        LightSceneGeometry::Primitive(object, part) => (object, part),
     }
 }
 
@@ -105,7 +105,7 @@ pub(super) use packet_of;
 /// [`packet_of`] for lights at infinity.
 macro_rules! infinite_packet_of {
     ($i:ident => $sample:expr) => {{
-        let row = $crate::lights::packet::packet_of!($crate::lights::sample::LightGeometry::Nothing, $i => {
+        let row = $crate::lights::packet::packet_of!($crate::lights::sample::LightSceneGeometry::Nothing, $i => {
             let (direction, weight) = $sample;
             (direction, $crate::math::Vec3::ZERO, weight)
         });
@@ -132,12 +132,12 @@ impl LightSamplePacket {
     }
 
     #[inline(always)]
-    pub(super) fn black(source: LightGeometry) -> Self {
+    pub(super) fn black(source: LightSceneGeometry) -> Self {
         Self {
             directions: [[0.0; PACKET_SIZE]; 3],
             targets: [[0.0; PACKET_SIZE]; 3],
             weights: [[0.0; PACKET_SIZE]; 3],
-            sources: LightGeometryPacket::splat(source),
+            sources: LightSceneGeometryPacket::splat(source),
             beyond: 0,
             environment_inverse_pdfs: [0.0; PACKET_SIZE],
         }
@@ -159,7 +159,7 @@ impl LightSamplePacket {
         used: u32,
         sample: impl Fn(usize, Vec3) -> Option<LightSample>,
     ) -> Self {
-        let mut row = Self::black(LightGeometry::Nothing);
+        let mut row = Self::black(LightSceneGeometry::Nothing);
         for i in (0..PACKET_SIZE).filter(|i| used & 1 << i != 0) {
             if let Some(sample) = sample(i, lane(points, i)) {
                 row.set_sample(i, &sample);

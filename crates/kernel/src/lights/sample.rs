@@ -13,7 +13,7 @@ pub struct LightSample {
     /// incidence. The contribution is the weight times the BSDF and the cosine.
     pub weight: Vec3,
     /// The light's own geometry, which the shadow ray ignores.
-    pub source: LightGeometry,
+    pub source: LightSceneGeometry,
 }
 
 /// End of a shadow ray.
@@ -36,7 +36,7 @@ pub enum LightCenter {
 
 /// The scene geometry that belongs to a light.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum LightGeometry {
+pub enum LightSceneGeometry {
     /// No geometry.
     Nothing,
     /// A convex object. It does not block rays to its near side.
@@ -63,7 +63,7 @@ pub struct LightHit {
 impl LightHit {
     /// Solid-angle pdf in sr⁻¹ of points sampled uniformly over an area, or 0 if the light is seen from
     /// behind.
-    pub(super) fn uniform_area_pdf(&self, area: f64) -> f32 {
+    pub(super) fn uniform_area_solid_angle_pdf(&self, area: f64) -> f32 {
         let cosine = -self.normal.dot(self.direction);
         if cosine > 0.0 { self.distance * self.distance / (area as f32 * cosine) } else { 0.0 }
     }

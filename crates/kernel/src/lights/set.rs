@@ -68,7 +68,7 @@ impl LightSamplingEffort {
 
     /// Creates a cut through a tree for this effort.
     #[inline(always)]
-    pub fn new_tree_cut(self, tree: &LightTree) -> AdaptiveLightTreeCut<'_> {
+    pub fn adaptive_tree_cut(self, tree: &LightTree) -> AdaptiveLightTreeCut<'_> {
         AdaptiveLightTreeCut::new(tree, self.nodes)
     }
 }
@@ -164,7 +164,7 @@ impl Lights {
         let Some(sampler) = self.sampler_for_purpose(receivers) else {
             return ExpectedSamplesPerLight(None);
         };
-        let mut cut = sampler.picks.new_tree_cut(sampler.tree);
+        let mut cut = sampler.picks.adaptive_tree_cut(sampler.tree);
         cut.adapt_to_receiver(&Receiver::with_unknown_lobe(point, normal));
         ExpectedSamplesPerLight(Some((sampler, cut)))
     }

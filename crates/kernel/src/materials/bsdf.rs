@@ -158,16 +158,16 @@ pub trait BxdfMaterial {
     fn look_up_parameters<'m>(&'m self, lookup: &mut impl ParameterLookup<'m>) -> Self::Point;
 
     /// The material's main color.
-    fn albedo<'m>(&'m self, lookup: &mut impl ParameterLookup<'m>) -> Vec3;
+    fn main_color<'m>(&'m self, lookup: &mut impl ParameterLookup<'m>) -> Vec3;
 
     /// Reflectance for ambient light.
-    fn ambient<'m>(&'m self, _lookup: &mut impl ParameterLookup<'m>) -> Vec3 {
+    fn look_up_ambient_reflectance<'m>(&'m self, _lookup: &mut impl ParameterLookup<'m>) -> Vec3 {
         Vec3::ZERO
     }
 
     /// The color that can be looked up for packets and set with
-    /// [`Bxdf::set_color`](super::bxdf::Bxdf::set_color), or `None` if there is no such color.
-    fn color_for_packet_lookup(&self) -> Option<&ColorOrTexture> {
+    /// [`Bxdf::set_looked_up_color`](super::bxdf::Bxdf::set_looked_up_color), or `None` if there is no such color.
+    fn color_to_look_up(&self) -> Option<&ColorOrTexture> {
         None
     }
 
@@ -197,7 +197,7 @@ pub trait BxdfParameters {
     /// Reflectances of the wide and the narrow lobes for light that a coat reflects back down. 0 neglects
     /// this light.
     #[inline(always)]
-    fn reflectances_under_coat(&self) -> [Vec3; 2] {
+    fn lobe_reflectances_under_coat(&self) -> [Vec3; 2] {
         [Vec3::ZERO; 2]
     }
 }

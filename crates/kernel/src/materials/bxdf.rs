@@ -84,7 +84,7 @@ pub struct ShadingGeometry {
 
 /// Lobes from which a direction is sampled.
 #[derive(Clone, Copy, Debug)]
-pub struct SampledLobes {
+pub struct LobesWithNormal {
     /// The lobes.
     pub lobes: LobesToSample,
     /// The unit normal of cosine lobes.
@@ -100,7 +100,7 @@ pub trait Bxdf: Soa + Default {
     type View: Soa + Default;
 
     /// Whether shading normals are rotated to face the viewer. See
-    /// [`ensure_normal_faces_viewer_branchless`](super::microfacet::ensure_normal_faces_viewer_branchless).
+    /// [`tilt_to_face_viewer_branchless`](super::microfacet::tilt_to_face_viewer_branchless).
     const TURNS_NORMALS: bool = true;
 
     /// Whether the BSDF is for light from behind the surface.
@@ -131,10 +131,10 @@ pub trait Bxdf: Soa + Default {
     fn new(point: &Self::Point, tangent: Vec3) -> Self;
 
     /// Replaces the color that
-    /// [`BxdfMaterial::color_for_packet_lookup`](super::bsdf::BxdfMaterial::color_for_packet_lookup) returns.
+    /// [`BxdfMaterial::color_to_look_up`](super::bsdf::BxdfMaterial::color_to_look_up) returns.
     /// Not called for materials without such a color.
     #[inline(always)]
-    fn set_color(&mut self, _point: &Self::Point, _color: Vec3) {}
+    fn set_looked_up_color(&mut self, _point: &Self::Point, _color: Vec3) {}
 
     /// Properties of the BSDF, in addition to [`Bxdf::ALWAYS`].
     fn flags(&self) -> BxdfFlags;
@@ -160,11 +160,11 @@ pub trait Bxdf: Soa + Default {
 
     /// Pdf in sr⁻¹ of a direction sampled from these lobes. `shape` is the narrow lobes'
     /// [`LobeValue::shape`].
-    fn pdf(&self, view: &Self::View, from: SampledLobes, wi: Vec3, shape: f32, any: BxdfFlags) -> f32;
+    fn pdf(&self, view: &Self::View, from: LobesWithNormal, wi: Vec3, shape: f32, any: BxdfFlags) -> f32;
 
     /// Samples a unit direction from these lobes. The first random number selects the lobe, and the others
     /// select the direction within it. All are in [0, 1).
-    fn sample(&self, view: &Self::View, from: SampledLobes, random: [f32; 3], any: BxdfFlags) -> Vec3;
+    fn sample(&self, view: &Self::View, from: LobesWithNormal, random: [f32; 3], any: BxdfFlags) -> Vec3;
 
     /// Probability that sampling all lobes chooses a narrow lobe.
     #[inline(always)]
@@ -204,7 +204,7 @@ pub(super) fn choose_vec3_by_bool(condition: bool, yes: Vec3, no: Vec3) -> Vec3 
 /// Computes the lobes' shading normal from a normal on the lit side and the direction to the viewer.
 #[inline(always)]
 pub fn lobe_shading_normal<B: Bxdf>(normal: Vec3, wo: Vec3) -> Vec3 {
-    use super::microfacet::ensure_normal_faces_viewer as turn;
+    use super::microfacet::tilt_to_face_viewer as turn;
     match (B::TURNS_NORMALS, B::IS_TRANSMISSION) {
         (false, _) => normal,
         (true, false) => turn(normal, wo),

@@ -1,8 +1,8 @@
 //! Packets of 16 non-specular BSDFs of the same kind. All functions must be called inside a SIMD kernel.
 
 use super::bsdf::{BsdfValues, DielectricSamplePacket, LobesToSample, NarrowLobe, ShownLobes, UvPacket};
-use super::bxdf::{Bxdf, BxdfFlags, SampledLobes, ShadingGeometry};
-use super::microfacet::ensure_normal_faces_viewer_branchless;
+use super::bxdf::{Bxdf, BxdfFlags, LobesWithNormal, ShadingGeometry};
+use super::microfacet::tilt_to_face_viewer_branchless;
 use super::rough_dielectric::DielectricBxdf;
 use super::texture::Texture;
 use crate::math::Vec3;
@@ -113,7 +113,7 @@ impl<B: Bxdf> BxdfPacket<B> {
             let colors = texture.lookup_packet(uv);
             for i in 0..PACKET_SIZE {
                 let mut bsdf = bsdf;
-                bsdf.set_color(point, lane(&colors, i));
+                bsdf.set_looked_up_color(point, lane(&colors, i));
                 bsdf.set(&mut filled, i);
             }
         }
@@ -143,7 +143,7 @@ impl<B: Bxdf> BxdfPacket<B> {
     ) {
         if B::TURNS_NORMALS {
             for i in 0..PACKET_SIZE {
-                let turned = ensure_normal_faces_viewer_branchless(lane(normals, i), -lane(directions, i));
+                let turned = tilt_to_face_viewer_branchless(lane(normals, i), -lane(directions, i));
                 set_lane(normals, i, turned);
             }
         }
@@ -246,7 +246,7 @@ impl<B: Bxdf> BxdfPacket<B> {
         for i in 0..PACKET_SIZE {
             let bsdf = B::get(&self.bsdf, i);
             let view = B::View::get(&self.view, i);
-            let from = SampledLobes { lobes, normal: lane(normals, i) };
+            let from = LobesWithNormal { lobes, normal: lane(normals, i) };
             pdfs[i] = bsdf.pdf(&view, from, lane(wi, i), values.shape[i], any);
         }
         pdfs
@@ -282,7 +282,7 @@ impl<B: Bxdf> BxdfPacket<B> {
         for i in 0..PACKET_SIZE {
             let bsdf = B::get(&self.bsdf, i);
             let view = B::View::get(&self.view, i);
-            let from = SampledLobes { lobes, normal: lane(normals, i) };
+            let from = LobesWithNormal { lobes, normal: lane(normals, i) };
             set_lane(&mut wi, i, bsdf.sample(&view, from, [choices[i], u[0][i], u[1][i]], any));
         }
         wi

@@ -17,7 +17,7 @@
 use super::footprint::TexturePoint;
 use super::fresnel::{dielectric_from_outside, schlick_weight};
 use super::lobe_albedo::{LobeAlbedoPolynomial, TERMS, evaluate_albedo_fit};
-use super::lookup::{MaterialTextureCollector, ParameterLookup, PointLookup};
+use super::lookup::{MaterialTextureCollector, ParameterLookup, PointTextureEvaluator};
 use super::microfacet::{
     self, MicrofacetDistribution, SmithTerms, UnnormalizedHalfVector, sample_reflection,
 };
@@ -109,7 +109,8 @@ impl Coat {
     /// Transmittance t for light that leaves the layer below at the given cosine. Counts texture lookups in
     /// `lookups`.
     pub fn transmittance(&self, at: &TexturePoint, cosine: f32, lookups: &mut u64) -> Vec3 {
-        let layer = ClearCoatLayer::from(&self.look_up_parameters(&mut PointLookup { point: at, lookups }));
+        let layer =
+            ClearCoatLayer::from(&self.look_up_parameters(&mut PointTextureEvaluator { point: at, lookups }));
         let cosine = cosine.abs();
         layer.absorption_transmittance(layer.path_length(cosine)) * (1.0 - layer.albedo(cosine))
     }
@@ -123,7 +124,8 @@ impl Coat {
         base: Vec3,
         lookups: &mut u64,
     ) -> Vec3 {
-        let layer = ClearCoatLayer::from(&self.look_up_parameters(&mut PointLookup { point: at, lookups }));
+        let layer =
+            ClearCoatLayer::from(&self.look_up_parameters(&mut PointTextureEvaluator { point: at, lookups }));
         let albedo = layer.albedo(cosine);
         let passed = (1.0 - albedo) * (1.0 - albedo);
         let absorbed = layer.absorption_transmittance(2.0 * layer.path_length(cosine));

@@ -27,20 +27,20 @@ pub trait ParameterLookup<'m> {
 
     /// The value of a color that is used only for ambient light.
     #[inline(always)]
-    fn ambient(&mut self, color: &'m ColorOrTexture) -> Vec3 {
+    fn ambient_color(&mut self, color: &'m ColorOrTexture) -> Vec3 {
         self.color(color)
     }
 }
 
 /// Looks up textures at a point.
-pub struct PointLookup<'a> {
+pub struct PointTextureEvaluator<'a> {
     /// The point.
     pub point: &'a TexturePoint,
     /// Counts texture lookups.
     pub lookups: &'a mut u64,
 }
 
-impl ParameterLookup<'_> for PointLookup<'_> {
+impl ParameterLookup<'_> for PointTextureEvaluator<'_> {
     #[inline(always)]
     fn color(&mut self, color: &ColorOrTexture) -> Vec3 {
         color.evaluate(self.point, self.lookups)
@@ -97,7 +97,7 @@ impl<'m> ParameterLookup<'m> for MaterialTextureCollector<'m> {
         WhiteLookup.number_neutral_at_zero(number)
     }
 
-    fn ambient(&mut self, color: &'m ColorOrTexture) -> Vec3 {
+    fn ambient_color(&mut self, color: &'m ColorOrTexture) -> Vec3 {
         self.ambient.extend(color.texture());
         WhiteLookup.color(color)
     }

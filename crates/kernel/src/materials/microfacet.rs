@@ -41,7 +41,7 @@ pub const MIN_ALPHA: f32 = 1e-3;
 const MIN_COSINE: f32 = 1e-6;
 
 /// Minimum cosine between a normal and the direction to the viewer. See
-/// [`ensure_normal_faces_viewer_branchless`].
+/// [`tilt_to_face_viewer_branchless`].
 const MIN_FACING_COSINE: f32 = 1e-3;
 
 /// Computes a lobe's α along u and along v. An anisotropy in [−1, 1] stretches the base value, roughness².
@@ -56,7 +56,7 @@ pub fn alphas_from_roughness(roughness: f32, anisotropy: f32) -> [f32; 2] {
 /// Rotates the unit normal just enough to face the viewer. Shading normals may face away from the viewer near
 /// silhouettes of smooth meshes.
 #[inline(always)]
-pub fn ensure_normal_faces_viewer_branchless(normal: Vec3, to_eye: Vec3) -> Vec3 {
+pub fn tilt_to_face_viewer_branchless(normal: Vec3, to_eye: Vec3) -> Vec3 {
     let missing = MIN_FACING_COSINE - normal.dot(to_eye);
     let turned = normal + to_eye * missing;
     let turned = turned * (1.0 / turned.length_squared().sqrt());
@@ -64,12 +64,12 @@ pub fn ensure_normal_faces_viewer_branchless(normal: Vec3, to_eye: Vec3) -> Vec3
     Vec3::new(choose(turned.x, normal.x), choose(turned.y, normal.y), choose(turned.z, normal.z))
 }
 
-/// [`ensure_normal_faces_viewer_branchless`] with a branch that is fast for normals that do not need
+/// [`tilt_to_face_viewer_branchless`] with a branch that is fast for normals that do not need
 /// rotation.
 #[inline(always)]
-pub fn ensure_normal_faces_viewer(normal: Vec3, to_eye: Vec3) -> Vec3 {
+pub fn tilt_to_face_viewer(normal: Vec3, to_eye: Vec3) -> Vec3 {
     if normal.dot(to_eye) < MIN_FACING_COSINE {
-        ensure_normal_faces_viewer_branchless(normal, to_eye)
+        tilt_to_face_viewer_branchless(normal, to_eye)
     } else {
         normal
     }

@@ -35,7 +35,7 @@ impl Mipmaps {
     }
 
     /// Number of levels, not counting the original image.
-    pub fn count(&self) -> usize {
+    pub fn reduced_level_count(&self) -> usize {
         self.levels.len()
     }
 
@@ -87,7 +87,7 @@ impl<'a> ImageHalver<'a> {
 
     /// Appends a row of the smaller image. Each texel is the mean over the area that it covers in the larger
     /// image, which preserves the overall mean even for odd sizes.
-    pub fn append_row(&self, y: u32, to: &mut TexelData) {
+    pub fn append_halved_row(&self, y: u32, to: &mut TexelData) {
         let rows = DownsampleTaps::new(y, self.height, self.of.height);
         for x in 0..self.width {
             let columns = DownsampleTaps::new(x, self.width, self.of.width);
@@ -146,7 +146,7 @@ mod tests {
     fn halved(of: &Texels) -> Result<Texels, ()> {
         let halving = ImageHalver::new(of);
         let mut rows = halving.allocate_halved_rows();
-        (0..halving.halved_height()).for_each(|y| halving.append_row(y, &mut rows));
+        (0..halving.halved_height()).for_each(|y| halving.append_halved_row(y, &mut rows));
         Ok(halving.assemble_image(rows))
     }
 
@@ -162,7 +162,7 @@ mod tests {
             let image = image(width, height);
             let mipmaps = Mipmaps::build(&image, halved).expect("halving succeeds");
             assert_eq!(mipmaps.memory_bytes() as u64, Mipmaps::estimate_memory_bytes(width, height, false));
-            for number in 1..=mipmaps.count() {
+            for number in 1..=mipmaps.reduced_level_count() {
                 let level = mipmaps.level(number).expect("the level exists");
                 assert_eq!(
                     (level.width, level.height),

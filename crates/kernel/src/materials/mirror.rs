@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::conductor::ConductorFresnel;
 use super::footprint::TexturePoint;
-use super::lookup::{MaterialTextureCollector, ParameterLookup, PointLookup, WhiteLookup};
+use super::lookup::{MaterialTextureCollector, ParameterLookup, PointTextureEvaluator, WhiteLookup};
 use super::texture::{ColorOrTexture, Texture};
 use crate::math::Vec3;
 
@@ -25,7 +25,7 @@ impl Mirror {
         match self {
             Self::Constant(color) => color.evaluate(at, lookups).min(Vec3::ONE) * tint.unwrap_or(Vec3::ONE),
             Self::Conductor(fresnel) => {
-                let fresnel = fresnel.look_up_parameters(&mut PointLookup { point: at, lookups });
+                let fresnel = fresnel.look_up_parameters(&mut PointTextureEvaluator { point: at, lookups });
                 tint.map_or(fresnel, |tint| fresnel.tinted(tint)).reflectance(cosine)
             }
         }

@@ -37,7 +37,7 @@ pub use normal_map::NormalMap;
 pub use normal_perturbation::{Bump, NormalPerturbation};
 pub use opacity::Opacity;
 pub use scalar::{Channel, ChannelSelector, ScalarParameter};
-pub use specular_over_base::{SpecularOverBase, SpecularPart};
+pub use specular_over_base::{SpecularLayer, SpecularOverBase};
 pub use thin_dielectric::ThinDielectric;
 
 use std::sync::Arc;
@@ -97,7 +97,7 @@ impl Material {
 
     /// The parts of a blend, or `None` for other materials.
     #[inline]
-    fn blend(&self) -> Option<&Blend> {
+    fn as_blend(&self) -> Option<&Blend> {
         match &self.bsdf {
             Bsdf::Blend(blend) => Some(blend),
             Bsdf::NonSpecular(_)
@@ -110,18 +110,18 @@ impl Material {
 
     /// Whether a property holds for any part of a blend.
     fn is_any_part(&self, property: impl Fn(&Self) -> bool) -> bool {
-        self.blend().is_some_and(|blend| blend.parts.iter().any(property))
+        self.as_blend().is_some_and(|blend| blend.parts.iter().any(property))
     }
 
     /// Chooses a part of a blend, or of blends nested in it, with a random number in [0, 1). Returns other
     /// materials unchanged. Counts texture lookups in `lookups`.
     #[inline]
     pub fn choose_part(&self, at: &TexturePoint, u: impl FnOnce() -> f32, lookups: &mut u64) -> &Self {
-        let Some(mut blend) = self.blend() else { return self };
+        let Some(mut blend) = self.as_blend() else { return self };
         let mut u = u();
         loop {
             let part = blend.choose(at, &mut u, lookups);
-            match part.blend() {
+            match part.as_blend() {
                 Some(nested) => blend = nested,
                 None => return part,
             }
@@ -143,7 +143,7 @@ impl Material {
         cosine: f32,
         lookups: &mut u64,
     ) -> Vec3 {
-        if let Some(blend) = self.blend() {
+        if let Some(blend) = self.as_blend() {
             return blend.mean_over_parts(at, lookups, |part, lookups| {
                 part.expected_emission(at, is_front, cosine, lookups)
             });
@@ -166,7 +166,7 @@ impl Material {
         accepts: &dyn Fn(&Self) -> bool,
         lookups: &mut u64,
     ) -> f32 {
-        match self.blend() {
+        match self.as_blend() {
             Some(blend) => {
                 let for_part = |part: &Self, lookups: &mut u64| {
                     Vec3::splat(part.presence_probability(at, accepts, lookups))
@@ -190,7 +190,7 @@ impl Material {
     /// Fraction of the light that passes undeflected at a point, for an incident angle with the given cosine.
     /// `color` multiplies a pane's transmittance. Counts texture lookups in `lookups`.
     pub fn null_transmittance(&self, at: &TexturePoint, color: Vec3, cosine: f32, lookups: &mut u64) -> Vec3 {
-        if let Some(blend) = self.blend() {
+        if let Some(blend) = self.as_blend() {
             return blend.mean_over_parts(at, lookups, |part, lookups| {
                 part.null_transmittance(at, color, cosine, lookups)
             });
@@ -282,7 +282,7 @@ impl Bsdf {
     /// Whether the lobes depend on the directions of the texture axes.
     #[inline]
     pub fn is_anisotropic(&self) -> bool {
-        self.is_any_non_specular_part(NonSpecular::is_anisotropic)
+        self.any_non_specular_part_satisfies(NonSpecular::is_anisotropic)
     }
 
     /// The non-δ lobes, or `None` for blends and for surfaces without such lobes.
@@ -335,14 +335,16 @@ impl Bsdf {
     }
 
     /// Whether the surface also scatters light to the other side.
-    pub fn is_transmissive(&self) -> bool {
-        self.is_any_non_specular_part(NonSpecular::is_transmissive)
+    pub fn has_non_specular_transmission(&self) -> bool {
+        self.any_non_specular_part_satisfies(NonSpecular::is_transmissive)
     }
 
     /// Whether a property holds for the non-δ lobes of the surface, or of any part of a blend.
-    fn is_any_non_specular_part(&self, property: fn(&NonSpecular) -> bool) -> bool {
+    fn any_non_specular_part_satisfies(&self, property: fn(&NonSpecular) -> bool) -> bool {
         match self {
-            Self::Blend(blend) => blend.parts.iter().any(|part| part.bsdf.is_any_non_specular_part(property)),
+            Self::Blend(blend) => {
+                blend.parts.iter().any(|part| part.bsdf.any_non_specular_part_satisfies(property))
+            }
             Self::NonSpecular(_)
             | Self::Mirror(_)
             | Self::Dielectric(_)
@@ -353,15 +355,15 @@ impl Bsdf {
 
     /// The surface's main color. Counts texture lookups in `lookups`.
     #[inline]
-    pub fn albedo(&self, at: &TexturePoint, lookups: &mut u64) -> Vec3 {
+    pub fn main_color(&self, at: &TexturePoint, lookups: &mut u64) -> Vec3 {
         match self {
-            Self::NonSpecular(rough) => rough.albedo(at, lookups),
+            Self::NonSpecular(rough) => rough.main_color(at, lookups),
             Self::Mirror(mirror) => mirror.reflectance(1.0, None, at, lookups),
             Self::Dielectric(glass) => glass.tint,
             Self::ThinDielectric(pane) => pane.tint.evaluate(at, lookups),
-            Self::SpecularOverBase(layers) => layers.albedo(at, lookups),
+            Self::SpecularOverBase(layers) => layers.main_color(at, lookups),
             Self::Blend(blend) => {
-                blend.mean_over_parts(at, lookups, |part, lookups| part.bsdf.albedo(at, lookups))
+                blend.mean_over_parts(at, lookups, |part, lookups| part.bsdf.main_color(at, lookups))
             }
         }
     }

@@ -41,7 +41,7 @@ pub enum ChannelSelector {
 
 impl ChannelSelector {
     /// The value of an opaque linear color.
-    pub fn of_opaque_color(self, color: Vec3) -> f32 {
+    pub fn value_of_opaque_color(self, color: Vec3) -> f32 {
         match self {
             Self::Luminance | Self::Opacity | Self::Mask { of_any_color: _ } => luminance(color),
             Self::Channel(Channel::Red) => color.x,

@@ -16,7 +16,7 @@ use crate::math::Vec3;
 #[derive(Clone, Debug, PartialEq)]
 pub struct SpecularOverBase {
     /// The surface with the δ lobe.
-    pub specular: SpecularPart,
+    pub specular: SpecularLayer,
     /// A clear coat over the δ lobe, if there is one.
     pub coat: Option<Coat>,
     /// The non-specular lobes.
@@ -25,7 +25,7 @@ pub struct SpecularOverBase {
 
 /// A surface with a δ lobe.
 #[derive(Clone, Debug, PartialEq)]
-pub enum SpecularPart {
+pub enum SpecularLayer {
     /// A smooth dielectric coat.
     SmoothCoat {
         /// Factor applied to the coat's reflection.
@@ -39,7 +39,7 @@ pub enum SpecularPart {
 
 impl SpecularOverBase {
     /// The probability of choosing the δ lobe at an incident angle with the given cosine. `mirror` is the
-    /// reflectance of [`SpecularPart::Mirror`]. Counts texture lookups in `lookups`.
+    /// reflectance of [`SpecularLayer::Mirror`]. Counts texture lookups in `lookups`.
     #[inline]
     pub fn specular_probability(
         &self,
@@ -49,11 +49,11 @@ impl SpecularOverBase {
         lookups: &mut u64,
     ) -> f32 {
         match &self.specular {
-            SpecularPart::SmoothCoat { tint: _, ior } => {
+            SpecularLayer::SmoothCoat { tint: _, ior } => {
                 let left = self.two_way_coat_transmittance(cosine, Vec3::ZERO, at, lookups);
                 left.max_element() * dielectric(cosine, *ior).0
             }
-            SpecularPart::Mirror(_) => {
+            SpecularLayer::Mirror(_) => {
                 (self.two_way_coat_transmittance(cosine, mirror, at, lookups) * mirror).max_element()
             }
         }
@@ -62,14 +62,20 @@ impl SpecularOverBase {
     /// Reflectance of the δ lobe divided by [`SpecularOverBase::specular_probability`], with the same
     /// parameters.
     #[inline]
-    pub fn specular_weight(&self, cosine: f32, mirror: Vec3, at: &TexturePoint, lookups: &mut u64) -> Vec3 {
+    pub fn specular_sample_weight(
+        &self,
+        cosine: f32,
+        mirror: Vec3,
+        at: &TexturePoint,
+        lookups: &mut u64,
+    ) -> Vec3 {
         let relative = |color: Vec3| color / color.max_element().max(f32::MIN_POSITIVE);
         match &self.specular {
-            SpecularPart::SmoothCoat { tint, ior: _ } => {
+            SpecularLayer::SmoothCoat { tint, ior: _ } => {
                 relative(self.two_way_coat_transmittance(cosine, Vec3::ZERO, at, lookups))
                     * tint.evaluate(at, lookups)
             }
-            SpecularPart::Mirror(_) => {
+            SpecularLayer::Mirror(_) => {
                 relative(self.two_way_coat_transmittance(cosine, mirror, at, lookups) * mirror)
             }
         }
@@ -90,18 +96,18 @@ impl SpecularOverBase {
 
     /// The surface's main color. Counts texture lookups in `lookups`.
     #[inline]
-    pub fn albedo(&self, at: &TexturePoint, lookups: &mut u64) -> Vec3 {
+    pub fn main_color(&self, at: &TexturePoint, lookups: &mut u64) -> Vec3 {
         match &self.specular {
-            SpecularPart::SmoothCoat { .. } => self.base.albedo(at, lookups),
-            SpecularPart::Mirror(mirror) => mirror.reflectance(1.0, None, at, lookups),
+            SpecularLayer::SmoothCoat { .. } => self.base.main_color(at, lookups),
+            SpecularLayer::Mirror(mirror) => mirror.reflectance(1.0, None, at, lookups),
         }
     }
 
     /// All textures of the δ lobe. The coat has the same textures as the coat of the base.
     pub fn specular_textures(&self) -> impl Iterator<Item = &Arc<Texture>> {
         let (tint, mirror) = match &self.specular {
-            SpecularPart::SmoothCoat { tint, ior: _ } => (tint.texture(), None),
-            SpecularPart::Mirror(mirror) => (None, Some(mirror)),
+            SpecularLayer::SmoothCoat { tint, ior: _ } => (tint.texture(), None),
+            SpecularLayer::Mirror(mirror) => (None, Some(mirror)),
         };
         tint.into_iter().chain(mirror.into_iter().flat_map(Mirror::textures))
     }

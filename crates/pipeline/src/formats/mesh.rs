@@ -130,7 +130,7 @@ fn scene_of_mesh(
         return Err(AssetError::malformed(path, None, reason));
     }
     let (mut document, mut names) = (BuiltDocument::default(), UsedNames::default());
-    document.add_comment(format!("{}, as glimt shows it.", file_name(path)));
+    document.add_comment_above_next_table(format!("{}, as glimt shows it.", file_name(path)));
     let lighting = Lighting::Default { is_polished: loaded.materials.iter().any(material_may_cast_caustics) };
     add_render_settings(&mut document, None, lighting);
     add_camera(&mut document, &eye, ModelProjection::Perspective { fov: FOV });

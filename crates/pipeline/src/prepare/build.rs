@@ -14,7 +14,7 @@ use crate::scene::fingerprint::Fingerprint;
 use crate::stages::AbortReason;
 use crate::stages::accel::build_accel_structures;
 use crate::stages::lights::collect_lights;
-use crate::table::StageTable;
+use crate::table::StageRecorder;
 use crate::world::{World, WorldInputs};
 
 /// A scene that is ready to be rendered.
@@ -40,13 +40,13 @@ impl SceneCache {
         assets: Arc<SceneAssets>,
         plan: RenderPlan,
         change: &CameraOverrides,
-        table: &mut StageTable<'_>,
+        table: &mut StageRecorder<'_>,
         pool: &ThreadPool,
     ) -> Result<ReadyScene, AbortReason> {
         let (scene, token) = (&plan.scene, table.token);
         let camera =
             RequestCamera::new(scene, assets.parsed.orbiter, change).rotated_for_turntable(plan.turn);
-        let (mesh_keys, orbiter) = (assets.mesh_keys(), camera.orbiter_text());
+        let (mesh_keys, orbiter) = (assets.mesh_keys(), camera.orbiter_fingerprint_text());
         let of = keys::scene_fingerprint_context(scene, &mesh_keys, orbiter.as_deref());
         let origin = camera.origin_near_camera();
         let stage = table.start(Stage::Accel);

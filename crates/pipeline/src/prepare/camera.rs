@@ -39,7 +39,7 @@ impl RequestCamera {
     }
 
     pub(crate) fn resolved_camera(&self) -> ResolvedCamera {
-        world::Camera::look_at_from_description(&self.camera, self.orbiter.as_ref())
+        world::Camera::resolve_look_at_camera(&self.camera, self.orbiter.as_ref())
     }
 
     /// Returns the coordinate origin that maximizes precision near the camera.
@@ -48,7 +48,7 @@ impl RequestCamera {
     }
 
     /// Returns the contents of the orbiter file as text for fingerprints, because they are small.
-    pub(crate) fn orbiter_text(&self) -> Option<String> {
+    pub(crate) fn orbiter_fingerprint_text(&self) -> Option<String> {
         self.orbiter.map(|camera| format!("{camera:?}"))
     }
 }

@@ -9,7 +9,7 @@ use crate::control::CancelToken;
 use crate::sink::EventSink;
 use crate::stages::containers::GltfContainers;
 use crate::stages::{AbortReason, FileReadContext, Findings};
-use crate::table::StageTable;
+use crate::table::StageRecorder;
 use crate::watch::content::{FileHashCache, FilesSeenByRequest};
 
 /// Maximum number of attempts to read one consistent version of the scene's files.
@@ -18,7 +18,7 @@ const MAX_READS: usize = 16;
 /// One attempt to read a scene's files.
 pub(crate) struct SceneReadAttempt<'a, 't> {
     pub(crate) files: FileReadContext<'a>,
-    pub(crate) table: &'a mut StageTable<'t>,
+    pub(crate) table: &'a mut StageRecorder<'t>,
     pub(crate) findings: &'a mut Findings,
 }
 
@@ -39,7 +39,7 @@ impl FileReader<'_> {
     /// Returns the error from `read`, or an error if the files keep changing.
     pub(crate) fn read_consistently<T>(
         &self,
-        table: &mut StageTable<'_>,
+        table: &mut StageRecorder<'_>,
         findings: &mut Findings,
         mut read: impl FnMut(&mut SceneReadAttempt<'_, '_>) -> Result<T, AbortReason>,
     ) -> Result<T, AbortReason> {
@@ -57,7 +57,7 @@ impl FileReader<'_> {
             findings.reset();
             table.stages.clear();
         }
-        Err(AbortReason::work_failure(
+        Err(AbortReason::from_work_error(
             "the scene's files keep changing while they are being read; try again once they are complete",
         ))
     }
@@ -95,6 +95,6 @@ impl SceneReadAttempt<'_, '_> {
         self.files.contents.recheck_seen_files(self.files.token)?;
         let changed = self.files.contents.changed_file();
         let message = |path: PathBuf| format!("{} changed while it was being read", path.display());
-        changed.map_or(Ok(()), |path| Err(AbortReason::work_failure(message(path))))
+        changed.map_or(Ok(()), |path| Err(AbortReason::from_work_error(message(path))))
     }
 }

@@ -119,8 +119,7 @@ impl SceneCache {
     pub(crate) fn end_request(&mut self, success: bool) {
         self.requests += 1;
         let meshes: [&mut dyn EvictableCache; 1] = [&mut self.meshes];
-        let caches =
-            meshes.into_iter().chain(self.textures.caches_mut()).chain(self.accel.caches_mut());
+        let caches = meshes.into_iter().chain(self.textures.caches_mut()).chain(self.accel.caches_mut());
         let mut caches: Vec<_> = caches.collect();
         caches.iter_mut().for_each(|cache| cache.record_request_usage(success, self.requests));
         let candidates = caches.iter().flat_map(|cache| cache.eviction_candidates());

@@ -13,7 +13,7 @@ use crate::protocol::Failure;
 use crate::scene::description::CameraOverrides;
 use crate::settings::Overrides;
 use crate::sink::EventSink;
-use crate::table::StageTable;
+use crate::table::StageRecorder;
 use crate::tests::{OBJ, SCENE};
 use crate::watch::content::FileHashCache;
 use crate::world::{Geometry, MeshTree};
@@ -54,7 +54,7 @@ impl SceneFixture {
     fn prepare_unsaved(&mut self) -> Result<ReadyScene, AbortReason> {
         let path = self.folder.path().join("scene.toml");
         let (sink, token, mut findings) = (EventSink::silent(1), CancelToken::new(), Findings::default());
-        let mut table = StageTable::new(None, &token);
+        let mut table = StageRecorder::new(None, &token);
         let reader = FileReader { contents: &self.contents, pool: &self.pool, sink: &sink, token: &token };
         let scenes = &mut self.scenes;
         let assets = reader.read_consistently(&mut table, &mut findings, |reading| {

@@ -36,7 +36,7 @@ impl FilmCache {
     /// # Errors
     /// There is no film.
     pub(crate) fn current_or_error(&self) -> Result<&FilmState, AbortReason> {
-        self.current().ok_or_else(|| AbortReason::work_failure("the film is missing"))
+        self.current().ok_or_else(|| AbortReason::from_work_error("the film is missing"))
     }
 
     pub(crate) fn current_mut(&mut self) -> Option<&mut FilmState> {

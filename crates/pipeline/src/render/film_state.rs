@@ -245,7 +245,7 @@ impl FilmState {
         let is_wanted = |tile: &&usize| {
             self.is_tile_in_shard(**tile) && self.cell_tile_overlaps_rect(part, CELLS * **tile)
         };
-        for &tile in self.film.tile_order().iter().filter(is_wanted) {
+        for &tile in self.film.tiles_center_outward().iter().filter(is_wanted) {
             let cells = (CELLS * tile..CELLS * (tile + 1))
                 .filter_map(|cell| Some((cell, self.film.cell_rect(cell)?)));
             let cells = cells.map(|(cell, rect)| (rect, [0, 1].map(|half| missing(cell, half))));
@@ -294,13 +294,13 @@ impl FilmState {
     /// Decides which of the tiles with `samples` samples (a power of two) need no more samples.
     pub(crate) fn decide_goals(&mut self, samples: u32, error: f64) {
         if let Some(judgement) = self.goals.decide_goals(&self.film, &self.done, samples, error) {
-            self.expected.predict(&judgement, &self.goals, &self.done);
+            self.expected.update_predictions(&judgement, &self.goals, &self.done);
         }
     }
 
     /// Returns the number of tiles that reached their sample limit but not the noise target, and the highest
     /// noise among them.
-    pub(crate) fn count_tiles_above_noise_target(&self, error: f64) -> Option<(usize, f64)> {
+    pub(crate) fn count_finished_tiles_above_target(&self, error: f64) -> Option<(usize, f64)> {
         self.goals.count_finished_tiles_above_target(&self.film, error)
     }
 
@@ -312,7 +312,7 @@ impl FilmState {
     /// Returns the expected final number of samples, summed over all pixels, with at most `most` samples per
     /// pixel.
     pub(crate) fn expected_total_samples(&self, most: u32) -> u64 {
-        self.sum_pixel_samples(|cell, half| self.expected_samples(cell, half, most))
+        self.sum_pixel_samples(|cell, half| self.expected_cell_half_samples(cell, half, most))
     }
 
     /// Returns the CPU seconds spent so far.
@@ -329,7 +329,7 @@ impl FilmState {
             |cell: &usize| self.is_tile_in_shard(cell / CELLS) && self.film.cell_rect(*cell).is_some();
         for cell in (0..self.done.len()).filter(is_there) {
             let remaining_samples = |half: usize| {
-                let (done, end) = (self.done[cell][half], self.expected_samples(cell, half, most));
+                let (done, end) = (self.done[cell][half], self.expected_cell_half_samples(cell, half, most));
                 let pixels = self.film.cell_half_pixel_count(cell, half) as f64;
                 let samples = pixels * f64::from(end.saturating_sub(done));
                 self.pixel_share.samples_including_overhead(samples, pixels * f64::from(jobs(done, end)))
@@ -356,16 +356,17 @@ impl FilmState {
         };
         [
             max_of(&|cell, half| self.done[cell][half]),
-            max_of(&|cell, half| self.expected_samples(cell, half, most)),
+            max_of(&|cell, half| self.expected_cell_half_samples(cell, half, most)),
         ]
     }
 
     /// Whether the final number of samples can be estimated despite a noise target.
     pub(crate) fn can_predict_samples(&self) -> bool {
-        self.cell_half_indices_in_shard().all(|(cell, half)| self.expected_samples(cell, half, u32::MAX) < u32::MAX)
+        self.cell_half_indices_in_shard()
+            .all(|(cell, half)| self.expected_cell_half_samples(cell, half, u32::MAX) < u32::MAX)
     }
 
-    fn expected_samples(&self, cell: usize, half: usize, most: u32) -> u32 {
+    fn expected_cell_half_samples(&self, cell: usize, half: usize, most: u32) -> u32 {
         let (goal, expected) = (self.goals.get(cell, half), self.expected.get(cell, half));
         (if goal < u32::MAX { goal } else { expected }).min(most)
     }

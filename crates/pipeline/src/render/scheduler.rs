@@ -39,7 +39,7 @@ pub(crate) struct RenderStageInputs<'a> {
     pub(crate) plan: &'a RenderPlan,
     /// The scene's photons, if the image uses them.
     pub(crate) photons: Option<&'a PhotonStore>,
-    pub(crate) display: DisplayOptions<'a>,
+    pub(crate) display: PreviewOptions<'a>,
     pub(crate) commands: &'a PendingCommandRunner<'a>,
     /// Checkpointer, if the render uses checkpoints.
     pub(crate) checkpointer: Option<&'a Checkpointer<'a>>,
@@ -58,7 +58,7 @@ pub(crate) struct FilmRequest {
 
 /// How a render is displayed.
 #[derive(Clone, Copy)]
-pub(crate) struct DisplayOptions<'a> {
+pub(crate) struct PreviewOptions<'a> {
     /// Sender of previews, with their size when the render starts.
     pub(crate) screen: PreviewSender<'a>,
     /// Section to render first.
@@ -399,7 +399,7 @@ impl<'s, 'a> Scheduler<'s, 'a> {
 
     fn coarse_image_renderer(&self) -> CoarseImageRenderer<'a> {
         let RenderStageInputs { tracer, plan, .. } = *self.rendering;
-        let DisplayOptions { is_moved, coarse_rate: rate, .. } = self.rendering.display;
+        let PreviewOptions { is_moved, coarse_rate: rate, .. } = self.rendering.display;
         CoarseImageRenderer { tracer, plan, is_moved, rate }
     }
 

@@ -10,7 +10,7 @@ use crate::prepare::FileReader;
 use crate::protocol::{Event, LastValidSceneRenderOutcome, Request, Status};
 use crate::report::finish::remove_outdated_report;
 use crate::stages::{AbortReason, Findings};
-use crate::table::StageTable;
+use crate::table::StageRecorder;
 
 impl Session {
     /// Renders and writes the last valid scene with the overrides from the newest request, whose own scene
@@ -44,16 +44,17 @@ impl Session {
         };
         // Load the textures needed for another view if their files are still valid.
         let plans = RequestPlans::resolve(&last.parsed.loaded.scene, request)?;
-        let pool = self.threads.pool(plans.shown.limits.threads, true)?;
+        let pool = self.threads.get_or_create_pool(plans.shown.limits.threads, true)?;
         let reader = FileReader { contents: &self.contents, pool: &pool, sink, token };
         let roles = plans.texture_needs();
-        let assets = reader.read_unless_files_change(|reading| self.scenes.load_missing_textures(last, roles, reading))?;
+        let assets = reader
+            .read_unless_files_change(|reading| self.scenes.load_missing_textures(last, roles, reading))?;
         let Some(assets) = assets.flatten() else { return Ok(None) };
         *last = Arc::clone(&assets);
         let estimate = MemoryEstimate::for_image_and_scene(&plans.shown, &assets);
         self.check_memory(&estimate, request, &plans)?;
         // Prepare the scene, reusing unchanged values, and render it.
-        let mut table = StageTable::new(None, token);
+        let mut table = StageRecorder::new(None, token);
         let scene = self.build_world(request, assets, plans, &mut table, &pool)?;
         let image = self.make_current_and_trace_photons(context, scene, &mut table, &pool)?;
         let rendered = self.render(context, &image, &pool)?;

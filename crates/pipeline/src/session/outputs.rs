@@ -7,12 +7,12 @@ use super::{RequestContext, Session};
 use crate::control::CancelToken;
 use crate::output::OutputError;
 use crate::plan::RenderPlan;
-use crate::protocol::{Event, Report, SavedSceneImageState, Stage, WriteRequirement, reasons};
+use crate::protocol::{Event, Report, SavedSceneRenderStatus, Stage, WriteRequirement, reasons};
 use crate::report::finish::write_report;
 use crate::sink::EventSink;
 use crate::stages::write::{ImageWriteContext, add_frame_and_write_if_last, write_if_wanted};
 use crate::stages::{AbortReason, Findings, StageResult};
-use crate::table::StageTable;
+use crate::table::StageRecorder;
 use crate::targets::output_conflicts;
 
 /// Outcome of the write stage.
@@ -29,14 +29,14 @@ impl Session {
         &mut self,
         context: &RequestContext<'_>,
         image: &RequestImage,
-        table: &mut StageTable<'_>,
+        table: &mut StageRecorder<'_>,
         findings: &mut Findings,
         pool: &ThreadPool,
     ) -> Result<WriteOutcome, AbortReason> {
         let (request, plan) = (context.request, &image.scene.plan);
         // Symbolic links and files may have changed during the render.
         let conflicts = output_conflicts(plan, &self.files.protected);
-        findings.record_conflicts(conflicts, request.write, context.sink)?;
+        findings.record_output_conflicts(conflicts, request.write, context.sink)?;
         let was_own_written = self.is_own_image_written();
         let stage = table.start(Stage::Write);
         let wrote = self.run_write_stage(context, plan, findings, pool).map(|staged| stage.finish(staged));
@@ -50,11 +50,11 @@ impl Session {
     pub(super) fn report_own_image_state(&self, context: &RequestContext<'_>, image: &RequestImage) {
         let Some(own) = self.own.current.as_ref().filter(|_| context.request.own.is_some()) else { return };
         let state = match self.films.get(own.film) {
-            _ if self.is_own_image_written() => SavedSceneImageState::Written,
+            _ if self.is_own_image_written() => SavedSceneRenderStatus::Written,
             Some(state) if state.has_samples() => {
-                SavedSceneImageState::Begun { is_rendering: own.film == image.film }
+                SavedSceneRenderStatus::Begun { is_rendering: own.film == image.film }
             }
-            Some(_) | None => SavedSceneImageState::NotBegun,
+            Some(_) | None => SavedSceneRenderStatus::NotBegun,
         };
         context.sink.send(Event::OwnImage { generation: context.request.generation, state });
     }

@@ -20,7 +20,7 @@ use crate::stages::parse::{ParsedScene, SceneParseRequest};
 use crate::stages::textures::TextureSelection;
 use crate::stages::write::check_outputs_are_writable;
 use crate::stages::{AbortReason, Findings};
-use crate::table::StageTable;
+use crate::table::StageRecorder;
 use crate::targets::output_conflicts;
 use crate::warnings::settings_warnings;
 
@@ -30,7 +30,7 @@ impl Session {
         &mut self,
         context: &RequestContext<'_>,
         pool: &ThreadPool,
-        table: &mut StageTable<'_>,
+        table: &mut StageRecorder<'_>,
         findings: &mut Findings,
     ) -> Result<ReadyScene, AbortReason> {
         let RequestContext { request, sink, token, .. } = *context;
@@ -66,7 +66,7 @@ impl Session {
         let findings = &mut *reading.findings;
         findings.warnings.extend(settings_warnings(&parsed.loaded, &plan.scene, &plan.settings, overrides));
         send_settings(&parsed, plan, sink);
-        findings.record_conflicts(
+        findings.record_output_conflicts(
             self.files.protect_inputs_and_find_conflicts(&parsed, plan),
             *write,
             sink,
@@ -84,7 +84,11 @@ impl Session {
         reading.verify_files_unchanged()?;
         self.check_memory(&MemoryEstimate::for_image_and_scene(plan, &assets), request, &plans)?;
         self.files.protected = ProtectedInputs::from_assets(&assets);
-        reading.findings.record_conflicts(output_conflicts(plan, &self.files.protected), *write, sink)?;
+        reading.findings.record_output_conflicts(
+            output_conflicts(plan, &self.files.protected),
+            *write,
+            sink,
+        )?;
         Ok((assets, plans))
     }
 
@@ -117,8 +121,8 @@ impl Session {
     fn additional_film_bytes(&self, request: &Request, plans: &RequestPlans) -> u64 {
         let (Some(own), Some(own_plan)) = (&self.own.current, &plans.own) else { return 0 };
         let of = |plan: &RenderPlan| keys::film_sums_key(own.film, &plan.settings, plan.crop);
-        let is_shared =
-            of(&plans.shown) == of(own_plan) && request.overrides.camera == request.own_overrides().camera;
+        let is_shared = of(&plans.shown) == of(own_plan)
+            && request.overrides.camera == request.saved_scene_overrides().camera;
         let state = self.films.get(own.film).filter(|state| state.has_samples() && !is_shared);
         state.map_or(0, FilmState::memory_bytes)
     }
@@ -129,13 +133,13 @@ impl Session {
         request: &Request,
         assets: Arc<SceneAssets>,
         plans: RequestPlans,
-        table: &mut StageTable<'_>,
+        table: &mut StageRecorder<'_>,
         pool: &ThreadPool,
     ) -> Result<ReadyScene, AbortReason> {
         let RequestPlans { shown, own } = plans;
         let ready = self.scenes.build_ready_scene(assets, shown, &request.overrides.camera, table, pool)?;
         let own = own.unwrap_or_else(|| ready.plan.clone());
-        self.own.set(&ready, own, request.own_overrides().camera, &mut self.films);
+        self.own.set(&ready, own, request.saved_scene_overrides().camera, &mut self.films);
         Ok(ready)
     }
 }

@@ -14,7 +14,7 @@ use crate::queries::QueryContext;
 use crate::render::coarse_image::CoarseImageRenderer;
 use crate::render::commands::PendingCommandRunner;
 use crate::render::preview::PreviewSender;
-use crate::render::scheduler::{DisplayOptions, FilmRequest, RenderStageInputs};
+use crate::render::scheduler::{FilmRequest, PreviewOptions, RenderStageInputs};
 use crate::render::share::Shard;
 use crate::scene::fingerprint::Fingerprint;
 use crate::stages::photons::{PhotonContext, PhotonStore, SkipReuseOrTracePhotons, trace_first_photons};
@@ -22,7 +22,7 @@ use crate::stages::render::render;
 use crate::stages::write::ImageWriteContext;
 use crate::stages::{AbortReason, StageResult};
 use crate::stopwatch::PausableStopwatch;
-use crate::table::StageTable;
+use crate::table::StageRecorder;
 use crate::trace::{TileKernel, Tracer};
 
 /// The image of a request.
@@ -42,7 +42,7 @@ impl Session {
         &mut self,
         context: &RequestContext<'_>,
         scene: ReadyScene,
-        table: &mut StageTable<'_>,
+        table: &mut StageRecorder<'_>,
         pool: &ThreadPool,
     ) -> Result<RequestImage, AbortReason> {
         let RequestContext { request, sink, token, .. } = *context;
@@ -107,7 +107,7 @@ impl Session {
         let plan = &image.scene.plan;
         let watch = PausableStopwatch::start(token);
         let Some(current) = &self.current else {
-            return Err(AbortReason::work_failure("the image is missing"));
+            return Err(AbortReason::from_work_error("the image is missing"));
         };
         let (inputs, contents) = (&self.files.protected, &*self.contents);
         let commands = PendingCommandRunner {
@@ -129,7 +129,7 @@ impl Session {
             tracer: create_tracer(self.config.kernel, pool, &image.scene, token),
             plan,
             photons: image.photons.and_then(|key| self.photons.get(key)),
-            display: DisplayOptions {
+            display: PreviewOptions {
                 screen: PreviewSender { bounds: request.preview, plan, sink },
                 first: request.first,
                 is_moved: is_camera_moving(request),

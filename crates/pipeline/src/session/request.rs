@@ -11,7 +11,7 @@ use crate::settings::ViewMode;
 use crate::stages::photons::PhotonStore;
 use crate::stages::{AbortReason, Findings};
 use crate::stopwatch::PausableStopwatch;
-use crate::table::StageTable;
+use crate::table::StageRecorder;
 
 /// Outcome of a finished request.
 pub(crate) struct CompletedRequest {
@@ -80,13 +80,13 @@ impl Session {
     ) -> Result<Report, AbortReason> {
         let RequestContext { request, sink, token, .. } = *context;
         let watch = PausableStopwatch::start(token);
-        let mut table = StageTable::new(Some(sink), token);
+        let mut table = StageRecorder::new(Some(sink), token);
         // A turntable never revisits earlier images.
         if request.overrides.turn.is_some() {
             self.films = FilmCache::default();
         }
         // Prepare the scene, from its files to the world.
-        let pool = self.threads.pool(thread_count(&request.overrides), true)?;
+        let pool = self.threads.get_or_create_pool(thread_count(&request.overrides), true)?;
         let scene = self.prepare(context, &pool, &mut table, findings);
         // Even if the render is stopped, keep the files for later requests.
         self.scenes.end_request(scene.is_ok());

@@ -59,7 +59,7 @@ impl GltfContainers {
         }
         let container = self.open(path, progress, token)?;
         match part {
-            Some(part) => container.build_part(part as usize, &ignore_progress, token),
+            Some(part) => container.build_part_mesh(part as usize, &ignore_progress, token),
             None => container.merge_scene_into_mesh(token),
         }
     }

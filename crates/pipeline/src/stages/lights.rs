@@ -13,7 +13,7 @@ use crate::lights::infinite::sky::Sky;
 use crate::lights::{LightSamplingPurpose, Lights};
 use crate::scene::description::{Material, Scene, TextureRole};
 use crate::scene::fingerprint::{Fingerprint, FingerprintContext, FingerprintHasher};
-use crate::world::{self, EnvironmentSource, Geometry, TextureSource};
+use crate::world::{self, EnvironmentSource, Geometry, TextureImageSource};
 
 /// Cache of the lights stage.
 #[derive(Default)]
@@ -35,7 +35,7 @@ pub(crate) fn collect_lights(
     token: &CancelToken,
 ) -> Result<StageResult<Arc<Lights>>, Canceled> {
     let map = textures.environment.as_ref().map(|(key, _)| key);
-    let declared = emissive_material_textures(scene).filter_map(|source| textures.key_of.get(&source));
+    let declared = textures_affecting_emission(scene).filter_map(|source| textures.key_of.get(&source));
     let patterns: Vec<&Fingerprint> = declared.chain(&textures.of_files).collect();
     let key = keys::lights_key(
         scene,
@@ -73,10 +73,10 @@ fn describe_light_tree(which: &str, lights: &Lights) -> String {
 }
 
 /// Returns the textures used by the scene file's emissive materials.
-fn emissive_material_textures(scene: &Scene) -> impl Iterator<Item = TextureSource> {
+fn textures_affecting_emission(scene: &Scene) -> impl Iterator<Item = TextureImageSource> {
     let shining = scene.materials.iter().filter(|material| material.emits());
     shining.flat_map(Material::self_and_blend_parts).flat_map(move |material| {
-        let textures = material.textures().into_iter().filter(|(_, role)| match role {
+        let textures = material.own_textures_with_roles().into_iter().filter(|(_, role)| match role {
             TextureRole::Emission
             | TextureRole::EmissionCoat(_)
             | TextureRole::Opacity(_)

@@ -127,7 +127,8 @@ pub(super) fn warn_about_missing_mesh_data<'a>(
         let name = &material.name;
         let textures = &loaded.scene.textures;
         let is_second = |(texture, _): &(usize, _)| textures[*texture].uv_set() == Some(UvSet::Second);
-        let all: Vec<_> = material.self_and_blend_parts().into_iter().flat_map(Material::textures).collect();
+        let all: Vec<_> =
+            material.self_and_blend_parts().into_iter().flat_map(Material::own_textures_with_roles).collect();
         if let Some((texture, _)) = all.iter().find(|texture| is_second(texture))
             && read.second_uvs.is_empty()
         {

@@ -34,7 +34,7 @@ use crate::assets::AssetError;
 use crate::control::{CancelToken, Canceled};
 use crate::scene::LoadedScene;
 use crate::scene::diagnostic::{Diagnostic, Severity};
-use crate::scene::report::{ReportStyle, render_report};
+use crate::scene::report::{ReportStyle, render_diagnostics};
 
 /// Line width for diagnostics in error messages.
 const COLUMNS: usize = 120;
@@ -52,7 +52,7 @@ impl fmt::Display for AbortReason {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Failed(Failure::Scene(diagnostics)) => {
-                f.write_str(render_report(diagnostics, COLUMNS, ReportStyle::Plain).trim_end())
+                f.write_str(render_diagnostics(diagnostics, COLUMNS, ReportStyle::Plain).trim_end())
             }
             Self::Failed(Failure::Work(message)) => f.write_str(message),
             Self::Canceled => f.write_str("the render was canceled"),
@@ -76,7 +76,7 @@ impl From<Box<Diagnostic>> for AbortReason {
 
 impl AbortReason {
     #[allow(clippy::needless_pass_by_value, reason = "`map_err` passes ownership")]
-    pub(super) fn work_failure(message: impl ToString) -> Self {
+    pub(super) fn from_work_error(message: impl ToString) -> Self {
         Self::Failed(Failure::Work(message.to_string()))
     }
 
@@ -86,7 +86,7 @@ impl AbortReason {
             AssetError::Canceled(_) => Err(Self::Canceled),
             AssetError::OutOfMemory { .. }
             | AssetError::MemoryLimit { .. }
-            | AssetError::TooManyOpenFiles { .. } => Err(Self::work_failure(error)),
+            | AssetError::TooManyOpenFiles { .. } => Err(Self::from_work_error(error)),
             AssetError::Unreadable { .. } | AssetError::Malformed { .. } => Ok(error),
         }
     }
@@ -222,7 +222,7 @@ impl Findings {
     ///
     /// # Errors
     /// Returns all conflicts if the image must be written.
-    pub(super) fn record_conflicts(
+    pub(super) fn record_output_conflicts(
         &mut self,
         found: Vec<Diagnostic>,
         writing: WriteRequirement,

@@ -57,7 +57,7 @@ fn abort_reason_from_import_error(
         AssetError::Canceled(_) => AbortReason::Canceled,
         AssetError::OutOfMemory { .. }
         | AssetError::MemoryLimit { .. }
-        | AssetError::TooManyOpenFiles { .. } => AbortReason::work_failure(error),
+        | AssetError::TooManyOpenFiles { .. } => AbortReason::from_work_error(error),
         AssetError::Unreadable { path, reason } => {
             if let Ok(content) = reading.contents.first_seen_content_id(&path, reading.token) {
                 findings.add_file(FilePathAndContentId { path: path.clone(), content });

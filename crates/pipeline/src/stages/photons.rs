@@ -20,7 +20,9 @@ use super::super::stopwatch::PausableStopwatch;
 use super::super::trace::TICK;
 use super::StageResult;
 use crate::control::{CancelToken, Canceled, Progress};
-use crate::integrators::{PhotonMapper, PhotonPass, PhotonPassesBySample, PhotonSettings, RenderSettings};
+use crate::integrators::{
+    PhotonPass, PhotonPassTracer, PhotonPassesBySample, PhotonSettings, RenderSettings,
+};
 use crate::scene::description::RenderOptions;
 use crate::scene::fingerprint::Fingerprint;
 use crate::world::World;
@@ -51,7 +53,7 @@ pub(crate) struct PhotonContext<'a> {
 /// Photons for a scene.
 #[derive(Debug)]
 pub(crate) struct PhotonStore {
-    photons: PhotonMapper,
+    photons: PhotonPassTracer,
     /// Cached passes, starting with the first.
     kept: RefCell<Vec<Arc<PhotonPass>>>,
     /// Photon counts of the current request.
@@ -149,7 +151,7 @@ impl PhotonStore {
     /// Reports the photons traced since the stage started, and the cached maps.
     pub(crate) fn report(&self) -> PhotonsReport {
         let PhotonCounts { passes, emitted, stored, lookups, seconds, max_alive_bytes } = self.sent.get();
-        let [caustic, bounced] = self.photons.initial_radii();
+        let [caustic, bounced] = self.photons.first_pass_radii();
         PhotonsReport {
             count: self.photons.photons_per_pass(),
             passes,
@@ -248,7 +250,7 @@ pub(crate) fn trace_first_photons(
     let watch = PausableStopwatch::start(token);
     let send = |progress: Progress<'_>| {
         run_with_ticks(pool, &mut tick, || {
-            PhotonMapper::new_with_first_pass(world, &settings, of_photons, progress, token)
+            PhotonPassTracer::new_with_first_pass(world, &settings, of_photons, progress, token)
         })
     };
     let (photons, first) = sending.sink.load_asset_with_progress("photons", send)?;

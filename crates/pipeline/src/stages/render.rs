@@ -32,17 +32,17 @@ pub(crate) fn render(
             false => ConvergenceModel::Stratified,
         };
         let state = || FilmState::new(key, rendering.plan, max_bytes, convergence, share.clone());
-        let empty = films.replace_current_with_retry(state).map_err(AbortReason::work_failure)?;
+        let empty = films.replace_current_with_retry(state).map_err(AbortReason::from_work_error)?;
         let is_usable = match rendering.checkpointer.filter(|_| !force) {
             Some(checkpointer) => checkpointer.resume(empty, wanted)?,
             None => true,
         };
         if !is_usable {
-            films.replace_current_with_retry(state).map_err(AbortReason::work_failure)?;
+            films.replace_current_with_retry(state).map_err(AbortReason::from_work_error)?;
         }
     }
     let Some(state) = films.current_mut() else {
-        return Err(AbortReason::work_failure("the film is missing"));
+        return Err(AbortReason::from_work_error("the film is missing"));
     };
     let budget = rendering.plan.limits.seconds;
     let is_part = state.is_finished_part;
@@ -72,7 +72,7 @@ pub(crate) fn render(
         }
         (false, _) if state.goals.has_goal_below(wanted) => {
             let missed = state
-                .count_tiles_above_noise_target(error.into())
+                .count_finished_tiles_above_target(error.into())
                 .map_or_else(String::new, |(tiles, worst)| {
                     format!("; {tiles} with a few noisy pixels (noise up to {worst:.2})")
                 });

@@ -17,12 +17,12 @@ use crate::control::Progress;
 use crate::materials::Mipmaps;
 use crate::materials::texels::Texels;
 use crate::scene::fingerprint::{Fingerprint, FingerprintHasher};
-use crate::world::{AlphaCutoffKey, NeededTexture, TextureSource};
+use crate::world::{HashableAlphaCutoff, NeededTexture, TextureImageSource};
 
 /// Canonical path of an image, and how to interpret its values.
-pub(super) type TextureKey = (PathBuf, Option<u32>, ColorEncoding, Option<AlphaCutoffKey>);
+pub(super) type TextureKey = (PathBuf, Option<u32>, ColorEncoding, Option<HashableAlphaCutoff>);
 
-pub(super) fn texture_key(source: &TextureSource) -> TextureKey {
+pub(super) fn texture_key(source: &TextureImageSource) -> TextureKey {
     (canonical(&source.path), source.image, source.encoding, source.coverage)
 }
 
@@ -210,7 +210,7 @@ fn decode_image(
 
 /// Returns where an image's bytes are stored.
 fn locate_image_bytes(
-    source: &TextureSource,
+    source: &TextureImageSource,
     reading: &FileReadContext<'_>,
 ) -> Result<ImageInput, AssetError> {
     match source.image {
@@ -223,7 +223,7 @@ fn locate_image_bytes(
 
 /// Returns the width, height and memory size of an image.
 fn image_dimensions_and_memory(
-    source: &TextureSource,
+    source: &TextureImageSource,
     reading: &FileReadContext<'_>,
 ) -> Result<(u32, u32, u64), AssetError> {
     let (limits, encoding) = (ImageLimits::default(), source.encoding);

@@ -29,7 +29,7 @@ pub(super) fn replace_unreadable_image(
     let mut warn = |material: &str| {
         let help = format!("glimt shows the material \"{material}\" in {file} without it");
         let warning = loaded.create_diagnostic_at(
-            reference_span(loaded, one),
+            texture_reference_span(loaded, one),
             Severity::Warning,
             prefix_mtl_line(one, error),
             Some(help),
@@ -42,8 +42,11 @@ pub(super) fn replace_unreadable_image(
     let Some(declared) = one.declared else { return };
     let mut is_light = true;
     for material in &loaded.scene.materials {
-        let mut roles =
-            material.textures().into_iter().filter(|(texture, _)| *texture == declared).peekable();
+        let mut roles = material
+            .own_textures_with_roles()
+            .into_iter()
+            .filter(|(texture, _)| *texture == declared)
+            .peekable();
         if roles.peek().is_some() {
             warn(&material.name);
         }
@@ -78,7 +81,7 @@ pub(super) fn add_unreadable_image_errors(
     findings: &mut Findings,
 ) {
     for one in &image.asked_by {
-        let span = reference_span(loaded, one);
+        let span = texture_reference_span(loaded, one);
         match (&one.material, one.mesh_file) {
             (Some(material), Some(file)) => {
                 let file = loaded.scene.mesh_files[file].value.display();
@@ -102,7 +105,7 @@ pub(super) fn warn_about_image(
     let (heights, alpha) = (gray_normal_map_warning(image, texels), opaque_alpha_warning(image, texels));
     let of_file = decoded.warnings.iter().map(|message| (first, message.clone()));
     for (one, message) in pixels.into_iter().chain(heights).chain(alpha).chain(of_file) {
-        findings.add_warning(loaded, reference_span(loaded, one), prefix_mtl_line(one, &message));
+        findings.add_warning(loaded, texture_reference_span(loaded, one), prefix_mtl_line(one, &message));
     }
 }
 
@@ -149,15 +152,15 @@ fn opaque_alpha_warning<'a>(
 }
 
 /// Returns the span of the environment map's file name.
-pub(super) fn environment_span(scene: &Scene) -> Option<Range<usize>> {
+pub(super) fn environment_file_span(scene: &Scene) -> Option<Range<usize>> {
     scene.environment.as_ref()?.file.as_ref().map(|file| file.span.clone())
 }
 
 /// Returns the span that references a texture: its own table, or the mesh whose materials use it.
-fn reference_span(loaded: &LoadedScene, one: &NeededTexture) -> Range<usize> {
+fn texture_reference_span(loaded: &LoadedScene, one: &NeededTexture) -> Range<usize> {
     let scene = &loaded.scene;
     let declared = one.declared.and_then(|index| Some(scene.textures[index].as_image()?.file.span.clone()));
     let mesh = || one.mesh_file.map(|index| scene.mesh_files[index].span.clone());
-    let environment = || environment_span(scene).filter(|_| one.is_environment);
+    let environment = || environment_file_span(scene).filter(|_| one.is_environment);
     declared.or_else(mesh).or_else(environment).unwrap_or(0..0)
 }

@@ -14,7 +14,7 @@ use super::texture_images::{
     texture_key,
 };
 use super::texture_warnings::{
-    add_unreadable_image_errors, environment_span, replace_unreadable_image, warn_about_image,
+    add_unreadable_image_errors, environment_file_span, replace_unreadable_image, warn_about_image,
 };
 use super::{AbortReason, FileCounts, FileReadContext, Findings, StageResult, loading_result};
 use crate::assets::image::ColorEncoding;
@@ -25,7 +25,7 @@ use crate::scene::LoadedScene;
 use crate::scene::description::TextureEncoding;
 use crate::scene::fingerprint::Fingerprint;
 use crate::world::{
-    Images, NeededTexture, TexelsAndMipmaps, TextureRolesNeededByRender, TextureSource,
+    Images, NeededTexture, TexelsAndMipmaps, TextureImageSource, TextureRolesNeededByRender,
     environment_map_source, textures_needed,
 };
 
@@ -63,7 +63,7 @@ impl TextureCache {
 pub(crate) struct Textures {
     pub(crate) images: Images,
     /// Key of each image.
-    pub(crate) key_of: HashMap<TextureSource, Fingerprint>,
+    pub(crate) key_of: HashMap<TextureImageSource, Fingerprint>,
     /// Key of each texture, in the same order as the needed textures.
     pub(crate) keys: Vec<Fingerprint>,
     /// Keys of the textures used by materials from mesh files.
@@ -198,7 +198,7 @@ pub(crate) fn load_textures(
     if let Some((_, texels)) = textures.environment.as_ref().filter(|(_, texels)| texels.is_black()) {
         let size = format!("{} × {}", texels.width, texels.height);
         let message = format!("the environment map is black: none of its {size} pixels emits light");
-        findings.add_warning(loaded, environment_span(&loaded.scene).unwrap_or(0..0), message);
+        findings.add_warning(loaded, environment_file_span(&loaded.scene).unwrap_or(0..0), message);
     }
     Ok(loading_result(textures, FileCounts { left_out: *left_out, ..counts }))
 }
@@ -251,7 +251,7 @@ fn add_check_only_textures(loaded: &LoadedScene, wanted: &mut Vec<NeededTexture>
             TextureEncoding::Linear => ColorEncoding::Linear,
         };
         let (path, image) = (image.file.value.clone(), image.image);
-        let source = TextureSource { path, image, encoding, coverage: None };
+        let source = TextureImageSource { path, image, encoding, coverage: None };
         wanted.push(NeededTexture {
             source,
             name: texture.name.clone(),

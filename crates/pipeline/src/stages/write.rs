@@ -20,7 +20,7 @@ use crate::choice::Choice;
 use crate::control::CancelToken;
 use crate::film::tone::tone_map_to_8_bits;
 use crate::film::{RadianceImage, Rect, SampleCountStats, Srgb8Image};
-use crate::integrators::{AovSource, LightAov, RenderSettings};
+use crate::integrators::{AovSource, PathAov, RenderSettings};
 use crate::output::part::{self, PartHeader, PartOrCheckpoint};
 use crate::output::write::{Durability, ExistingFilePolicy, SweptFolders};
 use crate::output::{self, BitDepth, FilmEncodingSettings, Format, OutputError, scene_path};
@@ -87,8 +87,8 @@ pub(crate) fn check_outputs_are_writable(
     match writing {
         WriteRequirement::No => Ok(()),
         WriteRequirement::Must => {
-            check_each_target_is_writable(plan, output::check_image_path, output::check_file_target)
-                .map_err(AbortReason::work_failure)
+            check_each_target_is_writable(plan, output::check_image_target, output::check_output_path)
+                .map_err(AbortReason::from_work_error)
         }
         WriteRequirement::Try => {
             if let Err(error) = check_each_target_is_writable(
@@ -167,7 +167,7 @@ fn write_outdated_outputs(
     let (mut count, mut errors) = (0, Vec::new());
     for path in &plan.outputs.images {
         let key = image_file_key(state, plan, path);
-        if let Some(content) = contents.outputs.content_if_image_matches(path, key)
+        if let Some(content) = contents.outputs.content_written_for_image(path, key)
             && contents.read_content_id(path, token)? == content
         {
             continue;
@@ -212,7 +212,11 @@ fn write_outdated_outputs(
             let last = errors.last().map(|(_, message)| message.clone()).unwrap_or_default();
             errors.truncate(errors.len() - usize::from(is_must));
             errors.into_iter().for_each(|(path, message)| sink.send_write_failed(Some(path), message));
-            if is_must { Err(AbortReason::work_failure(last)) } else { Ok(StageResult::skipped(false, last)) }
+            if is_must {
+                Err(AbortReason::from_work_error(last))
+            } else {
+                Ok(StageResult::skipped(false, last))
+            }
         }
         (true, 0) => Ok(StageResult::reused(true, reasons::ALREADY_WRITTEN)),
         (true, 1) => Ok(StageResult::done(true, "")),
@@ -258,7 +262,7 @@ pub(crate) fn add_frame_and_write_if_last(
 ) -> Result<StageResult<bool>, AbortReason> {
     let ImageWriteContext { plan, inputs, sink, .. } = to;
     let finish = image_encoding_settings(plan);
-    let image = finish.quantity_image(&state.film);
+    let image = finish.extract_quantity(&state.film);
     written.frames.truncate(turn.number as usize);
     written.frames.push((
         tone_map_to_8_bits(&image, &finish.tone.with_image_range(&image)),
@@ -287,7 +291,7 @@ pub(crate) fn add_frame_and_write_if_last(
         match write() {
             Ok(bytes) => sink.send_image_written(path, bytes, true, None),
             Err(OutputError::Canceled(_)) => return Err(AbortReason::Canceled),
-            Err(error) => return Err(AbortReason::work_failure(error)),
+            Err(error) => return Err(AbortReason::from_work_error(error)),
         }
     }
     Ok(StageResult::done(true, format!("{} frames", frames.len())))
@@ -325,7 +329,7 @@ fn write_part(
 ) -> Result<u64, OutputError> {
     let identity = state.identity.clone().unwrap_or_default();
     let scene = scene_path::relative_to_image(&plan.path, path);
-    let references = inputs.relative_paths(&plan.path);
+    let references = inputs.paths_relative_to_scene(&plan.path);
     let head = create_header(PartOrCheckpoint::Part, state, identity, &image_encoding_settings(plan));
     let head = PartHeader { scene, references, ..head };
     let save = |guard: &ExistingFilePolicy<'_>| {
@@ -342,7 +346,7 @@ pub(crate) fn image_encoding_settings(plan: &RenderPlan) -> FilmEncodingSettings
         tone: plan.tone_mapping(),
         bit_depth: BitDepth::try_from(plan.bit_depth).unwrap_or_default(),
         metadata: image_metadata(plan),
-        is_light: matches!(plan.settings.view.aov_source(), AovSource::Light(LightAov::Radiance(_))),
+        is_light: matches!(plan.settings.view.aov_source(), AovSource::Light(PathAov::Radiance(_))),
     }
 }
 

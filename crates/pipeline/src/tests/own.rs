@@ -1,7 +1,7 @@
 //! Tests for the scene's own image while the user views another one.
 
 use super::*;
-use crate::protocol::SavedSceneImageState;
+use crate::protocol::SavedSceneRenderStatus;
 use crate::scene::description::ShadowMode;
 use crate::settings::{CheckpointSettings, ResumeMode, ViewMode};
 
@@ -51,7 +51,7 @@ fn assert_resumed(report: &Report) {
     assert!(why.starts_with(reasons::RESUMED), "{report:?}");
 }
 
-fn states(events: &[Event]) -> Vec<SavedSceneImageState> {
+fn states(events: &[Event]) -> Vec<SavedSceneRenderStatus> {
     let state = |event: &Event| match event {
         Event::OwnImage { state, .. } => Some(*state),
         _ => None,
@@ -75,7 +75,7 @@ fn viewing_does_not_change_output_files() {
     ];
     for change in changes {
         let events = keys.shown(change);
-        assert_eq!(states(&events), [SavedSceneImageState::Written; 2], "{events:?}");
+        assert_eq!(states(&events), [SavedSceneRenderStatus::Written; 2], "{events:?}");
         assert!(!events.iter().any(|event| matches!(event, Event::Written { .. })));
         assert!(files(&keys) == before);
     }
@@ -96,7 +96,7 @@ fn write_command_saves_the_shown_image() {
     let events = keys.0.until_end(of);
     let by_hand = |event: &Event| matches!(event, Event::Written { is_own: false, .. });
     assert!(events.iter().any(by_hand), "{events:?}");
-    assert_eq!(states(&events).last(), Some(&SavedSceneImageState::Begun { is_rendering: false }));
+    assert_eq!(states(&events).last(), Some(&SavedSceneRenderStatus::Begun { is_rendering: false }));
     assert!(keys.0.picture() != own, "without shadows");
     let shadows = || {
         let report = fs::read_to_string(&report).expect("a report");
@@ -154,7 +154,7 @@ fn own_render_keeps_an_image_written_on_request() {
         let written = keys.0.picture();
         let events = keys.0.until_end(of);
         assert!(!events.iter().any(|event| matches!(event, Event::Written { .. })), "{events:?}");
-        assert!(matches!(states(&events).last(), Some(SavedSceneImageState::Begun { .. })), "{events:?}");
+        assert!(matches!(states(&events).last(), Some(SavedSceneRenderStatus::Begun { .. })), "{events:?}");
         let (report, _) = keys.0.done();
         assert_eq!(report.image.path, None);
         assert_eq!(report.stages[Stage::Write as usize].why, reasons::OTHER_IMAGE_WRITTEN);
@@ -180,7 +180,7 @@ fn save_replaces_an_image_written_on_request() {
     // The scene's own image shares its film with the preview.
     keys.0.edit("[camera", "[camera] # saved");
     let events = keys.shown(|overrides| overrides.exposure = Some(2.0));
-    assert_eq!(states(&events).last(), Some(&SavedSceneImageState::Written));
+    assert_eq!(states(&events).last(), Some(&SavedSceneRenderStatus::Written));
     let own = keys.0.picture();
     assert!(own != written);
     // Without a shared film, the saved scene's image is written once the user returns to the scene's
@@ -201,7 +201,7 @@ fn requested_image_is_not_kept_once_removed() {
     let (of, written) = write_brighter(&mut keys);
     fs::rename(keys.0.path("out.ppm"), keys.0.path("bright.ppm")).expect("moved");
     let events = keys.0.until_end(of);
-    assert_eq!(states(&events).last(), Some(&SavedSceneImageState::Written));
+    assert_eq!(states(&events).last(), Some(&SavedSceneRenderStatus::Written));
     assert!(keys.0.picture() != written);
 }
 
@@ -246,15 +246,15 @@ fn edit_during_another_view_keeps_old_image() {
     keys.0.done();
     let old = keys.0.picture();
     keys.0.edit("intensity = [10, 10, 10]", "intensity = [5, 5, 5]");
-    assert_eq!(states(&keys.shown(no_shadows)), [SavedSceneImageState::NotBegun; 2]);
+    assert_eq!(states(&keys.shown(no_shadows)), [SavedSceneRenderStatus::NotBegun; 2]);
     assert!(keys.0.picture() == old);
     // After the edit is reverted and a comment added, the image is up to date again.
     keys.0.edit("intensity = [5, 5, 5]", "intensity = [10, 10, 10] # as before");
-    assert_eq!(states(&keys.shown(no_shadows)), [SavedSceneImageState::Written; 2]);
+    assert_eq!(states(&keys.shown(no_shadows)), [SavedSceneRenderStatus::Written; 2]);
     // Saving the shown settings in the scene makes this the scene's own image.
     keys.0.edit("samples = 4", "samples = 4\nshadows = \"off\"");
     let events = keys.shown(no_shadows);
-    assert_eq!(states(&events).last(), Some(&SavedSceneImageState::Written));
+    assert_eq!(states(&events).last(), Some(&SavedSceneRenderStatus::Written));
     assert!(keys.0.picture() != old);
 }
 
@@ -309,7 +309,7 @@ fn interrupted_own_render_resumes() {
     let mut keys = ToggledBench::with(render_slowly);
     begin(&mut keys);
     let events = keys.shown(no_shadows);
-    assert_eq!(states(&events), [SavedSceneImageState::Begun { is_rendering: false }; 2]);
+    assert_eq!(states(&events), [SavedSceneRenderStatus::Begun { is_rendering: false }; 2]);
     assert!(!keys.0.path("out.ppm").exists());
     let (report, _) = keys.0.done();
     assert_resumed(&report);
@@ -323,7 +323,7 @@ fn own_image_is_written_despite_exposure_change() {
     let events = keys.shown(|overrides| overrides.exposure = Some(2.0));
     assert_eq!(
         states(&events),
-        [SavedSceneImageState::Begun { is_rendering: true }, SavedSceneImageState::Written]
+        [SavedSceneRenderStatus::Begun { is_rendering: true }, SavedSceneRenderStatus::Written]
     );
     let picture = keys.0.picture();
     let (report, _) = keys.0.done();
@@ -452,7 +452,7 @@ fn own_film_may_be_dropped_once_written() {
         keys.0.overrides.memory = Some(estimate_memory(&keys, &keys.0.overrides) + more);
         keys.0.done();
         let own = keys.0.picture();
-        assert_eq!(states(&keys.shown(no_shadows)), [SavedSceneImageState::Written; 2]);
+        assert_eq!(states(&keys.shown(no_shadows)), [SavedSceneRenderStatus::Written; 2]);
         assert!(keys.0.picture() == own);
         let (report, _) = keys.0.done();
         assert_statuses(&report, if stays { "rrrrrsrr" } else { "rrrrrsdr" });

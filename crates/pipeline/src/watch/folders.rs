@@ -59,7 +59,7 @@ impl WatchedFolders {
         let handler = move |event: notify::Result<Event>| {
             let names = of_interest.lock().unwrap_or_else(PoisonError::into_inner);
             if let Some(hint) =
-                event.map_or(Some(ChangeHint::Touched), |event| hint_for_event(&event, &names))
+                event.map_or(Some(ChangeHint::Touched), |event| change_hint_for_event(&event, &names))
             {
                 say(hint);
             }
@@ -149,7 +149,7 @@ impl WatchedFolders {
 
 /// Converts an event to a hint if it concerns one of the names. Ignores reads, because the watcher's own
 /// reads would wake it.
-fn hint_for_event(event: &Event, names: &HashSet<OsString>) -> Option<ChangeHint> {
+fn change_hint_for_event(event: &Event, names: &HashSet<OsString>) -> Option<ChangeHint> {
     let mut of_paths = event.paths.iter().map(|path| path.file_name());
     let named = of_paths.clone().flatten().find(|name| names.contains(*name)).map(ToOwned::to_owned);
     // An event without a path or a file name may concern any file.
@@ -218,7 +218,8 @@ mod tests {
     #[test]
     fn events_are_converted_to_hints() {
         let names = HashSet::from([OsString::from("a.toml")]);
-        let of = |kind, path: &str| hint_for_event(&Event::new(kind).add_path(PathBuf::from(path)), &names);
+        let of =
+            |kind, path: &str| change_hint_for_event(&Event::new(kind).add_path(PathBuf::from(path)), &names);
         let name = || OsString::from("a.toml");
         let closed = EventKind::Access(AccessKind::Close(AccessMode::Write));
         let renamed = |mode| EventKind::Modify(ModifyKind::Name(mode));
@@ -235,7 +236,8 @@ mod tests {
     #[test]
     fn reads_and_unrelated_names_are_ignored() {
         let names = HashSet::from([OsString::from("a.toml")]);
-        let of = |kind, path: &str| hint_for_event(&Event::new(kind).add_path(PathBuf::from(path)), &names);
+        let of =
+            |kind, path: &str| change_hint_for_event(&Event::new(kind).add_path(PathBuf::from(path)), &names);
         let opened = EventKind::Access(AccessKind::Open(AccessMode::Any));
         let read = EventKind::Access(AccessKind::Close(AccessMode::Read));
         assert_eq!(of(opened, "/x/a.toml"), None);
@@ -244,7 +246,7 @@ mod tests {
         assert_eq!(of(EventKind::Create(CreateKind::File), "/x/b"), None);
         let overflow = Event::new(EventKind::Other);
         assert_eq!(
-            hint_for_event(&overflow, &names),
+            change_hint_for_event(&overflow, &names),
             Some(ChangeHint::Touched),
             "a queue overflow may concern any file"
         );

@@ -120,7 +120,7 @@ impl WrittenOutputs {
     }
 
     /// Returns the content of a file when glimt wrote this image to it.
-    pub(crate) fn content_if_image_matches(&self, path: &Path, key: Fingerprint) -> Option<FileContentId> {
+    pub(crate) fn content_written_for_image(&self, path: &Path, key: Fingerprint) -> Option<FileContentId> {
         self.lock().get(path).filter(|output| output.image == Some(key)).map(|output| output.content)
     }
 

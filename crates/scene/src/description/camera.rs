@@ -80,7 +80,7 @@ impl Projection {
     }
 
     /// Returns the projection with another field of view or image height, if it has one.
-    pub fn with_change(self, fov: Option<f64>, view_height: Option<f64>) -> Self {
+    pub fn with_fov_or_view_height(self, fov: Option<f64>, view_height: Option<f64>) -> Self {
         match self {
             Self::Perspective { fov: own } => Self::Perspective { fov: fov.unwrap_or(own) },
             Self::Orthographic { view_height: own } => {
@@ -198,7 +198,7 @@ impl ResolvedCamera {
         let focus = if self.is_focused_on_look_at() { pose.distance() } else { self.focus };
         Self {
             pose,
-            projection: self.projection.with_change(change.fov, change.view_height),
+            projection: self.projection.with_fov_or_view_height(change.fov, change.view_height),
             focus: change.focus.unwrap_or(focus),
             ..*self
         }

@@ -556,7 +556,7 @@ impl Material {
 
     /// Returns the material's textures, as indices into [`Scene::textures`](super::Scene::textures) with
     /// their roles, but not those of the parts of a blend. A texture may occur several times.
-    pub fn textures(&self) -> Vec<(usize, TextureRole)> {
+    pub fn own_textures_with_roles(&self) -> Vec<(usize, TextureRole)> {
         let Self { name: _, kind, sides: _, emission, normal_map, bump, opacity, coat } = self;
         let coat = Some(coat).filter(|coat| coat.exists());
         let coat_tint = coat.map(|coat| (&coat.tint, TextureRole::Facets));

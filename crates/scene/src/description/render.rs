@@ -2,7 +2,7 @@
 
 use super::super::fingerprint::{FingerprintContext, FingerprintHasher, Fingerprinted};
 use super::super::keys::key::{
-    COLOR, DefaultValue, KeyInfo, ValueKind, choice_values, doc_text, parsed_default,
+    COLOR, DefaultValue, KeyInfo, ValueKind, choice_values, doc_without_final_period, parsed_default,
 };
 use super::super::keys::limits::Limits;
 use super::method::Integrator;
@@ -164,7 +164,7 @@ macro_rules! settings {
                     default_value: parsed_default!(DefaultValue::Is(
                         in_toml!($range, RenderOptions::DEFAULT.$name).leak()
                     )),
-                    doc: doc_text(concat!($($doc),*)),
+                    doc: doc_without_final_period(concat!($($doc),*)),
                 }),*]
             }
         }

@@ -49,7 +49,7 @@ impl Object {
         let placement = if has_own_steps { outer } else { &transform };
         Self {
             placement: self.placement.map(|_| Box::new(placement.to_affine_map())),
-            shape: self.shape.with_transform(transform),
+            shape: self.shape.with_replaced_transform(transform),
             ..self
         }
     }
@@ -257,7 +257,7 @@ impl Shape {
 
     /// Replaces the transform of a mesh, or the matrix of another shape; see [`Shape::transformed`].
     #[must_use]
-    pub fn with_transform(self, transform: ObjectTransform) -> Self {
+    pub fn with_replaced_transform(self, transform: ObjectTransform) -> Self {
         match self {
             Self::Mesh(mesh) => Self::Mesh(MeshReference { placed: transform, ..mesh }),
             Self::Transformed { shape, matrix: _ } => shape.transformed(transform.to_affine_map()),

@@ -88,7 +88,7 @@ impl Issue {
     }
 
     /// Marks the issue as a syntax error.
-    pub(super) fn with_syntax_error_cause(self) -> Self {
+    pub(super) fn marked_as_syntax_error(self) -> Self {
         Self { cause: IssueCause::Syntax, ..self }
     }
 }

@@ -144,7 +144,7 @@ fn read_instance(table: &TableReader<'_>, names: &DefinedNames) -> Option<Instan
     let group = table.key("group").index_by_name(names);
     let (transform, name) = (read_transform(table), table.key("name").optional_shape_name());
     table.report_unknown_and_missing_keys();
-    let (id, span) = (table.id(), table.span.clone());
+    let (id, span) = (table.table_id(), table.span.clone());
     Some(InstanceTable { id, group: group?, transform: transform?, name: name?, span })
 }
 
@@ -218,7 +218,7 @@ fn report_cycle(
 const MAX_COPIES: u64 = 2_000_000;
 
 impl DefinedGroups {
-    fn list(&self) -> &[ObjectGroup] {
+    fn all_groups(&self) -> &[ObjectGroup] {
         self.list.as_deref().unwrap_or_default()
     }
 
@@ -231,7 +231,7 @@ impl DefinedGroups {
     ) -> Option<usize> {
         let mut total = 0_u64;
         for instance in instances {
-            let size = self.list()[instance.group].size;
+            let size = self.all_groups()[instance.group].size;
             total = total.saturating_add(size);
             if total > MAX_COPIES {
                 let name = escape_and_truncate(self.names.name(instance.group), 40);
@@ -260,7 +260,7 @@ impl DefinedGroups {
         instance: &InstanceTable,
         objects: &mut Vec<Object>,
     ) -> Option<()> {
-        let members = |instance: &InstanceTable| self.list()[instance.group].members.iter();
+        let members = |instance: &InstanceTable| self.all_groups()[instance.group].members.iter();
         // Groups being expanded, from the outermost to the innermost, with their transforms.
         let mut open = vec![(members(instance), instance.transform)];
         while let Some((rest, outer)) = open.last_mut() {

@@ -10,7 +10,7 @@ mod vector;
 use std::ops::Range;
 
 use super::super::keys::key::{KeyInfo, ValueKind};
-use super::super::nearest::foreign_or_nearest_name;
+use super::super::nearest::translated_or_nearest_name;
 use super::super::sanitize::escape_and_truncate;
 use super::super::toml::{KeyValue, Number};
 use super::context::{FileContext, Issue};
@@ -136,11 +136,11 @@ impl<'a> KeyInTable<'a> {
 
     /// Reads a string. `expected` describes the string in error messages.
     pub(super) fn string(&self, expected: &str) -> Option<&'a str> {
-        self.string_described_by(|| expected.to_owned())
+        self.read_string_described_by(|| expected.to_owned())
     }
 
     /// Reads a string. `expected` returns the description of the string for error messages.
-    fn string_described_by(&self, expected: impl FnOnce() -> String) -> Option<&'a str> {
+    fn read_string_described_by(&self, expected: impl FnOnce() -> String) -> Option<&'a str> {
         let value = self.value?;
         let text = value.as_str();
         if text.is_none() {
@@ -176,7 +176,7 @@ impl<'a> KeyInTable<'a> {
             let list = C::ALL.iter().map(|one| format!("\"{}\"", one.name())).collect::<Vec<_>>().join(", ");
             if C::ALL.len() == 1 { list } else { format!("one of {list}") }
         };
-        let text = self.string_described_by(list)?;
+        let text = self.read_string_described_by(list)?;
         if let Some(meant) = C::named(text) {
             return Some(meant);
         }
@@ -190,7 +190,7 @@ impl<'a> KeyInTable<'a> {
                 .with_help(format!("expected {list}"))
         };
         let names: Vec<&str> = C::ALL.iter().map(|one| one.name()).collect();
-        if let Some(near) = foreign_or_nearest_name(text, &names) {
+        if let Some(near) = translated_or_nearest_name(text, &names) {
             issue = issue.with_label(format!("did you mean \"{near}\"?"));
         }
         self.context.report(issue);
@@ -214,7 +214,7 @@ impl<'a> KeyInTable<'a> {
 
     /// Reads a name and returns the name's index in `names`.
     pub(super) fn index_by_name(&self, names: &DefinedNames) -> Option<usize> {
-        let text = self.string_described_by(|| format!("the name of a {}", names.kind))?;
+        let text = self.read_string_described_by(|| format!("the name of a {}", names.kind))?;
         self.resolve_name_or_report(names, text, self.value_span())
     }
 

@@ -201,7 +201,8 @@ pub(super) fn read_materials(root: &TableReader<'_>, textures: &DefinedTextures)
         texture.is_some_and(|texture| texture.uv_set().is_none())
     };
     let use_object_point = all(&|material: &Material| {
-        let mut textures = material.self_and_blend_parts().into_iter().flat_map(Material::textures);
+        let mut textures =
+            material.self_and_blend_parts().into_iter().flat_map(Material::own_textures_with_roles);
         textures.any(|(texture, _)| is_of_object(texture))
     });
     MaterialList { names, list: read.into_iter().collect(), emissive, use_object_point }
@@ -218,9 +219,10 @@ fn read_material(
     let table = &MaterialReader { table, textures: &textures.names, defined_textures: &textures.list };
     let (kind, coat) = match kind {
         MaterialType::Phong => (Some(MaterialKind::Phong(table.read_phong())), table.read_coat()),
-        MaterialType::Mirror => {
-            (Some(MaterialKind::Mirror { reflectance: table.color("reflectance") }), table.read_coat())
-        }
+        MaterialType::Mirror => (
+            Some(MaterialKind::Mirror { reflectance: table.color_or_texture("reflectance") }),
+            table.read_coat(),
+        ),
         MaterialType::Glass => {
             table.reject_coat_keys();
             (table.read_glass(), CoatSource::NONE)
@@ -257,7 +259,7 @@ impl<'a> MaterialReader<'a> {
     }
 
     /// Reads a color or a texture.
-    fn color(&self, name: &str) -> ColorSource {
+    fn color_or_texture(&self, name: &str) -> ColorSource {
         self.key(name).read_or_default(|key| key.color_or_texture(self.textures))
     }
 
@@ -311,7 +313,7 @@ impl<'a> MaterialReader<'a> {
             self.table.context.report(issue);
             return None;
         }
-        Some(MaterialKind::Pane { ior, tint: self.color("tint") })
+        Some(MaterialKind::Pane { ior, tint: self.color_or_texture("tint") })
     }
 
     fn read_metal(&self) -> Option<MaterialKind> {
@@ -366,8 +368,8 @@ impl<'a> MaterialReader<'a> {
     fn read_plastic(&self) -> MaterialKind {
         let roughness = self.number("roughness");
         MaterialKind::Plastic {
-            diffuse: self.color("diffuse"),
-            specular: self.color("specular"),
+            diffuse: self.color_or_texture("diffuse"),
+            specular: self.color_or_texture("specular"),
             ior: self.constant("ior"),
             roughness,
             distribution: self.read_distribution(roughness),
@@ -376,7 +378,7 @@ impl<'a> MaterialReader<'a> {
 
     fn read_principled(&self) -> MaterialKind {
         let names = ["color", "diffuse_transmission"];
-        let [color, diffuse_transmission] = names.map(|name| self.color(name));
+        let [color, diffuse_transmission] = names.map(|name| self.color_or_texture(name));
         let message = "`diffuse_transmission` is limited to 1 − `color`";
         let keys = names.map(|name| self.key(name));
         warn_about_albedo_above_one(message, &keys, &[&color, &diffuse_transmission]);
@@ -387,7 +389,7 @@ impl<'a> MaterialReader<'a> {
             roughness: self.number("roughness"),
             ior: self.constant("ior"),
             specular: self.number("specular"),
-            specular_color: self.color("specular_color"),
+            specular_color: self.color_or_texture("specular_color"),
             transmission: self.number("transmission"),
         }
     }
@@ -463,7 +465,7 @@ impl<'a> MaterialReader<'a> {
             weight: self.number("coat"),
             roughness: self.number("coat_roughness"),
             ior: self.constant("coat_ior"),
-            tint: self.color("coat_tint"),
+            tint: self.color_or_texture("coat_tint"),
         };
         coat.none_if_zero_weight()
     }

@@ -29,10 +29,12 @@ macro_rules! shape_table {
     ) => {
         $visibility const $const: $crate::document::shape_table::ShapeTableDefinition = {
             use $crate::document::shape_table::{ShapeTableDefinition, shape_table};
-            use $crate::keys::key::{DefaultValue, TableInfo, TableSyntax, ValueKind, doc_text, keys};
+            use $crate::keys::key::{
+                DefaultValue, TableInfo, TableSyntax, ValueKind, doc_without_final_period, keys,
+            };
             use $crate::keys::limits::Limits;
 
-            let doc = doc_text(concat!($($doc),+));
+            let doc = doc_without_final_period(concat!($($doc),+));
             let info = TableInfo::new($name, TableSyntax::List, doc, keys! {
                 $($keys)*
                 /// The material; optional for meshes whose file has materials.

@@ -232,7 +232,7 @@ pub(super) fn read_shape_objects(
     for shape in &SHAPES {
         for table in parent.tables(&shape.info) {
             match read_object(shape, &table, materials, files) {
-                Some(object) => add(table.id(), object),
+                Some(object) => add(table.table_id(), object),
                 None => is_valid = false,
             }
         }

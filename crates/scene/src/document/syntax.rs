@@ -51,12 +51,12 @@ pub(super) fn report_errors_and_collect_broken_lines(
         // Ignore errors after an unclosed bracket on the same line.
         let open = opened.get(&context.line_number_at_offset(error.span.start));
         if open.is_none_or(|open| error.span.start < *open) {
-            context.report(syntax_issue(context, &lists, error).with_syntax_error_cause());
+            context.report(syntax_issue(context, &lists, error).marked_as_syntax_error());
         }
     }
     for open in opened.into_values() {
         let issue = Issue::error(open..open + 1, "`[` opened here is not closed");
-        context.report(issue.with_help(unclosed_list_help(context, open)).with_syntax_error_cause());
+        context.report(issue.with_help(unclosed_list_help(context, open)).marked_as_syntax_error());
     }
     lines.into_iter().map(|line| line..first_line_unaffected_by_error(context, line)).collect()
 }
@@ -143,7 +143,7 @@ fn missing_commas_message(
     let line = context.line_text_by_number(context.line_number_at_offset(at))?;
     let inner = line.get(open.checked_sub(line_start)? + 1..)?;
     let inner = &inner[..inner.find(']')?];
-    let values = split_values(inner);
+    let values = split_at_separators(inner);
     let is_plain = |value: &&str| !value.contains(['[', '{', '"', '\'', '#', '=']);
     let list = format_array_if_short(&values).filter(|_| values.iter().all(is_plain))?;
     let missing = (values.len() - 1).saturating_sub(inner.matches(',').count());
@@ -169,7 +169,7 @@ fn wrong_brackets_issue(context: &FileContext<'_>, at: usize) -> Option<Issue> {
 /// Formats numbers with any separators as a list, ignoring a closing bracket.
 fn reformat_number_list(text: &str) -> Option<String> {
     let text = text.split('#').next().unwrap_or_default().trim();
-    let values = split_values(text.strip_suffix([']', ')', '}', '>']).unwrap_or(text));
+    let values = split_at_separators(text.strip_suffix([']', ')', '}', '>']).unwrap_or(text));
     let is_digit = |c: Option<char>| c.is_some_and(|c| c.is_ascii_digit());
     let is_number = |value: &&str| {
         let digits = value.trim_start_matches(['+', '-']);
@@ -181,7 +181,7 @@ fn reformat_number_list(text: &str) -> Option<String> {
 }
 
 /// Splits at commas, semicolons and whitespace.
-fn split_values(text: &str) -> Vec<&str> {
+fn split_at_separators(text: &str) -> Vec<&str> {
     text.split([',', ';', ' ', '\t']).map(str::trim).filter(|value| !value.is_empty()).collect()
 }
 

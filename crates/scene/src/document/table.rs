@@ -9,7 +9,7 @@ use super::super::keys::key::{
     COLOR, DefaultValue, KeyInfo, TableInfo, TableSyntax, TableTypeInfo, ValueKind, choice_values, keys,
     parsed_default,
 };
-use super::super::nearest::{foreign_or_nearest_name, nearest_name};
+use super::super::nearest::{nearest_name, translated_or_nearest_name};
 use super::super::sanitize::escape_and_truncate;
 use super::super::toml::{Entries, KeyValue, TableId};
 use super::context::{FileContext, Issue};
@@ -49,7 +49,7 @@ impl TableTitle<'_> {
         }
     }
 
-    fn keys(self) -> &'static [KeyInfo] {
+    fn known_keys(self) -> &'static [KeyInfo] {
         match self {
             Self::Root => &[],
             Self::Table(info) | Self::Named(info, _) | Self::Inner(.., info) => info.keys,
@@ -107,7 +107,7 @@ impl<'a> TableReader<'a> {
         title: TableTitle<'a>,
     ) -> Self {
         let (known, unavailable, missing) = Default::default();
-        Self { context, span, title, keys: [&[], title.keys()], entries, known, unavailable, missing }
+        Self { context, span, title, keys: [&[], title.known_keys()], entries, known, unavailable, missing }
     }
 
     /// Creates a reader for the file's root table.
@@ -138,8 +138,8 @@ impl<'a> TableReader<'a> {
     }
 
     /// The table's ID, which orders tables as in the text.
-    pub(super) fn id(&self) -> TableId {
-        self.entries.id()
+    pub(super) fn table_id(&self) -> TableId {
+        self.entries.table_id()
     }
 
     /// Finds the entry called `name`, which then counts as known.
@@ -158,7 +158,7 @@ impl<'a> TableReader<'a> {
         let info = all.find(|key| key.name == name).expect("readers use only defined keys, as tests check");
         let key = KeyInTable::new(self.context, info, self.entry(info.name));
         if let DefaultValue::Required(example) = info.default {
-            self.require(&key, example);
+            self.record_if_missing(&key, example);
         }
         key
     }
@@ -167,12 +167,12 @@ impl<'a> TableReader<'a> {
     pub(super) fn key_required_without_alternative(&self, name: &str) -> KeyInTable<'a> {
         let key = self.key(name);
         if let DefaultValue::Alternative(example) = key.info.default {
-            self.require(&key, example);
+            self.record_if_missing(&key, example);
         }
         key
     }
 
-    fn require(&self, key: &KeyInTable<'a>, example: &'static str) {
+    fn record_if_missing(&self, key: &KeyInTable<'a>, example: &'static str) {
         let mut missing = self.missing.borrow_mut();
         let line = (key.info.name, example);
         if !key.is_present() && !missing.contains(&line) {
@@ -268,7 +268,7 @@ impl<'a> TableReader<'a> {
         let unavailable = self.unavailable.borrow();
         let is_other = |name: &&&'static str| absent(name) && !unavailable.contains(name);
         let others: Vec<&'static str> = known.iter().filter(is_other).copied().collect();
-        foreign_or_nearest_name(key, &others).or_else(|| nearest_name(key, known.iter().copied()))
+        translated_or_nearest_name(key, &others).or_else(|| nearest_name(key, known.iter().copied()))
     }
 
     /// Whether the file contains a table whose name is probably a misspelling of `name`.

@@ -197,7 +197,7 @@ pub(super) fn report_ambiguous_encodings(
 ) {
     let Some(list) = &textures.list else { return };
     let (mut colors, mut numbers) = (vec![false; list.len()], vec![false; list.len()]);
-    for (texture, role) in materials.iter().flat_map(Material::textures) {
+    for (texture, role) in materials.iter().flat_map(Material::own_textures_with_roles) {
         match role.pixel_interpretation() {
             PixelInterpretation::Color | PixelInterpretation::CutOut => colors[texture] = true,
             PixelInterpretation::Normal

@@ -243,7 +243,7 @@ macro_rules! keys {
                 unit: concat!($($unit)?),
                 default: $default,
                 default_value: $crate::keys::key::parsed_default!($default),
-                doc: $crate::keys::key::doc_text(concat!($($doc),+)),
+                doc: $crate::keys::key::doc_without_final_period(concat!($($doc),+)),
             },)*
         ]
     };
@@ -268,7 +268,7 @@ macro_rules! table_types {
         const $types: &[$crate::keys::key::TableTypeInfo] = &[
             $($crate::keys::key::TableTypeInfo {
                 name: $name,
-                doc: $crate::keys::key::doc_text(concat!($($doc),+)),
+                doc: $crate::keys::key::doc_without_final_period(concat!($($doc),+)),
                 keys: $crate::keys::key::keys! { $($keys)* },
             }),+
         ];
@@ -277,7 +277,7 @@ macro_rules! table_types {
 pub(crate) use table_types;
 
 /// Returns the text of a doc comment without its final period.
-pub(crate) const fn doc_text(lines: &'static str) -> &'static str {
+pub(crate) const fn doc_without_final_period(lines: &'static str) -> &'static str {
     match lines.trim_ascii().as_bytes() {
         [.., b'.'] => lines.trim_ascii().split_at(lines.trim_ascii().len() - 1).0,
         _ => lines.trim_ascii(),

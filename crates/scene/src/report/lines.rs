@@ -4,7 +4,7 @@ use annotate_snippets::Renderer;
 use anstyle::{AnsiColor, Effects};
 
 use super::super::diagnostic::Diagnostic;
-use super::render_report_with_renderer;
+use super::render_diagnostics_with_renderer;
 
 /// A line of a report.
 pub type ReportLine = Vec<StyledSpan>;
@@ -33,14 +33,14 @@ pub enum ReportTextRole {
     Message,
 }
 
-/// Returns the same report as [`super::render_report`], as styled lines.
+/// Returns the same report as [`super::render_diagnostics`], as styled lines.
 pub fn report_lines(diagnostics: &[Diagnostic], width: usize) -> Vec<ReportLine> {
     let renderer = Renderer::plain()
         .error(AnsiColor::Red.on_default())
         .warning(AnsiColor::Yellow.on_default())
         .line_num(AnsiColor::Blue.on_default())
         .emphasis(Effects::BOLD.into());
-    render_report_with_renderer(diagnostics, width, &renderer).lines().map(split_styled_spans).collect()
+    render_diagnostics_with_renderer(diagnostics, width, &renderer).lines().map(split_styled_spans).collect()
 }
 
 /// Splits a line at color escape sequences, all of which come from the renderer because text from files is

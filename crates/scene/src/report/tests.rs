@@ -17,7 +17,7 @@ fn at(source: &Arc<str>, span: Range<usize>, label: &str) -> Diagnostic {
 #[test]
 fn report_shows_position_source_label_and_help() {
     let source: Arc<str> = "# äöü\n[[sphere]]\nradius = -0.5\n".into();
-    let text = render_report(&[at(&source, 27..31, "found -0.5")], 80, ReportStyle::Plain);
+    let text = render_diagnostics(&[at(&source, 27..31, "found -0.5")], 80, ReportStyle::Plain);
     let expected = "\
 error: `radius` must be greater than 0
  --> a.toml:3:8
@@ -36,7 +36,7 @@ error: `radius` must be greater than 0
 fn columns_count_characters() {
     let source: Arc<str> = "\tmö\u{1b}[31m = \"木\u{202e}\" nix\r\n".into();
     let start = source.find("nix").expect("there");
-    let text = render_report(&[at(&source, start..start + 3, "here")], 80, ReportStyle::Plain);
+    let text = render_diagnostics(&[at(&source, start..start + 3, "here")], 80, ReportStyle::Plain);
     assert!(text.contains("a.toml:1:17\n"), "{text}");
     assert!(!text.contains(['\u{1b}', '\u{202e}', '\t', '\r']), "{text:?}");
     let mut rows = text.lines().skip(3);
@@ -51,9 +51,9 @@ fn columns_count_characters() {
 #[test]
 fn empty_labels_are_not_shown_as_notes() {
     let source: Arc<str> = format!("{}a", "[".repeat(100)).into();
-    let text = render_report(&[at(&source, 100..101, "")], 60, ReportStyle::Plain);
+    let text = render_diagnostics(&[at(&source, 100..101, "")], 60, ReportStyle::Plain);
     assert!(!text.contains("note"), "{text}");
-    let text = render_report(&[at(&source, 100..101, "here")], 60, ReportStyle::Plain);
+    let text = render_diagnostics(&[at(&source, 100..101, "here")], 60, ReportStyle::Plain);
     assert!(text.contains("= note: here"), "{text}");
 }
 
@@ -62,16 +62,16 @@ fn diagnostics_are_sorted_and_counted() {
     let source: Arc<str> = "a = 1\nb = 2\n".into();
     let mut warning = at(&source, 0..1, "first");
     warning.severity = Severity::Warning;
-    let text = render_report(&[at(&source, 6..7, "second"), warning], 80, ReportStyle::Plain);
+    let text = render_diagnostics(&[at(&source, 6..7, "second"), warning], 80, ReportStyle::Plain);
     assert!(text.find("first") < text.find("second"), "{text}");
     assert!(text.ends_with("\n1 error, 1 warning\n"), "{text}");
-    assert_eq!(render_report(&[], 80, ReportStyle::Plain), "");
+    assert_eq!(render_diagnostics(&[], 80, ReportStyle::Plain), "");
 }
 
 #[test]
 fn long_lines_are_cut_to_the_width() {
     let source: Arc<str> = format!("{} = oops{}", "x".repeat(3_000_000), " y".repeat(1_000_000)).into();
-    let text = render_report(&[at(&source, 3_000_003..3_000_007, "here")], 60, ReportStyle::Plain);
+    let text = render_diagnostics(&[at(&source, 3_000_003..3_000_007, "here")], 60, ReportStyle::Plain);
     assert!(text.contains("a.toml:1:3000004\n"), "{text}");
     assert!(text.contains("oops"), "{text}");
     assert!(text.lines().all(|line| line.chars().count() <= 60), "{text}");
@@ -80,12 +80,18 @@ fn long_lines_are_cut_to_the_width() {
 #[test]
 fn multiline_and_empty_spans_are_underlined() {
     let source: Arc<str> = "a = [\n 1,\n]".into();
-    assert!(render_report(&[at(&source, 4..11, "here")], 80, ReportStyle::Plain).contains("a.toml:1:5\n"));
-    assert!(render_report(&[at(&source, 11..11, "here")], 80, ReportStyle::Plain).contains("a.toml:3:2\n"));
+    assert!(
+        render_diagnostics(&[at(&source, 4..11, "here")], 80, ReportStyle::Plain).contains("a.toml:1:5\n")
+    );
+    assert!(
+        render_diagnostics(&[at(&source, 11..11, "here")], 80, ReportStyle::Plain).contains("a.toml:3:2\n")
+    );
     let empty: Arc<str> = "".into();
-    assert!(render_report(&[at(&empty, 0..0, "here")], 80, ReportStyle::Plain).contains("a.toml:1:1\n"));
+    assert!(render_diagnostics(&[at(&empty, 0..0, "here")], 80, ReportStyle::Plain).contains("a.toml:1:1\n"));
     let marked: Arc<str> = "\u{feff}a = 1".into();
-    assert!(render_report(&[at(&marked, 3..4, "here")], 80, ReportStyle::Plain).contains("a.toml:1:1\n"));
+    assert!(
+        render_diagnostics(&[at(&marked, 3..4, "here")], 80, ReportStyle::Plain).contains("a.toml:1:1\n")
+    );
 }
 
 #[test]
@@ -94,7 +100,7 @@ fn long_messages_are_wrapped() {
     let mut long = at(&source, 0..1, "");
     long.message = "many words ".repeat(20).trim_end().to_owned();
     long.help = Some("more words ".repeat(20).trim_end().to_owned());
-    let text = render_report(&[long], 50, ReportStyle::Plain);
+    let text = render_diagnostics(&[long], 50, ReportStyle::Plain);
     assert!(text.lines().all(|line| line.chars().count() <= 50), "{text}");
     assert_eq!(text.matches("many").count(), 20);
 }
@@ -106,7 +112,7 @@ fn lines_match_the_plain_report() {
     let lines = report_lines(&diagnostics, 80);
     let joined: Vec<String> =
         lines.iter().map(|line| line.iter().map(|piece| piece.text.as_str()).collect()).collect();
-    assert_eq!(joined.join("\n") + "\n", render_report(&diagnostics, 80, ReportStyle::Plain));
+    assert_eq!(joined.join("\n") + "\n", render_diagnostics(&diagnostics, 80, ReportStyle::Plain));
     let role =
         |text: &str| lines.iter().flatten().find(|piece| piece.text.contains(text)).map(|piece| piece.role);
     assert_eq!(role("error"), Some(ReportTextRole::Error));
@@ -114,7 +120,7 @@ fn lines_match_the_plain_report() {
     assert_eq!(role("greater"), Some(ReportTextRole::Message));
     assert_eq!(role("a.toml:1:10"), Some(ReportTextRole::Text));
     assert_eq!(role("-->"), Some(ReportTextRole::Frame));
-    assert!(render_report(&diagnostics, 80, ReportStyle::Ansi).contains("\u{1b}["));
+    assert!(render_diagnostics(&diagnostics, 80, ReportStyle::Ansi).contains("\u{1b}["));
 }
 
 #[test]
@@ -123,7 +129,7 @@ fn labels_are_never_cut() {
     let label = "`u` and `v` are parallel, or one of them is 0, and so on, for as long as it takes to say it";
     let one = at(&source, 13..22, label);
     for width in [30, 59, 60, 61, 80, 106, 107, 108, 200] {
-        let text = render_report(std::slice::from_ref(&one), width, ReportStyle::Plain);
+        let text = render_diagnostics(std::slice::from_ref(&one), width, ReportStyle::Plain);
         let rows: Vec<&str> = text.lines().collect();
         assert!(rows.iter().all(|row| row.chars().count() <= width), "{width}:\n{text}");
         let unwrapped = text.split_whitespace().collect::<Vec<_>>().join(" ");
@@ -131,7 +137,9 @@ fn labels_are_never_cut() {
         assert!(unwrapped.contains("^^^^^^^^^"), "{width}:\n{text}");
     }
     // If the label fits, it follows the carets.
-    assert!(render_report(std::slice::from_ref(&one), 200, ReportStyle::Plain).contains("^^^^^^^^^ `u` and"));
+    assert!(
+        render_diagnostics(std::slice::from_ref(&one), 200, ReportStyle::Plain).contains("^^^^^^^^^ `u` and")
+    );
     assert!(
         report_lines(std::slice::from_ref(&one), 60)
             .iter()

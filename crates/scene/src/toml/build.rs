@@ -95,12 +95,12 @@ impl BuiltDocument {
     }
 
     /// Sets the span in the foreign text of all tables and values added from now on. Errors underline it.
-    pub fn set_source_span(&mut self, span: Range<usize>) {
+    pub fn set_span_for_next_values(&mut self, span: Range<usize>) {
         self.span = Span::new(span.start, span.end);
     }
 
     /// Adds a comment above the next table.
-    pub fn add_comment(&mut self, text: impl Into<String>) {
+    pub fn add_comment_above_next_table(&mut self, text: impl Into<String>) {
         let table = self.document.next_table_id();
         self.comments.push(Comment { table, is_below_header: false, text: text.into() });
     }
@@ -195,11 +195,11 @@ mod tests {
     #[test]
     fn built_document_is_written_in_order() {
         let mut built = BuiltDocument::default();
-        built.add_comment("cube.glb");
-        built.add_comment("Approximated.");
+        built.add_comment_above_next_table("cube.glb");
+        built.add_comment_above_next_table("Approximated.");
         built.start_table("render");
         built.set("samples", 256.0);
-        built.add_comment("All lights.");
+        built.add_comment_above_next_table("All lights.");
         built.start_list_table("light");
         built.add_table_comment("sun");
         built.set("type", "directional");

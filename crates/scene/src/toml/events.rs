@@ -27,7 +27,7 @@ impl<'s> ExpressionEventReader<'_, 's> {
     /// Reads all events.
     pub(super) fn read_all(mut self) {
         if self.assembly.open.is_some() {
-            self.read_header();
+            self.read_rest_of_header();
         }
         while let (false, Some(event)) = (self.assembly.is_lost, self.next_raw_event()) {
             match event.kind() {
@@ -36,7 +36,7 @@ impl<'s> ExpressionEventReader<'_, 's> {
                     let is_list = event.kind() == EventKind::ArrayTableOpen;
                     let span = self.span(event);
                     self.assembly.open = Some(TableHeader { path: Vec::new(), key: None, span, is_list });
-                    self.read_header();
+                    self.read_rest_of_header();
                 }
                 EventKind::SimpleKey => self.read_key_value(event),
                 // Skip whitespace and the rest of incomplete expressions.
@@ -62,7 +62,7 @@ impl<'s> ExpressionEventReader<'_, 's> {
 
     /// Reads the rest of the open header. An unclosed header is closed by the next header, and takes that
     /// header's key.
-    fn read_header(&mut self) {
+    fn read_rest_of_header(&mut self) {
         let Some(mut header) = self.assembly.open.take() else { return };
         while let Some(event) = self.next_raw_event() {
             match event.kind() {

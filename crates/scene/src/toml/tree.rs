@@ -573,7 +573,7 @@ pub(crate) struct KeyValue<'d> {
 
 impl<'d> Entries<'d> {
     /// The table's ID.
-    pub(crate) fn id(&self) -> TableId {
+    pub(crate) fn table_id(&self) -> TableId {
         self.table
     }
 
@@ -589,7 +589,7 @@ impl<'d> Entries<'d> {
 
     /// Finds the entry with this key.
     pub(crate) fn get(&self, name: &str) -> Option<KeyValue<'d>> {
-        self.document.find_entry(self.table, name).map(|entry| self.key_value_at(entry))
+        self.document.find_entry(self.table, name).map(|entry| self.key_value_of_entry(entry))
     }
 
     /// The entries in insertion order.
@@ -601,10 +601,10 @@ impl<'d> Entries<'d> {
         let next = |entry: &u32| Some(entries[*entry as usize].next).filter(|next| *next != NONE);
         std::iter::successors(start, next)
             .filter(|entry| !entries[*entry as usize].is_removed)
-            .map(move |entry| this.key_value_at(entry))
+            .map(move |entry| this.key_value_of_entry(entry))
     }
 
-    fn key_value_at(&self, entry: u32) -> KeyValue<'d> {
+    fn key_value_of_entry(&self, entry: u32) -> KeyValue<'d> {
         let document = self.document;
         let TableEntry { key, text, node, .. } = document.entries[entry as usize];
         KeyValue {

@@ -17,11 +17,13 @@ pub(super) struct Comment {
 pub(super) fn format_document(document: &Document<'_>, comments: &[Comment]) -> String {
     let mut tables = Vec::new();
     collect_tables("", document.root(), &mut tables);
-    tables.sort_by_key(|(_, entries)| entries.id());
+    tables.sort_by_key(|(_, entries)| entries.table_id());
     let (mut text, mut comments) = (String::new(), comments.iter().peekable());
     for (header, entries) in tables {
         let mut is_first = true;
-        while let Some(comment) = comments.next_if(|one| !one.is_below_header && one.table <= entries.id()) {
+        while let Some(comment) =
+            comments.next_if(|one| !one.is_below_header && one.table <= entries.table_id())
+        {
             if std::mem::take(&mut is_first) {
                 start_paragraph(&mut text);
             }
@@ -30,7 +32,7 @@ pub(super) fn format_document(document: &Document<'_>, comments: &[Comment]) -> 
         start_paragraph(&mut text);
         text.push_str(&header);
         text.push('\n');
-        while let Some(comment) = comments.next_if(|one| one.table == entries.id()) {
+        while let Some(comment) = comments.next_if(|one| one.table == entries.table_id()) {
             write_comment(&mut text, &comment.text);
         }
         for KeyValue { key, value, .. } in entries.iter().filter(|entry| !has_header(entry.value)) {

@@ -59,7 +59,7 @@ pub fn record_first_hits_on_plain_surfaces(
         let Some(hit) = packet.hit(lane) else { continue };
         let index = tile.world.material_index(&hit);
         if known.is_none_or(|(own, _)| own != index) {
-            known = Some((index, values.constant_albedo(index, || constant_albedo(tile, index))));
+            known = Some((index, values.cached_constant_albedo(index, || constant_albedo(tile, index))));
         }
         let Some(albedo) = known.and_then(|(_, albedo)| albedo) else {
             left |= 1 << lane;
@@ -79,7 +79,7 @@ fn constant_albedo(tile: &TileContext<'_>, index: usize) -> Option<Vec3> {
     let is_constant = !tile.world.material_needs_uvs_or_tangents(index)
         && !material.has_null_interaction()
         && !material.is_black_from_behind();
-    is_constant.then(|| material.bsdf.albedo(&TexturePoint::from_uv(DVec2::ZERO), &mut 0))
+    is_constant.then(|| material.bsdf.main_color(&TexturePoint::from_uv(DVec2::ZERO), &mut 0))
 }
 
 /// Records the first-hit layers of a camera ray, given its first hit.
@@ -132,7 +132,7 @@ fn vertex_albedo(vertex: &SurfaceVertex<'_>, counters: &mut RayCounters) -> Vec3
     if !vertex.scatters() {
         return Vec3::ZERO;
     }
-    let albedo = vertex.material.bsdf.albedo(&vertex.texture_point, &mut counters.texture_lookups);
+    let albedo = vertex.material.bsdf.main_color(&vertex.texture_point, &mut counters.texture_lookups);
     vertex.times_vertex_color(albedo)
 }
 

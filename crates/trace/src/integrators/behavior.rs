@@ -1,7 +1,7 @@
 //! How paths continue at surfaces, derived from the integrator's method, the view and photon mapping.
 
 use super::settings::RenderSettings;
-use super::view::LightAov;
+use super::view::PathAov;
 use crate::lights::LightSamplingPurpose;
 use crate::scene::description::IntegratorProperties;
 
@@ -29,14 +29,14 @@ impl PathBehavior {
         let gathers = gathers && has_photons;
         match settings.view.aov_source().light_transport_aov_or_all() {
             // The lit fraction is measured at the first visible surface, where all lights are sampled.
-            LightAov::LitFraction => Self {
+            PathAov::LitFraction => Self {
                 splits: true,
                 scatters: gathers,
                 mirrors: false,
                 gathers,
                 receivers: LightSamplingPurpose::Eye,
             },
-            LightAov::Radiance(_) | LightAov::TraversalCost => {
+            PathAov::Radiance(_) | PathAov::TraversalCost => {
                 let scatters = scatters || gathers;
                 let receivers =
                     if scatters { LightSamplingPurpose::Paths } else { LightSamplingPurpose::Eye };

@@ -106,8 +106,8 @@ pub struct SampleLayerValues {
     values: Vec<f32>,
     /// Index of each layer's first component among the values of a sample, for layers in the set.
     places: [Option<usize>; SampleLayer::ALL.len()],
-    /// The tile's most recent results of [`SampleLayerValues::constant_albedo`], by material index modulo the
-    /// array length.
+    /// The tile's most recent results of [`SampleLayerValues::cached_constant_albedo`], by material index
+    /// modulo the array length.
     albedos: [Option<(usize, Option<Vec3>)>; 16],
 }
 
@@ -118,7 +118,7 @@ impl SampleLayerValues {
     }
 
     /// Returns a material's albedo if it is constant. Calls `evaluate` if the result is not cached.
-    pub fn constant_albedo(
+    pub fn cached_constant_albedo(
         &mut self,
         material: usize,
         evaluate: impl FnOnce() -> Option<Vec3>,
@@ -148,7 +148,7 @@ impl SampleLayerValues {
 
     /// Adds a value to a sample. Does nothing if the set does not contain the layer.
     #[inline]
-    pub fn add(&mut self, layer: SampleLayer, slot: u32, value: Vec3) {
+    pub fn add_to_sample(&mut self, layer: SampleLayer, slot: u32, value: Vec3) {
         let Some(place) = self.places[layer as usize] else { return };
         let start = (slot - self.first) as usize * self.size + place;
         if let Some([x, y, z]) = self.values.get_mut(start..).and_then(<[f32]>::first_chunk_mut) {
@@ -169,7 +169,7 @@ impl SampleLayerValues {
             }
             Some(_) | None => {
                 for (layer, value) in SampleLayer::ALL.into_iter().zip(values) {
-                    self.add(layer, slot, value);
+                    self.add_to_sample(layer, slot, value);
                 }
             }
         }
@@ -273,7 +273,7 @@ mod tests {
         for slots in [0..2, 2..4] {
             values.begin_batch(set, &slots);
             for slot in slots {
-                SampleLayer::ALL.iter().for_each(|layer| values.add(*layer, slot, Vec3::ONE));
+                SampleLayer::ALL.iter().for_each(|layer| values.add_to_sample(*layer, slot, Vec3::ONE));
             }
             let radiance = [Vec3::ONE, Vec3::new(0.0, f32::NAN, 0.0), Vec3::ONE, Vec3::ONE];
             values.add_to_sums(&mut sums, 3, (&radiance, None), InstructionSet::Portable);

@@ -4,7 +4,7 @@ use std::cell::RefCell;
 
 use super::direct::queue::DirectLightVertexQueue;
 use super::layers::SampleLayerValues;
-use super::transport::accumulator::DiffuseFractions;
+use super::transport::accumulator::PathDiffuseFractions;
 use super::transport::scratch::TraceBuffers;
 
 /// Buffers that a thread reuses for all of its batches.
@@ -15,7 +15,7 @@ pub struct ThreadMemory {
     /// Vertices of the current bounce that await direct lighting.
     pub direct: DirectLightVertexQueue,
     /// Diffuse fractions of the paths, if layers are recorded.
-    pub fractions: DiffuseFractions,
+    pub fractions: PathDiffuseFractions,
     /// Values of the layers, if there are any.
     pub layers: SampleLayerValues,
 }

@@ -36,7 +36,7 @@ use std::mem::take;
 use std::ops::Range;
 
 use crate::control::{CancelToken, Canceled};
-use crate::film::{LayerSums, NegativeLobeMask, SelectedPixels, TileSamples};
+use crate::film::{LayerSums, NegativeLobeSamples, SelectedPixels, TileSamples};
 use crate::math::Vec3;
 use crate::world::{PACKET_SIZE, World};
 use behavior::PathBehavior;
@@ -44,11 +44,11 @@ pub use behavior::light_sampling_purpose;
 pub use counters::RayCounters;
 pub use layers::{LayerSet, SampleLayer};
 use memory::ThreadMemory;
-pub use photons::{Photon, PhotonMap, PhotonMapper, PhotonPass, PhotonPassesBySample};
+pub use photons::{Photon, PhotonMap, PhotonPass, PhotonPassTracer, PhotonPassesBySample};
 pub use settings::{PhotonSettings, RenderSettings};
 use transport::accumulator::{Accumulator, LayerAccumulator};
 use transport::tile::{SampleBlock, TileContext};
-pub use view::{AovSource, FirstHitQuantity, LightAov, RadianceComponentMask, ViewMode};
+pub use view::{AovSource, FirstHitQuantity, PathAov, RadianceComponentMask, ViewMode};
 
 /// Number of camera rays in a batch.
 const BATCH_SIZE: usize = 1024;
@@ -109,14 +109,14 @@ pub fn render_tile_with_layers(
     let photons = photons.filter(|_| settings.gathers_photons());
     let behavior = PathBehavior::from_settings(settings, photons.is_some());
     let tile = TileContext::new(world, settings, &block, token, behavior);
-    let clamp = if settings.view.aov_source().light_transport_aov_or_all() == LightAov::TraversalCost {
+    let clamp = if settings.view.aov_source().light_transport_aov_or_all() == PathAov::TraversalCost {
         0.0
     } else {
         settings.render.clamp
     };
     let gain = match settings.view.aov_source().light_transport_aov_or_all() {
-        LightAov::Radiance(_) => settings.render.gain,
-        LightAov::LitFraction | LightAov::TraversalCost => 1.0,
+        PathAov::Radiance(_) => settings.render.gain,
+        PathAov::LitFraction | PathAov::TraversalCost => 1.0,
     };
     // Render one batch after another.
     let mut memory = ThreadMemory::take_from_thread();
@@ -174,7 +174,7 @@ pub fn render_tile_with_layers(
     // Return the samples.
     (memory.fractions, memory.layers) = (fractions, values);
     memory.return_to_thread();
-    let negative = weight.map(|weight| NegativeLobeMask { weight, is_negative });
+    let negative = weight.map(|weight| NegativeLobeSamples { weight, is_negative });
     let samples = block.samples.len() as u32;
     Ok((TileSamples { pixels: block.pixels, samples, radiance, negative, layers }, counters))
 }

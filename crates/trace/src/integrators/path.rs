@@ -29,10 +29,10 @@ use super::transport::crossing::CoincidentSurfaceBuffers;
 use super::transport::packet::POLL_INTERVAL;
 use super::transport::packet_source::PacketSource;
 use super::transport::ray::PathRay;
-use super::transport::scatter::{BounceContinuation, BsdfSampler};
+use super::transport::scatter::{BounceContinuationRules, BsdfSampler};
 use super::transport::scratch::TraceBuffers;
 use super::transport::tile::TileContext;
-use super::view::LightAov;
+use super::view::PathAov;
 use crate::control::Canceled;
 use crate::geometry::packet::set_bit_lanes;
 use crate::geometry::surface_packet::SurfacePacket;
@@ -82,7 +82,7 @@ pub fn trace_camera_paths(
     }
     paths.shade_queued_vertices()?;
     paths.direct.accumulate_light_of_consecutive_slots(slots.start, &mut paths.accumulator);
-    paths.next_bounce(rays);
+    paths.start_next_bounce(rays);
     // Trace the remaining bounces.
     while !rays.is_empty() {
         paths.begin_bounce(rays.len());
@@ -100,7 +100,7 @@ pub fn trace_camera_paths(
         }
         paths.shade_queued_vertices()?;
         paths.direct.accumulate_arrived_light(rays, &mut paths.accumulator);
-        paths.next_bounce(rays);
+        paths.start_next_bounce(rays);
     }
     Ok(())
 }
@@ -110,7 +110,7 @@ struct CameraPathWavefront<'a, 's> {
     /// Number of bounces before the current hits.
     depth: u32,
     /// How paths continue at diffuse and glossy surfaces, or `None` if they end there.
-    continuation: Option<BounceContinuation>,
+    continuation: Option<BounceContinuationRules>,
     tile: &'a TileContext<'a>,
     /// Photon maps for the samples, or `None` if no photons are gathered.
     maps: Option<&'a PhotonPassesBySample>,
@@ -143,7 +143,7 @@ impl CameraPathWavefront<'_, '_> {
         let buffers = (self.direct.spare_batch(), &mut *self.surfaces);
         let packet = tile.intersect_packet(rays, aov, are_lit, buffers);
         self.counters.texture_lookups += packet.lookups;
-        if aov == LightAov::TraversalCost {
+        if aov == PathAov::TraversalCost {
             self.add_traversal_costs(&rays, &packet);
         }
         if are_lit {
@@ -183,7 +183,7 @@ impl CameraPathWavefront<'_, '_> {
             self.direct.sample_group_lights(vertices.clone(), tile, aov, shares_with_paths)?;
             for (index, number) in vertices.clone().enumerate() {
                 let mut light = self.direct.reflected_light((index, number), tile, aov, shares_with_paths);
-                let row = self.direct.batch(number);
+                let row = self.direct.batch_at_index(number);
                 // Gather photons.
                 if let Some(maps) = self.maps {
                     let splits_lobes = self.direct.splits_lobes(row);
@@ -195,8 +195,8 @@ impl CameraPathWavefront<'_, '_> {
             }
             // Sample BSDFs, with Russian roulette.
             for number in vertices {
-                let row = self.direct.batch(number);
-                let Some(continuation) = self.continuation_at(row) else { continue };
+                let row = self.direct.batch_at_index(number);
+                let Some(continuation) = self.continuation_at_vertices(row) else { continue };
                 let fractions = self.accumulator.diffuse_fractions();
                 let has_fractions = fractions.is_some() && row.only_specular_before != 0;
                 let before = self.next.len();
@@ -214,9 +214,9 @@ impl CameraPathWavefront<'_, '_> {
     }
 
     /// How the paths continue at a packet of vertices, or `None` if they end there.
-    fn continuation_at(&self, row: &VertexBatch) -> Option<BounceContinuation> {
+    fn continuation_at_vertices(&self, row: &VertexBatch) -> Option<BounceContinuationRules> {
         let extends_narrow = row.bsdf.extends_narrow_lobe_paths() && self.tile.behavior.mirrors;
-        let narrow = || BounceContinuation::new(self.tile, self.depth, LobesToSample::Narrow);
+        let narrow = || BounceContinuationRules::new(self.tile, self.depth, LobesToSample::Narrow);
         let policy = self.continuation.or_else(|| extends_narrow.then(narrow));
         policy.filter(|policy| policy.continues)
     }
@@ -230,18 +230,18 @@ impl CameraPathWavefront<'_, '_> {
 
     /// Begins a bounce of `paths` paths.
     fn begin_bounce(&mut self, paths: usize) {
-        let policy = || BounceContinuation::new(self.tile, self.depth, LobesToSample::All);
+        let policy = || BounceContinuationRules::new(self.tile, self.depth, LobesToSample::All);
         self.continuation = self.tile.behavior.scatters.then(policy);
         let has_fractions = self.accumulator.diffuse_fractions().is_some();
         self.direct.begin_bounce(paths, self.tile.camera_cone.is_some(), has_fractions);
     }
 
     /// Starts the next bounce with the rays generated in this bounce, reusing the old queue for output.
-    fn next_bounce(&mut self, rays: &mut Vec<PathRay>) {
+    fn start_next_bounce(&mut self, rays: &mut Vec<PathRay>) {
         std::mem::swap(rays, self.next);
         self.next.clear();
         if let Some(fractions) = self.accumulator.diffuse_fractions() {
-            fractions.next_bounce();
+            fractions.start_next_bounce();
         }
         self.depth += 1;
     }

@@ -1,6 +1,6 @@
 //! Render settings.
 
-use super::{AovSource, FirstHitQuantity, LayerSet, LightAov, ViewMode};
+use super::{AovSource, FirstHitQuantity, LayerSet, PathAov, ViewMode};
 use crate::geometry::Ray;
 use crate::math::{DVec2, Vec2, Vec3};
 use crate::scene::description::RenderOptions;
@@ -50,9 +50,9 @@ impl RenderSettings {
     pub fn gathers_photons(&self) -> bool {
         let shows = match self.view.aov_source() {
             AovSource::FirstHit(number) => number == FirstHitQuantity::Photons,
-            AovSource::Light(LightAov::LitFraction) => false,
-            AovSource::Light(LightAov::Radiance(parts)) => parts.has_reflected() && self.render.max_depth > 1,
-            AovSource::Light(LightAov::TraversalCost) | AovSource::Film(_) | AovSource::Bounds => {
+            AovSource::Light(PathAov::LitFraction) => false,
+            AovSource::Light(PathAov::Radiance(parts)) => parts.has_reflected() && self.render.max_depth > 1,
+            AovSource::Light(PathAov::TraversalCost) | AovSource::Film(_) | AovSource::Bounds => {
                 self.render.max_depth > 1
             }
         };
@@ -79,13 +79,13 @@ impl RenderSettings {
                 | FirstHitQuantity::Photons,
             ) => TextureRolesNeededByRender::NONE,
             // Normals and emission are needed, but not surface colors.
-            AovSource::Light(LightAov::LitFraction) => TextureRolesNeededByRender {
+            AovSource::Light(PathAov::LitFraction) => TextureRolesNeededByRender {
                 diffuse: false,
                 specular: false,
                 ambient: false,
                 ..TextureRolesNeededByRender::ALL
             },
-            AovSource::Light(LightAov::Radiance(parts)) if !parts.has_reflected() => {
+            AovSource::Light(PathAov::Radiance(parts)) if !parts.has_reflected() => {
                 // These components are also visible in mirrors and through glass.
                 let ambient =
                     parts.ambient && self.without_ineffective_settings().render.ambient != Vec3::ZERO;
@@ -97,7 +97,7 @@ impl RenderSettings {
                 }
             }
             // Boxes are drawn over the beauty image.
-            AovSource::Light(LightAov::Radiance(_) | LightAov::TraversalCost)
+            AovSource::Light(PathAov::Radiance(_) | PathAov::TraversalCost)
             | AovSource::Bounds
             | AovSource::Film(_) => TextureRolesNeededByRender::ALL,
         }
@@ -131,7 +131,7 @@ impl Fingerprinted for RenderSettings {
         match view.aov_source() {
             // The brightness of the lines depends on the exposure.
             AovSource::Bounds => key.add_choice_name(render.accel).add_f32(render.exposure),
-            AovSource::Light(LightAov::TraversalCost) => key.add_choice_name(render.accel),
+            AovSource::Light(PathAov::TraversalCost) => key.add_choice_name(render.accel),
             AovSource::Light(_) | AovSource::FirstHit(_) | AovSource::Film(_) => &mut *key,
         };
         key.add_bool(photons.is_some());

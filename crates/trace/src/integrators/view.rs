@@ -51,7 +51,7 @@ choice! {
 impl ViewMode {
     /// Source of this view's values.
     pub fn aov_source(self) -> AovSource {
-        let of = |parts: RadianceComponentMask| AovSource::Light(LightAov::Radiance(parts));
+        let of = |parts: RadianceComponentMask| AovSource::Light(PathAov::Radiance(parts));
         let by = |paths: PathClasses| {
             of(RadianceComponentMask { diffuse: true, specular: true, paths, ..RadianceComponentMask::NONE })
         };
@@ -64,9 +64,9 @@ impl ViewMode {
             Self::Indirect => by(PathClasses { indirect: true, ..PathClasses::NONE }),
             Self::Caustic => by(PathClasses { caustic: true, ..PathClasses::NONE }),
             Self::Photons => AovSource::FirstHit(FirstHitQuantity::Photons),
-            Self::Shadow => AovSource::Light(LightAov::LitFraction),
+            Self::Shadow => AovSource::Light(PathAov::LitFraction),
             Self::Bounds => AovSource::Bounds,
-            Self::Cost => AovSource::Light(LightAov::TraversalCost),
+            Self::Cost => AovSource::Light(PathAov::TraversalCost),
             Self::Samples => AovSource::Film(FilmQuantity::Samples),
             Self::Error => AovSource::Film(FilmQuantity::Error),
             Self::Normal => AovSource::FirstHit(FirstHitQuantity::Normal),
@@ -102,7 +102,7 @@ impl ViewMode {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AovSource {
     /// Light gathered by paths.
-    Light(LightAov),
+    Light(PathAov),
     /// A quantity at the first hit, without exposure or tone mapping. All quantities except depth are
     /// displayed unchanged.
     FirstHit(FirstHitQuantity),
@@ -113,19 +113,19 @@ pub enum AovSource {
 }
 
 impl AovSource {
-    /// The light AOV accumulated by paths, or [`LightAov::ALL`] if the source is not a light AOV. First-hit
+    /// The light AOV accumulated by paths, or [`PathAov::ALL`] if the source is not a light AOV. First-hit
     /// views do not use it.
-    pub fn light_transport_aov_or_all(self) -> LightAov {
+    pub fn light_transport_aov_or_all(self) -> PathAov {
         match self {
             Self::Light(aov) => aov,
-            Self::FirstHit(_) | Self::Bounds | Self::Film(_) => LightAov::ALL,
+            Self::FirstHit(_) | Self::Bounds | Self::Film(_) => PathAov::ALL,
         }
     }
 }
 
 /// Quantity accumulated along a sample's paths.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum LightAov {
+pub enum PathAov {
     /// Radiance of these components.
     Radiance(RadianceComponentMask),
     /// Fraction of the lights' radiance that is not occluded, from 0 to 1.
@@ -134,7 +134,7 @@ pub enum LightAov {
     TraversalCost,
 }
 
-impl LightAov {
+impl PathAov {
     /// The beauty image.
     pub const ALL: Self = Self::Radiance(RadianceComponentMask::ALL);
 

@@ -54,7 +54,7 @@ impl World {
             see_through: None,
         };
         Self {
-            unlit_glass: world.find_shadowed_glass_interiors(),
+            unlit_glass: world.find_glass_untouched_by_lights(),
             lens_glass: world.find_closed_glass_near_lens(),
             enclosing_glass: world.closed_glass_shapes_by_subtree(),
             camera_solids: world.find_solids_around_camera(),

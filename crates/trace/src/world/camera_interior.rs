@@ -43,7 +43,7 @@ impl World {
         let around_origin = self
             .solids_near_ray_origins
             .iter()
-            .filter_map(move |body| Some((body.body, self.enclosing_glass_material(body, point, None)?)));
+            .filter_map(move |body| Some((body.body, self.glass_material_around_point(body, point, None)?)));
         let around_camera = self.camera_solids.iter().copied();
         self.lens_glass.iter().copied().filter(is_inside).chain(around_camera).chain(around_origin)
     }
@@ -70,7 +70,7 @@ impl World {
         if !self.camera.has_parallel_rays() {
             return Vec::new();
         }
-        let mut solids = self.find_compound_solids();
+        let mut solids = self.find_compound_glass_solids();
         solids.retain(|body| body.is_covered || self.camera.may_start_rays_in(&body.bounds));
         solids
     }
@@ -84,14 +84,15 @@ impl World {
         let eye = self.camera.position.as_vec3();
         let at = Aabb { min: eye, max: eye };
         let near = self
-            .find_compound_solids()
+            .find_compound_glass_solids()
             .into_iter()
             .filter(|body| body.is_covered || body.bounds.overlaps(&at));
-        near.filter_map(|body| Some((body.body, self.enclosing_glass_material(&body, eye, None)?))).collect()
+        near.filter_map(|body| Some((body.body, self.glass_material_around_point(&body, eye, None)?)))
+            .collect()
     }
 
     /// Closed glass solids that consist of meshes or several objects.
-    pub fn find_compound_solids(&self) -> Vec<CompoundSolid> {
+    pub fn find_compound_glass_solids(&self) -> Vec<CompoundSolid> {
         if !self.has_glass {
             return Vec::new();
         }
@@ -104,7 +105,7 @@ impl World {
                 ObjectMaterial::OfFile { .. } => true,
             };
             let body = self.solid_id(object);
-            if may_be_glass && !self.is_closed_shape(object) && !self.is_open_solid(body) {
+            if may_be_glass && !self.is_closed_shape(object) && !self.is_glass_solid_open(body) {
                 solids.entry(body).or_default().push(object);
             }
         }
@@ -120,7 +121,7 @@ impl World {
     /// Glass material around a point, determined by the majority of rays cast from the point toward the
     /// solid, or `None` if the point is outside or no ray hits the solid. If the point is on object `of`,
     /// this object does not block the rays.
-    pub fn enclosing_glass_material(
+    pub fn glass_material_around_point(
         &self,
         body: &CompoundSolid,
         point: Vec3,

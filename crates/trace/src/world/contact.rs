@@ -248,7 +248,7 @@ impl World {
     }
 
     /// Whether a glass solid is open.
-    pub fn is_open_solid(&self, body: u32) -> bool {
+    pub fn is_glass_solid_open(&self, body: u32) -> bool {
         self.glass_solids.is_open(body)
     }
 

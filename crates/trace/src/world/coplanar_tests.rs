@@ -6,7 +6,7 @@ use crate::accel::InstructionSet;
 use crate::control::CancelToken;
 use crate::geometry::Ray;
 use crate::geometry::mesh::TriangleMesh;
-use crate::lights::LightGeometry;
+use crate::lights::LightSceneGeometry;
 use crate::math::Vec3;
 use crate::math::origin::local_coordinate_origin;
 use crate::math::random::signed_number_generator as random;
@@ -320,7 +320,7 @@ fn lifted_lights_are_hit_only_from_the_front() {
                     // it.
                     let shadow = Ray::segment_ending_before_point(from, target);
                     assert!(
-                        !geometry.is_occluded_except_by_light(&shadow, LightGeometry::Object(number)),
+                        !geometry.is_occluded_except_by_light(&shadow, LightSceneGeometry::Object(number)),
                         "{tables} {from}"
                     );
                     let is_closed = tables.contains("box") || tables.contains("cylinder");
@@ -331,7 +331,7 @@ fn lifted_lights_are_hit_only_from_the_front() {
                     let lift = geometry.light_lifts_by_object()[number as usize].as_vec3();
                     let hidden = Ray::segment_ending_before_point(below, target + lift);
                     assert!(
-                        geometry.is_occluded_except_by_light(&hidden, LightGeometry::Object(number)),
+                        geometry.is_occluded_except_by_light(&hidden, LightSceneGeometry::Object(number)),
                         "{tables} {below}"
                     );
                 }

@@ -53,7 +53,7 @@ pub fn separate_coincident_emitters(
     }
     let (lifts, height) = find_triangle_lifts(&mesh, emits, emits_in_file, token)?;
     if !lifts.is_empty() {
-        lift_triangles(mesh.to_mut(), &lifts, height);
+        offset_along_normals(mesh.to_mut(), &lifts, height);
     }
     Ok(match mesh {
         Cow::Borrowed(_) => None,
@@ -122,14 +122,14 @@ fn find_triangle_lifts(
 
 /// Moves triangles by `height` along their normals in `lifts`. The moved triangles no longer share vertices
 /// with the others.
-fn lift_triangles(mesh: &mut TriangleMesh, lifts: &BTreeMap<usize, DVec3>, height: f64) {
+fn offset_along_normals(mesh: &mut TriangleMesh, lifts: &BTreeMap<usize, DVec3>, height: f64) {
     let mut known = HashMap::new();
     for (triangle, normal) in lifts {
         let direction = (*normal * 1e4).round().to_array().map(|part| part as i32);
         let corners = mesh.triangles[*triangle].map(|corner| {
             *known.entry((corner, direction)).or_insert_with(|| {
                 let at = mesh.positions[corner as usize].as_dvec3() + *normal * height;
-                append_vertex_copy_at(mesh, corner as usize, at.as_vec3())
+                append_vertex_copy_at_position(mesh, corner as usize, at.as_vec3())
             })
         });
         mesh.triangles[*triangle] = corners;
@@ -137,7 +137,7 @@ fn lift_triangles(mesh: &mut TriangleMesh, lifts: &BTreeMap<usize, DVec3>, heigh
 }
 
 /// Adds a copy of a vertex at position `at`.
-fn append_vertex_copy_at(mesh: &mut TriangleMesh, vertex: usize, at: Vec3) -> u32 {
+fn append_vertex_copy_at_position(mesh: &mut TriangleMesh, vertex: usize, at: Vec3) -> u32 {
     fn push_attribute_copy<T: Copy>(values: &mut Vec<T>, vertex: usize) {
         values.extend(values.get(vertex).copied());
     }

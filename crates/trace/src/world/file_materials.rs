@@ -73,14 +73,10 @@ pub fn lower_file_material(images: &Images, own: &FileMaterial) -> Material {
             )
         }
         (FileMaterialKind::Principled(physical), _) => {
-            return file_material_with_non_specular(
-                images,
-                own,
-                file_material_principled(images, own, physical),
-            );
+            return non_specular_file_material(images, own, file_material_principled(images, own, physical));
         }
         (FileMaterialKind::Phong | FileMaterialKind::Glass, _) => {
-            return file_material_with_non_specular(images, own, file_material_phong(images, own));
+            return non_specular_file_material(images, own, file_material_phong(images, own));
         }
     };
     Material {
@@ -93,7 +89,7 @@ pub fn lower_file_material(images: &Images, own: &FileMaterial) -> Material {
 }
 
 /// Non-specular material from a mesh file, including its emission and normal map.
-fn file_material_with_non_specular(images: &Images, own: &FileMaterial, rough: NonSpecular) -> Material {
+fn non_specular_file_material(images: &Images, own: &FileMaterial, rough: NonSpecular) -> Material {
     let normals = own.normal_texture.as_ref().and_then(|texture| {
         let texture = lower_file_texture(images, texture, PixelInterpretation::Normal)?;
         Some(NormalMap { texture, strength: own.normal_strength })

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::accel::{Bvh, InstructionSet, SphericalShell};
 use crate::control::{CancelToken, Canceled};
 use crate::geometry::{Aabb, Ray, Shape, ShapeHit, SurfacePoint, SurfaceRequest};
-use crate::lights::LightGeometry;
+use crate::lights::LightSceneGeometry;
 use crate::math::color::srgb8_color_to_linear;
 use crate::math::{DVec3, Vec2, Vec3};
 use crate::scene::description::{self, LoweredShape, Scene};
@@ -32,7 +32,7 @@ pub struct Geometry {
     origin: DVec3,
     tree: Bvh,
     /// Small meshes merged into one tree, or `None` if merging is not worthwhile.
-    merged: Option<MergedTree>,
+    merged: Option<MergedMeshesWithTopTree>,
     /// Infinite objects, which are not in the tree.
     unbounded: Vec<u32>,
     /// Upper bound on the position error of mesh triangles, including the error of ray tests.
@@ -46,7 +46,7 @@ pub struct Geometry {
 
 /// Small meshes in one tree, and the top-level tree used for tracing instead of the tree over all objects.
 #[derive(Debug)]
-pub(super) struct MergedTree {
+pub(super) struct MergedMeshesWithTopTree {
     /// The merged meshes. In `over`, they are represented by one object, whose id follows the ids of all real
     /// objects.
     pub(super) meshes: MergedMeshes,
@@ -102,8 +102,10 @@ impl Geometry {
             (0_u32..).zip(&bounds).filter(|(_, bounds)| bounds.is_none()).map(|(id, _)| id).collect();
         let boxes: Vec<Aabb> = bounds.into_iter().map(|bounds| bounds.unwrap_or(Aabb::EMPTY)).collect();
         let shell = |id: u32| bounding_spherical_shell(&objects[id as usize], &boxes[id as usize]);
-        let (tree, instructions) =
-            (Bvh::build(&boxes, token)?.with_shells_if_nested(shell), InstructionSet::best());
+        let (tree, instructions) = (
+            Bvh::build(&boxes, token)?.with_shells_if_nested(shell),
+            InstructionSet::from_environment_or_best(),
+        );
         let merged = merged.map(|meshes| -> Result<_, Canceled> {
             let each = (0..)
                 .zip(&boxes)
@@ -113,7 +115,10 @@ impl Geometry {
             let shell = |id: u32| {
                 objects.get(id as usize).map_or(SphericalShell::from_bounds(&of_merged), |_| shell(id))
             };
-            Ok(MergedTree { over: Bvh::build(&with_all, token)?.with_shells_if_nested(shell), meshes })
+            Ok(MergedMeshesWithTopTree {
+                over: Bvh::build(&with_all, token)?.with_shells_if_nested(shell),
+                meshes,
+            })
         });
         let merged = merged.transpose()?;
         let rounding = objects.iter().filter_map(Object::mesh).map(MeshInstance::max_rounding_error);
@@ -175,14 +180,14 @@ impl Geometry {
 
     /// Whether a light is an entire merged mesh. Shadow rays to such lights use the per-mesh trees instead.
     #[inline(always)]
-    pub(super) fn is_light_entire_merged_mesh(&self, source: LightGeometry) -> bool {
+    pub(super) fn is_light_entire_merged_mesh(&self, source: LightSceneGeometry) -> bool {
         match (source, &self.merged) {
-            (LightGeometry::Object(object), Some(merged)) => merged.meshes.contains_object(object),
+            (LightSceneGeometry::Object(object), Some(merged)) => merged.meshes.contains_object(object),
             (
-                LightGeometry::Nothing
-                | LightGeometry::Object(_)
-                | LightGeometry::SeeThrough(_)
-                | LightGeometry::Primitive(..),
+                LightSceneGeometry::Nothing
+                | LightSceneGeometry::Object(_)
+                | LightSceneGeometry::SeeThrough(_)
+                | LightSceneGeometry::Primitive(..),
                 _,
             ) => false,
         }
@@ -276,20 +281,24 @@ impl Geometry {
     }
 
     /// Whether anything other than the light itself blocks a shadow ray.
-    pub fn is_occluded_except_by_light(&self, ray: &Ray, source: LightGeometry) -> bool {
+    pub fn is_occluded_except_by_light(&self, ray: &Ray, source: LightSceneGeometry) -> bool {
         let ray_f64 = ray.to_f64();
         let any = |id: u32, except: Option<u32>| self.objects[id as usize].any_hit(ray, &ray_f64, except);
         let of_object = |id: u32| match source {
-            LightGeometry::Nothing => any(id, None),
-            LightGeometry::Object(own) | LightGeometry::SeeThrough(own) => own != id && any(id, None),
-            LightGeometry::Primitive(own, part) => any(id, (own == id).then_some(part)),
+            LightSceneGeometry::Nothing => any(id, None),
+            LightSceneGeometry::Object(own) | LightSceneGeometry::SeeThrough(own) => {
+                own != id && any(id, None)
+            }
+            LightSceneGeometry::Primitive(own, part) => any(id, (own == id).then_some(part)),
         };
         let test = |id: u32| match (self.merged_meshes_if_represented_by(id), source) {
             (
                 Some(merged),
-                LightGeometry::Nothing | LightGeometry::Object(_) | LightGeometry::SeeThrough(_),
+                LightSceneGeometry::Nothing
+                | LightSceneGeometry::Object(_)
+                | LightSceneGeometry::SeeThrough(_),
             ) => merged.any_hit(ray, None),
-            (Some(merged), LightGeometry::Primitive(own, part)) => {
+            (Some(merged), LightSceneGeometry::Primitive(own, part)) => {
                 merged.any_hit(ray, merged.merged_triangle_index(own, part))
             }
             (None, _) => of_object(id),
@@ -317,7 +326,7 @@ impl Geometry {
 
     /// Returns the requested surface attributes at a hit.
     pub fn requested_surface(&self, ray: &Ray, hit: &Hit, request: SurfaceRequest) -> SurfacePoint {
-        self.objects[hit.object as usize].surface(ray, &hit.shape, request)
+        self.objects[hit.object as usize].requested_surface_point(ray, &hit.shape, request)
     }
 
     /// Mean curvature at a hit, positive if the surface is convex on its front side.
@@ -354,7 +363,8 @@ impl Geometry {
 
     /// Memory used by the objects and the trees over them, in bytes, excluding per-mesh trees.
     pub fn top_level_memory_bytes(&self) -> usize {
-        let of_merged = |merged: &MergedTree| merged.meshes.memory_bytes() + merged.over.memory_bytes();
+        let of_merged =
+            |merged: &MergedMeshesWithTopTree| merged.meshes.memory_bytes() + merged.over.memory_bytes();
         let merged = self.merged.as_ref().map_or(0, of_merged);
         self.tree.memory_bytes() + merged + size_of_val(self.objects.as_slice())
     }

@@ -4,13 +4,13 @@ use std::sync::Arc;
 
 use super::Images;
 use super::lower_texture::lower_texture;
-use super::textures::{AlphaCutoffKey, coverage_cutoff};
+use super::textures::{HashableAlphaCutoff, coverage_preserving_cutoff};
 use crate::materials::microfacet::MicrofacetDistribution;
 use crate::materials::texture::{ColorOrTexture, Texture};
 use crate::materials::{
     Blend, Bsdf, Bump, Coat, CoatInputs, CoatedMaterial, Conductor, ConductorFresnel, Dielectric, Emission,
     Material, Mirror, NonSpecular, NormalMap, NormalPerturbation, Opacity, Phong, Plastic, Principled,
-    PrincipledInputs, ScalarParameter, SpecularOverBase, SpecularPart, ThinDielectric, TranslucentPhong,
+    PrincipledInputs, ScalarParameter, SpecularLayer, SpecularOverBase, ThinDielectric, TranslucentPhong,
 };
 use crate::math::Vec3;
 use crate::scene::description::{
@@ -93,10 +93,10 @@ pub fn lower_opacity(scene: &Scene, images: &Images, material: &description::Mat
             let of = MaterialParameterConverter { scene, images, material };
             let texture = of.lower_texture(index, TextureRole::Opacity(number));
             // If mip levels preserve coverage, the cutoff already includes the factor.
-            let coverage = coverage_cutoff(scene, index, source.cutoff);
+            let coverage = coverage_preserving_cutoff(scene, index, source.cutoff);
             let texture = Arc::unwrap_or_clone(texture);
             let texture = Arc::new(texture.map_image_factor(|factor| factor.filter(|_| coverage.is_none())));
-            (ScalarParameter::Texture(texture), coverage.map_or(source.cutoff, AlphaCutoffKey::value))
+            (ScalarParameter::Texture(texture), coverage.map_or(source.cutoff, HashableAlphaCutoff::value))
         }
     };
     Some(Opacity { value, cutoff })
@@ -146,7 +146,7 @@ pub(super) fn lower_plastic(
     let is_smooth = roughness.as_untextured() == Some(0.0);
     let base = Plastic::new(diffuse, specular.clone(), roughness, ior, distribution);
     if is_smooth {
-        let specular = SpecularPart::SmoothCoat { tint: specular, ior };
+        let specular = SpecularLayer::SmoothCoat { tint: specular, ior };
         return Bsdf::SpecularOverBase(SpecularOverBase {
             specular,
             coat: None,
@@ -185,7 +185,7 @@ fn add_coat_to_bsdf(coat: Coat, bsdf: Bsdf) -> Bsdf {
             let none = Phong { diffuse: black.clone(), specular: black, shininess: 1.0, ambient: None };
             let base = add_coat_to_lobes(coat.clone(), NonSpecular::Phong(none));
             Bsdf::SpecularOverBase(SpecularOverBase {
-                specular: SpecularPart::Mirror(mirror),
+                specular: SpecularLayer::Mirror(mirror),
                 coat: Some(coat),
                 base,
             })

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::textures::{TextureSource, file_texture_source, scene_material_texture_source};
+use super::textures::{TextureImageSource, file_texture_source, scene_material_texture_source};
 use super::{Images, TexelsAndMipmaps};
 use crate::assets::FileTexture;
 use crate::materials::UvSet;
@@ -73,7 +73,7 @@ fn lower_pattern(
         }
         PixelInterpretation::Number(number) => {
             let factor = if matches!(role, TextureRole::Bump(_)) { 1.0 } else { declared.factor.x };
-            colors.map(|color| Vec3::splat(number.of_opaque_color(color) * factor))
+            colors.map(|color| Vec3::splat(number.value_of_opaque_color(color) * factor))
         }
         PixelInterpretation::Normal => colors,
     };
@@ -108,7 +108,7 @@ pub(super) fn lower_file_texture(
 
 /// Returns a loaded image, or a placeholder if the image was not loaded. Images that are not loaded are used
 /// only by materials without objects, whose textures are never looked up.
-fn loaded_image_or_placeholder(images: &Images, source: &TextureSource) -> TexelsAndMipmaps {
+fn loaded_image_or_placeholder(images: &Images, source: &TextureImageSource) -> TexelsAndMipmaps {
     images.get(source).cloned().unwrap_or_else(|| {
         let data = TexelData::Linear8(vec![[128, 128, 255]]);
         TexelsAndMipmaps {

@@ -173,12 +173,14 @@ impl MergedMeshes {
         (active, ends): (u32, &F32x16),
         found: &mut HitPacket,
     ) {
-        let Some(facets) = &self.facets else { return self.closest_hit_by_tree(rows, active, ends, found) };
+        let Some(facets) = &self.facets else {
+            return self.closest_hit_packet_with_tree(rows, active, ends, found);
+        };
         let size = self.bounds().extent();
         match by.run(TriangleListClosestHitKernel { facets, size, rows, active, ends, found }) {
             Some(0) => {}
             Some(undecided) => self.closest_hit_per_ray(rows, undecided, ends, found),
-            None => self.closest_hit_by_tree(rows, active, ends, found),
+            None => self.closest_hit_packet_with_tree(rows, active, ends, found),
         }
     }
 
@@ -194,7 +196,13 @@ impl MergedMeshes {
     }
 
     #[inline(never)]
-    fn closest_hit_by_tree(&self, rows: &RayPacket, active: u32, ends: &F32x16, found: &mut HitPacket) {
+    fn closest_hit_packet_with_tree(
+        &self,
+        rows: &RayPacket,
+        active: u32,
+        ends: &F32x16,
+        found: &mut HitPacket,
+    ) {
         let mut hits = [None; PACKET_SIZE];
         self.tree.closest_hit_packet(&unpack_rays(rows, active), ends, &mut hits);
         for (lane, hit) in hits.iter().enumerate() {
@@ -373,7 +381,7 @@ pub(super) mod tests {
     use crate::assets::LoadedMesh;
     use crate::geometry::mesh::TriangleMesh;
     use crate::geometry::ray::offset_origin;
-    use crate::lights::LightGeometry;
+    use crate::lights::LightSceneGeometry;
     use crate::math::DVec3;
     use crate::math::random::signed_number_generator as random;
     use crate::math::transform::Transform;
@@ -475,16 +483,16 @@ pub(super) mod tests {
             let nothing = Hit { shape: ShapeHit::from_t(0.0), object: 3 };
             let Hit { shape, object } = found.unwrap_or(nothing);
             for source in [
-                LightGeometry::Nothing,
-                LightGeometry::Object(object),
-                LightGeometry::Primitive(object, shape.primitive),
+                LightSceneGeometry::Nothing,
+                LightSceneGeometry::Object(object),
+                LightSceneGeometry::Primitive(object, shape.primitive),
             ] {
                 let any = (0_u32..).zip(&alone).any(|(id, own)| match source {
-                    LightGeometry::Nothing => own.any_hit(&ray, &ray.to_f64(), None),
-                    LightGeometry::Object(except) | LightGeometry::SeeThrough(except) => {
+                    LightSceneGeometry::Nothing => own.any_hit(&ray, &ray.to_f64(), None),
+                    LightSceneGeometry::Object(except) | LightSceneGeometry::SeeThrough(except) => {
                         id != except && own.any_hit(&ray, &ray.to_f64(), None)
                     }
-                    LightGeometry::Primitive(of, part) => {
+                    LightSceneGeometry::Primitive(of, part) => {
                         own.any_hit(&ray, &ray.to_f64(), (id == of).then_some(part))
                     }
                 });

@@ -204,7 +204,12 @@ impl MeshInstance {
     }
 
     /// Computes the requested surface attributes at a hit.
-    pub(super) fn surface(&self, ray: &RayF64, hit: &ShapeHit, request: SurfaceRequest) -> SurfacePoint {
+    pub(super) fn requested_surface_point(
+        &self,
+        ray: &RayF64,
+        hit: &ShapeHit,
+        request: SurfaceRequest,
+    ) -> SurfacePoint {
         match self.is_transformed {
             true => self.surface_using_placement(self.to_placed_mesh(&self.transform), ray, hit, request),
             false => self.surface_using_placement(self.to_placed_mesh(IdentityPlacement), ray, hit, request),
@@ -357,8 +362,11 @@ mod tests {
             let mesh = MeshInstance::new(Arc::clone(&tree), transform, false);
             for primitive in 0..10 {
                 let hit = ShapeHit { primitive, u: 0.5, v: 0.25, t: 1.0 };
-                let surface =
-                    mesh.surface(&Ray::new(Vec3::ZERO, Vec3::Z).to_f64(), &hit, SurfaceRequest::ALL);
+                let surface = mesh.requested_surface_point(
+                    &Ray::new(Vec3::ZERO, Vec3::Z).to_f64(),
+                    &hit,
+                    SurfaceRequest::ALL,
+                );
                 let [a, b, c] = mesh.tree.loaded_mesh().mesh.corners(primitive);
                 let [a, b, c] = [a, b, c].map(|corner| transform.point(corner.as_dvec3()));
                 let off = surface.point.as_dvec3() - (a * 0.25 + b * 0.5 + c * 0.25);

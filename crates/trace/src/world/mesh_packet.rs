@@ -288,11 +288,14 @@ mod tests {
                 }
                 let (of, set) = (u32::MAX >> (32 - PACKET_SIZE), UvSet::First);
                 let filling = FillMesh { mesh: &mesh, rays: &rays, hits: &hits, of, set };
-                let row = InstructionSet::best().run(filling);
+                let row = InstructionSet::from_environment_or_best().run(filling);
                 for (i, ray) in rays.iter().enumerate() {
                     let exact = ray.origin.as_dvec3() + ray.direction.as_dvec3();
-                    let surface =
-                        mesh.surface(&ray.to_f64(), &hits.get(i).expect("a hit"), SurfaceRequest::ALL);
+                    let surface = mesh.requested_surface_point(
+                        &ray.to_f64(),
+                        &hits.get(i).expect("a hit"),
+                        SurfaceRequest::ALL,
+                    );
                     let off = (surface.point.as_dvec3() - exact).abs().max_element();
                     assert!(off < 2e-6 + f64::from(size) * 1e-14, "{size}: {off}");
                     assert!(surface.error.y < 2e-5 + size * 1e-14, "{size}: {}", surface.error);
@@ -329,7 +332,8 @@ mod tests {
                     assert_eq!(row.smooth, if mesh.smooth { of } else { 0 });
                     for i in (0..PACKET_SIZE).filter(|i| of & 1 << i != 0) {
                         let hit = hits.get(i).expect("a hit");
-                        let alone = mesh.surface(&rays[i].to_f64(), &hit, SurfaceRequest::ALL);
+                        let alone =
+                            mesh.requested_surface_point(&rays[i].to_f64(), &hit, SurfaceRequest::ALL);
                         let bits = |v: Vec3| v.to_array().map(f32::to_bits);
                         let what = || format!("{instructions:?}, {hit:?}, {alone:?}");
                         assert_eq!(bits(lane(&row.point, i)), bits(alone.point), "{}", what());

@@ -52,10 +52,10 @@ pub use object::Object;
 pub use origin::choose_origin_near_camera_target;
 pub use packet_material::PacketMaterial;
 pub use textures::{
-    AlphaCutoffKey, NeededTexture, TextureRolesNeededByRender, TextureSource, environment_map_source,
-    scene_material_texture_source, textures_needed,
+    HashableAlphaCutoff, NeededTexture, TextureImageSource, TextureRolesNeededByRender,
+    environment_map_source, scene_material_texture_source, textures_needed,
 };
-pub use unlit_glass::LightBoundingBoxPair;
+pub use unlit_glass::LightBallAndObjectBoxes;
 
 use crate::assets::GkitOrbiterCamera;
 use crate::geometry::SurfacePoint;
@@ -70,7 +70,7 @@ use crate::math::transform::Transform;
 use crate::scene::description;
 
 /// A scene's decoded images, indexed by source.
-pub type Images = HashMap<TextureSource, TexelsAndMipmaps>;
+pub type Images = HashMap<TextureImageSource, TexelsAndMipmaps>;
 
 /// A decoded image.
 #[derive(Clone, Debug)]

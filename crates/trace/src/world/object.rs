@@ -79,11 +79,16 @@ impl Object {
     }
 
     /// Computes the requested surface attributes at a hit.
-    pub fn surface(&self, ray: &Ray, hit: &ShapeHit, request: SurfaceRequest) -> SurfacePoint {
+    pub fn requested_surface_point(
+        &self,
+        ray: &Ray,
+        hit: &ShapeHit,
+        request: SurfaceRequest,
+    ) -> SurfacePoint {
         let ray = ray.to_f64();
         match self {
             Self::Shape(shape) => shape.requested_surface_point(&ray, hit, request),
-            Self::Mesh(mesh) => mesh.surface(&ray, hit, request),
+            Self::Mesh(mesh) => mesh.requested_surface_point(&ray, hit, request),
         }
     }
 

@@ -5,7 +5,7 @@ use super::{Geometry, Hit};
 use crate::accel::{AnyHitCallback, ClosestHitCallback, F32x16, PACKET_SIZE, SimdKernel};
 use crate::geometry::Ray;
 use crate::geometry::packet::{HitPacket, RayPacket, nonnegative_end_mask, set_bit_lanes};
-use crate::lights::{LightGeometry, LightGeometryPacket};
+use crate::lights::{LightSceneGeometry, LightSceneGeometryPacket};
 use crate::math::lanes::{Simd, TRUE, select, select_u32};
 
 impl Geometry {
@@ -48,7 +48,7 @@ impl Geometry {
         rows: &RayPacket,
         ends: &F32x16,
         traced: u32,
-        sources: &LightGeometryPacket,
+        sources: &LightSceneGeometryPacket,
         simd: impl Simd,
     ) -> u32 {
         simd.call_out_of_line(OcclusionKernel { geometry: self, rows, ends, traced, sources })
@@ -58,13 +58,13 @@ impl Geometry {
 impl Geometry {
     /// Mask of rays whose light is an entire merged mesh.
     #[inline(always)]
-    pub(super) fn target_light_is_merged_mesh_mask(&self, sources: &LightGeometryPacket) -> u32 {
+    pub(super) fn target_light_is_merged_mesh_mask(&self, sources: &LightSceneGeometryPacket) -> u32 {
         if !sources.is_any || !self.has_merged_meshes() {
             return 0;
         }
         let is_whole = |lane: usize| {
-            sources.part[lane] == LightGeometryPacket::NONE
-                && self.is_light_entire_merged_mesh(LightGeometry::Object(sources.object[lane]))
+            sources.part[lane] == LightSceneGeometryPacket::NONE
+                && self.is_light_entire_merged_mesh(LightSceneGeometry::Object(sources.object[lane]))
         };
         (0..PACKET_SIZE).filter(|&lane| is_whole(lane)).fold(0, |bits, lane| bits | 1 << lane)
     }
@@ -96,7 +96,7 @@ impl Geometry {
         rows: &RayPacket,
         ends: &F32x16,
         traced: u32,
-        sources: &LightGeometryPacket,
+        sources: &LightSceneGeometryPacket,
     ) -> u32 {
         let is_occluded = |&lane: &usize| {
             self.is_occluded_except_by_light(
@@ -114,7 +114,7 @@ struct OcclusionKernel<'a> {
     rows: &'a RayPacket,
     ends: &'a F32x16,
     traced: u32,
-    sources: &'a LightGeometryPacket,
+    sources: &'a LightSceneGeometryPacket,
 }
 
 impl SimdKernel for OcclusionKernel<'_> {
@@ -214,7 +214,7 @@ fn resolve_merged_hits(merged: &MergedMeshes, found: &mut HitPacket) -> [u32; PA
 pub(super) struct OcclusionTest<'a, F> {
     geometry: &'a Geometry,
     rows: &'a RayPacket,
-    sources: &'a LightGeometryPacket,
+    sources: &'a LightSceneGeometryPacket,
     /// Mask of rays whose light is a single primitive of an object.
     in_part: u32,
     simd: F,
@@ -226,10 +226,10 @@ impl<'a, F: Simd> OcclusionTest<'a, F> {
     pub(super) fn new(
         geometry: &'a Geometry,
         rows: &'a RayPacket,
-        sources: &'a LightGeometryPacket,
+        sources: &'a LightSceneGeometryPacket,
         simd: F,
     ) -> Self {
-        Self { geometry, rows, sources, in_part: target_light_is_primitive_mask(sources, simd), simd }
+        Self { geometry, rows, sources, in_part: light_is_single_primitive_mask(sources, simd), simd }
     }
 }
 
@@ -258,7 +258,7 @@ impl<F: Simd> AnyHitCallback for OcclusionTest<'_, F> {
                 Some(&own),
             );
         }
-        let own = object_light_ray_mask(self.sources, id, self.simd);
+        let own = light_is_on_object_mask(self.sources, id, self.simd);
         let (whole, in_part) = (own & !self.in_part, own & self.in_part);
         let active = active & !whole;
         if active == 0 {
@@ -272,20 +272,20 @@ impl<F: Simd> AnyHitCallback for OcclusionTest<'_, F> {
 
 /// Mask of rays whose light is a single primitive of an object.
 #[inline(always)]
-fn target_light_is_primitive_mask(sources: &LightGeometryPacket, simd: impl Simd) -> u32 {
+fn light_is_single_primitive_mask(sources: &LightSceneGeometryPacket, simd: impl Simd) -> u32 {
     if !sources.is_any {
         return 0;
     }
     let mut in_part = [0; PACKET_SIZE];
     for lane in 0..PACKET_SIZE {
-        in_part[lane] = if sources.part[lane] == LightGeometryPacket::NONE { 0 } else { TRUE };
+        in_part[lane] = if sources.part[lane] == LightSceneGeometryPacket::NONE { 0 } else { TRUE };
     }
     simd.movemask(&in_part)
 }
 
 /// Mask of rays whose light is on object `id`.
 #[inline(always)]
-fn object_light_ray_mask(sources: &LightGeometryPacket, id: u32, simd: impl Simd) -> u32 {
+fn light_is_on_object_mask(sources: &LightSceneGeometryPacket, id: u32, simd: impl Simd) -> u32 {
     if !sources.is_any {
         return 0;
     }
@@ -320,7 +320,7 @@ pub(super) mod tests {
     use crate::geometry::parallelogram::Parallelogram;
     use crate::geometry::plane::Plane;
     use crate::geometry::sphere::Sphere;
-    use crate::lights::LightGeometry;
+    use crate::lights::LightSceneGeometry;
     use crate::math::random::signed_number_generator as random;
     use crate::math::transform::Transform;
     use crate::math::{DVec3, Vec3};
@@ -381,7 +381,7 @@ pub(super) mod tests {
     struct OccludedRayPacketKernel<'a> {
         geometry: &'a Geometry,
         rays: &'a [Ray],
-        sources: &'a LightGeometryPacket,
+        sources: &'a LightSceneGeometryPacket,
     }
 
     impl SimdKernel for OccludedRayPacketKernel<'_> {
@@ -423,12 +423,12 @@ pub(super) mod tests {
             let alone: Vec<_> = rays.iter().map(|ray| geometry.closest_hit(ray)).collect();
             assert_eq!(found, alone, "{rays:?}");
             let source = |lane: usize| match alone[lane] {
-                Some(hit) if lane.is_multiple_of(3) => LightGeometry::Object(hit.object),
-                Some(hit) if lane % 3 == 1 => LightGeometry::Primitive(hit.object, hit.shape.primitive),
-                _ => LightGeometry::Object(u32::MAX),
+                Some(hit) if lane.is_multiple_of(3) => LightSceneGeometry::Object(hit.object),
+                Some(hit) if lane % 3 == 1 => LightSceneGeometry::Primitive(hit.object, hit.shape.primitive),
+                _ => LightSceneGeometry::Object(u32::MAX),
             };
             let sources: Vec<_> = (0..rays.len()).map(source).collect();
-            let mut row = LightGeometryPacket::splat(LightGeometry::Nothing);
+            let mut row = LightSceneGeometryPacket::splat(LightSceneGeometry::Nothing);
             sources.iter().enumerate().for_each(|(lane, source)| row.set_geometry(lane, *source));
             let occluded = geometry.instruction_set().run(OccludedRayPacketKernel {
                 geometry,

@@ -15,7 +15,7 @@ use crate::scene::description::{
 
 /// An image file and its encoding.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
-pub struct TextureSource {
+pub struct TextureImageSource {
     /// File path.
     pub path: PathBuf,
     /// Index of the image in a glTF file, or `None` for a separate image file.
@@ -23,14 +23,14 @@ pub struct TextureSource {
     /// Encoding of the pixel values.
     pub encoding: ColorEncoding,
     /// Alpha cutoff at which mip levels preserve coverage, or `None` for ordinary mip levels.
-    pub coverage: Option<AlphaCutoffKey>,
+    pub coverage: Option<HashableAlphaCutoff>,
 }
 
 /// An alpha cutoff, stored as the bits of an `f32` so that it can be hashed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct AlphaCutoffKey(u32);
+pub struct HashableAlphaCutoff(u32);
 
-impl AlphaCutoffKey {
+impl HashableAlphaCutoff {
     /// Converts a cutoff for opacity to a cutoff for pixel values. `factor` is the factor applied to the
     /// image.
     pub fn from_opacity_cutoff_and_factor(cutoff: f32, factor: f32) -> Self {
@@ -47,7 +47,7 @@ impl AlphaCutoffKey {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct NeededTexture {
     /// The file and its encoding.
-    pub source: TextureSource,
+    pub source: TextureImageSource,
     /// Name shown in progress bars.
     pub name: String,
     /// Index into [`Scene::textures`], or `None` if only a mesh file refers to the image.
@@ -166,7 +166,8 @@ pub fn textures_needed(
     let (used_materials, own_materials) = used_material_and_mesh_file_flags(scene);
     let used = scene.materials.iter().zip(used_materials).filter(|(_, used)| *used);
     for material in used.flat_map(|(material, _)| material.self_and_blend_parts()) {
-        let (textures, is_delta) = (material.textures().into_iter(), material.kind.has_delta_lobe());
+        let (textures, is_delta) =
+            (material.own_textures_with_roles().into_iter(), material.kind.has_delta_lobe());
         for (texture, role) in textures.filter(|(_, role)| lookups.includes_role(*role, is_delta)) {
             let Some(image) = scene.textures[texture].as_image() else { continue };
             add(NeededTexture {
@@ -216,7 +217,7 @@ fn texture_uses_mipmaps(scene: &Scene, texture: usize) -> bool {
 }
 
 /// The environment map's file, or `None` if there is no map or the map's color factor is black.
-pub fn environment_map_source(scene: &Scene) -> Option<TextureSource> {
+pub fn environment_map_source(scene: &Scene) -> Option<TextureImageSource> {
     environment_file(scene).map(environment_texture_source)
 }
 
@@ -225,8 +226,8 @@ fn environment_file(scene: &Scene) -> Option<&Path> {
     Some(&environment.file.as_ref()?.value)
 }
 
-fn environment_texture_source(file: &Path) -> TextureSource {
-    TextureSource { path: file.to_owned(), image: None, encoding: ColorEncoding::Color, coverage: None }
+fn environment_texture_source(file: &Path) -> TextureImageSource {
+    TextureImageSource { path: file.to_owned(), image: None, encoding: ColorEncoding::Color, coverage: None }
 }
 
 /// Which of the scene's materials are used by objects, and which mesh files' materials are used by mesh
@@ -250,12 +251,13 @@ pub fn scene_material_texture_source(
     material: &Material,
     (texture, role): (usize, TextureRole),
     image: &ImageSource,
-) -> TextureSource {
+) -> TextureImageSource {
     let source = scene_texture_source(image, texture_pixel_interpretation(scene, material, (texture, role)));
     match role {
-        TextureRole::Opacity(_) => {
-            TextureSource { coverage: coverage_cutoff(scene, texture, material.opacity.cutoff), ..source }
-        }
+        TextureRole::Opacity(_) => TextureImageSource {
+            coverage: coverage_preserving_cutoff(scene, texture, material.opacity.cutoff),
+            ..source
+        },
         TextureRole::Diffuse
         | TextureRole::Specular
         | TextureRole::Ambient
@@ -271,11 +273,12 @@ pub fn scene_material_texture_source(
 
 /// Cutoff at which an opacity texture's mip levels preserve coverage, or `None` without a cutoff or mip
 /// levels, and for patterns.
-pub fn coverage_cutoff(scene: &Scene, texture: usize, cutoff: f32) -> Option<AlphaCutoffKey> {
+pub fn coverage_preserving_cutoff(scene: &Scene, texture: usize, cutoff: f32) -> Option<HashableAlphaCutoff> {
     let is_image = scene.textures[texture].as_image().is_some();
     let is_covered = cutoff > 0.0 && texture_uses_mipmaps(scene, texture) && is_image;
-    is_covered
-        .then(|| AlphaCutoffKey::from_opacity_cutoff_and_factor(cutoff, scene.textures[texture].factor.x))
+    is_covered.then(|| {
+        HashableAlphaCutoff::from_opacity_cutoff_and_factor(cutoff, scene.textures[texture].factor.x)
+    })
 }
 
 /// How a scene material's texture is used in this role.
@@ -311,7 +314,7 @@ pub fn texture_pixel_interpretation(
 fn uses_image_as_color(scene: &Scene, material: &Material, texture: usize) -> bool {
     let image =
         |texture: usize| scene.textures[texture].as_image().map(|image| (&image.file.value, image.image));
-    material.textures().into_iter().any(|(other, role)| {
+    material.own_textures_with_roles().into_iter().any(|(other, role)| {
         role.pixel_interpretation() == PixelInterpretation::Color && image(other) == image(texture)
     })
 }
@@ -326,7 +329,7 @@ fn have_same_image_and_mapping(scene: &Scene, a: usize, b: usize) -> bool {
 }
 
 /// Image file and encoding for a scene texture with this pixel interpretation.
-pub fn scene_texture_source(image: &ImageSource, used: PixelInterpretation) -> TextureSource {
+pub fn scene_texture_source(image: &ImageSource, used: PixelInterpretation) -> TextureImageSource {
     let encoding = match (image.encoding, used) {
         (TextureEncoding::Srgb, PixelInterpretation::Color | PixelInterpretation::Normal) => {
             ColorEncoding::Srgb
@@ -350,11 +353,11 @@ pub fn scene_texture_source(image: &ImageSource, used: PixelInterpretation) -> T
             ColorEncoding::Number { of, is_srgb: false }
         }
     };
-    TextureSource { path: image.file.value.clone(), image: image.image, encoding, coverage: None }
+    TextureImageSource { path: image.file.value.clone(), image: image.image, encoding, coverage: None }
 }
 
 /// Returns the image file to load for a texture of a mesh file, and how to decode it for this use.
-pub fn file_texture_source(texture: &FileTexture, used: PixelInterpretation) -> TextureSource {
+pub fn file_texture_source(texture: &FileTexture, used: PixelInterpretation) -> TextureImageSource {
     let encoding = match used {
         PixelInterpretation::Color => ColorEncoding::Color,
         PixelInterpretation::CutOut => ColorEncoding::CutOut(ColorTransferFunction::Auto),
@@ -363,7 +366,7 @@ pub fn file_texture_source(texture: &FileTexture, used: PixelInterpretation) -> 
             ColorEncoding::Number { of: texture.number.unwrap_or(of), is_srgb: false }
         }
     };
-    TextureSource { path: texture.path.clone(), image: None, encoding, coverage: None }
+    TextureImageSource { path: texture.path.clone(), image: None, encoding, coverage: None }
 }
 
 /// How textures from mesh files are used as scalar parameters.
@@ -457,7 +460,11 @@ mod tests {
         let outcome = crate::scene::parse(Arc::from(text.as_str()), &path);
         let scene = outcome.scene.unwrap_or_else(|| panic!("{:?}: {text}", outcome.diagnostics));
         let found = scene.materials.iter().find(|material| material.name == "m").expect("the material");
-        found.textures().into_iter().map(|used| texture_pixel_interpretation(&scene, found, used)).collect()
+        found
+            .own_textures_with_roles()
+            .into_iter()
+            .map(|used| texture_pixel_interpretation(&scene, found, used))
+            .collect()
     }
 
     #[test]

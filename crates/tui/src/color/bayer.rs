@@ -17,7 +17,7 @@ pub(super) fn bayer_threshold(x: usize, y: usize) -> f32 {
 }
 
 /// Dithers a color to six bits per channel.
-pub(crate) fn dither_color_to_6_bits(rgb: [u8; 3], x: usize, y: usize) -> [u8; 3] {
+pub(crate) fn dither_to_6_bits_per_channel(rgb: [u8; 3], x: usize, y: usize) -> [u8; 3] {
     const LEVELS: u16 = 63;
     let more = (bayer_threshold(x, y) * 255.0) as u16;
     rgb.map(|channel| {
@@ -46,10 +46,11 @@ mod tests {
     #[test]
     fn dithered_mean_matches_input_color() {
         assert_eq!(
-            (dither_color_to_6_bits([0; 3], 3, 4), dither_color_to_6_bits([255; 3], 3, 4)),
+            (dither_to_6_bits_per_channel([0; 3], 3, 4), dither_to_6_bits_per_channel([255; 3], 3, 4)),
             ([0; 3], [255; 3])
         );
-        let sum: u32 = (0..64).map(|i| u32::from(dither_color_to_6_bits([101; 3], i % 8, i / 8)[0])).sum();
+        let sum: u32 =
+            (0..64).map(|i| u32::from(dither_to_6_bits_per_channel([101; 3], i % 8, i / 8)[0])).sum();
         assert!(sum.abs_diff(101 * 64) <= 64, "{sum}");
     }
 }

@@ -9,7 +9,7 @@ mod recipes;
 
 use ratatui::style::Color;
 
-pub(super) use self::bayer::dither_color_to_6_bits;
+pub(super) use self::bayer::dither_to_6_bits_per_channel;
 pub(super) use self::color_mapper::ColorMapper;
 pub(super) use self::oklab::linear_to_oklab;
 pub use self::palette::xterm_rgb;

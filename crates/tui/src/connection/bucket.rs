@@ -24,7 +24,7 @@ impl TokenBucket {
         self.tokens_at(now).max(0.0) as usize
     }
 
-    pub(super) fn take(&mut self, bytes: usize, now: Instant) {
+    pub(super) fn deduct(&mut self, bytes: usize, now: Instant) {
         (self.tokens, self.at) = (self.tokens_at(now) - bytes as f64, now);
     }
 

@@ -143,7 +143,7 @@ impl TerminalFlowControl {
     /// Records a sent slice. `bytes` includes its query.
     pub(super) fn record_sent(&mut self, bytes: usize, question: Option<QueryKind>, now: Instant) {
         self.unwritten += bytes;
-        self.bucket.take(bytes, now);
+        self.bucket.deduct(bytes, now);
         let Some(question) = question else { return };
         if self.flight.is_empty() {
             self.waiting_since = now;
@@ -155,7 +155,7 @@ impl TerminalFlowControl {
     }
 
     /// Records that the operating system has accepted bytes.
-    pub(super) fn record_written(&mut self, bytes: usize) {
+    pub(super) fn record_written_bytes(&mut self, bytes: usize) {
         self.unwritten = self.unwritten.saturating_sub(bytes);
     }
 
@@ -206,7 +206,7 @@ impl TerminalFlowControl {
     }
 
     /// Estimated bandwidth in bytes per second, or `None` if it is unknown or too high to matter.
-    pub(super) fn bytes_per_second(&self) -> Option<f64> {
+    pub(super) fn estimated_bytes_per_second(&self) -> Option<f64> {
         /// At this rate, sending a preview takes no noticeable time.
         const FAST: f64 = 2e6;
         let window_rate = || {

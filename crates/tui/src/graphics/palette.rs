@@ -7,7 +7,7 @@
 
 use std::ops::Range;
 
-use crate::color::{PaletteDither, dither_color_to_6_bits};
+use crate::color::{PaletteDither, dither_to_6_bits_per_channel};
 use crate::film::Srgb8Image;
 
 /// Maximum number of colors. Registers below 16 are reserved for the terminal.
@@ -32,7 +32,8 @@ impl Palette {
         let mut bins = histogram(picture);
         let colors = choose_palette_colors(&mut bins);
         let fits = |palette: &Self| {
-            palette_error(&bins, &palette.colors) <= MAX_ERROR_RATIO * palette_error(&bins, &colors) + ALLOWED
+            palette_rms_error(&bins, &palette.colors)
+                <= MAX_ERROR_RATIO * palette_rms_error(&bins, &colors) + ALLOWED
         };
         before.filter(fits).unwrap_or_else(|| Self { dither: PaletteDither::new(&colors), colors })
     }
@@ -46,7 +47,7 @@ impl Palette {
         let width = picture.width.max(1) as usize;
         let mut index = |(i, rgb): (usize, &[u8; 3])| {
             let (x, y) = (i % width, i / width);
-            self.dither.index_at(dither_color_to_6_bits(*rgb, x, y), x, y) as u8
+            self.dither.index_at(dither_to_6_bits_per_channel(*rgb, x, y), x, y) as u8
         };
         picture.pixels.iter().enumerate().map(&mut index).collect()
     }
@@ -128,7 +129,7 @@ fn choose_palette_colors(bins: &mut [HistogramBin]) -> Vec<[u8; 3]> {
 }
 
 /// RMS distance between an image's colors and the nearest palette colors, in code values.
-fn palette_error(bins: &[HistogramBin], colors: &[[u8; 3]]) -> f64 {
+fn palette_rms_error(bins: &[HistogramBin], colors: &[[u8; 3]]) -> f64 {
     let nearest = |mean: [f64; 3]| {
         let distance = |color: &[u8; 3]| -> f64 {
             mean.iter().zip(color).map(|(a, b)| (a - f64::from(*b)).powi(2)).sum()

@@ -4,5 +4,5 @@ mod fit;
 mod tile;
 
 pub(super) use self::fit::{FittedCell, fit_cell};
-pub use self::tile::filled_squares;
+pub use self::tile::squares_of_block_character;
 pub(super) use self::tile::{CellGrid, PLACES, TwoPartBlockPattern, pattern_and_inversion_for_symbol};

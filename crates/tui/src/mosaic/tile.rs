@@ -70,7 +70,7 @@ pub(crate) fn pattern_and_inversion_for_symbol(symbol: char) -> Option<(TwoPartB
 
 /// The grid squares that a character fills with the foreground color, as 12 rows of 2 columns, or `None` if
 /// it is not a block character.
-pub fn filled_squares(symbol: char) -> Option<[bool; 24]> {
+pub fn squares_of_block_character(symbol: char) -> Option<[bool; 24]> {
     let mask = match symbol {
         ' ' => 0,
         '█' => ALL,

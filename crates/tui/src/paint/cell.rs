@@ -58,7 +58,7 @@ impl TwoPartColorCell {
 
     /// Lists pairs of colors that overlap when this cell is laid over `other`. The weight of each pair is
     /// twice the fraction of the cell where the two colors overlap.
-    pub(super) fn overlapping_colors(
+    pub(super) fn overlapping_color_pairs(
         self,
         other: Self,
     ) -> impl Iterator<Item = (TerminalColor, TerminalColor, f32)> {
@@ -107,7 +107,7 @@ impl ForegroundParts {
     pub(super) const ALL: [Self; 4] = [Self::Blank, Self::First, Self::Second, Self::Full];
 
     /// The character that draws `tile`.
-    pub(super) fn symbol(self, tile: TwoPartBlockPattern) -> char {
+    pub(super) fn symbol_for_pattern(self, tile: TwoPartBlockPattern) -> char {
         match self {
             Self::Blank => ' ',
             Self::First => tile.symbols()[0],

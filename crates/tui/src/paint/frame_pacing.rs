@@ -31,7 +31,7 @@ pub struct PacingInputs {
 
 /// What to do with a preview.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum PacingAdvice {
+pub enum PacingDecision {
     /// Draw the preview with this precision.
     Aim(PreviewFidelity),
     /// Wait for a better preview.
@@ -60,20 +60,20 @@ const PREVIEW_BANDWIDTH: f64 = 0.5;
 /// Decides whether a preview is worth its cost. The first and last previews always are. A fast terminal gets
 /// 5 to 10 previews per second. A slow connection gets few intermediate previews, and none that would delay
 /// the last one.
-pub fn pace_preview(moment: &PacingInputs) -> PacingAdvice {
+pub fn preview_pacing_decision(moment: &PacingInputs) -> PacingDecision {
     if moment.is_final {
-        return PacingAdvice::Aim(PreviewFidelity::Still);
+        return PacingDecision::Aim(PreviewFidelity::Still);
     }
-    let Some(aimed) = moment.aimed_samples else { return PacingAdvice::Aim(PreviewFidelity::First) };
+    let Some(aimed) = moment.aimed_samples else { return PacingDecision::Aim(PreviewFidelity::First) };
     if moment.is_fast {
         let is_due = moment.is_shown && moment.since_aim >= moment.shortest_preview_interval();
-        return if is_due { PacingAdvice::Aim(PreviewFidelity::Following) } else { PacingAdvice::Wait };
+        return if is_due { PacingDecision::Aim(PreviewFidelity::Following) } else { PacingDecision::Wait };
     }
     let frame = moment.estimate_send_duration();
     let is_too_late = moment.final_in.is_some_and(|left| left < frame);
     let is_too_soon = moment.since_aim < MIN_INTERVAL.max(frame.div_f64(PREVIEW_BANDWIDTH));
     if is_too_late || is_too_soon {
-        return PacingAdvice::Wait;
+        return PacingDecision::Wait;
     }
     let is_better = |factor: f64| moment.samples >= (aimed * factor).max(1.0) && moment.samples > aimed;
     let is_worth_it = if moment.is_shown {
@@ -83,7 +83,7 @@ pub fn pace_preview(moment: &PacingInputs) -> PacingAdvice {
     } else {
         is_better(MANY_MORE_SAMPLES)
     };
-    if is_worth_it { PacingAdvice::Aim(PreviewFidelity::Moving) } else { PacingAdvice::Wait }
+    if is_worth_it { PacingDecision::Aim(PreviewFidelity::Moving) } else { PacingDecision::Wait }
 }
 
 impl PacingInputs {
@@ -126,7 +126,7 @@ mod tests {
         final_in: None,
     };
 
-    const MOVING: PacingAdvice = PacingAdvice::Aim(PreviewFidelity::Moving);
+    const MOVING: PacingDecision = PacingDecision::Aim(PreviewFidelity::Moving);
 
     #[test]
     fn first_and_last_previews_are_always_drawn() {
@@ -134,52 +134,56 @@ mod tests {
             let slow =
                 PacingInputs { bytes_per_second, since_aim: Duration::ZERO, is_shown: false, ..MOMENT };
             assert_eq!(
-                pace_preview(&PacingInputs { aimed_samples: None, ..slow }),
-                PacingAdvice::Aim(PreviewFidelity::First)
+                preview_pacing_decision(&PacingInputs { aimed_samples: None, ..slow }),
+                PacingDecision::Aim(PreviewFidelity::First)
             );
             assert_eq!(
-                pace_preview(&PacingInputs { is_final: true, ..slow }),
-                PacingAdvice::Aim(PreviewFidelity::Still)
+                preview_pacing_decision(&PacingInputs { is_final: true, ..slow }),
+                PacingDecision::Aim(PreviewFidelity::Still)
             );
         }
     }
 
     #[test]
     fn intermediate_previews_double_the_samples() {
-        assert_eq!(pace_preview(&MOMENT), PacingAdvice::Wait);
-        assert_eq!(pace_preview(&PacingInputs { samples: 2.0, ..MOMENT }), MOVING);
+        assert_eq!(preview_pacing_decision(&MOMENT), PacingDecision::Wait);
+        assert_eq!(preview_pacing_decision(&PacingInputs { samples: 2.0, ..MOMENT }), MOVING);
         let late = PacingInputs { since_aim: Duration::from_secs(3), ..MOMENT };
-        assert_eq!(pace_preview(&late), MOVING, "after a long time, any progress is drawn");
+        assert_eq!(preview_pacing_decision(&late), MOVING, "after a long time, any progress is drawn");
         assert_eq!(
-            pace_preview(&PacingInputs { samples: 1.0, ..late }),
-            PacingAdvice::Wait,
+            preview_pacing_decision(&PacingInputs { samples: 1.0, ..late }),
+            PacingDecision::Wait,
             "an unchanged preview is not redrawn"
         );
     }
 
     #[test]
     fn fast_terminals_get_5_to_10_previews_per_second() {
-        let following = PacingAdvice::Aim(PreviewFidelity::Following);
+        let following = PacingDecision::Aim(PreviewFidelity::Following);
         let quick = PacingInputs { is_fast: true, since_aim: Duration::from_millis(100), ..MOMENT };
-        assert_eq!(pace_preview(&quick), following, "drawn regardless of the number of new samples");
         assert_eq!(
-            pace_preview(&PacingInputs { samples: 0.5, ..quick }),
+            preview_pacing_decision(&quick),
+            following,
+            "drawn regardless of the number of new samples"
+        );
+        assert_eq!(
+            preview_pacing_decision(&PacingInputs { samples: 0.5, ..quick }),
             following,
             "drawn even if the sample count is lower"
         );
         assert_eq!(
-            pace_preview(&PacingInputs { since_aim: Duration::from_millis(99), ..quick }),
-            PacingAdvice::Wait
+            preview_pacing_decision(&PacingInputs { since_aim: Duration::from_millis(99), ..quick }),
+            PacingDecision::Wait
         );
         assert_eq!(
-            pace_preview(&PacingInputs { is_shown: false, ..quick }),
-            PacingAdvice::Wait,
+            preview_pacing_decision(&PacingInputs { is_shown: false, ..quick }),
+            PacingDecision::Wait,
             "not drawn before the previous preview has been shown"
         );
         let in_pixels = PacingInputs { is_in_pixels: true, ..quick };
-        assert_eq!(pace_preview(&in_pixels), PacingAdvice::Wait);
+        assert_eq!(preview_pacing_decision(&in_pixels), PacingDecision::Wait);
         assert_eq!(
-            pace_preview(&PacingInputs { since_aim: Duration::from_millis(200), ..in_pixels }),
+            preview_pacing_decision(&PacingInputs { since_aim: Duration::from_millis(200), ..in_pixels }),
             following
         );
     }
@@ -187,32 +191,39 @@ mod tests {
     #[test]
     fn first_pass_is_drawn_in_steps() {
         let coarse = PacingInputs { samples: 0.1, aimed_samples: Some(0.0), ..MOMENT };
-        assert_eq!(pace_preview(&coarse), PacingAdvice::Wait);
-        assert_eq!(pace_preview(&PacingInputs { samples: 0.25, ..coarse }), MOVING);
-        assert_eq!(pace_preview(&PacingInputs { samples: 1.0, aimed_samples: Some(0.5), ..coarse }), MOVING);
+        assert_eq!(preview_pacing_decision(&coarse), PacingDecision::Wait);
+        assert_eq!(preview_pacing_decision(&PacingInputs { samples: 0.25, ..coarse }), MOVING);
+        assert_eq!(
+            preview_pacing_decision(&PacingInputs { samples: 1.0, aimed_samples: Some(0.5), ..coarse }),
+            MOVING
+        );
     }
 
     #[test]
     fn slow_connections_get_few_previews() {
         // 15 kB take a quarter of a second at 60 kB/s.
         let thin = PacingInputs { bytes_per_second: Some(60e3), samples: 2.0, ..MOMENT };
-        assert_eq!(pace_preview(&thin), MOVING);
+        assert_eq!(preview_pacing_decision(&thin), MOVING);
         assert_eq!(
-            pace_preview(&PacingInputs { since_aim: Duration::from_millis(400), ..thin }),
-            PacingAdvice::Wait
+            preview_pacing_decision(&PacingInputs { since_aim: Duration::from_millis(400), ..thin }),
+            PacingDecision::Wait
         );
         assert_eq!(
-            pace_preview(&PacingInputs { is_shown: false, ..thin }),
-            PacingAdvice::Wait,
+            preview_pacing_decision(&PacingInputs { is_shown: false, ..thin }),
+            PacingDecision::Wait,
             "the previous preview is still being sent"
         );
         assert_eq!(
-            pace_preview(&PacingInputs { is_shown: false, samples: 4.0, ..thin }),
+            preview_pacing_decision(&PacingInputs { is_shown: false, samples: 4.0, ..thin }),
             MOVING,
             "the previous preview is much worse"
         );
         let ending = PacingInputs { final_in: Some(Duration::from_millis(200)), ..thin };
-        assert_eq!(pace_preview(&ending), PacingAdvice::Wait, "it would delay the final preview");
+        assert_eq!(
+            preview_pacing_decision(&ending),
+            PacingDecision::Wait,
+            "it would delay the final preview"
+        );
     }
 
     #[test]
@@ -229,7 +240,7 @@ mod tests {
                     since_aim: Duration::from_secs_f64(seconds - at),
                     ..MOMENT
                 };
-                if pace_preview(&moment) != PacingAdvice::Wait {
+                if preview_pacing_decision(&moment) != PacingDecision::Wait {
                     (aimed, at, count) = (Some(moment.samples), seconds, count + 1);
                 }
             }

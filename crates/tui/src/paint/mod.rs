@@ -8,7 +8,7 @@
 //!
 //! Text is always exact. Intermediate previews trade precision for size (except on a fast terminal, where
 //! they are exact), and cells unaffected by an edit are not redrawn. The final preview is accurate to 1/255.
-//! [`pace_preview`] decides which previews are worth drawing at the connection's speed.
+//! [`preview_pacing_decision`] decides which previews are worth drawing at the connection's speed.
 
 mod candidates;
 mod cell;
@@ -36,7 +36,7 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
 pub use self::fidelity::PreviewFidelity;
-pub use self::frame_pacing::{PacingAdvice, PacingInputs, pace_preview};
+pub use self::frame_pacing::{PacingDecision, PacingInputs, preview_pacing_decision};
 use self::hyperlinks::UrlTable;
 pub use self::hyperlinks::{Hyperlink, LINK_OFF};
 pub use self::lines::buffer_to_ansi_text;

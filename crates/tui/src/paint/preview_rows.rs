@@ -4,7 +4,7 @@ use super::cell::CellContent;
 use super::cost_model::RateDistortion;
 use super::cursor_moves::CellPosition;
 use super::fidelity::PreviewFidelity;
-use super::row_optimizer::{DrawOp, PlannedRow, RowStart, WantedAndShownCell, plan_row};
+use super::row_optimizer::{CellDrawOp, PlannedRow, RowStart, WantedAndShownCell, plan_row};
 use super::screen::{CellRun, ScreenModel};
 use super::stable_cells::FirstPreviewCells;
 use super::target_screen::TargetScreen;
@@ -63,8 +63,10 @@ pub(super) fn plan_preview_row(
     budget: &mut FirstPreviewByteBudget,
 ) -> Vec<CellRun> {
     let columns = wanted.picture.left()..wanted.picture.right();
-    let targets: Vec<WantedAndShownCell> =
-        columns.clone().map(|x| target_cell(screen, wanted, memory, CellPosition { x, y })).collect();
+    let targets: Vec<WantedAndShownCell> = columns
+        .clone()
+        .map(|x| wanted_and_shown_cell(screen, wanted, memory, CellPosition { x, y }))
+        .collect();
     let start = RowStart {
         fg: screen.pen.fg,
         bg: screen.pen.bg,
@@ -76,7 +78,7 @@ pub(super) fn plan_preview_row(
         PreviewFidelity::Moving => plan_row(&targets, start, RateDistortion::MOVING),
         PreviewFidelity::First => budget.plan_row_in_budget(&targets, start),
     };
-    let stroke = |op: DrawOp| CellRun::Mosaic {
+    let stroke = |op: CellDrawOp| CellRun::Mosaic {
         at: CellPosition { x: columns.start + op.column as u16, y },
         glyph: op.glyph,
         mosaic: op.mosaic,
@@ -86,7 +88,7 @@ pub(super) fn plan_preview_row(
     if can_repeat { CellRun::merge_repeated_blanks(&strokes) } else { strokes }
 }
 
-fn target_cell(
+fn wanted_and_shown_cell(
     screen: &ScreenModel,
     wanted: &TargetScreen,
     memory: &FirstPreviewCells,

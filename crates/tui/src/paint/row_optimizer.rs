@@ -36,7 +36,7 @@ pub(super) struct RowStart {
 
 /// An operation that draws one cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct DrawOp {
+pub(super) struct CellDrawOp {
     /// Column relative to the first target cell.
     pub(super) column: usize,
     pub(super) glyph: ForegroundParts,
@@ -50,7 +50,7 @@ struct RowPrefixPlan {
     bg: TerminalColor,
     /// Both colors of the pen, packed into one key.
     pen: u64,
-    gap: CursorGap,
+    gap: CursorDistance,
     bytes: u32,
     /// Weighted sum of bytes and errors.
     cost: f32,
@@ -61,19 +61,19 @@ struct RowPrefixPlan {
 }
 
 /// Packs two colors into one key.
-fn pen_key(fg: TerminalColor, bg: TerminalColor) -> u64 {
+fn color_pair_key(fg: TerminalColor, bg: TerminalColor) -> u64 {
     u64::from(fg.unique_number()) << 32 | u64::from(bg.unique_number())
 }
 
 /// Distance between the cursor and the next cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum CursorGap {
+enum CursorDistance {
     /// The cursor is in another row.
     Far,
     Cells(u8),
 }
 
-impl CursorGap {
+impl CursorDistance {
     fn move_byte_count(self) -> u32 {
         match self {
             Self::Far => 8,
@@ -94,16 +94,24 @@ impl CursorGap {
 /// A row's drawing operations.
 #[derive(Clone, Debug)]
 pub(super) struct PlannedRow {
-    pub(super) ops: Vec<DrawOp>,
+    pub(super) ops: Vec<CellDrawOp>,
     pub(super) bytes: u32,
 }
 
 /// Finds the cheapest path through a row of cells.
 pub(super) fn plan_row(targets: &[WantedAndShownCell], start: RowStart, model: RateDistortion) -> PlannedRow {
-    let gap = if start.is_at_start { CursorGap::Cells(0) } else { CursorGap::Far };
+    let gap = if start.is_at_start { CursorDistance::Cells(0) } else { CursorDistance::Far };
     let RowStart { fg, bg, .. } = start;
-    let first =
-        RowPrefixPlan { fg, bg, pen: pen_key(fg, bg), gap, bytes: 0, cost: 0.0, parent: 0, glyph: None };
+    let first = RowPrefixPlan {
+        fg,
+        bg,
+        pen: color_pair_key(fg, bg),
+        gap,
+        bytes: 0,
+        cost: 0.0,
+        parent: 0,
+        glyph: None,
+    };
     let mut paths = vec![vec![first]];
     let wanted: Vec<_> = targets.iter().map(|target| target.wanted).collect();
     for (column, target) in targets.iter().enumerate() {
@@ -124,7 +132,7 @@ fn extend_plans(
     let leave = match (target.wanted, target.shown) {
         (None, _) => 0.0,
         (Some(wanted), Some(shown)) => shown
-            .overlapping_colors(wanted)
+            .overlapping_color_pairs(wanted)
             .map(|(shown, wanted, part)| part * model.squared_color_error(shown, wanted))
             .sum(),
         (Some(_), None) => f32::INFINITY,
@@ -324,12 +332,12 @@ impl<'a> OneCellPlanExtender<'a> {
         if glyph == ForegroundParts::Second && self.tile == TwoPartBlockPattern::MEDIUM {
             return;
         }
-        let bytes = self.bytes + sgr + glyph.symbol(self.tile).len_utf8() as u32;
+        let bytes = self.bytes + sgr + glyph.symbol_for_pattern(self.tile).len_utf8() as u32;
         let cost = bytes as f32 * self.byte + self.error + ends.error(glyph);
         if cost < self.bound {
             let PenWithErrors { fg, bg, .. } = ends;
             let parent = self.parent;
-            let (pen, gap, glyph) = (pen_key(fg, bg), CursorGap::Cells(0), Some(glyph));
+            let (pen, gap, glyph) = (color_pair_key(fg, bg), CursorDistance::Cells(0), Some(glyph));
             self.beam.add(RowPrefixPlan { fg, bg, pen, gap, bytes, cost, parent, glyph });
             self.bound = self.beam.pruning_cost_threshold();
         }
@@ -380,7 +388,11 @@ fn trace_back_cheapest_plan(paths: &[Vec<RowPrefixPlan>], wanted: &[Option<TwoPa
                 ColorLayer::Foreground => path.fg,
                 ColorLayer::Background => path.bg,
             });
-            ops.push(DrawOp { column: column - 1, glyph, mosaic: TwoPartColorCell::new(mosaic.tile, pair) });
+            ops.push(CellDrawOp {
+                column: column - 1,
+                glyph,
+                mosaic: TwoPartColorCell::new(mosaic.tile, pair),
+            });
         }
         index = path.parent;
     }
@@ -448,7 +460,8 @@ mod tests {
             [TerminalColor::DefaultForeground, TerminalColor::DefaultBackground],
             [TerminalColor::DefaultForeground; 2],
         ] {
-            let targets = [WantedAndShownCell { wanted: Some(TwoPartColorCell::from_halves(halves)), shown: None }];
+            let targets =
+                [WantedAndShownCell { wanted: Some(TwoPartColorCell::from_halves(halves)), shown: None }];
             let found = plan_row(&targets, start(BLACK, BLACK), RateDistortion::MOVING);
             assert_eq!(found.ops.first().map(|op| op.mosaic.pair), Some(halves));
         }
@@ -497,7 +510,7 @@ mod tests {
             for (shown, target) in screen.iter().zip(&targets) {
                 let Some(wanted) = target.wanted else { continue };
                 let shown = shown.expect("unknown cells should be drawn");
-                for (shown, wanted, part) in shown.overlapping_colors(wanted) {
+                for (shown, wanted, part) in shown.overlapping_color_pairs(wanted) {
                     // Larger errors in a single channel should be avoided at any cost.
                     let most = if is_exact { 3.0 } else { RateDistortion::MOVING.byte * 120.0 };
                     prop_assert!(part * model.squared_color_error(shown, wanted) <= most);

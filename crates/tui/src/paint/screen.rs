@@ -158,7 +158,7 @@ impl ScreenModel {
         match stroke {
             CellRun::Text { text, .. } => bytes.extend_from_slice(text.symbol.as_bytes()),
             CellRun::Mosaic { glyph, mosaic, count, .. } => {
-                let symbol = glyph.symbol(mosaic.tile);
+                let symbol = glyph.symbol_for_pattern(mosaic.tile);
                 bytes.extend_from_slice(symbol.encode_utf8(&mut [0; 4]).as_bytes());
                 if *count > 1 {
                     bytes.extend(cursor_moves::csi_with_count(*count - 1, b'b'));

@@ -25,7 +25,7 @@ pub(super) fn plan_text_row(
         if screen.content(at) == look || wanted.region_at(x, y) != region {
             continue;
         }
-        if let Some(stroke) = stroke_for_cell(at, look) {
+        if let Some(stroke) = run_from_cell(at, look) {
             bridge_gap(screen, &mut strokes, at);
             strokes.push(stroke);
         }
@@ -33,7 +33,7 @@ pub(super) fn plan_text_row(
     replace_blanks_with_erase(wanted, y, &strokes)
 }
 
-fn stroke_for_cell(at: CellPosition, look: &CellContent) -> Option<CellRun> {
+fn run_from_cell(at: CellPosition, look: &CellContent) -> Option<CellRun> {
     match look {
         CellContent::Text(text) => Some(CellRun::Text { at, text: text.clone() }),
         CellContent::Mosaic(mosaic) => {
@@ -82,9 +82,9 @@ fn bridge_gap(screen: &ScreenModel, strokes: &mut Vec<CellRun>, to: CellPosition
 /// Replaces long runs of blanks with erase sequences.
 fn replace_blanks_with_erase(wanted: &TargetScreen, y: u16, strokes: &[CellRun]) -> Vec<CellRun> {
     let mut shorter = Vec::with_capacity(strokes.len());
-    for run in strokes.chunk_by(|a, b| {
-        draws_single_blank(a) && draws_single_blank(b) && a.position().x + 1 == b.position().x
-    }) {
+    for run in strokes
+        .chunk_by(|a, b| is_single_blank(a) && is_single_blank(b) && a.position().x + 1 == b.position().x)
+    {
         let at = run[0].position();
         let end = usize::from(at.x) + run.len();
         let rest = end as u16..wanted.columns;
@@ -92,9 +92,9 @@ fn replace_blanks_with_erase(wanted: &TargetScreen, y: u16, strokes: &[CellRun])
             && wanted.row(y)[end.min(usize::from(wanted.columns))..]
                 .iter()
                 .all(|look| *look == CellContent::BLANK);
-        if draws_single_blank(&run[0]) && is_last && run.len() >= ERASED_TO_END {
+        if is_single_blank(&run[0]) && is_last && run.len() >= ERASED_TO_END {
             shorter.push(CellRun::Erase { at, count: None });
-        } else if draws_single_blank(&run[0]) && run.len() >= MIN_ERASED_RUN {
+        } else if is_single_blank(&run[0]) && run.len() >= MIN_ERASED_RUN {
             shorter.push(CellRun::Erase { at, count: Some(run.len() as u16) });
         } else {
             shorter.extend_from_slice(run);
@@ -103,6 +103,6 @@ fn replace_blanks_with_erase(wanted: &TargetScreen, y: u16, strokes: &[CellRun])
     shorter
 }
 
-fn draws_single_blank(stroke: &CellRun) -> bool {
+fn is_single_blank(stroke: &CellRun) -> bool {
     matches!(stroke, CellRun::Mosaic { mosaic, count: 1, .. } if CellContent::Mosaic(*mosaic) == CellContent::BLANK)
 }

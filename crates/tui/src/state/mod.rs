@@ -24,7 +24,7 @@ use super::options::ExternalChange;
 use super::preview_style::PreviewStyle;
 use super::terminal_replies::TerminalQueries;
 use super::terminals::DesktopCapabilities;
-pub(super) use crate::pipeline::key_overrides::{KeyboardOverrides, format_stops};
+pub(super) use crate::pipeline::key_overrides::{KeyboardOverrides, format_exposure_stops};
 use crate::pipeline::settings::Overrides;
 use crate::scene::diagnostic::{Diagnostic, Severity};
 

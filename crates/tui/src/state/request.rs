@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
 
-use super::{KeyboardOverrides, format_stops};
+use super::{KeyboardOverrides, format_exposure_stops};
 use crate::math::DVec3;
 use crate::pipeline::FilePathAndContentId;
 use crate::pipeline::has_model_extension;
@@ -155,7 +155,7 @@ impl RequestState {
 
     /// Overrides from the command line combined with changes made with keys.
     pub(crate) fn combined_overrides(&self) -> Overrides {
-        self.toggles.apply_to_command_line(&self.command_line)
+        self.toggles.add_to_command_line_overrides(&self.command_line)
     }
 
     /// Overrides for the scene's own image, or `None` unless keys have changed the displayed image.
@@ -248,7 +248,7 @@ impl RequestState {
         let is_moved = pose.is_some() || fov.is_some() || view_height.is_some();
         let moved = is_moved.then(|| "camera".to_owned());
         let focused = (focus.is_some() && !is_moved).then(|| "focus".to_owned());
-        let exposed = self.toggles.exposure.map(|it| format!("exposure ({})", format_stops(it)));
+        let exposed = self.toggles.exposure.map(|it| format!("exposure ({})", format_exposure_stops(it)));
         moved.into_iter().chain(focused).chain(exposed).collect()
     }
 

@@ -7,7 +7,7 @@ use super::KeyboardOverrides;
 use crate::event::WriteFailure;
 use crate::messages;
 use crate::options::ExternalChange;
-use crate::pipeline::protocol::{ResolvedCamera, SavedCameraEdit, SavedSceneImageState};
+use crate::pipeline::protocol::{ResolvedCamera, SavedCameraEdit, SavedSceneRenderStatus};
 use crate::scene::sanitize::escape_invisible_chars;
 
 /// A saved change that is not on the screen yet.
@@ -20,7 +20,7 @@ pub(crate) struct UndisplayedChange {
 /// Progress of the scene's own image, which is rendered from the saved scene with command-line overrides.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct SceneImageProgress {
-    pub state: SavedSceneImageState,
+    pub state: SavedSceneRenderStatus,
     /// Progress of the render, from 0 to 1.
     pub fraction: f64,
 }
@@ -130,7 +130,7 @@ impl SavedFilesState {
             edits: 0,
             last_edit: None,
             saved_at: 0,
-            own: SceneImageProgress { state: SavedSceneImageState::NotBegun, fraction: 0.0 },
+            own: SceneImageProgress { state: SavedSceneRenderStatus::NotBegun, fraction: 0.0 },
             is_settled: true,
             change: None,
             editor_closed: None,

@@ -29,18 +29,18 @@ fn moved_camera_is_shown_but_not_written() {
     let mut ui = TestUi::new();
     ui.finish_render(RED);
     let effects = ui.press_character('l');
-    let moved = find_render_request(&effects).expect("a request");
+    let moved = sent_render_request(&effects).expect("a request");
     assert_eq!((moved.write, moved.force), (WriteRequirement::No, false));
     let text = ui.screen_text();
     assert!(text.contains(messages::CAMERA_MOVED), "{text}");
     assert!(text.lines().last().is_some_and(|line| line.contains("reset camera")), "{text}");
     show(&mut ui);
     let effects = ui.handle_event(Event::FileChanged(ContentChangeTime { noticed: ui.now }));
-    let edited = find_render_request(&effects).expect("a request");
+    let edited = sent_render_request(&effects).expect("a request");
     assert_eq!(edited.overrides.camera, moved.overrides.camera, "saving should not reset the camera");
     assert_eq!(edited.write, WriteRequirement::No);
     let effects = ui.press_character('0');
-    let own = find_render_request(&effects).expect("a request");
+    let own = sent_render_request(&effects).expect("a request");
     assert_eq!((own.write, own.overrides.camera.has_changes()), (WriteRequirement::Try, false));
     assert!(!ui.screen_text().contains(messages::CAMERA_MOVED));
 }
@@ -51,24 +51,24 @@ fn newest_camera_step_waits_for_a_preview() {
     ui.finish_render(RED);
     let effects = ui.press_character('l');
     let first =
-        find_render_request(&effects).expect("an immediate request").overrides.camera.pose.expect("a pose");
+        sent_render_request(&effects).expect("an immediate request").overrides.camera.pose.expect("a pose");
     for key in ['l', 'l', 'k', '<'] {
         assert!(ui.press_character(key).is_empty(), "steps should wait for the first step's preview");
     }
     let effects = show(&mut ui);
-    let newest = find_render_request(&effects).expect("the newest step should be requested").overrides.camera;
+    let newest = sent_render_request(&effects).expect("the newest step should be requested").overrides.camera;
     let pose = newest.pose.expect("a pose");
     assert!(pose.position.x > 2.9 * first.position.x && pose.position.y > 1.1, "{pose:?}");
     assert!(newest.fov.is_some_and(|fov| fov < 40.0));
     assert!(show(&mut ui).is_empty(), "no step should be waiting");
     assert!(
-        find_render_request(&ui.press_character('l')).is_some(),
+        sent_render_request(&ui.press_character('l')).is_some(),
         "the next step should be requested immediately"
     );
     // Other keys take effect immediately. Their request has the camera after all previous steps.
     ui.press_character('l');
     let effects = ui.press_character('s');
-    assert!(find_render_request(&effects).expect("a request").overrides.camera != newest);
+    assert!(sent_render_request(&effects).expect("a request").overrides.camera != newest);
     assert!(show(&mut ui).is_empty());
 }
 
@@ -86,7 +86,7 @@ fn zoom_and_dolly_follow_the_projection() {
     let own = Projection::Orthographic { view_height: 3.0 };
     for (key, factor) in [('>', 1.05), ('<', 1.0 / 1.05), ('+', 0.95), ('-', 1.0 / 0.95)] {
         let mut ui = with_projection(own, false);
-        let moved = find_render_request(&ui.press_character(key)).expect("a request").overrides.camera;
+        let moved = sent_render_request(&ui.press_character(key)).expect("a request").overrides.camera;
         let height = moved.view_height.expect("a height");
         assert!((height / 3.0 - factor).abs() < 1e-3, "{key}: {height}");
         assert_eq!(moved.fov, None);
@@ -96,10 +96,10 @@ fn zoom_and_dolly_follow_the_projection() {
         assert!(text.contains(&format!("--set camera.view_height={height}")), "{text}");
     }
     let mut ui = with_projection(Projection::Fisheye { fov: 359.0 }, false);
-    let wide = find_render_request(&ui.press_character('>')).expect("a request").overrides.camera;
+    let wide = sent_render_request(&ui.press_character('>')).expect("a request").overrides.camera;
     assert_eq!((wide.fov, wide.view_height), (Some(360.0), None));
     let mut ui = with_projection(Projection::Spherical, false);
-    assert!(find_render_request(&ui.press_character('>')).is_none());
+    assert!(sent_render_request(&ui.press_character('>')).is_none());
     assert!(ui.screen_text().contains(messages::NO_FIELD_OF_VIEW));
 }
 
@@ -107,7 +107,7 @@ fn zoom_and_dolly_follow_the_projection() {
 fn orbiting_follows_the_mirrored_image() {
     let x = |mirror| {
         let mut ui = with_projection(Projection::Perspective { fov: 40.0 }, mirror);
-        let moved = find_render_request(&ui.press_character('l')).expect("a request").overrides.camera;
+        let moved = sent_render_request(&ui.press_character('l')).expect("a request").overrides.camera;
         moved.pose.expect("a pose").position.x
     };
     assert!(x(false) > 0.1);
@@ -124,18 +124,18 @@ fn missing_previews_do_not_block_steps() {
     let diagnostics = vec![diagnostic(Severity::Error, "wrong")];
     let failure = protocol::Failure::Scene(diagnostics);
     let effects = ui.worker_event(protocol::Event::Failed { generation, failure });
-    assert!(find_render_request(&effects).is_none(), "the last valid scene should still be rendering");
-    assert!(find_render_request(&show(&mut ui)).is_some(), "the preview should trigger the waiting step");
+    assert!(sent_render_request(&effects).is_none(), "the last valid scene should still be rendering");
+    assert!(sent_render_request(&show(&mut ui)).is_some(), "the preview should trigger the waiting step");
     ui.press_character('l');
     let generation = ui.state.request.generation;
     let failure = protocol::Failure::Work("no memory".to_owned());
     let effects = ui.worker_event(protocol::Event::Failed { generation, failure });
-    assert!(find_render_request(&effects).is_some(), "a failure should trigger the waiting step");
+    assert!(sent_render_request(&effects).is_some(), "a failure should trigger the waiting step");
     let mut ui = TestUi::from_state(state(80, 1));
     ui.finish_render(RED);
     for _ in 0..3 {
         assert!(
-            find_render_request(&ui.press_character('l')).is_some(),
+            sent_render_request(&ui.press_character('l')).is_some(),
             "without space for a preview, steps should not wait"
         );
     }
@@ -151,7 +151,7 @@ fn arrows_scroll_open_diagnostics() {
     assert!(ui.state.overlays.diagnostics.scroll > 0);
     ui.press_key(KeyPress::special(KeyCode::Esc));
     assert!(
-        find_render_request(&ui.press_key(down)).is_some(),
+        sent_render_request(&ui.press_key(down)).is_some(),
         "arrow keys should move the camera after the pane is closed"
     );
 }
@@ -175,7 +175,7 @@ fn exposure_changes_start_from_scene_value() {
     ui.press_character(']');
     show(&mut ui);
     let effects = ui.press_character(']');
-    assert_eq!(find_render_request(&effects).and_then(|it| it.overrides.exposure), Some(1.5));
+    assert_eq!(sent_render_request(&effects).and_then(|it| it.overrides.exposure), Some(1.5));
     assert!(ui.screen_text().contains("0 reset exposure (+1.5)"), "{}", ui.screen_text());
 }
 
@@ -214,7 +214,7 @@ fn reverted_changes_are_not_sent() {
         let mut last = None;
         for key in keys.chars() {
             let effects = ui.press_character(key);
-            last = find_render_request(&effects).cloned();
+            last = sent_render_request(&effects).cloned();
             show(&mut ui);
         }
         let last = last.expect("a request");

@@ -419,7 +419,7 @@ fn unreadable_scene_has_no_save_hint() {
     ui.report_scene_errors(vec![diagnostic(Severity::Error, "unknown key `radus`")]);
     ui.handle_event(Event::Settled);
     assert!(
-        ui.screen_text().contains(&messages::save_to_render_hint("cornell.toml", false)),
+        ui.screen_text().contains(&messages::saving_starts_render_hint("cornell.toml", false)),
         "{}",
         ui.screen_text()
     );

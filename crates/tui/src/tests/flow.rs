@@ -15,7 +15,7 @@ use crate::{ContentChangeTime, ExitStatus};
 fn first_request_includes_the_preview_size() {
     let mut state = state(80, 24);
     let effects = crate::update::request_first_render(&mut state);
-    let request = find_render_request(&effects).expect("a request");
+    let request = sent_render_request(&effects).expect("a request");
     assert_eq!(request.preview, Some(MaxPreviewSize { width: 56, height: 42, around: None }));
     assert_eq!((request.generation, request.write, request.force), (1, WriteRequirement::Try, false));
 }
@@ -50,7 +50,7 @@ fn first_change_is_timed_from_the_save() {
     let noticed = ui.now;
     ui.now += Duration::from_millis(3);
     let effects = ui.handle_event(Event::FileChanged(ContentChangeTime { noticed }));
-    assert_eq!(find_render_request(&effects).map(|it| it.generation), Some(2));
+    assert_eq!(sent_render_request(&effects).map(|it| it.generation), Some(2));
     ui.handle_event(Event::FirstPreviewSent { generation: 1 });
     assert_eq!(ui.state.saving.first_change, None, "the old preview should not count");
     ui.handle_event(Event::Preview(PreviewUpdate {

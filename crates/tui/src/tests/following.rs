@@ -14,7 +14,7 @@ use crate::color::{ColorDepth, xterm_rgb};
 use crate::event::Event;
 use crate::film::Srgb8Image;
 use crate::fixtures::*;
-use crate::mosaic::filled_squares;
+use crate::mosaic::squares_of_block_character;
 use crate::pipeline::protocol::{self, PreviewSlot, PreviewUpdate};
 use crate::pipeline::settings::Overrides;
 use crate::preview_style::PreviewStyle;
@@ -127,7 +127,7 @@ fn parts(cell: &vt100::Cell) -> Option<[[u8; 3]; 24]> {
         vt100::Color::Idx(index) => xterm_rgb(ratatui::style::Color::Indexed(index)),
         vt100::Color::Rgb(r, g, b) => Some([r, g, b]),
     };
-    let filled_squares = filled_squares(cell.contents().chars().next().unwrap_or(' '))?;
+    let filled_squares = squares_of_block_character(cell.contents().chars().next().unwrap_or(' '))?;
     let (fg, bg) = (color(cell.fgcolor()), color(cell.bgcolor()));
     let part = |is_ink: bool| if is_ink { fg } else { bg };
     let parts = filled_squares.map(part);
@@ -232,7 +232,7 @@ impl WatchedRender {
                 self.send_event(event);
             }
             for bytes in std::mem::take(&mut *self.outbox.borrow_mut()) {
-                self.presenter.display.record_written(bytes.len());
+                self.presenter.display.record_written_bytes(bytes.len());
                 self.terminal.send(bytes, now);
             }
             let wake = self.presenter.next_action_time(&self.ui.state, now);

@@ -182,7 +182,7 @@ fn interrupted_render_is_counted_once() {
             keys.chars().for_each(|key| drop(ui.press_character(key)));
             ui.finish_render(RED);
             assert!(
-                ui.screen_text().contains(&messages::render_number(number)),
+                ui.screen_text().contains(&messages::numbered_render(number)),
                 "{kind:?} {keys}: {}",
                 ui.screen_text()
             );
@@ -198,7 +198,7 @@ fn first_render_is_counted_even_if_unchanged() {
     ui.press_character(']');
     ui.report_scene_read();
     ui.worker_event(done_event(ui.state.request.generation, Vec::new(), true));
-    assert!(ui.screen_text().contains(&messages::render_number(1)), "{}", ui.screen_text());
+    assert!(ui.screen_text().contains(&messages::numbered_render(1)), "{}", ui.screen_text());
 }
 
 #[test]

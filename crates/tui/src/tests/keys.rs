@@ -30,11 +30,11 @@ fn every_key_has_its_effect() {
 
 /// The camera pose requested by a key.
 fn requested_pose(effects: &[Effect]) -> Pose {
-    find_render_request(effects).and_then(|it| it.overrides.camera.pose).expect("a request with a camera")
+    sent_render_request(effects).and_then(|it| it.overrides.camera.pose).expect("a request with a camera")
 }
 
 fn check(action: Action, key: KeyPress, ui: &mut TestUi) {
-    let overrides = |effects: &[Effect]| find_render_request(effects).map(|it| it.overrides.clone());
+    let overrides = |effects: &[Effect]| sent_render_request(effects).map(|it| it.overrides.clone());
     match action {
         Action::CycleShadows => {
             // Returning to the scene's own value clears the override.
@@ -87,7 +87,7 @@ fn check(action: Action, key: KeyPress, ui: &mut TestUi) {
         Action::NextView | Action::PreviousView => {
             let effects = ui.press_key(key);
             let wanted = if action == Action::NextView { ViewMode::Normal } else { ViewMode::Error };
-            let request = find_render_request(&effects).expect("a request");
+            let request = sent_render_request(&effects).expect("a request");
             assert_eq!((request.overrides.view, request.write), (Some(wanted), WriteRequirement::No));
             assert!(ui.screen_text().contains(&messages::view_chosen(wanted.name())));
         }
@@ -115,11 +115,12 @@ fn check(action: Action, key: KeyPress, ui: &mut TestUi) {
             let stops = if action == Action::Darken { -0.25 } else { 0.25 };
             let effects = ui.press_key(key);
             assert_eq!(
-                find_render_request(&effects).map(|it| (it.overrides.exposure, it.write)),
+                sent_render_request(&effects).map(|it| (it.overrides.exposure, it.write)),
                 Some((Some(stops), WriteRequirement::No))
             );
             assert!(
-                ui.screen_text().contains(&messages::exposure_changed(&crate::state::format_stops(stops))),
+                ui.screen_text()
+                    .contains(&messages::exposure_changed(&crate::state::format_exposure_stops(stops))),
                 "{}",
                 ui.screen_text()
             );
@@ -170,7 +171,7 @@ fn check(action: Action, key: KeyPress, ui: &mut TestUi) {
             assert_eq!(around(&ui.press_key(key)), None);
         }
         Action::RenderRegionFirst => {
-            let first = |effects: &[Effect]| find_render_request(effects).expect("a request").first;
+            let first = |effects: &[Effect]| sent_render_request(effects).expect("a request").first;
             ui.press_character('r');
             assert!(ui.press_key(key).is_empty(), "expected to wait for a drag");
             let section = first(&ui.press_key(key)).expect("a region around the crosshair");
@@ -207,7 +208,7 @@ fn check(action: Action, key: KeyPress, ui: &mut TestUi) {
             assert!(ui.screen_text().contains("paused"));
             assert!(matches!(ui.press_key(key)[..], [Effect::Send(Command::Pause(false))]));
         }
-        Action::RenderAgain => assert!(find_render_request(&ui.press_key(key)).expect("a request").force),
+        Action::RenderAgain => assert!(sent_render_request(&ui.press_key(key)).expect("a request").force),
         Action::WriteImage => assert!(matches!(ui.press_key(key)[..], [Effect::Send(Command::Write)])),
         Action::ResetSettings => {
             ui.press_character('s');
@@ -330,13 +331,13 @@ fn toggles_start_from_the_command_line() {
     let mut ui = TestUi::from_state(state);
     assert!(bottom(&mut ui).starts_with("s off  p off") && bottom(&mut ui).contains("v depth"));
     let effects = ui.press_character('s');
-    let soft = find_render_request(&effects).expect("a request");
+    let soft = sent_render_request(&effects).expect("a request");
     assert_eq!((soft.overrides.shadows, soft.write), (Some(ShadowMode::Soft), WriteRequirement::No));
     assert_eq!(soft.own.as_deref(), Some(&base), "the scene's own image should continue");
     let effects = ui.press_character('V');
-    assert_eq!(find_render_request(&effects).expect("a request").write, WriteRequirement::No);
+    assert_eq!(sent_render_request(&effects).expect("a request").write, WriteRequirement::No);
     let effects = ui.press_character('0');
-    assert_eq!(find_render_request(&effects).map(|it| it.overrides.clone()), Some(base));
+    assert_eq!(sent_render_request(&effects).map(|it| it.overrides.clone()), Some(base));
 }
 
 #[test]
@@ -351,7 +352,7 @@ fn pinhole_has_no_depth_of_field() {
     let state = state_with(80, 24, PreviewStyle::HalfBlock, ColorDepth::TrueColor, base);
     let mut ui = TestUi::from_state(state);
     ui.worker_event(protocol::Event::Settings { generation: 1, settings: pinhole(), own: scene_settings() });
-    assert_eq!(find_render_request(&ui.press_character('d')).expect("a request").overrides.dof, Some(true));
+    assert_eq!(sent_render_request(&ui.press_character('d')).expect("a request").overrides.dof, Some(true));
     ui.worker_event(protocol::Event::Settings { generation: 2, settings: pinhole(), own: scene_settings() });
     assert!(ui.screen_text().contains(messages::PINHOLE));
 }
@@ -376,7 +377,7 @@ fn resuming_is_reported_with_other_messages() {
         let mut ui = TestUi::new();
         ui.press_character(' ');
         let effects = ui.press_character(key);
-        assert!(find_render_request(&effects).is_some() && !ui.state.work.paused);
+        assert!(sent_render_request(&effects).is_some() && !ui.state.work.paused);
         let text = ui.screen_text();
         assert!(text.contains(messages::RESUMED) && text.contains(&words[..5]), "{key}: {text}");
         ui.press_character(key);
@@ -449,11 +450,11 @@ fn reverted_toggle_is_not_a_change() {
         let mut requests = Vec::new();
         for key in keys.chars() {
             assert_eq!(ui.state.request.combined_overrides() == base, requests.is_empty(), "{keys}");
-            requests.extend(find_render_request(&ui.press_character(key)).cloned());
+            requests.extend(sent_render_request(&ui.press_character(key)).cloned());
         }
         assert_eq!(requests.last().map(|request| &request.overrides), Some(&base), "{keys}");
         // Toggling starts again from the scene's value, whether or not the reply has arrived.
-        let first = find_render_request(&ui.press_character(keys.chars().next().expect("a key")))
+        let first = sent_render_request(&ui.press_character(keys.chars().next().expect("a key")))
             .cloned()
             .expect("a request");
         assert_eq!(first.overrides, requests[0].overrides, "{keys}");
@@ -480,7 +481,7 @@ fn saved_settings_are_the_base_for_toggles() {
     let shadows: Vec<Option<ShadowMode>> = "sss"
         .chars()
         .map(|key| {
-            find_render_request(&ui.press_character(key)).and_then(|request| request.overrides.shadows)
+            sent_render_request(&ui.press_character(key)).and_then(|request| request.overrides.shadows)
         })
         .collect();
     assert_eq!(shadows, [Some(ShadowMode::Off), Some(ShadowMode::Soft), None]);

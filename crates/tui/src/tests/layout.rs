@@ -224,14 +224,14 @@ fn save_hint_is_shown_until_the_first_save() {
             // If all stages are listed, a narrow window has no space for the hint.
             ui.state.work.stages = Default::default();
             assert!(
-                ui.screen_words().contains(&messages::save_to_render_hint("cornell.toml", false)),
+                ui.screen_words().contains(&messages::saving_starts_render_hint("cornell.toml", false)),
                 "{}",
                 ui.screen_text()
             );
             ui.handle_event(Event::FileChanged(ContentChangeTime { noticed: ui.now }));
             ui.worker_event(done_event(2, Vec::new(), false));
             assert!(
-                !ui.screen_words().contains(&messages::save_to_render_hint("cornell.toml", false)),
+                !ui.screen_words().contains(&messages::saving_starts_render_hint("cornell.toml", false)),
                 "{}",
                 ui.screen_text()
             );
@@ -293,7 +293,7 @@ fn hints_wrap_at_the_panel_width() {
         let settings = Box::new(EffectiveSettingsSummary { width, height: 480, ..effective_settings() });
         ui.worker_event(protocol::Event::Settings { generation: 1, settings, own: scene_settings() });
         let panel = Layout::for_state(&ui.state).panel;
-        let hint = messages::save_to_render_hint("cornell.toml", true);
+        let hint = messages::saving_starts_render_hint("cornell.toml", true);
         assert_eq!(
             ui.screen_text().contains(&hint),
             usize::from(panel.width) >= hint.len(),

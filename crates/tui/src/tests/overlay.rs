@@ -140,7 +140,7 @@ fn digits_select_views() {
             "{text}"
         );
         let effects = ui.press_character('3');
-        let wanted = find_render_request(&effects).expect("a request").overrides.view;
+        let wanted = sent_render_request(&effects).expect("a request").overrides.view;
         assert_eq!(wanted, Some(ViewMode::Depth));
         assert!(ui.screen_text().contains("▸3 depth"), "{}", ui.screen_text());
         // Each digit always selects the same view.
@@ -166,7 +166,7 @@ fn keys_navigate_the_open_view_list() {
         let down = KeyPress::special(KeyCode::Down);
         for (number, view) in ViewMode::ALL.iter().enumerate().skip(2) {
             let effects = ui.press_key(if number % 2 == 0 { down } else { KeyPress::plain('j') });
-            let overrides = find_render_request(&effects).expect("a request").overrides.clone();
+            let overrides = sent_render_request(&effects).expect("a request").overrides.clone();
             assert_eq!((overrides.view, overrides.camera.has_changes()), (Some(*view), false));
             let text = ui.screen_text();
             let is_marked = |line: &str| line.contains('▸') && line.contains(view.name());
@@ -174,7 +174,7 @@ fn keys_navigate_the_open_view_list() {
         }
         assert!(ui.press_character('j').is_empty(), "at the end");
         assert_eq!(
-            find_render_request(&ui.press_character('k')).and_then(|it| it.overrides.view),
+            sent_render_request(&ui.press_character('k')).and_then(|it| it.overrides.view),
             Some(ViewMode::Samples)
         );
         for key in [KeyCode::Left, KeyCode::Right, KeyCode::Up] {
@@ -351,10 +351,10 @@ fn camera_steps_wait_while_the_scene_is_broken() {
     ui.finish_render(RED);
     ui.report_scene_errors(vec![diagnostic(Severity::Error, "misspelled")]);
     let first = ui.press_character('h');
-    assert!(find_render_request(&first).is_some());
+    assert!(sent_render_request(&first).is_some());
     ui.report_scene_errors(vec![diagnostic(Severity::Error, "misspelled")]);
     assert!(
-        find_render_request(&ui.press_character('h')).is_none(),
+        sent_render_request(&ui.press_character('h')).is_none(),
         "the step should wait for the first step's preview"
     );
     let generation = ui.state.request.generation;
@@ -367,7 +367,7 @@ fn camera_steps_wait_while_the_scene_is_broken() {
         lacks_photons: false,
         source: None,
     }));
-    assert!(find_render_request(&effects).is_some(), "the preview should trigger the waiting step");
+    assert!(sent_render_request(&effects).is_some(), "the preview should trigger the waiting step");
 }
 
 #[test]

@@ -66,7 +66,7 @@ fn drag_orbits_and_click_inspects() {
     let mut ui = ui();
     mouse(&mut ui, MouseEventKind::Press, 20, 10);
     let effects = mouse(&mut ui, MouseEventKind::Drag, 30, 10);
-    let pose = find_render_request(&effects).expect("a request").overrides.camera.pose.expect("a pose");
+    let pose = sent_render_request(&effects).expect("a request").overrides.camera.pose.expect("a pose");
     assert!(pose.position.x < -1.0, "the scene should follow the mouse: {pose:?}");
     assert!(
         mouse(&mut ui, MouseEventKind::Release, 30, 10).is_empty(),
@@ -88,7 +88,7 @@ fn wheel_zooms_and_scrolls_diagnostics() {
     let mut ui = ui();
     let effects = mouse(&mut ui, MouseEventKind::WheelUp, 20, 10);
     assert!(
-        find_render_request(&effects).expect("a request").overrides.camera.pose.expect("a pose").distance()
+        sent_render_request(&effects).expect("a request").overrides.camera.pose.expect("a pose").distance()
             < 4.0
     );
     ui.report_scene_errors((0..9).map(|i| diagnostic(Severity::Error, &format!("wrong {i}"))).collect());
@@ -135,7 +135,7 @@ fn click_after_f_sets_the_focus() {
     assert!(ui.screen_text().contains(messages::CLICK_TO_FOCUS), "{}", ui.screen_text());
     click(&mut ui, 12, 10);
     let effects = answer(&mut ui, Some(picked_object()));
-    let focused = find_render_request(&effects).expect("a request");
+    let focused = sent_render_request(&effects).expect("a request");
     assert_eq!((focused.overrides.camera.focus, focused.write), (Some(3.8167), WriteRequirement::No));
     assert!(ui.screen_text().contains(&messages::focus_moved(3.8167)[..40]), "{}", ui.screen_text());
     // Any other key cancels the pending click.
@@ -172,7 +172,7 @@ fn saved_camera_becomes_the_scene_camera() {
     ui.press_character('l');
     ui.press_character('c');
     let effects = kept(&mut ui, true, true);
-    let own = find_render_request(&effects).expect("a request");
+    let own = sent_render_request(&effects).expect("a request");
     assert_eq!((own.overrides.camera.has_changes(), own.write), (false, WriteRequirement::Try));
     let text = ui.screen_text();
     assert!(
@@ -233,7 +233,7 @@ fn undo_can_be_repeated_until_nothing_is_left() {
     assert!(ui.screen_text().contains("error: outdated"), "{}", ui.screen_text());
     assert!(asks(&mut ui, "two"), "a failed undo can be retried");
     assert!(
-        find_render_request(&undone(&mut ui, Ok("a.toml".into()))).is_some(),
+        sent_render_request(&undone(&mut ui, Ok("a.toml".into()))).is_some(),
         "the restored file should be rendered"
     );
     assert!(ui.screen_text().contains(&messages::camera_save_undone("a.toml")), "{}", ui.screen_text());
@@ -254,7 +254,7 @@ fn y_copies_if_the_terminal_supports_it() {
     assert!(text.contains(&format!("{} sphere", messages::SELECT_TO_COPY)), "{text}");
     assert!(text.contains("normal (0, 1, 0) · pixel 1, 2"), "{text}");
     ui.state.display.capabilities =
-        TerminalId { brand: TerminalBrand::Kitty, version: [0, 40] }.capabilities();
+        TerminalId { brand: TerminalBrand::Kitty, version: [0, 40] }.desktop_capabilities();
     let effects = ui.press_character('y');
     let words = "sphere \"ball\" · cornell.toml:47 · glass crystal · distance 3.9 · position (0.2, 0.5, -0.3) · \
                  radiance (0.5, 0.5, 0.5) · normal (0, 1, 0) · pixel 1, 2";
@@ -381,19 +381,19 @@ fn drag_after_z_selects_the_region_to_render() {
     assert_eq!(ui.draw_screen()[(10, 5)].symbol(), "┌");
     assert_eq!(ui.draw_screen()[(30, 12)].symbol(), "┘");
     let effects = mouse(&mut ui, MouseEventKind::Release, 30, 12);
-    let marked = find_render_request(&effects).expect("a request");
+    let marked = sent_render_request(&effects).expect("a request");
     let section = marked.first.expect("a region");
     assert!((section.left - 10.5 / 55.0).abs() < 1e-9 && (section.width - 20.0 / 55.0).abs() < 1e-9);
     assert!(!marked.overrides.camera.has_changes());
     // The region applies to all renders until `z` is pressed again.
-    assert_eq!(find_render_request(&ui.press_character('s')).expect("a request").first, Some(section));
-    assert_eq!(find_render_request(&ui.press_character('z')).expect("a request").first, None);
+    assert_eq!(sent_render_request(&ui.press_character('s')).expect("a request").first, Some(section));
+    assert_eq!(sent_render_request(&ui.press_character('z')).expect("a request").first, None);
     ui.finish_render(BLUE);
     ui.press_character('z');
     mouse(&mut ui, MouseEventKind::Press, 30, 12);
     assert!(mouse(&mut ui, MouseEventKind::Release, 30, 12).is_empty(), "no render is running");
     assert!(ui.screen_text().contains(messages::REGION_NEXT), "{}", ui.screen_text());
-    assert!(find_render_request(&ui.press_character('r')).expect("a request").first.is_some());
+    assert!(sent_render_request(&ui.press_character('r')).expect("a request").first.is_some());
 }
 
 #[test]

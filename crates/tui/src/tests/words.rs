@@ -117,7 +117,7 @@ fn save_hint_has_its_own_line() {
         ui.report_scene_errors(vec![diagnostic(Severity::Error, "unknown key `heigth`")]);
         ui.handle_event(Event::Settled);
         let text = ui.screen_text();
-        let hint = messages::save_to_render_hint("cornell.toml", false);
+        let hint = messages::saving_starts_render_hint("cornell.toml", false);
         let lines: Vec<&str> = text.lines().filter(|line| line.contains(&hint)).collect();
         assert_eq!(lines.len(), 1, "{text}");
         assert_eq!(lines[0].trim_end(), hint, "{text}");

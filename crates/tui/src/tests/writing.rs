@@ -7,7 +7,7 @@ use crate::exit_summary::summary_text;
 use crate::fixtures::*;
 use crate::messages;
 use crate::options::{ExternalChange, OutputChange};
-use crate::pipeline::protocol::{self, Command, SampleCounts, SavedSceneImageState, Stage, Status};
+use crate::pipeline::protocol::{self, Command, SampleCounts, SavedSceneRenderStatus, Stage, Status};
 use crate::scene::diagnostic::Severity;
 
 /// Creates a UI that has started to render the scene's own image.
@@ -18,7 +18,7 @@ fn ui_with_begun_render(columns: u16, rows: u16) -> TestUi {
     ui
 }
 
-fn own_image(ui: &mut TestUi, state: SavedSceneImageState) {
+fn own_image(ui: &mut TestUi, state: SavedSceneRenderStatus) {
     let generation = ui.state.request.generation;
     ui.worker_event(protocol::Event::OwnImage { generation, state });
 }
@@ -61,7 +61,7 @@ fn w_writes_the_newest_step() {
     ui.press_character(']');
     assert!(ui.press_character(']').is_empty(), "the step should wait for the first step's preview");
     let effects = ui.press_character('w');
-    assert_eq!(find_render_request(&effects).expect("the waiting step").overrides.exposure, Some(0.5));
+    assert_eq!(sent_render_request(&effects).expect("the waiting step").overrides.exposure, Some(0.5));
     assert!(matches!(effects.last(), Some(Effect::Send(Command::Write))), "{effects:?}");
     let generation = ui.state.request.generation;
     ui.worker_event(written_event(generation, "cornell.png", false));
@@ -76,7 +76,7 @@ fn image_written_on_request_is_named_until_replaced() {
     for (columns, rows) in [(80, 24), (120, 40), (100, 20)] {
         let mut ui = ui_with_begun_render(columns, rows);
         ui.press_character(']');
-        own_image(&mut ui, SavedSceneImageState::Begun { is_rendering: true });
+        own_image(&mut ui, SavedSceneRenderStatus::Begun { is_rendering: true });
         write(&mut ui, false, Some(PART));
         let part = "wrote cornell.png: unfinished (16 to 32 samples), with exposure +0.25";
         assert_eq!(summary_text(&ui.state), part);
@@ -90,7 +90,7 @@ fn image_written_on_request_is_named_until_replaced() {
         );
         // Show another image, then the scene's own image, which does not replace the written one.
         ui.press_character('s');
-        own_image(&mut ui, SavedSceneImageState::Begun { is_rendering: false });
+        own_image(&mut ui, SavedSceneRenderStatus::Begun { is_rendering: false });
         finish_unwritten(&mut ui, RED);
         assert_shows(&mut ui, messages::NOT_SAVED);
         assert_shows(&mut ui, &messages::image_written_with_changes("cornell.png", "exposure +0.25"));
@@ -124,16 +124,16 @@ fn complete_image_written_early_is_described() {
 fn written_image_is_outdated_only_after_a_save() {
     let mut ui = ui_with_begun_render(80, 24);
     ui.press_character('s');
-    own_image(&mut ui, SavedSceneImageState::NotBegun);
+    own_image(&mut ui, SavedSceneRenderStatus::NotBegun);
     finish_unwritten(&mut ui, BLUE);
     write(&mut ui, false, None);
     ui.press_character(']');
-    own_image(&mut ui, SavedSceneImageState::NotBegun);
+    own_image(&mut ui, SavedSceneRenderStatus::NotBegun);
     finish_unwritten(&mut ui, BLUE);
     assert_shows(&mut ui, &messages::image_written_with_changes("cornell.png", "shadows hard"));
     assert!(!ui.screen_words().contains("older than your last"), "{}", ui.screen_text());
     ui.handle_event(Event::FileChanged(ContentChangeTime { noticed: ui.now }));
-    own_image(&mut ui, SavedSceneImageState::NotBegun);
+    own_image(&mut ui, SavedSceneRenderStatus::NotBegun);
     finish_unwritten(&mut ui, RED);
     assert_shows(&mut ui, &messages::scene_image_outdated("cornell.png"));
     assert!(!ui.screen_text().contains("written with"), "{}", ui.screen_text());
@@ -185,7 +185,7 @@ fn conflict_hides_hints_about_saving_with_w() {
             "{}",
             ui.screen_text()
         );
-        own_image(&mut ui, SavedSceneImageState::Begun { is_rendering: false });
+        own_image(&mut ui, SavedSceneRenderStatus::Begun { is_rendering: false });
         ui.worker_event(protocol::Event::Started { generation: ui.state.request.generation });
         report_conflict(&mut ui);
         finish_unwritten(&mut ui, BLUE);

@@ -3,9 +3,7 @@
 
 use std::path::PathBuf;
 
-use super::notices::{
-    show_keyboard_change_notice, show_notice, show_notice_without_effects, show_until_key_without_effects,
-};
+use super::notices::{only_show_until_key, show_keyboard_change_notice, show_notice, show_notice_only};
 use super::request::request_render;
 use crate::camera::{dollied, orbited, zoomed};
 use crate::event::Effect;
@@ -14,7 +12,7 @@ use crate::pipeline::protocol::{CameraSaveResult, Command, MovedCamera};
 use crate::pipeline::settings::CameraOverrides;
 use crate::scene::description::{Pose, Projection, is_same_distance};
 use crate::scene::sanitize::escape_invisible_chars;
-use crate::state::{State, format_stops};
+use crate::state::{State, format_exposure_stops};
 
 /// Orbit step in degrees.
 const ORBIT_STEP: f64 = 3.0;
@@ -49,10 +47,7 @@ pub(super) fn dolly(state: &mut State, steps: f64) -> Vec<Effect> {
     };
     let pose = dollied(&view.pose, libm::pow(DOLLY_FACTOR, steps), own.pose.distance());
     if pose == view.pose {
-        return show_notice_without_effects(
-            state,
-            if steps > 0.0 { messages::CLOSEST } else { messages::FARTHEST },
-        );
+        return show_notice_only(state, if steps > 0.0 { messages::CLOSEST } else { messages::FARTHEST });
     }
     let factor = pose.distance() / view.pose.distance();
     if let height @ Some(_) = zoomed(view.projection, own.projection, factor).view_height() {
@@ -73,7 +68,7 @@ pub(super) fn widen_field_of_view(state: &mut State, steps: f64) -> Vec<Effect> 
             Projection::Orthographic { view_height } => messages::view_height_limit(view_height),
             Projection::Spherical => messages::NO_FIELD_OF_VIEW.to_owned(),
         };
-        return show_notice_without_effects(state, &limit);
+        return show_notice_only(state, &limit);
     }
     let camera = &mut state.request.toggles.camera;
     (camera.fov, camera.view_height) = (projection.fov(), projection.view_height());
@@ -87,11 +82,11 @@ pub(super) fn change_exposure(state: &mut State, steps: f32) -> Vec<Effect> {
     let before = state.request.toggles.exposure.unwrap_or(own);
     let stops = (before + steps * EXPOSURE_STEP).clamp((-MAX_STOPS).min(before), MAX_STOPS.max(before));
     if stops == before {
-        return show_notice_without_effects(state, &messages::exposure_limit(&format_stops(stops)));
+        return show_notice_only(state, &messages::exposure_limit(&format_exposure_stops(stops)));
     }
     state.request.toggles.exposure = (stops != own).then_some(stops);
     let effects = render_step_or_await_preview(state);
-    show_notice(state, messages::exposure_changed(&format_stops(stops)));
+    show_notice(state, messages::exposure_changed(&format_exposure_stops(stops)));
     effects
 }
 
@@ -102,7 +97,7 @@ fn move_camera(state: &mut State, how: impl FnOnce(&Pose) -> Pose) -> Vec<Effect
 }
 
 fn show_no_scene_notice(state: &mut State) -> Vec<Effect> {
-    show_notice_without_effects(state, messages::NO_SCENE)
+    show_notice_only(state, messages::NO_SCENE)
 }
 
 pub(super) fn render_camera_step(state: &mut State) -> Vec<Effect> {
@@ -140,7 +135,7 @@ pub(super) fn save_camera(state: &mut State) -> Vec<Effect> {
     let is_set = state.request.command_line.sets.iter().any(|set| set.trim_start().starts_with("camera"));
     // For models, `c` writes a new scene file, even with the default camera.
     if !state.request.toggles.camera.has_changes() && !is_set && !state.request.is_model() {
-        return show_notice_without_effects(state, messages::NOTHING_TO_KEEP);
+        return show_notice_only(state, messages::NOTHING_TO_KEEP);
     }
     let saved = state.request.scene_camera_edits_since_move();
     // Models do not contain a camera that could be overwritten.
@@ -148,10 +143,7 @@ pub(super) fn save_camera(state: &mut State) -> Vec<Effect> {
         // The message below lists the saved values, so they cause no further conflict.
         state.request.reset_move_origin_to_scene_camera();
         let saved = saved.join(", ");
-        return show_until_key_without_effects(
-            state,
-            &format!("error: {saved} {}", messages::CAMERA_CONFLICT),
-        );
+        return only_show_until_key(state, &format!("error: {saved} {}", messages::CAMERA_CONFLICT));
     }
     state.saving.is_camera_of_newest = state.preview.history.is_viewing_older();
     vec![Effect::Send(Command::KeepCamera(Box::new(MovedCamera { camera, own })))]
@@ -168,10 +160,7 @@ pub(super) fn handle_camera_save_result(
         Err(why) => {
             state.saving.camera_refused = Some(state.now);
             state.saving.has_scene_of_model |= state.request.is_model();
-            return show_until_key_without_effects(
-                state,
-                &format!("error: {}", escape_invisible_chars(&why)),
-            );
+            return only_show_until_key(state, &format!("error: {}", escape_invisible_chars(&why)));
         }
     };
     if of_model {
@@ -204,10 +193,8 @@ pub(super) fn handle_camera_save_result(
 pub(super) fn undo_camera_save(state: &mut State) -> Vec<Effect> {
     match state.saving.camera_edits.last() {
         Some(edit) => vec![Effect::Send(Command::UndoCamera(edit.clone()))],
-        None if state.saving.camera_of_model.is_some() => {
-            show_notice_without_effects(state, messages::NEW_SCENE_STAYS)
-        }
-        None => show_notice_without_effects(state, messages::NOTHING_TO_UNDO),
+        None if state.saving.camera_of_model.is_some() => show_notice_only(state, messages::NEW_SCENE_STAYS),
+        None => show_notice_only(state, messages::NOTHING_TO_UNDO),
     }
 }
 
@@ -217,10 +204,7 @@ pub(super) fn handle_camera_save_undone(state: &mut State, outcome: Result<PathB
         Ok(path) => path,
         Err(why) => {
             state.saving.camera_refused = Some(state.now);
-            return show_until_key_without_effects(
-                state,
-                &format!("error: {}", escape_invisible_chars(&why)),
-            );
+            return only_show_until_key(state, &format!("error: {}", escape_invisible_chars(&why)));
         }
     };
     state.saving.camera_edits.pop();

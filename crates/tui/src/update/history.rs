@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::notices::{show_notice, show_notice_without_effects, show_until_key};
+use super::notices::{show_notice, show_notice_only, show_until_key};
 use crate::event::Effect;
 use crate::messages;
 use crate::pipeline::protocol::PreviewUpdate;
@@ -11,7 +11,7 @@ use crate::state::{RenderState, State};
 /// Adds the current image to the history.
 pub(super) fn record_current_image(state: &mut State) {
     if let Some(shown) = newest_image(state).filter(|shown| shown.generation == state.request.generation) {
-        let is_finished = state.work.rendering == RenderState::Finished || shown.is_finished();
+        let is_finished = state.work.rendering == RenderState::Finished || shown.shows_finished_image();
         let origin = state.request.image_provenance(!is_finished);
         state.preview.history.record_shown_image(shown, state.now, origin);
     }
@@ -41,10 +41,9 @@ pub(super) fn browse_history(state: &mut State, steps: isize) -> Vec<Effect> {
     }
     match state.preview.history.step_back_by(steps, newest) {
         Some(shown) => show_history_render(state, shown),
-        None => show_notice_without_effects(
-            state,
-            if steps > 0 { messages::OLDEST_RENDER } else { messages::NEWEST_RENDER },
-        ),
+        None => {
+            show_notice_only(state, if steps > 0 { messages::OLDEST_RENDER } else { messages::NEWEST_RENDER })
+        }
     }
 }
 
@@ -76,7 +75,7 @@ pub(super) fn toggle_render_before_edit(state: &mut State) -> Vec<Effect> {
             show_until_key(state, format!("{}{edits}", messages::BEFORE_EDIT));
             effects
         }
-        None => show_notice_without_effects(state, messages::NO_EARLIER_RENDER),
+        None => show_notice_only(state, messages::NO_EARLIER_RENDER),
     }
 }
 
@@ -92,7 +91,7 @@ pub(super) fn return_to_newest(state: &mut State, words: &str) -> Vec<Effect> {
 /// Explains why the history, which consists of previews, has no image.
 fn report_no_image(state: &mut State) -> Vec<Effect> {
     let is_shown = state.request.preview_size.is_some();
-    show_notice_without_effects(state, if is_shown { messages::NO_IMAGE } else { messages::NO_PREVIEW })
+    show_notice_only(state, if is_shown { messages::NO_IMAGE } else { messages::NO_PREVIEW })
 }
 
 fn newest_image(state: &State) -> Option<PreviewUpdate> {

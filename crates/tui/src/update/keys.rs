@@ -2,7 +2,7 @@
 
 use crossterm::event::{KeyCode, KeyModifiers};
 
-use super::notices::{show_notice, show_notice_without_effects};
+use super::notices::{show_notice, show_notice_only};
 use super::request::{request_render, request_resized_preview};
 use super::views::select_view_and_open_list;
 use super::{camera, edit_position, history, overlay, pointer, region};
@@ -25,7 +25,7 @@ pub(super) fn handle_key(state: &mut State, key: KeyPress) -> Vec<Effect> {
     let Some(action) = keymap::action_for_key(key) else {
         let is_digit = key == KeyPress { code: key.code, modifiers: KeyModifiers::NONE }
             && matches!(key.code, KeyCode::Char('1'..='9'));
-        return if is_digit { show_notice_without_effects(state, messages::VIEWS_FIRST) } else { Vec::new() };
+        return if is_digit { show_notice_only(state, messages::VIEWS_FIRST) } else { Vec::new() };
     };
     state.dirty |= state.overlays.message.take().is_some() | state.selection.facts.take().is_some();
     state.selection.is_focusing &= action == Action::Focus;
@@ -59,14 +59,12 @@ pub(super) fn perform_action(state: &mut State, action: Action) -> Vec<Effect> {
         Action::KeepCamera => camera::save_camera(state),
         Action::UndoCamera => camera::undo_camera_save(state),
         Action::Inspect => pointer::inspect_at_crosshair(state),
-        Action::Copy => pointer::copy_values(state),
+        Action::Copy => pointer::copy_inspected_values(state),
         Action::Focus => pointer::start_or_confirm_focus_pick(state),
         Action::ActualPixels => toggle_actual_pixels(state),
         Action::RenderRegionFirst => region::start_confirm_or_clear_region(state),
         Action::ToggleMouse => pointer::toggle_mouse(state),
-        Action::Edit if state.request.is_model() => {
-            show_notice_without_effects(state, messages::NO_EDITOR_FOR_MODELS)
-        }
+        Action::Edit if state.request.is_model() => show_notice_only(state, messages::NO_EDITOR_FOR_MODELS),
         Action::Edit => vec![Effect::Edit(edit_position::position_to_edit(state))],
         Action::CompareLastEdit => history::toggle_render_before_edit(state),
         Action::OlderRender => history::browse_history(state, 1),
@@ -116,7 +114,7 @@ fn supporting_integrator_name_if_needed(
 
 fn cycle_shadows(state: &mut State) -> Vec<Effect> {
     if let Some(other) = supporting_integrator_name_if_needed(state, |method| method.honors_shadows) {
-        return show_notice_without_effects(
+        return show_notice_only(
             state,
             &messages::hard_shadows_unsupported(state.request.integrator().name(), other),
         );
@@ -135,9 +133,9 @@ fn cycle_shadows(state: &mut State) -> Vec<Effect> {
 fn toggle_depth_of_field(state: &mut State) -> Vec<Effect> {
     let switched_off = state.request.combined_overrides().dof == Some(false);
     match &state.request.effective {
-        None => return show_notice_without_effects(state, messages::NO_SCENE),
+        None => return show_notice_only(state, messages::NO_SCENE),
         Some(effective) if !effective.dof && !switched_off => {
-            return show_notice_without_effects(state, messages::PINHOLE);
+            return show_notice_only(state, messages::PINHOLE);
         }
         Some(_) => {}
     }
@@ -149,7 +147,7 @@ fn toggle_depth_of_field(state: &mut State) -> Vec<Effect> {
 
 fn toggle_photon_mapping(state: &mut State) -> Vec<Effect> {
     if let Some(other) = supporting_integrator_name_if_needed(state, |method| method.gathers) {
-        return show_notice_without_effects(state, &messages::photons_unsupported(other));
+        return show_notice_only(state, &messages::photons_unsupported(other));
     }
     let next = !state.request.are_photons_enabled();
     state.request.toggles.photons =
@@ -164,7 +162,7 @@ fn step_view(state: &mut State, steps: usize) -> Vec<Effect> {
 
 fn toggle_image_only(state: &mut State) -> Vec<Effect> {
     match state.display.kind {
-        PreviewStyle::None => return show_notice_without_effects(state, messages::NO_PREVIEW),
+        PreviewStyle::None => return show_notice_only(state, messages::NO_PREVIEW),
         PreviewStyle::HalfBlock
         | PreviewStyle::Quadrant
         | PreviewStyle::Sextant
@@ -180,7 +178,7 @@ fn toggle_image_only(state: &mut State) -> Vec<Effect> {
 /// Toggles between actual pixels around the crosshair and the whole image.
 fn toggle_actual_pixels(state: &mut State) -> Vec<Effect> {
     if state.request.preview_size.is_none() {
-        return show_notice_without_effects(state, messages::NO_PREVIEW);
+        return show_notice_only(state, messages::NO_PREVIEW);
     }
     history::return_to_newest(state, "");
     state.preview.close_up =
@@ -195,7 +193,7 @@ fn toggle_actual_pixels(state: &mut State) -> Vec<Effect> {
 
 fn toggle_pause(state: &mut State) -> Vec<Effect> {
     if !state.work.is_request_running() && !state.work.paused {
-        return show_notice_without_effects(state, messages::NOT_RENDERING);
+        return show_notice_only(state, messages::NOT_RENDERING);
     }
     state.set_clock_paused(!state.work.paused);
     state.dirty = true;
@@ -213,7 +211,7 @@ fn write_image_now(state: &mut State) -> Vec<Effect> {
 
 fn reset_to_scene_settings(state: &mut State) -> Vec<Effect> {
     if state.request.toggles == KeyboardOverrides::default() {
-        return show_notice_without_effects(state, messages::NOTHING_TO_RESET);
+        return show_notice_only(state, messages::NOTHING_TO_RESET);
     }
     state.request.toggles = KeyboardOverrides::default();
     let effects = request_render(state, false);
@@ -224,7 +222,7 @@ fn reset_to_scene_settings(state: &mut State) -> Vec<Effect> {
 fn toggle_diagnostics(state: &mut State) -> Vec<Effect> {
     if state.overlays.problems.is_none() && state.warnings_and_write_failure().is_empty() {
         let is_read = state.overlays.are_warnings_known || !state.work.is_request_running();
-        return show_notice_without_effects(
+        return show_notice_only(
             state,
             if is_read { messages::NO_DIAGNOSTICS } else { messages::STILL_READING },
         );

@@ -26,7 +26,7 @@ use super::preview_style::PreviewStyle;
 use super::state::{Message, SceneImageProgress, State, UndisplayedChange};
 use super::view::layout::Layout;
 use crate::film::Srgb8Image;
-use crate::pipeline::protocol::{Command, PreviewUpdate, SavedSceneImageState};
+use crate::pipeline::protocol::{Command, PreviewUpdate, SavedSceneRenderStatus};
 
 /// How long the window size must stay the same before a new preview is requested.
 const RESIZE_QUIET: Duration = Duration::from_millis(60);
@@ -84,7 +84,7 @@ fn handle_event(state: &mut State, event: Event) -> Vec<Effect> {
             state.saving.edits += 1;
             let effects = request_render(state, false);
             state.saving.saved_at = state.request.generation;
-            state.saving.own = SceneImageProgress { state: SavedSceneImageState::NotBegun, fraction: 0.0 };
+            state.saving.own = SceneImageProgress { state: SavedSceneRenderStatus::NotBegun, fraction: 0.0 };
             state.saving.last_edit = (!is_own).then_some(state.request.generation);
             // A change saved in the editor becomes visible only when the editor exits.
             let noticed = state.saving.editor_closed.map_or(noticed, |back| noticed.max(back));
@@ -103,7 +103,7 @@ fn handle_event(state: &mut State, event: Event) -> Vec<Effect> {
             record_save_to_screen_time(state, generation)
         }
         Event::Tick => handle_tick(state),
-        Event::SourceEnded(source) => handle_lost_source(state, source),
+        Event::SourceEnded(source) => handle_lost_event_source(state, source),
         Event::EditorExited => {
             state.saving.editor_closed = Some(state.now);
             Vec::new()
@@ -213,7 +213,7 @@ fn signal_effect(signal: Signal) -> Effect {
     }
 }
 
-fn handle_lost_source(state: &mut State, source: RequiredEventSource) -> Vec<Effect> {
+fn handle_lost_event_source(state: &mut State, source: RequiredEventSource) -> Vec<Effect> {
     match source {
         RequiredEventSource::Worker => vec![Effect::GiveUp],
         RequiredEventSource::Watcher => {

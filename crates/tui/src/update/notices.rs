@@ -33,13 +33,13 @@ fn set_message(state: &mut State, message: Message) {
 }
 
 /// Shows a notice and returns no effects.
-pub(super) fn show_notice_without_effects(state: &mut State, words: &str) -> Vec<Effect> {
+pub(super) fn show_notice_only(state: &mut State, words: &str) -> Vec<Effect> {
     show_notice(state, words);
     Vec::new()
 }
 
 /// Shows a message until a key is pressed and returns no effects.
-pub(super) fn show_until_key_without_effects(state: &mut State, words: &str) -> Vec<Effect> {
+pub(super) fn only_show_until_key(state: &mut State, words: &str) -> Vec<Effect> {
     show_until_key(state, words);
     Vec::new()
 }

@@ -1,13 +1,11 @@
 //! Handles the mouse and queries about image positions.
 
-use super::notices::{
-    show_keyboard_change_notice, show_notice, show_notice_without_effects, show_until_key_without_effects,
-};
+use super::notices::{only_show_until_key, show_keyboard_change_notice, show_notice, show_notice_only};
 use super::{camera, history, overlay, region};
 use crate::event::FilePosition;
 use crate::event::{Effect, MouseEvent, MouseEventKind};
 use crate::keymap::OverlayAction;
-use crate::math::decimal::{decimal_step_at_distance, round_to_step};
+use crate::math::decimal::{round_to_step, rounding_step_at_distance};
 use crate::messages;
 use crate::pipeline::protocol::{Command, PickedInstance, PickedObject, PickedPixel};
 use crate::scene::sanitize::escape_invisible_chars;
@@ -88,7 +86,7 @@ fn drag_region_or_orbit(state: &mut State, mouse: MouseEvent) -> Vec<Effect> {
 
 fn pick_object_at_click(state: &mut State, mouse: MouseEvent) -> Vec<Effect> {
     if state.preview.history.is_viewing_older() {
-        return show_notice_without_effects(state, messages::OLDER_RENDER);
+        return show_notice_only(state, messages::OLDER_RENDER);
     }
     let Some(spot) = image_position_at(state, mouse.column, mouse.row) else { return Vec::new() };
     state.selection.crosshair = spot;
@@ -108,15 +106,15 @@ pub(super) fn inspect_at_crosshair(state: &mut State) -> Vec<Effect> {
 /// Waits for a click that sets the focus. If already waiting, focuses on the object at the crosshair.
 pub(super) fn start_or_confirm_focus_pick(state: &mut State) -> Vec<Effect> {
     if state.preview.history.is_viewing_older() {
-        return show_notice_without_effects(state, messages::OLDER_RENDER);
+        return show_notice_only(state, messages::OLDER_RENDER);
     }
     if state.request.current_camera().is_some_and(|view| view.aperture == 0.0) {
         state.selection.is_focusing = false;
-        return show_notice_without_effects(state, messages::PINHOLE);
+        return show_notice_only(state, messages::PINHOLE);
     }
     if state.selection.is_mouse_on && !state.selection.is_focusing {
         state.selection.is_focusing = true;
-        return show_until_key_without_effects(state, messages::CLICK_TO_FOCUS);
+        return only_show_until_key(state, messages::CLICK_TO_FOCUS);
     }
     state.selection.is_focusing = false;
     send_pick_query(state, PickPurpose::Focus)
@@ -124,10 +122,10 @@ pub(super) fn start_or_confirm_focus_pick(state: &mut State) -> Vec<Effect> {
 
 fn send_pick_query(state: &mut State, purpose: PickPurpose) -> Vec<Effect> {
     if state.preview.history.is_viewing_older() {
-        return show_notice_without_effects(state, messages::OLDER_RENDER);
+        return show_notice_only(state, messages::OLDER_RENDER);
     }
     if state.request.own.is_none() {
-        return show_notice_without_effects(state, messages::NO_SCENE);
+        return show_notice_only(state, messages::NO_SCENE);
     }
     state.selection.purpose = purpose;
     vec![Effect::Send(Command::Pick(state.selection.crosshair))]
@@ -142,7 +140,7 @@ pub(super) fn toggle_mouse(state: &mut State) -> Vec<Effect> {
 }
 
 /// Handles the reply to a pick query.
-pub(super) fn handle_pick(state: &mut State, picked: &PickedPixel) -> Vec<Effect> {
+pub(super) fn handle_pick_reply(state: &mut State, picked: &PickedPixel) -> Vec<Effect> {
     // Ignore the reply if an older render was opened after the click.
     if state.preview.history.is_viewing_older() {
         return Vec::new();
@@ -160,19 +158,19 @@ pub(super) fn handle_pick(state: &mut State, picked: &PickedPixel) -> Vec<Effect
             state.dirty = true;
             Vec::new()
         }
-        (PickPurpose::Focus, None) => show_notice_without_effects(state, messages::NOTHING_TO_FOCUS),
+        (PickPurpose::Focus, None) => show_notice_only(state, messages::NOTHING_TO_FOCUS),
         (PickPurpose::Focus, Some(object)) => focus_at_depth(state, object.depth),
     }
 }
 
 fn focus_at_depth(state: &mut State, depth: f64) -> Vec<Effect> {
-    let distance = round_to_step(depth, decimal_step_at_distance(depth));
+    let distance = round_to_step(depth, rounding_step_at_distance(depth));
     if !(distance > 0.0) {
-        return show_notice_without_effects(state, messages::NOTHING_TO_FOCUS);
+        return show_notice_only(state, messages::NOTHING_TO_FOCUS);
     }
     // The scene may have been edited after the click.
     if state.request.current_camera().is_none_or(|view| view.aperture == 0.0) {
-        return show_notice_without_effects(state, messages::PINHOLE);
+        return show_notice_only(state, messages::PINHOLE);
     }
     state.request.toggles.camera.focus = Some(distance);
     let effects = camera::render_camera_step(state);
@@ -192,16 +190,16 @@ fn join_values_with_pixel_position(
 }
 
 /// Copies the inspected values if the terminal supports it.
-pub(super) fn copy_values(state: &mut State) -> Vec<Effect> {
+pub(super) fn copy_inspected_values(state: &mut State) -> Vec<Effect> {
     if state.preview.history.is_viewing_older() {
-        return show_notice_without_effects(state, messages::OLDER_RENDER);
+        return show_notice_only(state, messages::OLDER_RENDER);
     }
     let Some(clicked) = state.selection.clicked.clone() else {
-        return show_notice_without_effects(state, messages::NOTHING_TO_COPY);
+        return show_notice_only(state, messages::NOTHING_TO_COPY);
     };
     if !state.display.capabilities.clipboard {
         // The message contains the text so that the user can select it.
-        return show_notice_without_effects(state, &format!("{} {clicked}", messages::SELECT_TO_COPY));
+        return show_notice_only(state, &format!("{} {clicked}", messages::SELECT_TO_COPY));
     }
     show_notice(state, format!("{} {clicked}", messages::COPIED));
     vec![Effect::Aside(window_title::clipboard_bytes(&clicked))]

@@ -112,17 +112,18 @@ fn handle_terminal_name(state: &mut State, terminal: TerminalId) -> Vec<Effect> 
     let ask = state.display.ask;
     let mut effects = Vec::new();
     if ask.name {
-        let had_focus = std::mem::replace(&mut state.display.capabilities, terminal.capabilities()).focus;
+        let had_focus =
+            std::mem::replace(&mut state.display.capabilities, terminal.desktop_capabilities()).focus;
         effects.extend((state.display.capabilities.focus && !had_focus).then_some(Effect::ReportFocus));
         state.dirty = true;
     }
     if ask.blocks {
-        effects.extend(switch_to_block_glyphs(state, FinestNativeBlocks::supported_by(terminal)));
+        effects.extend(switch_to_finer_blocks(state, FinestNativeBlocks::supported_by(terminal)));
     }
     effects
 }
 
-fn switch_to_block_glyphs(state: &mut State, blocks: FinestNativeBlocks) -> Vec<Effect> {
+fn switch_to_finer_blocks(state: &mut State, blocks: FinestNativeBlocks) -> Vec<Effect> {
     let kind = match blocks {
         FinestNativeBlocks::Unknown => return Vec::new(),
         FinestNativeBlocks::Sextants => PreviewStyle::Sextant,
@@ -223,7 +224,7 @@ mod tests {
         state.display.ask = TerminalQueries { name: true, ..TerminalQueries::default() };
         let ghostty = TerminalId { brand: TerminalBrand::Ghostty, version: [1, 2] };
         assert!(matches!(handle_reply(&mut state, TerminalReply::Name(ghostty))[..], [Effect::ReportFocus]));
-        assert_eq!(state.display.capabilities, ghostty.capabilities());
+        assert_eq!(state.display.capabilities, ghostty.desktop_capabilities());
         assert!(
             handle_reply(&mut state, TerminalReply::Name(ghostty)).is_empty(),
             "focus reporting is already enabled"

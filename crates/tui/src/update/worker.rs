@@ -14,7 +14,7 @@ use crate::noise_curve::NoiseCurve;
 use crate::options::OutputChange;
 use crate::pipeline::protocol::{
     AssetProgress, CheckpointUpdate, Event, Failure, LastValidSceneRenderOutcome, Report, SampleCounts,
-    SavedSceneImageState, Stage, StageReport, Status,
+    SavedSceneRenderStatus, Stage, StageReport, Status,
 };
 use crate::scene::MAX_COMPARED_BYTES;
 use crate::scene::diagnostic::{Diagnostic, Severity};
@@ -31,7 +31,7 @@ pub(super) fn handle_worker_event(state: &mut State, event: Event) -> Vec<Effect
         // Replies to user actions are never outdated.
         Event::CameraKept { outcome, .. } => return camera::handle_camera_save_result(state, outcome),
         Event::CameraUndone { outcome, .. } => return camera::handle_camera_save_undone(state, outcome),
-        Event::Picked { picked, .. } => return pointer::handle_pick(state, &picked),
+        Event::Picked { picked, .. } => return pointer::handle_pick_reply(state, &picked),
         Event::WriteDone { paths, .. } => {
             report_written_files(state, &paths);
             return Vec::new();
@@ -78,7 +78,7 @@ pub(super) fn handle_worker_event(state: &mut State, event: Event) -> Vec<Effect
                 state.work.curve.record(progress.earlier_seconds + noise.seconds, noise.now);
             }
             state.work.progress = Some(progress);
-            let is_rendering = SavedSceneImageState::Begun { is_rendering: true };
+            let is_rendering = SavedSceneRenderStatus::Begun { is_rendering: true };
             if state.request.has_no_keyboard_overrides() {
                 state.saving.own.state = is_rendering;
             }
@@ -228,9 +228,10 @@ fn reset_work_for_new_request(state: &mut State) {
     state.work.report = None;
     state.saving.unwritten = None;
     // A written image stays up to date until the render of another image begins.
-    if state.request.has_no_keyboard_overrides() && state.saving.own.state != SavedSceneImageState::Written {
+    if state.request.has_no_keyboard_overrides() && state.saving.own.state != SavedSceneRenderStatus::Written
+    {
         state.saving.own =
-            SceneImageProgress { state: SavedSceneImageState::Begun { is_rendering: true }, fraction: 0.0 };
+            SceneImageProgress { state: SavedSceneRenderStatus::Begun { is_rendering: true }, fraction: 0.0 };
     }
     close_empty_pane(state);
     state.work.unchanged = false;
@@ -290,8 +291,8 @@ fn record_written_file(
         (None, None) => String::new(),
     };
     state.saving.written.retain(|other| other.path != path);
-    if !is_own && state.saving.own.state == SavedSceneImageState::Written {
-        state.saving.own.state = SavedSceneImageState::Begun { is_rendering: false };
+    if !is_own && state.saving.own.state == SavedSceneRenderStatus::Written {
+        state.saving.own.state = SavedSceneRenderStatus::Begun { is_rendering: false };
     }
     let is_unfinished = unfinished.is_some();
     let (is_stale, lost) = (false, None);
@@ -306,7 +307,7 @@ fn record_written_file(
         lost,
     });
     if generation >= state.saving.saved_at && is_scene_image_written(state, generation) {
-        state.saving.own = SceneImageProgress { state: SavedSceneImageState::Written, fraction: 1.0 };
+        state.saving.own = SceneImageProgress { state: SavedSceneRenderStatus::Written, fraction: 1.0 };
     }
 }
 
@@ -383,7 +384,7 @@ fn handle_done(state: &mut State, mut report: Box<Report>, warnings: Vec<Diagnos
     let is_on_disk = report.stages[Stage::Write as usize].status != Status::Skipped;
     if state.request.has_no_keyboard_overrides() && is_on_disk && state.saving.unwritten.is_none() {
         state.saving.write_failed = None;
-        state.saving.own = SceneImageProgress { state: SavedSceneImageState::Written, fraction: 1.0 };
+        state.saving.own = SceneImageProgress { state: SavedSceneRenderStatus::Written, fraction: 1.0 };
     }
     complete_noise_curve(state, &report, unchanged);
     set_written_image_descriptions(state, state.request.generation, &report);

@@ -25,7 +25,7 @@ pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) {
     let area = area.intersection(buffer.area);
     let text = pane_lines(state, area);
     let area = pane_area(area, text.len(), area == Layout::for_state(state).panel);
-    let (page, last) = page_and_max_scroll(&text, area);
+    let (page, last) = page_size_and_max_scroll(&text, area);
     let first = state.overlays.diagnostics.scroll.min(last);
     Clear.render(area, buffer);
     draw_title(state, nth_row(area, 0), (last > 0).then_some((first, page, text.len())), buffer);
@@ -65,7 +65,7 @@ fn draw_title(state: &State, area: Rect, shown: Option<(usize, usize, usize)>, b
     put_text(buffer, area, &[(&rule, tone)], state.display.depth);
     let words = match &state.overlays.problems {
         Some(_) => super::header::format_problem_count(state),
-        None => report::summarize_counts(&reported),
+        None => report::summarize_diagnostic_counts(&reported),
     };
     let mut room = area;
     if let Some((first, page, all)) = shown {
@@ -80,10 +80,10 @@ fn draw_title(state: &State, area: Rect, shown: Option<(usize, usize, usize)>, b
 pub(crate) fn page_height_and_max_scroll(state: &State) -> (usize, usize) {
     let area = Layout::for_state(state).pane;
     let text = pane_lines(state, area);
-    page_and_max_scroll(&text, area)
+    page_size_and_max_scroll(&text, area)
 }
 
-fn page_and_max_scroll(text: &[StyledLine], area: Rect) -> (usize, usize) {
+fn page_size_and_max_scroll(text: &[StyledLine], area: Rect) -> (usize, usize) {
     let page = usize::from(area.height.saturating_sub(1)).max(1);
     (page, text.len().saturating_sub(page))
 }

@@ -207,13 +207,13 @@ fn progress_or_result_variants(state: &State) -> Vec<String> {
         }
         (RequestStatus::Done, _, _) if state.work.unchanged => {
             vec![
-                format!("unchanged · {}", messages::render_number(state.work.renders)),
+                format!("unchanged · {}", messages::numbered_render(state.work.renders)),
                 "unchanged".to_owned(),
             ]
         }
         (RequestStatus::Done, Some(report), _) => {
             let time = format_seconds(report.seconds);
-            vec![format!("{time} · {}", messages::render_number(state.work.renders)), time]
+            vec![format!("{time} · {}", messages::numbered_render(state.work.renders)), time]
         }
         (RequestStatus::Waiting, _, _) => vec![messages::INCOMPLETE_FILE.to_owned()],
         (RequestStatus::Broken, _, _) if state.overlays.is_scene_missing() => {

@@ -11,7 +11,7 @@ use crate::action::Action;
 use crate::choice::Choice;
 use crate::keymap::{self, KEYMAP, KeyBinding, OVERLAY, OverlayAction};
 use crate::preview_style::PreviewStyle;
-use crate::scene::report::summarize_counts;
+use crate::scene::report::summarize_diagnostic_counts;
 use crate::state::{KeyboardOverrides, RequestStatus, State, ViewList};
 
 /// A hint in the key line: a key with long and short descriptions.
@@ -260,7 +260,7 @@ fn hidden_diagnostics_hint(state: &State) -> Option<KeyHint> {
         Some(_) => (super::header::format_problem_count(state), state_symbol_word_and_role(state).2),
         None => match state.warnings_and_write_failure() {
             none if none.is_empty() => return None,
-            reported => (summarize_counts(&reported), TextRole::Warning),
+            reported => (summarize_diagnostic_counts(&reported), TextRole::Warning),
         },
     };
     Some(KeyHint { tone, ..KeyHint::new(key, words) })

@@ -99,20 +99,21 @@ fn divide_image_and_panel(rest: Rect, shape: f32) -> (Rect, Rect) {
         let (width, height) = largest_image_size_in_area(area, shape);
         u32::from(width) * u32::from(height)
     };
-    let panels = [panel_below_image(rest, shape), panel_next_to_image(rest, shape)].into_iter().flatten();
+    let panels =
+        [image_and_panel_below(rest, shape), image_and_panel_beside(rest, shape)].into_iter().flatten();
     let best = panels.max_by_key(|(preview, _)| cells(*preview));
     let is_kept = |(preview, _): &(Rect, Rect)| cells(*preview) as f32 >= KEPT * cells(rest) as f32;
     best.filter(is_kept).unwrap_or((rest, Rect::ZERO))
 }
 
-fn panel_next_to_image(rest: Rect, shape: f32) -> Option<(Rect, Rect)> {
+fn image_and_panel_beside(rest: Rect, shape: f32) -> Option<(Rect, Rect)> {
     let room = Rect { width: rest.width.checked_sub(SIDE_WIDTH + 1)?, ..rest };
     let (width, _) = largest_image_size_in_area(room, shape);
     let panel = Rect { x: rest.x + width + 1, width: rest.width - width - 1, ..rest };
     (rest.height >= SIDE_HEIGHT).then_some((Rect { width, ..rest }, panel))
 }
 
-fn panel_below_image(rest: Rect, shape: f32) -> Option<(Rect, Rect)> {
+fn image_and_panel_below(rest: Rect, shape: f32) -> Option<(Rect, Rect)> {
     let columns = usize::from(rest.width / ENTRY_WIDTH);
     // Rows for the stages and one line of results.
     let rows = u16::try_from(Stage::ALL.len().div_ceil(columns.max(1)) + 1).unwrap_or(u16::MAX);

@@ -183,11 +183,11 @@ fn result_lines(state: &State, width: u16) -> Vec<StyledLine> {
         lines.extend(report.image.error.map(|error| fact("noise", format_two_digit_percent(error))));
         lines.extend(state.request.effective.as_ref().filter(|it| it.error > 0.0).map(|it| {
             let label =
-                if reached_limit(state) == Some(RenderLimit::Error) { "target ✓" } else { "target" };
+                if reached_render_limit(state) == Some(RenderLimit::Error) { "target ✓" } else { "target" };
             fact(label, format!("{} % per tile", f64::from((it.error * 1e4).round()) / 100.0))
         }));
     }
-    match reached_limit(state) {
+    match reached_render_limit(state) {
         Some(RenderLimit::Time) => lines.push(fact("stopped", "at time limit".to_owned())),
         Some(RenderLimit::Samples) => lines.push(fact("stopped", "at max samples".to_owned())),
         Some(RenderLimit::Error) | None => {}
@@ -206,7 +206,7 @@ enum RenderLimit {
 }
 
 /// Determines which limit ended the render, or returns `None` if only one was set.
-fn reached_limit(state: &State) -> Option<RenderLimit> {
+fn reached_render_limit(state: &State) -> Option<RenderLimit> {
     let (image, effective) = (&state.work.report.as_ref()?.image, state.request.effective.as_ref()?);
     let is_by_error = effective.error > 0.0;
     match () {

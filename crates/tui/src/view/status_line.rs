@@ -14,7 +14,7 @@ use super::text::{
 };
 use crate::exit_summary;
 use crate::messages;
-use crate::pipeline::protocol::{NoisePrediction, RenderProgress, SavedSceneImageState};
+use crate::pipeline::protocol::{NoisePrediction, RenderProgress, SavedSceneRenderStatus};
 use crate::pipeline::words::format_mean_samples;
 use crate::preview_style::PreviewStyle;
 use crate::scene::sanitize::escape_invisible_chars;
@@ -260,11 +260,13 @@ pub(crate) fn unsaved_image_messages(state: &State) -> Vec<String> {
             &file.escaped_path(),
             &file.describe_included_keyboard_changes().join(", "),
         )),
-        (SceneImageProgress { state: SavedSceneImageState::Written, .. }, None, _) | (_, None, None) => None,
-        (SceneImageProgress { state: SavedSceneImageState::Begun { .. }, fraction }, None, Some(name)) => {
-            Some(messages::scene_image_interrupted(&name, floor_percent(fraction)))
+        (SceneImageProgress { state: SavedSceneRenderStatus::Written, .. }, None, _) | (_, None, None) => {
+            None
         }
-        (SceneImageProgress { state: SavedSceneImageState::NotBegun, .. }, None, Some(name)) => {
+        (SceneImageProgress { state: SavedSceneRenderStatus::Begun { .. }, fraction }, None, Some(name)) => {
+            Some(messages::saved_scene_render_interrupted(&name, floor_percent(fraction)))
+        }
+        (SceneImageProgress { state: SavedSceneRenderStatus::NotBegun, .. }, None, Some(name)) => {
             let is_older = !saving.written.is_empty() && saving.are_images_outdated();
             is_older.then(|| messages::scene_image_outdated(&name))
         }
@@ -294,7 +296,7 @@ pub(super) fn save_scene_hint(state: &State) -> String {
     if state.request.is_model() {
         return messages::renders_on_changes_hint(&name);
     }
-    messages::save_to_render_hint(&name, state.preview.shown.is_some() || state.work.renders > 0)
+    messages::saving_starts_render_hint(&name, state.preview.shown.is_some() || state.work.renders > 0)
 }
 
 /// Whether the scene cannot be read at all, for example because the file does not exist.

@@ -54,7 +54,7 @@ impl Ranged for LogAxis {
 
 /// Formats a mark as `10⁻³`, `2·10⁻³` or `5`.
 pub(super) fn format_log_axis_mark(mark: f64) -> String {
-    let (factor, whole) = digit_and_exponent(mark);
+    let (factor, whole) = digit_and_exponent_of_log10(mark);
     if whole == 0 {
         return factor.to_string();
     }
@@ -64,7 +64,7 @@ pub(super) fn format_log_axis_mark(mark: f64) -> String {
 
 /// Formats a mark as `0.02`, `5` or `200`.
 pub(super) fn format_log_mark_as_decimal(mark: f64) -> String {
-    let (factor, whole) = digit_and_exponent(mark);
+    let (factor, whole) = digit_and_exponent_of_log10(mark);
     if (-3..=5).contains(&whole) {
         let decimals = (-whole).max(0) as usize;
         format!("{:.decimals$}", f64::from(factor) * libm::pow(10.0, f64::from(whole)))
@@ -74,7 +74,7 @@ pub(super) fn format_log_mark_as_decimal(mark: f64) -> String {
 }
 
 /// Returns the leading digit and exponent of a mark.
-fn digit_and_exponent(mark: f64) -> (i32, i32) {
+fn digit_and_exponent_of_log10(mark: f64) -> (i32, i32) {
     let whole = (mark + 1e-9).floor();
     (libm::pow(10.0, mark - whole).round() as i32, whole as i32)
 }

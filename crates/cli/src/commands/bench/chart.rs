@@ -43,7 +43,7 @@ struct MethodCurve {
 }
 
 impl ConvergenceChart {
-    fn from_scene(scene: &SceneResult) -> Self {
+    fn from_scene_result(scene: &SceneResult) -> Self {
         let methods = scene.methods.iter().map(|method| MethodCurve {
             name: method.name.clone(),
             points: method.steps.iter().map(|step| (step.seconds, step.relmse)).collect(),
@@ -128,7 +128,7 @@ pub(super) fn print_charts(results: &Results, console: &Console) {
     for scene in &results.scenes {
         console.print_line(&format!("{}: relMSE over seconds (log–log)", scene.scene));
         console.print_trusted_text(&buffer_to_ansi_text(
-            &ConvergenceChart::from_scene(scene).draw_to_buffer(columns, ROWS),
+            &ConvergenceChart::from_scene_result(scene).draw_to_buffer(columns, ROWS),
             console.is_colored(),
         ));
     }
@@ -179,7 +179,7 @@ mod tests {
 
     #[test]
     fn charts_have_lines_names_and_labels() {
-        let buffer = ConvergenceChart::from_scene(&scene()).draw_to_buffer(60, ROWS);
+        let buffer = ConvergenceChart::from_scene_result(&scene()).draw_to_buffer(60, ROWS);
         let plain = buffer_to_ansi_text(&buffer, false);
         assert!(plain.chars().any(|c| ('\u{2801}'..='\u{28ff}').contains(&c)), "{plain}");
         assert!(plain.contains("o path") && plain.contains("201 ms") && plain.contains("1e-1"), "{plain}");
@@ -195,7 +195,7 @@ mod tests {
         let mut empty = scene();
         empty.methods.clear();
         assert!(
-            !buffer_to_ansi_text(&ConvergenceChart::from_scene(&empty).draw_to_buffer(30, ROWS), true)
+            !buffer_to_ansi_text(&ConvergenceChart::from_scene_result(&empty).draw_to_buffer(30, ROWS), true)
                 .is_empty()
         );
     }

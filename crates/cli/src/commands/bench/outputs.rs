@@ -12,8 +12,8 @@ use crate::exit::Exit;
 use crate::lower::STDOUT_NAME;
 use crate::output::write::{self, ExistingFilePolicy};
 use crate::output::{
-    self, AttributeLossPolicy, FileIdentity, OutputError, is_same_file, json_replace_check,
-    plot_replace_check, table_replace_check,
+    self, AttributeLossPolicy, FileIdentity, OutputError, check_json_replacement, check_plot_replacement,
+    check_table_replacement, is_same_file,
 };
 use crate::system::{describe_error, file};
 
@@ -79,7 +79,7 @@ impl BenchOutputs {
                 format!("cannot write {}: plots are SVG files; use the extension .svg", path.display());
             return Err(OutputError::Refused { reason });
         }
-        output::check_file_target(path)
+        output::check_output_path(path)
     }
 
     /// Checks that output `index`, whose resolved path is `real`, is neither an input nor another output.
@@ -110,12 +110,12 @@ impl BenchOutputs {
     fn check_written_by_glimt(&self, index: usize, real: &Path) -> Result<(), OutputError> {
         let (option, path, kind) = &self.files[index];
         let replaced = match kind {
-            OutputKind::Csv => table_replace_check(real, csv::HEADER_LINE),
+            OutputKind::Csv => check_table_replacement(real, csv::HEADER_LINE),
             // Replace only valid baselines, which contain at least one scene.
             OutputKind::Json => {
-                json_replace_check(real, "a results file", |found: &Results| !found.scenes.is_empty())
+                check_json_replacement(real, "a results file", |found: &Results| !found.scenes.is_empty())
             }
-            OutputKind::Plot => plot_replace_check(real, &plot::AXES),
+            OutputKind::Plot => check_plot_replacement(real, &plot::AXES),
         };
         let Some(why) = replaced.reason_to_keep() else { return Ok(()) };
         let advice = format!("choose another file with {option} FILE, or use --force");

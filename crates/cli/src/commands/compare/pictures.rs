@@ -16,7 +16,11 @@ use crate::tui::{NamedImage, images_as_text};
 const MIN_VISIBLE_FLIP: f32 = 0.1;
 
 /// Renders the images as text. Returns an empty string if no images are wanted or the terminal is too small.
-pub(super) fn render_images(args: &CompareArgs, pair: &ImagePair, measured: &PairMeasurements) -> String {
+pub(super) fn render_images_as_text(
+    args: &CompareArgs,
+    pair: &ImagePair,
+    measured: &PairMeasurements,
+) -> String {
     let is_terminal = std::io::stdout().is_terminal();
     let is_wanted = match args.pictures {
         CompareImageVisibility::Auto => is_terminal,

@@ -19,7 +19,7 @@ pub(super) fn text_diagnostics(document: &OpenDocument) -> Vec<Diagnostic> {
 
 /// Returns the diagnostics for the file and the files it references, as in `glimt check`. Returns `None`
 /// if the file differs from the open document, if it cannot be read, or if the token is canceled.
-pub(super) fn file_diagnostics(
+pub(super) fn scene_and_asset_diagnostics(
     document: &OpenDocument,
     checker: &mut IncrementalSceneChecker,
     token: &CancelToken,

@@ -47,7 +47,8 @@ impl FileCheckThread {
         let read = move || {
             let mut checker = IncrementalSceneChecker::default();
             while let Some((uri, document, token)) = work.wait_for_request() {
-                if let Some(found) = diagnostics::file_diagnostics(&document, &mut checker, &token) {
+                if let Some(found) = diagnostics::scene_and_asset_diagnostics(&document, &mut checker, &token)
+                {
                     publish(uri, &document, found);
                 }
             }

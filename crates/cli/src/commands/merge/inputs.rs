@@ -47,7 +47,7 @@ impl<'a> RenderInputFiles<'a> {
             Some(format!("the parts' scene references it ({name})"))
         };
         let by_name = || {
-            let name = part::find_input_that_ends_path(self.parts, path)?;
+            let name = part::find_render_input_that_ends_path(self.parts, path)?;
             Some(format!("the parts' scene references a file with this name ({name})"))
         };
         let by_content = || {

@@ -18,7 +18,7 @@ impl GltfFile {
     /// Merges the file's scene into one mesh.
     ///
     /// # Errors
-    /// Same as [`GltfFile::convert_scene`] and [`GltfFile::build_part`]. Also fails if the scene has no faces
+    /// Same as [`GltfFile::convert_scene`] and [`GltfFile::build_part_mesh`]. Also fails if the scene has no faces
     /// or too many triangles.
     pub fn merge_scene_into_mesh(&self, token: &CancelToken) -> Result<LoadedMesh, AssetError> {
         let scene = self.convert_scene(token)?;
@@ -39,7 +39,7 @@ impl GltfFile {
                 Entry::Occupied(known) => known.into_mut(),
                 Entry::Vacant(new) => {
                     let LoadedMesh { mesh, dropped, .. } =
-                        self.build_part(instance.part, &ignore_progress, token)?;
+                        self.build_part_mesh(instance.part, &ignore_progress, token)?;
                     merged.dropped.degenerate += dropped.degenerate;
                     merged.dropped.non_finite += dropped.non_finite;
                     new.insert(mesh)

@@ -57,7 +57,7 @@ impl GltfFile {
         for instance in &scene.instances {
             let (mesh, extremes) = match parts.entry(instance.part) {
                 Entry::Occupied(known) => &*known.into_mut(),
-                Entry::Vacant(new) => match self.build_part(instance.part, &ignore_progress, token) {
+                Entry::Vacant(new) => match self.build_part_mesh(instance.part, &ignore_progress, token) {
                     Err(AssetError::Canceled(canceled)) => return Err(canceled.into()),
                     loaded => {
                         let mesh = loaded.map(|loaded| loaded.mesh).unwrap_or_else(|wrong| {

@@ -55,7 +55,7 @@ impl GltfFile {
     /// # Errors
     /// Returns [`AssetError::Malformed`] with the location in the JSON if the part is invalid or unsupported,
     /// or [`AssetError::Canceled`] if the token is canceled.
-    pub fn build_part(
+    pub fn build_part_mesh(
         &self,
         part: usize,
         progress: Progress<'_>,

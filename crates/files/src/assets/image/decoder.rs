@@ -12,7 +12,7 @@ use ::image::{ColorType, ImageDecoder, ImageError, ImageFormat, ImageReader, Lim
 
 use super::exr::ExrDecoder;
 use super::hdr::HdrDecoder;
-use super::metadata::{AlphaInterpretation, ImageMetadata};
+use super::metadata::{AlphaInterpretation, ImageColorMetadata};
 use super::png::PngDecoder;
 use super::{ColorEncoding, ImageLimits, tga};
 use super::{empty_image_message, implausible_size_message, memory_limit_message, side_too_long_message};
@@ -20,7 +20,7 @@ use super::{empty_image_message, implausible_size_message, memory_limit_message,
 /// A decoder, with metadata that the decoder itself does not apply.
 pub(super) struct ImageDecoderWithMetadata {
     pub(super) decoder: Box<dyn ImageDecoder>,
-    pub(super) metadata: ImageMetadata,
+    pub(super) metadata: ImageColorMetadata,
     /// Size of the texels in bytes.
     pub(super) texel_bytes: u64,
 }
@@ -31,7 +31,7 @@ pub(super) fn create_decoder<R: BufRead + Seek + 'static>(
     reader: ImageReader<R>,
     encoding: ColorEncoding,
     memory_bytes: u64,
-) -> Result<(Box<dyn ImageDecoder>, ImageMetadata), ImageError> {
+) -> Result<(Box<dyn ImageDecoder>, ImageColorMetadata), ImageError> {
     match reader.format() {
         Some(ImageFormat::Png) => {
             let decoder = PngDecoder::new(reader.into_inner(), memory_bytes)?;
@@ -50,7 +50,7 @@ pub(super) fn create_decoder<R: BufRead + Seek + 'static>(
         }
         Some(ImageFormat::Tga) => {
             let (decoder, alpha) = tga::open_with_alpha_usage(reader.into_inner())?;
-            Ok((Box::new(decoder), ImageMetadata { alpha, ..ImageMetadata::default() }))
+            Ok((Box::new(decoder), ImageColorMetadata { alpha, ..ImageColorMetadata::default() }))
         }
         Some(ImageFormat::Jpeg) => {
             limit_memory_and_read_profile(JpegDecoder::new(reader.into_inner())?, encoding, memory_bytes)
@@ -86,12 +86,12 @@ fn limit_memory_and_read_profile(
     mut decoder: impl ImageDecoder + 'static,
     encoding: ColorEncoding,
     memory_bytes: u64,
-) -> Result<(Box<dyn ImageDecoder>, ImageMetadata), ImageError> {
+) -> Result<(Box<dyn ImageDecoder>, ImageColorMetadata), ImageError> {
     // `check_size` checks the width and height, and reports errors more clearly.
     let mut limits = Limits::default();
     limits.max_alloc = Some(memory_bytes);
     decoder.set_limits(limits)?;
-    let mut metadata = ImageMetadata::default();
+    let mut metadata = ImageColorMetadata::default();
     if encoding.uses_file_color_space()
         && let Some(profile) = decoder.icc_profile()?
     {
@@ -110,7 +110,11 @@ pub(super) fn read_orientation(decoder: &mut dyn ImageDecoder) -> Result<Orienta
 }
 
 /// Size of a texel produced by [`texels`](super::convert::texels).
-pub(super) fn stored_bytes_per_texel(color: ColorType, encoding: ColorEncoding, metadata: &ImageMetadata) -> u64 {
+pub(super) fn stored_bytes_per_texel(
+    color: ColorType,
+    encoding: ColorEncoding,
+    metadata: &ImageColorMetadata,
+) -> u64 {
     let sample_bytes = color.bytes_per_pixel() / color.channel_count();
     let is_packed = sample_bytes == 1 && encoding.color_space(metadata).is_default();
     match encoding {

@@ -6,7 +6,7 @@ use std::io::{self, BufRead, Read};
 use ::image::error::{DecodingError, ImageFormatHint};
 use ::image::{ColorType, ImageDecoder, ImageError, ImageFormat, ImageResult};
 
-use super::metadata::{ImageMetadata, ImageWarning};
+use super::metadata::{ImageColorMetadata, ImageWarning};
 use super::primaries::Primaries;
 use super::space::ColorSpace;
 
@@ -34,12 +34,12 @@ impl<R: BufRead> HdrDecoder<R> {
     }
 
     /// Color space and warnings.
-    pub(super) fn take_metadata(&mut self) -> ImageMetadata {
+    pub(super) fn take_metadata(&mut self) -> ImageColorMetadata {
         let space = std::mem::take(&mut self.header.space);
-        ImageMetadata {
+        ImageColorMetadata {
             space,
             warnings: std::mem::take(&mut self.header.warnings),
-            ..ImageMetadata::default()
+            ..ImageColorMetadata::default()
         }
     }
 }
@@ -153,15 +153,19 @@ impl HeaderVariables {
                     return Err(unsupported_format_message(other));
                 }
             },
-            "EXPOSURE" => parse_numbers(value).filter(are_positive).is_some_and(|[factor]: [f64; 1]| {
-                self.exposure = Some(self.exposure.unwrap_or(1.0) * factor);
-                true
-            }),
-            "COLORCORR" => parse_numbers(value).filter(are_positive).is_some_and(|factors: [f64; 3]| {
-                let previous = self.correction.unwrap_or([1.0; 3]);
-                self.correction = Some(std::array::from_fn(|i| previous[i] * factors[i]));
-                true
-            }),
+            "EXPOSURE" => {
+                parse_numbers(value).filter(are_finite_and_positive).is_some_and(|[factor]: [f64; 1]| {
+                    self.exposure = Some(self.exposure.unwrap_or(1.0) * factor);
+                    true
+                })
+            }
+            "COLORCORR" => {
+                parse_numbers(value).filter(are_finite_and_positive).is_some_and(|factors: [f64; 3]| {
+                    let previous = self.correction.unwrap_or([1.0; 3]);
+                    self.correction = Some(std::array::from_fn(|i| previous[i] * factors[i]));
+                    true
+                })
+            }
             "PRIMARIES" => {
                 let primaries = parse_numbers(value).map(Primaries::from_numbers);
                 self.primaries = primaries.filter(|primaries| primaries.to_rec_709_matrix().is_some());
@@ -215,7 +219,7 @@ fn parse_numbers<const N: usize>(value: &str) -> Option<[f64; N]> {
 }
 
 /// Whether all numbers are finite and positive.
-fn are_positive<const N: usize>(numbers: &[f64; N]) -> bool {
+fn are_finite_and_positive<const N: usize>(numbers: &[f64; N]) -> bool {
     numbers.iter().all(|number| number.is_finite() && *number > 0.0)
 }
 

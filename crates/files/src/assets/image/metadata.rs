@@ -29,7 +29,7 @@ pub(super) struct ImageWarning {
 
 /// Metadata of an image.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct ImageMetadata {
+pub(super) struct ImageColorMetadata {
     /// Color space.
     pub(super) space: ColorSpace,
     /// Meaning of the alpha sample.
@@ -38,7 +38,7 @@ pub(super) struct ImageMetadata {
     pub(super) warnings: Vec<ImageWarning>,
 }
 
-impl ImageMetadata {
+impl ImageColorMetadata {
     /// Adds a warning.
     pub(super) fn add_warning(&mut self, words: impl Into<String>) {
         self.warnings.push(ImageWarning { line: None, words: words.into() });

@@ -34,10 +34,10 @@ use crate::system::describe_error;
 use counting_reader::ProgressReader;
 use decode_thread::ProgressReporter;
 use decoder::{
-    ImageDecoderWithMetadata, stored_bytes_per_texel, checked_texel_memory_size, create_decoder,
-    max_memory_to_file_ratio, read_orientation,
+    ImageDecoderWithMetadata, checked_texel_memory_size, create_decoder, max_memory_to_file_ratio,
+    read_orientation, stored_bytes_per_texel,
 };
-use metadata::{ImageMetadata, ImageWarning};
+use metadata::{ImageColorMetadata, ImageWarning};
 use pfm::PfmDecoder;
 use space::ColorSpace;
 
@@ -113,7 +113,7 @@ impl ColorEncoding {
     }
 
     /// Color space of a file's samples.
-    fn color_space(self, metadata: &ImageMetadata) -> ColorSpace {
+    fn color_space(self, metadata: &ImageColorMetadata) -> ColorSpace {
         if self.uses_file_color_space() { metadata.space.clone() } else { ColorSpace::default() }
     }
 
@@ -287,7 +287,7 @@ pub fn mipmaps(texels: &Texels, token: &CancelToken) -> Result<Mipmaps, Canceled
         let mut rows = halving.allocate_halved_rows();
         for y in 0..halving.halved_height() {
             token.check_pause_and_cancel()?;
-            halving.append_row(y, &mut rows);
+            halving.append_halved_row(y, &mut rows);
         }
         Ok(halving.assemble_image(rows))
     })
@@ -424,7 +424,7 @@ impl OpenImage {
         self,
         encoding: ColorEncoding,
         report: ProgressReporter,
-    ) -> Result<(DynamicImage, ImageMetadata), String> {
+    ) -> Result<(DynamicImage, ImageColorMetadata), String> {
         let ImageDecoderWithMetadata { mut decoder, metadata, .. } = self.open_decoder(encoding, report)?;
         let (width, height) = decoder.dimensions();
         let orientation = read_orientation(&mut *decoder).map_err(|error| shorten_decoder_error(&error))?;
@@ -485,7 +485,7 @@ impl OpenImage {
         let expansion = max_memory_to_file_ratio(reader.format());
         let chosen = if is_pfm {
             PfmDecoder::new(reader.into_inner())
-                .map(|decoder| (Box::new(decoder) as _, ImageMetadata::default()))
+                .map(|decoder| (Box::new(decoder) as _, ImageColorMetadata::default()))
         } else {
             create_decoder(reader, encoding, self.limits.memory_bytes)
         };

@@ -5,7 +5,7 @@ use std::io::{self, BufRead, Read, Seek, SeekFrom};
 use ::image::error::{DecodingError, ImageFormatHint, LimitError, LimitErrorKind};
 use ::image::{ColorType, ImageDecoder, ImageError, ImageFormat, ImageResult};
 
-use super::metadata::ImageMetadata;
+use super::metadata::ImageColorMetadata;
 use super::primaries::Primaries;
 use super::space::{ColorSpace, TransferFunction};
 use crate::assets::FileHash;
@@ -103,8 +103,8 @@ impl<R: BufRead + Seek> PngDecoder<R> {
 
     /// Color space and warnings. Color chunks take precedence in the order `cICP`, `sRGB`, `iCCP`, then
     /// `gAMA` with `cHRM`.
-    pub(super) fn color_space_and_warnings(&self) -> ImageMetadata {
-        let (info, mut metadata) = (self.reader.info(), ImageMetadata::default());
+    pub(super) fn color_space_and_warnings(&self) -> ImageColorMetadata {
+        let (info, mut metadata) = (self.reader.info(), ImageColorMetadata::default());
         metadata.warn_about_extra_frames(info.animation_control().map_or(0, |control| control.num_frames));
         let is_gray = !self.color_type.has_color();
         if let Some(points) = info.coding_independent_code_points {
@@ -122,7 +122,7 @@ impl<R: BufRead + Seek> PngDecoder<R> {
     }
 
     /// Color space defined by the `gAMA` and `cHRM` chunks.
-    fn color_space_from_gama_and_chrm(&self, metadata: &mut ImageMetadata, is_gray: bool) -> ColorSpace {
+    fn color_space_from_gama_and_chrm(&self, metadata: &mut ImageColorMetadata, is_gray: bool) -> ColorSpace {
         let info = self.reader.info();
         let curve = info.gama_chunk.map_or(TransferFunction::Srgb, |gamma| gamma_curve(gamma.into_scaled()));
         let number = |number: png::ScaledFloat| f64::from(number.into_scaled()) / 100_000.0;

@@ -33,7 +33,7 @@ const BATCH: usize = 1 << 16;
 pub fn vertex_normals(mesh: &TriangleMesh, token: &CancelToken) -> Result<Vec<Vec3>, Canceled> {
     let mut sums = sum_weighted_face_normals(mesh, token)?;
     let groups = &mesh.normal_groups;
-    let firsts = first_vertex_with_same_normal(groups);
+    let firsts = first_vertices_with_same_normal(groups);
     for (vertex, first) in firsts.iter().enumerate().filter(|(vertex, first)| vertex != *first) {
         let own = std::mem::take(&mut sums[vertex]);
         sums[*first] += own;
@@ -72,7 +72,7 @@ pub fn vertex_normals(mesh: &TriangleMesh, token: &CancelToken) -> Result<Vec<Ve
 }
 
 /// Maps each vertex to the first vertex with the same normal. Returns an empty list if there are no groups.
-fn first_vertex_with_same_normal(groups: &[VertexNormalGroup]) -> Vec<usize> {
+fn first_vertices_with_same_normal(groups: &[VertexNormalGroup]) -> Vec<usize> {
     let numbers = groups.iter().map(|group| group.normal as usize + 1).max().unwrap_or(0);
     let mut firsts = vec![usize::MAX; numbers];
     let first_of = |(vertex, group): (usize, &VertexNormalGroup)| {
@@ -93,7 +93,7 @@ pub(crate) fn is_polyhedral_without_normals(mesh: &TriangleMesh) -> bool {
     if !mesh.normals.is_empty() || groups.iter().any(|group| group.group != VertexNormalGroup::BY_ANGLE) {
         return false;
     }
-    let firsts = first_vertex_with_same_normal(groups);
+    let firsts = first_vertices_with_same_normal(groups);
     let mut sums = vec![(Vec3::ZERO, 0_u32); mesh.positions.len()];
     for corners in &mesh.triangles {
         let [a, b, c] = corners.map(|corner| mesh.positions[corner as usize]);

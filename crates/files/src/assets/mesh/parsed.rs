@@ -11,7 +11,7 @@ use crate::geometry::mesh::VertexNormalGroup;
 use crate::math::{DVec3, Vec2, Vec3};
 
 /// Returns the index of the face that contains a corner, given each face's number of corners.
-pub(super) fn face_of_corner_from_arities(arities: &[u32], corner: usize) -> usize {
+pub(super) fn face_index_of_corner(arities: &[u32], corner: usize) -> usize {
     let mut end = 0;
     let is_before = |arity: &&u32| {
         end += **arity as usize;
@@ -72,7 +72,7 @@ impl Faces {
         if self.arities.is_empty() {
             return corner / 3;
         }
-        face_of_corner_from_arities(&self.arities, corner)
+        face_index_of_corner(&self.arities, corner)
     }
 
     /// Number of faces.

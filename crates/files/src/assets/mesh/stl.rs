@@ -78,7 +78,7 @@ fn read_binary(source: &MeshFileBytes<'_>) -> Result<ParsedMesh, AssetError> {
     let excess = facets.remainder().len();
     let found = facets.len() as u64;
     if found < claimed {
-        return Err(source.malformed_error_without_line(missing_facets_message(claimed, found)));
+        return Err(source.malformed_error_without_line(too_few_facets_message(claimed, found)));
     }
     if found == 0 {
         return Err(source.malformed_error_without_line(format!(
@@ -116,7 +116,7 @@ fn not_stl_message(found: &[u8]) -> String {
     expected_message(&wanted, found)
 }
 
-fn missing_facets_message(claimed: u64, found: u64) -> String {
+fn too_few_facets_message(claimed: u64, found: u64) -> String {
     let facets = if claimed == 1 { "facet" } else { "facets" };
     format!("the header claims {claimed} {facets}, but the file ends after {found}")
 }
@@ -412,8 +412,8 @@ mod tests {
     #[test]
     fn errors_include_line_and_reason() {
         let cut = binary_of(b"", 9, &TETRAHEDRON);
-        assert_eq!(error(&cut), (None, missing_facets_message(9, 4)));
-        assert_eq!(error(&binary_of(b"", u32::MAX, &[])).1, missing_facets_message(u64::from(u32::MAX), 0));
+        assert_eq!(error(&cut), (None, too_few_facets_message(9, 4)));
+        assert_eq!(error(&binary_of(b"", u32::MAX, &[])).1, too_few_facets_message(u64::from(u32::MAX), 0));
         assert_eq!(error(b"PK\x03\x04 an archive").1, not_stl_message(b"PK\x03\x04 an archive"));
         let wide: Vec<u8> = "solid a\n".encode_utf16().flat_map(u16::to_le_bytes).collect();
         assert_eq!(error(&wide), (Some(1), read::UTF16_TEXT.to_owned()));

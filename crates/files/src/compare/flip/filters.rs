@@ -94,7 +94,7 @@ impl Filters {
     }
 
     /// Detects edges and points in the achromatic channel.
-    pub(super) fn detect_features(&self, y: &Plane) -> Features {
+    pub(super) fn detect_features(&self, y: &Plane) -> FeatureStrengths {
         let lightness = Plane { values: y.values.iter().map(|y| (y + 16.0) / 116.0).collect(), ..*y };
         let smooth = lightness.filter_along_rows(&self.smooth);
         let strengths = |taps: &[f64]| {
@@ -102,7 +102,7 @@ impl Filters {
             let down = smooth.filter_along_columns(taps);
             across.values.iter().zip(&down.values).map(|(x, y)| (x * x + y * y).sqrt()).collect()
         };
-        Features { edges: strengths(&self.edge), points: strengths(&self.point) }
+        FeatureStrengths { edges: strengths(&self.edge), points: strengths(&self.point) }
     }
 }
 
@@ -133,12 +133,12 @@ fn normalize_signs_separately(taps: &[f64]) -> Vec<f64> {
 }
 
 /// Strength of edges and points at each pixel.
-pub(super) struct Features {
+pub(super) struct FeatureStrengths {
     edges: Vec<f64>,
     points: Vec<f64>,
 }
 
-impl Features {
+impl FeatureStrengths {
     /// Returns each pixel's feature difference, in [0, 1].
     pub(super) fn differences<'a>(&'a self, other: &'a Self) -> impl Iterator<Item = f64> + 'a {
         let between = |a: &'a [f64], b: &'a [f64]| a.iter().zip(b).map(|(a, b)| (a - b).abs());

@@ -7,7 +7,7 @@ mod filters;
 use rayon::prelude::*;
 
 use self::color::{OpponentColor, PerceivedColor};
-use self::filters::{Features, Filters};
+use self::filters::{FeatureStrengths, Filters};
 use super::plane::Plane;
 use super::{ImagePair, tiles};
 use crate::film::Rect;
@@ -55,7 +55,7 @@ fn perceived_colors_and_features(
     which: usize,
     tile: Rect,
     filters: &Filters,
-) -> (Vec<PerceivedColor>, Features) {
+) -> (Vec<PerceivedColor>, FeatureStrengths) {
     let planes = opponent_planes(pair, which, tile, filters.radius());
     let features = filters.detect_features(&planes[0]);
     let [y, cx, cz] = filters.blurred(&planes);

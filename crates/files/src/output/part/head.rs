@@ -86,7 +86,7 @@ impl PartHeader {
 
     /// Searches the input files, then the scene's other references, for a name that matches the end of
     /// `path`. The file need not exist. Returns the name, relative to the scene's folder.
-    pub(super) fn find_input_that_ends_path(&self, path: &Path) -> Option<&str> {
+    pub(super) fn find_render_input_that_ends_path(&self, path: &Path) -> Option<&str> {
         let inputs = self.identity.iter().filter(|input| input.name.starts_with(FILE));
         let references = self.references.iter().map(String::as_str);
         inputs

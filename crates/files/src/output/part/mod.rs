@@ -25,7 +25,9 @@ pub use head::{
     render_input_differences,
 };
 pub use merge::{MergedParts, check_and_list_missing, merge_into_film};
-pub use read::{PartFile, find_input_that_ends_path, find_input_with_same_content, is_part_or_checkpoint};
+pub use read::{
+    PartFile, find_input_with_same_content, find_render_input_that_ends_path, is_part_or_checkpoint,
+};
 pub use save::save;
 
 /// Magic number. Like PNG's signature, it is corrupted if a program converts the file as if it were text, so

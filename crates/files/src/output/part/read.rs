@@ -51,11 +51,11 @@ pub fn find_input_with_same_content<'a>(parts: &'a [PartFile], path: &Path) -> O
 
 /// Returns the name of an input file that matches the end of `path`. Unlike a comparison of contents, this
 /// also finds files that were missing or have since changed.
-pub fn find_input_that_ends_path<'a>(parts: &'a [PartFile], path: &Path) -> Option<&'a str> {
+pub fn find_render_input_that_ends_path<'a>(parts: &'a [PartFile], path: &Path) -> Option<&'a str> {
     let absolute = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
     let real = path.canonicalize().unwrap_or_else(|_| absolute.clone());
     parts.iter().find_map(|part| {
-        [&absolute, &real].into_iter().find_map(|path| part.head.find_input_that_ends_path(path))
+        [&absolute, &real].into_iter().find_map(|path| part.head.find_render_input_that_ends_path(path))
     })
 }
 

@@ -296,6 +296,6 @@ fn inputs_match_the_end_of_a_path() {
         ("/d.png", None),
         ("/scenes", None),
     ] {
-        assert_eq!(head.find_input_that_ends_path(Path::new(path)), expected, "{path}");
+        assert_eq!(head.find_render_input_that_ends_path(Path::new(path)), expected, "{path}");
     }
 }

@@ -2,7 +2,7 @@
 
 use std::io::Read;
 
-use super::ImageInfo;
+use super::ImageFileInfo;
 
 /// Block types.
 const EXTENSION: u8 = 0x21;
@@ -15,10 +15,10 @@ const HAS_PALETTE: u8 = 0x80;
 
 /// Reads a GIF from the start. The frame count is unknown if the file is truncated. Returns `None` if the
 /// file has no frames.
-pub(super) fn read_gif_info(mut file: impl Read) -> Option<ImageInfo> {
+pub(super) fn read_gif_info(mut file: impl Read) -> Option<ImageFileInfo> {
     let [_, _, _, _, _, _, a, b, c, d, flags, _, _] = read_array(&mut file)?;
     let size = (u32::from(u16::from_le_bytes([a, b])), u32::from(u16::from_le_bytes([c, d])));
-    let mut info = ImageInfo { format: "GIF".to_owned(), size: Some(size), ..ImageInfo::default() };
+    let mut info = ImageFileInfo { format: "GIF".to_owned(), size: Some(size), ..ImageFileInfo::default() };
     skip_palette(&mut file, flags)?;
     let mut frames = 0;
     let is_complete = loop {
@@ -30,7 +30,7 @@ pub(super) fn read_gif_info(mut file: impl Read) -> Option<ImageInfo> {
                 if for_each_sub_block(&mut file, keep).is_none() {
                     break false;
                 }
-                String::from_utf8_lossy(&comment).lines().for_each(|line| info.add_line(line));
+                String::from_utf8_lossy(&comment).lines().for_each(|line| info.add_name_value_line(line));
             }
             Some([FRAME]) => {
                 frames += 1;

@@ -24,7 +24,7 @@ const PREFIX: &str = "glimt:";
 
 /// Properties of an image file, read from its header.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct ImageInfo {
+pub struct ImageFileInfo {
     /// Description of the format: "PNG", "part 2 of 8".
     pub format: String,
     /// Width and height. `None` if the header does not contain them.
@@ -39,7 +39,7 @@ pub struct ImageInfo {
     pub channels: Vec<String>,
 }
 
-impl ImageInfo {
+impl ImageFileInfo {
     /// Whether any version of glimt wrote the file.
     pub fn is_written_by_glimt(&self) -> bool {
         self.program.as_deref().is_some_and(|program| program.split(' ').next() == Some(PROGRAM))
@@ -58,7 +58,7 @@ impl ImageInfo {
     }
 
     /// Adds a line of the form `name: value`. Ignores all other lines.
-    fn add_line(&mut self, line: &str) {
+    fn add_name_value_line(&mut self, line: &str) {
         if let Some((name, value)) = line.split_once(": ") {
             self.add_entry(name.trim(), value.trim());
         }
@@ -99,7 +99,7 @@ pub enum ImageInfoReadError {
 ///
 /// # Errors
 /// [`ImageInfoReadError`].
-pub fn read_image_info(path: &Path) -> Result<ImageInfo, ImageInfoReadError> {
+pub fn read_image_info(path: &Path) -> Result<ImageFileInfo, ImageInfoReadError> {
     let unreadable = |why: String| ImageInfoReadError::Unreadable { path: path.to_owned(), why };
     let (opened, _) = match file::open_regular_file(path) {
         Ok(Ok(found)) => found,
@@ -142,7 +142,7 @@ fn read_start(file: &File) -> std::io::Result<Vec<u8>> {
 ///
 /// # Errors
 /// A description of the damage to the header, or `None` if the file has another format.
-fn read_info_from_start(bytes: &[u8]) -> Result<ImageInfo, Option<String>> {
+fn read_info_from_start(bytes: &[u8]) -> Result<ImageFileInfo, Option<String>> {
     let wrong = |format: &str| Some(format!("the {format} header is damaged or truncated"));
     match bytes {
         [0x89, b'P', b'N', b'G', ..] => read_png_info(bytes).ok_or_else(|| wrong("PNG")),
@@ -156,13 +156,13 @@ fn read_info_from_start(bytes: &[u8]) -> Result<ImageInfo, Option<String>> {
     }
 }
 
-fn read_png_info(bytes: &[u8]) -> Option<ImageInfo> {
+fn read_png_info(bytes: &[u8]) -> Option<ImageFileInfo> {
     let limits = ::png::Limits { bytes: START_BYTES as usize };
     let mut decoder = ::png::Decoder::new_with_limits(Cursor::new(bytes), limits);
     decoder.set_ignore_iccp_chunk(true);
     let header = decoder.read_header_info().ok()?;
     let (width, height, bits) = (header.width, header.height, header.bit_depth as u8);
-    let mut info = ImageInfo { size: Some((width, height)), ..ImageInfo::default() };
+    let mut info = ImageFileInfo { size: Some((width, height)), ..ImageFileInfo::default() };
     let reader = decoder.read_info().ok()?;
     let header = reader.info();
     info.frames = header.animation_control.map(|control| control.num_frames);
@@ -179,30 +179,34 @@ fn read_png_info(bytes: &[u8]) -> Option<ImageInfo> {
     Some(info)
 }
 
-fn read_exr_info(bytes: &[u8]) -> Option<ImageInfo> {
+fn read_exr_info(bytes: &[u8]) -> Option<ImageFileInfo> {
     let meta = MetaData::read_from_buffered(BufReader::new(Cursor::new(bytes)), false).ok()?;
     let header = meta.headers.first()?;
     let size =
         (u32::try_from(header.layer_size.width()).ok()?, u32::try_from(header.layer_size.height()).ok()?);
     let channels = header.channels.list.iter().map(|channel| channel.name.to_string()).collect();
-    let mut info = ImageInfo { format: "EXR".to_owned(), size: Some(size), channels, ..ImageInfo::default() };
+    let mut info =
+        ImageFileInfo { format: "EXR".to_owned(), size: Some(size), channels, ..ImageFileInfo::default() };
     info.program = header.own_attributes.software_name.as_ref().map(ToString::to_string);
     if let Some(comments) = &header.own_attributes.comments {
         // The library stores text as bytes. Decode it as UTF-8.
         let comments: Vec<u8> = comments.as_slice().to_vec();
-        String::from_utf8_lossy(&comments).lines().for_each(|line| info.add_line(line));
+        String::from_utf8_lossy(&comments).lines().for_each(|line| info.add_name_value_line(line));
     }
     Some(info)
 }
 
-fn read_part_file_info(path: &Path) -> Result<ImageInfo, String> {
+fn read_part_file_info(path: &Path) -> Result<ImageFileInfo, String> {
     let head = PartFile::read_header(path).map_err(|error| error.to_string())?;
     let format = match head.kind {
         PartOrCheckpoint::Part => format!("part {} of {}", head.share.index, head.share.count),
         PartOrCheckpoint::Checkpoint => "checkpoint".to_owned(),
     };
-    let mut info =
-        ImageInfo { format, size: Some((head.picture.width, head.picture.height)), ..ImageInfo::default() };
+    let mut info = ImageFileInfo {
+        format,
+        size: Some((head.picture.width, head.picture.height)),
+        ..ImageFileInfo::default()
+    };
     for input in &head.identity {
         match input.name.as_str() {
             PROGRAM => info.program = Some(format!("{PROGRAM} {}", input.value)),

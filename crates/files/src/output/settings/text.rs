@@ -1,14 +1,14 @@
 //! Reads settings from text headers and JPEG comments.
 
-use super::ImageInfo;
+use super::ImageFileInfo;
 
 /// Reads a Radiance HDR header. The settings end at an empty line, which is followed by the resolution.
-pub(super) fn read_hdr_info(bytes: &[u8]) -> Option<ImageInfo> {
-    let mut info = ImageInfo { format: "HDR".to_owned(), ..ImageInfo::default() };
+pub(super) fn read_hdr_info(bytes: &[u8]) -> Option<ImageFileInfo> {
+    let mut info = ImageFileInfo { format: "HDR".to_owned(), ..ImageFileInfo::default() };
     let mut lines = bytes.split(|byte| *byte == b'\n').map(String::from_utf8_lossy);
     for line in lines.by_ref() {
         match line.strip_prefix("# ") {
-            Some(comment) => info.add_line(comment),
+            Some(comment) => info.add_name_value_line(comment),
             None if line.is_empty() => break,
             None => {
                 if let Some((name, value)) = line.split_once('=').filter(|(name, _)| *name == "SOFTWARE") {
@@ -26,12 +26,12 @@ pub(super) fn read_hdr_info(bytes: &[u8]) -> Option<ImageInfo> {
 }
 
 /// Reads a PPM header, which contains the settings as comments between the numbers.
-pub(super) fn read_ppm_info(bytes: &[u8]) -> Option<ImageInfo> {
-    let mut info = ImageInfo::default();
+pub(super) fn read_ppm_info(bytes: &[u8]) -> Option<ImageFileInfo> {
+    let mut info = ImageFileInfo::default();
     let mut numbers = Vec::new();
     for line in bytes.get(2..)?.split(|byte| *byte == b'\n').map(String::from_utf8_lossy) {
         match line.strip_prefix('#') {
-            Some(comment) => info.add_line(comment.trim_start()),
+            Some(comment) => info.add_name_value_line(comment.trim_start()),
             None => {
                 numbers.extend(line.split_ascii_whitespace().map_while(|word| word.parse::<u32>().ok()));
             }
@@ -47,9 +47,9 @@ pub(super) fn read_ppm_info(bytes: &[u8]) -> Option<ImageInfo> {
 }
 
 /// Reads the segments that precede the pixels in a JPEG.
-pub(super) fn read_jpeg_info(bytes: &[u8]) -> Option<ImageInfo> {
+pub(super) fn read_jpeg_info(bytes: &[u8]) -> Option<ImageFileInfo> {
     const COMMENT: u8 = 0xfe;
-    let mut info = ImageInfo { format: "JPEG".to_owned(), ..ImageInfo::default() };
+    let mut info = ImageFileInfo { format: "JPEG".to_owned(), ..ImageFileInfo::default() };
     let mut at = 2;
     loop {
         let (mark, kind) = (*bytes.get(at)?, *bytes.get(at + 1)?);
@@ -57,7 +57,9 @@ pub(super) fn read_jpeg_info(bytes: &[u8]) -> Option<ImageInfo> {
         let content = bytes.get(at + 4..at + 2 + length)?;
         match kind {
             _ if mark != 0xff => return None,
-            COMMENT => String::from_utf8_lossy(content).lines().for_each(|line| info.add_line(line)),
+            COMMENT => {
+                String::from_utf8_lossy(content).lines().for_each(|line| info.add_name_value_line(line))
+            }
             // Start of frame. The excluded codes are Huffman tables and arithmetic coding.
             0xc0..=0xcf if !matches!(kind, 0xc4 | 0xc8 | 0xcc) => {
                 let [_, height @ .., _, _] = *content.first_chunk::<5>()?;

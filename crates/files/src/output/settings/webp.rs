@@ -2,14 +2,14 @@
 
 use std::io::{Read, Seek, SeekFrom};
 
-use super::ImageInfo;
+use super::ImageFileInfo;
 
 /// Maximum size of an XMP packet.
 const MAX_XMP: u32 = 1 << 20;
 
 /// Reads the chunks in a WebP file. Returns `None` if the size is missing.
-pub(super) fn read_webp_info(mut file: impl Read + Seek) -> Option<ImageInfo> {
-    let mut info = ImageInfo { format: "WebP".to_owned(), ..ImageInfo::default() };
+pub(super) fn read_webp_info(mut file: impl Read + Seek) -> Option<ImageFileInfo> {
+    let mut info = ImageFileInfo { format: "WebP".to_owned(), ..ImageFileInfo::default() };
     file.seek(SeekFrom::Start(12)).ok()?;
     let mut header = [0; 8];
     while file.read_exact(&mut header).is_ok() {
@@ -28,7 +28,7 @@ pub(super) fn read_webp_info(mut file: impl Read + Seek) -> Option<ImageInfo> {
                 info.size = Some((read_canvas_dimension(&content, 4)?, read_canvas_dimension(&content, 7)?));
             }
             b"VP8L" if info.size.is_none() => info.size = Some(read_lossless_size(&content)?),
-            b"XMP " => read_xmp_packet(&mut info, &String::from_utf8_lossy(&content)),
+            b"XMP " => add_info_from_xmp_packet(&mut info, &String::from_utf8_lossy(&content)),
             _ => {}
         }
         file.seek(SeekFrom::Start(next)).ok()?;
@@ -49,7 +49,7 @@ fn read_lossless_size(content: &[u8]) -> Option<(u32, u32)> {
 }
 
 /// Adds the program and the description lines from an XMP packet.
-fn read_xmp_packet(info: &mut ImageInfo, packet: &str) {
+fn add_info_from_xmp_packet(info: &mut ImageFileInfo, packet: &str) {
     let between = |start: &str, end: &str| {
         let (_, rest) = packet.split_once(start)?;
         Some(unescape_xml(rest.split_once(end)?.0))
@@ -58,7 +58,7 @@ fn read_xmp_packet(info: &mut ImageInfo, packet: &str) {
         info.add_entry("Software", &program);
     }
     if let Some(lines) = between("<rdf:li xml:lang=\"x-default\">", "</rdf:li>") {
-        lines.lines().for_each(|line| info.add_line(line));
+        lines.lines().for_each(|line| info.add_name_value_line(line));
     }
 }
 

@@ -7,7 +7,7 @@
 use arrayvec::ArrayVec;
 use glimt_base::reduce;
 
-use super::top_node::RayCoordinateBounds;
+use super::top_node::RayPacketBounds;
 use super::{Bvh, ChildRef, DEEP_STACK};
 use crate::accel::{F32x16, PACKET_SIZE};
 use crate::geometry::Aabb;
@@ -50,7 +50,7 @@ impl<'a> SlabRayPacket<'a> {
     }
 
     #[inline(always)]
-    fn entry_intervals(&self, bounds: &Aabb, ends: &F32x16) -> SlabIntervals {
+    fn intervals_in_box(&self, bounds: &Aabb, ends: &F32x16) -> SlabIntervals {
         let (min, max) = (bounds.min.to_array(), bounds.max.to_array());
         let mut stretches = SlabIntervals { near: [0.0; PACKET_SIZE], far: [0.0; PACKET_SIZE] };
         for (lane, &end) in ends.iter().enumerate() {
@@ -155,7 +155,7 @@ impl Bvh {
             return (0, [0.0; PACKET_SIZE]);
         }
         self.top.beam_hits_and_entries(
-            &RayCoordinateBounds::from_ray_packet(slabs.origin, &slabs.inverse, (ends, traced), simd),
+            &RayPacketBounds::from_ray_packet(slabs.origin, &slabs.inverse, (ends, traced), simd),
             simd,
         )
     }
@@ -194,7 +194,7 @@ impl Bvh {
                             return;
                         }
                         let (bounds, child) = self.top.subtree_bounds_and_child(i);
-                        (entry, hit_mask(&slabs.entry_intervals(&bounds, ends), simd), child)
+                        (entry, hit_mask(&slabs.intervals_in_box(&bounds, ends), simd), child)
                     }
                 };
                 if entry > end || in_it == 0 {
@@ -207,8 +207,8 @@ impl Bvh {
                 }
                 let node = &self.nodes[child.first as usize];
                 let (left, right) = (
-                    slabs.entry_intervals(&node.bounds[0], ends),
-                    slabs.entry_intervals(&node.bounds[1], ends),
+                    slabs.intervals_in_box(&node.bounds[0], ends),
+                    slabs.intervals_in_box(&node.bounds[1], ends),
                 );
                 let (left_met, right_met) = (hit_mask(&left, simd), hit_mask(&right, simd));
                 if left_met == 0 || right_met == 0 {
@@ -262,7 +262,7 @@ impl Bvh {
                             .top
                             .subtree_bounds_and_child(subtrees.trailing_zeros() as usize % PACKET_SIZE);
                         subtrees &= subtrees - 1;
-                        (hit_mask(&slabs.entry_intervals(&bounds, ends), simd), child)
+                        (hit_mask(&slabs.intervals_in_box(&bounds, ends), simd), child)
                     }
                 };
                 if in_it & free == 0 {
@@ -275,7 +275,7 @@ impl Bvh {
                 }
                 let node = &self.nodes[child.first as usize];
                 for (bounds, child) in node.bounds.iter().zip(node.child) {
-                    let hits = hit_mask(&slabs.entry_intervals(bounds, ends), simd);
+                    let hits = hit_mask(&slabs.intervals_in_box(bounds, ends), simd);
                     if hits & free != 0 {
                         stack.push((0.0, hits, child));
                     }

@@ -125,7 +125,7 @@ impl Bvh {
         if !self.is_nested {
             return self;
         }
-        let shells = self.fold_subtrees(SphericalShell::EMPTY, shell, SphericalShell::union);
+        let shells = self.fold_primitives_per_subtree(SphericalShell::EMPTY, shell, SphericalShell::union);
         let shells = shells.into_iter().map(|both| both.map(SphericalShell::padded)).collect();
         Self { shells: Some(shells), ..self }
     }
@@ -145,11 +145,11 @@ impl Bvh {
             all.sort_unstable_by(|a, b| b.cmp(a));
             all.into_iter().take(N).collect()
         };
-        self.fold_subtrees(ArrayVec::new(), own, join).into_iter().flatten().collect()
+        self.fold_primitives_per_subtree(ArrayVec::new(), own, join).into_iter().flatten().collect()
     }
 
     /// Folds a value over the primitives of every subtree.
-    fn fold_subtrees<T: Clone>(
+    fn fold_primitives_per_subtree<T: Clone>(
         &self,
         empty: T,
         own: impl Fn(u32) -> T,

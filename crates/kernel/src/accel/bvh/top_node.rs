@@ -87,7 +87,7 @@ impl WideTopNode {
 
     /// Mask of the subtrees that the rays in a beam may hit, and lower bounds on the entry distances.
     #[inline(always)]
-    pub(super) fn beam_hits_and_entries(&self, beam: &RayCoordinateBounds, simd: impl Simd) -> (u32, F32x16) {
+    pub(super) fn beam_hits_and_entries(&self, beam: &RayPacketBounds, simd: impl Simd) -> (u32, F32x16) {
         let (mut near, mut far) = ([0.0_f32; PACKET_SIZE], [beam.end * SLAB_PAD; PACKET_SIZE]);
         for axis in 0..3 {
             let [low, high] = beam.inverse[axis];
@@ -130,7 +130,7 @@ fn largest_openable_child(
 }
 
 /// Bounds on the coordinates of several rays.
-pub(super) struct RayCoordinateBounds {
+pub(super) struct RayPacketBounds {
     /// Minimum and maximum coordinates of the origins.
     origin: [[f32; 2]; 3],
     /// Minimum and maximum coordinates of the inverse directions.
@@ -139,7 +139,7 @@ pub(super) struct RayCoordinateBounds {
     end: f32,
 }
 
-impl RayCoordinateBounds {
+impl RayPacketBounds {
     /// Bounds the rays in the mask `traced`, which must not be empty.
     #[inline(always)]
     pub(super) fn from_ray_packet(
@@ -159,7 +159,7 @@ impl RayCoordinateBounds {
 impl Bvh {
     /// Whether every subtree of the top node is a single primitive.
     #[cfg(test)]
-    pub(super) fn is_flat(&self) -> bool {
+    pub(super) fn is_single_level(&self) -> bool {
         self.top.child.iter().enumerate().all(|(i, child)| self.top.used >> i & 1 == 0 || child.count == 1)
     }
 }
@@ -203,7 +203,7 @@ mod tests {
             };
             let boxes: Vec<Aabb> = (0..count).map(|_| cell(&mut next)).collect();
             let tree = Bvh::build(&boxes, &CancelToken::new()).expect("never canceled");
-            assert_eq!(tree.is_flat(), count <= PACKET_SIZE, "{count}");
+            assert_eq!(tree.is_single_level(), count <= PACKET_SIZE, "{count}");
             let (mut tested, mut hits) = (0, 0);
             for round in 0..600 {
                 let (from, to) = (Vec3::new(next(), next(), next()) * 6.0, Vec3::new(next(), next(), next()));

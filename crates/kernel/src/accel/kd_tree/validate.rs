@@ -8,7 +8,7 @@ use crate::geometry::Aabb;
 use crate::math::{DVec3, Vec3};
 
 /// A node to be checked.
-struct NodeVisit {
+struct NodeToCheck {
     place: u32,
     cell: Aabb,
     depth: u32,
@@ -43,8 +43,8 @@ impl KdTree {
         let limit = depth_limit(all.len());
         let mut named = SamplePointCoverage::new(&all, &corners);
         let mut reached = 0;
-        let mut pending = vec![NodeVisit { place: 0, cell: self.bounds, depth: 0, inside: all }];
-        while let Some(NodeVisit { place, cell, depth, inside }) = pending.pop() {
+        let mut pending = vec![NodeToCheck { place: 0, cell: self.bounds, depth: 0, inside: all }];
+        while let Some(NodeToCheck { place, cell, depth, inside }) = pending.pop() {
             if depth > limit {
                 return Err(format!("node {place} has depth {depth}, which exceeds the limit"));
             }
@@ -63,7 +63,7 @@ impl KdTree {
                             !ClippedPolygon::clip_to_box(corners(**id), &cell).points().is_empty()
                         };
                         let inside = inside.iter().filter(touches).copied().collect();
-                        pending.push(NodeVisit { place, cell, depth: depth + 1, inside });
+                        pending.push(NodeToCheck { place, cell, depth: depth + 1, inside });
                     }
                 }
                 DecodedNode::Leaf { first, count } => {

@@ -63,7 +63,7 @@ impl WideBvh {
         token: &CancelToken,
     ) -> Result<Self, Canceled> {
         let build::BuiltWideBvh { nodes, packs, bounds } = build::build(count, corners, quality, token)?;
-        Ok(Self { nodes, packs, bounds, instructions: InstructionSet::best(), quality })
+        Ok(Self { nodes, packs, bounds, instructions: InstructionSet::from_environment_or_best(), quality })
     }
 
     /// Sets the instruction set for traversal. Falls back to the fastest supported one if the processor lacks

@@ -149,7 +149,7 @@ impl TrianglePack {
 
     /// Corners of the triangle in a lane.
     #[inline(always)]
-    pub fn corners(&self, lane: usize) -> [Vec3; 3] {
+    pub fn corners_at_lane(&self, lane: usize) -> [Vec3; 3] {
         [0, 3, 6]
             .map(|row| Vec3::new(self.rows[row][lane], self.rows[row + 1][lane], self.rows[row + 2][lane]))
     }

@@ -83,7 +83,7 @@ impl UnitTorusLine {
         for (end, is_convex) in [(inflections[0], true), (inflections[1], false), (to, true)] {
             if end > low.s {
                 let high = self.evaluate(end);
-                let crossing = self.crossing_of_piece(low, high, is_inside, is_convex);
+                let crossing = self.crossing_between_samples(low, high, is_inside, is_convex);
                 if crossing.is_some() {
                     return crossing;
                 }
@@ -146,7 +146,7 @@ impl UnitTorusLine {
     }
 
     /// First crossing in an interval. `is_inside` is true if the interval starts inside the torus.
-    fn crossing_of_piece(
+    fn crossing_between_samples(
         &self,
         low: LineSample,
         high: LineSample,

@@ -1,7 +1,7 @@
 //! Box lights. The visible faces are sampled by solid angle.
 
 use super::quad::SphericalRectangle;
-use super::sample_point::LightSamplePoint;
+use super::sample_point::SampledLightPoint;
 use super::{LightHit, ShapeEmitter};
 use crate::geometry::cuboid::OrientedBox;
 use crate::math::{DVec3, Vec3};
@@ -37,7 +37,7 @@ impl ShapeEmitter for BoxEmitter {
     /// Chooses a face with a probability proportional to its solid angle, then samples the face uniformly
     /// over this solid angle.
     #[inline(always)]
-    fn sample(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
+    fn sample(&self, point: Vec3, u: [f32; 2]) -> SampledLightPoint {
         let BoxView { signs, faces } = self.seen_from(point);
         let [a, b, c] = faces.map(|face| face.solid_angle);
         let total = a + b + c;
@@ -59,7 +59,7 @@ impl ShapeEmitter for BoxEmitter {
         let local = [of([z, y, x]) * signs[0], of([x, z, y]) * signs[1], of([y, x, z]) * signs[2]];
         let offset = self.axes[0] * local[0] + self.axes[1] * local[1] + self.axes[2] * local[2];
         let factor = own * (total / face.solid_angle);
-        LightSamplePoint {
+        SampledLightPoint {
             direction: offset * (1.0 / offset.length_squared().sqrt()),
             target: point + offset,
             factor: if total > 0.0 { factor } else { 0.0 },
@@ -76,7 +76,7 @@ impl ShapeEmitter for BoxEmitter {
             Some((_, (face, _))) if face.rectangle.has_accurate_solid_angle() => 1.0 / total,
             Some((k, (face, _))) => {
                 let area = 4.0 * self.half[(k + 1) % 3] * self.half[(k + 2) % 3];
-                hit.uniform_area_pdf(f64::from(area)) * (face.solid_angle / total)
+                hit.uniform_area_solid_angle_pdf(f64::from(area)) * (face.solid_angle / total)
             }
             None => 0.0,
         }

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use super::sample_point::LightSamplePoint;
+use super::sample_point::SampledLightPoint;
 use super::{LightHit, ShapeEmitter};
 use crate::geometry::disk::Disk;
 use crate::math::elementary::sin_cos;
@@ -36,11 +36,11 @@ pub struct DiskView {
 impl ShapeEmitter for DiskEmitter {
     /// Samples the disk with a pdf within 20 % of uniform over the solid angle.
     #[inline(always)]
-    fn sample(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
+    fn sample(&self, point: Vec3, u: [f32; 2]) -> SampledLightPoint {
         let view = self.view_from(point);
         let (direction, distance, factor) = view.sample(self.normal, u);
         let direction = direction.as_vec3();
-        LightSamplePoint {
+        SampledLightPoint {
             direction,
             target: point + direction * distance as f32,
             factor: if view.height > 0.0 { factor as f32 } else { 0.0 },

@@ -2,7 +2,7 @@
 
 use std::f32::consts::{PI, TAU};
 
-use super::sample_point::LightSamplePoint;
+use super::sample_point::SampledLightPoint;
 use super::{LightHit, ShapeEmitter};
 use crate::geometry::{RayF64, Shape, SurfaceSample};
 use crate::math::elementary::sin_cos;
@@ -18,10 +18,10 @@ pub struct InwardEmitter {
 }
 
 impl ShapeEmitter for InwardEmitter {
-    fn sample(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
+    fn sample(&self, point: Vec3, u: [f32; 2]) -> SampledLightPoint {
         match self.shape.encloses_point_if_closed(point.as_dvec3()) {
             Some(true) => self.sample_direction(point, u),
-            Some(false) => LightSamplePoint::NOTHING,
+            Some(false) => SampledLightPoint::NOTHING,
             None => self.sample_by_area(point, u),
         }
     }
@@ -30,9 +30,10 @@ impl ShapeEmitter for InwardEmitter {
         match self.shape.encloses_point_if_closed(from.as_dvec3()) {
             Some(true) => 1.0 / ALL_AROUND,
             Some(false) => 0.0,
-            None if self.is_nearest_hit_at(from, hit.direction, hit.distance) => hit.uniform_area_pdf(
-                self.by_area.total() * self.shape.area_scale_for_world_normal(hit.normal.as_dvec3()),
-            ),
+            None if self.is_nearest_hit_at(from, hit.direction, hit.distance) => hit
+                .uniform_area_solid_angle_pdf(
+                    self.by_area.total() * self.shape.area_scale_for_world_normal(hit.normal.as_dvec3()),
+                ),
             None => 0.0,
         }
     }
@@ -52,19 +53,19 @@ impl InwardEmitter {
     }
 
     /// Samples a direction uniformly from a point inside the shape.
-    fn sample_direction(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
+    fn sample_direction(&self, point: Vec3, u: [f32; 2]) -> SampledLightPoint {
         let cos = 1.0 - 2.0 * u[0];
         let sin = ((1.0 - cos) * (1.0 + cos)).max(0.0).sqrt();
         let (sin_around, cos_around) = sin_cos(TAU * u[1]);
         let direction = Vec3::new(sin * cos_around, sin * sin_around, cos);
-        self.first_hit_distance(point, direction).map_or(LightSamplePoint::NOTHING, |distance| {
-            LightSamplePoint { direction, target: point + direction * distance, factor: ALL_AROUND }
+        self.first_hit_distance(point, direction).map_or(SampledLightPoint::NOTHING, |distance| {
+            SampledLightPoint { direction, target: point + direction * distance, factor: ALL_AROUND }
         })
     }
 
     /// Samples a point uniformly by area. The sample is black if another part of the shape occludes the
     /// point.
-    fn sample_by_area(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
+    fn sample_by_area(&self, point: Vec3, u: [f32; 2]) -> SampledLightPoint {
         let (part, rest) = self.by_area.sample(u[0]);
         let SurfaceSample { point: place, normal } =
             self.shape.sample_point_on_part(part as u32, Vec2::new(rest, u[1]));
@@ -74,11 +75,11 @@ impl InwardEmitter {
         let cosine = direction.dot(normal);
         let direction = direction.as_vec3();
         if !(cosine > 0.0 && self.is_nearest_hit_at(point, direction, distance as f32)) {
-            return LightSamplePoint::NOTHING;
+            return SampledLightPoint::NOTHING;
         }
         let area = self.by_area.total() * self.shape.area_scale_for_world_normal(normal);
         let factor = cosine * area / (distance * distance);
-        LightSamplePoint { direction, target: point + direction * distance as f32, factor: factor as f32 }
+        SampledLightPoint { direction, target: point + direction * distance as f32, factor: factor as f32 }
     }
 
     /// Whether no part of the shape occludes the point at `distance`.

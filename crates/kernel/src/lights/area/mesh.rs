@@ -2,13 +2,13 @@
 //! area if they have few triangles, and with a light tree if they have many.
 
 use super::quad::QuadEmitter;
-use super::sample_point::LightSamplePoint;
+use super::sample_point::SampledLightPoint;
 use super::triangle::TriangleEmitter;
 use super::{LightHit, ShapeEmitter};
 use crate::control::{CancelToken, Canceled};
 use crate::geometry::SurfaceSample;
 use crate::geometry::triangle::Triangle;
-use crate::lights::sample::{LightGeometry, LightSample, ShadowRayEnd};
+use crate::lights::sample::{LightSample, LightSceneGeometry, ShadowRayEnd};
 use crate::lights::tree::{LightBounds, LightTree, MAX_WITHOUT_TREE, Receiver};
 use crate::math::{DVec3, Vec2, Vec3};
 use crate::sampling::distribution::DiscreteDistribution;
@@ -160,16 +160,16 @@ impl MeshEmitter {
                 let pick = tree.pick(&Receiver::with_unknown_lobe(point, normal), f64::from(u[0]))?;
                 let (corners, primitive) = &self.triangles[pick.light as usize];
                 let rest = (pick.rest as f32).min(1.0_f32.next_down());
-                let LightSamplePoint { direction, target, factor } =
+                let SampledLightPoint { direction, target, factor } =
                     triangle_emitter(corners)?.sample(point, [rest, u[1]]);
-                (LightSamplePoint { direction, target, factor: factor / pick.probability }, *primitive)
+                (SampledLightPoint { direction, target, factor: factor / pick.probability }, *primitive)
             }
         };
         (arrival.factor > 0.0).then(|| LightSample {
             end: ShadowRayEnd::At(arrival.target),
             direction: arrival.direction,
             weight: radiance * arrival.factor,
-            source: LightGeometry::Primitive(object, primitive),
+            source: LightSceneGeometry::Primitive(object, primitive),
         })
     }
 
@@ -177,7 +177,7 @@ impl MeshEmitter {
     pub fn pdf(&self, from: Vec3, normal: Vec3, hit: &LightHit) -> f32 {
         let tree = match &self.sampling {
             MeshSampling::Quad(quad) => return quad.quad.pdf(from, hit),
-            MeshSampling::Area(_) => return hit.uniform_area_pdf(self.by_area.total()),
+            MeshSampling::Area(_) => return hit.uniform_area_solid_angle_pdf(self.by_area.total()),
             MeshSampling::Tree(tree) => tree,
         };
         let index = self.triangles.binary_search_by_key(&hit.primitive, |(_, primitive)| *primitive);
@@ -252,7 +252,7 @@ impl AreaSampledTriangles {
 
     /// Samples the triangles as seen from `point`.
     #[inline(always)]
-    pub fn sample(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
+    pub fn sample(&self, point: Vec3, u: [f32; 2]) -> SampledLightPoint {
         let (index, rest) = self.by_area.sample(u[0]);
         let EmissiveTriangle { corner, ab, ac, normal, .. } = &self.all[index];
         let weights = warp::triangle(Vec2::new(rest, u[1]));
@@ -261,7 +261,7 @@ impl AreaSampledTriangles {
         let direction = offset * nearness;
         let factor = -normal.dot(direction) * self.area * (nearness * nearness);
         let factor = if factor > 0.0 { factor } else { 0.0 };
-        LightSamplePoint { direction, target: point + offset, factor }
+        SampledLightPoint { direction, target: point + offset, factor }
     }
 
     /// Primitive index of the sampled triangle, given the sample's first random number.

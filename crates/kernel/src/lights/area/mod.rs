@@ -24,9 +24,9 @@ pub mod triangle;
 
 pub use emission_modulation::{BlendWeight, EmissionModulation, EmissionTerm, TriangleWithUvs, UvMapping};
 pub use mesh::MeshEmitter;
-pub use sample_point::LightSamplePoint;
+pub use sample_point::SampledLightPoint;
 
-use super::sample::{LightGeometry, LightHit, LightSample, ShadowRayEnd};
+use super::sample::{LightHit, LightSample, LightSceneGeometry, ShadowRayEnd};
 use super::tree::bounds::{EmissionCone, LightBounds, mean_channel};
 use crate::geometry::Shape;
 use crate::geometry::disk::Disk;
@@ -40,7 +40,7 @@ use disk::DiskEmitter;
 use inside::InwardEmitter;
 use mesh::TrianglePairQuad;
 use quad::QuadEmitter;
-use see_through::SeeThroughSideEmitter;
+use see_through::SeeThroughShapeSide;
 use sphere::SphereEmitter;
 use surface_of_revolution::{CappedRevolutionEmitter, ConeSide, CylinderSide};
 use textured_quad::TexturedQuadEmitter;
@@ -51,7 +51,7 @@ use triangle::TriangleEmitter;
 /// A shape whose front emits the same radiance in every direction.
 pub trait ShapeEmitter {
     /// Samples a point on the front that is visible from `point`. `u` is in [0, 1)².
-    fn sample(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint;
+    fn sample(&self, point: Vec3, u: [f32; 2]) -> SampledLightPoint;
 
     /// Pdf of [`ShapeEmitter::sample`] in sr⁻¹. `hit` is the point on the front that a ray from `from` hits.
     fn pdf(&self, from: Vec3, hit: &LightHit) -> f32;
@@ -123,7 +123,7 @@ pub enum Emitter {
     /// The inside of a shape.
     Inside(Box<InwardEmitter>),
     /// One side of a see-through shape. Near parts do not occlude far parts.
-    SeeThrough(Box<SeeThroughSideEmitter>),
+    SeeThrough(Box<SeeThroughShapeSide>),
     /// Triangles of a mesh.
     Mesh(MeshEmitter),
 }
@@ -152,8 +152,8 @@ macro_rules! of_any {
 
 /// For emitters in their own coordinates. Meshes are never transformed this way.
 impl ShapeEmitter for Emitter {
-    fn sample(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
-        of_any!(self, it => it.sample(point, u), _mesh => LightSamplePoint::NOTHING)
+    fn sample(&self, point: Vec3, u: [f32; 2]) -> SampledLightPoint {
+        of_any!(self, it => it.sample(point, u), _mesh => SampledLightPoint::NOTHING)
     }
 
     fn pdf(&self, from: Vec3, hit: &LightHit) -> f32 {
@@ -239,7 +239,7 @@ pub fn see_through_shape_side_light(
         Side::Front => front_area_light(shape, radiance, object)?,
         Side::Back => back_area_light(shape, radiance, object)?,
     };
-    let see_through = if hides_itself { SeeThroughSideEmitter::new(shape, side) } else { None };
+    let see_through = if hides_itself { SeeThroughShapeSide::new(shape, side) } else { None };
     Some(match see_through {
         Some(see_through) => AreaLight { shape: Emitter::SeeThrough(Box::new(see_through)), ..light },
         None => light,
@@ -342,8 +342,10 @@ impl AreaLight {
             return Some(sample);
         };
         let primitive = match sample.source {
-            LightGeometry::Primitive(_, primitive) => primitive,
-            LightGeometry::Object(_) | LightGeometry::SeeThrough(_) | LightGeometry::Nothing => 0,
+            LightSceneGeometry::Primitive(_, primitive) => primitive,
+            LightSceneGeometry::Object(_)
+            | LightSceneGeometry::SeeThrough(_)
+            | LightSceneGeometry::Nothing => 0,
         };
         Some(LightSample {
             weight: sample.weight * modulation.radiance_factor(target, primitive, sample.direction),
@@ -354,9 +356,9 @@ impl AreaLight {
     /// [`AreaLight::sample`] without the emission modulation.
     #[inline]
     pub fn sample_unmodulated(&self, point: Vec3, normal: Vec3, u: [f32; 2]) -> Option<LightSample> {
-        let own = |sample: LightSamplePoint| {
-            let LightSamplePoint { direction, target, factor } = sample;
-            let (end, source) = (ShadowRayEnd::At(target), self.light_geometry());
+        let own = |sample: SampledLightPoint| {
+            let SampledLightPoint { direction, target, factor } = sample;
+            let (end, source) = (ShadowRayEnd::At(target), self.scene_geometry());
             (factor > 0.0).then(|| LightSample { end, direction, weight: self.radiance * factor, source })
         };
         of_any!(&self.shape,
@@ -365,9 +367,13 @@ impl AreaLight {
     }
 
     /// The light's geometry.
-    pub(super) fn light_geometry(&self) -> LightGeometry {
+    pub(super) fn scene_geometry(&self) -> LightSceneGeometry {
         let is_sheer = matches!(self.shape, Emitter::SeeThrough(_));
-        if is_sheer { LightGeometry::SeeThrough(self.object) } else { LightGeometry::Object(self.object) }
+        if is_sheer {
+            LightSceneGeometry::SeeThrough(self.object)
+        } else {
+            LightSceneGeometry::Object(self.object)
+        }
     }
 
     /// Implements [`Light::pdf`](super::Light::pdf).

@@ -1,20 +1,20 @@
 //! Samples one area light for a packet of points.
 
-use super::sample_point::LightSamplePoint;
+use super::sample_point::SampledLightPoint;
 use super::{AreaLight, Emitter, MeshEmitter, ShapeEmitter};
 use crate::lights::packet::{LightSamplePacket, packet_of};
-use crate::lights::sample::LightGeometry;
+use crate::lights::sample::LightSceneGeometry;
 use crate::math::lanes::{F32x16, PACKET_SIZE, Vec3x16, lane, set_lane};
 
 /// Samples triangles by area for a packet in which each lane has its own light.
 macro_rules! triangle_packet_of {
     ($i:ident => ($facets:expr, $light:expr), $points:expr, $u:expr) => {{
-        let mut row = packet_of!(LightGeometry::Nothing, $i => {
-            let sample: LightSamplePoint = $facets.sample(lane($points, $i), [$u[0][$i], $u[1][$i]]);
+        let mut row = packet_of!(LightSceneGeometry::Nothing, $i => {
+            let sample: SampledLightPoint = $facets.sample(lane($points, $i), [$u[0][$i], $u[1][$i]]);
             (sample.direction, sample.target, $light.radiance * sample.factor)
         });
         for $i in 0..PACKET_SIZE {
-            let source = LightGeometry::Primitive($light.object, $facets.sampled_primitive($u[0][$i]));
+            let source = LightSceneGeometry::Primitive($light.object, $facets.sampled_primitive($u[0][$i]));
             row.sources.set_geometry($i, source);
         }
         row
@@ -33,11 +33,11 @@ impl AreaLight {
         used: u32,
         u: &[F32x16; 2],
     ) -> LightSamplePacket {
-        let source = self.light_geometry();
+        let source = self.scene_geometry();
         macro_rules! packet_from {
             ($emitter:expr) => {
                 packet_of!(source, i => {
-                    let sample: LightSamplePoint = $emitter.sample(lane(points, i), [u[0][i], u[1][i]]);
+                    let sample: SampledLightPoint = $emitter.sample(lane(points, i), [u[0][i], u[1][i]]);
                     (sample.direction, sample.target, self.radiance * sample.factor)
                 })
             };

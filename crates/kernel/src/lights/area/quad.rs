@@ -3,7 +3,7 @@
 
 use std::f32::consts::PI;
 
-use super::sample_point::LightSamplePoint;
+use super::sample_point::SampledLightPoint;
 use super::{LightHit, ShapeEmitter};
 use crate::math::elementary::{acos, sin_cos};
 use crate::math::{DVec3, Vec3};
@@ -36,7 +36,7 @@ struct RectangleEdges {
 impl ShapeEmitter for QuadEmitter {
     /// Samples rectangles by solid angle and other parallelograms by area.
     #[inline(always)]
-    fn sample(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
+    fn sample(&self, point: Vec3, u: [f32; 2]) -> SampledLightPoint {
         self.sample_given_corner_offset(point, self.offset_to_corner(point), u)
     }
 
@@ -45,7 +45,8 @@ impl ShapeEmitter for QuadEmitter {
         if !(to_corner.dot(self.normal) < 0.0) {
             return 0.0;
         }
-        self.pdf_by_solid_angle(to_corner).unwrap_or_else(|| hit.uniform_area_pdf(f64::from(self.area)))
+        self.pdf_by_solid_angle(to_corner)
+            .unwrap_or_else(|| hit.uniform_area_solid_angle_pdf(f64::from(self.area)))
     }
 
     fn area_centroid(&self) -> DVec3 {
@@ -66,7 +67,7 @@ impl QuadEmitter {
         point: Vec3,
         to_corner: Vec3,
         u: [f32; 2],
-    ) -> LightSamplePoint {
+    ) -> SampledLightPoint {
         let by_area = self.sample_by_area(to_corner, u);
         let (offset, factor) = match &self.rectangle {
             Some(rectangle) => {
@@ -83,7 +84,7 @@ impl QuadEmitter {
         };
         let direction = offset * (1.0 / offset.length_squared().sqrt());
         let is_front = to_corner.dot(self.normal) < 0.0;
-        LightSamplePoint { direction, target: point + offset, factor: if is_front { factor } else { 0.0 } }
+        SampledLightPoint { direction, target: point + offset, factor: if is_front { factor } else { 0.0 } }
     }
 
     /// Creates a quad from a corner and two nonparallel edges.

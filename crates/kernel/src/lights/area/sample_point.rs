@@ -4,7 +4,7 @@ use crate::math::Vec3;
 
 /// A sampled point on an area light, computed without branches.
 #[derive(Clone, Copy, Debug)]
-pub struct LightSamplePoint {
+pub struct SampledLightPoint {
     /// Unit direction to the sampled point.
     pub direction: Vec3,
     /// Sampled point.
@@ -13,7 +13,7 @@ pub struct LightSamplePoint {
     pub factor: f32,
 }
 
-impl LightSamplePoint {
+impl SampledLightPoint {
     /// No sample, because the light is not visible.
     pub const NOTHING: Self = Self { direction: Vec3::ZERO, target: Vec3::ZERO, factor: 0.0 };
 }

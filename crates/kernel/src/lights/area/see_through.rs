@@ -1,6 +1,6 @@
 //! One side of a see-through round shape or box. Surfaces behind the near side are visible through it.
 
-use super::sample_point::LightSamplePoint;
+use super::sample_point::SampledLightPoint;
 use super::{LightHit, ShapeEmitter, Side};
 use crate::geometry::{Shape, SurfaceSample};
 use crate::math::{DVec3, Vec2, Vec3};
@@ -8,14 +8,14 @@ use crate::sampling::distribution::DiscreteDistribution;
 
 /// One side of a shape, sampled by area. Shadow rays account for other parts of the shape along the way.
 #[derive(Clone, Debug, PartialEq)]
-pub struct SeeThroughSideEmitter {
+pub struct SeeThroughShapeSide {
     shape: Shape,
     by_area: DiscreteDistribution,
     /// 1 for the front, −1 for the back.
     outwards: f64,
 }
 
-impl SeeThroughSideEmitter {
+impl SeeThroughShapeSide {
     /// Creates an emitter for one side of a shape, or returns `None` if the shape has no area.
     pub fn new(shape: &Shape, side: Side) -> Option<Self> {
         let outwards = match side {
@@ -30,8 +30,8 @@ impl SeeThroughSideEmitter {
     }
 }
 
-impl ShapeEmitter for SeeThroughSideEmitter {
-    fn sample(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
+impl ShapeEmitter for SeeThroughShapeSide {
+    fn sample(&self, point: Vec3, u: [f32; 2]) -> SampledLightPoint {
         let (part, rest) = self.by_area.sample(u[0]);
         let SurfaceSample { point: place, normal } =
             self.shape.sample_point_on_part(part as u32, Vec2::new(rest, u[1]));
@@ -39,16 +39,16 @@ impl ShapeEmitter for SeeThroughSideEmitter {
         let distance = offset.length();
         let cosine = -self.outwards * normal.dot(offset) / distance;
         if !(cosine > 0.0) {
-            return LightSamplePoint::NOTHING;
+            return SampledLightPoint::NOTHING;
         }
         let direction = (offset / distance).as_vec3();
         let area = self.by_area.total() * self.shape.area_scale_for_world_normal(normal);
         let factor = cosine * area / (distance * distance);
-        LightSamplePoint { direction, target: point + direction * distance as f32, factor: factor as f32 }
+        SampledLightPoint { direction, target: point + direction * distance as f32, factor: factor as f32 }
     }
 
     fn pdf(&self, _: Vec3, hit: &LightHit) -> f32 {
-        hit.uniform_area_pdf(
+        hit.uniform_area_solid_angle_pdf(
             self.by_area.total() * self.shape.area_scale_for_world_normal(hit.normal.as_dvec3()),
         )
     }

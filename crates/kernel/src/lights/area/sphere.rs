@@ -2,7 +2,7 @@
 
 use std::f32::consts::PI;
 
-use super::sample_point::LightSamplePoint;
+use super::sample_point::SampledLightPoint;
 use super::{LightHit, ShapeEmitter};
 use crate::math::frame::Frame;
 use crate::math::{DVec3, Vec3};
@@ -21,7 +21,7 @@ impl ShapeEmitter for SphereEmitter {
     /// Samples uniformly over the solid angle (*Physically Based Rendering*, 4th ed., section 6.2.4).
     /// Accurate even for narrow cones.
     #[inline(always)]
-    fn sample(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
+    fn sample(&self, point: Vec3, u: [f32; 2]) -> SampledLightPoint {
         let (axis, distance, sin2_max) = self.cone_unchecked(point);
         let is_outside = sin2_max < 1.0;
         let sin2_max = if is_outside { sin2_max } else { 0.0 };
@@ -32,7 +32,7 @@ impl ShapeEmitter for SphereEmitter {
         let depth = (sin2_max - sin2).max(0.0).sqrt();
         let direction = Frame::from_normal(axis).to_world(local);
         let factor = 2.0 * PI * one_minus_cos_max;
-        LightSamplePoint {
+        SampledLightPoint {
             direction,
             target: point + direction * (distance * (local.z - depth)),
             factor: if is_outside { factor } else { 0.0 },

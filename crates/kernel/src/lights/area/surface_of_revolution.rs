@@ -2,7 +2,7 @@
 
 use super::disk::{DiskEmitter, perpendicular};
 use super::meridians::{AzimuthDistribution, PolarFrame, SinCos};
-use super::sample_point::LightSamplePoint;
+use super::sample_point::SampledLightPoint;
 use super::{LightHit, ShapeEmitter};
 use crate::geometry::cone::Cone;
 use crate::geometry::cylinder::Cylinder;
@@ -52,7 +52,7 @@ struct RevolutionView<V> {
 impl<S: RevolutionSide> ShapeEmitter for CappedRevolutionEmitter<S> {
     /// Samples nearly uniformly over the solid angle. The density varies between meridians, and it varies by
     /// up to 20 % on a cap.
-    fn sample(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
+    fn sample(&self, point: Vec3, u: [f32; 2]) -> SampledLightPoint {
         let view = self.view_from(point);
         let side_probability = view.side_probability as f32;
         let (direction, distance, factor) = match (view.side, view.cap) {
@@ -70,10 +70,10 @@ impl<S: RevolutionSide> ShapeEmitter for CappedRevolutionEmitter<S> {
                 let (direction, distance, factor) = cap.sample(normal, [rest.min(1.0_f32.next_down()), u[1]]);
                 (direction, distance, factor / f64::from(1.0 - side_probability))
             }
-            (_, None) => return LightSamplePoint::NOTHING,
+            (_, None) => return SampledLightPoint::NOTHING,
         };
         let direction = direction.as_vec3();
-        LightSamplePoint { direction, target: point + direction * distance as f32, factor: factor as f32 }
+        SampledLightPoint { direction, target: point + direction * distance as f32, factor: factor as f32 }
     }
 
     fn pdf(&self, from: Vec3, hit: &LightHit) -> f32 {

@@ -2,7 +2,7 @@
 //! angle.
 
 use super::quad::QuadEmitter;
-use super::sample_point::LightSamplePoint;
+use super::sample_point::SampledLightPoint;
 use super::{LightHit, ShapeEmitter};
 use crate::lights::tree::bounds::mean_channel;
 use crate::math::{DVec3, Vec3};
@@ -38,7 +38,7 @@ const MAX_TEXTURE_PROBABILITY: f64 = 0.9;
 impl ShapeEmitter for TexturedQuadEmitter {
     /// Samples according to the texture or by solid angle.
     #[inline(always)]
-    fn sample(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
+    fn sample(&self, point: Vec3, u: [f32; 2]) -> SampledLightPoint {
         let by_texture = u[0] < self.texture_probability;
         let (before, probability) = if by_texture {
             (0.0, self.texture_probability)
@@ -61,13 +61,13 @@ impl ShapeEmitter for TexturedQuadEmitter {
             let density = self.texture_probability * cell_factor / by_area
                 + (1.0 - self.texture_probability) * quad_pdf;
             let factor = if by_area > 0.0 { 1.0 / density } else { 0.0 };
-            return LightSamplePoint { direction, target: point + offset, factor };
+            return SampledLightPoint { direction, target: point + offset, factor };
         }
         if !(own.factor > 0.0) {
-            return LightSamplePoint { factor: 0.0, ..own };
+            return SampledLightPoint { factor: 0.0, ..own };
         }
         let density = self.mixture_pdf(own.target - point, to_corner, 1.0 / own.factor);
-        LightSamplePoint { factor: 1.0 / density, ..own }
+        SampledLightPoint { factor: 1.0 / density, ..own }
     }
 
     fn pdf(&self, from: Vec3, hit: &LightHit) -> f32 {

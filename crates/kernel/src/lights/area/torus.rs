@@ -6,7 +6,7 @@ use std::f64::consts::PI;
 use super::disk::perpendicular;
 use super::meridians::SinCos;
 use super::piecewise_linear::PiecewiseLinear;
-use super::sample_point::LightSamplePoint;
+use super::sample_point::SampledLightPoint;
 use super::{LightHit, ShapeEmitter};
 use crate::geometry::RayF64;
 use crate::geometry::torus::Torus;
@@ -85,21 +85,21 @@ struct SlicePoint {
 impl ShapeEmitter for TorusEmitter {
     /// Samples a direction toward the front of the torus. If a ray in this direction enters the torus twice,
     /// the pdf includes both hits. The sample is the nearer hit, so the torus never occludes it.
-    fn sample(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
-        let Some(view) = TorusView::new(&self.torus, point) else { return LightSamplePoint::NOTHING };
+    fn sample(&self, point: Vec3, u: [f32; 2]) -> SampledLightPoint {
+        let Some(view) = TorusView::new(&self.torus, point) else { return SampledLightPoint::NOTHING };
         let slices = view.slice_distribution();
         let side = 2.0 * f64::from(u[0]) - 1.0;
         let (share, density) = slices.sample(side.abs());
         let tau = share * view.reach;
         let turn = libm::sinh(tau) / view.closeness;
         let Some(slice) = view.slice(SinCos::from_radians(turn.copysign(side))) else {
-            return LightSamplePoint::NOTHING;
+            return SampledLightPoint::NOTHING;
         };
         let (sine, in_slice) = slice.elevation_distribution(&view).sample(f64::from(u[1]));
         let place = slice.near_intersection(&view, slice.slice_tangent_from_elevation_sine(2.0 * sine - 1.0));
         let own = view.to_density_over_angle(density, tau) * 0.5 * in_slice / place.factor;
         if !(own > 0.0) {
-            return LightSamplePoint::NOTHING;
+            return SampledLightPoint::NOTHING;
         }
         let offset = view.offset_to_slice_point(&slice, &place);
         let direction = offset.normalize();
@@ -108,7 +108,7 @@ impl ShapeEmitter for TorusEmitter {
         let (density, distance) =
             first.map_or((own, offset.length()), |first| (densities.max(0.5 * own), first));
         let direction = direction.as_vec3();
-        LightSamplePoint {
+        SampledLightPoint {
             direction,
             target: point + direction * distance as f32,
             factor: (1.0 / density) as f32,

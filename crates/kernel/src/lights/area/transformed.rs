@@ -1,6 +1,6 @@
 //! Light sampling of shapes under an affine transform.
 
-use super::sample_point::LightSamplePoint;
+use super::sample_point::SampledLightPoint;
 use super::{Emitter, LightHit, ShapeEmitter, flat_normal};
 use crate::geometry::transformed::TransformedShape;
 use crate::math::{DVec3, Vec3};
@@ -17,16 +17,16 @@ pub struct TransformedEmitter {
 }
 
 impl ShapeEmitter for TransformedEmitter {
-    fn sample(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
-        let Some(point) = self.local_point_if_in_front(point) else { return LightSamplePoint::NOTHING };
+    fn sample(&self, point: Vec3, u: [f32; 2]) -> SampledLightPoint {
+        let Some(point) = self.local_point_if_in_front(point) else { return SampledLightPoint::NOTHING };
         let local = self.emitter.sample(point, u);
         let to_world = &self.transformed.to_world;
         let offset = to_world.vector(local.direction.as_dvec3());
         let length = offset.length();
         if !(local.factor > 0.0 && length > 0.0) {
-            return LightSamplePoint::NOTHING;
+            return SampledLightPoint::NOTHING;
         }
-        LightSamplePoint {
+        SampledLightPoint {
             direction: (offset / length).as_vec3(),
             target: to_world.point(local.target.as_dvec3()).as_vec3(),
             factor: (f64::from(local.factor) * self.solid_angle_scale(length)) as f32,

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use super::sample_point::LightSamplePoint;
+use super::sample_point::SampledLightPoint;
 use super::{LightHit, ShapeEmitter};
 use crate::geometry::triangle::Triangle;
 use crate::math::{DVec3, Vec2, Vec3};
@@ -33,9 +33,9 @@ struct SphericalTriangle {
 
 impl ShapeEmitter for TriangleEmitter {
     /// Samples uniformly over the solid angle, or over the area for small solid angles.
-    fn sample(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
+    fn sample(&self, point: Vec3, u: [f32; 2]) -> SampledLightPoint {
         let Some((offsets, spherical)) = self.spherical_triangle(point.as_dvec3()) else {
-            return LightSamplePoint::NOTHING;
+            return SampledLightPoint::NOTHING;
         };
         let (direction, distance, factor) = if spherical.has_accurate_solid_angle() {
             let direction = spherical.sample(u.map(f64::from));
@@ -51,7 +51,7 @@ impl ShapeEmitter for TriangleEmitter {
             (direction, distance, -direction.dot(self.normal) * self.area / (distance * distance))
         };
         let direction = direction.as_vec3();
-        LightSamplePoint { direction, target: point + direction * distance as f32, factor: factor as f32 }
+        SampledLightPoint { direction, target: point + direction * distance as f32, factor: factor as f32 }
     }
 
     fn pdf(&self, from: Vec3, hit: &LightHit) -> f32 {
@@ -59,7 +59,7 @@ impl ShapeEmitter for TriangleEmitter {
             Some((_, spherical)) if spherical.has_accurate_solid_angle() => {
                 (1.0 / spherical.solid_angle) as f32
             }
-            Some(_) => hit.uniform_area_pdf(self.area),
+            Some(_) => hit.uniform_area_solid_angle_pdf(self.area),
             None => 0.0,
         }
     }

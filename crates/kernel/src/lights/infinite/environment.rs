@@ -7,7 +7,7 @@ use super::InfiniteLight;
 use super::environment_map::EnvironmentMap;
 use super::sky::{SkyDome, SkyFrame};
 use crate::lights::packet::LightSamplePacket;
-use crate::lights::sample::{LightGeometry, LightSample, ShadowRayEnd};
+use crate::lights::sample::{LightSample, LightSceneGeometry, ShadowRayEnd};
 use crate::lights::tree::bounds::{DistanceFalloff, EmissionCone, LightBounds, mean_channel};
 use crate::math::frame::Frame;
 use crate::math::lanes::{F32x16, PACKET_SIZE, Vec3x16, lane, set_lane};
@@ -172,7 +172,7 @@ impl Environment {
             let weight = lane(&weights, i) * inverse_pdfs[i];
             set_lane(&mut weights, i, weight);
         }
-        let dark = LightSamplePacket::black(LightGeometry::Nothing);
+        let dark = LightSamplePacket::black(LightSceneGeometry::Nothing);
         LightSamplePacket {
             directions,
             weights,
@@ -216,7 +216,7 @@ impl Environment {
             end: ShadowRayEnd::Beyond,
             direction,
             weight,
-            source: LightGeometry::Nothing,
+            source: LightSceneGeometry::Nothing,
         })
     }
 }

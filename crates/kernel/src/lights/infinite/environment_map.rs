@@ -131,7 +131,7 @@ impl EnvironmentMap {
     #[inline(always)]
     fn direction_in_cell(&self, column: f32, row: usize, along: [f32; 2], turn: f32) -> (Vec3, f32) {
         let extent = self.heights[row + 1] - self.heights[row];
-        self.direction_at_height(
+        self.direction_and_vertical_fraction(
             column,
             row as f32,
             self.heights[row] + extent * f64::from(along[1]),
@@ -143,7 +143,14 @@ impl EnvironmentMap {
     /// Unit direction at the height `y` and at a fraction `along` of a cell's azimuth range. Also returns the
     /// vertical fraction, measured in angle.
     #[inline(always)]
-    fn direction_at_height(&self, column: f32, row: f32, y: f64, along: f32, turn: f32) -> (Vec3, f32) {
+    fn direction_and_vertical_fraction(
+        &self,
+        column: f32,
+        row: f32,
+        y: f64,
+        along: f32,
+        turn: f32,
+    ) -> (Vec3, f32) {
         let across = ((1.0 - y) * (1.0 + y)).max(0.0).sqrt() as f32;
         let turns = (column + 0.5 + along) / self.texels.width as f32 - 0.5 - turn;
         let (sin, cos) = sin_cos(2.0 * PI * turns);
@@ -174,8 +181,13 @@ impl EnvironmentMap {
             let luminances = luminances_of_four_corners(&corners);
             let along = warp::bilinear([rest[0][i], rest[1][i]], &luminances);
             let y = tops[i] + extents[i] * f64::from(along[1]);
-            let (direction, down) =
-                self.direction_at_height(columns[i] as i32 as f32, rows[i] as i32 as f32, y, along[0], turn);
+            let (direction, down) = self.direction_and_vertical_fraction(
+                columns[i] as i32 as f32,
+                rows[i] as i32 as f32,
+                y,
+                along[0],
+                turn,
+            );
             set_lane(&mut directions, i, direction);
             set_lane(&mut colors, i, interpolate_bilinear(&corners, [along[0], down]));
             pdfs[i] *= relative_pdf_in_cell(&luminances, along);

@@ -102,7 +102,7 @@ impl PhotonTargets {
 
     /// Area density at a point if points are sampled uniformly on the disks of
     /// [`PhotonTargets::pick_by_cross_section`]. `is_on` returns whether the point is on a disk.
-    pub fn cross_section_pdf(&self, is_on: impl Fn(&BoundingSphere) -> bool) -> f64 {
+    pub fn area_pdf_on_disks(&self, is_on: impl Fn(&BoundingSphere) -> bool) -> f64 {
         // Disks are chosen with probabilities proportional to their areas, so each one contributes the same
         // density.
         self.balls.iter().filter(|ball| is_on(ball)).count() as f64 / self.total_disk_area()

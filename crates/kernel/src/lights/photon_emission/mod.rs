@@ -343,7 +343,7 @@ impl PhotonEmitter {
                 let (x, y) = (x - middle.dot(s), y - middle.dot(t));
                 x * x + y * y <= ball.radius * ball.radius
             };
-            aim.targets.cross_section_pdf(is_on) * (PI * radius * radius)
+            aim.targets.area_pdf_on_disks(is_on) * (PI * radius * radius)
         });
         let start = PhotonOrigin::Beyond((center + s * x + t * y + n * radius).as_vec3());
         let flux = (irradiance.as_dvec3() * (PI * radius * radius)).as_vec3();

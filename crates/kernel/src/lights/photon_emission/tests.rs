@@ -18,8 +18,8 @@ use crate::lights::infinite::sky::sun::OrientedSunDisk;
 use crate::lights::infinite::sky::{Sky, SkyFrame, SkyParameters};
 use crate::lights::infinite::{DirectionalLight, Environment, EnvironmentMap};
 use crate::lights::{
-    AreaLight, EmissionModulation, Emitter, EmittingPart, MeshEmitter, TriangleWithUvs,
-    UvMapping, front_area_light,
+    AreaLight, EmissionModulation, Emitter, EmittingPart, MeshEmitter, TriangleWithUvs, UvMapping,
+    front_area_light,
 };
 use crate::materials::texels::{TexelData, Texels};
 use crate::materials::texture::{ImageTexture, Texture, TextureFilter, TextureMapping, Wrap};

@@ -7,7 +7,7 @@ use arrayvec::ArrayVec;
 
 use super::node::{ImportanceAndNearnessPacket, NodeChild, Receiver};
 use super::{
-    CumulativeImportance, LightPick, LightTree, NOT_IN_TREE, PreviousPickPath, ROOT, clamp_below,
+    CumulativeImportance, LightPick, LightTree, NOT_IN_TREE, PreviousPickPath, ROOT, clamp_to_less_than,
     scale_u_to_total,
 };
 use crate::math::Vec3;
@@ -120,7 +120,7 @@ impl<'a> AdaptiveLightTreeCut<'a> {
                 scale = shares.total() / (self.sums[index] - before);
             }
             // Stay below the sum over the children, which is positive because the node's share is positive.
-            let part = clamp_below((target - before) * scale, shares.total());
+            let part = clamp_to_less_than((target - before) * scale, shares.total());
             let child = shares.find_child(part);
             let probability = self.child_probability(index, child, inverse);
             match self.tree.nodes[self.nodes[index] as usize].children[child] {

@@ -222,12 +222,12 @@ fn add_shifted_lanes<const STEP: usize>(sums: &[f64; PACKET_SIZE]) -> [f64; PACK
 /// position past the last interval.
 #[inline(always)]
 fn scale_u_to_total(u: f64, total: f64) -> f64 {
-    clamp_below(u * total, total)
+    clamp_to_less_than(u * total, total)
 }
 
 /// Limits `part` to less than `total`.
 #[inline(always)]
-fn clamp_below(part: f64, total: f64) -> f64 {
+fn clamp_to_less_than(part: f64, total: f64) -> f64 {
     let last = total.next_down();
     if part < last { part } else { last }
 }

@@ -27,7 +27,7 @@ pub struct LightPickPacket {
 impl LightTree {
     /// Importance of the tree's lights for a packet of points, or `None` if the tree has more than one node.
     #[inline(always)]
-    pub fn single_node_importance(
+    pub fn importance_if_single_node(
         &self,
         receivers: &ReceiverPacket,
         has_lobes: bool,
@@ -50,7 +50,7 @@ impl LightTree {
     }
 }
 
-/// Kernel of [`LightTree::single_node_importance`].
+/// Kernel of [`LightTree::importance_if_single_node`].
 struct ImportanceKernel<'a, 'b> {
     node: &'a LightTreeNode,
     receivers: &'b ReceiverPacket,
@@ -77,7 +77,7 @@ impl<'a> SimdKernel for ImportanceKernel<'a, '_> {
 impl SingleNodeLightImportances<'_> {
     /// Picks a light for each point. `u` is in [0, 1).
     #[inline(always)]
-    pub fn pick(&self, u: &[f64; PACKET_SIZE]) -> LightPickPacket {
+    pub fn pick_packet(&self, u: &[f64; PACKET_SIZE]) -> LightPickPacket {
         let mut targets = [0.0; PACKET_SIZE];
         for i in 0..PACKET_SIZE {
             // Stay below the total to avoid rounding past the last child with nonzero importance.

@@ -12,9 +12,7 @@ use crate::geometry::sphere::Sphere;
 use crate::geometry::triangle::Triangle;
 use crate::lights::delta::{Falloff, PointLight, SpotLight};
 use crate::lights::infinite::{DirectionalLight, Environment};
-use crate::lights::{
-    AreaLight, Emitter, EmittingPart, Light, Lights, MeshEmitter, Side, front_area_light,
-};
+use crate::lights::{AreaLight, Emitter, EmittingPart, Light, Lights, MeshEmitter, Side, front_area_light};
 use crate::math::lanes::PortableSimd;
 use crate::math::{DVec3, Vec3, random};
 
@@ -395,9 +393,10 @@ fn packet_picks_match_single_picks() {
             for (i, receiver) in receivers.iter().enumerate() {
                 receiver.lobe.iter().for_each(|lobe| row.set_lobe(i, lobe));
             }
-            let shares = tree.single_node_importance(&row, round % 2 == 0, PortableSimd).expect("one node");
+            let shares =
+                tree.importance_if_single_node(&row, round % 2 == 0, PortableSimd).expect("one node");
             let numbers: [f64; PACKET_SIZE] = std::array::from_fn(|_| f64::from(next()));
-            let picks = shares.pick(&numbers);
+            let picks = shares.pick_packet(&numbers);
             assert_eq!(shares.pick_probabilities(&picks), picks.probabilities);
             for (i, receiver) in receivers.iter().enumerate() {
                 let alone = tree.pick(receiver, numbers[i]);
@@ -414,7 +413,7 @@ fn packet_picks_match_single_picks() {
                 // Summing in a different order may shift a number to the next light.
                 picked += u32::from(alone.light == picks.lights[i]);
             }
-            let greatest = shares.pick(&[1.0_f64.next_down(); PACKET_SIZE]);
+            let greatest = shares.pick_packet(&[1.0_f64.next_down(); PACKET_SIZE]);
             for (i, receiver) in receivers.iter().enumerate() {
                 let own = tree.probability(receiver, greatest.lights[i]);
                 assert_eq!(greatest.probabilities[i] > 0.0, own > 0.0, "last contributing light");
@@ -456,7 +455,7 @@ fn mesh_pdf_matches_its_samples() {
             let (point, normal) = place(&mut next);
             let Some(sample) = light.sample(point, normal, [next(), next()]) else { continue };
             let crate::lights::ShadowRayEnd::At(target) = sample.end else { panic!("a finite light") };
-            let crate::lights::LightGeometry::Primitive(4, primitive) = sample.source else {
+            let crate::lights::LightSceneGeometry::Primitive(4, primitive) = sample.source else {
                 panic!("expected a triangle")
             };
             let Emitter::Mesh(mesh) = &light.shape else { panic!("a mesh") };

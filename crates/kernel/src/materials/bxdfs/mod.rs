@@ -33,7 +33,7 @@ use crate::materials::bsdf::{
 use crate::materials::bxdf::{Bxdf, ShadingGeometry, lobe_shading_normal};
 use crate::materials::bxdf_packet::BxdfPacket;
 use crate::materials::footprint::TexturePoint;
-use crate::materials::lookup::{MaterialTextureCollector, PointLookup, WhiteLookup};
+use crate::materials::lookup::{MaterialTextureCollector, PointTextureEvaluator, WhiteLookup};
 use crate::materials::texture::{ColorOrTexture, Texture};
 use crate::math::Vec3;
 use crate::math::lanes::{F32x16, Mask, Simd, Vec3x16};
@@ -90,7 +90,7 @@ macro_rules! kinds {
             /// Looks up the textures at a point. Counts texture lookups in `lookups`.
             #[inline(always)]
             pub fn evaluate_textures(&self, point: &TexturePoint, lookups: &mut u64) -> BxdfPoint {
-                let lookup = &mut PointLookup { point, lookups };
+                let lookup = &mut PointTextureEvaluator { point, lookups };
                 match self { $(Self::$kind(material) => BxdfPoint::$kind(material.look_up_parameters(lookup))),+ }
             }
 
@@ -102,16 +102,16 @@ macro_rules! kinds {
 
             /// The material's main color. Counts texture lookups in `lookups`.
             #[inline]
-            pub fn albedo(&self, point: &TexturePoint, lookups: &mut u64) -> Vec3 {
-                let lookup = &mut PointLookup { point, lookups };
-                match self { $(Self::$kind(material) => material.albedo(lookup)),+ }
+            pub fn main_color(&self, point: &TexturePoint, lookups: &mut u64) -> Vec3 {
+                let lookup = &mut PointTextureEvaluator { point, lookups };
+                match self { $(Self::$kind(material) => material.main_color(lookup)),+ }
             }
 
             /// Reflectance for ambient light. Counts texture lookups in `lookups`.
             #[inline]
             pub fn look_up_ambient(&self, point: &TexturePoint, lookups: &mut u64) -> Vec3 {
-                let lookup = &mut PointLookup { point, lookups };
-                match self { $(Self::$kind(material) => material.ambient(lookup)),+ }
+                let lookup = &mut PointTextureEvaluator { point, lookups };
+                match self { $(Self::$kind(material) => material.look_up_ambient_reflectance(lookup)),+ }
             }
 
             /// Collects all textures by use.
@@ -121,10 +121,10 @@ macro_rules! kinds {
                 textures
             }
 
-            /// [`BxdfMaterial::color_for_packet_lookup`].
+            /// [`BxdfMaterial::color_to_look_up`].
             #[inline]
             fn packet_color_parameter(&self) -> Option<&ColorOrTexture> {
-                match self { $(Self::$kind(material) => material.color_for_packet_lookup()),+ }
+                match self { $(Self::$kind(material) => material.color_to_look_up()),+ }
             }
 
             /// [`BxdfMaterial::is_anisotropic`].
@@ -252,7 +252,7 @@ macro_rules! kinds {
             ) -> u32 {
                 $(if let (Self::$kind(row), NonSpecular::$kind(material)) = (&mut *self, material) {
                     let point = material.look_up_parameters(&mut WhiteLookup);
-                    let texture = material.color_for_packet_lookup().and_then(ColorOrTexture::texture);
+                    let texture = material.color_to_look_up().and_then(ColorOrTexture::texture);
                     return row.evaluate_material_into_lanes(&point, texture.map(|texture| &**texture).zip(uv), shown, simd);
                 })+
                 0

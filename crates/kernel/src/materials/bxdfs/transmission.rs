@@ -9,7 +9,9 @@ impl BxdfPoint {
     #[inline(always)]
     pub fn bsdf_for_transmitted_light(&self) -> Option<Self> {
         match self {
-            Self::DielectricReflection(glass) | Self::BeckmannReflection(glass) => Some(glass.transmission()),
+            Self::DielectricReflection(glass) | Self::BeckmannReflection(glass) => {
+                Some(glass.transmission_bxdf())
+            }
             Self::Principled(point) => point.transmits().then_some(Self::PrincipledTransmission(*point)),
             Self::TranslucentPhong(point) => point.transmits().then_some(Self::PhongTransmission(*point)),
             Self::CoatedPrincipled(point) => {

@@ -82,7 +82,7 @@ impl ImageTexture {
     /// treated as 0.
     pub fn lookup(&self, at: &TexturePoint) -> Vec3 {
         let tiles = self.mapping.point(at);
-        let value = self.lookup_transformed_uv(tiles, || self.mip_level(at));
+        let value = self.lookup_transformed_uv(tiles, || self.fractional_mip_level(at));
         self.factor.map_or(value, |factor| factor.apply(value))
     }
 
@@ -103,7 +103,9 @@ impl ImageTexture {
     pub fn slopes(&self, at: &TexturePoint) -> Vec2 {
         let tiles = self.mapping.point(at);
         let level = match (self.filter, &self.mipmaps) {
-            (TextureFilter::Mipmap, Some(mipmaps)) => self.mip_level(at).min(mipmaps.count() as f32),
+            (TextureFilter::Mipmap, Some(mipmaps)) => {
+                self.fractional_mip_level(at).min(mipmaps.reduced_level_count() as f32)
+            }
             (TextureFilter::Mipmap | TextureFilter::Nearest | TextureFilter::Bilinear, _) => 0.0,
         };
         // Look up on both sides, along the axes of the image.
@@ -135,7 +137,7 @@ impl ImageTexture {
     #[inline(always)]
     pub fn lookup_packet(&self, uv: &[[f64; PACKET_SIZE]; 2]) -> Vec3x16 {
         let mut row = match &self.mapping.moved {
-            None => self.lookup_packet_at_scaled_uv(uv, self.mapping.repeat.as_dvec2()),
+            None => self.lookup_packet_with_repeat(uv, self.mapping.repeat.as_dvec2()),
             Some(_) => self.transform_and_lookup_packet(uv),
         };
         if let Some(factor) = self.factor {
@@ -151,12 +153,12 @@ impl ImageTexture {
     #[cold]
     #[inline(never)]
     fn transform_and_lookup_packet(&self, uv: &[[f64; PACKET_SIZE]; 2]) -> Vec3x16 {
-        self.lookup_packet_at_scaled_uv(&self.mapping.map_packet(uv), DVec2::ONE)
+        self.lookup_packet_with_repeat(&self.mapping.map_packet(uv), DVec2::ONE)
     }
 
     /// [`ImageTexture::lookup_packet`] at coordinates scaled by `repeat`.
     #[inline(always)]
-    fn lookup_packet_at_scaled_uv(&self, uv: &[[f64; PACKET_SIZE]; 2], repeat: DVec2) -> Vec3x16 {
+    fn lookup_packet_with_repeat(&self, uv: &[[f64; PACKET_SIZE]; 2], repeat: DVec2) -> Vec3x16 {
         let (texels, size) = (&*self.texels, float_size(&self.texels));
         let folded = [
             self.wrap.repeat_and_fold_packet(&uv[0], repeat.x),
@@ -211,7 +213,7 @@ impl ImageTexture {
 
     /// Mean of the image. This is the mean of the texture if a whole number of tiles fits into [0, 1]².
     pub fn mean(&self) -> Vec3 {
-        let last = self.mipmaps.as_ref().and_then(|mipmaps| mipmaps.level(mipmaps.count()));
+        let last = self.mipmaps.as_ref().and_then(|mipmaps| mipmaps.level(mipmaps.reduced_level_count()));
         let mean = last.map_or_else(|| self.texels.mean(), |last| last.get(0, 0));
         match self.factor {
             // Texels below 0 are clamped before they are averaged.
@@ -224,7 +226,7 @@ impl ImageTexture {
     }
 
     /// The mip level at which the footprint is one texel wide. It is nonnegative, and may be fractional.
-    fn mip_level(&self, at: &TexturePoint) -> f32 {
+    fn fractional_mip_level(&self, at: &TexturePoint) -> f32 {
         let texels = self.mapping.major_axis_length(at, float_size(&self.texels));
         if texels > 1.0 { log2(texels) } else { 0.0 }
     }
@@ -253,7 +255,7 @@ impl ImageTexture {
     #[inline(always)]
     fn adjacent_levels(&self, level: f32) -> Option<(&Texels, &Texels, f32)> {
         let mipmaps = self.mipmaps.as_ref().filter(|_| level > 0.0)?;
-        let level = level.min(mipmaps.count() as f32);
+        let level = level.min(mipmaps.reduced_level_count() as f32);
         let number = level as usize;
         let of = |number: usize| match number {
             0 => &*self.texels,
@@ -269,7 +271,7 @@ impl ImageTexture {
         let folded =
             [self.wrap.fold(finite_or_zero(tiles.x)) as f32, self.wrap.fold(finite_or_zero(tiles.y)) as f32];
         let cut = |value: f32| f32::from(u8::from(value >= cutoff));
-        let Some((near, far, part)) = self.adjacent_levels(self.mip_level(at)) else {
+        let Some((near, far, part)) = self.adjacent_levels(self.fractional_mip_level(at)) else {
             return cut(self.bilinear(&self.texels, folded).x);
         };
         let of = |texels: &Texels| {

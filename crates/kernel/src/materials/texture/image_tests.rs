@@ -193,7 +193,7 @@ fn levels(image: &Texels) -> Option<Arc<Mipmaps>> {
     let halved = |level: &Texels| -> Result<Texels, ()> {
         let halving = ImageHalver::new(level);
         let mut rows = halving.allocate_halved_rows();
-        (0..halving.halved_height()).for_each(|y| halving.append_row(y, &mut rows));
+        (0..halving.halved_height()).for_each(|y| halving.append_halved_row(y, &mut rows));
         Ok(halving.assemble_image(rows))
     };
     Mipmaps::build(image, halved).ok().map(Arc::new)

@@ -71,7 +71,7 @@ impl Noise {
     }
 
     /// Gradient of the noise in the shape's own coordinates, filtered as the value is.
-    pub fn gradient(&self, at: &TexturePoint, is_filtered: bool) -> Vec3 {
+    pub fn value_gradient(&self, at: &TexturePoint, is_filtered: bool) -> Vec3 {
         let (position, width) = object_position_and_width(at, is_filtered);
         let mut gradient = Vec3::ZERO;
         for octave in self.octaves(width).filter(|octave| octave.fade > 0.0) {
@@ -155,7 +155,7 @@ impl Cell {
 
     /// The noise, in [−1, 1].
     fn value(&self) -> f32 {
-        SCALE * blend(self.ramps(), self.at.to_array().map(quintic))
+        SCALE * interpolate_trilinearly(self.ramps(), self.at.to_array().map(quintic))
     }
 
     /// Derivatives of the noise with respect to the coordinates in the cell.
@@ -163,11 +163,11 @@ impl Cell {
         let (ramps, weights) = (self.ramps(), self.at.to_array().map(quintic));
         // The blended gradients of the ramps, and the ramps times the derivatives of their weights.
         let derivative = |axis: usize| {
-            let blended = blend(self.gradients.map(|gradient| gradient[axis]), weights);
+            let blended = interpolate_trilinearly(self.gradients.map(|gradient| gradient[axis]), weights);
             let at_end = |end: f32| {
                 let mut weights = weights;
                 weights[axis] = end;
-                blend(ramps, weights)
+                interpolate_trilinearly(ramps, weights)
             };
             blended + quintic_derivative(self.at[axis]) * (at_end(1.0) - at_end(0.0))
         };
@@ -176,7 +176,7 @@ impl Cell {
 }
 
 /// Interpolates between the corners of a cell. The weights apply to the upper corners along each axis.
-fn blend(corners: [f32; 8], [x, y, z]: [f32; 3]) -> f32 {
+fn interpolate_trilinearly(corners: [f32; 8], [x, y, z]: [f32; 3]) -> f32 {
     let mix = |a: f32, b: f32, t: f32| a + (b - a) * t;
     let along_x: [f32; 4] = std::array::from_fn(|i| mix(corners[2 * i], corners[2 * i + 1], x));
     mix(mix(along_x[0], along_x[1], y), mix(along_x[2], along_x[3], y), z)
@@ -289,7 +289,7 @@ mod tests {
         let step = 1e-3;
         let noise = Noise { size: 0.7, octaves: 3, seed: 9 };
         for at in points(300) {
-            let gradient = noise.gradient(&point(at, 0.0), true);
+            let gradient = noise.value_gradient(&point(at, 0.0), true);
             let change = |axis: DVec3| {
                 (value(&noise, at + axis * step) - value(&noise, at - axis * step)) / (2.0 * step) as f32
             };
@@ -305,7 +305,7 @@ mod tests {
             let face = DVec3::new(at.x.round() * 0.5, at.y, at.z);
             let [before, beyond] = [-1e-7, 1e-7].map(|step| {
                 let at = face + DVec3::X * step;
-                (noise.gradient(&point(at, 0.0), false), value(&noise, at))
+                (noise.value_gradient(&point(at, 0.0), false), value(&noise, at))
             });
             assert!((before.0 - beyond.0).length() < 1e-4, "{face}: {before:?} {beyond:?}");
             assert!((before.1 - beyond.1).abs() < 1e-5, "{face}: {before:?} {beyond:?}");
@@ -353,7 +353,7 @@ mod tests {
         for bad in [f64::NAN, f64::INFINITY, -1e300, 1e18, -0.0] {
             let at = DVec3::new(bad, 0.25, bad);
             assert!(value(&octaves(4), at).abs() <= 1.0, "{bad}");
-            assert!(octaves(4).gradient(&point(at, 0.0), false).is_finite(), "{bad}");
+            assert!(octaves(4).value_gradient(&point(at, 0.0), false).is_finite(), "{bad}");
         }
     }
 }

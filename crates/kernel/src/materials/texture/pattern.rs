@@ -83,7 +83,7 @@ impl Pattern {
             Self::Checker(checker) => HeightSlopes::AlongUv(checker.slopes(at, is_filtered)),
             Self::Bands(bands) => HeightSlopes::AlongUv(bands.slopes(at, is_filtered)),
             Self::Noise(noise) => {
-                let gradient = noise.gradient(at, is_filtered).as_dvec3() * 0.5;
+                let gradient = noise.value_gradient(at, is_filtered).as_dvec3() * 0.5;
                 let to_world = |object: &ObjectPoint| (object.from_world.transpose() * gradient).as_vec3();
                 HeightSlopes::World(at.object_point().map_or(Vec3::ZERO, to_world))
             }

@@ -70,7 +70,7 @@ pub(super) fn convert(
     let encode = |(name, content)| {
         let bytes = match content {
             GltfPartOrImage::Part(part) => {
-                write::encode_ply(&container.build_part(part, &ignore_progress, token)?.mesh)
+                write::encode_ply(&container.build_part_mesh(part, &ignore_progress, token)?.mesh)
             }
             GltfPartOrImage::Image(image) => {
                 // Check the content. Otherwise, a malicious glTF file could make the import copy arbitrary
@@ -154,9 +154,9 @@ struct SceneBuilder<'a> {
 impl SceneBuilder<'_> {
     fn add_all(&mut self, scene: &ModelScene, bounds: [DVec3; 2], view: ModelViewOptions) {
         // Describe the model and its approximations.
-        self.document.add_comment(format!("{}, as glimt shows it.", file_name(self.path)));
+        self.document.add_comment_above_next_table(format!("{}, as glimt shows it.", file_name(self.path)));
         for note in &scene.notes {
-            self.document.add_comment(note);
+            self.document.add_comment_above_next_table(note);
         }
         // Add the render settings, the camera and the lights.
         let own = scene.cameras.first().filter(|_| view.from.is_none());
@@ -189,7 +189,8 @@ impl SceneBuilder<'_> {
         };
         add_sky_and_key_light(&mut self.document, &eye, lighting);
         if !scene.lights.is_empty() {
-            self.document.add_comment("1 cd in the file is treated as 1 W/sr, and 1 lx as 1 W/m².");
+            self.document
+                .add_comment_above_next_table("1 cd in the file is treated as 1 W/sr, and 1 lx as 1 W/m².");
         }
         scene.lights.iter().for_each(|light| self.add_light(light));
         // Add the materials, then the meshes that use them.
@@ -247,7 +248,7 @@ impl SceneBuilder<'_> {
             }
         }
         self.document.set("material", material.to_owned());
-        self.add_placement(&instance.placed.linear, instance.placed.translate);
+        self.add_placement_keys(&instance.placed.linear, instance.placed.translate);
         if !instance.has_normals {
             self.document.set("smooth", false);
         }
@@ -257,7 +258,7 @@ impl SceneBuilder<'_> {
     }
 
     /// Adds the placement as `scale` and `translate` if possible, and as `matrix` if not.
-    fn add_placement(&mut self, linear: &DMat3, translate: DVec3) {
+    fn add_placement_keys(&mut self, linear: &DMat3, translate: DVec3) {
         let scale = DVec3::new(linear.x_axis.x, linear.y_axis.y, linear.z_axis.z);
         if *linear == DMat3::from_diagonal(scale) {
             if scale != DVec3::ONE {

@@ -43,12 +43,12 @@ pub(crate) fn create_header(
     identity: Vec<NamedRenderInput>,
     finish: &FilmEncodingSettings,
 ) -> PartHeader {
-    let share = part_index_and_blocks(state.share.as_ref());
+    let share = to_part_share(state.share.as_ref());
     let (picture, scene) = (ImageHeader::from_film(&state.film, finish), String::new());
     PartHeader { kind, identity, share, picture, scene, references: Vec::new() }
 }
 
-fn part_index_and_blocks(share: Option<&Shard>) -> PartShare {
+fn to_part_share(share: Option<&Shard>) -> PartShare {
     match share {
         Some(share) => PartShare {
             index: share.index,
@@ -234,7 +234,7 @@ impl<'a> Checkpointer<'a> {
         }
         let Some((head, there)) = read_checkpoint_header_and_state(&self.path) else {
             return match PartFile::read_header(&self.path) {
-                Err(PartError::Version { .. }) => self.move_aside_unless_shorter(|_| false),
+                Err(PartError::Version { .. }) => self.back_up_unless_backup_is_longer(|_| false),
                 Ok(head) if head.kind == PartOrCheckpoint::Part => {
                     Err(finished_part_conflict_message(&self.path))
                 }
@@ -260,14 +260,14 @@ impl<'a> Checkpointer<'a> {
         let is_longer = |aside: &Path| {
             read_checkpoint_header_and_state(aside).is_some_and(|(_, before)| before.seconds >= there.seconds)
         };
-        self.move_aside_unless_shorter(is_longer)
+        self.back_up_unless_backup_is_longer(is_longer)
     }
 
     /// Moves the checkpoint aside, unless `is_longer` returns true for one that was moved aside earlier.
     ///
     /// # Errors
     /// Returns why it cannot be moved.
-    fn move_aside_unless_shorter(&self, is_longer: impl Fn(&Path) -> bool) -> Result<(), String> {
+    fn back_up_unless_backup_is_longer(&self, is_longer: impl Fn(&Path) -> bool) -> Result<(), String> {
         let mut aside = self.path.as_os_str().to_owned();
         aside.push(BACKUP_EXTENSION);
         let aside = PathBuf::from(aside);
@@ -334,7 +334,7 @@ impl<'a> Checkpointer<'a> {
     fn differences_from(&self, head: &PartHeader, state: &FilmState) -> Vec<String> {
         let mut unlike =
             render_input_differences(&head.identity, self.current_render_inputs(), "there", "here");
-        let share = part_index_and_blocks(state.share.as_ref());
+        let share = to_part_share(state.share.as_ref());
         let name = |share: &PartShare| match share.count {
             1 => "the whole image".to_owned(),
             count => format!("part {}/{count}", share.index),

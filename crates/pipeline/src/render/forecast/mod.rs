@@ -34,7 +34,7 @@ use crate::trace::estimate_jobs_per_pixel;
 const EXPECTATION_SHARE: u32 = 100;
 
 /// The most recent estimate of the total work.
-struct WorkEstimate {
+struct TotalWorkEstimate {
     /// Time of the next estimate.
     due: Instant,
     /// CPU seconds for the whole render, or `None` while the end is unknown.
@@ -47,7 +47,7 @@ struct WorkEstimate {
 pub(crate) struct Forecast {
     rate: WorkRate,
     noise: NoiseTracker,
-    expectation: WorkEstimate,
+    expectation: TotalWorkEstimate,
     /// Last reported fraction.
     fraction: f64,
     /// Expected final number of samples, summed over all pixels.
@@ -79,7 +79,7 @@ impl Forecast {
         Self {
             rate: WorkRate::new(state.cpu_seconds()),
             noise: NoiseTracker::new(),
-            expectation: WorkEstimate { due: Instant::now(), total: None, passes: [0; 2] },
+            expectation: TotalWorkEstimate { due: Instant::now(), total: None, passes: [0; 2] },
             fraction: 0.0,
             total_units: state.expected_total_samples(most),
             photon_seconds: 0.0,
@@ -149,7 +149,7 @@ impl Forecast {
         if Instant::now() >= self.expectation.due {
             self.expectation = estimate_total_cpu_work(moment);
         }
-        let WorkEstimate { total, passes: [passes, all_passes], .. } = self.expectation;
+        let TotalWorkEstimate { total, passes: [passes, all_passes], .. } = self.expectation;
         let done = moment.state.cpu_seconds();
         let of_pass = moment.photons.map_or(0.0, PhotonStore::mean_seconds_per_pass);
         let of_this = self.photons_since.map_or(0.0, |since| moment.elapsed_seconds - since);
@@ -182,7 +182,7 @@ fn has_predictable_convergence(moment: &RenderSnapshot<'_>) -> bool {
 }
 
 /// Estimates the total work as a sum over all cells.
-fn estimate_total_cpu_work(moment: &RenderSnapshot<'_>) -> WorkEstimate {
+fn estimate_total_cpu_work(moment: &RenderSnapshot<'_>) -> TotalWorkEstimate {
     let RenderSnapshot { state, plan, photons, .. } = moment;
     let RenderOptions { samples: most, error, .. } = plan.settings.render;
     let begin = Instant::now();
@@ -192,5 +192,5 @@ fn estimate_total_cpu_work(moment: &RenderSnapshot<'_>) -> WorkEstimate {
     let jobs = |done, end| estimate_jobs_per_pixel(done, end, pixels, at_once);
     let total = is_known.then(|| state.cpu_seconds() + state.remaining_cpu_seconds(most, jobs));
     let passes = photons.map_or([0; 2], |_| state.current_and_final_photon_passes(most));
-    WorkEstimate { due: Instant::now() + EXPECTATION_SHARE * begin.elapsed(), total, passes }
+    TotalWorkEstimate { due: Instant::now() + EXPECTATION_SHARE * begin.elapsed(), total, passes }
 }

@@ -40,7 +40,8 @@ impl NoiseTracker {
         if samples < MIN_SAMPLES || Instant::now() < self.due {
             return;
         }
-        self.last_measurement = film.image_noise().map(|noise| NoiseMeasurement { noise, done, seconds });
+        self.last_measurement =
+            film.noise_and_convergence().map(|noise| NoiseMeasurement { noise, done, seconds });
         self.due = Instant::now() + INTERVAL;
     }
 

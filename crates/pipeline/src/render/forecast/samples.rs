@@ -35,7 +35,7 @@ impl ExpectedSamples {
     /// Updates the predictions from the noise in both halves of each tile and the rate at which it decreases.
     /// `judgement.samples` is a power of two. `done` is the number of samples in each half. Predictions for
     /// halves with a goal do not change.
-    pub(crate) fn predict(
+    pub(crate) fn update_predictions(
         &mut self,
         judgement: &NoiseMeasurements,
         goals: &CellSampleGoals,
@@ -149,7 +149,7 @@ mod tests {
         let (mut goals, mut expected) = (CellSampleGoals::new_undecided(1), ExpectedSamples::unknown(1));
         let done = [[samples; 2]];
         let judgement = goals.decide_goals(&film(halves, samples), &done, samples, error).expect("samples");
-        expected.predict(&judgement, &goals, &done);
+        expected.update_predictions(&judgement, &goals, &done);
         (goals, expected)
     }
 

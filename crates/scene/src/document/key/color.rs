@@ -31,7 +31,7 @@ impl KeyInTable<'_> {
 
     /// Reads a color in double precision, because `f32` would round some values to 0 or 1.
     pub(in super::super) fn color_f64(&self) -> Option<DVec3> {
-        self.color_described_as(COLOR)
+        self.read_color_described_as(COLOR)
     }
 
     /// Reads an array of two colors and converts them to linear.
@@ -57,7 +57,7 @@ impl KeyInTable<'_> {
             return self.inline_table_texture_index(textures).map(ColorSource::Texture);
         }
         self.reject_bare_texture_name(textures, COLOR_OR_TEXTURE)?;
-        self.color_described_as(COLOR_OR_TEXTURE).map(|color| ColorSource::Constant(color.as_vec3()))
+        self.read_color_described_as(COLOR_OR_TEXTURE).map(|color| ColorSource::Constant(color.as_vec3()))
     }
 
     /// Reads the texture in `{ texture = "name" }`.
@@ -78,7 +78,7 @@ impl KeyInTable<'_> {
             return Some(EmissionSource { texture: Some(texture?), ..EmissionSource::from_constant(scale?) });
         }
         self.reject_bare_texture_name(textures, EMISSION)?;
-        self.color_described_as(EMISSION).map(|color| EmissionSource::from_constant(color.as_vec3()))
+        self.read_color_described_as(EMISSION).map(|color| EmissionSource::from_constant(color.as_vec3()))
     }
 
     /// Returns `None` and reports an error if the value is a bare texture name.
@@ -97,7 +97,7 @@ impl KeyInTable<'_> {
     }
 
     /// Reads a color. Error messages call the value's type `expected`.
-    fn color_described_as(&self, expected: &str) -> Option<DVec3> {
+    fn read_color_described_as(&self, expected: &str) -> Option<DVec3> {
         let value = self.value?;
         if let Some(Limits::Between(..)) = self.info.kind.limits()
             && self

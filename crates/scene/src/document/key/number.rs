@@ -37,7 +37,7 @@ impl KeyInTable<'_> {
         if self.is_table() {
             return self.inline_table_texture_and_channel(textures);
         }
-        let name = self.string_described_by(|| NAME_OR_TEXTURE.to_owned())?;
+        let name = self.read_string_described_by(|| NAME_OR_TEXTURE.to_owned())?;
         Some((self.resolve_name_or_report(textures, name, self.value_span())?, None))
     }
 

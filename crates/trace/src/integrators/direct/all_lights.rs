@@ -7,9 +7,9 @@ use crate::integrators::RayCounters;
 use crate::integrators::transport::batch::{BsdfValuesAndCosines, VertexBatch};
 use crate::integrators::transport::interiors::{InteriorListPool, medium_transmittance};
 use crate::integrators::transport::tile::TileContext;
-use crate::integrators::view::LightAov;
+use crate::integrators::view::PathAov;
 use crate::lights::{
-    EmissionModulation, Light, LightCenter, LightGeometry, LightGeometryPacket, LightSamplePacket,
+    EmissionModulation, Light, LightCenter, LightSamplePacket, LightSceneGeometry, LightSceneGeometryPacket,
 };
 use crate::materials::bsdf::ratio;
 use crate::math::Vec3;
@@ -29,7 +29,7 @@ pub struct SampleAllLights<'a, const MIS: bool> {
     /// Mask of vertices to light.
     pub used: u32,
     /// The AOV to compute.
-    pub aov: LightAov,
+    pub aov: PathAov,
     /// Technique that competes with light samples. Unused if `MIS` is false.
     pub competing: CompetingTechnique,
     /// Media at the vertices, or `None` if all vertices are in air.
@@ -113,9 +113,9 @@ impl LightSums {
 
     /// Returns the reflected light or, for that AOV, the lit fraction.
     #[inline(always)]
-    pub fn reflected_light_for_aov(&self, aov: LightAov) -> ReflectedDirectLightPacket {
+    pub fn reflected_light_for_aov(&self, aov: PathAov) -> ReflectedDirectLightPacket {
         let mut light = self.light;
-        if aov == LightAov::LitFraction {
+        if aov == PathAov::LitFraction {
             for i in 0..PACKET_SIZE {
                 let share = if self.total[i] > 0.0 { self.light[0][i] / self.total[i] } else { 0.0 };
                 set_lane(&mut light, i, Vec3::splat(share));
@@ -210,7 +210,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
                         self.competing.adjust_wide_fraction(fraction, &unweighted, &values);
                     }
                 }
-                self.trace_samples_or_accumulate_pending(
+                self.add_or_defer_samples(
                     &samples,
                     (&values, fraction.as_ref()),
                     active,
@@ -261,9 +261,9 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
             let (target, direction) = (lane(&samples.targets, i), lane(&samples.directions, i));
             let color = pattern.radiance_factor(target, samples.sources.part[i], direction);
             let color = match self.aov {
-                LightAov::Radiance(_) => color,
-                LightAov::LitFraction => Vec3::splat(luminance(color)),
-                LightAov::TraversalCost => Vec3::ONE,
+                PathAov::Radiance(_) => color,
+                PathAov::LitFraction => Vec3::splat(luminance(color)),
+                PathAov::TraversalCost => Vec3::ONE,
             };
             let value = lane(&values, i) * color;
             set_lane(&mut values, i, value);
@@ -274,7 +274,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
     /// Adds the contributions of one light's samples. With `pending`, defers them until the light's shadow
     /// ray is traced.
     #[inline(always)]
-    fn trace_samples_or_accumulate_pending(
+    fn add_or_defer_samples(
         &self,
         samples: &LightSamplePacket,
         (values, fraction): (&Vec3x16, Option<&Vec3x16>),
@@ -308,13 +308,13 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
     #[inline(always)]
     fn trace_and_add_pending_light(
         &self,
-        middle: Option<(LightCenter, LightGeometry)>,
+        middle: Option<(LightCenter, LightSceneGeometry)>,
         pending: &PendingLight,
         sums: &mut LightSums,
         simd: impl Simd,
     ) {
         let is_untraced = self.tile.settings.render.shadows == ShadowMode::Off;
-        if is_untraced && self.aov == LightAov::TraversalCost {
+        if is_untraced && self.aov == PathAov::TraversalCost {
             return;
         }
         // Without shadows, all light is unoccluded.
@@ -342,7 +342,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
             .with_start_triangles(self.row.ray_start_triangles(&direction));
         self.add_light_along_shadow_rays(
             (&rays, &ends, traced),
-            &LightGeometryPacket::splat(source),
+            &LightSceneGeometryPacket::splat(source),
             (&pending.light, fraction.as_ref()),
             sums,
             simd,
@@ -355,13 +355,13 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
     pub fn add_light_along_shadow_rays(
         &self,
         (rays, ends, traced): (&RayPacket, &F32x16, u32),
-        sources: &LightGeometryPacket,
+        sources: &LightSceneGeometryPacket,
         (values, fraction): (&Vec3x16, Option<&Vec3x16>),
         sums: &mut LightSums,
         simd: impl Simd,
     ) {
         sums.rays.shadow += u64::from(traced.count_ones());
-        if self.aov == LightAov::TraversalCost {
+        if self.aov == PathAov::TraversalCost {
             return add_traversal_cost(self.tile, rays, ends, traced, &mut sums.light);
         }
         if self.tile.world.has_null_interaction_surfaces() {
@@ -381,7 +381,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
     fn add_attenuated_light(
         &self,
         (rays, ends, traced): (&RayPacket, &F32x16, u32),
-        sources: &LightGeometryPacket,
+        sources: &LightSceneGeometryPacket,
         (values, fraction): (&Vec3x16, Option<&Vec3x16>),
         sums: &mut LightSums,
     ) {
@@ -412,7 +412,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         let BsdfValuesAndCosines { bsdf, cosines } = &response;
         let f = bsdf.f();
         let mut arriving = samples.weights;
-        if self.aov == LightAov::LitFraction {
+        if self.aov == PathAov::LitFraction {
             for i in 0..PACKET_SIZE {
                 let light = Vec3::splat(luminance(lane(&samples.weights, i)));
                 set_lane(&mut arriving, i, light);
@@ -425,7 +425,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
             let contributes = (cosines[i] > 0.0) & ((value.x != 0.0) | (value.y != 0.0) | (value.z != 0.0));
             active[i] = if contributes { TRUE } else { 0 };
         }
-        if let Some(interior_lists) = self.interior_lists.filter(|_| self.aov != LightAov::LitFraction) {
+        if let Some(interior_lists) = self.interior_lists.filter(|_| self.aov != PathAov::LitFraction) {
             values = self.attenuate_by_glass(interior_lists, samples, values);
         }
         (values, simd.movemask(&active) & self.used, response)
@@ -494,9 +494,9 @@ pub fn add_masked_lane_products(bits: u32, values: &Vec3x16, fraction: &Vec3x16,
 }
 
 /// Converts the transmittance of null interactions to its luminance if the light AOV needs only luminance.
-pub fn convert_transmittance_for_aov(left: Vec3, aov: LightAov) -> Vec3 {
+pub fn convert_transmittance_for_aov(left: Vec3, aov: PathAov) -> Vec3 {
     match aov {
-        LightAov::Radiance(_) | LightAov::TraversalCost => left,
-        LightAov::LitFraction => Vec3::splat(luminance(left)),
+        PathAov::Radiance(_) | PathAov::TraversalCost => left,
+        PathAov::LitFraction => Vec3::splat(luminance(left)),
     }
 }

@@ -7,7 +7,7 @@ use super::all_lights::{LightSums, SampleAllLights, add_masked_lane_products, ad
 use super::mis::CompetingTechnique;
 use super::shadow_rays::ShadowRayQueue;
 use crate::geometry::packet::set_bit_lanes;
-use crate::integrators::view::LightAov;
+use crate::integrators::view::PathAov;
 use crate::lights::{
     LightCenter, LightSamplePacket, LightSampler, LightSamplingEffort, LightTree, Receiver, ReceiverLobe,
     ReceiverPacket,
@@ -216,15 +216,15 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
             }
         }
         // Normalize the estimates of each vertex.
-        let Some(shares) = tree.single_node_importance(&glossy, row.bsdf.has_narrow_lobes(), simd) else {
+        let Some(shares) = tree.importance_if_single_node(&glossy, row.bsdf.has_narrow_lobes(), simd) else {
             return;
         };
         let without = (MIS && row.bsdf.has_narrow_lobes())
-            .then(|| tree.single_node_importance(&plain, false, simd))
+            .then(|| tree.importance_if_single_node(&plain, false, simd))
             .flatten();
         // Pick lights with each row of numbers.
         for (numbers, pick) in numbers.iter().zip(picks) {
-            let picked = shares.pick(numbers);
+            let picked = shares.pick_packet(numbers);
             pick.lights = picked.lights;
             pick.weighed = match &without {
                 Some(without) => without.pick_probabilities(&picked),
@@ -248,7 +248,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         picks: &mut [LightPicks],
     ) {
         let (row, group) = (self.row, way.count as usize);
-        let (mut cut, mut without) = (way.new_tree_cut(tree), MIS.then(|| way.new_tree_cut(tree)));
+        let (mut cut, mut without) = (way.adaptive_tree_cut(tree), MIS.then(|| way.adaptive_tree_cut(tree)));
         for i in set_bit_lanes(self.used) {
             let plain = Receiver::with_unknown_lobe(lane(&row.from, i), lane(&row.normal, i));
             let lobe = self.receiver_lobe(i);
@@ -336,7 +336,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         }
         match render.shadows {
             // Nothing is traced, so there is no traversal cost.
-            ShadowMode::Off if self.aov == LightAov::TraversalCost => return,
+            ShadowMode::Off if self.aov == PathAov::TraversalCost => return,
             ShadowMode::Off => {
                 if let Some(fraction) = &fraction {
                     add_masked_lane_products(active, &values, fraction, &mut sums.diffuse);
@@ -350,7 +350,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         let traced = active & !row.below_horizon_mask(&samples.directions, simd);
         let (rays, ends) = self.shadow_rays(&samples, traced);
         match pool {
-            Some(pool) if self.aov != LightAov::TraversalCost => {
+            Some(pool) if self.aov != PathAov::TraversalCost => {
                 sums.rays.shadow += u64::from(traced.count_ones());
                 let mut places = [0; PACKET_SIZE];
                 for i in 0..PACKET_SIZE {

@@ -6,7 +6,7 @@ use crate::geometry::packet::{RayPacket, set_bit_lanes};
 use crate::integrators::transport::batch::{BsdfValuesAndCosines, VertexBatch};
 use crate::integrators::transport::interiors::{InteriorListPool, medium_transmittance};
 use crate::integrators::transport::tile::TileContext;
-use crate::integrators::view::LightAov;
+use crate::integrators::view::PathAov;
 use crate::materials::bsdf::LobesToSample;
 use crate::math::Vec3;
 use crate::math::lanes::{PACKET_SIZE, Simd, lane, set_lane};
@@ -24,7 +24,7 @@ pub struct LobeRayTracingKernel<'a> {
     /// Mask of vertices with narrow lobes.
     pub sharp: u32,
     /// The AOV to compute.
-    pub aov: LightAov,
+    pub aov: PathAov,
     /// Media at the vertices, or `None` if all vertices are in air.
     pub interior_lists: Option<&'a InteriorListPool>,
     /// The reflected light to which the results are added.
@@ -76,7 +76,7 @@ impl SimdKernel for LobeRayTracingKernel<'_> {
             // occluded.
             if tile.settings.render.shadows != ShadowMode::Soft {
                 // Traversal cost is counted only for the rays to the lights' centers.
-                let lit = if aov == LightAov::TraversalCost { 0 } else { sent };
+                let lit = if aov == PathAov::TraversalCost { 0 } else { sent };
                 for i in set_bit_lanes(lit) {
                     let found =
                         LobeRayWithoutSoftShadows { tile, row, lane: i, ray: rays.ray(i), pdf: pdfs[i] };
@@ -89,7 +89,7 @@ impl SimdKernel for LobeRayTracingKernel<'_> {
             }
             let (hits, objects) = tile.world.geometry.closest_hit_packet_simd(&rays, &mut ends, sent, simd);
             // If the view shows the traversal cost, add the cost of the rays.
-            if aov == LightAov::TraversalCost {
+            if aov == PathAov::TraversalCost {
                 for i in set_bit_lanes(sent) {
                     ends[i] = hits.get(i).map_or(f32::INFINITY, |hit| hit.t);
                 }

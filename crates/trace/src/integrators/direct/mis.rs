@@ -5,7 +5,7 @@ use crate::geometry::{Ray, ShapeHit};
 use crate::integrators::transport::batch::{BsdfValuesAndCosines, VertexBatch};
 use crate::integrators::transport::ray::PathRay;
 use crate::integrators::transport::tile::TileContext;
-use crate::lights::{LightGeometry, LightHit, LightSamplePacket, Side};
+use crate::lights::{LightHit, LightSamplePacket, LightSceneGeometry, Side};
 use crate::materials::Footprint;
 use crate::materials::bsdf::{BsdfValues, LobesToSample, ratio};
 use crate::math::Vec3;
@@ -85,7 +85,7 @@ impl CompetingTechnique {
             LobesToSample::Narrow => {
                 let BsdfValues { wide, narrow, .. } = &response.bsdf;
                 for i in 0..PACKET_SIZE {
-                    let left = combined_lobes_mis_factor(lane(wide, i), lane(narrow, i), weights[i]);
+                    let left = narrow_lobe_mis_factor(lane(wide, i), lane(narrow, i), weights[i]);
                     let value = lane(&values, i) * left;
                     set_lane(&mut values, i, value);
                 }
@@ -118,7 +118,7 @@ impl CompetingTechnique {
 /// Factor for reflected light if the MIS weight applies only to the narrow lobe, because rays in a narrow
 /// lobe do not account for wide lobes. With this factor, the AOVs still sum to the beauty image.
 #[inline(always)]
-fn combined_lobes_mis_factor(wide: Vec3, narrow: Vec3, weight: f32) -> Vec3 {
+fn narrow_lobe_mis_factor(wide: Vec3, narrow: Vec3, weight: f32) -> Vec3 {
     let part = |wide: f32, narrow: f32| {
         let all = wide + narrow;
         if all > 0.0 { (wide + narrow * weight) / all } else { 0.0 }
@@ -295,7 +295,7 @@ impl TileContext<'_> {
         let Ray { origin, direction, .. } = path.ray;
         let shadow = Ray::segment_ending_before_point(origin, origin + direction * hit.shape.t);
         if path.state.pdf > 0.0
-            && !self.world.has_zero_transmittance_along(&shadow, LightGeometry::Object(hit.object))
+            && !self.world.has_zero_transmittance_along(&shadow, LightSceneGeometry::Object(hit.object))
         {
             self.emitter_mis_weight(path, hit)
         } else {

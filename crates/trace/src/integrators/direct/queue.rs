@@ -16,7 +16,7 @@ use crate::integrators::transport::interiors::{InteriorList, InteriorListPool};
 use crate::integrators::transport::ray::PathRay;
 use crate::integrators::transport::tile::TileContext;
 use crate::integrators::transport::vertex::ShadingVertex;
-use crate::integrators::view::{LightAov, PathClasses};
+use crate::integrators::view::{PathAov, PathClasses};
 use crate::materials::BxdfKind;
 use crate::math::Vec3;
 use crate::math::lanes::{PACKET_SIZE, lane};
@@ -106,7 +106,7 @@ impl DirectLightVertexQueue {
             let path = &paths[place];
             let (slot, only_specular_before) = (path.slot, path.state.only_specular_before);
             let visible = self.arrived_diffuse.get(place).copied().filter(|_| only_specular_before);
-            let diffuse = accumulator.diffuse_part(place as u32, *light, visible);
+            let diffuse = accumulator.diffuse_part_of_light(place as u32, *light, visible);
             accumulator.add_clamped_direct(slot, (*light, diffuse), only_specular_before);
         }
     }
@@ -158,7 +158,7 @@ impl DirectLightVertexQueue {
         &mut self,
         tile: &TileContext<'_>,
         lit: &ShadingVertex<'_>,
-        aov: LightAov,
+        aov: PathAov,
         sides: ShadingSides<'_>,
     ) {
         self.store_ray_cone(lit.place, lit.vertex.cone);
@@ -223,7 +223,7 @@ impl DirectLightVertexQueue {
     }
 
     /// A packet of vertices.
-    pub fn batch(&self, number: usize) -> &VertexBatch {
+    pub fn batch_at_index(&self, number: usize) -> &VertexBatch {
         &self.rows[number]
     }
 
@@ -243,7 +243,7 @@ impl DirectLightVertexQueue {
         &mut self,
         group: Range<usize>,
         tile: &TileContext<'_>,
-        aov: LightAov,
+        aov: PathAov,
         shares_with_paths: bool,
     ) -> Result<(), Canceled> {
         // The sums of a group are large, so their buffer is reused.
@@ -277,7 +277,7 @@ impl DirectLightVertexQueue {
         &self,
         (index, number): (usize, usize),
         tile: &TileContext<'_>,
-        aov: LightAov,
+        aov: PathAov,
         shares_with_paths: bool,
     ) -> ReflectedDirectLightPacket {
         let row = &self.rows[number];
@@ -299,7 +299,7 @@ impl DirectLightVertexQueue {
         &self,
         request: DirectLightPacketRequest,
         tile: &TileContext<'_>,
-        aov: LightAov,
+        aov: PathAov,
     ) -> CompetingTechnique {
         let is_soft = tile.settings.render.shadows == ShadowMode::Soft;
         let row = &self.rows[request.number];
@@ -307,7 +307,7 @@ impl DirectLightVertexQueue {
             CompetingTechnique::Paths
         } else if row.bsdf.extends_narrow_lobe_paths() && is_soft && tile.behavior.mirrors {
             CompetingTechnique::NarrowPaths
-        } else if row.bsdf.extends_narrow_lobe_paths() && !is_soft && aov != LightAov::LitFraction {
+        } else if row.bsdf.extends_narrow_lobe_paths() && !is_soft && aov != PathAov::LitFraction {
             // Paths in microfacet lobes do not account for lights.
             CompetingTechnique::from_sharp_vertex_mask(row.bsdf.narrow_lobe_mask() & request.used)
         } else {
@@ -325,7 +325,7 @@ impl DirectLightVertexQueue {
         &mut self,
         request: DirectLightPacketRequest,
         tile: &TileContext<'_>,
-        aov: LightAov,
+        aov: PathAov,
         number: u32,
     ) -> LightSums {
         if request.used == 0 {
@@ -352,11 +352,11 @@ impl DirectLightVertexQueue {
 
     /// Whether the light from wide lobes must be summed separately at a packet.
     pub fn splits_lobes(&self, row: &VertexBatch) -> bool {
-        self.wide_narrow_lobe_split(row) == WideNarrowLobeSplit::Mixed
+        self.choose_lobe_split(row) == WideNarrowLobeSplit::Mixed
     }
 
     /// How to divide a packet's reflected light.
-    fn wide_narrow_lobe_split(&self, row: &VertexBatch) -> WideNarrowLobeSplit {
+    fn choose_lobe_split(&self, row: &VertexBatch) -> WideNarrowLobeSplit {
         if self.arrived_diffuse.is_empty() || row.only_specular_before == 0 {
             return WideNarrowLobeSplit::Unused;
         }
@@ -371,15 +371,15 @@ impl DirectLightVertexQueue {
     pub fn accumulate_reflected_light(
         &mut self,
         number: usize,
-        aov: LightAov,
+        aov: PathAov,
         arrived: &ReflectedDirectLightPacket,
     ) {
         let row = &self.rows[number];
         let light = match aov {
-            LightAov::Radiance(_) | LightAov::LitFraction => row.times_throughput(&arrived.light),
-            LightAov::TraversalCost => arrived.light,
+            PathAov::Radiance(_) | PathAov::LitFraction => row.times_throughput(&arrived.light),
+            PathAov::TraversalCost => arrived.light,
         };
-        let diffuse = match self.wide_narrow_lobe_split(row) {
+        let diffuse = match self.choose_lobe_split(row) {
             WideNarrowLobeSplit::Unused | WideNarrowLobeSplit::OnlyNarrow => None,
             WideNarrowLobeSplit::OnlyWide => Some(light),
             WideNarrowLobeSplit::Mixed => Some(row.times_throughput(&arrived.diffuse)),
@@ -419,7 +419,7 @@ enum WideNarrowLobeSplit {
 }
 
 /// Mask of vertices whose direct light is visible in the view and may be nonzero.
-fn contributing_vertex_mask(row: &VertexBatch, aov: LightAov) -> u32 {
+fn contributing_vertex_mask(row: &VertexBatch, aov: PathAov) -> u32 {
     if row.is_dark {
         return 0;
     }
@@ -440,7 +440,7 @@ struct DirectLightPacketRequest {
 }
 
 impl DirectLightPacketRequest {
-    fn new(number: usize, row: &VertexBatch, aov: LightAov, shares_with_paths: bool) -> Self {
+    fn new(number: usize, row: &VertexBatch, aov: PathAov, shares_with_paths: bool) -> Self {
         Self { number, used: row.used & contributing_vertex_mask(row, aov), shares_with_paths }
     }
 }

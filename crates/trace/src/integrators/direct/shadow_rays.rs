@@ -6,8 +6,8 @@ use super::all_lights::{
 };
 use crate::geometry::packet::{F32x16, RayPacket, set_bit_lanes};
 use crate::integrators::transport::tile::TileContext;
-use crate::integrators::view::LightAov;
-use crate::lights::{LightGeometry, LightGeometryPacket};
+use crate::integrators::view::PathAov;
+use crate::lights::{LightSceneGeometry, LightSceneGeometryPacket};
 use crate::math::lanes::{PACKET_SIZE, Simd, Vec3x16, lane, set_lane};
 use crate::world::{SimdKernel, World};
 
@@ -20,7 +20,7 @@ struct QueuedShadowRays {
     ends: F32x16,
     /// Mask of rays to trace.
     traced: u32,
-    sources: LightGeometryPacket,
+    sources: LightSceneGeometryPacket,
     values: Vec3x16,
     /// Whether [`ShadowRayQueue::fractions`] contains the fractions of `values` from wide lobes.
     has_fraction: bool,
@@ -57,7 +57,7 @@ impl ShadowRayQueue {
         &mut self,
         row: u32,
         (rays, ends, traced): (RayPacket, F32x16, u32),
-        sources: &LightGeometryPacket,
+        sources: &LightSceneGeometryPacket,
         (values, fraction): (&Vec3x16, Option<&Vec3x16>),
         places: &[u32; PACKET_SIZE],
     ) {
@@ -76,7 +76,7 @@ impl ShadowRayQueue {
     }
 
     /// Traces and removes all rays, and adds the unoccluded light to the packets' sums in queue order.
-    pub fn trace(&mut self, tile: &TileContext<'_>, aov: LightAov, sums: &mut [LightSums]) {
+    pub fn trace(&mut self, tile: &TileContext<'_>, aov: PathAov, sums: &mut [LightSums]) {
         if self.rows.is_empty() {
             return;
         }
@@ -126,7 +126,7 @@ impl ShadowRayQueue {
 /// Traces the queued rays and clears the bits of occluded rays in [`QueuedShadowRays::traced`].
 struct ShadowRayKernel<'a> {
     world: &'a World,
-    aov: LightAov,
+    aov: PathAov,
     rows: &'a mut [QueuedShadowRays],
     /// Rows and lanes of the rays.
     rays: &'a [u32],
@@ -141,7 +141,7 @@ impl SimdKernel for ShadowRayKernel<'_> {
         for rays in rays.chunks(PACKET_SIZE) {
             let mut packet = RayPacket::from_soa([[0.0; PACKET_SIZE]; 3], [[0.0; PACKET_SIZE]; 3]);
             let mut ends = [-1.0; PACKET_SIZE];
-            let mut sources = LightGeometryPacket::splat(LightGeometry::Nothing);
+            let mut sources = LightSceneGeometryPacket::splat(LightSceneGeometry::Nothing);
             for (to, &ray) in rays.iter().enumerate() {
                 let (row, from) = (&rows[ray as usize / PACKET_SIZE], ray as usize % PACKET_SIZE);
                 for axis in 0..3 {
@@ -172,9 +172,9 @@ impl SimdKernel for ShadowRayKernel<'_> {
 #[inline(never)]
 fn attenuate_queued_contributions(
     world: &World,
-    aov: LightAov,
+    aov: PathAov,
     (packet, ends, traced): (&RayPacket, &F32x16, u32),
-    sources: &LightGeometryPacket,
+    sources: &LightSceneGeometryPacket,
     (rows, rays): (&mut [QueuedShadowRays], &[u32]),
 ) -> u32 {
     let weakened = world.transmittance_packet(packet, ends, traced, sources);

@@ -45,7 +45,7 @@ impl CameraPathWavefront<'_, '_> {
             let Some(hit) = packet.hit(lane) else { continue };
             let index = tile.world.material_index(&hit);
             if known.is_none_or(|(own, _)| own != index) {
-                known = tile.plain_packet_material(index).map(|plain| (index, plain));
+                known = tile.packet_material_if_plain(index).map(|plain| (index, plain));
             }
             let Some((_, (material, _))) = known else { continue };
             let slot = first + lane as u32;
@@ -77,7 +77,7 @@ impl CameraPathWavefront<'_, '_> {
     /// Adds a plain surface's emission and ambient light.
     pub(super) fn add_emission_and_ambient(&mut self, path: &PathRay, hit: &Hit, is_shining: bool) {
         let index = self.tile.world.material_index(hit);
-        let Some((material, _)) = self.tile.plain_packet_material(index) else { return };
+        let Some((material, _)) = self.tile.packet_material_if_plain(index) else { return };
         if is_shining {
             self.add_weighted_emission(path, material.emission, self.tile.emitter_mis_weight(path, hit));
         }

@@ -16,7 +16,7 @@ use crate::integrators::transport::vertex::{SpecularLobe, SurfaceVertex};
 use crate::integrators::transport::walk::{
     DirectOrCoincidentHit, Interaction, Interface, NullInteractionOutcome, PathStepper, walk_to_interaction,
 };
-use crate::integrators::view::LightAov;
+use crate::integrators::view::PathAov;
 use crate::materials::{Bsdf, Mirror, SpecularOverBase, ThinDielectric};
 use crate::math::Vec3;
 use crate::world::Hit;
@@ -26,7 +26,7 @@ use crate::world::Hit;
 const MIN_SPLIT: f32 = 0.01;
 
 impl<'a> PathStepper<'a> for CameraPathWavefront<'a, '_> {
-    fn tile(&self) -> &'a TileContext<'a> {
+    fn tile_context(&self) -> &'a TileContext<'a> {
         self.tile
     }
 
@@ -35,7 +35,7 @@ impl<'a> PathStepper<'a> for CameraPathWavefront<'a, '_> {
     }
 
     fn record_surface_crossing(&mut self, path: &PathRay, next: Option<Hit>) {
-        if self.accumulator.aov == LightAov::TraversalCost {
+        if self.accumulator.aov == PathAov::TraversalCost {
             self.accumulator
                 .add_traversal_cost(path.slot, count_traversal_cost_to_hit(self.tile, path, next));
         }
@@ -50,10 +50,10 @@ impl<'a> PathStepper<'a> for CameraPathWavefront<'a, '_> {
                 }
                 if self.add_path_emission(path, vertex, hit) && vertex.scatters() {
                     match &vertex.material.bsdf {
-                        Bsdf::NonSpecular(rough) => self.shade_rough(path, vertex, rough, far),
-                        Bsdf::Mirror(mirror) => self.shade_mirror(path, vertex, mirror),
+                        Bsdf::NonSpecular(rough) => self.shade_non_specular(path, vertex, rough, far),
+                        Bsdf::Mirror(mirror) => self.shade_mirror_hit(path, vertex, mirror),
                         Bsdf::SpecularOverBase(layers) => {
-                            self.shade_specular_over_base(path, vertex, layers, far);
+                            self.shade_specular_over_base_hit(path, vertex, layers, far);
                         }
                         // At a blend, each vertex has the material of the chosen part.
                         Bsdf::Dielectric(_) | Bsdf::ThinDielectric(_) | Bsdf::Blend(_) => {}
@@ -67,7 +67,7 @@ impl<'a> PathStepper<'a> for CameraPathWavefront<'a, '_> {
                 if self.add_path_emission(path, vertex, DirectOrCoincidentHit::Direct(hit)) {
                     match rough {
                         Some(rough) => self.queue_rough_glass_vertices(path, vertex, rough, far),
-                        None => self.shade_glass(path, vertex, far),
+                        None => self.shade_glass_hit(path, vertex, far),
                     }
                 }
             }
@@ -114,7 +114,7 @@ impl<'a> PathStepper<'a> for CameraPathWavefront<'a, '_> {
 impl CameraPathWavefront<'_, '_> {
     /// Adds the traversal costs of a packet's rays.
     pub(super) fn add_traversal_costs(&mut self, rays: &PacketSource<'_>, packet: &PacketHits) {
-        for lane in 0..rays.count() {
+        for lane in 0..rays.lane_count() {
             let path = rays.path(self.tile, lane);
             let cost = count_traversal_cost_to_hit(self.tile, &path, packet.hit(lane));
             self.accumulator.add_traversal_cost(path.slot, cost);
@@ -173,7 +173,7 @@ impl CameraPathWavefront<'_, '_> {
         }
     }
 
-    pub(super) fn shade_mirror(&mut self, path: &PathRay, vertex: &SurfaceVertex<'_>, mirror: &Mirror) {
+    pub(super) fn shade_mirror_hit(&mut self, path: &PathRay, vertex: &SurfaceVertex<'_>, mirror: &Mirror) {
         let shading = vertex.perturbed_and_smooth_normals(self.counters);
         let is_colored = self.accumulator.aov.applies_surface_colors();
         let reflectance = vertex.mirror_reflectance(mirror, &shading, is_colored, self.counters);
@@ -181,7 +181,7 @@ impl CameraPathWavefront<'_, '_> {
     }
 
     /// Splits a path at a surface with a δ lobe and non-specular lobes, or randomly chooses one of the two.
-    pub(super) fn shade_specular_over_base(
+    pub(super) fn shade_specular_over_base_hit(
         &mut self,
         path: &PathRay,
         vertex: &SurfaceVertex<'_>,
@@ -197,8 +197,8 @@ impl CameraPathWavefront<'_, '_> {
         let both = weaker >= MIN_SPLIT && splits;
         let is_specular = !both && self.tile.chooses_reflection(path, probability);
         if both || is_specular {
-            let specular =
-                vertex.specular_weight(layers, &lobe, self.counters) * if both { probability } else { 1.0 };
+            let specular = vertex.specular_sample_weight(layers, &lobe, self.counters)
+                * if both { probability } else { 1.0 };
             if specular != Vec3::ZERO {
                 self.roulette_and_push_reflected(reflected_path(path, vertex, &shading, specular));
             }
@@ -209,11 +209,11 @@ impl CameraPathWavefront<'_, '_> {
             let mut state = path.state;
             state.roulette_throughput *= base_factor;
             let path = PathRay { throughput: path.throughput * base_factor, state, ..*path };
-            self.shade_rough(&path, vertex, &layers.base, far);
+            self.shade_non_specular(&path, vertex, &layers.base, far);
         }
     }
 
-    pub(super) fn shade_glass(&mut self, path: &PathRay, vertex: &SurfaceVertex<'_>, far: &InteriorList) {
+    pub(super) fn shade_glass_hit(&mut self, path: &PathRay, vertex: &SurfaceVertex<'_>, far: &InteriorList) {
         let shading = vertex.perturbed_and_smooth_normals(self.counters);
         let FresnelSplit { reflectance, refracted } =
             fresnel_split(self.tile.world, path, vertex, &shading, far);
@@ -233,7 +233,7 @@ impl CameraPathWavefront<'_, '_> {
 
     #[inline]
     fn roulette_and_push_reflected(&mut self, mut ray: PathRay) {
-        if self.apply_roulette(&mut ray) {
+        if self.apply_roulette_to_specular_ray(&mut ray) {
             self.counters.reflected_rays += 1;
             self.push_specular(ray);
         }
@@ -242,7 +242,7 @@ impl CameraPathWavefront<'_, '_> {
     #[inline]
     fn roulette_and_push_refracted(&mut self, mut ray: PathRay, weight: f32) {
         ray.throughput *= weight;
-        if self.apply_roulette(&mut ray) {
+        if self.apply_roulette_to_specular_ray(&mut ray) {
             self.counters.refracted_rays += 1;
             self.push_specular(ray);
         }
@@ -258,7 +258,7 @@ impl CameraPathWavefront<'_, '_> {
 
     /// Applies Russian roulette to a specular ray, unless the path may still split. Returns false if it ends.
     #[inline]
-    fn apply_roulette(&self, ray: &mut PathRay) -> bool {
+    fn apply_roulette_to_specular_ray(&self, ray: &mut PathRay) -> bool {
         match self.continuation {
             Some(continuation) if !self.tile.behavior.splits || !ray.state.only_specular_before => {
                 continuation.apply_roulette(self.tile, ray)

@@ -9,7 +9,7 @@ use crate::integrators::transport::packet::PacketHits;
 use crate::integrators::transport::packet_source::PacketSource;
 use crate::integrators::transport::ray::PathRay;
 use crate::integrators::transport::vertex::{ShadingVertex, SurfaceVertex};
-use crate::integrators::view::LightAov;
+use crate::integrators::view::PathAov;
 use crate::materials::{BxdfPoint, NonSpecular, RoughDielectricPoint};
 use crate::math::Vec3;
 use crate::scene::description::ShadowMode;
@@ -32,7 +32,7 @@ impl CameraPathWavefront<'_, '_> {
     }
 
     /// Shades a non-specular surface. `far` is the medium behind the surface.
-    pub(super) fn shade_rough(
+    pub(super) fn shade_non_specular(
         &mut self,
         path: &PathRay,
         vertex: &SurfaceVertex<'_>,
@@ -81,16 +81,16 @@ impl CameraPathWavefront<'_, '_> {
     ) {
         let (tile, place) = (self.tile, self.place);
         let shading = vertex.perturbed_and_smooth_normals(self.counters);
-        let behind = bsdf.bsdf_for_transmitted_light().map(|bsdf| (bsdf, shading.far_side()));
+        let behind = bsdf.bsdf_for_transmitted_light().map(|bsdf| (bsdf, shading.seen_from_far_side()));
         let aov = self.select_light_aov_for_path(path);
         let lit = ShadingVertex { path, interiors: &path.interiors, place, vertex, shading, bsdf };
         self.direct.push(tile, &lit, aov, ShadingSides::OneSide { is_dark: false });
         // Transmitted light has its own vertex, except for the lit fraction, which is measured on the
         // viewer's side.
-        if let Some((bsdf, shading)) = behind.filter(|_| aov != LightAov::LitFraction) {
+        if let Some((bsdf, shading)) = behind.filter(|_| aov != PathAov::LitFraction) {
             let throughput =
                 path.throughput * diffuser_basic_radiance_transmittance(tile.world, &path.interiors, far);
-            let (path, vertex) = (&PathRay { throughput, ..*path }, &vertex.far_side());
+            let (path, vertex) = (&PathRay { throughput, ..*path }, &vertex.seen_from_far_side());
             let lit = ShadingVertex { path, interiors: far, place, vertex, shading, bsdf: &bsdf };
             self.direct.push(tile, &lit, aov, ShadingSides::OneSide { is_dark: false });
         }
@@ -112,10 +112,10 @@ impl CameraPathWavefront<'_, '_> {
         let shading = vertex.perturbed_and_smooth_normals(self.counters);
         let aov = self.select_light_aov_for_path(path);
         let near = &path.interiors;
-        let (reflection, transmission) = (rough.reflection(), rough.transmission());
+        let (reflection, transmission) = (rough.reflection_bxdf(), rough.transmission_bxdf());
         // The lit fraction is measured on the viewer's side. Blocked light is included, so a dark side is
         // sampled like any other.
-        if aov == LightAov::LitFraction {
+        if aov == PathAov::LitFraction {
             let lit = ShadingVertex { path, interiors: near, place, vertex, shading, bsdf: &reflection };
             return self.direct.push(tile, &lit, aov, ShadingSides::OneSide { is_dark: false });
         }
@@ -133,7 +133,8 @@ impl CameraPathWavefront<'_, '_> {
             Some(_) | None => ShadingSides::OneSide { is_dark },
         };
         // Queue the viewer's side, unless the vertex on the other side represents both sides.
-        let behind = (!is_one || is_behind).then(|| (vertex.far_side(), shading.far_side()));
+        let behind =
+            (!is_one || is_behind).then(|| (vertex.seen_from_far_side(), shading.seen_from_far_side()));
         if !is_behind {
             let lit = ShadingVertex { path, interiors: near, place, vertex, shading, bsdf: &reflection };
             self.direct.push(tile, &lit, aov, sides(vertex, dark[0], far));
@@ -147,7 +148,7 @@ impl CameraPathWavefront<'_, '_> {
     }
 
     /// The light AOV at a path's vertex. After the first non-specular surface, all light is included.
-    pub(super) fn select_light_aov_for_path(&self, path: &PathRay) -> LightAov {
-        if path.state.only_specular_before { self.accumulator.aov } else { LightAov::ALL }
+    pub(super) fn select_light_aov_for_path(&self, path: &PathRay) -> PathAov {
+        if path.state.only_specular_before { self.accumulator.aov } else { PathAov::ALL }
     }
 }

@@ -22,14 +22,14 @@ use crate::integrators::transport::interface::{
 use crate::integrators::transport::interiors::{Interior, InteriorList, InteriorListPool, medium_ior};
 use crate::integrators::transport::packet_source::PacketSource;
 use crate::integrators::transport::ray::{PathHistory, PathRay};
-use crate::integrators::transport::scatter::{BounceContinuation, BsdfSampler};
+use crate::integrators::transport::scatter::{BounceContinuationRules, BsdfSampler};
 use crate::integrators::transport::tile::TileContext;
 use crate::integrators::transport::vertex::{ShadingVertex, SpecularLobe, SurfaceVertex};
 use crate::integrators::transport::walk::{
     DirectOrCoincidentHit, Interaction, Interface, MAX_PASSED_SURFACES, NullInteractionOutcome, PathStepper,
-    opacity_at, walk_to_interaction,
+    opacity_at_path_vertex, walk_to_interaction,
 };
-use crate::integrators::view::LightAov;
+use crate::integrators::view::PathAov;
 use crate::integrators::{PACKET_SIZE, RayCounters};
 use crate::lights::{EmittedPhoton, PhotonEmitter, PhotonOrigin, PhotonRandomNumbers};
 use crate::materials::bsdf::LobesToSample;
@@ -60,7 +60,7 @@ pub struct PhotonTracer<'a> {
 
 /// Photons stored by one chunk of a pass.
 #[derive(Default)]
-pub struct PhotonChunk {
+pub struct StoredPhotonChunk {
     /// Caustic photons, scattered only by mirrors and glass, in emission order within each bounce.
     pub caustic: Vec<Photon>,
     /// Bounced photons, scattered once at a caustic, in the same order.
@@ -74,7 +74,7 @@ impl PhotonTracer<'_> {
     ///
     /// # Errors
     /// [`Canceled`] if the token is canceled.
-    pub fn trace_photons(&self) -> Result<PhotonChunk, Canceled> {
+    pub fn trace_photons(&self) -> Result<StoredPhotonChunk, Canceled> {
         let count = self.tile.block.sample_count() as u32;
         let mut wavefront = PhotonWavefront {
             tracing: self,
@@ -85,7 +85,7 @@ impl PhotonTracer<'_> {
             open_behind: VertexBatch::empty(),
             interior_lists: InteriorListPool::default(),
             crossing: CoincidentSurfaceBuffers::default(),
-            stored: PhotonChunk::default(),
+            stored: StoredPhotonChunk::default(),
             counters: RayCounters::default(),
         };
         // Emit the photons, then trace them bounce by bounce.
@@ -135,7 +135,7 @@ impl PhotonTracer<'_> {
         let emitter = || Some(world.lights.get(emitted.light).as_area()?.object);
         let around = |glass: &&Interior| world.is_closed_shape_containing(glass.body, point);
         let in_parts = self.bodies.iter().filter(|_| !is_from_infinite_light(emitted)).filter_map(|body| {
-            let material = world.enclosing_glass_material(body, point, emitter())?;
+            let material = world.glass_material_around_point(body, point, emitter())?;
             Some(Interior { body: body.body, material })
         });
         self.glasses
@@ -162,12 +162,12 @@ struct PhotonWavefront<'a> {
     /// Media at the individually queued vertices.
     interior_lists: InteriorListPool,
     crossing: CoincidentSurfaceBuffers,
-    stored: PhotonChunk,
+    stored: StoredPhotonChunk,
     counters: RayCounters,
 }
 
 impl<'a> PathStepper<'a> for PhotonWavefront<'a> {
-    fn tile(&self) -> &'a TileContext<'a> {
+    fn tile_context(&self) -> &'a TileContext<'a> {
         self.tracing.tile
     }
 
@@ -185,12 +185,12 @@ impl<'a> PathStepper<'a> for PhotonWavefront<'a> {
                 self.shade_surface(path, vertex, (far, lacks_photons));
             }
             Interaction::Glass(vertex, _, Interface { far, rough: None }) => {
-                self.shade_glass(path, vertex, far);
+                self.shade_glass_hit(path, vertex, far);
             }
             // Direct light is found by light samples.
             Interaction::Glass(..) if self.depth == 0 && !has_passed => {}
             Interaction::Glass(vertex, _, Interface { far, rough: Some(rough) }) => {
-                self.store_and_scatter(path, vertex, rough.reflection(), (far, Some(1.0)));
+                self.store_and_scatter(path, vertex, rough.reflection_bxdf(), (far, Some(1.0)));
             }
             Interaction::Nothing | Interaction::Hidden => {}
         }
@@ -272,8 +272,7 @@ impl PhotonWavefront<'_> {
         surfaces: &mut SurfacePacket,
     ) {
         let tile = self.tracing.tile;
-        let packet =
-            tile.intersect_packet(PacketSource::Paths(rays, 0), LightAov::ALL, true, (row, surfaces));
+        let packet = tile.intersect_packet(PacketSource::Paths(rays, 0), PathAov::ALL, true, (row, surfaces));
         self.counters.texture_lookups += packet.lookups;
         // Direct light is found by light samples.
         if self.depth > 0 {
@@ -357,7 +356,7 @@ impl PhotonWavefront<'_> {
             self.store_and_scatter_at_rough(path, vertex, &layers.base, (far, factor));
         }
         if is_reflected && self.may_scatter() {
-            let specular = vertex.specular_weight(layers, &lobe, &mut self.counters);
+            let specular = vertex.specular_sample_weight(layers, &lobe, &mut self.counters);
             let part = if chooses { 1.0 } else { probability };
             let ray = reflected_path(path, vertex, &shading, specular * part);
             self.queue_specular_photon(path, vertex, (shading.normal, 1.0), ray);
@@ -406,7 +405,7 @@ impl PhotonWavefront<'_> {
         };
         // Queue the photon for scattering.
         let shading = vertex.perturbed_and_smooth_normals(&mut self.counters);
-        let behind = bsdf.bsdf_for_transmitted_light().map(|bsdf| (bsdf, shading.far_side()));
+        let behind = bsdf.bsdf_for_transmitted_light().map(|bsdf| (bsdf, shading.seen_from_far_side()));
         let interiors = self.interior_lists.push_list(&path.interiors);
         if self.open.used == ALL || self.open.bsdf.kind() != bsdf.kind() {
             self.scatter_queued_vertices();
@@ -414,7 +413,7 @@ impl PhotonWavefront<'_> {
         }
         let i = self.open.used.trailing_ones() as usize;
         let lit = ShadingVertex { path, interiors: &path.interiors, place: 0, vertex, shading, bsdf: &bsdf };
-        self.open.set_vertex(i, tile, &lit, LightAov::ALL, interiors);
+        self.open.set_vertex(i, tile, &lit, PathAov::ALL, interiors);
         let counts = self.open.adjoint_photon_weight(i, vertex.wo) * factor;
         set_lane(&mut self.open.throughput, i, path.throughput * counts);
         // Queue the transmitted photon. The medium behind the surface changes its basic flux.
@@ -436,15 +435,15 @@ impl PhotonWavefront<'_> {
             path,
             interiors: far,
             place: 0,
-            vertex: &vertex.far_side(),
+            vertex: &vertex.seen_from_far_side(),
             shading,
             bsdf: &bsdf,
         };
-        self.open_behind.set_vertex(i, tile, &lit, LightAov::ALL, interiors);
+        self.open_behind.set_vertex(i, tile, &lit, PathAov::ALL, interiors);
         set_lane(&mut self.open_behind.throughput, i, path.throughput * (counts * part));
     }
 
-    fn shade_glass(&mut self, path: &PathRay, vertex: &SurfaceVertex<'_>, far: &InteriorList) {
+    fn shade_glass_hit(&mut self, path: &PathRay, vertex: &SurfaceVertex<'_>, far: &InteriorList) {
         if !self.may_scatter() {
             return;
         }
@@ -514,7 +513,7 @@ impl PhotonWavefront<'_> {
             row.shading_normal_cosine[i] = UNPERTURBED;
         }
         let continuation =
-            BounceContinuation { continues: true, uses_roulette: false, lobes: LobesToSample::All };
+            BounceContinuationRules { continues: true, uses_roulette: false, lobes: LobesToSample::All };
         let used = row.used;
         BsdfSampler { tile: self.tracing.tile, row, used, continuation, has_fractions: false }
             .queue_scattered_paths(&self.interior_lists, &[], &mut self.next, None);
@@ -552,7 +551,7 @@ impl PhotonWavefront<'_> {
 /// Probability that a photon is stored where it hits a surface.
 fn storage_probability(path: &PathRay, vertex: &SurfaceVertex<'_>, lookups: &mut u64) -> f32 {
     if !vertex.is_blended() {
-        return opacity_at(path, vertex, lookups);
+        return opacity_at_path_vertex(path, vertex, lookups);
     }
     let at = vertex.texture_lookup_point(path.state.pdf > 0.0);
     let is_stored = |part: &Material| can_store_photons(part, vertex.is_front);

@@ -10,7 +10,7 @@ use crate::geometry::packet::set_bit_lanes;
 use crate::integrators::PACKET_SIZE;
 use crate::integrators::transport::batch::VertexBatch;
 use crate::integrators::transport::tile::TileContext;
-use crate::integrators::view::{LightAov, PathClasses};
+use crate::integrators::view::{PathAov, PathClasses};
 use crate::math::Vec3;
 use crate::math::lanes::{Simd, Vec3x16, set_lane};
 use crate::sampling::Dimension;
@@ -32,7 +32,7 @@ pub fn gather_photons(
     row: &VertexBatch,
     maps: &PhotonPassesBySample,
     depth: u32,
-    (aov, splits_lobes): (LightAov, bool),
+    (aov, splits_lobes): (PathAov, bool),
 ) -> [Vec3x16; 2] {
     let instruction_set = tile.world.geometry.instruction_set();
     if splits_lobes {
@@ -48,7 +48,7 @@ struct GatherPhotonsKernel<'a, const SPLIT: bool> {
     row: &'a VertexBatch,
     maps: &'a PhotonPassesBySample,
     depth: u32,
-    aov: LightAov,
+    aov: PathAov,
 }
 
 impl<const SPLIT: bool> SimdKernel for GatherPhotonsKernel<'_, SPLIT> {
@@ -75,7 +75,7 @@ impl<const SPLIT: bool> SimdKernel for GatherPhotonsKernel<'_, SPLIT> {
             let gathers_caustic =
                 if only_specular_before { caustic } else { indirect && row.after_gloss & 1 << i != 0 };
             // Determine the lookup probabilities.
-            let chances = if aov == LightAov::TraversalCost {
+            let chances = if aov == PathAov::TraversalCost {
                 [1.0; 2]
             } else if only_specular_before {
                 [1.0, BOUNCED_LOOKUP_PROBABILITY]
@@ -140,11 +140,11 @@ fn coverage_factor(
 fn gather_reflected_light<const SPLIT: bool>(
     (row, i): (&VertexBatch, usize),
     (map, look): (&PhotonMap, &GatherPoint),
-    aov: LightAov,
+    aov: PathAov,
     random: [f32; 2],
     simd: impl Simd,
 ) -> ([Vec3; 2], Option<PhotonPositionAndNormal>) {
-    if aov == LightAov::TraversalCost {
+    if aov == PathAov::TraversalCost {
         return ([Vec3::splat(map.count_near(look, simd) as f32); 2], None);
     }
     let is_flat = row.has_facet & 1 << i == 0;

@@ -20,7 +20,9 @@ pub fn kernel_integral_over_polygon(corners: &[DVec2]) -> f64 {
     match (is_around, is_beside) {
         (_, true) => 0.0,
         (true, false) => 1.0,
-        (false, false) => FRAC_2_PI * edges().map(|(a, b)| edge_triangle_weight(a, b)).sum::<f64>().abs(),
+        (false, false) => {
+            FRAC_2_PI * edges().map(|(a, b)| integral_over_center_triangle(a, b)).sum::<f64>().abs()
+        }
     }
 }
 
@@ -31,7 +33,7 @@ pub fn kernel_integral_over_polygon(corners: &[DVec2]) -> f64 {
 /// the edge. Where the edge is outside the disk, this is a quarter of the angle. For a point on an edge at
 /// distance d from the center, at arc length s along the edge, R² = d² + s² and dφ = d/R² ds, so the integral
 /// is d·∫ 1/2 − (d² + s²)/4 ds.
-fn edge_triangle_weight(a: DVec2, b: DVec2) -> f64 {
+fn integral_over_center_triangle(a: DVec2, b: DVec2) -> f64 {
     let length = (b - a).length();
     if !(length > 0.0) {
         return 0.0;

@@ -100,12 +100,12 @@ impl GatherPoint {
 }
 
 /// Disjoint ranges of photons that together cover a kernel.
-struct PhotonRanges {
+struct KernelPhotonRanges {
     of: [[u32; 2]; 8],
     count: usize,
 }
 
-impl PhotonRanges {
+impl KernelPhotonRanges {
     /// Adds a range and merges it with any overlapping ranges, because columns of different cells may have
     /// the same hash.
     #[inline(always)]
@@ -249,7 +249,7 @@ impl PhotonMap {
             }
         }
         let chosen = choices
-            .choose_lane_by_total_weight(random[1])
+            .choose_one_lane_by_weight(random[1])
             .map(|(block, i)| self.position_and_normal(block as usize, i));
         (Vec3::from(sums.map(sum_lanes)) * self.peak_weight(), chosen)
     }
@@ -305,8 +305,8 @@ impl PhotonMap {
 
     /// Ranges that may contain photons within a kernel.
     #[inline(always)]
-    fn candidate_ranges(&self, look: &GatherPoint) -> PhotonRanges {
-        let mut ranges = PhotonRanges { of: [[0; 2]; 8], count: 0 };
+    fn candidate_ranges(&self, look: &GatherPoint) -> KernelPhotonRanges {
+        let mut ranges = KernelPhotonRanges { of: [[0; 2]; 8], count: 0 };
         if self.count == 0 {
             return ranges;
         }

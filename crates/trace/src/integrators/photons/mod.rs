@@ -58,8 +58,8 @@ use crate::integrators::transport::tile::{SampleBlock, TileContext};
 use crate::lights::{BoundingSphere, PhotonEmitter};
 use crate::materials::{Dielectric, Material};
 use crate::scene::description::{RenderOptions, ShadowMode};
-use crate::world::{CompoundSolid, Hit, LightBoundingBoxPair, World, scene_photon_emitter};
-use emit::{PhotonChunk, PhotonTracer};
+use crate::world::{CompoundSolid, Hit, LightBallAndObjectBoxes, World, scene_photon_emitter};
+use emit::{PhotonTracer, StoredPhotonChunk};
 pub(super) use map::GatherPoint;
 pub use map::{Photon, PhotonMap};
 
@@ -78,7 +78,7 @@ const AIMED_FRACTIONS: [f32; 2] = [0.9, 0.5];
 
 /// Photon emission for an image, shared by all passes.
 #[derive(Debug)]
-pub struct PhotonMapper {
+pub struct PhotonPassTracer {
     settings: PhotonSettings,
     /// Maximum number of bounces per photon before it is gathered.
     max_depth: u32,
@@ -133,7 +133,7 @@ impl PhotonPassesBySample {
     }
 }
 
-impl PhotonMapper {
+impl PhotonPassTracer {
     /// Prepares photon emission for a world and traces pass 0, whose photons determine the radii. `progress`
     /// receives the number of photons traced so far and the total number.
     ///
@@ -171,7 +171,7 @@ impl PhotonMapper {
     }
 
     /// First-pass kernel radii for caustic and bounced photons.
-    pub fn initial_radii(&self) -> [f32; 2] {
+    pub fn first_pass_radii(&self) -> [f32; 2] {
         self.radii
     }
 
@@ -207,7 +207,7 @@ impl PhotonMapper {
         number: u32,
         token: &CancelToken,
     ) -> Result<PhotonPass, Canceled> {
-        let shrunk = radius_factor(number);
+        let shrunk = radius_relative_to_first_pass(number);
         let [of_caustic, of_bounced] = self.radii.map(|radius| (f64::from(radius) * shrunk) as f32);
         let map = |of: &[Photon], radius: f32| PhotonMap::new(of, radius, token);
         let (caustic, bounced) =
@@ -278,12 +278,12 @@ impl PhotonMapper {
             progress(done, count.into());
             Ok(stored)
         };
-        let chunks: Vec<PhotonChunk> = (0..self.settings.count.div_ceil(PHOTONS_PER_JOB))
+        let chunks: Vec<StoredPhotonChunk> = (0..self.settings.count.div_ceil(PHOTONS_PER_JOB))
             .into_par_iter()
             .map(|number| chunk(number * PHOTONS_PER_JOB))
             .collect::<Result<_, _>>()?;
         let lookups = chunks.iter().map(|chunk| chunk.lookups).sum();
-        let joined = |of: fn(&PhotonChunk) -> &[Photon]| -> Result<Vec<Photon>, Canceled> {
+        let joined = |of: fn(&StoredPhotonChunk) -> &[Photon]| -> Result<Vec<Photon>, Canceled> {
             let mut all = Vec::with_capacity(chunks.iter().map(|chunk| of(chunk).len()).sum());
             for chunk in &chunks {
                 token.check_pause_and_cancel()?;
@@ -309,7 +309,7 @@ struct StoredPhotons {
 }
 
 /// Kernel radius of a pass relative to the first pass: r²ᵢ₊₁ = r²ᵢ·(i + α)/(i + 1).
-fn radius_factor(pass: u32) -> f64 {
+fn radius_relative_to_first_pass(pass: u32) -> f64 {
     (1..=pass).map(f64::from).map(|i| (i + ALPHA) / (i + 1.0)).product::<f64>().sqrt()
 }
 
@@ -367,12 +367,12 @@ fn light_enclosing_glass_candidates(world: &World) -> (Vec<u32>, Vec<CompoundSol
     let closed = world.closed_glass_shapes().map(|(object, _)| object).filter(may_contain_light).collect();
     // A solid closed by opaque surfaces may extend beyond its bounding box, so test the center and corners of
     // each light.
-    let encloses_light = |body: &CompoundSolid, light: &LightBoundingBoxPair| {
+    let encloses_light = |body: &CompoundSolid, light: &LightBallAndObjectBoxes| {
         light
             .smaller_box_center_and_corners()
-            .any(|point| world.enclosing_glass_material(body, point, light.object).is_some())
+            .any(|point| world.glass_material_around_point(body, point, light.object).is_some())
     };
-    let mut bodies = world.find_compound_solids();
+    let mut bodies = world.find_compound_glass_solids();
     bodies.retain(|body| {
         light_boxes.iter().any(|light| {
             light.may_light_intersect_box(&body.bounds) || body.is_covered && encloses_light(body, light)
@@ -451,9 +451,9 @@ mod tests {
         // r²ᵢ₊₁ = r²ᵢ·(i + α)/(i + 1), α = 2/3 (Knaus and Zwicker, 2011).
         for (passes, exact) in [(1, 1.0), (100, 0.4882), (1000, 0.3328), (10_000, 0.2267)] {
             assert!(
-                (radius_factor(passes - 1) - exact).abs() < 1e-3,
+                (radius_relative_to_first_pass(passes - 1) - exact).abs() < 1e-3,
                 "{passes}: {}",
-                radius_factor(passes - 1)
+                radius_relative_to_first_pass(passes - 1)
             );
         }
     }

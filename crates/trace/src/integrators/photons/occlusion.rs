@@ -3,7 +3,7 @@
 use super::map::GatherPoint;
 use super::reservoir::PhotonPositionAndNormal;
 use crate::geometry::Ray;
-use crate::lights::LightGeometry;
+use crate::lights::LightSceneGeometry;
 use crate::world::Geometry;
 
 /// Height of the test segment above the surface, in kernel radii, chosen to clear the surface's own
@@ -32,8 +32,10 @@ pub fn is_photon_occluded(
         [look.point + above * look.normal, photon.point + above * photon.normal]
     };
     let is_blocked = |from, to| {
-        geometry
-            .is_occluded_except_by_light(&Ray::segment_ending_before_point(from, to), LightGeometry::Nothing)
+        geometry.is_occluded_except_by_light(
+            &Ray::segment_ending_before_point(from, to),
+            LightSceneGeometry::Nothing,
+        )
     };
     let [from, to] = lifted(ABOVE);
     if !is_blocked(from, to) {

@@ -58,7 +58,7 @@ impl ReservoirPacket {
     /// Chooses a lane in proportion to its total weight and returns the lane's item and index, or `None` if
     /// all weights are 0.
     #[inline(always)]
-    pub fn choose_lane_by_total_weight(&self, random: f32) -> Option<(u32, usize)> {
+    pub fn choose_one_lane_by_weight(&self, random: f32) -> Option<(u32, usize)> {
         let mut left = random * self.totals.iter().sum::<f32>();
         let mut last = None;
         for i in 0..PACKET_SIZE {
@@ -93,7 +93,7 @@ mod tests {
             let mut choices = ReservoirPacket::new(next());
             (0..ITEMS).for_each(|number| choices.add_item(number as u32, &weights[number]));
             let (number, lane) =
-                choices.choose_lane_by_total_weight(next()).expect("some weights should be positive");
+                choices.choose_one_lane_by_weight(next()).expect("some weights should be positive");
             counts[number as usize][lane] += 1;
         }
         for (weight, count) in weights.as_flattened().iter().zip(counts.as_flattened()) {
@@ -101,6 +101,6 @@ mod tests {
             let difference = (f64::from(*count) - expected).abs();
             assert!(difference <= 5.0 * expected.sqrt(), "got {count}, expected {expected}");
         }
-        assert_eq!(ReservoirPacket::new(0.3).choose_lane_by_total_weight(0.5), None);
+        assert_eq!(ReservoirPacket::new(0.3).choose_one_lane_by_weight(0.5), None);
     }
 }

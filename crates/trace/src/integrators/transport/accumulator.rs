@@ -2,7 +2,7 @@
 
 use super::ray::PathRay;
 use crate::integrators::layers::{SampleLayer, SampleLayerValues};
-use crate::integrators::view::{LightAov, RadianceComponentMask};
+use crate::integrators::view::{PathAov, RadianceComponentMask};
 use crate::math::Vec3;
 
 /// A contribution other than reflected light.
@@ -17,14 +17,14 @@ pub enum NonReflectedTerm {
 /// For each path in a bounce's queue, the fraction of its throughput that wide lobes of the path's first
 /// diffuse or glossy vertex reflect. Arbitrary before that vertex.
 #[derive(Default)]
-pub struct DiffuseFractions {
+pub struct PathDiffuseFractions {
     /// Fractions of this bounce's paths.
     pub current: Vec<Vec3>,
     /// Fractions of the next bounce's paths.
     pub next: Vec<Vec3>,
 }
 
-impl DiffuseFractions {
+impl PathDiffuseFractions {
     /// Begins with `count` camera paths.
     pub fn begin_camera_paths(&mut self, count: usize) {
         self.current.clear();
@@ -38,7 +38,7 @@ impl DiffuseFractions {
     }
 
     /// Starts the next bounce.
-    pub fn next_bounce(&mut self) {
+    pub fn start_next_bounce(&mut self) {
         std::mem::swap(&mut self.current, &mut self.next);
         self.next.clear();
     }
@@ -49,14 +49,14 @@ pub struct LayerAccumulator<'a> {
     /// The layers' values.
     pub values: &'a mut SampleLayerValues,
     /// The paths' diffuse fractions, or `None` if no component of the light is recorded.
-    pub fractions: Option<&'a mut DiffuseFractions>,
+    pub fractions: Option<&'a mut PathDiffuseFractions>,
 }
 
 impl LayerAccumulator<'_> {
     /// Adds light to a layer. Out of line because most images have no layers.
     #[inline(never)]
     fn add(&mut self, layer: SampleLayer, slot: u32, light: Vec3) {
-        self.values.add(layer, slot, light);
+        self.values.add_to_sample(layer, slot, light);
     }
 }
 
@@ -64,7 +64,7 @@ impl LayerAccumulator<'_> {
 /// and ambient light are added first, followed by reflected light, in path order.
 pub struct Accumulator<'a> {
     /// The AOV to accumulate.
-    pub aov: LightAov,
+    pub aov: PathAov,
     /// Radiance sums, indexed by slot.
     pub radiance: &'a mut [Vec3],
     /// Upper bound on contributions from vertices that the camera does not see, or 0 for no bound.
@@ -76,7 +76,7 @@ pub struct Accumulator<'a> {
 impl Accumulator<'_> {
     /// The paths' diffuse fractions, if they are needed for the layers.
     #[inline]
-    pub fn diffuse_fractions(&mut self) -> Option<&mut DiffuseFractions> {
+    pub fn diffuse_fractions(&mut self) -> Option<&mut PathDiffuseFractions> {
         self.layers.as_mut()?.fractions.as_deref_mut()
     }
 
@@ -92,7 +92,7 @@ impl Accumulator<'_> {
     /// Part of the light at a path's vertex that counts as diffuse. `visible` is this part if the camera sees
     /// the vertex.
     #[inline]
-    pub fn diffuse_part(&self, place: u32, light: Vec3, visible: Option<Vec3>) -> Vec3 {
+    pub fn diffuse_part_of_light(&self, place: u32, light: Vec3, visible: Option<Vec3>) -> Vec3 {
         let fractions = self.layers.as_ref().and_then(|layers| layers.fractions.as_deref());
         fractions.map_or(Vec3::ZERO, |fractions| {
             visible.unwrap_or_else(|| light * fractions.current[place as usize])
@@ -117,11 +117,11 @@ impl Accumulator<'_> {
     /// Adds light from a source that path `place` hits after its first diffuse or glossy surface.
     pub fn add_emitter_hit(&mut self, path: &PathRay, place: u32, radiance: Vec3) {
         match self.aov {
-            LightAov::Radiance(parts) if path.state.contributes_to_view(parts.paths) => {
-                let diffuse = self.diffuse_part(place, radiance, None);
+            PathAov::Radiance(parts) if path.state.contributes_to_view(parts.paths) => {
+                let diffuse = self.diffuse_part_of_light(place, radiance, None);
                 self.add_clamped_direct(path.slot, (radiance, diffuse), false);
             }
-            LightAov::Radiance(_) | LightAov::LitFraction | LightAov::TraversalCost => {}
+            PathAov::Radiance(_) | PathAov::LitFraction | PathAov::TraversalCost => {}
         }
     }
 
@@ -133,16 +133,16 @@ impl Accumulator<'_> {
     /// Radiance components to accumulate.
     fn components_to_accumulate(&self) -> RadianceComponentMask {
         match self.aov {
-            LightAov::Radiance(parts) => parts,
-            LightAov::LitFraction | LightAov::TraversalCost => RadianceComponentMask::NONE,
+            PathAov::Radiance(parts) => parts,
+            PathAov::LitFraction | PathAov::TraversalCost => RadianceComponentMask::NONE,
         }
     }
 
     /// Whether any reflected light is accumulated.
     pub fn accepts_reflected(&self) -> bool {
         match self.aov {
-            LightAov::Radiance(parts) => parts.has_reflected(),
-            LightAov::LitFraction | LightAov::TraversalCost => true,
+            PathAov::Radiance(parts) => parts.has_reflected(),
+            PathAov::LitFraction | PathAov::TraversalCost => true,
         }
     }
 
@@ -163,7 +163,7 @@ impl Accumulator<'_> {
         if path.state.only_specular_before {
             self.add_non_reflected(path.slot, NonReflectedTerm::Ambient, radiance);
         } else if self.accepts_ambient(path) {
-            let diffuse = self.diffuse_part(place, radiance, None);
+            let diffuse = self.diffuse_part_of_light(place, radiance, None);
             self.add_clamped_direct(path.slot, (radiance, diffuse), false);
         }
     }

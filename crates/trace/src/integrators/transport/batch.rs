@@ -4,7 +4,7 @@ use super::tile::TileContext;
 use super::vertex::{ScatteringGeometry, ShadingVertex};
 use crate::geometry::Ray;
 use crate::geometry::packet::set_bit_lanes;
-use crate::integrators::view::{LightAov, RadianceComponentMask};
+use crate::integrators::view::{PathAov, RadianceComponentMask};
 use crate::materials::bsdf::BsdfValues;
 use crate::materials::bxdf::ShadingGeometry;
 use crate::materials::{BsdfPacket, BxdfKind};
@@ -91,11 +91,11 @@ impl VertexBatch {
     const MIN_WIDTH_RATIO: f32 = 1.5;
 
     /// Mask of vertices whose highlights are too narrow for reliable light sampling.
-    pub fn sharp_lobe_mask(&self, tile: &TileContext<'_>, aov: LightAov) -> u32 {
+    pub fn sharp_lobe_mask(&self, tile: &TileContext<'_>, aov: PathAov) -> u32 {
         let shows = match aov {
-            LightAov::Radiance(RadianceComponentMask { specular, .. }) => specular,
-            LightAov::LitFraction => false,
-            LightAov::TraversalCost => true,
+            PathAov::Radiance(RadianceComponentMask { specular, .. }) => specular,
+            PathAov::LitFraction => false,
+            PathAov::TraversalCost => true,
         };
         let is_soft = tile.settings.render.shadows == ShadowMode::Soft;
         if !(self.bsdf.has_narrow_lobes() && shows && is_soft && tile.world.lights.can_be_hit()) {
@@ -169,7 +169,7 @@ impl VertexBatch {
         i: usize,
         tile: &TileContext<'_>,
         lit: &ShadingVertex<'_>,
-        aov: LightAov,
+        aov: PathAov,
         interiors: u32,
     ) {
         let ShadingVertex { path, place, vertex, shading, bsdf, .. } = lit;

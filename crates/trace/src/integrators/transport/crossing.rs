@@ -52,7 +52,7 @@ impl TileContext<'_> {
         let meeting = CoincidenceQuery { hit, surface: &vertex.surface, normal: vertex.normal, lead };
         let sides = self.world.find_coincident_surfaces_at(&meeting, around, |near| found.push(near));
         let (before, far) = self.media_on_both_sides(&path.interiors, found);
-        let opaque = found.iter().filter_map(|near| self.hit_if_opaque(near));
+        let opaque = found.iter().filter_map(|near| self.hit_if_not_glass(near));
         let opaque = opaque.min_by(|a, b| a.shape.t.total_cmp(&b.shape.t).then(a.object.cmp(&b.object)));
         InterfaceCrossing { sides, before, far, opaque }
     }
@@ -72,17 +72,17 @@ impl TileContext<'_> {
         // With only closed shapes, most rays enter at most one shape.
         if !self.world.has_open_glass() {
             match *found {
-                [] => return (None, known.retained(is_only_recorded)),
+                [] => return (None, known.filter_solids(is_only_recorded)),
                 [CoincidentOrEnclosingSurface::Around { object, material }] => {
                     let entered = Interior { body: object, material };
-                    return (None, known.retained(is_only_recorded).entered(entered));
+                    return (None, known.filter_solids(is_only_recorded).entered(entered));
                 }
                 [CoincidentOrEnclosingSurface::Surface { .. }] | [_, _, ..] => {}
             }
         }
         // Start with the recorded media, without open solids.
         let (mut arrived, mut near) = (*known, self.interiors_without_open_solids(*known));
-        let mut far = near.retained(is_only_recorded);
+        let mut far = near.filter_solids(is_only_recorded);
         let crossed = |as_front: bool| {
             found.iter().filter_map(move |surface_or_solid| match *surface_or_solid {
                 CoincidentOrEnclosingSurface::Surface { hit, material, is_front } if is_front == as_front => {
@@ -101,7 +101,7 @@ impl TileContext<'_> {
         });
         // Leave the solids whose back faces are hit.
         for glass in crossed(false) {
-            if self.world.is_open_solid(glass.body) {
+            if self.world.is_glass_solid_open(glass.body) {
                 near = near.entered(glass);
                 arrived = if arrived.exited(glass).is_none() { arrived.entered(glass) } else { arrived };
                 continue;
@@ -144,12 +144,12 @@ impl TileContext<'_> {
     /// Removes the open solids from a medium.
     pub fn interiors_without_open_solids(&self, interiors: InteriorList) -> InteriorList {
         if self.world.has_open_glass() {
-            return interiors.retained(|glass| !self.world.is_open_solid(glass.body));
+            return interiors.filter_solids(|glass| !self.world.is_glass_solid_open(glass.body));
         }
         interiors
     }
 
-    fn hit_if_opaque(&self, surface_or_solid: &CoincidentOrEnclosingSurface) -> Option<Hit> {
+    fn hit_if_not_glass(&self, surface_or_solid: &CoincidentOrEnclosingSurface) -> Option<Hit> {
         match *surface_or_solid {
             CoincidentOrEnclosingSurface::Around { .. } => None,
             CoincidentOrEnclosingSurface::Surface { hit, material, .. } => {

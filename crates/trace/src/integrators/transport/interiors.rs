@@ -74,7 +74,7 @@ impl InteriorList {
     }
 
     /// Keeps only the solids for which `holds` returns true.
-    pub fn retained(self, holds: impl Fn(Interior) -> bool) -> Self {
+    pub fn filter_solids(self, holds: impl Fn(Interior) -> bool) -> Self {
         let mut left = Self::default();
         for &glass in self.solids() {
             if holds(glass) {
@@ -189,7 +189,7 @@ mod tests {
     fn retained_keeps_order() {
         let both = InteriorList::default().entered(part(3, 0)).entered(part(1, 5)).entered(part(2, 0));
         let odd = InteriorList::default().entered(part(1, 5)).entered(part(3, 0));
-        assert_eq!(both.retained(|glass| glass.body != 2), odd);
-        assert_eq!(both.retained(|_| false), InteriorList::default());
+        assert_eq!(both.filter_solids(|glass| glass.body != 2), odd);
+        assert_eq!(both.filter_solids(|_| false), InteriorList::default());
     }
 }

@@ -12,7 +12,7 @@ use crate::control::Canceled;
 use crate::geometry::packet::{self, HitPacket, RayPacket};
 use crate::geometry::surface_packet::SurfacePacket;
 use crate::geometry::{Ray, SurfacePoint};
-use crate::integrators::view::LightAov;
+use crate::integrators::view::PathAov;
 use crate::materials::NonSpecular;
 use crate::materials::bsdf::ShownLobes;
 use crate::math::lanes::{F32x16, Simd, TRUE, Vec3x16, lane, set_lane};
@@ -115,7 +115,7 @@ impl TileContext<'_> {
     pub fn intersect_packet(
         &self,
         rays: PacketSource<'_>,
-        aov: LightAov,
+        aov: PathAov,
         are_lit: bool,
         (row, surface): (&mut VertexBatch, &mut SurfacePacket),
     ) -> PacketHits {
@@ -139,7 +139,7 @@ impl TileContext<'_> {
 
     /// Packet-shading data and non-specular BSDF of a material, or `None` if the material is not plain.
     #[inline(always)]
-    pub fn plain_packet_material(&self, material: usize) -> Option<(&PacketMaterial, &NonSpecular)> {
+    pub fn packet_material_if_plain(&self, material: usize) -> Option<(&PacketMaterial, &NonSpecular)> {
         let (plain, rough) = self.world.material_for_packet_shading(material)?;
         // A textured ambient color needs a lookup per surface.
         let has_ambient = self.settings.render.ambient != Vec3::ZERO;
@@ -150,7 +150,7 @@ impl TileContext<'_> {
 struct PacketIntersector<'a> {
     tile: &'a TileContext<'a>,
     rays: PacketSource<'a>,
-    aov: LightAov,
+    aov: PathAov,
     are_lit: bool,
     row: &'a mut VertexBatch,
     surface: &'a mut SurfacePacket,
@@ -288,7 +288,9 @@ impl PacketIntersector<'_> {
             while waiting != 0 {
                 let (material, alike) = first_index_and_matching_lanes(&materials, waiting, simd);
                 waiting &= !alike;
-                let Some((material, rough)) = tile.plain_packet_material(material as usize) else { continue };
+                let Some((material, rough)) = tile.packet_material_if_plain(material as usize) else {
+                    continue;
+                };
                 if plain.all | of == 0 {
                     row.bsdf.set_kind(material.kind);
                 } else if row.bsdf.kind() != material.kind {
@@ -331,7 +333,7 @@ impl PacketIntersector<'_> {
             for (rough, has_uv, of) in groups {
                 plain.lookups += if has_uv { u64::from(of.count_ones()) } else { 0 };
                 let shown = [(of, aov.lobes()), (of & !row.only_specular_before, ShownLobes::ALL)];
-                let shown = if *aov == LightAov::ALL { &shown[..1] } else { &shown };
+                let shown = if *aov == PathAov::ALL { &shown[..1] } else { &shown };
                 let black =
                     row.bsdf.evaluate_material_into_lanes(rough, has_uv.then_some(&surface.uv), shown, simd);
                 row.used |= of & !black;

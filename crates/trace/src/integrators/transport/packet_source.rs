@@ -18,7 +18,7 @@ pub enum PacketSource<'a> {
 
 impl PacketSource<'_> {
     /// Number of lanes, which may include lanes without a camera ray.
-    pub fn count(&self) -> usize {
+    pub fn lane_count(&self) -> usize {
         match self {
             Self::Camera(_, _, count, _) => *count,
             Self::Paths(paths, _) => paths.len(),
@@ -28,7 +28,7 @@ impl PacketSource<'_> {
 
     /// Mask of the lanes with a ray.
     pub fn mask(&self) -> u32 {
-        let all = ((1_u64 << self.count()) - 1) as u32;
+        let all = ((1_u64 << self.lane_count()) - 1) as u32;
         match self {
             Self::Camera(row, ..) => all & row.valid,
             Self::Paths(..) | Self::Traced(..) => all,

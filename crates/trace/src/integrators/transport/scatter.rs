@@ -1,6 +1,6 @@
 //! BSDF sampling at diffuse and glossy surfaces, sixteen at a time, and Russian roulette.
 
-use super::accumulator::DiffuseFractions;
+use super::accumulator::PathDiffuseFractions;
 use super::batch::{BsdfValuesAndCosines, VertexBatch};
 use super::cone::RayCone;
 use super::interface::SCATTERED;
@@ -18,7 +18,7 @@ use crate::world::SimdKernel;
 
 /// How paths continue after a bounce.
 #[derive(Clone, Copy, Debug)]
-pub struct BounceContinuation {
+pub struct BounceContinuationRules {
     /// Whether paths continue. After the last bounce, they continue only if they may hit a light.
     pub continues: bool,
     /// Whether Russian roulette applies.
@@ -27,7 +27,7 @@ pub struct BounceContinuation {
     pub lobes: LobesToSample,
 }
 
-impl BounceContinuation {
+impl BounceContinuationRules {
     /// Number of bounces before Russian roulette begins.
     const MIN_DEPTH: u32 = 3;
     /// Reciprocal of the throughput below which Russian roulette may end a path.
@@ -75,7 +75,7 @@ pub struct BsdfSampler<'a> {
     /// Mask of vertices whose paths continue.
     pub used: u32,
     /// How the paths continue.
-    pub continuation: BounceContinuation,
+    pub continuation: BounceContinuationRules,
     /// Whether the diffuse fractions of the paths are needed.
     pub has_fractions: bool,
 }
@@ -112,7 +112,7 @@ impl BsdfSampler<'_> {
         interior_lists: &InteriorListPool,
         cones: &[RayCone],
         next: &mut Vec<PathRay>,
-        fractions: Option<&mut DiffuseFractions>,
+        fractions: Option<&mut PathDiffuseFractions>,
     ) {
         // Sample the BSDFs of all vertices in the packet.
         let row = self.row;
@@ -145,7 +145,7 @@ impl BsdfSampler<'_> {
             path
         }));
         if let Some(fractions) = fractions {
-            let DiffuseFractions { current, next } = fractions;
+            let PathDiffuseFractions { current, next } = fractions;
             next.extend(set_bit_lanes(scattered.alive).map(|i| {
                 if row.only_specular_before & 1 << i != 0 {
                     lane(&scattered.diffuse, i)

@@ -10,7 +10,7 @@ use crate::geometry::ray::offset_origin;
 use crate::geometry::{Ray, SurfacePoint, SurfaceRequest};
 use crate::integrators::RayCounters;
 use crate::materials::{
-    BxdfPoint, Footprint, Material, Mirror, SpecularOverBase, SpecularPart, TexturePoint, ThinDielectric,
+    BxdfPoint, Footprint, Material, Mirror, SpecularLayer, SpecularOverBase, TexturePoint, ThinDielectric,
 };
 use crate::math::Vec3;
 use crate::sampling::Dimension;
@@ -203,7 +203,7 @@ impl<'a> SurfaceVertex<'a> {
     }
 
     /// Vertex for transmitted light, on the side facing away from the viewer.
-    pub fn far_side(&self) -> Self {
+    pub fn seen_from_far_side(&self) -> Self {
         let turned =
             |OffsetPoints { before, beyond }: OffsetPoints| OffsetPoints { before: beyond, beyond: before };
         Self {
@@ -266,8 +266,8 @@ impl<'a> SurfaceVertex<'a> {
     ) -> SpecularLobe {
         let cosine = shading.normal.dot(self.wo).abs().min(1.0);
         let mirror = match &layers.specular {
-            SpecularPart::Mirror(mirror) => self.mirror_reflectance(mirror, shading, is_colored, counters),
-            SpecularPart::SmoothCoat { .. } => Vec3::ONE,
+            SpecularLayer::Mirror(mirror) => self.mirror_reflectance(mirror, shading, is_colored, counters),
+            SpecularLayer::SmoothCoat { .. } => Vec3::ONE,
         };
         let lookups = &mut counters.texture_lookups;
         let probability = layers.specular_probability(cosine, mirror, &self.texture_point, lookups);
@@ -275,14 +275,14 @@ impl<'a> SurfaceVertex<'a> {
     }
 
     /// Reflectance of the δ lobe, divided by the probability of choosing it.
-    pub fn specular_weight(
+    pub fn specular_sample_weight(
         &self,
         layers: &SpecularOverBase,
         lobe: &SpecularLobe,
         counters: &mut RayCounters,
     ) -> Vec3 {
         let &SpecularLobe { cosine, mirror, probability: _ } = lobe;
-        layers.specular_weight(cosine, mirror, &self.texture_point, &mut counters.texture_lookups)
+        layers.specular_sample_weight(cosine, mirror, &self.texture_point, &mut counters.texture_lookups)
     }
 
     /// ∂p/∂u, or zero on a mesh without texture coordinates, where u is not defined.
@@ -424,7 +424,7 @@ pub struct ShadowOriginLiftSegment {
 
 impl PerturbedAndSmoothNormals {
     /// Returns the normals on the other side.
-    pub fn far_side(&self) -> Self {
+    pub fn seen_from_far_side(&self) -> Self {
         Self {
             normal: -self.normal,
             smooth_normal: -self.smooth_normal,

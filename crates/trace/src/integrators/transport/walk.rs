@@ -44,7 +44,7 @@ pub struct Interface<'v> {
 /// Handles the interactions of paths. Implemented by the camera path and photon wavefronts.
 pub trait PathStepper<'a> {
     /// Tile context.
-    fn tile(&self) -> &'a TileContext<'a>;
+    fn tile_context(&self) -> &'a TileContext<'a>;
 
     /// Buffers for the search for coincident surfaces.
     fn coincident_surface_buffers(&mut self) -> &mut CoincidentSurfaceBuffers;
@@ -97,7 +97,7 @@ impl SegmentFromLastVertex {
     const DIRECT: Self = Self { origin: Vec3::ZERO, distance: 0.0, count: 0 };
 
     /// Extends the segment across another surface, which the path hits at this distance.
-    fn extended_past_surface(self, path: &PathRay, distance: f32) -> Self {
+    fn extended_across_surface(self, path: &PathRay, distance: f32) -> Self {
         let origin = if self.count == 0 { path.ray.origin } else { self.origin };
         Self { origin, distance: self.distance + distance, count: self.count + 1 }
     }
@@ -139,7 +139,7 @@ pub fn walk_to_interaction<'a, W: PathStepper<'a>>(
     path: &mut PathRay,
     (hit, mut surface): (Hit, Option<SurfacePoint>),
 ) {
-    let tile = stepper.tile();
+    let tile = stepper.tile_context();
     let (mut way, mut hidden, mut next) = (SegmentFromLastVertex::DIRECT, 0, Some(hit));
     loop {
         let has_passed = hidden > 0;
@@ -161,7 +161,7 @@ pub fn walk_to_interaction<'a, W: PathStepper<'a>>(
                 match null_interaction_outcome(stepper, path, &vertex, (way, hit)) {
                     NullInteractionOutcome::Passed(_) if way.count == MAX_NULL_INTERACTIONS => return,
                     NullInteractionOutcome::Passed(part) => {
-                        way = way.extended_past_surface(path, hit.shape.t);
+                        way = way.extended_across_surface(path, hit.shape.t);
                         *path = path_past_surface(*path, &vertex, part);
                         next = tile.world.geometry.closest_hit(&path.ray);
                         stepper.record_surface_crossing(path, next);
@@ -175,7 +175,7 @@ pub fn walk_to_interaction<'a, W: PathStepper<'a>>(
                 path.interiors = tile.interiors_without_open_solids(path.interiors);
             }
             let mut far = path.interiors;
-            if vertex.material.bsdf.is_transmissive() && tile.world.has_glass() {
+            if vertex.material.bsdf.has_non_specular_transmission() && tile.world.has_glass() {
                 // The path may be inside glass that touches the surface.
                 let crossing =
                     tile.find_interface_crossing(path, &vertex, &hit, stepper.coincident_surface_buffers());
@@ -248,7 +248,7 @@ fn rough_dielectric_point<'a, W: PathStepper<'a>>(
     (vertex, hit): (&SurfaceVertex<'a>, &Hit),
     (sides, far): (OffsetPoints, &InteriorList),
 ) -> Option<RoughDielectricPoint> {
-    let tile = stepper.tile();
+    let tile = stepper.tile_context();
     let interior_lists = [&path.interiors, far];
     let indices = interior_lists.map(|interiors| medium_ior(tile.world, interiors));
     let boundary =
@@ -272,13 +272,13 @@ fn null_interaction_outcome<'a, W: PathStepper<'a>>(
     vertex: &SurfaceVertex<'a>,
     (way, hit): (SegmentFromLastVertex, Hit),
 ) -> NullInteractionOutcome {
-    if !stochastic_opacity_test(stepper.tile(), path, vertex, stepper.texture_lookup_counter()) {
+    if !stochastic_opacity_test(stepper.tile_context(), path, vertex, stepper.texture_lookup_counter()) {
         return NullInteractionOutcome::Passed(Vec3::ONE);
     }
     let Some(pane) = vertex.material.bsdf.as_thin_dielectric() else { return NullInteractionOutcome::Opaque };
     let mut whole = *path;
     let hit = way.rebase_ray_to_last_vertex(&mut whole, hit);
-    whole.interiors = stepper.tile().interiors_without_open_solids(whole.interiors);
+    whole.interiors = stepper.tile_context().interiors_without_open_solids(whole.interiors);
     stepper.handle_pane(&whole, vertex, DirectOrCoincidentHit::Direct(hit), pane)
 }
 
@@ -292,12 +292,12 @@ fn is_stopped_by_coincident_surface<'a, W: PathStepper<'a>>(
     vertex: &SurfaceVertex<'a>,
 ) -> bool {
     vertex.material.bsdf.as_thin_dielectric().is_none()
-        && stochastic_opacity_test(stepper.tile(), path, vertex, stepper.texture_lookup_counter())
+        && stochastic_opacity_test(stepper.tile_context(), path, vertex, stepper.texture_lookup_counter())
 }
 
 /// Opacity of the surface at a vertex. If light samples compete with the path, the texture is looked up
 /// without filtering, as for shadow rays.
-pub fn opacity_at(path: &PathRay, vertex: &SurfaceVertex<'_>, lookups: &mut u64) -> f32 {
+pub fn opacity_at_path_vertex(path: &PathRay, vertex: &SurfaceVertex<'_>, lookups: &mut u64) -> f32 {
     let Some(opacity) = &vertex.material.opacity else { return 1.0 };
     let is_shared = path.state.pdf > 0.0;
     let at = vertex.texture_lookup_point(is_shared);
@@ -311,7 +311,7 @@ fn stochastic_opacity_test(
     vertex: &SurfaceVertex<'_>,
     lookups: &mut u64,
 ) -> bool {
-    let chance = opacity_at(path, vertex, lookups);
+    let chance = opacity_at_path_vertex(path, vertex, lookups);
     chance >= 1.0 || tile.sampler_for_slot(path.slot).pair(path.path, Dimension::Opacity).x < chance
 }
 

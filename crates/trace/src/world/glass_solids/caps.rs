@@ -1,6 +1,6 @@
 //! Open rims that end at opaque surfaces, where light can reach the other side only through the glass.
 
-use super::parts::{GlassTriangleCoverage, OpenGlassParts, RimEdge, glass_triangle_coverage};
+use super::parts::{GlassTriangles, OpenGlassParts, RimEdge, which_triangles_are_glass};
 use crate::accel::Bvh;
 use crate::assets::LoadedMesh;
 use crate::control::{CancelToken, Canceled};
@@ -97,7 +97,7 @@ impl OpaqueSurfaceQuery {
     }
 
     /// Whether a triangle satisfies the query.
-    fn meets_triangle(&self, corners: [DVec3; 3]) -> bool {
+    fn is_satisfied_by_triangle(&self, corners: [DVec3; 3]) -> bool {
         match *self {
             Self::Way(way) => ray_hits_triangle(&way, corners),
             Self::Point(point, reach) => squared_distance_to_triangle(point, corners) <= reach * reach,
@@ -132,7 +132,7 @@ fn evaluate_opaque_surface_queries(
     let tree = Bvh::build(&bounds, token)?;
     let mut answers = vec![false; queries.len()];
     for object in &scene.objects {
-        if glass_triangle_coverage(scene, meshes, object) == Some(GlassTriangleCoverage::All) {
+        if which_triangles_are_glass(scene, meshes, object) == Some(GlassTriangles::All) {
             continue;
         }
         token.check_pause_and_cancel()?;
@@ -150,7 +150,7 @@ fn evaluate_opaque_surface_queries(
                     if around.overlaps(&all) {
                         tree.visit_overlapping(&around, |id| {
                             let id = id as usize;
-                            answers[id] = answers[id] || queries[id].meets_triangle(corners);
+                            answers[id] = answers[id] || queries[id].is_satisfied_by_triangle(corners);
                         });
                     }
                 }

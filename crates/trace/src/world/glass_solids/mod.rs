@@ -101,7 +101,7 @@ impl GlassSolids {
         solids.parts = (0..scene.objects.len() as u32).map(alone).collect();
         let all = groups.parts_by_solid();
         let holes = SolidHole::find_per_solid(&parts, &groups, &all, &shared_edges);
-        let covered = hole_covered_flags(scene, meshes, &parts, &holes, token)?;
+        let covered = covered_flag_per_hole(scene, meshes, &parts, &holes, token)?;
         let mut closed: Vec<ClosedSolid> = Vec::new();
         for ((members, hole), &is_covered) in all.iter().zip(&holes).zip(&covered) {
             let is_open = hole.part > SMALL_HOLE && !is_covered;
@@ -113,7 +113,7 @@ impl GlassSolids {
                 let is_inside_out = is_first_part_inside_out != groups.flips[part as usize];
                 solids.parts[object as usize] =
                     ObjectRoleInSolid { place: place.unwrap_or(object), is_inside_out, is_open };
-                solids.open.extend(hole.open_glass_from_hole_at_part(part, object, is_covered));
+                solids.open.extend(hole.describe_border_with_part(part, object, is_covered));
             }
             if hole.part <= NO_HOLE && groups.have_zero_volume(&parts, members) {
                 solids.flat.extend(members.first().map(|&part| parts.list[part as usize].object));
@@ -180,7 +180,7 @@ impl GlassSolids {
 }
 
 /// Whether opaque surfaces surround each hole.
-fn hole_covered_flags(
+fn covered_flag_per_hole(
     scene: &Scene,
     meshes: &[&LoadedMesh],
     parts: &OpenGlassParts,
@@ -379,7 +379,7 @@ impl SolidHole {
 
     /// Describes the hole where it borders one part. Returns `None` if the part does not border the hole or
     /// the hole is attributed to rounding.
-    fn open_glass_from_hole_at_part(&self, part: u32, object: u32, is_covered: bool) -> Option<OpenGlass> {
+    fn describe_border_with_part(&self, part: u32, object: u32, is_covered: bool) -> Option<OpenGlass> {
         let own = || self.rims.iter().zip(&self.disagree).filter(|(rim, _)| rim.part == part);
         let edges = own().count();
         let disagrees = own().all(|(_, disagrees)| *disagrees);

@@ -69,7 +69,7 @@ impl OpenGlassParts {
         let mut parts = Self::default();
         let mut open_of_file: HashMap<usize, Vec<[u32; 2]>> = HashMap::new();
         for (number, object) in (0_u32..).zip(&scene.objects) {
-            let Some(glass) = glass_triangle_coverage(scene, meshes, object) else { continue };
+            let Some(glass) = which_triangles_are_glass(scene, meshes, object) else { continue };
             token.check_pause_and_cancel()?;
             if parts.list.is_empty() {
                 parts.origin = point_on_or_inside_shape(&object.shape, meshes);
@@ -191,15 +191,15 @@ impl OpenGlassParts {
         object: u32,
         placed: &MeshReference,
         loaded: &LoadedMesh,
-        glass: GlassTriangleCoverage,
+        glass: GlassTriangles,
         open: &[[u32; 2]],
     ) {
         let mesh = &loaded.mesh;
         let place = placed.placed.to_transform().relative_to_origins(mesh.origin, self.origin);
         let mirrors = place.flips_handedness();
         let is_glass = |triangle: usize| match glass {
-            GlassTriangleCoverage::All => true,
-            GlassTriangleCoverage::Some => mesh
+            GlassTriangles::All => true,
+            GlassTriangles::Some => mesh
                 .materials
                 .get(triangle)
                 .is_some_and(|&own| loaded.materials.get(own as usize).is_some_and(FileMaterial::is_glass)),
@@ -245,7 +245,7 @@ fn point_on_or_inside_shape(shape: &Shape, meshes: &[&LoadedMesh]) -> DVec3 {
 
 /// Which of an object's triangles are glass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum GlassTriangleCoverage {
+pub(super) enum GlassTriangles {
     /// All triangles, or the whole object if it is not a mesh.
     All,
     /// Triangles whose material in the mesh file is glass.
@@ -253,20 +253,16 @@ pub(super) enum GlassTriangleCoverage {
 }
 
 /// Returns which triangles of an object are glass, or `None` if the object contains no glass.
-pub(super) fn glass_triangle_coverage(
+pub(super) fn which_triangles_are_glass(
     scene: &Scene,
     meshes: &[&LoadedMesh],
     object: &Object,
-) -> Option<GlassTriangleCoverage> {
+) -> Option<GlassTriangles> {
     match (object.material, object.shape.as_mesh()) {
-        (Some(index), _) => {
-            scene.materials[index].kind.is_solid_glass().then_some(GlassTriangleCoverage::All)
+        (Some(index), _) => scene.materials[index].kind.is_solid_glass().then_some(GlassTriangles::All),
+        (None, Some(mesh)) => {
+            meshes[mesh.file].materials.iter().any(FileMaterial::is_glass).then_some(GlassTriangles::Some)
         }
-        (None, Some(mesh)) => meshes[mesh.file]
-            .materials
-            .iter()
-            .any(FileMaterial::is_glass)
-            .then_some(GlassTriangleCoverage::Some),
         (None, None) => None,
     }
 }

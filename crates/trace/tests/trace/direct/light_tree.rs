@@ -1,7 +1,7 @@
 //! Tests of picking lights from a tree.
 
 use super::{Estimate, LitScene, ReferenceLight};
-use crate::integrators::LightAov;
+use crate::integrators::PathAov;
 use crate::integrators::direct::all_lights::SampleAllLights;
 use crate::integrators::direct::light_tree::LightPicks;
 use crate::integrators::direct::mis::CompetingTechnique;
@@ -36,7 +36,7 @@ fn picks_of(scene: &LitScene, row: &VertexBatch, samples: u32) -> (Vec<LightPick
         tile: &tile,
         row,
         used: row.used,
-        aov: LightAov::ALL,
+        aov: PathAov::ALL,
         competing: CompetingTechnique::Paths,
         interior_lists: None,
         only_infinite: false,

@@ -17,9 +17,9 @@ use crate::integrators::direct::shadow_rays::ShadowRayQueue;
 use crate::integrators::transport::batch::{ALL, BatchVertex, VertexBatch};
 use crate::integrators::transport::interiors::InteriorListPool;
 use crate::integrators::transport::ray::PathRay;
-use crate::integrators::transport::scatter::{BounceContinuation, BsdfSampler};
+use crate::integrators::transport::scatter::{BounceContinuationRules, BsdfSampler};
 use crate::integrators::transport::tile::{SampleBlock, TileContext};
-use crate::integrators::{LayerSet, LightAov, RenderSettings, ViewMode};
+use crate::integrators::{LayerSet, PathAov, RenderSettings, ViewMode};
 use crate::materials::bsdf::{LobesToSample, ShownLobes};
 use crate::materials::bxdf::ShadingGeometry;
 use crate::materials::microfacet::MicrofacetDistribution;
@@ -183,7 +183,7 @@ impl LitScene {
             tile,
             row,
             used: row.used,
-            aov: LightAov::ALL,
+            aov: PathAov::ALL,
             competing,
             interior_lists: None,
             only_infinite: false,
@@ -191,19 +191,19 @@ impl LitScene {
         };
         let mut pool = ShadowRayQueue::default();
         let mut sums = [lighting.sample_all_or_picked_lights(0, &mut pool)];
-        pool.trace(tile, LightAov::ALL, &mut sums);
+        pool.trace(tile, PathAov::ALL, &mut sums);
         let [sums] = sums;
         sums
     }
 
     /// Adds the light found by lobe rays to `sums`.
     fn trace_lobe_rays(&self, row: &VertexBatch, sharp: u32, sums: &LightSums) -> [f32; PACKET_SIZE] {
-        let arrived = sums.reflected_light_for_aov(LightAov::ALL);
+        let arrived = sums.reflected_light_for_aov(PathAov::ALL);
         let kernel = LobeRayTracingKernel {
             tile: &self.tile(),
             row,
             sharp,
-            aov: LightAov::ALL,
+            aov: PathAov::ALL,
             interior_lists: None,
             arrived,
         };
@@ -212,7 +212,7 @@ impl LitScene {
 
     /// Rays in BSDF-sampled directions.
     fn scattered_paths(&self, row: &VertexBatch, lobes: LobesToSample) -> Vec<PathRay> {
-        let continuation = BounceContinuation { continues: true, uses_roulette: false, lobes };
+        let continuation = BounceContinuationRules { continues: true, uses_roulette: false, lobes };
         let tile = &self.tile();
         let mut paths = Vec::new();
         BsdfSampler { tile, row, used: row.used, continuation, has_fractions: false }.queue_scattered_paths(

@@ -38,7 +38,7 @@ fn open_json(json: &Value) -> Result<GltfFile, AssetError> {
 }
 
 fn part(container: &GltfFile, number: usize) -> Result<LoadedMesh, AssetError> {
-    container.build_part(number, &ignore_progress, &CancelToken::new())
+    container.build_part_mesh(number, &ignore_progress, &CancelToken::new())
 }
 
 fn scene(container: &GltfFile) -> Result<ModelScene, AssetError> {

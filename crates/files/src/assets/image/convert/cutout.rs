@@ -6,7 +6,7 @@ use super::{
     Sample, alpha_sample_index, apply_transfer_curves_to_pixel, is_channel_filled_with, pixel_rgb, sanitize,
     with_samples,
 };
-use crate::assets::image::metadata::{AlphaInterpretation, ImageMetadata};
+use crate::assets::image::metadata::{AlphaInterpretation, ImageColorMetadata};
 use crate::assets::image::space::ColorSpace;
 use crate::assets::image::{ColorEncoding, ColorTransferFunction};
 use crate::materials::texels::{TexelData, Texels};
@@ -17,7 +17,7 @@ use crate::math::color::srgb_to_linear;
 pub(super) fn alpha_weighted_texels(
     image: DynamicImage,
     curve: ColorTransferFunction,
-    metadata: &ImageMetadata,
+    metadata: &ImageColorMetadata,
 ) -> Texels {
     let Some(alpha) =
         alpha_sample_index(&image, metadata).filter(|alpha| !is_channel_filled_with(&image, *alpha, 1.0))

@@ -6,7 +6,7 @@ mod scalars;
 use ::image::{ColorType, DynamicImage};
 
 use super::ColorEncoding;
-use super::metadata::{AlphaInterpretation, ImageMetadata};
+use super::metadata::{AlphaInterpretation, ImageColorMetadata};
 use super::space::ColorSpace;
 use crate::materials::ChannelSelector;
 use crate::materials::texels::{TexelData, Texels};
@@ -94,7 +94,7 @@ fn channel_count(image: &DynamicImage) -> usize {
 }
 
 /// Index of the alpha sample, if the image has alpha.
-fn alpha_sample_index(image: &DynamicImage, metadata: &ImageMetadata) -> Option<usize> {
+fn alpha_sample_index(image: &DynamicImage, metadata: &ImageColorMetadata) -> Option<usize> {
     let index = match channel_count(image) {
         2 => 1,
         4 => 3,
@@ -124,7 +124,7 @@ fn is_channel_filled_with(image: &DynamicImage, index: usize, value: f32) -> boo
 pub(super) fn constant_alpha_warning(
     image: &DynamicImage,
     encoding: ColorEncoding,
-    metadata: &ImageMetadata,
+    metadata: &ImageColorMetadata,
 ) -> Option<&'static str> {
     let ColorEncoding::Number { of: ChannelSelector::Opacity | ChannelSelector::Mask { .. }, .. } = encoding
     else {
@@ -160,7 +160,7 @@ pub(super) const OPAQUE: &str =
     "alpha is 1 everywhere, so the surface is opaque; set `channel` to use a color channel as the opacity";
 
 /// Converts an image to texels.
-pub(super) fn texels(image: DynamicImage, encoding: ColorEncoding, metadata: &ImageMetadata) -> Texels {
+pub(super) fn texels(image: DynamicImage, encoding: ColorEncoding, metadata: &ImageColorMetadata) -> Texels {
     // Convert formats added in later versions of `image`.
     let image = match image.color() {
         ColorType::L8 | ColorType::La8 | ColorType::Rgb8 | ColorType::Rgba8 => image,
@@ -256,7 +256,7 @@ fn texels_from_floats(
 fn convert_color_space(
     image: &DynamicImage,
     encoding: ColorEncoding,
-    metadata: &ImageMetadata,
+    metadata: &ImageColorMetadata,
     unusable: &mut u64,
 ) -> TexelData {
     fn convert_samples_color_space<T: Sample>(

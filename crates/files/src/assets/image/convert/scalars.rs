@@ -5,7 +5,7 @@ use ::image::DynamicImage;
 use super::{
     Sample, alpha_sample_index, channel_count, is_channel_filled_with, pixel_rgb, sanitize, with_samples,
 };
-use crate::assets::image::metadata::ImageMetadata;
+use crate::assets::image::metadata::ImageColorMetadata;
 use crate::materials::texels::{TexelData, Texels};
 use crate::materials::{Channel, ChannelSelector};
 use crate::math::Vec3;
@@ -27,7 +27,7 @@ fn choose_scalar_source(
     image: &DynamicImage,
     of: ChannelSelector,
     is_srgb: bool,
-    metadata: &ImageMetadata,
+    metadata: &ImageColorMetadata,
 ) -> ScalarSource {
     let is_gray = channel_count(image) < 3;
     let alpha = alpha_sample_index(image, metadata);
@@ -69,7 +69,7 @@ pub(super) fn scalar_texels(
     image: &DynamicImage,
     of: ChannelSelector,
     is_srgb: bool,
-    metadata: &ImageMetadata,
+    metadata: &ImageColorMetadata,
 ) -> Texels {
     let (width, height) = (image.width(), image.height());
     let (channels, samples) = (channel_count(image), choose_scalar_source(image, of, is_srgb, metadata));
@@ -147,7 +147,7 @@ mod tests {
     use ::image::ImageBuffer;
 
     fn number(image: DynamicImage, of: ChannelSelector, is_srgb: bool) -> f32 {
-        let texels = texels(image, ColorEncoding::Number { of, is_srgb }, &ImageMetadata::default());
+        let texels = texels(image, ColorEncoding::Number { of, is_srgb }, &ImageColorMetadata::default());
         let value = texels.get(0, 0);
         assert!(value.x == value.y && value.y == value.z, "{value}");
         value.x
@@ -187,14 +187,14 @@ mod tests {
         let broken = texels(
             float(),
             ColorEncoding::Number { of: of(Channel::Green), is_srgb: false },
-            &ImageMetadata::default(),
+            &ImageColorMetadata::default(),
         );
         assert_eq!((broken.get(0, 0).x, broken.unusable), (0.0, 1));
         // A pixel with several unusable samples is counted once.
         let broken = texels(
             float(),
             ColorEncoding::Number { of: ChannelSelector::Luminance, is_srgb: false },
-            &ImageMetadata::default(),
+            &ImageColorMetadata::default(),
         );
         assert_eq!(broken.unusable, 1);
     }

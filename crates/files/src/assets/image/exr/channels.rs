@@ -6,7 +6,7 @@ use ::exr::meta::header::Header;
 
 /// A channel, identified by a part index and a channel index within the part.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct ChannelIndex {
+pub(super) struct PartAndChannelIndex {
     pub(super) part: usize,
     pub(super) channel: usize,
 }
@@ -15,21 +15,21 @@ pub(super) struct ChannelIndex {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct ChosenChannels {
     pub(super) color: ColorChannels,
-    pub(super) alpha: Option<ChannelIndex>,
+    pub(super) alpha: Option<PartAndChannelIndex>,
 }
 
 /// Channels that make up a color.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum ColorChannels {
-    Rgb([ChannelIndex; 3]),
-    Gray(ChannelIndex),
+    Rgb([PartAndChannelIndex; 3]),
+    Gray(PartAndChannelIndex),
     /// Y, and the differences RY = (R − Y)/Y and BY = (B − Y)/Y.
-    LuminanceChroma(ChannelIndex, [ChannelIndex; 2]),
+    LuminanceChroma(PartAndChannelIndex, [PartAndChannelIndex; 2]),
 }
 
 impl ChosenChannels {
     /// Source channel for each pixel component: red, green, blue, alpha. Chroma channels are not included.
-    pub(super) fn component_channels(self) -> [Option<ChannelIndex>; 4] {
+    pub(super) fn component_channels(self) -> [Option<PartAndChannelIndex>; 4] {
         match self.color {
             ColorChannels::Rgb([red, green, blue]) => [Some(red), Some(green), Some(blue), self.alpha],
             ColorChannels::Gray(y) | ColorChannels::LuminanceChroma(y, _) => {
@@ -39,7 +39,7 @@ impl ChosenChannels {
     }
 
     /// Returns the Y, RY and BY channels if the image is stored as luminance and chroma.
-    pub(super) fn as_luminance_chroma(self) -> Option<[ChannelIndex; 3]> {
+    pub(super) fn as_luminance_chroma(self) -> Option<[PartAndChannelIndex; 3]> {
         match self.color {
             ColorChannels::Rgb(_) | ColorChannels::Gray(_) => None,
             ColorChannels::LuminanceChroma(y, [ry, by]) => Some([y, ry, by]),
@@ -47,7 +47,7 @@ impl ChosenChannels {
     }
 
     /// All channels to decode, including chroma.
-    pub(super) fn all(self) -> impl Iterator<Item = ChannelIndex> {
+    pub(super) fn all(self) -> impl Iterator<Item = PartAndChannelIndex> {
         self.component_channels()
             .into_iter()
             .flatten()
@@ -58,16 +58,16 @@ impl ChosenChannels {
 /// A layer's channels with known names, ignoring case.
 #[derive(Clone, Copy, Default)]
 struct LayerChannels {
-    rgb: [Option<ChannelIndex>; 3],
-    luminance: Option<ChannelIndex>,
-    chroma: [Option<ChannelIndex>; 2],
-    alpha: Option<ChannelIndex>,
+    rgb: [Option<PartAndChannelIndex>; 3],
+    luminance: Option<PartAndChannelIndex>,
+    chroma: [Option<PartAndChannelIndex>; 2],
+    alpha: Option<PartAndChannelIndex>,
     /// Whether the layer has an X channel, which means that Y is a coordinate rather than luminance.
     has_x: bool,
 }
 
 impl LayerChannels {
-    fn add(&mut self, name: &str, channel: ChannelIndex) {
+    fn add(&mut self, name: &str, channel: PartAndChannelIndex) {
         let slot = match name.to_ascii_uppercase().as_str() {
             "R" => &mut self.rgb[0],
             "G" => &mut self.rgb[1],
@@ -145,7 +145,7 @@ fn add_channels(part: usize, header: &Header, layers: &mut LayerMap) {
     for (channel, description) in header.channels.list.iter().enumerate() {
         let name = description.name.to_string();
         let (layer, name) = name.rsplit_once('.').unwrap_or(("", &name));
-        layers.entry(layer.to_owned()).or_default().add(name, ChannelIndex { part, channel });
+        layers.entry(layer.to_owned()).or_default().add(name, PartAndChannelIndex { part, channel });
     }
 }
 
@@ -175,7 +175,7 @@ fn gray_from_single_channel_part(headers: &[Header]) -> Option<ChosenChannels> {
     let is_vector =
         headers.len() > 1 && single_channel_parts(headers).any(|(_, header)| is_component(header));
     let (part, _) = single_channel_parts(headers).find(|_| !is_vector)?;
-    Some(ChosenChannels { color: ColorChannels::Gray(ChannelIndex { part, channel: 0 }), alpha: None })
+    Some(ChosenChannels { color: ColorChannels::Gray(PartAndChannelIndex { part, channel: 0 }), alpha: None })
 }
 
 /// Error message for a file without usable channels.

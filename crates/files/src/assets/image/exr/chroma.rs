@@ -4,7 +4,7 @@
 use ::exr::meta::header::Header;
 use ::exr::prelude::Vec2;
 
-use super::channels::ChannelIndex;
+use super::channels::PartAndChannelIndex;
 use super::{ChannelRow, SAMPLE_BYTES, channel_description};
 use crate::math::DVec3;
 
@@ -15,7 +15,7 @@ const WEIGHTS: [f32; 7] = [0.627_123, -0.186_077, 0.087_929, -0.043_159, 0.019_5
 /// Luminance and chroma planes for the data window.
 pub(super) struct LuminanceChromaPlanes {
     /// Y, RY and BY.
-    channels: [ChannelIndex; 3],
+    channels: [PartAndChannelIndex; 3],
     /// Size of the luminance plane.
     size: Vec2<usize>,
     /// Distance between chroma samples in pixels.
@@ -25,7 +25,7 @@ pub(super) struct LuminanceChromaPlanes {
 }
 
 impl LuminanceChromaPlanes {
-    pub(super) fn new(headers: &[Header], channels: [ChannelIndex; 3]) -> Self {
+    pub(super) fn new(headers: &[Header], channels: [PartAndChannelIndex; 3]) -> Self {
         let [_, ry, _] = channels;
         let (size, step) = (headers[ry.part].layer_size, channel_description(headers, ry).sampling);
         let chroma = || vec![0.0; (size / step).area()];
@@ -33,7 +33,7 @@ impl LuminanceChromaPlanes {
     }
 
     /// Size in memory of the planes after chroma has been interpolated along rows.
-    pub(super) fn memory_bytes(headers: &[Header], [_, ry, _]: [ChannelIndex; 3]) -> u64 {
+    pub(super) fn memory_bytes(headers: &[Header], [_, ry, _]: [PartAndChannelIndex; 3]) -> u64 {
         let size = headers[ry.part].layer_size;
         let rows = size.height() / channel_description(headers, ry).sampling.y();
         let samples = (size.width() as u64).saturating_mul((size.height() + 2 * rows) as u64);
@@ -41,7 +41,12 @@ impl LuminanceChromaPlanes {
     }
 
     /// Stores a row of samples if its channel belongs to one of the planes.
-    pub(super) fn store_channel_row(&mut self, channel: ChannelIndex, row: usize, line: ChannelRow<'_>) {
+    pub(super) fn store_channel_row(
+        &mut self,
+        channel: PartAndChannelIndex,
+        row: usize,
+        line: ChannelRow<'_>,
+    ) {
         let widths = [self.size, self.size / self.step, self.size / self.step].map(|size| size.width());
         let [ry, by] = &mut self.chroma;
         for ((plane, width), plane_channel) in

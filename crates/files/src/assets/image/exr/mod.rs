@@ -17,10 +17,10 @@ use ::exr::prelude::{Vec2, f16};
 use ::image::error::{DecodingError, ImageFormatHint, LimitError, LimitErrorKind};
 use ::image::{ColorType, ImageDecoder, ImageError, ImageFormat, ImageResult};
 
-use super::metadata::{AlphaInterpretation, ImageMetadata};
+use super::metadata::{AlphaInterpretation, ImageColorMetadata};
 use super::primaries::Primaries;
 use super::space::ColorSpace;
-use channels::{ChannelIndex, ChosenChannels, choose_channels, describe_unusable_channels};
+use channels::{ChosenChannels, PartAndChannelIndex, choose_channels, describe_unusable_channels};
 use chroma::LuminanceChromaPlanes;
 use sampling::{BlockDecompressor, ChannelSampling, SubsamplingHidingReader};
 
@@ -58,9 +58,9 @@ impl<R: BufRead + Seek> ExrDecoder<R> {
     }
 
     /// Color space, alpha usage and warnings.
-    pub(super) fn metadata(&self) -> ImageMetadata {
+    pub(super) fn metadata(&self) -> ImageColorMetadata {
         let mut metadata =
-            ImageMetadata { alpha: AlphaInterpretation::Premultiplied, ..ImageMetadata::default() };
+            ImageColorMetadata { alpha: AlphaInterpretation::Premultiplied, ..ImageColorMetadata::default() };
         if let Some(primaries) = primaries(self.header()) {
             match primaries.to_rec_709_matrix() {
                 Some(matrix) => metadata.space = ColorSpace::from_matrix_with_default_curves(matrix),
@@ -105,14 +105,14 @@ fn decompressed_block_size(header: &Header) -> u64 {
     pixels.saturating_mul(header.channels.bytes_per_pixel as u64)
 }
 
-fn channel_description(headers: &[Header], channel: ChannelIndex) -> &ChannelDescription {
+fn channel_description(headers: &[Header], channel: PartAndChannelIndex) -> &ChannelDescription {
     &headers[channel.part].channels.list[channel.channel]
 }
 
 /// Checks that only the chroma channels are subsampled, and both by the same factors.
 fn check_samplings(headers: &[Header], channels: ChosenChannels) -> Result<(), String> {
-    let sampling = |channel: ChannelIndex| channel_description(headers, channel).sampling;
-    let is_divided = |channel: &ChannelIndex| {
+    let sampling = |channel: PartAndChannelIndex| channel_description(headers, channel).sampling;
+    let is_divided = |channel: &PartAndChannelIndex| {
         let (Vec2(x, y), size) = (sampling(*channel), headers[channel.part].layer_size);
         x > 0 && y > 0 && size.width().is_multiple_of(x) && size.height().is_multiple_of(y)
     };
@@ -193,7 +193,7 @@ impl PartialImage<'_> {
                 let Some((line, rest)) = data.split_at_checked(bytes) else { return };
                 data = rest;
                 let line = ChannelRow { sample_type: description.sample_type, bytes: line };
-                let channel = ChannelIndex { part, channel };
+                let channel = PartAndChannelIndex { part, channel };
                 if let Some(planes) = &mut self.planes {
                     planes.store_channel_row(channel, row / down, line);
                 }
@@ -206,7 +206,7 @@ impl PartialImage<'_> {
     /// to the data window.
     fn copy_channel_row(
         &self,
-        channel: ChannelIndex,
+        channel: PartAndChannelIndex,
         [left, row]: [usize; 2],
         line: ChannelRow<'_>,
         samples: &mut [u8],

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use super::map::{Map, MapKind};
 use super::material::{is_opaque_despite_tr, to_file_material};
-use super::statements::{MtlColorKind, MtlNumber};
+use super::statements::{MtlColorKind, MtlNumberKind};
 use super::{MtlMaterial, WithLine};
 use crate::assets::{FileMaterial, FileMaterialKind, PhysicalMaterial};
 use crate::math::Vec3;
@@ -124,7 +124,7 @@ fn warn_about_approximations(
         11.. => add(model, UNKNOWN_MODEL),
         1..=9 => {}
     }
-    let ior = found.number_with_line(MtlNumber::Ior);
+    let ior = found.number_with_line(MtlNumberKind::Ior);
     match converted.kind() {
         FileMaterialKind::Glass if converted.ior <= 1.0 => add(model, INVISIBLE_GLASS),
         FileMaterialKind::Glass | FileMaterialKind::Principled(_)
@@ -162,7 +162,7 @@ fn warn_about_opacity(
         return;
     }
     let [opacity, transparency] =
-        [MtlNumber::Dissolve, MtlNumber::Transparency].map(|of| found.number_with_line(of));
+        [MtlNumberKind::Dissolve, MtlNumberKind::Transparency].map(|of| found.number_with_line(of));
     if converted.opacity_texture.is_some() {
         let given = opacity.or(transparency).filter(|_| converted.opacity < 1.0);
         given.iter().for_each(|at| add(Some(at.line), OPACITY_MAP));
@@ -238,17 +238,17 @@ fn warn_about_ineffective_pbr(
     converted: &FileMaterial,
     add: &mut impl FnMut(Option<usize>, &str),
 ) {
-    let nonzero = |number: MtlNumber| found.number_with_line(number).filter(|at| at.value != 0.0);
-    for number in [MtlNumber::Sheen, MtlNumber::AnisotropyRotation] {
+    let nonzero = |number: MtlNumberKind| found.number_with_line(number).filter(|at| at.value != 0.0);
+    for number in [MtlNumberKind::Sheen, MtlNumberKind::AnisotropyRotation] {
         if let Some(at) = nonzero(number) {
             add(Some(at.line), &ignored_statement_warning(number.keyword()));
         }
     }
     let is_metal = converted.physical.as_ref().is_some_and(PhysicalMaterial::is_metal);
-    if let Some(at) = nonzero(MtlNumber::Anisotropy).filter(|_| !is_metal || converted.is_glass()) {
+    if let Some(at) = nonzero(MtlNumberKind::Anisotropy).filter(|_| !is_metal || converted.is_glass()) {
         add(Some(at.line), ANISOTROPY_OF_METALS);
     }
-    for number in [MtlNumber::Metallic, MtlNumber::Coat] {
+    for number in [MtlNumberKind::Metallic, MtlNumberKind::Coat] {
         if let Some(at) = nonzero(number).filter(|_| converted.is_glass()) {
             add(Some(at.line), &no_effect_on_material_warning(number.keyword(), converted.kind()));
         }

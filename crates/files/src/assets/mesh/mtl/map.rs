@@ -208,7 +208,7 @@ impl Map {
     /// Candidate paths for the image file, relative to the MTL file's folder: first the whole name, then the
     /// name without possible comments.
     pub(super) fn candidate_paths(&self) -> impl Iterator<Item = PathBuf> {
-        with_and_without_comments(&self.name)
+        successively_strip_comments(&self.name)
             .flat_map(|name| encode_utf8_and_latin1_paths(&name.replace('\\', "/")))
     }
 
@@ -353,7 +353,7 @@ fn parse_switch(word: &str) -> Option<bool> {
 }
 
 /// Yields the whole text, then the text without its last comment, and so on.
-pub(in crate::assets::mesh) fn with_and_without_comments(text: &str) -> impl Iterator<Item = &str> {
+pub(in crate::assets::mesh) fn successively_strip_comments(text: &str) -> impl Iterator<Item = &str> {
     let is_comment = |(at, _): &(usize, &str)| text[..*at].ends_with([' ', '\t']);
     let cuts = text.rmatch_indices('#').filter(is_comment).map(|(at, _)| text[..at].trim_end());
     std::iter::once(text).chain(cuts).filter(|text| !text.is_empty())

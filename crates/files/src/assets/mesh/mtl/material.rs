@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::MtlMaterial;
 use super::map::MapKind;
-use super::statements::{MtlColorKind, MtlNumber};
+use super::statements::{MtlColorKind, MtlNumberKind};
 use crate::assets::{FileMaterial, PhysicalMaterial};
 use crate::math::{DVec3, Vec3};
 
@@ -28,9 +28,9 @@ pub(in crate::assets::mesh) fn to_file_material(found: &MtlMaterial, path: &Path
         name: found.name.clone(),
         diffuse: color_or_default(found, MtlColorKind::Diffuse, default_diffuse),
         specular,
-        shininess: found.number(MtlNumber::Shininess).unwrap_or(0.0) as f32,
+        shininess: found.number(MtlNumberKind::Shininess).unwrap_or(0.0) as f32,
         emission: color_or_default(found, MtlColorKind::Emission, default_emission),
-        ior: found.number(MtlNumber::Ior).unwrap_or(1.0) as f32,
+        ior: found.number(MtlNumberKind::Ior).unwrap_or(1.0) as f32,
         illumination_model: found.illumination.map(|at| at.value),
         opacity: opacity(found),
         opacity_texture: texture(MapKind::Opacity),
@@ -39,7 +39,7 @@ pub(in crate::assets::mesh) fn to_file_material(found: &MtlMaterial, path: &Path
         emission_texture,
         normal_texture: normals.and_then(|map| map.texture(path)),
         normal_strength: normals.map_or(1.0, |map| map.strength as f32),
-        physical: pbr_extension(found, path),
+        physical: physical_material_from_pbr(found, path),
     };
     material.drop_unused_textures();
     material
@@ -52,27 +52,27 @@ fn color_or_default(found: &MtlMaterial, color: MtlColorKind, default: f32) -> V
 
 /// Returns the opacity: `d` if present, otherwise 1 − `Tr`. `Tr 1` without `d` means opaque.
 fn opacity(found: &MtlMaterial) -> f32 {
-    let transparency = found.number(MtlNumber::Transparency).map(|part| 1.0 - part);
-    let opacity = found.number(MtlNumber::Dissolve).or(transparency);
+    let transparency = found.number(MtlNumberKind::Transparency).map(|part| 1.0 - part);
+    let opacity = found.number(MtlNumberKind::Dissolve).or(transparency);
     if is_opaque_despite_tr(found) { 1.0 } else { opacity.unwrap_or(1.0) as f32 }
 }
 
 /// Whether the material has `Tr 1` but no `d`. MeshLab and other programs write opaque materials this way.
 pub(super) fn is_opaque_despite_tr(found: &MtlMaterial) -> bool {
-    let transparency = found.number(MtlNumber::Transparency);
-    found.number(MtlNumber::Dissolve).is_none() && transparency.is_some_and(|part| part >= 1.0)
+    let transparency = found.number(MtlNumberKind::Transparency);
+    found.number(MtlNumberKind::Dissolve).is_none() && transparency.is_some_and(|part| part >= 1.0)
 }
 
 /// The PBR extension, if the material uses it.
-fn pbr_extension(found: &MtlMaterial, path: &Path) -> Option<PhysicalMaterial> {
-    const NUMBERS: [MtlNumber; 7] = [
-        MtlNumber::Roughness,
-        MtlNumber::Metallic,
-        MtlNumber::Coat,
-        MtlNumber::CoatRoughness,
-        MtlNumber::Sheen,
-        MtlNumber::Anisotropy,
-        MtlNumber::AnisotropyRotation,
+fn physical_material_from_pbr(found: &MtlMaterial, path: &Path) -> Option<PhysicalMaterial> {
+    const NUMBERS: [MtlNumberKind; 7] = [
+        MtlNumberKind::Roughness,
+        MtlNumberKind::Metallic,
+        MtlNumberKind::Coat,
+        MtlNumberKind::CoatRoughness,
+        MtlNumberKind::Sheen,
+        MtlNumberKind::Anisotropy,
+        MtlNumberKind::AnisotropyRotation,
     ];
     const MAPS: [MapKind; 4] = [MapKind::Roughness, MapKind::Metallic, MapKind::Coat, MapKind::CoatRoughness];
     let is_physical = NUMBERS.iter().any(|number| found.number(*number).is_some());
@@ -84,16 +84,16 @@ fn pbr_extension(found: &MtlMaterial, path: &Path) -> Option<PhysicalMaterial> {
     let [roughness_texture, metallic_texture, clearcoat_texture, clearcoat_roughness_texture] =
         MAPS.map(|kind| found.map(kind)?.texture(path));
     let physical = PhysicalMaterial {
-        roughness: number(MtlNumber::Roughness, usual.roughness),
-        metallic: number(MtlNumber::Metallic, usual.metallic),
-        clearcoat: number(MtlNumber::Coat, usual.clearcoat),
-        clearcoat_roughness: number(MtlNumber::CoatRoughness, usual.clearcoat_roughness),
+        roughness: number(MtlNumberKind::Roughness, usual.roughness),
+        metallic: number(MtlNumberKind::Metallic, usual.metallic),
+        clearcoat: number(MtlNumberKind::Coat, usual.clearcoat),
+        clearcoat_roughness: number(MtlNumberKind::CoatRoughness, usual.clearcoat_roughness),
         roughness_texture,
         metallic_texture,
         clearcoat_texture,
         clearcoat_roughness_texture,
         ..usual
     };
-    let anisotropy = if physical.is_metal() { number(MtlNumber::Anisotropy, 0.0) } else { 0.0 };
+    let anisotropy = if physical.is_metal() { number(MtlNumberKind::Anisotropy, 0.0) } else { 0.0 };
     Some(PhysicalMaterial { anisotropy, ..physical })
 }

@@ -11,9 +11,9 @@ use super::text::{convert_mac_line_ends, decode_line, strip_byte_order_mark};
 use crate::assets::read::{self, Monitor};
 use crate::assets::{AssetError, FileHash};
 pub(super) use ignored::{MtlWarning, collect_warnings};
-pub(super) use map::{encode_utf8_and_latin1_paths, first_existing_or_first, with_and_without_comments};
+pub(super) use map::{encode_utf8_and_latin1_paths, first_existing_or_first, successively_strip_comments};
 pub(super) use material::to_file_material;
-use statements::{MtlColorKind, MtlNumber, Statement};
+use statements::{MtlColorKind, MtlNumberKind, Statement};
 
 /// Maximum size of an MTL file.
 pub(super) const FILE_LIMIT: u64 = 64 << 20;
@@ -34,7 +34,7 @@ pub(super) struct MtlMaterial {
     /// Line of the `newmtl` statement.
     line: usize,
     colors: [Option<WithLine<[f64; 3]>>; MtlColorKind::ALL.len()],
-    numbers: [Option<WithLine<f64>>; MtlNumber::ALL.len()],
+    numbers: [Option<WithLine<f64>>; MtlNumberKind::ALL.len()],
     illumination: Option<WithLine<u8>>,
     maps: Vec<(map::MapKind, map::Map)>,
     /// Statements that have no effect.
@@ -53,11 +53,11 @@ impl MtlMaterial {
         self.colors[color as usize]
     }
 
-    fn number(&self, number: MtlNumber) -> Option<f64> {
+    fn number(&self, number: MtlNumberKind) -> Option<f64> {
         self.number_with_line(number).map(|number| number.value)
     }
 
-    fn number_with_line(&self, number: MtlNumber) -> Option<WithLine<f64>> {
+    fn number_with_line(&self, number: MtlNumberKind) -> Option<WithLine<f64>> {
         self.numbers[number as usize]
     }
 

@@ -27,7 +27,7 @@ impl MtlColorKind {
 
 /// A statement with a single number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum MtlNumber {
+pub(super) enum MtlNumberKind {
     Shininess,
     Ior,
     Dissolve,
@@ -41,7 +41,7 @@ pub(super) enum MtlNumber {
     AnisotropyRotation,
 }
 
-impl MtlNumber {
+impl MtlNumberKind {
     /// All numbers with their keywords, in enum order.
     pub(super) const ALL: [(Self, &'static str); 11] = [
         (Self::Shininess, "Ns"),
@@ -87,7 +87,7 @@ pub(super) enum Statement {
     Ignored,
     New(String),
     Color(MtlColorKind, [f64; 3]),
-    Number(MtlNumber, f64),
+    Number(MtlNumberKind, f64),
     Illumination(u8),
     Map(MapKind, Map),
 }
@@ -108,7 +108,7 @@ pub(super) fn parse_line(line: &str, warnings: &mut Vec<String>) -> Result<State
     if let Some((color, _)) = MtlColorKind::ALL.into_iter().find(|(_, name)| is(name)) {
         return parse_color(keyword, color, rest, warnings);
     }
-    if let Some((number, _)) = MtlNumber::ALL.into_iter().find(|(_, name)| is(name)) {
+    if let Some((number, _)) = MtlNumberKind::ALL.into_iter().find(|(_, name)| is(name)) {
         return parse_number(keyword, number, rest, warnings);
     }
     if let Some(kind) = MapKind::from_keyword(keyword) {
@@ -256,13 +256,13 @@ fn xyz_to_rgb([x, y, z]: [f64; 3]) -> [f64; 3] {
 /// Parses a number. Treats `d -halo` like `d`, with a warning.
 fn parse_number(
     keyword: &str,
-    number: MtlNumber,
+    number: MtlNumberKind,
     rest: &str,
     warnings: &mut Vec<String>,
 ) -> Result<Statement, String> {
     let words = words_before_comment(rest);
     let words = match words.as_slice() {
-        ["-halo", words @ ..] if number == MtlNumber::Dissolve => {
+        ["-halo", words @ ..] if number == MtlNumberKind::Dissolve => {
             warnings.push(ignored_option_warning("-halo"));
             words
         }

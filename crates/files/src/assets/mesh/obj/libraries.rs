@@ -3,7 +3,7 @@
 use std::collections::{BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
 
-use super::super::mtl::{self, MtlLibrary, encode_utf8_and_latin1_paths, with_and_without_comments};
+use super::super::mtl::{self, MtlLibrary, encode_utf8_and_latin1_paths, successively_strip_comments};
 use super::super::{AssetError, MeshFileBytes};
 use crate::assets::{Companion, FileMaterial};
 use crate::system::file::FileStamp;
@@ -53,11 +53,12 @@ impl MtlLibraryLoader<'_> {
         let all: Vec<_> = names.enumerate().map(|(index, name)| (name, index)).collect();
         let mut known: HashMap<&str, usize> = all.iter().copied().collect();
         for (name, index) in all {
-            for name in with_and_without_comments(name) {
+            for name in successively_strip_comments(name) {
                 known.entry(name).or_insert(index);
             }
         }
-        let index = |name: &String| with_and_without_comments(name).find_map(|name| known.get(name).copied());
+        let index =
+            |name: &String| successively_strip_comments(name).find_map(|name| known.get(name).copied());
         self.used.iter().filter_map(|name| Some((name.clone(), index(name)?))).collect()
     }
 
@@ -101,13 +102,13 @@ impl MtlLibraryLoader<'_> {
 pub(super) fn resolve_library_paths(obj: &Path, statement: &str) -> Vec<PathBuf> {
     let folder = obj.parent().unwrap_or(Path::new(""));
     let readings =
-        with_and_without_comments(statement).flat_map(|name| [name.to_owned(), name.replace('\\', "/")]);
+        successively_strip_comments(statement).flat_map(|name| [name.to_owned(), name.replace('\\', "/")]);
     let readings = readings.flat_map(|name| encode_utf8_and_latin1_paths(&name));
     let single = readings.map(|name| folder.join(name)).find(|path| path.exists());
     if let Some(path) = single {
         return vec![path];
     }
-    let names = with_and_without_comments(statement).last().unwrap_or(statement).replace('\\', "/");
+    let names = successively_strip_comments(statement).last().unwrap_or(statement).replace('\\', "/");
     names
         .split_whitespace()
         .filter_map(|name| mtl::first_existing_or_first(folder, encode_utf8_and_latin1_paths(name)))

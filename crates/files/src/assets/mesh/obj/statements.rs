@@ -1,6 +1,6 @@
 //! Parses the statements in an OBJ file.
 
-use super::super::parsed::{alpha_ignored_warning, face_of_corner_from_arities};
+use super::super::parsed::{alpha_ignored_warning, face_index_of_corner};
 use super::super::text::expected_message;
 use super::super::{AssetError, MeshFileBytes};
 use super::vertex::Vertices;
@@ -167,10 +167,8 @@ impl ParsedObj {
         {
             let Some(first) = self.corners.iter().position(|corner| corner[part] != NONE) else { continue };
             if count == 0 {
-                let line = source.line_number(byte_offset_of_face(
-                    source,
-                    face_of_corner_from_arities(&self.arities, first),
-                ));
+                let line = source
+                    .line_number(byte_offset_of_face(source, face_index_of_corner(&self.arities, first)));
                 self.warnings.push(missing_attribute_warning(line, name));
                 self.corners.iter_mut().for_each(|corner| corner[part] = NONE);
             }
@@ -191,7 +189,7 @@ impl ParsedObj {
         };
         let index = i64::from(self.corners[place][part]) + 1;
         Err(source.malformed_error_with_line(
-            byte_offset_of_face(source, face_of_corner_from_arities(&self.arities, place)),
+            byte_offset_of_face(source, face_index_of_corner(&self.arities, place)),
             out_of_range_message(part, index, counts[part]),
         ))
     }

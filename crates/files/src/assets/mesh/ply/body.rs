@@ -7,7 +7,7 @@ use super::header::ScalarType;
 pub(super) trait NumberReader: Clone {
     fn read_float(&mut self, scalar: ScalarType) -> Result<f64, String>;
     fn read_integer(&mut self, scalar: ScalarType) -> Result<i64, String>;
-    fn skip(&mut self, scalar: ScalarType, count: usize) -> Result<(), String>;
+    fn skip_scalars(&mut self, scalar: ScalarType, count: usize) -> Result<(), String>;
 
     /// Ends an item, such as a vertex or a face.
     fn end_item(&mut self) {}
@@ -58,7 +58,7 @@ impl NumberReader for AsciiReader<'_> {
         self.0.take_integer().ok_or_else(|| expected_message("an integer", self.0.take_word()))
     }
 
-    fn skip(&mut self, _: ScalarType, count: usize) -> Result<(), String> {
+    fn skip_scalars(&mut self, _: ScalarType, count: usize) -> Result<(), String> {
         for _ in 0..count {
             self.seek_word_across_lines()?;
             self.0.take_word();
@@ -140,7 +140,7 @@ impl<const BIG_ENDIAN: bool> NumberReader for BinaryReader<'_, BIG_ENDIAN> {
         })
     }
 
-    fn skip(&mut self, scalar: ScalarType, count: usize) -> Result<(), String> {
+    fn skip_scalars(&mut self, scalar: ScalarType, count: usize) -> Result<(), String> {
         if !self.has_bytes_for(scalar, count as u64) {
             return Err(END_OF_FILE.to_owned());
         }

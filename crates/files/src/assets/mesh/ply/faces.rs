@@ -223,7 +223,7 @@ impl FaceReader {
         if self.wrong > 0 {
             let (face, start) = self.first_wrong;
             let face = context.face_label(start, face);
-            parsed.warnings.push(wrong_list_length_warning(&face, self.wrong));
+            parsed.warnings.push(attribute_list_length_warning(&face, self.wrong));
         }
         if self.has_several_textures {
             parsed.warnings.push(SEVERAL_TEXTURES.to_owned());
@@ -243,7 +243,7 @@ impl FaceReader {
 pub(super) const SEVERAL_TEXTURES: &str = "`texnumber` is ignored: all faces have the same material";
 
 /// Warning about `count` faces whose texture coordinate or color lists do not match the number of corners.
-pub(super) fn wrong_list_length_warning(first: &str, count: u64) -> String {
+pub(super) fn attribute_list_length_warning(first: &str, count: u64) -> String {
     let more = if count > 1 { format!(" and {} more", count - 1) } else { String::new() };
     format!("{first}{more}: ignored texture coordinates or colors that do not match the number of corners")
 }

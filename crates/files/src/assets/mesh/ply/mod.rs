@@ -206,10 +206,10 @@ fn read_items<N: NumberReader>(
 
 fn skip_property(numbers: &mut impl NumberReader, kind: PropertyType) -> Result<(), String> {
     match kind {
-        PropertyType::Scalar(scalar) => numbers.skip(scalar, 1),
+        PropertyType::Scalar(scalar) => numbers.skip_scalars(scalar, 1),
         PropertyType::List { count, item } => {
             let length = read_list_length(numbers, count, item)?;
-            numbers.skip(item, length)
+            numbers.skip_scalars(item, length)
         }
     }
 }
@@ -418,7 +418,7 @@ fn read_items_with_list_property<N: NumberReader>(
             };
             let length = read_list_length(numbers, count, item)?;
             if index != corners {
-                numbers.skip(item, length)?;
+                numbers.skip_scalars(item, length)?;
                 continue;
             }
             read(numbers, item, length)?;

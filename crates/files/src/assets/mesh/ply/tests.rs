@@ -5,7 +5,7 @@ use super::super::parsed::{
 };
 use super::super::text::expected_message;
 use super::body::END_OF_FILE;
-use super::faces::{SEVERAL_TEXTURES, wrong_list_length_warning};
+use super::faces::{SEVERAL_TEXTURES, attribute_list_length_warning};
 use super::header::{
     NO_END, NO_FORMAT, PROPERTY_FIRST, header_too_long_message, ignored_texture_warning,
     invalid_count_message, invalid_statement_message, skipped_lines_warning, unknown_encoding_message,
@@ -351,7 +351,7 @@ fn corner_texture_coordinates_are_read() {
     assert_eq!(uvs(list, &[two[0], "3 0 2 3 0"]), (vec![a, b, c, a, a, a], vec![]));
     let (found, warnings) = uvs(list, &[two[0], "3 0 2 3 5 1 1 1 1 1"]);
     assert_eq!(found, [a, b, c, a, a, a]);
-    assert_eq!(warnings, [wrong_list_length_warning("line 15: face 2", 1)]);
+    assert_eq!(warnings, [attribute_list_length_warning("line 15: face 2", 1)]);
     assert!(uvs("", &["3 0 1 2"]).0.is_empty());
 }
 

@@ -37,7 +37,7 @@ fn wide_fan_edge_weight(faces: u32) -> f64 {
 pub(super) fn refined_value<T: VertexValue>(topology: &Topology, values: &[T], index: usize) -> T {
     match index.checked_sub(topology.vertex_count()) {
         None => refined_vertex(topology, values, index as u32),
-        Some(edge) => refined_edge(topology, values, topology.edge_halves[edge]),
+        Some(edge) => refined_edge_value(topology, values, topology.edge_halves[edge]),
     }
 }
 
@@ -64,7 +64,7 @@ fn refined_vertex<T: VertexValue>(topology: &Topology, values: &[T], vertex: u32
     }
 }
 
-fn refined_edge<T: VertexValue>(topology: &Topology, values: &[T], half: u32) -> T {
+fn refined_edge_value<T: VertexValue>(topology: &Topology, values: &[T], half: u32) -> T {
     let [a, b] = [topology.start(half), topology.end(half)];
     let at = |vertex: u32| values[vertex as usize];
     let twin = topology.twin(half);
@@ -72,7 +72,7 @@ fn refined_edge<T: VertexValue>(topology: &Topology, values: &[T], half: u32) ->
         return (at(a) + at(b)) * 0.5;
     }
     let wings = at(topology.start(previous_half_edge(half))) + at(topology.start(previous_half_edge(twin)));
-    let wide = match (topology.has_wide_fan(a), topology.has_wide_fan(b)) {
+    let wide = match (topology.has_wide_fan_at(a), topology.has_wide_fan_at(b)) {
         (true, false) => topology.wide_fan_face_count(half).map(|faces| (a, b, faces)),
         (false, true) => topology.wide_fan_face_count(twin).map(|faces| (b, a, faces)),
         // Only unrefined meshes have an edge between two such vertices. Use Loop's weights there.
@@ -110,7 +110,7 @@ fn limit_at_vertex<T: VertexValue>(topology: &Topology, refined: &[T], vertex: u
     if topology.is_corner(vertex) {
         return value;
     }
-    let at_middle = |half: u32| refined[topology.vertex_count() + topology.edge(half) as usize];
+    let at_middle = |half: u32| refined[topology.vertex_count() + topology.edge_of_half_edge(half) as usize];
     let (mut sum, mut count) = (T::default(), 0);
     let start = topology.vertex_halves[vertex as usize];
     let last = topology.walk_fan(start, |half| {
@@ -130,7 +130,7 @@ fn limit_at_vertex<T: VertexValue>(topology: &Topology, refined: &[T], vertex: u
 /// half-edge, which has a twin.
 pub(super) fn edge_ring(topology: &Topology, half: u32) -> [u32; 6] {
     let (first, twin) = (topology.vertex_count() as u32, topology.twin(half));
-    let middle = |half: u32| first + topology.edge(half);
+    let middle = |half: u32| first + topology.edge_of_half_edge(half);
     let sides = |half: u32| [middle(next_half_edge(half)), middle(previous_half_edge(half))];
     let ([b, c], [d, e]) = (sides(half), sides(twin));
     [topology.end(half), b, c, topology.start(half), d, e]

@@ -188,7 +188,9 @@ fn limit_surface(
     let positions = work.build(count, |vertex| {
         let index = match place(vertex) {
             RefinedVertexLocation::Vertex(half) => shape.start(half) as usize,
-            RefinedVertexLocation::Edge(half) => shape.vertex_count() + shape.edge(half) as usize,
+            RefinedVertexLocation::Edge(half) => {
+                shape.vertex_count() + shape.edge_of_half_edge(half) as usize
+            }
         };
         limit_value(shape, points, index).as_vec3()
     })?;

@@ -37,7 +37,7 @@ impl<'a> LimitNormals<'a> {
         // In the only fan of a smooth vertex, start at the same half-edge for all of its texture coordinates,
         // so that the sums are identical.
         let is_smooth = !is_corner && topology.twin(usual) != NONE;
-        let start = if is_smooth { usual } else { topology.fan_start(half) };
+        let start = if is_smooth { usual } else { topology.first_half_edge_of_fan(half) };
         let center = self.points[vertex as usize];
         let arm = |half: u32| self.point_at_edge_middle(half) - center;
         arms.clear();
@@ -46,7 +46,7 @@ impl<'a> LimitNormals<'a> {
         let normal = match (is_corner, last) {
             (true, _) => DVec3::ZERO,
             (false, None) => self.closed_fan_normal(arms),
-            (false, Some(_)) => open_fan_normal(arms, topology.has_wide_fan(vertex)),
+            (false, Some(_)) => open_fan_normal(arms, topology.has_wide_fan_at(vertex)),
         };
         unit_or_substitute(normal, arms, last.is_some())
     }
@@ -54,7 +54,7 @@ impl<'a> LimitNormals<'a> {
     /// Unit normal at the middle of a half-edge's edge, on the side of its face if the edge is a crease.
     pub(super) fn at_edge(&self, half: u32) -> Vec3 {
         let topology = self.topology;
-        let edge = topology.edge(half);
+        let edge = topology.edge_of_half_edge(half);
         let center = self.point_at_edge_middle(half);
         if topology.twin(half) == NONE {
             let [start, end] =
@@ -75,7 +75,7 @@ impl<'a> LimitNormals<'a> {
 
     /// Point at the middle of a half-edge's edge.
     fn point_at_edge_middle(&self, half: u32) -> DVec3 {
-        self.points[self.topology.vertex_count() + self.topology.edge(half) as usize]
+        self.points[self.topology.vertex_count() + self.topology.edge_of_half_edge(half) as usize]
     }
 
     /// Cross product of the tangents Σ cos(2πi/n) pᵢ and Σ sin(2πi/n) pᵢ (Loop 1987).

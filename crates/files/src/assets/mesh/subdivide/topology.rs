@@ -153,7 +153,7 @@ impl Topology {
             if fans.of_half[half as usize] != NONE {
                 continue;
             }
-            let (number, start) = (fans.list.len() as u32, self.fan_start(half));
+            let (number, start) = (fans.list.len() as u32, self.first_half_edge_of_fan(half));
             let mut faces = 0;
             let last = self.walk_fan(start, |half| {
                 fans.of_half[half as usize] = number;
@@ -233,7 +233,7 @@ impl Topology {
     }
 
     /// Edge of a half-edge.
-    pub(super) fn edge(&self, half: u32) -> u32 {
+    pub(super) fn edge_of_half_edge(&self, half: u32) -> u32 {
         value_at_half_edge(&self.edges, half) & !REVERSED
     }
 
@@ -243,7 +243,7 @@ impl Topology {
     }
 
     /// Whether a vertex on a boundary or crease has a large fan of faces, whose inner edges need special masks.
-    pub(super) fn has_wide_fan(&self, vertex: u32) -> bool {
+    pub(super) fn has_wide_fan_at(&self, vertex: u32) -> bool {
         self.wide.get(vertex as usize).copied().unwrap_or(false)
     }
 
@@ -265,7 +265,7 @@ impl Topology {
     }
 
     /// Returns the first half-edge of the fan that contains `half`, or `half` if the fan is closed.
-    pub(super) fn fan_start(&self, half: u32) -> u32 {
+    pub(super) fn first_half_edge_of_fan(&self, half: u32) -> u32 {
         let mut first = half;
         loop {
             let twin = self.twin(first);
@@ -282,7 +282,7 @@ impl Topology {
     /// If the edge of `half` is in a wide fan at the start of `half`, returns the number of faces in the fan.
     pub(super) fn wide_fan_face_count(&self, half: u32) -> Option<u32> {
         let mut faces = 0;
-        let last = self.walk_fan(self.fan_start(half), |_| faces += 1);
+        let last = self.walk_fan(self.first_half_edge_of_fan(half), |_| faces += 1);
         last.filter(|_| faces >= WIDE).map(|_| faces)
     }
 

@@ -12,7 +12,7 @@ pub fn try_add_to_histogram<const N: usize>(
     into: &mut Histogram<N>,
 ) -> bool {
     #[cfg(target_arch = "x86_64")]
-    if InstructionSet::best() >= InstructionSet::Avx2 {
+    if InstructionSet::from_environment_or_best() >= InstructionSet::Avx2 {
         // SAFETY: the processor has AVX2.
         unsafe { avx2::add_to_histogram(references, bins, into) };
         return true;
@@ -29,7 +29,7 @@ pub fn try_partition<const AXIS: usize>(
     bins: &BinMapping,
 ) -> Option<(usize, [SimdBounds; 2])> {
     #[cfg(target_arch = "x86_64")]
-    if InstructionSet::best() >= InstructionSet::Avx2 {
+    if InstructionSet::from_environment_or_best() >= InstructionSet::Avx2 {
         // SAFETY: the processor has AVX2.
         return Some(unsafe { avx2::partition::<AXIS>(references, bin, bins) });
     }

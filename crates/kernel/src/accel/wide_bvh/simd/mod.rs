@@ -52,7 +52,7 @@ impl InstructionSet {
 
     /// The fastest supported instruction set. To compare instruction sets, select a slower one with the
     /// environment variable `GLIMT_SIMD` (`portable` or `avx2`).
-    pub fn best() -> Self {
+    pub fn from_environment_or_best() -> Self {
         static BEST: LazyLock<InstructionSet> =
             LazyLock::new(|| match std::env::var("GLIMT_SIMD").as_deref() {
                 Ok("portable") => InstructionSet::Portable,

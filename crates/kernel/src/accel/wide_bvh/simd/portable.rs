@@ -70,7 +70,7 @@ pub fn any_hit(tree: &WideBvh, ray: &Ray, except: Option<u32>) -> bool {
                 let hits = |pack: &TrianglePack, lane: usize| {
                     Some(pack.ids[lane]) != except
                         && pack.ids[lane] != ray.start
-                        && sheared.intersect(&pack.corners(lane), ray.t_max).is_some()
+                        && sheared.intersect(&pack.corners_at_lane(lane), ray.t_max).is_some()
                 };
                 if packs.iter().any(|pack| (0..PACK).any(|lane| hits(pack, lane))) {
                     return true;
@@ -101,7 +101,7 @@ pub fn update_nearest_with_triangle(
     t_max: f32,
     best: &mut Option<ShapeHit>,
 ) {
-    if let Some(hit) = ray.intersect(&pack.corners(lane), t_max) {
+    if let Some(hit) = ray.intersect(&pack.corners_at_lane(lane), t_max) {
         let id = pack.ids[lane];
         if best.is_none_or(|best| (hit.t, id) < (best.t, best.primitive)) {
             *best = Some(ShapeHit { primitive: id, ..hit });

@@ -233,16 +233,16 @@ impl SimdRay {
     /// One corner of each triangle, in the ray's coordinates. `row` is the corner's first row.
     #[inline(always)]
     fn sheared_corner(&self, pack: &TrianglePack, row: usize) -> [SimdF32x4; 3] {
-        let z = self.relative_coordinates(pack, row, 2);
+        let z = self.relative_corner_coordinates(pack, row, 2);
         [
-            self.relative_coordinates(pack, row, 0) - self.shear[0] * z,
-            self.relative_coordinates(pack, row, 1) - self.shear[1] * z,
+            self.relative_corner_coordinates(pack, row, 0) - self.shear[0] * z,
+            self.relative_corner_coordinates(pack, row, 1) - self.shear[1] * z,
             z,
         ]
     }
 
     #[inline(always)]
-    fn relative_coordinates(&self, pack: &TrianglePack, row: usize, axis: usize) -> SimdF32x4 {
+    fn relative_corner_coordinates(&self, pack: &TrianglePack, row: usize, axis: usize) -> SimdF32x4 {
         // SAFETY: values of this type exist, so the processor has the instructions. There are nine rows,
         // `row` is 0, 3, or 6, and axes are less than 3.
         let row = unsafe { SimdF32x4::load(pack.rows.as_ptr().add(row + self.axes[axis]).cast()) };

@@ -157,7 +157,7 @@ pub fn prefetch_child_start(tree: &WideBvh, code: u32) {
 #[cold]
 #[inline(never)]
 fn is_lane_triangle_hit(pack: &TrianglePack, lane: usize, ray: &Ray) -> bool {
-    ShearedRay::new(ray.origin, ray.direction).intersect(&pack.corners(lane), ray.t_max).is_some()
+    ShearedRay::new(ray.origin, ray.direction).intersect(&pack.corners_at_lane(lane), ray.t_max).is_some()
 }
 
 /// [`WideBvh::any_hit`] with AVX2.

@@ -50,7 +50,7 @@ pub fn intersect<V: SimdVector>(
     let inverse = ax.splat_like(1.0).div(determinant);
     let t = along * inverse;
     let ahead = zero.lt(t) & t.le(t_max);
-    let (error, reach) = distance_error_and_max_t(corners, shear_z, inverse);
+    let (error, reach) = distance_error_and_corner_max_t(corners, shear_z, inverse);
     let needle = (reach * reach.splat_like(ILL_CONDITIONED)).lt(error);
     let at_start = t.abs().le(error);
     let doubtful = V::movemask(V::and_not(needle | at_start | on_edge, outside));
@@ -65,7 +65,7 @@ const UNITS: f32 = 1.05 * 0.5 * f32::EPSILON / ILL_CONDITIONED;
 /// Whether a triangle may need the full test. Returns false only if the triangle is not a needle and t is
 /// negative or past the ray's end by more than its error. Let s be the sum of the maxima of |x| and |y|, so
 /// the product of these maxima is at most s²/4, and let d be the maximum of |z|. Then the error from
-/// [`distance_error_and_max_t`] is at most the reach times 30·s·(s + d) unit roundoffs, divided by the
+/// [`distance_error_and_corner_max_t`] is at most the reach times 30·s·(s + d) unit roundoffs, divided by the
 /// determinant. If the inverse of the determinant may be infinite, the triangle counts as a needle. `along`
 /// is t times the determinant.
 #[inline(always)]
@@ -86,9 +86,9 @@ fn may_be_in_range_mask<V: SimdVector>(
     size.le(bound) | is_ahead
 }
 
-/// SIMD version of `ShearedRay::distance_error_and_max_t`.
+/// SIMD version of `ShearedRay::distance_error_and_corner_max_t`.
 #[inline(always)]
-fn distance_error_and_max_t<V: SimdVector>(
+fn distance_error_and_corner_max_t<V: SimdVector>(
     corners: &ShearedCorners<V>,
     shear_z: V,
     inverse_determinant: V,
@@ -150,7 +150,7 @@ mod tests {
             let inverse = like.splat_like(1.0).div(determinant);
             let along = (wa * az + wb * bz + wc * cz) * shear_z;
             let t = along * inverse;
-            let (error, reach) = distance_error_and_max_t(&corners, shear_z, inverse);
+            let (error, reach) = distance_error_and_corner_max_t(&corners, shear_z, inverse);
             let is_needle = SimdF32x4::movemask((reach * like.splat_like(ILL_CONDITIONED)).lt(error)) != 0;
             let is_at_start = SimdF32x4::movemask(t.abs().le(error)) != 0;
             // Place the ray's end in front of the triangle, on it, behind it, or at infinity.

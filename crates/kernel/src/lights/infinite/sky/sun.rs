@@ -70,7 +70,7 @@ impl SunDisk {
             for sector in 0..SECTORS {
                 let up = libm::cos((sector as f64 + 0.5) / SECTORS as f64 * TAU);
                 let height = sin * along + cos * across * up;
-                let radiance = self.radiance(height as f32, (2.0 * below_one) as f32).as_dvec3();
+                let radiance = self.radiance_inside_disk(height as f32, (2.0 * below_one) as f32).as_dvec3();
                 mean += radiance / (RINGS * SECTORS) as f64;
                 horizontal += radiance * height / (RINGS * SECTORS) as f64;
             }
@@ -81,7 +81,7 @@ impl SunDisk {
 
     /// Radiance at a point inside the disk, given the sine of its elevation and the squared chord to the
     /// disk's center.
-    fn radiance(&self, height: f32, squared_chord: f32) -> Vec3 {
+    fn radiance_inside_disk(&self, height: f32, squared_chord: f32) -> Vec3 {
         if height < 0.0 {
             return Vec3::ZERO;
         }
@@ -122,6 +122,6 @@ pub struct OrientedSunDisk {
 impl OrientedSunDisk {
     /// Radiance from a unit direction inside the disk around `center`.
     pub fn radiance(&self, center: Vec3, direction: Vec3) -> Vec3 {
-        self.disk.radiance(direction.dot(self.up), (direction - center).length_squared())
+        self.disk.radiance_inside_disk(direction.dot(self.up), (direction - center).length_squared())
     }
 }

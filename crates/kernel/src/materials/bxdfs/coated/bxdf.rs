@@ -3,7 +3,7 @@
 use super::CoatedPoint;
 use crate::materials::bsdf::{BxdfParameters, LobesToSample, NarrowLobe};
 use crate::materials::bxdf::{
-    Bxdf, BxdfFlags, LobeValue, SampledLobes, ShadingGeometry, choose_vec3_by_bool,
+    Bxdf, BxdfFlags, LobeValue, LobesWithNormal, ShadingGeometry, choose_vec3_by_bool,
 };
 use crate::materials::coat::{ClearCoatLayer, interreflection_gain, nonnegative_cosine};
 use crate::math::Vec3;
@@ -144,7 +144,7 @@ impl<B: Bxdf> Bxdf for CoatedBxdf<B> {
 
     #[inline(always)]
     fn new(point: &Self::Point, tangent: Vec3) -> Self {
-        let [wide, narrow_reflectance] = point.base.reflectances_under_coat();
+        let [wide, narrow_reflectance] = point.base.lobe_reflectances_under_coat();
         let wide_gain = interreflection_gain(wide, point.coat.weight * point.coat.albedo.mean);
         let coat = ClearCoatLayer::from(&point.coat);
         let layer = ClearCoat { coat, wide_gain, narrow_reflectance };
@@ -202,7 +202,7 @@ impl<B: Bxdf> Bxdf for CoatedBxdf<B> {
     }
 
     #[inline(always)]
-    fn pdf(&self, view: &Self::View, from: SampledLobes, wi: Vec3, shape: f32, any: BxdfFlags) -> f32 {
+    fn pdf(&self, view: &Self::View, from: LobesWithNormal, wi: Vec3, shape: f32, any: BxdfFlags) -> f32 {
         let CoatViewTerms { normal, wo, .. } = view.layer;
         let choice = CoatOrBaseProbabilities::new(&view.layer, from.lobes);
         let base = choice.base * self.base.pdf(&view.base, from, wi, shape, any);
@@ -215,7 +215,7 @@ impl<B: Bxdf> Bxdf for CoatedBxdf<B> {
     fn sample(
         &self,
         view: &Self::View,
-        from: SampledLobes,
+        from: LobesWithNormal,
         [choice, u @ ..]: [f32; 3],
         any: BxdfFlags,
     ) -> Vec3 {

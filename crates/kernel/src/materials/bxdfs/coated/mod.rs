@@ -36,12 +36,12 @@ impl<M: BxdfMaterial> BxdfMaterial for CoatedMaterial<M> {
     }
 
     #[inline]
-    fn albedo<'m>(&'m self, lookup: &mut impl ParameterLookup<'m>) -> Vec3 {
-        self.base.albedo(lookup)
+    fn main_color<'m>(&'m self, lookup: &mut impl ParameterLookup<'m>) -> Vec3 {
+        self.base.main_color(lookup)
     }
 
-    fn ambient<'m>(&'m self, lookup: &mut impl ParameterLookup<'m>) -> Vec3 {
-        self.base.ambient(lookup)
+    fn look_up_ambient_reflectance<'m>(&'m self, lookup: &mut impl ParameterLookup<'m>) -> Vec3 {
+        self.base.look_up_ambient_reflectance(lookup)
     }
 
     #[inline]

@@ -2,7 +2,7 @@
 
 use super::{ConductorPoint, FresnelPoint, reflectance};
 use crate::materials::bsdf::NarrowLobe;
-use crate::materials::bxdf::{Bxdf, BxdfFlags, LobeValue, SampledLobes, ShadingGeometry};
+use crate::materials::bxdf::{Bxdf, BxdfFlags, LobeValue, LobesWithNormal, ShadingGeometry};
 use crate::materials::fresnel::schlick_weight;
 use crate::materials::microfacet::{
     MicrofacetDistribution, SmithTerms, UnnormalizedHalfVector, frame_with_tangent, sample_reflection,
@@ -120,7 +120,7 @@ impl<const BRUSHED: bool, const BECKMANN: bool> Bxdf for ConductorBxdf<BRUSHED, 
     }
 
     #[inline(always)]
-    fn pdf(&self, view: &ConductorViewTerms, _: SampledLobes, wi: Vec3, shape: f32, _: BxdfFlags) -> f32 {
+    fn pdf(&self, view: &ConductorViewTerms, _: LobesWithNormal, wi: Vec3, shape: f32, _: BxdfFlags) -> f32 {
         let [eye, light] = self.view_and_light_smith_terms(view, wi);
         eye.pdf_from_reflection_term(&light, shape)
     }
@@ -129,7 +129,7 @@ impl<const BRUSHED: bool, const BECKMANN: bool> Bxdf for ConductorBxdf<BRUSHED, 
     fn sample(
         &self,
         view: &ConductorViewTerms,
-        _: SampledLobes,
+        _: LobesWithNormal,
         [_, u @ ..]: [f32; 3],
         _: BxdfFlags,
     ) -> Vec3 {

@@ -114,7 +114,7 @@ impl BxdfMaterial for Conductor {
     }
 
     #[inline]
-    fn albedo<'m>(&'m self, lookup: &mut impl ParameterLookup<'m>) -> Vec3 {
+    fn main_color<'m>(&'m self, lookup: &mut impl ParameterLookup<'m>) -> Vec3 {
         self.fresnel.look_up_parameters(lookup).reflectance(1.0)
     }
 
@@ -140,7 +140,7 @@ impl BxdfParameters for ConductorPoint {
     }
 
     #[inline(always)]
-    fn reflectances_under_coat(&self) -> [Vec3; 2] {
+    fn lobe_reflectances_under_coat(&self) -> [Vec3; 2] {
         [Vec3::ZERO, self.fresnel.reflectance(1.0)]
     }
 }

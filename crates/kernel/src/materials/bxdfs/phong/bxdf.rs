@@ -5,7 +5,7 @@ use std::f32::consts::FRAC_1_PI;
 use super::PhongBsdf;
 use super::lobes::{PhongLobes, phong_cosine_power};
 use crate::materials::bsdf::{LobesToSample, NarrowLobe};
-use crate::materials::bxdf::{Bxdf, BxdfFlags, LobeValue, SampledLobes, ShadingGeometry};
+use crate::materials::bxdf::{Bxdf, BxdfFlags, LobeValue, LobesWithNormal, ShadingGeometry};
 use crate::math::Vec3;
 use glimt_base::soa;
 
@@ -35,8 +35,8 @@ soa! {
 
 impl PhongBxdf {
     #[inline(always)]
-    pub(super) fn lobes(&self, view: &PhongViewTerms, from: SampledLobes) -> PhongLobes {
-        let SampledLobes { lobes, normal } = from;
+    pub(super) fn lobes(&self, view: &PhongViewTerms, from: LobesWithNormal) -> PhongLobes {
+        let LobesWithNormal { lobes, normal } = from;
         let [diffuse, specular] = match lobes {
             LobesToSample::All => self.albedos,
             LobesToSample::Narrow => [0.0, 1.0],
@@ -66,7 +66,7 @@ impl Bxdf for PhongBxdf {
     }
 
     #[inline(always)]
-    fn set_color(&mut self, _: &PhongBsdf, color: Vec3) {
+    fn set_looked_up_color(&mut self, _: &PhongBsdf, color: Vec3) {
         self.diffuse = color * FRAC_1_PI;
         self.albedos[0] = color.max_element();
     }
@@ -100,7 +100,7 @@ impl Bxdf for PhongBxdf {
     }
 
     #[inline(always)]
-    fn pdf(&self, view: &PhongViewTerms, lobes: SampledLobes, wi: Vec3, shape: f32, _: BxdfFlags) -> f32 {
+    fn pdf(&self, view: &PhongViewTerms, lobes: LobesWithNormal, wi: Vec3, shape: f32, _: BxdfFlags) -> f32 {
         self.lobes(view, lobes).pdf(wi, shape)
     }
 
@@ -108,7 +108,7 @@ impl Bxdf for PhongBxdf {
     fn sample(
         &self,
         view: &PhongViewTerms,
-        lobes: SampledLobes,
+        lobes: LobesWithNormal,
         [choice, u0, u1]: [f32; 3],
         any: BxdfFlags,
     ) -> Vec3 {
@@ -133,7 +133,7 @@ impl Bxdf for PhongBxdf {
     #[inline(always)]
     fn narrow_lobe(&self, view: &PhongViewTerms) -> Option<NarrowLobe> {
         // The normal is not used here.
-        let lobes = self.lobes(view, SampledLobes { lobes: LobesToSample::All, normal: Vec3::Z });
+        let lobes = self.lobes(view, LobesWithNormal { lobes: LobesToSample::All, normal: Vec3::Z });
         let (axis, exponent) = (view.reflected, self.shininess);
         Some(NarrowLobe {
             axis,

@@ -12,7 +12,7 @@ use crate::materials::texture::ColorOrTexture;
 #[cfg(test)]
 use crate::materials::{
     bsdf::LobesToSample,
-    bxdf::{Bxdf, SampledLobes, ShadingGeometry},
+    bxdf::{Bxdf, LobesWithNormal, ShadingGeometry},
 };
 use crate::math::Vec3;
 pub use bxdf::{PhongBxdf, PhongViewTerms};
@@ -53,21 +53,21 @@ impl BxdfMaterial for Phong {
             diffuse,
             specular: lookup.color(&self.specular),
             shininess: self.shininess,
-            ambient: self.ambient.as_ref().map_or(diffuse, |ambient| lookup.ambient(ambient)),
+            ambient: self.ambient.as_ref().map_or(diffuse, |ambient| lookup.ambient_color(ambient)),
         }
     }
 
     #[inline]
-    fn albedo<'m>(&'m self, lookup: &mut impl ParameterLookup<'m>) -> Vec3 {
+    fn main_color<'m>(&'m self, lookup: &mut impl ParameterLookup<'m>) -> Vec3 {
         lookup.color(&self.diffuse)
     }
 
-    fn ambient<'m>(&'m self, lookup: &mut impl ParameterLookup<'m>) -> Vec3 {
-        lookup.ambient(self.ambient.as_ref().unwrap_or(&self.diffuse))
+    fn look_up_ambient_reflectance<'m>(&'m self, lookup: &mut impl ParameterLookup<'m>) -> Vec3 {
+        lookup.ambient_color(self.ambient.as_ref().unwrap_or(&self.diffuse))
     }
 
     #[inline]
-    fn color_for_packet_lookup(&self) -> Option<&ColorOrTexture> {
+    fn color_to_look_up(&self) -> Option<&ColorOrTexture> {
         Some(&self.diffuse)
     }
 }
@@ -88,7 +88,7 @@ impl BxdfParameters for PhongBsdf {
     }
 
     #[inline(always)]
-    fn reflectances_under_coat(&self) -> [Vec3; 2] {
+    fn lobe_reflectances_under_coat(&self) -> [Vec3; 2] {
         [self.diffuse, self.specular]
     }
 }
@@ -120,7 +120,7 @@ impl PhongBsdf {
         let bxdf = PhongBxdf::new(self, Vec3::ZERO);
         let directions = ShadingGeometry { normal, wo, tangent: Vec3::ZERO };
         let view = bxdf.compute_view_terms(&directions, PhongBxdf::ALWAYS);
-        bxdf.lobes(&view, SampledLobes { lobes: LobesToSample::All, normal })
+        bxdf.lobes(&view, LobesWithNormal { lobes: LobesToSample::All, normal })
     }
 }
 

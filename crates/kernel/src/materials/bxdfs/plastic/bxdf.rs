@@ -5,7 +5,7 @@ use std::f32::consts::{FRAC_1_PI, PI};
 use super::{PlasticPoint, base_layer_f};
 use crate::materials::bsdf::{LobesToSample, NarrowLobe};
 use crate::materials::bxdf::{
-    Bxdf, BxdfFlags, LobeValue, SampledLobes, ShadingGeometry, choose_vec3_by_bool,
+    Bxdf, BxdfFlags, LobeValue, LobesWithNormal, ShadingGeometry, choose_vec3_by_bool,
 };
 use crate::materials::coat::{CoatLayer, nonnegative_cosine};
 use crate::materials::phong::lobes::direction_about_axis;
@@ -82,7 +82,7 @@ impl<const BECKMANN: bool> Bxdf for PlasticBxdf<BECKMANN> {
     }
 
     #[inline(always)]
-    fn set_color(&mut self, point: &PlasticPoint, color: Vec3) {
+    fn set_looked_up_color(&mut self, point: &PlasticPoint, color: Vec3) {
         self.base = base_layer_f(color.min(Vec3::ONE), point.ior, &point.albedo);
     }
 
@@ -123,7 +123,7 @@ impl<const BECKMANN: bool> Bxdf for PlasticBxdf<BECKMANN> {
     fn pdf(
         &self,
         view: &PlasticViewTerms,
-        SampledLobes { lobes, normal }: SampledLobes,
+        LobesWithNormal { lobes, normal }: LobesWithNormal,
         wi: Vec3,
         _: f32,
         any: BxdfFlags,
@@ -144,7 +144,7 @@ impl<const BECKMANN: bool> Bxdf for PlasticBxdf<BECKMANN> {
     fn sample(
         &self,
         view: &PlasticViewTerms,
-        SampledLobes { lobes, normal }: SampledLobes,
+        LobesWithNormal { lobes, normal }: LobesWithNormal,
         [choice, u @ ..]: [f32; 3],
         any: BxdfFlags,
     ) -> Vec3 {

@@ -106,16 +106,16 @@ impl BxdfMaterial for Plastic {
     }
 
     #[inline]
-    fn albedo<'m>(&'m self, lookup: &mut impl ParameterLookup<'m>) -> Vec3 {
+    fn main_color<'m>(&'m self, lookup: &mut impl ParameterLookup<'m>) -> Vec3 {
         lookup.color(&self.diffuse)
     }
 
-    fn ambient<'m>(&'m self, lookup: &mut impl ParameterLookup<'m>) -> Vec3 {
+    fn look_up_ambient_reflectance<'m>(&'m self, lookup: &mut impl ParameterLookup<'m>) -> Vec3 {
         lookup.color(&self.diffuse)
     }
 
     #[inline]
-    fn color_for_packet_lookup(&self) -> Option<&ColorOrTexture> {
+    fn color_to_look_up(&self) -> Option<&ColorOrTexture> {
         Some(&self.diffuse)
     }
 }

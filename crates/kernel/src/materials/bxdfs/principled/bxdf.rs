@@ -5,7 +5,7 @@ use std::f32::consts::FRAC_1_PI;
 use super::PrincipledPoint;
 use crate::materials::bsdf::{LobesToSample, NarrowLobe};
 use crate::materials::bxdf::{
-    Bxdf, BxdfFlags, LobeValue, SampledLobes, ShadingGeometry, choose_vec3_by_bool,
+    Bxdf, BxdfFlags, LobeValue, LobesWithNormal, ShadingGeometry, choose_vec3_by_bool,
 };
 use crate::materials::coat::nonnegative_cosine;
 use crate::materials::fresnel::schlick_weight;
@@ -74,7 +74,7 @@ impl<const THROUGH: bool> PrincipledBxdf<THROUGH> {
     /// Albedos of the specular lobe at a cosine ≥ 0, per unit of reflectance at normal incidence and at
     /// grazing angles.
     #[inline(always)]
-    fn specular_albedos(&self, cosine: f32) -> [f32; 2] {
+    fn normal_and_grazing_albedos(&self, cosine: f32) -> [f32; 2] {
         [
             evaluate_albedo_fit(cosine, |number| self.terms[number]),
             evaluate_albedo_fit(cosine, |number| self.grazing_terms[number]),
@@ -84,7 +84,7 @@ impl<const THROUGH: bool> PrincipledBxdf<THROUGH> {
     /// Fraction of the light that passes through the dielectric's specular lobe at a cosine ≥ 0.
     #[inline(always)]
     fn one_minus_specular_albedo(&self, cosine: f32) -> Vec3 {
-        let [normal, grazing] = self.specular_albedos(cosine);
+        let [normal, grazing] = self.normal_and_grazing_albedos(cosine);
         let rest = Vec3::ONE - self.dielectric * normal - Vec3::splat(self.dielectric_grazing * grazing);
         // If the facets reflect everything, no light passes. Clamp to 0 because rounding could make the
         // result negative.
@@ -137,7 +137,7 @@ impl<const THROUGH: bool> Bxdf for PrincipledBxdf<THROUGH> {
         let wo = if THROUGH { mirrored } else { wo };
         let cosine = nonnegative_cosine(normal.dot(wo));
         let transmittance = self.one_minus_specular_albedo(cosine);
-        let [at_normal, at_grazing] = self.specular_albedos(cosine);
+        let [at_normal, at_grazing] = self.normal_and_grazing_albedos(cosine);
         let specular = self.facets.max_element() * at_normal + self.grazing * at_grazing;
         let [diffuse, through] = self.diffuse_albedos;
         let (diffuse, through) =
@@ -188,7 +188,7 @@ impl<const THROUGH: bool> Bxdf for PrincipledBxdf<THROUGH> {
     fn pdf(
         &self,
         view: &PrincipledViewTerms,
-        SampledLobes { lobes, normal }: SampledLobes,
+        LobesWithNormal { lobes, normal }: LobesWithNormal,
         wi: Vec3,
         _: f32,
         _: BxdfFlags,
@@ -217,7 +217,7 @@ impl<const THROUGH: bool> Bxdf for PrincipledBxdf<THROUGH> {
     fn sample(
         &self,
         view: &PrincipledViewTerms,
-        SampledLobes { lobes, normal }: SampledLobes,
+        LobesWithNormal { lobes, normal }: LobesWithNormal,
         [choice, u @ ..]: [f32; 3],
         _: BxdfFlags,
     ) -> Vec3 {

@@ -133,11 +133,11 @@ impl BxdfMaterial for Principled {
     }
 
     #[inline]
-    fn albedo<'m>(&'m self, lookup: &mut impl ParameterLookup<'m>) -> Vec3 {
+    fn main_color<'m>(&'m self, lookup: &mut impl ParameterLookup<'m>) -> Vec3 {
         lookup.color(&self.inputs.color)
     }
 
-    fn ambient<'m>(&'m self, lookup: &mut impl ParameterLookup<'m>) -> Vec3 {
+    fn look_up_ambient_reflectance<'m>(&'m self, lookup: &mut impl ParameterLookup<'m>) -> Vec3 {
         let PrincipledInputs { color, metallic, transmission, .. } = &self.inputs;
         let [metallic, transmission] =
             [metallic, transmission].map(|number| lookup.number(number).clamp(0.0, 1.0));

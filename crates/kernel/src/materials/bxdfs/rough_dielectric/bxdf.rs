@@ -3,7 +3,7 @@
 use super::RoughDielectricPoint;
 use crate::materials::bsdf::NarrowLobe;
 use crate::materials::bxdf::{
-    Bxdf, BxdfFlags, LobeValue, SampledLobes, ShadingGeometry, choose_vec3_by_bool,
+    Bxdf, BxdfFlags, LobeValue, LobesWithNormal, ShadingGeometry, choose_vec3_by_bool,
 };
 use crate::materials::fresnel::{dielectric_for_any_eta, fresnel_transmittance};
 use crate::materials::microfacet::{
@@ -181,7 +181,7 @@ impl<const THROUGH: bool, const BECKMANN: bool> Bxdf for DielectricBxdf<THROUGH,
     }
 
     #[inline(always)]
-    fn pdf(&self, view: &DielectricViewTerms, _: SampledLobes, wi: Vec3, shape: f32, _: BxdfFlags) -> f32 {
+    fn pdf(&self, view: &DielectricViewTerms, _: LobesWithNormal, wi: Vec3, shape: f32, _: BxdfFlags) -> f32 {
         let [eye, light] = self.view_and_light_smith_terms(view, wi);
         eye.pdf_from_reflection_term(&light, shape)
     }
@@ -190,7 +190,7 @@ impl<const THROUGH: bool, const BECKMANN: bool> Bxdf for DielectricBxdf<THROUGH,
     fn sample(
         &self,
         view: &DielectricViewTerms,
-        _: SampledLobes,
+        _: LobesWithNormal,
         [choice, u @ ..]: [f32; 3],
         _: BxdfFlags,
     ) -> Vec3 {

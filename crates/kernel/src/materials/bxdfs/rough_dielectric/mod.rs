@@ -36,7 +36,7 @@ pub struct RoughDielectricPoint {
 
 impl RoughDielectricPoint {
     /// The BSDF for reflected light.
-    pub fn reflection(self) -> BxdfPoint {
+    pub fn reflection_bxdf(self) -> BxdfPoint {
         match self.distribution {
             MicrofacetDistribution::Ggx => BxdfPoint::DielectricReflection(self),
             MicrofacetDistribution::Beckmann => BxdfPoint::BeckmannReflection(self),
@@ -44,7 +44,7 @@ impl RoughDielectricPoint {
     }
 
     /// The BSDF for transmitted light.
-    pub fn transmission(self) -> BxdfPoint {
+    pub fn transmission_bxdf(self) -> BxdfPoint {
         match self.distribution {
             MicrofacetDistribution::Ggx => BxdfPoint::DielectricTransmission(self),
             MicrofacetDistribution::Beckmann => BxdfPoint::BeckmannTransmission(self),

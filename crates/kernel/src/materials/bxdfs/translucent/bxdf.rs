@@ -5,7 +5,7 @@ use std::f32::consts::{FRAC_1_PI, PI};
 use super::TranslucentPoint;
 use crate::materials::bsdf::{LobesToSample, NarrowLobe};
 use crate::materials::bxdf::{
-    Bxdf, BxdfFlags, LobeValue, SampledLobes, ShadingGeometry, choose_vec3_by_bool,
+    Bxdf, BxdfFlags, LobeValue, LobesWithNormal, ShadingGeometry, choose_vec3_by_bool,
 };
 use crate::materials::phong::lobes::direction_about_axis;
 use crate::materials::phong::{PhongBxdf, PhongViewTerms};
@@ -74,7 +74,7 @@ impl<const THROUGH: bool> Bxdf for TranslucentBxdf<THROUGH> {
     }
 
     #[inline(always)]
-    fn pdf(&self, view: &PhongViewTerms, from: SampledLobes, wi: Vec3, shape: f32, any: BxdfFlags) -> f32 {
+    fn pdf(&self, view: &PhongViewTerms, from: LobesWithNormal, wi: Vec3, shape: f32, any: BxdfFlags) -> f32 {
         if THROUGH {
             let cosine = from.normal.dot(wi);
             return self.transmission_probability * if cosine > 0.0 { cosine * FRAC_1_PI } else { 0.0 };
@@ -90,7 +90,7 @@ impl<const THROUGH: bool> Bxdf for TranslucentBxdf<THROUGH> {
     fn sample(
         &self,
         view: &PhongViewTerms,
-        from: SampledLobes,
+        from: LobesWithNormal,
         [choice, u @ ..]: [f32; 3],
         any: BxdfFlags,
     ) -> Vec3 {

@@ -62,12 +62,12 @@ impl BxdfMaterial for TranslucentPhong {
     }
 
     #[inline]
-    fn albedo<'m>(&'m self, lookup: &mut impl ParameterLookup<'m>) -> Vec3 {
-        self.reflection.albedo(lookup)
+    fn main_color<'m>(&'m self, lookup: &mut impl ParameterLookup<'m>) -> Vec3 {
+        self.reflection.main_color(lookup)
     }
 
-    fn ambient<'m>(&'m self, lookup: &mut impl ParameterLookup<'m>) -> Vec3 {
-        self.reflection.ambient(lookup)
+    fn look_up_ambient_reflectance<'m>(&'m self, lookup: &mut impl ParameterLookup<'m>) -> Vec3 {
+        self.reflection.look_up_ambient_reflectance(lookup)
     }
 
     fn is_transmissive(&self) -> bool {
@@ -91,8 +91,8 @@ impl BxdfParameters for TranslucentPoint {
     }
 
     #[inline(always)]
-    fn reflectances_under_coat(&self) -> [Vec3; 2] {
-        self.reflection.reflectances_under_coat()
+    fn lobe_reflectances_under_coat(&self) -> [Vec3; 2] {
+        self.reflection.lobe_reflectances_under_coat()
     }
 }
 

@@ -88,5 +88,5 @@ pub fn any_hit_if_coherent<V: SimdVector>(
 #[cold]
 #[inline(never)]
 fn recheck_doubtful_hit(ray: &Ray, pack: &TrianglePack, lane: usize) -> bool {
-    ShearedRay::new(ray.origin, ray.direction).intersect(&pack.corners(lane), ray.t_max).is_some()
+    ShearedRay::new(ray.origin, ray.direction).intersect(&pack.corners_at_lane(lane), ray.t_max).is_some()
 }

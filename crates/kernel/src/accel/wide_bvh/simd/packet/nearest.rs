@@ -89,7 +89,7 @@ impl<V: SimdVector> NearestHits<V> {
         self.v.store(&mut v);
         self.id.store(&mut id);
         let sheared = ShearedRay::new(own.origin, own.direction);
-        let Some(hit) = sheared.intersect(&pack.corners(lane), t[ray]) else { return 0 };
+        let Some(hit) = sheared.intersect(&pack.corners_at_lane(lane), t[ray]) else { return 0 };
         let number = pack.ids[lane];
         if (hit.t, number) >= (t[ray], id[ray].to_bits()) {
             return 0;
