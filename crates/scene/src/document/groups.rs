@@ -119,7 +119,7 @@ fn read_members(
 ) -> Option<Vec<GroupMember>> {
     let mut members = Vec::new();
     let are_shapes_valid = read_shape_objects(table, materials, files, |id, object| {
-        members.push((id, GroupMember::Object(object)))
+        members.push((id, GroupMember::Object(object)));
     });
     let instances = read_instances(table, names);
     table.reject_key(

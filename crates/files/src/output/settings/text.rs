@@ -58,7 +58,7 @@ pub(super) fn read_jpeg_info(bytes: &[u8]) -> Option<ImageFileInfo> {
         match kind {
             _ if mark != 0xff => return None,
             COMMENT => {
-                String::from_utf8_lossy(content).lines().for_each(|line| info.add_name_value_line(line))
+                String::from_utf8_lossy(content).lines().for_each(|line| info.add_name_value_line(line));
             }
             // Start of frame. The excluded codes are Huffman tables and arithmetic coding.
             0xc0..=0xcf if !matches!(kind, 0xc4 | 0xc8 | 0xcc) => {
