@@ -577,4 +577,5 @@ def main():
     sys.exit(f"{missed} faults were not detected" if missed else 0)
 
 
-main()
+if __name__ == "__main__":
+    main()

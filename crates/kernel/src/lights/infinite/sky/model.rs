@@ -5,7 +5,7 @@
 //! elevation, and the channels red, green and blue. The second contains the sun's mean radiance for the same
 //! turbidities as piecewise cubic polynomials of the elevation in radians: 45 segments, three channels, four
 //! coefficients. Radiances are in linear Rec. 709, where the luminance of a spectrally constant radiance of
-//! 1 W·m⁻²·sr⁻¹·nm⁻¹ is 1.
+//! 1 W·m⁻²·sr⁻¹·nm⁻¹ is 1. `tables.py` computes the file from the authors' tables.
 
 use std::f64::consts::FRAC_PI_2;
 
