@@ -202,7 +202,7 @@ FAULTS = [
      NULL_INTERACTIONS + "shadows_multiply_transmittances"),
     ("a MIS weight with the distance from a pane", "integrators/transport/walk.rs", "path.ray.origin = ⟦self.origin⟧;",
      "path.ray.origin", NULL_INTERACTIONS + "light_passes_through_panes"),
-    ("an emitter's back weighted as its front", "lights/area/mod.rs", "Side::Back => ⟦LightHit { normal: -hit.normal, ..*hit }⟧",
+    ("an emitter's back weighted as its front", "lights/area/mod.rs", "Side::Back => ⟦LightHitPoint { normal: -hit.normal, ..*hit }⟧",
      "*hit", TWO_SIDED + "flat_two_sided_lights_are_symmetric"),
     ("textures rotated the wrong way", "materials/texture/mapping.rs", "DVec2::new(⟦by.x * cos - by.y * sin⟧,",
      "by.x * cos + by.y * sin", "materials::texture::image::tests::coordinates_repeat_then_rotate_then_translate"),

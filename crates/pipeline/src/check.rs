@@ -115,7 +115,7 @@ impl IncrementalSceneChecker {
         let pool = self.threads.get_or_create_pool(logical_cpu_count(), false)?;
         let reader = FileReader { contents: &self.contents, pool: &pool, sink: &sink, token };
         let (scenes, mut table) = (&mut self.scenes, StageRecorder::new(None, token));
-        reader.read_consistently(&mut table, findings, |reading| {
+        reader.read_until_files_unchanged(&mut table, findings, |reading| {
             let scene = SceneParseRequest { path, sets, show: ModelViewOptions::default() };
             let parsed = scenes.parse_scene(scene, reading)?;
             let assets = scenes.load_assets(&parsed, TextureSelection::ForCheck, reading)?;

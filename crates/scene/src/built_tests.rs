@@ -4,15 +4,15 @@ use std::path::Path;
 
 use super::description::Scene;
 use super::diagnostic::Diagnostic;
-use super::{BuiltDocument, BuiltValue, LoadedScene, load_built, parse};
+use super::{BuiltValue, LoadedScene, SceneDocumentBuilder, load_built, parse};
 use crate::math::DVec3;
 
 /// Text of a foreign file. The last number is the radius of the second sphere.
 const SOURCE: &str = "camera; ball 1; brick; ball -2";
 
 /// Builds a scene with two spheres and, between them, a box.
-fn built(radius: f64, source: &str) -> BuiltDocument {
-    let mut built = BuiltDocument::new(source.into());
+fn built(radius: f64, source: &str) -> SceneDocumentBuilder {
+    let mut built = SceneDocumentBuilder::new(source.into());
     built.start_table("camera");
     built.set("position", DVec3::new(0.0, 1.0, 4.0));
     built.set("look_at", [0.0, 0.1, 1.0 / 3.0]);
@@ -39,12 +39,12 @@ fn built(radius: f64, source: &str) -> BuiltDocument {
     built
 }
 
-fn load(built: BuiltDocument, sets: &[&str]) -> Result<LoadedScene, Vec<Diagnostic>> {
+fn load(built: SceneDocumentBuilder, sets: &[&str]) -> Result<LoadedScene, Vec<Diagnostic>> {
     let sets: Vec<String> = sets.iter().map(|set| (*set).to_owned()).collect();
     load_built(built, Path::new("a.pbrt"), &sets)
 }
 
-fn first_error(built: BuiltDocument, sets: &[&str]) -> Diagnostic {
+fn first_error(built: SceneDocumentBuilder, sets: &[&str]) -> Diagnostic {
     load(built, sets).expect_err("an error").remove(0)
 }
 

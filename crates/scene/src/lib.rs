@@ -2,7 +2,7 @@
 //!
 //! [`load`] checks a file's size and type and reads it. [`parse`] converts its text to a
 //! [`description::Scene`] and a list of [`diagnostic::Diagnostic`]s. [`report`] formats diagnostics for the
-//! terminal. Importers of foreign formats build a [`BuiltDocument`] instead of a text, and [`load_built`]
+//! terminal. Importers of foreign formats build a [`SceneDocumentBuilder`] instead of a text, and [`load_built`]
 //! validates it in the same way.
 
 mod changes;
@@ -31,7 +31,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-pub use self::toml::{BuiltDocument, BuiltValue, quote_toml_string};
+pub use self::toml::{BuiltValue, SceneDocumentBuilder, quote_toml_string};
 pub use changes::{MAX_COMPARED_BYTES, list_changes};
 use description::{Camera, ResolvedCamera, Scene};
 use diagnostic::{Diagnostic, Severity};
@@ -70,7 +70,7 @@ pub struct LoadedScene {
     /// The file's text followed by the `--set` values. All spans in [`Self::scene`] index into it.
     pub source: SceneText,
     /// The document built from a foreign file, without the `--set` values. `None` for a scene file.
-    pub built: Option<Arc<BuiltDocument>>,
+    pub built: Option<Arc<SceneDocumentBuilder>>,
     /// The path as passed by the caller.
     pub path: PathBuf,
     /// Likely mistakes, in file order.
@@ -205,7 +205,7 @@ pub fn load(path: &Path, sets: &[String]) -> Result<LoadedScene, Vec<Diagnostic>
 /// # Errors
 /// Returns all errors and warnings.
 pub fn load_built(
-    built: BuiltDocument,
+    built: SceneDocumentBuilder,
     path: &Path,
     sets: &[String],
 ) -> Result<LoadedScene, Vec<Diagnostic>> {
@@ -218,7 +218,7 @@ pub fn load_built(
 fn loaded_scene_from_parse_outcome(
     ParseOutcome { scene, diagnostics, settings }: ParseOutcome,
     source: SceneText,
-    built: Option<Arc<BuiltDocument>>,
+    built: Option<Arc<SceneDocumentBuilder>>,
     path: &Path,
     named: Vec<PathBuf>,
 ) -> Result<LoadedScene, Vec<Diagnostic>> {

@@ -101,7 +101,7 @@ pub const HISTORY_KEYS: [&str; 2] = ["n older", "N newer"];
 /// Title of the history panel.
 pub const HISTORY: &str = "History";
 /// Describes a render that has no number.
-pub fn unnumbered_render(state: &str) -> String {
+pub fn unnumbered_render_label(state: &str) -> String {
     format!("{state} render")
 }
 

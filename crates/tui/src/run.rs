@@ -44,7 +44,7 @@ pub fn run(options: Options, queue: EventQueue) -> Result<TuiOutcome, TuiError> 
     let listener = SignalListener::start(&sender).map_err(io_error_to_tui_error("handle signals for"))?;
     let variable = |name: &str| std::env::var(name).ok();
     let capabilities =
-        TerminalId::from_environment(variable).map(TerminalId::desktop_capabilities).unwrap_or_default();
+        TerminalId::from_environment(variable).map(TerminalId::desktop_integration).unwrap_or_default();
     if capabilities.focus {
         terminal::enable_focus_reports_on_setup();
     }

@@ -44,7 +44,7 @@ pub(super) enum NotificationProtocol {
 
 /// Terminal capabilities beyond text.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) struct DesktopCapabilities {
+pub(super) struct DesktopIntegration {
     /// Window titles (OSC 2).
     pub(super) title: bool,
     /// A progress bar in the window frame or taskbar (OSC 9;4).
@@ -174,9 +174,9 @@ impl TerminalId {
     }
 
     /// Capabilities according to the terminal's documentation.
-    pub(super) fn desktop_capabilities(self) -> DesktopCapabilities {
+    pub(super) fn desktop_integration(self) -> DesktopIntegration {
         let Self { brand, version } = self;
-        let all = DesktopCapabilities {
+        let all = DesktopIntegration {
             title: true,
             progress: false,
             notice: Some(NotificationProtocol::Bell),
@@ -186,46 +186,46 @@ impl TerminalId {
         };
         let since = |least: [u32; 2]| version >= least;
         match brand {
-            TerminalBrand::Kitty => DesktopCapabilities { notice: Some(NotificationProtocol::Osc99), ..all },
+            TerminalBrand::Kitty => DesktopIntegration { notice: Some(NotificationProtocol::Osc99), ..all },
             TerminalBrand::Foot | TerminalBrand::Contour => {
-                DesktopCapabilities { notice: Some(NotificationProtocol::Osc777), ..all }
+                DesktopIntegration { notice: Some(NotificationProtocol::Osc777), ..all }
             }
-            TerminalBrand::Ghostty => DesktopCapabilities {
+            TerminalBrand::Ghostty => DesktopIntegration {
                 notice: Some(NotificationProtocol::Osc777),
                 progress: since([1, 2]),
                 ..all
             },
             // Older versions display the progress sequence as a notification.
-            TerminalBrand::WezTerm => DesktopCapabilities {
+            TerminalBrand::WezTerm => DesktopIntegration {
                 notice: Some(NotificationProtocol::Osc777),
                 progress: since([20_250_301, 0]),
                 ..all
             },
-            TerminalBrand::Iterm2 => DesktopCapabilities {
+            TerminalBrand::Iterm2 => DesktopIntegration {
                 notice: Some(NotificationProtocol::Osc9),
                 progress: since([3, 7]),
                 ..all
             },
-            TerminalBrand::WindowsTerminal => DesktopCapabilities { progress: true, ..all },
-            TerminalBrand::VsCode => DesktopCapabilities { progress: since([1, 97]), ..all },
-            TerminalBrand::Mintty => DesktopCapabilities { progress: since([3, 5]), ..all },
+            TerminalBrand::WindowsTerminal => DesktopIntegration { progress: true, ..all },
+            TerminalBrand::VsCode => DesktopIntegration { progress: since([1, 97]), ..all },
+            TerminalBrand::Mintty => DesktopIntegration { progress: since([3, 5]), ..all },
             TerminalBrand::Alacritty => all,
             TerminalBrand::Konsole => {
-                DesktopCapabilities { progress: since([25, 4]), clipboard: false, ..all }
+                DesktopIntegration { progress: since([25, 4]), clipboard: false, ..all }
             }
-            TerminalBrand::Vte => DesktopCapabilities {
+            TerminalBrand::Vte => DesktopIntegration {
                 progress: since([8000, 0]),
                 links: since([5000, 0]),
                 clipboard: false,
                 ..all
             },
             // xterm denies clipboard access by default.
-            TerminalBrand::Xterm => DesktopCapabilities { links: false, clipboard: false, ..all },
+            TerminalBrand::Xterm => DesktopIntegration { links: false, clipboard: false, ..all },
             TerminalBrand::ConEmu => {
-                DesktopCapabilities { title: true, progress: true, ..DesktopCapabilities::default() }
+                DesktopIntegration { title: true, progress: true, ..DesktopIntegration::default() }
             }
             TerminalBrand::AppleTerminal => {
-                DesktopCapabilities { links: false, clipboard: false, focus: false, notice: None, ..all }
+                DesktopIntegration { links: false, clipboard: false, focus: false, notice: None, ..all }
             }
         }
     }
@@ -317,7 +317,7 @@ mod tests {
             ("XTerm(390)", false),
         ] {
             let terminal = TerminalId::from_report(report).expect(report);
-            assert_eq!(terminal.desktop_capabilities().progress, has_progress, "{report}");
+            assert_eq!(terminal.desktop_integration().progress, has_progress, "{report}");
         }
     }
 }

@@ -134,12 +134,12 @@ mod tests {
     use super::*;
     use crate::fixtures::{TestUi, render_progress};
     use crate::pipeline::protocol::Event;
-    use crate::terminals::{DesktopCapabilities, TerminalBrand, TerminalId};
+    use crate::terminals::{DesktopIntegration, TerminalBrand, TerminalId};
 
     fn ui() -> TestUi {
         let mut ui = TestUi::new();
         ui.state.display.capabilities =
-            TerminalId { brand: TerminalBrand::Ghostty, version: [1, 2] }.desktop_capabilities();
+            TerminalId { brand: TerminalBrand::Ghostty, version: [1, 2] }.desktop_integration();
         ui
     }
 
@@ -178,7 +178,7 @@ mod tests {
     #[test]
     fn unsupported_terminals_get_no_title() {
         let (mut ui, mut shown_title) = (TestUi::new(), TitleAndProgress::default());
-        assert_eq!(ui.state.display.capabilities, DesktopCapabilities::default());
+        assert_eq!(ui.state.display.capabilities, DesktopIntegration::default());
         ui.finish_render([200, 30, 30]);
         assert_eq!(sent(&mut shown_title, &ui, false), "");
     }

@@ -144,7 +144,7 @@ impl TriangleReference {
             if (from < at && at < to) || (to < at && at < from) {
                 let (start, way) = (before.as_dvec3(), corner.as_dvec3() - before.as_dvec3());
                 let part = (f64::from(at) - f64::from(from)) / (f64::from(to) - f64::from(from));
-                let crossing = outward_rounded_point_bounds(start + way * part);
+                let crossing = outward_rounded_bounds_of_point(start + way * part);
                 parts[0].grow(&crossing);
                 parts[1].grow(&crossing);
             }
@@ -175,7 +175,7 @@ impl TriangleReference {
 
 /// `f32` box around a double-precision point, rounded outward.
 #[inline(always)]
-fn outward_rounded_point_bounds(exact: DVec3) -> SimdBounds {
+fn outward_rounded_bounds_of_point(exact: DVec3) -> SimdBounds {
     let near = exact.as_vec3();
     let off = exact - near.as_dvec3();
     let [mut min, mut max] = [near; 2];

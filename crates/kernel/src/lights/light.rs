@@ -4,7 +4,7 @@ use super::area::{AreaLight, EmissionModulation};
 use super::delta::{DeltaLight, PointLight, SpotLight};
 use super::infinite::{DirectionalLight, Environment, InfiniteLight};
 use super::packet::LightSamplePacket;
-use super::sample::{LightCenter, LightHit, LightSample, LightSceneGeometry};
+use super::sample::{LightCenter, LightHitPoint, LightSample, LightSceneGeometry};
 use super::tree::LightBounds;
 use crate::math::Vec3;
 use crate::math::lanes::{F32x16, PACKET_SIZE, Vec3x16, lane};
@@ -123,7 +123,7 @@ impl Light {
     /// Light-sampling pdf of a hit's direction in sr⁻¹, for the surface point `from` with the given normal.
     /// It is 0 if light sampling never generates the direction, or if rays cannot hit the light.
     #[inline]
-    pub fn pdf(&self, from: Vec3, normal: Vec3, hit: &LightHit) -> f32 {
+    pub fn pdf(&self, from: Vec3, normal: Vec3, hit: &LightHitPoint) -> f32 {
         self.as_area().map_or(0.0, |light| light.pdf(from, normal, hit))
     }
 

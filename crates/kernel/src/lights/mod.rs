@@ -53,7 +53,7 @@ pub use packet::{LightSamplePacket, LightSceneGeometryPacket};
 pub use photon_emission::{
     BoundingSphere, EmissiveObjectGeometry, EmittedPhoton, PhotonEmitter, PhotonOrigin, PhotonRandomNumbers,
 };
-pub use sample::{LightCenter, LightHit, LightSample, LightSceneGeometry, ShadowRayEnd};
+pub use sample::{LightCenter, LightHitPoint, LightSample, LightSceneGeometry, ShadowRayEnd};
 pub use set::{ExpectedSamplesPerLight, LightSampler, LightSamplingEffort, LightSamplingPurpose, Lights};
 pub use tree::{
     AdaptiveLightTreeCut, LightBounds, LightPick, LightTree, Receiver, ReceiverLobe, ReceiverPacket,

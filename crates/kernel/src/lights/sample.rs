@@ -49,7 +49,7 @@ pub enum LightSceneGeometry {
 
 /// A point where a ray hits a light.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LightHit {
+pub struct LightHitPoint {
     /// Unit direction of the ray.
     pub direction: Vec3,
     /// Distance to the point.
@@ -60,7 +60,7 @@ pub struct LightHit {
     pub primitive: u32,
 }
 
-impl LightHit {
+impl LightHitPoint {
     /// Solid-angle pdf in sr⁻¹ of points sampled uniformly over an area, or 0 if the light is seen from
     /// behind.
     pub(super) fn uniform_area_solid_angle_pdf(&self, area: f64) -> f32 {

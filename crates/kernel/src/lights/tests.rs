@@ -56,11 +56,11 @@ const POINT: PointLight =
     PointLight { position: DVec3::ZERO, intensity: Vec3::ONE, falloff: Falloff::Square };
 
 /// Finds the point where a ray hits a shape.
-pub fn light_hit(shape: &Shape, from: Vec3, direction: Vec3) -> Option<(LightHit, ShapeHit)> {
+pub fn light_hit(shape: &Shape, from: Vec3, direction: Vec3) -> Option<(LightHitPoint, ShapeHit)> {
     let ray = Ray::new(from, direction).to_f64();
     let hit = shape.intersect(&ray)?;
     let normal = shape.surface_point_at_hit(&ray, &hit).normal;
-    Some((LightHit { direction, distance: hit.t, normal, primitive: hit.primitive }, hit))
+    Some((LightHitPoint { direction, distance: hit.t, normal, primitive: hit.primitive }, hit))
 }
 
 /// Samples a light from a point. Returns directions, targets, and inverse pdfs.
@@ -354,12 +354,12 @@ fn mesh_triangles_map_to_their_lights() {
         [Some(0), None, Some(2), None, Some(0), None]
     );
     assert_eq!(light_at(4, 0), None);
-    let light_hit = LightHit { direction: Vec3::NEG_Z, distance: 2.0, normal: Vec3::Z, primitive: 2 };
+    let light_hit = LightHitPoint { direction: Vec3::NEG_Z, distance: 2.0, normal: Vec3::Z, primitive: 2 };
     let (_, light) = lights.light_on_primitive(3, 2, Side::Front).expect("a light");
     // d²/(A·cos) = 4/½.
     assert!((light.pdf(Vec3::ZERO, Vec3::Z, &light_hit) - 8.0).abs() < 1e-5);
     assert_eq!(
-        light.pdf(Vec3::ZERO, Vec3::Z, &LightHit { normal: Vec3::NEG_Z, ..light_hit }),
+        light.pdf(Vec3::ZERO, Vec3::Z, &LightHitPoint { normal: Vec3::NEG_Z, ..light_hit }),
         0.0,
         "from behind"
     );
@@ -417,7 +417,7 @@ fn triangle_pairs_are_sampled_like_quads() {
             assert!(inside || (on_edge - 1.0).abs() < 0.3, "{target} is not on triangle {part}");
             seen += u32::from(inside);
             parts[(part - 5) as usize] += 1;
-            let light_hit = LightHit {
+            let light_hit = LightHitPoint {
                 direction: own.direction,
                 distance: way.length(),
                 normal: u.cross(v).as_vec3(),

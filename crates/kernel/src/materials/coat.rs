@@ -19,7 +19,7 @@ use super::fresnel::{dielectric_from_outside, schlick_weight};
 use super::lobe_albedo::{LobeAlbedoPolynomial, TERMS, evaluate_albedo_fit};
 use super::lookup::{MaterialTextureCollector, ParameterLookup, PointTextureEvaluator};
 use super::microfacet::{
-    self, MicrofacetDistribution, SmithTerms, UnnormalizedHalfVector, sample_reflection,
+    self, MicrofacetDistribution, SmithTerms, UnnormalizedHalfVector, sample_reflected_direction,
 };
 use super::scalar::ScalarParameter;
 use super::schlick_albedo::SchlickAlbedoPair;
@@ -173,7 +173,7 @@ impl From<&CoatPoint> for ClearCoatLayer {
 
 /// Limits a cosine to at least 0.
 #[inline(always)]
-pub(super) fn nonnegative_cosine(cosine: f32) -> f32 {
+pub(super) fn clamp_cosine_to_nonnegative(cosine: f32) -> f32 {
     if cosine > 0.0 { cosine } else { 0.0 }
 }
 
@@ -227,7 +227,7 @@ impl<const EXACT: bool, const BECKMANN: bool> CoatLayer<EXACT, BECKMANN> {
     /// Samples a direction from the lobe.
     #[inline(always)]
     pub fn sample(&self, normal: Vec3, wo: Vec3, u: [f32; 2]) -> Vec3 {
-        sample_reflection(Self::DISTRIBUTION, &Frame::from_normal(normal), wo, [self.alpha; 2], u)
+        sample_reflected_direction(Self::DISTRIBUTION, &Frame::from_normal(normal), wo, [self.alpha; 2], u)
     }
 
     /// Length of the refracted path through the layer, 1/cosθₜ in units of its thickness, at a cosine ≥ 0.

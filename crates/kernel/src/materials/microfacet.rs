@@ -225,7 +225,7 @@ impl SmithTerms {
         if self.is_direction_above_surface() & other.is_direction_above_surface() { value } else { 0.0 }
     }
 
-    /// Computes, from D, the pdf in sr⁻¹ of a direction that [`sample_reflection`] samples for this view
+    /// Computes, from D, the pdf in sr⁻¹ of a direction that [`sample_reflected_direction`] samples for this view
     /// direction.
     #[inline(always)]
     pub fn reflection_pdf(&self, distribution: f32) -> f32 {
@@ -263,7 +263,7 @@ pub fn frame_with_tangent(normal: Vec3, tangent: Vec3) -> Frame {
 /// Samples a direction by reflecting the view direction at a visible normal. The result may be below the
 /// surface, where f is 0.
 #[inline(always)]
-pub fn sample_reflection(
+pub fn sample_reflected_direction(
     distribution: MicrofacetDistribution,
     frame: &Frame,
     to_eye: Vec3,

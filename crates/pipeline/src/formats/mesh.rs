@@ -16,7 +16,7 @@ use crate::control::ignore_progress;
 use crate::math::DVec3;
 use crate::math::limits::MAX_MAGNITUDE;
 use crate::messages::INVISIBLE_MODEL;
-use crate::scene::{BuiltDocument, BuiltValue, MORE_LIKE_THESE};
+use crate::scene::{BuiltValue, MORE_LIKE_THESE, SceneDocumentBuilder};
 use crate::settings::{UpAxis, ViewSide};
 use crate::stages::mesh_warnings::MAX_WARNINGS;
 
@@ -129,7 +129,7 @@ fn scene_of_mesh(
         );
         return Err(AssetError::malformed(path, None, reason));
     }
-    let (mut document, mut names) = (BuiltDocument::default(), UsedNames::default());
+    let (mut document, mut names) = (SceneDocumentBuilder::default(), UsedNames::default());
     document.add_comment_above_next_table(format!("{}, as glimt shows it.", file_name(path)));
     let lighting = Lighting::Default { is_polished: loaded.materials.iter().any(material_may_cast_caustics) };
     add_render_settings(&mut document, None, lighting);

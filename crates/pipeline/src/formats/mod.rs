@@ -24,7 +24,7 @@ use crate::control::CancelToken;
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::sanitize::escape_invisible_chars;
 use crate::scene::{
-    BuiltDocument, LoadedScene, MODEL_NOT_FOUND, NEW_SCENE_HELP, lacks_camera_header, load_built,
+    LoadedScene, MODEL_NOT_FOUND, NEW_SCENE_HELP, SceneDocumentBuilder, lacks_camera_header, load_built,
     missing_file_help,
 };
 use crate::system::file::{FileKind, file_kind};
@@ -82,7 +82,7 @@ pub(crate) struct ForeignReadContext<'a> {
 #[derive(Debug)]
 pub(crate) struct ForeignScene {
     /// The tables and keys of the scene.
-    pub(crate) document: BuiltDocument,
+    pub(crate) document: SceneDocumentBuilder,
     /// Hash of the file.
     pub(crate) hash: FileHash,
     /// Other files that affect the scene and are therefore watched. The assets that the scene references are
@@ -98,7 +98,7 @@ pub(crate) struct ForeignScene {
 #[derive(Debug)]
 pub struct ImportedScene {
     /// The scene. Its paths are relative to the scene file.
-    pub document: BuiltDocument,
+    pub document: SceneDocumentBuilder,
     /// Files referenced by the scene, with paths relative to the scene file.
     pub files: Vec<(PathBuf, Vec<u8>)>,
     /// Features without an exact equivalent and their substitutes.
@@ -110,7 +110,7 @@ pub struct ImportedScene {
 /// # Errors
 /// Returns all errors and warnings.
 pub(crate) fn scene_from_document(
-    document: BuiltDocument,
+    document: SceneDocumentBuilder,
     path: &Path,
     sets: &[String],
 ) -> Result<LoadedScene, Vec<Diagnostic>> {

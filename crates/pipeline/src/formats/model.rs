@@ -10,7 +10,7 @@ use super::frame::{
 use super::rounding::{round_significant, shorten, shorten_vector};
 use crate::assets::gltf::ModelProjection;
 use crate::math::DVec3;
-use crate::scene::BuiltDocument;
+use crate::scene::SceneDocumentBuilder;
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::fingerprint::FingerprintHasher;
 use crate::settings::{Overrides, UpAxis, ViewSide};
@@ -126,7 +126,11 @@ impl Lighting {
 }
 
 /// Adds the `[render]` table.
-pub(super) fn add_render_settings(document: &mut BuiltDocument, size: Option<[f64; 2]>, light: Lighting) {
+pub(super) fn add_render_settings(
+    document: &mut SceneDocumentBuilder,
+    size: Option<[f64; 2]>,
+    light: Lighting,
+) {
     document.start_table("render");
     if let Some([width, height]) = size {
         document.set("width", width);
@@ -145,7 +149,7 @@ pub(super) fn add_render_settings(document: &mut BuiltDocument, size: Option<[f6
 
 /// Adds the `[camera]` table. Keeps all digits of the points, because a small model may be far from the
 /// origin.
-pub(super) fn add_camera(document: &mut BuiltDocument, eye: &CameraPose, projection: ModelProjection) {
+pub(super) fn add_camera(document: &mut SceneDocumentBuilder, eye: &CameraPose, projection: ModelProjection) {
     document.start_table("camera");
     document.set("position", eye.position);
     document.set("look_at", eye.look_at);
@@ -163,7 +167,7 @@ pub(super) fn add_camera(document: &mut BuiltDocument, eye: &CameraPose, project
 }
 
 /// Adds a sky, plus a key light if the model has no lights.
-pub(super) fn add_sky_and_key_light(document: &mut BuiltDocument, eye: &CameraPose, light: Lighting) {
+pub(super) fn add_sky_and_key_light(document: &mut SceneDocumentBuilder, eye: &CameraPose, light: Lighting) {
     document.start_table("environment");
     document.set("color", shorten(light.uniform_sky_radiance()));
     if matches!(light, Lighting::Default { .. }) {
@@ -177,7 +181,7 @@ pub(super) fn add_sky_and_key_light(document: &mut BuiltDocument, eye: &CameraPo
 
 /// Adds a ground plane below the model, unless the camera is below it.
 pub(super) fn add_ground(
-    document: &mut BuiltDocument,
+    document: &mut SceneDocumentBuilder,
     names: &mut UsedNames,
     [min, max]: [DVec3; 2],
     eye: &CameraPose,

@@ -37,7 +37,7 @@ impl FileReader<'_> {
     ///
     /// # Errors
     /// Returns the error from `read`, or an error if the files keep changing.
-    pub(crate) fn read_consistently<T>(
+    pub(crate) fn read_until_files_unchanged<T>(
         &self,
         table: &mut StageRecorder<'_>,
         findings: &mut Findings,

@@ -57,7 +57,7 @@ impl SceneFixture {
         let mut table = StageRecorder::new(None, &token);
         let reader = FileReader { contents: &self.contents, pool: &self.pool, sink: &sink, token: &token };
         let scenes = &mut self.scenes;
-        let assets = reader.read_consistently(&mut table, &mut findings, |reading| {
+        let assets = reader.read_until_files_unchanged(&mut table, &mut findings, |reading| {
             let scene = SceneParseRequest { path: &path, sets: &[], show: ModelViewOptions::default() };
             let parsed = scenes.parse_scene(scene, reading)?;
             let all = TextureSelection::ForImage(TextureRolesNeededByRender::ALL);

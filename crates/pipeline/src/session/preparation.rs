@@ -37,7 +37,7 @@ impl Session {
         let contents = Arc::clone(&self.contents);
         let reader = FileReader { contents: &contents, pool, sink, token };
         let read = |reading: &mut SceneReadAttempt<'_, '_>| self.read_scene(request, reading);
-        let (assets, plans) = reader.read_consistently(table, findings, read)?;
+        let (assets, plans) = reader.read_until_files_unchanged(table, findings, read)?;
         let ready = self.build_world(request, Arc::new(assets), plans, table, pool)?;
         self.written.record_scene_save_count(request.saves);
         self.files.last_valid = Some(Arc::clone(&ready.assets));

@@ -13,7 +13,7 @@ use crate::math::DVec3;
 /// Tables have the same order as in the scene file that [`Self::to_toml`] returns. The keys of a table follow
 /// the call that starts it.
 #[derive(Clone, Debug)]
-pub struct BuiltDocument {
+pub struct SceneDocumentBuilder {
     pub(crate) document: Document<'static>,
     /// The text of the foreign file, into which all spans index.
     pub(crate) source: Arc<str>,
@@ -24,7 +24,7 @@ pub struct BuiltDocument {
     span: Span,
 }
 
-/// A value in a [`BuiltDocument`].
+/// A value in a [`SceneDocumentBuilder`].
 #[derive(Clone, Debug, PartialEq)]
 pub enum BuiltValue {
     /// A number.
@@ -81,13 +81,13 @@ impl From<DVec3> for BuiltValue {
     }
 }
 
-impl Default for BuiltDocument {
+impl Default for SceneDocumentBuilder {
     fn default() -> Self {
         Self::new("".into())
     }
 }
 
-impl BuiltDocument {
+impl SceneDocumentBuilder {
     /// Creates an empty document. `source` is the text of the foreign file, or empty if the file is not text.
     pub fn new(source: Arc<str>) -> Self {
         let (comments, span) = Default::default();
@@ -194,7 +194,7 @@ mod tests {
 
     #[test]
     fn built_document_is_written_in_order() {
-        let mut built = BuiltDocument::default();
+        let mut built = SceneDocumentBuilder::default();
         built.add_comment_above_next_table("cube.glb");
         built.add_comment_above_next_table("Approximated.");
         built.start_table("render");

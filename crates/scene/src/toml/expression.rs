@@ -13,12 +13,12 @@ use super::{MARK, MAX_DEPTH};
 
 /// Expression parser with reusable buffers.
 #[derive(Default)]
-pub(super) struct StatementParser {
+pub(super) struct TomlExpressionParser {
     tokens: Vec<Token>,
     events: Vec<Event>,
 }
 
-impl StatementParser {
+impl TomlExpressionParser {
     /// Reads the expression that starts at byte `at`, which must be the start of a line. Returns the offset
     /// after the expression.
     pub(super) fn read<'s>(

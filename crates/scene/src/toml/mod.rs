@@ -33,9 +33,9 @@ mod tree;
 mod write;
 
 use assembly::DocumentBuilder;
-use expression::StatementParser;
+use expression::TomlExpressionParser;
 
-pub use build::{BuiltDocument, BuiltValue};
+pub use build::{BuiltValue, SceneDocumentBuilder};
 pub use write::quote_toml_string;
 
 pub(super) use brackets::{BracketToken, find_all_array_brackets, innermost_bracket_open_at_end};
@@ -78,7 +78,7 @@ pub(super) fn apply_assignment<'s>(
 ) -> (Document<'s>, Result<(), KeyError>) {
     let (mut assembly, detached) =
         DocumentBuilder::from_document_with_new_table(document.with_extended_source(source));
-    StatementParser::default().read(source, at, &mut assembly);
+    TomlExpressionParser::default().read(source, at, &mut assembly);
     let (mut document, _) = assembly.finish();
     let placed = match document.sole_assignment_in_table(detached) {
         Some((keys, value)) => document.set_at_path(&keys, value, layout),
@@ -91,7 +91,7 @@ pub(super) fn apply_assignment<'s>(
 /// in keys and values, both in text order.
 pub(super) fn parse(source: &str) -> (Document<'_>, Vec<SyntaxError>) {
     let mut assembly = DocumentBuilder::new(source);
-    let mut expressions = StatementParser::default();
+    let mut expressions = TomlExpressionParser::default();
     let mut at = if source.starts_with(MARK) { MARK.len() } else { 0 };
     while at < source.len() {
         let plain = if assembly.has_unclosed_header() {

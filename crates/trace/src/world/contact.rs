@@ -112,19 +112,19 @@ impl World {
             }
             self.geometry.set_hit_as_only_candidate(at, memory)
         } else {
-            self.find_coincident_candidates(at, memory)
+            self.collect_surfaces_near_hit(at, memory)
         };
         self.visit_coincident_candidates(at, (memory, error), visit)
     }
 
     /// Collects surfaces that may coincide with the hit point or enclose it, and returns their error bound per
     /// axis.
-    pub fn find_coincident_candidates(
+    pub fn collect_surfaces_near_hit(
         &self,
         at: &CoincidenceQuery<'_>,
         memory: &mut CoincidenceScratch,
     ) -> Vec3 {
-        self.geometry.find_coincident_candidates(at, memory, &self.enclosing_glass)
+        self.geometry.collect_surfaces_near_hit(at, memory, &self.enclosing_glass)
     }
 
     /// Whether the hit is on a glass shape whose far side is not close to the hit point.
@@ -325,7 +325,7 @@ impl Geometry {
     /// Collects shapes and triangles that may coincide with the hit point, and returns their error bound per
     /// axis. Shapes that enclose the point but whose surfaces are far away are included only if `enclosing`
     /// lists them for their subtree.
-    pub(super) fn find_coincident_candidates(
+    pub(super) fn collect_surfaces_near_hit(
         &self,
         at: &CoincidenceQuery<'_>,
         memory: &mut CoincidenceScratch,

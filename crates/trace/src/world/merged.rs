@@ -177,7 +177,7 @@ impl MergedMeshes {
             return self.closest_hit_packet_with_tree(rows, active, ends, found);
         };
         let size = self.bounds().extent();
-        match by.run(TriangleListClosestHitKernel { facets, size, rows, active, ends, found }) {
+        match by.run(ClosestHitIfIncoherentKernel { facets, size, rows, active, ends, found }) {
             Some(0) => {}
             Some(undecided) => self.closest_hit_per_ray(rows, undecided, ends, found),
             None => self.closest_hit_packet_with_tree(rows, active, ends, found),
@@ -225,7 +225,7 @@ impl MergedMeshes {
         let Some(facets) = &self.facets else { return self.any_hit_by_tree(rows, active, ends, except) };
         let own = except.unwrap_or(&[Self::NO_TRIANGLE; PACKET_SIZE]);
         let size = self.bounds().extent();
-        match by.run(TriangleListAnyHitKernel { facets, size, rows, active, ends, except: own }) {
+        match by.run(AnyHitIfIncoherentKernel { facets, size, rows, active, ends, except: own }) {
             Some([hit, 0]) => hit,
             Some([hit, undecided]) => hit | self.any_hit_one_by_one(rows, undecided, ends, own),
             None => self.any_hit_by_tree(rows, active, ends, except),
@@ -295,7 +295,7 @@ const COHERENCE: f32 = 0.125;
 
 /// Kernel that calls [`TriangleList::update_decided_closest_hits`] for incoherent rays and returns the lanes
 /// that need an exact test, or returns `None` for coherent rays.
-struct TriangleListClosestHitKernel<'a> {
+struct ClosestHitIfIncoherentKernel<'a> {
     facets: &'a TriangleList,
     size: Vec3,
     rows: &'a RayPacket,
@@ -304,7 +304,7 @@ struct TriangleListClosestHitKernel<'a> {
     found: &'a mut HitPacket,
 }
 
-impl SimdKernel for TriangleListClosestHitKernel<'_> {
+impl SimdKernel for ClosestHitIfIncoherentKernel<'_> {
     type Output = Option<u32>;
 
     #[inline(always)]
@@ -319,7 +319,7 @@ impl SimdKernel for TriangleListClosestHitKernel<'_> {
 
 /// Kernel that calls [`TriangleList::any_hit_and_undecided_masks`] for incoherent rays and returns the hit
 /// lanes and the lanes that need an exact test, or returns `None` for coherent rays.
-struct TriangleListAnyHitKernel<'a> {
+struct AnyHitIfIncoherentKernel<'a> {
     facets: &'a TriangleList,
     size: Vec3,
     rows: &'a RayPacket,
@@ -328,7 +328,7 @@ struct TriangleListAnyHitKernel<'a> {
     except: &'a [u32; PACKET_SIZE],
 }
 
-impl SimdKernel for TriangleListAnyHitKernel<'_> {
+impl SimdKernel for AnyHitIfIncoherentKernel<'_> {
     type Output = Option<[u32; 2]>;
 
     #[inline(always)]

@@ -193,7 +193,7 @@ impl SimdKernel for ShadowTransmittanceKernel<'_> {
         // Find the rays not blocked by opaque objects.
         let geometry: &Geometry = &world.geometry;
         let each_mesh =
-            see_through.is_any_merged || traced & geometry.target_light_is_merged_mesh_mask(sources) != 0;
+            see_through.is_any_merged || traced & geometry.light_is_entire_merged_mesh_mask(sources) != 0;
         let tree = if each_mesh { geometry.tree() } else { geometry.traced_tree() };
         if tree.has_shells() {
             for lane in set_bit_lanes(traced) {

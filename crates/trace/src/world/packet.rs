@@ -58,7 +58,7 @@ impl Geometry {
 impl Geometry {
     /// Mask of rays whose light is an entire merged mesh.
     #[inline(always)]
-    pub(super) fn target_light_is_merged_mesh_mask(&self, sources: &LightSceneGeometryPacket) -> u32 {
+    pub(super) fn light_is_entire_merged_mesh_mask(&self, sources: &LightSceneGeometryPacket) -> u32 {
         if !sources.is_any || !self.has_merged_meshes() {
             return 0;
         }
@@ -124,7 +124,7 @@ impl SimdKernel for OcclusionKernel<'_> {
     fn run(self, simd: impl Simd) -> u32 {
         let Self { geometry, rows, ends, traced, sources } = self;
         if geometry.traced_tree().has_shells()
-            || traced & geometry.target_light_is_merged_mesh_mask(sources) != 0
+            || traced & geometry.light_is_entire_merged_mesh_mask(sources) != 0
         {
             return geometry.occluded_one_by_one(rows, ends, traced, sources);
         }

@@ -70,7 +70,7 @@ impl NeededTexture {
     /// The image used as the environment map.
     pub fn for_environment(file: &Path) -> Self {
         Self {
-            source: environment_texture_source(file),
+            source: environment_source_from_path(file),
             name: "environment".to_owned(),
             declared: None,
             mesh_file: None,
@@ -218,7 +218,7 @@ fn texture_uses_mipmaps(scene: &Scene, texture: usize) -> bool {
 
 /// The environment map's file, or `None` if there is no map or the map's color factor is black.
 pub fn environment_map_source(scene: &Scene) -> Option<TextureImageSource> {
-    environment_file(scene).map(environment_texture_source)
+    environment_file(scene).map(environment_source_from_path)
 }
 
 fn environment_file(scene: &Scene) -> Option<&Path> {
@@ -226,7 +226,7 @@ fn environment_file(scene: &Scene) -> Option<&Path> {
     Some(&environment.file.as_ref()?.value)
 }
 
-fn environment_texture_source(file: &Path) -> TextureImageSource {
+fn environment_source_from_path(file: &Path) -> TextureImageSource {
     TextureImageSource { path: file.to_owned(), image: None, encoding: ColorEncoding::Color, coverage: None }
 }
 

@@ -217,7 +217,7 @@ fn isolated_regions_match_the_full_search() {
                 let error = if only_hit {
                     world.geometry.set_hit_as_only_candidate(&at, &mut memory)
                 } else {
-                    world.find_coincident_candidates(&at, &mut memory)
+                    world.collect_surfaces_near_hit(&at, &mut memory)
                 };
                 (world.visit_coincident_candidates(&at, (&memory, error), |one| near.push(one)), near)
             };

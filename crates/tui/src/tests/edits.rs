@@ -278,7 +278,7 @@ fn complete_image_is_not_listed_as_stopped() {
     ui.press_character('n');
     let text = ui.screen_text();
     assert!(
-        text.contains(&format!("{}, 0 s ago", messages::unnumbered_render(messages::OLDER)))
+        text.contains(&format!("{}, 0 s ago", messages::unnumbered_render_label(messages::OLDER)))
             && !text.contains(messages::STOPPED),
         "{text}"
     );
@@ -303,7 +303,8 @@ fn entries_are_numbered_by_render() {
     );
     ui.press_character('n');
     assert!(
-        ui.screen_text().contains(&format!("{}, 0 s ago", messages::unnumbered_render(messages::STOPPED))),
+        ui.screen_text()
+            .contains(&format!("{}, 0 s ago", messages::unnumbered_render_label(messages::STOPPED))),
         "{}",
         ui.screen_text()
     );
@@ -354,7 +355,8 @@ fn age_counts_from_the_last_improvement() {
     ui.finish_render(RED);
     ui.press_character('n');
     assert!(
-        ui.screen_text().contains(&format!("{}, 5 s ago", messages::unnumbered_render(messages::STOPPED))),
+        ui.screen_text()
+            .contains(&format!("{}, 5 s ago", messages::unnumbered_render_label(messages::STOPPED))),
         "{}",
         ui.screen_text()
     );

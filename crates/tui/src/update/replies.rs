@@ -113,7 +113,7 @@ fn handle_terminal_name(state: &mut State, terminal: TerminalId) -> Vec<Effect> 
     let mut effects = Vec::new();
     if ask.name {
         let had_focus =
-            std::mem::replace(&mut state.display.capabilities, terminal.desktop_capabilities()).focus;
+            std::mem::replace(&mut state.display.capabilities, terminal.desktop_integration()).focus;
         effects.extend((state.display.capabilities.focus && !had_focus).then_some(Effect::ReportFocus));
         state.dirty = true;
     }
@@ -147,7 +147,7 @@ mod tests {
     use crate::pipeline::protocol::Command;
     use crate::pixel_request::MultiplexerPassthrough;
     use crate::terminal_replies::TerminalQueries;
-    use crate::terminals::{DesktopCapabilities, TerminalBrand};
+    use crate::terminals::{DesktopIntegration, TerminalBrand};
     use crate::update::request_first_render;
 
     /// A UI whose user has requested kitty images.
@@ -210,7 +210,7 @@ mod tests {
         let before = state.request.preview_size.expect("a size");
         let foot = TerminalReply::Name(TerminalId { brand: TerminalBrand::Foot, version: [1, 20] });
         assert!(handle_reply(&mut state, foot).is_empty(), "the name was not queried");
-        assert_eq!(state.display.capabilities, DesktopCapabilities::default());
+        assert_eq!(state.display.capabilities, DesktopIntegration::default());
         state.display.ask = TerminalQueries { blocks: true, ..TerminalQueries::default() };
         let effects = handle_reply(&mut state, foot);
         let [Effect::Send(Command::Preview(Some(size)))] = &effects[..] else { panic!("{effects:?}") };
@@ -224,7 +224,7 @@ mod tests {
         state.display.ask = TerminalQueries { name: true, ..TerminalQueries::default() };
         let ghostty = TerminalId { brand: TerminalBrand::Ghostty, version: [1, 2] };
         assert!(matches!(handle_reply(&mut state, TerminalReply::Name(ghostty))[..], [Effect::ReportFocus]));
-        assert_eq!(state.display.capabilities, ghostty.desktop_capabilities());
+        assert_eq!(state.display.capabilities, ghostty.desktop_integration());
         assert!(
             handle_reply(&mut state, TerminalReply::Name(ghostty)).is_empty(),
             "focus reporting is already enabled"

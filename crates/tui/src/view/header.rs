@@ -175,7 +175,7 @@ fn progress_or_result_variants(state: &State) -> Vec<String> {
             }
             None => {
                 let place = if is_unfinished { messages::STOPPED } else { messages::OLDER };
-                (place.to_owned(), messages::unnumbered_render(place))
+                (place.to_owned(), messages::unnumbered_render_label(place))
             }
         };
         let age = age_in_words(state.now.saturating_duration_since(time));

@@ -2,7 +2,7 @@
 
 use super::quad::SphericalRectangle;
 use super::sample_point::SampledLightPoint;
-use super::{LightHit, ShapeEmitter};
+use super::{LightHitPoint, ShapeEmitter};
 use crate::geometry::cuboid::OrientedBox;
 use crate::math::{DVec3, Vec3};
 
@@ -66,7 +66,7 @@ impl ShapeEmitter for BoxEmitter {
         }
     }
 
-    fn pdf(&self, from: Vec3, hit: &LightHit) -> f32 {
+    fn pdf(&self, from: Vec3, hit: &LightHitPoint) -> f32 {
         let BoxView { faces, .. } = self.seen_from(from);
         let total: f32 = faces.iter().map(|face| face.solid_angle).sum();
         let own = faces.iter().zip(self.axes).enumerate();

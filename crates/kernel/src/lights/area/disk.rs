@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use super::sample_point::SampledLightPoint;
-use super::{LightHit, ShapeEmitter};
+use super::{LightHitPoint, ShapeEmitter};
 use crate::geometry::disk::Disk;
 use crate::math::elementary::sin_cos;
 use crate::math::{DVec3, Vec3};
@@ -47,7 +47,7 @@ impl ShapeEmitter for DiskEmitter {
         }
     }
 
-    fn pdf(&self, from: Vec3, hit: &LightHit) -> f32 {
+    fn pdf(&self, from: Vec3, hit: &LightHitPoint) -> f32 {
         let view = self.view_from(from);
         if view.is_front() { view.pdf(hit.direction) as f32 } else { 0.0 }
     }

@@ -3,7 +3,7 @@
 use std::f32::consts::{PI, TAU};
 
 use super::sample_point::SampledLightPoint;
-use super::{LightHit, ShapeEmitter};
+use super::{LightHitPoint, ShapeEmitter};
 use crate::geometry::{RayF64, Shape, SurfaceSample};
 use crate::math::elementary::sin_cos;
 use crate::math::{DVec3, Vec2, Vec3};
@@ -26,7 +26,7 @@ impl ShapeEmitter for InwardEmitter {
         }
     }
 
-    fn pdf(&self, from: Vec3, hit: &LightHit) -> f32 {
+    fn pdf(&self, from: Vec3, hit: &LightHitPoint) -> f32 {
         match self.shape.encloses_point_if_closed(from.as_dvec3()) {
             Some(true) => 1.0 / ALL_AROUND,
             Some(false) => 0.0,

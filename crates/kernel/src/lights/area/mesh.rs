@@ -4,7 +4,7 @@
 use super::quad::QuadEmitter;
 use super::sample_point::SampledLightPoint;
 use super::triangle::TriangleEmitter;
-use super::{LightHit, ShapeEmitter};
+use super::{LightHitPoint, ShapeEmitter};
 use crate::control::{CancelToken, Canceled};
 use crate::geometry::SurfaceSample;
 use crate::geometry::triangle::Triangle;
@@ -174,7 +174,7 @@ impl MeshEmitter {
     }
 
     /// Implements [`Light::pdf`](crate::lights::Light::pdf).
-    pub fn pdf(&self, from: Vec3, normal: Vec3, hit: &LightHit) -> f32 {
+    pub fn pdf(&self, from: Vec3, normal: Vec3, hit: &LightHitPoint) -> f32 {
         let tree = match &self.sampling {
             MeshSampling::Quad(quad) => return quad.quad.pdf(from, hit),
             MeshSampling::Area(_) => return hit.uniform_area_solid_angle_pdf(self.by_area.total()),

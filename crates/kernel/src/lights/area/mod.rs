@@ -26,7 +26,7 @@ pub use emission_modulation::{BlendWeight, EmissionModulation, EmissionTerm, Tri
 pub use mesh::MeshEmitter;
 pub use sample_point::SampledLightPoint;
 
-use super::sample::{LightHit, LightSample, LightSceneGeometry, ShadowRayEnd};
+use super::sample::{LightHitPoint, LightSample, LightSceneGeometry, ShadowRayEnd};
 use super::tree::bounds::{EmissionCone, LightBounds, mean_channel};
 use crate::geometry::Shape;
 use crate::geometry::disk::Disk;
@@ -54,7 +54,7 @@ pub trait ShapeEmitter {
     fn sample(&self, point: Vec3, u: [f32; 2]) -> SampledLightPoint;
 
     /// Pdf of [`ShapeEmitter::sample`] in sr⁻¹. `hit` is the point on the front that a ray from `from` hits.
-    fn pdf(&self, from: Vec3, hit: &LightHit) -> f32;
+    fn pdf(&self, from: Vec3, hit: &LightHitPoint) -> f32;
 
     /// Centroid of the area.
     fn area_centroid(&self) -> DVec3;
@@ -156,7 +156,7 @@ impl ShapeEmitter for Emitter {
         of_any!(self, it => it.sample(point, u), _mesh => SampledLightPoint::NOTHING)
     }
 
-    fn pdf(&self, from: Vec3, hit: &LightHit) -> f32 {
+    fn pdf(&self, from: Vec3, hit: &LightHitPoint) -> f32 {
         of_any!(self, it => it.pdf(from, hit), _mesh => 0.0)
     }
 
@@ -377,10 +377,10 @@ impl AreaLight {
     }
 
     /// Implements [`Light::pdf`](super::Light::pdf).
-    pub fn pdf(&self, from: Vec3, normal: Vec3, hit: &LightHit) -> f32 {
+    pub fn pdf(&self, from: Vec3, normal: Vec3, hit: &LightHitPoint) -> f32 {
         let hit = &match self.side {
             Side::Front => *hit,
-            Side::Back => LightHit { normal: -hit.normal, ..*hit },
+            Side::Back => LightHitPoint { normal: -hit.normal, ..*hit },
         };
         if !(hit.normal.dot(hit.direction) < 0.0) {
             return 0.0;

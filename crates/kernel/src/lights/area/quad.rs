@@ -4,7 +4,7 @@
 use std::f32::consts::PI;
 
 use super::sample_point::SampledLightPoint;
-use super::{LightHit, ShapeEmitter};
+use super::{LightHitPoint, ShapeEmitter};
 use crate::math::elementary::{acos, sin_cos};
 use crate::math::{DVec3, Vec3};
 
@@ -40,7 +40,7 @@ impl ShapeEmitter for QuadEmitter {
         self.sample_given_corner_offset(point, self.offset_to_corner(point), u)
     }
 
-    fn pdf(&self, from: Vec3, hit: &LightHit) -> f32 {
+    fn pdf(&self, from: Vec3, hit: &LightHitPoint) -> f32 {
         let to_corner = self.offset_to_corner(from);
         if !(to_corner.dot(self.normal) < 0.0) {
             return 0.0;

@@ -1,7 +1,7 @@
 //! One side of a see-through round shape or box. Surfaces behind the near side are visible through it.
 
 use super::sample_point::SampledLightPoint;
-use super::{LightHit, ShapeEmitter, Side};
+use super::{LightHitPoint, ShapeEmitter, Side};
 use crate::geometry::{Shape, SurfaceSample};
 use crate::math::{DVec3, Vec2, Vec3};
 use crate::sampling::distribution::DiscreteDistribution;
@@ -47,7 +47,7 @@ impl ShapeEmitter for SeeThroughShapeSide {
         SampledLightPoint { direction, target: point + direction * distance as f32, factor: factor as f32 }
     }
 
-    fn pdf(&self, _: Vec3, hit: &LightHit) -> f32 {
+    fn pdf(&self, _: Vec3, hit: &LightHitPoint) -> f32 {
         hit.uniform_area_solid_angle_pdf(
             self.by_area.total() * self.shape.area_scale_for_world_normal(hit.normal.as_dvec3()),
         )

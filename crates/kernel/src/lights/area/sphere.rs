@@ -3,7 +3,7 @@
 use std::f32::consts::PI;
 
 use super::sample_point::SampledLightPoint;
-use super::{LightHit, ShapeEmitter};
+use super::{LightHitPoint, ShapeEmitter};
 use crate::math::frame::Frame;
 use crate::math::{DVec3, Vec3};
 use crate::sampling::warp;
@@ -40,7 +40,7 @@ impl ShapeEmitter for SphereEmitter {
     }
 
     /// The pdf is the same for all directions that hit the sphere.
-    fn pdf(&self, from: Vec3, _: &LightHit) -> f32 {
+    fn pdf(&self, from: Vec3, _: &LightHitPoint) -> f32 {
         self.cone(from).map_or(0.0, |(_, _, sin2_max)| 1.0 / (2.0 * PI * one_minus_cos_from_sin2(sin2_max)))
     }
 

@@ -3,7 +3,7 @@
 use super::disk::{DiskEmitter, perpendicular};
 use super::meridians::{AzimuthDistribution, PolarFrame, SinCos};
 use super::sample_point::SampledLightPoint;
-use super::{LightHit, ShapeEmitter};
+use super::{LightHitPoint, ShapeEmitter};
 use crate::geometry::cone::Cone;
 use crate::geometry::cylinder::Cylinder;
 use crate::math::{DVec3, Vec3};
@@ -76,7 +76,7 @@ impl<S: RevolutionSide> ShapeEmitter for CappedRevolutionEmitter<S> {
         SampledLightPoint { direction, target: point + direction * distance as f32, factor: factor as f32 }
     }
 
-    fn pdf(&self, from: Vec3, hit: &LightHit) -> f32 {
+    fn pdf(&self, from: Vec3, hit: &LightHitPoint) -> f32 {
         let view = self.view_from(from);
         let side_probability = f64::from(view.side_probability as f32);
         let is_cap = |normal: DVec3| hit.normal.as_dvec3().dot(normal) > 1.0 - 1e-5;

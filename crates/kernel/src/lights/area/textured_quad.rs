@@ -3,7 +3,7 @@
 
 use super::quad::QuadEmitter;
 use super::sample_point::SampledLightPoint;
-use super::{LightHit, ShapeEmitter};
+use super::{LightHitPoint, ShapeEmitter};
 use crate::lights::tree::bounds::mean_channel;
 use crate::math::{DVec3, Vec3};
 use crate::sampling::piecewise_constant::{GridSample, PiecewiseConstant2D};
@@ -70,7 +70,7 @@ impl ShapeEmitter for TexturedQuadEmitter {
         SampledLightPoint { factor: 1.0 / density, ..own }
     }
 
-    fn pdf(&self, from: Vec3, hit: &LightHit) -> f32 {
+    fn pdf(&self, from: Vec3, hit: &LightHitPoint) -> f32 {
         let to_corner = self.quad.offset_to_corner(from);
         let quad_pdf = self.quad.pdf(from, hit);
         if quad_pdf > 0.0 { self.mixture_pdf(hit.direction * hit.distance, to_corner, quad_pdf) } else { 0.0 }

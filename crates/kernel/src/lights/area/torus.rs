@@ -7,7 +7,7 @@ use super::disk::perpendicular;
 use super::meridians::SinCos;
 use super::piecewise_linear::PiecewiseLinear;
 use super::sample_point::SampledLightPoint;
-use super::{LightHit, ShapeEmitter};
+use super::{LightHitPoint, ShapeEmitter};
 use crate::geometry::RayF64;
 use crate::geometry::torus::Torus;
 use crate::math::elementary::sin_cos;
@@ -115,7 +115,7 @@ impl ShapeEmitter for TorusEmitter {
         }
     }
 
-    fn pdf(&self, from: Vec3, hit: &LightHit) -> f32 {
+    fn pdf(&self, from: Vec3, hit: &LightHitPoint) -> f32 {
         TorusView::new(&self.torus, from).map_or(0.0, |view| {
             let slices = view.slice_distribution();
             let (density, first) = view.sum_entry_pdfs(&self.torus, &slices, hit.direction.as_dvec3());

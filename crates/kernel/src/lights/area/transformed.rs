@@ -1,7 +1,7 @@
 //! Light sampling of shapes under an affine transform.
 
 use super::sample_point::SampledLightPoint;
-use super::{Emitter, LightHit, ShapeEmitter, flat_normal};
+use super::{Emitter, LightHitPoint, ShapeEmitter, flat_normal};
 use crate::geometry::transformed::TransformedShape;
 use crate::math::{DVec3, Vec3};
 
@@ -33,13 +33,13 @@ impl ShapeEmitter for TransformedEmitter {
         }
     }
 
-    fn pdf(&self, from: Vec3, hit: &LightHit) -> f32 {
+    fn pdf(&self, from: Vec3, hit: &LightHitPoint) -> f32 {
         let Some(from) = self.local_point_if_in_front(from) else { return 0.0 };
         let to_world = &self.transformed.to_world;
         let direction = to_world.inverse_vector(hit.direction.as_dvec3());
         let length = direction.length();
         let normal = to_world.linear.transpose() * hit.normal.as_dvec3();
-        let local = LightHit {
+        let local = LightHitPoint {
             direction: (direction / length).as_vec3(),
             distance: (f64::from(hit.distance) * length) as f32,
             normal: normal.normalize().as_vec3(),

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use super::sample_point::SampledLightPoint;
-use super::{LightHit, ShapeEmitter};
+use super::{LightHitPoint, ShapeEmitter};
 use crate::geometry::triangle::Triangle;
 use crate::math::{DVec3, Vec2, Vec3};
 use crate::sampling::warp;
@@ -54,7 +54,7 @@ impl ShapeEmitter for TriangleEmitter {
         SampledLightPoint { direction, target: point + direction * distance as f32, factor: factor as f32 }
     }
 
-    fn pdf(&self, from: Vec3, hit: &LightHit) -> f32 {
+    fn pdf(&self, from: Vec3, hit: &LightHitPoint) -> f32 {
         match self.spherical_triangle(from.as_dvec3()) {
             Some((_, spherical)) if spherical.has_accurate_solid_angle() => {
                 (1.0 / spherical.solid_angle) as f32

@@ -460,7 +460,7 @@ fn mesh_pdf_matches_its_samples() {
             };
             let Emitter::Mesh(mesh) = &light.shape else { panic!("a mesh") };
             let front = mesh.normal_of(primitive).expect("expected one of the light's triangles").as_vec3();
-            let hit = crate::lights::LightHit {
+            let hit = crate::lights::LightHitPoint {
                 direction: sample.direction,
                 distance: (target - point).length(),
                 normal: front,

@@ -24,7 +24,7 @@ use crate::control::ignore_progress;
 use crate::math::color::luminance;
 use crate::math::{DMat3, DVec3};
 use crate::messages::INVISIBLE_MODEL;
-use crate::scene::BuiltDocument;
+use crate::scene::SceneDocumentBuilder;
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::keys::endings::MAPS;
 use crate::settings::{UpAxis, ViewSide};
@@ -111,7 +111,7 @@ fn scene_of_file(
         container: &container,
         path,
         asset_location,
-        document: BuiltDocument::default(),
+        document: SceneDocumentBuilder::default(),
         files: UsedNames::default(),
         assets: Vec::new(),
         names: HashMap::new(),
@@ -138,7 +138,7 @@ struct SceneBuilder<'a> {
     container: &'a GltfFile,
     path: &'a Path,
     asset_location: &'a SceneAssetLocation<'a>,
-    document: BuiltDocument,
+    document: SceneDocumentBuilder,
     /// File names already used in the folder.
     files: UsedNames,
     /// Names and contents of files that the scene references but that do not exist yet.

@@ -5,7 +5,7 @@ use crate::geometry::{Ray, ShapeHit};
 use crate::integrators::transport::batch::{BsdfValuesAndCosines, VertexBatch};
 use crate::integrators::transport::ray::PathRay;
 use crate::integrators::transport::tile::TileContext;
-use crate::lights::{LightHit, LightSamplePacket, LightSceneGeometry, Side};
+use crate::lights::{LightHitPoint, LightSamplePacket, LightSceneGeometry, Side};
 use crate::materials::Footprint;
 use crate::materials::bsdf::{BsdfValues, LobesToSample, ratio};
 use crate::math::Vec3;
@@ -216,7 +216,7 @@ impl TileContext<'_> {
     /// `normal` is the surface's normal. Returns 0 if the hit is not on a light.
     fn light_pdf(&self, ray: &Ray, normal: Vec3, (hit, of_light): (&Hit, Vec3)) -> f32 {
         let (direction, distance, primitive) = (ray.direction, hit.shape.t, hit.shape.primitive);
-        let met = LightHit { direction, distance, normal: of_light, primitive };
+        let met = LightHitPoint { direction, distance, normal: of_light, primitive };
         let lights = &self.world.lights;
         let side = if of_light.dot(direction) > 0.0 { Side::Back } else { Side::Front };
         lights.light_on_primitive(hit.object, primitive, side).map_or(0.0, |(number, light)| {

@@ -69,7 +69,7 @@ impl OpenGlassParts {
         let mut parts = Self::default();
         let mut open_of_file: HashMap<usize, Vec<[u32; 2]>> = HashMap::new();
         for (number, object) in (0_u32..).zip(&scene.objects) {
-            let Some(glass) = which_triangles_are_glass(scene, meshes, object) else { continue };
+            let Some(glass) = all_or_some_triangles_are_glass(scene, meshes, object) else { continue };
             token.check_pause_and_cancel()?;
             if parts.list.is_empty() {
                 parts.origin = point_on_or_inside_shape(&object.shape, meshes);
@@ -253,7 +253,7 @@ pub(super) enum GlassTriangles {
 }
 
 /// Returns which triangles of an object are glass, or `None` if the object contains no glass.
-pub(super) fn which_triangles_are_glass(
+pub(super) fn all_or_some_triangles_are_glass(
     scene: &Scene,
     meshes: &[&LoadedMesh],
     object: &Object,

@@ -143,7 +143,7 @@ impl Map {
             warnings: Vec::new(),
             name: String::new(),
         };
-        let mut rest = MapArguments(text.trim());
+        let mut rest = MapArgumentCursor(text.trim());
         while let Some(option) = rest.next_option() {
             let start = rest.0;
             if !map.parse_option_arguments(&option, &mut rest) {
@@ -161,7 +161,7 @@ impl Map {
     }
 
     /// Parses an option's arguments. Returns whether all of them are usable.
-    fn parse_option_arguments(&mut self, option: &str, rest: &mut MapArguments<'_>) -> bool {
+    fn parse_option_arguments(&mut self, option: &str, rest: &mut MapArgumentCursor<'_>) -> bool {
         match option {
             "-s" => {
                 let scale =
@@ -272,9 +272,9 @@ pub(super) fn not_an_option_warning(word: &str) -> String {
 
 /// Arguments of a map statement, of which the last one is the file name.
 #[derive(Clone, Copy)]
-struct MapArguments<'a>(&'a str);
+struct MapArgumentCursor<'a>(&'a str);
 
-impl<'a> MapArguments<'a> {
+impl<'a> MapArgumentCursor<'a> {
     /// Consumes an option and returns it in lowercase. An unknown option is recognized only if a number or a
     /// switch follows it. Any other word starts the file name, even if it begins with a dash.
     fn next_option(&mut self) -> Option<String> {

@@ -196,7 +196,7 @@ fn limit_surface(
     })?;
     let normals = work.build_with_buffer(count, |vertex, arms| match place(vertex) {
         RefinedVertexLocation::Vertex(half) => limit_normals.at_vertex(half, arms),
-        RefinedVertexLocation::Edge(half) => limit_normals.at_edge(half),
+        RefinedVertexLocation::Edge(half) => limit_normals.normal_at_edge(half),
     })?;
     Ok((positions, normals))
 }

@@ -39,7 +39,7 @@ impl<'a> LimitNormals<'a> {
         let is_smooth = !is_corner && topology.twin(usual) != NONE;
         let start = if is_smooth { usual } else { topology.first_half_edge_of_fan(half) };
         let center = self.points[vertex as usize];
-        let arm = |half: u32| self.point_at_edge_middle(half) - center;
+        let arm = |half: u32| self.edge_middle_position(half) - center;
         arms.clear();
         let last = topology.walk_fan(start, |half| arms.push(arm(half)));
         arms.extend(last.map(arm));
@@ -52,17 +52,17 @@ impl<'a> LimitNormals<'a> {
     }
 
     /// Unit normal at the middle of a half-edge's edge, on the side of its face if the edge is a crease.
-    pub(super) fn at_edge(&self, half: u32) -> Vec3 {
+    pub(super) fn normal_at_edge(&self, half: u32) -> Vec3 {
         let topology = self.topology;
         let edge = topology.edge_of_half_edge(half);
-        let center = self.point_at_edge_middle(half);
+        let center = self.edge_middle_position(half);
         if topology.twin(half) == NONE {
             let [start, end] =
                 [topology.start(half), topology.end(half)].map(|end| self.points[end as usize]);
             let arms = [
                 end,
-                self.point_at_edge_middle(next_half_edge(half)),
-                self.point_at_edge_middle(previous_half_edge(half)),
+                self.edge_middle_position(next_half_edge(half)),
+                self.edge_middle_position(previous_half_edge(half)),
                 start,
             ];
             let arms = arms.map(|point| point - center);
@@ -74,7 +74,7 @@ impl<'a> LimitNormals<'a> {
     }
 
     /// Point at the middle of a half-edge's edge.
-    fn point_at_edge_middle(&self, half: u32) -> DVec3 {
+    fn edge_middle_position(&self, half: u32) -> DVec3 {
         self.points[self.topology.vertex_count() + self.topology.edge_of_half_edge(half) as usize]
     }
 

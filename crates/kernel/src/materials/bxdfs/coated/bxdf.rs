@@ -5,7 +5,7 @@ use crate::materials::bsdf::{BxdfParameters, LobesToSample, NarrowLobe};
 use crate::materials::bxdf::{
     Bxdf, BxdfFlags, LobeValue, LobesWithNormal, ShadingGeometry, choose_vec3_by_bool,
 };
-use crate::materials::coat::{ClearCoatLayer, interreflection_gain, nonnegative_cosine};
+use crate::materials::coat::{ClearCoatLayer, clamp_cosine_to_nonnegative, interreflection_gain};
 use crate::math::Vec3;
 use crate::math::lanes::Mask;
 use crate::math::soa::Soa;
@@ -116,7 +116,7 @@ impl<B: Bxdf> CoatedBxdf<B> {
     #[inline(always)]
     fn light_cosine_and_albedo(&self, view: &CoatViewTerms, wi: Vec3) -> (f32, f32) {
         let cosine = view.normal.dot(wi);
-        (cosine, self.layer.coat.albedo(nonnegative_cosine(cosine)))
+        (cosine, self.layer.coat.albedo(clamp_cosine_to_nonnegative(cosine)))
     }
 
     /// Transmittance of the coat, in and out together, or 0 for light from behind.
@@ -125,7 +125,7 @@ impl<B: Bxdf> CoatedBxdf<B> {
         let (cosine, albedo) = self.light_cosine_and_albedo(view, wi);
         let both = if cosine > 0.0 { view.transmittance * (1.0 - albedo) } else { 0.0 };
         if any.contains(ABSORBS) {
-            let length = view.path_length + self.layer.coat.path_length(nonnegative_cosine(cosine));
+            let length = view.path_length + self.layer.coat.path_length(clamp_cosine_to_nonnegative(cosine));
             self.layer.coat.absorption_transmittance(length) * both
         } else {
             Vec3::splat(both)
@@ -166,7 +166,7 @@ impl<B: Bxdf> Bxdf for CoatedBxdf<B> {
         let &ShadingGeometry { normal, wo, .. } = directions;
         let mirrored = wo - normal * (2.0 * normal.dot(wo));
         let wo = if B::IS_TRANSMISSION { mirrored } else { wo };
-        let cosine = nonnegative_cosine(normal.dot(wo));
+        let cosine = clamp_cosine_to_nonnegative(normal.dot(wo));
         let base = self.base.compute_view_terms(directions, any);
         let albedo = self.layer.coat.albedo(cosine);
         let below = (1.0 - albedo) * self.base.albedo_estimate(&base);
@@ -223,7 +223,7 @@ impl<B: Bxdf> Bxdf for CoatedBxdf<B> {
         let CoatOrBaseProbabilities { coat, base } = CoatOrBaseProbabilities::new(&view.layer, from.lobes);
         // Remap the random number to choose among the base's lobes.
         let rest = (choice - coat) / base.max(f32::MIN_POSITIVE);
-        let rest = nonnegative_cosine(rest).min(1.0 - f32::EPSILON);
+        let rest = clamp_cosine_to_nonnegative(rest).min(1.0 - f32::EPSILON);
         let below = self.base.sample(&view.base, from, [rest, u[0], u[1]], any);
         // This direction is unused if the path continues on the other side.
         let coated = if B::IS_TRANSMISSION { -normal } else { self.layer.coat.sample(normal, wo, u) };
@@ -237,7 +237,7 @@ impl<B: Bxdf> Bxdf for CoatedBxdf<B> {
             return self.base.narrow_lobe(&view.base);
         }
         let reflectance =
-            self.layer.coat.weight * self.layer.coat.fresnel(nonnegative_cosine(normal.dot(wo)));
+            self.layer.coat.weight * self.layer.coat.fresnel(clamp_cosine_to_nonnegative(normal.dot(wo)));
         let wide = self.base.wide_lobe_value(&view.base, normal, BxdfFlags::WIDE).max * transmittance;
         Some(NarrowLobe::from_microfacets(normal, wo, self.layer.coat.alpha, reflectance, wide))
     }

@@ -5,7 +5,8 @@ use crate::materials::bsdf::NarrowLobe;
 use crate::materials::bxdf::{Bxdf, BxdfFlags, LobeValue, LobesWithNormal, ShadingGeometry};
 use crate::materials::fresnel::schlick_weight;
 use crate::materials::microfacet::{
-    MicrofacetDistribution, SmithTerms, UnnormalizedHalfVector, frame_with_tangent, sample_reflection,
+    MicrofacetDistribution, SmithTerms, UnnormalizedHalfVector, frame_with_tangent,
+    sample_reflected_direction,
 };
 use crate::math::Vec3;
 use crate::math::frame::Frame;
@@ -133,7 +134,7 @@ impl<const BRUSHED: bool, const BECKMANN: bool> Bxdf for ConductorBxdf<BRUSHED, 
         [_, u @ ..]: [f32; 3],
         _: BxdfFlags,
     ) -> Vec3 {
-        sample_reflection(Self::DISTRIBUTION, &Self::frame(view), view.wo, self.alphas, u)
+        sample_reflected_direction(Self::DISTRIBUTION, &Self::frame(view), view.wo, self.alphas, u)
     }
 
     #[inline(always)]

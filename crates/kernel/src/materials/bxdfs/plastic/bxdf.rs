@@ -7,7 +7,7 @@ use crate::materials::bsdf::{LobesToSample, NarrowLobe};
 use crate::materials::bxdf::{
     Bxdf, BxdfFlags, LobeValue, LobesWithNormal, ShadingGeometry, choose_vec3_by_bool,
 };
-use crate::materials::coat::{CoatLayer, nonnegative_cosine};
+use crate::materials::coat::{CoatLayer, clamp_cosine_to_nonnegative};
 use crate::materials::phong::lobes::direction_about_axis;
 use crate::math::Vec3;
 use glimt_base::soa;
@@ -62,7 +62,7 @@ impl<const BECKMANN: bool> PlasticBxdf<BECKMANN> {
     #[inline(always)]
     fn two_way_coat_transmittance(&self, view: &PlasticViewTerms, wi: Vec3, any: BxdfFlags) -> f32 {
         let cosine = view.normal.dot(wi);
-        let entering = 1.0 - self.coat_albedo(nonnegative_cosine(cosine), any);
+        let entering = 1.0 - self.coat_albedo(clamp_cosine_to_nonnegative(cosine), any);
         if cosine > 0.0 { view.transmittance * entering } else { 0.0 }
     }
 }
@@ -99,7 +99,7 @@ impl<const BECKMANN: bool> Bxdf for PlasticBxdf<BECKMANN> {
     #[inline(always)]
     fn compute_view_terms(&self, directions: &ShadingGeometry, any: BxdfFlags) -> PlasticViewTerms {
         let &ShadingGeometry { normal, wo, .. } = directions;
-        let albedo = self.coat_albedo(nonnegative_cosine(normal.dot(wo)), any);
+        let albedo = self.coat_albedo(clamp_cosine_to_nonnegative(normal.dot(wo)), any);
         let diffuse = (1.0 - albedo) * (1.0 - self.mean) * PI * self.base.max_element();
         let coat = albedo * self.specular.max_element();
         let coat_probability = coat / (coat + diffuse).max(f32::MIN_POSITIVE);
@@ -133,7 +133,7 @@ impl<const BECKMANN: bool> Bxdf for PlasticBxdf<BECKMANN> {
             let pdf = self.coat.pdf(view.normal, view.wo, wi);
             coat = if self.alpha > 0.0 { pdf } else { 0.0 };
         }
-        let diffuse = nonnegative_cosine(normal.dot(wi)) * FRAC_1_PI;
+        let diffuse = clamp_cosine_to_nonnegative(normal.dot(wi)) * FRAC_1_PI;
         match lobes {
             LobesToSample::All => view.coat_probability * coat + (1.0 - view.coat_probability) * diffuse,
             LobesToSample::Narrow => coat,

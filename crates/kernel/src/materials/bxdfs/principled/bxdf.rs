@@ -7,11 +7,11 @@ use crate::materials::bsdf::{LobesToSample, NarrowLobe};
 use crate::materials::bxdf::{
     Bxdf, BxdfFlags, LobeValue, LobesWithNormal, ShadingGeometry, choose_vec3_by_bool,
 };
-use crate::materials::coat::nonnegative_cosine;
+use crate::materials::coat::clamp_cosine_to_nonnegative;
 use crate::materials::fresnel::schlick_weight;
 use crate::materials::lobe_albedo::{TERMS, evaluate_albedo_fit};
 use crate::materials::microfacet::{
-    MicrofacetDistribution, SmithTerms, UnnormalizedHalfVector, sample_reflection,
+    MicrofacetDistribution, SmithTerms, UnnormalizedHalfVector, sample_reflected_direction,
 };
 use crate::materials::phong::lobes::direction_about_axis;
 use crate::math::Vec3;
@@ -88,7 +88,11 @@ impl<const THROUGH: bool> PrincipledBxdf<THROUGH> {
         let rest = Vec3::ONE - self.dielectric * normal - Vec3::splat(self.dielectric_grazing * grazing);
         // If the facets reflect everything, no light passes. Clamp to 0 because rounding could make the
         // result negative.
-        Vec3::new(nonnegative_cosine(rest.x), nonnegative_cosine(rest.y), nonnegative_cosine(rest.z))
+        Vec3::new(
+            clamp_cosine_to_nonnegative(rest.x),
+            clamp_cosine_to_nonnegative(rest.y),
+            clamp_cosine_to_nonnegative(rest.z),
+        )
     }
 
     /// Smith terms for the directions to the viewer and to the light.
@@ -135,7 +139,7 @@ impl<const THROUGH: bool> Bxdf for PrincipledBxdf<THROUGH> {
         let &ShadingGeometry { normal, wo, .. } = directions;
         let mirrored = wo - normal * (2.0 * normal.dot(wo));
         let wo = if THROUGH { mirrored } else { wo };
-        let cosine = nonnegative_cosine(normal.dot(wo));
+        let cosine = clamp_cosine_to_nonnegative(normal.dot(wo));
         let transmittance = self.one_minus_specular_albedo(cosine);
         let [at_normal, at_grazing] = self.normal_and_grazing_albedos(cosine);
         let specular = self.facets.max_element() * at_normal + self.grazing * at_grazing;
@@ -146,7 +150,7 @@ impl<const THROUGH: bool> Bxdf for PrincipledBxdf<THROUGH> {
         let mut transmission = 0.0;
         if any.contains(TRANSMITS) {
             let rest = transmittance + Vec3::splat(at_normal + at_grazing - 1.0);
-            transmission = nonnegative_cosine((self.transmission * rest).max_element());
+            transmission = clamp_cosine_to_nonnegative((self.transmission * rest).max_element());
             all += transmission;
         }
         let by_albedo = 1.0 / all.max(f32::MIN_POSITIVE);
@@ -163,7 +167,8 @@ impl<const THROUGH: bool> Bxdf for PrincipledBxdf<THROUGH> {
     #[inline(always)]
     fn wide_lobe_value(&self, view: &PrincipledViewTerms, wi: Vec3, _: BxdfFlags) -> LobeValue {
         let cosine = view.normal.dot(wi);
-        let transmittance = self.one_minus_specular_albedo(nonnegative_cosine(cosine)) * view.transmittance;
+        let transmittance =
+            self.one_minus_specular_albedo(clamp_cosine_to_nonnegative(cosine)) * view.transmittance;
         let f = self.base * transmittance * if cosine > 0.0 { 1.0 } else { 0.0 };
         LobeValue { f, max: f.max_element(), shape: 0.0 }
     }
@@ -205,7 +210,7 @@ impl<const THROUGH: bool> Bxdf for PrincipledBxdf<THROUGH> {
                 let through = view.diffuse_transmission_probability;
                 let reflected = 1.0 - specular_probability - transmission_probability - through;
                 let diffuse_probability = if THROUGH { through } else { reflected };
-                narrow + diffuse_probability * nonnegative_cosine(normal.dot(wi)) * FRAC_1_PI
+                narrow + diffuse_probability * clamp_cosine_to_nonnegative(normal.dot(wi)) * FRAC_1_PI
             }
             LobesToSample::Narrow => {
                 narrow / (specular_probability + transmission_probability).max(f32::MIN_POSITIVE)
@@ -238,7 +243,8 @@ impl<const THROUGH: bool> Bxdf for PrincipledBxdf<THROUGH> {
             LobesToSample::All => choice >= specular_probability,
             LobesToSample::Narrow => false,
         };
-        let narrow = sample_reflection(GGX, &Frame::from_normal(view.normal), view.wo, [self.alpha; 2], u);
+        let narrow =
+            sample_reflected_direction(GGX, &Frame::from_normal(view.normal), view.wo, [self.alpha; 2], u);
         let wide = direction_about_axis(normal, u[0].sqrt(), (1.0 - u[0]).sqrt(), u[1]);
         // If the path continues on the other side, this direction is not used.
         choose_vec3_by_bool(is_through == THROUGH, choose_vec3_by_bool(is_wide, wide, narrow), -view.normal)
