@@ -195,7 +195,7 @@ fn limit_surface(
         limit_value(shape, points, index).as_vec3()
     })?;
     let normals = work.build_with_buffer(count, |vertex, arms| match place(vertex) {
-        RefinedVertexLocation::Vertex(half) => limit_normals.at_vertex(half, arms),
+        RefinedVertexLocation::Vertex(half) => limit_normals.normal_at_vertex(half, arms),
         RefinedVertexLocation::Edge(half) => limit_normals.normal_at_edge(half),
     })?;
     Ok((positions, normals))

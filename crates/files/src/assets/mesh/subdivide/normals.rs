@@ -30,7 +30,7 @@ impl<'a> LimitNormals<'a> {
     }
 
     /// Unit normal at the start of a half-edge, on the side of the half-edge's fan. `arms` is a buffer.
-    pub(super) fn at_vertex(&self, half: u32, arms: &mut Vec<DVec3>) -> Vec3 {
+    pub(super) fn normal_at_vertex(&self, half: u32, arms: &mut Vec<DVec3>) -> Vec3 {
         let topology = self.topology;
         let vertex = topology.start(half);
         let (is_corner, usual) = (topology.is_corner(vertex), topology.vertex_halves[vertex as usize]);
