@@ -53,9 +53,9 @@ impl TestDir {
         fs::write(self.path(name), content).expect("written");
     }
 
-    /// Copies the program for another user without access to the build directory. Uses `cp`, because a copy
-    /// written by this process could still be open for writing in a child forked by another test, and could
-    /// not be executed then.
+    /// Copies the program, so that a user without access to the build directory can run it. Uses `cp`: a copy
+    /// written by this process might still be open for writing in a child forked by another test, which would
+    /// prevent running it.
     pub(crate) fn program(&self) -> PathBuf {
         let copy = self.path("program");
         let made = Process::new("cp").arg(PROGRAM).arg(&copy).status();

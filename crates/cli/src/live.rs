@@ -107,8 +107,8 @@ fn run_terminal_ui(request: RenderRequest, console: &Console) -> Result<Exit, (E
 }
 
 /// Returns the lines to print after the terminal UI exits: unreported writes, the summary, the checkpoint and
-/// the changes that were not kept. The summary is printed only after `q`, and only if all writes were
-/// reported or if a write failed but earlier files exist. `is_older` is true if the images are older than the
+/// the changes that were not kept. The summary is printed only after `q`, in two cases: all writes were
+/// reported, or a write failed but earlier files exist. `is_older` is true if the images are older than the
 /// scene. `lost` contains the outputs changed by other programs. `call` is the command line glimt was started
 /// with.
 fn exit_summary_lines(

@@ -120,7 +120,7 @@ mod tests {
     use crate::math::Vec3;
     use crate::math::random::TestRandom;
 
-    /// Generator of images with noise.
+    /// Generates noisy images.
     struct NoisyImages(TestRandom);
 
     impl NoisyImages {

@@ -147,8 +147,8 @@ fn check_directory_is_writable(path: &Path, directory: &Path) -> Result<Metadata
     }
 }
 
-/// Checks that the file or directory has no flag that protects it from changes, which would prevent the new
-/// file from being renamed or removed.
+/// Checks that no flag protects the file or directory from changes. Such a flag would also keep the new file
+/// from being renamed or removed.
 fn check_no_protection_flag(path: &Path, name: &str, what: &Path) -> Result<(), OutputError> {
     let Some(flag) = ProtectionFlag::from_path(what) else { return Ok(()) };
     let why = format!("{name} is {}", flag.description());

@@ -37,7 +37,7 @@ pub struct SurfacePointF64 {
 }
 
 impl SurfacePointF64 {
-    /// Surface point without texture coordinates and tangents.
+    /// Surface point without texture coordinates or tangents.
     pub fn to_surface_point_without_uv(&self) -> SurfacePoint {
         SurfacePoint::from_f64(self.point, self.normal, Vec2::ZERO, DVec3::ZERO, DVec3::ZERO, self.reach)
     }

@@ -115,7 +115,7 @@ impl TransformedShape {
         self.volume_scale / (self.to_world.linear.transpose() * normal).length()
     }
 
-    /// The centroid of the untransformed shape, in world space.
+    /// The centroid of the original shape, transformed to world space.
     pub fn centroid(&self) -> DVec3 {
         self.to_world.point(self.shape.centroid())
     }

@@ -206,7 +206,7 @@ fn warn_if_empty_or_unlit(context: &FileContext<'_>, scene: &Scene) {
         && scene.render.ambient != Vec3::ZERO
         && !(method.gathers && scene.photons.enabled);
     if !has_lights && !has_file_materials && !has_emitters && !has_ambient {
-        let help = "add a [[light]] or an [environment], give a material in use `emission`, or set `ambient` in [render]";
+        let help = "add a [[light]] or an [environment], set `emission` on a material that is in use, or set `ambient` in [render]";
         context.report(Issue::warning(0..0, UNLIT_SCENE).with_help(help));
     }
 }

@@ -135,7 +135,7 @@ impl ValueKind {
         if let Self::InlineTable(keys) = self { keys } else { &[] }
     }
 
-    /// Returns the limits of the value's numbers, or `None` if the value has no numbers, or is an integer.
+    /// Returns the range of the numbers in the value, or `None` if it is an integer or contains no numbers.
     pub fn limits(self) -> Option<Limits> {
         match self {
             Self::Number(limits)

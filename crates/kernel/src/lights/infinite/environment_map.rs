@@ -33,9 +33,9 @@ pub struct EnvironmentMap {
 struct TexelPosition {
     column: u32,
     row: u32,
-    /// Fractions from left to right and from top to bottom. The vertical fraction is measured in angle.
+    /// Fractions from left to right and from top to bottom. The vertical fraction is linear in the angle.
     between: [f32; 2],
-    /// Fractions from left to right and from top to bottom. The vertical fraction is measured in height.
+    /// Fractions from left to right and from top to bottom. The vertical fraction is linear in the height.
     along: [f32; 2],
 }
 

@@ -206,7 +206,7 @@ fn sample_frequencies_match_the_pdf() {
         let count = 1_000_000;
         let mut counts = vec![0.0; columns * rows];
         for i in 0..count {
-            // Use independent random numbers, because the samples for a single pixel would be stratified.
+            // Use independent random numbers, because samples of a single pixel are stratified.
             let number = |salt: u32| {
                 let bits = (i * 2 + salt).wrapping_mul(0x9e37_79b9) ^ 0x85eb_ca6b;
                 let bits = (bits ^ bits >> 15).wrapping_mul(0x2c1b_3c6d);

@@ -138,7 +138,7 @@ impl<B: Bxdf> TestSurface<B> {
                     (wide + narrow - f).abs().max_element() <= 2e-6 * f.max_element(),
                     "the parts should add up to {f}"
                 );
-                // One lane per packet suffices: single lanes would take most of the time.
+                // Compare only one lane per packet, because evaluating single lanes is slow.
                 if i == number % some.len() {
                     self.check_single_lane(i, some[i], f, wide);
                 }

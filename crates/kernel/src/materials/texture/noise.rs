@@ -70,7 +70,7 @@ impl Noise {
         FilteredNoise { value, removed_variance }
     }
 
-    /// Gradient of the noise in the shape's own coordinates, filtered as the value is.
+    /// Gradient of the noise in the shape's own coordinates, filtered like the value.
     pub fn value_gradient(&self, at: &TexturePoint, is_filtered: bool) -> Vec3 {
         let (position, width) = object_position_and_width(at, is_filtered);
         let mut gradient = Vec3::ZERO;

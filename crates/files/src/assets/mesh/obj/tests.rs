@@ -229,7 +229,7 @@ fn keywords_are_case_insensitive() {
     let lower = lower.expect("whole");
     assert_eq!(loaded.mesh, lower.mesh);
     assert_eq!((loaded.materials.len(), loaded.warnings.len()), (1, 1));
-    // Uppercase statements also count as lines in error messages.
+    // Lines with uppercase statements are also counted in error messages.
     assert_eq!(error("V 0 0 0\nF 1 1 1\nF 1 2 3\n"), vertex_error(3, 2, 1));
 }
 

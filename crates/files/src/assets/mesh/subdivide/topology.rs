@@ -286,8 +286,8 @@ impl Topology {
         last.filter(|_| faces >= WIDE).map(|_| faces)
     }
 
-    /// Triangles after splitting each face into four: one at each corner, then the one in the middle. The new
-    /// vertices have the index of their edge plus the number of vertices.
+    /// Triangles after splitting each face into four: one at each corner, then the one in the middle. The
+    /// index of the new vertex on an edge is the original vertex count plus the edge's index.
     pub(super) fn refined_triangles(
         &self,
         work: ParallelListBuilder<'_>,

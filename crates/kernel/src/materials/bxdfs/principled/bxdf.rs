@@ -52,8 +52,7 @@ soa! {
         normal: Vec3 = Vec3::Z,
         /// Unit direction to the viewer, mirrored to the opposite side for transmitted light.
         wo: Vec3 = Vec3::Z,
-        /// Fraction of the light that passes through the specular lobe between the diffuse lobe and the
-        /// viewer.
+        /// Fraction of the light from the diffuse base that the specular layer transmits to the viewer.
         transmittance: Vec3 = Vec3::ONE,
         /// Probability of choosing the specular lobe.
         specular_probability: f32 = 1.0,
