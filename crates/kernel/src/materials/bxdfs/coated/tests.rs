@@ -194,6 +194,34 @@ fn albedos_over_white_match_quadrature() {
     }
 }
 
+#[test]
+fn albedos_over_a_leaf_match_quadrature() {
+    type Front = CoatedBxdf<TranslucentBxdf<false>>;
+    type Behind = CoatedBxdf<TranslucentBxdf<true>>;
+    let (kd, kt) = (0.45_f32, 0.55_f32);
+    let leaf = translucent(Vec3::splat(kd), 0.0, Vec3::splat(kt));
+    let [kd, kt] = [kd, kt].map(f64::from);
+    for alpha in [0.001, 0.05, 0.3, 1.0] {
+        let means = (0..32).map(|i| reference_albedo(alpha, ((f64::from(i) + 0.5) / 32.0).sqrt()) / 32.0);
+        let mean: f64 = means.sum();
+        let point = coated(leaf, 1.0, alpha, 1.5, Vec3::ONE);
+        for cosine in COSINES {
+            let at = spherical_direction(cosine, 0.3);
+            let coat = reference_albedo(alpha, cosine);
+            let front = TestSurface::<Front>::new(&point, [alpha; 2], at);
+            let behind =
+                TestSurface::<Behind>::with_light_path(&point, [alpha; 2], at, NarrowLightPath::Through);
+            let [reflected, transmitted] = [front.lobe_stratified_albedo(48).x, behind.sampled_albedo(128).x];
+            // Both sides are coated, and light passes one coat on each.
+            let passed = (1.0 - coat) * (1.0 - mean);
+            let exact = [coat + passed * kd / (1.0 - kd * mean), passed * kt];
+            let what = format!("α {alpha} at {cosine}: {reflected}, {transmitted} instead of {exact:?}");
+            assert!((reflected - exact[0]).abs() < 1e-3 && (transmitted - exact[1]).abs() < 1e-3, "{what}");
+            assert!(reflected + transmitted < 1.0 + 5e-4, "{what}");
+        }
+    }
+}
+
 /// Checks samples against pdfs, and albedos of white bases against quadrature.
 fn check_sampling<B: Bxdf>(what: &str, base: impl Fn(f32) -> B::Point) {
     for (alpha, cosine) in [0.02, 0.3].into_iter().flat_map(|alpha| [0.15, 0.8].map(|cosine| (alpha, cosine)))
