@@ -104,7 +104,7 @@ FAULTS = [
     ("a sheet on glass that transmits into air", "integrators/transport/walk.rs", "far = ⟦crossing.far⟧;",
      "path.interiors", FROSTED + "sheet_on_glass_transmits_into_the_glass"),
     ("a sheet in front of glass that transmits into air", "integrators/transport/walk.rs",
-     "Interaction::Opaque(&vertex, DirectOrCoincidentHit::Touching(touched), ⟦&far⟧)", "&path.interiors",
+     "Interaction::Opaque(&vertex, OpaqueSurfaceHit::Touching(touched), ⟦&far⟧)", "&path.interiors",
      FROSTED + "sheet_on_glass_transmits_into_the_glass"),
     ("energy gained in a denser medium", "integrators/transport/interface.rs", "⟦(eta * eta).min(1.0)⟧", "1.0",
      FROSTED + "sheet_on_glass_adds_no_light"),

@@ -186,8 +186,8 @@ pub(crate) fn surfaces_and_lights_key(
     textures: &[Fingerprint],
 ) -> Fingerprint {
     // A new field of the scene must be added to one of the keys. This key includes the keys of the lights and
-    // of the objects' shapes. The settings, the camera and the photons have separate keys. The context and
-    // The files and their parts are in `textures`. Instances only locate objects in the scene file.
+    // of the objects' shapes. The settings, the camera and the photons have separate keys. Textures and
+    // their files are in `textures`. Instances only locate objects in the scene file.
     let Scene {
         objects,
         materials,

@@ -11,7 +11,7 @@ use super::settings::{
 };
 use super::turntable::{self, TurntableFrame};
 use crate::choice::Choice;
-use crate::film::range_map::{DataKind, RangeMap};
+use crate::film::range_map::{DataBrightnessMap, DataKind};
 use crate::film::tone::ToneMapping;
 use crate::film::{FilmQuantity, Rect};
 use crate::integrators::{AovSource, FirstHitQuantity, PathAov, PhotonSettings, RenderSettings};
@@ -91,14 +91,16 @@ impl RenderPlan {
             | AovSource::Film(FilmQuantity::Radiance) => {
                 ToneMapping { exposure_stops: exposure, curve, ..Default::default() }
             }
-            AovSource::FirstHit(FirstHitQuantity::Depth) => {
-                ToneMapping { range_map: RangeMap::Unresolved(DataKind::Distances), ..ToneMapping::DATA }
-            }
+            AovSource::FirstHit(FirstHitQuantity::Depth) => ToneMapping {
+                range_map: DataBrightnessMap::Unresolved(DataKind::Distances),
+                ..ToneMapping::DATA
+            },
             AovSource::Light(PathAov::TraversalCost)
             | AovSource::FirstHit(FirstHitQuantity::Photons)
-            | AovSource::Film(FilmQuantity::Samples | FilmQuantity::Error) => {
-                ToneMapping { range_map: RangeMap::Unresolved(DataKind::Amounts), ..ToneMapping::DATA }
-            }
+            | AovSource::Film(FilmQuantity::Samples | FilmQuantity::Error) => ToneMapping {
+                range_map: DataBrightnessMap::Unresolved(DataKind::Amounts),
+                ..ToneMapping::DATA
+            },
             AovSource::FirstHit(
                 FirstHitQuantity::Normal
                 | FirstHitQuantity::Barycentric

@@ -47,7 +47,11 @@ impl TurntableFrame {
     }
 
     /// Returns the vector from `look_at` to the camera for each frame.
-    pub(super) fn target_to_camera_vectors(of: u32, arm: DVec3, up: DVec3) -> impl Iterator<Item = DVec3> {
+    pub(super) fn camera_offsets_of_all_frames(
+        of: u32,
+        arm: DVec3,
+        up: DVec3,
+    ) -> impl Iterator<Item = DVec3> {
         let first = Pose { position: arm, look_at: DVec3::ZERO, up };
         (0..of.max(1)).map(move |number| Self { number, of: of.max(1) }.pose(&first).position)
     }

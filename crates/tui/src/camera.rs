@@ -2,7 +2,7 @@
 //! camera can be written to a scene file exactly.
 
 use crate::math::DVec3;
-use crate::math::decimal::{round_to_step, rounding_step_at_distance};
+use crate::math::decimal::{decimal_step_for_distance, round_to_step};
 use crate::scene::description::{Pose, Projection};
 
 /// Minimum angle in degrees between the orbit axis and the direction from `look_at` to the eye.
@@ -56,7 +56,7 @@ pub(super) fn zoomed(view: Projection, own: Projection, factor: f64) -> Projecti
             let wanted =
                 (now * factor).clamp((own / MAX_DOLLY_FACTOR).min(now), (own * MAX_DOLLY_FACTOR).max(now));
             let view_height =
-                if wanted == now { now } else { round_to_step(wanted, rounding_step_at_distance(wanted)) };
+                if wanted == now { now } else { round_to_step(wanted, decimal_step_for_distance(wanted)) };
             Projection::Orthographic { view_height }
         }
         Projection::Spherical => Projection::Spherical,
@@ -65,7 +65,7 @@ pub(super) fn zoomed(view: Projection, own: Projection, factor: f64) -> Projecti
 
 /// Moves the eye to `look_at + arm`, rounding its position by at most 1/10,000 of the distance.
 fn with_target_to_eye_vector(pose: &Pose, arm: DVec3) -> Pose {
-    let step = rounding_step_at_distance(arm.length());
+    let step = decimal_step_for_distance(arm.length());
     let position = (pose.look_at + arm).to_array().map(|number| round_to_step(number, step));
     Pose { position: DVec3::from_array(position), ..*pose }
 }

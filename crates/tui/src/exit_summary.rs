@@ -22,7 +22,7 @@ pub(super) fn summary_text(state: &State) -> String {
 /// Whether the summary claims that the scene's own image is up to date.
 pub(super) fn is_saved_scene_image_current(state: &State) -> bool {
     let is_written = state.saving.own.state == SavedSceneRenderStatus::Written;
-    is_written && state.saving.write_failed.is_none() && !is_scene_broken(state)
+    is_written && state.saving.write_failed.is_none() && !state.is_scene_broken()
 }
 
 /// Changes that were made with keys and saved neither to the scene nor in an image, formatted as command-line
@@ -49,7 +49,7 @@ pub(super) fn output_file_names(state: &State) -> Option<String> {
 
 /// Explains why this run has not written an image.
 fn reason_for_no_image(state: &State) -> String {
-    if is_scene_broken(state) {
+    if state.is_scene_broken() {
         return format!("no image written; {} has errors", scene_name(state));
     }
     let Some(name) = output_file_names(state) else { return "no image written".to_owned() };
@@ -67,7 +67,7 @@ const NEXT_RENDER: &str = "the next render";
 
 /// Describes what has happened since the files were written.
 fn describe_events_since_writing(state: &State) -> String {
-    if is_scene_broken(state) {
+    if state.is_scene_broken() {
         return format!("; {} has errors since", scene_name(state));
     }
     let written = &state.saving.written;
@@ -95,10 +95,6 @@ fn describe_events_since_writing(state: &State) -> String {
         (RequestStatus::Running { .. } | RequestStatus::Canceled, None) => format!("; {next} was stopped"),
         (RequestStatus::Done | RequestStatus::Waiting | RequestStatus::Broken, _) => String::new(),
     }
-}
-
-fn is_scene_broken(state: &State) -> bool {
-    matches!(state.work.activity, RequestStatus::Waiting | RequestStatus::Broken)
 }
 
 fn scene_name(state: &State) -> String {
@@ -174,7 +170,7 @@ mod tests {
     use super::*;
     use crate::ContentChangeTime;
     use crate::fixtures::{TestUi, diagnostic, done_event, render_progress, written_event};
-    use crate::pipeline::protocol::{Event, Stage, Status};
+    use crate::pipeline::protocol::{Event, Failure, Stage, Status};
     use crate::scene::description::Camera;
     use crate::scene::diagnostic::Severity;
 
@@ -365,6 +361,17 @@ mod tests {
         assert_eq!(summary_text(&ui.state), made);
         ui.report_scene_errors(vec![diagnostic(Severity::Error, "wrong")]);
         assert_eq!(summary_text(&ui.state), format!("{made}; cornell.toml has errors since"));
+    }
+
+    #[test]
+    fn failed_render_does_not_blame_the_scene() {
+        let mut ui = TestUi::new();
+        let failure = Failure::Work("no memory".to_owned());
+        ui.worker_event(Event::Failed { generation: 1, failure });
+        let summary = summary_text(&ui.state);
+        assert!(!summary.contains("has errors"), "{summary}");
+        ui.report_scene_errors(vec![diagnostic(Severity::Error, "wrong")]);
+        assert_eq!(summary_text(&ui.state), "no image written; cornell.toml has errors");
     }
 
     #[test]

@@ -6,11 +6,11 @@ use crate::math::Vec3;
 
 /// Mapping from data values to brightness.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub enum RangeMap {
+pub enum DataBrightnessMap {
     /// Leaves the values unchanged.
     #[default]
     None,
-    /// A mapping whose range is unknown until [`RangeMap::with_image_range`] sets it. Maps everything to
+    /// A mapping whose range is unknown until [`DataBrightnessMap::with_image_range`] sets it. Maps everything to
     /// black.
     Unresolved(DataKind),
     /// A mapping for values in this range.
@@ -46,7 +46,7 @@ const MIN_MEDIAN_BRIGHTNESS: f32 = 0.25;
 /// Minimum bias, which limits the steepness of the curve.
 const MIN_BIAS: f32 = 1e-3;
 
-impl RangeMap {
+impl DataBrightnessMap {
     /// Sets the range from the values in an image.
     pub fn with_image_range(self, image: &RadianceImage) -> Self {
         match self {
@@ -146,7 +146,7 @@ mod tests {
     }
 
     fn shown(kind: DataKind, numbers: &[f32]) -> Vec<f32> {
-        let map = RangeMap::Unresolved(kind).with_image_range(&picture(numbers));
+        let map = DataBrightnessMap::Unresolved(kind).with_image_range(&picture(numbers));
         numbers.iter().map(|x| map.map_to_brightness(Vec3::splat(*x)).x).collect()
     }
 
@@ -160,16 +160,18 @@ mod tests {
         assert_near(&shown(DataKind::Distances, &[2.0, 4.0, 6.0]), &[1.0, 0.55, 0.1]);
         assert_near(&shown(DataKind::Distances, &[3.0; 4]), &[1.0; 4]);
         assert_near(&shown(DataKind::Distances, &[0.0; 4]), &[0.0; 4]);
-        let range =
-            RangeMap::Unresolved(DataKind::Distances).with_image_range(&picture(&[2.0, 4.0, 6.0])).range();
+        let range = DataBrightnessMap::Unresolved(DataKind::Distances)
+            .with_image_range(&picture(&[2.0, 4.0, 6.0]))
+            .range();
         assert_eq!(range.map(|range| (range.min, range.max)), Some((2.0, 6.0)));
-        let nothing = RangeMap::Unresolved(DataKind::Distances).with_image_range(&picture(&[0.0; 4]));
+        let nothing =
+            DataBrightnessMap::Unresolved(DataKind::Distances).with_image_range(&picture(&[0.0; 4]));
         assert_eq!(nothing.range(), None);
     }
 
     #[test]
     fn subpixel_objects_determine_the_range() {
-        let range = RangeMap::Unresolved(DataKind::Distances)
+        let range = DataBrightnessMap::Unresolved(DataKind::Distances)
             .with_image_range(&picture(&[0.0, 2.0, 0.0, 6.0, 0.0]))
             .range();
         assert_eq!(range.map(|range| range.limits()), Some([2.0, 6.0]));

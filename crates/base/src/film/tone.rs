@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::range_map::RangeMap;
+use super::range_map::DataBrightnessMap;
 use super::{RadianceImage, Srgb8Image, Srgb16Image, curves, is_in_thread_pool, linear_to_srgb8_by_table};
 use crate::choice;
 use crate::math::Vec3;
@@ -50,7 +50,7 @@ pub struct ToneMapping {
     /// Encoding of the result.
     pub transfer: Transfer,
     /// Range mapping for data without an inherent brightness.
-    pub range_map: RangeMap,
+    pub range_map: DataBrightnessMap,
 }
 
 /// Maximum radiance, far above the saturation point of every curve and far below overflow.
@@ -64,7 +64,7 @@ impl ToneMapping {
         exposure_stops: 0.0,
         curve: Tonemap::None,
         transfer: Transfer::Identity,
-        range_map: RangeMap::None,
+        range_map: DataBrightnessMap::None,
     };
 
     /// Resolves the range mapping using the values in this image.

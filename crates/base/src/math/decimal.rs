@@ -9,7 +9,7 @@ pub fn round_to_step(number: f64, step: f64) -> f64 {
 
 /// Decimal step for rounding coordinates at `distance` from the viewpoint: a power of ten between 1e-5 and
 /// 1e-4 times the distance.
-pub fn rounding_step_at_distance(distance: f64) -> f64 {
+pub fn decimal_step_for_distance(distance: f64) -> f64 {
     libm::pow(10.0, libm::floor(libm::log10(distance)) - 4.0)
 }
 
@@ -28,7 +28,7 @@ mod tests {
             assert_eq!(round_to_step(number, step).to_string(), text);
         }
         for distance in [0.003, 1.0, 4.0, 9.99, 12_345.0] {
-            let error = rounding_step_at_distance(distance) / 2.0 / distance;
+            let error = decimal_step_for_distance(distance) / 2.0 / distance;
             assert!((4e-6..=5.1e-5).contains(&error), "{distance}: {error}");
         }
     }

@@ -177,7 +177,7 @@ impl Shape {
 
     /// Surface point at a hit, with at least the requested fields.
     #[inline]
-    pub fn requested_surface_point(
+    pub fn surface_point_with_fields(
         &self,
         ray: &RayF64,
         hit: &ShapeHit,
@@ -496,7 +496,7 @@ mod tests {
         for shape in shapes() {
             for (ray, hit) in hits(&shape).take(1000) {
                 let [bare, full] = [false, true].map(|uv| {
-                    shape.requested_surface_point(&ray, &hit, SurfaceRequest { uv, shadow_point: true })
+                    shape.surface_point_with_fields(&ray, &hit, SurfaceRequest { uv, shadow_point: true })
                 });
                 let parts =
                     |of: &SurfacePoint| [of.point, of.error, of.normal, of.shadow_point, of.shading_normal];

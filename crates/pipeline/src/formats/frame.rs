@@ -55,7 +55,7 @@ pub(super) fn frame_model(
     // Move the camera back until every point is inside the frame.
     let half = (max - min) * 0.5;
     let mut distance = 0.0_f64;
-    for back in TurntableFrame::target_to_camera_vectors(turns.min(MAX_MEASURED), back, up) {
+    for back in TurntableFrame::camera_offsets_of_all_frames(turns.min(MAX_MEASURED), back, up) {
         let right = up.cross(back).normalize_or(DVec3::X);
         let above = back.cross(right);
         for point in points {

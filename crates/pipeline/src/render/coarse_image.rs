@@ -4,7 +4,7 @@ use std::cell::Cell;
 use std::time::{Duration, Instant};
 
 use super::preview::PreviewSender;
-use crate::film::range_map::RangeMap;
+use crate::film::range_map::DataBrightnessMap;
 use crate::film::{RadianceImage, Rect};
 use crate::integrators::{LayerSet, PhotonPassesBySample, RenderSettings};
 use crate::plan::RenderPlan;
@@ -103,7 +103,7 @@ impl<'a> CoarseImageRenderer<'a> {
         let is_whole = screen.bounds.is_some_and(|bounds| bounds.around.is_none());
         // Skip data views, because they depend on the value range of the whole image or show the photons
         // themselves.
-        let is_of_light = self.plan.tone_mapping().range_map == RangeMap::None;
+        let is_of_light = self.plan.tone_mapping().range_map == DataBrightnessMap::None;
         let Some((shown_width, shown_height)) =
             screen.fitted_image_size().filter(|_| is_whole && is_of_light)
         else {

@@ -6,7 +6,7 @@ use rayon::ThreadPool;
 
 use super::film_state::FilmState;
 use crate::control::CancelToken;
-use crate::film::range_map::RangeMap;
+use crate::film::range_map::DataBrightnessMap;
 use crate::film::tone::{ToneMapping, tone_map_to_8_bits};
 use crate::film::{FilmQuantity, Previewer, RadianceImage, Rect};
 use crate::keys;
@@ -119,7 +119,7 @@ impl PreviewSender<'_> {
         let tone = self.plan.tone_mapping();
         let is_known = state.has_sampled_all_pixels()
             && (has_time || state.film.crop_rect().area() <= MAX_SCANNED_PIXELS);
-        if tone.range_map == RangeMap::None || !is_known {
+        if tone.range_map == DataBrightnessMap::None || !is_known {
             return tone.with_image_range(image);
         }
         tone.with_image_range(&state.film.image(self.plan.settings.view.displayed_film_quantity()))

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use super::{ImageReport, LightSamplingReport, PhotonsReport, Report, SampledLightSet, WorkCounters};
 use crate::control::CancelToken;
-use crate::film::range_map::RangeMap;
+use crate::film::range_map::DataBrightnessMap;
 use crate::inputs::ProtectedInputs;
 use crate::integrators::{RayCounters, light_sampling_purpose};
 use crate::output::write::{ExistingFilePolicy, atomic_with_policy};
@@ -129,7 +129,7 @@ fn light_sampling_report(finished: &RequestResults<'_>) -> LightSamplingReport {
 fn data_view_value_range(finished: &RequestResults<'_>) -> Option<[f32; 2]> {
     let RequestResults { plan, state, .. } = finished;
     let tone = plan.tone_mapping();
-    if tone.range_map == RangeMap::None {
+    if tone.range_map == DataBrightnessMap::None {
         return None;
     }
     let image = state.film.image(plan.settings.view.displayed_film_quantity());

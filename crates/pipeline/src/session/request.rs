@@ -14,7 +14,7 @@ use crate::stopwatch::PausableStopwatch;
 use crate::table::StageRecorder;
 
 /// Outcome of a finished request.
-pub(crate) struct CompletedRequest {
+pub(crate) struct RequestOutcome {
     pub(crate) report: Report,
     /// Reasons why the image is not written.
     pub(crate) conflicts: Vec<Diagnostic>,
@@ -31,7 +31,7 @@ impl Session {
         let outcome = self.run_request(context);
         let is_broken = matches!(outcome, Err(AbortReason::Failed(Failure::Scene(_))));
         context.sink.send(match outcome {
-            Ok(CompletedRequest { report, conflicts, warnings, unchanged }) => {
+            Ok(RequestOutcome { report, conflicts, warnings, unchanged }) => {
                 let warnings = [conflicts, warnings].concat();
                 Event::Done { generation, report: Box::new(report), warnings, unchanged }
             }
@@ -47,7 +47,7 @@ impl Session {
     pub(crate) fn run_request(
         &mut self,
         context: &RequestContext<'_>,
-    ) -> Result<CompletedRequest, AbortReason> {
+    ) -> Result<RequestOutcome, AbortReason> {
         let RequestContext { request, sink, .. } = *context;
         sink.send(Event::Started { generation: request.generation });
         let mut findings = Findings::default();
@@ -69,7 +69,7 @@ impl Session {
         let unchanged =
             self.current_image_key_and_view() == before && settled(Stage::Render) && settled(Stage::Write);
         let Findings { conflicts, warnings, .. } = findings;
-        Ok(CompletedRequest { report, conflicts, warnings, unchanged })
+        Ok(RequestOutcome { report, conflicts, warnings, unchanged })
     }
 
     /// Runs all stages of a request and returns its report.

@@ -5,7 +5,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 use crate::assets::GkitOrbiterCamera;
 use crate::geometry::packet::RayPacket;
 use crate::geometry::{Aabb, Ray};
-use crate::math::decimal::{round_to_step, rounding_step_at_distance};
+use crate::math::decimal::{decimal_step_for_distance, round_to_step};
 use crate::math::elementary::sin_cos_f64;
 use crate::math::lanes::{F32x16, PACKET_SIZE, set_lane};
 use crate::math::transform::rotation_xyz;
@@ -172,7 +172,7 @@ impl Camera {
                 let look_at = position + forward * file.size;
                 let short = |place: DVec3| {
                     DVec3::from_array(
-                        place.to_array().map(|at| round_to_step(at, rounding_step_at_distance(file.size))),
+                        place.to_array().map(|at| round_to_step(at, decimal_step_for_distance(file.size))),
                     )
                 };
                 let (position, look_at) = (short(position), short(look_at));

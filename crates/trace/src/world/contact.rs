@@ -108,7 +108,7 @@ impl World {
         let margin = self.geometry.coincidence_margin(at);
         let error = if self.geometry.is_hit_isolated(at.hit, at.surface, margin) {
             if self.is_glass_thicker_than(at, margin) {
-                return self.visit_isolated_hit_surface(at, visit);
+                return self.visit_glass_entered_at_isolated_hit(at, visit);
             }
             self.geometry.set_hit_as_only_candidate(at, memory)
         } else {
@@ -139,7 +139,7 @@ impl World {
 
     /// Fast path for [`World::visit_coincident_candidates`] if [`World::is_glass_thicker_than`] is true and
     /// nothing else is nearby. In this case, only the incoming ray's side matters.
-    fn visit_isolated_hit_surface(
+    fn visit_glass_entered_at_isolated_hit(
         &self,
         at: &CoincidenceQuery<'_>,
         mut visit: impl FnMut(CoincidentOrEnclosingSurface),
@@ -223,7 +223,7 @@ impl World {
         let bare = SurfaceRequest { uv: false, shadow_point: false };
         let own = shape.intersect(&ray)?;
         let is_front =
-            shape.requested_surface_point(&ray, &own, bare).normal.as_dvec3().dot(ray.direction) < 0.0;
+            shape.surface_point_with_fields(&ray, &own, bare).normal.as_dvec3().dot(ray.direction) < 0.0;
         Some(self.build_coincident_surface(Hit { shape: own, object }, material, is_front))
     }
 

@@ -326,7 +326,7 @@ impl Geometry {
 
     /// Returns the requested surface attributes at a hit.
     pub fn requested_surface(&self, ray: &Ray, hit: &Hit, request: SurfaceRequest) -> SurfacePoint {
-        self.objects[hit.object as usize].requested_surface_point(ray, &hit.shape, request)
+        self.objects[hit.object as usize].surface_point_with_fields(ray, &hit.shape, request)
     }
 
     /// Mean curvature at a hit, positive if the surface is convex on its front side.

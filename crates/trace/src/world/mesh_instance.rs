@@ -204,7 +204,7 @@ impl MeshInstance {
     }
 
     /// Computes the requested surface attributes at a hit.
-    pub(super) fn requested_surface_point(
+    pub(super) fn surface_point_with_fields(
         &self,
         ray: &RayF64,
         hit: &ShapeHit,
@@ -362,7 +362,7 @@ mod tests {
             let mesh = MeshInstance::new(Arc::clone(&tree), transform, false);
             for primitive in 0..10 {
                 let hit = ShapeHit { primitive, u: 0.5, v: 0.25, t: 1.0 };
-                let surface = mesh.requested_surface_point(
+                let surface = mesh.surface_point_with_fields(
                     &Ray::new(Vec3::ZERO, Vec3::Z).to_f64(),
                     &hit,
                     SurfaceRequest::ALL,

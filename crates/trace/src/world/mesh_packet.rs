@@ -291,7 +291,7 @@ mod tests {
                 let row = InstructionSet::from_environment_or_best().run(filling);
                 for (i, ray) in rays.iter().enumerate() {
                     let exact = ray.origin.as_dvec3() + ray.direction.as_dvec3();
-                    let surface = mesh.requested_surface_point(
+                    let surface = mesh.surface_point_with_fields(
                         &ray.to_f64(),
                         &hits.get(i).expect("a hit"),
                         SurfaceRequest::ALL,
@@ -333,7 +333,7 @@ mod tests {
                     for i in (0..PACKET_SIZE).filter(|i| of & 1 << i != 0) {
                         let hit = hits.get(i).expect("a hit");
                         let alone =
-                            mesh.requested_surface_point(&rays[i].to_f64(), &hit, SurfaceRequest::ALL);
+                            mesh.surface_point_with_fields(&rays[i].to_f64(), &hit, SurfaceRequest::ALL);
                         let bits = |v: Vec3| v.to_array().map(f32::to_bits);
                         let what = || format!("{instructions:?}, {hit:?}, {alone:?}");
                         assert_eq!(bits(lane(&row.point, i)), bits(alone.point), "{}", what());

@@ -79,7 +79,7 @@ impl Object {
     }
 
     /// Computes the requested surface attributes at a hit.
-    pub fn requested_surface_point(
+    pub fn surface_point_with_fields(
         &self,
         ray: &Ray,
         hit: &ShapeHit,
@@ -87,8 +87,8 @@ impl Object {
     ) -> SurfacePoint {
         let ray = ray.to_f64();
         match self {
-            Self::Shape(shape) => shape.requested_surface_point(&ray, hit, request),
-            Self::Mesh(mesh) => mesh.requested_surface_point(&ray, hit, request),
+            Self::Shape(shape) => shape.surface_point_with_fields(&ray, hit, request),
+            Self::Mesh(mesh) => mesh.surface_point_with_fields(&ray, hit, request),
         }
     }
 

@@ -89,9 +89,7 @@ impl State {
         // While the scene is broken, the last valid one is being rendered.
         let is_at_work = match work.activity {
             RequestStatus::Running { .. } => true,
-            RequestStatus::Waiting | RequestStatus::Broken => {
-                request.own.is_some() && self.is_failure_in_scene()
-            }
+            RequestStatus::Waiting | RequestStatus::Broken => request.own.is_some() && self.is_scene_broken(),
             RequestStatus::Done | RequestStatus::Canceled => false,
         };
         let is_newest = request.camera_step.generation == Some(request.generation);
@@ -120,9 +118,13 @@ impl State {
         unwritten.into_iter().chain(warnings.iter().cloned()).collect()
     }
 
-    /// Whether the failure, if there is one, is in the scene rather than in the render.
-    fn is_failure_in_scene(&self) -> bool {
-        self.overlays.problems.as_ref().is_none_or(|problems| problems.work.is_none())
+    /// Whether the current scene is invalid. A failed render does not make its scene invalid.
+    pub(super) fn is_scene_broken(&self) -> bool {
+        let has_failed = match self.work.activity {
+            RequestStatus::Waiting | RequestStatus::Broken => true,
+            RequestStatus::Running { .. } | RequestStatus::Done | RequestStatus::Canceled => false,
+        };
+        has_failed && self.overlays.problems.as_ref().is_none_or(|problems| problems.work.is_none())
     }
 
     /// Opens the view list, or restarts its timeout if it is already open.

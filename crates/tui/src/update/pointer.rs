@@ -5,7 +5,7 @@ use super::{camera, history, overlay, region};
 use crate::event::FilePosition;
 use crate::event::{Effect, MouseEvent, MouseEventKind};
 use crate::keymap::OverlayAction;
-use crate::math::decimal::{round_to_step, rounding_step_at_distance};
+use crate::math::decimal::{decimal_step_for_distance, round_to_step};
 use crate::messages;
 use crate::pipeline::protocol::{Command, PickedInstance, PickedObject, PickedPixel};
 use crate::scene::sanitize::escape_invisible_chars;
@@ -164,7 +164,7 @@ pub(super) fn handle_pick_reply(state: &mut State, picked: &PickedPixel) -> Vec<
 }
 
 fn focus_at_depth(state: &mut State, depth: f64) -> Vec<Effect> {
-    let distance = round_to_step(depth, rounding_step_at_distance(depth));
+    let distance = round_to_step(depth, decimal_step_for_distance(depth));
     if !(distance > 0.0) {
         return show_notice_only(state, messages::NOTHING_TO_FOCUS);
     }

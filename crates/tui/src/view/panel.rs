@@ -95,7 +95,7 @@ fn panel_lines(state: &State, width: u16, column: u16, is_in_full: bool) -> Vec<
         return lines;
     }
     // If the scene is broken, its stages have no visible result.
-    if !is_done && !is_scene_broken(state) {
+    if !is_done && !state.is_scene_broken() {
         let of = |stage| if is_in_full { stages::lines_of_stage_with_full_reason } else { stages::stage_line_with_reason }(state, stage, width);
         lines.extend(Stage::ALL.into_iter().flat_map(of));
     }
@@ -122,15 +122,6 @@ fn inspected_lines(state: &State, width: u16) -> Vec<StyledLine> {
         lines.push(StyledLine::new());
     }
     lines
-}
-
-/// Whether the current scene is invalid.
-fn is_scene_broken(state: &State) -> bool {
-    let is_at_rest = match state.work.activity {
-        RequestStatus::Waiting | RequestStatus::Broken => true,
-        RequestStatus::Running { .. } | RequestStatus::Done | RequestStatus::Canceled => false,
-    };
-    is_at_rest && state.overlays.problems.as_ref().is_none_or(|problems| problems.work.is_none())
 }
 
 fn asset_progress_line(state: &State, asset: &AssetProgressBar, width: u16) -> StyledLine {
@@ -221,7 +212,7 @@ fn reached_render_limit(state: &State) -> Option<RenderLimit> {
 /// A wrapped hint for users who have not saved yet. If the scene is broken and there is no image, the status
 /// line shows the hint instead.
 fn wrapped_save_scene_hint(state: &State, width: u16) -> Vec<StyledLine> {
-    if is_scene_broken(state) && state.preview.shown.is_none() {
+    if state.is_scene_broken() && state.preview.shown.is_none() {
         return Vec::new();
     }
     let mut lines: Vec<String> = Vec::new();

@@ -82,7 +82,7 @@ fn context_in_table(
     if opened > closed {
         return Some(context_in_inline_table(of, typed.rsplit_once('{').unwrap_or_default()));
     }
-    let current = if is_inline { last_list_item(typed) } else { typed };
+    let current = if is_inline { text_after_last_top_level_comma(typed) } else { typed };
     let Some((key, value)) = current.split_once('=') else {
         let is_assigned =
             after.trim_start_matches(|c: char| c.is_alphanumeric() || c == '_').trim_start().starts_with('=');
@@ -98,7 +98,7 @@ fn context_in_inline_table(of: CursorTable, (before, typed): (&str, &str)) -> Cu
     let outer = before.trim_end().trim_end_matches('=').trim_end();
     let outer =
         outer.rsplit(|c: char| !(c.is_alphanumeric() || c == '_')).next().unwrap_or_default().to_owned();
-    let current = last_list_item(typed);
+    let current = text_after_last_top_level_comma(typed);
     match current.split_once('=') {
         Some((key, value)) => {
             let (key, is_quoted) = (key.trim().to_owned(), is_in_quotes(value));
@@ -112,7 +112,7 @@ fn context_in_inline_table(of: CursorTable, (before, typed): (&str, &str)) -> Cu
 }
 
 /// Returns the last item in a comma-separated list. Ignores commas within brackets.
-fn last_list_item(typed: &str) -> &str {
+fn text_after_last_top_level_comma(typed: &str) -> &str {
     let mut depth = 0_i32;
     let mut start = 0;
     for (at, character) in typed.char_indices() {

@@ -6,15 +6,6 @@ use std::path::PathBuf;
 use crate::system::file::FileKind;
 use crate::system::{describe_error, is_too_many_open_files};
 
-/// Part index and part count.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct PartIndexAndCount {
-    /// Index of the part, starting at 1.
-    pub index: u32,
-    /// Number of parts.
-    pub count: u32,
-}
-
 /// Reason why parts cannot be merged or a checkpoint cannot be resumed.
 #[derive(Debug, thiserror::Error)]
 pub enum PartError {

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::super::{BitDepth, FilmEncodingSettings};
 use crate::choice::Choice;
-use crate::film::range_map::{DataKind, RangeMap};
+use crate::film::range_map::{DataBrightnessMap, DataKind};
 use crate::film::tone::{ToneMapping, Tonemap, Transfer};
 use crate::film::{ConvergenceModel, Film, FilmCreationError, FilmQuantity, Rect, SumOrder};
 
@@ -175,8 +175,8 @@ impl ImageHeader {
         let Rect { x, y, width, height } = film.crop_rect();
         let tone = &finish.tone;
         let kind = match tone.range_map {
-            RangeMap::None => None,
-            RangeMap::Unresolved(kind) | RangeMap::Resolved(kind, _) => Some(kind),
+            DataBrightnessMap::None => None,
+            DataBrightnessMap::Unresolved(kind) | DataBrightnessMap::Resolved(kind, _) => Some(kind),
         };
         let word = |wanted: DataKind| {
             RANGE_MAPPING_NAMES.iter().find(|(kind, _)| *kind == wanted).map(|(_, word)| *word)
@@ -206,9 +206,9 @@ impl ImageHeader {
     /// Returns the settings for encoding the image file, or `None` if a name is unknown.
     pub fn film_encoding_settings(&self) -> Option<FilmEncodingSettings> {
         let range_map = match self.tone.stretch.as_deref() {
-            None => RangeMap::None,
+            None => DataBrightnessMap::None,
             Some(word) => {
-                RangeMap::Unresolved(RANGE_MAPPING_NAMES.iter().find(|(_, known)| *known == word)?.0)
+                DataBrightnessMap::Unresolved(RANGE_MAPPING_NAMES.iter().find(|(_, known)| *known == word)?.0)
             }
         };
         Some(FilmEncodingSettings {

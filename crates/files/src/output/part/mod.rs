@@ -19,7 +19,7 @@ mod merge;
 mod read;
 mod save;
 
-pub use error::{PartError, PartIndexAndCount, missing_parts_message};
+pub use error::{PartError, missing_parts_message};
 pub use head::{
     ImageHeader, NamedRenderInput, PartHeader, PartOrCheckpoint, PartShare, ToneHeader,
     render_input_differences,

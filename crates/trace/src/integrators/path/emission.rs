@@ -8,7 +8,7 @@ use crate::integrators::transport::packet::PacketHits;
 use crate::integrators::transport::packet_source::PacketSource;
 use crate::integrators::transport::ray::PathRay;
 use crate::integrators::transport::vertex::SurfaceVertex;
-use crate::integrators::transport::walk::DirectOrCoincidentHit;
+use crate::integrators::transport::walk::OpaqueSurfaceHit;
 use crate::math::Vec3;
 use crate::math::lanes::lane as lane_of;
 use crate::scene::description::ShadowMode;
@@ -93,14 +93,12 @@ impl CameraPathWavefront<'_, '_> {
         &mut self,
         path: &PathRay,
         vertex: &SurfaceVertex<'_>,
-        hit: DirectOrCoincidentHit,
+        hit: OpaqueSurfaceHit,
     ) -> bool {
         if vertex.emits() {
             let weight = match hit {
-                DirectOrCoincidentHit::Direct(hit) => self.tile.emitter_mis_weight(path, &hit),
-                DirectOrCoincidentHit::Touching(hit) => {
-                    self.tile.coincident_glass_emitter_mis_weight(path, &hit)
-                }
+                OpaqueSurfaceHit::Direct(hit) => self.tile.emitter_mis_weight(path, &hit),
+                OpaqueSurfaceHit::Touching(hit) => self.tile.coincident_glass_emitter_mis_weight(path, &hit),
             };
             let radiance = vertex.emitted_radiance(path, self.counters);
             self.add_weighted_emission(path, radiance, weight);

@@ -14,7 +14,7 @@ use crate::integrators::transport::ray::PathRay;
 use crate::integrators::transport::tile::TileContext;
 use crate::integrators::transport::vertex::{SpecularLobe, SurfaceVertex};
 use crate::integrators::transport::walk::{
-    DirectOrCoincidentHit, Interaction, Interface, NullInteractionOutcome, PathStepper, walk_to_interaction,
+    Interaction, Interface, NullInteractionOutcome, OpaqueSurfaceHit, PathStepper, walk_to_interaction,
 };
 use crate::integrators::view::PathAov;
 use crate::materials::{Bsdf, Mirror, SpecularOverBase, ThinDielectric};
@@ -45,7 +45,7 @@ impl<'a> PathStepper<'a> for CameraPathWavefront<'a, '_> {
     fn handle_walk_end(&mut self, path: &PathRay, reached: Interaction<'_, 'a>, has_passed: bool) {
         match reached {
             Interaction::Opaque(vertex, hit, far) => {
-                if !has_passed && matches!(hit, DirectOrCoincidentHit::Direct(_)) {
+                if !has_passed && matches!(hit, OpaqueSurfaceHit::Direct(_)) {
                     self.record_camera_vertex(path, vertex);
                 }
                 if self.add_path_emission(path, vertex, hit) && vertex.scatters() {
@@ -64,7 +64,7 @@ impl<'a> PathStepper<'a> for CameraPathWavefront<'a, '_> {
                 if !has_passed {
                     self.record_camera_vertex(path, vertex);
                 }
-                if self.add_path_emission(path, vertex, DirectOrCoincidentHit::Direct(hit)) {
+                if self.add_path_emission(path, vertex, OpaqueSurfaceHit::Direct(hit)) {
                     match rough {
                         Some(rough) => self.queue_rough_glass_vertices(path, vertex, rough, far),
                         None => self.shade_glass_hit(path, vertex, far),
@@ -85,7 +85,7 @@ impl<'a> PathStepper<'a> for CameraPathWavefront<'a, '_> {
         &mut self,
         path: &PathRay,
         vertex: &SurfaceVertex<'a>,
-        hit: DirectOrCoincidentHit,
+        hit: OpaqueSurfaceHit,
         pane: &ThinDielectric,
     ) -> NullInteractionOutcome {
         let reflectance = pane.reflectance(vertex.surface.shading_normal.dot(vertex.wo));

@@ -26,7 +26,7 @@ use crate::integrators::transport::scatter::{BounceContinuationRules, BsdfSample
 use crate::integrators::transport::tile::TileContext;
 use crate::integrators::transport::vertex::{ShadingVertex, SpecularLobe, SurfaceVertex};
 use crate::integrators::transport::walk::{
-    DirectOrCoincidentHit, Interaction, Interface, MAX_PASSED_SURFACES, NullInteractionOutcome, PathStepper,
+    Interaction, Interface, MAX_PASSED_SURFACES, NullInteractionOutcome, OpaqueSurfaceHit, PathStepper,
     opacity_at_path_vertex, walk_to_interaction,
 };
 use crate::integrators::view::PathAov;
@@ -204,7 +204,7 @@ impl<'a> PathStepper<'a> for PhotonWavefront<'a> {
         &mut self,
         path: &PathRay,
         vertex: &SurfaceVertex<'a>,
-        _: DirectOrCoincidentHit,
+        _: OpaqueSurfaceHit,
         pane: &ThinDielectric,
     ) -> NullInteractionOutcome {
         let reflectance = pane.reflectance(vertex.surface.shading_normal.dot(vertex.wo));

@@ -23,7 +23,7 @@ pub const MAX_PASSED_SURFACES: usize = 64;
 /// The interaction at which a walk ends.
 pub enum Interaction<'v, 'a> {
     /// An opaque surface, and the medium behind it.
-    Opaque(&'v SurfaceVertex<'a>, DirectOrCoincidentHit, &'v InteriorList),
+    Opaque(&'v SurfaceVertex<'a>, OpaqueSurfaceHit, &'v InteriorList),
     /// A boundary between media, at a hit on glass.
     Glass(&'v SurfaceVertex<'a>, Hit, Interface<'v>),
     /// The ray leaves the scene.
@@ -65,7 +65,7 @@ pub trait PathStepper<'a> {
         &mut self,
         path: &PathRay,
         vertex: &SurfaceVertex<'a>,
-        hit: DirectOrCoincidentHit,
+        hit: OpaqueSurfaceHit,
         pane: &ThinDielectric,
     ) -> NullInteractionOutcome;
 }
@@ -124,7 +124,7 @@ impl SegmentFromLastVertex {
 
 /// Hit on an opaque surface.
 #[derive(Clone, Copy, Debug)]
-pub enum DirectOrCoincidentHit {
+pub enum OpaqueSurfaceHit {
     /// The ray hits the surface itself.
     Direct(Hit),
     /// The surface is coincident with glass that the ray hits.
@@ -188,7 +188,7 @@ pub fn walk_to_interaction<'a, W: PathStepper<'a>>(
             let hit = way.rebase_ray_to_last_vertex(path, hit);
             return stepper.handle_walk_end(
                 path,
-                Interaction::Opaque(&vertex, DirectOrCoincidentHit::Direct(hit), &far),
+                Interaction::Opaque(&vertex, OpaqueSurfaceHit::Direct(hit), &far),
                 has_passed,
             );
         }
@@ -207,7 +207,7 @@ pub fn walk_to_interaction<'a, W: PathStepper<'a>>(
             {
                 let touched = Hit { shape: ShapeHit { t: hit.shape.t, ..touching.shape }, ..touching };
                 let touched = way.rebase_ray_to_last_vertex(path, touched);
-                let reached = Interaction::Opaque(&vertex, DirectOrCoincidentHit::Touching(touched), &far);
+                let reached = Interaction::Opaque(&vertex, OpaqueSurfaceHit::Touching(touched), &far);
                 return stepper.handle_walk_end(path, reached, has_passed);
             }
             path.path = path.continuation_path_number(PASSED);
@@ -279,7 +279,7 @@ fn null_interaction_outcome<'a, W: PathStepper<'a>>(
     let mut whole = *path;
     let hit = way.rebase_ray_to_last_vertex(&mut whole, hit);
     whole.interiors = stepper.tile_context().interiors_without_open_solids(whole.interiors);
-    stepper.handle_pane(&whole, vertex, DirectOrCoincidentHit::Direct(hit), pane)
+    stepper.handle_pane(&whole, vertex, OpaqueSurfaceHit::Direct(hit), pane)
 }
 
 /// Whether a partially transparent surface coincident with glass stops a path. Thin panes on glass have no

@@ -106,7 +106,7 @@ impl OpaqueSurfaceQuery {
 
     /// Whether a shape satisfies the query. At least one of three orthogonal segments is at an angle of at
     /// least 35° to the surface, so it hits a surface at distance d within √3·d.
-    fn meets_shape(&self, shape: &Shape) -> bool {
+    fn is_satisfied_by_shape(&self, shape: &Shape) -> bool {
         match *self {
             Self::Way(way) => shape.intersect(&way).is_some(),
             Self::Point(point, reach) => DVec3::AXES.into_iter().any(|axis| {
@@ -141,7 +141,7 @@ fn evaluate_opaque_surface_queries(
                 let around = shape.bounds().unwrap_or(all);
                 tree.visit_overlapping(&around, |id| {
                     let id = id as usize;
-                    answers[id] = answers[id] || queries[id].meets_shape(&shape);
+                    answers[id] = answers[id] || queries[id].is_satisfied_by_shape(&shape);
                 });
             }
             LoweredShape::Mesh(placed) => {
