@@ -60,7 +60,8 @@ fn mean_color(picture: &Srgb8Image, columns: &[(u32, f32)], rows: &[(u32, f32)])
             weights += width * height;
         }
     }
-    (sum / weights).to_array().map(linear_to_srgb8)
+    let mean = sum / weights;
+    [linear_to_srgb8(mean.x), linear_to_srgb8(mean.y), linear_to_srgb8(mean.z)]
 }
 
 #[cfg(test)]

@@ -83,8 +83,8 @@ fn all_lattice_indices([nx, ny, nz]: [usize; 3]) -> impl Iterator<Item = [usize;
 }
 
 /// Position of a lattice point, offset by a fraction of a cell along all axes.
-fn lattice_position(at: [usize; 3], by: f64) -> Vector {
-    add(CORNER, at.map(|index| (index as f64 + by) * CELL))
+fn lattice_position([x, y, z]: [usize; 3], by: f64) -> Vector {
+    add(CORNER, scale([x as f64 + by, y as f64 + by, z as f64 + by], CELL))
 }
 
 /// Moves a point onto the surface with Newton steps along the gradient.

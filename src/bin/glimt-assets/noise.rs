@@ -17,7 +17,7 @@ pub(crate) fn lattice_random(point: [i64; 3], seed: u64) -> f64 {
 /// Smooth noise in [0, 1]. If `period` is positive, the noise repeats after `period` lattice points in x and
 /// y.
 pub(crate) fn value_noise(at: Vector, period: i64, seed: u64) -> f64 {
-    let base = at.map(f64::floor);
+    let base = [at[0].floor(), at[1].floor(), at[2].floor()];
     let fade = |axis: usize| {
         let t = at[axis] - base[axis];
         t * t * t * (t * (t * 6.0 - 15.0) + 10.0)

@@ -14,9 +14,12 @@ pub(crate) fn coral() -> PolygonMesh {
     })
 }
 
-/// A mountainous globe with 1,310,720 triangles.
-pub(crate) fn mountainous_globe() -> PolygonMesh {
-    displaced_icosphere(8, |direction| {
+/// Number of subdivisions of the globe in `million.ply`.
+pub(crate) const GLOBE_SUBDIVISIONS: u32 = 8;
+
+/// A mountainous globe with 20 · 4^`times` triangles.
+pub(crate) fn mountainous_globe(times: u32) -> PolygonMesh {
+    displaced_icosphere(times, |direction| {
         let height = fractal_noise(scale(direction, 2.0), 8, 0, 3);
         let crater = value_noise(scale(direction, 9.0), 0, 11);
         0.82 + 0.42 * height - 0.05 * smoothstep(0.68, 0.8, crater)

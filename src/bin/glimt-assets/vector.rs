@@ -1,5 +1,5 @@
 //! Vectors as arrays. Trigonometric functions are from the `libm` crate, whose results are identical on every
-//! machine.
+//! machine. Components are written out because `array::map` is slow without optimization, as in tests.
 
 pub(crate) type Vector = [f64; 3];
 
@@ -8,11 +8,11 @@ pub(crate) fn add(a: Vector, b: Vector) -> Vector {
 }
 
 pub(crate) fn subtract(a: Vector, b: Vector) -> Vector {
-    add(a, scale(b, -1.0))
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
 pub(crate) fn scale(a: Vector, by: f64) -> Vector {
-    a.map(|component| component * by)
+    [a[0] * by, a[1] * by, a[2] * by]
 }
 
 pub(crate) fn dot(a: Vector, b: Vector) -> f64 {

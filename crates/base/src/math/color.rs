@@ -42,8 +42,9 @@ pub fn linear_to_srgb8(linear: f32) -> u8 {
 
 /// Decodes an sRGB byte triple to a linear color.
 #[inline]
-pub fn srgb8_color_to_linear(bytes: [u8; 3]) -> Vec3 {
-    Vec3::from_array(bytes.map(|byte| SRGB8_TO_LINEAR[usize::from(byte)]))
+pub fn srgb8_color_to_linear([red, green, blue]: [u8; 3]) -> Vec3 {
+    let table = &*SRGB8_TO_LINEAR;
+    Vec3::new(table[usize::from(red)], table[usize::from(green)], table[usize::from(blue)])
 }
 
 /// Lookup table for [`srgb_to_linear`], indexed by sRGB byte.

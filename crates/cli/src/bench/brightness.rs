@@ -84,20 +84,31 @@ mod tests {
     use crate::math::Vec3;
     use crate::math::random::unit_generator;
 
+    /// Width and height of the images.
     const SIDE: u32 = 64;
 
     /// Returns an image with gray value 0.5 · (1 + `brighter`), independent noise per pixel, and an offset
     /// shared by all pixels.
     fn picture(next: &mut impl FnMut() -> f32, brighter: f32, noise: f32, shared: f32) -> RadianceImage {
-        let all = shared * (2.0 * next() - 1.0);
-        let pixels = (0..SIDE * SIDE)
-            .map(|_| Vec3::splat(0.5 * (1.0 + brighter) + all + noise * (2.0 * next() - 1.0)));
-        RadianceImage { width: SIDE, height: SIDE, pixels: pixels.collect() }
+        sized_picture(SIDE, next, brighter, noise, shared)
     }
 
-    fn references(next: &mut impl FnMut() -> f32) -> IndependentReferences {
+    fn sized_picture(
+        side: u32,
+        next: &mut impl FnMut() -> f32,
+        brighter: f32,
+        noise: f32,
+        shared: f32,
+    ) -> RadianceImage {
+        let all = shared * (2.0 * next() - 1.0);
+        let pixels = (0..side * side)
+            .map(|_| Vec3::splat(0.5 * (1.0 + brighter) + all + noise * (2.0 * next() - 1.0)));
+        RadianceImage { width: side, height: side, pixels: pixels.collect() }
+    }
+
+    fn references(side: u32, next: &mut impl FnMut() -> f32) -> IndependentReferences {
         let pair = [Path::new("r1"), Path::new("r2")];
-        let [a, b] = [picture(next, 0.0, 0.02, 0.0), picture(next, 0.0, 0.02, 0.0)];
+        let [a, b] = [(); 2].map(|()| sized_picture(side, next, 0.0, 0.02, 0.0));
         IndependentReferences::new(ImagePair::new(pair, a, b).expect("a pair"))
     }
 
@@ -107,7 +118,7 @@ mod tests {
         let (mut off, mut missed) = (Vec::new(), 0);
         for seed in 1..=SEEDS {
             let mut next = unit_generator(seed.into());
-            let references = references(&mut next);
+            let references = references(SIDE, &mut next);
             let pictures: Vec<_> = (0..3).map(|_| picture(&mut next, -0.01, 0.2, 0.0)).collect();
             let found = compare_brightness(&references, &pictures, true).expect("enough seeds");
             missed += u32::from(!found.is_biased());
@@ -131,8 +142,9 @@ mod tests {
         for (noise, shared) in [(0.2, 0.0), (0.02, 0.02)] {
             let mut next = unit_generator(5);
             let alarms = (0..200).filter(|_| {
-                let references = references(&mut next);
-                let pictures: Vec<_> = (0..4).map(|_| picture(&mut next, 0.0, noise, shared)).collect();
+                let references = references(32, &mut next);
+                let pictures: Vec<_> =
+                    (0..4).map(|_| sized_picture(32, &mut next, 0.0, noise, shared)).collect();
                 compare_brightness(&references, &pictures, shared == 0.0).expect("enough seeds").is_biased()
             });
             // The expected count is 0.2. The probability of 4 or more is 1e-4.
@@ -144,7 +156,7 @@ mod tests {
     #[test]
     fn too_few_images_or_black_references_give_none() {
         let mut next = unit_generator(7);
-        let references = references(&mut next);
+        let references = references(SIDE, &mut next);
         let pictures: Vec<_> = (0..2).map(|_| picture(&mut next, 0.0, 0.1, 0.0)).collect();
         assert_eq!(compare_brightness(&references, &pictures, true), None);
         let black = || RadianceImage::black(2, 2);

@@ -244,7 +244,7 @@ fn trimming_drops_one_pixel_in_a_thousand() {
 
 #[test]
 fn results_do_not_depend_on_thread_count() {
-    let [a, b] = edges(300, 270);
+    let [a, b] = edges(200, 150);
     let pair = pair(a, b);
     let with = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");

@@ -110,7 +110,7 @@ fn sphere_cosine_deviations(shape: &Shape, from: Vec3) -> (f64, f64) {
     let around = shape.bounds().expect("expected a finite shape");
     let reach = around.extent().length() * 0.5 / (around.center() - from).length();
     let one_minus_cos = if reach < 0.9 { 1.02 * (1.0 - (1.0 - reach * reach).sqrt()) } else { 2.0 };
-    let n = 20_000;
+    let n = 10_000;
     for i in 0..n {
         let u = [(i as f32 + 0.5) / n as f32, (f64::from(i) * 0.618_033_988_75).fract() as f32];
         let direction = frame.to_world(crate::sampling::warp::cone(u, one_minus_cos));
@@ -125,7 +125,7 @@ fn sphere_cosine_deviations(shape: &Shape, from: Vec3) -> (f64, f64) {
     let Some(towards) = sum.try_normalize() else { return (0.0, 0.0) };
     let ball = Shape::Sphere(Sphere { center: from.as_dvec3() + towards.as_dvec3(), radius });
     (
-        mean_and_relative_deviation(&irradiance_samples(&light_from_shape(&ball), from, 20_000)).1,
+        mean_and_relative_deviation(&irradiance_samples(&light_from_shape(&ball), from, 10_000)).1,
         mean_and_relative_deviation(&cosines).1,
     )
 }
@@ -133,7 +133,7 @@ fn sphere_cosine_deviations(shape: &Shape, from: Vec3) -> (f64, f64) {
 /// Number of direction cells along each axis.
 const SIDE: usize = 20;
 /// Number of samples per light.
-const COUNT: usize = 400_000;
+const COUNT: usize = 200_000;
 
 /// Distances from the floor to the lights, and points on the floor for which the lights are sampled.
 const PLACES: [(f64, Vec3); 2] = [(0.02, Vec3::ZERO), (0.8, Vec3::new(0.3, 0.0, -0.2))];
@@ -145,7 +145,7 @@ fn shape_samples_follow_their_pdf() {
         let ball = ("ball", Shape::Sphere(Sphere { center: DVec3::Y * (0.5 + gap), radius: 0.5 }));
         for (name, shape) in named_light_shapes(gap).into_iter().chain([ball]) {
             // Squares must be narrow compared with the shape.
-            let fine = if name.ends_with("thin") { 30 } else { 20 };
+            let fine = if name.ends_with("thin") { 30 } else { 16 };
             let name = format!("{name} at {gap}");
             checked += u32::from(follows_its_pdf(&name, &shape, &light_from_shape(&shape), from, fine));
         }

@@ -63,7 +63,7 @@ fn best_division(grid: CellGrid, pixels: &[Vec3]) -> CellDivision {
 }
 
 fn to_srgb_bytes(linear: Vec3) -> [u8; 3] {
-    linear.to_array().map(linear_to_srgb8)
+    [linear_to_srgb8(linear.x), linear_to_srgb8(linear.y), linear_to_srgb8(linear.z)]
 }
 
 #[cfg(test)]

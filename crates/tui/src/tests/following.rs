@@ -302,6 +302,7 @@ impl WatchedRender {
 fn picture((width, height): (u32, u32), samples: f64, turn: u32) -> Srgb8Image {
     /// Noise of a single sample in code values, similar to a Cornell box.
     const NOISE: f64 = 1.2;
+    let root = samples.sqrt();
     let pixel = |i: u32| {
         let column = (i % width + 3 * turn) % width;
         let (x, y) = (f64::from(column) / f64::from(width), f64::from(i / width) / f64::from(height));
@@ -310,9 +311,9 @@ fn picture((width, height): (u32, u32), samples: f64, turn: u32) -> Srgb8Image {
         let channel = |c: usize| {
             let unit = f64::from((hash >> (16 * c) & 0xFFFF) as u16) / 65536.0 - 0.5;
             // The mean absolute deviation is a quarter of the distribution's width.
-            wall[c] * (0.4 + 0.6 * y) + NOISE * 4.0 * unit / samples.sqrt()
+            (wall[c] * (0.4 + 0.6 * y) + NOISE * 4.0 * unit / root).round() as u8
         };
-        std::array::from_fn(|c| channel(c).round() as u8)
+        [channel(0), channel(1), channel(2)]
     };
     Srgb8Image { width, height, pixels: (0..width * height).map(pixel).collect() }
 }

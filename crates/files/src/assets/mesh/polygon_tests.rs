@@ -1,10 +1,10 @@
 //! Polygons with holes and polygons that touch themselves, in every format that has polygons.
 
 use std::fs;
+use std::sync::{Arc, LazyLock};
 
 use super::load;
 use super::polygon::tests::{Points, area, layers, reversed, sieve};
-use crate::assets::LoadedMesh;
 use crate::control::{CancelToken, ignore_progress};
 
 /// A polygon, and points in its holes or next to its outline that no triangle may cover.
@@ -92,10 +92,20 @@ fn encodings(points: &Points) -> Vec<(&'static str, Vec<u8>)> {
     ]
 }
 
-/// Calls `check` with each polygon in each format, and the triangles that it is loaded as.
-fn check_all(check: impl Fn(&str, &Polygon, &LoadedMesh, (&Points, &[[usize; 3]]))) {
+/// A polygon that was loaded from a file, and its triangles.
+struct LoadedPolygon {
+    case: String,
+    polygon: Arc<Polygon>,
+    warnings: Vec<String>,
+    points: Points,
+    triangles: Vec<[usize; 3]>,
+}
+
+/// Each polygon in each format. Loading them takes most of the time, so all tests share them.
+static LOADED: LazyLock<Vec<LoadedPolygon>> = LazyLock::new(|| {
     let folder = tempfile::tempdir().expect("a folder");
-    for polygon in polygons() {
+    let mut all = Vec::new();
+    for polygon in polygons().into_iter().map(Arc::new) {
         for (file, bytes) in encodings(&polygon.points) {
             let path = folder.path().join(file);
             fs::write(&path, bytes).expect("written");
@@ -108,40 +118,44 @@ fn check_all(check: impl Fn(&str, &Polygon, &LoadedMesh, (&Points, &[[usize; 3]]
             };
             let points = loaded.mesh.positions.iter().map(position).collect();
             let corners = |triangle: &[u32; 3]| triangle.map(|corner| corner as usize);
-            let triangles: Vec<_> = loaded.mesh.triangles.iter().map(corners).collect();
-            check(&case, &polygon, &loaded, (&points, &triangles));
+            let triangles = loaded.mesh.triangles.iter().map(corners).collect();
+            let polygon = Arc::clone(&polygon);
+            all.push(LoadedPolygon { case, polygon, warnings: loaded.warnings, points, triangles });
+        }
+    }
+    all
+});
+
+#[test]
+fn triangle_areas_sum_to_the_polygon_area() {
+    for LoadedPolygon { case, polygon, points, triangles, .. } in LOADED.iter() {
+        let all: Vec<usize> = (0..polygon.points.len()).collect();
+        let sum: f64 = triangles.iter().map(|triangle| area(points, triangle)).sum();
+        assert_eq!(sum, area(&polygon.points, &all), "{case}");
+    }
+}
+
+#[test]
+fn triangles_keep_the_polygon_orientation() {
+    for LoadedPolygon { case, polygon, points, triangles, .. } in LOADED.iter() {
+        let all: Vec<usize> = (0..polygon.points.len()).collect();
+        let total = area(&polygon.points, &all);
+        assert!(triangles.iter().all(|triangle| area(points, triangle) * total > 0.0), "{case}");
+    }
+}
+
+#[test]
+fn holes_and_gaps_are_not_covered() {
+    for LoadedPolygon { case, polygon, points, triangles, .. } in LOADED.iter() {
+        for (x, y) in &polygon.outside {
+            assert_eq!(layers(points, triangles, *x, *y), 0, "{case}: ({x}, {y})");
         }
     }
 }
 
 #[test]
-fn triangle_areas_sum_to_the_polygon_area() {
-    check_all(|case, polygon, _, (points, triangles)| {
-        let all: Vec<usize> = (0..polygon.points.len()).collect();
-        let sum: f64 = triangles.iter().map(|triangle| area(points, triangle)).sum();
-        assert_eq!(sum, area(&polygon.points, &all), "{case}");
-    });
-}
-
-#[test]
-fn triangles_keep_the_polygon_orientation() {
-    check_all(|case, polygon, _, (points, triangles)| {
-        let all: Vec<usize> = (0..polygon.points.len()).collect();
-        let total = area(&polygon.points, &all);
-        assert!(triangles.iter().all(|triangle| area(points, triangle) * total > 0.0), "{case}");
-    });
-}
-
-#[test]
-fn holes_and_gaps_are_not_covered() {
-    check_all(|case, polygon, _, (points, triangles)| {
-        for (x, y) in &polygon.outside {
-            assert_eq!(layers(points, triangles, *x, *y), 0, "{case}: ({x}, {y})");
-        }
-    });
-}
-
-#[test]
 fn touching_polygons_cause_no_warnings() {
-    check_all(|case, _, loaded, _| assert!(loaded.warnings.is_empty(), "{case}: {:?}", loaded.warnings));
+    for LoadedPolygon { case, warnings, .. } in LOADED.iter() {
+        assert!(warnings.is_empty(), "{case}: {warnings:?}");
+    }
 }

@@ -1,4 +1,5 @@
 use std::f64::consts::TAU;
+use std::sync::LazyLock;
 
 use super::*;
 use crate::control::CancelToken;
@@ -74,6 +75,8 @@ fn sun(degrees: f64) -> DirectionalLight {
 }
 
 /// Lights whose photons have different fluxes: a sky and its sun, with their powers in the green channel.
+static SKY_LIGHTS: LazyLock<Vec<(Light, Option<Shape>, f64)>> = LazyLock::new(sky_lights);
+
 fn sky_lights() -> Vec<(Light, Option<Shape>, f64)> {
     let (disk, mut all) = (PI * SCENE.radius * SCENE.radius, Vec::new());
     let (sky, sun) = sky_and_sun();
@@ -84,7 +87,7 @@ fn sky_lights() -> Vec<(Light, Option<Shape>, f64)> {
             Light::Point(_) | Light::Spot(_) | Light::Area(_) => 0.0,
         };
         // A grid over the directions within an angle of the sun.
-        let (n, to_sun) = (800, DVec3::new(-0.6, 0.8, 0.0));
+        let (n, to_sun) = (400, DVec3::new(-0.6, 0.8, 0.0));
         let at = |i: u32| (f64::from(i) + 0.5) / f64::from(n);
         let sum: f64 = (0..n)
             .flat_map(|i| (0..n).map(move |j| (i, j)))
@@ -116,6 +119,8 @@ fn sky_and_sun() -> (Light, Light) {
 }
 
 /// Lights with their shapes and their powers relative to [`COLOR`].
+static LIGHTS: LazyLock<Vec<(Light, Option<Shape>, f64)>> = LazyLock::new(lights);
+
 fn lights() -> Vec<(Light, Option<Shape>, f64)> {
     let disk = PI * SCENE.radius * SCENE.radius;
     let mut all = vec![(Light::Point(point(Falloff::Square)), None, 4.0 * PI)];
@@ -178,20 +183,50 @@ impl MeanEstimate {
 
 const GROUPS: u32 = 32;
 
-/// Computes the mean of a function over photons. Attempts that do not produce a photon count as 0.
-fn mean(source: &PhotonEmitter, count: u32, of: impl Fn(&EmittedPhoton) -> f64) -> MeanEstimate {
-    let groups = (0..GROUPS).map(|group| {
-        let one = |i: u32| {
-            let sampler = PixelSampler::new(3, group, 5, i);
-            let pair = |k: u32| sampler.pair(1, Dimension::Light(k)).to_array();
-            let u =
-                PhotonRandomNumbers { light: pair(0), aim: pair(1), position: pair(2), direction: pair(3) };
-            source.emit(&u).map_or(0.0, |photon| of(&photon))
-        };
-        (0..count).map(one).sum::<f64>() / f64::from(count)
-    });
-    MeanEstimate::of(&groups.collect::<Vec<_>>())
+/// Estimates the mean of `one` over groups and over sample numbers. Doubles the number of samples per group
+/// until the estimate is accurate, from 1024 to at most `max_count`.
+fn estimate_mean(
+    max_count: u32,
+    one: impl Fn(u32, u32) -> f64,
+    is_accurate: impl Fn(&MeanEstimate) -> bool,
+) -> MeanEstimate {
+    let (mut sums, mut counts) = ([0.0; GROUPS as usize], 0..max_count.min(1024));
+    loop {
+        for (sum, group) in sums.iter_mut().zip(0..) {
+            *sum += counts.clone().map(|i| one(group, i)).sum::<f64>();
+        }
+        let estimate = MeanEstimate::of(&sums.map(|sum| sum / f64::from(counts.end)));
+        if counts.end >= max_count || is_accurate(&estimate) {
+            return estimate;
+        }
+        counts = counts.end..2 * counts.end;
+    }
 }
+
+/// Computes the mean of a function over photons, with at most `max_count` photons per group. Attempts that do
+/// not produce a photon count as 0.
+fn mean_until(
+    source: &PhotonEmitter,
+    max_count: u32,
+    of: impl Fn(&EmittedPhoton) -> f64,
+    is_accurate: impl Fn(&MeanEstimate) -> bool,
+) -> MeanEstimate {
+    let one = |group: u32, i: u32| {
+        let sampler = PixelSampler::new(3, group, 5, i);
+        let pair = |k: u32| sampler.pair(1, Dimension::Light(k)).to_array();
+        let u = PhotonRandomNumbers { light: pair(0), aim: pair(1), position: pair(2), direction: pair(3) };
+        source.emit(&u).map_or(0.0, |photon| of(&photon))
+    };
+    estimate_mean(max_count, one, is_accurate)
+}
+
+/// Computes the mean of a function over `count` photons per group.
+fn mean(source: &PhotonEmitter, count: u32, of: impl Fn(&EmittedPhoton) -> f64) -> MeanEstimate {
+    mean_until(source, count, of, |_| false)
+}
+
+/// The fraction of a bound on the standard error at which enough samples were taken.
+const ACCURATE: f64 = 0.5;
 
 /// Photon targets: a distant sphere, two overlapping spheres, and a sphere that contains most lights.
 fn targets() -> [BoundingSphere; 4] {
@@ -201,14 +236,16 @@ fn targets() -> [BoundingSphere; 4] {
 
 #[test]
 fn mean_flux_equals_power_for_any_aimed_fraction() {
-    for (light, shape, power) in lights().into_iter().chain(sky_lights()) {
+    for (light, shape, power) in LIGHTS.iter().chain(&*SKY_LIGHTS) {
+        let (light, power) = (light.clone(), *power);
         let plain = source_of(light.clone(), shape.as_ref());
         for (targets, share) in [(&targets()[..], 0.5), (&targets()[..3], 0.9), (&targets()[..1], 0.3)] {
             let source = plain.clone().with_targets(targets, share);
             assert_eq!(source.aimed_probability(), share);
-            let found = mean(&source, 1 << 14, |photon| f64::from(photon.flux.y));
             let exact = power;
             let greatest_error = if share > 0.5 { 3e-3 } else { 1e-3 };
+            let is_accurate = |found: &MeanEstimate| found.error < ACCURATE * greatest_error * exact;
+            let found = mean_until(&source, 1 << 14, |photon| f64::from(photon.flux.y), is_accurate);
             assert!(found.error < greatest_error * exact, "{light:?} {share}: ± {}", found.error / exact);
             let off = (found.mean - exact).abs();
             assert!(off < 5.0 * found.error + 1e-4 * exact, "{light:?} {share}: {found:?}, not {exact}");
@@ -235,27 +272,24 @@ fn disk_contribution(photon: &EmittedPhoton, shape: Option<&Shape>) -> f64 {
     if is_met && is_free() { f64::from(photon.flux.y) / area } else { 0.0 }
 }
 
-/// Estimates the irradiance on the disk with light samples.
-fn sampled(light: &Light, count: u32) -> MeanEstimate {
+/// Estimates the irradiance on the disk with light samples, up to a relative standard error.
+fn sampled(light: &Light, max_error: f64) -> MeanEstimate {
     let normal = disk_normal().as_vec3();
     let Frame { s, t, .. } = Frame::from_normal(normal);
-    let groups = (0..GROUPS).map(|group| {
-        let one = |i: u32| {
-            let sampler = PixelSampler::new(4, group, 5, i);
-            let at = warp::disk(sampler.pair(1, Dimension::Lens)) * DISK.radius as f32;
-            let from = DISK.center.as_vec3() + s * at.x + t * at.y;
-            let sample = light.sample(from, normal, sampler.pair(1, Dimension::Light(0)).to_array());
-            sample.map_or(0.0, |sample| f64::from(sample.weight.y * sample.direction.dot(normal).max(0.0)))
-        };
-        (0..count).map(one).sum::<f64>() / f64::from(count)
-    });
-    MeanEstimate::of(&groups.collect::<Vec<_>>())
+    let one = |group: u32, i: u32| {
+        let sampler = PixelSampler::new(4, group, 5, i);
+        let at = warp::disk(sampler.pair(1, Dimension::Lens)) * DISK.radius as f32;
+        let from = DISK.center.as_vec3() + s * at.x + t * at.y;
+        let sample = light.sample(from, normal, sampler.pair(1, Dimension::Light(0)).to_array());
+        sample.map_or(0.0, |sample| f64::from(sample.weight.y * sample.direction.dot(normal).max(0.0)))
+    };
+    estimate_mean(1 << 12, one, |found| found.error < max_error * found.mean)
 }
 
 #[track_caller]
 fn assert_same_irradiance(name: &str, light: &Light, source: &PhotonEmitter, shape: Option<&Shape>) {
-    let expected = sampled(light, 1 << 12);
     let greatest_error = if light.emission_modulation().is_some() { 5e-3 } else { 3e-3 };
+    let expected = sampled(light, 0.3 * greatest_error);
     assert!(expected.mean > 0.0, "{name}");
     let around = BoundingSphere { radius: DISK.radius * 1.001, ..DISK };
     let beside = BoundingSphere { center: DISK.center + DVec3::new(0.1, 0.0, 0.05), radius: 0.15 };
@@ -263,7 +297,10 @@ fn assert_same_irradiance(name: &str, light: &Light, source: &PhotonEmitter, sha
     let ways = [(0.0, 1 << 13, 0.12), (0.9, 1 << 14, greatest_error)];
     for (share, count, greatest_error) in ways {
         let source = source.clone().with_targets(&others, share);
-        let found = mean(&source, count, |photon| disk_contribution(photon, shape));
+        let is_accurate = |found: &MeanEstimate| {
+            found.error.hypot(expected.error) < ACCURATE * greatest_error * expected.mean
+        };
+        let found = mean_until(&source, count, |photon| disk_contribution(photon, shape), is_accurate);
         let error = found.error.hypot(expected.error);
         let ratio = found.mean / expected.mean;
         println!("{name:.40} {share}: {ratio:.5} ± {:.5}", error / expected.mean);
@@ -275,12 +312,12 @@ fn assert_same_irradiance(name: &str, light: &Light, source: &PhotonEmitter, sha
 
 #[test]
 fn photon_irradiance_matches_light_sampling() {
-    for (light, shape, _) in lights().into_iter().chain(sky_lights()) {
+    for (light, shape, _) in LIGHTS.iter().chain(&*SKY_LIGHTS) {
         if matches!(light, Light::Spot(_)) {
             continue;
         }
         let source = source_of(light.clone(), shape.as_ref());
-        assert_same_irradiance(&format!("{light:?}"), &light, &source, shape.as_ref());
+        assert_same_irradiance(&format!("{light:?}"), light, &source, shape.as_ref());
     }
     // Aim spotlights to put the disk in the fading part of the cone.
     for (degrees, blend) in [(70.0_f64, 0.0), (40.0, 0.9), (200.0, 1.0)] {
@@ -297,9 +334,9 @@ fn photon_irradiance_matches_light_sampling() {
 fn photons_from_one_light_carry_its_power() {
     // The flux of photons from transformed shapes varies.
     let is_transformed = |shape: &Option<Shape>| matches!(shape, Some(Shape::Transformed(_)));
-    for (light, shape, power) in lights().into_iter().filter(|(_, shape, _)| !is_transformed(shape)) {
+    for (light, shape, power) in LIGHTS.iter().filter(|(_, shape, _)| !is_transformed(shape)) {
         let source = source_of(light.clone(), shape.as_ref());
-        let power = COLOR.as_dvec3() * power;
+        let power = COLOR.as_dvec3() * *power;
         let told = source.total_light_power().as_dvec3();
         assert!((told / power - 1.0).abs().max_element() < 1e-5, "{light:?}: {told} instead of {power}");
         let mut next = numbers(random::unit_generator(1));

@@ -7,7 +7,8 @@ use crate::choice::Choice;
 use crate::materials::bsdf::LobesToSample;
 use crate::materials::bxdfs::lane_tests::check_lane_independence;
 use crate::materials::bxdfs::lobe_tests::{
-    ALPHAS, COSINES, TestSurface, check_beckmann_values, check_values, spherical_direction,
+    ALPHAS, COSINES, TestSurface, check_beckmann_values, check_values, estimate_close_to_exact,
+    spherical_direction,
 };
 use crate::materials::bxdfs::reference_tests::{reference_beckmann_brdf, reference_microfacet_brdf};
 use crate::math::DVec3;
@@ -95,8 +96,9 @@ fn beckmann_albedos_match_quadrature() {
             let at = spherical_direction(cosine, 0.3);
             let white = ConductorPoint { fresnel: FresnelPoint::from_schlick(Vec3::ONE), alphas };
             let subject = TestSurface::<ConductorBxdf<true, true>>::new(&white, alphas, at);
-            let sampled = subject.sampled_albedo(192).x;
             let exact = subject.reference_albedo(|o, i| reference_beckmann_brdf(o, i, alphas.map(f64::from)));
+            let is_close = |sampled: &f64| (sampled - exact).abs() < 5e-4 && *sampled < 1.0 + 5e-6;
+            let sampled = estimate_close_to_exact(192, |side| subject.sampled_albedo(side).x, is_close);
             let what = format!("α {alphas:?} at a cosine of {cosine}: {sampled} instead of {exact}");
             assert!((sampled - exact).abs() < 1e-3, "{what}");
             assert!(sampled < 1.0 + 1e-5, "{what}");
@@ -147,7 +149,11 @@ fn sampled_albedos_match_quadrature() {
                     alphas,
                     spherical_direction(cosine, 0.3),
                 );
-                let (sampled, exact) = (subject.sampled_albedo(192), subject.albedo());
+                let exact = subject.albedo();
+                let is_close = |sampled: &DVec3| {
+                    (*sampled - exact).abs().max_element() < 5e-4 && sampled.max_element() < 1.0 + 5e-4
+                };
+                let sampled = estimate_close_to_exact(192, |side| subject.sampled_albedo(side), is_close);
                 let what = format!("α {alphas:?} at a cosine of {cosine}: {sampled} instead of {exact}");
                 assert!((sampled - exact).abs().max_element() < 1e-3, "{what}");
                 assert!(sampled.max_element() < 1.0 + 1e-3, "{what}");

@@ -4,7 +4,8 @@ use super::*;
 use crate::materials::bsdf::LobesToSample;
 use crate::materials::bxdfs::lane_tests::check_lane_independence;
 use crate::materials::bxdfs::lobe_tests::{
-    ALPHAS, COSINES, TestSurface, check_beckmann_values, check_values, spherical_direction,
+    ALPHAS, COSINES, TestSurface, check_beckmann_values, check_values, estimate_close_to_exact,
+    spherical_direction,
 };
 use crate::materials::bxdfs::reference_tests::{reference_beckmann_brdf, reference_microfacet_brdf};
 use crate::materials::lookup::WhiteLookup;
@@ -87,6 +88,11 @@ fn samples_follow_the_pdf() {
     }
 }
 
+/// Whether the albedo of a white surface is within half of the bounds below.
+fn is_close_to_one(furnace: &f64) -> bool {
+    (-1e-3..2.5e-4).contains(&(furnace - 1.0))
+}
+
 #[test]
 fn white_furnace_and_albedos_match_quadrature() {
     for (alpha, ior) in ALPHAS.into_iter().flat_map(|alpha| [1.0, 1.33, 1.5, 2.5].map(|ior| (alpha, ior))) {
@@ -95,12 +101,15 @@ fn white_furnace_and_albedos_match_quadrature() {
             let white = point(&plastic(Vec3::ONE, 1.0, ior, alpha));
             let subject =
                 TestSurface::<PlasticBxdf<false>>::new(&white, [alpha; 2], spherical_direction(cosine, 0.3));
-            let furnace = subject.sampled_albedo(192).x;
+            let furnace =
+                estimate_close_to_exact(192, |side| subject.sampled_albedo(side).x, is_close_to_one);
             assert!((-2e-3..5e-4).contains(&(furnace - 1.0)), "{what}: white plastic reflects {furnace}");
             let red = point(&plastic(RED, 1.0, ior, alpha));
             let subject =
                 TestSurface::<PlasticBxdf<false>>::new(&red, [alpha; 2], spherical_direction(cosine, 0.3));
-            let (sampled, exact) = (subject.sampled_albedo(192), subject.albedo());
+            let exact = subject.albedo();
+            let is_close = |sampled: &DVec3| (*sampled - exact).abs().max_element() < 5e-4;
+            let sampled = estimate_close_to_exact(192, |side| subject.sampled_albedo(side), is_close);
             assert!((sampled - exact).abs().max_element() < 1e-3, "{what}: {sampled} instead of {exact}");
         }
     }
@@ -130,7 +139,8 @@ fn white_beckmann_plastic_reflects_all_light() {
             let white = point(&beckmann(Vec3::ONE, 1.0, ior, alpha));
             let at = spherical_direction(cosine, 0.3);
             let subject = TestSurface::<PlasticBxdf<true>>::new(&white, [alpha; 2], at);
-            let furnace = subject.sampled_albedo(128).x;
+            let furnace =
+                estimate_close_to_exact(128, |side| subject.sampled_albedo(side).x, is_close_to_one);
             assert!((-2e-3..5e-4).contains(&(furnace - 1.0)), "{what}: white plastic reflects {furnace}");
             // The coat's albedo, compared with a quadrature of its formula.
             let exact = subject.reference_albedo(|o, i| {

@@ -5,7 +5,7 @@ use super::*;
 use crate::materials::bsdf::LobesToSample;
 use crate::materials::bxdfs::lane_tests::{check_lane_independence, check_lane_independence_with};
 use crate::materials::bxdfs::lobe_tests::{
-    ALPHAS, COSINES, NarrowLightPath, TestSurface, check_values, spherical_direction,
+    ALPHAS, COSINES, NarrowLightPath, TestSurface, check_values, estimate_close_to_exact, spherical_direction,
 };
 use crate::materials::bxdfs::reference_tests::reference_microfacet_brdf;
 use crate::materials::lookup::WhiteLookup;
@@ -108,6 +108,11 @@ fn samples_follow_the_pdf() {
     }
 }
 
+/// Whether an albedo is within half of the bounds below.
+fn is_close(sampled: DVec3, exact: DVec3) -> bool {
+    (sampled - exact).abs().max_element() < 5e-4 && sampled.max_element() < 1.0 + 2.5e-4
+}
+
 #[test]
 fn albedos_match_quadrature_and_stay_below_1() {
     for (alpha, metallic) in subjects() {
@@ -119,7 +124,12 @@ fn albedos_match_quadrature_and_stay_below_1() {
                     [alpha; 2],
                     spherical_direction(cosine, 0.3),
                 );
-                let (sampled, exact) = (subject.sampled_albedo(192), subject.albedo());
+                let exact = subject.albedo();
+                let sampled = estimate_close_to_exact(
+                    192,
+                    |side| subject.sampled_albedo(side),
+                    |sampled| is_close(*sampled, exact),
+                );
                 let what = format!(
                     "α {alpha}, metallic {metallic} at a cosine of {cosine}: {sampled} instead of {exact}"
                 );
@@ -292,11 +302,19 @@ fn two_sided_albedos_match_quadrature() {
                 NarrowLightPath::Through,
             );
             let front = TestSurface::<PrincipledBxdf<false>>::new(&point, [alpha; 2], at);
-            let sampled = match transmission {
-                "leaf" => front.lobe_stratified_albedo(128) + behind.lobe_stratified_albedo(128),
-                _ => front.sampled_albedo(192) + behind.sampled_albedo(192),
-            };
             let exact = front.albedo() + behind.albedo();
+            let sampled = match transmission {
+                "leaf" => estimate_close_to_exact(
+                    128,
+                    |side| front.lobe_stratified_albedo(side) + behind.lobe_stratified_albedo(side),
+                    |sampled| is_close(*sampled, exact),
+                ),
+                _ => estimate_close_to_exact(
+                    192,
+                    |side| front.sampled_albedo(side) + behind.sampled_albedo(side),
+                    |sampled| is_close(*sampled, exact),
+                ),
+            };
             let what =
                 format!("α {alpha}, metallic {metallic}, {transmission} at {cosine}: {sampled}, {exact}");
             assert!((sampled - exact).abs().max_element() < 1e-3, "{what}");

@@ -66,7 +66,7 @@ fn glossy_samples_follow_the_pdf() {
                     let offset = (direction - lobes.mirrored_eye).as_dvec3();
                     let cosine = 1.0 - 0.5 * offset.length_squared();
                     // cos^(α + 1) and the azimuth are uniformly distributed.
-                    let power = libm::pow(cosine.max(0.0), n - 1.0);
+                    let power = cosine.max(0.0).powf(n - 1.0);
                     let ring = (power * cosine * 16.0) as usize;
                     let phi = frame.t.dot(direction).atan2(frame.s.dot(direction)) / (2.0 * PI) + 0.5;
                     counts[ring.min(15) * 16 + ((phi * 16.0) as usize).min(15)] += 1;
