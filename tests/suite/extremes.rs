@@ -211,7 +211,7 @@ fn bundled_scenes_do_not_depend_on_threads() {
         let dir = TestDir::new();
         let path = scene.display();
         for integrator in ["whitted", "path"] {
-            for threads in [1, 2, 7] {
+            for threads in [1, 5] {
                 let size = format!("--width 40 --height 30 --samples 3 --integrator {integrator}");
                 let outputs = format!("-o {threads}.png -o {threads}.exr");
                 let report = dir.report(&format!("{path} {size} {outputs} --threads {threads}"));
@@ -220,10 +220,7 @@ fn bundled_scenes_do_not_depend_on_threads() {
             }
             for ending in ["png", "exr"] {
                 let picture = |threads: u32| dir.bytes(&format!("{threads}.{ending}"));
-                assert!(
-                    picture(1) == picture(2) && picture(1) == picture(7),
-                    "{path} .{ending} with {integrator}"
-                );
+                assert!(picture(1) == picture(5), "{path} .{ending} with {integrator}");
             }
         }
         let check = dir.run(&format!("check {path}"));

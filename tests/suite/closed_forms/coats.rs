@@ -104,7 +104,7 @@ fn photons_match_path_on_coated_surfaces() {
         .quad(v(-0.5, 1.9, -0.5), v(1.0, 0.0, 0.0), v(0.0, 0.0, 1.0), emitter(4.0))
         .pictured(v(0.0, 1.0, 3.5), v(0.2, 0.6, -0.9), 30.0, 12, 12);
     for depth in [2, 3] {
-        let means = path_and_photon_means(&room.clone().depth(depth), depth, [144, 9], (20_000, 0.05));
+        let means = path_and_photon_means(&room.clone().depth(depth), depth, [96, 6], (20_000, 0.05));
         assert_same_light(&format!("depth {depth}"), means, 1e-2, 4e-3);
     }
 }

@@ -107,7 +107,7 @@ fn two_plates_exchange_light() {
     };
     for (at, exact) in [(0.0, 5.0 / 3.0), (1.0, 4.0 / 3.0)] {
         // Four standard errors are at most 0.1 %.
-        let values = path_traced(plates(at), 100).values(16384, 96);
+        let values = path_traced(plates(at), 100).values(16384, 48);
         assert_mean("plates", &values, exact, 2.5e-4);
         assert!((mean_and_error(&values).0 - exact).abs() <= 1e-3 * exact);
     }

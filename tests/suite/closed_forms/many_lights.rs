@@ -181,8 +181,8 @@ fn mesh_light_matches_separate_triangles() {
         mesh.world().lights.sampler_for_purpose(LightSamplingPurpose::Eye).is_none(),
         "a mesh must be a single light"
     );
-    assert_same("whitted", &mesh.clone().shadows(ShadowMode::Soft, 8), &alone, (64, 16), 3e-3);
-    assert_same("path", &path_traced(mesh, 2), &path_traced(alone, 2), (64, 24), 6e-3);
+    assert_same("whitted", &mesh.clone().shadows(ShadowMode::Soft, 8), &alone, (32, 16), 3e-3);
+    assert_same("path", &path_traced(mesh, 2), &path_traced(alone, 2), (32, 24), 6e-3);
 }
 
 #[test]

@@ -166,8 +166,8 @@ fn whitted_with_photons_matches_path() {
             .quad(v(-2.0, -0.1, 2.0), v(4.0, 0.0, 0.0), v(0.0, 0.0, -4.0), with_opacity(matte(0.8), 0.5))
     });
     let lit = lit.depth(4);
-    let photons = mean_and_error(&lit.clone().photons(6_000, 0.04).values(16, 48));
-    assert_same_mean("photons", photons, mean_and_error(&path(lit).values(1024, 64)), 0.025);
+    let photons = mean_and_error(&lit.clone().photons(6_000, 0.04).values(16, 20));
+    assert_same_mean("photons", photons, mean_and_error(&path(lit).values(1024, 26)), 0.025);
 }
 
 #[test]

@@ -148,7 +148,7 @@ fn photons_match_path_with_black_backs() {
         .quad(v(-0.5, 1.4, -0.5), v(1.0, 0.0, 0.0), v(0.0, 0.0, 1.0), emitter(4.0))
         .pictured(v(0.0, 0.9, 3.0), v(0.0, 0.4, 0.0), 36.0, 12, 12);
     for depth in [2, 4] {
-        let means = path_and_photon_means(&room.clone().depth(depth), depth, [128, 16], (10_000, 0.04));
+        let means = path_and_photon_means(&room.clone().depth(depth), depth, [48, 6], (10_000, 0.04));
         assert_same_light(&format!("depth {depth}"), means, 1.2e-2, 4e-3);
     }
 }

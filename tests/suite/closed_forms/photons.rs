@@ -184,8 +184,8 @@ fn photons_match_path_at_every_depth() {
 
 #[test]
 fn photons_match_path_with_light_in_glass() {
-    for depth in [2, 3, 6] {
-        let means = path_and_photon_means(&only_caustics(depth), depth, [128, 16], (10_000, 0.01));
+    for (depth, passes) in [(2, 8), (3, 13), (6, 11)] {
+        let means = path_and_photon_means(&only_caustics(depth), depth, [128, passes], (10_000, 0.01));
         assert_same_light(&format!("depth {depth}"), means, 1e-2, 3e-3);
     }
 }

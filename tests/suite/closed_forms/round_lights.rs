@@ -77,7 +77,7 @@ pub fn assert_same(shape: &Shape) {
     }
     assert!(exact > 0.01, "{shape:?} too dim: {exact}");
     for (samples, shadow_samples) in [(1024, 1), (64, 16)] {
-        let values = lit(shape).shadows(ShadowMode::Soft, shadow_samples).values(samples, 64);
+        let values = lit(shape).shadows(ShadowMode::Soft, shadow_samples).values(samples, 22);
         let (mean, error) = super::mean_and_error(&values);
         let (mean, error) = (mean * PI / 0.7, error * PI / 0.7);
         assert!(error < 2e-4 * exact, "{shape:?}: too noisy: {error}");

@@ -315,6 +315,20 @@ impl Build {
         World::new(&self.scene, &parts, geometry, lights)
     }
 
+    /// Values of the only pixel seen from each position toward the origin, with one sample. Geometry and lights
+    /// are built only once.
+    pub fn values_from(&self, positions: &[DVec3]) -> Vec<f64> {
+        let mut build = self.clone().seen(positions[0], DVec3::ZERO);
+        let (first, settings) = (build.world(), build.settings(0));
+        let rect = Rect { x: 0, y: 0, width: 1, height: 1 };
+        let value = |&position: &DVec3| {
+            build.scene.camera = look_at(position, DVec3::ZERO, NARROW);
+            let (geometry, lights) = (Arc::clone(&first.geometry), Arc::clone(&first.lights));
+            tile(&World::new(&build.scene, &build.parts, geometry, lights), &settings, rect, 1)[0].x
+        };
+        positions.iter().map(value).collect()
+    }
+
     pub fn settings(&self, seed: u32) -> RenderSettings {
         let render = RenderOptions { seed, ..self.scene.render };
         let PhotonOptions { enabled, count, radius, bounces } = self.scene.photons;

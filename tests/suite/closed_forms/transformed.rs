@@ -93,7 +93,7 @@ fn shapes_and_meshes() -> [(&'static str, Shape, TriangleMesh, AffineMap); 3] {
 #[track_caller]
 fn assert_same_image_mean(what: &str, scenes: [Build; 2], noise: f64) {
     let [(a, error_a), (b, error_b)] = scenes.map(|build| {
-        mean_and_error(&build.pictured(v(1.5, 2.0, 4.0), DVec3::ZERO, 30.0, 24, 18).mean_reds(2))
+        mean_and_error(&build.pictured(v(1.5, 2.0, 4.0), DVec3::ZERO, 30.0, 24, 18).mean_reds(1))
     });
     let error = error_a.hypot(error_b);
     assert!(error < noise * a, "{what}: too noisy: {a} ± {error}");
