@@ -58,8 +58,8 @@
 //! 2. `tui/run.rs` takes the change from the queue (`tui/event.rs`), and `tui/update/mod.rs` updates the state.
 //! 3. `tui/update/request.rs` creates a request, and `tui/run.rs` sends it. The header (`tui/view/header.rs`)
 //!    changes first: it is redrawn as in step 9 and shows that a render is running.
-//! 4. `pipeline/worker.rs` holds at most one pending request in its mailbox. A newer request cancels the
-//!    current render.
+//! 4. `pipeline/worker/mailbox.rs` holds at most one pending request. A newer request cancels the current
+//!    render.
 //! 5. `pipeline/session/request.rs` runs the steps of the request. The first is
 //!    `pipeline/session/preparation.rs`: it reads the scene with `pipeline/prepare/mod.rs`
 //!    (`pipeline/stages/parse.rs`, `pipeline/plan.rs`, then meshes, textures and glass), and builds its world

@@ -3,8 +3,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 
-use super::imports::{Module, Modules};
-use super::{all_sources, root};
+use super::imports::Module;
+use super::{all_modules, root};
 
 /// Pairs of files that may import each other, each with the reason.
 const PAIRS: [(&str, &str, &str); 9] = [
@@ -38,14 +38,6 @@ const PAIRS: [(&str, &str, &str); 9] = [
     ("world/geometry", "world/isolated", "the geometry stores its isolated surfaces"),
     ("world/mesh_instance", "world/mesh_packet", "packets and single hits share interpolation code"),
 ];
-
-/// All source files with their imports.
-fn all_modules() -> Modules {
-    Modules::new(all_sources().into_iter().map(|(file, path)| {
-        let path = path.to_str().expect("UTF-8").to_owned();
-        (path, fs::read_to_string(&file).expect("a source file"))
-    }))
-}
 
 /// Import cycles within a module: groups of files that reach each other through imports.
 fn cycles() -> Vec<Vec<String>> {

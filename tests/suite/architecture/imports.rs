@@ -43,6 +43,11 @@ impl Modules {
         self.texts.keys()
     }
 
+    /// Whether a file, given as a path like in [`Modules::new`], is compiled without tests.
+    pub(super) fn is_production(&self, path: &str) -> bool {
+        self.texts.contains_key(&module(path))
+    }
+
     /// Modules that a module imports or names in its code, except its ancestors, whose items it may always
     /// use.
     pub(super) fn used_by(&self, module: &Module) -> BTreeSet<Module> {

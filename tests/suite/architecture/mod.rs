@@ -2,10 +2,13 @@
 
 mod cycles;
 mod imports;
+mod lengths;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
+
+use imports::Modules;
 
 /// The modules that each top-level module may use, from the `text` block in `src/lib.rs`.
 fn dependencies() -> BTreeMap<String, BTreeSet<String>> {
@@ -50,6 +53,14 @@ fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
             found.push(path);
         }
     }
+}
+
+/// All source files with their imports.
+fn all_modules() -> Modules {
+    Modules::new(all_sources().into_iter().map(|(file, path)| {
+        let path = path.to_str().expect("UTF-8").to_owned();
+        (path, fs::read_to_string(&file).expect("a source file"))
+    }))
 }
 
 /// Every module that the code, excluding comments, refers to as `crate::module`.

@@ -110,7 +110,7 @@ fn sphere_cosine_deviations(shape: &Shape, from: Vec3) -> (f64, f64) {
     let around = shape.bounds().expect("expected a finite shape");
     let reach = around.extent().length() * 0.5 / (around.center() - from).length();
     let one_minus_cos = if reach < 0.9 { 1.02 * (1.0 - (1.0 - reach * reach).sqrt()) } else { 2.0 };
-    let n = 10_000;
+    let n = 20_000;
     for i in 0..n {
         let u = [(i as f32 + 0.5) / n as f32, (f64::from(i) * 0.618_033_988_75).fract() as f32];
         let direction = frame.to_world(crate::sampling::warp::cone(u, one_minus_cos));
@@ -125,7 +125,7 @@ fn sphere_cosine_deviations(shape: &Shape, from: Vec3) -> (f64, f64) {
     let Some(towards) = sum.try_normalize() else { return (0.0, 0.0) };
     let ball = Shape::Sphere(Sphere { center: from.as_dvec3() + towards.as_dvec3(), radius });
     (
-        mean_and_relative_deviation(&irradiance_samples(&light_from_shape(&ball), from, 10_000)).1,
+        mean_and_relative_deviation(&irradiance_samples(&light_from_shape(&ball), from, 20_000)).1,
         mean_and_relative_deviation(&cosines).1,
     )
 }

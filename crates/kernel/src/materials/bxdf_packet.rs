@@ -4,38 +4,13 @@ use super::bsdf::{BsdfValues, DielectricSamplePacket, LobesToSample, NarrowLobe,
 use super::bxdf::{Bxdf, BxdfFlags, LobesWithNormal, ShadingGeometry};
 use super::microfacet::tilt_to_face_viewer_branchless;
 use super::rough_dielectric::DielectricBxdf;
+use super::shown_lobe_factors::{LobeFactorsPacket, ShownLobeFactors};
 use super::texture::Texture;
 use crate::math::Vec3;
 use crate::math::lanes::{
     F32x16, Mask, PACKET_SIZE, Simd, SimdKernel, TRUE, Vec3x16, lane, mask_from_bits, set_lane,
 };
 use crate::math::soa::Soa;
-use glimt_base::soa;
-
-soa! {
-    /// Factors that select which lobes an image shows.
-    pub struct ShownLobeFactors in LobeFactorsPacket {
-        /// Factor for the wide lobes: 1 if they are shown, and 0 if they are hidden.
-        wide: f32 = 0.0,
-        /// Factor for the narrow lobes: 1 if they are shown, and 0 if they are hidden.
-        narrow: f32 = 0.0,
-        /// Value of f in sr⁻¹ that is shown instead of the lobes.
-        unit: f32 = 0.0,
-    }
-}
-
-impl From<ShownLobes> for ShownLobeFactors {
-    #[inline(always)]
-    fn from(shown: ShownLobes) -> Self {
-        let factor = |is_shown: bool| if is_shown { 1.0 } else { 0.0 };
-        match shown {
-            ShownLobes::Of { diffuse, specular } => {
-                Self { wide: factor(diffuse), narrow: factor(specular), unit: 0.0 }
-            }
-            ShownLobes::Unit => Self { wide: 0.0, narrow: 0.0, unit: 1.0 },
-        }
-    }
-}
 
 /// A packet of BSDFs.
 #[derive(Clone, Debug)]

@@ -20,6 +20,7 @@ pub mod normal_perturbation;
 pub mod opacity;
 pub mod scalar;
 pub mod schlick_albedo;
+mod shown_lobe_factors;
 pub mod specular_over_base;
 pub mod texels;
 pub mod texture;

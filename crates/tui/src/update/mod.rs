@@ -1,6 +1,7 @@
 //! The update function, which modifies the state and returns effects. It has no side effects of its own.
 
 mod camera;
+mod diagnostics;
 mod edit_position;
 mod history;
 mod keys;
@@ -12,6 +13,7 @@ mod replies;
 mod request;
 mod views;
 mod worker;
+mod written_files;
 
 use std::time::{Duration, Instant};
 
@@ -92,10 +94,10 @@ fn handle_event(state: &mut State, event: Event) -> Vec<Effect> {
             effects
         }
         Event::Settled => {
-            worker::show_withheld_errors(state);
+            diagnostics::show_withheld_errors(state);
             Vec::new()
         }
-        Event::OutputChanged(change) => worker::handle_external_output_change(state, &change),
+        Event::OutputChanged(change) => written_files::handle_external_output_change(state, &change),
         Event::Signal(signal) => vec![signal_effect(signal)],
         Event::FirstPreviewSent { generation } => {
             // The preview has been sent, so the history can be updated now.
@@ -217,7 +219,7 @@ fn handle_lost_event_source(state: &mut State, source: RequiredEventSource) -> V
     match source {
         RequiredEventSource::Worker => vec![Effect::GiveUp],
         RequiredEventSource::Watcher => {
-            worker::show_withheld_errors(state);
+            diagnostics::show_withheld_errors(state);
             show_until_key(state, messages::NOT_WATCHING);
             Vec::new()
         }

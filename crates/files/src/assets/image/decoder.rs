@@ -12,10 +12,12 @@ use ::image::{ColorType, ImageDecoder, ImageError, ImageFormat, ImageReader, Lim
 
 use super::exr::ExrDecoder;
 use super::hdr::HdrDecoder;
+use super::messages::{
+    empty_image_message, implausible_size_message, memory_limit_message, side_too_long_message,
+};
 use super::metadata::{AlphaInterpretation, ImageColorMetadata};
 use super::png::PngDecoder;
 use super::{ColorEncoding, ImageLimits, tga};
-use super::{empty_image_message, implausible_size_message, memory_limit_message, side_too_long_message};
 
 /// A decoder, with metadata that the decoder itself does not apply.
 pub(super) struct ImageDecoderWithMetadata {

@@ -3,6 +3,10 @@ use std::sync::Mutex;
 
 use ::image::{ExtendedColorType, save_buffer};
 
+use super::messages::{
+    EMPTY_FILE, empty_image_message, implausible_size_message, memory_limit_message, side_too_long_message,
+    undecodable_image_message, unknown_format_message,
+};
 use super::metadata::profile_ignored_warning;
 use super::*;
 use crate::assets::rejection;

@@ -3,7 +3,8 @@
 
 use std::ops::Range;
 
-use super::all_lights::{LightSums, SampleAllLights, add_masked_lane_products, add_masked_lanes};
+use super::all_lights::SampleAllLights;
+use super::light_sums::{LightSums, add_masked_lane_products, add_masked_lanes};
 use super::mis::CompetingTechnique;
 use super::shadow_rays::ShadowRayQueue;
 use crate::geometry::packet::set_bit_lanes;

@@ -1,6 +1,7 @@
 //! Rays in narrow lobes, which complement light samples.
 
-use super::all_lights::{ReflectedDirectLightPacket, add_traversal_cost};
+use super::all_lights::add_traversal_cost;
+use super::light_sums::ReflectedDirectLightPacket;
 use super::unshadowed::LobeRayWithoutSoftShadows;
 use crate::geometry::packet::{RayPacket, set_bit_lanes};
 use crate::integrators::transport::batch::{BsdfValuesAndCosines, VertexBatch};

@@ -2,7 +2,8 @@
 
 use std::ops::Range;
 
-use super::all_lights::{LightSums, ReflectedDirectLightPacket, SampleAllLights};
+use super::all_lights::SampleAllLights;
+use super::light_sums::{LightSums, ReflectedDirectLightPacket};
 use super::lobe_rays::LobeRayTracingKernel;
 use super::mis::CompetingTechnique;
 use super::shadow_lift::ShadowOriginLiftKernel;

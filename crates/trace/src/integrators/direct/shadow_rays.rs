@@ -1,9 +1,8 @@
 //! Shadow rays from many vertex packets, regrouped by light. Rays to nearby lights visit the same bounding
 //! boxes, whereas the rays of one packet diverge.
 
-use super::all_lights::{
-    LightSums, add_masked_lane_products, add_masked_lanes, convert_transmittance_for_aov,
-};
+use super::all_lights::convert_transmittance_for_aov;
+use super::light_sums::{LightSums, add_masked_lane_products, add_masked_lanes};
 use crate::geometry::packet::{F32x16, RayPacket, set_bit_lanes};
 use crate::integrators::transport::tile::TileContext;
 use crate::integrators::view::PathAov;

@@ -11,7 +11,7 @@ use crate::math::lanes::lane;
 use crate::scene::description::ShadowMode;
 use crate::world::{Hit, MAX_NULL_INTERACTIONS};
 
-use super::all_lights::DirectLightCounters;
+use super::light_sums::DirectLightCounters;
 
 /// A ray in a vertex's narrow lobe, and the pdf of its direction.
 pub struct LobeRayWithoutSoftShadows<'a> {

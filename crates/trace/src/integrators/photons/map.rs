@@ -1,6 +1,8 @@
 //! A photon map: photons sorted into the cells of a hashed grid. Because of the hashing, the cells can be as
 //! small as the radius requires. Lookups weight sixteen photons at a time.
 
+mod cells;
+
 use super::packed::{self, PackedDirectionPacket};
 use super::reservoir::{PhotonPositionAndNormal, ReservoirPacket};
 use crate::control::{CancelToken, Canceled};
@@ -8,6 +10,7 @@ use crate::geometry::Aabb;
 use crate::geometry::packet::set_bit_lanes;
 use crate::math::Vec3;
 use crate::math::lanes::{F32x16, Mask, PACKET_SIZE, Simd, TRUE, Vec3x16, lane, set_lane};
+use cells::{CELL, blocks_covering_photon_range, bucket_of_cell, cell_of};
 
 /// A photon stored on a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -68,10 +71,6 @@ pub(super) const MIN_COSINE: f32 = 0.7;
 /// Maximum distance of photons from the tangent plane, in radii.
 pub(super) const MAX_PLANE_DISTANCE: f32 = 0.3;
 
-/// Cell size in radii: larger than the bounding box of any kernel, 2·√(1 + MAX_PLANE_DISTANCE²), so that a
-/// kernel overlaps at most two cells along each axis.
-const CELL: f32 = 2.1;
-
 /// A query for photons near a surface point.
 #[derive(Clone, Copy, Debug)]
 pub struct GatherPoint {
@@ -96,37 +95,6 @@ impl GatherPoint {
         let own = self.normal.abs();
         let along = (Vec3::ONE - own * own).max(Vec3::ZERO);
         Vec3::new(along.x.sqrt(), along.y.sqrt(), along.z.sqrt()) + own * MAX_PLANE_DISTANCE
-    }
-}
-
-/// Disjoint ranges of photons that together cover a kernel.
-struct KernelPhotonRanges {
-    of: [[u32; 2]; 8],
-    count: usize,
-}
-
-impl KernelPhotonRanges {
-    /// Adds a range and merges it with any overlapping ranges, because columns of different cells may have
-    /// the same hash.
-    #[inline(always)]
-    fn merge_range(&mut self, mut range: [u32; 2]) {
-        if range[0] == range[1] {
-            return;
-        }
-        let mut i = 0;
-        while i < self.count {
-            let other = self.of[i];
-            if range[0] <= other[1] && other[0] <= range[1] {
-                range = [range[0].min(other[0]), range[1].max(other[1])];
-                self.count -= 1;
-                self.of[i] = self.of[self.count];
-                i = 0;
-            } else {
-                i += 1;
-            }
-        }
-        self.of[self.count] = range;
-        self.count += 1;
     }
 }
 
@@ -303,34 +271,6 @@ impl PhotonMap {
         2.0 / (std::f32::consts::PI * (self.radius * self.radius))
     }
 
-    /// Ranges that may contain photons within a kernel.
-    #[inline(always)]
-    fn candidate_ranges(&self, look: &GatherPoint) -> KernelPhotonRanges {
-        let mut ranges = KernelPhotonRanges { of: [[0; 2]; 8], count: 0 };
-        if self.count == 0 {
-            return ranges;
-        }
-        let half = look.unit_kernel_half_extents() * self.radius;
-        let first = cell_of(look.point - half, self.cells);
-        let last = cell_of(look.point + half, self.cells);
-        let more = |axis: usize| u32::from(first[axis] != last[axis]);
-        let (columns, rows, run) = (more(1) + 1, more(2) + 1, more(0));
-        for row in 0..rows {
-            for column in 0..columns {
-                let (y, z) = (first[1].wrapping_add(column as i32), first[2].wrapping_add(row as i32));
-                let begin = bucket_of_cell(first[0], y, z, self.mask);
-                let end = begin + run;
-                if end <= self.mask {
-                    ranges.merge_range([self.starts[begin as usize], self.starts[end as usize + 1]]);
-                } else {
-                    ranges.merge_range([self.starts[begin as usize], self.starts[begin as usize + 1]]);
-                    ranges.merge_range([self.starts[0], self.starts[1]]);
-                }
-            }
-        }
-        ranges
-    }
-
     /// Weights of a block's photons that are in a range and within the kernel, relative to the kernel's value
     /// at the center, or `None` if there are no such photons.
     #[inline(always)]
@@ -403,12 +343,6 @@ impl PhotonBlock {
     }
 }
 
-/// Blocks that contain a nonempty range of photons.
-#[inline(always)]
-fn blocks_covering_photon_range([start, end]: [u32; 2]) -> std::ops::Range<usize> {
-    start as usize / PACKET_SIZE..(end as usize).div_ceil(PACKET_SIZE)
-}
-
 /// Mask of lanes with values above 0.
 #[inline(always)]
 fn positive_lane_mask(weights: &F32x16, simd: impl Simd) -> u32 {
@@ -431,109 +365,5 @@ fn sum_lanes(mut row: F32x16) -> f32 {
     (row[0] + row[2]) + (row[1] + row[3])
 }
 
-/// Cell that contains a point.
-#[inline(always)]
-fn cell_of(point: Vec3, cells: f32) -> [i32; 3] {
-    // `f32::floor` would be a function call. Coordinates out of range are clamped to the last cell.
-    let below = |x: f32| {
-        let whole = x as i32;
-        whole.wrapping_sub(i32::from(whole as f32 > x))
-    };
-    [below(point.x * cells), below(point.y * cells), below(point.z * cells)]
-}
-
-/// The bucket that contains a cell. Cells in a column have consecutive buckets.
-#[inline(always)]
-fn bucket_of_cell(x: i32, y: i32, z: i32, mask: u32) -> u32 {
-    let hash = (y as u32).wrapping_mul(0x9e37_79b1) ^ (z as u32).wrapping_mul(0x85eb_ca77).rotate_left(16);
-    (hash ^ hash >> 15).wrapping_mul(0x2c1b_3c6d).rotate_left(13).wrapping_add(x as u32) & mask
-}
-
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::math::lanes::PortableSimd;
-    use crate::math::random::signed_number_generator as random;
-
-    fn photon(point: Vec3, normal: Vec3) -> Photon {
-        Photon { point, direction: normal, flux: Vec3::ONE, normal, depth: 1 }
-    }
-
-    #[test]
-    fn lookups_match_brute_force() {
-        let mut next = random(5);
-        for count in [0, 1, 2, 3, 17, 3000] {
-            for radius in [1e-3_f32, 0.05, 0.4, 30.0] {
-                let place = |next: &mut dyn FnMut() -> f32| {
-                    let point = Vec3::new(next(), next(), 0.1 * next()) * 3.0;
-                    let normal = if next() > 0.0 { Vec3::Z } else { Vec3::new(0.6, 0.0, 0.8) };
-                    (point, normal)
-                };
-                let photons: Vec<Photon> =
-                    (0..count).map(|_| place(&mut next)).map(|(p, n)| photon(p, n)).collect();
-                let map = PhotonMap::new(&photons, radius, &CancelToken::new()).expect("never canceled");
-                assert_eq!(map.len(), count);
-                let mut seen = 0;
-                for look in 0..60 {
-                    let (point, normal) = match photons.get(7 * look) {
-                        // Query near one of the photons.
-                        Some(photon) => (
-                            photon.point + 0.1 * radius * Vec3::new(next(), next(), 0.1 * next()),
-                            photon.normal,
-                        ),
-                        None => place(&mut next),
-                    };
-                    let mut found = Vec::new();
-                    map.visit_weighted_photons(
-                        &GatherPoint { point, normal, max_depth: 1 },
-                        PortableSimd,
-                        |photon, density| {
-                            found.push((photon.point.to_array(), density));
-                        },
-                    );
-                    let near = |photon: &&Photon| {
-                        let way = photon.point - point;
-                        let above = way.dot(normal);
-                        let is_near = way.length_squared() - above * above < radius * radius;
-                        let is_flat = above.abs() < MAX_PLANE_DISTANCE * radius;
-                        is_near && is_flat && photon.normal.dot(normal) > MIN_COSINE
-                    };
-                    let mut expected: Vec<_> =
-                        photons.iter().filter(near).map(|photon| photon.point.to_array()).collect();
-                    let mut points: Vec<_> = found.iter().map(|(point, _)| *point).collect();
-                    points.sort_by(|a, b| a.partial_cmp(b).expect("numbers"));
-                    expected.sort_by(|a, b| a.partial_cmp(b).expect("numbers"));
-                    assert!(points.len().abs_diff(expected.len()) <= 1, "counts may differ by 1 at the edge");
-                    seen += expected.len();
-                    let peak = 2.0 / (std::f32::consts::PI * radius * radius);
-                    assert!(found.iter().all(|(_, density)| *density >= 0.0 && *density <= peak));
-                    points.dedup();
-                    assert_eq!(points.len(), found.len(), "each photon should be visited once");
-                    assert!(points.iter().filter(|point| !expected.contains(point)).count() <= 1);
-                }
-                assert!(seen >= count.min(60) / 8, "found {seen} of {count} photons within {radius}");
-            }
-        }
-    }
-
-    #[test]
-    fn kernel_sums_to_one_and_excludes_deep_photons() {
-        // Each photon on a fine grid represents one cell's area.
-        let step = 0.01_f32;
-        let at = |i: i32| (i as f32 + 0.3) * step;
-        let place = |i: i32| photon(Vec3::new(at(i % 200 - 100), 0.5, at(i / 200 - 100)), Vec3::Y);
-        let photons: Vec<Photon> = (0..40_000).map(place).collect();
-        let map = PhotonMap::new(&photons, 0.4, &CancelToken::new()).expect("never canceled");
-        let sum = |max_depth: u32, normal: Vec3| {
-            let mut sum = 0.0;
-            let look = GatherPoint { point: Vec3::new(0.1, 0.5, -0.2), normal, max_depth };
-            map.visit_weighted_photons(&look, PortableSimd, |_, density| sum += density * step * step);
-            let flux =
-                f64::from(map.irradiance_and_chosen_photon(&look, [0.5; 2], PortableSimd).0.x * step * step);
-            assert!((flux - f64::from(sum)).abs() < 1e-4, "got {flux}, expected {sum}");
-            sum
-        };
-        assert!((sum(1, Vec3::Y) - 1.0).abs() < 2e-3, "{}", sum(1, Vec3::Y));
-        assert_eq!((sum(0, Vec3::Y), sum(1, Vec3::NEG_Y)), (0.0, 0.0));
-    }
-}
+mod tests;

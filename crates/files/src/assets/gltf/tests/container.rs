@@ -95,7 +95,7 @@ fn image_errors_include_the_image_index() {
     check(0, "none.png");
     check(1, "damaged.png");
     check(2, "8 × 8");
-    check(4, &image::unknown_format_message());
+    check(4, &image::messages::unknown_format_message());
     assert!(container.check_image_decodes(3, &token).is_ok());
     assert!(
         container.check_image_header(1, &token).is_ok() && container.check_image_header(0, &token).is_err()

@@ -4,7 +4,7 @@ use ::image::{DynamicImage, ImageBuffer, Rgba};
 
 use super::*;
 use crate::assets::image::convert;
-use crate::assets::image::metadata::AlphaInterpretation;
+use crate::assets::image::metadata::{AlphaInterpretation, ImageColorMetadata};
 use crate::materials::Channel;
 use crate::math::Vec4;
 
