@@ -8,7 +8,7 @@ use glimt::materials::TexturePoint;
 use glimt::math::{DVec3, Vec2, Vec3};
 use glimt::scene::description::light::Falloff;
 use glimt::scene::description::{
-    ColorSource, Material, MaterialKind, PhongParameters, ShadowMode, Shape, TextureFilter, Wrap,
+    ColorSource, Material, MaterialKind, PhongParameters, ShadowMode, TextureFilter, Wrap,
 };
 
 use super::scenes::{Build, emitter, glass, lat_long_sphere, matte, mirror, phong, scene};

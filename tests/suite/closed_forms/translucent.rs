@@ -149,7 +149,7 @@ fn room() -> Build {
 #[test]
 fn photons_match_path_on_translucent_surfaces() {
     for depth in [2, 3, 5] {
-        let means = path_and_photon_means(&room().depth(depth), depth, [40, 4], (10_000, 0.05));
+        let means = path_and_photon_means(&room().depth(depth), depth, [96, 8], (10_000, 0.05));
         assert_same_light(&format!("depth {depth}"), means, 1.2e-2, 4e-3);
     }
 }
@@ -166,7 +166,7 @@ fn photons_scatter_to_both_sides() {
             .sphere(at, 0.75, glass(1.0))
             .pictured(v(0.0, 0.3, 3.5), v(0.0, 0.25, 0.0), 26.0, 8, 8)
             .depth(4);
-        let means = path_and_photon_means(&lit, 4, [384, 10], (10_000, 0.04));
+        let means = path_and_photon_means(&lit, 4, [192, 5], (10_000, 0.04));
         assert_same_light(name, means, 2e-2, 4e-3);
     }
 }
