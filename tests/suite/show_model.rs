@@ -326,7 +326,7 @@ fn interrupted_import_is_all_or_nothing() {
             let mut child = import.stderr(std::process::Stdio::piped()).spawn().expect("it runs");
             // Kill the process while it writes.
             while hidden() == 0 && child.try_wait().expect("a state").is_none() {
-                std::thread::sleep(std::time::Duration::from_micros(200));
+                std::thread::yield_now();
             }
             kill(Pid::from_raw(child.id() as i32), signal).expect("sent");
             child.wait_with_output().expect("its end")
