@@ -1,4 +1,5 @@
 use super::*;
+use crate::math::DVec4;
 
 /// Shapes of each kind, before and after a transform that mirrors them.
 fn shapes() -> Vec<Shape> {
@@ -31,13 +32,19 @@ fn untransformed_shapes() -> [Shape; 11] {
 
 const SIDE: u32 = 400;
 
-/// Integrates a function over the surface.
-fn integral(shape: &Shape, function: impl Fn(&SurfaceSample) -> f64) -> f64 {
-    let grid = |i: u32| Vec2::new((i % SIDE) as f32 + 0.5, (i / SIDE) as f32 + 0.5) / SIDE as f32;
+/// A regular grid over the unit square.
+fn grid(side: u32) -> impl Iterator<Item = Vec2> {
+    (0..side * side).map(move |i| Vec2::new((i % side) as f32 + 0.5, (i / side) as f32 + 0.5) / side as f32)
+}
+
+/// Integrates several functions over the surface.
+fn integrals(shape: &Shape, functions: impl Fn(&SurfaceSample) -> DVec4) -> DVec4 {
+    let side = 100;
     let over_part = |(part, area): (u32, f64)| {
-        let value = |place: SurfaceSample| function(&place) * shape.area_scale_for_world_normal(place.normal);
-        let sum: f64 = (0..SIDE * SIDE).map(|i| value(shape.sample_point_on_part(part, grid(i)))).sum();
-        sum * area / f64::from(SIDE * SIDE)
+        let values =
+            |place: SurfaceSample| functions(&place) * shape.area_scale_for_world_normal(place.normal);
+        let sum: DVec4 = grid(side).map(|u| values(shape.sample_point_on_part(part, u))).sum();
+        sum * area / f64::from(side * side)
     };
     (0..).zip(shape.local_part_areas()).map(over_part).sum()
 }
@@ -96,18 +103,19 @@ fn surfaces_match_with_and_without_uvs() {
 fn projected_area_integrates_the_cosines() {
     for shape in shapes().into_iter().filter(|shape| !shape.local_part_areas().is_empty()) {
         let directions = [DVec3::X, DVec3::NEG_Y, DVec3::new(-0.3, 0.5, 0.8).normalize()];
-        let shown = |direction: DVec3| integral(&shape, |place| place.normal.dot(direction).max(0.0));
-        let area = integral(&shape, |_| 1.0);
         if matches!(untransformed(&shape), (Shape::Torus(_), true)) {
             continue;
         }
-        for direction in directions {
+        let integrals = integrals(&shape, |place| {
+            DVec3::from_array(directions.map(|direction| place.normal.dot(direction).max(0.0))).extend(1.0)
+        });
+        for (direction, shown) in directions.into_iter().zip(integrals.to_array()) {
             if matches!(shape, Shape::Torus(_)) {
                 // For a torus, only the mean over all directions is computed (Cauchy's formula).
                 assert_eq!(shape.projected_area(direction), shape.local_part_areas()[0] / 4.0);
             } else {
-                let off = shape.projected_area(direction) - shown(direction);
-                assert!(off.abs() < 2e-3 * area, "{shape:?}: {off}");
+                let off = shape.projected_area(direction) - shown;
+                assert!(off.abs() < 2e-3 * integrals.w, "{shape:?}: {off}");
             }
         }
     }
@@ -119,11 +127,9 @@ fn centroid_is_the_mean_of_the_points() {
     let is_cone = |shape: &Shape| matches!(untransformed(shape), (Shape::Cone(_), true));
     let bounded = |shape: &Shape| !shape.local_part_areas().is_empty();
     for shape in shapes().into_iter().filter(|shape| bounded(shape) && !is_cone(shape)) {
-        let area = integral(&shape, |_| 1.0);
-        for axis in 0..3 {
-            let mean = integral(&shape, |place| place.point[axis]) / area;
-            assert!((mean - shape.centroid()[axis]).abs() < 2e-3, "{shape:?}: {mean}");
-        }
+        let integrals = integrals(&shape, |place| place.point.extend(1.0));
+        let mean = integrals.truncate() / integrals.w;
+        assert!((mean - shape.centroid()).abs().max_element() < 2e-3, "{shape:?}: {mean}");
     }
 }
 
@@ -135,9 +141,8 @@ fn distance_is_to_the_nearest_point() {
     };
     for shape in shapes() {
         let parts = (0_u32..).zip(shape.local_part_areas()).filter(|(_, area)| *area > 0.0);
-        let grid = |i: u32| Vec2::new((i % SIDE) as f32 + 0.5, (i / SIDE) as f32 + 0.5) / SIDE as f32;
         let places: Vec<DVec3> = parts
-            .flat_map(|(part, _)| (0..SIDE * SIDE).map(move |i| (part, grid(i))))
+            .flat_map(|(part, _)| grid(SIDE).map(move |u| (part, u)))
             .map(|(part, u)| shape.sample_point_on_part(part, u).point)
             .collect();
         for i in 0..12_u32 {
