@@ -2,6 +2,7 @@
 
 mod bench;
 pub(crate) mod candidates;
+mod foreign;
 #[cfg(test)]
 mod help_tests;
 mod parsers;
@@ -14,6 +15,7 @@ use clap::Parser;
 use clap::builder::styling::{AnsiColor, Styles};
 
 pub use self::bench::BenchArgs;
+pub use self::foreign::ForeignArgs;
 use self::parsers::{choice_long_help, choice_parser, parse_nonnegative_number};
 pub use self::parts::{ClusterScheduler, FarmArgs, MergeArgs};
 pub use self::render::RenderArgs;
@@ -110,7 +112,7 @@ pub enum Subcommand {
     /// Validate a scene and its files without rendering
     Check {
         /// The scene file
-        #[arg(add = candidates::scene_completer())]
+        #[arg(add = candidates::scene_or_foreign_completer())]
         scene: PathBuf,
         /// Override a scene key
         #[arg(long = "set", add = candidates::key_assignment_completer(), value_name = "TABLE.KEY=VALUE")]
@@ -118,6 +120,9 @@ pub enum Subcommand {
         /// Print errors and warnings as one JSON object on stdout
         #[arg(long)]
         json: bool,
+        /// Options for the scenes of other renderers.
+        #[command(flatten)]
+        foreign: ForeignArgs,
         /// Colors: auto, truecolor, 256, 16, none
         #[arg(long, value_parser = choice_parser::<ColorDepthChoice>(), hide_possible_values = true, long_help = choice_long_help::<ColorDepthChoice>("Colors of messages and images"), default_value = "auto", value_name = "HOW")]
         color: ColorDepthChoice,
@@ -287,9 +292,9 @@ pub struct ImportArgs {
     /// The scene to write [default: FILE with .toml, in the current folder]
     #[arg(short, long, value_name = "SCENE")]
     pub output: Option<PathBuf>,
-    /// Fail if anything cannot be converted exactly
-    #[arg(long)]
-    pub strict: bool,
+    /// Options for the scenes of other renderers.
+    #[command(flatten)]
+    pub foreign: ForeignArgs,
     /// Colors: auto, truecolor, 256, 16, none
     #[arg(long, value_parser = choice_parser::<ColorDepthChoice>(), hide_possible_values = true, long_help = choice_long_help::<ColorDepthChoice>("Colors of messages and images"), default_value = "auto", value_name = "HOW")]
     pub color: ColorDepthChoice,

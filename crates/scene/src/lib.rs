@@ -40,7 +40,7 @@ pub use facing::MeshBoundingBox;
 pub use key_path::{key_parts, shortened_key, split_at_unquoted_space};
 pub use other_content::{NEW_SCENE_HELP, detect_image_or_part, has_scene_extension};
 pub use read::{find_renamed_scene, lacks_camera_header, missing_file_help};
-pub use source::SceneText;
+pub use source::{SceneText, SourceFiles};
 
 /// Maximum size of a scene file in bytes.
 pub const MAX_FILE_BYTES: u64 = 128 << 20;
@@ -148,9 +148,7 @@ impl LoadedScene {
     /// Returns the 1-based line number in the file where `span` starts, or `None` if the file has no text for
     /// it.
     pub fn line_number(&self, span: &Range<usize>) -> Option<usize> {
-        let before = self.source.file_text().get(..span.start).unwrap_or_default();
-        let line = before.bytes().filter(|byte| *byte == b'\n').count() + 1;
-        self.source.has_text_at(span).then_some(line)
+        self.source.has_text_at(span).then(|| self.source.line_number(span))
     }
 
     /// Returns the span of a setting's value in the file or in a `--set` argument, or `None` if neither sets
@@ -209,7 +207,7 @@ pub fn load_built(
     path: &Path,
     sets: &[String],
 ) -> Result<LoadedScene, Vec<Diagnostic>> {
-    let source = SceneText::with_set_args(Arc::clone(&built.source), sets)?.mark_foreign();
+    let source = SceneText::with_set_args(Arc::clone(&built.source), sets)?.mark_foreign(Arc::clone(&built.files));
     let outcome = document::lower_built(&source, &built.document, path);
     let named = if sets.is_empty() { Vec::new() } else { document::referenced_files(&built.document, path) };
     loaded_scene(outcome, source, Some(Arc::new(built)), path, named)

@@ -7,6 +7,7 @@
 //! the view and the lights for models, which `glimt MODEL` and `glimt import` share so that they produce the
 //! same image.
 
+pub(crate) mod foreign;
 mod frame;
 mod gltf;
 mod import;
@@ -17,9 +18,10 @@ mod rounding;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
+use self::foreign::{ForeignError, ForeignOptions};
 use self::model::ModelViewOptions;
 use super::stages::containers::GltfContainers;
-use crate::assets::{AssetError, Companion, FileHash};
+use crate::assets::{Companion, FileHash};
 use crate::control::CancelToken;
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::sanitize::escape_invisible_chars;
@@ -65,14 +67,16 @@ pub(crate) struct ForeignFormat {
     convert: Option<ConvertFn>,
 }
 
-type ReadFn = fn(&Path, &ForeignReadContext<'_>) -> Result<ForeignScene, AssetError>;
-type ConvertFn = fn(&Path, &str, &ForeignReadContext<'_>) -> Result<ImportedScene, AssetError>;
+type ReadFn = fn(&Path, &ForeignReadContext<'_>) -> Result<ForeignScene, ForeignError>;
+type ConvertFn = fn(&Path, &str, &ForeignReadContext<'_>) -> Result<ImportedScene, ForeignError>;
 
 /// Inputs of an importer other than the file.
 #[derive(Clone, Copy)]
 pub(crate) struct ForeignReadContext<'a> {
     /// View of a model.
     pub(crate) view: ModelViewOptions,
+    /// Options for the scenes of other renderers.
+    pub(crate) options: &'a ForeignOptions,
     /// Files that are open. Meshes stored here are not read again when the scene's assets are loaded.
     pub(crate) containers: &'a GltfContainers,
     pub(crate) token: &'a CancelToken,

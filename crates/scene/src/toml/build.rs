@@ -7,6 +7,7 @@ use std::sync::Arc;
 use super::tree::{Document, Name, NodeKind, Span, TableId, TableOrigin, ValueNode};
 use super::write::{Comment, format_document};
 use crate::math::DVec3;
+use crate::source::{SourceFile, SourceFiles};
 
 /// A scene document built in memory: the tables and keys of a scene file, and comments.
 ///
@@ -17,6 +18,8 @@ pub struct BuiltDocument {
     pub(crate) document: Document<'static>,
     /// The text of the foreign file, into which all spans index.
     pub(crate) source: Arc<str>,
+    /// The files of which the source consists. Empty if it is a single file.
+    pub(crate) files: Arc<[SourceFile]>,
     comments: Vec<Comment>,
     /// The current table.
     table: TableId,
@@ -91,7 +94,13 @@ impl BuiltDocument {
     /// Creates an empty document. `source` is the text of the foreign file, or empty if the file is not text.
     pub fn new(source: Arc<str>) -> Self {
         let (comments, span) = Default::default();
-        Self { document: Document::new(""), source, comments, table: Document::ROOT, span }
+        Self { document: Document::new(""), source, files: Arc::new([]), comments, table: Document::ROOT, span }
+    }
+
+    /// Creates an empty document for a foreign scene that consists of several text files.
+    pub fn from_files(files: SourceFiles) -> Self {
+        let (source, files) = files.into_parts();
+        Self { files, ..Self::new(source) }
     }
 
     /// Sets the span in the foreign text of all tables and values added from now on. Errors underline it.
@@ -123,10 +132,14 @@ impl BuiltDocument {
 
     /// Starts a table `[[list]]`.
     pub fn list_table(&mut self, list: &'static str) {
-        let found = self.document.find_in_table(Document::ROOT, list).map(|found| found.kind);
+        self.list_table_in(Document::ROOT, list);
+    }
+
+    fn list_table_in(&mut self, parent: TableId, list: &'static str) {
+        let found = self.document.find_in_table(parent, list).map(|found| found.kind);
         let kind = found.unwrap_or_else(|| {
             let kind = self.document.add_table_list();
-            self.add_entry(Document::ROOT, list.into(), kind);
+            self.add_entry(parent, list.into(), kind);
             kind
         });
         self.table = self.document.add_table(TableOrigin::default());
@@ -134,6 +147,13 @@ impl BuiltDocument {
             let node = ValueNode { span: self.span, kind: NodeKind::Table(self.table) };
             self.document.table_list_mut(list).push(node);
         }
+    }
+
+    /// Starts a table `[[groups.group.list]]`.
+    pub fn group_list_table(&mut self, group: &str, list: &'static str) {
+        self.named_table("groups", group);
+        let parent = self.table;
+        self.list_table_in(parent, list);
     }
 
     /// Adds a key, which must be new, to the current table.
