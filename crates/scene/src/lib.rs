@@ -27,11 +27,12 @@ mod toml;
 use glimt_base::{choice, film, math, sampling, system};
 use glimt_kernel::{geometry, lights, materials};
 
+use std::collections::HashSet;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-pub use self::toml::{BuiltDocument, BuiltValue, quote_toml_string};
+pub use self::toml::{BuiltDocument, BuiltValue, GeneratedFile, quote_toml_string};
 pub use changes::{MAX_COMPARED_BYTES, list_changes};
 use description::{Camera, ResolvedCamera, Scene};
 use diagnostic::{Diagnostic, Severity};
@@ -105,6 +106,13 @@ impl LoadedScene {
     /// Whether the file at [`Self::path`] is not a scene file.
     pub fn is_foreign(&self) -> bool {
         self.built.is_some()
+    }
+
+    /// The files that exist only in memory, with their paths.
+    pub fn generated_files(&self) -> impl Iterator<Item = (PathBuf, &GeneratedFile)> {
+        let folder = self.path.parent().unwrap_or(Path::new(""));
+        let files = self.built.iter().flat_map(|built| built.generated.iter());
+        files.map(move |(name, file)| (folder.join(name), file))
     }
 
     /// Returns the text of the scene file after writing `camera` to `[camera]`. Replaces numbers in place and
@@ -208,8 +216,12 @@ pub fn load_built(
     sets: &[String],
 ) -> Result<LoadedScene, Vec<Diagnostic>> {
     let source = SceneText::with_set_args(Arc::clone(&built.source), sets)?.mark_foreign(Arc::clone(&built.files));
-    let outcome = document::lower_built(&source, &built.document, path);
-    let named = if sets.is_empty() { Vec::new() } else { document::referenced_files(&built.document, path) };
+    let outcome = document::lower_built(&source, &built, path);
+    let mut named =
+        if sets.is_empty() { Vec::new() } else { document::referenced_files(&built.document, path) };
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let generated: HashSet<PathBuf> = built.generated.keys().map(|name| folder.join(name)).collect();
+    named.retain(|file| !generated.contains(file));
     loaded_scene(outcome, source, Some(Arc::new(built)), path, named)
 }
 

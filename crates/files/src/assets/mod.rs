@@ -3,6 +3,7 @@
 pub mod catch_panic;
 mod file_material;
 pub mod gltf;
+mod gzip;
 pub mod image;
 pub mod mesh;
 pub mod orbiter;
@@ -17,6 +18,7 @@ use crate::geometry::mesh::TriangleMesh;
 use crate::system::file::FileStamp;
 use crate::system::{RAISE_FILE_LIMIT, describe_error, is_too_many_open_files};
 
+pub use gzip::{GzipFile, read_gzip_file};
 pub use text_file::{TextFile, read_text_file};
 
 pub use file_material::{FileLine, FileMaterial, FileMaterialKind, FileTexture, PhysicalMaterial};

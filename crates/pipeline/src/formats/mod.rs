@@ -13,6 +13,7 @@ mod gltf;
 mod import;
 mod mesh;
 pub(crate) mod model;
+mod pbrt;
 mod rounding;
 
 use std::io::ErrorKind;
@@ -34,7 +35,7 @@ use crate::system::file::{FileKind, file_kind};
 pub use import::{ImportError, import_scene};
 
 /// All foreign formats.
-const FORMATS: [ForeignFormat; 4] = [
+const FORMATS: [ForeignFormat; 5] = [
     ForeignFormat { extensions: &["obj", "off"], is_model: true, read: mesh::read, convert: None },
     ForeignFormat { extensions: &["ply"], is_model: true, read: mesh::read_ply, convert: None },
     ForeignFormat { extensions: &["stl"], is_model: true, read: mesh::read_stl, convert: None },
@@ -44,6 +45,7 @@ const FORMATS: [ForeignFormat; 4] = [
         read: gltf::read,
         convert: Some(gltf::convert),
     },
+    ForeignFormat { extensions: &["pbrt"], is_model: false, read: pbrt::read, convert: Some(pbrt::convert) },
 ];
 
 /// Extensions of unsupported model formats.

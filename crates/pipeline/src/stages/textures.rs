@@ -131,6 +131,7 @@ pub(crate) fn load_textures(
     findings: &mut Findings,
     reading: &FileReadContext<'_>,
 ) -> Result<StageResult<Textures>, AbortReason> {
+    reading.add_generated_files(loaded, findings);
     let mut textures = Textures::default();
     let NeededTextures { textures: needed, left_out, are_required } = needed;
     if needed.is_empty() {

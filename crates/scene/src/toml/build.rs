@@ -1,6 +1,7 @@
 //! Documents built in memory by the importers of foreign formats.
 
 use std::borrow::Cow;
+use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -20,11 +21,22 @@ pub struct BuiltDocument {
     pub(crate) source: Arc<str>,
     /// The files of which the source consists. Empty if it is a single file.
     pub(crate) files: Arc<[SourceFile]>,
+    /// Meshes and images that exist only in memory, by the value of the key `file`.
+    pub(crate) generated: Arc<BTreeMap<String, GeneratedFile>>,
     comments: Vec<Comment>,
     /// The current table.
     table: TableId,
     /// The span of the values added next.
     span: Span,
+}
+
+/// A mesh or an image that an importer has generated. The extension of its name determines its format.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct GeneratedFile {
+    /// The content of the file.
+    pub bytes: Arc<[u8]>,
+    /// BLAKE3 hash of the bytes.
+    pub hash: [u8; 32],
 }
 
 /// A value in a [`BuiltDocument`].
@@ -94,13 +106,23 @@ impl BuiltDocument {
     /// Creates an empty document. `source` is the text of the foreign file, or empty if the file is not text.
     pub fn new(source: Arc<str>) -> Self {
         let (comments, span) = Default::default();
-        Self { document: Document::new(""), source, files: Arc::new([]), comments, table: Document::ROOT, span }
+        Self { document: Document::new(""), source, files: Arc::new([]), generated: Arc::default(), comments, table: Document::ROOT, span }
     }
 
     /// Creates an empty document for a foreign scene that consists of several text files.
     pub fn from_files(files: SourceFiles) -> Self {
         let (source, files) = files.into_parts();
         Self { files, ..Self::new(source) }
+    }
+
+    /// Adds a file that exists only in memory. The key `file` refers to it by `name`.
+    pub fn add_generated_file(&mut self, name: String, file: GeneratedFile) {
+        Arc::make_mut(&mut self.generated).insert(name, file);
+    }
+
+    /// The files that exist only in memory, by name.
+    pub fn generated_files(&self) -> &Arc<BTreeMap<String, GeneratedFile>> {
+        &self.generated
     }
 
     /// Sets the span in the foreign text of all tables and values added from now on. Errors underline it.

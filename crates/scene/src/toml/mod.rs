@@ -35,7 +35,7 @@ mod write;
 use assembly::DocumentBuilder;
 use expression::StatementParser;
 
-pub use build::{BuiltDocument, BuiltValue};
+pub use build::{BuiltDocument, BuiltValue, GeneratedFile};
 pub use write::quote_toml_string;
 
 pub(super) use brackets::{BracketToken, find_all_array_brackets, innermost_bracket_open_at_end};

@@ -1,0 +1,192 @@
+//! Emission and opacity of shapes.
+
+use super::colors::SpectrumUse;
+use super::lexer::{PbrtError, PbrtResult};
+use super::material_tables::{Emission, ShapeProperties};
+use super::meshes::MeshData;
+use super::parameters::Parameters;
+use super::scene::SceneWriter;
+use super::state::{Entity, ShapeEntity};
+use super::texture_nodes::{ImageFilter, ImageNode, ImageWrap, TextureNode, TextureValue, UvMapping};
+use crate::math::{DMat4, DVec3};
+
+/// The light of an `AreaLightSource`.
+struct AreaLight {
+    emission: Emission,
+    /// Power of every shape, if it determines the radiance.
+    power: Option<f64>,
+    /// Luminance of the image, for `power`.
+    mean: f64,
+}
+
+impl SceneWriter<'_> {
+    /// Reads the properties that glimt's materials have instead of shapes. Returns `None` if the shape is not
+    /// visible and does not emit light.
+    pub(super) fn shape_properties(
+        &mut self,
+        shape: &ShapeEntity,
+        data: Option<&MeshData>,
+        matrix: &DMat4,
+        is_in_object: bool,
+    ) -> PbrtResult<Option<ShapeProperties>> {
+        let entity = &shape.placed.entity;
+        let area_light = shape.area_light.map(|index| &self.statements.area_lights[index]);
+        let emission = match area_light {
+            Some(light) if is_in_object => {
+                self.notes.note("area lights in objects", "they do not emit light, as in pbrt", light.span());
+                None
+            }
+            Some(light) => self.read_area_light(light, entity, data, matrix)?,
+            None => None,
+        };
+        let (parameters, space) = (&entity.parameters, entity.color_space);
+        let notes = &mut self.notes;
+        let alpha = self.resolver.parameter(parameters, "alpha", TextureValue::Number, space, notes)?;
+        let alpha = alpha.filter(|alpha| alpha.as_constant().is_none_or(|alpha| alpha.x < 1.0));
+        let is_hidden = alpha.as_ref().and_then(TextureNode::as_constant).is_some_and(|alpha| alpha.x <= 0.0);
+        let tint = self.read_inside_medium(shape)?;
+        match (is_hidden, emission) {
+            (true, None) => Ok(None),
+            (true, emission) => {
+                let text = "it is visible";
+                self.notes.substitute_light("a light that `alpha` hides", text, entity.span());
+                Ok(Some(ShapeProperties { emission, alpha: None, tint }))
+            }
+            (false, emission) => Ok(Some(ShapeProperties { emission, alpha, tint })),
+        }
+    }
+
+    /// Returns the light that a shape emits.
+    fn read_area_light(
+        &mut self,
+        light: &Entity,
+        shape: &Entity,
+        data: Option<&MeshData>,
+        matrix: &DMat4,
+    ) -> PbrtResult<Option<Emission>> {
+        if light.kind.text != "diffuse" {
+            let error = PbrtError::new(light.kind.span.clone(), "unknown area light");
+            return Err(error.with_label("the only one is \"diffuse\""));
+        }
+        let AreaLight { mut emission, power, mean } = self.read_area_light_parameters(light)?;
+        if let Some(power) = power {
+            let sides = if emission.is_two_sided { 2.0 } else { 1.0 };
+            let area = self.area_for_power(shape, data, matrix)?;
+            emission.color *= power / (mean * sides * area * std::f64::consts::PI);
+        }
+        Ok(Some(emission).filter(|emission| emission.color != DVec3::ZERO))
+    }
+
+    fn read_area_light_parameters(&mut self, light: &Entity) -> PbrtResult<AreaLight> {
+        let (parameters, space) = (&light.parameters, light.color_space);
+        let color = self.resolver.colors.color(parameters, "L", space, SpectrumUse::Emission)?;
+        let file = parameters.string("filename")?;
+        let scale = parameters.float("scale", 1.0)?;
+        if scale < 0.0 {
+            return Err(PbrtError::new(parameters.span_of("scale"), "`scale` cannot be negative"));
+        }
+        let is_two_sided = parameters.bool("twosided", false)?;
+        let power = parameters.optional_float("power")?.filter(|power| *power > 0.0);
+        parameters.check_all_used()?;
+        let image = match file {
+            Some(_) if color.is_some() => {
+                let span = parameters.span_of("filename");
+                let error = PbrtError::new(span, "`filename` cannot be combined with `L`");
+                return Err(error.with_help("remove one of them"));
+            }
+            Some(file) if self.is_tolerated_missing(file, "image of a light", "the light is white") => None,
+            Some(file) => Some(ImageNode {
+                file: file.clone(),
+                mapping: UvMapping::IDENTITY,
+                wrap: ImageWrap::Clamp,
+                filter: ImageFilter::Bilinear,
+                is_linear: false,
+                is_number: false,
+                factor: DVec3::ONE,
+                is_inverted: false,
+            }),
+            None => None,
+        };
+        let mean = match (&image, power) {
+            (Some(image), Some(_)) => self.mean_luminance(image)?,
+            _ => 1.0,
+        };
+        let color = color.unwrap_or(DVec3::ONE) * scale;
+        let image = image.map(TextureNode::Image);
+        Ok(AreaLight { emission: Emission { color, image, is_two_sided }, power, mean })
+    }
+
+    /// Returns the area of a shape for `power`, which pbrt gives to every triangle of a mesh.
+    fn area_for_power(
+        &mut self,
+        shape: &Entity,
+        data: Option<&MeshData>,
+        matrix: &DMat4,
+    ) -> PbrtResult<f64> {
+        let (parameters, span) = (&shape.parameters, shape.span());
+        let loaded;
+        let data = match (&*shape.kind.text, data) {
+            (_, Some(data)) => data,
+            ("plymesh", None) => {
+                let Some(mesh) = self.load_mesh_file(parameters)? else { return Ok(1.0) };
+                loaded = mesh;
+                &loaded
+            }
+            (kind, None) => {
+                loaded = super::shapes::round_shape_mesh(kind, parameters)?;
+                let area: f64 =
+                    loaded.triangles.iter().map(|triangle| loaded.transformed_area(*triangle, matrix)).sum();
+                return positive_area(area, parameters);
+            }
+        };
+        let areas: Vec<f64> =
+            data.triangles.iter().map(|triangle| data.transformed_area(*triangle, matrix)).collect();
+        let mean = areas.iter().sum::<f64>() / areas.len().max(1) as f64;
+        let is_equal = areas.iter().all(|area| (area / mean - 1.0).abs() < 0.01);
+        if !is_equal {
+            let text = "every triangle has the same radiance instead of the same power";
+            self.notes.substitute_light("`power` of a mesh", text, span);
+        }
+        positive_area(mean, parameters)
+    }
+
+    /// Returns the transmittance per unit of length of the medium inside of a shape.
+    fn read_inside_medium(&mut self, shape: &ShapeEntity) -> PbrtResult<Option<DVec3>> {
+        let [inside, outside] = &shape.media;
+        if inside == outside {
+            return Ok(None);
+        }
+        let span = shape.placed.entity.span();
+        let Some(medium) = self.statements.media.get(&**inside) else {
+            if inside.is_empty() {
+                let text = "there is no medium outside";
+                self.notes.substitute_light("a medium around a shape", text, span);
+                return Ok(None);
+            }
+            return Err(PbrtError::new(span, format!("there is no medium \"{inside}\"")));
+        };
+        let parameters = &medium.parameters;
+        let kind = parameters.string("type")?.map_or("", |kind| &kind.text);
+        let color = |name, default: f64| {
+            let color = self.resolver.colors.color(parameters, name, medium.color_space, SpectrumUse::Unbounded)?;
+            PbrtResult::Ok(color.unwrap_or(DVec3::splat(default)))
+        };
+        let scattering = color("sigma_s", 1.0)?;
+        let absorption = color("sigma_a", 1.0)?;
+        let scale = parameters.float("scale", 1.0)?;
+        let is_clear = kind == "homogeneous" && scattering == DVec3::ZERO;
+        if is_clear && parameters.find("preset").is_none() && parameters.find("Le").is_none() {
+            let attenuation = (absorption * scale).max(DVec3::ZERO);
+            return Ok(Some(DVec3::from(attenuation.to_array().map(|part| libm::exp(-part)))));
+        }
+        self.notes.substitute_light(&format!("medium `{kind}`"), "there is no medium", medium.span());
+        Ok(None)
+    }
+}
+
+fn positive_area(area: f64, parameters: &Parameters) -> PbrtResult<f64> {
+    if area > 0.0 {
+        return Ok(area);
+    }
+    Err(PbrtError::new(parameters.span.clone(), "a light without area cannot have a `power`"))
+}
