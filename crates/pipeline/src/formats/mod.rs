@@ -12,6 +12,7 @@ mod frame;
 mod gltf;
 mod import;
 mod mesh;
+mod mitsuba;
 pub(crate) mod model;
 mod rounding;
 
@@ -34,7 +35,7 @@ use crate::system::file::{FileKind, file_kind};
 pub use import::{ImportError, import_scene};
 
 /// All foreign formats.
-const FORMATS: [ForeignFormat; 4] = [
+const FORMATS: [ForeignFormat; 5] = [
     ForeignFormat { extensions: &["obj", "off"], is_model: true, read: mesh::read, convert: None },
     ForeignFormat { extensions: &["ply"], is_model: true, read: mesh::read_ply, convert: None },
     ForeignFormat { extensions: &["stl"], is_model: true, read: mesh::read_stl, convert: None },
@@ -43,6 +44,12 @@ const FORMATS: [ForeignFormat; 4] = [
         is_model: true,
         read: gltf::read,
         convert: Some(gltf::convert),
+    },
+    ForeignFormat {
+        extensions: &["xml"],
+        is_model: false,
+        read: mitsuba::read,
+        convert: Some(mitsuba::convert),
     },
 ];
 
