@@ -78,10 +78,9 @@ impl SourceFiles {
         Diagnostic { severity, message: message.into(), path, place, help }
     }
 
-    /// Returns the path of the file that contains a span, and the 1-based number of its line.
-    pub fn path_and_line(&self, span: &Range<usize>) -> Option<(&Path, usize)> {
-        let found = self.files.iter().find_map(|file| Some((file, file.local_span(span)?)));
-        found.map(|(file, local)| (file.path.as_path(), line_number_at(&file.text, local.start)))
+    /// Returns the path of the file that contains a span.
+    pub fn path_at(&self, span: &Range<usize>) -> Option<&Path> {
+        self.files.iter().find(|file| file.local_span(span).is_some()).map(|file| file.path.as_path())
     }
 
     pub(crate) fn into_parts(self) -> (Arc<str>, Arc<[SourceFile]>) {

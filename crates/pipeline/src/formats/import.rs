@@ -47,11 +47,11 @@ pub fn import_scene(
     let context = ForeignReadContext { view, options, containers: &containers, token };
     pool.install(|| convert(path, folder, &context)).map_err(|error| match error {
         ForeignError::Scene { diagnostics, companions: _ } => ImportError::Scene(diagnostics),
-        ForeignError::Asset(error) => import_error(error),
+        ForeignError::Asset(error) => import_error(&error),
     })
 }
 
-fn import_error(error: AssetError) -> ImportError {
+fn import_error(error: &AssetError) -> ImportError {
     match error {
         AssetError::OutOfMemory { .. }
         | AssetError::MemoryLimit { .. }

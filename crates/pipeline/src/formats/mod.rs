@@ -12,6 +12,7 @@ mod frame;
 mod gltf;
 mod import;
 mod mesh;
+mod mitsuba;
 pub(crate) mod model;
 mod pbrt;
 mod rounding;
@@ -35,7 +36,7 @@ use crate::system::file::{FileKind, file_kind};
 pub use import::{ImportError, import_scene};
 
 /// All foreign formats.
-const FORMATS: [ForeignFormat; 5] = [
+const FORMATS: [ForeignFormat; 6] = [
     ForeignFormat { extensions: &["obj", "off"], is_model: true, read: mesh::read, convert: None },
     ForeignFormat { extensions: &["ply"], is_model: true, read: mesh::read_ply, convert: None },
     ForeignFormat { extensions: &["stl"], is_model: true, read: mesh::read_stl, convert: None },
@@ -46,6 +47,12 @@ const FORMATS: [ForeignFormat; 5] = [
         convert: Some(gltf::convert),
     },
     ForeignFormat { extensions: &["pbrt"], is_model: false, read: pbrt::read, convert: Some(pbrt::convert) },
+    ForeignFormat {
+        extensions: &["xml"],
+        is_model: false,
+        read: mitsuba::read,
+        convert: Some(mitsuba::convert),
+    },
 ];
 
 /// Extensions of unsupported model formats.

@@ -6,6 +6,7 @@ use super::super::fingerprint::{FingerprintContext, FingerprintHasher, Fingerpri
 use super::Spanned;
 use crate::lights;
 pub use crate::lights::delta::Falloff;
+pub use crate::lights::infinite::MapRows;
 use crate::lights::infinite::sky::{SkyParameters, elevation};
 use crate::math::transform::rotation_xyz;
 use crate::math::{DMat3, DVec3, Vec3};
@@ -67,6 +68,8 @@ pub struct Environment {
     pub sky: Option<Sky>,
     /// Orientation of the map or the sky.
     pub orientation: MapOrientation,
+    /// Polar angles of the map's rows.
+    pub rows: MapRows,
 }
 
 /// Orientation of an environment map or a sky.
@@ -220,8 +223,8 @@ impl Fingerprinted for Sky {
 /// Covers only the lookup parameters. The texels have a separate fingerprint.
 impl Fingerprinted for Environment {
     fn add_to(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
-        let Self { color, file, sky, orientation } = self;
-        key.add_vec3(*color).add_bool(file.is_some());
+        let Self { color, file, sky, orientation, rows } = self;
+        key.add_vec3(*color).add_bool(file.is_some()).add_choice(*rows);
         match orientation {
             MapOrientation::Turn(degrees) => key.add_usize(0).add_f64(*degrees),
             MapOrientation::Rotation(DMat3 { x_axis, y_axis, z_axis }) => {

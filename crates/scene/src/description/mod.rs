@@ -19,7 +19,7 @@ use std::path::PathBuf;
 pub use camera::{
     Camera, CameraOverrides, ImageWindow, Pose, Projection, ProjectionKind, ResolvedCamera, is_same_distance,
 };
-pub use light::{Environment, Light, MapOrientation, Sky};
+pub use light::{Environment, Light, MapOrientation, MapRows, Sky};
 pub use material::{
     Bump, Channel, ChannelSelector, CoatSource, ColorSource, EmissionSides, EmissionSource, FresnelSource,
     Material, MaterialKind, MicrofacetDistribution, NormalMap, NumberSource, OpacitySource, PhongParameters,

@@ -1,10 +1,10 @@
 //! The `[environment]` table.
 
-use super::super::description::{Environment, MapOrientation, Scene, Sky};
+use super::super::description::{Environment, MapOrientation, MapRows, Scene, Sky};
 use super::super::keys::endings::MAPS;
 use super::super::keys::key::DefaultValue::{Absent, By, Is, Required};
-use super::super::keys::key::ValueKind::{Color, File, InlineTable, Number, Rotation};
-use super::super::keys::key::{COLOR, DIRECTION, KeyInfo, TableInfo, TableSyntax, keys};
+use super::super::keys::key::ValueKind::{Color, File, InlineTable, Number, Rotation, Words};
+use super::super::keys::key::{COLOR, DIRECTION, KeyInfo, TableInfo, TableSyntax, choice_values, keys};
 use super::context::Issue;
 use super::key::KeyInTable;
 use super::limits::Limits::{Any, AtLeast, Between};
@@ -21,6 +21,9 @@ pub(crate) static ENVIRONMENT: TableInfo = TableInfo::new(
         /// An equirectangular map. Its center is toward −z, the middle of its right half toward +x, and its
         /// top row toward +y.
         file: File(MAPS), Absent;
+        /// Polar angles of the map's rows: `"centers"`, or `"poles"` if the first and the last row are at the
+        /// poles, as in Mitsuba.
+        rows: Words(choice_values::<MapRows>), Is("\"centers\"");
         /// A clear sky with a sun.
         sky: InlineTable(SKY), Absent;
         /// Rotation of the map or the sky about +y, counterclockwise seen from above.
@@ -66,6 +69,7 @@ pub(super) fn read_environment(root: &TableReader<'_>) -> Option<Option<Environm
     } else {
         rotate.number().map(MapOrientation::Turn)
     };
+    let rows = table.key("rows").choice::<MapRows>();
     table.report_unknown_and_missing_keys();
     if let (Some(Vec3::ZERO), Some(span)) = (radiance, color.value_span().filter(|_| file.is_present())) {
         let issue = Issue::warning(span, "`color` is black, so the environment is black")
@@ -80,7 +84,13 @@ pub(super) fn read_environment(root: &TableReader<'_>) -> Option<Option<Environm
             table.context.report(issue.with_help(help));
         }
     }
-    Some(Some(Environment { color: radiance?, file: map?, sky: clear_sky?, orientation: orientation? }))
+    Some(Some(Environment {
+        color: radiance?,
+        file: map?,
+        sky: clear_sky?,
+        orientation: orientation?,
+        rows: rows?,
+    }))
 }
 
 /// Reads the sky. The `replaced` keys must be absent.

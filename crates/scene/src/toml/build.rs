@@ -125,6 +125,12 @@ impl BuiltDocument {
         &self.generated
     }
 
+    /// Sets the files of a foreign scene that consists of several text files. All spans, including those of
+    /// values added before, index into their concatenated texts.
+    pub fn attach_files(&mut self, files: SourceFiles) {
+        (self.source, self.files) = files.into_parts();
+    }
+
     /// Sets the span in the foreign text of all tables and values added from now on. Errors underline it.
     pub fn at(&mut self, span: Range<usize>) {
         self.span = Span::new(span.start, span.end);

@@ -9,7 +9,7 @@ use crate::geometry::mesh::TriangleMesh;
 use crate::materials::texels::Texels;
 use crate::math::{DVec3, Vec3};
 use crate::scene::description::{
-    Accel, Environment, MapOrientation, MeshFile, MeshReference, Object, ObjectTransform, Scene, Shape,
+    Accel, Environment, MapOrientation, MapRows, MeshFile, MeshReference, Object, ObjectTransform, Scene, Shape,
     Spanned,
 };
 use crate::world::{
@@ -63,8 +63,8 @@ impl TestWorldBuilder {
     /// Adds an environment map.
     pub fn sky(mut self, texels: &Arc<Texels>) -> Self {
         let file = Some(Spanned { value: PathBuf::from("sky.exr"), span: 0..0 });
-        self.scene.environment =
-            Some(Environment { color: Vec3::ONE, file, sky: None, orientation: MapOrientation::Turn(0.0) });
+        let (orientation, rows) = (MapOrientation::Turn(0.0), MapRows::Centers);
+        self.scene.environment = Some(Environment { color: Vec3::ONE, file, sky: None, orientation, rows });
         self.sky = Some(Arc::clone(texels));
         self
     }

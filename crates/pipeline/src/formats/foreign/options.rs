@@ -26,6 +26,7 @@ choice! {
     }
 }
 
+#[expect(clippy::derivable_impls, reason = "`choice!` derives no `Default`")]
 impl Default for MissingAssetMode {
     fn default() -> Self {
         Self::Error
