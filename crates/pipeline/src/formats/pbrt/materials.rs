@@ -77,7 +77,7 @@ impl SceneWriter<'_> {
         if is_named && parameters.string("type")?.is_none() {
             return Err(PbrtError::new(entity.span(), "this material has no `type`"));
         }
-        let mut reader = MaterialReader {
+        let reader = MaterialReader {
             writer: self,
             parameters,
             space: entity.color_space,
@@ -97,9 +97,13 @@ impl MaterialReader<'_, '_> {
             "" | "none" | "interface" => return Ok(MaterialModel::Invisible),
             "mix" => return self.read_mix(),
             "diffuse" => self.color("diffuse", "reflectance", 0.5)?,
-            "coateddiffuse" => self.read_coated_diffuse()?,
+            "coateddiffuse" => self.read_coated_diffuse(entity)?,
             "conductor" => self.read_conductor(false, 1.0)?,
-            "coatedconductor" => self.read_coated_conductor()?,
+            "coatedconductor" => {
+                let text = "the highlight of the metal is not widened by refraction";
+                self.writer.notes.note("material `coatedconductor`", text, entity.span());
+                self.read_coated_conductor()?;
+            }
             "dielectric" => {
                 is_glass = true;
                 self.read_dielectric()?;
@@ -216,11 +220,18 @@ impl MaterialReader<'_, '_> {
         Ok(())
     }
 
-    fn read_coated_diffuse(&mut self) -> PbrtResult<()> {
+    fn read_coated_diffuse(&mut self, entity: &Entity) -> PbrtResult<()> {
         self.keys.push(("type", "plastic".into()));
         self.color("diffuse", "reflectance", 0.5)?;
-        self.ior("eta", 1.5)?;
-        self.isotropic_roughness("roughness", ["roughness", "uroughness", "vroughness"])?;
+        let ior = self.read_ior("eta", 1.5)?;
+        self.keys.push(("ior", ior.max(1.0).into()));
+        let roughness = ["roughness", "uroughness", "vroughness"];
+        self.isotropic_roughness("roughness", roughness)?;
+        let is_smooth = self.keys.last().is_some_and(|(_, value)| *value == BuiltValue::Number(0.0));
+        if !is_smooth {
+            let text = "glimt's base receives all light that the coat does not reflect, and is 2 to 5 % brighter";
+            self.writer.notes.note("rough `coateddiffuse`", text, entity.span());
+        }
         self.read_layer_medium()
     }
 

@@ -58,7 +58,7 @@ pub(super) fn convert(
     for (name, source) in copies {
         context.token.check_pause_and_cancel()?;
         let bytes = std::fs::read(&source)
-            .map_err(|error| AssetError::unreadable(&source, format!("cannot read the file: {error}")))?;
+            .map_err(|error| AssetError::malformed(&source, None, format!("cannot read the file: {error}")))?;
         files.push((PathBuf::from(name), bytes));
     }
     let generated = document.generated_files().iter();

@@ -249,12 +249,6 @@ impl Parameters {
         found.texts()
     }
 
-    /// Reads the name of a texture, for parameters that must be textures.
-    pub(super) fn texture(&self, name: &'static str) -> PbrtResult<Option<&Text>> {
-        let Some(found) = self.of_type(name, &[ParameterType::Texture])? else { return Ok(None) };
-        found.single(found.texts()?).map(Some)
-    }
-
     pub(super) fn point2s(&self, name: &'static str) -> PbrtResult<Vec<DVec2>> {
         let numbers = self.numbers(name, &[ParameterType::Point2, ParameterType::Float], 2)?;
         Ok(numbers.as_chunks().0.iter().map(|&pair| DVec2::from_array(pair)).collect())

@@ -4,8 +4,8 @@ use super::lexer::{PbrtError, PbrtResult};
 use super::parameters::{ParameterType, Parameters};
 use super::scene::SceneWriter;
 use super::state::{Entity, PlacedEntity};
-use crate::formats::foreign::transform::{is_mirroring, similarity_scale};
-use crate::math::{DMat4, DVec2, DVec3};
+use crate::formats::foreign::transform::{is_mirroring, linear_part};
+use crate::math::{DMat3, DMat4, DVec2, DVec3};
 use crate::scene::nearest::nearest_name;
 
 /// A film: its size, and the part of it that is rendered.
@@ -212,7 +212,7 @@ impl SceneWriter<'_> {
         self.document.at(span.clone());
         let still = self.still_transform(*transform, span.clone());
         let matrix = still.inverse();
-        if !matrix.is_finite() || similarity_scale(&matrix).is_none_or(|scale| scale < 1e-12) {
+        if !matrix.is_finite() || camera_scale(&matrix).is_none() {
             let error = PbrtError::new(span, "the transform of this camera is not a rotation and a uniform scale");
             return Err(error.with_help("shears and different scales along the axes are not supported"));
         }
@@ -296,8 +296,8 @@ impl SceneWriter<'_> {
     ) -> PbrtResult<()> {
         let frame = film.size[0] as f64 / film.size[1] as f64;
         let [x0, x1, y0, y1] = window.unwrap_or([-frame.max(1.0), frame.max(1.0), -1.0, 1.0]);
-        let scale = similarity_scale(&matrix).unwrap_or(1.0);
-        let axis = |axis: DVec3| matrix.transform_vector3(axis) / scale;
+        let scale = camera_scale(&matrix).unwrap_or(1.0);
+        let axis = |axis: DVec3| matrix.transform_vector3(axis).normalize_or_zero();
         let [forward, up] = match projection {
             "panorama" => [axis(DVec3::NEG_X), axis(DVec3::Y)],
             _ => [axis(DVec3::Z), axis(DVec3::Y)],
@@ -344,6 +344,17 @@ impl SceneWriter<'_> {
         }
         Ok(())
     }
+}
+
+/// Returns the scale of a rotation or reflection with a uniform scale. Files list their matrices with few
+/// digits.
+fn camera_scale(matrix: &DMat4) -> Option<f64> {
+    const TOLERANCE: f64 = 5e-3;
+    let linear = linear_part(matrix);
+    let scale = libm::cbrt(linear.determinant().abs());
+    let product = linear.transpose() * linear * (1.0 / (scale * scale));
+    let error = (product - DMat3::IDENTITY).to_cols_array();
+    (scale > 1e-12 && error.iter().all(|entry| entry.abs() < TOLERANCE)).then_some(scale)
 }
 
 /// A thin lens.
