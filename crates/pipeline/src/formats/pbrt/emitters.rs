@@ -9,6 +9,8 @@ use super::scene::SceneWriter;
 use super::state::{Entity, ShapeEntity};
 use super::texture_nodes::{ImageFilter, ImageNode, ImageWrap, TextureNode, TextureValue, UvMapping};
 use crate::math::{DMat4, DVec3};
+use crate::scene::nearest::nearest_name;
+use crate::scene::sanitize::escape_and_truncate;
 
 /// The light of an `AreaLightSource`.
 struct AreaLight {
@@ -150,37 +152,53 @@ impl SceneWriter<'_> {
         positive_area(mean, parameters)
     }
 
-    /// Returns the transmittance per unit of length of the medium inside of a shape.
+    /// Returns the transmittance per unit of length of the medium inside of a shape, if the medium only
+    /// absorbs light. Substitutes other media.
     fn read_inside_medium(&mut self, shape: &ShapeEntity) -> PbrtResult<Option<DVec3>> {
         let [inside, outside] = &shape.media;
-        if inside == outside {
-            return Ok(None);
-        }
         let span = shape.placed.entity.span();
-        let Some(medium) = self.statements.media.get(&**inside) else {
-            if inside.is_empty() {
-                let text = "there is no medium outside";
-                self.notes.substitute_light("a medium around a shape", text, span);
-                return Ok(None);
+        let mut tint = None;
+        for (name, is_inside) in [(inside, true), (outside, false)] {
+            if name.is_empty() || !is_inside && name == inside {
+                continue;
             }
-            return Err(PbrtError::new(span, format!("there is no medium \"{inside}\"")));
-        };
+            let Some(medium) = self.statements.media.get(&**name) else {
+                let shown = escape_and_truncate(name, 40);
+                let near = nearest_name(name, self.statements.media.keys().map(String::as_str));
+                let error = PbrtError::new(span, format!("there is no medium \"{shown}\""));
+                return Err(error.with_suggestion(near));
+            };
+            let absorption = self.pure_absorption(medium)?;
+            match absorption.filter(|_| is_inside && inside != outside) {
+                Some(absorption) => {
+                    tint = Some(DVec3::from(absorption.to_array().map(|part| libm::exp(-part))));
+                }
+                None => {
+                    let kind = medium.parameters.string("type")?.map_or("", |kind| &kind.text);
+                    let subject = format!("medium `{kind}`");
+                    self.notes.substitute_light(&subject, "light passes it unchanged", medium.span());
+                }
+            }
+        }
+        Ok(tint)
+    }
+
+    /// Returns the absorption of a medium that does not scatter or emit light.
+    fn pure_absorption(&self, medium: &Entity) -> PbrtResult<Option<DVec3>> {
         let parameters = &medium.parameters;
         let kind = parameters.string("type")?.map_or("", |kind| &kind.text);
         let color = |name, default: f64| {
-            let color = self.resolver.colors.color(parameters, name, medium.color_space, SpectrumUse::Unbounded)?;
+            let (colors, usage) = (self.resolver.colors, SpectrumUse::Unbounded);
+            let color = colors.color(parameters, name, medium.color_space, usage)?;
             PbrtResult::Ok(color.unwrap_or(DVec3::splat(default)))
         };
-        let scattering = color("sigma_s", 1.0)?;
-        let absorption = color("sigma_a", 1.0)?;
+        let (scattering, absorption) = (color("sigma_s", 1.0)?, color("sigma_a", 1.0)?);
         let scale = parameters.float("scale", 1.0)?;
-        let is_clear = kind == "homogeneous" && scattering == DVec3::ZERO;
-        if is_clear && parameters.find("preset").is_none() && parameters.find("Le").is_none() {
-            let attenuation = (absorption * scale).max(DVec3::ZERO);
-            return Ok(Some(DVec3::from(attenuation.to_array().map(|part| libm::exp(-part)))));
-        }
-        self.notes.substitute_light(&format!("medium `{kind}`"), "there is no medium", medium.span());
-        Ok(None)
+        let is_clear = kind == "homogeneous"
+            && scattering == DVec3::ZERO
+            && parameters.find("preset").is_none()
+            && parameters.find("Le").is_none();
+        Ok(is_clear.then_some((absorption * scale).max(DVec3::ZERO)))
     }
 }
 

@@ -18,7 +18,12 @@ use crate::math::color::luminance;
 use crate::math::{DMat4, DVec2, DVec3, Vec3};
 
 /// Samples per texel along each axis.
-const SUBSAMPLES: usize = 4;
+const SUBSAMPLES: usize = 2;
+/// Samples per texel along each axis where the radiance varies by more than [`CONTRAST`].
+const FINE_SUBSAMPLES: usize = 8;
+/// Ratio of the largest to the smallest sample of a texel above which more samples are taken, so that small
+/// bright sources keep their power.
+const CONTRAST: f64 = 3.0;
 /// Largest and smallest number of rows of an environment map.
 const ROWS: [usize; 2] = [64, 2048];
 
@@ -120,17 +125,24 @@ impl Map {
 /// Adds all maps and a constant to an equirectangular map.
 fn resample(maps: &[Map], color: DVec3, rows: usize) -> Pixels {
     let columns = 2 * rows;
+    let texel = |column: usize, row: usize, count: usize| {
+        let (mut sum, mut least, mut most) = (DVec3::ZERO, f64::INFINITY, 0.0_f64);
+        for index in 0..count * count {
+            let offset = |index: usize| (index as f64 + 0.5) / count as f64;
+            let u = (column as f64 + offset(index % count)) / columns as f64;
+            let v = (row as f64 + offset(index / count)) / rows as f64;
+            let direction = environment_direction(u, v);
+            let radiance: DVec3 = maps.iter().map(|map| map.radiance(direction)).sum();
+            (least, most) = (least.min(radiance.max_element()), most.max(radiance.max_element()));
+            sum += radiance;
+        }
+        (sum / (count * count) as f64, most > CONTRAST * least)
+    };
     let row_values = |row: usize| {
         (0..columns).map(move |column| {
-            let mut sum = DVec3::ZERO;
-            for index in 0..SUBSAMPLES * SUBSAMPLES {
-                let offset = |index: usize| (index as f64 + 0.5) / SUBSAMPLES as f64;
-                let u = (column as f64 + offset(index % SUBSAMPLES)) / columns as f64;
-                let v = (row as f64 + offset(index / SUBSAMPLES)) / rows as f64;
-                let direction = environment_direction(u, v);
-                sum += maps.iter().map(|map| map.radiance(direction)).sum::<DVec3>();
-            }
-            (sum / (SUBSAMPLES * SUBSAMPLES) as f64 + color).max(DVec3::ZERO).as_vec3()
+            let (coarse, has_contrast) = texel(column, row, SUBSAMPLES);
+            let radiance = if has_contrast { texel(column, row, FINE_SUBSAMPLES).0 } else { coarse };
+            (radiance + color).max(DVec3::ZERO).as_vec3()
         })
     };
     let values: Vec<Vec3> = (0..rows).into_par_iter().flat_map_iter(row_values).collect();
@@ -197,6 +209,26 @@ mod tests {
         assert!((mean - 1.0 / 3.0).abs() < 1e-3, "{mean}");
         let mean = directions.iter().map(|direction| direction.x * direction.x).sum::<f64>() / directions.len() as f64;
         assert!((mean - 1.0 / 3.0).abs() < 1e-3, "{mean}");
+    }
+
+    #[test]
+    fn small_sources_keep_their_power() {
+        let size = 64;
+        let mut values = vec![Vec3::splat(0.01); size * size];
+        values[20 * size + 37] = Vec3::splat(1000.0);
+        let exact = 4.0 * PI * (1000.0 + 0.01 * (size * size - 1) as f64) / (size * size) as f64;
+        let map =
+            Map { pixels: Pixels { width: size, height: size, values }, scale: 1.0, to_light: DMat4::IDENTITY };
+        let resampled = resample(&[map], DVec3::ZERO, size);
+        let row_angle = PI / resampled.height as f64;
+        let power: f64 = (0..resampled.height)
+            .flat_map(|row| (0..resampled.width).map(move |column| (column, row)))
+            .map(|(column, row)| {
+                let sine = ((row as f64 + 0.5) * row_angle).sin();
+                resampled.get(column, row).x * sine * row_angle * TAU / resampled.width as f64
+            })
+            .sum();
+        assert!((power / exact - 1.0).abs() < 0.02, "{power} {exact}");
     }
 
     #[test]

@@ -399,6 +399,7 @@ impl MaterialReader<'_, '_> {
     /// Reads `displacement`, which perturbs the normals.
     fn read_bump(&mut self) -> PbrtResult<()> {
         let Some(node) = self.node("displacement", TextureValue::Number)? else { return Ok(()) };
+        let node = self.writer.without_missing_images(&node);
         if node.as_constant().is_some() {
             return Ok(());
         }

@@ -48,13 +48,12 @@ impl SceneWriter<'_> {
         let header = read_header(&self.asset_path(&file.text));
         let is_compressed = is_gzip(&file.text);
         let must_read = header.as_ref().is_some_and(|header| {
-            is_compressed
-                || header.size < SMALL_FILE_BYTES
+            header.size < SMALL_FILE_BYTES
                 || placement.is_reversed
                 || placement.emits && header.has_normals
                 || placement.needs_uv && !header.has_uvs
         });
-        if must_read {
+        if is_compressed || must_read {
             match self.load_mesh_file(parameters)? {
                 Some(data) if is_compressed || placement.emits || placement.needs_uv && data.uvs.is_empty() => {
                     self.write_mesh_data(data, &stem(&file.text), placement);

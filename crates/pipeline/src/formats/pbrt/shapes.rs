@@ -158,7 +158,10 @@ impl SceneWriter<'_> {
     ) -> PbrtResult<()> {
         let levels = parameters.integer("levels", 3, 0..=i64::from(i32::MAX))?;
         parameters.ignore(&["scheme"]);
-        let most = if data.triangles.len() > 50_000 { 3 } else { 6 };
+        /// Maximum number of triangles after subdivision.
+        const MAX_TRIANGLES: usize = 16 << 20;
+        let fits = |level: &i64| data.triangles.len() << (2 * level) <= MAX_TRIANGLES;
+        let most = (0..=6).rev().find(fits).unwrap_or(0);
         if levels > most {
             let text = format!("{most} levels are used");
             self.notes.note("many levels of `loopsubdiv`", &text, parameters.span_of("levels"));

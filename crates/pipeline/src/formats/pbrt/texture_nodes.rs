@@ -127,7 +127,7 @@ impl TextureNode {
     }
 
     /// Interpolates two textures.
-    fn mix(first: Self, second: Self, amount: Self) -> Self {
+    pub(super) fn mix(first: Self, second: Self, amount: Self) -> Self {
         match (&first, &second, amount.as_constant()) {
             (Self::Constant(a), Self::Constant(b), Some(amount)) => Self::Constant(a.lerp(*b, amount.x)),
             (_, _, Some(amount)) if amount.x == 0.0 => first,

@@ -1,6 +1,7 @@
 //! Adds the `[textures]` tables.
 
 use std::collections::HashMap;
+use std::sync::Arc;
 
 use super::scene::SceneWriter;
 use super::texture_nodes::{ImageFilter, ImageNode, ImageWrap, TextureNode, UvMapping};
@@ -30,6 +31,7 @@ pub(super) enum TextureUse {
 impl SceneWriter<'_> {
     /// Returns the value of a color key: a color or a reference to a texture.
     pub(super) fn color_value(&mut self, node: &TextureNode) -> BuiltValue {
+        let node = &self.without_missing_images(node);
         if let Some(color) = node.as_constant() {
             return shorten_color(color);
         }
@@ -38,11 +40,45 @@ impl SceneWriter<'_> {
 
     /// Returns the value of a number key.
     pub(super) fn number_value(&mut self, node: &TextureNode) -> BuiltValue {
+        let node = &self.without_missing_images(node);
         if let Some(number) = node.as_constant() {
             return number.x.into();
         }
         let name = self.texture(node, TextureUse::Number);
         BuiltValue::Table(vec![("texture", name.into()), ("channel", "r".into())])
+    }
+
+    /// Replaces missing images with gray if they are tolerated.
+    pub(super) fn without_missing_images(&mut self, node: &TextureNode) -> TextureNode {
+        if let TextureNode::Image(image) = node
+            && self.is_tolerated_missing(&image.file, "image", "gray is used")
+        {
+            return TextureNode::Constant(DVec3::splat(0.5));
+        }
+        let mut of = |part: &TextureNode| self.without_missing_images(part);
+        match node {
+            TextureNode::Constant(_) | TextureNode::Image(_) | TextureNode::Noise { .. } => node.clone(),
+            TextureNode::Checker(mapping, parts) => {
+                TextureNode::Checker(*mapping, Arc::new(parts.each_ref().map(&mut of)))
+            }
+            TextureNode::Product(parts) => {
+                let [first, second] = parts.each_ref().map(&mut of);
+                TextureNode::product(first, second)
+            }
+            TextureNode::Mix(parts) => {
+                let [first, second, amount] = parts.each_ref().map(&mut of);
+                TextureNode::mix(first, second, amount)
+            }
+            TextureNode::Bilinear(mapping, parts) => {
+                TextureNode::Bilinear(*mapping, Arc::new(parts.each_ref().map(&mut of)))
+            }
+            TextureNode::Power(part, exponent) => match of(part) {
+                TextureNode::Constant(value) => {
+                    TextureNode::Constant(DVec3::splat(libm::pow(value.x.max(0.0), *exponent)))
+                }
+                part => TextureNode::Power(Arc::new(part), *exponent),
+            },
+        }
     }
 
     /// Returns the name of the texture's table. Adds the table if it is new.
