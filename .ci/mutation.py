@@ -47,6 +47,8 @@ DIRECT = "direct::"
 PICKS = "direct::light_tree::"
 SKY = "lights::infinite::sky::tests::"
 SUBDIVISION = "assets::mesh::subdivide::tests::"
+PBRT = "formats::pbrt::"
+PBRT_FACTS = "formats::pbrt::tests::facts::"
 
 # Fault, file, the code around the expression in ⟦⟧, its replacement, and the test that must fail.
 FAULTS = [
@@ -488,6 +490,37 @@ FAULTS = [
      "models::physical_mtl_matches_principled_material"),
     ("metals in MTL files that are isotropic", "assets/mesh/mtl/material.rs", "let anisotropy = if ⟦physical.is_metal()⟧ {", "false",
      "assets::mesh::mtl::tests::pbr_statements_are_converted"),
+    ("images of pbrt cameras that are not mirrored", "formats/pbrt/settings.rs", "if ⟦!is_mirroring(&matrix)⟧ {", "false",
+     PBRT_FACTS + "left_handed_cameras_mirror_the_image"),
+    ("fields of view along the height", "formats/pbrt/settings.rs", "libm::tan(fov.to_radians() * 0.5) * ⟦height⟧ * 0.5;", "2.0",
+     PBRT_FACTS + "field_of_view_is_along_the_shorter_side"),
+    ("exposure without the shutter", "formats/pbrt/settings.rs", "film.gain * ⟦exposure⟧;", "1.0",
+     PBRT_FACTS + "iso_and_shutter_become_gain"),
+    ("roughness that is never remapped", "formats/pbrt/materials.rs", "Some(if ⟦is_remapped⟧ {", "false",
+     PBRT_FACTS + "roughness_is_remapped_by_default"),
+    ("metals under coats as in air", "formats/pbrt/materials.rs", "TextureNode::Constant(DVec3::splat(⟦1.0 / coat_ior⟧))", "1.0",
+     PBRT_FACTS + "conductors_are_copper_by_default"),
+    ("spectra of lights that keep their luminance", "formats/pbrt/colors.rs", "xyz_to_linear_rgb(xyz / ⟦xyz.y⟧)", "1.0",
+     PBRT + "colors::tests::emission_is_divided_by_its_luminance_but_rgb_is_not"),
+    ("fronts of meshes that ignore the normals", "formats/pbrt/meshes.rs", "⟦self.area_vector(triangle).dot(sum) < 0.0⟧", "is_reversed",
+     PBRT_FACTS + "fronts_of_emissive_meshes_follow_pbrt"),
+    ("disks that ReverseOrientation does not turn", "formats/pbrt/shapes.rs", "let normal = if ⟦placement.is_reversed⟧ {", "false",
+     PBRT_FACTS + "only_reverse_orientation_turns_disks_and_spheres"),
+    ("power of a whole mesh", "formats/pbrt/emitters.rs", "/ ⟦areas.len().max(1) as f64⟧;", "1.0",
+     PBRT_FACTS + "power_of_area_lights_is_per_triangle"),
+    ("two checker cells per unit", "formats/pbrt/textures.rs", "push_mapping(&mut keys, mapping, ⟦2.0⟧);", "1.0",
+     PBRT_FACTS + "checker_cells_are_one_unit"),
+    ("linear numbers of images", "formats/pbrt/textures.rs", "let is_integer = ⟦!has_float_extension(&image.file.text)⟧;", "false",
+     PBRT_FACTS + "numbers_of_images_decode_from_srgb"),
+    ("reliefs of one unit", "formats/pbrt/bake.rs", "sign * ⟦image.factor.x⟧)", "1.0",
+     PBRT_FACTS + "displacement_keeps_its_scale"),
+    ("lower half of equal-area maps turned", "formats/pbrt/environment.rs", "(u, v) = ⟦(1.0 - v, 1.0 - u)⟧;", "(1.0 - u, 1.0 - v)",
+     PBRT + "environment::tests::square_mapping_is_inverted"),
+    ("small bright sources sampled coarsely", "formats/pbrt/environment.rs", "let radiance = if ⟦has_contrast(column, row)⟧ {", "false",
+     PBRT + "environment::tests::small_sources_keep_their_power"),
+    ("paths relative to the included file", "formats/pbrt/parser.rs", "let path = ⟦self.folder.join(&name.text)⟧;",
+     "self.open_files[self.open_files.len() - 1].with_file_name(&name.text)",
+     PBRT_FACTS + "included_paths_are_relative_to_the_first_file"),
 ]
 
 

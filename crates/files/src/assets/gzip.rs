@@ -50,8 +50,10 @@ mod tests {
     fn gzip_files_are_decompressed_up_to_a_limit() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("a.gz");
-        let mut encoder =
-            flate2::write::GzEncoder::new(std::fs::File::create(&path).expect("a file"), flate2::Compression::fast());
+        let mut encoder = flate2::write::GzEncoder::new(
+            std::fs::File::create(&path).expect("a file"),
+            flate2::Compression::fast(),
+        );
         encoder.write_all(&[7; 5000]).expect("written");
         encoder.finish().expect("written");
         let read = |limit| read_gzip_file(&path, limit, &CancelToken::new()).map(|file| file.bytes);

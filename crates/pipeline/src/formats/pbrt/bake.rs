@@ -6,6 +6,7 @@ use std::collections::HashMap;
 use rayon::prelude::*;
 
 use super::lexer::{PbrtError, PbrtResult};
+use super::memo;
 use super::pixels::Pixels;
 use super::scene::SceneWriter;
 use super::texture_nodes::{ImageFilter, ImageNode, ImageWrap, TextureNode, UvMapping};
@@ -16,6 +17,7 @@ use crate::control::ignore_progress;
 use crate::materials::texels::Texels;
 use crate::math::color::luminance;
 use crate::math::{DVec2, DVec3, Vec3};
+use crate::system::file::FileStamp;
 
 /// Maximum number of texels of a computed image.
 const MAX_TEXELS: f64 = 8e6;
@@ -58,8 +60,13 @@ impl SceneWriter<'_> {
 
     /// Whether an image is gray without alpha, so that its first channel is the number that pbrt uses.
     pub(super) fn is_gray_image(&mut self, image: &ImageNode) -> bool {
-        let Ok(texels) = self.decode(image, ImageEncoding::CutOut(ColorCurve::Srgb)) else { return true };
-        texels.are_all_gray() && !has_transparency(&texels)
+        let path = self.asset_path(&image.file.text);
+        let stamp = FileStamp::from_path(&path);
+        self.companions.push(Companion { path: path.clone(), hash: None, stamp });
+        memo::is_gray(&path, stamp, || {
+            let Ok(texels) = self.decode(image, ImageEncoding::CutOut(ColorCurve::Srgb)) else { return true };
+            texels.are_all_gray() && !has_transparency(&texels)
+        })
     }
 
     /// Mean luminance of an image.
@@ -134,12 +141,13 @@ impl SceneWriter<'_> {
 
     fn decode(&mut self, image: &ImageNode, encoding: ImageEncoding) -> Result<Texels, AssetError> {
         let path = self.asset_path(&image.file.text);
+        let stamp = FileStamp::from_path(&path);
         let loaded = load_hashed(&path, encoding, ImageLimits::default(), &ignore_progress, self.token);
         let (hash, result) = match loaded {
             Ok((decoded, hash)) => (Some(hash), Ok(decoded.texels)),
             Err(error) => (None, Err(error)),
         };
-        self.companions.push(Companion { path, hash, stamp: None });
+        self.companions.push(Companion { path, hash, stamp });
         result
     }
 }

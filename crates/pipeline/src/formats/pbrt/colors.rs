@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use super::lexer::{PbrtError, PbrtResult};
 use super::parameters::{Parameter, ParameterType, Parameters, Text, Values};
 use super::state::ColorSpace;
-use crate::assets::read_text_file;
 use crate::assets::Companion;
+use crate::assets::read_text_file;
 use crate::choice::Choice;
 use crate::control::CancelToken;
 use crate::formats::foreign::spectra::{
@@ -169,7 +169,7 @@ impl<'a> ColorReader<'a> {
             return Err(unknown_spectrum(&name.text, span));
         }
         let read = read_text_file(&path, MAX_BYTES, self.token);
-        let (hash, stamp) = read.as_ref().map_or((None, None), |file| (Some(file.hash), file.stamp.clone()));
+        let (hash, stamp) = read.as_ref().map_or((None, None), |file| (Some(file.hash), file.stamp));
         self.companions.borrow_mut().push(Companion { path: path.clone(), hash, stamp });
         let file = read.map_err(|error| PbrtError::new(span.clone(), error.to_string()))?;
         SampledSpectrum::from_spd(&file.text).map_err(|(line, reason)| {

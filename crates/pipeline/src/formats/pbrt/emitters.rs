@@ -119,12 +119,7 @@ impl SceneWriter<'_> {
     }
 
     /// Returns the area of a shape for `power`, which pbrt gives to every triangle of a mesh.
-    fn area_for_power(
-        &mut self,
-        shape: &Entity,
-        data: Option<&MeshData>,
-        matrix: &DMat4,
-    ) -> PbrtResult<f64> {
+    fn area_for_power(&mut self, shape: &Entity, data: Option<&MeshData>, matrix: &DMat4) -> PbrtResult<f64> {
         let (parameters, span) = (&shape.parameters, shape.span());
         let loaded;
         let data = match (&*shape.kind.text, data) {

@@ -7,23 +7,25 @@ use rayon::prelude::*;
 
 use super::lexer::{PbrtError, PbrtResult};
 use super::lights::InfiniteLights;
+use super::memo;
 use super::parameters::Text;
 use super::pixels::Pixels;
 use super::scene::SceneWriter;
-use crate::assets::Companion;
 use crate::assets::image::{ImageEncoding, ImageLimits, load_hashed};
+use crate::assets::{Companion, FileHash};
 use crate::control::ignore_progress;
 use crate::formats::rounding::shorten_color;
 use crate::math::color::luminance;
 use crate::math::{DMat4, DVec2, DVec3, Vec3};
+use crate::system::file::FileStamp;
 
 /// Samples per texel along each axis.
 const SUBSAMPLES: usize = 2;
 /// Samples per texel along each axis where the radiance varies by more than [`CONTRAST`].
 const FINE_SUBSAMPLES: usize = 8;
-/// Ratio of the largest to the smallest sample of a texel above which more samples are taken, so that small
+/// Ratio of the largest to the smallest sample of a texel and its neighbors above which more samples are taken, so that small
 /// bright sources keep their power.
-const CONTRAST: f64 = 3.0;
+const CONTRAST: f32 = 3.0;
 /// Largest and smallest number of rows of an environment map.
 const ROWS: [usize; 2] = [64, 2048];
 
@@ -44,6 +46,8 @@ struct Map {
     scale: f64,
     /// Transform from the world to the light's coordinates.
     to_light: DMat4,
+    /// Hash of the file.
+    hash: FileHash,
 }
 
 impl SceneWriter<'_> {
@@ -60,11 +64,16 @@ impl SceneWriter<'_> {
         for image in &lights.images {
             maps.push(self.load_map(image)?);
         }
+        // Everything that determines the map.
+        let mut key = format!("{:?}", lights.color);
+        for (image, map) in lights.images.iter().zip(&maps) {
+            key.push_str(&format!("{:?} {:?} {:?}", map.hash, map.scale, image.matrix));
+        }
         let rows = maps.iter().map(|map| map.pixels.height).max().unwrap_or(ROWS[0]);
         let rows = rows.clamp(ROWS[0], ROWS[1]);
-        let pixels = resample(&maps, lights.color, rows);
+        let bytes = memo::environment(key, || resample(&maps, lights.color, rows).encode_pfm(false));
         let span = lights.images[0].file.span.clone();
-        let name = self.add_generated_file("environment", "pfm", pixels.encode_pfm(false));
+        let name = self.add_generated_file("environment", "pfm", bytes);
         self.document.at(span);
         self.document.table("environment");
         self.document.set("file", name);
@@ -74,10 +83,11 @@ impl SceneWriter<'_> {
     fn load_map(&mut self, image: &InfiniteImage) -> PbrtResult<Map> {
         let path = self.asset_path(&image.file.text);
         let (limits, encoding) = (ImageLimits::default(), ImageEncoding::Color);
+        let stamp = FileStamp::from_path(&path);
         let loaded = load_hashed(&path, encoding, limits, &ignore_progress, self.token);
         let hash = loaded.as_ref().ok().map(|(_, hash)| *hash);
-        self.companions.push(Companion { path, hash, stamp: None });
-        let (decoded, _) =
+        self.companions.push(Companion { path, hash, stamp });
+        let (decoded, hash) =
             loaded.map_err(|error| PbrtError::new(image.file.span.clone(), error.to_string()))?;
         let (width, height) = (decoded.texels.width as usize, decoded.texels.height as usize);
         let pixels = Pixels { width, height, values: decoded.texels.into_linear_colors() };
@@ -89,7 +99,7 @@ impl SceneWriter<'_> {
             Some(goal) => image.scale * goal / upper_illuminance(&pixels).max(1e-12),
             None => image.scale,
         };
-        Ok(Map { pixels, scale, to_light: image.matrix.inverse() })
+        Ok(Map { pixels, scale, to_light: image.matrix.inverse(), hash })
     }
 }
 
@@ -122,30 +132,59 @@ impl Map {
     }
 }
 
-/// Adds all maps and a constant to an equirectangular map.
+/// The samples of a texel.
+#[derive(Clone, Copy)]
+struct TexelSamples {
+    mean: Vec3,
+    /// Smallest and largest component.
+    least: f32,
+    most: f32,
+}
+
+/// Takes `count`² samples of the texel at a column and a row.
+fn sample_texel(maps: &[Map], rows: usize, column: usize, row: usize, count: usize) -> TexelSamples {
+    let (mut sum, mut least, mut most) = (DVec3::ZERO, f64::INFINITY, 0.0_f64);
+    for index in 0..count * count {
+        let offset = |index: usize| (index as f64 + 0.5) / count as f64;
+        let u = (column as f64 + offset(index % count)) / (2 * rows) as f64;
+        let v = (row as f64 + offset(index / count)) / rows as f64;
+        let direction = environment_direction(u, v);
+        let radiance: DVec3 = maps.iter().map(|map| map.radiance(direction)).sum();
+        (least, most) = (least.min(radiance.max_element()), most.max(radiance.max_element()));
+        sum += radiance;
+    }
+    let mean = (sum / (count * count) as f64).as_vec3();
+    TexelSamples { mean, least: least as f32, most: most as f32 }
+}
+
+/// Adds all maps and a constant to an equirectangular map. Where neighboring texels differ much, takes more
+/// samples.
 fn resample(maps: &[Map], color: DVec3, rows: usize) -> Pixels {
     let columns = 2 * rows;
-    let texel = |column: usize, row: usize, count: usize| {
-        let (mut sum, mut least, mut most) = (DVec3::ZERO, f64::INFINITY, 0.0_f64);
-        for index in 0..count * count {
-            let offset = |index: usize| (index as f64 + 0.5) / count as f64;
-            let u = (column as f64 + offset(index % count)) / columns as f64;
-            let v = (row as f64 + offset(index / count)) / rows as f64;
-            let direction = environment_direction(u, v);
-            let radiance: DVec3 = maps.iter().map(|map| map.radiance(direction)).sum();
-            (least, most) = (least.min(radiance.max_element()), most.max(radiance.max_element()));
-            sum += radiance;
+    let coarse: Vec<TexelSamples> = (0..rows * columns)
+        .into_par_iter()
+        .map(|index| sample_texel(maps, rows, index % columns, index / columns, SUBSAMPLES))
+        .collect();
+    let has_contrast = |column: usize, row: usize| {
+        let (mut least, mut most) = (f32::INFINITY, 0.0_f32);
+        for near in row.saturating_sub(1)..(row + 2).min(rows) {
+            for offset in [columns - 1, 0, 1] {
+                let texel = coarse[near * columns + (column + offset) % columns];
+                (least, most) = (least.min(texel.least), most.max(texel.most));
+            }
         }
-        (sum / (count * count) as f64, most > CONTRAST * least)
+        most > CONTRAST * least
     };
-    let row_values = |row: usize| {
-        (0..columns).map(move |column| {
-            let (coarse, has_contrast) = texel(column, row, SUBSAMPLES);
-            let radiance = if has_contrast { texel(column, row, FINE_SUBSAMPLES).0 } else { coarse };
-            (radiance + color).max(DVec3::ZERO).as_vec3()
-        })
+    let value = |index: usize| {
+        let (column, row) = (index % columns, index / columns);
+        let radiance = if has_contrast(column, row) {
+            sample_texel(maps, rows, column, row, FINE_SUBSAMPLES).mean
+        } else {
+            coarse[index].mean
+        };
+        (radiance + color.as_vec3()).max(Vec3::ZERO)
     };
-    let values: Vec<Vec3> = (0..rows).into_par_iter().flat_map_iter(row_values).collect();
+    let values = (0..rows * columns).into_par_iter().map(value).collect();
     Pixels { width: columns, height: rows, values }
 }
 
@@ -202,12 +241,16 @@ mod tests {
         // Each of the 8 octants covers the same number of texels, and the mean of z² is 1/3.
         let count = 256;
         let directions: Vec<DVec3> = (0..count * count)
-            .map(|index| DVec2::new((index % count) as f64 + 0.5, (index / count) as f64 + 0.5) / count as f64)
+            .map(|index| {
+                DVec2::new((index % count) as f64 + 0.5, (index / count) as f64 + 0.5) / count as f64
+            })
             .map(direction_of_square)
             .collect();
-        let mean = directions.iter().map(|direction| direction.z * direction.z).sum::<f64>() / directions.len() as f64;
+        let mean = directions.iter().map(|direction| direction.z * direction.z).sum::<f64>()
+            / directions.len() as f64;
         assert!((mean - 1.0 / 3.0).abs() < 1e-3, "{mean}");
-        let mean = directions.iter().map(|direction| direction.x * direction.x).sum::<f64>() / directions.len() as f64;
+        let mean = directions.iter().map(|direction| direction.x * direction.x).sum::<f64>()
+            / directions.len() as f64;
         assert!((mean - 1.0 / 3.0).abs() < 1e-3, "{mean}");
     }
 
@@ -217,8 +260,11 @@ mod tests {
         let mut values = vec![Vec3::splat(0.01); size * size];
         values[20 * size + 37] = Vec3::splat(1000.0);
         let exact = 4.0 * PI * (1000.0 + 0.01 * (size * size - 1) as f64) / (size * size) as f64;
-        let map =
-            Map { pixels: Pixels { width: size, height: size, values }, scale: 1.0, to_light: DMat4::IDENTITY };
+        let map = Map {
+            pixels: Pixels { width: size, height: size, values },
+            scale: 1.0,
+            to_light: DMat4::IDENTITY,
+        };
         let resampled = resample(&[map], DVec3::ZERO, size);
         let row_angle = PI / resampled.height as f64;
         let power: f64 = (0..resampled.height)
@@ -245,7 +291,7 @@ mod tests {
             DVec3::Y.extend(0.0),
             crate::math::DVec4::W,
         );
-        let map = Map { pixels, scale: 2.0, to_light: matrix.inverse() };
+        let map = Map { pixels, scale: 2.0, to_light: matrix.inverse(), hash: [0; 32] };
         let resampled = resample(&[map], DVec3::new(0.0, 0.5, 0.0), 64);
         assert_eq!(resampled.get(17, 10), DVec3::new(2.0, 0.5, 0.0), "upper half");
         assert_eq!(resampled.get(90, 50), DVec3::new(0.0, 0.5, 2.0), "lower half");

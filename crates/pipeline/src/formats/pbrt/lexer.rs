@@ -208,7 +208,10 @@ mod tests {
     #[test]
     fn tokens_need_no_blanks_between_them() {
         let text = "Shape\"sphere\"\"float radius\"[1 -2.5e3]# to the end [ \"\nWorldBegin";
-        assert_eq!(tokens(text), ["Shape", "'sphere", "'float radius", "[", "1", "-2.5e3", "]", "WorldBegin"]);
+        assert_eq!(
+            tokens(text),
+            ["Shape", "'sphere", "'float radius", "[", "1", "-2.5e3", "]", "WorldBegin"]
+        );
         assert_eq!(tokens("\u{feff}a#b \"x\\\"y\\n\""), ["a#b", "'x\"y\n"]);
     }
 

@@ -67,12 +67,7 @@ impl SceneWriter<'_> {
 
     /// Returns color · scale, with `scale` changed so that a luminance of 1 has the given `power` or
     /// `illuminance`. `unit` is the power or the illuminance for a luminance of 1.
-    fn scaled_color(
-        &self,
-        light: &PlacedEntity,
-        names: [&'static str; 2],
-        unit: f64,
-    ) -> PbrtResult<DVec3> {
+    fn scaled_color(&self, light: &PlacedEntity, names: [&'static str; 2], unit: f64) -> PbrtResult<DVec3> {
         let [color_name, goal_name] = names;
         let (parameters, space) = (&light.entity.parameters, light.entity.color_space);
         let color = self.resolver.colors.color(parameters, color_name, space, SpectrumUse::Emission)?;
@@ -160,7 +155,8 @@ impl SceneWriter<'_> {
             return Ok(());
         };
         if parameters.find("L").is_some() {
-            let error = PbrtError::new(parameters.span_of("filename"), "`filename` cannot be combined with `L`");
+            let error =
+                PbrtError::new(parameters.span_of("filename"), "`filename` cannot be combined with `L`");
             return Err(error.with_help("remove one of them"));
         }
         let illuminance = parameters.optional_float("illuminance")?.filter(|goal| *goal > 0.0);

@@ -30,13 +30,26 @@ pub(super) enum MaterialModel {
         /// Whether it is solid glass.
         is_glass: bool,
     },
-    Blend { parts: [BlendPart; 2], amount: TextureNode },
+    Blend {
+        parts: [BlendPart; 2],
+        amount: TextureNode,
+    },
     Invisible,
 }
 
 const MATERIALS: [&str; 12] = [
-    "interface", "diffuse", "coateddiffuse", "coatedconductor", "diffusetransmission", "dielectric",
-    "thindielectric", "hair", "conductor", "measured", "mix", "subsurface",
+    "interface",
+    "diffuse",
+    "coateddiffuse",
+    "coatedconductor",
+    "diffusetransmission",
+    "dielectric",
+    "thindielectric",
+    "hair",
+    "conductor",
+    "measured",
+    "mix",
+    "subsurface",
 ];
 
 const OLD_MATERIALS: [&str; 9] =
@@ -229,7 +242,8 @@ impl MaterialReader<'_, '_> {
         self.isotropic_roughness("roughness", roughness)?;
         let is_smooth = self.keys.last().is_some_and(|(_, value)| *value == BuiltValue::Number(0.0));
         if !is_smooth {
-            let text = "glimt's base receives all light that the coat does not reflect, and is 2 to 5 % brighter";
+            let text =
+                "glimt's base receives all light that the coat does not reflect, and is 2 to 5 % brighter";
             self.writer.notes.note("rough `coateddiffuse`", text, entity.span());
         }
         self.read_layer_medium()

@@ -55,7 +55,9 @@ impl SceneWriter<'_> {
         });
         if is_compressed || must_read {
             match self.load_mesh_file(parameters)? {
-                Some(data) if is_compressed || placement.emits || placement.needs_uv && data.uvs.is_empty() => {
+                Some(data)
+                    if is_compressed || placement.emits || placement.needs_uv && data.uvs.is_empty() =>
+                {
                     self.write_mesh_data(data, &stem(&file.text), placement);
                     return Ok(());
                 }
@@ -135,7 +137,8 @@ fn read_header(path: &Path) -> Option<MeshHeader> {
     let header = text.split("end_header").next().unwrap_or_default();
     let has = |names: &[&str]| {
         let is_property = |line: &str| {
-            line.starts_with("property") && names.contains(&line.split_whitespace().last().unwrap_or_default())
+            line.starts_with("property")
+                && names.contains(&line.split_whitespace().last().unwrap_or_default())
         };
         header.lines().any(|line| is_property(line.trim()))
     };

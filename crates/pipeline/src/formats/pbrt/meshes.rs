@@ -34,8 +34,7 @@ impl MeshData {
 
     /// Twice the area of a triangle whose corners are transformed by `matrix`.
     pub(super) fn transformed_area(&self, triangle: [u32; 3], matrix: &crate::math::DMat4) -> f64 {
-        let [a, b, c] =
-            triangle.map(|vertex| matrix.transform_point3(self.positions[vertex as usize]));
+        let [a, b, c] = triangle.map(|vertex| matrix.transform_point3(self.positions[vertex as usize]));
         0.5 * (b - a).cross(c - a).length()
     }
 
@@ -78,15 +77,13 @@ impl MeshData {
         self.normals = corner(&self.normals, &self.triangles);
         let uvs = [DVec2::ZERO, DVec2::X, DVec2::ONE];
         self.uvs = uvs.into_iter().cycle().take(3 * self.triangles.len()).collect();
-        self.triangles = (0..self.triangles.len() as u32).map(|index| [0, 1, 2].map(|k| 3 * index + k)).collect();
+        self.triangles =
+            (0..self.triangles.len() as u32).map(|index| [0, 1, 2].map(|k| 3 * index + k)).collect();
     }
 
     /// Splits a parametric surface into a grid of `columns` by `rows` cells. `surface` returns the position
     /// and the normal at (u, v).
-    pub(super) fn from_surface(
-        [columns, rows]: [u32; 2],
-        surface: impl Fn(DVec2) -> (DVec3, DVec3),
-    ) -> Self {
+    pub(super) fn from_surface([columns, rows]: [u32; 2], surface: impl Fn(DVec2) -> (DVec3, DVec3)) -> Self {
         let mut mesh = Self::default();
         for row in 0..=rows {
             for column in 0..=columns {
@@ -123,7 +120,9 @@ impl MeshData {
             header.push_str("property float u\nproperty float v\n");
         }
         let count = self.triangles.len();
-        header.push_str(&format!("element face {count}\nproperty list uchar uint vertex_indices\nend_header\n"));
+        header.push_str(&format!(
+            "element face {count}\nproperty list uchar uint vertex_indices\nend_header\n"
+        ));
         let mut bytes = header.into_bytes();
         bytes.reserve(self.positions.len() * 44 + count * 13);
         for (index, position) in self.positions.iter().enumerate() {

@@ -12,6 +12,7 @@ mod lexer;
 mod lights;
 mod material_tables;
 mod materials;
+mod memo;
 mod mesh_files;
 mod meshes;
 mod objects;
@@ -26,6 +27,7 @@ mod state;
 mod tests;
 mod texture_nodes;
 mod textures;
+mod values;
 
 use std::path::{Path, PathBuf};
 
@@ -57,8 +59,9 @@ pub(super) fn convert(
     let mut files: Vec<(PathBuf, Vec<u8>)> = Vec::new();
     for (name, source) in copies {
         context.token.check_pause_and_cancel()?;
-        let bytes = std::fs::read(&source)
-            .map_err(|error| AssetError::malformed(&source, None, format!("cannot read the file: {error}")))?;
+        let bytes = std::fs::read(&source).map_err(|error| {
+            AssetError::malformed(&source, None, format!("cannot read the file: {error}"))
+        })?;
         files.push((PathBuf::from(name), bytes));
     }
     let generated = document.generated_files().iter();
@@ -69,7 +72,9 @@ pub(super) fn convert(
 /// Rejects a scene that `glimt check` would reject.
 fn check_rendered_scene(path: &Path, context: &ForeignReadContext<'_>) -> Result<(), ForeignError> {
     let ForeignScene { document, companions, .. } = read(path, context)?;
-    lower(document, path, &[]).map(|_| ()).map_err(|diagnostics| ForeignError::Scene { diagnostics, companions })
+    lower(document, path, &[])
+        .map(|_| ())
+        .map_err(|diagnostics| ForeignError::Scene { diagnostics, companions })
 }
 
 /// Reads a scene. `import` is the folder for the assets of an imported scene. Also returns the files to copy

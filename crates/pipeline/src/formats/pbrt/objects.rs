@@ -42,7 +42,8 @@ impl SceneWriter<'_> {
             let Some(group) = groups.get(&*instance.name.text) else {
                 let near = nearest_name(&instance.name.text, groups.keys().copied());
                 let shown = escape_and_truncate(&instance.name.text, 40);
-                let error = PbrtError::new(instance.name.span.clone(), format!("there is no object \"{shown}\""));
+                let error =
+                    PbrtError::new(instance.name.span.clone(), format!("there is no object \"{shown}\""));
                 let _ = self.attempt::<()>(Err(error.with_suggestion(near)));
                 continue;
             };

@@ -5,6 +5,7 @@ use std::ops::Range;
 use std::rc::Rc;
 
 use super::lexer::{Lexer, PbrtError, PbrtResult, Token, TokenKind};
+use super::values::parse_values;
 use crate::math::{DVec2, DVec3};
 use crate::scene::nearest::nearest_name;
 use crate::scene::sanitize::escape_and_truncate;
@@ -82,6 +83,9 @@ pub(super) struct Parameter {
     is_used: Cell<bool>,
 }
 
+/// Maximum number of parameters of a statement.
+const MAX_PARAMETERS: usize = 1000;
+
 /// The parameters of a statement.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Parameters {
@@ -115,6 +119,10 @@ impl Parameters {
             if parsed.list.iter().any(|known| known.name == parameter.name) {
                 let message = format!("the parameter `{}` is given twice", shown(&parameter.name));
                 return Err(PbrtError::new(parameter.span, message).with_help("remove one of the two"));
+            }
+            if parsed.list.len() >= MAX_PARAMETERS {
+                let message = format!("a statement can have at most {MAX_PARAMETERS} parameters");
+                return Err(PbrtError::new(parameter.span, message));
             }
             parsed.list.push(Rc::new(parameter));
         }
@@ -323,7 +331,8 @@ impl Parameter {
         match values {
             [one] => Ok(one),
             _ => {
-                let message = format!("`{}` must have one value, but has {}", shown(&self.name), values.len());
+                let message =
+                    format!("`{}` must have one value, but has {}", shown(&self.name), values.len());
                 Err(PbrtError::new(self.values_span.clone(), message))
             }
         }
@@ -361,63 +370,6 @@ fn unknown_type(kind: &str, span: Range<usize>) -> Box<PbrtError> {
 pub(super) const V3_HELP: &str =
     "glimt reads pbrt-v4 scenes; `pbrt --upgrade OLD.pbrt > NEW.pbrt` (of pbrt-v4) converts older ones";
 
-fn parse_values(declaration: &Range<usize>, lexer: &mut Lexer<'_>) -> PbrtResult<(Values, Range<usize>)> {
-    let missing = || PbrtError::new(declaration.clone(), "this parameter has no value");
-    let first = lexer.next()?.ok_or_else(missing)?;
-    let start = first.span.start;
-    let mut values = ValueList::default();
-    match first.kind {
-        TokenKind::Word | TokenKind::Quoted => {
-            let end = first.span.end;
-            values.add(&first)?;
-            return Ok((values.finish(), start..end));
-        }
-        TokenKind::CloseBracket => return Err(PbrtError::new(first.span, "expected a value, found ]")),
-        TokenKind::OpenBracket => {}
-    }
-    loop {
-        let open = || PbrtError::new(first.span.clone(), "this bracket is never closed");
-        let token = lexer.next()?.ok_or_else(open)?;
-        match token.kind {
-            TokenKind::CloseBracket => return Ok((values.finish(), start..token.span.end)),
-            TokenKind::OpenBracket => return Err(PbrtError::new(token.span, "lists cannot be nested")),
-            TokenKind::Word | TokenKind::Quoted => values.add(&token)?,
-        }
-    }
-}
-
-/// Values read so far.
-#[derive(Default)]
-struct ValueList(Option<Values>);
-
-impl ValueList {
-    fn add(&mut self, token: &Token<'_>) -> PbrtResult<()> {
-        let flag = match (&*token.text, token.kind) {
-            ("true", TokenKind::Word) => Some(true),
-            ("false", TokenKind::Word) => Some(false),
-            _ => None,
-        };
-        let text = || Text { text: token.text.clone().into_owned(), span: token.span.clone() };
-        match (&mut self.0, flag, token.kind) {
-            (None, Some(flag), _) => self.0 = Some(Values::Flags(vec![flag])),
-            (None, None, TokenKind::Quoted) => self.0 = Some(Values::Texts(vec![text()])),
-            (None, None, _) => self.0 = Some(Values::Numbers(vec![parse_number(token)?])),
-            (Some(Values::Flags(flags)), Some(flag), _) => flags.push(flag),
-            (Some(Values::Texts(texts)), None, TokenKind::Quoted) => texts.push(text()),
-            (Some(Values::Numbers(numbers)), None, TokenKind::Word) => numbers.push(parse_number(token)?),
-            (Some(_), _, _) => {
-                return Err(PbrtError::new(token.span.clone(), "the values of a list must have the same type"));
-            }
-        }
-        Ok(())
-    }
-
-    /// An empty list counts as numbers.
-    fn finish(self) -> Values {
-        self.0.unwrap_or_else(|| Values::Numbers(Vec::new()))
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -428,11 +380,15 @@ mod tests {
 
     #[test]
     fn values_may_lack_brackets() {
-        let parsed = parse("\"float fov\" 30 \"bool b\" true \"string s\" [ \"x\" ] \"point3 P\" [0 1 2 # c\n 3 4 5]");
+        let parsed =
+            parse("\"float fov\" 30 \"bool b\" true \"string s\" [ \"x\" ] \"point3 P\" [0 1 2 # c\n 3 4 5]");
         let parsed = parsed.expect("parameters");
         assert_eq!(parsed.float("fov", 1.0), Ok(30.0));
         assert_eq!(parsed.bool("b", false), Ok(true));
-        assert_eq!(parsed.string("s").map(|text| text.map(|text| text.text.clone())), Ok(Some("x".to_owned())));
+        assert_eq!(
+            parsed.string("s").map(|text| text.map(|text| text.text.clone())),
+            Ok(Some("x".to_owned()))
+        );
         assert_eq!(parsed.point3s("P"), Ok(vec![DVec3::new(0.0, 1.0, 2.0), DVec3::new(3.0, 4.0, 5.0)]));
         assert_eq!(parsed.check_all_used(), Ok(()));
     }
@@ -470,11 +426,15 @@ mod tests {
 
     #[test]
     fn defaults_are_used_last() {
-        let (mut own, defaults) = (parse("\"float a\" 1"), parse("\"float a\" 2 \"float b\" 3 \"float c\" 4"));
+        let (mut own, defaults) =
+            (parse("\"float a\" 1"), parse("\"float a\" 2 \"float b\" 3 \"float c\" 4"));
         let defaults: Vec<_> = defaults.expect("parameters").into_defaults().collect();
         let own = own.as_mut().expect("parameters");
         own.add_defaults(&defaults);
-        assert_eq!((own.float("a", 0.0), own.float("b", 0.0), own.check_all_used()), (Ok(1.0), Ok(3.0), Ok(())));
+        assert_eq!(
+            (own.float("a", 0.0), own.float("b", 0.0), own.check_all_used()),
+            (Ok(1.0), Ok(3.0), Ok(()))
+        );
     }
 
     #[test]

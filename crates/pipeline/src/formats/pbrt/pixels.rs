@@ -18,11 +18,7 @@ impl Pixels {
 
     /// Interpolates between texel centers. `at` is in pixels from the top left corner. `index` maps columns
     /// and rows outside of the image to columns and rows inside, or returns `None` for black.
-    pub(super) fn bilinear(
-        &self,
-        at: DVec2,
-        index: impl Fn(i64, usize) -> Option<usize>,
-    ) -> DVec3 {
+    pub(super) fn bilinear(&self, at: DVec2, index: impl Fn(i64, usize) -> Option<usize>) -> DVec3 {
         let corner = (at - 0.5).floor();
         let part = at - 0.5 - corner;
         let texel = |column: i64, row: i64| {

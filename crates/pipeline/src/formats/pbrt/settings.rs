@@ -83,7 +83,8 @@ impl SceneWriter<'_> {
         let most = i64::from(u32::MAX);
         let samples = match &*sampler.kind.text {
             "stratified" => {
-                parameters.integer("xsamples", 4, 1..=65_535)? * parameters.integer("ysamples", 4, 1..=65_535)?
+                parameters.integer("xsamples", 4, 1..=65_535)?
+                    * parameters.integer("ysamples", 4, 1..=65_535)?
             }
             "independent" => parameters.integer("pixelsamples", 4, 1..=most)?,
             known if NAMES.contains(&known) => parameters.integer("pixelsamples", 16, 1..=most)?,
@@ -137,10 +138,28 @@ impl SceneWriter<'_> {
             self.notes.note("`regularize`", text, parameters.span_of("regularize"));
         }
         parameters.ignore(&[
-            "lightsampler", "samplelights", "samplebsdf", "bootstrapsamples", "chains",
-            "mutationsperpixel", "largestepprobability", "sigma", "streamcount", "visualizestrategies",
-            "visualizeweights", "cossample", "maxdistance", "seed", "photonsperiteration", "radius",
-            "iterations", "rr", "pixelbounds", "function", "filename", "illuminant",
+            "lightsampler",
+            "samplelights",
+            "samplebsdf",
+            "bootstrapsamples",
+            "chains",
+            "mutationsperpixel",
+            "largestepprobability",
+            "sigma",
+            "streamcount",
+            "visualizestrategies",
+            "visualizeweights",
+            "cossample",
+            "maxdistance",
+            "seed",
+            "photonsperiteration",
+            "radius",
+            "iterations",
+            "rr",
+            "pixelbounds",
+            "function",
+            "filename",
+            "illuminant",
         ]);
         parameters.check_all_used()
     }
@@ -213,7 +232,8 @@ impl SceneWriter<'_> {
         let still = self.still_transform(*transform, span.clone());
         let matrix = still.inverse();
         if !matrix.is_finite() || camera_scale(&matrix).is_none() {
-            let error = PbrtError::new(span, "the transform of this camera is not a rotation and a uniform scale");
+            let error =
+                PbrtError::new(span, "the transform of this camera is not a rotation and a uniform scale");
             return Err(error.with_help("shears and different scales along the axes are not supported"));
         }
         let lens = Lens {
@@ -231,7 +251,8 @@ impl SceneWriter<'_> {
         match kind {
             "perspective" | "orthographic" | "spherical" => {}
             "realistic" => {
-                let error = PbrtError::new(entity.kind.span.clone(), "glimt has no cameras with lens systems");
+                let error =
+                    PbrtError::new(entity.kind.span.clone(), "glimt has no cameras with lens systems");
                 return Err(error.with_help("use a \"perspective\" camera with `lensradius`"));
             }
             other => {
@@ -315,8 +336,7 @@ impl SceneWriter<'_> {
         let pixel = DVec2::new((x1 - x0) / film.size[0] as f64, (y1 - y0) / film.size[1] as f64);
         let [left, top, right, bottom] = film.crop.map(|edge| edge as f64);
         let height = (bottom - top) * pixel.y;
-        let center =
-            DVec2::new(x0 + 0.5 * (left + right) * pixel.x, y1 - 0.5 * (top + bottom) * pixel.y);
+        let center = DVec2::new(x0 + 0.5 * (left + right) * pixel.x, y1 - 0.5 * (top + bottom) * pixel.y);
         match projection {
             "panorama" => {
                 self.document.set("projection", "panorama");
@@ -340,7 +360,7 @@ impl SceneWriter<'_> {
         }
         if lens.radius > 0.0 {
             self.document.set("aperture", lens.radius * scale);
-            self.document.set("focus", lens.focus * scale);
+            self.document.set("focus", (lens.focus * scale).min(1e12));
         }
         Ok(())
     }
@@ -381,7 +401,12 @@ fn read_crop(parameters: &Parameters, [width, height]: [i64; 2]) -> PbrtResult<[
         (&[x0, x1, y0, y1], _) => [clamp(x0, width), clamp(y0, height), clamp(x1, width), clamp(y1, height)],
         ([], &[x0, x1, y0, y1]) => {
             let edge = |part: f64, size: i64| (part.clamp(0.0, 1.0) * size as f64).ceil() as i64;
-            [edge(x0.min(x1), width), edge(y0.min(y1), height), edge(x0.max(x1), width), edge(y0.max(y1), height)]
+            [
+                edge(x0.min(x1), width),
+                edge(y0.min(y1), height),
+                edge(x0.max(x1), width),
+                edge(y0.max(y1), height),
+            ]
         }
         _ => {
             let name = if bounds.is_empty() { "cropwindow" } else { "pixelbounds" };

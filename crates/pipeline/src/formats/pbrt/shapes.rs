@@ -326,7 +326,8 @@ fn bilinear_mesh(parameters: &Parameters) -> PbrtResult<MeshData> {
         let at = patch.map(|vertex| vertex as usize);
         let corners = at.map(|vertex| positions[vertex]);
         let [p00, p10, p01, p11] = corners;
-        let is_flat = (p10 + p01 - p00 - p11).length() <= 1e-6 * (p11 - p00).length().max((p10 - p01).length());
+        let is_flat =
+            (p10 + p01 - p00 - p11).length() <= 1e-6 * (p11 - p00).length().max((p10 - p01).length());
         let cells = if is_flat { 1 } else { CELLS };
         let mut mesh = MeshData::from_surface([cells, cells], |uv| {
             let along_u = (p10 - p00).lerp(p11 - p01, uv.y);

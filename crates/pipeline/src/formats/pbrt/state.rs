@@ -134,8 +134,18 @@ impl GraphicsState {
         &self.defaults[target as usize]
     }
 
-    pub(super) fn add_defaults(&mut self, target: AttributeTarget, parameters: Parameters) {
-        self.defaults[target as usize].extend(parameters.into_defaults());
+    /// Adds the parameters of an `Attribute` statement.
+    pub(super) fn add_defaults(&mut self, target: AttributeTarget, parameters: Parameters) -> PbrtResult<()> {
+        /// Maximum number of defaults.
+        const MAX_DEFAULTS: usize = 1000;
+        let span = parameters.span.clone();
+        let defaults = &mut self.defaults[target as usize];
+        defaults.extend(parameters.into_defaults());
+        if defaults.len() <= MAX_DEFAULTS {
+            return Ok(());
+        }
+        defaults.clear();
+        Err(PbrtError::new(span, format!("more than {MAX_DEFAULTS} defaults are set by `Attribute`")))
     }
 }
 
@@ -160,7 +170,8 @@ pub(super) fn look_at(numbers: &[f64; 9], span: &Range<usize>) -> PbrtResult<DMa
 /// The matrix of `Rotate`.
 pub(super) fn rotation(degrees: f64, axis: DVec3, span: &Range<usize>) -> PbrtResult<DMat4> {
     let axis = axis.try_normalize();
-    let axis = axis.ok_or_else(|| PbrtError::new(span.clone(), "the axis of this rotation has no direction"))?;
+    let axis =
+        axis.ok_or_else(|| PbrtError::new(span.clone(), "the axis of this rotation has no direction"))?;
     Ok(rotation_about_raw_axis(axis, degrees))
 }
 
@@ -241,7 +252,9 @@ mod tests {
     #[test]
     fn look_at_has_x_on_the_right_of_a_left_handed_world() {
         let matrix = look_at(&[0.0, 0.0, -5.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0], &(0..0)).expect("a matrix");
-        assert!(matrix.transform_point3(DVec3::new(1.0, 2.0, 0.0)).abs_diff_eq(DVec3::new(1.0, 2.0, 5.0), 1e-12));
+        assert!(
+            matrix.transform_point3(DVec3::new(1.0, 2.0, 0.0)).abs_diff_eq(DVec3::new(1.0, 2.0, 5.0), 1e-12)
+        );
         assert!(look_at(&[0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 0.0], &(0..0)).is_err());
     }
 

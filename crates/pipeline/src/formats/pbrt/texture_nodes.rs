@@ -86,7 +86,10 @@ pub(super) enum TextureNode {
     /// A power of a number.
     Power(Arc<Self>, f64),
     /// Gradient noise around a mean, with the number of octaves and a factor.
-    Noise { octaves: u32, factor: f64 },
+    Noise {
+        octaves: u32,
+        factor: f64,
+    },
 }
 
 impl TextureNode {
@@ -244,7 +247,8 @@ impl<'a> TextureResolver<'a> {
             "mix" => {
                 let (first, second) = (part(self, "tex1", 0.0)?, part(self, "tex2", 1.0)?);
                 let (space, number) = (entity.color_space, TextureValue::Number);
-                let amount = self.parameter_at_depth(parameters, "amount", number, space, notes, depth + 1)?;
+                let amount =
+                    self.parameter_at_depth(parameters, "amount", number, space, notes, depth + 1)?;
                 let amount = amount.unwrap_or(TextureNode::Constant(DVec3::splat(0.5)));
                 TextureNode::mix(first, second, amount)
             }
@@ -296,8 +300,19 @@ impl<'a> TextureResolver<'a> {
 
 fn unknown_texture(kind: &str, at: &Text) -> Box<PbrtError> {
     const NAMES: [&str; 13] = [
-        "constant", "scale", "mix", "directionmix", "checkerboard", "dots", "bilerp", "imagemap", "fbm",
-        "wrinkled", "windy", "marble", "ptex",
+        "constant",
+        "scale",
+        "mix",
+        "directionmix",
+        "checkerboard",
+        "dots",
+        "bilerp",
+        "imagemap",
+        "fbm",
+        "wrinkled",
+        "windy",
+        "marble",
+        "ptex",
     ];
     let message = format!("unknown texture type \"{}\"", escape_and_truncate(kind, 40));
     PbrtError::new(at.span.clone(), message).with_suggestion(nearest_name(kind, NAMES))
@@ -315,7 +330,11 @@ fn uv_mapping(texture: &PlacedEntity, notes: &mut NoteCollector) -> PbrtResult<U
         None | Some("uv") => Ok(UvMapping { scale, offset }),
         Some(other @ ("spherical" | "cylindrical" | "planar")) => {
             let subject = format!("texture mapping `{other}`");
-            notes.substitute(&subject, "the texture coordinates of the shape are used", texture.entity.span());
+            notes.substitute(
+                &subject,
+                "the texture coordinates of the shape are used",
+                texture.entity.span(),
+            );
             Ok(UvMapping { scale, offset })
         }
         Some(other) => {

@@ -87,14 +87,12 @@ impl SceneWriter<'_> {
             TextureNode::Image(image) if self.is_plain_image(image, usage) => {
                 (self.image_keys(image, usage), file_stem(&image.file.text))
             }
-            TextureNode::Checker(mapping, parts) => {
-                match (parts[0].as_constant(), parts[1].as_constant()) {
-                    (Some(first), Some(second)) => {
-                        (checker_keys(*mapping, [first, second]), "checker".to_owned())
-                    }
-                    _ => self.baked_keys(node, usage),
+            TextureNode::Checker(mapping, parts) => match (parts[0].as_constant(), parts[1].as_constant()) {
+                (Some(first), Some(second)) => {
+                    (checker_keys(*mapping, [first, second]), "checker".to_owned())
                 }
-            }
+                _ => self.baked_keys(node, usage),
+            },
             TextureNode::Noise { octaves, factor } => (noise_keys(*octaves, *factor), "noise".to_owned()),
             TextureNode::Constant(_)
             | TextureNode::Image(_)

@@ -21,7 +21,10 @@ const WORLDS: [(&str, &str); 36] = [
     ("Material §\"matte\"\nShape \"sphere\"", "pbrt-v3"),
     ("Material §\"difuse\"\nShape \"sphere\"", "unknown material"),
     ("NamedMaterial §\"none\"\nShape \"sphere\"", "there is no material"),
-    ("Material \"diffuse\" \"texture reflectance\" §\"none\"\nShape \"sphere\"", "there is no spectrum texture"),
+    (
+        "Material \"diffuse\" \"texture reflectance\" §\"none\"\nShape \"sphere\"",
+        "there is no spectrum texture",
+    ),
     ("Material \"diffuse\" \"rgb reflectance\" §[1 2]\nShape \"sphere\"", "three numbers"),
     ("Material \"conductor\" \"spectrum eta\" §\"metal-Xy-eta\"\nShape \"sphere\"", "unknown spectrum"),
     ("§Material \"mix\"\nShape \"sphere\"", "two names"),
@@ -55,9 +58,9 @@ fn errors_have_the_right_place() {
 fn errors_of_options_have_the_right_place() {
     for (marked, message) in [
         ("§Shape \"sphere\"", "must follow `WorldBegin`"),
-        ("Film §\"image\"", "pbrt-v3"),
-        ("Film \"rgb\" \"integer xresolution\" §0", "between"),
-        ("Film \"rgb\" \"float cropwindow\" §[0 1]", "four numbers"),
+        ("Film §\"image\"\nWorldBegin", "pbrt-v3"),
+        ("Film \"rgb\" \"integer xresolution\" §0\nWorldBegin", "between"),
+        ("Film \"rgb\" \"float cropwindow\" §[0 1]\nWorldBegin", "four numbers"),
         ("Camera §\"persp\"\nWorldBegin", "unknown camera"),
         ("Camera §\"realistic\"\nWorldBegin", "lens systems"),
         ("Camera \"perspective\" \"float fov\" §180\nWorldBegin", "between 0 and 180"),
@@ -83,7 +86,8 @@ fn check(marked: &str, message: &str) {
 
 #[test]
 fn several_errors_are_reported_with_suggestions() {
-    let text = format!("{CAMERA}WorldBegin\nShap \"sphere\"\nShape \"sphere\" \"flaot radius\" 1\nTranslat 1 2 3\n");
+    let text =
+        format!("{CAMERA}WorldBegin\nShap \"sphere\"\nShape \"sphere\" \"flaot radius\" 1\nTranslat 1 2 3\n");
     let errors = SceneFolder::new(&text).read().expect_err("errors");
     assert_eq!(errors.len(), 3, "{errors:?}");
     let labels: Vec<_> = errors.iter().map(|one| &*one.place.as_ref().expect("a place").label).collect();
@@ -109,7 +113,10 @@ fn cycles_and_deep_nesting_are_errors() {
     let folder = SceneFolder::new(&format!("{CAMERA}WorldBegin\nInclude \"0.pbrt\"\n"));
     for depth in 0..100 {
         let next = depth + 1;
-        folder.write(&format!("{depth}.pbrt"), format!("Include \"{next}.pbrt\" Include \"{next}.pbrt\"").as_bytes());
+        folder.write(
+            &format!("{depth}.pbrt"),
+            format!("Include \"{next}.pbrt\" Include \"{next}.pbrt\"").as_bytes(),
+        );
     }
     assert!(folder.read().is_err());
     let blocks = format!("{CAMERA}WorldBegin\n{}", "AttributeBegin\n".repeat(100_000));
@@ -117,7 +124,9 @@ fn cycles_and_deep_nesting_are_errors() {
     let textures: String = (0..100)
         .map(|index| format!("Texture \"{index}\" \"float\" \"scale\" \"texture tex\" \"{}\"\n", index + 1))
         .collect();
-    let world = format!("{textures}Texture \"100\" \"float\" \"scale\" \"texture tex\" \"0\"\nShape \"sphere\" \"texture alpha\" \"0\"");
+    let world = format!(
+        "{textures}Texture \"100\" \"float\" \"scale\" \"texture tex\" \"0\"\nShape \"sphere\" \"texture alpha\" \"0\""
+    );
     let errors = SceneFolder::new(&format!("{CAMERA}WorldBegin\n{world}")).read().expect_err("errors");
     assert!(errors[0].message.contains("uses itself"), "{errors:?}");
 }

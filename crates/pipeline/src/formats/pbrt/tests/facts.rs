@@ -12,7 +12,8 @@ fn check(toml: &str, lines: &[&str]) {
 /// Returns the number after `key = `, or the first number of an array.
 fn number(toml: &str, key: &str) -> f64 {
     let rest = toml.split(&format!("\n{key} = ")).nth(1).unwrap_or_else(|| panic!("no {key}:\n{toml}"));
-    let word: String = rest.chars().skip_while(|c| *c == '[').take_while(|c| "0123456789.-e".contains(*c)).collect();
+    let word: String =
+        rest.chars().skip_while(|c| *c == '[').take_while(|c| "0123456789.-e".contains(*c)).collect();
     word.parse().unwrap_or_else(|_| panic!("{key}: {rest}"))
 }
 
@@ -20,7 +21,8 @@ const LIGHT: &str = "LightSource \"infinite\"\n";
 
 #[test]
 fn left_handed_cameras_mirror_the_image() {
-    let camera = |text: &str| toml_of(&format!("{text}Camera \"perspective\"\nWorldBegin\n{LIGHT}Shape \"sphere\""));
+    let camera =
+        |text: &str| toml_of(&format!("{text}Camera \"perspective\"\nWorldBegin\n{LIGHT}Shape \"sphere\""));
     let look_at = "LookAt 0 0 -5  0 0 0  0 1 0\n";
     let plain = camera(look_at);
     check(&plain, &["mirror = true", "position = [0, 0, -5]", "look_at = [0, 0, -4]"]);
@@ -34,7 +36,9 @@ fn left_handed_cameras_mirror_the_image() {
 fn field_of_view_is_along_the_shorter_side() {
     let fov = |width: u32, height: u32, rest: &str| {
         let film = format!("\"integer xresolution\" {width} \"integer yresolution\" {height} {rest}");
-        let text = format!("Film \"rgb\" {film}\nCamera \"perspective\" \"float fov\" 90\nWorldBegin\n{LIGHT}Shape \"sphere\"");
+        let text = format!(
+            "Film \"rgb\" {film}\nCamera \"perspective\" \"float fov\" 90\nWorldBegin\n{LIGHT}Shape \"sphere\""
+        );
         toml_of(&text)
     };
     assert!((number(&fov(200, 100, ""), "fov") - 90.0).abs() < 1e-9);
@@ -62,7 +66,9 @@ fn only_reverse_orientation_turns_disks_and_spheres() {
     let light = "AreaLightSource \"diffuse\"\n";
     let normal = |before: &str| number(&toml_of_world(&format!("{light}{before}Shape \"disk\"")), "normal");
     assert_eq!([normal(""), normal("Scale -1 1 1\n")], [0.0; 2]);
-    let z = |before: &str| toml_of_world(&format!("{light}{before}Shape \"disk\"")).contains("normal = [0, 0, -1]");
+    let z = |before: &str| {
+        toml_of_world(&format!("{light}{before}Shape \"disk\"")).contains("normal = [0, 0, -1]")
+    };
     assert_eq!([z(""), z("Scale 1 1 -1\n"), z("ReverseOrientation\n")], [false, false, true]);
     // A sphere that emits inward becomes a mesh.
     let sphere = |before: &str| toml_of_world(&format!("{light}{before}Shape \"sphere\""));
@@ -94,16 +100,25 @@ fn fronts_of_emissive_meshes_follow_pbrt() {
 #[test]
 fn roughness_is_remapped_by_default() {
     let roughness = |text: &str| {
-        number(&toml_of_world(&format!("{LIGHT}Material \"conductor\" {text}\nShape \"sphere\"")), "roughness")
+        number(
+            &toml_of_world(&format!("{LIGHT}Material \"conductor\" {text}\nShape \"sphere\"")),
+            "roughness",
+        )
     };
     let close = |a: f64, b: f64| assert!((a - b).abs() < 1e-9, "{a} {b}");
     close(roughness("\"float roughness\" 0.0625"), 0.5);
     close(roughness("\"float roughness\" 0.0625 \"bool remaproughness\" false"), 0.25);
-    close(roughness("\"float uroughness\" 0.16 \"float vroughness\" 0.01 \"bool remaproughness\" false"), 0.2);
+    close(
+        roughness("\"float uroughness\" 0.16 \"float vroughness\" 0.01 \"bool remaproughness\" false"),
+        0.2,
+    );
     close(roughness(""), 0.0);
     let anisotropy = |u: f64, v: f64| {
         let text = format!("\"float uroughness\" {u} \"float vroughness\" {v} \"bool remaproughness\" false");
-        number(&toml_of_world(&format!("{LIGHT}Material \"conductor\" {text}\nShape \"sphere\"")), "anisotropy")
+        number(
+            &toml_of_world(&format!("{LIGHT}Material \"conductor\" {text}\nShape \"sphere\"")),
+            "anisotropy",
+        )
     };
     // α_v / α_u = 1 − 0.9 · anisotropy.
     close(anisotropy(0.2, 0.1), 0.5 / 0.9);
@@ -114,7 +129,14 @@ fn roughness_is_remapped_by_default() {
 fn light_spectra_are_divided_by_their_luminance() {
     let intensity = |text: &str| {
         let toml = toml_of_world(&format!("LightSource \"point\" {text}\nShape \"sphere\""));
-        let rest = toml.split("intensity = ").nth(1).expect("an intensity").lines().next().expect("a line").to_owned();
+        let rest = toml
+            .split("intensity = ")
+            .nth(1)
+            .expect("an intensity")
+            .lines()
+            .next()
+            .expect("a line")
+            .to_owned();
         let numbers: Vec<f64> =
             rest.trim_matches(['[', ']']).split(", ").map(|word| word.parse().expect("a number")).collect();
         match numbers[..] {
@@ -145,7 +167,9 @@ fn power_of_area_lights_is_per_triangle() {
 
 #[test]
 fn iso_and_shutter_become_gain() {
-    let text = format!("Film \"rgb\" \"float iso\" 150\nCamera \"perspective\" \"float shutterclose\" 0.5\nWorldBegin\n{LIGHT}Shape \"sphere\"");
+    let text = format!(
+        "Film \"rgb\" \"float iso\" 150\nCamera \"perspective\" \"float shutterclose\" 0.5\nWorldBegin\n{LIGHT}Shape \"sphere\""
+    );
     assert_eq!(number(&toml_of(&text), "gain"), 0.75);
     assert!(!toml_of_world("Shape \"sphere\"").contains("gain"));
 }
@@ -170,7 +194,9 @@ fn toml_with_image(world: &str) -> String {
 fn checker_cells_are_one_unit() {
     let texture = "Texture \"c\" \"spectrum\" \"checkerboard\" \"float uscale\" 4 \"float vscale\" 8 \
         \"float udelta\" 1 \"rgb tex1\" [1 0 0] \"rgb tex2\" [0 0 1]\n";
-    let toml = toml_of_world(&format!("{texture}Material \"diffuse\" \"texture reflectance\" \"c\"\nShape \"sphere\""));
+    let toml = toml_of_world(&format!(
+        "{texture}Material \"diffuse\" \"texture reflectance\" \"c\"\nShape \"sphere\""
+    ));
     check(&toml, &["repeat = [2, 4]", "offset = [0.5, 0]", "colors = [[1, 0, 0], [0, 0, 1]]"]);
 }
 
@@ -178,7 +204,10 @@ fn checker_cells_are_one_unit() {
 fn numbers_of_images_decode_from_srgb() {
     let texture = "Texture \"t\" \"float\" \"imagemap\" \"string filename\" \"a.pgm\" \"float uscale\" 3\n";
     let toml = toml_with_image(&format!("{texture}Shape \"sphere\" \"texture alpha\" \"t\""));
-    check(&toml, &["encoding = \"srgb\"", "opacity = { texture = \"a\", channel = \"r\" }", "repeat = [3, 1]"]);
+    check(
+        &toml,
+        &["encoding = \"srgb\"", "opacity = { texture = \"a\", channel = \"r\" }", "repeat = [3, 1]"],
+    );
     // Roughness is a function of the image, computed in linear values.
     let world = format!("{texture}Material \"conductor\" \"texture roughness\" \"t\"\nShape \"sphere\"");
     let folder = folder_with_image(&world);
@@ -197,14 +226,16 @@ fn displacement_keeps_its_scale() {
     let textures = "Texture \"raw\" \"float\" \"imagemap\" \"string filename\" \"a.pgm\" \"float vscale\" 2\n\
         Texture \"small\" \"float\" \"constant\" \"float value\" 0.002\n\
         Texture \"d\" \"float\" \"scale\" \"texture tex\" \"raw\" \"texture scale\" \"small\"\n";
-    let toml =
-        toml_with_image(&format!("{textures}Material \"diffuse\" \"texture displacement\" \"d\"\nShape \"sphere\""));
+    let toml = toml_with_image(&format!(
+        "{textures}Material \"diffuse\" \"texture displacement\" \"d\"\nShape \"sphere\""
+    ));
     check(&toml, &["bump_scale = 0.002", "bump = { texture = \"a\", channel = \"r\" }", "repeat = [1, 2]"]);
 }
 
 #[test]
 fn inverted_images_are_computed() {
-    let texture = "Texture \"t\" \"spectrum\" \"imagemap\" \"string filename\" \"a.pgm\" \"bool invert\" true\n";
+    let texture =
+        "Texture \"t\" \"spectrum\" \"imagemap\" \"string filename\" \"a.pgm\" \"bool invert\" true\n";
     let world = format!("{texture}Material \"diffuse\" \"texture reflectance\" \"t\"\nShape \"sphere\"");
     let scene = folder_with_image(&world).read().expect("a scene");
     let file = scene.document.generated_files().values().next().expect("an image");
@@ -215,8 +246,13 @@ fn inverted_images_are_computed() {
 
 #[test]
 fn included_paths_are_relative_to_the_first_file() {
-    let folder = SceneFolder::new(&format!("{CAMERA}WorldBegin\n{LIGHT}Include \"parts/a.pbrt\"\nInclude \"parts/b.pbrt\""));
-    folder.write("parts/a.pbrt", b"Material \"diffuse\" # red\n\"rgb reflectance\" [1 # first\n0 0]\nInclude \"parts/c.pbrt\"");
+    let folder = SceneFolder::new(&format!(
+        "{CAMERA}WorldBegin\n{LIGHT}Include \"parts/a.pbrt\"\nInclude \"parts/b.pbrt\""
+    ));
+    folder.write(
+        "parts/a.pbrt",
+        b"Material \"diffuse\" # red\n\"rgb reflectance\" [1 # first\n0 0]\nInclude \"parts/c.pbrt\"",
+    );
     folder.write("parts/b.pbrt", b"Shape \"plymesh\" \"string filename\" \"parts/t.ply\"");
     folder.write("parts/c.pbrt", b"Shape \"plymesh\" \"string filename\" \"parts/t.ply.gz\"");
     folder.write("parts/t.ply", TRIANGLE_PLY);
@@ -246,7 +282,14 @@ fn instances_multiply_the_current_transform() {
     let world = "ObjectBegin \"o\"\nTranslate 1 0 0\nMaterial \"diffuse\" \"rgb reflectance\" [0 1 0]\nShape \"sphere\"\nObjectEnd\n\
         Scale 2 2 2\nObjectInstance \"o\"\nMaterial \"conductor\"\nObjectInstance \"o\"\n";
     let toml = toml_of_world(&format!("{LIGHT}{world}"));
-    check(&toml, &["[[groups.o.sphere]]", "center = [1, 0, 0]", "matrix = [2, 0, 0, 0,  0, 2, 0, 0,  0, 0, 2, 0,  0, 0, 0, 1]"]);
+    check(
+        &toml,
+        &[
+            "[[groups.o.sphere]]",
+            "center = [1, 0, 0]",
+            "matrix = [2, 0, 0, 0,  0, 2, 0, 0,  0, 0, 2, 0,  0, 0, 0, 1]",
+        ],
+    );
     assert_eq!(toml.matches("[[instance]]").count(), 2);
     // Shapes keep the material of their definition.
     assert!(!toml.contains("metal"), "{toml}");
@@ -259,14 +302,18 @@ fn conductors_are_copper_by_default() {
     let [red, blue] = [number(&toml, "eta"), number(&toml, "k")];
     assert!((0.1..0.4).contains(&red) && (3.0..4.0).contains(&blue), "{toml}");
     // A metal under a coat is seen through the coat's index of refraction.
-    let coated = toml_of_world(&format!("{LIGHT}Material \"coatedconductor\" \"float interface.eta\" 2\nShape \"sphere\""));
+    let coated = toml_of_world(&format!(
+        "{LIGHT}Material \"coatedconductor\" \"float interface.eta\" 2\nShape \"sphere\""
+    ));
     assert!((number(&coated, "eta") - red / 2.0).abs() < 1e-6, "{coated}");
     check(&coated, &["coat = 1", "coat_ior = 2", "coat_roughness = 0"]);
 }
 
 #[test]
 fn reflectance_of_conductors_is_exact_at_normal_incidence() {
-    let toml = toml_of_world(&format!("{LIGHT}Material \"conductor\" \"rgb reflectance\" [0.5 0.5 0.5]\nShape \"sphere\""));
+    let toml = toml_of_world(&format!(
+        "{LIGHT}Material \"conductor\" \"rgb reflectance\" [0.5 0.5 0.5]\nShape \"sphere\""
+    ));
     let (eta, k) = (number(&toml, "eta"), number(&toml, "k"));
     let reflectance = ((eta - 1.0).powi(2) + k * k) / ((eta + 1.0).powi(2) + k * k);
     assert!((reflectance - 0.5).abs() < 1e-6, "{toml}");
@@ -284,17 +331,20 @@ fn mixes_take_the_second_material_by_amount() {
 #[test]
 fn spheres_have_the_texture_coordinates_of_pbrt() {
     // u starts at +x and turns to +y, and v = 1 is at +z.
-    let texture = "Texture \"c\" \"spectrum\" \"checkerboard\"\nMaterial \"diffuse\" \"texture reflectance\" \"c\"\n";
+    let texture =
+        "Texture \"c\" \"spectrum\" \"checkerboard\"\nMaterial \"diffuse\" \"texture reflectance\" \"c\"\n";
     let toml = toml_of_world(&format!("{LIGHT}{texture}Shape \"sphere\" \"float radius\" 2"));
     check(&toml, &["matrix = [-1, 0, 0, 0,  0, 0, -1, 0,  0, 1, 0, 0,  0, 0, 0, 1]", "radius = 2"]);
 }
 
 #[test]
 fn transforms_are_applied_to_the_right() {
-    let toml = toml_of_world(&format!("{LIGHT}Translate 1 2 3\nRotate 90 0 0 2\nTranslate 1 0 0\nShape \"sphere\""));
+    let toml =
+        toml_of_world(&format!("{LIGHT}Translate 1 2 3\nRotate 90 0 0 2\nTranslate 1 0 0\nShape \"sphere\""));
     check(&toml, &["center = [1, 3, 3]"]);
     // `Transform` lists columns.
-    let toml = toml_of_world(&format!("{LIGHT}Transform [1 0 0 0  0 1 0 0  0 0 1 0  4 5 6 1]\nShape \"sphere\""));
+    let toml =
+        toml_of_world(&format!("{LIGHT}Transform [1 0 0 0  0 1 0 0  0 0 1 0  4 5 6 1]\nShape \"sphere\""));
     check(&toml, &["center = [4, 5, 6]"]);
 }
 
@@ -305,8 +355,13 @@ fn clear_media_become_tints() {
     let toml = toml_of_world(&format!("{LIGHT}{medium}"));
     check(&toml, &["tint = [1, 0.36787945, 0.13533528]"]);
     let scattering = medium.replace("[0 0 0]", "[1 1 1]");
-    let scene = SceneFolder::new(&format!("{CAMERA}WorldBegin\n{LIGHT}{scattering}")).read().expect("a scene");
-    assert!(scene.substitutions[0].message.starts_with("the light differs: medium"), "{:?}", scene.substitutions);
+    let scene =
+        SceneFolder::new(&format!("{CAMERA}WorldBegin\n{LIGHT}{scattering}")).read().expect("a scene");
+    assert!(
+        scene.substitutions[0].message.starts_with("the light differs: medium"),
+        "{:?}",
+        scene.substitutions
+    );
 }
 
 #[test]
@@ -326,8 +381,10 @@ fn missing_files_can_be_tolerated() {
     assert!(errors[0].message.contains("file not found"), "{errors:?}");
     let place = errors[0].place.as_ref().expect("a place");
     assert_eq!(&place.source[place.span.clone()], "\"none.ply\"");
-    let options =
-        ForeignOptions { missing: crate::formats::foreign::MissingAssetMode::Note, ..ForeignOptions::default() };
+    let options = ForeignOptions {
+        missing: crate::formats::foreign::MissingAssetMode::Note,
+        ..ForeignOptions::default()
+    };
     let scene = read_path(&folder.path(), &options).expect("a scene");
     assert!(scene.substitutions[0].message.contains("missing mesh"));
 }

@@ -56,9 +56,30 @@ impl Random {
 /// Changes, removes, doubles or swaps a word.
 fn mutated(random: &mut Random) -> String {
     const WORDS: [&str; 24] = [
-        "[", "]", "\"", "0", "-1", "1e300", "1e-300", "nan", "true", "\"a\"", "WorldBegin", "AttributeEnd",
-        "AttributeBegin", "\"float radius\"", "\"texture x\" \"c\"", "Shape \"disk\"", "Identity", "#", "\\",
-        "Scale 0 0 0", "4294967296", "ObjectEnd", "\"rgb L\"", "é",
+        "[",
+        "]",
+        "\"",
+        "0",
+        "-1",
+        "1e300",
+        "1e-300",
+        "nan",
+        "true",
+        "\"a\"",
+        "WorldBegin",
+        "AttributeEnd",
+        "AttributeBegin",
+        "\"float radius\"",
+        "\"texture x\" \"c\"",
+        "Shape \"disk\"",
+        "Identity",
+        "#",
+        "\\",
+        "Scale 0 0 0",
+        "4294967296",
+        "ObjectEnd",
+        "\"rgb L\"",
+        "é",
     ];
     let mut words: Vec<&str> = SCENE.split_inclusive([' ', '\n']).collect();
     for _ in 0..1 + random.below(3) {

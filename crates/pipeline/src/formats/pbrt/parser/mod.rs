@@ -1,21 +1,23 @@
 //! Parses the statements of a pbrt file and the files that it includes.
 
-use std::collections::HashMap;
+mod transforms;
+mod world;
+
+use std::collections::{HashMap, HashSet};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
-use std::rc::Rc;
 use std::sync::Arc;
 
 use super::lexer::{Lexer, PbrtError, PbrtResult, Token, TokenKind};
-use super::parameters::{Parameters, Text, V3_HELP, parse_number};
+use super::parameters::{Parameters, Text, V3_HELP};
 use super::state::{
-    AttributeTarget, ColorSpace, Entity, GraphicsState, MaterialReference, MotionTransform,
-    ObjectDefinition, ObjectInstance, PlacedEntity, ShapeEntity, Statements, look_at, rotation,
+    AttributeTarget, ColorSpace, Entity, GraphicsState, MotionTransform, ObjectDefinition, PlacedEntity,
+    Statements,
 };
 use crate::assets::AssetError;
 use crate::control::CancelToken;
 use crate::formats::foreign::sources::SourceReader;
-use crate::math::{DMat4, DVec3};
+use crate::math::DMat4;
 use crate::scene::nearest::nearest_name;
 use crate::scene::sanitize::escape_and_truncate;
 
@@ -28,18 +30,53 @@ const MAX_ATTRIBUTE_DEPTH: usize = 4096;
 
 /// The directives of pbrt-v4.
 const DIRECTIVES: [&str; 43] = [
-    "Accelerator", "ActiveTransform", "AreaLightSource", "Attribute", "AttributeBegin", "AttributeEnd",
-    "Camera", "ColorSpace", "ConcatTransform", "CoordSysTransform", "CoordinateSystem", "Film", "Identity",
-    "Import", "Include", "Integrator", "LightSource", "LookAt", "MakeNamedMaterial", "MakeNamedMedium",
-    "Material", "MediumInterface", "NamedMaterial", "ObjectBegin", "ObjectEnd", "ObjectInstance", "Option",
-    "PixelFilter", "ReverseOrientation", "Rotate", "Sampler", "Scale", "Shape", "Texture", "Transform",
-    "TransformBegin", "TransformEnd", "TransformTimes", "Translate", "WorldBegin", "All", "StartTime",
+    "Accelerator",
+    "ActiveTransform",
+    "AreaLightSource",
+    "Attribute",
+    "AttributeBegin",
+    "AttributeEnd",
+    "Camera",
+    "ColorSpace",
+    "ConcatTransform",
+    "CoordSysTransform",
+    "CoordinateSystem",
+    "Film",
+    "Identity",
+    "Import",
+    "Include",
+    "Integrator",
+    "LightSource",
+    "LookAt",
+    "MakeNamedMaterial",
+    "MakeNamedMedium",
+    "Material",
+    "MediumInterface",
+    "NamedMaterial",
+    "ObjectBegin",
+    "ObjectEnd",
+    "ObjectInstance",
+    "Option",
+    "PixelFilter",
+    "ReverseOrientation",
+    "Rotate",
+    "Sampler",
+    "Scale",
+    "Shape",
+    "Texture",
+    "Transform",
+    "TransformBegin",
+    "TransformEnd",
+    "TransformTimes",
+    "Translate",
+    "WorldBegin",
+    "All",
+    "StartTime",
     "EndTime",
 ];
 
 /// The directives that only pbrt-v3 has.
-const OLD_DIRECTIVES: [&str; 5] =
-    ["WorldEnd", "Renderer", "SurfaceIntegrator", "VolumeIntegrator", "Volume"];
+const OLD_DIRECTIVES: [&str; 5] = ["WorldEnd", "Renderer", "SurfaceIntegrator", "VolumeIntegrator", "Volume"];
 
 /// What an attribute stack entry ends with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -62,6 +99,9 @@ pub(super) struct Parser<'a> {
     is_world: bool,
     /// The object that is being defined.
     object: Option<ObjectDefinition>,
+    object_names: HashSet<String>,
+    /// Number of shapes and instances.
+    shape_count: usize,
     /// The files being read, from the first to the innermost.
     open_files: Vec<PathBuf>,
 }
@@ -87,6 +127,8 @@ pub(super) fn parse<'a>(
         coordinate_systems: HashMap::new(),
         is_world: false,
         object: None,
+        object_names: HashSet::new(),
+        shape_count: 0,
         open_files: vec![canonical(path)],
     };
     parser.statements.materials.push(default_material());
@@ -310,76 +352,6 @@ impl Parser<'_> {
         Ok(())
     }
 
-    fn world_entity(&mut self, directive: &Token<'_>, lexer: &mut Lexer<'_>) -> PbrtResult<()> {
-        match &*directive.text {
-            "Shape" => {
-                let entity = self.entity(directive, lexer, AttributeTarget::Shape)?;
-                self.add_shape(entity);
-            }
-            "LightSource" => {
-                let entity = self.entity(directive, lexer, AttributeTarget::Light)?;
-                let placed = self.placed(entity);
-                self.statements.lights.push(placed);
-            }
-            "AreaLightSource" => {
-                let entity = self.entity(directive, lexer, AttributeTarget::Light)?;
-                self.statements.area_lights.push(entity);
-                self.state.area_light = Some(self.statements.area_lights.len() - 1);
-            }
-            "Material" => {
-                let entity = self.entity(directive, lexer, AttributeTarget::Material)?;
-                self.state.material_span = entity.span();
-                self.statements.materials.push(entity);
-                self.state.material = MaterialReference::Index(self.statements.materials.len() - 1);
-            }
-            "MakeNamedMaterial" => {
-                let entity = self.entity(directive, lexer, AttributeTarget::Material)?;
-                let Text { text: name, span } = entity.kind.clone();
-                if self.statements.named_materials.insert(name, entity).is_some() {
-                    return Err(PbrtError::new(span, "there is already a material of this name"));
-                }
-            }
-            "NamedMaterial" => {
-                let name = quoted(directive, lexer)?;
-                self.state.material = MaterialReference::Named(name.text.into());
-                self.state.material_span = name.span;
-            }
-            _ => self.texture(directive, lexer)?,
-        }
-        Ok(())
-    }
-
-    fn texture(&mut self, directive: &Token<'_>, lexer: &mut Lexer<'_>) -> PbrtResult<()> {
-        let (name, value) = (quoted(directive, lexer)?, quoted(directive, lexer)?);
-        let entity = self.entity(directive, lexer, AttributeTarget::Texture)?;
-        let placed = self.placed(entity);
-        let textures = match &*value.text {
-            "float" => &mut self.statements.float_textures,
-            "spectrum" => &mut self.statements.spectrum_textures,
-            "color" => {
-                let error = PbrtError::new(value.span, "\"color\" textures are of pbrt-v3");
-                return Err(error.with_help(V3_HELP));
-            }
-            _ => {
-                let error = PbrtError::new(value.span, "a texture must be \"float\" or \"spectrum\"");
-                return Err(error);
-            }
-        };
-        if textures.insert(name.text, placed).is_some() {
-            return Err(PbrtError::new(name.span, "there is already a texture of this name"));
-        }
-        Ok(())
-    }
-
-    fn add_shape(&mut self, entity: Entity) {
-        let GraphicsState { is_reversed, material, material_span, area_light, media, .. } =
-            self.state.clone();
-        let placed = self.placed(entity);
-        let shape = ShapeEntity { placed, is_reversed, material, material_span, area_light, media };
-        let shapes = self.object.as_mut().map(|object| &mut object.shapes);
-        shapes.unwrap_or(&mut self.statements.shapes).push(shape);
-    }
-
     fn attribute(&mut self, directive: &Token<'_>, lexer: &mut Lexer<'_>) -> PbrtResult<()> {
         let Entity { kind, parameters, .. } = self.entity_without_defaults(directive, lexer)?;
         let found = AttributeTarget::NAMES.iter().find(|(name, _)| *name == kind.text);
@@ -387,8 +359,7 @@ impl Parser<'_> {
             let near = nearest_name(&kind.text, AttributeTarget::NAMES.iter().map(|(name, _)| *name));
             return Err(PbrtError::new(kind.span, "unknown attribute target").with_suggestion(near));
         };
-        self.state.add_defaults(*target, parameters);
-        Ok(())
+        self.state.add_defaults(*target, parameters)
     }
 
     fn color_space(&mut self, directive: &Token<'_>, lexer: &mut Lexer<'_>) -> PbrtResult<()> {
@@ -399,17 +370,6 @@ impl Parser<'_> {
             return Err(PbrtError::new(name.span, "unknown color space").with_suggestion(near));
         };
         self.state.color_space = *space;
-        Ok(())
-    }
-
-    fn medium_interface(&mut self, directive: &Token<'_>, lexer: &mut Lexer<'_>) -> PbrtResult<()> {
-        let inside: Rc<str> = quoted(directive, lexer)?.text.into();
-        let second = lexer.peek()?.filter(|token| token.kind == TokenKind::Quoted);
-        let outside = match second {
-            Some(_) => quoted(directive, lexer)?.text.into(),
-            None => Rc::clone(&inside),
-        };
-        self.state.media = [inside, outside];
         Ok(())
     }
 
@@ -446,94 +406,6 @@ impl Parser<'_> {
         }
         Ok(())
     }
-
-    fn begin_object(&mut self, directive: &Token<'_>, lexer: &mut Lexer<'_>) -> PbrtResult<()> {
-        let name = quoted(directive, lexer)?;
-        if self.object.is_some() {
-            return Err(PbrtError::new(directive.span.clone(), "objects cannot be nested"));
-        }
-        if self.statements.objects.iter().any(|known| known.name.text == name.text) {
-            return Err(PbrtError::new(name.span, "there is already an object of this name"));
-        }
-        self.begin_block(BlockKind::Object, directive.span.clone())?;
-        self.object = Some(ObjectDefinition { name, shapes: Vec::new() });
-        Ok(())
-    }
-
-    fn end_object(&mut self, span: &Range<usize>) -> PbrtResult<()> {
-        self.end_block(BlockKind::Object, span)?;
-        self.statements.objects.extend(self.object.take());
-        Ok(())
-    }
-
-    fn instance(&mut self, directive: &Token<'_>, lexer: &mut Lexer<'_>) -> PbrtResult<()> {
-        let name = quoted(directive, lexer)?;
-        self.check_world(&directive.span, "ObjectInstance")?;
-        if self.object.is_some() {
-            return Err(PbrtError::new(directive.span.clone(), "objects cannot contain instances"));
-        }
-        self.statements.instances.push(ObjectInstance { name, transform: self.state.transform });
-        Ok(())
-    }
-
-    fn transform_statement(&mut self, directive: &Token<'_>, lexer: &mut Lexer<'_>) -> PbrtResult<()> {
-        let span = &directive.span;
-        match &*directive.text {
-            "Identity" => self.state.change(|_| DMat4::IDENTITY),
-            "Translate" => {
-                let offset = DVec3::from(numbers(directive, lexer)?);
-                self.state.concat(DMat4::from_translation(offset));
-            }
-            "Scale" => {
-                let factors = DVec3::from(numbers(directive, lexer)?);
-                self.state.concat(DMat4::from_scale(factors));
-            }
-            "Rotate" => {
-                let [angle, x, y, z] = numbers(directive, lexer)?;
-                self.state.concat(rotation(angle, DVec3::new(x, y, z), span)?);
-            }
-            "LookAt" => {
-                let matrix = look_at(&numbers(directive, lexer)?, span)?;
-                self.state.concat(matrix);
-            }
-            "Transform" => {
-                let matrix = bracketed_matrix(directive, lexer)?;
-                self.state.change(|_| matrix);
-            }
-            "ConcatTransform" => {
-                let matrix = bracketed_matrix(directive, lexer)?;
-                self.state.concat(matrix);
-            }
-            "TransformTimes" => {
-                let [_, _] = numbers(directive, lexer)?;
-            }
-            "CoordinateSystem" => {
-                let name = quoted(directive, lexer)?;
-                self.coordinate_systems.insert(name.text, self.state.transform);
-            }
-            "CoordSysTransform" => {
-                let name = quoted(directive, lexer)?;
-                let Some(transform) = self.coordinate_systems.get(&name.text) else {
-                    let near = nearest_name(&name.text, self.coordinate_systems.keys().map(String::as_str));
-                    let error = PbrtError::new(name.span, "unknown coordinate system");
-                    return Err(error.with_suggestion(near));
-                };
-                self.state.transform = *transform;
-            }
-            _ => self.state.active = active_transforms(directive, lexer)?,
-        }
-        Ok(())
-    }
-}
-
-fn active_transforms(directive: &Token<'_>, lexer: &mut Lexer<'_>) -> PbrtResult<[bool; 2]> {
-    let which = any(directive, lexer)?;
-    match &*which.text {
-        "All" => Ok([true; 2]),
-        "StartTime" => Ok([true, false]),
-        "EndTime" => Ok([false, true]),
-        _ => Err(PbrtError::new(which.span, "expected All, StartTime or EndTime")),
-    }
 }
 
 fn unknown_directive(name: &str, span: Range<usize>) -> Box<PbrtError> {
@@ -547,11 +419,12 @@ fn unknown_directive(name: &str, span: Range<usize>) -> Box<PbrtError> {
 
 /// Skips tokens until a directive follows. Returns whether there is one.
 fn skip_to_directive(lexer: &mut Lexer<'_>) -> bool {
+    let is_directive = |token: &Token<'_>| {
+        token.kind == TokenKind::Word && token.text.starts_with(|c: char| c.is_ascii_uppercase())
+    };
     loop {
         match lexer.peek() {
-            Ok(Some(token)) if token.kind == TokenKind::Word && DIRECTIVES.contains(&&*token.text) => {
-                return true;
-            }
+            Ok(Some(token)) if is_directive(&token) => return true,
             Ok(Some(_)) => {}
             Ok(None) | Err(_) => return false,
         }
@@ -579,28 +452,4 @@ fn quoted(directive: &Token<'_>, lexer: &mut Lexer<'_>) -> PbrtResult<Text> {
         return Err(error.with_label(format!("found {}", escape_and_truncate(&token.text, 32))));
     }
     Ok(Text { text: token.text.into_owned(), span: token.span })
-}
-
-/// Reads `N` numbers, with or without brackets.
-fn numbers<const N: usize>(directive: &Token<'_>, lexer: &mut Lexer<'_>) -> PbrtResult<[f64; N]> {
-    let has_brackets = lexer.peek()?.is_some_and(|token| token.kind == TokenKind::OpenBracket);
-    if has_brackets {
-        lexer.next()?;
-    }
-    let mut values = [0.0; N];
-    for value in &mut values {
-        *value = parse_number(&any(directive, lexer)?)?;
-    }
-    if has_brackets {
-        let close = any(directive, lexer)?;
-        if close.kind != TokenKind::CloseBracket {
-            return Err(PbrtError::new(close.span, format!("expected ] after {N} numbers")));
-        }
-    }
-    Ok(values)
-}
-
-/// Reads 16 numbers in brackets, column by column.
-fn bracketed_matrix(directive: &Token<'_>, lexer: &mut Lexer<'_>) -> PbrtResult<DMat4> {
-    Ok(DMat4::from_cols_array(&numbers(directive, lexer)?))
 }
