@@ -36,7 +36,7 @@ pub use import::{ImportError, import_scene};
 
 /// All foreign formats.
 const FORMATS: [ForeignFormat; 5] = [
-    ForeignFormat { extensions: &["obj", "off"], is_model: true, read: mesh::read, convert: None },
+    ForeignFormat { extensions: &["obj", "off", "serialized"], is_model: true, read: mesh::read, convert: None },
     ForeignFormat { extensions: &["ply"], is_model: true, read: mesh::read_ply, convert: None },
     ForeignFormat { extensions: &["stl"], is_model: true, read: mesh::read_stl, convert: None },
     ForeignFormat {

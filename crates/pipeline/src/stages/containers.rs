@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::assets::gltf::{GltfFile, ImageLocation, is_gltf};
-use crate::assets::mesh::load;
+use crate::assets::mesh::{load, serialized};
 use crate::assets::{AssetError, FileHash, LoadedMesh};
 use crate::control::{CancelToken, Progress, ignore_progress};
 
@@ -53,6 +53,9 @@ impl GltfContainers {
         progress: Progress<'_>,
         token: &CancelToken,
     ) -> Result<LoadedMesh, AssetError> {
+        if serialized::is_serialized(path) {
+            return serialized::load(path, part, progress, token);
+        }
         if !is_gltf(path) {
             let ahead = self.ahead.lock().unwrap_or_else(PoisonError::into_inner).remove(&canonical(path));
             return ahead.map_or_else(|| load(path, progress, token), Ok);

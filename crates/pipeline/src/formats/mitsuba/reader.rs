@@ -263,12 +263,27 @@ impl<'a> SceneReader<'a> {
     fn color_of_child(&mut self, child: &Child, role: ColorRole) -> ColorSource {
         let object = self.object(child.target);
         match object.kind {
+            ObjectKind::Texture if matches!(object.plugin.as_str(), "rawconstant" | "constant" | "srgb" | "uniform") => {
+                ColorSource::Constant(self.constant_texture_color(object))
+            }
             ObjectKind::Texture => ColorSource::Texture(child.target),
             ObjectKind::Spectrum => ColorSource::Constant(self.spectrum_plugin_color(object, role)),
             _ => {
                 self.error(child.span.clone(), "expected a texture", None);
                 ColorSource::Constant(DVec3::splat(0.5))
             }
+        }
+    }
+
+    /// Returns the color of a texture with a single value.
+    fn constant_texture_color(&mut self, object: &'a Object) -> DVec3 {
+        let name = if object.property("color").is_some() { "color" } else { "value" };
+        match object.property(name).map(|property| &property.value) {
+            Some(PropertyValue::Vector(vector)) => *vector,
+            Some(_) | None => match self.color(object, name, ColorRole::Unbounded, 0.5) {
+                ColorSource::Constant(color) => color,
+                ColorSource::Texture(_) => DVec3::splat(0.5),
+            },
         }
     }
 
