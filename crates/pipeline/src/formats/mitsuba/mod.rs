@@ -10,6 +10,8 @@ mod plastic;
 mod reader;
 mod settings;
 mod shapes;
+#[cfg(test)]
+mod tests;
 mod textures;
 mod values;
 mod xml;
