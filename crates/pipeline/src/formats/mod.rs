@@ -261,7 +261,7 @@ mod tests {
             let Diagnostic { message, help, .. } = message(&path);
             let help = help.expect("a help text");
             if name == "d.FBX" {
-                assert!(message.contains(".fbx") && help.contains(".obj, .off, .ply, .stl, .glb, .gltf"));
+                assert!(message.contains(".fbx") && help.contains(".obj, .off, .serialized, .ply, .stl, .glb, .gltf"));
             } else {
                 assert_eq!(message, "this is a mesh, not a scene");
                 assert!(help.contains(&format!("`file = \"{name}\"`")), "{help}");

@@ -277,6 +277,32 @@ fn roughness_is_the_root_of_alpha() {
 }
 
 #[test]
+fn gray_scales_of_metals_are_blends_with_black() {
+    let text = material(
+        r#"<bsdf type="roughconductor"><float name="specular_reflectance" value="0.25"/></bsdf>"#,
+    );
+    has_line(&text, "materials = [\"black\", \"roughconductor\"]");
+    has_line(&text, "weight = 0.25");
+}
+
+#[test]
+fn meshes_without_area_are_left_out() {
+    let bench = scene(r#"<shape type="obj"><string name="filename" value="a.obj"/></shape><shape type="sphere"/>"#);
+    bench.write("a.obj", "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n");
+    lacks(&bench.toml(), "file");
+    assert!(bench.notes().iter().any(|note| note.contains("without area")));
+}
+
+#[test]
+fn identity_normal_maps_are_left_out() {
+    let text = material(
+        r#"<bsdf type="normalmap"><texture name="normalmap" type="rawconstant"><vector name="value" value="0.5 0.5 1"/></texture>
+        <bsdf type="diffuse"/></bsdf>"#,
+    );
+    lacks(&text, "normal_map");
+}
+
+#[test]
 fn plastic_is_linear_by_default() {
     let linear = numbers(&material(r#"<bsdf type="plastic"/>"#), "diffuse")[0];
     let nonlinear = material(r#"<bsdf type="plastic"><boolean name="nonlinear" value="true"/></bsdf>"#);
