@@ -33,6 +33,7 @@ pub(super) const EXAMPLES: &str = "  \
   glimt check ball.toml                   report errors without rendering
   glimt explain materials.metal.roughness describe a key
   glimt helmet.glb                        view a model: obj, off, ply, stl, gltf
+  glimt kitchen.xml -D spp=64             render a scene of Mitsuba
   glimt helmet.glb --once --turntable 36 -o helmet.gif
   glimt import helmet.glb -o helmet.toml  convert it to an editable scene
   glimt compare a.exr reference.exr       measure the error of an image
@@ -135,7 +136,7 @@ pub enum Subcommand {
         #[arg(long)]
         schema: bool,
     },
-    /// Convert a glTF file to a scene without overwriting files
+    /// Convert a glTF file or a Mitsuba scene without overwriting files
     ///
     /// Meshes (as PLY files) and images are written to a folder next to the scene.
     #[command(after_long_help = IMPORT_HELP)]
@@ -286,7 +287,7 @@ and something is approximated.";
 /// Arguments of `import`.
 #[derive(Clone, Debug, clap::Args)]
 pub struct ImportArgs {
-    /// The file to read: gltf, glb
+    /// The file to read: gltf, glb, xml (Mitsuba)
     #[arg(add = candidates::import_completer())]
     pub file: PathBuf,
     /// The scene to write [default: FILE with .toml, in the current folder]

@@ -37,7 +37,7 @@ pub use import::{ImportError, import_scene};
 
 /// All foreign formats.
 const FORMATS: [ForeignFormat; 6] = [
-    ForeignFormat { extensions: &["obj", "off"], is_model: true, read: mesh::read, convert: None },
+    ForeignFormat { extensions: &["obj", "off", "serialized"], is_model: true, read: mesh::read, convert: None },
     ForeignFormat { extensions: &["ply"], is_model: true, read: mesh::read_ply, convert: None },
     ForeignFormat { extensions: &["stl"], is_model: true, read: mesh::read_stl, convert: None },
     ForeignFormat {
@@ -263,7 +263,7 @@ mod tests {
             let Diagnostic { message, help, .. } = message(&path);
             let help = help.expect("a help text");
             if name == "d.FBX" {
-                assert!(message.contains(".fbx") && help.contains(".obj, .off, .ply, .stl, .glb, .gltf"));
+                assert!(message.contains(".fbx") && help.contains(".obj, .off, .serialized, .ply, .stl, .glb, .gltf"));
             } else {
                 assert_eq!(message, "this is a mesh, not a scene");
                 assert!(help.contains(&format!("`file = \"{name}\"`")), "{help}");

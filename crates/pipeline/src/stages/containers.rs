@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::assets::gltf::{GltfFile, ImageLocation, is_gltf};
-use crate::assets::mesh::{load, load_from_bytes};
+use crate::assets::mesh::{load, load_from_bytes, serialized};
 use crate::assets::{AssetError, FileHash, LoadedMesh};
 use crate::control::{CancelToken, Progress, ignore_progress};
 
@@ -57,6 +57,9 @@ impl GltfContainers {
     ) -> Result<LoadedMesh, AssetError> {
         if let Some(bytes) = self.generated_file(path) {
             return load_from_bytes(path, &bytes, progress, token);
+        }
+        if serialized::is_serialized(path) {
+            return serialized::load(path, part, progress, token);
         }
         if !is_gltf(path) {
             let ahead = self.ahead.lock().unwrap_or_else(PoisonError::into_inner).remove(&canonical(path));

@@ -13,6 +13,7 @@ pub mod ply;
 mod polygon;
 #[cfg(test)]
 mod polygon_tests;
+pub mod serialized;
 mod stl;
 pub mod subdivide;
 mod text;

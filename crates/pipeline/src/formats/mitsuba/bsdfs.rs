@@ -42,6 +42,8 @@ pub(super) struct BsdfContext {
     uv: UvConvention,
     /// Whether a `twosided` contains the BSDF.
     is_two_sided: bool,
+    /// The `mask` that contains the BSDF.
+    mask: Option<ObjectIndex>,
     depth: u32,
 }
 
@@ -95,7 +97,7 @@ impl<'a> SceneReader<'a> {
         if let Some(known) = self.materials.get(&key) {
             return known.clone();
         }
-        let context = BsdfContext { uv, is_two_sided: false, depth: 0 };
+        let context = BsdfContext { uv, is_two_sided: false, mask: None, depth: 0 };
         let builder = match bsdf {
             Some(child) => self.bsdf(child.target, context),
             None => Some(MaterialBuilder::one_sided("phong", vec![("diffuse", 0.5.into())])),
@@ -203,7 +205,7 @@ impl<'a> SceneReader<'a> {
             "ward" => Some(self.ward(object, context)),
             "coating" | "roughcoating" => self.coating(object, context),
             "twosided" => self.two_sided(object, context),
-            "mask" => self.mask(object, context),
+            "mask" => self.mask(index, context),
             "blendbsdf" | "mixturebsdf" => self.blend(object, context),
             "bumpmap" | "bump" => self.bump_map(object, context),
             "normalmap" => self.normal_map(object, context),
@@ -423,13 +425,68 @@ impl<'a> SceneReader<'a> {
         {
             self.notes.substitute_light("`ext_eta` of a conductor", "replaced by air", span_of(object, "ext_eta"));
         }
-        self.ignored_scale(object, "specular_reflectance");
         if is_rough {
             self.add_distribution(&mut keys, object, 0.1, context, true);
         } else {
             keys.push(("roughness", 0.0.into()));
         }
-        Some(MaterialBuilder::one_sided("metal", keys))
+        let metal = MaterialBuilder::one_sided("metal", keys);
+        let scale = self.color(object, "specular_reflectance", ColorRole::Reflectance, 1.0);
+        Some(self.scaled_metal(metal, scale, object, context))
+    }
+
+    /// Scales the reflectance of a metal: a blend with a black material, which is exact for a gray scale.
+    fn scaled_metal(
+        &mut self,
+        mut metal: MaterialBuilder,
+        scale: ColorSource,
+        object: &'a Object,
+        context: BsdfContext,
+    ) -> MaterialBuilder {
+        let weight = match scale {
+            ColorSource::Constant(color) => {
+                let color = color.clamp(DVec3::ZERO, DVec3::ONE);
+                if color == DVec3::ONE {
+                    return metal;
+                }
+                if color.max_element() - color.min_element() > 2e-3 {
+                    let text = "replaced by its luminance";
+                    self.notes.substitute_light("a colored `specular_reflectance`", text, span_of(object, "specular_reflectance"));
+                }
+                shorten_number(luminance(color).clamp(0.0, 1.0)).into()
+            }
+            ColorSource::Texture(texture) => match self.number_texture(texture, context.uv) {
+                Some(value) => {
+                    let text = "replaced by its luminance";
+                    self.notes.substitute_light("a texture of `specular_reflectance`", text, span_of(object, "specular_reflectance"));
+                    value
+                }
+                None => return metal,
+            },
+        };
+        metal.is_one_sided &= !context.is_two_sided;
+        if context.mask.is_some() {
+            self.add_opacity(&mut metal, context);
+        }
+        let wanted = object.id.as_deref().unwrap_or(&object.plugin);
+        let metal = self.add_material(metal, wanted, object.span.clone());
+        let black = match &self.black {
+            Some(black) if context.mask.is_none() => black.clone(),
+            Some(_) | None => {
+                let mut black = MaterialBuilder::new("phong", vec![("diffuse", 0.0.into())]);
+                if context.mask.is_some() {
+                    self.add_opacity(&mut black, context);
+                }
+                let name = self.add_material(black, "black", object.span.clone());
+                if context.mask.is_none() {
+                    self.black = Some(name.clone());
+                }
+                name
+            }
+        };
+        let materials = BuiltValue::Array(vec![black.into(), metal.into()]);
+        let keys = vec![("materials", materials), ("weight", weight)];
+        MaterialBuilder { is_blend: true, ..MaterialBuilder::new("blend", keys) }
     }
 
     fn dielectric(&mut self, object: &'a Object, context: BsdfContext) -> MaterialBuilder {
@@ -553,26 +610,40 @@ impl<'a> SceneReader<'a> {
         Some(MaterialBuilder { is_one_sided: false, ..built })
     }
 
-    fn mask(&mut self, object: &'a Object, context: BsdfContext) -> Option<MaterialBuilder> {
+    fn mask(&mut self, index: ObjectIndex, context: BsdfContext) -> Option<MaterialBuilder> {
+        let object = self.object(index);
         let nested = self.nested_bsdf(object)?;
         let opacity = self.number(object, "opacity", 0.5);
-        let mut built = self.bsdf(nested.target, context)?;
-        if built.is_invisible {
-            return Some(built);
-        }
         if opacity == NumberSource::Constant(1.0) {
-            return Some(built);
+            return self.bsdf(nested.target, context);
         }
-        if built.is_glass && !built.has("thin") || built.is_blend || built.has("opacity") {
+        if context.mask.is_some() {
+            let text = "the inner mask is ignored";
+            self.notes.substitute_light("`mask` around another mask", text, object.span.clone());
+            return self.bsdf(nested.target, context);
+        }
+        let context = BsdfContext { mask: Some(index), ..context };
+        let mut built = self.bsdf(nested.target, context)?;
+        // The materials of a blend have the opacity already.
+        if !built.is_invisible && !built.is_blend {
+            self.add_opacity(&mut built, context);
+        }
+        Some(built)
+    }
+
+    /// Adds the opacity of the mask that contains a material.
+    fn add_opacity(&mut self, built: &mut MaterialBuilder, context: BsdfContext) {
+        let Some(object) = context.mask.map(|index| self.object(index)) else { return };
+        if built.is_glass && !built.has("thin") || built.has("opacity") {
             let text = "the mask is ignored";
-            self.notes.substitute_light("`mask` around glass, a blend or another mask", text, object.span.clone());
-            return Some(built);
+            self.notes.substitute_light("`mask` around solid glass", text, object.span.clone());
+            return;
         }
         let text = "they let light from point, spot and directional lights through, which Mitsuba blocks";
         self.notes.note("masks", text, object.span.clone());
+        let opacity = self.number(object, "opacity", 0.5);
         let value = self.number_value(opacity, context);
         built.keys.push(("opacity", value));
-        Some(built)
     }
 
     fn blend(&mut self, object: &'a Object, context: BsdfContext) -> Option<MaterialBuilder> {
@@ -602,6 +673,9 @@ impl<'a> SceneReader<'a> {
                 built = MaterialBuilder::new("phong", vec![("diffuse", 0.0.into()), ("opacity", 0.0.into())]);
             }
             built.is_one_sided &= !context.is_two_sided;
+            if context.mask.is_some() && !built.is_blend {
+                self.add_opacity(&mut built, context);
+            }
             let wanted = inner.id.as_deref().unwrap_or(&inner.plugin);
             names.push(BuiltValue::from(self.add_material(built, wanted, inner.span.clone())));
         }
@@ -687,6 +761,12 @@ impl<'a> SceneReader<'a> {
 
     fn normal_map(&mut self, object: &'a Object, context: BsdfContext) -> Option<MaterialBuilder> {
         let nested = self.nested_bsdf(object)?;
+        if let Some(constant) = object.named_child("normalmap").map(|child| self.object(child.target))
+            && constant.plugin == "rawconstant"
+        {
+            self.note_constant_normal_map(constant);
+            return self.bsdf(nested.target, context);
+        }
         let texture = self.nested_texture(object)?;
         for name in ["flip_invalid_normals", "use_shadowing_function"] {
             object.property(name);
@@ -703,6 +783,14 @@ impl<'a> SceneReader<'a> {
             self.notes.note("bump and normal maps", text, object.span.clone());
         }
         Some(built)
+    }
+
+    /// Reports a constant normal map, unless it is the identity.
+    fn note_constant_normal_map(&mut self, constant: &'a Object) {
+        let value = constant.property("value").map(|property| &property.value);
+        if value != Some(&PropertyValue::Vector(DVec3::new(0.5, 0.5, 1.0))) {
+            self.notes.substitute_light("a constant normal map", "left out", constant.span.clone());
+        }
     }
 
     fn principled(&mut self, object: &'a Object, context: BsdfContext) -> MaterialBuilder {

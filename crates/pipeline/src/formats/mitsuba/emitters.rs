@@ -19,6 +19,12 @@ const KNOWN_EMITTERS: [&str; 12] = [
 ];
 
 impl<'a> SceneReader<'a> {
+    /// Whether an emitter is an area light that shapes can refer to.
+    pub(super) fn is_named_area_light(&self, index: usize) -> bool {
+        let object = self.object(index);
+        object.plugin == "area" && object.id.is_some()
+    }
+
     /// Adds an emitter of the scene.
     pub(super) fn add_emitter(&mut self, index: usize) {
         let object = self.object(index);

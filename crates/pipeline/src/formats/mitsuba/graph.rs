@@ -305,8 +305,13 @@ impl<'a> GraphBuilder<'a> {
         };
         let span = element.attribute("value").map_or(element.span.clone(), |value| value.span.clone());
         let properties = &mut self.graph.objects[parent].properties;
-        if properties.iter().any(|known| known.name == name) {
-            return self.error(span, format!("`{}` is specified twice", shorten(&name)), None);
+        if let Some(known) = properties.iter_mut().find(|known| known.name == name) {
+            // Version 0.6 only warns about it.
+            if !element.is_old && known.value != value {
+                return self.error(span, format!("`{}` is specified twice", shorten(&name)), None);
+            }
+            known.value = value;
+            return;
         }
         properties.push(Property { name, value, span, is_used: Cell::new(false) });
     }

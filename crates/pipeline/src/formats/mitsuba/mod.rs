@@ -10,6 +10,8 @@ mod plastic;
 mod reader;
 mod settings;
 mod shapes;
+#[cfg(test)]
+mod tests;
 mod textures;
 mod values;
 mod xml;
@@ -93,6 +95,8 @@ fn read_scene(
             ObjectKind::Shape => {
                 reader.add_shape(child.target, ShapeTarget::SCENE);
             }
+            // A named area light is a definition that shapes refer to.
+            ObjectKind::Emitter if reader.is_named_area_light(child.target) => {}
             ObjectKind::Emitter => reader.add_emitter(child.target),
             // BSDFs, textures and media are converted where they are used.
             ObjectKind::Bsdf

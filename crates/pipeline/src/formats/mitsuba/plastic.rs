@@ -38,7 +38,7 @@ impl PlasticCoat {
         let facets = Facets { alpha, is_beckmann };
         let transmittance = mean_over_hemisphere(|cosine| facets.transmittance(cosine, eta));
         let internal_reflectance =
-            mean_over_hemisphere(|cosine| facets.reflectance(cosine, 1.0 / eta, Masking::Separable));
+            mitsuba_mean(|cosine| facets.reflectance(cosine, 1.0 / eta, Masking::Separable));
         let albedo = mean_over_hemisphere(|cosine| facets.reflectance(cosine, eta, Masking::HeightCorrelated));
         Self {
             transmittance_squared: transmittance * transmittance,
@@ -73,6 +73,14 @@ fn mean_over_hemisphere(value: impl Fn(f64) -> f64) -> f64 {
     const STEPS: u32 = 40;
     let at = |step: u32| value(((f64::from(step) + 0.5) / f64::from(STEPS)).sqrt());
     (0..STEPS).map(at).sum::<f64>() / f64::from(STEPS)
+}
+
+/// Like [`mean_over_hemisphere`], as Mitsuba computes it: with 64 values from 0 to 1, and without halving the
+/// weight of the last one. The result is up to 1.6 % lower.
+fn mitsuba_mean(value: impl Fn(f64) -> f64) -> f64 {
+    const COUNT: u32 = 64;
+    let at = |index: u32| (f64::from(index) / f64::from(COUNT - 1)).max(1e-6);
+    2.0 * (0..COUNT).map(|index| value(at(index)) * at(index)).sum::<f64>() / f64::from(COUNT)
 }
 
 /// Masking and shadowing of two directions.
@@ -190,7 +198,7 @@ mod tests {
         for is_beckmann in [false, true] {
             let rough = PlasticCoat::new(1.5, Some(0.01), is_beckmann);
             assert!((rough.transmittance_squared - smooth.transmittance_squared).abs() < 4e-3, "{rough:?}");
-            assert!((rough.internal_reflectance - smooth.internal_reflectance).abs() < 6e-3, "{rough:?}");
+            assert!((rough.internal_reflectance / smooth.internal_reflectance - 63.0 / 64.0).abs() < 1e-2, "{rough:?}");
         }
     }
 

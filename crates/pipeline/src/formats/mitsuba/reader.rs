@@ -21,6 +21,7 @@ use crate::formats::model::UsedNames;
 use crate::math::{DMat4, DVec3};
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::nearest::nearest_name;
+use crate::stages::containers::GltfContainers;
 use crate::scene::{BuiltDocument, BuiltValue, SourceFiles};
 
 /// Keys and values of a table.
@@ -61,6 +62,8 @@ pub(super) struct SceneReader<'a> {
     pub(super) folders: &'a [PathBuf],
     pub(super) options: &'a ForeignOptions,
     pub(super) token: &'a CancelToken,
+    /// Loads meshes.
+    pub(super) containers: &'a GltfContainers,
     /// Folder to which an import copies the assets. `None` if they stay in place.
     pub(super) asset_folder: Option<&'a str>,
     pub(super) errors: Vec<Diagnostic>,
@@ -84,6 +87,8 @@ pub(super) struct SceneReader<'a> {
     /// Properties reported as unused.
     pub(super) reported_unused: HashSet<ObjectIndex>,
     pub(super) has_environment: bool,
+    /// Name of the black material, if it is in the document.
+    pub(super) black: Option<String>,
     /// Integrals of plastic coats, by index of refraction, α and distribution.
     pub(super) plastic_coats: HashMap<(u64, Option<u64>, bool), PlasticCoat>,
 }
@@ -97,7 +102,7 @@ impl<'a> SceneReader<'a> {
         asset_folder: Option<&'a str>,
         context: &ForeignReadContext<'a>,
     ) -> Self {
-        let ForeignReadContext { options, token, .. } = *context;
+        let ForeignReadContext { options, token, containers, .. } = *context;
         Self {
             graph,
             files,
@@ -105,6 +110,7 @@ impl<'a> SceneReader<'a> {
             folders,
             options,
             token,
+            containers,
             asset_folder,
             errors: Vec::new(),
             notes: NoteCollector::default(),
@@ -121,6 +127,7 @@ impl<'a> SceneReader<'a> {
             used_asset_names: UsedNames::default(),
             reported_unused: HashSet::new(),
             has_environment: false,
+            black: None,
             plastic_coats: HashMap::new(),
         }
     }
@@ -263,12 +270,27 @@ impl<'a> SceneReader<'a> {
     fn color_of_child(&mut self, child: &Child, role: ColorRole) -> ColorSource {
         let object = self.object(child.target);
         match object.kind {
+            ObjectKind::Texture if matches!(object.plugin.as_str(), "rawconstant" | "constant" | "srgb" | "uniform") => {
+                ColorSource::Constant(self.constant_texture_color(object))
+            }
             ObjectKind::Texture => ColorSource::Texture(child.target),
             ObjectKind::Spectrum => ColorSource::Constant(self.spectrum_plugin_color(object, role)),
             _ => {
                 self.error(child.span.clone(), "expected a texture", None);
                 ColorSource::Constant(DVec3::splat(0.5))
             }
+        }
+    }
+
+    /// Returns the color of a texture with a single value.
+    fn constant_texture_color(&mut self, object: &'a Object) -> DVec3 {
+        let name = if object.property("color").is_some() { "color" } else { "value" };
+        match object.property(name).map(|property| &property.value) {
+            Some(PropertyValue::Vector(vector)) => *vector,
+            Some(_) | None => match self.color(object, name, ColorRole::Unbounded, 0.5) {
+                ColorSource::Constant(color) => color,
+                ColorSource::Texture(_) => DVec3::splat(0.5),
+            },
         }
     }
 
@@ -419,8 +441,15 @@ impl<'a> SceneReader<'a> {
     /// Returns the name by which the document refers to an asset. Reports an error if the file does not
     /// exist, unless missing files are allowed.
     pub(super) fn asset(&mut self, name: &str, span: &Range<usize>, kind: &str) -> Option<String> {
+        let path = self.asset_path(name, span, kind)?;
+        Some(self.asset_reference(&path))
+    }
+
+    /// Returns the path of an asset. Reports an error if the file does not exist, unless missing files are
+    /// allowed.
+    pub(super) fn asset_path(&mut self, name: &str, span: &Range<usize>, kind: &str) -> Option<PathBuf> {
         if let Some(found) = self.find_file(name, span) {
-            return Some(self.asset_reference(&found));
+            return Some(found);
         }
         match self.options.missing {
             MissingAssetMode::Error => {
@@ -436,7 +465,7 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Returns the name by which the document refers to an existing file.
-    fn asset_reference(&mut self, path: &Path) -> String {
+    pub(super) fn asset_reference(&mut self, path: &Path) -> String {
         let Some(folder) = self.asset_folder else {
             let scene_folder = self.path.parent().unwrap_or(Path::new(""));
             let relative = path.strip_prefix(scene_folder).unwrap_or(path);

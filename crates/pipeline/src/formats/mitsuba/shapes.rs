@@ -1,5 +1,7 @@
 //! Converts shapes, groups and instances.
 
+use std::path::Path;
+
 use super::graph::{Child, Object, ObjectIndex, ObjectKind};
 use super::reader::SceneReader;
 use super::settings::span_of;
@@ -8,6 +10,8 @@ use super::xml::shorten;
 use crate::formats::foreign::transform::{
     is_invertible_affine, is_mirroring, linear_part, matrix_value, similarity_scale,
 };
+use crate::assets::AssetError;
+use crate::control::ignore_progress;
 use crate::math::{DMat4, DVec3};
 
 /// Plugins that are shapes in Mitsuba 3, 2 or 0.6.
@@ -16,6 +20,8 @@ const KNOWN_SHAPES: [&str; 18] = [
     "merge", "hair", "bsplinecurve", "linearcurve", "sdfgrid", "heightfield", "ellipsoids",
 ];
 
+/// Start of the error message for a mesh without a usable face.
+const NO_USABLE_FACE: &str = "no usable face";
 /// Maximum depth of nested shapes.
 const MAX_DEPTH: u32 = 16;
 
@@ -165,7 +171,12 @@ impl<'a> SceneReader<'a> {
         let has_flat_faces = self.boolean(object, "face_normals", false);
         let is_flipped = self.boolean(object, "flip_normals", false);
         let part = self.integer(object, "shape_index");
-        let Some(file) = self.asset(name, &span, "mesh") else { return false };
+        let Some(path) = self.asset_path(name, &span, "mesh") else { return false };
+        if self.is_mesh_without_area(&path, part) {
+            self.notes.note("a mesh without area", "left out", span);
+            return false;
+        }
+        let file = self.asset_reference(&path);
         let Some(material) = self.shape_material(object, uv) else { return false };
         self.start_shape(object, target, "mesh", material);
         self.document.at(span);
@@ -185,6 +196,17 @@ impl<'a> SceneReader<'a> {
             object.property(name);
         }
         true
+    }
+
+    /// Whether no face of a mesh has an area. Only small files are checked, because such meshes are small.
+    fn is_mesh_without_area(&self, path: &Path, part: Option<i64>) -> bool {
+        const MAX_BYTES: u64 = 4096;
+        if !std::fs::metadata(path).is_ok_and(|metadata| metadata.len() <= MAX_BYTES) {
+            return false;
+        }
+        let part = part.and_then(|part| u32::try_from(part).ok());
+        let loaded = self.containers.load_any_mesh(path, part, &ignore_progress, self.token);
+        matches!(loaded, Err(AssetError::Malformed { reason, .. }) if reason.starts_with(NO_USABLE_FACE))
     }
 
     fn add_sphere(&mut self, object: &'a Object, target: ShapeTarget<'_>) -> bool {
