@@ -136,7 +136,7 @@ pub enum Subcommand {
         #[arg(long)]
         schema: bool,
     },
-    /// Convert a glTF file or a Mitsuba scene without overwriting files
+    /// Convert a glTF file, a Mitsuba scene or a pbrt scene without overwriting files
     ///
     /// Meshes (as PLY files) and images are written to a folder next to the scene.
     #[command(after_long_help = IMPORT_HELP)]
@@ -287,7 +287,7 @@ and something is approximated.";
 /// Arguments of `import`.
 #[derive(Clone, Debug, clap::Args)]
 pub struct ImportArgs {
-    /// The file to read: gltf, glb, xml (Mitsuba)
+    /// The file to read: gltf, glb, xml (Mitsuba), pbrt
     #[arg(add = candidates::import_completer())]
     pub file: PathBuf,
     /// The scene to write [default: FILE with .toml, in the current folder]

@@ -19,7 +19,7 @@ use crate::tui::{ColorDepthChoice, PreviewChoice};
 /// Arguments of a render. Options override the scene's settings for this run.
 #[derive(Clone, Debug, clap::Args)]
 pub struct RenderArgs {
-    /// A scene (TOML, or Mitsuba's XML) or a model: obj, off, ply, stl, glb, gltf
+    /// A scene (TOML, Mitsuba's XML, or pbrt) or a model: obj, off, ply, stl, glb, gltf
     #[arg(required = true, add = candidates::scene_or_foreign_completer(), value_name = "SCENE")]
     pub scene: Option<PathBuf>,
     /// Render once, write the image and exit
