@@ -251,7 +251,7 @@ mod tests {
     }
 
     #[test]
-    fn emission_is_divided_by_its_luminance_but_rgb_is_not() {
+    fn emission_has_unit_luminance_unless_rgb() {
         for text in ["\"blackbody L\" 6500", "\"blackbody L\" 3000", "\"spectrum L\" [300 7 900 7]"] {
             let color = color(text, SpectrumUse::Emission).expect("a color");
             assert!((luminance(color) - 1.0).abs() < 2e-3, "{text}: {color}");
@@ -263,7 +263,7 @@ mod tests {
     }
 
     #[test]
-    fn illuminant_a_is_as_warm_as_a_blackbody_of_2856_kelvin() {
+    fn illuminant_a_equals_a_warm_blackbody() {
         let a = color("\"spectrum L\" \"stdillum-A\"", SpectrumUse::Emission).expect("a color");
         let blackbody = color("\"blackbody L\" 2856", SpectrumUse::Emission).expect("a color");
         assert!((a - blackbody).abs().max_element() < 0.01, "{a} {blackbody}");

@@ -250,7 +250,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn look_at_has_x_on_the_right_of_a_left_handed_world() {
+    fn look_at_has_x_on_the_right() {
         let matrix = look_at(&[0.0, 0.0, -5.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0], &(0..0)).expect("a matrix");
         assert!(
             matrix.transform_point3(DVec3::new(1.0, 2.0, 0.0)).abs_diff_eq(DVec3::new(1.0, 2.0, 5.0), 1e-12)

@@ -62,7 +62,7 @@ fn depth_defaults_to_five_scatterings() {
 }
 
 #[test]
-fn only_reverse_orientation_turns_disks_and_spheres() {
+fn only_reverse_orientation_turns_spheres() {
     let light = "AreaLightSource \"diffuse\"\n";
     let normal = |before: &str| number(&toml_of_world(&format!("{light}{before}Shape \"disk\"")), "normal");
     assert_eq!([normal(""), normal("Scale -1 1 1\n")], [0.0; 2]);
@@ -310,7 +310,7 @@ fn conductors_are_copper_by_default() {
 }
 
 #[test]
-fn reflectance_of_conductors_is_exact_at_normal_incidence() {
+fn conductor_reflectance_is_exact() {
     let toml = toml_of_world(&format!(
         "{LIGHT}Material \"conductor\" \"rgb reflectance\" [0.5 0.5 0.5]\nShape \"sphere\""
     ));
