@@ -264,6 +264,7 @@ mod tests {
             pixels: Pixels { width: size, height: size, values },
             scale: 1.0,
             to_light: DMat4::IDENTITY,
+            hash: [0; 32],
         };
         let resampled = resample(&[map], DVec3::ZERO, size);
         let row_angle = PI / resampled.height as f64;
