@@ -37,6 +37,7 @@ METAL = "materials::bxdfs::conductor::tests::"
 NOISE = "materials::texture::noise::tests::"
 STRIPES = "materials::texture::stripes::tests::"
 PLASTIC = "materials::bxdfs::plastic::tests::"
+FACTS = "formats::mitsuba::tests::facts::"
 PRINCIPLED = "materials::bxdfs::principled::tests::"
 COATED = "materials::bxdfs::coated::tests::"
 FROSTED = "closed_forms::frosted::"
@@ -52,6 +53,30 @@ PBRT_FACTS = "formats::pbrt::tests::facts::"
 
 # Fault, file, the code around the expression in ⟦⟧, its replacement, and the test that must fail.
 FAULTS = [
+    ("rows at the poles read as centered rows", "lights/infinite/environment_map.rs", "Self::Poles if rows > 1 => (⟦rows as f32 - 1.0⟧, 1.0),", "rows as f32",
+     "lights::infinite::environment::tests::rows_at_the_poles_are_interpolated_exactly"),
+    ("linear bases without interreflection", "materials/bxdfs/plastic/mod.rs", "if is_linear { diffuse / ⟦(1.0 - returned)⟧ } else", "1.0",
+     PLASTIC + "linear_bases_scale_the_white_base"),
+    ("fields of view along y", "formats/mitsuba/settings.rs", "\"x\" => ⟦half / aspect⟧,", "half",
+     FACTS + "field_of_view_is_along_x"),
+    ("depth limits that are not converted", "formats/mitsuba/settings.rs", "(⟦depth - 1⟧).clamp(0, 10_000)", "depth",
+     FACTS + "depth_limits_count_vertices"),
+    ("images that are not flipped", "formats/mitsuba/textures.rs", "return Self { rows: [first, ⟦flipped⟧], offset", "second",
+     FACTS + "images_start_at_the_top_row"),
+    ("checkerboards that are not swapped", "formats/mitsuba/textures.rs", "TextureUse::Number => ⟦colors.reverse()⟧,", "{}",
+     FACTS + "checkerboards_swap_colors_as_numbers"),
+    ("flat emission spectra that are white", "formats/mitsuba/reader.rs", "ColorRole::Emission => ⟦flat_emission_color() * *value⟧,", "DVec3::splat(*value)",
+     FACTS + "flat_emission_spectra_are_purple"),
+    ("roughness that is α", "formats/mitsuba/bsdfs.rs", "shorten_number(⟦libm::sqrt(alpha.clamp(1e-4, 1.0))⟧).into(),\n            NumberSource::Texture(texture) => match self.roughness_texture", "alpha",
+     FACTS + "roughness_is_the_root_of_alpha"),
+    ("reflectances of plastic that are copied", "formats/mitsuba/plastic.rs", "if remapped.is_finite() { ⟦remapped.clamp(0.0, 1.0)⟧ } else", "kd",
+     FACTS + "plastic_is_linear_by_default"),
+    ("environment maps that are not turned", "formats/mitsuba/emitters.rs", "linear_part(&matrix) * ⟦half_turn⟧);", "DMat3::IDENTITY",
+     FACTS + "environment_maps_start_at_minus_z"),
+    ("mirrored rectangles whose front is reversed", "formats/mitsuba/shapes.rs", "let is_reversed = ⟦is_mirroring(&matrix) != is_flipped⟧;\n        let uv = UvConvention { flips_u: is_reversed", "is_flipped",
+     FACTS + "mirrored_rectangles_keep_their_front"),
+    ("offsets of serialized meshes with 8 bytes in version 3", "assets/mesh/serialized.rs", "let offset_bytes = if ⟦version == 3⟧ { 4 } else { 8 };", "false",
+     "assets::mesh::serialized::tests::parts_of_all_versions_are_found"),
     ("panoramas with half the range of elevations", "world/camera.rs", "sin_cos_f64(⟦FRAC_PI_2⟧ * place.y);", "0.5 * FRAC_PI_2",
      PROJECTIONS + "panorama_directions_match_environment_maps"),
     ("fisheyes that are linear in the sine of the angle", "world/camera.rs", "sin_cos_f64(⟦radius.min(1.0) * half_fov⟧);", "(radius.min(1.0) * half_fov.min(1.0)).asin()",

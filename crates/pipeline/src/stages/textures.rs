@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::super::cache::{CacheOfNamedValues, RequestCache};
+use super::super::formats::has_model_extension;
 use super::super::protocol::reasons;
 use super::super::watch::content::FilePathAndContentId;
 use super::meshes::MeshesByFileIndex;
@@ -186,7 +187,7 @@ pub(crate) fn load_textures(
             Err(error) => {
                 let error = AbortReason::unless_fatal(error)?;
                 counts.failed += 1;
-                if !are_required && loaded.is_foreign() {
+                if !are_required && loaded.is_foreign() && has_model_extension(&loaded.path) {
                     for one in &image.asked_by {
                         replace_unreadable_image(loaded, one, &error, &mut textures.images, findings);
                     }

@@ -59,6 +59,8 @@ pub(super) struct MaterialBuilder {
     is_blend: bool,
     /// Whether the back of the surface is black.
     is_one_sided: bool,
+    /// Whether the surface has a smooth conductor or a smooth dielectric coat.
+    has_smooth_reflection: bool,
 }
 
 impl MaterialBuilder {
@@ -232,7 +234,8 @@ impl<'a> SceneReader<'a> {
             }
         };
         self.report_unused(index);
-        built
+        let is_smooth = matches!(object.plugin.as_str(), "conductor" | "dielectric" | "thindielectric" | "plastic");
+        built.map(|built| MaterialBuilder { has_smooth_reflection: built.has_smooth_reflection || is_smooth, ..built })
     }
 
     fn refused(&mut self, object: &Object, what: &str) -> Option<MaterialBuilder> {
@@ -671,6 +674,10 @@ impl<'a> SceneReader<'a> {
             if built.is_invisible {
                 // A surface without effect is transparent.
                 built = MaterialBuilder::new("phong", vec![("diffuse", 0.0.into()), ("opacity", 0.0.into())]);
+            }
+            if built.has_smooth_reflection {
+                let text = "glimt blends their light by the weight; Mitsuba mixes up their pdfs";
+                self.notes.note("smooth metal, glass or plastic in a blend", text, object.span.clone());
             }
             built.is_one_sided &= !context.is_two_sided;
             if context.mask.is_some() && !built.is_blend {

@@ -216,8 +216,9 @@ impl<'a> SceneReader<'a> {
         for name in ["resolution", "stretch", "extend", "complex_sun", "latitude", "longitude", "timezone", "year", "month", "day", "hour", "minute", "second"] {
             object.property(name);
         }
+        // An explicit direction is in the world, while a time and a place result in a local one.
         let direction = match direction {
-            Some(direction) => direction,
+            Some(direction) => linear_part(&matrix).inverse() * direction,
             None => self.sun_direction(object),
         };
         if !self.start_environment(object) {

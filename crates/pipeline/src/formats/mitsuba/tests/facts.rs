@@ -345,6 +345,29 @@ fn environment_maps_start_at_minus_z() {
 }
 
 #[test]
+fn skies_have_z_up_and_suns_in_the_world() {
+    let of = |version: &str| {
+        let bench = super::Bench::new();
+        let turn = r#"<transform name="to_world"><rotate x="1" angle="-90"/></transform>"#;
+        let turn = if version.starts_with('3') { turn } else { "" };
+        bench.write(
+            "scene.xml",
+            format!(
+                r#"<scene version="{version}"><sensor type="perspective"/><emitter type="sunsky">{turn}
+                <vector name="sun_direction" x="0.6" y="0.8" z="0"/></emitter></scene>"#
+            ),
+        );
+        bench.toml()
+    };
+    // In version 3, the turn moves the local up axis z to the world's y.
+    for version in ["3.0.0", "0.6.0"] {
+        let text = of(version);
+        assert!(text.contains("sky = { sun = [0.6, 0.8, 0]"), "{version}:\n{text}");
+        lacks(&text, "matrix");
+    }
+}
+
+#[test]
 fn mirrored_rectangles_keep_their_front() {
     let of = |transform: &str| {
         let text = scene(&format!(
