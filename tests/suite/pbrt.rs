@@ -138,3 +138,19 @@ fn pbrt_errors_name_the_place() {
     let stderr = dir.expect(&format!("scene.pbrt {SMALL} --strict -o a.exr"), 2);
     assert_mentions(&stderr, &["`curve`"]);
 }
+
+#[test]
+fn many_dielectrics_are_checked_in_parallel() {
+    let dir = TestDir::new();
+    let balls: String = (0..5000)
+        .map(|index| {
+            format!(
+                "AttributeBegin Translate {} {} 0 Shape \"sphere\" \"float radius\" 0.3 AttributeEnd\n",
+                index % 70,
+                index / 70
+            )
+        })
+        .collect();
+    dir.write("scene.pbrt", format!("{OPTIONS}LightSource \"infinite\"\nMaterial \"dielectric\"\n{balls}"));
+    dir.expect("check scene.pbrt", 0);
+}

@@ -168,7 +168,7 @@ fn read_scene(
         companions.collect::<Result<Vec<_>, Canceled>>()
     };
     let ForeignScene { document, hash, companions, notes, substitutions } =
-        match (format.read)(path, &context) {
+        match reading.pool.install(|| (format.read)(path, &context)) {
             Ok(scene) => scene,
             Err(ForeignError::Asset(error)) => return Err(abort_reason(error, findings, reading)),
             Err(ForeignError::Scene { diagnostics, companions }) => {
