@@ -6,6 +6,7 @@ use super::material_tables::{Emission, ShapeProperties};
 use super::meshes::MeshData;
 use super::parameters::Parameters;
 use super::scene::SceneWriter;
+use super::shapes::round_shape_area;
 use super::state::{Entity, ShapeEntity};
 use super::texture_nodes::{ImageFilter, ImageNode, ImageWrap, TextureNode, TextureValue, UvMapping};
 use crate::math::{DMat4, DVec3};
@@ -129,12 +130,8 @@ impl SceneWriter<'_> {
                 loaded = mesh;
                 &loaded
             }
-            (kind, None) => {
-                loaded = super::shapes::round_shape_mesh(kind, parameters)?;
-                let area: f64 =
-                    loaded.triangles.iter().map(|triangle| loaded.transformed_area(*triangle, matrix)).sum();
-                return positive_area(area, parameters);
-            }
+            // pbrt ignores the transform of these shapes.
+            (kind, None) => return positive_area(round_shape_area(kind, parameters)?, parameters),
         };
         let areas: Vec<f64> =
             data.triangles.iter().map(|triangle| data.transformed_area(*triangle, matrix)).collect();

@@ -359,9 +359,13 @@ where
     (a * (1.0 - uv.x) + b * uv.x) * (1.0 - uv.y) + (c * (1.0 - uv.x) + d * uv.x) * uv.y
 }
 
-/// Builds the mesh of a sphere, a disk or a cylinder.
-pub(super) fn round_shape_mesh(kind: &str, parameters: &Parameters) -> PbrtResult<MeshData> {
-    Ok(round_mesh(kind, &read_round(kind, parameters)?))
+/// Returns the area of a sphere, a disk or a cylinder, without its transform.
+pub(super) fn round_shape_area(kind: &str, parameters: &Parameters) -> PbrtResult<f64> {
+    let Round { radius, z: [low, high], inner_radius, azimuth } = read_round(kind, parameters)?;
+    Ok(match kind {
+        "disk" => 0.5 * azimuth * (radius * radius - inner_radius * inner_radius),
+        _ => azimuth * radius * (high - low),
+    })
 }
 
 fn read_round(kind: &str, parameters: &Parameters) -> PbrtResult<Round> {

@@ -163,6 +163,10 @@ fn power_of_area_lights_is_per_triangle() {
     let toml = toml_of_world(&both);
     check(&toml, &["emission_sides = \"both\""]);
     assert!((number(&toml, "emission") - 0.5).abs() < 1e-6);
+    // The area of a sphere of radius 1 is 4π.
+    let sphere = toml_of_world("AreaLightSource \"diffuse\" \"float power\" 100\nShape \"sphere\"");
+    let pi = std::f64::consts::PI;
+    assert!((number(&sphere, "emission") / (100.0 / (4.0 * pi * pi)) - 1.0).abs() < 1e-6, "{sphere}");
 }
 
 #[test]
