@@ -391,7 +391,13 @@ impl<'a> SceneReader<'a> {
     fn conductor(&mut self, object: &'a Object, context: BsdfContext) -> Option<MaterialBuilder> {
         let is_rough = object.plugin == "roughconductor";
         let material = self.text(object, "material");
-        if object.property("eta").is_none() && object.named_child("eta").is_none() && matches!(material, Some(("none", _))) {
+        let has_eta = object.property("eta").is_some() || object.named_child("eta").is_some();
+        // Without a material, version 0.6 uses copper, and later versions reflect all light.
+        let reflects_all = match material {
+            Some((name, _)) => name == "none",
+            None => !object.is_old,
+        };
+        if !has_eta && reflects_all {
             let color = self.color(object, "specular_reflectance", ColorRole::Reflectance, 1.0);
             let color = self.color_value(color, context, 1.0);
             if !is_rough {
@@ -401,7 +407,6 @@ impl<'a> SceneReader<'a> {
             self.add_distribution(&mut keys, object, 0.1, context, true);
             return Some(MaterialBuilder::one_sided("metal", keys));
         }
-        let has_eta = object.property("eta").is_some() || object.named_child("eta").is_some();
         let mut keys = Entries::new();
         if has_eta {
             let eta = self.color(object, "eta", ColorRole::Unbounded, 0.0);

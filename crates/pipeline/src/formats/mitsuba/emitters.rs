@@ -205,7 +205,7 @@ impl<'a> SceneReader<'a> {
             "sun" => sky_scale = 0.0,
             _ => {}
         }
-        let ground = match self.color(object, "albedo", ColorRole::Reflectance, if object.is_old { 0.2 } else { 0.3 }) {
+        let ground = match self.color(object, "albedo", ColorRole::Reflectance, if object.is_old { 0.15 } else { 0.3 }) {
             ColorSource::Constant(color) => color.min(DVec3::ONE),
             ColorSource::Texture(_) => DVec3::splat(0.3),
         };
@@ -251,9 +251,11 @@ impl<'a> SceneReader<'a> {
                 sky.push((key, shorten_number(value.max(0.0)).into()));
             }
         }
+        // In Mitsuba, the lower hemisphere is black.
+        sky.push(("ground_scale", 0.0.into()));
         self.document.set("sky", BuiltValue::Table(sky));
         self.set_environment_matrix(object, linear_part(&matrix) * to_local.transpose());
-        let text = "the sun is up to 8.5 % dimmer than in Mitsuba's RGB mode, and the ground below the horizon is visible";
+        let text = "the sun is up to 8.5 % dimmer than in Mitsuba's RGB mode";
         self.notes.note(&format!("`{}`", object.plugin), text, object.span.clone());
     }
 

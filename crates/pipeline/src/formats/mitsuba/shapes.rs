@@ -1,11 +1,16 @@
 //! Converts shapes, groups and instances.
 
+use std::f64::consts::TAU;
+use std::io::Read;
 use std::path::Path;
+
+use glimt_kernel::geometry::cylinder::Cylinder;
 
 use super::graph::{Child, Object, ObjectIndex, ObjectKind};
 use super::reader::SceneReader;
 use super::settings::span_of;
-use super::textures::UvConvention;
+use super::textures::{UvConvention, extension};
+use super::values::perpendicular_up;
 use super::xml::shorten;
 use crate::formats::foreign::transform::{
     is_invertible_affine, is_mirroring, linear_part, matrix_value, similarity_scale,
@@ -121,10 +126,10 @@ impl<'a> SceneReader<'a> {
         self.material(bsdf, emitter, uv, object)
     }
 
-    /// Reports flipped normals, which glimt ignores.
+    /// Reports flipped normals, which glimt ignores. In Mitsuba, mirroring transforms flip normals, too.
     fn note_flipped_normals(&mut self, object: &'a Object) {
-        let text = "ignored; the front is the usual side";
-        self.notes.substitute_light("`flip_normals`", text, span_of(object, "flip_normals"));
+        let text = "the front is the usual side, which matters to one-sided materials, glass and lights";
+        self.notes.substitute_light("normals flipped by `flip_normals` or a mirroring `to_world`", text, object.span.clone());
     }
 
     /// Returns the transform of a shape, or reports an error and returns `None`.
@@ -189,7 +194,9 @@ impl<'a> SceneReader<'a> {
             self.document.set("smooth", false);
         }
         self.set_matrix(&matrix);
-        if is_flipped {
+        // Normals in the file are mirrored with the mesh, computed normals are not.
+        let is_mirrored = is_mirroring(&matrix) && (has_flat_faces || !has_normals(&path));
+        if is_flipped != is_mirrored {
             self.note_flipped_normals(object);
         }
         for name in ["max_smooth_angle", "flip_uvs", "srgb"] {
@@ -237,7 +244,7 @@ impl<'a> SceneReader<'a> {
                 self.set_matrix(&placed);
             }
         }
-        if is_flipped {
+        if is_flipped != is_mirroring(&matrix) {
             self.note_flipped_normals(object);
         }
         true
@@ -265,12 +272,20 @@ impl<'a> SceneReader<'a> {
         let end = self.vector(object, "p1").unwrap_or(DVec3::Z);
         let radius = self.float(object, "radius").unwrap_or(1.0);
         let is_flipped = self.boolean(object, "flip_normals", false);
-        if self.shape_uses_coordinates(object) {
-            let text = "the texture may be turned around the axis";
-            self.notes.substitute("a textured `cylinder`", text, object.span.clone());
-        }
         let Some(material) = self.shape_material(object, UvConvention::default()) else { return false };
+        let placed = if self.shape_uses_coordinates(object) { cylinder_matrix(&matrix, start, end, radius) } else { None };
         self.start_shape(object, target, "cylinder", material);
+        if let Some(placed) = placed {
+            self.document.set("a", DVec3::ZERO);
+            self.document.set("b", DVec3::Z);
+            self.document.set("radius", 1.0);
+            self.set_matrix(&placed);
+            self.document.set("caps", false);
+            if is_flipped != is_mirroring(&matrix) {
+                self.note_flipped_normals(object);
+            }
+            return true;
+        }
         match similarity_scale(&matrix) {
             Some(scale) => {
                 self.document.set("a", matrix.transform_point3(start));
@@ -285,7 +300,7 @@ impl<'a> SceneReader<'a> {
             }
         }
         self.document.set("caps", false);
-        if is_flipped {
+        if is_flipped != is_mirroring(&matrix) {
             self.note_flipped_normals(object);
         }
         true
@@ -413,5 +428,48 @@ impl<'a> SceneReader<'a> {
         let name = is_added.then_some(name);
         self.groups.insert(index, name.clone());
         name
+    }
+}
+
+/// Matrix that places a cylinder from the origin to (0, 0, 1) with radius 1, such that its texture coordinate u
+/// is Mitsuba's angle. Returns `None` if the ends coincide.
+fn cylinder_matrix(matrix: &DMat4, start: DVec3, end: DVec3, radius: f64) -> Option<DMat4> {
+    let axis = end - start;
+    let direction = axis.try_normalize()?;
+    let across = perpendicular_up(direction);
+    let along = direction.cross(across);
+    let frame = DMat4::from_cols(
+        (across * radius).extend(0.0),
+        (along * radius).extend(0.0),
+        axis.extend(0.0),
+        start.extend(1.0),
+    );
+    // Turn the cylinder by the angle at which glimt's u is 0. If u runs the other way, mirror it.
+    let cylinder = Cylinder::new(DVec3::ZERO, DVec3::Z, 1.0, false);
+    let u_at = |point: DVec3| cylinder.uv_at_point(point + DVec3::Z * 0.5).x;
+    let (first, quarter) = (u_at(DVec3::X), u_at(DVec3::Y));
+    let is_reversed = (quarter - first).rem_euclid(1.0) > 0.5;
+    let turn = DMat4::from_rotation_z(TAU * if is_reversed { -first } else { first });
+    let mirror = DMat4::from_scale(DVec3::new(1.0, if is_reversed { -1.0 } else { 1.0 }, 1.0));
+    Some(*matrix * frame * mirror * turn)
+}
+
+/// Whether a mesh file has normals. Serialized files are assumed to have them.
+fn has_normals(path: &Path) -> bool {
+    const MAX_BYTES: u64 = 256 << 20;
+    let Ok(file) = std::fs::File::open(path) else { return true };
+    let mut bytes = Vec::new();
+    if file.take(MAX_BYTES).read_to_end(&mut bytes).is_err() {
+        return true;
+    }
+    let contains = |bytes: &[u8], word: &[u8]| bytes.windows(word.len()).any(|window| window == word);
+    match extension(&path.to_string_lossy()).as_str() {
+        "obj" => contains(&bytes, b"\nvn "),
+        "ply" => {
+            let end = bytes.windows(10).position(|window| window == b"end_header").unwrap_or(bytes.len());
+            contains(&bytes[..end], b" nx")
+        }
+        "stl" => false,
+        _ => true,
     }
 }

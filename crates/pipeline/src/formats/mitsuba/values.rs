@@ -212,7 +212,7 @@ fn parse_look_at(step: &Element) -> Result<(DMat4, Option<DVec3>), ValueError> {
 
 /// An up direction for a camera without one: the first tangent of Duff et al., Building an Orthonormal Basis,
 /// Revisited, JCGT 6(1), 2017.
-fn perpendicular_up(n: DVec3) -> DVec3 {
+pub(super) fn perpendicular_up(n: DVec3) -> DVec3 {
     let sign = if n.z >= 0.0 { 1.0 } else { -1.0 };
     let a = -1.0 / (sign + n.z);
     DVec3::new(1.0 + sign * n.x * n.x * a, sign * n.x * n.y * a, -sign * n.x)

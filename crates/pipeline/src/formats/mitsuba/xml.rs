@@ -16,7 +16,7 @@ const MAX_INCLUDE_DEPTH: usize = 15;
 /// Maximum depth of nested elements.
 const MAX_DEPTH: usize = 64;
 /// Maximum number of XML nodes in a file.
-const MAX_NODES: u32 = 16 << 20;
+const MAX_NODES: u32 = 4 << 20;
 /// Maximum length of an attribute, which is ample for a spectrum.
 const MAX_ATTRIBUTE_BYTES: usize = 4 << 20;
 /// Maximum length of an attribute after substitution, and maximum length of a parameter.

@@ -277,9 +277,19 @@ fn roughness_is_the_root_of_alpha() {
 }
 
 #[test]
+fn conductors_without_material_reflect_all_light() {
+    has_line(&material(r#"<bsdf type="conductor"/>"#), "reflectance = 1");
+    has_line(&material(r#"<bsdf type="roughconductor"/>"#), "color = 1");
+    let bench = super::Bench::new();
+    let shape = r#"<shape type="sphere"><bsdf type="conductor"/></shape>"#;
+    bench.write("scene.xml", format!("<scene version=\"0.6.0\">{}{shape}</scene>", super::SENSOR));
+    has_line(&bench.toml(), "type = \"metal\"");
+}
+
+#[test]
 fn gray_scales_of_metals_are_blends_with_black() {
     let text = material(
-        r#"<bsdf type="roughconductor"><float name="specular_reflectance" value="0.25"/></bsdf>"#,
+        r#"<bsdf type="roughconductor"><string name="material" value="Au"/><float name="specular_reflectance" value="0.25"/></bsdf>"#,
     );
     has_line(&text, "materials = [\"black\", \"roughconductor\"]");
     has_line(&text, "weight = 0.25");
