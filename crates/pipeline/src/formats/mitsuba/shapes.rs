@@ -1,28 +1,40 @@
 //! Converts shapes, groups and instances.
 
-use std::f64::consts::TAU;
-use std::io::Read;
 use std::path::Path;
 
-use glimt_kernel::geometry::cylinder::Cylinder;
-
 use super::graph::{Child, Object, ObjectIndex, ObjectKind};
+use super::placement::{cylinder_matrix, has_normals};
 use super::reader::SceneReader;
 use super::settings::span_of;
-use super::textures::{UvConvention, extension};
-use super::values::perpendicular_up;
+use super::textures::UvConvention;
 use super::xml::shorten;
+use crate::assets::AssetError;
+use crate::control::ignore_progress;
 use crate::formats::foreign::transform::{
     is_invertible_affine, is_mirroring, linear_part, matrix_value, similarity_scale,
 };
-use crate::assets::AssetError;
-use crate::control::ignore_progress;
 use crate::math::{DMat4, DVec3};
 
 /// Plugins that are shapes in Mitsuba 3, 2 or 0.6.
 const KNOWN_SHAPES: [&str; 18] = [
-    "obj", "ply", "serialized", "stl", "sphere", "cylinder", "disk", "rectangle", "cube", "shapegroup", "instance",
-    "merge", "hair", "bsplinecurve", "linearcurve", "sdfgrid", "heightfield", "ellipsoids",
+    "obj",
+    "ply",
+    "serialized",
+    "stl",
+    "sphere",
+    "cylinder",
+    "disk",
+    "rectangle",
+    "cube",
+    "shapegroup",
+    "instance",
+    "merge",
+    "hair",
+    "bsplinecurve",
+    "linearcurve",
+    "sdfgrid",
+    "heightfield",
+    "ellipsoids",
 ];
 
 /// Start of the error message for a mesh without a usable face.
@@ -79,7 +91,8 @@ impl<'a> SceneReader<'a> {
             "disk" => self.add_disk(object, target),
             "rectangle" => self.add_rectangle(object, target),
             "cube" => self.add_cube(object, target),
-            "hair" | "bsplinecurve" | "linearcurve" | "sdfgrid" | "heightfield" | "ellipsoids" | "ellipsoidsmesh" | "deformable" => {
+            "hair" | "bsplinecurve" | "linearcurve" | "sdfgrid" | "heightfield" | "ellipsoids"
+            | "ellipsoidsmesh" | "deformable" => {
                 self.refuse(object, "this kind of shape");
                 false
             }
@@ -129,7 +142,11 @@ impl<'a> SceneReader<'a> {
     /// Reports flipped normals, which glimt ignores. In Mitsuba, mirroring transforms flip normals, too.
     fn note_flipped_normals(&mut self, object: &'a Object) {
         let text = "the front is the usual side, which matters to one-sided materials, glass and lights";
-        self.notes.substitute_light("normals flipped by `flip_normals` or a mirroring `to_world`", text, object.span.clone());
+        self.notes.substitute_light(
+            "normals flipped by `flip_normals` or a mirroring `to_world`",
+            text,
+            object.span.clone(),
+        );
     }
 
     /// Returns the transform of a shape, or reports an error and returns `None`.
@@ -144,7 +161,13 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Starts the table of a shape.
-    fn start_shape(&mut self, object: &'a Object, target: ShapeTarget<'_>, list: &'static str, material: String) {
+    fn start_shape(
+        &mut self,
+        object: &'a Object,
+        target: ShapeTarget<'_>,
+        list: &'static str,
+        material: String,
+    ) {
         self.document.at(object.span.clone());
         match target.group {
             Some(group) => self.document.group_list_table(group, list),
@@ -228,7 +251,8 @@ impl<'a> SceneReader<'a> {
             DVec3::NEG_Y.extend(0.0),
             DVec3::ZERO.extend(1.0),
         );
-        let Some(material) = self.shape_material(object, UvConvention { flips_u: false, flips_v: true }) else {
+        let Some(material) = self.shape_material(object, UvConvention { flips_u: false, flips_v: true })
+        else {
             return false;
         };
         self.start_shape(object, target, "sphere", material);
@@ -273,7 +297,11 @@ impl<'a> SceneReader<'a> {
         let radius = self.float(object, "radius").unwrap_or(1.0);
         let is_flipped = self.boolean(object, "flip_normals", false);
         let Some(material) = self.shape_material(object, UvConvention::default()) else { return false };
-        let placed = if self.shape_uses_coordinates(object) { cylinder_matrix(&matrix, start, end, radius) } else { None };
+        let placed = if self.shape_uses_coordinates(object) {
+            cylinder_matrix(&matrix, start, end, radius)
+        } else {
+            None
+        };
         self.start_shape(object, target, "cylinder", material);
         if let Some(placed) = placed {
             self.document.set("a", DVec3::ZERO);
@@ -336,7 +364,8 @@ impl<'a> SceneReader<'a> {
         let Some(matrix) = self.shape_transform(object) else { return false };
         let is_flipped = self.boolean(object, "flip_normals", false);
         let corner = |x: f64, y: f64| matrix.transform_point3(DVec3::new(x, y, 0.0));
-        let (across, along) = (corner(1.0, -1.0) - corner(-1.0, -1.0), corner(-1.0, 1.0) - corner(-1.0, -1.0));
+        let (across, along) =
+            (corner(1.0, -1.0) - corner(-1.0, -1.0), corner(-1.0, 1.0) - corner(-1.0, -1.0));
         // A quad's front is on the side of u × v, which a mirroring transform reverses.
         let is_reversed = is_mirroring(&matrix) != is_flipped;
         let uv = UvConvention { flips_u: is_reversed, flips_v: false };
@@ -428,48 +457,5 @@ impl<'a> SceneReader<'a> {
         let name = is_added.then_some(name);
         self.groups.insert(index, name.clone());
         name
-    }
-}
-
-/// Matrix that places a cylinder from the origin to (0, 0, 1) with radius 1, such that its texture coordinate u
-/// is Mitsuba's angle. Returns `None` if the ends coincide.
-fn cylinder_matrix(matrix: &DMat4, start: DVec3, end: DVec3, radius: f64) -> Option<DMat4> {
-    let axis = end - start;
-    let direction = axis.try_normalize()?;
-    let across = perpendicular_up(direction);
-    let along = direction.cross(across);
-    let frame = DMat4::from_cols(
-        (across * radius).extend(0.0),
-        (along * radius).extend(0.0),
-        axis.extend(0.0),
-        start.extend(1.0),
-    );
-    // Turn the cylinder by the angle at which glimt's u is 0. If u runs the other way, mirror it.
-    let cylinder = Cylinder::new(DVec3::ZERO, DVec3::Z, 1.0, false);
-    let u_at = |point: DVec3| cylinder.uv_at_point(point + DVec3::Z * 0.5).x;
-    let (first, quarter) = (u_at(DVec3::X), u_at(DVec3::Y));
-    let is_reversed = (quarter - first).rem_euclid(1.0) > 0.5;
-    let turn = DMat4::from_rotation_z(TAU * if is_reversed { -first } else { first });
-    let mirror = DMat4::from_scale(DVec3::new(1.0, if is_reversed { -1.0 } else { 1.0 }, 1.0));
-    Some(*matrix * frame * mirror * turn)
-}
-
-/// Whether a mesh file has normals. Serialized files are assumed to have them.
-fn has_normals(path: &Path) -> bool {
-    const MAX_BYTES: u64 = 256 << 20;
-    let Ok(file) = std::fs::File::open(path) else { return true };
-    let mut bytes = Vec::new();
-    if file.take(MAX_BYTES).read_to_end(&mut bytes).is_err() {
-        return true;
-    }
-    let contains = |bytes: &[u8], word: &[u8]| bytes.windows(word.len()).any(|window| window == word);
-    match extension(&path.to_string_lossy()).as_str() {
-        "obj" => contains(&bytes, b"\nvn "),
-        "ply" => {
-            let end = bytes.windows(10).position(|window| window == b"end_header").unwrap_or(bytes.len());
-            contains(&bytes[..end], b" nx")
-        }
-        "stl" => false,
-        _ => true,
     }
 }

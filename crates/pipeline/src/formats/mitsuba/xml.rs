@@ -315,7 +315,9 @@ impl<'a> XmlLoader<'a> {
                 let known = self.parameters.iter().map(|(name, _)| name.as_str());
                 let help = match nearest_name(&name, known) {
                     Some(near) => format!("did you mean `${near}`?"),
-                    None => format!("set it with -D {name}=VALUE, or add <default name=\"{name}\" value=\"…\"/>"),
+                    None => {
+                        format!("set it with -D {name}=VALUE, or add <default name=\"{name}\" value=\"…\"/>")
+                    }
                 };
                 let (span, message) = (attribute.span.clone(), format!("undefined parameter `${name}`"));
                 if self.errors.len() < MAX_ERRORS {
@@ -368,7 +370,12 @@ fn substitute(text: &str, parameters: &[(String, String)]) -> String {
 
 /// Whether a version such as "0.6.0" is below 2.
 fn is_old_version(version: &str) -> bool {
-    version.trim().split('.').next().and_then(|major| major.parse::<u32>().ok()).is_some_and(|major| major < 2)
+    version
+        .trim()
+        .split('.')
+        .next()
+        .and_then(|major| major.parse::<u32>().ok())
+        .is_some_and(|major| major < 2)
 }
 
 /// Span of the element's name in its start tag.
@@ -426,7 +433,10 @@ mod tests {
 
     #[test]
     fn versions_below_two_are_old() {
-        assert_eq!(["0.6.0", "1.0", "2.0.0", "3.9.1", ""].map(is_old_version), [true, true, false, false, false]);
+        assert_eq!(
+            ["0.6.0", "1.0", "2.0.0", "3.9.1", ""].map(is_old_version),
+            [true, true, false, false, false]
+        );
     }
 
     #[test]
