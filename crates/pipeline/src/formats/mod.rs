@@ -130,7 +130,8 @@ pub(crate) fn lower(
     load_built(document, path, sets).map_err(|mut errors| {
         // Mark errors in generated values, which the user cannot see. Errors in overrides need no mark.
         for error in errors.iter_mut().filter(|error| error.path == path && error.place.is_none()) {
-            error.message = format!("in the scene generated for this model, {}", error.message);
+            let what = if has_model_extension(path) { "generated for this model" } else { "converted from this file" };
+            error.message = format!("in the scene {what}, {}", error.message);
         }
         errors
     })

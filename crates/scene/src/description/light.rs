@@ -96,6 +96,8 @@ pub struct Sky {
     pub sun_scale: f32,
     /// Factor on the sky's radiance.
     pub sky_scale: f32,
+    /// Factor on the radiance of the ground.
+    pub ground_scale: f32,
 }
 
 impl Light {
@@ -178,7 +180,7 @@ impl Environment {
 impl Sky {
     /// The parameters of the model.
     pub fn parameters(&self) -> SkyParameters {
-        let Self { sun, turbidity, ground, sun_angle, sun_scale, sky_scale } = *self;
+        let Self { sun, turbidity, ground, sun_angle, sun_scale, sky_scale, ground_scale } = *self;
         SkyParameters {
             sun_elevation: elevation(sun),
             turbidity,
@@ -186,6 +188,7 @@ impl Sky {
             sun_angle: sun_angle.to_radians(),
             sun_scale,
             sky_scale,
+            ground_scale,
         }
     }
 }
@@ -214,9 +217,9 @@ impl Fingerprinted for PointLight {
 
 impl Fingerprinted for Sky {
     fn add_to(&self, key: &mut FingerprintHasher, _: &FingerprintContext<'_>) {
-        let Self { sun, turbidity, ground, sun_angle, sun_scale, sky_scale } = *self;
+        let Self { sun, turbidity, ground, sun_angle, sun_scale, sky_scale, ground_scale } = *self;
         key.add_dvec3(sun).add_f64(turbidity).add_vec3(ground).add_f64(sun_angle);
-        key.add_f32(sun_scale).add_f32(sky_scale);
+        key.add_f32(sun_scale).add_f32(sky_scale).add_f32(ground_scale);
     }
 }
 

@@ -49,6 +49,8 @@ const SKY: &[KeyInfo] = keys! {
     sun_scale: Number(AtLeast(0.0)), Is("1.0");
     /// Factor on the sky's radiance; 0 removes the sky.
     sky_scale: Number(AtLeast(0.0)), Is("1.0");
+    /// Factor on the light from the ground below the horizon; 0 makes it black.
+    ground_scale: Number(AtLeast(0.0)), Is("1.0");
 };
 
 /// Reads the environment. Returns `None` if it is invalid, and `Some(None)` if it is absent.
@@ -105,7 +107,8 @@ fn read_sky(key: &KeyInTable<'_>, replaced: [&KeyInTable<'_>; 2]) -> Option<Sky>
     let sun_key = table.key("sun");
     let sun = sun_key.direction("sun").map(DVec3::normalize);
     let [turbidity, sun_angle] = ["turbidity", "sun_angle"].map(|name| table.key(name).number());
-    let [sun_scale, sky_scale] = ["sun_scale", "sky_scale"].map(|name| table.key(name).number_f32());
+    let [sun_scale, sky_scale, ground_scale] =
+        ["sun_scale", "sky_scale", "ground_scale"].map(|name| table.key(name).number_f32());
     let ground = table.key("ground").color();
     table.report_unknown_and_missing_keys();
     if sun.is_some_and(|sun| sun.y <= 0.0) {
@@ -121,6 +124,7 @@ fn read_sky(key: &KeyInTable<'_>, replaced: [&KeyInTable<'_>; 2]) -> Option<Sky>
         sun_angle: sun_angle?,
         sun_scale: sun_scale?,
         sky_scale: sky_scale?,
+        ground_scale: ground_scale?,
     })
 }
 

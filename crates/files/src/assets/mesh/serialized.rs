@@ -90,20 +90,29 @@ fn version_at(bytes: &[u8], at: usize) -> Option<u16> {
 fn mesh_offsets(source: &MeshFileBytes<'_>) -> Result<Vec<usize>, AssetError> {
     let bytes = source.bytes;
     let malformed = |reason: &str| Err(source.malformed_error_without_line(reason));
-    let Some(version) = version_at(bytes, 0) else { return malformed("it is not a serialized mesh of Mitsuba") };
+    let Some(version) = version_at(bytes, 0) else {
+        return malformed("it is not a serialized mesh of Mitsuba");
+    };
     if !(3..=5).contains(&version) {
         return malformed(&format!("version {version} is not supported; versions 3 to 5 are"));
     }
     let offset_bytes = if version == 3 { 4 } else { 8 };
     let table_end = bytes.len().saturating_sub(4);
-    let count = bytes.get(table_end..).and_then(|last| last.first_chunk()).map_or(0, |last| u32::from_le_bytes(*last));
+    let count = bytes
+        .get(table_end..)
+        .and_then(|last| last.first_chunk())
+        .map_or(0, |last| u32::from_le_bytes(*last));
     let table_start = table_end.checked_sub(offset_bytes * count as usize);
-    let Some(table) = table_start.and_then(|start| bytes.get(start..table_end)).filter(|table| !table.is_empty()) else {
+    let Some(table) =
+        table_start.and_then(|start| bytes.get(start..table_end)).filter(|table| !table.is_empty())
+    else {
         return malformed("the table of offsets at the end is invalid: the file is truncated");
     };
     let read = |entry: &[u8]| entry.iter().rev().fold(0_u64, |sum, byte| sum << 8 | u64::from(*byte));
-    let offsets: Vec<usize> =
-        table.chunks_exact(offset_bytes).map(|entry| usize::try_from(read(entry)).unwrap_or(usize::MAX)).collect();
+    let offsets: Vec<usize> = table
+        .chunks_exact(offset_bytes)
+        .map(|entry| usize::try_from(read(entry)).unwrap_or(usize::MAX))
+        .collect();
     Ok(offsets)
 }
 
@@ -170,9 +179,13 @@ impl MeshStream<'_> {
     fn floats(&mut self, count: usize, is_double: bool) -> Result<Vec<f64>, AssetError> {
         let size = if is_double { 8 } else { 4 };
         let bytes = self.bytes(count * size)?;
-        let single = |bytes: &[u8]| bytes.first_chunk().map_or(0.0, |bytes| f64::from(f32::from_le_bytes(*bytes)));
+        let single =
+            |bytes: &[u8]| bytes.first_chunk().map_or(0.0, |bytes| f64::from(f32::from_le_bytes(*bytes)));
         let double = |bytes: &[u8]| bytes.first_chunk().map_or(0.0, |bytes| f64::from_le_bytes(*bytes));
-        Ok(bytes.chunks_exact(size).map(|bytes| if is_double { double(bytes) } else { single(bytes) }).collect())
+        Ok(bytes
+            .chunks_exact(size)
+            .map(|bytes| if is_double { double(bytes) } else { single(bytes) })
+            .collect())
     }
 
     fn indices(&mut self, count: usize) -> Result<Vec<u32>, AssetError> {
@@ -289,7 +302,9 @@ mod tests {
     /// A triangle whose first vertex is (x, 0, 0), in a version of the format.
     fn triangle(version: u16, x: f32) -> Vec<u8> {
         let mut data: Vec<u8> = Vec::new();
-        let floats = |data: &mut Vec<u8>, values: &[f32]| values.iter().for_each(|value| data.extend(value.to_le_bytes()));
+        let floats = |data: &mut Vec<u8>, values: &[f32]| {
+            values.iter().for_each(|value| data.extend(value.to_le_bytes()))
+        };
         if version == 5 {
             data.extend((0x1000_u32 | HAS_COORDINATES_5).to_le_bytes());
             data.extend(1_u32.to_le_bytes());

@@ -29,7 +29,11 @@ impl SourceReader {
     /// Returns an error if the file is not UTF-8 text or the texts become too large.
     pub(crate) fn read(&mut self, path: &Path, token: &CancelToken) -> Result<(Arc<str>, usize), AssetError> {
         if self.count >= MAX_FILES {
-            return Err(AssetError::malformed(path, None, format!("more than {MAX_FILES} files are included")));
+            return Err(AssetError::malformed(
+                path,
+                None,
+                format!("more than {MAX_FILES} files are included"),
+            ));
         }
         let rest = MAX_FILE_BYTES.saturating_sub(self.files.total_bytes() as u64);
         let TextFile { text, hash, stamp } = match read_text_file(path, rest, token) {

@@ -46,7 +46,8 @@ impl SampledSpectrum {
         let mut points = Vec::new();
         for (index, line) in text.lines().enumerate() {
             let line = line.split('#').next().unwrap_or_default();
-            let mut words = line.split(|c: char| c.is_whitespace() || c == ',').filter(|word| !word.is_empty());
+            let mut words =
+                line.split(|c: char| c.is_whitespace() || c == ',').filter(|word| !word.is_empty());
             let Some(first) = words.next() else { continue };
             let number = |word: Option<&str>| {
                 let parsed = word.and_then(|word| word.parse::<f64>().ok()).filter(|value| value.is_finite());
@@ -78,7 +79,9 @@ fn observer_and_d65(wavelength: f64) -> [f64; 4] {
     let position = (wavelength - FIRST) / STEP;
     let index = (position as usize).min(OBSERVER_AND_D65.len() - 2);
     let (before, after) = (OBSERVER_AND_D65[index], OBSERVER_AND_D65[index + 1]);
-    std::array::from_fn(|column| before[column] + (after[column] - before[column]) * (position - index as f64))
+    std::array::from_fn(|column| {
+        before[column] + (after[column] - before[column]) * (position - index as f64)
+    })
 }
 
 /// Converts CIE XYZ to linear Rec. 709.

@@ -41,18 +41,17 @@ fn zero_if_negligible(number: f64) -> f64 {
 
 /// The linear part of an affine matrix.
 pub(crate) fn linear_part(matrix: &DMat4) -> DMat3 {
-    DMat3::from_cols(
-        matrix.x_axis.truncate(),
-        matrix.y_axis.truncate(),
-        matrix.z_axis.truncate(),
-    )
+    DMat3::from_cols(matrix.x_axis.truncate(), matrix.y_axis.truncate(), matrix.z_axis.truncate())
 }
 
 /// Whether a matrix is affine, invertible and finite.
 pub(crate) fn is_invertible_affine(matrix: &DMat4) -> bool {
     let last = matrix.row(3);
     let determinant = linear_part(matrix).determinant();
-    matrix.is_finite() && last.to_array() == [0.0, 0.0, 0.0, 1.0] && determinant != 0.0 && determinant.is_finite()
+    matrix.is_finite()
+        && last.to_array() == [0.0, 0.0, 0.0, 1.0]
+        && determinant != 0.0
+        && determinant.is_finite()
 }
 
 /// If a matrix is a rotation or reflection times a uniform scale, returns the scale factor, which is positive.

@@ -14,8 +14,18 @@ use crate::scene::BuiltValue;
 
 /// Plugins that are emitters in Mitsuba 3, 2 or 0.6.
 const KNOWN_EMITTERS: [&str; 12] = [
-    "area", "point", "spot", "directional", "constant", "envmap", "sunsky", "sky", "sun", "projector",
-    "directionalarea", "collimated",
+    "area",
+    "point",
+    "spot",
+    "directional",
+    "constant",
+    "envmap",
+    "sunsky",
+    "sky",
+    "sun",
+    "projector",
+    "directionalarea",
+    "collimated",
 ];
 
 impl<'a> SceneReader<'a> {
@@ -80,14 +90,19 @@ impl<'a> SceneReader<'a> {
     fn add_spot_light(&mut self, object: &'a Object) {
         let intensity = self.light_color(object, "intensity");
         if object.named_child("texture").is_some() {
-            self.notes.substitute_light("a spot light with a texture", "the texture is left out", object.span.clone());
+            self.notes.substitute_light(
+                "a spot light with a texture",
+                "the texture is left out",
+                object.span.clone(),
+            );
         }
         let transform = self.transform_value(object, "to_world");
         let matrix = transform.map_or(DMat4::IDENTITY, |transform| transform.matrix);
         let cutoff = self.float(object, "cutoff_angle").unwrap_or(20.0);
         let beam = self.float(object, "beam_width").unwrap_or(cutoff * 0.75);
         if !(cutoff > 0.0 && cutoff < 180.0) || beam > cutoff {
-            let message = "the angles must satisfy 0 < `cutoff_angle` < 180 and `beam_width` ≤ `cutoff_angle`";
+            let message =
+                "the angles must satisfy 0 < `cutoff_angle` < 180 and `beam_width` ≤ `cutoff_angle`";
             return self.error(span_of(object, "cutoff_angle"), message, None);
         }
         let position = matrix.w_axis.truncate();
@@ -157,7 +172,9 @@ impl<'a> SceneReader<'a> {
             return self.error(span, format!("glimt cannot read .{} images", shorten(&kind)), Some(help));
         }
         let Some(file) = self.asset(name, &span, "image") else {
-            if self.options.missing == crate::formats::foreign::MissingAssetMode::Note && self.start_environment(object) {
+            if self.options.missing == crate::formats::foreign::MissingAssetMode::Note
+                && self.start_environment(object)
+            {
                 self.document.set("color", shorten_number(0.5 * scale));
             }
             return;
@@ -183,7 +200,11 @@ impl<'a> SceneReader<'a> {
         };
         if x.cross(y).dot(z) < 0.0 || x.dot(y).abs().max(x.dot(z).abs()).max(y.dot(z).abs()) > 1e-4 {
             let text = "glimt only rotates environments: the map is not mirrored or skewed";
-            self.notes.substitute_light("an environment with a mirroring or skewed `to_world`", text, object.span.clone());
+            self.notes.substitute_light(
+                "an environment with a mirroring or skewed `to_world`",
+                text,
+                object.span.clone(),
+            );
         }
         // Orthonormalize.
         let Some(x) = (x - y * x.dot(y)).try_normalize() else { return };
@@ -205,7 +226,12 @@ impl<'a> SceneReader<'a> {
             "sun" => sky_scale = 0.0,
             _ => {}
         }
-        let ground = match self.color(object, "albedo", ColorRole::Reflectance, if object.is_old { 0.2 } else { 0.3 }) {
+        let ground = match self.color(
+            object,
+            "albedo",
+            ColorRole::Reflectance,
+            if object.is_old { 0.15 } else { 0.3 },
+        ) {
             ColorSource::Constant(color) => color.min(DVec3::ONE),
             ColorSource::Texture(_) => DVec3::splat(0.3),
         };
@@ -213,7 +239,21 @@ impl<'a> SceneReader<'a> {
         let direction = self.vector(object, "sun_direction");
         let angle = self.float(object, "sun_aperture").unwrap_or(0.5338)
             * self.float(object, "sun_radius_scale").unwrap_or(1.0);
-        for name in ["resolution", "stretch", "extend", "complex_sun", "latitude", "longitude", "timezone", "year", "month", "day", "hour", "minute", "second"] {
+        for name in [
+            "resolution",
+            "stretch",
+            "extend",
+            "complex_sun",
+            "latitude",
+            "longitude",
+            "timezone",
+            "year",
+            "month",
+            "day",
+            "hour",
+            "minute",
+            "second",
+        ] {
             object.property(name);
         }
         // An explicit direction is in the world, while a time and a place result in a local one.
@@ -225,11 +265,8 @@ impl<'a> SceneReader<'a> {
             return;
         }
         // Mitsuba 3 has z up; version 0.6 has y up and gives the direction in the world.
-        let to_local = if object.is_old {
-            DMat3::IDENTITY
-        } else {
-            DMat3::from_cols(DVec3::X, DVec3::NEG_Z, DVec3::Y)
-        };
+        let to_local =
+            if object.is_old { DMat3::IDENTITY } else { DMat3::from_cols(DVec3::X, DVec3::NEG_Z, DVec3::Y) };
         let local = to_local * direction;
         let Some(local) = local.try_normalize().filter(|local| local.y > 0.0) else {
             let help = "choose a direction above the horizon".to_owned();
@@ -251,13 +288,15 @@ impl<'a> SceneReader<'a> {
                 sky.push((key, shorten_number(value.max(0.0)).into()));
             }
         }
+        // In Mitsuba, the lower hemisphere is black.
+        sky.push(("ground_scale", 0.0.into()));
         self.document.set("sky", BuiltValue::Table(sky));
         self.set_environment_matrix(object, linear_part(&matrix) * to_local.transpose());
-        let text = "the sun is up to 8.5 % dimmer than in Mitsuba's RGB mode, and the ground below the horizon is visible";
+        let text = "the sun is up to 8.5 % dimmer than in Mitsuba's RGB mode";
         self.notes.note(&format!("`{}`", object.plugin), text, object.span.clone());
     }
 
-    /// Direction toward the sun at a time and place, with z up and x to the north in Mitsuba 3, or y up and x
+    /// Direction toward the sun at a time and place, with z up and x to the south in Mitsuba 3, or y up and x
     /// to the east in version 0.6. Uses the algorithm of Blanco-Muriel et al., Computing the Solar Vector,
     /// Solar Energy 70(5), 2001.
     fn sun_direction(&mut self, object: &'a Object) -> DVec3 {
@@ -265,7 +304,8 @@ impl<'a> SceneReader<'a> {
         let (latitude, longitude) = (number("latitude", 35.6894), number("longitude", 139.6917));
         let timezone = number("timezone", 9.0);
         let (year, month, day) = (number("year", 2010.0), number("month", 7.0), number("day", 10.0));
-        let hour = number("hour", 15.0) - timezone + (number("minute", 0.0) + number("second", 0.0) / 60.0) / 60.0;
+        let hour =
+            number("hour", 15.0) - timezone + (number("minute", 0.0) + number("second", 0.0) / 60.0) / 60.0;
         let month_term = ((month - 14.0) / 12.0).trunc();
         let days = (1461.0 * (year + 4800.0 + month_term) / 4.0).trunc()
             + (367.0 * (month - 2.0 - 12.0 * month_term) / 12.0).trunc()
@@ -276,9 +316,10 @@ impl<'a> SceneReader<'a> {
         let omega = 2.1429 - 0.001_039_459_4 * elapsed;
         let mean_longitude = 4.895_063 + 0.017_202_791_698 * elapsed;
         let anomaly = 6.240_06 + 0.017_201_969_9 * elapsed;
-        let ecliptic_longitude = mean_longitude + 0.033_416_07 * libm::sin(anomaly) + 0.000_348_94 * libm::sin(2.0 * anomaly)
-            - 0.000_113_4
-            - 0.000_020_3 * libm::sin(omega);
+        let ecliptic_longitude =
+            mean_longitude + 0.033_416_07 * libm::sin(anomaly) + 0.000_348_94 * libm::sin(2.0 * anomaly)
+                - 0.000_113_4
+                - 0.000_020_3 * libm::sin(omega);
         let obliquity = 0.409_092_8 - 6.2140e-9 * elapsed + 0.000_039_6 * libm::cos(omega);
         let sine = libm::sin(ecliptic_longitude);
         let mut ascension = libm::atan2(libm::cos(obliquity) * sine, libm::cos(ecliptic_longitude));
@@ -292,7 +333,8 @@ impl<'a> SceneReader<'a> {
         let (sin_latitude, cos_latitude) = (libm::sin(latitude), libm::cos(latitude));
         let cos_hour = libm::cos(hour_angle);
         let zenith = libm::acos(
-            (cos_latitude * cos_hour * libm::cos(declination) + libm::sin(declination) * sin_latitude).clamp(-1.0, 1.0),
+            (cos_latitude * cos_hour * libm::cos(declination) + libm::sin(declination) * sin_latitude)
+                .clamp(-1.0, 1.0),
         );
         let azimuth = libm::atan2(
             -libm::sin(hour_angle),
@@ -304,7 +346,7 @@ impl<'a> SceneReader<'a> {
         if object.is_old {
             DVec3::new(libm::sin(azimuth) * sin_zenith, cos_zenith, -libm::cos(azimuth) * sin_zenith)
         } else {
-            DVec3::new(libm::cos(azimuth) * sin_zenith, libm::sin(azimuth) * sin_zenith, cos_zenith)
+            DVec3::new(-libm::cos(azimuth) * sin_zenith, -libm::sin(azimuth) * sin_zenith, cos_zenith)
         }
     }
 }

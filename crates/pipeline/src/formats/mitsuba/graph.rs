@@ -4,7 +4,7 @@ use std::cell::Cell;
 use std::collections::HashMap;
 use std::ops::Range;
 
-use super::values::{self, ValueError, parse_float, parse_numbers, parse_point};
+use super::values::{self, ValueError, parse_float, parse_numbers, parse_point, property_name};
 use super::xml::{Attribute, Element, MAX_ERRORS, shorten};
 use crate::formats::foreign::spectra::SampledSpectrum;
 use crate::math::{DMat4, DVec3};
@@ -57,8 +57,22 @@ const OBJECT_TAGS: [(&str, ObjectKind); 16] = [
 
 /// Names of elements that define values.
 const VALUE_TAGS: [&str; 16] = [
-    "float", "integer", "boolean", "string", "vector", "point", "rgb", "srgb", "spectrum", "blackbody",
-    "transform", "animation", "ref", "alias", "tensor", "xyz",
+    "float",
+    "integer",
+    "boolean",
+    "string",
+    "vector",
+    "point",
+    "rgb",
+    "srgb",
+    "spectrum",
+    "blackbody",
+    "transform",
+    "animation",
+    "ref",
+    "alias",
+    "tensor",
+    "xyz",
 ];
 
 /// A plugin instance.
@@ -215,7 +229,8 @@ impl<'a> GraphBuilder<'a> {
             self.error(element.span.clone(), "the attribute `type` is missing", Some(help));
             return None;
         }
-        let (name, span) = plugin.map_or(("scene", element.span.clone()), |one| (&one.value, one.span.clone()));
+        let (name, span) =
+            plugin.map_or(("scene", element.span.clone()), |one| (&one.value, one.span.clone()));
         let index = self.graph.objects.len();
         let id = element.value("id").map(str::to_owned);
         if let Some(id) = &id
@@ -266,7 +281,8 @@ impl<'a> GraphBuilder<'a> {
                 self.references.push(Reference { parent, child, id, span });
             }
             "alias" => {
-                let (Some(id), Some(copy)) = (self.required(element, "id"), self.required(element, "as")) else {
+                let (Some(id), Some(copy)) = (self.required(element, "id"), self.required(element, "as"))
+                else {
                     return;
                 };
                 match self.ids.get(&id.value) {
@@ -330,7 +346,9 @@ impl<'a> GraphBuilder<'a> {
             "vector" | "point" => Ok(PropertyValue::Vector(parse_point(element, None)?)),
             "blackbody" => {
                 let number = |name: &str, default: f64| match element.attribute(name) {
-                    Some(attribute) => parse_float(attribute.value.trim_end_matches(['k', 'K']), &attribute.span),
+                    Some(attribute) => {
+                        parse_float(attribute.value.trim_end_matches(['k', 'K']), &attribute.span)
+                    }
                     None => Ok(default),
                 };
                 let (temperature, scale) = (number("temperature", 5000.0)?, number("scale", 1.0)?);
@@ -380,7 +398,11 @@ impl<'a> GraphBuilder<'a> {
         let object = &mut self.graph.objects[index];
         if object.plugin == "diffuse" {
             let old = "diffuse_reflectance";
-            object.properties.iter_mut().filter(|one| one.name == old).for_each(|one| one.name = "reflectance".to_owned());
+            object
+                .properties
+                .iter_mut()
+                .filter(|one| one.name == old)
+                .for_each(|one| one.name = "reflectance".to_owned());
             let children = object.children.iter_mut().filter(|child| child.name.as_deref() == Some(old));
             children.for_each(|child| child.name = Some("reflectance".to_owned()));
         }
@@ -392,7 +414,8 @@ impl<'a> GraphBuilder<'a> {
                 Some(_) | None => (default, None),
             }
         };
-        let parts = [number("uscale", 1.0), number("vscale", 1.0), number("uoffset", 0.0), number("voffset", 0.0)];
+        let parts =
+            [number("uscale", 1.0), number("vscale", 1.0), number("uoffset", 0.0), number("voffset", 0.0)];
         let Some(span) = parts.iter().find_map(|(_, span)| span.clone()) else { return };
         let [(scale_u, _), (scale_v, _), (offset_u, _), (offset_v, _)] = parts;
         let names = ["uscale", "vscale", "uoffset", "voffset"];
@@ -434,57 +457,17 @@ impl<'a> GraphBuilder<'a> {
                     match states[target] {
                         NEW => stack.push((target, 0)),
                         OPEN => {
-                            self.error(span, "this object contains itself", Some("remove this reference".to_owned()));
+                            self.error(
+                                span,
+                                "this object contains itself",
+                                Some("remove this reference".to_owned()),
+                            );
                             return;
                         }
                         _ => {}
                     }
                 }
             }
-        }
-    }
-}
-
-/// Returns a property's name, converted from camel case if it is from a version below 2.
-fn property_name(name: &str, is_old: bool) -> String {
-    if !is_old {
-        return name.to_owned();
-    }
-    let mut result = String::new();
-    let mut characters = name.chars().peekable();
-    let mut is_after_lowercase = false;
-    while let Some(character) = characters.next() {
-        if is_after_lowercase && character.is_ascii_uppercase() {
-            result.push('_');
-            result.push(character.to_ascii_lowercase());
-            while let Some(upper) = characters.next_if(char::is_ascii_uppercase) {
-                result.push(upper.to_ascii_lowercase());
-            }
-            is_after_lowercase = false;
-        } else {
-            result.push(character);
-            is_after_lowercase = character.is_ascii_lowercase();
-        }
-    }
-    result
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn camel_case_becomes_snake_case() {
-        for (old, new) in [
-            ("toWorld", "to_world"),
-            ("intIOR", "int_ior"),
-            ("fovAxis", "fov_axis"),
-            ("alpha", "alpha"),
-            ("flipTexCoords", "flip_tex_coords"),
-            ("to_world", "to_world"),
-            ("sigmaA", "sigma_a"),
-        ] {
-            assert_eq!((property_name(old, true), property_name(old, false)), (new.to_owned(), old.to_owned()));
         }
     }
 }

@@ -3,9 +3,12 @@
 //! `xml` reads the files, `graph` resolves references, and the other modules convert the objects to the tables
 //! of a scene file, which [`SceneReader`] collects.
 
+mod assets;
 mod bsdfs;
+mod colors;
 mod emitters;
 mod graph;
+mod placement;
 mod plastic;
 mod reader;
 mod settings;

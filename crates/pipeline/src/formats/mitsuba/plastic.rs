@@ -39,7 +39,8 @@ impl PlasticCoat {
         let transmittance = mean_over_hemisphere(|cosine| facets.transmittance(cosine, eta));
         let internal_reflectance =
             mitsuba_mean(|cosine| facets.reflectance(cosine, 1.0 / eta, Masking::Separable));
-        let albedo = mean_over_hemisphere(|cosine| facets.reflectance(cosine, eta, Masking::HeightCorrelated));
+        let albedo =
+            mean_over_hemisphere(|cosine| facets.reflectance(cosine, eta, Masking::HeightCorrelated));
         Self {
             transmittance_squared: transmittance * transmittance,
             internal_reflectance,
@@ -137,9 +138,8 @@ impl Facets {
         let mut sum = 0.0;
         for height in 0..HEIGHTS {
             let u = (f64::from(height) + 0.5) / f64::from(HEIGHTS);
-            let tangent_squared = self.alpha
-                * self.alpha
-                * if self.is_beckmann { -libm::log(1.0 - u) } else { u / (1.0 - u) };
+            let tangent_squared =
+                self.alpha * self.alpha * if self.is_beckmann { -libm::log(1.0 - u) } else { u / (1.0 - u) };
             let mz = 1.0 / (1.0 + tangent_squared).sqrt();
             let sine = (1.0 - mz * mz).max(0.0).sqrt();
             for angle in 0..ANGLES {
@@ -198,7 +198,10 @@ mod tests {
         for is_beckmann in [false, true] {
             let rough = PlasticCoat::new(1.5, Some(0.01), is_beckmann);
             assert!((rough.transmittance_squared - smooth.transmittance_squared).abs() < 4e-3, "{rough:?}");
-            assert!((rough.internal_reflectance / smooth.internal_reflectance - 63.0 / 64.0).abs() < 1e-2, "{rough:?}");
+            assert!(
+                (rough.internal_reflectance / smooth.internal_reflectance - 63.0 / 64.0).abs() < 1e-2,
+                "{rough:?}"
+            );
         }
     }
 

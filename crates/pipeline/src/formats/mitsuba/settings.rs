@@ -19,9 +19,28 @@ const UNLIMITED_DEPTH: f64 = 1000.0;
 
 /// Integrators that solve the whole rendering equation.
 const PATH_INTEGRATORS: [&str; 22] = [
-    "path", "volpath", "volpathmis", "volpath_simple", "bdpt", "mlt", "pssmlt", "erpt", "ptracer", "vpl", "prb",
-    "prbvolpath", "prb_basic", "prb_projective", "direct_projective", "emission_projective", "projective_path",
-    "pathsimple", "path_mis", "guided_path", "moment", "aov",
+    "path",
+    "volpath",
+    "volpathmis",
+    "volpath_simple",
+    "bdpt",
+    "mlt",
+    "pssmlt",
+    "erpt",
+    "ptracer",
+    "vpl",
+    "prb",
+    "prbvolpath",
+    "prb_basic",
+    "prb_projective",
+    "direct_projective",
+    "emission_projective",
+    "projective_path",
+    "pathsimple",
+    "path_mis",
+    "guided_path",
+    "moment",
+    "aov",
 ];
 /// Integrators with photon maps.
 const PHOTON_INTEGRATORS: [&str; 3] = ["photonmapper", "ppm", "sppm"];
@@ -52,7 +71,8 @@ impl FilmWindow {
     /// Offset of the rendered part's center from the film's center, to the right and up, in heights of the
     /// rendered part.
     fn shift(&self) -> [f64; 2] {
-        let offset = |axis: usize| self.crop_offset[axis] + self.crop_size[axis] / 2.0 - self.size[axis] / 2.0;
+        let offset =
+            |axis: usize| self.crop_offset[axis] + self.crop_size[axis] / 2.0 - self.size[axis] / 2.0;
         [offset(0) / self.crop_size[1], -offset(1) / self.crop_size[1]]
     }
 }
@@ -126,7 +146,8 @@ impl<'a> SceneReader<'a> {
             }
             _ => self.unknown_plugin(film, "film", &["hdrfilm", "ldrfilm", "specfilm"]),
         }
-        for name in ["pixel_format", "component_format", "file_format", "compensate", "banner", "attach_log"] {
+        for name in ["pixel_format", "component_format", "file_format", "compensate", "banner", "attach_log"]
+        {
             film.property(name);
         }
         for name in ["gamma", "exposure", "tonemap_method", "key", "burn"] {
@@ -136,7 +157,11 @@ impl<'a> SceneReader<'a> {
             }
         }
         if self.boolean(film, "sample_border", false) || self.boolean(film, "high_quality_edges", false) {
-            self.notes.note("`sample_border`", "glimt samples no pixels outside of the image", film.span.clone());
+            self.notes.note(
+                "`sample_border`",
+                "glimt samples no pixels outside of the image",
+                film.span.clone(),
+            );
         }
         let mut size = |name: &str, default: i64| {
             let value = self.integer(film, name).unwrap_or(default);
@@ -183,16 +208,31 @@ impl<'a> SceneReader<'a> {
             }
             "mitchell" => "mitchell",
             "catmullrom" | "lanczos" => {
-                self.notes.note(&format!("`{}`", filter.plugin), "replaced by `mitchell`", filter.span.clone());
+                self.notes.note(
+                    &format!("`{}`", filter.plugin),
+                    "replaced by `mitchell`",
+                    filter.span.clone(),
+                );
                 "mitchell"
             }
             _ => {
-                self.unknown_plugin(filter, "filter", &["box", "tent", "gaussian", "mitchell", "catmullrom", "lanczos"]);
+                self.unknown_plugin(
+                    filter,
+                    "filter",
+                    &["box", "tent", "gaussian", "mitchell", "catmullrom", "lanczos"],
+                );
                 "box"
             }
         };
-        if filter.property("radius").is_some() || filter.property("b").is_some() || filter.property("c").is_some() {
-            self.notes.note("parameters of the filter", "glimt's filter has its usual size", filter.span.clone());
+        if filter.property("radius").is_some()
+            || filter.property("b").is_some()
+            || filter.property("c").is_some()
+        {
+            self.notes.note(
+                "parameters of the filter",
+                "glimt's filter has its usual size",
+                filter.span.clone(),
+            );
         }
         self.document.set("filter", name);
     }
@@ -235,7 +275,11 @@ impl<'a> SceneReader<'a> {
                     let count = self.integer(integrator, name);
                     if name != "bsdf_samples" && count.is_some_and(|count| count > 1) {
                         let text = "Mitsuba counts point, spot and directional lights once per emitter sample; glimt counts them once";
-                        self.notes.note("`direct` with several emitter samples", text, integrator.span.clone());
+                        self.notes.note(
+                            "`direct` with several emitter samples",
+                            text,
+                            integrator.span.clone(),
+                        );
                     }
                 }
                 self.document.set("integrator", "path");
@@ -260,7 +304,8 @@ impl<'a> SceneReader<'a> {
                 self.document.set("max_depth", depth);
             }
             _ => {
-                let known = ["path", "direct", "volpath", "aov", "moment", "ptracer", "bdpt", "photonmapper", "sppm"];
+                let known =
+                    ["path", "direct", "volpath", "aov", "moment", "ptracer", "bdpt", "photonmapper", "sppm"];
                 self.unknown_plugin(integrator, "integrator", &known);
             }
         }
@@ -284,11 +329,16 @@ impl<'a> SceneReader<'a> {
         let [width, height, depth] = [linear.x_axis, linear.y_axis, linear.z_axis].map(DVec3::length);
         if skew > 1e-4 || (width / height - 1.0).abs() > 1e-4 {
             let text = "the image is not stretched";
-            self.notes.substitute_light("a sensor with a skewed or stretched `to_world`", text, sensor.span.clone());
+            self.notes.substitute_light(
+                "a sensor with a skewed or stretched `to_world`",
+                text,
+                sensor.span.clone(),
+            );
         }
         let position = matrix.w_axis.truncate();
         let target = transform.and_then(|transform| transform.target);
-        let distance = target.map(|target| (target - position).dot(forward)).filter(|distance| *distance > 0.0);
+        let distance =
+            target.map(|target| (target - position).dot(forward)).filter(|distance| *distance > 0.0);
         self.document.table("camera");
         self.document.set("position", position);
         self.document.set("look_at", position + forward * distance.unwrap_or(width.max(1.0)));
@@ -326,7 +376,11 @@ impl<'a> SceneReader<'a> {
                 return;
             }
             _ => {
-                self.unknown_plugin(sensor, "sensor", &["perspective", "thinlens", "orthographic", "spherical"]);
+                self.unknown_plugin(
+                    sensor,
+                    "sensor",
+                    &["perspective", "thinlens", "orthographic", "spherical"],
+                );
                 return;
             }
         }

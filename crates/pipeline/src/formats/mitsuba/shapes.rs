@@ -3,21 +3,38 @@
 use std::path::Path;
 
 use super::graph::{Child, Object, ObjectIndex, ObjectKind};
+use super::placement::{cylinder_matrix, has_normals};
 use super::reader::SceneReader;
 use super::settings::span_of;
 use super::textures::UvConvention;
 use super::xml::shorten;
+use crate::assets::AssetError;
+use crate::control::ignore_progress;
 use crate::formats::foreign::transform::{
     is_invertible_affine, is_mirroring, linear_part, matrix_value, similarity_scale,
 };
-use crate::assets::AssetError;
-use crate::control::ignore_progress;
 use crate::math::{DMat4, DVec3};
 
 /// Plugins that are shapes in Mitsuba 3, 2 or 0.6.
 const KNOWN_SHAPES: [&str; 18] = [
-    "obj", "ply", "serialized", "stl", "sphere", "cylinder", "disk", "rectangle", "cube", "shapegroup", "instance",
-    "merge", "hair", "bsplinecurve", "linearcurve", "sdfgrid", "heightfield", "ellipsoids",
+    "obj",
+    "ply",
+    "serialized",
+    "stl",
+    "sphere",
+    "cylinder",
+    "disk",
+    "rectangle",
+    "cube",
+    "shapegroup",
+    "instance",
+    "merge",
+    "hair",
+    "bsplinecurve",
+    "linearcurve",
+    "sdfgrid",
+    "heightfield",
+    "ellipsoids",
 ];
 
 /// Start of the error message for a mesh without a usable face.
@@ -74,7 +91,8 @@ impl<'a> SceneReader<'a> {
             "disk" => self.add_disk(object, target),
             "rectangle" => self.add_rectangle(object, target),
             "cube" => self.add_cube(object, target),
-            "hair" | "bsplinecurve" | "linearcurve" | "sdfgrid" | "heightfield" | "ellipsoids" | "ellipsoidsmesh" | "deformable" => {
+            "hair" | "bsplinecurve" | "linearcurve" | "sdfgrid" | "heightfield" | "ellipsoids"
+            | "ellipsoidsmesh" | "deformable" => {
                 self.refuse(object, "this kind of shape");
                 false
             }
@@ -121,10 +139,14 @@ impl<'a> SceneReader<'a> {
         self.material(bsdf, emitter, uv, object)
     }
 
-    /// Reports flipped normals, which glimt ignores.
+    /// Reports flipped normals, which glimt ignores. In Mitsuba, mirroring transforms flip normals, too.
     fn note_flipped_normals(&mut self, object: &'a Object) {
-        let text = "ignored; the front is the usual side";
-        self.notes.substitute_light("`flip_normals`", text, span_of(object, "flip_normals"));
+        let text = "the front is the usual side, which matters to one-sided materials, glass and lights";
+        self.notes.substitute_light(
+            "normals flipped by `flip_normals` or a mirroring `to_world`",
+            text,
+            object.span.clone(),
+        );
     }
 
     /// Returns the transform of a shape, or reports an error and returns `None`.
@@ -139,7 +161,13 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Starts the table of a shape.
-    fn start_shape(&mut self, object: &'a Object, target: ShapeTarget<'_>, list: &'static str, material: String) {
+    fn start_shape(
+        &mut self,
+        object: &'a Object,
+        target: ShapeTarget<'_>,
+        list: &'static str,
+        material: String,
+    ) {
         self.document.at(object.span.clone());
         match target.group {
             Some(group) => self.document.group_list_table(group, list),
@@ -189,7 +217,9 @@ impl<'a> SceneReader<'a> {
             self.document.set("smooth", false);
         }
         self.set_matrix(&matrix);
-        if is_flipped {
+        // Normals in the file are mirrored with the mesh, computed normals are not.
+        let is_mirrored = is_mirroring(&matrix) && (has_flat_faces || !has_normals(&path));
+        if is_flipped != is_mirrored {
             self.note_flipped_normals(object);
         }
         for name in ["max_smooth_angle", "flip_uvs", "srgb"] {
@@ -221,7 +251,8 @@ impl<'a> SceneReader<'a> {
             DVec3::NEG_Y.extend(0.0),
             DVec3::ZERO.extend(1.0),
         );
-        let Some(material) = self.shape_material(object, UvConvention { flips_u: false, flips_v: true }) else {
+        let Some(material) = self.shape_material(object, UvConvention { flips_u: false, flips_v: true })
+        else {
             return false;
         };
         self.start_shape(object, target, "sphere", material);
@@ -237,7 +268,7 @@ impl<'a> SceneReader<'a> {
                 self.set_matrix(&placed);
             }
         }
-        if is_flipped {
+        if is_flipped != is_mirroring(&matrix) {
             self.note_flipped_normals(object);
         }
         true
@@ -265,12 +296,24 @@ impl<'a> SceneReader<'a> {
         let end = self.vector(object, "p1").unwrap_or(DVec3::Z);
         let radius = self.float(object, "radius").unwrap_or(1.0);
         let is_flipped = self.boolean(object, "flip_normals", false);
-        if self.shape_uses_coordinates(object) {
-            let text = "the texture may be turned around the axis";
-            self.notes.substitute("a textured `cylinder`", text, object.span.clone());
-        }
         let Some(material) = self.shape_material(object, UvConvention::default()) else { return false };
+        let placed = if self.shape_uses_coordinates(object) {
+            cylinder_matrix(&matrix, start, end, radius)
+        } else {
+            None
+        };
         self.start_shape(object, target, "cylinder", material);
+        if let Some(placed) = placed {
+            self.document.set("a", DVec3::ZERO);
+            self.document.set("b", DVec3::Z);
+            self.document.set("radius", 1.0);
+            self.set_matrix(&placed);
+            self.document.set("caps", false);
+            if is_flipped != is_mirroring(&matrix) {
+                self.note_flipped_normals(object);
+            }
+            return true;
+        }
         match similarity_scale(&matrix) {
             Some(scale) => {
                 self.document.set("a", matrix.transform_point3(start));
@@ -285,7 +328,7 @@ impl<'a> SceneReader<'a> {
             }
         }
         self.document.set("caps", false);
-        if is_flipped {
+        if is_flipped != is_mirroring(&matrix) {
             self.note_flipped_normals(object);
         }
         true
@@ -321,7 +364,8 @@ impl<'a> SceneReader<'a> {
         let Some(matrix) = self.shape_transform(object) else { return false };
         let is_flipped = self.boolean(object, "flip_normals", false);
         let corner = |x: f64, y: f64| matrix.transform_point3(DVec3::new(x, y, 0.0));
-        let (across, along) = (corner(1.0, -1.0) - corner(-1.0, -1.0), corner(-1.0, 1.0) - corner(-1.0, -1.0));
+        let (across, along) =
+            (corner(1.0, -1.0) - corner(-1.0, -1.0), corner(-1.0, 1.0) - corner(-1.0, -1.0));
         // A quad's front is on the side of u × v, which a mirroring transform reverses.
         let is_reversed = is_mirroring(&matrix) != is_flipped;
         let uv = UvConvention { flips_u: is_reversed, flips_v: false };

@@ -89,7 +89,12 @@ impl UvMap {
 impl<'a> SceneReader<'a> {
     /// Returns the name of a texture, adding it if it is new. Returns `None` if the texture is constant or
     /// missing.
-    pub(super) fn texture(&mut self, index: ObjectIndex, usage: TextureUse, uv: UvConvention) -> Option<String> {
+    pub(super) fn texture(
+        &mut self,
+        index: ObjectIndex,
+        usage: TextureUse,
+        uv: UvConvention,
+    ) -> Option<String> {
         self.texture_with_factor(index, usage, uv, 1.0)
     }
 
@@ -107,7 +112,8 @@ impl<'a> SceneReader<'a> {
             "checkerboard" => (self.checkerboard_keys(object, usage, uv)?, "checker".to_owned()),
             "scale" => {
                 let inner = self.children_of_kind(object, ObjectKind::Texture).next()?.target;
-                let scale = self.float(object, "scale").or_else(|| self.float(object, "value")).unwrap_or(1.0);
+                let scale =
+                    self.float(object, "scale").or_else(|| self.float(object, "value")).unwrap_or(1.0);
                 self.report_unused(index);
                 return self.texture_with_factor(inner, usage, uv, factor * scale);
             }
@@ -118,11 +124,19 @@ impl<'a> SceneReader<'a> {
             }
             "gridtexture" | "wireframe" | "curvature" | "volume" => {
                 let text = "replaced by gray";
-                self.notes.substitute_light(&format!("texture `{}`", object.plugin), text, object.span.clone());
+                self.notes.substitute_light(
+                    &format!("texture `{}`", object.plugin),
+                    text,
+                    object.span.clone(),
+                );
                 return None;
             }
             _ => {
-                self.unknown_plugin(object, "texture", &["bitmap", "checkerboard", "mesh_attribute", "volume", "scale"]);
+                self.unknown_plugin(
+                    object,
+                    "texture",
+                    &["bitmap", "checkerboard", "mesh_attribute", "volume", "scale"],
+                );
                 return None;
             }
         };
@@ -205,7 +219,12 @@ impl<'a> SceneReader<'a> {
         }
     }
 
-    fn bitmap_keys(&mut self, object: &'a Object, usage: TextureUse, uv: UvConvention) -> Option<(Entries, String)> {
+    fn bitmap_keys(
+        &mut self,
+        object: &'a Object,
+        usage: TextureUse,
+        uv: UvConvention,
+    ) -> Option<(Entries, String)> {
         let Some((name, span)) = self.text(object, "filename") else {
             self.error(object.span.clone(), "the texture needs `filename`", None);
             return None;
@@ -262,7 +281,8 @@ impl<'a> SceneReader<'a> {
     }
 
     fn uv_keys(&mut self, object: &'a Object, uv: UvConvention, is_image: bool) -> Entries {
-        let to_uv = self.transform_value(object, "to_uv").map_or(DMat4::IDENTITY, |transform| transform.matrix);
+        let to_uv =
+            self.transform_value(object, "to_uv").map_or(DMat4::IDENTITY, |transform| transform.matrix);
         let keys = UvMap::new(&to_uv, uv, is_image).keys();
         keys.unwrap_or_else(|| {
             let text = "left out";
@@ -273,17 +293,27 @@ impl<'a> SceneReader<'a> {
 
     /// Colors of a checkerboard, which may not be textures themselves.
     fn checker_colors(&mut self, object: &'a Object) -> [DVec3; 2] {
-        let mut color = |name: &str, default: f64| match self.color(object, name, ColorRole::Reflectance, default) {
-            ColorSource::Constant(color) => color,
-            ColorSource::Texture(_) => {
-                self.notes.substitute_light("a texture in a checkerboard", "replaced by gray", object.span.clone());
-                DVec3::splat(0.5)
-            }
-        };
+        let mut color =
+            |name: &str, default: f64| match self.color(object, name, ColorRole::Reflectance, default) {
+                ColorSource::Constant(color) => color,
+                ColorSource::Texture(_) => {
+                    self.notes.substitute_light(
+                        "a texture in a checkerboard",
+                        "replaced by gray",
+                        object.span.clone(),
+                    );
+                    DVec3::splat(0.5)
+                }
+            };
         [color("color0", 0.4), color("color1", 0.2)]
     }
 
-    fn checkerboard_keys(&mut self, object: &'a Object, usage: TextureUse, uv: UvConvention) -> Option<Entries> {
+    fn checkerboard_keys(
+        &mut self,
+        object: &'a Object,
+        usage: TextureUse,
+        uv: UvConvention,
+    ) -> Option<Entries> {
         let mut colors = self.checker_colors(object);
         match usage {
             TextureUse::Color => {}
@@ -343,7 +373,8 @@ mod tests {
         assert_eq!(map(obj, DMat4::IDENTITY, true)(0.25, 0.75), [0.25, 0.75]);
         assert_eq!(map(UvConvention::default(), DMat4::IDENTITY, true)(0.25, 0.75), [0.25, 0.25]);
         // v scale s and offset t give the offset 1 − s − t.
-        let to_uv = DMat4::from_translation(DVec3::new(0.0, 0.25, 0.0)) * DMat4::from_scale(DVec3::new(1.0, 4.0, 1.0));
+        let to_uv = DMat4::from_translation(DVec3::new(0.0, 0.25, 0.0))
+            * DMat4::from_scale(DVec3::new(1.0, 4.0, 1.0));
         assert_eq!(map(obj, to_uv, true)(0.0, 0.0), [0.0, 1.0 - 4.0 - 0.25]);
         assert_eq!(map(obj, to_uv, true)(0.0, 1.0), [0.0, 1.0 - 0.25]);
     }

@@ -31,7 +31,9 @@ pub(super) fn parse_float(text: &str, span: &Range<usize>) -> Result<f64, ValueE
     let parsed = text.trim().trim_start_matches('+').parse::<f64>().ok();
     match parsed {
         Some(number) if number.abs() <= MAX_NUMBER => Ok(number),
-        Some(_) => Err(ValueError::new(span, format!("the number must be finite and at most {MAX_NUMBER:e}"))),
+        Some(_) => {
+            Err(ValueError::new(span, format!("the number must be finite and at most {MAX_NUMBER:e}")))
+        }
         None => Err(ValueError::new(span, format!("expected a number, found `{}`", shorten(text)))),
     }
 }
@@ -119,9 +121,9 @@ pub(super) fn parse_spectrum(attribute: &Attribute) -> Result<PropertyValue, Val
         };
     }
     let pair = |word: &str| {
-        let (wavelength, value) = word
-            .split_once(':')
-            .ok_or_else(|| ValueError::new(span, format!("expected WAVELENGTH:VALUE, found `{}`", shorten(word))))?;
+        let (wavelength, value) = word.split_once(':').ok_or_else(|| {
+            ValueError::new(span, format!("expected WAVELENGTH:VALUE, found `{}`", shorten(word)))
+        })?;
         Ok([parse_float(wavelength, span)?, parse_float(value, span)?])
     };
     let points = words(text).map(pair).collect::<Result<Vec<_>, ValueError>>()?;
@@ -212,7 +214,7 @@ fn parse_look_at(step: &Element) -> Result<(DMat4, Option<DVec3>), ValueError> {
 
 /// An up direction for a camera without one: the first tangent of Duff et al., Building an Orthonormal Basis,
 /// Revisited, JCGT 6(1), 2017.
-fn perpendicular_up(n: DVec3) -> DVec3 {
+pub(super) fn perpendicular_up(n: DVec3) -> DVec3 {
     let sign = if n.z >= 0.0 { 1.0 } else { -1.0 };
     let a = -1.0 / (sign + n.z);
     DVec3::new(1.0 + sign * n.x * n.x * a, sign * n.x * n.y * a, -sign * n.x)
@@ -236,6 +238,30 @@ fn parse_matrix(attribute: &Attribute) -> Result<DMat4, ValueError> {
         return Err(ValueError { help, ..ValueError::new(span, message) });
     }
     Ok(matrix)
+}
+
+/// Returns a property's name, converted from camel case if it is from a version below 2.
+pub(super) fn property_name(name: &str, is_old: bool) -> String {
+    if !is_old {
+        return name.to_owned();
+    }
+    let mut result = String::new();
+    let mut characters = name.chars().peekable();
+    let mut is_after_lowercase = false;
+    while let Some(character) = characters.next() {
+        if is_after_lowercase && character.is_ascii_uppercase() {
+            result.push('_');
+            result.push(character.to_ascii_lowercase());
+            while let Some(upper) = characters.next_if(char::is_ascii_uppercase) {
+                result.push(upper.to_ascii_lowercase());
+            }
+            is_after_lowercase = false;
+        } else {
+            result.push(character);
+            is_after_lowercase = character.is_ascii_lowercase();
+        }
+    }
+    result
 }
 
 #[cfg(test)]
@@ -262,7 +288,11 @@ mod tests {
             tag: tag.to_owned(),
             attributes: attributes
                 .iter()
-                .map(|(name, value)| Attribute { name: (*name).to_owned(), value: (*value).to_owned(), span: 0..0 })
+                .map(|(name, value)| Attribute {
+                    name: (*name).to_owned(),
+                    value: (*value).to_owned(),
+                    span: 0..0,
+                })
                 .collect(),
             children,
             span: 0..0,
@@ -276,5 +306,23 @@ mod tests {
         };
         assert_eq!(at(vec![scale(), moved()]), DVec3::X * 3.0);
         assert_eq!(at(vec![moved(), scale()]), DVec3::X * 4.0);
+    }
+
+    #[test]
+    fn camel_case_becomes_snake_case() {
+        for (old, new) in [
+            ("toWorld", "to_world"),
+            ("intIOR", "int_ior"),
+            ("fovAxis", "fov_axis"),
+            ("alpha", "alpha"),
+            ("flipTexCoords", "flip_tex_coords"),
+            ("to_world", "to_world"),
+            ("sigmaA", "sigma_a"),
+        ] {
+            assert_eq!(
+                (property_name(old, true), property_name(old, false)),
+                (new.to_owned(), old.to_owned())
+            );
+        }
     }
 }

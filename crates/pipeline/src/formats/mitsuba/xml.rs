@@ -16,7 +16,7 @@ const MAX_INCLUDE_DEPTH: usize = 15;
 /// Maximum depth of nested elements.
 const MAX_DEPTH: usize = 64;
 /// Maximum number of XML nodes in a file.
-const MAX_NODES: u32 = 16 << 20;
+const MAX_NODES: u32 = 4 << 20;
 /// Maximum length of an attribute, which is ample for a spectrum.
 const MAX_ATTRIBUTE_BYTES: usize = 4 << 20;
 /// Maximum length of an attribute after substitution, and maximum length of a parameter.
@@ -315,7 +315,9 @@ impl<'a> XmlLoader<'a> {
                 let known = self.parameters.iter().map(|(name, _)| name.as_str());
                 let help = match nearest_name(&name, known) {
                     Some(near) => format!("did you mean `${near}`?"),
-                    None => format!("set it with -D {name}=VALUE, or add <default name=\"{name}\" value=\"…\"/>"),
+                    None => {
+                        format!("set it with -D {name}=VALUE, or add <default name=\"{name}\" value=\"…\"/>")
+                    }
                 };
                 let (span, message) = (attribute.span.clone(), format!("undefined parameter `${name}`"));
                 if self.errors.len() < MAX_ERRORS {
@@ -368,7 +370,12 @@ fn substitute(text: &str, parameters: &[(String, String)]) -> String {
 
 /// Whether a version such as "0.6.0" is below 2.
 fn is_old_version(version: &str) -> bool {
-    version.trim().split('.').next().and_then(|major| major.parse::<u32>().ok()).is_some_and(|major| major < 2)
+    version
+        .trim()
+        .split('.')
+        .next()
+        .and_then(|major| major.parse::<u32>().ok())
+        .is_some_and(|major| major < 2)
 }
 
 /// Span of the element's name in its start tag.
@@ -426,7 +433,10 @@ mod tests {
 
     #[test]
     fn versions_below_two_are_old() {
-        assert_eq!(["0.6.0", "1.0", "2.0.0", "3.9.1", ""].map(is_old_version), [true, true, false, false, false]);
+        assert_eq!(
+            ["0.6.0", "1.0", "2.0.0", "3.9.1", ""].map(is_old_version),
+            [true, true, false, false, false]
+        );
     }
 
     #[test]

@@ -6,7 +6,10 @@ use super::{OBJ, PLY, close, has_line, lacks, material, numbers, png, scene};
 fn parameters_may_precede_their_defaults() {
     let bench = super::Bench::new();
     let sensor = r#"<sensor type="perspective"><sampler type="independent"><integer name="sample_count" value="$spp"/></sampler></sensor>"#;
-    bench.write("scene.xml", format!("<scene version=\"3.0.0\">{sensor}<include filename=\"a.xml\"/></scene>"));
+    bench.write(
+        "scene.xml",
+        format!("<scene version=\"3.0.0\">{sensor}<include filename=\"a.xml\"/></scene>"),
+    );
     bench.write(
         "a.xml",
         "<scene version=\"3.0.0\"><default name=\"spp\" value=\"7\"/><default name=\"spp\" value=\"9\"/></scene>",
@@ -126,7 +129,8 @@ fn crop_windows_shift_the_view() {
     let film = r#"<film type="hdrfilm"><integer name="width" value="100"/><integer name="height" value="100"/>
         <integer name="crop_offset_x" value="50"/><integer name="crop_offset_y" value="0"/>
         <integer name="crop_width" value="50"/><integer name="crop_height" value="25"/></film>"#;
-    let text = camera(&format!("<sensor type=\"perspective\"><float name=\"fov\" value=\"90\"/>{film}</sensor>"));
+    let text =
+        camera(&format!("<sensor type=\"perspective\"><float name=\"fov\" value=\"90\"/>{film}</sensor>"));
     has_line(&text, "width = 50");
     close(&numbers(&text, "shift"), &[1.0, 1.5], 1e-12);
     close(&numbers(&text, "fov"), &[2.0 * 0.25_f64.atan().to_degrees()], 1e-9);
@@ -144,13 +148,20 @@ fn scale_sets_the_width_of_orthographic_views() {
 
 #[test]
 fn depth_limits_count_vertices() {
-    let of = |depth: &str| numbers(&scene(&format!("<integrator type=\"path\">{depth}</integrator>")).toml(), "max_depth")[0];
+    let of = |depth: &str| {
+        numbers(&scene(&format!("<integrator type=\"path\">{depth}</integrator>")).toml(), "max_depth")[0]
+    };
     assert_eq!(of(r#"<integer name="max_depth" value="3"/>"#), 2.0);
     assert_eq!(of(r#"<integer name="max_depth" value="-1"/>"#), 1000.0);
     assert_eq!(of(""), 1000.0);
-    let direct = scene(r#"<integrator type="direct"><integer name="emitter_samples" value="4"/></integrator>"#);
+    let direct =
+        scene(r#"<integrator type="direct"><integer name="emitter_samples" value="4"/></integrator>"#);
     assert_eq!(numbers(&direct.toml(), "max_depth"), [1.0]);
-    assert!(direct.notes().iter().any(|note| note.contains("once per emitter sample")), "{:?}", direct.notes());
+    assert!(
+        direct.notes().iter().any(|note| note.contains("once per emitter sample")),
+        "{:?}",
+        direct.notes()
+    );
 }
 
 /// The keys of the texture on a shape.
@@ -203,10 +214,9 @@ fn checkerboards_swap_colors_as_numbers() {
 
 #[test]
 fn masks_take_the_luminance() {
-    for (has_alpha, line) in [
-        (true, "opacity = { texture = \"a\", channel = \"r\" }"),
-        (false, "opacity = { texture = \"a\" }"),
-    ] {
+    for (has_alpha, line) in
+        [(true, "opacity = { texture = \"a\", channel = \"r\" }"), (false, "opacity = { texture = \"a\" }")]
+    {
         let bench = scene(
             r#"<shape type="rectangle"><bsdf type="mask"><bsdf type="diffuse"/>
             <texture name="opacity" type="bitmap"><string name="filename" value="a.png"/></texture></bsdf></shape>"#,
@@ -229,7 +239,10 @@ fn flat_emission_spectra_are_purple() {
     close(&of(r#"<float name="radiance" value="2"/>"#), &[2.0], 0.0);
     close(&of(r#"<rgb name="radiance" value="2, 1, 0"/>"#), &[2.0, 1.0, 0.0], 0.0);
     // A reflectance is gray.
-    has_line(&material(r#"<bsdf type="diffuse"><spectrum name="reflectance" value="0.25"/></bsdf>"#), "diffuse = 0.25");
+    has_line(
+        &material(r#"<bsdf type="diffuse"><spectrum name="reflectance" value="0.25"/></bsdf>"#),
+        "diffuse = 0.25",
+    );
 }
 
 #[test]
@@ -277,17 +290,38 @@ fn roughness_is_the_root_of_alpha() {
 }
 
 #[test]
+fn conductors_without_material_reflect_all_light() {
+    has_line(&material(r#"<bsdf type="conductor"/>"#), "reflectance = 1");
+    has_line(&material(r#"<bsdf type="roughconductor"/>"#), "color = 1");
+    let bench = super::Bench::new();
+    let shape = r#"<shape type="sphere"><bsdf type="conductor"/></shape>"#;
+    bench.write("scene.xml", format!("<scene version=\"0.6.0\">{}{shape}</scene>", super::SENSOR));
+    has_line(&bench.toml(), "type = \"metal\"");
+}
+
+#[test]
 fn gray_scales_of_metals_are_blends_with_black() {
     let text = material(
-        r#"<bsdf type="roughconductor"><float name="specular_reflectance" value="0.25"/></bsdf>"#,
+        r#"<bsdf type="roughconductor"><string name="material" value="Au"/><float name="specular_reflectance" value="0.25"/></bsdf>"#,
     );
     has_line(&text, "materials = [\"black\", \"roughconductor\"]");
     has_line(&text, "weight = 0.25");
 }
 
 #[test]
+fn coats_of_scaled_metals_are_on_both_parts() {
+    let text = material(
+        r#"<bsdf type="coating"><float name="thickness" value="0.5"/><float name="sigma_a" value="2"/>
+        <bsdf type="conductor"><string name="material" value="Au"/><float name="specular_reflectance" value="0.5"/></bsdf></bsdf>"#,
+    );
+    assert_eq!(text.matches("coat_ior = ").count(), 2, "{text}");
+    close(&numbers(&text, "coat_tint"), &[(-2.0_f64).exp()], 1e-6);
+}
+
+#[test]
 fn meshes_without_area_are_left_out() {
-    let bench = scene(r#"<shape type="obj"><string name="filename" value="a.obj"/></shape><shape type="sphere"/>"#);
+    let bench =
+        scene(r#"<shape type="obj"><string name="filename" value="a.obj"/></shape><shape type="sphere"/>"#);
     bench.write("a.obj", "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n");
     lacks(&bench.toml(), "file");
     assert!(bench.notes().iter().any(|note| note.contains("without area")));
@@ -310,16 +344,20 @@ fn plastic_is_linear_by_default() {
     close(&numbers(&nonlinear, "ior"), &[1.49 / 1.000277], 1e-6);
     // kd / (1 − F + kd F) with F = 1 − (1 − 0.0908)/η² for η = 1.4896.
     close(&[linear], &[0.5 / (1.0 - 0.5 * 0.5903)], 2e-3);
-    let rough = numbers(&material(r#"<bsdf type="roughplastic"><boolean name="nonlinear" value="true"/><float name="alpha" value="0.4"/></bsdf>"#), "diffuse")[0];
+    let rough = numbers(
+        &material(
+            r#"<bsdf type="roughplastic"><boolean name="nonlinear" value="true"/><float name="alpha" value="0.4"/></bsdf>"#,
+        ),
+        "diffuse",
+    )[0];
     assert!((0.42..0.49).contains(&rough), "{rough}");
 }
 
 #[test]
 fn flat_meshes_are_not_smooth() {
     let of = |content: &str| {
-        let bench = scene(&format!(
-            r#"<shape type="ply"><string name="filename" value="a.ply"/>{content}</shape>"#
-        ));
+        let bench =
+            scene(&format!(r#"<shape type="ply"><string name="filename" value="a.ply"/>{content}</shape>"#));
         bench.write("a.ply", PLY);
         bench.toml()
     };
@@ -364,6 +402,25 @@ fn skies_have_z_up_and_suns_in_the_world() {
         let text = of(version);
         assert!(text.contains("sky = { sun = [0.6, 0.8, 0]"), "{version}:\n{text}");
         lacks(&text, "matrix");
+    }
+}
+
+#[test]
+fn suns_follow_the_time() {
+    // The values of Mitsuba 3.9.1 for Tokyo, 10 July 2010, in its local axes (z up).
+    for (hour, x, y, z) in [(9, 0.095_695_2, -0.614_786, 0.782_867), (15, 0.051_385_1, 0.691_748, 0.720_308)]
+    {
+        let text =
+            scene(&format!(r#"<emitter type="sunsky"><float name="hour" value="{hour}"/></emitter>"#)).toml();
+        let sky = text.lines().find_map(|line| line.strip_prefix("sky = { sun = [")).expect("a sky");
+        let sun: Vec<f64> = sky
+            .split(']')
+            .next()
+            .expect("numbers")
+            .split(',')
+            .map(|word| word.trim().parse().expect("a number"))
+            .collect();
+        close(&sun, &[x, z, -y], 1e-4);
     }
 }
 

@@ -18,8 +18,24 @@ const SCENE: &str = r##"<default name="r" value="0.5"/><integrator type="path"><
 
 /// Replacements for words.
 const WORDS: [&str; 18] = [
-    "", "-1", "0", "1e30", "1e-30", "nan", "99999999999999999999", "$r", "wall", "ball", "g", "leaf", "scene.xml",
-    "diffuse", "mask", "\u{1F600}", "1 2", "<",
+    "",
+    "-1",
+    "0",
+    "1e30",
+    "1e-30",
+    "nan",
+    "99999999999999999999",
+    "$r",
+    "wall",
+    "ball",
+    "g",
+    "leaf",
+    "scene.xml",
+    "diffuse",
+    "mask",
+    "\u{1F600}",
+    "1 2",
+    "<",
 ];
 
 /// Pseudorandom numbers (xorshift).
@@ -43,7 +59,9 @@ fn mutate(text: &str, random: &mut Random) -> String {
         0..=2 => {
             let quotes: Vec<usize> = text.match_indices('"').map(|(at, _)| at).collect();
             let pair = 2 * random.below(quotes.len() / 2);
-            let (Some(start), Some(end)) = (quotes.get(pair), quotes.get(pair + 1)) else { return text.to_owned() };
+            let (Some(start), Some(end)) = (quotes.get(pair), quotes.get(pair + 1)) else {
+                return text.to_owned();
+            };
             format!("{}{}{}", &text[..=*start], WORDS[random.below(WORDS.len())], &text[*end..])
         }
         3 => format!("{}{}", &text[..a], &text[b..]),

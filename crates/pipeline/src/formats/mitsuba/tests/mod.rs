@@ -56,7 +56,9 @@ impl Bench {
     }
 
     fn import(&self) -> ImportedScene {
-        self.with_context(|path, context| convert(path, "scene_files", context)).map_err(diagnostics).expect("valid")
+        self.with_context(|path, context| convert(path, "scene_files", context))
+            .map_err(diagnostics)
+            .expect("valid")
     }
 
     /// The scene's tables as TOML, without the first comment.
@@ -130,7 +132,9 @@ fn close(found: &[f64], wanted: &[f64], tolerance: f64) {
 fn png(has_alpha: bool) -> Vec<u8> {
     let mut bytes = std::io::Cursor::new(Vec::new());
     let image = match has_alpha {
-        true => image::DynamicImage::ImageLumaA8(image::ImageBuffer::from_pixel(1, 1, image::LumaA([128, 255]))),
+        true => {
+            image::DynamicImage::ImageLumaA8(image::ImageBuffer::from_pixel(1, 1, image::LumaA([128, 255])))
+        }
         false => image::DynamicImage::ImageLuma8(image::ImageBuffer::from_pixel(1, 1, image::Luma([128]))),
     };
     image.write_to(&mut bytes, image::ImageFormat::Png).expect("encoded");
@@ -169,7 +173,8 @@ fn imported_scenes_copy_their_assets() {
 fn included_files_are_watched() {
     let bench = scene(r#"<include filename="parts/light.xml"/>"#);
     bench.write("parts/light.xml", "<scene version=\"3.0.0\"><emitter type=\"constant\"/></scene>");
-    let companions: Vec<_> = bench.read().expect("valid").companions.into_iter().map(|one| one.path).collect();
+    let companions: Vec<_> =
+        bench.read().expect("valid").companions.into_iter().map(|one| one.path).collect();
     assert_eq!(companions, [bench.path("parts/light.xml")]);
 }
 
