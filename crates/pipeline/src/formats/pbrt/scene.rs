@@ -82,8 +82,6 @@ pub(super) struct SceneWriter<'a> {
     pub(super) texture_names: UsedNames,
     pub(super) material_names: UsedNames,
     pub(super) materials: HashMap<MaterialIdentity, LoweredMaterial>,
-    /// Number of generated files.
-    generated: usize,
     /// Generated files by their hash.
     generated_names: HashMap<[u8; 32], String>,
 }
@@ -111,7 +109,6 @@ impl<'a> SceneWriter<'a> {
             texture_names: UsedNames::default(),
             material_names: UsedNames::default(),
             materials: HashMap::new(),
-            generated: 0,
             generated_names: HashMap::new(),
         }
     }
@@ -169,19 +166,22 @@ impl<'a> SceneWriter<'a> {
     /// Adds a file that exists only in memory, and returns the value of the key `file`.
     pub(super) fn add_generated_file(&mut self, stem: &str, extension: &str, bytes: Vec<u8>) -> String {
         let hash = *blake3::hash(&bytes).as_bytes();
-        let key = hash;
-        if let Some(known) = self.generated_names.get(&key) {
+        if let Some(known) = self.generated_names.get(&hash) {
             return known.clone();
         }
-        self.generated += 1;
         let stem = if stem.is_empty() { "part" } else { stem };
         let name = match self.assets.import {
             Some(folder) => self.assets.unique_name(folder, stem, extension),
-            None => format!("{}/{stem}-{}.{extension}", self.assets.file, self.generated),
+            // The name depends only on the content, so that edits elsewhere in the file keep what is cached.
+            None => format!(
+                "{}/{stem}-{}.{extension}",
+                self.assets.file,
+                &blake3::Hash::from(hash).to_hex()[..16]
+            ),
         };
         let bytes: Arc<[u8]> = bytes.into();
         self.document.add_generated_file(name.clone(), GeneratedFile { bytes, hash });
-        self.generated_names.insert(key, name.clone());
+        self.generated_names.insert(hash, name.clone());
         name
     }
 
