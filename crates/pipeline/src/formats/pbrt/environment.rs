@@ -6,7 +6,6 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use super::lexer::{PbrtError, PbrtResult};
-use super::lights::InfiniteLights;
 use super::memo;
 use super::parameters::Text;
 use super::pixels::Pixels;
@@ -28,6 +27,14 @@ const FINE_SUBSAMPLES: usize = 8;
 const CONTRAST: f32 = 3.0;
 /// Largest and smallest number of rows of an environment map.
 const ROWS: [usize; 2] = [64, 2048];
+
+/// The light from all around.
+#[derive(Default)]
+pub(super) struct InfiniteLights {
+    /// Sum of all constant lights.
+    pub(super) color: DVec3,
+    pub(super) images: Vec<InfiniteImage>,
+}
 
 /// An infinite light with an image.
 pub(super) struct InfiniteImage {
@@ -228,7 +235,7 @@ mod tests {
     #[test]
     fn square_mapping_is_inverted() {
         for index in 0..900 {
-            let at = DVec2::new((index % 30) as f64 + 0.5, (index / 30) as f64 + 0.5) / 30.0;
+            let at = DVec2::new(f64::from(index % 30) + 0.5, f64::from(index / 30) + 0.5) / 30.0;
             let direction = direction_of_square(at);
             assert!((direction.length() - 1.0).abs() < 1e-12);
             assert!((square_of_direction(direction) - at).length() < 1e-9, "{at} {direction}");
@@ -242,7 +249,7 @@ mod tests {
         let count = 256;
         let directions: Vec<DVec3> = (0..count * count)
             .map(|index| {
-                DVec2::new((index % count) as f64 + 0.5, (index / count) as f64 + 0.5) / count as f64
+                DVec2::new(f64::from(index % count) + 0.5, f64::from(index / count) + 0.5) / f64::from(count)
             })
             .map(direction_of_square)
             .collect();
@@ -282,7 +289,7 @@ mod tests {
     fn resampled_map_has_the_radiance_of_its_light() {
         // Red for +z of the light, whose z axis is the world's y axis.
         let values = (0..64 * 64)
-            .map(|index| DVec2::new((index % 64) as f64 + 0.5, (index / 64) as f64 + 0.5) / 64.0)
+            .map(|index| DVec2::new(f64::from(index % 64) + 0.5, f64::from(index / 64) + 0.5) / 64.0)
             .map(|at| if direction_of_square(at).z > 0.0 { Vec3::X } else { Vec3::Z })
             .collect();
         let pixels = Pixels { width: 64, height: 64, values };

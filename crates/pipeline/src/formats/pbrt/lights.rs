@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use super::colors::SpectrumUse;
-use super::environment::InfiniteImage;
+use super::environment::{InfiniteImage, InfiniteLights};
 use super::lexer::{PbrtError, PbrtResult};
 use super::parameters::ParameterType;
 use super::scene::SceneWriter;
@@ -13,14 +13,6 @@ use crate::math::{DMat4, DVec3};
 use crate::scene::nearest::nearest_name;
 
 const LIGHTS: [&str; 6] = ["point", "spot", "distant", "infinite", "goniometric", "projection"];
-
-/// The light from all around.
-#[derive(Default)]
-pub(super) struct InfiniteLights {
-    /// Sum of all constant lights.
-    pub(super) color: DVec3,
-    pub(super) images: Vec<InfiniteImage>,
-}
 
 impl SceneWriter<'_> {
     /// Writes all lights.

@@ -2,7 +2,7 @@
 
 use super::lexer::{PbrtError, PbrtResult};
 use super::materials::{BlendPart, MaterialModel};
-use super::scene::SceneWriter;
+use super::scene::{LoweredMaterial, SceneWriter};
 use super::state::{Entity, MaterialReference};
 use super::texture_nodes::TextureNode;
 use super::textures::{Entries, TextureUse, texture_value};
@@ -31,25 +31,6 @@ pub(super) struct ShapeProperties {
     pub(super) alpha: Option<TextureNode>,
     /// Transmittance per unit of length inside of dielectrics.
     pub(super) tint: Option<DVec3>,
-}
-
-/// A material with the properties of a shape, formatted.
-pub(super) type MaterialIdentity = (MaterialReference, String);
-
-/// A material in the document.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) enum LoweredMaterial {
-    Table {
-        name: String,
-        /// Whether it uses texture coordinates or tangents.
-        needs_uv: bool,
-        /// Whether the front differs from the back.
-        has_inside: bool,
-    },
-    /// Shapes without a surface.
-    Invisible,
-    /// An error has been reported.
-    Invalid,
 }
 
 impl SceneWriter<'_> {
@@ -114,7 +95,7 @@ impl SceneWriter<'_> {
         match model {
             MaterialModel::Invisible => Ok(self.lower_invisible(&name, properties)),
             MaterialModel::Blend { parts, amount } => {
-                self.lower_blend(&name, parts, &amount, properties, &entity, depth)
+                self.lower_blend(&name, &parts, &amount, properties, &entity, depth)
             }
             MaterialModel::Plain { mut keys, needs_uv, is_glass } => {
                 let has_alpha = properties.alpha.is_some();
@@ -152,14 +133,14 @@ impl SceneWriter<'_> {
     fn lower_blend(
         &mut self,
         name: &str,
-        parts: [BlendPart; 2],
+        parts: &[BlendPart; 2],
         amount: &TextureNode,
         properties: &ShapeProperties,
         entity: &Entity,
         depth: usize,
     ) -> PbrtResult<LoweredMaterial> {
         let mut names = Vec::new();
-        for BlendPart { name, span } in &parts {
+        for BlendPart { name, span } in parts {
             let reference = MaterialReference::Named(name.as_str().into());
             let lowered = self.lower_material(&reference, span, properties, depth + 1)?;
             match lowered {

@@ -10,6 +10,8 @@ use crate::math::{DVec2, DVec3};
 use crate::scene::nearest::nearest_name;
 use crate::scene::sanitize::escape_and_truncate;
 
+pub(super) use super::values::{Text, Values};
+
 /// Types of parameters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum ParameterType {
@@ -53,21 +55,6 @@ impl ParameterType {
     }
 }
 
-/// A string with its place.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct Text {
-    pub(super) text: String,
-    pub(super) span: Range<usize>,
-}
-
-/// The values of a parameter.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) enum Values {
-    Numbers(Vec<f64>),
-    Texts(Vec<Text>),
-    Flags(Vec<bool>),
-}
-
 /// A parameter.
 #[derive(Debug)]
 pub(super) struct Parameter {
@@ -94,19 +81,6 @@ pub(super) struct Parameters {
     pub(super) span: Range<usize>,
     /// Names that the reader has asked for.
     asked: RefCell<Vec<&'static str>>,
-}
-
-/// Parses a finite number.
-pub(super) fn parse_number(token: &Token<'_>) -> PbrtResult<f64> {
-    let number = (token.kind == TokenKind::Word).then(|| token.text.parse::<f64>().ok()).flatten();
-    match number {
-        Some(number) if number.is_finite() && number.abs() <= f64::from(f32::MAX) => Ok(number),
-        Some(_) => Err(PbrtError::new(token.span.clone(), "this number is too large")),
-        None => {
-            let shown = escape_and_truncate(&token.text, 32);
-            Err(PbrtError::new(token.span.clone(), format!("expected a number, found {shown}")))
-        }
-    }
 }
 
 impl Parameters {

@@ -6,11 +6,9 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::lexer::{PbrtError, PbrtResult};
-use super::material_tables::{LoweredMaterial, MaterialIdentity};
 use super::parameters::Text;
-use super::state::Statements;
+use super::state::{MaterialReference, Statements};
 use super::texture_nodes::TextureResolver;
-use super::textures::TextureTables;
 use crate::assets::Companion;
 use crate::control::CancelToken;
 use crate::formats::foreign::notes::NoteCollector;
@@ -67,6 +65,25 @@ impl<'a> AssetLocation<'a> {
     }
 }
 
+/// A material with the properties of a shape, formatted.
+pub(super) type MaterialIdentity = (MaterialReference, String);
+
+/// A material in the document.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum LoweredMaterial {
+    Table {
+        name: String,
+        /// Whether it uses texture coordinates or tangents.
+        needs_uv: bool,
+        /// Whether the front differs from the back.
+        has_inside: bool,
+    },
+    /// Shapes without a surface.
+    Invisible,
+    /// An error has been reported.
+    Invalid,
+}
+
 /// Writes a scene.
 pub(super) struct SceneWriter<'a> {
     pub(super) statements: &'a Statements,
@@ -78,7 +95,8 @@ pub(super) struct SceneWriter<'a> {
     pub(super) options: &'a ForeignOptions,
     pub(super) token: &'a CancelToken,
     pub(super) companions: Vec<Companion>,
-    pub(super) textures: TextureTables,
+    /// Names of the textures by their formatted keys.
+    pub(super) textures: HashMap<String, String>,
     pub(super) texture_names: UsedNames,
     pub(super) material_names: UsedNames,
     pub(super) materials: HashMap<MaterialIdentity, LoweredMaterial>,
@@ -105,7 +123,7 @@ impl<'a> SceneWriter<'a> {
             options,
             token,
             companions: Vec::new(),
-            textures: TextureTables::default(),
+            textures: HashMap::new(),
             texture_names: UsedNames::default(),
             material_names: UsedNames::default(),
             materials: HashMap::new(),

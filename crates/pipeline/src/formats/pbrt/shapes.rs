@@ -3,10 +3,9 @@
 use std::ops::Range;
 
 use super::lexer::{PbrtError, PbrtResult};
-use super::material_tables::LoweredMaterial;
 use super::meshes::MeshData;
 use super::parameters::Parameters;
-use super::scene::SceneWriter;
+use super::scene::{LoweredMaterial, SceneWriter};
 use super::state::ShapeEntity;
 use crate::formats::foreign::transform::{is_invertible_affine, matrix_value, similarity_scale};
 use crate::formats::rounding::shorten;

@@ -1,6 +1,5 @@
 //! Adds the `[textures]` tables.
 
-use std::collections::HashMap;
 use std::sync::Arc;
 
 use super::scene::SceneWriter;
@@ -11,12 +10,6 @@ use crate::scene::BuiltValue;
 
 /// Keys and values of a table.
 pub(super) type Entries = Vec<(&'static str, BuiltValue)>;
-
-/// The textures of the scene, by their formatted keys.
-#[derive(Default)]
-pub(super) struct TextureTables {
-    names: HashMap<String, String>,
-}
 
 /// The values of a texture that are used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -107,13 +100,13 @@ impl SceneWriter<'_> {
     /// Adds a table unless an equal one exists, and returns its name.
     pub(super) fn add_texture_table(&mut self, keys: Entries, wanted: &str) -> String {
         let identity = format!("{keys:?}");
-        if let Some(known) = self.textures.names.get(&identity) {
+        if let Some(known) = self.textures.get(&identity) {
             return known.clone();
         }
         let name = self.texture_names.make_unique(wanted, "texture");
         self.document.named_table("textures", &name);
         keys.into_iter().for_each(|(key, value)| self.document.set(key, value));
-        self.textures.names.insert(identity, name.clone());
+        self.textures.insert(identity, name.clone());
         name
     }
 

@@ -3,7 +3,35 @@
 use std::ops::Range;
 
 use super::lexer::{Lexer, PbrtError, PbrtResult, Token, TokenKind};
-use super::parameters::{Text, Values, parse_number};
+use crate::scene::sanitize::escape_and_truncate;
+
+/// A string with its place.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Text {
+    pub(super) text: String,
+    pub(super) span: Range<usize>,
+}
+
+/// The values of a parameter.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Values {
+    Numbers(Vec<f64>),
+    Texts(Vec<Text>),
+    Flags(Vec<bool>),
+}
+
+/// Parses a finite number.
+pub(super) fn parse_number(token: &Token<'_>) -> PbrtResult<f64> {
+    let number = (token.kind == TokenKind::Word).then(|| token.text.parse::<f64>().ok()).flatten();
+    match number {
+        Some(number) if number.is_finite() && number.abs() <= f64::from(f32::MAX) => Ok(number),
+        Some(_) => Err(PbrtError::new(token.span.clone(), "this number is too large")),
+        None => {
+            let shown = escape_and_truncate(&token.text, 32);
+            Err(PbrtError::new(token.span.clone(), format!("expected a number, found {shown}")))
+        }
+    }
+}
 
 /// Parses the values that follow a declaration.
 pub(super) fn parse_values(

@@ -147,6 +147,7 @@ fn canonical(path: &Path) -> PathBuf {
 }
 
 impl Parser<'_> {
+    #[allow(clippy::boxed_local, reason = "all results have boxed errors")]
     fn report(&mut self, error: Box<PbrtError>) {
         if self.errors.len() < MAX_ERRORS {
             self.errors.push(*error);

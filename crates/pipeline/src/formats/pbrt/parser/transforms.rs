@@ -1,8 +1,8 @@
 //! Statements that change the current transform.
 
 use super::super::lexer::{Lexer, PbrtError, PbrtResult, Token, TokenKind};
-use super::super::parameters::parse_number;
 use super::super::state::{look_at, rotation};
+use super::super::values::parse_number;
 use super::{Parser, any, quoted};
 use crate::math::{DMat4, DVec3};
 use crate::scene::nearest::nearest_name;
