@@ -543,7 +543,7 @@ FAULTS = [
      PBRT + "environment::tests::square_mapping_is_inverted"),
     ("small bright sources sampled coarsely", "formats/pbrt/environment.rs", "let radiance = if ⟦has_contrast(column, row)⟧ {", "false",
      PBRT + "environment::tests::small_sources_keep_their_power"),
-    ("paths relative to the included file", "formats/pbrt/parser.rs", "let path = ⟦self.folder.join(&name.text)⟧;",
+    ("paths relative to the included file", "formats/pbrt/parser/mod.rs", "let path = ⟦self.folder.join(&name.text)⟧;",
      "self.open_files[self.open_files.len() - 1].with_file_name(&name.text)",
      PBRT_FACTS + "included_paths_are_relative_to_the_first_file"),
 ]
