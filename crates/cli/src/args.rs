@@ -113,7 +113,7 @@ pub enum Subcommand {
     /// Validate a scene and its files without rendering
     Check {
         /// The scene file
-        #[arg(add = candidates::scene_or_foreign_completer())]
+        #[arg(add = candidates::any_scene_completer())]
         scene: PathBuf,
         /// Override a scene key
         #[arg(long = "set", add = candidates::key_assignment_completer(), value_name = "TABLE.KEY=VALUE")]

@@ -2,7 +2,8 @@
 
 use std::ops::Range;
 
-use super::graph::{Child, Object, ObjectKind, PropertyValue, SpectrumValue};
+use super::graph::{Child, Object, ObjectKind};
+use super::property::{PropertyValue, SpectrumValue};
 use super::reader::{ColorRole, ColorSource, NumberSource, SceneReader, luminance};
 use crate::assets::Companion;
 use crate::formats::foreign::spectra::{

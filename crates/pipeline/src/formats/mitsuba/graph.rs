@@ -4,9 +4,9 @@ use std::cell::Cell;
 use std::collections::HashMap;
 use std::ops::Range;
 
+use super::property::{PropertyValue, SpectrumValue, TransformValue};
 use super::values::{self, ValueError, parse_float, parse_numbers, parse_point, property_name};
 use super::xml::{Attribute, Element, MAX_ERRORS, shorten};
-use crate::formats::foreign::spectra::SampledSpectrum;
 use crate::math::{DMat4, DVec3};
 use crate::scene::SourceFiles;
 use crate::scene::diagnostic::{Diagnostic, Severity};
@@ -105,57 +105,6 @@ pub(super) struct Child {
     pub(super) name: Option<String>,
     pub(super) target: ObjectIndex,
     pub(super) span: Range<usize>,
-}
-
-/// The value of a property.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) enum PropertyValue {
-    Boolean(bool),
-    Integer(i64),
-    Float(f64),
-    Text(String),
-    Vector(DVec3),
-    /// Linear Rec. 709.
-    Rgb(DVec3),
-    Spectrum(SpectrumValue),
-    Transform(TransformValue),
-}
-
-/// A spectrum.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) enum SpectrumValue {
-    /// The same value at all wavelengths.
-    Uniform(f64),
-    /// Values at wavelengths.
-    Sampled(SampledSpectrum),
-    /// The name of a file with wavelengths and values.
-    File(String),
-    /// Temperature of a blackbody in kelvin, and a factor.
-    Blackbody(f64, f64),
-}
-
-/// A transform.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct TransformValue {
-    pub(super) matrix: DMat4,
-    /// The target of the last `lookat`.
-    pub(super) target: Option<DVec3>,
-}
-
-impl PropertyValue {
-    /// The value's type as messages name it.
-    pub(super) fn type_name(&self) -> &'static str {
-        match self {
-            Self::Boolean(_) => "a boolean",
-            Self::Integer(_) => "an integer",
-            Self::Float(_) => "a float",
-            Self::Text(_) => "a string",
-            Self::Vector(_) => "a vector",
-            Self::Rgb(_) => "an RGB color",
-            Self::Spectrum(_) => "a spectrum",
-            Self::Transform(_) => "a transform",
-        }
-    }
 }
 
 impl Object {

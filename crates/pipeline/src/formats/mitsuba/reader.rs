@@ -4,11 +4,10 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use super::bsdfs::MaterialKey;
-use super::graph::{
-    Child, Object, ObjectIndex, ObjectKind, PropertyValue, SceneGraph, SpectrumValue, TransformValue,
-};
+use super::graph::{Child, Object, ObjectIndex, ObjectKind, SceneGraph};
+use super::material_key::MaterialKey;
 use super::plastic::PlasticCoat;
+use super::property::{PropertyValue, SpectrumValue, TransformValue};
 use super::xml::{MAX_ERRORS, shorten};
 use crate::assets::Companion;
 use crate::control::CancelToken;

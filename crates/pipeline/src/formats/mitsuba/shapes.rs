@@ -3,10 +3,10 @@
 use std::path::Path;
 
 use super::graph::{Child, Object, ObjectIndex, ObjectKind};
+use super::material_key::UvConvention;
 use super::placement::{cylinder_matrix, has_normals};
 use super::reader::SceneReader;
 use super::settings::span_of;
-use super::textures::UvConvention;
 use super::xml::shorten;
 use crate::assets::AssetError;
 use crate::control::ignore_progress;

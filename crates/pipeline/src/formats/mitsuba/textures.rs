@@ -1,21 +1,13 @@
 //! Converts textures.
 
 use super::graph::{Object, ObjectIndex, ObjectKind};
+use super::material_key::UvConvention;
 use super::reader::{ColorRole, ColorSource, Entries, SceneReader, luminance};
 use super::settings::span_of;
 use super::xml::shorten;
 use crate::formats::rounding::{shorten as shorten_number, shorten_color};
 use crate::math::{DMat4, DVec3};
 use crate::scene::BuiltValue;
-
-/// How a shape's texture coordinates in glimt differ from Mitsuba's.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-pub(super) struct UvConvention {
-    /// Mitsuba's u is 1 − u.
-    pub(super) flips_u: bool,
-    /// Mitsuba's v is 1 − v.
-    pub(super) flips_v: bool,
-}
 
 /// What a texture is used for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::graph::{PropertyValue, SpectrumValue, TransformValue};
+use super::property::{PropertyValue, SpectrumValue, TransformValue};
 use super::xml::{Attribute, Element, shorten};
 use crate::formats::foreign::spectra::SampledSpectrum;
 use crate::formats::foreign::transform::{look_at_left, rotation_about_raw_axis};

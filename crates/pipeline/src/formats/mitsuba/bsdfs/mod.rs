@@ -4,8 +4,9 @@ mod nested;
 mod surfaces;
 
 use super::graph::{Child, Object, ObjectIndex, ObjectKind};
+use super::material_key::{MaterialKey, UvConvention};
 use super::reader::{ColorRole, ColorSource, Entries, NumberSource, SceneReader, luminance};
-use super::textures::{TextureUse, UvConvention};
+use super::textures::TextureUse;
 use crate::formats::rounding::{shorten as shorten_number, shorten_color};
 use crate::math::DVec3;
 use crate::scene::BuiltValue;
@@ -42,17 +43,6 @@ const KNOWN_BSDFS: [&str; 26] = [
     "irawan",
     "measured",
 ];
-
-/// What a material of the document depends on.
-#[derive(Clone, Debug, PartialEq, Eq, Hash)]
-pub(super) struct MaterialKey {
-    /// The BSDF, or `None` for the default one.
-    pub(super) bsdf: Option<ObjectIndex>,
-    /// The area light of the shape.
-    pub(super) emitter: Option<ObjectIndex>,
-    /// Texture coordinates of the shape. The same for all shapes if the material has no textures.
-    pub(super) uv: UvConvention,
-}
 
 /// Context of a nested BSDF.
 #[derive(Clone, Copy, Debug)]

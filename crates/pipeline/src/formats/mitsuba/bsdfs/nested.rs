@@ -1,7 +1,8 @@
 //! Converts BSDFs that contain other BSDFs.
 
 use super::{BsdfContext, MaterialBuilder};
-use crate::formats::mitsuba::graph::{Child, Object, ObjectIndex, ObjectKind, PropertyValue};
+use crate::formats::mitsuba::graph::{Child, Object, ObjectIndex, ObjectKind};
+use crate::formats::mitsuba::property::PropertyValue;
 use crate::formats::mitsuba::reader::{ColorRole, ColorSource, Entries, NumberSource, SceneReader};
 use crate::formats::mitsuba::textures::TextureUse;
 use crate::formats::mitsuba::xml::shorten;

@@ -4,8 +4,9 @@ use super::{AIR, BsdfContext, MaterialBuilder};
 use crate::choice::Choice;
 use crate::formats::foreign::ior::{dielectric_ior, dielectric_names};
 use crate::formats::foreign::spectra::flat_emission_color;
-use crate::formats::mitsuba::graph::{Object, PropertyValue};
+use crate::formats::mitsuba::graph::Object;
 use crate::formats::mitsuba::plastic::{PlasticCoat, remapped_reflectance};
+use crate::formats::mitsuba::property::PropertyValue;
 use crate::formats::mitsuba::reader::{
     ColorRole, ColorSource, Entries, NumberSource, SceneReader, luminance,
 };
